@@ -1,0 +1,27 @@
+# One place for warnings and sanitizers: bushd_target(<target>) is called for every target of ours.
+function(bushd_target target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+    $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>
+    $<$<BOOL:${BUSHD_WERROR}>:-Werror>)
+  if(BUSHD_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=${BUSHD_SANITIZE} -fno-sanitize-recover=all
+      -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=${BUSHD_SANITIZE})
+  endif()
+endfunction()
+
+# bushd_library(engine SOURCES...) makes the target bushd_engine with the alias bushd::engine.
+# Headers are included by their path below lib/ ("engine/table.h") or below the top ("firmware/core/mcu.h").
+function(bushd_library name)
+  add_library(bushd_${name} STATIC ${ARGN})
+  add_library(bushd::${name} ALIAS bushd_${name})
+  target_include_directories(bushd_${name} PUBLIC ${PROJECT_SOURCE_DIR}/lib ${PROJECT_SOURCE_DIR})
+  bushd_target(bushd_${name})
+endfunction()
+
+# bushd_program(bushtab SOURCES...) makes a program of that name in <build>/bin.
+function(bushd_program name)
+  add_executable(${name} ${ARGN})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/lib ${PROJECT_SOURCE_DIR})
+  bushd_target(${name})
+endfunction()

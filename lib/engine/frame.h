@@ -1,0 +1,63 @@
+// Framing: raw frame = address, type, tag, payload, CRC-16 (low byte first); on the line it is COBS encoded
+// and ended by a zero byte. A raw frame has at most 254 bytes, so COBS costs exactly one byte.
+// CRC-16/IBM-3740: polynomial 0x1021, start 0xFFFF, not reflected; check value 0x29B1.
+#ifndef BUSHD_ENGINE_FRAME_H
+#define BUSHD_ENGINE_FRAME_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "engine/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define BUSHD_FRAME_HEADER 3u
+#define BUSHD_FRAME_CRC 2u
+#define BUSHD_FRAME_MAX_RAW 254u
+#define BUSHD_FRAME_MAX_PAYLOAD (BUSHD_FRAME_MAX_RAW - BUSHD_FRAME_HEADER - BUSHD_FRAME_CRC)
+#define BUSHD_FRAME_MAX_WIRE (BUSHD_FRAME_MAX_RAW + 2u)  // + COBS code byte + delimiter
+#define BUSHD_FRAME_OVERHEAD (BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC + 2u)  // wire bytes - payload
+
+#define BUSHD_ADDRESS_BROADCAST 0u
+#define BUSHD_TYPE_REPLY 0x80u  // set in `type` of everything that an MCU sends
+
+#define BUSHD_CRC16_START 0xFFFFu
+uint16_t bushd_crc16(uint16_t crc, const uint8_t* data, size_t size);
+
+// Encodes one frame into `wire` (BUSHD_FRAME_MAX_WIRE bytes suffice for any); returns the number of
+// bytes including the delimiter. Precondition: payload_size <= BUSHD_FRAME_MAX_PAYLOAD. O(size).
+size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint8_t* payload,
+                          size_t payload_size, uint8_t* wire);
+
+// A decoded frame; `payload` points into the receiver's buffer and lives until the next byte.
+typedef struct bushd_frame {
+  uint8_t address;
+  uint8_t type;
+  uint8_t tag;
+  uint8_t payload_size;
+  const uint8_t* payload;
+} bushd_frame;
+
+// Collects bytes of a line into frames. Zero-initialise it; resynchronises at every delimiter.
+typedef struct bushd_receiver {
+  uint8_t buffer[BUSHD_FRAME_MAX_RAW + 1u];
+  uint16_t size;     // bytes collected; BUSHD_FRAME_MAX_RAW + 2 marks an overlong frame
+} bushd_receiver;
+
+typedef enum bushd_receive {
+  BUSHD_RECEIVE_MORE = 0,    // no frame yet
+  BUSHD_RECEIVE_FRAME = 1,   // *frame holds a frame with a good checksum
+  BUSHD_RECEIVE_BAD_CRC = 2,
+  BUSHD_RECEIVE_BAD_LENGTH = 3  // too long, too short, or broken COBS
+} bushd_receive;
+
+// Feeds one byte. Empty frames (two delimiters in a row) are nothing. O(1), O(frame) at a delimiter.
+bushd_receive bushd_receive_byte(bushd_receiver* receiver, uint8_t byte, bushd_frame* frame);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,350 @@
+// A run is cut once, when it starts, into at most four parts by the rule max(A(j-1), D(N-j), c):
+// a lead (a step taken over in its middle), steps on the accelerating side, steps at cruise, steps
+// on the decelerating side. Both sides are sorted, so A(j-1) - D(N-j) never rises with j and one binary
+// search finds where deceleration takes over; codes not above c count as cruise.
+//
+// State in time is (which step runs, time units since the last step). Advancing by dt:
+//   side with an index   S[i] + since + dt looked up in the prefix sums S: one bucket, one comparison
+//   side without         the codes are walked
+//   cruise               quotient and remainder of dt / c, computed once a block
+#include "engine/run.h"
+
+// First index of a side whose code is <= cruise: from there on the side is cruise.
+static uint32_t codes_above_cruise(const bushd_ramp* ramp, uint16_t cruise) {
+  uint32_t low = 0;
+  uint32_t high = ramp->count;
+  while (low < high) {
+    const uint32_t middle = low + (high - low) / 2;
+    if (ramp->code[middle] <= cruise) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return low;
+}
+
+static void clear(bushd_run* run, const bushd_table* table, int direction) {
+  run->table = table;
+  run->steps_done = 0;
+  run->lead_steps = 0;
+  run->accel_at = 0;
+  run->accel_end = 0;
+  run->cruise_left = 0;
+  run->decel_left = 0;
+  run->since = 0;
+  run->since_ns = 0;
+  run->lead_delay = 0;
+  run->fraction = 0;
+  run->direction = direction < 0 ? -1 : 1;
+}
+
+void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction) {
+  clear(run, table, direction);
+  // The first `rising` steps have A(j-1) >= D(N-j).
+  uint32_t low = 0;
+  uint32_t high = steps;
+  while (low < high) {
+    const uint32_t j = low + (high - low) / 2 + 1;
+    if (bushd_table_accel(table, j - 1) >= bushd_table_decel(table, steps - j)) {
+      low = j;
+    } else {
+      high = j - 1;
+    }
+  }
+  const uint32_t rising = low;
+  const uint32_t accel_codes = codes_above_cruise(&table->accel, table->cruise);
+  const uint32_t decel_codes = codes_above_cruise(&table->decel, table->cruise);
+  run->accel_end = rising < accel_codes ? rising : accel_codes;
+  run->decel_left = steps - rising < decel_codes ? steps - rising : decel_codes;
+  run->cruise_left = steps - run->accel_end - run->decel_left;
+}
+
+static void lead_then_ramp_down(bushd_run* run, uint16_t delay) {
+  run->lead_steps = 1;
+  run->lead_delay = delay;
+  run->accel_at = run->accel_end;
+  run->cruise_left = 0;
+  run->decel_left = bushd_table_steps_to_stop(run->table, delay);
+}
+
+void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
+                               uint8_t fraction, int direction) {
+  clear(run, table, direction);
+  if (delay == 0) return;
+  lead_then_ramp_down(run, delay);
+  run->since = (uint32_t)delay * fraction / 256u;
+  run->fraction = fraction;
+}
+
+void bushd_run_ramp_down(bushd_run* run) {
+  const uint16_t delay = bushd_run_delay(run);
+  if (delay != 0) lead_then_ramp_down(run, delay);
+}
+
+uint16_t bushd_run_delay(const bushd_run* run) {
+  if (run->lead_steps != 0) return run->lead_delay;
+  if (run->accel_at < run->accel_end) return run->table->accel.code[run->accel_at];
+  if (run->cruise_left != 0) return run->table->cruise;
+  if (run->decel_left != 0) return run->table->decel.code[run->decel_left - 1];
+  return 0;
+}
+
+uint32_t bushd_run_steps_left(const bushd_run* run) {
+  return run->lead_steps + (run->accel_end - run->accel_at) + run->cruise_left + run->decel_left;
+}
+
+bool bushd_run_done(const bushd_run* run) { return bushd_run_steps_left(run) == 0; }
+
+static uint64_t units_between(const bushd_ramp* ramp, uint32_t from, uint32_t to) {
+  if (ramp->sum != NULL) return ramp->sum[to] - ramp->sum[from];
+  uint64_t units = 0;
+  for (uint32_t i = from; i < to; ++i) units += ramp->code[i];
+  return units;
+}
+
+uint64_t bushd_run_units_left(const bushd_run* run) {
+  if (bushd_run_done(run)) return 0;
+  const bushd_table* table = run->table;
+  return (uint64_t)run->lead_steps * run->lead_delay +
+         units_between(&table->accel, run->accel_at, run->accel_end) +
+         (uint64_t)run->cruise_left * table->cruise +
+         units_between(&table->decel, 0, run->decel_left) - run->since;
+}
+
+// The greatest i with sum[i] <= units. Precondition: units < sum[count].
+static inline uint32_t look_up(const bushd_ramp* ramp, uint32_t units) {
+  uint32_t i = ramp->bucket[units >> ramp->bucket_shift];
+  i += ramp->sum[i + 1] <= units;
+  while (ramp->sum[i + 1] <= units) ++i;
+  return i;
+}
+
+// Each advance_* lets `since` (already grown by the tick) pay for steps of its part, one after the
+// other, and returns how many it paid for; what is left in `since` belongs to the next part.
+
+static uint32_t advance_accel(bushd_run* run) {
+  const bushd_ramp* ramp = &run->table->accel;
+  uint32_t i = run->accel_at;
+  if (ramp->sum != NULL) {
+    const uint32_t now = ramp->sum[i] + run->since;
+    i = now >= ramp->sum[run->accel_end] ? run->accel_end : look_up(ramp, now);
+    run->since = now - ramp->sum[i];
+  } else {
+    while (i < run->accel_end && run->since >= ramp->code[i]) run->since -= ramp->code[i++];
+  }
+  const uint32_t steps = i - run->accel_at;
+  run->accel_at = i;
+  return steps;
+}
+
+static uint32_t advance_cruise(bushd_run* run) {
+  uint32_t steps = run->since / run->table->cruise;
+  if (steps > run->cruise_left) steps = run->cruise_left;
+  run->since -= steps * run->table->cruise;
+  run->cruise_left -= steps;
+  return steps;
+}
+
+static uint32_t advance_decel(bushd_run* run) {
+  const bushd_ramp* ramp = &run->table->decel;
+  uint32_t left = run->decel_left;
+  if (ramp->sum != NULL) {
+    // sum[left] is the time from the last step made to the end; after `since` of it `remaining` is to
+    // come, and the steps still to be made are the fewest whose time is not less.
+    if (run->since >= ramp->sum[left]) {
+      run->since -= ramp->sum[left];
+      left = 0;
+    } else {
+      const uint32_t remaining = ramp->sum[left] - run->since;
+      left = remaining == ramp->sum[left] ? left : look_up(ramp, remaining);
+      left += ramp->sum[left] < remaining;
+      run->since = ramp->sum[left] - remaining;
+    }
+  } else {
+    while (left > 0 && run->since >= ramp->code[left - 1]) run->since -= ramp->code[--left];
+  }
+  const uint32_t steps = run->decel_left - left;
+  run->decel_left = left;
+  return steps;
+}
+
+// One tick across any borders of parts. `since` has not yet grown by it.
+static uint32_t advance(bushd_run* run, uint32_t units) {
+  uint32_t steps = 0;
+  run->since += units;
+  if (run->lead_steps != 0 && run->since >= run->lead_delay) {
+    run->since -= run->lead_delay;
+    run->lead_steps = 0;
+    ++steps;
+  }
+  if (run->lead_steps == 0 && run->accel_at < run->accel_end) steps += advance_accel(run);
+  if (run->lead_steps == 0 && run->accel_at == run->accel_end) {
+    if (run->cruise_left != 0) steps += advance_cruise(run);
+    if (run->cruise_left == 0 && run->decel_left != 0) steps += advance_decel(run);
+  }
+  return steps;
+}
+
+// A tick in whole units and the rest; `since_ns` collects the rests until they make a unit.
+typedef struct tick_units {
+  uint32_t whole;
+  uint32_t rest_ns;
+  uint32_t unit_ns;
+} tick_units;
+
+static tick_units in_units(const bushd_run* run, uint32_t tick_ns) {
+  const uint32_t unit_ns = run->table->time_unit_ns;
+  const tick_units tick = {tick_ns / unit_ns, tick_ns % unit_ns, unit_ns};
+  return tick;
+}
+
+static inline uint32_t next_units(uint32_t* since_ns, const tick_units* tick) {
+  const uint32_t sum = *since_ns + tick->rest_ns;
+  const bool carry = sum >= tick->unit_ns;
+  *since_ns = carry ? sum - tick->unit_ns : sum;
+  return tick->whole + carry;
+}
+
+static inline uint8_t coarse(uint32_t steps, uint8_t direction_bit) {
+  return (uint8_t)(steps | direction_bit);
+}
+
+// The blocks below expand many ticks inside one part with its state in registers; they stop before
+// a tick that would leave the part, which `advance` then handles. Only coarse ones exist: they are what the
+// host's speed is measured on, and a fine tick is dominated by its division.
+
+static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t ticks, uint8_t* out,
+                                 size_t stride, uint8_t bit) {
+  const bushd_ramp* ramp = &run->table->accel;
+  const uint32_t end = ramp->sum[run->accel_end];
+  const uint32_t* const sum = ramp->sum;
+  uint32_t i = run->accel_at;
+  uint32_t now = sum[i] + run->since;
+  uint32_t since_ns = run->since_ns;
+  size_t n = 0;
+  for (; n < ticks; ++n) {
+    uint32_t next_ns = since_ns;
+    const uint32_t next = now + next_units(&next_ns, tick);
+    if (next >= end) break;
+    const uint32_t at = look_up(ramp, next);
+    out[n * stride] = coarse(at - i, bit);
+    i = at;
+    now = next;
+    since_ns = next_ns;
+  }
+  run->steps_done += i - run->accel_at;
+  run->accel_at = i;
+  run->since = now - sum[i];
+  run->since_ns = since_ns;
+  return n;
+}
+
+static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t ticks, uint8_t* out,
+                                 size_t stride, uint8_t bit) {
+  const bushd_ramp* ramp = &run->table->decel;
+  const uint32_t* const sum = ramp->sum;
+  uint32_t left = run->decel_left;
+  uint32_t remaining = sum[left] - run->since;
+  uint32_t since_ns = run->since_ns;
+  size_t n = 0;
+  for (; n < ticks; ++n) {
+    uint32_t next_ns = since_ns;
+    const uint32_t units = next_units(&next_ns, tick);
+    if (units == 0 || units >= remaining) break;
+    const uint32_t next = remaining - units;
+    uint32_t at = look_up(ramp, next);
+    at += sum[at] < next;
+    out[n * stride] = coarse(left - at, bit);
+    left = at;
+    remaining = next;
+    since_ns = next_ns;
+  }
+  run->steps_done += run->decel_left - left;
+  run->decel_left = left;
+  run->since = sum[left] - remaining;
+  run->since_ns = since_ns;
+  return n;
+}
+
+static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t ticks, uint8_t* out,
+                                  size_t stride, uint8_t bit) {
+  const uint32_t cruise = run->table->cruise;
+  const uint32_t whole = tick->whole / cruise;
+  const uint32_t rest = tick->whole % cruise;
+  // A tick makes at most whole + 2 steps: a unit carried in and a delay carried over.
+  const size_t safe = (size_t)(run->cruise_left / (whole + 2));
+  if (ticks > safe) ticks = safe;
+  uint32_t since = run->since;
+  uint32_t since_ns = run->since_ns;
+  uint32_t steps = 0;
+  if (since >= cruise) return 0;
+  for (size_t n = 0; n < ticks; ++n) {
+    const uint32_t sum = since_ns + tick->rest_ns;
+    const bool unit = sum >= tick->unit_ns;
+    since_ns = unit ? sum - tick->unit_ns : sum;
+    // since <= cruise - 1, rest <= cruise - 1, unit <= 1: below 2 cruise, so one subtraction is enough.
+    const uint32_t units = since + rest + unit;
+    const bool more = units >= cruise;
+    since = more ? units - cruise : units;
+    const uint32_t made = whole + more;
+    steps += made;
+    out[n * stride] = coarse(made, bit);
+  }
+  run->since = since;
+  run->since_ns = since_ns;
+  run->cruise_left -= steps;
+  run->steps_done += steps;
+  return ticks;
+}
+
+static size_t coarse_block(bushd_run* run, const tick_units* tick, size_t ticks, uint8_t* out,
+                           size_t stride, uint8_t bit) {
+  if (run->lead_steps != 0) return 0;
+  if (run->accel_at < run->accel_end) {
+    if (run->table->accel.sum == NULL) return 0;
+    return coarse_accel_block(run, tick, ticks, out, stride, bit);
+  }
+  if (run->cruise_left != 0) return coarse_cruise_block(run, tick, ticks, out, stride, bit);
+  if (run->decel_left == 0 || run->table->decel.sum == NULL) return 0;
+  return coarse_decel_block(run, tick, ticks, out, stride, bit);
+}
+
+size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, uint8_t* out,
+                               size_t stride) {
+  const tick_units tick = in_units(run, tick_ns);
+  const uint8_t bit = run->direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
+  size_t n = 0;
+  while (n < ticks && !bushd_run_done(run)) {
+    n += coarse_block(run, &tick, ticks - n, out + n * stride, stride, bit);
+    if (n == ticks) break;
+    const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
+    run->steps_done += steps;
+    out[n++ * stride] = coarse(steps, bit);
+  }
+  const size_t active = n;
+  for (; n < ticks; ++n) out[n * stride] = 0;
+  return active;
+}
+
+size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int16_t* out,
+                             size_t stride) {
+  const tick_units tick = in_units(run, tick_ns);
+  size_t n = 0;
+  while (n < ticks && !bushd_run_done(run)) {
+    const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
+    run->steps_done += steps;
+    uint32_t fraction = 0;
+    const uint16_t delay = bushd_run_delay(run);
+    if (delay != 0) {
+      const uint64_t elapsed_ns = (uint64_t)run->since * tick.unit_ns + run->since_ns;
+      fraction = (uint32_t)(elapsed_ns * 256u / ((uint64_t)delay * tick.unit_ns));
+    }
+    const int32_t displacement = (int32_t)(steps * 256u + fraction) - (int32_t)run->fraction;
+    run->fraction = (uint8_t)fraction;
+    out[n++ * stride] = (int16_t)(displacement * run->direction);
+  }
+  const size_t active = n;
+  for (; n < ticks; ++n) out[n * stride] = 0;
+  return active;
+}

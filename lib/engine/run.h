@@ -1,0 +1,78 @@
+// A running move: the table's step times turned into displacements per tick.
+//
+// Step j of a run falls at the sum of its first j delays (engine/table.h). A motor's position at the
+// end of a tick counts every step whose time is <= that end; the fine format adds the elapsed share
+// of the running delay, rounded down to 1/256 step. A displacement is the difference of two such
+// positions. All in integers; nothing is lost over any number of ticks, calls or block sizes.
+#ifndef BUSHD_ENGINE_RUN_H
+#define BUSHD_ENGINE_RUN_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "engine/table.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Coarse displacement, the byte of RU 2704486: bit 7 direction (1 = positive), bits 6..0 steps.
+// Fine displacement: int16, steps x 256, signed. Both hold at most 127 steps a tick.
+#define BUSHD_MAX_STEPS_PER_TICK 127u
+#define BUSHD_COARSE_DIRECTION 0x80u
+
+// Plain state, copyable: a copy taken at some tick replays the same ticks. Private to run.c but for
+// the fields named here: `direction` (+1 / -1), `steps_done`.
+typedef struct bushd_run {
+  const bushd_table* table;
+  uint32_t steps_done;
+  uint32_t lead_steps;   // 0 or 1: a step with a delay of its own (`lead_delay`), before all others
+  uint32_t accel_at;     // next index on the accelerating side
+  uint32_t accel_end;    // and where that part ends
+  uint32_t cruise_left;  // steps left at the cruise delay
+  uint32_t decel_left;   // steps left on the decelerating side
+  uint32_t since;        // whole time units since the last step
+  uint32_t since_ns;     // and the rest, < time_unit_ns
+  uint16_t lead_delay;
+  uint8_t fraction;      // of the position at the end of the last fine tick, 1/256 step
+  int8_t direction;
+} bushd_run;
+
+// A move of `steps` (>= 0) from rest; direction is +1 or -1. The first tick expanded is the one in
+// which the move starts at its beginning. O(log steps).
+// Precondition: the table passed bushd_table_check.
+void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction);
+
+// A ramp-down taken up in the middle of a step whose delay is `delay`, of which fraction/256 is over:
+// that step, then D(k-1) .. D(0). It is what an MCU runs when its queue ends early. O(log count).
+void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
+                               uint8_t fraction, int direction);
+
+// Shortens the run to the nearest end that its table allows: the running step is completed, then
+// the fewest steps k with D(k) <= its delay. Does nothing to a run that is done. O(log count).
+void bushd_run_ramp_down(bushd_run* run);
+
+// The next `ticks` displacements of `tick_ns` each into out[0], out[stride], ... ; after the end of the
+// run they are 0. Returns the number of ticks in which the run was still active (<= ticks), so
+// a return value below `ticks` says that it has ended. O(1) amortised per tick.
+// Precondition: bushd_table_max_steps_per_tick(table, tick_ns) <= BUSHD_MAX_STEPS_PER_TICK, and a run
+// uses one tick length and one format throughout.
+size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, uint8_t* out,
+                               size_t stride);
+size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int16_t* out,
+                             size_t stride);
+
+// The delay of the step that is running, time units; 0 when the run is done. O(1).
+uint16_t bushd_run_delay(const bushd_run* run);
+bool bushd_run_done(const bushd_run* run);
+// Steps still to be made. O(1).
+uint32_t bushd_run_steps_left(const bushd_run* run);
+// Time from now to the last step, in time units and rounded up. O(steps left on the ramps) without an
+// index, else O(1).
+uint64_t bushd_run_units_left(const bushd_run* run);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,37 @@
+// From a displacement to the slots in which its steps fall.
+//
+// A tick is cut into S slots. A motor's exact position moves linearly through the tick; a step is made
+// in the slot in which it crosses the next whole number. Coarse displacements are the same thing with
+// the crossing half a step earlier, which spaces c steps evenly: step i at slot (2i+1)S/2c.
+#ifndef BUSHD_ENGINE_SLOTS_H
+#define BUSHD_ENGINE_SLOTS_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define BUSHD_MIN_SLOTS 128u
+#define BUSHD_MAX_SLOTS 256u
+
+// Where in a step the crossing lies, in 1/256 step from the last whole position.
+#define BUSHD_CROSSING_FINE 256
+#define BUSHD_CROSSING_COARSE 128
+
+// Sets `bit` in the masks of the slots in which the motor steps during one tick.
+//   masks         slot_count entries (BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS)
+//   displacement  steps x 256, |displacement| <= 256 x slot_count (then no two steps share a slot)
+//   remainder     exact position minus steps made, 1/256 step, kept by the caller from tick to tick
+//   crossing      BUSHD_CROSSING_FINE or BUSHD_CROSSING_COARSE
+// Returns the signed number of steps. O(steps), two divisions, no division per step.
+int16_t bushd_slots_add(uint16_t* masks, uint16_t slot_count, uint16_t bit, int16_t displacement,
+                        int16_t* remainder, int16_t crossing);
+
+// The coarse byte as a fine displacement: steps x 256, signed by bit 7.
+int16_t bushd_coarse_to_fine(uint8_t coarse);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

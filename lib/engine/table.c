@@ -1,0 +1,120 @@
+#include "engine/table.h"
+
+#include <stddef.h>
+
+static bushd_status check_ramp(const bushd_ramp* ramp, uint32_t* bad_index) {
+  uint32_t sum = 0;
+  *bad_index = 0;
+  if (ramp->code == NULL || ramp->count == 0) return BUSHD_E_TABLE_EMPTY;
+  for (uint32_t i = 0; i < ramp->count; ++i) {
+    *bad_index = i;
+    if (ramp->code[i] == 0) return BUSHD_E_TABLE_ZERO;
+    if (i > 0 && ramp->code[i] > ramp->code[i - 1]) return BUSHD_E_TABLE_UNSORTED;
+    // One tick (at most 2^16 units of slack) is added to sums while a run advances: keep clear of 2^32.
+    if (sum > UINT32_MAX / 2 - ramp->code[i]) return BUSHD_E_TABLE_TOO_LONG;
+    sum += ramp->code[i];
+  }
+  return BUSHD_OK;
+}
+
+bushd_status bushd_table_check(const bushd_table* table, uint32_t* bad_index, bool* bad_decel) {
+  uint32_t index = 0;
+  bool decel = false;
+  bushd_status status = check_ramp(&table->accel, &index);
+  if (status == BUSHD_OK) {
+    decel = true;
+    status = check_ramp(&table->decel, &index);
+  }
+  if (status == BUSHD_OK && (table->cruise == 0 || table->time_unit_ns == 0)) {
+    status = BUSHD_E_TABLE_ZERO;
+  }
+  if (bad_index != NULL) *bad_index = index;
+  if (bad_decel != NULL) *bad_decel = decel;
+  return status;
+}
+
+uint16_t bushd_table_accel(const bushd_table* table, uint32_t i) {
+  return i < table->accel.count ? table->accel.code[i] : table->cruise;
+}
+
+uint16_t bushd_table_decel(const bushd_table* table, uint32_t i) {
+  return i < table->decel.count ? table->decel.code[i] : table->cruise;
+}
+
+uint16_t bushd_table_delay(const bushd_table* table, uint32_t j, uint32_t n) {
+  uint16_t delay = table->cruise;
+  const uint16_t accel = bushd_table_accel(table, j - 1);
+  const uint16_t decel = bushd_table_decel(table, n - j);
+  if (accel > delay) delay = accel;
+  if (decel > delay) delay = decel;
+  return delay;
+}
+
+uint32_t bushd_table_steps_to_stop(const bushd_table* table, uint16_t delay) {
+  // D(k) never rises with k, and is the cruise delay from `count` on: binary search for the first
+  // D(k) <= delay. A delay below cruise cannot be running; the whole side is then the honest answer.
+  uint32_t low = 0;
+  uint32_t high = table->decel.count;
+  while (low < high) {
+    const uint32_t middle = low + (high - low) / 2;
+    if (table->decel.code[middle] <= delay) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return low;
+}
+
+uint16_t bushd_table_fastest(const bushd_table* table) {
+  // Every delay is a maximum with the cruise delay, and a long move reaches it.
+  return table->cruise;
+}
+
+uint32_t bushd_table_max_steps_per_tick(const bushd_table* table, uint32_t tick_ns) {
+  // Steps at the shortest delay x: a stretch of length T holds at most floor(T / x) + 1 of them.
+  const uint64_t shortest_ns = (uint64_t)bushd_table_fastest(table) * table->time_unit_ns;
+  const uint64_t steps = tick_ns / shortest_ns + 1;
+  return steps > UINT32_MAX ? UINT32_MAX : (uint32_t)steps;
+}
+
+uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp) { return ramp->count + 1; }
+
+// Buckets no wider than the shortest delay hold at most one step each, so that a look-up needs one
+// comparison. A table with a huge spread of delays would need too many: then they are wider, up to
+// about eight entries a code, and the look-up takes a few comparisons more.
+static uint8_t bucket_shift(const bushd_ramp* ramp, uint32_t total) {
+  uint8_t shift = 0;
+  while ((2u << shift) <= ramp->code[ramp->count - 1]) ++shift;
+  while ((total >> shift) / 8 > ramp->count + 8) ++shift;
+  return shift;
+}
+
+static uint32_t total_units(const bushd_ramp* ramp) {
+  uint32_t total = 0;
+  for (uint32_t i = 0; i < ramp->count; ++i) total += ramp->code[i];
+  return total;
+}
+
+uint32_t bushd_ramp_bucket_entries(const bushd_ramp* ramp) {
+  const uint32_t total = total_units(ramp);
+  return (total >> bucket_shift(ramp, total)) + 1;
+}
+
+void bushd_ramp_index(bushd_ramp* ramp, uint32_t* sum, uint32_t* bucket) {
+  uint32_t total = 0;
+  for (uint32_t i = 0; i < ramp->count; ++i) {
+    sum[i] = total;
+    total += ramp->code[i];
+  }
+  sum[ramp->count] = total;
+  const uint8_t shift = bucket_shift(ramp, total);
+  uint32_t i = 0;
+  for (uint32_t b = 0; b <= total >> shift; ++b) {
+    while (i < ramp->count && sum[i + 1] <= b << shift) ++i;
+    bucket[b] = i;
+  }
+  ramp->sum = sum;
+  ramp->bucket = bucket;
+  ramp->bucket_shift = shift;
+}

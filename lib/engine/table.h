@@ -1,0 +1,72 @@
+// Acceleration tables and the delay rule.
+//
+// A table holds delays in whole time units. A delay stands *before* its step. With A(i) the i-th
+// delay from rest, D(i) the delay i steps before the end and c the cruise delay,
+//
+//     delay before step j of N  =  max( A(j-1), D(N-j), c ),   j = 1 .. N        (the BUSHD rule)
+//
+// where A(i) = c for i >= the length of the accelerating side, D likewise (JINR P10-85-635, figure 4:
+// mode 1 and mode 2 of BUSHD-2 are the short and the long case of this one formula).
+#ifndef BUSHD_ENGINE_TABLE_H
+#define BUSHD_ENGINE_TABLE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "engine/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// One side of a table, ordered from slow to fast: code[0] is the delay next to rest.
+// The three index arrays are optional (all set or all NULL): with them a run finds its place in a
+// ramp in constant time (bushd_ramp_index makes them); without, it walks the codes. Results agree.
+typedef struct bushd_ramp {
+  const uint16_t* code;    // `count` delays in time units, 1..65535, never rising
+  uint32_t count;          // >= 1
+  const uint32_t* sum;     // count + 1 entries: sum[i] = code[0] + ... + code[i-1]
+  const uint32_t* bucket;  // entry b: the greatest i with sum[i] <= b << bucket_shift
+  uint8_t bucket_shift;
+} bushd_ramp;
+
+// A view of a table; the caller owns all memory and keeps it alive and unchanged while a run uses it.
+typedef struct bushd_table {
+  bushd_ramp accel;       // A(i) = accel.code[i]
+  bushd_ramp decel;       // D(i) = decel.code[i]: i counts steps before the end (a file lists it reversed)
+  uint16_t cruise;        // c, time units, >= 1
+  uint32_t time_unit_ns;  // >= 1
+} bushd_table;
+
+// Checks all that a run relies on: no empty side, no zero, sides never rising, sums within 32 bits.
+// On error *bad_index (may be NULL) is the index, from slow to fast, of the offending code and
+// *bad_decel (may be NULL) tells its side. O(count).
+bushd_status bushd_table_check(const bushd_table* table, uint32_t* bad_index, bool* bad_decel);
+
+// A(i), D(i) and the delay before step j of N (1 <= j <= N), in time units. O(1).
+uint16_t bushd_table_accel(const bushd_table* table, uint32_t i);
+uint16_t bushd_table_decel(const bushd_table* table, uint32_t i);
+uint16_t bushd_table_delay(const bushd_table* table, uint32_t j, uint32_t n);
+
+// The fewest steps k with D(k) <= delay: after a step made at `delay` a ramp-down takes k more steps,
+// with the delays D(k-1) .. D(0). O(log count).
+uint32_t bushd_table_steps_to_stop(const bushd_table* table, uint16_t delay);
+
+// The shortest delay that any move with this table can have, in time units. O(1).
+uint16_t bushd_table_fastest(const bushd_table* table);
+
+// Upper bound of the steps within any stretch of `tick_ns`; saturates at UINT32_MAX. O(1).
+uint32_t bushd_table_max_steps_per_tick(const bushd_table* table, uint32_t tick_ns);
+
+// Memory for the index of a ramp: entries needed for `sum` and `bucket`. O(1) and O(count).
+uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp);
+uint32_t bushd_ramp_bucket_entries(const bushd_ramp* ramp);
+
+// Fills the caller's arrays (of at least the sizes above) and hangs them into `ramp`.
+// Precondition: the ramp passed bushd_table_check. O(count).
+void bushd_ramp_index(bushd_ramp* ramp, uint32_t* sum, uint32_t* bucket);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
