@@ -1,0 +1,94 @@
+// bushd.toml (docs/configuration.md): which motor hangs on which output of which MCU on which bus, and
+// which table it runs. A Config that exists is consistent: every index below is valid, no output is used
+// twice, every table is slow enough for its bus's tick and no line is asked for more than it can carry.
+#pragma once
+
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "engine/message.h"
+#include "tables/table.h"
+
+namespace bushd::config {
+
+// Positions in the vectors of Config, and what is on the wire. Each its own type: a mix-up moves the
+// wrong motor.
+struct BusIndex {
+  std::size_t value = 0;
+  auto operator<=>(const BusIndex&) const = default;
+};
+struct McuIndex {
+  std::size_t value = 0;
+  auto operator<=>(const McuIndex&) const = default;
+};
+struct GroupIndex {
+  std::size_t value = 0;
+  auto operator<=>(const GroupIndex&) const = default;
+};
+struct McuAddress {
+  std::uint8_t value = 0;  // 1..255
+  auto operator<=>(const McuAddress&) const = default;
+};
+struct Output {
+  std::uint8_t value = 0;  // 0..15
+  auto operator<=>(const Output&) const = default;
+};
+
+struct Lcm {
+  std::string url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string prefix = "BUSHD";
+};
+
+struct Bus {
+  std::string name;
+  std::string port;          // as written in the file
+  std::uint32_t baud = 0;    // one of libserial's fixed rates
+  std::uint32_t tick_us = 0;
+  bushd_format format = BUSHD_FORMAT_FINE;
+
+  std::uint32_t tick_ns() const { return tick_us * 1000u; }
+};
+
+struct Mcu {
+  BusIndex bus;
+  McuAddress address;
+  std::string id;  // "hall:1"
+};
+
+struct Group {
+  std::string name;
+  tables::TablePtr table;  // never null; groups with the same table share it
+};
+
+struct Motor {
+  std::string name;
+  McuIndex mcu;
+  Output output;
+  GroupIndex group;
+};
+
+struct Config {
+  std::string path;
+  Lcm lcm;
+  // In the order of the file.
+  std::vector<Bus> buses;
+  std::vector<Mcu> mcus;
+  std::vector<Group> groups;
+  std::vector<Motor> motors;
+
+  const Bus& bus_of(const Mcu& mcu) const { return buses[mcu.bus.value]; }
+  const Mcu& mcu_of(const Motor& motor) const { return mcus[motor.mcu.value]; }
+  const Group& group_of(const Motor& motor) const { return groups[motor.group.value]; }
+  const Bus& bus_of(const Motor& motor) const { return bus_of(mcu_of(motor)); }
+  const tables::Table& table_of(const Motor& motor) const { return *group_of(motor).table; }
+};
+
+// Reads the file and the tables it names; the first thing that is wrong is the error.
+Result<Config> load(const std::filesystem::path& path);
+
+}  // namespace bushd::config

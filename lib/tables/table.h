@@ -1,0 +1,71 @@
+// A table in memory: what a table file says, checked, with the index that makes the host fast.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "engine/table.h"
+
+namespace bushd::tables {
+
+// An MCU addresses the codes of a table, both sides together, by 16 bits.
+inline constexpr std::size_t kMaxCodes = 65535;
+// One second: above it nothing can be told apart any more, and the engine's sums of two rests fit 32 bits.
+inline constexpr std::uint32_t kMaxTimeUnitNs = 1'000'000'000;
+inline constexpr std::size_t kMaxNameLength = 63;
+
+// What a table file holds, in the file's order.
+struct TableContent {
+  std::string name{};
+  std::uint32_t time_unit_ns = 0;
+  std::vector<std::uint16_t> accel{};                         // slow to fast
+  std::optional<std::vector<std::uint16_t>> decel{};          // fast to slow; none: accel reversed
+  std::optional<std::uint16_t> cruise{};                      // none: the last of accel
+  std::string description{};
+};
+
+// Immutable, so it may be shared by motors and threads. Not copyable: view() points into it.
+class Table {
+ public:
+  Table(const Table&) = delete;
+  Table& operator=(const Table&) = delete;
+
+  // Valid as long as this object; passed bushd_table_check, and both sides are indexed. If
+  // symmetric(), both sides are the same arrays.
+  const bushd_table& view() const { return view_; }
+  const std::string& name() const { return name_; }
+  const std::string& description() const { return description_; }
+  const std::string& path() const { return path_; }  // empty: not from a file
+  bool symmetric() const { return view_.decel.code == view_.accel.code; }
+
+ private:
+  friend Result<std::shared_ptr<const Table>> make(TableContent content, std::string path);
+
+  struct Side {
+    std::vector<std::uint16_t> code;
+    std::vector<std::uint32_t> sum;
+    std::vector<std::uint32_t> bucket;
+    bushd_ramp index();
+  };
+
+  Table() = default;
+
+  std::string name_;
+  std::string description_;
+  std::string path_;
+  Side accel_;
+  Side decel_;  // empty if symmetric
+  bushd_table view_{};
+};
+
+using TablePtr = std::shared_ptr<const Table>;
+
+// Checks and indexes. An error's key names the offending element as in a file (`accel[17]`).
+Result<TablePtr> make(TableContent content, std::string path = {});
+
+}  // namespace bushd::tables

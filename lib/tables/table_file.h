@@ -1,0 +1,29 @@
+// Table files (docs/tables.md). Every refusal names file, line, key, cause and what is allowed.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "tables/table.h"
+
+namespace bushd::tables {
+
+Result<TablePtr> load(const std::filesystem::path& path);
+
+// `path` is only what errors and Table::path() say.
+Result<TablePtr> parse(std::string_view text, const std::string& path);
+
+// The path of the first NAME.toml in `directories`; the error lists where it was looked for. Names that
+// lead elsewhere (with '/' or a leading '.') are refused.
+Result<std::filesystem::path> find(std::string_view name,
+                                   std::span<const std::filesystem::path> directories);
+
+// Where the tables that come with bushd lie: $BUSHD_TABLES_DIR if set, else the source tree of a
+// development build, then the installed ones.
+std::vector<std::filesystem::path> shipped_directories();
+
+}  // namespace bushd::tables
