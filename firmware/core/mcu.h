@@ -51,14 +51,14 @@ typedef struct bushd_mcu_motor {
   int8_t table;             // table slot, -1: none
   bool running_down;        // `run` is a ramp-down after the queue ended early
   uint16_t delay;           // of the running step when the queued ticks end; 0: at rest there
-  uint32_t known_until;     // first tick for which nothing is queued
+  uint32_t known_until;     // first tick for which nothing is queued; always > tick + 1 once prepared
   bushd_run run;
 } bushd_mcu_motor;
 
 typedef struct bushd_mcu_table {
   bool valid;
   uint16_t first;        // of its codes, in code memory
-  uint16_t expected;     // codes announced
+  uint16_t count;        // codes announced, both sides
   uint16_t received;
   bushd_table table;
 } bushd_mcu_table;
@@ -74,8 +74,9 @@ typedef struct bushd_mcu {
   uint8_t flags;
   uint8_t epoch;
   bushd_format format;
+  uint8_t front;       // plane[front] is being emitted
+  uint8_t settling;    // ticks until the tick timer has carried out the last jump; marks are void till then
   uint8_t mark_tag;
-  bool mark_valid;     // a mark was heard since the tick counter was last set
   uint32_t mark_tick;
   uint32_t mark_ns;
   uint16_t bad_frames;
@@ -83,7 +84,7 @@ typedef struct bushd_mcu {
   uint8_t last_rejection;
   uint16_t direction;  // DIR levels of the plane prepared last
   uint16_t codes_used;
-  bushd_plane plane[2];  // plane[tick & 1] is being emitted
+  bushd_plane plane[2];
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];
   bushd_receiver receiver;

@@ -37,7 +37,7 @@ typedef enum bushd_type {
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its tag and the MCU's address.
 
 typedef enum bushd_state {
-  BUSHD_STATE_BUSY = 0,   // booted; not yet configured and in step with the bus
+  BUSHD_STATE_BUSY = 0,   // takes no moves yet: not configured, not in step with the bus, or EN is low
   BUSHD_STATE_READY = 1,  // all motors at rest
   BUSHD_STATE_RUN = 2,    // a motor moves
   BUSHD_STATE_FAULT = 3   // a fault is latched
@@ -52,7 +52,8 @@ enum {
 enum {
   BUSHD_FLAG_ENABLED = 1 << 0,     // EN is high
   BUSHD_FLAG_SYNCED = 1 << 1,      // the tick counter is the bus's
-  BUSHD_FLAG_CONFIGURED = 1 << 2   // tick and format are set
+  BUSHD_FLAG_CONFIGURED = 1 << 2,  // tick and format are set
+  BUSHD_FLAG_MARK = 1 << 3         // mark_* of the report are valid
 };
 
 typedef enum bushd_format { BUSHD_FORMAT_COARSE = 0, BUSHD_FORMAT_FINE = 1 } bushd_format;

@@ -1,0 +1,130 @@
+// The tick queue. Per motor, everything before `known_until` is decided: queued, or known to be rest. A
+// frame is taken whole or not at all:
+//   ordinary      of the MCU's epoch; for a motor that moves at known_until it must join (no gap), ticks before
+//                 known_until are duplicates and left alone; for a motor at rest there it must not begin before it
+//   replacement   of epoch + 1; from its first tick on it stands instead of what was queued
+#include <string.h>
+
+#include "firmware/core/internal.h"
+
+void bushd_mcu_clear_streams(bushd_mcu* mcu) {
+  memset(mcu->config.queue, 0,
+         (size_t)mcu->config.queue_ticks * mcu->config.motors * sizeof mcu->config.queue[0]);
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    mcu->motor[m].known_until = FIRST_OPEN(mcu);
+    mcu->motor[m].delay = 0;
+    mcu->motor[m].running_down = false;
+  }
+}
+
+static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks,
+                                bool replace, bool* news) {
+  if (m >= mcu->config.motors) return BUSHD_E_FORMAT;
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  if (motor->table < 0) return BUSHD_E_NO_TABLE;
+  const int32_t first = ticks_after(ticks->first_tick, motor->known_until);
+  const bool at_rest = motor->delay == 0;
+  if (!at_rest && first > 0) return BUSHD_E_GAP;
+  if (replace) {
+    *news = true;
+    return ticks_after(ticks->first_tick, FIRST_OPEN(mcu)) < 0 ? BUSHD_E_LATE : BUSHD_OK;
+  }
+  if (first + ticks->count <= 0) return BUSHD_OK;
+  if (at_rest && first < 0) return BUSHD_E_LATE;
+  *news = true;
+  return BUSHD_OK;
+}
+
+static bushd_status check_ticks(const bushd_mcu* mcu, const bushd_ticks* ticks) {
+  const bool replace = (ticks->flags & BUSHD_TICKS_REPLACE) != 0;
+  const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
+  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
+  if (fine != (mcu->format == BUSHD_FORMAT_FINE)) return BUSHD_E_FORMAT;
+  if (replace && ticks->delays == NULL) return BUSHD_E_FORMAT;
+  if (ticks->epoch != (uint8_t)(mcu->epoch + (replace ? 1u : 0u))) return BUSHD_E_EPOCH;
+  // The queue holds the ticks after the one prepared; an old frame may lie far back.
+  const int32_t last = ticks_after(ticks->first_tick, mcu->tick) + ticks->count - 1;
+  if (last > (int32_t)mcu->config.queue_ticks) return BUSHD_E_CAPACITY;
+  bool news = false;
+  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((ticks->mask & motor_bit(m)) == 0) continue;
+    const bushd_status status = check_motor(mcu, m, ticks, replace, &news);
+    if (status != BUSHD_OK) return status;
+  }
+  return news ? BUSHD_OK : BUSHD_E_LATE;
+}
+
+static int16_t displacement_at(const bushd_ticks* ticks, uint8_t row, uint8_t column) {
+  const uint16_t index = (uint16_t)(row * ticks->motors + column);
+  if (ticks->flags & BUSHD_TICKS_FINE) return bushd_get_i16(ticks->displacements + 2u * index);
+  return bushd_coarse_to_fine(ticks->displacements[index]);
+}
+
+bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
+  const bushd_status status = check_ticks(mcu, ticks);
+  if (status != BUSHD_OK) return status;
+  const uint32_t end = ticks->first_tick + ticks->count;
+  uint8_t column = 0;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if ((ticks->mask & motor_bit(m)) == 0) continue;
+    bushd_mcu_motor* motor = &mcu->motor[m];
+    if (ticks->flags & BUSHD_TICKS_REPLACE) {
+      while (ticks_after(motor->known_until, ticks->first_tick) > 0) {
+        *queue_at(mcu, --motor->known_until, m) = 0;
+      }
+    }
+    if (ticks_after(end, motor->known_until) > 0) {
+      for (uint8_t row = 0; row < ticks->count; ++row) {
+        const uint32_t tick = ticks->first_tick + row;
+        if (ticks_after(tick, motor->known_until) >= 0) {
+          *queue_at(mcu, tick, m) = displacement_at(ticks, row, column);
+        }
+      }
+      motor->known_until = end;
+      if (ticks->delays != NULL) motor->delay = bushd_get_u16(ticks->delays + 2u * column);
+    }
+    ++column;
+  }
+  if (ticks->flags & BUSHD_TICKS_REPLACE) mcu->epoch = ticks->epoch;
+  return BUSHD_OK;
+}
+
+static void start_running_down(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  const int direction = mcu->direction & motor_bit(m) ? 1 : -1;
+  // In the fine format the remainder is the elapsed share of the running delay; in the coarse one that share is
+  // unknown, and taking it as 0 makes the next step late rather than early.
+  const int32_t progress = (int32_t)motor->remainder * direction;
+  const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
+  bushd_run_start_ramp_down(&motor->run, &mcu->table[motor->table].table, motor->delay, fraction,
+                            direction);
+  motor->delay = 0;
+  motor->running_down = true;
+  mcu->faults |= BUSHD_FAULT_LINK;
+}
+
+static int16_t run_down(bushd_mcu* mcu, bushd_mcu_motor* motor) {
+  int16_t displacement = 0;
+  if (mcu->format == BUSHD_FORMAT_FINE) {
+    bushd_run_expand_fine(&motor->run, mcu->tick_ns, 1, &displacement, 1);
+  } else {
+    uint8_t counts = 0;
+    bushd_run_expand_coarse(&motor->run, mcu->tick_ns, 1, &counts, 1);
+    displacement = bushd_coarse_to_fine(counts);
+  }
+  motor->running_down = !bushd_run_done(&motor->run);
+  return displacement;
+}
+
+int16_t bushd_mcu_next_displacement(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  if (ticks_after(motor->known_until, tick) > 0) {
+    int16_t* const queued = queue_at(mcu, tick, m);
+    const int16_t displacement = *queued;
+    *queued = 0;
+    return displacement;
+  }
+  motor->known_until = tick + 1u;
+  if (motor->delay != 0) start_running_down(mcu, m);
+  return motor->running_down ? run_down(mcu, motor) : 0;
+}

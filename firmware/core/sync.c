@@ -1,0 +1,59 @@
+// The tick counter against the bus's. A SYNC frame's end is a mark that all MCUs hear at once; the next SYNC
+// tells when, in bus time, the mark before was. The difference to the own time of that mark is the error.
+//
+// Not yet in step: the counter jumps, and the rest of the difference is made up by lengthening one tick (a
+// timer can always wait longer, but not go back). In step: the next tick is made longer or shorter by the error, at
+// most by 1/64 tick a time, so that no step shifts by more.
+#include "firmware/core/internal.h"
+
+#define MAX_ERROR_DIVISOR 8
+#define MAX_SLEW_DIVISOR 64
+
+static void adopt(bushd_mcu* mcu, const bushd_sync* sync) {
+  const int32_t tick_ns = (int32_t)mcu->tick_ns;
+  int32_t behind_ns = (int32_t)sync->mark_ns - (int32_t)mcu->mark_ns;
+  mcu->tick += sync->mark_tick - mcu->mark_tick;
+  if (behind_ns > 0) {
+    behind_ns -= tick_ns;
+    ++mcu->tick;
+  }
+  mcu->port.adjust_tick(mcu->port.context, -behind_ns);
+  bushd_mcu_clear_streams(mcu);
+  mcu->settling = 3;
+  mcu->flags = (uint8_t)((mcu->flags | BUSHD_FLAG_SYNCED) & ~BUSHD_FLAG_MARK);
+}
+
+static void correct(bushd_mcu* mcu, const bushd_sync* sync) {
+  const int32_t tick_ns = (int32_t)mcu->tick_ns;
+  const int32_t ticks = ticks_after(sync->mark_tick, mcu->mark_tick);
+  if (ticks >= -1 && ticks <= 1) {
+    const int32_t behind_ns = ticks * tick_ns + (int32_t)sync->mark_ns - (int32_t)mcu->mark_ns;
+    if (behind_ns <= tick_ns / MAX_ERROR_DIVISOR && behind_ns >= -tick_ns / MAX_ERROR_DIVISOR) {
+      const int32_t slew = tick_ns / MAX_SLEW_DIVISOR;
+      const int32_t step = behind_ns > slew ? slew : behind_ns < -slew ? -slew : behind_ns;
+      if (step != 0) mcu->port.adjust_tick(mcu->port.context, -step);
+      return;
+    }
+  }
+  if (bushd_mcu_moving(mcu) != 0) {
+    mcu->faults |= BUSHD_FAULT_SYNC;
+  } else {
+    adopt(mcu, sync);
+  }
+}
+
+void bushd_mcu_sync(bushd_mcu* mcu, uint8_t tag, const bushd_sync* sync, uint32_t time_in_tick_ns) {
+  if ((mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return;
+  const bool known = sync->follows && (mcu->flags & BUSHD_FLAG_MARK) != 0 &&
+                     mcu->mark_tag == sync->mark_tag && sync->mark_ns < mcu->tick_ns;
+  if (known && (mcu->flags & BUSHD_FLAG_SYNCED) != 0) {
+    correct(mcu, sync);
+  } else if (known && bushd_mcu_moving(mcu) == 0) {
+    adopt(mcu, sync);
+  }
+  if (mcu->settling != 0) return;
+  mcu->flags |= BUSHD_FLAG_MARK;
+  mcu->mark_tag = tag;
+  mcu->mark_tick = mcu->tick;
+  mcu->mark_ns = time_in_tick_ns;
+}

@@ -1,0 +1,87 @@
+// Table memory: the tables' codes lie one behind the other; a table that is sent anew first gives its place back.
+#include <string.h>
+
+#include "firmware/core/internal.h"
+
+static void locate_codes(const bushd_mcu* mcu, bushd_mcu_table* entry) {
+  const uint16_t* codes = mcu->config.codes + entry->first;
+  const bool symmetric = entry->table.decel.code == entry->table.accel.code;
+  entry->table.accel.code = codes;
+  entry->table.decel.code = symmetric ? codes : codes + entry->table.accel.count;
+}
+
+static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
+  const uint16_t end = (uint16_t)(entry->first + entry->count);
+  memmove(mcu->config.codes + entry->first, mcu->config.codes + end,
+          (size_t)(mcu->codes_used - end) * sizeof mcu->config.codes[0]);
+  mcu->codes_used = (uint16_t)(mcu->codes_used - entry->count);
+  for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
+    bushd_mcu_table* other = &mcu->table[i];
+    if (other->count != 0 && other->first >= end) {
+      other->first = (uint16_t)(other->first - entry->count);
+      locate_codes(mcu, other);
+    }
+  }
+  memset(entry, 0, sizeof *entry);
+}
+
+bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message) {
+  if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  bushd_mcu_table* entry = &mcu->table[message->slot];
+  if (entry->count != 0) give_back(mcu, entry);
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if (mcu->motor[m].table == (int8_t)message->slot) mcu->motor[m].table = -1;
+  }
+  const uint32_t count = (uint32_t)message->accel_count + message->decel_count;
+  if (count > (uint32_t)(mcu->config.code_count - mcu->codes_used)) return BUSHD_E_CAPACITY;
+  entry->first = mcu->codes_used;
+  entry->count = (uint16_t)count;
+  mcu->codes_used = (uint16_t)(mcu->codes_used + count);
+  const bool symmetric = message->decel_count == 0;
+  entry->table.accel.count = message->accel_count;
+  entry->table.decel.count = symmetric ? message->accel_count : message->decel_count;
+  entry->table.accel.code = mcu->config.codes + entry->first;
+  entry->table.decel.code = entry->table.accel.code + (symmetric ? 0 : message->accel_count);
+  entry->table.cruise = message->cruise;
+  entry->table.time_unit_ns = message->time_unit_ns;
+  return BUSHD_OK;
+}
+
+bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message) {
+  bushd_mcu_table* entry = &mcu->table[message->slot];
+  const uint32_t end = (uint32_t)message->offset + message->count;
+  // Pieces come in order; one that was sent again because its acknowledgement was lost is written again.
+  if (entry->valid || end > entry->count || message->offset > entry->received) return BUSHD_E_STATE;
+  for (uint8_t i = 0; i < message->count; ++i) {
+    mcu->config.codes[entry->first + message->offset + i] = bushd_get_u16(message->codes + 2u * i);
+  }
+  if (end > entry->received) entry->received = (uint16_t)end;
+  return BUSHD_OK;
+}
+
+bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message) {
+  bushd_mcu_table* entry = &mcu->table[message->slot];
+  if (entry->count == 0 || entry->received != entry->count) return BUSHD_E_STATE;
+  uint16_t crc = BUSHD_CRC16_START;
+  for (uint16_t i = 0; i < entry->count; ++i) {
+    uint8_t bytes[2];
+    bushd_put_u16(bytes, mcu->config.codes[entry->first + i]);
+    crc = bushd_crc16(crc, bytes, sizeof bytes);
+  }
+  if (crc != message->crc) return BUSHD_E_CRC;
+  const bushd_status status = bushd_table_check(&entry->table, NULL, NULL);
+  entry->valid = status == BUSHD_OK;
+  return status;
+}
+
+bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
+  if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
+  if (bushd_mcu_moving(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
+  const bushd_mcu_table* entry = &mcu->table[message->slot];
+  if (!entry->valid || (mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
+  if (bushd_table_max_steps_per_tick(&entry->table, mcu->tick_ns) > BUSHD_MAX_STEPS_PER_TICK) {
+    return BUSHD_E_CAPACITY;
+  }
+  mcu->motor[message->motor].table = (int8_t)message->slot;
+  return BUSHD_OK;
+}

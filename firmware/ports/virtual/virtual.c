@@ -1,0 +1,194 @@
+#include "firmware/ports/virtual/virtual.h"
+
+#include <assert.h>
+#include <string.h>
+
+enum { kMillion = 1000000 };
+
+// Both conversions split whole multiples off first, so that no product can overflow in years of
+// simulated time.
+static int64_t own_time(const bushd_virtual* v, int64_t time_ns) {
+  const int64_t since_boot = time_ns - v->config.boot_ns;
+  const int64_t rate = kMillion + v->config.clock_ppm;
+  return since_boot / kMillion * rate + since_boot % kMillion * rate / kMillion;
+}
+
+static int64_t true_time(const bushd_virtual* v, int64_t own_ns) {
+  const int64_t rate = kMillion + v->config.clock_ppm;
+  const int64_t whole = own_ns / rate * kMillion;
+  return v->config.boot_ns + whole + (own_ns % rate * kMillion + rate - 1) / rate;
+}
+
+static void emit(bushd_virtual* v, int64_t time_ns, bushd_virtual_signal signal, uint8_t index,
+                 bool level) {
+  if (v->config.edge != NULL) v->config.edge(v->config.context, time_ns, signal, index, level);
+}
+
+// One edge for every pin in which `levels` and `*present` differ.
+static void drive(bushd_virtual* v, int64_t time_ns, bushd_virtual_signal signal, uint16_t* present,
+                  uint16_t levels) {
+  const uint16_t changed = (uint16_t)(*present ^ levels);
+  *present = levels;
+  for (uint8_t i = 0; changed >> i != 0; ++i) {
+    if (changed >> i & 1) emit(v, time_ns, signal, i, levels >> i & 1);
+  }
+}
+
+static int64_t edge_time(const bushd_virtual* v, uint16_t edge) {
+  return true_time(
+      v, v->tick_start_own_ns + edge * v->tick_length_ns / (2 * (int64_t)v->config.mcu.slots));
+}
+
+// Calls back the STEP edges of the present tick up to until_ns.
+static void emit_steps(bushd_virtual* v, int64_t until_ns) {
+  const uint16_t edges = (uint16_t)(2 * v->config.mcu.slots);
+  if (v->config.edge == NULL || v->plane == NULL || v->plane->active == 0) return;
+  for (; v->edge_cursor < edges; ++v->edge_cursor) {
+    const uint16_t mask = v->plane->step[v->edge_cursor / 2];
+    if (mask == 0) continue;
+    const int64_t time_ns = edge_time(v, v->edge_cursor);
+    if (time_ns > until_ns) return;
+    drive(v, time_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, v->edge_cursor % 2 ? 0 : mask);
+  }
+}
+
+static void turn(bushd_virtual_shaft* shaft, int steps) {
+  shaft->position_steps += steps;
+  shaft->travel_steps += (uint64_t)(steps < 0 ? -steps : steps);
+}
+
+static void turn_for_whole_tick(bushd_virtual* v) {
+  if (v->plane == NULL || v->plane->active == 0) return;
+  for (uint8_t i = 0; i < v->config.mcu.motors; ++i) turn(&v->shaft[i], v->plane->steps[i]);
+}
+
+// A reset cuts the tick short: only the pulses that have begun count.
+static void turn_for_cut_tick(bushd_virtual* v) {
+  if (v->plane == NULL || v->plane->active == 0) return;
+  for (uint16_t slot = 0; slot < v->config.mcu.slots; ++slot) {
+    const uint16_t mask = v->plane->step[slot];
+    if (mask == 0) continue;
+    if (edge_time(v, (uint16_t)(2 * slot)) > v->now_ns) return;
+    for (uint8_t i = 0; i < v->config.mcu.motors; ++i) {
+      if (mask >> i & 1) turn(&v->shaft[i], v->plane->steps[i] < 0 ? -1 : 1);
+    }
+  }
+}
+
+static void begin_tick(bushd_virtual* v, int64_t start_own_ns) {
+  v->tick_start_own_ns = start_own_ns;
+  v->tick_length_ns = (int64_t)v->tick_ns + v->adjust_ns;
+  v->adjust_ns = 0;
+  // Shorter, two edges would fall together: the core must never ask for it.
+  assert(v->tick_length_ns >= 2 * (int64_t)v->config.mcu.slots);
+  v->next_event_ns = true_time(v, start_own_ns + v->tick_length_ns);
+  v->edge_cursor = 0;
+}
+
+static void tick_boundary(bushd_virtual* v) {
+  emit_steps(v, v->next_event_ns);
+  turn_for_whole_tick(v);
+  v->now_ns = v->next_event_ns;
+  begin_tick(v, v->tick_start_own_ns + v->tick_length_ns);
+  v->plane = bushd_mcu_swap(&v->mcu);
+  drive(v, v->now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, v->plane->direction);
+  bushd_mcu_prepare(&v->mcu);
+}
+
+static void port_transmit(void* context, const uint8_t* wire, size_t size) {
+  const bushd_virtual* v = context;
+  v->config.transmit(v->config.context, v->now_ns + v->config.turnaround_ns, wire, size);
+}
+
+static void port_set_enable(void* context, bool on) {
+  bushd_virtual* v = context;
+  if (on == v->enable_level) return;
+  emit_steps(v, v->now_ns);
+  v->enable_level = on;
+  emit(v, v->now_ns, BUSHD_VIRTUAL_EN, 0, on);
+}
+
+static void port_set_tick(void* context, uint32_t tick_ns) {
+  bushd_virtual* v = context;
+  v->tick_ns = tick_ns;
+}
+
+static void port_adjust_tick(void* context, int32_t ns) {
+  bushd_virtual* v = context;
+  v->adjust_ns = ns;
+}
+
+static uint32_t port_time_in_tick_ns(void* context) {
+  const bushd_virtual* v = context;
+  return (uint32_t)(own_time(v, v->now_ns) - v->tick_start_own_ns);
+}
+
+static uint16_t port_read_inputs(void* context) {
+  const bushd_virtual* v = context;
+  return v->inputs;
+}
+
+static bool port_self_test(void* context) {
+  const bushd_virtual* v = context;
+  return !v->self_test_fails;
+}
+
+static void boot(bushd_virtual* v) {
+  const bushd_port port = {.context = v,
+                           .transmit = port_transmit,
+                           .set_enable = port_set_enable,
+                           .set_tick = port_set_tick,
+                           .adjust_tick = port_adjust_tick,
+                           .time_in_tick_ns = port_time_in_tick_ns,
+                           .read_inputs = port_read_inputs,
+                           .self_test = port_self_test};
+  v->now_ns = v->config.boot_ns;
+  v->running = true;
+  v->plane = NULL;
+  v->tick_ns = BUSHD_BOOT_TICK_NS;
+  v->adjust_ns = 0;
+  begin_tick(v, 0);
+  bushd_mcu_boot(&v->mcu, &port, &v->config.mcu);
+  bushd_mcu_prepare(&v->mcu);
+}
+
+void bushd_virtual_init(bushd_virtual* v, const bushd_virtual_config* config) {
+  assert(config->transmit != NULL);
+  assert(config->clock_ppm >= -BUSHD_VIRTUAL_MAX_PPM && config->clock_ppm <= BUSHD_VIRTUAL_MAX_PPM);
+  memset(v, 0, sizeof *v);
+  v->config = *config;
+  v->next_event_ns = config->boot_ns;
+}
+
+int64_t bushd_virtual_next_event_ns(const bushd_virtual* v) { return v->next_event_ns; }
+
+void bushd_virtual_advance(bushd_virtual* v, int64_t now_ns) {
+  assert(now_ns >= v->now_ns);
+  while (v->next_event_ns <= now_ns) {
+    if (v->running) {
+      tick_boundary(v);
+    } else {
+      boot(v);
+    }
+  }
+  v->now_ns = now_ns;
+  if (v->running) emit_steps(v, now_ns);
+}
+
+void bushd_virtual_receive(bushd_virtual* v, uint8_t byte, int64_t now_ns) {
+  bushd_virtual_advance(v, now_ns);
+  if (v->running) bushd_mcu_receive(&v->mcu, byte, port_time_in_tick_ns(v));
+}
+
+void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint16_t boot_number) {
+  assert(boot_ns >= now_ns);
+  bushd_virtual_advance(v, now_ns);
+  if (v->running) turn_for_cut_tick(v);
+  drive(v, now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, 0);
+  drive(v, now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, 0);
+  if (v->running) port_set_enable(v, false);
+  v->running = false;
+  v->config.boot_ns = boot_ns;
+  v->config.mcu.boot_number = boot_number;
+  v->next_event_ns = boot_ns;
+}
