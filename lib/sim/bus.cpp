@@ -1,0 +1,95 @@
+#include "sim/bus.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace bushd::sim {
+namespace {
+
+// How far a sink may have to wait for edges (and so to buffer) while time is moved in great strides.
+constexpr TimeNs kSettlingPeriodNs = 10'000'000;
+
+}  // namespace
+
+Bus::Bus(std::uint32_t baud, EdgeSink* sink) : sink_(sink), line_(baud) { line_.add_talker(); }
+
+std::size_t Bus::add_mcu(const McuOptions& options) {
+  assert(options.boot_ns >= now_ns_);
+  const std::size_t index = mcus_.size();
+  line_.add_talker();
+  VirtualMcu::Driver& driver = *this;  // here, where the private base is known
+  mcus_.push_back(std::make_unique<VirtualMcu>(options, index, driver, sink_));
+  return index;
+}
+
+void Bus::master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns) {
+  assert(at_ns >= now_ns_);
+  line_.send(kMaster, bytes, at_ns);
+}
+
+void Bus::transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire, std::size_t size) {
+  line_.send(mcu + 1, {wire, size}, start_ns);
+}
+
+std::uint8_t Bus::talker_address(std::size_t talker) const {
+  return talker == kMaster ? BUSHD_ADDRESS_BROADCAST : mcus_[talker - 1]->address();
+}
+
+TimeNs Bus::next_event_ns() const {
+  TimeNs next_ns = line_.next_end_ns();
+  for (const auto& mcu : mcus_) next_ns = std::min(next_ns, mcu->next_event_ns());
+  return next_ns;
+}
+
+// Ticks of different MCUs touch nothing in common, so that only those of one MCU need be in order.
+void Bus::run_ticks_until(TimeNs t_ns) {
+  for (const auto& mcu : mcus_) {
+    if (mcu->next_event_ns() <= t_ns) mcu->advance(t_ns);
+  }
+}
+
+void Bus::deliver(const LineByte& byte) {
+  corrupted_bytes_ += byte.corrupted;
+  if (byte.collision) {
+    ++collisions_;
+    if (on_collision) {
+      on_collision(byte.collision->time_ns, talker_address(byte.collision->talker[0]),
+                   talker_address(byte.collision->talker[1]));
+    }
+  }
+  for (std::size_t i = 0; i < mcus_.size(); ++i) {
+    const std::size_t talker = i + 1;
+    if (talker == byte.talker || line_.drives(talker, byte.start_ns, byte.end_ns)) continue;
+    mcus_[i]->receive(byte.value, byte.end_ns);
+  }
+  if (byte.talker != kMaster && on_master_byte) on_master_byte(byte.value, byte.end_ns);
+}
+
+void Bus::settle(TimeNs t_ns) {
+  for (const auto& mcu : mcus_) mcu->advance(t_ns);
+  if (sink_ != nullptr) sink_->settled(t_ns);
+  next_settling_ns_ = t_ns + kSettlingPeriodNs;
+}
+
+void Bus::advance_to(TimeNs t_ns) {
+  assert(t_ns >= now_ns_);
+  for (;;) {
+    const TimeNs end_ns = line_.next_end_ns();
+    const TimeNs until_ns = std::min(end_ns, t_ns);
+    while (sink_ != nullptr && next_settling_ns_ < until_ns) settle(next_settling_ns_);
+    run_ticks_until(until_ns);
+    now_ns_ = until_ns;
+    if (end_ns > t_ns) break;
+    deliver(line_.take());
+  }
+  settle(t_ns);
+}
+
+void Bus::reboot(std::size_t mcu, TimeNs down_ns) {
+  VirtualMcu& rebooted = *mcus_[mcu];
+  line_.silence(mcu + 1, now_ns_);
+  rebooted.reset(now_ns_, now_ns_ + down_ns,
+                 static_cast<std::uint16_t>(rebooted.boot_number() + 1));
+}
+
+}  // namespace bushd::sim

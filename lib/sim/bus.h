@@ -1,0 +1,84 @@
+// A bus in simulated time: one master's port, a line, and MCUs that run the firmware core. No I/O and no
+// clock: time is moved by the caller, and the same calls always give the same result.
+//
+// Who hears what: an MCU hears every byte of the others and of the master, at the end of its stop bit,
+// unless it drives the line itself meanwhile (its receiver is off then) or is in reset. The master's port
+// hears every byte of the MCUs and not its own.
+//
+// Order of events: by time. What happens at the same ns goes thus: boots and tick boundaries, in
+// the order in which the MCUs were added; then ends of bytes, the master's first, then the
+// MCUs' in that order. A byte that ends with a tick is so heard at time 0 of the next.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sim/edge.h"
+#include "sim/line.h"
+#include "sim/virtual_mcu.h"
+
+namespace bushd::sim {
+
+class Bus : private VirtualMcu::Driver {
+ public:
+  // `sink` gets all edges; it outlives the bus. Without one, ticks cost no work per slot.
+  explicit Bus(std::uint32_t baud, EdgeSink* sink = nullptr);
+
+  // Returns its index. Several MCUs of one address are possible: that is a fault worth simulating.
+  std::size_t add_mcu(const McuOptions& options);
+
+  // Bytes for the line at `at_ns` (>= now_ns()), or as soon as those given before are sent. The master does
+  // not listen before it talks.
+  void master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns);
+
+  // A byte for the master: called when its stop bit has ended. May call master_send.
+  std::function<void(std::uint8_t byte, TimeNs end_ns)> on_master_byte;
+
+  // Two have begun to talk at once. Addresses; 0 is the master.
+  std::function<void(TimeNs time_ns, std::uint8_t first_address, std::uint8_t second_address)>
+      on_collision;
+
+  // Everything up to t_ns (included) happens. Precondition: t_ns >= now_ns().
+  void advance_to(TimeNs t_ns);
+
+  TimeNs now_ns() const { return now_ns_; }
+  // When something happens next, if nothing comes from outside.
+  TimeNs next_event_ns() const;
+  // When the line falls silent, if nothing more is sent; in the past if it is silent.
+  TimeNs line_busy_until_ns() const { return line_.busy_until_ns(); }
+
+  // Resets an MCU now: what it was sending breaks off, and it boots with the next boot number when `down_ns`
+  // have passed.
+  void reboot(std::size_t mcu, TimeNs down_ns = 0);
+
+  std::size_t mcu_count() const { return mcus_.size(); }
+  VirtualMcu& mcu(std::size_t index) { return *mcus_[index]; }
+  const VirtualMcu& mcu(std::size_t index) const { return *mcus_[index]; }
+
+  std::uint64_t collisions() const { return collisions_; }
+  std::uint64_t corrupted_bytes() const { return corrupted_bytes_; }
+
+ private:
+  static constexpr std::size_t kMaster = 0;  // as a talker; MCU i is talker i + 1
+
+  void transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire,
+                std::size_t size) override;
+  std::uint8_t talker_address(std::size_t talker) const;
+  void run_ticks_until(TimeNs t_ns);
+  void deliver(const LineByte& byte);
+  void settle(TimeNs t_ns);
+
+  EdgeSink* sink_;
+  Line line_;
+  std::vector<std::unique_ptr<VirtualMcu>> mcus_;
+  TimeNs now_ns_ = 0;
+  TimeNs next_settling_ns_ = 0;
+  std::uint64_t collisions_ = 0;
+  std::uint64_t corrupted_bytes_ = 0;
+};
+
+}  // namespace bushd::sim

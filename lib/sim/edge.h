@@ -1,0 +1,39 @@
+// What can be seen on the pins of the virtual MCUs.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace bushd::sim {
+
+// Simulated time since the beginning of the simulation, ns. It has nothing to do with the clock on the wall.
+using TimeNs = std::int64_t;
+
+enum class Signal : std::uint8_t { kStep, kDir, kEnable };
+
+inline constexpr std::size_t kOutputsPerMcu = 16;
+
+struct Edge {
+  TimeNs time_ns;
+  std::size_t mcu;     // position on the bus, in the order of Bus::add_mcu
+  Signal signal;
+  std::uint8_t index;  // output 0..15; 0 for kEnable
+  bool level;
+};
+
+// All pins are low when the simulation begins.
+class EdgeSink {
+ public:
+  EdgeSink() = default;
+  EdgeSink(const EdgeSink&) = delete;
+  EdgeSink& operator=(const EdgeSink&) = delete;
+  virtual ~EdgeSink() = default;
+
+  // In order of time for each MCU, but not from one MCU to another.
+  virtual void edge(const Edge& edge) = 0;
+
+  // Every edge of every MCU before `until_ns` has been given; later ones lie at or after it.
+  virtual void settled(TimeNs until_ns) = 0;
+};
+
+}  // namespace bushd::sim

@@ -1,0 +1,147 @@
+#include "sim/vcd.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cerrno>
+#include <charconv>
+#include <system_error>
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::size_t kWiresPerMcu = 2 * kOutputsPerMcu + 1;
+constexpr std::size_t kTextBytes = std::size_t{1} << 18;
+
+std::size_t wire_of(const Edge& edge) {
+  const std::size_t first = edge.mcu * kWiresPerMcu;
+  switch (edge.signal) {
+    case Signal::kStep: return first + edge.index;
+    case Signal::kDir: return first + kOutputsPerMcu + edge.index;
+    case Signal::kEnable: break;
+  }
+  return first + 2 * kOutputsPerMcu;
+}
+
+std::string wire_name(std::size_t wire) {
+  if (wire < kOutputsPerMcu) return "step" + std::to_string(wire);
+  if (wire < 2 * kOutputsPerMcu) return "dir" + std::to_string(wire - kOutputsPerMcu);
+  return "en";
+}
+
+// The standard allows any printable characters; short codes keep the file small.
+std::string identifier(std::size_t number) {
+  constexpr char kFirst = '!';
+  constexpr std::size_t kCount = '~' - kFirst + 1;
+  std::string code;
+  do {
+    code += static_cast<char>(kFirst + number % kCount);
+    number /= kCount;
+  } while (number != 0);
+  return code;
+}
+
+Error write_error(const std::string& path, const char* what, int error_number) {
+  return {.message = std::string(what) + ": " + std::generic_category().message(error_number) +
+                     "; give a path on a disk that has room and may be written",
+          .file = path};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<VcdWriter>> VcdWriter::create(const std::string& path,
+                                                     std::span<const std::uint8_t> addresses) {
+  File file(std::fopen(path.c_str(), "we"));
+  if (!file) return fail(write_error(path, "the trace cannot be created", errno));
+  // Text is gathered here already; a second buffer would only delay the news of a full disk.
+  std::setvbuf(file.get(), nullptr, _IONBF, 0);
+  std::unique_ptr<VcdWriter> writer(new VcdWriter(path, std::move(file), addresses.size()));
+  writer->write_head(addresses);
+  writer->flush_text();
+  if (writer->error_) return fail(*writer->error_);
+  return writer;
+}
+
+VcdWriter::VcdWriter(std::string path, File file, std::size_t mcus)
+    : path_(std::move(path)), file_(std::move(file)) {
+  for (std::size_t wire = 0; wire < mcus * kWiresPerMcu; ++wire) {
+    identifiers_.push_back(identifier(wire));
+  }
+  text_.reserve(kTextBytes + 64);
+}
+
+void VcdWriter::write_head(std::span<const std::uint8_t> addresses) {
+  text_ += "$version bushd virtual bus $end\n$timescale 1 ns $end\n";
+  for (std::size_t mcu = 0; mcu < addresses.size(); ++mcu) {
+    text_ += "$scope module mcu" + std::to_string(addresses[mcu]) + " $end\n";
+    for (std::size_t wire = 0; wire < kWiresPerMcu; ++wire) {
+      text_ += "$var wire 1 " + identifiers_[mcu * kWiresPerMcu + wire] + " " + wire_name(wire) +
+               " $end\n";
+    }
+    text_ += "$upscope $end\n";
+  }
+  text_ += "$enddefinitions $end\n";
+  write_time(0);
+  text_ += "$dumpvars\n";
+  for (std::size_t wire = 0; wire < identifiers_.size(); ++wire) write_value(wire, false);
+  text_ += "$end\n";
+}
+
+void VcdWriter::write_time(TimeNs time_ns) {
+  assert(time_ns >= last_time_ns_);
+  if (time_ns == last_time_ns_) return;
+  last_time_ns_ = time_ns;
+  char digits[24];
+  const auto end = std::to_chars(std::begin(digits), std::end(digits), time_ns).ptr;
+  text_ += '#';
+  text_.append(digits, end);
+  text_ += '\n';
+}
+
+void VcdWriter::write_value(std::size_t wire, bool level) {
+  text_ += level ? '1' : '0';
+  text_ += identifiers_[wire];
+  text_ += '\n';
+}
+
+void VcdWriter::write_pending(TimeNs until_ns) {
+  const auto rest = std::stable_partition(pending_.begin(), pending_.end(),
+                                          [&](const Edge& e) { return e.time_ns < until_ns; });
+  // The order given is the order of each MCU; a stable sort by time and MCU keeps it.
+  std::stable_sort(pending_.begin(), rest, [](const Edge& a, const Edge& b) {
+    return a.time_ns != b.time_ns ? a.time_ns < b.time_ns : a.mcu < b.mcu;
+  });
+  for (auto edge = pending_.begin(); edge != rest; ++edge) {
+    write_time(edge->time_ns);
+    write_value(wire_of(*edge), edge->level);
+    ++edges_written_;
+    if (text_.size() >= kTextBytes) flush_text();
+  }
+  pending_.erase(pending_.begin(), rest);
+}
+
+void VcdWriter::settled(TimeNs until_ns) {
+  if (!pending_.empty()) write_pending(until_ns);
+}
+
+void VcdWriter::flush_text() {
+  if (!error_ && std::fwrite(text_.data(), 1, text_.size(), file_.get()) != text_.size()) {
+    fail_with(errno);
+  }
+  text_.clear();
+}
+
+void VcdWriter::fail_with(int error_number) {
+  if (!error_) error_ = write_error(path_, "the trace cannot be written", error_number);
+}
+
+Result<void> VcdWriter::close(TimeNs end_ns) {
+  assert(file_);
+  write_pending(end_ns + 1);
+  write_time(end_ns);
+  flush_text();
+  if (std::fclose(file_.release()) != 0) fail_with(errno);
+  if (error_) return fail(*error_);
+  return {};
+}
+
+}  // namespace bushd::sim

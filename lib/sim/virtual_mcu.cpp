@@ -1,0 +1,44 @@
+#include "sim/virtual_mcu.h"
+
+namespace bushd::sim {
+
+VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
+    : index_(index),
+      driver_(driver),
+      sink_(sink),
+      queue_(std::size_t{options.queue_ticks} * options.motors),
+      codes_(options.code_count) {
+  bushd_virtual_config config{};
+  config.mcu.address = options.address;
+  config.mcu.motors = options.motors;
+  config.mcu.slots = options.slots;
+  config.mcu.boot_number = options.boot_number;
+  config.mcu.queue = queue_.data();
+  config.mcu.queue_ticks = options.queue_ticks;
+  config.mcu.codes = codes_.data();
+  config.mcu.code_count = options.code_count;
+  config.boot_ns = options.boot_ns;
+  config.clock_ppm = options.clock_ppm;
+  config.turnaround_ns = options.turnaround_ns;
+  config.context = this;
+  config.edge = sink != nullptr ? on_edge : nullptr;
+  config.transmit = on_transmit;
+  bushd_virtual_init(&port_, &config);
+}
+
+void VirtualMcu::on_edge(void* context, std::int64_t time_ns, bushd_virtual_signal signal,
+                         std::uint8_t index, bool level) {
+  const auto& self = *static_cast<VirtualMcu*>(context);
+  static_assert(static_cast<int>(Signal::kStep) == BUSHD_VIRTUAL_STEP);
+  static_assert(static_cast<int>(Signal::kDir) == BUSHD_VIRTUAL_DIR);
+  static_assert(static_cast<int>(Signal::kEnable) == BUSHD_VIRTUAL_EN);
+  self.sink_->edge({time_ns, self.index_, static_cast<Signal>(signal), index, level});
+}
+
+void VirtualMcu::on_transmit(void* context, std::int64_t start_ns, const std::uint8_t* wire,
+                             std::size_t size) {
+  const auto& self = *static_cast<VirtualMcu*>(context);
+  self.driver_.transmit(self.index_, start_ns, wire, size);
+}
+
+}  // namespace bushd::sim

@@ -1,0 +1,80 @@
+// One MCU on the virtual bus: the real firmware core on the virtual port, with its memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "firmware/ports/virtual/virtual.h"
+#include "sim/edge.h"
+
+namespace bushd::sim {
+
+// What is typical for a 32-bit MCU of today; all of it is told to the host in its identity.
+struct McuOptions {
+  std::uint8_t address = 1;  // 1..255
+  std::uint8_t motors = BUSHD_MOTORS_PER_MCU;
+  std::uint16_t slots = BUSHD_MAX_SLOTS;
+  std::uint16_t boot_number = 1;
+  std::uint16_t queue_ticks = 1024;  // a power of two
+  std::uint16_t code_count = 16384;
+  TimeNs boot_ns = 0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
+  std::int32_t clock_ppm = 0;  // > 0: its clock is fast
+  std::uint32_t turnaround_ns = 20'000;
+};
+
+class VirtualMcu {
+ public:
+  // Where its bytes go.
+  class Driver {
+   public:
+    Driver() = default;
+    Driver(const Driver&) = delete;
+    Driver& operator=(const Driver&) = delete;
+    virtual ~Driver() = default;
+    virtual void transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire,
+                          std::size_t size) = 0;
+  };
+
+  // `index` stands in its edges and transmissions. `sink` may be null; both outlive the MCU.
+  VirtualMcu(const McuOptions& options, std::size_t index, Driver& driver, EdgeSink* sink);
+  VirtualMcu(const VirtualMcu&) = delete;
+  VirtualMcu& operator=(const VirtualMcu&) = delete;
+
+  std::uint8_t address() const { return port_.config.mcu.address; }
+  std::uint16_t boot_number() const { return port_.config.mcu.boot_number; }
+  bool running() const { return port_.running; }  // out of reset
+  TimeNs next_event_ns() const { return bushd_virtual_next_event_ns(&port_); }
+
+  // Not valid before the first boot.
+  const bushd_mcu& core() const { return port_.mcu; }
+
+  // What the motor on this output has done, whatever the MCU believes: it outlives reboots. Until the
+  // start of the present tick.
+  const bushd_virtual_shaft& shaft(std::size_t output) const { return port_.shaft[output]; }
+
+  void set_inputs(std::uint16_t levels) { port_.inputs = levels; }
+  void fail_next_self_test(bool fails) { port_.self_test_fails = fails; }
+
+  // See firmware/ports/virtual/virtual.h.
+  void advance(TimeNs now_ns) { bushd_virtual_advance(&port_, now_ns); }
+  void receive(std::uint8_t byte, TimeNs now_ns) { bushd_virtual_receive(&port_, byte, now_ns); }
+  void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) {
+    bushd_virtual_reset(&port_, now_ns, boot_ns, boot_number);
+  }
+
+ private:
+  static void on_edge(void* context, std::int64_t time_ns, bushd_virtual_signal signal,
+                      std::uint8_t index, bool level);
+  static void on_transmit(void* context, std::int64_t start_ns, const std::uint8_t* wire,
+                          std::size_t size);
+
+  std::size_t index_;
+  Driver& driver_;
+  EdgeSink* sink_;
+  std::vector<std::int16_t> queue_;
+  std::vector<std::uint16_t> codes_;
+  bushd_virtual port_;
+};
+
+}  // namespace bushd::sim
