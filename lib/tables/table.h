@@ -23,11 +23,19 @@ inline constexpr std::size_t kMaxNameLength = 63;
 struct TableContent {
   std::string name{};
   std::uint32_t time_unit_ns = 0;
-  std::vector<std::uint16_t> accel{};                         // slow to fast
-  std::optional<std::vector<std::uint16_t>> decel{};          // fast to slow; none: accel reversed
-  std::optional<std::uint16_t> cruise{};                      // none: the last of accel
+  std::vector<std::uint16_t> accel{};                 // slow to fast
+  std::optional<std::vector<std::uint16_t>> decel{};  // fast to slow; none: accel reversed
+  std::optional<std::uint16_t> cruise{};              // none: the last of accel
   std::string description{};
 };
+
+// What is wrong with a content, if anything: the first thing in the order of the members above.
+struct ContentFault {
+  std::string key;                   // as in a file
+  std::optional<std::size_t> index;  // of an element of `key`
+  std::string message;
+};
+std::optional<ContentFault> check(const TableContent& content);
 
 // Immutable, so it may be shared by motors and threads. Not copyable: view() points into it.
 class Table {

@@ -1,0 +1,42 @@
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <system_error>
+
+#include "tables/table_file.h"
+
+namespace bushd::tables {
+
+Result<std::filesystem::path> find(std::string_view name,
+                                   std::span<const std::filesystem::path> directories) {
+  const bool leads_elsewhere = name.empty() || name.front() == '.' ||
+                               name.find('/') != std::string_view::npos ||
+                               name.find('\0') != std::string_view::npos;
+  if (leads_elsewhere || name.size() > kMaxNameLength) {
+    return fail(fmt::format("\"{}\" is not a table's name; allowed: 1..{} characters without '/' and not "
+                            "beginning with '.' (the name of a file without \".toml\")",
+                            name.substr(0, kMaxNameLength), kMaxNameLength));
+  }
+  std::string looked_in;
+  for (const std::filesystem::path& directory : directories) {
+    const std::filesystem::path path = directory / fmt::format("{}.toml", name);
+    std::error_code error;
+    if (std::filesystem::exists(path, error)) return path;
+    looked_in += (looked_in.empty() ? "" : ", ") + directory.string();
+  }
+  return fail(fmt::format("there is no table \"{}\": no file {}.toml in {}", name, name, looked_in));
+}
+
+std::vector<std::filesystem::path> shipped_directories() {
+  std::vector<std::filesystem::path> directories;
+  if (const char* chosen = std::getenv("BUSHD_TABLES_DIR"); chosen != nullptr && *chosen != '\0') {
+    directories.emplace_back(chosen);
+  }
+#ifdef BUSHD_SOURCE_TABLES
+  directories.emplace_back(BUSHD_SOURCE_TABLES);
+#endif
+  directories.emplace_back(BUSHD_INSTALLED_TABLES);
+  return directories;
+}
+
+}  // namespace bushd::tables

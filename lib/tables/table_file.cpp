@@ -1,0 +1,83 @@
+#include "tables/table_file.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "tables/toml_file.h"
+#include "tables/toml_reader.h"
+
+namespace bushd::tables {
+namespace {
+
+constexpr std::int64_t kMaxCode = std::numeric_limits<std::uint16_t>::max();
+constexpr std::string_view kUnits = "(time units)";
+
+Result<std::vector<std::uint16_t>> read_codes(const TomlReader& reader, std::string_view key) {
+  const auto elements = reader.array(key, "an array of whole numbers 1..65535 (time units)");
+  if (!elements) return fail(elements.error());
+  std::vector<std::uint16_t> codes;
+  codes.reserve((*elements)->size());
+  for (const toml::node& node : **elements) {
+    const auto code = reader.integer(key, codes.size(), node, 1, kMaxCode, kUnits);
+    if (!code) return fail(code.error());
+    codes.push_back(static_cast<std::uint16_t>(*code));
+  }
+  return codes;
+}
+
+Result<TableContent> read_content(const TomlReader& reader) {
+  const auto known =
+      reader.only({"name", "description", "time_unit_ns", "accel", "decel", "cruise"});
+  if (!known) return fail(known.error());
+  TableContent content;
+  auto name = reader.string("name", fmt::format("a string of 1..{} bytes", kMaxNameLength));
+  if (!name) return fail(name.error());
+  content.name = std::move(*name);
+  const auto unit = reader.integer("time_unit_ns", 1, kMaxTimeUnitNs, "(nanoseconds)");
+  if (!unit) return fail(unit.error());
+  content.time_unit_ns = static_cast<std::uint32_t>(*unit);
+  auto accel = read_codes(reader, "accel");
+  if (!accel) return fail(accel.error());
+  content.accel = std::move(*accel);
+  if (reader.has("decel")) {
+    auto decel = read_codes(reader, "decel");
+    if (!decel) return fail(decel.error());
+    content.decel = std::move(*decel);
+  }
+  if (reader.has("cruise")) {
+    const auto cruise = reader.integer("cruise", 1, kMaxCode, kUnits);
+    if (!cruise) return fail(cruise.error());
+    content.cruise = static_cast<std::uint16_t>(*cruise);
+  }
+  if (reader.has("description")) {
+    auto description = reader.string("description", "a string");
+    if (!description) return fail(description.error());
+    content.description = std::move(*description);
+  }
+  return content;
+}
+
+}  // namespace
+
+Result<TablePtr> parse(std::string_view text, const std::string& path) {
+  const auto document = parse_toml(text, path);
+  if (!document) return fail(document.error());
+  const TomlReader reader(*document, path);
+  auto content = read_content(reader);
+  if (!content) return fail(content.error());
+  if (auto fault = check(*content)) {
+    return fail(reader.error(fault->key, fault->index, std::move(fault->message)));
+  }
+  return make(std::move(*content), path);
+}
+
+Result<TablePtr> load(const std::filesystem::path& path) {
+  const auto text = read_text(path);
+  if (!text) return fail(text.error());
+  return parse(*text, path.string());
+}
+
+}  // namespace bushd::tables

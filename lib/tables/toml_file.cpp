@@ -1,0 +1,121 @@
+#include "tables/toml_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+namespace bushd::tables {
+namespace {
+
+// Ours nest two deep ("lcm.url").
+constexpr int kMaxDottedDepth = 16;
+
+// toml++ 3.3 bounds nested values (256) but not dotted keys: "a.a.a. ..." makes a tree as deep as
+// the file is long, and freeing it overflows the stack. So keys that nest deeper than any of ours are found
+// before it sees them. Dots are counted outside of strings and comments and start anew at whatever cannot
+// stand within a key, so that numbers and text cost nothing. The lexer need only agree with TOML up to the
+// first syntax error: there toml++ stops as well.
+class DottedKeyGuard {
+ public:
+  explicit DottedKeyGuard(std::string_view text) : rest_(text) {}
+
+  // The line of the first key that is too deep, or 0.
+  int find() {
+    while (!rest_.empty()) {
+      const char c = rest_.front();
+      if (c == '"' || c == '\'') {
+        skip_string(c);
+        continue;
+      }
+      if (c == '#') {
+        rest_.remove_prefix(std::min(rest_.find('\n'), rest_.size()));
+        continue;
+      }
+      if (c == '.') {
+        if (++dots_ >= kMaxDottedDepth) return line_;
+      } else if (std::string_view("=,[]{}\n").find(c) != std::string_view::npos) {
+        dots_ = 0;
+      }
+      skip(1);
+    }
+    return 0;
+  }
+
+ private:
+  void skip(std::size_t count) {
+    for (const char c : rest_.substr(0, count)) line_ += c == '\n';
+    rest_.remove_prefix(std::min(count, rest_.size()));
+  }
+
+  void skip_string(char quote) {
+    const std::string_view three = quote == '"' ? "\"\"\"" : "'''";
+    const bool many_lines = rest_.starts_with(three);
+    const std::string_view end = many_lines ? three : three.substr(0, 1);
+    skip(end.size());
+    while (!rest_.empty() && !rest_.starts_with(end)) {
+      if (!many_lines && rest_.front() == '\n') return;
+      skip(rest_.front() == '\\' && quote == '"' ? 2 : 1);
+    }
+    skip(end.size());
+    // One or two more quotes before the closing three belong to the text.
+    for (int i = 0; many_lines && i < 2 && rest_.starts_with(quote); ++i) skip(1);
+  }
+
+  std::string_view rest_;
+  int line_ = 1;
+  int dots_ = 0;
+};
+
+tl::unexpected<Error> unreadable(const std::filesystem::path& path, std::string why) {
+  return fail(Error{.message = "cannot be read: " + std::move(why), .file = path.string()});
+}
+
+}  // namespace
+
+Result<std::string> read_text(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) {
+    return unreadable(path, error ? error.message() : "no such file");
+  }
+  // A FIFO would block, a device may never end.
+  if (!std::filesystem::is_regular_file(status)) return unreadable(path, "not a regular file");
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  std::string text(kMaxFileBytes + 1, '\0');
+  if (!file) return unreadable(path, std::strerror(errno));
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (file.bad()) return unreadable(path, std::strerror(errno));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kMaxFileBytes) {
+    return unreadable(path, fmt::format("larger than {} bytes, and the longest table allowed needs half "
+                                        "of that",
+                                        kMaxFileBytes));
+  }
+  return text;
+}
+
+Result<toml::table> parse_toml(std::string_view text, const std::string& path) {
+  if (const int line = DottedKeyGuard(text).find()) {
+    return fail(Error{.message = fmt::format("a key of more than {} parts; allowed: the keys of the "
+                                             "documentation, which have two at most",
+                                             kMaxDottedDepth),
+                      .file = path,
+                      .line = line});
+  }
+  try {
+    return toml::parse(text, path);
+  } catch (const toml::parse_error& error) {
+    return fail(Error{.message = fmt::format("not TOML: {}", error.description()),
+                      .file = path,
+                      .line = static_cast<int>(error.source().begin.line)});
+  } catch (const std::exception& error) {
+    return fail(Error{.message = fmt::format("cannot be parsed: {}", error.what()), .file = path});
+  }
+}
+
+}  // namespace bushd::tables
