@@ -46,8 +46,8 @@ struct Lcm {
 
 struct Bus {
   std::string name;
-  std::string port;          // as written in the file
-  std::uint32_t baud = 0;    // one of libserial's fixed rates
+  std::string port;        // as written in the file
+  std::uint32_t baud = 0;  // one of libserial's fixed rates
   std::uint32_t tick_us = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
 

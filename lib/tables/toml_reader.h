@@ -19,6 +19,8 @@ class TomlReader {
   TomlReader(const toml::table& table, std::string file, std::string place = {});
 
   bool has(std::string_view key) const { return table_->contains(key); }
+  // The sub-table under `key`, or null.
+  const toml::table* table(std::string_view key) const { return (*table_)[key].as_table(); }
 
   // Refuses any other key.
   Result<void> only(std::initializer_list<std::string_view> keys) const;

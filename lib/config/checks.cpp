@@ -1,0 +1,119 @@
+#include "config/checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <string>
+
+#include "engine/run.h"
+#include "link/line_budget.h"
+
+namespace bushd::config {
+namespace {
+
+constexpr std::array<std::uint32_t, 30> kBaudRates = {
+    50,     75,     110,    134,     150,     200,     300,     600,     1200,    1800,
+    2400,   4800,   9600,   19200,   38400,   57600,   115200,  230400,  460800,  500000,
+    576000, 921600, 1000000, 1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000};
+
+Result<void> check_speed(const Loading& loading, std::size_t index) {
+  const Config& config = loading.config;
+  const Motor& motor = config.motors[index];
+  const Bus& bus = config.bus_of(motor);
+  const tables::Table& table = config.table_of(motor);
+  const bushd_table& view = table.view();
+  const std::uint32_t steps = bushd_table_max_steps_per_tick(&view, bus.tick_ns());
+  if (steps <= BUSHD_MAX_STEPS_PER_TICK) return {};
+  const std::uint64_t shortest_ns = std::uint64_t{view.time_unit_ns} * bushd_table_fastest(&view);
+  const std::uint64_t longest_tick_us = (shortest_ns * BUSHD_MAX_STEPS_PER_TICK - 1) / 1000;
+  const std::string remedy =
+      longest_tick_us * 1000 >= BUSHD_MIN_TICK_NS
+          ? fmt::format("Use a slower table or tick_us = {} or less", longest_tick_us)
+          : std::string("Use a slower table: no tick is short enough for this one");
+  return fail(loading.motors[index].error(
+      "group", fmt::format("the table \"{}\" of group \"{}\" makes up to {} steps in the {} us tick of bus "
+                           "\"{}\"; allowed: {}. {}",
+                           table.name(), config.group_of(motor).name, steps, bus.tick_us, bus.name,
+                           BUSHD_MAX_STEPS_PER_TICK, remedy)));
+}
+
+Result<void> check_table_slots(const Loading& loading) {
+  const Config& config = loading.config;
+  std::vector<std::set<const tables::Table*>> used(config.mcus.size());
+  for (std::size_t i = 0; i < config.motors.size(); ++i) {
+    const Motor& motor = config.motors[i];
+    std::set<const tables::Table*>& of_mcu = used[motor.mcu.value];
+    of_mcu.insert(&config.table_of(motor));
+    if (of_mcu.size() <= BUSHD_TABLE_SLOTS) continue;
+    return fail(loading.motors[i].error(
+        "group", fmt::format("is one table too many for MCU \"{}\"; allowed: {} different tables among its "
+                             "motors. Let groups share a table or move the motor to another MCU",
+                             config.mcu_of(motor).id, BUSHD_TABLE_SLOTS)));
+  }
+  return {};
+}
+
+// What would help, by itself: the lowest faster rate, the shortest longer tick.
+std::string line_remedy(const Bus& bus, std::span<const std::uint8_t> motors) {
+  const auto fits = [&](std::uint32_t baud, std::uint32_t tick_us) {
+    return link::line_load(baud, tick_us * 1000u, bus.format, motors) <= link::kMaxLineLoad;
+  };
+  std::string remedy;
+  for (const std::uint32_t baud : kBaudRates) {
+    if (!fits(baud, bus.tick_us)) continue;
+    remedy = fmt::format("baud = {} or more", baud);
+    break;
+  }
+  std::uint32_t low = bus.tick_us;
+  std::uint32_t high = BUSHD_MAX_TICK_NS / 1000;
+  if (fits(bus.baud, high)) {
+    while (high - low > 1) {
+      const std::uint32_t middle = low + (high - low) / 2;
+      (fits(bus.baud, middle) ? high : low) = middle;
+    }
+    remedy += fmt::format("{}tick_us = {} or more", remedy.empty() ? "" : ", or ", high);
+  }
+  if (bus.format == BUSHD_FORMAT_FINE &&
+      link::line_load(bus.baud, bus.tick_ns(), BUSHD_FORMAT_COARSE, motors) <= link::kMaxLineLoad) {
+    remedy += fmt::format("{}format = \"coarse\"", remedy.empty() ? "" : ", or ");
+  }
+  return remedy.empty() ? "Spread the MCUs over more buses" : "Use " + remedy;
+}
+
+Result<void> check_line(const Loading& loading, std::size_t index) {
+  const Config& config = loading.config;
+  const Bus& bus = config.buses[index];
+  std::vector<std::uint8_t> motors;
+  for (std::size_t i = 0; i < config.mcus.size(); ++i) {
+    if (config.mcus[i].bus != BusIndex{index}) continue;
+    motors.push_back(static_cast<std::uint8_t>(
+        std::count_if(config.motors.begin(), config.motors.end(),
+                      [&](const Motor& motor) { return motor.mcu == McuIndex{i}; })));
+  }
+  const double load = link::line_load(bus.baud, bus.tick_ns(), bus.format, motors);
+  if (load <= link::kMaxLineLoad) return {};
+  return fail(loading.buses[index].error(
+      "tick_us", fmt::format("is {}: ticks, polls and sync would take {:.1f} % of the line at {} baud; "
+                             "allowed: {:.0f} %. {}",
+                             bus.tick_us, load * 100, bus.baud, link::kMaxLineLoad * 100,
+                             line_remedy(bus, motors))));
+}
+
+}  // namespace
+
+std::span<const std::uint32_t> baud_rates() { return kBaudRates; }
+
+Result<void> check_together(const Loading& loading) {
+  for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {
+    if (auto checked = check_speed(loading, i); !checked) return checked;
+  }
+  if (auto checked = check_table_slots(loading); !checked) return checked;
+  for (std::size_t i = 0; i < loading.config.buses.size(); ++i) {
+    if (auto checked = check_line(loading, i); !checked) return checked;
+  }
+  return {};
+}
+
+}  // namespace bushd::config

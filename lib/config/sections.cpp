@@ -1,0 +1,308 @@
+#include "config/sections.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "config/checks.h"
+#include "tables/table_file.h"
+
+namespace bushd::config {
+namespace {
+
+using tables::TomlReader;
+
+constexpr std::size_t kMaxName = 63;
+constexpr std::string_view kNameRule = "1..63 characters of A-Z a-z 0-9 _ . -";
+// A prefix becomes the beginning of LCM channel names, which have 63 characters at most.
+constexpr std::size_t kMaxPrefix = 48;
+constexpr std::string_view kPrefixRule = "1..48 characters of A-Z a-z 0-9 _ . -";
+
+bool is_name(std::string_view text, std::size_t longest) {
+  return !text.empty() && text.size() <= longest &&
+         std::all_of(text.begin(), text.end(), [](char c) {
+           return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') ||
+                  c == '_' || c == '.' || c == '-';
+         });
+}
+
+// "is X; allowed: A" for a value of the right type.
+tl::unexpected<Error> refuse(const TomlReader& reader, std::string_view key, std::string_view value,
+                             std::string_view allowed) {
+  return fail(reader.error(key, fmt::format("is \"{}\"; allowed: {}", value, allowed)));
+}
+
+Result<std::string> read_name(const TomlReader& reader, std::string_view key = "name",
+                              std::size_t longest = kMaxName, std::string_view rule = kNameRule) {
+  auto name = reader.string(key, rule);
+  if (!name || is_name(*name, longest)) return name;
+  return refuse(reader, key, *name, rule);
+}
+
+// The elements of `[[key]]`; a section that may be left out and is yields none.
+Result<std::vector<TomlReader>> read_array(const TomlReader& root, const std::string& file,
+                                           const std::string& key, bool needed) {
+  std::vector<TomlReader> readers;
+  if (!needed && !root.has(key)) return readers;
+  const std::string allowed = fmt::format("sections [[{}]]", key);
+  const auto elements = root.array(key, allowed);
+  if (!elements) return fail(elements.error());
+  for (const toml::node& node : **elements) {
+    const toml::table* table = node.as_table();
+    if (table == nullptr) {
+      return fail(root.error(key, readers.size(), fmt::format("is {}; allowed: {}",
+                                                              tables::describe(node), allowed)));
+    }
+    readers.emplace_back(*table, file, fmt::format("{}[{}]", key, readers.size()));
+  }
+  if (needed && readers.empty()) {
+    return fail(root.error(key, fmt::format("is empty; allowed: {}", allowed)));
+  }
+  return readers;
+}
+
+// Names already taken and the line that took them.
+class Taken {
+ public:
+  // Takes `value`, or says where it was taken.
+  Result<void> take(const TomlReader& reader, std::string_view key, const std::string& value,
+                    std::string_view what) {
+    const int line = reader.error(key, "").line;
+    const auto [first, is_new] = lines_.emplace(value, line);
+    if (is_new) return {};
+    return fail(reader.error(key, fmt::format("{} is already taken in line {}; allowed: each once", what,
+                                              first->second)));
+  }
+
+ private:
+  std::map<std::string, int> lines_;
+};
+
+template <class T, class Key>
+std::string known(const std::vector<T>& elements, Key key) {
+  std::string list;
+  for (const T& element : elements) {
+    list += fmt::format("{}\"{}\"", list.empty() ? "" : ", ", element.*key);
+  }
+  return list.empty() ? "nothing, as none is defined" : list;
+}
+
+template <class Index, class T, class Key>
+Result<Index> resolve(const TomlReader& reader, std::string_view key, const std::vector<T>& elements,
+                      Key name) {
+  const auto wanted = reader.string(key, known(elements, name));
+  if (!wanted) return fail(wanted.error());
+  const auto found = std::find_if(elements.begin(), elements.end(),
+                                  [&](const T& element) { return element.*name == *wanted; });
+  if (found == elements.end()) return refuse(reader, key, *wanted, known(elements, name));
+  return Index{static_cast<std::size_t>(found - elements.begin())};
+}
+
+Result<void> read_lcm(const TomlReader& root, Config* config) {
+  if (!root.has("lcm")) return {};
+  const toml::table* section = root.table("lcm");
+  if (section == nullptr) return fail(root.error("lcm", "is not a section; allowed: one [lcm]"));
+  const TomlReader reader(*section, config->path, "lcm");
+  if (auto known = reader.only({"url", "prefix"}); !known) return known;
+  if (reader.has("url")) {
+    constexpr std::string_view kUrlRule = "a URL beginning with udpm://, tcpq:// or memq://";
+    auto url = reader.string("url", kUrlRule);
+    if (!url) return fail(url.error());
+    constexpr std::array<std::string_view, 3> kProviders = {"udpm://", "tcpq://", "memq://"};
+    const bool good = std::any_of(kProviders.begin(), kProviders.end(),
+                                  [&](std::string_view start) { return url->starts_with(start); });
+    if (!good) return refuse(reader, "url", *url, kUrlRule);
+    config->lcm.url = std::move(*url);
+  }
+  if (reader.has("prefix")) {
+    auto prefix = read_name(reader, "prefix", kMaxPrefix, kPrefixRule);
+    if (!prefix) return fail(prefix.error());
+    config->lcm.prefix = std::move(*prefix);
+  }
+  return {};
+}
+
+Result<bushd_format> read_format(const TomlReader& reader) {
+  constexpr std::string_view kRule = "\"fine\" or \"coarse\"";
+  const auto format = reader.string("format", kRule);
+  if (!format) return fail(format.error());
+  if (*format == "fine") return BUSHD_FORMAT_FINE;
+  if (*format == "coarse") return BUSHD_FORMAT_COARSE;
+  return refuse(reader, "format", *format, kRule);
+}
+
+Result<std::uint32_t> read_baud(const TomlReader& reader) {
+  const auto rates = baud_rates();
+  const auto baud = reader.integer("baud", rates.front(), rates.back(), "bit/s");
+  if (!baud) return fail(baud.error());
+  const auto rate = static_cast<std::uint32_t>(*baud);
+  if (std::binary_search(rates.begin(), rates.end(), rate)) return rate;
+  return fail(reader.error(
+      "baud", fmt::format("is {}; allowed: {}", rate, fmt::join(rates.begin(), rates.end(), ", "))));
+}
+
+// The same port under two names would give its bytes to whoever reads first.
+Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vector<Bus>& others) {
+  for (const Bus& other : others) {
+    std::error_code missing;
+    const bool same = bus.port == other.port ||
+                      std::filesystem::equivalent(bus.port, other.port, missing);
+    if (!same) continue;
+    return fail(reader.error("port", fmt::format("\"{}\" is the port \"{}\" of bus \"{}\"; allowed: one bus "
+                                                 "a port. Put the MCUs of both on one [[bus]]",
+                                                 bus.port, other.port, other.name)));
+  }
+  return {};
+}
+
+Result<void> read_buses(Loading* loading) {
+  Taken names;
+  for (const TomlReader& reader : loading->buses) {
+    if (auto known = reader.only({"name", "port", "baud", "tick_us", "format"}); !known) return known;
+    Bus bus;
+    auto name = read_name(reader);
+    if (!name) return fail(name.error());
+    bus.name = std::move(*name);
+    if (auto taken = names.take(reader, "name", bus.name, bus.name); !taken) return taken;
+    constexpr std::string_view kPortRule = "the path of a serial port, such as \"/dev/ttyUSB0\"";
+    auto port = reader.string("port", kPortRule);
+    if (!port) return fail(port.error());
+    if (port->empty() || port->find('\0') != std::string::npos) {
+      return refuse(reader, "port", "", kPortRule);
+    }
+    bus.port = std::move(*port);
+    if (auto once = check_port(reader, bus, loading->config.buses); !once) return once;
+    const auto baud = read_baud(reader);
+    if (!baud) return fail(baud.error());
+    bus.baud = *baud;
+    const auto tick_us =
+        reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
+    if (!tick_us) return fail(tick_us.error());
+    bus.tick_us = static_cast<std::uint32_t>(*tick_us);
+    const auto format = read_format(reader);
+    if (!format) return fail(format.error());
+    bus.format = *format;
+    loading->config.buses.push_back(std::move(bus));
+  }
+  return {};
+}
+
+Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
+  Taken ids;
+  for (const TomlReader& reader : readers) {
+    if (auto known = reader.only({"bus", "address"}); !known) return known;
+    const auto bus = resolve<BusIndex>(reader, "bus", config->buses, &Bus::name);
+    if (!bus) return fail(bus.error());
+    const auto address = reader.integer("address", 1, 255);
+    if (!address) return fail(address.error());
+    Mcu mcu{.bus = *bus,
+            .address = {static_cast<std::uint8_t>(*address)},
+            .id = fmt::format("{}:{}", config->buses[bus->value].name, *address)};
+    const std::string what = fmt::format("address {} of bus \"{}\"", *address,
+                                         config->buses[bus->value].name);
+    if (auto taken = ids.take(reader, "address", mcu.id, what); !taken) return taken;
+    config->mcus.push_back(std::move(mcu));
+  }
+  return {};
+}
+
+// Tables by path, so that groups that name the same one share it.
+class TableShelf {
+ public:
+  explicit TableShelf(const std::filesystem::path& config_path) {
+    const std::filesystem::path beside = config_path.parent_path();
+    directories_ = {beside.empty() ? std::filesystem::path(".") : beside, beside / "tables"};
+    for (auto& shipped : tables::shipped_directories()) directories_.push_back(std::move(shipped));
+  }
+
+  Result<tables::TablePtr> get(const TomlReader& reader, const std::string& group) {
+    const auto name = reader.string("table", "the name of a table");
+    if (!name) return fail(name.error());
+    const auto path = tables::find(*name, directories_);
+    if (!path) return fail(reader.error("table", path.error().message));
+    if (const auto shelved = tables_.find(*path); shelved != tables_.end()) return shelved->second;
+    auto table = tables::load(*path);
+    if (!table) {
+      const Error user = reader.error("table", "");
+      table.error().message += fmt::format(" (the table of group \"{}\", {}:{})", group, user.file,
+                                           user.line);
+      return table;
+    }
+    return tables_.emplace(*path, std::move(*table)).first->second;
+  }
+
+ private:
+  std::vector<std::filesystem::path> directories_;
+  std::map<std::filesystem::path, tables::TablePtr> tables_;
+};
+
+Result<void> read_groups(Loading* loading) {
+  Taken names;
+  TableShelf shelf(loading->config.path);
+  for (const TomlReader& reader : loading->groups) {
+    if (auto known = reader.only({"name", "table"}); !known) return known;
+    auto name = read_name(reader);
+    if (!name) return fail(name.error());
+    if (auto taken = names.take(reader, "name", *name, *name); !taken) return taken;
+    auto table = shelf.get(reader, *name);
+    if (!table) return fail(table.error());
+    loading->config.groups.push_back({.name = std::move(*name), .table = std::move(*table)});
+  }
+  return {};
+}
+
+Result<void> read_motors(Loading* loading) {
+  Config& config = loading->config;
+  Taken names;
+  Taken outputs;
+  for (const TomlReader& reader : loading->motors) {
+    if (auto known = reader.only({"name", "mcu", "output", "group"}); !known) return known;
+    auto name = read_name(reader);
+    if (!name) return fail(name.error());
+    if (auto taken = names.take(reader, "name", *name, *name); !taken) return taken;
+    const auto mcu = resolve<McuIndex>(reader, "mcu", config.mcus, &Mcu::id);
+    if (!mcu) return fail(mcu.error());
+    const auto output = reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
+    if (!output) return fail(output.error());
+    const std::string& id = config.mcus[mcu->value].id;
+    const std::string what = fmt::format("output {} of MCU \"{}\"", *output, id);
+    if (auto taken = outputs.take(reader, "output", what, what); !taken) return taken;
+    const auto group = resolve<GroupIndex>(reader, "group", config.groups, &Group::name);
+    if (!group) return fail(group.error());
+    config.motors.push_back({.name = std::move(*name),
+                             .mcu = *mcu,
+                             .output = {static_cast<std::uint8_t>(*output)},
+                             .group = *group});
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> read_sections(const TomlReader& root, Loading* loading) {
+  const std::string& file = loading->config.path;
+  if (auto known = root.only({"lcm", "bus", "mcu", "group", "motor"}); !known) return known;
+  if (auto read = read_lcm(root, &loading->config); !read) return read;
+  auto buses = read_array(root, file, "bus", true);
+  if (!buses) return fail(buses.error());
+  loading->buses = std::move(*buses);
+  const auto mcus = read_array(root, file, "mcu", false);
+  if (!mcus) return fail(mcus.error());
+  auto groups = read_array(root, file, "group", false);
+  if (!groups) return fail(groups.error());
+  loading->groups = std::move(*groups);
+  auto motors = read_array(root, file, "motor", false);
+  if (!motors) return fail(motors.error());
+  loading->motors = std::move(*motors);
+  if (auto read = read_buses(loading); !read) return read;
+  if (auto read = read_mcus(*mcus, &loading->config); !read) return read;
+  if (auto read = read_groups(loading); !read) return read;
+  return read_motors(loading);
+}
+
+}  // namespace bushd::config
