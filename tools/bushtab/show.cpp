@@ -1,0 +1,111 @@
+#include <fmt/core.h>
+
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "engine/run.h"
+#include "open_table.h"
+
+namespace bushtab {
+namespace {
+
+using bushd::tables::Table;
+using nlohmann::ordered_json;
+
+double steps_per_s(const Table& table, std::uint16_t code) {
+  return 1e9 / (static_cast<double>(code) * table.view().time_unit_ns);
+}
+
+std::uint64_t ramp_ns(const Table& table, const bushd_ramp& side) {
+  return std::uint64_t{side.sum[side.count]} * table.view().time_unit_ns;
+}
+
+// The first index from which a side does not slow the motor below cruise.
+std::uint64_t codes_above_cruise(const bushd_ramp& side, std::uint16_t cruise) {
+  std::uint64_t count = 0;
+  while (count < side.count && side.code[count] > cruise) ++count;
+  return count;
+}
+
+std::uint64_t shortest_cruising_move(const bushd_table& table) {
+  return codes_above_cruise(table.accel, table.cruise) +
+         codes_above_cruise(table.decel, table.cruise) + 1;
+}
+
+// 0: not even the shortest one.
+std::uint64_t longest_tick_us(const bushd_table& table) {
+  const std::uint64_t shortest_ns = std::uint64_t{table.time_unit_ns} * bushd_table_fastest(&table);
+  const std::uint64_t tick_ns = shortest_ns * BUSHD_MAX_STEPS_PER_TICK - 1;
+  if (tick_ns < BUSHD_MIN_TICK_NS) return 0;
+  return (tick_ns > BUSHD_MAX_TICK_NS ? BUSHD_MAX_TICK_NS : tick_ns) / 1000;
+}
+
+ordered_json side_json(const Table& table, const bushd_ramp& side) {
+  const std::uint16_t slowest = side.code[0];
+  const std::uint16_t fastest = side.code[side.count - 1];
+  return {{"codes", side.count},
+          {"slowest_code", slowest},
+          {"fastest_code", fastest},
+          {"slowest_steps_per_s", steps_per_s(table, slowest)},
+          {"fastest_steps_per_s", steps_per_s(table, fastest)},
+          {"time_ns", ramp_ns(table, side)}};
+}
+
+void print_json(const Table& table) {
+  const bushd_table& view = table.view();
+  const ordered_json json = {
+      {"name", table.name()},
+      {"description", table.description()},
+      {"path", table.path()},
+      {"time_unit_ns", view.time_unit_ns},
+      {"symmetric", table.symmetric()},
+      {"accel", side_json(table, view.accel)},
+      {"decel", side_json(table, view.decel)},
+      {"cruise", {{"code", view.cruise}, {"steps_per_s", steps_per_s(table, view.cruise)}}},
+      {"shortest_cruising_move_steps", shortest_cruising_move(view)},
+      {"longest_tick_us", longest_tick_us(view)}};
+  // A path need not be UTF-8.
+  fmt::print("{}\n", json.dump(2, ' ', false, ordered_json::error_handler_t::replace));
+}
+
+std::string side_text(const Table& table, const bushd_ramp& side) {
+  const std::uint16_t slowest = side.code[0];
+  const std::uint16_t fastest = side.code[side.count - 1];
+  return fmt::format("{} codes {}..{}, {:.6g}..{:.6g} steps/s, {:.3f} ms", side.count, slowest, fastest,
+                     steps_per_s(table, slowest), steps_per_s(table, fastest),
+                     static_cast<double>(ramp_ns(table, side)) * 1e-6);
+}
+
+void print_text(const Table& table) {
+  const bushd_table& view = table.view();
+  fmt::print("{} ({})\n", table.name(), table.path());
+  if (!table.description().empty()) fmt::print("{}\n", table.description());
+  fmt::print("\n  time unit     {} ns\n", view.time_unit_ns);
+  fmt::print("  acceleration  {}\n", side_text(table, view.accel));
+  fmt::print("  deceleration  {}\n",
+             table.symmetric() ? "the same, reversed" : side_text(table, view.decel));
+  fmt::print("  cruise        code {}, {:.6g} steps/s, reached by moves of {} steps or more\n",
+             view.cruise, steps_per_s(table, view.cruise), shortest_cruising_move(view));
+  if (const std::uint64_t tick_us = longest_tick_us(view)) {
+    fmt::print("  ticks         up to {} us ({} steps a tick at most)\n", tick_us,
+               BUSHD_MAX_STEPS_PER_TICK);
+  } else {
+    fmt::print("  ticks         too fast for any: more than {} steps in the shortest tick\n",
+               BUSHD_MAX_STEPS_PER_TICK);
+  }
+}
+
+}  // namespace
+
+int show(const std::string& name, bool json) {
+  const auto table = open_table(name);
+  if (!table) return refuse(table.error());
+  if (json) {
+    print_json(**table);
+  } else {
+    print_text(**table);
+  }
+  return kDone;
+}
+
+}  // namespace bushtab
