@@ -73,7 +73,11 @@ void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_
   clear(run, table, direction);
   if (delay == 0) return;
   lead_then_ramp_down(run, delay);
-  run->since = (uint32_t)delay * fraction / 256u;
+  // Rounded up to whole ns: rounded down, the position would first fall back behind `fraction`.
+  const uint32_t unit_ns = table->time_unit_ns;
+  const uint64_t over_ns = ((uint64_t)delay * unit_ns * fraction + 255u) / 256u;
+  run->since = (uint32_t)(over_ns / unit_ns);
+  run->since_ns = (uint32_t)(over_ns % unit_ns);
   run->fraction = fraction;
 }
 

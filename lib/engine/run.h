@@ -44,8 +44,9 @@ typedef struct bushd_run {
 // Precondition: the table passed bushd_table_check.
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction);
 
-// A ramp-down taken up in the middle of a step whose delay is `delay`, of which fraction/256 is over:
-// that step, then D(k-1) .. D(0). It is what an MCU runs when its queue ends early. O(log count).
+// A ramp-down taken up in the middle of a step whose delay is `delay`, of which fraction/256 (rounded up to
+// whole ns) is over: that step, then D(k-1) .. D(0). It is what an MCU runs when its queue ends early.
+// O(log count).
 void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
                                uint8_t fraction, int direction);
 

@@ -1,0 +1,117 @@
+// The slow reference: positions straight from the definition, step by step, in exact rational numbers.
+//
+//   delay before step j of N = max(A(j-1), D(N-j), c);  step j falls at the sum of the first j delays;
+//   position at time t = steps whose time is <= t, in the fine format plus the elapsed share of the
+//   running delay, rounded down to 1/256 step.
+//
+// Shares no code with lib/engine: sides are plain vectors, times are 128-bit counts of 1/256 ns.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace bushd::test {
+
+__extension__ typedef __int128 Wide;
+
+struct Law {
+  std::vector<uint16_t> accel;  // from slow to fast
+  std::vector<uint16_t> decel;  // from slow to fast, that is: by steps before the end
+  uint16_t cruise = 1;
+  uint32_t unit_ns = 1;
+
+  Wide accel_at(size_t i) const { return i < accel.size() ? accel[i] : cruise; }
+  Wide decel_at(size_t i) const { return i < decel.size() ? decel[i] : cruise; }
+};
+
+// A step's delay and when it ends, both in 1/256 ns (so that 256ths of a step stay whole numbers).
+struct Step {
+  Wide delay;
+  Wide end;
+};
+
+class Reference {
+ public:
+  static Reference move(const Law& law, size_t steps) {
+    Reference r(law);
+    for (size_t j = 1; j <= steps; ++j) {
+      Wide delay = law.cruise;
+      if (law.accel_at(j - 1) > delay) delay = law.accel_at(j - 1);
+      if (law.decel_at(steps - j) > delay) delay = law.decel_at(steps - j);
+      r.append(delay);
+    }
+    return r;
+  }
+
+  // Taken up in the middle of a step of `delay` units of which fraction/256 is over, to whole ns.
+  static Reference ramp_down(const Law& law, uint16_t delay, uint8_t fraction) {
+    Reference r(law);
+    const Wide over_ns = (Wide{delay} * law.unit_ns * fraction + 255) / 256;
+    r.append(delay);
+    r.steps_.back().end -= over_ns * 256;
+    r.origin_ = -over_ns * 256;
+    r.append_ramp_down(delay);
+    return r;
+  }
+
+  // From `ns` on: the running step, then the fewest steps k with D(k) <= its delay.
+  void ramp_down_at(uint64_t ns) {
+    const size_t made = steps_at(ns);
+    if (made == steps_.size()) return;
+    steps_.resize(made + 1);
+    append_ramp_down(steps_.back().delay / (Wide{law_.unit_ns} * 256));
+  }
+
+  size_t steps() const { return steps_.size(); }
+  const Step& step(size_t i) const { return steps_[i]; }
+
+  size_t steps_at(uint64_t ns) const {
+    size_t made = 0;
+    while (made < steps_.size() && steps_[made].end <= Wide{ns} * 256) ++made;
+    return made;
+  }
+
+  // In 1/256 step.
+  int64_t position_at(uint64_t ns) const {
+    const size_t made = steps_at(ns);
+    int64_t position = static_cast<int64_t>(made) * 256;
+    if (made < steps_.size()) {
+      const Wide begin = made == 0 ? origin_ : steps_[made - 1].end;
+      position += static_cast<int64_t>((Wide{ns} * 256 - begin) * 256 / steps_[made].delay);
+    }
+    return position;
+  }
+
+  uint64_t units_left_at(uint64_t ns) const {
+    if (steps_.empty() || steps_.back().end <= Wide{ns} * 256) return 0;
+    const Wide unit = Wide{law_.unit_ns} * 256;
+    return static_cast<uint64_t>((steps_.back().end - Wide{ns} * 256 + unit - 1) / unit);
+  }
+
+  // The delay of the step that runs at `ns`, in units; 0 when all are made.
+  uint16_t delay_at(uint64_t ns) const {
+    const size_t made = steps_at(ns);
+    if (made == steps_.size()) return 0;
+    return static_cast<uint16_t>(steps_[made].delay / (Wide{law_.unit_ns} * 256));
+  }
+
+ private:
+  explicit Reference(const Law& law) : law_(law) {}
+
+  void append(Wide units) {
+    const Wide delay = units * law_.unit_ns * 256;
+    steps_.push_back({delay, (steps_.empty() ? Wide{0} : steps_.back().end) + delay});
+  }
+  void append_ramp_down(Wide delay) {
+    size_t k = 0;
+    while (k < law_.decel.size() && law_.decel_at(k) > delay) ++k;
+    while (k-- > 0) append(law_.decel_at(k));
+  }
+
+  Law law_;
+  std::vector<Step> steps_;
+  Wide origin_ = 0;
+};
+
+}  // namespace bushd::test

@@ -1,0 +1,314 @@
+#include "engine/run.h"
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/tables.h"
+
+namespace bushd::test {
+namespace {
+
+enum class Format { kCoarse, kFine };
+
+// The next ticks as signed 1/256 steps whatever the format; blocks of random size and stride if asked.
+std::vector<int> expand(bushd_run* run, Format format, uint32_t tick_ns, size_t ticks,
+                        bool random_blocks = false) {
+  std::vector<int> all;
+  while (all.size() < ticks) {
+    size_t block = ticks - all.size();
+    size_t stride = 1;
+    if (random_blocks) {
+      block = std::min(block, between<size_t>(1, 20));
+      stride = between<size_t>(1, 3);
+    }
+    const bool was_done = bushd_run_done(run);
+    size_t active = 0;
+    if (format == Format::kCoarse) {
+      std::vector<uint8_t> out(block * stride, 0x55);
+      active = bushd_run_expand_coarse(run, tick_ns, block, out.data(), stride);
+      for (size_t i = 0; i < out.size(); ++i) {
+        if (i % stride != 0) {
+          EXPECT_EQ(out[i], 0x55) << "wrote between its places";
+        } else {
+          all.push_back((out[i] & BUSHD_COARSE_DIRECTION ? 1 : -1) * (out[i] & 0x7F) * 256);
+        }
+      }
+    } else {
+      std::vector<int16_t> out(block * stride, 0x5555);
+      active = bushd_run_expand_fine(run, tick_ns, block, out.data(), stride);
+      for (size_t i = 0; i < out.size(); ++i) {
+        if (i % stride != 0) {
+          EXPECT_EQ(out[i], 0x5555) << "wrote between its places";
+        } else {
+          all.push_back(out[i]);
+        }
+      }
+    }
+    EXPECT_LE(active, block);
+    if (was_done) { EXPECT_EQ(active, 0u); }
+    if (active < block) { EXPECT_TRUE(bushd_run_done(run)); }
+  }
+  return all;
+}
+
+int64_t position(const Reference& reference, Format format, uint64_t ns) {
+  return format == Format::kFine ? reference.position_at(ns)
+                                 : static_cast<int64_t>(reference.steps_at(ns)) * 256;
+}
+
+// The displacements of ticks first .. first + ticks - 1 by the definition.
+std::vector<int> expected(const Reference& reference, Format format, uint32_t tick_ns, size_t first,
+                          size_t ticks, int direction, int64_t start = 0) {
+  std::vector<int> all;
+  int64_t before = first == 0 ? start : position(reference, format, uint64_t{first} * tick_ns);
+  for (size_t n = first; n < first + ticks; ++n) {
+    const int64_t after = position(reference, format, uint64_t{n + 1} * tick_ns);
+    all.push_back(static_cast<int>(after - before) * direction);
+    before = after;
+  }
+  return all;
+}
+
+// Ticks until the end of the reference, and some more; bounded so that a slow table does not stall the test.
+size_t ticks_to_compare(const Reference& reference, uint32_t tick_ns) {
+  const uint64_t units_ns = reference.steps() == 0
+                                ? 0
+                                : static_cast<uint64_t>(reference.step(reference.steps() - 1).end / 256);
+  return static_cast<size_t>(std::min<uint64_t>(units_ns / tick_ns + 3, 2000));
+}
+
+int64_t sum(const std::vector<int>& values) {
+  int64_t total = 0;
+  for (const int value : values) total += value;
+  return total;
+}
+
+// A short, readable table: 5 4 3 | 3 | 2 3 6, with the sides unequal.
+const Law kSmall{{5, 4, 3}, {6, 3, 2}, 3, 1000};
+
+TEST(Run, FollowsTheRuleOnAMoveComputedByHand) {
+  const TestTable table(kSmall, false);
+  bushd_run run;
+  bushd_run_start(&run, table.view(), 5, 1);
+  // Delays max(A(j-1), D(5-j), 3) = 5 4 3 3 6; steps at 5, 9, 12, 15, 21 us; ticks of 4 us.
+  EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 7), (std::vector<int>{0, 256, 512, 256, 0, 256, 0}));
+}
+
+TEST(Run, ShortMoveNeverReachesCruise) {
+  const Law law{{50, 40, 30, 20, 10}, {50, 40, 30, 20, 10}, 10, 1000};
+  const TestTable table(law, true);
+  bushd_run run;
+  bushd_run_start(&run, table.view(), 4, 1);
+  EXPECT_EQ(bushd_run_units_left(&run), 50u + 40u + 40u + 50u);
+}
+
+TEST(Run, OfNoStepsIsDone) {
+  const TestTable table(kSmall, true);
+  bushd_run run;
+  bushd_run_start(&run, table.view(), 0, 1);
+  EXPECT_TRUE(bushd_run_done(&run));
+  EXPECT_EQ(bushd_run_delay(&run), 0);
+  uint8_t out[3] = {1, 1, 1};
+  EXPECT_EQ(bushd_run_expand_coarse(&run, 4000, 3, out, 1), 0u);
+  EXPECT_EQ(out[0] + out[1] + out[2], 0);
+}
+
+TEST(Run, OfTheMostStepsStartsInstantly) {
+  const TestTable table(kSmall, true);
+  bushd_run run;
+  bushd_run_start(&run, table.view(), UINT32_MAX, 1);
+  EXPECT_EQ(bushd_run_steps_left(&run), UINT32_MAX);
+  EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 3), (std::vector<int>{0, 256, 512}));
+}
+
+TEST(Run, IdleTicksAfterTheEndAreZeroBytesInBothDirections) {
+  const TestTable table(kSmall, true);
+  for (const int direction : {1, -1}) {
+    bushd_run run;
+    bushd_run_start(&run, table.view(), 1, direction);
+    uint8_t out[4];
+    EXPECT_EQ(bushd_run_expand_coarse(&run, 4000, 4, out, 1), 2u);
+    EXPECT_EQ(out[2], 0);
+    EXPECT_EQ(out[3], 0);
+  }
+}
+
+void check_move(const TestTable& table, Format format) {
+  const auto steps = between<uint32_t>(0, 300);
+  const int direction = *rc::gen::element(1, -1);
+  const uint32_t tick_ns = any_tick_ns(table.law());
+  const Reference reference = Reference::move(table.law(), steps);
+  const size_t ticks = ticks_to_compare(reference, tick_ns);
+  RC_LOG() << "steps " << steps << " tick " << tick_ns << " ticks " << ticks << '\n';
+  bushd_run run;
+  bushd_run_start(&run, table.view(), steps, direction);
+  const auto got = expand(&run, format, tick_ns, ticks, true);
+  RC_ASSERT(got == expected(reference, format, tick_ns, 0, ticks, direction));
+  const uint64_t now = uint64_t{ticks} * tick_ns;
+  RC_ASSERT(run.steps_done == reference.steps_at(now));
+  RC_ASSERT(bushd_run_steps_left(&run) == steps - run.steps_done);
+  if (bushd_run_done(&run)) RC_ASSERT(sum(got) == int64_t{steps} * 256 * direction);
+}
+
+TEST(Run, CoarseTicksAgreeWithTheDefinition) {
+  holds("coarse, walked", [] { check_move(TestTable(any_law(), false), Format::kCoarse); });
+  holds("coarse, indexed", [] { check_move(TestTable(any_law(), true), Format::kCoarse); });
+}
+
+TEST(Run, FineTicksAgreeWithTheDefinition) {
+  holds("fine, walked", [] { check_move(TestTable(any_law(), false), Format::kFine); });
+  holds("fine, indexed", [] { check_move(TestTable(any_law(), true), Format::kFine); });
+}
+
+// Realistic tables are long and take many ticks: block by block through every part.
+TEST(Run, LongMovesAgreeWithTheDefinitionTickByTick) {
+  Law law;
+  for (uint16_t i = 0; i < 238; ++i) law.accel.push_back(static_cast<uint16_t>(250 - i));
+  law.accel.push_back(10);
+  law.decel = law.accel;
+  law.cruise = 10;
+  law.unit_ns = 40000;
+  for (const bool indexed : {false, true}) {
+    const TestTable table(law, indexed);
+    for (const uint32_t steps : {1u, 2u, 237u, 475u, 476u, 477u, 478u, 479u, 5000u}) {
+      for (const Format format : {Format::kCoarse, Format::kFine}) {
+        const Reference reference = Reference::move(law, steps);
+        const size_t ticks = ticks_to_compare(reference, 2'560'000);
+        bushd_run run;
+        bushd_run_start(&run, table.view(), steps, -1);
+        ASSERT_EQ(expand(&run, format, 2'560'000, ticks),
+                  expected(reference, format, 2'560'000, 0, ticks, -1))
+            << steps << " steps";
+        EXPECT_TRUE(bushd_run_done(&run));
+      }
+    }
+  }
+}
+
+TEST(Run, TellsDelayAndTimeLeftAtEveryTick) {
+  holds("delay and units_left == definition", [] {
+    const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
+    const auto steps = between<uint32_t>(0, 100);
+    const uint32_t tick_ns = any_tick_ns(table.law());
+    const Format format = *rc::gen::element(Format::kCoarse, Format::kFine);
+    const Reference reference = Reference::move(table.law(), steps);
+    const size_t ticks = std::min<size_t>(ticks_to_compare(reference, tick_ns), 200);
+    bushd_run run;
+    bushd_run_start(&run, table.view(), steps, 1);
+    for (size_t n = 0; n <= ticks; ++n) {
+      const uint64_t now = uint64_t{n} * tick_ns;
+      RC_ASSERT(bushd_run_delay(&run) == reference.delay_at(now));
+      RC_ASSERT(bushd_run_units_left(&run) == reference.units_left_at(now));
+      expand(&run, format, tick_ns, 1);
+    }
+  });
+}
+
+TEST(Run, RampsDownFromAnyTick) {
+  holds("ramp-down == definition", [] {
+    const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
+    const auto steps = between<uint32_t>(0, 200);
+    const int direction = *rc::gen::element(1, -1);
+    const uint32_t tick_ns = any_tick_ns(table.law());
+    const Format format = *rc::gen::element(Format::kCoarse, Format::kFine);
+    Reference reference = Reference::move(table.law(), steps);
+    const size_t all = ticks_to_compare(reference, tick_ns);
+    // Once or twice: a ramp-down may itself be asked to ramp down.
+    size_t at = between<size_t>(0, all);
+    bushd_run run;
+    bushd_run_start(&run, table.view(), steps, direction);
+    auto got = expand(&run, format, tick_ns, at, true);
+    auto want = expected(reference, format, tick_ns, 0, at, direction);
+    for (int again = between(0, 1); again >= 0; --again) {
+      const uint32_t before = bushd_run_steps_left(&run);
+      bushd_run_ramp_down(&run);
+      RC_ASSERT(bushd_run_steps_left(&run) <= before);
+      reference.ramp_down_at(uint64_t{at} * tick_ns);
+      const size_t more = again > 0 ? between<size_t>(0, 20) : ticks_to_compare(reference, tick_ns) + 1;
+      for (const int d : expand(&run, format, tick_ns, more, true)) got.push_back(d);
+      for (const int d : expected(reference, format, tick_ns, at, more, direction)) want.push_back(d);
+      at += more;
+    }
+    RC_ASSERT(got == want);
+    RC_ASSERT(run.steps_done == reference.steps_at(uint64_t{at} * tick_ns));
+    if (bushd_run_done(&run)) {
+      RC_ASSERT(sum(got) == static_cast<int64_t>(reference.steps()) * 256 * direction);
+    }
+  });
+}
+
+TEST(Run, RampDownBeforeTheFirstTickMakesTheFirstStepOnly) {
+  const Law law{{50, 40, 30}, {50, 40, 30}, 30, 1000};
+  const TestTable table(law, true);
+  bushd_run run;
+  bushd_run_start(&run, table.view(), 100, 1);
+  bushd_run_ramp_down(&run);
+  EXPECT_EQ(bushd_run_steps_left(&run), 1u);  // D(0) = 50 <= 50: no step more is needed
+}
+
+TEST(Run, TakesOverInTheMiddleOfAStep) {
+  holds("taken over == definition", [] {
+    const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
+    // A delay that a run of this table can have: not below cruise.
+    const uint16_t delay = between<uint16_t>(table.law().cruise, 65535);
+    const auto fraction = *rc::gen::arbitrary<uint8_t>();
+    const int direction = *rc::gen::element(1, -1);
+    const uint32_t tick_ns = any_tick_ns(table.law());
+    const Format format = *rc::gen::element(Format::kCoarse, Format::kFine);
+    const Reference reference = Reference::ramp_down(table.law(), delay, fraction);
+    const size_t ticks = ticks_to_compare(reference, tick_ns);
+    bushd_run run;
+    bushd_run_start_ramp_down(&run, table.view(), delay, fraction, direction);
+    RC_ASSERT(bushd_run_units_left(&run) == reference.units_left_at(0));
+    const auto got = expand(&run, format, tick_ns, ticks, true);
+    RC_ASSERT(got == expected(reference, format, tick_ns, 0, ticks, direction,
+                              format == Format::kFine ? fraction : 0));
+    for (const int d : got) RC_ASSERT(d * direction >= 0);
+    if (bushd_run_done(&run) && format == Format::kFine) {
+      RC_ASSERT(sum(got) ==
+                (static_cast<int64_t>(reference.steps()) * 256 - fraction) * direction);
+    }
+  });
+}
+
+// What an MCU makes of (delay, fraction) when its queue ends must be the steps that the daemon's own
+// ramp-down of the same run makes, at most one unit of 1/256 step apart in time.
+TEST(Run, TakeOverMakesAsManyStepsAsTheRunItselfRampingDown) {
+  holds("take-over and ramp-down end at the same step", [] {
+    const TestTable table(any_law(), true);
+    const uint32_t tick_ns = any_tick_ns(table.law());
+    bushd_run run;
+    bushd_run_start(&run, table.view(), between<uint32_t>(1, 200), 1);
+    expand(&run, Format::kFine, tick_ns, between<size_t>(0, 60));
+    RC_PRE(!bushd_run_done(&run));
+    bushd_run taken;
+    bushd_run_start_ramp_down(&taken, table.view(), bushd_run_delay(&run), run.fraction, 1);
+    bushd_run_ramp_down(&run);
+    RC_ASSERT(bushd_run_steps_left(&taken) == bushd_run_steps_left(&run));
+    RC_ASSERT(bushd_run_units_left(&taken) >= bushd_run_units_left(&run));
+  });
+}
+
+TEST(Run, TakeOverAtRestIsDone) {
+  const TestTable table(kSmall, true);
+  bushd_run run;
+  bushd_run_start_ramp_down(&run, table.view(), 0, 0, 1);
+  EXPECT_TRUE(bushd_run_done(&run));
+}
+
+TEST(Run, ACopyReplaysTheSameTicks) {
+  holds("copy == original", [] {
+    const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
+    const uint32_t tick_ns = any_tick_ns(table.law());
+    const Format format = *rc::gen::element(Format::kCoarse, Format::kFine);
+    bushd_run run;
+    bushd_run_start(&run, table.view(), between<uint32_t>(0, 200), 1);
+    expand(&run, format, tick_ns, between<size_t>(0, 60));
+    bushd_run copy = run;
+    const auto first = expand(&run, format, tick_ns, 60);
+    RC_ASSERT(expand(&copy, format, tick_ns, 60) == first);
+  });
+}
+
+}  // namespace
+}  // namespace bushd::test
