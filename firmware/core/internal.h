@@ -36,5 +36,6 @@ bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message);
 
 // sync.c: the tick counter against the bus's.
 void bushd_mcu_sync(bushd_mcu* mcu, uint8_t tag, const bushd_sync* sync, uint32_t time_in_tick_ns);
+void bushd_mcu_slew(bushd_mcu* mcu);  // at every tick boundary
 
 #endif

@@ -77,7 +77,7 @@ const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   }
   mcu->front ^= 1u;
   ++mcu->tick;
-  if (mcu->settling != 0) --mcu->settling;
+  bushd_mcu_slew(mcu);
   return &mcu->plane[mcu->front];
 }
 
@@ -157,6 +157,7 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
   // Another tick length is another time: the MCU must be told the bus's tick again, and its tables be checked
   // against it again.
   mcu->flags = (uint8_t)((mcu->flags | BUSHD_FLAG_CONFIGURED) & ~(BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK));
+  mcu->behind_ns = 0;
   mcu->settling = 2;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     mcu->motor[m].table = -1;

@@ -76,6 +76,7 @@ typedef struct bushd_mcu {
   bushd_format format;
   uint8_t front;       // plane[front] is being emitted
   uint8_t settling;    // ticks until the tick timer has carried out the last jump; marks are void till then
+  int32_t behind_ns;   // the bus, still to be made up by the tick timer
   uint8_t mark_tag;
   uint32_t mark_tick;
   uint32_t mark_ns;
