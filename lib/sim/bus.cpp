@@ -6,12 +6,15 @@
 namespace bushd::sim {
 namespace {
 
-// How far a sink may have to wait for edges (and so to buffer) while time is moved in great strides.
+// How far a sink may have to wait for edges (and so to buffer) while time is moved in great
+// strides.
 constexpr TimeNs kSettlingPeriodNs = 10'000'000;
 
 }  // namespace
 
-Bus::Bus(std::uint32_t baud, EdgeSink* sink) : sink_(sink), line_(baud) { line_.add_talker(); }
+Bus::Bus(std::uint32_t baud, EdgeSink* sink) : sink_(sink), line_(baud) {
+  line_.add_talker();
+}
 
 std::size_t Bus::add_mcu(const McuOptions& options) {
   assert(options.boot_ns >= now_ns_);

@@ -1,9 +1,9 @@
-// A bus in simulated time: one master's port, a line, and MCUs that run the firmware core. No I/O and no
-// clock: time is moved by the caller, and the same calls always give the same result.
+// A bus in simulated time: one master's port, a line, and MCUs that run the firmware core. No I/O
+// and no clock: time is moved by the caller, and the same calls always give the same result.
 //
-// Who hears what: an MCU hears every byte of the others and of the master, at the end of its stop bit,
-// unless it drives the line itself meanwhile (its receiver is off then) or is in reset. The master's port
-// hears every byte of the MCUs and not its own.
+// Who hears what: an MCU hears every byte of the others and of the master, at the end of its stop
+// bit, unless it drives the line itself meanwhile (its receiver is off then) or is in reset. The
+// master's port hears every byte of the MCUs and not its own.
 //
 // Order of events: by time. What happens at the same ns goes thus: boots and tick boundaries, in
 // the order in which the MCUs were added; then ends of bytes, the master's first, then the
@@ -31,8 +31,8 @@ class Bus : private VirtualMcu::Driver {
   // Returns its index. Several MCUs of one address are possible: that is a fault worth simulating.
   std::size_t add_mcu(const McuOptions& options);
 
-  // Bytes for the line at `at_ns` (>= now_ns()), or as soon as those given before are sent. The master does
-  // not listen before it talks.
+  // Bytes for the line at `at_ns` (>= now_ns()), or as soon as those given before are sent. The
+  // master does not listen before it talks.
   void master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns);
 
   // A byte for the master: called when its stop bit has ended. May call master_send.
@@ -51,8 +51,8 @@ class Bus : private VirtualMcu::Driver {
   // When the line falls silent, if nothing more is sent; in the past if it is silent.
   TimeNs line_busy_until_ns() const { return line_.busy_until_ns(); }
 
-  // Resets an MCU now: what it was sending breaks off, and it boots with the next boot number when `down_ns`
-  // have passed.
+  // Resets an MCU now: what it was sending breaks off, and it boots with the next boot number when
+  // `down_ns` have passed.
   void reboot(std::size_t mcu, TimeNs down_ns = 0);
 
   std::size_t mcu_count() const { return mcus_.size(); }

@@ -6,7 +6,8 @@
 
 namespace bushd::sim {
 
-// Simulated time since the beginning of the simulation, ns. It has nothing to do with the clock on the wall.
+// Simulated time since the beginning of the simulation, ns. It has nothing to do with the clock on
+// the wall.
 using TimeNs = std::int64_t;
 
 enum class Signal : std::uint8_t { kStep, kDir, kEnable };
@@ -15,7 +16,7 @@ inline constexpr std::size_t kOutputsPerMcu = 16;
 
 struct Edge {
   TimeNs time_ns;
-  std::size_t mcu;     // position on the bus, in the order of Bus::add_mcu
+  std::size_t mcu;  // position on the bus, in the order of Bus::add_mcu
   Signal signal;
   std::uint8_t index;  // output 0..15; 0 for kEnable
   bool level;

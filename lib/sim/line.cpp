@@ -30,8 +30,7 @@ TimeNs Line::send(std::size_t talker, std::span<const std::uint8_t> bytes, TimeN
       t.bytes_since_origin = 0;
     }
     ++t.bytes_since_origin;
-    const TimeNs end_ns =
-        t.origin_ns + t.bytes_since_origin * kBitsPerByte * kNsPerSecond / baud_;
+    const TimeNs end_ns = t.origin_ns + t.bytes_since_origin * kBitsPerByte * kNsPerSecond / baud_;
     t.waiting.push_back({t.free_ns, end_ns, value, false});
     t.free_ns = end_ns;
   }
@@ -49,8 +48,8 @@ void Line::silence(std::size_t talker, TimeNs now_ns) {
   find_next();
 }
 
-// A byte that is looked at ends now, so whatever could overlap it is the one taken last or the one on
-// the line: both bytes are of the same length.
+// A byte that is looked at ends now, so whatever could overlap it is the one taken last or the one
+// on the line: both bytes are of the same length.
 const Line::Byte* Line::overlap(const Talker& talker, TimeNs start_ns, TimeNs end_ns) {
   if (talker.last.end_ns > start_ns && talker.last.start_ns < end_ns) return &talker.last;
   if (talker.waiting.empty()) return nullptr;
@@ -72,9 +71,8 @@ LineByte Line::take() {
     taken.corrupted = true;
     const TimeNs began_ns = std::max(byte.start_ns, other->start_ns);
     if (began_ns > collision_until_ns_) {
-      const bool first = byte.start_ns < other->start_ns;
-      taken.collision =
-          Collision{began_ns, {first ? next_talker_ : i, first ? i : next_talker_}};
+      const bool first = byte.start_ns <= other->start_ns;
+      taken.collision = Collision{began_ns, {first ? next_talker_ : i, first ? i : next_talker_}};
     }
     collision_until_ns_ = std::max({collision_until_ns_, byte.end_ns, other->end_ns});
   }

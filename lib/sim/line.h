@@ -1,9 +1,9 @@
 // A half-duplex RS-485 line: who talks when, and what happens when two talk at once.
 //
-// A byte takes 10 bit times (start, 8 data, stop). Bytes of one talker never overlap each other; where those of two
-// talkers do, all of them arrive corrupted: a pattern is put over them, always the same, so
-// that a simulation can be repeated. Byte boundaries are kept exact over any length of time, also where
-// 10 bit times are no whole number of ns.
+// A byte takes 10 bit times (start, 8 data, stop). Bytes of one talker never overlap each other;
+// where those of two talkers do, all of them arrive corrupted: a pattern is put over them, always
+// the same, so that a simulation can be repeated. Byte boundaries are kept exact over any length of
+// time, also where 10 bit times are no whole number of ns.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ inline constexpr std::int64_t kBitsPerByte = 10;
 
 struct Collision {
   TimeNs time_ns;  // when the second one began
-  std::size_t talker[2];
+  std::size_t talker[2];  // in the order in which their bytes began
 };
 
 struct LineByte {
@@ -47,8 +47,8 @@ class Line {
   // Returns the end of the last one. Precondition: at_ns is not before the last byte taken.
   TimeNs send(std::size_t talker, std::span<const std::uint8_t> bytes, TimeNs at_ns);
 
-  // The talker falls silent at now_ns: the byte on the line is broken off (and so corrupted), those behind it
-  // are dropped.
+  // The talker falls silent at now_ns: the byte on the line is broken off (and so corrupted), those
+  // behind it are dropped.
   void silence(std::size_t talker, TimeNs now_ns);
 
   // End of the byte that ends next, kNever if there is none. O(1).
@@ -58,8 +58,8 @@ class Line {
   // Precondition: there is one. O(talkers).
   LineByte take();
 
-  // Does the talker drive the line at any time within (from_ns, until_ns)? Right for the present byte only: the
-  // past is forgotten. O(1).
+  // Does the talker drive the line at any time within (from_ns, until_ns)? Right for the present
+  // byte only: the past is forgotten. O(1).
   bool drives(std::size_t talker, TimeNs from_ns, TimeNs until_ns) const;
 
   // When the last byte now waiting ends; not after now if the line is free. O(talkers).

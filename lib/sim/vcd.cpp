@@ -15,9 +15,12 @@ constexpr std::size_t kTextBytes = std::size_t{1} << 18;
 std::size_t wire_of(const Edge& edge) {
   const std::size_t first = edge.mcu * kWiresPerMcu;
   switch (edge.signal) {
-    case Signal::kStep: return first + edge.index;
-    case Signal::kDir: return first + kOutputsPerMcu + edge.index;
-    case Signal::kEnable: break;
+    case Signal::kStep:
+      return first + edge.index;
+    case Signal::kDir:
+      return first + kOutputsPerMcu + edge.index;
+    case Signal::kEnable:
+      break;
   }
   return first + 2 * kOutputsPerMcu;
 }

@@ -1,10 +1,11 @@
-// Edges into a Value Change Dump (IEEE 1364-2005, clause 18), for GTKWave, PulseView and tools/check-trace.
+// Edges into a Value Change Dump (IEEE 1364-2005, clause 18), for GTKWave, PulseView and
+// tools/check-trace.
 //
 //     $timescale 1 ns $end
 //     scopes `mcu<address>`, in each the wires `step0`..`step15`, `dir0`..`dir15`, `en`
 //
-// Time stamps rise strictly: edges of all MCUs are merged. Those of one ns stand in the order of the MCUs
-// on the bus, those of one MCU in the order in which they were made.
+// Time stamps rise strictly: edges of all MCUs are merged. Those of one ns stand in the order of
+// the MCUs on the bus, those of one MCU in the order in which they were made.
 #pragma once
 
 #include <cstdint>
@@ -22,21 +23,24 @@ namespace bushd::sim {
 
 class VcdWriter final : public EdgeSink {
  public:
-  // Creates (or empties) the file and writes its head. `addresses` in the order of the MCUs on the bus.
+  // Creates (or empties) the file and writes its head. `addresses` in the order of the MCUs on the
+  // bus.
   static Result<std::unique_ptr<VcdWriter>> create(const std::string& path,
                                                    std::span<const std::uint8_t> addresses);
 
-  // A writer that was not closed leaves a file without its end; call close() to know that all is written.
+  // A writer that was not closed leaves a file without its end; call close() to know that all is
+  // written.
   ~VcdWriter() override = default;
 
   void edge(const Edge& edge) override { pending_.push_back(edge); }
   void settled(TimeNs until_ns) override;
 
-  // The first write that failed, if any; from then on nothing more is written. Known late, because output
-  // is buffered.
+  // The first write that failed, if any; from then on nothing more is written. Known late, because
+  // output is buffered.
   const std::optional<Error>& error() const { return error_; }
 
-  // Writes what is pending, then the time stamp `end_ns` (so that a viewer shows the rest after the last edge).
+  // Writes what is pending, then the time stamp `end_ns` (so that a viewer shows the rest after the
+  // last edge).
   Result<void> close(TimeNs end_ns);
 
   std::uint64_t edges_written() const { return edges_written_; }

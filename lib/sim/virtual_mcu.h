@@ -18,7 +18,8 @@ struct McuOptions {
   std::uint16_t boot_number = 1;
   std::uint16_t queue_ticks = 1024;  // a power of two
   std::uint16_t code_count = 16384;
-  TimeNs boot_ns = 0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
+  TimeNs boot_ns =
+      0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
   std::int32_t clock_ppm = 0;  // > 0: its clock is fast
   std::uint32_t turnaround_ns = 20'000;
 };
@@ -49,8 +50,8 @@ class VirtualMcu {
   // Not valid before the first boot.
   const bushd_mcu& core() const { return port_.mcu; }
 
-  // What the motor on this output has done, whatever the MCU believes: it outlives reboots. Until the
-  // start of the present tick.
+  // What the motor on this output has done, whatever the MCU believes: it outlives reboots. Until
+  // the start of the present tick.
   const bushd_virtual_shaft& shaft(std::size_t output) const { return port_.shaft[output]; }
 
   void set_inputs(std::uint16_t levels) { port_.inputs = levels; }

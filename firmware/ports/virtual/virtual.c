@@ -160,7 +160,9 @@ void bushd_virtual_init(bushd_virtual* v, const bushd_virtual_config* config) {
   v->next_event_ns = config->boot_ns;
 }
 
-int64_t bushd_virtual_next_event_ns(const bushd_virtual* v) { return v->next_event_ns; }
+int64_t bushd_virtual_next_event_ns(const bushd_virtual* v) {
+  return v->next_event_ns;
+}
 
 void bushd_virtual_advance(bushd_virtual* v, int64_t now_ns) {
   assert(now_ns >= v->now_ns);

@@ -1,13 +1,14 @@
 // The virtual port: an MCU whose tick timer, pins and bus driver live in simulated time.
 //
-// Nothing runs by itself. The caller moves time with bushd_virtual_advance and hands over bytes; the
-// port calls back with the edges of its pins and the bytes that it sends. The same calls give the same
-// callbacks, always.
+// Nothing runs by itself. The caller moves time with bushd_virtual_advance and hands over bytes;
+// the port calls back with the edges of its pins and the bytes that it sends. The same calls give
+// the same callbacks, always.
 //
 // Time is true time in ns, int64. The MCU's own clock starts at 0 at boot and runs at
 // (1 + clock_ppm / 1e6) times true time; the core sees only this clock:
 //
-//     own(t)  = floor((t - boot) * (1e6 + ppm) / 1e6)         true(own) = the first t that reaches it
+//     own(t)  = floor((t - boot) * (1e6 + ppm) / 1e6)         true(own) = the first t that reaches
+//     it
 //
 // A tick of `len` own ns with S slots makes its edges at own times  start + floor(e * len / 2S):
 // e = 2s is where the STEP pulses of slot s rise, e = 2s + 1 where they fall, half a slot later.
@@ -34,14 +35,14 @@ typedef enum bushd_virtual_signal {
 } bushd_virtual_signal;
 
 typedef struct bushd_virtual_config {
-  bushd_mcu_config mcu;    // identity and memory; its boot_number is that of the first boot
-  int64_t boot_ns;         // the MCU comes out of reset here; before that it is deaf and its pins are low
-  int32_t clock_ppm;       // rate error of its clock, > 0: fast; |clock_ppm| <= BUSHD_VIRTUAL_MAX_PPM
+  bushd_mcu_config mcu;  // identity and memory; its boot_number is that of the first boot
+  int64_t boot_ns;  // the MCU comes out of reset here; before that it is deaf and its pins are low
+  int32_t clock_ppm;  // rate error of its clock, > 0: fast; |clock_ppm| <= BUSHD_VIRTUAL_MAX_PPM
   uint32_t turnaround_ns;  // from the end of a request to the first bit of the reply
   void* context;           // handed back in both callbacks
 
-  // A pin changed. All pins are low at first. Times never fall from call to call. NULL if nobody looks:
-  // then ticks cost no work per slot.
+  // A pin changed. All pins are low at first. Times never fall from call to call. NULL if nobody
+  // looks: then ticks cost no work per slot.
   void (*edge)(void* context, int64_t time_ns, bushd_virtual_signal signal, uint8_t index,
                bool level);
 
@@ -60,9 +61,9 @@ typedef struct bushd_virtual {
   bushd_mcu mcu;
   bushd_virtual_config config;
   bushd_virtual_shaft shaft[BUSHD_VIRTUAL_OUTPUTS];  // until the start of the present tick
-  bool running;         // out of reset
-  uint16_t inputs;      // set: levels of the input pins
-  bool self_test_fails; // set: for the next boot
+  bool running;                                      // out of reset
+  uint16_t inputs;                                   // set: levels of the input pins
+  bool self_test_fails;                              // set: for the next boot
 
   // Private.
   int64_t now_ns;
@@ -85,14 +86,15 @@ void bushd_virtual_init(bushd_virtual* v, const bushd_virtual_config* config);
 // When the port next has something to do by itself: boot or tick boundary. O(1).
 int64_t bushd_virtual_next_event_ns(const bushd_virtual* v);
 
-// Moves time forward to now_ns: boots and ticks on the way happen, and all edges up to now_ns (included) are
-// called back. Precondition: now_ns is not before the last time given.
+// Moves time forward to now_ns: boots and ticks on the way happen, and all edges up to now_ns
+// (included) are called back. Precondition: now_ns is not before the last time given.
 void bushd_virtual_advance(bushd_virtual* v, int64_t now_ns);
 
 // A byte's stop bit ended at now_ns. Advances to that time first; lost on an MCU in reset.
 void bushd_virtual_receive(bushd_virtual* v, uint8_t byte, int64_t now_ns);
 
-// Pulls the MCU's reset at now_ns: all pins fall, all memory is lost. It boots again at boot_ns (>= now_ns).
+// Pulls the MCU's reset at now_ns: all pins fall, all memory is lost. It boots again at boot_ns (>=
+// now_ns).
 void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint16_t boot_number);
 
 #ifdef __cplusplus

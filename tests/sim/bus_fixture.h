@@ -1,0 +1,236 @@
+// A master for tests: speaks with the engine's encoders, reads with the engine's receiver.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/frame.h"
+#include "engine/message.h"
+#include "sim/bus.h"
+
+namespace bushd::sim {
+
+using Bytes = std::vector<std::uint8_t>;
+
+// Keeps edges per MCU as they come and checks what an EdgeSink is promised.
+class Recorder final : public EdgeSink {
+ public:
+  void edge(const Edge& edge) override {
+    EXPECT_GE(edge.time_ns, settled_ns_) << "an edge before a time that was said to be settled";
+    EXPECT_GE(edge.time_ns, last_ns_[edge.mcu]) << "edges of one MCU out of order";
+    last_ns_[edge.mcu] = edge.time_ns;
+    edges.push_back(edge);
+  }
+  void settled(TimeNs until_ns) override {
+    EXPECT_GE(until_ns, settled_ns_);
+    settled_ns_ = until_ns;
+  }
+
+  std::vector<TimeNs> times(std::size_t mcu, Signal signal, std::uint8_t index, bool level) const {
+    std::vector<TimeNs> out;
+    for (const Edge& e : edges) {
+      if (e.mcu == mcu && e.signal == signal && e.index == index && e.level == level) {
+        out.push_back(e.time_ns);
+      }
+    }
+    return out;
+  }
+
+  std::vector<Edge> edges;
+
+ private:
+  TimeNs settled_ns_ = 0;
+  std::array<TimeNs, 8> last_ns_{};
+};
+
+struct Frame {
+  std::uint8_t address;
+  std::uint8_t type;
+  std::uint8_t tag;
+  Bytes payload;
+  TimeNs end_ns;
+};
+
+class Master {
+ public:
+  explicit Master(Bus& bus) : bus_(bus) {
+    bus_.on_master_byte = [this](std::uint8_t byte, TimeNs end_ns) {
+      bushd_frame frame;
+      const bushd_receive got = bushd_receive_byte(&receiver_, byte, &frame);
+      if (got == BUSHD_RECEIVE_FRAME) {
+        frames.push_back({frame.address, frame.type, frame.tag,
+                          Bytes(frame.payload, frame.payload + frame.payload_size), end_ns});
+      } else if (got != BUSHD_RECEIVE_MORE) {
+        ++bad_frames;
+      }
+    };
+  }
+
+  static Bytes wire(std::uint8_t address, std::uint8_t type, std::uint8_t tag,
+                    std::span<const std::uint8_t> payload) {
+    Bytes out(BUSHD_FRAME_MAX_WIRE);
+    out.resize(bushd_frame_encode(address, type, tag, payload.data(), payload.size(), out.data()));
+    return out;
+  }
+
+  // Sends now and lets time pass until the line is silent.
+  void send(std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload) {
+    bus_.master_send(wire(address, type, ++tag_, payload), bus_.now_ns());
+    drain();
+  }
+
+  void drain() {
+    while (bus_.line_busy_until_ns() > bus_.now_ns()) bus_.advance_to(bus_.line_busy_until_ns());
+  }
+
+  // What a master does when a reply fails to come: what there is of it is nothing, and a delimiter
+  // ends whatever the MCUs have heard of the last frame.
+  void give_up() {
+    receiver_ = {};
+    bus_.master_send(Bytes{0}, bus_.now_ns());
+    drain();
+  }
+
+  // The reply to a request; nothing if none came.
+  std::optional<Frame> request(std::uint8_t address, std::uint8_t type,
+                               std::span<const std::uint8_t> payload = {}) {
+    frames.clear();
+    send(address, type, payload);
+    for (const Frame& frame : frames) {
+      if (frame.address == address && frame.type == (type | BUSHD_TYPE_REPLY) &&
+          frame.tag == tag_) {
+        return frame;
+      }
+    }
+    return std::nullopt;
+  }
+
+  // The status that an MCU acknowledges a request with; BUSHD_E_LENGTH if no good reply came.
+  template <class Message>
+  bushd_status acknowledged(std::uint8_t address, bushd_type type,
+                            std::size_t (*encode)(const Message*, std::uint8_t*),
+                            const Message& message) {
+    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+    const std::size_t size = encode(&message, payload.data());
+    return acknowledged(address, type, {payload.data(), size});
+  }
+  bushd_status acknowledged(std::uint8_t address, bushd_type type,
+                            std::span<const std::uint8_t> payload) {
+    const auto reply = request(address, static_cast<std::uint8_t>(type), payload);
+    bushd_acknowledgement ack{BUSHD_E_LENGTH};
+    if (!reply || bushd_decode_acknowledgement(reply->payload.data(), reply->payload.size(),
+                                               &ack) != BUSHD_OK) {
+      return BUSHD_E_LENGTH;
+    }
+    return static_cast<bushd_status>(ack.status);
+  }
+
+  bushd_report poll(std::uint8_t address) {
+    bushd_report report{};
+    const auto reply = request(address, BUSHD_MSG_POLL);
+    if (!reply) {
+      ADD_FAILURE() << "no report from " << int{address};
+      return report;
+    }
+    EXPECT_EQ(bushd_decode_report(reply->payload.data(), reply->payload.size(), &report), BUSHD_OK);
+    return report;
+  }
+
+  // A SYNC to all; its tag is the name of the mark.
+  std::uint8_t sync(const bushd_sync& message) {
+    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+    send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC,
+         {payload.data(), bushd_encode_sync(&message, payload.data())});
+    return tag_;
+  }
+
+  // Sets tick and format and puts all MCUs in step with the first one, as docs/design.md has it:
+  // mark, question to the first, mark with the answer. On a fresh bus the first mark is named tick
+  // 0.
+  void bring_up(std::uint32_t tick_ns, bushd_format format) {
+    bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});  // all have booted
+    for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
+      const bushd_configure configure{tick_ns, format};
+      ASSERT_EQ(acknowledged(bus_.mcu(i).address(), BUSHD_MSG_CONFIGURE, bushd_encode_configure,
+                             configure),
+                BUSHD_OK);
+    }
+    bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
+    const std::uint8_t tag = sync({});
+    bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
+    sync({true, tag, 0, 0});
+    bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
+    for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
+      const std::uint8_t address = bus_.mcu(i).address();
+      ASSERT_EQ(acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
+                             bushd_control{BUSHD_CONTROL_ENABLE}),
+                BUSHD_OK);
+      ASSERT_EQ(poll(address).state, BUSHD_STATE_READY);
+    }
+  }
+
+  // One mark that also tells where, by the first MCU's clock, the mark before was.
+  void discipline(std::uint8_t reference_address) {
+    const bushd_report report = poll(reference_address);
+    sync({true, report.mark_tag, report.mark_tick, report.mark_ns});
+  }
+
+  void upload_table(std::uint8_t address, std::uint8_t slot, std::uint32_t time_unit_ns,
+                    const std::vector<std::uint16_t>& accel, std::uint16_t cruise) {
+    const bushd_table_begin begin{slot, static_cast<std::uint16_t>(accel.size()), 0, cruise,
+                                  time_unit_ns};
+    ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin, begin),
+              BUSHD_OK);
+    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+    Bytes raw;
+    for (const std::uint16_t code : accel) {
+      raw.push_back(static_cast<std::uint8_t>(code));
+      raw.push_back(static_cast<std::uint8_t>(code >> 8));
+    }
+    for (std::size_t at = 0; at < accel.size(); at += BUSHD_TABLE_DATA_MAX_CODES) {
+      const auto count = static_cast<std::uint8_t>(
+          std::min<std::size_t>(BUSHD_TABLE_DATA_MAX_CODES, accel.size() - at));
+      const std::size_t size = bushd_encode_table_data(slot, static_cast<std::uint16_t>(at), count,
+                                                       accel.data() + at, payload.data());
+      ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_DATA, {payload.data(), size}), BUSHD_OK);
+    }
+    const bushd_table_end end{slot, bushd_crc16(BUSHD_CRC16_START, raw.data(), raw.size())};
+    ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_END, bushd_encode_table_end, end), BUSHD_OK);
+  }
+
+  void assign(std::uint8_t address, std::uint8_t motor, std::uint8_t slot) {
+    ASSERT_EQ(acknowledged(address, BUSHD_MSG_ASSIGN, bushd_encode_assign, {motor, slot}),
+              BUSHD_OK);
+  }
+
+  // Fine ticks for one motor, from first_tick on, at rest behind the last.
+  void fine_ticks(std::uint8_t address, std::uint8_t motor, std::uint32_t first_tick,
+                  const std::vector<std::int16_t>& displacements, std::uint16_t delay_at_end = 0) {
+    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+    std::size_t size = bushd_encode_ticks_head(0, BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS, first_tick,
+                                               static_cast<std::uint8_t>(displacements.size()),
+                                               static_cast<std::uint16_t>(1u << motor),
+                                               &delay_at_end, payload.data());
+    for (const std::int16_t displacement : displacements) {
+      bushd_put_i16(payload.data() + size, displacement);
+      size += 2;
+    }
+    send(address, BUSHD_MSG_TICKS, {payload.data(), size});
+  }
+
+  std::vector<Frame> frames;
+  int bad_frames = 0;
+
+ private:
+  Bus& bus_;
+  bushd_receiver receiver_{};
+  std::uint8_t tag_ = 0;
+};
+
+}  // namespace bushd::sim
