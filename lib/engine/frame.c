@@ -61,7 +61,7 @@ bushd_receive bushd_receive_byte(bushd_receiver* receiver, uint8_t byte, bushd_f
   if (!cobs_decode(receiver->buffer, size)) return BUSHD_RECEIVE_BAD_LENGTH;
   const uint8_t* const raw = receiver->buffer + 1;
   const uint16_t body = (uint16_t)(size - 1 - BUSHD_FRAME_CRC);
-  const uint16_t sent = (uint16_t)(raw[body] | raw[body + 1] << 8);
+  const uint16_t sent = (uint16_t)(raw[body] | (uint16_t)raw[body + 1] << 8);
   if (bushd_crc16(BUSHD_CRC16_START, raw, body) != sent) return BUSHD_RECEIVE_BAD_CRC;
   frame->address = raw[0];
   frame->type = raw[1];

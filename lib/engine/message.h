@@ -215,7 +215,10 @@ bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_repo
 bushd_status bushd_decode_acknowledgement(const uint8_t* payload, size_t size,
                                           bushd_acknowledgement* message);
 
-static inline uint16_t bushd_get_u16(const uint8_t* p) { return (uint16_t)(p[0] | p[1] << 8); }
+// The cast before the shift keeps it defined where int has 16 bits.
+static inline uint16_t bushd_get_u16(const uint8_t* p) {
+  return (uint16_t)(p[0] | (uint16_t)p[1] << 8);
+}
 static inline int16_t bushd_get_i16(const uint8_t* p) { return (int16_t)bushd_get_u16(p); }
 static inline uint32_t bushd_get_u32(const uint8_t* p) {
   return (uint32_t)bushd_get_u16(p) | (uint32_t)bushd_get_u16(p + 2) << 16;

@@ -21,7 +21,7 @@ extern "C" {
 
 // Sets `bit` in the masks of the slots in which the motor steps during one tick.
 //   masks         slot_count entries (BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS)
-//   displacement  steps x 256, |displacement| <= 256 x slot_count (then no two steps share a slot)
+//   displacement  steps x 256, |displacement| < 256 x slot_count (then no two steps share a slot)
 //   remainder     exact position minus steps made, 1/256 step, kept by the caller from tick to tick
 //   crossing      BUSHD_CROSSING_FINE or BUSHD_CROSSING_COARSE
 // Returns the signed number of steps. O(steps), two divisions, no division per step.

@@ -85,7 +85,7 @@ uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp) { return ramp->count + 1
 // about eight entries a code, and the look-up takes a few comparisons more.
 static uint8_t bucket_shift(const bushd_ramp* ramp, uint32_t total) {
   uint8_t shift = 0;
-  while ((2u << shift) <= ramp->code[ramp->count - 1]) ++shift;
+  while ((UINT32_C(2) << shift) <= ramp->code[ramp->count - 1]) ++shift;
   while ((total >> shift) / 8 > ramp->count + 8) ++shift;
   return shift;
 }

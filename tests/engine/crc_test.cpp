@@ -35,7 +35,8 @@ TEST(Crc, OfNothingIsTheStartValue) {
   EXPECT_EQ(bushd_crc16(0x1234, &none, 0), 0x1234);
 }
 
-// Every entry of every slice is reached by one of these: a single bit at each place of a 16-byte round.
+// Every entry of every slice is reached by one of these: a single bit at each place of a 16-byte
+// round.
 TEST(Crc, AgreesWithTheDefinitionForEverySingleByteValueAtEveryPlace) {
   for (size_t place = 0; place < 16; ++place) {
     for (int value = 0; value < 256; ++value) {
@@ -49,7 +50,8 @@ TEST(Crc, AgreesWithTheDefinitionForEverySingleByteValueAtEveryPlace) {
 TEST(Crc, AgreesWithTheDefinitionForAnyBytes) {
   holds("crc == bitwise definition", [] {
     const auto size = between<size_t>(0, 300);
-    const auto data = *rc::gen::container<std::vector<uint8_t>>(size, rc::gen::arbitrary<uint8_t>());
+    const auto data =
+        *rc::gen::container<std::vector<uint8_t>>(size, rc::gen::arbitrary<uint8_t>());
     const auto start = *rc::gen::arbitrary<uint16_t>();
     RC_ASSERT(engine(start, data) == bitwise(start, data));
   });

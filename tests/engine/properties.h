@@ -1,5 +1,6 @@
-// Runs a rapidcheck property as a gtest expectation. rapidcheck prints the seed ("Using configuration:
-// seed=...") when it starts and, on failure, the shrunk counterexample; RC_PARAMS="seed=N" repeats a run.
+// Runs a rapidcheck property as a gtest expectation. rapidcheck prints the seed ("Using
+// configuration: seed=...") when it starts and, on failure, the shrunk counterexample;
+// RC_PARAMS="seed=N" repeats a run.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -19,7 +20,8 @@ void holds(const std::string& description, Property&& property) {
 // Uniform in [low, high], independent of rapidcheck's size parameter.
 template <class T>
 T between(T low, T high) {
-  const auto wide = rc::gen::inRange<int64_t>(static_cast<int64_t>(low), static_cast<int64_t>(high) + 1);
+  const auto wide =
+      rc::gen::inRange<int64_t>(static_cast<int64_t>(low), static_cast<int64_t>(high) + 1);
   return static_cast<T>(*rc::gen::resize(rc::kNominalSize, wide));
 }
 

@@ -1,8 +1,9 @@
-// The slow reference: positions straight from the definition, step by step, in exact rational numbers.
+// The slow reference: positions straight from the definition, step by step, in exact rational
+// numbers.
 //
-//   delay before step j of N = max(A(j-1), D(N-j), c);  step j falls at the sum of the first j delays;
-//   position at time t = steps whose time is <= t, in the fine format plus the elapsed share of the
-//   running delay, rounded down to 1/256 step.
+//   delay before step j of N = max(A(j-1), D(N-j), c);  step j falls at the sum of the first j
+//   delays; position at time t = steps whose time is <= t, in the fine format plus the elapsed
+//   share of the running delay, rounded down to 1/256 step.
 //
 // Shares no code with lib/engine: sides are plain vectors, times are 128-bit counts of 1/256 ns.
 #pragma once

@@ -10,7 +10,8 @@ namespace {
 
 enum class Format { kCoarse, kFine };
 
-// The next ticks as signed 1/256 steps whatever the format; blocks of random size and stride if asked.
+// The next ticks as signed 1/256 steps whatever the format; blocks of random size and stride if
+// asked.
 std::vector<int> expand(bushd_run* run, Format format, uint32_t tick_ns, size_t ticks,
                         bool random_blocks = false) {
   std::vector<int> all;
@@ -45,8 +46,12 @@ std::vector<int> expand(bushd_run* run, Format format, uint32_t tick_ns, size_t 
       }
     }
     EXPECT_LE(active, block);
-    if (was_done) { EXPECT_EQ(active, 0u); }
-    if (active < block) { EXPECT_TRUE(bushd_run_done(run)); }
+    if (was_done) {
+      EXPECT_EQ(active, 0u);
+    }
+    if (active < block) {
+      EXPECT_TRUE(bushd_run_done(run));
+    }
   }
   return all;
 }
@@ -69,11 +74,13 @@ std::vector<int> expected(const Reference& reference, Format format, uint32_t ti
   return all;
 }
 
-// Ticks until the end of the reference, and some more; bounded so that a slow table does not stall the test.
+// Ticks until the end of the reference, and some more; bounded so that a slow table does not stall
+// the test.
 size_t ticks_to_compare(const Reference& reference, uint32_t tick_ns) {
-  const uint64_t units_ns = reference.steps() == 0
-                                ? 0
-                                : static_cast<uint64_t>(reference.step(reference.steps() - 1).end / 256);
+  const uint64_t units_ns =
+      reference.steps() == 0
+          ? 0
+          : static_cast<uint64_t>(reference.step(reference.steps() - 1).end / 256);
   return static_cast<size_t>(std::min<uint64_t>(units_ns / tick_ns + 3, 2000));
 }
 
@@ -91,7 +98,8 @@ TEST(Run, FollowsTheRuleOnAMoveComputedByHand) {
   bushd_run run;
   bushd_run_start(&run, table.view(), 5, 1);
   // Delays max(A(j-1), D(5-j), 3) = 5 4 3 3 6; steps at 5, 9, 12, 15, 21 us; ticks of 4 us.
-  EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 7), (std::vector<int>{0, 256, 512, 256, 0, 256, 0}));
+  EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 7),
+            (std::vector<int>{0, 256, 512, 256, 0, 256, 0}));
 }
 
 TEST(Run, ShortMoveNeverReachesCruise) {
@@ -224,9 +232,11 @@ TEST(Run, RampsDownFromAnyTick) {
       bushd_run_ramp_down(&run);
       RC_ASSERT(bushd_run_steps_left(&run) <= before);
       reference.ramp_down_at(uint64_t{at} * tick_ns);
-      const size_t more = again > 0 ? between<size_t>(0, 20) : ticks_to_compare(reference, tick_ns) + 1;
+      const size_t more =
+          again > 0 ? between<size_t>(0, 20) : ticks_to_compare(reference, tick_ns) + 1;
       for (const int d : expand(&run, format, tick_ns, more, true)) got.push_back(d);
-      for (const int d : expected(reference, format, tick_ns, at, more, direction)) want.push_back(d);
+      for (const int d : expected(reference, format, tick_ns, at, more, direction))
+        want.push_back(d);
       at += more;
     }
     RC_ASSERT(got == want);
@@ -265,14 +275,13 @@ TEST(Run, TakesOverInTheMiddleOfAStep) {
                               format == Format::kFine ? fraction : 0));
     for (const int d : got) RC_ASSERT(d * direction >= 0);
     if (bushd_run_done(&run) && format == Format::kFine) {
-      RC_ASSERT(sum(got) ==
-                (static_cast<int64_t>(reference.steps()) * 256 - fraction) * direction);
+      RC_ASSERT(sum(got) == (static_cast<int64_t>(reference.steps()) * 256 - fraction) * direction);
     }
   });
 }
 
-// What an MCU makes of (delay, fraction) when its queue ends must be the steps that the daemon's own
-// ramp-down of the same run makes, at most one unit of 1/256 step apart in time.
+// What an MCU makes of (delay, fraction) when its queue ends must be the steps that the daemon's
+// own ramp-down of the same run makes, at most one unit of 1/256 step apart in time.
 TEST(Run, TakeOverMakesAsManyStepsAsTheRunItselfRampingDown) {
   holds("take-over and ramp-down end at the same step", [] {
     const TestTable table(any_law(), true);

@@ -16,8 +16,10 @@ namespace bushd::test {
 class TestTable {
  public:
   TestTable(Law law, bool indexed) : law_(std::move(law)) {
-    view_.accel = {law_.accel.data(), static_cast<uint32_t>(law_.accel.size()), nullptr, nullptr, 0};
-    view_.decel = {law_.decel.data(), static_cast<uint32_t>(law_.decel.size()), nullptr, nullptr, 0};
+    view_.accel = {law_.accel.data(), static_cast<uint32_t>(law_.accel.size()), nullptr, nullptr,
+                   0};
+    view_.decel = {law_.decel.data(), static_cast<uint32_t>(law_.decel.size()), nullptr, nullptr,
+                   0};
     view_.cruise = law_.cruise;
     view_.time_unit_ns = law_.unit_ns;
     if (!indexed) return;
@@ -52,16 +54,22 @@ inline std::vector<uint16_t> any_side() {
   return side;
 }
 
-// Any table that passes bushd_table_check: one code, equal codes, sides that differ, cruise above, at and
-// below the last codes, odd units.
+// Any table that passes bushd_table_check: one code, equal codes, sides that differ, cruise above,
+// at and below the last codes, odd units.
 inline Law any_law() {
   Law law;
   law.accel = any_side();
   law.decel = between(0, 2) == 0 ? law.accel : any_side();
   switch (between(0, 2)) {
-    case 0: law.cruise = law.accel.back(); break;
-    case 1: law.cruise = between<uint16_t>(1, law.accel.back()); break;
-    default: law.cruise = between<uint16_t>(law.accel.back(), 65535); break;
+    case 0:
+      law.cruise = law.accel.back();
+      break;
+    case 1:
+      law.cruise = between<uint16_t>(1, law.accel.back());
+      break;
+    default:
+      law.cruise = between<uint16_t>(law.accel.back(), 65535);
+      break;
   }
   law.unit_ns = *rc::gen::element<uint32_t>(1, 7, 100, 999, 40000, 123457, 5000000);
   return law;
