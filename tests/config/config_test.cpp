@@ -1,0 +1,373 @@
+#include "config/config.h"
+
+#include <fmt/core.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tables/temp_directory.h"
+
+namespace bushd::config {
+namespace {
+
+using test::TempDirectory;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr const char* kTable = "name = \"t\"\ntime_unit_ns = 40000\naccel = [250, 10]\n";
+
+// The numbers are lines.
+const std::string kGood =
+    "[lcm]\n"                                    // 1
+    "url = \"memq://\"\n"                        // 2
+    "prefix = \"TEST\"\n"                        // 3
+    "[[bus]]\n"                                  // 4
+    "name = \"hall\"\n"                          // 5
+    "port = \"/dev/no-such-port-a\"\n"           // 6
+    "baud = 500000\n"                            // 7
+    "tick_us = 2560\n"                           // 8
+    "format = \"fine\"\n"                        // 9
+    "[[bus]]\n"                                  // 10
+    "name = \"roof\"\n"                          // 11
+    "port = \"/dev/no-such-port-b\"\n"           // 12
+    "baud = 115200\n"                            // 13
+    "tick_us = 5000\n"                           // 14
+    "format = \"coarse\"\n"                      // 15
+    "[[mcu]]\n"                                  // 16
+    "bus = \"hall\"\n"                           // 17
+    "address = 1\n"                              // 18
+    "[[mcu]]\n"                                  // 19
+    "bus = \"roof\"\n"                           // 20
+    "address = 255\n"                            // 21
+    "[[group]]\n"                                // 22
+    "name = \"goniometer\"\n"                    // 23
+    "table = \"bushd2-constant\"\n"              // 24
+    "[[group]]\n"                                // 25
+    "name = \"slits\"\n"                         // 26
+    "table = \"own\"\n"                          // 27
+    "[[motor]]\n"                                // 28
+    "name = \"theta\"\n"                         // 29
+    "mcu = \"hall:1\"\n"                         // 30
+    "output = 0\n"                               // 31
+    "group = \"goniometer\"\n"                   // 32
+    "[[motor]]\n"                                // 33
+    "name = \"slit\"\n"                          // 34
+    "mcu = \"roof:255\"\n"                       // 35
+    "output = 15\n"                              // 36
+    "group = \"slits\"\n";                       // 37
+
+// A configuration's file with its tables beside it.
+class ConfigFile {
+ public:
+  explicit ConfigFile(const std::string& text) {
+    directory_.write("own.toml", kTable);
+    path_ = directory_.write("bushd.toml", text);
+  }
+  Result<Config> load() const { return config::load(path_); }
+  const TempDirectory& directory() const { return directory_; }
+  const std::string& path() const { return path_; }
+
+ private:
+  TempDirectory directory_;
+  std::string path_;
+};
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+TEST(Config, GoodFileIsReadInItsOrder) {
+  const ConfigFile file(kGood);
+  const auto config = file.load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(config->path, file.path());
+  EXPECT_EQ(config->lcm.url, "memq://");
+  EXPECT_EQ(config->lcm.prefix, "TEST");
+  ASSERT_EQ(config->buses.size(), 2u);
+  EXPECT_EQ(config->buses[0].name, "hall");
+  EXPECT_EQ(config->buses[0].port, "/dev/no-such-port-a");
+  EXPECT_EQ(config->buses[0].baud, 500000u);
+  EXPECT_EQ(config->buses[0].tick_ns(), 2'560'000u);
+  EXPECT_EQ(config->buses[0].format, BUSHD_FORMAT_FINE);
+  EXPECT_EQ(config->buses[1].format, BUSHD_FORMAT_COARSE);
+  ASSERT_EQ(config->mcus.size(), 2u);
+  EXPECT_EQ(config->mcus[1].bus, BusIndex{1});
+  EXPECT_EQ(config->mcus[1].address, McuAddress{255});
+  EXPECT_EQ(config->mcus[1].id, "roof:255");
+  ASSERT_EQ(config->groups.size(), 2u);
+  EXPECT_EQ(config->groups[0].table->name(), "bushd2-constant");
+  ASSERT_EQ(config->motors.size(), 2u);
+  const Motor& slit = config->motors[1];
+  EXPECT_EQ(slit.name, "slit");
+  EXPECT_EQ(slit.output, Output{15});
+  EXPECT_EQ(config->mcu_of(slit).id, "roof:255");
+  EXPECT_EQ(config->bus_of(slit).name, "roof");
+  EXPECT_EQ(config->group_of(slit).name, "slits");
+  EXPECT_EQ(config->table_of(slit).name(), "t");
+}
+
+TEST(Config, LcmHasDefaults) {
+  const ConfigFile file(kGood.substr(kGood.find("[[bus]]")));
+  const auto config = file.load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(config->lcm.url, "udpm://239.255.76.67:7667?ttl=0");
+  EXPECT_EQ(config->lcm.prefix, "BUSHD");
+}
+
+TEST(Config, BusAloneIsEnough) {
+  const ConfigFile file("[[bus]]\nname='b'\nport='p'\nbaud=9600\ntick_us=20000\nformat='coarse'\n");
+  const auto config = file.load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_TRUE(config->motors.empty());
+}
+
+TEST(Config, GroupsWithTheSameTableShareIt) {
+  const ConfigFile file(replaced(kGood, "\"bushd2-constant\"", "\"own\""));
+  const auto config = file.load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(config->groups[0].table, config->groups[1].table);
+}
+
+TEST(Config, TablesAreLookedUpBesideTheFileThenInItsTablesThenAmongTheShipped) {
+  const ConfigFile file(kGood);
+  EXPECT_EQ(file.load()->groups[0].table->path(), BUSHD_SOURCE_DIR "/tables/bushd2-constant.toml");
+  const auto below = file.directory().write("tables/bushd2-constant.toml", kTable);
+  EXPECT_EQ(file.load()->groups[0].table->path(), below.string());
+  const auto beside = file.directory().write("bushd2-constant.toml", kTable);
+  EXPECT_EQ(file.load()->groups[0].table->path(), beside.string());
+}
+
+struct Refusal {
+  const char* what;
+  std::string text;
+  int line;
+  const char* key;
+  const char* message;
+};
+
+void PrintTo(const Refusal& refusal, std::ostream* out) { *out << refusal.what; }
+
+class ConfigRefusal : public testing::TestWithParam<Refusal> {};
+
+TEST_P(ConfigRefusal, NamesFileLineKeyAndWhatIsAllowed) {
+  const ConfigFile file(GetParam().text);
+  const auto config = file.load();
+  ASSERT_FALSE(config.has_value());
+  EXPECT_EQ(config.error().file, file.path());
+  EXPECT_EQ(config.error().line, GetParam().line) << config.error().text();
+  EXPECT_EQ(config.error().key, GetParam().key) << config.error().text();
+  EXPECT_THAT(config.error().message, HasSubstr(GetParam().message));
+}
+
+Refusal change(const char* what, const std::string& from, const std::string& to, int line,
+               const char* key, const char* message) {
+  return {what, replaced(kGood, from, to), line, key, message};
+}
+
+const auto kNames = [](const auto& tested) { return std::string(tested.param.what); };
+
+INSTANTIATE_TEST_SUITE_P(
+    Lcm, ConfigRefusal,
+    testing::Values(
+        change("UnknownKey", "url =", "uri =", 2, "lcm.uri", "unknown key; allowed here: url, prefix"),
+        change("UrlIsNumber", "\"memq://\"", "7667", 2, "lcm.url", "is 7667; allowed: a URL"),
+        change("UrlOfUnknownProvider", "memq://", "http://x", 2, "lcm.url", "udpm://"),
+        change("Prefix", "\"TEST\"", "\"A B\"", 3, "lcm.prefix", "1..48 characters"),
+        change("Array", "[lcm]", "[[lcm]]", 1, "lcm", "one [lcm]"),
+        Refusal{"Value", "lcm = 3\n", 1, "lcm", "one [lcm]"}),
+    kNames);
+
+INSTANTIATE_TEST_SUITE_P(
+    Bus, ConfigRefusal,
+    testing::Values(
+        Refusal{"Missing", "", 1, "bus", "is missing; allowed: sections [[bus]]"},
+        Refusal{"Single", "[bus]\nname = \"b\"\n", 1, "bus", "is a table; allowed: sections [[bus]]"},
+        Refusal{"Empty", "bus = []\n", 1, "bus", "is empty"},
+        Refusal{"Numbers", "bus = [1]\n", 1, "bus[0]", "is 1; allowed: sections [[bus]]"},
+        change("UnknownSection", "[[mcu]]", "[[motors]]", 16, "motors",
+               "unknown key; allowed here: lcm, bus, mcu, group, motor"),
+        change("UnknownKey", "tick_us", "tick_ms", 8, "bus[0].tick_ms",
+               "unknown key; allowed here: name, port, baud, tick_us, format"),
+        change("NameMissing", "name = \"hall\"\n", "", 4, "bus[0].name", "is missing"),
+        change("NameBad", "\"hall\"", "\"ha:ll\"", 5, "bus[0].name",
+               "is \"ha:ll\"; allowed: 1..63 characters of A-Z a-z 0-9 _ . -"),
+        change("NameEmpty", "\"hall\"", "\"\"", 5, "bus[0].name", "1..63"),
+        change("NameLong", "\"hall\"", "\"" + std::string(64, 'x') + "\"", 5, "bus[0].name", "1..63"),
+        change("NameTwice", "\"roof\"", "\"hall\"", 11, "bus[1].name", "already taken in line 5"),
+        change("PortMissing", "port = \"/dev/no-such-port-a\"\n", "", 4, "bus[0].port", "is missing"),
+        change("PortEmpty", "\"/dev/no-such-port-a\"", "\"\"", 6, "bus[0].port", "serial port"),
+        change("PortTwice", "no-such-port-b", "no-such-port-a", 12, "bus[1].port",
+               "of bus \"hall\"; allowed: one bus a port"),
+        change("BaudMissing", "baud = 500000\n", "", 4, "bus[0].baud", "is missing"),
+        change("BaudString", "500000", "\"500000\"", 7, "bus[0].baud", "is the string \"500000\""),
+        change("BaudNotFixed", "500000", "250000", 7, "bus[0].baud", "is 250000; allowed: 50, 75, 110"),
+        change("BaudTooHigh", "500000", "12000000", 7, "bus[0].baud", "50..4000000"),
+        change("TickMissing", "tick_us = 2560\n", "", 4, "bus[0].tick_us", "is missing"),
+        change("TickShort", "2560", "199", 8, "bus[0].tick_us", "is 199; allowed: a whole number 200..20000"),
+        change("TickLong", "2560", "20001", 8, "bus[0].tick_us", "200..20000"),
+        change("TickFloat", "2560", "2560.0", 8, "bus[0].tick_us", "floating-point"),
+        change("FormatMissing", "format = \"fine\"\n", "", 4, "bus[0].format", "is missing"),
+        change("FormatUnknown", "\"fine\"", "\"medium\"", 9, "bus[0].format",
+               "is \"medium\"; allowed: \"fine\" or \"coarse\"")),
+    kNames);
+
+INSTANTIATE_TEST_SUITE_P(
+    Mcu, ConfigRefusal,
+    testing::Values(
+        change("UnknownKey", "address = 1\n", "address = 1\nmotors = 16\n", 19, "mcu[0].motors", "unknown key"),
+        change("BusMissing", "bus = \"hall\"\n", "", 16, "mcu[0].bus", "is missing; allowed: \"hall\", \"roof\""),
+        change("BusUnknown", "bus = \"hall\"", "bus = \"cellar\"", 17, "mcu[0].bus",
+               "is \"cellar\"; allowed: \"hall\", \"roof\""),
+        change("AddressMissing", "address = 1\n", "", 16, "mcu[0].address", "is missing"),
+        change("AddressZero", "address = 1", "address = 0", 18, "mcu[0].address",
+               "is 0; allowed: a whole number 1..255"),
+        change("AddressHigh", "address = 255", "address = 256", 21, "mcu[1].address", "1..255"),
+        change("AddressTwice", "bus = \"roof\"\naddress = 255", "bus = \"hall\"\naddress = 1", 21,
+               "mcu[1].address", "address 1 of bus \"hall\" is already taken in line 18")),
+    kNames);
+
+INSTANTIATE_TEST_SUITE_P(
+    Group, ConfigRefusal,
+    testing::Values(
+        change("UnknownKey", "table = \"own\"", "tables = \"own\"", 27, "group[1].tables", "unknown key"),
+        change("NameMissing", "name = \"slits\"\n", "", 25, "group[1].name", "is missing"),
+        change("NameTwice", "\"slits\"", "\"goniometer\"", 26, "group[1].name", "already taken in line 23"),
+        change("TableMissing", "table = \"own\"\n", "", 25, "group[1].table",
+               "is missing; allowed: the name of a table"),
+        change("TableUnknown", "\"own\"", "\"owl\"", 27, "group[1].table", "there is no table \"owl\""),
+        change("TableOutside", "\"own\"", "\"../own\"", 27, "group[1].table", "is not a table's name")),
+    kNames);
+
+INSTANTIATE_TEST_SUITE_P(
+    Motor, ConfigRefusal,
+    testing::Values(
+        change("UnknownKey", "output = 0", "pin = 0", 31, "motor[0].pin",
+               "unknown key; allowed here: name, mcu, output, group"),
+        change("NameMissing", "name = \"theta\"\n", "", 28, "motor[0].name", "is missing"),
+        change("NameBad", "\"theta\"", "\"θ\"", 29, "motor[0].name", "1..63 characters"),
+        change("NameTwice", "\"slit\"", "\"theta\"", 34, "motor[1].name", "already taken in line 29"),
+        change("McuMissing", "mcu = \"hall:1\"\n", "", 28, "motor[0].mcu",
+               "is missing; allowed: \"hall:1\", \"roof:255\""),
+        change("McuUnknown", "\"hall:1\"", "\"hall:2\"", 30, "motor[0].mcu",
+               "is \"hall:2\"; allowed: \"hall:1\", \"roof:255\""),
+        change("McuIsNumber", "\"hall:1\"", "1", 30, "motor[0].mcu", "is 1; allowed: \"hall:1\""),
+        change("OutputMissing", "output = 0\n", "", 28, "motor[0].output", "is missing"),
+        change("OutputHigh", "output = 15", "output = 16", 36, "motor[1].output",
+               "is 16; allowed: a whole number 0..15"),
+        change("OutputNegative", "output = 0", "output = -1", 31, "motor[0].output", "0..15"),
+        change("OutputTwice", "mcu = \"roof:255\"\noutput = 15", "mcu = \"hall:1\"\noutput = 0", 36,
+               "motor[1].output", "output 0 of MCU \"hall:1\" is already taken in line 31"),
+        change("GroupMissing", "group = \"goniometer\"\n", "", 28, "motor[0].group", "is missing"),
+        change("GroupUnknown", "group = \"slits\"", "group = \"slots\"", 37, "motor[1].group",
+               "is \"slots\"; allowed: \"goniometer\", \"slits\""),
+        Refusal{"TableTooFastForTheTick",
+                replaced(replaced(kGood, "\"own\"", "\"micro16-standard\""), "5000", "10000"), 37,
+                "motor[1].group",
+                "makes up to 201 steps in the 10000 us tick of bus \"roof\"; allowed: 127. Use a slower "
+                "table or tick_us = 6349 or less"}),
+    kNames);
+
+// A bus, `mcus` MCUs with 16 motors each, and as many groups and tables as asked for.
+std::string wide(int mcus, int baud, int tick_us, const char* format, int groups = 1) {
+  std::string text = fmt::format(
+      "[[bus]]\nname = \"hall\"\nport = \"p\"\nbaud = {}\ntick_us = {}\nformat = \"{}\"\n", baud, tick_us,
+      format);
+  for (int g = 0; g < groups; ++g) {
+    text += fmt::format("[[group]]\nname = \"g{}\"\ntable = \"t{}\"\n", g, g);
+  }
+  for (int m = 1; m <= mcus; ++m) text += fmt::format("[[mcu]]\nbus = \"hall\"\naddress = {}\n", m);
+  for (int m = 0; m < mcus * 16; ++m) {
+    text += fmt::format("[[motor]]\nname = \"m{}\"\nmcu = \"hall:{}\"\noutput = {}\ngroup = \"g{}\"\n", m,
+                        m / 16 + 1, m % 16, m % groups);
+  }
+  return text;
+}
+
+ConfigFile wide_file(int mcus, int baud, int tick_us, const char* format, int groups = 1) {
+  return ConfigFile(wide(mcus, baud, tick_us, format, groups));
+}
+
+void write_tables(const ConfigFile& file, int count) {
+  for (int t = 0; t < count; ++t) file.directory().write(fmt::format("t{}.toml", t), kTable);
+}
+
+TEST(ConfigTogether, LineThatCannotCarryItsTicksIsRefusedWithLoadAndRemedy) {
+  const ConfigFile file = wide_file(2, 115200, 2560, "fine");
+  write_tables(file, 1);
+  const auto config = file.load();
+  ASSERT_FALSE(config.has_value());
+  EXPECT_EQ(config.error().file, file.path());
+  EXPECT_EQ(config.error().line, 5);
+  EXPECT_EQ(config.error().key, "bus[0].tick_us");
+  EXPECT_THAT(config.error().message, HasSubstr("% of the line at 115200 baud; allowed: 85 %. Use baud = "));
+  EXPECT_THAT(config.error().message, HasSubstr("or more, or tick_us = "));
+}
+
+TEST(ConfigTogether, RemediesForTheLineHelp) {
+  const ConfigFile refused = wide_file(2, 115200, 2560, "fine");
+  write_tables(refused, 1);
+  const std::string message = refused.load().error().message;
+  const auto number_after = [&](const std::string& text) {
+    return std::stoi(message.substr(message.find(text) + text.size()));
+  };
+  const int baud = number_after("Use baud = ");
+  const int tick_us = number_after("tick_us = ");
+  for (const auto& [remedy_baud, remedy_tick_us, good] :
+       {std::tuple{baud, 2560, true}, std::tuple{115200, tick_us, true},
+        std::tuple{115200, tick_us - 1, false}}) {
+    const ConfigFile file = wide_file(2, remedy_baud, remedy_tick_us, "fine");
+    write_tables(file, 1);
+    EXPECT_EQ(file.load().has_value(), good) << remedy_baud << ' ' << remedy_tick_us;
+  }
+}
+
+TEST(ConfigTogether, NinthTableOfAnMcuIsRefused) {
+  const ConfigFile eight = wide_file(1, 500000, 2560, "fine", 8);
+  write_tables(eight, 8);
+  EXPECT_TRUE(eight.load().has_value());
+  const ConfigFile nine = wide_file(1, 500000, 2560, "fine", 9);
+  write_tables(nine, 9);
+  const auto config = nine.load();
+  ASSERT_FALSE(config.has_value());
+  EXPECT_EQ(config.error().key, "motor[8].group");
+  EXPECT_EQ(config.error().line, 6 + 9 * 3 + 3 + 9 * 5);
+  EXPECT_THAT(config.error().message, HasSubstr("one table too many for MCU \"hall:1\"; allowed: 8"));
+}
+
+TEST(ConfigTogether, OnePortUnderTwoNamesIsRefused) {
+  const TempDirectory directory;
+  const auto port = directory.write("port", "");
+  const auto link = directory.path() / "link";
+  std::filesystem::create_symlink(port, link);
+  const ConfigFile file(replaced(replaced(kGood, "/dev/no-such-port-a", port), "/dev/no-such-port-b", link));
+  const auto config = file.load();
+  ASSERT_FALSE(config.has_value());
+  EXPECT_EQ(config.error().line, 12);
+  EXPECT_EQ(config.error().key, "bus[1].port");
+}
+
+TEST(ConfigTogether, BrokenTableIsNamedWithTheGroupThatUsesIt) {
+  const ConfigFile file(kGood);
+  const auto table = file.directory().write("own.toml", "name = \"own\"\ntime_unit_ns = 1\naccel = [1, 2]\n");
+  const auto config = file.load();
+  ASSERT_FALSE(config.has_value());
+  EXPECT_EQ(config.error().file, table);
+  EXPECT_EQ(config.error().line, 3);
+  EXPECT_EQ(config.error().key, "accel[1]");
+  EXPECT_THAT(config.error().message,
+              HasSubstr("(the table of group \"slits\", " + file.path() + ":27)"));
+}
+
+TEST(ConfigTogether, MissingFileAndBrokenTomlAreRefused) {
+  const TempDirectory directory;
+  const std::string missing = directory.path() / "none.toml";
+  EXPECT_THAT(load(missing).error().text(), StartsWith(missing + ": cannot be read: "));
+  const std::string broken = directory.write("broken.toml", "[[bus]]\nname = hall\n");
+  EXPECT_THAT(load(broken).error().text(), StartsWith(broken + ":2: not TOML: "));
+}
+
+}  // namespace
+}  // namespace bushd::config
