@@ -264,7 +264,9 @@ INSTANTIATE_TEST_SUITE_P(
         change("GroupUnknown", "group = \"slits\"", "group = \"slots\"", 37, "motor[1].group",
                "is \"slots\"; allowed: \"goniometer\", \"slits\""),
         Refusal{"TableTooFastForTheTick",
-                replaced(replaced(kGood, "\"own\"", "\"micro16-standard\""), "5000", "10000"), 37,
+                replaced(replaced(kGood, "\"own\"", "\"micro16-standard\""), "tick_us = 5000",
+                         "tick_us = 10000"),
+                37,
                 "motor[1].group",
                 "makes up to 201 steps in the 10000 us tick of bus \"roof\"; allowed: 127. Use a slower "
                 "table or tick_us = 6349 or less"}),
