@@ -14,8 +14,8 @@ namespace bushd::config {
 namespace {
 
 constexpr std::array<std::uint32_t, 30> kBaudRates = {
-    50,     75,     110,    134,     150,     200,     300,     600,     1200,    1800,
-    2400,   4800,   9600,   19200,   38400,   57600,   115200,  230400,  460800,  500000,
+    50,     75,     110,     134,     150,     200,     300,     600,     1200,    1800,
+    2400,   4800,   9600,    19200,   38400,   57600,   115200,  230400,  460800,  500000,
     576000, 921600, 1000000, 1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000};
 
 Result<void> check_speed(const Loading& loading, std::size_t index) {
@@ -33,10 +33,11 @@ Result<void> check_speed(const Loading& loading, std::size_t index) {
           ? fmt::format("Use a slower table or tick_us = {} or less", longest_tick_us)
           : std::string("Use a slower table: no tick is short enough for this one");
   return fail(loading.motors[index].error(
-      "group", fmt::format("the table \"{}\" of group \"{}\" makes up to {} steps in the {} us tick of bus "
-                           "\"{}\"; allowed: {}. {}",
-                           table.name(), config.group_of(motor).name, steps, bus.tick_us, bus.name,
-                           BUSHD_MAX_STEPS_PER_TICK, remedy)));
+      "group",
+      fmt::format("the table \"{}\" of group \"{}\" makes up to {} steps in the {} us tick of bus "
+                  "\"{}\"; allowed: {}. {}",
+                  table.name(), config.group_of(motor).name, steps, bus.tick_us, bus.name,
+                  BUSHD_MAX_STEPS_PER_TICK, remedy)));
 }
 
 Result<void> check_table_slots(const Loading& loading) {
@@ -48,9 +49,10 @@ Result<void> check_table_slots(const Loading& loading) {
     of_mcu.insert(&config.table_of(motor));
     if (of_mcu.size() <= BUSHD_TABLE_SLOTS) continue;
     return fail(loading.motors[i].error(
-        "group", fmt::format("is one table too many for MCU \"{}\"; allowed: {} different tables among its "
-                             "motors. Let groups share a table or move the motor to another MCU",
-                             config.mcu_of(motor).id, BUSHD_TABLE_SLOTS)));
+        "group",
+        fmt::format("is one table too many for MCU \"{}\"; allowed: {} different tables among its "
+                    "motors. Let groups share a table or move the motor to another MCU",
+                    config.mcu_of(motor).id, BUSHD_TABLE_SLOTS)));
   }
   return {};
 }
@@ -95,15 +97,18 @@ Result<void> check_line(const Loading& loading, std::size_t index) {
   const double load = link::line_load(bus.baud, bus.tick_ns(), bus.format, motors);
   if (load <= link::kMaxLineLoad) return {};
   return fail(loading.buses[index].error(
-      "tick_us", fmt::format("is {}: ticks, polls and sync would take {:.1f} % of the line at {} baud; "
-                             "allowed: {:.0f} %. {}",
-                             bus.tick_us, load * 100, bus.baud, link::kMaxLineLoad * 100,
-                             line_remedy(bus, motors))));
+      "tick_us",
+      fmt::format("is {}: ticks, polls and sync would take {:.1f} % of the line at {} baud; "
+                  "allowed: {:.0f} %. {}",
+                  bus.tick_us, load * 100, bus.baud, link::kMaxLineLoad * 100,
+                  line_remedy(bus, motors))));
 }
 
 }  // namespace
 
-std::span<const std::uint32_t> baud_rates() { return kBaudRates; }
+std::span<const std::uint32_t> baud_rates() {
+  return kBaudRates;
+}
 
 Result<void> check_together(const Loading& loading) {
   for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {

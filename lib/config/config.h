@@ -1,6 +1,7 @@
-// bushd.toml (docs/configuration.md): which motor hangs on which output of which MCU on which bus, and
-// which table it runs. A Config that exists is consistent: every index below is valid, no output is used
-// twice, every table is slow enough for its bus's tick and no line is asked for more than it can carry.
+// bushd.toml (docs/configuration.md): which motor hangs on which output of which MCU on which bus,
+// and which table it runs. A Config that exists is consistent: every index below is valid, no
+// output is used twice, every table is slow enough for its bus's tick and no line is asked for more
+// than it can carry.
 #pragma once
 
 #include <compare>
@@ -16,8 +17,8 @@
 
 namespace bushd::config {
 
-// Positions in the vectors of Config, and what is on the wire. Each its own type: a mix-up moves the
-// wrong motor.
+// Positions in the vectors of Config, and what is on the wire. Each its own type: a mix-up moves
+// the wrong motor.
 struct BusIndex {
   std::size_t value = 0;
   auto operator<=>(const BusIndex&) const = default;

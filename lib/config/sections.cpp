@@ -55,8 +55,8 @@ Result<std::vector<TomlReader>> read_array(const TomlReader& root, const std::st
   for (const toml::node& node : **elements) {
     const toml::table* table = node.as_table();
     if (table == nullptr) {
-      return fail(root.error(key, readers.size(), fmt::format("is {}; allowed: {}",
-                                                              tables::describe(node), allowed)));
+      return fail(root.error(key, readers.size(),
+                             fmt::format("is {}; allowed: {}", tables::describe(node), allowed)));
     }
     readers.emplace_back(*table, file, fmt::format("{}[{}]", key, readers.size()));
   }
@@ -75,8 +75,8 @@ class Taken {
     const int line = reader.error(key, "").line;
     const auto [first, is_new] = lines_.emplace(value, line);
     if (is_new) return {};
-    return fail(reader.error(key, fmt::format("{} is already taken in line {}; allowed: each once", what,
-                                              first->second)));
+    return fail(reader.error(key, fmt::format("{} is already taken in line {}; allowed: each once",
+                                              what, first->second)));
   }
 
  private:
@@ -93,8 +93,8 @@ std::string known(const std::vector<T>& elements, Key key) {
 }
 
 template <class Index, class T, class Key>
-Result<Index> resolve(const TomlReader& reader, std::string_view key, const std::vector<T>& elements,
-                      Key name) {
+Result<Index> resolve(const TomlReader& reader, std::string_view key,
+                      const std::vector<T>& elements, Key name) {
   const auto wanted = reader.string(key, known(elements, name));
   if (!wanted) return fail(wanted.error());
   const auto found = std::find_if(elements.begin(), elements.end(),
@@ -142,20 +142,21 @@ Result<std::uint32_t> read_baud(const TomlReader& reader) {
   if (!baud) return fail(baud.error());
   const auto rate = static_cast<std::uint32_t>(*baud);
   if (std::binary_search(rates.begin(), rates.end(), rate)) return rate;
-  return fail(reader.error(
-      "baud", fmt::format("is {}; allowed: {}", rate, fmt::join(rates.begin(), rates.end(), ", "))));
+  return fail(reader.error("baud", fmt::format("is {}; allowed: {}", rate,
+                                               fmt::join(rates.begin(), rates.end(), ", "))));
 }
 
 // The same port under two names would give its bytes to whoever reads first.
 Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vector<Bus>& others) {
   for (const Bus& other : others) {
     std::error_code missing;
-    const bool same = bus.port == other.port ||
-                      std::filesystem::equivalent(bus.port, other.port, missing);
+    const bool same =
+        bus.port == other.port || std::filesystem::equivalent(bus.port, other.port, missing);
     if (!same) continue;
-    return fail(reader.error("port", fmt::format("\"{}\" is the port \"{}\" of bus \"{}\"; allowed: one bus "
-                                                 "a port. Put the MCUs of both on one [[bus]]",
-                                                 bus.port, other.port, other.name)));
+    return fail(reader.error(
+        "port", fmt::format("\"{}\" is the port \"{}\" of bus \"{}\"; allowed: one bus "
+                            "a port. Put the MCUs of both on one [[bus]]",
+                            bus.port, other.port, other.name)));
   }
   return {};
 }
@@ -163,7 +164,8 @@ Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vec
 Result<void> read_buses(Loading* loading) {
   Taken names;
   for (const TomlReader& reader : loading->buses) {
-    if (auto known = reader.only({"name", "port", "baud", "tick_us", "format"}); !known) return known;
+    if (auto known = reader.only({"name", "port", "baud", "tick_us", "format"}); !known)
+      return known;
     Bus bus;
     auto name = read_name(reader);
     if (!name) return fail(name.error());
@@ -203,8 +205,8 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     Mcu mcu{.bus = *bus,
             .address = {static_cast<std::uint8_t>(*address)},
             .id = fmt::format("{}:{}", config->buses[bus->value].name, *address)};
-    const std::string what = fmt::format("address {} of bus \"{}\"", *address,
-                                         config->buses[bus->value].name);
+    const std::string what =
+        fmt::format("address {} of bus \"{}\"", *address, config->buses[bus->value].name);
     if (auto taken = ids.take(reader, "address", mcu.id, what); !taken) return taken;
     config->mcus.push_back(std::move(mcu));
   }
@@ -229,8 +231,8 @@ class TableShelf {
     auto table = tables::load(*path);
     if (!table) {
       const Error user = reader.error("table", "");
-      table.error().message += fmt::format(" (the table of group \"{}\", {}:{})", group, user.file,
-                                           user.line);
+      table.error().message +=
+          fmt::format(" (the table of group \"{}\", {}:{})", group, user.file, user.line);
       return table;
     }
     return tables_.emplace(*path, std::move(*table)).first->second;

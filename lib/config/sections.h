@@ -1,4 +1,5 @@
-// Private to lib/config: from sections of the file to the vectors of Config, each section by itself.
+// Private to lib/config: from sections of the file to the vectors of Config, each section by
+// itself.
 #pragma once
 
 #include <vector>

@@ -13,9 +13,10 @@ Result<std::filesystem::path> find(std::string_view name,
                                name.find('/') != std::string_view::npos ||
                                name.find('\0') != std::string_view::npos;
   if (leads_elsewhere || name.size() > kMaxNameLength) {
-    return fail(fmt::format("\"{}\" is not a table's name; allowed: 1..{} characters without '/' and not "
-                            "beginning with '.' (the name of a file without \".toml\")",
-                            name.substr(0, kMaxNameLength), kMaxNameLength));
+    return fail(
+        fmt::format("\"{}\" is not a table's name; allowed: 1..{} characters without '/' and not "
+                    "beginning with '.' (the name of a file without \".toml\")",
+                    name.substr(0, kMaxNameLength), kMaxNameLength));
   }
   std::string looked_in;
   for (const std::filesystem::path& directory : directories) {
@@ -24,7 +25,8 @@ Result<std::filesystem::path> find(std::string_view name,
     if (std::filesystem::exists(path, error)) return path;
     looked_in += (looked_in.empty() ? "" : ", ") + directory.string();
   }
-  return fail(fmt::format("there is no table \"{}\": no file {}.toml in {}", name, name, looked_in));
+  return fail(
+      fmt::format("there is no table \"{}\": no file {}.toml in {}", name, name, looked_in));
 }
 
 std::vector<std::filesystem::path> shipped_directories() {

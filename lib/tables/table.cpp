@@ -8,16 +8,19 @@
 namespace bushd::tables {
 namespace {
 
-bool is_control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }
+bool is_control(char c) {
+  return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
+}
 
 std::optional<ContentFault> check_name(const std::string& name) {
   if (!name.empty() && name.size() <= kMaxNameLength &&
       std::none_of(name.begin(), name.end(), is_control)) {
     return std::nullopt;
   }
-  return ContentFault{"name", std::nullopt,
-                      fmt::format("has {} bytes or a control character; allowed: 1..{} bytes of text",
-                                  name.size(), kMaxNameLength)};
+  return ContentFault{
+      "name", std::nullopt,
+      fmt::format("has {} bytes or a control character; allowed: 1..{} bytes of text", name.size(),
+                  kMaxNameLength)};
 }
 
 std::optional<ContentFault> check_sizes(const TableContent& content) {
@@ -25,19 +28,22 @@ std::optional<ContentFault> check_sizes(const TableContent& content) {
   const std::size_t decel = content.decel ? content.decel->size() : 0;
   if (accel == 0) return ContentFault{"accel", std::nullopt, "is empty; allowed: 1 code or more"};
   if (content.decel && decel == 0) {
-    return ContentFault{"decel", std::nullopt,
-                        "is empty; allowed: 1 code or more, or leave it out: then it is accel reversed"};
+    return ContentFault{
+        "decel", std::nullopt,
+        "is empty; allowed: 1 code or more, or leave it out: then it is accel reversed"};
   }
   if (accel + decel <= kMaxCodes) return std::nullopt;
-  return ContentFault{accel > kMaxCodes ? "accel" : "decel", std::nullopt,
-                      fmt::format("makes {} codes in all; allowed: {}, because an MCU addresses the "
-                                  "codes of a table by 16 bits. Use a steeper ramp",
-                                  accel + decel, kMaxCodes)};
+  return ContentFault{
+      accel > kMaxCodes ? "accel" : "decel", std::nullopt,
+      fmt::format("makes {} codes in all; allowed: {}, because an MCU addresses the "
+                  "codes of a table by 16 bits. Use a steeper ramp",
+                  accel + decel, kMaxCodes)};
 }
 
 // The engine counts both sides from slow to fast; a file lists decel from fast to slow.
 ContentFault place(bushd_status status, std::uint32_t engine_index, bool in_decel,
-                   const std::vector<std::uint16_t>& accel, const std::vector<std::uint16_t>& decel) {
+                   const std::vector<std::uint16_t>& accel,
+                   const std::vector<std::uint16_t>& decel) {
   const std::string key = in_decel ? "decel" : "accel";
   const std::vector<std::uint16_t>& file_order = in_decel ? decel : accel;
   const std::size_t last = file_order.size() - 1;
@@ -54,9 +60,10 @@ ContentFault place(bushd_status status, std::uint32_t engine_index, bool in_dece
                           in_decel ? "fast to slow" : "slow to fast")};
     }
     case BUSHD_E_TABLE_TOO_LONG:
-      return {key, at,
-              "the delays between rest and this code add up to more than 2147483647 time units, the "
-              "longest ramp that can be run. Use a larger time_unit_ns or fewer codes"};
+      return {
+          key, at,
+          "the delays between rest and this code add up to more than 2147483647 time units, the "
+          "longest ramp that can be run. Use a larger time_unit_ns or fewer codes"};
     default:
       return {key, at, bushd_status_text(status)};
   }
@@ -87,8 +94,9 @@ std::optional<ContentFault> check_codes(const TableContent& content) {
 std::optional<ContentFault> check(const TableContent& content) {
   if (auto fault = check_name(content.name)) return fault;
   if (content.time_unit_ns < 1 || content.time_unit_ns > kMaxTimeUnitNs) {
-    return ContentFault{"time_unit_ns", std::nullopt,
-                        fmt::format("is {}; allowed: 1..{} (1 s)", content.time_unit_ns, kMaxTimeUnitNs)};
+    return ContentFault{
+        "time_unit_ns", std::nullopt,
+        fmt::format("is {}; allowed: 1..{} (1 s)", content.time_unit_ns, kMaxTimeUnitNs)};
   }
   if (auto fault = check_sizes(content)) return fault;
   if (auto fault = check_codes(content)) return fault;

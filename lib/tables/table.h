@@ -15,7 +15,8 @@ namespace bushd::tables {
 
 // An MCU addresses the codes of a table, both sides together, by 16 bits.
 inline constexpr std::size_t kMaxCodes = 65535;
-// One second: above it nothing can be told apart any more, and the engine's sums of two rests fit 32 bits.
+// One second: above it nothing can be told apart any more, and the engine's sums of two rests fit
+// 32 bits.
 inline constexpr std::uint32_t kMaxTimeUnitNs = 1'000'000'000;
 inline constexpr std::size_t kMaxNameLength = 63;
 

@@ -17,8 +17,8 @@ Result<TablePtr> load(const std::filesystem::path& path);
 // `path` is only what errors and Table::path() say.
 Result<TablePtr> parse(std::string_view text, const std::string& path);
 
-// The path of the first NAME.toml in `directories`; the error lists where it was looked for. Names that
-// lead elsewhere (with '/' or a leading '.') are refused.
+// The path of the first NAME.toml in `directories`; the error lists where it was looked for. Names
+// that lead elsewhere (with '/' or a leading '.') are refused.
 Result<std::filesystem::path> find(std::string_view name,
                                    std::span<const std::filesystem::path> directories);
 

@@ -15,10 +15,10 @@ namespace {
 constexpr int kMaxDottedDepth = 16;
 
 // toml++ 3.3 bounds nested values (256) but not dotted keys: "a.a.a. ..." makes a tree as deep as
-// the file is long, and freeing it overflows the stack. So keys that nest deeper than any of ours are found
-// before it sees them. Dots are counted outside of strings and comments and start anew at whatever cannot
-// stand within a key, so that numbers and text cost nothing. The lexer need only agree with TOML up to the
-// first syntax error: there toml++ stops as well.
+// the file is long, and freeing it overflows the stack. So keys that nest deeper than any of ours
+// are found before it sees them. Dots are counted outside of strings and comments and start anew at
+// whatever cannot stand within a key, so that numbers and text cost nothing. The lexer need only
+// agree with TOML up to the first syntax error: there toml++ stops as well.
 class DottedKeyGuard {
  public:
   explicit DottedKeyGuard(std::string_view text) : rest_(text) {}
@@ -92,20 +92,22 @@ Result<std::string> read_text(const std::filesystem::path& path) {
   if (file.bad()) return unreadable(path, std::strerror(errno));
   text.resize(static_cast<std::size_t>(file.gcount()));
   if (text.size() > kMaxFileBytes) {
-    return unreadable(path, fmt::format("larger than {} bytes, and the longest table allowed needs half "
-                                        "of that",
-                                        kMaxFileBytes));
+    return unreadable(path,
+                      fmt::format("larger than {} bytes, and the longest table allowed needs half "
+                                  "of that",
+                                  kMaxFileBytes));
   }
   return text;
 }
 
 Result<toml::table> parse_toml(std::string_view text, const std::string& path) {
   if (const int line = DottedKeyGuard(text).find()) {
-    return fail(Error{.message = fmt::format("a key of more than {} parts; allowed: the keys of the "
-                                             "documentation, which have two at most",
-                                             kMaxDottedDepth),
-                      .file = path,
-                      .line = line});
+    return fail(
+        Error{.message = fmt::format("a key of more than {} parts; allowed: the keys of the "
+                                     "documentation, which have two at most",
+                                     kMaxDottedDepth),
+              .file = path,
+              .line = line});
   }
   try {
     return toml::parse(text, path);

@@ -1,17 +1,19 @@
 // TOML text from outside, made safe: whatever the bytes are, the result is a document or an Error.
 #pragma once
 
+#include <toml++/toml.h>
+
 #include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
-#include <toml++/toml.h>
 
 #include "base/result.h"
 
 namespace bushd::tables {
 
-// Two sides of 65535 codes take 1 MB with all separators; a parsed code takes about 100 bytes of memory.
+// Two sides of 65535 codes take 1 MB with all separators; a parsed code takes about 100 bytes of
+// memory.
 inline constexpr std::size_t kMaxFileBytes = 2 * 1024 * 1024;
 
 // A regular file of at most kMaxFileBytes.

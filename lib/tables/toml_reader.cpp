@@ -11,7 +11,9 @@ namespace {
 
 constexpr std::size_t kMaxQuoted = 80;
 
-int line_of(const toml::source_region& source) { return static_cast<int>(source.begin.line); }
+int line_of(const toml::source_region& source) {
+  return static_cast<int>(source.begin.line);
+}
 
 std::string range(std::int64_t lowest, std::int64_t highest, std::string_view unit) {
   return fmt::format("a whole number {}..{}{}{}", lowest, highest, unit.empty() ? "" : " ", unit);
@@ -76,7 +78,8 @@ Result<void> TomlReader::only(std::initializer_list<std::string_view> keys) cons
   return fail(std::move(unknown_key));
 }
 
-Result<const toml::node*> TomlReader::required(std::string_view key, std::string_view allowed) const {
+Result<const toml::node*> TomlReader::required(std::string_view key,
+                                               std::string_view allowed) const {
   if (const toml::node* node = table_->get(key)) return node;
   return fail(error(key, fmt::format("is missing; allowed: {}", allowed)));
 }
@@ -93,18 +96,20 @@ Result<std::int64_t> TomlReader::integer(std::string_view key, std::int64_t lowe
   const auto node = required(key, range(lowest, highest, unit));
   if (!node) return fail(node.error());
   const auto* number = (*node)->as_integer();
-  if (number != nullptr && number->get() >= lowest && number->get() <= highest) return number->get();
-  return fail(error(key, fmt::format("is {}; allowed: {}", describe(**node),
-                                     range(lowest, highest, unit))));
+  if (number != nullptr && number->get() >= lowest && number->get() <= highest)
+    return number->get();
+  return fail(error(
+      key, fmt::format("is {}; allowed: {}", describe(**node), range(lowest, highest, unit))));
 }
 
 Result<std::int64_t> TomlReader::integer(std::string_view key, std::size_t index,
                                          const toml::node& node, std::int64_t lowest,
                                          std::int64_t highest, std::string_view unit) const {
   const auto* number = node.as_integer();
-  if (number != nullptr && number->get() >= lowest && number->get() <= highest) return number->get();
-  return fail(error(key, index, fmt::format("is {}; allowed: {}", describe(node),
-                                            range(lowest, highest, unit))));
+  if (number != nullptr && number->get() >= lowest && number->get() <= highest)
+    return number->get();
+  return fail(error(
+      key, index, fmt::format("is {}; allowed: {}", describe(node), range(lowest, highest, unit))));
 }
 
 Result<const toml::array*> TomlReader::array(std::string_view key, std::string_view allowed) const {

@@ -1,13 +1,14 @@
-// Reads one TOML table by a schema: required keys, exact types, ranges, nothing unknown. Every refusal
-// names file, line, key, what stands there and what is allowed.
+// Reads one TOML table by a schema: required keys, exact types, ranges, nothing unknown. Every
+// refusal names file, line, key, what stands there and what is allowed.
 #pragma once
+
+#include <toml++/toml.h>
 
 #include <cstdint>
 #include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <toml++/toml.h>
 
 #include "base/result.h"
 
@@ -15,7 +16,8 @@ namespace bushd::tables {
 
 class TomlReader {
  public:
-  // `table` must outlive the reader. `place` is the dotted path of the table ("motor[3]"; root: empty).
+  // `table` must outlive the reader. `place` is the dotted path of the table ("motor[3]"; root:
+  // empty).
   TomlReader(const toml::table& table, std::string file, std::string place = {});
 
   bool has(std::string_view key) const { return table_->contains(key); }

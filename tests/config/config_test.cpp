@@ -19,43 +19,43 @@ constexpr const char* kTable = "name = \"t\"\ntime_unit_ns = 40000\naccel = [250
 
 // The numbers are lines.
 const std::string kGood =
-    "[lcm]\n"                                    // 1
-    "url = \"memq://\"\n"                        // 2
-    "prefix = \"TEST\"\n"                        // 3
-    "[[bus]]\n"                                  // 4
-    "name = \"hall\"\n"                          // 5
-    "port = \"/dev/no-such-port-a\"\n"           // 6
-    "baud = 500000\n"                            // 7
-    "tick_us = 2560\n"                           // 8
-    "format = \"fine\"\n"                        // 9
-    "[[bus]]\n"                                  // 10
-    "name = \"roof\"\n"                          // 11
-    "port = \"/dev/no-such-port-b\"\n"           // 12
-    "baud = 115200\n"                            // 13
-    "tick_us = 5000\n"                           // 14
-    "format = \"coarse\"\n"                      // 15
-    "[[mcu]]\n"                                  // 16
-    "bus = \"hall\"\n"                           // 17
-    "address = 1\n"                              // 18
-    "[[mcu]]\n"                                  // 19
-    "bus = \"roof\"\n"                           // 20
-    "address = 255\n"                            // 21
-    "[[group]]\n"                                // 22
-    "name = \"goniometer\"\n"                    // 23
-    "table = \"bushd2-constant\"\n"              // 24
-    "[[group]]\n"                                // 25
-    "name = \"slits\"\n"                         // 26
-    "table = \"own\"\n"                          // 27
-    "[[motor]]\n"                                // 28
-    "name = \"theta\"\n"                         // 29
-    "mcu = \"hall:1\"\n"                         // 30
-    "output = 0\n"                               // 31
-    "group = \"goniometer\"\n"                   // 32
-    "[[motor]]\n"                                // 33
-    "name = \"slit\"\n"                          // 34
-    "mcu = \"roof:255\"\n"                       // 35
-    "output = 15\n"                              // 36
-    "group = \"slits\"\n";                       // 37
+    "[lcm]\n"                           // 1
+    "url = \"memq://\"\n"               // 2
+    "prefix = \"TEST\"\n"               // 3
+    "[[bus]]\n"                         // 4
+    "name = \"hall\"\n"                 // 5
+    "port = \"/dev/no-such-port-a\"\n"  // 6
+    "baud = 500000\n"                   // 7
+    "tick_us = 2560\n"                  // 8
+    "format = \"fine\"\n"               // 9
+    "[[bus]]\n"                         // 10
+    "name = \"roof\"\n"                 // 11
+    "port = \"/dev/no-such-port-b\"\n"  // 12
+    "baud = 115200\n"                   // 13
+    "tick_us = 5000\n"                  // 14
+    "format = \"coarse\"\n"             // 15
+    "[[mcu]]\n"                         // 16
+    "bus = \"hall\"\n"                  // 17
+    "address = 1\n"                     // 18
+    "[[mcu]]\n"                         // 19
+    "bus = \"roof\"\n"                  // 20
+    "address = 255\n"                   // 21
+    "[[group]]\n"                       // 22
+    "name = \"goniometer\"\n"           // 23
+    "table = \"bushd2-constant\"\n"     // 24
+    "[[group]]\n"                       // 25
+    "name = \"slits\"\n"                // 26
+    "table = \"own\"\n"                 // 27
+    "[[motor]]\n"                       // 28
+    "name = \"theta\"\n"                // 29
+    "mcu = \"hall:1\"\n"                // 30
+    "output = 0\n"                      // 31
+    "group = \"goniometer\"\n"          // 32
+    "[[motor]]\n"                       // 33
+    "name = \"slit\"\n"                 // 34
+    "mcu = \"roof:255\"\n"              // 35
+    "output = 15\n"                     // 36
+    "group = \"slits\"\n";              // 37
 
 // A configuration's file with its tables beside it.
 class ConfigFile {
@@ -148,7 +148,9 @@ struct Refusal {
   const char* message;
 };
 
-void PrintTo(const Refusal& refusal, std::ostream* out) { *out << refusal.what; }
+void PrintTo(const Refusal& refusal, std::ostream* out) {
+  *out << refusal.what;
+}
 
 class ConfigRefusal : public testing::TestWithParam<Refusal> {};
 
@@ -171,20 +173,22 @@ const auto kNames = [](const auto& tested) { return std::string(tested.param.wha
 
 INSTANTIATE_TEST_SUITE_P(
     Lcm, ConfigRefusal,
-    testing::Values(
-        change("UnknownKey", "url =", "uri =", 2, "lcm.uri", "unknown key; allowed here: url, prefix"),
-        change("UrlIsNumber", "\"memq://\"", "7667", 2, "lcm.url", "is 7667; allowed: a URL"),
-        change("UrlOfUnknownProvider", "memq://", "http://x", 2, "lcm.url", "udpm://"),
-        change("Prefix", "\"TEST\"", "\"A B\"", 3, "lcm.prefix", "1..48 characters"),
-        change("Array", "[lcm]", "[[lcm]]", 1, "lcm", "one [lcm]"),
-        Refusal{"Value", "lcm = 3\n", 1, "lcm", "one [lcm]"}),
+    testing::Values(change("UnknownKey", "url =", "uri =", 2, "lcm.uri",
+                           "unknown key; allowed here: url, prefix"),
+                    change("UrlIsNumber", "\"memq://\"", "7667", 2, "lcm.url",
+                           "is 7667; allowed: a URL"),
+                    change("UrlOfUnknownProvider", "memq://", "http://x", 2, "lcm.url", "udpm://"),
+                    change("Prefix", "\"TEST\"", "\"A B\"", 3, "lcm.prefix", "1..48 characters"),
+                    change("Array", "[lcm]", "[[lcm]]", 1, "lcm", "one [lcm]"),
+                    Refusal{"Value", "lcm = 3\n", 1, "lcm", "one [lcm]"}),
     kNames);
 
 INSTANTIATE_TEST_SUITE_P(
     Bus, ConfigRefusal,
     testing::Values(
         Refusal{"Missing", "", 1, "bus", "is missing; allowed: sections [[bus]]"},
-        Refusal{"Single", "[bus]\nname = \"b\"\n", 1, "bus", "is a table; allowed: sections [[bus]]"},
+        Refusal{"Single", "[bus]\nname = \"b\"\n", 1, "bus",
+                "is a table; allowed: sections [[bus]]"},
         Refusal{"Empty", "bus = []\n", 1, "bus", "is empty"},
         Refusal{"Numbers", "bus = [1]\n", 1, "bus[0]", "is 1; allowed: sections [[bus]]"},
         change("UnknownSection", "[[mcu]]", "[[motors]]", 16, "motors",
@@ -195,18 +199,22 @@ INSTANTIATE_TEST_SUITE_P(
         change("NameBad", "\"hall\"", "\"ha:ll\"", 5, "bus[0].name",
                "is \"ha:ll\"; allowed: 1..63 characters of A-Z a-z 0-9 _ . -"),
         change("NameEmpty", "\"hall\"", "\"\"", 5, "bus[0].name", "1..63"),
-        change("NameLong", "\"hall\"", "\"" + std::string(64, 'x') + "\"", 5, "bus[0].name", "1..63"),
+        change("NameLong", "\"hall\"", "\"" + std::string(64, 'x') + "\"", 5, "bus[0].name",
+               "1..63"),
         change("NameTwice", "\"roof\"", "\"hall\"", 11, "bus[1].name", "already taken in line 5"),
-        change("PortMissing", "port = \"/dev/no-such-port-a\"\n", "", 4, "bus[0].port", "is missing"),
+        change("PortMissing", "port = \"/dev/no-such-port-a\"\n", "", 4, "bus[0].port",
+               "is missing"),
         change("PortEmpty", "\"/dev/no-such-port-a\"", "\"\"", 6, "bus[0].port", "serial port"),
         change("PortTwice", "no-such-port-b", "no-such-port-a", 12, "bus[1].port",
                "of bus \"hall\"; allowed: one bus a port"),
         change("BaudMissing", "baud = 500000\n", "", 4, "bus[0].baud", "is missing"),
         change("BaudString", "500000", "\"500000\"", 7, "bus[0].baud", "is the string \"500000\""),
-        change("BaudNotFixed", "500000", "250000", 7, "bus[0].baud", "is 250000; allowed: 50, 75, 110"),
+        change("BaudNotFixed", "500000", "250000", 7, "bus[0].baud",
+               "is 250000; allowed: 50, 75, 110"),
         change("BaudTooHigh", "500000", "12000000", 7, "bus[0].baud", "50..4000000"),
         change("TickMissing", "tick_us = 2560\n", "", 4, "bus[0].tick_us", "is missing"),
-        change("TickShort", "2560", "199", 8, "bus[0].tick_us", "is 199; allowed: a whole number 200..20000"),
+        change("TickShort", "2560", "199", 8, "bus[0].tick_us",
+               "is 199; allowed: a whole number 200..20000"),
         change("TickLong", "2560", "20001", 8, "bus[0].tick_us", "200..20000"),
         change("TickFloat", "2560", "2560.0", 8, "bus[0].tick_us", "floating-point"),
         change("FormatMissing", "format = \"fine\"\n", "", 4, "bus[0].format", "is missing"),
@@ -217,8 +225,10 @@ INSTANTIATE_TEST_SUITE_P(
 INSTANTIATE_TEST_SUITE_P(
     Mcu, ConfigRefusal,
     testing::Values(
-        change("UnknownKey", "address = 1\n", "address = 1\nmotors = 16\n", 19, "mcu[0].motors", "unknown key"),
-        change("BusMissing", "bus = \"hall\"\n", "", 16, "mcu[0].bus", "is missing; allowed: \"hall\", \"roof\""),
+        change("UnknownKey", "address = 1\n", "address = 1\nmotors = 16\n", 19, "mcu[0].motors",
+               "unknown key"),
+        change("BusMissing", "bus = \"hall\"\n", "", 16, "mcu[0].bus",
+               "is missing; allowed: \"hall\", \"roof\""),
         change("BusUnknown", "bus = \"hall\"", "bus = \"cellar\"", 17, "mcu[0].bus",
                "is \"cellar\"; allowed: \"hall\", \"roof\""),
         change("AddressMissing", "address = 1\n", "", 16, "mcu[0].address", "is missing"),
@@ -229,17 +239,21 @@ INSTANTIATE_TEST_SUITE_P(
                "mcu[1].address", "address 1 of bus \"hall\" is already taken in line 18")),
     kNames);
 
-INSTANTIATE_TEST_SUITE_P(
-    Group, ConfigRefusal,
-    testing::Values(
-        change("UnknownKey", "table = \"own\"", "tables = \"own\"", 27, "group[1].tables", "unknown key"),
-        change("NameMissing", "name = \"slits\"\n", "", 25, "group[1].name", "is missing"),
-        change("NameTwice", "\"slits\"", "\"goniometer\"", 26, "group[1].name", "already taken in line 23"),
-        change("TableMissing", "table = \"own\"\n", "", 25, "group[1].table",
-               "is missing; allowed: the name of a table"),
-        change("TableUnknown", "\"own\"", "\"owl\"", 27, "group[1].table", "there is no table \"owl\""),
-        change("TableOutside", "\"own\"", "\"../own\"", 27, "group[1].table", "is not a table's name")),
-    kNames);
+INSTANTIATE_TEST_SUITE_P(Group, ConfigRefusal,
+                         testing::Values(change("UnknownKey", "table = \"own\"", "tables = \"own\"",
+                                                27, "group[1].tables", "unknown key"),
+                                         change("NameMissing", "name = \"slits\"\n", "", 25,
+                                                "group[1].name", "is missing"),
+                                         change("NameTwice", "\"slits\"", "\"goniometer\"", 26,
+                                                "group[1].name", "already taken in line 23"),
+                                         change("TableMissing", "table = \"own\"\n", "", 25,
+                                                "group[1].table",
+                                                "is missing; allowed: the name of a table"),
+                                         change("TableUnknown", "\"own\"", "\"owl\"", 27,
+                                                "group[1].table", "there is no table \"owl\""),
+                                         change("TableOutside", "\"own\"", "\"../own\"", 27,
+                                                "group[1].table", "is not a table's name")),
+                         kNames);
 
 INSTANTIATE_TEST_SUITE_P(
     Motor, ConfigRefusal,
@@ -248,7 +262,8 @@ INSTANTIATE_TEST_SUITE_P(
                "unknown key; allowed here: name, mcu, output, group"),
         change("NameMissing", "name = \"theta\"\n", "", 28, "motor[0].name", "is missing"),
         change("NameBad", "\"theta\"", "\"θ\"", 29, "motor[0].name", "1..63 characters"),
-        change("NameTwice", "\"slit\"", "\"theta\"", 34, "motor[1].name", "already taken in line 29"),
+        change("NameTwice", "\"slit\"", "\"theta\"", 34, "motor[1].name",
+               "already taken in line 29"),
         change("McuMissing", "mcu = \"hall:1\"\n", "", 28, "motor[0].mcu",
                "is missing; allowed: \"hall:1\", \"roof:255\""),
         change("McuUnknown", "\"hall:1\"", "\"hall:2\"", 30, "motor[0].mcu",
@@ -266,24 +281,25 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"TableTooFastForTheTick",
                 replaced(replaced(kGood, "\"own\"", "\"micro16-standard\""), "tick_us = 5000",
                          "tick_us = 10000"),
-                37,
-                "motor[1].group",
-                "makes up to 201 steps in the 10000 us tick of bus \"roof\"; allowed: 127. Use a slower "
+                37, "motor[1].group",
+                "makes up to 201 steps in the 10000 us tick of bus \"roof\"; allowed: 127. Use a "
+                "slower "
                 "table or tick_us = 6349 or less"}),
     kNames);
 
 // A bus, `mcus` MCUs with 16 motors each, and as many groups and tables as asked for.
 std::string wide(int mcus, int baud, int tick_us, const char* format, int groups = 1) {
   std::string text = fmt::format(
-      "[[bus]]\nname = \"hall\"\nport = \"p\"\nbaud = {}\ntick_us = {}\nformat = \"{}\"\n", baud, tick_us,
-      format);
+      "[[bus]]\nname = \"hall\"\nport = \"p\"\nbaud = {}\ntick_us = {}\nformat = \"{}\"\n", baud,
+      tick_us, format);
   for (int g = 0; g < groups; ++g) {
     text += fmt::format("[[group]]\nname = \"g{}\"\ntable = \"t{}\"\n", g, g);
   }
   for (int m = 1; m <= mcus; ++m) text += fmt::format("[[mcu]]\nbus = \"hall\"\naddress = {}\n", m);
   for (int m = 0; m < mcus * 16; ++m) {
-    text += fmt::format("[[motor]]\nname = \"m{}\"\nmcu = \"hall:{}\"\noutput = {}\ngroup = \"g{}\"\n", m,
-                        m / 16 + 1, m % 16, m % groups);
+    text +=
+        fmt::format("[[motor]]\nname = \"m{}\"\nmcu = \"hall:{}\"\noutput = {}\ngroup = \"g{}\"\n",
+                    m, m / 16 + 1, m % 16, m % groups);
   }
   return text;
 }
@@ -304,7 +320,8 @@ TEST(ConfigTogether, LineThatCannotCarryItsTicksIsRefusedWithLoadAndRemedy) {
   EXPECT_EQ(config.error().file, file.path());
   EXPECT_EQ(config.error().line, 5);
   EXPECT_EQ(config.error().key, "bus[0].tick_us");
-  EXPECT_THAT(config.error().message, HasSubstr("% of the line at 115200 baud; allowed: 85 %. Use baud = "));
+  EXPECT_THAT(config.error().message,
+              HasSubstr("% of the line at 115200 baud; allowed: 85 %. Use baud = "));
   EXPECT_THAT(config.error().message, HasSubstr("or more, or tick_us = "));
 }
 
@@ -336,7 +353,8 @@ TEST(ConfigTogether, NinthTableOfAnMcuIsRefused) {
   ASSERT_FALSE(config.has_value());
   EXPECT_EQ(config.error().key, "motor[8].group");
   EXPECT_EQ(config.error().line, 6 + 9 * 3 + 3 + 9 * 5);
-  EXPECT_THAT(config.error().message, HasSubstr("one table too many for MCU \"hall:1\"; allowed: 8"));
+  EXPECT_THAT(config.error().message,
+              HasSubstr("one table too many for MCU \"hall:1\"; allowed: 8"));
 }
 
 TEST(ConfigTogether, OnePortUnderTwoNamesIsRefused) {
@@ -344,7 +362,8 @@ TEST(ConfigTogether, OnePortUnderTwoNamesIsRefused) {
   const auto port = directory.write("port", "");
   const auto link = directory.path() / "link";
   std::filesystem::create_symlink(port, link);
-  const ConfigFile file(replaced(replaced(kGood, "/dev/no-such-port-a", port), "/dev/no-such-port-b", link));
+  const ConfigFile file(
+      replaced(replaced(kGood, "/dev/no-such-port-a", port), "/dev/no-such-port-b", link));
   const auto config = file.load();
   ASSERT_FALSE(config.has_value());
   EXPECT_EQ(config.error().line, 12);
@@ -353,7 +372,8 @@ TEST(ConfigTogether, OnePortUnderTwoNamesIsRefused) {
 
 TEST(ConfigTogether, BrokenTableIsNamedWithTheGroupThatUsesIt) {
   const ConfigFile file(kGood);
-  const auto table = file.directory().write("own.toml", "name = \"own\"\ntime_unit_ns = 1\naccel = [1, 2]\n");
+  const auto table =
+      file.directory().write("own.toml", "name = \"own\"\ntime_unit_ns = 1\naccel = [1, 2]\n");
   const auto config = file.load();
   ASSERT_FALSE(config.has_value());
   EXPECT_EQ(config.error().file, table);

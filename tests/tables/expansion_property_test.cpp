@@ -70,7 +70,8 @@ TEST(Expansion, AgreesWithTheSlowReferenceForAnyMonotoneTable) {
       const ReferenceMove reference(made.content, steps, made.tick_ns);
       const std::vector<int> coarse = reference.coarse();
       const std::vector<int> fine = reference.fine();
-      RC_LOG() << file_text(made.content) << "tick_ns " << made.tick_ns << " steps " << steps << '\n';
+      RC_LOG() << file_text(made.content) << "tick_ns " << made.tick_ns << " steps " << steps
+               << '\n';
       for (const bushd_table* view : {&indexed, &plain}) {
         RC_ASSERT(expand<std::uint8_t>(*view, steps, made.tick_ns, bushd_run_expand_coarse,
                                        random_block) == coarse);

@@ -1,5 +1,5 @@
-// Random monotone tables with a tick that they are slow enough for: symmetric or not, cruise slower or faster
-// than the ends of the sides, units that do not divide the tick.
+// Random monotone tables with a tick that they are slow enough for: symmetric or not, cruise slower
+// or faster than the ends of the sides, units that do not divide the tick.
 #pragma once
 
 #include <rapidcheck.h>
@@ -20,9 +20,12 @@ struct RandomCase {
   std::uint32_t tick_ns = 0;
 };
 
-inline int random_in(int low, int high) { return *rc::gen::inRange(low, high + 1); }
+inline int random_in(int low, int high) {
+  return *rc::gen::inRange(low, high + 1);
+}
 
-// Falling codes between `fastest` and a random multiple of it; plateaus are likely when that is small.
+// Falling codes between `fastest` and a random multiple of it; plateaus are likely when that is
+// small.
 inline std::vector<std::uint16_t> random_side(int fastest) {
   const int slowest = std::min(65535, fastest + random_in(0, fastest * random_in(1, 30)));
   const int count = random_in(1, random_in(0, 3) == 0 ? 2 : 60);
@@ -38,7 +41,8 @@ inline std::vector<std::uint16_t> random_side(int fastest) {
 inline RandomCase random_case(std::uint32_t tick_step_ns) {
   RandomCase made;
   const int step = static_cast<int>(tick_step_ns);
-  made.tick_ns = tick_step_ns * static_cast<std::uint32_t>(random_in(200'000 / step, 20'000'000 / step));
+  made.tick_ns =
+      tick_step_ns * static_cast<std::uint32_t>(random_in(200'000 / step, 20'000'000 / step));
   const int fastest = random_in(1, random_in(0, 1) == 0 ? 12 : 2000);
   tables::TableContent& content = made.content;
   content.name = "random";
@@ -48,14 +52,16 @@ inline RandomCase random_case(std::uint32_t tick_step_ns) {
     std::reverse(content.decel->begin(), content.decel->end());
   }
   if (random_in(0, 2) != 0) {
-    content.cruise = static_cast<std::uint16_t>(random_in(1, std::min(65535, 3 * content.accel.back())));
+    content.cruise =
+        static_cast<std::uint16_t>(random_in(1, std::min(65535, 3 * content.accel.back())));
   }
   // The shortest delay is between the fastest that the tick allows and a few ticks.
   const std::int64_t shortest = content.cruise.value_or(content.accel.back());
   const std::int64_t least_ns = made.tick_ns / (BUSHD_MAX_STEPS_PER_TICK - 1) + 1;
-  const std::int64_t delay_ns = random_in(0, 1) == 0
-                                    ? least_ns
-                                    : random_in(static_cast<int>(least_ns), 2 * static_cast<int>(made.tick_ns));
+  const std::int64_t delay_ns =
+      random_in(0, 1) == 0
+          ? least_ns
+          : random_in(static_cast<int>(least_ns), 2 * static_cast<int>(made.tick_ns));
   content.time_unit_ns = static_cast<std::uint32_t>((delay_ns + shortest - 1) / shortest);
   return made;
 }

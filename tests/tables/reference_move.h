@@ -1,5 +1,5 @@
-// The slow reference: a move straight from the formula, every step and every tick by itself, in exact
-// rational arithmetic. Shares no code with the engine.
+// The slow reference: a move straight from the formula, every step and every tick by itself, in
+// exact rational arithmetic. Shares no code with the engine.
 //
 //   delay before step j of N  =  max( A(j-1), D(N-j), c )
 //   step j at the sum of the first j delays
@@ -73,9 +73,8 @@ class ReferenceMove {
 
   std::size_t steps_at(std::uint64_t tick_end) const {
     const Wide end_ns = Wide{tick_end} * tick_ns_;
-    const auto later = std::find_if(times_units_.begin(), times_units_.end(), [&](std::uint64_t t) {
-      return Wide{t} * unit_ns_ > end_ns;
-    });
+    const auto later = std::find_if(times_units_.begin(), times_units_.end(),
+                                    [&](std::uint64_t t) { return Wide{t} * unit_ns_ > end_ns; });
     return static_cast<std::size_t>(later - times_units_.begin());
   }
 
@@ -85,7 +84,8 @@ class ReferenceMove {
     if (steps == delays_.size()) return position;
     const std::uint64_t last = steps == 0 ? 0 : times_units_[steps - 1];
     const Wide elapsed_ns = Wide{tick_end} * tick_ns_ - Wide{last} * unit_ns_;
-    return position + static_cast<std::int64_t>(256 * elapsed_ns / (Wide{delays_[steps]} * unit_ns_));
+    return position +
+           static_cast<std::int64_t>(256 * elapsed_ns / (Wide{delays_[steps]} * unit_ns_));
   }
 
   Wide unit_ns_;

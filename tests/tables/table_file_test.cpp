@@ -18,7 +18,9 @@ namespace {
 using test::TempDirectory;
 using testing::HasSubstr;
 
-std::vector<std::uint16_t> codes_of(const bushd_ramp& side) { return {side.code, side.code + side.count}; }
+std::vector<std::uint16_t> codes_of(const bushd_ramp& side) {
+  return {side.code, side.code + side.count};
+}
 
 TEST(TableFile, SymmetricTableSharesOneSide) {
   const auto table = parse("name = \"t\"\ntime_unit_ns = 40000\naccel = [250, 20, 10]\n", "t.toml");
@@ -83,7 +85,9 @@ struct Refusal {
   const char* message;
 };
 
-void PrintTo(const Refusal& refusal, std::ostream* out) { *out << refusal.what; }
+void PrintTo(const Refusal& refusal, std::ostream* out) {
+  *out << refusal.what;
+}
 
 class TableRefusal : public testing::TestWithParam<Refusal> {};
 
@@ -110,18 +114,20 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Refusal{"MissingName", "time_unit_ns = 1\naccel = [1]\n", 1, "name", "is missing"},
         Refusal{"EmptyName", "time_unit_ns = 1\nname = \"\"\naccel = [1]\n", 2, "name", "1..63"},
-        Refusal{"LongName", "name = \"" + std::string(64, 'x') + "\"\ntime_unit_ns = 1\naccel = [1]\n", 1,
+        Refusal{"LongName",
+                "name = \"" + std::string(64, 'x') + "\"\ntime_unit_ns = 1\naccel = [1]\n", 1,
                 "name", "1..63"},
-        Refusal{"ControlCharacterInName", "name = \"a\\nb\"\ntime_unit_ns = 1\naccel = [1]\n", 1, "name",
-                "control character"},
-        Refusal{"NameIsNumber", "name = 3\ntime_unit_ns = 1\naccel = [1]\n", 1, "name", "is 3; allowed"},
+        Refusal{"ControlCharacterInName", "name = \"a\\nb\"\ntime_unit_ns = 1\naccel = [1]\n", 1,
+                "name", "control character"},
+        Refusal{"NameIsNumber", "name = 3\ntime_unit_ns = 1\naccel = [1]\n", 1, "name",
+                "is 3; allowed"},
         Refusal{"MissingUnit", "name = \"t\"\naccel = [1]\n", 1, "time_unit_ns", "is missing"},
         Refusal{"ZeroUnit", "name = \"t\"\ntime_unit_ns = 0\naccel = [1]\n", 2, "time_unit_ns",
                 "is 0; allowed: a whole number 1..1000000000"},
-        Refusal{"HugeUnit", "name = \"t\"\ntime_unit_ns = 1000000001\naccel = [1]\n", 2, "time_unit_ns",
-                "1..1000000000"},
-        Refusal{"FloatUnit", "name = \"t\"\ntime_unit_ns = 40000.0\naccel = [1]\n", 2, "time_unit_ns",
-                "floating-point number 40000"},
+        Refusal{"HugeUnit", "name = \"t\"\ntime_unit_ns = 1000000001\naccel = [1]\n", 2,
+                "time_unit_ns", "1..1000000000"},
+        Refusal{"FloatUnit", "name = \"t\"\ntime_unit_ns = 40000.0\naccel = [1]\n", 2,
+                "time_unit_ns", "floating-point number 40000"},
         Refusal{"MissingAccel", kHead, 1, "accel", "is missing"},
         Refusal{"EmptyAccel", kHead + "accel = []\n", 3, "accel", "is empty"},
         Refusal{"AccelIsNumber", kHead + "accel = 250\n", 3, "accel", "is 250; allowed: an array"},
@@ -129,10 +135,12 @@ INSTANTIATE_TEST_SUITE_P(
                 "is 0; allowed: a whole number 1..65535"},
         Refusal{"NegativeCode", kHead + "accel = [250, -10]\n", 3, "accel[1]", "is -10"},
         Refusal{"CodeOf17Bits", kHead + "accel = [\n65536]\n", 4, "accel[0]", "is 65536"},
-        Refusal{"FloatCode", kHead + "accel = [250, 10.5]\n", 3, "accel[1]", "floating-point number 10.5"},
+        Refusal{"FloatCode", kHead + "accel = [250, 10.5]\n", 3, "accel[1]",
+                "floating-point number 10.5"},
         Refusal{"NanCode", kHead + "accel = [nan]\n", 3, "accel[0]", "nan"},
         Refusal{"InfiniteCode", kHead + "accel = [inf]\n", 3, "accel[0]", "inf"},
-        Refusal{"StringCode", kHead + "accel = [250, \"10\"]\n", 3, "accel[1]", "the string \"10\""},
+        Refusal{"StringCode", kHead + "accel = [250, \"10\"]\n", 3, "accel[1]",
+                "the string \"10\""},
         Refusal{"NestedCode", kHead + "accel = [250, [10]]\n", 3, "accel[1]", "an array"},
         Refusal{"UnsortedAccel", kHead + "accel = [\n  250, 20,\n  21, 10]\n", 5, "accel[2]",
                 "is 21 after 20; allowed: codes that never rise"},
@@ -144,18 +152,21 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"ZeroInDecel", kHead + "accel = [9]\ndecel = [0, 9]\n", 4, "decel[0]", "is 0"},
         Refusal{"ZeroCruise", kHead + "accel = [9]\ncruise = 0\n", 4, "cruise", "1..65535"},
         Refusal{"HugeCruise", kHead + "accel = [9]\ncruise = 65536\n", 4, "cruise", "1..65535"},
-        Refusal{"DescriptionIsNumber", kHead + "accel = [9]\ndescription = 1\n", 4, "description", "a string"},
+        Refusal{"DescriptionIsNumber", kHead + "accel = [9]\ndescription = 1\n", 4, "description",
+                "a string"},
         Refusal{"UnknownKey", kHead + "accel = [9]\naccell = [9]\n", 4, "accell",
                 "unknown key; allowed here: name, description, time_unit_ns, accel, decel, cruise"},
-        Refusal{"FirstUnknownKeyOfTheFile", "zeta = 1\n" + kHead + "accel = [9]\nalpha = 1\n", 1, "zeta",
+        Refusal{"FirstUnknownKeyOfTheFile", "zeta = 1\n" + kHead + "accel = [9]\nalpha = 1\n", 1,
+                "zeta", "unknown key"},
+        Refusal{"UnknownSection", kHead + "accel = [9]\n[motor]\nx = 1\n", 4, "motor",
                 "unknown key"},
-        Refusal{"UnknownSection", kHead + "accel = [9]\n[motor]\nx = 1\n", 4, "motor", "unknown key"},
         Refusal{"DuplicateKey", kHead + "accel = [9]\naccel = [8]\n", 4, "", "not TOML"},
         Refusal{"SyntaxError", kHead + "accel = [9\n", 3, "", "not TOML"},
         Refusal{"TooManyCodes", kHead + "accel = [" + repeated("9", 65536) + "]\n", 3, "accel",
                 "65536 codes in all; allowed: 65535"},
         Refusal{"TooManyCodesOnBothSides",
-                kHead + "accel = [" + repeated("9", 65535) + "]\ndecel = [9]\n", 4, "decel", "65536 codes"},
+                kHead + "accel = [" + repeated("9", 65535) + "]\ndecel = [9]\n", 4, "decel",
+                "65536 codes"},
         Refusal{"RampLongerThan31Bits", kHead + "accel = [" + repeated("65535", 40000) + "]\n", 3,
                 "accel[32768]", "add up to more than 2147483647 time units"}),
     [](const auto& tested) { return std::string(tested.param.what); });
@@ -208,9 +219,10 @@ TEST(HostileTableFile, DeepestKeysInDeepestValuesAreRefusedWithoutACrash) {
 
 TEST(HostileTableFile, DotsThatAreNotKeysCostNothing) {
   const std::string dots(200, '.');
-  const auto table = parse("# " + dots + "\nname = \"t\"\ntime_unit_ns = 1\naccel = [1]\n" +
-                               "description = \"\"\"" + dots + "\n\\\"\"\" " + dots + "\"\"\" # " + dots,
-                           "dots.toml");
+  const auto table =
+      parse("# " + dots + "\nname = \"t\"\ntime_unit_ns = 1\naccel = [1]\n" +
+                "description = \"\"\"" + dots + "\n\\\"\"\" " + dots + "\"\"\" # " + dots,
+            "dots.toml");
   ASSERT_TRUE(table.has_value()) << table.error().text();
   const auto floats = parse(kHead + "accel = [" + repeated("1.5", 100) + "]\n", "floats.toml");
   ASSERT_FALSE(floats.has_value());

@@ -25,8 +25,10 @@ TEST(TableMake, FaultsAreNamedAsInAFile) {
 TEST(TableMake, ZeroesAreRefused) {
   EXPECT_EQ(make({.name = "t", .time_unit_ns = 0, .accel = {9}}).error().key, "time_unit_ns");
   EXPECT_EQ(make({.name = "t", .time_unit_ns = 1, .accel = {9, 0}}).error().key, "accel[1]");
-  EXPECT_EQ(make({.name = "t", .time_unit_ns = 1, .accel = {9}, .decel = {{0, 9}}}).error().key, "decel[0]");
-  EXPECT_EQ(make({.name = "t", .time_unit_ns = 1, .accel = {9}, .cruise = 0}).error().key, "cruise");
+  EXPECT_EQ(make({.name = "t", .time_unit_ns = 1, .accel = {9}, .decel = {{0, 9}}}).error().key,
+            "decel[0]");
+  EXPECT_EQ(make({.name = "t", .time_unit_ns = 1, .accel = {9}, .cruise = 0}).error().key,
+            "cruise");
 }
 
 class ShippedTable : public testing::TestWithParam<const char*> {
@@ -70,8 +72,8 @@ TEST_P(MicrosteppingTable, IsSlowEnoughForTheUsualTick) {
 INSTANTIATE_TEST_SUITE_P(All, MicrosteppingTable,
                          testing::Values("micro16-standard", "micro32-smooth"));
 
-// Step k of x = v0 t + a t^2 / 2 falls at (sqrt(v0^2 + 2 a k) - v0) / a; a follows from the last delay.
-// Rounding up makes every delay too long by less than one unit, and never too short.
+// Step k of x = v0 t + a t^2 / 2 falls at (sqrt(v0^2 + 2 a k) - v0) / a; a follows from the last
+// delay. Rounding up makes every delay too long by less than one unit, and never too short.
 TEST(ShippedTables, ConstantAccelerationIsTheExactLaw) {
   const auto table = load(find("bushd2-constant", shipped_directories()).value());
   ASSERT_TRUE(table.has_value());

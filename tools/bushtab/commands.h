@@ -1,4 +1,5 @@
-// What bushtab does. Every command returns the exit code: 0 done, 1 refused (the reason is on stderr).
+// What bushtab does. Every command returns the exit code: 0 done, 1 refused (the reason is on
+// stderr).
 #pragma once
 
 #include <cstdint>
@@ -12,8 +13,8 @@ namespace bushtab {
 inline constexpr int kDone = 0;
 inline constexpr int kRefused = 1;
 
-// `table` is a file's path (it contains '/', ends in ".toml" or names a file that is there) or the name of a
-// shipped table.
+// `table` is a file's path (it contains '/', ends in ".toml" or names a file that is there) or the
+// name of a shipped table.
 int show(const std::string& table, bool json);
 
 int check(const std::vector<std::string>& files);

@@ -46,9 +46,10 @@ int expand(const Expansion& expansion) {
   const std::uint32_t steps_per_tick = bushd_table_max_steps_per_tick(view, tick_ns);
   if (steps_per_tick > BUSHD_MAX_STEPS_PER_TICK) {
     return refuse(bushd::Error{
-        .message = fmt::format("makes up to {} steps in a tick of {} us; allowed: {}. Use a shorter tick or a "
-                               "slower table",
-                               steps_per_tick, expansion.tick_us, BUSHD_MAX_STEPS_PER_TICK),
+        .message = fmt::format(
+            "makes up to {} steps in a tick of {} us; allowed: {}. Use a shorter tick or a "
+            "slower table",
+            steps_per_tick, expansion.tick_us, BUSHD_MAX_STEPS_PER_TICK),
         .file = (*table)->path()});
   }
   bushd_run run;

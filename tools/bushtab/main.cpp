@@ -1,6 +1,6 @@
-// bushtab: shows, checks and expands acceleration tables. The only file that includes CLI11 (slow to compile).
+// bushtab: shows, checks and expands acceleration tables. The only file that includes CLI11 (slow
+// to compile).
 #include <CLI/CLI.hpp>
-
 #include <cstdio>
 #include <exception>
 #include <limits>

@@ -71,8 +71,8 @@ void print_json(const Table& table) {
 std::string side_text(const Table& table, const bushd_ramp& side) {
   const std::uint16_t slowest = side.code[0];
   const std::uint16_t fastest = side.code[side.count - 1];
-  return fmt::format("{} codes {}..{}, {:.6g}..{:.6g} steps/s, {:.3f} ms", side.count, slowest, fastest,
-                     steps_per_s(table, slowest), steps_per_s(table, fastest),
+  return fmt::format("{} codes {}..{}, {:.6g}..{:.6g} steps/s, {:.3f} ms", side.count, slowest,
+                     fastest, steps_per_s(table, slowest), steps_per_s(table, fastest),
                      static_cast<double>(ramp_ns(table, side)) * 1e-6);
 }
 

@@ -94,8 +94,10 @@ TEST(BushtabExpand, AgreesWithTheSlowReference) {
     while (ReferenceMove(made.content, steps, made.tick_ns).active_ticks() > 10000) steps /= 2;
     const ReferenceMove reference(made.content, steps, made.tick_ns);
     const std::uint32_t tick_us = made.tick_ns / 1000;
-    RC_ASSERT(bushtab(expand_arguments(table, steps, tick_us, "coarse")).out == csv(reference.coarse()));
-    RC_ASSERT(bushtab(expand_arguments(table, steps, tick_us, "fine")).out == csv(reference.fine()));
+    RC_ASSERT(bushtab(expand_arguments(table, steps, tick_us, "coarse")).out ==
+              csv(reference.coarse()));
+    RC_ASSERT(bushtab(expand_arguments(table, steps, tick_us, "fine")).out ==
+              csv(reference.fine()));
   }));
 }
 
@@ -114,8 +116,9 @@ TEST(BushtabExpand, TableTooFastForTheTickIsRefused) {
   const Outcome outcome = bushtab(expand_arguments("micro16-standard", 100, 20000, "fine"));
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.out, IsEmpty());
-  EXPECT_THAT(outcome.err, HasSubstr("micro16-standard.toml: makes up to 401 steps in a tick of 20000 us; "
-                                     "allowed: 127"));
+  EXPECT_THAT(outcome.err,
+              HasSubstr("micro16-standard.toml: makes up to 401 steps in a tick of 20000 us; "
+                        "allowed: 127"));
 }
 
 TEST(BushtabExpand, WrongUsageHasAnExitCodeOfItsOwn) {
@@ -124,7 +127,8 @@ TEST(BushtabExpand, WrongUsageHasAnExitCodeOfItsOwn) {
         expand_arguments("bushd2-constant", -2147483648, 2560, "fine"),
         expand_arguments("bushd2-constant", 1, 199, "fine"),
         expand_arguments("bushd2-constant", 1, 20001, "fine"),
-        expand_arguments("bushd2-constant", 1, 2560, "medium"), std::string("expand"), std::string()}) {
+        expand_arguments("bushd2-constant", 1, 2560, "medium"), std::string("expand"),
+        std::string()}) {
     const Outcome outcome = bushtab(arguments);
     EXPECT_EQ(outcome.exit_code, 2) << arguments;
     EXPECT_THAT(outcome.out, IsEmpty());
@@ -145,8 +149,8 @@ TEST(BushtabCheck, GoodFilesPass) {
 
 TEST(BushtabCheck, EveryBadFileIsNamedWithLineAndKey) {
   const TempDirectory directory;
-  const std::string bad = directory.write(
-      "bad.toml", "name = \"bad\"\ntime_unit_ns = 1\naccel = [\n9,\n10]\n");
+  const std::string bad =
+      directory.write("bad.toml", "name = \"bad\"\ntime_unit_ns = 1\naccel = [\n9,\n10]\n");
   const std::string worse = directory.write("worse.toml", "name = 1\n");
   const std::string good = directory.write("good.toml", kSmallTable);
   const Outcome outcome = bushtab("check " + bad + " " + good + " " + worse);
@@ -160,17 +164,18 @@ TEST(BushtabShow, TellsSpeedsTimesAndCounts) {
   const Outcome outcome = bushtab("show bushd2-constant");
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_THAT(outcome.out, HasSubstr("238 codes 250..10, 100..2500 steps/s"));
-  EXPECT_THAT(outcome.out, HasSubstr("code 10, 2500 steps/s, reached by moves of 475 steps or more"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("code 10, 2500 steps/s, reached by moves of 475 steps or more"));
 }
 
 TEST(BushtabShow, JsonHasTheSame) {
   const TempDirectory directory;
-  const std::string table = directory.write(
-      "t.toml", std::string(kSmallTable) + "decel = [5, 20, 40]\ncruise = 5\n");
+  const std::string table =
+      directory.write("t.toml", std::string(kSmallTable) + "decel = [5, 20, 40]\ncruise = 5\n");
   const Outcome outcome = bushtab("show --json " + table);
   EXPECT_EQ(outcome.exit_code, 0);
-  for (const char* part : {"\"symmetric\": false", "\"codes\": 2", "\"time_ns\": 1600000", "\"codes\": 3",
-                           "\"time_ns\": 6500000", "\"steps_per_s\": 2000.0",
+  for (const char* part : {"\"symmetric\": false", "\"codes\": 2", "\"time_ns\": 1600000",
+                           "\"codes\": 3", "\"time_ns\": 6500000", "\"steps_per_s\": 2000.0",
                            "\"shortest_cruising_move_steps\": 5", "\"longest_tick_us\": 20000"}) {
     EXPECT_THAT(outcome.out, HasSubstr(part));
   }
