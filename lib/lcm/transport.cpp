@@ -1,0 +1,118 @@
+#include "lcm/transport.h"
+
+#include <fmt/format.h>
+#include <lcm/lcm.h>
+
+#include <cctype>
+
+namespace bushd::lcm {
+namespace {
+
+// Of LCM's wire format.
+constexpr std::size_t kMaxChannelName = LCM_MAX_CHANNEL_NAME_LENGTH;
+
+// The multicast address in "udpm://ADDRESS:PORT?..."; "" for other URLs.
+std::string multicast_address(const std::string& url) {
+  constexpr std::string_view kScheme = "udpm://";
+  if (!url.starts_with(kScheme)) return {};
+  const std::string rest = url.substr(kScheme.size());
+  const std::string address = rest.substr(0, rest.find_first_of(":?"));
+  return address.empty() ? "239.255.76.67" : address;
+}
+
+Error cannot_open(const std::string& url) {
+  const std::string address = multicast_address(url);
+  if (address.empty()) {
+    return {.message = fmt::format("LCM cannot use the URL \"{}\"; one that works is "
+                                   "\"udpm://239.255.76.67:7667?ttl=0\"",
+                                   url)};
+  }
+  return {.message = fmt::format(
+              "LCM cannot use the URL \"{}\": the address is wrong or there is no route "
+              "to it. For this machine only: ip route replace {}/32 dev lo (as root)",
+              url, address)};
+}
+
+Error cannot_receive(const std::string& url) {
+  return {
+      .message = fmt::format(
+          "LCM at \"{}\" does not hear its own packets. Check that multicast goes to a device that "
+          "carries it (ip route get {}) and that no firewall drops UDP to it",
+          url, multicast_address(url))};
+}
+
+// LCM takes the name of a subscribed channel for a regular expression.
+std::string literal(const std::string& channel) {
+  std::string out;
+  for (const char c : channel) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '_') out += '\\';
+    out += c;
+  }
+  return out;
+}
+
+Result<void> check_channel(const std::string& channel) {
+  if (!channel.empty() && channel.size() <= kMaxChannelName) return {};
+  return fail(
+      fmt::format("channel name \"{}\" has {} characters; LCM allows 1 to {}: shorten the prefix",
+                  channel, channel.size(), kMaxChannelName));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Transport>> Transport::open(const std::string& url) {
+  lcm_t* lcm = lcm_create(url.c_str());
+  if (lcm == nullptr) return fail(cannot_open(url));
+  // Asked now: without a descriptor LCM's later calls abort the process.
+  const int fd = lcm_get_fileno(lcm);
+  if (fd < 0) {
+    lcm_destroy(lcm);
+    return fail(cannot_receive(url));
+  }
+  return std::unique_ptr<Transport>(new Transport(lcm, fd));
+}
+
+Transport::~Transport() {
+  lcm_destroy(lcm_);
+}
+
+void Transport::handle() {
+  for (int i = 0; i < kQueueCapacity; ++i) {
+    if (lcm_handle_timeout(lcm_, 0) <= 0) return;
+    if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+  }
+}
+
+void Transport::on_message(const lcm_recv_buf_t* buffer, const char*, void* subscription) {
+  auto& self = *static_cast<Subscription*>(subscription);
+  // C code calls this. An exception that passed through it would leave LCM believing that a handler
+  // still runs, and the next lcm_handle() would abort.
+  try {
+    self.handler({static_cast<const std::uint8_t*>(buffer->data), buffer->data_size});
+  } catch (...) {
+    self.transport->thrown_ = std::current_exception();
+  }
+}
+
+Result<void> Transport::subscribe_bytes(const std::string& channel, BytesHandler handler) {
+  if (auto checked = check_channel(channel); !checked) return checked;
+  auto subscription = std::make_unique<Subscription>(Subscription{this, std::move(handler)});
+  lcm_subscription_t* added =
+      lcm_subscribe(lcm_, literal(channel).c_str(), &Transport::on_message, subscription.get());
+  if (added == nullptr)
+    return fail(fmt::format("LCM refuses to subscribe to channel \"{}\"", channel));
+  lcm_subscription_set_queue_capacity(added, kQueueCapacity);
+  subscriptions_.push_back(std::move(subscription));
+  return {};
+}
+
+Result<void> Transport::publish_bytes(const std::string& channel,
+                                      std::span<const std::uint8_t> bytes) {
+  if (auto checked = check_channel(channel); !checked) return checked;
+  if (lcm_publish(lcm_, channel.c_str(), bytes.data(), static_cast<unsigned>(bytes.size())) != 0) {
+    return fail(fmt::format("LCM cannot send on channel \"{}\": is the network up?", channel));
+  }
+  return {};
+}
+
+}  // namespace bushd::lcm

@@ -1,0 +1,95 @@
+// The one place that uses LCM's client library. Everything else sees messages of bushd's types, a
+// descriptor to wait for, and no exceptions but its own.
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/result.h"
+#include "lcm/wire.h"
+
+// LCM's own handle, so that its headers stay out of here.
+typedef struct _lcm_t lcm_t;
+typedef struct _lcm_recv_buf_t lcm_recv_buf_t;
+
+namespace bushd::lcm {
+
+// handle() and subscribe() belong to one thread; publish() may be called from any.
+class Transport {
+ public:
+  // Messages that wait for handle(), per subscription; LCM drops the newest beyond. LCM's default
+  // of 30 is less than one snapshot of 512 motors. For bursts the socket needs room too:
+  // `&recv_buf_size=4194304` in the URL, within the kernel's net.core.rmem_max.
+  static constexpr int kQueueCapacity = 256;
+
+  // `url`: "udpm://239.255.76.67:7667?ttl=0", or "memq://" for messages that stay within this
+  // object (tests). Takes up to 10 s when the network is there but swallows multicast packets; that
+  // is an error too. LCM starts a receiving thread here, which inherits the signal mask and the
+  // scheduling policy: block signals that are to be taken from a descriptor before, become
+  // real-time after.
+  static Result<std::unique_ptr<Transport>> open(const std::string& url);
+  ~Transport();
+  Transport(const Transport&) = delete;
+  Transport& operator=(const Transport&) = delete;
+
+  // Readable (level-triggered) while messages wait.
+  int fd() const { return fd_; }
+
+  // Calls the handlers of the messages that wait, at most kQueueCapacity of them, so that a flood
+  // cannot keep the caller here; never blocks. An exception of a handler comes out here, after the
+  // library was left in order. Not to be called from a handler.
+  void handle();
+
+  // `handler` is called from handle() for every valid message on exactly this channel, for as long
+  // as this object lives: there is no unsubscribing, which within a handler would corrupt LCM's
+  // memory.
+  template <class T>
+  Result<void> subscribe(const std::string& channel, std::function<void(const T&)> handler) {
+    return subscribe_bytes(channel, [this, handler = std::move(handler)](auto payload) {
+      if (const auto message = decode<T>(payload)) {
+        handler(*message);
+      } else {
+        ++rejected_;
+      }
+    });
+  }
+
+  // Fails as encode() does, when the channel's name is too long, or when the network is gone.
+  template <class T>
+  Result<void> publish(const std::string& channel, const T& message) {
+    const auto bytes = encode(message);
+    if (!bytes) return fail(bytes.error());
+    return publish_bytes(channel, *bytes);
+  }
+
+  // As they are; for tests of what broken senders do.
+  Result<void> publish_bytes(const std::string& channel, std::span<const std::uint8_t> bytes);
+
+  // Payloads on subscribed channels that were no message of the channel's type.
+  std::uint64_t rejected() const { return rejected_; }
+
+ private:
+  using BytesHandler = std::function<void(std::span<const std::uint8_t>)>;
+  struct Subscription {
+    Transport* transport;
+    BytesHandler handler;
+  };
+
+  Transport(lcm_t* lcm, int fd) : lcm_(lcm), fd_(fd) {}
+  Result<void> subscribe_bytes(const std::string& channel, BytesHandler handler);
+  static void on_message(const lcm_recv_buf_t* buffer, const char* channel, void* subscription);
+
+  lcm_t* lcm_;
+  int fd_;
+  std::vector<std::unique_ptr<Subscription>> subscriptions_;  // LCM holds pointers to them
+  std::uint64_t rejected_ = 0;
+  std::exception_ptr thrown_;
+};
+
+}  // namespace bushd::lcm

@@ -1,0 +1,181 @@
+#include "lcm/wire.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <type_traits>
+
+namespace bushd::lcm {
+namespace {
+
+// Walks over a payload, field by field in the order of the .lcm file; numbers are big-endian.
+class Scan {
+ public:
+  explicit Scan(std::span<const std::uint8_t> payload) : rest_(payload) {}
+
+  void fixed(std::size_t bytes) {
+    if (bytes > rest_.size()) {
+      good_ = false;
+      rest_ = {};
+    } else {
+      rest_ = rest_.subspan(bytes);
+    }
+  }
+
+  // Length with the NUL, characters, NUL.
+  void text() {
+    const std::size_t length = number();
+    if (length == 0 || length > rest_.size()) {
+      good_ = false;
+      return;
+    }
+    const auto nul = std::find(rest_.begin(), rest_.end(), std::uint8_t{0});
+    good_ = good_ && nul == rest_.begin() + static_cast<std::ptrdiff_t>(length - 1);
+    fixed(length);
+  }
+
+  // An array length, of elements that take at least so many bytes; 0 once something is wrong.
+  std::size_t count(std::size_t min_element_bytes) {
+    const std::size_t elements = number();
+    if (elements > rest_.size() / min_element_bytes) good_ = false;
+    return good_ ? elements : 0;
+  }
+
+  bool ended_well() const { return good_ && rest_.empty(); }
+
+ private:
+  // An int32 seen as unsigned, so that a negative length is one that is far too long.
+  std::size_t number() {
+    if (rest_.size() < 4) {
+      fixed(4);
+      return 0;
+    }
+    const std::size_t value = std::size_t{rest_[0]} << 24 | std::size_t{rest_[1]} << 16 |
+                              std::size_t{rest_[2]} << 8 | std::size_t{rest_[3]};
+    fixed(4);
+    return value;
+  }
+
+  std::span<const std::uint8_t> rest_;
+  bool good_ = true;
+};
+
+constexpr std::size_t kFingerprint = 8;
+constexpr std::size_t kInt8 = 1;
+constexpr std::size_t kInt16 = 2;
+constexpr std::size_t kInt32 = 4;
+constexpr std::size_t kInt64 = 8;
+constexpr std::size_t kDouble = 8;
+constexpr std::size_t kMinText = 5;
+constexpr std::size_t kMinMotorState = 4 * kMinText + kInt16 + 2 * kInt64 + kDouble + 3 * kInt8;
+
+void scan_fields(Scan& scan, std::type_identity<command_t>) {
+  scan.fixed(kInt64);  // utime_us
+  scan.text();         // client_id
+  scan.fixed(kInt64);  // number
+  scan.fixed(kInt8);   // kind
+  const std::size_t motors = scan.count(kMinText + kInt64);
+  for (std::size_t i = 0; i < motors; ++i) scan.text();
+  scan.fixed(motors * kInt64);  // steps
+}
+
+void scan_fields(Scan& scan, std::type_identity<reply_t>) {
+  scan.fixed(kInt64);  // utime_us
+  scan.text();         // client_id
+  scan.fixed(kInt64);  // number
+  scan.fixed(kInt8);   // phase
+  scan.text();         // result
+  scan.text();         // reason
+  const std::size_t motors = scan.count(2 * kMinText + kInt64);
+  for (std::size_t i = 0; i < 2 * motors; ++i) scan.text();  // motors, motor_results
+  scan.fixed(motors * kInt64);                               // position_steps
+}
+
+void scan_fields(Scan& scan, std::type_identity<motor_state_t>) {
+  for (int i = 0; i < 3; ++i) scan.text();    // name, group, table
+  scan.fixed(kInt16 + 2 * kInt64 + kDouble);  // output, position, target, velocity
+  scan.fixed(3 * kInt8);                      // moving, enabled, input
+  scan.text();                                // trust
+}
+
+void scan_fields(Scan& scan, std::type_identity<state_t>) {
+  scan.fixed(2 * kInt64 + 2 * kInt32);  // utime_us, sequence, part, parts
+  scan.text();                          // bus
+  scan.text();                          // mcu
+  scan.fixed(kInt32);                   // address
+  scan.text();                          // mcu_state
+  scan.text();                          // detail
+  scan.fixed(kInt32 + 2 * kInt64);      // boot_number, tick, rejected_commands
+  const std::size_t motors = scan.count(kMinMotorState);
+  for (std::size_t i = 0; i < motors; ++i) scan_fields(scan, std::type_identity<motor_state_t>{});
+}
+
+template <class T>
+bool well_formed(std::span<const std::uint8_t> payload) {
+  Scan scan(payload);
+  scan.fixed(kFingerprint);  // compared by the decoder, before anything else
+  scan_fields(scan, std::type_identity<T>{});
+  return scan.ended_well();
+}
+
+bool counted(std::int32_t count, std::size_t elements) {
+  return count >= 0 && static_cast<std::size_t>(count) == elements;
+}
+
+bool counts_match(const command_t& command) {
+  return counted(command.motor_count, command.motors.size()) &&
+         counted(command.motor_count, command.steps.size());
+}
+
+bool counts_match(const reply_t& reply) {
+  return counted(reply.motor_count, reply.motors.size()) &&
+         counted(reply.motor_count, reply.motor_results.size()) &&
+         counted(reply.motor_count, reply.position_steps.size());
+}
+
+bool counts_match(const state_t& state) {
+  return counted(state.motor_count, state.motors.size());
+}
+
+}  // namespace
+
+template <class T>
+Result<std::vector<std::uint8_t>> encode(const T& message) {
+  // The encoder reads `motor_count` elements, however many there are.
+  if (!counts_match(message)) {
+    return fail(
+        fmt::format("{}: motor_count {} is not the length of its arrays; set it to that length",
+                    T::getTypeName(), message.motor_count));
+  }
+  const auto size = static_cast<std::size_t>(message.getEncodedSize());
+  if (size > kMaxMessageBytes) {
+    return fail(
+        fmt::format("{} of {} bytes does not fit one datagram ({} bytes); name fewer motors",
+                    T::getTypeName(), size, kMaxMessageBytes));
+  }
+  std::vector<std::uint8_t> bytes(size);
+  const int used = message.encode(bytes.data(), 0, static_cast<int>(size));
+  if (used < 0 || static_cast<std::size_t>(used) != size || !well_formed<T>(bytes)) {
+    return fail(
+        fmt::format("{}: one of its texts contains a NUL character; remove it", T::getTypeName()));
+  }
+  return bytes;
+}
+
+template <class T>
+std::optional<T> decode(std::span<const std::uint8_t> payload) {
+  if (payload.size() > kMaxMessageBytes || !well_formed<T>(payload)) return std::nullopt;
+  T message{};
+  const auto size = static_cast<int>(payload.size());
+  if (message.decode(payload.data(), 0, size) != size) return std::nullopt;
+  return message;
+}
+
+template Result<std::vector<std::uint8_t>> encode(const command_t&);
+template Result<std::vector<std::uint8_t>> encode(const reply_t&);
+template Result<std::vector<std::uint8_t>> encode(const state_t&);
+template std::optional<command_t> decode(std::span<const std::uint8_t>);
+template std::optional<reply_t> decode(std::span<const std::uint8_t>);
+template std::optional<state_t> decode(std::span<const std::uint8_t>);
+
+}  // namespace bushd::lcm
