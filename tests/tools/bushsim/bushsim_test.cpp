@@ -1,0 +1,299 @@
+// The program itself, from outside: a real process, a real tty, a real file.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/wait.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "engine/frame.h"
+#include "engine/message.h"
+#include "sim/vcd_reader.h"
+
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr auto kPatience = std::chrono::seconds(20);  // used up only when something is broken
+
+// Looks until it holds. The program under test is a process of its own, so there is nothing to be
+// woken by.
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto until = std::chrono::steady_clock::now() + kPatience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > until) return false;
+    ::usleep(1000);
+  }
+  return true;
+}
+
+std::string read_file(const std::string& path) {
+  std::ifstream in(path);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+std::string new_folder() {
+  std::string pattern = testing::TempDir() + "bushsim_XXXXXX";
+  if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  return pattern;
+}
+
+// The host's side of the serial port.
+class Port {
+ public:
+  explicit Port(const std::string& path) : fd_(::open(path.c_str(), O_RDWR | O_NOCTTY)) {
+    EXPECT_GE(fd_, 0) << path;
+  }
+  Port(const Port&) = delete;
+  Port& operator=(const Port&) = delete;
+  ~Port() { ::close(fd_); }
+
+  int fd() const { return fd_; }
+
+  void send(std::uint8_t address, bushd_type type) const {
+    std::uint8_t wire[BUSHD_FRAME_MAX_WIRE];
+    const std::size_t size =
+        bushd_frame_encode(address, static_cast<std::uint8_t>(type), 77, nullptr, 0, wire);
+    ASSERT_EQ(::write(fd_, wire, size), static_cast<ssize_t>(size));
+  }
+
+  // The identity of an MCU, as it answers now.
+  std::optional<bushd_identity> identify(std::uint8_t address) const {
+    send(address, BUSHD_MSG_IDENTIFY);
+    bushd_receiver receiver{};
+    bushd_frame frame;
+    for (;;) {
+      pollfd ready{fd_, POLLIN, 0};
+      std::uint8_t byte = 0;
+      if (::poll(&ready, 1, static_cast<int>(kPatience / std::chrono::milliseconds(1))) != 1 ||
+          ::read(fd_, &byte, 1) != 1) {
+        return std::nullopt;
+      }
+      if (bushd_receive_byte(&receiver, byte, &frame) == BUSHD_RECEIVE_FRAME) break;
+    }
+    bushd_identity identity;
+    EXPECT_EQ(frame.address, address);
+    EXPECT_EQ(frame.type, BUSHD_MSG_IDENTIFY | BUSHD_TYPE_REPLY);
+    EXPECT_EQ(frame.tag, 77);
+    EXPECT_EQ(bushd_decode_identity(frame.payload, frame.payload_size, &identity), BUSHD_OK);
+    return identity;
+  }
+
+ private:
+  int fd_;
+};
+
+class Bushsim : public testing::Test {
+ protected:
+  Bushsim() { write_config({"hall"}); }
+
+  ~Bushsim() override {
+    if (process > 0) {
+      ::kill(process, SIGKILL);
+      ::waitpid(process, nullptr, 0);
+    }
+    std::filesystem::remove_all(folder);
+  }
+
+  // Buses of one name each, with MCUs 1 and 2 on the first.
+  void write_config(const std::vector<std::string>& buses, int baud = 500'000) const {
+    std::ofstream file(config);
+    for (const std::string& bus : buses) {
+      file << "[[bus]]\nname = \"" << bus << "\"\nport = \"" << folder << "/" << bus
+           << "\"\nbaud = " << baud << "\ntick_us = 2560\nformat = \"fine\"\n";
+    }
+    for (const int address : {1, 2}) {
+      file << "[[mcu]]\nbus = \"" << buses.front() << "\"\naddress = " << address << "\n";
+    }
+  }
+
+  void start(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), BUSHSIM_PROGRAM);
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    process = ::fork();
+    ASSERT_GE(process, 0);
+    if (process != 0) return;
+    constexpr int kCreate = O_WRONLY | O_CREAT | O_TRUNC;
+    if (::dup2(::open(out.c_str(), kCreate, 0600), 1) < 0) ::_exit(126);
+    if (::dup2(::open(err.c_str(), kCreate, 0600), 2) < 0) ::_exit(126);
+    ::execv(argv[0], argv.data());
+    ::_exit(127);
+  }
+
+  void start_ready(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"--config", config, "--link", link, "--trace", trace};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    start(arguments);
+    ASSERT_TRUE(eventually([&] { return read_file(out) == "bushsim: ready " + link + "\n"; }))
+        << read_file(out) << read_file(err);
+  }
+
+  // Waits for the end; the exit code, or minus the signal that killed it.
+  int finish() {
+    int status = 0;
+    EXPECT_TRUE(eventually([&] { return ::waitpid(process, &status, WNOHANG) == process; }));
+    process = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+  int stop(int signal = SIGTERM) {
+    ::kill(process, signal);
+    return finish();
+  }
+
+  // Runs what is expected to be refused; returns what it says.
+  std::string refusal(const std::vector<std::string>& arguments, int exit_code = 1) {
+    start(arguments);
+    EXPECT_EQ(finish(), exit_code);
+    EXPECT_THAT(read_file(out), Not(HasSubstr("ready")));
+    return read_file(err);
+  }
+
+  const std::string folder = new_folder();
+  const std::string config = folder + "/bushd.toml";
+  const std::string link = folder + "/hall";
+  const std::string trace = folder + "/trace.vcd";
+  const std::string out = folder + "/out";
+  const std::string err = folder + "/err";
+  pid_t process = -1;
+};
+
+TEST_F(Bushsim, BothMcusAnswerAndTheTraceIsWholeAfterSigterm) {
+  start_ready({"--boot-number", "4711"});
+  {
+    const Port port(link);
+    for (const std::uint8_t address : {std::uint8_t{1}, std::uint8_t{2}}) {
+      const auto identity = port.identify(address);
+      ASSERT_TRUE(identity);
+      EXPECT_EQ(identity->boot_number, 4711);
+      EXPECT_EQ(identity->motors, 16);
+    }
+  }
+  EXPECT_EQ(stop(), 0);
+  EXPECT_FALSE(std::filesystem::exists(std::filesystem::symlink_status(link)));
+  EXPECT_THAT(read_file(out), HasSubstr("mcu2: 0 steps made; bad frames 0, rejected 0"));
+  EXPECT_THAT(read_file(out), HasSubstr("collisions 0, corrupted bytes 0, dropped bytes 0"));
+  const bushd::sim::VcdFile vcd = bushd::sim::read_vcd(trace);
+  EXPECT_EQ(vcd.timescale, "1ns");
+  EXPECT_EQ(vcd.wires.size(), 2u * 33u);
+  EXPECT_TRUE(vcd.wires.contains("mcu1.step15"));
+  EXPECT_TRUE(vcd.wires.contains("mcu2.en"));
+  EXPECT_GT(vcd.stamps.back(), 0);
+}
+
+TEST_F(Bushsim, HostMayCloseAndComeBackEvenFromExclusiveUse) {
+  start_ready();
+  {
+    const Port port(link);
+    ASSERT_EQ(::ioctl(port.fd(), TIOCEXCL), 0);
+    ASSERT_TRUE(port.identify(1));
+  }
+  const Port again(link);  // root may open it in any case
+  EXPECT_TRUE(eventually([&] {
+    int exclusive = 1;
+    return ::ioctl(again.fd(), TIOCGEXCL, &exclusive) == 0 && exclusive == 0;
+  }));
+  EXPECT_TRUE(again.identify(2));
+  EXPECT_EQ(stop(SIGINT), 0);
+}
+
+TEST_F(Bushsim, TtyIsRaw) {
+  start_ready();
+  const Port port(link);
+  termios settings{};
+  ASSERT_EQ(::tcgetattr(port.fd(), &settings), 0);
+  EXPECT_EQ(settings.c_lflag & static_cast<tcflag_t>(ECHO | ICANON | ISIG), 0u);
+  EXPECT_EQ(settings.c_oflag & static_cast<tcflag_t>(OPOST), 0u);
+  EXPECT_EQ(stop(), 0);
+}
+
+TEST_F(Bushsim, RepliesThatNobodyReadsAreDroppedAndCounted) {
+  write_config({"hall"}, 4'000'000);
+  start_ready();
+  const Port port(link);
+  // Far more replies than a tty can hold. They collide with the requests, which makes them no
+  // shorter.
+  for (int i = 0; i < 30'000; ++i) port.send(1, BUSHD_MSG_POLL);
+  EXPECT_EQ(stop(), 0);
+  const std::string summary = read_file(out);
+  EXPECT_THAT(summary, HasSubstr("dropped bytes "));
+  EXPECT_THAT(summary, Not(HasSubstr("dropped bytes 0")));
+  EXPECT_THAT(read_file(err), HasSubstr("further collisions are only counted"));
+}
+
+TEST_F(Bushsim, BootNumberDiffersFromStartToStart) {
+  std::vector<std::uint16_t> numbers;
+  for (int i = 0; i < 2; ++i) {
+    start_ready();
+    const auto identity = Port(link).identify(1);
+    ASSERT_TRUE(identity);
+    numbers.push_back(identity->boot_number);
+    EXPECT_EQ(stop(), 0);
+  }
+  EXPECT_NE(numbers[0], numbers[1]);
+}
+
+TEST_F(Bushsim, ReplacesAStaleLinkAndLeavesAForeignOneAlone) {
+  std::filesystem::create_symlink("/dev/null", link);
+  start_ready();
+  EXPECT_TRUE(Port(link).identify(1));
+  std::filesystem::remove(link);
+  std::filesystem::create_symlink("/dev/zero", link);
+  EXPECT_EQ(stop(), 0);
+  EXPECT_EQ(std::filesystem::read_symlink(link), "/dev/zero");
+}
+
+TEST_F(Bushsim, RefusesToReplaceWhatIsNoLink) {
+  std::ofstream(link) << "precious";
+  EXPECT_THAT(refusal({"--config", config, "--link", link}), HasSubstr(link));
+  EXPECT_EQ(read_file(link), "precious");
+}
+
+TEST_F(Bushsim, SeveralBusesWantAChoice) {
+  write_config({"hall", "roof"});
+  const std::vector<std::string> arguments = {"--config", config, "--link", link};
+  EXPECT_THAT(refusal(arguments), HasSubstr("choose with --bus: hall, roof"));
+  auto with_bus = [&](const char* bus) {
+    auto more = arguments;
+    more.insert(more.end(), {"--bus", bus});
+    return more;
+  };
+  EXPECT_THAT(refusal(with_bus("cellar")), HasSubstr("no bus \"cellar\""));
+  EXPECT_THAT(refusal(with_bus("roof")), HasSubstr("has no MCU"));
+  start_ready({"--bus", "hall"});
+  EXPECT_EQ(stop(), 0);
+}
+
+TEST_F(Bushsim, BadArgumentsAreRefusedWithTheirReason) {
+  EXPECT_THAT(refusal({"--link", link}, 2), HasSubstr("--config is required"));
+  EXPECT_THAT(refusal({"--config", folder + "/none.toml", "--link", link}), HasSubstr("none.toml"));
+  EXPECT_THAT(refusal({"--config", config, "--link", folder + "/none/hall"}),
+              HasSubstr("none/hall"));
+  EXPECT_THAT(refusal({"--config", config, "--link", link, "--trace", folder + "/none/trace.vcd"}),
+              HasSubstr("none/trace.vcd"));
+  EXPECT_THAT(refusal({"--config", config, "--link", link, "--boot-number", "65536"}, 2),
+              HasSubstr("--boot-number"));
+  EXPECT_FALSE(std::filesystem::exists(std::filesystem::symlink_status(link)))
+      << "what failed must not leave a link behind";
+}
+
+}  // namespace

@@ -1,0 +1,82 @@
+// bushsim: a virtual bus with virtual MCUs behind a pty. The only file that includes CLI11 (slow to
+// compile).
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <limits>
+#include <string>
+
+#include "simulator.h"
+
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kUsage = 2;
+
+int refuse(const bushd::Error& error) {
+  fmt::print(stderr, "bushsim: {}\n", error.text());
+  return kFailed;
+}
+
+// Another one at every start, so that a bushsim that is started again looks like MCUs that have
+// booted again.
+std::uint16_t fresh_boot_number() {
+  const auto seconds = static_cast<std::uint64_t>(std::time(nullptr));
+  const auto process = static_cast<std::uint64_t>(::getpid());
+  return static_cast<std::uint16_t>(1 + (seconds * 31 + process) % UINT16_MAX);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"bushsim: virtual MCUs on a virtual RS-485 bus, reached through a pty"};
+  app.footer("Exit codes: 0 ended by a signal, 1 failed (reason on stderr), 2 wrong usage.");
+  bushsim::Options options;
+  options.boot_number = fresh_boot_number();
+  std::string config;
+  std::string bus;
+  app.add_option("--config", config, "bushd.toml: baud rate and MCUs of the bus")->required();
+  app.add_option("--link", options.link, "Symlink to make, the bus's serial port")->required();
+  app.add_option("--trace", options.trace, "VCD file for all edges of STEP, DIR and EN");
+  app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
+  app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
+      ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+
+  const auto setup = bushsim::load_setup(config, bus);
+  if (!setup) return refuse(setup.error());
+  options.setup = *setup;
+  bushd::Result<void> ended;
+  std::string summary;
+  {
+    const auto simulator = bushsim::Simulator::create(options);
+    if (!simulator) return refuse(simulator.error());
+    fmt::print("bushsim: ready {}\n", options.link);
+    std::fflush(stdout);
+    ended = (*simulator)->run();
+    summary = (*simulator)->summary();
+  }
+  // Only now, with trace and link put in order: whoever started this may have closed its end of
+  // stdout.
+  fmt::print("{}", summary);
+  if (!ended) return refuse(ended.error());
+  return kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bushsim: {}\n", error.what());
+    return kFailed;
+  }
+}

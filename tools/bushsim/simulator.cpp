@@ -1,0 +1,229 @@
+#include "simulator.h"
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+#include <sys/signalfd.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <ctime>
+#include <iterator>
+
+namespace bushsim {
+namespace {
+
+using bushd::fail;
+using bushd::Result;
+using bushd::sim::TimeNs;
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+
+// Simulated before anybody is told that the bus is there: all MCUs have booted by then.
+constexpr TimeNs kHeadStartNs = 20'000'000;
+// MCUs come out of reset one after the other, so that their ticks begin in different phases, as on
+// a real bus.
+constexpr TimeNs kBootSpacingNs = 617'000;
+constexpr TimeNs kBootSpreadNs = 2'560'000;
+
+// How long to sleep. Virtual time is exact whenever it is looked at; waking up serves only to hand
+// out replies (a busy line: soon after they end) and edges (an idle line: now and then).
+constexpr TimeNs kShortestSleepNs = 50'000;
+constexpr TimeNs kBusySleepNs = 1'000'000;
+constexpr TimeNs kIdleSleepNs = 20'000'000;
+
+constexpr std::size_t kReadBytes = 4096;
+// No more is read while this much still waits for the line: so whoever writes faster than the line
+// meets a full buffer, as with a real adapter.
+constexpr std::int64_t kBacklogBytes = 4096;
+
+constexpr std::uint64_t kCollisionsReported = 10;
+
+}  // namespace
+
+Simulator::Simulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace)
+    : setup_(options.setup),
+      pty_(std::move(pty)),
+      trace_(std::move(trace)),
+      bus_(options.setup.baud, trace_.get()) {
+  TimeNs boot_ns = 0;
+  for (const std::uint8_t address : setup_.addresses) {
+    bus_.add_mcu({.address = address, .boot_number = options.boot_number, .boot_ns = boot_ns});
+    boot_ns = (boot_ns + kBootSpacingNs) % kBootSpreadNs;
+  }
+  bus_.on_master_byte = [this](std::uint8_t byte, TimeNs) { replies_.push_back(byte); };
+  bus_.on_collision = [this](TimeNs time_ns, std::uint8_t first, std::uint8_t second) {
+    report_collision(time_ns, first, second);
+  };
+}
+
+void Simulator::report_collision(TimeNs time_ns, std::uint8_t first, std::uint8_t second) {
+  if (bus_.collisions() > kCollisionsReported) return;
+  const auto name = [](std::uint8_t address) {
+    return address == BUSHD_ADDRESS_BROADCAST ? std::string("the master")
+                                              : fmt::format("mcu{}", address);
+  };
+  fmt::print(stderr, "bushsim: collision at {:.6f} s: {} talks while {} does\n",
+             static_cast<double>(time_ns) / 1e9, name(second), name(first));
+  if (bus_.collisions() == kCollisionsReported) {
+    fmt::print(stderr, "bushsim: further collisions are only counted\n");
+  }
+}
+
+Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
+  auto pty = Pty::open(options.link);
+  if (!pty) return fail(pty.error());
+  std::unique_ptr<bushd::sim::VcdWriter> trace;
+  if (!options.trace.empty()) {
+    auto created = bushd::sim::VcdWriter::create(options.trace, options.setup.addresses);
+    if (!created) return fail(created.error());
+    trace = std::move(*created);
+  }
+  std::unique_ptr<Simulator> simulator(new Simulator(options, std::move(*pty), std::move(trace)));
+  if (const auto watched = simulator->watch(); !watched) return fail(watched.error());
+  return simulator;
+}
+
+Result<void> Simulator::watch() {
+  sigset_t mask;
+  sigemptyset(&mask);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&mask, signal);
+  if (::sigprocmask(SIG_BLOCK, &mask, nullptr) != 0) {
+    return fail(system_error("signals cannot be blocked"));
+  }
+  signals_ = Descriptor(::signalfd(-1, &mask, SFD_NONBLOCK | SFD_CLOEXEC));
+  timer_ = Descriptor(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  epoll_ = Descriptor(::epoll_create1(EPOLL_CLOEXEC));
+  if (!signals_.valid() || !timer_.valid() || !epoll_.valid()) {
+    return fail(system_error("the event loop cannot be set up"));
+  }
+  for (const int fd : {signals_.get(), timer_.get(), pty_.fd()}) {
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.fd = fd;
+    if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0) {
+      return fail(system_error("the event loop cannot be set up"));
+    }
+  }
+  bus_.advance_to(kHeadStartNs);
+  start_ns_ = wall_time_ns() - kHeadStartNs;
+  return set_timer(kHeadStartNs);
+}
+
+// Simulated time as the clock on the wall has it.
+TimeNs Simulator::wall_time_ns() const {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kNsPerSecond + now.tv_nsec - start_ns_;
+}
+
+Result<void> Simulator::take_bytes(TimeNs now_ns) {
+  std::array<std::uint8_t, kReadBytes> space;
+  const auto size = pty_.read(space);
+  if (!size) return fail(size.error());
+  bus_.master_send({space.data(), *size}, now_ns);
+  return {};
+}
+
+Result<void> Simulator::hand_out_replies() {
+  if (replies_.empty()) return {};
+  const auto taken = pty_.write(replies_);
+  if (!taken) return fail(taken.error());
+  // Nobody reads, as with an adapter whose buffer is full: what does not fit is lost.
+  dropped_bytes_ += replies_.size() - *taken;
+  replies_.clear();
+  return {};
+}
+
+Result<void> Simulator::hold_back(TimeNs now_ns) {
+  const TimeNs backlog_ns = kBacklogBytes * bushd::sim::kBitsPerByte * kNsPerSecond / setup_.baud;
+  const bool listen = bus_.line_busy_until_ns() - now_ns < backlog_ns;
+  if (listen == listening_) return {};
+  listening_ = listen;
+  epoll_event event{};
+  event.events = listen ? EPOLLIN : 0u;
+  event.data.fd = pty_.fd();
+  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, pty_.fd(), &event) != 0) {
+    return fail(system_error("the event loop cannot be changed"));
+  }
+  return {};
+}
+
+Result<void> Simulator::set_timer(TimeNs now_ns) {
+  const TimeNs busy_until_ns = bus_.line_busy_until_ns();
+  const TimeNs wake_ns =
+      busy_until_ns > now_ns
+          ? std::clamp(busy_until_ns, now_ns + kShortestSleepNs, now_ns + kBusySleepNs)
+          : now_ns + kIdleSleepNs;
+  const std::int64_t at_ns = start_ns_ + wake_ns;
+  itimerspec when{};
+  when.it_value.tv_sec = at_ns / kNsPerSecond;
+  when.it_value.tv_nsec = at_ns % kNsPerSecond;
+  if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &when, nullptr) != 0) {
+    return fail(system_error("the timer cannot be set"));
+  }
+  return {};
+}
+
+Result<void> Simulator::loop() {
+  for (;;) {
+    std::array<epoll_event, 3> events;
+    const int count = ::epoll_wait(epoll_.get(), events.data(), std::ssize(events), -1);
+    if (count < 0 && errno != EINTR) return fail(system_error("waiting failed"));
+    const TimeNs now_ns = wall_time_ns();
+    bus_.advance_to(now_ns);
+    bool ended = false;
+    for (int i = 0; i < count; ++i) {
+      const int fd = events[static_cast<std::size_t>(i)].data.fd;
+      if (fd == pty_.fd()) {
+        if (const auto taken = take_bytes(now_ns); !taken) return taken;
+      } else if (fd == signals_.get()) {
+        ended = true;
+      } else {
+        pty_.lift_exclusive_use();
+      }
+    }
+    if (const auto handed = hand_out_replies(); !handed) return handed;
+    if (trace_ && trace_->error()) return fail(*trace_->error());
+    if (ended) return {};
+    if (const auto held = hold_back(now_ns); !held) return held;
+    // Setting the timer anew also clears its expiration.
+    if (const auto set = set_timer(now_ns); !set) return set;
+  }
+}
+
+Result<void> Simulator::run() {
+  const auto ended = loop();
+  if (!trace_) return ended;
+  const auto closed = trace_->close(bus_.now_ns());
+  return ended ? closed : ended;
+}
+
+std::string Simulator::summary() const {
+  std::string text;
+  const auto out = std::back_inserter(text);
+  for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
+    const bushd::sim::VirtualMcu& mcu = bus_.mcu(i);
+    std::uint64_t total = 0;
+    std::vector<std::string> motors;
+    for (std::size_t output = 0; output < bushd::sim::kOutputsPerMcu; ++output) {
+      const bushd_virtual_shaft& shaft = mcu.shaft(output);
+      total += shaft.travel_steps;
+      if (shaft.travel_steps == 0) continue;
+      motors.push_back(
+          fmt::format("step{} {} (at {:+})", output, shaft.travel_steps, shaft.position_steps));
+    }
+    fmt::format_to(out, "bushsim: mcu{}: {} steps made{}{}; bad frames {}, rejected {}\n",
+                   mcu.address(), total, motors.empty() ? "" : ": ", fmt::join(motors, ", "),
+                   mcu.core().bad_frames, mcu.core().rejected_frames);
+  }
+  fmt::format_to(out, "bushsim: {:.3f} s; collisions {}, corrupted bytes {}, dropped bytes {}\n",
+                 static_cast<double>(bus_.now_ns()) / 1e9, bus_.collisions(),
+                 bus_.corrupted_bytes(), dropped_bytes_);
+  return text;
+}
+
+}  // namespace bushsim

@@ -1,0 +1,61 @@
+// The virtual bus behind a pty, paced to the clock on the wall.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "descriptor.h"
+#include "pty.h"
+#include "setup.h"
+#include "sim/bus.h"
+#include "sim/vcd.h"
+
+namespace bushsim {
+
+struct Options {
+  Setup setup;
+  std::string link;
+  std::string trace;  // empty: none
+  std::uint16_t boot_number = 1;
+};
+
+class Simulator {
+ public:
+  // Makes all that can fail: pty, link, trace, timers. Blocks SIGINT, SIGTERM and SIGHUP: run()
+  // takes them.
+  static bushd::Result<std::unique_ptr<Simulator>> create(const Options& options);
+
+  // Until a signal ends it. One thread, one epoll loop.
+  bushd::Result<void> run();
+
+  // What was done, for people: a line per MCU and one for the line.
+  std::string summary() const;
+
+ private:
+  Simulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace);
+  bushd::Result<void> watch();
+  bushd::sim::TimeNs wall_time_ns() const;
+  bushd::Result<void> take_bytes(bushd::sim::TimeNs now_ns);
+  bushd::Result<void> hand_out_replies();
+  bushd::Result<void> hold_back(bushd::sim::TimeNs now_ns);
+  void report_collision(bushd::sim::TimeNs time_ns, std::uint8_t first, std::uint8_t second);
+  bushd::Result<void> set_timer(bushd::sim::TimeNs now_ns);
+  bushd::Result<void> loop();
+
+  Setup setup_;
+  Pty pty_;
+  std::unique_ptr<bushd::sim::VcdWriter> trace_;
+  bushd::sim::Bus bus_;
+  Descriptor epoll_;
+  Descriptor timer_;
+  Descriptor signals_;
+  std::int64_t start_ns_ = 0;  // CLOCK_MONOTONIC at simulated time 0
+  std::vector<std::uint8_t> replies_;
+  std::uint64_t dropped_bytes_ = 0;
+  bool listening_ = true;  // to the pty
+};
+
+}  // namespace bushsim
