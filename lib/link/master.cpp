@@ -81,11 +81,14 @@ void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
     Stream& stream = m.stream[i];
     if ((motors >> i & 1) == 0 || !stream.active) continue;
     stream.finished = false;
-    if (stream.next > first) sent |= static_cast<std::uint16_t>(1u << i);
+    const bool begun = stream.next != stream.start;
+    if (begun && stream.next > first) sent |= static_cast<std::uint16_t>(1u << i);
   }
   if (sent == 0) return;
+  // Two wishes before the first was sent: one replacement must serve both, so it takes the earlier tick. If that is
+  // too late by now, it fails as a whole and is planned again.
+  m.replace_at = m.replacing == 0 ? first : std::min(m.replace_at, first);
   m.replacing |= sent;
-  m.replace_at = std::max(m.replace_at, first);
 }
 
 void Master::control(std::size_t mcu, std::uint8_t actions) {
@@ -160,14 +163,13 @@ void Master::ask(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
 bool Master::send_due_replacement(std::int64_t now_us) {
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     Mcu& mcu = mcus_[i];
-    if (mcu.replacing == 0) continue;
+    if (mcu.replacing == 0 || mcu.replaced != 0) continue;
     const auto motors = static_cast<std::uint8_t>(std::popcount(mcu.replacing));
     const bool fine = setup_.format == BUSHD_FORMAT_FINE;
     const unsigned count = std::min<unsigned>(bushd_ticks_capacity(motors, fine, true), kMaxTicksPerFrame);
     ++mcu.epoch;
     send_ticks(now_us, i, mcu.replacing, mcu.replace_at, count, true);
     mcu.replaced = std::exchange(mcu.replacing, std::uint16_t{0});
-    mcu.replace_at = 0;
     mcu.poll_now = true;
     return true;
   }

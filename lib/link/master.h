@@ -96,7 +96,7 @@ class Master {
   // Earliest tick from which a replacement can take effect.
   Tick earliest_replace(std::int64_t now_us) const;
 
-  // From `start` on the source has ticks for this motor. Preconditions: the MCU is online, the motor has a
+  // From `start` on, until dropped, the source has ticks for this motor. Preconditions: the MCU is online, the motor has a
   // table, start >= earliest_start.
   void begin(std::size_t mcu, std::uint8_t motor, Tick start);
   // The source's answer for these motors has changed from `first` on.
@@ -108,13 +108,16 @@ class Master {
   void control(std::size_t mcu, std::uint8_t actions);
   void set_position(std::size_t mcu, std::uint8_t motor, std::int32_t position_steps);
 
+  // Requests made by the two calls above are not yet answered, or not yet seen in a report.
+  bool busy(std::size_t mcu) const { return !mcus_[mcu].script.empty() || mcus_[mcu].poll_now; }
+
   std::uint64_t bad_frames() const { return bad_frames_; }
   std::uint64_t timeouts() const { return timeouts_; }
 
  private:
   struct Stream {
     bool active = false;
-    bool finished = false;  // all is sent, to be confirmed by a report
+    bool finished = false;  // all is sent; until dropped it may still be repeated or replaced
     Tick start = 0;
     Tick next = 0;                           // first tick not yet sent
     std::optional<std::uint16_t> delay_sent;  // as told at `next`; empty: must be told again

@@ -211,9 +211,10 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     clock_.sample(view.tick, report.tick_ns + line_ns, now_us);
   }
   for (unsigned m = 0; m < report.motor_count; ++m) {
+    // Never before the present tick, whatever the line says: ticks executed cannot be asked for again.
     const auto ahead = static_cast<std::int16_t>(report.motor[m].known_until -
                                                  static_cast<std::uint16_t>(report.tick));
-    view.known_until[m] = view.tick + ahead;
+    view.known_until[m] = view.tick + std::max<std::int16_t>(ahead, 0);
   }
   if (view.phase == McuPhase::kConnecting) {
     // A motor may still be running down from before; tables are for motors at rest.
@@ -256,10 +257,7 @@ void Master::follow_streams(std::size_t index) {
     Stream& stream = mcu.stream[m];
     if (!stream.active || stream.next == stream.start) continue;
     const Tick known = mcu.view.known_until[m];
-    if (known >= stream.next) {
-      if (stream.finished) stream.active = false;
-      continue;
-    }
+    if (known >= stream.next) continue;
     const bool moving = (mcu.view.report.moving >> m & 1) != 0;
     if (!moving && known > stream.start) {
       stream.active = false;
@@ -278,7 +276,6 @@ void Master::drop_streams(Mcu& mcu) {
   for (Stream& stream : mcu.stream) stream = {};
   mcu.replacing = 0;
   mcu.replaced = 0;
-  mcu.replace_at = 0;
 }
 
 void Master::go_offline(std::size_t index, const std::string& cause, std::int64_t retry_due_us) {

@@ -1,0 +1,330 @@
+// Commands of clients: refused with a reason, or accepted and later answered with exactly one result.
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "daemon/bus.h"
+#include "daemon/core.h"
+
+namespace bushd::daemon {
+namespace {
+
+constexpr std::size_t kMaxClientId = 64;
+constexpr std::int64_t kPendingUs = 5'000'000;  // a ramp-down from full speed, with room
+// MCUs count positions in 32 bits.
+constexpr std::int64_t kMaxPosition = INT32_MAX;
+
+bool is_move(std::int8_t kind) {
+  return kind == command_t::MOVE_RELATIVE || kind == command_t::MOVE_ABSOLUTE;
+}
+
+bool valid_client_id(const std::string& id) {
+  return !id.empty() && id.size() <= kMaxClientId &&
+         std::all_of(id.begin(), id.end(), [](unsigned char c) { return c > 0x20 && c < 0x7F; });
+}
+
+}  // namespace
+
+void Core::command(std::int64_t now_us, const command_t& command) {
+  if (!valid_client_id(command.client_id)) {
+    outputs_.log(LogLevel::kWarning,
+                 "a command without a usable client_id (1..64 printable characters) was dropped");
+    return;
+  }
+  const Client client{command.client_id, command.number};
+  switch (clients_.note(client.id, client.number)) {
+    case ClientLog::Verdict::kRepeated:
+      for (const reply_t& reply : clients_.replies(client.id, client.number)) outputs_.reply(reply);
+      return;
+    case ClientLog::Verdict::kTooOld:
+      answer(client, reply_t::REFUSED, "refused",
+             "number " + std::to_string(client.number) +
+                 " is not above the highest that this client has used; count up");
+      return;
+    case ClientLog::Verdict::kNew: break;
+  }
+  if (const std::string why = refuse(command); !why.empty()) {
+    answer(client, reply_t::REFUSED, "refused", why);
+    return;
+  }
+  if (is_move(command.kind)) {
+    start_move(now_us, command);
+  } else {
+    start_pending(now_us, command);
+  }
+}
+
+std::optional<std::size_t> Core::find_motor(const std::string& name) const {
+  const auto found = motor_by_name_.find(name);
+  if (found == motor_by_name_.end()) return std::nullopt;
+  return found->second;
+}
+
+std::string Core::refuse(const command_t& command) const {
+  if (command.kind < command_t::MOVE_RELATIVE || command.kind > command_t::CLEAR_FAULTS) {
+    return "there is no command kind " + std::to_string(command.kind);
+  }
+  if (command.steps.size() != command.motors.size()) return "motors and steps differ in number";
+  std::set<std::string> seen;
+  for (const std::string& name : command.motors) {
+    if (!find_motor(name)) return "there is no motor \"" + name.substr(0, 64) + "\"";
+    if (!seen.insert(name).second) return "motor " + name + " is named twice";
+  }
+  const bool targets = is_move(command.kind) || command.kind == command_t::SET_POSITION;
+  if (targets && command.motors.empty()) return "no motor is named";
+  if (is_move(command.kind) && shutting_down_) return "the daemon is shutting down";
+  for (std::size_t i = 0; i < command.motors.size(); ++i) {
+    const std::size_t index = *find_motor(command.motors[i]);
+    const Motor& motor = motors_[index];
+    const std::int64_t value = command.steps[i];
+    // Compared before any arithmetic: the sum of two values from outside could overflow.
+    if (targets && (value > 2 * kMaxPosition || value < -2 * kMaxPosition)) {
+      return motor.config->name + ": " + std::to_string(value) + " steps is out of range";
+    }
+    if (is_move(command.kind)) {
+      const bool relative = command.kind == command_t::MOVE_RELATIVE;
+      const std::int64_t target = relative ? motor.position_steps + value : value;
+      const std::string why = refuse_move(index, target, target - motor.position_steps);
+      if (!why.empty()) return motor.config->name + ": " + why;
+    }
+    if (command.kind == command_t::SET_POSITION) {
+      if (motor.axis.busy()) return motor.config->name + " moves; its position can be set at rest only";
+      if (value > kMaxPosition || value < -kMaxPosition) {
+        return motor.config->name + ": positions lie within +-" + std::to_string(kMaxPosition);
+      }
+    }
+  }
+  if (command.kind == command_t::STOP) return {};
+  for (const std::size_t m : mcus_of(motors_named(command))) {
+    const link::McuView& view = view_of(mcus_[m]);
+    if (view.phase != link::McuPhase::kOnline) {
+      return "MCU " + mcus_[m].config->id + " is offline: " + view.detail;
+    }
+    const bool at_rest_only =
+        command.kind == command_t::DISABLE || command.kind == command_t::CLEAR_FAULTS;
+    for (const int motor : mcus_[m].motor_of) {
+      if (at_rest_only && motor >= 0 && motors_[static_cast<std::size_t>(motor)].axis.busy()) {
+        return motors_[static_cast<std::size_t>(motor)].config->name + " moves; stop it first";
+      }
+    }
+  }
+  return {};
+}
+
+std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64_t steps) const {
+  const Motor& motor = motors_[index];
+  const Mcu& mcu = mcus_[motor.mcu];
+  const link::McuView& view = view_of(mcu);
+  if (view.phase != link::McuPhase::kOnline) {
+    return "MCU " + mcu.config->id + " is offline: " + view.detail;
+  }
+  if (view.report.faults != 0) return "MCU " + mcu.config->id + " has a fault; clear it first";
+  if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
+    return "the drivers of MCU " + mcu.config->id + " are disabled; enable them first";
+  }
+  if (motor.axis.busy()) return "it moves already; stop it or wait for its result";
+  if (!motor.trusted) return "its position is uncertain; set it first";
+  if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
+    return "target " + std::to_string(target) + " is beyond +-" + std::to_string(kMaxPosition) +
+           " steps";
+  }
+  return {};
+}
+
+void Core::start_move(std::int64_t now_us, const command_t& command) {
+  std::vector<std::size_t> motors;
+  for (const std::string& name : command.motors) motors.push_back(*find_motor(name));
+  // All motors of a bus start in the same tick: the earliest that suits every one of them.
+  std::unordered_map<std::size_t, motion::Tick> start;
+  for (const std::size_t index : motors) {
+    const Motor& motor = motors_[index];
+    const Mcu& mcu = mcus_[motor.mcu];
+    const motion::Tick earliest =
+        master_of(mcu).earliest_start(now_us, mcu.in_bus, motor.config->output.value);
+    motion::Tick& common = start.try_emplace(motor.bus, earliest).first->second;
+    common = std::max(common, earliest);
+  }
+  const std::uint64_t move = book_.open(motors);
+  client_of_move_.emplace(move, Client{command.client_id, command.number});
+  answer({command.client_id, command.number}, reply_t::ACCEPTED, "", "accepted");
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    Motor& motor = motors_[motors[i]];
+    const Mcu& mcu = mcus_[motor.mcu];
+    const config::Bus& bus = config_.buses[motor.bus];
+    const bool relative = command.kind == command_t::MOVE_RELATIVE;
+    const std::int64_t steps = relative ? command.steps[i] : command.steps[i] - motor.position_steps;
+    motor.log_id = ++last_log_id_;
+    motor.axis.start(motor.position_steps, steps, start[motor.bus]);
+    const nlohmann::json line = {{"event", "move"},
+                                 {"id", motor.log_id},
+                                 {"motor", motor.config->name},
+                                 {"bus", bus.name},
+                                 {"address", mcu.config->address.value},
+                                 {"output", motor.config->output.value},
+                                 {"table_file", config_.table_of(*motor.config).path()},
+                                 {"tick_ns", bus.tick_ns()},
+                                 {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
+                                 {"start_tick", start[motor.bus]},
+                                 {"steps", steps},
+                                 {"from_steps", motor.position_steps}};
+    outputs_.move_log(line.dump());
+    if (steps != 0) {
+      master_of(mcu).begin(mcu.in_bus, motor.config->output.value, start[motor.bus]);
+    } else {
+      end_motor(motors[i], motion::Outcome::kReached, "stands at its target already");
+    }
+  }
+  changed_ = true;
+}
+
+void Core::stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors) {
+  std::unordered_map<std::size_t, std::uint16_t> masks;  // by MCU
+  for (const std::size_t index : motors) {
+    Motor& motor = motors_[index];
+    const Mcu& mcu = mcus_[motor.mcu];
+    if (!motor.axis.busy()) continue;
+    const motion::Tick at = master_of(mcu).earliest_replace(now_us);
+    motor.axis.ramp_down(at);
+    if (at >= motor.axis.end_tick()) continue;  // over before a stop could arrive
+    masks[motor.mcu] |= static_cast<std::uint16_t>(1u << motor.config->output.value);
+  }
+  for (const auto& [index, mask] : masks) {
+    const Mcu& mcu = mcus_[index];
+    master_of(mcu).replace(mcu.in_bus, mask, master_of(mcu).earliest_replace(now_us));
+  }
+  changed_ = true;
+}
+
+std::vector<std::size_t> Core::motors_named(const command_t& command) const {
+  std::vector<std::size_t> motors;
+  for (const std::string& name : command.motors) motors.push_back(*find_motor(name));
+  if (motors.empty()) {
+    for (std::size_t i = 0; i < motors_.size(); ++i) motors.push_back(i);
+  }
+  return motors;
+}
+
+std::vector<std::size_t> Core::mcus_of(const std::vector<std::size_t>& motors) const {
+  std::set<std::size_t> mcus;
+  for (const std::size_t motor : motors) mcus.insert(motors_[motor].mcu);
+  return {mcus.begin(), mcus.end()};
+}
+
+void Core::start_pending(std::int64_t now_us, const command_t& command) {
+  Pending pending{.client = {command.client_id, command.number},
+                  .kind = command.kind,
+                  .motors = motors_named(command),
+                  .steps = command.steps,
+                  .mcus = {},
+                  .deadline_us = now_us + kPendingUs};
+  answer(pending.client, reply_t::ACCEPTED, "", "accepted");
+  if (command.kind == command_t::STOP) {
+    std::vector<std::size_t> fresh;  // one that is stopping already needs no second stop
+    std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
+    for (const std::size_t m : pending.motors) {
+      if (!motors_[m].axis.stopping()) fresh.push_back(m);
+    }
+    stop_motors(now_us, fresh);
+  } else {
+    pending.mcus = mcus_of(pending.motors);
+    for (const std::size_t m : pending.mcus) {
+      const Mcu& mcu = mcus_[m];
+      if (command.kind == command_t::ENABLE) master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_ENABLE);
+      if (command.kind == command_t::DISABLE) master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_DISABLE);
+      if (command.kind == command_t::CLEAR_FAULTS) {
+        master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_CLEAR_FAULTS);
+      }
+    }
+    if (command.kind == command_t::SET_POSITION) {
+      for (std::size_t i = 0; i < pending.motors.size(); ++i) {
+        const Motor& motor = motors_[pending.motors[i]];
+        const Mcu& mcu = mcus_[motor.mcu];
+        master_of(mcu).set_position(mcu.in_bus, motor.config->output.value,
+                                    static_cast<std::int32_t>(command.steps[i]));
+      }
+    }
+  }
+  pending_.push_back(std::move(pending));
+}
+
+// What the report of an MCU shows against a command being done there; "" for nothing.
+std::string Core::still_wrong(const Pending& pending, const Mcu& mcu) const {
+  const bushd_report& report = view_of(mcu).report;
+  const bool enabled = (report.flags & BUSHD_FLAG_ENABLED) != 0;
+  if (pending.kind == command_t::ENABLE && !enabled) return "did not enable its drivers";
+  if (pending.kind == command_t::DISABLE && enabled) return "did not disable its drivers";
+  if (pending.kind == command_t::CLEAR_FAULTS && report.faults != 0) return "still has a fault";
+  if (pending.kind == command_t::SET_POSITION) {
+    for (std::size_t i = 0; i < pending.motors.size(); ++i) {
+      const Motor& motor = motors_[pending.motors[i]];
+      if (&mcus_[motor.mcu] == &mcu && motor.position_steps != pending.steps[i]) {
+        return "did not take the position of " + motor.config->name;
+      }
+    }
+  }
+  return {};
+}
+
+void Core::check_pending(std::int64_t now_us, std::optional<std::size_t> reported) {
+  for (auto it = pending_.begin(); it != pending_.end();) {
+    Pending& pending = *it;
+    std::string failure;
+    if (pending.kind == command_t::STOP) {
+      std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
+    } else if (reported && !master_of(mcus_[*reported]).busy(mcus_[*reported].in_bus)) {
+      const auto found = std::find(pending.mcus.begin(), pending.mcus.end(), *reported);
+      if (found != pending.mcus.end()) {
+        failure = still_wrong(pending, mcus_[*reported]);
+        if (!failure.empty()) failure = "MCU " + mcus_[*reported].config->id + " " + failure;
+        pending.mcus.erase(found);
+      }
+    }
+    const bool stop = pending.kind == command_t::STOP;
+    const bool done = stop ? pending.motors.empty() : pending.mcus.empty();
+    // A motor that runs down a long table may take its time: the deadline is for MCUs that do not answer.
+    if (!done && failure.empty() && !stop && now_us > pending.deadline_us) {
+      failure = "MCU " + mcus_[pending.mcus.front()].config->id + " did not confirm it in time";
+    }
+    if (!done && failure.empty()) {
+      ++it;
+      continue;
+    }
+    const Pending finished = std::move(pending);
+    it = pending_.erase(it);
+    finish_pending(finished, failure);
+  }
+}
+
+void Core::finish_pending(const Pending& pending, const std::string& failure) {
+  if (failure.empty() && pending.kind == command_t::SET_POSITION) {
+    for (const std::size_t motor : pending.motors) motors_[motor].trusted = true;
+  }
+  changed_ = true;
+  const bool good = failure.empty();
+  answer(pending.client, reply_t::RESULT, good ? "done" : "fault", good ? "done" : failure);
+}
+
+void Core::answer(const Client& client, std::int8_t phase, const std::string& result,
+                  const std::string& reason, const motion::MoveResult* move) {
+  reply_t reply;
+  reply.utime_us = outputs_.wall_clock_us();
+  reply.client_id = client.id;
+  reply.number = client.number;
+  reply.phase = phase;
+  reply.result = result;
+  reply.reason = reason;
+  reply.motor_count = 0;
+  if (move != nullptr) {
+    for (const motion::MotorOutcome& part : move->motors) {
+      reply.motors.push_back(motors_[part.motor].config->name);
+      reply.motor_results.push_back(motion::outcome_word(part.outcome));
+      reply.position_steps.push_back(part.position_steps);
+    }
+    reply.motor_count = static_cast<std::int32_t>(move->motors.size());
+  }
+  clients_.record(reply);
+  outputs_.reply(reply);
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,110 @@
+#include "daemon/core.h"
+
+#include <algorithm>
+
+#include "daemon/bus.h"
+
+namespace bushd::daemon {
+
+std::uint16_t Core::Bus::render(std::size_t mcu, std::uint8_t motor, link::Tick first, unsigned count,
+                                std::int16_t* out, std::size_t stride) {
+  const int index = core.mcus_[mcus[mcu]].motor_of[motor];
+  motion::Axis* axis = index < 0 ? nullptr : &core.motors_[static_cast<std::size_t>(index)].axis;
+  if (axis != nullptr && axis->busy()) return axis->render(first, count, out, stride);
+  for (unsigned i = 0; i < count; ++i) out[i * stride] = 0;
+  return 0;
+}
+
+Core::Core(const config::Config& config, Outputs& outputs) : config_(config), outputs_(outputs) {
+  for (const config::Mcu& mcu : config.mcus) {
+    Mcu entry{.config = &mcu, .bus = mcu.bus.value, .in_bus = 0, .boot_number = {}};
+    entry.motor_of.fill(-1);
+    mcus_.push_back(entry);
+  }
+  for (const config::Motor& motor : config.motors) {
+    const config::Bus& bus = config.bus_of(motor);
+    const tables::Table& table = config.table_of(motor);
+    mcus_[motor.mcu.value].motor_of[motor.output.value] = static_cast<int>(motors_.size());
+    motor_by_name_[motor.name] = motors_.size();
+    motors_.push_back({.config = &motor,
+                       .table_name = table.name(),
+                       .axis = motion::Axis(table.view(), bus.tick_ns(), bus.format),
+                       .bus = config.mcu_of(motor).bus.value,
+                       .mcu = motor.mcu.value});
+  }
+  for (std::size_t b = 0; b < config.buses.size(); ++b) {
+    const config::Bus& bus = config.buses[b];
+    link::BusSetup setup{.baud = bus.baud, .tick_ns = bus.tick_ns(), .format = bus.format, .mcus = {}};
+    std::vector<std::size_t> members;
+    for (std::size_t m = 0; m < mcus_.size(); ++m) {
+      if (mcus_[m].bus != b) continue;
+      mcus_[m].in_bus = members.size();
+      members.push_back(m);
+      link::McuSetup mcu{.address = mcus_[m].config->address.value, .tables = {}};
+      mcu.table_of_motor.fill(-1);
+      for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
+        const int motor = mcus_[m].motor_of[output];
+        if (motor < 0) continue;
+        const bushd_table* table = &config.table_of(config.motors[static_cast<std::size_t>(motor)]).view();
+        const auto found = std::find(mcu.tables.begin(), mcu.tables.end(), table);
+        mcu.table_of_motor[output] = static_cast<int>(found - mcu.tables.begin());
+        if (found == mcu.tables.end()) mcu.tables.push_back(table);
+      }
+      setup.mcus.push_back(std::move(mcu));
+    }
+    buses_.push_back(std::make_unique<Bus>(std::move(setup), *this));
+    buses_.back()->mcus = std::move(members);
+  }
+}
+
+Core::~Core() = default;
+
+link::Master& Core::master_of(const Mcu& mcu) { return buses_[mcu.bus]->master; }
+const link::Master& Core::master_of(const Mcu& mcu) const { return buses_[mcu.bus]->master; }
+const link::McuView& Core::view_of(const Mcu& mcu) const { return master_of(mcu).view(mcu.in_bus); }
+std::size_t Core::mcu_at(std::size_t bus, std::size_t in_bus) const { return buses_[bus]->mcus[in_bus]; }
+
+void Core::port_opened(std::int64_t now_us, std::size_t bus) {
+  buses_[bus]->master.port_opened(now_us);
+  changed_ = true;
+}
+
+void Core::port_lost(std::int64_t now_us, std::size_t bus, const std::string& cause) {
+  buses_[bus]->master.port_lost(now_us, cause);
+  handle_events(now_us, bus);
+  changed_ = true;
+}
+
+void Core::receive(std::int64_t now_us, std::size_t bus, std::span<const std::uint8_t> bytes) {
+  buses_[bus]->master.receive(now_us, bytes);
+  handle_events(now_us, bus);
+}
+
+void Core::step(std::int64_t now_us) {
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    const std::span<const std::uint8_t> bytes = buses_[b]->master.step(now_us);
+    if (!bytes.empty()) outputs_.send(b, bytes);
+    handle_events(now_us, b);
+  }
+  check_pending(now_us, std::nullopt);
+  if (changed_ || now_us >= state_due_us_) {
+    publish();
+    changed_ = false;
+    state_due_us_ = now_us + kStatePeriodUs;
+  }
+}
+
+std::int64_t Core::next_wake_us() const {
+  std::int64_t wake = changed_ ? 0 : state_due_us_;
+  for (const auto& bus : buses_) wake = std::min(wake, bus->master.next_wake_us());
+  return wake;
+}
+
+void Core::shut_down(std::int64_t now_us) {
+  shutting_down_ = true;
+  std::vector<std::size_t> all(motors_.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  stop_motors(now_us, all);
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,154 @@
+// The daemon without I/O: configuration, bytes, commands and time go in; bytes, replies, states and log lines come
+// out. daemon/main.cpp puts ports, LCM and the clock around it; simulations put virtual ones.
+//
+// Not thread-safe; all times are microseconds of one monotonic clock.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "bushd/command_t.hpp"
+#include "bushd/reply_t.hpp"
+#include "bushd/state_t.hpp"
+#include "config/config.h"
+#include "daemon/client_log.h"
+#include "link/master.h"
+#include "motion/axis.h"
+#include "motion/move_book.h"
+
+namespace bushd::daemon {
+
+enum class LogLevel { kInfo, kWarning, kError };
+
+// Where the core's output goes. Called from within the core's functions; must not call back into the core.
+class Outputs {
+ public:
+  virtual ~Outputs() = default;
+  virtual void send(std::size_t bus, std::span<const std::uint8_t> bytes) = 0;
+  virtual void reply(const reply_t& reply) = 0;
+  virtual void state(const state_t& state) = 0;
+  virtual void move_log(const std::string& json_line) = 0;
+  virtual void log(LogLevel level, const std::string& text) = 0;
+  virtual std::int64_t wall_clock_us() = 0;  // microseconds since 1970, for messages
+};
+
+class Core {
+ public:
+  static constexpr std::int64_t kStatePeriodUs = 50'000;
+
+  // `config` must be one that config::load accepted; it and `outputs` outlive the core.
+  Core(const config::Config& config, Outputs& outputs);
+  ~Core();
+  Core(const Core&) = delete;
+  Core& operator=(const Core&) = delete;
+
+  void port_opened(std::int64_t now_us, std::size_t bus);
+  void port_lost(std::int64_t now_us, std::size_t bus, const std::string& cause);
+  void receive(std::int64_t now_us, std::size_t bus, std::span<const std::uint8_t> bytes);
+
+  void command(std::int64_t now_us, const command_t& command);
+  // Payloads that were no valid command, so far; shown in the state.
+  void set_rejected_commands(std::uint64_t count) { rejected_commands_ = count; }
+
+  // Does what is due; to be called after every call above and at next_wake_us() at the latest.
+  void step(std::int64_t now_us);
+  std::int64_t next_wake_us() const;
+
+  // Ramps down all motors and takes no more moves.
+  void shut_down(std::int64_t now_us);
+  // No motor moves by this core's doing.
+  bool at_rest() const { return book_.empty(); }
+
+ private:
+  struct Bus;
+  struct Motor {
+    const config::Motor* config;
+    std::string table_name;
+    motion::Axis axis;
+    std::size_t bus;           // index in buses_
+    std::size_t mcu;           // index in mcus_
+    std::uint64_t log_id = 0;  // of its present move in the log of moves
+    std::int64_t position_steps = 0;  // as reported last
+    bool trusted = true;
+  };
+  struct Mcu {
+    const config::Mcu* config;
+    std::size_t bus;
+    std::size_t in_bus;                                 // index within the bus's master
+    std::array<int, BUSHD_MOTORS_PER_MCU> motor_of{};   // by output; -1: none
+    std::optional<std::uint16_t> boot_number;           // of the boot that positions belong to
+    bool clearing = false;                              // faults are being cleared
+  };
+  struct Client {
+    std::string id;
+    std::int64_t number;
+  };
+  // A command that is neither answered at once nor a move: done when nothing is left to wait for.
+  struct Pending {
+    Client client;
+    std::int8_t kind;
+    std::vector<std::size_t> motors;    // STOP: still moving; SET_POSITION: all
+    std::vector<std::int64_t> steps;    // SET_POSITION
+    std::vector<std::size_t> mcus;      // whose report is awaited
+    std::int64_t deadline_us;
+  };
+
+  link::Master& master_of(const Mcu& mcu);
+  const link::Master& master_of(const Mcu& mcu) const;
+  const link::McuView& view_of(const Mcu& mcu) const;
+  std::size_t mcu_at(std::size_t bus, std::size_t in_bus) const;
+
+  // events.cpp
+  void handle_events(std::int64_t now_us, std::size_t bus);
+  void on_online(std::size_t mcu);
+  void on_offline(std::size_t mcu);
+  void on_report(std::int64_t now_us, std::size_t mcu);
+  void follow_motor(std::size_t motor, const Mcu& mcu, const link::McuView& view);
+  void clear_link_fault(Mcu& mcu);
+  void end_motor(std::size_t motor, motion::Outcome outcome, const std::string& reason);
+
+  // commands.cpp
+  std::string refuse(const command_t& command) const;  // "" when nothing speaks against it
+  std::string refuse_move(std::size_t motor, std::int64_t target, std::int64_t steps) const;
+  std::optional<std::size_t> find_motor(const std::string& name) const;
+  std::vector<std::size_t> motors_named(const command_t& command) const;  // none named: all
+  std::vector<std::size_t> mcus_of(const std::vector<std::size_t>& motors) const;
+  void start_move(std::int64_t now_us, const command_t& command);
+  void stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors);
+  void start_pending(std::int64_t now_us, const command_t& command);
+  void check_pending(std::int64_t now_us, std::optional<std::size_t> reported_mcu);
+  std::string still_wrong(const Pending& pending, const Mcu& mcu) const;
+  void finish_pending(const Pending& pending, const std::string& failure);
+  void answer(const Client& client, std::int8_t phase, const std::string& result,
+              const std::string& reason, const motion::MoveResult* move = nullptr);
+
+  // snapshot.cpp
+  void publish();
+  state_t state_of(const Mcu& mcu) const;
+
+  const config::Config& config_;
+  Outputs& outputs_;
+  std::vector<std::unique_ptr<Bus>> buses_;
+  std::vector<Mcu> mcus_;
+  std::vector<Motor> motors_;
+  std::unordered_map<std::string, std::size_t> motor_by_name_;
+  motion::MoveBook book_;
+  std::unordered_map<std::uint64_t, Client> client_of_move_;
+  std::list<Pending> pending_;
+  ClientLog clients_;
+  std::uint64_t rejected_commands_ = 0;
+  std::uint64_t last_log_id_ = 0;
+  std::int64_t sequence_ = 0;
+  std::int64_t state_due_us_ = 0;
+  bool changed_ = true;
+  bool shutting_down_ = false;
+};
+
+}  // namespace bushd::daemon

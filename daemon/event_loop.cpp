@@ -1,0 +1,237 @@
+#include "daemon/event_loop.h"
+
+#include <spdlog/spdlog.h>
+#include <sys/epoll.h>
+#include <sys/resource.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+
+namespace bushd::daemon {
+namespace {
+
+// epoll tags: buses count from 0.
+constexpr std::uint64_t kLcmTag = UINT64_MAX;
+constexpr std::uint64_t kSignalTag = UINT64_MAX - 1;
+
+std::int64_t now_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+std::int64_t cpu_us() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return (usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) * 1'000'000 + usage.ru_utime.tv_usec +
+         usage.ru_stime.tv_usec;
+}
+
+}  // namespace
+
+EventLoop::EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log)
+    : config_(config),
+      transport_(transport),
+      move_log_(move_log),
+      core_(config, *this),
+      ports_(config.buses.size()),
+      lost_(config.buses.size()),
+      state_channel_(config.lcm.prefix + "_STATE"),
+      reply_channel_(config.lcm.prefix + "_REPLY"),
+      command_channel_(config.lcm.prefix + "_COMMAND") {}
+
+EventLoop::~EventLoop() {
+  if (epoll_ >= 0) ::close(epoll_);
+  if (signals_ >= 0) ::close(signals_);
+}
+
+Result<void> EventLoop::watch(int fd, std::uint32_t events, std::uint64_t tag) {
+  epoll_event event{};
+  event.events = events;
+  event.data.u64 = tag;
+  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) {
+    return fail(std::string("epoll: ") + std::strerror(errno));
+  }
+  return {};
+}
+
+Result<void> EventLoop::set_up() {
+  epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
+  if (epoll_ < 0) return fail(std::string("epoll: ") + std::strerror(errno));
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGINT);
+  signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+  if (signals_ < 0) return fail(std::string("signalfd: ") + std::strerror(errno));
+  if (const auto watched = watch(signals_, EPOLLIN, kSignalTag); !watched) return watched;
+  if (const auto watched = watch(transport_.fd(), EPOLLIN, kLcmTag); !watched) return watched;
+  transport_.subscribe<command_t>(command_channel_,
+                                  [this](const command_t& command) { core_.command(now_us(), command); });
+  return {};
+}
+
+Result<void> EventLoop::run() {
+  if (const auto ready = set_up(); !ready) return ready;
+  started_us_ = now_us();
+  while (true) {
+    const std::int64_t now = now_us();
+    for (std::size_t bus = 0; bus < lost_.size(); ++bus) {
+      if (lost_[bus]) lose_port(now, bus, *std::exchange(lost_[bus], std::nullopt));
+    }
+    open_due_ports(now);
+    core_.step(now);
+    if (shut_down_by_us_ && (core_.at_rest() || now >= *shut_down_by_us_)) break;
+    std::array<epoll_event, 16> events;
+    const std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
+    const timespec wait = {.tv_sec = wait_us / 1'000'000, .tv_nsec = wait_us % 1'000'000 * 1000};
+    const int n = ::epoll_pwait2(epoll_, events.data(), static_cast<int>(events.size()), &wait, nullptr);
+    if (n < 0 && errno != EINTR) return fail(std::string("epoll: ") + std::strerror(errno));
+    for (int i = 0; i < n; ++i) {
+      const epoll_event& event = events[static_cast<std::size_t>(i)];
+      if (event.data.u64 == kLcmTag) {
+        transport_.handle();
+        core_.set_rejected_commands(transport_.rejected());
+      } else if (event.data.u64 == kSignalTag) {
+        handle_signal(now_us());
+      } else {
+        handle_port(now_us(), event.data.u64, event.events);
+      }
+    }
+  }
+  if (!core_.at_rest()) spdlog::error("not all motors are known to be at rest; MCUs run down by themselves");
+  log_cpu_share();
+  return {};
+}
+
+std::int64_t EventLoop::next_wake_us() const {
+  std::int64_t wake = core_.next_wake_us();
+  for (const Port& port : ports_) {
+    if (!port.serial) wake = std::min(wake, port.open_due_us);
+  }
+  if (shut_down_by_us_) wake = std::min(wake, *shut_down_by_us_);
+  if (std::any_of(lost_.begin(), lost_.end(), [](const auto& lost) { return lost.has_value(); })) wake = 0;
+  return wake;
+}
+
+void EventLoop::open_due_ports(std::int64_t now) {
+  for (std::size_t bus = 0; bus < ports_.size(); ++bus) {
+    if (!ports_[bus].serial && ports_[bus].open_due_us <= now) open_port(now, bus);
+  }
+}
+
+void EventLoop::open_port(std::int64_t now, std::size_t bus) {
+  Port& port = ports_[bus];
+  const config::Bus& config = config_.buses[bus];
+  port.open_due_us = now + kReopenUs;
+  auto opened = SerialPort::open(config.port, config.baud);
+  Result<void> watched;
+  if (opened) watched = watch(opened->fd(), EPOLLIN, bus);
+  if (!opened || !watched) {
+    const std::string error = opened ? watched.error().text() : opened.error().text();
+    if (error != port.last_error) {
+      spdlog::error("bus {}: {}; trying again twice a second", config.name, error);
+      port.last_error = error;
+      core_.port_lost(now, bus, "is out of reach: port " + error);
+    }
+    return;
+  }
+  port.serial = std::move(*opened);
+  port.last_error.clear();
+  spdlog::info("bus {}: port {} opened at {} baud", config.name, config.port, config.baud);
+  core_.port_opened(now, bus);
+}
+
+void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& cause) {
+  Port& port = ports_[bus];
+  if (!port.serial) return;
+  const config::Bus& config = config_.buses[bus];
+  port.serial.reset();  // closing takes it out of the epoll set
+  port.open_due_us = now + kReopenUs;
+  port.last_error = config.port + ": " + cause;
+  spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, config.port, cause);
+  core_.port_lost(now, bus, "is out of reach: port " + port.last_error);
+}
+
+void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t events) {
+  if (!ports_[bus].serial) return;
+  SerialPort& serial = *ports_[bus].serial;
+  if (events & EPOLLIN) {
+    std::vector<std::uint8_t> bytes;
+    const auto read = serial.read(bytes);
+    if (!bytes.empty()) core_.receive(now, bus, bytes);
+    if (!read) return lose_port(now, bus, read.error().text());
+  } else if (events & (EPOLLHUP | EPOLLERR)) {
+    return lose_port(now, bus, "hung up");
+  }
+  if (events & EPOLLOUT) {
+    const auto flushed = serial.flush();
+    if (!flushed) return lose_port(now, bus, flushed.error().text());
+    update_write_interest(bus);
+  }
+}
+
+void EventLoop::handle_signal(std::int64_t now) {
+  signalfd_siginfo info{};
+  if (::read(signals_, &info, sizeof info) != sizeof info || shut_down_by_us_) return;
+  spdlog::info("{}: ramping all motors down", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
+  core_.shut_down(now);
+  shut_down_by_us_ = now + kShutDownUs;
+}
+
+void EventLoop::update_write_interest(std::size_t bus) {
+  const SerialPort& serial = *ports_[bus].serial;
+  epoll_event event{};
+  event.events = EPOLLIN | (serial.wants_to_write() ? static_cast<std::uint32_t>(EPOLLOUT) : 0u);
+  event.data.u64 = bus;
+  static_cast<void>(::epoll_ctl(epoll_, EPOLL_CTL_MOD, serial.fd(), &event));
+}
+
+void EventLoop::log_cpu_share() const {
+  const double elapsed_s = static_cast<double>(now_us() - started_us_) * 1e-6;
+  const double cpu_s = static_cast<double>(cpu_us()) * 1e-6;
+  spdlog::info("ended; used {:.2f} s of CPU in {:.1f} s, {:.1f} % of a core", cpu_s, elapsed_s,
+               100.0 * cpu_s / elapsed_s);
+}
+
+void EventLoop::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
+  if (!ports_[bus].serial) return;
+  const bool waited = ports_[bus].serial->wants_to_write();
+  if (const auto written = ports_[bus].serial->write(bytes); !written) {
+    lost_[bus] = written.error().text();
+  } else if (waited != ports_[bus].serial->wants_to_write()) {
+    update_write_interest(bus);
+  }
+}
+
+void EventLoop::reply(const reply_t& reply) { transport_.publish(reply_channel_, reply); }
+
+void EventLoop::state(const state_t& state) { transport_.publish(state_channel_, state); }
+
+void EventLoop::move_log(const std::string& json_line) {
+  if (move_log_ == nullptr) return;
+  if (const auto written = move_log_->append(json_line); !written) {
+    spdlog::error("log of moves: {}", written.error().text());
+  }
+}
+
+void EventLoop::log(LogLevel level, const std::string& text) {
+  switch (level) {
+    case LogLevel::kInfo: spdlog::info(text); break;
+    case LogLevel::kWarning: spdlog::warn(text); break;
+    case LogLevel::kError: spdlog::error(text); break;
+  }
+}
+
+std::int64_t EventLoop::wall_clock_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace bushd::daemon

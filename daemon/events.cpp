@@ -1,0 +1,169 @@
+// What the bus tells: MCUs that come and go, reports, and with them the ends of moves.
+#include <nlohmann/json.hpp>
+
+#include "daemon/bus.h"
+#include "daemon/core.h"
+
+namespace bushd::daemon {
+namespace {
+
+const char* fault_text(std::uint8_t faults) {
+  if (faults & BUSHD_FAULT_SELF_TEST) return "its self-test failed";
+  if (faults & BUSHD_FAULT_SYNC) return "it fell out of step with the bus";
+  return "its tick queue ran empty";
+}
+
+}  // namespace
+
+void Core::handle_events(std::int64_t now_us, std::size_t bus) {
+  for (const link::Event& event : buses_[bus]->master.take_events()) {
+    const std::size_t mcu = mcu_at(bus, event.mcu);
+    switch (event.kind) {
+      case link::Event::Kind::kOnline: on_online(mcu); break;
+      case link::Event::Kind::kOffline: on_offline(mcu); break;
+      case link::Event::Kind::kReport: on_report(now_us, mcu); break;
+      case link::Event::Kind::kLateStart: {
+        const int motor = mcus_[mcu].motor_of[event.motor];
+        const bool link_fault = (view_of(mcus_[mcu]).report.faults & BUSHD_FAULT_LINK) != 0;
+        if (motor >= 0 && !link_fault) {
+          end_motor(static_cast<std::size_t>(motor), motion::Outcome::kLink,
+                    "its first ticks reached MCU " + mcus_[mcu].config->id +
+                        " too late to start in time; it did not move");
+        }
+        break;
+      }
+      case link::Event::Kind::kReplaceFailed: {
+        std::vector<std::size_t> again;
+        for (unsigned output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
+          const int motor = mcus_[mcu].motor_of[output];
+          if ((event.motors >> output & 1) != 0 && motor >= 0) {
+            again.push_back(static_cast<std::size_t>(motor));
+          }
+        }
+        stop_motors(now_us, again);
+        break;
+      }
+    }
+  }
+}
+
+void Core::on_online(std::size_t index) {
+  Mcu& mcu = mcus_[index];
+  const link::McuView& view = view_of(mcu);
+  // Positions are counts since the MCU's boot; a boot that this daemon did not see the positions of has lost them.
+  const bool restarted = mcu.boot_number && *mcu.boot_number != view.report.boot_number;
+  mcu.boot_number = view.report.boot_number;
+  mcu.clearing = false;
+  for (unsigned output = 0; output < view.report.motor_count; ++output) {
+    if (mcu.motor_of[output] < 0) continue;
+    Motor& motor = motors_[static_cast<std::size_t>(mcu.motor_of[output])];
+    motor.position_steps = view.report.motor[output].position_steps;
+    if (restarted) motor.trusted = false;
+  }
+  outputs_.log(restarted ? LogLevel::kWarning : LogLevel::kInfo,
+               "MCU " + mcu.config->id + " is ready, boot number " +
+                   std::to_string(view.report.boot_number) +
+                   (restarted ? "; it restarted, so its motors' positions are uncertain: set them" : ""));
+  changed_ = true;
+}
+
+void Core::on_offline(std::size_t index) {
+  const Mcu& mcu = mcus_[index];
+  const std::string cause = "MCU " + mcu.config->id + " " + view_of(mcu).detail;
+  outputs_.log(LogLevel::kError, cause);
+  for (const int motor : mcu.motor_of) {
+    if (motor < 0) continue;
+    end_motor(static_cast<std::size_t>(motor), motion::Outcome::kLink,
+              cause + "; the position is the last one reported");
+  }
+  changed_ = true;
+}
+
+void Core::on_report(std::int64_t now_us, std::size_t index) {
+  Mcu& mcu = mcus_[index];
+  const link::McuView& view = view_of(mcu);
+  for (unsigned output = 0; output < view.report.motor_count; ++output) {
+    if (mcu.motor_of[output] < 0) continue;
+    const auto motor = static_cast<std::size_t>(mcu.motor_of[output]);
+    motors_[motor].position_steps = view.report.motor[output].position_steps;
+    if (motors_[motor].axis.busy()) follow_motor(motor, mcu, view);
+  }
+  clear_link_fault(mcu);
+  check_pending(now_us, index);
+}
+
+void Core::follow_motor(std::size_t index, const Mcu& mcu, const link::McuView& view) {
+  Motor& motor = motors_[index];
+  const std::uint8_t output = motor.config->output.value;
+  if (view.report.faults != 0) {
+    // The MCU takes no more ticks; what it has, it runs, and then down its own table.
+    if ((view.report.moving >> output & 1) == 0) {
+      const std::string fault = fault_text(view.report.faults);
+      end_motor(index, motion::Outcome::kLink,
+                "MCU " + mcu.config->id + " ran it down by itself because " + fault);
+    }
+    return;
+  }
+  motor.axis.executed(view.tick);
+  if (view.tick < motor.axis.end_tick()) return;
+  if (motor.position_steps != motor.axis.target_steps()) {
+    motor.trusted = false;
+    end_motor(index, motion::Outcome::kFault,
+              "MCU " + mcu.config->id + " counted position " + std::to_string(motor.position_steps) +
+                  " where the table leads to " + std::to_string(motor.axis.target_steps()) +
+                  "; check the position and set it");
+  } else if (motor.position_steps != motor.axis.wanted_steps()) {
+    end_motor(index, motion::Outcome::kStopped, "stopped on request");
+  } else {
+    end_motor(index, motion::Outcome::kReached, "stands at its target");
+  }
+}
+
+// The daemon knows where the motors are again, so the fault has served its purpose; it stays latched as long as a
+// motor moves or a move has not got its result.
+void Core::clear_link_fault(Mcu& mcu) {
+  const link::McuView& view = view_of(mcu);
+  const bool faulty = (view.report.faults & (BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC)) != 0;
+  if (faulty && !mcu.clearing && view.report.moving == 0) {
+    outputs_.log(LogLevel::kWarning, "MCU " + mcu.config->id + ": " + fault_text(view.report.faults) +
+                                         "; positions are read, clearing the fault");
+    master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_CLEAR_FAULTS);
+  }
+  if (mcu.clearing != faulty) changed_ = true;
+  mcu.clearing = faulty && view.report.moving == 0;
+}
+
+void Core::end_motor(std::size_t index, motion::Outcome outcome, const std::string& reason) {
+  Motor& motor = motors_[index];
+  if (!motor.axis.busy()) return;
+  const Mcu& mcu = mcus_[motor.mcu];
+  master_of(mcu).drop(mcu.in_bus, motor.config->output.value);
+  const bool planned = outcome == motion::Outcome::kReached || outcome == motion::Outcome::kStopped;
+  if (motor.axis.stop_at() && planned) {
+    const nlohmann::json stop = {{"event", "stop"},
+                                 {"id", motor.log_id},
+                                 {"motor", motor.config->name},
+                                 {"tick", *motor.axis.stop_at()}};
+    outputs_.move_log(stop.dump());
+  }
+  motor.axis.finish();
+  const nlohmann::json result = {{"event", "result"},
+                                 {"id", motor.log_id},
+                                 {"motor", motor.config->name},
+                                 {"result", motion::outcome_word(outcome)},
+                                 {"position_steps", motor.position_steps}};
+  outputs_.move_log(result.dump());
+  if (!planned) outputs_.log(LogLevel::kWarning, motor.config->name + ": " + reason);
+  changed_ = true;
+  const auto finished = book_.end({.motor = index,
+                                   .outcome = outcome,
+                                   .position_steps = motor.position_steps,
+                                   .reason = motor.config->name + ": " + reason});
+  if (!finished) return;
+  const auto client = client_of_move_.find(finished->move);
+  answer(client->second, reply_t::RESULT, motion::outcome_word(finished->outcome), finished->reason,
+         &*finished);
+  client_of_move_.erase(client);
+}
+
+}  // namespace bushd::daemon

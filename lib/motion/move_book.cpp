@@ -1,0 +1,60 @@
+#include "motion/move_book.h"
+
+#include <algorithm>
+
+namespace bushd::motion {
+
+const char* outcome_word(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::kReached: return "reached";
+    case Outcome::kStopped: return "stopped";
+    case Outcome::kLimit: return "limit";
+    case Outcome::kStall: return "stall";
+    case Outcome::kLink: return "link";
+    case Outcome::kFault: return "fault";
+  }
+  return "fault";
+}
+
+std::uint64_t MoveBook::open(const std::vector<std::size_t>& motors) {
+  const std::uint64_t id = ++last_;
+  Open move;
+  move.result.move = id;
+  move.left = motors.size();
+  for (const std::size_t motor : motors) {
+    move.result.motors.push_back({.motor = motor, .reason = {}});
+    of_motor_[motor] = id;
+  }
+  open_.emplace(id, std::move(move));
+  return id;
+}
+
+std::optional<MoveResult> MoveBook::end(MotorOutcome outcome) {
+  const auto of_motor = of_motor_.find(outcome.motor);
+  if (of_motor == of_motor_.end()) return std::nullopt;
+  const auto found = open_.find(of_motor->second);
+  of_motor_.erase(of_motor);
+  Open& move = found->second;
+  for (MotorOutcome& part : move.result.motors) {
+    if (part.motor != outcome.motor) continue;
+    part = std::move(outcome);
+    break;
+  }
+  if (--move.left != 0) return std::nullopt;
+  MoveResult result = std::move(move.result);
+  open_.erase(found);
+  const auto worst = std::max_element(
+      result.motors.begin(), result.motors.end(),
+      [](const MotorOutcome& a, const MotorOutcome& b) { return a.outcome < b.outcome; });
+  result.outcome = worst->outcome;
+  result.reason = worst->reason;
+  return result;
+}
+
+std::optional<std::uint64_t> MoveBook::move_of(std::size_t motor) const {
+  const auto found = of_motor_.find(motor);
+  if (found == of_motor_.end()) return std::nullopt;
+  return found->second;
+}
+
+}  // namespace bushd::motion

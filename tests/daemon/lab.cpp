@@ -1,0 +1,188 @@
+#include "daemon/lab.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace bushd::test {
+
+Lab::Lab(const std::string& toml, sim::EdgeSink* sink) {
+  directory_ = std::filesystem::temp_directory_path() / ("bushd-lab-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(directory_);
+  const auto path = directory_ / "bushd.toml";
+  std::ofstream(path) << toml;
+  auto config = config::load(path);
+  if (!config) throw std::runtime_error(config.error().text());
+  config_ = std::move(*config);
+  for (std::size_t b = 0; b < config_.buses.size(); ++b) {
+    buses_.push_back({std::make_unique<sim::Bus>(config_.buses[b].baud, sink), {}, true});
+  }
+  for (std::size_t b = 0; b < config_.buses.size(); ++b) {
+    for (std::size_t m = 0; m < config_.mcus.size(); ++m) {
+      if (config_.mcus[m].bus.value != b) continue;
+      // Each boots at another time, so that their ticks have nothing in common by themselves.
+      buses_[b].bus->add_mcu({.address = config_.mcus[m].address.value,
+                              .boot_number = static_cast<std::uint16_t>(100 * b + m + 1),
+                              .boot_ns = static_cast<std::int64_t>(m) * 777'777});
+    }
+    buses_[b].bus->on_master_byte = [this, b](std::uint8_t byte, sim::TimeNs) {
+      if (buses_[b].plugged) buses_[b].received.push_back(byte);
+    };
+  }
+  start_daemon();
+}
+
+Lab::~Lab() { std::filesystem::remove_all(directory_); }
+
+void Lab::start_daemon() {
+  core_ = std::make_unique<daemon::Core>(config_, *this);
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    if (buses_[b].plugged) core_->port_opened(now_us(), b);
+  }
+}
+
+void Lab::restart_daemon() {
+  core_.reset();
+  for (SimulatedBus& bus : buses_) bus.received.clear();
+  states_.clear();
+  start_daemon();
+}
+
+void Lab::unplug(std::size_t bus) {
+  buses_[bus].plugged = false;
+  core_->port_lost(now_us(), bus, "unplugged");
+}
+
+void Lab::plug(std::size_t bus) {
+  buses_[bus].plugged = true;
+  buses_[bus].received.clear();
+  core_->port_opened(now_us(), bus);
+}
+
+void Lab::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
+  std::vector<std::uint8_t> copy(bytes.begin(), bytes.end());
+  if (on_send && !on_send(bus, copy)) return;
+  if (buses_[bus].plugged) buses_[bus].bus->master_send(copy, now_ns_);
+}
+
+void Lab::log(daemon::LogLevel level, const std::string& text) {
+  if (level != daemon::LogLevel::kInfo) {
+    std::printf("[%.3f s] %s\n", static_cast<double>(now_ns_) * 1e-9, text.c_str());
+  }
+}
+
+// To the next thing that happens: on a bus, or in the daemon.
+void Lab::advance() {
+  core_->step(now_us());
+  std::int64_t next = std::max(core_->next_wake_us() * 1000, now_ns_ + 1000);
+  for (const SimulatedBus& bus : buses_) next = std::min(next, bus.bus->next_event_ns());
+  now_ns_ = std::max(next, now_ns_);
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    buses_[b].bus->advance_to(now_ns_);
+    if (buses_[b].received.empty()) continue;
+    const std::vector<std::uint8_t> bytes = std::exchange(buses_[b].received, {});
+    core_->receive(now_us(), b, bytes);
+  }
+}
+
+bool Lab::run_until(const std::function<bool()>& done, double limit_s) {
+  const auto limit = now_ns_ + static_cast<std::int64_t>(limit_s * 1e9);
+  while (now_ns_ < limit) {
+    if (done()) return true;
+    advance();
+  }
+  return done();
+}
+
+void Lab::run_for(double seconds) {
+  run_until([] { return false; }, seconds);
+}
+
+std::int64_t Lab::send(std::int8_t kind, const std::vector<std::string>& motors,
+                       const std::vector<std::int64_t>& steps) {
+  command_t command;
+  command.utime_us = 0;
+  command.client_id = "test";
+  command.number = ++number_;
+  command.kind = kind;
+  command.motors = motors;
+  command.steps = steps;
+  command.steps.resize(motors.size());
+  command.motor_count = static_cast<std::int32_t>(motors.size());
+  core_->command(now_us(), command);
+  return number_;
+}
+
+std::vector<reply_t> Lab::replies(std::int64_t number) const {
+  std::vector<reply_t> found;
+  std::copy_if(replies_.begin(), replies_.end(), std::back_inserter(found), [&](const reply_t& reply) {
+    return reply.client_id == "test" && reply.number == number;
+  });
+  return found;
+}
+
+reply_t Lab::last_reply(std::int64_t number) const { return replies(number).back(); }
+
+bool Lab::has_result(std::int64_t number) const {
+  const std::vector<reply_t> all = replies(number);
+  return !all.empty() && all.back().phase != reply_t::ACCEPTED;
+}
+
+reply_t Lab::wait(std::int64_t number, double limit_s) {
+  EXPECT_TRUE(run_until([&] { return has_result(number); }, limit_s)) << "no result in time";
+  core_->step(now_us());  // publishes what has changed
+  return last_reply(number);
+}
+
+bool Lab::all_ready() const {
+  if (states_.size() != config_.mcus.size()) return false;
+  return std::all_of(states_.begin(), states_.end(),
+                     [](const auto& entry) { return entry.second.mcu_state == "READY"; });
+}
+
+void Lab::connect() {
+  ASSERT_TRUE(run_until([this] { return all_ready(); }, 10)) << "not all MCUs became READY";
+}
+
+motor_state_t Lab::motor(const std::string& name) const {
+  for (const auto& [mcu, state] : states_) {
+    for (const motor_state_t& motor : state.motors) {
+      if (motor.name == name) return motor;
+    }
+  }
+  throw std::out_of_range(name);
+}
+
+std::int64_t Lab::shaft_steps(const std::string& name) const {
+  for (const config::Motor& motor : config_.motors) {
+    if (motor.name != name) continue;
+    const config::Mcu& mcu = config_.mcu_of(motor);
+    std::size_t in_bus = 0;
+    for (std::size_t m = 0; m < motor.mcu.value; ++m) {
+      if (config_.mcus[m].bus == mcu.bus) ++in_bus;
+    }
+    return buses_[mcu.bus.value].bus->mcu(in_bus).shaft(motor.output.value).position_steps;
+  }
+  throw std::out_of_range(name);
+}
+
+std::string hall(int mcus, int motors, const std::string& format, const std::string& table) {
+  std::string toml =
+      "[[bus]]\nname = \"hall\"\nport = \"/dev/null\"\nbaud = 500000\ntick_us = 2560\nformat = \"" + format +
+      "\"\n[[group]]\nname = \"axes\"\ntable = \"" + table + "\"\n";
+  int number = 0;
+  for (int m = 1; m <= mcus; ++m) {
+    toml += "[[mcu]]\nbus = \"hall\"\naddress = " + std::to_string(m) + "\n";
+    for (int output = 0; output < motors; ++output) {
+      ++number;
+      const std::string name = (number < 10 ? "m0" : "m") + std::to_string(number);
+      toml += "[[motor]]\nname = \"" + name + "\"\nmcu = \"hall:" + std::to_string(m) +
+              "\"\noutput = " + std::to_string(output) + "\ngroup = \"axes\"\n";
+    }
+  }
+  return toml;
+}
+
+}  // namespace bushd::test
