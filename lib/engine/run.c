@@ -1,12 +1,13 @@
 // A run is cut once, when it starts, into at most four parts by the rule max(A(j-1), D(N-j), c):
 // a lead (a step taken over in its middle), steps on the accelerating side, steps at cruise, steps
-// on the decelerating side. Both sides are sorted, so A(j-1) - D(N-j) never rises with j and one binary
-// search finds where deceleration takes over; codes not above c count as cruise.
+// on the decelerating side. Both sides are sorted, so A(j-1) - D(N-j) never rises with j and one
+// binary search finds where deceleration takes over; codes not above c count as cruise.
 //
 // State in time is (which step runs, time units since the last step). Advancing by dt:
-//   side with an index   S[i] + since + dt looked up in the prefix sums S: one bucket, one comparison
-//   side without         the codes are walked
-//   cruise               quotient and remainder of dt / c, computed once a block
+//   side with an index   S[i] + since + dt looked up in the prefix sums S: one bucket, one
+//   comparison side without         the codes are walked cruise               quotient and
+//   remainder of dt / c, computed once a block
+// The decelerating side is the same walk through its sums, backwards in time from the end.
 #include "engine/run.h"
 
 // First index of a side whose code is <= cruise: from there on the side is cruise.
@@ -98,7 +99,9 @@ uint32_t bushd_run_steps_left(const bushd_run* run) {
   return run->lead_steps + (run->accel_end - run->accel_at) + run->cruise_left + run->decel_left;
 }
 
-bool bushd_run_done(const bushd_run* run) { return bushd_run_steps_left(run) == 0; }
+bool bushd_run_done(const bushd_run* run) {
+  return bushd_run_steps_left(run) == 0;
+}
 
 static uint64_t units_between(const bushd_ramp* ramp, uint32_t from, uint32_t to) {
   if (ramp->sum != NULL) return ramp->sum[to] - ramp->sum[from];
@@ -117,9 +120,8 @@ uint64_t bushd_run_units_left(const bushd_run* run) {
 }
 
 // The greatest i with sum[i] <= units. Precondition: units < sum[count].
-static inline uint32_t look_up(const bushd_ramp* ramp, uint32_t units) {
+static uint32_t look_up(const bushd_ramp* ramp, uint32_t units) {
   uint32_t i = ramp->bucket[units >> ramp->bucket_shift];
-  i += ramp->sum[i + 1] <= units;
   while (ramp->sum[i + 1] <= units) ++i;
   return i;
 }
@@ -154,17 +156,15 @@ static uint32_t advance_decel(bushd_run* run) {
   const bushd_ramp* ramp = &run->table->decel;
   uint32_t left = run->decel_left;
   if (ramp->sum != NULL) {
-    // sum[left] is the time from the last step made to the end; after `since` of it `remaining` is to
-    // come, and the steps still to be made are the fewest whose time is not less.
+    // sum[left] is the time from the last step made to the end; after `since` of it `remaining` is
+    // to come, and the steps still to be made are the fewest whose time is not less.
+    const uint32_t remaining = ramp->sum[left] - run->since;
     if (run->since >= ramp->sum[left]) {
-      run->since -= ramp->sum[left];
       left = 0;
     } else {
-      const uint32_t remaining = ramp->sum[left] - run->since;
-      left = remaining == ramp->sum[left] ? left : look_up(ramp, remaining);
-      left += ramp->sum[left] < remaining;
-      run->since = ramp->sum[left] - remaining;
+      left = look_up(ramp, remaining - 1) + 1;
     }
+    run->since = ramp->sum[left] - remaining;
   } else {
     while (left > 0 && run->since >= ramp->code[left - 1]) run->since -= ramp->code[--left];
   }
@@ -210,125 +210,161 @@ static inline uint32_t next_units(uint32_t* since_ns, const tick_units* tick) {
   return tick->whole + carry;
 }
 
-static inline uint8_t coarse(uint32_t steps, uint8_t direction_bit) {
-  return (uint8_t)(steps | direction_bit);
+// Below this many ticks the divisions that a block begins with cost more than it saves.
+#define BLOCK_TICKS 4u
+
+// Where coarse displacements go.
+typedef struct coarse_out {
+  uint8_t* at;
+  size_t stride;
+  uint8_t direction_bit;
+} coarse_out;
+
+// The blocks below expand many ticks inside one part with its state in registers. How many surely
+// stay inside is known before, so that their loops have no way out; `advance` takes the ticks
+// across a border. Only coarse ones exist: a fine tick is dominated by its division.
+
+// Ticks along an indexed side, in its direction (forward) or against it. `*time` is the place on
+// the side in units, `*index` the step that runs there. Precondition: buckets not wider than the
+// shortest delay, so that one comparison finds the step.
+static inline void ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, size_t ticks,
+                              bool forward, bool whole_only, uint32_t* time, uint32_t* index,
+                              uint32_t* since_ns, coarse_out out) {
+  const uint32_t* const sum = ramp->sum;
+  const uint32_t* const bucket = ramp->bucket;
+  const uint8_t shift = ramp->bucket_shift;
+  const tick_units t = *tick;
+  uint32_t now = *time;
+  uint32_t i = *index;
+  uint32_t ns = *since_ns;
+  for (; ticks > 0; --ticks) {
+    const uint32_t units = whole_only ? t.whole : next_units(&ns, &t);
+    now = forward ? now + units : now - units;
+    uint32_t next = bucket[now >> shift];
+    next += sum[next + 1] <= now;
+    *out.at = (uint8_t)((forward ? next - i : i - next) | out.direction_bit);
+    out.at += out.stride;
+    i = next;
+  }
+  *time = now;
+  *index = i;
+  *since_ns = ns;
 }
 
-// The blocks below expand many ticks inside one part with its state in registers; they stop before
-// a tick that would leave the part, which `advance` then handles. Only coarse ones exist: they are what the
-// host's speed is measured on, and a fine tick is dominated by its division.
+// Ticks that surely end before `units` more have passed; 0 if the buckets are too wide for ramp_ticks.
+static size_t safe_ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, uint32_t units) {
+  if (UINT32_C(1) << ramp->bucket_shift > ramp->code[ramp->count - 1]) return 0;
+  return (units - 1) / (tick->whole + (tick->rest_ns != 0));
+}
 
-static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t ticks, uint8_t* out,
-                                 size_t stride, uint8_t bit) {
+static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t ticks,
+                                 coarse_out out) {
   const bushd_ramp* ramp = &run->table->accel;
-  const uint32_t end = ramp->sum[run->accel_end];
-  const uint32_t* const sum = ramp->sum;
+  if (ramp->sum == NULL) return 0;
   uint32_t i = run->accel_at;
-  uint32_t now = sum[i] + run->since;
-  uint32_t since_ns = run->since_ns;
-  size_t n = 0;
-  for (; n < ticks; ++n) {
-    uint32_t next_ns = since_ns;
-    const uint32_t next = now + next_units(&next_ns, tick);
-    if (next >= end) break;
-    const uint32_t at = look_up(ramp, next);
-    out[n * stride] = coarse(at - i, bit);
-    i = at;
-    now = next;
-    since_ns = next_ns;
+  uint32_t now = ramp->sum[i] + run->since;
+  const size_t safe = safe_ramp_ticks(ramp, tick, ramp->sum[run->accel_end] - now);
+  if (ticks > safe) ticks = safe;
+  if (tick->rest_ns == 0) {
+    ramp_ticks(ramp, tick, ticks, true, true, &now, &i, &run->since_ns, out);
+  } else {
+    ramp_ticks(ramp, tick, ticks, true, false, &now, &i, &run->since_ns, out);
   }
   run->steps_done += i - run->accel_at;
   run->accel_at = i;
-  run->since = now - sum[i];
-  run->since_ns = since_ns;
-  return n;
+  run->since = now - ramp->sum[i];
+  return ticks;
 }
 
-static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t ticks, uint8_t* out,
-                                 size_t stride, uint8_t bit) {
+static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t ticks,
+                                 coarse_out out) {
   const bushd_ramp* ramp = &run->table->decel;
-  const uint32_t* const sum = ramp->sum;
-  uint32_t left = run->decel_left;
-  uint32_t remaining = sum[left] - run->since;
-  uint32_t since_ns = run->since_ns;
-  size_t n = 0;
-  for (; n < ticks; ++n) {
-    uint32_t next_ns = since_ns;
-    const uint32_t units = next_units(&next_ns, tick);
-    if (units == 0 || units >= remaining) break;
-    const uint32_t next = remaining - units;
-    uint32_t at = look_up(ramp, next);
-    at += sum[at] < next;
-    out[n * stride] = coarse(left - at, bit);
-    left = at;
-    remaining = next;
-    since_ns = next_ns;
+  if (ramp->sum == NULL) return 0;
+  // One unit before the time that remains, the step that runs is the fewest left, less one
+  // (advance_decel).
+  uint32_t i = run->decel_left - 1;
+  uint32_t now = ramp->sum[run->decel_left] - run->since - 1;
+  const size_t safe = safe_ramp_ticks(ramp, tick, now + 1);
+  if (ticks > safe) ticks = safe;
+  if (tick->rest_ns == 0) {
+    ramp_ticks(ramp, tick, ticks, false, true, &now, &i, &run->since_ns, out);
+  } else {
+    ramp_ticks(ramp, tick, ticks, false, false, &now, &i, &run->since_ns, out);
   }
-  run->steps_done += run->decel_left - left;
-  run->decel_left = left;
-  run->since = sum[left] - remaining;
-  run->since_ns = since_ns;
-  return n;
+  run->steps_done += run->decel_left - 1 - i;
+  run->decel_left = i + 1;
+  run->since = ramp->sum[i + 1] - (now + 1);
+  return ticks;
 }
 
-static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t ticks, uint8_t* out,
-                                  size_t stride, uint8_t bit) {
-  const uint32_t cruise = run->table->cruise;
-  const uint32_t whole = tick->whole / cruise;
-  const uint32_t rest = tick->whole % cruise;
-  // A tick makes at most whole + 2 steps: a unit carried in and a delay carried over.
-  const size_t safe = (size_t)(run->cruise_left / (whole + 2));
+static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t ticks,
+                                  coarse_out out) {
+  const uint16_t cruise = run->table->cruise;
+  // In units if ticks are whole units, else in ns: one remainder to carry instead of two.
+  const bool in_ns = tick->rest_ns != 0;
+  const int64_t scale = in_ns ? tick->unit_ns : 1;
+  const int64_t delay = cruise * scale;
+  const int64_t tick_length = in_ns ? tick->whole * scale + tick->rest_ns : tick->whole;
+  const uint32_t whole = (uint32_t)(tick_length / delay);
+  const int64_t rest = tick_length - whole * delay;
+  const size_t safe = run->cruise_left / (whole + 1);
   if (ticks > safe) ticks = safe;
-  uint32_t since = run->since;
-  uint32_t since_ns = run->since_ns;
-  uint32_t steps = 0;
-  if (since >= cruise) return 0;
+  // Kept negative: what is missing to the next step.
+  int64_t missing = run->since * scale + (in_ns ? run->since_ns : 0) - delay;
+  const uint8_t byte = (uint8_t)(whole | out.direction_bit);
+  uint32_t extra = 0;
   for (size_t n = 0; n < ticks; ++n) {
-    const uint32_t sum = since_ns + tick->rest_ns;
-    const bool unit = sum >= tick->unit_ns;
-    since_ns = unit ? sum - tick->unit_ns : sum;
-    // since <= cruise - 1, rest <= cruise - 1, unit <= 1: below 2 cruise, so one subtraction is enough.
-    const uint32_t units = since + rest + unit;
-    const bool more = units >= cruise;
-    since = more ? units - cruise : units;
-    const uint32_t made = whole + more;
-    steps += made;
-    out[n * stride] = coarse(made, bit);
+    const int64_t later = missing + rest;
+    const int64_t after_step = missing + (rest - delay);
+    const bool more = later >= 0;
+    missing = more ? after_step : later;
+    extra += more;
+    *out.at = (uint8_t)(byte + more);
+    out.at += out.stride;
   }
-  run->since = since;
-  run->since_ns = since_ns;
+  const int64_t since = missing + delay;
+  run->since = (uint32_t)(in_ns ? since / scale : since);
+  if (in_ns) run->since_ns = (uint32_t)(since % scale);
+  const uint32_t steps = (uint32_t)ticks * whole + extra;
   run->cruise_left -= steps;
   run->steps_done += steps;
   return ticks;
 }
 
-static size_t coarse_block(bushd_run* run, const tick_units* tick, size_t ticks, uint8_t* out,
-                           size_t stride, uint8_t bit) {
+static size_t coarse_block(bushd_run* run, const tick_units* tick, size_t ticks, coarse_out out) {
   if (run->lead_steps != 0) return 0;
-  if (run->accel_at < run->accel_end) {
-    if (run->table->accel.sum == NULL) return 0;
-    return coarse_accel_block(run, tick, ticks, out, stride, bit);
-  }
-  if (run->cruise_left != 0) return coarse_cruise_block(run, tick, ticks, out, stride, bit);
-  if (run->decel_left == 0 || run->table->decel.sum == NULL) return 0;
-  return coarse_decel_block(run, tick, ticks, out, stride, bit);
+  if (run->accel_at < run->accel_end) return coarse_accel_block(run, tick, ticks, out);
+  if (run->cruise_left != 0) return coarse_cruise_block(run, tick, ticks, out);
+  return coarse_decel_block(run, tick, ticks, out);
 }
 
 size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, uint8_t* out,
                                size_t stride) {
   const tick_units tick = in_units(run, tick_ns);
-  const uint8_t bit = run->direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
+  const uint8_t direction_bit = run->direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
   size_t n = 0;
   while (n < ticks && !bushd_run_done(run)) {
-    n += coarse_block(run, &tick, ticks - n, out + n * stride, stride, bit);
-    if (n == ticks) break;
+    if (ticks - n >= BLOCK_TICKS) {
+      const coarse_out rest = {out + n * stride, stride, direction_bit};
+      n += coarse_block(run, &tick, ticks - n, rest);
+      if (n == ticks) break;
+    }
     const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
     run->steps_done += steps;
-    out[n++ * stride] = coarse(steps, bit);
+    out[n++ * stride] = (uint8_t)(steps | direction_bit);
   }
   const size_t active = n;
   for (; n < ticks; ++n) out[n * stride] = 0;
   return active;
+}
+
+// 256 since_ns / unit_ns, rounded down. Dividing what is rounded down rounds as dividing the exact
+// sum does, so the fraction of a step needs 32 bits only; on an 8-bit MCU 64-bit divisions would
+// not fit into a tick.
+static uint32_t sub_units(uint32_t since_ns, uint32_t unit_ns) {
+  if (since_ns == 0) return 0;
+  if (since_ns < UINT32_C(1) << 24) return since_ns * 256u / unit_ns;
+  return (uint32_t)((uint64_t)since_ns * 256u / unit_ns);
 }
 
 size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int16_t* out,
@@ -338,12 +374,9 @@ size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int
   while (n < ticks && !bushd_run_done(run)) {
     const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
     run->steps_done += steps;
-    uint32_t fraction = 0;
     const uint16_t delay = bushd_run_delay(run);
-    if (delay != 0) {
-      const uint64_t elapsed_ns = (uint64_t)run->since * tick.unit_ns + run->since_ns;
-      fraction = (uint32_t)(elapsed_ns * 256u / ((uint64_t)delay * tick.unit_ns));
-    }
+    const uint32_t fraction =
+        delay == 0 ? 0 : (run->since * 256u + sub_units(run->since_ns, tick.unit_ns)) / delay;
     const int32_t displacement = (int32_t)(steps * 256u + fraction) - (int32_t)run->fraction;
     run->fraction = (uint8_t)fraction;
     out[n++ * stride] = (int16_t)(displacement * run->direction);

@@ -1,9 +1,9 @@
 // A running move: the table's step times turned into displacements per tick.
 //
-// Step j of a run falls at the sum of its first j delays (engine/table.h). A motor's position at the
-// end of a tick counts every step whose time is <= that end; the fine format adds the elapsed share
-// of the running delay, rounded down to 1/256 step. A displacement is the difference of two such
-// positions. All in integers; nothing is lost over any number of ticks, calls or block sizes.
+// Step j of a run falls at the sum of its first j delays (engine/table.h). A motor's position at
+// the end of a tick counts every step whose time is <= that end; the fine format adds the elapsed
+// share of the running delay, rounded down to 1/256 step. A displacement is the difference of two
+// such positions. All in integers; nothing is lost over any number of ticks, calls or block sizes.
 #ifndef BUSHD_ENGINE_RUN_H
 #define BUSHD_ENGINE_RUN_H
 
@@ -35,7 +35,7 @@ typedef struct bushd_run {
   uint32_t since;        // whole time units since the last step
   uint32_t since_ns;     // and the rest, < time_unit_ns
   uint16_t lead_delay;
-  uint8_t fraction;      // of the position at the end of the last fine tick, 1/256 step
+  uint8_t fraction;  // of the position at the end of the last fine tick, 1/256 step
   int8_t direction;
 } bushd_run;
 
@@ -44,9 +44,9 @@ typedef struct bushd_run {
 // Precondition: the table passed bushd_table_check.
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction);
 
-// A ramp-down taken up in the middle of a step whose delay is `delay`, of which fraction/256 (rounded up to
-// whole ns) is over: that step, then D(k-1) .. D(0). It is what an MCU runs when its queue ends early.
-// O(log count).
+// A ramp-down taken up in the middle of a step whose delay is `delay`, of which fraction/256
+// (rounded up to whole ns) is over: that step, then D(k-1) .. D(0). It is what an MCU runs when its
+// queue ends early. O(log count).
 void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
                                uint8_t fraction, int direction);
 
@@ -54,11 +54,11 @@ void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_
 // the fewest steps k with D(k) <= its delay. Does nothing to a run that is done. O(log count).
 void bushd_run_ramp_down(bushd_run* run);
 
-// The next `ticks` displacements of `tick_ns` each into out[0], out[stride], ... ; after the end of the
-// run they are 0. Returns the number of ticks in which the run was still active (<= ticks), so
+// The next `ticks` displacements of `tick_ns` each into out[0], out[stride], ... ; after the end of
+// the run they are 0. Returns the number of ticks in which the run was still active (<= ticks), so
 // a return value below `ticks` says that it has ended. O(1) amortised per tick.
-// Precondition: bushd_table_max_steps_per_tick(table, tick_ns) <= BUSHD_MAX_STEPS_PER_TICK, and a run
-// uses one tick length and one format throughout.
+// Precondition: tick_ns >= 1, bushd_table_max_steps_per_tick(table, tick_ns) <=
+// BUSHD_MAX_STEPS_PER_TICK, and a run uses one tick length and one format throughout.
 size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, uint8_t* out,
                                size_t stride);
 size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int16_t* out,
@@ -69,8 +69,8 @@ uint16_t bushd_run_delay(const bushd_run* run);
 bool bushd_run_done(const bushd_run* run);
 // Steps still to be made. O(1).
 uint32_t bushd_run_steps_left(const bushd_run* run);
-// Time from now to the last step, in time units and rounded up. O(steps left on the ramps) without an
-// index, else O(1).
+// Time from now to the last step, in time units and rounded up. O(steps left on the ramps) without
+// an index, else O(1).
 uint64_t bushd_run_units_left(const bushd_run* run);
 
 #ifdef __cplusplus
