@@ -237,10 +237,12 @@ static void handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time
     const bushd_acknowledgement acknowledgement = {(uint8_t)status};
     size = bushd_encode_acknowledgement(&acknowledgement, payload);
   }
+  // A delimiter comes first: it ends whatever the master took, while the line was idle, for a frame's beginning.
+  mcu->reply[0] = 0;
   const size_t wire =
       bushd_frame_encode(mcu->config.address, (uint8_t)(frame->type | BUSHD_TYPE_REPLY), frame->tag,
-                         payload, size, mcu->reply);
-  mcu->port.transmit(mcu->port.context, mcu->reply, wire);
+                         payload, size, mcu->reply + 1);
+  mcu->port.transmit(mcu->port.context, mcu->reply, wire + 1);
 }
 
 void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, uint32_t time_in_tick_ns) {

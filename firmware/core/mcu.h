@@ -89,7 +89,7 @@ typedef struct bushd_mcu {
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];
   bushd_receiver receiver;
-  uint8_t reply[BUSHD_FRAME_MAX_WIRE];
+  uint8_t reply[BUSHD_FRAME_MAX_WIRE + 1u];
 } bushd_mcu;
 
 // Starts in state BUSY with EN low; raises EN when configured, enabled and in step with the bus.

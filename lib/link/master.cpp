@@ -144,18 +144,20 @@ bool Master::send_next(std::int64_t now_us) {
 
 void Master::send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,
                   std::span<const std::uint8_t> payload) {
+  // After silence a delimiter comes first: it ends whatever noise the receivers took for the beginning of a frame.
+  if (line_free_us_ < now_us) out_.push_back(0);
   const std::size_t before = out_.size();
   out_.resize(before + BUSHD_FRAME_MAX_WIRE);
   const std::size_t size = bushd_frame_encode(address, type, ++tag_, payload.data(), payload.size(),
                                               out_.data() + before);
   out_.resize(before + size);
-  line_free_us_ = std::max(line_free_us_, now_us) + line_us(setup_.baud, size);
+  line_free_us_ = std::max(line_free_us_, now_us) + line_us(setup_.baud, size + 1);
 }
 
 void Master::ask(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
                  std::span<const std::uint8_t> payload, std::size_t reply_payload) {
   send(now_us, mcus_[mcu].setup.address, type, payload);
-  const std::size_t reply_size = reply_payload + BUSHD_FRAME_OVERHEAD;
+  const std::size_t reply_size = reply_payload + BUSHD_FRAME_OVERHEAD + 1;
   const std::int64_t timeout = line_free_us_ + line_us(setup_.baud, reply_size) + kReplyTimeoutUs;
   outstanding_ = Outstanding{mcu, type, tag_, timeout};
 }

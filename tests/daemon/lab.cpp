@@ -50,6 +50,11 @@ void Lab::restart_daemon() {
   start_daemon();
 }
 
+void Lab::pause_daemon(double seconds) {
+  now_ns_ += static_cast<std::int64_t>(seconds * 1e9);
+  for (SimulatedBus& bus : buses_) bus.bus->advance_to(now_ns_);
+}
+
 void Lab::unplug(std::size_t bus) {
   buses_[bus].plugged = false;
   core_->port_lost(now_us(), bus, "unplugged");

@@ -38,6 +38,7 @@ class Lab : public daemon::Outputs {
   bool all_ready() const;
   void connect();  // asserts that all MCUs become READY
 
+  bool has_state(const std::string& mcu) const { return states_.contains(mcu); }
   const state_t& state_of(const std::string& mcu) const { return states_.at(mcu); }
   motor_state_t motor(const std::string& name) const;
   // Steps that the motor has really made, seen from the outside.
@@ -46,6 +47,8 @@ class Lab : public daemon::Outputs {
   // The port of a bus goes away / comes back.
   void unplug(std::size_t bus);
   void plug(std::size_t bus);
+  // The daemon does nothing for a while, as after SIGSTOP or on a very busy machine; what arrives waits.
+  void pause_daemon(double seconds);
   // The daemon is gone, and a new one starts on the same buses.
   void restart_daemon();
   // Bytes on the way to MCUs are handed to this before they are sent; returning false drops them.

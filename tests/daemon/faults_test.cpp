@@ -1,0 +1,186 @@
+// The same lab with trouble on the line: what is lost is repaired, what cannot be repaired is told, and no step goes
+// unaccounted for.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+class Faults : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Formats, Faults, testing::Values("fine", "coarse"),
+                         [](const auto& format) { return std::string(format.param); });
+
+TEST_P(Faults, SomeLostWritesAreRepairedInTime) {
+  Lab lab(hall(2, 4, GetParam()));
+  lab.connect();
+  std::mt19937 random(1985);
+  // One write in eight is lost: queues are 300 ms deep and polls come every 50 ms.
+  lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return random() % 8 != 0; };
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02", "m05"}, {5000, -3000, 4000});
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_EQ(lab.shaft_steps("m01"), 5000);
+  EXPECT_EQ(lab.shaft_steps("m02"), -3000);
+  EXPECT_EQ(lab.shaft_steps("m05"), 4000);
+  EXPECT_GT(lab.bus(0).mcu(0).core().rejected_frames, 0) << "gaps were seen: the test did its work";
+}
+
+TEST_P(Faults, FlippedBitsAreDroppedCountedAndRepaired) {
+  Lab lab(hall(1, 2, GetParam()));
+  lab.connect();
+  std::mt19937 random(20261121);
+  lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
+    if (random() % 10 == 0) bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
+    return true;
+  };
+  const reply_t result = lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {4000, -4000}));
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_EQ(lab.shaft_steps("m01"), 4000);
+  EXPECT_EQ(lab.shaft_steps("m02"), -4000);
+  EXPECT_GT(lab.bus(0).mcu(0).core().bad_frames, 0);
+}
+
+// Whatever is lost of a stop, a motor ends where its result says.
+TEST_P(Faults, LostReplacementIsPlannedAgain) {
+  for (int lost = 1; lost <= 4; ++lost) {
+    Lab lab(hall(1, 2, GetParam()));
+    lab.connect();
+    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {9000, 3000});
+    lab.run_for(1.3);
+    int count = 0;
+    lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return ++count > lost; };
+    EXPECT_EQ(lab.wait(lab.send(command_t::STOP, {"m01"})).result, "done");
+    const reply_t result = lab.wait(move);
+    EXPECT_EQ(result.motor_results.at(0), "stopped") << lost << " lost: " << result.reason;
+    EXPECT_EQ(result.motor_results.at(1), "reached");
+    EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
+    EXPECT_LT(result.position_steps.at(0), 9000);
+    EXPECT_EQ(lab.shaft_steps("m02"), 3000);
+  }
+}
+
+TEST_P(Faults, LinkLostInMotionRunsDownAndGoesOnFromThere) {
+  Lab lab(hall(2, 4, GetParam()));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m06"}, {9000, -9000});
+  lab.run_for(1.5);
+  lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "link");
+  lab.run_for(2);
+  const std::int64_t first = lab.shaft_steps("m01");
+  EXPECT_GT(first, 0);
+  EXPECT_LT(first, 9000);
+  EXPECT_NE(lab.bus(0).mcu(0).core().faults & BUSHD_FAULT_LINK, 0) << "latched";
+  lab.on_send = nullptr;
+  lab.connect();
+  EXPECT_EQ(lab.motor("m01").position_steps, first);
+  EXPECT_EQ(lab.motor("m01").trust, "known");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01", "m06"}, {0, 0})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(lab.shaft_steps("m06"), 0);
+}
+
+TEST_P(Faults, DaemonPausedLongerThanTheQueue) {
+  Lab lab(hall(1, 2, GetParam()));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+  lab.run_for(1.5);
+  lab.pause_daemon(1.7);
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "link") << result.reason;
+  EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << "read after the run-down";
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
+TEST_P(Faults, PortLostAndBack) {
+  Lab lab(hall(1, 2, GetParam()));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {-9000});
+  lab.run_for(1.1);
+  lab.unplug(0);
+  EXPECT_EQ(lab.last_reply(move).result, "link");
+  lab.run_for(2);
+  EXPECT_EQ(lab.state_of("hall:1").mcu_state, "OFFLINE");
+  EXPECT_THAT(lab.state_of("hall:1").detail, testing::HasSubstr("unplugged"));
+  EXPECT_THAT(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).reason,
+              testing::HasSubstr("offline"));
+  lab.plug(0);
+  lab.connect();
+  EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {10})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 10);
+}
+
+TEST_P(Faults, NewDaemonTakesPositionsOverInMotion) {
+  Lab lab(hall(2, 4, GetParam()));
+  lab.connect();
+  lab.send(command_t::MOVE_RELATIVE, {"m01", "m08"}, {9000, -9000});
+  lab.run_for(1.5);
+  lab.restart_daemon();
+  lab.connect();
+  for (const char* name : {"m01", "m08"}) {
+    EXPECT_EQ(lab.motor(name).position_steps, lab.shaft_steps(name));
+    EXPECT_NE(lab.shaft_steps(name), 0);
+    EXPECT_EQ(lab.motor(name).trust, "known");
+  }
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01", "m08"}, {0, 0})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(lab.shaft_steps("m08"), 0);
+}
+
+TEST_P(Faults, McuResetMakesPositionsUncertainUntilSet) {
+  Lab lab(hall(2, 2, GetParam()));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m03"}, {9000, 700});
+  lab.run_for(1.5);
+  lab.bus(0).reboot(0, 50'000'000);
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.motor_results.at(0), "link") << result.reason;
+  EXPECT_EQ(result.motor_results.at(1), "reached") << "the other MCU goes on";
+  lab.connect();
+  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m03").trust, "known");
+  EXPECT_THAT(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).reason,
+              testing::HasSubstr("uncertain"));
+  EXPECT_EQ(lab.wait(lab.send(command_t::SET_POSITION, {"m01"}, {0})).result, "done");
+  EXPECT_EQ(lab.motor("m01").trust, "known");
+  const std::int64_t before = lab.shaft_steps("m01");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {25})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), before + 25);
+}
+
+TEST_P(Faults, NoiseFromTheLineDoesNoHarm) {
+  Lab lab(hall(1, 1, GetParam()));
+  lab.connect();
+  std::mt19937 random(7);
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {3000});
+  for (int i = 0; i < 400; ++i) {
+    std::vector<std::uint8_t> noise(random() % 300);
+    for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random());
+    lab.core().receive(lab.now_us(), 0, noise);
+    lab.run_for(0.005);
+  }
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 3000);
+}
+
+TEST_P(Faults, SilentMcuCostsTheOthersNothing) {
+  Lab lab(hall(2, 2, GetParam()));
+  lab.bus(0).reboot(1, 3'600'000'000'000);
+  EXPECT_TRUE(lab.run_until([&] {
+    return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "READY";
+  }, 10));
+  EXPECT_EQ(lab.state_of("hall:2").mcu_state, "OFFLINE");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {3000})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 3000);
+}
+
+}  // namespace
+}  // namespace bushd::test
