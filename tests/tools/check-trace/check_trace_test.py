@@ -1,0 +1,336 @@
+"""tools/check-trace on traces that are right, and on the same traces with one thing wrong."""
+
+import json
+import pathlib
+import random
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import synthetic
+from synthetic import SLOTS, TICK_NS
+
+TOP = pathlib.Path(__file__).resolve().parents[3]
+SLOT_NS = TICK_NS // SLOTS
+TABLE = {
+    "name": "test",
+    "time_unit_ns": 40_000,
+    "accel": [250, 172, 114, 92, 79, 70, 64, 59, 55, 52, 49, 47, 45, 43, 42, 40, 39, 30, 20, 20, 20, 15],
+}
+
+
+class CheckTraceTest(unittest.TestCase):
+    def setUp(self):
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        self.directory = pathlib.Path(directory.name)
+        self.table_file = str(self.directory / "test.toml")
+        self.write_table(TABLE)
+
+    def write_table(self, table):
+        with open(self.table_file, "w", encoding="utf-8") as file:
+            for key, value in table.items():
+                print(f"{key} = {json.dumps(value)}", file=file)
+
+    def scene(self, fine=True):
+        """Two MCUs, four motors, both directions, a second move, one stopped in flight."""
+        scene = synthetic.Scene(TABLE, self.table_file, fine)
+        scene.move("theta", 1, 0, 100, 300)
+        scene.move("phi", 1, 15, 100, -35)
+        scene.move("chi", 2, 0, 130, 1, move_id=2)
+        scene.move("omega", 2, 3, 131, 500, stop_tick=181, move_id=3)
+        scene.move("theta", 1, 0, 320, -200, move_id=4)
+        return scene
+
+    def check(self, scene, *more):
+        moves, trace = self.directory / "moves.jsonl", self.directory / "trace.vcd"
+        scene.write_moves(moves)
+        scene.write_trace(trace)
+        return self.run_tool("--moves", moves, "--trace", trace, *more)
+
+    def run_tool(self, *arguments):
+        command = [sys.executable, "-B", TOP / "tools" / "check-trace", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    def assert_right(self, scene, *more):
+        result = self.check(scene, *more)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        return result
+
+    def assert_problem(self, scene, *parts):
+        """One line of output names all of `parts`."""
+        result = self.check(scene)
+        self.assertEqual(result.returncode, 1, result.stdout + result.stderr)
+        lines = [line for line in result.stdout.splitlines() if line.startswith("problem: ")]
+        self.assertTrue(any(all(part in line for part in parts) for line in lines), result.stdout)
+        self.assertNotIn("Traceback", result.stderr)
+        return lines
+
+
+class RightTraces(CheckTraceTest):
+    def test_every_edge_of_both_formats_is_explained(self):
+        for fine in (True, False):
+            with self.subTest(fine=fine):
+                scene = self.scene(fine)
+                made = sum(map(len, scene.edges.values()))
+                result = self.assert_right(scene)
+                last = result.stdout.splitlines()[-1]
+                steps = f"{made} steps commanded, {made} steps made"
+                self.assertRegex(last, rf"^4 motors, 2 MCUs, {steps}, max edge error [0-9.]+ us$")
+                self.assertIn("slot 0.0 us", result.stdout)
+
+    def test_any_table_and_any_stop_keeps_the_derived_bound(self):
+        seed = random.randrange(2**32)
+        chance = random.Random(seed)
+        for round_number in range(12):
+            accel = sorted((chance.randint(1, 300) for _ in range(chance.randint(1, 40))), reverse=True)
+            decel = sorted(chance.randint(1, 300) for _ in range(chance.randint(1, 40)))
+            table = {"time_unit_ns": chance.randint(21_000, 60_000), "accel": accel, "decel": decel}
+            table["cruise"] = chance.randint(1, accel[-1])
+            self.write_table(table)
+            scene = synthetic.Scene(table, self.table_file, fine=chance.random() < 0.5)
+            tick = 10
+            for number in range(3):
+                stop = tick + chance.randint(-2, 60) if chance.random() < 0.5 else None
+                steps = chance.choice((-1, 1)) * chance.randint(1, 200)
+                scene.move("m", 1, 5, tick, steps, stop_tick=stop, move_id=number)
+                tick += 200 * 300 * 60_000 // TICK_NS
+            if scene.edges[1, 5]:
+                with self.subTest(seed=seed, round=round_number):
+                    self.assert_right(scene)
+
+    def test_a_stop_before_the_start_makes_no_step(self):
+        scene = self.scene()
+        self.assertEqual(scene.move("chi", 2, 0, 400, 50, stop_tick=400, move_id=7), 0)
+        self.assert_right(scene)
+
+    def test_a_stop_after_the_end_changes_nothing(self):
+        scene = self.scene()
+        self.assertEqual(scene.move("chi", 2, 0, 400, 20, stop_tick=900, move_id=7), 20)
+        self.assert_right(scene)
+
+    def test_of_two_stops_the_later_line_stands(self):
+        scene = self.scene()
+        scene.events.insert(-1, {"event": "stop", "id": 4, "motor": "theta", "tick": 322})
+        scene.events.insert(-1, {"event": "stop", "id": 4, "motor": "theta", "tick": 900})
+        self.assert_right(scene)
+
+    def test_clocks_of_crystals_are_followed(self):
+        scene = self.scene()
+        scene.rates = {1: 40, 2: 40}
+        report = json.loads(self.assert_right(scene, "--json").stdout)
+        self.assertLess(report["max_off_slot_us"], 0.01)
+
+    def test_positions_of_the_daemon_are_compared(self):
+        scene = self.scene()
+        status = self.directory / "status.json"
+        motors = [{"name": name, "position_steps": steps} for name, steps in scene.steps.items()]
+        status.write_text(json.dumps({"motors": motors}), encoding="utf-8")
+        self.assert_right(scene, "--positions", status)
+        motors[1]["position_steps"] += 1
+        status.write_text(json.dumps({"motors": motors}), encoding="utf-8")
+        result = self.check(scene, "--positions", status)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stdout, r"problem: phi .* at -34 steps, its edges lead to -35")
+
+    def test_json_says_what_the_text_says(self):
+        report = json.loads(self.assert_right(self.scene(), "--json").stdout)
+        self.assertTrue(report["good"])
+        self.assertEqual(report["problems"], [])
+        self.assertEqual([row["motor"] for row in report["per_motor"]], ["theta", "phi", "chi", "omega"])
+
+
+class WrongTraces(CheckTraceTest):
+    def test_a_missing_edge(self):
+        for index in (0, 150, 299, -1):  # first and last of a move, and within one
+            with self.subTest(index=index):
+                scene = self.scene()
+                del scene.edges[1, 0][index]
+                number = index + 1 if index >= 0 else 200
+                lines = self.assert_problem(scene, "theta", f"step {number} of", "is missing")
+                self.assertEqual(len(lines), 1, lines)
+
+    def test_a_missing_edge_of_the_only_motor(self):
+        for index in (0, 60, 119):
+            with self.subTest(index=index):
+                scene = synthetic.Scene(TABLE, self.table_file)
+                scene.move("lonely", 1, 0, 100, 120)
+                del scene.edges[1, 0][index]
+                self.assert_problem(scene, "lonely", f"step {index + 1} of 120", "is missing")
+
+    def test_a_surplus_edge_within_a_move(self):
+        scene = self.scene()
+        scene.edges[2, 3].insert(41, [scene.edges[2, 3][40][0] + 3 * SLOT_NS, 1])
+        self.assertEqual(len(self.assert_problem(scene, "omega", "no move explains")), 1)
+
+    def test_a_surplus_edge_outside_of_all_moves(self):
+        scene = self.scene()
+        scene.edges[2, 0].append([700 * TICK_NS, 1])
+        self.assert_problem(scene, "chi", "no move explains")
+
+    def test_an_edge_of_an_output_without_a_motor(self):
+        scene = self.scene()
+        scene.edges[2, 9] = [[200 * TICK_NS, 1]]
+        self.assert_problem(scene, "output 9 of mcu2", "no move explains")
+
+    def test_an_edge_two_ticks_late(self):
+        scene = self.scene()
+        scene.edges[1, 15][-1][0] += 2 * TICK_NS
+        self.assert_problem(scene, "phi", "step 35 of 35", "(+2.00 ticks) from its slot")
+
+    def test_an_edge_two_ticks_late_among_others(self):
+        scene = self.scene()
+        edges = scene.edges[1, 0]
+        edges[100][0] += 2 * TICK_NS + 2 * SLOT_NS
+        edges.sort()
+        self.assert_problem(scene, "theta", "step 101 of 300", "is missing")
+        self.assert_problem(scene, "theta", "no move explains")
+
+    def test_an_edge_two_slots_late(self):
+        scene = self.scene()
+        scene.edges[2, 3][20][0] += 2 * SLOT_NS
+        self.assert_problem(scene, "omega", "step 21 of", "+20.0 us")
+
+    def test_an_edge_one_slot_off_but_in_the_tick_before_or_after(self):
+        # Delays that are no divisor of the tick, so that some step falls into any slot.
+        table = {"time_unit_ns": 1000, "accel": [1000, 601]}
+        self.write_table(table)
+        for border, shift_slots in ((0, -1), (SLOTS - 1, 1)):
+            with self.subTest(border=border):
+                scene = synthetic.Scene(table, self.table_file)
+                scene.move("theta", 1, 0, 100, 1500)
+                edges = scene.edges[1, 0]
+                at = next(i for i, (ns, _) in enumerate(edges) if ns % TICK_NS // SLOT_NS == border)
+                edges[at][0] += shift_slots * SLOT_NS
+                self.assert_problem(scene, "theta", f"step {at + 1} of 1500", "in tick")
+
+    def test_the_wrong_direction(self):
+        scene = self.scene()
+        for edge in scene.edges[1, 15]:
+            edge[1] = 1
+        self.assert_problem(scene, "phi", "step 1 of 35", "DIR 1")
+
+    def test_a_direction_that_changes_together_with_the_pulse(self):
+        scene = self.scene()
+        changes = scene.changes()
+        first = next(time for time, _, address, wire, _ in changes if (address, wire) == (2, "step0"))
+        scene.raw = sorted((first, *c[1:]) if c[2:4] == (2, "dir0") else c for c in changes)
+        self.assert_problem(scene, "chi", "DIR changed only 0 ns before")
+
+    def test_en_low_at_an_edge(self):
+        scene = self.scene()
+        at = scene.edges[2, 3][30][0]
+        scene.en_low_ns[2] = [(at - 1000, at + 1000)]
+        self.assertEqual(len(self.assert_problem(scene, "omega", "EN is low", "step 31")), 1)
+
+    def test_time_that_goes_back(self):
+        scene = self.scene()
+        changes = scene.changes()
+        at = next(i for i, c in enumerate(changes) if c[2:] == (2, "step3", 1))
+        changes[at], changes[at + 60] = changes[at + 60], changes[at]
+        scene.raw = changes
+        self.assert_problem(scene, "omega", "after a later change")
+
+    def test_two_motors_swapped(self):
+        scene = self.scene()
+        scene.edges[1, 0], scene.edges[1, 15] = scene.edges[1, 15], scene.edges[1, 0]
+        self.assert_problem(scene, "theta")
+        self.assert_problem(scene, "phi")
+
+    def test_mcus_30_us_apart(self):
+        scene = self.scene()
+        scene.offsets_ns[2] += 30_000
+        lines = self.assert_problem(scene, "hall:2", "chi, omega", "+30.0 us")
+        self.assertEqual(len(lines), 1, lines)
+
+    def test_mcus_19_us_apart_are_allowed(self):
+        scene = self.scene()
+        scene.offsets_ns[2] += 19_000
+        self.assert_right(scene)
+
+    def test_a_clock_worse_than_a_crystal(self):
+        scene = self.scene()
+        scene.rates = {1: 3000}
+        self.assertEqual(self.check(scene).returncode, 1)
+
+    def test_no_edges_at_all(self):
+        scene = self.scene()
+        for edges in scene.edges.values():
+            edges.clear()
+        for motor in ("theta", "phi", "chi", "omega"):
+            self.assert_problem(scene, motor, "is missing")
+
+
+class WrongLogs(CheckTraceTest):
+    def test_a_result_that_the_table_denies(self):
+        scene = self.scene()
+        scene.events[-1]["position_steps"] += 1
+        self.assert_problem(scene, "theta", "ended at 101 steps, by the table it ends at 100")
+
+    def test_a_move_without_a_result(self):
+        scene = self.scene()
+        scene.events.pop()
+        self.assert_problem(scene, "theta", "move 4 has no result")
+
+    def test_a_move_with_two_results(self):
+        scene = self.scene()
+        scene.events.append(scene.events[-1])
+        self.assert_problem(scene, "theta", "more than one result")
+
+    def test_a_move_that_a_fault_ended(self):
+        scene = self.scene()
+        scene.events[-1]["result"] = "link"
+        self.assert_problem(scene, "theta", "ended as 'link'")
+
+    def test_a_stopped_move_that_is_called_reached(self):
+        scene = self.scene()
+        result = next(e for e in scene.events if e["event"] == "result" and e["motor"] == "omega")
+        result["result"] = "reached"
+        self.assert_problem(scene, "omega", "yet its result is 'reached'")
+
+    def test_a_position_lost_between_two_moves(self):
+        scene = self.scene()
+        move = next(e for e in scene.events if e["event"] == "move" and e["id"] == 4)
+        move["from_steps"] += 2
+        self.assert_problem(scene, "theta", "starts from 302 steps")
+
+    def test_a_move_that_starts_before_the_one_before_has_ended(self):
+        scene = self.scene()
+        move = next(e for e in scene.events if e["event"] == "move" and e["id"] == 4)
+        move["start_tick"] = 150
+        self.assert_problem(scene, "theta", "starts in tick 150")
+
+    def test_input_that_cannot_be_read_is_named(self):
+        scene = self.scene()
+        moves, trace = self.directory / "moves.jsonl", self.directory / "trace.vcd"
+        scene.write_moves(moves)
+        scene.write_trace(trace)
+        cases = []
+        bad_logs = {"cut.jsonl": '{"event":"mo', "odd.jsonl": '{"event":"dance"}\n', "empty.jsonl": ""}
+        for name, text in bad_logs.items():
+            (self.directory / name).write_text(text, encoding="utf-8")
+            cases.append((self.directory / name, trace, name))
+        other = trace.read_text(encoding="ascii").replace("1 ns", "10 ps", 1)
+        for name, text in {"no.vcd": "hello\n", "none.vcd": "", "unit.vcd": other}.items():
+            (self.directory / name).write_text(text, encoding="ascii")
+            cases.append((moves, self.directory / name, name))
+        cases.append((self.directory / "missing.jsonl", trace, "missing.jsonl"))
+        for moves_file, trace_file, name in cases:
+            with self.subTest(name=name):
+                result = self.run_tool("--moves", moves_file, "--trace", trace_file)
+                self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
+                self.assertTrue(re.match(rf"check-trace: .*{re.escape(name)}", result.stderr), result.stderr)
+                self.assertNotIn("Traceback", result.stderr)
+
+    def test_a_table_that_is_missing_is_named(self):
+        scene = self.scene()
+        pathlib.Path(self.table_file).unlink()
+        result = self.check(scene)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("test.toml", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

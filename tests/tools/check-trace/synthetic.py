@@ -1,0 +1,155 @@
+"""Logs of moves and the traces that follow from them, made slowly and without the code under test.
+
+Positions are Fractions looked up step by step; nothing is shared with tools/check_trace.
+"""
+
+import json
+from fractions import Fraction
+
+TICK_NS = 2_560_000
+SLOTS = 256
+PULSE_NS = 5_000
+
+
+def delays_of(table, steps):
+    accel, cruise = table["accel"], table.get("cruise", table["accel"][-1])
+    decel = table.get("decel", accel[::-1])
+    delays = []
+    for j in range(1, steps + 1):
+        up = accel[j - 1] if j <= len(accel) else cruise
+        left = steps - j
+        down = decel[len(decel) - 1 - left] if left < len(decel) else cruise
+        delays.append(max(up, down, cruise))
+    return delays
+
+
+def stopped(table, delays, after_ns):
+    """The delays of a move that is stopped `after_ns` after its time 0."""
+    if after_ns <= 0:
+        return []
+    decel = table.get("decel", table["accel"][::-1])
+    now = 0
+    for done, delay in enumerate(delays):
+        now += delay * table["time_unit_ns"]
+        if now > after_ns:
+            ways = (k for k in range(len(decel)) if decel[len(decel) - 1 - k] <= delay)
+            k = next(ways, len(decel))
+            return delays[: done + 1] + decel[len(decel) - k :]
+    return delays
+
+
+def edges_of(table, delays, fine):
+    """(ns since time 0, step number) of every edge of a move."""
+    times = [0]
+    for delay in delays:
+        times.append(times[-1] + delay * table["time_unit_ns"])
+    ticks = -(-times[-1] // TICK_NS)
+
+    def position(at_ns):
+        whole = 0
+        while whole < len(delays) and times[whole + 1] <= at_ns:
+            whole += 1
+        if whole == len(delays) or not fine:
+            return Fraction(whole)
+        part = Fraction(at_ns - times[whole], times[whole + 1] - times[whole])
+        return whole + Fraction(int(part * 256), 256)
+
+    edges = []
+    for tick in range(ticks):
+        begin, end = position(tick * TICK_NS), position((tick + 1) * TICK_NS)
+        for number in range(1, len(delays) + 1):
+            if not begin < number <= end:
+                continue
+            crossing = Fraction(number) if fine else number - Fraction(1, 2)
+            slot = min(int((crossing - begin) / (end - begin) * SLOTS), SLOTS - 1)
+            edges.append(tick * TICK_NS + slot * TICK_NS // SLOTS)
+    return edges
+
+
+class Scene:
+    """Motors that move; may be spoilt in many ways before it is written."""
+
+    def __init__(self, table, table_file, fine=True):
+        self.table = table
+        self.table_file = table_file
+        self.fine = fine
+        self.events = []
+        self.edges = {}  # (address, output): [[time_ns, direction]]
+        self.steps = {}  # by motor
+        self.rates = {}  # ppm by address
+        self.offsets_ns = {1: 700_000_123, 2: 700_000_123}  # by address
+        self.en_low_ns = {}  # address: [(from, to)]
+        self.raw = None  # the trace's changes in their order, if it is not to be made from the above
+
+    def move(self, motor, address, output, start_tick, steps, stop_tick=None, move_id=1):
+        direction = 1 if steps >= 0 else -1
+        start = self.steps.get(motor, 0)
+        delays = delays_of(self.table, abs(steps))
+        event = {"id": move_id, "motor": motor}
+        self.events.append({
+            "event": "move", **event, "bus": "hall", "address": address, "output": output,
+            "table_file": self.table_file, "tick_ns": TICK_NS, "format": "fine" if self.fine else "coarse",
+            "start_tick": start_tick, "steps": steps, "from_steps": start,
+        })
+        result = "reached"
+        if stop_tick is not None:
+            delays = stopped(self.table, delays, (stop_tick - start_tick) * TICK_NS)
+            self.events.append({"event": "stop", **event, "tick": stop_tick})
+            if len(delays) != abs(steps):
+                result = "stopped"
+        end = start + direction * len(delays)
+        self.steps[motor] = end
+        self.events.append({"event": "result", **event, "result": result, "position_steps": end})
+        own = self.edges.setdefault((address, output), [])
+        own += [[start_tick * TICK_NS + at, direction] for at in edges_of(self.table, delays, self.fine)]
+        return len(delays)
+
+    def write_moves(self, path):
+        with open(path, "w", encoding="utf-8") as file:
+            for event in self.events:
+                print(json.dumps(event), file=file)
+
+    def trace_time(self, address, bus_ns):
+        drift = bus_ns * self.rates.get(address, 0) // 1_000_000
+        return self.offsets_ns[address] + bus_ns + drift
+
+    def changes(self):
+        """(time, rank, address, wire, level): DIR stands before STEP if they change at once."""
+        changes = []
+        for address in {address for address, _ in self.edges}:
+            changes.append((1000, 0, address, "en", 1))
+            for low, high in self.en_low_ns.get(address, []):
+                changes.append((self.trace_time(address, low), 0, address, "en", 0))
+                changes.append((self.trace_time(address, high), 0, address, "en", 1))
+        for (address, output), edges in self.edges.items():
+            level = 0
+            for bus_ns, direction in edges:
+                at = self.trace_time(address, bus_ns)
+                if level != (direction > 0):
+                    level = int(direction > 0)
+                    # As an MCU does: at the beginning of the tick.
+                    begin = self.trace_time(address, bus_ns // TICK_NS * TICK_NS)
+                    changes.append((begin, 1, address, f"dir{output}", level))
+                changes.append((at, 2, address, f"step{output}", 1))
+                changes.append((at + PULSE_NS, 2, address, f"step{output}", 0))
+        return sorted(changes)
+
+    def write_trace(self, path):
+        addresses = sorted({address for address, _ in self.edges})
+        with open(path, "w", encoding="ascii") as file:
+            print("$timescale 1 ns $end", file=file)
+            for address in addresses:
+                print(f"$scope module mcu{address} $end", file=file)
+                for output in range(16):
+                    print(f"$var wire 1 s{address}_{output} step{output} $end", file=file)
+                    print(f"$var wire 1 d{address}_{output} dir{output} $end", file=file)
+                print(f"$var wire 1 e{address} en $end", file=file)
+                print("$upscope $end", file=file)
+            print("$enddefinitions $end\n#0\n$dumpvars", file=file)
+            for address in addresses:
+                print(f"0e{address}", file=file)
+            print("$end", file=file)
+            for time, _, address, wire, level in self.raw or self.changes():
+                output = wire.lstrip("stepdirn")
+                code = f"e{address}" if wire == "en" else f"{wire[0]}{address}_{output}"
+                print(f"#{time}\n{level}{code}", file=file)

@@ -1,0 +1,147 @@
+"""Edges against steps, and what else pins and positions must fulfil."""
+
+import json
+import math
+
+from check_trace.problems import InputError
+
+MAX_SKEW_NS = 20_000  # between the MCUs of a bus
+
+
+def name_of(step):
+    return f"step {step.number} of {len(step.move.delays)} of move {step.move.id}"
+
+
+class MotorCheck:
+    """All edges of one motor against all steps that it was to make."""
+
+    def __init__(self, motor, clock, slot_ns, problems):
+        self._motor = motor
+        self._clock = clock
+        self._slot_ns = slot_ns
+        self._problems = problems
+
+    def run(self):
+        steps, edges = self._motor.steps, self._motor.edges
+        missing, surplus = [], []
+        i = j = 0
+        while i < len(steps) or j < len(edges):
+            if i == len(steps):
+                away_ns = -math.inf
+            elif j == len(edges):
+                away_ns = math.inf
+            else:
+                away_ns = self._away_ns(steps[i], edges[j])
+            # A nanosecond for the trace's own rounding.
+            if away_ns < -self._slot_ns - 1:
+                surplus.append(edges[j])
+                j += 1
+            elif away_ns > self._slot_ns + 1:
+                missing.append(steps[i])
+                i += 1
+            else:
+                self._explain(missing, surplus)
+                missing, surplus = [], []
+                self._check(steps[i], edges[j])
+                i += 1
+                j += 1
+        self._explain(missing, surplus)
+
+    def _away_ns(self, step, edge):
+        return self._clock.bus_ns(edge.time_ns) - step.emitted_ns
+
+    def _report(self, kind, text, edge):
+        self._problems.add(self._motor, kind, text, edge.time_ns)
+
+    def _explain(self, missing, surplus):
+        """What lies between two good edges: a missing and a surplus one are one that was displaced."""
+        for step, edge in zip(missing, surplus):
+            away_ns = self._away_ns(step, edge)
+            ticks = away_ns / step.move.tick_ns
+            text = f"{name_of(step)} is {away_ns / 1000:+.1f} us ({ticks:+.2f} ticks) from its slot"
+            self._report("time", text, edge)
+        for step in missing[len(surplus) :]:
+            due_ns = step.emitted_ns + self._clock.at(step.emitted_ns)
+            self._problems.add(self._motor, "missing", f"{name_of(step)} is missing", due_ns)
+        for edge in surplus[len(missing) :]:
+            self._report("surplus", "an edge that no move explains", edge)
+
+    def _check(self, step, edge):
+        """An edge that lies within a slot of where the step should be."""
+        motor = self._motor
+        at_ns = self._clock.bus_ns(edge.time_ns)
+        error_ns = at_ns - step.time_ns
+        motor.errors_ns[step.place].append(error_ns)
+        motor.off_slot_ns = max(motor.off_slot_ns, abs(at_ns - step.emitted_ns))
+
+        if edge.direction != (step.direction > 0):
+            self._report("direction", f"{name_of(step)} has DIR {int(edge.direction)}", edge)
+        if edge.direction_for_ns < self._slot_ns / 2:
+            text = f"DIR changed only {edge.direction_for_ns} ns before {name_of(step)}"
+            self._report("direction", text, edge)
+        if not edge.enabled:
+            self._report("enable", f"EN is low at {name_of(step)}", edge)
+        # A pulse begins with its slot, the last one a slot before the tick's end: so the clock may err by
+        # half a slot to either side.
+        clock_ns = self._slot_ns / 2
+        tick = int((at_ns + clock_ns) // step.move.tick_ns)
+        if tick != step.tick:
+            self._report("tick", f"{name_of(step)} is in tick {tick}, by the table in {step.tick}", edge)
+        if abs(error_ns) > step.bound_ns + clock_ns:
+            text = f"{name_of(step)} is {error_ns / 1000:+.1f} us from the table"
+            self._report("time", f"{text}, allowed are {step.bound_ns / 1000:.1f} us", edge)
+
+
+def check_pins(trace, motors, slot_ns, problems):
+    """What holds for every output, whether or not the log knows a motor there."""
+    motor_at = {(motor.address, motor.output): motor for motor in motors}
+
+    def owner(place):
+        return motor_at.get(place) or f"output {place[1]} of mcu{place[0]} (no motor in the log)"
+
+    for place, time_ns in trace.disorder:
+        problems.add(owner(place), "order", "stands in the trace after a later change", time_ns)
+    for place, time_ns in trace.double:
+        problems.add(owner(place), "pulse", "STEP rises while it is high", time_ns)
+    for place, pulses in trace.pulses.items():
+        for time_ns, width_ns in pulses:
+            if not 0 < width_ns <= slot_ns:
+                text = f"a STEP pulse of {width_ns} ns, longer than a slot or void"
+                problems.add(owner(place), "pulse", text, time_ns)
+    for place, edges in trace.edges.items():
+        if place not in motor_at:
+            for edge in edges:
+                problems.add(owner(place), "surplus", "an edge that no move explains", edge.time_ns)
+
+
+def check_skew(motors, clocks, problems):
+    """All MCUs of a bus must begin their ticks at the same time. Returns the largest difference."""
+    if not clocks:
+        return 0
+    times = [motor.steps[i].time_ns for motor in motors if motor.steps for i in (0, -1)]
+    reference = min(clocks)
+    largest_ns = 0
+    for address, clock in clocks.items():
+        skews_ns = [clock.at(time) - clocks[reference].at(time) for time in (min(times), max(times))]
+        skew_ns = max(skews_ns, key=abs)
+        largest_ns = max(largest_ns, abs(skew_ns))
+        if abs(skew_ns) > MAX_SKEW_NS:
+            own = [motor for motor in motors if motor.address == address]
+            names = ", ".join(motor.name for motor in own)
+            text = f"ticks begin {skew_ns / 1000:+.1f} us from those of mcu{reference}"
+            problems.add(f"{own[0].mcu} ({names})", "skew", f"{text}, allowed are {MAX_SKEW_NS // 1000} us")
+    return largest_ns
+
+
+def check_positions(path, motors, problems):
+    """What the daemon says in the end (bushctl status --json) against edges counted by their DIR."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            said = {entry["name"]: entry["position_steps"] for entry in json.load(file)["motors"]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: not the output of bushctl status --json: {error!r}") from None
+    for motor in motors:
+        counted = motor.moves[0].from_steps + motor.travelled()
+        if said.get(motor.name) != counted:
+            text = f"the daemon says it is at {said.get(motor.name)} steps, its edges lead to {counted}"
+            problems.add(motor, "position", text)

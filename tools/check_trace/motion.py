@@ -1,0 +1,147 @@
+"""The motion, computed anew from the table: every step's time, and the slot that an MCU makes it in.
+
+What a move is.  Delay before step j of N:  max(A(j-1), D(N-j), c), times the table's unit; the sum of the
+first j delays is the table's time of step j, counted from the beginning of the move's start tick. A stop at
+tick k lets the step that runs then go on and adds the fewest steps m with D(m) <= its delay: D(m-1) .. D(0).
+
+What an MCU makes of it.  A step belongs to tick i if its time lies in (begin of i, end of i]. Position is
+linear between steps; q is the position at a tick's end, rounded down to 1/256 step (fine) or to a whole step
+(coarse). Within the tick the motor moves evenly from q0 to q1 = q0 + d. Step n is made in the slot, of S in
+a tick, in which that line crosses n (fine) or n - 1/2 (coarse: so that c steps are spaced evenly).
+
+How far an edge may lie from the table.  T is the tick, v the speed in steps per time. Within the tick the
+true position has slopes from vmin to vmax, so it leaves its own chord by at most (vmax - vmin) T / 4.
+Rounding lowers the chord by up to r = 1/256 step; in the coarse format by up to a whole step, of which the
+crossing half a step earlier takes back half: r = 1/2. The line's slope is d / T, and a slot adds up to T / S:
+
+    |edge - table|  <=  T / d * ((vmax - vmin) T / 4 + r) + T / S,  and never more than T
+
+In a move's last tick vmin is 0, as the motor comes to rest somewhere in it: it is reported apart, and so is
+the first.
+"""
+
+import bisect
+import tomllib
+from collections import namedtuple
+from itertools import accumulate
+
+from check_trace.problems import InputError
+
+Step = namedtuple("Step", "move number time_ns emitted_ns tick direction place bound_ns")
+INTERIOR, FIRST_TICK, LAST_TICK = range(3)
+
+
+class Table:
+    def __init__(self, path):
+        try:
+            with open(path, "rb") as file:
+                content = tomllib.load(file)
+            self.accel = content["accel"]
+            self.decel = content.get("decel", self.accel[::-1])[::-1]  # by steps before the end
+            self.cruise = content.get("cruise", self.accel[-1])
+            self.unit_ns = content["time_unit_ns"]
+        except (OSError, tomllib.TOMLDecodeError, KeyError, IndexError) as error:
+            raise InputError(f"{path}: table cannot be read: {error!r}") from None
+
+    def delay_from_start(self, i):
+        return self.accel[i] if i < len(self.accel) else self.cruise
+
+    def delay_before_end(self, i):
+        return self.decel[i] if i < len(self.decel) else self.cruise
+
+    def delays(self, steps):
+        """Of a whole move, in time units."""
+        return [
+            max(self.delay_from_start(j - 1), self.delay_before_end(steps - j), self.cruise)
+            for j in range(1, steps + 1)
+        ]
+
+    def ramp_down(self, delay):
+        """The delays that bring a motor to rest after a step made at `delay`."""
+        fewest = next(k for k in range(len(self.decel) + 1) if self.delay_before_end(k) <= delay)
+        return [self.delay_before_end(k) for k in range(fewest - 1, -1, -1)]
+
+
+class Move:
+    def __init__(self, event, table):
+        self.id = event["id"]
+        self.tick_ns = event["tick_ns"]
+        self.fine = {"fine": True, "coarse": False}[event["format"]]
+        self.start_tick = event["start_tick"]
+        self.from_steps = event["from_steps"]
+        self.asked_steps = abs(event["steps"])
+        self.direction = 1 if event["steps"] >= 0 else -1
+        self.table = table
+        self.delays = table.delays(self.asked_steps)  # as long as no stop is known
+        self.stopped = False
+        self.result = None
+        self.result_steps = None
+
+    def times_ns(self):
+        """The table's times of the steps, from the beginning of the start tick."""
+        return list(accumulate(delay * self.table.unit_ns for delay in self.delays))
+
+    def stop(self, tick):
+        """A stop that comes later stands instead of the one before: the daemon had to plan it again."""
+        self.stopped = True
+        self.delays = self.table.delays(self.asked_steps)
+        if tick <= self.start_tick:
+            self.delays = []
+            return
+        done = bisect.bisect_right(self.times_ns(), (tick - self.start_tick) * self.tick_ns)
+        if done < len(self.delays):
+            running = self.delays[done]
+            self.delays[done + 1 :] = self.table.ramp_down(running)
+
+    def end_steps(self):
+        return self.from_steps + self.direction * len(self.delays)
+
+    def end_tick(self):
+        """The first tick in which the motor is at rest again."""
+        times = self.times_ns()
+        return self.start_tick - (-times[-1] // self.tick_ns) if times else self.start_tick
+
+    def steps(self, slots):
+        """Every step: when by the table, and when by way of ticks and slots."""
+        times = self.times_ns()
+        crossing = 256 if self.fine else 128
+        made = 0
+        q0 = 0  # position at the beginning of the tick, 1/256 step
+        tick = 0
+        while made < len(times):
+            end_ns = (tick + 1) * self.tick_ns
+            after = bisect.bisect_right(times, end_ns, made)
+            q1 = 256 * after
+            if self.fine and after < len(times):
+                since_ns = end_ns - (times[after - 1] if after else 0)
+                q1 += since_ns * 256 // (self.delays[after] * self.table.unit_ns)
+            if after > made:
+                last = after == len(times)
+                place = LAST_TICK if last else FIRST_TICK if tick == 0 else INTERIOR
+                bound_ns = self.bound_ns(self.delays[made : after + 1], last, q1 - q0, slots)
+            begin_ns = (self.start_tick + tick) * self.tick_ns
+            for n in range(made, after):
+                x = 256 * n + crossing - q0
+                # A crossing exactly at the tick's end belongs to the tick: its last slot.
+                slot = min(x * slots // (q1 - q0), slots - 1)
+                yield Step(
+                    move=self,
+                    number=n + 1,
+                    time_ns=self.start_tick * self.tick_ns + times[n],
+                    emitted_ns=begin_ns + slot * self.tick_ns // slots,
+                    tick=self.start_tick + tick,
+                    direction=self.direction,
+                    place=place,
+                    bound_ns=bound_ns,
+                )
+            made = after
+            q0 = q1
+            tick += 1
+
+    def bound_ns(self, delays, last, displacement, slots):
+        """How far an edge of a tick may lie from the table (above); `delays` are those that run in it."""
+        vmax = 1 / (min(delays) * self.table.unit_ns)
+        vmin = 0 if last else 1 / (max(delays) * self.table.unit_ns)
+        rounding = 1 / 256 if self.fine else 1 / 2
+        off_steps = (vmax - vmin) * self.tick_ns / 4 + rounding
+        return min(self.tick_ns, 256 * self.tick_ns / displacement * off_steps + self.tick_ns / slots)

@@ -1,0 +1,119 @@
+"""The daemon's log of moves (docs/design.md)."""
+
+import json
+
+from check_trace.motion import Move, Table
+from check_trace.problems import InputError
+
+
+class Motor:
+    def __init__(self, name, bus, address, output):
+        self.name = name
+        self.bus = bus
+        self.address = address
+        self.output = output
+        self.mcu = f"{bus}:{address}"
+        self.moves = []
+        self.steps = []
+        self.edges = []
+        self.errors_ns = ([], [], [])  # of the edges against the table, by place in the move
+        self.off_slot_ns = 0  # farthest from the exact slot
+
+    def place(self):
+        return self.bus, self.address, self.output
+
+    def __str__(self):
+        return f"{self.name} ({self.mcu}, output {self.output})"
+
+    def travelled(self):
+        return sum(1 if edge.direction else -1 for edge in self.edges)
+
+
+class MoveLog:
+    def __init__(self, bus, problems):
+        self.motors = {}  # by name
+        self._bus = bus
+        self._problems = problems
+        self._moves = {}  # by motor and id: a group move has one id
+        self._tables = {}
+        self._ticks = set()  # (bus, tick_ns)
+
+    def read(self, path):
+        take = {"move": self._move, "stop": self._stop, "result": self._result}
+        try:
+            with open(path, encoding="utf-8") as file:
+                for number, line in enumerate(file, 1):
+                    try:
+                        event = json.loads(line)
+                        take[event["event"]](event)
+                    except (ValueError, KeyError, TypeError) as error:
+                        raise InputError(f"{path}:{number}: not an event: {error!r}") from None
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror}") from None
+        if len(self._ticks) > 1:
+            raise InputError(f"{path}: moves on several buses or ticks; choose one with --bus NAME")
+        self._check_each()
+
+    def _move(self, event):
+        if self._bus is not None and event["bus"] != self._bus:
+            return
+        self._ticks.add((event["bus"], event["tick_ns"]))
+        path = event["table_file"]
+        if path not in self._tables:
+            self._tables[path] = Table(path)
+        name = event["motor"]
+        place = (event["bus"], event["address"], event["output"])
+        motor = self.motors.setdefault(name, Motor(name, *place))
+        if motor.place() != place:
+            self._problems.add(motor, "output", f"move {event['id']} is on another output: {place}")
+        move = Move(event, self._tables[path])
+        motor.moves.append(move)
+        self._moves[name, move.id] = move
+
+    def _stop(self, event):
+        move = self._moves.get((event["motor"], event["id"]))
+        if move is not None:
+            move.stop(event["tick"])
+
+    def _result(self, event):
+        move = self._moves.get((event["motor"], event["id"]))
+        if move is None:
+            return
+        if move.result is not None:
+            motor = self.motors[event["motor"]]
+            self._problems.add(motor, "result", f"move {move.id} has more than one result")
+        move.result = event["result"]
+        move.result_steps = event["position_steps"]
+
+    def _check_each(self):
+        """What the log must fulfil by itself, before edges are looked at."""
+        outputs = {}
+        for motor in self.motors.values():
+            other = outputs.setdefault(motor.place(), motor)
+            if other is not motor:
+                self._problems.add(motor, "output", f"shares its output with {other.name}")
+            for move in motor.moves:
+                self._check_result(motor, move)
+            for before, after in zip(motor.moves, motor.moves[1:]):
+                if after.from_steps != before.end_steps():
+                    text = f"move {after.id} starts from {after.from_steps} steps, the one before ends at"
+                    self._problems.add(motor, "position", f"{text} {before.end_steps()}")
+                if after.delays and after.start_tick < before.end_tick():
+                    text = f"move {after.id} starts in tick {after.start_tick}, the one before runs until"
+                    self._problems.add(motor, "overlap", f"{text} {before.end_tick()}")
+
+    def _check_result(self, motor, move):
+        text = None
+        if move.result is None:
+            text = f"move {move.id} has no result"
+        elif move.result not in ("reached", "stopped"):
+            text = f"move {move.id} ended as '{move.result}', so the table does not say what was to happen"
+        elif move.result == "reached" and len(move.delays) != move.asked_steps:
+            text = f"move {move.id} was cut short by a stop, and yet its result is 'reached'"
+        elif move.result == "stopped" and not move.stopped:
+            text = f"move {move.id} ended as 'stopped' without a stop"
+        elif move.result_steps != move.end_steps():
+            by_table = move.end_steps()
+            text = f"move {move.id} ended at {move.result_steps} steps, by the table it ends at {by_table}"
+        if text is not None:
+            self._problems.add(motor, "result", text)

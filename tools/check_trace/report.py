@@ -1,0 +1,80 @@
+"""The figures, for people and as JSON."""
+
+import json
+
+from check_trace.motion import FIRST_TICK, INTERIOR, LAST_TICK
+
+
+def largest_us(errors_ns):
+    return max(map(abs, errors_ns), default=0) / 1000
+
+
+def figures(motors, trace, skew_ns):
+    every = [[error for motor in motors for error in motor.errors_ns[place]] for place in range(3)]
+    interior = every[INTERIOR]
+    return {
+        "motors": len(motors),
+        "mcus": len({motor.mcu for motor in motors}),
+        "steps_commanded": sum(len(motor.steps) for motor in motors),
+        "steps_made": sum(map(len, trace.edges.values())),
+        "max_edge_error_us": round(largest_us(interior), 1),
+        "rms_edge_error_us": round((sum(e * e for e in interior) / max(1, len(interior))) ** 0.5 / 1000, 1),
+        "max_first_tick_error_us": round(largest_us(every[FIRST_TICK]), 1),
+        "max_last_tick_error_us": round(largest_us(every[LAST_TICK]), 1),
+        "max_off_slot_us": round(max((motor.off_slot_ns for motor in motors), default=0) / 1000, 3),
+        "max_skew_us": round(skew_ns / 1000, 3),
+    }
+
+
+def rows(motors):
+    for motor in motors:
+        yield {
+            "motor": motor.name,
+            "mcu": motor.mcu,
+            "output": motor.output,
+            "moves": len(motor.moves),
+            "commanded": len(motor.steps),
+            "made": len(motor.edges),
+            "max_us": round(largest_us(motor.errors_ns[INTERIOR]), 1),
+            "first_us": round(largest_us(motor.errors_ns[FIRST_TICK]), 1),
+            "last_us": round(largest_us(motor.errors_ns[LAST_TICK]), 1),
+        }
+
+
+def print_rows(motors):
+    all_rows = list(rows(motors))
+    if not all_rows:
+        return
+    names = list(all_rows[0])
+    widths = [max(len(name), *(len(str(row[name])) for row in all_rows)) for name in names]
+    print("  ".join(name.ljust(width) for name, width in zip(names, widths)))
+    for row in all_rows:
+        print("  ".join(str(row[name]).ljust(width) for name, width in zip(names, widths)))
+
+
+def print_report(motors, clocks, problems, total, verbose):
+    if verbose:
+        print_rows(motors)
+        for address, clock in sorted(clocks.items()):
+            print(f"mcu{address}: tick 0 at {clock.at(0) / 1e6:.6f} ms, rate {clock.rate * 1e6:+.3f} ppm")
+    for line in problems.lines():
+        print(f"problem: {line}")
+    print(
+        f"max error in a move's first tick {total['max_first_tick_error_us']} us, in its last tick "
+        f"{total['max_last_tick_error_us']} us; rms in all others {total['rms_edge_error_us']} us"
+    )
+    print(
+        f"farthest from the exact slot {total['max_off_slot_us']} us; largest skew between MCUs "
+        f"{total['max_skew_us']} us"
+    )
+    print(
+        f"{total['motors']} motors, {total['mcus']} MCUs, {total['steps_commanded']} steps commanded, "
+        f"{total['steps_made']} steps made, max edge error {total['max_edge_error_us']} us"
+    )
+
+
+def print_json(motors, problems, total):
+    report = {"good": problems.none(), **total}
+    report["per_motor"] = list(rows(motors))
+    report["problems"] = list(problems.lines())
+    print(json.dumps(report, indent=1))
