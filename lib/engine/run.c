@@ -252,7 +252,7 @@ static inline void ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, si
 }
 
 // Ticks that surely end before `units` more have passed; 0 if the buckets are too wide for ramp_ticks.
-static size_t safe_ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, uint32_t units) {
+static uint32_t safe_ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, uint32_t units) {
   if (UINT32_C(1) << ramp->bucket_shift > ramp->code[ramp->count - 1]) return 0;
   return (units - 1) / (tick->whole + (tick->rest_ns != 0));
 }
@@ -263,8 +263,8 @@ static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t 
   if (ramp->sum == NULL) return 0;
   uint32_t i = run->accel_at;
   uint32_t now = ramp->sum[i] + run->since;
-  const size_t safe = safe_ramp_ticks(ramp, tick, ramp->sum[run->accel_end] - now);
-  if (ticks > safe) ticks = safe;
+  const uint32_t safe = safe_ramp_ticks(ramp, tick, ramp->sum[run->accel_end] - now);
+  if (ticks > safe) ticks = (size_t)safe;
   if (tick->rest_ns == 0) {
     ramp_ticks(ramp, tick, ticks, true, true, &now, &i, &run->since_ns, out);
   } else {
@@ -284,8 +284,8 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
   // (advance_decel).
   uint32_t i = run->decel_left - 1;
   uint32_t now = ramp->sum[run->decel_left] - run->since - 1;
-  const size_t safe = safe_ramp_ticks(ramp, tick, now + 1);
-  if (ticks > safe) ticks = safe;
+  const uint32_t safe = safe_ramp_ticks(ramp, tick, now + 1);
+  if (ticks > safe) ticks = (size_t)safe;
   if (tick->rest_ns == 0) {
     ramp_ticks(ramp, tick, ticks, false, true, &now, &i, &run->since_ns, out);
   } else {
@@ -307,8 +307,8 @@ static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t
   const int64_t tick_length = in_ns ? tick->whole * scale + tick->rest_ns : tick->whole;
   const uint32_t whole = (uint32_t)(tick_length / delay);
   const int64_t rest = tick_length - whole * delay;
-  const size_t safe = run->cruise_left / (whole + 1);
-  if (ticks > safe) ticks = safe;
+  const uint32_t safe = run->cruise_left / (whole + 1);
+  if (ticks > safe) ticks = (size_t)safe;
   // Kept negative: what is missing to the next step.
   int64_t missing = run->since * scale + (in_ns ? run->since_ns : 0) - delay;
   const uint8_t byte = (uint8_t)(whole | out.direction_bit);

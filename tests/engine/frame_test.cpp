@@ -110,8 +110,8 @@ TEST(Frame, IsStandardCobsWithTheCrcBehindTheRawBytes) {
     RC_ASSERT(wire.back() == 0);
     wire.pop_back();
     for (const uint8_t byte : wire) RC_ASSERT(byte != 0);
-    Bytes raw{frame.address, frame.type, frame.tag};
-    raw.insert(raw.end(), frame.payload.begin(), frame.payload.end());
+    Bytes raw = frame.payload;
+    raw.insert(raw.begin(), {frame.address, frame.type, frame.tag});
     const uint16_t crc = bushd_crc16(BUSHD_CRC16_START, raw.data(), raw.size());
     raw.push_back(static_cast<uint8_t>(crc & 0xFF));
     raw.push_back(static_cast<uint8_t>(crc >> 8));
