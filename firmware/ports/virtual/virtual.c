@@ -6,14 +6,17 @@
 enum { kMillion = 1000000 };
 
 // Both conversions split whole multiples off first, so that no product can overflow in years of
-// simulated time.
+// simulated time. A perfect clock is the common case and spared the divisions: it is asked for
+// every byte and edge.
 static int64_t own_time(const bushd_virtual* v, int64_t time_ns) {
   const int64_t since_boot = time_ns - v->config.boot_ns;
+  if (v->config.clock_ppm == 0) return since_boot;
   const int64_t rate = kMillion + v->config.clock_ppm;
   return since_boot / kMillion * rate + since_boot % kMillion * rate / kMillion;
 }
 
 static int64_t true_time(const bushd_virtual* v, int64_t own_ns) {
+  if (v->config.clock_ppm == 0) return v->config.boot_ns + own_ns;
   const int64_t rate = kMillion + v->config.clock_ppm;
   const int64_t whole = own_ns / rate * kMillion;
   return v->config.boot_ns + whole + (own_ns % rate * kMillion + rate - 1) / rate;
