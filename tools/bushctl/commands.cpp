@@ -1,0 +1,55 @@
+#include "commands.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "render.h"
+
+namespace bushctl {
+
+using bushd::command_t;
+using bushd::reply_t;
+using bushd::lcm::Client;
+
+int failure(const Client& client, const bushd::Error& error) {
+  if (client.interrupted()) return kInterrupted;
+  fmt::print(stderr, "bushctl: {}\n", error.text());
+  return kFailed;
+}
+
+int show_status(Client& client, std::chrono::milliseconds timeout, bool as_json) {
+  const auto snapshot = client.snapshot(timeout);
+  if (!snapshot) return failure(client, snapshot.error());
+  if (as_json) {
+    fmt::print("{}\n", json(*snapshot));
+  } else {
+    for (const std::string& line : table(*snapshot)) fmt::print("{}\n", line);
+  }
+  return kDone;
+}
+
+int send(Client& client, const command_t& command, Client::Until until) {
+  const bool is_move =
+      command.kind == command_t::MOVE_RELATIVE || command.kind == command_t::MOVE_ABSOLUTE;
+  bool accepted = false;
+  const auto reply = client.run(command, until, [&](const reply_t& heard) {
+    accepted = accepted || heard.phase == reply_t::ACCEPTED;
+    if (heard.phase == reply_t::REFUSED) return;
+    for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
+    std::fflush(stdout);
+  });
+  if (!reply) {
+    if (client.interrupted() && accepted && is_move) {
+      fmt::print(stderr, "bushctl: the move goes on; 'bushctl stop' ends it\n");
+    }
+    return failure(client, reply.error());
+  }
+  if (reply->phase == reply_t::ACCEPTED) return kDone;
+  if (reply->phase == reply_t::RESULT && reply->result == (is_move ? "reached" : "done"))
+    return kDone;
+  fmt::print(stderr, "bushctl: {}: {}\n", printable(reply->result), printable(reply->reason));
+  return kFailed;
+}
+
+}  // namespace bushctl

@@ -1,0 +1,35 @@
+// What bushctl's subcommands do. All return the exit code.
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "bushd/command_t.hpp"
+#include "lcm/client.h"
+
+namespace bushctl {
+
+enum Exit : int {
+  kDone = 0,
+  kFailed = 1,  // refused, no daemon, or a result other than hoped for; stderr says which
+  kUsage = 2,
+  kInterrupted = 130
+};
+
+int show_status(bushd::lcm::Client& client, std::chrono::milliseconds timeout, bool as_json);
+
+// kAnswered: done when accepted. kResult: done when every motor reached its target, or the command
+// was carried out.
+int send(bushd::lcm::Client& client, const bushd::command_t& command,
+         bushd::lcm::Client::Until until);
+
+struct WatchOptions {
+  std::chrono::milliseconds timeout{2000};  // without a snapshot
+  std::optional<unsigned> count;            // snapshots to show; none: until interrupted
+};
+int watch(bushd::lcm::Client& client, const WatchOptions& options);
+
+// Says on stderr why, unless it was the user who broke off.
+int failure(const bushd::lcm::Client& client, const bushd::Error& error);
+
+}  // namespace bushctl

@@ -1,0 +1,185 @@
+// bushctl: the command line client of bushd. The only file that includes CLI11 (slow to compile).
+#include <fmt/format.h>
+#include <sys/signalfd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "move_arguments.h"
+
+namespace {
+
+using bushd::command_t;
+using bushd::lcm::Client;
+
+struct Arguments {
+  std::string url;
+  std::string prefix = bushd::lcm::kDefaultPrefix;
+  double timeout_s = 2.0;
+  bool json = false;
+  bool wait = false;
+  unsigned count = 0;
+  std::vector<std::string> motors;
+  std::string motor;
+  std::string steps;
+};
+
+// Both before and after the subcommand.
+void add_connection(CLI::App* app, Arguments& arguments) {
+  app->add_option("--url", arguments.url, "LCM URL")->capture_default_str();
+  app->add_option("--prefix", arguments.prefix, "Prefix of the daemon's channels")
+      ->capture_default_str();
+}
+
+CLI::App* add_command(CLI::App& app, Arguments& arguments, const char* name, const char* text) {
+  CLI::App* command = app.add_subcommand(name, text);
+  add_connection(command, arguments);
+  return command;
+}
+
+CLI::App* add_motors_command(CLI::App& app, Arguments& arguments, const char* name,
+                             const char* text) {
+  CLI::App* command = add_command(app, arguments, name, text);
+  command->add_option("NAME", arguments.motors, "Motors; none: all");
+  return command;
+}
+
+void add_timeout(CLI::App* command, Arguments& arguments) {
+  command->add_option("--timeout-s", arguments.timeout_s, "How long to wait for the daemon's state")
+      ->check(CLI::Range(0.01, 3600.0))
+      ->capture_default_str();
+}
+
+std::chrono::milliseconds milliseconds(double seconds) {
+  return std::chrono::milliseconds(std::lround(seconds * 1000));
+}
+
+// SIGINT and SIGTERM from a descriptor. Before LCM starts its thread, which inherits the mask.
+int block_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  sigprocmask(SIG_BLOCK, &signals, nullptr);
+  return signalfd(-1, &signals, SFD_CLOEXEC);
+}
+
+int with_client(const Arguments& arguments, const auto& action) {
+  auto client = Client::open({.url = arguments.url,
+                              .prefix = arguments.prefix,
+                              .program = "bushctl",
+                              .interrupt_fd = block_signals()});
+  if (!client) {
+    fmt::print(stderr, "bushctl: {}\n", client.error().text());
+    return bushctl::kFailed;
+  }
+  return action(**client);
+}
+
+int send(const Arguments& arguments, const bushd::Result<command_t>& command, bool wait) {
+  if (!command) {
+    fmt::print(stderr, "bushctl: {}\n", command.error().text());
+    return bushctl::kUsage;
+  }
+  return with_client(arguments, [&](Client& client) {
+    return bushctl::send(client, *command,
+                         wait ? Client::Until::kResult : Client::Until::kAnswered);
+  });
+}
+
+command_t to_motors(std::int8_t kind, const std::vector<std::string>& motors) {
+  command_t command{};
+  command.kind = kind;
+  command.motors = motors;
+  command.steps.assign(motors.size(), 0);
+  return command;
+}
+
+int run(int argc, char** argv) {
+  Arguments arguments;
+  const char* url = std::getenv("LCM_DEFAULT_URL");
+  arguments.url = url != nullptr && *url != '\0' ? url : bushd::lcm::kDefaultUrl;
+
+  CLI::App app{"bushctl: moves and watches the motors of a running bushd"};
+  app.footer("Exit codes: 0 done, 1 refused or not done (reason on stderr), 2 wrong usage.");
+  app.require_subcommand(1);
+  add_connection(&app, arguments);
+
+  CLI::App* status = add_command(app, arguments, "status", "All motors and MCUs");
+  status->add_flag("--json", arguments.json, "As JSON");
+  add_timeout(status, arguments);
+
+  CLI::App* move =
+      add_command(app, arguments, "move", "Moves motors, all starting in the same tick");
+  move->footer(
+      "bushctl move [--wait] NAME STEPS [NAME STEPS...]            by so many steps\n"
+      "bushctl move [--wait] NAME --to STEPS [NAME --to STEPS...]  to these positions\n"
+      "STEPS may be negative. With --wait the exit code is 0 only if every motor reached its "
+      "target.");
+  move->add_flag("--wait", arguments.wait, "Wait for the result");
+  move->allow_extras();  // names and numbers, in their order: parse_move()
+
+  CLI::App* stop = add_motors_command(app, arguments, "stop", "Ramps motors down");
+  stop->add_flag("--wait", arguments.wait, "Wait until they stand");
+  CLI::App* enable = add_motors_command(app, arguments, "enable", "Drivers of the motors' MCUs on");
+  CLI::App* disable =
+      add_motors_command(app, arguments, "disable", "Drivers of the motors' MCUs off");
+  add_motors_command(app, arguments, "clear", "Clears faults of the motors' MCUs");
+  CLI::App* set = add_command(app, arguments, "set", "Says at which position a motor stands");
+  set->add_option("NAME", arguments.motor, "The motor, at rest")->required();
+  set->add_option("STEPS", arguments.steps, "Its position from now on")->required();
+
+  CLI::App* watch =
+      add_command(app, arguments, "watch", "Live table; in a pipe: lines of what changes");
+  watch->add_option("--count", arguments.count, "End after so many snapshots")
+      ->check(CLI::PositiveNumber);
+  add_timeout(watch, arguments);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? bushctl::kDone : bushctl::kUsage;
+  }
+
+  if (status->parsed()) {
+    return with_client(arguments, [&](Client& client) {
+      return bushctl::show_status(client, milliseconds(arguments.timeout_s), arguments.json);
+    });
+  }
+  if (watch->parsed()) {
+    bushctl::WatchOptions options{.timeout = milliseconds(arguments.timeout_s), .count = {}};
+    if (arguments.count > 0) options.count = arguments.count;
+    return with_client(arguments, [&](Client& client) { return bushctl::watch(client, options); });
+  }
+  if (move->parsed())
+    return send(arguments, bushctl::parse_move(move->remaining()), arguments.wait);
+  if (stop->parsed()) {
+    return send(arguments, to_motors(command_t::STOP, arguments.motors), arguments.wait);
+  }
+  // These are over in a moment, and only their result tells whether the MCUs did them.
+  if (set->parsed())
+    return send(arguments, bushctl::parse_set(arguments.motor, arguments.steps), true);
+  const std::int8_t kind = enable->parsed()    ? command_t::ENABLE
+                           : disable->parsed() ? command_t::DISABLE
+                                               : command_t::CLEAR_FAULTS;
+  return send(arguments, to_motors(kind, arguments.motors), true);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bushctl: {}\n", error.what());
+    return bushctl::kFailed;
+  }
+}

@@ -1,0 +1,134 @@
+#include "render.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+
+namespace bushctl {
+namespace {
+
+using bushd::motor_state_t;
+using bushd::state_t;
+using bushd::lcm::Snapshot;
+
+enum class Align { kLeft, kRight };
+
+// Columns as wide as their widest entry, two blanks between them.
+class Grid {
+ public:
+  explicit Grid(std::vector<Align> align) : align_(std::move(align)) {}
+  void row(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
+
+  std::vector<std::string> lines() const {
+    std::vector<std::size_t> width(align_.size(), 0);
+    for (const auto& row : rows_) {
+      for (std::size_t i = 0; i < row.size(); ++i) width[i] = std::max(width[i], row[i].size());
+    }
+    std::vector<std::string> out;
+    for (const auto& row : rows_) {
+      std::string line;
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        line += align_[i] == Align::kRight ? fmt::format("{:>{}}  ", row[i], width[i])
+                                           : fmt::format("{:<{}}  ", row[i], width[i]);
+      }
+      line.erase(line.find_last_not_of(' ') + 1);
+      out.push_back(std::move(line));
+    }
+    return out;
+  }
+
+ private:
+  std::vector<Align> align_;
+  std::vector<std::vector<std::string>> rows_;
+};
+
+nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
+  return {{"name", motor.name},
+          {"mcu", mcu.mcu},
+          {"output", motor.output},
+          {"group", motor.group},
+          {"table", motor.table},
+          {"position_steps", motor.position_steps},
+          {"target_steps", motor.target_steps},
+          {"velocity_steps_per_s", motor.velocity_steps_per_s},
+          {"moving", motor.moving != 0},
+          {"enabled", motor.enabled != 0},
+          {"input", motor.input != 0},
+          {"trust", motor.trust}};
+}
+
+nlohmann::json mcu_json(const state_t& mcu) {
+  return {{"mcu", mcu.mcu},         {"bus", mcu.bus},       {"address", mcu.address},
+          {"state", mcu.mcu_state}, {"detail", mcu.detail}, {"boot", mcu.boot_number},
+          {"tick", mcu.tick}};
+}
+
+}  // namespace
+
+std::string printable(const std::string& text) {
+  std::string out = text;
+  std::replace_if(
+      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, '?');
+  return out;
+}
+
+std::vector<std::string> table(const Snapshot& snapshot) {
+  using enum Align;
+  Grid motors({kLeft, kLeft, kRight, kLeft, kLeft, kRight, kRight, kRight, kLeft, kLeft});
+  motors.row({"MOTOR", "MCU", "OUTPUT", "GROUP", "TABLE", "POSITION", "TARGET", "STEPS/S", "MOVING",
+              "TRUST"});
+  Grid mcus({kLeft, kLeft, kRight, kLeft});
+  mcus.row({"MCU", "STATE", "BOOT", "DETAIL"});
+  for (const state_t& mcu : snapshot.mcus) {
+    for (const motor_state_t& motor : mcu.motors) {
+      motors.row({printable(motor.name), printable(mcu.mcu), fmt::to_string(motor.output),
+                  printable(motor.group), printable(motor.table),
+                  fmt::to_string(motor.position_steps), fmt::to_string(motor.target_steps),
+                  fmt::format("{:.1f}", motor.velocity_steps_per_s),
+                  motor.moving != 0 ? "yes" : "-", printable(motor.trust)});
+    }
+    mcus.row({printable(mcu.mcu), printable(mcu.mcu_state), fmt::to_string(mcu.boot_number),
+              printable(mcu.detail)});
+  }
+  std::vector<std::string> out = motors.lines();
+  out.emplace_back();
+  for (std::string& line : mcus.lines()) out.push_back(std::move(line));
+  return out;
+}
+
+std::string motor_line(const motor_state_t& motor) {
+  std::string line = fmt::format(
+      "{} position {} target {} velocity {:.1f} {}", printable(motor.name), motor.position_steps,
+      motor.target_steps, motor.velocity_steps_per_s, motor.moving != 0 ? "moving" : "at rest");
+  if (motor.trust != "known") line += " " + printable(motor.trust);
+  return line;
+}
+
+std::string json(const Snapshot& snapshot) {
+  nlohmann::json out = {{"motors", nlohmann::json::array()},
+                        {"mcus", nlohmann::json::array()},
+                        {"sequence", snapshot.sequence},
+                        {"utime_us", snapshot.mcus.front().utime_us},
+                        {"rejected_commands", snapshot.mcus.front().rejected_commands}};
+  for (const state_t& mcu : snapshot.mcus) {
+    for (const motor_state_t& motor : mcu.motors) out["motors"].push_back(motor_json(motor, mcu));
+    out["mcus"].push_back(mcu_json(mcu));
+  }
+  // Texts from the network need not be UTF-8; by default dump() throws then.
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::vector<std::string> lines(const bushd::reply_t& reply) {
+  if (reply.phase == bushd::reply_t::ACCEPTED) return {"accepted"};
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < reply.motors.size(); ++i) {
+    out.push_back(fmt::format("{}: {}, stands at {}", printable(reply.motors[i]),
+                              printable(reply.motor_results[i]), reply.position_steps[i]));
+  }
+  if (out.empty()) out.push_back(printable(reply.result));
+  return out;
+}
+
+}  // namespace bushctl

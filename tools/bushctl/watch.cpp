@@ -1,0 +1,118 @@
+// Live view: in a terminal a table that is drawn anew, elsewhere a line for every motor that has
+// changed.
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "render.h"
+
+namespace bushctl {
+namespace {
+
+using bushd::lcm::Snapshot;
+
+class View {
+ public:
+  virtual ~View() = default;
+  virtual void show(const Snapshot& snapshot) = 0;
+  // No snapshot came in time. Whether to go on waiting.
+  virtual bool silent() = 0;
+};
+
+class ChangesView : public View {
+ public:
+  void show(const Snapshot& snapshot) override {
+    for (const bushd::state_t& mcu : snapshot.mcus) {
+      line(mcu.mcu,
+           fmt::format("{} {} boot {}{}{}", printable(mcu.mcu), printable(mcu.mcu_state),
+                       mcu.boot_number, mcu.detail.empty() ? "" : " ", printable(mcu.detail)));
+      for (const bushd::motor_state_t& motor : mcu.motors) line(motor.name, motor_line(motor));
+    }
+    std::fflush(stdout);
+  }
+  bool silent() override { return false; }
+
+ private:
+  void line(const std::string& about, const std::string& text) {
+    std::string& last = shown_[about];
+    if (last == text) return;
+    last = text;
+    fmt::print("{}\n", text);
+  }
+
+  std::map<std::string, std::string> shown_;  // last line by motor or MCU
+};
+
+// On the terminal's second screen, so that the first is there again afterwards.
+class TerminalView : public View {
+ public:
+  TerminalView() { fmt::print("\x1b[?1049h\x1b[?25l\x1b[?7l"); }
+  ~TerminalView() override {
+    fmt::print("\x1b[?7h\x1b[?25h\x1b[?1049l");
+    std::fflush(stdout);
+  }
+  TerminalView(const TerminalView&) = delete;
+  TerminalView& operator=(const TerminalView&) = delete;
+
+  void show(const Snapshot& snapshot) override {
+    lines_ = table(snapshot);
+    draw("");
+  }
+  bool silent() override {
+    draw("no state from bushd; what is shown is old");
+    return true;
+  }
+
+ private:
+  void draw(const std::string& notice) {
+    winsize size{};
+    const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row > 3;
+    const std::size_t room = (known ? size.ws_row : 24u) - 2u;
+    // Overwritten from the top, not cleared first: that would flicker.
+    std::string screen = "\x1b[H";
+    for (std::size_t i = 0; i < lines_.size() && i < room; ++i) screen += lines_[i] + "\x1b[K\n";
+    screen += "\x1b[J";
+    if (lines_.size() > room) {
+      screen += fmt::format("... {} more lines; 'bushctl status' shows all", lines_.size() - room);
+    }
+    screen += "\n" + (notice.empty() ? std::string("Ctrl-C ends") : notice);
+    fmt::print("{}", screen);
+    std::fflush(stdout);
+  }
+
+  std::vector<std::string> lines_;
+};
+
+}  // namespace
+
+int watch(bushd::lcm::Client& client, const WatchOptions& options) {
+  // Before the terminal is touched: without a daemon the message belongs on the first screen.
+  auto snapshot = client.snapshot(options.timeout);
+  if (!snapshot) return failure(client, snapshot.error());
+  std::unique_ptr<View> view;
+  if (isatty(STDOUT_FILENO) != 0) {
+    view = std::make_unique<TerminalView>();
+  } else {
+    view = std::make_unique<ChangesView>();
+  }
+  for (unsigned shown = 0;;) {
+    if (snapshot) {
+      view->show(*snapshot);
+      if (options.count && ++shown >= *options.count) return kDone;
+    } else if (client.interrupted()) {
+      return kDone;
+    } else if (!view->silent()) {
+      return failure(client, snapshot.error());
+    }
+    snapshot = client.snapshot(options.timeout);
+  }
+}
+
+}  // namespace bushctl
