@@ -4,11 +4,12 @@
     tables/make_tables.py            writes tables/*.toml
     tables/make_tables.py --check    exit code 1 if a file differs from what would be written
 
-Every table follows a law of motion, speed v(t) with v(0) = start speed and x(t) its integral. The first
-code is 1 / start speed: the motor makes its first step at the speed that it can start with. From
-there on step k of the law falls at the time t_k with x(t_k) = k, and the delay before it is t_k - t_(k-1). Laws
-have one free number (an acceleration or a top speed); it is chosen so that the last delay is exactly the
-one asked for. Delays are rounded up to whole time units: a motor is never asked to run faster than the law.
+Every table follows a law of motion, speed v(t) with v(0) = start speed and x(t) its integral. The
+first code is 1 / start speed: the motor makes its first step at the speed that it can start with.
+From there on step k of the law falls at the time t_k with x(t_k) = k, and the delay before it is
+t_k - t_(k-1). Laws have one free number (an acceleration or a top speed); it is chosen so that the
+last delay is exactly the one asked for. Delays are rounded up to whole time units: a motor is
+never asked to run faster than the law.
 Python standard library only.
 """
 
@@ -18,10 +19,13 @@ import pathlib
 import sys
 import textwrap
 
-# Binary fractions cannot hold most delays: this much of a unit above a whole number is noise, not delay.
+# Binary fractions cannot hold most delays: this much of a unit above a whole number is noise.
 NOISE_UNITS = 1e-6
 BISECTIONS = 200  # more than a double has digits, so the result does not depend on where it starts
 CODES_PER_LINE = 16
+
+BUSHD2_UNIT_NS = 40000  # 1 / (250 F_start) with F_start = 100 Hz, the fastest start of BUSHD-2
+MICRO_UNIT_NS = 250
 
 
 def solve(function, low, high):
@@ -100,7 +104,10 @@ def exponential(u, k=math.log(5)):
 
 
 def codes_of(make_law, count, unit_ns, start_code, top_code, bounds):
-    """`count` codes from start_code to top_code; make_law(parameter) within `bounds` is faster for more."""
+    """`count` codes from start_code to top_code, and the free number of the law that makes them.
+
+    make_law(number) is faster for a greater number; the one that fits lies within `bounds`.
+    """
     unit_s = unit_ns * 1e-9
     steps = count - 1  # of the law: the first code is the start
 
@@ -119,20 +126,19 @@ def codes_of(make_law, count, unit_ns, start_code, top_code, bounds):
 
 
 def bushd2(make_law, bounds):
-    """A motion program of BUSHD-2: 238 codes from 250 (F_start) to 10 (25 F_start), unit 1 / (250 F_start)."""
-    return codes_of(make_law, 238, 40000, 250, 10, bounds)
+    """A motion program of BUSHD-2: 238 codes from 250 (F_start) to 10 (25 F_start)."""
+    return codes_of(make_law, 238, BUSHD2_UNIT_NS, 250, 10, bounds)
 
 
 def micro(make_law, count, start_hz, top_hz, bounds):
-    unit_ns = 250
-    return codes_of(
-        make_law, count, unit_ns, round(1e9 / (start_hz * unit_ns)), round(1e9 / (top_hz * unit_ns)), bounds
-    )
+    start_code = round(1e9 / (start_hz * MICRO_UNIT_NS))
+    top_code = round(1e9 / (top_hz * MICRO_UNIT_NS))
+    return codes_of(make_law, count, MICRO_UNIT_NS, start_code, top_code, bounds)
 
 
 def text_of(name, description, comment, unit_ns, codes):
     lines = [f"# {line}" for line in textwrap.wrap(comment, 98)]
-    lines.append("# Made by make_tables.py: change it there, or copy this file under a new name and edit that.")
+    lines.append("# Made by make_tables.py: change it there, or copy this file under a new name.")
     lines.append(f'name = "{name}"')
     lines.append(f'description = "{description}"')
     lines.append(f"time_unit_ns = {unit_ns}")
@@ -151,96 +157,106 @@ def summary(codes, unit_ns):
 
 
 def tables():
-    """Yields (file name, text)."""
+    """Yields (name, text) of each."""
+
+    def bushd2_text(name, motor, law, codes):
+        return text_of(
+            name,
+            f"{motor}: {summary(codes, BUSHD2_UNIT_NS)}",
+            f"BUSHD-2 motion program of 238 codes, 250 = F_start = 100 Hz to 10 = 25 F_start. {law}",
+            BUSHD2_UNIT_NS,
+            codes,
+        )
+
     accelerations = (1.0, 1e7)  # steps/s^2
-    bushd2_tops = (2000.0, 4000.0)  # steps/s
+    tops = (2000.0, 4000.0)  # steps/s
 
     codes, a = bushd2(lambda a: ConstantAcceleration(100.0, a), accelerations)
-    yield "bushd2-constant", text_of(
+    yield "bushd2-constant", bushd2_text(
         "bushd2-constant",
-        f"Full-step motor with inertial load, constant acceleration: {summary(codes, 40000)}",
-        "BUSHD-2 motion program of 238 codes, 250 = F_start = 100 Hz to 10 = 25 F_start. Constant acceleration of "
-        f"{a:.0f} steps/s^2: the plain choice for a motor whose torque hardly falls with speed (200 steps a "
-        "turn, chopper drive) and whose load is mostly inertia.",
-        40000,
+        "Full-step motor with inertial load, constant acceleration",
+        f"Constant acceleration of {a:.0f} steps/s^2: the plain choice for a motor whose torque "
+        "hardly falls with speed (200 steps a turn, chopper drive) and whose load is mostly "
+        "inertia.",
         codes,
     )
 
-    codes, _ = bushd2(lambda v: Shaped(100.0, 237, v, smooth_step), bushd2_tops)
-    yield "bushd2-scurve", text_of(
+    codes, _ = bushd2(lambda v: Shaped(100.0, 237, v, smooth_step), tops)
+    yield "bushd2-scurve", bushd2_text(
         "bushd2-scurve",
-        f"Full-step motor with a load that swings, S-shaped speed: {summary(codes, 40000)}",
-        "BUSHD-2 motion program of 238 codes, 250 = F_start = 100 Hz to 10 = 25 F_start. The speed follows 3 u^2 - 2 "
-        "u^3 over time, so that acceleration begins and ends at zero: for a motor with a long arm, a belt or a "
-        "liquid on it, which a jump of the acceleration would set swinging.",
-        40000,
+        "Full-step motor with a load that swings, S-shaped speed",
+        "The speed follows 3 u^2 - 2 u^3 over time, so that acceleration begins and ends at zero: "
+        "for a motor with a long arm, a belt or a liquid on it, which a jump of the acceleration "
+        "would set swinging.",
         codes,
     )
 
-    codes, _ = bushd2(lambda v: Shaped(100.0, 237, v, exponential), bushd2_tops)
-    yield "bushd2-exponential", text_of(
+    codes, _ = bushd2(lambda v: Shaped(100.0, 237, v, exponential), tops)
+    yield "bushd2-exponential", bushd2_text(
         "bushd2-exponential",
-        f"Full-step motor whose torque falls with speed (unipolar, L/R drive): {summary(codes, 40000)}",
-        "BUSHD-2 motion program of 238 codes, 250 = F_start = 100 Hz to 10 = 25 F_start. The acceleration falls "
-        "exponentially over time, to a fifth at the top: for unipolar motors on plain L/R drives, whose torque "
-        "falls with speed; it uses the torque that is there at low speed.",
-        40000,
+        "Full-step motor whose torque falls with speed (unipolar, L/R drive)",
+        "The acceleration falls exponentially over time, to a fifth at the top: for unipolar "
+        "motors on plain L/R drives, whose torque falls with speed; it uses the torque that is "
+        "there at low speed.",
         codes,
     )
 
     codes, a = bushd2(lambda a: QuickBand(100.0, a, (600.0, 1000.0), 4.0), accelerations)
-    yield "bushd2-resonance", text_of(
+    yield "bushd2-resonance", bushd2_text(
         "bushd2-resonance",
-        f"Full-step motor that resonates at 600..1000 steps/s, band passed quickly: {summary(codes, 40000)}",
-        "BUSHD-2 motion program of 238 codes, 250 = F_start = 100 Hz to 10 = 25 F_start. Constant acceleration of "
-        f"{a:.0f} steps/s^2, but four times as much from 600 to 1000 steps/s: for an undamped full-step motor "
-        "with a mid-range resonance there, which must not have the time to build up.",
-        40000,
+        "Full-step motor that resonates at 600..1000 steps/s, band passed quickly",
+        f"Constant acceleration of {a:.0f} steps/s^2, but four times as much from 600 to 1000 "
+        "steps/s: for an undamped full-step motor with a mid-range resonance there, which must not "
+        "have the time to build up.",
         codes,
     )
 
-    codes, a = micro(lambda a: ConstantAcceleration(1000.0, a), 1000, 1000.0, 20000.0, (1.0, 1e8))
+    codes, a = micro(
+        lambda a: ConstantAcceleration(1000.0, a), 1000, 1000.0, 20000.0, accelerations
+    )
     yield "micro16-standard", text_of(
         "micro16-standard",
-        f"1.8 degree motor at 1/16 step, general use, constant acceleration: {summary(codes, 250)}",
-        "For a 1.8 degree motor of NEMA 17 or 23 size on a chopper drive at 1/16 step (3200 steps a turn), lightly "
-        f"loaded: up to 375 turns/min with {a:.0f} steps/s^2.",
-        250,
+        "1.8 degree motor at 1/16 step, general use, constant acceleration: "
+        + summary(codes, MICRO_UNIT_NS),
+        "For a 1.8 degree motor of NEMA 17 or 23 size on a chopper drive at 1/16 step (3200 steps "
+        f"a turn), lightly loaded: up to 375 turns/min with {a:.0f} steps/s^2.",
+        MICRO_UNIT_NS,
         codes,
     )
 
-    codes, _ = micro(lambda v: Shaped(800.0, 1499, v, smooth_step), 1500, 800.0, 25000.0, (2e4, 1e5))
+    codes, _ = micro(
+        lambda v: Shaped(800.0, 1499, v, smooth_step), 1500, 800.0, 25000.0, (20000.0, 40000.0)
+    )
     yield "micro32-smooth", text_of(
         "micro32-smooth",
-        f"1.8 degree motor at 1/32 step, quiet, S-shaped speed: {summary(codes, 250)}",
-        "For a 1.8 degree motor of NEMA 17 or 23 size on a chopper drive at 1/32 step (6400 steps a turn), where "
-        "quiet running counts (optics, cameras): up to 234 turns/min, acceleration without jumps.",
-        250,
+        "1.8 degree motor at 1/32 step, quiet, S-shaped speed: " + summary(codes, MICRO_UNIT_NS),
+        "For a 1.8 degree motor of NEMA 17 or 23 size on a chopper drive at 1/32 step (6400 steps "
+        "a turn), where quiet running counts (optics, cameras): up to 234 turns/min, acceleration "
+        "without jumps.",
+        MICRO_UNIT_NS,
         codes,
     )
 
 
 def main():
     parser = argparse.ArgumentParser(description="Makes the shipped tables.")
-    parser.add_argument("--check", action="store_true", help="compare only; exit code 1 on a difference")
-    parser.add_argument(
-        "--directory", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent, help="where they lie"
-    )
+    parser.add_argument("--check", action="store_true", help="compare, write nothing")
     options = parser.parse_args()
+    directory = pathlib.Path(__file__).resolve().parent
     different = []
     made = set()
     for name, text in tables():
-        path = options.directory / f"{name}.toml"
+        path = directory / f"{name}.toml"
         made.add(path.name)
         if not options.check:
             path.write_bytes(text.encode())
         elif not path.is_file() or path.read_bytes() != text.encode():
             different.append(path)
-    strays = sorted(set(path.name for path in options.directory.glob("*.toml")) - made)
+    strays = sorted(set(path.name for path in directory.glob("*.toml")) - made)
     for path in different:
-        print(f"{path}: is not what make_tables.py makes; run it and look at the difference", file=sys.stderr)
+        print(f"{path}: differs from what make_tables.py makes; run it", file=sys.stderr)
     for name in strays:
-        print(f"{options.directory / name}: not made by make_tables.py; add it there", file=sys.stderr)
+        print(f"{directory / name}: not made by make_tables.py; add it there", file=sys.stderr)
     return 1 if different or strays else 0
 
 

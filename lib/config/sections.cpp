@@ -164,8 +164,9 @@ Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vec
 Result<void> read_buses(Loading* loading) {
   Taken names;
   for (const TomlReader& reader : loading->buses) {
-    if (auto known = reader.only({"name", "port", "baud", "tick_us", "format"}); !known)
+    if (auto known = reader.only({"name", "port", "baud", "tick_us", "format"}); !known) {
       return known;
+    }
     Bus bus;
     auto name = read_name(reader);
     if (!name) return fail(name.error());
