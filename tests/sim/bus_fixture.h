@@ -79,22 +79,16 @@ class Master {
     return out;
   }
 
-  // Sends now and lets time pass until the line is silent.
+  // Sends now, behind a delimiter as everybody who takes the line does, and lets time pass until it
+  // is silent.
   void send(std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload) {
+    bus_.master_send(Bytes{0}, bus_.now_ns());
     bus_.master_send(wire(address, type, ++tag_, payload), bus_.now_ns());
     drain();
   }
 
   void drain() {
     while (bus_.line_busy_until_ns() > bus_.now_ns()) bus_.advance_to(bus_.line_busy_until_ns());
-  }
-
-  // What a master does when a reply fails to come: what there is of it is nothing, and a delimiter
-  // ends whatever the MCUs have heard of the last frame.
-  void give_up() {
-    receiver_ = {};
-    bus_.master_send(Bytes{0}, bus_.now_ns());
-    drain();
   }
 
   // The reply to a request; nothing if none came.
