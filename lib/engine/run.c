@@ -347,7 +347,8 @@ size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, u
     if (ticks - n >= BLOCK_TICKS) {
       const coarse_out rest = {out + n * stride, stride, direction_bit};
       n += coarse_block(run, &tick, ticks - n, rest);
-      if (n == ticks) break;
+      // The block may have made the last step: no tick is active after it.
+      if (n == ticks || bushd_run_done(run)) break;
     }
     const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
     run->steps_done += steps;

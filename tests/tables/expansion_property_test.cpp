@@ -82,6 +82,22 @@ TEST(Expansion, AgreesWithTheSlowReferenceForAnyMonotoneTable) {
   }));
 }
 
+// Once the last step fell on the last tick that a block took in one go, one more tick was called
+// active.
+TEST(Expansion, MoveThatEndsWithABlockHasNoTickAfterIt) {
+  const tables::TableContent content{.name = "t", .time_unit_ns = 22223, .accel = {1}};
+  const auto table = tables::make(content);
+  ASSERT_TRUE(table.has_value());
+  for (const std::int64_t steps : {117, 125, 126, 135}) {
+    for (const std::size_t block : {4, 5, 7, 13, 14, 100}) {
+      EXPECT_EQ(expand<std::uint8_t>((*table)->view(), steps, 200'000, bushd_run_expand_coarse,
+                                     [&] { return block; }),
+                ReferenceMove(content, steps, 200'000).coarse())
+          << steps << ' ' << block;
+    }
+  }
+}
+
 TEST(Expansion, AgreesWithTheSlowReferenceForTheShippedTables) {
   const auto block = [] { return std::size_t{37}; };
   for (const char* name : {"bushd2-constant", "bushd2-scurve", "bushd2-exponential",
