@@ -1,0 +1,123 @@
+// Messages for tests: fixed ones of a wanted size, and random ones.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <string>
+
+#include "bushd/command_t.hpp"
+#include "bushd/reply_t.hpp"
+#include "bushd/state_t.hpp"
+
+namespace bushd::test {
+
+using Random = std::mt19937_64;
+
+inline std::size_t below(Random& random, std::size_t limit) {
+  return std::uniform_int_distribution<std::size_t>(0, limit - 1)(random);
+}
+
+template <class Number>
+Number any(Random& random) {
+  return static_cast<Number>(random());
+}
+
+inline std::string text(Random& random) {
+  std::string out(below(random, 24), ' ');
+  for (char& c : out) c = static_cast<char>(1 + below(random, 255));
+  return out;
+}
+
+inline void fill(Random& random, command_t& command) {
+  command.utime_us = any<std::int64_t>(random);
+  command.client_id = text(random);
+  command.number = any<std::int64_t>(random);
+  command.kind = any<std::int8_t>(random);
+  for (std::size_t i = below(random, 5); i > 0; --i) {
+    command.motors.push_back(text(random));
+    command.steps.push_back(any<std::int64_t>(random));
+  }
+  command.motor_count = static_cast<std::int32_t>(command.motors.size());
+}
+
+inline void fill(Random& random, reply_t& reply) {
+  reply.utime_us = any<std::int64_t>(random);
+  reply.client_id = text(random);
+  reply.number = any<std::int64_t>(random);
+  reply.phase = any<std::int8_t>(random);
+  reply.result = text(random);
+  reply.reason = text(random);
+  for (std::size_t i = below(random, 5); i > 0; --i) {
+    reply.motors.push_back(text(random));
+    reply.motor_results.push_back(text(random));
+    reply.position_steps.push_back(any<std::int64_t>(random));
+  }
+  reply.motor_count = static_cast<std::int32_t>(reply.motors.size());
+}
+
+inline motor_state_t motor_state(const std::string& name) {
+  motor_state_t motor{};
+  motor.name = name;
+  motor.group = "goniometer";
+  motor.table = "bushd2-constant";
+  motor.trust = "known";
+  return motor;
+}
+
+inline void fill(Random& random, state_t& state) {
+  state.utime_us = any<std::int64_t>(random);
+  state.sequence = any<std::int64_t>(random);
+  state.part = any<std::int32_t>(random);
+  state.parts = any<std::int32_t>(random);
+  state.bus = text(random);
+  state.mcu = text(random);
+  state.address = any<std::int32_t>(random);
+  state.mcu_state = text(random);
+  state.detail = text(random);
+  state.boot_number = any<std::int32_t>(random);
+  state.tick = any<std::int64_t>(random);
+  state.rejected_commands = any<std::int64_t>(random);
+  for (std::size_t i = below(random, 4); i > 0; --i) {
+    motor_state_t motor = motor_state(text(random));
+    motor.output = any<std::int16_t>(random);
+    motor.position_steps = any<std::int64_t>(random);
+    motor.target_steps = any<std::int64_t>(random);
+    motor.velocity_steps_per_s = static_cast<double>(any<std::int32_t>(random)) / 256;
+    motor.moving = any<std::int8_t>(random);
+    motor.enabled = any<std::int8_t>(random);
+    motor.input = any<std::int8_t>(random);
+    state.motors.push_back(motor);
+  }
+  state.motor_count = static_cast<std::int32_t>(state.motors.size());
+}
+
+template <class T>
+T random_message(Random& random) {
+  T message{};
+  fill(random, message);
+  return message;
+}
+
+// One part of a snapshot, with motors "<name_stem>0", ... padded to `name_length`.
+inline state_t state_part(std::int64_t sequence, std::int32_t part, std::int32_t parts,
+                          std::size_t motors = 0, std::size_t name_length = 0) {
+  state_t state{};
+  state.sequence = sequence;
+  state.part = part;
+  state.parts = parts;
+  state.bus = "hall";
+  state.address = part + 1;
+  state.mcu = "hall:" + std::to_string(state.address);
+  state.mcu_state = "READY";
+  for (std::size_t i = 0; i < motors; ++i) {
+    std::string name = "m" + std::to_string(part) + "_" + std::to_string(i);
+    if (name.size() < name_length) name.resize(name_length, 'x');
+    state.motors.push_back(motor_state(name));
+    state.motors.back().output = static_cast<std::int16_t>(i);
+  }
+  state.motor_count = static_cast<std::int32_t>(motors);
+  return state;
+}
+
+}  // namespace bushd::test
