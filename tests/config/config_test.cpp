@@ -1,83 +1,22 @@
 #include "config/config.h"
 
-#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
 #include <string>
 
-#include "tables/temp_directory.h"
+#include "config/config_file.h"
 
 namespace bushd::config {
 namespace {
 
-using test::TempDirectory;
+using test::ConfigFile;
+using test::kGood;
+using test::kTable;
+using test::replaced;
 using testing::HasSubstr;
-using testing::StartsWith;
-
-constexpr const char* kTable = "name = \"t\"\ntime_unit_ns = 40000\naccel = [250, 10]\n";
-
-// The numbers are lines.
-const std::string kGood =
-    "[lcm]\n"                           // 1
-    "url = \"memq://\"\n"               // 2
-    "prefix = \"TEST\"\n"               // 3
-    "[[bus]]\n"                         // 4
-    "name = \"hall\"\n"                 // 5
-    "port = \"/dev/no-such-port-a\"\n"  // 6
-    "baud = 500000\n"                   // 7
-    "tick_us = 2560\n"                  // 8
-    "format = \"fine\"\n"               // 9
-    "[[bus]]\n"                         // 10
-    "name = \"roof\"\n"                 // 11
-    "port = \"/dev/no-such-port-b\"\n"  // 12
-    "baud = 115200\n"                   // 13
-    "tick_us = 5000\n"                  // 14
-    "format = \"coarse\"\n"             // 15
-    "[[mcu]]\n"                         // 16
-    "bus = \"hall\"\n"                  // 17
-    "address = 1\n"                     // 18
-    "[[mcu]]\n"                         // 19
-    "bus = \"roof\"\n"                  // 20
-    "address = 255\n"                   // 21
-    "[[group]]\n"                       // 22
-    "name = \"goniometer\"\n"           // 23
-    "table = \"bushd2-constant\"\n"     // 24
-    "[[group]]\n"                       // 25
-    "name = \"slits\"\n"                // 26
-    "table = \"own\"\n"                 // 27
-    "[[motor]]\n"                       // 28
-    "name = \"theta\"\n"                // 29
-    "mcu = \"hall:1\"\n"                // 30
-    "output = 0\n"                      // 31
-    "group = \"goniometer\"\n"          // 32
-    "[[motor]]\n"                       // 33
-    "name = \"slit\"\n"                 // 34
-    "mcu = \"roof:255\"\n"              // 35
-    "output = 15\n"                     // 36
-    "group = \"slits\"\n";              // 37
-
-// A configuration's file with its tables beside it.
-class ConfigFile {
- public:
-  explicit ConfigFile(const std::string& text) {
-    directory_.write("own.toml", kTable);
-    path_ = directory_.write("bushd.toml", text);
-  }
-  Result<Config> load() const { return config::load(path_); }
-  const TempDirectory& directory() const { return directory_; }
-  const std::string& path() const { return path_; }
-
- private:
-  TempDirectory directory_;
-  std::string path_;
-};
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
-  return text.replace(at, from.size(), to);
-}
 
 TEST(Config, GoodFileIsReadInItsOrder) {
   const ConfigFile file(kGood);
@@ -138,6 +77,16 @@ TEST(Config, TablesAreLookedUpBesideTheFileThenInItsTablesThenAmongTheShipped) {
   EXPECT_EQ(file.load()->groups[0].table->path(), below.string());
   const auto beside = file.directory().write("bushd2-constant.toml", kTable);
   EXPECT_EQ(file.load()->groups[0].table->path(), beside.string());
+}
+
+TEST(Config, ExampleOfTheDocumentationIsGood) {
+  std::ifstream page(BUSHD_SOURCE_DIR "/docs/configuration.md");
+  const std::string text{std::istreambuf_iterator<char>(page), std::istreambuf_iterator<char>()};
+  const std::size_t from = text.find("```toml\n") + 8;
+  const ConfigFile file(text.substr(from, text.find("```", from) - from));
+  const auto config = file.load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(config->motors.size(), 1u);
 }
 
 struct Refusal {
@@ -286,110 +235,6 @@ INSTANTIATE_TEST_SUITE_P(
                 "slower "
                 "table or tick_us = 6349 or less"}),
     kNames);
-
-// A bus, `mcus` MCUs with 16 motors each, and as many groups and tables as asked for.
-std::string wide(int mcus, int baud, int tick_us, const char* format, int groups = 1) {
-  std::string text = fmt::format(
-      "[[bus]]\nname = \"hall\"\nport = \"p\"\nbaud = {}\ntick_us = {}\nformat = \"{}\"\n", baud,
-      tick_us, format);
-  for (int g = 0; g < groups; ++g) {
-    text += fmt::format("[[group]]\nname = \"g{}\"\ntable = \"t{}\"\n", g, g);
-  }
-  for (int m = 1; m <= mcus; ++m) text += fmt::format("[[mcu]]\nbus = \"hall\"\naddress = {}\n", m);
-  for (int m = 0; m < mcus * 16; ++m) {
-    text +=
-        fmt::format("[[motor]]\nname = \"m{}\"\nmcu = \"hall:{}\"\noutput = {}\ngroup = \"g{}\"\n",
-                    m, m / 16 + 1, m % 16, m % groups);
-  }
-  return text;
-}
-
-ConfigFile wide_file(int mcus, int baud, int tick_us, const char* format, int groups = 1) {
-  return ConfigFile(wide(mcus, baud, tick_us, format, groups));
-}
-
-void write_tables(const ConfigFile& file, int count) {
-  for (int t = 0; t < count; ++t) file.directory().write(fmt::format("t{}.toml", t), kTable);
-}
-
-TEST(ConfigTogether, LineThatCannotCarryItsTicksIsRefusedWithLoadAndRemedy) {
-  const ConfigFile file = wide_file(2, 115200, 2560, "fine");
-  write_tables(file, 1);
-  const auto config = file.load();
-  ASSERT_FALSE(config.has_value());
-  EXPECT_EQ(config.error().file, file.path());
-  EXPECT_EQ(config.error().line, 5);
-  EXPECT_EQ(config.error().key, "bus[0].tick_us");
-  EXPECT_THAT(config.error().message,
-              HasSubstr("% of the line at 115200 baud; allowed: 85 %. Use baud = "));
-  EXPECT_THAT(config.error().message, HasSubstr("or more, or tick_us = "));
-}
-
-TEST(ConfigTogether, RemediesForTheLineHelp) {
-  const ConfigFile refused = wide_file(2, 115200, 2560, "fine");
-  write_tables(refused, 1);
-  const std::string message = refused.load().error().message;
-  const auto number_after = [&](const std::string& text) {
-    return std::stoi(message.substr(message.find(text) + text.size()));
-  };
-  const int baud = number_after("Use baud = ");
-  const int tick_us = number_after("tick_us = ");
-  for (const auto& [remedy_baud, remedy_tick_us, good] :
-       {std::tuple{baud, 2560, true}, std::tuple{115200, tick_us, true},
-        std::tuple{115200, tick_us - 1, false}}) {
-    const ConfigFile file = wide_file(2, remedy_baud, remedy_tick_us, "fine");
-    write_tables(file, 1);
-    EXPECT_EQ(file.load().has_value(), good) << remedy_baud << ' ' << remedy_tick_us;
-  }
-}
-
-TEST(ConfigTogether, NinthTableOfAnMcuIsRefused) {
-  const ConfigFile eight = wide_file(1, 500000, 2560, "fine", 8);
-  write_tables(eight, 8);
-  EXPECT_TRUE(eight.load().has_value());
-  const ConfigFile nine = wide_file(1, 500000, 2560, "fine", 9);
-  write_tables(nine, 9);
-  const auto config = nine.load();
-  ASSERT_FALSE(config.has_value());
-  EXPECT_EQ(config.error().key, "motor[8].group");
-  EXPECT_EQ(config.error().line, 6 + 9 * 3 + 3 + 9 * 5);
-  EXPECT_THAT(config.error().message,
-              HasSubstr("one table too many for MCU \"hall:1\"; allowed: 8"));
-}
-
-TEST(ConfigTogether, OnePortUnderTwoNamesIsRefused) {
-  const TempDirectory directory;
-  const auto port = directory.write("port", "");
-  const auto link = directory.path() / "link";
-  std::filesystem::create_symlink(port, link);
-  const ConfigFile file(
-      replaced(replaced(kGood, "/dev/no-such-port-a", port), "/dev/no-such-port-b", link));
-  const auto config = file.load();
-  ASSERT_FALSE(config.has_value());
-  EXPECT_EQ(config.error().line, 12);
-  EXPECT_EQ(config.error().key, "bus[1].port");
-}
-
-TEST(ConfigTogether, BrokenTableIsNamedWithTheGroupThatUsesIt) {
-  const ConfigFile file(kGood);
-  const auto table =
-      file.directory().write("own.toml", "name = \"own\"\ntime_unit_ns = 1\naccel = [1, 2]\n");
-  const auto config = file.load();
-  ASSERT_FALSE(config.has_value());
-  EXPECT_EQ(config.error().file, table);
-  EXPECT_EQ(config.error().line, 3);
-  EXPECT_EQ(config.error().key, "accel[1]");
-  EXPECT_THAT(config.error().message,
-              HasSubstr("(the table of group \"slits\", " + file.path() + ":27)"));
-}
-
-TEST(ConfigTogether, MissingFileAndBrokenTomlAreRefused) {
-  const TempDirectory directory;
-  const std::string missing = directory.path() / "none.toml";
-  EXPECT_THAT(load(missing).error().text(), StartsWith(missing + ": cannot be read: "));
-  const std::string broken = directory.write("broken.toml", "[[bus]]\nname = hall\n");
-  EXPECT_THAT(load(broken).error().text(), StartsWith(broken + ":2: not TOML: "));
-}
 
 }  // namespace
 }  // namespace bushd::config

@@ -77,6 +77,22 @@ TEST(BushtabExpand, FineIsStepsTimes256) {
             "tick,displacement\n0,-682\n1,-342\n");
 }
 
+// The n-th fenced block of a language in docs/tables.md.
+std::string documented(const std::string& language, int n) {
+  const std::string text = read_file(BUSHD_SOURCE_DIR "/docs/tables.md");
+  const std::string fence = "```" + language + "\n";
+  std::size_t from = 0;
+  for (int i = 0; i <= n; ++i) from = text.find(fence, from) + fence.size();
+  return text.substr(from, text.find("```", from) - from);
+}
+
+TEST(BushtabExpand, DoesWhatTheDocumentationSays) {
+  const TempDirectory directory;
+  const std::string table = directory.write("small.toml", documented("toml", 0));
+  EXPECT_EQ(bushtab(expand_arguments(table, 4, 2000, "fine")).out, documented("csv", 0));
+  EXPECT_EQ(bushtab(expand_arguments(table, 4, 1000, "coarse")).out, documented("csv", 1));
+}
+
 TEST(BushtabExpand, NoStepsAreTheHeaderOnly) {
   for (const char* format : {"coarse", "fine"}) {
     const Outcome outcome = bushtab(expand_arguments("bushd2-constant", 0, 2560, format));
