@@ -10,48 +10,60 @@ namespace {
 
 enum class Format { kCoarse, kFine };
 
-// The next ticks as signed 1/256 steps whatever the format; blocks of random size and stride if
-// asked.
-std::vector<int> expand(bushd_run* run, Format format, uint32_t tick_ns, size_t ticks,
-                        bool random_blocks = false) {
-  std::vector<int> all;
-  while (all.size() < ticks) {
-    size_t block = ticks - all.size();
+// Signed 1/256 steps of each tick, whatever the format.
+struct Ticks {
+  std::vector<int> displacements;
+  size_t active = 0;
+
+  void append(const Ticks& more) {
+    displacements.insert(displacements.end(), more.displacements.begin(), more.displacements.end());
+    active += more.active;
+  }
+};
+
+int decode(const bushd_run& run, uint8_t byte, bool active) {
+  const uint8_t direction = run.direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
+  EXPECT_EQ(byte & BUSHD_COARSE_DIRECTION, active ? direction : 0);
+  return (byte & 0x7F) * 256 * run.direction;
+}
+int decode(const bushd_run&, int16_t displacement, bool) {
+  return displacement;
+}
+
+template <class Displacement, class Expand>
+Ticks expand_block(bushd_run* run, uint32_t tick_ns, size_t ticks, size_t stride, Expand expand) {
+  constexpr Displacement kUntouched = 0x55;
+  std::vector<Displacement> out(ticks * stride, kUntouched);
+  Ticks block;
+  block.active = expand(run, tick_ns, ticks, out.data(), stride);
+  EXPECT_LE(block.active, ticks);
+  if (block.active < ticks) {
+    EXPECT_TRUE(bushd_run_done(run));
+  }
+  for (size_t i = 0; i < out.size(); ++i) {
+    if (i % stride != 0) {
+      EXPECT_EQ(out[i], kUntouched) << "wrote between its places";
+    } else {
+      block.displacements.push_back(decode(*run, out[i], i / stride < block.active));
+    }
+  }
+  return block;
+}
+
+// The next ticks, in one call or in blocks and strides of any size.
+Ticks expand(bushd_run* run, Format format, uint32_t tick_ns, size_t ticks,
+             bool random_blocks = false) {
+  Ticks all;
+  while (all.displacements.size() < ticks) {
+    size_t block = ticks - all.displacements.size();
     size_t stride = 1;
     if (random_blocks) {
       block = std::min(block, between<size_t>(1, 20));
       stride = between<size_t>(1, 3);
     }
-    const bool was_done = bushd_run_done(run);
-    size_t active = 0;
-    if (format == Format::kCoarse) {
-      std::vector<uint8_t> out(block * stride, 0x55);
-      active = bushd_run_expand_coarse(run, tick_ns, block, out.data(), stride);
-      for (size_t i = 0; i < out.size(); ++i) {
-        if (i % stride != 0) {
-          EXPECT_EQ(out[i], 0x55) << "wrote between its places";
-        } else {
-          all.push_back((out[i] & BUSHD_COARSE_DIRECTION ? 1 : -1) * (out[i] & 0x7F) * 256);
-        }
-      }
-    } else {
-      std::vector<int16_t> out(block * stride, 0x5555);
-      active = bushd_run_expand_fine(run, tick_ns, block, out.data(), stride);
-      for (size_t i = 0; i < out.size(); ++i) {
-        if (i % stride != 0) {
-          EXPECT_EQ(out[i], 0x5555) << "wrote between its places";
-        } else {
-          all.push_back(out[i]);
-        }
-      }
-    }
-    EXPECT_LE(active, block);
-    if (was_done) {
-      EXPECT_EQ(active, 0u);
-    }
-    if (active < block) {
-      EXPECT_TRUE(bushd_run_done(run));
-    }
+    all.append(format == Format::kCoarse
+                   ? expand_block<uint8_t>(run, tick_ns, block, stride, bushd_run_expand_coarse)
+                   : expand_block<int16_t>(run, tick_ns, block, stride, bushd_run_expand_fine));
   }
   return all;
 }
@@ -84,6 +96,13 @@ size_t ticks_to_compare(const Reference& reference, uint32_t tick_ns) {
   return static_cast<size_t>(std::min<uint64_t>(units_ns / tick_ns + 3, 2000));
 }
 
+// Ticks at whose beginning a step is still to be made.
+size_t active_ticks(const Reference& reference, uint32_t tick_ns, size_t ticks) {
+  size_t active = 0;
+  while (active < ticks && reference.delay_at(uint64_t{active} * tick_ns) != 0) ++active;
+  return active;
+}
+
 int64_t sum(const std::vector<int>& values) {
   int64_t total = 0;
   for (const int value : values) total += value;
@@ -98,7 +117,7 @@ TEST(Run, FollowsTheRuleOnAMoveComputedByHand) {
   bushd_run run;
   bushd_run_start(&run, table.view(), 5, 1);
   // Delays max(A(j-1), D(5-j), 3) = 5 4 3 3 6; steps at 5, 9, 12, 15, 21 us; ticks of 4 us.
-  EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 7),
+  EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 7).displacements,
             (std::vector<int>{0, 256, 512, 256, 0, 256, 0}));
 }
 
@@ -126,7 +145,7 @@ TEST(Run, OfTheMostStepsStartsInstantly) {
   bushd_run run;
   bushd_run_start(&run, table.view(), UINT32_MAX, 1);
   EXPECT_EQ(bushd_run_steps_left(&run), UINT32_MAX);
-  EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 3), (std::vector<int>{0, 256, 512}));
+  EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 3).displacements, (std::vector<int>{0, 256, 512}));
 }
 
 TEST(Run, IdleTicksAfterTheEndAreZeroBytesInBothDirections) {
@@ -151,11 +170,12 @@ void check_move(const TestTable& table, Format format) {
   bushd_run run;
   bushd_run_start(&run, table.view(), steps, direction);
   const auto got = expand(&run, format, tick_ns, ticks, true);
-  RC_ASSERT(got == expected(reference, format, tick_ns, 0, ticks, direction));
+  RC_ASSERT(got.displacements == expected(reference, format, tick_ns, 0, ticks, direction));
+  RC_ASSERT(got.active == active_ticks(reference, tick_ns, ticks));
   const uint64_t now = uint64_t{ticks} * tick_ns;
   RC_ASSERT(run.steps_done == reference.steps_at(now));
   RC_ASSERT(bushd_run_steps_left(&run) == steps - run.steps_done);
-  if (bushd_run_done(&run)) RC_ASSERT(sum(got) == int64_t{steps} * 256 * direction);
+  if (bushd_run_done(&run)) RC_ASSERT(sum(got.displacements) == int64_t{steps} * 256 * direction);
 }
 
 TEST(Run, CoarseTicksAgreeWithTheDefinition) {
@@ -184,7 +204,7 @@ TEST(Run, LongMovesAgreeWithTheDefinitionTickByTick) {
         const size_t ticks = ticks_to_compare(reference, 2'560'000);
         bushd_run run;
         bushd_run_start(&run, table.view(), steps, -1);
-        ASSERT_EQ(expand(&run, format, 2'560'000, ticks),
+        ASSERT_EQ(expand(&run, format, 2'560'000, ticks).displacements,
                   expected(reference, format, 2'560'000, 0, ticks, -1))
             << steps << " steps";
         EXPECT_TRUE(bushd_run_done(&run));
@@ -234,15 +254,17 @@ TEST(Run, RampsDownFromAnyTick) {
       reference.ramp_down_at(uint64_t{at} * tick_ns);
       const size_t more =
           again > 0 ? between<size_t>(0, 20) : ticks_to_compare(reference, tick_ns) + 1;
-      for (const int d : expand(&run, format, tick_ns, more, true)) got.push_back(d);
+      got.append(expand(&run, format, tick_ns, more, true));
       for (const int d : expected(reference, format, tick_ns, at, more, direction))
         want.push_back(d);
       at += more;
     }
-    RC_ASSERT(got == want);
+    RC_ASSERT(got.displacements == want);
+    RC_ASSERT(got.active == active_ticks(reference, tick_ns, at));
     RC_ASSERT(run.steps_done == reference.steps_at(uint64_t{at} * tick_ns));
     if (bushd_run_done(&run)) {
-      RC_ASSERT(sum(got) == static_cast<int64_t>(reference.steps()) * 256 * direction);
+      RC_ASSERT(sum(got.displacements) ==
+                static_cast<int64_t>(reference.steps()) * 256 * direction);
     }
   });
 }
@@ -271,11 +293,12 @@ TEST(Run, TakesOverInTheMiddleOfAStep) {
     bushd_run_start_ramp_down(&run, table.view(), delay, fraction, direction);
     RC_ASSERT(bushd_run_units_left(&run) == reference.units_left_at(0));
     const auto got = expand(&run, format, tick_ns, ticks, true);
-    RC_ASSERT(got == expected(reference, format, tick_ns, 0, ticks, direction,
-                              format == Format::kFine ? fraction : 0));
-    for (const int d : got) RC_ASSERT(d * direction >= 0);
+    RC_ASSERT(got.displacements == expected(reference, format, tick_ns, 0, ticks, direction,
+                                            format == Format::kFine ? fraction : 0));
+    for (const int d : got.displacements) RC_ASSERT(d * direction >= 0);
     if (bushd_run_done(&run) && format == Format::kFine) {
-      RC_ASSERT(sum(got) == (static_cast<int64_t>(reference.steps()) * 256 - fraction) * direction);
+      RC_ASSERT(sum(got.displacements) ==
+                (static_cast<int64_t>(reference.steps()) * 256 - fraction) * direction);
     }
   });
 }
@@ -314,8 +337,8 @@ TEST(Run, ACopyReplaysTheSameTicks) {
     bushd_run_start(&run, table.view(), between<uint32_t>(0, 200), 1);
     expand(&run, format, tick_ns, between<size_t>(0, 60));
     bushd_run copy = run;
-    const auto first = expand(&run, format, tick_ns, 60);
-    RC_ASSERT(expand(&copy, format, tick_ns, 60) == first);
+    const auto first = expand(&run, format, tick_ns, 60).displacements;
+    RC_ASSERT(expand(&copy, format, tick_ns, 60).displacements == first);
   });
 }
 
