@@ -1,0 +1,317 @@
+// The real bushctl against a daemon made up here, over real LCM. The program runs itself again
+// within a network of its own (tests/tools/with-loopback-multicast), so nothing is needed of the
+// machine and nothing else is heard.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "lcm/wire.h"
+#include "tools/bushctl/fake_daemon.h"
+#include "tools/bushctl/program.h"
+
+namespace bushctl::test {
+namespace {
+
+using bushd::command_t;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+struct Ran {
+  int code;
+  std::string out;
+  std::string err;
+};
+
+std::vector<std::string> with_program(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), BUSHCTL);
+  return arguments;
+}
+
+Ran bushctl(const std::vector<std::string>& arguments) {
+  Program program(with_program(arguments));
+  const int code = program.finish();
+  return {code, program.out(), program.err()};
+}
+
+FakeDaemon::Answer always(const std::string& word) {
+  return [word](const command_t& command, int) {
+    return std::vector{accepted(), result(command, word)};
+  };
+}
+
+TEST(Bushctl, StatusAsJsonHasTheAgreedKeys) {
+  FakeDaemon daemon;
+  daemon.start();
+  const Ran ran = bushctl({"status", "--json"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto status = nlohmann::json::parse(ran.out);
+  ASSERT_EQ(status["motors"].size(), 4u);
+  const auto& theta = status["motors"][0];
+  EXPECT_EQ(theta["name"], "theta");
+  EXPECT_EQ(theta["mcu"], "hall:1");
+  EXPECT_EQ(theta["output"], 0);
+  EXPECT_EQ(theta["group"], "goniometer");
+  EXPECT_EQ(theta["table"], "bushd2-constant");
+  EXPECT_EQ(theta["position_steps"], -12);
+  EXPECT_EQ(theta["target_steps"], 400);
+  EXPECT_EQ(theta["velocity_steps_per_s"], 2500.5);
+  EXPECT_EQ(theta["moving"], true);
+  EXPECT_EQ(theta["trust"], "known");
+  EXPECT_EQ(status["motors"][3]["name"], "stop");
+  EXPECT_EQ(status["motors"][3]["mcu"], "hall:2");
+  EXPECT_EQ(status["motors"][3]["trust"], "uncertain");
+  ASSERT_EQ(status["mcus"].size(), 2u);
+  EXPECT_EQ(status["mcus"][1]["mcu"], "hall:2");
+  EXPECT_EQ(status["mcus"][1]["state"], "READY");
+  EXPECT_EQ(status["mcus"][1]["boot"], 42);
+}
+
+TEST(Bushctl, StatusIsATableOfMotorsAndMcus) {
+  FakeDaemon daemon;
+  daemon.start();
+  const Ran ran = bushctl({"status"});
+  EXPECT_EQ(ran.code, 0);
+  EXPECT_THAT(ran.out, HasSubstr("theta  hall:1       0  goniometer"));
+  EXPECT_THAT(ran.out, HasSubstr("hall:2  READY    42"));
+}
+
+TEST(Bushctl, StatusSurvivesHostileStates) {
+  FakeDaemon daemon;
+  auto cut = bushd::lcm::encode(bushd::state_t{}).value();
+  auto huge = cut;
+  cut.resize(20);
+  huge[32] = 0x80;  // the length of `bus` becomes INT32_MIN + 1
+  daemon.set_hostile_states({{}, cut, huge, std::vector<std::uint8_t>(65000, 0xFF)});
+  daemon.start();
+  EXPECT_EQ(bushctl({"status"}).code, 0);
+}
+
+TEST(Bushctl, NamesDoNotSteerTheTerminal) {
+  FakeDaemon daemon;
+  daemon.set_name("\x1b]0;owned\x07");
+  daemon.start();
+  EXPECT_THAT(bushctl({"status"}).out, Not(HasSubstr("\x1b")));
+  EXPECT_EQ(nlohmann::json::parse(bushctl({"status", "--json"}).out)["motors"][0]["name"],
+            "\x1b]0;owned\x07");
+}
+
+TEST(Bushctl, WithoutDaemonSaysSoAndFails) {
+  const Ran status = bushctl({"status", "--timeout-s", "0.1"});
+  EXPECT_EQ(status.code, 1);
+  EXPECT_THAT(status.err, HasSubstr("no bushd answers"));
+  const Ran move = bushctl({"move", "theta", "5"});
+  EXPECT_EQ(move.code, 1);
+  EXPECT_THAT(move.err, HasSubstr("no bushd answers"));
+}
+
+TEST(Bushctl, ListensOnTheGivenPrefixOnly) {
+  FakeDaemon daemon;
+  daemon.start();
+  EXPECT_EQ(bushctl({"--prefix", "LAB", "status", "--timeout-s", "0.2"}).code, 1);
+  EXPECT_EQ(bushctl({"status", "--prefix", "BUSHD"}).code, 0);
+}
+
+TEST(Bushctl, TakesTheUrlFromTheEnvironmentUnlessGiven) {
+  setenv("LCM_DEFAULT_URL", "nonsense", 1);
+  FakeDaemon daemon;
+  daemon.start();
+  EXPECT_THAT(bushctl({"status"}).err, HasSubstr("nonsense"));
+  EXPECT_EQ(bushctl({"status", "--url", "udpm://239.255.76.67:7667?ttl=0"}).code, 0);
+  unsetenv("LCM_DEFAULT_URL");
+}
+
+TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
+  FakeDaemon daemon;
+  daemon.start(always("reached"));
+  const Ran ran = bushctl({"move", "theta", "-400", "chi", "20", "--wait"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out, "accepted\ntheta: reached, stands at 7\nchi: reached, stands at 7\n");
+  const auto commands = daemon.commands();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(commands[0].kind, command_t::MOVE_RELATIVE);
+  EXPECT_THAT(commands[0].motors, ElementsAre("theta", "chi"));
+  EXPECT_THAT(commands[0].steps, ElementsAre(-400, 20));
+  EXPECT_THAT(commands[0].client_id, HasSubstr("bushctl-"));
+}
+
+TEST(Bushctl, MoveToPositionsAndMotorsCalledLikeCommands) {
+  FakeDaemon daemon;
+  daemon.start(always("reached"));
+  EXPECT_EQ(bushctl({"move", "--wait", "stop", "--to", "-5", "phi", "--to=6"}).code, 0);
+  const auto commands = daemon.commands();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(commands[0].kind, command_t::MOVE_ABSOLUTE);
+  EXPECT_THAT(commands[0].motors, ElementsAre("stop", "phi"));
+  EXPECT_THAT(commands[0].steps, ElementsAre(-5, 6));
+}
+
+TEST(Bushctl, WithoutWaitingAcceptedIsEnough) {
+  FakeDaemon daemon;
+  daemon.start([](const command_t&, int) { return std::vector{accepted()}; });
+  const Ran ran = bushctl({"move", "theta", "5"});
+  EXPECT_EQ(ran.code, 0);
+  EXPECT_EQ(ran.out, "accepted\n");
+}
+
+TEST(Bushctl, EveryResultButReachedFails) {
+  for (const char* word : {"limit", "stopped", "link", "stall", "fault"}) {
+    FakeDaemon daemon;
+    daemon.start(always(word));
+    const Ran ran = bushctl({"move", "theta", "5", "--wait"});
+    EXPECT_EQ(ran.code, 1) << word;
+    EXPECT_THAT(ran.err, HasSubstr(std::string(word) + " for a reason"));
+  }
+}
+
+TEST(Bushctl, RefusedPrintsTheReason) {
+  FakeDaemon daemon;
+  daemon.start([](const command_t&, int) { return std::vector{refused("theta is moving")}; });
+  const Ran ran = bushctl({"move", "theta", "5"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("theta is moving"));
+}
+
+TEST(Bushctl, RepeatsACommandThatGotLost) {
+  FakeDaemon daemon;
+  daemon.start([](const command_t& command, int times) {
+    return times < 3 ? std::vector<bushd::reply_t>{}
+                     : std::vector{accepted(), result(command, "reached")};
+  });
+  EXPECT_EQ(bushctl({"move", "theta", "5", "--wait"}).code, 0);
+  EXPECT_EQ(daemon.commands().size(), 1u);
+}
+
+TEST(Bushctl, AsksAgainForALostResult) {
+  FakeDaemon daemon;
+  daemon.start([](const command_t& command, int times) {
+    return times < 2 ? std::vector{accepted()}
+                     : std::vector{accepted(), result(command, "reached")};
+  });
+  EXPECT_EQ(bushctl({"move", "theta", "5", "--wait"}).code, 0);
+}
+
+TEST(Bushctl, DoesNotRepeatAMoveToARestartedDaemon) {
+  FakeDaemon daemon;
+  daemon.start([&daemon](const command_t&, int) { return std::vector{accepted()}; });
+  Program move(with_program({"move", "theta", "5", "--wait"}));
+  ASSERT_TRUE(move.wait_for("accepted"));
+  daemon.restart();
+  EXPECT_EQ(move.finish(), 1);
+  EXPECT_THAT(move.err(), HasSubstr("restarted"));
+}
+
+TEST(Bushctl, MixedMovesAndWrongWordsAreUsageErrors) {
+  const Ran mixed = bushctl({"move", "theta", "5", "chi", "--to", "6"});
+  EXPECT_EQ(mixed.code, 2);
+  EXPECT_THAT(mixed.err, HasSubstr("one command is either"));
+  EXPECT_EQ(bushctl({"move"}).code, 2);
+  EXPECT_EQ(bushctl({"move", "theta"}).code, 2);
+  EXPECT_EQ(bushctl({"move", "theta", "1.5"}).code, 2);
+  EXPECT_EQ(bushctl({"move", "theta", "5", "--wiat"}).code, 2);
+  EXPECT_EQ(bushctl({"set", "theta", "x"}).code, 2);
+  EXPECT_EQ(bushctl({"dance"}).code, 2);
+}
+
+TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
+  FakeDaemon daemon;
+  daemon.start(always("done"));
+  EXPECT_EQ(bushctl({"stop"}).code, 0);
+  EXPECT_EQ(bushctl({"stop", "theta", "--wait"}).code, 0);
+  EXPECT_EQ(bushctl({"enable", "theta", "phi"}).code, 0);
+  EXPECT_EQ(bushctl({"disable"}).code, 0);
+  EXPECT_EQ(bushctl({"set", "theta", "-100"}).code, 0);
+  EXPECT_EQ(bushctl({"clear"}).code, 0);
+  const auto commands = daemon.commands();
+  ASSERT_EQ(commands.size(), 6u);
+  EXPECT_EQ(commands[0].kind, command_t::STOP);
+  EXPECT_TRUE(commands[0].motors.empty());
+  EXPECT_THAT(commands[1].motors, ElementsAre("theta"));
+  EXPECT_EQ(commands[2].kind, command_t::ENABLE);
+  EXPECT_THAT(commands[2].motors, ElementsAre("theta", "phi"));
+  EXPECT_EQ(commands[3].kind, command_t::DISABLE);
+  EXPECT_EQ(commands[4].kind, command_t::SET_POSITION);
+  EXPECT_THAT(commands[4].steps, ElementsAre(-100));
+  EXPECT_EQ(commands[5].kind, command_t::CLEAR_FAULTS);
+}
+
+TEST(Bushctl, SetFailsWhenTheMcuDidNotTakeIt) {
+  FakeDaemon daemon;
+  daemon.start(always("fault"));
+  EXPECT_EQ(bushctl({"set", "theta", "0"}).code, 1);
+}
+
+TEST(Bushctl, InterruptedMoveSaysThatItGoesOn) {
+  FakeDaemon daemon;
+  daemon.start([](const command_t&, int) { return std::vector{accepted()}; });
+  Program move(with_program({"move", "theta", "5", "--wait"}));
+  ASSERT_TRUE(move.wait_for("accepted"));
+  move.send_signal(SIGINT);
+  EXPECT_EQ(move.finish(), 130);
+  EXPECT_THAT(move.err(), HasSubstr("the move goes on"));
+}
+
+TEST(Bushctl, WatchInAPipePrintsALineForWhatChanged) {
+  FakeDaemon daemon;
+  daemon.start();
+  const Ran ran = bushctl({"watch", "--count", "3"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out,
+            "hall:1 READY boot 41\n"
+            "theta position -12 target 400 velocity 2500.5 moving\n"
+            "chi position 0 target 0 velocity 0.0 at rest uncertain\n"
+            "hall:2 READY boot 42\n"
+            "phi position -12 target 400 velocity 2500.5 moving\n"
+            "stop position 0 target 0 velocity 0.0 at rest uncertain\n");
+}
+
+TEST(Bushctl, WatchEndsOnInterrupt) {
+  FakeDaemon daemon;
+  daemon.start();
+  Program watch(with_program({"watch"}));
+  ASSERT_TRUE(watch.wait_for("theta"));
+  watch.send_signal(SIGINT);
+  EXPECT_EQ(watch.finish(), 0);
+}
+
+TEST(Bushctl, WatchLeavesTheTerminalAsItWas) {
+  FakeDaemon daemon;
+  daemon.start();
+  Program watch(with_program({"watch"}), true);
+  ASSERT_TRUE(watch.wait_for("Ctrl-C"));
+  watch.send_signal(SIGTERM);
+  EXPECT_EQ(watch.finish(), 0);
+  EXPECT_THAT(watch.out(), testing::StartsWith("\x1b[?1049h"));
+  EXPECT_THAT(watch.out(), testing::EndsWith("\x1b[?7h\x1b[?25h\x1b[?1049l"));
+}
+
+TEST(Examples, MoveAndWaitInCpp) {
+  FakeDaemon daemon;
+  daemon.start(always("reached"));
+  Program example({EXAMPLE_MOVE_AND_WAIT, "theta", "-400", "chi", "5"});
+  EXPECT_EQ(example.finish(), 0) << example.err();
+  EXPECT_THAT(example.out(), HasSubstr("chi: reached, stands at 7"));
+  EXPECT_THAT(daemon.commands().at(0).steps, ElementsAre(-400, 5));
+}
+
+}  // namespace
+}  // namespace bushctl::test
+
+int main(int argc, char** argv) {
+  std::vector<char*> again(argv, argv + argc + 1);
+  testing::InitGoogleTest(&argc, argv);
+  if (!testing::GTEST_FLAG(list_tests) && std::getenv("BUSHCTL_TEST_IN_NAMESPACE") == nullptr) {
+    setenv("BUSHCTL_TEST_IN_NAMESPACE", "yes", 1);
+    std::string helper = BUSHD_SOURCE_DIR "/tests/tools/with-loopback-multicast";
+    again.insert(again.begin(), helper.data());
+    execv(helper.c_str(), again.data());
+    return 1;
+  }
+  return RUN_ALL_TESTS();
+}
