@@ -4,6 +4,9 @@
 #include <lcm/lcm.h>
 
 #include <cctype>
+#include <set>
+
+#include "lcm/datagram_filter.h"
 
 namespace bushd::lcm {
 namespace {
@@ -61,6 +64,7 @@ Result<void> check_channel(const std::string& channel) {
 }  // namespace
 
 Result<std::unique_ptr<Transport>> Transport::open(const std::string& url) {
+  const std::set<int> others = udp_sockets();
   lcm_t* lcm = lcm_create(url.c_str());
   if (lcm == nullptr) return fail(cannot_open(url));
   // Asked now: without a descriptor LCM's later calls abort the process.
@@ -69,7 +73,13 @@ Result<std::unique_ptr<Transport>> Transport::open(const std::string& url) {
     lcm_destroy(lcm);
     return fail(cannot_receive(url));
   }
-  return std::unique_ptr<Transport>(new Transport(lcm, fd));
+  std::unique_ptr<Transport> transport(new Transport(lcm, fd));
+  for (const int udp_socket : udp_sockets()) {
+    if (others.contains(udp_socket)) continue;
+    if (auto filtered = accept_whole_messages_only(udp_socket); !filtered)
+      return fail(filtered.error());
+  }
+  return transport;
 }
 
 Transport::~Transport() {

@@ -1,9 +1,11 @@
 // The real bushctl against a daemon made up here, over real LCM. The program runs itself again
 // within a network of its own (tests/tools/with-loopback-multicast), so nothing is needed of the
 // machine and nothing else is heard.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -91,6 +93,48 @@ TEST(Bushctl, StatusSurvivesHostileStates) {
   daemon.set_hostile_states({{}, cut, huge, std::vector<std::uint8_t>(65000, 0xFF)});
   daemon.start();
   EXPECT_EQ(bushctl({"status"}).code, 0);
+}
+
+// As a datagram on the wire, below what LCM's publish() can make.
+class RawSender {
+ public:
+  ~RawSender() { close(socket_); }
+  void send(const std::string& datagram) const {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(7667);
+    to.sin_addr.s_addr = inet_addr("239.255.76.67");
+    sendto(socket_, datagram.data(), datagram.size(), 0, reinterpret_cast<const sockaddr*>(&to),
+           sizeof to);
+  }
+
+ private:
+  int socket_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+};
+
+TEST(Bushctl, SurvivesDatagramsThatCrashLcm) {
+  FakeDaemon daemon;
+  daemon.start(always("reached"));
+  Program watch(with_program({"watch", "--count", "10"}));
+  ASSERT_TRUE(watch.wait_for("theta"));
+  const RawSender sender;
+  for (char number = 0; number < 50; ++number) {
+    // Sequence number, message of 100 bytes, fragment at 0xFFFFFF00 (so that its end wraps around),
+    // second of two.
+    const std::string first = std::string("LC03\0\0\0", 7) + number +
+                              std::string("\0\0\0d\0\0\0\0\0\0\0\2BUSHD_STATE\0", 24);
+    const std::string wrapping =
+        std::string("LC03\0\0\0", 7) + number + std::string("\0\0\0d\xFF\xFF\xFF\0\0\1\0\2", 12);
+    sender.send(first + std::string(20, 'x'));
+    sender.send(wrapping + std::string(0x120, 'y'));
+    sender.send(std::string("LC02\0\0\0\0", 8) +
+                std::string(40, 'B'));  // a channel name that does not end
+    sender.send("LC02");
+    sender.send("");
+    sender.send("junk");
+  }
+  EXPECT_EQ(watch.finish(), 0);
+  EXPECT_EQ(bushctl({"move", "theta", "5", "--wait"}).code, 0);
 }
 
 TEST(Bushctl, NamesDoNotSteerTheTerminal) {

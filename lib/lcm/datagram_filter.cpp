@@ -1,0 +1,58 @@
+#include "lcm/datagram_filter.h"
+
+#include <dirent.h>
+#include <linux/filter.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string>
+
+namespace bushd::lcm {
+namespace {
+
+constexpr std::uint32_t kWholeMessage = 0x4C433032;  // "LC02"; a fragment has "LC03"
+constexpr std::uint32_t kUdpHeaderBytes = 8;  // the filter sees the datagram from its UDP header on
+
+int option(int fd, int name) {
+  int value = -1;
+  socklen_t size = sizeof value;
+  return getsockopt(fd, SOL_SOCKET, name, &value, &size) == 0 ? value : -1;
+}
+
+}  // namespace
+
+std::set<int> udp_sockets() {
+  std::set<int> found;
+  const std::unique_ptr<DIR, int (*)(DIR*)> directory(opendir("/proc/self/fd"), closedir);
+  if (!directory) return found;
+  while (const dirent* entry = readdir(directory.get())) {
+    int fd = -1;
+    std::from_chars(entry->d_name, entry->d_name + std::strlen(entry->d_name), fd);
+    if (fd >= 0 && option(fd, SO_TYPE) == SOCK_DGRAM && option(fd, SO_DOMAIN) == AF_INET) {
+      found.insert(fd);
+    }
+  }
+  return found;
+}
+
+Result<void> accept_whole_messages_only(int udp_socket) {
+  constexpr std::uint32_t kTakeAll = UINT32_MAX;
+  std::array<sock_filter, 4> program{{
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kUdpHeaderBytes),  // a shorter datagram is dropped here
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kWholeMessage, 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, kTakeAll),
+      BPF_STMT(BPF_RET | BPF_K, 0),
+  }};
+  const sock_fprog filter{.len = program.size(), .filter = program.data()};
+  if (setsockopt(udp_socket, SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof filter) != 0) {
+    return fail(std::string("cannot filter LCM's datagrams: ") + std::strerror(errno));
+  }
+  return {};
+}
+
+}  // namespace bushd::lcm

@@ -1,0 +1,23 @@
+// Keeps datagrams away from LCM that it does not survive.
+//
+// LCM's reassembly of fragmented messages (liblcm 1.3.1 and later) adds offset and length of a
+// fragment in 32 bits before it compares them with the message's size; a fragment whose sum wraps
+// around is copied outside the buffer, and the process dies or worse. bushd's messages are never
+// fragmented, so the kernel is told to drop every datagram that is not a whole message, on LCM's
+// own sockets, before LCM sees it.
+#pragma once
+
+#include <set>
+
+#include "base/result.h"
+
+namespace bushd::lcm {
+
+// Descriptors of this process that are UDP sockets. LCM does not give its sockets out: they are
+// those that are there after it was opened and were not before.
+std::set<int> udp_sockets();
+
+// Only datagrams with the magic of a whole LCM message reach the socket from now on.
+Result<void> accept_whole_messages_only(int udp_socket);
+
+}  // namespace bushd::lcm
