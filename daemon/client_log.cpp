@@ -7,9 +7,9 @@ namespace bushd::daemon {
 ClientLog::Verdict ClientLog::note(const std::string& client_id, std::int64_t number) {
   const auto found = clients_.find(client_id);
   if (found == clients_.end() && clients_.size() >= kClients) {
-    clients_.erase(std::min_element(clients_.begin(), clients_.end(), [](const auto& a, const auto& b) {
-      return a.second.used < b.second.used;
-    }));
+    clients_.erase(std::min_element(
+        clients_.begin(), clients_.end(),
+        [](const auto& a, const auto& b) { return a.second.used < b.second.used; }));
   }
   const bool first = found == clients_.end();
   Client& client = clients_[client_id];

@@ -1,4 +1,5 @@
-// Which commands of which client were answered how, so that a repeated command is answered again and not run again.
+// Which commands of which client were answered how, so that a repeated command is answered again
+// and not run again.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@ namespace bushd::daemon {
 
 class ClientLog {
  public:
-  static constexpr std::size_t kClients = 256;          // the one longest silent is forgotten first
+  static constexpr std::size_t kClients = 256;  // the one longest silent is forgotten first
   static constexpr std::size_t kCommandsPerClient = 64;  // the oldest is forgotten first
 
   enum class Verdict {

@@ -1,4 +1,5 @@
-// Commands of clients: refused with a reason, or accepted and later answered with exactly one result.
+// Commands of clients: refused with a reason, or accepted and later answered with exactly one
+// result.
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -42,7 +43,8 @@ void Core::command(std::int64_t now_us, const command_t& command) {
              "number " + std::to_string(client.number) +
                  " is not above the highest that this client has used; count up");
       return;
-    case ClientLog::Verdict::kNew: break;
+    case ClientLog::Verdict::kNew:
+      break;
   }
   if (const std::string why = refuse(command); !why.empty()) {
     answer(client, reply_t::REFUSED, "refused", why);
@@ -89,7 +91,8 @@ std::string Core::refuse(const command_t& command) const {
       if (!why.empty()) return motor.config->name + ": " + why;
     }
     if (command.kind == command_t::SET_POSITION) {
-      if (motor.axis.busy()) return motor.config->name + " moves; its position can be set at rest only";
+      if (motor.axis.busy())
+        return motor.config->name + " moves; its position can be set at rest only";
       if (value > kMaxPosition || value < -kMaxPosition) {
         return motor.config->name + ": positions lie within +-" + std::to_string(kMaxPosition);
       }
@@ -153,7 +156,8 @@ void Core::start_move(std::int64_t now_us, const command_t& command) {
     const Mcu& mcu = mcus_[motor.mcu];
     const config::Bus& bus = config_.buses[motor.bus];
     const bool relative = command.kind == command_t::MOVE_RELATIVE;
-    const std::int64_t steps = relative ? command.steps[i] : command.steps[i] - motor.position_steps;
+    const std::int64_t steps =
+        relative ? command.steps[i] : command.steps[i] - motor.position_steps;
     motor.log_id = ++last_log_id_;
     motor.axis.start(motor.position_steps, steps, start[motor.bus]);
     const nlohmann::json line = {{"event", "move"},
@@ -230,8 +234,10 @@ void Core::start_pending(std::int64_t now_us, const command_t& command) {
     pending.mcus = mcus_of(pending.motors);
     for (const std::size_t m : pending.mcus) {
       const Mcu& mcu = mcus_[m];
-      if (command.kind == command_t::ENABLE) master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_ENABLE);
-      if (command.kind == command_t::DISABLE) master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_DISABLE);
+      if (command.kind == command_t::ENABLE)
+        master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_ENABLE);
+      if (command.kind == command_t::DISABLE)
+        master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_DISABLE);
       if (command.kind == command_t::CLEAR_FAULTS) {
         master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_CLEAR_FAULTS);
       }
@@ -282,7 +288,8 @@ void Core::check_pending(std::int64_t now_us, std::optional<std::size_t> reporte
     }
     const bool stop = pending.kind == command_t::STOP;
     const bool done = stop ? pending.motors.empty() : pending.mcus.empty();
-    // A motor that runs down a long table may take its time: the deadline is for MCUs that do not answer.
+    // A motor that runs down a long table may take its time: the deadline is for MCUs that do not
+    // answer.
     if (!done && failure.empty() && !stop && now_us > pending.deadline_us) {
       failure = "MCU " + mcus_[pending.mcus.front()].config->id + " did not confirm it in time";
     }

@@ -6,8 +6,8 @@
 
 namespace bushd::daemon {
 
-std::uint16_t Core::Bus::render(std::size_t mcu, std::uint8_t motor, link::Tick first, unsigned count,
-                                std::int16_t* out, std::size_t stride) {
+std::uint16_t Core::Bus::render(std::size_t mcu, std::uint8_t motor, link::Tick first,
+                                unsigned count, std::int16_t* out, std::size_t stride) {
   const int index = core.mcus_[mcus[mcu]].motor_of[motor];
   motion::Axis* axis = index < 0 ? nullptr : &core.motors_[static_cast<std::size_t>(index)].axis;
   if (axis != nullptr && axis->busy()) return axis->render(first, count, out, stride);
@@ -34,7 +34,8 @@ Core::Core(const config::Config& config, Outputs& outputs) : config_(config), ou
   }
   for (std::size_t b = 0; b < config.buses.size(); ++b) {
     const config::Bus& bus = config.buses[b];
-    link::BusSetup setup{.baud = bus.baud, .tick_ns = bus.tick_ns(), .format = bus.format, .mcus = {}};
+    link::BusSetup setup{
+        .baud = bus.baud, .tick_ns = bus.tick_ns(), .format = bus.format, .mcus = {}};
     std::vector<std::size_t> members;
     for (std::size_t m = 0; m < mcus_.size(); ++m) {
       if (mcus_[m].bus != b) continue;
@@ -45,7 +46,8 @@ Core::Core(const config::Config& config, Outputs& outputs) : config_(config), ou
       for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
         const int motor = mcus_[m].motor_of[output];
         if (motor < 0) continue;
-        const bushd_table* table = &config.table_of(config.motors[static_cast<std::size_t>(motor)]).view();
+        const bushd_table* table =
+            &config.table_of(config.motors[static_cast<std::size_t>(motor)]).view();
         const auto found = std::find(mcu.tables.begin(), mcu.tables.end(), table);
         mcu.table_of_motor[output] = static_cast<int>(found - mcu.tables.begin());
         if (found == mcu.tables.end()) mcu.tables.push_back(table);
@@ -59,10 +61,18 @@ Core::Core(const config::Config& config, Outputs& outputs) : config_(config), ou
 
 Core::~Core() = default;
 
-link::Master& Core::master_of(const Mcu& mcu) { return buses_[mcu.bus]->master; }
-const link::Master& Core::master_of(const Mcu& mcu) const { return buses_[mcu.bus]->master; }
-const link::McuView& Core::view_of(const Mcu& mcu) const { return master_of(mcu).view(mcu.in_bus); }
-std::size_t Core::mcu_at(std::size_t bus, std::size_t in_bus) const { return buses_[bus]->mcus[in_bus]; }
+link::Master& Core::master_of(const Mcu& mcu) {
+  return buses_[mcu.bus]->master;
+}
+const link::Master& Core::master_of(const Mcu& mcu) const {
+  return buses_[mcu.bus]->master;
+}
+const link::McuView& Core::view_of(const Mcu& mcu) const {
+  return master_of(mcu).view(mcu.in_bus);
+}
+std::size_t Core::mcu_at(std::size_t bus, std::size_t in_bus) const {
+  return buses_[bus]->mcus[in_bus];
+}
 
 void Core::port_opened(std::int64_t now_us, std::size_t bus) {
   buses_[bus]->master.port_opened(now_us);

@@ -1,5 +1,6 @@
-// The daemon without I/O: configuration, bytes, commands and time go in; bytes, replies, states and log lines come
-// out. daemon/main.cpp puts ports, LCM and the clock around it; simulations put virtual ones.
+// The daemon without I/O: configuration, bytes, commands and time go in; bytes, replies, states and
+// log lines come out. daemon/main.cpp puts ports, LCM and the clock around it; simulations put
+// virtual ones.
 //
 // Not thread-safe; all times are microseconds of one monotonic clock.
 #pragma once
@@ -27,7 +28,8 @@ namespace bushd::daemon {
 
 enum class LogLevel { kInfo, kWarning, kError };
 
-// Where the core's output goes. Called from within the core's functions; must not call back into the core.
+// Where the core's output goes. Called from within the core's functions; must not call back into
+// the core.
 class Outputs {
  public:
   virtual ~Outputs() = default;
@@ -72,19 +74,19 @@ class Core {
     const config::Motor* config;
     std::string table_name;
     motion::Axis axis;
-    std::size_t bus;           // index in buses_
-    std::size_t mcu;           // index in mcus_
-    std::uint64_t log_id = 0;  // of its present move in the log of moves
+    std::size_t bus;                  // index in buses_
+    std::size_t mcu;                  // index in mcus_
+    std::uint64_t log_id = 0;         // of its present move in the log of moves
     std::int64_t position_steps = 0;  // as reported last
     bool trusted = true;
   };
   struct Mcu {
     const config::Mcu* config;
     std::size_t bus;
-    std::size_t in_bus;                                 // index within the bus's master
-    std::array<int, BUSHD_MOTORS_PER_MCU> motor_of{};   // by output; -1: none
-    std::optional<std::uint16_t> boot_number;           // of the boot that positions belong to
-    bool clearing = false;                              // faults are being cleared
+    std::size_t in_bus;                                // index within the bus's master
+    std::array<int, BUSHD_MOTORS_PER_MCU> motor_of{};  // by output; -1: none
+    std::optional<std::uint16_t> boot_number;          // of the boot that positions belong to
+    bool clearing = false;                             // faults are being cleared
   };
   struct Client {
     std::string id;
@@ -94,9 +96,9 @@ class Core {
   struct Pending {
     Client client;
     std::int8_t kind;
-    std::vector<std::size_t> motors;    // STOP: still moving; SET_POSITION: all
-    std::vector<std::int64_t> steps;    // SET_POSITION
-    std::vector<std::size_t> mcus;      // whose report is awaited
+    std::vector<std::size_t> motors;  // STOP: still moving; SET_POSITION: all
+    std::vector<std::int64_t> steps;  // SET_POSITION
+    std::vector<std::size_t> mcus;    // whose report is awaited
     std::int64_t deadline_us;
   };
 

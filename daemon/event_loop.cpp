@@ -71,8 +71,8 @@ Result<void> EventLoop::set_up() {
   if (signals_ < 0) return fail(std::string("signalfd: ") + std::strerror(errno));
   if (const auto watched = watch(signals_, EPOLLIN, kSignalTag); !watched) return watched;
   if (const auto watched = watch(transport_.fd(), EPOLLIN, kLcmTag); !watched) return watched;
-  transport_.subscribe<command_t>(command_channel_,
-                                  [this](const command_t& command) { core_.command(now_us(), command); });
+  transport_.subscribe<command_t>(
+      command_channel_, [this](const command_t& command) { core_.command(now_us(), command); });
   return {};
 }
 
@@ -90,7 +90,8 @@ Result<void> EventLoop::run() {
     std::array<epoll_event, 16> events;
     const std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
     const timespec wait = {.tv_sec = wait_us / 1'000'000, .tv_nsec = wait_us % 1'000'000 * 1000};
-    const int n = ::epoll_pwait2(epoll_, events.data(), static_cast<int>(events.size()), &wait, nullptr);
+    const int n =
+        ::epoll_pwait2(epoll_, events.data(), static_cast<int>(events.size()), &wait, nullptr);
     if (n < 0 && errno != EINTR) return fail(std::string("epoll: ") + std::strerror(errno));
     for (int i = 0; i < n; ++i) {
       const epoll_event& event = events[static_cast<std::size_t>(i)];
@@ -104,7 +105,8 @@ Result<void> EventLoop::run() {
       }
     }
   }
-  if (!core_.at_rest()) spdlog::error("not all motors are known to be at rest; MCUs run down by themselves");
+  if (!core_.at_rest())
+    spdlog::error("not all motors are known to be at rest; MCUs run down by themselves");
   log_cpu_share();
   return {};
 }
@@ -115,7 +117,8 @@ std::int64_t EventLoop::next_wake_us() const {
     if (!port.serial) wake = std::min(wake, port.open_due_us);
   }
   if (shut_down_by_us_) wake = std::min(wake, *shut_down_by_us_);
-  if (std::any_of(lost_.begin(), lost_.end(), [](const auto& lost) { return lost.has_value(); })) wake = 0;
+  if (std::any_of(lost_.begin(), lost_.end(), [](const auto& lost) { return lost.has_value(); }))
+    wake = 0;
   return wake;
 }
 
@@ -154,7 +157,8 @@ void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& 
   port.serial.reset();  // closing takes it out of the epoll set
   port.open_due_us = now + kReopenUs;
   port.last_error = config.port + ": " + cause;
-  spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, config.port, cause);
+  spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, config.port,
+                cause);
   core_.port_lost(now, bus, "is out of reach: port " + port.last_error);
 }
 
@@ -209,9 +213,13 @@ void EventLoop::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
   }
 }
 
-void EventLoop::reply(const reply_t& reply) { transport_.publish(reply_channel_, reply); }
+void EventLoop::reply(const reply_t& reply) {
+  transport_.publish(reply_channel_, reply);
+}
 
-void EventLoop::state(const state_t& state) { transport_.publish(state_channel_, state); }
+void EventLoop::state(const state_t& state) {
+  transport_.publish(state_channel_, state);
+}
 
 void EventLoop::move_log(const std::string& json_line) {
   if (move_log_ == nullptr) return;
@@ -222,9 +230,15 @@ void EventLoop::move_log(const std::string& json_line) {
 
 void EventLoop::log(LogLevel level, const std::string& text) {
   switch (level) {
-    case LogLevel::kInfo: spdlog::info(text); break;
-    case LogLevel::kWarning: spdlog::warn(text); break;
-    case LogLevel::kError: spdlog::error(text); break;
+    case LogLevel::kInfo:
+      spdlog::info(text);
+      break;
+    case LogLevel::kWarning:
+      spdlog::warn(text);
+      break;
+    case LogLevel::kError:
+      spdlog::error(text);
+      break;
   }
 }
 

@@ -22,13 +22,14 @@ class EventLoop : private Outputs {
   EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log);
   ~EventLoop() override;
 
-  // Runs until SIGTERM or SIGINT, then ramps all motors down and returns. Precondition: both signals are blocked in
-  // every thread of the process (lcm::Transport starts some).
+  // Runs until SIGTERM or SIGINT, then ramps all motors down and returns. Precondition: both
+  // signals are blocked in every thread of the process (lcm::Transport starts some).
   Result<void> run();
 
  private:
   static constexpr std::int64_t kReopenUs = 500'000;
-  // A ramp-down of the longest table fits; an MCU that does not answer must not keep the daemon from ending.
+  // A ramp-down of the longest table fits; an MCU that does not answer must not keep the daemon
+  // from ending.
   static constexpr std::int64_t kShutDownUs = 15'000'000;
 
   struct Port {
@@ -61,7 +62,8 @@ class EventLoop : private Outputs {
   MoveLog* move_log_;
   Core core_;
   std::vector<Port> ports_;
-  std::vector<std::optional<std::string>> lost_;  // by bus: a write failed, to be handled outside the core
+  std::vector<std::optional<std::string>>
+      lost_;  // by bus: a write failed, to be handled outside the core
   std::string state_channel_;
   std::string reply_channel_;
   std::string command_channel_;

@@ -19,9 +19,15 @@ void Core::handle_events(std::int64_t now_us, std::size_t bus) {
   for (const link::Event& event : buses_[bus]->master.take_events()) {
     const std::size_t mcu = mcu_at(bus, event.mcu);
     switch (event.kind) {
-      case link::Event::Kind::kOnline: on_online(mcu); break;
-      case link::Event::Kind::kOffline: on_offline(mcu); break;
-      case link::Event::Kind::kReport: on_report(now_us, mcu); break;
+      case link::Event::Kind::kOnline:
+        on_online(mcu);
+        break;
+      case link::Event::Kind::kOffline:
+        on_offline(mcu);
+        break;
+      case link::Event::Kind::kReport:
+        on_report(now_us, mcu);
+        break;
       case link::Event::Kind::kLateStart: {
         const int motor = mcus_[mcu].motor_of[event.motor];
         const bool link_fault = (view_of(mcus_[mcu]).report.faults & BUSHD_FAULT_LINK) != 0;
@@ -50,7 +56,8 @@ void Core::handle_events(std::int64_t now_us, std::size_t bus) {
 void Core::on_online(std::size_t index) {
   Mcu& mcu = mcus_[index];
   const link::McuView& view = view_of(mcu);
-  // Positions are counts since the MCU's boot; a boot that this daemon did not see the positions of has lost them.
+  // Positions are counts since the MCU's boot; a boot that this daemon did not see the positions of
+  // has lost them.
   const bool restarted = mcu.boot_number && *mcu.boot_number != view.report.boot_number;
   mcu.boot_number = view.report.boot_number;
   mcu.clearing = false;
@@ -60,10 +67,11 @@ void Core::on_online(std::size_t index) {
     motor.position_steps = view.report.motor[output].position_steps;
     if (restarted) motor.trusted = false;
   }
-  outputs_.log(restarted ? LogLevel::kWarning : LogLevel::kInfo,
-               "MCU " + mcu.config->id + " is ready, boot number " +
-                   std::to_string(view.report.boot_number) +
-                   (restarted ? "; it restarted, so its motors' positions are uncertain: set them" : ""));
+  outputs_.log(
+      restarted ? LogLevel::kWarning : LogLevel::kInfo,
+      "MCU " + mcu.config->id + " is ready, boot number " +
+          std::to_string(view.report.boot_number) +
+          (restarted ? "; it restarted, so its motors' positions are uncertain: set them" : ""));
   changed_ = true;
 }
 
@@ -109,9 +117,9 @@ void Core::follow_motor(std::size_t index, const Mcu& mcu, const link::McuView& 
   if (motor.position_steps != motor.axis.target_steps()) {
     motor.trusted = false;
     end_motor(index, motion::Outcome::kFault,
-              "MCU " + mcu.config->id + " counted position " + std::to_string(motor.position_steps) +
-                  " where the table leads to " + std::to_string(motor.axis.target_steps()) +
-                  "; check the position and set it");
+              "MCU " + mcu.config->id + " counted position " +
+                  std::to_string(motor.position_steps) + " where the table leads to " +
+                  std::to_string(motor.axis.target_steps()) + "; check the position and set it");
   } else if (motor.position_steps != motor.axis.wanted_steps()) {
     end_motor(index, motion::Outcome::kStopped, "stopped on request");
   } else {
@@ -119,13 +127,14 @@ void Core::follow_motor(std::size_t index, const Mcu& mcu, const link::McuView& 
   }
 }
 
-// The daemon knows where the motors are again, so the fault has served its purpose; it stays latched as long as a
-// motor moves or a move has not got its result.
+// The daemon knows where the motors are again, so the fault has served its purpose; it stays
+// latched as long as a motor moves or a move has not got its result.
 void Core::clear_link_fault(Mcu& mcu) {
   const link::McuView& view = view_of(mcu);
   const bool faulty = (view.report.faults & (BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC)) != 0;
   if (faulty && !mcu.clearing && view.report.moving == 0) {
-    outputs_.log(LogLevel::kWarning, "MCU " + mcu.config->id + ": " + fault_text(view.report.faults) +
+    outputs_.log(LogLevel::kWarning, "MCU " + mcu.config->id + ": " +
+                                         fault_text(view.report.faults) +
                                          "; positions are read, clearing the fault");
     master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_CLEAR_FAULTS);
   }

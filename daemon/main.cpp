@@ -1,5 +1,5 @@
-// bushd: the program. Exit codes: 0 ended on request or the configuration is good, 1 it could not start or go on,
-// others: wrong usage (CLI11).
+// bushd: the program. Exit codes: 0 ended on request or the configuration is good, 1 it could not
+// start or go on, others: wrong usage (CLI11).
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -55,11 +55,13 @@ int main(int argc, char** argv) {
   std::string config_path;
   std::string check_path;
   std::string move_log_path;
-  auto* config_option = app.add_option("--config", config_path, "configuration file")->type_name("FILE");
-  auto* check_option =
-      app.add_option("--check-config", check_path, "say whether this configuration is good, and end")
-          ->type_name("FILE");
-  app.add_option("--move-log", move_log_path, "append moves and their results to this file, as JSON lines")
+  auto* config_option =
+      app.add_option("--config", config_path, "configuration file")->type_name("FILE");
+  auto* check_option = app.add_option("--check-config", check_path,
+                                      "say whether this configuration is good, and end")
+                           ->type_name("FILE");
+  app.add_option("--move-log", move_log_path,
+                 "append moves and their results to this file, as JSON lines")
       ->type_name("FILE");
   config_option->excludes(check_option);
   CLI11_PARSE(app, argc, argv);

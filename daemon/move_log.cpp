@@ -11,8 +11,9 @@ namespace bushd::daemon {
 Result<MoveLog> MoveLog::open(const std::string& path) {
   const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (fd < 0) {
-    return fail(Error{.message = std::string("the log of moves cannot be opened: ") + std::strerror(errno),
-                      .file = path});
+    return fail(
+        Error{.message = std::string("the log of moves cannot be opened: ") + std::strerror(errno),
+              .file = path});
   }
   return MoveLog(fd, path);
 }
@@ -27,8 +28,9 @@ Result<void> MoveLog::append(const std::string& line) {
   const std::string text = line + "\n";
   const ssize_t n = ::write(fd_, text.data(), text.size());
   if (n == static_cast<ssize_t>(text.size())) return {};
-  return fail(Error{.message = std::string("a line was lost: ") + (n < 0 ? std::strerror(errno) : "disk full"),
-                    .file = path_});
+  return fail(Error{
+      .message = std::string("a line was lost: ") + (n < 0 ? std::strerror(errno) : "disk full"),
+      .file = path_});
 }
 
 }  // namespace bushd::daemon

@@ -1,4 +1,5 @@
-// The log of moves: one JSON object a line, appended whole, so that a reader never sees half a line.
+// The log of moves: one JSON object a line, appended whole, so that a reader never sees half a
+// line.
 #pragma once
 
 #include <string>
@@ -10,7 +11,9 @@ namespace bushd::daemon {
 class MoveLog {
  public:
   static Result<MoveLog> open(const std::string& path);
-  MoveLog(MoveLog&& other) noexcept : fd_(other.fd_), path_(std::move(other.path_)) { other.fd_ = -1; }
+  MoveLog(MoveLog&& other) noexcept : fd_(other.fd_), path_(std::move(other.path_)) {
+    other.fd_ = -1;
+  }
   MoveLog(const MoveLog&) = delete;
   MoveLog& operator=(const MoveLog&) = delete;
   ~MoveLog();  // brings it to the disk

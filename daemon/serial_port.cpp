@@ -16,13 +16,15 @@
 namespace bushd::daemon {
 namespace {
 
-constexpr std::size_t kMaxUnsent = 65536;  // over a second at any rate in use: nobody reads at the other end
+constexpr std::size_t kMaxUnsent =
+    65536;  // over a second at any rate in use: nobody reads at the other end
 
 struct Rate {
   std::uint32_t baud;
   LibSerial::BaudRate rate;
 };
-#define BUSHD_RATE(n) {n, LibSerial::BaudRate::BAUD_##n}
+#define BUSHD_RATE(n) \
+  { n, LibSerial::BaudRate::BAUD_##n }
 constexpr Rate kRates[] = {
     BUSHD_RATE(50),      BUSHD_RATE(75),      BUSHD_RATE(110),     BUSHD_RATE(134),
     BUSHD_RATE(150),     BUSHD_RATE(200),     BUSHD_RATE(300),     BUSHD_RATE(600),
@@ -38,13 +40,14 @@ Error port_error(const std::string& path, const std::string& what, int error) {
   return {.message = what + ": " + std::strerror(error), .file = path};
 }
 
-// Only a tty that can be opened reaches libserial: a SerialPort whose Open failed half-way cannot be destroyed.
+// Only a tty that can be opened reaches libserial: a SerialPort whose Open failed half-way cannot
+// be destroyed.
 Result<void> check_tty(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) {
     const int error = errno;
-    const char* what = error == EACCES ? "may not be opened (is the user in group dialout?)"
-                                       : "cannot be opened";
+    const char* what =
+        error == EACCES ? "may not be opened (is the user in group dialout?)" : "cannot be opened";
     return fail(port_error(path, what, error));
   }
   const bool tty = ::isatty(fd) == 1;
@@ -85,7 +88,8 @@ Result<int> open_with_libserial(const std::string& path, LibSerial::BaudRate rat
 }
 
 void ask_for_low_latency(int fd) {
-  // USB adapters hold bytes back for up to 16 ms otherwise. A pty and many drivers do not know it: then it stays.
+  // USB adapters hold bytes back for up to 16 ms otherwise. A pty and many drivers do not know it:
+  // then it stays.
   serial_struct serial{};
   if (::ioctl(fd, TIOCGSERIAL, &serial) != 0) return;
   serial.flags |= ASYNC_LOW_LATENCY;

@@ -1,6 +1,6 @@
-// One serial port, opened and set up with libserial, then read and written without blocking on a descriptor of its
-// own: libserial's reads poll with sleeps, its writes spin, and its destructor ends the process after a hang-up
-// (docs/design.md, "Serial ports").
+// One serial port, opened and set up with libserial, then read and written without blocking on a
+// descriptor of its own: libserial's reads poll with sleeps, its writes spin, and its destructor
+// ends the process after a hang-up (docs/design.md, "Serial ports").
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ namespace bushd::daemon {
 
 class SerialPort {
  public:
-  // 8 data bits, no parity, 1 stop bit, raw, no flow control; locked against other programs. `baud` is one of libserial's
-  // fixed rates. Never blocks.
+  // 8 data bits, no parity, 1 stop bit, raw, no flow control; locked against other programs. `baud`
+  // is one of libserial's fixed rates. Never blocks.
   static Result<SerialPort> open(const std::string& path, std::uint32_t baud);
 
   SerialPort(SerialPort&& other) noexcept;
@@ -26,8 +26,9 @@ class SerialPort {
 
   // Appends what has arrived to `bytes`. An error means that the port is gone.
   Result<void> read(std::vector<std::uint8_t>& bytes);
-  // Sends now what the driver takes and keeps the rest; wants_to_write() then asks for flush() when the descriptor
-  // is writable. An error means that the port is gone or has taken nothing for very long.
+  // Sends now what the driver takes and keeps the rest; wants_to_write() then asks for flush() when
+  // the descriptor is writable. An error means that the port is gone or has taken nothing for very
+  // long.
   Result<void> write(std::span<const std::uint8_t> bytes);
   Result<void> flush();
   bool wants_to_write() const { return !unsent_.empty(); }

@@ -9,10 +9,14 @@ const char* state_word(const link::McuView& view) {
   if (view.phase == link::McuPhase::kOffline) return "OFFLINE";
   if (view.phase == link::McuPhase::kConnecting) return "BUSY";
   switch (view.report.state) {
-    case BUSHD_STATE_READY: return "READY";
-    case BUSHD_STATE_RUN: return "RUN";
-    case BUSHD_STATE_FAULT: return "FAULT";
-    default: return "BUSY";
+    case BUSHD_STATE_READY:
+      return "READY";
+    case BUSHD_STATE_RUN:
+      return "RUN";
+    case BUSHD_STATE_FAULT:
+      return "FAULT";
+    default:
+      return "BUSY";
   }
 }
 

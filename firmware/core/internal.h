@@ -7,12 +7,15 @@
 // The first tick that can still be changed: the next one is already prepared.
 #define FIRST_OPEN(mcu) ((mcu)->tick + 2u)
 
-// Tick numbers wrap (at 2.56 ms after 127 days); differences do not, as long as they are below 2^31.
+// Tick numbers wrap (at 2.56 ms after 127 days); differences do not, as long as they are below
+// 2^31.
 static inline int32_t ticks_after(uint32_t tick, uint32_t reference) {
   return (int32_t)(tick - reference);
 }
 
-static inline uint16_t motor_bit(uint8_t motor) { return (uint16_t)(1u << motor); }
+static inline uint16_t motor_bit(uint8_t motor) {
+  return (uint16_t)(1u << motor);
+}
 
 static inline int16_t* queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t motor) {
   const uint32_t row = tick & (uint32_t)(mcu->config.queue_ticks - 1u);

@@ -26,8 +26,8 @@ void bushd_mcu_update_state(bushd_mcu* mcu) {
   }
 }
 
-// The engine against known answers: a wrong compiler, a broken flash cell or bad RAM shows here before a motor
-// can move by it.
+// The engine against known answers: a wrong compiler, a broken flash cell or bad RAM shows here
+// before a motor can move by it.
 static bool engine_self_test(bushd_mcu* mcu) {
   static const uint8_t kDigits[9] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
   static const uint16_t kCodes[3] = {4, 3, 2};
@@ -154,9 +154,10 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
   if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
   mcu->tick_ns = message->tick_ns;
   mcu->format = message->format;
-  // Another tick length is another time: the MCU must be told the bus's tick again, and its tables be checked
-  // against it again.
-  mcu->flags = (uint8_t)((mcu->flags | BUSHD_FLAG_CONFIGURED) & ~(BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK));
+  // Another tick length is another time: the MCU must be told the bus's tick again, and its tables
+  // be checked against it again.
+  mcu->flags =
+      (uint8_t)((mcu->flags | BUSHD_FLAG_CONFIGURED) & ~(BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK));
   mcu->behind_ns = 0;
   mcu->settling = 2;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -191,26 +192,36 @@ static bushd_status set_position(bushd_mcu* mcu, const bushd_set_position* messa
   return BUSHD_OK;
 }
 
-// Decodes into a local and hands it to the function that acts; a decoding error is the answer as it is.
-#define HANDLE(kind, act)                                                          \
-  do {                                                                             \
-    bushd_##kind message;                                                          \
-    const bushd_status decoded =                                                   \
-        bushd_decode_##kind(frame->payload, frame->payload_size, &message);        \
-    return decoded == BUSHD_OK ? act(mcu, &message) : decoded;                     \
+// Decodes into a local and hands it to the function that acts; a decoding error is the answer as it
+// is.
+#define HANDLE(kind, act)                                                   \
+  do {                                                                      \
+    bushd_##kind message;                                                   \
+    const bushd_status decoded =                                            \
+        bushd_decode_##kind(frame->payload, frame->payload_size, &message); \
+    return decoded == BUSHD_OK ? act(mcu, &message) : decoded;              \
   } while (0)
 
 static bushd_status handle_request(bushd_mcu* mcu, const bushd_frame* frame) {
   switch (frame->type) {
-    case BUSHD_MSG_CONFIGURE: HANDLE(configure, configure);
-    case BUSHD_MSG_TABLE_BEGIN: HANDLE(table_begin, bushd_mcu_table_begin);
-    case BUSHD_MSG_TABLE_DATA: HANDLE(table_data, bushd_mcu_table_data);
-    case BUSHD_MSG_TABLE_END: HANDLE(table_end, bushd_mcu_table_end);
-    case BUSHD_MSG_ASSIGN: HANDLE(assign, bushd_mcu_assign);
-    case BUSHD_MSG_CONTROL: HANDLE(control, control);
-    case BUSHD_MSG_SET_POSITION: HANDLE(set_position, set_position);
-    case BUSHD_MSG_TICKS: HANDLE(ticks, bushd_mcu_take_ticks);
-    default: return BUSHD_E_UNKNOWN_MESSAGE;
+    case BUSHD_MSG_CONFIGURE:
+      HANDLE(configure, configure);
+    case BUSHD_MSG_TABLE_BEGIN:
+      HANDLE(table_begin, bushd_mcu_table_begin);
+    case BUSHD_MSG_TABLE_DATA:
+      HANDLE(table_data, bushd_mcu_table_data);
+    case BUSHD_MSG_TABLE_END:
+      HANDLE(table_end, bushd_mcu_table_end);
+    case BUSHD_MSG_ASSIGN:
+      HANDLE(assign, bushd_mcu_assign);
+    case BUSHD_MSG_CONTROL:
+      HANDLE(control, control);
+    case BUSHD_MSG_SET_POSITION:
+      HANDLE(set_position, set_position);
+    case BUSHD_MSG_TICKS:
+      HANDLE(ticks, bushd_mcu_take_ticks);
+    default:
+      return BUSHD_E_UNKNOWN_MESSAGE;
   }
 }
 
@@ -226,7 +237,8 @@ static void handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time
   size_t size = 0;
   if (frame->type == BUSHD_MSG_IDENTIFY || frame->type == BUSHD_MSG_POLL) {
     if (frame->address == BUSHD_ADDRESS_BROADCAST) return;
-    size = frame->type == BUSHD_MSG_POLL ? encode_report(mcu, payload) : encode_identity(mcu, payload);
+    size =
+        frame->type == BUSHD_MSG_POLL ? encode_report(mcu, payload) : encode_identity(mcu, payload);
   } else {
     const bushd_status status = handle_request(mcu, frame);
     if (status != BUSHD_OK) {
@@ -237,7 +249,8 @@ static void handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time
     const bushd_acknowledgement acknowledgement = {(uint8_t)status};
     size = bushd_encode_acknowledgement(&acknowledgement, payload);
   }
-  // A delimiter comes first: it ends whatever the master took, while the line was idle, for a frame's beginning.
+  // A delimiter comes first: it ends whatever the master took, while the line was idle, for a
+  // frame's beginning.
   mcu->reply[0] = 0;
   const size_t wire =
       bushd_frame_encode(mcu->config.address, (uint8_t)(frame->type | BUSHD_TYPE_REPLY), frame->tag,
@@ -248,12 +261,14 @@ static void handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time
 void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, uint32_t time_in_tick_ns) {
   bushd_frame frame;
   switch (bushd_receive_byte(&mcu->receiver, byte, &frame)) {
-    case BUSHD_RECEIVE_MORE: return;
+    case BUSHD_RECEIVE_MORE:
+      return;
     case BUSHD_RECEIVE_BAD_CRC:
     case BUSHD_RECEIVE_BAD_LENGTH:
       mcu->bad_frames = saturating_increment(mcu->bad_frames);
       return;
-    case BUSHD_RECEIVE_FRAME: break;
+    case BUSHD_RECEIVE_FRAME:
+      break;
   }
   // Replies of other MCUs pass by on the same line.
   if (frame.type & BUSHD_TYPE_REPLY) return;

@@ -1,5 +1,5 @@
-// What a microcontroller must provide. Everything that the core cannot do by itself comes in through this
-// struct; `context` is handed back in every call. No function may block.
+// What a microcontroller must provide. Everything that the core cannot do by itself comes in
+// through this struct; `context` is handed back in every call. No function may block.
 #ifndef BUSHD_FIRMWARE_CORE_PORT_H
 #define BUSHD_FIRMWARE_CORE_PORT_H
 
@@ -14,8 +14,9 @@ extern "C" {
 typedef struct bushd_port {
   void* context;
 
-  // Sends these bytes on the bus as soon as the line is the MCU's (driver enable, turnaround and its release
-  // after the last stop bit are the port's). The buffer stays valid until the next call.
+  // Sends these bytes on the bus as soon as the line is the MCU's (driver enable, turnaround and
+  // its release after the last stop bit are the port's). The buffer stays valid until the next
+  // call.
   void (*transmit)(void* context, const uint8_t* wire, size_t size);
 
   // EN, common to all drivers of the MCU; true = drivers powered.

@@ -1,8 +1,10 @@
-// The tick queue. Per motor, everything before `known_until` is decided: queued, or known to be rest. A
-// frame is taken whole or not at all:
-//   ordinary      of the MCU's epoch; for a motor that moves at known_until it must join (no gap), ticks before
-//                 known_until are duplicates and left alone; for a motor at rest there it must not begin before it
-//   replacement   of epoch + 1; from its first tick on it stands instead of what was queued
+// The tick queue. Per motor, everything before `known_until` is decided: queued, or known to be
+// rest. A frame is taken whole or not at all:
+//   start         of the MCU's epoch; its motors are at rest at known_until and start there or
+//   later continuation  of the MCU's epoch; its motors move at known_until and it joins there (no
+//   gap) replacement   of epoch + 1; from its first tick on it stands instead of what was queued
+// Ticks before known_until that are not replaced are duplicates and left alone. That a start says
+// so is what tells a lost start from a motor that need not move yet.
 #include <string.h>
 
 #include "firmware/core/internal.h"
@@ -17,22 +19,28 @@ void bushd_mcu_clear_streams(bushd_mcu* mcu) {
   }
 }
 
+// `news`: the frame holds something for this motor that is not known yet.
 static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks,
-                                bool replace, bool* news) {
+                                bool* news) {
   if (m >= mcu->config.motors) return BUSHD_E_FORMAT;
   const bushd_mcu_motor* motor = &mcu->motor[m];
   if (motor->table < 0) return BUSHD_E_NO_TABLE;
   const int32_t first = ticks_after(ticks->first_tick, motor->known_until);
-  const bool at_rest = motor->delay == 0;
-  if (!at_rest && first > 0) return BUSHD_E_GAP;
-  if (replace) {
+  const bool moves_on = motor->delay != 0;  // at known_until
+  if (ticks->flags & BUSHD_TICKS_REPLACE) {
+    // Something must be queued to be replaced: if the start was lost, there is nothing to go on
+    // from.
+    if (moves_on ? first > 0 : first >= 0) return BUSHD_E_GAP;
     *news = true;
     return ticks_after(ticks->first_tick, FIRST_OPEN(mcu)) < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
   if (first + ticks->count <= 0) return BUSHD_OK;
-  if (at_rest && first < 0) return BUSHD_E_LATE;
   *news = true;
-  return BUSHD_OK;
+  if (ticks->flags & BUSHD_TICKS_START) {
+    if (moves_on) return BUSHD_E_STATE;
+    return first < 0 ? BUSHD_E_LATE : BUSHD_OK;
+  }
+  return moves_on && first <= 0 ? BUSHD_OK : BUSHD_E_GAP;
 }
 
 static bushd_status check_ticks(const bushd_mcu* mcu, const bushd_ticks* ticks) {
@@ -48,7 +56,7 @@ static bushd_status check_ticks(const bushd_mcu* mcu, const bushd_ticks* ticks) 
   bool news = false;
   for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((ticks->mask & motor_bit(m)) == 0) continue;
-    const bushd_status status = check_motor(mcu, m, ticks, replace, &news);
+    const bushd_status status = check_motor(mcu, m, ticks, &news);
     if (status != BUSHD_OK) return status;
   }
   return news ? BUSHD_OK : BUSHD_E_LATE;
@@ -92,8 +100,8 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
 static void start_running_down(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   const int direction = mcu->direction & motor_bit(m) ? 1 : -1;
-  // In the fine format the remainder is the elapsed share of the running delay; in the coarse one that share is
-  // unknown, and taking it as 0 makes the next step late rather than early.
+  // In the fine format the remainder is the elapsed share of the running delay; in the coarse one
+  // that share is unknown, and taking it as 0 makes the next step late rather than early.
   const int32_t progress = (int32_t)motor->remainder * direction;
   const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
   bushd_run_start_ramp_down(&motor->run, &mcu->table[motor->table].table, motor->delay, fraction,

@@ -1,16 +1,17 @@
-// The tick counter against the bus's. A SYNC frame's end is a mark that all MCUs hear at once; the next SYNC
-// tells when, in bus time, the mark before was. The difference to the own time of that mark is the error.
+// The tick counter against the bus's. A SYNC frame's end is a mark that all MCUs hear at once; the
+// next SYNC tells when, in bus time, the mark before was. The difference to the own time of that
+// mark is the error.
 //
-// Not yet in step: the counter jumps, and the rest of the difference is made up by lengthening one tick (a
-// timer can always wait longer, but not go back). In step: the next ticks are made longer or shorter until the
-// error is made up, each by at most 1/64, so that no step shifts by more.
+// Not yet in step: the counter jumps, and the rest of the difference is made up by lengthening one
+// tick (a timer can always wait longer, but not go back). In step: the next ticks are made longer
+// or shorter until the error is made up, each by at most 1/64, so that no step shifts by more.
 //
 // The error is known one mark late. So the present mark is noted as the clock will show it once the
-// correction is done: else the same error would be found in it again, corrected twice, and the clock would swing
-// around the bus's without end.
+// correction is done: else the same error would be found in it again, corrected twice, and the
+// clock would swing around the bus's without end.
 #include "firmware/core/internal.h"
 
-#define MAX_ERROR_DIVISOR 8
+#define MAX_ERROR_DIVISOR 2
 #define MAX_SLEW_DIVISOR 64
 
 static void adopt(bushd_mcu* mcu, const bushd_sync* sync) {
@@ -73,8 +74,9 @@ void bushd_mcu_slew(bushd_mcu* mcu) {
   if (mcu->settling != 0) --mcu->settling;
   if (mcu->behind_ns == 0) return;
   const int32_t slew = (int32_t)(mcu->tick_ns / MAX_SLEW_DIVISOR);
-  const int32_t step =
-      mcu->behind_ns > slew ? slew : mcu->behind_ns < -slew ? -slew : mcu->behind_ns;
+  const int32_t step = mcu->behind_ns > slew    ? slew
+                       : mcu->behind_ns < -slew ? -slew
+                                                : mcu->behind_ns;
   mcu->behind_ns -= step;
   mcu->port.adjust_tick(mcu->port.context, -step);
   // The next tick is the one that changes, so the clock shows it from the one after on.

@@ -1,4 +1,5 @@
-// Table memory: the tables' codes lie one behind the other; a table that is sent anew first gives its place back.
+// Table memory: the tables' codes lie one behind the other; a table that is sent anew first gives
+// its place back.
 #include <string.h>
 
 #include "firmware/core/internal.h"
@@ -50,7 +51,8 @@ bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* mess
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message) {
   bushd_mcu_table* entry = &mcu->table[message->slot];
   const uint32_t end = (uint32_t)message->offset + message->count;
-  // Pieces come in order; one that was sent again because its acknowledgement was lost is written again.
+  // Pieces come in order; one that was sent again because its acknowledgement was lost is written
+  // again.
   if (entry->valid || end > entry->count || message->offset > entry->received) return BUSHD_E_STATE;
   for (uint8_t i = 0; i < message->count; ++i) {
     mcu->config.codes[entry->first + message->offset + i] = bushd_get_u16(message->codes + 2u * i);

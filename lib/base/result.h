@@ -1,4 +1,5 @@
-// One way to fail on the host: Result<T>, with an Error that says where, what and what to do about it.
+// One way to fail on the host: Result<T>, with an Error that says where, what and what to do about
+// it.
 #pragma once
 
 #include <string>
@@ -32,6 +33,8 @@ using Result = tl::expected<T, Error>;
 inline tl::unexpected<Error> fail(std::string message) {
   return tl::unexpected<Error>(Error{.message = std::move(message)});
 }
-inline tl::unexpected<Error> fail(Error error) { return tl::unexpected<Error>(std::move(error)); }
+inline tl::unexpected<Error> fail(Error error) {
+  return tl::unexpected<Error>(std::move(error));
+}
 
 }  // namespace bushd

@@ -242,8 +242,10 @@ bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks
   if (message->flags & BUSHD_TICKS_DELAYS) message->delays = take(&r, 2u * message->motors);
   const size_t width = message->flags & BUSHD_TICKS_FINE ? 2 : 1;
   message->displacements = take(&r, width * message->motors * message->count);
-  const uint8_t known = BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS | BUSHD_TICKS_REPLACE;
-  return finish(&r, message->flags <= known && message->count >= 1 && message->mask != 0);
+  const uint8_t known =
+      BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS | BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
+  const uint8_t either = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
+  return finish(&r, message->flags <= known && (message->flags & either) != either && message->count >= 1 && message->mask != 0);
 }
 
 size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {

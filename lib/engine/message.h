@@ -127,7 +127,8 @@ typedef struct bushd_sync {
 enum {
   BUSHD_TICKS_FINE = 1 << 0,     // int16 displacements, else coarse bytes
   BUSHD_TICKS_DELAYS = 1 << 1,   // running delays at the end of the frame follow (else unchanged)
-  BUSHD_TICKS_REPLACE = 1 << 2   // for its motors: this instead of all that is queued from first_tick on
+  BUSHD_TICKS_REPLACE = 1 << 2,  // for its motors: this instead of all that is queued from first_tick on
+  BUSHD_TICKS_START = 1 << 3     // its motors start from rest here; without it they must be moving
 };
 
 // Displacements of `count` ticks for the motors in `mask`. Only these motors are touched.

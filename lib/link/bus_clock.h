@@ -1,8 +1,9 @@
 // The host's idea of bus time, from reports.
 //
-// A report says at which bus time it was made; its last byte reaches the host a known line time and an
-// unknown latency later. Latency is never negative, so the smallest difference "host minus bus" of the last reports
-// is the best: the estimate lags true bus time by the smallest latency seen, never leads it.
+// A report says at which bus time it was made; its last byte reaches the host a known line time and
+// an unknown latency later. Latency is never negative, so the smallest difference "host minus bus"
+// of the last reports is the best: the estimate lags true bus time by the smallest latency seen,
+// never leads it.
 #pragma once
 
 #include <array>
@@ -22,7 +23,8 @@ class BusClock {
 
   // The tick counter of a report, next to what this clock expects; the first one is taken as it is.
   Tick unwrap(std::uint32_t tick, std::int64_t now_us) const;
-  // Bus time (tick, ns into it) at host time `now_us`, the latency already taken off as far as it is known.
+  // Bus time (tick, ns into it) at host time `now_us`, the latency already taken off as far as it
+  // is known.
   void sample(Tick tick, std::int64_t ns_in_tick, std::int64_t now_us);
   // The tick that the bus is in; precondition: valid().
   Tick tick_at(std::int64_t now_us) const;

@@ -1,6 +1,7 @@
-// Sending: what is due next on a line where only one may talk at a time. Order of urgency: replacements and the
-// polls that confirm them, queues about to run empty, reports, time marks, configuration, filling queues, looking for
-// silent MCUs. While an answer is awaited nothing is sent.
+// Sending: what is due next on a line where only one may talk at a time. Order of urgency:
+// replacements and the polls that confirm them, queues about to run empty, reports, time marks,
+// configuration, filling queues, looking for silent MCUs. While an answer is awaited nothing is
+// sent.
 #include "link/master.h"
 
 #include <algorithm>
@@ -12,13 +13,14 @@ namespace {
 
 constexpr std::int64_t kQueueTargetUs = 300'000;  // queues are kept this full
 constexpr std::int64_t kQueueUrgentUs = 120'000;  // below this, ticks go before everything routine
-constexpr std::int64_t kStartLeadUs = 100'000;    // two polls: one lost first frame can still be repaired
-constexpr std::int64_t kReplaceLeadUs = 30'000;   // a frame in flight, an answer awaited, adapter latency
-constexpr std::int64_t kMaxBacklogUs = 4'000;     // bytes handed to the port but not yet on the line
-constexpr std::int64_t kReplyTimeoutUs = 40'000;  // beyond the reply's own time on the line
+constexpr std::int64_t kStartLeadUs =
+    100'000;  // two polls: one lost first frame can still be repaired
+constexpr std::int64_t kReplaceLeadUs =
+    30'000;  // a frame in flight, an answer awaited, adapter latency
+constexpr std::int64_t kMaxBacklogUs = 4'000;  // bytes handed to the port but not yet on the line
 constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be told the time
 constexpr std::int64_t kStreamWakeUs = 5'000;
-constexpr unsigned kMaxTicksPerFrame = 32;
+constexpr unsigned kMaxTicksPerFrame = 16;  // what one lost frame can cost
 
 std::int64_t line_us(std::uint32_t baud, std::size_t bytes) {
   return static_cast<std::int64_t>(bytes) * 10'000'000 / baud + 1;
@@ -72,7 +74,9 @@ void Master::begin(std::size_t mcu, std::uint8_t motor, Tick start) {
       .active = true, .finished = false, .start = start, .next = start, .delay_sent = {}};
 }
 
-void Master::drop(std::size_t mcu, std::uint8_t motor) { mcus_[mcu].stream[motor].active = false; }
+void Master::drop(std::size_t mcu, std::uint8_t motor) {
+  mcus_[mcu].stream[motor].active = false;
+}
 
 void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
   Mcu& m = mcus_[mcu];
@@ -85,8 +89,8 @@ void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
     if (begun && stream.next > first) sent |= static_cast<std::uint16_t>(1u << i);
   }
   if (sent == 0) return;
-  // Two wishes before the first was sent: one replacement must serve both, so it takes the earlier tick. If that is
-  // too late by now, it fails as a whole and is planned again.
+  // Two wishes before the first was sent: one replacement must serve both, so it takes the earlier
+  // tick. If that is too late by now, it fails as a whole and is planned again.
   m.replace_at = m.replacing == 0 ? first : std::min(m.replace_at, first);
   m.replacing |= sent;
 }
@@ -105,7 +109,9 @@ void Master::set_position(std::size_t mcu, std::uint8_t motor, std::int32_t posi
   mcus_[mcu].script.push_back(std::move(request));
 }
 
-std::vector<Event> Master::take_events() { return std::exchange(events_, {}); }
+std::vector<Event> Master::take_events() {
+  return std::exchange(events_, {});
+}
 
 std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   out_.clear();
@@ -127,9 +133,8 @@ std::int64_t Master::next_wake_us() const {
       continue;
     }
     wake = std::min(wake, mcu.poll_due_us);
-    const bool streaming = std::any_of(mcu.stream.begin(), mcu.stream.end(), [](const Stream& s) {
-      return s.active && !s.finished;
-    });
+    const bool streaming = std::any_of(mcu.stream.begin(), mcu.stream.end(),
+                                       [](const Stream& s) { return s.active && !s.finished; });
     if (streaming || !mcu.script.empty()) wake = std::min(wake, stepped_us_ + kStreamWakeUs);
     if (mcu.replacing != 0 || mcu.poll_now) wake = stepped_us_;
   }
@@ -144,7 +149,8 @@ bool Master::send_next(std::int64_t now_us) {
 
 void Master::send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,
                   std::span<const std::uint8_t> payload) {
-  // After silence a delimiter comes first: it ends whatever noise the receivers took for the beginning of a frame.
+  // After silence a delimiter comes first: it ends whatever noise the receivers took for the
+  // beginning of a frame.
   if (line_free_us_ < now_us) out_.push_back(0);
   const std::size_t before = out_.size();
   out_.resize(before + BUSHD_FRAME_MAX_WIRE);
@@ -158,8 +164,8 @@ void Master::ask(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
                  std::span<const std::uint8_t> payload, std::size_t reply_payload) {
   send(now_us, mcus_[mcu].setup.address, type, payload);
   const std::size_t reply_size = reply_payload + BUSHD_FRAME_OVERHEAD + 1;
-  const std::int64_t timeout = line_free_us_ + line_us(setup_.baud, reply_size) + kReplyTimeoutUs;
-  outstanding_ = Outstanding{mcu, type, tag_, timeout};
+  const std::int64_t timeout = line_free_us_ + line_us(setup_.baud, reply_size) + patience_us_;
+  outstanding_ = Outstanding{mcu, type, tag_, timeout, timeout - patience_us_};
 }
 
 bool Master::send_due_replacement(std::int64_t now_us) {
@@ -168,9 +174,10 @@ bool Master::send_due_replacement(std::int64_t now_us) {
     if (mcu.replacing == 0 || mcu.replaced != 0) continue;
     const auto motors = static_cast<std::uint8_t>(std::popcount(mcu.replacing));
     const bool fine = setup_.format == BUSHD_FORMAT_FINE;
-    const unsigned count = std::min<unsigned>(bushd_ticks_capacity(motors, fine, true), kMaxTicksPerFrame);
+    const unsigned count =
+        std::min<unsigned>(bushd_ticks_capacity(motors, fine, true), kMaxTicksPerFrame);
     ++mcu.epoch;
-    send_ticks(now_us, i, mcu.replacing, mcu.replace_at, count, true);
+    send_ticks(now_us, i, mcu.replacing, mcu.replace_at, count, BUSHD_TICKS_REPLACE);
     mcu.replaced = std::exchange(mcu.replacing, std::uint16_t{0});
     mcu.poll_now = true;
     return true;
@@ -208,7 +215,8 @@ bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us) {
   Tick least = INT64_MAX;
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     const Mcu& mcu = mcus_[i];
-    // While it is open whether a replacement was taken, no frame can be of the right epoch for sure.
+    // While it is open whether a replacement was taken, no frame can be of the right epoch for
+    // sure.
     if (mcu.view.phase != McuPhase::kOnline || mcu.replaced != 0) continue;
     for (const Stream& stream : mcu.stream) {
       if (stream.active && !stream.finished && stream.next < least) {
@@ -218,46 +226,50 @@ bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us) {
     }
   }
   if (neediest == mcus_.size()) return false;
-  const Tick depth = mcus_[neediest].view.identity.queue_ticks - 4;  // its tick counter runs on meanwhile
+  const Tick depth =
+      mcus_[neediest].view.identity.queue_ticks - 4;  // its tick counter runs on meanwhile
   return send_ticks_of(now_us, neediest, now + std::min(ticks_in(lead_us), depth));
 }
 
-// One frame for the motors of an MCU whose next tick is the oldest. Motors that start later or are ahead join
-// when the others have caught up.
+// One frame for the motors of an MCU whose next tick is the oldest. Motors that start, start later
+// or are ahead have frames of their own until the others have caught up.
 bool Master::send_ticks_of(std::int64_t now_us, std::size_t index, Tick horizon) {
   Mcu& mcu = mcus_[index];
   Tick first = INT64_MAX;
   for (const Stream& stream : mcu.stream) {
     if (stream.active && !stream.finished) first = std::min(first, stream.next);
   }
-  std::uint16_t mask = 0;
+  std::uint16_t starting = 0;
+  std::uint16_t moving = 0;
   Tick join = INT64_MAX;
   for (unsigned i = 0; i < BUSHD_MOTORS_PER_MCU; ++i) {
     const Stream& stream = mcu.stream[i];
     if (!stream.active || stream.finished) continue;
-    if (stream.next == first) {
-      mask |= static_cast<std::uint16_t>(1u << i);
-    } else {
+    if (stream.next != first) {
       join = std::min(join, stream.next);
+    } else {
+      (stream.next == stream.start ? starting : moving) |= static_cast<std::uint16_t>(1u << i);
     }
   }
+  const std::uint16_t mask = starting != 0 ? starting : moving;
   const auto motors = static_cast<std::uint8_t>(std::popcount(mask));
   const bool fine = setup_.format == BUSHD_FORMAT_FINE;
   const Tick capacity = std::min<Tick>(bushd_ticks_capacity(motors, fine, true), kMaxTicksPerFrame);
   const Tick count = std::min(capacity, join - first);
   // Only whole frames: a queue filled tick by tick would cost more in headers than in ticks.
   if (first + count > horizon) return false;
-  send_ticks(now_us, index, mask, first, static_cast<unsigned>(count), false);
+  send_ticks(now_us, index, mask, first, static_cast<unsigned>(count),
+             starting != 0 ? BUSHD_TICKS_START : 0);
   return true;
 }
 
 void Master::send_ticks(std::int64_t now_us, std::size_t index, std::uint16_t mask, Tick first,
-                        unsigned count, bool replacement) {
+                        unsigned count, unsigned flags) {
   Mcu& mcu = mcus_[index];
   const auto motors = static_cast<std::size_t>(std::popcount(mask));
   std::array<std::int16_t, kMaxTicksPerFrame * BUSHD_MOTORS_PER_MCU> displacement;
   std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delay;
-  bool tell_delays = replacement;
+  bool tell_delays = flags != 0;  // a start and a replacement begin a new story
   std::size_t column = 0;
   for (unsigned i = 0; i < BUSHD_MOTORS_PER_MCU; ++i) {
     if ((mask >> i & 1) == 0) continue;
@@ -271,9 +283,7 @@ void Master::send_ticks(std::int64_t now_us, std::size_t index, std::uint16_t ma
     ++column;
   }
   const bool fine = setup_.format == BUSHD_FORMAT_FINE;
-  unsigned flags = 0;
   if (fine) flags |= BUSHD_TICKS_FINE;
-  if (replacement) flags |= BUSHD_TICKS_REPLACE;
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
   std::size_t size = bushd_encode_ticks_head(
       mcu.epoch, static_cast<std::uint8_t>(flags), static_cast<std::uint32_t>(first),
@@ -291,8 +301,8 @@ void Master::send_ticks(std::int64_t now_us, std::size_t index, std::uint16_t ma
 
 bool Master::send_due_sync(std::int64_t now_us) {
   if (now_us < sync_due_us_) return false;
-  bool waiting = false;   // an MCU does not know the time yet
-  bool anybody = false;   // an MCU knows it
+  bool waiting = false;  // an MCU does not know the time yet
+  bool anybody = false;  // an MCU knows it
   bool listening = false;
   const McuView* reference = nullptr;
   for (const Mcu& mcu : mcus_) {

@@ -1,6 +1,7 @@
-// The master of one bus as a machine without I/O: host time and received bytes go in, bytes to send and events come
-// out. It finds and configures MCUs, keeps them in step, keeps their tick queues filled, repairs what was lost and
-// asks for reports. What motors shall do it asks from a TickSource.
+// The master of one bus as a machine without I/O: host time and received bytes go in, bytes to send
+// and events come out. It finds and configures MCUs, keeps them in step, keeps their tick queues
+// filled, repairs what was lost and asks for reports. What motors shall do it asks from a
+// TickSource.
 //
 // Not thread-safe; all times are microseconds of one monotonic clock.
 #pragma once
@@ -37,9 +38,10 @@ struct BusSetup {
 class TickSource {
  public:
   virtual ~TickSource() = default;
-  // Displacements of ticks first .. first+count-1 into out[0], out[stride], ...: fine ones as they are, coarse ones as
-  // the byte's value. Returns the delay of the step running at the end, 0 when the motor is at rest there for good.
-  // `first` may go back as far as the oldest tick that the MCU has not reported as known.
+  // Displacements of ticks first .. first+count-1 into out[0], out[stride], ...: fine ones as they
+  // are, coarse ones as the byte's value. Returns the delay of the step running at the end, 0 when
+  // the motor is at rest there for good. `first` may go back as far as the oldest tick that the MCU
+  // has not reported as known.
   virtual std::uint16_t render(std::size_t mcu, std::uint8_t motor, Tick first, unsigned count,
                                std::int16_t* out, std::size_t stride) = 0;
 };
@@ -91,13 +93,14 @@ class Master {
   std::size_t mcu_count() const { return mcus_.size(); }
   bool time_known() const { return clock_.valid(); }
   Tick tick_at(std::int64_t now_us) const { return clock_.tick_at(now_us); }
-  // Earliest tick at which a move of this motor can start and all its first frames still arrive well before.
+  // Earliest tick at which a move of this motor can start and all its first frames still arrive
+  // well before.
   Tick earliest_start(std::int64_t now_us, std::size_t mcu, std::uint8_t motor) const;
   // Earliest tick from which a replacement can take effect.
   Tick earliest_replace(std::int64_t now_us) const;
 
-  // From `start` on, until dropped, the source has ticks for this motor. Preconditions: the MCU is online, the motor has a
-  // table, start >= earliest_start.
+  // From `start` on, until dropped, the source has ticks for this motor. Preconditions: the MCU is
+  // online, the motor has a table, start >= earliest_start.
   void begin(std::size_t mcu, std::uint8_t motor, Tick start);
   // The source's answer for these motors has changed from `first` on.
   void replace(std::size_t mcu, std::uint16_t motors, Tick first);
@@ -119,7 +122,7 @@ class Master {
     bool active = false;
     bool finished = false;  // all is sent; until dropped it may still be repeated or replaced
     Tick start = 0;
-    Tick next = 0;                           // first tick not yet sent
+    Tick next = 0;                            // first tick not yet sent
     std::optional<std::uint16_t> delay_sent;  // as told at `next`; empty: must be told again
   };
   struct Request {
@@ -130,11 +133,12 @@ class Master {
     McuSetup setup;
     McuView view;
     std::array<Stream, BUSHD_MOTORS_PER_MCU> stream;
-    std::deque<Request> script;  // requests to make in this order, each acknowledged before the next
-    bool scripted = false;       // while connecting: the script has been written
+    std::deque<Request>
+        script;             // requests to make in this order, each acknowledged before the next
+    bool scripted = false;  // while connecting: the script has been written
     std::int64_t poll_due_us = 0;
     std::int64_t retry_due_us = 0;
-    int silent = 0;              // requests in a row without an answer
+    int silent = 0;  // requests in a row without an answer
     std::uint8_t epoch = 0;
     std::uint16_t replacing = 0;  // motors of a replacement to be sent
     Tick replace_at = 0;
@@ -146,6 +150,7 @@ class Master {
     std::uint8_t type;
     std::uint8_t tag;
     std::int64_t timeout_us;
+    std::int64_t expected_us;  // when the answer ends if nothing but the line takes time
   };
 
   void send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,
@@ -158,7 +163,7 @@ class Master {
   bool send_stream(std::int64_t now_us, std::int64_t lead_us);
   bool send_ticks_of(std::int64_t now_us, std::size_t mcu, Tick horizon);
   void send_ticks(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first,
-                  unsigned count, bool replacement);
+                  unsigned count, unsigned flags);
   bool send_due_poll(std::int64_t now_us);
   bool send_due_sync(std::int64_t now_us);
   bool send_script(std::int64_t now_us);
@@ -171,6 +176,7 @@ class Master {
   void handle_acknowledgement(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
                               std::uint8_t status);
   void follow_streams(std::size_t mcu);
+  void answered(std::int64_t now_us);
   void handle_timeout(std::int64_t now_us);
   std::string unfit(const Mcu& mcu, const bushd_identity& identity) const;  // "" when it fits
   void write_script(Mcu& mcu) const;
@@ -186,6 +192,11 @@ class Master {
   std::vector<Event> events_;
   bushd_receiver receiver_{};
   std::optional<Outstanding> outstanding_;
+  // How long an answer may be late. All wait meanwhile, so it follows the latencies seen: from 40
+  // ms, which any adapter keeps, down to 10 ms on a good one.
+  static constexpr std::int64_t kMaxPatienceUs = 40'000;
+  static constexpr std::int64_t kMinPatienceUs = 10'000;
+  std::int64_t patience_us_ = kMaxPatienceUs;
   std::int64_t line_free_us_ = 0;  // when all that was sent has left
   std::int64_t sync_due_us_ = 0;
   std::int64_t stepped_us_ = 0;

@@ -7,10 +7,10 @@
 namespace bushd::link {
 namespace {
 
-constexpr int kMaxSilent = 8;                      // unanswered requests in a row
-constexpr std::int64_t kRetryUs = 500'000;         // between two looks for a silent MCU
+constexpr int kMaxSilent = 10;                       // unanswered requests in a row: about 0.4 s
+constexpr std::int64_t kRetryUs = 500'000;           // between two looks for a silent MCU
 constexpr std::int64_t kRefusedRetryUs = 2'000'000;  // for an MCU that does not fit: no hurry
-constexpr std::int64_t kClockJumpUs = 400'000;     // more than any latency: the bus's time began anew
+constexpr std::int64_t kClockJumpUs = 400'000;  // more than any latency: the bus's time began anew
 
 }  // namespace
 
@@ -18,16 +18,22 @@ void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
   for (const std::uint8_t byte : bytes) {
     bushd_frame frame;
     switch (bushd_receive_byte(&receiver_, byte, &frame)) {
-      case BUSHD_RECEIVE_MORE: break;
-      case BUSHD_RECEIVE_FRAME: handle_frame(now_us, frame); break;
+      case BUSHD_RECEIVE_MORE:
+        break;
+      case BUSHD_RECEIVE_FRAME:
+        handle_frame(now_us, frame);
+        break;
       case BUSHD_RECEIVE_BAD_CRC:
-      case BUSHD_RECEIVE_BAD_LENGTH: ++bad_frames_; break;
+      case BUSHD_RECEIVE_BAD_LENGTH:
+        ++bad_frames_;
+        break;
     }
   }
 }
 
 void Master::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
-  // Only the answer that is awaited counts: an old one, an echo or a stranger's frame would be taken for it.
+  // Only the answer that is awaited counts: an old one, an echo or a stranger's frame would be
+  // taken for it.
   if (!outstanding_ || frame.tag != outstanding_->tag ||
       frame.type != (outstanding_->type | BUSHD_TYPE_REPLY) ||
       frame.address != mcus_[outstanding_->mcu].setup.address) {
@@ -41,8 +47,7 @@ void Master::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
       ++bad_frames_;
       return;
     }
-    outstanding_.reset();
-    mcus_[mcu].silent = 0;
+    answered(now_us);
     handle_report(now_us, mcu, report);
   } else if (type == BUSHD_MSG_IDENTIFY) {
     bushd_identity identity;
@@ -50,19 +55,26 @@ void Master::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
       ++bad_frames_;
       return;
     }
-    outstanding_.reset();
-    mcus_[mcu].silent = 0;
+    answered(now_us);
     handle_identity(now_us, mcu, identity);
   } else {
     bushd_acknowledgement acknowledgement;
-    if (bushd_decode_acknowledgement(frame.payload, frame.payload_size, &acknowledgement) != BUSHD_OK) {
+    if (bushd_decode_acknowledgement(frame.payload, frame.payload_size, &acknowledgement) !=
+        BUSHD_OK) {
       ++bad_frames_;
       return;
     }
-    outstanding_.reset();
-    mcus_[mcu].silent = 0;
+    answered(now_us);
     handle_acknowledgement(now_us, mcu, type, acknowledgement.status);
   }
+}
+
+void Master::answered(std::int64_t now_us) {
+  const std::int64_t latency_us = now_us - outstanding_->expected_us;
+  patience_us_ = std::clamp(std::max(4 * latency_us, patience_us_ - patience_us_ / 8),
+                            kMinPatienceUs, kMaxPatienceUs);
+  mcus_[outstanding_->mcu].silent = 0;
+  outstanding_.reset();
 }
 
 void Master::handle_timeout(std::int64_t now_us) {
@@ -79,10 +91,13 @@ void Master::handle_timeout(std::int64_t now_us) {
     return;
   }
   ++timeouts_;
+  patience_us_ = std::min(2 * patience_us_, kMaxPatienceUs);
   if (++mcu.silent >= kMaxSilent) {
     go_offline(index, "does not answer", now_us + kRetryUs);
   } else if (type == BUSHD_MSG_POLL) {
-    mcu.poll_now = true;
+    // Soon again; but only a replacement whose fate is unknown goes before queues that run low.
+    mcu.poll_now = mcu.replaced != 0;
+    mcu.poll_due_us = now_us;
   }
 }
 
@@ -104,14 +119,16 @@ std::string Master::unfit(const Mcu& mcu, const bushd_identity& identity) const 
     if (table->decel.code != table->accel.code) codes += table->decel.count;
   }
   if (codes > identity.table_codes) {
-    return "has memory for " + std::to_string(identity.table_codes) + " table codes, but its motors' tables need " +
-           std::to_string(codes) + ": use shorter tables or fewer on this MCU";
+    return "has memory for " + std::to_string(identity.table_codes) +
+           " table codes, but its motors' tables need " + std::to_string(codes) +
+           ": use shorter tables or fewer on this MCU";
   }
   if (identity.queue_ticks < 16) return "has a queue of fewer than 16 ticks";
   return {};
 }
 
-void Master::handle_identity(std::int64_t now_us, std::size_t index, const bushd_identity& identity) {
+void Master::handle_identity(std::int64_t now_us, std::size_t index,
+                             const bushd_identity& identity) {
   Mcu& mcu = mcus_[index];
   mcu.view.identity = identity;
   mcu.view.identified = true;
@@ -151,7 +168,8 @@ void Master::write_script(Mcu& mcu) const {
         .decel_count = static_cast<std::uint16_t>(symmetric ? 0 : table.decel.count),
         .cruise = table.cruise,
         .time_unit_ns = table.time_unit_ns};
-    add(BUSHD_MSG_TABLE_BEGIN, [&](std::uint8_t* p) { return bushd_encode_table_begin(&begin, p); });
+    add(BUSHD_MSG_TABLE_BEGIN,
+        [&](std::uint8_t* p) { return bushd_encode_table_begin(&begin, p); });
     bushd_table_end end = {.slot = s, .crc = BUSHD_CRC16_START};
     for (std::size_t at = 0; at < codes.size(); at += BUSHD_TABLE_DATA_MAX_CODES) {
       const auto count = static_cast<std::uint8_t>(
@@ -196,7 +214,8 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     go_offline(index, "restarted", now_us);
     return;
   }
-  const bool in_step = (report.flags & BUSHD_FLAG_SYNCED) != 0 && (report.flags & BUSHD_FLAG_MARK) != 0;
+  const bool in_step =
+      (report.flags & BUSHD_FLAG_SYNCED) != 0 && (report.flags & BUSHD_FLAG_MARK) != 0;
   view.report = report;
   view.reported = true;
   view.tick = clock_.unwrap(report.tick, now_us);
@@ -211,7 +230,8 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     clock_.sample(view.tick, report.tick_ns + line_ns, now_us);
   }
   for (unsigned m = 0; m < report.motor_count; ++m) {
-    // Never before the present tick, whatever the line says: ticks executed cannot be asked for again.
+    // Never before the present tick, whatever the line says: ticks executed cannot be asked for
+    // again.
     const auto ahead = static_cast<std::int16_t>(report.motor[m].known_until -
                                                  static_cast<std::uint16_t>(report.tick));
     view.known_until[m] = view.tick + std::max<std::int16_t>(ahead, 0);
@@ -242,15 +262,15 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
       mcu.stream[m].finished = false;
       mcu.stream[m].delay_sent.reset();
     }
-    events_.push_back(
-        {.kind = Event::Kind::kReplaceFailed, .mcu = index, .motors = mcu.replaced});
+    events_.push_back({.kind = Event::Kind::kReplaceFailed, .mcu = index, .motors = mcu.replaced});
   }
   mcu.replaced = 0;
   follow_streams(index);
   events_.push_back({Event::Kind::kReport, index});
 }
 
-// All frames sent before the poll were handled before its answer was made: what is not known is lost.
+// All frames sent before the poll were handled before its answer was made: what is not known is
+// lost.
 void Master::follow_streams(std::size_t index) {
   Mcu& mcu = mcus_[index];
   for (unsigned m = 0; m < mcu.view.report.motor_count; ++m) {
@@ -261,9 +281,8 @@ void Master::follow_streams(std::size_t index) {
     const bool moving = (mcu.view.report.moving >> m & 1) != 0;
     if (!moving && known > stream.start) {
       stream.active = false;
-      events_.push_back({.kind = Event::Kind::kLateStart,
-                         .mcu = index,
-                         .motor = static_cast<std::uint8_t>(m)});
+      events_.push_back(
+          {.kind = Event::Kind::kLateStart, .mcu = index, .motor = static_cast<std::uint8_t>(m)});
       continue;
     }
     stream.next = std::max(known, stream.start);

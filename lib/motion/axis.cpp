@@ -78,7 +78,8 @@ void Axis::plan_end() {
     target_ = from_;
     return;
   }
-  if (bushd_run_done(&base_.run)) return;  // over, but for the report that says so: nothing to change
+  if (bushd_run_done(&base_.run))
+    return;  // over, but for the report that says so: nothing to change
   Place place = base_;
   if (stop_at_ && *stop_at_ < end_of(base_)) {
     advance(place, *stop_at_);
@@ -107,8 +108,8 @@ std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::s
     done += static_cast<unsigned>(n);
   }
   head_.tick = std::max(head_.tick, first + count);
-  // A stop that begins where this ends is already due: the MCU must know the delay it starts from, which the stop does
-  // not change.
+  // A stop that begins where this ends is already due: the MCU must know the delay it starts from,
+  // which the stop does not change.
   return bushd_run_delay(&head_.run);
 }
 

@@ -1,5 +1,5 @@
-// One motor's motion: the run of its table placed at a tick, ready to be asked for any tick again that the MCU has
-// not yet executed, and to be ramped down from a tick on.
+// One motor's motion: the run of its table placed at a tick, ready to be asked for any tick again
+// that the MCU has not yet executed, and to be ramped down from a tick on.
 #pragma once
 
 #include <cstddef>
@@ -23,14 +23,15 @@ class Axis {
   // Precondition: !busy(), |steps| < 2^31.
   void start(std::int64_t from_steps, std::int64_t steps, Tick start);
 
-  // From the beginning of tick `at` on: the running step goes on, then the fewest steps to rest. At or before the
-  // start no step is made. A later call replaces an earlier one, as long as the earlier has not been executed.
-  // Precondition: busy(), `at` not yet executed.
+  // From the beginning of tick `at` on: the running step goes on, then the fewest steps to rest. At
+  // or before the start no step is made. A later call replaces an earlier one, as long as the
+  // earlier has not been executed. Precondition: busy(), `at` not yet executed.
   void ramp_down(Tick at);
 
-  // Displacements of ticks first .. first+count-1 (before the start and after the end: 0) into out[0], out[stride], ...
-  // as the format has them (coarse: the byte's value). Returns the delay of the step running at the end of them, 0 at
-  // rest for good. Precondition: busy(), first >= the last `executed`.
+  // Displacements of ticks first .. first+count-1 (before the start and after the end: 0) into
+  // out[0], out[stride], ... as the format has them (coarse: the byte's value). Returns the delay
+  // of the step running at the end of them, 0 at rest for good. Precondition: busy(), first >= the
+  // last `executed`.
   std::uint16_t render(Tick first, unsigned count, std::int16_t* out, std::size_t stride);
 
   // The ticks before `until` are over and will not be asked for again.
@@ -57,7 +58,8 @@ class Axis {
     Tick tick;  // the run's state is that at the beginning of this tick
   };
   void advance(Place& place, Tick to) const;
-  std::size_t expand(bushd_run& run, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  std::size_t expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
+                     std::size_t stride) const;
   Tick end_of(const Place& place) const;
   void plan_end();
 

@@ -6,12 +6,18 @@ namespace bushd::motion {
 
 const char* outcome_word(Outcome outcome) {
   switch (outcome) {
-    case Outcome::kReached: return "reached";
-    case Outcome::kStopped: return "stopped";
-    case Outcome::kLimit: return "limit";
-    case Outcome::kStall: return "stall";
-    case Outcome::kLink: return "link";
-    case Outcome::kFault: return "fault";
+    case Outcome::kReached:
+      return "reached";
+    case Outcome::kStopped:
+      return "stopped";
+    case Outcome::kLimit:
+      return "limit";
+    case Outcome::kStall:
+      return "stall";
+    case Outcome::kLink:
+      return "link";
+    case Outcome::kFault:
+      return "fault";
   }
   return "fault";
 }

@@ -1,5 +1,5 @@
-// Which moves are under way, and what became of each motor in them: a move that was accepted ends exactly once,
-// when the last of its motors has.
+// Which moves are under way, and what became of each motor in them: a move that was accepted ends
+// exactly once, when the last of its motors has.
 #pragma once
 
 #include <cstddef>
@@ -33,8 +33,8 @@ class MoveBook {
   // Precondition: no motor twice, none in a move that is open.
   std::uint64_t open(const std::vector<std::size_t>& motors);
 
-  // This motor's part has ended; returns the move's result if it was the last part. A motor without an open
-  // move is ignored.
+  // This motor's part has ended; returns the move's result if it was the last part. A motor without
+  // an open move is ignored.
   std::optional<MoveResult> end(MotorOutcome outcome);
 
   // The open move of a motor.

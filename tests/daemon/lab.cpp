@@ -34,7 +34,9 @@ Lab::Lab(const std::string& toml, sim::EdgeSink* sink) {
   start_daemon();
 }
 
-Lab::~Lab() { std::filesystem::remove_all(directory_); }
+Lab::~Lab() {
+  std::filesystem::remove_all(directory_);
+}
 
 void Lab::start_daemon() {
   core_ = std::make_unique<daemon::Core>(config_, *this);
@@ -122,13 +124,15 @@ std::int64_t Lab::send(std::int8_t kind, const std::vector<std::string>& motors,
 
 std::vector<reply_t> Lab::replies(std::int64_t number) const {
   std::vector<reply_t> found;
-  std::copy_if(replies_.begin(), replies_.end(), std::back_inserter(found), [&](const reply_t& reply) {
-    return reply.client_id == "test" && reply.number == number;
-  });
+  std::copy_if(
+      replies_.begin(), replies_.end(), std::back_inserter(found),
+      [&](const reply_t& reply) { return reply.client_id == "test" && reply.number == number; });
   return found;
 }
 
-reply_t Lab::last_reply(std::int64_t number) const { return replies(number).back(); }
+reply_t Lab::last_reply(std::int64_t number) const {
+  return replies(number).back();
+}
 
 bool Lab::has_result(std::int64_t number) const {
   const std::vector<reply_t> all = replies(number);
@@ -175,8 +179,8 @@ std::int64_t Lab::shaft_steps(const std::string& name) const {
 
 std::string hall(int mcus, int motors, const std::string& format, const std::string& table) {
   std::string toml =
-      "[[bus]]\nname = \"hall\"\nport = \"/dev/null\"\nbaud = 500000\ntick_us = 2560\nformat = \"" + format +
-      "\"\n[[group]]\nname = \"axes\"\ntable = \"" + table + "\"\n";
+      "[[bus]]\nname = \"hall\"\nport = \"/dev/null\"\nbaud = 500000\ntick_us = 2560\nformat = \"" +
+      format + "\"\n[[group]]\nname = \"axes\"\ntable = \"" + table + "\"\n";
   int number = 0;
   for (int m = 1; m <= mcus; ++m) {
     toml += "[[mcu]]\nbus = \"hall\"\naddress = " + std::to_string(m) + "\n";

@@ -1,5 +1,6 @@
-// A whole lab in one process and in simulated time: the daemon's core, one or more virtual buses with MCUs that run
-// the firmware core, and a client's ears. Time moves only in run_*(); everything is repeatable.
+// A whole lab in one process and in simulated time: the daemon's core, one or more virtual buses
+// with MCUs that run the firmware core, and a client's ears. Time moves only in run_*(); everything
+// is repeatable.
 #pragma once
 
 #include <filesystem>
@@ -21,7 +22,8 @@ class Lab : public daemon::Outputs {
   explicit Lab(const std::string& toml, sim::EdgeSink* sink = nullptr);
   ~Lab() override;
 
-  // Runs until `done` holds (checked after every event) or `limit_s` has passed; returns whether it held.
+  // Runs until `done` holds (checked after every event) or `limit_s` has passed; returns whether it
+  // held.
   bool run_until(const std::function<bool()>& done, double limit_s = 30);
   void run_for(double seconds);
 
@@ -47,7 +49,8 @@ class Lab : public daemon::Outputs {
   // The port of a bus goes away / comes back.
   void unplug(std::size_t bus);
   void plug(std::size_t bus);
-  // The daemon does nothing for a while, as after SIGSTOP or on a very busy machine; what arrives waits.
+  // The daemon does nothing for a while, as after SIGSTOP or on a very busy machine; what arrives
+  // waits.
   void pause_daemon(double seconds);
   // The daemon is gone, and a new one starts on the same buses.
   void restart_daemon();
@@ -85,7 +88,8 @@ class Lab : public daemon::Outputs {
   std::vector<std::string> move_lines_;
 };
 
-// One bus "hall" with `mcus` MCUs of `motors` motors each, named m01.., all in group "axes" of `table`.
+// One bus "hall" with `mcus` MCUs of `motors` motors each, named m01.., all in group "axes" of
+// `table`.
 std::string hall(int mcus, int motors, const std::string& format = "fine",
                  const std::string& table = "bushd2-constant");
 

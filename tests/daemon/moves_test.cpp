@@ -89,7 +89,8 @@ TEST(Moves, StopAtEveryPhaseOfAMoveLosesNoStep) {
     lab.run_for(ms * 1e-3);
     lab.wait(lab.send(command_t::STOP, {}));
     const reply_t result = lab.wait(move);
-    EXPECT_THAT(result.result, testing::AnyOf("stopped", "reached")) << ms << " ms: " << result.reason;
+    EXPECT_THAT(result.result, testing::AnyOf("stopped", "reached"))
+        << ms << " ms: " << result.reason;
     EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << ms << " ms";
     // And it can move again.
     EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {5})).result, "reached");
@@ -142,7 +143,8 @@ TEST(Moves, RefusalsNameMotorAndCause) {
   using testing::HasSubstr;
   EXPECT_THAT(refused(command_t::MOVE_RELATIVE, {"nobody"}, {1}), HasSubstr("no motor \"nobody\""));
   EXPECT_THAT(refused(command_t::MOVE_RELATIVE, {}, {}), HasSubstr("no motor is named"));
-  EXPECT_THAT(refused(command_t::MOVE_RELATIVE, {"m01", "m01"}, {1, 2}), HasSubstr("m01 is named twice"));
+  EXPECT_THAT(refused(command_t::MOVE_RELATIVE, {"m01", "m01"}, {1, 2}),
+              HasSubstr("m01 is named twice"));
   EXPECT_THAT(refused(command_t::MOVE_ABSOLUTE, {"m01"}, {INT64_MAX}), HasSubstr("out of range"));
   EXPECT_THAT(refused(command_t::MOVE_ABSOLUTE, {"m01"}, {INT64_MIN}), HasSubstr("out of range"));
   EXPECT_THAT(refused(command_t::MOVE_RELATIVE, {"m01"}, {3'000'000'000}), HasSubstr("beyond"));

@@ -207,10 +207,10 @@ class Master {
   void fine_ticks(std::uint8_t address, std::uint8_t motor, std::uint32_t first_tick,
                   const std::vector<std::int16_t>& displacements, std::uint16_t delay_at_end = 0) {
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-    std::size_t size = bushd_encode_ticks_head(0, BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS, first_tick,
-                                               static_cast<std::uint8_t>(displacements.size()),
-                                               static_cast<std::uint16_t>(1u << motor),
-                                               &delay_at_end, payload.data());
+    std::size_t size = bushd_encode_ticks_head(
+        0, BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS | BUSHD_TICKS_START, first_tick,
+        static_cast<std::uint8_t>(displacements.size()), static_cast<std::uint16_t>(1u << motor),
+        &delay_at_end, payload.data());
     for (const std::int16_t displacement : displacements) {
       bushd_put_i16(payload.data() + size, displacement);
       size += 2;
