@@ -1,0 +1,142 @@
+#include "vectors/check_vectors.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "engine/frame.h"
+#include "engine/message.h"
+#include "engine/run.h"
+#include "engine/slots.h"
+#include "engine/table.h"
+
+typedef struct move_vector {
+  const bushd_table* table;
+  uint32_t steps;
+  int8_t direction;
+  uint32_t tick_ns;
+  bool fine;
+  int16_t ramp_down_at_tick;  // -1: none
+  const uint8_t* displacements;
+  uint16_t size;
+} move_vector;
+
+typedef struct take_over_vector {
+  const bushd_table* table;
+  uint16_t delay;
+  uint8_t fraction;
+  int8_t direction;
+  uint32_t tick_ns;
+  bool fine;
+  const uint8_t* displacements;
+  uint16_t size;
+} take_over_vector;
+
+typedef struct slots_vector {
+  uint16_t slot_count;
+  int16_t crossing;
+  const int16_t* displacements;
+  uint16_t ticks;
+  const int16_t* slots;  // of all ticks in a row; -1 ends a tick
+  int16_t remainder;
+} slots_vector;
+
+typedef struct frame_vector {
+  uint8_t address;
+  uint8_t type;
+  uint8_t tag;
+  size_t (*encode)(uint8_t* payload);
+  const uint8_t* wire;
+  uint16_t size;
+} frame_vector;
+
+#include "golden_vectors.h"
+
+// Tick by tick, as an MCU does it. The run must end with the vector.
+static bool expands_to(bushd_run* run, uint32_t tick_ns, bool fine, int16_t ramp_down_at_tick,
+                       const uint8_t* bytes, uint16_t size) {
+  const uint16_t ticks = fine ? (uint16_t)(size / 2u) : size;
+  for (uint16_t n = 0; n < ticks; ++n) {
+    if (ramp_down_at_tick == (int16_t)n) bushd_run_ramp_down(run);
+    if (fine) {
+      int16_t displacement = 0;
+      if (bushd_run_expand_fine(run, tick_ns, 1, &displacement, 1) != 1) return false;
+      if (displacement != bushd_get_i16(bytes + 2u * n)) return false;
+    } else {
+      uint8_t count = 0;
+      if (bushd_run_expand_coarse(run, tick_ns, 1, &count, 1) != 1) return false;
+      if (count != bytes[n]) return false;
+    }
+  }
+  return bushd_run_done(run);
+}
+
+static bool check_move(const move_vector* vector) {
+  bushd_run run;
+  bushd_run_start(&run, vector->table, vector->steps, vector->direction);
+  return expands_to(&run, vector->tick_ns, vector->fine, vector->ramp_down_at_tick,
+                    vector->displacements, vector->size);
+}
+
+static bool check_take_over(const take_over_vector* vector) {
+  bushd_run run;
+  bushd_run_start_ramp_down(&run, vector->table, vector->delay, vector->fraction,
+                            vector->direction);
+  return expands_to(&run, vector->tick_ns, vector->fine, -1, vector->displacements, vector->size);
+}
+
+static bool check_slots(const slots_vector* vector) {
+  uint16_t masks[BUSHD_MAX_SLOTS];
+  int16_t remainder = 0;
+  const int16_t* expected = vector->slots;
+  for (uint16_t n = 0; n < vector->ticks; ++n) {
+    memset(masks, 0, sizeof masks);
+    bushd_slots_add(masks, vector->slot_count, 1, vector->displacements[n], &remainder,
+                    vector->crossing);
+    for (uint16_t slot = 0; slot < vector->slot_count; ++slot) {
+      const bool steps = *expected == (int16_t)slot;
+      if (masks[slot] != (steps ? 1 : 0)) return false;
+      if (steps) ++expected;
+    }
+    if (*expected++ != -1) return false;
+  }
+  return remainder == vector->remainder;
+}
+
+static bool check_frame(const frame_vector* vector) {
+  uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
+  uint8_t wire[BUSHD_FRAME_MAX_WIRE];
+  const size_t payload_size = vector->encode(payload);
+  const size_t size =
+      bushd_frame_encode(vector->address, vector->type, vector->tag, payload, payload_size, wire);
+  if (size != vector->size || memcmp(wire, vector->wire, size) != 0) return false;
+  bushd_receiver receiver;
+  memset(&receiver, 0, sizeof receiver);
+  bushd_frame frame;
+  for (size_t i = 0; i + 1 < size; ++i) {
+    if (bushd_receive_byte(&receiver, wire[i], &frame) != BUSHD_RECEIVE_MORE) return false;
+  }
+  if (bushd_receive_byte(&receiver, wire[size - 1], &frame) != BUSHD_RECEIVE_FRAME) return false;
+  return frame.address == vector->address && frame.type == vector->type &&
+         frame.tag == vector->tag && frame.payload_size == payload_size &&
+         memcmp(frame.payload, payload, payload_size) == 0;
+}
+
+#define CHECK_ALL(kind, vectors, check)                                   \
+  for (unsigned i = 0; i < sizeof(vectors) / sizeof((vectors)[0]); ++i) { \
+    ++*checked;                                                           \
+    if (check(&(vectors)[i])) continue;                                   \
+    ++failed;                                                             \
+    if (report != NULL) report(kind, i);                                  \
+  }
+
+unsigned bushd_check_vectors(unsigned* checked, void (*report)(const char* kind, unsigned index)) {
+  unsigned failed = 0;
+  *checked = 0;
+  CHECK_ALL("move", kMoves, check_move)
+  CHECK_ALL("take-over", kTakeOvers, check_take_over)
+  CHECK_ALL("slots", kSlots, check_slots)
+  CHECK_ALL("frame", kFrames, check_frame)
+  return failed;
+}
