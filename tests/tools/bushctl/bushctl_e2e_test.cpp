@@ -344,6 +344,20 @@ TEST(Examples, MoveAndWaitInCpp) {
   EXPECT_THAT(daemon.commands().at(0).steps, ElementsAre(-400, 5));
 }
 
+TEST(Examples, MoveAndWaitInPython) {
+  if (access(EXAMPLE_PYTHON, X_OK) != 0) {
+    GTEST_SKIP() << "no " EXAMPLE_PYTHON
+                    "; the target example_python makes it (needs a package index)";
+  }
+  FakeDaemon daemon;
+  daemon.start(always("reached"));
+  const std::string script = BUSHD_SOURCE_DIR "/tools/examples/python/move_and_wait.py";
+  Program example({EXAMPLE_PYTHON, script, "theta", "-400", "chi", "5"});
+  EXPECT_EQ(example.finish(), 0) << example.err();
+  EXPECT_THAT(example.out(), HasSubstr("chi: reached, stands at 7"));
+  EXPECT_THAT(daemon.commands().at(0).steps, ElementsAre(-400, 5));
+}
+
 }  // namespace
 }  // namespace bushctl::test
 
