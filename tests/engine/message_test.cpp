@@ -78,7 +78,7 @@ bushd_status ticks_again(const Bytes& payload, Bytes* again) {
 }
 
 Bytes any_ticks() {
-  const auto flags = between<uint8_t>(0, 7);
+  const auto flags = between<uint8_t>(0, 11);  // START and REPLACE never together
   const auto mask = static_cast<uint16_t>(between(1, 0xFFFF));
   const auto motors = static_cast<uint8_t>(bits_set(mask));
   const uint8_t most =
@@ -184,7 +184,11 @@ const std::map<std::string, Kind>& kinds() {
                    }),
         codec(bushd_decode_sync, bushd_encode_sync),
         {{"follows 2", set8(0, 2)}, {"mark beyond any tick", set32(6, BUSHD_MAX_TICK_NS)}}}},
-      {"ticks", {any_ticks, ticks_again, {{"unknown flag", [](Bytes* p) { (*p)[1] |= 8; }}}}},
+      {"ticks",
+       {any_ticks,
+        ticks_again,
+        {{"unknown flag", [](Bytes* p) { (*p)[1] |= 16; }},
+         {"start and replacement at once", [](Bytes* p) { (*p)[1] |= 12; }}}}},
       {"report",
        {[] {
           const auto motors = between<uint8_t>(0, 16);

@@ -198,6 +198,8 @@ FRAMES = [
     (0, 42, "sync", {"follows": 1, "mark_tag": 41, "mark_tick": 100000, "mark_ns": 1280000}),
     (1, 8, "ticks", {"epoch": 3, "flags": 0, "first_tick": 1000, "count": 2, "mask": 0x8003, "delays": [],
                      "displacements": [0x81, 0x02, 0x80, 0x83, 0x00, 0xFF]}),
+    (1, 9, "ticks", {"epoch": 3, "flags": 10, "first_tick": 1002, "count": 3, "mask": 0x0010, "delays": [250],
+                     "displacements": [0x80, 0x80, 0x81]}),
     (1, 9, "ticks", {"epoch": 4, "flags": 7, "first_tick": 1002, "count": 1, "mask": 0x0005, "delays": [10, 0],
                      "displacements": [0x00, 0x01, 0x80, 0xFF]}),
     (1, 7, "identity", {"protocol_version": 1, "motors": 16, "firmware_version": 258, "boot_number": 4660,
