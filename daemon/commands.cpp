@@ -183,6 +183,13 @@ void Core::start_move(std::int64_t now_us, const command_t& command) {
 }
 
 void Core::stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors) {
+  std::vector<std::size_t> fresh;  // a stop under way is not planned a second time
+  std::copy_if(motors.begin(), motors.end(), std::back_inserter(fresh),
+               [this](std::size_t m) { return !motors_[m].axis.stopping(); });
+  plan_stop(now_us, fresh);
+}
+
+void Core::plan_stop(std::int64_t now_us, const std::vector<std::size_t>& motors) {
   std::unordered_map<std::size_t, std::uint16_t> masks;  // by MCU
   for (const std::size_t index : motors) {
     Motor& motor = motors_[index];
@@ -224,12 +231,8 @@ void Core::start_pending(std::int64_t now_us, const command_t& command) {
                   .deadline_us = now_us + kPendingUs};
   answer(pending.client, reply_t::ACCEPTED, "", "accepted");
   if (command.kind == command_t::STOP) {
-    std::vector<std::size_t> fresh;  // one that is stopping already needs no second stop
     std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
-    for (const std::size_t m : pending.motors) {
-      if (!motors_[m].axis.stopping()) fresh.push_back(m);
-    }
-    stop_motors(now_us, fresh);
+    stop_motors(now_us, pending.motors);
   } else {
     pending.mcus = mcus_of(pending.motors);
     for (const std::size_t m : pending.mcus) {

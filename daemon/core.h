@@ -124,6 +124,8 @@ class Core {
   std::vector<std::size_t> mcus_of(const std::vector<std::size_t>& motors) const;
   void start_move(std::int64_t now_us, const command_t& command);
   void stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors);
+  // Takes the place of a stop that the MCU has not taken.
+  void plan_stop(std::int64_t now_us, const std::vector<std::size_t>& motors);
   void start_pending(std::int64_t now_us, const command_t& command);
   void check_pending(std::int64_t now_us, std::optional<std::size_t> reported_mcu);
   std::string still_wrong(const Pending& pending, const Mcu& mcu) const;

@@ -46,7 +46,7 @@ void Core::handle_events(std::int64_t now_us, std::size_t bus) {
             again.push_back(static_cast<std::size_t>(motor));
           }
         }
-        stop_motors(now_us, again);
+        plan_stop(now_us, again);
         break;
       }
     }

@@ -178,6 +178,20 @@ TEST(Moves, SetPositionMovesNothing) {
   EXPECT_EQ(lab.shaft_steps("m02"), 34);
 }
 
+TEST(Moves, SecondStopChangesNothing) {
+  Lab lab(hall(1, 1));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  lab.run_for(1.5);
+  lab.send(command_t::STOP, {"m01"});
+  lab.run_for(0.05);
+  lab.send(command_t::STOP, {});
+  lab.core().shut_down(lab.now_us());
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "stopped") << result.reason;
+  EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
+}
+
 TEST(Moves, ShutDownRampsEverythingDown) {
   Lab lab(hall(2, 16));
   lab.connect();
