@@ -75,7 +75,7 @@ class View:
     def show(self, motors, last=False):
         if self._tty:
             self._draw(motors)
-        elif last or time.monotonic() >= self._next_line_s:
+        elif last or (time.monotonic() >= self._next_line_s and any(m["moving"] for m in motors)):
             self._next_line_s = time.monotonic() + 1
             self._print_line(motors)
 

@@ -73,6 +73,7 @@ class MotorCheck:
         error_ns = at_ns - step.time_ns
         motor.errors_ns[step.place].append(error_ns)
         motor.off_slot_ns = max(motor.off_slot_ns, abs(at_ns - step.emitted_ns))
+        motor.bound_share = max(motor.bound_share, abs(error_ns) / step.bound_ns)
 
         if edge.direction != (step.direction > 0):
             self._report("direction", f"{name_of(step)} has DIR {int(edge.direction)}", edge)

@@ -18,6 +18,7 @@ class Motor:
         self.edges = []
         self.errors_ns = ([], [], [])  # of the edges against the table, by place in the move
         self.off_slot_ns = 0  # farthest from the exact slot
+        self.bound_share = 0.0  # largest error as a part of what it may be
 
     def place(self):
         return self.bus, self.address, self.output

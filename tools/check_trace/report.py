@@ -21,6 +21,7 @@ def figures(motors, trace, skew_ns):
         "rms_edge_error_us": round((sum(e * e for e in interior) / max(1, len(interior))) ** 0.5 / 1000, 1),
         "max_first_tick_error_us": round(largest_us(every[FIRST_TICK]), 1),
         "max_last_tick_error_us": round(largest_us(every[LAST_TICK]), 1),
+        "max_bound_share": round(max((motor.bound_share for motor in motors), default=0), 3),
         "max_off_slot_us": round(max((motor.off_slot_ns for motor in motors), default=0) / 1000, 3),
         "max_skew_us": round(skew_ns / 1000, 3),
     }
@@ -62,6 +63,10 @@ def print_report(motors, clocks, problems, total, verbose):
     print(
         f"max error in a move's first tick {total['max_first_tick_error_us']} us, in its last tick "
         f"{total['max_last_tick_error_us']} us; rms in all others {total['rms_edge_error_us']} us"
+    )
+    print(
+        f"largest share of the error that interpolation within a tick may make: "
+        f"{100 * total['max_bound_share']:.0f} %"
     )
     print(
         f"farthest from the exact slot {total['max_off_slot_us']} us; largest skew between MCUs "
