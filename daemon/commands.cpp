@@ -166,7 +166,7 @@ void Core::start_move(std::int64_t now_us, const command_t& command) {
                                  {"bus", bus.name},
                                  {"address", mcu.config->address.value},
                                  {"output", motor.config->output.value},
-                                 {"table_file", config_.table_of(*motor.config).path()},
+                                 {"table_file", table_of(*motor.config).path()},
                                  {"tick_ns", bus.tick_ns()},
                                  {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
                                  {"start_tick", start[motor.bus]},

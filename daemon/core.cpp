@@ -1,6 +1,7 @@
 #include "daemon/core.h"
 
 #include <algorithm>
+#include <set>
 
 #include "daemon/bus.h"
 
@@ -16,19 +17,17 @@ std::uint16_t Core::Bus::render(std::size_t mcu, std::uint8_t motor, link::Tick 
 }
 
 Core::Core(const config::Config& config, Outputs& outputs) : config_(config), outputs_(outputs) {
+  for (const config::Group& group : config.groups) tables_.push_back(group.table);
   for (const config::Mcu& mcu : config.mcus) {
     Mcu entry{.config = &mcu, .bus = mcu.bus.value, .in_bus = 0, .boot_number = {}};
     entry.motor_of.fill(-1);
     mcus_.push_back(entry);
   }
   for (const config::Motor& motor : config.motors) {
-    const config::Bus& bus = config.bus_of(motor);
-    const tables::Table& table = config.table_of(motor);
     mcus_[motor.mcu.value].motor_of[motor.output.value] = static_cast<int>(motors_.size());
     motor_by_name_[motor.name] = motors_.size();
     motors_.push_back({.config = &motor,
-                       .table_name = table.name(),
-                       .axis = motion::Axis(table.view(), bus.tick_ns(), bus.format),
+                       .axis = new_axis(motor),
                        .bus = config.mcu_of(motor).bus.value,
                        .mcu = motor.mcu.value});
   }
@@ -41,22 +40,64 @@ Core::Core(const config::Config& config, Outputs& outputs) : config_(config), ou
       if (mcus_[m].bus != b) continue;
       mcus_[m].in_bus = members.size();
       members.push_back(m);
-      link::McuSetup mcu{.address = mcus_[m].config->address.value, .tables = {}};
-      mcu.table_of_motor.fill(-1);
-      for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
-        const int motor = mcus_[m].motor_of[output];
-        if (motor < 0) continue;
-        const bushd_table* table =
-            &config.table_of(config.motors[static_cast<std::size_t>(motor)]).view();
-        const auto found = std::find(mcu.tables.begin(), mcu.tables.end(), table);
-        mcu.table_of_motor[output] = static_cast<int>(found - mcu.tables.begin());
-        if (found == mcu.tables.end()) mcu.tables.push_back(table);
-      }
-      setup.mcus.push_back(std::move(mcu));
+      setup.mcus.push_back(setup_of(mcus_[m]));
     }
     buses_.push_back(std::make_unique<Bus>(std::move(setup), *this));
     buses_.back()->mcus = std::move(members);
   }
+}
+
+motion::Axis Core::new_axis(const config::Motor& motor) const {
+  const config::Bus& bus = config_.bus_of(motor);
+  return {table_of(motor).view(), bus.tick_ns(), bus.format};
+}
+
+link::McuSetup Core::setup_of(const Mcu& mcu) const {
+  link::McuSetup setup{.address = mcu.config->address.value, .tables = {}};
+  setup.table_of_motor.fill(-1);
+  for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
+    const int motor = mcu.motor_of[output];
+    if (motor < 0) continue;
+    const bushd_table* table = &table_of(config_.motors[static_cast<std::size_t>(motor)]).view();
+    const auto found = std::find(setup.tables.begin(), setup.tables.end(), table);
+    setup.table_of_motor[output] = static_cast<int>(found - setup.tables.begin());
+    if (found == setup.tables.end()) setup.tables.push_back(table);
+  }
+  return setup;
+}
+
+Result<void> Core::reload_tables(const config::Config& fresh) {
+  if (!config::same_but_for_tables(config_, fresh)) {
+    return fail("more than tables has changed; restart the daemon to take it over");
+  }
+  std::set<std::size_t> changed_mcus;
+  std::set<std::size_t> changed_groups;
+  for (std::size_t m = 0; m < motors_.size(); ++m) {
+    const config::GroupIndex group = motors_[m].config->group;
+    if (tables_[group.value]->same_content(*fresh.groups[group.value].table)) continue;
+    changed_groups.insert(group.value);
+    changed_mcus.insert(motors_[m].mcu);
+  }
+  for (const Motor& motor : motors_) {
+    if (motor.axis.busy() && changed_mcus.contains(motor.mcu)) {
+      return fail("motor " + motor.config->name + " moves on MCU " + mcus_[motor.mcu].config->id +
+                  ", which would need a changed table; reload when it is at rest");
+    }
+  }
+  for (const std::size_t group : changed_groups) tables_[group] = fresh.groups[group].table;
+  for (Motor& motor : motors_) {
+    if (changed_groups.contains(motor.config->group.value)) motor.axis = new_axis(*motor.config);
+  }
+  for (const std::size_t index : changed_mcus) {
+    const Mcu& mcu = mcus_[index];
+    master_of(mcu).reconfigure(mcu.in_bus, setup_of(mcu));
+  }
+  for (const std::size_t group : changed_groups) {
+    outputs_.log(LogLevel::kInfo, "group " + config_.groups[group].name + " has table " +
+                                      tables_[group]->name() + " from " + tables_[group]->path());
+  }
+  changed_ = true;
+  return {};
 }
 
 Core::~Core() = default;

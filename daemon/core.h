@@ -63,6 +63,11 @@ class Core {
   void step(std::int64_t now_us);
   std::int64_t next_wake_us() const;
 
+  // Takes over the tables of a configuration that was read anew; it need not outlive the call.
+  // Refused as a whole, with the reason, if it differs in anything else or if a motor moves on an
+  // MCU that would need a changed table.
+  Result<void> reload_tables(const config::Config& fresh);
+
   // Ramps down all motors and takes no more moves.
   void shut_down(std::int64_t now_us);
   // No motor moves by this core's doing.
@@ -72,8 +77,7 @@ class Core {
   struct Bus;
   struct Motor {
     const config::Motor* config;
-    std::string table_name;
-    motion::Axis axis;
+    motion::Axis axis;                // with the table of its group in tables_
     std::size_t bus;                  // index in buses_
     std::size_t mcu;                  // index in mcus_
     std::uint64_t log_id = 0;         // of its present move in the log of moves
@@ -102,6 +106,11 @@ class Core {
     std::int64_t deadline_us;
   };
 
+  const tables::Table& table_of(const config::Motor& motor) const {
+    return *tables_[motor.group.value];
+  }
+  motion::Axis new_axis(const config::Motor& motor) const;
+  link::McuSetup setup_of(const Mcu& mcu) const;
   link::Master& master_of(const Mcu& mcu);
   const link::Master& master_of(const Mcu& mcu) const;
   const link::McuView& view_of(const Mcu& mcu) const;
@@ -139,6 +148,7 @@ class Core {
 
   const config::Config& config_;
   Outputs& outputs_;
+  std::vector<tables::TablePtr> tables_;  // in service, by group
   std::vector<std::unique_ptr<Bus>> buses_;
   std::vector<Mcu> mcus_;
   std::vector<Motor> motors_;

@@ -67,6 +67,7 @@ Result<void> EventLoop::set_up() {
   sigemptyset(&set);
   sigaddset(&set, SIGTERM);
   sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGHUP);
   signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
   if (signals_ < 0) return fail(std::string("signalfd: ") + std::strerror(errno));
   if (const auto watched = watch(signals_, EPOLLIN, kSignalTag); !watched) return watched;
@@ -183,9 +184,21 @@ void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t eve
 void EventLoop::handle_signal(std::int64_t now) {
   signalfd_siginfo info{};
   if (::read(signals_, &info, sizeof info) != sizeof info || shut_down_by_us_) return;
+  if (info.ssi_signo == SIGHUP) return reload_tables();
   spdlog::info("{}: ramping all motors down", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
   core_.shut_down(now);
   shut_down_by_us_ = now + kShutDownUs;
+}
+
+void EventLoop::reload_tables() {
+  const auto fresh = config::load(config_.path);
+  const auto reloaded = fresh ? core_.reload_tables(*fresh) : Result<void>(fail(fresh.error()));
+  if (reloaded) {
+    spdlog::info("SIGHUP: tables reloaded from {}", config_.path);
+  } else {
+    spdlog::error("SIGHUP: tables not reloaded, the old ones stay in service: {}",
+                  reloaded.error().text());
+  }
 }
 
 void EventLoop::update_write_interest(std::size_t bus) {

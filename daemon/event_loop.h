@@ -45,6 +45,7 @@ class EventLoop : private Outputs {
   void lose_port(std::int64_t now_us, std::size_t bus, const std::string& cause);
   void handle_port(std::int64_t now_us, std::size_t bus, std::uint32_t events);
   void handle_signal(std::int64_t now_us);
+  void reload_tables();
   void update_write_interest(std::size_t bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;

@@ -48,7 +48,7 @@ state_t Core::state_of(const Mcu& mcu) const {
     motor_state_t entry;
     entry.name = motor.config->name;
     entry.group = config_.group_of(*motor.config).name;
-    entry.table = motor.table_name;
+    entry.table = table_of(*motor.config).name();
     entry.output = static_cast<std::int16_t>(output);
     entry.position_steps = motor.position_steps;
     entry.target_steps = motor.axis.busy() ? motor.axis.target_steps() : motor.position_steps;

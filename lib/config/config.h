@@ -92,4 +92,8 @@ struct Config {
 // Reads the file and the tables it names; the first thing that is wrong is the error.
 Result<Config> load(const std::filesystem::path& path);
 
+// Whether two configurations differ in nothing but what is in their tables: then a daemon can go
+// from one to the other without a restart.
+bool same_but_for_tables(const Config& a, const Config& b);
+
 }  // namespace bushd::config

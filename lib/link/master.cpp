@@ -95,6 +95,18 @@ void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
   m.replacing |= sent;
 }
 
+void Master::reconfigure(std::size_t mcu, McuSetup setup) {
+  Mcu& m = mcus_[mcu];
+  m.setup = std::move(setup);
+  if (m.view.phase == McuPhase::kOffline) return;
+  drop_streams(m);
+  m.view.phase = McuPhase::kConnecting;
+  m.view.detail = "being configured";
+  m.scripted = false;
+  m.script.clear();
+  m.poll_now = true;
+}
+
 void Master::control(std::size_t mcu, std::uint8_t actions) {
   const bushd_control message = {actions};
   Request request{.type = BUSHD_MSG_CONTROL, .payload = std::vector<std::uint8_t>(1)};

@@ -107,6 +107,10 @@ class Master {
   // Nothing more is sent for this motor.
   void drop(std::size_t mcu, std::uint8_t motor);
 
+  // Other tables or motors for an MCU, at rest: it goes through configuration again and comes back
+  // with kOnline.
+  void reconfigure(std::size_t mcu, McuSetup setup);
+
   // Sent as soon as the line allows, answered in later reports.
   void control(std::size_t mcu, std::uint8_t actions);
   void set_position(std::size_t mcu, std::uint8_t motor, std::int32_t position_steps);

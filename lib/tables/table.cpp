@@ -106,6 +106,12 @@ std::optional<ContentFault> check(const TableContent& content) {
   return std::nullopt;
 }
 
+bool Table::same_content(const Table& other) const {
+  return name_ == other.name_ && view_.time_unit_ns == other.view_.time_unit_ns &&
+         view_.cruise == other.view_.cruise && accel_.code == other.accel_.code &&
+         decel_.code == other.decel_.code;
+}
+
 bushd_ramp Table::Side::index() {
   bushd_ramp ramp{};
   ramp.code = code.data();

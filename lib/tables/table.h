@@ -51,6 +51,9 @@ class Table {
   const std::string& description() const { return description_; }
   const std::string& path() const { return path_; }  // empty: not from a file
   bool symmetric() const { return view_.decel.code == view_.accel.code; }
+  // Same name, unit, codes and cruise delay; where it was read from and its description do not
+  // count.
+  bool same_content(const Table& other) const;
 
  private:
   friend Result<std::shared_ptr<const Table>> make(TableContent content, std::string path);

@@ -52,6 +52,18 @@ void Lab::restart_daemon() {
   start_daemon();
 }
 
+void Lab::write_file(const std::string& name, const std::string& text) {
+  std::ofstream(directory_ / name) << text;
+}
+
+Result<void> Lab::reload_tables() {
+  const auto fresh = config::load(directory_ / "bushd.toml");
+  if (!fresh) return fail(fresh.error());
+  auto reloaded = core_->reload_tables(*fresh);
+  core_->step(now_us());  // publishes that MCUs are configured anew
+  return reloaded;
+}
+
 void Lab::pause_daemon(double seconds) {
   now_ns_ += static_cast<std::int64_t>(seconds * 1e9);
   for (SimulatedBus& bus : buses_) bus.bus->advance_to(now_ns_);

@@ -57,6 +57,10 @@ class Lab : public daemon::Outputs {
   // Bytes on the way to MCUs are handed to this before they are sent; returning false drops them.
   std::function<bool(std::size_t bus, std::vector<std::uint8_t>& bytes)> on_send;
 
+  // A file beside bushd.toml, where tables are looked for first; then what SIGHUP does.
+  void write_file(const std::string& name, const std::string& text);
+  Result<void> reload_tables();
+
   daemon::Core& core() { return *core_; }
   sim::Bus& bus(std::size_t index) { return *buses_[index].bus; }
   std::int64_t now_us() const { return now_ns_ / 1000; }
