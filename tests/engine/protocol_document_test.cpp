@@ -1,0 +1,189 @@
+// docs/protocol.md is normative, so what it prints in hexadecimal must be what the code does. In
+// its blocks marked `frame` and `exchange` lines begin with
+//   wire HEX       a frame on the line                     raw HEX        the same without COBS and
+//   delimiter master HEX     sent to an MCU                          mcu HEX        which must
+//   answer just that says TEXT      what the frame above means (message_text) ticks N        N tick
+//   boundaries pass
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "engine/frame.h"
+#include "engine/message_text.h"
+#include "firmware/core/mcu.h"
+
+namespace bushd::test {
+namespace {
+
+using Bytes = std::vector<uint8_t>;
+
+struct Line {
+  int number;
+  std::string keyword;
+  std::string rest;
+
+  Bytes bytes() const {
+    Bytes out;
+    std::istringstream hex(rest);
+    for (std::string byte; hex >> byte;) {
+      out.push_back(static_cast<uint8_t>(std::stoi(byte, nullptr, 16)));
+    }
+    return out;
+  }
+};
+
+// The lines of all blocks of a kind; a line that is indented continues the one before.
+std::vector<Line> lines_of(const std::string& kind) {
+  std::ifstream file(BUSHD_SOURCE_DIR "/docs/protocol.md");
+  EXPECT_TRUE(file) << "docs/protocol.md";
+  std::vector<Line> lines;
+  bool inside = false;
+  int number = 0;
+  for (std::string text; std::getline(file, text);) {
+    ++number;
+    if (text.rfind("```", 0) == 0) {
+      inside = !inside && text == "```" + kind;
+      continue;
+    }
+    if (!inside || text.empty()) continue;
+    const size_t word = text.find_first_not_of(' ');
+    if (word > 0) {
+      lines.back().rest += text.substr(word - 1);
+      continue;
+    }
+    const size_t space = text.find(' ');
+    lines.push_back(
+        {number, text.substr(0, space), text.substr(text.find_first_not_of(' ', space))});
+  }
+  EXPECT_FALSE(lines.empty()) << "no block of kind " << kind;
+  return lines;
+}
+
+std::string hex(const Bytes& bytes) {
+  std::string out;
+  for (const uint8_t byte : bytes) {
+    char text[4];
+    std::snprintf(text, sizeof text, "%s%02X", out.empty() ? "" : " ", byte);
+    out += text;
+  }
+  return out;
+}
+
+// "ADDRESS TAG MESSAGE FIELDS" of the one frame among these bytes.
+std::string meaning(const Bytes& wire) {
+  bushd_receiver receiver{};
+  std::string out;
+  for (const uint8_t byte : wire) {
+    bushd_frame frame;
+    const bushd_receive received = bushd_receive_byte(&receiver, byte, &frame);
+    if (received == BUSHD_RECEIVE_MORE) continue;
+    if (received != BUSHD_RECEIVE_FRAME) return "broken frame";
+    out += (out.empty() ? "" : " and ") + std::string("address=") + std::to_string(frame.address) +
+           " tag=" + std::to_string(frame.tag) + " " + message_text(frame);
+  }
+  return out;
+}
+
+TEST(ProtocolDocument, DecodedFramesAreRight) {
+  Bytes wire;
+  for (const Line& line : lines_of("frame")) {
+    SCOPED_TRACE("docs/protocol.md:" + std::to_string(line.number));
+    if (line.keyword == "wire") {
+      wire = line.bytes();
+    } else if (line.keyword == "raw") {
+      const Bytes raw = line.bytes();
+      ASSERT_GE(raw.size(), BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC);
+      Bytes again(BUSHD_FRAME_MAX_WIRE);
+      again.resize(bushd_frame_encode(raw[0], raw[1], raw[2], raw.data() + BUSHD_FRAME_HEADER,
+                                      raw.size() - BUSHD_FRAME_HEADER - BUSHD_FRAME_CRC,
+                                      again.data()));
+      EXPECT_EQ(hex(again), hex(wire));
+      EXPECT_EQ(bushd_crc16(BUSHD_CRC16_START, raw.data(), raw.size() - 2),
+                raw[raw.size() - 2] | raw[raw.size() - 1] << 8);
+    } else if (line.keyword == "says") {
+      EXPECT_EQ(meaning(wire), line.rest);
+    } else {
+      ADD_FAILURE() << "unknown keyword " << line.keyword;
+    }
+  }
+}
+
+// The MCU of the exchange: address 1, two motors, boot number 4660. Every request ends 100 us into
+// a tick.
+class ExampleMcu {
+ public:
+  ExampleMcu() {
+    bushd_port port{};
+    port.context = this;
+    port.transmit = [](void* context, const uint8_t* wire, size_t size) {
+      static_cast<ExampleMcu*>(context)->sent_.assign(wire, wire + size);
+    };
+    port.set_enable = [](void*, bool) {};
+    port.set_tick = [](void*, uint32_t) {};
+    port.adjust_tick = [](void*, int32_t) {};
+    port.time_in_tick_ns = [](void*) { return kTimeInTickNs; };
+    port.read_inputs = [](void*) { return uint16_t{0}; };
+    port.self_test = [](void*) { return true; };
+    bushd_mcu_config config{};
+    config.address = 1;
+    config.motors = 2;
+    config.slots = 128;
+    config.boot_number = 4660;
+    config.queue = queue_;
+    config.queue_ticks = 256;
+    config.codes = codes_;
+    config.code_count = 2048;
+    bushd_mcu_boot(&mcu_, &port, &config);
+  }
+
+  Bytes answer(const Bytes& request) {
+    sent_.clear();
+    for (const uint8_t byte : request) bushd_mcu_receive(&mcu_, byte, kTimeInTickNs);
+    return sent_;
+  }
+
+  void pass_ticks(int count) {
+    for (int i = 0; i < count; ++i) {
+      bushd_mcu_swap(&mcu_);
+      bushd_mcu_prepare(&mcu_);
+    }
+  }
+
+ private:
+  static constexpr uint32_t kTimeInTickNs = 100'000;
+
+  bushd_mcu mcu_{};
+  int16_t queue_[256 * 2]{};
+  uint16_t codes_[2048]{};
+  Bytes sent_;
+};
+
+TEST(ProtocolDocument, TheExchangeIsWhatTheFirmwareCoreAnswers) {
+  ExampleMcu mcu;
+  Bytes last;
+  Bytes answer;
+  for (const Line& line : lines_of("exchange")) {
+    SCOPED_TRACE("docs/protocol.md:" + std::to_string(line.number));
+    if (line.keyword == "master") {
+      EXPECT_EQ(hex(answer), "") << "an answer that the document does not print";
+      last = line.bytes();
+      answer = mcu.answer(last);
+    } else if (line.keyword == "mcu") {
+      last = line.bytes();
+      EXPECT_EQ(hex(answer), hex(last));
+      answer.clear();
+    } else if (line.keyword == "says") {
+      EXPECT_EQ(meaning(last), line.rest);
+    } else if (line.keyword == "ticks") {
+      mcu.pass_ticks(std::stoi(line.rest));
+    } else {
+      ADD_FAILURE() << "unknown keyword " << line.keyword;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bushd::test
