@@ -1,8 +1,9 @@
 // CRC-16/IBM-3740. Two ways to the same value, chosen by BUSHD_CRC_SLICES:
 //   0   no table: the shift form of the polynomial x^16 + x^12 + x^5 + 1; for small MCUs
 //   16  slicing: sixteen bytes a round through sixteen tables of 256 entries (8 KiB); for the host
-// Slice k maps a byte to its CRC followed by k zero bytes. A CRC is linear over XOR, so a slice is spanned by
-// its values at 1, 2, 4, .. 128: the rows below (tests/engine/crc_test.cpp checks them bit by bit).
+// Slice k maps a byte to its CRC followed by k zero bytes. A CRC is linear over XOR, so a slice is
+// spanned by its values at 1, 2, 4, .. 128: the rows below (tests/engine/crc_test.cpp checks them
+// bit by bit).
 #include "engine/frame.h"
 
 #ifndef BUSHD_CRC_SLICES
@@ -18,19 +19,23 @@ static inline uint16_t crc_shift(uint16_t crc, uint8_t byte) {
 #if BUSHD_CRC_SLICES == 16
 
 #define BIT(b, n, v) (((b) >> (n)) & 1 ? (v) : 0)
-#define ENTRY(b, v0, v1, v2, v3, v4, v5, v6, v7)                                       \
-  (BIT(b, 0, v0) ^ BIT(b, 1, v1) ^ BIT(b, 2, v2) ^ BIT(b, 3, v3) ^ BIT(b, 4, v4) ^     \
-   BIT(b, 5, v5) ^ BIT(b, 6, v6) ^ BIT(b, 7, v7))
-#define FOUR(b, ...) \
-  ENTRY(b, __VA_ARGS__), ENTRY(b + 1, __VA_ARGS__), ENTRY(b + 2, __VA_ARGS__), ENTRY(b + 3, __VA_ARGS__)
-#define SIXTEEN(b, ...) \
-  FOUR(b, __VA_ARGS__), FOUR(b + 4, __VA_ARGS__), FOUR(b + 8, __VA_ARGS__), FOUR(b + 12, __VA_ARGS__)
-#define SIXTYFOUR(b, ...)                                                                    \
+#define ENTRY(b, v0, v1, v2, v3, v4, v5, v6, v7)                                                   \
+  (BIT(b, 0, v0) ^ BIT(b, 1, v1) ^ BIT(b, 2, v2) ^ BIT(b, 3, v3) ^ BIT(b, 4, v4) ^ BIT(b, 5, v5) ^ \
+   BIT(b, 6, v6) ^ BIT(b, 7, v7))
+#define FOUR(b, ...)                                                           \
+  ENTRY(b, __VA_ARGS__), ENTRY(b + 1, __VA_ARGS__), ENTRY(b + 2, __VA_ARGS__), \
+      ENTRY(b + 3, __VA_ARGS__)
+#define SIXTEEN(b, ...)                                                     \
+  FOUR(b, __VA_ARGS__), FOUR(b + 4, __VA_ARGS__), FOUR(b + 8, __VA_ARGS__), \
+      FOUR(b + 12, __VA_ARGS__)
+#define SIXTYFOUR(b, ...)                                                              \
   SIXTEEN(b, __VA_ARGS__), SIXTEEN(b + 16, __VA_ARGS__), SIXTEEN(b + 32, __VA_ARGS__), \
       SIXTEEN(b + 48, __VA_ARGS__)
-#define ROW(...)                                                                             \
-  {SIXTYFOUR(0, __VA_ARGS__), SIXTYFOUR(64, __VA_ARGS__), SIXTYFOUR(128, __VA_ARGS__), \
-   SIXTYFOUR(192, __VA_ARGS__)}
+#define ROW(...)                                                                        \
+  {                                                                                     \
+    SIXTYFOUR(0, __VA_ARGS__), SIXTYFOUR(64, __VA_ARGS__), SIXTYFOUR(128, __VA_ARGS__), \
+        SIXTYFOUR(192, __VA_ARGS__)                                                     \
+  }
 
 static const uint16_t kSlice[16][256] = {
     ROW(0x1021, 0x2042, 0x4084, 0x8108, 0x1231, 0x2462, 0x48C4, 0x9188),

@@ -1,6 +1,6 @@
-// COBS (Cheshire and Baker, 1999) for frames of at most 254 bytes: every zero is replaced by the distance to
-// the next one (or to the end), and one such distance stands in front. The code byte 255 of the general scheme
-// can then only mean "no zero at all", so no case is special.
+// COBS (Cheshire and Baker, 1999) for frames of at most 254 bytes: every zero is replaced by the
+// distance to the next one (or to the end), and one such distance stands in front. The code byte
+// 255 of the general scheme can then only mean "no zero at all", so no case is special.
 #include "engine/frame.h"
 
 #include <string.h>
@@ -31,8 +31,8 @@ size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint
   return size + 2;
 }
 
-// In place: data[0] is the leading distance and the raw frame stays where it is, behind it. Bytes collected
-// between delimiters are never 0, so every distance moves on.
+// In place: data[0] is the leading distance and the raw frame stays where it is, behind it. Bytes
+// collected between delimiters are never 0, so every distance moves on.
 static bool cobs_decode(uint8_t* data, uint16_t size) {
   uint16_t at = data[0];
   while (at < size) {

@@ -1,6 +1,6 @@
-// Framing: raw frame = address, type, tag, payload, CRC-16 (low byte first); on the line it is COBS encoded
-// and ended by a zero byte. A raw frame has at most 254 bytes, so COBS costs exactly one byte.
-// CRC-16/IBM-3740: polynomial 0x1021, start 0xFFFF, not reflected; check value 0x29B1.
+// Framing: raw frame = address, type, tag, payload, CRC-16 (low byte first); on the line it is COBS
+// encoded and ended by a zero byte. A raw frame has at most 254 bytes, so COBS costs exactly one
+// byte. CRC-16/IBM-3740: polynomial 0x1021, start 0xFFFF, not reflected; check value 0x29B1.
 #ifndef BUSHD_ENGINE_FRAME_H
 #define BUSHD_ENGINE_FRAME_H
 
@@ -44,17 +44,18 @@ typedef struct bushd_frame {
 // Collects bytes of a line into frames. Zero-initialise it; resynchronises at every delimiter.
 typedef struct bushd_receiver {
   uint8_t buffer[BUSHD_FRAME_MAX_RAW + 1u];
-  uint16_t size;     // bytes collected; BUSHD_FRAME_MAX_RAW + 2 marks an overlong frame
+  uint16_t size;  // bytes collected; BUSHD_FRAME_MAX_RAW + 2 marks an overlong frame
 } bushd_receiver;
 
 typedef enum bushd_receive {
-  BUSHD_RECEIVE_MORE = 0,    // no frame yet
-  BUSHD_RECEIVE_FRAME = 1,   // *frame holds a frame with a good checksum
+  BUSHD_RECEIVE_MORE = 0,   // no frame yet
+  BUSHD_RECEIVE_FRAME = 1,  // *frame holds a frame with a good checksum
   BUSHD_RECEIVE_BAD_CRC = 2,
   BUSHD_RECEIVE_BAD_LENGTH = 3  // too long, too short, or broken COBS
 } bushd_receive;
 
-// Feeds one byte. Empty frames (two delimiters in a row) are nothing. O(1), O(frame) at a delimiter.
+// Feeds one byte. Empty frames (two delimiters in a row) are nothing. O(1), O(frame) at a
+// delimiter.
 bushd_receive bushd_receive_byte(bushd_receiver* receiver, uint8_t byte, bushd_frame* frame);
 
 #ifdef __cplusplus

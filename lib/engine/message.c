@@ -1,7 +1,7 @@
 #include "engine/message.h"
 
-// A cursor over a payload. Reading beyond the end yields zeros and is remembered, so that a decoder reads
-// its fields in a row and asks once.
+// A cursor over a payload. Reading beyond the end yields zeros and is remembered, so that a decoder
+// reads its fields in a row and asks once.
 typedef struct reader {
   const uint8_t* at;
   const uint8_t* end;
@@ -18,9 +18,15 @@ static const uint8_t* take(reader* r, size_t size) {
   r->at += size;
   return at;
 }
-static uint8_t get8(reader* r) { return *take(r, 1); }
-static uint16_t get16(reader* r) { return bushd_get_u16(take(r, 2)); }
-static uint32_t get32(reader* r) { return bushd_get_u32(take(r, 4)); }
+static uint8_t get8(reader* r) {
+  return *take(r, 1);
+}
+static uint16_t get16(reader* r) {
+  return bushd_get_u16(take(r, 2));
+}
+static uint32_t get32(reader* r) {
+  return bushd_get_u32(take(r, 4));
+}
 static reader read_from(const uint8_t* payload, size_t size) {
   const reader r = {payload, payload + size, false};
   return r;
@@ -35,7 +41,9 @@ typedef struct writer {
   uint8_t* at;
 } writer;
 
-static void put8(writer* w, uint8_t value) { *w->at++ = value; }
+static void put8(writer* w, uint8_t value) {
+  *w->at++ = value;
+}
 static void put16(writer* w, uint16_t value) {
   bushd_put_u16(w->at, value);
   w->at += 2;
@@ -81,8 +89,8 @@ bushd_status bushd_decode_configure(const uint8_t* payload, size_t size, bushd_c
   message->tick_ns = get32(&r);
   const uint8_t format = get8(&r);
   message->format = format == BUSHD_FORMAT_FINE ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
-  return finish(&r, message->tick_ns >= BUSHD_MIN_TICK_NS && message->tick_ns <= BUSHD_MAX_TICK_NS &&
-                        format <= BUSHD_FORMAT_FINE);
+  return finish(&r, message->tick_ns >= BUSHD_MIN_TICK_NS &&
+                        message->tick_ns <= BUSHD_MAX_TICK_NS && format <= BUSHD_FORMAT_FINE);
 }
 
 size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* payload) {
@@ -245,7 +253,8 @@ bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks
   const uint8_t known =
       BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS | BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
   const uint8_t either = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
-  return finish(&r, message->flags <= known && (message->flags & either) != either && message->count >= 1 && message->mask != 0);
+  return finish(&r, message->flags <= known && (message->flags & either) != either &&
+                        message->count >= 1 && message->mask != 0);
 }
 
 size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {

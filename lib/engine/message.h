@@ -1,6 +1,7 @@
-// The messages of the bus: what the payloads of frames mean. docs/protocol.md is the normative text.
-// All numbers are little-endian. Every decode checks length and ranges of what it reads, so that a decoded
-// struct can be used without further checks; encoders need BUSHD_FRAME_MAX_PAYLOAD bytes.
+// The messages of the bus: what the payloads of frames mean. docs/protocol.md is the normative
+// text. All numbers are little-endian. Every decode checks length and ranges of what it reads, so
+// that a decoded struct can be used without further checks; encoders need BUSHD_FRAME_MAX_PAYLOAD
+// bytes.
 #ifndef BUSHD_ENGINE_MESSAGE_H
 #define BUSHD_ENGINE_MESSAGE_H
 
@@ -37,7 +38,8 @@ typedef enum bushd_type {
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its tag and the MCU's address.
 
 typedef enum bushd_state {
-  BUSHD_STATE_BUSY = 0,   // takes no moves yet: not configured, not in step with the bus, or EN is low
+  // Takes no moves yet: not configured, not in step with the bus, or EN is low.
+  BUSHD_STATE_BUSY = 0,
   BUSHD_STATE_READY = 1,  // all motors at rest
   BUSHD_STATE_RUN = 2,    // a motor moves
   BUSHD_STATE_FAULT = 3   // a fault is latched
@@ -60,12 +62,12 @@ typedef enum bushd_format { BUSHD_FORMAT_COARSE = 0, BUSHD_FORMAT_FINE = 1 } bus
 
 typedef struct bushd_identity {
   uint8_t protocol_version;
-  uint8_t motors;            // outputs 0 .. motors-1, at most BUSHD_MOTORS_PER_MCU
+  uint8_t motors;  // outputs 0 .. motors-1, at most BUSHD_MOTORS_PER_MCU
   uint16_t firmware_version;
-  uint16_t boot_number;      // changes at every boot
-  uint16_t slots;            // slots per tick
-  uint16_t queue_ticks;      // depth of the tick queue
-  uint16_t table_codes;      // table memory, in codes of 16 bits
+  uint16_t boot_number;  // changes at every boot
+  uint16_t slots;        // slots per tick
+  uint16_t queue_ticks;  // depth of the tick queue
+  uint16_t table_codes;  // table memory, in codes of 16 bits
 } bushd_identity;
 
 typedef struct bushd_configure {
@@ -73,8 +75,8 @@ typedef struct bushd_configure {
   bushd_format format;
 } bushd_configure;
 
-// A table is sent as: begin, data (accelerating side, then decelerating side unless it is the same), end.
-// `slot` 0 .. BUSHD_TABLE_SLOTS-1. Codes run from slow to fast on both sides.
+// A table is sent as: begin, data (accelerating side, then decelerating side unless it is the
+// same), end. `slot` 0 .. BUSHD_TABLE_SLOTS-1. Codes run from slow to fast on both sides.
 typedef struct bushd_table_begin {
   uint8_t slot;
   uint16_t accel_count;
@@ -86,8 +88,8 @@ typedef struct bushd_table_begin {
 #define BUSHD_TABLE_DATA_MAX_CODES 120u
 typedef struct bushd_table_data {
   uint8_t slot;
-  uint16_t offset;  // of the first code, counted over both sides
-  uint8_t count;    // 1 .. BUSHD_TABLE_DATA_MAX_CODES
+  uint16_t offset;       // of the first code, counted over both sides
+  uint8_t count;         // 1 .. BUSHD_TABLE_DATA_MAX_CODES
   const uint8_t* codes;  // count little-endian 16-bit codes, unaligned
 } bushd_table_data;
 
@@ -115,8 +117,8 @@ typedef struct bushd_set_position {
   int32_t position_steps;
 } bushd_set_position;
 
-// Two-step time reference. The end of this frame is a mark named by the frame's tag. If `follows`, the
-// mark named `mark_tag` lay at (mark_tick, mark_ns into that tick) of bus time.
+// Two-step time reference. The end of this frame is a mark named by the frame's tag. If `follows`,
+// the mark named `mark_tag` lay at (mark_tick, mark_ns into that tick) of bus time.
 typedef struct bushd_sync {
   bool follows;
   uint8_t mark_tag;
@@ -127,25 +129,25 @@ typedef struct bushd_sync {
 enum {
   BUSHD_TICKS_FINE = 1 << 0,     // int16 displacements, else coarse bytes
   BUSHD_TICKS_DELAYS = 1 << 1,   // running delays at the end of the frame follow (else unchanged)
-  BUSHD_TICKS_REPLACE = 1 << 2,  // for its motors: this instead of all that is queued from first_tick on
+  BUSHD_TICKS_REPLACE = 1 << 2,  // instead of all that its motors have queued from first_tick on
   BUSHD_TICKS_START = 1 << 3     // its motors start from rest here; without it they must be moving
 };
 
 // Displacements of `count` ticks for the motors in `mask`. Only these motors are touched.
 typedef struct bushd_ticks {
-  uint8_t epoch;       // stream epoch; a replacement carries the MCU's epoch + 1 and so opens the next
+  uint8_t epoch;  // stream epoch; a replacement carries the MCU's epoch + 1 and so opens the next
   uint8_t flags;
   uint32_t first_tick;
-  uint8_t count;       // >= 1
-  uint16_t mask;       // != 0
-  uint8_t motors;      // bits set in mask
-  const uint8_t* delays;         // motors x 16 bit: delay of the running step at the end, 0: at rest; or NULL
+  uint8_t count;                 // >= 1
+  uint16_t mask;                 // != 0
+  uint8_t motors;                // bits set in mask
+  const uint8_t* delays;         // motors x 16 bit, running at the end, 0: at rest; or NULL
   const uint8_t* displacements;  // count x motors, tick by tick, motors in rising order
 } bushd_ticks;
 
 // Bytes of a ticks payload before the arrays.
 #define BUSHD_TICKS_HEADER 9u
-// The most ticks of `motors` motors that one frame can carry.
+// The most ticks of `motors` (1 .. BUSHD_MOTORS_PER_MCU) motors that one frame can carry.
 uint8_t bushd_ticks_capacity(uint8_t motors, bool fine, bool delays);
 
 typedef struct bushd_motor_report {
@@ -159,13 +161,13 @@ typedef struct bushd_report {
   uint8_t flags;   // BUSHD_FLAG_*
   uint8_t epoch;
   uint16_t boot_number;
-  uint32_t tick;      // the tick being emitted
-  uint32_t tick_ns;   // how far into it, when the report was made
-  uint8_t mark_tag;   // the last mark heard, and when it was by the MCU's own clock
+  uint32_t tick;     // the tick being emitted
+  uint32_t tick_ns;  // how far into it, when the report was made
+  uint8_t mark_tag;  // the last mark heard, and when it was by the MCU's own clock
   uint32_t mark_tick;
   uint32_t mark_ns;
-  uint16_t moving;    // motors not at rest
-  uint16_t inputs;    // bit per motor
+  uint16_t moving;           // motors not at rest
+  uint16_t inputs;           // bit per motor
   uint16_t bad_frames;       // CRC and length errors; saturates
   uint16_t rejected_frames;  // good frames that could not be used; saturates
   uint8_t last_rejection;    // bushd_status of the last one
@@ -193,9 +195,9 @@ size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload);
 size_t bushd_encode_report(const bushd_report* message, uint8_t* payload);
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload);
 
-// Writes header and delays of a ticks payload and returns where the displacements go; the caller writes
-// count x motors of them there (bushd_put_i16 or plain bytes). `delays` has an entry per motor of the mask, or is
-// NULL. The payload's size is that offset plus the displacements.
+// Writes header and delays of a ticks payload and returns where the displacements go; the caller
+// writes count x motors of them there (bushd_put_i16 or plain bytes). `delays` has an entry per
+// motor of the mask, or is NULL. The payload's size is that offset plus the displacements.
 size_t bushd_encode_ticks_head(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint8_t count,
                                uint16_t mask, const uint16_t* delays, uint8_t* payload);
 
@@ -204,7 +206,8 @@ bushd_status bushd_decode_identity(const uint8_t* payload, size_t size, bushd_id
 bushd_status bushd_decode_configure(const uint8_t* payload, size_t size, bushd_configure* message);
 bushd_status bushd_decode_table_begin(const uint8_t* payload, size_t size,
                                       bushd_table_begin* message);
-bushd_status bushd_decode_table_data(const uint8_t* payload, size_t size, bushd_table_data* message);
+bushd_status bushd_decode_table_data(const uint8_t* payload, size_t size,
+                                     bushd_table_data* message);
 bushd_status bushd_decode_table_end(const uint8_t* payload, size_t size, bushd_table_end* message);
 bushd_status bushd_decode_assign(const uint8_t* payload, size_t size, bushd_assign* message);
 bushd_status bushd_decode_control(const uint8_t* payload, size_t size, bushd_control* message);
@@ -220,7 +223,9 @@ bushd_status bushd_decode_acknowledgement(const uint8_t* payload, size_t size,
 static inline uint16_t bushd_get_u16(const uint8_t* p) {
   return (uint16_t)(p[0] | (uint16_t)p[1] << 8);
 }
-static inline int16_t bushd_get_i16(const uint8_t* p) { return (int16_t)bushd_get_u16(p); }
+static inline int16_t bushd_get_i16(const uint8_t* p) {
+  return (int16_t)bushd_get_u16(p);
+}
 static inline uint32_t bushd_get_u32(const uint8_t* p) {
   return (uint32_t)bushd_get_u16(p) | (uint32_t)bushd_get_u16(p + 2) << 16;
 }
@@ -228,7 +233,9 @@ static inline void bushd_put_u16(uint8_t* p, uint16_t value) {
   p[0] = (uint8_t)value;
   p[1] = (uint8_t)(value >> 8);
 }
-static inline void bushd_put_i16(uint8_t* p, int16_t value) { bushd_put_u16(p, (uint16_t)value); }
+static inline void bushd_put_i16(uint8_t* p, int16_t value) {
+  bushd_put_u16(p, (uint16_t)value);
+}
 static inline void bushd_put_u32(uint8_t* p, uint32_t value) {
   bushd_put_u16(p, (uint16_t)value);
   bushd_put_u16(p + 2, (uint16_t)(value >> 16));

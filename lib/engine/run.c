@@ -251,7 +251,8 @@ static inline void ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, si
   *since_ns = ns;
 }
 
-// Ticks that surely end before `units` more have passed; 0 if the buckets are too wide for ramp_ticks.
+// Ticks that surely end before `units` more have passed; 0 if the buckets are too wide for
+// ramp_ticks.
 static uint32_t safe_ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, uint32_t units) {
   if (UINT32_C(1) << ramp->bucket_shift > ramp->code[ramp->count - 1]) return 0;
   return (units - 1) / (tick->whole + (tick->rest_ns != 0));

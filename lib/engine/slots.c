@@ -1,6 +1,6 @@
-// The crossing of the i-th step of a tick lies x_i = 256 i + (crossing - progress) past the tick's start
-// position, so its slot is floor(x_i S / |d|): one quotient and remainder for the first, one for
-// the distance between two, and additions from there (Bresenham's scheme).
+// The crossing of the i-th step of a tick lies x_i = 256 i + (crossing - progress) past the tick's
+// start position, so its slot is floor(x_i S / |d|): one quotient and remainder for the first, one
+// for the distance between two, and additions from there (Bresenham's scheme).
 #include "engine/slots.h"
 
 int16_t bushd_slots_add(uint16_t* masks, uint16_t slot_count, uint16_t bit, int16_t displacement,

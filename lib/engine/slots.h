@@ -1,8 +1,9 @@
 // From a displacement to the slots in which its steps fall.
 //
-// A tick is cut into S slots. A motor's exact position moves linearly through the tick; a step is made
-// in the slot in which it crosses the next whole number. Coarse displacements are the same thing with
-// the crossing half a step earlier, which spaces c steps evenly: step i at slot (2i+1)S/2c.
+// A tick is cut into S slots. A motor's exact position moves linearly through the tick; a step is
+// made in the slot in which it crosses the next whole number. Coarse displacements are the same
+// thing with the crossing half a step earlier, which spaces c steps evenly: step i at slot
+// (2i+1)S/2c.
 #ifndef BUSHD_ENGINE_SLOTS_H
 #define BUSHD_ENGINE_SLOTS_H
 

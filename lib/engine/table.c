@@ -10,7 +10,7 @@ static bushd_status check_ramp(const bushd_ramp* ramp, uint32_t* bad_index) {
     *bad_index = i;
     if (ramp->code[i] == 0) return BUSHD_E_TABLE_ZERO;
     if (i > 0 && ramp->code[i] > ramp->code[i - 1]) return BUSHD_E_TABLE_UNSORTED;
-    // One tick (at most 2^16 units of slack) is added to sums while a run advances: keep clear of 2^32.
+    // A run adds a tick (at most 127 delays of 16 bits) to such a sum: keep clear of 2^32.
     if (sum > UINT32_MAX / 2 - ramp->code[i]) return BUSHD_E_TABLE_TOO_LONG;
     sum += ramp->code[i];
   }
@@ -52,7 +52,8 @@ uint16_t bushd_table_delay(const bushd_table* table, uint32_t j, uint32_t n) {
 
 uint32_t bushd_table_steps_to_stop(const bushd_table* table, uint16_t delay) {
   // D(k) never rises with k, and is the cruise delay from `count` on: binary search for the first
-  // D(k) <= delay. A delay below cruise cannot be running; the whole side is then the honest answer.
+  // D(k) <= delay. A delay below cruise cannot be running; the whole side is then the honest
+  // answer.
   uint32_t low = 0;
   uint32_t high = table->decel.count;
   while (low < high) {
@@ -78,7 +79,9 @@ uint32_t bushd_table_max_steps_per_tick(const bushd_table* table, uint32_t tick_
   return steps > UINT32_MAX ? UINT32_MAX : (uint32_t)steps;
 }
 
-uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp) { return ramp->count + 1; }
+uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp) {
+  return ramp->count + 1;
+}
 
 // Buckets no wider than the shortest delay hold at most one step each, so that a look-up needs one
 // comparison. A table with a huge spread of delays would need too many: then they are wider, up to

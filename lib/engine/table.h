@@ -5,8 +5,8 @@
 //
 //     delay before step j of N  =  max( A(j-1), D(N-j), c ),   j = 1 .. N        (the BUSHD rule)
 //
-// where A(i) = c for i >= the length of the accelerating side, D likewise (JINR P10-85-635, figure 4:
-// mode 1 and mode 2 of BUSHD-2 are the short and the long case of this one formula).
+// where A(i) = c for i >= the length of the accelerating side, D likewise (JINR P10-85-635, figure
+// 4: mode 1 and mode 2 of BUSHD-2 are the short and the long case of this one formula).
 #ifndef BUSHD_ENGINE_TABLE_H
 #define BUSHD_ENGINE_TABLE_H
 
@@ -30,15 +30,16 @@ typedef struct bushd_ramp {
   uint8_t bucket_shift;
 } bushd_ramp;
 
-// A view of a table; the caller owns all memory and keeps it alive and unchanged while a run uses it.
+// A view of a table; the caller owns all memory and keeps it alive and unchanged while a run uses
+// it.
 typedef struct bushd_table {
   bushd_ramp accel;       // A(i) = accel.code[i]
-  bushd_ramp decel;       // D(i) = decel.code[i]: i counts steps before the end (a file lists it reversed)
+  bushd_ramp decel;       // D(i) = decel.code[i]: i steps before the end (a file lists it reversed)
   uint16_t cruise;        // c, time units, >= 1
   uint32_t time_unit_ns;  // >= 1
 } bushd_table;
 
-// Checks all that a run relies on: no empty side, no zero, sides never rising, sums within 32 bits.
+// Checks all that a run relies on: no empty side, no zero, sides never rising, sums below 2^31.
 // On error *bad_index (may be NULL) is the index, from slow to fast, of the offending code and
 // *bad_decel (may be NULL) tells its side. O(count).
 bushd_status bushd_table_check(const bushd_table* table, uint32_t* bad_index, bool* bad_decel);
@@ -48,8 +49,8 @@ uint16_t bushd_table_accel(const bushd_table* table, uint32_t i);
 uint16_t bushd_table_decel(const bushd_table* table, uint32_t i);
 uint16_t bushd_table_delay(const bushd_table* table, uint32_t j, uint32_t n);
 
-// The fewest steps k with D(k) <= delay: after a step made at `delay` a ramp-down takes k more steps,
-// with the delays D(k-1) .. D(0). O(log count).
+// The fewest steps k with D(k) <= delay: after a step made at `delay` a ramp-down takes k more
+// steps, with the delays D(k-1) .. D(0). O(log count).
 uint32_t bushd_table_steps_to_stop(const bushd_table* table, uint16_t delay);
 
 // The shortest delay that any move with this table can have, in time units. O(1).
