@@ -264,7 +264,7 @@ std::vector<std::string> kind_names() {
 INSTANTIATE_TEST_SUITE_P(Every, Message, testing::ValuesIn(kind_names()),
                          [](const auto& kind) { return kind.param; });
 
-// These leave an impossible length behind, so that both answers are right; none may be taken.
+// Payloads that are as long as these fields say, so that only the range speaks against them.
 TEST(MessageTicks, RefusesNoTicksAndNoMotors) {
   bushd_ticks message;
   Bytes payload(BUSHD_TICKS_HEADER, 0);
