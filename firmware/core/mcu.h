@@ -3,11 +3,12 @@
 // its interrupts.
 //
 // Who calls what:
-//   bushd_mcu_boot      once after reset
-//   bushd_mcu_receive   for every byte on the line
-//   bushd_mcu_swap      at every tick boundary; the returned plane is emitted during the tick that
-//   begins bushd_mcu_prepare   after every swap, before the next one: computes the plane of the
-//   tick that follows
+// - bushd_mcu_boot: once after reset
+// - bushd_mcu_receive: for every byte on the line
+// - bushd_mcu_swap: at every tick boundary; the returned plane is emitted during the tick that
+//   begins
+// - bushd_mcu_prepare: after every swap and before the next; computes the plane of the tick that
+//   follows
 // The functions are not reentrant; a port that calls `swap` from an interrupt may do so between two
 // calls of the others only (or masks it). Ticks run from boot on, whether or not the host has been
 // heard.
@@ -97,7 +98,7 @@ typedef struct bushd_mcu {
   uint8_t reply[BUSHD_FRAME_MAX_WIRE + 1u];
 } bushd_mcu;
 
-// Starts in state BUSY with EN low; raises EN when configured, enabled and in step with the bus.
+// Starts in state BUSY with EN low; a control message raises it.
 void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_config* config);
 
 // One byte from the line. `time_in_tick_ns` is when its stop bit ended, counted from the start of
