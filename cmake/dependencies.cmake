@@ -1,6 +1,6 @@
 # Everything here is a Debian 12 package; tools/setup installs them by name.
 find_package(PkgConfig REQUIRED)
-find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 pkg_check_modules(LCM REQUIRED IMPORTED_TARGET lcm)
