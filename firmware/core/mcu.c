@@ -73,7 +73,9 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
 const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   const bushd_plane* ended = &mcu->plane[mcu->front];
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    mcu->motor[m].position_steps += ended->steps[m];
+    // Unsigned: the counter may be set to any value, and then wraps.
+    const uint32_t position = (uint32_t)mcu->motor[m].position_steps + (uint32_t)ended->steps[m];
+    mcu->motor[m].position_steps = (int32_t)position;
   }
   mcu->front ^= 1u;
   ++mcu->tick;

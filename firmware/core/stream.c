@@ -1,8 +1,8 @@
 // The tick queue. Per motor, everything before `known_until` is decided: queued, or known to be
 // rest. A frame is taken whole or not at all:
-//   start         of the MCU's epoch; its motors are at rest at known_until and start there or
-//   later continuation  of the MCU's epoch; its motors move at known_until and it joins there (no
-//   gap) replacement   of epoch + 1; from its first tick on it stands instead of what was queued
+// - a start is of the MCU's epoch; its motors are at rest at known_until and start there or later
+// - a continuation is of the MCU's epoch; its motors move at known_until and it joins there
+// - a replacement is of epoch + 1; from its first tick on it stands instead of what was queued
 // Ticks before known_until that are not replaced are duplicates and left alone. That a start says
 // so is what tells a lost start from a motor that need not move yet.
 #include <string.h>
@@ -43,6 +43,17 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_tic
   return moves_on && first <= 0 ? BUSHD_OK : BUSHD_E_GAP;
 }
 
+static bool in_range(const bushd_ticks* ticks) {
+  const uint16_t size = (uint16_t)(ticks->motors * ticks->count);
+  for (uint16_t i = 0; i < size; ++i) {
+    const int16_t displacement = bushd_get_i16(ticks->displacements + 2u * i);
+    // More would put two steps into one slot.
+    const int16_t limit = BUSHD_MAX_STEPS_PER_TICK * 256;
+    if (displacement > limit || displacement < -limit) return false;
+  }
+  return true;
+}
+
 static bushd_status check_ticks(const bushd_mcu* mcu, const bushd_ticks* ticks) {
   const bool replace = (ticks->flags & BUSHD_TICKS_REPLACE) != 0;
   const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
@@ -50,9 +61,12 @@ static bushd_status check_ticks(const bushd_mcu* mcu, const bushd_ticks* ticks) 
   if (fine != (mcu->format == BUSHD_FORMAT_FINE)) return BUSHD_E_FORMAT;
   if (replace && ticks->delays == NULL) return BUSHD_E_FORMAT;
   if (ticks->epoch != (uint8_t)(mcu->epoch + (replace ? 1u : 0u))) return BUSHD_E_EPOCH;
-  // The queue holds the ticks after the one prepared; an old frame may lie far back.
-  const int32_t last = ticks_after(ticks->first_tick, mcu->tick) + ticks->count - 1;
-  if (last > (int32_t)mcu->config.queue_ticks) return BUSHD_E_CAPACITY;
+  // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once
+  // both ends are checked; a frame so old that it holds nothing but past ticks is done with here.
+  const int32_t first = ticks_after(ticks->first_tick, mcu->tick);
+  if (first > (int32_t)mcu->config.queue_ticks + 1 - ticks->count) return BUSHD_E_CAPACITY;
+  if (first <= -(int32_t)UINT8_MAX) return BUSHD_E_LATE;
+  if (fine && !in_range(ticks)) return BUSHD_E_FORMAT;
   bool news = false;
   for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((ticks->mask & motor_bit(m)) == 0) continue;
@@ -69,6 +83,8 @@ static int16_t displacement_at(const bushd_ticks* ticks, uint8_t row, uint8_t co
 }
 
 bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
+  // What came since the last tick counts: without EN no step must be made, nor counted.
+  bushd_mcu_update_state(mcu);
   const bushd_status status = check_ticks(mcu, ticks);
   if (status != BUSHD_OK) return status;
   const uint32_t end = ticks->first_tick + ticks->count;

@@ -1,0 +1,340 @@
+#include "firmware/rig.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstdlib>
+#include <utility>
+
+namespace bushd::test {
+namespace {
+
+constexpr std::uint32_t kTimeInTickNs = 1000;
+
+template <class Encode>
+Bytes payload_of(Encode&& encode) {
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(encode(payload.data()));
+  return payload;
+}
+
+std::vector<std::uint16_t> codes_of(const Law& law) {
+  std::vector<std::uint16_t> codes = law.accel;
+  codes.insert(codes.end(), law.decel.begin(), law.decel.end());
+  return codes;
+}
+
+}  // namespace
+
+Law ramp_law() {
+  Law law;
+  for (int i = 0; i < 24; ++i) law.accel.push_back(static_cast<std::uint16_t>(250 - 10 * i));
+  for (int i = 0; i < 11; ++i) law.decel.push_back(static_cast<std::uint16_t>(180 - 16 * i));
+  law.cruise = 20;
+  law.unit_ns = 40'000;
+  return law;
+}
+
+std::vector<int> steps_by_tick(const Reference& reference, std::uint32_t tick_ns) {
+  std::vector<int> steps;
+  std::size_t made = 0;
+  for (std::uint64_t tick = 1; made < reference.steps(); ++tick) {
+    const std::size_t now = reference.steps_at(tick * tick_ns);
+    steps.push_back(static_cast<int>(now - made));
+    made = now;
+  }
+  return steps;
+}
+
+Plan plan_move(const Law& law, std::int64_t steps, std::uint32_t tick_ns, bushd_format format) {
+  const auto reference = Reference::move(law, static_cast<std::size_t>(std::abs(steps)));
+  Plan plan;
+  plan.direction = steps < 0 ? -1 : 1;
+  std::int64_t before = 0;
+  for (std::uint64_t tick = 1; before < std::abs(steps) * 256; ++tick) {
+    const std::uint64_t end_ns = tick * tick_ns;
+    const auto made = static_cast<std::int64_t>(reference.steps_at(end_ns));
+    const bool fine = format == BUSHD_FORMAT_FINE;
+    const std::int64_t position = fine ? reference.position_at(end_ns) : made * 256;
+    const std::int64_t displacement = position - before;
+    plan.displacement.push_back(static_cast<std::int16_t>(
+        fine ? displacement * plan.direction : displacement / 256 | (steps < 0 ? 0 : 0x80)));
+    plan.delay.push_back(reference.delay_at(end_ns));
+    plan.fraction.push_back(static_cast<std::uint8_t>(position - made * 256));
+    plan.made.push_back(made);
+    before = position;
+  }
+  return plan;
+}
+
+Rig::Rig(RigOptions options)
+    : options_(options),
+      queue_(std::size_t{options.queue_ticks} * options.motors, 0x5A5A),  // as RAM may be at boot
+      codes_(options.code_count, 0xA5A5) {
+  bushd_port port{};
+  port.context = this;
+  port.transmit = [](void* context, const std::uint8_t* wire, std::size_t size) {
+    static_cast<Rig*>(context)->sent_.emplace_back(wire, wire + size);
+  };
+  port.set_enable = [](void* context, bool on) {
+    static_cast<Rig*>(context)->enabled_ = on;
+    ++static_cast<Rig*>(context)->enable_calls_;
+  };
+  port.set_tick = [](void* context, std::uint32_t ns) {
+    static_cast<Rig*>(context)->port_tick_ns_ = ns;
+  };
+  port.adjust_tick = [](void*, std::int32_t) {};
+  port.time_in_tick_ns = [](void*) { return kTimeInTickNs; };
+  port.read_inputs = [](void*) { return std::uint16_t{0x1234}; };
+  port.self_test = [](void* context) { return static_cast<Rig*>(context)->options_.self_test; };
+  bushd_mcu_config config{};
+  config.address = options.address;
+  config.motors = options.motors;
+  config.slots = options.slots;
+  config.boot_number = 77;
+  config.queue = queue_.data();
+  config.queue_ticks = options.queue_ticks;
+  config.codes = codes_.data();
+  config.code_count = options.code_count;
+  bushd_mcu_boot(&mcu_, &port, &config);
+  plane_ = bushd_mcu_swap(&mcu_);
+  bushd_mcu_prepare(&mcu_);
+}
+
+void Rig::feed(std::span<const std::uint8_t> bytes) {
+  for (const std::uint8_t byte : bytes) bushd_mcu_receive(&mcu_, byte, kTimeInTickNs);
+}
+
+void Rig::frame(std::uint8_t address, std::uint8_t type, const Bytes& payload) {
+  std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire;
+  const std::size_t size =
+      bushd_frame_encode(address, type, ++tag_, payload.data(), payload.size(), wire.data());
+  feed(std::span(wire).first(size));
+}
+
+std::optional<Answer> Rig::answer() {
+  const std::vector<Bytes> sent = std::exchange(sent_, {});
+  if (sent.empty()) return std::nullopt;
+  EXPECT_EQ(sent.size(), 1u) << "one answer per request";
+  bushd_receiver receiver{};
+  std::optional<Answer> answer;
+  for (const std::uint8_t byte : sent.front()) {
+    bushd_frame frame;
+    const bushd_receive received = bushd_receive_byte(&receiver, byte, &frame);
+    if (received == BUSHD_RECEIVE_MORE) continue;
+    EXPECT_EQ(received, BUSHD_RECEIVE_FRAME);
+    EXPECT_FALSE(answer) << "one frame per answer";
+    EXPECT_EQ(frame.address, options_.address);
+    EXPECT_EQ(frame.tag, tag_);
+    EXPECT_NE(frame.type & BUSHD_TYPE_REPLY, 0);
+    answer = Answer{static_cast<std::uint8_t>(frame.type & ~BUSHD_TYPE_REPLY), frame.tag,
+                    Bytes(frame.payload, frame.payload + frame.payload_size)};
+  }
+  return answer;
+}
+
+bushd_status Rig::request(std::uint8_t type, const Bytes& payload) {
+  frame(type, payload);
+  const auto got = answer();
+  bushd_acknowledgement acknowledgement{0xFF};
+  EXPECT_TRUE(got) << "no answer to " << int{type};
+  if (!got) return BUSHD_E_UNKNOWN_MESSAGE;
+  EXPECT_EQ(got->type, type);
+  EXPECT_EQ(bushd_decode_acknowledgement(got->payload.data(), got->payload.size(), &acknowledgement),
+            BUSHD_OK);
+  return static_cast<bushd_status>(acknowledgement.status);
+}
+
+bushd_report Rig::poll() {
+  frame(BUSHD_MSG_POLL, {});
+  const auto got = answer();
+  bushd_report report{};
+  EXPECT_TRUE(got);
+  if (!got) return report;
+  EXPECT_EQ(got->type, BUSHD_MSG_POLL);
+  EXPECT_EQ(bushd_decode_report(got->payload.data(), got->payload.size(), &report), BUSHD_OK);
+  return report;
+}
+
+bushd_identity Rig::identify() {
+  frame(BUSHD_MSG_IDENTIFY, {});
+  const auto got = answer();
+  bushd_identity identity{};
+  EXPECT_TRUE(got);
+  if (!got) return identity;
+  EXPECT_EQ(bushd_decode_identity(got->payload.data(), got->payload.size(), &identity), BUSHD_OK);
+  return identity;
+}
+
+bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns) {
+  const bushd_configure message = {tick_ns, format};
+  const bushd_status status =
+      request(BUSHD_MSG_CONFIGURE,
+              payload_of([&](std::uint8_t* p) { return bushd_encode_configure(&message, p); }));
+  if (status == BUSHD_OK) format_ = format;
+  return status;
+}
+
+void Rig::sync_to(std::uint32_t tick) {
+  const auto sync = [this](const bushd_sync& message) {
+    frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC,
+          payload_of([&](std::uint8_t* p) { return bushd_encode_sync(&message, p); }));
+    EXPECT_FALSE(answer()) << "SYNC is not answered";
+  };
+  pass(4);  // a new tick length has settled
+  sync({});
+  const std::uint8_t mark_tag = tag_;
+  sync({true, mark_tag, tick, kTimeInTickNs});
+  EXPECT_EQ(this->tick(), tick);
+  pass(4);
+  sync({true, mark_tag, tick, kTimeInTickNs});
+  sync({});
+}
+
+bushd_status Rig::begin(std::uint8_t slot, const Law& law, bool symmetric) {
+  const bushd_table_begin message = {
+      .slot = slot,
+      .accel_count = static_cast<std::uint16_t>(law.accel.size()),
+      .decel_count = static_cast<std::uint16_t>(symmetric ? 0 : law.decel.size()),
+      .cruise = law.cruise,
+      .time_unit_ns = law.unit_ns};
+  return request(BUSHD_MSG_TABLE_BEGIN, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_table_begin(&message, p);
+                 }));
+}
+
+bushd_status Rig::data(std::uint8_t slot, std::uint16_t offset,
+                       const std::vector<std::uint16_t>& codes) {
+  return request(BUSHD_MSG_TABLE_DATA, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_table_data(
+                       slot, offset, static_cast<std::uint8_t>(codes.size()), codes.data(), p);
+                 }));
+}
+
+bushd_status Rig::end(std::uint8_t slot, const std::vector<std::uint16_t>& codes) {
+  bushd_table_end message = {slot, BUSHD_CRC16_START};
+  for (const std::uint16_t code : codes) {
+    const std::uint8_t bytes[2] = {static_cast<std::uint8_t>(code),
+                                   static_cast<std::uint8_t>(code >> 8)};
+    message.crc = bushd_crc16(message.crc, bytes, 2);
+  }
+  return request(BUSHD_MSG_TABLE_END,
+                 payload_of([&](std::uint8_t* p) { return bushd_encode_table_end(&message, p); }));
+}
+
+bushd_status Rig::upload(std::uint8_t slot, const Law& law) {
+  if (const bushd_status status = begin(slot, law); status != BUSHD_OK) return status;
+  const std::vector<std::uint16_t> codes = codes_of(law);
+  for (std::size_t at = 0; at < codes.size(); at += BUSHD_TABLE_DATA_MAX_CODES) {
+    const auto first = codes.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto size = std::min<std::size_t>(codes.size() - at, BUSHD_TABLE_DATA_MAX_CODES);
+    const bushd_status status = data(slot, static_cast<std::uint16_t>(at),
+                                     {first, first + static_cast<std::ptrdiff_t>(size)});
+    if (status != BUSHD_OK) return status;
+  }
+  return end(slot, codes);
+}
+
+bushd_status Rig::assign(std::uint8_t motor, std::uint8_t slot) {
+  return request(BUSHD_MSG_ASSIGN, {motor, slot});
+}
+
+bushd_status Rig::control(std::uint8_t actions) {
+  return request(BUSHD_MSG_CONTROL, {actions});
+}
+
+bushd_status Rig::set_position(std::uint8_t motor, std::int32_t position_steps) {
+  const bushd_set_position message = {motor, position_steps};
+  return request(BUSHD_MSG_SET_POSITION, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_set_position(&message, p);
+                 }));
+}
+
+void Rig::make_ready(const Law& law, bushd_format format, std::uint32_t tick) {
+  EXPECT_EQ(configure(format), BUSHD_OK);
+  sync_to(tick);
+  EXPECT_EQ(upload(0, law), BUSHD_OK);
+  for (std::uint8_t m = 0; m < options_.motors; ++m) EXPECT_EQ(assign(m, 0), BUSHD_OK);
+  EXPECT_EQ(control(BUSHD_CONTROL_ENABLE), BUSHD_OK);
+  EXPECT_EQ(poll().state, BUSHD_STATE_READY);
+}
+
+Bytes Rig::encode(const Ticks& ticks) const {
+  const bool fine = format_ == BUSHD_FORMAT_FINE;
+  return payload_of([&](std::uint8_t* p) {
+    const auto flags = static_cast<std::uint8_t>(ticks.flags | (fine ? BUSHD_TICKS_FINE : 0));
+    std::size_t size =
+        bushd_encode_ticks_head(ticks.epoch, flags, ticks.first, ticks.count, ticks.mask,
+                                ticks.delays.empty() ? nullptr : ticks.delays.data(), p);
+    for (const std::int16_t displacement : ticks.displacements) {
+      if (fine) {
+        bushd_put_i16(p + size, displacement);
+        size += 2;
+      } else {
+        p[size++] = static_cast<std::uint8_t>(displacement);
+      }
+    }
+    return size;
+  });
+}
+
+bushd_status Rig::take(const Ticks& ticks) {
+  const std::uint16_t before = poll().rejected_frames;
+  frame(BUSHD_MSG_TICKS, encode(ticks));
+  EXPECT_FALSE(answer()) << "TICKS is not answered";
+  const bushd_report after = poll();
+  if (after.rejected_frames == before) return BUSHD_OK;
+  EXPECT_EQ(after.rejected_frames, before + 1);
+  return static_cast<bushd_status>(after.last_rejection);
+}
+
+Ticks Rig::part(const Plan& plan, std::uint32_t start, std::size_t from, std::size_t count,
+                std::uint8_t motor) const {
+  const std::size_t end = std::min(from + count, plan.ticks());
+  return {.flags = static_cast<std::uint8_t>(from == 0 ? BUSHD_TICKS_START : 0),
+          .first = start + static_cast<std::uint32_t>(from),
+          .count = static_cast<std::uint8_t>(end - from),
+          .mask = static_cast<std::uint16_t>(1u << motor),
+          .displacements = {plan.displacement.begin() + static_cast<std::ptrdiff_t>(from),
+                            plan.displacement.begin() + static_cast<std::ptrdiff_t>(end)},
+          .delays = {plan.delay[end - 1]},
+          .epoch = mcu_.epoch};
+}
+
+void Rig::run_plan(const Plan& plan, std::uint8_t motor) {
+  constexpr std::size_t kPart = 10;
+  const std::uint32_t start = first_open();
+  for (std::size_t from = 0; from < plan.ticks(); from += kPart) {
+    ASSERT_EQ(take(part(plan, start, from, kPart, motor)), BUSHD_OK) << "tick " << from;
+    while (start + static_cast<std::uint32_t>(from) - tick() > 3) pass();
+  }
+  pass_until_rest();
+}
+
+void Rig::pass() {
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    const int sign = plane_->direction >> m & 1 ? 1 : -1;
+    int steps = 0;
+    for (std::uint16_t slot = 0; slot < options_.slots; ++slot) steps += plane_->step[slot] >> m & 1;
+    pulses_[m] += sign * steps;
+    history_[m].push_back(sign * steps);
+    if (steps != 0 && !enabled_) ++steps_while_disabled_;
+  }
+  if ((plane_->step[0] & (plane_->direction ^ direction_)) != 0) ++steps_with_dir_;
+  direction_ = plane_->direction;
+  plane_ = bushd_mcu_swap(&mcu_);
+  bushd_mcu_prepare(&mcu_);
+}
+
+void Rig::pass_until_rest(int limit) {
+  for (int i = 0; i < limit; ++i) {
+    if (poll().moving == 0) return;
+    pass();
+  }
+  ADD_FAILURE() << "does not come to rest";
+}
+
+void Rig::forget_history() {
+  for (auto& ticks : history_) ticks.clear();
+}
+
+}  // namespace bushd::test

@@ -1,0 +1,147 @@
+// One MCU program behind a port that only records: what it sends, what it does to EN, and every
+// STEP pulse of the planes it hands out. Ticks pass when a test says so.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/reference.h"
+#include "firmware/core/mcu.h"
+
+namespace bushd::test {
+
+using Bytes = std::vector<std::uint8_t>;
+
+struct RigOptions {
+  std::uint8_t address = 7;
+  std::uint8_t motors = 4;
+  std::uint16_t slots = 256;
+  std::uint16_t queue_ticks = 128;
+  std::uint16_t code_count = 400;
+  bool self_test = true;
+};
+
+struct Answer {
+  std::uint8_t type;  // without BUSHD_TYPE_REPLY
+  std::uint8_t tag;
+  Bytes payload;
+};
+
+// A move as a master would send it, from the slow reference: displacements by tick and the delay
+// that runs at each tick's end.
+struct Plan {
+  std::vector<std::int16_t> displacement;  // fine: 1/256 step; coarse: the byte
+  std::vector<std::uint16_t> delay;
+  std::vector<std::uint8_t> fraction;  // of the position at each tick's end, 1/256 step
+  std::vector<std::int64_t> made;      // steps made until each tick's end, unsigned
+  int direction;
+  std::size_t ticks() const { return displacement.size(); }
+};
+Plan plan_move(const Law& law, std::int64_t steps, std::uint32_t tick_ns, bushd_format format);
+// Steps in each tick of a reference that begins at a tick's beginning.
+std::vector<int> steps_by_tick(const Reference& reference, std::uint32_t tick_ns);
+
+struct Ticks {
+  std::uint8_t flags = 0;  // BUSHD_TICKS_FINE and _DELAYS are added as needed
+  std::uint32_t first = 0;
+  std::uint8_t count = 1;
+  std::uint16_t mask = 1;
+  std::vector<std::int16_t> displacements;  // count x motors of the mask
+  std::vector<std::uint16_t> delays{};      // empty: not told
+  std::uint8_t epoch = 0;
+};
+
+class Rig {
+ public:
+  static constexpr std::uint32_t kTickNs = 2'560'000;
+
+  explicit Rig(RigOptions options = {});
+  Rig(const Rig&) = delete;
+  Rig& operator=(const Rig&) = delete;
+
+  void feed(std::span<const std::uint8_t> bytes);
+  // A frame on the line, without looking at what comes back.
+  void frame(std::uint8_t address, std::uint8_t type, const Bytes& payload);
+  void frame(std::uint8_t type, const Bytes& payload) { frame(options_.address, type, payload); }
+  // The only answer since the last call, if any.
+  std::optional<Answer> answer();
+  // Sends a request to this MCU and returns the status that it acknowledges with.
+  bushd_status request(std::uint8_t type, const Bytes& payload);
+  bushd_report poll();
+  bushd_identity identify();
+
+  bushd_status configure(bushd_format format, std::uint32_t tick_ns = kTickNs);
+  // Two SYNC frames: afterwards the MCU is in step and the tick being emitted is `tick`.
+  void sync_to(std::uint32_t tick);
+  bushd_status begin(std::uint8_t slot, const Law& law, bool symmetric = false);
+  bushd_status data(std::uint8_t slot, std::uint16_t offset,
+                    const std::vector<std::uint16_t>& codes);
+  bushd_status end(std::uint8_t slot, const std::vector<std::uint16_t>& codes);
+  bushd_status upload(std::uint8_t slot, const Law& law);
+  bushd_status assign(std::uint8_t motor, std::uint8_t slot);
+  bushd_status control(std::uint8_t actions);
+  bushd_status set_position(std::uint8_t motor, std::int32_t position_steps);
+  // Everything up to READY, with this table for all motors.
+  void make_ready(const Law& law, bushd_format format, std::uint32_t tick = 1000);
+
+  Bytes encode(const Ticks& ticks) const;
+  // What the MCU made of it, as its reports tell.
+  bushd_status take(const Ticks& ticks);
+  // Ticks [from, from + count) of a plan that starts at `start`, with the delay at their end.
+  Ticks part(const Plan& plan, std::uint32_t start, std::size_t from, std::size_t count,
+             std::uint8_t motor = 0) const;
+  // Keeps the queue filled with a plan and lets time pass until the motor is at rest.
+  void run_plan(const Plan& plan, std::uint8_t motor);
+
+  // One tick boundary: the plane in force is counted, the next one emitted, the one after prepared.
+  void pass();
+  void pass(int ticks) {
+    for (int i = 0; i < ticks; ++i) pass();
+  }
+  void pass_until_rest(int limit = 100000);
+
+  std::uint32_t tick() const { return mcu_.tick; }
+  std::uint32_t first_open() const { return mcu_.tick + 2; }
+  // Steps of the planes that have ended, counted from STEP and DIR levels alone.
+  std::int64_t pulses(std::uint8_t motor) const { return pulses_[motor]; }
+  // Signed steps of a motor in each tick since boot; entry i is the i-th plane emitted.
+  const std::vector<int>& history(std::uint8_t motor) const { return history_[motor]; }
+  void forget_history();
+  bool enabled() const { return enabled_; }
+  int enable_calls() const { return enable_calls_; }
+  // Steps in the first slot of a tick in which DIR changed: no set-up time for the driver.
+  int steps_with_dir() const { return steps_with_dir_; }
+  int steps_while_disabled() const { return steps_while_disabled_; }
+  std::uint32_t port_tick_ns() const { return port_tick_ns_; }
+  const bushd_plane& plane() const { return *plane_; }
+  const bushd_mcu& mcu() const { return mcu_; }
+  const RigOptions& options() const { return options_; }
+
+ private:
+  RigOptions options_;
+  std::vector<std::int16_t> queue_;
+  std::vector<std::uint16_t> codes_;
+  bushd_mcu mcu_{};
+  const bushd_plane* plane_ = nullptr;
+  bushd_format format_ = BUSHD_FORMAT_COARSE;
+  std::uint8_t tag_ = 0;
+  std::vector<Bytes> sent_;
+  bool enabled_ = true;
+  int enable_calls_ = 0;
+  std::uint32_t port_tick_ns_ = 0;
+  std::uint16_t direction_ = 0;
+  std::array<std::int64_t, BUSHD_MOTORS_PER_MCU> pulses_{};
+  std::array<std::vector<int>, BUSHD_MOTORS_PER_MCU> history_;
+  int steps_with_dir_ = 0;
+  int steps_while_disabled_ = 0;
+};
+
+// A ramp of 24 codes with unequal sides: 40 us units, 10 ms down to 0.8 ms.
+Law ramp_law();
+
+}  // namespace bushd::test
