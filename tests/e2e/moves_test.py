@@ -1,0 +1,88 @@
+"""Moves that go as planned: every edge of them is checked against the tables."""
+
+import csv
+import io
+import unittest
+
+from rig import FAR, MOTORS, TICK_US, TOP, EndToEndTest, program
+
+
+class Moves(EndToEndTest):
+    def check_moves(self, displacement_format):
+        self.bring_up(displacement_format)
+        signs = {name: 1 if i % 3 else -1 for i, name in enumerate(MOTORS)}
+        # Shorter than both ramps together, and one step; then with cruise.
+        short = {name: signs[name] * (1 + 61 * i) for i, name in enumerate(MOTORS)}
+        self.command("move", "--wait", *[word for pair in short.items() for word in pair])
+        self.assertEqual(self.positions(), short)
+        long = {name: -signs[name] * (900 + 97 * i) for i, name in enumerate(MOTORS)}
+        self.command("move", "--wait", *[word for pair in long.items() for word in pair])
+
+        # Of two that move, one is stopped; the other goes on to its target.
+        stopped = self.start_move("a0", FAR)
+        other = self.start_move("b1", -5000)
+        self.wait_until_travelled(1500, "a0")
+        self.command("stop", "a0", "--wait")
+        self.assertEqual(stopped.process.wait(), 1)
+        self.assertIn("stopped", stopped.said())
+        self.assertEqual(other.process.wait(), 0, other.said())
+
+        self.assertGreater(self.positions()["a0"], 1500)
+        self.command("move", "--wait", *[word for name in MOTORS for word in (name, "--to", "0")])
+        status = self.status()
+        self.assertEqual({motor["position_steps"] for motor in status["motors"]}, {0})
+
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        self.assert_one_result_each()
+        self.assert_trace_is_right(status)
+        results = [event["result"] for event in self.moves() if event["event"] == "result"]
+        self.assertEqual(results.count("stopped"), 1)
+        self.assertEqual(set(results), {"reached", "stopped"})
+
+    def test_group_moves_and_a_stop_in_flight_fine(self):
+        self.check_moves("fine")
+
+    def test_group_moves_and_a_stop_in_flight_coarse(self):
+        self.check_moves("coarse")
+
+    def test_group_move_starts_in_one_tick(self):
+        self.bring_up()
+        self.command("move", "--wait", *[word for name in MOTORS for word in (name, "3")])
+        self.assertEqual(len({event["start_tick"] for event in self.moves() if event["event"] == "move"}), 1)
+
+
+class Expansion(EndToEndTest):
+    def steps_per_tick(self, edges, expected):
+        """Edges counted by tick; the first edge tells where ticks begin."""
+        first = next(i for i, count in enumerate(expected) if count != 0)
+        # Steps of a coarse tick are spaced evenly: the first of c lies 1 / 2c into it.
+        begin_ns = edges[0].time_ns - TICK_US * 1000 * (first + 1 / (2 * abs(expected[first])))
+        counts = [0] * len(expected)
+        for edge in edges:
+            tick = int((edge.time_ns - begin_ns) // (TICK_US * 1000))
+            self.assertIn(tick, range(len(counts)), "an edge lies outside of the move")
+            counts[tick] += 1 if edge.direction else -1
+        return counts
+
+    def test_bushtab_expand_is_what_the_pins_do(self):
+        self.bring_up("coarse")
+        moves = {"a0": ("bushd2-constant", 1234), "b2": ("bushd2-exponential", -777)}
+        for name, (_, steps) in moves.items():
+            self.command("move", "--wait", name, steps)
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        edges = self.traced()
+        for name, (table, steps) in moves.items():
+            arguments = ["--table", TOP / "tables" / f"{table}.toml", "--steps", str(steps)]
+            arguments += ["--tick-us", str(TICK_US), "--format", "coarse"]
+            ran = self.run_program(program("BUSHTAB"), "expand", *arguments)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            octets = [int(row["displacement"]) for row in csv.DictReader(io.StringIO(ran.stdout))]
+            expected = [octet & 0x7F if octet & 0x80 else -(octet & 0x7F) for octet in octets]
+            self.assertEqual(sum(expected), steps)
+            self.assertEqual(self.steps_per_tick(edges[name], expected), expected, name)
+
+
+if __name__ == "__main__":
+    unittest.main()
