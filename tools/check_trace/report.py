@@ -6,7 +6,12 @@ from check_trace.motion import FIRST_TICK, INTERIOR, LAST_TICK
 
 
 def largest_us(errors_ns):
-    return max(map(abs, errors_ns), default=0) / 1000
+    """None if there are none: no edge is something else than no error."""
+    return round(max(map(abs, errors_ns)) / 1000, 1) if errors_ns else None
+
+
+def text_us(error_us):
+    return "(no edges)" if error_us is None else f"{error_us} us"
 
 
 def figures(motors, trace, skew_ns):
@@ -17,10 +22,10 @@ def figures(motors, trace, skew_ns):
         "mcus": len({motor.mcu for motor in motors}),
         "steps_commanded": sum(len(motor.steps) for motor in motors),
         "steps_made": sum(map(len, trace.edges.values())),
-        "max_edge_error_us": round(largest_us(interior), 1),
+        "max_edge_error_us": largest_us(interior) or 0.0,
         "rms_edge_error_us": round((sum(e * e for e in interior) / max(1, len(interior))) ** 0.5 / 1000, 1),
-        "max_first_tick_error_us": round(largest_us(every[FIRST_TICK]), 1),
-        "max_last_tick_error_us": round(largest_us(every[LAST_TICK]), 1),
+        "max_first_tick_error_us": largest_us(every[FIRST_TICK]),
+        "max_last_tick_error_us": largest_us(every[LAST_TICK]),
         "max_bound_share": round(max((motor.bound_share for motor in motors), default=0), 3),
         "max_off_slot_us": round(max((motor.off_slot_ns for motor in motors), default=0) / 1000, 3),
         "max_skew_us": round(skew_ns / 1000, 3),
@@ -36,9 +41,9 @@ def rows(motors):
             "moves": len(motor.moves),
             "commanded": len(motor.steps),
             "made": len(motor.edges),
-            "max_us": round(largest_us(motor.errors_ns[INTERIOR]), 1),
-            "first_us": round(largest_us(motor.errors_ns[FIRST_TICK]), 1),
-            "last_us": round(largest_us(motor.errors_ns[LAST_TICK]), 1),
+            "max_us": largest_us(motor.errors_ns[INTERIOR]),
+            "first_us": largest_us(motor.errors_ns[FIRST_TICK]),
+            "last_us": largest_us(motor.errors_ns[LAST_TICK]),
         }
 
 
@@ -47,10 +52,10 @@ def print_rows(motors):
     if not all_rows:
         return
     names = list(all_rows[0])
-    widths = [max(len(name), *(len(str(row[name])) for row in all_rows)) for name in names]
-    print("  ".join(name.ljust(width) for name, width in zip(names, widths)))
-    for row in all_rows:
-        print("  ".join(str(row[name]).ljust(width) for name, width in zip(names, widths)))
+    cells = [names] + [["-" if row[name] is None else str(row[name]) for name in names] for row in all_rows]
+    widths = [max(map(len, column)) for column in zip(*cells)]
+    for row in cells:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
 
 
 def print_report(motors, clocks, problems, total, verbose):
@@ -61,8 +66,8 @@ def print_report(motors, clocks, problems, total, verbose):
     for line in problems.lines():
         print(f"problem: {line}")
     print(
-        f"max error in a move's first tick {total['max_first_tick_error_us']} us, in its last tick "
-        f"{total['max_last_tick_error_us']} us; rms in all others {total['rms_edge_error_us']} us"
+        f"max error in a move's first tick {text_us(total['max_first_tick_error_us'])}, in its last tick "
+        f"{text_us(total['max_last_tick_error_us'])}; rms in all others {total['rms_edge_error_us']} us"
     )
     print(
         f"largest share of the error that interpolation within a tick may make: "
