@@ -55,7 +55,9 @@ typedef struct bushd_mcu_motor {
   int16_t remainder;       // exact position minus steps made, 1/256 step
   int8_t table;            // table slot, -1: none
   bool running_down;       // `run` is a ramp-down after the queue ended early
+  bool begun;              // a displacement was executed since start_tick
   uint16_t delay;          // of the running step when the queued ticks end; 0: at rest there
+  uint32_t start_tick;     // of the last start taken
   uint32_t known_until;  // first tick for which nothing is queued; always > tick + 1 once prepared
   bushd_run run;
 } bushd_mcu_motor;

@@ -98,6 +98,7 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
       }
     }
     if (ticks_after(end, motor->known_until) > 0) {
+      if (ticks->flags & BUSHD_TICKS_START) motor->start_tick = ticks->first_tick;
       for (uint8_t row = 0; row < ticks->count; ++row) {
         const uint32_t tick = ticks->first_tick + row;
         if (ticks_after(tick, motor->known_until) >= 0) {
@@ -115,16 +116,21 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
 
 static void start_running_down(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
+  const bushd_table* table = &mcu->table[motor->table].table;
+  // A delay below cruise cannot be running; the ramp must not reach codes that no move uses.
+  const uint16_t delay = motor->delay < table->cruise ? table->cruise : motor->delay;
+  motor->delay = 0;
+  mcu->faults |= BUSHD_FAULT_LINK;
+  // DIR then still shows the move before: where this one was to go is not known. It has not left
+  // rest, so it may stay.
+  if (!motor->begun) return;
   const int direction = mcu->direction & motor_bit(m) ? 1 : -1;
   // In the fine format the remainder is the elapsed share of the running delay; in the coarse one
   // that share is unknown, and taking it as 0 makes the next step late rather than early.
   const int32_t progress = (int32_t)motor->remainder * direction;
   const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
-  bushd_run_start_ramp_down(&motor->run, &mcu->table[motor->table].table, motor->delay, fraction,
-                            direction);
-  motor->delay = 0;
+  bushd_run_start_ramp_down(&motor->run, table, delay, fraction, direction);
   motor->running_down = true;
-  mcu->faults |= BUSHD_FAULT_LINK;
 }
 
 static int16_t run_down(bushd_mcu* mcu, bushd_mcu_motor* motor) {
@@ -146,6 +152,8 @@ int16_t bushd_mcu_next_displacement(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
     int16_t* const queued = queue_at(mcu, tick, m);
     const int16_t displacement = *queued;
     *queued = 0;
+    if (tick == motor->start_tick) motor->begun = false;
+    if (displacement != 0) motor->begun = true;
     return displacement;
   }
   motor->known_until = tick + 1u;

@@ -114,6 +114,7 @@ void Rig::frame(std::uint8_t address, std::uint8_t type, const Bytes& payload) {
 std::optional<Answer> Rig::answer() {
   const std::vector<Bytes> sent = std::exchange(sent_, {});
   if (sent.empty()) return std::nullopt;
+  last_sent_ = sent.front();
   EXPECT_EQ(sent.size(), 1u) << "one answer per request";
   bushd_receiver receiver{};
   std::optional<Answer> answer;
@@ -139,8 +140,9 @@ bushd_status Rig::request(std::uint8_t type, const Bytes& payload) {
   EXPECT_TRUE(got) << "no answer to " << int{type};
   if (!got) return BUSHD_E_UNKNOWN_MESSAGE;
   EXPECT_EQ(got->type, type);
-  EXPECT_EQ(bushd_decode_acknowledgement(got->payload.data(), got->payload.size(), &acknowledgement),
-            BUSHD_OK);
+  EXPECT_EQ(
+      bushd_decode_acknowledgement(got->payload.data(), got->payload.size(), &acknowledgement),
+      BUSHD_OK);
   return static_cast<bushd_status>(acknowledgement.status);
 }
 
@@ -314,7 +316,8 @@ void Rig::pass() {
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     const int sign = plane_->direction >> m & 1 ? 1 : -1;
     int steps = 0;
-    for (std::uint16_t slot = 0; slot < options_.slots; ++slot) steps += plane_->step[slot] >> m & 1;
+    for (std::uint16_t slot = 0; slot < options_.slots; ++slot)
+      steps += plane_->step[slot] >> m & 1;
     pulses_[m] += sign * steps;
     history_[m].push_back(sign * steps);
     if (steps != 0 && !enabled_) ++steps_while_disabled_;

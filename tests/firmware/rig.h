@@ -51,8 +51,8 @@ struct Ticks {
   std::uint32_t first = 0;
   std::uint8_t count = 1;
   std::uint16_t mask = 1;
-  std::vector<std::int16_t> displacements;  // count x motors of the mask
-  std::vector<std::uint16_t> delays{};      // empty: not told
+  std::vector<std::int16_t> displacements{};  // count x motors of the mask
+  std::vector<std::uint16_t> delays{};        // empty: not told
   std::uint8_t epoch = 0;
 };
 
@@ -70,6 +70,7 @@ class Rig {
   void frame(std::uint8_t type, const Bytes& payload) { frame(options_.address, type, payload); }
   // The only answer since the last call, if any.
   std::optional<Answer> answer();
+  const Bytes& last_sent() const { return last_sent_; }
   // Sends a request to this MCU and returns the status that it acknowledges with.
   bushd_status request(std::uint8_t type, const Bytes& payload);
   bushd_report poll();
@@ -131,6 +132,7 @@ class Rig {
   bushd_format format_ = BUSHD_FORMAT_COARSE;
   std::uint8_t tag_ = 0;
   std::vector<Bytes> sent_;
+  Bytes last_sent_;
   bool enabled_ = true;
   int enable_calls_ = 0;
   std::uint32_t port_tick_ns_ = 0;
