@@ -27,7 +27,7 @@ TICK_US = 2560
 TABLES = ["bushd2-constant", "bushd2-scurve", "bushd2-exponential", "bushd2-resonance"]
 # a0 .. a3 on MCU 1, b0 .. b3 on MCU 2, each with another table. By name: (address, output).
 MOTORS = {f"{'ab'[address - 1]}{output}": (address, output) for address in (1, 2) for output in range(4)}
-FAR = 1_000_000  # a move of so many steps is under way until something ends it
+FAR = 200_000  # 80 s: a move of so many steps is under way until something ends it
 
 # Children must reach the network of this test only, and the one that the configuration says.
 os.environ.pop("LCM_DEFAULT_URL", None)

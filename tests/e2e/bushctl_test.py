@@ -1,0 +1,122 @@
+"""bushctl and the example clients against the real daemon."""
+
+import json
+import os
+import subprocess
+import unittest
+
+from rig import FAR, MOTORS, TOP, EndToEndTest, program
+
+
+class Bushctl(EndToEndTest):
+    def test_wait_succeeds_only_for_reached(self):
+        self.bring_up()
+        ran = self.command("move", "--wait", "a0", "300", "b0", "-7")
+        self.assertIn("a0: reached, stands at 300\nb0: reached, stands at -7\n", ran.stdout)
+        # Of a group move one motor is stopped, the other arrives.
+        move = self.start_move("a0", FAR, "b0", 100)
+        self.wait_until_travelled(600, "a0")
+        self.command("stop", "a0")
+        self.assertEqual(move.process.wait(), 1)
+        self.assertRegex(move.said(), r"a0: stopped, stands at \d+\nb0: reached, stands at 93\n")
+        # Nothing to be done is reached, too.
+        self.command("move", "--wait", "b0", "--to", "93")
+
+    def test_what_cannot_be_is_refused_with_the_reason(self):
+        self.bring_up()
+        self.start_move("a0", FAR)
+        for arguments, reason in (
+            (("move", "nobody", "5"), 'no motor "nobody"'),
+            (("move", "b0", "5", "nobody", "5"), 'no motor "nobody"'),
+            (("move", "b0", "5", "b0", "6"), "b0 is named twice"),
+            (("move", "a0", "5"), "a0: it moves already"),
+            (("move", "b0", "3000000000"), "b0: "),
+            (("set", "a0", "5"), "a0 moves"),
+            (("disable", "a1"), "a0 moves; stop it first"),
+            (("stop", "nobody"), 'no motor "nobody"'),
+        ):
+            with self.subTest(arguments):
+                ran = self.bushctl(*arguments)
+                self.assertEqual(ran.returncode, 1)
+                self.assertIn(reason, ran.stderr)
+        # Of a refused group nothing has moved.
+        self.command("stop", "--wait")
+        self.assertEqual(self.positions()["b0"], 0)
+
+    def test_disabled_drivers_refuse_moves(self):
+        self.bring_up()
+        self.command("disable", "a0")
+        refused = self.bushctl("move", "a1", "5")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("disabled", refused.stderr)
+        self.command("move", "--wait", "b0", "5")
+        self.command("enable", "a0")
+        self.command("move", "--wait", "a1", "5")
+
+    def test_status_as_json(self):
+        self.bring_up()
+        self.command("set", "b3", "-12")
+        status = json.loads(self.command("status", "--json").stdout)
+        self.assertEqual([motor["name"] for motor in status["motors"]], list(MOTORS))
+        motor = status["motors"][-1]
+        expected = {
+            "name": "b3",
+            "mcu": "hall:2",
+            "output": 3,
+            "group": "group3",
+            "table": "bushd2-resonance",
+            "position_steps": -12,
+            "target_steps": -12,
+            "velocity_steps_per_s": 0,
+            "moving": False,
+            "trust": "known",
+        }
+        self.assertEqual({key: motor[key] for key in expected}, expected)
+        self.assertEqual([mcu["mcu"] for mcu in status["mcus"]], ["hall:1", "hall:2"])
+        for mcu in status["mcus"]:
+            self.assertEqual(mcu["state"], "READY")
+            self.assertGreater(mcu["boot"], 0)
+
+    def test_status_of_a_motor_under_way(self):
+        self.bring_up()
+        self.start_move("a0", -FAR)
+        self.wait_until_travelled(1000, "a0")
+        motor = self.motors()["a0"]
+        self.assertTrue(motor["moving"])
+        self.assertEqual(motor["target_steps"], -FAR)
+        # The table's cruise: 10 time units of 40 us a step.
+        self.assertAlmostEqual(motor["velocity_steps_per_s"], -2500, delta=1)
+
+    def test_watch_ends_after_a_count(self):
+        self.bring_up()
+        ran = self.command("watch", "--count", "2")
+        for name in MOTORS:
+            self.assertIn(f"{name} position 0 target 0", ran.stdout)
+
+
+class Examples(EndToEndTest):
+    def check_example(self, *example):
+        self.bring_up()
+        ran = self.run_program(*example, "a0", "400", "b1", "-20")
+        self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
+        self.assertIn("a0: reached, stands at 400", ran.stdout)
+        self.assertIn("b1: reached, stands at -20", ran.stdout)
+        ran = self.run_program(*example, "nobody", "5")
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn('no motor "nobody"', ran.stdout + ran.stderr)
+        self.assertEqual(self.positions()["a0"], 400)
+
+    def test_in_cpp(self):
+        self.check_example(program("MOVE_AND_WAIT"))
+
+    def test_in_python(self):
+        python = os.environ["EXAMPLE_PYTHON"]
+        try:
+            subprocess.run([python, "-c", "import lcm, bushd"], check=True, capture_output=True)
+        except (OSError, subprocess.CalledProcessError):
+            self.skipTest(f"{python} has no lcm: tools/examples/python/setup-venv needs a package index")
+        self.check_example(python, TOP / "tools" / "examples" / "python" / "move_and_wait.py")
+
+
+if __name__ == "__main__":
+    unittest.main()

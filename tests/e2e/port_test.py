@@ -1,0 +1,89 @@
+"""A serial port that is missing or goes away: the daemon stays, says so, and goes on when the port is back."""
+
+import signal
+import unittest
+
+from rig import FAR, EndToEndTest
+
+
+class Port(EndToEndTest):
+    def wait_until_offline(self):
+        self.wait_until("both MCUs to be OFFLINE", lambda: self.mcu_states() == ["OFFLINE", "OFFLINE"])
+        for mcu in self.status()["mcus"]:
+            self.assertIn(str(self.file("port")), mcu["detail"])
+
+    def test_missing_at_the_start(self):
+        self.write_config()
+        self.bushd = self.start_bushd()
+        self.wait_until_offline()
+        self.assertIn(f"{self.file('port')}: cannot be opened: No such file", self.bushd.said())
+        refused = self.bushctl("move", "a0", "5")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("a0: MCU hall:1 is offline", refused.stderr)
+        self.assertIn(str(self.file("port")), refused.stderr)
+
+        self.start_bushsim()
+        self.wait_until_ready()
+        self.command("move", "--wait", "a0", "5")
+        self.assertEqual(self.bushd.end(), 0)
+
+    def test_ends_while_the_port_is_missing(self):
+        self.write_config()
+        bushd = self.start_bushd()
+        self.wait_until_offline()
+        self.assertEqual(bushd.end(signal.SIGTERM), 0)
+
+    def test_lost_in_motion_and_back_with_mcus_that_booted_again(self):
+        self.bring_up()
+        before = {mcu["mcu"]: mcu["boot"] for mcu in self.status()["mcus"]}
+        move = self.start_move("a0", FAR, "b1", -FAR)
+        self.wait_until_travelled(300, "a0", "b1")
+        self.bushsim.end(signal.SIGKILL)  # takes the port with it
+        self.assertEqual(move.process.wait(), 1)
+        self.assertIn("a0: link, stands at", move.said())
+        self.assertIn("b1: link, stands at", move.said())
+        self.assertIn(str(self.file("port")), move.said())
+        self.wait_until_offline()
+        self.assertIn(f"bus hall: port {self.file('port')} lost", self.bushd.said())
+        self.assert_one_result_each()
+
+        self.start_bushsim("trace-after.vcd")
+        self.wait_until_ready()
+        status = self.status()
+        for mcu in status["mcus"]:
+            self.assertNotEqual(mcu["boot"], before[mcu["mcu"]])
+        self.assertEqual({motor["trust"] for motor in status["motors"]}, {"uncertain"})
+        refused = self.bushctl("move", "a0", "5")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("a0: its position is uncertain", refused.stderr)
+
+        self.command("set", "a0", "-4000")
+        self.assertEqual(self.motors()["a0"]["position_steps"], -4000)
+        self.assertEqual(self.motors()["a0"]["trust"], "known")
+        self.assertEqual(self.motors()["a1"]["trust"], "uncertain")
+        self.command("move", "--wait", "a0", "--to", "-3995")
+        self.assertEqual(self.motors()["a0"]["position_steps"], -3995)
+        self.assertEqual(self.bushd.end(), 0)
+
+    def test_no_serial_port_at_all(self):
+        self.write_config()
+        self.file("port").write_text("a file")
+        self.bushd = self.start_bushd()
+        self.wait_until_offline()
+        self.assertIn("is no serial port", self.bushd.said())
+        self.file("port").unlink()
+        self.start_bushsim()
+        self.wait_until_ready()
+
+    def test_in_use_by_another_daemon(self):
+        self.bring_up()
+        second = self.start_bushd("moves-second.jsonl")
+        self.wait_until("the second daemon to complain", lambda: "trying again" in second.said())
+        self.assertIn(str(self.file("port")), second.said())
+        self.assertEqual(second.end(), 0)
+        self.wait_until_ready()
+        self.command("move", "--wait", "a0", "5")
+
+
+if __name__ == "__main__":
+    unittest.main()
