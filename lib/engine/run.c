@@ -4,9 +4,10 @@
 // binary search finds where deceleration takes over; codes not above c count as cruise.
 //
 // State in time is (which step runs, time units since the last step). Advancing by dt:
-//   side with an index   S[i] + since + dt looked up in the prefix sums S: one bucket, one
-//   comparison side without         the codes are walked cruise               quotient and
-//   remainder of dt / c, computed once a block
+// - on a side with an index, S[i] + since + dt is looked up in the prefix sums S: one bucket, one
+//   comparison
+// - on a side without, the codes are walked
+// - in cruise, by quotient and remainder of dt / c, computed once a block
 // The decelerating side is the same walk through its sums, backwards in time from the end.
 #include "engine/run.h"
 
