@@ -238,6 +238,15 @@ size_t bushd_encode_ticks_head(uint8_t epoch, uint8_t flags, uint32_t first_tick
   return (size_t)(w.at - payload);
 }
 
+// -32768 has no positive counterpart, and with 128 slots two of its steps would share one.
+static bool in_fine_range(const bushd_ticks* message) {
+  const uint16_t values = (uint16_t)(message->count * message->motors);
+  for (uint16_t i = 0; i < values; ++i) {
+    if (bushd_get_i16(message->displacements + 2u * i) == INT16_MIN) return false;
+  }
+  return true;
+}
+
 bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks* message) {
   reader r = read_from(payload, size);
   message->epoch = get8(&r);
@@ -253,8 +262,11 @@ bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks
   const uint8_t known =
       BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS | BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
   const uint8_t either = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
-  return finish(&r, message->flags <= known && (message->flags & either) != either &&
-                        message->count >= 1 && message->mask != 0);
+  const bushd_status status =
+      finish(&r, message->flags <= known && (message->flags & either) != either &&
+                     message->count >= 1 && message->mask != 0);
+  if (status != BUSHD_OK || width == 1) return status;
+  return in_fine_range(message) ? BUSHD_OK : BUSHD_E_FORMAT;
 }
 
 size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {

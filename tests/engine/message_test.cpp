@@ -91,6 +91,12 @@ Bytes any_ticks() {
   payload[1] = flags;
   payload[6] = count;
   bushd_put_u16(payload.data() + 7, mask);
+  if (width == 2) {
+    for (std::size_t at = payload.size() - width * motors * count; at < payload.size();
+         at += width) {
+      if (bushd_get_i16(&payload[at]) == INT16_MIN) bushd_put_i16(&payload[at], 1);
+    }
+  }
   return payload;
 }
 
@@ -273,6 +279,17 @@ TEST(MessageTicks, RefusesNoTicksAndNoMotors) {
   payload[6] = 1;
   bushd_put_u16(payload.data() + 7, 0);
   EXPECT_EQ(bushd_decode_ticks(payload.data(), payload.size(), &message), BUSHD_E_FORMAT);
+}
+
+TEST(MessageTicks, RefusesTheFineDisplacementWithoutACounterpart) {
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  std::size_t size = bushd_encode_ticks_head(0, BUSHD_TICKS_FINE, 5, 2, 1, nullptr, payload.data());
+  bushd_put_i16(&payload[size], 7);
+  bushd_put_i16(&payload[size + 2], INT16_MIN + 1);
+  bushd_ticks ticks{};
+  EXPECT_EQ(bushd_decode_ticks(payload.data(), size + 4, &ticks), BUSHD_OK);
+  bushd_put_i16(&payload[size + 2], INT16_MIN);
+  EXPECT_EQ(bushd_decode_ticks(payload.data(), size + 4, &ticks), BUSHD_E_FORMAT);
 }
 
 TEST(MessageTableData, RefusesNoCodesAndTooMany) {

@@ -1,9 +1,11 @@
 // docs/protocol.md is normative, so what it prints in hexadecimal must be what the code does. In
 // its blocks marked `frame` and `exchange` lines begin with
-//   wire HEX       a frame on the line                     raw HEX        the same without COBS and
-//   delimiter master HEX     sent to an MCU                          mcu HEX        which must
-//   answer just that says TEXT      what the frame above means (message_text) ticks N        N tick
-//   boundaries pass
+// - wire HEX: a frame on the line
+// - raw HEX: the same without COBS and delimiter
+// - master HEX: sent to an MCU
+// - mcu HEX: which must answer just that
+// - says TEXT: what the frame above means (message_text)
+// - ticks N: N tick boundaries pass
 #include <gtest/gtest.h>
 
 #include <fstream>
