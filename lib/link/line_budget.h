@@ -11,6 +11,7 @@ namespace bushd::link {
 
 inline constexpr std::int64_t kPollPeriodUs = 50'000;  // each MCU is asked this often
 inline constexpr std::int64_t kSyncPeriodUs = 500'000;
+inline constexpr unsigned kMaxTicksPerFrame = 16;  // what one lost frame can cost
 // Share of the line that may be planned: the rest is for repeats, turnaround and adapter latency.
 inline constexpr double kMaxLineLoad = 0.85;
 

@@ -20,7 +20,6 @@ constexpr std::int64_t kReplaceLeadUs =
 constexpr std::int64_t kMaxBacklogUs = 4'000;  // bytes handed to the port but not yet on the line
 constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be told the time
 constexpr std::int64_t kStreamWakeUs = 5'000;
-constexpr unsigned kMaxTicksPerFrame = 16;  // what one lost frame can cost
 
 std::int64_t line_us(std::uint32_t baud, std::size_t bytes) {
   return static_cast<std::int64_t>(bytes) * 10'000'000 / baud + 1;
@@ -70,12 +69,16 @@ Tick Master::earliest_replace(std::int64_t now_us) const {
 }
 
 void Master::begin(std::size_t mcu, std::uint8_t motor, Tick start) {
+  drop(mcu, motor);
   mcus_[mcu].stream[motor] = {
       .active = true, .finished = false, .start = start, .next = start, .delay_sent = {}};
 }
 
 void Master::drop(std::size_t mcu, std::uint8_t motor) {
-  mcus_[mcu].stream[motor].active = false;
+  Mcu& m = mcus_[mcu];
+  m.stream[motor].active = false;
+  // Nor is a replacement that has been asked for and not yet sent.
+  m.replacing &= static_cast<std::uint16_t>(~(1u << motor));
 }
 
 void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
@@ -323,7 +326,8 @@ bool Master::send_due_sync(std::int64_t now_us) {
     if (!mcu.view.reported) continue;
     const bool synced = (mcu.view.report.flags & BUSHD_FLAG_SYNCED) != 0;
     const bool marked = (mcu.view.report.flags & BUSHD_FLAG_MARK) != 0 && mark_tag_ &&
-                        mcu.view.report.mark_tag == *mark_tag_;
+                        mcu.view.report.mark_tag == *mark_tag_ &&
+                        mcu.view.report.mark_ns < setup_.tick_ns;
     anybody |= synced;
     waiting |= !synced || (mcu.view.report.flags & BUSHD_FLAG_MARK) == 0;
     if (marked && synced && reference == nullptr) reference = &mcu.view;

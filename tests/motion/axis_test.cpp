@@ -51,7 +51,8 @@ std::vector<std::int16_t> ticks_of(const Reference& reference, int direction, st
 // The first tick after the last step, counted from the start.
 Tick ticks_until_rest(const Reference& reference, std::uint32_t tick_ns) {
   Tick ticks = 0;
-  while (reference.steps_at(static_cast<std::uint64_t>(ticks) * tick_ns) < reference.steps()) ++ticks;
+  while (reference.steps_at(static_cast<std::uint64_t>(ticks) * tick_ns) < reference.steps())
+    ++ticks;
   return ticks;
 }
 
@@ -67,9 +68,10 @@ class AxisTest : public testing::TestWithParam<bushd_format> {
   const test::TestTable table{ramp(), true};
   Axis axis{*table.view(), kTickNs, format};
 };
-INSTANTIATE_TEST_SUITE_P(Formats, AxisTest,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         [](const auto& p) { return p.param == BUSHD_FORMAT_FINE ? "Fine" : "Coarse"; });
+INSTANTIATE_TEST_SUITE_P(Formats, AxisTest, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
+                         [](const auto& p) {
+                           return p.param == BUSHD_FORMAT_FINE ? "Fine" : "Coarse";
+                         });
 
 TEST_P(AxisTest, AnySplitGivesTheTicksOfTheFormula) {
   for (const std::int64_t steps : {1, -2, 35, -36, 200}) {
@@ -81,7 +83,8 @@ TEST_P(AxisTest, AnySplitGivesTheTicksOfTheFormula) {
       axis.start(0, steps, 1000);
       std::vector<std::int16_t> seen;
       // Ticks before the start are rest.
-      for (const std::int16_t d : render(axis, 1000 - static_cast<Tick>(split), split)) ASSERT_EQ(d, 0);
+      for (const std::int16_t d : render(axis, 1000 - static_cast<Tick>(split), split))
+        ASSERT_EQ(d, 0);
       while (seen.size() < total) {
         std::vector<std::int16_t> part(split * 3, 0x7777);
         const Tick first = 1000 + static_cast<Tick>(seen.size());
@@ -165,8 +168,8 @@ Reference stopped_move(const Law& law, std::int64_t steps, Tick at) {
 TEST_P(AxisTest, RampDownAtEveryTickOfShortAndLongMoves) {
   for (const std::int64_t steps : {1, 2, -9, 34, -60, 240}) {
     const int direction = steps < 0 ? -1 : 1;
-    const Tick length =
-        ticks_until_rest(Reference::move(table.law(), static_cast<std::size_t>(std::abs(steps))), kTickNs);
+    const Tick length = ticks_until_rest(
+        Reference::move(table.law(), static_cast<std::size_t>(std::abs(steps))), kTickNs);
     for (Tick at = 1; at <= length + 2; ++at) {
       // What is executed by the time of the wish must not matter, nor what was asked for before.
       for (const Tick executed : {Tick{0}, at / 2, at}) {
@@ -175,7 +178,8 @@ TEST_P(AxisTest, RampDownAtEveryTickOfShortAndLongMoves) {
         axis.executed(3000 + executed);
         axis.ramp_down(3000 + at);
         const Reference reference = stopped_move(table.law(), steps, at);
-        ASSERT_EQ(axis.target_steps(), 50 + direction * static_cast<std::int64_t>(reference.steps()))
+        ASSERT_EQ(axis.target_steps(),
+                  50 + direction * static_cast<std::int64_t>(reference.steps()))
             << steps << " at " << at;
         ASSERT_EQ(axis.wanted_steps(), 50 + steps);
         ASSERT_EQ(axis.end_tick(), 3000 + ticks_until_rest(reference, kTickNs));
@@ -203,7 +207,8 @@ TEST_P(AxisTest, LaterStopForgetsTheEarlierOne) {
       EXPECT_EQ(axis.target_steps(), static_cast<std::int64_t>(reference.steps()));
       auto expected = ticks_of(reference, 1, kTickNs, format, 400);
       expected.erase(expected.begin(), expected.begin() + first);
-      ASSERT_EQ(render(axis, first, 400 - static_cast<unsigned>(first)), expected) << first << ' ' << later;
+      ASSERT_EQ(render(axis, first, 400 - static_cast<unsigned>(first)), expected)
+          << first << ' ' << later;
       axis.finish();
     }
   }
@@ -228,7 +233,8 @@ TEST_P(AxisTest, StopAtOrBeforeTheStartMakesNoStep) {
 TEST_P(AxisTest, StopOneTickAfterTheStartMakesTheFirstStepOnly) {
   axis.start(5, 300, 100);
   axis.ramp_down(101);
-  EXPECT_EQ(axis.target_steps(), 5 + static_cast<std::int64_t>(stopped_move(table.law(), 300, 1).steps()));
+  EXPECT_EQ(axis.target_steps(),
+            5 + static_cast<std::int64_t>(stopped_move(table.law(), 300, 1).steps()));
   EXPECT_GE(axis.target_steps(), 6);
 }
 

@@ -126,8 +126,7 @@ TEST(MoveBook, EveryMoveEndsExactlyOnce) {
       RC_ASSERT(book.empty() == open.empty());
       for (std::size_t m = 0; m < 12; ++m) {
         const auto of = busy.find(m);
-        RC_ASSERT(book.move_of(m) ==
-                  (of == busy.end() ? std::nullopt : std::optional(of->second)));
+        RC_ASSERT(book.move_of(m) == (of == busy.end() ? std::nullopt : std::optional(of->second)));
       }
     }
   });

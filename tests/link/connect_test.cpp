@@ -1,0 +1,267 @@
+// From an open port to an MCU that takes moves, and everything that can be in the way.
+#include <gmock/gmock.h>
+
+#include "link/slave.h"
+
+namespace bushd::test {
+namespace {
+
+using link::Event;
+using link::McuPhase;
+using testing::HasSubstr;
+
+TEST(Connect, FindsConfiguresSyncsAndEnables) {
+  FakeBus bus(1, 3);
+  EXPECT_EQ(bus.master->view(0).phase, McuPhase::kOffline);
+  bus.connect();
+  EXPECT_EQ(bus.count(Event::Kind::kOnline), 1);
+  std::vector<int> requests;
+  for (const Heard& heard : bus.heard) {
+    if (heard.type != BUSHD_MSG_POLL && heard.type != BUSHD_MSG_SYNC)
+      requests.push_back(heard.type);
+  }
+  const std::vector<int> expected = {
+      BUSHD_MSG_IDENTIFY,   BUSHD_MSG_CONFIGURE,  BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA,
+      BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_END,   BUSHD_MSG_ASSIGN,
+      BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,     BUSHD_MSG_CONTROL};
+  EXPECT_EQ(requests, expected);
+  const Slave& slave = bus.slaves[0];
+  std::vector<std::uint16_t> codes = bus.codes;
+  codes.insert(codes.end(), bus.codes.begin() + 50, bus.codes.end());
+  EXPECT_EQ(slave.tables.at(0), codes) << "both sides, from slow to fast";
+  EXPECT_EQ(slave.flags, 15);
+  const Bytes control = bus.heard_of(BUSHD_MSG_CONTROL).back().payload;
+  EXPECT_EQ(control, (Bytes{BUSHD_CONTROL_ENABLE | BUSHD_CONTROL_CLEAR_FAULTS}));
+  EXPECT_EQ(bus.master->view(0).detail, "");
+  EXPECT_TRUE(bus.master->time_known());
+  EXPECT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(0), 1);
+  EXPECT_EQ(bus.master->timeouts(), 0u);
+  EXPECT_EQ(bus.master->bad_frames(), 0u);
+}
+
+TEST(Connect, AllMcusAgreeOnTheTime) {
+  FakeBus bus(5, 2);
+  bus.connect();
+  EXPECT_EQ(bus.count(Event::Kind::kOnline), 5);
+  for (std::size_t i = 1; i < 5; ++i)
+    EXPECT_NEAR(static_cast<double>(bus.slaves[i].zero_us),
+                static_cast<double>(bus.slaves[0].zero_us), 2);
+}
+
+TEST(Connect, LatecomerTakesTheTimeOfTheBus) {
+  FakeBus bus(2, 2);
+  bus.slaves[1].answers = false;
+  ASSERT_TRUE(bus.run_until([&] { return bus.online(0); }));
+  bus.run_for(5'000'000);
+  const std::int64_t zero = bus.slaves[0].zero_us;
+  bus.slaves[1].answers = true;
+  bus.connect();
+  EXPECT_EQ(bus.slaves[0].zero_us, zero) << "time goes on";
+  EXPECT_NEAR(static_cast<double>(bus.slaves[1].zero_us), static_cast<double>(zero), 2);
+}
+
+TEST(Connect, SymmetricTableIsSentOnce) {
+  FakeBus bus;
+  bus.table.decel = bus.table.accel;
+  bus.connect();
+  EXPECT_EQ(bus.slaves[0].tables.at(0), bus.codes);
+}
+
+struct Misfit {
+  const char* name;
+  void (*change)(bushd_identity& identity);
+  std::vector<std::string> said;
+};
+
+class Unfit : public testing::TestWithParam<Misfit> {};
+INSTANTIATE_TEST_SUITE_P(Identities, Unfit,
+                         testing::Values(Misfit{"Version",
+                                                [](bushd_identity& i) { i.protocol_version = 9; },
+                                                {"protocol version 9", "this program version 1",
+                                                 "update"}},
+                                         Misfit{"Outputs",
+                                                [](bushd_identity& i) { i.motors = 3; },
+                                                {"has only 3 outputs", "output 3 is configured"}},
+                                         Misfit{"Memory",
+                                                [](bushd_identity& i) { i.table_codes = 349; },
+                                                {"memory for 349", "need 350"}},
+                                         Misfit{"Queue",
+                                                [](bushd_identity& i) { i.queue_ticks = 8; },
+                                                {"queue of fewer than 16"}}),
+                         [](const auto& misfit) { return misfit.param.name; });
+
+TEST_P(Unfit, IsSaidAndAskedAgainWithoutHurry) {
+  FakeBus bus(1, 4);
+  const bushd_identity good = bus.slaves[0].identity;
+  GetParam().change(bus.slaves[0].identity);
+  bus.run_for(3'000'000);
+  EXPECT_EQ(bus.master->view(0).phase, McuPhase::kOffline);
+  for (const std::string& text : GetParam().said) {
+    EXPECT_THAT(bus.master->view(0).detail, HasSubstr(text));
+  }
+  EXPECT_TRUE(bus.master->view(0).identified);
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_IDENTIFY).size(), 2u);
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONFIGURE).size(), 0u) << "nothing is done to it";
+  EXPECT_TRUE(bus.events.empty());
+  // Another MCU in its place.
+  bus.slaves[0].identity = good;
+  bus.connect();
+}
+
+TEST(Connect, ExactlyEnoughMemoryIsEnough) {
+  FakeBus bus(1, 4);
+  bus.slaves[0].identity.table_codes = 350;
+  bus.connect();
+}
+
+TEST(Connect, RefusedRequestsAreNamedAndTriedAgain) {
+  for (const std::uint8_t type : {BUSHD_MSG_CONFIGURE, BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA,
+                                  BUSHD_MSG_TABLE_END, BUSHD_MSG_ASSIGN, BUSHD_MSG_CONTROL}) {
+    FakeBus bus;
+    bus.slaves[0].refusals = {{type, BUSHD_E_TABLE_UNSORTED}};
+    bus.run_for(1'000'000);
+    EXPECT_EQ(bus.count(Event::Kind::kOnline), 0) << int{type};
+    EXPECT_THAT(bus.master->view(0).detail,
+                testing::AnyOf(HasSubstr(bushd_status_text(BUSHD_E_TABLE_UNSORTED)),
+                               HasSubstr("being configured")));
+    ASSERT_TRUE(bus.run_until([&] { return bus.master->view(0).phase == McuPhase::kOffline; }));
+    EXPECT_THAT(bus.master->view(0).detail, HasSubstr("refused its configuration"));
+    bus.slaves[0].refusals.clear();
+    bus.connect();
+  }
+}
+
+TEST(Connect, LostRequestsAndAnswersAreRepeated) {
+  FakeBus bus;
+  int n = 0;
+  bus.slaves[0].loses = [&](const Heard&) { return ++n % 3 == 0; };
+  bus.connect();
+  EXPECT_GT(bus.master->timeouts(), 3u);
+  std::vector<std::uint16_t> codes = bus.codes;
+  codes.insert(codes.end(), bus.codes.begin() + 50, bus.codes.end());
+  EXPECT_EQ(bus.slaves[0].tables.at(0), codes);
+}
+
+TEST(Connect, SilenceMakesOfflineOnceAndAfterALimit) {
+  FakeBus bus(2);
+  bus.connect();
+  bus.run_for(1'000'000);
+  bus.slaves[0].answers = false;
+  const std::int64_t from_us = bus.now_us;
+  ASSERT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kOffline) > 0; }));
+  EXPECT_GE(bus.now_us - from_us, 100'000) << "ten answers missing, each awaited 10 ms or more";
+  EXPECT_LE(bus.now_us - from_us, 1'200'000);
+  EXPECT_EQ(bus.master->view(0).phase, McuPhase::kOffline);
+  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("does not answer"));
+  bus.run_for(3'000'000);
+  EXPECT_EQ(bus.count(Event::Kind::kOffline), 1);
+  EXPECT_TRUE(bus.online(1)) << "the other is not disturbed";
+  bus.slaves[0].answers = true;
+  bus.connect();
+}
+
+TEST(Connect, SomeLostAnswersAreNoOffline) {
+  FakeBus bus;
+  bus.connect();
+  int n = 0;
+  bus.slaves[0].loses = [&](const Heard& heard) {
+    return heard.type == BUSHD_MSG_POLL && ++n % 10 != 0;  // nine of ten
+  };
+  bus.run_for(10'000'000);
+  EXPECT_EQ(bus.count(Event::Kind::kOffline), 0);
+  EXPECT_GT(bus.master->timeouts(), 50u);
+}
+
+TEST(Connect, RestartIsSeenAndConfiguredAgain) {
+  FakeBus bus;
+  bus.connect();
+  Slave fresh;
+  fresh.address = 1;
+  fresh.identity = bus.slaves[0].identity;
+  ++fresh.identity.boot_number;
+  fresh.zero_us = bus.now_us;
+  bus.slaves[0] = fresh;
+  ASSERT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kOffline) > 0; }, 200'000));
+  EXPECT_EQ(bus.master->view(0).detail, "restarted");
+  bus.connect();
+  EXPECT_EQ(bus.slaves[0].flags, 15);
+  EXPECT_EQ(bus.count(Event::Kind::kOnline), 2);
+}
+
+TEST(Connect, PortLostIsOfflineWithItsCauseAndSilence) {
+  FakeBus bus(2);
+  bus.connect();
+  bus.events.clear();
+  bus.master->port_lost(bus.now_us, "unplugged");
+  const auto frames = bus.heard.size();
+  EXPECT_EQ(bus.master->next_wake_us(), INT64_MAX);
+  EXPECT_TRUE(bus.master->step(bus.now_us).empty());
+  bus.run_for(1'000'000);
+  EXPECT_EQ(bus.heard.size(), frames);
+  EXPECT_EQ(bus.count(Event::Kind::kOffline), 2);
+  EXPECT_EQ(bus.master->view(1).detail, "unplugged");
+  EXPECT_FALSE(bus.master->time_known());
+  bus.master->port_opened(bus.now_us);
+  EXPECT_EQ(bus.master->view(1).detail, "no answer yet");
+  bus.connect();
+}
+
+TEST(Connect, EachMcuIsPolledTwentyTimesASecond) {
+  FakeBus bus(3);
+  bus.connect();
+  bus.run_for(500'000);
+  bus.heard.clear();
+  bus.run_for(2'000'000);
+  for (std::uint8_t address = 1; address <= 3; ++address) {
+    std::int64_t last = -1;
+    int polls = 0;
+    for (const Heard& heard : bus.heard_of(BUSHD_MSG_POLL)) {
+      if (heard.address != address) continue;
+      EXPECT_TRUE(last < 0 || heard.at_us - last <= 60'000) << heard.at_us - last;
+      last = heard.at_us;
+      ++polls;
+    }
+    EXPECT_NEAR(polls, 40, 3);
+  }
+  EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_SYNC).size()), 4, 1);
+}
+
+TEST(Connect, StrangeAnswersAreNotTaken) {
+  FakeBus bus;
+  bus.connect();
+  const std::int32_t before = bus.master->view(0).report.motor[0].position_steps;
+  bushd_report forged = bus.master->view(0).report;
+  forged.motor[0].position_steps = 99;
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(bushd_encode_report(&forged, payload.data()));
+  for (int tag = 0; tag < 256; ++tag) {
+    Bytes wire(BUSHD_FRAME_MAX_WIRE);
+    wire.resize(bushd_frame_encode(1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY,
+                                   static_cast<std::uint8_t>(tag), payload.data(), payload.size(),
+                                   wire.data()));
+    bus.master->receive(bus.now_us, wire);  // nothing was asked
+  }
+  EXPECT_EQ(bus.master->view(0).report.motor[0].position_steps, before);
+  bus.master->receive(bus.now_us, Bytes{1, 2, 3, 0, 9, 9, 9, 9, 9, 9, 9, 9, 0});
+  EXPECT_EQ(bus.master->bad_frames(), 2u);
+  bus.run_for(1'000'000);
+  EXPECT_TRUE(bus.online());
+}
+
+TEST(Connect, ControlAndPositionAreAskedForOnceAndSeen) {
+  FakeBus bus;
+  bus.connect();
+  bus.heard.clear();
+  bus.master->set_position(0, 2, -77);
+  bus.master->control(0, BUSHD_CONTROL_DISABLE);
+  EXPECT_TRUE(bus.master->busy(0));
+  ASSERT_TRUE(bus.run_until([&] { return !bus.master->busy(0); }));
+  bus.run_for(100'000);
+  EXPECT_EQ(bus.master->view(0).report.motor[2].position_steps, -77);
+  EXPECT_EQ(bus.master->view(0).report.flags & BUSHD_FLAG_ENABLED, 0);
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_SET_POSITION).size(), 1u);
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONTROL).size(), 1u);
+}
+
+}  // namespace
+}  // namespace bushd::test

@@ -1,0 +1,121 @@
+// A bus with slaves that are not the firmware: they keep to docs/protocol.md as far as a test lets
+// them, and remember all that they were sent. Time is simulated; bytes take theirs.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "link/master.h"
+
+namespace bushd::test {
+
+using Bytes = std::vector<std::uint8_t>;
+
+struct Heard {
+  std::int64_t at_us;  // end of the frame
+  std::uint8_t address;
+  std::uint8_t type;
+  Bytes payload;
+};
+
+struct Slave {
+  bushd_identity identity{BUSHD_PROTOCOL_VERSION, 16, 1, 500, 256, 256, 4000};
+  std::uint8_t address = 1;
+  bool answers = true;
+  std::map<std::uint8_t, std::uint8_t> refusals;  // request type -> status
+  // Frames for which this returns true are lost on the way here.
+  std::function<bool(const Heard&)> loses = [](const Heard&) { return false; };
+
+  // What it knows.
+  std::uint8_t flags = 0;
+  std::uint8_t epoch = 0;
+  std::uint8_t faults = 0;
+  std::int64_t zero_us = -1'000'000;  // when its tick 0 began
+  std::uint8_t mark_tag = 0;
+  std::int64_t mark_us = 0;
+  std::map<std::uint8_t, std::vector<std::uint16_t>> tables;
+  std::array<int, BUSHD_MOTORS_PER_MCU> table_of{};
+  std::array<std::uint32_t, BUSHD_MOTORS_PER_MCU> known_until{};
+  std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delay{};
+  std::array<std::int32_t, BUSHD_MOTORS_PER_MCU> position{};
+  // Everything it took, by motor and tick.
+  std::array<std::map<std::uint32_t, std::int16_t>, BUSHD_MOTORS_PER_MCU> taken;
+  std::uint16_t rejected = 0;
+};
+
+// One step a tick and motor for ever, unless a test says otherwise; notes what it was asked.
+class FakeSource : public link::TickSource {
+ public:
+  std::function<std::int16_t(std::uint8_t motor, link::Tick tick)> displacement =
+      [](std::uint8_t motor, link::Tick tick) {
+        return static_cast<std::int16_t>((tick * 7 + motor) % 1000);
+      };
+  // Of the step running at the end of `tick - 1`.
+  std::function<std::uint16_t(std::uint8_t motor, link::Tick tick)> delay =
+      [](std::uint8_t, link::Tick tick) { return static_cast<std::uint16_t>(100 + tick % 100); };
+
+  std::uint16_t render(std::size_t, std::uint8_t motor, link::Tick first, unsigned count,
+                       std::int16_t* out, std::size_t stride) override {
+    for (unsigned i = 0; i < count; ++i) out[i * stride] = displacement(motor, first + i);
+    return delay(motor, first + count);
+  }
+};
+
+class FakeBus {
+ public:
+  static constexpr std::uint32_t kBaud = 500'000;
+  static constexpr std::uint32_t kTickNs = 2'560'000;
+
+  // Slaves get the addresses 1, 2, ...; all outputs of `motors` have table 0.
+  explicit FakeBus(int slaves = 1, int motors = 4, bushd_format format = BUSHD_FORMAT_FINE,
+                   std::uint32_t tick_ns = kTickNs);
+
+  void run_for(std::int64_t us);
+  bool run_until(const std::function<bool()>& done, std::int64_t limit_us = 20'000'000);
+  void connect();
+  bool online(std::size_t mcu = 0) const {
+    return master->view(mcu).phase == link::McuPhase::kOnline;
+  }
+  int count(link::Event::Kind kind) const;
+  std::optional<link::Event> last(link::Event::Kind kind) const;
+  std::uint32_t tick(std::size_t slave) const { return tick_of(slaves[slave]); }
+  std::uint32_t tick_of(const Slave& slave) const;
+  std::vector<Heard> heard_of(std::uint8_t type) const;
+
+  std::int64_t now_us = 1'000'000;
+  std::int64_t turnaround_us = 100;
+  std::vector<Slave> slaves;
+  FakeSource source;
+  std::vector<std::uint16_t> codes;
+  bushd_table table{};
+  link::BusSetup setup;
+  std::unique_ptr<link::Master> master;
+  std::vector<Heard> heard;  // every frame of the master
+  std::vector<link::Event> events;
+  std::int64_t master_bytes = 0;
+  std::int64_t slave_bytes = 0;
+
+ private:
+  void advance(std::int64_t limit_us);
+  void hear(const Heard& frame, std::uint8_t tag);
+  void act(Slave& slave, const Heard& frame, std::uint8_t tag);
+  void take_ticks(Slave& slave, const Heard& frame);
+  void answer(const Slave& slave, const Heard& frame, std::uint8_t tag, const Bytes& payload);
+  void follow_time(Slave& slave);
+  Bytes report(Slave& slave);
+
+  bushd_receiver receiver_{};
+  std::multimap<std::int64_t, std::pair<Heard, std::uint8_t>> frames_;
+  std::multimap<std::int64_t, Bytes> arrivals_;
+  std::int64_t line_free_us_ = 0;
+};
+
+}  // namespace bushd::test
