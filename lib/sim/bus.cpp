@@ -20,6 +20,7 @@ std::size_t Bus::add_mcu(const McuOptions& options) {
   assert(options.boot_ns >= now_ns_);
   const std::size_t index = mcus_.size();
   line_.add_talker();
+  deaf_until_ns_.push_back(0);
   VirtualMcu::Driver& driver = *this;  // here, where the private base is known
   mcus_.push_back(std::make_unique<VirtualMcu>(options, index, driver, sink_));
   return index;
@@ -63,6 +64,7 @@ void Bus::deliver(const LineByte& byte) {
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     const std::size_t talker = i + 1;
     if (talker == byte.talker || line_.drives(talker, byte.start_ns, byte.end_ns)) continue;
+    if (byte.end_ns <= deaf_until_ns_[i]) continue;
     mcus_[i]->receive(byte.value, byte.end_ns);
   }
   if (byte.talker != kMaster && on_master_byte) on_master_byte(byte.value, byte.end_ns);
@@ -86,6 +88,10 @@ void Bus::advance_to(TimeNs t_ns) {
     deliver(line_.take());
   }
   settle(t_ns);
+}
+
+void Bus::deafen(std::size_t mcu, TimeNs until_ns) {
+  deaf_until_ns_[mcu] = std::max(deaf_until_ns_[mcu], until_ns);
 }
 
 void Bus::reboot(std::size_t mcu, TimeNs down_ns) {

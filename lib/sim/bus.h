@@ -55,6 +55,11 @@ class Bus : private VirtualMcu::Driver {
   // `down_ns` have passed.
   void reboot(std::size_t mcu, TimeNs down_ns = 0);
 
+  // From now until then this MCU alone hears nothing: disturbances are not the same everywhere.
+  void deafen(std::size_t mcu, TimeNs until_ns);
+  // The master falls silent now: the byte on the line breaks off, those behind it are dropped.
+  void break_off_master() { line_.silence(kMaster, now_ns_); }
+
   std::size_t mcu_count() const { return mcus_.size(); }
   VirtualMcu& mcu(std::size_t index) { return *mcus_[index]; }
   const VirtualMcu& mcu(std::size_t index) const { return *mcus_[index]; }
@@ -75,6 +80,7 @@ class Bus : private VirtualMcu::Driver {
   EdgeSink* sink_;
   Line line_;
   std::vector<std::unique_ptr<VirtualMcu>> mcus_;
+  std::vector<TimeNs> deaf_until_ns_;  // by MCU
   TimeNs now_ns_ = 0;
   TimeNs next_settling_ns_ = 0;
   std::uint64_t collisions_ = 0;

@@ -1,0 +1,113 @@
+// Whether a motor's steps, seen from outside, keep to its table: no jump in speed, neither up nor
+// down, whoever made the steps (streamed ticks, a stop, an MCU's own run-down).
+//
+// Let tau_j be the exact time of step j by the table and t_j when its pulse came. Within
+// tolerances derived below, t_j = tau_j + e with |e| <= E. From rest, the exact delay before step j
+// is one of the table's, and after A(k) no shorter one than A(k+1) can follow. So two bounds are
+// carried from step to step:
+//
+//     k    <=  k + 1; and if the pulses lie m apart, the exact delay was >= m - 2E, which may say
+//              that k is smaller
+//     tau  >=  max( tau of the step before + A(k), t - E )
+//
+// and a pulse is a violation if it comes before this bound by more than E. Errors do not add up:
+// the bound on tau is one of absolute time, so being a little too fast for long is found too.
+// Speeds can only fall as a table allows: when a motor has come to rest, its last n steps must have
+// taken at least D(n-1) + ... + D(0), less 2E, for every n. A gap within a motion, or a motion that
+// goes on after a gap, breaks the first rule: after a long delay only the beginning of the table is
+// allowed.
+//
+// Tolerances. T is the tick, S its slots; ticks are emitted up to 1/64 (sync) and 50 ppm (crystal)
+// faster than real time, so every delay counts 1/63 less. Fine format (docs/performance.md):
+//
+//     E = min( T, (dv T/4 + 1/256) / v ) + T/S
+//
+// with dv the greatest change of speed in a tick that contains the step and v the slowest speed in
+// it, both by the table. Coarse: steps are spaced evenly in their tick, so E = T, and for delays d
+// shorter than the tick E = d. In the last tick steps may be late by up to T (they spread over the
+// tick, the movement does not); late means slower, and matters only for the start after it.
+//
+// E must be taken for the exact delay d, which is unknown; since E <= 3d/8 in the fine format,
+// d <= 4m, and E rises with d: that of 4m is enough. (In the coarse format, with c steps in a tick,
+// m >= T/2c and d <= 2T/c.)
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/message.h"
+#include "engine/table.h"
+#include "sim/edge.h"
+
+namespace bushd::sim {
+
+// What a table allows, with its tolerances; shared by all motors that run it.
+class PaceRules {
+ public:
+  PaceRules(const bushd_table& table, std::uint32_t tick_ns, std::uint16_t slots,
+            bushd_format format);
+
+  TimeNs tick_ns() const { return tick_ns_; }
+  std::size_t last() const { return delay_ns_.size() - 1; }              // the index of cruise
+  TimeNs delay_ns(std::size_t k) const { return delay_ns_[k]; }          // A(k), 1/63 shorter
+  TimeNs tolerance_ns(std::size_t k) const { return tolerance_ns_[k]; }  // for A(k) and shorter
+  std::size_t stop_steps() const { return stop_ns_.size() - 1; }
+  TimeNs stop_ns(std::size_t n) const { return stop_ns_[n]; }  // the least time of the last n
+  // Silent for longer, the motor is surely at rest.
+  TimeNs rest_ns() const { return rest_ns_; }
+
+ private:
+  TimeNs tick_ns_;
+  std::vector<TimeNs> delay_ns_;
+  std::vector<TimeNs> tolerance_ns_;
+  std::vector<TimeNs> stop_ns_;
+  TimeNs rest_ns_;
+};
+
+enum class Jump {
+  kNone,
+  kTooFast,     // a step earlier than the table allows after those before
+  kTurned,      // the direction changed without a rest
+  kStoppedDead  // at rest without a run-down
+};
+
+class Pace {
+ public:
+  explicit Pace(const PaceRules& rules) : rules_(&rules) {}
+
+  // A step at t_ns, not before the last one. O(1) amortised.
+  Jump step(TimeNs t_ns, bool positive);
+  // No step since the last one until now.
+  Jump silent(TimeNs now_ns) {
+    if (count_ == 0 || now_ns - last_ns() < rules_->rest_ns()) return Jump::kNone;
+    return come_to_rest();
+  }
+  // The motor was cut off (a reset): what came before says nothing about what follows.
+  void cut() { count_ = 0; }
+
+  bool moving() const { return count_ != 0; }
+  TimeNs last_ns() const { return time_ns_[newest_]; }
+  // For a message, after a jump: how much too early (kTooFast, kTurned).
+  TimeNs too_early_ns() const { return too_early_ns_; }
+
+ private:
+  static constexpr std::size_t kHistory = 64;  // a power of two
+
+  void start(TimeNs t_ns, bool positive);
+  void remember(TimeNs t_ns);
+  Jump come_to_rest();
+
+  const PaceRules* rules_;
+  std::array<TimeNs, kHistory> time_ns_{};
+  std::size_t newest_ = 0;
+  std::size_t count_ = 0;  // steps since rest, at most kHistory
+  bool positive_ = false;
+  std::size_t k_ = 0;       // the last exact delay was at least A(k)
+  std::size_t cursor_ = 0;  // where the tolerance was found last
+  TimeNs exact_ns_ = 0;     // the last step's exact time is not before this
+  TimeNs too_early_ns_ = 0;
+};
+
+}  // namespace bushd::sim

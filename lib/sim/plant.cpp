@@ -1,0 +1,88 @@
+#include "sim/plant.h"
+
+namespace bushd::sim {
+namespace {
+
+std::string in_us(TimeNs ns) {
+  return std::to_string(ns / 1000) + " us";
+}
+
+}  // namespace
+
+Plant::Plant(std::size_t mcus) : motor_of_(mcus), enabled_(mcus, false) {
+  for (auto& motors : motor_of_) motors.resize(kOutputsPerMcu);
+}
+
+void Plant::attach(std::size_t mcu, std::size_t output, const PaceRules& rules) {
+  motor_of_[mcu].at(output) = std::make_unique<Motor>(rules);
+}
+
+void Plant::violated(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what) {
+  if (on_violation) on_violation(time_ns, mcu, output, what);
+}
+
+void Plant::report(TimeNs time_ns, std::size_t mcu, std::size_t output, const Motor& motor,
+                   Jump jump) {
+  switch (jump) {
+    case Jump::kNone:
+      break;
+    case Jump::kTooFast:
+      violated(time_ns, mcu, output,
+               "jump in speed: a step " + in_us(motor.pace.too_early_ns()) +
+                   " earlier than its table allows");
+      break;
+    case Jump::kTurned:
+      violated(time_ns, mcu, output,
+               "turned without a rest, " + in_us(motor.pace.too_early_ns()) + " too early");
+      break;
+    case Jump::kStoppedDead:
+      violated(time_ns, mcu, output, "stopped without the run-down of its table");
+      break;
+  }
+}
+
+void Plant::edge(const Edge& edge) {
+  if (edge.signal == Signal::kEnable) {
+    enabled_[edge.mcu] = edge.level;
+    return;
+  }
+  Motor* motor = motor_of_[edge.mcu][edge.index].get();
+  if (motor == nullptr) {
+    if (edge.signal == Signal::kStep && edge.level) {
+      violated(edge.time_ns, edge.mcu, edge.index, "a step where no motor is");
+    }
+    return;
+  }
+  if (edge.signal == Signal::kDir) {
+    motor->forward = edge.level;
+    return;
+  }
+  if (!edge.level) return;  // a driver steps when STEP rises
+  if (!enabled_[edge.mcu]) {
+    violated(edge.time_ns, edge.mcu, edge.index, "a step while its driver is off");
+    return;
+  }
+  ++steps_made_;
+  motor->position_steps += motor->forward ? 1 : -1;
+  const Jump jump = motor->pace.step(edge.time_ns, motor->forward);
+  if (jump != Jump::kNone) report(edge.time_ns, edge.mcu, edge.index, *motor, jump);
+}
+
+void Plant::settled(TimeNs until_ns) {
+  for (std::size_t mcu = 0; mcu < motor_of_.size(); ++mcu) {
+    for (std::size_t output = 0; output < kOutputsPerMcu; ++output) {
+      Motor* motor = motor_of_[mcu][output].get();
+      if (motor == nullptr || !motor->pace.moving()) continue;
+      const Jump jump = motor->pace.silent(until_ns);
+      if (jump != Jump::kNone) report(until_ns, mcu, output, *motor, jump);
+    }
+  }
+}
+
+void Plant::cut(std::size_t mcu) {
+  for (const auto& motor : motor_of_[mcu]) {
+    if (motor) motor->pace.cut();
+  }
+}
+
+}  // namespace bushd::sim

@@ -1,0 +1,183 @@
+#include "clients.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace bushfaults {
+namespace {
+
+using bushd::command_t;
+
+constexpr std::int64_t kLongestMove = 6000;
+constexpr std::int64_t kFarthest = 20'000;
+constexpr std::uint32_t kStream = 100;  // of randomness
+
+}  // namespace
+
+Clients::Clients(const bushd::config::Config& config, const Witness& witness, std::uint64_t seed)
+    : config_(config), witness_(witness), random_(seed, kStream), number_(kClients, 0) {}
+
+void Clients::begin_anew() {
+  ++generation_;
+  sent_.clear();
+  std::fill(number_.begin(), number_.end(), 0);
+}
+
+command_t Clients::make(std::int8_t kind) {
+  const auto client = static_cast<std::size_t>(random_.below(kClients));
+  command_t command;
+  command.utime_us = 0;
+  command.client_id = "c" + std::to_string(client) + "-" + std::to_string(generation_);
+  command.number = ++number_[client];
+  command.kind = kind;
+  command.motor_count = 0;
+  return command;
+}
+
+void Clients::add(command_t& command, const std::string& motor, std::int64_t steps) {
+  command.motors.push_back(motor);
+  command.steps.push_back(steps);
+  ++command.motor_count;
+}
+
+std::string Clients::any_motor() {
+  return config_.motors[static_cast<std::size_t>(random_.below(config_.motors.size()))].name;
+}
+
+std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) const {
+  std::vector<Choice> found;
+  for (const auto& state : witness_.states()) {
+    if (!state) continue;
+    for (const bushd::motor_state_t& motor : state->motors) {
+      if ((motor.moving != 0) == moving && (motor.trust == "uncertain") == uncertain) {
+        found.push_back({motor.name, motor.position_steps});
+      }
+    }
+  }
+  return found;
+}
+
+command_t Clients::move() {
+  const bool absolute = random_.one_in(3);
+  command_t command = make(absolute ? command_t::MOVE_ABSOLUTE : command_t::MOVE_RELATIVE);
+  std::vector<Choice> free = motors_that(false, false);
+  const std::uint64_t many = random_.below(10);
+  std::size_t wanted = 1;
+  if (many >= 6) wanted = static_cast<std::size_t>(random_.between(2, 6));
+  if (many == 9) wanted = static_cast<std::size_t>(random_.between(7, 32));
+  // Now and then one that may be moving: refused, or a race.
+  if (free.empty() || random_.one_in(20)) {
+    add(command, any_motor(), random_.between(-100, 100));
+    return command;
+  }
+  for (; wanted > 0 && !free.empty(); --wanted) {
+    const auto index = static_cast<std::size_t>(random_.below(free.size()));
+    const Choice motor = free[index];
+    free.erase(free.begin() + static_cast<std::ptrdiff_t>(index));
+    std::int64_t steps = random_.magnitude(1, kLongestMove) * (random_.one_in(2) ? 1 : -1);
+    if (motor.position_steps + steps > kFarthest) steps = -std::abs(steps);
+    if (motor.position_steps + steps < -kFarthest) steps = std::abs(steps);
+    if (random_.one_in(50)) steps = 0;
+    add(command, motor.name, absolute ? motor.position_steps + steps : steps);
+  }
+  return command;
+}
+
+command_t Clients::stop() {
+  if (random_.one_in(6)) return stop_all();
+  command_t command = make(command_t::STOP);
+  std::vector<Choice> moving = motors_that(true, false);
+  if (moving.empty()) {
+    add(command, any_motor(), 0);
+    return command;
+  }
+  for (std::int64_t n = random_.magnitude(1, 8); n > 0 && !moving.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(moving.size()));
+    add(command, moving[index].name, 0);
+    moving.erase(moving.begin() + static_cast<std::ptrdiff_t>(index));
+  }
+  return command;
+}
+
+command_t Clients::set(const std::vector<Choice>& motors) {
+  command_t command = make(command_t::SET_POSITION);
+  for (const Choice& motor : motors) {
+    add(command, motor.name, random_.between(-kFarthest / 2, kFarthest / 2));
+    if (command.motor_count == 16) break;
+  }
+  return command;
+}
+
+command_t Clients::nonsense() {
+  constexpr std::int64_t kHuge = std::numeric_limits<std::int64_t>::max();
+  command_t command = make(static_cast<std::int8_t>(random_.between(-128, 127)));
+  switch (random_.below(8)) {
+    case 0:
+      break;
+    case 1:
+      command.kind = command_t::MOVE_RELATIVE;
+      add(command, "no such motor", 1);
+      break;
+    case 2:
+      command.kind = static_cast<std::int8_t>(random_.between(1, 7));
+      command.motors.push_back(any_motor());
+      break;
+    case 3:
+      command.kind = command_t::MOVE_RELATIVE;
+      add(command, any_motor(), random_.one_in(2) ? kHuge : -kHuge);
+      break;
+    case 4:
+      command.kind = random_.one_in(2) ? command_t::MOVE_ABSOLUTE : command_t::SET_POSITION;
+      add(command, any_motor(), random_.one_in(2) ? kHuge : -kHuge - 1);
+      break;
+    case 5:
+      command.kind = command_t::MOVE_RELATIVE;
+      add(command, any_motor(), 5);
+      add(command, command.motors.front(), 5);
+      break;
+    case 6:
+      command.client_id = random_.one_in(2) ? "" : std::string(200, 'x');
+      break;
+    default:
+      command.number = -random_.between(0, 1000);
+      break;
+  }
+  return command;
+}
+
+command_t Clients::next() {
+  command_t command;
+  const std::uint64_t chance = random_.below(100);
+  const std::vector<Choice> uncertain = motors_that(false, true);
+  const auto disabled = [](const auto& state) {
+    return state && state->detail == "drivers disabled";
+  };
+  const bool off = std::any_of(witness_.states().begin(), witness_.states().end(), disabled);
+  if (off && chance < 30) {
+    command = enable_all();
+  } else if (!uncertain.empty() && chance < 50) {
+    command = set(uncertain);
+  } else if (chance < 60) {
+    command = move();
+  } else if (chance < 78) {
+    command = stop();
+  } else if (chance < 81) {
+    std::vector<Choice> some = motors_that(false, false);
+    if (some.size() > 2) some.resize(2);
+    command = set(some);
+  } else if (chance < 83) {
+    command = make(random_.one_in(2) ? command_t::ENABLE : command_t::DISABLE);
+    if (!random_.one_in(3)) add(command, any_motor(), 0);
+  } else if (chance < 85) {
+    command = make(command_t::CLEAR_FAULTS);
+  } else if (chance < 93 && !sent_.empty()) {
+    return random_.pick(sent_);  // again
+  } else {
+    return nonsense();
+  }
+  if (sent_.size() == kRemembered) sent_.pop_front();
+  sent_.push_back(command);
+  return command;
+}
+
+}  // namespace bushfaults

@@ -1,0 +1,38 @@
+#include "fault_kinds.h"
+
+namespace bushfaults {
+namespace {
+
+// What a line sees often is frequent, what a lab sees now and then is rarer; but rare enough, all
+// of it, that moves go well in between: a daemon that is always down proves nothing.
+constexpr std::array<FaultKindInfo, kFaultKinds> kInfo = {{
+    {"bit-errors", 9000, "one to three bits flipped in a byte"},
+    {"lost-bytes", 4000, "one to four bytes in a row missing"},
+    {"repeated-bytes", 4000, "a byte comes twice"},
+    {"delayed-bytes", 3000, "a gap of 1..60 ms between two bytes"},
+    {"noise", 3000, "1..300 bytes that nobody sent"},
+    {"lost-frames", 6000, "a frame missing"},
+    {"truncated-frames", 3000, "a frame breaks off before its delimiter"},
+    {"repeated-frames", 4000, "a frame comes again, at once or some frames later"},
+    {"delayed-frames", 3000, "a frame comes 1..60 ms late"},
+    {"deaf-mcus", 4000, "one MCU alone hears nothing for 20 us .. 50 ms"},
+    {"silences", 120, "nothing gets through for 1 ms .. 10 s"},
+    {"unplugs", 30, "the adapter goes away for 10 ms .. 5 s"},
+    {"pauses", 60, "the daemon does nothing for 0.1 .. 3 s"},
+    {"kills", 30, "the daemon is killed, another starts 10 ms .. 3 s later"},
+    {"resets", 30, "an MCU is reset and boots 1 ms .. 2 s later"},
+}};
+
+}  // namespace
+
+const FaultKindInfo& info(FaultKind kind) {
+  return kInfo[static_cast<std::size_t>(kind)];
+}
+
+Rates usual_rates() {
+  Rates rates{};
+  for (std::size_t i = 0; i < kFaultKinds; ++i) rates[i] = kInfo[i].per_hour;
+  return rates;
+}
+
+}  // namespace bushfaults

@@ -1,0 +1,169 @@
+#include "host.h"
+
+#include <algorithm>
+
+namespace bushfaults {
+namespace {
+
+constexpr std::uint32_t kStream = 200;  // of randomness; garblers have the next two
+// What an adapter adds to each transfer, another at each plugging in: from a good one to one whose
+// latency timer is not the shortest.
+constexpr bushd::sim::TimeNs kMaxLatencyNs = 5'000'000;
+
+}  // namespace
+
+Host::Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness,
+           Clients& clients, Recent& recent, std::uint64_t seed)
+    : config_(config),
+      bus_(bus),
+      witness_(witness),
+      clients_(clients),
+      recent_(recent),
+      random_(seed, kStream),
+      garbler_{bushd::sim::Garbler(seed, kStream + 1), bushd::sim::Garbler(seed, kStream + 2)} {
+  bus_.on_master_byte = [this](std::uint8_t byte, TimeNs end_ns) {
+    if (plugged_ && end_ns >= silent_until_ns_) arriving_.push_back(byte);
+  };
+  plug_in();
+  start();
+}
+
+Host::~Host() {
+  bus_.on_master_byte = nullptr;
+}
+
+void Host::start() {
+  core_ = std::make_unique<bushd::daemon::Core>(config_, *this);
+  witness_.daemon_started(now_ns_);
+  clients_.begin_anew();
+  inbox_.clear();
+  if (plugged_) core_->port_opened(now_us(), 0);
+  step();
+}
+
+void Host::plug_in() {
+  plugged_ = true;
+  latency_ns_ = random_.magnitude(kStrideNs, kMaxLatencyNs);
+  if (core_) core_->port_opened(now_us(), 0);
+}
+
+void Host::send(std::size_t, std::span<const std::uint8_t> bytes) {
+  const auto pieces = garbler_[static_cast<std::size_t>(Direction::kOut)].pass(bytes);
+  if (!plugged_ || silent()) return;
+  TimeNs at_ns = std::max(free_ns_, now_ns_ + random_.between(20'000, latency_ns_ / 4));
+  for (const auto& piece : pieces) {
+    at_ns += piece.delay_ns;
+    if (!piece.bytes.empty()) bus_.master_send(piece.bytes, at_ns);
+  }
+  free_ns_ = at_ns;
+}
+
+void Host::take_in() {
+  if (arriving_.empty()) return;
+  const auto pieces = garbler_[static_cast<std::size_t>(Direction::kIn)].pass(arriving_);
+  TimeNs due_ns = now_ns_ - kStrideNs + random_.between(kStrideNs, latency_ns_);
+  if (!inbox_.empty()) due_ns = std::max(due_ns, inbox_.back().due_ns);
+  for (const auto& piece : pieces) {
+    due_ns += piece.delay_ns;
+    if (!piece.bytes.empty()) inbox_.push_back({due_ns, piece.bytes});
+  }
+  arriving_.clear();
+}
+
+void Host::deliver() {
+  while (!inbox_.empty() && inbox_.front().due_ns <= now_ns_) {
+    core_->receive(now_us(), 0, inbox_.front().bytes);
+    inbox_.pop_front();
+  }
+}
+
+void Host::step() {
+  core_->step(now_us());
+  wake_ns_ = std::max(core_->next_wake_us(), now_us() + 1) * 1000;
+}
+
+void Host::run(TimeNs now_ns) {
+  now_ns_ = now_ns;
+  take_in();
+  if (!plugged_ && now_ns_ >= back_ns_) {
+    recent_.note(now_ns_, "adapter is back");
+    plug_in();
+    wake_ns_ = now_ns_;
+  }
+  if (!core_) {
+    if (now_ns_ < starts_ns_) return;
+    recent_.note(now_ns_, "a new daemon starts");
+    start();
+  }
+  if (now_ns_ < paused_until_ns_) return;
+  const bool due = now_ns_ >= wake_ns_ || !commands_.empty() ||
+                   (!inbox_.empty() && inbox_.front().due_ns <= now_ns_);
+  if (!due) return;
+  deliver();
+  for (; !commands_.empty(); commands_.pop_front()) {
+    witness_.command(now_ns_, commands_.front());
+    core_->command(now_us(), commands_.front());
+  }
+  step();
+}
+
+Host::TimeNs Host::next_ns() const {
+  TimeNs next = now_ns_ + kStrideNs;
+  if (!plugged_) next = std::min(next, back_ns_);
+  if (!core_) return std::min(next, starts_ns_);
+  if (now_ns_ < paused_until_ns_) return std::min(next, paused_until_ns_);
+  if (!inbox_.empty()) next = std::min(next, inbox_.front().due_ns);
+  return std::max(std::min(next, wake_ns_), now_ns_ + 1000);
+}
+
+void Host::command(TimeNs, const bushd::command_t& command) {
+  if (core_) commands_.push_back(command);  // else nobody listens
+}
+
+void Host::garble(Direction direction, bushd::sim::Garbling what) {
+  garbler_[static_cast<std::size_t>(direction)].inflict(what);
+}
+
+void Host::silence(TimeNs until_ns) {
+  silent_until_ns_ = std::max(silent_until_ns_, until_ns);
+}
+
+void Host::unplug(TimeNs now_ns, TimeNs until_ns) {
+  now_ns_ = now_ns;
+  back_ns_ = plugged_ ? until_ns : std::max(back_ns_, until_ns);
+  if (!plugged_) return;
+  plugged_ = false;
+  arriving_.clear();
+  inbox_.clear();
+  free_ns_ = 0;
+  bus_.break_off_master();
+  // A paused daemon learns of it later; that is the same as a later unplugging to it.
+  if (!core_) return;
+  core_->port_lost(now_us(), 0, "the adapter was unplugged");
+  step();
+}
+
+void Host::pause(TimeNs now_ns, TimeNs until_ns) {
+  paused_until_ns_ = std::max({paused_until_ns_, now_ns, until_ns});
+}
+
+void Host::kill(TimeNs now_ns, TimeNs until_ns) {
+  now_ns_ = now_ns;
+  starts_ns_ = core_ ? until_ns : std::max(starts_ns_, until_ns);
+  core_.reset();
+  commands_.clear();
+  paused_until_ns_ = 0;
+}
+
+Host::TimeNs Host::faults_over_ns() const {
+  TimeNs over = std::max(silent_until_ns_, paused_until_ns_);
+  if (!plugged_) over = std::max(over, back_ns_);
+  if (!core_) over = std::max(over, starts_ns_);
+  return over;
+}
+
+void Host::log(bushd::daemon::LogLevel level, const std::string& text) {
+  if (level != bushd::daemon::LogLevel::kInfo) recent_.note(now_ns_, "log: " + text);
+}
+
+}  // namespace bushfaults

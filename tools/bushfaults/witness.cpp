@@ -1,0 +1,294 @@
+#include "witness.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+namespace bushfaults {
+namespace {
+
+using bushd::command_t;
+using bushd::motor_state_t;
+using bushd::reply_t;
+using bushd::state_t;
+
+// A move of the random clients lasts some seconds, the longest fault ten, and then a link is given
+// up within one.
+constexpr bushd::sim::TimeNs kResultDueNs = 40'000'000'000;
+// Commands that clients repeat are younger.
+constexpr std::int64_t kNumbersKept = 60;
+
+bool is_move(const command_t& command) {
+  return command.kind == command_t::MOVE_RELATIVE || command.kind == command_t::MOVE_ABSOLUTE;
+}
+
+bool same(const reply_t& a, const reply_t& b) {
+  return a.utime_us == b.utime_us && a.phase == b.phase && a.result == b.result &&
+         a.reason == b.reason && a.motors == b.motors && a.motor_results == b.motor_results &&
+         a.position_steps == b.position_steps;
+}
+
+std::string text_of(const command_t& command) {
+  static constexpr std::array<const char*, 8> kWords = {
+      "?", "move by", "move to", "stop", "enable", "disable", "set position", "clear faults"};
+  const bool known = command.kind > 0 && command.kind < static_cast<int>(kWords.size());
+  const char* word = kWords[known ? static_cast<std::size_t>(command.kind) : 0];
+  return fmt::format("{} #{}: {} {} {}", command.client_id.substr(0, 16), command.number, word,
+                     fmt::join(command.motors, ","), fmt::join(command.steps, ","));
+}
+
+std::string text_of(const reply_t& reply) {
+  return fmt::format("  {} #{}: {} ({}) {} {}", reply.client_id.substr(0, 16), reply.number,
+                     reply.phase == reply_t::ACCEPTED ? "accepted" : reply.result, reply.reason,
+                     fmt::join(reply.motor_results, ","), fmt::join(reply.position_steps, ","));
+}
+
+}  // namespace
+
+Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus,
+                 const bushd::sim::Plant& plant, Recent& recent)
+    : config_(config), bus_(bus), plant_(plant), recent_(recent) {
+  for (const bushd::config::Motor& motor : config.motors) {
+    motor_by_name_[motor.name] = motors_.size();
+    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, 0, {}, {}});
+  }
+  states_.resize(config.mcus.size());
+  boot_seen_.resize(config.mcus.size());
+}
+
+void Witness::violated(TimeNs now_ns, const std::string& what) {
+  recent_.note(now_ns, "VIOLATION: " + what);
+  if (!violation_) violation_ = Violation{now_ns, what};
+}
+
+const Witness::Motor* Witness::find(const std::string& name) const {
+  const auto found = motor_by_name_.find(name);
+  return found == motor_by_name_.end() ? nullptr : &motors_[found->second];
+}
+
+Witness::Motor* Witness::find(const std::string& name) {
+  return const_cast<Motor*>(std::as_const(*this).find(name));
+}
+
+void Witness::daemon_started(TimeNs) {
+  asked_.clear();
+  repeating_.reset();
+  for (Motor& motor : motors_) motor.move.reset();
+  std::fill(states_.begin(), states_.end(), std::nullopt);
+  std::fill(boot_seen_.begin(), boot_seen_.end(), std::nullopt);
+}
+
+void Witness::mcu_reset(std::size_t mcu) {
+  for (Motor& motor : motors_) {
+    if (motor.mcu != mcu) continue;
+    motor.offset.reset();
+    motor.perhaps_set.clear();
+  }
+}
+
+void Witness::command(TimeNs now_ns, const command_t& command) {
+  recent_.note(now_ns, text_of(command));
+  const Key key{command.client_id, command.number};
+  const auto [asked, fresh] = asked_.try_emplace(key);
+  repeating_.reset();
+  if (!fresh) {
+    repeating_ = key;
+    return;
+  }
+  asked->second.command = command;
+  const auto old = asked_.find({command.client_id, command.number - kNumbersKept});
+  if (old != asked_.end() && old->second.finished()) asked_.erase(old);
+}
+
+void Witness::reply(TimeNs now_ns, const reply_t& reply) {
+  const auto found = asked_.find({reply.client_id, reply.number});
+  if (found == asked_.end())
+    return violated(now_ns, "a reply that nobody asked for:" + text_of(reply));
+  Asked& asked = found->second;
+  if (reply.reason.empty()) violated(now_ns, "a reply without a reason:" + text_of(reply));
+  const bool known = std::any_of(asked.replies.begin(), asked.replies.end(),
+                                 [&](const reply_t& before) { return same(before, reply); });
+  const bool repeating = repeating_ == found->first;
+  // A number from before the daemon's memory is refused whenever it comes.
+  const bool too_old = !asked.replies.empty() && asked.replies[0].phase == reply_t::REFUSED &&
+                       reply.phase == reply_t::REFUSED;
+  if (repeating && (known || too_old)) return;
+  recent_.note(now_ns, text_of(reply));
+  const bool first = asked.replies.empty();
+  const bool in_order =
+      first ? reply.phase != reply_t::RESULT
+            : asked.replies.size() == 1 && asked.accepted() && reply.phase == reply_t::RESULT;
+  if (!in_order) return violated(now_ns, "one reply too many:" + text_of(reply));
+  asked.replies.push_back(reply);
+  if (reply.phase == reply_t::ACCEPTED) {
+    asked.accepted_ns = now_ns;
+    accepted(found->first, asked);
+  } else if (reply.phase == reply_t::RESULT) {
+    finished(now_ns, asked, reply);
+  } else if (is_move(asked.command)) {
+    ++moves_by_result_["refused"];
+  }
+}
+
+void Witness::accepted(const Key& key, Asked& asked) {
+  const command_t& command = asked.command;
+  for (std::size_t i = 0; i < command.motors.size(); ++i) {
+    Motor& motor = *find(command.motors[i]);
+    const std::int64_t stands = plant_steps(motor);
+    if (command.kind == command_t::SET_POSITION) motor.perhaps_set.push_back(command.steps[i]);
+    if (command.kind == command_t::MOVE_RELATIVE) {
+      asked.target.emplace_back(stands + command.steps[i]);
+    } else if (command.kind == command_t::MOVE_ABSOLUTE && motor.offset) {
+      asked.target.emplace_back(*motor.offset + command.steps[i]);
+    } else {
+      asked.target.emplace_back();
+    }
+    asked.end.emplace_back();
+    if (is_move(command)) motor.move = key;
+    if (is_move(command) && asked.target.back()) {
+      steps_commanded_ += static_cast<std::uint64_t>(std::abs(*asked.target.back() - stands));
+    }
+  }
+}
+
+void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result) {
+  const command_t& command = asked.command;
+  if (command.kind == command_t::SET_POSITION && result.result == "done") {
+    for (std::size_t i = 0; i < command.motors.size(); ++i) {
+      Motor& motor = *find(command.motors[i]);
+      motor.offset = plant_steps(motor) - command.steps[i];
+      motor.perhaps_set.clear();
+    }
+  }
+  if (!is_move(command)) return;
+  ++moves_by_result_[result.result];
+  if (result.motors != command.motors) {
+    return violated(now_ns, "a result of other motors:" + text_of(result));
+  }
+  for (std::size_t i = 0; i < result.motors.size(); ++i) {
+    if (asked.end[i] == End{result.motor_results[i], result.position_steps[i]}) continue;
+    violated(now_ns, result.motors[i] + " ended otherwise than its result says:" + text_of(result));
+  }
+}
+
+void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
+  const nlohmann::json line = nlohmann::json::parse(json_line);
+  if (line.at("event") != "result") return;
+  Motor& motor = *find(line.at("motor").get<std::string>());
+  if (!motor.move) return violated(now_ns, motor.name + " ended without a move");
+  Asked& asked = asked_.at(*motor.move);
+  motor.move.reset();
+  const auto& motors = asked.command.motors;
+  const auto index = static_cast<std::size_t>(std::find(motors.begin(), motors.end(), motor.name) -
+                                              motors.begin());
+  asked.end[index] = End{line.at("result"), line.at("position_steps")};
+  check_end(now_ns, motor, asked, index);
+}
+
+void Witness::check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index) {
+  const End& end = *asked.end[index];
+  const std::int64_t stands = plant_steps(motor);
+  const bool planned = end.word == "reached" || end.word == "stopped";
+  const auto& target = asked.target[index];
+  if (end.word == "fault") {
+    violated(now_ns, fmt::format("{} ended in fault at {}", motor.name, end.position_steps));
+  } else if (end.word == "reached" && target && *target != stands) {
+    violated(now_ns, fmt::format("{} is said to have reached its target, and stands {} steps off",
+                                 motor.name, stands - *target));
+  } else if (planned && motor.offset && stands - *motor.offset != end.position_steps) {
+    violated(now_ns, fmt::format("{} {} at {}, but stands at {}", motor.name, end.word,
+                                 end.position_steps, stands - *motor.offset));
+  }
+}
+
+void Witness::state(TimeNs now_ns, const state_t& state) {
+  std::size_t mcu = 0;
+  while (mcu < config_.mcus.size() && config_.mcus[mcu].id != state.mcu) ++mcu;
+  if (mcu == config_.mcus.size()) return violated(now_ns, "a state of an unknown MCU " + state.mcu);
+  if (!states_[mcu] || states_[mcu]->mcu_state != state.mcu_state) {
+    recent_.note(now_ns, fmt::format("{} {} {}", state.mcu, state.mcu_state, state.detail));
+  }
+  states_[mcu] = state;
+  const bool online =
+      state.mcu_state == "READY" || state.mcu_state == "RUN" || state.mcu_state == "FAULT";
+  if (!online || state.boot_number != bus_.mcu(mcu).boot_number()) return;
+  for (const motor_state_t& claim : state.motors) {
+    if (!claim.moving && claim.trust == "known") check_motor(now_ns, mcu, claim);
+  }
+  boot_seen_[mcu] = state.boot_number;
+}
+
+void Witness::check_motor(TimeNs now_ns, std::size_t mcu, const motor_state_t& claim) {
+  Motor& motor = *find(claim.name);
+  const std::int64_t stands = plant_steps(motor);
+  if (!motor.offset) {
+    // A daemon that has met this boot only cannot know that there was one before.
+    const bool first = !boot_seen_[mcu] || *boot_seen_[mcu] == bus_.mcu(mcu).boot_number();
+    if (!first) {
+      return violated(now_ns, motor.name + " is said to be known although its MCU was reset");
+    }
+    motor.offset = stands - claim.position_steps;
+    return;
+  }
+  if (stands - *motor.offset == claim.position_steps) return;
+  const auto& perhaps = motor.perhaps_set;
+  if (std::find(perhaps.begin(), perhaps.end(), claim.position_steps) != perhaps.end()) {
+    motor.offset = stands - claim.position_steps;
+    return;
+  }
+  violated(now_ns, fmt::format("{} is said to be at rest at {}, but stands at {}", motor.name,
+                               claim.position_steps, stands - *motor.offset));
+}
+
+void Witness::check_deadlines(TimeNs now_ns) {
+  for (const auto& [key, asked] : asked_) {
+    if (asked.replies.empty() && key.first.size() <= 64 && !key.first.empty()) {
+      violated(now_ns, "no reply to " + text_of(asked.command));
+    } else if (asked.accepted() && !asked.finished() && now_ns - asked.accepted_ns > kResultDueNs) {
+      violated(now_ns,
+               fmt::format("no result {} s after it was accepted: {}",
+                           (now_ns - asked.accepted_ns) / 1'000'000'000, text_of(asked.command)));
+    }
+  }
+}
+
+bool Witness::all_ready() const {
+  return std::all_of(states_.begin(), states_.end(),
+                     [](const auto& state) { return state && state->mcu_state == "READY"; });
+}
+
+std::string Witness::not_ready() const {
+  std::string text;
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (states_[i] && states_[i]->mcu_state == "READY") continue;
+    text += text.empty() ? "" : ", ";
+    text += config_.mcus[i].id + " is ";
+    text += states_[i] ? states_[i]->mcu_state + " " + states_[i]->detail : "unknown";
+  }
+  return text;
+}
+
+bool Witness::commands_open() const {
+  return std::any_of(asked_.begin(), asked_.end(), [](const auto& entry) {
+    return entry.second.accepted() && !entry.second.finished();
+  });
+}
+
+std::uint64_t Witness::steps_unaccounted() const {
+  std::uint64_t steps = 0;
+  for (const auto& state : states_) {
+    if (!state) continue;
+    for (const motor_state_t& claim : state->motors) {
+      const Motor& motor = *find(claim.name);
+      if (!motor.offset || claim.trust != "known" || claim.moving) continue;
+      steps += static_cast<std::uint64_t>(
+          std::abs(plant_steps(motor) - *motor.offset - claim.position_steps));
+    }
+  }
+  return steps;
+}
+
+}  // namespace bushfaults

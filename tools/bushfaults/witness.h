@@ -1,0 +1,114 @@
+// Compares what the daemon says with what the motors did. Knows the plant, the commands sent, the
+// replies and the states; nothing of the daemon's or the MCUs' inner life but boot numbers.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bushd/command_t.hpp"
+#include "bushd/reply_t.hpp"
+#include "bushd/state_t.hpp"
+#include "config/config.h"
+#include "recent.h"
+#include "sim/bus.h"
+#include "sim/plant.h"
+
+namespace bushfaults {
+
+struct Violation {
+  bushd::sim::TimeNs time_ns;
+  std::string what;
+};
+
+class Witness {
+ public:
+  using TimeNs = bushd::sim::TimeNs;
+
+  // All of them outlive the witness.
+  Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus,
+          const bushd::sim::Plant& plant, Recent& recent);
+
+  void violated(TimeNs now_ns, const std::string& what);
+  const std::optional<Violation>& violation() const { return violation_; }  // the first
+
+  void daemon_started(TimeNs now_ns);  // what clients had asked of the one before is void
+  void mcu_reset(std::size_t mcu);
+  // Before the daemon gets it; after that come the replies that it makes at once.
+  void command(TimeNs now_ns, const bushd::command_t& command);
+  void reply(TimeNs now_ns, const bushd::reply_t& reply);
+  void state(TimeNs now_ns, const bushd::state_t& state);
+  // A line of the log of moves: there each motor of a group ends by itself.
+  void move_log(TimeNs now_ns, const std::string& json_line);
+  // Accepted commands that should have had their result by now.
+  void check_deadlines(TimeNs now_ns);
+
+  // As the daemon said last, by MCU; empty before it has said anything in this life.
+  const std::vector<std::optional<bushd::state_t>>& states() const { return states_; }
+  bool all_ready() const;
+  std::string not_ready() const;  // which MCUs, and why
+  bool commands_open() const;
+
+  const std::map<std::string, std::uint64_t>& moves_by_result() const { return moves_by_result_; }
+  std::uint64_t steps_commanded() const { return steps_commanded_; }
+  // Between the last states and the motors, where the daemon claims to know.
+  std::uint64_t steps_unaccounted() const;
+
+ private:
+  using Key = std::pair<std::string, std::int64_t>;  // client and number of a command
+  struct End {
+    std::string word;  // of the result
+    std::int64_t position_steps;
+    bool operator==(const End&) const = default;
+  };
+  struct Motor {
+    std::string name;
+    std::size_t mcu;
+    std::size_t output;
+    // Plant's count minus daemon's; nothing once a reset has made the MCU forget its count.
+    std::optional<std::int64_t> offset = 0;
+    // Positions that somebody asked to set and that may have been set, although nobody was told.
+    std::vector<std::int64_t> perhaps_set;
+    std::optional<Key> move;  // accepted, and this motor's part of it not yet ended
+  };
+  struct Asked {
+    bushd::command_t command;
+    std::vector<bushd::reply_t> replies;
+    TimeNs accepted_ns = 0;
+    // Of moves, by motor: where the plant must stand in the end, and how it ended.
+    std::vector<std::optional<std::int64_t>> target;
+    std::vector<std::optional<End>> end;
+    bool accepted() const { return !replies.empty() && replies[0].phase == reply_accepted(); }
+    bool finished() const { return replies.size() == (accepted() ? 2u : 1u); }
+    static std::int8_t reply_accepted() { return bushd::reply_t::ACCEPTED; }
+  };
+
+  const Motor* find(const std::string& name) const;
+  Motor* find(const std::string& name);
+  std::int64_t plant_steps(const Motor& motor) const {
+    return plant_.position_steps(motor.mcu, motor.output);
+  }
+  void accepted(const Key& key, Asked& asked);
+  void finished(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
+  void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index);
+  void check_motor(TimeNs now_ns, std::size_t mcu, const bushd::motor_state_t& claim);
+
+  const bushd::config::Config& config_;
+  const bushd::sim::Bus& bus_;
+  const bushd::sim::Plant& plant_;
+  Recent& recent_;
+  std::optional<Violation> violation_;
+  std::vector<Motor> motors_;
+  std::map<std::string, std::size_t> motor_by_name_;
+  std::map<Key, Asked> asked_;
+  std::optional<Key> repeating_;  // the command being given was given before
+  std::vector<std::optional<bushd::state_t>> states_;
+  std::vector<std::optional<int>> boot_seen_;  // by MCU: the boot that this daemon has dealt with
+  std::map<std::string, std::uint64_t> moves_by_result_;
+  std::uint64_t steps_commanded_ = 0;
+};
+
+}  // namespace bushfaults

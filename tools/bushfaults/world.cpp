@@ -1,0 +1,194 @@
+#include "world.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+namespace bushfaults {
+namespace {
+
+using bushd::sim::kNever;
+using bushd::sim::TimeNs;
+
+constexpr TimeNs kMs = 1'000'000;
+constexpr TimeNs kSecond = 1'000'000'000;
+constexpr TimeNs kHour = 3600 * kSecond;
+
+constexpr TimeNs kWellAfterNs = 5 * kSecond;  // the promise: READY by itself
+constexpr TimeNs kMoveNs = 12 * kSecond;      // the clients' longest, with a start and a result
+constexpr std::uint32_t kWorldStream = 1;     // of randomness
+constexpr std::uint32_t kFaultStream = 300;   // and one for each kind of fault
+
+bushd::sim::McuOptions mcu_options(const bushd::config::Mcu& mcu, std::size_t index,
+                                   std::int64_t crystal_ppm, bushd::sim::Random& random) {
+  bushd::sim::McuOptions options;
+  options.address = mcu.address.value;
+  options.boot_number = static_cast<std::uint16_t>(1000 * (index + 1));
+  options.boot_ns = random.between(0, 3 * kMs);
+  options.clock_ppm = static_cast<std::int32_t>(random.between(-crystal_ppm, crystal_ppm));
+  options.turnaround_ns = static_cast<std::uint32_t>(random.between(10'000, 1'000'000));
+  return options;
+}
+
+}  // namespace
+
+World::World(const Options& options, bushd::config::Config config)
+    : options_(options),
+      config_(std::move(config)),
+      plant_(config_.mcus.size()),
+      bus_(config_.buses[0].baud, &plant_),
+      witness_(config_, bus_, plant_, recent_),
+      clients_(config_, witness_, options.seed),
+      host_(config_, bus_, witness_, clients_, recent_, options.seed) {
+  bushd::sim::Random random(options.seed, kWorldStream);
+  for (std::size_t i = 0; i < config_.mcus.size(); ++i) {
+    bus_.add_mcu(mcu_options(config_.mcus[i], i, options.crystal_ppm, random));
+  }
+  for (const bushd::config::Group& group : config_.groups) {
+    rules_.push_back(
+        std::make_unique<bushd::sim::PaceRules>(group.table->view(), config_.buses[0].tick_ns(),
+                                                bushd::sim::McuOptions{}.slots, options.format));
+  }
+  for (const bushd::config::Motor& motor : config_.motors) {
+    plant_.attach(motor.mcu.value, motor.output.value, *rules_[motor.group.value]);
+  }
+  plant_.on_violation = [this](TimeNs time_ns, std::size_t mcu, std::size_t output,
+                               const std::string& what) {
+    witness_.violated(time_ns, fmt::format("{} output {}: {}", config_.mcus[mcu].id, output, what));
+  };
+  for (std::size_t i = 0; i < kFaultKinds; ++i) {
+    chance_.emplace_back(options.seed, kFaultStream + static_cast<std::uint32_t>(i));
+  }
+}
+
+void World::run() {
+  const auto end_ns = static_cast<TimeNs>(options_.hours * static_cast<double>(kHour));
+  bushd::sim::Random random(options_.seed, kWorldStream + 1);
+  run_until(2 * kSecond);
+  while (!witness_.violation() && now_ns_ < end_ns) {
+    spell_of_trouble(std::min(now_ns_ + random.magnitude(20 * kSecond, 600 * kSecond), end_ns));
+    calm();
+  }
+}
+
+void World::spell_of_trouble(TimeNs until_ns) {
+  next_command_ns_ = now_ns_;
+  for (std::size_t i = 0; i < kFaultKinds; ++i) {
+    const double per_hour = options_.rates[i];
+    next_fault_ns_[i] =
+        per_hour > 0 ? now_ns_ + chance_[i].wait(static_cast<double>(kHour) / per_hour) : kNever;
+  }
+  while (now_ns_ < until_ns && !witness_.violation()) {
+    const auto next = std::min_element(next_fault_ns_.begin(), next_fault_ns_.end());
+    advance(std::min({until_ns, next_command_ns_, *next}));
+    const auto kind = static_cast<std::size_t>(next - next_fault_ns_.begin());
+    if (now_ns_ >= *next) {
+      strike(static_cast<FaultKind>(kind));
+      *next = now_ns_ + chance_[kind].wait(static_cast<double>(kHour) / options_.rates[kind]);
+    }
+    if (now_ns_ >= next_command_ns_) {
+      host_.command(now_ns_, clients_.next());
+      next_command_ns_ = now_ns_ + clients_.pause_ns();
+    }
+    if (now_ns_ - deadlines_checked_ns_ >= kSecond) {
+      witness_.check_deadlines(now_ns_);
+      deadlines_checked_ns_ = now_ns_;
+    }
+  }
+}
+
+void World::calm() {
+  if (witness_.violation()) return;
+  run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_}));
+  const TimeNs began_ns = now_ns_;
+  host_.command(now_ns_, clients_.stop_all());
+  const auto ready = [this] { return witness_.all_ready(); };
+  while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
+    run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
+    // What a client has switched off only a client switches on again.
+    host_.command(now_ns_, clients_.enable_all());
+  }
+  if (witness_.violation()) return;
+  if (!ready()) {
+    witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready());
+  }
+  run_until(now_ns_ + kSecond);
+  while (witness_.commands_open() && now_ns_ < began_ns + kMoveNs && !witness_.violation()) {
+    run_until(now_ns_ + 100 * kMs);
+  }
+  if (witness_.violation()) return;
+  if (witness_.commands_open()) witness_.violated(now_ns_, "a command without a result in calm");
+  witness_.check_deadlines(now_ns_);
+}
+
+void World::run_until(TimeNs until_ns) {
+  while (now_ns_ < until_ns && !witness_.violation()) advance(until_ns);
+}
+
+// To the next thing that happens in the host, at most to until_ns.
+void World::advance(TimeNs until_ns) {
+  now_ns_ = std::max(now_ns_, std::min(until_ns, host_.next_ns()));
+  bus_.advance_to(now_ns_);
+  host_.run(now_ns_);
+}
+
+void World::note_fault(FaultKind kind, const std::string& detail) {
+  ++faults_[static_cast<std::size_t>(kind)];
+  recent_.note(now_ns_, fmt::format("fault: {} {}", info(kind).name, detail));
+}
+
+void World::reset_mcu() {
+  bushd::sim::Random& random = chance_[static_cast<std::size_t>(FaultKind::kReset)];
+  const auto mcu = static_cast<std::size_t>(random.below(bus_.mcu_count()));
+  const TimeNs down_ns = random.magnitude(kMs, 2 * kSecond);
+  bus_.reboot(mcu, down_ns);
+  plant_.cut(mcu);
+  witness_.mcu_reset(mcu);
+  mcus_up_ns_ = std::max(mcus_up_ns_, now_ns_ + down_ns);
+  note_fault(FaultKind::kReset, fmt::format("{} for {} ms", config_.mcus[mcu].id, down_ns / kMs));
+}
+
+void World::deafen_mcu() {
+  bushd::sim::Random& random = chance_[static_cast<std::size_t>(FaultKind::kDeafMcu)];
+  const auto mcu = static_cast<std::size_t>(random.below(bus_.mcu_count()));
+  const TimeNs length_ns = random.magnitude(20'000, 50 * kMs);
+  bus_.deafen(mcu, now_ns_ + length_ns);
+  note_fault(FaultKind::kDeafMcu,
+             fmt::format("{} for {} us", config_.mcus[mcu].id, length_ns / 1000));
+}
+
+void World::strike(FaultKind kind) {
+  bushd::sim::Random& random = chance_[static_cast<std::size_t>(kind)];
+  TimeNs length_ns = 0;
+  switch (kind) {
+    case FaultKind::kDeafMcu:
+      return deafen_mcu();
+    case FaultKind::kReset:
+      return reset_mcu();
+    case FaultKind::kSilence:
+      length_ns = random.magnitude(kMs, 10 * kSecond);
+      host_.silence(now_ns_ + length_ns);
+      break;
+    case FaultKind::kUnplug:
+      length_ns = random.magnitude(10 * kMs, 5 * kSecond);
+      host_.unplug(now_ns_, now_ns_ + length_ns);
+      break;
+    case FaultKind::kPause:
+      length_ns = random.magnitude(100 * kMs, 3 * kSecond);
+      host_.pause(now_ns_, now_ns_ + length_ns);
+      break;
+    case FaultKind::kKill:
+      length_ns = random.magnitude(10 * kMs, 3 * kSecond);
+      host_.kill(now_ns_, now_ns_ + length_ns);
+      break;
+    default: {
+      const bool out = random.one_in(2);
+      host_.garble(out ? Host::Direction::kOut : Host::Direction::kIn,
+                   static_cast<bushd::sim::Garbling>(kind));
+      return note_fault(kind, out ? "to the MCUs" : "to the daemon");
+    }
+  }
+  note_fault(kind, fmt::format("for {} ms", length_ns / kMs));
+}
+
+}  // namespace bushfaults

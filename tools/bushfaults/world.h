@@ -1,0 +1,77 @@
+// All of it in one process and on virtual time: clients, daemon, adapter, line, MCUs, motors, and
+// the trouble that comes over them.
+//
+// Trouble comes in spells of some minutes, each kind at random times of its own; then there is
+// calm for some seconds, in which everything must be well again by itself. The last calm is the
+// end.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "clients.h"
+#include "config/config.h"
+#include "fault_kinds.h"
+#include "host.h"
+#include "recent.h"
+#include "sim/bus.h"
+#include "sim/plant.h"
+#include "witness.h"
+
+namespace bushfaults {
+
+struct Options {
+  std::uint64_t seed = 1;
+  double hours = 0.1;
+  std::size_t motors = 32;
+  std::size_t mcus = 2;
+  bushd_format format = BUSHD_FORMAT_FINE;
+  Rates rates = usual_rates();
+  std::int64_t crystal_ppm = 50;
+};
+
+class World {
+ public:
+  using TimeNs = bushd::sim::TimeNs;
+
+  World(const Options& options, bushd::config::Config config);
+
+  // Until the end or the first violation.
+  void run();
+
+  TimeNs now_ns() const { return now_ns_; }
+  const Counts& faults() const { return faults_; }
+  const Witness& witness() const { return witness_; }
+  const bushd::sim::Plant& plant() const { return plant_; }
+  const Recent& recent() const { return recent_; }
+
+ private:
+  void spell_of_trouble(TimeNs until_ns);
+  void calm();
+  void advance(TimeNs until_ns);
+  void run_until(TimeNs until_ns);
+  void strike(FaultKind kind);
+  void reset_mcu();
+  void deafen_mcu();
+  void note_fault(FaultKind kind, const std::string& detail);
+
+  Options options_;
+  bushd::config::Config config_;
+  Recent recent_;
+  bushd::sim::Plant plant_;
+  bushd::sim::Bus bus_;
+  Witness witness_;
+  Clients clients_;
+  Host host_;
+  std::vector<std::unique_ptr<bushd::sim::PaceRules>> rules_;  // by group
+  std::vector<bushd::sim::Random> chance_;                     // by fault kind
+  std::array<TimeNs, kFaultKinds> next_fault_ns_{};
+  Counts faults_{};
+  TimeNs now_ns_ = 0;
+  TimeNs next_command_ns_ = 0;
+  TimeNs mcus_up_ns_ = 0;  // when the last MCU that was reset boots
+  TimeNs deadlines_checked_ns_ = 0;
+};
+
+}  // namespace bushfaults
