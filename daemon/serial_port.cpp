@@ -40,9 +40,10 @@ Error port_error(const std::string& path, const std::string& what, int error) {
   return {.message = what + ": " + std::strerror(error), .file = path};
 }
 
-// Only a tty that can be opened reaches libserial: a SerialPort whose Open failed half-way cannot
-// be destroyed.
-Result<void> check_tty(const std::string& path) {
+// Locked before anything is changed: a second program must not disturb the line of the first. And
+// only a tty that can be opened reaches libserial: a SerialPort whose Open failed half-way cannot be
+// destroyed.
+Result<int> open_and_lock(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) {
     const int error = errno;
@@ -50,14 +51,19 @@ Result<void> check_tty(const std::string& path) {
         error == EACCES ? "may not be opened (is the user in group dialout?)" : "cannot be opened";
     return fail(port_error(path, what, error));
   }
-  const bool tty = ::isatty(fd) == 1;
+  const char* why_not = nullptr;
+  if (::isatty(fd) != 1) {
+    why_not = "is no serial port";
+  } else if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    why_not = "is in use by another program";
+  }
+  if (why_not == nullptr) return fd;
   ::close(fd);
-  if (!tty) return fail(Error{.message = "is no serial port", .file = path});
-  return {};
+  return fail(Error{.message = why_not, .file = path});
 }
 
-// The set-up that libserial does well; returns a descriptor that does not depend on it any more.
-Result<int> open_with_libserial(const std::string& path, LibSerial::BaudRate rate) {
+// The set-up that libserial does well, kept on a descriptor that does not depend on it.
+Result<void> set_up_with_libserial(const std::string& path, int fd, LibSerial::BaudRate rate) {
   auto port = std::make_unique<LibSerial::SerialPort>();
   try {
     port->Open(path);
@@ -66,20 +72,17 @@ Result<int> open_with_libserial(const std::string& path, LibSerial::BaudRate rat
     port->SetParity(LibSerial::Parity::PARITY_NONE);
     port->SetStopBits(LibSerial::StopBits::STOP_BITS_1);
     port->SetFlowControl(LibSerial::FlowControl::FLOW_CONTROL_NONE);
-    const int fd = ::fcntl(port->GetFileDescriptor(), F_DUPFD_CLOEXEC, 0);
-    if (fd < 0) return fail(port_error(path, "descriptor cannot be duplicated", errno));
     // Close() puts the old settings back: keep ours over it.
     termios settings{};
     const bool kept = ::tcgetattr(fd, &settings) == 0;
     port->Close();
-    settings.c_cc[VMIN] = 0;
+    // With VMIN 0 a read of an empty line would give 0, as after a hang-up.
+    settings.c_cc[VMIN] = 1;
     settings.c_cc[VTIME] = 0;
     if (!kept || ::tcsetattr(fd, TCSANOW, &settings) != 0 || ::tcflush(fd, TCIOFLUSH) != 0) {
-      const int error = errno;
-      ::close(fd);
-      return fail(port_error(path, "cannot be set up", error));
+      return fail(port_error(path, "cannot be set up", errno));
     }
-    return fd;
+    return {};
   } catch (const std::exception& e) {
     // Its destructor would call std::terminate; some hundred bytes are the lesser loss.
     static_cast<void>(port.release());
@@ -106,15 +109,11 @@ Result<SerialPort> SerialPort::open(const std::string& path, std::uint32_t baud)
   if (rate == nullptr) {
     return fail(Error{.message = "has no rate of " + std::to_string(baud) + " baud", .file = path});
   }
-  if (const auto tty = check_tty(path); !tty) return fail(tty.error());
-  const auto fd = open_with_libserial(path, rate->rate);
+  const auto fd = open_and_lock(path);
   if (!fd) return fail(fd.error());
   SerialPort port(*fd);
-  if (::flock(*fd, LOCK_EX | LOCK_NB) != 0) {
-    return fail(Error{.message = "is in use by another program", .file = path});
-  }
-  if (::fcntl(*fd, F_SETFL, O_NONBLOCK) != 0) {
-    return fail(port_error(path, "cannot be made non-blocking", errno));
+  if (const auto ready = set_up_with_libserial(path, *fd, rate->rate); !ready) {
+    return fail(ready.error());
   }
   ask_for_low_latency(*fd);
   return port;
