@@ -22,15 +22,16 @@ std::atomic<std::size_t> g_largest_allocation{0};
 }  // namespace
 
 // Watches that no length from the network becomes an allocation of its own size.
-void* operator new(std::size_t size) {
+// Not inlined: gcc would see malloc here and operator delete there, and warn of a mismatch.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   g_largest_allocation = std::max(g_largest_allocation.load(), size);
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept {
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
   std::free(memory);
 }
-void operator delete(void* memory, std::size_t) noexcept {
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
   std::free(memory);
 }
 
