@@ -254,11 +254,12 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     return;
   }
   if (mcu.replaced != 0 && report.epoch != mcu.epoch) {
-    // What was queued before stays in force, whatever has been sent since.
+    // What was queued before stays in force, whatever has been sent since. If not even the start
+    // has come, it has to be sent again, as one.
     mcu.epoch = report.epoch;
     for (unsigned m = 0; m < report.motor_count; ++m) {
       if ((mcu.replaced >> m & 1) == 0) continue;
-      mcu.stream[m].next = view.known_until[m];
+      mcu.stream[m].next = std::max(view.known_until[m], mcu.stream[m].start);
       mcu.stream[m].finished = false;
       mcu.stream[m].delay_sent.reset();
     }
