@@ -13,7 +13,11 @@ namespace bushd::config {
 Result<Config> load(const std::filesystem::path& path) {
   const auto text = tables::read_text(path);
   if (!text) return fail(text.error());
-  const auto document = tables::parse_toml(*text, path.string());
+  return parse(*text, path);
+}
+
+Result<Config> parse(std::string_view text, const std::filesystem::path& path) {
+  const auto document = tables::parse_toml(text, path.string());
   if (!document) return fail(document.error());
   Loading loading;
   loading.config.path = path.string();

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -91,6 +92,9 @@ struct Config {
 
 // Reads the file and the tables it names; the first thing that is wrong is the error.
 Result<Config> load(const std::filesystem::path& path);
+
+// The same for the text of a file that would be at `path`: tables are looked for beside it.
+Result<Config> parse(std::string_view text, const std::filesystem::path& path);
 
 // Whether two configurations differ in nothing but what is in their tables: then a daemon can go
 // from one to the other without a restart.
