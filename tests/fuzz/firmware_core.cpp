@@ -1,0 +1,304 @@
+// The whole MCU program on a port that only records, fed with whatever a line can carry.
+//
+// Input: a programme. Noise goes in as it is; frames are sent with a good checksum, since no fuzzer
+// guesses one, and those that must fit the MCU's present tick, epoch, mark or table are made to.
+//
+// Promises checked: counters are the sum of the STEP pulses, whatever comes, and are set at rest
+// only; no pulse without EN; corrections of the clock within their bounds; every transmission is
+// one good frame; after all of it the MCU still identifies itself and reports those counters.
+#include <array>
+#include <cstring>
+#include <vector>
+
+#include "firmware/core/mcu.h"
+#include "fuzz/fuzz.h"
+
+namespace bushd::fuzz {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr std::uint8_t kAddress = 7;
+constexpr std::uint8_t kMotors = 3;
+constexpr std::uint16_t kSlots = 128;
+constexpr std::uint16_t kBootNumber = 4660;
+constexpr std::uint16_t kQueueTicks = 16;
+constexpr std::uint16_t kCodes = 24;
+
+enum class Op : std::uint8_t {
+  kNoise,       // count, bytes
+  kTicksPass,   // count
+  kTimeInTick,  // u16, share of the tick
+  kFrame,       // flag: broadcast; type, tag, count, payload
+  kTicks,       // TICKS whose first tick and epoch count from the MCU's
+  kSync,        // SYNC that follows the last mark, this far off it
+  kTableEnd,    // TABLE_END with the checksum of what is there
+  kCount
+};
+
+class Mcu {
+ public:
+  Mcu() {
+    const bushd_port port = {
+        .context = this,
+        .transmit =
+            [](void* self, const std::uint8_t* wire, std::size_t size) {
+              static_cast<Mcu*>(self)->transmitted({wire, size});
+            },
+        .set_enable = [](void* self, bool on) { static_cast<Mcu*>(self)->enabled_ = on; },
+        .set_tick = [](void* self,
+                       std::uint32_t tick_ns) { static_cast<Mcu*>(self)->tick_ns_ = tick_ns; },
+        .adjust_tick = [](void* self, std::int32_t ns) { static_cast<Mcu*>(self)->adjusted(ns); },
+        .time_in_tick_ns = [](void* self) { return static_cast<Mcu*>(self)->time_in_tick_ns(); },
+        .read_inputs = [](void*) -> std::uint16_t { return 5; },
+        .self_test = [](void*) { return true; }};
+    const bushd_mcu_config config = {.address = kAddress,
+                                     .motors = kMotors,
+                                     .slots = kSlots,
+                                     .boot_number = kBootNumber,
+                                     .queue = queue_.data(),
+                                     .queue_ticks = kQueueTicks,
+                                     .codes = codes_.data(),
+                                     .code_count = kCodes};
+    bushd_mcu_boot(&mcu_, &port, &config);
+    BUSHD_REQUIRE(mcu_.state == BUSHD_STATE_BUSY && !enabled_);
+    pass();
+  }
+
+  void pass() {
+    const bushd_plane* emitted = bushd_mcu_swap(&mcu_);
+    begun_ = counted_;
+    for (std::size_t m = 0; m < kMotors; ++m) BUSHD_REQUIRE(position(m) == begun_[m]);
+    count_pulses(*emitted);
+    bushd_mcu_prepare(&mcu_);
+    check_state();
+    BUSHD_REQUIRE((mcu_.state == BUSHD_STATE_FAULT) == (mcu_.faults != 0));
+  }
+
+  void feed(Bytes bytes) {
+    for (const std::uint8_t byte : bytes) bushd_mcu_receive(&mcu_, byte, time_in_tick_ns());
+    check_state();
+    for (std::size_t m = 0; m < kMotors; ++m) {
+      if (position(m) == begun_[m]) continue;
+      BUSHD_REQUIRE(counted_[m] == begun_[m]);
+      begun_[m] = counted_[m] = position(m);
+    }
+  }
+
+  void frame(std::uint8_t address, std::uint8_t type, std::uint8_t tag, Bytes payload) {
+    std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire;
+    const std::size_t size =
+        bushd_frame_encode(address, type, tag, payload.data(), payload.size(), wire.data());
+    feed(Bytes(wire).first(size));
+  }
+
+  void set_time(std::uint16_t share) { share_ = share; }
+  const bushd_mcu& core() const { return mcu_; }
+
+  // From here on exactly one answer is due; returns it.
+  bushd_frame ask(std::uint8_t type) {
+    const std::uint8_t delimiter = 0;
+    feed({&delimiter, 1});
+    answers_ = 0;
+    frame(kAddress, type, 42, {});
+    BUSHD_REQUIRE(answers_ == 1 && answer_.tag == 42);
+    BUSHD_REQUIRE(answer_.type == (type | BUSHD_TYPE_REPLY));
+    return answer_;
+  }
+
+  void check_answers() {
+    const bushd_frame identity_frame = ask(BUSHD_MSG_IDENTIFY);
+    bushd_identity identity;
+    BUSHD_REQUIRE(bushd_decode_identity(identity_frame.payload, identity_frame.payload_size,
+                                        &identity) == BUSHD_OK);
+    BUSHD_REQUIRE(identity.motors == kMotors && identity.boot_number == kBootNumber);
+    const bushd_frame report_frame = ask(BUSHD_MSG_POLL);
+    bushd_report report;
+    BUSHD_REQUIRE(bushd_decode_report(report_frame.payload, report_frame.payload_size, &report) ==
+                  BUSHD_OK);
+    BUSHD_REQUIRE(report.tick == mcu_.tick && report.motor_count == kMotors);
+    for (std::size_t m = 0; m < kMotors; ++m) {
+      BUSHD_REQUIRE(static_cast<std::uint32_t>(report.motor[m].position_steps) == begun_[m]);
+    }
+  }
+
+ private:
+  // Counters may be set to anything and then wrap.
+  std::uint32_t position(std::size_t m) const {
+    return static_cast<std::uint32_t>(mcu_.motor[m].position_steps);
+  }
+
+  std::uint32_t time_in_tick_ns() const {
+    return static_cast<std::uint32_t>(std::uint64_t{tick_ns_} * share_ >> 16);
+  }
+
+  void transmitted(Bytes wire) {
+    BUSHD_REQUIRE(wire.size() >= 2 && wire.size() <= BUSHD_FRAME_MAX_WIRE + 1);
+    BUSHD_REQUIRE(wire.front() == 0 && wire.back() == 0);
+    for (std::size_t i = 0; i < wire.size(); ++i) {
+      const bool last = i + 1 == wire.size();
+      BUSHD_REQUIRE(bushd_receive_byte(&listener_, wire[i], &answer_) ==
+                    (last ? BUSHD_RECEIVE_FRAME : BUSHD_RECEIVE_MORE));
+    }
+    BUSHD_REQUIRE(answer_.address == kAddress && (answer_.type & BUSHD_TYPE_REPLY) != 0);
+    ++answers_;
+  }
+
+  void adjusted(std::int32_t ns) {
+    const auto tick_ns = static_cast<std::int32_t>(tick_ns_);
+    BUSHD_REQUIRE(ns >= -tick_ns / 64 && ns < tick_ns);
+  }
+
+  void count_pulses(const bushd_plane& plane) {
+    std::array<std::uint32_t, kMotors> pulses{};
+    unsigned all = 0;
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      if (plane.step[slot] == 0) continue;
+      all |= plane.step[slot];
+      for (std::size_t m = 0; m < kMotors; ++m) pulses[m] += plane.step[slot] >> m & 1;
+    }
+    BUSHD_REQUIRE(all >> kMotors == 0);
+    BUSHD_REQUIRE(all == 0 || enabled_);
+    for (std::size_t m = 0; m < kMotors; ++m) {
+      BUSHD_REQUIRE(pulses[m] <= BUSHD_MAX_STEPS_PER_TICK);
+      counted_[m] += (plane.direction >> m & 1) != 0 ? pulses[m] : 0u - pulses[m];
+    }
+  }
+
+  void check_state() const {
+    BUSHD_REQUIRE(mcu_.state <= BUSHD_STATE_FAULT);
+    BUSHD_REQUIRE(enabled_ == ((mcu_.flags & BUSHD_FLAG_ENABLED) != 0));
+    BUSHD_REQUIRE(mcu_.codes_used <= kCodes && mcu_.tick_ns == tick_ns_);
+    for (std::size_t m = 0; m < kMotors; ++m) {
+      BUSHD_REQUIRE(mcu_.motor[m].remainder > -256 && mcu_.motor[m].remainder < 256);
+      BUSHD_REQUIRE(mcu_.motor[m].table < static_cast<int>(BUSHD_TABLE_SLOTS));
+    }
+  }
+
+  std::array<std::int16_t, kQueueTicks * kMotors> queue_{};
+  std::array<std::uint16_t, kCodes> codes_{};
+  bushd_mcu mcu_{};
+  bushd_receiver listener_{};
+  bushd_frame answer_{};
+  int answers_ = 0;
+  bool enabled_ = true;
+  std::uint32_t tick_ns_ = 0;
+  std::uint16_t share_ = 0;
+  std::array<std::uint32_t, kMotors> begun_{};    // at the beginning of the present tick
+  std::array<std::uint32_t, kMotors> counted_{};  // at its end
+};
+
+// A frame's payload, as far as the input provides it; zeros after.
+struct Payload {
+  std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> bytes{};
+  std::size_t size = 0;
+
+  void take(Input& input, std::size_t count) {
+    count = std::min(count, bytes.size() - size);
+    const Bytes taken = input.bytes(count);
+    std::copy(taken.begin(), taken.end(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    size += count;
+  }
+  Bytes view() const { return Bytes(bytes).first(size); }
+};
+
+void send_frame(Mcu& mcu, Input& input) {
+  const std::uint8_t address = (input.u8() & 1) != 0 ? BUSHD_ADDRESS_BROADCAST : kAddress;
+  const std::uint8_t type = input.u8();
+  const std::uint8_t tag = input.u8();
+  Payload payload;
+  payload.take(input, input.u8());
+  mcu.frame(address, type, tag, payload.view());
+}
+
+void send_ticks(Mcu& mcu, Input& input) {
+  const std::uint8_t epoch = static_cast<std::uint8_t>(mcu.core().epoch + input.u8());
+  const std::uint8_t flags = input.u8();
+  const std::uint32_t first =
+      mcu.core().tick + static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
+  const std::uint8_t count = input.u8();
+  const std::uint8_t mask = input.u8();
+  Payload payload;
+  const auto head = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_DELAYS);
+  payload.size =
+      bushd_encode_ticks_head(epoch, head, first, count, mask, nullptr, payload.bytes.data());
+  payload.bytes[1] = flags;
+  std::size_t motors = 0;
+  for (unsigned m = 0; m < 8; ++m) motors += mask >> m & 1;
+  const std::size_t width = (flags & BUSHD_TICKS_FINE) != 0 ? 2 : 1;
+  payload.take(input, (flags & BUSHD_TICKS_DELAYS) != 0 ? 2 * motors : 0);
+  payload.take(input, width * motors * count);
+  mcu.frame(kAddress, BUSHD_MSG_TICKS, 0, payload.view());
+}
+
+void send_sync(Mcu& mcu, Input& input) {
+  const std::uint8_t tag = input.u8();
+  const std::uint32_t tick_ns = mcu.core().tick_ns;
+  const std::uint32_t later_ns =
+      static_cast<std::uint32_t>(std::uint64_t{tick_ns} * input.u16() >> 16);
+  const std::uint32_t later_ticks =
+      static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
+  const bushd_sync sync = {.follows = true,
+                           .mark_tag = mcu.core().mark_tag,
+                           .mark_tick = mcu.core().mark_tick + later_ticks,
+                           .mark_ns = (mcu.core().mark_ns + later_ns) % tick_ns};
+  Payload payload;
+  payload.size = bushd_encode_sync(&sync, payload.bytes.data());
+  mcu.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, tag, payload.view());
+}
+
+void send_table_end(Mcu& mcu, Input& input) {
+  bushd_table_end end = {.slot = static_cast<std::uint8_t>(input.u8() % BUSHD_TABLE_SLOTS),
+                         .crc = BUSHD_CRC16_START};
+  const bushd_mcu_table& table = mcu.core().table[end.slot];
+  for (std::uint32_t i = 0; i < table.count; ++i) {
+    std::array<std::uint8_t, 2> code;
+    bushd_put_u16(code.data(), mcu.core().config.codes[table.first + i]);
+    end.crc = bushd_crc16(end.crc, code.data(), code.size());
+  }
+  Payload payload;
+  payload.size = bushd_encode_table_end(&end, payload.bytes.data());
+  mcu.frame(kAddress, BUSHD_MSG_TABLE_END, 0, payload.view());
+}
+
+void run(Input input) {
+  Mcu mcu;
+  while (!input.empty()) {
+    switch (static_cast<Op>(input.u8() % static_cast<unsigned>(Op::kCount))) {
+      case Op::kNoise:
+        mcu.feed(input.bytes(input.u8()));
+        break;
+      case Op::kTicksPass:
+        for (unsigned i = input.u8() % 16u; i > 0; --i) mcu.pass();
+        break;
+      case Op::kTimeInTick:
+        mcu.set_time(input.u16());
+        break;
+      case Op::kFrame:
+        send_frame(mcu, input);
+        break;
+      case Op::kTicks:
+        send_ticks(mcu, input);
+        break;
+      case Op::kSync:
+        send_sync(mcu, input);
+        break;
+      case Op::kTableEnd:
+        send_table_end(mcu, input);
+        break;
+      case Op::kCount:
+        break;
+    }
+  }
+  // The queue runs out, and motors begin to run down.
+  for (unsigned i = 0; i < kQueueTicks + 2u; ++i) mcu.pass();
+  mcu.check_answers();
+}
+
+}  // namespace
+}  // namespace bushd::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  bushd::fuzz::run({data, size});
+  return 0;
+}

@@ -1,0 +1,394 @@
+// The master of a bus whose MCUs answer what they like, when they like, and whose daemon asks for
+// whatever it may.
+//
+// Input: a programme. Noise goes in as it is. An answer is a frame to the request that is awaited,
+// with a payload of the input's own, or with a fitting one of which a few bytes are overwritten:
+// no fuzzer guesses a tag and a checksum.
+//
+// Promises checked: what is sent are frames that an MCU's decoders accept, nothing is sent while an
+// answer is awaited, ticks are asked for within the source's promise, and what is seen of an MCU is
+// consistent. A sane bus comes online afterwards, whatever was before.
+#include <array>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "fuzz/fuzz.h"
+#include "link/master.h"
+
+namespace bushd::fuzz {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr std::size_t kMcus = 2;
+constexpr std::uint8_t kMotors = 3;
+constexpr std::uint32_t kTickNs = 2'560'000;
+constexpr std::uint16_t kBootNumber = 4660;
+constexpr std::int64_t kMinPatienceUs = 10'000;  // docs/protocol.md, Line
+
+enum class Op : std::uint8_t {
+  kNoise,     // count, bytes
+  kWait,      // u16, microseconds x 8
+  kSpeak,     // own answer: count, payload
+  kAnswer,    // fitting answer: u8 spoilt bytes, each place and value
+  kBegin,     // mcu, motor, ticks later
+  kReplace,   // mcu, mask, ticks later
+  kDrop,      // mcu, motor
+  kPosition,  // mcu, motor, u16
+  kControl,   // mcu, actions
+  kPort,      // lost and opened again
+  kReconfigure,
+  kCount
+};
+
+const std::array<std::uint16_t, 4> kCodes = {250, 200, 150, 100};
+const bushd_table kTable = {
+    .accel =
+        {.code = kCodes.data(), .count = 4, .sum = nullptr, .bucket = nullptr, .bucket_shift = 0},
+    .decel =
+        {.code = kCodes.data(), .count = 4, .sum = nullptr, .bucket = nullptr, .bucket_shift = 0},
+    .cruise = 100,
+    .time_unit_ns = 40000};
+
+link::McuSetup mcu_setup(std::uint8_t address) {
+  link::McuSetup setup{.address = address, .tables = {&kTable}, .table_of_motor = {}};
+  setup.table_of_motor.fill(-1);
+  for (std::size_t m = 0; m < kMotors; ++m) setup.table_of_motor[m] = 0;
+  return setup;
+}
+
+// Every motor moves until a tick of its own.
+class Source : public link::TickSource {
+ public:
+  std::uint16_t render(std::size_t mcu, std::uint8_t motor, link::Tick first, unsigned count,
+                       std::int16_t* out, std::size_t stride) override {
+    BUSHD_REQUIRE(mcu < kMcus && motor < kMotors && count >= 1 && stride >= 1);
+    BUSHD_REQUIRE(first >= start[mcu][motor]);
+    for (unsigned i = 0; i < count; ++i) out[i * stride] = 65;
+    return first + count < start[mcu][motor] + length[mcu][motor] ? 100 : 0;
+  }
+
+  std::array<std::array<link::Tick, kMotors>, kMcus> start{};
+  std::array<std::array<link::Tick, kMotors>, kMcus> length{};
+};
+
+// What an MCU answers that is as the master wants it.
+struct SaneMcu {
+  bool configured = false;
+  bool synced = false;
+  bool enabled = false;
+  std::uint8_t mark_tag = 0;
+  bool marked = false;
+  std::int64_t marked_at_us = 0;
+};
+
+class Bus {
+ public:
+  Bus()
+      : master_({.baud = 500'000,
+                 .tick_ns = kTickNs,
+                 .format = BUSHD_FORMAT_FINE,
+                 .mcus = {mcu_setup(1), mcu_setup(2)}},
+                source_) {
+    master_.port_opened(now_us_);
+    step();
+  }
+
+  void wait(std::int64_t us) {
+    now_us_ += us;
+    step();
+  }
+
+  void receive(Bytes bytes) {
+    for (const std::uint8_t byte : bytes) {
+      bushd_frame frame;
+      const bool complete = bushd_receive_byte(&answers_, byte, &frame) == BUSHD_RECEIVE_FRAME;
+      if (complete && awaited_ && frame.tag == awaited_->tag) awaited_.reset();
+    }
+    master_.receive(now_us_, bytes);
+    step();
+  }
+
+  void lose_port() {
+    master_.port_lost(now_us_, "adapter gone");
+    BUSHD_REQUIRE(master_.step(now_us_).empty());
+    master_.port_opened(now_us_);
+    awaited_.reset();
+    answers_ = {};
+    step();
+  }
+
+  // To the request that is awaited; nothing if none is.
+  void answer(Bytes payload) {
+    if (!awaited_) return;
+    std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE + 1> wire;
+    const auto type = static_cast<std::uint8_t>(awaited_->type | BUSHD_TYPE_REPLY);
+    wire[0] = 0;  // ends whatever noise was before
+    const std::size_t size = bushd_frame_encode(awaited_->address, type, awaited_->tag,
+                                                payload.data(), payload.size(), &wire[1]);
+    receive(Bytes(wire).first(size + 1));
+  }
+
+  std::vector<std::uint8_t> fitting_answer() const {
+    std::vector<std::uint8_t> payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(awaited_ ? fit(payload.data()) : 0);
+    return payload;
+  }
+
+  link::Master& master() { return master_; }
+  Source& source() { return source_; }
+  std::int64_t now_us() const { return now_us_; }
+  bool online(std::size_t mcu) const { return master_.view(mcu).phase == link::McuPhase::kOnline; }
+
+  void step() {
+    const Bytes sent = master_.step(now_us_);
+    BUSHD_REQUIRE(sent.empty() || !awaited_ || now_us_ > awaited_->sent_us + kMinPatienceUs);
+    if (!sent.empty()) awaited_.reset();
+    for (const std::uint8_t byte : sent) {
+      bushd_frame frame;
+      const bushd_receive result = bushd_receive_byte(&receiver_, byte, &frame);
+      BUSHD_REQUIRE(result == BUSHD_RECEIVE_MORE || result == BUSHD_RECEIVE_FRAME);
+      if (result == BUSHD_RECEIVE_FRAME) heard(frame);
+    }
+    BUSHD_REQUIRE(receiver_.size == 0);
+    for (const link::Event& event : master_.take_events()) {
+      BUSHD_REQUIRE(event.mcu < kMcus && event.motor < BUSHD_MOTORS_PER_MCU);
+    }
+    for (std::size_t i = 0; i < kMcus; ++i) check(master_.view(i));
+  }
+
+ private:
+  struct Awaited {
+    std::uint8_t address;
+    std::uint8_t type;
+    std::uint8_t tag;
+    std::int64_t sent_us;
+  };
+
+  static void check(const link::McuView& view) {
+    if (view.phase != link::McuPhase::kOffline) BUSHD_REQUIRE(view.identified);
+    if (view.phase != link::McuPhase::kOnline) {
+      BUSHD_REQUIRE(!view.detail.empty());
+      return;
+    }
+    BUSHD_REQUIRE(view.reported && view.report.motor_count <= BUSHD_MOTORS_PER_MCU);
+    BUSHD_REQUIRE(view.report.boot_number == view.identity.boot_number);
+    for (std::size_t m = 0; m < view.report.motor_count; ++m) {
+      BUSHD_REQUIRE(view.known_until[m] >= view.tick);
+    }
+  }
+
+  // A frame of the master, as an MCU sees it.
+  void heard(const bushd_frame& frame) {
+    BUSHD_REQUIRE(!awaited_);
+    BUSHD_REQUIRE((frame.type & BUSHD_TYPE_REPLY) == 0 && frame.address <= kMcus);
+    BUSHD_REQUIRE((frame.address == BUSHD_ADDRESS_BROADCAST) == (frame.type == BUSHD_MSG_SYNC));
+    BUSHD_REQUIRE(acceptable(frame));
+    if (frame.type == BUSHD_MSG_SYNC) {
+      sync(frame);
+    } else if (frame.type != BUSHD_MSG_TICKS) {
+      awaited_ = Awaited{frame.address, frame.type, frame.tag, now_us_};
+      obey(frame, &mcus_[frame.address - 1u]);
+    }
+  }
+
+  static bool acceptable(const bushd_frame& frame) {
+    const auto decodes = [&](auto message, auto decode) {
+      return decode(frame.payload, frame.payload_size, &message) == BUSHD_OK;
+    };
+    switch (frame.type) {
+      case BUSHD_MSG_IDENTIFY:
+      case BUSHD_MSG_POLL:
+        return frame.payload_size == 0;
+      case BUSHD_MSG_CONFIGURE:
+        return decodes(bushd_configure{}, bushd_decode_configure);
+      case BUSHD_MSG_TABLE_BEGIN:
+        return decodes(bushd_table_begin{}, bushd_decode_table_begin);
+      case BUSHD_MSG_TABLE_DATA:
+        return decodes(bushd_table_data{}, bushd_decode_table_data);
+      case BUSHD_MSG_TABLE_END:
+        return decodes(bushd_table_end{}, bushd_decode_table_end);
+      case BUSHD_MSG_ASSIGN:
+        return decodes(bushd_assign{}, bushd_decode_assign);
+      case BUSHD_MSG_CONTROL:
+        return decodes(bushd_control{}, bushd_decode_control);
+      case BUSHD_MSG_SET_POSITION:
+        return decodes(bushd_set_position{}, bushd_decode_set_position);
+      case BUSHD_MSG_SYNC:
+        return decodes(bushd_sync{}, bushd_decode_sync);
+      case BUSHD_MSG_TICKS:
+        return decodes(bushd_ticks{}, bushd_decode_ticks);
+      default:
+        return false;
+    }
+  }
+
+  void sync(const bushd_frame& frame) {
+    bushd_sync message;
+    bushd_decode_sync(frame.payload, frame.payload_size, &message);
+    for (SaneMcu& mcu : mcus_) {
+      if (!mcu.configured) continue;
+      if (mcu.marked && message.follows && message.mark_tag == mcu.mark_tag) mcu.synced = true;
+      mcu.marked = true;
+      mcu.mark_tag = frame.tag;
+      mcu.marked_at_us = now_us_;
+    }
+  }
+
+  static void obey(const bushd_frame& frame, SaneMcu* mcu) {
+    if (frame.type == BUSHD_MSG_CONFIGURE) mcu->configured = true;
+    if (frame.type == BUSHD_MSG_CONTROL && (frame.payload[0] & BUSHD_CONTROL_ENABLE) != 0) {
+      mcu->enabled = true;
+    }
+  }
+
+  std::size_t fit(std::uint8_t* payload) const {
+    if (awaited_->type == BUSHD_MSG_IDENTIFY) {
+      const bushd_identity identity = {.protocol_version = BUSHD_PROTOCOL_VERSION,
+                                       .motors = kMotors,
+                                       .firmware_version = 1,
+                                       .boot_number = kBootNumber,
+                                       .slots = 128,
+                                       .queue_ticks = 64,
+                                       .table_codes = 100};
+      return bushd_encode_identity(&identity, payload);
+    }
+    if (awaited_->type == BUSHD_MSG_POLL) {
+      const bushd_report report = sane_report(mcus_[awaited_->address - 1u]);
+      return bushd_encode_report(&report, payload);
+    }
+    const bushd_acknowledgement done = {BUSHD_OK};
+    return bushd_encode_acknowledgement(&done, payload);
+  }
+
+  bushd_report sane_report(const SaneMcu& mcu) const {
+    const auto tick_us = static_cast<std::int64_t>(kTickNs / 1000);
+    bushd_report report{};
+    const bool ready = mcu.configured && mcu.synced && mcu.enabled;
+    report.state = ready ? BUSHD_STATE_READY : BUSHD_STATE_BUSY;
+    report.flags = static_cast<std::uint8_t>(
+        (mcu.configured ? BUSHD_FLAG_CONFIGURED : 0) | (mcu.synced ? BUSHD_FLAG_SYNCED : 0) |
+        (mcu.enabled ? BUSHD_FLAG_ENABLED : 0) | (mcu.marked ? BUSHD_FLAG_MARK : 0));
+    report.boot_number = kBootNumber;
+    report.tick = static_cast<std::uint32_t>(now_us_ / tick_us);
+    report.tick_ns = static_cast<std::uint32_t>(now_us_ % tick_us * 1000);
+    report.mark_tag = mcu.mark_tag;
+    report.mark_tick = static_cast<std::uint32_t>(mcu.marked_at_us / tick_us);
+    report.mark_ns = static_cast<std::uint32_t>(mcu.marked_at_us % tick_us * 1000);
+    report.motor_count = kMotors;
+    for (std::size_t m = 0; m < kMotors; ++m) {
+      report.motor[m].known_until = static_cast<std::uint16_t>(report.tick + 2);
+    }
+    return report;
+  }
+
+  Source source_;
+  link::Master master_;
+  std::array<SaneMcu, kMcus> mcus_;
+  bushd_receiver receiver_{};  // of what the master sends
+  bushd_receiver answers_{};   // of what it hears
+  std::optional<Awaited> awaited_;
+  std::int64_t now_us_ = 1'000'000;
+};
+
+void answer_spoilt(Bus& bus, Input& input) {
+  std::vector<std::uint8_t> payload = bus.fitting_answer();
+  for (unsigned i = input.u8() % 8u; i > 0; --i) {
+    const std::uint8_t at = input.u8();
+    const std::uint8_t value = input.u8();
+    if (!payload.empty()) payload[at % payload.size()] = value;
+  }
+  bus.answer(payload);
+}
+
+void begin(Bus& bus, Input& input) {
+  const std::size_t mcu = input.u8() % kMcus;
+  const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
+  const std::uint8_t later = input.u8();
+  const std::uint8_t length = input.u8();
+  if (!bus.online(mcu) || !bus.master().time_known()) return;
+  const link::Tick start = bus.master().earliest_start(bus.now_us(), mcu, motor) + later;
+  bus.source().start[mcu][motor] = start;
+  bus.source().length[mcu][motor] = length;
+  bus.master().begin(mcu, motor, start);
+}
+
+void replace(Bus& bus, Input& input) {
+  const std::size_t mcu = input.u8() % kMcus;
+  const auto mask = static_cast<std::uint16_t>(input.u8() % (1u << kMotors));
+  const std::uint8_t later = input.u8();
+  if (!bus.online(mcu) || !bus.master().time_known()) return;
+  link::Tick first = bus.master().earliest_replace(bus.now_us()) + later;
+  for (const link::Tick start : bus.source().start[mcu]) first = std::max(first, start);
+  bus.master().replace(mcu, mask, first);
+}
+
+void run_op(Op op, Bus& bus, Input& input) {
+  link::Master& master = bus.master();
+  switch (op) {
+    case Op::kNoise:
+      return bus.receive(input.bytes(input.u8()));
+    case Op::kWait:
+      return bus.wait(std::int64_t{input.u16()} * 8);
+    case Op::kSpeak:
+      return bus.answer(input.bytes(std::min<std::size_t>(input.u8(), BUSHD_FRAME_MAX_PAYLOAD)));
+    case Op::kAnswer:
+      return answer_spoilt(bus, input);
+    case Op::kBegin:
+      return begin(bus, input);
+    case Op::kReplace:
+      return replace(bus, input);
+    case Op::kDrop: {
+      const std::size_t mcu = input.u8() % kMcus;
+      return master.drop(mcu, static_cast<std::uint8_t>(input.u8() % kMotors));
+    }
+    case Op::kPosition: {
+      const std::size_t mcu = input.u8() % kMcus;
+      const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
+      return master.set_position(mcu, motor, input.u16() - 32768);
+    }
+    case Op::kControl: {
+      constexpr std::array<std::uint8_t, 4> kActions = {1, 2, 4, 5};
+      const std::size_t mcu = input.u8() % kMcus;
+      return master.control(mcu, kActions[input.u8() % kActions.size()]);
+    }
+    case Op::kPort:
+      return bus.lose_port();
+    case Op::kReconfigure: {
+      const std::size_t mcu = input.u8() % kMcus;
+      return master.reconfigure(mcu, mcu_setup(static_cast<std::uint8_t>(mcu + 1)));
+    }
+    case Op::kCount:
+      return;
+  }
+}
+
+// Answers everything at once, as it should be.
+void recover(Bus& bus) {
+  constexpr int kMaxAnswers = 3000;
+  for (int i = 0; i < kMaxAnswers && !(bus.online(0) && bus.online(1)); ++i) {
+    bus.answer(bus.fitting_answer());
+    bus.wait(10'000);
+  }
+  BUSHD_REQUIRE(bus.online(0) && bus.online(1));
+}
+
+void run(Input input) {
+  Bus bus;
+  while (!input.empty()) {
+    const auto op = static_cast<Op>(input.u8() % static_cast<unsigned>(Op::kCount));
+    run_op(op, bus, input);
+    bus.step();
+  }
+  recover(bus);
+}
+
+}  // namespace
+}  // namespace bushd::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  bushd::fuzz::run({data, size});
+  return 0;
+}
