@@ -1,7 +1,7 @@
 // Sending: what is due next on a line where only one may talk at a time. Order of urgency:
-// replacements and the polls that confirm them, queues about to run empty, reports, time marks,
-// configuration, filling queues, looking for silent MCUs. While an answer is awaited nothing is
-// sent.
+// replacements, what follows them, and the polls that confirm them; queues about to run empty,
+// reports, time marks, configuration, filling queues, looking for silent MCUs. While an answer is
+// awaited nothing is sent.
 #include "link/master.h"
 
 #include <algorithm>
@@ -157,9 +157,10 @@ std::int64_t Master::next_wake_us() const {
 }
 
 bool Master::send_next(std::int64_t now_us) {
-  return send_due_replacement(now_us) || send_wanted_poll(now_us) ||
-         send_stream(now_us, kQueueUrgentUs) || send_due_poll(now_us) || send_due_sync(now_us) ||
-         send_script(now_us) || send_stream(now_us, kQueueTargetUs) || send_due_identify(now_us);
+  return send_due_replacement(now_us) || send_stream(now_us, kQueueUrgentUs, true) ||
+         send_wanted_poll(now_us) || send_stream(now_us, kQueueUrgentUs) || send_due_poll(now_us) ||
+         send_due_sync(now_us) || send_script(now_us) || send_stream(now_us, kQueueTargetUs) ||
+         send_due_identify(now_us);
 }
 
 void Master::send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,
@@ -223,16 +224,17 @@ bool Master::send_due_poll(std::int64_t now_us) {
   return send_wanted_poll(now_us);
 }
 
-bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us) {
+// A replacement leaves an MCU with little more than one frame of ticks, far less than an answer may
+// take. So more goes out before anybody knows whether it was taken: if it was not, its followers
+// are of an epoch that the MCU does not have and change nothing.
+bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced) {
   if (!clock_.valid()) return false;
   const Tick now = tick_at(now_us);
   std::size_t neediest = mcus_.size();
   Tick least = INT64_MAX;
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     const Mcu& mcu = mcus_[i];
-    // While it is open whether a replacement was taken, no frame can be of the right epoch for
-    // sure.
-    if (mcu.view.phase != McuPhase::kOnline || mcu.replaced != 0) continue;
+    if (mcu.view.phase != McuPhase::kOnline || (only_replaced && mcu.replaced == 0)) continue;
     for (const Stream& stream : mcu.stream) {
       if (stream.active && !stream.finished && stream.next < least) {
         least = stream.next;

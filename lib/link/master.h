@@ -164,7 +164,7 @@ class Master {
   bool send_next(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
   bool send_wanted_poll(std::int64_t now_us);
-  bool send_stream(std::int64_t now_us, std::int64_t lead_us);
+  bool send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced = false);
   bool send_ticks_of(std::int64_t now_us, std::size_t mcu, Tick horizon);
   void send_ticks(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first,
                   unsigned count, unsigned flags);

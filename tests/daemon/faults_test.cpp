@@ -70,6 +70,24 @@ TEST_P(Faults, LostReplacementIsPlannedAgain) {
   }
 }
 
+// A stop leaves the MCU with a short queue: a machine too busy to go on at once must not let it run
+// empty.
+TEST_P(Faults, DaemonPausedJustAfterAStop) {
+  for (const double after_ms : {0.5, 5.0, 15.0, 40.0}) {
+    Lab lab(hall(2, 3, GetParam()));
+    lab.connect();
+    const auto move =
+        lab.send(command_t::MOVE_RELATIVE, {"m01", "m02", "m05"}, {9000, -9000, 9000});
+    lab.run_for(1.3);
+    lab.send(command_t::STOP, {});
+    lab.run_for(after_ms / 1000);
+    lab.pause_daemon(0.07);
+    const reply_t result = lab.wait(move);
+    EXPECT_EQ(result.result, "stopped") << "paused " << after_ms << " ms after: " << result.reason;
+    EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
+  }
+}
+
 TEST_P(Faults, LinkLostInMotionRunsDownAndGoesOnFromThere) {
   Lab lab(hall(2, 4, GetParam()));
   lab.connect();
