@@ -142,7 +142,7 @@ def check_positions(path, motors, problems):
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not the output of bushctl status --json: {error!r}") from None
     for motor in motors:
-        counted = motor.moves[0].from_steps + motor.travelled()
+        counted = motor.moves[0].from_steps + motor.set_by_steps + motor.travelled()
         if said.get(motor.name) != counted:
             text = f"the daemon says it is at {said.get(motor.name)} steps, its edges lead to {counted}"
             problems.add(motor, "position", text)

@@ -14,6 +14,7 @@ class Motor:
         self.output = output
         self.mcu = f"{bus}:{address}"
         self.moves = []
+        self.set_by_steps = 0  # sum of what "set" has shifted the position by, without a step
         self.steps = []
         self.edges = []
         self.errors_ns = ([], [], [])  # of the edges against the table, by place in the move
@@ -36,11 +37,12 @@ class MoveLog:
         self._bus = bus
         self._problems = problems
         self._moves = {}  # by motor and id: a group move has one id
+        self._at_steps = {}  # by motor name: where the last result or "set" leaves it
         self._tables = {}
         self._ticks = set()  # (bus, tick_ns)
 
     def read(self, path):
-        take = {"move": self._move, "stop": self._stop, "result": self._result}
+        take = {"move": self._move, "stop": self._stop, "result": self._result, "set": self._set}
         try:
             with open(path, encoding="utf-8") as file:
                 for number, line in enumerate(file, 1):
@@ -68,6 +70,10 @@ class MoveLog:
         if motor.place() != place:
             self._problems.add(motor, "output", f"move {event['id']} is on another output: {place}")
         move = Move(event, self._tables[path])
+        before_steps = self._at_steps.get(name, move.from_steps)
+        if move.from_steps != before_steps:
+            text = f"move {move.id} starts from {move.from_steps} steps, the one before ends at {before_steps}"
+            self._problems.add(motor, "position", text)
         motor.moves.append(move)
         self._moves[name, move.id] = move
 
@@ -85,6 +91,13 @@ class MoveLog:
             self._problems.add(motor, "result", f"move {move.id} has more than one result")
         move.result = event["result"]
         move.result_steps = event["position_steps"]
+        self._at_steps[event["motor"]] = event["position_steps"]
+
+    def _set(self, event):
+        name, steps = event["motor"], event["position_steps"]
+        if name in self.motors:
+            self.motors[name].set_by_steps += steps - self._at_steps.get(name, steps)
+        self._at_steps[name] = steps
 
     def _check_each(self):
         """What the log must fulfil by itself, before edges are looked at."""
@@ -96,9 +109,6 @@ class MoveLog:
             for move in motor.moves:
                 self._check_result(motor, move)
             for before, after in zip(motor.moves, motor.moves[1:]):
-                if after.from_steps != before.end_steps():
-                    text = f"move {after.id} starts from {after.from_steps} steps, the one before ends at"
-                    self._problems.add(motor, "position", f"{text} {before.end_steps()}")
                 if after.delays and after.start_tick < before.end_tick():
                     text = f"move {after.id} starts in tick {after.start_tick}, the one before runs until"
                     self._problems.add(motor, "overlap", f"{text} {before.end_tick()}")

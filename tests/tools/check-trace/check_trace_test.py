@@ -296,6 +296,17 @@ class WrongLogs(CheckTraceTest):
         move["from_steps"] += 2
         self.assert_problem(scene, "theta", "starts from 302 steps")
 
+    def test_a_position_that_was_set_between_two_moves(self):
+        scene = self.scene()
+        at = next(i for i, e in enumerate(scene.events) if e["event"] == "move" and e["id"] == 4)
+        move = scene.events[at]
+        result = next(e for e in scene.events if e["event"] == "result" and e["id"] == 4)
+        move["from_steps"] -= 1000
+        result["position_steps"] -= 1000
+        self.assert_problem(scene, "theta", "starts from -700 steps")
+        scene.events.insert(at, {"event": "set", "motor": "theta", "position_steps": move["from_steps"]})
+        self.assert_right(scene)
+
     def test_a_move_that_starts_before_the_one_before_has_ended(self):
         scene = self.scene()
         move = next(e for e in scene.events if e["event"] == "move" and e["id"] == 4)
