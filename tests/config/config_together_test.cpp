@@ -47,7 +47,7 @@ void write_tables(const ConfigFile& file, int count) {
 }
 
 TEST(ConfigTogether, LineThatCannotCarryItsTicksIsRefusedWithLoadAndRemedy) {
-  const ConfigFile file = wide_file(2, 115200, 2560, "fine");
+  const ConfigFile file = wide_file(2, 230400, 2560, "fine");
   write_tables(file, 1);
   const auto config = file.load();
   ASSERT_FALSE(config.has_value());
@@ -55,12 +55,12 @@ TEST(ConfigTogether, LineThatCannotCarryItsTicksIsRefusedWithLoadAndRemedy) {
   EXPECT_EQ(config.error().line, 5);
   EXPECT_EQ(config.error().key, "bus[0].tick_us");
   EXPECT_THAT(config.error().message,
-              HasSubstr("% of the line at 115200 baud; allowed: 85 %. Use baud = "));
+              HasSubstr("% of the line at 230400 baud; allowed: 85 %. Use baud = "));
   EXPECT_THAT(config.error().message, HasSubstr("or more, or tick_us = "));
 }
 
 TEST(ConfigTogether, RemediesForTheLineHelp) {
-  const ConfigFile refused = wide_file(2, 115200, 2560, "fine");
+  const ConfigFile refused = wide_file(2, 230400, 2560, "fine");
   write_tables(refused, 1);
   const std::string message = refused.load().error().message;
   const auto number_after = [&](const std::string& text) {
@@ -69,8 +69,8 @@ TEST(ConfigTogether, RemediesForTheLineHelp) {
   const int baud = number_after("Use baud = ");
   const int tick_us = number_after("tick_us = ");
   for (const auto& [remedy_baud, remedy_tick_us, good] :
-       {std::tuple{baud, 2560, true}, std::tuple{115200, tick_us, true},
-        std::tuple{115200, tick_us - 1, false}}) {
+       {std::tuple{baud, 2560, true}, std::tuple{230400, tick_us, true},
+        std::tuple{230400, tick_us - 1, false}}) {
     const ConfigFile file = wide_file(2, remedy_baud, remedy_tick_us, "fine");
     write_tables(file, 1);
     EXPECT_EQ(file.load().has_value(), good) << remedy_baud << ' ' << remedy_tick_us;
