@@ -41,8 +41,8 @@ Error port_error(const std::string& path, const std::string& what, int error) {
 }
 
 // Locked before anything is changed: a second program must not disturb the line of the first. And
-// only a tty that can be opened reaches libserial: a SerialPort whose Open failed half-way cannot be
-// destroyed.
+// only a tty that can be opened reaches libserial: a SerialPort whose Open failed half-way cannot
+// be destroyed.
 Result<int> open_and_lock(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) {
