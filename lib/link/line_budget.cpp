@@ -21,8 +21,8 @@ double line_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
     if (motors == 0) continue;
     const double ticks =
         std::min<unsigned>(bushd_ticks_capacity(motors, fine, true), kMaxTicksPerFrame);
-    const double frame = kFrameCost + BUSHD_TICKS_HEADER + 2.0 * motors +
-                         ticks * motors * (fine ? 2.0 : 1.0);
+    const double frame =
+        kFrameCost + BUSHD_TICKS_HEADER + 2.0 * motors + ticks * motors * (fine ? 2.0 : 1.0);
     bytes_per_s += frame / (ticks * tick_s);
   }
   return bytes_per_s * 10.0 / baud;
