@@ -93,6 +93,9 @@ std::string Core::refuse(const command_t& command) const {
     if (command.kind == command_t::SET_POSITION) {
       if (motor.axis.busy())
         return motor.config->name + " moves; its position can be set at rest only";
+      if (being_set(index)) {
+        return motor.config->name + ": its position is being set; wait for that result";
+      }
       if (value > kMaxPosition || value < -kMaxPosition) {
         return motor.config->name + ": positions lie within +-" + std::to_string(kMaxPosition);
       }
@@ -128,11 +131,30 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
   }
   if (motor.axis.busy()) return "it moves already; stop it or wait for its result";
   if (!motor.trusted) return "its position is uncertain; set it first";
+  // A move begins where the motor stands when it is accepted, and makes its steps with drivers on.
+  if (being_set(index)) return "its position is being set; wait for that result";
+  if (being_disabled(motor.mcu)) {
+    return "the drivers of MCU " + mcu.config->id + " are being disabled; enable them first";
+  }
   if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
     return "target " + std::to_string(target) + " is beyond +-" + std::to_string(kMaxPosition) +
            " steps";
   }
   return {};
+}
+
+bool Core::being_set(std::size_t motor) const {
+  return std::any_of(pending_.begin(), pending_.end(), [motor](const Pending& pending) {
+    return pending.kind == command_t::SET_POSITION &&
+           std::find(pending.motors.begin(), pending.motors.end(), motor) != pending.motors.end();
+  });
+}
+
+bool Core::being_disabled(std::size_t mcu) const {
+  return std::any_of(pending_.begin(), pending_.end(), [mcu](const Pending& pending) {
+    return pending.kind == command_t::DISABLE &&
+           std::find(pending.mcus.begin(), pending.mcus.end(), mcu) != pending.mcus.end();
+  });
 }
 
 void Core::start_move(std::int64_t now_us, const command_t& command) {
@@ -196,8 +218,7 @@ void Core::plan_stop(std::int64_t now_us, const std::vector<std::size_t>& motors
     const Mcu& mcu = mcus_[motor.mcu];
     if (!motor.axis.busy()) continue;
     const motion::Tick at = master_of(mcu).earliest_replace(now_us);
-    motor.axis.ramp_down(at);
-    if (at >= motor.axis.end_tick()) continue;  // over before a stop could arrive
+    if (!motor.axis.ramp_down(at)) continue;  // over before a stop could arrive
     masks[motor.mcu] |= static_cast<std::uint16_t>(1u << motor.config->output.value);
   }
   for (const auto& [index, mask] : masks) {
@@ -308,7 +329,13 @@ void Core::check_pending(std::int64_t now_us, std::optional<std::size_t> reporte
 
 void Core::finish_pending(const Pending& pending, const std::string& failure) {
   if (failure.empty() && pending.kind == command_t::SET_POSITION) {
-    for (const std::size_t motor : pending.motors) motors_[motor].trusted = true;
+    for (std::size_t i = 0; i < pending.motors.size(); ++i) {
+      Motor& motor = motors_[pending.motors[i]];
+      motor.trusted = true;
+      const nlohmann::json line = {
+          {"event", "set"}, {"motor", motor.config->name}, {"position_steps", pending.steps[i]}};
+      outputs_.move_log(line.dump());
+    }
   }
   changed_ = true;
   const bool good = failure.empty();

@@ -122,12 +122,15 @@ class Core {
   void on_offline(std::size_t mcu);
   void on_report(std::int64_t now_us, std::size_t mcu);
   void follow_motor(std::size_t motor, const Mcu& mcu, const link::McuView& view);
+  static std::string did_not_start(const Mcu& mcu);  // for the reason of a move's end
   void clear_link_fault(Mcu& mcu);
   void end_motor(std::size_t motor, motion::Outcome outcome, const std::string& reason);
 
   // commands.cpp
   std::string refuse(const command_t& command) const;  // "" when nothing speaks against it
   std::string refuse_move(std::size_t motor, std::int64_t target, std::int64_t steps) const;
+  bool being_set(std::size_t motor) const;     // a SET_POSITION has no result yet
+  bool being_disabled(std::size_t mcu) const;  // a DISABLE is not yet confirmed by this MCU
   std::optional<std::size_t> find_motor(const std::string& name) const;
   std::vector<std::size_t> motors_named(const command_t& command) const;  // none named: all
   std::vector<std::size_t> mcus_of(const std::vector<std::size_t>& motors) const;

@@ -15,6 +15,10 @@ const char* fault_text(std::uint8_t faults) {
 
 }  // namespace
 
+std::string Core::did_not_start(const Mcu& mcu) {
+  return "its first ticks did not reach MCU " + mcu.config->id + " in time; it did not move";
+}
+
 void Core::handle_events(std::int64_t now_us, std::size_t bus) {
   for (const link::Event& event : buses_[bus]->master.take_events()) {
     const std::size_t mcu = mcu_at(bus, event.mcu);
@@ -33,8 +37,7 @@ void Core::handle_events(std::int64_t now_us, std::size_t bus) {
         const bool link_fault = (view_of(mcus_[mcu]).report.faults & BUSHD_FAULT_LINK) != 0;
         if (motor >= 0 && !link_fault) {
           end_motor(static_cast<std::size_t>(motor), motion::Outcome::kLink,
-                    "its first ticks reached MCU " + mcus_[mcu].config->id +
-                        " too late to start in time; it did not move");
+                    did_not_start(mcus_[mcu]));
         }
         break;
       }
@@ -114,7 +117,11 @@ void Core::follow_motor(std::size_t index, const Mcu& mcu, const link::McuView& 
   }
   motor.axis.executed(view.tick);
   if (view.tick < motor.axis.end_tick()) return;
-  if (motor.position_steps != motor.axis.target_steps()) {
+  if (motor.position_steps != motor.axis.target_steps() &&
+      motor.position_steps == motor.axis.from_steps()) {
+    // A motor at rest looks the same whether its start came and is over or never came.
+    end_motor(index, motion::Outcome::kLink, did_not_start(mcu));
+  } else if (motor.position_steps != motor.axis.target_steps()) {
     motor.trusted = false;
     end_motor(index, motion::Outcome::kFault,
               "MCU " + mcu.config->id + " counted position " +

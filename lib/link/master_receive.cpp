@@ -276,10 +276,13 @@ void Master::follow_streams(std::size_t index) {
   Mcu& mcu = mcus_[index];
   for (unsigned m = 0; m < mcu.view.report.motor_count; ++m) {
     Stream& stream = mcu.stream[m];
-    if (!stream.active || stream.next == stream.start) continue;
+    if (!stream.active) continue;
     const Tick known = mcu.view.known_until[m];
-    if (known >= stream.next) continue;
     const bool moving = (mcu.view.report.moving >> m & 1) != 0;
+    // Of a stream that has not begun nothing can be missing; but a busy line may keep it waiting
+    // past its start.
+    const bool begun = stream.next != stream.start;
+    if (begun ? known >= stream.next : moving || known <= stream.start) continue;
     if (!moving && known > stream.start) {
       stream.active = false;
       events_.push_back(

@@ -23,10 +23,10 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start) {
   plan_end();
 }
 
-void Axis::ramp_down(Tick at) {
+bool Axis::ramp_down(Tick at) {
   stop_at_ = at;
   head_ = base_;
-  plan_end();
+  return plan_end();
 }
 
 std::size_t Axis::expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
@@ -44,11 +44,22 @@ std::size_t Axis::expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
   return active;
 }
 
+// At the beginning of a place's tick: what the stop makes of its run. The place that the axis goes
+// back to keeps the run as it was until the MCU has executed the stop, for a stop that the MCU did
+// not take is planned again, later.
+void Axis::take_stop(Place& place) const {
+  if (cancelled()) {
+    if (place.tick == start_) bushd_run_start(&place.run, table_, 0, 1);
+  } else if (stop_at_ == place.tick) {
+    bushd_run_ramp_down(&place.run);
+  }
+}
+
 // Advances a place, taking the stop on the way if it lies at or after the place.
 void Axis::advance(Place& place, Tick to) const {
   std::array<std::int16_t, kBlock> unused;
   while (place.tick < to) {
-    if (stop_at_ == place.tick) bushd_run_ramp_down(&place.run);
+    take_stop(place);
     Tick next = to;
     if (stop_at_ && *stop_at_ > place.tick) next = std::min(next, *stop_at_);
     if (bushd_run_done(&place.run)) {
@@ -68,29 +79,32 @@ Tick Axis::end_of(const Place& place) const {
   return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
 }
 
-void Axis::plan_end() {
-  if (stop_at_ && *stop_at_ <= start_) {
-    // Cancelled before its first tick.
-    bushd_run_start(&base_.run, table_, 0, 1);
-    base_.tick = start_;
-    head_ = base_;
+// Returns whether the stop, if there is one, changes anything.
+bool Axis::plan_end() {
+  if (cancelled()) {
     end_ = start_;
     target_ = from_;
-    return;
+    return true;
   }
   if (bushd_run_done(&base_.run))
-    return;  // over, but for the report that says so: nothing to change
+    return false;  // over, but for the report that says so: nothing to change
   Place place = base_;
-  if (stop_at_ && *stop_at_ < end_of(base_)) {
+  const bool stops = stop_at_ && *stop_at_ < end_of(base_);
+  if (stops) {
     advance(place, *stop_at_);
     bushd_run_ramp_down(&place.run);
   }
   target_ = from_ + place.run.direction * (static_cast<std::int64_t>(place.run.steps_done) +
                                            bushd_run_steps_left(&place.run));
   end_ = end_of(place);
+  return stops;
 }
 
 std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::size_t stride) {
+  if (cancelled()) {
+    for (unsigned i = 0; i < count; ++i) out[i * stride] = 0;
+    return 0;
+  }
   if (first != head_.tick) {
     if (first < head_.tick) head_ = base_;
     advance(head_, first);
@@ -99,11 +113,11 @@ std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::s
   // Before the start the run stands still.
   while (done < count && first + done < start_) out[done++ * stride] = 0;
   while (done < count) {
-    const Tick tick = first + done;
-    if (stop_at_ == tick) bushd_run_ramp_down(&head_.run);
+    head_.tick = first + done;
+    take_stop(head_);
     Tick until = first + count;
-    if (stop_at_ && *stop_at_ > tick) until = std::min(until, *stop_at_);
-    const auto n = static_cast<std::size_t>(until - tick);
+    if (stop_at_ && *stop_at_ > head_.tick) until = std::min(until, *stop_at_);
+    const auto n = static_cast<std::size_t>(until - head_.tick);
     expand(head_.run, n, out + done * stride, stride);
     done += static_cast<unsigned>(n);
   }
@@ -123,7 +137,7 @@ void Axis::executed(Tick until) {
 double Axis::velocity_steps_per_s() const {
   if (!busy_) return 0.0;
   Place place = base_;
-  if (stop_at_ == place.tick) bushd_run_ramp_down(&place.run);
+  take_stop(place);
   const std::uint16_t delay = bushd_run_delay(&place.run);
   if (delay == 0) return 0.0;
   return place.run.direction * 1e9 / (static_cast<double>(delay) * table_->time_unit_ns);

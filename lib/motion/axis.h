@@ -25,8 +25,9 @@ class Axis {
 
   // From the beginning of tick `at` on: the running step goes on, then the fewest steps to rest. At
   // or before the start no step is made. A later call replaces an earlier one, as long as the
-  // earlier has not been executed. Precondition: busy(), `at` not yet executed.
-  void ramp_down(Tick at);
+  // earlier has not been executed. Returns false if the move is over by then anyway. Precondition:
+  // busy(), `at` not yet executed.
+  bool ramp_down(Tick at);
 
   // Displacements of ticks first .. first+count-1 (before the start and after the end: 0) into
   // out[0], out[stride], ... as the format has them (coarse: the byte's value). Returns the delay
@@ -46,6 +47,7 @@ class Axis {
   Tick start_tick() const { return start_; }
   // First tick after the last step, as planned now.
   Tick end_tick() const { return end_; }
+  std::int64_t from_steps() const { return from_; }
   // Where the motor will stand at the end, as planned now, and where the move was to lead.
   std::int64_t target_steps() const { return target_; }
   std::int64_t wanted_steps() const { return wanted_; }
@@ -57,11 +59,13 @@ class Axis {
     bushd_run run;
     Tick tick;  // the run's state is that at the beginning of this tick
   };
+  bool cancelled() const { return stop_at_ && *stop_at_ <= start_; }
+  void take_stop(Place& place) const;
   void advance(Place& place, Tick to) const;
   std::size_t expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
                      std::size_t stride) const;
   Tick end_of(const Place& place) const;
-  void plan_end();
+  bool plan_end();
 
   const bushd_table* table_;
   std::uint32_t tick_ns_;
