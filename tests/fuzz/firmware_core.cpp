@@ -170,13 +170,23 @@ class Mcu {
     BUSHD_REQUIRE(enabled_ == ((mcu_.flags & BUSHD_FLAG_ENABLED) != 0));
     BUSHD_REQUIRE(mcu_.codes_used <= kCodes && mcu_.tick_ns == tick_ns_);
     for (std::size_t m = 0; m < kMotors; ++m) {
-      BUSHD_REQUIRE(mcu_.motor[m].remainder > -256 && mcu_.motor[m].remainder < 256);
-      BUSHD_REQUIRE(mcu_.motor[m].table < static_cast<int>(BUSHD_TABLE_SLOTS));
+      const bushd_mcu_motor& motor = mcu_.motor[m];
+      BUSHD_REQUIRE(motor.remainder > -256 && motor.remainder < 256);
+      BUSHD_REQUIRE(motor.table < static_cast<int>(BUSHD_TABLE_SLOTS));
+      // The table that it must be able to run down.
+      if (motor.delay != 0 || motor.running_down) {
+        BUSHD_REQUIRE(motor.table >= 0 && mcu_.table[motor.table].valid);
+      }
+      BUSHD_REQUIRE(static_cast<std::int32_t>(motor.known_until - mcu_.tick) <= kQueueTicks + 1);
+    }
+    for (std::size_t m = kMotors; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      BUSHD_REQUIRE(mcu_.motor[m].position_steps == 0 && mcu_.motor[m].known_until == 0);
     }
   }
 
-  std::array<std::int16_t, kQueueTicks * kMotors> queue_{};
-  std::array<std::uint16_t, kCodes> codes_{};
+  // On the heap, each by itself: there a sanitizer sees what lies beside them.
+  std::vector<std::int16_t> queue_ = std::vector<std::int16_t>(kQueueTicks * kMotors);
+  std::vector<std::uint16_t> codes_ = std::vector<std::uint16_t>(kCodes);
   bushd_mcu mcu_{};
   bushd_receiver listener_{};
   bushd_frame answer_{};
