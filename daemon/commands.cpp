@@ -70,7 +70,8 @@ std::string Core::refuse(const command_t& command) const {
   if (command.steps.size() != command.motors.size()) return "motors and steps differ in number";
   std::set<std::string> seen;
   for (const std::string& name : command.motors) {
-    if (!find_motor(name)) return "there is no motor \"" + name.substr(0, 64) + "\"";
+    if (!find_motor(name))
+      return "there is no motor \"" + name.substr(0, 64) + "\"; 'bushctl status' lists them";
     if (!seen.insert(name).second) return "motor " + name + " is named twice";
   }
   const bool targets = is_move(command.kind) || command.kind == command_t::SET_POSITION;
@@ -82,7 +83,8 @@ std::string Core::refuse(const command_t& command) const {
     const std::int64_t value = command.steps[i];
     // Compared before any arithmetic: the sum of two values from outside could overflow.
     if (targets && (value > 2 * kMaxPosition || value < -2 * kMaxPosition)) {
-      return motor.config->name + ": " + std::to_string(value) + " steps is out of range";
+      return motor.config->name + ": " + std::to_string(value) +
+             " steps is out of range; allowed: +-" + std::to_string(kMaxPosition);
     }
     if (is_move(command.kind)) {
       const bool relative = command.kind == command_t::MOVE_RELATIVE;
@@ -125,12 +127,14 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
   if (view.phase != link::McuPhase::kOnline) {
     return "MCU " + mcu.config->id + " is offline: " + view.detail;
   }
-  if (view.report.faults != 0) return "MCU " + mcu.config->id + " has a fault; clear it first";
+  if (view.report.faults != 0)
+    return "MCU " + mcu.config->id + " has a fault, named by 'bushctl status'; say 'bushctl clear'";
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
     return "the drivers of MCU " + mcu.config->id + " are disabled; enable them first";
   }
   if (motor.axis.busy()) return "it moves already; stop it or wait for its result";
-  if (!motor.trusted) return "its position is uncertain; set it first";
+  if (!motor.trusted)
+    return "its position is uncertain; find out where it stands and say 'bushctl set NAME STEPS'";
   // A move begins where the motor stands when it is accepted, and makes its steps with drivers on.
   if (being_set(index)) return "its position is being set; wait for that result";
   if (being_disabled(motor.mcu)) {
@@ -139,6 +143,13 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
   if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
     return "target " + std::to_string(target) + " is beyond +-" + std::to_string(kMaxPosition) +
            " steps";
+  }
+  if (motor.axis.duration_ticks(steps) > motion::Axis::kMaxDurationTicks) {
+    const double tick_s = config_.buses[motor.bus].tick_us * 1e-6;
+    const double days = motor.axis.duration_ticks(steps) * tick_s / 86400;
+    return std::to_string(steps) + " steps would take " + std::to_string(std::llround(days)) +
+           " days with this table; the longest move is " +
+           std::to_string(std::llround(motion::Axis::kMaxDurationTicks * tick_s / 86400)) + " days";
   }
   return {};
 }

@@ -16,7 +16,11 @@ std::uint16_t Core::Bus::render(std::size_t mcu, std::uint8_t motor, link::Tick 
   return 0;
 }
 
-Core::Core(const config::Config& config, Outputs& outputs) : config_(config), outputs_(outputs) {
+Core::Core(const config::Config& config, Outputs& outputs)
+    : config_(config),
+      outputs_(outputs),
+      // The log of moves is appended to: its ids must not begin anew with every daemon.
+      last_log_id_(static_cast<std::uint64_t>(outputs.wall_clock_us())) {
   for (const config::Group& group : config.groups) tables_.push_back(group.table);
   for (const config::Mcu& mcu : config.mcus) {
     Mcu entry{.config = &mcu, .bus = mcu.bus.value, .in_bus = 0, .boot_number = {}};
@@ -138,17 +142,31 @@ void Core::step(std::int64_t now_us) {
     handle_events(now_us, b);
   }
   check_pending(now_us, std::nullopt);
-  if (changed_ || now_us >= state_due_us_) {
+  if (changed_) state_due_us_ = std::min(state_due_us_, state_sent_us_ + kMinStatePeriodUs);
+  if (now_us >= state_due_us_) {
     publish();
     changed_ = false;
+    state_sent_us_ = now_us;
     state_due_us_ = now_us + kStatePeriodUs;
   }
 }
 
 std::int64_t Core::next_wake_us() const {
-  std::int64_t wake = changed_ ? 0 : state_due_us_;
+  std::int64_t wake = state_due_us_;
+  if (changed_) wake = std::min(wake, state_sent_us_ + kMinStatePeriodUs);
   for (const auto& bus : buses_) wake = std::min(wake, bus->master.next_wake_us());
   return wake;
+}
+
+std::int64_t Core::rest_by_us(std::int64_t now_us) const {
+  std::int64_t latest_us = now_us;
+  for (const Motor& motor : motors_) {
+    const link::Master& master = buses_[motor.bus]->master;
+    if (!motor.axis.busy() || !master.time_known()) continue;
+    const motion::Tick ticks = motor.axis.end_tick() - master.tick_at(now_us);
+    latest_us = std::max(latest_us, now_us + ticks * config_.buses[motor.bus].tick_us);
+  }
+  return latest_us;
 }
 
 void Core::shut_down(std::int64_t now_us) {

@@ -44,6 +44,9 @@ class Outputs {
 class Core {
  public:
   static constexpr std::int64_t kStatePeriodUs = 50'000;
+  // "At once on change", but not more often than this: a client that sends many commands must not
+  // make the daemon flood the network.
+  static constexpr std::int64_t kMinStatePeriodUs = 5'000;
 
   // `config` must be one that config::load accepted; it and `outputs` outlive the core.
   Core(const config::Config& config, Outputs& outputs);
@@ -72,6 +75,8 @@ class Core {
   void shut_down(std::int64_t now_us);
   // No motor moves by this core's doing.
   bool at_rest() const { return book_.empty(); }
+  // When all that moves now will have come to rest, as planned.
+  std::int64_t rest_by_us(std::int64_t now_us) const;
 
  private:
   struct Bus;
@@ -164,6 +169,7 @@ class Core {
   std::uint64_t last_log_id_ = 0;
   std::int64_t sequence_ = 0;
   std::int64_t state_due_us_ = 0;
+  std::int64_t state_sent_us_ = INT64_MIN / 2;
   bool changed_ = true;
   bool shutting_down_ = false;
 };

@@ -72,9 +72,8 @@ Result<void> EventLoop::set_up() {
   if (signals_ < 0) return fail(std::string("signalfd: ") + std::strerror(errno));
   if (const auto watched = watch(signals_, EPOLLIN, kSignalTag); !watched) return watched;
   if (const auto watched = watch(transport_.fd(), EPOLLIN, kLcmTag); !watched) return watched;
-  transport_.subscribe<command_t>(
+  return transport_.subscribe<command_t>(
       command_channel_, [this](const command_t& command) { core_.command(now_us(), command); });
-  return {};
 }
 
 Result<void> EventLoop::run() {
@@ -106,10 +105,9 @@ Result<void> EventLoop::run() {
       }
     }
   }
-  if (!core_.at_rest())
-    spdlog::error("not all motors are known to be at rest; MCUs run down by themselves");
   log_cpu_share();
-  return {};
+  if (core_.at_rest()) return {};
+  return fail("not all motors are known to be at rest; their MCUs run them down by themselves");
 }
 
 std::int64_t EventLoop::next_wake_us() const {
@@ -187,7 +185,7 @@ void EventLoop::handle_signal(std::int64_t now) {
   if (info.ssi_signo == SIGHUP) return reload_tables();
   spdlog::info("{}: ramping all motors down", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
   core_.shut_down(now);
-  shut_down_by_us_ = now + kShutDownUs;
+  shut_down_by_us_ = core_.rest_by_us(now) + kShutDownSlackUs;
 }
 
 void EventLoop::reload_tables() {
@@ -227,11 +225,22 @@ void EventLoop::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
 }
 
 void EventLoop::reply(const reply_t& reply) {
-  transport_.publish(reply_channel_, reply);
+  check_published(transport_.publish(reply_channel_, reply));
 }
 
 void EventLoop::state(const state_t& state) {
-  transport_.publish(state_channel_, state);
+  check_published(transport_.publish(state_channel_, state));
+}
+
+// Said once when it begins and once when it is over, not twenty times a second.
+void EventLoop::check_published(const Result<void>& published) {
+  if (mute_ == !published) return;
+  mute_ = !published;
+  if (mute_) {
+    spdlog::error("LCM does not take messages: {}; clients hear nothing", published.error().text());
+  } else {
+    spdlog::info("LCM takes messages again");
+  }
 }
 
 void EventLoop::move_log(const std::string& json_line) {

@@ -28,9 +28,9 @@ class EventLoop : private Outputs {
 
  private:
   static constexpr std::int64_t kReopenUs = 500'000;
-  // A ramp-down of the longest table fits; an MCU that does not answer must not keep the daemon
+  // Beyond the time that the ramp-downs need: an MCU that does not answer must not keep the daemon
   // from ending.
-  static constexpr std::int64_t kShutDownUs = 15'000'000;
+  static constexpr std::int64_t kShutDownSlackUs = 3'000'000;
 
   struct Port {
     std::optional<SerialPort> serial;
@@ -49,6 +49,7 @@ class EventLoop : private Outputs {
   void update_write_interest(std::size_t bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
+  void check_published(const Result<void>& published);
 
   // Outputs
   void send(std::size_t bus, std::span<const std::uint8_t> bytes) override;
@@ -68,6 +69,7 @@ class EventLoop : private Outputs {
   std::string state_channel_;
   std::string reply_channel_;
   std::string command_channel_;
+  bool mute_ = false;  // LCM takes nothing
   int epoll_ = -1;
   int signals_ = -1;
   std::int64_t started_us_ = 0;

@@ -1,6 +1,7 @@
 #include "daemon/move_log.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -28,6 +29,11 @@ Result<void> MoveLog::append(const std::string& line) {
   const std::string text = line + "\n";
   const ssize_t n = ::write(fd_, text.data(), text.size());
   if (n == static_cast<ssize_t>(text.size())) return {};
+  // Half a line would spoil the next one too.
+  struct stat status {};
+  if (n > 0 && ::fstat(fd_, &status) == 0) {
+    static_cast<void>(::ftruncate(fd_, status.st_size - n));
+  }
   return fail(Error{
       .message = std::string("a line was lost: ") + (n < 0 ? std::strerror(errno) : "disk full"),
       .file = path_});

@@ -45,7 +45,7 @@ typedef struct bushd_mcu_config {
   uint16_t boot_number;  // differs from that of the boot before
   int16_t* queue;        // queue_ticks x motors displacements
   uint16_t
-      queue_ticks;  // 8 .. 32768, a power of two (absolute tick numbers then wrap without a seam)
+      queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint16_t* codes;  // table memory
   uint16_t code_count;
 } bushd_mcu_config;

@@ -2,7 +2,7 @@
 // rest. A frame is taken whole or not at all:
 // - a start is of the MCU's epoch; its motors are at rest at known_until and start there or later
 // - a continuation is of the MCU's epoch; its motors move at known_until and it joins there
-// - a replacement is of epoch + 1; from its first tick on it stands instead of what was queued
+// - a replacement opens a later epoch; from its first tick on it stands instead of what was queued
 // Ticks before known_until that are not replaced are duplicates and left alone. That a start says
 // so is what tells a lost start from a motor that need not move yet.
 #include <string.h>
@@ -60,7 +60,8 @@ static bushd_status check_ticks(const bushd_mcu* mcu, const bushd_ticks* ticks) 
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
   if (fine != (mcu->format == BUSHD_FORMAT_FINE)) return BUSHD_E_FORMAT;
   if (replace && ticks->delays == NULL) return BUSHD_E_FORMAT;
-  if (ticks->epoch != (uint8_t)(mcu->epoch + (replace ? 1u : 0u))) return BUSHD_E_EPOCH;
+  const uint8_t ahead = (uint8_t)(ticks->epoch - mcu->epoch);
+  if (replace ? ahead == 0 || ahead > INT8_MAX : ahead != 0) return BUSHD_E_EPOCH;
   // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once
   // both ends are checked; a frame so old that it holds nothing but past ticks is done with here.
   const int32_t first = ticks_after(ticks->first_tick, mcu->tick);

@@ -135,7 +135,7 @@ enum {
 
 // Displacements of `count` ticks for the motors in `mask`. Only these motors are touched.
 typedef struct bushd_ticks {
-  uint8_t epoch;  // stream epoch; a replacement carries the MCU's epoch + 1 and so opens the next
+  uint8_t epoch;  // stream epoch; a replacement carries a later one than the MCU's: it opens it
   uint8_t flags;
   uint32_t first_tick;
   uint8_t count;                 // >= 1

@@ -20,6 +20,7 @@ constexpr std::int64_t kReplaceLeadUs =
 constexpr std::int64_t kMaxBacklogUs = 4'000;  // bytes handed to the port but not yet on the line
 constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be told the time
 constexpr std::int64_t kStreamWakeUs = 5'000;
+constexpr std::uint8_t kMaxEpochsAhead = 100;  // MCUs take up to 127
 
 std::int64_t line_us(std::uint32_t baud, std::size_t bytes) {
   return static_cast<std::int64_t>(bytes) * 10'000'000 / baud + 1;
@@ -111,6 +112,8 @@ void Master::reconfigure(std::size_t mcu, McuSetup setup) {
 }
 
 void Master::control(std::size_t mcu, std::uint8_t actions) {
+  if (actions & BUSHD_CONTROL_ENABLE) mcus_[mcu].powered = true;
+  if (actions & BUSHD_CONTROL_DISABLE) mcus_[mcu].powered = false;
   const bushd_control message = {actions};
   Request request{.type = BUSHD_MSG_CONTROL, .payload = std::vector<std::uint8_t>(1)};
   bushd_encode_control(&message, request.payload.data());
@@ -188,13 +191,22 @@ bool Master::send_due_replacement(std::int64_t now_us) {
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     Mcu& mcu = mcus_[i];
     if (mcu.replacing == 0 || mcu.replaced != 0) continue;
-    const auto motors = static_cast<std::uint8_t>(std::popcount(mcu.replacing));
+    const std::uint16_t mask = std::exchange(mcu.replacing, std::uint16_t{0});
+    if (too_late(mcu.replace_at, tick_at(now_us))) {
+      events_.push_back({.kind = Event::Kind::kReplaceFailed, .mcu = i, .motors = mask});
+      continue;
+    }
+    const auto motors = static_cast<std::uint8_t>(std::popcount(mask));
     const bool fine = setup_.format == BUSHD_FORMAT_FINE;
     const unsigned count =
         std::min<unsigned>(bushd_ticks_capacity(motors, fine, true), kMaxTicksPerFrame);
-    ++mcu.epoch;
-    send_ticks(now_us, i, mcu.replacing, mcu.replace_at, count, BUSHD_TICKS_REPLACE);
-    mcu.replaced = std::exchange(mcu.replacing, std::uint16_t{0});
+    // Another epoch at each try: frames of one that failed may still be on their way.
+    if (static_cast<std::uint8_t>(mcu.newest_epoch - mcu.epoch) >= kMaxEpochsAhead) {
+      mcu.newest_epoch = mcu.epoch;
+    }
+    mcu.epoch = ++mcu.newest_epoch;
+    send_ticks(now_us, i, mask, mcu.replace_at, count, BUSHD_TICKS_REPLACE);
+    mcu.replaced = mask;
     mcu.poll_now = true;
     return true;
   }
@@ -230,22 +242,23 @@ bool Master::send_due_poll(std::int64_t now_us) {
 bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced) {
   if (!clock_.valid()) return false;
   const Tick now = tick_at(now_us);
-  std::size_t neediest = mcus_.size();
-  Tick least = INT64_MAX;
+  // The neediest first; one whose queue is full must not keep the others waiting.
+  std::vector<std::pair<Tick, std::size_t>> needy;
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     const Mcu& mcu = mcus_[i];
     if (mcu.view.phase != McuPhase::kOnline || (only_replaced && mcu.replaced == 0)) continue;
+    Tick next = INT64_MAX;
     for (const Stream& stream : mcu.stream) {
-      if (stream.active && !stream.finished && stream.next < least) {
-        least = stream.next;
-        neediest = i;
-      }
+      if (stream.active && !stream.finished) next = std::min(next, stream.next);
     }
+    if (next != INT64_MAX) needy.emplace_back(next, i);
   }
-  if (neediest == mcus_.size()) return false;
-  const Tick depth =
-      mcus_[neediest].view.identity.queue_ticks - 4;  // its tick counter runs on meanwhile
-  return send_ticks_of(now_us, neediest, now + std::min(ticks_in(lead_us), depth));
+  std::sort(needy.begin(), needy.end());
+  return std::any_of(needy.begin(), needy.end(), [&](const auto& entry) {
+    // Its ticks run on meanwhile.
+    const Tick depth = mcus_[entry.second].view.identity.queue_ticks - 4;
+    return send_ticks_of(now_us, entry.second, now + std::min(ticks_in(lead_us), depth));
+  });
 }
 
 // One frame for the motors of an MCU whose next tick is the oldest. Motors that start, start later
@@ -253,15 +266,15 @@ bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_re
 bool Master::send_ticks_of(std::int64_t now_us, std::size_t index, Tick horizon) {
   Mcu& mcu = mcus_[index];
   Tick first = INT64_MAX;
-  for (const Stream& stream : mcu.stream) {
-    if (stream.active && !stream.finished) first = std::min(first, stream.next);
+  for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if (sendable(mcu, m)) first = std::min(first, mcu.stream[m].next);
   }
   std::uint16_t starting = 0;
   std::uint16_t moving = 0;
   Tick join = INT64_MAX;
   for (unsigned i = 0; i < BUSHD_MOTORS_PER_MCU; ++i) {
     const Stream& stream = mcu.stream[i];
-    if (!stream.active || stream.finished) continue;
+    if (!sendable(mcu, i)) continue;
     if (stream.next != first) {
       join = std::min(join, stream.next);
     } else {

@@ -140,11 +140,15 @@ class Master {
     std::deque<Request>
         script;             // requests to make in this order, each acknowledged before the next
     bool scripted = false;  // while connecting: the script has been written
+    // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
+    // switched off stay off through restarts and lost links: there may be hands in the mechanism.
+    std::optional<bool> powered;
     std::int64_t poll_due_us = 0;
     std::int64_t retry_due_us = 0;
-    int silent = 0;  // requests in a row without an answer
-    std::uint8_t epoch = 0;
-    std::uint16_t replacing = 0;  // motors of a replacement to be sent
+    int silent = 0;                 // requests in a row without an answer
+    std::uint8_t epoch = 0;         // of frames
+    std::uint8_t newest_epoch = 0;  // of all replacements, whether taken or not
+    std::uint16_t replacing = 0;    // motors of a replacement to be sent
     Tick replace_at = 0;
     std::uint16_t replaced = 0;  // motors of a replacement sent and not yet confirmed
     bool poll_now = false;
@@ -161,6 +165,12 @@ class Master {
             std::span<const std::uint8_t> payload);
   void ask(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
            std::span<const std::uint8_t> payload, std::size_t reply_payload);
+  // Of a motor whose replacement still waits, the next ticks belong to a plan that the MCU does not
+  // know.
+  static bool sendable(const Mcu& mcu, unsigned motor) {
+    const Stream& stream = mcu.stream[motor];
+    return stream.active && !stream.finished && (mcu.replacing >> motor & 1) == 0;
+  }
   bool send_next(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
   bool send_wanted_poll(std::int64_t now_us);
@@ -179,6 +189,9 @@ class Master {
   void handle_identity(std::int64_t now_us, std::size_t mcu, const bushd_identity& identity);
   void handle_acknowledgement(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
                               std::uint8_t status);
+  void follow_replacements(std::size_t mcu);
+  // An MCU in tick `now` or later can no longer change tick `at`.
+  static bool too_late(Tick at, Tick now) { return at < now + 2; }
   void follow_streams(std::size_t mcu);
   void answered(std::int64_t now_us);
   void handle_timeout(std::int64_t now_us);

@@ -1,14 +1,17 @@
 // Receiving: what an answer, or its absence, means for an MCU and its streams.
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "link/master.h"
 
 namespace bushd::link {
 namespace {
 
-constexpr int kMaxSilent = 10;                       // unanswered requests in a row: about 0.4 s
-constexpr std::int64_t kRetryUs = 500'000;           // between two looks for a silent MCU
+constexpr int kMaxSilent = 10;  // unanswered requests in a row: about 0.4 s
+constexpr unsigned kMinQueueTicks = 2 * kMaxTicksPerFrame;  // one runs while the next arrives
+constexpr std::int64_t kMinQueueUs = 150'000;               // two lost answers and a frame
+constexpr std::int64_t kRetryUs = 500'000;                  // between two looks for a silent MCU
 constexpr std::int64_t kRefusedRetryUs = 2'000'000;  // for an MCU that does not fit: no hurry
 constexpr std::int64_t kClockJumpUs = 400'000;  // more than any latency: the bus's time began anew
 
@@ -95,8 +98,7 @@ void Master::handle_timeout(std::int64_t now_us) {
   if (++mcu.silent >= kMaxSilent) {
     go_offline(index, "does not answer", now_us + kRetryUs);
   } else if (type == BUSHD_MSG_POLL) {
-    // Soon again; but only a replacement whose fate is unknown goes before queues that run low.
-    mcu.poll_now = mcu.replaced != 0;
+    // Soon again, but after queues that run low: a dead MCU must not starve the others.
     mcu.poll_due_us = now_us;
   }
 }
@@ -123,7 +125,13 @@ std::string Master::unfit(const Mcu& mcu, const bushd_identity& identity) const 
            " table codes, but its motors' tables need " + std::to_string(codes) +
            ": use shorter tables or fewer on this MCU";
   }
-  if (identity.queue_ticks < 16) return "has a queue of fewer than 16 ticks";
+  const std::int64_t queue_us =
+      static_cast<std::int64_t>(identity.queue_ticks) * setup_.tick_ns / 1000;
+  if (identity.queue_ticks < kMinQueueTicks || queue_us < kMinQueueUs) {
+    return "has a queue of " + std::to_string(identity.queue_ticks) + " ticks, " +
+           std::to_string(queue_us / 1000) + " ms; needed are " + std::to_string(kMinQueueTicks) +
+           " ticks and " + std::to_string(kMinQueueUs / 1000) + " ms: use a longer tick";
+  }
   return {};
 }
 
@@ -190,7 +198,9 @@ void Master::write_script(Mcu& mcu) const {
     const bushd_assign assign = {m, static_cast<std::uint8_t>(mcu.setup.table_of_motor[m])};
     add(BUSHD_MSG_ASSIGN, [&](std::uint8_t* p) { return bushd_encode_assign(&assign, p); });
   }
-  const bushd_control control = {BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_ENABLE};
+  std::uint8_t actions = BUSHD_CONTROL_CLEAR_FAULTS;
+  if (mcu.powered.value_or(true)) actions |= BUSHD_CONTROL_ENABLE;
+  const bushd_control control = {actions};
   add(BUSHD_MSG_CONTROL, [&](std::uint8_t* p) { return bushd_encode_control(&control, p); });
 }
 
@@ -237,14 +247,20 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     view.known_until[m] = view.tick + std::max<std::int16_t>(ahead, 0);
   }
   if (view.phase == McuPhase::kConnecting) {
+    if (!mcu.powered) {
+      const bool switched_off =
+          (report.flags & BUSHD_FLAG_CONFIGURED) != 0 && (report.flags & BUSHD_FLAG_ENABLED) == 0;
+      mcu.powered = !switched_off;
+    }
     // A motor may still be running down from before; tables are for motors at rest.
     if (!mcu.scripted && report.moving == 0) {
       write_script(mcu);
       mcu.scripted = true;
-    } else if (mcu.scripted && mcu.script.empty() && in_step && report.state != BUSHD_STATE_BUSY) {
+    } else if (mcu.scripted && mcu.script.empty() && in_step &&
+               (report.state != BUSHD_STATE_BUSY || !*mcu.powered)) {
       view.phase = McuPhase::kOnline;
       view.detail.clear();
-      mcu.epoch = report.epoch;
+      mcu.epoch = mcu.newest_epoch = report.epoch;
       events_.push_back({Event::Kind::kOnline, index});
     }
     return;
@@ -253,21 +269,32 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     go_offline(index, "lost its configuration", now_us);
     return;
   }
-  if (mcu.replaced != 0 && report.epoch != mcu.epoch) {
-    // What was queued before stays in force, whatever has been sent since. If not even the start
-    // has come, it has to be sent again, as one.
-    mcu.epoch = report.epoch;
-    for (unsigned m = 0; m < report.motor_count; ++m) {
-      if ((mcu.replaced >> m & 1) == 0) continue;
-      mcu.stream[m].next = std::max(view.known_until[m], mcu.stream[m].start);
-      mcu.stream[m].finished = false;
-      mcu.stream[m].delay_sent.reset();
-    }
-    events_.push_back({.kind = Event::Kind::kReplaceFailed, .mcu = index, .motors = mcu.replaced});
-  }
-  mcu.replaced = 0;
+  follow_replacements(index);
   follow_streams(index);
   events_.push_back({Event::Kind::kReport, index});
+}
+
+// A replacement was taken if the MCU is in the epoch that it opened.
+void Master::follow_replacements(std::size_t index) {
+  Mcu& mcu = mcus_[index];
+  std::uint16_t failed = mcu.view.report.epoch == mcu.epoch ? std::uint16_t{0} : mcu.replaced;
+  mcu.replaced = 0;
+  mcu.epoch = mcu.view.report.epoch;
+  // What was queued before stays in force, whatever has been sent since. If not even the start has
+  // come, it has to be sent again, as one.
+  for (unsigned m = 0; m < mcu.view.report.motor_count; ++m) {
+    if ((failed >> m & 1) == 0) continue;
+    mcu.stream[m].next = std::max(mcu.view.known_until[m], mcu.stream[m].start);
+    mcu.stream[m].finished = false;
+    mcu.stream[m].delay_sent.reset();
+  }
+  // One not even sent must be known to have failed before its tick is taken for executed.
+  if (mcu.replacing != 0 && too_late(mcu.replace_at, mcu.view.tick)) {
+    failed |= std::exchange(mcu.replacing, std::uint16_t{0});
+  }
+  if (failed != 0) {
+    events_.push_back({.kind = Event::Kind::kReplaceFailed, .mcu = index, .motors = failed});
+  }
 }
 
 // All frames sent before the poll were handled before its answer was made: what is not known is

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace bushd::motion {
 namespace {
@@ -9,6 +10,13 @@ namespace {
 constexpr std::size_t kBlock = 64;
 
 }  // namespace
+
+double Axis::duration_ticks(std::int64_t steps) const {
+  bushd_run run;
+  bushd_run_start(&run, table_, static_cast<std::uint32_t>(steps < 0 ? -steps : steps), 1);
+  const double ns = static_cast<double>(bushd_run_units_left(&run)) * table_->time_unit_ns;
+  return std::ceil(ns / tick_ns_);
+}
 
 void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start) {
   busy_ = true;

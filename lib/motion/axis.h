@@ -19,8 +19,15 @@ class Axis {
   Axis(const bushd_table& table, std::uint32_t tick_ns, bushd_format format)
       : table_(&table), tick_ns_(tick_ns), format_(format) {}
 
+  // How long a move of `steps` takes, in ticks, rounded up; for any number of steps.
+  double duration_ticks(std::int64_t steps) const;
+
+  // Longer moves are beyond what tick numbers and times are made for: a month of the shortest
+  // ticks, years of the longest.
+  static constexpr double kMaxDurationTicks = 1 << 30;
+
   // From rest at `from_steps`, by `steps` (either sign), time 0 at the beginning of tick `start`.
-  // Precondition: !busy(), |steps| < 2^31.
+  // Precondition: !busy(), |steps| < 2^31, duration_ticks(steps) <= kMaxDurationTicks.
   void start(std::int64_t from_steps, std::int64_t steps, Tick start);
 
   // From the beginning of tick `at` on: the running step goes on, then the fewest steps to rest. At

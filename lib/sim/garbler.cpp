@@ -46,7 +46,7 @@ std::span<const Garbler::Piece> Garbler::pass(std::span<const std::uint8_t> byte
     if (!work_.empty()) garble(what, work_);
   }
   pending_.clear();
-  remember(bytes);
+  remember(work_);
   pieces_.resize(1);
   pieces_[0].bytes = work_;
   if (gap_ && !work_.empty()) {

@@ -181,6 +181,40 @@ TEST_P(Faults, McuResetMakesPositionsUncertainUntilSet) {
   EXPECT_EQ(lab.shaft_steps("m01"), before + 25);
 }
 
+TEST_P(Faults, StopForADeadMcuDoesNotStarveTheOthers) {
+  Lab lab(hall(2, 2, GetParam()));
+  lab.connect();
+  const auto dying = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+  const auto healthy = lab.send(command_t::MOVE_RELATIVE, {"m03"}, {5000});
+  lab.run_for(1.3);
+  lab.bus(0).reboot(0, 3'600'000'000'000);
+  lab.run_for(0.05);
+  lab.send(command_t::STOP, {"m01"});
+  EXPECT_EQ(lab.wait(dying).result, "link");
+  const reply_t result = lab.wait(healthy);
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_EQ(lab.shaft_steps("m03"), 5000);
+}
+
+TEST_P(Faults, DriversSwitchedOffStayOff) {
+  Lab lab(hall(1, 2, GetParam()));
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(command_t::DISABLE, {})).result, "done");
+  const auto online = [&] {
+    return lab.has_state("hall:1") && lab.state_of("hall:1").detail == "drivers disabled";
+  };
+  lab.unplug(0);
+  lab.run_for(0.3);
+  lab.plug(0);
+  EXPECT_TRUE(lab.run_until(online, 10)) << "after a lost port";
+  EXPECT_FALSE(lab.motor("m01").enabled);
+  lab.restart_daemon();
+  EXPECT_TRUE(lab.run_until(online, 10)) << "after a restart of the daemon";
+  EXPECT_FALSE(lab.motor("m01").enabled);
+  EXPECT_EQ(lab.wait(lab.send(command_t::ENABLE, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {25})).result, "reached");
+}
+
 TEST_P(Faults, NoiseFromTheLineDoesNoHarm) {
   Lab lab(hall(1, 1, GetParam()));
   lab.connect();

@@ -8,11 +8,12 @@
 
 namespace bushd::test {
 
-Lab::Lab(const std::string& toml, sim::EdgeSink* sink) {
+Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink) {
   directory_ = std::filesystem::temp_directory_path() / ("bushd-lab-" + std::to_string(::getpid()));
   std::filesystem::create_directories(directory_);
   const auto path = directory_ / "bushd.toml";
   std::ofstream(path) << toml;
+  if (!glacier.empty()) write_file("glacier.toml", glacier);
   auto config = config::load(path);
   if (!config) throw std::runtime_error(config.error().text());
   config_ = std::move(*config);
@@ -60,7 +61,7 @@ Result<void> Lab::reload_tables() {
   const auto fresh = config::load(directory_ / "bushd.toml");
   if (!fresh) return fail(fresh.error());
   auto reloaded = core_->reload_tables(*fresh);
-  core_->step(now_us());  // publishes that MCUs are configured anew
+  run_for(0.006);  // until it is published that MCUs are configured anew
   return reloaded;
 }
 
@@ -153,7 +154,7 @@ bool Lab::has_result(std::int64_t number) const {
 
 reply_t Lab::wait(std::int64_t number, double limit_s) {
   EXPECT_TRUE(run_until([&] { return has_result(number); }, limit_s)) << "no result in time";
-  core_->step(now_us());  // publishes what has changed
+  run_for(0.006);  // the state is published 5 ms after the last at the earliest
   return last_reply(number);
 }
 

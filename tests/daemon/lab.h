@@ -19,7 +19,9 @@ namespace bushd::test {
 class Lab : public daemon::Outputs {
  public:
   // `toml` as in bushd.toml; its ports are only names here. Every MCU of it exists.
-  explicit Lab(const std::string& toml, sim::EdgeSink* sink = nullptr);
+  // `glacier` is the text of a table file of that name beside it, if not empty.
+  explicit Lab(const std::string& toml, const std::string& glacier = {},
+               sim::EdgeSink* sink = nullptr);
   ~Lab() override;
 
   // Runs until `done` holds (checked after every event) or `limit_s` has passed; returns whether it

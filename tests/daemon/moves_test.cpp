@@ -158,6 +158,16 @@ TEST(Moves, RefusalsNameMotorAndCause) {
   EXPECT_EQ(lab.shaft_steps("m02"), 0) << "a group move is refused as a whole";
 }
 
+TEST(Moves, AMoveOfManyYearsIsRefused) {
+  Lab lab(hall(1, 1, "fine", "glacier"),
+          "name = \"glacier\"\ntime_unit_ns = 1000000000\naccel = [60000]\n");
+  lab.connect();
+  const reply_t reply =
+      lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {2'000'000'000}));
+  EXPECT_EQ(reply.phase, reply_t::REFUSED);
+  EXPECT_THAT(reply.reason, testing::HasSubstr("days"));
+}
+
 TEST(Moves, DisabledDriversRefuseMovesUntilEnabled) {
   Lab lab(hall(1, 1));
   lab.connect();

@@ -2,10 +2,41 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <vector>
+
 #include "daemon/lab.h"
 
 namespace bushd::test {
 namespace {
+
+// The frames of a write, each with the delimiter that ends it; a leading delimiter goes with the
+// first.
+std::vector<std::vector<std::uint8_t>> frames_of(const std::vector<std::uint8_t>& bytes) {
+  std::vector<std::vector<std::uint8_t>> frames(1);
+  for (const std::uint8_t byte : bytes) {
+    frames.back().push_back(byte);
+    if (byte == 0 && frames.back().size() > 1) frames.emplace_back();
+  }
+  frames.pop_back();
+  return frames;
+}
+
+// The ticks of a frame, if it holds ticks; `decoder` keeps their bytes.
+std::optional<bushd_ticks> ticks_in(const std::vector<std::uint8_t>& wire,
+                                    bushd_receiver& decoder) {
+  decoder = {};
+  for (const std::uint8_t byte : wire) {
+    bushd_frame frame;
+    bushd_ticks ticks;
+    if (bushd_receive_byte(&decoder, byte, &frame) == BUSHD_RECEIVE_FRAME &&
+        frame.type == BUSHD_MSG_TICKS &&
+        bushd_decode_ticks(frame.payload, frame.payload_size, &ticks) == BUSHD_OK) {
+      return ticks;
+    }
+  }
+  return std::nullopt;
+}
 
 class Regressions : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Formats, Regressions, testing::Values("fine", "coarse"),
@@ -92,6 +123,64 @@ TEST_P(Regressions, MoveWhileDriversAreBeingDisabled) {
   EXPECT_EQ(lab.last_reply(move).result, "refused");
   EXPECT_THAT(lab.last_reply(move).reason, testing::HasSubstr("being disabled"));
   EXPECT_EQ(lab.wait(disable).result, "done");
+}
+
+// A second stop while nobody knows yet whether the first was taken: its motor goes on by the plan
+// that the MCU has, until its own replacement is out.
+TEST_P(Regressions, StopWhileAnotherIsNotConfirmed) {
+  for (int lost = 1; lost <= 4; ++lost) {
+    Lab lab(hall(1, 2, GetParam()));
+    lab.connect();
+    const auto first = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+    const auto second = lab.send(command_t::MOVE_RELATIVE, {"m02"}, {9000});
+    lab.run_for(1.3);
+    int writes = 0;
+    lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) {
+      ++writes;
+      return writes == 1 || writes > 1 + lost;
+    };
+    lab.send(command_t::STOP, {"m01"});
+    lab.run_for(0.006);
+    lab.send(command_t::STOP, {"m02"});
+    EXPECT_EQ(lab.wait(first).result, "stopped") << lost << " lost";
+    const reply_t result = lab.wait(second);
+    EXPECT_EQ(result.result, "stopped") << lost << " lost: " << result.reason;
+    EXPECT_EQ(lab.shaft_steps("m02"), result.position_steps.at(0));
+  }
+}
+
+// A stop is lost, what followed it is not, and comes once more after the second try: it must not be
+// taken for what follows that.
+TEST_P(Regressions, FollowersOfALostStopComeAgainAfterTheNext) {
+  Lab lab(hall(1, 1, GetParam()));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+  lab.run_for(1.3);
+  std::vector<std::uint8_t> followers;
+  int replacements = 0;
+  lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
+    const auto frames = frames_of(bytes);
+    bytes.clear();
+    for (const auto& frame : frames) {
+      bushd_receiver decoder;
+      const auto ticks = ticks_in(frame, decoder);
+      const bool replaces = ticks && (ticks->flags & BUSHD_TICKS_REPLACE) != 0;
+      replacements += replaces;
+      if (replaces && replacements == 1) continue;
+      if (ticks && replacements == 1) followers.insert(followers.end(), frame.begin(), frame.end());
+      bytes.insert(bytes.end(), frame.begin(), frame.end());
+      if (replaces && replacements == 2) {
+        bytes.insert(bytes.end(), followers.begin(), followers.end());
+      }
+    }
+    return true;
+  };
+  lab.send(command_t::STOP, {"m01"});
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "stopped") << result.reason;
+  EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
+  EXPECT_EQ(replacements, 2);
+  EXPECT_FALSE(followers.empty());
 }
 
 }  // namespace

@@ -13,9 +13,11 @@ TEST_P(Replacement, TakesTheTailAndRaisesTheEpoch) {
   ASSERT_EQ(rig.take(ones(kStart, start, 40)), BUSHD_OK);
   rig.pass(10);
   Ticks replacement = ones(kReplace, start + 20, 3, 0);
-  EXPECT_EQ(rig.take(replacement), BUSHD_E_EPOCH) << "it must open the next epoch";
-  replacement.epoch = 2;
-  EXPECT_EQ(rig.take(replacement), BUSHD_E_EPOCH);
+  EXPECT_EQ(rig.take(replacement), BUSHD_E_EPOCH) << "it must open a later epoch";
+  for (const int epoch : {128, 200, 255}) {
+    replacement.epoch = static_cast<std::uint8_t>(epoch);
+    EXPECT_EQ(rig.take(replacement), BUSHD_E_EPOCH) << epoch;
+  }
   replacement.epoch = 1;
   replacement.first = rig.first_open() - 1;
   EXPECT_EQ(rig.take(replacement), BUSHD_E_LATE) << "that tick is prepared";
@@ -31,6 +33,19 @@ TEST_P(Replacement, TakesTheTailAndRaisesTheEpoch) {
   expect_position(0, 23);
   rig.run_plan(plan(-23), 0);
   expect_position(0, 0);
+}
+
+TEST_P(Replacement, OpensAnyEpochThatIsLater) {
+  int epoch = 0;
+  for (const int ahead : {2, 127, 127, 60}) {
+    ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 4)), BUSHD_OK);
+    Ticks replacement = ones(kReplace, rig.first_open() + 1, 1, 0);
+    replacement.epoch = static_cast<std::uint8_t>(epoch + ahead);
+    EXPECT_EQ(rig.take(replacement), BUSHD_OK) << epoch << " + " << ahead;
+    epoch = rig.poll().epoch;
+    EXPECT_EQ(epoch, replacement.epoch);
+    rig.pass_until_rest();
+  }
 }
 
 TEST_P(Replacement, OfTheWholeQueueFromTheFirstOpenTick) {

@@ -87,7 +87,7 @@ INSTANTIATE_TEST_SUITE_P(Identities, Unfit,
                                                 {"memory for 349", "need 350"}},
                                          Misfit{"Queue",
                                                 [](bushd_identity& i) { i.queue_ticks = 8; },
-                                                {"queue of fewer than 16"}}),
+                                                {"queue of 8 ticks", "use a longer tick"}}),
                          [](const auto& misfit) { return misfit.param.name; });
 
 TEST_P(Unfit, IsSaidAndAskedAgainWithoutHurry) {

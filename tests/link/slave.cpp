@@ -186,7 +186,8 @@ void FakeBus::take_ticks(Slave& slave, const Heard& frame) {
   ASSERT_EQ(bushd_decode_ticks(frame.payload.data(), frame.payload.size(), &ticks), BUSHD_OK);
   const bool replace = ticks.flags & BUSHD_TICKS_REPLACE;
   const bool start = ticks.flags & BUSHD_TICKS_START;
-  bool good = ticks.epoch == static_cast<std::uint8_t>(slave.epoch + replace) && slave.faults == 0;
+  const auto ahead = static_cast<std::int8_t>(ticks.epoch - slave.epoch);
+  bool good = (replace ? ahead > 0 : ahead == 0) && slave.faults == 0;
   bool news = false;
   for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((ticks.mask >> m & 1) == 0) continue;

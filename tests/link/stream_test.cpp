@@ -161,7 +161,7 @@ TEST_P(Stream, LostReplacementIsToldAndTheOldPlanStandsUntilThen) {
   bus.source.displacement = [again](std::uint8_t m, Tick t) { return value(m, t, t >= again); };
   bus.master->replace(0, 3, again);
   bus.run_for(1'000'000);
-  EXPECT_EQ(bus.slaves[0].epoch, 1);
+  EXPECT_EQ(bus.slaves[0].epoch, 2) << "what followed the first may still be on its way";
   expect_taken(0, start, again, 0);
   expect_taken(0, again, again + 350, 1);
   EXPECT_EQ(bus.count(Event::Kind::kReplaceFailed), 1);
