@@ -22,7 +22,7 @@ inline constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
 inline constexpr std::int64_t kBitsPerByte = 10;
 
 struct Collision {
-  TimeNs time_ns;  // when the second one began
+  TimeNs time_ns;         // when the second one began
   std::size_t talker[2];  // in the order in which their bytes began
 };
 
