@@ -2,18 +2,17 @@
 
 #include "commands.h"
 #include "open_table.h"
-#include "tables/table_file.h"
 
 namespace bushtab {
 
-int check(const std::vector<std::string>& files) {
+int check(const std::vector<std::string>& tables) {
   int result = kDone;
-  for (const std::string& file : files) {
-    const auto table = bushd::tables::load(file);
-    if (table) {
-      fmt::print("{}: good\n", file);
+  for (const std::string& table : tables) {
+    const auto opened = open_table(table);
+    if (opened) {
+      fmt::print("{}: good\n", table);
     } else {
-      result = refuse(table.error());
+      result = refuse(opened.error());
     }
   }
   return result;

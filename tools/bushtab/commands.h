@@ -16,8 +16,7 @@ inline constexpr int kRefused = 1;
 // `table` is a file's path (it contains '/', ends in ".toml" or names a file that is there) or the
 // name of a shipped table.
 int show(const std::string& table, bool json);
-
-int check(const std::vector<std::string>& files);
+int check(const std::vector<std::string>& tables);
 
 struct Expansion {
   std::string table;

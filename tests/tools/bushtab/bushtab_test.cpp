@@ -151,6 +151,15 @@ TEST(BushtabExpand, WrongUsageHasAnExitCodeOfItsOwn) {
   }
 }
 
+TEST(BushtabExpand, FractionsOfAStepAreToldApartFromTooManySteps) {
+  const Outcome fraction =
+      bushtab("expand --table bushd2-constant --steps 5.5 --tick-us 2560 --format fine");
+  EXPECT_EQ(fraction.exit_code, 2);
+  EXPECT_THAT(fraction.err, HasSubstr("--steps: 5.5 is not a whole number"));
+  const Outcome many = bushtab(expand_arguments("bushd2-constant", 2147483648, 2560, "fine"));
+  EXPECT_THAT(many.err, HasSubstr("2147483648 not in range"));
+}
+
 TEST(BushtabExpand, FullDiskIsAnError) {
   const std::string arguments = expand_arguments("bushd2-constant", 100, 2560, "fine");
   const int status = std::system((BUSHTAB " " + arguments + " >/dev/full 2>/dev/null").c_str());
@@ -161,6 +170,13 @@ TEST(BushtabCheck, GoodFilesPass) {
   const Outcome outcome = bushtab("check " BUSHD_SOURCE_DIR "/tables/*.toml");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("bushd2-resonance.toml: good\n"));
+}
+
+TEST(BushtabCheck, TakesNamesOfShippedTables) {
+  const Outcome outcome = bushtab("check bushd2-constant nosuch");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.out, "bushd2-constant: good\n");
+  EXPECT_THAT(outcome.err, HasSubstr("there is no table \"nosuch\""));
 }
 
 TEST(BushtabCheck, EveryBadFileIsNamedWithLineAndKey) {
