@@ -101,8 +101,8 @@ void Client::drain() {
 Error Client::no_daemon() const {
   return {
       .message = fmt::format(
-          "no bushd answers on channels {0}_... of {1}. Is it running (systemctl status bushd), "
-          "with url = \"{1}\" and prefix = \"{0}\" in [lcm] of its configuration?",
+          "no bushd answers on channels {0}_... of {1}. Start `bushd --config FILE`, with url = "
+          "\"{1}\" and prefix = \"{0}\" in [lcm] of that file",
           options_.prefix, options_.url)};
 }
 

@@ -117,8 +117,8 @@ int run(int argc, char** argv) {
   status->add_flag("--json", arguments.json, "As JSON");
   add_timeout(status, arguments);
 
-  CLI::App* move =
-      add_command(app, arguments, "move", "Moves motors, all starting in the same tick");
+  CLI::App* move = add_command(app, arguments, "move",
+                               "Moves motors, those of one bus starting in the same tick");
   move->footer(
       "bushctl move [--wait] NAME STEPS [NAME STEPS...]            by so many steps\n"
       "bushctl move [--wait] NAME --to STEPS [NAME --to STEPS...]  to these positions\n"

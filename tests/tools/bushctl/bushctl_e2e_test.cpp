@@ -150,6 +150,7 @@ TEST(Bushctl, WithoutDaemonSaysSoAndFails) {
   const Ran status = bushctl({"status", "--timeout-s", "0.1"});
   EXPECT_EQ(status.code, 1);
   EXPECT_THAT(status.err, HasSubstr("no bushd answers"));
+  EXPECT_THAT(status.err, HasSubstr("bushd --config FILE"));
   const Ran move = bushctl({"move", "theta", "5"});
   EXPECT_EQ(move.code, 1);
   EXPECT_THAT(move.err, HasSubstr("no bushd answers"));
