@@ -18,6 +18,18 @@ constexpr std::array<std::uint32_t, 30> kBaudRates = {
     2400,   4800,   9600,    19200,   38400,   57600,   115200,  230400,  460800,  500000,
     576000, 921600, 1000000, 1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000};
 
+Result<void> check_populated(const Loading& loading, std::size_t index) {
+  const Config& config = loading.config;
+  const bool populated =
+      std::ranges::any_of(config.mcus, [&](const Mcu& mcu) { return mcu.bus == BusIndex{index}; });
+  if (populated) return {};
+  const std::string& name = config.buses[index].name;
+  return fail(loading.buses[index].error(
+      "name", fmt::format("\"{}\" has no MCU; allowed: buses with at least one. Add a [[mcu]] with "
+                          "bus = \"{}\", or remove the bus",
+                          name, name)));
+}
+
 Result<void> check_speed(const Loading& loading, std::size_t index) {
   const Config& config = loading.config;
   const Motor& motor = config.motors[index];
@@ -111,6 +123,9 @@ std::span<const std::uint32_t> baud_rates() {
 }
 
 Result<void> check_together(const Loading& loading) {
+  for (std::size_t i = 0; i < loading.config.buses.size(); ++i) {
+    if (auto checked = check_populated(loading, i); !checked) return checked;
+  }
   for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {
     if (auto checked = check_speed(loading, i); !checked) return checked;
   }

@@ -12,8 +12,8 @@ namespace bushd::config {
 // The fixed rates that libserial can set, rising.
 std::span<const std::uint32_t> baud_rates();
 
-// Every table is slow enough for its bus's tick, fits its MCU's table slots, and no line is asked
-// for more than it can carry.
+// Every bus has an MCU, every table is slow enough for its bus's tick, fits its MCU's table slots,
+// and no line is asked for more than it can carry.
 Result<void> check_together(const Loading& loading);
 
 }  // namespace bushd::config

@@ -146,12 +146,21 @@ Result<std::uint32_t> read_baud(const TomlReader& reader) {
                                                fmt::join(rates.begin(), rates.end(), ", "))));
 }
 
+// One path for all spellings; a port that is not plugged in has one too.
+std::filesystem::path plain(const std::string& port) {
+  std::error_code error;
+  const auto absolute = std::filesystem::absolute(port, error);
+  if (error) return port;
+  const auto path = std::filesystem::weakly_canonical(absolute, error);
+  return error ? absolute : path;
+}
+
 // The same port under two names would give its bytes to whoever reads first.
 Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vector<Bus>& others) {
   for (const Bus& other : others) {
     std::error_code missing;
-    const bool same =
-        bus.port == other.port || std::filesystem::equivalent(bus.port, other.port, missing);
+    const bool same = plain(bus.port) == plain(other.port) ||
+                      std::filesystem::equivalent(bus.port, other.port, missing);
     if (!same) continue;
     return fail(reader.error(
         "port", fmt::format("\"{}\" is the port \"{}\" of bus \"{}\"; allowed: one bus "

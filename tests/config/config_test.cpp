@@ -56,8 +56,10 @@ TEST(Config, LcmHasDefaults) {
   EXPECT_EQ(config->lcm.prefix, "BUSHD");
 }
 
-TEST(Config, BusAloneIsEnough) {
-  const ConfigFile file("[[bus]]\nname='b'\nport='p'\nbaud=9600\ntick_us=20000\nformat='coarse'\n");
+TEST(Config, BusWithAnMcuIsEnough) {
+  const ConfigFile file(
+      "[[bus]]\nname='b'\nport='p'\nbaud=500000\ntick_us=20000\nformat='coarse'\n"
+      "[[mcu]]\nbus='b'\naddress=1\n");
   const auto config = file.load();
   ASSERT_TRUE(config.has_value()) << config.error().text();
   EXPECT_TRUE(config->motors.empty());

@@ -104,6 +104,30 @@ TEST(ConfigTogether, OnePortUnderTwoNamesIsRefused) {
   EXPECT_EQ(config.error().key, "bus[1].port");
 }
 
+TEST(ConfigTogether, OnePortUnderTwoSpellingsIsRefusedBeforeItIsThere) {
+  const TempDirectory directory;
+  std::filesystem::create_directory(directory.path() / "sub");
+  const std::string port = directory.path() / "nox";
+  const std::string other = directory.path() / "sub" / ".." / "." / "nox";
+  const ConfigFile file(
+      replaced(replaced(kGood, "/dev/no-such-port-a", port), "/dev/no-such-port-b", other));
+  const auto config = file.load();
+  ASSERT_FALSE(config.has_value());
+  EXPECT_EQ(config.error().line, 12);
+  EXPECT_EQ(config.error().key, "bus[1].port");
+}
+
+TEST(ConfigTogether, BusWithoutMcuIsRefused) {
+  const ConfigFile file(kGood +
+                        "[[bus]]\nname='cellar'\nport='p'\nbaud=9600\ntick_us=20000\n"
+                        "format='coarse'\n");
+  const auto config = file.load();
+  ASSERT_FALSE(config.has_value());
+  EXPECT_EQ(config.error().line, 39);
+  EXPECT_EQ(config.error().key, "bus[2].name");
+  EXPECT_THAT(config.error().message, HasSubstr("bus = \"cellar\""));
+}
+
 TEST(ConfigTogether, BrokenTableIsNamedWithTheGroupThatUsesIt) {
   const ConfigFile file(kGood);
   const auto table =

@@ -112,15 +112,15 @@ class Bushsim : public testing::Test {
     std::filesystem::remove_all(folder);
   }
 
-  // Buses of one name each, with MCUs 1 and 2 on the first.
+  // Buses of one name each, with MCUs 1 and 2 on each.
   void write_config(const std::vector<std::string>& buses, int baud = 500'000) const {
     std::ofstream file(config);
     for (const std::string& bus : buses) {
       file << "[[bus]]\nname = \"" << bus << "\"\nport = \"" << folder << "/" << bus
            << "\"\nbaud = " << baud << "\ntick_us = 2560\nformat = \"fine\"\n";
-    }
-    for (const int address : {1, 2}) {
-      file << "[[mcu]]\nbus = \"" << buses.front() << "\"\naddress = " << address << "\n";
+      for (const int address : {1, 2}) {
+        file << "[[mcu]]\nbus = \"" << bus << "\"\naddress = " << address << "\n";
+      }
     }
   }
 
@@ -278,7 +278,6 @@ TEST_F(Bushsim, SeveralBusesWantAChoice) {
     return more;
   };
   EXPECT_THAT(refusal(with_bus("cellar")), HasSubstr("no bus \"cellar\""));
-  EXPECT_THAT(refusal(with_bus("roof")), HasSubstr("has no MCU"));
   start_ready({"--bus", "hall"});
   EXPECT_EQ(stop(), 0);
 }
