@@ -1,15 +1,29 @@
 // bushd: the program. Exit codes: 0 ended on request or the configuration is good, 1 it could not
-// start or go on, others: wrong usage (CLI11).
+// start or go on, 2 wrong usage.
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <optional>
+#include <string>
 
 #include "daemon/event_loop.h"
 
 namespace {
+
+constexpr int kUsage = 2;
+
+std::string counted(std::size_t count, const char* one, const char* many) {
+  return fmt::format("{} {}", count, count == 1 ? one : many);
+}
+
+std::string extent(const bushd::config::Config& config) {
+  return fmt::format("{} on {} and {}", counted(config.motors.size(), "motor", "motors"),
+                     counted(config.mcus.size(), "MCU", "MCUs"),
+                     counted(config.buses.size(), "bus", "buses"));
+}
 
 // In all threads, those that LCM starts included: signals are taken from a descriptor.
 void block_signals() {
@@ -38,8 +52,7 @@ int run(const bushd::config::Config& config, const std::string& move_log_path) {
     spdlog::error("{}", transport.error().text());
     return 1;
   }
-  spdlog::info("bushd: {} motors on {} MCUs and {} buses, LCM {}", config.motors.size(),
-               config.mcus.size(), config.buses.size(), config.lcm.url);
+  spdlog::info("bushd: {}, LCM {}", extent(config), config.lcm.url);
   bushd::daemon::EventLoop loop(config, **transport, move_log ? &*move_log : nullptr);
   if (const auto ended = loop.run(); !ended) {
     spdlog::error("{}", ended.error().text());
@@ -52,6 +65,9 @@ int run(const bushd::config::Config& config, const std::string& move_log_path) {
 
 int main(int argc, char** argv) {
   CLI::App app{"bushd moves stepper motors from acceleration tables"};
+  app.footer(
+      "Exit codes: 0 ended on request or the configuration is good, 1 it could not start or go on "
+      "(reason on stderr), 2 wrong usage.");
   app.set_version_flag("--version", BUSHD_VERSION);
   std::string config_path;
   std::string check_path;
@@ -65,14 +81,18 @@ int main(int argc, char** argv) {
                  "append moves and their results to this file, as JSON lines")
       ->type_name("FILE");
   config_option->excludes(check_option);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kUsage;
+  }
 
   spdlog::set_default_logger(spdlog::stderr_color_mt("bushd"));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
   const bool check = !check_path.empty();
   if (!check && config_path.empty()) {
     fmt::print(stderr, "bushd: --config FILE or --check-config FILE is needed; see --help\n");
-    return 1;
+    return kUsage;
   }
   const auto config = bushd::config::load(check ? check_path : config_path);
   if (!config) {
@@ -80,8 +100,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   if (check) {
-    fmt::print("{}: good: {} motors on {} MCUs and {} buses\n", check_path, config->motors.size(),
-               config->mcus.size(), config->buses.size());
+    fmt::print("{}: good: {}\n", check_path, extent(*config));
     return 0;
   }
   return run(*config, move_log_path);

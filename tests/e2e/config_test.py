@@ -30,7 +30,7 @@ class Configuration(EndToEndTest):
     def test_good_file(self):
         ran = self.check(configuration(self.file("port")))
         self.assertEqual((ran.returncode, ran.stderr), (0, ""))
-        self.assertIn("good: 8 motors on 2 MCUs and 1 buses", ran.stdout)
+        self.assertIn("good: 8 motors on 2 MCUs and 1 bus\n", ran.stdout)
 
     def test_bad_files_name_line_and_key_and_are_refused_at_the_start(self):
         good = configuration(self.file("port"))
@@ -52,6 +52,13 @@ class Configuration(EndToEndTest):
     def first_difference(good, bad):
         lines = zip(good.splitlines(), bad.splitlines())
         return next(number for number, (a, b) in enumerate(lines, 1) if a != b)
+
+    def test_wrong_usage_has_an_exit_code_of_its_own(self):
+        for arguments in ([], ["--konfig", "bushd.toml"], ["--config"], ["--config", "a", "--check-config", "b"]):
+            with self.subTest(arguments):
+                ran = self.run_program(program("BUSHD"), *arguments)
+                self.assertEqual((ran.returncode, ran.stdout), (2, ""))
+                self.assertNotEqual(ran.stderr, "")
 
     def test_missing_file(self):
         ran = self.run_program(program("BUSHD"), "--check-config", self.file("none.toml"))
