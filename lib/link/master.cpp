@@ -248,8 +248,8 @@ bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_re
     const Mcu& mcu = mcus_[i];
     if (mcu.view.phase != McuPhase::kOnline || (only_replaced && mcu.replaced == 0)) continue;
     Tick next = INT64_MAX;
-    for (const Stream& stream : mcu.stream) {
-      if (stream.active && !stream.finished) next = std::min(next, stream.next);
+    for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      if (sendable(mcu, m)) next = std::min(next, mcu.stream[m].next);
     }
     if (next != INT64_MAX) needy.emplace_back(next, i);
   }
