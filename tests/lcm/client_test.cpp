@@ -133,7 +133,7 @@ TEST_F(ClientTest, GivesUpWhenNobodyAnswersAndSaysWhatToLookAt) {
   open(milliseconds(50));
   const auto result = move();
   ASSERT_FALSE(result);
-  EXPECT_NE(result.error().text().find("Is it running"), std::string::npos);
+  EXPECT_NE(result.error().text().find("Start `bushd --config FILE`"), std::string::npos);
   EXPECT_GT(commands_.size(), 1u);
 }
 
