@@ -136,6 +136,7 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   stepped_us_ = now_us;
   if (!port_open_) return out_;
   if (outstanding_ && now_us >= outstanding_->timeout_us) handle_timeout(now_us);
+  if (fail_late_replacements(now_us)) return out_;
   while (!outstanding_ && line_free_us_ - now_us < kMaxBacklogUs && send_next(now_us)) {
   }
   return out_;
@@ -187,15 +188,25 @@ void Master::ask(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
   outstanding_ = Outstanding{mcu, type, tag_, timeout, timeout - patience_us_};
 }
 
+// Until its source has planned anew, a motor whose replacement failed has no ticks that could be
+// sent: so nothing is, in the step in which one fails.
+bool Master::fail_late_replacements(std::int64_t now_us) {
+  bool failed = false;
+  for (std::size_t i = 0; i < mcus_.size(); ++i) {
+    Mcu& mcu = mcus_[i];
+    if (mcu.replacing == 0 || !too_late(mcu.replace_at, tick_at(now_us))) continue;
+    const std::uint16_t motors = std::exchange(mcu.replacing, std::uint16_t{0});
+    events_.push_back({.kind = Event::Kind::kReplaceFailed, .mcu = i, .motors = motors});
+    failed = true;
+  }
+  return failed;
+}
+
 bool Master::send_due_replacement(std::int64_t now_us) {
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     Mcu& mcu = mcus_[i];
     if (mcu.replacing == 0 || mcu.replaced != 0) continue;
     const std::uint16_t mask = std::exchange(mcu.replacing, std::uint16_t{0});
-    if (too_late(mcu.replace_at, tick_at(now_us))) {
-      events_.push_back({.kind = Event::Kind::kReplaceFailed, .mcu = i, .motors = mask});
-      continue;
-    }
     const auto motors = static_cast<std::uint8_t>(std::popcount(mask));
     const bool fine = setup_.format == BUSHD_FORMAT_FINE;
     const unsigned count =

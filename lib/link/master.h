@@ -172,6 +172,7 @@ class Master {
     return stream.active && !stream.finished && (mcu.replacing >> motor & 1) == 0;
   }
   bool send_next(std::int64_t now_us);
+  bool fail_late_replacements(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
   bool send_wanted_poll(std::int64_t now_us);
   bool send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced = false);

@@ -143,6 +143,37 @@ TEST_P(Stream, ReplacementSwitchesThePlanAtItsTick) {
   EXPECT_EQ(bus.slaves[1].epoch, 0);
 }
 
+// One that had to wait for an answer until it was too late is not even sent; and nothing else goes
+// out before the source knows and has planned anew.
+TEST_P(Stream, LateReplacementIsToldBeforeAnythingElseIsSent) {
+  int late = 0;
+  for (int silent_ms = 150; silent_ms < 230; silent_ms += 2) {
+    FakeBus fresh(1, 4, GetParam());
+    fresh.source.displacement = bus.source.displacement;
+    fresh.connect();
+    const Tick start = fresh.master->earliest_start(fresh.now_us, 0, 0);
+    fresh.master->begin(0, 0, start);
+    fresh.run_for(600'000);
+    fresh.slaves[0].loses = [](const Heard& frame) { return frame.type == BUSHD_MSG_POLL; };
+    fresh.run_for(silent_ms * 1000);
+    const Tick at = fresh.master->earliest_replace(fresh.now_us);
+    fresh.source.displacement = [at](std::uint8_t m, Tick t) { return value(m, t, t >= at); };
+    fresh.master->replace(0, 1, at);
+    fresh.slaves[0].loses = [](const Heard&) { return false; };
+    fresh.run_until(
+        [&] { return fresh.count(Event::Kind::kReplaceFailed) > 0 || fresh.slaves[0].epoch != 0; },
+        200'000);
+    if (fresh.slaves[0].epoch != 0) continue;
+    ++late;
+    fresh.source.displacement = bus.source.displacement;
+    fresh.run_for(500'000);
+    for (const auto& [tick, taken] : fresh.slaves[0].taken[0]) {
+      ASSERT_EQ(taken, value(0, tick, 0)) << silent_ms << " ms, tick " << tick - start;
+    }
+  }
+  EXPECT_GT(late, 0);
+}
+
 TEST_P(Stream, LostReplacementIsToldAndTheOldPlanStandsUntilThen) {
   const Tick start = begin(0);
   begin(1);
