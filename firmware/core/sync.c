@@ -13,6 +13,7 @@
 
 #define MAX_ERROR_DIVISOR 2
 #define MAX_SLEW_DIVISOR 64
+#define REPEATED_WITHIN_NS 100000000u
 
 static void adopt(bushd_mcu* mcu, const bushd_sync* sync) {
   const int32_t tick_ns = (int32_t)mcu->tick_ns;
@@ -56,6 +57,13 @@ void bushd_mcu_sync(bushd_mcu* mcu, uint8_t tag, const bushd_sync* sync, uint32_
     adopt(mcu, sync);
   }
   if (mcu->settling != 0) return;
+  // A frame that comes twice is one mark, and the first time is the one that the others heard.
+  // Later the name may be another mark's, of a master that has just started.
+  const uint32_t since_mark = mcu->tick - mcu->mark_tick;
+  if ((mcu->flags & BUSHD_FLAG_MARK) != 0 && mcu->mark_tag == tag &&
+      since_mark < REPEATED_WITHIN_NS / mcu->tick_ns) {
+    return;
+  }
   int32_t mark_ns = (int32_t)time_in_tick_ns + mcu->behind_ns;
   mcu->mark_tick = mcu->tick;
   if (mark_ns < 0) {

@@ -18,7 +18,6 @@ constexpr std::int64_t kStartLeadUs =
 constexpr std::int64_t kReplaceLeadUs =
     30'000;  // a frame in flight, an answer awaited, adapter latency
 constexpr std::int64_t kMaxBacklogUs = 4'000;  // bytes handed to the port but not yet on the line
-constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be told the time
 constexpr std::int64_t kStreamWakeUs = 5'000;
 constexpr std::uint8_t kMaxEpochsAhead = 100;  // MCUs take up to 127
 
@@ -338,50 +337,6 @@ void Master::send_ticks(std::int64_t now_us, std::size_t index, std::uint16_t ma
     }
   }
   send(now_us, mcu.setup.address, BUSHD_MSG_TICKS, {payload.data(), size});
-}
-
-bool Master::send_due_sync(std::int64_t now_us) {
-  if (now_us < sync_due_us_) return false;
-  bool waiting = false;  // an MCU does not know the time yet
-  bool anybody = false;  // an MCU knows it
-  bool listening = false;
-  const McuView* reference = nullptr;
-  for (const Mcu& mcu : mcus_) {
-    if (mcu.view.phase == McuPhase::kOffline) continue;
-    listening = true;
-    if (!mcu.view.reported) continue;
-    const bool synced = (mcu.view.report.flags & BUSHD_FLAG_SYNCED) != 0;
-    const bool marked = (mcu.view.report.flags & BUSHD_FLAG_MARK) != 0 && mark_tag_ &&
-                        mcu.view.report.mark_tag == *mark_tag_ &&
-                        mcu.view.report.mark_ns < setup_.tick_ns;
-    anybody |= synced;
-    waiting |= !synced || (mcu.view.report.flags & BUSHD_FLAG_MARK) == 0;
-    if (marked && synced && reference == nullptr) reference = &mcu.view;
-  }
-  sync_due_us_ = now_us + (waiting ? kFirstSyncPeriodUs : kSyncPeriodUs);
-  if (!listening) return false;
-  bushd_sync sync{};
-  if (mark_tag_) sync.mark_tag = *mark_tag_;
-  if (reference != nullptr) {
-    sync.follows = true;
-    sync.mark_tick = reference->report.mark_tick;
-    sync.mark_ns = reference->report.mark_ns;
-  } else if (!anybody && mark_tag_) {
-    // Nobody on the bus knows the time: it begins at the mark before.
-    sync.follows = true;
-    clock_.reset();
-  }
-  std::array<std::uint8_t, 16> payload;
-  const std::size_t size = bushd_encode_sync(&sync, payload.data());
-  send(now_us, BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, {payload.data(), size});
-  mark_tag_ = tag_;
-  // MCUs that wait are asked at once, so that the next mark can follow this one.
-  if (waiting) {
-    for (Mcu& mcu : mcus_) {
-      if (mcu.view.phase == McuPhase::kConnecting) mcu.poll_now = true;
-    }
-  }
-  return true;
 }
 
 bool Master::send_script(std::int64_t now_us) {

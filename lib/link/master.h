@@ -152,6 +152,16 @@ class Master {
     Tick replace_at = 0;
     std::uint16_t replaced = 0;  // motors of a replacement sent and not yet confirmed
     bool poll_now = false;
+    bool asked_since_mark = false;  // and has answered
+  };
+  // What MCUs' reports say of the last mark.
+  struct MarkSurvey {
+    bool listening = false;  // somebody would hear a SYNC
+    bool waiting = false;    // an MCU does not know the time yet
+    bool anybody = false;    // an MCU knows it
+    bool all_asked = true;   // all who know it have reported since the mark
+    bool agreed = true;      // and agree when it was
+    const bushd_report* reference = nullptr;
   };
   struct Outstanding {
     std::size_t mcu;
@@ -180,6 +190,8 @@ class Master {
   void send_ticks(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first,
                   unsigned count, unsigned flags);
   bool send_due_poll(std::int64_t now_us);
+  std::int64_t mark_difference_ns(const bushd_report& a, const bushd_report& b) const;
+  MarkSurvey survey_marks() const;
   bool send_due_sync(std::int64_t now_us);
   bool send_script(std::int64_t now_us);
   bool send_due_identify(std::int64_t now_us);
@@ -220,6 +232,7 @@ class Master {
   std::int64_t stepped_us_ = 0;
   std::uint8_t tag_ = 0;
   std::optional<std::uint8_t> mark_tag_;  // of the last SYNC sent
+  bool disagreed_ = false;                // MCUs, about the mark before
   std::uint64_t bad_frames_ = 0;
   std::uint64_t timeouts_ = 0;
 };

@@ -228,6 +228,7 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
       (report.flags & BUSHD_FLAG_SYNCED) != 0 && (report.flags & BUSHD_FLAG_MARK) != 0;
   view.report = report;
   view.reported = true;
+  mcu.asked_since_mark = true;
   view.tick = clock_.unwrap(report.tick, now_us);
   if (in_step) {
     if (clock_.valid() && std::abs(view.tick - clock_.tick_at(now_us)) > ticks_in(kClockJumpUs)) {

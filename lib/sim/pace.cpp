@@ -81,6 +81,7 @@ void Pace::start(TimeNs t_ns, bool positive) {
   count_ = 0;
   remember(t_ns);
   positive_ = positive;
+  first_ns_ = t_ns;
   k_ = 0;
   cursor_ = 0;
   exact_ns_ = t_ns - rules_->tolerance_ns(0);

@@ -89,6 +89,8 @@ class Pace {
 
   bool moving() const { return count_ != 0; }
   TimeNs last_ns() const { return time_ns_[newest_]; }
+  // The first step since the last rest.
+  TimeNs first_ns() const { return first_ns_; }
   // For a message, after a jump: how much too early (kTooFast, kTurned).
   TimeNs too_early_ns() const { return too_early_ns_; }
 
@@ -106,7 +108,8 @@ class Pace {
   bool positive_ = false;
   std::size_t k_ = 0;       // the last exact delay was at least A(k)
   std::size_t cursor_ = 0;  // where the tolerance was found last
-  TimeNs exact_ns_ = 0;     // the last step's exact time is not before this
+  TimeNs first_ns_ = 0;
+  TimeNs exact_ns_ = 0;  // the last step's exact time is not before this
   TimeNs too_early_ns_ = 0;
 };
 

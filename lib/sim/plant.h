@@ -33,6 +33,10 @@ class Plant final : public EdgeSink {
   std::int64_t position_steps(std::size_t mcu, std::size_t output) const {
     return motor_of_[mcu].at(output)->position_steps;
   }
+  // The first pulse of its present or last movement.
+  TimeNs first_step_ns(std::size_t mcu, std::size_t output) const {
+    return motor_of_[mcu].at(output)->pace.first_ns();
+  }
   // Pulses of all motors.
   std::uint64_t steps_made() const { return steps_made_; }
 

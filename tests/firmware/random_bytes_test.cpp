@@ -229,7 +229,7 @@ TEST(RandomBytes, AnyRequestsInAnyOrderKeepCountsTrue) {
     rig.feed(Bytes{0});
     RC_ASSERT(rig.identify().motors == rig.options().motors);
   });
-  EXPECT_GT(steps, 10000);
+  EXPECT_GT(steps, 1000);
   EXPECT_GT(link_faults, 100);
 }
 

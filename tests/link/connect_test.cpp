@@ -60,6 +60,27 @@ TEST(Connect, LatecomerTakesTheTimeOfTheBus) {
   EXPECT_NEAR(static_cast<double>(bus.slaves[1].zero_us), static_cast<double>(zero), 2);
 }
 
+// An MCU that missed a SYNC and heard a repetition of it knows another mark by that name.
+TEST(Connect, MarkThatMcusDisagreeAboutIsNotPassedOn) {
+  FakeBus bus(2, 2);
+  bus.connect();
+  bus.run_for(2'000'000);
+  const auto syncs = [&] { return bus.heard_of(BUSHD_MSG_SYNC); };
+  const auto next_sync = [&] {
+    const std::size_t before = syncs().size();
+    EXPECT_TRUE(bus.run_until([&] { return syncs().size() > before; }, 1'000'000));
+    return syncs().back();
+  };
+  EXPECT_EQ(next_sync().payload[0], 1) << "follows, as a rule";
+  bus.slaves[1].mark_us += 30'000;
+  EXPECT_EQ(next_sync().payload[0], 0);
+  EXPECT_EQ(next_sync().payload[0], 1) << "about the next mark they agree";
+  // A clock that is off is so at every mark: then the first MCU's time is that of the bus.
+  bus.slaves[1].zero_us -= 30'000;
+  EXPECT_EQ(next_sync().payload[0], 0);
+  EXPECT_EQ(next_sync().payload[0], 1);
+}
+
 TEST(Connect, SymmetricTableIsSentOnce) {
   FakeBus bus;
   bus.table.decel = bus.table.accel;

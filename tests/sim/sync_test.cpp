@@ -51,6 +51,29 @@ TEST(Sync, LateComerJoinsTheOthers) {
   EXPECT_EQ(skew_ns(bus), 0);
 }
 
+// A frame that an adapter sends twice is one mark: the first, which the others heard too. Much
+// later its name is another mark's.
+TEST(Sync, RepeatedFrameIsNoOtherMark) {
+  Bus bus(500'000);
+  bus.add_mcu({.address = 1});
+  Master master(bus);
+  master.bring_up(kTickNs, BUSHD_FORMAT_FINE);
+  const bushd_sync message{};
+  std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+  const Bytes wire = Master::wire(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, 200,
+                                  {payload.data(), bushd_encode_sync(&message, payload.data())});
+  const auto mark_after = [&](TimeNs pause_ns) {
+    bus.advance_to(bus.now_ns() + pause_ns);
+    bus.master_send(wire, bus.now_ns());
+    master.drain();
+    return bus.mcu(0).core().mark_tick;
+  };
+  const std::uint32_t first = mark_after(1'000'000);
+  EXPECT_EQ(mark_after(0), first);
+  EXPECT_EQ(mark_after(60'000'000), first);
+  EXPECT_GT(mark_after(200'000'000), first);
+}
+
 // Two crystals 100 ppm apart part by 50 us in the half second between two marks, and a mark's error
 // is known at the next one: so twice that is the bound, for as long as it goes on. A correction is
 // spread over several ticks where 1/64 of a tick is less.

@@ -146,7 +146,9 @@ void Witness::accepted(const Key& key, Asked& asked) {
     } else {
       asked.target.emplace_back();
     }
+    asked.from.push_back(stands);
     asked.end.emplace_back();
+    asked.first_step_ns.emplace_back();
     if (is_move(command)) motor.move = key;
     if (is_move(command) && asked.target.back()) {
       steps_commanded_ += static_cast<std::uint64_t>(std::abs(*asked.target.back() - stands));
@@ -172,6 +174,21 @@ void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result)
     if (asked.end[i] == End{result.motor_results[i], result.position_steps[i]}) continue;
     violated(now_ns, result.motors[i] + " ended otherwise than its result says:" + text_of(result));
   }
+  check_start(now_ns, asked);
+}
+
+// All motors of a move start in the same tick, whichever MCUs they are on; and all tables have the
+// same first delay, so their first steps come together.
+void Witness::check_start(TimeNs now_ns, const Asked& asked) {
+  std::vector<TimeNs> first;
+  for (const auto& step : asked.first_step_ns) {
+    if (step) first.push_back(*step);
+  }
+  if (first.empty()) return;
+  const auto [earliest, latest] = std::minmax_element(first.begin(), first.end());
+  if (*latest - *earliest < config_.buses[0].tick_ns() / 2) return;
+  violated(now_ns, fmt::format("motors of one move started {} us apart: {}",
+                               (*latest - *earliest) / 1000, text_of(asked.command)));
 }
 
 void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
@@ -186,6 +203,10 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
                                               motors.begin());
   asked.end[index] = End{line.at("result"), line.at("position_steps")};
   check_end(now_ns, motor, asked, index);
+  const bool planned = asked.end[index]->word == "reached" || asked.end[index]->word == "stopped";
+  if (planned && plant_steps(motor) != asked.from[index]) {
+    asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
+  }
 }
 
 void Witness::check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index) {

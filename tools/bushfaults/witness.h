@@ -78,9 +78,12 @@ class Witness {
     bushd::command_t command;
     std::vector<bushd::reply_t> replies;
     TimeNs accepted_ns = 0;
-    // Of moves, by motor: where the plant must stand in the end, and how it ended.
+    // Of moves, by motor: where the plant stood and must stand in the end, how it ended, and when
+    // it made its first step, if it did and ended as planned.
+    std::vector<std::int64_t> from;
     std::vector<std::optional<std::int64_t>> target;
     std::vector<std::optional<End>> end;
+    std::vector<std::optional<TimeNs>> first_step_ns;
     bool accepted() const { return !replies.empty() && replies[0].phase == reply_accepted(); }
     bool finished() const { return replies.size() == (accepted() ? 2u : 1u); }
     static std::int8_t reply_accepted() { return bushd::reply_t::ACCEPTED; }
@@ -93,6 +96,7 @@ class Witness {
   }
   void accepted(const Key& key, Asked& asked);
   void finished(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
+  void check_start(TimeNs now_ns, const Asked& asked);
   void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index);
   void check_motor(TimeNs now_ns, std::size_t mcu, const bushd::motor_state_t& claim);
 

@@ -1,0 +1,82 @@
+// Time marks: when the next SYNC is due and what it says of the mark before.
+//
+// A mark is heard by all at once, but not by an MCU that a disturbance hit, and that one may hear a
+// repetition of the frame instead: its mark of that name is another one. If its time were passed
+// on, the others would be put out of step with the bus. So an answer counts only if all MCUs that
+// are in step agree about the mark, and have been asked since. If they disagree about the next mark
+// too, it is their clocks and not the mark; then the first one's time is that of the bus.
+#include <cstdlib>
+
+#include "link/master.h"
+
+namespace bushd::link {
+namespace {
+
+constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be told the time
+// Of a tick; crystals of +-50 ppm need seconds without a mark for it.
+constexpr std::int64_t kAgreementDivisor = 8;
+
+}  // namespace
+
+// When two MCUs heard the same mark, a minus b.
+std::int64_t Master::mark_difference_ns(const bushd_report& a, const bushd_report& b) const {
+  const auto ticks = static_cast<std::int32_t>(a.mark_tick - b.mark_tick);
+  return std::int64_t{ticks} * setup_.tick_ns + a.mark_ns - b.mark_ns;
+}
+
+Master::MarkSurvey Master::survey_marks() const {
+  MarkSurvey survey;
+  for (const Mcu& mcu : mcus_) {
+    if (mcu.view.phase == McuPhase::kOffline) continue;
+    survey.listening = true;
+    if (!mcu.view.reported) continue;
+    const bushd_report& report = mcu.view.report;
+    const bool synced = (report.flags & BUSHD_FLAG_SYNCED) != 0;
+    const bool marked = (report.flags & BUSHD_FLAG_MARK) != 0;
+    survey.anybody |= synced;
+    survey.waiting |= !synced || !marked;
+    if (!synced) continue;
+    survey.all_asked &= mcu.asked_since_mark;
+    if (!marked || mark_tag_ != report.mark_tag || report.mark_ns >= setup_.tick_ns) continue;
+    if (survey.reference == nullptr) {
+      survey.reference = &report;
+    } else if (std::abs(mark_difference_ns(report, *survey.reference)) >
+               setup_.tick_ns / kAgreementDivisor) {
+      survey.agreed = false;
+    }
+  }
+  return survey;
+}
+
+bool Master::send_due_sync(std::int64_t now_us) {
+  if (now_us < sync_due_us_) return false;
+  const MarkSurvey survey = survey_marks();
+  const bool doubtful = !survey.agreed && !disagreed_;
+  const bool soon = survey.waiting || doubtful;
+  sync_due_us_ = now_us + (soon ? kFirstSyncPeriodUs : kSyncPeriodUs);
+  if (!survey.listening) return false;
+  bushd_sync sync{};
+  if (mark_tag_) sync.mark_tag = *mark_tag_;
+  if (survey.reference != nullptr && survey.all_asked && !doubtful) {
+    sync.follows = true;
+    sync.mark_tick = survey.reference->mark_tick;
+    sync.mark_ns = survey.reference->mark_ns;
+  } else if (!survey.anybody && mark_tag_) {
+    // Nobody on the bus knows the time: it begins at the mark before.
+    sync.follows = true;
+    clock_.reset();
+  }
+  disagreed_ = doubtful;
+  std::array<std::uint8_t, 16> payload;
+  const std::size_t size = bushd_encode_sync(&sync, payload.data());
+  send(now_us, BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, {payload.data(), size});
+  mark_tag_ = tag_;
+  for (Mcu& mcu : mcus_) {
+    mcu.asked_since_mark = false;
+    // MCUs that wait are asked at once, so that the next mark can follow this one.
+    if (survey.waiting && mcu.view.phase == McuPhase::kConnecting) mcu.poll_now = true;
+  }
+  return true;
+}
+
+}  // namespace bushd::link
