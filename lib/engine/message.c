@@ -1,56 +1,37 @@
-#include "engine/message.h"
+// Messages that set an MCU up and tell what it is. Those of motion are in message_motion.c.
+#include <string.h>
 
-// A cursor over a payload. Reading beyond the end yields zeros and is remembered, so that a decoder
-// reads its fields in a row and asks once.
-typedef struct reader {
-  const uint8_t* at;
-  const uint8_t* end;
-  bool short_of_bytes;
-} reader;
+#include "engine/cursor.h"
 
-static const uint8_t* take(reader* r, size_t size) {
-  static const uint8_t kZeros[4] = {0, 0, 0, 0};
-  if ((size_t)(r->end - r->at) < size) {
-    r->short_of_bytes = true;
-    return kZeros;
-  }
-  const uint8_t* const at = r->at;
-  r->at += size;
-  return at;
+static void put_id(writer* w, const uint8_t* unique_id) {
+  memcpy(w->at, unique_id, BUSHD_UNIQUE_ID_SIZE);
+  w->at += BUSHD_UNIQUE_ID_SIZE;
 }
-static uint8_t get8(reader* r) {
-  return *take(r, 1);
-}
-static uint16_t get16(reader* r) {
-  return bushd_get_u16(take(r, 2));
-}
-static uint32_t get32(reader* r) {
-  return bushd_get_u32(take(r, 4));
-}
-static reader read_from(const uint8_t* payload, size_t size) {
-  const reader r = {payload, payload + size, false};
-  return r;
-}
-// The whole payload and nothing else must have been read; then the ranges count.
-static bushd_status finish(const reader* r, bool in_range) {
-  if (r->short_of_bytes || r->at != r->end) return BUSHD_E_LENGTH;
-  return in_range ? BUSHD_OK : BUSHD_E_FORMAT;
+static void get_id(reader* r, uint8_t* unique_id) {
+  for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) unique_id[i] = get8(r);
 }
 
-typedef struct writer {
-  uint8_t* at;
-} writer;
+size_t bushd_encode_identify(const bushd_identify* message, uint8_t* payload) {
+  writer w = {payload};
+  put16(&w, message->salt);
+  put8(&w, message->slots);
+  put16(&w, message->slot_units);
+  return (size_t)(w.at - payload);
+}
 
-static void put8(writer* w, uint8_t value) {
-  *w->at++ = value;
+bushd_status bushd_decode_identify(const uint8_t* payload, size_t size, bushd_identify* message) {
+  reader r = read_from(payload, size);
+  message->salt = get16(&r);
+  message->slots = get8(&r);
+  message->slot_units = get16(&r);
+  return finish(&r, message->slots >= 1);
 }
-static void put16(writer* w, uint16_t value) {
-  bushd_put_u16(w->at, value);
-  w->at += 2;
-}
-static void put32(writer* w, uint32_t value) {
-  bushd_put_u32(w->at, value);
-  w->at += 4;
+
+uint8_t bushd_identify_slot(const uint8_t* unique_id, uint16_t salt, uint8_t slots) {
+  uint8_t bytes[2];
+  bushd_put_u16(bytes, salt);
+  const uint16_t crc = bushd_crc16(BUSHD_CRC16_START, unique_id, BUSHD_UNIQUE_ID_SIZE);
+  return (uint8_t)(bushd_crc16(crc, bytes, sizeof bytes) % slots);
 }
 
 size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload) {
@@ -62,25 +43,48 @@ size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload) {
   put16(&w, message->slots);
   put16(&w, message->queue_ticks);
   put16(&w, message->table_codes);
+  put16(&w, message->capabilities);
+  put_id(&w, message->unique_id);
   return (size_t)(w.at - payload);
 }
 
 bushd_status bushd_decode_identity(const uint8_t* payload, size_t size, bushd_identity* message) {
   reader r = read_from(payload, size);
+  memset(message, 0, sizeof *message);
   message->protocol_version = get8(&r);
+  if (r.short_of_bytes) return BUSHD_E_LENGTH;
+  if (message->protocol_version != BUSHD_PROTOCOL_VERSION) return BUSHD_OK;
   message->motors = get8(&r);
   message->firmware_version = get16(&r);
   message->boot_number = get16(&r);
   message->slots = get16(&r);
   message->queue_ticks = get16(&r);
   message->table_codes = get16(&r);
+  message->capabilities = get16(&r);
+  get_id(&r, message->unique_id);
   return finish(&r, message->motors >= 1 && message->motors <= BUSHD_MOTORS_PER_MCU);
+}
+
+size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* payload) {
+  writer w = {payload};
+  put_id(&w, message->unique_id);
+  put8(&w, message->address);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_set_address(const uint8_t* payload, size_t size,
+                                      bushd_set_address* message) {
+  reader r = read_from(payload, size);
+  get_id(&r, message->unique_id);
+  message->address = get8(&r);
+  return finish(&r, message->address != BUSHD_ADDRESS_BROADCAST);
 }
 
 size_t bushd_encode_configure(const bushd_configure* message, uint8_t* payload) {
   writer w = {payload};
   put32(&w, message->tick_ns);
   put8(&w, (uint8_t)message->format);
+  put16(&w, message->silence_ticks);
   return (size_t)(w.at - payload);
 }
 
@@ -89,8 +93,10 @@ bushd_status bushd_decode_configure(const uint8_t* payload, size_t size, bushd_c
   message->tick_ns = get32(&r);
   const uint8_t format = get8(&r);
   message->format = format == BUSHD_FORMAT_FINE ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
+  message->silence_ticks = get16(&r);
   return finish(&r, message->tick_ns >= BUSHD_MIN_TICK_NS &&
-                        message->tick_ns <= BUSHD_MAX_TICK_NS && format <= BUSHD_FORMAT_FINE);
+                        message->tick_ns <= BUSHD_MAX_TICK_NS && format <= BUSHD_FORMAT_FINE &&
+                        message->silence_ticks >= 1);
 }
 
 size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* payload) {
@@ -100,6 +106,7 @@ size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* paylo
   put16(&w, message->decel_count);
   put16(&w, message->cruise);
   put32(&w, message->time_unit_ns);
+  put32(&w, message->revision);
   return (size_t)(w.at - payload);
 }
 
@@ -111,6 +118,7 @@ bushd_status bushd_decode_table_begin(const uint8_t* payload, size_t size,
   message->decel_count = get16(&r);
   message->cruise = get16(&r);
   message->time_unit_ns = get32(&r);
+  message->revision = get32(&r);
   return finish(&r, message->slot < BUSHD_TABLE_SLOTS && message->accel_count >= 1 &&
                         message->cruise >= 1 && message->time_unit_ns >= 1);
 }
@@ -139,15 +147,39 @@ bushd_status bushd_decode_table_data(const uint8_t* payload, size_t size,
 size_t bushd_encode_table_end(const bushd_table_end* message, uint8_t* payload) {
   writer w = {payload};
   put8(&w, message->slot);
-  put16(&w, message->crc);
+  put32(&w, message->crc);
   return (size_t)(w.at - payload);
 }
 
 bushd_status bushd_decode_table_end(const uint8_t* payload, size_t size, bushd_table_end* message) {
   reader r = read_from(payload, size);
   message->slot = get8(&r);
-  message->crc = get16(&r);
+  message->crc = get32(&r);
   return finish(&r, message->slot < BUSHD_TABLE_SLOTS);
+}
+
+size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload) {
+  writer w = {payload + 1};
+  uint8_t valid = 0;
+  for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
+    const bushd_table_held* held = &message->slot[i];
+    if (held->valid) valid |= (uint8_t)(1u << i);
+    put32(&w, held->crc);
+    put32(&w, held->revision);
+  }
+  payload[0] = valid;
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message) {
+  reader r = read_from(payload, size);
+  const uint8_t valid = get8(&r);
+  for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
+    message->slot[i].valid = (valid >> i & 1u) != 0;
+    message->slot[i].crc = get32(&r);
+    message->slot[i].revision = get32(&r);
+  }
+  return finish(&r, true);
 }
 
 size_t bushd_encode_assign(const bushd_assign* message, uint8_t* payload) {
@@ -190,134 +222,6 @@ bushd_status bushd_decode_set_position(const uint8_t* payload, size_t size,
   message->motor = get8(&r);
   message->position_steps = (int32_t)get32(&r);
   return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU);
-}
-
-size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload) {
-  writer w = {payload};
-  put8(&w, message->follows ? 1 : 0);
-  put8(&w, message->mark_tag);
-  put32(&w, message->mark_tick);
-  put32(&w, message->mark_ns);
-  return (size_t)(w.at - payload);
-}
-
-bushd_status bushd_decode_sync(const uint8_t* payload, size_t size, bushd_sync* message) {
-  reader r = read_from(payload, size);
-  const uint8_t follows = get8(&r);
-  message->follows = follows == 1;
-  message->mark_tag = get8(&r);
-  message->mark_tick = get32(&r);
-  message->mark_ns = get32(&r);
-  return finish(&r, follows <= 1 && message->mark_ns < BUSHD_MAX_TICK_NS);
-}
-
-static uint8_t bits_set(uint16_t mask) {
-  uint8_t bits = 0;
-  for (; mask != 0; mask = (uint16_t)(mask & (mask - 1u))) ++bits;
-  return bits;
-}
-
-uint8_t bushd_ticks_capacity(uint8_t motors, bool fine, bool delays) {
-  const size_t arrays = BUSHD_FRAME_MAX_PAYLOAD - BUSHD_TICKS_HEADER - (delays ? 2u * motors : 0u);
-  return (uint8_t)(arrays / (fine ? 2u * motors : motors));
-}
-
-size_t bushd_encode_ticks_head(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint8_t count,
-                               uint16_t mask, const uint16_t* delays, uint8_t* payload) {
-  writer w = {payload};
-  put8(&w, epoch);
-  if (delays != NULL) flags |= BUSHD_TICKS_DELAYS;
-  put8(&w, flags);
-  put32(&w, first_tick);
-  put8(&w, count);
-  put16(&w, mask);
-  if (delays != NULL) {
-    const uint8_t motors = bits_set(mask);
-    for (uint8_t i = 0; i < motors; ++i) put16(&w, delays[i]);
-  }
-  return (size_t)(w.at - payload);
-}
-
-// -32768 has no positive counterpart, and with 128 slots two of its steps would share one.
-static bool in_fine_range(const bushd_ticks* message) {
-  const uint16_t values = (uint16_t)(message->count * message->motors);
-  for (uint16_t i = 0; i < values; ++i) {
-    if (bushd_get_i16(message->displacements + 2u * i) == INT16_MIN) return false;
-  }
-  return true;
-}
-
-bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks* message) {
-  reader r = read_from(payload, size);
-  message->epoch = get8(&r);
-  message->flags = get8(&r);
-  message->first_tick = get32(&r);
-  message->count = get8(&r);
-  message->mask = get16(&r);
-  message->motors = bits_set(message->mask);
-  message->delays = NULL;
-  if (message->flags & BUSHD_TICKS_DELAYS) message->delays = take(&r, 2u * message->motors);
-  const size_t width = message->flags & BUSHD_TICKS_FINE ? 2 : 1;
-  message->displacements = take(&r, width * message->motors * message->count);
-  const uint8_t known =
-      BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS | BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
-  const uint8_t either = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
-  const bushd_status status =
-      finish(&r, message->flags <= known && (message->flags & either) != either &&
-                     message->count >= 1 && message->mask != 0);
-  if (status != BUSHD_OK || width == 1) return status;
-  return in_fine_range(message) ? BUSHD_OK : BUSHD_E_FORMAT;
-}
-
-size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {
-  writer w = {payload};
-  put8(&w, message->state);
-  put8(&w, message->faults);
-  put8(&w, message->flags);
-  put8(&w, message->epoch);
-  put16(&w, message->boot_number);
-  put32(&w, message->tick);
-  put32(&w, message->tick_ns);
-  put8(&w, message->mark_tag);
-  put32(&w, message->mark_tick);
-  put32(&w, message->mark_ns);
-  put16(&w, message->moving);
-  put16(&w, message->inputs);
-  put16(&w, message->bad_frames);
-  put16(&w, message->rejected_frames);
-  put8(&w, message->last_rejection);
-  put8(&w, message->motor_count);
-  for (uint8_t i = 0; i < message->motor_count; ++i) {
-    put32(&w, (uint32_t)message->motor[i].position_steps);
-    put16(&w, message->motor[i].known_until);
-  }
-  return (size_t)(w.at - payload);
-}
-
-bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_report* message) {
-  reader r = read_from(payload, size);
-  message->state = get8(&r);
-  message->faults = get8(&r);
-  message->flags = get8(&r);
-  message->epoch = get8(&r);
-  message->boot_number = get16(&r);
-  message->tick = get32(&r);
-  message->tick_ns = get32(&r);
-  message->mark_tag = get8(&r);
-  message->mark_tick = get32(&r);
-  message->mark_ns = get32(&r);
-  message->moving = get16(&r);
-  message->inputs = get16(&r);
-  message->bad_frames = get16(&r);
-  message->rejected_frames = get16(&r);
-  message->last_rejection = get8(&r);
-  message->motor_count = get8(&r);
-  if (message->motor_count > BUSHD_MOTORS_PER_MCU) return BUSHD_E_FORMAT;
-  for (uint8_t i = 0; i < message->motor_count; ++i) {
-    message->motor[i].position_steps = (int32_t)get32(&r);
-    message->motor[i].known_until = get16(&r);
-  }
-  return finish(&r, message->state <= BUSHD_STATE_FAULT);
 }
 
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload) {

@@ -10,20 +10,23 @@
 #include <stdint.h>
 
 #include "engine/frame.h"
+#include "engine/run_state.h"
 #include "engine/status.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#define BUSHD_PROTOCOL_VERSION 1u
+#define BUSHD_PROTOCOL_VERSION 2u
 #define BUSHD_MOTORS_PER_MCU 16u
 #define BUSHD_TABLE_SLOTS 8u
 #define BUSHD_MIN_TICK_NS 200000u
 #define BUSHD_MAX_TICK_NS 20000000u
+#define BUSHD_UNIQUE_ID_SIZE 8u
+#define BUSHD_REPLY_UNIT_NS 10000u  // of times at which an answer shall begin
 
 typedef enum bushd_type {
-  BUSHD_MSG_IDENTIFY = 0x01,      // empty -> reply: bushd_identity
+  BUSHD_MSG_IDENTIFY = 0x01,      // bushd_identify -> reply: bushd_identity, in a slot
   BUSHD_MSG_CONFIGURE = 0x02,     // bushd_configure -> acknowledgement
   BUSHD_MSG_TABLE_BEGIN = 0x03,   // bushd_table_begin -> acknowledgement
   BUSHD_MSG_TABLE_DATA = 0x04,    // bushd_table_data -> acknowledgement
@@ -31,9 +34,14 @@ typedef enum bushd_type {
   BUSHD_MSG_ASSIGN = 0x06,        // bushd_assign -> acknowledgement
   BUSHD_MSG_CONTROL = 0x07,       // bushd_control -> acknowledgement
   BUSHD_MSG_SET_POSITION = 0x08,  // bushd_set_position -> acknowledgement
-  BUSHD_MSG_POLL = 0x09,          // empty -> reply: bushd_report
+  BUSHD_MSG_POLL = 0x09,          // bushd_poll, broadcast -> a bushd_report of each MCU it names
   BUSHD_MSG_SYNC = 0x0A,          // bushd_sync, broadcast, no reply; the frame's end is a time mark
-  BUSHD_MSG_TICKS = 0x0B          // bushd_ticks, no reply: its effect shows in the next report
+  BUSHD_MSG_TICKS = 0x0B,         // bushd_ticks, no reply: its effect shows in the next report
+  BUSHD_MSG_TABLE_TICKS = 0x0C,   // bushd_table_ticks, no reply
+  BUSHD_MSG_TABLE_RUN = 0x0D,     // bushd_table_run, no reply
+  BUSHD_MSG_EMERGENCY = 0x0E,     // bushd_emergency, no reply
+  BUSHD_MSG_SET_ADDRESS = 0x0F,   // bushd_set_address, broadcast -> acknowledgement of the one MCU
+  BUSHD_MSG_TABLES = 0x10         // empty -> reply: bushd_tables
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its tag and the MCU's address.
 
@@ -48,31 +56,62 @@ typedef enum bushd_state {
 enum {
   BUSHD_FAULT_SELF_TEST = 1 << 0,  // boot self-test failed; only a reboot clears it
   BUSHD_FAULT_LINK = 1 << 1,       // the queue ended while a motor moved; it ran down its own table
-  BUSHD_FAULT_SYNC = 1 << 2        // the tick counter differs from the bus by more than it may
+  BUSHD_FAULT_SYNC = 1 << 2,       // the tick counter differs from the bus by more than it may
+  BUSHD_FAULT_EMERGENCY = 1 << 3   // an emergency stop was commanded
 };
 
 enum {
   BUSHD_FLAG_ENABLED = 1 << 0,     // EN is high
   BUSHD_FLAG_SYNCED = 1 << 1,      // the tick counter is the bus's
   BUSHD_FLAG_CONFIGURED = 1 << 2,  // tick and format are set
-  BUSHD_FLAG_MARK = 1 << 3         // mark_* of the report are valid
+  BUSHD_FLAG_MARK = 1 << 3,        // mark_* of the report are valid
+  BUSHD_FLAG_TWO_MASTERS = 1 << 4  // SYNC frames of two masters come by turns
 };
 
 typedef enum bushd_format { BUSHD_FORMAT_COARSE = 0, BUSHD_FORMAT_FINE = 1 } bushd_format;
 
+// Asks for identities; the one request that may be broadcast and is answered all the same. To keep
+// apart MCUs that have the same address (or all of them, on a broadcast) each answers in one of
+// `slots` reply slots, chosen by bushd_identify_slot: slot i begins i x slot_units after this
+// frame's end, in BUSHD_REPLY_UNIT_NS.
+typedef struct bushd_identify {
+  uint16_t salt;
+  uint8_t slots;  // >= 1
+  uint16_t slot_units;
+} bushd_identify;
+uint8_t bushd_identify_slot(const uint8_t* unique_id, uint16_t salt, uint8_t slots);
+
+enum {
+  BUSHD_CAN_COARSE = 1 << 0,
+  BUSHD_CAN_FINE = 1 << 1,
+  BUSHD_CAN_TABLE_TICKS = 1 << 2,
+  BUSHD_CAN_TABLE_RUN = 1 << 3
+};
+
+// Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
+// which one it is.
 typedef struct bushd_identity {
   uint8_t protocol_version;
   uint8_t motors;  // outputs 0 .. motors-1, at most BUSHD_MOTORS_PER_MCU
   uint16_t firmware_version;
-  uint16_t boot_number;  // changes at every boot
-  uint16_t slots;        // slots per tick
-  uint16_t queue_ticks;  // depth of the tick queue
-  uint16_t table_codes;  // table memory, in codes of 16 bits
+  uint16_t boot_number;   // changes at every boot
+  uint16_t slots;         // slots per tick
+  uint16_t queue_ticks;   // depth of the tick queue
+  uint16_t table_codes;   // table memory, in codes of 16 bits
+  uint16_t capabilities;  // BUSHD_CAN_*
+  uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
 } bushd_identity;
+
+// The MCU with this unique id answers to `address` from now on, and after its next boots.
+typedef struct bushd_set_address {
+  uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
+  uint8_t address;  // 1..255
+} bushd_set_address;
 
 typedef struct bushd_configure {
   uint32_t tick_ns;  // BUSHD_MIN_TICK_NS .. BUSHD_MAX_TICK_NS
   bushd_format format;
+  uint16_t silence_ticks;  // >= 1: table runs are run down after as many without a good frame
 } bushd_configure;
 
 // A table is sent as: begin, data (accelerating side, then decelerating side unless it is the
@@ -83,6 +122,7 @@ typedef struct bushd_table_begin {
   uint16_t decel_count;  // 0: the decelerating side is the accelerating one
   uint16_t cruise;
   uint32_t time_unit_ns;
+  uint32_t revision;  // of the table, as its file has it; told back by bushd_tables
 } bushd_table_begin;
 
 #define BUSHD_TABLE_DATA_MAX_CODES 120u
@@ -95,8 +135,18 @@ typedef struct bushd_table_data {
 
 typedef struct bushd_table_end {
   uint8_t slot;
-  uint16_t crc;  // CRC-16 over all codes as sent (little-endian)
+  uint32_t crc;  // bushd_table_crc32 (engine/table.h) of the whole table
 } bushd_table_end;
+
+// What an MCU holds, by table slot.
+typedef struct bushd_table_held {
+  bool valid;
+  uint32_t crc;
+  uint32_t revision;
+} bushd_table_held;
+typedef struct bushd_tables {
+  bushd_table_held slot[BUSHD_TABLE_SLOTS];
+} bushd_tables;
 
 typedef struct bushd_assign {
   uint8_t motor;
@@ -117,20 +167,35 @@ typedef struct bushd_set_position {
   int32_t position_steps;
 } bushd_set_position;
 
-// Two-step time reference. The end of this frame is a mark named by the frame's tag. If `follows`,
-// the mark named `mark_tag` lay at (mark_tick, mark_ns into that tick) of bus time.
+// Asks `count` MCUs for reports, each in a reply slot of its own: entry i (bushd_poll_entry) names
+// an address and when, after this frame's end, its answer begins.
+#define BUSHD_POLL_MAX_ENTRIES ((BUSHD_FRAME_MAX_PAYLOAD - 1u) / 3u)
+typedef struct bushd_poll_entry {
+  uint8_t address;
+  uint16_t begin_units;  // BUSHD_REPLY_UNIT_NS
+} bushd_poll_entry;
+typedef struct bushd_poll {
+  uint8_t count;           // >= 1
+  const uint8_t* entries;  // count x 3 bytes
+} bushd_poll;
+// The entry with this address, if there is one.
+bool bushd_poll_find(const bushd_poll* poll, uint8_t address, bushd_poll_entry* entry);
+
+// Two-step time reference. The end of this frame is a mark named `mark`. If `follows`, the mark
+// named `known_mark` lay at (mark_tick, mark_ns into that tick) of bus time.
 typedef struct bushd_sync {
+  uint16_t master;  // who sends this: two masters on one line have different ones
+  uint32_t mark;    // never the name of another mark of this master
   bool follows;
-  uint8_t mark_tag;
+  uint32_t known_mark;
   uint32_t mark_tick;
   uint32_t mark_ns;
 } bushd_sync;
 
 enum {
   BUSHD_TICKS_FINE = 1 << 0,     // int16 displacements, else coarse bytes
-  BUSHD_TICKS_DELAYS = 1 << 1,   // running delays at the end of the frame follow (else unchanged)
-  BUSHD_TICKS_REPLACE = 1 << 2,  // instead of all that its motors have queued from first_tick on
-  BUSHD_TICKS_START = 1 << 3     // its motors start from rest here; without it they must be moving
+  BUSHD_TICKS_REPLACE = 1 << 1,  // instead of all that its motors have queued from first_tick on
+  BUSHD_TICKS_START = 1 << 2     // its motors start from rest here; without it they must be moving
 };
 
 // Displacements of `count` ticks for the motors in `mask`. Only these motors are touched.
@@ -141,18 +206,63 @@ typedef struct bushd_ticks {
   uint8_t count;                 // >= 1
   uint16_t mask;                 // != 0
   uint8_t motors;                // bits set in mask
-  const uint8_t* delays;         // motors x 16 bit, running at the end, 0: at rest; or NULL
+  const uint8_t* delays;         // motors x 16 bit: running at the end, 0: at rest
   const uint8_t* displacements;  // count x motors, tick by tick, motors in rising order
 } bushd_ticks;
 
 // Bytes of a ticks payload before the arrays.
 #define BUSHD_TICKS_HEADER 9u
 // The most ticks of `motors` (1 .. BUSHD_MOTORS_PER_MCU) motors that one frame can carry.
-uint8_t bushd_ticks_capacity(uint8_t motors, bool fine, bool delays);
+uint8_t bushd_ticks_capacity(uint8_t motors, bool fine);
+
+// The same displacements without sending them: for each motor the state of its run at the beginning
+// of first_tick. The MCU expands `count` ticks of it by its own table, in the configured format,
+// and has the displacements that the master's run gives.
+typedef struct bushd_table_ticks {
+  uint8_t epoch;
+  uint8_t flags;  // as in bushd_ticks, without BUSHD_TICKS_FINE
+  uint32_t first_tick;
+  uint16_t count;  // >= 1
+  uint16_t mask;   // of the motors, in rising order; != 0
+  const uint8_t* entries;
+  uint16_t entries_size;
+} bushd_table_ticks;
+#define BUSHD_TABLE_TICKS_HEADER 8u
+#define BUSHD_TABLE_TICKS_MAX_ENTRY 19u
+
+// An entry of it. A motor that cruises throughout is told so in three bytes.
+typedef struct bushd_table_ticks_entry {
+  uint8_t motor;
+  bushd_run_state state;
+} bushd_table_ticks_entry;
+
+// The whole move at once: from rest, at the beginning of first_tick, by the motor's own table.
+// Steps fall exact to a slot.
+typedef struct bushd_table_run {
+  uint8_t epoch;
+  uint32_t first_tick;
+  uint8_t count;           // of entries, >= 1
+  const uint8_t* entries;  // count x 5 bytes
+} bushd_table_run;
+#define BUSHD_TABLE_RUN_HEADER 5u
+#define BUSHD_TABLE_RUN_ENTRY 5u
+typedef struct bushd_table_run_entry {
+  uint8_t motor;
+  uint8_t slot;      // of the table; must be the one assigned to the motor
+  int8_t direction;  // +1, -1
+  uint32_t steps;    // >= 1
+} bushd_table_run_entry;
+
+typedef enum bushd_how { BUSHD_RAMP_DOWN = 0, BUSHD_CUT = 1 } bushd_how;
+// All motors stop, within two ticks: by their tables' ramps, or without another step.
+typedef struct bushd_emergency {
+  bushd_how how;
+} bushd_emergency;
 
 typedef struct bushd_motor_report {
   int32_t position_steps;  // steps made until the start of `tick`
-  uint16_t known_until;    // low 16 bits of the first tick for which nothing is queued
+  uint16_t known_until;    // low 16 bits of the first tick for which nothing is decided; at most
+                           // 32767 after `tick`
 } bushd_motor_report;
 
 typedef struct bushd_report {
@@ -162,26 +272,39 @@ typedef struct bushd_report {
   uint8_t epoch;
   uint16_t boot_number;
   uint32_t tick;     // the tick being emitted
-  uint32_t tick_ns;  // how far into it, when the report was made
-  uint8_t mark_tag;  // the last mark heard, and when it was by the MCU's own clock
+  uint32_t tick_ns;  // how far into it, when the poll's frame ended
+  uint32_t mark;     // the last mark heard, and when it was by the MCU's own clock
   uint32_t mark_tick;
   uint32_t mark_ns;
+  int32_t rate_ppb;          // how much faster than its crystal the MCU counts, to follow the bus
   uint16_t moving;           // motors not at rest
+  uint16_t running;          // of them, those in a table run
   uint16_t inputs;           // bit per motor
   uint16_t bad_frames;       // CRC and length errors; saturates
   uint16_t rejected_frames;  // good frames that could not be used; saturates
   uint8_t last_rejection;    // bushd_status of the last one
-  uint8_t motor_count;       // <= BUSHD_MOTORS_PER_MCU
+  uint16_t run_downs;        // motors that had to be run down since boot; saturates
+  uint16_t low_water_ticks;  // the fewest ticks that a moving motor had queued, since the report
+                             // before; 65535: none moved
+  // Ticks that these motors have beyond a gap: from the tick `island_from` (low 16 bits) on, until
+  // `island_until`.
+  uint16_t islands;
+  uint16_t island_from;
+  uint16_t island_until;
+  uint8_t motor_count;  // <= BUSHD_MOTORS_PER_MCU
   bushd_motor_report motor[BUSHD_MOTORS_PER_MCU];
 } bushd_report;
 
-#define BUSHD_REPORT_SIZE(motors) (33u + 6u * (motors))
+#define BUSHD_REPORT_SIZE(motors) (52u + 6u * (motors))
+#define BUSHD_IDENTITY_SIZE 22u
+#define BUSHD_TABLES_SIZE (1u + 8u * BUSHD_TABLE_SLOTS)
 
 typedef struct bushd_acknowledgement {
   uint8_t status;  // bushd_status
 } bushd_acknowledgement;
 
 // Encoders return the payload's size. Preconditions are the ranges given above.
+size_t bushd_encode_identify(const bushd_identify* message, uint8_t* payload);
 size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload);
 size_t bushd_encode_configure(const bushd_configure* message, uint8_t* payload);
 size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* payload);
@@ -191,17 +314,30 @@ size_t bushd_encode_table_end(const bushd_table_end* message, uint8_t* payload);
 size_t bushd_encode_assign(const bushd_assign* message, uint8_t* payload);
 size_t bushd_encode_control(const bushd_control* message, uint8_t* payload);
 size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* payload);
+size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* payload);
+size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload);
+size_t bushd_encode_poll(const bushd_poll_entry* entries, uint8_t count, uint8_t* payload);
 size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload);
+size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload);
 size_t bushd_encode_report(const bushd_report* message, uint8_t* payload);
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload);
 
 // Writes header and delays of a ticks payload and returns where the displacements go; the caller
 // writes count x motors of them there (bushd_put_i16 or plain bytes). `delays` has an entry per
-// motor of the mask, or is NULL. The payload's size is that offset plus the displacements.
+// motor of the mask. The payload's size is that offset plus the displacements.
 size_t bushd_encode_ticks_head(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint8_t count,
                                uint16_t mask, const uint16_t* delays, uint8_t* payload);
+// `entries` by rising motor. Precondition: they fit one frame
+// (BUSHD_TABLE_TICKS_MAX_ENTRY bytes each at most).
+size_t bushd_encode_table_ticks(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint16_t count,
+                                const bushd_table_ticks_entry* entries, uint8_t motors,
+                                uint8_t* payload);
+size_t bushd_encode_table_run(uint8_t epoch, uint32_t first_tick,
+                              const bushd_table_run_entry* entries, uint8_t count,
+                              uint8_t* payload);
 
 // Decoders return BUSHD_OK, BUSHD_E_LENGTH or BUSHD_E_FORMAT.
+bushd_status bushd_decode_identify(const uint8_t* payload, size_t size, bushd_identify* message);
 bushd_status bushd_decode_identity(const uint8_t* payload, size_t size, bushd_identity* message);
 bushd_status bushd_decode_configure(const uint8_t* payload, size_t size, bushd_configure* message);
 bushd_status bushd_decode_table_begin(const uint8_t* payload, size_t size,
@@ -213,8 +349,22 @@ bushd_status bushd_decode_assign(const uint8_t* payload, size_t size, bushd_assi
 bushd_status bushd_decode_control(const uint8_t* payload, size_t size, bushd_control* message);
 bushd_status bushd_decode_set_position(const uint8_t* payload, size_t size,
                                        bushd_set_position* message);
+bushd_status bushd_decode_set_address(const uint8_t* payload, size_t size,
+                                      bushd_set_address* message);
+bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message);
+bushd_status bushd_decode_poll(const uint8_t* payload, size_t size, bushd_poll* message);
+bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message);
 bushd_status bushd_decode_sync(const uint8_t* payload, size_t size, bushd_sync* message);
 bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks* message);
+bushd_status bushd_decode_table_ticks(const uint8_t* payload, size_t size,
+                                      bushd_table_ticks* message);
+// The next entry of a decoded message: moves `at` (0 at first) past it and returns true, or false
+// behind the last one.
+bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at,
+                                  bushd_table_ticks_entry* entry);
+bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_table_run* message);
+// Entry `index` < count.
+bushd_table_run_entry bushd_get_table_run_entry(const bushd_table_run* message, uint8_t index);
 bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_report* message);
 bushd_status bushd_decode_acknowledgement(const uint8_t* payload, size_t size,
                                           bushd_acknowledgement* message);

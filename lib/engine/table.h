@@ -59,6 +59,12 @@ uint16_t bushd_table_fastest(const bushd_table* table);
 // Upper bound of the steps within any stretch of `tick_ns`; saturates at UINT32_MAX. O(1).
 uint32_t bushd_table_max_steps_per_tick(const bushd_table* table, uint32_t tick_ns);
 
+// CRC-32/ISO-HDLC (polynomial 0x04C11DB7, reflected, start and final inversion; of "123456789":
+// 0xCBF43926) of what a table holds, little-endian: the number of accelerating codes, of
+// decelerating ones (0 if both sides are the same array), the cruise delay (16 bits each), the time
+// unit (32), then the codes of both sides (16), slow to fast. O(count).
+uint32_t bushd_table_crc32(const bushd_table* table);
+
 // Memory for the index of a ramp: entries needed for `sum` and `bucket`. O(1) and O(count).
 uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp);
 uint32_t bushd_ramp_bucket_entries(const bushd_ramp* ramp);

@@ -1,0 +1,318 @@
+// Messages of motion: time, ticks, table runs, polls and reports.
+#include "engine/cursor.h"
+
+#define POLL_ENTRY 3u
+
+size_t bushd_encode_poll(const bushd_poll_entry* entries, uint8_t count, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, count);
+  for (uint8_t i = 0; i < count; ++i) {
+    put8(&w, entries[i].address);
+    put16(&w, entries[i].begin_units);
+  }
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_poll(const uint8_t* payload, size_t size, bushd_poll* message) {
+  reader r = read_from(payload, size);
+  message->count = get8(&r);
+  message->entries = take(&r, (size_t)message->count * POLL_ENTRY);
+  return finish(&r, message->count >= 1);
+}
+
+bool bushd_poll_find(const bushd_poll* poll, uint8_t address, bushd_poll_entry* entry) {
+  for (uint8_t i = 0; i < poll->count; ++i) {
+    const uint8_t* const at = poll->entries + (size_t)i * POLL_ENTRY;
+    if (at[0] != address) continue;
+    entry->address = address;
+    entry->begin_units = bushd_get_u16(at + 1);
+    return true;
+  }
+  return false;
+}
+
+size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload) {
+  writer w = {payload};
+  put16(&w, message->master);
+  put32(&w, message->mark);
+  put8(&w, message->follows ? 1 : 0);
+  put32(&w, message->known_mark);
+  put32(&w, message->mark_tick);
+  put32(&w, message->mark_ns);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_sync(const uint8_t* payload, size_t size, bushd_sync* message) {
+  reader r = read_from(payload, size);
+  message->master = get16(&r);
+  message->mark = get32(&r);
+  const uint8_t follows = get8(&r);
+  message->follows = follows == 1;
+  message->known_mark = get32(&r);
+  message->mark_tick = get32(&r);
+  message->mark_ns = get32(&r);
+  return finish(&r, follows <= 1 && message->mark_ns < BUSHD_MAX_TICK_NS);
+}
+
+size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload) {
+  payload[0] = (uint8_t)message->how;
+  return 1;
+}
+
+bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message) {
+  reader r = read_from(payload, size);
+  const uint8_t how = get8(&r);
+  message->how = how == BUSHD_CUT ? BUSHD_CUT : BUSHD_RAMP_DOWN;
+  return finish(&r, how <= BUSHD_CUT);
+}
+
+static uint8_t bits_set(uint16_t mask) {
+  uint8_t bits = 0;
+  for (; mask != 0; mask = (uint16_t)(mask & (mask - 1u))) ++bits;
+  return bits;
+}
+
+uint8_t bushd_ticks_capacity(uint8_t motors, bool fine) {
+  const size_t arrays = BUSHD_FRAME_MAX_PAYLOAD - BUSHD_TICKS_HEADER - 2u * motors;
+  return (uint8_t)(arrays / (fine ? 2u * motors : motors));
+}
+
+size_t bushd_encode_ticks_head(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint8_t count,
+                               uint16_t mask, const uint16_t* delays, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, epoch);
+  put8(&w, flags);
+  put32(&w, first_tick);
+  put8(&w, count);
+  put16(&w, mask);
+  const uint8_t motors = bits_set(mask);
+  for (uint8_t i = 0; i < motors; ++i) put16(&w, delays[i]);
+  return (size_t)(w.at - payload);
+}
+
+// A frame cannot replace and start at once.
+static bool known_flags(uint8_t flags, uint8_t known) {
+  const uint8_t either = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
+  return (flags & ~known) == 0 && (flags & either) != either;
+}
+
+// -32768 has no positive counterpart, and with 128 slots two of its steps would share one.
+static bool in_fine_range(const bushd_ticks* message) {
+  const uint16_t values = (uint16_t)(message->count * message->motors);
+  for (uint16_t i = 0; i < values; ++i) {
+    if (bushd_get_i16(message->displacements + 2u * i) == INT16_MIN) return false;
+  }
+  return true;
+}
+
+bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks* message) {
+  reader r = read_from(payload, size);
+  message->epoch = get8(&r);
+  message->flags = get8(&r);
+  message->first_tick = get32(&r);
+  message->count = get8(&r);
+  message->mask = get16(&r);
+  message->motors = bits_set(message->mask);
+  message->delays = take(&r, 2u * message->motors);
+  const size_t width = message->flags & BUSHD_TICKS_FINE ? 2 : 1;
+  message->displacements = take(&r, width * message->motors * message->count);
+  const uint8_t known = BUSHD_TICKS_FINE | BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
+  const bushd_status status =
+      finish(&r, known_flags(message->flags, known) && message->count >= 1 && message->mask != 0);
+  if (status != BUSHD_OK || width == 1) return status;
+  return in_fine_range(message) ? BUSHD_OK : BUSHD_E_FORMAT;
+}
+
+// First byte of an entry of TABLE_TICKS and TABLE_RUN: the motor, its direction, and what follows.
+#define HEAD_MOTOR 0x0Fu
+#define HEAD_POSITIVE 0x80u
+#define HEAD_PARTS 0x40u     // TABLE_TICKS: the parts follow; else it cruises
+#define HEAD_SINCE_NS 0x20u  // TABLE_TICKS
+#define HEAD_LEAD 0x10u      // TABLE_TICKS
+#define HEAD_SLOT_SHIFT 4u   // TABLE_RUN: three bits
+
+static void put_entry(writer* w, const bushd_table_ticks_entry* entry) {
+  const bushd_run_state* const state = &entry->state;
+  uint8_t head = entry->motor;
+  if (state->direction > 0) head |= HEAD_POSITIVE;
+  if (!state->cruises) head |= HEAD_PARTS;
+  if (state->since_ns != 0) head |= HEAD_SINCE_NS;
+  if (state->lead_delay != 0) head |= HEAD_LEAD;
+  put8(w, head);
+  put16(w, state->since);
+  if (state->since_ns != 0) put32(w, state->since_ns);
+  if (state->lead_delay != 0) put16(w, state->lead_delay);
+  if (state->cruises) return;
+  put16(w, state->accel_at);
+  put16(w, state->accel_end);
+  put32(w, state->cruise_left);
+  put16(w, state->decel_left);
+}
+
+static void get_entry(reader* r, bushd_table_ticks_entry* entry) {
+  bushd_run_state* const state = &entry->state;
+  const uint8_t head = get8(r);
+  entry->motor = head & HEAD_MOTOR;
+  state->direction = head & HEAD_POSITIVE ? 1 : -1;
+  state->cruises = (head & HEAD_PARTS) == 0;
+  state->since = get16(r);
+  state->since_ns = head & HEAD_SINCE_NS ? get32(r) : 0;
+  state->lead_delay = head & HEAD_LEAD ? get16(r) : 0;
+  state->accel_at = state->cruises ? 0 : get16(r);
+  state->accel_end = state->cruises ? 0 : get16(r);
+  state->cruise_left = state->cruises ? 0 : get32(r);
+  state->decel_left = state->cruises ? 0 : get16(r);
+}
+
+size_t bushd_encode_table_ticks(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint16_t count,
+                                const bushd_table_ticks_entry* entries, uint8_t motors,
+                                uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, epoch);
+  put8(&w, flags);
+  put32(&w, first_tick);
+  put16(&w, count);
+  for (uint8_t i = 0; i < motors; ++i) put_entry(&w, &entries[i]);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_table_ticks(const uint8_t* payload, size_t size,
+                                      bushd_table_ticks* message) {
+  reader r = read_from(payload, size);
+  message->epoch = get8(&r);
+  message->flags = get8(&r);
+  message->first_tick = get32(&r);
+  message->count = get16(&r);
+  if (r.short_of_bytes) return BUSHD_E_LENGTH;
+  message->entries = r.at;
+  message->entries_size = (uint16_t)(r.end - r.at);
+  message->mask = 0;
+  bool rising = true;
+  while (r.at != r.end && !r.short_of_bytes) {
+    bushd_table_ticks_entry entry;
+    get_entry(&r, &entry);
+    const uint16_t bit = (uint16_t)(1u << entry.motor);
+    if (message->mask >= bit) rising = false;
+    message->mask |= bit;
+  }
+  const uint8_t known = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
+  return finish(&r, known_flags(message->flags, known) && message->count >= 1 &&
+                        message->mask != 0 && rising);
+}
+
+bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at,
+                                  bushd_table_ticks_entry* entry) {
+  if (*at >= message->entries_size) return false;
+  reader r = read_from(message->entries + *at, (size_t)(message->entries_size - *at));
+  get_entry(&r, entry);
+  *at = (uint16_t)(r.at - message->entries);
+  return true;
+}
+
+size_t bushd_encode_table_run(uint8_t epoch, uint32_t first_tick,
+                              const bushd_table_run_entry* entries, uint8_t count,
+                              uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, epoch);
+  put32(&w, first_tick);
+  for (uint8_t i = 0; i < count; ++i) {
+    uint8_t head = (uint8_t)(entries[i].motor | entries[i].slot << HEAD_SLOT_SHIFT);
+    if (entries[i].direction > 0) head |= HEAD_POSITIVE;
+    put8(&w, head);
+    put32(&w, entries[i].steps);
+  }
+  return (size_t)(w.at - payload);
+}
+
+bushd_table_run_entry bushd_get_table_run_entry(const bushd_table_run* message, uint8_t index) {
+  const uint8_t* const at = message->entries + (size_t)index * BUSHD_TABLE_RUN_ENTRY;
+  const bushd_table_run_entry entry = {(uint8_t)(at[0] & HEAD_MOTOR),
+                                       (uint8_t)(at[0] >> HEAD_SLOT_SHIFT & 7u),
+                                       at[0] & HEAD_POSITIVE ? 1 : -1, bushd_get_u32(at + 1)};
+  return entry;
+}
+
+bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_table_run* message) {
+  reader r = read_from(payload, size);
+  message->epoch = get8(&r);
+  message->first_tick = get32(&r);
+  if (r.short_of_bytes) return BUSHD_E_LENGTH;
+  const size_t rest = (size_t)(r.end - r.at);
+  if (rest % BUSHD_TABLE_RUN_ENTRY != 0) return BUSHD_E_LENGTH;
+  message->count = (uint8_t)(rest / BUSHD_TABLE_RUN_ENTRY);
+  message->entries = take(&r, rest);
+  uint16_t mask = 0;
+  bool in_range = message->count >= 1;
+  for (uint8_t i = 0; i < message->count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message, i);
+    const uint16_t bit = (uint16_t)(1u << entry.motor);
+    if (mask >= bit || entry.steps == 0 || entry.steps > INT32_MAX) in_range = false;
+    mask |= bit;
+  }
+  return finish(&r, in_range);
+}
+
+size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, message->state);
+  put8(&w, message->faults);
+  put8(&w, message->flags);
+  put8(&w, message->epoch);
+  put16(&w, message->boot_number);
+  put32(&w, message->tick);
+  put32(&w, message->tick_ns);
+  put32(&w, message->mark);
+  put32(&w, message->mark_tick);
+  put32(&w, message->mark_ns);
+  put32(&w, (uint32_t)message->rate_ppb);
+  put16(&w, message->moving);
+  put16(&w, message->running);
+  put16(&w, message->inputs);
+  put16(&w, message->bad_frames);
+  put16(&w, message->rejected_frames);
+  put8(&w, message->last_rejection);
+  put16(&w, message->run_downs);
+  put16(&w, message->low_water_ticks);
+  put16(&w, message->islands);
+  put16(&w, message->island_from);
+  put16(&w, message->island_until);
+  put8(&w, message->motor_count);
+  for (uint8_t i = 0; i < message->motor_count; ++i) {
+    put32(&w, (uint32_t)message->motor[i].position_steps);
+    put16(&w, message->motor[i].known_until);
+  }
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_report* message) {
+  reader r = read_from(payload, size);
+  message->state = get8(&r);
+  message->faults = get8(&r);
+  message->flags = get8(&r);
+  message->epoch = get8(&r);
+  message->boot_number = get16(&r);
+  message->tick = get32(&r);
+  message->tick_ns = get32(&r);
+  message->mark = get32(&r);
+  message->mark_tick = get32(&r);
+  message->mark_ns = get32(&r);
+  message->rate_ppb = (int32_t)get32(&r);
+  message->moving = get16(&r);
+  message->running = get16(&r);
+  message->inputs = get16(&r);
+  message->bad_frames = get16(&r);
+  message->rejected_frames = get16(&r);
+  message->last_rejection = get8(&r);
+  message->run_downs = get16(&r);
+  message->low_water_ticks = get16(&r);
+  message->islands = get16(&r);
+  message->island_from = get16(&r);
+  message->island_until = get16(&r);
+  message->motor_count = get8(&r);
+  if (message->motor_count > BUSHD_MOTORS_PER_MCU) return BUSHD_E_FORMAT;
+  for (uint8_t i = 0; i < message->motor_count; ++i) {
+    message->motor[i].position_steps = (int32_t)get32(&r);
+    message->motor[i].known_until = get16(&r);
+  }
+  return finish(&r, message->state <= BUSHD_STATE_FAULT);
+}

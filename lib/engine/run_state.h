@@ -1,0 +1,38 @@
+// A run's state in few bytes: enough for an MCU that has the same table to go on with the run from
+// a tick boundary, with the same displacements as the host.
+#ifndef BUSHD_ENGINE_RUN_STATE_H
+#define BUSHD_ENGINE_RUN_STATE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "engine/run.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct bushd_run_state {
+  int8_t direction;     // +1, -1
+  bool cruises;         // throughout what is asked for: the fields from accel_at on mean nothing
+  uint16_t since;       // whole time units since the last step
+  uint32_t since_ns;    // and the rest, less than a unit
+  uint16_t lead_delay;  // time units; 0: no lead
+  uint16_t accel_at;
+  uint16_t accel_end;
+  uint32_t cruise_left;
+  uint16_t decel_left;
+} bushd_run_state;
+
+// The state of a run that is not done, for going on with it for `ticks` ticks. Precondition: the
+// run stands at a tick boundary. O(1).
+bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks);
+
+// A run in that state; steps_done begins at 0. Returns false, and leaves the run undefined, if no
+// run of this table can be in that state: nothing in `state` is believed. O(1).
+bool bushd_run_restore(bushd_run* run, const bushd_table* table, const bushd_run_state* state);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
