@@ -17,13 +17,19 @@
 #include "engine/message.h"
 #include "engine/table.h"
 #include "link/bus_clock.h"
+#include "link/health.h"
 #include "link/line_budget.h"
 
 namespace bushd::link {
 
+struct TableRef {
+  const bushd_table* table = nullptr;  // outlives the master
+  std::uint32_t revision = 0;
+};
+
 struct McuSetup {
   std::uint8_t address = 0;
-  std::vector<const bushd_table*> tables;  // by slot, at most BUSHD_TABLE_SLOTS; outlive the master
+  std::vector<TableRef> tables;                            // by slot, at most BUSHD_TABLE_SLOTS
   std::array<int, BUSHD_MOTORS_PER_MCU> table_of_motor{};  // slot, or -1: no motor at this output
 };
 
@@ -31,6 +37,10 @@ struct BusSetup {
   std::uint32_t baud = 0;
   std::uint32_t tick_ns = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
+  // Ticks of motors that run by their table are sent as states of the run where that is shorter;
+  // otherwise each as its displacement.
+  bool table_ticks = true;
+  std::uint16_t master = 0;  // tells this master from another on the same line
   std::vector<McuSetup> mcus;
 };
 
@@ -44,6 +54,16 @@ class TickSource {
   // has not reported as known.
   virtual std::uint16_t render(std::size_t mcu, std::uint8_t motor, Tick first, unsigned count,
                                std::int16_t* out, std::size_t stride) = 0;
+  // The motor's run at the beginning of tick `first`, if it is one of its table and not over, and
+  // for how many ticks (1 .. max_ticks) it gives what render() would.
+  struct Stretch {
+    bushd_run run;
+    unsigned ticks;
+  };
+  virtual std::optional<Stretch> run_at(std::size_t mcu, std::uint8_t motor, Tick first,
+                                        unsigned max_ticks) = 0;
+  // First tick after the motor's last step, as planned now.
+  virtual Tick end_tick(std::size_t mcu, std::uint8_t motor) = 0;
 };
 
 enum class McuPhase { kOffline, kConnecting, kOnline };
@@ -98,14 +118,25 @@ class Master {
   Tick earliest_start(std::int64_t now_us, std::size_t mcu, std::uint8_t motor) const;
   // Earliest tick from which a replacement can take effect.
   Tick earliest_replace(std::int64_t now_us) const;
+  // Another master was heard on this line within the last seconds, by this one or by an MCU.
+  bool two_masters(std::int64_t now_us) const;
 
   // From `start` on, until dropped, the source has ticks for this motor. Preconditions: the MCU is
   // online, the motor has a table, start >= earliest_start.
   void begin(std::size_t mcu, std::uint8_t motor, Tick start);
+  // The same, but the MCU gets the whole move at once and runs it by the motor's table. `steps`
+  // (either sign, not 0) are those of the source's run from `start` on. Precondition also: the MCU
+  // can (can_run_tables).
+  void begin_table_run(std::size_t mcu, std::uint8_t motor, Tick start, std::int32_t steps);
+  bool can_run_tables(std::size_t mcu) const;
   // The source's answer for these motors has changed from `first` on.
   void replace(std::size_t mcu, std::uint16_t motors, Tick first);
   // Nothing more is sent for this motor.
   void drop(std::size_t mcu, std::uint8_t motor);
+
+  // Every motor of every MCU stops within two ticks of hearing it, and nothing more is sent for
+  // any. Said again until all MCUs that are online have latched BUSHD_FAULT_EMERGENCY.
+  void emergency_stop(bushd_how how);
 
   // Other tables or motors for an MCU, at rest: it goes through configuration again and comes back
   // with kOnline.
@@ -118,16 +149,24 @@ class Master {
   // Requests made by the two calls above are not yet answered, or not yet seen in a report.
   bool busy(std::size_t mcu) const { return !mcus_[mcu].script.empty() || mcus_[mcu].poll_now; }
 
-  std::uint64_t bad_frames() const { return bad_frames_; }
-  std::uint64_t timeouts() const { return timeouts_; }
+  const McuHealth& health(std::size_t mcu) const { return mcus_[mcu].health; }
+  const BusHealth& bus_health() const { return bus_health_; }
+  void reset_low_water();
 
  private:
+  struct Gap {
+    Tick until = 0;     // where the ticks begin that the MCU has beyond it
+    Tick known_to = 0;  // and end
+  };
   struct Stream {
     bool active = false;
     bool finished = false;  // all is sent; until dropped it may still be repeated or replaced
     Tick start = 0;
-    Tick next = 0;                            // first tick not yet sent
-    std::optional<std::uint16_t> delay_sent;  // as told at `next`; empty: must be told again
+    Tick next = 0;           // first tick not yet sent, or to be sent again
+    Tick sent = 0;           // first tick never sent
+    std::optional<Gap> gap;  // while what lies before it is sent again
+    // Of a table run, until it is replaced.
+    std::optional<std::int32_t> run_steps;
   };
   struct Request {
     std::uint8_t type = 0;
@@ -136,6 +175,7 @@ class Master {
   struct Mcu {
     McuSetup setup;
     McuView view;
+    McuHealth health;
     std::array<Stream, BUSHD_MOTORS_PER_MCU> stream;
     std::deque<Request>
         script;             // requests to make in this order, each acknowledged before the next
@@ -143,8 +183,10 @@ class Master {
     // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
     // switched off stay off through restarts and lost links: there may be hands in the mechanism.
     std::optional<bool> powered;
+    bool taken_over = false;  // while connecting: table runs of an earlier master were stopped
     std::int64_t poll_due_us = 0;
     std::int64_t retry_due_us = 0;
+    unsigned looks = 0;             // IDENTIFYs in a row without an MCU that fits
     int silent = 0;                 // requests in a row without an answer
     std::uint8_t epoch = 0;         // of frames
     std::uint8_t newest_epoch = 0;  // of all replacements, whether taken or not
@@ -153,6 +195,10 @@ class Master {
     std::uint16_t replaced = 0;  // motors of a replacement sent and not yet confirmed
     bool poll_now = false;
     bool asked_since_mark = false;  // and has answered
+    // Counters as last told: what they have grown by goes into `health`.
+    std::uint16_t crc_errors_told = 0;
+    std::uint16_t rejected_told = 0;
+    std::uint16_t run_downs_told = 0;
   };
   // What MCUs' reports say of the last mark.
   struct MarkSurvey {
@@ -163,55 +209,97 @@ class Master {
     bool agreed = true;      // and agree when it was
     const bushd_report* reference = nullptr;
   };
-  struct Outstanding {
+  // A request whose answers are awaited; nothing else is sent meanwhile.
+  struct Awaited {
     std::size_t mcu;
-    std::uint8_t type;
-    std::uint8_t tag;
-    std::int64_t timeout_us;
-    std::int64_t expected_us;  // when the answer ends if nothing but the line takes time
+    std::int64_t expected_us;  // when its answer ends if nothing but the line takes time
+    bool answered = false;
+  };
+  struct Exchange {
+    std::uint8_t type = 0;
+    std::uint8_t tag = 0;
+    std::vector<Awaited> awaited;
+    std::int64_t line_quiet_us = 0;  // when the last answer should have passed
+    std::int64_t timeout_us = 0;
+    // IDENTIFY: who answered. Several MCUs may have the address.
+    unsigned slots = 1;
+    std::vector<bushd_identity> identities;
+  };
+  struct Emergency {
+    bushd_how how;
+    bool send = true;
+    std::int64_t until_us = 0;  // 0: not yet sent
   };
 
+  // master.cpp
   void send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,
             std::span<const std::uint8_t> payload);
   void ask(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
            std::span<const std::uint8_t> payload, std::size_t reply_payload);
+  bool send_next(std::int64_t now_us);
+  bool send_emergency(std::int64_t now_us);
+  bool send_script(std::int64_t now_us);
+  std::int64_t line_us(std::size_t bytes) const;
+  Tick ticks_in(std::int64_t us) const;  // rounded up
+
+  // master_receive.cpp: answers, and their absence
+  void handle_frame(std::int64_t now_us, const bushd_frame& frame);
+  bool handle_answer(std::int64_t now_us, std::size_t mcu, const bushd_frame& frame);
+  void answered(std::int64_t now_us, Awaited& awaited);
+  void handle_report(std::int64_t now_us, std::size_t mcu, const bushd_report& report,
+                     std::int64_t polled_us);
+  void note_health(Mcu& mcu, const bushd_report& report);
+  void handle_timeout(std::int64_t now_us);
+  void handle_silence(std::int64_t now_us, std::size_t mcu, std::uint8_t type);
+
+  // master_poll.cpp
+  bool send_wanted_poll(std::int64_t now_us);
+  bool send_due_poll(std::int64_t now_us);
+
+  // master_connect.cpp
+  bool send_due_identify(std::int64_t now_us);
+  void finish_identify(std::int64_t now_us, std::size_t mcu, const Exchange& exchange);
+  void handle_identity(std::int64_t now_us, std::size_t mcu, const bushd_identity& identity);
+  void handle_tables(std::size_t mcu, const bushd_tables& held);
+  void handle_acknowledgement(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
+                              std::uint8_t status);
+  void follow_connecting(std::size_t mcu, bool in_step);
+  std::string unfit(const Mcu& mcu, const bushd_identity& identity) const;  // "" when it fits
+  void write_script(Mcu& mcu) const;
+  void go_offline(std::size_t mcu, const std::string& cause, std::int64_t retry_due_us);
+
+  // master_stream.cpp
   // Of a motor whose replacement still waits, the next ticks belong to a plan that the MCU does not
   // know.
   static bool sendable(const Mcu& mcu, unsigned motor) {
     const Stream& stream = mcu.stream[motor];
     return stream.active && !stream.finished && (mcu.replacing >> motor & 1) == 0;
   }
-  bool send_next(std::int64_t now_us);
+  struct Horizon {
+    Tick begin;  // a frame that begins later can wait
+    Tick end;    // no tick from here on is sent yet
+  };
   bool fail_late_replacements(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
-  bool send_wanted_poll(std::int64_t now_us);
   bool send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced = false);
-  bool send_ticks_of(std::int64_t now_us, std::size_t mcu, Tick horizon);
+  bool send_ticks_of(std::int64_t now_us, std::size_t mcu, Tick now, std::int64_t lead_us);
+  bool send_table_runs(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first);
+  bool send_table_ticks(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first,
+                        Tick max_ticks, unsigned flags);
   void send_ticks(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first,
                   unsigned count, unsigned flags);
-  bool send_due_poll(std::int64_t now_us);
-  std::int64_t mark_difference_ns(const bushd_report& a, const bushd_report& b) const;
-  MarkSurvey survey_marks() const;
-  bool send_due_sync(std::int64_t now_us);
-  bool send_script(std::int64_t now_us);
-  bool send_due_identify(std::int64_t now_us);
-  Tick ticks_in(std::int64_t us) const;  // rounded up
-
-  void handle_frame(std::int64_t now_us, const bushd_frame& frame);
-  void handle_report(std::int64_t now_us, std::size_t mcu, const bushd_report& report);
-  void handle_identity(std::int64_t now_us, std::size_t mcu, const bushd_identity& identity);
-  void handle_acknowledgement(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
-                              std::uint8_t status);
+  void note_sent(std::size_t mcu, std::uint16_t mask, Tick until);
   void follow_replacements(std::size_t mcu);
   // An MCU in tick `now` or later can no longer change tick `at`.
   static bool too_late(Tick at, Tick now) { return at < now + 2; }
   void follow_streams(std::size_t mcu);
-  void answered(std::int64_t now_us);
-  void handle_timeout(std::int64_t now_us);
-  std::string unfit(const Mcu& mcu, const bushd_identity& identity) const;  // "" when it fits
-  void write_script(Mcu& mcu) const;
-  void go_offline(std::size_t mcu, const std::string& cause, std::int64_t retry_due_us);
+  void go_back(std::size_t mcu, std::uint8_t motor);
   void drop_streams(Mcu& mcu);
+
+  // master_sync.cpp
+  std::int64_t mark_difference_ns(const bushd_report& a, const bushd_report& b) const;
+  MarkSurvey survey_marks() const;
+  bool send_due_sync(std::int64_t now_us);
 
   BusSetup setup_;
   TickSource& source_;
@@ -221,7 +309,7 @@ class Master {
   std::vector<std::uint8_t> out_;
   std::vector<Event> events_;
   bushd_receiver receiver_{};
-  std::optional<Outstanding> outstanding_;
+  std::optional<Exchange> exchange_;
   // How long an answer may be late. All wait meanwhile, so it follows the latencies seen: from 40
   // ms, which any adapter keeps, down to 10 ms on a good one.
   static constexpr std::int64_t kMaxPatienceUs = 40'000;
@@ -231,10 +319,12 @@ class Master {
   std::int64_t sync_due_us_ = 0;
   std::int64_t stepped_us_ = 0;
   std::uint8_t tag_ = 0;
-  std::optional<std::uint8_t> mark_tag_;  // of the last SYNC sent
-  bool disagreed_ = false;                // MCUs, about the mark before
-  std::uint64_t bad_frames_ = 0;
-  std::uint64_t timeouts_ = 0;
+  std::optional<std::uint32_t> mark_;  // of the last SYNC sent
+  bool disagreed_ = false;             // MCUs, about the mark before
+  std::optional<Emergency> emergency_;
+  std::int64_t other_master_until_us_ = INT64_MIN;
+  std::uint16_t salt_ = 0;
+  BusHealth bus_health_;
 };
 
 }  // namespace bushd::link
