@@ -205,8 +205,9 @@ bushd_status bushd_decode_control(const uint8_t* payload, size_t size, bushd_con
   reader r = read_from(payload, size);
   message->actions = get8(&r);
   const uint8_t both = BUSHD_CONTROL_ENABLE | BUSHD_CONTROL_DISABLE;
-  return finish(&r, message->actions <= (both | BUSHD_CONTROL_CLEAR_FAULTS) &&
-                        (message->actions & both) != both);
+  return finish(
+      &r, message->actions <= (both | BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES) &&
+              (message->actions & both) != both);
 }
 
 size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* payload) {

@@ -154,9 +154,10 @@ typedef struct bushd_assign {
 } bushd_assign;
 
 enum {
-  BUSHD_CONTROL_ENABLE = 1 << 0,       // EN high
-  BUSHD_CONTROL_DISABLE = 1 << 1,      // EN low; refused while a motor moves
-  BUSHD_CONTROL_CLEAR_FAULTS = 1 << 2  // refused while a motor moves
+  BUSHD_CONTROL_ENABLE = 1 << 0,        // EN high
+  BUSHD_CONTROL_DISABLE = 1 << 1,       // EN low; refused while a motor moves
+  BUSHD_CONTROL_CLEAR_FAULTS = 1 << 2,  // refused while a motor moves
+  BUSHD_CONTROL_FORGET_TABLES = 1 << 3  // all of them; refused while a motor moves
 };
 typedef struct bushd_control {
   uint8_t actions;
