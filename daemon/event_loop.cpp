@@ -12,6 +12,8 @@
 #include <csignal>
 #include <cstring>
 
+#include "config/port_pattern.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -30,6 +32,18 @@ std::int64_t cpu_us() {
   getrusage(RUSAGE_SELF, &usage);
   return (usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) * 1'000'000 + usage.ru_utime.tv_usec +
          usage.ru_stime.tv_usec;
+}
+
+// Of the ports that the configuration may mean, the first that opens; else why the first does not.
+Result<serial::SerialPort> open_first(const config::Bus& bus) {
+  std::optional<Error> first_error;
+  for (const std::string& path : config::ports_matching(bus.port)) {
+    auto opened = serial::SerialPort::open(path, bus.baud);
+    if (opened) return opened;
+    if (!first_error) first_error = opened.error();
+  }
+  if (first_error) return fail(*first_error);
+  return fail(Error{.message = "no port matches", .file = bus.port});
 }
 
 }  // namespace
@@ -131,7 +145,7 @@ void EventLoop::open_port(std::int64_t now, std::size_t bus) {
   Port& port = ports_[bus];
   const config::Bus& config = config_.buses[bus];
   port.open_due_us = now + kReopenUs;
-  auto opened = SerialPort::open(config.port, config.baud);
+  auto opened = open_first(config);
   Result<void> watched;
   if (opened) watched = watch(opened->fd(), EPOLLIN, bus);
   if (!opened || !watched) {
@@ -145,7 +159,7 @@ void EventLoop::open_port(std::int64_t now, std::size_t bus) {
   }
   port.serial = std::move(*opened);
   port.last_error.clear();
-  spdlog::info("bus {}: port {} opened at {} baud", config.name, config.port, config.baud);
+  spdlog::info("bus {}: port {} opened at {} baud", config.name, port.serial->path(), config.baud);
   core_.port_opened(now, bus);
 }
 
@@ -153,17 +167,17 @@ void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& 
   Port& port = ports_[bus];
   if (!port.serial) return;
   const config::Bus& config = config_.buses[bus];
+  const std::string path = port.serial->path();
   port.serial.reset();  // closing takes it out of the epoll set
   port.open_due_us = now + kReopenUs;
-  port.last_error = config.port + ": " + cause;
-  spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, config.port,
-                cause);
+  port.last_error = path + ": " + cause;
+  spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, path, cause);
   core_.port_lost(now, bus, "is out of reach: port " + port.last_error);
 }
 
 void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t events) {
   if (!ports_[bus].serial) return;
-  SerialPort& serial = *ports_[bus].serial;
+  serial::SerialPort& serial = *ports_[bus].serial;
   if (events & EPOLLIN) {
     std::vector<std::uint8_t> bytes;
     const auto read = serial.read(bytes);
@@ -200,7 +214,7 @@ void EventLoop::reload_tables() {
 }
 
 void EventLoop::update_write_interest(std::size_t bus) {
-  const SerialPort& serial = *ports_[bus].serial;
+  const serial::SerialPort& serial = *ports_[bus].serial;
   epoll_event event{};
   event.events = EPOLLIN | (serial.wants_to_write() ? static_cast<std::uint32_t>(EPOLLOUT) : 0u);
   event.data.u64 = bus;

@@ -11,8 +11,8 @@
 #include "config/config.h"
 #include "daemon/core.h"
 #include "daemon/move_log.h"
-#include "daemon/serial_port.h"
 #include "lcm/transport.h"
+#include "serial/serial_port.h"
 
 namespace bushd::daemon {
 
@@ -33,7 +33,7 @@ class EventLoop : private Outputs {
   static constexpr std::int64_t kShutDownSlackUs = 3'000'000;
 
   struct Port {
-    std::optional<SerialPort> serial;
+    std::optional<serial::SerialPort> serial;
     std::int64_t open_due_us = 0;
     std::string last_error;  // so that a missing port is logged once, not twice a second
   };

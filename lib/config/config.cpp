@@ -30,7 +30,8 @@ Result<Config> parse(std::string_view text, const std::filesystem::path& path) {
 bool same_but_for_tables(const Config& a, const Config& b) {
   const auto bus = [](const Bus& x, const Bus& y) {
     return x.name == y.name && x.port == y.port && x.baud == y.baud && x.tick_us == y.tick_us &&
-           x.format == y.format;
+           x.format == y.format && x.table_runs == y.table_runs && x.table_ticks == y.table_ticks &&
+           x.emergency_stop == y.emergency_stop;
   };
   const auto mcu = [](const Mcu& x, const Mcu& y) {
     return x.bus == y.bus && x.address == y.address;

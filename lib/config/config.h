@@ -48,10 +48,13 @@ struct Lcm {
 
 struct Bus {
   std::string name;
-  std::string port;        // as written in the file
+  std::string port;        // as written in the file; may be a pattern (config/port_pattern.h)
   std::uint32_t baud = 0;  // one of libserial's fixed rates
   std::uint32_t tick_us = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
+  bool table_runs = false;  // a move from rest is given to the MCU as a whole, if the MCU can
+  bool table_ticks = true;  // streamed ticks may be told as states of the run
+  bushd_how emergency_stop = BUSHD_RAMP_DOWN;
 
   std::uint32_t tick_ns() const { return tick_us * 1000u; }
 };

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "config/checks.h"
+#include "config/port_pattern.h"
 #include "tables/table_file.h"
 
 namespace bushd::config {
@@ -127,13 +128,35 @@ Result<void> read_lcm(const TomlReader& root, Config* config) {
   return {};
 }
 
-Result<bushd_format> read_format(const TomlReader& reader) {
-  constexpr std::string_view kRule = "\"fine\" or \"coarse\"";
-  const auto format = reader.string("format", kRule);
-  if (!format) return fail(format.error());
-  if (*format == "fine") return BUSHD_FORMAT_FINE;
-  if (*format == "coarse") return BUSHD_FORMAT_COARSE;
-  return refuse(reader, "format", *format, kRule);
+// Which of two words stands there: 0 or 1.
+Result<int> read_word(const TomlReader& reader, std::string_view key, std::string_view first,
+                      std::string_view second) {
+  const std::string rule = fmt::format("\"{}\" or \"{}\"", first, second);
+  const auto word = reader.string(key, rule);
+  if (!word) return fail(word.error());
+  if (*word == first) return 0;
+  if (*word == second) return 1;
+  return refuse(reader, key, *word, rule);
+}
+
+// The keys of a bus that may be left out.
+Result<void> read_manners(const TomlReader& reader, Bus* bus) {
+  if (reader.has("moves")) {
+    const auto moves = read_word(reader, "moves", "stream", "table");
+    if (!moves) return fail(moves.error());
+    bus->table_runs = *moves == 1;
+  }
+  if (reader.has("frames")) {
+    const auto frames = read_word(reader, "frames", "auto", "ticks");
+    if (!frames) return fail(frames.error());
+    bus->table_ticks = *frames == 0;
+  }
+  if (reader.has("emergency_stop")) {
+    const auto how = read_word(reader, "emergency_stop", "ramp", "cut");
+    if (!how) return fail(how.error());
+    bus->emergency_stop = *how == 0 ? BUSHD_RAMP_DOWN : BUSHD_CUT;
+  }
+  return {};
 }
 
 Result<std::uint32_t> read_baud(const TomlReader& reader) {
@@ -161,6 +184,12 @@ Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vec
     std::error_code missing;
     const bool same = plain(bus.port) == plain(other.port) ||
                       std::filesystem::equivalent(bus.port, other.port, missing);
+    if (!same && patterns_may_meet(bus.port, other.port)) {
+      return fail(reader.error(
+          "port", fmt::format("\"{}\" and \"{}\", the port of bus \"{}\", may be the same port; "
+                              "allowed: one bus a port. Write more of the names",
+                              bus.port, other.port, other.name)));
+    }
     if (!same) continue;
     return fail(reader.error(
         "port", fmt::format("\"{}\" is the port \"{}\" of bus \"{}\"; allowed: one bus "
@@ -173,7 +202,9 @@ Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vec
 Result<void> read_buses(Loading* loading) {
   Taken names;
   for (const TomlReader& reader : loading->buses) {
-    if (auto known = reader.only({"name", "port", "baud", "tick_us", "format"}); !known) {
+    if (auto known = reader.only(
+            {"name", "port", "baud", "tick_us", "format", "moves", "frames", "emergency_stop"});
+        !known) {
       return known;
     }
     Bus bus;
@@ -181,7 +212,8 @@ Result<void> read_buses(Loading* loading) {
     if (!name) return fail(name.error());
     bus.name = std::move(*name);
     if (auto taken = names.take(reader, "name", bus.name, bus.name); !taken) return taken;
-    constexpr std::string_view kPortRule = "the path of a serial port, such as \"/dev/ttyUSB0\"";
+    constexpr std::string_view kPortRule =
+        "the path of a serial port, such as \"/dev/ttyUSB0\" or \"/dev/ttyUSB*\"";
     auto port = reader.string("port", kPortRule);
     if (!port) return fail(port.error());
     if (port->empty() || port->find('\0') != std::string::npos) {
@@ -196,9 +228,10 @@ Result<void> read_buses(Loading* loading) {
         reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
     if (!tick_us) return fail(tick_us.error());
     bus.tick_us = static_cast<std::uint32_t>(*tick_us);
-    const auto format = read_format(reader);
+    const auto format = read_word(reader, "format", "fine", "coarse");
     if (!format) return fail(format.error());
-    bus.format = *format;
+    bus.format = *format == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
+    if (auto read = read_manners(reader, &bus); !read) return read;
     loading->config.buses.push_back(std::move(bus));
   }
   return {};

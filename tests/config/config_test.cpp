@@ -48,6 +48,32 @@ TEST(Config, GoodFileIsReadInItsOrder) {
   EXPECT_EQ(config->table_of(slit).name(), "t");
 }
 
+TEST(Config, MannersOfABusHaveDefaults) {
+  const auto plain = ConfigFile(kGood).load();
+  ASSERT_TRUE(plain.has_value()) << plain.error().text();
+  EXPECT_FALSE(plain->buses[0].table_runs);
+  EXPECT_TRUE(plain->buses[0].table_ticks);
+  EXPECT_EQ(plain->buses[0].emergency_stop, BUSHD_RAMP_DOWN);
+  const auto chosen = ConfigFile(replaced(kGood, "format = \"fine\"\n",
+                                          "format = \"fine\"\nmoves = \"table\"\n"
+                                          "frames = \"ticks\"\nemergency_stop = \"cut\"\n"))
+                          .load();
+  ASSERT_TRUE(chosen.has_value()) << chosen.error().text();
+  EXPECT_TRUE(chosen->buses[0].table_runs);
+  EXPECT_FALSE(chosen->buses[0].table_ticks);
+  EXPECT_EQ(chosen->buses[0].emergency_stop, BUSHD_CUT);
+  EXPECT_FALSE(chosen->buses[1].table_runs) << "of this bus only";
+  EXPECT_FALSE(same_but_for_tables(*plain, *chosen)) << "needs a restart";
+}
+
+TEST(Config, PortsMayBePatterns) {
+  const ConfigFile file(replaced(replaced(kGood, "no-such-port-a", "no-such-port-a*"),
+                                 "no-such-port-b", "no-such-port-b[0-9]"));
+  const auto config = file.load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(config->buses[0].port, "/dev/no-such-port-a*");
+}
+
 TEST(Config, LcmHasDefaults) {
   const ConfigFile file(kGood.substr(kGood.find("[[bus]]")));
   const auto config = file.load();
@@ -145,7 +171,8 @@ INSTANTIATE_TEST_SUITE_P(
         change("UnknownSection", "[[mcu]]", "[[motors]]", 16, "motors",
                "unknown key; allowed here: lcm, bus, mcu, group, motor"),
         change("UnknownKey", "tick_us", "tick_ms", 8, "bus[0].tick_ms",
-               "unknown key; allowed here: name, port, baud, tick_us, format"),
+               "unknown key; allowed here: name, port, baud, tick_us, format, moves, frames, "
+               "emergency_stop"),
         change("NameMissing", "name = \"hall\"\n", "", 4, "bus[0].name", "is missing"),
         change("NameBad", "\"hall\"", "\"ha:ll\"", 5, "bus[0].name",
                "is \"ha:ll\"; allowed: 1..63 characters of A-Z a-z 0-9 _ . -"),
@@ -170,7 +197,24 @@ INSTANTIATE_TEST_SUITE_P(
         change("TickFloat", "2560", "2560.0", 8, "bus[0].tick_us", "floating-point"),
         change("FormatMissing", "format = \"fine\"\n", "", 4, "bus[0].format", "is missing"),
         change("FormatUnknown", "\"fine\"", "\"medium\"", 9, "bus[0].format",
-               "is \"medium\"; allowed: \"fine\" or \"coarse\"")),
+               "is \"medium\"; allowed: \"fine\" or \"coarse\""),
+        change("PortPatternsOfTwoBuses", "no-such-port-b", "no-such-*", 12, "bus[1].port",
+               "may be the same port; allowed: one bus a port. Write more of the names"),
+        change("PortNul", "no-such-port-a", "a\\u0000b*", 6, "bus[0].port", "serial port"),
+        change("MovesUnknown", "format = \"fine\"\n", "format = \"fine\"\nmoves = \"whole\"\n", 10,
+               "bus[0].moves", "is \"whole\"; allowed: \"stream\" or \"table\""),
+        change("MovesIsBool", "format = \"fine\"\n", "format = \"fine\"\nmoves = true\n", 10,
+               "bus[0].moves", "allowed: \"stream\" or \"table\""),
+        change("FramesUnknown", "format = \"fine\"\n", "format = \"fine\"\nframes = \"\"\n", 10,
+               "bus[0].frames", "is \"\"; allowed: \"auto\" or \"ticks\""),
+        change("FramesIsArray", "format = \"fine\"\n", "format = \"fine\"\nframes = [\"ticks\"]\n",
+               10, "bus[0].frames", "allowed: \"auto\" or \"ticks\""),
+        change("EmergencyStopUnknown", "format = \"fine\"\n",
+               "format = \"fine\"\nemergency_stop = \"Cut\"\n", 10, "bus[0].emergency_stop",
+               "is \"Cut\"; allowed: \"ramp\" or \"cut\""),
+        change("EmergencyStopIsNumber", "format = \"fine\"\n",
+               "format = \"fine\"\nemergency_stop = 1\n", 10, "bus[0].emergency_stop",
+               "is 1; allowed: \"ramp\" or \"cut\"")),
     kNames);
 
 INSTANTIATE_TEST_SUITE_P(

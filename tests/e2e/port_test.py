@@ -65,6 +65,25 @@ class Port(EndToEndTest):
         self.assertEqual(self.motors()["a0"]["position_steps"], -3995)
         self.assertEqual(self.bushd.end(), 0)
 
+    def test_back_under_another_name(self):
+        self.write_config(port="tty[0-9]")
+        self.bushd = self.start_bushd()
+        self.wait_until("the daemon to look", lambda: f"{self.file('tty[0-9]')}: no port matches" in self.bushd.said())
+        bushsim = self.start_bushsim(link="tty3")
+        self.wait_until_ready()
+        self.assertIn(f"port {self.file('tty3')} opened", self.bushd.said())
+        self.command("move", "--wait", "a0", "5")
+        bushsim.end()
+        self.wait_until("the port to be lost", lambda: f"port {self.file('tty3')} lost" in self.bushd.said())
+        # What is there under the first name is no port any more: the next that opens is taken.
+        self.file("tty3").write_text("a file")
+        self.start_bushsim("trace-after.vcd", link="tty7")
+        self.wait_until_ready()
+        self.assertIn(f"port {self.file('tty7')} opened", self.bushd.said())
+        self.command("set", "a0", "5")
+        self.command("move", "--wait", "a0", "--to", "0")
+        self.assertEqual(self.bushd.end(), 0)
+
     def test_no_serial_port_at_all(self):
         self.write_config()
         self.file("port").write_text("a file")

@@ -40,10 +40,10 @@ def program(name):
     return os.environ[name]
 
 
-def configuration(port, displacement_format="fine"):
+def configuration(port, displacement_format="fine", bus_lines=()):
     lines = ['[lcm]\nurl = "udpm://239.255.76.67:7667?ttl=0"\nprefix = "BUSHD"']
     lines += [f'[[bus]]\nname = "hall"\nport = "{port}"\nbaud = 500000\ntick_us = {TICK_US}']
-    lines += [f'format = "{displacement_format}"']
+    lines += [f'format = "{displacement_format}"', *bus_lines]
     lines += [f'[[mcu]]\nbus = "hall"\naddress = {address}' for address in (1, 2)]
     lines += [f'[[group]]\nname = "group{i}"\ntable = "{table}"' for i, table in enumerate(TABLES)]
     for name, (address, output) in MOTORS.items():
@@ -116,11 +116,11 @@ class EndToEndTest(unittest.TestCase):
         self.programs.append(running)
         return running
 
-    def write_config(self, displacement_format="fine"):
-        self.file("bushd.toml").write_text(configuration(self.file("port"), displacement_format))
+    def write_config(self, displacement_format="fine", bus_lines=(), port="port"):
+        self.file("bushd.toml").write_text(configuration(self.file(port), displacement_format, bus_lines))
 
-    def start_bushsim(self, trace="trace.vcd"):
-        command = [program("BUSHSIM"), "--config", self.file("bushd.toml"), "--link", self.file("port")]
+    def start_bushsim(self, trace="trace.vcd", link="port", options=()):
+        command = [program("BUSHSIM"), "--config", self.file("bushd.toml"), "--link", self.file(link), *options]
         bushsim = self.start([*command, "--trace", self.file(trace)], f"bushsim-{len(self.programs)}.log", True)
         self.wait_until("bushsim to offer its port", lambda: "bushsim: ready" in bushsim.said())
         return bushsim
@@ -129,8 +129,8 @@ class EndToEndTest(unittest.TestCase):
         command = [program("BUSHD"), "--config", self.file("bushd.toml"), "--move-log", self.file(moves)]
         return self.start(command, f"bushd-{len(self.programs)}.log", True)
 
-    def bring_up(self, displacement_format="fine"):
-        self.write_config(displacement_format)
+    def bring_up(self, displacement_format="fine", bus_lines=()):
+        self.write_config(displacement_format, bus_lines)
         self.bushsim = self.start_bushsim()
         self.bushd = self.start_bushd()
         self.wait_until_ready()

@@ -1,5 +1,5 @@
 // The real thing: a pty of the kernel, opened through libserial.
-#include "daemon/serial_port.h"
+#include "serial/serial_port.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@
 #include <numeric>
 #include <string>
 
-namespace bushd::daemon {
+namespace bushd::serial {
 namespace {
 
 using testing::HasSubstr;
@@ -235,4 +235,4 @@ TEST_F(Pty, UnknownRateIsRefused) {
 }
 
 }  // namespace
-}  // namespace bushd::daemon
+}  // namespace bushd::serial

@@ -1,4 +1,4 @@
-#include "daemon/serial_port.h"
+#include "serial/serial_port.h"
 
 #include <fcntl.h>
 #include <libserial/SerialPort.h>
@@ -13,7 +13,7 @@
 #include <memory>
 #include <utility>
 
-namespace bushd::daemon {
+namespace bushd::serial {
 namespace {
 
 constexpr std::size_t kMaxUnsent =
@@ -111,7 +111,7 @@ Result<SerialPort> SerialPort::open(const std::string& path, std::uint32_t baud)
   }
   const auto fd = open_and_lock(path);
   if (!fd) return fail(fd.error());
-  SerialPort port(*fd);
+  SerialPort port(*fd, path);
   if (const auto ready = set_up_with_libserial(path, *fd, rate->rate); !ready) {
     return fail(ready.error());
   }
@@ -120,12 +120,15 @@ Result<SerialPort> SerialPort::open(const std::string& path, std::uint32_t baud)
 }
 
 SerialPort::SerialPort(SerialPort&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)), unsent_(std::move(other.unsent_)) {}
+    : fd_(std::exchange(other.fd_, -1)),
+      path_(std::move(other.path_)),
+      unsent_(std::move(other.unsent_)) {}
 
 SerialPort& SerialPort::operator=(SerialPort&& other) noexcept {
   if (this != &other) {
     if (fd_ >= 0) ::close(fd_);
     fd_ = std::exchange(other.fd_, -1);
+    path_ = std::move(other.path_);
     unsent_ = std::move(other.unsent_);
   }
   return *this;
@@ -163,4 +166,4 @@ Result<void> SerialPort::flush() {
   return {};
 }
 
-}  // namespace bushd::daemon
+}  // namespace bushd::serial

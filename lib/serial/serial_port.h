@@ -6,11 +6,12 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/result.h"
 
-namespace bushd::daemon {
+namespace bushd::serial {
 
 class SerialPort {
  public:
@@ -23,6 +24,7 @@ class SerialPort {
   ~SerialPort();
 
   int fd() const { return fd_; }
+  const std::string& path() const { return path_; }
 
   // Appends what has arrived to `bytes`. An error means that the port is gone.
   Result<void> read(std::vector<std::uint8_t>& bytes);
@@ -34,10 +36,11 @@ class SerialPort {
   bool wants_to_write() const { return !unsent_.empty(); }
 
  private:
-  explicit SerialPort(int fd) : fd_(fd) {}
+  SerialPort(int fd, std::string path) : fd_(fd), path_(std::move(path)) {}
 
   int fd_ = -1;
+  std::string path_;
   std::vector<std::uint8_t> unsent_;
 };
 
-}  // namespace bushd::daemon
+}  // namespace bushd::serial
