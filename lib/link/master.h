@@ -219,6 +219,7 @@ class Master {
     std::uint8_t type = 0;
     std::uint8_t tag = 0;
     std::vector<Awaited> awaited;
+    std::int64_t sent_us = 0;        // when the request has left
     std::int64_t line_quiet_us = 0;  // when the last answer should have passed
     std::int64_t timeout_us = 0;
     // IDENTIFY: who answered. Several MCUs may have the address.
@@ -227,8 +228,8 @@ class Master {
   };
   struct Emergency {
     bushd_how how;
-    bool send = true;
-    std::int64_t until_us = 0;  // 0: not yet sent
+    std::int64_t due_us = 0;
+    std::int64_t until_us = 0;  // 0: not yet said
   };
 
   // master.cpp
@@ -244,10 +245,10 @@ class Master {
 
   // master_receive.cpp: answers, and their absence
   void handle_frame(std::int64_t now_us, const bushd_frame& frame);
-  bool handle_answer(std::int64_t now_us, std::size_t mcu, const bushd_frame& frame);
+  bool handle_answer(std::int64_t now_us, const Awaited& from, const bushd_frame& frame);
   void answered(std::int64_t now_us, Awaited& awaited);
   void handle_report(std::int64_t now_us, std::size_t mcu, const bushd_report& report,
-                     std::int64_t polled_us);
+                     std::int64_t line_us);
   void note_health(Mcu& mcu, const bushd_report& report);
   void handle_timeout(std::int64_t now_us);
   void handle_silence(std::int64_t now_us, std::size_t mcu, std::uint8_t type);
@@ -258,13 +259,18 @@ class Master {
 
   // master_connect.cpp
   bool send_due_identify(std::int64_t now_us);
-  void finish_identify(std::int64_t now_us, std::size_t mcu, const Exchange& exchange);
+  void finish_identify(std::int64_t now_us, std::size_t mcu,
+                       const std::vector<bushd_identity>& identities);
   void handle_identity(std::int64_t now_us, std::size_t mcu, const bushd_identity& identity);
   void handle_tables(std::size_t mcu, const bushd_tables& held);
   void handle_acknowledgement(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
                               std::uint8_t status);
-  void follow_connecting(std::size_t mcu, bool in_step);
+  void follow_connecting(std::int64_t now_us, std::size_t mcu, bool in_step);
   std::string unfit(const Mcu& mcu, const bushd_identity& identity) const;  // "" when it fits
+  template <class Encode>
+  static void add_request(Mcu& mcu, std::uint8_t type, Encode encode);
+  static void add_control(Mcu& mcu, std::uint8_t actions);
+  static void add_table(Mcu& mcu, std::uint8_t slot);
   void write_script(Mcu& mcu) const;
   void go_offline(std::size_t mcu, const std::string& cause, std::int64_t retry_due_us);
 
@@ -275,30 +281,27 @@ class Master {
     const Stream& stream = mcu.stream[motor];
     return stream.active && !stream.finished && (mcu.replacing >> motor & 1) == 0;
   }
-  struct Horizon {
-    Tick begin;  // a frame that begins later can wait
-    Tick end;    // no tick from here on is sent yet
-  };
   bool fail_late_replacements(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
   bool send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced = false);
-  bool send_ticks_of(std::int64_t now_us, std::size_t mcu, Tick now, std::int64_t lead_us);
+  bool send_ticks_of(std::int64_t now_us, std::size_t mcu, Tick now, Tick lead);
   bool send_table_runs(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first);
   bool send_table_ticks(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first,
                         Tick max_ticks, unsigned flags);
   void send_ticks(std::int64_t now_us, std::size_t mcu, std::uint16_t mask, Tick first,
                   unsigned count, unsigned flags);
-  void note_sent(std::size_t mcu, std::uint16_t mask, Tick until);
+  void note_sent(std::size_t mcu, std::uint8_t motor, Tick first, Tick until);
   void follow_replacements(std::size_t mcu);
   // An MCU in tick `now` or later can no longer change tick `at`.
   static bool too_late(Tick at, Tick now) { return at < now + 2; }
   void follow_streams(std::size_t mcu);
-  void go_back(std::size_t mcu, std::uint8_t motor);
+  static void go_back(Mcu& mcu, std::uint8_t motor);
   void drop_streams(Mcu& mcu);
 
   // master_sync.cpp
   std::int64_t mark_difference_ns(const bushd_report& a, const bushd_report& b) const;
   MarkSurvey survey_marks() const;
+  void note_offsets(const bushd_report* reference);
   bool send_due_sync(std::int64_t now_us);
 
   BusSetup setup_;
@@ -326,5 +329,12 @@ class Master {
   std::uint16_t salt_ = 0;
   BusHealth bus_health_;
 };
+
+template <class Encode>
+void Master::add_request(Mcu& mcu, std::uint8_t type, Encode encode) {
+  Request request{.type = type, .payload = std::vector<std::uint8_t>(BUSHD_FRAME_MAX_PAYLOAD)};
+  request.payload.resize(encode(request.payload.data()));
+  mcu.script.push_back(std::move(request));
+}
 
 }  // namespace bushd::link

@@ -37,7 +37,7 @@ Master::MarkSurvey Master::survey_marks() const {
     survey.waiting |= !synced || !marked;
     if (!synced) continue;
     survey.all_asked &= mcu.asked_since_mark;
-    if (!marked || mark_tag_ != report.mark_tag || report.mark_ns >= setup_.tick_ns) continue;
+    if (!marked || mark_ != report.mark || report.mark_ns >= setup_.tick_ns) continue;
     if (survey.reference == nullptr) {
       survey.reference = &report;
     } else if (std::abs(mark_difference_ns(report, *survey.reference)) >
@@ -48,29 +48,45 @@ Master::MarkSurvey Master::survey_marks() const {
   return survey;
 }
 
+void Master::note_offsets(const bushd_report* reference) {
+  if (reference == nullptr) return;
+  for (Mcu& mcu : mcus_) {
+    const bushd_report& report = mcu.view.report;
+    const bool comparable = mcu.view.reported && (report.flags & BUSHD_FLAG_MARK) != 0 &&
+                            report.mark == reference->mark;
+    if (!comparable) continue;
+    mcu.health.clock_offset_us = static_cast<double>(mark_difference_ns(report, *reference)) * 1e-3;
+  }
+}
+
 bool Master::send_due_sync(std::int64_t now_us) {
   if (now_us < sync_due_us_) return false;
   const MarkSurvey survey = survey_marks();
+  note_offsets(survey.reference);
   const bool doubtful = !survey.agreed && !disagreed_;
   const bool soon = survey.waiting || doubtful;
   sync_due_us_ = now_us + (soon ? kFirstSyncPeriodUs : kSyncPeriodUs);
   if (!survey.listening) return false;
+  // By the clock, so that no two marks of a master have the same name.
+  const auto name = static_cast<std::uint32_t>(now_us / 1000);
   bushd_sync sync{};
-  if (mark_tag_) sync.mark_tag = *mark_tag_;
+  sync.master = setup_.master;
+  sync.mark = mark_ == name ? name + 1 : name;
+  if (mark_) sync.known_mark = *mark_;
   if (survey.reference != nullptr && survey.all_asked && !doubtful) {
     sync.follows = true;
     sync.mark_tick = survey.reference->mark_tick;
     sync.mark_ns = survey.reference->mark_ns;
-  } else if (!survey.anybody && mark_tag_) {
+  } else if (!survey.anybody && mark_) {
     // Nobody on the bus knows the time: it begins at the mark before.
     sync.follows = true;
     clock_.reset();
   }
   disagreed_ = doubtful;
-  std::array<std::uint8_t, 16> payload;
+  std::array<std::uint8_t, 24> payload;
   const std::size_t size = bushd_encode_sync(&sync, payload.data());
   send(now_us, BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, {payload.data(), size});
-  mark_tag_ = tag_;
+  mark_ = sync.mark;
   for (Mcu& mcu : mcus_) {
     mcu.asked_since_mark = false;
     // MCUs that wait are asked at once, so that the next mark can follow this one.
