@@ -14,7 +14,7 @@ typedef struct reader {
 
 static inline const uint8_t* take(reader* r, size_t size) {
   static const uint8_t kZeros[4] = {0, 0, 0, 0};
-  if ((size_t)(r->end - r->at) < size) {
+  if (r->short_of_bytes || (size_t)(r->end - r->at) < size) {
     r->short_of_bytes = true;
     return kZeros;
   }

@@ -27,11 +27,21 @@ bushd_status bushd_decode_identify(const uint8_t* payload, size_t size, bushd_id
   return finish(&r, message->slots >= 1);
 }
 
+static uint32_t fnv1a(uint32_t hash, const uint8_t* bytes, uint8_t count) {
+  for (uint8_t i = 0; i < count; ++i) hash = (hash ^ bytes[i]) * UINT32_C(16777619);
+  return hash;
+}
+
+// A CRC would not do: it is linear, so two MCUs that share a slot of 2^n would share it whatever
+// the salt. Hence FNV-1a and the last mixing of MurmurHash3.
 uint8_t bushd_identify_slot(const uint8_t* unique_id, uint16_t salt, uint8_t slots) {
   uint8_t bytes[2];
   bushd_put_u16(bytes, salt);
-  const uint16_t crc = bushd_crc16(BUSHD_CRC16_START, unique_id, BUSHD_UNIQUE_ID_SIZE);
-  return (uint8_t)(bushd_crc16(crc, bytes, sizeof bytes) % slots);
+  uint32_t hash = fnv1a(UINT32_C(2166136261), unique_id, BUSHD_UNIQUE_ID_SIZE);
+  hash = fnv1a(hash, bytes, sizeof bytes);
+  hash = (hash ^ hash >> 16) * UINT32_C(0x85EBCA6B);
+  hash = (hash ^ hash >> 13) * UINT32_C(0xC2B2AE35);
+  return (uint8_t)((hash ^ hash >> 16) % slots);
 }
 
 size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload) {

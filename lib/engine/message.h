@@ -79,6 +79,7 @@ typedef struct bushd_identify {
   uint8_t slots;  // >= 1
   uint16_t slot_units;
 } bushd_identify;
+// Two MCUs that share a slot are apart after a few other salts.
 uint8_t bushd_identify_slot(const uint8_t* unique_id, uint16_t salt, uint8_t slots);
 
 enum {

@@ -28,25 +28,69 @@ static bool part_fits(const bushd_ramp* ramp, uint16_t cruise, uint16_t end) {
   return end == 0 || (end <= ramp->count && ramp->code[end - 1] > cruise);
 }
 
+// Where one part follows another a jump in speed could hide. A step of delay x may be followed by
+// the first code of the accelerating side that is below x, and by anything slower; with n steps to
+// come after it, x must be at least D(n). Within a part both hold, since sides are sorted.
+
+// Codes from `at` on may follow a step of delay x.
+static bool may_follow(const bushd_table* table, uint16_t x, uint16_t at) {
+  return at == 0 || bushd_table_accel(table, at - 1u) >= x;
+}
+
+static bool speeds_up_in_order(const bushd_table* table, const bushd_run_state* state) {
+  const uint16_t top = state->accel_end;
+  const bool rises = state->accel_at < top;
+  const bool on_top = bushd_table_accel(table, top) <= table->cruise;
+  const uint16_t brake =
+      state->decel_left != 0 ? table->decel.code[state->decel_left - 1] : UINT16_MAX;
+  if (state->cruise_left != 0) {
+    if (!on_top) return false;
+  } else if (rises && !on_top && brake < table->accel.code[top]) {
+    return false;
+  }
+  if (state->lead_delay == 0) return true;
+  if (rises && table->accel.code[state->accel_at] > state->lead_delay) return false;
+  if (rises || state->cruise_left != 0) {
+    return may_follow(table, state->lead_delay, state->accel_at);
+  }
+  return brake >= state->lead_delay ||
+         (may_follow(table, state->lead_delay, top) && brake >= bushd_table_accel(table, top));
+}
+
+static bool slows_down_in_order(const bushd_table* table, const bushd_run_state* state) {
+  const uint16_t brakes_from = bushd_table_decel(table, state->decel_left);
+  if (state->cruise_left != 0) {
+    if (brakes_from > table->cruise) return false;
+  } else if (state->accel_at < state->accel_end) {
+    if (brakes_from > table->accel.code[state->accel_end - 1]) return false;
+  }
+  const uint32_t after_lead =
+      (uint32_t)state->decel_left + state->cruise_left + (state->accel_end - state->accel_at);
+  return state->lead_delay == 0 || bushd_table_decel(table, after_lead) <= state->lead_delay;
+}
+
+static bool parts_fit(const bushd_table* table, const bushd_run_state* state) {
+  const uint32_t most = UINT32_MAX - 1u - state->accel_end - state->decel_left;
+  return state->accel_at <= state->accel_end && state->cruise_left <= most &&
+         part_fits(&table->accel, table->cruise, state->accel_end) &&
+         part_fits(&table->decel, table->cruise, state->decel_left) &&
+         (state->lead_delay == 0 || state->lead_delay >= table->cruise) &&
+         speeds_up_in_order(table, state) && slows_down_in_order(table, state);
+}
+
 bool bushd_run_restore(bushd_run* run, const bushd_table* table, const bushd_run_state* state) {
   bushd_run_start(run, table, 0, state->direction);
   if (state->cruises) {
+    if (state->lead_delay != 0) return false;
     run->cruise_left = UINT32_MAX;
   } else {
-    if (state->accel_at > state->accel_end ||
-        !part_fits(&table->accel, table->cruise, state->accel_end) ||
-        !part_fits(&table->decel, table->cruise, state->decel_left)) {
-      return false;
-    }
+    if (!parts_fit(table, state)) return false;
+    run->lead_steps = state->lead_delay != 0;
+    run->lead_delay = state->lead_delay;
     run->accel_at = state->accel_at;
     run->accel_end = state->accel_end;
     run->cruise_left = state->cruise_left;
     run->decel_left = state->decel_left;
-  }
-  if (state->lead_delay != 0) {
-    if (state->lead_delay < table->cruise) return false;
-    run->lead_steps = 1;
-    run->lead_delay = state->lead_delay;
   }
   const uint16_t delay = bushd_run_delay(run);
   if (state->since >= delay || state->since_ns >= table->time_unit_ns) return false;

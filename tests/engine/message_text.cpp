@@ -1,6 +1,7 @@
 #include "engine/message_text.h"
 
 #include <cstdint>
+#include <initializer_list>
 
 #include "engine/message.h"
 
@@ -31,17 +32,36 @@ class Fields {
   std::string text_;
 };
 
+// The numbers of one element of a list.
+std::string parts(std::initializer_list<int64_t> values) {
+  std::string text;
+  for (const int64_t value : values) text += (text.empty() ? "" : "/") + std::to_string(value);
+  return text;
+}
+
+void append(std::string* list, const std::string& element) {
+  *list += (list->empty() ? "" : ":") + element;
+}
+
+void put(const bushd_identify& m, Fields& f) {
+  f.add("salt", m.salt).add("slots", m.slots).add("slot_units", m.slot_units);
+}
 void put(const bushd_identity& m, Fields& f) {
   f.add("protocol_version", m.protocol_version).add("motors", m.motors);
   f.add("firmware_version", m.firmware_version).add("boot_number", m.boot_number);
   f.add("slots", m.slots).add("queue_ticks", m.queue_ticks).add("table_codes", m.table_codes);
+  f.add("capabilities", m.capabilities);
+  f.add_list("unique_id", m.unique_id, BUSHD_UNIQUE_ID_SIZE, 1);
+}
+void put(const bushd_set_address& m, Fields& f) {
+  f.add_list("unique_id", m.unique_id, BUSHD_UNIQUE_ID_SIZE, 1).add("address", m.address);
 }
 void put(const bushd_configure& m, Fields& f) {
-  f.add("tick_ns", m.tick_ns).add("format", m.format);
+  f.add("tick_ns", m.tick_ns).add("format", m.format).add("silence_ticks", m.silence_ticks);
 }
 void put(const bushd_table_begin& m, Fields& f) {
   f.add("slot", m.slot).add("accel_count", m.accel_count).add("decel_count", m.decel_count);
-  f.add("cruise", m.cruise).add("time_unit_ns", m.time_unit_ns);
+  f.add("cruise", m.cruise).add("time_unit_ns", m.time_unit_ns).add("revision", m.revision);
 }
 void put(const bushd_table_data& m, Fields& f) {
   f.add("slot", m.slot).add("offset", m.offset).add("count", m.count);
@@ -49,6 +69,15 @@ void put(const bushd_table_data& m, Fields& f) {
 }
 void put(const bushd_table_end& m, Fields& f) {
   f.add("slot", m.slot).add("crc", m.crc);
+}
+void put(const bushd_tables& m, Fields& f) {
+  unsigned valid = 0;
+  std::string held;
+  for (size_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
+    if (m.slot[i].valid) valid |= 1u << i;
+    append(&held, parts({m.slot[i].crc, m.slot[i].revision}));
+  }
+  f.add("valid", valid).add_text("held", held);
 }
 void put(const bushd_assign& m, Fields& f) {
   f.add("motor", m.motor).add("slot", m.slot);
@@ -59,28 +88,63 @@ void put(const bushd_control& m, Fields& f) {
 void put(const bushd_set_position& m, Fields& f) {
   f.add("motor", m.motor).add("position_steps", m.position_steps);
 }
+void put(const bushd_poll& m, Fields& f) {
+  std::string entries;
+  for (size_t i = 0; i < m.count; ++i) {
+    const uint8_t* const at = m.entries + 3 * i;
+    append(&entries, parts({at[0], bushd_get_u16(at + 1)}));
+  }
+  f.add("count", m.count).add_text("entries", entries);
+}
 void put(const bushd_sync& m, Fields& f) {
-  f.add("follows", m.follows).add("mark_tag", m.mark_tag);
+  f.add("master", m.master).add("mark", m.mark).add("follows", m.follows);
+  f.add("known_mark", m.known_mark);
   f.add("mark_tick", m.mark_tick).add("mark_ns", m.mark_ns);
 }
 void put(const bushd_ticks& m, Fields& f) {
   f.add("epoch", m.epoch).add("flags", m.flags).add("first_tick", m.first_tick);
   f.add("count", m.count).add("mask", m.mask);
-  f.add_list("delays", m.delays, m.delays == nullptr ? 0 : m.motors, 2);
+  f.add_list("delays", m.delays, m.motors, 2);
   const size_t width = m.flags & BUSHD_TICKS_FINE ? 2 : 1;
   f.add_list("displacements", m.displacements, width * m.motors * m.count, 1);
+}
+void put(const bushd_table_ticks& m, Fields& f) {
+  f.add("epoch", m.epoch).add("flags", m.flags).add("first_tick", m.first_tick);
+  f.add("count", m.count);
+  std::string entries;
+  uint16_t at = 0;
+  for (bushd_table_ticks_entry entry; bushd_next_table_ticks_entry(&m, &at, &entry);) {
+    const bushd_run_state& s = entry.state;
+    append(&entries, parts({entry.motor, s.direction, s.cruises, s.since, s.since_ns, s.lead_delay,
+                            s.accel_at, s.accel_end, s.cruise_left, s.decel_left}));
+  }
+  f.add_text("entries", entries);
+}
+void put(const bushd_table_run& m, Fields& f) {
+  f.add("epoch", m.epoch).add("first_tick", m.first_tick);
+  std::string entries;
+  for (uint8_t i = 0; i < m.count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(&m, i);
+    append(&entries, parts({entry.motor, entry.slot, entry.direction, entry.steps}));
+  }
+  f.add_text("entries", entries);
+}
+void put(const bushd_emergency& m, Fields& f) {
+  f.add("how", m.how);
 }
 void put(const bushd_report& m, Fields& f) {
   f.add("state", m.state).add("faults", m.faults).add("flags", m.flags).add("epoch", m.epoch);
   f.add("boot_number", m.boot_number).add("tick", m.tick).add("tick_ns", m.tick_ns);
-  f.add("mark_tag", m.mark_tag).add("mark_tick", m.mark_tick).add("mark_ns", m.mark_ns);
-  f.add("moving", m.moving).add("inputs", m.inputs).add("bad_frames", m.bad_frames);
+  f.add("mark", m.mark).add("mark_tick", m.mark_tick).add("mark_ns", m.mark_ns);
+  f.add("rate_ppb", m.rate_ppb).add("moving", m.moving).add("running", m.running);
+  f.add("inputs", m.inputs).add("bad_frames", m.bad_frames);
   f.add("rejected_frames", m.rejected_frames).add("last_rejection", m.last_rejection);
-  f.add("motor_count", m.motor_count);
+  f.add("run_downs", m.run_downs).add("low_water_ticks", m.low_water_ticks);
+  f.add("islands", m.islands).add("island_from", m.island_from);
+  f.add("island_until", m.island_until).add("motor_count", m.motor_count);
   std::string motors;
   for (size_t i = 0; i < m.motor_count; ++i) {
-    motors += (i > 0 ? ":" : "") + std::to_string(m.motor[i].position_steps) + "/" +
-              std::to_string(m.motor[i].known_until);
+    append(&motors, parts({m.motor[i].position_steps, m.motor[i].known_until}));
   }
   f.add_text("motor", motors);
 }
@@ -108,7 +172,7 @@ std::string empty_text(const char* name, const bushd_frame& frame) {
 std::string message_text(const bushd_frame& frame) {
   switch (frame.type) {
     case BUSHD_MSG_IDENTIFY:
-      return empty_text("identify", frame);
+      return text("identify", frame, bushd_decode_identify);
     case BUSHD_MSG_CONFIGURE:
       return text("configure", frame, bushd_decode_configure);
     case BUSHD_MSG_TABLE_BEGIN:
@@ -124,11 +188,23 @@ std::string message_text(const bushd_frame& frame) {
     case BUSHD_MSG_SET_POSITION:
       return text("set_position", frame, bushd_decode_set_position);
     case BUSHD_MSG_POLL:
-      return empty_text("poll", frame);
+      return text("poll", frame, bushd_decode_poll);
     case BUSHD_MSG_SYNC:
       return text("sync", frame, bushd_decode_sync);
     case BUSHD_MSG_TICKS:
       return text("ticks", frame, bushd_decode_ticks);
+    case BUSHD_MSG_TABLE_TICKS:
+      return text("table_ticks", frame, bushd_decode_table_ticks);
+    case BUSHD_MSG_TABLE_RUN:
+      return text("table_run", frame, bushd_decode_table_run);
+    case BUSHD_MSG_EMERGENCY:
+      return text("emergency", frame, bushd_decode_emergency);
+    case BUSHD_MSG_SET_ADDRESS:
+      return text("set_address", frame, bushd_decode_set_address);
+    case BUSHD_MSG_TABLES:
+      return empty_text("get_tables", frame);
+    case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
+      return text("tables", frame, bushd_decode_tables);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY:
       return text("identity", frame, bushd_decode_identity);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_POLL:
@@ -142,9 +218,10 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {"identify",  "identity", "configure", "table_begin",    "table_data",
-          "table_end", "assign",   "control",   "set_position",   "poll",
-          "report",    "sync",     "ticks",     "acknowledgement"};
+  return {"identify",  "identity",  "configure",   "table_begin",     "table_data",
+          "table_end", "assign",    "control",     "set_position",    "poll",
+          "report",    "sync",      "ticks",       "acknowledgement", "table_ticks",
+          "table_run", "emergency", "set_address", "get_tables",      "tables"};
 }
 
 }  // namespace bushd::test

@@ -8,7 +8,7 @@
 
 namespace bushd::test {
 
-// "sync follows=1 mark_tag=41 ...", or "sync: impossible length" if the payload is refused.
+// "sync master=7 mark=41 ...", or "sync: impossible length" if the payload is refused.
 std::string message_text(const bushd_frame& frame);
 
 // All names that message_text can give.

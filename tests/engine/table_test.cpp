@@ -108,6 +108,43 @@ TEST(TableMaxSteps, SaturatesNever) {
   EXPECT_EQ(bushd_table_max_steps_per_tick(table.view(), 20'000'000), 20'000'001u);
 }
 
+// Bit by bit, as the definition has it.
+uint32_t crc32_of(const std::vector<uint8_t>& bytes) {
+  uint32_t crc = UINT32_MAX;
+  for (const uint8_t byte : bytes) {
+    crc ^= byte;
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ ((crc & 1) != 0 ? 0xEDB88320u : 0u);
+  }
+  return ~crc;
+}
+
+void append16(std::vector<uint8_t>* bytes, size_t value) {
+  bytes->push_back(static_cast<uint8_t>(value));
+  bytes->push_back(static_cast<uint8_t>(value >> 8));
+}
+
+TEST(TableCrc32, IsThatOfAllThatTheTableHolds) {
+  EXPECT_EQ(crc32_of({'1', '2', '3', '4', '5', '6', '7', '8', '9'}), 0xCBF43926u);
+  holds("crc32 == definition", [] {
+    const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
+    bushd_table view = *table.view();
+    const bool symmetric = *rc::gen::arbitrary<bool>();
+    if (symmetric) view.decel = view.accel;
+    const Law& law = table.law();
+    std::vector<uint8_t> bytes;
+    append16(&bytes, law.accel.size());
+    append16(&bytes, symmetric ? 0 : law.decel.size());
+    append16(&bytes, law.cruise);
+    append16(&bytes, law.unit_ns & 0xFFFF);
+    append16(&bytes, law.unit_ns >> 16);
+    for (const uint16_t code : law.accel) append16(&bytes, code);
+    if (!symmetric) {
+      for (const uint16_t code : law.decel) append16(&bytes, code);
+    }
+    RC_ASSERT(bushd_table_crc32(&view) == crc32_of(bytes));
+  });
+}
+
 TEST(RampIndex, HoldsThePrefixSumsAndTheGreatestIndexOfEachBucket) {
   holds("sum and bucket by definition", [] {
     const TestTable table(any_law(), true);
