@@ -62,6 +62,11 @@ Result<void> Client::listen() {
   auto replies = transport_->subscribe<reply_t>(options_.prefix + "_REPLY",
                                                 [this](const reply_t& reply) { on_reply(reply); });
   if (!replies) return replies;
+  auto health =
+      transport_->subscribe<health_t>(options_.prefix + "_HEALTH", [this](const health_t& part) {
+        if (auto complete = health_collector_.add(part)) newest_health_ = std::move(complete);
+      });
+  if (!health) return health;
   return transport_->subscribe<state_t>(options_.prefix + "_STATE",
                                         [this](const state_t& state) { on_state(state); });
 }
@@ -94,8 +99,8 @@ Result<void> Client::wait(Clock::time_point deadline) {
 }
 
 void Client::drain() {
-  // Twice: each of the two subscriptions may hold a full queue.
-  for (int i = 0; i < 2 && readable(transport_->fd()); ++i) transport_->handle();
+  // Thrice: each of the three subscriptions may hold a full queue.
+  for (int i = 0; i < 3 && readable(transport_->fd()); ++i) transport_->handle();
 }
 
 Error Client::no_daemon() const {
@@ -172,15 +177,24 @@ Result<reply_t> Client::run(command_t command, Until until,
   }
 }
 
-Result<Snapshot> Client::snapshot(std::chrono::milliseconds timeout) {
+template <class Whole>
+Result<Whole> Client::await(std::optional<Whole>& newest, std::chrono::milliseconds timeout) {
   drain();
-  newest_.reset();
+  newest.reset();
   const Clock::time_point deadline = Clock::now() + timeout;
-  while (!newest_) {
+  while (!newest) {
     if (auto waited = wait(deadline); !waited) return fail(waited.error());
-    if (!newest_ && Clock::now() >= deadline) return fail(no_daemon());
+    if (!newest && Clock::now() >= deadline) return fail(no_daemon());
   }
-  return std::move(*newest_);
+  return std::move(*newest);
+}
+
+Result<Snapshot> Client::snapshot(std::chrono::milliseconds timeout) {
+  return await(newest_, timeout);
+}
+
+Result<Health> Client::health(std::chrono::milliseconds timeout) {
+  return await(newest_health_, timeout);
 }
 
 }  // namespace bushd::lcm

@@ -53,6 +53,9 @@ class Client {
   // The newest complete snapshot that arrives from now on.
   Result<Snapshot> snapshot(std::chrono::milliseconds timeout);
 
+  // The same of the buses' health.
+  Result<Health> health(std::chrono::milliseconds timeout);
+
   // interrupt_fd has become readable during one of the calls above.
   bool interrupted() const { return interrupted_; }
 
@@ -66,6 +69,9 @@ class Client {
   void on_state(const state_t& state);
   // Handles what has been waiting since the last call of ours.
   void drain();
+  // The newest of what is collected from now on.
+  template <class Whole>
+  Result<Whole> await(std::optional<Whole>& newest, std::chrono::milliseconds timeout);
   // Handles messages until `deadline`, or until there were some. Fails when interrupted.
   Result<void> wait(Clock::time_point deadline);
   Error no_daemon() const;
@@ -82,6 +88,8 @@ class Client {
 
   SnapshotCollector collector_;
   std::optional<Snapshot> newest_;
+  HealthCollector health_collector_;
+  std::optional<Health> newest_health_;
   std::optional<std::int64_t> sequence_;  // of the state heard last
   Clock::time_point state_heard_{};
   bool restarted_ = false;

@@ -4,7 +4,8 @@
 
 namespace bushd::lcm {
 
-std::optional<Snapshot> SnapshotCollector::add(state_t part) {
+template <class Whole, class Part>
+std::optional<Whole> Collector<Whole, Part>::add(Part part) {
   if (part.parts < 1 || part.parts > kMaxParts || part.part < 0 || part.part >= part.parts) {
     return std::nullopt;
   }
@@ -16,10 +17,13 @@ std::optional<Snapshot> SnapshotCollector::add(state_t part) {
   const std::int32_t index = part.part;
   collected_.insert_or_assign(index, std::move(part));
   if (collected_.size() != static_cast<std::size_t>(parts_)) return std::nullopt;
-  Snapshot snapshot{.sequence = sequence_, .mcus = {}};
-  for (auto& [at, state] : collected_) snapshot.mcus.push_back(std::move(state));
+  std::vector<Part> all;
+  for (auto& [at, one] : collected_) all.push_back(std::move(one));
   collected_.clear();
-  return snapshot;
+  return Whole{sequence_, std::move(all)};
 }
+
+template class Collector<Snapshot, state_t>;
+template class Collector<Health, health_t>;
 
 }  // namespace bushd::lcm

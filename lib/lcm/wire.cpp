@@ -110,6 +110,28 @@ void scan_fields(Scan& scan, std::type_identity<state_t>) {
   for (std::size_t i = 0; i < motors; ++i) scan_fields(scan, std::type_identity<motor_state_t>{});
 }
 
+constexpr std::size_t kMinMcuHealth = 2 * kMinText + 4 * kInt32 + 7 * kInt64 + 2 * kDouble + kInt8;
+
+void scan_fields(Scan& scan, std::type_identity<mcu_health_t>) {
+  scan.text();                      // mcu
+  scan.fixed(kInt32);               // address
+  scan.text();                      // unique_id
+  scan.fixed(2 * kInt32);           // firmware_version, boot_number
+  scan.fixed(7 * kInt64);           // crc_errors .. restarts
+  scan.fixed(kInt32);               // low_water_ticks
+  scan.fixed(2 * kDouble + kInt8);  // rate_ppm, clock_offset_us, two_masters
+}
+
+void scan_fields(Scan& scan, std::type_identity<health_t>) {
+  scan.fixed(2 * kInt64 + 2 * kInt32);  // utime_us, sequence, part, parts
+  scan.text();                          // bus
+  scan.text();                          // port_state
+  scan.fixed(kInt8 + 3 * kInt64);       // two_masters, crc_errors, stray_frames, recent_latency_us
+  scan.fixed(scan.count(2 * kInt64) * 2 * kInt64);  // latency_below_us, latency_answers
+  const std::size_t mcus = scan.count(kMinMcuHealth);
+  for (std::size_t i = 0; i < mcus; ++i) scan_fields(scan, std::type_identity<mcu_health_t>{});
+}
+
 template <class T>
 bool well_formed(std::span<const std::uint8_t> payload) {
   Scan scan(payload);
@@ -137,15 +159,22 @@ bool counts_match(const state_t& state) {
   return counted(state.motor_count, state.motors.size());
 }
 
+bool counts_match(const health_t& health) {
+  return counted(health.latency_count, health.latency_below_us.size()) &&
+         counted(health.latency_count, health.latency_answers.size()) &&
+         counted(health.mcu_count, health.mcus.size());
+}
+
 }  // namespace
 
 template <class T>
 Result<std::vector<std::uint8_t>> encode(const T& message) {
-  // The encoder reads `motor_count` elements, however many there are.
+  // The encoder reads as many elements as the counts say, however many there are.
   if (!counts_match(message)) {
     return fail(
-        fmt::format("{}: motor_count {} is not the length of its arrays; set it to that length",
-                    T::getTypeName(), message.motor_count));
+        fmt::format("{}: a count, such as motor_count, is not the length of its arrays; set "
+                    "it to that length",
+                    T::getTypeName()));
   }
   const auto size = static_cast<std::size_t>(message.getEncodedSize());
   if (size > kMaxMessageBytes) {
@@ -172,9 +201,11 @@ std::optional<T> decode(std::span<const std::uint8_t> payload) {
 }
 
 template Result<std::vector<std::uint8_t>> encode(const command_t&);
+template Result<std::vector<std::uint8_t>> encode(const health_t&);
 template Result<std::vector<std::uint8_t>> encode(const reply_t&);
 template Result<std::vector<std::uint8_t>> encode(const state_t&);
 template std::optional<command_t> decode(std::span<const std::uint8_t>);
+template std::optional<health_t> decode(std::span<const std::uint8_t>);
 template std::optional<reply_t> decode(std::span<const std::uint8_t>);
 template std::optional<state_t> decode(std::span<const std::uint8_t>);
 

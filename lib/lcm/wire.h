@@ -4,7 +4,8 @@
 // payload is first walked through without copying anything; only one whose every length fits the
 // bytes that are there is decoded.
 //
-// T is one of the types that travel by themselves: command_t, reply_t, state_t.
+// T is one of the types that travel by themselves: command_t, health_t, reply_t,
+// state_t.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +16,7 @@
 
 #include "base/result.h"
 #include "bushd/command_t.hpp"
+#include "bushd/health_t.hpp"
 #include "bushd/reply_t.hpp"
 #include "bushd/state_t.hpp"
 
@@ -24,8 +26,8 @@ namespace bushd::lcm {
 // above 65499 bytes.
 inline constexpr std::size_t kMaxMessageBytes = 60 * 1024;
 
-// The bytes to publish. Fails when the message is longer than kMaxMessageBytes, when `motor_count`
-// is not the length of the arrays it counts, or when a text contains a NUL (LCM's strings end
+// The bytes to publish. Fails when the message is longer than kMaxMessageBytes, when a count is
+// not the length of the arrays it counts, or when a text contains a NUL (LCM's strings end
 // there).
 template <class T>
 Result<std::vector<std::uint8_t>> encode(const T& message);

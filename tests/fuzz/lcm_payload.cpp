@@ -43,8 +43,11 @@ void run(Input input) {
       return check_behind_fingerprint<reply_t>(rest);
     case 2:
       return check_behind_fingerprint<state_t>(rest);
+    case 3:
+      return check_behind_fingerprint<health_t>(rest);
     default:
       check<command_t>(rest);
+      check<health_t>(rest);
       check<reply_t>(rest);
       check<state_t>(rest);
   }

@@ -194,5 +194,20 @@ TEST_F(ClientTest, SnapshotThatNeverCompletesIsAnError) {
   EXPECT_FALSE(client_->snapshot(milliseconds(1)));
 }
 
+TEST_F(ClientTest, HealthIsThatOfAllBuses) {
+  // The second part of one makes both of the next.
+  transport().subscribe<health_t>("BUSHD_HEALTH", [this](const health_t& heard) {
+    for (std::int32_t part = 0; heard.part == 1 && part < 2; ++part) {
+      ASSERT_TRUE(
+          transport().publish("BUSHD_HEALTH", test::health_part(heard.sequence + 1, part, 2)));
+    }
+  });
+  ASSERT_TRUE(transport().publish("BUSHD_HEALTH", test::health_part(1, 1, 2)));
+  const auto health = client_->health(std::chrono::minutes(5));
+  ASSERT_TRUE(health);
+  EXPECT_GT(health->sequence, 1);
+  EXPECT_EQ(health->buses.size(), 2u);
+}
+
 }  // namespace
 }  // namespace bushd::lcm

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "bushd/command_t.hpp"
+#include "bushd/health_t.hpp"
 #include "bushd/reply_t.hpp"
 #include "bushd/state_t.hpp"
 
@@ -92,6 +93,44 @@ inline void fill(Random& random, state_t& state) {
   state.motor_count = static_cast<std::int32_t>(state.motors.size());
 }
 
+inline mcu_health_t mcu_health(const std::string& mcu) {
+  mcu_health_t health{};
+  health.mcu = mcu;
+  health.unique_id = "0123456789abcdef";
+  health.low_water_ticks = -1;
+  return health;
+}
+
+inline void fill(Random& random, health_t& health) {
+  health.utime_us = any<std::int64_t>(random);
+  health.sequence = any<std::int64_t>(random);
+  health.part = any<std::int32_t>(random);
+  health.parts = any<std::int32_t>(random);
+  health.bus = text(random);
+  health.port_state = text(random);
+  health.two_masters = any<std::int8_t>(random);
+  health.crc_errors = any<std::int64_t>(random);
+  health.stray_frames = any<std::int64_t>(random);
+  health.recent_latency_us = any<std::int64_t>(random);
+  for (std::size_t i = below(random, 9); i > 0; --i) {
+    health.latency_below_us.push_back(any<std::int64_t>(random));
+    health.latency_answers.push_back(any<std::int64_t>(random));
+  }
+  health.latency_count = static_cast<std::int32_t>(health.latency_answers.size());
+  for (std::size_t i = below(random, 4); i > 0; --i) {
+    mcu_health_t mcu = mcu_health(text(random));
+    mcu.address = any<std::int32_t>(random);
+    mcu.unique_id = text(random);
+    mcu.boot_number = any<std::int32_t>(random);
+    mcu.repeats = any<std::int64_t>(random);
+    mcu.low_water_ticks = any<std::int32_t>(random);
+    mcu.rate_ppm = static_cast<double>(any<std::int32_t>(random)) / 256;
+    mcu.two_masters = any<std::int8_t>(random);
+    health.mcus.push_back(mcu);
+  }
+  health.mcu_count = static_cast<std::int32_t>(health.mcus.size());
+}
+
 template <class T>
 T random_message(Random& random) {
   T message{};
@@ -118,6 +157,26 @@ inline state_t state_part(std::int64_t sequence, std::int32_t part, std::int32_t
   }
   state.motor_count = static_cast<std::int32_t>(motors);
   return state;
+}
+
+// One part of the buses' health, with `mcus` MCUs on the bus, named by `bus`.
+inline health_t health_part(std::int64_t sequence, std::int32_t part, std::int32_t parts,
+                            int mcus = 0, const std::string& bus = "hall") {
+  health_t health{};
+  health.sequence = sequence;
+  health.part = part;
+  health.parts = parts;
+  health.bus = bus;
+  health.port_state = "open";
+  health.latency_below_us = {1000, INT64_MAX};
+  health.latency_answers = {7, 1};
+  health.latency_count = 2;
+  for (int address = 1; address <= mcus; ++address) {
+    health.mcus.push_back(mcu_health(bus + ":" + std::to_string(address)));
+    health.mcus.back().address = address;
+  }
+  health.mcu_count = mcus;
+  return health;
 }
 
 }  // namespace bushd::test

@@ -58,5 +58,15 @@ TEST(Snapshot, Of512MotorsIs32Messages) {
   EXPECT_EQ(motors, 512u);
 }
 
+TEST(Health, IsCompleteWithItsLastBus) {
+  HealthCollector collector;
+  EXPECT_FALSE(collector.add(test::health_part(3, 0, 2, 1, "hall")));
+  const auto health = collector.add(test::health_part(3, 1, 2, 2, "roof"));
+  ASSERT_TRUE(health);
+  EXPECT_EQ(health->sequence, 3);
+  ASSERT_EQ(health->buses.size(), 2u);
+  EXPECT_EQ(health->buses[1].mcus[1].mcu, "roof:2");
+}
+
 }  // namespace
 }  // namespace bushd::lcm

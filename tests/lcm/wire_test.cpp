@@ -62,7 +62,7 @@ class Wire : public testing::Test {
   test::Random random_{kSeed};
 };
 
-using Types = testing::Types<command_t, reply_t, state_t>;
+using Types = testing::Types<command_t, health_t, reply_t, state_t>;
 
 class TypeNames {
  public:
@@ -159,6 +159,9 @@ TEST(Encode, RefusesCountsThatAreNotThoseOfTheArrays) {
   auto reply = test::random_message<reply_t>(random);
   reply.motor_results.emplace_back();
   EXPECT_FALSE(encode(reply));
+  auto health = test::random_message<health_t>(random);
+  health.latency_below_us.emplace_back();
+  EXPECT_FALSE(encode(health));
 }
 
 TEST(Encode, RefusesTextsWithANul) {
@@ -177,6 +180,10 @@ TEST(Encode, RefusesWhatDoesNotFitOneDatagram) {
 
 TEST(Size, StateOfOneMcuWithTheLongestNamesIsBelow4KiB) {
   EXPECT_LT(encode(test::state_part(1, 0, 1, 16, 63)).value().size(), 4096u);
+}
+
+TEST(Size, HealthOfABusWithEveryAddressFitsOneDatagram) {
+  EXPECT_TRUE(encode(test::health_part(1, 0, 1, 255, std::string(63, 'x'))));
 }
 
 TEST(Size, CommandAndReplyFor512MotorsFitOneDatagram) {
