@@ -173,7 +173,7 @@ size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload) {
   uint8_t valid = 0;
   for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
     const bushd_table_held* held = &message->slot[i];
-    if (held->valid) valid |= (uint8_t)(1u << i);
+    if (held->valid) valid = (uint8_t)(valid | 1u << i);
     put32(&w, held->crc);
     put32(&w, held->revision);
   }
@@ -185,7 +185,7 @@ bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tabl
   reader r = read_from(payload, size);
   const uint8_t valid = get8(&r);
   for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
-    message->slot[i].valid = (valid >> i & 1u) != 0;
+    message->slot[i].valid = ((unsigned)valid >> i & 1u) != 0;
     message->slot[i].crc = get32(&r);
     message->slot[i].revision = get32(&r);
   }

@@ -13,6 +13,7 @@
 #include "engine/message.h"
 #include "engine/message_text.h"
 #include "engine/run.h"
+#include "engine/run_state.h"
 #include "engine/slots.h"
 #include "engine/tables.h"
 
@@ -76,7 +77,9 @@ T number(const Row& row, const std::string& key) {
 Law law_of(const std::string& name) {
   for (const Row& row : read_csv("tables.csv")) {
     if (row.at("table") != name) continue;
-    return {numbers<uint16_t>(row.at("accel")), numbers<uint16_t>(row.at("decel")),
+    const std::string decel = row.at("decel");
+    return {numbers<uint16_t>(row.at("accel")),
+            numbers<uint16_t>(decel.empty() ? row.at("accel") : decel),
             number<uint16_t>(row, "cruise"), number<uint32_t>(row, "time_unit_ns")};
   }
   ADD_FAILURE() << "no table " << name;
@@ -136,6 +139,56 @@ TEST(Vectors, TakeOvers) {
       EXPECT_EQ(got, expected) << row.at("table") << ' ' << row.at("delay");
       EXPECT_TRUE(bushd_run_done(&run));
     }
+  }
+}
+
+TEST(Vectors, RunStates) {
+  for (const Row& row : read_csv("run_states.csv")) {
+    for (const bool indexed : {false, true}) {
+      SCOPED_TRACE(row.at("table") + ' ' + row.at("steps") + " tick " + row.at("tick"));
+      const TestTable table(law_of(row.at("table")), indexed);
+      const auto steps = number<int64_t>(row, "steps");
+      const auto tick_ns = number<uint32_t>(row, "tick_ns");
+      const auto tick = number<size_t>(row, "tick");
+      bushd_run run;
+      bushd_run_start(&run, table.view(), static_cast<uint32_t>(std::abs(steps)),
+                      steps < 0 ? -1 : 1);
+      std::vector<uint8_t> before;
+      const std::string stop = row.at("ramp_down_at_tick");
+      const size_t stopped = stop.empty() ? tick : std::stoul(stop);
+      expand(&run, row, stopped, &before);
+      if (!stop.empty()) bushd_run_ramp_down(&run);
+      expand(&run, row, tick - stopped, &before);
+      const bushd_run_state s = bushd_run_save(&run, tick_ns, number<uint16_t>(row, "ticks"));
+      const std::vector<int64_t> parts{s.accel_at, s.accel_end, s.cruise_left, s.decel_left};
+      std::vector<int64_t> state{s.direction, s.cruises, s.since, s.since_ns, s.lead_delay};
+      for (const int64_t part : parts) state.push_back(s.cruises ? 0 : part);
+      EXPECT_EQ(state, numbers<int64_t>(row.at("state"), '/'));
+      bushd_run taken_up;
+      ASSERT_TRUE(bushd_run_restore(&taken_up, table.view(), &s));
+      const auto expected = bytes_of(row.at("displacements"));
+      std::vector<uint8_t> got;
+      expand(&taken_up, row, expected.size() / (row.at("format") == "fine" ? 2 : 1), &got);
+      EXPECT_EQ(got, expected);
+    }
+  }
+}
+
+TEST(Vectors, TableChecksums) {
+  for (const Row& row : read_csv("tables.csv")) {
+    const TestTable table(law_of(row.at("table")), true);
+    bushd_table view = *table.view();
+    if (row.at("decel").empty()) view.decel = view.accel;
+    EXPECT_EQ(bushd_table_crc32(&view), number<uint32_t>(row, "crc32")) << row.at("table");
+  }
+}
+
+TEST(Vectors, IdentifySlots) {
+  for (const Row& row : read_csv("identify_slots.csv")) {
+    EXPECT_EQ(bushd_identify_slot(bytes_of(row.at("unique_id")).data(),
+                                  number<uint16_t>(row, "salt"), number<uint8_t>(row, "slots")),
+              number<int>(row, "slot"))
+        << row.at("unique_id") << " salt " << row.at("salt");
   }
 }
 

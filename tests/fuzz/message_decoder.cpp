@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "engine/message.h"
+#include "engine/run_state.h"
 #include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {
@@ -35,10 +36,21 @@ bool inside(Bytes payload, const std::uint8_t* at, std::size_t size) {
 }
 
 void decode_for_mcu(Bytes payload) {
+  bushd_identify identify;
+  if (decoded(payload, &identify, bushd_decode_identify, bushd_encode_identify)) {
+    BUSHD_REQUIRE(identify.slots >= 1);
+    const std::uint8_t id[BUSHD_UNIQUE_ID_SIZE] = {1, 2, 3, 4, 5, 6, 7, 8};
+    BUSHD_REQUIRE(bushd_identify_slot(id, identify.salt, identify.slots) < identify.slots);
+  }
+  bushd_set_address address;
+  if (decoded(payload, &address, bushd_decode_set_address, bushd_encode_set_address)) {
+    BUSHD_REQUIRE(address.address != BUSHD_ADDRESS_BROADCAST);
+  }
   bushd_configure configure;
   if (decoded(payload, &configure, bushd_decode_configure, bushd_encode_configure)) {
     BUSHD_REQUIRE(configure.tick_ns >= BUSHD_MIN_TICK_NS && configure.tick_ns <= BUSHD_MAX_TICK_NS);
     BUSHD_REQUIRE(configure.format == BUSHD_FORMAT_COARSE || configure.format == BUSHD_FORMAT_FINE);
+    BUSHD_REQUIRE(configure.silence_ticks >= 1);
   }
   bushd_table_begin begin;
   if (decoded(payload, &begin, bushd_decode_table_begin, bushd_encode_table_begin)) {
@@ -69,16 +81,38 @@ void decode_for_mcu(Bytes payload) {
   }
   bushd_control control;
   if (decoded(payload, &control, bushd_decode_control, bushd_encode_control)) {
-    BUSHD_REQUIRE(control.actions < 8 && (control.actions & 3) != 3);
+    BUSHD_REQUIRE(control.actions < 16 && (control.actions & 3) != 3);
   }
   bushd_set_position position;
   if (decoded(payload, &position, bushd_decode_set_position, bushd_encode_set_position)) {
     BUSHD_REQUIRE(position.motor < BUSHD_MOTORS_PER_MCU);
   }
+  bushd_emergency emergency;
+  if (decoded(payload, &emergency, bushd_decode_emergency, bushd_encode_emergency)) {
+    BUSHD_REQUIRE(emergency.how == BUSHD_RAMP_DOWN || emergency.how == BUSHD_CUT);
+  }
   bushd_sync sync;
   if (decoded(payload, &sync, bushd_decode_sync, bushd_encode_sync)) {
     BUSHD_REQUIRE(sync.mark_ns < BUSHD_MAX_TICK_NS);
   }
+}
+
+void decode_poll(Bytes payload) {
+  std::array<bushd_poll_entry, 256> entries;
+  const auto encode = [&](const bushd_poll* message, std::uint8_t* out) {
+    BUSHD_REQUIRE(inside(payload, message->entries, 3u * message->count));
+    for (std::size_t i = 0; i < message->count; ++i) {
+      const std::uint8_t* const at = message->entries + 3 * i;
+      entries[i] = {at[0], bushd_get_u16(at + 1)};
+    }
+    return bushd_encode_poll(entries.data(), message->count, out);
+  };
+  bushd_poll poll;
+  if (!decoded(payload, &poll, bushd_decode_poll, encode)) return;
+  BUSHD_REQUIRE(poll.count >= 1 && poll.count <= BUSHD_POLL_MAX_ENTRIES);
+  bushd_poll_entry found;
+  const std::uint8_t address = entries[poll.count - 1u].address;
+  BUSHD_REQUIRE(bushd_poll_find(&poll, address, &found) && found.address == address);
 }
 
 void decode_ticks(Bytes payload) {
@@ -87,12 +121,13 @@ void decode_ticks(Bytes payload) {
   };
   const auto encode = [&](const bushd_ticks* message, std::uint8_t* out) {
     std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delays;
-    for (std::size_t i = 0; message->delays != nullptr && i < message->motors; ++i) {
+    BUSHD_REQUIRE(inside(payload, message->delays, 2u * message->motors));
+    for (std::size_t i = 0; i < message->motors; ++i) {
       delays[i] = bushd_get_u16(message->delays + 2 * i);
     }
-    const std::size_t head = bushd_encode_ticks_head(
-        message->epoch, message->flags, message->first_tick, message->count, message->mask,
-        message->delays != nullptr ? delays.data() : nullptr, out);
+    const std::size_t head =
+        bushd_encode_ticks_head(message->epoch, message->flags, message->first_tick, message->count,
+                                message->mask, delays.data(), out);
     const std::size_t size = width(message) * message->count * message->motors;
     BUSHD_REQUIRE(inside(payload, message->displacements, size));
     std::memcpy(out + head, message->displacements, size);
@@ -102,15 +137,93 @@ void decode_ticks(Bytes payload) {
   if (!decoded(payload, &ticks, bushd_decode_ticks, encode)) return;
   BUSHD_REQUIRE(ticks.count >= 1 && ticks.mask != 0);
   BUSHD_REQUIRE(ticks.motors == std::popcount(ticks.mask));
-  const bool delays = (ticks.flags & BUSHD_TICKS_DELAYS) != 0;
-  BUSHD_REQUIRE(delays == (ticks.delays != nullptr));
-  BUSHD_REQUIRE((ticks.flags & 12) != 12 && ticks.flags < 16);
-  BUSHD_REQUIRE(ticks.count <= bushd_ticks_capacity(ticks.motors, width(&ticks) == 2, delays));
+  BUSHD_REQUIRE((ticks.flags & 6) != 6 && ticks.flags < 8);
+  BUSHD_REQUIRE(ticks.count <= bushd_ticks_capacity(ticks.motors, width(&ticks) == 2));
+}
+
+// What a table makes of a state that nobody vouches for: it is refused, or no step is faster than
+// the table's next and both formats count the same steps.
+void take_up(const bushd_run_state& state) {
+  static constexpr std::array<std::uint16_t, 6> kUp{{250, 200, 120, 120, 60, 40}};
+  static constexpr std::array<std::uint16_t, 4> kDown{{300, 150, 70, 30}};
+  static constexpr bushd_table kTable{{kUp.data(), kUp.size(), nullptr, nullptr, 0},
+                                      {kDown.data(), kDown.size(), nullptr, nullptr, 0},
+                                      45,
+                                      10000};
+  constexpr std::uint32_t kTickNs = 2560000;
+  constexpr std::size_t kTicks = 64;
+  bushd_run run;
+  if (!bushd_run_restore(&run, &kTable, &state)) return;
+  BUSHD_REQUIRE(run.direction == state.direction && !bushd_run_done(&run));
+  BUSHD_REQUIRE(bushd_run_delay(&run) >= kTable.cruise);
+  bushd_run fine = run;
+  std::array<std::uint8_t, kTicks> coarse_ticks;
+  std::array<std::int16_t, kTicks> fine_ticks;
+  bushd_run_expand_coarse(&run, kTickNs, kTicks, coarse_ticks.data(), 1);
+  bushd_run_expand_fine(&fine, kTickNs, kTicks, fine_ticks.data(), 1);
+  const auto most = bushd_table_max_steps_per_tick(&kTable, kTickNs);
+  for (std::size_t n = 0; n < kTicks; ++n) {
+    BUSHD_REQUIRE((coarse_ticks[n] & 0x7Fu) <= most);
+    BUSHD_REQUIRE(fine_ticks[n] * state.direction >= 0);
+  }
+  BUSHD_REQUIRE(run.steps_done == fine.steps_done);
+}
+
+// A field that is 0 and need not be there may have been sent all the same: then what the encoder
+// makes is shorter, and says the same.
+void decode_table_ticks(Bytes payload) {
+  bushd_table_ticks message;
+  std::memset(&message, 0xA5, sizeof message);
+  if (bushd_decode_table_ticks(payload.data(), payload.size(), &message) != BUSHD_OK) return;
+  BUSHD_REQUIRE(message.count >= 1 && message.mask != 0);
+  BUSHD_REQUIRE((message.flags & ~6) == 0 && message.flags != 6);
+  BUSHD_REQUIRE(inside(payload, message.entries, message.entries_size));
+  std::array<bushd_table_ticks_entry, BUSHD_MOTORS_PER_MCU> entries;
+  std::uint8_t motors = 0;
+  std::uint16_t mask = 0;
+  std::uint16_t at = 0;
+  for (bushd_table_ticks_entry entry; bushd_next_table_ticks_entry(&message, &at, &entry);) {
+    BUSHD_REQUIRE(motors < BUSHD_MOTORS_PER_MCU && mask < 1 << entry.motor);
+    mask = static_cast<std::uint16_t>(mask | 1 << entry.motor);
+    entries[motors++] = entry;
+    take_up(entry.state);
+  }
+  BUSHD_REQUIRE(at == message.entries_size && mask == message.mask);
+  Payload again;
+  const std::size_t size =
+      bushd_encode_table_ticks(message.epoch, message.flags, message.first_tick, message.count,
+                               entries.data(), motors, again.data());
+  BUSHD_REQUIRE(size <= payload.size());
+  bushd_table_ticks second;
+  BUSHD_REQUIRE(bushd_decode_table_ticks(again.data(), size, &second) == BUSHD_OK);
+  BUSHD_REQUIRE(second.mask == message.mask);
+  if (size == payload.size()) BUSHD_REQUIRE(same(payload, again, size));
+}
+
+void decode_table_run(Bytes payload) {
+  std::array<bushd_table_run_entry, BUSHD_MOTORS_PER_MCU> entries;
+  const auto encode = [&](const bushd_table_run* message, std::uint8_t* out) {
+    BUSHD_REQUIRE(message->count >= 1 && message->count <= BUSHD_MOTORS_PER_MCU);
+    for (std::uint8_t i = 0; i < message->count; ++i) {
+      entries[i] = bushd_get_table_run_entry(message, i);
+      BUSHD_REQUIRE(entries[i].steps >= 1 && entries[i].steps <= INT32_MAX);
+      BUSHD_REQUIRE(entries[i].slot < BUSHD_TABLE_SLOTS);
+      BUSHD_REQUIRE(i == 0 || entries[i].motor > entries[i - 1u].motor);
+    }
+    return bushd_encode_table_run(message->epoch, message->first_tick, entries.data(),
+                                  message->count, out);
+  };
+  bushd_table_run message;
+  decoded(payload, &message, bushd_decode_table_run, encode);
 }
 
 void decode_for_master(Bytes payload) {
   bushd_identity identity;
-  if (decoded(payload, &identity, bushd_decode_identity, bushd_encode_identity)) {
+  std::memset(&identity, 0xA5, sizeof identity);
+  if (!payload.empty() && payload[0] != BUSHD_PROTOCOL_VERSION) {
+    BUSHD_REQUIRE(bushd_decode_identity(payload.data(), payload.size(), &identity) == BUSHD_OK);
+    BUSHD_REQUIRE(identity.protocol_version == payload[0] && identity.motors == 0);
+  } else if (decoded(payload, &identity, bushd_decode_identity, bushd_encode_identity)) {
     BUSHD_REQUIRE(identity.motors >= 1 && identity.motors <= BUSHD_MOTORS_PER_MCU);
   }
   bushd_report report;
@@ -119,6 +232,8 @@ void decode_for_master(Bytes payload) {
     BUSHD_REQUIRE(report.motor_count <= BUSHD_MOTORS_PER_MCU);
     BUSHD_REQUIRE(payload.size() == BUSHD_REPORT_SIZE(report.motor_count));
   }
+  bushd_tables tables;
+  decoded(payload, &tables, bushd_decode_tables, bushd_encode_tables);
   bushd_acknowledgement acknowledgement;
   decoded(payload, &acknowledgement, bushd_decode_acknowledgement, bushd_encode_acknowledgement);
 }
@@ -130,7 +245,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size > BUSHD_FRAME_MAX_PAYLOAD) return 0;
   const std::span payload(data, size);
   bushd::fuzz::decode_for_mcu(payload);
+  bushd::fuzz::decode_poll(payload);
   bushd::fuzz::decode_ticks(payload);
+  bushd::fuzz::decode_table_ticks(payload);
+  bushd::fuzz::decode_table_run(payload);
   bushd::fuzz::decode_for_master(payload);
   return 0;
 }

@@ -8,6 +8,7 @@
 #include "engine/frame.h"
 #include "engine/message.h"
 #include "engine/run.h"
+#include "engine/run_state.h"
 #include "engine/slots.h"
 #include "engine/table.h"
 
@@ -33,6 +34,27 @@ typedef struct take_over_vector {
   uint16_t size;
 } take_over_vector;
 
+typedef struct run_state_vector {
+  const bushd_table* table;
+  uint32_t steps;
+  int8_t direction;
+  uint32_t tick_ns;
+  bool fine;
+  int16_t ramp_down_at_tick;  // -1: none
+  uint16_t tick;              // at whose beginning it is saved
+  uint16_t ticks;             // for which it is asked
+  bushd_run_state state;
+  const uint8_t* displacements;  // from there on; fewer than `ticks` if it ends before
+  uint16_t size;
+} run_state_vector;
+
+typedef struct identify_slot_vector {
+  uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
+  uint16_t salt;
+  uint8_t slots;
+  uint8_t slot;
+} identify_slot_vector;
+
 typedef struct slots_vector {
   uint16_t slot_count;
   int16_t crossing;
@@ -53,7 +75,7 @@ typedef struct frame_vector {
 
 #include "golden_vectors.h"
 
-// Tick by tick, as an MCU does it. The run must end with the vector.
+// Tick by tick, as an MCU does it.
 static bool expands_to(bushd_run* run, uint32_t tick_ns, bool fine, int16_t ramp_down_at_tick,
                        const uint8_t* bytes, uint16_t size) {
   const uint16_t ticks = fine ? (uint16_t)(size / 2u) : size;
@@ -69,21 +91,55 @@ static bool expands_to(bushd_run* run, uint32_t tick_ns, bool fine, int16_t ramp
       if (count != bytes[n]) return false;
     }
   }
-  return bushd_run_done(run);
+  return true;
 }
 
 static bool check_move(const move_vector* vector) {
   bushd_run run;
   bushd_run_start(&run, vector->table, vector->steps, vector->direction);
   return expands_to(&run, vector->tick_ns, vector->fine, vector->ramp_down_at_tick,
-                    vector->displacements, vector->size);
+                    vector->displacements, vector->size) &&
+         bushd_run_done(&run);
 }
 
 static bool check_take_over(const take_over_vector* vector) {
   bushd_run run;
   bushd_run_start_ramp_down(&run, vector->table, vector->delay, vector->fraction,
                             vector->direction);
-  return expands_to(&run, vector->tick_ns, vector->fine, -1, vector->displacements, vector->size);
+  return expands_to(&run, vector->tick_ns, vector->fine, -1, vector->displacements, vector->size) &&
+         bushd_run_done(&run);
+}
+
+static bool same_state(const bushd_run_state* a, const bushd_run_state* b) {
+  if (a->direction != b->direction || a->cruises != b->cruises || a->since != b->since ||
+      a->since_ns != b->since_ns || a->lead_delay != b->lead_delay) {
+    return false;
+  }
+  return a->cruises || (a->accel_at == b->accel_at && a->accel_end == b->accel_end &&
+                        a->cruise_left == b->cruise_left && a->decel_left == b->decel_left);
+}
+
+static bool check_run_state(const run_state_vector* vector) {
+  bushd_run run;
+  bushd_run_start(&run, vector->table, vector->steps, vector->direction);
+  for (uint16_t n = 0; n <= vector->tick; ++n) {
+    if (vector->ramp_down_at_tick == (int16_t)n) bushd_run_ramp_down(&run);
+    if (n == vector->tick) break;
+    int16_t displacement = 0;
+    bushd_run_expand_fine(&run, vector->tick_ns, 1, &displacement, 1);
+  }
+  const bushd_run_state saved = bushd_run_save(&run, vector->tick_ns, vector->ticks);
+  if (!same_state(&saved, &vector->state)) return false;
+  return bushd_run_restore(&run, vector->table, &vector->state) &&
+         expands_to(&run, vector->tick_ns, vector->fine, -1, vector->displacements, vector->size);
+}
+
+static bool check_crc(const uint32_t* crc) {
+  return bushd_table_crc32(&kTables[crc - kTableCrcs]) == *crc;
+}
+
+static bool check_identify_slot(const identify_slot_vector* vector) {
+  return bushd_identify_slot(vector->unique_id, vector->salt, vector->slots) == vector->slot;
 }
 
 static bool check_slots(const slots_vector* vector) {
@@ -136,6 +192,9 @@ unsigned bushd_check_vectors(unsigned* checked, void (*report)(const char* kind,
   *checked = 0;
   CHECK_ALL("move", kMoves, check_move)
   CHECK_ALL("take-over", kTakeOvers, check_take_over)
+  CHECK_ALL("run state", kRunStates, check_run_state)
+  CHECK_ALL("table", kTableCrcs, check_crc)
+  CHECK_ALL("identify slot", kIdentifySlots, check_identify_slot)
   CHECK_ALL("slots", kSlots, check_slots)
   CHECK_ALL("frame", kFrames, check_frame)
   return failed;
