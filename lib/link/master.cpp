@@ -167,8 +167,8 @@ bool Master::send_next(std::int64_t now_us) {
   return send_emergency(now_us) || send_due_replacement(now_us) ||
          send_stream(now_us, urgent_us, true) || send_wanted_poll(now_us) ||
          send_stream(now_us, urgent_us) || send_due_poll(now_us) || send_due_sync(now_us) ||
-         send_script(now_us) || send_stream(now_us, kQueueTargetUs + held_back_us) ||
-         send_due_identify(now_us);
+         send_ramp_down(now_us) || send_script(now_us) ||
+         send_stream(now_us, kQueueTargetUs + held_back_us) || send_due_identify(now_us);
 }
 
 void Master::send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,
@@ -211,12 +211,21 @@ bool Master::send_emergency(std::int64_t now_us) {
   if (now_us < emergency_->due_us) return false;
   if (!said) emergency_->until_us = now_us + kEmergencyUs;
   emergency_->due_us = now_us + kEmergencyRepeatUs;
-  const bushd_emergency message = {emergency_->how};
-  std::array<std::uint8_t, 1> payload;
-  bushd_encode_emergency(&message, payload.data());
+  const std::array<std::uint8_t, 1> payload = {static_cast<std::uint8_t>(emergency_->how)};
   for (int i = 0; i < 3; ++i) send(now_us, BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_EMERGENCY, payload);
   for (Mcu& mcu : mcus_) mcu.poll_now |= mcu.view.phase != McuPhase::kOffline;
   return true;
+}
+
+bool Master::send_ramp_down(std::int64_t now_us) {
+  for (Mcu& mcu : mcus_) {
+    if (mcu.view.phase != McuPhase::kConnecting || !mcu.ramp_down_now) continue;
+    mcu.ramp_down_now = false;
+    const std::array<std::uint8_t, 1> payload = {BUSHD_RAMP_DOWN};
+    send(now_us, mcu.setup.address, BUSHD_MSG_EMERGENCY, payload);
+    return true;
+  }
+  return false;
 }
 
 bool Master::send_script(std::int64_t now_us) {

@@ -183,7 +183,9 @@ class Master {
     // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
     // switched off stay off through restarts and lost links: there may be hands in the mechanism.
     std::optional<bool> powered;
-    bool taken_over = false;  // while connecting: table runs of an earlier master were stopped
+    // While connecting: table runs of an earlier master are to be stopped, and were.
+    bool ramp_down_now = false;
+    bool taken_over = false;
     std::int64_t poll_due_us = 0;
     std::int64_t retry_due_us = 0;
     unsigned looks = 0;             // IDENTIFYs in a row without an MCU that fits
@@ -239,6 +241,7 @@ class Master {
            std::span<const std::uint8_t> payload, std::size_t reply_payload);
   bool send_next(std::int64_t now_us);
   bool send_emergency(std::int64_t now_us);
+  bool send_ramp_down(std::int64_t now_us);
   bool send_script(std::int64_t now_us);
   std::int64_t line_us(std::size_t bytes) const;
   Tick ticks_in(std::int64_t us) const;  // rounded up
@@ -265,7 +268,7 @@ class Master {
   void handle_tables(std::size_t mcu, const bushd_tables& held);
   void handle_acknowledgement(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
                               std::uint8_t status);
-  void follow_connecting(std::int64_t now_us, std::size_t mcu, bool in_step);
+  void follow_connecting(std::size_t mcu, bool in_step);
   std::string unfit(const Mcu& mcu, const bushd_identity& identity) const;  // "" when it fits
   template <class Encode>
   static void add_request(Mcu& mcu, std::uint8_t type, Encode encode);

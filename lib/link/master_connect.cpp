@@ -221,7 +221,7 @@ void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std:
              now_us + kRetryUs);
 }
 
-void Master::follow_connecting(std::int64_t now_us, std::size_t index, bool in_step) {
+void Master::follow_connecting(std::size_t index, bool in_step) {
   Mcu& mcu = mcus_[index];
   const bushd_report& report = mcu.view.report;
   if (!mcu.powered) {
@@ -236,10 +236,7 @@ void Master::follow_connecting(std::int64_t now_us, std::size_t index, bool in_s
     mcu.scripted = true;
   } else if (!mcu.scripted && report.running != 0) {
     mcu.taken_over |= (report.faults & BUSHD_FAULT_EMERGENCY) == 0;
-    const bushd_emergency message = {BUSHD_RAMP_DOWN};
-    std::array<std::uint8_t, 1> payload;
-    bushd_encode_emergency(&message, payload.data());
-    send(now_us, mcu.setup.address, BUSHD_MSG_EMERGENCY, payload);
+    mcu.ramp_down_now = true;
   } else if (mcu.scripted && mcu.script.empty() && in_step &&
              (report.state != BUSHD_STATE_BUSY || !*mcu.powered)) {
     mcu.view.phase = McuPhase::kOnline;

@@ -21,9 +21,10 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
       requests.push_back(heard.type);
   }
   const std::vector<int> expected = {
-      BUSHD_MSG_IDENTIFY,   BUSHD_MSG_CONFIGURE,  BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA,
-      BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_END,   BUSHD_MSG_ASSIGN,
-      BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,     BUSHD_MSG_CONTROL};
+      BUSHD_MSG_IDENTIFY,    BUSHD_MSG_CONFIGURE,  BUSHD_MSG_TABLES,     BUSHD_MSG_CONTROL,
+      BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA,
+      BUSHD_MSG_TABLE_END,   BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,
+      BUSHD_MSG_CONTROL};
   EXPECT_EQ(requests, expected);
   const Slave& slave = bus.slaves[0];
   std::vector<std::uint16_t> codes = bus.codes;
@@ -35,8 +36,8 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
   EXPECT_EQ(bus.master->view(0).detail, "");
   EXPECT_TRUE(bus.master->time_known());
   EXPECT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(0), 1);
-  EXPECT_EQ(bus.master->timeouts(), 0u);
-  EXPECT_EQ(bus.master->bad_frames(), 0u);
+  EXPECT_EQ(bus.master->health(0).timeouts, 0u);
+  EXPECT_EQ(bus.master->bus_health().crc_errors, 0u);
 }
 
 TEST(Connect, AllMcusAgreeOnTheTime) {
@@ -71,14 +72,14 @@ TEST(Connect, MarkThatMcusDisagreeAboutIsNotPassedOn) {
     EXPECT_TRUE(bus.run_until([&] { return syncs().size() > before; }, 1'000'000));
     return syncs().back();
   };
-  EXPECT_EQ(next_sync().payload[0], 1) << "follows, as a rule";
+  EXPECT_EQ(next_sync().payload[6], 1) << "follows, as a rule";
   bus.slaves[1].mark_us += 30'000;
-  EXPECT_EQ(next_sync().payload[0], 0);
-  EXPECT_EQ(next_sync().payload[0], 1) << "about the next mark they agree";
+  EXPECT_EQ(next_sync().payload[6], 0);
+  EXPECT_EQ(next_sync().payload[6], 1) << "about the next mark they agree";
   // A clock that is off is so at every mark: then the first MCU's time is that of the bus.
   bus.slaves[1].zero_us -= 30'000;
-  EXPECT_EQ(next_sync().payload[0], 0);
-  EXPECT_EQ(next_sync().payload[0], 1);
+  EXPECT_EQ(next_sync().payload[6], 0);
+  EXPECT_EQ(next_sync().payload[6], 1);
 }
 
 TEST(Connect, SymmetricTableIsSentOnce) {
@@ -98,7 +99,7 @@ class Unfit : public testing::TestWithParam<Misfit> {};
 INSTANTIATE_TEST_SUITE_P(Identities, Unfit,
                          testing::Values(Misfit{"Version",
                                                 [](bushd_identity& i) { i.protocol_version = 9; },
-                                                {"protocol version 9", "this program version 1",
+                                                {"protocol version 9", "this program version 2",
                                                  "update"}},
                                          Misfit{"Outputs",
                                                 [](bushd_identity& i) { i.motors = 3; },
@@ -157,7 +158,7 @@ TEST(Connect, LostRequestsAndAnswersAreRepeated) {
   int n = 0;
   bus.slaves[0].loses = [&](const Heard&) { return ++n % 3 == 0; };
   bus.connect();
-  EXPECT_GT(bus.master->timeouts(), 3u);
+  EXPECT_GT(bus.master->health(0).timeouts, 3u);
   std::vector<std::uint16_t> codes = bus.codes;
   codes.insert(codes.end(), bus.codes.begin() + 50, bus.codes.end());
   EXPECT_EQ(bus.slaves[0].tables.at(0), codes);
@@ -190,7 +191,7 @@ TEST(Connect, SomeLostAnswersAreNoOffline) {
   };
   bus.run_for(10'000'000);
   EXPECT_EQ(bus.count(Event::Kind::kOffline), 0);
-  EXPECT_GT(bus.master->timeouts(), 50u);
+  EXPECT_GT(bus.master->health(0).timeouts, 50u);
 }
 
 TEST(Connect, RestartIsSeenAndConfiguredAgain) {
@@ -227,24 +228,121 @@ TEST(Connect, PortLostIsOfflineWithItsCauseAndSilence) {
   bus.connect();
 }
 
-TEST(Connect, EachMcuIsPolledTwentyTimesASecond) {
+// How often each of the MCUs was asked in the frames heard.
+std::map<int, int> polls_by_address(const FakeBus& bus) {
+  std::map<int, int> polls;
+  for (const Heard& heard : bus.heard_of(BUSHD_MSG_POLL)) {
+    for (std::size_t i = 1; i < heard.payload.size(); i += 3) ++polls[heard.payload[i]];
+  }
+  return polls;
+}
+
+TEST(Connect, OnePollTwentyTimesASecondAsksAll) {
   FakeBus bus(3);
   bus.connect();
   bus.run_for(500'000);
   bus.heard.clear();
   bus.run_for(2'000'000);
-  for (std::uint8_t address = 1; address <= 3; ++address) {
-    std::int64_t last = -1;
-    int polls = 0;
-    for (const Heard& heard : bus.heard_of(BUSHD_MSG_POLL)) {
-      if (heard.address != address) continue;
-      EXPECT_TRUE(last < 0 || heard.at_us - last <= 60'000) << heard.at_us - last;
-      last = heard.at_us;
-      ++polls;
-    }
-    EXPECT_NEAR(polls, 40, 3);
-  }
+  EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_POLL).size()), 40, 3);
+  for (int address = 1; address <= 3; ++address) EXPECT_NEAR(polls_by_address(bus)[address], 40, 3);
   EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_SYNC).size()), 4, 1);
+  EXPECT_EQ(bus.master->health(0).timeouts, 0u) << "answers do not collide";
+}
+
+// It is asked for its report first, so the answers after it end the waiting.
+TEST(Connect, SilentMcuCostsItsSlotAndNotTheCycle) {
+  FakeBus bus(4);
+  bus.connect();
+  bus.run_for(500'000);
+  int n = 0;
+  bus.slaves[2].loses = [&n](const Heard& h) { return h.type == BUSHD_MSG_POLL && ++n % 9 != 0; };
+  bus.run_for(200'000);
+  bus.heard.clear();
+  bus.run_for(2'000'000);
+  int first = 0;
+  for (const Heard& heard : bus.heard_of(BUSHD_MSG_POLL)) first += heard.payload[1] == 3;
+  EXPECT_GE(first, 30) << "of some 40, as every ninth is answered";
+  EXPECT_NEAR(polls_by_address(bus)[1], 40, 5);
+  EXPECT_TRUE(bus.online(2));
+}
+
+TEST(Connect, TablesThatAreThereAreNotSentAgain) {
+  FakeBus bus;
+  bus.connect();
+  const auto sent = bus.heard_of(BUSHD_MSG_TABLE_DATA).size();
+  bus.master->port_lost(bus.now_us, "unplugged");
+  bus.master->port_opened(bus.now_us);
+  bus.connect();
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_DATA).size(), sent);
+  // Another revision is another table.
+  link::McuSetup changed = bus.setup.mcus[0];
+  changed.tables[0].revision = 8;
+  bus.master->reconfigure(0, changed);
+  bus.connect();
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_DATA).size(), 2 * sent);
+  EXPECT_EQ(bus.slaves[0].held.at(0).revision, 8u);
+}
+
+TEST(Connect, TwoMcusWithOneAddressAreNamed) {
+  FakeBus bus(2);
+  bus.slaves[1].address = 1;
+  bus.slaves[1].zero_us = bus.slaves[0].zero_us;
+  ASSERT_TRUE(bus.run_until(
+      [&] { return bus.master->view(0).detail.find("shares its address") != std::string::npos; },
+      10'000'000));
+  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("64000000000000"));
+  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("65000000000000"));
+  EXPECT_EQ(bus.count(Event::Kind::kOnline), 0);
+  bus.slaves[1].answers = false;  // unplugged
+  ASSERT_TRUE(bus.run_until([&] { return bus.online(0); }));
+}
+
+TEST(Connect, AnotherMasterOnTheLineIsNoticedForSomeSeconds) {
+  FakeBus bus;
+  bus.connect();
+  EXPECT_FALSE(bus.master->two_masters(bus.now_us));
+  bushd_sync sync{};
+  sync.master = 4711;
+  Bytes payload(32);
+  payload.resize(bushd_encode_sync(&sync, payload.data()));
+  Bytes wire(BUSHD_FRAME_MAX_WIRE);
+  wire.resize(
+      bushd_frame_encode(0, BUSHD_MSG_SYNC, 1, payload.data(), payload.size(), wire.data()));
+  bus.master->receive(bus.now_us, wire);
+  EXPECT_TRUE(bus.master->two_masters(bus.now_us));
+  bus.run_for(2'000'000);
+  EXPECT_FALSE(bus.master->two_masters(bus.now_us));
+  // Or an MCU hears it.
+  bus.slaves[0].flags |= BUSHD_FLAG_TWO_MASTERS;
+  bus.run_for(100'000);
+  EXPECT_TRUE(bus.master->two_masters(bus.now_us));
+}
+
+TEST(Connect, TableRunOfAnEarlierMasterIsRampedDownFirst) {
+  FakeBus bus;
+  bus.slaves[0].run[1] = bushd_table_run_entry{1, 0, 1, 1000};
+  bus.slaves[0].known_until[1] = bus.tick(0) + 20'000;
+  bus.connect();
+  ASSERT_EQ(bus.heard_of(BUSHD_MSG_EMERGENCY).size(), 1u);
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_EMERGENCY)[0].address, 1);
+  EXPECT_EQ(bus.slaves[0].faults, 0) << "nobody's emergency";
+}
+
+TEST(Connect, AdapterLatencyIsMeasured) {
+  FakeBus bus;
+  bus.adapter_latency_us = 3'000;
+  bus.connect();
+  bus.run_for(2'000'000);
+  const link::Latency& latency = bus.master->bus_health().latency;
+  EXPECT_NEAR(static_cast<double>(latency.recent_us), 3'000, 600) << "a slot may begin late";
+  EXPECT_GT(latency.count[3], 40u) << "2 to 4 ms";
+  EXPECT_EQ(latency.count[5] + latency.count[6] + latency.count[7], 0u);
+  FakeBus quick;
+  quick.connect();
+  quick.run_for(2'000'000);
+  EXPECT_LT(quick.master->earliest_replace(quick.now_us) - quick.tick(0),
+            bus.master->earliest_replace(bus.now_us) - bus.tick(0))
+      << "changes are planned further ahead";
 }
 
 TEST(Connect, StrangeAnswersAreNotTaken) {
@@ -264,7 +362,7 @@ TEST(Connect, StrangeAnswersAreNotTaken) {
   }
   EXPECT_EQ(bus.master->view(0).report.motor[0].position_steps, before);
   bus.master->receive(bus.now_us, Bytes{1, 2, 3, 0, 9, 9, 9, 9, 9, 9, 9, 9, 0});
-  EXPECT_EQ(bus.master->bad_frames(), 2u);
+  EXPECT_EQ(bus.master->bus_health().crc_errors, 2u);
   bus.run_for(1'000'000);
   EXPECT_TRUE(bus.online());
 }

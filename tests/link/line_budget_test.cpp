@@ -14,20 +14,20 @@ using link::line_load;
 
 TEST(LineBudget, ByHand) {
   // 16 fine motors: 6 ticks a frame; 1 delimiter + 7 + 9 + 2 x 16 + 6 x 32 = 241 bytes every 15.36
-  // ms. Poll and report: 8 + (8 + 33 + 96) = 145 bytes every 50 ms; a time mark: 18 bytes every 500
-  // ms.
+  // ms. Every 50 ms a poll, 8 + 1 + 3 bytes and 1 ms, and a report, 8 + 52 + 96 bytes and 0.6 ms. A
+  // time mark: 8 + 19 bytes every 500 ms.
   const std::array<std::uint8_t, 1> one = {16};
-  const double bytes_per_s = 241 / 0.01536 + 145 / 0.05 + 18 / 0.5;
-  EXPECT_NEAR(line_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, one), bytes_per_s * 10 / 500'000,
-              1e-9);
+  const double bytes_per_s = 241 / 0.01536 + (12 + 156) / 0.05 + 27 / 0.5;
+  EXPECT_NEAR(line_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, one),
+              bytes_per_s * 10 / 500'000 + 1.6 / 50, 1e-9);
   // Two MCUs without motors are still asked.
   const std::array<std::uint8_t, 2> idle = {0, 0};
   EXPECT_NEAR(line_load(1'000'000, 2'560'000, BUSHD_FORMAT_COARSE, idle),
-              (2 * (8 + 8 + 33) / 0.05 + 18 / 0.5) * 10 / 1e6, 1e-9);
+              ((9 + 2 * (3 + 8 + 52)) / 0.05 + 27 / 0.5) * 10 / 1e6 + 2.2 / 50, 1e-9);
   // One coarse motor: 16 ticks a frame, 1 + 7 + 9 + 2 + 16 bytes every 16 ms.
   const std::array<std::uint8_t, 1> single = {1};
   EXPECT_NEAR(line_load(250'000, 1'000'000, BUSHD_FORMAT_COARSE, single),
-              (35 / 0.016 + (8 + 8 + 39) / 0.05 + 18 / 0.5) * 10 / 250'000, 1e-9);
+              (35 / 0.016 + (12 + 8 + 58) / 0.05 + 27 / 0.5) * 10 / 250'000 + 1.6 / 50, 1e-9);
 }
 
 TEST(LineBudget, GrowsWithEverythingThatCosts) {
@@ -62,7 +62,9 @@ TEST(LineBudget, IsACloseUpperBoundOfWhatIsSent) {
         const std::int64_t before = bus.master_bytes + bus.slave_bytes;
         bus.run_for(10'000'000);
         const auto bytes = static_cast<double>(bus.master_bytes + bus.slave_bytes - before);
-        const double sent = bytes * 10 / FakeBus::kBaud / 10.0;
+        // Twenty times a second the line is quiet before each answer.
+        const double quiet_s = 20 * (1e-3 + slaves * 0.6e-3);
+        const double sent = bytes * 10 / FakeBus::kBaud / 10.0 + quiet_s;
         const std::vector<std::uint8_t> all(bus.slaves.size(), static_cast<std::uint8_t>(motors));
         const double budget = line_load(FakeBus::kBaud, FakeBus::kTickNs, format, all);
         EXPECT_LE(sent, budget * 1.002) << "one frame more or less: 0.2 % of ten seconds";

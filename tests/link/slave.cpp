@@ -15,13 +15,14 @@ FakeBus::FakeBus(int count, int motors, bushd_format format, std::uint32_t tick_
   for (int i = 0; i < count; ++i) {
     link::McuSetup mcu;
     mcu.address = static_cast<std::uint8_t>(i + 1);
-    mcu.tables = {&table};
+    mcu.tables = {{&table, 7}};
     mcu.table_of_motor.fill(-1);
     std::fill_n(mcu.table_of_motor.begin(), motors, 0);
     setup.mcus.push_back(mcu);
     Slave slave;
     slave.address = mcu.address;
     slave.identity.motors = static_cast<std::uint8_t>(motors);
+    slave.identity.unique_id[0] = static_cast<std::uint8_t>(100 + i);
     slave.zero_us = -1'000'000 - 12'345 * i;
     slaves.push_back(slave);
   }
@@ -91,7 +92,7 @@ void FakeBus::advance(std::int64_t limit_us) {
 
   std::int64_t next = std::min(std::max(master->next_wake_us(), now_us + 1), limit_us);
   if (!frames_.empty()) next = std::min(next, frames_.begin()->first);
-  if (!arrivals_.empty()) next = std::min(next, arrivals_.begin()->first);
+  if (!arrivals_.empty()) next = std::min(next, arrivals_.begin()->first + adapter_latency_us);
   now_us = std::max(next, now_us);
   while (!frames_.empty() && frames_.begin()->first <= now_us) {
     const auto [frame, tag] = frames_.begin()->second;
@@ -99,7 +100,7 @@ void FakeBus::advance(std::int64_t limit_us) {
     heard.push_back(frame);
     hear(frame, tag);
   }
-  while (!arrivals_.empty() && arrivals_.begin()->first <= now_us) {
+  while (!arrivals_.empty() && arrivals_.begin()->first + adapter_latency_us <= now_us) {
     const Bytes bytes = arrivals_.begin()->second;
     arrivals_.erase(arrivals_.begin());
     master->receive(now_us, bytes);
@@ -122,6 +123,8 @@ void FakeBus::follow_time(Slave& slave) {
     slave.known_until[m] = open;
     if (slave.delay[m] != 0) slave.faults |= BUSHD_FAULT_LINK;
     slave.delay[m] = 0;
+    slave.island[m].reset();
+    slave.run[m].reset();
   }
 }
 
@@ -131,16 +134,25 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
   const Bytes& p = frame.payload;
   switch (frame.type) {
     case BUSHD_MSG_IDENTIFY: {
+      bushd_identify identify;
+      ASSERT_EQ(bushd_decode_identify(p.data(), p.size(), &identify), BUSHD_OK);
+      const std::uint8_t slot =
+          bushd_identify_slot(slave.identity.unique_id, identify.salt, identify.slots);
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       payload.resize(bushd_encode_identity(&slave.identity, payload.data()));
-      return answer(slave, frame, tag, payload);
+      return answer(slave, frame, tag, payload, std::int64_t{slot} * identify.slot_units * 10);
     }
-    case BUSHD_MSG_POLL:
-      return answer(slave, frame, tag, report(slave));
+    case BUSHD_MSG_POLL: {
+      bushd_poll poll;
+      ASSERT_EQ(bushd_decode_poll(p.data(), p.size(), &poll), BUSHD_OK);
+      bushd_poll_entry entry;
+      if (!bushd_poll_find(&poll, slave.address, &entry)) return;
+      return answer(slave, frame, tag, report(slave), std::int64_t{entry.begin_units} * 10);
+    }
     case BUSHD_MSG_SYNC: {
       bushd_sync sync;
       ASSERT_EQ(bushd_decode_sync(p.data(), p.size(), &sync), BUSHD_OK);
-      const bool marked = (slave.flags & BUSHD_FLAG_MARK) && sync.mark_tag == slave.mark_tag;
+      const bool marked = (slave.flags & BUSHD_FLAG_MARK) && sync.known_mark == slave.mark;
       // Its clock is exact: once in step it stays so.
       if (sync.follows && marked && (slave.flags & BUSHD_FLAG_SYNCED) == 0) {
         slave.zero_us =
@@ -148,19 +160,43 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
         slave.flags |= BUSHD_FLAG_SYNCED;
         slave.known_until.fill(tick_of(slave) + 2);
       }
-      slave.mark_tag = tag;
+      slave.mark = sync.mark;
       slave.mark_us = frame.at_us;
       slave.flags |= BUSHD_FLAG_MARK;
       return;
     }
     case BUSHD_MSG_TICKS:
-      return take_ticks(slave, frame);
+      return take_ticks(slave, read_ticks(frame));
+    case BUSHD_MSG_TABLE_TICKS:
+      return take_ticks(slave, read_table_ticks(frame));
+    case BUSHD_MSG_TABLE_RUN:
+      return take_table_run(slave, frame);
+    case BUSHD_MSG_EMERGENCY:
+      slave.faults |= BUSHD_FAULT_EMERGENCY;
+      slave.delay.fill(0);
+      slave.run.fill({});
+      slave.known_until.fill(tick_of(slave) + 2);
+      return;
+    case BUSHD_MSG_TABLES: {
+      bushd_tables tables{};
+      for (const auto& [slot, held] : slave.held) tables.slot[slot] = held;
+      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+      payload.resize(bushd_encode_tables(&tables, payload.data()));
+      return answer(slave, frame, tag, payload);
+    }
     default:
       break;
   }
   if (status == 0) {
     if (frame.type == BUSHD_MSG_CONFIGURE) slave.flags |= BUSHD_FLAG_CONFIGURED;
-    if (frame.type == BUSHD_MSG_TABLE_BEGIN) slave.tables[p[0]].clear();
+    if (frame.type == BUSHD_MSG_TABLE_BEGIN) {
+      slave.tables[p[0]].clear();
+      slave.held[p[0]] = {.valid = false, .crc = 0, .revision = bushd_get_u32(&p[11])};
+    }
+    if (frame.type == BUSHD_MSG_TABLE_END) {
+      slave.held[p[0]].valid = true;
+      slave.held[p[0]].crc = bushd_get_u32(&p[1]);
+    }
     if (frame.type == BUSHD_MSG_TABLE_DATA) {
       for (std::size_t i = 0; i < p[3]; ++i) {
         slave.tables[p[0]].push_back(bushd_get_u16(&p[4 + 2 * i]));
@@ -172,6 +208,10 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
       if (p[0] & BUSHD_CONTROL_DISABLE)
         slave.flags &= static_cast<std::uint8_t>(~BUSHD_FLAG_ENABLED);
       if (p[0] & BUSHD_CONTROL_CLEAR_FAULTS) slave.faults = 0;
+      if (p[0] & BUSHD_CONTROL_FORGET_TABLES) {
+        slave.tables.clear();
+        slave.held.clear();
+      }
     }
     if (frame.type == BUSHD_MSG_SET_POSITION) {
       slave.position[p[0]] = static_cast<std::int32_t>(bushd_get_u32(&p[1]));
@@ -180,25 +220,70 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
   answer(slave, frame, tag, {status});
 }
 
+FakeBus::Ticks FakeBus::read_ticks(const Heard& frame) {
+  bushd_ticks ticks{};
+  EXPECT_EQ(bushd_decode_ticks(frame.payload.data(), frame.payload.size(), &ticks), BUSHD_OK);
+  Ticks read{ticks.epoch, ticks.flags, ticks.first_tick, ticks.count, {}};
+  unsigned column = 0;
+  for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((ticks.mask >> m & 1) == 0) continue;
+    auto& [displacements, delay] = read.of_motor[m];
+    for (unsigned i = 0; i < ticks.count; ++i) {
+      const unsigned at = i * ticks.motors + column;
+      displacements.push_back(ticks.flags & BUSHD_TICKS_FINE
+                                  ? bushd_get_i16(ticks.displacements + 2 * at)
+                                  : static_cast<std::int16_t>(ticks.displacements[at]));
+    }
+    delay = bushd_get_u16(ticks.delays + 2 * column);
+    ++column;
+  }
+  return read;
+}
+
+FakeBus::Ticks FakeBus::read_table_ticks(const Heard& frame) const {
+  bushd_table_ticks ticks{};
+  EXPECT_EQ(bushd_decode_table_ticks(frame.payload.data(), frame.payload.size(), &ticks), BUSHD_OK);
+  Ticks read{ticks.epoch, ticks.flags, ticks.first_tick, ticks.count, {}};
+  std::uint16_t at = 0;
+  bushd_table_ticks_entry entry;
+  while (bushd_next_table_ticks_entry(&ticks, &at, &entry)) {
+    bushd_run run;
+    EXPECT_TRUE(bushd_run_restore(&run, &table, &entry.state));
+    auto& [displacements, delay] = read.of_motor[entry.motor];
+    displacements.resize(ticks.count);
+    if (setup.format == BUSHD_FORMAT_FINE) {
+      bushd_run_expand_fine(&run, setup.tick_ns, ticks.count, displacements.data(), 1);
+    } else {
+      Bytes coarse(ticks.count);
+      bushd_run_expand_coarse(&run, setup.tick_ns, ticks.count, coarse.data(), 1);
+      std::copy(coarse.begin(), coarse.end(), displacements.begin());
+    }
+    delay = bushd_run_delay(&run);
+  }
+  return read;
+}
+
 // The rules of docs/protocol.md, "Streams".
-void FakeBus::take_ticks(Slave& slave, const Heard& frame) {
-  bushd_ticks ticks;
-  ASSERT_EQ(bushd_decode_ticks(frame.payload.data(), frame.payload.size(), &ticks), BUSHD_OK);
+void FakeBus::take_ticks(Slave& slave, const Ticks& ticks) {
   const bool replace = ticks.flags & BUSHD_TICKS_REPLACE;
   const bool start = ticks.flags & BUSHD_TICKS_START;
   const auto ahead = static_cast<std::int8_t>(ticks.epoch - slave.epoch);
+  const auto count = static_cast<std::int32_t>(ticks.count);
   bool good = (replace ? ahead > 0 : ahead == 0) && slave.faults == 0;
   bool news = false;
-  for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((ticks.mask >> m & 1) == 0) continue;
+  for (const auto& entry : ticks.of_motor) {
+    const unsigned m = entry.first;
     const auto first = static_cast<std::int32_t>(ticks.first_tick - slave.known_until[m]);
     const bool moves = slave.delay[m] != 0;
+    const auto& island = slave.island[m];
     if (replace) {
       good &= (moves ? first <= 0 : first < 0) &&
               static_cast<std::int32_t>(ticks.first_tick - tick_of(slave)) >= 2;
       news = true;
-    } else if (first + ticks.count > 0) {
-      good &= start ? !moves && first >= 0 : moves && first <= 0;
+    } else if (first + count > 0) {
+      const bool joins = first <= 0 || !island ||
+                         (ticks.first_tick >= island->from && ticks.first_tick <= island->until);
+      good &= start ? !moves && first >= 0 : moves && joins;
       news = true;
     }
   }
@@ -206,25 +291,60 @@ void FakeBus::take_ticks(Slave& slave, const Heard& frame) {
     ++slave.rejected;
     return;
   }
-  unsigned column = 0;
-  for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((ticks.mask >> m & 1) == 0) continue;
-    for (unsigned i = 0; i < ticks.count; ++i) {
-      const std::uint32_t tick = ticks.first_tick + i;
-      if (!replace && static_cast<std::int32_t>(tick - slave.known_until[m]) < 0) continue;
-      const unsigned at = i * ticks.motors + column;
-      slave.taken[m][tick] = ticks.flags & BUSHD_TICKS_FINE
-                                 ? bushd_get_i16(ticks.displacements + 2 * at)
-                                 : static_cast<std::int16_t>(ticks.displacements[at]);
-    }
-    const std::uint32_t end = ticks.first_tick + ticks.count;
-    if (replace || static_cast<std::int32_t>(end - slave.known_until[m]) > 0) {
-      slave.known_until[m] = end;
-      if (ticks.delays != nullptr) slave.delay[m] = bushd_get_u16(ticks.delays + 2 * column);
-    }
-    ++column;
-  }
+  for (const auto& entry : ticks.of_motor) take_motor_ticks(slave, entry.first, ticks);
   if (replace) slave.epoch = ticks.epoch;
+}
+
+void FakeBus::take_motor_ticks(Slave& slave, unsigned m, const Ticks& ticks) const {
+  const bool replace = ticks.flags & BUSHD_TICKS_REPLACE;
+  const bool start = ticks.flags & BUSHD_TICKS_START;
+  const auto& [displacements, delay] = ticks.of_motor.at(m);
+  const std::uint32_t end = ticks.first_tick + ticks.count;
+  for (std::uint32_t i = 0; i < ticks.count; ++i) {
+    const std::uint32_t tick = ticks.first_tick + i;
+    if (!replace && static_cast<std::int32_t>(tick - slave.known_until[m]) < 0) continue;
+    slave.taken[m][tick] = displacements[i];
+  }
+  auto& island = slave.island[m];
+  if (replace) {
+    slave.run[m].reset();
+    island.reset();
+  } else if (!start && ticks.first_tick > slave.known_until[m]) {
+    if (!island) island = Slave::Island{ticks.first_tick, end, delay};
+    if (end > island->until) island = Slave::Island{island->from, end, delay};
+    return;
+  }
+  if (replace || end > slave.known_until[m]) {
+    slave.known_until[m] = end;
+    slave.delay[m] = delay;
+  }
+  if (island && slave.known_until[m] >= island->from) {
+    if (island->until > slave.known_until[m]) {
+      slave.known_until[m] = island->until;
+      slave.delay[m] = island->delay;
+    }
+    island.reset();
+  }
+}
+
+void FakeBus::take_table_run(Slave& slave, const Heard& frame) {
+  bushd_table_run message{};
+  ASSERT_EQ(bushd_decode_table_run(frame.payload.data(), frame.payload.size(), &message), BUSHD_OK);
+  bool good = message.epoch == slave.epoch && slave.faults == 0;
+  for (std::uint8_t i = 0; i < message.count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(&message, i);
+    good &= slave.delay[entry.motor] == 0 && message.first_tick >= slave.known_until[entry.motor];
+  }
+  if (!good) {
+    ++slave.rejected;
+    return;
+  }
+  for (std::uint8_t i = 0; i < message.count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(&message, i);
+    slave.run[entry.motor] = entry;
+    slave.known_until[entry.motor] =
+        static_cast<std::uint32_t>(source.end(entry.motor));  // by its table
+  }
 }
 
 Bytes FakeBus::report(Slave& slave) {
@@ -236,8 +356,17 @@ Bytes FakeBus::report(Slave& slave) {
     if (slave.known_until[m] - r.tick > 2 || slave.delay[m] != 0) {
       r.moving |= static_cast<std::uint16_t>(1u << m);
     }
+    if (slave.run[m]) r.running |= static_cast<std::uint16_t>(1u << m);
     r.motor[m] = {slave.position[m], static_cast<std::uint16_t>(slave.known_until[m])};
+    if (!slave.island[m]) continue;
+    const auto from = static_cast<std::uint16_t>(slave.island[m]->from);
+    const auto until = static_cast<std::uint16_t>(slave.island[m]->until);
+    if (r.islands != 0 && (r.island_from != from || r.island_until != until)) continue;
+    r.islands |= static_cast<std::uint16_t>(1u << m);
+    r.island_from = from;
+    r.island_until = until;
   }
+  r.low_water_ticks = slave.low_water;
   r.state = slave.faults != 0                ? BUSHD_STATE_FAULT
             : (slave.flags & ready) != ready ? BUSHD_STATE_BUSY
             : r.moving != 0                  ? BUSHD_STATE_RUN
@@ -247,27 +376,36 @@ Bytes FakeBus::report(Slave& slave) {
   r.epoch = slave.epoch;
   r.boot_number = slave.identity.boot_number;
   r.tick_ns = static_cast<std::uint32_t>((now_us - slave.zero_us) * 1000 % setup.tick_ns);
-  r.mark_tag = slave.mark_tag;
+  r.mark = slave.mark;
   const std::int64_t mark_ns = (slave.mark_us - slave.zero_us) * 1000;
   r.mark_tick = static_cast<std::uint32_t>(mark_ns / setup.tick_ns);
   r.mark_ns = static_cast<std::uint32_t>(mark_ns % setup.tick_ns);
   r.rejected_frames = slave.rejected;
   r.motor_count = slave.identity.motors;
+  slave.spoils(r);
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_report(&r, payload.data()));
   return payload;
 }
 
-void FakeBus::answer(const Slave& slave, const Heard& frame, std::uint8_t tag,
-                     const Bytes& payload) {
+void FakeBus::answer(const Slave& slave, const Heard& frame, std::uint8_t tag, const Bytes& payload,
+                     std::int64_t delay_us) {
   Bytes wire(1 + BUSHD_FRAME_MAX_WIRE);
   wire[0] = 0;
   wire.resize(1 + bushd_frame_encode(slave.address,
                                      static_cast<std::uint8_t>(frame.type | BUSHD_TYPE_REPLY), tag,
                                      payload.data(), payload.size(), wire.data() + 1));
   slave_bytes += static_cast<std::int64_t>(wire.size());
-  const std::int64_t end =
-      frame.at_us + turnaround_us + static_cast<std::int64_t>(wire.size()) * 10'000'000 / kBaud;
+  const std::int64_t begin = frame.at_us + std::max(turnaround_us, delay_us);
+  const std::int64_t end = begin + static_cast<std::int64_t>(wire.size()) * 10'000'000 / kBaud;
+  // Who talks at the same time spoils it for both.
+  for (auto& [other_end, other] : arrivals_) {
+    const std::int64_t other_begin =
+        other_end - static_cast<std::int64_t>(other.size()) * 10'000'000 / kBaud;
+    if (begin >= other_end || end <= other_begin) continue;
+    wire[wire.size() / 2] ^= 0x55;
+    other[other.size() / 2] ^= 0x55;
+  }
   arrivals_.emplace(end, wire);
 }
 

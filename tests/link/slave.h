@@ -27,28 +27,49 @@ struct Heard {
 };
 
 struct Slave {
-  bushd_identity identity{BUSHD_PROTOCOL_VERSION, 16, 1, 500, 256, 256, 4000};
+  bushd_identity identity{.protocol_version = BUSHD_PROTOCOL_VERSION,
+                          .motors = 16,
+                          .firmware_version = 1,
+                          .boot_number = 500,
+                          .slots = 256,
+                          .queue_ticks = 256,
+                          .table_codes = 4000,
+                          .capabilities = BUSHD_CAN_COARSE | BUSHD_CAN_FINE |
+                                          BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN,
+                          .unique_id = {}};
   std::uint8_t address = 1;
   bool answers = true;
   std::map<std::uint8_t, std::uint8_t> refusals;  // request type -> status
   // Frames for which this returns true are lost on the way here.
   std::function<bool(const Heard&)> loses = [](const Heard&) { return false; };
 
+  // Lies in its reports.
+  std::function<void(bushd_report&)> spoils = [](bushd_report&) {};
+
   // What it knows.
   std::uint8_t flags = 0;
   std::uint8_t epoch = 0;
   std::uint8_t faults = 0;
   std::int64_t zero_us = -1'000'000;  // when its tick 0 began
-  std::uint8_t mark_tag = 0;
+  std::uint32_t mark = 0;
   std::int64_t mark_us = 0;
   std::map<std::uint8_t, std::vector<std::uint16_t>> tables;
+  std::map<std::uint8_t, bushd_table_held> held;
   std::array<int, BUSHD_MOTORS_PER_MCU> table_of{};
   std::array<std::uint32_t, BUSHD_MOTORS_PER_MCU> known_until{};
   std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delay{};
+  struct Island {
+    std::uint32_t from;
+    std::uint32_t until;
+    std::uint16_t delay;
+  };
+  std::array<std::optional<Island>, BUSHD_MOTORS_PER_MCU> island;
+  std::array<std::optional<bushd_table_run_entry>, BUSHD_MOTORS_PER_MCU> run;  // taken
   std::array<std::int32_t, BUSHD_MOTORS_PER_MCU> position{};
   // Everything it took, by motor and tick.
   std::array<std::map<std::uint32_t, std::int16_t>, BUSHD_MOTORS_PER_MCU> taken;
   std::uint16_t rejected = 0;
+  std::uint16_t low_water = UINT16_MAX;
 };
 
 // One step a tick and motor for ever, unless a test says otherwise; notes what it was asked.
@@ -67,6 +88,17 @@ class FakeSource : public link::TickSource {
     for (unsigned i = 0; i < count; ++i) out[i * stride] = displacement(motor, first + i);
     return delay(motor, first + count);
   }
+
+  // None: what the displacements are follows no table.
+  std::function<std::optional<Stretch>(std::uint8_t motor, link::Tick first, unsigned max_ticks)>
+      stretch = [](std::uint8_t, link::Tick, unsigned) { return std::nullopt; };
+  std::function<link::Tick(std::uint8_t motor)> end = [](std::uint8_t) { return INT64_MAX; };
+
+  std::optional<Stretch> run_at(std::size_t, std::uint8_t motor, link::Tick first,
+                                unsigned max_ticks) override {
+    return stretch(motor, first, max_ticks);
+  }
+  link::Tick end_tick(std::size_t, std::uint8_t motor) override { return end(motor); }
 };
 
 class FakeBus {
@@ -92,6 +124,7 @@ class FakeBus {
 
   std::int64_t now_us = 1'000'000;
   std::int64_t turnaround_us = 100;
+  std::int64_t adapter_latency_us = 0;  // of answers
   std::vector<Slave> slaves;
   FakeSource source;
   std::vector<std::uint16_t> codes;
@@ -107,8 +140,22 @@ class FakeBus {
   void advance(std::int64_t limit_us);
   void hear(const Heard& frame, std::uint8_t tag);
   void act(Slave& slave, const Heard& frame, std::uint8_t tag);
-  void take_ticks(Slave& slave, const Heard& frame);
-  void answer(const Slave& slave, const Heard& frame, std::uint8_t tag, const Bytes& payload);
+  // A frame of ticks, however it was coded: by motor, the displacements and the delay at the end.
+  struct Ticks {
+    std::uint8_t epoch;
+    std::uint8_t flags;
+    std::uint32_t first_tick;
+    std::uint32_t count;
+    std::map<unsigned, std::pair<std::vector<std::int16_t>, std::uint16_t>> of_motor;
+  };
+  static Ticks read_ticks(const Heard& frame);
+  Ticks read_table_ticks(const Heard& frame) const;
+  void take_ticks(Slave& slave, const Ticks& ticks);
+  void take_motor_ticks(Slave& slave, unsigned motor, const Ticks& ticks) const;
+  void take_table_run(Slave& slave, const Heard& frame);
+  // `delay_us` after the request's end.
+  void answer(const Slave& slave, const Heard& frame, std::uint8_t tag, const Bytes& payload,
+              std::int64_t delay_us = 0);
   void follow_time(Slave& slave);
   Bytes report(Slave& slave);
 

@@ -86,6 +86,7 @@ TEST_P(Stream, EndOfAMoveEndsItsStream) {
   };
   Tick start = bus.master->earliest_start(bus.now_us, 0, 1);
   start += 256 - start % 256;  // so that rest comes after some 100 ticks
+  bus.source.end = [start](std::uint8_t) { return start + 101; };
   bus.run_for((start - bus.tick(0) - 60) * 2560);
   bus.master->begin(0, 1, start);
   bus.run_for(1'500'000);
@@ -96,10 +97,8 @@ TEST_P(Stream, EndOfAMoveEndsItsStream) {
 }
 
 // Any frame may be lost, also its repetition: the slave has the whole stream in the end.
-TEST_P(Stream, LostFramesAreSentAgainFromTheGapOn) {
-  // What follows a lost frame is lost too until the next report, 50 ms later; a frame holds 41 ms.
-  // So more than one or two in a row must come through for the queue not to run dry.
-  for (int every = 6; every < 14; ++every) {
+TEST_P(Stream, LostFramesAreSentAgain) {
+  for (int every = 3; every < 14; ++every) {
     int n = 0;
     bus.slaves[0].loses = [&](const Heard& heard) {
       return heard.type == BUSHD_MSG_TICKS && ++n % every == 0;
@@ -115,14 +114,41 @@ TEST_P(Stream, LostFramesAreSentAgainFromTheGapOn) {
     bus.slaves[0].loses = [](const Heard&) { return false; };
     const Tick stop = bus.master->earliest_replace(bus.now_us);
     bus.source.delay = [stop](std::uint8_t, Tick t) { return std::uint16_t(t > stop ? 0 : 50); };
+    bus.source.end = [stop](std::uint8_t) { return stop + 1; };
     bus.master->replace(0, 0b1001, stop);
     bus.run_for(200'000);
     bus.master->drop(0, 0);
     bus.master->drop(0, 3);
     bus.source.delay = [](std::uint8_t, Tick) { return std::uint16_t{50}; };
+    bus.source.end = [](std::uint8_t) { return INT64_MAX; };
     bus.run_for(500'000);
     ASSERT_EQ(bus.slaves[0].faults, 0);
   }
+}
+
+// The second of the frames that fill the queue at first.
+TEST_P(Stream, OnlyWhatWasLostIsSentAgain) {
+  int n = 0;
+  bus.slaves[0].loses = [&n](const Heard& h) { return h.type == BUSHD_MSG_TICKS && n++ == 1; };
+  const Tick start = begin(0);
+  bus.run_for(1'000'000);
+  expect_taken(0, start, start + 300);
+  EXPECT_EQ(bus.master->health(0).repeats, 1u);
+  EXPECT_EQ(bus.master->health(0).missed_ticks, 16u) << "a frame";
+  EXPECT_EQ(bus.slaves[0].rejected, 0);
+}
+
+// What an MCU claims to have beyond a gap is believed only as far as it can be true.
+TEST_P(Stream, IslandThatCannotBeIsNotBelieved) {
+  int n = 0;
+  bus.slaves[0].loses = [&n](const Heard& h) { return h.type == BUSHD_MSG_TICKS && n++ == 1; };
+  bus.slaves[0].spoils = [](bushd_report& report) {
+    if (report.islands != 0) report.island_until = static_cast<std::uint16_t>(report.tick + 5000);
+  };
+  const Tick start = begin(0);
+  bus.run_for(1'000'000);
+  expect_taken(0, start, start + 300);
+  EXPECT_GT(bus.master->health(0).repeats, 1u) << "all from the gap on";
 }
 
 TEST_P(Stream, ReplacementSwitchesThePlanAtItsTick) {
