@@ -40,6 +40,8 @@ enum class Op : std::uint8_t {
   kControl,   // mcu, actions
   kPort,      // lost and opened again
   kReconfigure,
+  kTableRun,   // mcu, motor, ticks later
+  kEmergency,  // how
   kCount
 };
 
@@ -53,7 +55,7 @@ const bushd_table kTable = {
     .time_unit_ns = 40000};
 
 link::McuSetup mcu_setup(std::uint8_t address) {
-  link::McuSetup setup{.address = address, .tables = {&kTable}, .table_of_motor = {}};
+  link::McuSetup setup{.address = address, .tables = {{&kTable, 3}}, .table_of_motor = {}};
   setup.table_of_motor.fill(-1);
   for (std::size_t m = 0; m < kMotors; ++m) setup.table_of_motor[m] = 0;
   return setup;
@@ -67,7 +69,27 @@ class Source : public link::TickSource {
     BUSHD_REQUIRE(mcu < kMcus && motor < kMotors && count >= 1 && stride >= 1);
     BUSHD_REQUIRE(first >= start[mcu][motor]);
     for (unsigned i = 0; i < count; ++i) out[i * stride] = 65;
-    return first + count < start[mcu][motor] + length[mcu][motor] ? 100 : 0;
+    return first + count < end_tick(mcu, motor) ? 100 : 0;
+  }
+
+  // Odd motors run by their table, at its cruise delay.
+  std::optional<Stretch> run_at(std::size_t mcu, std::uint8_t motor, link::Tick first,
+                                unsigned max_ticks) override {
+    BUSHD_REQUIRE(mcu < kMcus && motor < kMotors && max_ticks >= 1);
+    BUSHD_REQUIRE(first >= start[mcu][motor]);
+    if (motor % 2 == 0 || first >= end_tick(mcu, motor)) return std::nullopt;
+    bushd_run_state state{};
+    state.direction = 1;
+    state.cruises = true;
+    Stretch stretch{};
+    BUSHD_REQUIRE(bushd_run_restore(&stretch.run, &kTable, &state));
+    const link::Tick left = end_tick(mcu, motor) - first;
+    stretch.ticks = static_cast<unsigned>(std::min<link::Tick>(left, max_ticks));
+    return stretch;
+  }
+
+  link::Tick end_tick(std::size_t mcu, std::uint8_t motor) override {
+    return start[mcu][motor] + length[mcu][motor];
   }
 
   std::array<std::array<link::Tick, kMotors>, kMcus> start{};
@@ -79,7 +101,7 @@ struct SaneMcu {
   bool configured = false;
   bool synced = false;
   bool enabled = false;
-  std::uint8_t mark_tag = 0;
+  std::uint32_t mark = 0;
   bool marked = false;
   std::int64_t marked_at_us = 0;
 };
@@ -105,7 +127,7 @@ class Bus {
     for (const std::uint8_t byte : bytes) {
       bushd_frame frame;
       const bool complete = bushd_receive_byte(&answers_, byte, &frame) == BUSHD_RECEIVE_FRAME;
-      if (complete && awaited_ && frame.tag == awaited_->tag) awaited_.reset();
+      if (complete && awaited_ && frame.tag == awaited_->tag) answered(frame.address);
     }
     master_.receive(now_us_, bytes);
     step();
@@ -126,7 +148,7 @@ class Bus {
     std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE + 1> wire;
     const auto type = static_cast<std::uint8_t>(awaited_->type | BUSHD_TYPE_REPLY);
     wire[0] = 0;  // ends whatever noise was before
-    const std::size_t size = bushd_frame_encode(awaited_->address, type, awaited_->tag,
+    const std::size_t size = bushd_frame_encode(awaited_->addresses.front(), type, awaited_->tag,
                                                 payload.data(), payload.size(), &wire[1]);
     receive(Bytes(wire).first(size + 1));
   }
@@ -144,8 +166,7 @@ class Bus {
 
   void step() {
     const Bytes sent = master_.step(now_us_);
-    BUSHD_REQUIRE(sent.empty() || !awaited_ || now_us_ > awaited_->sent_us + kMinPatienceUs);
-    if (!sent.empty()) awaited_.reset();
+    if (!sent.empty() && awaited_ && now_us_ > awaited_->sent_us + kMinPatienceUs) awaited_.reset();
     for (const std::uint8_t byte : sent) {
       bushd_frame frame;
       const bushd_receive result = bushd_receive_byte(&receiver_, byte, &frame);
@@ -161,11 +182,16 @@ class Bus {
 
  private:
   struct Awaited {
-    std::uint8_t address;
+    std::vector<std::uint8_t> addresses;  // who has not answered yet
     std::uint8_t type;
     std::uint8_t tag;
     std::int64_t sent_us;
   };
+
+  void answered(std::uint8_t address) {
+    std::erase(awaited_->addresses, address);
+    if (awaited_->addresses.empty()) awaited_.reset();
+  }
 
   static void check(const link::McuView& view) {
     if (view.phase != link::McuPhase::kOffline) BUSHD_REQUIRE(view.identified);
@@ -182,16 +208,40 @@ class Bus {
 
   // A frame of the master, as an MCU sees it.
   void heard(const bushd_frame& frame) {
-    BUSHD_REQUIRE(!awaited_);
+    // An emergency does not wait for the last answer.
+    BUSHD_REQUIRE(!awaited_ || frame.type == BUSHD_MSG_EMERGENCY);
     BUSHD_REQUIRE((frame.type & BUSHD_TYPE_REPLY) == 0 && frame.address <= kMcus);
-    BUSHD_REQUIRE((frame.address == BUSHD_ADDRESS_BROADCAST) == (frame.type == BUSHD_MSG_SYNC));
+    const bool to_all = frame.type == BUSHD_MSG_SYNC || frame.type == BUSHD_MSG_POLL;
+    const bool to_any = frame.type == BUSHD_MSG_EMERGENCY;
+    BUSHD_REQUIRE(to_any || (frame.address == BUSHD_ADDRESS_BROADCAST) == to_all);
     BUSHD_REQUIRE(acceptable(frame));
-    if (frame.type == BUSHD_MSG_SYNC) {
-      sync(frame);
-    } else if (frame.type != BUSHD_MSG_TICKS) {
-      awaited_ = Awaited{frame.address, frame.type, frame.tag, now_us_};
-      obey(frame, &mcus_[frame.address - 1u]);
+    switch (frame.type) {
+      case BUSHD_MSG_SYNC:
+        return sync(frame);
+      case BUSHD_MSG_TICKS:
+      case BUSHD_MSG_TABLE_TICKS:
+      case BUSHD_MSG_TABLE_RUN:
+      case BUSHD_MSG_EMERGENCY:
+        return;
+      case BUSHD_MSG_POLL:
+        awaited_ = Awaited{polled(frame), frame.type, frame.tag, now_us_};
+        return;
+      default:
+        awaited_ = Awaited{{frame.address}, frame.type, frame.tag, now_us_};
+        obey(frame, &mcus_[frame.address - 1u]);
     }
+  }
+
+  static std::vector<std::uint8_t> polled(const bushd_frame& frame) {
+    bushd_poll poll;
+    bushd_decode_poll(frame.payload, frame.payload_size, &poll);
+    std::vector<std::uint8_t> addresses;
+    for (std::uint8_t address = 1; address <= kMcus; ++address) {
+      bushd_poll_entry entry;
+      if (bushd_poll_find(&poll, address, &entry)) addresses.push_back(address);
+    }
+    BUSHD_REQUIRE(addresses.size() == poll.count);
+    return addresses;
   }
 
   static bool acceptable(const bushd_frame& frame) {
@@ -200,7 +250,10 @@ class Bus {
     };
     switch (frame.type) {
       case BUSHD_MSG_IDENTIFY:
+        return decodes(bushd_identify{}, bushd_decode_identify);
       case BUSHD_MSG_POLL:
+        return decodes(bushd_poll{}, bushd_decode_poll);
+      case BUSHD_MSG_TABLES:
         return frame.payload_size == 0;
       case BUSHD_MSG_CONFIGURE:
         return decodes(bushd_configure{}, bushd_decode_configure);
@@ -220,6 +273,12 @@ class Bus {
         return decodes(bushd_sync{}, bushd_decode_sync);
       case BUSHD_MSG_TICKS:
         return decodes(bushd_ticks{}, bushd_decode_ticks);
+      case BUSHD_MSG_TABLE_TICKS:
+        return decodes(bushd_table_ticks{}, bushd_decode_table_ticks);
+      case BUSHD_MSG_TABLE_RUN:
+        return decodes(bushd_table_run{}, bushd_decode_table_run);
+      case BUSHD_MSG_EMERGENCY:
+        return decodes(bushd_emergency{}, bushd_decode_emergency);
       default:
         return false;
     }
@@ -230,9 +289,9 @@ class Bus {
     bushd_decode_sync(frame.payload, frame.payload_size, &message);
     for (SaneMcu& mcu : mcus_) {
       if (!mcu.configured) continue;
-      if (mcu.marked && message.follows && message.mark_tag == mcu.mark_tag) mcu.synced = true;
+      if (mcu.marked && message.follows && message.known_mark == mcu.mark) mcu.synced = true;
       mcu.marked = true;
-      mcu.mark_tag = frame.tag;
+      mcu.mark = message.mark;
       mcu.marked_at_us = now_us_;
     }
   }
@@ -252,12 +311,18 @@ class Bus {
                                        .boot_number = kBootNumber,
                                        .slots = 128,
                                        .queue_ticks = 64,
-                                       .table_codes = 100};
+                                       .table_codes = 100,
+                                       .capabilities = UINT16_MAX,
+                                       .unique_id = {awaited_->addresses.front()}};
       return bushd_encode_identity(&identity, payload);
     }
     if (awaited_->type == BUSHD_MSG_POLL) {
-      const bushd_report report = sane_report(mcus_[awaited_->address - 1u]);
+      const bushd_report report = sane_report(mcus_[awaited_->addresses.front() - 1u]);
       return bushd_encode_report(&report, payload);
+    }
+    if (awaited_->type == BUSHD_MSG_TABLES) {
+      const bushd_tables none{};
+      return bushd_encode_tables(&none, payload);
     }
     const bushd_acknowledgement done = {BUSHD_OK};
     return bushd_encode_acknowledgement(&done, payload);
@@ -274,7 +339,7 @@ class Bus {
     report.boot_number = kBootNumber;
     report.tick = static_cast<std::uint32_t>(now_us_ / tick_us);
     report.tick_ns = static_cast<std::uint32_t>(now_us_ % tick_us * 1000);
-    report.mark_tag = mcu.mark_tag;
+    report.mark = mcu.mark;
     report.mark_tick = static_cast<std::uint32_t>(mcu.marked_at_us / tick_us);
     report.mark_ns = static_cast<std::uint32_t>(mcu.marked_at_us % tick_us * 1000);
     report.motor_count = kMotors;
@@ -303,7 +368,7 @@ void answer_spoilt(Bus& bus, Input& input) {
   bus.answer(payload);
 }
 
-void begin(Bus& bus, Input& input) {
+void begin(Bus& bus, Input& input, bool whole) {
   const std::size_t mcu = input.u8() % kMcus;
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const std::uint8_t later = input.u8();
@@ -312,7 +377,11 @@ void begin(Bus& bus, Input& input) {
   const link::Tick start = bus.master().earliest_start(bus.now_us(), mcu, motor) + later;
   bus.source().start[mcu][motor] = start;
   bus.source().length[mcu][motor] = length;
-  bus.master().begin(mcu, motor, start);
+  if (whole) {
+    bus.master().begin_table_run(mcu, motor, start, length - 128 == 0 ? 1 : length - 128);
+  } else {
+    bus.master().begin(mcu, motor, start);
+  }
 }
 
 void replace(Bus& bus, Input& input) {
@@ -337,7 +406,7 @@ void run_op(Op op, Bus& bus, Input& input) {
     case Op::kAnswer:
       return answer_spoilt(bus, input);
     case Op::kBegin:
-      return begin(bus, input);
+      return begin(bus, input, false);
     case Op::kReplace:
       return replace(bus, input);
     case Op::kDrop: {
@@ -360,6 +429,10 @@ void run_op(Op op, Bus& bus, Input& input) {
       const std::size_t mcu = input.u8() % kMcus;
       return master.reconfigure(mcu, mcu_setup(static_cast<std::uint8_t>(mcu + 1)));
     }
+    case Op::kTableRun:
+      return begin(bus, input, true);
+    case Op::kEmergency:
+      return master.emergency_stop(input.u8() % 2 == 0 ? BUSHD_RAMP_DOWN : BUSHD_CUT);
     case Op::kCount:
       return;
   }
