@@ -52,20 +52,21 @@ constexpr uint8_t kFrameMotors = BUSHD_MOTORS_PER_MCU;
 
 // Full TICKS frames of 16 moving motors, from displacements in memory to bytes for the line.
 void frame_coarse(benchmark::State& state) {
-  const uint8_t ticks = bushd_ticks_capacity(kFrameMotors, false, false);
+  const uint8_t ticks = bushd_ticks_capacity(kFrameMotors, false);
   const size_t bytes = size_t{ticks} * kFrameMotors;
   constexpr size_t kFrames = 160;
   Moves moves(kFrameMotors);
   moves.start();
   std::vector<uint8_t> displacements(bytes * kFrames);
   moves.expand_coarse(ticks * kFrames, displacements.data());
+  const uint16_t delays[kFrameMotors] = {};
   uint8_t wire[BUSHD_FRAME_MAX_WIRE];
   size_t frames = 0;
   for (auto _ : state) {
     for (size_t f = 0; f < kFrames; ++f) {
       uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
       const size_t head = bushd_encode_ticks_head(0, 0, static_cast<uint32_t>(frames * ticks),
-                                                  ticks, 0xFFFF, nullptr, payload);
+                                                  ticks, 0xFFFF, delays, payload);
       std::copy_n(displacements.data() + f * bytes, bytes, payload + head);
       benchmark::DoNotOptimize(bushd_frame_encode(1, BUSHD_MSG_TICKS, static_cast<uint8_t>(frames),
                                                   payload, head + bytes, wire));
