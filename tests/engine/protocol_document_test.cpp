@@ -3,7 +3,8 @@
 // - wire HEX: a frame on the line
 // - raw HEX: the same without COBS and delimiter
 // - master HEX: sent to an MCU
-// - mcu HEX: which must answer just that
+// - mcu HEX: which must answer just that, at once or
+// - begins N: N us after the master's frame
 // - says TEXT: what the frame above means (message_text)
 // - ticks N: N tick boundaries pass
 #include <gtest/gtest.h>
@@ -113,16 +114,19 @@ TEST(ProtocolDocument, DecodedFramesAreRight) {
   }
 }
 
-// The MCU of the exchange: address 1, two motors, boot number 4660. Every request ends 100 us into
-// a tick.
+// The MCU of the exchange: address 1, two motors, boot number 4660, unique id 1 .. 8. Every request
+// ends 100 us into a tick.
 class ExampleMcu {
  public:
   ExampleMcu() {
     bushd_port port{};
     port.context = this;
-    port.transmit = [](void* context, const uint8_t* wire, size_t size) {
-      static_cast<ExampleMcu*>(context)->sent_.assign(wire, wire + size);
+    port.transmit = [](void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
+      auto* const self = static_cast<ExampleMcu*>(context);
+      self->sent_.assign(wire, wire + size);
+      self->delay_us_ = static_cast<int>(delay_ns / 1000);
     };
+    port.store_address = [](void*, uint8_t) { return true; };
     port.set_enable = [](void*, bool) {};
     port.set_tick = [](void*, uint32_t) {};
     port.adjust_tick = [](void*, int32_t) {};
@@ -138,14 +142,19 @@ class ExampleMcu {
     config.queue_ticks = 256;
     config.codes = codes_;
     config.code_count = 2048;
+    for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = i + 1;
     bushd_mcu_boot(&mcu_, &port, &config);
   }
 
   Bytes answer(const Bytes& request) {
     sent_.clear();
+    delay_us_ = 0;
     for (const uint8_t byte : request) bushd_mcu_receive(&mcu_, byte, kTimeInTickNs);
     return sent_;
   }
+
+  // Of the last answer.
+  int delay_us() const { return delay_us_; }
 
   void pass_ticks(int count) {
     for (int i = 0; i < count; ++i) {
@@ -161,21 +170,28 @@ class ExampleMcu {
   int16_t queue_[256 * 2]{};
   uint16_t codes_[2048]{};
   Bytes sent_;
+  int delay_us_ = 0;
 };
 
 TEST(ProtocolDocument, TheExchangeIsWhatTheFirmwareCoreAnswers) {
   ExampleMcu mcu;
   Bytes last;
   Bytes answer;
+  int delay_us = 0;
   for (const Line& line : lines_of("exchange")) {
     SCOPED_TRACE("docs/protocol.md:" + std::to_string(line.number));
     if (line.keyword == "master") {
       EXPECT_EQ(hex(answer), "") << "an answer that the document does not print";
       last = line.bytes();
       answer = mcu.answer(last);
+      delay_us = mcu.delay_us();
+    } else if (line.keyword == "begins") {
+      EXPECT_EQ(delay_us, std::stoi(line.rest));
+      delay_us = 0;
     } else if (line.keyword == "mcu") {
       last = line.bytes();
       EXPECT_EQ(hex(answer), hex(last));
+      EXPECT_EQ(delay_us, 0) << "a time that the document does not print";
       answer.clear();
     } else if (line.keyword == "says") {
       EXPECT_EQ(meaning(last), line.rest);
