@@ -253,6 +253,7 @@ class Master {
   void handle_report(std::int64_t now_us, std::size_t mcu, const bushd_report& report,
                      std::int64_t line_us);
   void note_health(Mcu& mcu, const bushd_report& report);
+  void finish_exchange(std::int64_t now_us);
   void handle_timeout(std::int64_t now_us);
   void handle_silence(std::int64_t now_us, std::size_t mcu, std::uint8_t type);
 

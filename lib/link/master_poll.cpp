@@ -19,13 +19,16 @@ bool Master::send_wanted_poll(std::int64_t now_us) {
   if (std::none_of(mcus_.begin(), mcus_.end(), [](const Mcu& mcu) { return mcu.poll_now; })) {
     return false;
   }
+  const bool doubtful = std::any_of(mcus_.begin(), mcus_.end(),
+                                    [](const Mcu& mcu) { return mcu.poll_now && mcu.silent != 0; });
   std::vector<std::size_t> asked;
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     const Mcu& mcu = mcus_[i];
-    // Those whose turn comes soon are asked along.
-    const bool soon =
-        mcu.view.phase != McuPhase::kOffline && mcu.poll_due_us <= now_us + kPollPeriodUs / 2;
-    if (mcu.poll_now || soon) asked.push_back(i);
+    // Those whose turn comes soon are asked along, and all if one may be silent: somebody must
+    // answer after it.
+    const bool soon = doubtful || mcu.poll_due_us <= now_us + kPollPeriodUs / 2;
+    const bool along = mcu.view.phase != McuPhase::kOffline && soon;
+    if (mcu.poll_now || along) asked.push_back(i);
   }
   std::stable_sort(asked.begin(), asked.end(), [this](std::size_t a, std::size_t b) {
     const auto rank = [this](std::size_t i) {

@@ -9,6 +9,7 @@
 namespace bushd::link {
 namespace {
 
+constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
 constexpr std::int64_t kClockJumpUs = 400'000;  // more than any latency: the bus's time began anew
 // A master says SYNC at least as often; two of them in a row may be lost.
 constexpr std::int64_t kOtherMasterUs = 3 * kSyncPeriodUs;
@@ -67,10 +68,16 @@ void Master::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
   const Awaited from = *awaited;
   answered(now_us, *awaited);
   if (!handle_answer(now_us, from, frame)) ++bus_health_.crc_errors;
-  const bool all = exchange_ && !several &&
-                   std::all_of(exchange_->awaited.begin(), exchange_->awaited.end(),
-                               [](const Awaited& a) { return a.answered; });
-  if (all) exchange_.reset();
+  // Answers come in the order of their slots: after the last one nobody is waited for.
+  if (!several && exchange_ && from.mcu == exchange_->awaited.back().mcu) finish_exchange(now_us);
+}
+
+// Who has not answered is silent.
+void Master::finish_exchange(std::int64_t now_us) {
+  const Exchange exchange = *std::exchange(exchange_, std::nullopt);
+  for (const Awaited& awaited : exchange.awaited) {
+    if (!awaited.answered) handle_silence(now_us, awaited.mcu, exchange.type);
+  }
 }
 
 void Master::answered(std::int64_t now_us, Awaited& awaited) {
@@ -119,14 +126,12 @@ bool Master::handle_answer(std::int64_t now_us, const Awaited& from, const bushd
 }
 
 void Master::handle_timeout(std::int64_t now_us) {
-  const Exchange exchange = *std::exchange(exchange_, std::nullopt);
-  if (!exchange.identities.empty()) {
-    finish_identify(now_us, exchange.awaited.front().mcu, exchange.identities);
+  if (exchange_->identities.empty()) {
+    finish_exchange(now_us);
     return;
   }
-  for (const Awaited& awaited : exchange.awaited) {
-    if (!awaited.answered) handle_silence(now_us, awaited.mcu, exchange.type);
-  }
+  const Exchange exchange = *std::exchange(exchange_, std::nullopt);
+  finish_identify(now_us, exchange.awaited.front().mcu, exchange.identities);
 }
 
 void Master::handle_silence(std::int64_t now_us, std::size_t index, std::uint8_t type) {
@@ -144,8 +149,8 @@ void Master::handle_silence(std::int64_t now_us, std::size_t index, std::uint8_t
   if (++mcu.silent >= kMaxSilent) {
     go_offline(index, "does not answer", now_us + kRetryUs);
   } else if (type == BUSHD_MSG_POLL) {
-    // Soon again, but after queues that run low: a dead MCU must not starve the others.
-    mcu.poll_due_us = now_us;
+    // Sooner than usual; but a dead MCU must not starve the others.
+    mcu.poll_due_us = now_us + kPollAgainUs;
   }
 }
 

@@ -10,6 +10,7 @@
 // consistent. A sane bus comes online afterwards, whatever was before.
 #include <array>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -182,15 +183,19 @@ class Bus {
 
  private:
   struct Awaited {
-    std::vector<std::uint8_t> addresses;  // who has not answered yet
+    std::vector<std::uint8_t> addresses;  // who has not answered yet, by slot
     std::uint8_t type;
     std::uint8_t tag;
     std::int64_t sent_us;
   };
 
+  // After the last one has answered nobody is waited for.
   void answered(std::uint8_t address) {
-    std::erase(awaited_->addresses, address);
-    if (awaited_->addresses.empty()) awaited_.reset();
+    if (address == awaited_->addresses.back()) {
+      awaited_.reset();
+    } else {
+      std::erase(awaited_->addresses, address);
+    }
   }
 
   static void check(const link::McuView& view) {
@@ -235,12 +240,14 @@ class Bus {
   static std::vector<std::uint8_t> polled(const bushd_frame& frame) {
     bushd_poll poll;
     bushd_decode_poll(frame.payload, frame.payload_size, &poll);
-    std::vector<std::uint8_t> addresses;
+    std::map<std::uint16_t, std::uint8_t> by_begin;
     for (std::uint8_t address = 1; address <= kMcus; ++address) {
       bushd_poll_entry entry;
-      if (bushd_poll_find(&poll, address, &entry)) addresses.push_back(address);
+      if (bushd_poll_find(&poll, address, &entry)) by_begin[entry.begin_units] = address;
     }
-    BUSHD_REQUIRE(addresses.size() == poll.count);
+    BUSHD_REQUIRE(by_begin.size() == poll.count);
+    std::vector<std::uint8_t> addresses;
+    for (const auto& slot : by_begin) addresses.push_back(slot.second);
     return addresses;
   }
 
