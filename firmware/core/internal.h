@@ -17,28 +17,59 @@ static inline uint16_t motor_bit(uint8_t motor) {
   return (uint16_t)(1u << motor);
 }
 
+static inline uint16_t saturating_increment(uint16_t value) {
+  return value < UINT16_MAX ? (uint16_t)(value + 1u) : value;
+}
+
 static inline int16_t* queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t motor) {
   const uint32_t row = tick & (uint32_t)(mcu->config.queue_ticks - 1u);
   return &mcu->config.queue[row * mcu->config.motors + motor];
+}
+
+static inline bool has_island(const bushd_mcu_motor* motor) {
+  return motor->island.from != motor->island.until;
 }
 
 // mcu.c
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu);
 void bushd_mcu_update_state(bushd_mcu* mcu);
 
-// stream.c: TICKS frames into the queue, and a motor's next displacement out of it.
+// requests.c: frames for this MCU, and their answers.
+void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns);
+
+// stream.c: frames of ticks into the queue.
+typedef struct bushd_mcu_stretch {
+  uint8_t epoch;
+  uint8_t flags;
+  uint32_t first_tick;
+  uint16_t count;
+  uint16_t mask;
+} bushd_mcu_stretch;
+// What all frames that move motors must keep to. BUSHD_E_LATE: good, and holds nothing new.
+bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch);
 bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks);
-int16_t bushd_mcu_next_displacement(bushd_mcu* mcu, uint8_t motor, uint32_t tick);
+bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks* ticks);
+// Nothing is known of this motor from `tick` on.
+void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t motor, uint32_t tick);
+void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t motor);
 void bushd_mcu_clear_streams(bushd_mcu* mcu);
+
+// motor.c: what a motor does in the tick that is prepared, and how it stops by itself.
+int16_t bushd_mcu_emit(bushd_mcu* mcu, uint8_t motor, bushd_plane* plane);
+bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message);
+void bushd_mcu_watch_silence(bushd_mcu* mcu);  // before every tick is prepared
+bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message);
 
 // tables.c: table memory.
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message);
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message);
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message);
+bushd_tables bushd_mcu_tables(const bushd_mcu* mcu);
 
 // sync.c: the tick counter against the bus's.
-void bushd_mcu_sync(bushd_mcu* mcu, uint8_t tag, const bushd_sync* sync, uint32_t time_in_tick_ns);
-void bushd_mcu_slew(bushd_mcu* mcu);  // at every tick boundary
+void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, uint32_t time_in_tick_ns);
+void bushd_mcu_slew(bushd_mcu* mcu);             // at every tick boundary
+void bushd_mcu_new_tick_length(bushd_mcu* mcu);  // mcu->tick_ns is another one
 
 #endif

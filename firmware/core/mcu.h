@@ -26,7 +26,7 @@
 extern "C" {
 #endif
 
-#define BUSHD_FIRMWARE_VERSION 1u
+#define BUSHD_FIRMWARE_VERSION 2u
 #define BUSHD_BOOT_TICK_NS 2560000u  // tick length until the host configures one
 
 // What is emitted during one tick.
@@ -48,18 +48,39 @@ typedef struct bushd_mcu_config {
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint16_t* codes;  // table memory
   uint16_t code_count;
+  uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
 } bushd_mcu_config;
+
+typedef enum bushd_mcu_mode {
+  BUSHD_MCU_STREAM = 0,  // the queue decides
+  BUSHD_MCU_TABLE_RUN = 1,
+  BUSHD_MCU_RAMP_DOWN = 2
+} bushd_mcu_mode;
+
+// Ticks that are queued beyond a gap; none if they end where they begin.
+typedef struct bushd_mcu_island {
+  uint32_t from;
+  uint32_t until;
+  uint16_t delay;  // of the running step at `until`
+} bushd_mcu_island;
 
 typedef struct bushd_mcu_motor {
   int32_t position_steps;  // until the start of the present tick
   int16_t remainder;       // exact position minus steps made, 1/256 step
   int8_t table;            // table slot, -1: none
-  bool running_down;       // `run` is a ramp-down after the queue ended early
-  bool begun;              // a displacement was executed since start_tick
+  uint8_t mode;            // bushd_mcu_mode
+  bool exact;              // `run` is emitted exact to a slot, not by displacements
+  bool begun;              // moves, as far as is known
   uint16_t delay;          // of the running step when the queued ticks end; 0: at rest there
+  uint16_t displacement;   // the last one that was not 0, unsigned
+  uint16_t still_ticks;    // made since; saturates
+  uint32_t rest_from;      // at rest from here to start_tick
   uint32_t start_tick;     // of the last start taken
-  uint32_t known_until;  // first tick for which nothing is queued; always > tick + 1 once prepared
-  bushd_run run;
+  uint32_t known_until;  // first tick for which nothing is decided; always > tick + 1 once prepared
+  bushd_mcu_island island;
+  uint32_t run_from;   // the ticks that a table run makes
+  uint32_t run_until;  // its end, or where ticks replace it
+  bushd_run run;       // stands at the first tick that is not prepared
 } bushd_mcu_motor;
 
 typedef struct bushd_mcu_table {
@@ -67,8 +88,39 @@ typedef struct bushd_mcu_table {
   uint16_t first;  // of its codes, in code memory
   uint16_t count;  // codes announced, both sides
   uint16_t received;
+  uint32_t revision;
+  uint32_t crc;
   bushd_table table;
 } bushd_mcu_table;
+
+// The tick counter against the bus's (sync.c). All adjustments are as the port takes them: > 0 is a
+// longer tick.
+typedef struct bushd_mcu_clock {
+  uint8_t settling;    // ticks until the tick timer has another length; marks are void till then
+  bool heard;          // a SYNC frame; the last one's mark is:
+  uint16_t master;     // whose it is
+  uint32_t mark;       // its name
+  uint32_t mark_tick;  // when it was, if BUSHD_FLAG_MARK
+  uint32_t mark_ns;
+  int32_t behind_ns;     // the bus, not yet given to the port
+  int32_t slew_now_ns;   // of the present tick
+  int32_t slew_next_ns;  // of the next one, given
+  int32_t rate_now_ns;   // the rate's share in the same
+  int32_t rate_next_ns;
+  int32_t rate_ppb;       // faster than the crystal
+  int32_t rate_step;      // ns a tick, x 4096
+  int32_t rate_fraction;  // of it, not yet given
+  bool rate_known;
+  bool corrected;  // the clock was right at this time of the bus
+  uint32_t corrected_tick;
+  uint32_t corrected_ns;
+  // Masters that come by turns.
+  uint16_t other_master;   // the last one that was not `master`
+  uint32_t master_uptime;  // when they were heard last
+  uint32_t other_uptime;
+  bool other_heard;
+  uint16_t two_masters_ticks;  // until the flag falls
+} bushd_mcu_clock;
 
 // Read-only for ports and tests; everything in here is the core's.
 typedef struct bushd_mcu {
@@ -81,18 +133,18 @@ typedef struct bushd_mcu {
   uint8_t flags;
   uint8_t epoch;
   bushd_format format;
-  uint8_t front;      // plane[front] is being emitted
-  uint8_t settling;   // ticks until the tick timer has carried out the last jump; marks are void
-                      // till then
-  int32_t behind_ns;  // the bus, still to be made up by the tick timer
-  uint8_t mark_tag;
-  uint32_t mark_tick;
-  uint32_t mark_ns;
+  uint8_t front;           // plane[front] is being emitted
+  uint32_t uptime;         // ticks since boot, whatever their numbers
+  uint16_t silence_ticks;  // after as many without a good frame, table runs are run down
+  uint16_t silent_ticks;   // since the last good frame; saturates
+  uint16_t run_downs;
+  uint16_t low_water_ticks;
   uint16_t bad_frames;
   uint16_t rejected_frames;
   uint8_t last_rejection;
   uint16_t direction;  // DIR levels of the plane prepared last
   uint16_t codes_used;
+  bushd_mcu_clock clock;
   bushd_plane plane[2];
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];

@@ -14,10 +14,14 @@ extern "C" {
 typedef struct bushd_port {
   void* context;
 
-  // Sends these bytes on the bus as soon as the line is the MCU's (driver enable, turnaround and
-  // its release after the last stop bit are the port's). The buffer stays valid until the next
-  // call.
-  void (*transmit)(void* context, const uint8_t* wire, size_t size);
+  // Sends these bytes on the bus: the first bit `delay_ns` after the last stop bit of the frame
+  // that has just been handed over, or as soon as the line is the MCU's if that is later (driver
+  // enable, turnaround and its release after the last stop bit are the port's). The buffer stays
+  // valid until the next call.
+  void (*transmit)(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns);
+
+  // Keeps the address for the next boots; false if it cannot.
+  bool (*store_address)(void* context, uint8_t address);
 
   // EN, common to all drivers of the MCU; true = drivers powered.
   void (*set_enable)(void* context, bool on);

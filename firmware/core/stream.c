@@ -1,46 +1,169 @@
-// The tick queue. Per motor, everything before `known_until` is decided: queued, or known to be
-// rest. A frame is taken whole or not at all:
+// The tick queue. Per motor, everything before `known_until` is decided: queued, in a table run, or
+// known to be rest. A frame is taken whole or not at all:
 // - a start is of the MCU's epoch; its motors are at rest at known_until and start there or later
-// - a continuation is of the MCU's epoch; its motors move at known_until and it joins there
+// - a continuation is of the MCU's epoch; its motors move at known_until. It joins there; or else
+// it
+//   is kept beyond the gap as an island, one per motor, until the lost frame has come again
 // - a replacement opens a later epoch; from its first tick on it stands instead of what was queued
-// Ticks before known_until that are not replaced are duplicates and left alone. That a start says
-// so is what tells a lost start from a motor that need not move yet.
+// Ticks that are known and not replaced are duplicates and left alone. That a start says so is what
+// tells a lost start from a motor that need not move yet.
 #include <string.h>
 
+#include "engine/slots.h"
 #include "firmware/core/internal.h"
 
 void bushd_mcu_clear_streams(bushd_mcu* mcu) {
   memset(mcu->config.queue, 0,
          (size_t)mcu->config.queue_ticks * mcu->config.motors * sizeof mcu->config.queue[0]);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    mcu->motor[m].known_until = FIRST_OPEN(mcu);
-    mcu->motor[m].delay = 0;
-    mcu->motor[m].running_down = false;
+    bushd_mcu_motor* motor = &mcu->motor[m];
+    motor->known_until = FIRST_OPEN(mcu);
+    motor->delay = 0;
+    motor->mode = BUSHD_MCU_STREAM;
+    motor->begun = false;
+    motor->rest_from = motor->start_tick = motor->known_until;
+    motor->island.until = motor->island.from;
   }
 }
 
+// A table run is known for longer than the queue is deep.
+static void clear_rows(bushd_mcu* mcu, uint8_t m, uint32_t from, uint32_t until) {
+  uint32_t count = until - from;
+  if (count > mcu->config.queue_ticks) count = mcu->config.queue_ticks;
+  for (; count > 0; --count) *queue_at(mcu, from++, m) = 0;
+}
+
+void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_island* island = &mcu->motor[m].island;
+  clear_rows(mcu, m, island->from, island->until);
+  island->until = island->from;
+}
+
+void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_mcu_drop_island(mcu, m);
+  if (ticks_after(motor->known_until, tick) > 0) {
+    clear_rows(mcu, m, tick, motor->known_until);
+    motor->known_until = tick;
+  }
+  motor->delay = 0;
+  if (motor->mode != BUSHD_MCU_TABLE_RUN) return;
+  if (ticks_after(motor->run_until, tick) > 0) motor->run_until = tick;
+  if (ticks_after(motor->run_until, motor->run_from) <= 0) motor->mode = BUSHD_MCU_STREAM;
+}
+
 // `news`: the frame holds something for this motor that is not known yet.
-static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks,
+static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
                                 bool* news) {
   if (m >= mcu->config.motors) return BUSHD_E_FORMAT;
   const bushd_mcu_motor* motor = &mcu->motor[m];
   if (motor->table < 0) return BUSHD_E_NO_TABLE;
-  const int32_t first = ticks_after(ticks->first_tick, motor->known_until);
+  const int32_t first = ticks_after(stretch->first_tick, motor->known_until);
+  const int32_t end = first + stretch->count;
   const bool moves_on = motor->delay != 0;  // at known_until
-  if (ticks->flags & BUSHD_TICKS_REPLACE) {
+  if (stretch->flags & BUSHD_TICKS_REPLACE) {
     // Something must be queued to be replaced: if the start was lost, there is nothing to go on
     // from.
     if (moves_on ? first > 0 : first >= 0) return BUSHD_E_GAP;
     *news = true;
-    return ticks_after(ticks->first_tick, FIRST_OPEN(mcu)) < 0 ? BUSHD_E_LATE : BUSHD_OK;
+    return ticks_after(stretch->first_tick, FIRST_OPEN(mcu)) < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
-  if (first + ticks->count <= 0) return BUSHD_OK;
-  *news = true;
-  if (ticks->flags & BUSHD_TICKS_START) {
+  if (end <= 0) return BUSHD_OK;
+  if (stretch->flags & BUSHD_TICKS_START) {
+    *news = true;
     if (moves_on) return BUSHD_E_STATE;
     return first < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
-  return moves_on && first <= 0 ? BUSHD_OK : BUSHD_E_GAP;
+  if (!moves_on) return BUSHD_E_GAP;
+  if (first > 0 && has_island(motor)) {
+    const int32_t from = ticks_after(motor->island.from, motor->known_until);
+    const int32_t until = ticks_after(motor->island.until, motor->known_until);
+    if (first > until || end < from) return BUSHD_E_GAP;
+    if (first >= from && end <= until) return BUSHD_OK;
+  }
+  *news = true;
+  return BUSHD_OK;
+}
+
+bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
+  // What came since the last tick counts: without EN no step must be made, nor counted.
+  bushd_mcu_update_state(mcu);
+  const bool replace = (stretch->flags & BUSHD_TICKS_REPLACE) != 0;
+  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
+  const uint8_t ahead = (uint8_t)(stretch->epoch - mcu->epoch);
+  if (replace ? ahead == 0 || ahead > INT8_MAX : ahead != 0) return BUSHD_E_EPOCH;
+  // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once
+  // both ends are checked; a frame so old that it holds nothing but past ticks is done with here.
+  const int32_t first = ticks_after(stretch->first_tick, mcu->tick);
+  if (first > (int32_t)mcu->config.queue_ticks + 1 - (int32_t)stretch->count) {
+    return BUSHD_E_CAPACITY;
+  }
+  if (first <= -(int32_t)UINT16_MAX) return BUSHD_E_LATE;
+  bool news = false;
+  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((stretch->mask & motor_bit(m)) == 0) continue;
+    const bushd_status status = check_motor(mcu, m, stretch, &news);
+    if (status != BUSHD_OK) return status;
+  }
+  return news ? BUSHD_OK : BUSHD_E_LATE;
+}
+
+// Before its displacements: makes room for a motor's part of a stretch that was found good.
+static void open_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  if (stretch->flags & BUSHD_TICKS_REPLACE) {
+    bushd_mcu_cut_queue(mcu, m, stretch->first_tick);
+  }
+  const bool known = ticks_after(stretch->first_tick + stretch->count, motor->known_until) <= 0;
+  if ((stretch->flags & BUSHD_TICKS_START) == 0 || known) return;
+  motor->rest_from = motor->known_until;
+  motor->start_tick = stretch->first_tick;
+}
+
+static void put(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t displacement) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  if (ticks_after(tick, motor->known_until) < 0) return;
+  const bool in_island = has_island(motor) && ticks_after(tick, motor->island.from) >= 0 &&
+                         ticks_after(tick, motor->island.until) < 0;
+  if (!in_island) *queue_at(mcu, tick, m) = displacement;
+}
+
+static void grow_island(bushd_mcu_motor* motor, uint32_t from, uint32_t until, uint16_t delay) {
+  bushd_mcu_island* island = &motor->island;
+  if (!has_island(motor)) island->from = island->until = from;
+  if (ticks_after(island->from, from) > 0) island->from = from;
+  if (ticks_after(until, island->until) <= 0) return;
+  island->until = until;
+  island->delay = delay;
+}
+
+// After them: they are known now, and what lies behind a gap that they have filled.
+static void close_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
+                        uint16_t delay) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  const uint32_t end = stretch->first_tick + stretch->count;
+  const bool start = (stretch->flags & BUSHD_TICKS_START) != 0;
+  if (!start && ticks_after(stretch->first_tick, motor->known_until) > 0) {
+    grow_island(motor, stretch->first_tick, end, delay);
+    return;
+  }
+  if (ticks_after(end, motor->known_until) <= 0) return;
+  motor->known_until = end;
+  motor->delay = delay;
+  if (!has_island(motor)) return;
+  if (ticks_after(end, motor->island.from) < 0) {
+    if (delay == 0) bushd_mcu_drop_island(mcu, m);
+    return;
+  }
+  if (ticks_after(motor->island.until, end) > 0) {
+    motor->known_until = motor->island.until;
+    motor->delay = motor->island.delay;
+  }
+  motor->island.until = motor->island.from;
+}
+
+static void close_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
+  if (stretch->flags & BUSHD_TICKS_REPLACE) mcu->epoch = stretch->epoch;
 }
 
 static bool in_range(const bushd_ticks* ticks) {
@@ -54,29 +177,6 @@ static bool in_range(const bushd_ticks* ticks) {
   return true;
 }
 
-static bushd_status check_ticks(const bushd_mcu* mcu, const bushd_ticks* ticks) {
-  const bool replace = (ticks->flags & BUSHD_TICKS_REPLACE) != 0;
-  const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
-  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
-  if (fine != (mcu->format == BUSHD_FORMAT_FINE)) return BUSHD_E_FORMAT;
-  if (replace && ticks->delays == NULL) return BUSHD_E_FORMAT;
-  const uint8_t ahead = (uint8_t)(ticks->epoch - mcu->epoch);
-  if (replace ? ahead == 0 || ahead > INT8_MAX : ahead != 0) return BUSHD_E_EPOCH;
-  // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once
-  // both ends are checked; a frame so old that it holds nothing but past ticks is done with here.
-  const int32_t first = ticks_after(ticks->first_tick, mcu->tick);
-  if (first > (int32_t)mcu->config.queue_ticks + 1 - ticks->count) return BUSHD_E_CAPACITY;
-  if (first <= -(int32_t)UINT8_MAX) return BUSHD_E_LATE;
-  if (fine && !in_range(ticks)) return BUSHD_E_FORMAT;
-  bool news = false;
-  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((ticks->mask & motor_bit(m)) == 0) continue;
-    const bushd_status status = check_motor(mcu, m, ticks, &news);
-    if (status != BUSHD_OK) return status;
-  }
-  return news ? BUSHD_OK : BUSHD_E_LATE;
-}
-
 static int16_t displacement_at(const bushd_ticks* ticks, uint8_t row, uint8_t column) {
   const uint16_t index = (uint16_t)(row * ticks->motors + column);
   if (ticks->flags & BUSHD_TICKS_FINE) return bushd_get_i16(ticks->displacements + 2u * index);
@@ -84,80 +184,70 @@ static int16_t displacement_at(const bushd_ticks* ticks, uint8_t row, uint8_t co
 }
 
 bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
-  // What came since the last tick counts: without EN no step must be made, nor counted.
-  bushd_mcu_update_state(mcu);
-  const bushd_status status = check_ticks(mcu, ticks);
+  const bushd_mcu_stretch stretch = {ticks->epoch, ticks->flags, ticks->first_tick, ticks->count,
+                                     ticks->mask};
+  const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
+  const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
   if (status != BUSHD_OK) return status;
-  const uint32_t end = ticks->first_tick + ticks->count;
+  if (fine != (mcu->format == BUSHD_FORMAT_FINE) || (fine && !in_range(ticks))) {
+    return BUSHD_E_FORMAT;
+  }
   uint8_t column = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((ticks->mask & motor_bit(m)) == 0) continue;
-    bushd_mcu_motor* motor = &mcu->motor[m];
-    if (ticks->flags & BUSHD_TICKS_REPLACE) {
-      while (ticks_after(motor->known_until, ticks->first_tick) > 0) {
-        *queue_at(mcu, --motor->known_until, m) = 0;
-      }
+    open_motor(mcu, m, &stretch);
+    for (uint8_t row = 0; row < ticks->count; ++row) {
+      put(mcu, m, ticks->first_tick + row, displacement_at(ticks, row, column));
     }
-    if (ticks_after(end, motor->known_until) > 0) {
-      if (ticks->flags & BUSHD_TICKS_START) motor->start_tick = ticks->first_tick;
-      for (uint8_t row = 0; row < ticks->count; ++row) {
-        const uint32_t tick = ticks->first_tick + row;
-        if (ticks_after(tick, motor->known_until) >= 0) {
-          *queue_at(mcu, tick, m) = displacement_at(ticks, row, column);
-        }
-      }
-      motor->known_until = end;
-      if (ticks->delays != NULL) motor->delay = bushd_get_u16(ticks->delays + 2u * column);
-    }
+    close_motor(mcu, m, &stretch, bushd_get_u16(ticks->delays + 2u * column));
     ++column;
   }
-  if (ticks->flags & BUSHD_TICKS_REPLACE) mcu->epoch = ticks->epoch;
+  close_stretch(mcu, &stretch);
   return BUSHD_OK;
 }
 
-static void start_running_down(bushd_mcu* mcu, uint8_t m) {
-  bushd_mcu_motor* motor = &mcu->motor[m];
-  const bushd_table* table = &mcu->table[motor->table].table;
-  // A delay below cruise cannot be running; the ramp must not reach codes that no move uses.
-  const uint16_t delay = motor->delay < table->cruise ? table->cruise : motor->delay;
-  motor->delay = 0;
-  mcu->faults |= BUSHD_FAULT_LINK;
-  // DIR then still shows the move before: where this one was to go is not known. It has not left
-  // rest, so it may stay.
-  if (!motor->begun) return;
-  const int direction = mcu->direction & motor_bit(m) ? 1 : -1;
-  // In the fine format the remainder is the elapsed share of the running delay; in the coarse one
-  // that share is unknown, and taking it as 0 makes the next step late rather than early.
-  const int32_t progress = (int32_t)motor->remainder * direction;
-  const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
-  bushd_run_start_ramp_down(&motor->run, table, delay, fraction, direction);
-  motor->running_down = true;
+// The run of an entry: what its motor's table makes of it.
+static bool restore(const bushd_mcu* mcu, const bushd_table_ticks_entry* entry, bushd_run* run) {
+  const int8_t slot = mcu->motor[entry->motor].table;
+  return bushd_run_restore(run, &mcu->table[slot].table, &entry->state);
 }
 
-static int16_t run_down(bushd_mcu* mcu, bushd_mcu_motor* motor) {
-  int16_t displacement = 0;
-  if (mcu->format == BUSHD_FORMAT_FINE) {
-    bushd_run_expand_fine(&motor->run, mcu->tick_ns, 1, &displacement, 1);
-  } else {
-    uint8_t counts = 0;
-    bushd_run_expand_coarse(&motor->run, mcu->tick_ns, 1, &counts, 1);
-    displacement = bushd_coarse_to_fine(counts);
+static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch, bushd_run* run) {
+  enum { CHUNK = 16 };
+  int16_t fine[CHUNK];
+  uint8_t coarse[CHUNK];
+  for (uint16_t at = 0; at < stretch->count; at = (uint16_t)(at + CHUNK)) {
+    const uint16_t left = (uint16_t)(stretch->count - at);
+    const uint16_t count = left < CHUNK ? left : CHUNK;
+    const bool in_fine = mcu->format == BUSHD_FORMAT_FINE;
+    if (in_fine) {
+      bushd_run_expand_fine(run, mcu->tick_ns, count, fine, 1);
+    } else {
+      bushd_run_expand_coarse(run, mcu->tick_ns, count, coarse, 1);
+    }
+    for (uint16_t i = 0; i < count; ++i) {
+      put(mcu, m, stretch->first_tick + at + i,
+          in_fine ? fine[i] : bushd_coarse_to_fine(coarse[i]));
+    }
   }
-  motor->running_down = !bushd_run_done(&motor->run);
-  return displacement;
 }
 
-int16_t bushd_mcu_next_displacement(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
-  bushd_mcu_motor* motor = &mcu->motor[m];
-  if (ticks_after(motor->known_until, tick) > 0) {
-    int16_t* const queued = queue_at(mcu, tick, m);
-    const int16_t displacement = *queued;
-    *queued = 0;
-    if (tick == motor->start_tick) motor->begun = false;
-    if (displacement != 0) motor->begun = true;
-    return displacement;
+bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks* ticks) {
+  const bushd_mcu_stretch stretch = {ticks->epoch, ticks->flags, ticks->first_tick, ticks->count,
+                                     ticks->mask};
+  const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
+  if (status != BUSHD_OK) return status;
+  bushd_table_ticks_entry entry;
+  bushd_run run;
+  for (uint16_t at = 0; bushd_next_table_ticks_entry(ticks, &at, &entry);) {
+    if (!restore(mcu, &entry, &run)) return BUSHD_E_FORMAT;
   }
-  motor->known_until = tick + 1u;
-  if (motor->delay != 0) start_running_down(mcu, m);
-  return motor->running_down ? run_down(mcu, motor) : 0;
+  for (uint16_t at = 0; bushd_next_table_ticks_entry(ticks, &at, &entry);) {
+    restore(mcu, &entry, &run);
+    open_motor(mcu, entry.motor, &stretch);
+    put_run(mcu, entry.motor, &stretch, &run);
+    close_motor(mcu, entry.motor, &stretch, bushd_run_delay(&run));
+  }
+  close_stretch(mcu, &stretch);
+  return BUSHD_OK;
 }

@@ -1,42 +1,109 @@
-// The tick counter against the bus's. A SYNC frame's end is a mark that all MCUs hear at once; the
-// next SYNC tells when, in bus time, the mark before was. The difference to the own time of that
-// mark is the error.
+// The tick counter against the bus's. A SYNC frame's end is a mark that all MCUs hear at once; a
+// later SYNC tells when, in bus time, that mark was. The difference to the own time of the mark is
+// the error.
 //
 // Not yet in step: the counter jumps, and the rest of the difference is made up by lengthening one
 // tick (a timer can always wait longer, but not go back). In step: the next ticks are made longer
 // or shorter until the error is made up, each by at most 1/64, so that no step shifts by more.
 //
-// The error is known one mark late. So the present mark is noted as the clock will show it once the
-// correction is done: else the same error would be found in it again, corrected twice, and the
-// clock would swing around the bus's without end.
+// Every mark is noted as the corrected clock shows it: with the corrections that are known but not
+// yet carried out. So the error of a mark is what the clock has drifted since the last mark whose
+// error was corrected, and
+//
+//     rate += gain x error / (time between these marks)
+//
+// The rate's share of each tick is added up in 1/4096 ns and given out in whole ns. With the rate
+// changes what the clock has drifted from the mark until now: that is made up at once too.
 #include "firmware/core/internal.h"
 
 #define MAX_ERROR_DIVISOR 2
 #define MAX_SLEW_DIVISOR 64
-#define REPEATED_WITHIN_NS 100000000u
+#define GAIN_DIVISOR 4
+#define MAX_RATE_PPB 500000
+#define MAX_INTERVAL_NS INT64_C(60000000000)
+#define BILLION INT64_C(1000000000)
+#define TWO_MASTERS_NS 2000000000u
+#define FRACTION 4096
 
-static void adopt(bushd_mcu* mcu, const bushd_sync* sync) {
-  const int32_t tick_ns = (int32_t)mcu->tick_ns;
-  int32_t behind_ns = (int32_t)sync->mark_ns - (int32_t)mcu->mark_ns;
-  mcu->tick += sync->mark_tick - mcu->mark_tick;
-  if (behind_ns > 0) {
-    behind_ns -= tick_ns;
-    ++mcu->tick;
-  }
-  mcu->port.adjust_tick(mcu->port.context, -behind_ns);
-  bushd_mcu_clear_streams(mcu);
-  mcu->behind_ns = 0;
-  mcu->settling = 3;
-  mcu->flags = (uint8_t)((mcu->flags | BUSHD_FLAG_SYNCED) & ~BUSHD_FLAG_MARK);
+static int64_t span_ns(const bushd_mcu* mcu, uint32_t from_tick, uint32_t from_ns, uint32_t tick,
+                       int64_t ns) {
+  return (int64_t)ticks_after(tick, from_tick) * mcu->tick_ns + ns - from_ns;
 }
 
-static void correct(bushd_mcu* mcu, const bushd_sync* sync) {
+// Of the present tick, as the corrected clock shows it; may lie outside of the tick.
+static int64_t corrected_ns(const bushd_mcu* mcu, uint32_t time_in_tick_ns) {
+  const bushd_mcu_clock* clock = &mcu->clock;
+  const int64_t by_rate = (int64_t)clock->rate_now_ns * time_in_tick_ns / mcu->tick_ns;
+  return (int64_t)time_in_tick_ns - by_rate + clock->behind_ns - clock->slew_now_ns -
+         clock->slew_next_ns;
+}
+
+static void note_correction(bushd_mcu_clock* clock, const bushd_sync* sync) {
+  clock->corrected = true;
+  clock->corrected_tick = sync->mark_tick;
+  clock->corrected_ns = sync->mark_ns;
+}
+
+static void adopt(bushd_mcu* mcu, const bushd_sync* sync) {
+  bushd_mcu_clock* clock = &mcu->clock;
   const int32_t tick_ns = (int32_t)mcu->tick_ns;
-  const int32_t ticks = ticks_after(sync->mark_tick, mcu->mark_tick);
+  // Takes the place of what was given to the port for the next tick, but for the rate's share.
+  const int32_t behind_ns = (int32_t)sync->mark_ns - (int32_t)clock->mark_ns + clock->behind_ns;
+  int32_t longer_ns = clock->slew_next_ns + clock->rate_next_ns - behind_ns;
+  mcu->tick += sync->mark_tick - clock->mark_tick;
+  for (; longer_ns < 0; longer_ns += tick_ns) ++mcu->tick;
+  for (; longer_ns >= tick_ns; longer_ns -= tick_ns) --mcu->tick;
+  clock->slew_next_ns = longer_ns - clock->rate_next_ns;
+  clock->behind_ns = 0;
+  mcu->port.adjust_tick(mcu->port.context, longer_ns);
+  bushd_mcu_clear_streams(mcu);
+  note_correction(clock, sync);
+  mcu->flags |= BUSHD_FLAG_SYNCED;
+}
+
+static void set_rate(bushd_mcu* mcu, int32_t rate_ppb) {
+  mcu->clock.rate_ppb = rate_ppb;
+  mcu->clock.rate_step = (int32_t)((int64_t)rate_ppb * mcu->tick_ns * FRACTION / BILLION);
+}
+
+// Returns by how much the rate was changed, in ppb.
+static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t error_ns,
+                            uint32_t time_in_tick_ns) {
+  bushd_mcu_clock* clock = &mcu->clock;
+  if (!clock->corrected) return 0;
+  const int64_t interval_ns =
+      span_ns(mcu, clock->corrected_tick, clock->corrected_ns, sync->mark_tick, sync->mark_ns);
+  if (interval_ns <= 0 || interval_ns > MAX_INTERVAL_NS) return 0;
+  const int64_t error_ppb = error_ns * BILLION / interval_ns;
+  if (error_ppb > MAX_RATE_PPB || error_ppb < -MAX_RATE_PPB) return 0;
+  const int32_t old_ppb = clock->rate_ppb;
+  const int32_t old_step = clock->rate_step;
+  int32_t rate_ppb = old_ppb + (int32_t)(clock->rate_known ? error_ppb / GAIN_DIVISOR : error_ppb);
+  if (rate_ppb > MAX_RATE_PPB) rate_ppb = MAX_RATE_PPB;
+  if (rate_ppb < -MAX_RATE_PPB) rate_ppb = -MAX_RATE_PPB;
+  clock->rate_known = true;
+  set_rate(mcu, rate_ppb);
+  // The present tick and the next one still go by the old rate.
+  const int64_t change = clock->rate_step - old_step;
+  const int64_t old_ns = 2 * (int64_t)mcu->tick_ns - time_in_tick_ns;
+  clock->rate_fraction += (int32_t)(change * old_ns / mcu->tick_ns);
+  return rate_ppb - old_ppb;
+}
+
+static void correct(bushd_mcu* mcu, const bushd_sync* sync, uint32_t time_in_tick_ns) {
+  bushd_mcu_clock* clock = &mcu->clock;
+  const int32_t limit_ns = (int32_t)(mcu->tick_ns / MAX_ERROR_DIVISOR);
+  const int32_t ticks = ticks_after(sync->mark_tick, clock->mark_tick);
   if (ticks >= -1 && ticks <= 1) {
-    const int32_t behind_ns = ticks * tick_ns + (int32_t)sync->mark_ns - (int32_t)mcu->mark_ns;
-    if (behind_ns <= tick_ns / MAX_ERROR_DIVISOR && behind_ns >= -tick_ns / MAX_ERROR_DIVISOR) {
-      mcu->behind_ns += behind_ns;
+    const int32_t error_ns =
+        (int32_t)span_ns(mcu, clock->mark_tick, clock->mark_ns, sync->mark_tick, sync->mark_ns);
+    if (error_ns <= limit_ns && error_ns >= -limit_ns) {
+      int64_t since_ns = span_ns(mcu, clock->mark_tick, clock->mark_ns, mcu->tick,
+                                 corrected_ns(mcu, time_in_tick_ns));
+      if (since_ns > MAX_INTERVAL_NS) since_ns = MAX_INTERVAL_NS;
+      const int32_t change_ppb = correct_rate(mcu, sync, error_ns, time_in_tick_ns);
+      clock->behind_ns += error_ns + (int32_t)(change_ppb * since_ns / BILLION);
+      note_correction(clock, sync);
       return;
     }
   }
@@ -47,46 +114,90 @@ static void correct(bushd_mcu* mcu, const bushd_sync* sync) {
   }
 }
 
-void bushd_mcu_sync(bushd_mcu* mcu, uint8_t tag, const bushd_sync* sync, uint32_t time_in_tick_ns) {
-  if ((mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return;
-  const bool known = sync->follows && (mcu->flags & BUSHD_FLAG_MARK) != 0 &&
-                     mcu->mark_tag == sync->mark_tag && sync->mark_ns < mcu->tick_ns;
+// Two masters that have each started at some time are no trouble; two that talk by turns are.
+static void watch_masters(bushd_mcu* mcu, uint16_t master) {
+  bushd_mcu_clock* clock = &mcu->clock;
+  if (clock->heard && master != clock->master) {
+    const uint32_t window_ticks = TWO_MASTERS_NS / mcu->tick_ns;
+    const bool again = clock->other_heard && master == clock->other_master &&
+                       mcu->uptime - clock->other_uptime <= window_ticks;
+    if (again) {
+      mcu->flags |= BUSHD_FLAG_TWO_MASTERS;
+      clock->two_masters_ticks = (uint16_t)window_ticks;
+    }
+    clock->other_heard = true;
+    clock->other_master = clock->master;
+    clock->other_uptime = clock->master_uptime;
+  }
+  clock->master_uptime = mcu->uptime;
+}
+
+static void note_mark(bushd_mcu* mcu, uint32_t time_in_tick_ns) {
+  bushd_mcu_clock* clock = &mcu->clock;
+  const int32_t tick_ns = (int32_t)mcu->tick_ns;
+  int32_t ns = (int32_t)corrected_ns(mcu, time_in_tick_ns);
+  clock->mark_tick = mcu->tick;
+  for (; ns < 0; ns += tick_ns) --clock->mark_tick;
+  for (; ns >= tick_ns; ns -= tick_ns) ++clock->mark_tick;
+  clock->mark_ns = (uint32_t)ns;
+  mcu->flags |= BUSHD_FLAG_MARK;
+}
+
+void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, uint32_t time_in_tick_ns) {
+  bushd_mcu_clock* clock = &mcu->clock;
+  watch_masters(mcu, sync->master);
+  const bool same_master = clock->heard && clock->master == sync->master;
+  // A frame that comes twice is one mark, and the first time is the one that the others heard.
+  if (same_master && clock->mark == sync->mark) return;
+  const bool known = same_master && sync->follows && (mcu->flags & BUSHD_FLAG_MARK) != 0 &&
+                     clock->mark == sync->known_mark && sync->mark_ns < mcu->tick_ns;
   if (known && (mcu->flags & BUSHD_FLAG_SYNCED) != 0) {
-    correct(mcu, sync);
+    correct(mcu, sync, time_in_tick_ns);
   } else if (known && bushd_mcu_moving(mcu) == 0) {
     adopt(mcu, sync);
   }
-  if (mcu->settling != 0) return;
-  // A frame that comes twice is one mark, and the first time is the one that the others heard.
-  // Later the name may be another mark's, of a master that has just started.
-  const uint32_t since_mark = mcu->tick - mcu->mark_tick;
-  if ((mcu->flags & BUSHD_FLAG_MARK) != 0 && mcu->mark_tag == tag &&
-      since_mark < REPEATED_WITHIN_NS / mcu->tick_ns) {
-    return;
+  clock->heard = true;
+  clock->master = sync->master;
+  clock->mark = sync->mark;
+  mcu->flags &= (uint8_t)~BUSHD_FLAG_MARK;
+  if (clock->settling == 0 && (mcu->flags & BUSHD_FLAG_CONFIGURED) != 0) {
+    note_mark(mcu, time_in_tick_ns);
   }
-  int32_t mark_ns = (int32_t)time_in_tick_ns + mcu->behind_ns;
-  mcu->mark_tick = mcu->tick;
-  if (mark_ns < 0) {
-    mark_ns += (int32_t)mcu->tick_ns;
-    --mcu->mark_tick;
-  } else if (mark_ns >= (int32_t)mcu->tick_ns) {
-    mark_ns -= (int32_t)mcu->tick_ns;
-    ++mcu->mark_tick;
-  }
-  mcu->flags |= BUSHD_FLAG_MARK;
-  mcu->mark_tag = tag;
-  mcu->mark_ns = (uint32_t)mark_ns;
+}
+
+// What the rate adds to the next tick, in whole ns; the rest waits.
+static int32_t rate_share_ns(bushd_mcu_clock* clock) {
+  clock->rate_fraction += clock->rate_step;
+  const int32_t whole_ns = clock->rate_fraction / FRACTION;
+  clock->rate_fraction -= whole_ns * FRACTION;
+  return -whole_ns;
 }
 
 void bushd_mcu_slew(bushd_mcu* mcu) {
-  if (mcu->settling != 0) --mcu->settling;
-  if (mcu->behind_ns == 0) return;
-  const int32_t slew = (int32_t)(mcu->tick_ns / MAX_SLEW_DIVISOR);
-  const int32_t step = mcu->behind_ns > slew    ? slew
-                       : mcu->behind_ns < -slew ? -slew
-                                                : mcu->behind_ns;
-  mcu->behind_ns -= step;
-  mcu->port.adjust_tick(mcu->port.context, -step);
-  // The next tick is the one that changes, so the clock shows it from the one after on.
-  mcu->settling = 2;
+  bushd_mcu_clock* clock = &mcu->clock;
+  if (clock->settling != 0) --clock->settling;
+  if (clock->two_masters_ticks != 0 && --clock->two_masters_ticks == 0) {
+    mcu->flags &= (uint8_t)~BUSHD_FLAG_TWO_MASTERS;
+  }
+  clock->slew_now_ns = clock->slew_next_ns;
+  clock->rate_now_ns = clock->rate_next_ns;
+  clock->rate_next_ns = rate_share_ns(clock);
+  const int32_t rate_ns = clock->rate_next_ns < 0 ? -clock->rate_next_ns : clock->rate_next_ns;
+  const int32_t limit_ns = (int32_t)(mcu->tick_ns / MAX_SLEW_DIVISOR) - rate_ns;
+  const int32_t step_ns = clock->behind_ns > limit_ns    ? limit_ns
+                          : clock->behind_ns < -limit_ns ? -limit_ns
+                                                         : clock->behind_ns;
+  clock->behind_ns -= step_ns;
+  clock->slew_next_ns = -step_ns;
+  const int32_t longer_ns = clock->slew_next_ns + clock->rate_next_ns;
+  if (longer_ns != 0) mcu->port.adjust_tick(mcu->port.context, longer_ns);
+}
+
+void bushd_mcu_new_tick_length(bushd_mcu* mcu) {
+  bushd_mcu_clock* clock = &mcu->clock;
+  clock->settling = 2;
+  clock->behind_ns = 0;
+  clock->corrected = false;
+  clock->rate_fraction = 0;
+  set_rate(mcu, clock->rate_ppb);
 }

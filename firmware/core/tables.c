@@ -45,6 +45,7 @@ bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* mess
   entry->table.decel.code = entry->table.accel.code + (symmetric ? 0 : message->accel_count);
   entry->table.cruise = message->cruise;
   entry->table.time_unit_ns = message->time_unit_ns;
+  entry->revision = message->revision;
   return BUSHD_OK;
 }
 
@@ -64,13 +65,8 @@ bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* messag
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message) {
   bushd_mcu_table* entry = &mcu->table[message->slot];
   if (entry->count == 0 || entry->received != entry->count) return BUSHD_E_STATE;
-  uint16_t crc = BUSHD_CRC16_START;
-  for (uint16_t i = 0; i < entry->count; ++i) {
-    uint8_t bytes[2];
-    bushd_put_u16(bytes, mcu->config.codes[entry->first + i]);
-    crc = bushd_crc16(crc, bytes, sizeof bytes);
-  }
-  if (crc != message->crc) return BUSHD_E_CRC;
+  entry->crc = bushd_table_crc32(&entry->table);
+  if (entry->crc != message->crc) return BUSHD_E_CRC;
   const bushd_status status = bushd_table_check(&entry->table, NULL, NULL);
   entry->valid = status == BUSHD_OK;
   return status;
@@ -86,4 +82,17 @@ bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
   }
   mcu->motor[message->motor].table = (int8_t)message->slot;
   return BUSHD_OK;
+}
+
+bushd_tables bushd_mcu_tables(const bushd_mcu* mcu) {
+  bushd_tables tables;
+  memset(&tables, 0, sizeof tables);
+  for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
+    const bushd_mcu_table* entry = &mcu->table[i];
+    if (!entry->valid) continue;
+    tables.slot[i].valid = true;
+    tables.slot[i].crc = entry->crc;
+    tables.slot[i].revision = entry->revision;
+  }
+  return tables;
 }

@@ -22,6 +22,7 @@ struct McuOptions {
       0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
   std::int32_t clock_ppm = 0;  // > 0: its clock is fast
   std::uint32_t turnaround_ns = 20'000;
+  std::uint64_t unique_id = 0;  // 0: made of its place on the bus
 };
 
 class VirtualMcu {

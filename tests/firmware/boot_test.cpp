@@ -1,4 +1,6 @@
 // From reset to READY: what an MCU does before it was told anything, and in which states it moves.
+#include <algorithm>
+
 #include "firmware/rig.h"
 
 namespace bushd::test {
@@ -45,6 +47,9 @@ TEST(Boot, IdentitySaysWhatThePortGave) {
   EXPECT_EQ(identity.queue_ticks, 32);
   EXPECT_EQ(identity.table_codes, 900);
   EXPECT_EQ(identity.boot_number, 77);
+  EXPECT_EQ(identity.capabilities,
+            BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN);
+  EXPECT_TRUE(std::ranges::equal(identity.unique_id, Rig::unique_id()));
 }
 
 TEST(Boot, FailedSelfTestNeverRaisesEn) {
@@ -135,14 +140,16 @@ TEST(Boot, TicksRightAfterEnableAreTaken) {
 
 TEST(Boot, ValuesOutOfRangeAreRefused) {
   Rig rig;
-  EXPECT_EQ(rig.request(BUSHD_MSG_CONFIGURE, {0, 0, 0, 0, 1}), BUSHD_E_FORMAT) << "tick of 0 ns";
-  EXPECT_EQ(rig.request(BUSHD_MSG_CONFIGURE, {0, 0, 0x27, 0, 2}), BUSHD_E_FORMAT) << "format 2";
+  EXPECT_EQ(rig.request(BUSHD_MSG_CONFIGURE, {0, 0, 0, 0, 1, 9, 0}), BUSHD_E_FORMAT)
+      << "tick of 0 ns";
+  EXPECT_EQ(rig.request(BUSHD_MSG_CONFIGURE, {0, 0, 0x27, 0, 2, 9, 0}), BUSHD_E_FORMAT)
+      << "format 2";
   EXPECT_EQ(rig.request(BUSHD_MSG_CONFIGURE, {0, 0, 0x27, 0}), BUSHD_E_LENGTH);
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {3}), BUSHD_E_FORMAT) << "enable and disable";
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {8}), BUSHD_E_FORMAT);
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {}), BUSHD_E_LENGTH);
   EXPECT_EQ(rig.set_position(4, 0), BUSHD_E_FORMAT) << "four motors: 0..3";
-  EXPECT_EQ(rig.request(0x0C, {}), BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(rig.request(0x11, {}), BUSHD_E_UNKNOWN_MESSAGE);
   EXPECT_EQ(rig.request(0x7F, {1, 2, 3}), BUSHD_E_UNKNOWN_MESSAGE);
   EXPECT_EQ(rig.poll().rejected_frames, 9);
   EXPECT_EQ(rig.poll().flags, 0) << "nothing of it had an effect";

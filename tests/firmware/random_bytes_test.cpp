@@ -23,12 +23,13 @@ class Stranger {
   // Something that a master might send, with values that are often right, and sometimes bent.
   void speak(Rig& rig) {
     Bytes payload;
-    std::uint8_t type = static_cast<std::uint8_t>(1 + below(11));
+    std::uint8_t type = static_cast<std::uint8_t>(1 + below(16));
     switch (type) {
       case BUSHD_MSG_CONFIGURE:
         put32(payload, below(4) != 0 ? Rig::kTickNs : below(21'000'000));
         payload.push_back(static_cast<std::uint8_t>(below(20) != 0 ? format_ : below(3)));
         if (below(8) == 0) format_ ^= 1;
+        put16(payload, below(3) != 0 ? 1 + below(60) : below(65536));
         break;
       case BUSHD_MSG_TABLE_BEGIN:
         codes_ = below(12);
@@ -41,6 +42,8 @@ class Stranger {
                    0};
         put32(payload, below(3) != 0 ? 40'000 : below(2'000'000'000));
         slot_ = payload[0];
+        put32(payload, static_cast<std::uint32_t>(random_()));
+        head_.assign(payload.begin() + 1, payload.begin() + 11);
         break;
       case BUSHD_MSG_TABLE_DATA:
         payload = {slot_, 0, 0, static_cast<std::uint8_t>(codes_)};
@@ -52,8 +55,10 @@ class Stranger {
         payload.insert(payload.end(), sent_.begin(), sent_.end());
         break;
       case BUSHD_MSG_TABLE_END: {
-        const std::uint16_t crc = bushd_crc16(BUSHD_CRC16_START, sent_.data(), sent_.size());
-        payload = {slot_, static_cast<std::uint8_t>(crc), static_cast<std::uint8_t>(crc >> 8)};
+        Bytes all = head_;
+        all.insert(all.end(), sent_.begin(), sent_.end());
+        payload = {slot_};
+        put32(payload, crc32(all));
         break;
       }
       case BUSHD_MSG_ASSIGN:
@@ -68,10 +73,13 @@ class Stranger {
         break;
       case BUSHD_MSG_SYNC: {
         const bushd_report report = rig.poll();
-        payload = {static_cast<std::uint8_t>(below(3) != 0), report.mark_tag};
+        put16(payload, below(2));
+        put32(payload, below(9) != 0 ? ++mark_ : mark_);
+        payload.push_back(static_cast<std::uint8_t>(below(3) != 0));
+        put32(payload, report.mark);
         put32(payload, below(3) != 0 ? report.mark_tick : report.mark_tick + below(5) - 2);
         put32(payload, below(3) != 0 ? report.mark_ns : below(2'600'000));
-        if (below(200) == 0) payload[2 + below(4)] = byte();
+        if (below(200) == 0) payload[11 + below(4)] = byte();
         break;
       }
       case BUSHD_MSG_TICKS:
@@ -89,6 +97,9 @@ class Stranger {
   }
 
  private:
+  static void put16(Bytes& payload, std::uint32_t value) {
+    for (int i = 0; i < 2; ++i) payload.push_back(static_cast<std::uint8_t>(value >> 8 * i));
+  }
   static void put32(Bytes& payload, std::uint32_t value) {
     for (int i = 0; i < 4; ++i) payload.push_back(static_cast<std::uint8_t>(value >> 8 * i));
   }
@@ -116,15 +127,12 @@ class Stranger {
       made.displacements.push_back(below(10) == 0 ? static_cast<std::int16_t>(random_())
                                                   : static_cast<std::int16_t>(below(900)));
     }
-    if (below(5) != 0 || replace) {
-      made.delays.assign(columns, static_cast<std::uint16_t>(below(2) == 0 ? 0 : below(300)));
-    }
+    made.delays.assign(columns, static_cast<std::uint16_t>(below(2) == 0 ? 0 : below(300)));
     made.epoch = static_cast<std::uint8_t>(mcu.epoch + (replace ? 1 : 0));
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     std::size_t size = bushd_encode_ticks_head(
         made.epoch, static_cast<std::uint8_t>(made.flags | (fine ? BUSHD_TICKS_FINE : 0)),
-        made.first, made.count, made.mask, made.delays.empty() ? nullptr : made.delays.data(),
-        payload.data());
+        made.first, made.count, made.mask, made.delays.data(), payload.data());
     for (const std::int16_t displacement : made.displacements) {
       if (fine) {
         bushd_put_i16(payload.data() + size, displacement);
@@ -141,7 +149,9 @@ class Stranger {
   std::uint32_t format_ = 1;
   std::uint32_t codes_ = 3;
   std::uint8_t slot_ = 0;
+  Bytes head_;
   Bytes sent_;
+  std::uint32_t mark_ = 100;
 };
 
 // A tick in which all that must hold is looked at from outside.

@@ -15,7 +15,7 @@ Bytes wire_of(std::uint8_t address, std::uint8_t type, const Bytes& payload = {}
 TEST(Receive, AnswersOnlyItsOwnAddress) {
   Rig rig({.address = 7});
   for (int address = 0; address <= 255; ++address) {
-    for (const std::uint8_t type : {BUSHD_MSG_IDENTIFY, BUSHD_MSG_POLL, BUSHD_MSG_CONTROL}) {
+    for (const std::uint8_t type : {BUSHD_MSG_TABLES, BUSHD_MSG_CONTROL}) {
       rig.frame(static_cast<std::uint8_t>(address), type,
                 type == BUSHD_MSG_CONTROL ? Bytes{0} : Bytes{});
       EXPECT_EQ(rig.answer().has_value(), address == 7) << address;
@@ -110,7 +110,7 @@ TEST(Receive, CountersStopAtTheirEnd) {
 
 TEST(Receive, AnswersBeginWithADelimiter) {
   Rig rig;
-  rig.frame(BUSHD_MSG_IDENTIFY, {});
+  rig.frame(BUSHD_MSG_TABLES, {});
   const auto answer = rig.answer();  // decodes from the first byte on, and accepts a single frame
   ASSERT_TRUE(answer);
   EXPECT_EQ(rig.last_sent().front(), 0);

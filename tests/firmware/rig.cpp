@@ -25,6 +25,15 @@ std::vector<std::uint16_t> codes_of(const Law& law) {
 
 }  // namespace
 
+std::uint32_t crc32(const Bytes& bytes) {
+  std::uint32_t crc = 0xFFFFFFFF;
+  for (const std::uint8_t byte : bytes) {
+    crc ^= byte;
+    for (int i = 0; i < 8; ++i) crc = crc >> 1 ^ (crc & 1 ? 0xEDB88320u : 0u);
+  }
+  return ~crc;
+}
+
 Law ramp_law() {
   Law law;
   for (int i = 0; i < 24; ++i) law.accel.push_back(static_cast<std::uint16_t>(250 - 10 * i));
@@ -72,8 +81,14 @@ Rig::Rig(RigOptions options)
       codes_(options.code_count, 0xA5A5) {
   bushd_port port{};
   port.context = this;
-  port.transmit = [](void* context, const std::uint8_t* wire, std::size_t size) {
-    static_cast<Rig*>(context)->sent_.emplace_back(wire, wire + size);
+  port.transmit = [](void* context, const std::uint8_t* wire, std::size_t size,
+                     std::uint32_t delay_ns) {
+    static_cast<Rig*>(context)->sent_.emplace_back(Bytes(wire, wire + size), delay_ns);
+  };
+  port.store_address = [](void* context, std::uint8_t address) {
+    auto& rig = *static_cast<Rig*>(context);
+    if (rig.options_.stores_address) rig.stored_address_ = address;
+    return rig.options_.stores_address;
   };
   port.set_enable = [](void* context, bool on) {
     static_cast<Rig*>(context)->enabled_ = on;
@@ -95,6 +110,7 @@ Rig::Rig(RigOptions options)
   config.queue_ticks = options.queue_ticks;
   config.codes = codes_.data();
   config.code_count = options.code_count;
+  std::ranges::copy(unique_id(), config.unique_id);
   bushd_mcu_boot(&mcu_, &port, &config);
   plane_ = bushd_mcu_swap(&mcu_);
   bushd_mcu_prepare(&mcu_);
@@ -112,23 +128,23 @@ void Rig::frame(std::uint8_t address, std::uint8_t type, const Bytes& payload) {
 }
 
 std::optional<Answer> Rig::answer() {
-  const std::vector<Bytes> sent = std::exchange(sent_, {});
+  const auto sent = std::exchange(sent_, {});
   if (sent.empty()) return std::nullopt;
-  last_sent_ = sent.front();
+  last_sent_ = sent.front().first;
   EXPECT_EQ(sent.size(), 1u) << "one answer per request";
   bushd_receiver receiver{};
   std::optional<Answer> answer;
-  for (const std::uint8_t byte : sent.front()) {
+  for (const std::uint8_t byte : last_sent_) {
     bushd_frame frame;
     const bushd_receive received = bushd_receive_byte(&receiver, byte, &frame);
     if (received == BUSHD_RECEIVE_MORE) continue;
     EXPECT_EQ(received, BUSHD_RECEIVE_FRAME);
     EXPECT_FALSE(answer) << "one frame per answer";
-    EXPECT_EQ(frame.address, options_.address);
+    EXPECT_EQ(frame.address, mcu_.config.address);
     EXPECT_EQ(frame.tag, tag_);
     EXPECT_NE(frame.type & BUSHD_TYPE_REPLY, 0);
     answer = Answer{static_cast<std::uint8_t>(frame.type & ~BUSHD_TYPE_REPLY), frame.tag,
-                    Bytes(frame.payload, frame.payload + frame.payload_size)};
+                    Bytes(frame.payload, frame.payload + frame.payload_size), sent.front().second};
   }
   return answer;
 }
@@ -147,7 +163,7 @@ bushd_status Rig::request(std::uint8_t type, const Bytes& payload) {
 }
 
 bushd_report Rig::poll() {
-  frame(BUSHD_MSG_POLL, {});
+  frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, {1, mcu_.config.address, 0, 0});
   const auto got = answer();
   bushd_report report{};
   EXPECT_TRUE(got);
@@ -158,7 +174,7 @@ bushd_report Rig::poll() {
 }
 
 bushd_identity Rig::identify() {
-  frame(BUSHD_MSG_IDENTIFY, {});
+  frame(BUSHD_MSG_IDENTIFY, {0, 0, 1, 0, 0});
   const auto got = answer();
   bushd_identity identity{};
   EXPECT_TRUE(got);
@@ -167,8 +183,9 @@ bushd_identity Rig::identify() {
   return identity;
 }
 
-bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns) {
-  const bushd_configure message = {tick_ns, format};
+bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns,
+                            std::uint16_t silence_ticks) {
+  const bushd_configure message = {tick_ns, format, silence_ticks};
   const bushd_status status =
       request(BUSHD_MSG_CONFIGURE,
               payload_of([&](std::uint8_t* p) { return bushd_encode_configure(&message, p); }));
@@ -176,29 +193,34 @@ bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns) {
   return status;
 }
 
-void Rig::sync_to(std::uint32_t tick) {
-  const auto sync = [this](const bushd_sync& message) {
-    frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC,
-          payload_of([&](std::uint8_t* p) { return bushd_encode_sync(&message, p); }));
-    EXPECT_FALSE(answer()) << "SYNC is not answered";
-  };
-  pass(4);  // a new tick length has settled
-  sync({});
-  const std::uint8_t mark_tag = tag_;
-  sync({true, mark_tag, tick, kTimeInTickNs});
-  EXPECT_EQ(this->tick(), tick);
-  pass(4);
-  sync({true, mark_tag, tick, kTimeInTickNs});
-  sync({});
+void Rig::sync(const bushd_sync& message) {
+  frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC,
+        payload_of([&](std::uint8_t* p) { return bushd_encode_sync(&message, p); }));
+  EXPECT_FALSE(answer()) << "SYNC is not answered";
 }
 
-bushd_status Rig::begin(std::uint8_t slot, const Law& law, bool symmetric) {
+void Rig::sync_to(std::uint32_t tick) {
+  pass(4);  // a new tick length has settled
+  const std::uint32_t mark = mark_ += 2;
+  sync({1, mark, false, 0, 0, 0});
+  sync({1, mark + 1, true, mark, tick, kTimeInTickNs});
+  EXPECT_EQ(this->tick(), tick);
+}
+
+bushd_status Rig::begin(std::uint8_t slot, const Law& law, bool symmetric, std::uint32_t revision) {
   const bushd_table_begin message = {
       .slot = slot,
       .accel_count = static_cast<std::uint16_t>(law.accel.size()),
       .decel_count = static_cast<std::uint16_t>(symmetric ? 0 : law.decel.size()),
       .cruise = law.cruise,
-      .time_unit_ns = law.unit_ns};
+      .time_unit_ns = law.unit_ns,
+      .revision = revision};
+  Bytes head(10);
+  bushd_put_u16(&head[0], message.accel_count);
+  bushd_put_u16(&head[2], message.decel_count);
+  bushd_put_u16(&head[4], message.cruise);
+  bushd_put_u32(&head[6], message.time_unit_ns);
+  table_head_[slot] = head;
   return request(BUSHD_MSG_TABLE_BEGIN, payload_of([&](std::uint8_t* p) {
                    return bushd_encode_table_begin(&message, p);
                  }));
@@ -213,12 +235,12 @@ bushd_status Rig::data(std::uint8_t slot, std::uint16_t offset,
 }
 
 bushd_status Rig::end(std::uint8_t slot, const std::vector<std::uint16_t>& codes) {
-  bushd_table_end message = {slot, BUSHD_CRC16_START};
+  Bytes bytes = table_head_[slot];
   for (const std::uint16_t code : codes) {
-    const std::uint8_t bytes[2] = {static_cast<std::uint8_t>(code),
-                                   static_cast<std::uint8_t>(code >> 8)};
-    message.crc = bushd_crc16(message.crc, bytes, 2);
+    bytes.push_back(static_cast<std::uint8_t>(code));
+    bytes.push_back(static_cast<std::uint8_t>(code >> 8));
   }
+  const bushd_table_end message = {slot, crc32(bytes)};
   return request(BUSHD_MSG_TABLE_END,
                  payload_of([&](std::uint8_t* p) { return bushd_encode_table_end(&message, p); }));
 }
@@ -238,6 +260,21 @@ bushd_status Rig::upload(std::uint8_t slot, const Law& law) {
 
 bushd_status Rig::assign(std::uint8_t motor, std::uint8_t slot) {
   return request(BUSHD_MSG_ASSIGN, {motor, slot});
+}
+
+bushd_tables Rig::tables() {
+  frame(BUSHD_MSG_TABLES, {});
+  const auto got = answer();
+  bushd_tables tables{};
+  EXPECT_TRUE(got);
+  if (!got) return tables;
+  EXPECT_EQ(bushd_decode_tables(got->payload.data(), got->payload.size(), &tables), BUSHD_OK);
+  return tables;
+}
+
+void Rig::emergency(bushd_how how, std::uint8_t address) {
+  frame(address, BUSHD_MSG_EMERGENCY, {static_cast<std::uint8_t>(how)});
+  EXPECT_FALSE(answer()) << "EMERGENCY is not answered";
 }
 
 bushd_status Rig::control(std::uint8_t actions) {
@@ -264,9 +301,8 @@ Bytes Rig::encode(const Ticks& ticks) const {
   const bool fine = format_ == BUSHD_FORMAT_FINE;
   return payload_of([&](std::uint8_t* p) {
     const auto flags = static_cast<std::uint8_t>(ticks.flags | (fine ? BUSHD_TICKS_FINE : 0));
-    std::size_t size =
-        bushd_encode_ticks_head(ticks.epoch, flags, ticks.first, ticks.count, ticks.mask,
-                                ticks.delays.empty() ? nullptr : ticks.delays.data(), p);
+    std::size_t size = bushd_encode_ticks_head(ticks.epoch, flags, ticks.first, ticks.count,
+                                               ticks.mask, ticks.delays.data(), p);
     for (const std::int16_t displacement : ticks.displacements) {
       if (fine) {
         bushd_put_i16(p + size, displacement);
@@ -279,10 +315,10 @@ Bytes Rig::encode(const Ticks& ticks) const {
   });
 }
 
-bushd_status Rig::take(const Ticks& ticks) {
+bushd_status Rig::take(std::uint8_t type, const Bytes& payload) {
   const std::uint16_t before = poll().rejected_frames;
-  frame(BUSHD_MSG_TICKS, encode(ticks));
-  EXPECT_FALSE(answer()) << "TICKS is not answered";
+  frame(type, payload);
+  EXPECT_FALSE(answer()) << "what moves motors is not answered";
   const bushd_report after = poll();
   if (after.rejected_frames == before) return BUSHD_OK;
   EXPECT_EQ(after.rejected_frames, before + 1);

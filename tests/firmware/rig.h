@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "engine/reference.h"
@@ -24,12 +25,14 @@ struct RigOptions {
   std::uint16_t queue_ticks = 128;
   std::uint16_t code_count = 400;
   bool self_test = true;
+  bool stores_address = true;
 };
 
 struct Answer {
   std::uint8_t type;  // without BUSHD_TYPE_REPLY
   std::uint8_t tag;
   Bytes payload;
+  std::uint32_t delay_ns;  // as the port was told
 };
 
 // A move as a master would send it, from the slow reference: displacements by tick and the delay
@@ -46,13 +49,16 @@ Plan plan_move(const Law& law, std::int64_t steps, std::uint32_t tick_ns, bushd_
 // Steps in each tick of a reference that begins at a tick's beginning.
 std::vector<int> steps_by_tick(const Reference& reference, std::uint32_t tick_ns);
 
+// CRC-32/ISO-HDLC, bit by bit.
+std::uint32_t crc32(const Bytes& bytes);
+
 struct Ticks {
-  std::uint8_t flags = 0;  // BUSHD_TICKS_FINE and _DELAYS are added as needed
+  std::uint8_t flags = 0;  // BUSHD_TICKS_FINE is added as needed
   std::uint32_t first = 0;
   std::uint8_t count = 1;
   std::uint16_t mask = 1;
   std::vector<std::int16_t> displacements{};  // count x motors of the mask
-  std::vector<std::uint16_t> delays{};        // empty: not told
+  std::vector<std::uint16_t> delays{};        // one a motor
   std::uint8_t epoch = 0;
 };
 
@@ -76,10 +82,13 @@ class Rig {
   bushd_report poll();
   bushd_identity identify();
 
-  bushd_status configure(bushd_format format, std::uint32_t tick_ns = kTickNs);
+  bushd_status configure(bushd_format format, std::uint32_t tick_ns = kTickNs,
+                         std::uint16_t silence_ticks = 65535);
   // Two SYNC frames: afterwards the MCU is in step and the tick being emitted is `tick`.
   void sync_to(std::uint32_t tick);
-  bushd_status begin(std::uint8_t slot, const Law& law, bool symmetric = false);
+  void sync(const bushd_sync& message);
+  bushd_status begin(std::uint8_t slot, const Law& law, bool symmetric = false,
+                     std::uint32_t revision = 0);
   bushd_status data(std::uint8_t slot, std::uint16_t offset,
                     const std::vector<std::uint16_t>& codes);
   bushd_status end(std::uint8_t slot, const std::vector<std::uint16_t>& codes);
@@ -87,12 +96,16 @@ class Rig {
   bushd_status assign(std::uint8_t motor, std::uint8_t slot);
   bushd_status control(std::uint8_t actions);
   bushd_status set_position(std::uint8_t motor, std::int32_t position_steps);
+  bushd_tables tables();
+  // Without an answer.
+  void emergency(bushd_how how, std::uint8_t address = BUSHD_ADDRESS_BROADCAST);
   // Everything up to READY, with this table for all motors.
   void make_ready(const Law& law, bushd_format format, std::uint32_t tick = 1000);
 
   Bytes encode(const Ticks& ticks) const;
   // What the MCU made of it, as its reports tell.
-  bushd_status take(const Ticks& ticks);
+  bushd_status take(const Ticks& ticks) { return take(BUSHD_MSG_TICKS, encode(ticks)); }
+  bushd_status take(std::uint8_t type, const Bytes& payload);
   // Ticks [from, from + count) of a plan that starts at `start`, with the delay at their end.
   Ticks part(const Plan& plan, std::uint32_t start, std::size_t from, std::size_t count,
              std::uint8_t motor = 0) const;
@@ -115,6 +128,10 @@ class Rig {
   void forget_history();
   bool enabled() const { return enabled_; }
   int enable_calls() const { return enable_calls_; }
+  int stored_address() const { return stored_address_; }
+  static std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE> unique_id() {
+    return {'b', 'u', 's', 'h', 0, 1, 2, 3};
+  }
   // Steps in the first slot of a tick in which DIR changed: no set-up time for the driver.
   int steps_with_dir() const { return steps_with_dir_; }
   int steps_while_disabled() const { return steps_while_disabled_; }
@@ -131,10 +148,13 @@ class Rig {
   const bushd_plane* plane_ = nullptr;
   bushd_format format_ = BUSHD_FORMAT_COARSE;
   std::uint8_t tag_ = 0;
-  std::vector<Bytes> sent_;
+  std::vector<std::pair<Bytes, std::uint32_t>> sent_;
+  std::array<Bytes, 256> table_head_;  // what TABLE_BEGIN said, by slot, as a checksum has it
   Bytes last_sent_;
   bool enabled_ = true;
   int enable_calls_ = 0;
+  int stored_address_ = -1;
+  std::uint32_t mark_ = 0;
   std::uint32_t port_tick_ns_ = 0;
   std::uint16_t direction_ = 0;
   std::array<std::int64_t, BUSHD_MOTORS_PER_MCU> pulses_{};

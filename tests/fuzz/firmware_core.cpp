@@ -33,6 +33,8 @@ enum class Op : std::uint8_t {
   kTicks,       // TICKS whose first tick and epoch count from the MCU's
   kSync,        // SYNC that follows the last mark, this far off it
   kTableEnd,    // TABLE_END with the checksum of what is there
+  kTableTicks,  // TABLE_TICKS in the same way as TICKS
+  kTableRun,    // TABLE_RUN, too
   kCount
 };
 
@@ -42,8 +44,13 @@ class Mcu {
     const bushd_port port = {
         .context = this,
         .transmit =
-            [](void* self, const std::uint8_t* wire, std::size_t size) {
+            [](void* self, const std::uint8_t* wire, std::size_t size, std::uint32_t) {
               static_cast<Mcu*>(self)->transmitted({wire, size});
+            },
+        .store_address =
+            [](void* self, std::uint8_t address) {
+              static_cast<Mcu*>(self)->address_ = address;
+              return true;
             },
         .set_enable = [](void* self, bool on) { static_cast<Mcu*>(self)->enabled_ = on; },
         .set_tick = [](void* self,
@@ -59,7 +66,8 @@ class Mcu {
                                      .queue = queue_.data(),
                                      .queue_ticks = kQueueTicks,
                                      .codes = codes_.data(),
-                                     .code_count = kCodes};
+                                     .code_count = kCodes,
+                                     .unique_id = {'f', 'u', 'z', 'z'}};
     bushd_mcu_boot(&mcu_, &port, &config);
     BUSHD_REQUIRE(mcu_.state == BUSHD_STATE_BUSY && !enabled_);
     pass();
@@ -96,23 +104,25 @@ class Mcu {
   const bushd_mcu& core() const { return mcu_; }
 
   // From here on exactly one answer is due; returns it.
-  bushd_frame ask(std::uint8_t type) {
+  bushd_frame ask(std::uint8_t address, std::uint8_t type, Bytes payload) {
     const std::uint8_t delimiter = 0;
     feed({&delimiter, 1});
     answers_ = 0;
-    frame(kAddress, type, 42, {});
+    frame(address, type, 42, payload);
     BUSHD_REQUIRE(answers_ == 1 && answer_.tag == 42);
     BUSHD_REQUIRE(answer_.type == (type | BUSHD_TYPE_REPLY));
     return answer_;
   }
 
   void check_answers() {
-    const bushd_frame identity_frame = ask(BUSHD_MSG_IDENTIFY);
+    const std::array<std::uint8_t, 5> at_once = {0, 0, 1, 0, 0};
+    const bushd_frame identity_frame = ask(address_, BUSHD_MSG_IDENTIFY, at_once);
     bushd_identity identity;
     BUSHD_REQUIRE(bushd_decode_identity(identity_frame.payload, identity_frame.payload_size,
                                         &identity) == BUSHD_OK);
     BUSHD_REQUIRE(identity.motors == kMotors && identity.boot_number == kBootNumber);
-    const bushd_frame report_frame = ask(BUSHD_MSG_POLL);
+    const std::array<std::uint8_t, 4> me = {1, address_, 0, 0};
+    const bushd_frame report_frame = ask(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, me);
     bushd_report report;
     BUSHD_REQUIRE(bushd_decode_report(report_frame.payload, report_frame.payload_size, &report) ==
                   BUSHD_OK);
@@ -140,7 +150,7 @@ class Mcu {
       BUSHD_REQUIRE(bushd_receive_byte(&listener_, wire[i], &answer_) ==
                     (last ? BUSHD_RECEIVE_FRAME : BUSHD_RECEIVE_MORE));
     }
-    BUSHD_REQUIRE(answer_.address == kAddress && (answer_.type & BUSHD_TYPE_REPLY) != 0);
+    BUSHD_REQUIRE(answer_.address == mcu_.config.address && (answer_.type & BUSHD_TYPE_REPLY) != 0);
     ++answers_;
   }
 
@@ -168,16 +178,25 @@ class Mcu {
   void check_state() const {
     BUSHD_REQUIRE(mcu_.state <= BUSHD_STATE_FAULT);
     BUSHD_REQUIRE(enabled_ == ((mcu_.flags & BUSHD_FLAG_ENABLED) != 0));
+    BUSHD_REQUIRE(mcu_.config.address == address_);
     BUSHD_REQUIRE(mcu_.codes_used <= kCodes && mcu_.tick_ns == tick_ns_);
     for (std::size_t m = 0; m < kMotors; ++m) {
       const bushd_mcu_motor& motor = mcu_.motor[m];
       BUSHD_REQUIRE(motor.remainder > -256 && motor.remainder < 256);
       BUSHD_REQUIRE(motor.table < static_cast<int>(BUSHD_TABLE_SLOTS));
       // The table that it must be able to run down.
-      if (motor.delay != 0 || motor.running_down) {
+      if (motor.delay != 0 || motor.mode != BUSHD_MCU_STREAM) {
         BUSHD_REQUIRE(motor.table >= 0 && mcu_.table[motor.table].valid);
       }
-      BUSHD_REQUIRE(static_cast<std::int32_t>(motor.known_until - mcu_.tick) <= kQueueTicks + 1);
+      if (motor.mode != BUSHD_MCU_TABLE_RUN) {
+        BUSHD_REQUIRE(static_cast<std::int32_t>(motor.known_until - mcu_.tick) <= kQueueTicks + 1);
+      }
+      // Only a motor that moves on has an island, beyond a gap and within the queue.
+      if (motor.island.from != motor.island.until) {
+        const std::uint32_t gap = motor.island.from - motor.known_until;
+        const std::uint32_t end = motor.island.until - mcu_.tick;
+        BUSHD_REQUIRE(motor.delay != 0 && gap - 1 < kQueueTicks && end <= kQueueTicks + 1u);
+      }
     }
     for (std::size_t m = kMotors; m < BUSHD_MOTORS_PER_MCU; ++m) {
       BUSHD_REQUIRE(mcu_.motor[m].position_steps == 0 && mcu_.motor[m].known_until == 0);
@@ -191,6 +210,7 @@ class Mcu {
   bushd_receiver listener_{};
   bushd_frame answer_{};
   int answers_ = 0;
+  std::uint8_t address_ = kAddress;
   bool enabled_ = true;
   std::uint32_t tick_ns_ = 0;
   std::uint16_t share_ = 0;
@@ -218,7 +238,7 @@ void send_frame(Mcu& mcu, Input& input) {
   const std::uint8_t tag = input.u8();
   Payload payload;
   payload.take(input, input.u8());
-  mcu.frame(address, type, tag, payload.view());
+  mcu.frame(address == kAddress ? mcu.core().config.address : address, type, tag, payload.view());
 }
 
 void send_ticks(Mcu& mcu, Input& input) {
@@ -229,46 +249,74 @@ void send_ticks(Mcu& mcu, Input& input) {
   const std::uint8_t count = input.u8();
   const std::uint8_t mask = input.u8();
   Payload payload;
-  const auto head = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_DELAYS);
-  payload.size =
-      bushd_encode_ticks_head(epoch, head, first, count, mask, nullptr, payload.bytes.data());
-  payload.bytes[1] = flags;
+  const std::array<std::uint16_t, 8> delays{};
   std::size_t motors = 0;
+  payload.size = BUSHD_TICKS_HEADER;
+  bushd_encode_ticks_head(epoch, flags, first, count, mask, delays.data(), payload.bytes.data());
   for (unsigned m = 0; m < 8; ++m) motors += mask >> m & 1;
   const std::size_t width = (flags & BUSHD_TICKS_FINE) != 0 ? 2 : 1;
-  payload.take(input, (flags & BUSHD_TICKS_DELAYS) != 0 ? 2 * motors : 0);
+  payload.take(input, 2 * motors);
   payload.take(input, width * motors * count);
-  mcu.frame(kAddress, BUSHD_MSG_TICKS, 0, payload.view());
+  mcu.frame(mcu.core().config.address, BUSHD_MSG_TICKS, 0, payload.view());
+}
+
+void send_table_ticks(Mcu& mcu, Input& input) {
+  const std::uint8_t epoch = static_cast<std::uint8_t>(mcu.core().epoch + input.u8());
+  const std::uint8_t flags = input.u8();
+  const std::uint32_t first =
+      mcu.core().tick + static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
+  const std::uint16_t count = input.u8();
+  Payload payload;
+  payload.size =
+      bushd_encode_table_ticks(epoch, flags, first, count, nullptr, 0, payload.bytes.data());
+  payload.take(input, input.u8() % (2 * BUSHD_TABLE_TICKS_MAX_ENTRY));
+  mcu.frame(mcu.core().config.address, BUSHD_MSG_TABLE_TICKS, 0, payload.view());
+}
+
+void send_table_run(Mcu& mcu, Input& input) {
+  const std::uint8_t epoch = static_cast<std::uint8_t>(mcu.core().epoch + input.u8() % 2u);
+  const std::uint32_t first = mcu.core().tick + input.u8() % 24u;
+  std::array<bushd_table_run_entry, kMotors> entries{};
+  const auto count = static_cast<std::uint8_t>(1 + input.u8() % kMotors);
+  for (std::uint8_t i = 0; i < count; ++i) {
+    const std::uint8_t how = input.u8();
+    entries[i] = {.motor = i,
+                  .slot = static_cast<std::uint8_t>(how % BUSHD_TABLE_SLOTS),
+                  .direction = static_cast<std::int8_t>((how & 0x80) != 0 ? 1 : -1),
+                  .steps = (how & 0x40) != 0 ? 0xFFFFu * input.u16() : input.u8()};
+  }
+  Payload payload;
+  payload.size = bushd_encode_table_run(epoch, first, entries.data(), count, payload.bytes.data());
+  mcu.frame(mcu.core().config.address, BUSHD_MSG_TABLE_RUN, 0, payload.view());
 }
 
 void send_sync(Mcu& mcu, Input& input) {
-  const std::uint8_t tag = input.u8();
+  const std::uint8_t mark = input.u8();
   const std::uint32_t tick_ns = mcu.core().tick_ns;
+  const bushd_mcu_clock& clock = mcu.core().clock;
   const std::uint32_t later_ns =
       static_cast<std::uint32_t>(std::uint64_t{tick_ns} * input.u16() >> 16);
   const std::uint32_t later_ticks =
       static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
-  const bushd_sync sync = {.follows = true,
-                           .mark_tag = mcu.core().mark_tag,
-                           .mark_tick = mcu.core().mark_tick + later_ticks,
-                           .mark_ns = (mcu.core().mark_ns + later_ns) % tick_ns};
+  const bushd_sync sync = {.master = static_cast<std::uint16_t>(clock.master + mark % 4 / 3),
+                           .mark = clock.mark + mark / 4u,
+                           .follows = true,
+                           .known_mark = clock.mark,
+                           .mark_tick = clock.mark_tick + later_ticks,
+                           .mark_ns = (clock.mark_ns + later_ns) % tick_ns};
   Payload payload;
   payload.size = bushd_encode_sync(&sync, payload.bytes.data());
-  mcu.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, tag, payload.view());
+  mcu.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, 0, payload.view());
 }
 
 void send_table_end(Mcu& mcu, Input& input) {
   bushd_table_end end = {.slot = static_cast<std::uint8_t>(input.u8() % BUSHD_TABLE_SLOTS),
-                         .crc = BUSHD_CRC16_START};
+                         .crc = 0};
   const bushd_mcu_table& table = mcu.core().table[end.slot];
-  for (std::uint32_t i = 0; i < table.count; ++i) {
-    std::array<std::uint8_t, 2> code;
-    bushd_put_u16(code.data(), mcu.core().config.codes[table.first + i]);
-    end.crc = bushd_crc16(end.crc, code.data(), code.size());
-  }
+  if (table.count != 0) end.crc = bushd_table_crc32(&table.table);
   Payload payload;
   payload.size = bushd_encode_table_end(&end, payload.bytes.data());
-  mcu.frame(kAddress, BUSHD_MSG_TABLE_END, 0, payload.view());
+  mcu.frame(mcu.core().config.address, BUSHD_MSG_TABLE_END, 0, payload.view());
 }
 
 void run(Input input) {
@@ -295,6 +343,12 @@ void run(Input input) {
         break;
       case Op::kTableEnd:
         send_table_end(mcu, input);
+        break;
+      case Op::kTableTicks:
+        send_table_ticks(mcu, input);
+        break;
+      case Op::kTableRun:
+        send_table_run(mcu, input);
         break;
       case Op::kCount:
         break;

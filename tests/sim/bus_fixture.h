@@ -105,6 +105,18 @@ class Master {
     return std::nullopt;
   }
 
+  std::optional<Frame> identify(std::uint8_t address) {
+    return request(address, BUSHD_MSG_IDENTIFY, Bytes{0, 0, 1, 0, 0});
+  }
+  // All good answers of a broadcast scan.
+  std::vector<Frame> scan(const bushd_identify& message) {
+    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+    frames.clear();
+    send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_IDENTIFY,
+         {payload.data(), bushd_encode_identify(&message, payload.data())});
+    return frames;
+  }
+
   // The status that an MCU acknowledges a request with; BUSHD_E_LENGTH if no good reply came.
   template <class Message>
   bushd_status acknowledged(std::uint8_t address, bushd_type type,
@@ -127,21 +139,26 @@ class Master {
 
   bushd_report poll(std::uint8_t address) {
     bushd_report report{};
-    const auto reply = request(address, BUSHD_MSG_POLL);
-    if (!reply) {
+    frames.clear();
+    const Bytes payload = {1, address, 0, 0};
+    send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, payload);
+    if (frames.size() != 1 || frames[0].address != address) {
       ADD_FAILURE() << "no report from " << int{address};
       return report;
     }
-    EXPECT_EQ(bushd_decode_report(reply->payload.data(), reply->payload.size(), &report), BUSHD_OK);
+    const Bytes& reply = frames[0].payload;
+    EXPECT_EQ(bushd_decode_report(reply.data(), reply.size(), &report), BUSHD_OK);
     return report;
   }
 
-  // A SYNC to all; its tag is the name of the mark.
-  std::uint8_t sync(const bushd_sync& message) {
+  // A SYNC to all; returns the name of its mark.
+  std::uint32_t sync(bushd_sync message) {
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+    message.master = 1;
+    message.mark = ++mark_;
     send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC,
          {payload.data(), bushd_encode_sync(&message, payload.data())});
-    return tag_;
+    return mark_;
   }
 
   // Sets tick and format and puts all MCUs in step with the first one, as docs/design.md has it:
@@ -150,15 +167,15 @@ class Master {
   void bring_up(std::uint32_t tick_ns, bushd_format format) {
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});  // all have booted
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
-      const bushd_configure configure{tick_ns, format};
+      const bushd_configure configure{tick_ns, format, 1000};
       ASSERT_EQ(acknowledged(bus_.mcu(i).address(), BUSHD_MSG_CONFIGURE, bushd_encode_configure,
                              configure),
                 BUSHD_OK);
     }
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
-    const std::uint8_t tag = sync({});
+    const std::uint32_t mark = sync({});
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
-    sync({true, tag, 0, 0});
+    sync({0, 0, true, mark, 0, 0});
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
       const std::uint8_t address = bus_.mcu(i).address();
@@ -172,21 +189,16 @@ class Master {
   // One mark that also tells where, by the first MCU's clock, the mark before was.
   void discipline(std::uint8_t reference_address) {
     const bushd_report report = poll(reference_address);
-    sync({true, report.mark_tag, report.mark_tick, report.mark_ns});
+    sync({0, 0, true, report.mark, report.mark_tick, report.mark_ns});
   }
 
   void upload_table(std::uint8_t address, std::uint8_t slot, std::uint32_t time_unit_ns,
                     const std::vector<std::uint16_t>& accel, std::uint16_t cruise) {
-    const bushd_table_begin begin{slot, static_cast<std::uint16_t>(accel.size()), 0, cruise,
-                                  time_unit_ns};
+    const bushd_table_begin begin{
+        slot, static_cast<std::uint16_t>(accel.size()), 0, cruise, time_unit_ns, 1};
     ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin, begin),
               BUSHD_OK);
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-    Bytes raw;
-    for (const std::uint16_t code : accel) {
-      raw.push_back(static_cast<std::uint8_t>(code));
-      raw.push_back(static_cast<std::uint8_t>(code >> 8));
-    }
     for (std::size_t at = 0; at < accel.size(); at += BUSHD_TABLE_DATA_MAX_CODES) {
       const auto count = static_cast<std::uint8_t>(
           std::min<std::size_t>(BUSHD_TABLE_DATA_MAX_CODES, accel.size() - at));
@@ -194,7 +206,12 @@ class Master {
                                                        accel.data() + at, payload.data());
       ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_DATA, {payload.data(), size}), BUSHD_OK);
     }
-    const bushd_table_end end{slot, bushd_crc16(BUSHD_CRC16_START, raw.data(), raw.size())};
+    bushd_table table{};
+    table.accel.code = table.decel.code = accel.data();
+    table.accel.count = table.decel.count = static_cast<std::uint32_t>(accel.size());
+    table.cruise = cruise;
+    table.time_unit_ns = time_unit_ns;
+    const bushd_table_end end{slot, bushd_table_crc32(&table)};
     ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_END, bushd_encode_table_end, end), BUSHD_OK);
   }
 
@@ -207,10 +224,10 @@ class Master {
   void fine_ticks(std::uint8_t address, std::uint8_t motor, std::uint32_t first_tick,
                   const std::vector<std::int16_t>& displacements, std::uint16_t delay_at_end = 0) {
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-    std::size_t size = bushd_encode_ticks_head(
-        0, BUSHD_TICKS_FINE | BUSHD_TICKS_DELAYS | BUSHD_TICKS_START, first_tick,
-        static_cast<std::uint8_t>(displacements.size()), static_cast<std::uint16_t>(1u << motor),
-        &delay_at_end, payload.data());
+    std::size_t size = bushd_encode_ticks_head(0, BUSHD_TICKS_FINE | BUSHD_TICKS_START, first_tick,
+                                               static_cast<std::uint8_t>(displacements.size()),
+                                               static_cast<std::uint16_t>(1u << motor),
+                                               &delay_at_end, payload.data());
     for (const std::int16_t displacement : displacements) {
       bushd_put_i16(payload.data() + size, displacement);
       size += 2;
@@ -225,6 +242,7 @@ class Master {
   Bus& bus_;
   bushd_receiver receiver_{};
   std::uint8_t tag_ = 0;
+  std::uint32_t mark_ = 0;
 };
 
 }  // namespace bushd::sim

@@ -49,7 +49,7 @@ class TwoMcus : public testing::Test {
 
 TEST_F(TwoMcus, EachAnswersForItself) {
   for (std::size_t i = 0; i < 2; ++i) {
-    const auto reply = master.request(bus.mcu(i).address(), BUSHD_MSG_IDENTIFY);
+    const auto reply = master.identify(bus.mcu(i).address());
     ASSERT_TRUE(reply);
     bushd_identity identity;
     ASSERT_EQ(bushd_decode_identity(reply->payload.data(), reply->payload.size(), &identity),
@@ -64,9 +64,9 @@ TEST_F(TwoMcus, EachAnswersForItself) {
 }
 
 TEST_F(TwoMcus, ReplyComesAfterRequestTurnaroundAndItsOwnBytes) {
-  const Bytes request = Master::wire(1, BUSHD_MSG_POLL, 0, {});
+  const Bytes request = Master::wire(1, BUSHD_MSG_TABLES, 0, {});
   const TimeNs asked_ns = bus.now_ns();
-  const auto reply = master.request(1, BUSHD_MSG_POLL);
+  const auto reply = master.request(1, BUSHD_MSG_TABLES);
   ASSERT_TRUE(reply);
   const std::size_t reply_bytes = reply->payload.size() + BUSHD_FRAME_OVERHEAD;
   EXPECT_EQ(reply->end_ns - asked_ns,
@@ -74,7 +74,7 @@ TEST_F(TwoMcus, ReplyComesAfterRequestTurnaroundAndItsOwnBytes) {
 }
 
 TEST_F(TwoMcus, UnknownAddressIsMetWithSilence) {
-  EXPECT_FALSE(master.request(3, BUSHD_MSG_IDENTIFY));
+  EXPECT_FALSE(master.identify(3));
   EXPECT_THAT(master.frames, IsEmpty());
 }
 
@@ -86,7 +86,7 @@ TEST_F(TwoMcus, RepliesOfOthersCountForNothing) {
 }
 
 TEST_F(TwoMcus, BrokenFrameIsCountedByAllAndAnsweredByNone) {
-  Bytes wire = Master::wire(1, BUSHD_MSG_IDENTIFY, 9, {});
+  Bytes wire = Master::wire(1, BUSHD_MSG_TABLES, 9, {});
   wire[3] ^= 0x40;
   bus.master_send(wire, bus.now_ns());
   master.drain();
@@ -101,8 +101,8 @@ TEST_F(TwoMcus, TwoTalkersAtOnceCollideAndAreReported) {
     collisions.push_back({first, second});
   };
   // Two requests without a pause: the second is on the line while the first is being answered.
-  Bytes both = Master::wire(1, BUSHD_MSG_IDENTIFY, 1, {});
-  const Bytes second = Master::wire(2, BUSHD_MSG_IDENTIFY, 2, {});
+  Bytes both = Master::wire(1, BUSHD_MSG_TABLES, 1, {});
+  const Bytes second = Master::wire(2, BUSHD_MSG_TABLES, 2, {});
   both.insert(both.end(), second.begin(), second.end());
   bus.master_send(both, bus.now_ns());
   master.drain();
@@ -112,8 +112,8 @@ TEST_F(TwoMcus, TwoTalkersAtOnceCollideAndAreReported) {
   EXPECT_THAT(master.frames, IsEmpty());
   EXPECT_GT(master.bad_frames, 0);
   // What is left of that costs nobody the next frame.
-  EXPECT_TRUE(master.request(1, BUSHD_MSG_IDENTIFY));
-  EXPECT_TRUE(master.request(2, BUSHD_MSG_IDENTIFY));
+  EXPECT_TRUE(master.identify(1));
+  EXPECT_TRUE(master.identify(2));
 }
 
 TEST(Bus, TwoMcusOfOneAddressCollide) {
@@ -125,8 +125,67 @@ TEST(Bus, TwoMcusOfOneAddressCollide) {
   bus.on_collision = [&](TimeNs, std::uint8_t first, std::uint8_t second) {
     between_mcus += first == 5 && second == 5;
   };
-  EXPECT_FALSE(master.request(5, BUSHD_MSG_IDENTIFY));
+  EXPECT_FALSE(master.identify(5));
   EXPECT_EQ(between_mcus, 1);
+}
+
+// Reply slots of one broadcast, as the master lays them out: no collision, one answer each.
+TEST_F(TwoMcus, OnePollIsAnsweredByAllInTheirSlots) {
+  const TimeNs asked_ns = bus.now_ns();
+  const std::array<bushd_poll_entry, 3> entries = {{{2, 500}, {9, 900}, {1, 1300}}};
+  std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+  const std::size_t size = bushd_encode_poll(entries.data(), 3, payload.data());
+  master.frames.clear();
+  master.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, {payload.data(), size});
+  ASSERT_EQ(master.frames.size(), 2u);
+  EXPECT_EQ(bus.collisions(), 0u);
+  const TimeNs poll_ns = asked_ns + static_cast<TimeNs>(1 + size + BUSHD_FRAME_OVERHEAD) * kByteNs;
+  const TimeNs begin_ns[] = {5'000'000, 13'000'000};
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(master.frames[i].address, i == 0 ? 2 : 1);
+    const std::size_t bytes = 1 + master.frames[i].payload.size() + BUSHD_FRAME_OVERHEAD;
+    EXPECT_EQ(master.frames[i].end_ns,
+              poll_ns + begin_ns[i] + static_cast<TimeNs>(bytes) * kByteNs);
+    bushd_report report;
+    ASSERT_EQ(bushd_decode_report(master.frames[i].payload.data(), master.frames[i].payload.size(),
+                                  &report),
+              BUSHD_OK);
+    // As it was when the poll's frame ended.
+    const TimeNs boot_ns = i == 0 ? 333'333 : 0;
+    EXPECT_EQ(TimeNs{report.tick} * BUSHD_BOOT_TICK_NS + report.tick_ns, poll_ns - boot_ns);
+  }
+}
+
+// The same address twice, told apart by the slots that their unique ids choose, and one moved away.
+TEST(Bus, McusOfOneAddressAreFoundAndParted) {
+  Bus bus(kBaud);
+  bus.add_mcu({.address = 5});
+  bus.add_mcu({.address = 5});
+  Master master(bus);
+  std::vector<Frame> found;
+  for (std::uint16_t salt = 0; salt < 50 && found.size() < 2; ++salt) {
+    found = master.scan({salt, 4, 300});
+  }
+  ASSERT_EQ(found.size(), 2u);
+  bushd_identity identity;
+  ASSERT_EQ(bushd_decode_identity(found[1].payload.data(), found[1].payload.size(), &identity),
+            BUSHD_OK);
+  bushd_set_address message{};
+  std::copy_n(identity.unique_id, BUSHD_UNIQUE_ID_SIZE, message.unique_id);
+  message.address = 6;
+  std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+  master.frames.clear();
+  master.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS,
+              {payload.data(), bushd_encode_set_address(&message, payload.data())});
+  ASSERT_EQ(master.frames.size(), 1u);
+  EXPECT_EQ(master.frames[0].address, 6);
+  EXPECT_EQ(master.frames[0].payload, Bytes{BUSHD_OK});
+  EXPECT_TRUE(master.identify(5));
+  EXPECT_TRUE(master.identify(6));
+  for (std::size_t i = 0; i < 2; ++i) bus.reboot(i);
+  bus.advance_to(bus.now_ns() + 1'000'000);
+  EXPECT_TRUE(master.identify(5));
+  EXPECT_TRUE(master.identify(6)) << "kept";
 }
 
 TEST_F(TwoMcus, StepsFallInExactlyTheirSlots) {
@@ -195,8 +254,8 @@ TEST_F(TwoMcus, RebootDropsThePinsTheReplyAndTheMemory) {
   master.fine_ticks(1, 0, first, {32 * 256, 32 * 256, 32 * 256}, 1000);
   // In the second tick, within the pulse of its 5th step.
   const TimeNs reset_ns = tick_start_ns(first) + kTickNs + 5 * 8 * kSlotNs + kSlotNs / 4;
-  const Bytes poll = Master::wire(1, BUSHD_MSG_POLL, 1, {});
-  bus.master_send(poll, reset_ns - static_cast<TimeNs>(poll.size() + 5) * kByteNs);
+  const Bytes question = Master::wire(1, BUSHD_MSG_TABLES, 1, {});
+  bus.master_send(question, reset_ns - static_cast<TimeNs>(question.size() + 5) * kByteNs);
   bus.advance_to(reset_ns);
   master.frames.clear();
   bus.reboot(0, 3'000'000);
@@ -205,7 +264,7 @@ TEST_F(TwoMcus, RebootDropsThePinsTheReplyAndTheMemory) {
   EXPECT_EQ(recorder.times(0, Signal::kStep, 0, false).back(), reset_ns);
   EXPECT_THAT(recorder.times(0, Signal::kEnable, 0, false), ElementsAre(reset_ns));
   EXPECT_THAT(recorder.times(0, Signal::kDir, 0, false), ElementsAre(reset_ns));
-  EXPECT_FALSE(master.request(1, BUSHD_MSG_POLL)) << "it is still in reset";
+  EXPECT_FALSE(master.request(1, BUSHD_MSG_TABLES)) << "it is still in reset";
   bus.advance_to(reset_ns + 4'000'000);
   const bushd_report report = master.poll(1);
   EXPECT_EQ(report.boot_number, 12);
@@ -245,7 +304,7 @@ TEST(Bus, StrideDoesNotMatter) {
 
 TEST_F(TwoMcus, NextEventIsNeverLateAndNeverPast) {
   master.bring_up(kTickNs, BUSHD_FORMAT_FINE);
-  bus.master_send(Master::wire(1, BUSHD_MSG_POLL, 1, {}), bus.now_ns() + 123);
+  bus.master_send(Master::wire(1, BUSHD_MSG_TABLES, 1, {}), bus.now_ns() + 123);
   for (int i = 0; i < 500; ++i) {
     const TimeNs next_ns = bus.next_event_ns();
     ASSERT_GT(next_ns, bus.now_ns());

@@ -33,9 +33,14 @@ struct Rig {
     bushd_virtual_init(&port, &config);
   }
 
-  void hear(std::uint8_t type, std::int64_t end_ns) {
+  void identify(std::int64_t end_ns, std::uint16_t slot_units = 0) {
     std::uint8_t wire[BUSHD_FRAME_MAX_WIRE];
-    const std::size_t size = bushd_frame_encode(1, type, 3, nullptr, 0, wire);
+    // Of two slots the second one.
+    bushd_identify message = {0, 2, slot_units};
+    while (bushd_identify_slot(port.config.mcu.unique_id, message.salt, 2) != 1) ++message.salt;
+    std::uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
+    const std::size_t size = bushd_frame_encode(1, BUSHD_MSG_IDENTIFY, 3, payload,
+                                                bushd_encode_identify(&message, payload), wire);
     for (std::size_t i = 0; i < size; ++i) {
       bushd_virtual_receive(&port, wire[i], end_ns - static_cast<std::int64_t>(size - 1 - i) * 10);
     }
@@ -114,17 +119,35 @@ TEST(VirtualPort, NewTickLengthHoldsFromTheNextBoundaryOn) {
 
 TEST(VirtualPort, AnswersOneTurnaroundAfterTheRequest) {
   Rig rig;
-  rig.hear(BUSHD_MSG_IDENTIFY, 1'000'000);
+  rig.identify(1'000'000);
   EXPECT_EQ(rig.sent_at_ns, 1'020'000);
   EXPECT_FALSE(rig.sent.empty());
+}
+
+TEST(VirtualPort, AnswersInItsSlotIfThatIsLaterThanTheTurnaround) {
+  Rig rig;
+  rig.identify(1'000'000, 1);
+  EXPECT_EQ(rig.sent_at_ns, 1'020'000);
+  rig.identify(2'000'000, 300);
+  EXPECT_EQ(rig.sent_at_ns, 5'000'000);
+}
+
+TEST(VirtualPort, KeepsItsAddressOverAReset) {
+  Rig rig;
+  bushd_virtual_advance(&rig.port, 0);
+  const bushd_port& io = rig.port.mcu.port;
+  EXPECT_TRUE(io.store_address(io.context, 9));
+  bushd_virtual_reset(&rig.port, 5'000'000, 6'000'000, 8);
+  bushd_virtual_advance(&rig.port, 6'000'000);
+  EXPECT_EQ(rig.port.mcu.config.address, 9);
 }
 
 TEST(VirtualPort, DeafInResetAndAnotherBootNumberAfterIt) {
   Rig rig;
   bushd_virtual_reset(&rig.port, 5'000'000, 6'000'000, 8);
-  rig.hear(BUSHD_MSG_IDENTIFY, 5'999'999);
+  rig.identify(5'999'999);
   EXPECT_TRUE(rig.sent.empty());
-  rig.hear(BUSHD_MSG_IDENTIFY, 7'000'000);
+  rig.identify(7'000'000);
   ASSERT_FALSE(rig.sent.empty());
   EXPECT_EQ(rig.port.mcu.config.boot_number, 8);
   EXPECT_EQ(rig.port.mcu.tick, 0u);

@@ -98,9 +98,18 @@ static void tick_boundary(bushd_virtual* v) {
   bushd_mcu_prepare(&v->mcu);
 }
 
-static void port_transmit(void* context, const uint8_t* wire, size_t size) {
+// The delay is a few ms at most: the MCU's own clock is as good as true time for it.
+static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
   const bushd_virtual* v = context;
-  v->config.transmit(v->config.context, v->now_ns + v->config.turnaround_ns, wire, size);
+  const uint32_t turnaround_ns = v->config.turnaround_ns;
+  const uint32_t begin_ns = delay_ns > turnaround_ns ? delay_ns : turnaround_ns;
+  v->config.transmit(v->config.context, v->now_ns + begin_ns, wire, size);
+}
+
+static bool port_store_address(void* context, uint8_t address) {
+  bushd_virtual* v = context;
+  v->config.mcu.address = address;
+  return true;
 }
 
 static void port_set_enable(void* context, bool on) {
@@ -139,6 +148,7 @@ static bool port_self_test(void* context) {
 static void boot(bushd_virtual* v) {
   const bushd_port port = {.context = v,
                            .transmit = port_transmit,
+                           .store_address = port_store_address,
                            .set_enable = port_set_enable,
                            .set_tick = port_set_tick,
                            .adjust_tick = port_adjust_tick,

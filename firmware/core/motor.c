@@ -1,0 +1,243 @@
+// What a motor does in the tick that is prepared: a displacement of its queue, a tick of its table
+// run, or of a ramp-down. It runs down its own table when
+// - its queue ends while it moves
+// - no master is heard for too long while it is in a table run
+// - an emergency stop is commanded
+#include "engine/run_slots.h"
+#include "firmware/core/internal.h"
+
+static const bushd_table* table_of(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
+  return &mcu->table[motor->table].table;
+}
+
+// `delay` is that of the running step.
+static void ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  const bushd_table* table = table_of(mcu, motor);
+  // A delay below cruise cannot be running; the ramp must not reach codes that no move uses.
+  if (delay < table->cruise) delay = table->cruise;
+  const int direction = mcu->direction & motor_bit(m) ? 1 : -1;
+  // In the fine format the remainder is the elapsed share of the running delay; in the coarse one
+  // that share is unknown, and taking it as 0 makes the next step late rather than early.
+  const int32_t progress = (int32_t)motor->remainder * direction;
+  const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
+  bushd_run_start_ramp_down(&motor->run, table, delay, fraction, direction);
+  motor->mode = BUSHD_MCU_RAMP_DOWN;
+  motor->exact = false;
+}
+
+static void queue_ended(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  const uint16_t delay = motor->delay;
+  bushd_mcu_drop_island(mcu, m);
+  motor->delay = 0;
+  mcu->faults |= BUSHD_FAULT_LINK;
+  // DIR then still shows the move before: where this one was to go is not known. It has not left
+  // rest, so it may stay.
+  if (!motor->begun) return;
+  mcu->run_downs = saturating_increment(mcu->run_downs);
+  ramp_down_stream(mcu, m, delay);
+}
+
+static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
+  int16_t displacement = 0;
+  if (mcu->format == BUSHD_FORMAT_FINE) {
+    bushd_run_expand_fine(&motor->run, mcu->tick_ns, 1, &displacement, 1);
+  } else {
+    uint8_t counts = 0;
+    bushd_run_expand_coarse(&motor->run, mcu->tick_ns, 1, &counts, 1);
+    displacement = bushd_coarse_to_fine(counts);
+  }
+  if (bushd_run_done(&motor->run)) motor->mode = BUSHD_MCU_STREAM;
+  return displacement;
+}
+
+static int16_t queued_displacement(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  int16_t* const queued = queue_at(mcu, tick, m);
+  const int16_t displacement = *queued;
+  *queued = 0;
+  const bool at_rest =
+      ticks_after(tick, motor->rest_from) >= 0 && ticks_after(tick, motor->start_tick) <= 0;
+  if (at_rest) motor->begun = false;
+  if (displacement != 0) motor->begun = true;
+  return displacement;
+}
+
+static void set_direction(bushd_mcu* mcu, uint8_t m, bool positive) {
+  if (positive) {
+    mcu->direction |= motor_bit(m);
+  } else {
+    mcu->direction &= (uint16_t)~motor_bit(m);
+  }
+}
+
+static void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
+  if (displacement == 0) {
+    motor->still_ticks = saturating_increment(motor->still_ticks);
+    return;
+  }
+  motor->still_ticks = 0;
+  motor->displacement = (uint16_t)(displacement < 0 ? -displacement : displacement);
+}
+
+static int16_t emit_exact(bushd_mcu* mcu, uint8_t m, bushd_plane* plane) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_run* run = &motor->run;
+  set_direction(mcu, m, run->direction > 0);
+  const int16_t steps =
+      bushd_run_slots(run, mcu->tick_ns, mcu->config.slots, motor_bit(m), plane->step);
+  // As ticks of the format would leave it, so that they can go on from here.
+  motor->remainder =
+      mcu->format == BUSHD_FORMAT_FINE ? (int16_t)(run->fraction * run->direction) : (int16_t)0;
+  motor->begun = true;
+  note_speed(motor, (int16_t)(steps * 256));
+  if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) motor->mode = BUSHD_MCU_STREAM;
+  return steps;
+}
+
+static int16_t emit_displacement(bushd_mcu* mcu, uint8_t m, bushd_plane* plane,
+                                 int16_t displacement) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  note_speed(motor, displacement);
+  if (displacement == 0) return 0;
+  set_direction(mcu, m, displacement > 0);
+  const int16_t crossing =
+      mcu->format == BUSHD_FORMAT_FINE ? BUSHD_CROSSING_FINE : BUSHD_CROSSING_COARSE;
+  return bushd_slots_add(plane->step, mcu->config.slots, motor_bit(m), displacement,
+                         &motor->remainder, crossing);
+}
+
+int16_t bushd_mcu_emit(bushd_mcu* mcu, uint8_t m, bushd_plane* plane) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  const uint32_t tick = mcu->tick + 1u;
+  if (motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->run_until) >= 0) {
+    motor->mode = BUSHD_MCU_STREAM;
+  }
+  if (motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->run_from) >= 0) {
+    return emit_exact(mcu, m, plane);
+  }
+  if (ticks_after(motor->known_until, tick) > 0) {
+    return emit_displacement(mcu, m, plane, queued_displacement(mcu, m, tick));
+  }
+  motor->known_until = tick + 1u;
+  if (motor->delay != 0) queue_ended(mcu, m);
+  if (motor->mode != BUSHD_MCU_RAMP_DOWN) {
+    motor->begun = false;
+    return 0;
+  }
+  if (motor->exact) return emit_exact(mcu, m, plane);
+  return emit_displacement(mcu, m, plane, ramp_down_displacement(mcu, motor));
+}
+
+// When a run from rest is over, in ticks; false if that is farther than tick numbers reach.
+static bool ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks) {
+  const uint32_t unit_ns = run->table->time_unit_ns;
+  const uint64_t units = bushd_run_units_left(run);
+  if (units > (uint64_t)(INT32_MAX / 2) * tick_ns / unit_ns) return false;
+  *ticks = (uint32_t)((units * unit_ns + tick_ns - 1u) / tick_ns);
+  return true;
+}
+
+static bushd_status check_run(const bushd_mcu* mcu, uint32_t first_tick,
+                              const bushd_table_run_entry* entry, bushd_run* run,
+                              uint32_t* ticks) {
+  const bushd_mcu_motor* motor = &mcu->motor[entry->motor];
+  if (ticks_after(first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
+  if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
+  // There is room for one.
+  if (motor->mode == BUSHD_MCU_TABLE_RUN) return BUSHD_E_STATE;
+  bushd_run_start(run, table_of(mcu, motor), entry->steps, entry->direction);
+  return ticks_of_run(run, mcu->tick_ns, ticks) ? BUSHD_OK : BUSHD_E_CAPACITY;
+}
+
+bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message) {
+  bushd_mcu_stretch stretch = {message->epoch, BUSHD_TICKS_START, message->first_tick, 1, 0};
+  for (uint8_t i = 0; i < message->count; ++i) {
+    stretch.mask |= motor_bit(bushd_get_table_run_entry(message, i).motor);
+  }
+  const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
+  if (status != BUSHD_OK) return status;
+  bushd_run run;
+  uint32_t ticks = 0;
+  for (uint8_t i = 0; i < message->count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message, i);
+    const bushd_status run_status = check_run(mcu, message->first_tick, &entry, &run, &ticks);
+    if (run_status != BUSHD_OK) return run_status;
+  }
+  for (uint8_t i = 0; i < message->count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message, i);
+    bushd_mcu_motor* motor = &mcu->motor[entry.motor];
+    check_run(mcu, message->first_tick, &entry, &motor->run, &ticks);
+    motor->mode = BUSHD_MCU_TABLE_RUN;
+    motor->exact = true;
+    motor->rest_from = motor->known_until;
+    motor->start_tick = message->first_tick;
+    motor->run_from = message->first_tick;
+    motor->run_until = message->first_tick + ticks;
+    motor->known_until = motor->run_until;
+  }
+  return BUSHD_OK;
+}
+
+// Not only waiting for it: the tick before `next`, the first that is not prepared, was one of it.
+static bool in_table_run(const bushd_mcu_motor* motor, uint32_t next) {
+  return motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->run_from) > 0;
+}
+
+static void ramp_down_run(bushd_mcu_motor* motor) {
+  bushd_run_ramp_down(&motor->run);
+  motor->mode = bushd_run_done(&motor->run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
+}
+
+void bushd_mcu_watch_silence(bushd_mcu* mcu) {
+  if (mcu->silent_ticks < mcu->silence_ticks) return;
+  const uint32_t next = mcu->tick + 1u;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    bushd_mcu_motor* motor = &mcu->motor[m];
+    if (motor->mode != BUSHD_MCU_TABLE_RUN || bushd_run_done(&motor->run)) continue;
+    const bool begun = in_table_run(motor, next);
+    const uint32_t from = begun ? next : motor->run_from;
+    if (begun) {
+      mcu->run_downs = saturating_increment(mcu->run_downs);
+      ramp_down_run(motor);
+    }
+    bushd_mcu_cut_queue(mcu, m, from);
+    mcu->faults |= BUSHD_FAULT_LINK;
+  }
+}
+
+// The delay of the running step of a stream, from the last tick that made steps.
+static uint16_t stream_delay(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
+  // It has moved without a step yet.
+  if (motor->displacement == 0) return UINT16_MAX;
+  const uint64_t time_ns = (uint64_t)mcu->tick_ns * ((uint32_t)motor->still_ticks + 1u) * 256u;
+  const uint64_t units =
+      time_ns / ((uint64_t)table_of(mcu, motor)->time_unit_ns * motor->displacement) + 1u;
+  return units < UINT16_MAX ? (uint16_t)units : UINT16_MAX;
+}
+
+static void stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  const uint32_t next = FIRST_OPEN(mcu);
+  const bool in_run = in_table_run(motor, next);
+  const bool over = motor->delay == 0 && ticks_after(motor->known_until, next) <= 0;
+  const bool at_rest =
+      !motor->begun || over ||
+      (ticks_after(next, motor->rest_from) >= 0 && ticks_after(next, motor->start_tick) <= 0);
+  bushd_mcu_cut_queue(mcu, m, next);
+  if (how == BUSHD_CUT) {
+    if (motor->mode != BUSHD_MCU_STREAM || !at_rest) motor->remainder = 0;
+    motor->mode = BUSHD_MCU_STREAM;
+  } else if (in_run) {
+    ramp_down_run(motor);
+  } else if (motor->mode != BUSHD_MCU_RAMP_DOWN && !at_rest) {
+    ramp_down_stream(mcu, m, stream_delay(mcu, motor));
+  }
+}
+
+bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message) {
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) stop_motor(mcu, m, message->how);
+  mcu->faults |= BUSHD_FAULT_EMERGENCY;
+  return BUSHD_OK;
+}

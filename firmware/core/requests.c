@@ -1,0 +1,278 @@
+// Frames for this MCU: what they ask for, and what is answered.
+#include <string.h>
+
+#include "firmware/core/internal.h"
+
+static uint16_t running(const bushd_mcu* mcu) {
+  uint16_t mask = 0;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    const bushd_mcu_motor* motor = &mcu->motor[m];
+    if (motor->mode != BUSHD_MCU_STREAM && motor->exact) mask |= motor_bit(m);
+  }
+  return mask;
+}
+
+// One island has room in a report: that of the lowest motor, and who else has the same one.
+static void report_islands(const bushd_mcu* mcu, bushd_report* report) {
+  report->islands = 0;
+  report->island_from = 0;
+  report->island_until = 0;
+  const bushd_mcu_island* told = NULL;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if (!has_island(&mcu->motor[m])) continue;
+    const bushd_mcu_island* island = &mcu->motor[m].island;
+    if (told == NULL) told = island;
+    if (island->from == told->from && island->until == told->until) report->islands |= motor_bit(m);
+  }
+  if (told == NULL) return;
+  report->island_from = (uint16_t)told->from;
+  report->island_until = (uint16_t)told->until;
+}
+
+static size_t encode_report(bushd_mcu* mcu, uint8_t* payload) {
+  bushd_mcu_update_state(mcu);
+  bushd_report report;
+  report.state = mcu->state;
+  report.faults = mcu->faults;
+  report.flags = mcu->flags;
+  report.epoch = mcu->epoch;
+  report.boot_number = mcu->config.boot_number;
+  report.tick = mcu->tick;
+  report.tick_ns = mcu->port.time_in_tick_ns(mcu->port.context);
+  report.mark = mcu->clock.mark;
+  report.mark_tick = mcu->clock.mark_tick;
+  report.mark_ns = mcu->clock.mark_ns;
+  report.rate_ppb = mcu->clock.rate_ppb;
+  report.moving = bushd_mcu_moving(mcu);
+  report.running = running(mcu);
+  report.inputs = mcu->port.read_inputs(mcu->port.context);
+  report.bad_frames = mcu->bad_frames;
+  report.rejected_frames = mcu->rejected_frames;
+  report.last_rejection = mcu->last_rejection;
+  report.run_downs = mcu->run_downs;
+  report.low_water_ticks = mcu->low_water_ticks;
+  mcu->low_water_ticks = UINT16_MAX;
+  report_islands(mcu, &report);
+  report.motor_count = mcu->config.motors;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    report.motor[m].position_steps = mcu->motor[m].position_steps;
+    const bool far = ticks_after(mcu->motor[m].known_until, mcu->tick) > INT16_MAX;
+    report.motor[m].known_until =
+        (uint16_t)(far ? mcu->tick + INT16_MAX : mcu->motor[m].known_until);
+  }
+  return bushd_encode_report(&report, payload);
+}
+
+static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
+  bushd_identity identity;
+  identity.protocol_version = BUSHD_PROTOCOL_VERSION;
+  identity.motors = mcu->config.motors;
+  identity.firmware_version = BUSHD_FIRMWARE_VERSION;
+  identity.boot_number = mcu->config.boot_number;
+  identity.slots = mcu->config.slots;
+  identity.queue_ticks = mcu->config.queue_ticks;
+  identity.table_codes = mcu->config.code_count;
+  identity.capabilities =
+      BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN;
+  memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
+  return bushd_encode_identity(&identity, payload);
+}
+
+static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
+  const bool same = (mcu->flags & BUSHD_FLAG_CONFIGURED) != 0 && mcu->tick_ns == message->tick_ns &&
+                    mcu->format == message->format;
+  if (!same && bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  mcu->silence_ticks = message->silence_ticks;
+  if (same) return BUSHD_OK;
+  mcu->tick_ns = message->tick_ns;
+  mcu->format = message->format;
+  // Another tick length is another time: the MCU must be told the bus's tick again, and its tables
+  // be checked against it again.
+  mcu->flags =
+      (uint8_t)((mcu->flags | BUSHD_FLAG_CONFIGURED) & ~(BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK));
+  bushd_mcu_new_tick_length(mcu);
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    mcu->motor[m].table = -1;
+    mcu->motor[m].remainder = 0;
+  }
+  mcu->port.set_tick(mcu->port.context, mcu->tick_ns);
+  return BUSHD_OK;
+}
+
+static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
+  const uint8_t at_rest_only = BUSHD_CONTROL_DISABLE | BUSHD_CONTROL_CLEAR_FAULTS;
+  if ((message->actions & at_rest_only) != 0 && bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) mcu->faults &= BUSHD_FAULT_SELF_TEST;
+  if (message->actions & BUSHD_CONTROL_DISABLE) {
+    mcu->flags &= (uint8_t)~BUSHD_FLAG_ENABLED;
+    mcu->port.set_enable(mcu->port.context, false);
+  }
+  if (message->actions & BUSHD_CONTROL_ENABLE) {
+    if (mcu->faults & BUSHD_FAULT_SELF_TEST) return BUSHD_E_STATE;
+    mcu->flags |= BUSHD_FLAG_ENABLED;
+    mcu->port.set_enable(mcu->port.context, true);
+  }
+  return BUSHD_OK;
+}
+
+static bushd_status set_position(bushd_mcu* mcu, const bushd_set_position* message) {
+  if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
+  if (bushd_mcu_moving(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
+  mcu->motor[message->motor].position_steps = message->position_steps;
+  mcu->motor[message->motor].remainder = 0;
+  return BUSHD_OK;
+}
+
+static bushd_status set_address(bushd_mcu* mcu, const bushd_set_address* message) {
+  if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if (message->address == mcu->config.address) return BUSHD_OK;
+  if (!mcu->port.store_address(mcu->port.context, message->address)) return BUSHD_E_STATE;
+  mcu->config.address = message->address;
+  return BUSHD_OK;
+}
+
+// What goes back. Size 0: an acknowledgement of the status.
+typedef struct answer {
+  bool due;
+  uint32_t delay_ns;
+  size_t size;
+  uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
+} answer;
+
+// In units of BUSHD_REPLY_UNIT_NS; as far as a port can count.
+static bool answer_at(answer* a, uint32_t units) {
+  a->due = units <= UINT32_MAX / BUSHD_REPLY_UNIT_NS;
+  a->delay_ns = a->due ? units * BUSHD_REPLY_UNIT_NS : 0;
+  return a->due;
+}
+
+static bushd_status answer_identify(bushd_mcu* mcu, const bushd_frame* frame, answer* a) {
+  bushd_identify message;
+  const bushd_status status = bushd_decode_identify(frame->payload, frame->payload_size, &message);
+  if (status != BUSHD_OK) return status;
+  const uint8_t slot = bushd_identify_slot(mcu->config.unique_id, message.salt, message.slots);
+  if (!answer_at(a, (uint32_t)slot * message.slot_units)) return BUSHD_E_FORMAT;
+  a->size = encode_identity(mcu, a->payload);
+  return BUSHD_OK;
+}
+
+static bushd_status answer_poll(bushd_mcu* mcu, const bushd_frame* frame, answer* a) {
+  a->due = false;
+  bushd_poll message;
+  const bushd_status status = bushd_decode_poll(frame->payload, frame->payload_size, &message);
+  bushd_poll_entry entry;
+  if (status != BUSHD_OK || !bushd_poll_find(&message, mcu->config.address, &entry)) return status;
+  answer_at(a, entry.begin_units);
+  a->size = encode_report(mcu, a->payload);
+  return BUSHD_OK;
+}
+
+static bushd_status answer_set_address(bushd_mcu* mcu, const bushd_frame* frame, answer* a) {
+  bushd_set_address message;
+  const bushd_status status =
+      bushd_decode_set_address(frame->payload, frame->payload_size, &message);
+  if (status != BUSHD_OK) return status;
+  a->due = memcmp(message.unique_id, mcu->config.unique_id, sizeof message.unique_id) == 0;
+  return a->due ? set_address(mcu, &message) : BUSHD_OK;
+}
+
+static bushd_status answer_tables(bushd_mcu* mcu, const bushd_frame* frame, answer* a) {
+  if (frame->payload_size != 0) return BUSHD_E_LENGTH;
+  const bushd_tables tables = bushd_mcu_tables(mcu);
+  a->size = bushd_encode_tables(&tables, a->payload);
+  return BUSHD_OK;
+}
+
+static bushd_status hear_sync(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns) {
+  bushd_sync sync;
+  const bushd_status status = bushd_decode_sync(frame->payload, frame->payload_size, &sync);
+  if (status == BUSHD_OK) bushd_mcu_sync(mcu, &sync, time_in_tick_ns);
+  return status;
+}
+
+// Decodes into a local and hands it to the function that acts; a decoding error is the answer as it
+// is.
+#define HANDLE(kind, act)                                                   \
+  do {                                                                      \
+    bushd_##kind message;                                                   \
+    const bushd_status decoded =                                            \
+        bushd_decode_##kind(frame->payload, frame->payload_size, &message); \
+    return decoded == BUSHD_OK ? act(mcu, &message) : decoded;              \
+  } while (0)
+
+// What an MCU is told of without answering it.
+static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns) {
+  switch (frame->type) {
+    case BUSHD_MSG_SYNC:
+      return hear_sync(mcu, frame, time_in_tick_ns);
+    case BUSHD_MSG_TICKS:
+      HANDLE(ticks, bushd_mcu_take_ticks);
+    case BUSHD_MSG_TABLE_TICKS:
+      HANDLE(table_ticks, bushd_mcu_take_table_ticks);
+    case BUSHD_MSG_TABLE_RUN:
+      HANDLE(table_run, bushd_mcu_take_table_run);
+    default:
+      HANDLE(emergency, bushd_mcu_emergency);
+  }
+}
+
+static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns,
+                           answer* a) {
+  switch (frame->type) {
+    case BUSHD_MSG_IDENTIFY:
+      return answer_identify(mcu, frame, a);
+    case BUSHD_MSG_POLL:
+      return answer_poll(mcu, frame, a);
+    case BUSHD_MSG_SET_ADDRESS:
+      return answer_set_address(mcu, frame, a);
+    case BUSHD_MSG_TABLES:
+      return answer_tables(mcu, frame, a);
+    case BUSHD_MSG_CONFIGURE:
+      HANDLE(configure, configure);
+    case BUSHD_MSG_TABLE_BEGIN:
+      HANDLE(table_begin, bushd_mcu_table_begin);
+    case BUSHD_MSG_TABLE_DATA:
+      HANDLE(table_data, bushd_mcu_table_data);
+    case BUSHD_MSG_TABLE_END:
+      HANDLE(table_end, bushd_mcu_table_end);
+    case BUSHD_MSG_ASSIGN:
+      HANDLE(assign, bushd_mcu_assign);
+    case BUSHD_MSG_CONTROL:
+      HANDLE(control, control);
+    case BUSHD_MSG_SET_POSITION:
+      HANDLE(set_position, set_position);
+    case BUSHD_MSG_SYNC:
+    case BUSHD_MSG_TICKS:
+    case BUSHD_MSG_TABLE_TICKS:
+    case BUSHD_MSG_TABLE_RUN:
+    case BUSHD_MSG_EMERGENCY:
+      a->due = false;
+      return hear(mcu, frame, time_in_tick_ns);
+    default:
+      return BUSHD_E_UNKNOWN_MESSAGE;
+  }
+}
+
+void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns) {
+  answer a;
+  a.due = frame->address != BUSHD_ADDRESS_BROADCAST;
+  a.delay_ns = 0;
+  a.size = 0;
+  const bushd_status status = handle(mcu, frame, time_in_tick_ns, &a);
+  if (status != BUSHD_OK) {
+    mcu->rejected_frames = saturating_increment(mcu->rejected_frames);
+    mcu->last_rejection = (uint8_t)status;
+  }
+  if (!a.due) return;
+  if (a.size == 0) {
+    const bushd_acknowledgement acknowledgement = {(uint8_t)status};
+    a.size = bushd_encode_acknowledgement(&acknowledgement, a.payload);
+  }
+  // A delimiter comes first: it ends whatever the master took, while the line was idle, for a
+  // frame's beginning.
+  mcu->reply[0] = 0;
+  const size_t wire =
+      bushd_frame_encode(mcu->config.address, (uint8_t)(frame->type | BUSHD_TYPE_REPLY), frame->tag,
+                         a.payload, a.size, mcu->reply + 1);
+  mcu->port.transmit(mcu->port.context, mcu->reply, wire + 1, a.delay_ns);
+}

@@ -1,0 +1,26 @@
+// A run's steps exact to a slot, where no displacements stand between the table and the outputs.
+#ifndef BUSHD_ENGINE_RUN_SLOTS_H
+#define BUSHD_ENGINE_RUN_SLOTS_H
+
+#include <stdint.h>
+
+#include "engine/run.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Makes the next tick of a run: sets `bit` in the masks of the slots floor(t x slot_count /
+// tick_ns) for the steps at the times t from the tick's start; one at exactly its end falls into
+// its last slot. Returns the signed number of steps, 0 when the run is done. The run stands at the
+// tick's end afterwards, as bushd_run_expand_fine would leave it: ticks of both kinds may be mixed.
+//   masks  slot_count entries (BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS)
+// Precondition: as for bushd_run_expand_*; then no two steps share a slot. O(steps), with 64-bit
+// divisions.
+int16_t bushd_run_slots(bushd_run* run, uint32_t tick_ns, uint16_t slot_count, uint16_t bit,
+                        uint16_t* masks);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
