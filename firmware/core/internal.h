@@ -66,6 +66,7 @@ bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* messag
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message);
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message);
 bushd_tables bushd_mcu_tables(const bushd_mcu* mcu);
+void bushd_mcu_forget_tables(bushd_mcu* mcu);
 
 // sync.c: the tick counter against the bus's.
 void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, uint32_t time_in_tick_ns);

@@ -140,8 +140,7 @@ static bool ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks
 }
 
 static bushd_status check_run(const bushd_mcu* mcu, uint32_t first_tick,
-                              const bushd_table_run_entry* entry, bushd_run* run,
-                              uint32_t* ticks) {
+                              const bushd_table_run_entry* entry, bushd_run* run, uint32_t* ticks) {
   const bushd_mcu_motor* motor = &mcu->motor[entry->motor];
   if (ticks_after(first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
   if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;

@@ -100,9 +100,11 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
 }
 
 static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
-  const uint8_t at_rest_only = BUSHD_CONTROL_DISABLE | BUSHD_CONTROL_CLEAR_FAULTS;
+  const uint8_t at_rest_only =
+      BUSHD_CONTROL_DISABLE | BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES;
   if ((message->actions & at_rest_only) != 0 && bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
   if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) mcu->faults &= BUSHD_FAULT_SELF_TEST;
+  if (message->actions & BUSHD_CONTROL_FORGET_TABLES) bushd_mcu_forget_tables(mcu);
   if (message->actions & BUSHD_CONTROL_DISABLE) {
     mcu->flags &= (uint8_t)~BUSHD_FLAG_ENABLED;
     mcu->port.set_enable(mcu->port.context, false);

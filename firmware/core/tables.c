@@ -96,3 +96,9 @@ bushd_tables bushd_mcu_tables(const bushd_mcu* mcu) {
   }
   return tables;
 }
+
+void bushd_mcu_forget_tables(bushd_mcu* mcu) {
+  memset(mcu->table, 0, sizeof mcu->table);
+  mcu->codes_used = 0;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) mcu->motor[m].table = -1;
+}

@@ -146,7 +146,7 @@ TEST(Boot, ValuesOutOfRangeAreRefused) {
       << "format 2";
   EXPECT_EQ(rig.request(BUSHD_MSG_CONFIGURE, {0, 0, 0x27, 0}), BUSHD_E_LENGTH);
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {3}), BUSHD_E_FORMAT) << "enable and disable";
-  EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {8}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {16}), BUSHD_E_FORMAT);
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {}), BUSHD_E_LENGTH);
   EXPECT_EQ(rig.set_position(4, 0), BUSHD_E_FORMAT) << "four motors: 0..3";
   EXPECT_EQ(rig.request(0x11, {}), BUSHD_E_UNKNOWN_MESSAGE);

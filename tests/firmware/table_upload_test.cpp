@@ -241,6 +241,60 @@ TEST_F(TableUpload, RefusedWhileAMotorMoves) {
   EXPECT_EQ(rig.upload(0, law), BUSHD_OK);
 }
 
+TEST_F(TableUpload, WhatIsHeldIsTold) {
+  const Law law = flat_law(250, 20, 10);
+  ASSERT_EQ(rig.upload(2, law), BUSHD_OK);
+  const Law flat = flat_law(240, 8, 0);
+  ASSERT_EQ(rig.begin(5, flat, true, 0xCAFE1234), BUSHD_OK);
+  ASSERT_EQ(rig.data(5, 0, flat.accel), BUSHD_OK);
+  EXPECT_FALSE(rig.tables().slot[5].valid) << "not yet checked";
+  ASSERT_EQ(rig.end(5, flat.accel), BUSHD_OK);
+  const bushd_tables tables = rig.tables();
+  for (std::uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
+    EXPECT_EQ(tables.slot[i].valid, i == 2 || i == 5) << int{i};
+  }
+  EXPECT_EQ(tables.slot[5].revision, 0xCAFE1234);
+  Bytes whole = {8, 0, 0, 0, 25, 0, 0x40, 0x9C, 0, 0};
+  for (const std::uint16_t code : flat.accel) {
+    whole.push_back(static_cast<std::uint8_t>(code));
+    whole.push_back(static_cast<std::uint8_t>(code >> 8));
+  }
+  EXPECT_EQ(tables.slot[5].crc, crc32(whole));
+}
+
+// The checksum covers all that a table holds, not its codes alone.
+TEST_F(TableUpload, AnotherCruiseThanTheMastersIsFound) {
+  const Law law = flat_law(200, 6, 4);
+  ASSERT_EQ(rig.begin(0, law), BUSHD_OK);
+  ASSERT_EQ(rig.data(0, 0, codes_of(law)), BUSHD_OK);
+  Bytes whole = {6, 0, 4, 0, 26, 0, 0x40, 0x9C, 0, 0};
+  for (const std::uint16_t code : codes_of(law)) {
+    whole.push_back(static_cast<std::uint8_t>(code));
+    whole.push_back(static_cast<std::uint8_t>(code >> 8));
+  }
+  Bytes end(5);
+  bushd_put_u32(&end[1], crc32(whole));
+  EXPECT_EQ(rig.request(BUSHD_MSG_TABLE_END, end), BUSHD_E_CRC);
+  EXPECT_EQ(rig.assign(0, 0), BUSHD_E_STATE);
+}
+
+TEST_F(TableUpload, AllAreForgottenAtOnceAndTheirMemoryIsFree) {
+  const Law law = flat_law(250, 80, 40);
+  ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
+  ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
+  EXPECT_EQ(rig.begin(1, law), BUSHD_E_CAPACITY);
+  const Plan plan = plan_move(law, 4, Rig::kTickNs, BUSHD_FORMAT_FINE);
+  ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_FORGET_TABLES), BUSHD_E_STATE) << "a motor moves";
+  rig.pass_until_rest();
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_FORGET_TABLES), BUSHD_OK);
+  EXPECT_FALSE(rig.tables().slot[0].valid);
+  EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_E_NO_TABLE);
+  EXPECT_EQ(rig.upload(1, law), BUSHD_OK);
+  ASSERT_EQ(rig.assign(0, 1), BUSHD_OK);
+  expect_runs_down_by(rig, 0, law);
+}
+
 TEST_F(TableUpload, RefusedDuringARunDown) {
   const Law law = flat_law(250, 20, 10);
   ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
