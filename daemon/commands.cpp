@@ -87,8 +87,7 @@ std::string Core::refuse(const command_t& command) const {
              " steps is out of range; allowed: +-" + std::to_string(kMaxPosition);
     }
     if (is_move(command.kind)) {
-      const bool relative = command.kind == command_t::MOVE_RELATIVE;
-      const std::int64_t target = relative ? motor.position_steps + value : value;
+      const std::int64_t target = target_of(command, i);
       const std::string why = refuse_move(index, target, target - motor.position_steps);
       if (!why.empty()) return motor.config->name + ": " + why;
     }
@@ -132,7 +131,6 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
     return "the drivers of MCU " + mcu.config->id + " are disabled; enable them first";
   }
-  if (motor.axis.busy()) return "it moves already; stop it or wait for its result";
   if (!motor.trusted)
     return "its position is uncertain; find out where it stands and say 'bushctl set NAME STEPS'";
   // A move begins where the motor stands when it is accepted, and makes its steps with drivers on.
@@ -168,73 +166,117 @@ bool Core::being_disabled(std::size_t mcu) const {
   });
 }
 
+std::int64_t Core::target_of(const command_t& command, std::size_t i) const {
+  if (command.kind == command_t::MOVE_ABSOLUTE) return command.steps[i];
+  const Motor& motor = motors_[*find_motor(command.motors[i])];
+  return command.steps[i] + (motor.axis.busy() ? motor.axis.final_steps() : motor.position_steps);
+}
+
 void Core::start_move(std::int64_t now_us, const command_t& command) {
+  const Client client{command.client_id, command.number};
   std::vector<std::size_t> motors;
-  for (const std::string& name : command.motors) motors.push_back(*find_motor(name));
-  // All motors of a bus start in the same tick: the earliest that suits every one of them.
+  std::vector<std::int64_t> targets;
+  std::vector<std::size_t> moving;
+  // All motors of a bus that are at rest start in the same tick: the earliest that suits every one
+  // of them.
   std::unordered_map<std::size_t, motion::Tick> start;
-  for (const std::size_t index : motors) {
-    const Motor& motor = motors_[index];
+  for (std::size_t i = 0; i < command.motors.size(); ++i) {
+    motors.push_back(*find_motor(command.motors[i]));
+    targets.push_back(target_of(command, i));
+    const Motor& motor = motors_[motors.back()];
     const Mcu& mcu = mcus_[motor.mcu];
+    if (motor.axis.busy()) {
+      moving.push_back(motors.back());
+      continue;
+    }
     const motion::Tick earliest =
         master_of(mcu).earliest_start(now_us, mcu.in_bus, motor.config->output.value);
     motion::Tick& common = start.try_emplace(motor.bus, earliest).first->second;
     common = std::max(common, earliest);
   }
-  const std::uint64_t move = book_.open(motors);
-  client_of_move_.emplace(move, Client{command.client_id, command.number});
-  answer({command.client_id, command.number}, reply_t::ACCEPTED, "", "accepted");
+  answer(client, reply_t::ACCEPTED, "", "accepted");
+  for (const std::size_t motor : moving) take_over(motor, client);
+  client_of_move_.emplace(book_.open(motors), client);
   for (std::size_t i = 0; i < motors.size(); ++i) {
-    Motor& motor = motors_[motors[i]];
-    const Mcu& mcu = mcus_[motor.mcu];
-    const config::Bus& bus = config_.buses[motor.bus];
-    const bool relative = command.kind == command_t::MOVE_RELATIVE;
-    const std::int64_t steps =
-        relative ? command.steps[i] : command.steps[i] - motor.position_steps;
-    motor.log_id = ++last_log_id_;
-    motor.axis.start(motor.position_steps, steps, start[motor.bus]);
-    const nlohmann::json line = {{"event", "move"},
-                                 {"id", motor.log_id},
-                                 {"motor", motor.config->name},
-                                 {"bus", bus.name},
-                                 {"address", mcu.config->address.value},
-                                 {"output", motor.config->output.value},
-                                 {"table_file", table_of(*motor.config).path()},
-                                 {"tick_ns", bus.tick_ns()},
-                                 {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
-                                 {"start_tick", start[motor.bus]},
-                                 {"steps", steps},
-                                 {"from_steps", motor.position_steps}};
-    outputs_.move_log(line.dump());
-    if (steps != 0) {
-      master_of(mcu).begin(mcu.in_bus, motor.config->output.value, start[motor.bus]);
+    motion::Axis& axis = motors_[motors[i]].axis;
+    if (axis.busy()) {
+      axis.aim(targets[i]);
     } else {
-      end_motor(motors[i], motion::Outcome::kReached, "stands at its target already");
+      start_run(motors[i], targets[i], start[motors_[motors[i]].bus]);
     }
+  }
+  std::erase_if(moving, [this](std::size_t m) { return !motors_[m].axis.needs_change(); });
+  change_motors(now_us, moving);
+}
+
+void Core::take_over(std::size_t index, const Client& by) {
+  const std::string meanwhile =
+      "was given a new target by command " + std::to_string(by.number) + " of " + by.id;
+  for (Pending& pending : pending_) {
+    if (pending.kind != command_t::STOP || std::erase(pending.motors, index) == 0) continue;
+    pending.done = motors_[index].config->name + " " + meanwhile + " while it ran down";
+  }
+  end_part(index, motion::Outcome::kStopped, meanwhile + "; it moves on");
+}
+
+void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start) {
+  Motor& motor = motors_[index];
+  const Mcu& mcu = mcus_[motor.mcu];
+  const config::Bus& bus = config_.buses[motor.bus];
+  const std::int64_t steps = target - motor.position_steps;
+  motor.log_id = ++last_log_id_;
+  motor.axis.start(motor.position_steps, steps, start);
+  const nlohmann::json line = {{"event", "move"},
+                               {"id", motor.log_id},
+                               {"motor", motor.config->name},
+                               {"bus", bus.name},
+                               {"address", mcu.config->address.value},
+                               {"output", motor.config->output.value},
+                               {"table_file", table_of(*motor.config).path()},
+                               {"tick_ns", bus.tick_ns()},
+                               {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
+                               {"start_tick", start},
+                               {"steps", steps},
+                               {"from_steps", motor.position_steps}};
+  outputs_.move_log(line.dump());
+  if (steps != 0) {
+    master_of(mcu).begin(mcu.in_bus, motor.config->output.value, start);
+  } else {
+    end_motor(index, motion::Outcome::kReached, "stands at its target already");
   }
   changed_ = true;
 }
 
 void Core::stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors) {
-  std::vector<std::size_t> fresh;  // a stop under way is not planned a second time
-  std::copy_if(motors.begin(), motors.end(), std::back_inserter(fresh),
-               [this](std::size_t m) { return !motors_[m].axis.stopping(); });
-  plan_stop(now_us, fresh);
+  std::vector<std::size_t> changed;
+  for (const std::size_t index : motors) {
+    motion::Axis& axis = motors_[index].axis;
+    if (!axis.busy()) continue;
+    axis.stop();
+    if (axis.needs_change()) changed.push_back(index);
+  }
+  change_motors(now_us, changed);
 }
 
-void Core::plan_stop(std::int64_t now_us, const std::vector<std::size_t>& motors) {
+void Core::change_motors(std::int64_t now_us, const std::vector<std::size_t>& motors) {
+  // One replacement serves all motors of an MCU. It can bring a motor that has not begun to rest at
+  // any tick, but another beginning only at the tick where it was to begin.
+  std::unordered_map<std::size_t, motion::Tick> at;  // by MCU
+  for (const std::size_t index : motors) {
+    const Motor& motor = motors_[index];
+    const motion::Tick earliest = master_of(mcus_[motor.mcu]).earliest_replace(now_us);
+    motion::Tick& common = at.try_emplace(motor.mcu, earliest).first->second;
+    if (!motor.axis.stopping()) common = std::max(common, motor.axis.start_tick());
+  }
   std::unordered_map<std::size_t, std::uint16_t> masks;  // by MCU
   for (const std::size_t index : motors) {
     Motor& motor = motors_[index];
-    const Mcu& mcu = mcus_[motor.mcu];
-    if (!motor.axis.busy()) continue;
-    const motion::Tick at = master_of(mcu).earliest_replace(now_us);
-    if (!motor.axis.ramp_down(at)) continue;  // over before a stop could arrive
+    if (!motor.axis.busy() || !motor.axis.change(at[motor.mcu])) continue;
     masks[motor.mcu] |= static_cast<std::uint16_t>(1u << motor.config->output.value);
   }
   for (const auto& [index, mask] : masks) {
     const Mcu& mcu = mcus_[index];
-    master_of(mcu).replace(mcu.in_bus, mask, master_of(mcu).earliest_replace(now_us));
+    master_of(mcu).replace(mcu.in_bus, mask, at[index]);
   }
   changed_ = true;
 }
@@ -350,7 +392,7 @@ void Core::finish_pending(const Pending& pending, const std::string& failure) {
   }
   changed_ = true;
   const bool good = failure.empty();
-  answer(pending.client, reply_t::RESULT, good ? "done" : "fault", good ? "done" : failure);
+  answer(pending.client, reply_t::RESULT, good ? "done" : "fault", good ? pending.done : failure);
 }
 
 void Core::answer(const Client& client, std::int8_t phase, const std::string& result,

@@ -109,6 +109,7 @@ class Core {
     std::vector<std::int64_t> steps;  // SET_POSITION
     std::vector<std::size_t> mcus;    // whose report is awaited
     std::int64_t deadline_us;
+    std::string done = "done";  // the reason, if all goes well
   };
 
   const tables::Table& table_of(const config::Motor& motor) const {
@@ -126,10 +127,16 @@ class Core {
   void on_online(std::size_t mcu);
   void on_offline(std::size_t mcu);
   void on_report(std::int64_t now_us, std::size_t mcu);
-  void follow_motor(std::size_t motor, const Mcu& mcu, const link::McuView& view);
+  void follow_motor(std::int64_t now_us, std::size_t motor, const Mcu& mcu,
+                    const link::McuView& view);
   static std::string did_not_start(const Mcu& mcu);  // for the reason of a move's end
   void clear_link_fault(Mcu& mcu);
+  // The motor's run has come to rest, or is lost: so has its part of the move.
   void end_motor(std::size_t motor, motion::Outcome outcome, const std::string& reason);
+  // Its part of the move only.
+  void end_part(std::size_t motor, motion::Outcome outcome, const std::string& reason);
+  void log_change(const Motor& motor, const motion::Change& change);
+  void log_result(const Motor& motor, const std::string& result);
 
   // commands.cpp
   std::string refuse(const command_t& command) const;  // "" when nothing speaks against it
@@ -139,10 +146,18 @@ class Core {
   std::optional<std::size_t> find_motor(const std::string& name) const;
   std::vector<std::size_t> motors_named(const command_t& command) const;  // none named: all
   std::vector<std::size_t> mcus_of(const std::vector<std::size_t>& motors) const;
+  // Where the i-th motor of a move shall go. Of one that moves, "by" counts from its present
+  // target.
+  std::int64_t target_of(const command_t& command, std::size_t i) const;
   void start_move(std::int64_t now_us, const command_t& command);
+  // A motor that moves is given to another move: what it was moving or stopping for has ended.
+  void take_over(std::size_t motor, const Client& by);
+  // From rest; the motor is part of a move.
+  void start_run(std::size_t motor, std::int64_t target, motion::Tick start);
   void stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors);
-  // Takes the place of a stop that the MCU has not taken.
-  void plan_stop(std::int64_t now_us, const std::vector<std::size_t>& motors);
+  // Lets the MCUs know what is wanted of these motors now, in place of changes that they have not
+  // taken.
+  void change_motors(std::int64_t now_us, const std::vector<std::size_t>& motors);
   void start_pending(std::int64_t now_us, const command_t& command);
   void check_pending(std::int64_t now_us, std::optional<std::size_t> reported_mcu);
   std::string still_wrong(const Pending& pending, const Mcu& mcu) const;

@@ -49,7 +49,7 @@ void Core::handle_events(std::int64_t now_us, std::size_t bus) {
             again.push_back(static_cast<std::size_t>(motor));
           }
         }
-        plan_stop(now_us, again);
+        change_motors(now_us, again);
         break;
       }
     }
@@ -97,13 +97,14 @@ void Core::on_report(std::int64_t now_us, std::size_t index) {
     if (mcu.motor_of[output] < 0) continue;
     const auto motor = static_cast<std::size_t>(mcu.motor_of[output]);
     motors_[motor].position_steps = view.report.motor[output].position_steps;
-    if (motors_[motor].axis.busy()) follow_motor(motor, mcu, view);
+    if (motors_[motor].axis.busy()) follow_motor(now_us, motor, mcu, view);
   }
   clear_link_fault(mcu);
   check_pending(now_us, index);
 }
 
-void Core::follow_motor(std::size_t index, const Mcu& mcu, const link::McuView& view) {
+void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
+                        const link::McuView& view) {
   Motor& motor = motors_[index];
   const std::uint8_t output = motor.config->output.value;
   if (view.report.faults != 0) {
@@ -115,8 +116,11 @@ void Core::follow_motor(std::size_t index, const Mcu& mcu, const link::McuView& 
     }
     return;
   }
-  motor.axis.executed(view.tick);
-  if (view.tick < motor.axis.end_tick()) return;
+  if (const auto change = motor.axis.executed(view.tick)) log_change(motor, *change);
+  if (view.tick < motor.axis.end_tick()) {
+    if (motor.axis.needs_change()) change_motors(now_us, {index});
+    return;
+  }
   if (motor.position_steps != motor.axis.target_steps() &&
       motor.position_steps == motor.axis.from_steps()) {
     // A motor at rest looks the same whether its start came and is over or never came.
@@ -127,10 +131,15 @@ void Core::follow_motor(std::size_t index, const Mcu& mcu, const link::McuView& 
               "MCU " + mcu.config->id + " counted position " +
                   std::to_string(motor.position_steps) + " where the table leads to " +
                   std::to_string(motor.axis.target_steps()) + "; check the position and set it");
-  } else if (motor.position_steps != motor.axis.wanted_steps()) {
+  } else if (motor.position_steps == motor.axis.wanted_steps()) {
+    end_motor(index, motion::Outcome::kReached, "stands at its target");
+  } else if (motor.axis.stopping()) {
     end_motor(index, motion::Outcome::kStopped, "stopped on request");
   } else {
-    end_motor(index, motion::Outcome::kReached, "stands at its target");
+    // It was given a target that its table could not lead to without a rest.
+    log_result(motor, "turned");
+    start_run(index, motor.axis.wanted_steps(),
+              master_of(mcu).earliest_start(now_us, mcu.in_bus, output));
   }
 }
 
@@ -154,22 +163,33 @@ void Core::end_motor(std::size_t index, motion::Outcome outcome, const std::stri
   if (!motor.axis.busy()) return;
   const Mcu& mcu = mcus_[motor.mcu];
   master_of(mcu).drop(mcu.in_bus, motor.config->output.value);
-  const bool planned = outcome == motion::Outcome::kReached || outcome == motion::Outcome::kStopped;
-  if (motor.axis.stop_at() && planned) {
-    const nlohmann::json stop = {{"event", "stop"},
-                                 {"id", motor.log_id},
-                                 {"motor", motor.config->name},
-                                 {"tick", *motor.axis.stop_at()}};
-    outputs_.move_log(stop.dump());
-  }
   motor.axis.finish();
-  const nlohmann::json result = {{"event", "result"},
-                                 {"id", motor.log_id},
-                                 {"motor", motor.config->name},
-                                 {"result", motion::outcome_word(outcome)},
-                                 {"position_steps", motor.position_steps}};
-  outputs_.move_log(result.dump());
+  log_result(motor, motion::outcome_word(outcome));
+  const bool planned = outcome == motion::Outcome::kReached || outcome == motion::Outcome::kStopped;
   if (!planned) outputs_.log(LogLevel::kWarning, motor.config->name + ": " + reason);
+  end_part(index, outcome, reason);
+}
+
+void Core::log_change(const Motor& motor, const motion::Change& change) {
+  nlohmann::json line = {{"event", change.target_steps ? "retarget" : "stop"},
+                         {"id", motor.log_id},
+                         {"motor", motor.config->name},
+                         {"tick", change.at}};
+  if (change.target_steps) line["target_steps"] = *change.target_steps;
+  outputs_.move_log(line.dump());
+}
+
+void Core::log_result(const Motor& motor, const std::string& result) {
+  const nlohmann::json line = {{"event", "result"},
+                               {"id", motor.log_id},
+                               {"motor", motor.config->name},
+                               {"result", result},
+                               {"position_steps", motor.position_steps}};
+  outputs_.move_log(line.dump());
+}
+
+void Core::end_part(std::size_t index, motion::Outcome outcome, const std::string& reason) {
+  const Motor& motor = motors_[index];
   changed_ = true;
   const auto finished = book_.end({.motor = index,
                                    .outcome = outcome,

@@ -51,7 +51,7 @@ state_t Core::state_of(const Mcu& mcu) const {
     entry.table = table_of(*motor.config).name();
     entry.output = static_cast<std::int16_t>(output);
     entry.position_steps = motor.position_steps;
-    entry.target_steps = motor.axis.busy() ? motor.axis.target_steps() : motor.position_steps;
+    entry.target_steps = motor.axis.busy() ? motor.axis.final_steps() : motor.position_steps;
     entry.velocity_steps_per_s = motor.axis.velocity_steps_per_s();
     entry.moving = motor.axis.busy();
     entry.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;

@@ -1,7 +1,8 @@
-// A run is cut once, when it starts, into at most four parts by the rule max(A(j-1), D(N-j), c):
-// a lead (a step taken over in its middle), steps on the accelerating side, steps at cruise, steps
-// on the decelerating side. Both sides are sorted, so A(j-1) - D(N-j) never rises with j and one
-// binary search finds where deceleration takes over; codes not above c count as cruise.
+// A run is cut, when it starts or gets a new target, into at most four parts by the rule
+// max(A(j-1), D(N-j), c): a lead (a step taken over in its middle), steps on the accelerating side,
+// steps at cruise, steps on the decelerating side. Both sides are sorted, so A(j-1) - D(N-j) never
+// rises with j and one binary search finds where deceleration takes over; codes not above c count
+// as cruise.
 //
 // State in time is (which step runs, time units since the last step). Advancing by dt:
 // - on a side with an index, S[i] + since + dt is looked up in the prefix sums S: one bucket, one
@@ -11,13 +12,13 @@
 // The decelerating side is the same walk through its sums, backwards in time from the end.
 #include "engine/run.h"
 
-// First index of a side whose code is <= cruise: from there on the side is cruise.
-static uint32_t codes_above_cruise(const bushd_ramp* ramp, uint16_t cruise) {
+// First index of a side whose code is <= delay.
+static uint32_t codes_above(const bushd_ramp* ramp, uint16_t delay) {
   uint32_t low = 0;
   uint32_t high = ramp->count;
   while (low < high) {
     const uint32_t middle = low + (high - low) / 2;
-    if (ramp->code[middle] <= cruise) {
+    if (ramp->code[middle] <= delay) {
       high = middle;
     } else {
       low = middle + 1;
@@ -41,25 +42,34 @@ static void clear(bushd_run* run, const bushd_table* table, int direction) {
   run->direction = direction < 0 ? -1 : 1;
 }
 
-void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction) {
-  clear(run, table, direction);
-  // The first `rising` steps have A(j-1) >= D(N-j).
+// `steps` to rest, the first of them with the delay A(first): max(A(first + j-1), D(steps-j), c).
+static void cut(bushd_run* run, uint32_t first, uint32_t steps) {
+  const bushd_table* table = run->table;
+  const uint32_t accel_codes = codes_above(&table->accel, table->cruise);
+  const uint32_t decel_codes = codes_above(&table->decel, table->cruise);
+  if (first > accel_codes) first = accel_codes;  // from there on all is cruise
+  // The first `rising` steps have A(first + j-1) >= D(steps-j).
   uint32_t low = 0;
   uint32_t high = steps;
   while (low < high) {
     const uint32_t j = low + (high - low) / 2 + 1;
-    if (bushd_table_accel(table, j - 1) >= bushd_table_decel(table, steps - j)) {
+    const uint32_t i = j - 1 < accel_codes - first ? first + (j - 1) : table->accel.count;
+    if (bushd_table_accel(table, i) >= bushd_table_decel(table, steps - j)) {
       low = j;
     } else {
       high = j - 1;
     }
   }
   const uint32_t rising = low;
-  const uint32_t accel_codes = codes_above_cruise(&table->accel, table->cruise);
-  const uint32_t decel_codes = codes_above_cruise(&table->decel, table->cruise);
-  run->accel_end = rising < accel_codes ? rising : accel_codes;
+  run->accel_at = first;
+  run->accel_end = rising < accel_codes - first ? first + rising : accel_codes;
   run->decel_left = steps - rising < decel_codes ? steps - rising : decel_codes;
-  run->cruise_left = steps - run->accel_end - run->decel_left;
+  run->cruise_left = steps - (run->accel_end - run->accel_at) - run->decel_left;
+}
+
+void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction) {
+  clear(run, table, direction);
+  cut(run, 0, steps);
 }
 
 static void lead_then_ramp_down(bushd_run* run, uint16_t delay) {
@@ -86,6 +96,17 @@ void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_
 void bushd_run_ramp_down(bushd_run* run) {
   const uint16_t delay = bushd_run_delay(run);
   if (delay != 0) lead_then_ramp_down(run, delay);
+}
+
+bool bushd_run_retarget(bushd_run* run, uint32_t steps_after) {
+  const uint16_t delay = bushd_run_delay(run);
+  if (delay == 0 || bushd_table_steps_to_stop(run->table, delay) > steps_after) return false;
+  run->lead_steps = 1;
+  run->lead_delay = delay;
+  const bushd_ramp* accel = &run->table->accel;
+  const uint32_t at = codes_above(accel, delay);
+  cut(run, at < accel->count && accel->code[at] == delay ? at + 1 : at, steps_after);
+  return true;
 }
 
 uint16_t bushd_run_delay(const bushd_run* run) {

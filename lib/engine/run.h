@@ -54,6 +54,17 @@ void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_
 // the fewest steps k with D(k) <= its delay. Does nothing to a run that is done. O(log count).
 void bushd_run_ramp_down(bushd_run* run);
 
+// Changes where the run ends, in its direction: the running step, of delay x, is completed, and
+// `steps_after` more follow. They take up the accelerating side where x stands in it: with a the
+// first index of A(a) <= x, or the one after it if A(a) == x, the delay before step j of these n is
+//
+//     max( A(a+j-1), D(n-j), c )
+//
+// so that the run goes on speeding up, holds cruise, or runs down, whatever it did before. Returns
+// false, and changes nothing, if a ramp-down takes more steps than that (the run would overshoot)
+// or the run is done. O(log steps).
+bool bushd_run_retarget(bushd_run* run, uint32_t steps_after);
+
 // The next `ticks` displacements of `tick_ns` each into out[0], out[stride], ... ; after the end of
 // the run they are 0. Returns the number of ticks in which the run was still active (<= ticks), so
 // a return value below `ticks` says that it has ended. O(1) amortised per tick.

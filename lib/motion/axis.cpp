@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
+#include <utility>
 
 namespace bushd::motion {
 namespace {
@@ -23,7 +25,9 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start) {
   start_ = start;
   from_ = from_steps;
   wanted_ = from_steps + steps;
-  stop_at_.reset();
+  stopping_ = false;
+  stale_ = false;
+  change_.reset();
   const auto count = static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
   bushd_run_start(&base_.run, table_, count, steps < 0 ? -1 : 1);
   base_.tick = start;
@@ -31,10 +35,33 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start) {
   plan_end();
 }
 
-bool Axis::ramp_down(Tick at) {
-  stop_at_ = at;
+void Axis::stop() {
+  if (stopping_) return;
+  stopping_ = true;
+  stale_ = true;
+}
+
+void Axis::aim(std::int64_t target_steps) {
+  stopping_ = false;
+  wanted_ = target_steps;
+  stale_ = true;
+}
+
+bool Axis::change(Tick at) {
+  stale_ = false;
+  change_.reset();
   head_ = base_;
-  return plan_end();
+  if (bushd_run_done(&base_.run)) return false;  // over, but for the report that says so
+  plan_end();
+  const std::int64_t target = target_;
+  if (at >= std::max(end_, start_ + 1)) return false;
+  change_ = Change{.at = at, .target_steps = {}};
+  if (!stopping_) change_->target_steps = wanted_;
+  plan_end();
+  if (target_ != target) return true;
+  change_.reset();
+  plan_end();
+  return false;
 }
 
 std::size_t Axis::expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
@@ -52,24 +79,31 @@ std::size_t Axis::expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
   return active;
 }
 
-// At the beginning of a place's tick: what the stop makes of its run. The place that the axis goes
-// back to keeps the run as it was until the MCU has executed the stop, for a stop that the MCU did
-// not take is planned again, later.
-void Axis::take_stop(Place& place) const {
-  if (cancelled()) {
-    if (place.tick == start_) bushd_run_start(&place.run, table_, 0, 1);
-  } else if (stop_at_ == place.tick) {
-    bushd_run_ramp_down(&place.run);
+// At the beginning of a place's tick: what the change, if it is due there, makes of the run.
+void Axis::take_change(Place& place) const {
+  if (!change_ || place.tick != effective()) return;
+  bushd_run& run = place.run;
+  if (change_->at <= start_) {
+    const std::int64_t steps = change_->target_steps.value_or(from_) - from_;
+    bushd_run_start(&run, table_, static_cast<std::uint32_t>(std::abs(steps)), steps < 0 ? -1 : 1);
+    return;
   }
+  if (change_->target_steps) {
+    // What is left of the way after the running step.
+    const std::int64_t way = (*change_->target_steps - from_) * run.direction;
+    const std::int64_t after = way - static_cast<std::int64_t>(run.steps_done) - 1;
+    if (after >= 0 && bushd_run_retarget(&run, static_cast<std::uint32_t>(after))) return;
+  }
+  bushd_run_ramp_down(&run);
 }
 
-// Advances a place, taking the stop on the way if it lies at or after the place.
+// Advances a place, taking the change on the way if it lies at or after the place.
 void Axis::advance(Place& place, Tick to) const {
   std::array<std::int16_t, kBlock> unused;
   while (place.tick < to) {
-    take_stop(place);
+    take_change(place);
     Tick next = to;
-    if (stop_at_ && *stop_at_ > place.tick) next = std::min(next, *stop_at_);
+    if (change_ && effective() > place.tick) next = std::min(next, effective());
     if (bushd_run_done(&place.run)) {
       place.tick = next;
       continue;
@@ -87,65 +121,59 @@ Tick Axis::end_of(const Place& place) const {
   return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
 }
 
-// Returns whether the stop, if there is one, changes anything.
-bool Axis::plan_end() {
-  if (cancelled()) {
-    end_ = start_;
-    target_ = from_;
-    return true;
-  }
-  if (bushd_run_done(&base_.run))
-    return false;  // over, but for the report that says so: nothing to change
+void Axis::plan_end() {
   Place place = base_;
-  const bool stops = stop_at_ && *stop_at_ < end_of(base_);
-  if (stops) {
-    advance(place, *stop_at_);
-    bushd_run_ramp_down(&place.run);
+  if (change_) {
+    advance(place, effective());
+    take_change(place);
   }
   target_ = from_ + place.run.direction * (static_cast<std::int64_t>(place.run.steps_done) +
                                            bushd_run_steps_left(&place.run));
   end_ = end_of(place);
-  return stops;
 }
 
 std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::size_t stride) {
-  if (cancelled()) {
-    for (unsigned i = 0; i < count; ++i) out[i * stride] = 0;
-    return 0;
-  }
   if (first != head_.tick) {
     if (first < head_.tick) head_ = base_;
     advance(head_, first);
   }
+  // The delay to be told at the end of ticks before the start is that of the changed run.
+  if (change_ && change_->at <= start_) take_change(head_);
   unsigned done = 0;
   // Before the start the run stands still.
   while (done < count && first + done < start_) out[done++ * stride] = 0;
   while (done < count) {
     head_.tick = first + done;
-    take_stop(head_);
+    take_change(head_);
     Tick until = first + count;
-    if (stop_at_ && *stop_at_ > head_.tick) until = std::min(until, *stop_at_);
+    if (change_ && effective() > head_.tick) until = std::min(until, effective());
     const auto n = static_cast<std::size_t>(until - head_.tick);
     expand(head_.run, n, out + done * stride, stride);
     done += static_cast<unsigned>(n);
   }
   head_.tick = std::max(head_.tick, first + count);
-  // A stop that begins where this ends is already due: the MCU must know the delay it starts from,
-  // which the stop does not change.
+  // A change that begins where this ends is already due: the MCU must know the delay it starts
+  // from, which the change leaves as it is.
   return bushd_run_delay(&head_.run);
 }
 
-void Axis::executed(Tick until) {
-  if (busy_ && until > base_.tick) {
-    advance(base_, until);
-    if (head_.tick < base_.tick) head_ = base_;
+std::optional<Change> Axis::executed(Tick until) {
+  if (!busy_ || until < base_.tick) return std::nullopt;
+  advance(base_, until);
+  std::optional<Change> taken;
+  // Of a run that makes no step nothing comes after the change.
+  if (change_ && (until > effective() || until >= end_)) {
+    take_change(base_);
+    taken = std::exchange(change_, std::nullopt);
   }
+  if (head_.tick <= base_.tick) head_ = base_;
+  return taken;
 }
 
 double Axis::velocity_steps_per_s() const {
   if (!busy_) return 0.0;
   Place place = base_;
-  take_stop(place);
+  take_change(place);
   const std::uint16_t delay = bushd_run_delay(&place.run);
   if (delay == 0) return 0.0;
   return place.run.direction * 1e9 / (static_cast<double>(delay) * table_->time_unit_ns);

@@ -1,7 +1,10 @@
 // One motor's motion: the run of its table placed at a tick, ready to be asked for any tick again
-// that the MCU has not yet executed, and to be ramped down from a tick on.
+// that the MCU has not yet executed, and to be changed from a tick on: ramped down, or given
+// another target. A target that the table cannot lead to in one go (too near, or behind) takes a
+// second run, from where the first has come to rest; whoever follows the axis starts it.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,6 +15,14 @@
 namespace bushd::motion {
 
 using Tick = std::int64_t;
+
+// At the beginning of tick `at` the running step goes on. Then the run leads to `target_steps` if
+// the table allows that; otherwise, or without a target, to rest in the fewest steps. At or before
+// the run's start it is a run to `target_steps` from the beginning, or none.
+struct Change {
+  Tick at;
+  std::optional<std::int64_t> target_steps;
+};
 
 // Not copied while a run uses the table: the table outlives the axis.
 class Axis {
@@ -30,11 +41,20 @@ class Axis {
   // Precondition: !busy(), |steps| < 2^31, duration_ticks(steps) <= kMaxDurationTicks.
   void start(std::int64_t from_steps, std::int64_t steps, Tick start);
 
-  // From the beginning of tick `at` on: the running step goes on, then the fewest steps to rest. At
-  // or before the start no step is made. A later call replaces an earlier one, as long as the
-  // earlier has not been executed. Returns false if the move is over by then anyway. Precondition:
-  // busy(), `at` not yet executed.
-  bool ramp_down(Tick at);
+  // What is wanted of the motor from now on: rest, or another target. The plan follows with
+  // change(). Precondition: busy().
+  void stop();
+  void aim(std::int64_t target_steps);
+
+  // The plan does not yet do what is wanted, and can be changed: of two changes the first must have
+  // been executed (or known to have failed) before the second is planned, for the MCU may have
+  // taken it.
+  bool needs_change() const { return stale_ && !change_; }
+
+  // Plans what is wanted from tick `at` on, in place of a change that was planned before and that
+  // the MCU has not taken. Returns false if the plan stays what it was without any change: over by
+  // then, or it leads there already. Precondition: busy(), `at` not yet executed.
+  bool change(Tick at);
 
   // Displacements of ticks first .. first+count-1 (before the start and after the end: 0) into
   // out[0], out[stride], ... as the format has them (coarse: the byte's value). Returns the delay
@@ -42,22 +62,24 @@ class Axis {
   // last `executed`.
   std::uint16_t render(Tick first, unsigned count, std::int16_t* out, std::size_t stride);
 
-  // The ticks before `until` are over and will not be asked for again.
-  void executed(Tick until);
+  // The ticks before `until` are over and will not be asked for again. Returns the change that was
+  // among them.
+  std::optional<Change> executed(Tick until);
 
   // The motor's part is over, for whatever reason.
   void finish() { busy_ = false; }
 
   bool busy() const { return busy_; }
-  bool stopping() const { return stop_at_.has_value(); }
-  std::optional<Tick> stop_at() const { return stop_at_; }
+  bool stopping() const { return stopping_; }
   Tick start_tick() const { return start_; }
   // First tick after the last step, as planned now.
   Tick end_tick() const { return end_; }
   std::int64_t from_steps() const { return from_; }
-  // Where the motor will stand at the end, as planned now, and where the move was to lead.
+  // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t target_steps() const { return target_; }
   std::int64_t wanted_steps() const { return wanted_; }
+  // Where the motor will stand when all is done: after a second run, if it takes one.
+  std::int64_t final_steps() const { return stopping_ ? target_ : wanted_; }
   // Of the step that runs at the last executed tick; 0 when not moving.
   double velocity_steps_per_s() const;
 
@@ -66,13 +88,13 @@ class Axis {
     bushd_run run;
     Tick tick;  // the run's state is that at the beginning of this tick
   };
-  bool cancelled() const { return stop_at_ && *stop_at_ <= start_; }
-  void take_stop(Place& place) const;
+  Tick effective() const { return std::max(change_->at, start_); }
+  void take_change(Place& place) const;
   void advance(Place& place, Tick to) const;
   std::size_t expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
                      std::size_t stride) const;
   Tick end_of(const Place& place) const;
-  bool plan_end();
+  void plan_end();
 
   const bushd_table* table_;
   std::uint32_t tick_ns_;
@@ -83,8 +105,10 @@ class Axis {
   std::int64_t from_ = 0;
   std::int64_t target_ = 0;
   std::int64_t wanted_ = 0;
-  std::optional<Tick> stop_at_;
-  Place base_{};  // executed up to here; a stop at or after base_.tick is not yet in it
+  bool stopping_ = false;
+  bool stale_ = false;            // what is wanted has changed since the last change()
+  std::optional<Change> change_;  // planned and not yet executed
+  Place base_{};  // executed up to here; without `change_`, which may be planned again, later
   Place head_{};  // where the last render ended, so that the next one need not start from base_
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -86,11 +87,15 @@ Result<std::string> read_text(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(status)) return unreadable(path, "not a regular file");
   errno = 0;
   std::ifstream file(path, std::ios::binary);
-  std::string text(kMaxFileBytes + 1, '\0');
   if (!file) return unreadable(path, std::strerror(errno));
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  // In pieces: files are mostly short, and the largest allowed is costly to make room for.
+  std::string text;
+  std::array<char, 16 * 1024> piece;
+  while (file && text.size() <= kMaxFileBytes) {
+    file.read(piece.data(), piece.size());
+    text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
+  }
   if (file.bad()) return unreadable(path, std::strerror(errno));
-  text.resize(static_cast<std::size_t>(file.gcount()));
   if (text.size() > kMaxFileBytes) {
     return unreadable(path,
                       fmt::format("larger than {} bytes, and the longest table allowed needs half "

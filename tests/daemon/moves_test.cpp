@@ -150,8 +150,8 @@ TEST(Moves, RefusalsNameMotorAndCause) {
   EXPECT_THAT(refused(command_t::MOVE_RELATIVE, {"m01"}, {3'000'000'000}), HasSubstr("beyond"));
   EXPECT_THAT(refused(99, {"m01"}, {1}), HasSubstr("no command kind 99"));
   lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1000});
-  EXPECT_THAT(refused(command_t::MOVE_RELATIVE, {"m02", "m01"}, {1, 1}),
-              HasSubstr("m01: it moves already"));
+  EXPECT_THAT(refused(command_t::MOVE_RELATIVE, {"m02", "m01"}, {1, 3'000'000'000}),
+              HasSubstr("m01: target 3000001000 is beyond"));
   EXPECT_THAT(refused(command_t::DISABLE, {"m02"}, {0}), HasSubstr("m01 moves"));
   EXPECT_THAT(refused(command_t::SET_POSITION, {"m01"}, {0}), HasSubstr("m01 moves"));
   lab.run_for(3);

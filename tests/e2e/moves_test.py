@@ -40,6 +40,43 @@ class Moves(EndToEndTest):
         self.assertEqual(results.count("stopped"), 1)
         self.assertEqual(set(results), {"reached", "stopped"})
 
+    def check_new_targets(self, displacement_format):
+        self.bring_up(displacement_format)
+        first = self.start_move("a0", FAR, "b1", -FAR)
+        self.wait_until_travelled(700, "a0", "b1")
+        # In reach; behind; and one that stands joins them.
+        second = self.start_move("a0", "--to", 5000, "b1", "--to", 300, "b2", "--to", 400)
+        self.assertEqual(first.process.wait(), 1)
+        self.assertRegex(first.said(), r"a0: was given a new target by command \d+ of bushctl")
+        self.assertEqual(second.process.wait(), 0, second.said())
+        reached = self.positions()
+        self.assertEqual([reached[name] for name in ("a0", "b1", "b2")], [5000, 300, 400])
+        # Farther, by steps from the present target; then too near.
+        self.start_move("a0", -3000)
+        self.wait_until("a0 to be under way", lambda: self.positions()["a0"] < 4700)
+        third = self.start_move("a0", -500)
+        self.wait_until("a0 to have a new target", lambda: self.motors()["a0"]["target_steps"] == 1500)
+        self.wait_until("a0 to have passed 3000", lambda: self.positions()["a0"] < 3000)
+        self.command("move", "--wait", "a0", "--to", "2990")
+        self.assertEqual(third.process.wait(), 1)
+        status = self.status()
+        self.assertEqual(self.positions()["a0"], 2990)
+
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        self.assert_one_result_each()
+        self.assert_trace_is_right(status)
+        targets = [event["target_steps"] for event in self.moves() if event["event"] == "retarget"]
+        self.assertEqual(sorted(targets), [300, 1500, 2990, 5000])
+        results = [event["result"] for event in self.moves() if event["event"] == "result"]
+        self.assertEqual(results.count("turned"), 2)
+
+    def test_new_targets_for_moving_motors_fine(self):
+        self.check_new_targets("fine")
+
+    def test_new_targets_for_moving_motors_coarse(self):
+        self.check_new_targets("coarse")
+
     def test_group_moves_and_a_stop_in_flight_fine(self):
         self.check_moves("fine")
 

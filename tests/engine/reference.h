@@ -8,6 +8,7 @@
 // Shares no code with lib/engine: sides are plain vectors, times are 128-bit counts of 1/256 ns.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -62,6 +63,25 @@ class Reference {
     if (made == steps_.size()) return;
     steps_.resize(made + 1);
     append_ramp_down(steps_.back().delay / (Wide{law_.unit_ns} * 256));
+  }
+
+  // From `ns` on: the running step, then `after` more, the accelerating side taken up where its
+  // delay stands. Returns false if it cannot come to rest within so few steps, or is at rest.
+  bool retarget_at(uint64_t ns, size_t after) {
+    const size_t made = steps_at(ns);
+    if (made == steps_.size()) return false;
+    const Wide delay = steps_[made].delay / (Wide{law_.unit_ns} * 256);
+    size_t k = 0;
+    while (law_.decel_at(k) > delay) ++k;
+    if (k > after) return false;
+    steps_.resize(made + 1);
+    size_t a = 0;
+    while (law_.accel_at(a) > delay) ++a;
+    if (law_.accel_at(a) == delay) ++a;
+    for (size_t j = 1; j <= after; ++j) {
+      append(std::max({law_.accel_at(a + j - 1), law_.decel_at(after - j), Wide{law_.cruise}}));
+    }
+    return true;
   }
 
   size_t steps() const { return steps_.size(); }

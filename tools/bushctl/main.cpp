@@ -122,7 +122,8 @@ int run(int argc, char** argv) {
   move->footer(
       "bushctl move [--wait] NAME STEPS [NAME STEPS...]            by so many steps\n"
       "bushctl move [--wait] NAME --to STEPS [NAME --to STEPS...]  to these positions\n"
-      "STEPS may be negative. With --wait the exit code is 0 only if every motor reached its "
+      "STEPS may be negative. A motor that moves is given a new target; by STEPS then counts from "
+      "its present one. With --wait the exit code is 0 only if every motor reached its "
       "target.");
   move->add_flag("--wait", arguments.wait, "Wait for the result");
   move->allow_extras();  // names and numbers, in their order: parse_move()

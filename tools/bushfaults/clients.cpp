@@ -50,7 +50,7 @@ std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) c
     if (!state) continue;
     for (const bushd::motor_state_t& motor : state->motors) {
       if ((motor.moving != 0) == moving && (motor.trust == "uncertain") == uncertain) {
-        found.push_back({motor.name, motor.position_steps});
+        found.push_back({motor.name, motor.position_steps, motor.target_steps});
       }
     }
   }
@@ -65,7 +65,7 @@ command_t Clients::move() {
   std::size_t wanted = 1;
   if (many >= 6) wanted = static_cast<std::size_t>(random_.between(2, 6));
   if (many == 9) wanted = static_cast<std::size_t>(random_.between(7, 32));
-  // Now and then one that may be moving: refused, or a race.
+  // Now and then one that may be moving: a new target, or a race.
   if (free.empty() || random_.one_in(20)) {
     add(command, any_motor(), random_.between(-100, 100));
     return command;
@@ -79,6 +79,27 @@ command_t Clients::move() {
     if (motor.position_steps + steps < -kFarthest) steps = std::abs(steps);
     if (random_.one_in(50)) steps = 0;
     add(command, motor.name, absolute ? motor.position_steps + steps : steps);
+  }
+  return command;
+}
+
+// A new target for some that move: around their old one, or around where they are, so that it is
+// ahead, near or behind. Sometimes one at rest joins them.
+command_t Clients::retarget() {
+  const bool absolute = !random_.one_in(3);
+  command_t command = make(absolute ? command_t::MOVE_ABSOLUTE : command_t::MOVE_RELATIVE);
+  std::vector<Choice> some = motors_that(true, false);
+  if (some.empty()) return move();
+  const auto at_rest = motors_that(false, false);
+  if (!at_rest.empty() && random_.one_in(4)) some.push_back(random_.pick(at_rest));
+  for (std::int64_t n = random_.magnitude(1, 8); n > 0 && !some.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(some.size()));
+    const Choice motor = some[index];
+    some.erase(some.begin() + static_cast<std::ptrdiff_t>(index));
+    const std::int64_t base = random_.one_in(2) ? motor.position_steps : motor.target_steps;
+    const std::int64_t away = random_.magnitude(1, kLongestMove) * (random_.one_in(2) ? 1 : -1);
+    const std::int64_t target = std::clamp(base + away, -kFarthest, kFarthest);
+    add(command, motor.name, absolute ? target : target - motor.target_steps);
   }
   return command;
 }
@@ -157,8 +178,10 @@ command_t Clients::next() {
     command = enable_all();
   } else if (!uncertain.empty() && chance < 50) {
     command = set(uncertain);
-  } else if (chance < 60) {
+  } else if (chance < 50) {
     command = move();
+  } else if (chance < 60) {
+    command = retarget();
   } else if (chance < 78) {
     command = stop();
   } else if (chance < 81) {

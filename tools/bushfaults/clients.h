@@ -30,10 +30,12 @@ class Clients {
   struct Choice {
     std::string name;
     std::int64_t position_steps;
+    std::int64_t target_steps;
   };
   bushd::command_t make(std::int8_t kind);
   void add(bushd::command_t& command, const std::string& motor, std::int64_t steps);
   bushd::command_t move();
+  bushd::command_t retarget();
   bushd::command_t stop();
   bushd::command_t set(const std::vector<Choice>& motors);
   bushd::command_t nonsense();

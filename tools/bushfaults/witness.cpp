@@ -53,7 +53,7 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
     : config_(config), bus_(bus), plant_(plant), recent_(recent) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
-    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, 0, {}, {}});
+    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, 0, {}, {}, {}});
   }
   states_.resize(config.mcus.size());
   boot_seen_.resize(config.mcus.size());
@@ -135,25 +135,44 @@ void Witness::reply(TimeNs now_ns, const reply_t& reply) {
 
 void Witness::accepted(const Key& key, Asked& asked) {
   const command_t& command = asked.command;
+  if (command.kind == command_t::STOP) {
+    for (Motor& motor : motors_) {
+      const auto& named = command.motors;
+      const bool stops =
+          named.empty() || std::find(named.begin(), named.end(), motor.name) != named.end();
+      if (stops) motor.target.reset();
+    }
+  }
   for (std::size_t i = 0; i < command.motors.size(); ++i) {
     Motor& motor = *find(command.motors[i]);
     const std::int64_t stands = plant_steps(motor);
     if (command.kind == command_t::SET_POSITION) motor.perhaps_set.push_back(command.steps[i]);
     if (command.kind == command_t::MOVE_RELATIVE) {
-      asked.target.emplace_back(stands + command.steps[i]);
+      const std::optional<std::int64_t> base = motor.move ? motor.target : stands;
+      asked.target.push_back(base ? std::optional(*base + command.steps[i]) : std::nullopt);
     } else if (command.kind == command_t::MOVE_ABSOLUTE && motor.offset) {
       asked.target.emplace_back(*motor.offset + command.steps[i]);
     } else {
       asked.target.emplace_back();
     }
-    asked.from.push_back(stands);
+    asked.from.push_back(motor.move ? std::nullopt : std::optional(stands));
     asked.end.emplace_back();
     asked.first_step_ns.emplace_back();
-    if (is_move(command)) motor.move = key;
+    if (is_move(command)) take_over(motor, key, asked.target.back());
     if (is_move(command) && asked.target.back()) {
       steps_commanded_ += static_cast<std::uint64_t>(std::abs(*asked.target.back() - stands));
     }
   }
+}
+
+// A motor that moves belongs to the newest move; its part of the one before has ended.
+void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target) {
+  if (motor.move) {
+    Asked& before = asked_.at(*motor.move);
+    before.end[before.index_of(motor.name)] = End{"stopped", 0, true};
+  }
+  motor.move = by;
+  motor.target = target;
 }
 
 void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result) {
@@ -171,7 +190,8 @@ void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result)
     return violated(now_ns, "a result of other motors:" + text_of(result));
   }
   for (std::size_t i = 0; i < result.motors.size(); ++i) {
-    if (asked.end[i] == End{result.motor_results[i], result.position_steps[i]}) continue;
+    const auto& end = asked.end[i];
+    if (end && end->agrees(result.motor_results[i], result.position_steps[i])) continue;
     violated(now_ns, result.motors[i] + " ended otherwise than its result says:" + text_of(result));
   }
   check_start(now_ns, asked);
@@ -197,23 +217,23 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   Motor& motor = *find(line.at("motor").get<std::string>());
   if (!motor.move) return violated(now_ns, motor.name + " ended without a move");
   Asked& asked = asked_.at(*motor.move);
+  const End end{line.at("result"), line.at("position_steps")};
+  if (end.word == "turned") return check_end(now_ns, motor, end, std::nullopt);
   motor.move.reset();
-  const auto& motors = asked.command.motors;
-  const auto index = static_cast<std::size_t>(std::find(motors.begin(), motors.end(), motor.name) -
-                                              motors.begin());
-  asked.end[index] = End{line.at("result"), line.at("position_steps")};
-  check_end(now_ns, motor, asked, index);
+  const std::size_t index = asked.index_of(motor.name);
+  asked.end[index] = end;
+  check_end(now_ns, motor, end, asked.target[index]);
   const bool planned = asked.end[index]->word == "reached" || asked.end[index]->word == "stopped";
-  if (planned && plant_steps(motor) != asked.from[index]) {
+  const auto& from = asked.from[index];
+  if (planned && from && plant_steps(motor) != *from) {
     asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
   }
 }
 
-void Witness::check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index) {
-  const End& end = *asked.end[index];
+void Witness::check_end(TimeNs now_ns, const Motor& motor, const End& end,
+                        std::optional<std::int64_t> target) {
   const std::int64_t stands = plant_steps(motor);
-  const bool planned = end.word == "reached" || end.word == "stopped";
-  const auto& target = asked.target[index];
+  const bool planned = end.word == "reached" || end.word == "stopped" || end.word == "turned";
   if (end.word == "fault") {
     violated(now_ns, fmt::format("{} ended in fault at {}", motor.name, end.position_steps));
   } else if (end.word == "reached" && target && *target != stands) {

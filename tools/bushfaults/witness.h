@@ -2,6 +2,7 @@
 // replies and the states; nothing of the daemon's or the MCUs' inner life but boot numbers.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -62,7 +63,10 @@ class Witness {
   struct End {
     std::string word;  // of the result
     std::int64_t position_steps;
-    bool operator==(const End&) const = default;
+    bool moves_on = false;  // by another move; then nobody knows where exactly that began
+    bool agrees(const std::string& result, std::int64_t steps) const {
+      return word == result && (moves_on || position_steps == steps);
+    }
   };
   struct Motor {
     std::string name;
@@ -73,17 +77,23 @@ class Witness {
     // Positions that somebody asked to set and that may have been set, although nobody was told.
     std::vector<std::int64_t> perhaps_set;
     std::optional<Key> move;  // accepted, and this motor's part of it not yet ended
+    // Where it leads, as the plant counts; nothing after a stop.
+    std::optional<std::int64_t> target;
   };
   struct Asked {
     bushd::command_t command;
     std::vector<bushd::reply_t> replies;
     TimeNs accepted_ns = 0;
-    // Of moves, by motor: where the plant stood and must stand in the end, how it ended, and when
-    // it made its first step, if it did and ended as planned.
-    std::vector<std::int64_t> from;
+    // Of moves, by motor: where the plant stood (nothing if it moved) and must stand in the end,
+    // how it ended, and when it made its first step, if it began at rest, did and ended as planned.
+    std::vector<std::optional<std::int64_t>> from;
     std::vector<std::optional<std::int64_t>> target;
     std::vector<std::optional<End>> end;
     std::vector<std::optional<TimeNs>> first_step_ns;
+    std::size_t index_of(const std::string& motor) const {
+      const auto& all = command.motors;
+      return static_cast<std::size_t>(std::find(all.begin(), all.end(), motor) - all.begin());
+    }
     bool accepted() const { return !replies.empty() && replies[0].phase == reply_accepted(); }
     bool finished() const { return replies.size() == (accepted() ? 2u : 1u); }
     static std::int8_t reply_accepted() { return bushd::reply_t::ACCEPTED; }
@@ -97,7 +107,9 @@ class Witness {
   void accepted(const Key& key, Asked& asked);
   void finished(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
   void check_start(TimeNs now_ns, const Asked& asked);
-  void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index);
+  void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
+  void check_end(TimeNs now_ns, const Motor& motor, const End& end,
+                 std::optional<std::int64_t> target);
   void check_motor(TimeNs now_ns, std::size_t mcu, const bushd::motor_state_t& claim);
 
   const bushd::config::Config& config_;

@@ -61,6 +61,16 @@ class Table:
         fewest = next(k for k in range(len(self.decel) + 1) if self.delay_before_end(k) <= delay)
         return [self.delay_before_end(k) for k in range(fewest - 1, -1, -1)]
 
+    def onward(self, delay, steps):
+        """The delays of `steps` more after one made at `delay`, to rest."""
+        a = next(i for i in range(len(self.accel) + 1) if self.delay_from_start(i) <= delay)
+        if self.delay_from_start(a) == delay:
+            a += 1
+        return [
+            max(self.delay_from_start(a + j - 1), self.delay_before_end(steps - j), self.cruise)
+            for j in range(1, steps + 1)
+        ]
+
 
 class Move:
     def __init__(self, event, table):
@@ -69,11 +79,9 @@ class Move:
         self.fine = {"fine": True, "coarse": False}[event["format"]]
         self.start_tick = event["start_tick"]
         self.from_steps = event["from_steps"]
-        self.asked_steps = abs(event["steps"])
-        self.direction = 1 if event["steps"] >= 0 else -1
         self.table = table
-        self.delays = table.delays(self.asked_steps)  # as long as no stop is known
-        self.stopped = False
+        self.goal_steps = self.from_steps + event["steps"]
+        self._go_to(self.goal_steps)
         self.result = None
         self.result_steps = None
 
@@ -81,17 +89,28 @@ class Move:
         """The table's times of the steps, from the beginning of the start tick."""
         return list(accumulate(delay * self.table.unit_ns for delay in self.delays))
 
-    def stop(self, tick):
-        """A stop that comes later stands instead of the one before: the daemon had to plan it again."""
-        self.stopped = True
-        self.delays = self.table.delays(self.asked_steps)
+    def _go_to(self, goal_steps):
+        steps = goal_steps - self.from_steps
+        self.direction = 1 if steps >= 0 else -1
+        self.delays = self.table.delays(abs(steps))
+
+    def change(self, tick, target_steps=None):
+        """What a stop, or a new target, at `tick` makes of the rest; changes follow each other."""
+        if target_steps is not None:
+            self.goal_steps = target_steps
         if tick <= self.start_tick:
-            self.delays = []
+            self._go_to(self.from_steps if target_steps is None else target_steps)
             return
         done = bisect.bisect_right(self.times_ns(), (tick - self.start_tick) * self.tick_ns)
-        if done < len(self.delays):
-            running = self.delays[done]
-            self.delays[done + 1 :] = self.table.ramp_down(running)
+        if done == len(self.delays):
+            return
+        running = self.delays[done]
+        rest = self.table.ramp_down(running)
+        if target_steps is not None:
+            after = (target_steps - self.from_steps) * self.direction - (done + 1)
+            if after >= len(rest):
+                rest = self.table.onward(running, after)
+        self.delays[done + 1 :] = rest
 
     def end_steps(self):
         return self.from_steps + self.direction * len(self.delays)

@@ -42,7 +42,13 @@ class MoveLog:
         self._ticks = set()  # (bus, tick_ns)
 
     def read(self, path):
-        take = {"move": self._move, "stop": self._stop, "result": self._result, "set": self._set}
+        take = {
+            "move": self._move,
+            "stop": self._change,
+            "retarget": self._change,
+            "result": self._result,
+            "set": self._set,
+        }
         try:
             with open(path, encoding="utf-8") as file:
                 for number, line in enumerate(file, 1):
@@ -77,10 +83,10 @@ class MoveLog:
         motor.moves.append(move)
         self._moves[name, move.id] = move
 
-    def _stop(self, event):
+    def _change(self, event):
         move = self._moves.get((event["motor"], event["id"]))
         if move is not None:
-            move.stop(event["tick"])
+            move.change(event["tick"], event["target_steps"] if event["event"] == "retarget" else None)
 
     def _result(self, event):
         move = self._moves.get((event["motor"], event["id"]))
@@ -108,6 +114,9 @@ class MoveLog:
                 self._problems.add(motor, "output", f"shares its output with {other.name}")
             for move in motor.moves:
                 self._check_result(motor, move)
+            if motor.moves[-1].result == "turned":
+                text = f"move {motor.moves[-1].id} turned, and no move to its target follows"
+                self._problems.add(motor, "result", text)
             for before, after in zip(motor.moves, motor.moves[1:]):
                 if after.delays and after.start_tick < before.end_tick():
                     text = f"move {after.id} starts in tick {after.start_tick}, the one before runs until"
@@ -117,12 +126,10 @@ class MoveLog:
         text = None
         if move.result is None:
             text = f"move {move.id} has no result"
-        elif move.result not in ("reached", "stopped"):
+        elif move.result not in ("reached", "stopped", "turned"):
             text = f"move {move.id} ended as '{move.result}', so the table does not say what was to happen"
-        elif move.result == "reached" and len(move.delays) != move.asked_steps:
-            text = f"move {move.id} was cut short by a stop, and yet its result is 'reached'"
-        elif move.result == "stopped" and not move.stopped:
-            text = f"move {move.id} ended as 'stopped' without a stop"
+        elif move.result == "reached" and move.end_steps() != move.goal_steps:
+            text = f"move {move.id} does not end at its target, and yet its result is 'reached'"
         elif move.result_steps != move.end_steps():
             by_table = move.end_steps()
             text = f"move {move.id} ended at {move.result_steps} steps, by the table it ends at {by_table}"

@@ -111,11 +111,48 @@ class RightTraces(CheckTraceTest):
         self.assertEqual(scene.move("chi", 2, 0, 400, 20, stop_tick=900, move_id=7), 20)
         self.assert_right(scene)
 
-    def test_of_two_stops_the_later_line_stands(self):
+    def test_changes_of_a_move_follow_each_other(self):
         scene = self.scene()
-        scene.events.insert(-1, {"event": "stop", "id": 4, "motor": "theta", "tick": 322})
-        scene.events.insert(-1, {"event": "stop", "id": 4, "motor": "theta", "tick": 900})
+        self.assertEqual(scene.move("chi", 2, 0, 400, 200, move_id=7), 200)
+        self.assertEqual(scene.change("chi", "retarget", 430, 350), 350)
+        scene.change("chi", "stop", 440)
+        self.assertEqual(scene.change("chi", "retarget", 442, 300), 300)
         self.assert_right(scene)
+
+    def test_a_target_that_is_too_near_is_reached_from_the_other_side(self):
+        scene = self.scene()
+        scene.move("chi", 2, 0, 400, 300, move_id=7)
+        overshot = scene.change("chi", "retarget", 440, 60)
+        self.assertGreater(overshot, 60)
+        self.assert_problem(scene, "chi", "move 7 turned, and no move to its target follows")
+        scene.move("chi", 2, 0, 600, 60 - overshot, move_id=8)
+        self.assert_right(scene)
+
+    def test_a_target_before_the_start_is_another_move(self):
+        scene = self.scene()
+        scene.move("chi", 2, 0, 400, 300, move_id=7)
+        self.assertEqual(scene.change("chi", "retarget", 400, 20), 20)
+        self.assert_right(scene)
+
+    def test_any_table_and_any_targets(self):
+        seed = random.randrange(2**32)
+        chance = random.Random(seed)
+        for round_number in range(12):
+            accel = sorted((chance.randint(1, 300) for _ in range(chance.randint(1, 40))), reverse=True)
+            decel = sorted(chance.randint(1, 300) for _ in range(chance.randint(1, 40)))
+            table = {"time_unit_ns": chance.randint(21_000, 60_000), "accel": accel, "decel": decel}
+            table["cruise"] = chance.randint(1, accel[-1])
+            self.write_table(table)
+            scene = synthetic.Scene(table, self.table_file, fine=chance.random() < 0.5)
+            scene.move("m", 1, 5, 10, chance.choice((-1, 1)) * chance.randint(1, 200))
+            tick = 10
+            for _ in range(chance.randint(1, 4)):
+                tick += chance.randint(0, 60)
+                scene.change("m", "retarget", tick, chance.randint(1, 300))
+            if scene.events[-1]["result"] == "turned":
+                scene.events[-1]["result"] = "stopped"
+            with self.subTest(seed=seed, round=round_number):
+                self.assert_right(scene)
 
     def test_clocks_of_crystals_are_followed(self):
         scene = self.scene()
@@ -289,6 +326,13 @@ class WrongLogs(CheckTraceTest):
         result = next(e for e in scene.events if e["event"] == "result" and e["motor"] == "omega")
         result["result"] = "reached"
         self.assert_problem(scene, "omega", "yet its result is 'reached'")
+
+    def test_another_target_than_the_motor_was_given(self):
+        scene = self.scene()
+        scene.move("chi", 2, 0, 400, 300, move_id=7)
+        scene.change("chi", "retarget", 430, 200)
+        scene.events[-2]["target_steps"] += 1
+        self.assert_problem(scene, "chi", "ended at 201 steps, by the table it ends at 202")
 
     def test_a_position_lost_between_two_moves(self):
         scene = self.scene()

@@ -38,6 +38,31 @@ def stopped(table, delays, after_ns):
     return delays
 
 
+def retargeted(table, delays, after_ns, target):
+    """The delays of a move whose target, in steps from its start, is another from `after_ns` on."""
+    if after_ns <= 0:
+        return delays_of(table, target)
+    ramp = stopped(table, delays, after_ns)
+    now = 0
+    for done, delay in enumerate(delays, 1):
+        now += delay * table["time_unit_ns"]
+        if now > after_ns:
+            break
+    else:
+        return delays
+    if target < len(ramp):
+        return ramp
+    # As long a move as no ramp at its ends can disturb, from where its delay is that of the running step.
+    accel, cruise = table["accel"], table.get("cruise", table["accel"][-1])
+    up = [max(code, cruise) for code in accel] + [cruise] * (target + 1)
+    while up and up[0] > delay:
+        up.pop(0)
+    if max(up[0], cruise) == delay:
+        up.pop(0)
+    down = delays_of({**table, "accel": [cruise], "decel": table.get("decel", accel[::-1])}, target)[done:]
+    return delays[:done] + [max(a, d) for a, d in zip(up, down)]
+
+
 def edges_of(table, delays, fine):
     """(ns since time 0, step number) of every edge of a move."""
     times = [0]
@@ -76,6 +101,7 @@ class Scene:
         self.events = []
         self.edges = {}  # (address, output): [[time_ns, direction]]
         self.steps = {}  # by motor
+        self.delays = {}  # by motor, of its last move
         self.rates = {}  # ppm by address
         self.offsets_ns = {1: 700_000_123, 2: 700_000_123}  # by address
         self.en_low_ns = {}  # address: [(from, to)]
@@ -99,9 +125,34 @@ class Scene:
                 result = "stopped"
         end = start + direction * len(delays)
         self.steps[motor] = end
+        self.delays[motor] = delays
         self.events.append({"event": "result", **event, "result": result, "position_steps": end})
         own = self.edges.setdefault((address, output), [])
         own += [[start_tick * TICK_NS + at, direction] for at in edges_of(self.table, delays, self.fine)]
+        return len(delays)
+
+    def change(self, motor, event, tick, target=None):
+        """Changes the last move of a motor; `target` counts from that move's start."""
+        move = next(e for e in reversed(self.events) if e["event"] == "move" and e["motor"] == motor)
+        result = self.events.pop()
+        after_ns = (tick - move["start_tick"]) * TICK_NS
+        direction = 1 if move["steps"] >= 0 else -1
+        line = {"event": event, "id": move["id"], "motor": motor, "tick": tick}
+        delays = self.delays[motor]
+        if event == "stop":
+            delays = stopped(self.table, delays, after_ns)
+        else:
+            delays = retargeted(self.table, delays, after_ns, target)
+            line["target_steps"] = move["from_steps"] + direction * target
+        wanted = abs(move["steps"]) if target is None else target
+        result["result"] = "reached" if len(delays) == wanted else "stopped" if target is None else "turned"
+        result["position_steps"] = self.steps[motor] = move["from_steps"] + direction * len(delays)
+        self.events += [line, result]
+        self.delays[motor] = delays
+        own = self.edges[move["address"], move["output"]]
+        begin = move["start_tick"] * TICK_NS
+        own[:] = [edge for edge in own if edge[0] < begin]
+        own += [[begin + at, direction] for at in edges_of(self.table, delays, self.fine)]
         return len(delays)
 
     def write_moves(self, path):
