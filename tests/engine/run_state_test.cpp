@@ -28,15 +28,20 @@ std::vector<int> expand(bushd_run* run, Format format, uint32_t tick_ns, size_t 
   return all;
 }
 
-// A run at any tick boundary of any move, perhaps ramped down once or twice on the way.
+// A run at any tick boundary of any move, perhaps ramped down or given another end on the way.
 bushd_run any_run(const TestTable& table, Format format, uint32_t tick_ns) {
   bushd_run run;
   const int direction = *rc::gen::element(1, -1);
   bushd_run_start(&run, table.view(),
                   *rc::gen::element<uint32_t>(between<uint32_t>(1, 300), INT32_MAX), direction);
-  for (int again = between(0, 2); again >= 0; --again) {
+  for (int again = between(0, 3); again >= 0; --again) {
     expand(&run, format, tick_ns, between<size_t>(0, 60));
-    if (again > 0) bushd_run_ramp_down(&run);
+    if (again == 0) break;
+    if (between(0, 1) == 0) {
+      bushd_run_ramp_down(&run);
+    } else {
+      bushd_run_retarget(&run, between<uint32_t>(0, 300));
+    }
   }
   return run;
 }
