@@ -33,13 +33,21 @@ std::uint16_t fresh_boot_number() {
 
 int run(int argc, char** argv) {
   CLI::App app{"bushsim: virtual MCUs on a virtual RS-485 bus, reached through a pty"};
-  app.footer("Exit codes: 0 ended by a signal, 1 failed (reason on stderr), 2 wrong usage.");
+  app.footer(
+      "SIGUSR1 pulls the serial adapter out: the port and its name are gone, the MCUs live on and\n"
+      "hear nothing. SIGUSR2 plugs it in again, under the next --link.\n"
+      "SIGINT, SIGTERM and SIGHUP end it.\n"
+      "Exit codes: 0 ended by a signal, 1 failed (reason on stderr), 2 wrong usage.");
   bushsim::Options options;
   options.boot_number = fresh_boot_number();
   std::string config;
   std::string bus;
   app.add_option("--config", config, "bushd.toml: baud rate and MCUs of the bus")->required();
-  app.add_option("--link", options.link, "Symlink to make, the bus's serial port")->required();
+  app.add_option("--link", options.links,
+                 "Symlink to make, the bus's serial port. Given several times: its names in turn, "
+                 "each time that it is plugged in")
+      ->required()
+      ->allow_extra_args(false);
   app.add_option("--trace", options.trace, "VCD file for all edges of STEP, DIR and EN");
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
@@ -58,7 +66,7 @@ int run(int argc, char** argv) {
   {
     const auto simulator = bushsim::Simulator::create(options);
     if (!simulator) return refuse(simulator.error());
-    fmt::print("bushsim: ready {}\n", options.link);
+    fmt::print("bushsim: ready {}\n", options.links.front());
     std::fflush(stdout);
     ended = (*simulator)->run();
     summary = (*simulator)->summary();

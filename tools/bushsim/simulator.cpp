@@ -46,6 +46,7 @@ constexpr std::uint64_t kCollisionsReported = 10;
 
 Simulator::Simulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace)
     : setup_(options.setup),
+      links_(options.links),
       pty_(std::move(pty)),
       trace_(std::move(trace)),
       bus_(options.setup.baud, trace_.get()) {
@@ -74,7 +75,7 @@ void Simulator::report_collision(TimeNs time_ns, std::uint8_t first, std::uint8_
 }
 
 Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
-  auto pty = Pty::open(options.link);
+  auto pty = Pty::open(options.links.front());
   if (!pty) return fail(pty.error());
   std::unique_ptr<bushd::sim::VcdWriter> trace;
   if (!options.trace.empty()) {
@@ -90,7 +91,7 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
 Result<void> Simulator::watch() {
   sigset_t mask;
   sigemptyset(&mask);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&mask, signal);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2}) sigaddset(&mask, signal);
   if (::sigprocmask(SIG_BLOCK, &mask, nullptr) != 0) {
     return fail(system_error("signals cannot be blocked"));
   }
@@ -100,17 +101,55 @@ Result<void> Simulator::watch() {
   if (!signals_.valid() || !timer_.valid() || !epoll_.valid()) {
     return fail(system_error("the event loop cannot be set up"));
   }
-  for (const int fd : {signals_.get(), timer_.get(), pty_.fd()}) {
-    epoll_event event{};
-    event.events = EPOLLIN;
-    event.data.fd = fd;
-    if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0) {
-      return fail(system_error("the event loop cannot be set up"));
-    }
+  for (const int fd : {signals_.get(), timer_.get(), pty_->fd()}) {
+    if (const auto watched = watch(fd); !watched) return watched;
   }
   bus_.advance_to(kHeadStartNs);
   start_ns_ = wall_time_ns() - kHeadStartNs;
   return set_timer(kHeadStartNs);
+}
+
+Result<void> Simulator::watch(int fd) {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.fd = fd;
+  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0) {
+    return fail(system_error("the event loop cannot be set up"));
+  }
+  return {};
+}
+
+Result<void> Simulator::plug_in() {
+  if (pty_) return {};
+  auto opened = Pty::open(links_[links_used_ % links_.size()]);
+  if (!opened) return fail(opened.error());
+  ++links_used_;
+  pty_.emplace(std::move(*opened));
+  listening_ = true;
+  return watch(pty_->fd());
+}
+
+// The adapter loses its power: what it was sending breaks off, what it holds is lost.
+void Simulator::unplug() {
+  pty_.reset();  // closing takes it out of the epoll set
+  bus_.break_off_master();
+}
+
+Result<void> Simulator::take_signal() {
+  signalfd_siginfo info{};
+  if (::read(signals_.get(), &info, sizeof info) != sizeof info) {
+    return fail(system_error("a signal cannot be read"));
+  }
+  switch (info.ssi_signo) {
+    case SIGUSR1:
+      unplug();
+      return {};
+    case SIGUSR2:
+      return plug_in();
+    default:
+      ended_ = true;
+      return {};
+  }
 }
 
 // Simulated time as the clock on the wall has it.
@@ -122,7 +161,7 @@ TimeNs Simulator::wall_time_ns() const {
 
 Result<void> Simulator::take_bytes(TimeNs now_ns) {
   std::array<std::uint8_t, kReadBytes> space;
-  const auto size = pty_.read(space);
+  const auto size = pty_->read(space);
   if (!size) return fail(size.error());
   bus_.master_send({space.data(), *size}, now_ns);
   return {};
@@ -130,7 +169,7 @@ Result<void> Simulator::take_bytes(TimeNs now_ns) {
 
 Result<void> Simulator::hand_out_replies() {
   if (replies_.empty()) return {};
-  const auto taken = pty_.write(replies_);
+  const auto taken = pty_ ? pty_->write(replies_) : 0;
   if (!taken) return fail(taken.error());
   // Nobody reads, as with an adapter whose buffer is full: what does not fit is lost.
   dropped_bytes_ += replies_.size() - *taken;
@@ -141,12 +180,12 @@ Result<void> Simulator::hand_out_replies() {
 Result<void> Simulator::hold_back(TimeNs now_ns) {
   const TimeNs backlog_ns = kBacklogBytes * bushd::sim::kBitsPerByte * kNsPerSecond / setup_.baud;
   const bool listen = bus_.line_busy_until_ns() - now_ns < backlog_ns;
-  if (listen == listening_) return {};
+  if (!pty_ || listen == listening_) return {};
   listening_ = listen;
   epoll_event event{};
   event.events = listen ? EPOLLIN : 0u;
-  event.data.fd = pty_.fd();
-  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, pty_.fd(), &event) != 0) {
+  event.data.fd = pty_->fd();
+  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, pty_->fd(), &event) != 0) {
     return fail(system_error("the event loop cannot be changed"));
   }
   return {};
@@ -175,20 +214,19 @@ Result<void> Simulator::loop() {
     if (count < 0 && errno != EINTR) return fail(system_error("waiting failed"));
     const TimeNs now_ns = wall_time_ns();
     bus_.advance_to(now_ns);
-    bool ended = false;
     for (int i = 0; i < count; ++i) {
       const int fd = events[static_cast<std::size_t>(i)].data.fd;
-      if (fd == pty_.fd()) {
+      if (fd == signals_.get()) {
+        if (const auto taken = take_signal(); !taken) return taken;
+      } else if (pty_ && fd == pty_->fd()) {
         if (const auto taken = take_bytes(now_ns); !taken) return taken;
-      } else if (fd == signals_.get()) {
-        ended = true;
-      } else {
-        pty_.lift_exclusive_use();
+      } else if (pty_) {
+        pty_->lift_exclusive_use();
       }
     }
     if (const auto handed = hand_out_replies(); !handed) return handed;
     if (trace_ && trace_->error()) return fail(*trace_->error());
-    if (ended) return {};
+    if (ended_) return {};
     if (const auto held = hold_back(now_ns); !held) return held;
     // Setting the timer anew also clears its expiration.
     if (const auto set = set_timer(now_ns); !set) return set;

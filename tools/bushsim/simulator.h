@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,18 +18,19 @@ namespace bushsim {
 
 struct Options {
   Setup setup;
-  std::string link;
-  std::string trace;  // empty: none
+  std::vector<std::string> links;  // at least one: the port's names, each time it is plugged in
+  std::string trace;               // empty: none
   std::uint16_t boot_number = 1;
 };
 
 class Simulator {
  public:
-  // Makes all that can fail: pty, link, trace, timers. Blocks SIGINT, SIGTERM and SIGHUP: run()
-  // takes them.
+  // Makes all that can fail: pty, link, trace, timers. Blocks SIGINT, SIGTERM, SIGHUP, SIGUSR1 and
+  // SIGUSR2: run() takes them.
   static bushd::Result<std::unique_ptr<Simulator>> create(const Options& options);
 
-  // Until a signal ends it. One thread, one epoll loop.
+  // Until a signal ends it. SIGUSR1 takes the serial adapter away, SIGUSR2 plugs it in again; the
+  // MCUs live on. One thread, one epoll loop.
   bushd::Result<void> run();
 
   // What was done, for people: a line per MCU and one for the line.
@@ -37,6 +39,10 @@ class Simulator {
  private:
   Simulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace);
   bushd::Result<void> watch();
+  bushd::Result<void> watch(int fd);
+  bushd::Result<void> plug_in();
+  void unplug();
+  bushd::Result<void> take_signal();
   bushd::sim::TimeNs wall_time_ns() const;
   bushd::Result<void> take_bytes(bushd::sim::TimeNs now_ns);
   bushd::Result<void> hand_out_replies();
@@ -46,7 +52,9 @@ class Simulator {
   bushd::Result<void> loop();
 
   Setup setup_;
-  Pty pty_;
+  std::vector<std::string> links_;
+  std::size_t links_used_ = 1;
+  std::optional<Pty> pty_;  // none: unplugged
   std::unique_ptr<bushd::sim::VcdWriter> trace_;
   bushd::sim::Bus bus_;
   Descriptor epoll_;
@@ -56,6 +64,7 @@ class Simulator {
   std::vector<std::uint8_t> replies_;
   std::uint64_t dropped_bytes_ = 0;
   bool listening_ = true;  // to the pty
+  bool ended_ = false;     // by a signal
 };
 
 }  // namespace bushsim

@@ -49,6 +49,11 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
+// The name itself, wherever it may lead.
+bool there(const std::string& link) {
+  return std::filesystem::exists(std::filesystem::symlink_status(link));
+}
+
 std::string new_folder() {
   std::string pattern = testing::TempDir() + "bushsim_XXXXXX";
   if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
@@ -67,16 +72,20 @@ class Port {
 
   int fd() const { return fd_; }
 
-  void send(std::uint8_t address, bushd_type type) const {
+  // One slot: answered at once.
+  void ask_who(std::uint8_t address) const {
+    const bushd_identify message{.salt = 0, .slots = 1, .slot_units = 0};
+    std::uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
+    const std::size_t payload_size = bushd_encode_identify(&message, payload);
     std::uint8_t wire[BUSHD_FRAME_MAX_WIRE];
     const std::size_t size =
-        bushd_frame_encode(address, static_cast<std::uint8_t>(type), 77, nullptr, 0, wire);
+        bushd_frame_encode(address, BUSHD_MSG_IDENTIFY, 77, payload, payload_size, wire);
     ASSERT_EQ(::write(fd_, wire, size), static_cast<ssize_t>(size));
   }
 
   // The identity of an MCU, as it answers now.
   std::optional<bushd_identity> identify(std::uint8_t address) const {
-    send(address, BUSHD_MSG_IDENTIFY);
+    ask_who(address);
     bushd_receiver receiver{};
     bushd_frame frame;
     for (;;) {
@@ -88,7 +97,7 @@ class Port {
       }
       if (bushd_receive_byte(&receiver, byte, &frame) == BUSHD_RECEIVE_FRAME) break;
     }
-    bushd_identity identity;
+    bushd_identity identity{};
     EXPECT_EQ(frame.address, address);
     EXPECT_EQ(frame.type, BUSHD_MSG_IDENTIFY | BUSHD_TYPE_REPLY);
     EXPECT_EQ(frame.tag, 77);
@@ -189,7 +198,7 @@ TEST_F(Bushsim, BothMcusAnswerAndTheTraceIsWholeAfterSigterm) {
     }
   }
   EXPECT_EQ(stop(), 0);
-  EXPECT_FALSE(std::filesystem::exists(std::filesystem::symlink_status(link)));
+  EXPECT_FALSE(there(link));
   EXPECT_THAT(read_file(out), HasSubstr("mcu2: 0 steps made; bad frames 0, rejected 0"));
   EXPECT_THAT(read_file(out), HasSubstr("collisions 0, corrupted bytes 0, dropped bytes 0"));
   const bushd::sim::VcdFile vcd = bushd::sim::read_vcd(trace);
@@ -216,6 +225,43 @@ TEST_F(Bushsim, HostMayCloseAndComeBackEvenFromExclusiveUse) {
   EXPECT_EQ(stop(SIGINT), 0);
 }
 
+TEST_F(Bushsim, UnpluggedThePortHangsUpAndIsBackUnderItsNamesInTurn) {
+  const std::string other = folder + "/hall-again";
+  start_ready({"--link", other});
+  std::string name = link;
+  for (const std::string& next : {other, link, other}) {
+    const Port port(name);
+    ASSERT_TRUE(port.identify(1));
+    ::kill(process, SIGUSR1);
+    EXPECT_TRUE(eventually([&] {
+      pollfd ready{port.fd(), POLLIN, 0};
+      return ::poll(&ready, 1, 0) == 1 && (ready.revents & POLLHUP) != 0;
+    }));
+    EXPECT_FALSE(there(link) || there(other));
+    ::kill(process, SIGUSR1);  // it is out already
+    ::kill(process, SIGUSR2);
+    EXPECT_TRUE(eventually([&] { return there(next); }));
+    EXPECT_FALSE(there(name));
+    name = next;
+  }
+  ::kill(process, SIGUSR2);  // it is in already
+  EXPECT_TRUE(Port(name).identify(2));
+  EXPECT_EQ(stop(), 0);
+  EXPECT_FALSE(there(link) || there(other));
+}
+
+TEST_F(Bushsim, NameThatIsTakenWhenItIsPluggedInEndsIt) {
+  start_ready();
+  ::kill(process, SIGUSR1);
+  ASSERT_TRUE(eventually([&] { return !there(link); }));
+  std::ofstream(link) << "precious";
+  ::kill(process, SIGUSR2);
+  EXPECT_EQ(finish(), 1);
+  EXPECT_THAT(read_file(err), HasSubstr(link));
+  EXPECT_EQ(read_file(link), "precious");
+  EXPECT_GT(bushd::sim::read_vcd(trace).stamps.back(), 0);
+}
+
 TEST_F(Bushsim, TtyIsRaw) {
   start_ready();
   const Port port(link);
@@ -232,7 +278,7 @@ TEST_F(Bushsim, RepliesThatNobodyReadsAreDroppedAndCounted) {
   const Port port(link);
   // Far more replies than a tty can hold. They collide with the requests, which makes them no
   // shorter.
-  for (int i = 0; i < 30'000; ++i) port.send(1, BUSHD_MSG_POLL);
+  for (int i = 0; i < 30'000; ++i) port.ask_who(1);
   EXPECT_EQ(stop(), 0);
   const std::string summary = read_file(out);
   EXPECT_THAT(summary, HasSubstr("dropped bytes "));
@@ -291,8 +337,7 @@ TEST_F(Bushsim, BadArgumentsAreRefusedWithTheirReason) {
               HasSubstr("none/trace.vcd"));
   EXPECT_THAT(refusal({"--config", config, "--link", link, "--boot-number", "65536"}, 2),
               HasSubstr("--boot-number"));
-  EXPECT_FALSE(std::filesystem::exists(std::filesystem::symlink_status(link)))
-      << "what failed must not leave a link behind";
+  EXPECT_FALSE(there(link)) << "what failed must not leave a link behind";
 }
 
 }  // namespace
