@@ -211,8 +211,8 @@ static uint16_t stream_delay(const bushd_mcu* mcu, const bushd_mcu_motor* motor)
   // It has moved without a step yet.
   if (motor->displacement == 0) return UINT16_MAX;
   const uint64_t time_ns = (uint64_t)mcu->tick_ns * ((uint32_t)motor->still_ticks + 1u) * 256u;
-  const uint64_t units =
-      time_ns / ((uint64_t)table_of(mcu, motor)->time_unit_ns * motor->displacement) + 1u;
+  const uint64_t unit = (uint64_t)table_of(mcu, motor)->time_unit_ns * motor->displacement;
+  const uint64_t units = (time_ns + unit - 1u) / unit;
   return units < UINT16_MAX ? (uint16_t)units : UINT16_MAX;
 }
 

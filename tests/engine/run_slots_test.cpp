@@ -1,0 +1,93 @@
+#include "engine/run_slots.h"
+
+#include <vector>
+
+#include "engine/slots.h"
+#include "engine/tables.h"
+
+namespace bushd::test {
+namespace {
+
+struct Emitted {
+  std::vector<uint16_t> masks;
+  int steps;
+};
+
+Emitted emit(bushd_run* run, uint32_t tick_ns, uint16_t slots, uint16_t bit) {
+  Emitted tick{std::vector<uint16_t>(slots), 0};
+  tick.steps = bushd_run_slots(run, tick_ns, slots, bit, tick.masks.data());
+  return tick;
+}
+
+// The step at time t lies in slot floor((t - tick's start) x S / tick); at the tick's end in the
+// last one.
+TEST(RunSlots, EveryStepFallsIntoItsSlotByTheSumOfTheDelays) {
+  holds("slots of a move against the slow reference", [] {
+    const TestTable table(any_law(), between(0, 1) != 0);
+    const uint32_t tick_ns = any_tick_ns(table.law());
+    const auto slots = *rc::gen::element<uint16_t>(128, 199, 256);
+    const auto steps = between<uint32_t>(1, 200);
+    const int direction = between(0, 1) != 0 ? 1 : -1;
+    const auto reference = Reference::move(table.law(), steps);
+    bushd_run run;
+    bushd_run_start(&run, table.view(), steps, direction);
+    size_t made = 0;
+    for (uint64_t tick = 0; tick < 3000 && !bushd_run_done(&run); ++tick) {
+      std::vector<uint16_t> expected(slots);
+      const size_t before = made;
+      for (; made < steps && reference.step(made).end <= Wide{(tick + 1) * tick_ns} * 256; ++made) {
+        const Wide at = reference.step(made).end - Wide{tick * tick_ns} * 256;
+        const auto slot = static_cast<size_t>(at * slots / (Wide{tick_ns} * 256));
+        expected[std::min<size_t>(slot, slots - 1u)] |= 4;
+      }
+      const Emitted emitted = emit(&run, tick_ns, slots, 4);
+      RC_ASSERT(emitted.steps == direction * static_cast<int>(made - before));
+      RC_ASSERT(emitted.masks == expected);
+      RC_ASSERT(run.steps_done == made);
+    }
+  });
+}
+
+// So ticks of displacements may take over from any tick on, and the other way round.
+TEST(RunSlots, LeavesTheRunWhereAnExpandedTickLeavesIt) {
+  holds("two runs that take turns", [] {
+    const TestTable table(any_law(), between(0, 1) != 0);
+    const uint32_t tick_ns = any_tick_ns(table.law());
+    bushd_run by_ticks;
+    bushd_run_start(&by_ticks, table.view(), between<uint32_t>(1, 300), -1);
+    bushd_run mixed = by_ticks;
+    for (int tick = 0; tick < 400; ++tick) {
+      if (tick == 50) {
+        bushd_run_ramp_down(&by_ticks);
+        bushd_run_ramp_down(&mixed);
+      }
+      int16_t displacement = 0;
+      bushd_run_expand_fine(&by_ticks, tick_ns, 1, &displacement, 1);
+      if (between(0, 1) != 0) {
+        emit(&mixed, tick_ns, 256, 1);
+      } else {
+        bushd_run_expand_fine(&mixed, tick_ns, 1, &displacement, 1);
+      }
+      RC_ASSERT(mixed.steps_done == by_ticks.steps_done);
+      RC_ASSERT(mixed.fraction == by_ticks.fraction);
+      RC_ASSERT(bushd_run_delay(&mixed) == bushd_run_delay(&by_ticks));
+      RC_ASSERT(bushd_run_units_left(&mixed) == bushd_run_units_left(&by_ticks));
+    }
+  });
+}
+
+TEST(RunSlots, MotorsShareMasksAndADoneRunMakesNothing) {
+  const TestTable table({{4}, {4}, 4, 1000}, false);
+  bushd_run run;
+  bushd_run_start(&run, table.view(), 2, 1);
+  std::vector<uint16_t> masks(128, 0x8000);
+  EXPECT_EQ(bushd_run_slots(&run, 8000, 128, 1, masks.data()), 2);
+  for (size_t slot = 0; slot < 128; ++slot) {
+    EXPECT_EQ(masks[slot], slot == 64 || slot == 127 ? 0x8001 : 0x8000) << slot;
+  }
+  EXPECT_EQ(bushd_run_slots(&run, 8000, 128, 1, masks.data()), 0);
+  EXPECT_EQ(run.fraction, 0);
+}
+
+}  // namespace
+}  // namespace bushd::test
