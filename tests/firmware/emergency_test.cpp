@@ -1,0 +1,200 @@
+// EMERGENCY: all stop from the first tick that is not prepared, and every step is counted.
+#include <algorithm>
+#include <numeric>
+
+#include "firmware/streams.h"
+
+namespace bushd::test {
+namespace {
+
+class Emergency : public Streams {
+ protected:
+  // Steps from the first open tick on until rest.
+  static std::vector<int> after_emergency(Rig& on, bushd_how how) {
+    const std::size_t open = on.history(0).size() + 2;
+    on.emergency(how);
+    EXPECT_EQ(on.poll().state, BUSHD_STATE_FAULT);
+    on.pass_until_rest();
+    on.pass(3);
+    EXPECT_EQ(on.poll().faults, BUSHD_FAULT_EMERGENCY);
+    EXPECT_EQ(on.poll().motor[0].position_steps, on.pulses(0));
+    return {on.history(0).begin() + static_cast<std::ptrdiff_t>(open), on.history(0).end()};
+  }
+  static void expect_steps(const std::vector<int>& seen, std::vector<int> expected, int direction) {
+    for (int& n : expected) n *= direction;
+    ASSERT_LE(expected.size(), seen.size());
+    expected.resize(seen.size());
+    EXPECT_EQ(seen, expected);
+  }
+  static Bytes run_frame(std::uint32_t first, std::uint32_t steps, std::int8_t direction) {
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    const bushd_table_run_entry entry = {0, 0, direction, steps};
+    payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
+    return payload;
+  }
+  // The delay of the step that runs at the end of the first `ticks` of a plan, as their last steps
+  // tell.
+  std::uint16_t delay_of(const Plan& moves, std::size_t ticks) const {
+    std::uint64_t still = 1;
+    while (magnitude(moves, ticks - still) == 0) ++still;
+    const std::uint64_t d = magnitude(moves, ticks - still) * std::uint64_t{law.unit_ns};
+    const std::uint64_t units = (256ull * Rig::kTickNs * still + d - 1) / d;
+    return static_cast<std::uint16_t>(std::max<std::uint64_t>(units, law.cruise));
+  }
+  std::uint64_t magnitude(const Plan& moves, std::size_t tick) const {
+    const int d = moves.displacement[tick];
+    return static_cast<std::uint64_t>(format == BUSHD_FORMAT_FINE ? std::abs(d) : (d & 0x7F) * 256);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Formats, Emergency,
+                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+
+TEST_P(Emergency, RampsATableRunDownFromEveryTick) {
+  const std::size_t ticks = steps_by_tick(Reference::move(law, 150), Rig::kTickNs).size();
+  for (std::size_t n = 0; n <= ticks; n += 3) {
+    Rig fresh;
+    fresh.make_ready(law, format);
+    const std::uint32_t first = fresh.first_open();
+    ASSERT_EQ(fresh.take(BUSHD_MSG_TABLE_RUN, run_frame(first, 150, -1)), BUSHD_OK);
+    fresh.pass(static_cast<int>(n));
+    const std::int64_t open_ns = static_cast<std::int64_t>(n) * Rig::kTickNs;
+    auto reference = Reference::move(law, 150);
+    std::vector<int> expected;
+    if (n > 0) {
+      reference.ramp_down_at(static_cast<std::uint64_t>(open_ns));
+      expected = steps_by_tick(reference, Rig::kTickNs);
+      expected.erase(expected.begin(),
+                     expected.begin() + static_cast<std::ptrdiff_t>(std::min(n, expected.size())));
+    }
+    SCOPED_TRACE(n);
+    expect_steps(after_emergency(fresh, BUSHD_RAMP_DOWN), expected, -1);
+  }
+}
+
+TEST_P(Emergency, RampsAStreamDownFromEveryTick) {
+  const Plan moves = plan(200);
+  for (std::size_t n = 0; n <= moves.ticks(); n += 2) {
+    Rig fresh({.queue_ticks = 256});
+    fresh.make_ready(law, format);
+    const std::uint32_t start = fresh.first_open();
+    for (std::size_t from = 0; from < moves.ticks(); from += 40) {
+      ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 40)), BUSHD_OK);
+    }
+    fresh.pass(static_cast<int>(n));
+    std::vector<int> expected;
+    bool begun = false;
+    for (std::size_t i = 0; i < n; ++i) begun |= magnitude(moves, i) != 0;
+    if (begun && n < moves.ticks()) {
+      const bool fine = format == BUSHD_FORMAT_FINE;
+      expected = steps_by_tick(Reference::ramp_down(law, delay_of(moves, n),
+                                                    fine ? moves.fraction[n - 1] : std::uint8_t{0}),
+                               Rig::kTickNs);
+    }
+    SCOPED_TRACE(n);
+    expect_steps(after_emergency(fresh, BUSHD_RAMP_DOWN), expected, 1);
+  }
+}
+
+TEST_P(Emergency, CutsWithoutAnotherStep) {
+  const Plan moves = plan(200);
+  for (const int n : {0, 3, 30, 100}) {
+    for (const bool run : {false, true}) {
+      Rig fresh({.queue_ticks = 256});
+      fresh.make_ready(law, format);
+      const std::uint32_t start = fresh.first_open();
+      if (run) {
+        ASSERT_EQ(fresh.take(BUSHD_MSG_TABLE_RUN, run_frame(start, 200, 1)), BUSHD_OK);
+      }
+      for (std::size_t from = 0; !run && from < moves.ticks(); from += 40) {
+        ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 40)), BUSHD_OK);
+      }
+      fresh.pass(n);
+      expect_steps(after_emergency(fresh, BUSHD_CUT), {}, 1);
+      // And it moves again from there, by whole steps.
+      ASSERT_EQ(fresh.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+      const std::int64_t stands = fresh.pulses(0);
+      fresh.run_plan(plan(-7), 0);
+      EXPECT_EQ(fresh.pulses(0), stands - 7);
+    }
+  }
+}
+
+TEST_P(Emergency, CutsARampDownShortToo) {
+  ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(rig.first_open(), 500, 1)), BUSHD_OK);
+  rig.pass(100);
+  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.pass(4);
+  expect_steps(after_emergency(rig, BUSHD_CUT), {}, 1);
+}
+
+TEST_P(Emergency, RepeatedFramesChangeNothing) {
+  const Plan moves = plan(200);
+  std::vector<std::vector<int>> seen;
+  for (const int repeats : {0, 5}) {
+    Rig fresh;
+    fresh.make_ready(law, format);
+    const std::uint32_t start = fresh.first_open();
+    for (std::size_t from = 0; from < 80; from += 40) {
+      ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 40)), BUSHD_OK);
+    }
+    ASSERT_EQ(fresh.take(BUSHD_MSG_TABLE_RUN,
+                         [&] {
+                           Bytes payload = run_frame(start, 200, -1);
+                           payload[BUSHD_TABLE_RUN_HEADER] |= 1;  // motor 1
+                           return payload;
+                         }()),
+              BUSHD_OK);
+    fresh.pass(40);
+    fresh.emergency(BUSHD_RAMP_DOWN);
+    for (int i = 0; i < repeats; ++i) {
+      fresh.pass();
+      fresh.emergency(BUSHD_RAMP_DOWN, i % 2 ? BUSHD_ADDRESS_BROADCAST : fresh.options().address);
+    }
+    fresh.pass(150 - repeats);
+    EXPECT_EQ(fresh.poll().moving, 0);
+    seen.push_back(fresh.history(0));
+    seen.push_back(fresh.history(1));
+  }
+  EXPECT_EQ(seen[0], seen[2]);
+  EXPECT_EQ(seen[1], seen[3]);
+}
+
+TEST_P(Emergency, WaitingStartsAreEmptied) {
+  const std::uint32_t start = rig.first_open();
+  ASSERT_EQ(rig.take(ones(kStart, start + 20, 10, 64)), BUSHD_OK);
+  ASSERT_EQ(rig.take(ones(0, start + 40, 10, 64)), BUSHD_OK);
+  Bytes run = run_frame(start + 20, 200, -1);
+  run[BUSHD_TABLE_RUN_HEADER] |= 1;
+  ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run), BUSHD_OK);
+  rig.pass(5);
+  expect_steps(after_emergency(rig, BUSHD_RAMP_DOWN), {}, 1);
+  EXPECT_EQ(rig.poll().islands, 0);
+  EXPECT_EQ(rig.pulses(1), 0);
+}
+
+// Between two moves that are both queued a motor is at rest, though it has moved just before.
+TEST_P(Emergency, MotorThatRestsBetweenTwoQueuedMovesStays) {
+  const std::uint32_t start = rig.first_open();
+  ASSERT_EQ(rig.take(ones(kStart, start, 5, 0)), BUSHD_OK);
+  ASSERT_EQ(rig.take(ones(kStart, start + 20, 5, 0)), BUSHD_OK);
+  rig.pass(5);
+  expect_steps(after_emergency(rig, BUSHD_RAMP_DOWN), {}, 1);
+  EXPECT_EQ(rig.pulses(0), 5);
+}
+
+TEST_P(Emergency, IsLatchedAtRestTooAndClearedByControl) {
+  rig.emergency(BUSHD_RAMP_DOWN);
+  EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_EMERGENCY);
+  EXPECT_EQ(rig.take(ones(kStart, rig.first_open(), 5, 0)), BUSHD_E_STATE);
+  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(rig.first_open(), 5, 1)), BUSHD_E_STATE);
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 5, 0)), BUSHD_OK);
+  rig.pass(2);
+  rig.emergency(BUSHD_RAMP_DOWN);
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_E_STATE) << "it still moves";
+  rig.pass_until_rest();
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+}
+
+}  // namespace
+}  // namespace bushd::test
