@@ -132,11 +132,24 @@ void Axis::plan_end() {
   end_ = end_of(place);
 }
 
+void Axis::go_to(Tick first) {
+  if (first < head_.tick) head_ = base_;
+  advance(head_, first);
+}
+
+std::optional<Axis::Stretch> Axis::run_at(Tick first, unsigned max_ticks) {
+  if (!busy_ || first < start_) return std::nullopt;
+  go_to(first);
+  Place place = head_;
+  take_change(place);
+  if (bushd_run_done(&place.run)) return std::nullopt;
+  Tick until = std::min(first + max_ticks, end_of(place));
+  if (change_ && effective() > first) until = std::min(until, effective());
+  return Stretch{.run = place.run, .ticks = static_cast<unsigned>(until - first)};
+}
+
 std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::size_t stride) {
-  if (first != head_.tick) {
-    if (first < head_.tick) head_ = base_;
-    advance(head_, first);
-  }
+  go_to(first);
   // The delay to be told at the end of ticks before the start is that of the changed run.
   if (change_ && change_->at <= start_) take_change(head_);
   unsigned done = 0;

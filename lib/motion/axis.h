@@ -62,6 +62,15 @@ class Axis {
   // last `executed`.
   std::uint16_t render(Tick first, unsigned count, std::int16_t* out, std::size_t stride);
 
+  // The run as it is at the beginning of tick `first`, and for how many ticks (1 .. max_ticks) it
+  // gives what render() would: up to the next change or the run's end. Nothing before the start and
+  // after the end. Preconditions as of render().
+  struct Stretch {
+    bushd_run run;
+    unsigned ticks;
+  };
+  std::optional<Stretch> run_at(Tick first, unsigned max_ticks);
+
   // The ticks before `until` are over and will not be asked for again. Returns the change that was
   // among them.
   std::optional<Change> executed(Tick until);
@@ -75,6 +84,10 @@ class Axis {
   // First tick after the last step, as planned now.
   Tick end_tick() const { return end_; }
   std::int64_t from_steps() const { return from_; }
+  // Where it stands when the ticks that are over have been run.
+  std::int64_t executed_steps() const {
+    return from_ + base_.run.direction * static_cast<std::int64_t>(base_.run.steps_done);
+  }
   // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t target_steps() const { return target_; }
   std::int64_t wanted_steps() const { return wanted_; }
@@ -89,6 +102,7 @@ class Axis {
     Tick tick;  // the run's state is that at the beginning of this tick
   };
   Tick effective() const { return std::max(change_->at, start_); }
+  void go_to(Tick first);
   void take_change(Place& place) const;
   void advance(Place& place, Tick to) const;
   std::size_t expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
