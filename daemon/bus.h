@@ -12,10 +12,18 @@ struct Core::Bus : link::TickSource {
 
   std::uint16_t render(std::size_t mcu, std::uint8_t motor, link::Tick first, unsigned count,
                        std::int16_t* out, std::size_t stride) override;
+  std::optional<Stretch> run_at(std::size_t mcu, std::uint8_t motor, link::Tick first,
+                                unsigned max_ticks) override;
+  link::Tick end_tick(std::size_t mcu, std::uint8_t motor) override;
+
+  // Null where no motor is or where it does not move.
+  motion::Axis* moving_axis(std::size_t mcu, std::uint8_t motor);
 
   Core& core;
   std::vector<std::size_t> mcus;  // indices in Core::mcus_, by index in the master
   link::Master master;
+  std::string port_state = "not yet opened";
+  bool two_masters = false;  // as told in the log last
 };
 
 }  // namespace bushd::daemon

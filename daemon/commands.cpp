@@ -1,5 +1,5 @@
 // Commands of clients: refused with a reason, or accepted and later answered with exactly one
-// result.
+// result. Moves and stops are here, what waits for an MCU's word is in pending.cpp.
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -12,7 +12,6 @@ namespace bushd::daemon {
 namespace {
 
 constexpr std::size_t kMaxClientId = 64;
-constexpr std::int64_t kPendingUs = 5'000'000;  // a ramp-down from full speed, with room
 // MCUs count positions in 32 bits.
 constexpr std::int64_t kMaxPosition = INT32_MAX;
 
@@ -64,6 +63,8 @@ std::optional<std::size_t> Core::find_motor(const std::string& name) const {
 }
 
 std::string Core::refuse(const command_t& command) const {
+  // Whatever else is wrong with the command: it is for all motors, and no time to be particular.
+  if (command.kind == command_t::EMERGENCY_STOP) return {};
   if (command.kind < command_t::MOVE_RELATIVE || command.kind > command_t::CLEAR_FAULTS) {
     return "there is no command kind " + std::to_string(command.kind);
   }
@@ -77,6 +78,9 @@ std::string Core::refuse(const command_t& command) const {
   const bool targets = is_move(command.kind) || command.kind == command_t::SET_POSITION;
   if (targets && command.motors.empty()) return "no motor is named";
   if (is_move(command.kind) && shutting_down_) return "the daemon is shutting down";
+  if (stopping_all() && (is_move(command.kind) || command.kind == command_t::CLEAR_FAULTS)) {
+    return "an emergency stop is under way; wait for its result";
+  }
   for (std::size_t i = 0; i < command.motors.size(); ++i) {
     const std::size_t index = *find_motor(command.motors[i]);
     const Motor& motor = motors_[index];
@@ -131,8 +135,14 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
     return "the drivers of MCU " + mcu.config->id + " are disabled; enable them first";
   }
-  if (!motor.trusted)
-    return "its position is uncertain; find out where it stands and say 'bushctl set NAME STEPS'";
+  if (!motor.doubt.empty()) {
+    return "its position is uncertain, because " + motor.doubt +
+           "; find out where it stands and say 'bushctl set NAME STEPS'";
+  }
+  if (buses_[motor.bus]->two_masters) {
+    return "another master talks on bus " + config_.buses[motor.bus].name +
+           ": end it, or take it off the line";
+  }
   // A move begins where the motor stands when it is accepted, and makes its steps with drivers on.
   if (being_set(index)) return "its position is being set; wait for that result";
   if (being_disabled(motor.mcu)) {
@@ -239,10 +249,14 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
                                {"steps", steps},
                                {"from_steps", motor.position_steps}};
   outputs_.move_log(line.dump());
-  if (steps != 0) {
-    master_of(mcu).begin(mcu.in_bus, motor.config->output.value, start);
-  } else {
+  const std::uint8_t output = motor.config->output.value;
+  if (steps == 0) {
     end_motor(index, motion::Outcome::kReached, "stands at its target already");
+  } else if (bus.table_runs && master_of(mcu).can_run_tables(mcu.in_bus) &&
+             std::abs(steps) <= kMaxPosition) {
+    master_of(mcu).begin_table_run(mcu.in_bus, output, start, static_cast<std::int32_t>(steps));
+  } else {
+    master_of(mcu).begin(mcu.in_bus, output, start);
   }
   changed_ = true;
 }
@@ -294,105 +308,6 @@ std::vector<std::size_t> Core::mcus_of(const std::vector<std::size_t>& motors) c
   std::set<std::size_t> mcus;
   for (const std::size_t motor : motors) mcus.insert(motors_[motor].mcu);
   return {mcus.begin(), mcus.end()};
-}
-
-void Core::start_pending(std::int64_t now_us, const command_t& command) {
-  Pending pending{.client = {command.client_id, command.number},
-                  .kind = command.kind,
-                  .motors = motors_named(command),
-                  .steps = command.steps,
-                  .mcus = {},
-                  .deadline_us = now_us + kPendingUs};
-  answer(pending.client, reply_t::ACCEPTED, "", "accepted");
-  if (command.kind == command_t::STOP) {
-    std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
-    stop_motors(now_us, pending.motors);
-  } else {
-    pending.mcus = mcus_of(pending.motors);
-    for (const std::size_t m : pending.mcus) {
-      const Mcu& mcu = mcus_[m];
-      if (command.kind == command_t::ENABLE)
-        master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_ENABLE);
-      if (command.kind == command_t::DISABLE)
-        master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_DISABLE);
-      if (command.kind == command_t::CLEAR_FAULTS) {
-        master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_CLEAR_FAULTS);
-      }
-    }
-    if (command.kind == command_t::SET_POSITION) {
-      for (std::size_t i = 0; i < pending.motors.size(); ++i) {
-        const Motor& motor = motors_[pending.motors[i]];
-        const Mcu& mcu = mcus_[motor.mcu];
-        master_of(mcu).set_position(mcu.in_bus, motor.config->output.value,
-                                    static_cast<std::int32_t>(command.steps[i]));
-      }
-    }
-  }
-  pending_.push_back(std::move(pending));
-}
-
-// What the report of an MCU shows against a command being done there; "" for nothing.
-std::string Core::still_wrong(const Pending& pending, const Mcu& mcu) const {
-  const bushd_report& report = view_of(mcu).report;
-  const bool enabled = (report.flags & BUSHD_FLAG_ENABLED) != 0;
-  if (pending.kind == command_t::ENABLE && !enabled) return "did not enable its drivers";
-  if (pending.kind == command_t::DISABLE && enabled) return "did not disable its drivers";
-  if (pending.kind == command_t::CLEAR_FAULTS && report.faults != 0) return "still has a fault";
-  if (pending.kind == command_t::SET_POSITION) {
-    for (std::size_t i = 0; i < pending.motors.size(); ++i) {
-      const Motor& motor = motors_[pending.motors[i]];
-      if (&mcus_[motor.mcu] == &mcu && motor.position_steps != pending.steps[i]) {
-        return "did not take the position of " + motor.config->name;
-      }
-    }
-  }
-  return {};
-}
-
-void Core::check_pending(std::int64_t now_us, std::optional<std::size_t> reported) {
-  for (auto it = pending_.begin(); it != pending_.end();) {
-    Pending& pending = *it;
-    std::string failure;
-    if (pending.kind == command_t::STOP) {
-      std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
-    } else if (reported && !master_of(mcus_[*reported]).busy(mcus_[*reported].in_bus)) {
-      const auto found = std::find(pending.mcus.begin(), pending.mcus.end(), *reported);
-      if (found != pending.mcus.end()) {
-        failure = still_wrong(pending, mcus_[*reported]);
-        if (!failure.empty()) failure = "MCU " + mcus_[*reported].config->id + " " + failure;
-        pending.mcus.erase(found);
-      }
-    }
-    const bool stop = pending.kind == command_t::STOP;
-    const bool done = stop ? pending.motors.empty() : pending.mcus.empty();
-    // A motor that runs down a long table may take its time: the deadline is for MCUs that do not
-    // answer.
-    if (!done && failure.empty() && !stop && now_us > pending.deadline_us) {
-      failure = "MCU " + mcus_[pending.mcus.front()].config->id + " did not confirm it in time";
-    }
-    if (!done && failure.empty()) {
-      ++it;
-      continue;
-    }
-    const Pending finished = std::move(pending);
-    it = pending_.erase(it);
-    finish_pending(finished, failure);
-  }
-}
-
-void Core::finish_pending(const Pending& pending, const std::string& failure) {
-  if (failure.empty() && pending.kind == command_t::SET_POSITION) {
-    for (std::size_t i = 0; i < pending.motors.size(); ++i) {
-      Motor& motor = motors_[pending.motors[i]];
-      motor.trusted = true;
-      const nlohmann::json line = {
-          {"event", "set"}, {"motor", motor.config->name}, {"position_steps", pending.steps[i]}};
-      outputs_.move_log(line.dump());
-    }
-  }
-  changed_ = true;
-  const bool good = failure.empty();
-  answer(pending.client, reply_t::RESULT, good ? "done" : "fault", good ? pending.done : failure);
 }
 
 void Core::answer(const Client& client, std::int8_t phase, const std::string& result,

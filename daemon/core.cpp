@@ -7,16 +7,36 @@
 
 namespace bushd::daemon {
 
+motion::Axis* Core::Bus::moving_axis(std::size_t mcu, std::uint8_t motor) {
+  const int index = core.mcus_[mcus[mcu]].motor_of[motor];
+  if (index < 0) return nullptr;
+  motion::Axis& axis = core.motors_[static_cast<std::size_t>(index)].axis;
+  return axis.busy() ? &axis : nullptr;
+}
+
 std::uint16_t Core::Bus::render(std::size_t mcu, std::uint8_t motor, link::Tick first,
                                 unsigned count, std::int16_t* out, std::size_t stride) {
-  const int index = core.mcus_[mcus[mcu]].motor_of[motor];
-  motion::Axis* axis = index < 0 ? nullptr : &core.motors_[static_cast<std::size_t>(index)].axis;
-  if (axis != nullptr && axis->busy()) return axis->render(first, count, out, stride);
+  motion::Axis* axis = moving_axis(mcu, motor);
+  if (axis != nullptr) return axis->render(first, count, out, stride);
   for (unsigned i = 0; i < count; ++i) out[i * stride] = 0;
   return 0;
 }
 
-Core::Core(const config::Config& config, Outputs& outputs)
+std::optional<link::TickSource::Stretch> Core::Bus::run_at(std::size_t mcu, std::uint8_t motor,
+                                                           link::Tick first, unsigned max_ticks) {
+  motion::Axis* axis = moving_axis(mcu, motor);
+  if (axis == nullptr) return std::nullopt;
+  const auto stretch = axis->run_at(first, max_ticks);
+  if (!stretch) return std::nullopt;
+  return Stretch{.run = stretch->run, .ticks = stretch->ticks};
+}
+
+link::Tick Core::Bus::end_tick(std::size_t mcu, std::uint8_t motor) {
+  const motion::Axis* axis = moving_axis(mcu, motor);
+  return axis == nullptr ? 0 : axis->end_tick();
+}
+
+Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
     : config_(config),
       outputs_(outputs),
       // The log of moves is appended to: its ids must not begin anew with every daemon.
@@ -37,8 +57,12 @@ Core::Core(const config::Config& config, Outputs& outputs)
   }
   for (std::size_t b = 0; b < config.buses.size(); ++b) {
     const config::Bus& bus = config.buses[b];
-    link::BusSetup setup{
-        .baud = bus.baud, .tick_ns = bus.tick_ns(), .format = bus.format, .mcus = {}};
+    link::BusSetup setup{.baud = bus.baud,
+                         .tick_ns = bus.tick_ns(),
+                         .format = bus.format,
+                         .table_ticks = bus.table_ticks,
+                         .master = master,
+                         .mcus = {}};
     std::vector<std::size_t> members;
     for (std::size_t m = 0; m < mcus_.size(); ++m) {
       if (mcus_[m].bus != b) continue;
@@ -63,9 +87,10 @@ link::McuSetup Core::setup_of(const Mcu& mcu) const {
     const int motor = mcu.motor_of[output];
     if (motor < 0) continue;
     const bushd_table* table = &table_of(config_.motors[static_cast<std::size_t>(motor)]).view();
-    const auto found = std::find(setup.tables.begin(), setup.tables.end(), table);
+    const auto found = std::find_if(setup.tables.begin(), setup.tables.end(),
+                                    [&](const link::TableRef& ref) { return ref.table == table; });
     setup.table_of_motor[output] = static_cast<int>(found - setup.tables.begin());
-    if (found == setup.tables.end()) setup.tables.push_back(table);
+    if (found == setup.tables.end()) setup.tables.push_back({.table = table});
   }
   return setup;
 }
@@ -121,11 +146,13 @@ std::size_t Core::mcu_at(std::size_t bus, std::size_t in_bus) const {
 
 void Core::port_opened(std::int64_t now_us, std::size_t bus) {
   buses_[bus]->master.port_opened(now_us);
+  buses_[bus]->port_state = "open";
   changed_ = true;
 }
 
 void Core::port_lost(std::int64_t now_us, std::size_t bus, const std::string& cause) {
   buses_[bus]->master.port_lost(now_us, cause);
+  buses_[bus]->port_state = cause;
   handle_events(now_us, bus);
   changed_ = true;
 }
@@ -142,6 +169,11 @@ void Core::step(std::int64_t now_us) {
     handle_events(now_us, b);
   }
   check_pending(now_us, std::nullopt);
+  watch_for_other_masters(now_us);
+  if (now_us >= health_due_us_) {
+    publish_health();
+    health_due_us_ = now_us + kHealthPeriodUs;
+  }
   if (changed_) state_due_us_ = std::min(state_due_us_, state_sent_us_ + kMinStatePeriodUs);
   if (now_us >= state_due_us_) {
     publish();
@@ -152,7 +184,7 @@ void Core::step(std::int64_t now_us) {
 }
 
 std::int64_t Core::next_wake_us() const {
-  std::int64_t wake = state_due_us_;
+  std::int64_t wake = std::min(state_due_us_, health_due_us_);
   if (changed_) wake = std::min(wake, state_sent_us_ + kMinStatePeriodUs);
   for (const auto& bus : buses_) wake = std::min(wake, bus->master.next_wake_us());
   return wake;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "bushd/command_t.hpp"
+#include "bushd/health_t.hpp"
 #include "bushd/reply_t.hpp"
 #include "bushd/state_t.hpp"
 #include "config/config.h"
@@ -36,6 +37,7 @@ class Outputs {
   virtual void send(std::size_t bus, std::span<const std::uint8_t> bytes) = 0;
   virtual void reply(const reply_t& reply) = 0;
   virtual void state(const state_t& state) = 0;
+  virtual void health(const health_t& health) = 0;
   virtual void move_log(const std::string& json_line) = 0;
   virtual void log(LogLevel level, const std::string& text) = 0;
   virtual std::int64_t wall_clock_us() = 0;  // microseconds since 1970, for messages
@@ -47,9 +49,11 @@ class Core {
   // "At once on change", but not more often than this: a client that sends many commands must not
   // make the daemon flood the network.
   static constexpr std::int64_t kMinStatePeriodUs = 5'000;
+  static constexpr std::int64_t kHealthPeriodUs = 1'000'000;
 
-  // `config` must be one that config::load accepted; it and `outputs` outlive the core.
-  Core(const config::Config& config, Outputs& outputs);
+  // `config` must be one that config::load accepted; it and `outputs` outlive the core. `master`
+  // tells this core from others on the same lines: a number that no other is likely to have.
+  Core(const config::Config& config, Outputs& outputs, std::uint16_t master);
   ~Core();
   Core(const Core&) = delete;
   Core& operator=(const Core&) = delete;
@@ -87,7 +91,8 @@ class Core {
     std::size_t mcu;                  // index in mcus_
     std::uint64_t log_id = 0;         // of its present move in the log of moves
     std::int64_t position_steps = 0;  // as reported last
-    bool trusted = true;
+    std::string doubt = {};           // why the position is uncertain; empty: it is known
+    bool wrong = false;               // counted otherwise than planned; it is being stopped
   };
   struct Mcu {
     const config::Mcu* config;
@@ -107,7 +112,7 @@ class Core {
     std::int8_t kind;
     std::vector<std::size_t> motors;  // STOP: still moving; SET_POSITION: all
     std::vector<std::int64_t> steps;  // SET_POSITION
-    std::vector<std::size_t> mcus;    // whose report is awaited
+    std::vector<std::size_t> mcus;    // whose report is awaited; EMERGENCY_STOP: that do not stand
     std::int64_t deadline_us;
     std::string done = "done";  // the reason, if all goes well
   };
@@ -129,7 +134,9 @@ class Core {
   void on_report(std::int64_t now_us, std::size_t mcu);
   void follow_motor(std::int64_t now_us, std::size_t motor, const Mcu& mcu,
                     const link::McuView& view);
+  void end_faulty_motor(std::size_t motor, const Mcu& mcu, std::uint8_t faults);
   static std::string did_not_start(const Mcu& mcu);  // for the reason of a move's end
+  bool cuts(const Mcu& mcu) const;                   // in an emergency
   void clear_link_fault(Mcu& mcu);
   // The motor's run has come to rest, or is lost: so has its part of the move.
   void end_motor(std::size_t motor, motion::Outcome outcome, const std::string& reason);
@@ -159,6 +166,10 @@ class Core {
   // taken.
   void change_motors(std::int64_t now_us, const std::vector<std::size_t>& motors);
   void start_pending(std::int64_t now_us, const command_t& command);
+  void emergency_stop(Pending& pending);
+  bool stopping_all() const;  // an EMERGENCY_STOP has no result yet
+  std::string follow_emergency_stop(Pending& pending,
+                                    std::int64_t now_us) const;  // a failure, or ""
   void check_pending(std::int64_t now_us, std::optional<std::size_t> reported_mcu);
   std::string still_wrong(const Pending& pending, const Mcu& mcu) const;
   void finish_pending(const Pending& pending, const std::string& failure);
@@ -168,6 +179,12 @@ class Core {
   // snapshot.cpp
   void publish();
   state_t state_of(const Mcu& mcu) const;
+
+  // health.cpp
+  void watch_for_other_masters(std::int64_t now_us);
+  void publish_health();
+  health_t health_of(const Bus& bus, const config::Bus& config) const;
+  mcu_health_t health_of(const Mcu& mcu) const;
 
   const config::Config& config_;
   Outputs& outputs_;
@@ -185,6 +202,8 @@ class Core {
   std::int64_t sequence_ = 0;
   std::int64_t state_due_us_ = 0;
   std::int64_t state_sent_us_ = INT64_MIN / 2;
+  std::int64_t health_sequence_ = 0;
+  std::int64_t health_due_us_ = 0;
   bool changed_ = true;
   bool shutting_down_ = false;
 };

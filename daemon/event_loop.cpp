@@ -34,6 +34,19 @@ std::int64_t cpu_us() {
          usage.ru_stime.tv_usec;
 }
 
+std::int64_t unix_time_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+// Another one in every run, and in every process on every machine as far as 16 bits go.
+std::uint16_t master_number() {
+  const auto seed =
+      static_cast<std::uint64_t>(unix_time_us()) ^ static_cast<std::uint64_t>(::getpid()) << 32;
+  return static_cast<std::uint16_t>(seed * 0x9E3779B97F4A7C15u >> 48);
+}
+
 // Of the ports that the configuration may mean, the first that opens; else why the first does not.
 Result<serial::SerialPort> open_first(const config::Bus& bus) {
   std::optional<Error> first_error;
@@ -52,10 +65,11 @@ EventLoop::EventLoop(const config::Config& config, lcm::Transport& transport, Mo
     : config_(config),
       transport_(transport),
       move_log_(move_log),
-      core_(config, *this),
+      core_(config, *this, master_number()),
       ports_(config.buses.size()),
       lost_(config.buses.size()),
       state_channel_(config.lcm.prefix + "_STATE"),
+      health_channel_(config.lcm.prefix + "_HEALTH"),
       reply_channel_(config.lcm.prefix + "_REPLY"),
       command_channel_(config.lcm.prefix + "_COMMAND") {}
 
@@ -238,6 +252,10 @@ void EventLoop::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
   }
 }
 
+void EventLoop::health(const health_t& health) {
+  check_published(transport_.publish(health_channel_, health));
+}
+
 void EventLoop::reply(const reply_t& reply) {
   check_published(transport_.publish(reply_channel_, reply));
 }
@@ -279,9 +297,7 @@ void EventLoop::log(LogLevel level, const std::string& text) {
 }
 
 std::int64_t EventLoop::wall_clock_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
+  return unix_time_us();
 }
 
 }  // namespace bushd::daemon

@@ -55,6 +55,7 @@ class EventLoop : private Outputs {
   void send(std::size_t bus, std::span<const std::uint8_t> bytes) override;
   void reply(const reply_t& reply) override;
   void state(const state_t& state) override;
+  void health(const health_t& health) override;
   void move_log(const std::string& json_line) override;
   void log(LogLevel level, const std::string& text) override;
   std::int64_t wall_clock_us() override;
@@ -67,6 +68,7 @@ class EventLoop : private Outputs {
   std::vector<std::optional<std::string>>
       lost_;  // by bus: a write failed, to be handled outside the core
   std::string state_channel_;
+  std::string health_channel_;
   std::string reply_channel_;
   std::string command_channel_;
   bool mute_ = false;  // LCM takes nothing

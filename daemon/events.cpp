@@ -8,12 +8,19 @@ namespace bushd::daemon {
 namespace {
 
 const char* fault_text(std::uint8_t faults) {
+  if (faults & BUSHD_FAULT_EMERGENCY) return "an emergency stop was commanded";
   if (faults & BUSHD_FAULT_SELF_TEST) return "its self-test failed";
   if (faults & BUSHD_FAULT_SYNC) return "it fell out of step with the bus";
   return "its tick queue ran empty";
 }
 
+constexpr const char* kCutOff = "it was cut off by an emergency stop and may have overrun";
+
 }  // namespace
+
+bool Core::cuts(const Mcu& mcu) const {
+  return config_.buses[mcu.bus].emergency_stop == BUSHD_CUT;
+}
 
 std::string Core::did_not_start(const Mcu& mcu) {
   return "its first ticks did not reach MCU " + mcu.config->id + " in time; it did not move";
@@ -34,8 +41,12 @@ void Core::handle_events(std::int64_t now_us, std::size_t bus) {
         break;
       case link::Event::Kind::kLateStart: {
         const int motor = mcus_[mcu].motor_of[event.motor];
-        const bool link_fault = (view_of(mcus_[mcu]).report.faults & BUSHD_FAULT_LINK) != 0;
-        if (motor >= 0 && !link_fault) {
+        const bool ran_down = view_of(mcus_[mcu]).report.faults != 0;  // says the report
+        // Of a move that was cancelled before its start no tick is missed.
+        const bool cancelled =
+            motor >= 0 && motors_[static_cast<std::size_t>(motor)].axis.end_tick() <=
+                              motors_[static_cast<std::size_t>(motor)].axis.start_tick();
+        if (motor >= 0 && !ran_down && !cancelled) {
           end_motor(static_cast<std::size_t>(motor), motion::Outcome::kLink,
                     did_not_start(mcus_[mcu]));
         }
@@ -62,13 +73,18 @@ void Core::on_online(std::size_t index) {
   // Positions are counts since the MCU's boot; a boot that this daemon did not see the positions of
   // has lost them.
   const bool restarted = mcu.boot_number && *mcu.boot_number != view.report.boot_number;
+  const bool cut = (view.report.faults & BUSHD_FAULT_EMERGENCY) != 0 && cuts(mcu);
+  const bool first = !mcu.boot_number;
   mcu.boot_number = view.report.boot_number;
   mcu.clearing = false;
   for (unsigned output = 0; output < view.report.motor_count; ++output) {
     if (mcu.motor_of[output] < 0) continue;
     Motor& motor = motors_[static_cast<std::size_t>(mcu.motor_of[output])];
+    const std::int64_t before = motor.position_steps;
     motor.position_steps = view.report.motor[output].position_steps;
-    if (restarted) motor.trusted = false;
+    if (restarted) motor.doubt = "MCU " + mcu.config->id + " restarted";
+    // Nobody here has seen whether it moved when it was cut off.
+    if (cut && (first || motor.position_steps != before)) motor.doubt = kCutOff;
   }
   outputs_.log(
       restarted ? LogLevel::kWarning : LogLevel::kInfo,
@@ -107,30 +123,33 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
                         const link::McuView& view) {
   Motor& motor = motors_[index];
   const std::uint8_t output = motor.config->output.value;
+  const bool moving = (view.report.moving >> output & 1) != 0;
   if (view.report.faults != 0) {
     // The MCU takes no more ticks; what it has, it runs, and then down its own table.
-    if ((view.report.moving >> output & 1) == 0) {
-      const std::string fault = fault_text(view.report.faults);
-      end_motor(index, motion::Outcome::kLink,
-                "MCU " + mcu.config->id + " ran it down by itself because " + fault);
-    }
+    if (!moving) end_faulty_motor(index, mcu, view.report.faults);
     return;
   }
   if (const auto change = motor.axis.executed(view.tick)) log_change(motor, *change);
+  const std::int64_t planned = motor.axis.executed_steps();
+  if (!motor.wrong && motor.position_steps != planned) {
+    if (!moving && motor.position_steps == motor.axis.from_steps()) {
+      // A motor at rest looks the same whether its start came and is over or never came.
+      end_motor(index, motion::Outcome::kLink, did_not_start(mcu));
+      return;
+    }
+    motor.wrong = true;
+    motor.doubt = "MCU " + mcu.config->id + " counted position " +
+                  std::to_string(motor.position_steps) + " where the table leads to " +
+                  std::to_string(planned);
+    outputs_.log(LogLevel::kError, motor.config->name + ": " + motor.doubt + "; it is stopped");
+    stop_motors(now_us, {index});
+  }
   if (view.tick < motor.axis.end_tick()) {
     if (motor.axis.needs_change()) change_motors(now_us, {index});
     return;
   }
-  if (motor.position_steps != motor.axis.target_steps() &&
-      motor.position_steps == motor.axis.from_steps()) {
-    // A motor at rest looks the same whether its start came and is over or never came.
-    end_motor(index, motion::Outcome::kLink, did_not_start(mcu));
-  } else if (motor.position_steps != motor.axis.target_steps()) {
-    motor.trusted = false;
-    end_motor(index, motion::Outcome::kFault,
-              "MCU " + mcu.config->id + " counted position " +
-                  std::to_string(motor.position_steps) + " where the table leads to " +
-                  std::to_string(motor.axis.target_steps()) + "; check the position and set it");
+  if (motor.wrong) {
+    if (!moving) end_faulty_motor(index, mcu, 0);
   } else if (motor.position_steps == motor.axis.wanted_steps()) {
     end_motor(index, motion::Outcome::kReached, "stands at its target");
   } else if (motor.axis.stopping()) {
@@ -143,11 +162,32 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
   }
 }
 
+// It stands, and not by its plan.
+void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, std::uint8_t faults) {
+  Motor& motor = motors_[index];
+  if (motor.wrong) {
+    end_motor(index, motion::Outcome::kFault, motor.doubt + "; check the position and set it");
+  } else if ((faults & BUSHD_FAULT_EMERGENCY) == 0) {
+    end_motor(index, motion::Outcome::kLink,
+              "MCU " + mcu.config->id + " ran it down by itself because " + fault_text(faults));
+  } else {
+    // One that has not made a step cannot overrun.
+    const bool overran = cuts(mcu) && motor.position_steps != motor.axis.from_steps();
+    if (overran) motor.doubt = kCutOff;
+    end_motor(index, motion::Outcome::kStopped,
+              overran ? "cut off by an emergency stop; it may have overrun, so check the position "
+                        "and set it"
+                      : "stopped by an emergency stop");
+  }
+}
+
 // The daemon knows where the motors are again, so the fault has served its purpose; it stays
-// latched as long as a motor moves or a move has not got its result.
+// latched as long as a motor moves or a move has not got its result. An emergency stop is for
+// people to clear, and clearing is for all faults at once.
 void Core::clear_link_fault(Mcu& mcu) {
   const link::McuView& view = view_of(mcu);
-  const bool faulty = (view.report.faults & (BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC)) != 0;
+  const bool faulty = (view.report.faults & (BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC)) != 0 &&
+                      (view.report.faults & BUSHD_FAULT_EMERGENCY) == 0;
   if (faulty && !mcu.clearing && view.report.moving == 0) {
     outputs_.log(LogLevel::kWarning, "MCU " + mcu.config->id + ": " +
                                          fault_text(view.report.faults) +
@@ -164,6 +204,7 @@ void Core::end_motor(std::size_t index, motion::Outcome outcome, const std::stri
   const Mcu& mcu = mcus_[motor.mcu];
   master_of(mcu).drop(mcu.in_bus, motor.config->output.value);
   motor.axis.finish();
+  motor.wrong = false;
   log_result(motor, motion::outcome_word(outcome));
   const bool planned = outcome == motion::Outcome::kReached || outcome == motion::Outcome::kStopped;
   if (!planned) outputs_.log(LogLevel::kWarning, motor.config->name + ": " + reason);

@@ -20,11 +20,13 @@ const char* state_word(const link::McuView& view) {
   }
 }
 
-std::string detail_of(const link::McuView& view) {
+std::string detail_of(const link::McuView& view, bool two_masters) {
   if (view.phase != link::McuPhase::kOnline) return view.detail;
   if (view.report.faults & BUSHD_FAULT_SELF_TEST) return "self-test failed";
+  if (view.report.faults & BUSHD_FAULT_EMERGENCY) return "emergency stop; say 'bushctl clear'";
   if (view.report.faults & BUSHD_FAULT_SYNC) return "out of step with the bus";
   if (view.report.faults & BUSHD_FAULT_LINK) return "tick queue ran empty in motion";
+  if (two_masters) return "another master talks on the line";
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) return "drivers disabled";
   return {};
 }
@@ -38,7 +40,7 @@ state_t Core::state_of(const Mcu& mcu) const {
   state.mcu = mcu.config->id;
   state.address = mcu.config->address.value;
   state.mcu_state = state_word(view);
-  state.detail = detail_of(view);
+  state.detail = detail_of(view, buses_[mcu.bus]->two_masters);
   state.boot_number = view.identified ? view.identity.boot_number : 0;
   state.tick = view.tick;
   state.rejected_commands = static_cast<std::int64_t>(rejected_commands_);
@@ -56,7 +58,7 @@ state_t Core::state_of(const Mcu& mcu) const {
     entry.moving = motor.axis.busy();
     entry.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;
     entry.input = view.reported && (view.report.inputs >> output & 1) != 0;
-    entry.trust = motor.trusted ? "known" : "uncertain";
+    entry.trust = motor.doubt.empty() ? "known" : "uncertain";
     state.motors.push_back(std::move(entry));
   }
   state.motor_count = static_cast<std::int32_t>(state.motors.size());

@@ -11,8 +11,10 @@ namespace bushd::test {
 namespace {
 
 class Faults : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Formats, Faults, testing::Values("fine", "coarse"),
-                         [](const auto& format) { return std::string(format.param); });
+INSTANTIATE_TEST_SUITE_P(Formats, Faults,
+                         testing::Values("fine", "coarse", "fine_table", "coarse_table",
+                                         "fine_ticks"),
+                         [](const auto& manner) { return std::string(manner.param); });
 
 TEST_P(Faults, SomeLostWritesAreRepairedInTime) {
   Lab lab(hall(2, 4, GetParam()));
@@ -25,12 +27,13 @@ TEST_P(Faults, SomeLostWritesAreRepairedInTime) {
     if (!keep) ++lost;
     return keep;
   };
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02", "m05"}, {5000, -3000, 4000});
+  const auto move =
+      lab.send(command_t::MOVE_RELATIVE, {"m01", "m02", "m05"}, {15000, -9000, 12000});
   const reply_t result = lab.wait(move);
   EXPECT_EQ(result.result, "reached") << result.reason;
-  EXPECT_EQ(lab.shaft_steps("m01"), 5000);
-  EXPECT_EQ(lab.shaft_steps("m02"), -3000);
-  EXPECT_EQ(lab.shaft_steps("m05"), 4000);
+  EXPECT_EQ(lab.shaft_steps("m01"), 15000);
+  EXPECT_EQ(lab.shaft_steps("m02"), -9000);
+  EXPECT_EQ(lab.shaft_steps("m05"), 12000);
   EXPECT_GT(lost, 10);
 }
 

@@ -40,7 +40,7 @@ Lab::~Lab() {
 }
 
 void Lab::start_daemon() {
-  core_ = std::make_unique<daemon::Core>(config_, *this);
+  core_ = std::make_unique<daemon::Core>(config_, *this, ++master_);
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     if (buses_[b].plugged) core_->port_opened(now_us(), b);
   }
@@ -88,6 +88,7 @@ void Lab::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
 }
 
 void Lab::log(daemon::LogLevel level, const std::string& text) {
+  if (level == daemon::LogLevel::kError) errors_.push_back(text);
   if (level != daemon::LogLevel::kInfo) {
     std::printf("[%.3f s] %s\n", static_cast<double>(now_ns_) * 1e-9, text.c_str());
   }
@@ -177,6 +178,20 @@ motor_state_t Lab::motor(const std::string& name) const {
   throw std::out_of_range(name);
 }
 
+health_t Lab::health_of(const std::string& bus) {
+  health_.erase(bus);
+  EXPECT_TRUE(run_until([&] { return health_.contains(bus); }, 2)) << "no health in time";
+  return health_.at(bus);
+}
+
+mcu_health_t Lab::mcu_health(const std::string& mcu) {
+  const health_t health = health_of(mcu.substr(0, mcu.find(':')));
+  for (const mcu_health_t& candidate : health.mcus) {
+    if (candidate.mcu == mcu) return candidate;
+  }
+  throw std::out_of_range(mcu);
+}
+
 std::int64_t Lab::shaft_steps(const std::string& name) const {
   for (const config::Motor& motor : config_.motors) {
     if (motor.name != name) continue;
@@ -190,10 +205,13 @@ std::int64_t Lab::shaft_steps(const std::string& name) const {
   throw std::out_of_range(name);
 }
 
-std::string hall(int mcus, int motors, const std::string& format, const std::string& table) {
+std::string hall(int mcus, int motors, const std::string& manner, const std::string& table) {
+  const std::string format = manner.substr(0, manner.find('_'));
   std::string toml =
       "[[bus]]\nname = \"hall\"\nport = \"/dev/null\"\nbaud = 500000\ntick_us = 2560\nformat = \"" +
-      format + "\"\n[[group]]\nname = \"axes\"\ntable = \"" + table + "\"\n";
+      format + "\"\n" + (manner.ends_with("_table") ? "moves = \"table\"\n" : "") +
+      (manner.ends_with("_ticks") ? "frames = \"ticks\"\n" : "") +
+      "[[group]]\nname = \"axes\"\ntable = \"" + table + "\"\n";
   int number = 0;
   for (int m = 1; m <= mcus; ++m) {
     toml += "[[mcu]]\nbus = \"hall\"\naddress = " + std::to_string(m) + "\n";

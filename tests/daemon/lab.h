@@ -45,6 +45,11 @@ class Lab : public daemon::Outputs {
   bool has_state(const std::string& mcu) const { return states_.contains(mcu); }
   const state_t& state_of(const std::string& mcu) const { return states_.at(mcu); }
   motor_state_t motor(const std::string& name) const;
+  // As published next.
+  health_t health_of(const std::string& bus);
+  mcu_health_t mcu_health(const std::string& mcu);
+  // What the daemon has logged as errors.
+  const std::vector<std::string>& errors() const { return errors_; }
   // Steps that the motor has really made, seen from the outside.
   std::int64_t shaft_steps(const std::string& motor) const;
 
@@ -77,6 +82,7 @@ class Lab : public daemon::Outputs {
   void send(std::size_t bus, std::span<const std::uint8_t> bytes) override;
   void reply(const reply_t& reply) override { replies_.push_back(reply); }
   void state(const state_t& state) override { states_[state.mcu] = state; }
+  void health(const health_t& health) override { health_[health.bus] = health; }
   void move_log(const std::string& line) override { move_lines_.push_back(line); }
   void log(daemon::LogLevel level, const std::string& text) override;
   std::int64_t wall_clock_us() override { return now_us(); }
@@ -91,12 +97,16 @@ class Lab : public daemon::Outputs {
   std::int64_t number_ = 0;
   std::vector<reply_t> replies_;
   std::map<std::string, state_t> states_;
+  std::map<std::string, health_t> health_;
+  std::vector<std::string> errors_;
+  std::uint16_t master_ = 0;
   std::vector<std::string> move_lines_;
 };
 
 // One bus "hall" with `mcus` MCUs of `motors` motors each, named m01.., all in group "axes" of
-// `table`.
-std::string hall(int mcus, int motors, const std::string& format = "fine",
+// `table`. `manner` is the format, "fine" or "coarse", and with "_table" behind it moves are given
+// to the MCUs as a whole, with "_ticks" every tick is sent.
+std::string hall(int mcus, int motors, const std::string& manner = "fine",
                  const std::string& table = "bushd2-constant");
 
 }  // namespace bushd::test

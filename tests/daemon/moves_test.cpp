@@ -31,8 +31,9 @@ TEST(Moves, ShortAndLongMovesReachTheirTargets) {
 }
 
 TEST(Moves, AllMotorsOfTwoMcusAtOnce) {
-  for (const char* format : {"fine", "coarse"}) {
-    Lab lab(hall(2, 16, format));
+  for (const char* manner :
+       {"fine", "coarse", "fine_table", "coarse_table", "fine_ticks", "coarse_ticks"}) {
+    Lab lab(hall(2, 16, manner));
     lab.connect();
     std::vector<std::string> names;
     std::vector<std::int64_t> steps;

@@ -38,6 +38,11 @@ std::optional<bushd_ticks> ticks_in(const std::vector<std::uint8_t>& wire,
   return std::nullopt;
 }
 
+// These look at frames of ticks.
+std::string every_tick(const char* format) {
+  return std::string(format) + "_ticks";
+}
+
 class Regressions : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Formats, Regressions, testing::Values("fine", "coarse"),
                          [](const auto& format) { return std::string(format.param); });
@@ -130,7 +135,7 @@ TEST_P(Regressions, MoveWhileDriversAreBeingDisabled) {
 TEST_P(Regressions, StopWhileAnotherIsNotConfirmed) {
   for (const int later_ms : {1, 6, 12, 25}) {
     for (int lost = 1; lost <= 3; ++lost) {
-      Lab lab(hall(1, 2, GetParam()));
+      Lab lab(hall(1, 2, every_tick(GetParam())));
       lab.connect();
       const auto first = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
       const auto second = lab.send(command_t::MOVE_RELATIVE, {"m02"}, {9000});
@@ -161,7 +166,7 @@ TEST_P(Regressions, StopWhileAnotherIsNotConfirmed) {
 // A stop is lost, what followed it is not, and comes once more after the second try: it must not be
 // taken for what follows that.
 TEST_P(Regressions, FollowersOfALostStopComeAgainAfterTheNext) {
-  Lab lab(hall(1, 1, GetParam()));
+  Lab lab(hall(1, 1, every_tick(GetParam())));
   lab.connect();
   const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
   lab.run_for(1.3);

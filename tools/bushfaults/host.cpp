@@ -33,7 +33,7 @@ Host::~Host() {
 }
 
 void Host::start() {
-  core_ = std::make_unique<bushd::daemon::Core>(config_, *this);
+  core_ = std::make_unique<bushd::daemon::Core>(config_, *this, ++master_);
   witness_.daemon_started(now_ns_);
   clients_.begin_anew();
   inbox_.clear();

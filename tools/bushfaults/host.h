@@ -54,6 +54,7 @@ class Host final : public bushd::daemon::Outputs {
   void send(std::size_t bus, std::span<const std::uint8_t> bytes) override;
   void reply(const bushd::reply_t& reply) override { witness_.reply(now_ns_, reply); }
   void state(const bushd::state_t& state) override { witness_.state(now_ns_, state); }
+  void health(const bushd::health_t&) override {}
   void move_log(const std::string& line) override { witness_.move_log(now_ns_, line); }
   void log(bushd::daemon::LogLevel level, const std::string& text) override;
   std::int64_t wall_clock_us() override { return now_us(); }
@@ -76,6 +77,7 @@ class Host final : public bushd::daemon::Outputs {
   TimeNs now_ns_ = 0;
 
   std::unique_ptr<bushd::daemon::Core> core_;  // none: killed
+  std::uint16_t master_ = 0;                   // of the present one
   TimeNs starts_ns_ = 0;                       // when the next daemon starts
   TimeNs paused_until_ns_ = 0;
   TimeNs wake_ns_ = 0;

@@ -1,0 +1,120 @@
+// Emergency stops: every motor stops within two ticks, nothing moves until people say so, and what
+// is not known any more is not claimed.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <tuple>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::HasSubstr;
+
+std::string emergency_hall(int mcus, int motors, const std::string& manner, bool cut) {
+  std::string toml = hall(mcus, motors, manner);
+  const std::string before = "[[group]]";
+  return toml.insert(toml.find(before), cut ? "emergency_stop = \"cut\"\n" : "");
+}
+
+class Emergency : public testing::TestWithParam<std::tuple<const char*, bool>> {
+ protected:
+  const std::string manner = std::get<0>(GetParam());
+  const bool cut = std::get<1>(GetParam());
+  Lab lab{emergency_hall(2, 2, manner, cut)};  // m01, m02 on the first MCU, m03, m04 on the second
+};
+INSTANTIATE_TEST_SUITE_P(Manners, Emergency,
+                         testing::Combine(testing::Values("fine", "fine_table", "coarse_table"),
+                                          testing::Bool()),
+                         [](const auto& p) {
+                           return std::string(std::get<0>(p.param)) +
+                                  (std::get<1>(p.param) ? "_cut" : "_ramp");
+                         });
+
+TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m03"}, {20000, -20000});
+  lab.run_for(1.5);
+  const std::int64_t at = lab.shaft_steps("m01");
+  const auto stop = lab.send(command_t::EMERGENCY_STOP, {});
+  EXPECT_EQ(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {5})).result, "refused");
+  const reply_t done = lab.wait(stop);
+  EXPECT_EQ(done.result, "done") << done.reason;
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "stopped");
+  EXPECT_THAT(result.reason, HasSubstr("emergency stop"));
+  EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
+  EXPECT_EQ(lab.shaft_steps("m03"), result.position_steps.at(1));
+  if (cut) {
+    EXPECT_LE(lab.shaft_steps("m01") - at, 60) << "a few ticks at 2500 steps/s";
+  } else {
+    EXPECT_GT(lab.shaft_steps("m01") - at, 100) << "the table's ramp";
+  }
+  EXPECT_EQ(lab.motor("m01").trust, cut ? "uncertain" : "known");
+  EXPECT_EQ(lab.motor("m02").trust, "known") << "it did not move";
+  EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
+  EXPECT_THAT(lab.state_of("hall:2").detail, HasSubstr("emergency stop"));
+
+  // Neither time nor a lost link nor a new daemon lifts it.
+  lab.run_for(3);
+  lab.unplug(0);
+  lab.run_for(1);
+  lab.plug(0);
+  lab.run_for(2);
+  EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
+  const reply_t refused = lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {5}));
+  EXPECT_THAT(refused.reason, HasSubstr("bushctl clear"));
+  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {5})).result, "reached");
+  const auto again = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5});
+  if (cut) {
+    EXPECT_THAT(lab.last_reply(again).reason, HasSubstr("may have overrun"));
+    EXPECT_EQ(lab.wait(lab.send(command_t::SET_POSITION, {"m01"}, {0})).result, "done");
+  } else {
+    EXPECT_EQ(lab.wait(again).result, "reached");
+  }
+}
+
+TEST_P(Emergency, BeforeTheStartNoStepIsMade) {
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {500});
+  lab.run_for(0.02);
+  EXPECT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+  EXPECT_EQ(lab.wait(move).result, "stopped");
+  lab.run_for(1);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(lab.motor("m01").trust, "known");
+}
+
+TEST_P(Emergency, IsHeardThoughTheFirstWritesAreLost) {
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m03"}, {20000, 20000});
+  lab.run_for(1.5);
+  int writes = 0;
+  lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return ++writes > 3; };
+  EXPECT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+  EXPECT_EQ(lab.wait(move).result, "stopped");
+  EXPECT_LT(lab.shaft_steps("m01"), 6000);
+}
+
+TEST_P(Emergency, IsTakenWhateverElseIsWrong) {
+  // Nobody is online yet, and a motor is named that is none.
+  const auto stop = lab.send(command_t::EMERGENCY_STOP, {"nobody"});
+  const reply_t result = lab.wait(stop);
+  EXPECT_EQ(result.result, "done");
+  EXPECT_THAT(result.reason, HasSubstr("hall:1 hall:2"));
+}
+
+TEST_P(Emergency, AnMcuThatIsLostEndsItsMovesWithLink) {
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  lab.run_for(1.5);
+  lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
+  const auto stop = lab.send(command_t::EMERGENCY_STOP, {});
+  EXPECT_EQ(lab.wait(move).result, "link");
+  EXPECT_THAT(lab.wait(stop).reason, HasSubstr("hall:"));
+}
+
+}  // namespace
+}  // namespace bushd::test
