@@ -29,6 +29,14 @@ struct WatchOptions {
 };
 int watch(bushd::lcm::Client& client, const WatchOptions& options);
 
+struct HealthOptions {
+  std::chrono::milliseconds timeout{2000};
+  bool json = false;
+  bool watch = false;
+  std::optional<unsigned> count;  // with `watch`: messages to show; none: until interrupted
+};
+int show_health(bushd::lcm::Client& client, const HealthOptions& options);
+
 // Says on stderr why, unless it was the user who broke off.
 int failure(const bushd::lcm::Client& client, const bushd::Error& error);
 

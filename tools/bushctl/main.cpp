@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "line_commands.h"
 #include "move_arguments.h"
 
 namespace {
@@ -30,6 +31,10 @@ struct Arguments {
   std::vector<std::string> motors;
   std::string motor;
   std::string steps;
+  bool watch = false;
+  bushctl::LineOptions line;
+  std::uint8_t address = 0;
+  std::string unique_id;
 };
 
 // Both before and after the subcommand.
@@ -103,6 +108,16 @@ command_t to_motors(std::int8_t kind, const std::vector<std::string>& motors) {
   return command;
 }
 
+// Commands that have the line for themselves.
+CLI::App* add_line_command(CLI::App& app, Arguments& arguments, const char* name,
+                           const char* text) {
+  CLI::App* command = app.add_subcommand(name, text);
+  command->footer("No daemon may have the port meanwhile.");
+  command->add_option("PORT", arguments.line.port, "Serial port")->required();
+  command->add_option("--baud", arguments.line.baud, "Bits per second")->required();
+  return command;
+}
+
 int run(int argc, char** argv) {
   Arguments arguments;
   const char* url = std::getenv("LCM_DEFAULT_URL");
@@ -144,6 +159,36 @@ int run(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   add_timeout(watch, arguments);
 
+  CLI::App* estop = add_command(app, arguments, "estop",
+                                "Emergency stop: all motors of all buses, at once, until 'clear'");
+
+  CLI::App* health = add_command(app, arguments, "health", "How well buses, adapters and MCUs do");
+  health->add_flag("--json", arguments.json, "As JSON");
+  health->add_flag("--watch", arguments.watch, "Again every second");
+  health->add_option("--count", arguments.count, "With --watch: end after so many")
+      ->check(CLI::PositiveNumber);
+  add_timeout(health, arguments);
+
+  CLI::App* latency =
+      add_line_command(app, arguments, "latency-test", "How late an adapter hands over answers");
+  latency->add_option("--address", arguments.address, "Of the MCU to ask; default: any")
+      ->check(CLI::Range(1, 255));
+  unsigned requests = 200;
+  latency->add_option("--count", requests, "Requests")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  latency->add_flag("--json", arguments.line.json, "As JSON");
+  CLI::App* scan = add_line_command(app, arguments, "scan",
+                                    "Which MCUs are on a line, whatever their addresses");
+  scan->add_flag("--json", arguments.line.json, "As JSON");
+  CLI::App* address =
+      add_line_command(app, arguments, "address", "Gives an MCU another address, for good");
+  address->add_option("UNIQUE_ID", arguments.unique_id, "Of the MCU, as 'scan' shows it")
+      ->required();
+  address->add_option("NEW", arguments.address, "Its address from now on")
+      ->required()
+      ->check(CLI::Range(1, 255));
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -160,6 +205,23 @@ int run(int argc, char** argv) {
     if (arguments.count > 0) options.count = arguments.count;
     return with_client(arguments, [&](Client& client) { return bushctl::watch(client, options); });
   }
+  if (health->parsed()) {
+    bushctl::HealthOptions options{.timeout = milliseconds(arguments.timeout_s),
+                                   .json = arguments.json,
+                                   .watch = arguments.watch,
+                                   .count = {}};
+    if (arguments.count > 0) options.count = arguments.count;
+    return with_client(arguments,
+                       [&](Client& client) { return bushctl::show_health(client, options); });
+  }
+  if (latency->parsed()) {
+    return bushctl::latency_test(arguments.line, arguments.address, requests);
+  }
+  if (scan->parsed()) return bushctl::scan(arguments.line);
+  if (address->parsed()) {
+    return bushctl::set_address(arguments.line, arguments.unique_id, arguments.address);
+  }
+  if (estop->parsed()) return send(arguments, to_motors(command_t::EMERGENCY_STOP, {}), true);
   if (move->parsed())
     return send(arguments, bushctl::parse_move(move->remaining()), arguments.wait);
   if (stop->parsed()) {

@@ -1,10 +1,8 @@
 // Live view: in a terminal a table that is drawn anew, elsewhere a line for every motor that has
 // changed.
 #include <fmt/format.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <cstddef>
 #include <cstdio>
 #include <map>
 #include <string>
@@ -12,6 +10,7 @@
 
 #include "commands.h"
 #include "render.h"
+#include "screen.h"
 
 namespace bushctl {
 namespace {
@@ -50,44 +49,16 @@ class ChangesView : public View {
   std::map<std::string, std::string> shown_;  // last line by motor or MCU
 };
 
-// On the terminal's second screen, so that the first is there again afterwards.
 class TerminalView : public View {
  public:
-  TerminalView() { fmt::print("\x1b[?1049h\x1b[?25l\x1b[?7l"); }
-  ~TerminalView() override {
-    fmt::print("\x1b[?7h\x1b[?25h\x1b[?1049l");
-    std::fflush(stdout);
-  }
-  TerminalView(const TerminalView&) = delete;
-  TerminalView& operator=(const TerminalView&) = delete;
-
-  void show(const Snapshot& snapshot) override {
-    lines_ = table(snapshot);
-    draw("");
-  }
+  void show(const Snapshot& snapshot) override { screen_.show(table(snapshot)); }
   bool silent() override {
-    draw("no state from bushd; what is shown is old");
+    screen_.notice("no state from bushd; what is shown is old");
     return true;
   }
 
  private:
-  void draw(const std::string& notice) {
-    winsize size{};
-    const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row > 3;
-    const std::size_t room = (known ? size.ws_row : 24u) - 2u;
-    // Overwritten from the top, not cleared first: that would flicker.
-    std::string screen = "\x1b[H";
-    for (std::size_t i = 0; i < lines_.size() && i < room; ++i) screen += lines_[i] + "\x1b[K\n";
-    screen += "\x1b[J";
-    if (lines_.size() > room) {
-      screen += fmt::format("... {} more lines; 'bushctl status' shows all", lines_.size() - room);
-    }
-    screen += "\n" + (notice.empty() ? std::string("Ctrl-C ends") : notice);
-    fmt::print("{}", screen);
-    std::fflush(stdout);
-  }
-
-  std::vector<std::string> lines_;
+  Screen screen_{"'bushctl status' shows all"};
 };
 
 }  // namespace

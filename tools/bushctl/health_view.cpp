@@ -1,0 +1,136 @@
+#include "health_view.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "grid.h"
+#include "render.h"
+
+namespace bushctl {
+namespace {
+
+using bushd::health_t;
+using bushd::mcu_health_t;
+using bushd::lcm::Health;
+
+std::string bound(std::int64_t below_us) {
+  if (below_us == INT64_MAX) return "more";
+  return fmt::format("<{} ms", static_cast<double>(below_us) / 1000);
+}
+
+std::vector<std::string> bus_lines(const Health& health) {
+  using enum Align;
+  Grid grid({kLeft, kRight, kRight, kRight, kLeft});
+  grid.row({"BUS", "CRC ERRORS", "STRAY", "LATENCY MS", "PORT"});
+  for (const health_t& bus : health.buses) {
+    grid.row({printable(bus.bus), fmt::to_string(bus.crc_errors), fmt::to_string(bus.stray_frames),
+              fmt::format("{:.1f}", static_cast<double>(bus.recent_latency_us) / 1000),
+              printable(bus.port_state) +
+                  (bus.two_masters != 0 ? "; another master talks on the line" : "")});
+  }
+  return grid.lines();
+}
+
+std::vector<std::string> latency_lines(const Health& health) {
+  std::vector<Align> align(health.buses.front().latency_answers.size() + 1, Align::kRight);
+  align.front() = Align::kLeft;
+  Grid grid(align);
+  std::vector<std::string> head = {"ANSWERS AFTER"};
+  for (const std::int64_t below_us : health.buses.front().latency_below_us) {
+    head.push_back(bound(below_us));
+  }
+  grid.row(head);
+  for (const health_t& bus : health.buses) {
+    if (bus.latency_below_us != health.buses.front().latency_below_us) continue;
+    std::vector<std::string> row = {printable(bus.bus)};
+    for (const std::int64_t answers : bus.latency_answers) row.push_back(fmt::to_string(answers));
+    grid.row(row);
+  }
+  return grid.lines();
+}
+
+std::vector<std::string> mcu_lines(const Health& health) {
+  using enum Align;
+  std::vector<Align> align(15, kRight);
+  align[0] = align[1] = align[14] = kLeft;
+  Grid grid(align);
+  grid.row({"MCU", "UNIQUE ID", "FIRMWARE", "BOOT", "CRC ERRORS", "REJECTED", "TIMEOUTS", "REPEATS",
+            "MISSED TICKS", "RUN-DOWNS", "RESTARTS", "LOW WATER", "RATE PPM", "OFFSET US", ""});
+  for (const health_t& bus : health.buses) {
+    for (const mcu_health_t& mcu : bus.mcus) {
+      grid.row({printable(mcu.mcu), mcu.unique_id.empty() ? "-" : printable(mcu.unique_id),
+                fmt::to_string(mcu.firmware_version), fmt::to_string(mcu.boot_number),
+                fmt::to_string(mcu.crc_errors), fmt::to_string(mcu.rejected_frames),
+                fmt::to_string(mcu.timeouts), fmt::to_string(mcu.repeats),
+                fmt::to_string(mcu.missed_ticks), fmt::to_string(mcu.run_downs),
+                fmt::to_string(mcu.restarts),
+                mcu.low_water_ticks < 0 ? "-" : fmt::to_string(mcu.low_water_ticks),
+                fmt::format("{:+.1f}", mcu.rate_ppm), fmt::format("{:+.1f}", mcu.clock_offset_us),
+                mcu.two_masters != 0 ? "hears two masters" : ""});
+    }
+  }
+  return grid.lines();
+}
+
+nlohmann::json mcu_json(const mcu_health_t& mcu) {
+  nlohmann::json out = {{"mcu", mcu.mcu},
+                        {"address", mcu.address},
+                        {"unique_id", mcu.unique_id},
+                        {"firmware_version", mcu.firmware_version},
+                        {"boot", mcu.boot_number},
+                        {"crc_errors", mcu.crc_errors},
+                        {"rejected_frames", mcu.rejected_frames},
+                        {"run_downs", mcu.run_downs},
+                        {"timeouts", mcu.timeouts},
+                        {"repeats", mcu.repeats},
+                        {"missed_ticks", mcu.missed_ticks},
+                        {"restarts", mcu.restarts},
+                        {"low_water_ticks", nullptr},
+                        {"rate_ppm", mcu.rate_ppm},
+                        {"clock_offset_us", mcu.clock_offset_us},
+                        {"two_masters", mcu.two_masters != 0}};
+  if (mcu.low_water_ticks >= 0) out["low_water_ticks"] = mcu.low_water_ticks;
+  return out;
+}
+
+nlohmann::json bus_json(const health_t& bus) {
+  nlohmann::json out = {{"bus", bus.bus},
+                        {"port_state", bus.port_state},
+                        {"two_masters", bus.two_masters != 0},
+                        {"crc_errors", bus.crc_errors},
+                        {"stray_frames", bus.stray_frames},
+                        {"recent_latency_us", bus.recent_latency_us},
+                        {"latency", nlohmann::json::array()},
+                        {"mcus", nlohmann::json::array()}};
+  for (std::size_t i = 0; i < bus.latency_answers.size(); ++i) {
+    nlohmann::json column = {{"below_us", nullptr}, {"answers", bus.latency_answers[i]}};
+    if (bus.latency_below_us[i] != INT64_MAX) column["below_us"] = bus.latency_below_us[i];
+    out["latency"].push_back(column);
+  }
+  for (const mcu_health_t& mcu : bus.mcus) out["mcus"].push_back(mcu_json(mcu));
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::string> health_table(const Health& health) {
+  std::vector<std::string> out;
+  for (const auto& part : {bus_lines(health), latency_lines(health), mcu_lines(health)}) {
+    if (!out.empty()) out.emplace_back();
+    out.insert(out.end(), part.begin(), part.end());
+  }
+  return out;
+}
+
+std::string health_json(const Health& health) {
+  nlohmann::json out = {{"buses", nlohmann::json::array()},
+                        {"sequence", health.sequence},
+                        {"utime_us", health.buses.front().utime_us}};
+  for (const health_t& bus : health.buses) out["buses"].push_back(bus_json(bus));
+  // Texts from the network need not be UTF-8; by default dump() throws then.
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace bushctl

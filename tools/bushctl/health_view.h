@@ -1,0 +1,17 @@
+// The buses' health as people and programs read it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lcm/snapshot.h"
+
+namespace bushctl {
+
+// Tables of the buses, of their adapters' latencies and of the MCUs.
+std::vector<std::string> health_table(const bushd::lcm::Health& health);
+
+// {"buses":[...],...}; docs/lcm.md lists the keys.
+std::string health_json(const bushd::lcm::Health& health);
+
+}  // namespace bushctl

@@ -1,0 +1,208 @@
+#include "line_commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstring>
+#include <optional>
+
+#include "bus_line.h"
+#include "commands.h"
+#include "line_report.h"
+
+namespace bushctl {
+namespace {
+
+using bushd::fail;
+using bushd::Result;
+using std::chrono::microseconds;
+using Answers = std::vector<BusLine::Answer>;
+
+// More than any adapter takes to hand over what has arrived.
+constexpr microseconds kPatience{60'000};
+// An answer may begin so late after its slot's beginning, and the line must be let go.
+constexpr microseconds kSlotGuard{600};
+constexpr std::uint8_t kScanSlots = 64;
+// With every further round the chance that two MCUs have hidden each other in all of them falls:
+// looked for until three rounds in a row have found nothing new.
+constexpr unsigned kMaxRounds = 16;
+constexpr unsigned kQuietRounds = 3;
+constexpr unsigned kTries = 3;
+
+int failed(const bushd::Error& error) {
+  fmt::print(stderr, "bushctl: {}\n", error.text());
+  return kFailed;
+}
+
+bool one(const Answers& answers) {
+  return !answers.empty();
+}
+bool never(const Answers&) {
+  return false;
+}
+
+Result<std::vector<Found>> identify(BusLine& line, std::uint8_t address, std::uint16_t salt,
+                                    std::uint8_t slots) {
+  const microseconds slot =
+      line.line_time(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + kSlotGuard;
+  const bushd_identify message = {.salt = salt,
+                                  .slots = slots,
+                                  .slot_units = static_cast<std::uint16_t>(std::min<std::int64_t>(
+                                      slot.count() * 1000 / BUSHD_REPLY_UNIT_NS + 1, UINT16_MAX))};
+  std::array<std::uint8_t, 16> payload{};
+  const std::size_t size = bushd_encode_identify(&message, payload.data());
+  const auto answers = line.ask(address, BUSHD_MSG_IDENTIFY, {payload.data(), size},
+                                BUSHD_IDENTITY_SIZE, slot * slots + kPatience, never);
+  if (!answers) return fail(answers.error());
+  std::vector<Found> found;
+  for (const BusLine::Answer& answer : *answers) {
+    Found mcu{.address = answer.address};
+    if (bushd_decode_identity(answer.payload.data(), answer.payload.size(), &mcu.identity) ==
+        BUSHD_OK) {
+      found.push_back(mcu);
+    }
+  }
+  return found;
+}
+
+bool same(const Found& a, const Found& b) {
+  return a.address == b.address &&
+         std::memcmp(a.identity.unique_id, b.identity.unique_id, BUSHD_UNIQUE_ID_SIZE) == 0;
+}
+
+Result<std::vector<Found>> find_all(BusLine& line) {
+  std::vector<Found> all;
+  unsigned quiet = 0;
+  for (unsigned round = 1; round <= kMaxRounds && quiet < kQuietRounds; ++round) {
+    const auto heard = identify(line, BUSHD_ADDRESS_BROADCAST,
+                                static_cast<std::uint16_t>(round * 257), kScanSlots);
+    if (!heard) return fail(heard.error());
+    ++quiet;
+    for (const Found& mcu : *heard) {
+      if (std::any_of(all.begin(), all.end(), [&](const Found& f) { return same(f, mcu); }))
+        continue;
+      all.push_back(mcu);
+      quiet = 0;
+    }
+  }
+  return all;
+}
+
+Result<std::vector<Found>> find_some(BusLine& line, const LineOptions& options) {
+  auto found = find_all(line);
+  if (found && found->empty()) {
+    return fail(fmt::format("{}: no MCU answers at {} baud; check baud rate, cables and power",
+                            options.port, options.baud));
+  }
+  return found;
+}
+
+std::optional<std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE>> parse_id(const std::string& text) {
+  std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE> id{};
+  if (text.size() != 2 * id.size() ||
+      text.find_first_not_of("0123456789abcdefABCDEF") != std::string::npos) {
+    return std::nullopt;
+  }
+  for (std::size_t i = 0; i < id.size(); ++i) {
+    id[i] = static_cast<std::uint8_t>(std::stoul(text.substr(2 * i, 2), nullptr, 16));
+  }
+  return id;
+}
+
+}  // namespace
+
+int latency_test(const LineOptions& options, std::uint8_t address, unsigned count) {
+  auto line = BusLine::open(options.port, options.baud);
+  if (!line) return failed(line.error());
+  if (address == 0) {
+    const auto found = find_some(*line, options);
+    if (!found) return failed(found.error());
+    address = found->front().address;
+  }
+  const bushd_identify message = {.salt = 0, .slots = 1, .slot_units = 0};
+  std::array<std::uint8_t, 16> payload{};
+  const std::size_t size = bushd_encode_identify(&message, payload.data());
+  LatencyTest test{.port = options.port, .baud = options.baud, .asked = count, .latencies_us = {}};
+  for (unsigned i = 0; i < count; ++i) {
+    const auto answers = line->ask(address, BUSHD_MSG_IDENTIFY, {payload.data(), size},
+                                   BUSHD_IDENTITY_SIZE, kPatience, one);
+    if (!answers) return failed(answers.error());
+    if (!answers->empty()) test.latencies_us.push_back(answers->front().latency_us);
+  }
+  if (test.latencies_us.empty()) {
+    return failed({.message = fmt::format("{}: address {} does not answer at {} baud; 'bushctl "
+                                          "scan' shows who does",
+                                          options.port, address, options.baud)});
+  }
+  std::sort(test.latencies_us.begin(), test.latencies_us.end());
+  if (options.json) {
+    fmt::print("{}\n", latency_json(test));
+  } else {
+    for (const std::string& text : latency_lines(test)) fmt::print("{}\n", text);
+  }
+  return kDone;
+}
+
+int scan(const LineOptions& options) {
+  auto line = BusLine::open(options.port, options.baud);
+  if (!line) return failed(line.error());
+  const auto found = find_some(*line, options);
+  if (!found) return failed(found.error());
+  if (options.json) {
+    fmt::print("{}\n", scan_json(*found));
+  } else {
+    for (const std::string& text : scan_lines(*found)) fmt::print("{}\n", text);
+  }
+  return kDone;
+}
+
+int set_address(const LineOptions& options, const std::string& unique_id, std::uint8_t address) {
+  const auto id = parse_id(unique_id);
+  if (!id) {
+    fmt::print(stderr,
+               "bushctl: \"{}\" is no unique id; one has 16 hexadecimal digits, and "
+               "'bushctl scan' shows them\n",
+               unique_id);
+    return kUsage;
+  }
+  auto line = BusLine::open(options.port, options.baud);
+  if (!line) return failed(line.error());
+  // Two with one address would be worse than the wrong address.
+  const auto there = find_all(*line);
+  if (!there) return failed(there.error());
+  for (const Found& mcu : *there) {
+    const bool itself = std::memcmp(mcu.identity.unique_id, id->data(), id->size()) == 0;
+    if (mcu.address != address || itself) continue;
+    return failed({.message = fmt::format("address {} is that of {} already; give that one another "
+                                          "first",
+                                          address, unique_id_text(mcu.identity))});
+  }
+  bushd_set_address message{.unique_id = {}, .address = address};
+  std::copy(id->begin(), id->end(), message.unique_id);
+  std::array<std::uint8_t, 16> payload{};
+  const std::size_t size = bushd_encode_set_address(&message, payload.data());
+  for (unsigned i = 0; i < kTries; ++i) {
+    const auto answers = line->ask(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS,
+                                   {payload.data(), size}, 1, kPatience, one);
+    if (!answers) return failed(answers.error());
+    bushd_acknowledgement reply;
+    if (answers->empty() ||
+        bushd_decode_acknowledgement(answers->front().payload.data(),
+                                     answers->front().payload.size(), &reply) != BUSHD_OK) {
+      continue;
+    }
+    if (reply.status != BUSHD_OK) {
+      return failed(
+          {.message = fmt::format("{} refuses: {}", unique_id,
+                                  bushd_status_text(static_cast<bushd_status>(reply.status)))});
+    }
+    fmt::print("{}: address {}\n", unique_id, address);
+    return kDone;
+  }
+  return failed(
+      {.message = fmt::format("{}: no MCU with unique id {} answers", options.port, unique_id)});
+}
+
+}  // namespace bushctl

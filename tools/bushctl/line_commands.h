@@ -1,0 +1,21 @@
+// What bushctl does on a line by itself, while no daemon has it. All return the exit code.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace bushctl {
+
+struct LineOptions {
+  std::string port;
+  std::uint32_t baud = 0;
+  bool json = false;
+};
+
+// Asks `count` times who has this address; 0: whoever answers a scan.
+int latency_test(const LineOptions& options, std::uint8_t address, unsigned count);
+int scan(const LineOptions& options);
+// `unique_id`: 16 hexadecimal digits.
+int set_address(const LineOptions& options, const std::string& unique_id, std::uint8_t address);
+
+}  // namespace bushctl
