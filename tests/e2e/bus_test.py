@@ -3,7 +3,7 @@
 import json
 import unittest
 
-from rig import FAR, EndToEndTest
+from rig import FAR, EndToEndTest, program
 
 
 class EmergencyStop(EndToEndTest):
@@ -112,6 +112,20 @@ class Line(EndToEndTest):
         self.assertEqual(nobody.returncode, 1)
         self.assertIn("no MCU with unique id", nobody.stderr)
         self.assertEqual(self.line("address", "xyz", 7).returncode, 2)
+
+    def test_a_doubled_address_is_found_and_mended(self):
+        self.write_config()
+        command = [program("BUSHSIM"), "--config", self.file("bushd.toml"), "--link", self.file("port")]
+        bushsim = self.start([*command, "--doubled", "1"], "bushsim.log", True)
+        self.wait_until("bushsim to offer its port", lambda: "bushsim: ready" in bushsim.said())
+        ids = self.scanned()
+        self.assertEqual(sorted(ids.values()), [1, 1, 2])
+        self.assertIn("address 1 is that of 2 MCUs", self.line("scan").stdout)
+        twin = next(name for name, address in ids.items() if address == 1)
+        self.assertEqual(self.line("address", twin, 3).returncode, 0)
+        self.assertEqual(sorted(self.scanned().values()), [1, 2, 3])
+        self.start_bushd()
+        self.wait_until_ready()
 
     def test_a_port_of_the_daemon_is_left_alone(self):
         self.bring_up()

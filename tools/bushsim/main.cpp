@@ -9,6 +9,7 @@
 #include <exception>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "simulator.h"
 
@@ -49,6 +50,10 @@ int run(int argc, char** argv) {
       ->required()
       ->allow_extra_args(false);
   app.add_option("--trace", options.trace, "VCD file for all edges of STEP, DIR and EN");
+  std::vector<std::uint8_t> doubled;
+  app.add_option("--doubled", doubled, "One more MCU with this address, a fault worth trying")
+      ->check(CLI::Range(1, 255))
+      ->excludes("--trace");
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
@@ -61,6 +66,7 @@ int run(int argc, char** argv) {
   const auto setup = bushsim::load_setup(config, bus);
   if (!setup) return refuse(setup.error());
   options.setup = *setup;
+  options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
   bushd::Result<void> ended;
   std::string summary;
   {

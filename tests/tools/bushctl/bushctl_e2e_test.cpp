@@ -273,8 +273,9 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   EXPECT_EQ(bushctl({"disable"}).code, 0);
   EXPECT_EQ(bushctl({"set", "theta", "-100"}).code, 0);
   EXPECT_EQ(bushctl({"clear"}).code, 0);
+  EXPECT_EQ(bushctl({"estop"}).code, 0);
   const auto commands = daemon.commands();
-  ASSERT_EQ(commands.size(), 6u);
+  ASSERT_EQ(commands.size(), 7u);
   EXPECT_EQ(commands[0].kind, command_t::STOP);
   EXPECT_TRUE(commands[0].motors.empty());
   EXPECT_THAT(commands[1].motors, ElementsAre("theta"));
@@ -284,6 +285,7 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   EXPECT_EQ(commands[4].kind, command_t::SET_POSITION);
   EXPECT_THAT(commands[4].steps, ElementsAre(-100));
   EXPECT_EQ(commands[5].kind, command_t::CLEAR_FAULTS);
+  EXPECT_EQ(commands[6].kind, command_t::EMERGENCY_STOP);
 }
 
 TEST(Bushctl, SetFailsWhenTheMcuDidNotTakeIt) {
