@@ -7,7 +7,9 @@ tick k lets the step that runs then go on and adds the fewest steps m with D(m) 
 What an MCU makes of it.  A step belongs to tick i if its time lies in (begin of i, end of i]. Position is
 linear between steps; q is the position at a tick's end, rounded down to 1/256 step (fine) or to a whole step
 (coarse). Within the tick the motor moves evenly from q0 to q1 = q0 + d. Step n is made in the slot, of S in
-a tick, in which that line crosses n (fine) or n - 1/2 (coarse: so that c steps are spaced evenly).
+a tick, in which that line crosses n (fine) or n - 1/2 (coarse: so that c steps are spaced evenly). A move that the MCU runs by its own
+table ("moves": "table") is made otherwise: every step in the slot in which its time lies, until the first
+change; from that tick on it is made of ticks as well.
 
 How far an edge may lie from the table.  T is the tick, v the speed in steps per time. Within the tick the
 true position has slopes from vmin to vmax, so it leaves its own chord by at most (vmax - vmin) T / 4.
@@ -17,10 +19,11 @@ crossing half a step earlier takes back half: r = 1/2. The line's slope is d / T
     |edge - table|  <=  T / d * ((vmax - vmin) T / 4 + r) + T / S,  and never more than T
 
 In a move's last tick vmin is 0, as the motor comes to rest somewhere in it: it is reported apart, and so is
-the first.
+the first. Of a table run an edge lies in its slot: |edge - table| <= T / S.
 """
 
 import bisect
+import math
 import tomllib
 from collections import namedtuple
 from itertools import accumulate
@@ -80,6 +83,8 @@ class Move:
         self.start_tick = event["start_tick"]
         self.from_steps = event["from_steps"]
         self.table = table
+        # From this tick on it is made of ticks.
+        self.ticks_from = {"stream": self.start_tick, "table": math.inf}[event.get("moves", "stream")]
         self.goal_steps = self.from_steps + event["steps"]
         self._go_to(self.goal_steps)
         self.result = None
@@ -96,6 +101,7 @@ class Move:
 
     def change(self, tick, target_steps=None):
         """What a stop, or a new target, at `tick` makes of the rest; changes follow each other."""
+        self.ticks_from = min(self.ticks_from, tick)
         if target_steps is not None:
             self.goal_steps = target_steps
         if tick <= self.start_tick:
@@ -138,11 +144,15 @@ class Move:
                 last = after == len(times)
                 place = LAST_TICK if last else FIRST_TICK if tick == 0 else INTERIOR
                 bound_ns = self.bound_ns(self.delays[made : after + 1], last, q1 - q0, slots)
+            by_table = self.start_tick + tick < self.ticks_from
             begin_ns = (self.start_tick + tick) * self.tick_ns
             for n in range(made, after):
-                x = 256 * n + crossing - q0
-                # A crossing exactly at the tick's end belongs to the tick: its last slot.
-                slot = min(x * slots // (q1 - q0), slots - 1)
+                if by_table:
+                    slot = (times[n] - tick * self.tick_ns) * slots // self.tick_ns
+                else:
+                    slot = (256 * n + crossing - q0) * slots // (q1 - q0)
+                # A step exactly at the tick's end belongs to the tick.
+                slot = min(slot, slots - 1)
                 yield Step(
                     move=self,
                     number=n + 1,
@@ -151,7 +161,7 @@ class Move:
                     tick=self.start_tick + tick,
                     direction=self.direction,
                     place=place,
-                    bound_ns=bound_ns,
+                    bound_ns=self.tick_ns / slots if by_table else bound_ns,
                 )
             made = after
             q0 = q1

@@ -1,5 +1,6 @@
 """tools/check-trace on traces that are right, and on the same traces with one thing wrong."""
 
+import itertools
 import json
 import pathlib
 import random
@@ -34,9 +35,9 @@ class CheckTraceTest(unittest.TestCase):
             for key, value in table.items():
                 print(f"{key} = {json.dumps(value)}", file=file)
 
-    def scene(self, fine=True):
+    def scene(self, fine=True, moves=None):
         """Two MCUs, four motors, both directions, a second move, one stopped in flight."""
-        scene = synthetic.Scene(TABLE, self.table_file, fine)
+        scene = synthetic.Scene(TABLE, self.table_file, fine, moves)
         scene.move("theta", 1, 0, 100, 300)
         scene.move("phi", 1, 15, 100, -35)
         scene.move("chi", 2, 0, 130, 1, move_id=2)
@@ -71,9 +72,9 @@ class CheckTraceTest(unittest.TestCase):
 
 class RightTraces(CheckTraceTest):
     def test_every_edge_of_both_formats_is_explained(self):
-        for fine in (True, False):
-            with self.subTest(fine=fine):
-                scene = self.scene(fine)
+        for fine, moves in itertools.product((True, False), (None, "stream", "table")):
+            with self.subTest(fine=fine, moves=moves):
+                scene = self.scene(fine, moves)
                 made = sum(map(len, scene.edges.values()))
                 result = self.assert_right(scene)
                 last = result.stdout.splitlines()[-1]
@@ -90,7 +91,8 @@ class RightTraces(CheckTraceTest):
             table = {"time_unit_ns": chance.randint(21_000, 60_000), "accel": accel, "decel": decel}
             table["cruise"] = chance.randint(1, accel[-1])
             self.write_table(table)
-            scene = synthetic.Scene(table, self.table_file, fine=chance.random() < 0.5)
+            moves = chance.choice(("stream", "table"))
+            scene = synthetic.Scene(table, self.table_file, chance.random() < 0.5, moves)
             tick = 10
             for number in range(3):
                 stop = tick + chance.randint(-2, 60) if chance.random() < 0.5 else None
@@ -143,7 +145,8 @@ class RightTraces(CheckTraceTest):
             table = {"time_unit_ns": chance.randint(21_000, 60_000), "accel": accel, "decel": decel}
             table["cruise"] = chance.randint(1, accel[-1])
             self.write_table(table)
-            scene = synthetic.Scene(table, self.table_file, fine=chance.random() < 0.5)
+            moves = chance.choice(("stream", "table"))
+            scene = synthetic.Scene(table, self.table_file, chance.random() < 0.5, moves)
             scene.move("m", 1, 5, 10, chance.choice((-1, 1)) * chance.randint(1, 200))
             tick = 10
             for _ in range(chance.randint(1, 4)):
@@ -229,6 +232,15 @@ class WrongTraces(CheckTraceTest):
         scene = self.scene()
         scene.edges[2, 3][20][0] += 2 * SLOT_NS
         self.assert_problem(scene, "omega", "step 21 of", "+20.0 us")
+
+    def test_table_runs_and_streams_are_told_apart(self):
+        for moves, said in (("table", "stream"), ("stream", "table")):
+            with self.subTest(moves=moves):
+                scene = self.scene(moves=moves)
+                for event in scene.events:
+                    if event["event"] == "move":
+                        event["moves"] = said
+                self.assert_problem(scene, "theta", "from its slot")
 
     def test_an_edge_one_slot_off_but_in_the_tick_before_or_after(self):
         # Delays that are no divisor of the tick, so that some step falls into any slot.

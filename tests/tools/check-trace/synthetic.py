@@ -4,6 +4,7 @@ Positions are Fractions looked up step by step; nothing is shared with tools/che
 """
 
 import json
+import math
 from fractions import Fraction
 
 TICK_NS = 2_560_000
@@ -63,8 +64,8 @@ def retargeted(table, delays, after_ns, target):
     return delays[:done] + [max(a, d) for a, d in zip(up, down)]
 
 
-def edges_of(table, delays, fine):
-    """(ns since time 0, step number) of every edge of a move."""
+def edges_of(table, delays, fine, ticks_from_ns):
+    """ns since time 0 of every edge of a move; before ticks_from_ns the table is run as it is."""
     times = [0]
     for delay in delays:
         times.append(times[-1] + delay * table["time_unit_ns"])
@@ -85,6 +86,10 @@ def edges_of(table, delays, fine):
         for number in range(1, len(delays) + 1):
             if not begin < number <= end:
                 continue
+            if tick * TICK_NS < ticks_from_ns:
+                slot = min(times[number] * SLOTS // TICK_NS, (tick + 1) * SLOTS - 1)
+                edges.append(slot * TICK_NS // SLOTS)
+                continue
             crossing = Fraction(number) if fine else number - Fraction(1, 2)
             slot = min(int((crossing - begin) / (end - begin) * SLOTS), SLOTS - 1)
             edges.append(tick * TICK_NS + slot * TICK_NS // SLOTS)
@@ -94,14 +99,16 @@ def edges_of(table, delays, fine):
 class Scene:
     """Motors that move; may be spoilt in many ways before it is written."""
 
-    def __init__(self, table, table_file, fine=True):
+    def __init__(self, table, table_file, fine=True, moves=None):
         self.table = table
         self.table_file = table_file
         self.fine = fine
+        self.moves = moves  # "stream", "table", or None: the log does not say
         self.events = []
         self.edges = {}  # (address, output): [[time_ns, direction]]
         self.steps = {}  # by motor
         self.delays = {}  # by motor, of its last move
+        self.ticks_from_ns = {}  # by motor, of its last move: after its start, before that the table is run
         self.rates = {}  # ppm by address
         self.offsets_ns = {1: 700_000_123, 2: 700_000_123}  # by address
         self.en_low_ns = {}  # address: [(from, to)]
@@ -116,10 +123,12 @@ class Scene:
             "event": "move", **event, "bus": "hall", "address": address, "output": output,
             "table_file": self.table_file, "tick_ns": TICK_NS, "format": "fine" if self.fine else "coarse",
             "start_tick": start_tick, "steps": steps, "from_steps": start,
+            **({"moves": self.moves} if self.moves else {}),
         })
+        self.ticks_from_ns[motor] = math.inf if self.moves == "table" else 0
         result = "reached"
         if stop_tick is not None:
-            delays = stopped(self.table, delays, (stop_tick - start_tick) * TICK_NS)
+            delays = stopped(self.table, delays, self._changed(motor, (stop_tick - start_tick) * TICK_NS))
             self.events.append({"event": "stop", **event, "tick": stop_tick})
             if len(delays) != abs(steps):
                 result = "stopped"
@@ -128,14 +137,14 @@ class Scene:
         self.delays[motor] = delays
         self.events.append({"event": "result", **event, "result": result, "position_steps": end})
         own = self.edges.setdefault((address, output), [])
-        own += [[start_tick * TICK_NS + at, direction] for at in edges_of(self.table, delays, self.fine)]
+        own += self._edges(motor, delays, start_tick, direction)
         return len(delays)
 
     def change(self, motor, event, tick, target=None):
         """Changes the last move of a motor; `target` counts from that move's start."""
         move = next(e for e in reversed(self.events) if e["event"] == "move" and e["motor"] == motor)
         result = self.events.pop()
-        after_ns = (tick - move["start_tick"]) * TICK_NS
+        after_ns = self._changed(motor, (tick - move["start_tick"]) * TICK_NS)
         direction = 1 if move["steps"] >= 0 else -1
         line = {"event": event, "id": move["id"], "motor": motor, "tick": tick}
         delays = self.delays[motor]
@@ -152,8 +161,16 @@ class Scene:
         own = self.edges[move["address"], move["output"]]
         begin = move["start_tick"] * TICK_NS
         own[:] = [edge for edge in own if edge[0] < begin]
-        own += [[begin + at, direction] for at in edges_of(self.table, delays, self.fine)]
+        own += self._edges(motor, delays, move["start_tick"], direction)
         return len(delays)
+
+    def _changed(self, motor, after_ns):
+        self.ticks_from_ns[motor] = min(self.ticks_from_ns[motor], after_ns)
+        return after_ns
+
+    def _edges(self, motor, delays, start_tick, direction):
+        edges = edges_of(self.table, delays, self.fine, self.ticks_from_ns[motor])
+        return [[start_tick * TICK_NS + at, direction] for at in edges]
 
     def write_moves(self, path):
         with open(path, "w", encoding="utf-8") as file:
