@@ -236,6 +236,8 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
   const std::int64_t steps = target - motor.position_steps;
   motor.log_id = ++last_log_id_;
   motor.axis.start(motor.position_steps, steps, start);
+  const bool by_table = bus.table_runs && master_of(mcu).can_run_tables(mcu.in_bus) &&
+                        std::abs(steps) <= kMaxPosition;
   const nlohmann::json line = {{"event", "move"},
                                {"id", motor.log_id},
                                {"motor", motor.config->name},
@@ -245,6 +247,7 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
                                {"table_file", table_of(*motor.config).path()},
                                {"tick_ns", bus.tick_ns()},
                                {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
+                               {"moves", by_table ? "table" : "stream"},
                                {"start_tick", start},
                                {"steps", steps},
                                {"from_steps", motor.position_steps}};
@@ -252,8 +255,7 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
   const std::uint8_t output = motor.config->output.value;
   if (steps == 0) {
     end_motor(index, motion::Outcome::kReached, "stands at its target already");
-  } else if (bus.table_runs && master_of(mcu).can_run_tables(mcu.in_bus) &&
-             std::abs(steps) <= kMaxPosition) {
+  } else if (by_table) {
     master_of(mcu).begin_table_run(mcu.in_bus, output, start, static_cast<std::int32_t>(steps));
   } else {
     master_of(mcu).begin(mcu.in_bus, output, start);

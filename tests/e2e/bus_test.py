@@ -3,7 +3,7 @@
 import json
 import unittest
 
-from rig import FAR, EndToEndTest, program
+from rig import FAR, TABLE_RUNS, EndToEndTest, program
 
 
 class EmergencyStop(EndToEndTest):
@@ -34,36 +34,7 @@ class EmergencyStop(EndToEndTest):
         self.check()
 
     def test_cuts_table_runs(self):
-        self.check('moves = "table"', 'emergency_stop = "cut"')
-
-
-class TableMoves(EndToEndTest):
-    def test_moves_and_stops(self):
-        self.bring_up(bus_lines=['moves = "table"'])
-        self.command("move", "--wait", "a0", "700", "b1", "-300")
-        move = self.start_move("a0", FAR)
-        self.wait_until_travelled(1500, "a0")
-        self.command("stop", "--wait")
-        self.assertEqual(move.process.wait(), 1)
-        self.assertIn("a0: stopped", move.said())
-        positions = self.positions()
-        self.bushd.end()
-        self.bushsim.end()
-        self.assertEqual(self.traced_positions(), positions)
-
-    def test_daemon_killed_in_a_run(self):
-        self.bring_up(bus_lines=['moves = "table"'])
-        self.start_move("a0", FAR)
-        self.wait_until_travelled(600, "a0")
-        self.bushd.end(9)
-        self.start_bushd("moves-after.jsonl")
-        self.wait_until_ready()
-        after = self.motors()["a0"]
-        self.assertEqual(after["trust"], "known")
-        self.command("move", "--wait", "a0", "--to", "0")
-        self.bushsim.end()
-        self.assertEqual(self.traced_positions()["a0"], 0)
-        self.assertGreater(after["position_steps"], 600)
+        self.check(*TABLE_RUNS, 'emergency_stop = "cut"')
 
 
 class Health(EndToEndTest):

@@ -4,12 +4,12 @@ import csv
 import io
 import unittest
 
-from rig import FAR, MOTORS, TICK_US, TOP, EndToEndTest, program
+from rig import FAR, MOTORS, TABLE_RUNS, TICK_US, TOP, EndToEndTest, program
 
 
 class Moves(EndToEndTest):
-    def check_moves(self, displacement_format):
-        self.bring_up(displacement_format)
+    def check_moves(self, displacement_format, bus_lines=()):
+        self.bring_up(displacement_format, bus_lines)
         signs = {name: 1 if i % 3 else -1 for i, name in enumerate(MOTORS)}
         # Shorter than both ramps together, and one step; then with cruise.
         short = {name: signs[name] * (1 + 61 * i) for i, name in enumerate(MOTORS)}
@@ -40,8 +40,8 @@ class Moves(EndToEndTest):
         self.assertEqual(results.count("stopped"), 1)
         self.assertEqual(set(results), {"reached", "stopped"})
 
-    def check_new_targets(self, displacement_format):
-        self.bring_up(displacement_format)
+    def check_new_targets(self, displacement_format, bus_lines=()):
+        self.bring_up(displacement_format, bus_lines)
         first = self.start_move("a0", FAR, "b1", -FAR)
         self.wait_until_travelled(700, "a0", "b1")
         # In reach; behind; and one that stands joins them.
@@ -77,11 +77,23 @@ class Moves(EndToEndTest):
     def test_new_targets_for_moving_motors_coarse(self):
         self.check_new_targets("coarse")
 
+    def test_new_targets_for_moving_motors_table_runs_fine(self):
+        self.check_new_targets("fine", TABLE_RUNS)
+
+    def test_new_targets_for_moving_motors_table_runs_coarse(self):
+        self.check_new_targets("coarse", TABLE_RUNS)
+
     def test_group_moves_and_a_stop_in_flight_fine(self):
         self.check_moves("fine")
 
     def test_group_moves_and_a_stop_in_flight_coarse(self):
         self.check_moves("coarse")
+
+    def test_group_moves_and_a_stop_in_flight_table_runs_fine(self):
+        self.check_moves("fine", TABLE_RUNS)
+
+    def test_group_moves_and_a_stop_in_flight_table_runs_coarse(self):
+        self.check_moves("coarse", TABLE_RUNS)
 
     def test_group_move_starts_in_one_tick(self):
         self.bring_up()

@@ -3,7 +3,7 @@
 import signal
 import unittest
 
-from rig import FAR, EndToEndTest
+from rig import FAR, OUTWARD, TABLE_RUNS, EndToEndTest
 
 
 class Port(EndToEndTest):
@@ -64,6 +64,36 @@ class Port(EndToEndTest):
         self.command("move", "--wait", "a0", "--to", "-3995")
         self.assertEqual(self.motors()["a0"]["position_steps"], -3995)
         self.assertEqual(self.bushd.end(), 0)
+
+    def check_unplugged(self, bus_lines=(), port="port", links=("port",)):
+        self.bring_up(bus_lines=bus_lines, port=port, links=links)
+        before = [mcu["boot"] for mcu in self.status()["mcus"]]
+        move = self.start_outward()
+        self.bushsim.send(signal.SIGUSR1)
+        self.assertEqual(move.process.wait(), 1)
+        lost = f"port {self.file(links[0])} lost"
+        self.wait_until("the port to be lost", lambda: lost in self.bushd.said())
+        results = {event["motor"]: event["result"] for event in self.moves() if event["event"] == "result"}
+        self.assertEqual(results, dict.fromkeys(OUTWARD, "link"))
+        self.assertEqual(self.mcu_states(), ["OFFLINE", "OFFLINE"])
+
+        self.bushsim.send(signal.SIGUSR2)
+        self.wait_until_ready()
+        self.assertIn(f"port {self.file(links[-1])} opened", self.bushd.said())
+        self.assertEqual([mcu["boot"] for mcu in self.status()["mcus"]], before)
+        self.assert_way_back_shows_no_step_lost()
+
+    def test_unplugged_in_motion_the_motors_stand_where_the_mcus_counted(self):
+        self.check_unplugged()
+
+    def test_unplugged_in_table_runs_the_motors_stand_where_the_mcus_counted(self):
+        self.check_unplugged(TABLE_RUNS)
+
+    def test_unplugged_in_motion_and_back_under_another_name(self):
+        self.check_unplugged(port="tty[0-9]", links=("tty3", "tty0"))
+
+    def test_unplugged_in_table_runs_and_back_under_another_name(self):
+        self.check_unplugged(TABLE_RUNS, port="tty[0-9]", links=("tty3", "tty0"))
 
     def test_back_under_another_name(self):
         self.write_config(port="tty[0-9]")

@@ -31,6 +31,9 @@ TABLES = ["bushd2-constant", "bushd2-scurve", "bushd2-exponential", "bushd2-reso
 # a0 .. a3 on MCU 1, b0 .. b3 on MCU 2, each with another table. By name: (address, output).
 MOTORS = {f"{'ab'[address - 1]}{output}": (address, output) for address in (1, 2) for output in range(4)}
 FAR = 200_000  # 80 s: a move of so many steps is under way until something ends it
+# Moving both ways, on both MCUs, by all four tables.
+OUTWARD = {"a0": FAR, "a1": -FAR, "a2": FAR, "b1": FAR, "b3": -FAR}
+TABLE_RUNS = ['moves = "table"']  # for a bus, in place of streams
 
 # Children must reach the network of this test only, and the one that the configuration says.
 os.environ.pop("LCM_DEFAULT_URL", None)
@@ -129,9 +132,11 @@ class EndToEndTest(unittest.TestCase):
         command = [program("BUSHD"), "--config", self.file("bushd.toml"), "--move-log", self.file(moves)]
         return self.start(command, f"bushd-{len(self.programs)}.log", True)
 
-    def bring_up(self, displacement_format="fine", bus_lines=()):
-        self.write_config(displacement_format, bus_lines)
-        self.bushsim = self.start_bushsim()
+    def bring_up(self, displacement_format="fine", bus_lines=(), port="port", links=("port",)):
+        """`links`: the port's names, each time it is plugged in; `port` is how the configuration calls it."""
+        self.write_config(displacement_format, bus_lines, port)
+        more = [word for link in links[1:] for word in ("--link", self.file(link))]
+        self.bushsim = self.start_bushsim(link=links[0], options=more)
         self.bushd = self.start_bushd()
         self.wait_until_ready()
 
@@ -155,6 +160,12 @@ class EndToEndTest(unittest.TestCase):
         move = self.start_bushctl("move", "--wait", *arguments)
         self.wait_until("the move to be accepted", lambda: "accepted" in move.said() or not move.lives())
         self.assertTrue(move.lives(), move.said())
+        return move
+
+    def start_outward(self):
+        """All of OUTWARD at full speed."""
+        move = self.start_move(*[word for pair in OUTWARD.items() for word in pair])
+        self.wait_until_travelled(600, *OUTWARD)
         return move
 
     # -- what can be seen
@@ -211,6 +222,41 @@ class EndToEndTest(unittest.TestCase):
     def traced_positions(self, trace="trace.vcd"):
         edges = self.traced(trace)
         return {name: sum(1 if edge.direction else -1 for edge in edges[name]) for name in MOTORS}
+
+    def assert_way_back_shows_no_step_lost(self, moves="moves.jsonl"):
+        """Motors that went OUTWARD and were ended by a fault: they stand where the trace leads to, and their tables
+        brought them to rest there; so they get back to where they began. Ends all programs."""
+        found = self.motors()
+        self.assertEqual({motor["trust"] for motor in found.values()}, {"known"})
+        self.assertEqual({motor["moving"] for motor in found.values()}, {False})
+        # Each against its former direction, so that in the trace the two can be told apart.
+        self.command("move", "--wait", *[word for name in OUTWARD for word in (name, "--to", "0")])
+        self.assertEqual(set(self.positions().values()), {0})
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+
+        edges = self.traced()
+        for name, motor in found.items():
+            outward = OUTWARD.get(name, FAR) > 0
+            out = [edge for edge in edges[name] if edge.direction == outward]
+            back = [edge for edge in edges[name] if edge.direction != outward]
+            self.assertEqual(motor["position_steps"], len(out) if outward else -len(out), name)
+            self.assertEqual(len(back), len(out), name)
+            if name in OUTWARD:
+                self.assertGreater(len(out), 600)
+                self.assert_ran_down_by_table(out, motor["table"])
+                self.assert_ran_down_by_table(back, motor["table"])
+        self.assert_one_result_each(moves)
+
+    def assert_ran_down_by_table(self, edges, table):
+        """The times of the last steps before the end, against the table: each edge may lie a tick off."""
+        delays_us = delays_before_end_us(table)
+        end_us = edges[-1].time_ns / 1000
+        before_us = 0
+        for step, delay_us in enumerate(delays_us[: len(delays_us) - 1]):
+            before_us += delay_us
+            made_us = end_us - edges[-2 - step].time_ns / 1000
+            self.assertAlmostEqual(made_us, before_us, delta=2 * TICK_US, msg=f"{table}, {step + 1} steps before")
 
     def assert_trace_is_right(self, positions):
         """Every edge lies where the tables say, and as many were made as bushctl said: positions."""
