@@ -40,7 +40,10 @@ void Master::begin_table_run(std::size_t mcu, std::uint8_t motor, Tick start, st
 
 void Master::drop(std::size_t mcu, std::uint8_t motor) {
   Mcu& m = mcus_[mcu];
-  m.stream[motor].active = false;
+  Stream& stream = m.stream[motor];
+  stream.active = false;
+  // A run that the MCU has broken off does not occupy the motor until where it was to end.
+  if (stream.run_steps) stream.next = m.view.known_until[motor];
   // Nor is a replacement that has been asked for and not yet sent.
   m.replacing &= static_cast<std::uint16_t>(~bit(motor));
 }
