@@ -93,6 +93,8 @@ struct BushdImport {
 int import_bushd(const Places& places, const BushdImport& wanted);
 
 int list(const Places& places, bool json);
+// In the terminal: as wide as that is, coloured if it is one.
+int plot(const Places& places, const std::vector<std::string>& tables);
 int time(const Places& places, const std::string& table, const std::vector<std::uint32_t>& steps,
          bool json);
 int diff(const Places& places, const std::string& before, const std::string& after, bool json);

@@ -42,7 +42,8 @@ void add_check(CLI::App& app, const Places& places, const Run& run) {
       [&](double value) { limits.acceleration = value; }, "The greatest acceleration");
   check
       ->add_option("--speed-ratio", limits.speed_ratio,
-                   "The greatest change of speed from one step to the next (default 2, with --torque any; 0: any)")
+                   "The greatest change of speed from one step to the next (default 2, with "
+                   "--torque any; 0: any)")
       ->type_name("RATIO");
   check->add_option("--code-bits", limits.code_bits, "8: codes must be those of BUSHD-2, 10..250")
       ->check(CLI::IsMember({8, 16}))
@@ -88,6 +89,15 @@ void add_time(CLI::App& app, const Places& places, const Run& run) {
   run(time, [&places, options] {
     return bushtab::time(places, options->table, options->steps, options->json);
   });
+}
+
+void add_plot(CLI::App& app, const Places& places, const Run& run) {
+  const auto tables = std::make_shared<std::vector<std::string>>();
+  CLI::App* plot = app.add_subcommand("plot", "Speed over time, drawn in the terminal");
+  plot->add_option("TABLE", *tables, "Tables' files or names, in one picture")->required();
+  plot->footer(
+      "As wide as the terminal, else $COLUMNS, else 80. No colours with $NO_COLOR or in a file.");
+  run(plot, [&places, tables] { return bushtab::plot(places, *tables); });
 }
 
 void add_diff(CLI::App& app, const Places& places, const Run& run) {
@@ -154,6 +164,7 @@ void add_look_options(CLI::App& app, const Places& places, const Run& run) {
   add_diff(app, places, run);
   add_expand(app, places, run);
   add_list(app, places, run);
+  add_plot(app, places, run);
   add_time(app, places, run);
 }
 

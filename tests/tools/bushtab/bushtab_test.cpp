@@ -4,9 +4,11 @@
 #include <rapidcheck.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,7 @@ namespace {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::StartsWith;
 
 struct Outcome {
@@ -298,6 +301,24 @@ TEST_F(BushtabEdit, TimesAndDifferencesAreThoseOfTheDelays) {
   EXPECT_THAT(run("diff t@1 t").out, HasSubstr("accel      1         70.000         71.000\n"));
   EXPECT_THAT(run("diff t@1 t@1").out, HasSubstr("the same content"));
   EXPECT_THAT(run("diff t@1 t --json").out, HasSubstr("\"after_us\": 71.0"));
+}
+
+TEST_F(BushtabEdit, PlotFitsTheWidthAndHasNoColoursInAFile) {
+  const Outcome plot = bushtab("plot bushd2-constant bushd2-scurve" + places_, "COLUMNS=50");
+  EXPECT_EQ(plot.exit_code, 0) << plot.err;
+  EXPECT_THAT(plot.out, Not(HasSubstr("\033")));
+  EXPECT_THAT(plot.out, HasSubstr("     2500 │"));
+  EXPECT_THAT(plot.out, HasSubstr("        0 │"));
+  EXPECT_THAT(plot.out, HasSubstr("bushd2-scurve\n"));
+  std::istringstream lines(plot.out);
+  int longest = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const auto columns = std::count_if(line.begin(), line.end(), [](char c) {
+      return (static_cast<unsigned char>(c) & 0xC0) != 0x80;  // first bytes of UTF-8 only
+    });
+    longest = std::max(longest, static_cast<int>(columns));
+  }
+  EXPECT_EQ(longest, 50);
 }
 
 TEST_F(BushtabEdit, BushdImagesGoOutAndComeBack) {
