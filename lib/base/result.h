@@ -13,13 +13,15 @@ struct Error {
   std::string file{};   // empty: not about a file
   int line = 0;         // 1-based; 0: unknown
   std::string key{};    // the key in the file, dotted path ("motor[3].output"); empty: none
+  int column = 0;       // of `line`, 1-based, in characters; 0: unknown
 
-  // "FILE:LINE: KEY: MESSAGE", leaving out what is unknown.
+  // "FILE:LINE:COLUMN: KEY: MESSAGE", leaving out what is unknown.
   std::string text() const {
     std::string out;
     if (!file.empty()) {
       out += file;
       if (line > 0) out += ":" + std::to_string(line);
+      if (line > 0 && column > 0) out += ":" + std::to_string(column);
       out += ": ";
     }
     if (!key.empty()) out += key + ": ";

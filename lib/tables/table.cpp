@@ -1,6 +1,7 @@
 #include "tables/table.h"
 
 #include <fmt/core.h>
+#include <glib.h>
 
 #include <algorithm>
 #include <utility>
@@ -106,6 +107,33 @@ std::optional<ContentFault> check(const TableContent& content) {
   return std::nullopt;
 }
 
+std::string content_hash(const TableContent& content) {
+  struct Free {
+    void operator()(GChecksum* checksum) const { g_checksum_free(checksum); }
+  };
+  const std::unique_ptr<GChecksum, Free> checksum(g_checksum_new(G_CHECKSUM_SHA256));
+  // Numbers as decimal text with a separator: the same on every machine, and not ambiguous.
+  std::string text;
+  const auto add = [&](std::uint32_t number) { text += fmt::format("{} ", number); };
+  const auto flush = [&] {
+    g_checksum_update(checksum.get(), reinterpret_cast<const guchar*>(text.data()),
+                      static_cast<gssize>(text.size()));
+    text.clear();
+  };
+  add(content.time_unit_ns);
+  add(content.cruise.value_or(content.accel.back()));
+  add(static_cast<std::uint32_t>(content.accel.size()));
+  for (const std::uint16_t code : content.accel) add(code);
+  flush();
+  if (content.decel) {
+    for (const std::uint16_t code : *content.decel) add(code);
+  } else {
+    for (auto code = content.accel.rbegin(); code != content.accel.rend(); ++code) add(*code);
+  }
+  flush();
+  return g_checksum_get_string(checksum.get());
+}
+
 bool Table::same_content(const Table& other) const {
   return name_ == other.name_ && view_.time_unit_ns == other.view_.time_unit_ns &&
          view_.cruise == other.view_.cruise && accel_.code == other.accel_.code &&
@@ -128,6 +156,8 @@ Result<TablePtr> make(TableContent content, std::string path) {
     return fail(Error{.message = fault->message, .file = path, .key = fault->key + index});
   }
   const std::shared_ptr<Table> table(new Table);
+  table->content_hash_ = content_hash(content);
+  table->revision_ = content.revision;
   table->name_ = std::move(content.name);
   table->description_ = std::move(content.description);
   table->path_ = std::move(path);

@@ -19,6 +19,7 @@ inline constexpr std::size_t kMaxCodes = 65535;
 // 32 bits.
 inline constexpr std::uint32_t kMaxTimeUnitNs = 1'000'000'000;
 inline constexpr std::size_t kMaxNameLength = 63;
+inline constexpr std::int64_t kMaxRevision = 2147483647;
 
 // What a table file holds, in the file's order.
 struct TableContent {
@@ -28,7 +29,15 @@ struct TableContent {
   std::optional<std::vector<std::uint16_t>> decel{};  // fast to slow; none: accel reversed
   std::optional<std::uint16_t> cruise{};              // none: the last of accel
   std::string description{};
+  std::uint32_t revision = 0;  // counted by bushtab from 1; 0: none
+  friend bool operator==(const TableContent&, const TableContent&) = default;
 };
+
+// SHA-256, as 64 hexadecimal digits, of what moves a motor: time unit, both sides and cruise delay,
+// whether written or implied. Name, description and revision do not count.
+// Precondition: check() finds nothing.
+std::string content_hash(const TableContent& content);
+inline constexpr std::size_t kShortHashLength = 8;
 
 // What is wrong with a content, if anything: the first thing in the order of the members above.
 struct ContentFault {
@@ -49,6 +58,11 @@ class Table {
   const bushd_table& view() const { return view_; }
   const std::string& name() const { return name_; }
   const std::string& description() const { return description_; }
+  // Counted by bushtab at each change, from 1; 0: the file tells none.
+  std::uint32_t revision() const { return revision_; }
+  // content_hash, and its first 32 bits as 8 hexadecimal digits: for states and logs.
+  const std::string& content_hash() const { return content_hash_; }
+  std::string short_hash() const { return content_hash_.substr(0, kShortHashLength); }
   const std::string& path() const { return path_; }  // empty: not from a file
   bool symmetric() const { return view_.decel.code == view_.accel.code; }
   // Same name, unit, codes and cruise delay; where it was read from and its description do not
@@ -70,6 +84,8 @@ class Table {
   std::string name_;
   std::string description_;
   std::string path_;
+  std::string content_hash_;
+  std::uint32_t revision_ = 0;
   Side accel_;
   Side decel_;  // empty if symmetric
   bushd_table view_{};

@@ -30,7 +30,7 @@ Result<std::vector<std::uint16_t>> read_codes(const TomlReader& reader, std::str
 
 Result<TableContent> read_content(const TomlReader& reader) {
   const auto known =
-      reader.only({"name", "description", "time_unit_ns", "accel", "decel", "cruise"});
+      reader.only({"name", "description", "revision", "time_unit_ns", "accel", "decel", "cruise"});
   if (!known) return fail(known.error());
   TableContent content;
   auto name = reader.string("name", fmt::format("a string of 1..{} bytes", kMaxNameLength));
@@ -52,6 +52,11 @@ Result<TableContent> read_content(const TomlReader& reader) {
     if (!cruise) return fail(cruise.error());
     content.cruise = static_cast<std::uint16_t>(*cruise);
   }
+  if (reader.has("revision")) {
+    const auto revision = reader.integer("revision", 1, kMaxRevision);
+    if (!revision) return fail(revision.error());
+    content.revision = static_cast<std::uint32_t>(*revision);
+  }
   if (reader.has("description")) {
     auto description = reader.string("description", "a string");
     if (!description) return fail(description.error());
@@ -62,7 +67,7 @@ Result<TableContent> read_content(const TomlReader& reader) {
 
 }  // namespace
 
-Result<TablePtr> parse(std::string_view text, const std::string& path) {
+Result<TableContent> parse_content(std::string_view text, const std::string& path) {
   const auto document = parse_toml(text, path);
   if (!document) return fail(document.error());
   const TomlReader reader(*document, path);
@@ -71,6 +76,12 @@ Result<TablePtr> parse(std::string_view text, const std::string& path) {
   if (auto fault = check(*content)) {
     return fail(reader.error(fault->key, fault->index, std::move(fault->message)));
   }
+  return content;
+}
+
+Result<TablePtr> parse(std::string_view text, const std::string& path) {
+  auto content = parse_content(text, path);
+  if (!content) return fail(content.error());
   return make(std::move(*content), path);
 }
 

@@ -15,6 +15,7 @@ namespace bushd::tables {
 Result<TablePtr> load(const std::filesystem::path& path);
 
 // `path` is only what errors and Table::path() say.
+Result<TableContent> parse_content(std::string_view text, const std::string& path);
 Result<TablePtr> parse(std::string_view text, const std::string& path);
 
 // The path of the first NAME.toml in `directories`; the error lists where it was looked for. Names

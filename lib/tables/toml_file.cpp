@@ -119,7 +119,8 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& path) {
   } catch (const toml::parse_error& error) {
     return fail(Error{.message = fmt::format("not TOML: {}", error.description()),
                       .file = path,
-                      .line = static_cast<int>(error.source().begin.line)});
+                      .line = static_cast<int>(error.source().begin.line),
+                      .column = static_cast<int>(error.source().begin.column)});
   } catch (const std::exception& error) {
     return fail(Error{.message = fmt::format("cannot be parsed: {}", error.what()), .file = path});
   }

@@ -15,6 +15,10 @@ int line_of(const toml::source_region& source) {
   return static_cast<int>(source.begin.line);
 }
 
+int column_of(const toml::source_region& source) {
+  return static_cast<int>(source.begin.column);
+}
+
 std::string range(std::int64_t lowest, std::int64_t highest, std::string_view unit) {
   return fmt::format("a whole number {}..{}{}{}", lowest, highest, unit.empty() ? "" : " ", unit);
 }
@@ -60,6 +64,7 @@ Error TomlReader::error(std::string_view key, std::optional<std::size_t> index,
     if (elements != nullptr && *index < elements->size()) node = elements->get(*index);
   }
   error.line = line_of(node->source());
+  error.column = column_of(node->source());
   return error;
 }
 
@@ -74,7 +79,8 @@ Result<void> TomlReader::only(std::initializer_list<std::string_view> keys) cons
   Error unknown_key{.message = fmt::format("unknown key; allowed here: {}", fmt::join(keys, ", ")),
                     .file = file_,
                     .line = line_of(unknown->source()),
-                    .key = full(unknown->str())};
+                    .key = full(unknown->str()),
+                    .column = column_of(unknown->source())};
   return fail(std::move(unknown_key));
 }
 

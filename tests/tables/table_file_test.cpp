@@ -155,7 +155,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"DescriptionIsNumber", kHead + "accel = [9]\ndescription = 1\n", 4, "description",
                 "a string"},
         Refusal{"UnknownKey", kHead + "accel = [9]\naccell = [9]\n", 4, "accell",
-                "unknown key; allowed here: name, description, time_unit_ns, accel, decel, cruise"},
+                "unknown key; allowed here: name, description, revision, time_unit_ns, accel, "
+                "decel, cruise"},
         Refusal{"FirstUnknownKeyOfTheFile", "zeta = 1\n" + kHead + "accel = [9]\nalpha = 1\n", 1,
                 "zeta", "unknown key"},
         Refusal{"UnknownSection", kHead + "accel = [9]\n[motor]\nx = 1\n", 4, "motor",

@@ -1,19 +1,80 @@
 #include <fmt/core.h>
 
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
 #include "commands.h"
 #include "open_table.h"
 
 namespace bushtab {
+namespace {
 
-int check(const std::vector<std::string>& tables) {
+namespace laws = bushd::tables::laws;
+using nlohmann::ordered_json;
+
+bool is_error(const laws::Finding& finding) {
+  return finding.severity == laws::Severity::kError;
+}
+
+std::string place(const laws::Finding& finding) {
+  if (finding.side.empty()) return "";
+  return finding.index && finding.side != "cruise"
+             ? fmt::format("{}[{}]: ", finding.side, *finding.index)
+             : finding.side + ": ";
+}
+
+ordered_json to_json(const laws::Finding& finding) {
+  ordered_json json = {{"severity", is_error(finding) ? "error" : "warning"},
+                       {"rule", finding.rule},
+                       {"side", finding.side},
+                       {"index", nullptr},
+                       {"value", finding.value},
+                       {"limit", finding.limit},
+                       {"message", finding.message}};
+  if (finding.index) json["index"] = *finding.index;
+  return json;
+}
+
+}  // namespace
+
+int check(const Places& places, const Check& wanted) {
+  auto motor = load_motor(wanted.motor);
+  if (!motor) return refuse(motor.error());
+  laws::Limits limits = wanted.limits;
+  limits.motor = std::move(*motor);
+
   int result = kDone;
-  for (const std::string& table : tables) {
-    const auto opened = open_table(table);
-    if (opened) {
-      fmt::print("{}: good\n", table);
-    } else {
+  ordered_json all = ordered_json::array();
+  for (const std::string& table : wanted.tables) {
+    const auto opened = open_table(places, table);
+    ordered_json entry = {{"table", table}, {"good", false}, {"findings", ordered_json::array()}};
+    if (!opened) {
+      entry["error"] = opened.error().text();
       result = refuse(opened.error());
+      all.push_back(entry);
+      continue;
     }
+    const auto found = laws::findings(**opened, limits);
+    bool good = true;
+    for (const laws::Finding& finding : found) {
+      const bool refused = is_error(finding) || wanted.strict;
+      good = good && !refused;
+      entry["findings"].push_back(to_json(finding));
+      if (!wanted.json) {
+        fmt::print("{}: {}: {}: {}{}\n", table, is_error(finding) ? "error" : "warning",
+                   finding.rule, place(finding), finding.message);
+      }
+    }
+    entry["good"] = good;
+    all.push_back(entry);
+    if (!good) {
+      result = kRefused;
+    } else if (!wanted.json) {
+      fmt::print("{}: good\n", table);
+    }
+  }
+  if (wanted.json) {
+    fmt::print("{}\n", all.dump(2, ' ', false, ordered_json::error_handler_t::replace));
   }
   return result;
 }

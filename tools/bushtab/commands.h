@@ -3,20 +3,38 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/message.h"
+#include "open_table.h"
+#include "tables/laws/findings.h"
+#include "tables/laws/make.h"
 
 namespace bushtab {
 
 inline constexpr int kDone = 0;
 inline constexpr int kRefused = 1;
 
-// `table` is a file's path (it contains '/', ends in ".toml" or names a file that is there) or the
-// name of a shipped table.
-int show(const std::string& table, bool json);
-int check(const std::vector<std::string>& tables);
+// What is known of the motor, for laws and checks that ask for it.
+struct MotorOptions {
+  std::string torque_file;  // empty: nothing is known
+  bushd::tables::laws::Motor motor;
+};
+bushd::Result<std::optional<bushd::tables::laws::Motor>> load_motor(const MotorOptions& options);
+
+int show(const Places& places, const std::string& table, bool json);
+
+struct Check {
+  std::vector<std::string> tables;
+  bushd::tables::laws::Limits limits;
+  MotorOptions motor;
+  bool strict = false;  // warnings are refusals too
+  bool json = false;
+};
+int check(const Places& places, const Check& wanted);
 
 struct Expansion {
   std::string table;
@@ -24,6 +42,61 @@ struct Expansion {
   std::uint32_t tick_us = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
 };
-int expand(const Expansion& expansion);
+int expand(const Places& places, const Expansion& expansion);
+
+// The table of a spec whose name is a table as on the command line.
+struct New {
+  bushd::tables::laws::Spec spec;
+  MotorOptions motor;
+  std::string table;
+  std::vector<std::string> comments;
+  bool print = false;    // to stdout instead of into a file
+  bool replace = false;  // a table that is there: a new revision of it
+};
+int make_new(const Places& places, const New& wanted);
+
+// A change of a table that is there: a new revision, comments kept.
+using Change =
+    std::function<bushd::Result<bushd::tables::TableContent>(bushd::tables::TableContent content)>;
+int change(const Places& places, const std::string& table, const std::string& note,
+           const Change& change);
+// In $VISUAL or $EDITOR; what is no table is kept aside, and the old one stays.
+int edit(const Places& places, const std::string& table);
+int copy(const Places& places, const std::string& from, const std::string& to);
+int log(const Places& places, const std::string& table, bool json);
+int revert(const Places& places, const std::string& table, const std::string& revision);
+int tag(const Places& places, const std::string& table, const std::string& tag,
+        const std::string& revision);
+
+struct BushdExport {
+  std::string image;
+  std::string table;
+  unsigned page = 0;
+  std::uint32_t steps = 0;
+  std::string positions;  // hexadecimal; empty: those of the image
+  bool resample = false;
+  bool bushd1 = false;
+  std::uint32_t reactor_delay = 0;
+};
+int export_bushd(const Places& places, const BushdExport& wanted);
+
+struct BushdImport {
+  std::string image;
+  std::string table;
+  unsigned page = 0;
+  double start_hz = 0;
+  std::uint32_t time_unit_ns = 0;  // bushd1
+  bool bushd1 = false;
+  bool replace = false;
+  bool json = false;
+};
+int import_bushd(const Places& places, const BushdImport& wanted);
+
+int list(const Places& places, bool json);
+// In the terminal: as wide as that is, coloured if it is one.
+int plot(const Places& places, const std::vector<std::string>& tables);
+int time(const Places& places, const std::string& table, const std::vector<std::uint32_t>& steps,
+         bool json);
+int diff(const Places& places, const std::string& before, const std::string& after, bool json);
 
 }  // namespace bushtab

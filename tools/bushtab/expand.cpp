@@ -38,8 +38,8 @@ bool print_ticks(bushd_run run, std::uint32_t tick_ns, ExpandFunction<Displaceme
 
 }  // namespace
 
-int expand(const Expansion& expansion) {
-  const auto table = open_table(expansion.table);
+int expand(const Places& places, const Expansion& expansion) {
+  const auto table = open_table(places, expansion.table);
   if (!table) return refuse(table.error());
   const bushd_table* view = &(*table)->view();
   const std::uint32_t tick_ns = expansion.tick_us * 1000;

@@ -57,6 +57,8 @@ void print_json(const Table& table) {
       {"name", table.name()},
       {"description", table.description()},
       {"path", table.path()},
+      {"revision", table.revision()},
+      {"sha256", table.content_hash()},
       {"time_unit_ns", view.time_unit_ns},
       {"symmetric", table.symmetric()},
       {"accel", side_json(table, view.accel)},
@@ -80,7 +82,10 @@ void print_text(const Table& table) {
   const bushd_table& view = table.view();
   fmt::print("{} ({})\n", table.name(), table.path());
   if (!table.description().empty()) fmt::print("{}\n", table.description());
-  fmt::print("\n  time unit     {} ns\n", view.time_unit_ns);
+  fmt::print("\n  revision      {}, content {}\n",
+             table.revision() > 0 ? fmt::format("{}", table.revision()) : "none",
+             table.short_hash());
+  fmt::print("  time unit     {} ns\n", view.time_unit_ns);
   fmt::print("  acceleration  {}\n", side_text(table, view.accel));
   fmt::print("  deceleration  {}\n",
              table.symmetric() ? "the same, reversed" : side_text(table, view.decel));
@@ -97,8 +102,8 @@ void print_text(const Table& table) {
 
 }  // namespace
 
-int show(const std::string& name, bool json) {
-  const auto table = open_table(name);
+int show(const Places& places, const std::string& name, bool json) {
+  const auto table = open_table(places, name);
   if (!table) return refuse(table.error());
   if (json) {
     print_json(**table);

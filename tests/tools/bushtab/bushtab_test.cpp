@@ -4,9 +4,11 @@
 #include <rapidcheck.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,7 @@ namespace {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::StartsWith;
 
 struct Outcome {
@@ -32,12 +35,12 @@ std::string read_file(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-Outcome bushtab(const std::string& arguments) {
+Outcome bushtab(const std::string& arguments, const std::string& environment = "") {
   const TempDirectory directory;
   const std::string out = directory.path() / "out";
   const std::string err = directory.path() / "err";
-  const int status =
-      std::system((BUSHTAB " " + arguments + " </dev/null >" + out + " 2>" + err).c_str());
+  const int status = std::system(
+      (environment + " " BUSHTAB " " + arguments + " </dev/null >" + out + " 2>" + err).c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
 }
 
@@ -187,9 +190,199 @@ TEST(BushtabCheck, EveryBadFileIsNamedWithLineAndKey) {
   const std::string good = directory.write("good.toml", kSmallTable);
   const Outcome outcome = bushtab("check " + bad + " " + good + " " + worse);
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_EQ(outcome.out, good + ": good\n");
-  EXPECT_THAT(outcome.err, StartsWith(bad + ":5: accel[1]: is 10 after 9; allowed: "));
-  EXPECT_THAT(outcome.err, HasSubstr("\n" + worse + ":1: name: is 1; allowed: "));
+  EXPECT_THAT(outcome.out, HasSubstr("\n" + good + ": good\n"));
+  EXPECT_THAT(outcome.err, StartsWith(bad + ":5:1: accel[1]: is 10 after 9; allowed: "));
+  EXPECT_THAT(outcome.err, HasSubstr("\n" + worse + ":1:8: name: is 1; allowed: "));
+}
+
+TEST(BushtabCheck, StrictRefusesWarnings) {
+  const TempDirectory directory;
+  const std::string table = directory.write("small.toml", kSmallTable);
+  EXPECT_EQ(bushtab("check " + table).exit_code, 0);
+  const Outcome strict = bushtab("check --strict " + table);
+  EXPECT_EQ(strict.exit_code, 1);
+  EXPECT_THAT(strict.out, HasSubstr("warning: resolution: cruise: one code more changes"));
+  const Outcome json = bushtab("check --strict --json " + table);
+  EXPECT_EQ(json.exit_code, 1);
+  for (const char* part : {"\"good\": false", "\"rule\": \"resolution\"", "\"limit\": 0.1"}) {
+    EXPECT_THAT(json.out, HasSubstr(part));
+  }
+}
+
+TEST(BushtabCheck, TableFasterThanTheMotorIsRefusedBeforehand) {
+  const TempDirectory directory;
+  const std::string curve =
+      directory.write("m.csv", "speed_rpm,torque_ncm\n0,40\n600,30\n1500,10\n");
+  const std::string motor =
+      " --torque " + curve + " --inertia 200gcm2 --friction 2Ncm --safety 1.2";
+  const std::string table = directory.path() / "t.toml";
+  ASSERT_EQ(bushtab("new " + table + " --law torque --start 200 --max 3kHz" + motor).exit_code, 0);
+  EXPECT_EQ(bushtab("check --strict " + table + motor).exit_code, 0);
+  ASSERT_EQ(bushtab("scale --speed 1.3 " + table).exit_code, 0);
+  const Outcome fast = bushtab("check " + table + motor);
+  EXPECT_EQ(fast.exit_code, 1);
+  EXPECT_THAT(fast.out, HasSubstr("error: torque: accel["));
+  EXPECT_THAT(fast.out, HasSubstr("it will lose steps"));
+}
+
+// A table in a directory of its own, with the commands that change it.
+class BushtabEdit : public testing::Test {
+ protected:
+  void SetUp() override {
+    directory_.write("t.toml",
+                     "# mine\nname = \"t\"\ntime_unit_ns = 1000\naccel = [90, 70, 50] # fast\n");
+  }
+  Outcome run(const std::string& arguments) { return bushtab(arguments + places_); }
+  std::string text() { return read_file(directory_.path() / "t.toml"); }
+
+  TempDirectory directory_;
+  std::string places_ = " --dir " + directory_.path().string();
+};
+
+TEST_F(BushtabEdit, EveryCommandIsARevisionThatCanComeBack) {
+  EXPECT_THAT(run("set t 1 71").out, HasSubstr("t.toml: revision 2\n"));
+  EXPECT_THAT(text(), HasSubstr("accel = [90, 71, 50] # fast\n"));
+  EXPECT_EQ(run("insert t 2 60 55").exit_code, 0);
+  EXPECT_THAT(text(), HasSubstr("accel = [90, 71, 60, 55, 50] # fast\n"));
+  EXPECT_EQ(run("delete t 0 2").exit_code, 0);
+  EXPECT_THAT(text(), HasSubstr("accel = [60, 55, 50] # fast\n"));
+  EXPECT_EQ(run("scale t --speed 0.5").exit_code, 0);
+  EXPECT_THAT(text(), HasSubstr("accel = [120, 110, 100] # fast\n"));
+  EXPECT_EQ(run("resample t --time-unit 2us").exit_code, 0);
+  EXPECT_THAT(text(), HasSubstr("time_unit_ns = 2000\naccel = [60, 55, 50] # fast\n"));
+  EXPECT_EQ(run("tag t good 3").exit_code, 0);
+  EXPECT_EQ(run("revert t good").exit_code, 0);
+  EXPECT_THAT(text(), StartsWith("# mine\nname = \"t\"\nrevision = 7\ntime_unit_ns = 1000\n"
+                                 "accel = [90, 71, 60, 55, 50] # fast\n"));
+  const Outcome log = run("log t");
+  EXPECT_THAT(log.out, HasSubstr("revert to 3\n"));
+  EXPECT_THAT(log.out, HasSubstr("insert 2 codes at 2  [good]\n"));
+  EXPECT_THAT(log.out, HasSubstr("found\n"));
+  EXPECT_THAT(run("log t --json").out, HasSubstr("\"note\": \"delete 2 codes from 0\""));
+}
+
+TEST_F(BushtabEdit, ChangeThatIsNoTableIsRefusedAndTheOldOneStays) {
+  const std::string before = text();
+  const Outcome outcome = run("set t 1 95");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("accel[1]: is 95 after 90"));
+  EXPECT_THAT(run("set t 3 40").err, HasSubstr("accel has no index 3; allowed: 0..2"));
+  EXPECT_EQ(run("set t 0 70000").exit_code, 2);
+  EXPECT_EQ(text(), before);
+}
+
+TEST_F(BushtabEdit, EditorsTextIsCheckedOnReturn) {
+  EXPECT_THAT(bushtab("edit t" + places_, "EDITOR='sed -i s/90/80/'").out, HasSubstr("revision 2"));
+  EXPECT_THAT(text(), HasSubstr("accel = [80, 70, 50] # fast\n"));
+  const std::string before = text();
+  const Outcome bad = bushtab("edit t" + places_, "EDITOR='sed -i s/80/8x/'");
+  EXPECT_EQ(bad.exit_code, 1);
+  EXPECT_THAT(bad.err,
+              HasSubstr("your text is in " + (directory_.path() / ".t.edited.toml").string()));
+  EXPECT_THAT(read_file(directory_.path() / ".t.edited.toml"), HasSubstr("8x"));
+  EXPECT_EQ(text(), before);
+  EXPECT_THAT(bushtab("edit t" + places_, "EDITOR=false").err, HasSubstr("nothing was changed"));
+}
+
+TEST_F(BushtabEdit, CopyHasANameAndAHistoryOfItsOwn) {
+  EXPECT_EQ(run("copy t other").exit_code, 0);
+  EXPECT_THAT(read_file(directory_.path() / "other.toml"),
+              StartsWith("# mine\nname = \"other\"\nrevision = 1\n"));
+  EXPECT_THAT(run("copy bushd2-constant t").err, HasSubstr("is there already"));
+  EXPECT_THAT(run("list").out, HasSubstr("other                      1  "));
+}
+
+TEST_F(BushtabEdit, TimesAndDifferencesAreThoseOfTheDelays) {
+  // 90 + 70 + 50 + 70 + 90 us
+  EXPECT_THAT(run("time t --steps 5 --json").out, HasSubstr("\"time_ns\": 370000"));
+  EXPECT_EQ(run("time t --steps 5").out,
+            "         5 steps           0.370 ms  up to 20000 steps/s\n");
+  ASSERT_EQ(run("set t 1 71").exit_code, 0);
+  EXPECT_THAT(run("diff t@1 t").out, HasSubstr("accel      1         70.000         71.000\n"));
+  EXPECT_THAT(run("diff t@1 t@1").out, HasSubstr("the same content"));
+  EXPECT_THAT(run("diff t@1 t --json").out, HasSubstr("\"after_us\": 71.0"));
+}
+
+TEST_F(BushtabEdit, PlotFitsTheWidthAndHasNoColoursInAFile) {
+  const Outcome plot = bushtab("plot bushd2-constant bushd2-scurve" + places_, "COLUMNS=50");
+  EXPECT_EQ(plot.exit_code, 0) << plot.err;
+  EXPECT_THAT(plot.out, Not(HasSubstr("\033")));
+  EXPECT_THAT(plot.out, HasSubstr("     2500 │"));
+  EXPECT_THAT(plot.out, HasSubstr("        0 │"));
+  EXPECT_THAT(plot.out, HasSubstr("bushd2-scurve\n"));
+  std::istringstream lines(plot.out);
+  int longest = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const auto columns = std::count_if(line.begin(), line.end(), [](char c) {
+      return (static_cast<unsigned char>(c) & 0xC0) != 0x80;  // first bytes of UTF-8 only
+    });
+    longest = std::max(longest, static_cast<int>(columns));
+  }
+  EXPECT_EQ(longest, 50);
+}
+
+TEST_F(BushtabEdit, BushdImagesGoOutAndComeBack) {
+  const std::string image = directory_.path() / "image";
+  EXPECT_THAT(run("export-bushd bushd2-constant " + image + " --page 3 --steps 1000").out,
+              HasSubstr("page 3, 1000 steps; set F_start to 100 Hz"));
+  EXPECT_EQ(run("export-bushd bushd2-scurve " + image + " --page 0 --steps 9").exit_code, 0);
+  EXPECT_EQ(std::filesystem::file_size(image), 1024U);
+  EXPECT_EQ(run("import-bushd " + image + " back --page 3 --start 100Hz").exit_code, 0);
+  EXPECT_THAT(run("diff back bushd2-constant").out, HasSubstr("the same content"));
+  EXPECT_THAT(run("import-bushd " + image + " none --page 1 --start 100Hz").err,
+              HasSubstr("Is there a program in this page?"));
+  EXPECT_THAT(run("export-bushd micro16-standard " + image + " --steps 9").err,
+              HasSubstr("F_start"));
+  EXPECT_THAT(run("export-bushd micro16-standard " + image + " --steps 9 --resample").out,
+              HasSubstr("top speed 2500 instead of 20000 steps/s"));
+  EXPECT_THAT(run("export-bushd bushd2-constant " + image + " --steps 65536").err,
+              HasSubstr("a page counts up to 65535"));
+}
+
+const char* const kLaw = " --law constant --start 100Hz --max 1kHz --acceleration 5kHz/s";
+
+TEST(BushtabNew, MakesAFileThatIsRevisionOne) {
+  const TempDirectory directory;
+  const std::string table = directory.path() / "mine.toml";
+  const Outcome made = bushtab("new " + table + kLaw + " --comment why --description 'a motor'");
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(made.out, table + ": revision 1\n");
+  EXPECT_THAT(read_file(table), StartsWith("# why\nname = \"mine\"\ndescription = \"a motor\"\n"
+                                           "revision = 1\ntime_unit_ns = 200\naccel = [\n"));
+  EXPECT_EQ(bushtab("check " + table).exit_code, 0);
+  EXPECT_THAT(bushtab("new " + table + kLaw).err, HasSubstr("is there already"));
+  EXPECT_EQ(bushtab("new --replace " + table + kLaw).out, table + ": revision 2\n");
+}
+
+TEST(BushtabNew, NamesLiveInTheDirectoryOfTables) {
+  const TempDirectory directory;
+  const std::string places = " --dir " + directory.path().string();
+  EXPECT_EQ(bushtab("new mine" + std::string(kLaw) + places).exit_code, 0);
+  EXPECT_THAT(bushtab("show mine" + places).out, HasSubstr("100..1000 steps/s"));
+  EXPECT_EQ(bushtab("show mine@1" + places).exit_code, 0);
+  EXPECT_THAT(bushtab("show mine@2" + places).err, HasSubstr("has no revision 2"));
+}
+
+TEST(BushtabNew, PrintLeavesNothingBehind) {
+  const TempDirectory directory;
+  const std::string places = " --dir " + directory.path().string();
+  EXPECT_THAT(bushtab("new mine --print" + std::string(kLaw) + places).out,
+              StartsWith("name = \"mine\"\n"));
+  EXPECT_TRUE(std::filesystem::is_empty(directory.path()));
+}
+
+TEST(BushtabNew, WrongUnitsAreWrongUsage) {
+  const Outcome outcome =
+      bushtab("new ./x.toml --law constant --start 100rpm --max 1kHz --time 1s");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--start: \"100rpm\"; allowed: a number with one of the units "
+                                     "steps/s, Hz, kHz"));
+}
+
+TEST(BushtabNew, WhatCannotWorkIsRefused) {
+  const Outcome outcome = bushtab("new ./x.toml --law constant --start 1kHz --max 100Hz --time 1s");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("allowed: up to the maximum, 100"));
 }
 
 TEST(BushtabShow, TellsSpeedsTimesAndCounts) {

@@ -1,0 +1,36 @@
+// Changes of a table's content, pure functions. None makes a step faster by rounding: delays are
+// rounded up. The result has passed check(); what would not is refused with its reason.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "base/result.h"
+#include "tables/table.h"
+
+namespace bushd::tables {
+
+enum class SideKey { kAccel, kDecel };  // decel where there is none: a mirror image is written out
+
+// Indices count from 0 in the order of the file.
+Result<TableContent> set_codes(TableContent content, SideKey side, std::size_t index,
+                               std::span<const std::uint16_t> codes);
+Result<TableContent> insert_codes(TableContent content, SideKey side, std::size_t index,
+                                  std::span<const std::uint16_t> codes);
+Result<TableContent> delete_codes(TableContent content, SideKey side, std::size_t index,
+                                  std::size_t count);
+
+// All speeds times `factor`, by new codes in the same time unit.
+Result<TableContent> scale_speed(TableContent content, double factor);
+// The same speeds with `factor` times the acceleration, so in 1 / factor of the steps and the time.
+Result<TableContent> scale_acceleration(TableContent content, double factor);
+// The same delays in another time unit.
+Result<TableContent> resample_unit(TableContent content, std::uint32_t time_unit_ns);
+// Each side with `codes` codes and the same speeds: the acceleration changes accordingly.
+Result<TableContent> resample_codes(TableContent content, std::size_t codes);
+// Accelerates as it braked, and brakes as it accelerated.
+Result<TableContent> reverse(TableContent content);
+
+}  // namespace bushd::tables

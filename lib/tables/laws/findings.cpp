@@ -1,0 +1,234 @@
+#include "tables/laws/findings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/run.h"
+
+namespace bushd::tables::laws {
+namespace {
+
+constexpr double kNoise = 1e-6;
+constexpr double kSpeedRatio = 2.0;
+constexpr double kBushdSlowest = 250;
+constexpr double kBushdFastest = 10;
+
+// A pair of neighbouring delays, the slower one before the faster one, and where the faster stands.
+struct Pair {
+  double slower_s;
+  double faster_s;
+  std::optional<std::size_t> index;  // none: the step from the side to the cruise delay
+};
+
+class Inspector {
+ public:
+  Inspector(const Table& table, const Limits& limits) : table_(table), limits_(limits) {
+    unit_s_ = table.view().time_unit_ns * 1e-9;
+    speed_ratio_ = limits.speed_ratio.value_or(limits.motor ? 0.0 : kSpeedRatio);
+  }
+
+  std::vector<Finding> inspect() {
+    inspect_side(table_.view().accel, Side::kAccel);
+    if (!table_.symmetric()) inspect_side(table_.view().decel, Side::kDecel);
+    inspect_cruise();
+    inspect_place();
+    return std::move(found_);
+  }
+
+ private:
+  double hz(double delay_s) const { return 1.0 / delay_s; }
+  double delay_s(const bushd_ramp& side, std::size_t i) const { return side.code[i] * unit_s_; }
+  double cruise_s() const { return table_.view().cruise * unit_s_; }
+
+  void add(Severity severity, const char* rule, const char* side, std::optional<std::size_t> index,
+           double value, double limit, std::string message) {
+    found_.push_back({severity, rule, side, index, value, limit, std::move(message)});
+  }
+
+  // Of the side's codes only those above the cruise delay are ever run.
+  void inspect_side(const bushd_ramp& side, Side which) {
+    const char* name = which == Side::kAccel ? "accel" : "decel";
+    const auto in_file = [&](std::size_t i) {
+      return which == Side::kAccel ? i : side.count - 1 - i;
+    };
+    inspect_start(side, name, in_file(0));
+    Finding ratio{.rule = "speed_ratio", .side = name, .value = speed_ratio_};
+    Finding steep{.rule = "acceleration", .side = name, .value = 1};
+    Finding weak{.rule = "torque", .side = name, .value = 1};
+    for (std::size_t i = 0; i < side.count && delay_s(side, i) > cruise_s(); ++i) {
+      const bool last = i + 1 == side.count;
+      const Pair pair{delay_s(side, i),
+                      last ? cruise_s() : std::max(cruise_s(), delay_s(side, i + 1)),
+                      in_file(last ? i : i + 1)};
+      inspect_ratio(pair, ratio);
+      inspect_acceleration(pair, steep);
+      inspect_torque(pair, which, weak);
+    }
+    for (Finding& finding : std::array{ratio, steep, weak}) {
+      if (!finding.message.empty()) found_.push_back(std::move(finding));
+    }
+  }
+
+  void inspect_start(const bushd_ramp& side, const char* name, std::size_t index) {
+    const double start_hz = hz(std::max(delay_s(side, 0), cruise_s()));
+    if (!limits_.start_hz || start_hz <= *limits_.start_hz * (1 + kNoise)) return;
+    add(Severity::kError, "start_speed", name, index, start_hz, *limits_.start_hz,
+        fmt::format(
+            "begins or ends at {:.6g} steps/s; the motor starts and stops at {:.6g} at most. "
+            "Put slower codes before it",
+            start_hz, *limits_.start_hz));
+  }
+
+  void inspect_ratio(const Pair& pair, Finding& worst) const {
+    const double ratio = pair.slower_s / pair.faster_s;
+    if (speed_ratio_ <= 0 || ratio <= worst.value * (1 + kNoise)) return;
+    worst.index = pair.index;
+    worst.value = ratio;
+    worst.limit = speed_ratio_;
+    worst.message = fmt::format(
+        "the speed changes {:.3g} times from one step to the next; allowed: "
+        "{:.3g} times. Put codes in between",
+        ratio, speed_ratio_);
+  }
+
+  // The least acceleration that rounding up leaves possible: a code may stand for a delay of up to
+  // one unit less.
+  double least_acceleration(const Pair& pair) const {
+    const double slower_s = pair.slower_s - unit_s_ * (1 - kNoise);
+    if (slower_s <= pair.faster_s) return 0;
+    return (hz(pair.faster_s) - hz(slower_s)) / (0.5 * (pair.slower_s + pair.faster_s));
+  }
+
+  // `worst.value` is the share of what is allowed until the finding is made.
+  void inspect_acceleration(const Pair& pair, Finding& worst) const {
+    if (!limits_.acceleration) return;
+    const double acceleration = least_acceleration(pair);
+    if (acceleration <= *limits_.acceleration * (1 + kNoise) ||
+        (!worst.message.empty() && acceleration <= worst.value)) {
+      return;
+    }
+    worst.index = pair.index;
+    worst.value = acceleration;
+    worst.limit = *limits_.acceleration;
+    worst.message = fmt::format(
+        "accelerates by {:.6g} steps/s^2; allowed: {:.6g}. Put codes in "
+        "between, or \"bushtab scale --acceleration {:.3f}\"",
+        acceleration, worst.limit, worst.limit / acceleration);
+  }
+
+  void inspect_torque(const Pair& pair, Side which, Finding& worst) const {
+    if (!limits_.motor) return;
+    const Motor& motor = *limits_.motor;
+    const double wanted = least_acceleration(pair);
+    if (wanted <= 0) return;
+    const double middle_hz = 2.0 / (pair.slower_s + pair.faster_s);
+    // Torque that the step takes, as a share of what the motor has without any safety factor.
+    const double friction = which == Side::kAccel ? motor.friction_nm : -motor.brake_friction_nm;
+    constexpr double kTurn = 6.283185307179586;
+    const double needs_nm = wanted * kTurn / motor.steps_per_turn * motor.inertia_kgm2 + friction;
+    const double has_nm = torque_at(motor, middle_hz);
+    const double share = needs_nm / std::max(has_nm, 1e-12);
+    const bool stalls = share > 1 + kNoise;
+    if (share * motor.safety <= 1 + kNoise || (!worst.message.empty() && share <= worst.value))
+      return;
+    worst.severity = stalls ? Severity::kError : Severity::kWarning;
+    worst.index = pair.index;
+    worst.value = share;
+    worst.limit = 1 / motor.safety;
+    worst.message = fmt::format(
+        "takes {:.3g} Nm at {:.6g} steps/s and the motor has {:.3g}, {:.3g} with the safety "
+        "factor: "
+        "{}. Make the table slower, or with --law torque",
+        needs_nm, middle_hz, has_nm, has_nm / motor.safety,
+        stalls ? "it will lose steps" : "it may lose steps");
+  }
+
+  void inspect_cruise() {
+    const bushd_table& view = table_.view();
+    const double cruise_hz = hz(bushd_table_fastest(&view) * unit_s_);
+    if (limits_.max_hz && cruise_hz > *limits_.max_hz * (1 + kNoise)) {
+      add(Severity::kError, "max_speed", "cruise", std::nullopt, cruise_hz, *limits_.max_hz,
+          fmt::format("cruises at {:.6g} steps/s; allowed: {:.6g}. Set cruise = {:.0f} or more",
+                      cruise_hz, *limits_.max_hz,
+                      std::ceil(1 / (*limits_.max_hz * unit_s_) - kNoise)));
+    }
+    const double resolution = 1.0 / view.cruise;
+    if (limits_.code_bits != 8U && resolution > limits_.resolution * (1 + kNoise)) {
+      add(Severity::kWarning, "resolution", "cruise", std::nullopt, resolution, limits_.resolution,
+          fmt::format(
+              "one code more changes the cruise speed by {:.3g} %; allowed: {:.3g} %. Use a "
+              "shorter time_unit_ns",
+              100 * resolution, 100 * limits_.resolution));
+    }
+    if (limits_.motor && cruise_hz > limits_.motor->torque.back().speed_hz * (1 + kNoise)) {
+      add(Severity::kError, "torque", "cruise", std::nullopt, cruise_hz,
+          limits_.motor->torque.back().speed_hz,
+          fmt::format("cruises at {:.6g} steps/s; the torque curve ends at {:.6g}. Set a slower "
+                      "cruise",
+                      cruise_hz, limits_.motor->torque.back().speed_hz));
+    }
+  }
+
+  void inspect_place() {
+    const bushd_table& view = table_.view();
+    if (limits_.code_bits == 8U) inspect_bytes();
+    const std::uint32_t codes = view.accel.count + (table_.symmetric() ? 0 : view.decel.count);
+    if (limits_.mcu_codes && codes > *limits_.mcu_codes) {
+      add(Severity::kError, "mcu_memory", "", std::nullopt, codes, *limits_.mcu_codes,
+          fmt::format("has {} codes; the MCU has memory for {}. Use a steeper ramp, \"bushtab "
+                      "resample\", or sides that mirror each other",
+                      codes, *limits_.mcu_codes));
+    }
+    if (!limits_.tick_ns) return;
+    const std::uint32_t steps = bushd_table_max_steps_per_tick(&view, *limits_.tick_ns);
+    if (steps > BUSHD_MAX_STEPS_PER_TICK) {
+      add(Severity::kError, "tick", "cruise", std::nullopt, steps, BUSHD_MAX_STEPS_PER_TICK,
+          fmt::format(
+              "makes up to {} steps in a tick of {} us; allowed: {}. Use a shorter tick or a "
+              "slower table",
+              steps, *limits_.tick_ns / 1000, BUSHD_MAX_STEPS_PER_TICK));
+    }
+    if (!limits_.slots) return;
+    const double slot_s = *limits_.tick_ns * 1e-9 / *limits_.slots;
+    const double fastest_s = bushd_table_fastest(&view) * unit_s_;
+    if (fastest_s < 2 * slot_s * (1 - kNoise)) {
+      add(Severity::kWarning, "slots", "cruise", std::nullopt, fastest_s * 1e6, 2e6 * slot_s,
+          fmt::format(
+              "the shortest delay is {:.4g} us and a slot {:.4g} us, so steps come up to {:.0f} % "
+              "of a delay early or late; allowed: two slots. Use a shorter tick or a slower table",
+              fastest_s * 1e6, slot_s * 1e6, 100 * slot_s / fastest_s));
+    }
+  }
+
+  void inspect_bytes() {
+    const bushd_table& view = table_.view();
+    for (const auto& [code, side, index] :
+         {std::tuple{view.accel.code[0], "accel", std::size_t{0}},
+          std::tuple{view.decel.code[0], "decel", std::size_t{view.decel.count - 1}},
+          std::tuple{bushd_table_fastest(&view), "cruise", std::size_t{0}}}) {
+      if (code >= kBushdFastest && code <= kBushdSlowest) continue;
+      const bool slow = code > kBushdSlowest;
+      add(Severity::kError, "code_width", side, index, code, slow ? kBushdSlowest : kBushdFastest,
+          fmt::format("is code {}; BUSHD-2 has bytes of 10 (25 F_start) to 250 (F_start). Use a {} "
+                      "time unit",
+                      code, slow ? "longer" : "shorter"));
+    }
+  }
+
+  const Table& table_;
+  const Limits& limits_;
+  double unit_s_ = 0;
+  double speed_ratio_ = 0;
+  std::vector<Finding> found_;
+};
+
+}  // namespace
+
+std::vector<Finding> findings(const Table& table, const Limits& limits) {
+  return Inspector(table, limits).inspect();
+}
+
+}  // namespace bushd::tables::laws

@@ -1,0 +1,29 @@
+// Files that are replaced whole: whoever reads, or whatever crashes, sees the old or the new text.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+#include "base/result.h"
+
+namespace bushd::tables::store {
+
+// Writes to a temporary file in the same directory, syncs it, renames it and syncs the directory.
+// Keeps the permissions of the file that is replaced. Directories are not made.
+Result<void> replace_file(const std::filesystem::path& path, std::string_view text);
+
+// Only one process at a time holds the lock of a file; waits for the others. Released with the
+// object, and when the process dies.
+class FileLock {
+ public:
+  static Result<FileLock> take(const std::filesystem::path& path);
+  FileLock(FileLock&& other) noexcept : fd_(other.fd_) { other.fd_ = -1; }
+  FileLock& operator=(FileLock&&) = delete;
+  ~FileLock();
+
+ private:
+  explicit FileLock(int fd) : fd_(fd) {}
+  int fd_;
+};
+
+}  // namespace bushd::tables::store

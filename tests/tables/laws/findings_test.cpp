@@ -1,0 +1,130 @@
+// What the check finds, and where.
+#include "tables/laws/findings.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tables/laws/random_spec.h"
+
+namespace bushd::test {
+namespace {
+
+using tables::TableContent;
+using tables::laws::Finding;
+using tables::laws::Law;
+using tables::laws::Limits;
+using tables::laws::Motor;
+using tables::laws::Severity;
+using tables::laws::Spec;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// 100, 200, 400 steps/s
+const TableContent kTable{.name = "t", .time_unit_ns = 100'000, .accel = {100, 50, 25}};
+
+std::vector<Finding> found(const TableContent& content, const Limits& limits) {
+  return findings(**tables::make(content), limits);
+}
+
+TEST(Findings, GoodTableHasNone) {
+  EXPECT_THAT(found(kTable, {.start_hz = 100,
+                             .max_hz = 400,
+                             .acceleration = 53'000,
+                             .mcu_codes = 3,
+                             .tick_ns = 20'000'000,
+                             .slots = 128}),
+              IsEmpty());
+}
+
+TEST(Findings, StartAndMaximumSpeed) {
+  const auto start = found(kTable, {.start_hz = 99});
+  ASSERT_EQ(start.size(), 1U);
+  EXPECT_EQ(start[0].rule, "start_speed");
+  EXPECT_EQ(start[0].index, 0U);
+  EXPECT_DOUBLE_EQ(start[0].value, 100);
+  EXPECT_EQ(start[0].severity, Severity::kError);
+  const auto max = found(kTable, {.max_hz = 399});
+  ASSERT_EQ(max.size(), 1U);
+  EXPECT_EQ(max[0].rule, "max_speed");
+  EXPECT_THAT(max[0].message, HasSubstr("Set cruise = 26 or more"));
+}
+
+TEST(Findings, BothSidesAreLookedAtInTheOrderOfTheFile) {
+  TableContent content = kTable;
+  content.decel = {{25, 30, 90}};
+  const auto stop = found(content, {.start_hz = 105});
+  ASSERT_EQ(stop.size(), 2U);
+  EXPECT_EQ(stop[0].rule, "start_speed");
+  EXPECT_EQ(stop[0].side, "decel");
+  EXPECT_EQ(stop[0].index, 2U);
+  EXPECT_EQ(stop[1].rule, "speed_ratio");
+  EXPECT_EQ(stop[1].index, 1U);
+  EXPECT_DOUBLE_EQ(stop[1].value, 3);
+}
+
+TEST(Findings, JumpFromASideToItsCruiseIsOneToo) {
+  TableContent content = kTable;
+  content.cruise = 12;
+  const auto jump = found(content, {});
+  ASSERT_EQ(jump.size(), 1U);
+  EXPECT_EQ(jump[0].rule, "speed_ratio");
+  EXPECT_EQ(jump[0].index, 2U);
+}
+
+TEST(Findings, AccelerationCountsWithoutWhatRoundingMayMake) {
+  // From 10 ms to 5 ms: 100 steps/s within 7.5 ms; the first code may stand for 9.9 ms.
+  EXPECT_THAT(found(kTable, {.acceleration = 26'500}), testing::SizeIs(1));
+  const auto steep = found(kTable, {.acceleration = 12'000});
+  ASSERT_EQ(steep.size(), 1U);
+  EXPECT_EQ(steep[0].rule, "acceleration");
+  EXPECT_EQ(steep[0].index, 2U);
+}
+
+TEST(Findings, TablesOfALawKeepItsBound) {
+  EXPECT_TRUE(rc::check("no false alarm", [] {
+    const Spec spec = random_spec(*rc::gen::element(Law::kConstant, Law::kScurve));
+    const auto content = make_content(spec);
+    RC_ASSERT(content.has_value());
+    RC_ASSERT(
+        found(*content, {.speed_ratio = 0, .acceleration = *spec.accel.acceleration}).empty());
+  }));
+}
+
+TEST(Findings, CodesThatAreNotThoseOfBushd) {
+  TableContent content{.name = "t", .time_unit_ns = 40'000, .accel = {251, 100, 9}};
+  const auto wide = found(content, {.speed_ratio = 0, .code_bits = 8});
+  ASSERT_EQ(wide.size(), 3U);
+  EXPECT_EQ(wide[0].rule, "code_width");
+  EXPECT_EQ(wide[0].side, "accel");
+  EXPECT_EQ(wide[2].side, "cruise");
+}
+
+TEST(Findings, McuAndBus) {
+  EXPECT_EQ(found(kTable, {.mcu_codes = 2}).at(0).rule, "mcu_memory");
+  TableContent fast{.name = "t", .time_unit_ns = 100, .accel = {1000, 500}};
+  EXPECT_EQ(found(fast, {.tick_ns = 10'000'000}).at(0).rule, "tick");
+  const auto slots = found(fast, {.tick_ns = 6'000'000, .slots = 128});
+  ASSERT_EQ(slots.size(), 1U);
+  EXPECT_EQ(slots[0].rule, "slots");
+  EXPECT_EQ(slots[0].severity, Severity::kWarning);
+}
+
+TEST(Findings, TooFastForTheMotorByThirtyPerCent) {
+  Spec spec{.name = "t", .start_hz = 200, .max_hz = 3000};
+  spec.accel.law = Law::kTorque;
+  spec.motor = Motor{.torque = {{0, 0.4}, {2000, 0.3}, {6000, 0.1}},
+                     .inertia_kgm2 = 2e-5,
+                     .friction_nm = 0.02,
+                     .safety = 1.2};
+  TableContent content = *make_content(spec);
+  EXPECT_THAT(found(content, {.motor = spec.motor}), IsEmpty());
+  content.time_unit_ns = static_cast<std::uint32_t>(content.time_unit_ns / 1.3);
+  const auto fast = found(content, {.motor = spec.motor});
+  ASSERT_FALSE(fast.empty());
+  EXPECT_EQ(fast[0].rule, "torque");
+  EXPECT_EQ(fast[0].severity, Severity::kError);
+  EXPECT_THAT(fast[0].message, HasSubstr("it will lose steps"));
+}
+
+}  // namespace
+}  // namespace bushd::test

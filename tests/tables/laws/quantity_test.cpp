@@ -1,0 +1,29 @@
+#include "tables/laws/quantity.h"
+
+#include <gtest/gtest.h>
+
+namespace bushd::test {
+namespace {
+
+using tables::laws::parse_quantity;
+using tables::laws::Quantity;
+
+TEST(Quantity, UnitsAreConverted) {
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kSpeed, "2.5kHz"), 2500);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kSpeed, "300 steps/s"), 300);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kSpeed, "7"), 7);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kAcceleration, "12kHz/s"), 12000);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kTime, "250ms"), 0.25);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kTimeUnit, "25us"), 25000);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kTorque, "12Ncm"), 0.12);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kInertia, "38gcm2"), 38e-7);
+}
+
+TEST(Quantity, AnythingElseIsRefused) {
+  for (const char* text : {"", "Hz", "nan", "inf", "1e999", "5 rpm", "5Hz ", "0x", "--5", "5s"}) {
+    EXPECT_FALSE(parse_quantity(Quantity::kSpeed, text)) << text;
+  }
+}
+
+}  // namespace
+}  // namespace bushd::test

@@ -1,0 +1,74 @@
+// A save that is killed before any one of its system calls leaves the old table or the new one, and
+// a history that goes on.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/ptrace.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
+#include "tables/store/store.h"
+#include "tables/temp_directory.h"
+
+namespace bushd::test {
+namespace {
+
+using tables::store::Store;
+
+enum class End { kKilled, kFinished, kNotTraced };
+
+// Runs `work` in a child that is killed at its n-th stop at a system call (entries and exits).
+template <class Work>
+End killed_at(int n, const Work& work) {
+  const pid_t child = fork();
+  if (child == 0) {
+    if (ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) _exit(2);
+    raise(SIGSTOP);
+    _exit(work() ? 0 : 1);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  for (int stop = 0; WIFSTOPPED(status); ++stop) {
+    if (stop == n) kill(child, SIGKILL);
+    ptrace(PTRACE_SYSCALL, child, nullptr, nullptr);
+    waitpid(child, &status, 0);
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 2) return End::kNotTraced;
+  EXPECT_TRUE(WIFSIGNALED(status) || WEXITSTATUS(status) == 0);
+  return WIFSIGNALED(status) ? End::kKilled : End::kFinished;
+}
+
+TEST(TableStoreCrash, LeavesOldOrNewAtAnySystemCall) {
+  const std::string old_text =
+      "name = \"t\"\nrevision = 1\ntime_unit_ns = 1000\naccel = [9, 7, 5]\n";
+  const std::string new_text =
+      "name = \"t\"\nrevision = 2\ntime_unit_ns = 1000\naccel = [8, 7, 5]\n";
+  // What counts here is the order of the calls: a disk that syncs would only make it slow.
+  if (access("/dev/shm", W_OK) == 0) setenv("TMPDIR", "/dev/shm", 1);
+  int left_old = 0;
+  int left_new = 0;
+  for (int n = 1;; ++n) {
+    const TempDirectory directory;
+    Store store(directory.path(), directory.path() / "history.sqlite");
+    ASSERT_TRUE(store.create("t", old_text, "new"));
+    const End end =
+        killed_at(n, [&] { return store.save("t", old_text, new_text, "set").has_value(); });
+    if (end == End::kNotTraced) GTEST_SKIP() << "no tracing of children here";
+    const auto found = store.read("t");
+    ASSERT_TRUE(found) << "killed at stop " << n << ": " << found.error().text();
+    ASSERT_TRUE(found->text == old_text || found->text == new_text) << found->text;
+    (found->text == old_text ? left_old : left_new)++;
+    // The next one is not hindered by what was left behind, and has the right number.
+    const auto next = store.save("t", found->text, found->text + "# more\n", "next");
+    ASSERT_TRUE(next) << "killed at stop " << n << ": " << next.error().text();
+    ASSERT_EQ(*next, found->content.revision + 1);
+    ASSERT_EQ(store.read("t", std::to_string(found->content.revision))->text, found->text);
+    if (end == End::kFinished) break;
+  }
+  EXPECT_GT(left_old, 10);
+  EXPECT_GT(left_new, 2);
+}
+
+}  // namespace
+}  // namespace bushd::test

@@ -1,0 +1,173 @@
+#include <fmt/core.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "commands.h"
+#include "open_table.h"
+#include "tables/store/atomic_file.h"
+#include "tables/table_file.h"
+#include "tables/table_text.h"
+#include "tables/toml_file.h"
+
+namespace bushtab {
+namespace {
+
+namespace tables = bushd::tables;
+namespace fs = std::filesystem;
+
+int saved(const Home& home, const bushd::Result<std::uint32_t>& revision) {
+  if (!revision) return refuse(revision.error());
+  fmt::print("{}: revision {}\n", home.store.path_of(home.name).string(), *revision);
+  return kDone;
+}
+
+// The editor may have arguments of its own ("code --wait"), so a shell runs it; the file is a
+// parameter of that shell and not part of its text.
+bool run_editor(const std::string& editor, const fs::path& file) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const std::string command = editor + " \"$1\"";
+    execl("/bin/sh", "sh", "-c", command.c_str(), "sh", file.c_str(), nullptr);
+    _exit(127);
+  }
+  int status = -1;
+  while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return child > 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+std::string editor_of_user() {
+  for (const char* variable : {"VISUAL", "EDITOR"}) {
+    const char* editor = std::getenv(variable);
+    if (editor != nullptr && *editor != '\0') return editor;
+  }
+  return "vi";
+}
+
+}  // namespace
+
+int change(const Places& places, const std::string& table, const std::string& note,
+           const Change& change) {
+  auto home = home_of(places, table);
+  if (!home) return refuse(home.error());
+  const auto old = home->store.read(home->name);
+  if (!old) return refuse(old.error());
+  const auto content = change(old->content);
+  if (!content) return refuse(content.error());
+  if (*content == old->content) {
+    fmt::print("{}: nothing to change\n", home->store.path_of(home->name).string());
+    return kDone;
+  }
+  const auto text = tables::rewrite(old->text, *content, home->store.path_of(home->name).string());
+  if (!text) return refuse(text.error());
+  return saved(*home, home->store.save(home->name, old->text, *text, note));
+}
+
+int edit(const Places& places, const std::string& table) {
+  auto home = home_of(places, table);
+  if (!home) return refuse(home.error());
+  const auto old = home->store.read(home->name);
+  if (!old) return refuse(old.error());
+  const fs::path path = home->store.path_of(home->name);
+  const fs::path aside = path.parent_path() / ("." + home->name + ".edited.toml");
+  if (auto written = tables::store::replace_file(aside, old->text); !written) {
+    return refuse(written.error());
+  }
+  const std::string editor = editor_of_user();
+  const bool edited = run_editor(editor, aside);
+  const auto text = tables::read_text(aside);
+  std::error_code ignored;
+  if (!edited || !text || *text == old->text) {
+    fs::remove(aside, ignored);
+    if (!edited) {
+      return refuse(
+          bushd::Error{.message = fmt::format("the editor \"{}\" failed; nothing was changed. "
+                                              "Set VISUAL or EDITOR",
+                                              editor)});
+    }
+    if (!text) return refuse(text.error());
+    fmt::print("{}: nothing to change\n", path.string());
+    return kDone;
+  }
+  const auto revision = home->store.save(home->name, old->text, *text, "edit");
+  if (revision) {
+    fs::remove(aside, ignored);
+    return saved(*home, revision);
+  }
+  fmt::print(stderr, "{} stays as it was; your text is in {}\n", path.string(), aside.string());
+  return refuse(revision.error());
+}
+
+int copy(const Places& places, const std::string& from, const std::string& to) {
+  const auto source = open_table(places, from);
+  if (!source) return refuse(source.error());
+  auto home = home_of(places, to);
+  if (!home) return refuse(home.error());
+  const auto text = tables::read_text((*source)->path());
+  if (!text) return refuse(text.error());
+  auto content = tables::parse_content(*text, (*source)->path());
+  if (!content) return refuse(content.error());
+  content->name = home->name;
+  const auto renamed = tables::rewrite(*text, *content, (*source)->path());
+  if (!renamed) return refuse(renamed.error());
+  return saved(*home, home->store.create(home->name, *renamed, "copy of " + from));
+}
+
+int log(const Places& places, const std::string& table, bool json) {
+  const auto home = home_of(places, table);
+  if (!home) return refuse(home.error());
+  const auto revisions = home->store.log(home->name);
+  if (!revisions) return refuse(revisions.error());
+  if (revisions->empty()) {
+    return refuse(bushd::Error{.message = fmt::format("table \"{}\" has no history", home->name)});
+  }
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const auto& revision : *revisions) {
+    all.push_back({{"revision", revision.number},
+                   {"time", revision.time},
+                   {"note", revision.note},
+                   {"sha256", revision.content_hash},
+                   {"tags", revision.tags}});
+    if (json) continue;
+    std::string tags;
+    for (const std::string& tag : revision.tags) tags += "  [" + tag + "]";
+    fmt::print("{:>5}  {}  {}  {}{}\n", revision.number, revision.time,
+               revision.content_hash.substr(0, tables::kShortHashLength), revision.note, tags);
+  }
+  if (json) {
+    fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  }
+  return kDone;
+}
+
+int revert(const Places& places, const std::string& table, const std::string& revision) {
+  auto home = home_of(places, table);
+  if (!home) return refuse(home.error());
+  const auto now = home->store.read(home->name);
+  const auto then = home->store.read(home->name, revision);
+  if (!then) return refuse(then.error());
+  const std::string note = fmt::format("revert to {}", then->content.revision);
+  // The file may be gone, or be no table any more; what else stands there is not written over.
+  if (!now) return saved(*home, home->store.create(home->name, then->text, note));
+  return saved(*home, home->store.save(home->name, now->text, then->text, note));
+}
+
+int tag(const Places& places, const std::string& table, const std::string& tag,
+        const std::string& revision) {
+  auto home = home_of(places, table);
+  if (!home) return refuse(home.error());
+  const auto number = home->store.tag(home->name, tag, revision);
+  if (!number) return refuse(number.error());
+  fmt::print("{}: revision {} is {}\n", home->name, *number, tag);
+  return kDone;
+}
+
+}  // namespace bushtab

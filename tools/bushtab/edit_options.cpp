@@ -1,0 +1,238 @@
+#include <fmt/core.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "options.h"
+#include "tables/bushd/image.h"
+#include "tables/edit.h"
+
+namespace bushtab {
+namespace {
+
+namespace tables = bushd::tables;
+using tables::SideKey;
+using tables::TableContent;
+using tables::laws::Quantity;
+
+struct Codes {
+  std::string table;
+  std::size_t index = 0;
+  std::size_t count = 1;
+  std::vector<std::uint16_t> codes;
+  bool decel = false;
+
+  SideKey side() const { return decel ? SideKey::kDecel : SideKey::kAccel; }
+};
+
+std::shared_ptr<Codes> codes_command(CLI::App* command, bool takes_codes) {
+  const auto options = std::make_shared<Codes>();
+  command->add_option("TABLE", options->table, "A table's file or name")->required();
+  command->add_option("INDEX", options->index, "Of the first code, from 0 in the order of the file")
+      ->required()
+      ->check(refuse_fraction);
+  if (takes_codes) {
+    command->add_option("CODE", options->codes, "Delays in time units")
+        ->required()
+        ->check(refuse_fraction);
+  } else {
+    command->add_option("COUNT", options->count, "How many (default 1)")->check(refuse_fraction);
+  }
+  command->add_flag("--decel", options->decel, "Of the decelerating side");
+  return options;
+}
+
+void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
+  CLI::App* set = app.add_subcommand("set", "Sets codes of a table");
+  const auto set_options = codes_command(set, true);
+  run(set, [&places, o = set_options] {
+    return change(places, o->table, fmt::format("set {} codes from {}", o->codes.size(), o->index),
+                  [&](TableContent content) {
+                    return tables::set_codes(std::move(content), o->side(), o->index, o->codes);
+                  });
+  });
+  CLI::App* insert = app.add_subcommand("insert", "Inserts codes before an index");
+  const auto insert_options = codes_command(insert, true);
+  run(insert, [&places, o = insert_options] {
+    return change(places, o->table, fmt::format("insert {} codes at {}", o->codes.size(), o->index),
+                  [&](TableContent content) {
+                    return tables::insert_codes(std::move(content), o->side(), o->index, o->codes);
+                  });
+  });
+  CLI::App* remove = app.add_subcommand("delete", "Deletes codes");
+  const auto remove_options = codes_command(remove, false);
+  run(remove, [&places, o = remove_options] {
+    return change(places, o->table, fmt::format("delete {} codes from {}", o->count, o->index),
+                  [&](TableContent content) {
+                    return tables::delete_codes(std::move(content), o->side(), o->index, o->count);
+                  });
+  });
+}
+
+void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
+  struct Options {
+    std::string table;
+    double speed = 0;
+    double acceleration = 0;
+    std::uint32_t time_unit_ns = 0;
+    std::size_t codes = 0;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* scale = app.add_subcommand("scale", "Multiplies speeds or accelerations");
+  scale->add_option("TABLE", options->table, "A table's file or name")->required();
+  auto* what = scale->add_option_group("what", "One of")->require_option(1);
+  what->add_option("--speed", options->speed, "All speeds times FACTOR")
+      ->check(CLI::PositiveNumber)
+      ->type_name("FACTOR");
+  what->add_option("--acceleration", options->acceleration,
+                   "The same speeds, accelerations times FACTOR, in fewer or more codes")
+      ->check(CLI::PositiveNumber)
+      ->type_name("FACTOR");
+  run(scale, [&places, options] {
+    if (options->speed > 0) {
+      return change(places, options->table, fmt::format("speeds times {:.6g}", options->speed),
+                    [&](TableContent content) {
+                      return tables::scale_speed(std::move(content), options->speed);
+                    });
+    }
+    return change(places, options->table,
+                  fmt::format("accelerations times {:.6g}", options->acceleration),
+                  [&](TableContent content) {
+                    return tables::scale_acceleration(std::move(content), options->acceleration);
+                  });
+  });
+
+  CLI::App* resample = app.add_subcommand("resample", "Another time unit or number of codes");
+  resample->add_option("TABLE", options->table, "A table's file or name")->required();
+  auto* how = resample->add_option_group("how", "One of")->require_option(1);
+  add_quantity(
+      how, "--time-unit", Quantity::kTimeUnit,
+      [options](double ns) {
+        if (ns < 1 || ns > tables::kMaxTimeUnitNs || ns != std::floor(ns)) {
+          throw CLI::ValidationError("--time-unit", "allowed: whole ns, 1ns..1s");
+        }
+        options->time_unit_ns = static_cast<std::uint32_t>(ns);
+      },
+      "The same delays, rounded up to this unit");
+  how->add_option("--codes", options->codes, "The same speeds over this number of codes a side")
+      ->check(refuse_fraction)
+      ->type_name("N");
+  run(resample, [&places, options] {
+    if (options->time_unit_ns > 0) {
+      return change(places, options->table, fmt::format("time unit {} ns", options->time_unit_ns),
+                    [&](TableContent content) {
+                      return tables::resample_unit(std::move(content), options->time_unit_ns);
+                    });
+    }
+    return change(places, options->table, fmt::format("{} codes a side", options->codes),
+                  [&](TableContent content) {
+                    return tables::resample_codes(std::move(content), options->codes);
+                  });
+  });
+
+  CLI::App* reverse = app.add_subcommand("reverse", "Swaps acceleration and deceleration");
+  reverse->add_option("TABLE", options->table, "A table's file or name")->required();
+  run(reverse, [&places, options] {
+    return change(places, options->table, "reverse",
+                  [](TableContent content) { return tables::reverse(std::move(content)); });
+  });
+  CLI::App* edit = app.add_subcommand("edit", "Edits the file in $VISUAL or $EDITOR");
+  edit->add_option("TABLE", options->table, "A table's file or name")->required();
+  edit->footer("A text that is no table is kept aside; the old table stays.");
+  run(edit, [&places, options] { return bushtab::edit(places, options->table); });
+}
+
+void add_history_commands(CLI::App& app, const Places& places, const Run& run) {
+  struct Options {
+    std::string table;
+    std::string other;
+    std::string revision;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* copy = app.add_subcommand("copy", "A table under another name");
+  copy->add_option("TABLE", options->table, "A table's file or name")->required();
+  copy->add_option("NEW", options->other, "The new table's name, or a file NAME.toml")->required();
+  run(copy, [&places, options] { return bushtab::copy(places, options->table, options->other); });
+  CLI::App* log = app.add_subcommand("log", "The revisions of a table, the newest first");
+  log->add_option("TABLE", options->table, "A table's file or name")->required();
+  log->add_flag("--json", options->json, "As JSON");
+  run(log, [&places, options] { return bushtab::log(places, options->table, options->json); });
+  CLI::App* revert = app.add_subcommand("revert", "Makes an old revision the newest again");
+  revert->add_option("TABLE", options->table, "A table's file or name")->required();
+  revert->add_option("REVISION", options->revision, "Its number or a tag")->required();
+  run(revert,
+      [&places, options] { return bushtab::revert(places, options->table, options->revision); });
+  CLI::App* tag = app.add_subcommand("tag", "Gives a revision a name");
+  tag->add_option("TABLE", options->table, "A table's file or name")->required();
+  tag->add_option("TAG", options->other, "The name")->required();
+  tag->add_option("REVISION", options->revision, "Its number or another tag (default: the newest)");
+  run(tag, [&places, options] {
+    return bushtab::tag(places, options->table, options->other, options->revision);
+  });
+}
+
+void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
+  const auto out = std::make_shared<BushdExport>();
+  CLI::App* to = app.add_subcommand("export-bushd", "Writes a table into a memory image of BUSHD");
+  to->add_option("TABLE", out->table, "A table's file or name")->required();
+  to->add_option("IMAGE", out->image, "1024 bytes; other pages of an image that is there stay")
+      ->required();
+  to->add_option("--page", out->page, "Of BUSHD-2, 0..3 (default 0)")->check(CLI::Range(0U, 3U));
+  to->add_option("--steps", out->steps,
+                 "Number of steps of the program, 0..65535 (BUSHD-1: 1..126)")
+      ->required()
+      ->check(refuse_fraction);
+  to->add_option("--positions", out->positions, "The position area, 32 hexadecimal digits");
+  to->add_flag("--resample", out->resample,
+               "Round up to codes of 8 bits, cut the top speed at 238 codes, and print the error");
+  auto* bushd1 =
+      to->add_flag("--bushd1", out->bushd1, "A travel of BUSHD-1 instead, 4 bytes and one a step");
+  to->add_option("--reactor-delay", out->reactor_delay,
+                 "BUSHD-1: code of the delay from reactor start")
+      ->needs(bushd1)
+      ->check(refuse_fraction);
+  run(to, [&places, out] { return export_bushd(places, *out); });
+
+  const auto in = std::make_shared<BushdImport>();
+  CLI::App* from = app.add_subcommand("import-bushd", "Makes a table of a memory image of BUSHD");
+  from->add_option("IMAGE", in->image, "1024 bytes, or with --bushd1 4 and one a step")->required();
+  from->add_option("TABLE", in->table, "The new table's name, or a file NAME.toml")->required();
+  from->add_option("--page", in->page, "Of BUSHD-2, 0..3 (default 0)")->check(CLI::Range(0U, 3U));
+  auto* start = add_quantity(
+      from, "--start", Quantity::kSpeed, [in](double value) { in->start_hz = value; },
+      "F_start, to which the hardware is set: 1..100 Hz");
+  auto* unit = add_quantity(
+      from, "--time-unit", Quantity::kTimeUnit,
+      [in](double ns) {
+        if (ns < 1 || ns > tables::kMaxTimeUnitNs || ns != std::floor(ns)) {
+          throw CLI::ValidationError("--time-unit", "allowed: whole ns, 1ns..1s");
+        }
+        in->time_unit_ns = static_cast<std::uint32_t>(ns);
+      },
+      "BUSHD-1: of its codes");
+  from->add_flag("--bushd1", in->bushd1, "A travel of BUSHD-1");
+  from->add_flag("--replace", in->replace, "If the table is there: a new revision of it");
+  from->add_flag("--json", in->json, "Steps and positions of the image as JSON");
+  run(from, [&places, in, start, unit] {
+    if (in->bushd1 ? unit->count() == 0 : start->count() == 0) {
+      return refuse(bushd::Error{.message = in->bushd1
+                                                ? "--bushd1 needs --time-unit"
+                                                : "F_start is not in the image: --start 1..100Hz"});
+    }
+    return import_bushd(places, *in);
+  });
+}
+
+}  // namespace
+
+void add_edit_options(CLI::App& app, const Places& places, const Run& run) {
+  add_code_commands(app, places, run);
+  add_whole_commands(app, places, run);
+  add_history_commands(app, places, run);
+  add_bushd_commands(app, places, run);
+}
+
+}  // namespace bushtab

@@ -1,0 +1,171 @@
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "options.h"
+
+namespace bushtab {
+namespace {
+
+using bushd::tables::laws::Quantity;
+
+constexpr const char* kTable = "A table's file or name";
+
+void add_show(CLI::App& app, const Places& places, const Run& run) {
+  struct Options {
+    std::string table;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* show = app.add_subcommand("show", "Speeds, times and sizes of a table");
+  show->add_option("TABLE", options->table, kTable)->required();
+  show->add_flag("--json", options->json, "As JSON");
+  run(show, [&places, options] { return bushtab::show(places, options->table, options->json); });
+}
+
+void add_check(CLI::App& app, const Places& places, const Run& run) {
+  const auto options = std::make_shared<Check>();
+  CLI::App* check = app.add_subcommand("check", "Says of every table whether it is good");
+  check->add_option("TABLE", options->tables, "Tables' files or names")->required();
+  check->add_flag("--strict", options->strict, "Warnings are refusals too (exit code 1)");
+  check->add_flag("--json", options->json, "As JSON");
+  auto& limits = options->limits;
+  add_quantity(
+      check, "--start", Quantity::kSpeed, [&](double hz) { limits.start_hz = hz; },
+      "The fastest that the motor can start and stop at");
+  add_quantity(
+      check, "--max", Quantity::kSpeed, [&](double hz) { limits.max_hz = hz; },
+      "The fastest that it may run");
+  add_quantity(
+      check, "--acceleration", Quantity::kAcceleration,
+      [&](double value) { limits.acceleration = value; }, "The greatest acceleration");
+  check
+      ->add_option("--speed-ratio", limits.speed_ratio,
+                   "The greatest change of speed from one step to the next (default 2, with "
+                   "--torque any; 0: any)")
+      ->type_name("RATIO");
+  check->add_option("--code-bits", limits.code_bits, "8: codes must be those of BUSHD-2, 10..250")
+      ->check(CLI::IsMember({8, 16}))
+      ->type_name("8|16");
+  check->add_option("--mcu-codes", limits.mcu_codes, "Table memory of the MCU, in codes")
+      ->check(refuse_fraction)
+      ->type_name("N");
+  check
+      ->add_option_function<std::uint32_t>(
+          "--tick-us", [&](const std::uint32_t& us) { limits.tick_ns = us * 1000; },
+          "Tick of the bus")
+      ->check(refuse_fraction)
+      ->check(CLI::Range(BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000));
+  check->add_option("--slots", limits.slots, "Slots of a tick, 128..256 (with --tick-us)")
+      ->check(refuse_fraction)
+      ->check(CLI::Range(128U, 256U));
+  add_motor_options(check, options->motor);
+  run(check, [&places, options] { return bushtab::check(places, *options); });
+}
+
+void add_list(CLI::App& app, const Places& places, const Run& run) {
+  const auto json = std::make_shared<bool>(false);
+  CLI::App* list = app.add_subcommand("list", "The tables that are there, shipped ones too");
+  list->add_flag("--json", *json, "As JSON");
+  run(list, [&places, json] { return bushtab::list(places, *json); });
+}
+
+void add_time(CLI::App& app, const Places& places, const Run& run) {
+  struct Options {
+    std::string table;
+    std::vector<std::uint32_t> steps;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* time = app.add_subcommand("time", "How long moves take");
+  time->add_option("TABLE", options->table, kTable)->required();
+  time->add_option("--steps", options->steps, "Lengths of moves")
+      ->required()
+      ->check(refuse_fraction)
+      ->check(CLI::Range(0U, 2147483647U))
+      ->type_name("N");
+  time->add_flag("--json", options->json, "As JSON");
+  run(time, [&places, options] {
+    return bushtab::time(places, options->table, options->steps, options->json);
+  });
+}
+
+void add_plot(CLI::App& app, const Places& places, const Run& run) {
+  const auto tables = std::make_shared<std::vector<std::string>>();
+  CLI::App* plot = app.add_subcommand("plot", "Speed over time, drawn in the terminal");
+  plot->add_option("TABLE", *tables, "Tables' files or names, in one picture")->required();
+  plot->footer(
+      "As wide as the terminal, else $COLUMNS, else 80. No colours with $NO_COLOR or in a file.");
+  run(plot, [&places, tables] { return bushtab::plot(places, *tables); });
+}
+
+void add_diff(CLI::App& app, const Places& places, const Run& run) {
+  struct Options {
+    std::string before;
+    std::string after;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* diff = app.add_subcommand("diff", "Two tables, by step and by speed");
+  diff->add_option("BEFORE", options->before, kTable)->required();
+  diff->add_option("AFTER", options->after, kTable)->required();
+  diff->add_flag("--json", options->json, "As JSON");
+  run(diff, [&places, options] {
+    return bushtab::diff(places, options->before, options->after, options->json);
+  });
+}
+
+void add_expand(CLI::App& app, const Places& places, const Run& run) {
+  struct Options {
+    Expansion expansion;
+    std::string format;
+  };
+  const auto options = std::make_shared<Options>();
+  Expansion& expansion = options->expansion;
+  CLI::App* expand = app.add_subcommand(
+      "expand", "A move as CSV tick,displacement: exactly what the daemon would send");
+  expand->footer(
+      "Displacements of format coarse are the bytes on the line: bit 7 is 1 if the motor goes\n"
+      "forward, bits 6..0 count its steps in the tick: 130 is +2, 2 is -2. Those of format fine\n"
+      "are signed, in 1/256 step: 512 is +2, -512 is -2.");
+  constexpr std::int64_t kMaxSteps = std::numeric_limits<std::int32_t>::max();
+  expand->add_option("--table", expansion.table, kTable)->required();
+  expand->add_option("--steps", expansion.steps, "Length and direction of the move")
+      ->required()
+      ->check(refuse_fraction)
+      ->check(CLI::Range(-kMaxSteps, kMaxSteps));
+  expand->add_option("--tick-us", expansion.tick_us, "Length of a tick in us")
+      ->required()
+      ->check(refuse_fraction)
+      ->check(CLI::Range(BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000));
+  expand->add_option("--format", options->format, "coarse (a byte) or fine (steps x 256)")
+      ->required()
+      ->check(CLI::IsMember({"coarse", "fine"}));
+  run(expand, [&places, options] {
+    options->expansion.format =
+        options->format == "coarse" ? BUSHD_FORMAT_COARSE : BUSHD_FORMAT_FINE;
+    return bushtab::expand(places, options->expansion);
+  });
+}
+
+}  // namespace
+
+std::string refuse_fraction(const std::string& value) {
+  const std::size_t first_digit = value.starts_with('-') || value.starts_with('+') ? 1 : 0;
+  const bool whole = value.size() > first_digit &&
+                     value.find_first_not_of("0123456789", first_digit) == std::string::npos;
+  return whole ? std::string() : value + " is not a whole number";
+}
+
+void add_look_options(CLI::App& app, const Places& places, const Run& run) {
+  add_show(app, places, run);
+  add_check(app, places, run);
+  add_diff(app, places, run);
+  add_expand(app, places, run);
+  add_list(app, places, run);
+  add_plot(app, places, run);
+  add_time(app, places, run);
+}
+
+}  // namespace bushtab

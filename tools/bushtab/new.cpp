@@ -1,0 +1,54 @@
+#include <fmt/core.h>
+
+#include <cstdio>
+
+#include "commands.h"
+#include "open_table.h"
+#include "tables/laws/make.h"
+#include "tables/table_text.h"
+
+namespace bushtab {
+
+namespace tables = bushd::tables;
+
+bushd::Result<std::optional<tables::laws::Motor>> load_motor(const MotorOptions& options) {
+  if (options.torque_file.empty()) return std::nullopt;
+  tables::laws::Motor motor = options.motor;
+  auto curve = tables::laws::load_torque_csv(options.torque_file, motor.steps_per_turn);
+  if (!curve) return bushd::fail(curve.error());
+  motor.torque = std::move(*curve);
+  if (auto fault = tables::laws::fault_of(motor)) return bushd::fail(*fault);
+  return motor;
+}
+
+int make_new(const Places& places, const New& wanted) {
+  auto home = home_of(places, wanted.table);
+  if (!home) return refuse(home.error());
+  tables::laws::Spec spec = wanted.spec;
+  spec.name = home->name;
+  auto motor = load_motor(wanted.motor);
+  if (!motor) return refuse(motor.error());
+  spec.motor = std::move(*motor);
+  auto content = tables::laws::make_content(spec);
+  if (!content) return refuse(content.error());
+  content->revision = 1;
+  const std::string text = tables::to_text(*content, wanted.comments);
+  if (wanted.print) {
+    const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
+    if (written && std::fflush(stdout) == 0) return kDone;
+    return refuse(bushd::Error{.message = "cannot write to standard output: is the disk full?"});
+  }
+  const std::string note = fmt::format("new, law {}", tables::laws::name_of(spec.accel.law));
+  bushd::Result<std::uint32_t> revision{0};
+  const auto old = home->store.read(home->name);
+  if (old && wanted.replace) {
+    revision = home->store.save(home->name, old->text, text, note);
+  } else {
+    revision = home->store.create(home->name, text, note);
+  }
+  if (!revision) return refuse(revision.error());
+  fmt::print("{}: revision {}\n", home->store.path_of(home->name).string(), *revision);
+  return kDone;
+}
+
+}  // namespace bushtab

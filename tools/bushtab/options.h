@@ -1,0 +1,32 @@
+// The command line of each group of commands. CLI11 is slow to compile: only these files include
+// it. An Action is what the program does when its command was given.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "commands.h"
+#include "tables/laws/quantity.h"
+
+namespace bushtab {
+
+// Gives the command its action; the result is the program's exit code.
+using Run = std::function<void(CLI::App* command, std::function<int()> action)>;
+
+void add_look_options(CLI::App& app, const Places& places, const Run& run);
+void add_edit_options(CLI::App& app, const Places& places, const Run& run);
+void add_new_options(CLI::App& app, const Places& places, const Run& run);
+
+void add_motor_options(CLI::App* command, MotorOptions& motor);
+
+// An option whose value has a unit.
+CLI::Option* add_quantity(CLI::App* command, const std::string& name,
+                          bushd::tables::laws::Quantity quantity, std::function<void(double)> set,
+                          const std::string& help);
+
+// "5.5" would otherwise be called out of range.
+std::string refuse_fraction(const std::string& value);
+
+}  // namespace bushtab
