@@ -40,7 +40,7 @@ class Configuration(EndToEndTest):
                 text = good.replace(old, new, 1)
                 ran = self.check(text)
                 self.assertEqual((ran.returncode, ran.stdout), (1, ""))
-                found = re.match(rf"{re.escape(str(self.file('bushd.toml')))}:(\d+): {message}", ran.stderr)
+                found = re.match(rf"{re.escape(str(self.file('bushd.toml')))}:(\d+)(?::\d+)?: {message}", ran.stderr)
                 self.assertIsNotNone(found, ran.stderr)
                 changed = self.first_difference(good, text)
                 # At the line itself, or at the head of its section if a key is missing or several lines conflict.

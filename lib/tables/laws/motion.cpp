@@ -165,10 +165,11 @@ Motion between(const Motion& motion, double low_hz, double high_hz) {
 
 std::vector<double> delays_s(const Motion& motion, std::size_t most) {
   const double steps = steps_of(motion);
-  if (motion.empty() || !(steps + 2.0 <= static_cast<double>(most))) return {};
   // A motion of a whole number of steps has no step that is partly beyond it.
   const double noise = 1e-9 * std::max(1.0, steps);
-  const auto last = static_cast<std::size_t>(std::ceil(steps - noise));
+  const double whole = std::ceil(steps - noise);
+  if (motion.empty() || !(whole + 2.0 <= static_cast<double>(most))) return {};
+  const auto last = static_cast<std::size_t>(whole);
   std::vector<double> delays{1.0 / motion.front().from_hz};
   delays.reserve(last + 2);
   auto segment = motion.begin();

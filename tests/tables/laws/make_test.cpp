@@ -91,6 +91,16 @@ TEST(MakeTable, ScurveWithAJerkHasAStraightPart) {
   EXPECT_EQ(make_content(spec)->accel.size(), 332U);
 }
 
+TEST(MakeTable, LongestSideThatAnMcuCanAddressIsMade) {
+  for (const Law law : {Law::kConstant, Law::kScurve, Law::kExponential}) {
+    Spec spec{.name = "t", .start_hz = 100, .max_hz = 20000};
+    spec.accel = {.law = law, .codes = 65535};
+    const auto content = make_content(spec);
+    ASSERT_TRUE(content) << content.error().text();
+    EXPECT_EQ(content->accel.size(), 65535U);
+  }
+}
+
 TEST(MakeTable, CruisingInTheBandIsRefused) {
   Spec spec = constant(100, 800, 1000);
   spec.skip = {.low_hz = 600, .high_hz = 1000, .factor = 4};

@@ -195,6 +195,32 @@ TEST(BushtabCheck, EveryBadFileIsNamedWithLineAndKey) {
   EXPECT_THAT(outcome.err, HasSubstr("\n" + worse + ":1:8: name: is 1; allowed: "));
 }
 
+TEST(BushtabCheck, HostileFilesAreRefusedWithLineAndColumn) {
+  const TempDirectory directory;
+  const auto repeated = [](const std::string& text, int times) {
+    std::string all;
+    for (int i = 0; i < times; ++i) all += text;
+    return all;
+  };
+  const auto refusal = [&](const std::string& accel) {
+    const std::string path =
+        directory.write("h.toml", "name = \"h\"\ntime_unit_ns = 1000\naccel = " + accel + "\n");
+    const Outcome outcome = bushtab("check " + path);
+    EXPECT_EQ(outcome.exit_code, 1) << accel.substr(0, 20);
+    return outcome.err.substr(0, 1000);
+  };
+  EXPECT_THAT(refusal("[9, nan]"),
+              HasSubstr("h.toml:3:13: accel[1]: is the floating-point number nan"));
+  EXPECT_THAT(refusal("[9, -5]"), HasSubstr("h.toml:3:13: accel[1]: is -5"));
+  EXPECT_THAT(refusal("[9, \"7\"]"), HasSubstr("h.toml:3:13: accel[1]: is the string"));
+  EXPECT_THAT(refusal("9"), HasSubstr("h.toml:3:9: accel: is 9; allowed: an array"));
+  EXPECT_THAT(refusal("[9] # \xff"), HasSubstr("h.toml:3:14: not TOML: "));
+  EXPECT_THAT(refusal(repeated("[", 100'000)), HasSubstr("h.toml:3:"));
+  EXPECT_THAT(refusal("[" + repeated("1,", 100'000) + "]"), HasSubstr("makes 100000 codes in all"));
+  EXPECT_THAT(refusal("[" + repeated("1,", 1'100'000) + "]"),
+              HasSubstr("larger than 2097152 bytes"));
+}
+
 TEST(BushtabCheck, StrictRefusesWarnings) {
   const TempDirectory directory;
   const std::string table = directory.write("small.toml", kSmallTable);
