@@ -86,11 +86,14 @@ link::McuSetup Core::setup_of(const Mcu& mcu) const {
   for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
     const int motor = mcu.motor_of[output];
     if (motor < 0) continue;
-    const bushd_table* table = &table_of(config_.motors[static_cast<std::size_t>(motor)]).view();
-    const auto found = std::find_if(setup.tables.begin(), setup.tables.end(),
-                                    [&](const link::TableRef& ref) { return ref.table == table; });
+    const tables::Table& table = table_of(config_.motors[static_cast<std::size_t>(motor)]);
+    const auto found =
+        std::find_if(setup.tables.begin(), setup.tables.end(),
+                     [&table](const link::TableRef& ref) { return ref.table == &table.view(); });
     setup.table_of_motor[output] = static_cast<int>(found - setup.tables.begin());
-    if (found == setup.tables.end()) setup.tables.push_back({.table = table});
+    if (found == setup.tables.end()) {
+      setup.tables.push_back({.table = &table.view(), .revision = table.revision()});
+    }
   }
   return setup;
 }
@@ -103,7 +106,9 @@ Result<void> Core::reload_tables(const config::Config& fresh) {
   std::set<std::size_t> changed_groups;
   for (std::size_t m = 0; m < motors_.size(); ++m) {
     const config::GroupIndex group = motors_[m].config->group;
-    if (tables_[group.value]->same_content(*fresh.groups[group.value].table)) continue;
+    const tables::Table& before = *tables_[group.value];
+    const tables::Table& after = *fresh.groups[group.value].table;
+    if (before.same_content(after) && before.revision() == after.revision()) continue;
     changed_groups.insert(group.value);
     changed_mcus.insert(motors_[m].mcu);
   }

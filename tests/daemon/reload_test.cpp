@@ -33,6 +33,21 @@ TEST(Reload, ChangedTableServesTheNextMove) {
   EXPECT_EQ(lab.motor("m01").trust, "known");
 }
 
+// Another revision is another table, also with the same codes: the MCU is to tell which one it has.
+TEST(Reload, RevisionsReachTheMcus) {
+  Lab lab(hall(1, 2));
+  lab.write_file("bushd2-constant.toml", std::string(kSlow) + "revision = 3\n");
+  ASSERT_TRUE(lab.reload_tables());
+  lab.connect();
+  const bushd_mcu& core = lab.bus(0).mcu(0).core();
+  EXPECT_EQ(core.table[0].revision, 3u);
+  lab.write_file("bushd2-constant.toml", std::string(kSlow) + "revision = 4\n");
+  ASSERT_TRUE(lab.reload_tables());
+  lab.connect();
+  EXPECT_TRUE(core.table[0].valid);
+  EXPECT_EQ(core.table[0].revision, 4u);
+}
+
 TEST(Reload, RefusedWhileAMotorOfTheGroupMoves) {
   Lab lab(hall(1, 2));
   lab.connect();
