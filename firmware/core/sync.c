@@ -12,13 +12,18 @@
 //
 //     rate += gain x error / (time between these marks)
 //
+// A mark is noted to some microseconds only. An error within these may be nothing else, so a
+// quarter of it is taken; all of a larger one: that is drift, of a rate not yet known or of another
+// reference.
+//
 // The rate's share of each tick is added up in 1/4096 ns and given out in whole ns. With the rate
 // changes what the clock has drifted from the mark until now: that is made up at once too.
 #include "firmware/core/internal.h"
 
 #define MAX_ERROR_DIVISOR 2
 #define MAX_SLEW_DIVISOR 64
-#define GAIN_DIVISOR 4
+#define MARK_NOISE_NS 5000
+#define NOISE_GAIN_DIVISOR 4
 #define MAX_RATE_PPB 500000
 #define MAX_INTERVAL_NS INT64_C(60000000000)
 #define BILLION INT64_C(1000000000)
@@ -78,10 +83,10 @@ static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t erro
   if (error_ppb > MAX_RATE_PPB || error_ppb < -MAX_RATE_PPB) return 0;
   const int32_t old_ppb = clock->rate_ppb;
   const int32_t old_step = clock->rate_step;
-  int32_t rate_ppb = old_ppb + (int32_t)(clock->rate_known ? error_ppb / GAIN_DIVISOR : error_ppb);
+  const bool drift = error_ns > MARK_NOISE_NS || error_ns < -MARK_NOISE_NS;
+  int32_t rate_ppb = old_ppb + (int32_t)(drift ? error_ppb : error_ppb / NOISE_GAIN_DIVISOR);
   if (rate_ppb > MAX_RATE_PPB) rate_ppb = MAX_RATE_PPB;
   if (rate_ppb < -MAX_RATE_PPB) rate_ppb = -MAX_RATE_PPB;
-  clock->rate_known = true;
   set_rate(mcu, rate_ppb);
   // The present tick and the next one still go by the old rate.
   const int64_t change = clock->rate_step - old_step;

@@ -106,7 +106,7 @@ TEST(Sync, ClocksThatDifferAreHeldTogether) {
 }
 
 // A master that keeps two MCUs together over a line that loses SYNC frames: each MCU by itself
-// misses 30 % of them, and now and then all are lost for 10 s. The first MCU is the reference.
+// misses 30 % of them, and now and then all are lost for 10 s. One of them is the reference.
 class Hour {
  public:
   Hour(std::int32_t ppm_a, std::int32_t ppm_b, std::uint32_t tick_ns)
@@ -114,6 +114,27 @@ class Hour {
     bus_.add_mcu({.address = 1, .clock_ppm = ppm_a});
     bus_.add_mcu({.address = 2, .boot_ns = 777'777, .clock_ppm = ppm_b});
     master_.bring_up(tick_ns, BUSHD_FORMAT_FINE);
+  }
+  void refer_to(std::uint8_t address) { reference_ = address; }
+  // The first MCU has lost its time and its rate, and joins the second.
+  void reboot_first() {
+    bus_.reboot(0);
+    bus_.advance_to(bus_.now_ns() + 100'000'000);
+    const bushd_configure configure{tick_ns_, BUSHD_FORMAT_FINE, 1000};
+    ASSERT_EQ(master_.acknowledged(1, BUSHD_MSG_CONFIGURE, bushd_encode_configure, configure),
+              BUSHD_OK);
+    for (int i = 0; i < 2; ++i) {
+      bus_.advance_to(bus_.now_ns() + 60'000'000);
+      master_.discipline(2);
+    }
+    ASSERT_NE(master_.poll(1).flags & BUSHD_FLAG_SYNCED, 0);
+  }
+  void silence(TimeNs length_ns) {
+    const TimeNs end_ns = bus_.now_ns() + length_ns;
+    while (bus_.now_ns() < end_ns) {
+      bus_.advance_to(std::min(end_ns, bus_.now_ns() + 20'000'000));
+      if (measured_) worst_ns_ = std::max(worst_ns_, std::abs(skew_ns(bus_, tick_ns_)));
+    }
   }
   // Half a second, with a mark at its end.
   void half_second(bool loss) {
@@ -127,7 +148,7 @@ class Hour {
       --silent_;
       return;
     }
-    const bushd_report report = master_.poll(1);
+    const bushd_report report = master_.poll(reference_);
     for (std::size_t i = 0; i < 2; ++i) {
       if (loss && random_() % 10 < 3) bus_.deafen(i, bus_.now_ns() + 3'000'000);
     }
@@ -142,6 +163,7 @@ class Hour {
   std::uint32_t tick_ns_;
   Bus bus_;
   Master master_;
+  std::uint8_t reference_ = 1;
   std::mt19937 random_{20260401};
   int silent_ = 0;
   bool measured_ = false;
@@ -161,6 +183,21 @@ TEST(Sync, CrystalsApartByHundredPpmKeepTogetherForAnHourThroughLostFrames) {
     const double expected_ppb = ((1e6 + a) / (1e6 + b) - 1) * 1e9;
     EXPECT_NEAR(second.rate_ppb, expected_ppb, 100);
     EXPECT_EQ(hour.report(1).rate_ppb, 0) << "the reference keeps its own";
+  }
+}
+
+// It knows nothing of the rate that all the others have, and then the bus has another one.
+TEST(Sync, ReferenceThatJoinedLaterIsFollowedWithinThreeSeconds) {
+  for (const std::int32_t ppm : {50, -50, 4}) {
+    Hour hour(ppm, -ppm, kTickNs);
+    hour.refer_to(2);
+    for (int i = 0; i < 10; ++i) hour.half_second(false);
+    hour.reboot_first();
+    hour.refer_to(1);
+    for (int i = 0; i < 6; ++i) hour.half_second(false);
+    hour.measure();
+    hour.silence(10'000'000'000);
+    EXPECT_LT(hour.worst_ns(), 20'000) << ppm;
   }
 }
 
