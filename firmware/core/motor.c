@@ -85,13 +85,14 @@ static int16_t emit_exact(bushd_mcu* mcu, uint8_t m, bushd_plane* plane) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_run* run = &motor->run;
   set_direction(mcu, m, run->direction > 0);
+  const int16_t before = motor->remainder;
   const int16_t steps =
       bushd_run_slots(run, mcu->tick_ns, mcu->config.slots, motor_bit(m), plane->step);
   // As ticks of the format would leave it, so that they can go on from here.
   motor->remainder =
       mcu->format == BUSHD_FORMAT_FINE ? (int16_t)(run->fraction * run->direction) : (int16_t)0;
   motor->begun = true;
-  note_speed(motor, (int16_t)(steps * 256));
+  note_speed(motor, (int16_t)(steps * 256 + motor->remainder - before));
   if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) motor->mode = BUSHD_MCU_STREAM;
   return steps;
 }
@@ -206,24 +207,64 @@ void bushd_mcu_watch_silence(bushd_mcu* mcu) {
   }
 }
 
-// The delay of the running step of a stream, from the last tick that made steps.
-static uint16_t stream_delay(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
-  // It has moved without a step yet.
-  if (motor->displacement == 0) return UINT16_MAX;
-  const uint64_t time_ns = (uint64_t)mcu->tick_ns * ((uint32_t)motor->still_ticks + 1u) * 256u;
-  const uint64_t unit = (uint64_t)table_of(mcu, motor)->time_unit_ns * motor->displacement;
-  const uint64_t units = (time_ns + unit - 1u) / unit;
+// Of the motion that is under way at `next`: a start may wait behind it.
+typedef struct rest_of_stream {
+  uint32_t until;  // the first tick that is not known to be its
+  bool goes_on;    // beyond that
+  bool moves;      // makes a step or part of one from `next` on
+  uint16_t steps;  // whole ones in the next WINDOW ticks
+} rest_of_stream;
+
+enum { WINDOW = 4 };
+
+static rest_of_stream rest_of(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  const bool start_waits = ticks_after(motor->rest_from, next) > 0;
+  rest_of_stream rest = {motor->known_until, motor->delay != 0, motor->delay != 0, 0};
+  if (start_waits) {
+    rest.until = motor->rest_from;
+    rest.goes_on = rest.moves = false;
+  }
+  for (uint32_t tick = next; ticks_after(rest.until, tick) > 0; ++tick) {
+    const int16_t queued = *queue_at((bushd_mcu*)mcu, tick, m);
+    if (queued == 0) continue;
+    rest.moves = true;
+    if (tick - next < WINDOW) rest.steps += (uint16_t)((queued < 0 ? -queued : queued) / 256);
+  }
+  return rest;
+}
+
+static uint16_t delay_for(const bushd_mcu* mcu, const bushd_mcu_motor* motor, uint64_t time_ns,
+                          uint16_t displacement) {
+  const uint64_t unit = (uint64_t)table_of(mcu, motor)->time_unit_ns * displacement;
+  const uint64_t units = (time_ns * 256u + unit - 1u) / unit;
   return units < UINT16_MAX ? (uint16_t)units : UINT16_MAX;
+}
+
+// The delay of the running step of a stream. In the fine format the last displacement tells it. In
+// the coarse one a tick of one step may be of any speed from a step in two ticks to two in one, and
+// a motor that was taken for too slow a one would stop all but dead: so it is the least delay that
+// the ticks to come may have, or that which is told for their end.
+static uint16_t stream_delay(const bushd_mcu* mcu, const bushd_mcu_motor* motor,
+                             const rest_of_stream* rest, uint32_t next) {
+  if (mcu->format == BUSHD_FORMAT_FINE) {
+    const uint64_t time_ns = (uint64_t)mcu->tick_ns * ((uint32_t)motor->still_ticks + 1u);
+    return motor->displacement == 0 ? UINT16_MAX
+                                    : delay_for(mcu, motor, time_ns, motor->displacement);
+  }
+  if (rest->goes_on && ticks_after(rest->until, next) < WINDOW) return motor->delay;
+  return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * WINDOW / (rest->steps + 1u), 256);
 }
 
 static void stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   const uint32_t next = FIRST_OPEN(mcu);
   const bool in_run = in_table_run(motor, next);
-  const bool over = motor->delay == 0 && ticks_after(motor->known_until, next) <= 0;
+  const rest_of_stream rest = rest_of(mcu, m, next);
   const bool at_rest =
-      !motor->begun || over ||
+      !motor->begun || !rest.moves ||
       (ticks_after(next, motor->rest_from) >= 0 && ticks_after(next, motor->start_tick) <= 0);
+  const uint16_t delay = at_rest || in_run ? 0 : stream_delay(mcu, motor, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
   if (how == BUSHD_CUT) {
     if (motor->mode != BUSHD_MCU_STREAM || !at_rest) motor->remainder = 0;
@@ -231,7 +272,7 @@ static void stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how) {
   } else if (in_run) {
     ramp_down_run(motor);
   } else if (motor->mode != BUSHD_MCU_RAMP_DOWN && !at_rest) {
-    ramp_down_stream(mcu, m, stream_delay(mcu, motor));
+    ramp_down_stream(mcu, m, delay);
   }
 }
 

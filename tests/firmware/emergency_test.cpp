@@ -32,14 +32,28 @@ class Emergency : public Streams {
     payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
     return payload;
   }
-  // The delay of the step that runs at the end of the first `ticks` of a plan, as their last steps
-  // tell.
+  // The delay of the step that runs at the end of the first `ticks` of a plan, as the MCU takes it:
+  // from the last displacement, or in the coarse format from the steps of the next four ticks.
   std::uint16_t delay_of(const Plan& moves, std::size_t ticks) const {
-    std::uint64_t still = 1;
-    while (magnitude(moves, ticks - still) == 0) ++still;
-    const std::uint64_t d = magnitude(moves, ticks - still) * std::uint64_t{law.unit_ns};
-    const std::uint64_t units = (256ull * Rig::kTickNs * still + d - 1) / d;
-    return static_cast<std::uint16_t>(std::max<std::uint64_t>(units, law.cruise));
+    std::uint64_t time_ns = Rig::kTickNs;
+    std::uint64_t share = 0;
+    if (format == BUSHD_FORMAT_FINE) {
+      std::uint64_t still = 1;
+      while (magnitude(moves, ticks - still) == 0) ++still;
+      time_ns *= still;
+      share = magnitude(moves, ticks - still);
+    } else {
+      time_ns = time_ns * 4 / (steps_in(moves, ticks, ticks + 4) + 1);
+      share = 256;
+    }
+    const std::uint64_t d = share * law.unit_ns;
+    return static_cast<std::uint16_t>(
+        std::max<std::uint64_t>((256 * time_ns + d - 1) / d, law.cruise));
+  }
+  std::uint64_t steps_in(const Plan& moves, std::size_t from, std::size_t until) const {
+    std::uint64_t steps = 0;
+    for (; from < std::min(until, moves.ticks()); ++from) steps += magnitude(moves, from) / 256;
+    return steps;
   }
   std::uint64_t magnitude(const Plan& moves, std::size_t tick) const {
     const int d = moves.displacement[tick];
@@ -92,6 +106,23 @@ TEST_P(Emergency, RampsAStreamDownFromEveryTick) {
     }
     SCOPED_TRACE(n);
     expect_steps(after_emergency(fresh, BUSHD_RAMP_DOWN), expected, 1);
+  }
+}
+
+// Its last step is made, and its queue goes on, since frames are of some length or another motor's.
+TEST_P(Emergency, MotorThatStandsBeforeItsQueueEndsMakesNoStep) {
+  Plan moves = plan(5);
+  const std::size_t ticks = moves.ticks();
+  moves.displacement.resize(ticks + 20, format == BUSHD_FORMAT_FINE ? 0 : 0x80);
+  moves.delay.resize(ticks + 20, 0);
+  for (std::size_t n = ticks; n < ticks + 20; n += 3) {
+    Rig fresh({.queue_ticks = 256});
+    fresh.make_ready(law, format);
+    ASSERT_EQ(fresh.take(fresh.part(moves, fresh.first_open(), 0, ticks + 20)), BUSHD_OK);
+    fresh.pass(static_cast<int>(n));
+    SCOPED_TRACE(n);
+    expect_steps(after_emergency(fresh, BUSHD_RAMP_DOWN), {}, 1);
+    EXPECT_EQ(fresh.pulses(0), 5);
   }
 }
 
