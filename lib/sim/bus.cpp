@@ -66,6 +66,7 @@ void Bus::deliver(const LineByte& byte) {
     if (talker == byte.talker || line_.drives(talker, byte.start_ns, byte.end_ns)) continue;
     if (byte.end_ns <= deaf_until_ns_[i]) continue;
     mcus_[i]->receive(byte.value, byte.end_ns);
+    if (on_mcu_byte && mcus_[i]->running()) on_mcu_byte(i, byte.value, byte.end_ns);
   }
   if (byte.talker != kMaster && on_master_byte) on_master_byte(byte.value, byte.end_ns);
 }

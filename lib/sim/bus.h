@@ -38,6 +38,9 @@ class Bus : private VirtualMcu::Driver {
   // A byte for the master: called when its stop bit has ended. May call master_send.
   std::function<void(std::uint8_t byte, TimeNs end_ns)> on_master_byte;
 
+  // An MCU that runs has heard a byte. Looks on only: what it does must not reach the bus.
+  std::function<void(std::size_t mcu, std::uint8_t byte, TimeNs end_ns)> on_mcu_byte;
+
   // Two have begun to talk at once. Addresses; 0 is the master.
   std::function<void(TimeNs time_ns, std::uint8_t first_address, std::uint8_t second_address)>
       on_collision;

@@ -32,6 +32,7 @@
 // m >= T/2c and d <= 2T/c.)
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -55,6 +56,9 @@ class PaceRules {
   TimeNs tolerance_ns(std::size_t k) const { return tolerance_ns_[k]; }  // for A(k) and shorter
   std::size_t stop_steps() const { return stop_ns_.size() - 1; }
   TimeNs stop_ns(std::size_t n) const { return stop_ns_[n]; }  // the least time of the last n
+  // The longest run-down, tolerances included, of a motor whose exact delay is at least A(k): it
+  // completes the running step, of delay x, and makes the fewest steps n with D(n) <= x.
+  TimeNs run_down_ns(std::size_t k) const { return run_down_ns_[k]; }
   // Silent for longer, the motor is surely at rest.
   TimeNs rest_ns() const { return rest_ns_; }
 
@@ -63,6 +67,7 @@ class PaceRules {
   std::vector<TimeNs> delay_ns_;
   std::vector<TimeNs> tolerance_ns_;
   std::vector<TimeNs> stop_ns_;
+  std::vector<TimeNs> run_down_ns_;
   TimeNs rest_ns_;
 };
 
@@ -88,6 +93,11 @@ class Pace {
   void cut() { count_ = 0; }
 
   bool moving() const { return count_ != 0; }
+  // If it runs down from now on, it rests after this time. At rest: it may have begun, and then
+  // completes its first step.
+  TimeNs run_down_ns() const {
+    return rules_->run_down_ns(count_ == 0 ? 0 : std::min(k_ + 1, rules_->last()));
+  }
   TimeNs last_ns() const { return time_ns_[newest_]; }
   // The first step since the last rest.
   TimeNs first_ns() const { return first_ns_; }

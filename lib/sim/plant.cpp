@@ -1,5 +1,7 @@
 #include "sim/plant.h"
 
+#include <algorithm>
+
 namespace bushd::sim {
 namespace {
 
@@ -64,6 +66,9 @@ void Plant::edge(const Edge& edge) {
   }
   ++steps_made_;
   motor->position_steps += motor->forward ? 1 : -1;
+  if (motor->halt && edge.time_ns > motor->halt->from_ns) {
+    check_halt(edge.time_ns, edge.mcu, edge.index, *motor);
+  }
   const Jump jump = motor->pace.step(edge.time_ns, motor->forward);
   if (jump != Jump::kNone) report(edge.time_ns, edge.mcu, edge.index, *motor, jump);
 }
@@ -73,6 +78,7 @@ void Plant::settled(TimeNs until_ns) {
     for (std::size_t output = 0; output < kOutputsPerMcu; ++output) {
       Motor* motor = motor_of_[mcu][output].get();
       if (motor == nullptr || !motor->pace.moving()) continue;
+      if (motor->halt && motor->halt->cut && until_ns >= motor->halt->from_ns) motor->pace.cut();
       const Jump jump = motor->pace.silent(until_ns);
       if (jump != Jump::kNone) report(until_ns, mcu, output, *motor, jump);
     }
@@ -83,6 +89,32 @@ void Plant::cut(std::size_t mcu) {
   for (const auto& motor : motor_of_[mcu]) {
     if (motor) motor->pace.cut();
   }
+  release(mcu);
+}
+
+void Plant::halt(std::size_t mcu, TimeNs now_ns, bool cut) {
+  for (const auto& motor : motor_of_[mcu]) {
+    if (!motor || (motor->halt && motor->halt->cut >= cut)) continue;
+    const TimeNs tick_ns = motor->rules->tick_ns();
+    motor->halt = Halt{now_ns + 2 * tick_ns + tick_ns / 16, cut, motor->pace.run_down_ns()};
+  }
+}
+
+void Plant::release(std::size_t mcu) {
+  for (const auto& motor : motor_of_[mcu]) {
+    if (motor) motor->halt.reset();
+  }
+}
+
+void Plant::check_halt(TimeNs time_ns, std::size_t mcu, std::size_t output, Motor& motor) {
+  Halt& halt = *motor.halt;
+  if (halt.cut) return violated(time_ns, mcu, output, "a step after it was cut off");
+  if (!halt.seen) halt.run_down_ns = std::max(halt.run_down_ns, motor.pace.run_down_ns());
+  halt.seen = true;
+  const TimeNs late_ns = time_ns - halt.from_ns - halt.run_down_ns;
+  if (late_ns <= 0) return;
+  violated(time_ns, mcu, output,
+           "still moving " + in_us(late_ns) + " after an emergency stop's ramp");
 }
 
 }  // namespace bushd::sim

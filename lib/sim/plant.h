@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,11 @@ class Plant final : public EdgeSink {
   // The MCU was reset: whatever moved was cut off, and is excused until it starts again.
   void cut(std::size_t mcu);
 
+  // An emergency stop has reached the MCU. From two ticks later on its motors make no step (`cut`),
+  // or run down; none starts until release().
+  void halt(std::size_t mcu, TimeNs now_ns, bool cut);
+  void release(std::size_t mcu);
+
   // Where the motor stands, by its pulses since the beginning.
   std::int64_t position_steps(std::size_t mcu, std::size_t output) const {
     return motor_of_[mcu].at(output)->position_steps;
@@ -41,14 +47,25 @@ class Plant final : public EdgeSink {
   std::uint64_t steps_made() const { return steps_made_; }
 
  private:
+  struct Halt {
+    TimeNs from_ns;
+    bool cut;
+    // The longest run-down from what it has been seen to do: while the stop takes effect it may
+    // still speed up.
+    TimeNs run_down_ns;
+    bool seen = false;  // a step after from_ns
+  };
   struct Motor {
-    explicit Motor(const PaceRules& rules) : pace(rules) {}
+    explicit Motor(const PaceRules& motor_rules) : rules(&motor_rules), pace(motor_rules) {}
+    const PaceRules* rules;
     Pace pace;
     std::int64_t position_steps = 0;
     bool forward = false;
+    std::optional<Halt> halt;
   };
 
   void report(TimeNs time_ns, std::size_t mcu, std::size_t output, const Motor& motor, Jump jump);
+  void check_halt(TimeNs time_ns, std::size_t mcu, std::size_t output, Motor& motor);
   void violated(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what);
 
   std::vector<std::vector<std::unique_ptr<Motor>>> motor_of_;  // by MCU and output

@@ -38,11 +38,10 @@ class Random {
   }
   // Time to the next of events that come at random, `mean` apart.
   std::int64_t wait(double mean) { return static_cast<std::int64_t>(-mean * std::log1p(-unit())); }
-
- private:
   // [0, 1), of 53 bits.
   double unit() { return static_cast<double>(engine_() >> 11) * 0x1.0p-53; }
 
+ private:
   std::mt19937_64 engine_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 namespace bushfaults {
 namespace {
@@ -14,8 +15,18 @@ constexpr std::uint32_t kStream = 100;  // of randomness
 
 }  // namespace
 
-Clients::Clients(const bushd::config::Config& config, const Witness& witness, std::uint64_t seed)
-    : config_(config), witness_(witness), random_(seed, kStream), number_(kClients, 0) {}
+Clients::Clients(const bushd::config::Config& config, const Witness& witness,
+                 const CommandRates& rates, std::uint64_t seed)
+    : config_(config),
+      witness_(witness),
+      rates_(rates),
+      per_hour_(std::accumulate(rates.begin(), rates.end(), 0.0)),
+      random_(seed, kStream),
+      number_(kClients, 0) {}
+
+bushd::sim::TimeNs Clients::next_after(bushd::sim::TimeNs now_ns) {
+  return per_hour_ > 0 ? now_ns + random_.wait(3.6e12 / per_hour_) : bushd::sim::kNever;
+}
 
 void Clients::begin_anew() {
   ++generation_;
@@ -57,14 +68,10 @@ std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) c
   return found;
 }
 
-command_t Clients::move() {
+command_t Clients::move(std::size_t wanted) {
   const bool absolute = random_.one_in(3);
   command_t command = make(absolute ? command_t::MOVE_ABSOLUTE : command_t::MOVE_RELATIVE);
   std::vector<Choice> free = motors_that(false, false);
-  const std::uint64_t many = random_.below(10);
-  std::size_t wanted = 1;
-  if (many >= 6) wanted = static_cast<std::size_t>(random_.between(2, 6));
-  if (many == 9) wanted = static_cast<std::size_t>(random_.between(7, 32));
   // Now and then one that may be moving: a new target, or a race.
   if (free.empty() || random_.one_in(20)) {
     add(command, any_motor(), random_.between(-100, 100));
@@ -89,7 +96,7 @@ command_t Clients::retarget() {
   const bool absolute = !random_.one_in(3);
   command_t command = make(absolute ? command_t::MOVE_ABSOLUTE : command_t::MOVE_RELATIVE);
   std::vector<Choice> some = motors_that(true, false);
-  if (some.empty()) return move();
+  if (some.empty()) return move(1);
   const auto at_rest = motors_that(false, false);
   if (!at_rest.empty() && random_.one_in(4)) some.push_back(random_.pick(at_rest));
   for (std::int64_t n = random_.magnitude(1, 8); n > 0 && !some.empty(); --n) {
@@ -166,38 +173,66 @@ command_t Clients::nonsense() {
   return command;
 }
 
-command_t Clients::next() {
-  command_t command;
-  const std::uint64_t chance = random_.below(100);
+command_t Clients::switch_drivers() {
+  command_t command = make(random_.one_in(2) ? command_t::ENABLE : command_t::DISABLE);
+  if (!random_.one_in(3)) add(command, any_motor(), 0);
+  return command;
+}
+
+bool Clients::says(const char* detail) const {
+  return std::any_of(witness_.states().begin(), witness_.states().end(), [&](const auto& state) {
+    return state && state->detail.find(detail) != std::string::npos;
+  });
+}
+
+std::optional<command_t> Clients::remedy() {
+  if (!random_.one_in(3)) return std::nullopt;
+  if (emergency()) return clear_all();
+  if (says("drivers disabled")) return enable_all();
   const std::vector<Choice> uncertain = motors_that(false, true);
-  const auto disabled = [](const auto& state) {
-    return state && state->detail == "drivers disabled";
-  };
-  const bool off = std::any_of(witness_.states().begin(), witness_.states().end(), disabled);
-  if (off && chance < 30) {
-    command = enable_all();
-  } else if (!uncertain.empty() && chance < 50) {
-    command = set(uncertain);
-  } else if (chance < 50) {
-    command = move();
-  } else if (chance < 60) {
-    command = retarget();
-  } else if (chance < 78) {
-    command = stop();
-  } else if (chance < 81) {
-    std::vector<Choice> some = motors_that(false, false);
-    if (some.size() > 2) some.resize(2);
-    command = set(some);
-  } else if (chance < 83) {
-    command = make(random_.one_in(2) ? command_t::ENABLE : command_t::DISABLE);
-    if (!random_.one_in(3)) add(command, any_motor(), 0);
-  } else if (chance < 85) {
-    command = make(command_t::CLEAR_FAULTS);
-  } else if (chance < 93 && !sent_.empty()) {
-    return random_.pick(sent_);  // again
-  } else {
-    return nonsense();
+  if (!uncertain.empty()) return set(uncertain);
+  return std::nullopt;
+}
+
+command_t Clients::compose(CommandKind kind) {
+  switch (kind) {
+    case CommandKind::kMove:
+      return move(1);
+    case CommandKind::kGroupMove:
+      return move(static_cast<std::size_t>(random_.one_in(4) ? random_.between(7, 32)
+                                                             : random_.between(2, 6)));
+    case CommandKind::kRetarget:
+      return retarget();
+    case CommandKind::kStop:
+      return stop();
+    case CommandKind::kEmergencyStop:
+      return make(command_t::EMERGENCY_STOP);
+    case CommandKind::kSetPosition: {
+      std::vector<Choice> some = motors_that(false, false);
+      if (some.size() > 2) some.resize(2);
+      return set(some);
+    }
+    case CommandKind::kSwitch:
+      return switch_drivers();
+    case CommandKind::kClear:
+      return clear_all();
+    case CommandKind::kAgain:
+      return sent_.empty() ? nonsense() : random_.pick(sent_);
+    case CommandKind::kNonsense:
+      return nonsense();
   }
+  return nonsense();
+}
+
+command_t Clients::next() {
+  if (auto command = remedy()) return *command;
+  double chance = random_.unit() * per_hour_;
+  std::size_t kind = 0;
+  while (kind + 1 < kCommandKinds && chance >= rates_[kind]) chance -= rates_[kind++];
+  ++sent_by_kind_[kind];
+  const auto chosen = static_cast<CommandKind>(kind);
+  command_t command = compose(chosen);
+  if (chosen == CommandKind::kAgain || chosen == CommandKind::kNonsense) return command;
   if (sent_.size() == kRemembered) sent_.pop_front();
   sent_.push_back(command);
   return command;

@@ -7,8 +7,8 @@ namespace {
 
 constexpr std::uint32_t kStream = 200;  // of randomness; garblers have the next two
 // What an adapter adds to each transfer, another at each plugging in: from a good one to one whose
-// latency timer is not the shortest.
-constexpr bushd::sim::TimeNs kMaxLatencyNs = 5'000'000;
+// latency timer is as long as its maker set it.
+constexpr bushd::sim::TimeNs kMaxLatencyNs = 16'000'000;
 
 }  // namespace
 
@@ -33,7 +33,8 @@ Host::~Host() {
 }
 
 void Host::start() {
-  core_ = std::make_unique<bushd::daemon::Core>(config_, *this, ++master_);
+  core_ = std::make_unique<bushd::daemon::Core>(
+      config_, *this, static_cast<std::uint16_t>(random_.between(1, 0xFFFF)));
   witness_.daemon_started(now_ns_);
   clients_.begin_anew();
   inbox_.clear();

@@ -77,7 +77,6 @@ class Host final : public bushd::daemon::Outputs {
   TimeNs now_ns_ = 0;
 
   std::unique_ptr<bushd::daemon::Core> core_;  // none: killed
-  std::uint16_t master_ = 0;                   // of the present one
   TimeNs starts_ns_ = 0;                       // when the next daemon starts
   TimeNs paused_until_ns_ = 0;
   TimeNs wake_ns_ = 0;

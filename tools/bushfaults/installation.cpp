@@ -5,6 +5,7 @@
 #include <array>
 
 #include "link/line_budget.h"
+#include "sim/random.h"
 #include "tables/table_file.h"
 
 namespace bushfaults {
@@ -15,11 +16,27 @@ namespace {
 constexpr std::array<const char*, 4> kTables = {"bushd2-constant", "bushd2-scurve",
                                                 "bushd2-exponential", "bushd2-resonance"};
 constexpr std::array<std::uint32_t, 4> kBauds = {500'000, 1'000'000, 2'000'000, 4'000'000};
+constexpr std::uint32_t kStream = 400;  // of randomness
+
+// Every choice is drawn, also where the way is given: so a run told all its ways is the same run.
+bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
+  bushd::sim::Random random(seed, kStream);
+  bushd::config::Bus bus{.name = "hall", .port = "simulated", .tick_us = kTickUs};
+  const bool table_runs = random.one_in(2);
+  const bool table_ticks = random.one_in(2);
+  const bool coarse = random.one_in(2);
+  const bool cut = random.one_in(2);
+  bus.table_runs = ways.table_runs.value_or(table_runs);
+  bus.table_ticks = ways.table_ticks.value_or(table_ticks);
+  bus.format = ways.format.value_or(coarse ? BUSHD_FORMAT_COARSE : BUSHD_FORMAT_FINE);
+  bus.emergency_stop = ways.emergency_stop.value_or(cut ? BUSHD_CUT : BUSHD_RAMP_DOWN);
+  return bus;
+}
 
 }  // namespace
 
 bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::size_t mcus,
-                                                       bushd_format format) {
+                                                       const Ways& ways, std::uint64_t seed) {
   if (mcus == 0 || mcus > 255) return bushd::fail("--mcus must be 1 to 255");
   if (motors < mcus || motors > mcus * BUSHD_MOTORS_PER_MCU) {
     return bushd::fail(fmt::format("--motors must be {} to {} for {} MCUs: each has 1 to {} motors",
@@ -47,16 +64,25 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
                              .output = {motors_of_mcu[mcu]++},
                              .group = {i / mcus % kTables.size()}});
   }
+  bushd::config::Bus bus = make_bus(ways, seed);
   for (const std::uint32_t baud : kBauds) {
-    if (bushd::link::line_load(baud, kTickUs * 1000, format, motors_of_mcu) >
+    if (bushd::link::line_load(baud, bus.tick_ns(), bus.format, motors_of_mcu) >
         bushd::link::kMaxLineLoad) {
       continue;
     }
-    config.buses.push_back(
-        {.name = "hall", .port = "simulated", .baud = baud, .tick_us = kTickUs, .format = format});
+    bus.baud = baud;
+    config.buses.push_back(bus);
     return config;
   }
   return bushd::fail(fmt::format("no line can carry {} motors; use fewer", motors));
+}
+
+std::string ways_text(const bushd::config::Config& config) {
+  const bushd::config::Bus& bus = config.buses[0];
+  return fmt::format("--moves {} --frames {} --format {} --emergency {}",
+                     bus.table_runs ? "table" : "stream", bus.table_ticks ? "auto" : "ticks",
+                     bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse",
+                     bus.emergency_stop == BUSHD_CUT ? "cut" : "ramp");
 }
 
 }  // namespace bushfaults

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 
 #include "base/result.h"
 #include "config/config.h"
@@ -11,8 +13,19 @@ namespace bushfaults {
 
 inline constexpr std::uint32_t kTickUs = 2560;
 
+// How motors are told their moves; what is not given is chosen by the seed.
+struct Ways {
+  std::optional<bool> table_runs;   // moves = "table", or "stream"
+  std::optional<bool> table_ticks;  // frames = "auto", or "ticks"
+  std::optional<bushd_format> format;
+  std::optional<bushd_how> emergency_stop;
+};
+
 // Refuses what does not fit: more motors than outputs, or than any line can carry.
 bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::size_t mcus,
-                                                       bushd_format format);
+                                                       const Ways& ways, std::uint64_t seed);
+
+// The ways of its bus, as options of bushfaults.
+std::string ways_text(const bushd::config::Config& config);
 
 }  // namespace bushfaults

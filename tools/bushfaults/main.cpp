@@ -3,11 +3,14 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <exception>
+#include <map>
+#include <optional>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "installation.h"
 #include "summary.h"
@@ -18,6 +21,29 @@ namespace {
 constexpr int kDone = 0;
 constexpr int kViolation = 1;
 constexpr int kUsage = 2;
+
+// An option that the seed decides unless it is given.
+template <class Value>
+void add_way(CLI::App& app, const std::string& name, std::optional<Value>& way,
+             const std::map<std::string, Value>& words) {
+  std::vector<std::string> allowed;
+  for (const auto& [word, value] : words) allowed.push_back(word);
+  app.add_option_function<std::string>(
+         name, [&way, words](const std::string& word) { way = words.at(word); },
+         "As in bushd.toml; by default the seed decides")
+      ->check(CLI::IsMember(allowed));
+}
+
+template <class Kind, std::size_t kSize>
+void add_rates(CLI::App& app, std::array<double, kSize>& rates, const std::string& group) {
+  for (std::size_t i = 0; i < kSize; ++i) {
+    const bushfaults::KindInfo& kind = bushfaults::info(static_cast<Kind>(i));
+    app.add_option("--" + std::string(kind.name), rates[i], std::string(kind.what))
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str()
+        ->group(group);
+  }
+}
 
 int run(int argc, char** argv) {
   CLI::App app{
@@ -30,26 +56,24 @@ int run(int argc, char** argv) {
   bushfaults::Options options;
   bool json = false;
   std::string seed = "fresh";
-  std::string format = "fine";
+  bushfaults::Ways& ways = options.ways;
   app.add_option("--seed", seed, "A number; `fresh`: another one each time, printed")
       ->capture_default_str();
   app.add_option("--hours", options.hours, "Simulated time")->capture_default_str();
   app.add_option("--motors", options.motors, "All of them")->capture_default_str();
   app.add_option("--mcus", options.mcus, "On one bus")->capture_default_str();
-  app.add_option("--format", format, "Of displacements")
-      ->check(CLI::IsMember({"fine", "coarse"}))
-      ->capture_default_str();
+  add_way<bool>(app, "--moves", ways.table_runs, {{"stream", false}, {"table", true}});
+  add_way<bool>(app, "--frames", ways.table_ticks, {{"ticks", false}, {"auto", true}});
+  add_way<bushd_format>(app, "--format", ways.format,
+                        {{"coarse", BUSHD_FORMAT_COARSE}, {"fine", BUSHD_FORMAT_FINE}});
+  add_way<bushd_how>(app, "--emergency", ways.emergency_stop,
+                     {{"ramp", BUSHD_RAMP_DOWN}, {"cut", BUSHD_CUT}});
   app.add_option("--crystal-ppm", options.crystal_ppm, "MCUs' clocks are off by up to this")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
   app.add_flag("--json", json, "Summary as one JSON object");
-  for (std::size_t i = 0; i < bushfaults::kFaultKinds; ++i) {
-    const auto& kind = bushfaults::info(static_cast<bushfaults::FaultKind>(i));
-    app.add_option("--" + std::string(kind.name), options.rates[i], std::string(kind.what))
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str()
-        ->group("Faults per hour");
-  }
+  add_rates<bushfaults::FaultKind>(app, options.fault_rates, "Faults per hour");
+  add_rates<bushfaults::CommandKind>(app, options.command_rates, "Commands per hour");
   try {
     app.parse(argc, argv);
     options.seed = seed == "fresh" ? std::random_device{}() : std::stoull(seed);
@@ -59,19 +83,19 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "bushfaults: --seed {}: not a number from 0 to 2^64 - 1\n", seed);
     return kUsage;
   }
-  options.format = format == "fine" ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
-  auto config = bushfaults::make_installation(options.motors, options.mcus, options.format);
+  auto config =
+      bushfaults::make_installation(options.motors, options.mcus, options.ways, options.seed);
   if (!config) {
     fmt::print(stderr, "bushfaults: {}\n", config.error().text());
     return kUsage;
   }
   fmt::print(stderr, "seed {}\n", options.seed);
 
-  const auto began = std::chrono::steady_clock::now();
+  const std::clock_t began = std::clock();
   bushfaults::World world(options, std::move(*config));
   world.run();
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
-  fmt::print("{}", json ? summary_json(world) : summary_text(world, took.count()));
+  const double processor_s = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
+  fmt::print("{}", json ? summary_json(world) : summary_text(world, processor_s));
   if (!world.witness().violation()) return kDone;
   std::fflush(stdout);
   fmt::print(stderr, "{}", story(world, options));

@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "installation.h"
+
 namespace bushfaults {
 namespace {
 
@@ -12,21 +14,40 @@ double hours(const World& world) {
   return static_cast<double>(world.now_ns()) / 3.6e12;
 }
 
-std::uint64_t total(const Counts& faults) {
-  return std::accumulate(faults.begin(), faults.end(), std::uint64_t{0});
+template <std::size_t kSize>
+std::uint64_t total(const std::array<std::uint64_t, kSize>& counts) {
+  return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+}
+
+template <class Kind, std::size_t kSize>
+std::string text_of(const std::array<std::uint64_t, kSize>& counts) {
+  std::string text;
+  for (std::size_t i = 0; i < kSize; ++i) {
+    const KindInfo& kind = info(static_cast<Kind>(i));
+    text += fmt::format("           {:<17}{:>9}  {}\n", kind.name, counts[i], kind.what);
+  }
+  return text;
+}
+
+template <class Kind, std::size_t kSize>
+nlohmann::json json_of(const std::array<std::uint64_t, kSize>& counts) {
+  nlohmann::json all = nlohmann::json::object();
+  for (std::size_t i = 0; i < kSize; ++i) {
+    all[std::string(info(static_cast<Kind>(i)).name)] = counts[i];
+  }
+  return all;
 }
 
 }  // namespace
 
-std::string summary_text(const World& world, double real_s) {
-  std::string text = fmt::format("simulated  {:.3f} h, {:.0f} times real time\n", hours(world),
-                                 hours(world) * 3600 / real_s);
+std::string summary_text(const World& world, double processor_s) {
+  std::string text = fmt::format("simulated  {:.3f} h, {:.0f} times real time on one core\n",
+                                 hours(world), hours(world) * 3600 / processor_s);
+  text += fmt::format("bus        {}\n", ways_text(world.config()));
   text += fmt::format("faults     {}\n", total(world.faults()));
-  for (std::size_t i = 0; i < kFaultKinds; ++i) {
-    const auto kind = static_cast<FaultKind>(i);
-    text += fmt::format("           {:<17}{:>9}  {}\n", info(kind).name, world.faults()[i],
-                        info(kind).what);
-  }
+  text += text_of<FaultKind>(world.faults());
+  text += fmt::format("commands   {}\n", total(world.commands()));
+  text += text_of<CommandKind>(world.commands());
   text += "moves      by result\n";
   for (const auto& [result, count] : world.witness().moves_by_result()) {
     text += fmt::format("           {:<17}{:>9}\n", result, count);
@@ -34,22 +55,23 @@ std::string summary_text(const World& world, double real_s) {
   text += fmt::format("steps      {} commanded, {} made, {} unaccounted\n",
                       world.witness().steps_commanded(), world.plant().steps_made(),
                       world.witness().steps_unaccounted());
+  text += fmt::format("skew       {:.1f} us between MCUs in step, at most\n",
+                      static_cast<double>(world.skew().worst_ns()) / 1000);
   text += fmt::format("violations {}\n", world.witness().violation() ? 1 : 0);
   return text;
 }
 
 std::string summary_json(const World& world) {
-  nlohmann::json faults = nlohmann::json::object();
-  for (std::size_t i = 0; i < kFaultKinds; ++i) {
-    faults[std::string(info(static_cast<FaultKind>(i)).name)] = world.faults()[i];
-  }
   const nlohmann::json all = {{"sim_hours", hours(world)},
-                              {"faults", faults},
+                              {"bus", ways_text(world.config())},
+                              {"faults", json_of<FaultKind>(world.faults())},
                               {"faults_total", total(world.faults())},
+                              {"commands", json_of<CommandKind>(world.commands())},
                               {"moves", world.witness().moves_by_result()},
                               {"steps_commanded", world.witness().steps_commanded()},
                               {"steps_made", world.plant().steps_made()},
                               {"steps_unaccounted", world.witness().steps_unaccounted()},
+                              {"skew_us", static_cast<double>(world.skew().worst_ns()) / 1000},
                               {"violations", world.witness().violation() ? 1 : 0}};
   return all.dump() + "\n";
 }
@@ -58,11 +80,9 @@ std::string story(const World& world, const Options& options) {
   const Violation& violation = *world.witness().violation();
   return fmt::format(
       "VIOLATION at {} s of virtual time: {}\nWhat led to it:\n{}"
-      "Again: bushfaults --seed {} --hours {} --motors {} --mcus {} --format {} and the same "
-      "rates\n",
+      "Again: bushfaults --seed {} --hours {} --motors {} --mcus {} {} and the same rates\n",
       in_seconds(violation.time_ns), violation.what, world.recent().text(), options.seed,
-      options.hours, options.motors, options.mcus,
-      options.format == BUSHD_FORMAT_FINE ? "fine" : "coarse");
+      options.hours, options.motors, options.mcus, ways_text(world.config()));
 }
 
 }  // namespace bushfaults

@@ -32,8 +32,9 @@ bool same(const reply_t& a, const reply_t& b) {
 }
 
 std::string text_of(const command_t& command) {
-  static constexpr std::array<const char*, 8> kWords = {
-      "?", "move by", "move to", "stop", "enable", "disable", "set position", "clear faults"};
+  static constexpr std::array<const char*, 9> kWords = {
+      "?",       "move by",      "move to",      "stop",          "enable",
+      "disable", "set position", "clear faults", "emergency stop"};
   const bool known = command.kind > 0 && command.kind < static_cast<int>(kWords.size());
   const char* word = kWords[known ? static_cast<std::size_t>(command.kind) : 0];
   return fmt::format("{} #{}: {} {} {}", command.client_id.substr(0, 16), command.number, word,
@@ -135,7 +136,7 @@ void Witness::reply(TimeNs now_ns, const reply_t& reply) {
 
 void Witness::accepted(const Key& key, Asked& asked) {
   const command_t& command = asked.command;
-  if (command.kind == command_t::STOP) {
+  if (command.kind == command_t::STOP || command.kind == command_t::EMERGENCY_STOP) {
     for (Motor& motor : motors_) {
       const auto& named = command.motors;
       const bool stops =

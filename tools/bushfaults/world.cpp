@@ -15,9 +15,10 @@ constexpr TimeNs kSecond = 1'000'000'000;
 constexpr TimeNs kHour = 3600 * kSecond;
 
 constexpr TimeNs kWellAfterNs = 5 * kSecond;  // the promise: READY by itself
-constexpr TimeNs kMoveNs = 12 * kSecond;      // the clients' longest, with a start and a result
-constexpr std::uint32_t kWorldStream = 1;     // of randomness
-constexpr std::uint32_t kFaultStream = 300;   // and one for each kind of fault
+constexpr TimeNs kSkewPeriodNs = 20 * kMs;
+constexpr TimeNs kMoveNs = 12 * kSecond;     // the clients' longest, with a start and a result
+constexpr std::uint32_t kWorldStream = 1;    // of randomness
+constexpr std::uint32_t kFaultStream = 300;  // and one for each kind of fault
 
 bushd::sim::McuOptions mcu_options(const bushd::config::Mcu& mcu, std::size_t index,
                                    std::int64_t crystal_ppm, bushd::sim::Random& random) {
@@ -38,16 +39,29 @@ World::World(const Options& options, bushd::config::Config config)
       plant_(config_.mcus.size()),
       bus_(config_.buses[0].baud, &plant_),
       witness_(config_, bus_, plant_, recent_),
-      clients_(config_, witness_, options.seed),
+      skew_(config_, bus_, witness_),
+      clients_(config_, witness_, options.command_rates, options.seed),
       host_(config_, bus_, witness_, clients_, recent_, options.seed) {
-  bushd::sim::Random random(options.seed, kWorldStream);
-  for (std::size_t i = 0; i < config_.mcus.size(); ++i) {
-    bus_.add_mcu(mcu_options(config_.mcus[i], i, options.crystal_ppm, random));
+  add_mcus();
+  add_motors();
+  overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_);
+  for (std::size_t i = 0; i < kFaultKinds; ++i) {
+    chance_.emplace_back(options.seed, kFaultStream + static_cast<std::uint32_t>(i));
   }
+}
+
+void World::add_mcus() {
+  bushd::sim::Random random(options_.seed, kWorldStream);
+  for (std::size_t i = 0; i < config_.mcus.size(); ++i) {
+    bus_.add_mcu(mcu_options(config_.mcus[i], i, options_.crystal_ppm, random));
+  }
+}
+
+void World::add_motors() {
+  const bushd::config::Bus& bus = config_.buses[0];
   for (const bushd::config::Group& group : config_.groups) {
-    rules_.push_back(
-        std::make_unique<bushd::sim::PaceRules>(group.table->view(), config_.buses[0].tick_ns(),
-                                                bushd::sim::McuOptions{}.slots, options.format));
+    rules_.push_back(std::make_unique<bushd::sim::PaceRules>(
+        group.table->view(), bus.tick_ns(), bushd::sim::McuOptions{}.slots, bus.format));
   }
   for (const bushd::config::Motor& motor : config_.motors) {
     plant_.attach(motor.mcu.value, motor.output.value, *rules_[motor.group.value]);
@@ -56,9 +70,6 @@ World::World(const Options& options, bushd::config::Config config)
                                const std::string& what) {
     witness_.violated(time_ns, fmt::format("{} output {}: {}", config_.mcus[mcu].id, output, what));
   };
-  for (std::size_t i = 0; i < kFaultKinds; ++i) {
-    chance_.emplace_back(options.seed, kFaultStream + static_cast<std::uint32_t>(i));
-  }
 }
 
 void World::run() {
@@ -72,9 +83,9 @@ void World::run() {
 }
 
 void World::spell_of_trouble(TimeNs until_ns) {
-  next_command_ns_ = now_ns_;
+  next_command_ns_ = clients_.next_after(now_ns_);
   for (std::size_t i = 0; i < kFaultKinds; ++i) {
-    const double per_hour = options_.rates[i];
+    const double per_hour = options_.fault_rates[i];
     next_fault_ns_[i] =
         per_hour > 0 ? now_ns_ + chance_[i].wait(static_cast<double>(kHour) / per_hour) : kNever;
   }
@@ -84,11 +95,11 @@ void World::spell_of_trouble(TimeNs until_ns) {
     const auto kind = static_cast<std::size_t>(next - next_fault_ns_.begin());
     if (now_ns_ >= *next) {
       strike(static_cast<FaultKind>(kind));
-      *next = now_ns_ + chance_[kind].wait(static_cast<double>(kHour) / options_.rates[kind]);
+      *next = now_ns_ + chance_[kind].wait(static_cast<double>(kHour) / options_.fault_rates[kind]);
     }
     if (now_ns_ >= next_command_ns_) {
       host_.command(now_ns_, clients_.next());
-      next_command_ns_ = now_ns_ + clients_.pause_ns();
+      next_command_ns_ = clients_.next_after(now_ns_);
     }
     if (now_ns_ - deadlines_checked_ns_ >= kSecond) {
       witness_.check_deadlines(now_ns_);
@@ -102,16 +113,8 @@ void World::calm() {
   run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_}));
   const TimeNs began_ns = now_ns_;
   host_.command(now_ns_, clients_.stop_all());
-  const auto ready = [this] { return witness_.all_ready(); };
-  while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
-    run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
-    // What a client has switched off only a client switches on again.
-    host_.command(now_ns_, clients_.enable_all());
-  }
+  be_well(began_ns);
   if (witness_.violation()) return;
-  if (!ready()) {
-    witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready());
-  }
   run_until(now_ns_ + kSecond);
   while (witness_.commands_open() && now_ns_ < began_ns + kMoveNs && !witness_.violation()) {
     run_until(now_ns_ + 100 * kMs);
@@ -119,6 +122,20 @@ void World::calm() {
   if (witness_.violation()) return;
   if (witness_.commands_open()) witness_.violated(now_ns_, "a command without a result in calm");
   witness_.check_deadlines(now_ns_);
+  if (const std::uint64_t steps = witness_.steps_unaccounted(); steps != 0) {
+    witness_.violated(now_ns_, fmt::format("{} steps unaccounted", steps));
+  }
+}
+
+void World::be_well(TimeNs began_ns) {
+  const auto ready = [this] { return witness_.all_ready(); };
+  while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
+    run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
+    // What a client has switched off or stopped only a client sets going again.
+    host_.command(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
+  }
+  if (ready() || witness_.violation()) return;
+  witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready());
 }
 
 void World::run_until(TimeNs until_ns) {
@@ -130,6 +147,9 @@ void World::advance(TimeNs until_ns) {
   now_ns_ = std::max(now_ns_, std::min(until_ns, host_.next_ns()));
   bus_.advance_to(now_ns_);
   host_.run(now_ns_);
+  if (now_ns_ - skew_checked_ns_ < kSkewPeriodNs) return;
+  skew_checked_ns_ = now_ns_;
+  if (const auto wrong = skew_.check(now_ns_)) witness_.violated(now_ns_, *wrong);
 }
 
 void World::note_fault(FaultKind kind, const std::string& detail) {
@@ -144,6 +164,7 @@ void World::reset_mcu() {
   bus_.reboot(mcu, down_ns);
   plant_.cut(mcu);
   witness_.mcu_reset(mcu);
+  overheard_->mcu_reset(mcu);
   mcus_up_ns_ = std::max(mcus_up_ns_, now_ns_ + down_ns);
   note_fault(FaultKind::kReset, fmt::format("{} for {} ms", config_.mcus[mcu].id, down_ns / kMs));
 }

@@ -12,11 +12,14 @@
 
 #include "clients.h"
 #include "config/config.h"
-#include "fault_kinds.h"
 #include "host.h"
+#include "installation.h"
+#include "kinds.h"
+#include "overheard.h"
 #include "recent.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
+#include "skew.h"
 #include "witness.h"
 
 namespace bushfaults {
@@ -26,8 +29,9 @@ struct Options {
   double hours = 0.1;
   std::size_t motors = 32;
   std::size_t mcus = 2;
-  bushd_format format = BUSHD_FORMAT_FINE;
-  Rates rates = usual_rates();
+  Ways ways;
+  FaultRates fault_rates = usual_fault_rates();
+  CommandRates command_rates = usual_command_rates();
   std::int64_t crystal_ppm = 50;
 };
 
@@ -41,14 +45,20 @@ class World {
   void run();
 
   TimeNs now_ns() const { return now_ns_; }
-  const Counts& faults() const { return faults_; }
+  const bushd::config::Config& config() const { return config_; }
+  const FaultCounts& faults() const { return faults_; }
+  const CommandCounts& commands() const { return clients_.sent(); }
+  const Skew& skew() const { return skew_; }
   const Witness& witness() const { return witness_; }
   const bushd::sim::Plant& plant() const { return plant_; }
   const Recent& recent() const { return recent_; }
 
  private:
+  void add_mcus();
+  void add_motors();
   void spell_of_trouble(TimeNs until_ns);
   void calm();
+  void be_well(TimeNs began_ns);
   void advance(TimeNs until_ns);
   void run_until(TimeNs until_ns);
   void strike(FaultKind kind);
@@ -62,16 +72,19 @@ class World {
   bushd::sim::Plant plant_;
   bushd::sim::Bus bus_;
   Witness witness_;
+  Skew skew_;
   Clients clients_;
   Host host_;
   std::vector<std::unique_ptr<bushd::sim::PaceRules>> rules_;  // by group
   std::vector<bushd::sim::Random> chance_;                     // by fault kind
   std::array<TimeNs, kFaultKinds> next_fault_ns_{};
-  Counts faults_{};
+  std::unique_ptr<Overheard> overheard_;  // once the MCUs are on the bus
+  FaultCounts faults_{};
   TimeNs now_ns_ = 0;
   TimeNs next_command_ns_ = 0;
   TimeNs mcus_up_ns_ = 0;  // when the last MCU that was reset boots
   TimeNs deadlines_checked_ns_ = 0;
+  TimeNs skew_checked_ns_ = 0;
 };
 
 }  // namespace bushfaults

@@ -1,0 +1,64 @@
+#include "kinds.h"
+
+namespace bushfaults {
+namespace {
+
+// What a line sees often is frequent, what a lab sees now and then is rarer; but rare enough, all
+// of it, that moves go well in between: a daemon that is always down proves nothing.
+constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
+    {"bit-errors", 9000, "one to three bits flipped in a byte"},
+    {"lost-bytes", 4000, "one to four bytes in a row missing"},
+    {"repeated-bytes", 4000, "a byte comes twice"},
+    {"delayed-bytes", 3000, "a gap of 1..60 ms between two bytes"},
+    {"noise", 3000, "1..300 bytes that nobody sent"},
+    {"lost-frames", 6000, "a frame missing"},
+    {"truncated-frames", 3000, "a frame breaks off before its delimiter"},
+    {"repeated-frames", 4000, "a frame comes again, at once or some frames later"},
+    {"delayed-frames", 3000, "a frame comes 1..60 ms late"},
+    {"deaf-mcus", 4000, "one MCU alone hears nothing for 20 us .. 50 ms"},
+    {"silences", 120, "nothing gets through for 1 ms .. 10 s"},
+    {"unplugs", 30, "the adapter goes away for 10 ms .. 5 s; another one comes back"},
+    {"pauses", 60, "the daemon does nothing for 0.1 .. 3 s"},
+    {"kills", 30, "the daemon is killed, another starts 10 ms .. 3 s later"},
+    {"resets", 30, "an MCU is reset and boots 1 ms .. 2 s later"},
+}};
+
+constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
+    {"single-moves", 7200, "one motor, by or to, 1 .. 6000 steps"},
+    {"group-moves", 4800, "2 .. 32 motors at once"},
+    {"retargets", 2400, "new targets for motors that move"},
+    {"stops", 4300, "of some motors that move, or of all"},
+    {"emergency-stops", 60, "of all motors"},
+    {"set-positions", 700, "of motors at rest"},
+    {"switches", 500, "drivers on or off"},
+    {"clears", 500, "of faults"},
+    {"repeats", 1900, "a command again that was sent before"},
+    {"nonsense", 1700, "what no client should send"},
+}};
+
+template <std::size_t kSize>
+std::array<double, kSize> rates(const std::array<KindInfo, kSize>& kinds) {
+  std::array<double, kSize> all{};
+  for (std::size_t i = 0; i < kSize; ++i) all[i] = kinds[i].per_hour;
+  return all;
+}
+
+}  // namespace
+
+const KindInfo& info(FaultKind kind) {
+  return kFaults[static_cast<std::size_t>(kind)];
+}
+
+const KindInfo& info(CommandKind kind) {
+  return kCommands[static_cast<std::size_t>(kind)];
+}
+
+FaultRates usual_fault_rates() {
+  return rates(kFaults);
+}
+
+CommandRates usual_command_rates() {
+  return rates(kCommands);
+}
+
+}  // namespace bushfaults

@@ -1,0 +1,65 @@
+// The kinds of trouble, and of commands, each with its flag and its usual rate.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace bushfaults {
+
+enum class FaultKind : std::uint8_t {
+  // On the bytes between daemon and line, in either direction (sim/garbler.h, in its order).
+  kBitError,
+  kLostByte,
+  kRepeatedByte,
+  kDelayedByte,
+  kNoise,
+  kLostFrame,
+  kTruncatedFrame,
+  kRepeatedFrame,
+  kDelayedFrame,
+  // On larger things.
+  kDeafMcu,
+  kSilence,
+  kUnplug,
+  kPause,
+  kKill,
+  kReset,
+};
+inline constexpr std::size_t kFaultKinds = 15;
+
+// What clients send.
+enum class CommandKind : std::uint8_t {
+  kMove,
+  kGroupMove,
+  kRetarget,
+  kStop,
+  kEmergencyStop,
+  kSetPosition,
+  kSwitch,
+  kClear,
+  kAgain,
+  kNonsense,
+};
+inline constexpr std::size_t kCommandKinds = 10;
+
+struct KindInfo {
+  std::string_view name;  // as a flag and in the summary
+  double per_hour;        // by default
+  std::string_view what;
+};
+
+const KindInfo& info(FaultKind kind);
+const KindInfo& info(CommandKind kind);
+
+// Per simulated hour.
+using FaultRates = std::array<double, kFaultKinds>;
+using CommandRates = std::array<double, kCommandKinds>;
+FaultRates usual_fault_rates();
+CommandRates usual_command_rates();
+
+using FaultCounts = std::array<std::uint64_t, kFaultKinds>;
+using CommandCounts = std::array<std::uint64_t, kCommandKinds>;
+
+}  // namespace bushfaults
