@@ -165,6 +165,9 @@ class Master {
     Tick next = 0;           // first tick not yet sent, or to be sent again
     Tick sent = 0;           // first tick never sent
     std::optional<Gap> gap;  // while what lies before it is sent again
+    // Since a replacement failed: beyond `sent` the MCU may have ticks of the plan before it,
+    // behind a gap. Reports need not show them, so the next replacement takes them away.
+    bool unsure = false;
     // Of a table run, until it is replaced.
     std::optional<std::int32_t> run_steps;
   };

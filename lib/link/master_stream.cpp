@@ -51,12 +51,15 @@ void Master::drop(std::size_t mcu, std::uint8_t motor) {
 void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
   Mcu& m = mcus_[mcu];
   std::uint16_t sent = 0;  // motors of which ticks from `first` on have been sent already
+  Tick earliest = first;
   for (unsigned i = 0; i < BUSHD_MOTORS_PER_MCU; ++i) {
     Stream& stream = m.stream[i];
     if ((motors >> i & 1) == 0 || !stream.active) continue;
     const bool begun = stream.sent != stream.start;
-    if (begun && stream.sent > first) {
+    if (begun && (stream.sent > first || stream.unsure)) {
       sent |= bit(i);
+      // Where it has become too late for that, the MCU refuses the other tick until it runs dry.
+      if (!too_late(stream.sent, tick_at(stepped_us_))) earliest = std::min(earliest, stream.sent);
     } else {
       // A table run of which nothing has been sent is another one now; it goes out as a stream.
       stream.run_steps.reset();
@@ -66,7 +69,7 @@ void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
   if (sent == 0) return;
   // Two wishes before the first was sent: one replacement must serve both, so it takes the earlier
   // tick. If that is too late by now, it fails as a whole and is planned again.
-  m.replace_at = m.replacing == 0 ? first : std::min(m.replace_at, first);
+  m.replace_at = m.replacing == 0 ? earliest : std::min(m.replace_at, earliest);
   m.replacing |= sent;
 }
 
@@ -290,7 +293,11 @@ void Master::note_sent(std::size_t index, std::uint8_t motor, Tick first, Tick u
 // A replacement was taken if the MCU is in the epoch that it opened.
 void Master::follow_replacements(std::size_t index) {
   Mcu& mcu = mcus_[index];
-  std::uint16_t failed = mcu.view.report.epoch == mcu.epoch ? std::uint16_t{0} : mcu.replaced;
+  const bool taken = mcu.view.report.epoch == mcu.epoch;
+  std::uint16_t failed = taken ? std::uint16_t{0} : mcu.replaced;
+  for (unsigned m = 0; taken && m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((mcu.replaced >> m & 1) != 0) mcu.stream[m].unsure = false;
+  }
   mcu.replaced = 0;
   mcu.epoch = mcu.view.report.epoch;
   // What was queued before stays in force, whatever has been sent since. If not even the start has
@@ -299,6 +306,7 @@ void Master::follow_replacements(std::size_t index) {
     if ((failed >> m & 1) == 0) continue;
     Stream& stream = mcu.stream[m];
     stream.next = stream.sent = std::max(mcu.view.known_until[m], stream.start);
+    stream.unsure = stream.sent != stream.start;
     stream.gap.reset();
     stream.finished = false;
   }
