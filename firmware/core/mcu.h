@@ -110,7 +110,7 @@ typedef struct bushd_mcu_clock {
   int32_t rate_ppb;       // faster than the crystal
   int32_t rate_step;      // ns a tick, x 4096
   int32_t rate_fraction;  // of it, not yet given
-  bool corrected;  // the clock was right at this time of the bus
+  bool corrected;         // the clock was right at this time of the bus
   uint32_t corrected_tick;
   uint32_t corrected_ns;
   // Masters that come by turns.
