@@ -25,7 +25,8 @@ struct MotorOptions {
 };
 bushd::Result<std::optional<bushd::tables::laws::Motor>> load_motor(const MotorOptions& options);
 
-int show(const Places& places, const std::string& table, bool json);
+// With `steps`, every step of the move that just comes to cruise.
+int show(const Places& places, const std::string& table, bool steps, bool json);
 
 struct Check {
   std::vector<std::string> tables;
@@ -95,6 +96,12 @@ int import_bushd(const Places& places, const BushdImport& wanted);
 int list(const Places& places, bool json);
 // In the terminal: as wide as that is, coloured if it is one.
 int plot(const Places& places, const std::vector<std::string>& tables);
+struct Plot {
+  std::vector<std::string> tables;
+  std::string svg;  // files; empty: none
+  std::string png;
+};
+int draw_pictures(const Places& places, const Plot& wanted);
 int time(const Places& places, const std::string& table, const std::vector<std::uint32_t>& steps,
          bool json);
 int diff(const Places& places, const std::string& before, const std::string& after, bool json);

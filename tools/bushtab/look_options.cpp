@@ -15,13 +15,19 @@ constexpr const char* kTable = "A table's file or name";
 void add_show(CLI::App& app, const Places& places, const Run& run) {
   struct Options {
     std::string table;
+    bool steps = false;
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
   CLI::App* show = app.add_subcommand("show", "Speeds, times and sizes of a table");
   show->add_option("TABLE", options->table, kTable)->required();
+  show->add_flag(
+      "--steps", options->steps,
+      "Every step of the move that just comes to cruise: delay, time, speed, acceleration");
   show->add_flag("--json", options->json, "As JSON");
-  run(show, [&places, options] { return bushtab::show(places, options->table, options->json); });
+  run(show, [&places, options] {
+    return bushtab::show(places, options->table, options->steps, options->json);
+  });
 }
 
 void add_check(CLI::App& app, const Places& places, const Run& run) {
@@ -92,12 +98,20 @@ void add_time(CLI::App& app, const Places& places, const Run& run) {
 }
 
 void add_plot(CLI::App& app, const Places& places, const Run& run) {
-  const auto tables = std::make_shared<std::vector<std::string>>();
-  CLI::App* plot = app.add_subcommand("plot", "Speed over time, drawn in the terminal");
-  plot->add_option("TABLE", *tables, "Tables' files or names, in one picture")->required();
+  const auto options = std::make_shared<Plot>();
+  CLI::App* plot =
+      app.add_subcommand("plot", "Draws tables in one picture, in the terminal or into files");
+  plot->add_option("TABLE", options->tables, "Tables' files or names")->required();
+  plot->add_option("--svg", options->svg, "Speed over steps and time, acceleration, as SVG")
+      ->type_name("FILE");
+  plot->add_option("--png", options->png, "The same as PNG")->type_name("FILE");
   plot->footer(
-      "As wide as the terminal, else $COLUMNS, else 80. No colours with $NO_COLOR or in a file.");
-  run(plot, [&places, tables] { return bushtab::plot(places, *tables); });
+      "In the terminal: speed over time, as wide as that is, else $COLUMNS, else 80. No colours\n"
+      "with $NO_COLOR or in a file.");
+  run(plot, [&places, options] {
+    const bool to_files = !options->svg.empty() || !options->png.empty();
+    return to_files ? draw_pictures(places, *options) : bushtab::plot(places, options->tables);
+  });
 }
 
 void add_diff(CLI::App& app, const Places& places, const Run& run) {

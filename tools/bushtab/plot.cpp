@@ -12,12 +12,11 @@
 #include <vector>
 
 #include "commands.h"
+#include "curve.h"
 #include "open_table.h"
 
 namespace bushtab {
 namespace {
-
-namespace tables = bushd::tables;
 
 constexpr int kDotsAcross = 2;
 constexpr int kDotsDown = 4;
@@ -27,29 +26,6 @@ constexpr int kMaxColumns = 400;
 constexpr int kRows = 16;
 constexpr int kLabelColumns = 11;  // "123456.7 |" and a space
 constexpr std::array<const char*, 6> kColours{"36", "33", "35", "32", "31", "34"};
-
-struct Point {
-  double time_s;
-  double speed_hz;
-};
-
-// A move that just reaches its cruise speed: up one side, a short cruise, down the other. The speed
-// of a delay holds for its length.
-std::vector<Point> curve_of(const tables::Table& table) {
-  const bushd_table& view = table.view();
-  const double unit_s = view.time_unit_ns * 1e-9;
-  std::vector<Point> curve;
-  double time_s = 0;
-  const auto add = [&](std::uint16_t code) {
-    const double delay_s = std::max(code, view.cruise) * unit_s;
-    curve.push_back({time_s + delay_s / 2, 1 / delay_s});
-    time_s += delay_s;
-  };
-  for (std::uint32_t i = 0; i < view.accel.count; ++i) add(view.accel.code[i]);
-  add(view.cruise);
-  for (std::uint32_t i = view.decel.count; i-- > 0;) add(view.decel.code[i]);
-  return curve;
-}
 
 int columns() {
   winsize size{};
@@ -71,10 +47,10 @@ class Canvas {
         cells_(static_cast<std::size_t>(width) * kRows) {}
 
   // Lines between the points, dot by dot.
-  void draw(const std::vector<Point>& curve, int colour) {
+  void draw(const std::vector<CurveStep>& curve, int colour) {
     for (std::size_t i = 0; i < curve.size(); ++i) {
-      const Point& to = curve[i];
-      const Point& from = i == 0 ? to : curve[i - 1];
+      const CurveStep& to = curve[i];
+      const CurveStep& from = i == 0 ? to : curve[i - 1];
       const double across = std::abs(x(to) - x(from));
       const double down = std::abs(y(to) - y(from));
       const int dots = 1 + static_cast<int>(std::max(across, down));
@@ -109,9 +85,11 @@ class Canvas {
     int colour = 0;
   };
 
-  double x(const Point& point) const { return point.time_s / end_s_ * (width_ * kDotsAcross - 1); }
-  double y(const Point& point) const {
-    return (1 - point.speed_hz / top_hz_) * (kRows * kDotsDown - 1);
+  double x(const CurveStep& point) const {
+    return point.middle_s() / end_s_ * (width_ * kDotsAcross - 1);
+  }
+  double y(const CurveStep& point) const {
+    return (1 - point.speed_hz() / top_hz_) * (kRows * kDotsDown - 1);
   }
 
   void set(double across, double down, int colour) {
@@ -134,17 +112,15 @@ class Canvas {
 }  // namespace
 
 int plot(const Places& places, const std::vector<std::string>& names) {
-  std::vector<std::vector<Point>> curves;
+  std::vector<std::vector<CurveStep>> curves;
   double end_s = 0;
   double top_hz = 0;
   for (const std::string& name : names) {
     const auto table = open_table(places, name);
     if (!table) return refuse(table.error());
     curves.push_back(curve_of(**table));
-    for (const Point& point : curves.back()) {
-      top_hz = std::max(top_hz, point.speed_hz);
-      end_s = std::max(end_s, point.time_s + 0.5 / point.speed_hz);
-    }
+    for (const CurveStep& step : curves.back()) top_hz = std::max(top_hz, step.speed_hz());
+    end_s = std::max(end_s, static_cast<double>(curves.back().back().time_ns) * 1e-9);
   }
   const int width = columns() - kLabelColumns;
   const bool coloured = isatty(STDOUT_FILENO) == 1 && std::getenv("NO_COLOR") == nullptr;

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "curve.h"
 #include "engine/run.h"
 #include "open_table.h"
 
@@ -51,9 +52,50 @@ ordered_json side_json(const Table& table, const bushd_ramp& side) {
           {"time_ns", ramp_ns(table, side)}};
 }
 
-void print_json(const Table& table) {
+const char* text_of(CurveStep::Part part) {
+  switch (part) {
+    case CurveStep::Part::kAccel:
+      return "accel";
+    case CurveStep::Part::kCruise:
+      return "cruise";
+    case CurveStep::Part::kDecel:
+      break;
+  }
+  return "decel";
+}
+
+ordered_json steps_json(const std::vector<CurveStep>& curve) {
+  ordered_json steps = ordered_json::array();
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    const CurveStep& step = curve[i];
+    steps.push_back({{"step", i + 1},
+                     {"part", text_of(step.part)},
+                     {"index", step.index},
+                     {"delay_ns", step.delay_ns},
+                     {"time_ns", step.time_ns},
+                     {"steps_per_s", step.speed_hz()},
+                     {"steps_per_s2", nullptr}});
+    if (i > 0) steps.back()["steps_per_s2"] = acceleration(curve[i - 1], step);
+  }
+  return steps;
+}
+
+void print_steps(const std::vector<CurveStep>& curve) {
+  fmt::print("\n{:>6}  {:<6} {:>6} {:>14} {:>14} {:>12} {:>14}\n", "step", "part", "index",
+             "delay us", "time ms", "steps/s", "steps/s²");
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    const CurveStep& step = curve[i];
+    const std::string change =
+        i == 0 ? "-" : fmt::format("{:.6g}", acceleration(curve[i - 1], step));
+    fmt::print("{:>6}  {:<6} {:>6} {:>14.3f} {:>14.6f} {:>12.6g} {:>14}\n", i + 1,
+               text_of(step.part), step.index, static_cast<double>(step.delay_ns) * 1e-3,
+               static_cast<double>(step.time_ns) * 1e-6, step.speed_hz(), change);
+  }
+}
+
+void print_json(const Table& table, bool steps) {
   const bushd_table& view = table.view();
-  const ordered_json json = {
+  ordered_json json = {
       {"name", table.name()},
       {"description", table.description()},
       {"path", table.path()},
@@ -66,6 +108,7 @@ void print_json(const Table& table) {
       {"cruise", {{"code", view.cruise}, {"steps_per_s", steps_per_s(table, view.cruise)}}},
       {"shortest_cruising_move_steps", shortest_cruising_move(view)},
       {"longest_tick_us", longest_tick_us(view)}};
+  if (steps) json["steps"] = steps_json(curve_of(table));
   // A path need not be UTF-8.
   fmt::print("{}\n", json.dump(2, ' ', false, ordered_json::error_handler_t::replace));
 }
@@ -102,13 +145,14 @@ void print_text(const Table& table) {
 
 }  // namespace
 
-int show(const Places& places, const std::string& name, bool json) {
+int show(const Places& places, const std::string& name, bool steps, bool json) {
   const auto table = open_table(places, name);
   if (!table) return refuse(table.error());
   if (json) {
-    print_json(**table);
+    print_json(**table, steps);
   } else {
     print_text(**table);
+    if (steps) print_steps(curve_of(**table));
   }
   return kDone;
 }

@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+"""docs/man/bushtab.1 and bushtab --help tell of the same commands and options. The program is $BUSHTAB."""
+
+import os
+import pathlib
+import re
+import subprocess
+import unittest
+
+PAGE = pathlib.Path(os.environ["BUSHD_SOURCE_DIR"]) / "docs/man/bushtab.1"
+
+
+def bushtab_help(*command):
+    return subprocess.run(
+        [os.environ["BUSHTAB"], *command, "--help"], capture_output=True, text=True, check=True
+    ).stdout
+
+
+def options_in_help(*command):
+    found = set(re.findall(r"^ +(?:-h,)?(--[a-z][a-z0-9-]*)", bushtab_help(*command), re.MULTILINE))
+    return found - {"--help"} if command else found
+
+
+def commands_in_help():
+    listed = bushtab_help().split("Subcommands:\n")[1].split("\n\n")[0]
+    return set(re.findall(r"^  ([a-z0-9-]+)", listed, re.MULTILINE))
+
+
+def options_in(section):
+    heads = re.findall(r"^\.TP\n(.*)$", section, re.MULTILINE)
+    return {option for head in heads for option in re.findall(r"--[a-z][a-z0-9-]*", head)}
+
+
+class ManPage(unittest.TestCase):
+    def setUp(self):
+        text = PAGE.read_text().replace(r"\-", "-")
+        self.options = text.split(".SH OPTIONS\n")[1].split("\n.SH ")[0]
+        sections = text.split(".SH COMMANDS\n")[1].split("\n.SH ")[0].split(".SS ")[1:]
+        self.commands = {section.split("\n")[0]: section for section in sections}
+
+    def test_commands_are_the_same(self):
+        self.assertEqual(set(self.commands), commands_in_help())
+
+    def test_options_are_the_same(self):
+        self.assertEqual(options_in(self.options), options_in_help())
+        for name, section in self.commands.items():
+            with self.subTest(name):
+                self.assertEqual(options_in(section), options_in_help(name))
+
+    def test_operands_are_the_same(self):
+        for name, section in self.commands.items():
+            with self.subTest(name):
+                usage = re.search(r"^Usage: .* \[OPTIONS\](.*)$", bushtab_help(name), re.MULTILINE)
+                operands = re.search(r"^\\fB.*?\\fR(.*)$", section, re.MULTILINE).group(1)
+                self.assertEqual(re.findall("[A-Z]+", re.sub(r"\\f.", "", operands)), re.findall("[A-Z]+", usage.group(1)))
+
+
+if __name__ == "__main__":
+    unittest.main()
