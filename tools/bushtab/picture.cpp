@@ -104,14 +104,14 @@ void draw_panel(Drawing& drawing, const Panel& panel, double top) {
     const double at = y(i * y_distance);
     drawing.line({{kPlotLeft, at}, {kPlotRight, at}}, i == 0 ? axis : grid);
     drawing.text({kPlotLeft - 2 * kTickLength, at + kTextSize / 3.0}, Anchor::kEnd,
-                 fmt::format("{:.6g}", i * y_distance));
+                 fmt::format("{:.10g}", i * y_distance));
   }
   const double x_distance = tick_distance(panel.x);
   for (int i = 0; i * x_distance <= panel.x.high * (1 + 1e-9); ++i) {
     const double at = x(i * x_distance);
     drawing.line({{at, lower}, {at, lower + kTickLength}}, axis);
     drawing.text({at, lower + kTickLength + kTextSize}, Anchor::kMiddle,
-                 fmt::format("{:.6g}", i * x_distance));
+                 fmt::format("{:.10g}", i * x_distance));
   }
   drawing.text({kPlotRight, lower + kTickLength + 2.2 * kTextSize}, Anchor::kEnd, panel.x_title);
   drawing.line({{kPlotLeft, upper}, {kPlotLeft, lower}, {kPlotRight, lower}}, axis);
