@@ -149,7 +149,8 @@ static void put_entry(writer* w, const bushd_table_ticks_entry* entry) {
   put16(w, state->decel_left);
 }
 
-static void get_entry(reader* r, bushd_table_ticks_entry* entry) {
+// Returns whether each field that the head announces is needed: so a state has one spelling.
+static bool get_entry(reader* r, bushd_table_ticks_entry* entry) {
   bushd_run_state* const state = &entry->state;
   const uint8_t head = get8(r);
   entry->motor = head & HEAD_MOTOR;
@@ -162,6 +163,8 @@ static void get_entry(reader* r, bushd_table_ticks_entry* entry) {
   state->accel_end = state->cruises ? 0 : get16(r);
   state->cruise_left = state->cruises ? 0 : get32(r);
   state->decel_left = state->cruises ? 0 : get16(r);
+  return (state->since_ns != 0 || (head & HEAD_SINCE_NS) == 0) &&
+         (state->lead_delay != 0 || (head & HEAD_LEAD) == 0);
 }
 
 size_t bushd_encode_table_ticks(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint16_t count,
@@ -187,17 +190,17 @@ bushd_status bushd_decode_table_ticks(const uint8_t* payload, size_t size,
   message->entries = r.at;
   message->entries_size = (uint16_t)(r.end - r.at);
   message->mask = 0;
-  bool rising = true;
+  bool in_range = true;
   while (r.at != r.end && !r.short_of_bytes) {
     bushd_table_ticks_entry entry;
-    get_entry(&r, &entry);
+    if (!get_entry(&r, &entry)) in_range = false;
     const uint16_t bit = (uint16_t)(1u << entry.motor);
-    if (message->mask >= bit) rising = false;
+    if (message->mask >= bit) in_range = false;
     message->mask |= bit;
   }
   const uint8_t known = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
   return finish(&r, known_flags(message->flags, known) && message->count >= 1 &&
-                        message->mask != 0 && rising);
+                        message->mask != 0 && in_range);
 }
 
 bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at,

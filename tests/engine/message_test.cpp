@@ -448,6 +448,24 @@ TEST(MessageTableTicks, RefusesMotorsThatDoNotRise) {
   });
 }
 
+TEST(MessageTableTicks, RefusesAFieldOf0ThatNeedNotBeThere) {
+  bushd_table_ticks_entry entry{5, {}};
+  entry.state.direction = 1;
+  entry.state.since_ns = 7;
+  entry.state.lead_delay = 9;
+  entry.state.decel_left = 1;
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(bushd_encode_table_ticks(1, 0, 1000, 190, &entry, 1, payload.data()));
+  bushd_table_ticks message{};
+  EXPECT_EQ(bushd_decode_table_ticks(payload.data(), payload.size(), &message), BUSHD_OK);
+  Bytes no_ns = payload;
+  bushd_put_u32(&no_ns[BUSHD_TABLE_TICKS_HEADER + 3], 0);
+  EXPECT_EQ(bushd_decode_table_ticks(no_ns.data(), no_ns.size(), &message), BUSHD_E_FORMAT);
+  Bytes no_lead = payload;
+  bushd_put_u16(&no_lead[BUSHD_TABLE_TICKS_HEADER + 7], 0);
+  EXPECT_EQ(bushd_decode_table_ticks(no_lead.data(), no_lead.size(), &message), BUSHD_E_FORMAT);
+}
+
 TEST(MessageTableTicks, AMotorInCruiseTakesThreeBytes) {
   bushd_table_ticks_entry entry{5, {}};
   entry.state.direction = -1;

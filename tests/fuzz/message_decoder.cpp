@@ -193,11 +193,7 @@ void decode_table_ticks(Bytes payload) {
   const std::size_t size =
       bushd_encode_table_ticks(message.epoch, message.flags, message.first_tick, message.count,
                                entries.data(), motors, again.data());
-  BUSHD_REQUIRE(size <= payload.size());
-  bushd_table_ticks second;
-  BUSHD_REQUIRE(bushd_decode_table_ticks(again.data(), size, &second) == BUSHD_OK);
-  BUSHD_REQUIRE(second.mask == message.mask);
-  if (size == payload.size()) BUSHD_REQUIRE(same(payload, again, size));
+  BUSHD_REQUIRE(size == payload.size() && same(payload, again, size));
 }
 
 void decode_table_run(Bytes payload) {
