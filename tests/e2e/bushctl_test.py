@@ -108,13 +108,23 @@ class Examples(EndToEndTest):
     def test_in_cpp(self):
         self.check_example(program("MOVE_AND_WAIT"))
 
-    def test_in_python(self):
+    def python_with(self, example):
         python = os.environ["EXAMPLE_PYTHON"]
         try:
             subprocess.run([python, "-c", "import lcm, bushd"], check=True, capture_output=True)
         except (OSError, subprocess.CalledProcessError):
             self.skipTest(f"{python} has no lcm: tools/examples/python/setup-venv needs a package index")
-        self.check_example(python, TOP / "tools" / "examples" / "python" / "move_and_wait.py")
+        return python, TOP / "tools" / "examples" / "python" / example
+
+    def test_in_python(self):
+        self.check_example(*self.python_with("move_and_wait.py"))
+
+    def test_health_in_python(self):
+        example = self.python_with("show_health.py")
+        self.bring_up()
+        ran = self.run_program(*example, "--count", "1")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertRegex(ran.stdout, r"hall:1: \d+ CRC errors, .*\nhall:2: \d+ CRC errors, ")
 
 
 if __name__ == "__main__":
