@@ -2,19 +2,10 @@
 // somebody else talks on a line.
 #include "daemon/bus.h"
 #include "daemon/core.h"
+#include "link/unique_id.h"
 
 namespace bushd::daemon {
 namespace {
-
-std::string hex(const std::uint8_t (&unique_id)[BUSHD_UNIQUE_ID_SIZE]) {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string text;
-  for (const std::uint8_t byte : unique_id) {
-    text += kDigits[byte >> 4];
-    text += kDigits[byte & 15];
-  }
-  return text;
-}
 
 std::int64_t number(std::uint64_t count) {
   return static_cast<std::int64_t>(count);
@@ -45,7 +36,7 @@ mcu_health_t Core::health_of(const Mcu& mcu) const {
   mcu_health_t out;
   out.mcu = mcu.config->id;
   out.address = mcu.config->address.value;
-  out.unique_id = view.identified ? hex(view.identity.unique_id) : std::string();
+  out.unique_id = view.identified ? link::unique_id_text(view.identity) : std::string();
   out.firmware_version = view.identified ? view.identity.firmware_version : 0;
   out.boot_number = view.identified ? view.identity.boot_number : 0;
   out.crc_errors = number(health.crc_errors);

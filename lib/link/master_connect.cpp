@@ -7,6 +7,7 @@
 
 #include "link/master.h"
 #include "link/master_limits.h"
+#include "link/unique_id.h"
 
 namespace bushd::link {
 namespace {
@@ -16,16 +17,6 @@ constexpr std::int64_t kMinQueueUs = 150'000;               // two lost answers 
 // Table runs go on without a word from here for as long: more than a busy PC needs to come back.
 constexpr std::int64_t kSilenceUs = 1'000'000;
 constexpr unsigned kIdentifySlots = 8;
-
-std::string hex(const std::uint8_t* unique_id) {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string text;
-  for (unsigned i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {
-    text += kDigits[unique_id[i] >> 4];
-    text += kDigits[unique_id[i] & 15];
-  }
-  return text;
-}
 
 bool same_id(const bushd_identity& a, const bushd_identity& b) {
   return std::memcmp(a.unique_id, b.unique_id, BUSHD_UNIQUE_ID_SIZE) == 0;
@@ -66,8 +57,8 @@ void Master::finish_identify(std::int64_t now_us, std::size_t index,
     return;
   }
   mcu.view.detail = "shares its address " + std::to_string(mcu.setup.address) +
-                    " with another: unique ids " + hex(first.unique_id) + " and " +
-                    hex(other->unique_id) +
+                    " with another: unique ids " + unique_id_text(first) + " and " +
+                    unique_id_text(*other) +
                     "; unplug one, or give one another address with 'bushctl address'";
   mcu.retry_due_us = now_us + kRefusedRetryUs;
   mcu.looks = 1;  // in slots again

@@ -11,6 +11,7 @@
 #include "bus_line.h"
 #include "commands.h"
 #include "line_report.h"
+#include "link/unique_id.h"
 
 namespace bushctl {
 namespace {
@@ -177,7 +178,7 @@ int set_address(const LineOptions& options, const std::string& unique_id, std::u
     if (mcu.address != address || itself) continue;
     return failed({.message = fmt::format("address {} is that of {} already; give that one another "
                                           "first",
-                                          address, unique_id_text(mcu.identity))});
+                                          address, bushd::link::unique_id_text(mcu.identity))});
   }
   bushd_set_address message{.unique_id = {}, .address = address};
   std::copy(id->begin(), id->end(), message.unique_id);

@@ -8,9 +8,12 @@
 
 #include "grid.h"
 #include "link/health.h"
+#include "link/unique_id.h"
 
 namespace bushctl {
 namespace {
+
+using bushd::link::unique_id_text;
 
 // The timer of an FTDI adapter as it is delivered; answers that it holds back lie around it.
 constexpr std::int64_t kHeldFromUs = 10'000;
@@ -115,10 +118,6 @@ std::string latency_json(const LatencyTest& test) {
     out["latency"].push_back(column);
   }
   return out.dump();
-}
-
-std::string unique_id_text(const bushd_identity& identity) {
-  return fmt::format("{:02x}", fmt::join(identity.unique_id, ""));
 }
 
 std::vector<std::string> scan_lines(std::vector<Found> found) {

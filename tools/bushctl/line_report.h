@@ -25,7 +25,6 @@ struct Found {
   std::uint8_t address = 0;
   bushd_identity identity{};
 };
-std::string unique_id_text(const bushd_identity& identity);
 // By address; then what is wrong with them.
 std::vector<std::string> scan_lines(std::vector<Found> found);
 std::string scan_json(std::vector<Found> found);
