@@ -25,7 +25,7 @@ std::string detail_of(const link::McuView& view, bool two_masters) {
   if (view.report.faults & BUSHD_FAULT_SELF_TEST) return "self-test failed";
   if (view.report.faults & BUSHD_FAULT_EMERGENCY) return "emergency stop; say 'bushctl clear'";
   if (view.report.faults & BUSHD_FAULT_SYNC) return "out of step with the bus";
-  if (view.report.faults & BUSHD_FAULT_LINK) return "tick queue ran empty in motion";
+  if (view.report.faults & BUSHD_FAULT_LINK) return "nothing more reached it in motion";
   if (two_masters) return "another master talks on the line";
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) return "drivers disabled";
   return {};
