@@ -11,7 +11,7 @@ const char* fault_text(std::uint8_t faults) {
   if (faults & BUSHD_FAULT_EMERGENCY) return "an emergency stop was commanded";
   if (faults & BUSHD_FAULT_SELF_TEST) return "its self-test failed";
   if (faults & BUSHD_FAULT_SYNC) return "it fell out of step with the bus";
-  return "its tick queue ran empty";
+  return "nothing more reached it in time";
 }
 
 constexpr const char* kCutOff = "it was cut off by an emergency stop and may have overrun";
@@ -187,7 +187,7 @@ void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, std::uint8_t faul
 void Core::clear_link_fault(Mcu& mcu) {
   const link::McuView& view = view_of(mcu);
   const bool faulty = (view.report.faults & (BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC)) != 0 &&
-                      (view.report.faults & BUSHD_FAULT_EMERGENCY) == 0;
+                      (view.report.faults & BUSHD_FAULT_EMERGENCY) == 0 && !stopping_all();
   if (faulty && !mcu.clearing && view.report.moving == 0) {
     outputs_.log(LogLevel::kWarning, "MCU " + mcu.config->id + ": " +
                                          fault_text(view.report.faults) +

@@ -119,7 +119,17 @@ void Master::set_position(std::size_t mcu, std::uint8_t motor, std::int32_t posi
 
 void Master::emergency_stop(bushd_how how) {
   emergency_ = Emergency{.how = how};
-  for (Mcu& mcu : mcus_) drop_streams(mcu);
+  for (Mcu& mcu : mcus_) {
+    drop_streams(mcu);
+    // One that was latched before says nothing of this one, and nothing that was wished before may
+    // clear it.
+    mcu.view.report.faults &= static_cast<std::uint8_t>(~BUSHD_FAULT_EMERGENCY);
+    mcu.taken_over = false;
+    for (Request& request : mcu.script) {
+      if (request.type != BUSHD_MSG_CONTROL) continue;
+      request.payload[0] &= static_cast<std::uint8_t>(~BUSHD_CONTROL_CLEAR_FAULTS);
+    }
+  }
 }
 
 std::vector<Event> Master::take_events() {

@@ -194,7 +194,8 @@ void Master::handle_tables(std::size_t index, const bushd_tables& held) {
                 [&](std::uint8_t* p) { return bushd_encode_assign(&assign, p); });
   }
   // An emergency stop is for people to clear; the one that took the MCU over is nobody's.
-  const bool emergency = (mcu.view.report.faults & BUSHD_FAULT_EMERGENCY) != 0 && !mcu.taken_over;
+  const bool latched = (mcu.view.report.faults & BUSHD_FAULT_EMERGENCY) != 0 && !mcu.taken_over;
+  const bool emergency = emergency_ || latched;
   std::uint8_t actions = emergency ? 0 : BUSHD_CONTROL_CLEAR_FAULTS;
   if (mcu.powered.value_or(true)) actions |= BUSHD_CONTROL_ENABLE;
   add_control(mcu, actions);

@@ -98,6 +98,37 @@ TEST_P(Emergency, IsHeardThoughTheFirstWritesAreLost) {
   EXPECT_LT(lab.shaft_steps("m01"), 6000);
 }
 
+TEST_P(Emergency, IsNotLiftedByAClearThatWasUnderWay) {
+  lab.connect();
+  for (int ms = 0; ms < 60; ms += 7) {
+    SCOPED_TRACE(ms);
+    ASSERT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+    const auto clear = lab.send(command_t::CLEAR_FAULTS, {});
+    lab.run_for(ms * 1e-3);
+    ASSERT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+    lab.wait(clear);
+    lab.run_for(0.5);
+    ASSERT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
+    ASSERT_EQ(lab.state_of("hall:2").mcu_state, "FAULT");
+  }
+}
+
+TEST_P(Emergency, HeardByAnMcuThatIsBeingConfiguredStaysLatched) {
+  int seen = 0;
+  for (int ms = 0; ms < 400; ms += 9) {
+    Lab fresh{emergency_hall(1, 2, manner, cut)};
+    fresh.run_for(ms * 1e-3);
+    if (!fresh.has_state("hall:1")) continue;
+    if (fresh.state_of("hall:1").detail != "being configured") continue;
+    SCOPED_TRACE(ms);
+    ++seen;
+    ASSERT_EQ(fresh.wait(fresh.send(command_t::EMERGENCY_STOP, {})).result, "done");
+    fresh.run_for(2);
+    ASSERT_EQ(fresh.state_of("hall:1").mcu_state, "FAULT");
+  }
+  EXPECT_GT(seen, 5);
+}
+
 TEST_P(Emergency, IsTakenWhateverElseIsWrong) {
   // Nobody is online yet, and a motor is named that is none.
   const auto stop = lab.send(command_t::EMERGENCY_STOP, {"nobody"});
