@@ -20,9 +20,16 @@ constexpr std::int64_t kReplaceLeadUs =
     12'000;  // a frame in flight, an answer awaited; adapter latency comes on top
 constexpr std::int64_t kMaxBacklogUs = 4'000;  // bytes handed to the port but not yet on the line
 constexpr std::int64_t kStreamWakeUs = 5'000;
+// More than any adapter holds back. An answer that was read later still waited for this program,
+// which had been stopped: moves and stops must not be put off by seconds for that.
+constexpr std::int64_t kMaxHeldBackUs = 40'000;
 constexpr std::int64_t kEmergencyRepeatUs = 20'000;
 constexpr std::int64_t kEmergencyUs =
     2'000'000;  // after this an MCU that says nothing is left alone
+
+std::int64_t held_back_us(const BusHealth& health) {
+  return std::min(health.latency.recent_us, kMaxHeldBackUs);
+}
 
 }  // namespace
 
@@ -64,7 +71,7 @@ std::int64_t Master::line_us(std::size_t bytes) const {
 // What an adapter holds back is late on the line, and its answer is later still: queues are deeper
 // by that, and changes are planned further ahead.
 Tick Master::earliest_start(std::int64_t now_us, std::size_t mcu, std::uint8_t motor) const {
-  const std::int64_t lead_us = kStartLeadUs + 4 * bus_health_.latency.recent_us;
+  const std::int64_t lead_us = kStartLeadUs + 4 * held_back_us(bus_health_);
   return std::max(tick_at(now_us) + ticks_in(lead_us), mcus_[mcu].stream[motor].next);
 }
 
@@ -73,7 +80,7 @@ Tick Master::earliest_replace(std::int64_t now_us) const {
   constexpr Tick kMcuTicks = 3;
   const std::int64_t waits_us =
       exchange_ ? std::max<std::int64_t>(exchange_->line_quiet_us - now_us, 0) : 0;
-  const std::int64_t lead_us = kReplaceLeadUs + waits_us + 2 * bus_health_.latency.recent_us;
+  const std::int64_t lead_us = kReplaceLeadUs + waits_us + 2 * held_back_us(bus_health_);
   return tick_at(now_us) + ticks_in(lead_us) + kMcuTicks;
 }
 
@@ -172,13 +179,13 @@ std::int64_t Master::next_wake_us() const {
 }
 
 bool Master::send_next(std::int64_t now_us) {
-  const std::int64_t held_back_us = 4 * bus_health_.latency.recent_us;
-  const std::int64_t urgent_us = kQueueUrgentUs + held_back_us;
+  const std::int64_t deeper_us = 4 * held_back_us(bus_health_);
+  const std::int64_t urgent_us = kQueueUrgentUs + deeper_us;
   return send_emergency(now_us) || send_due_replacement(now_us) ||
          send_stream(now_us, urgent_us, true) || send_wanted_poll(now_us) ||
          send_stream(now_us, urgent_us) || send_due_poll(now_us) || send_due_sync(now_us) ||
          send_ramp_down(now_us) || send_script(now_us) ||
-         send_stream(now_us, kQueueTargetUs + held_back_us) || send_due_identify(now_us);
+         send_stream(now_us, kQueueTargetUs + deeper_us) || send_due_identify(now_us);
 }
 
 void Master::send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,

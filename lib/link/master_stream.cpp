@@ -162,8 +162,8 @@ bool Master::send_ticks_of(std::int64_t now_us, std::size_t index, Tick now, Tic
     (starts ? (stream.run_steps ? running : starting) : moving) |= bit(i);
   }
   const Tick depth = mcu.view.identity.queue_ticks - kSpareTicks;
-  // Table runs need no queue: they are given as soon as they are known.
-  if (running != 0) return send_table_runs(now_us, index, running, first);
+  // Table runs need no queue: they are given as soon as the MCU takes them.
+  if (running != 0) return first <= now + depth && send_table_runs(now_us, index, running, first);
   // A quarter of a small queue is empty before it is worth a frame.
   if (first > now + std::min(lead, depth * 3 / 4)) return false;
   const std::uint16_t mask = starting != 0 ? starting : moving;

@@ -67,7 +67,7 @@ Result<void> Lab::reload_tables() {
 
 void Lab::pause_daemon(double seconds) {
   now_ns_ += static_cast<std::int64_t>(seconds * 1e9);
-  for (SimulatedBus& bus : buses_) bus.bus->advance_to(now_ns_);
+  run_buses();
 }
 
 void Lab::unplug(std::size_t bus) {
@@ -100,6 +100,10 @@ void Lab::advance() {
   std::int64_t next = std::max(core_->next_wake_us() * 1000, now_ns_ + 1000);
   for (const SimulatedBus& bus : buses_) next = std::min(next, bus.bus->next_event_ns());
   now_ns_ = std::max(next, now_ns_);
+  run_buses();
+}
+
+void Lab::run_buses() {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     buses_[b].bus->advance_to(now_ns_);
     if (buses_[b].received.empty()) continue;

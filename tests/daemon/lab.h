@@ -56,8 +56,8 @@ class Lab : public daemon::Outputs {
   // The port of a bus goes away / comes back.
   void unplug(std::size_t bus);
   void plug(std::size_t bus);
-  // The daemon does nothing for a while, as after SIGSTOP or on a very busy machine; what arrives
-  // waits.
+  // The daemon does nothing for a while, as after SIGSTOP or on a very busy machine; what has
+  // arrived meanwhile is the first that it reads.
   void pause_daemon(double seconds);
   // The daemon is gone, and a new one starts on the same buses.
   void restart_daemon();
@@ -88,6 +88,7 @@ class Lab : public daemon::Outputs {
   std::int64_t wall_clock_us() override { return now_us(); }
   void start_daemon();
   void advance();
+  void run_buses();  // until now; the daemon reads what has arrived
 
   std::filesystem::path directory_;
   config::Config config_;
