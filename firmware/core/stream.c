@@ -2,8 +2,7 @@
 // known to be rest. A frame is taken whole or not at all:
 // - a start is of the MCU's epoch; its motors are at rest at known_until and start there or later
 // - a continuation is of the MCU's epoch; its motors move at known_until. It joins there; or else
-// it
-//   is kept beyond the gap as an island, one per motor, until the lost frame has come again
+//   it is kept beyond the gap as an island, one per motor, until the lost frame has come again
 // - a replacement opens a later epoch; from its first tick on it stands instead of what was queued
 // Ticks that are known and not replaced are duplicates and left alone. That a start says so is what
 // tells a lost start from a motor that need not move yet.

@@ -7,9 +7,9 @@ tick k lets the step that runs then go on and adds the fewest steps m with D(m) 
 What an MCU makes of it.  A step belongs to tick i if its time lies in (begin of i, end of i]. Position is
 linear between steps; q is the position at a tick's end, rounded down to 1/256 step (fine) or to a whole step
 (coarse). Within the tick the motor moves evenly from q0 to q1 = q0 + d. Step n is made in the slot, of S in
-a tick, in which that line crosses n (fine) or n - 1/2 (coarse: so that c steps are spaced evenly). A move that the MCU runs by its own
-table ("moves": "table") is made otherwise: every step in the slot in which its time lies, until the first
-change; from that tick on it is made of ticks as well.
+a tick, in which that line crosses n (fine) or n - 1/2 (coarse: so that c steps are spaced evenly). A move
+that the MCU runs by its own table ("moves": "table") is made otherwise: every step in the slot in which its
+time lies, until the first change; from that tick on it is made of ticks as well.
 
 How far an edge may lie from the table.  T is the tick, v the speed in steps per time. Within the tick the
 true position has slopes from vmin to vmax, so it leaves its own chord by at most (vmax - vmin) T / 4.
