@@ -21,6 +21,11 @@ static inline uint16_t saturating_increment(uint16_t value) {
   return value < UINT16_MAX ? (uint16_t)(value + 1u) : value;
 }
 
+static inline void bushd_mcu_reject(bushd_mcu* mcu, bushd_status status) {
+  mcu->rejected_frames = saturating_increment(mcu->rejected_frames);
+  mcu->last_rejection = (uint8_t)status;
+}
+
 static inline int16_t* queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t motor) {
   const uint32_t row = tick & (uint32_t)(mcu->config.queue_ticks - 1u);
   return &mcu->config.queue[row * mcu->config.motors + motor];

@@ -4,6 +4,9 @@
 
 #include "firmware/core/internal.h"
 
+#define STALE_TAGS 128u
+#define STALE_NS 100000000u  // no line or adapter keeps a frame back for so long
+
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu) {
   uint16_t moving = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -33,7 +36,7 @@ void bushd_mcu_update_state(bushd_mcu* mcu) {
 static bool engine_self_test(bushd_mcu* mcu) {
   static const uint8_t kDigits[9] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
   static const uint16_t kCodes[3] = {4, 3, 2};
-  if (bushd_crc16(BUSHD_CRC16_START, kDigits, sizeof kDigits) != 0x29B1) return false;
+  if (~bushd_crc32(BUSHD_CRC32_START, kDigits, sizeof kDigits) != 0xCBF43926) return false;
   bushd_table table;
   memset(&table, 0, sizeof table);
   table.accel.code = kCodes;
@@ -109,6 +112,25 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
   bushd_mcu_update_state(mcu);
 }
 
+// Ticks tell when they are for; requests do not. One that a line or an adapter has kept back, or
+// made twice, must not undo what was asked later: a position, or drivers that were switched off.
+static bool changes_the_mcu(uint8_t type) {
+  return (type >= BUSHD_MSG_CONFIGURE && type <= BUSHD_MSG_SET_POSITION) ||
+         type == BUSHD_MSG_SET_ADDRESS;
+}
+
+// The master counts its frames in their tags. So one whose tag is the newest or one of those before
+// it has been heard, or was overtaken. After silence another master may have begun.
+static bool is_stale(bushd_mcu* mcu, const bushd_frame* frame) {
+  const uint8_t age = (uint8_t)(mcu->newest_tag - frame->tag);
+  const bool silence = mcu->uptime - mcu->newest_uptime > STALE_NS / mcu->tick_ns;
+  if (mcu->frames_heard && !silence && age < STALE_TAGS) return true;
+  mcu->frames_heard = true;
+  mcu->newest_tag = frame->tag;
+  mcu->newest_uptime = mcu->uptime;
+  return false;
+}
+
 void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, uint32_t time_in_tick_ns) {
   bushd_frame frame;
   switch (bushd_receive_byte(&mcu->receiver, byte, &frame)) {
@@ -123,7 +145,12 @@ void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, uint32_t time_in_tick_ns) {
   }
   // Replies of other MCUs pass by on the same line.
   if (frame.type & BUSHD_TYPE_REPLY) return;
+  const bool stale = is_stale(mcu, &frame);
   if (frame.address != mcu->config.address && frame.address != BUSHD_ADDRESS_BROADCAST) return;
+  if (stale && changes_the_mcu(frame.type)) {
+    bushd_mcu_reject(mcu, BUSHD_E_LATE);
+    return;
+  }
   mcu->silent_ticks = 0;
   bushd_mcu_handle_frame(mcu, &frame, time_in_tick_ns);
 }

@@ -136,6 +136,9 @@ typedef struct bushd_mcu {
   uint32_t uptime;         // ticks since boot, whatever their numbers
   uint16_t silence_ticks;  // after as many without a good frame, table runs are run down
   uint16_t silent_ticks;   // since the last good frame; saturates
+  bool frames_heard;
+  uint8_t newest_tag;      // of the master's frames, whomever they were for
+  uint32_t newest_uptime;  // when it was heard
   uint16_t run_downs;
   uint16_t low_water_ticks;
   uint16_t bad_frames;

@@ -261,10 +261,7 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t t
   a.delay_ns = 0;
   a.size = 0;
   const bushd_status status = handle(mcu, frame, time_in_tick_ns, &a);
-  if (status != BUSHD_OK) {
-    mcu->rejected_frames = saturating_increment(mcu->rejected_frames);
-    mcu->last_rejection = (uint8_t)status;
-  }
+  if (status != BUSHD_OK) bushd_mcu_reject(mcu, status);
   if (!a.due) return;
   if (a.size == 0) {
     const bushd_acknowledgement acknowledgement = {(uint8_t)status};

@@ -16,9 +16,10 @@ size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint
   raw[2] = tag;
   if (payload_size != 0) memcpy(raw + BUSHD_FRAME_HEADER, payload, payload_size);
   size_t size = BUSHD_FRAME_HEADER + payload_size;
-  const uint16_t crc = bushd_crc16(BUSHD_CRC16_START, raw, size);
-  raw[size++] = (uint8_t)crc;
-  raw[size++] = (uint8_t)(crc >> 8);
+  const uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, raw, size);
+  for (uint8_t shift = 0; shift < 32; shift = (uint8_t)(shift + 8)) {
+    raw[size++] = (uint8_t)(crc >> shift);
+  }
   // Backwards, so that the distance to the next zero is known at each.
   size_t next = size;
   for (size_t i = size; i-- > 0;) {
@@ -61,8 +62,11 @@ bushd_receive bushd_receive_byte(bushd_receiver* receiver, uint8_t byte, bushd_f
   if (!cobs_decode(receiver->buffer, size)) return BUSHD_RECEIVE_BAD_LENGTH;
   const uint8_t* const raw = receiver->buffer + 1;
   const uint16_t body = (uint16_t)(size - 1 - BUSHD_FRAME_CRC);
-  const uint16_t sent = (uint16_t)(raw[body] | (uint16_t)raw[body + 1] << 8);
-  if (bushd_crc16(BUSHD_CRC16_START, raw, body) != sent) return BUSHD_RECEIVE_BAD_CRC;
+  // A frame and its own CRC leave the same register behind, whatever the frame.
+  const uint32_t kResidue = 0xDEBB20E3;
+  if (bushd_crc32(BUSHD_CRC32_START, raw, body + BUSHD_FRAME_CRC) != kResidue) {
+    return BUSHD_RECEIVE_BAD_CRC;
+  }
   frame->address = raw[0];
   frame->type = raw[1];
   frame->tag = raw[2];

@@ -1,6 +1,7 @@
-// Framing: raw frame = address, type, tag, payload, CRC-16 (low byte first); on the line it is COBS
+// Framing: raw frame = address, type, tag, payload, CRC-32 (low byte first); on the line it is COBS
 // encoded and ended by a zero byte. A raw frame has at most 254 bytes, so COBS costs exactly one
-// byte. CRC-16/IBM-3740: polynomial 0x1021, start 0xFFFF, not reflected; check value 0x29B1.
+// byte. CRC-32/ISO-HDLC: polynomial 0x04C11DB7, reflected, start 0xFFFFFFFF, inverted at the end;
+// check value 0xCBF43926.
 #ifndef BUSHD_ENGINE_FRAME_H
 #define BUSHD_ENGINE_FRAME_H
 
@@ -15,7 +16,7 @@ extern "C" {
 #endif
 
 #define BUSHD_FRAME_HEADER 3u
-#define BUSHD_FRAME_CRC 2u
+#define BUSHD_FRAME_CRC 4u
 #define BUSHD_FRAME_MAX_RAW 254u
 #define BUSHD_FRAME_MAX_PAYLOAD (BUSHD_FRAME_MAX_RAW - BUSHD_FRAME_HEADER - BUSHD_FRAME_CRC)
 #define BUSHD_FRAME_MAX_WIRE (BUSHD_FRAME_MAX_RAW + 2u)  // + COBS code byte + delimiter
@@ -24,8 +25,9 @@ extern "C" {
 #define BUSHD_ADDRESS_BROADCAST 0u
 #define BUSHD_TYPE_REPLY 0x80u  // set in `type` of everything that an MCU sends
 
-#define BUSHD_CRC16_START 0xFFFFu
-uint16_t bushd_crc16(uint16_t crc, const uint8_t* data, size_t size);
+// The register after `data`, which may come in pieces; a CRC is its complement. O(size).
+#define BUSHD_CRC32_START UINT32_MAX
+uint32_t bushd_crc32(uint32_t crc, const uint8_t* data, size_t size);
 
 // Encodes one frame into `wire` (BUSHD_FRAME_MAX_WIRE bytes suffice for any); returns the number of
 // bytes including the delimiter. Precondition: payload_size <= BUSHD_FRAME_MAX_PAYLOAD. O(size).

@@ -2,6 +2,8 @@
 
 #include <stddef.h>
 
+#include "engine/frame.h"
+
 static bushd_status check_ramp(const bushd_ramp* ramp, uint32_t* bad_index) {
   uint32_t sum = 0;
   *bad_index = 0;
@@ -79,19 +81,9 @@ uint32_t bushd_table_max_steps_per_tick(const bushd_table* table, uint32_t tick_
   return steps > UINT32_MAX ? UINT32_MAX : (uint32_t)steps;
 }
 
-// A nibble at a time: 64 bytes of table instead of 1 KiB, and a table is sent once.
-static uint32_t crc32_byte(uint32_t crc, uint8_t byte) {
-  static const uint32_t kNibble[16] = {0x00000000, 0x1DB71064, 0x3B6E20C8, 0x26D930AC,
-                                       0x76DC4190, 0x6B6B51F4, 0x4DB26158, 0x5005713C,
-                                       0xEDB88320, 0xF00F9344, 0xD6D6A3E8, 0xCB61B38C,
-                                       0x9B64C2B0, 0x86D3D2D4, 0xA00AE278, 0xBDBDF21C};
-  crc ^= byte;
-  crc = crc >> 4 ^ kNibble[crc & 15u];
-  return crc >> 4 ^ kNibble[crc & 15u];
-}
-
 static uint32_t crc32_u16(uint32_t crc, uint16_t value) {
-  return crc32_byte(crc32_byte(crc, (uint8_t)value), (uint8_t)(value >> 8));
+  const uint8_t bytes[2] = {(uint8_t)value, (uint8_t)(value >> 8)};
+  return bushd_crc32(crc, bytes, sizeof bytes);
 }
 
 static uint32_t crc32_codes(uint32_t crc, const bushd_ramp* ramp) {
@@ -101,7 +93,7 @@ static uint32_t crc32_codes(uint32_t crc, const bushd_ramp* ramp) {
 
 uint32_t bushd_table_crc32(const bushd_table* table) {
   const bool symmetric = table->decel.code == table->accel.code;
-  uint32_t crc = UINT32_MAX;
+  uint32_t crc = BUSHD_CRC32_START;
   crc = crc32_u16(crc, (uint16_t)table->accel.count);
   crc = crc32_u16(crc, (uint16_t)(symmetric ? 0 : table->decel.count));
   crc = crc32_u16(crc, table->cruise);

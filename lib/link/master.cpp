@@ -18,7 +18,7 @@ constexpr std::int64_t kStartLeadUs =
     100'000;  // two polls: one lost first frame can still be repaired
 constexpr std::int64_t kReplaceLeadUs =
     12'000;  // a frame in flight, an answer awaited; adapter latency comes on top
-constexpr std::int64_t kMaxBacklogUs = 4'000;  // bytes handed to the port but not yet on the line
+constexpr std::int64_t kMaxBacklogUs = 5'000;  // bytes handed to the port but not yet on the line
 constexpr std::int64_t kStreamWakeUs = 5'000;
 // More than any adapter holds back. An answer that was read later still waited for this program,
 // which had been stopped: moves and stops must not be put off by seconds for that.

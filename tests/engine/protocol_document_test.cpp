@@ -104,8 +104,8 @@ TEST(ProtocolDocument, DecodedFramesAreRight) {
                                       raw.size() - BUSHD_FRAME_HEADER - BUSHD_FRAME_CRC,
                                       again.data()));
       EXPECT_EQ(hex(again), hex(wire));
-      EXPECT_EQ(bushd_crc16(BUSHD_CRC16_START, raw.data(), raw.size() - 2),
-                raw[raw.size() - 2] | raw[raw.size() - 1] << 8);
+      EXPECT_EQ(~bushd_crc32(BUSHD_CRC32_START, raw.data(), raw.size() - BUSHD_FRAME_CRC),
+                bushd_get_u32(&raw[raw.size() - BUSHD_FRAME_CRC]));
     } else if (line.keyword == "says") {
       EXPECT_EQ(meaning(wire), line.rest);
     } else {

@@ -6,10 +6,51 @@
 namespace bushd::test {
 namespace {
 
-Bytes wire_of(std::uint8_t address, std::uint8_t type, const Bytes& payload = {}) {
+Bytes wire_of(std::uint8_t address, std::uint8_t type, const Bytes& payload = {},
+              std::uint8_t tag = 100) {
   Bytes wire(BUSHD_FRAME_MAX_WIRE);
-  wire.resize(bushd_frame_encode(address, type, 1, payload.data(), payload.size(), wire.data()));
+  wire.resize(bushd_frame_encode(address, type, tag, payload.data(), payload.size(), wire.data()));
   return wire;
+}
+
+// To all, so that nobody answers.
+Bytes set_position_wire(std::int32_t steps, std::uint8_t tag) {
+  const bushd_set_position message = {0, steps};
+  Bytes payload(8);
+  payload.resize(bushd_encode_set_position(&message, payload.data()));
+  return wire_of(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_POSITION, payload, tag);
+}
+
+// A line or an adapter may keep a frame back, or make it twice. What it asked for is then no longer
+// wanted.
+TEST(Receive, RequestsThatWereOvertakenChangeNothing) {
+  Rig rig({.address = 7});
+  rig.feed(set_position_wire(11, 250));
+  rig.feed(set_position_wire(22, 251));
+  rig.feed(set_position_wire(11, 250));
+  rig.feed(set_position_wire(22, 251));
+  const auto control = [](std::uint8_t action, std::uint8_t tag) {
+    return wire_of(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_CONTROL, {action}, tag);
+  };
+  rig.feed(control(BUSHD_CONTROL_DISABLE, 3));
+  rig.feed(control(BUSHD_CONTROL_ENABLE, 2));
+  EXPECT_FALSE(rig.enabled());
+  // Frames for others are counted along.
+  rig.feed(wire_of(9, BUSHD_MSG_CONTROL, {BUSHD_CONTROL_DISABLE}, 10));
+  rig.feed(set_position_wire(33, 9));
+  const bushd_report report = rig.poll();
+  EXPECT_EQ(report.motor[0].position_steps, 22);
+  EXPECT_EQ(report.last_rejection, BUSHD_E_LATE);
+  EXPECT_EQ(report.rejected_frames, 4);
+}
+
+// A new master counts from anywhere.
+TEST(Receive, AfterSilenceAnyTagIsNew) {
+  Rig rig({.address = 7});
+  rig.feed(set_position_wire(11, 200));
+  rig.pass(41);  // 105 ms
+  rig.feed(set_position_wire(22, 199));
+  EXPECT_EQ(rig.poll().motor[0].position_steps, 22);
 }
 
 TEST(Receive, AnswersOnlyItsOwnAddress) {
@@ -91,7 +132,7 @@ TEST(Receive, TooShortAndTooLongAreCountedOnceAndTheNextFrameIsHeard) {
   EXPECT_EQ(rig.poll().bad_frames, 3);
   rig.feed(Bytes(100, 0xFF));
   rig.feed(Bytes{0});
-  rig.feed(wire_of(7, BUSHD_MSG_CONTROL, {BUSHD_CONTROL_ENABLE}));
+  rig.feed(wire_of(7, BUSHD_MSG_CONTROL, {BUSHD_CONTROL_ENABLE}, 101));
   EXPECT_TRUE(rig.enabled()) << "a delimiter first ends the noise";
 }
 

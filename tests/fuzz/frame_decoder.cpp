@@ -22,21 +22,20 @@ struct Decoded {
   std::size_t size = 0;
 };
 
-// CRC-16/IBM-3740 without a table: the four terms of 0x1021 folded by shifts.
-std::uint16_t other_crc(Bytes bytes) {
-  unsigned crc = 0xFFFF;
+// CRC-32/ISO-HDLC without a table, a bit at a time.
+std::uint32_t other_crc(Bytes bytes) {
+  std::uint32_t crc = UINT32_MAX;
   for (const std::uint8_t byte : bytes) {
-    unsigned top = crc >> 8 ^ byte;
-    top ^= top >> 4;
-    crc = (crc << 8 ^ top << 12 ^ top << 5 ^ top) & 0xFFFF;
+    crc ^= byte;
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (0xEDB88320 & (0 - (crc & 1)));
   }
-  return static_cast<std::uint16_t>(crc);
+  return ~crc;
 }
 
 Decoded decode(Bytes stuffed) {
   Decoded out;
   if (stuffed.empty()) out.result = BUSHD_RECEIVE_MORE;
-  if (stuffed.size() < 6 || stuffed.size() > 255) return out;
+  if (stuffed.size() < 8 || stuffed.size() > 255) return out;
   for (std::size_t at = 0; at < stuffed.size();) {
     const std::size_t distance = stuffed[at];
     if (at + distance > stuffed.size()) return out;
@@ -44,8 +43,9 @@ Decoded decode(Bytes stuffed) {
     at += distance;
     if (at < stuffed.size()) out.raw[out.size++] = 0;
   }
-  const std::size_t body = out.size - 2;
-  const unsigned sent = out.raw[body] | static_cast<unsigned>(out.raw[body + 1]) << 8;
+  const std::size_t body = out.size - 4;
+  std::uint32_t sent = 0;
+  for (std::size_t i = 4; i-- > 0;) sent = sent << 8 | out.raw[body + i];
   const bool good = other_crc(Bytes(out.raw).first(body)) == sent;
   out.result = good ? BUSHD_RECEIVE_FRAME : BUSHD_RECEIVE_BAD_CRC;
   return out;
@@ -73,7 +73,7 @@ class Line {
     BUSHD_REQUIRE(frame.address == expected.raw[0]);
     BUSHD_REQUIRE(frame.type == expected.raw[1]);
     BUSHD_REQUIRE(frame.tag == expected.raw[2]);
-    BUSHD_REQUIRE(frame.payload_size == expected.size - 5);
+    BUSHD_REQUIRE(frame.payload_size == expected.size - BUSHD_FRAME_HEADER - BUSHD_FRAME_CRC);
     BUSHD_REQUIRE(std::memcmp(frame.payload, &expected.raw[3], frame.payload_size) == 0);
     // There is one way only to put a frame on the line.
     std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire;
@@ -109,7 +109,8 @@ void run(Input input) {
     if (mode == 1) BUSHD_REQUIRE(result == BUSHD_RECEIVE_FRAME);
   }
   line.feed(0);
-  constexpr std::array<std::uint8_t, 6> kIdentify = {0x06, 0x01, 0x01, 0x01, 0xBC, 0xD8};
+  constexpr std::array<std::uint8_t, 8> kIdentify = {0x08, 0x01, 0x01, 0x01,
+                                                     0xF2, 0xB2, 0x9F, 0x90};
   line.feed(kIdentify);
   BUSHD_REQUIRE(line.feed(0) == BUSHD_RECEIVE_FRAME);
 }

@@ -118,15 +118,6 @@ def identify_slot(unique_id, salt, slots):
     return (value ^ value >> 16) % slots
 
 
-def crc16(data):
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = ((crc << 1) ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
-    return crc
-
-
 def cobs(raw):
     out = bytearray()
     for block in raw.split(b"\0"):
@@ -136,7 +127,7 @@ def cobs(raw):
 
 def frame(address, kind, tag, payload):
     raw = bytes([address, kind, tag]) + payload
-    raw += crc16(raw).to_bytes(2, "little")
+    raw += zlib.crc32(raw).to_bytes(4, "little")
     assert len(raw) <= 254
     return cobs(raw) + b"\0"
 
@@ -290,10 +281,10 @@ FRAMES = [
                                             [0, 0]]}),
     (1, 6, "acknowledgement", {"status": 8}),
     # The longest payload without a zero, and the longest of zeros.
-    (255, 255, "ticks", {"epoch": 255, "flags": 1, "first_tick": 0xFFFFFFFF, "count": 119, "mask": 0x0100,
-                         "delays": [257], "displacements": [1] * 238}),
-    (0, 0, "ticks", {"epoch": 0, "flags": 0, "first_tick": 0, "count": 238, "mask": 0x0001, "delays": [0],
-                     "displacements": [0] * 238}),
+    (255, 255, "ticks", {"epoch": 255, "flags": 1, "first_tick": 0xFFFFFFFF, "count": 118, "mask": 0x0100,
+                         "delays": [257], "displacements": [1] * 236}),
+    (0, 0, "ticks", {"epoch": 0, "flags": 0, "first_tick": 0, "count": 236, "mask": 0x0001, "delays": [0],
+                     "displacements": [0] * 236}),
 ]
 
 

@@ -97,7 +97,7 @@ BENCHMARK(receive_coarse);
 void crc(benchmark::State& state) {
   std::vector<uint8_t> bytes(252, 0x5A);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(bushd_crc16(BUSHD_CRC16_START, bytes.data(), bytes.size()));
+    benchmark::DoNotOptimize(bushd_crc32(BUSHD_CRC32_START, bytes.data(), bytes.size()));
     benchmark::ClobberMemory();
   }
   state.SetBytesProcessed(
