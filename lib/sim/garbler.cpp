@@ -34,19 +34,20 @@ auto at(std::vector<std::uint8_t>& bytes, std::size_t index) {
 
 }  // namespace
 
-void Garbler::remember(std::span<const std::uint8_t> bytes) {
-  old_frames_[oldest_].assign(bytes.begin(), bytes.end());
+void Garbler::remember(TimeNs now_ns, std::span<const std::uint8_t> bytes) {
+  old_frames_[oldest_].time_ns = now_ns;
+  old_frames_[oldest_].bytes.assign(bytes.begin(), bytes.end());
   oldest_ = (oldest_ + 1) % kOldFrames;
 }
 
-std::span<const Garbler::Piece> Garbler::pass(std::span<const std::uint8_t> bytes) {
+std::span<const Garbler::Piece> Garbler::pass(TimeNs now_ns, std::span<const std::uint8_t> bytes) {
   pieces_.clear();
   work_.assign(bytes.begin(), bytes.end());
   for (const Garbling what : pending_) {
-    if (!work_.empty()) garble(what, work_);
+    if (!work_.empty()) garble(now_ns, what, work_);
   }
   pending_.clear();
-  remember(work_);
+  remember(now_ns, work_);
   pieces_.resize(1);
   pieces_[0].bytes = work_;
   if (gap_ && !work_.empty()) {
@@ -61,7 +62,7 @@ std::span<const Garbler::Piece> Garbler::pass(std::span<const std::uint8_t> byte
   return pieces_;
 }
 
-void Garbler::garble(Garbling what, Bytes& bytes) {
+void Garbler::garble(TimeNs now_ns, Garbling what, Bytes& bytes) {
   const std::size_t i = static_cast<std::size_t>(random_.below(bytes.size()));
   const Range frame = pick_frame(bytes, random_);
   switch (what) {
@@ -93,8 +94,12 @@ void Garbler::garble(Garbling what, Bytes& bytes) {
       break;
     }
     case Garbling::kRepeatedFrame: {
-      const Bytes again = random_.one_in(2) ? Bytes(at(bytes, frame.first), at(bytes, frame.end))
-                                            : random_.pick(old_frames_);
+      Bytes again(at(bytes, frame.first), at(bytes, frame.end));
+      if (!random_.one_in(2)) {
+        // Nothing on the way keeps bytes for longer than it delays any.
+        const OldFrame& old = random_.pick(old_frames_);
+        if (now_ns - old.time_ns <= kMaxDelayNs) again = old.bytes;
+      }
       bytes.insert(at(bytes, frame.end), again.begin(), again.end());
       break;
     }

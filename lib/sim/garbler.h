@@ -21,7 +21,7 @@ enum class Garbling : std::uint8_t {
   kNoise,           // bytes that nobody sent
   kLostFrame,       // a frame is missing
   kTruncatedFrame,  // a frame breaks off; its delimiter is missing too
-  kRepeatedFrame,   // a frame comes again, at once or some frames later
+  kRepeatedFrame,   // a frame comes again, at once or up to 60 ms later
   kDelayedFrame     // all of it comes later
 };
 
@@ -39,20 +39,25 @@ class Garbler {
   void inflict(Garbling what) { pending_.push_back(what); }
   bool idle() const { return pending_.empty(); }
 
-  // Bytes of whole frames, as a rule. The result is valid until the next call.
-  std::span<const Piece> pass(std::span<const std::uint8_t> bytes);
+  // Bytes of whole frames, as a rule. Times never fall. The result is valid until the next call.
+  std::span<const Piece> pass(TimeNs now_ns, std::span<const std::uint8_t> bytes);
 
  private:
   using Bytes = std::vector<std::uint8_t>;
   static constexpr std::size_t kOldFrames = 8;
 
-  void remember(std::span<const std::uint8_t> bytes);
-  void garble(Garbling what, Bytes& bytes);
+  struct OldFrame {
+    TimeNs time_ns = 0;
+    Bytes bytes;
+  };
+
+  void remember(TimeNs now_ns, std::span<const std::uint8_t> bytes);
+  void garble(TimeNs now_ns, Garbling what, Bytes& bytes);
 
   Random random_;
   std::vector<Garbling> pending_;
   std::optional<Garbling> gap_;  // a delay to be put in when all else is done
-  std::array<Bytes, kOldFrames> old_frames_;
+  std::array<OldFrame, kOldFrames> old_frames_;
   std::size_t oldest_ = 0;
   std::vector<Piece> pieces_;
   Bytes work_;

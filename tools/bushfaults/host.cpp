@@ -49,7 +49,7 @@ void Host::plug_in() {
 }
 
 void Host::send(std::size_t, std::span<const std::uint8_t> bytes) {
-  const auto pieces = garbler_[static_cast<std::size_t>(Direction::kOut)].pass(bytes);
+  const auto pieces = garbler_[static_cast<std::size_t>(Direction::kOut)].pass(now_ns_, bytes);
   if (!plugged_ || silent()) return;
   TimeNs at_ns = std::max(free_ns_, now_ns_ + random_.between(20'000, latency_ns_ / 4));
   for (const auto& piece : pieces) {
@@ -61,7 +61,7 @@ void Host::send(std::size_t, std::span<const std::uint8_t> bytes) {
 
 void Host::take_in() {
   if (arriving_.empty()) return;
-  const auto pieces = garbler_[static_cast<std::size_t>(Direction::kIn)].pass(arriving_);
+  const auto pieces = garbler_[static_cast<std::size_t>(Direction::kIn)].pass(now_ns_, arriving_);
   TimeNs due_ns = now_ns_ - kStrideNs + random_.between(kStrideNs, latency_ns_);
   if (!inbox_.empty()) due_ns = std::max(due_ns, inbox_.back().due_ns);
   for (const auto& piece : pieces) {

@@ -13,7 +13,7 @@ constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
     {"noise", 3000, "1..300 bytes that nobody sent"},
     {"lost-frames", 6000, "a frame missing"},
     {"truncated-frames", 3000, "a frame breaks off before its delimiter"},
-    {"repeated-frames", 4000, "a frame comes again, at once or some frames later"},
+    {"repeated-frames", 4000, "a frame comes again, at once or up to 60 ms later"},
     {"delayed-frames", 3000, "a frame comes 1..60 ms late"},
     {"deaf-mcus", 4000, "one MCU alone hears nothing for 20 us .. 50 ms"},
     {"silences", 120, "nothing gets through for 1 ms .. 10 s"},
