@@ -34,6 +34,6 @@ int16_t bushd_run_slots(bushd_run* run, uint32_t tick_ns, uint16_t slot_count, u
   const uint64_t since_ns = end_ns - last_ns;
   run->since = (uint32_t)(since_ns / unit_ns);
   run->since_ns = (uint32_t)(since_ns % unit_ns);
-  run->fraction = delay_ns == 0 ? 0 : (uint8_t)(since_ns * 256u / delay_ns);
+  run->fraction = (uint8_t)(delay_ns == 0 ? 0u : since_ns * 256u / delay_ns);
   return (int16_t)(steps * run->direction);
 }
