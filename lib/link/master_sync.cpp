@@ -13,8 +13,9 @@ namespace bushd::link {
 namespace {
 
 constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be told the time
-// Of a tick; crystals of +-50 ppm need seconds without a mark for it.
-constexpr std::int64_t kAgreementDivisor = 8;
+// A SYNC frame lasts longer on most lines, so its repetition is told apart. Crystals that are 100
+// ppm apart need a second without a mark for it, those whose rate is known much longer.
+constexpr std::int64_t kAgreementNs = 100'000;
 
 }  // namespace
 
@@ -40,8 +41,7 @@ Master::MarkSurvey Master::survey_marks() const {
     if (!marked || mark_ != report.mark || report.mark_ns >= setup_.tick_ns) continue;
     if (survey.reference == nullptr) {
       survey.reference = &report;
-    } else if (std::abs(mark_difference_ns(report, *survey.reference)) >
-               setup_.tick_ns / kAgreementDivisor) {
+    } else if (std::abs(mark_difference_ns(report, *survey.reference)) > kAgreementNs) {
       survey.agreed = false;
     }
   }
