@@ -62,6 +62,7 @@ static void adopt(bushd_mcu* mcu, const bushd_sync* sync) {
   clock->behind_ns = 0;
   mcu->port.adjust_tick(mcu->port.context, longer_ns);
   bushd_mcu_clear_streams(mcu);
+  clock->rate_known = false;
   note_correction(clock, sync);
   mcu->flags |= BUSHD_FLAG_SYNCED;
 }
@@ -83,7 +84,9 @@ static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t erro
   if (error_ppb > MAX_RATE_PPB || error_ppb < -MAX_RATE_PPB) return 0;
   const int32_t old_ppb = clock->rate_ppb;
   const int32_t old_step = clock->rate_step;
-  const bool drift = error_ns > MARK_NOISE_NS || error_ns < -MARK_NOISE_NS;
+  // The first estimate is better than none, however short the time that it was made in.
+  const bool drift = !clock->rate_known || error_ns > MARK_NOISE_NS || error_ns < -MARK_NOISE_NS;
+  clock->rate_known = true;
   int32_t rate_ppb = old_ppb + (int32_t)(drift ? error_ppb : error_ppb / NOISE_GAIN_DIVISOR);
   if (rate_ppb > MAX_RATE_PPB) rate_ppb = MAX_RATE_PPB;
   if (rate_ppb < -MAX_RATE_PPB) rate_ppb = -MAX_RATE_PPB;

@@ -117,13 +117,13 @@ class Hour {
   }
   void refer_to(std::uint8_t address) { reference_ = address; }
   // The first MCU has lost its time and its rate, and joins the second.
-  void reboot_first() {
+  void reboot_first(int marks = 2) {
     bus_.reboot(0);
     bus_.advance_to(bus_.now_ns() + 100'000'000);
     const bushd_configure configure{tick_ns_, BUSHD_FORMAT_FINE, 1000};
     ASSERT_EQ(master_.acknowledged(1, BUSHD_MSG_CONFIGURE, bushd_encode_configure, configure),
               BUSHD_OK);
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < marks; ++i) {
       bus_.advance_to(bus_.now_ns() + 60'000'000);
       master_.discipline(2);
     }
@@ -202,6 +202,20 @@ TEST(Sync, ReferenceThatJoinedLaterIsFollowedWithinThreeSeconds) {
 }
 
 // Also where ticks are short or long: a tick's share of the rate is no whole number of ns.
+// A daemon that stands still just after an MCU has come into step: its rate was estimated from
+// marks that lie close together.
+TEST(Sync, FirstEstimateOfTheRateHoldsThroughSilence) {
+  for (const std::int32_t ppm : {14, -14, 50, -50}) {
+    Hour hour(ppm, -ppm, kTickNs);
+    hour.refer_to(2);
+    for (int i = 0; i < 4; ++i) hour.half_second(false);
+    hour.reboot_first(4);
+    hour.measure();
+    hour.silence(3'000'000'000);
+    EXPECT_LT(hour.worst_ns(), 20'000) << ppm;
+  }
+}
+
 TEST(Sync, RateHoldsForAllTickLengths) {
   for (const std::uint32_t tick_ns : {BUSHD_MIN_TICK_NS, 1'000'000u, BUSHD_MAX_TICK_NS}) {
     Hour hour(50, -50, tick_ns);
