@@ -7,24 +7,16 @@
 
 #include "engine/tables.h"
 #include "motion/axis.h"
+#include "motion/ramp.h"
 
 namespace bushd::motion {
 namespace {
 
 using test::between;
+using test::kTickNs;
 using test::Law;
+using test::ramp;
 using test::Reference;
-
-constexpr std::uint32_t kTickNs = 2'560'000;
-
-Law ramp() {
-  Law law;
-  for (int i = 0; i < 24; ++i) law.accel.push_back(static_cast<std::uint16_t>(250 - 10 * i));
-  for (int i = 0; i < 11; ++i) law.decel.push_back(static_cast<std::uint16_t>(180 - 16 * i));
-  law.cruise = 20;
-  law.unit_ns = 40'000;
-  return law;
-}
 
 // What the MCU will do, tick by tick from the start on, and where that leads.
 struct Plan {

@@ -8,23 +8,15 @@
 #include <cstdlib>
 
 #include "engine/tables.h"
+#include "motion/ramp.h"
 
 namespace bushd::motion {
 namespace {
 
+using test::kTickNs;
 using test::Law;
+using test::ramp;
 using test::Reference;
-
-constexpr std::uint32_t kTickNs = 2'560'000;
-
-Law ramp() {
-  Law law;
-  for (int i = 0; i < 24; ++i) law.accel.push_back(static_cast<std::uint16_t>(250 - 10 * i));
-  for (int i = 0; i < 11; ++i) law.decel.push_back(static_cast<std::uint16_t>(180 - 16 * i));
-  law.cruise = 20;
-  law.unit_ns = 40'000;
-  return law;
-}
 
 // What the ticks of a reference are in the format's code; `ticks` of them, zeros after the end.
 std::vector<std::int16_t> ticks_of(const Reference& reference, int direction, std::uint32_t tick_ns,
