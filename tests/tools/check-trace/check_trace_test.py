@@ -22,6 +22,14 @@ TABLE = {
 }
 
 
+def any_table(chance):
+    accel = sorted((chance.randint(1, 300) for _ in range(chance.randint(1, 40))), reverse=True)
+    decel = sorted(chance.randint(1, 300) for _ in range(chance.randint(1, 40)))
+    table = {"time_unit_ns": chance.randint(21_000, 60_000), "accel": accel, "decel": decel}
+    table["cruise"] = chance.randint(1, accel[-1])
+    return table
+
+
 class CheckTraceTest(unittest.TestCase):
     def setUp(self):
         directory = tempfile.TemporaryDirectory()
@@ -86,10 +94,7 @@ class RightTraces(CheckTraceTest):
         seed = random.randrange(2**32)
         chance = random.Random(seed)
         for round_number in range(12):
-            accel = sorted((chance.randint(1, 300) for _ in range(chance.randint(1, 40))), reverse=True)
-            decel = sorted(chance.randint(1, 300) for _ in range(chance.randint(1, 40)))
-            table = {"time_unit_ns": chance.randint(21_000, 60_000), "accel": accel, "decel": decel}
-            table["cruise"] = chance.randint(1, accel[-1])
+            table = any_table(chance)
             self.write_table(table)
             moves = chance.choice(("stream", "table"))
             scene = synthetic.Scene(table, self.table_file, chance.random() < 0.5, moves)
@@ -140,10 +145,7 @@ class RightTraces(CheckTraceTest):
         seed = random.randrange(2**32)
         chance = random.Random(seed)
         for round_number in range(12):
-            accel = sorted((chance.randint(1, 300) for _ in range(chance.randint(1, 40))), reverse=True)
-            decel = sorted(chance.randint(1, 300) for _ in range(chance.randint(1, 40)))
-            table = {"time_unit_ns": chance.randint(21_000, 60_000), "accel": accel, "decel": decel}
-            table["cruise"] = chance.randint(1, accel[-1])
+            table = any_table(chance)
             self.write_table(table)
             moves = chance.choice(("stream", "table"))
             scene = synthetic.Scene(table, self.table_file, chance.random() < 0.5, moves)
