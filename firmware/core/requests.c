@@ -138,7 +138,7 @@ typedef struct answer {
   bool due;
   uint32_t delay_ns;
   size_t size;
-  uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
+  uint8_t* payload;  // where it stands in the frame already: a small MCU has no room for it twice
 } answer;
 
 // In units of BUSHD_REPLY_UNIT_NS; as far as a port can count.
@@ -260,6 +260,7 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t t
   a.due = frame->address != BUSHD_ADDRESS_BROADCAST;
   a.delay_ns = 0;
   a.size = 0;
+  a.payload = mcu->reply + 2 + BUSHD_FRAME_HEADER;
   const bushd_status status = handle(mcu, frame, time_in_tick_ns, &a);
   if (status != BUSHD_OK) bushd_mcu_reject(mcu, status);
   if (!a.due) return;

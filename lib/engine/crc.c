@@ -1,6 +1,7 @@
-// CRC-32/ISO-HDLC, reflected: polynomial 0x04C11DB7. Two ways to the same value, chosen by
+// CRC-32/ISO-HDLC, reflected: polynomial 0x04C11DB7. Three ways to the same value, chosen by
 // BUSHD_CRC_SLICES:
 //   0   a nibble at a time through 64 bytes of table; for small MCUs
+//   1   a byte at a time through 1 KiB, which an AVR keeps in its flash
 //   16  slicing: sixteen bytes a round through sixteen tables of 256 entries (16 KiB); for the host
 // Slice k maps a byte to its CRC followed by k zero bytes. A CRC is linear over XOR, so a slice is
 // spanned by its values at 1, 2, 4, .. 128: the rows below (tests/engine/crc_test.cpp checks them
@@ -10,6 +11,14 @@
 #ifndef BUSHD_CRC_SLICES
 #define BUSHD_CRC_SLICES 0
 #endif
+
+#ifdef __AVR__
+#define CONST_TABLE static const __flash
+#else
+#define CONST_TABLE static const
+#endif
+
+#if BUSHD_CRC_SLICES != 1
 
 static inline uint32_t crc_nibbles(uint32_t crc, uint8_t byte) {
   static const uint32_t kNibble[16] = {0x00000000, 0x1DB71064, 0x3B6E20C8, 0x26D930AC,
@@ -21,7 +30,9 @@ static inline uint32_t crc_nibbles(uint32_t crc, uint8_t byte) {
   return crc >> 4 ^ kNibble[crc & 15u];
 }
 
-#if BUSHD_CRC_SLICES == 16
+#endif
+
+#if BUSHD_CRC_SLICES != 0
 
 #define BIT(b, n, v) (((b) >> (n)) & 1 ? (v) : 0)
 #define ENTRY(b, v0, v1, v2, v3, v4, v5, v6, v7)                                                   \
@@ -42,9 +53,10 @@ static inline uint32_t crc_nibbles(uint32_t crc, uint8_t byte) {
         SIXTYFOUR(192, __VA_ARGS__)                                                     \
   }
 
-static const uint32_t kSlice[16][256] = {
+CONST_TABLE uint32_t kSlice[BUSHD_CRC_SLICES][256] = {
     ROW(0x77073096, 0xEE0E612C, 0x076DC419, 0x0EDB8832, 0x1DB71064, 0x3B6E20C8, 0x76DC4190,
         0xEDB88320),
+#if BUSHD_CRC_SLICES == 16
     ROW(0x191B3141, 0x32366282, 0x646CC504, 0xC8D98A08, 0x4AC21251, 0x958424A2, 0xF0794F05,
         0x3B83984B),
     ROW(0x01C26A37, 0x0384D46E, 0x0709A8DC, 0x0E1351B8, 0x1C26A370, 0x384D46E0, 0x709A8DC0,
@@ -75,7 +87,12 @@ static const uint32_t kSlice[16][256] = {
         0x4E87F0BB),
     ROW(0xAE689191, 0x87A02563, 0xD4314C87, 0x73139F4F, 0xE6273E9E, 0x173F7B7D, 0x2E7EF6FA,
         0x5CFDEDF4),
+#endif
 };
+
+#endif
+
+#if BUSHD_CRC_SLICES == 16
 
 uint32_t bushd_crc32(uint32_t crc, const uint8_t* data, size_t size) {
   for (; size >= 16; size -= 16, data += 16) {
@@ -85,6 +102,13 @@ uint32_t bushd_crc32(uint32_t crc, const uint8_t* data, size_t size) {
     crc = next;
   }
   for (; size > 0; --size, ++data) crc = crc_nibbles(crc, *data);
+  return crc;
+}
+
+#elif BUSHD_CRC_SLICES == 1
+
+uint32_t bushd_crc32(uint32_t crc, const uint8_t* data, size_t size) {
+  for (; size > 0; --size, ++data) crc = crc >> 8 ^ kSlice[0][(uint8_t)crc ^ *data];
   return crc;
 }
 

@@ -14,7 +14,8 @@ size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint
   raw[0] = address;
   raw[1] = type;
   raw[2] = tag;
-  if (payload_size != 0) memcpy(raw + BUSHD_FRAME_HEADER, payload, payload_size);
+  uint8_t* const body = raw + BUSHD_FRAME_HEADER;
+  if (payload_size != 0 && payload != body) memcpy(body, payload, payload_size);
   size_t size = BUSHD_FRAME_HEADER + payload_size;
   const uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, raw, size);
   for (uint8_t shift = 0; shift < 32; shift = (uint8_t)(shift + 8)) {

@@ -30,7 +30,8 @@ extern "C" {
 uint32_t bushd_crc32(uint32_t crc, const uint8_t* data, size_t size);
 
 // Encodes one frame into `wire` (BUSHD_FRAME_MAX_WIRE bytes suffice for any); returns the number of
-// bytes including the delimiter. Precondition: payload_size <= BUSHD_FRAME_MAX_PAYLOAD. O(size).
+// bytes including the delimiter. The payload may stand in its place already, at wire + 1 +
+// BUSHD_FRAME_HEADER. Precondition: payload_size <= BUSHD_FRAME_MAX_PAYLOAD. O(size).
 size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint8_t* payload,
                           size_t payload_size, uint8_t* wire);
 

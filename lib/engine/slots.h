@@ -14,7 +14,10 @@ extern "C" {
 #endif
 
 #define BUSHD_MIN_SLOTS 128u
+// A build for a small MCU may have fewer: planes are made for as many.
+#ifndef BUSHD_MAX_SLOTS
 #define BUSHD_MAX_SLOTS 256u
+#endif
 
 // Where in a step the crossing lies, in 1/256 step from the last whole position.
 #define BUSHD_CROSSING_FINE 256

@@ -12,17 +12,24 @@ constexpr TimeNs kSettlingPeriodNs = 10'000'000;
 
 }  // namespace
 
-Bus::Bus(std::uint32_t baud, EdgeSink* sink) : sink_(sink), line_(baud) {
+Bus::Bus(std::uint32_t baud, EdgeSink* sink) : baud_(baud), sink_(sink), line_(baud) {
   line_.add_talker();
 }
 
 std::size_t Bus::add_mcu(const McuOptions& options) {
   assert(options.boot_ns >= now_ns_);
+  return add_mcu([&options](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+    return std::make_unique<VirtualMcu>(options, index, driver, sink);
+  });
+}
+
+std::size_t Bus::add_mcu(const MakeMcu& make) {
   const std::size_t index = mcus_.size();
   line_.add_talker();
   deaf_until_ns_.push_back(0);
-  VirtualMcu::Driver& driver = *this;  // here, where the private base is known
-  mcus_.push_back(std::make_unique<VirtualMcu>(options, index, driver, sink_));
+  Mcu::Driver& driver = *this;  // here, where the private base is known
+  mcus_.push_back(make(index, driver, sink_));
+  if (!mcus_.back()->announces_answers()) stride_ns_ = kBitsPerByte * 1'000'000'000 / 2 / baud_;
   return index;
 }
 
@@ -81,12 +88,17 @@ void Bus::advance_to(TimeNs t_ns) {
   assert(t_ns >= now_ns_);
   for (;;) {
     const TimeNs end_ns = line_.next_end_ns();
-    const TimeNs until_ns = std::min(end_ns, t_ns);
+    // Half a byte: none that an unforeseen answer begins with within a stride can end in it.
+    const TimeNs stride_end_ns = stride_ns_ == kNever ? kNever : now_ns_ + stride_ns_;
+    const TimeNs until_ns = std::min({end_ns, t_ns, stride_end_ns});
     while (sink_ != nullptr && next_settling_ns_ < until_ns) settle(next_settling_ns_);
     run_ticks_until(until_ns);
     now_ns_ = until_ns;
-    if (end_ns > t_ns) break;
-    deliver(line_.take());
+    if (end_ns <= until_ns) {
+      deliver(line_.take());
+    } else if (until_ns == t_ns) {
+      break;
+    }
   }
   settle(t_ns);
 }
@@ -96,7 +108,7 @@ void Bus::deafen(std::size_t mcu, TimeNs until_ns) {
 }
 
 void Bus::reboot(std::size_t mcu, TimeNs down_ns) {
-  VirtualMcu& rebooted = *mcus_[mcu];
+  Mcu& rebooted = *mcus_[mcu];
   line_.silence(mcu + 1, now_ns_);
   rebooted.reset(now_ns_, now_ns_ + down_ns,
                  static_cast<std::uint16_t>(rebooted.boot_number() + 1));

@@ -23,13 +23,17 @@
 
 namespace bushd::sim {
 
-class Bus : private VirtualMcu::Driver {
+class Bus : private Mcu::Driver {
  public:
   // `sink` gets all edges; it outlives the bus. Without one, ticks cost no work per slot.
   explicit Bus(std::uint32_t baud, EdgeSink* sink = nullptr);
 
   // Returns its index. Several MCUs of one address are possible: that is a fault worth simulating.
   std::size_t add_mcu(const McuOptions& options);
+  // The same for an MCU of another kind: `make` gets what VirtualMcu gets besides its options.
+  using MakeMcu =
+      std::function<std::unique_ptr<Mcu>(std::size_t index, Mcu::Driver& driver, EdgeSink* sink)>;
+  std::size_t add_mcu(const MakeMcu& make);
 
   // Bytes for the line at `at_ns` (>= now_ns()), or as soon as those given before are sent. The
   // master does not listen before it talks.
@@ -64,8 +68,12 @@ class Bus : private VirtualMcu::Driver {
   void break_off_master() { line_.silence(kMaster, now_ns_); }
 
   std::size_t mcu_count() const { return mcus_.size(); }
-  VirtualMcu& mcu(std::size_t index) { return *mcus_[index]; }
-  const VirtualMcu& mcu(std::size_t index) const { return *mcus_[index]; }
+  Mcu& node(std::size_t index) { return *mcus_[index]; }
+  // Precondition: it is a virtual one.
+  VirtualMcu& mcu(std::size_t index) { return static_cast<VirtualMcu&>(*mcus_[index]); }
+  const VirtualMcu& mcu(std::size_t index) const {
+    return static_cast<const VirtualMcu&>(*mcus_[index]);
+  }
 
   std::uint64_t collisions() const { return collisions_; }
   std::uint64_t corrupted_bytes() const { return corrupted_bytes_; }
@@ -80,9 +88,11 @@ class Bus : private VirtualMcu::Driver {
   void deliver(const LineByte& byte);
   void settle(TimeNs t_ns);
 
+  std::uint32_t baud_;
   EdgeSink* sink_;
   Line line_;
-  std::vector<std::unique_ptr<VirtualMcu>> mcus_;
+  std::vector<std::unique_ptr<Mcu>> mcus_;
+  TimeNs stride_ns_ = kNever;          // time moves on by this much at most
   std::vector<TimeNs> deaf_until_ns_;  // by MCU
   TimeNs now_ns_ = 0;
   TimeNs next_settling_ns_ = 0;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "firmware/ports/virtual/virtual.h"
-#include "sim/edge.h"
+#include "sim/mcu.h"
 
 namespace bushd::sim {
 
@@ -25,28 +25,15 @@ struct McuOptions {
   std::uint64_t unique_id = 0;  // 0: made of its place on the bus
 };
 
-class VirtualMcu {
+class VirtualMcu final : public Mcu {
  public:
-  // Where its bytes go.
-  class Driver {
-   public:
-    Driver() = default;
-    Driver(const Driver&) = delete;
-    Driver& operator=(const Driver&) = delete;
-    virtual ~Driver() = default;
-    virtual void transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire,
-                          std::size_t size) = 0;
-  };
-
   // `index` stands in its edges and transmissions. `sink` may be null; both outlive the MCU.
   VirtualMcu(const McuOptions& options, std::size_t index, Driver& driver, EdgeSink* sink);
-  VirtualMcu(const VirtualMcu&) = delete;
-  VirtualMcu& operator=(const VirtualMcu&) = delete;
 
-  std::uint8_t address() const { return port_.config.mcu.address; }
-  std::uint16_t boot_number() const { return port_.config.mcu.boot_number; }
-  bool running() const { return port_.running; }  // out of reset
-  TimeNs next_event_ns() const { return bushd_virtual_next_event_ns(&port_); }
+  std::uint8_t address() const override { return port_.config.mcu.address; }
+  std::uint16_t boot_number() const override { return port_.config.mcu.boot_number; }
+  bool running() const override { return port_.running; }  // out of reset
+  TimeNs next_event_ns() const override { return bushd_virtual_next_event_ns(&port_); }
 
   // Not valid before the first boot.
   const bushd_mcu& core() const { return port_.mcu; }
@@ -59,9 +46,11 @@ class VirtualMcu {
   void fail_next_self_test(bool fails) { port_.self_test_fails = fails; }
 
   // See firmware/ports/virtual/virtual.h.
-  void advance(TimeNs now_ns) { bushd_virtual_advance(&port_, now_ns); }
-  void receive(std::uint8_t byte, TimeNs now_ns) { bushd_virtual_receive(&port_, byte, now_ns); }
-  void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) {
+  void advance(TimeNs now_ns) override { bushd_virtual_advance(&port_, now_ns); }
+  void receive(std::uint8_t byte, TimeNs now_ns) override {
+    bushd_virtual_receive(&port_, byte, now_ns);
+  }
+  void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override {
     bushd_virtual_reset(&port_, now_ns, boot_ns, boot_number);
   }
 

@@ -88,7 +88,11 @@ class Master {
   }
 
   void drain() {
-    while (bus_.line_busy_until_ns() > bus_.now_ns()) bus_.advance_to(bus_.line_busy_until_ns());
+    TimeNs silent_ns;
+    do {
+      silent_ns = std::max(bus_.line_busy_until_ns(), bus_.now_ns());
+      bus_.advance_to(silent_ns + patience_ns);
+    } while (bus_.line_busy_until_ns() > silent_ns);
   }
 
   // The reply to a request; nothing if none came.
@@ -168,7 +172,7 @@ class Master {
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});  // all have booted
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
       const bushd_configure configure{tick_ns, format, 1000};
-      ASSERT_EQ(acknowledged(bus_.mcu(i).address(), BUSHD_MSG_CONFIGURE, bushd_encode_configure,
+      ASSERT_EQ(acknowledged(bus_.node(i).address(), BUSHD_MSG_CONFIGURE, bushd_encode_configure,
                              configure),
                 BUSHD_OK);
     }
@@ -178,7 +182,7 @@ class Master {
     sync({0, 0, true, mark, 0, 0});
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
-      const std::uint8_t address = bus_.mcu(i).address();
+      const std::uint8_t address = bus_.node(i).address();
       ASSERT_EQ(acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
                              bushd_control{BUSHD_CONTROL_ENABLE}),
                 BUSHD_OK);
@@ -235,6 +239,8 @@ class Master {
     send(address, BUSHD_MSG_TICKS, {payload.data(), size});
   }
 
+  // For how long an MCU may be silent before it answers, if it does not announce its answers.
+  TimeNs patience_ns = 0;
   std::vector<Frame> frames;
   int bad_frames = 0;
 

@@ -1,0 +1,38 @@
+// Planes onto the pins. Timer 1 counts the cycles of a slot; its interrupt begins slots, and in the
+// last one of a tick changes over to the next plane.
+//
+//     slot k of a tick of L cycles begins at  start + k floor(L / slots);  the last one takes the
+//     rest
+//
+// The core learns of a new tick when the main loop comes to it (emission_begun, emission_swap);
+// meanwhile its plane, prepared a tick ago, is emitted. If no plane is ready when it is wanted, the
+// present tick goes on for another tick's length without a step: no step is lost and none is half
+// prepared, but the MCU falls behind the bus by a tick, which the next SYNC shows (fault 4).
+#ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_H
+#define BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_H
+
+#include "firmware/core/mcu.h"
+
+#define EMISSION_SLOTS 128u
+
+// All of these are for the main loop only.
+
+// The first tick begins, one without steps. With interrupts off, after set_tick; slots are late if
+// they stay off.
+void emission_start(void);
+
+// The plane of the next tick is prepared.
+void emission_ready(const bushd_plane* plane);
+
+// The tick after the core's present one has begun, at *start.
+bool emission_begun(uint32_t* start);
+// The core's present tick is this one; before bushd_mcu_swap.
+void emission_swap(void);
+// How far the core's present tick has gone at `time` (clock.h), in ns.
+uint32_t emission_time_in_tick_ns(uint32_t time);
+
+// As in bushd_port.
+void emission_set_tick(uint32_t tick_ns);
+void emission_adjust_tick(int32_t ns);
+
+#endif

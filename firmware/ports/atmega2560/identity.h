@@ -1,0 +1,24 @@
+// What the EEPROM keeps. From address 0: unique id (8 bytes), address, CRC-32 of these nine (low
+// byte first); at 16 the boot number.
+#ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_IDENTITY_H
+#define BUSHD_FIRMWARE_PORTS_ATMEGA2560_IDENTITY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "engine/message.h"
+
+typedef struct identity {
+  uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
+  uint8_t address;
+  uint32_t crc;
+} identity;
+
+// Counts the boot. False if the EEPROM holds no identity: then the address is 1 and the id all
+// zero.
+bool identity_load(identity* kept, uint16_t* boot_number);
+
+// Returns at once, some 40 ms before all is written; false while an earlier one is being written.
+bool identity_store_address(uint8_t address);
+
+#endif

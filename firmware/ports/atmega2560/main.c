@@ -1,0 +1,115 @@
+// The MCU program on an ATmega2560: the core, its memory, and the main loop. Interrupts emit slots,
+// collect bytes with the times of delimiters, and send; the core runs in the main loop only.
+#include <avr/interrupt.h>
+
+#include "firmware/ports/atmega2560/board.h"
+#include "firmware/ports/atmega2560/clock.h"
+#include "firmware/ports/atmega2560/emission.h"
+#include "firmware/ports/atmega2560/identity.h"
+#include "firmware/ports/atmega2560/line.h"
+
+#define QUEUE_TICKS 64u
+#define TABLE_CODES 952u  // four tables of 238 codes
+
+static bushd_mcu mcu;
+static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
+static uint16_t codes[TABLE_CODES];
+static bool has_identity;
+
+static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
+  (void)context;
+  line_transmit(wire, size, delay_ns);
+}
+
+static bool port_store_address(void* context, uint8_t address) {
+  (void)context;
+  return identity_store_address(address);
+}
+
+static void port_set_enable(void* context, bool on) {
+  (void)context;
+  if (on) {
+    EN_PORT |= 1 << EN_BIT;
+  } else {
+    EN_PORT &= (uint8_t) ~(1 << EN_BIT);
+  }
+}
+
+static void port_set_tick(void* context, uint32_t tick_ns) {
+  (void)context;
+  emission_set_tick(tick_ns);
+}
+
+static void port_adjust_tick(void* context, int32_t ns) {
+  (void)context;
+  emission_adjust_tick(ns);
+}
+
+static uint32_t port_time_in_tick_ns(void* context) {
+  (void)context;
+  return emission_time_in_tick_ns(clock_now());
+}
+
+static uint16_t port_read_inputs(void* context) {
+  (void)context;
+  const uint8_t low = INPUT_LOW;
+  const uint8_t high = INPUT_HIGH;
+  return (uint16_t) ~((uint16_t)high << 8 | low);
+}
+
+static bool port_self_test(void* context) {
+  (void)context;
+  return has_identity;
+}
+
+static void boot(void) {
+  static const bushd_port kPort = {.transmit = port_transmit,
+                                   .store_address = port_store_address,
+                                   .set_enable = port_set_enable,
+                                   .set_tick = port_set_tick,
+                                   .adjust_tick = port_adjust_tick,
+                                   .time_in_tick_ns = port_time_in_tick_ns,
+                                   .read_inputs = port_read_inputs,
+                                   .self_test = port_self_test};
+  bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
+                             .slots = EMISSION_SLOTS,
+                             .queue = queue,
+                             .queue_ticks = QUEUE_TICKS,
+                             .codes = codes,
+                             .code_count = TABLE_CODES};
+  identity kept;
+  has_identity = identity_load(&kept, &config.boot_number);
+  config.address = kept.address;
+  for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = kept.unique_id[i];
+  bushd_mcu_boot(&mcu, &kPort, &config);
+}
+
+static void prepare(void) {
+  bushd_mcu_prepare(&mcu);
+  emission_ready(&mcu.plane[mcu.front ^ 1u]);
+}
+
+int main(void) {
+  board_init();
+  clock_init();
+  boot();
+  prepare();
+  line_init();
+  emission_start();
+  sei();
+  for (;;) {
+    // A frame that ended in the tick before must be heard by the core in that tick.
+    uint32_t start = 0;
+    uint32_t time = 0;
+    const bool begun = emission_begun(&start);
+    if (begun && !(line_delimiter_time(&time) && clock_before(time, start))) {
+      emission_swap();
+      bushd_mcu_swap(&mcu);
+      prepare();
+      continue;
+    }
+    uint8_t byte = 0;
+    if (!line_take(&byte, &time)) continue;
+    bushd_mcu_receive(&mcu, byte, byte == 0 ? emission_time_in_tick_ns(time) : 0);
+  }
+}

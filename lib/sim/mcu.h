@@ -1,0 +1,48 @@
+// What the bus asks of an MCU, whatever runs its firmware.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "sim/edge.h"
+
+namespace bushd::sim {
+
+class Mcu {
+ public:
+  // Where its bytes go.
+  class Driver {
+   public:
+    Driver() = default;
+    Driver(const Driver&) = delete;
+    Driver& operator=(const Driver&) = delete;
+    virtual ~Driver() = default;
+    virtual void transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire,
+                          std::size_t size) = 0;
+  };
+
+  Mcu() = default;
+  Mcu(const Mcu&) = delete;
+  Mcu& operator=(const Mcu&) = delete;
+  virtual ~Mcu() = default;
+
+  virtual std::uint8_t address() const = 0;
+  virtual std::uint16_t boot_number() const = 0;
+  virtual bool running() const = 0;  // out of reset
+
+  // When it next does something by itself.
+  virtual TimeNs next_event_ns() const = 0;
+  // Does it speak in answer to a byte only, at a time that it gives at once? If not, it may begin
+  // at any time, and time moves on in steps of a byte.
+  virtual bool announces_answers() const { return true; }
+
+  // Everything up to now_ns (included) happens. Precondition: it is not before the last time given.
+  virtual void advance(TimeNs now_ns) = 0;
+  // A byte's stop bit ended at now_ns. Advances to that time first.
+  virtual void receive(std::uint8_t byte, TimeNs now_ns) = 0;
+  // Its reset is pulled at now_ns; it boots again at boot_ns. An MCU that counts its boots itself
+  // takes no notice of the number.
+  virtual void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) = 0;
+};
+
+}  // namespace bushd::sim

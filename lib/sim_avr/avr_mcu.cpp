@@ -1,0 +1,223 @@
+#include "sim_avr/avr_mcu.h"
+
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+
+extern "C" {
+#include <avr_eeprom.h>
+#include <avr_ioport.h>
+#include <avr_uart.h>
+#include <sim_avr.h>
+#include <sim_elf.h>
+#include <sim_interrupts.h>
+#include <sim_io.h>
+#include <sim_regbit.h>
+}
+
+#include "engine/frame.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kFrequency = 16'000'000;
+// The CPU overshoots a time by this at most.
+constexpr avr_cycle_count_t kOvershootCycles = 8;
+constexpr std::size_t kRamBegin = 0x200;
+constexpr std::uint8_t kPaint = 0xC5;
+// Behind the one that simavr holds: the chip's buffer has two, its shift register one more.
+constexpr std::size_t kHardwareFifo = 2;
+constexpr std::size_t kAddressAt = 8;
+constexpr std::size_t kBootNumberAt = 16;
+
+// Busy waiting is all that the image does; the simulator must not sleep for it in real time.
+void no_sleep(avr_t*, avr_cycle_count_t) {}
+
+avr_uart_t* find_uart(avr_t* avr) {
+  for (avr_io_t* io = avr->io_port; io != nullptr; io = io->next) {
+    if (std::strcmp(io->kind, "uart") != 0) continue;
+    auto* uart = reinterpret_cast<avr_uart_t*>(io);
+    if (uart->name == '0') return uart;
+  }
+  throw std::runtime_error("simavr: no UART 0");
+}
+
+}  // namespace
+
+AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
+    : index_(index), driver_(driver), sink_(sink) {
+  elf_firmware_t firmware{};
+  if (elf_read_firmware(options.image.c_str(), &firmware) != 0) {
+    throw std::runtime_error(options.image + ": not an image for an AVR");
+  }
+  avr_ = avr_make_mcu_by_name("atmega2560");
+  if (avr_ == nullptr) throw std::runtime_error("simavr: no ATmega2560");
+  avr_init(avr_);
+  avr_->frequency = firmware.frequency = kFrequency;
+  avr_load_firmware(avr_, &firmware);
+  avr_->sleep = no_sleep;
+  avr_->run_cycle_limit = kOvershootCycles;
+  avr_->log = LOG_ERROR;
+  stack_begin_ = kRamBegin + firmware.datasize + firmware.bsssize;
+  std::memset(avr_->data + stack_begin_, kPaint, avr_->ramend + 1u - stack_begin_);
+
+  std::array<std::uint8_t, 18> memory{};
+  for (std::size_t i = 0; i < kAddressAt; ++i) {
+    memory[i] = static_cast<std::uint8_t>(options.unique_id >> 8 * i);
+  }
+  memory[kAddressAt] = options.address;
+  const std::uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, memory.data(), kAddressAt + 1);
+  for (std::size_t i = 0; i < 4; ++i) {
+    memory[kAddressAt + 1 + i] = static_cast<std::uint8_t>(crc >> 8 * i);
+  }
+  memory[kBootNumberAt] = static_cast<std::uint8_t>(options.boots);
+  memory[kBootNumberAt + 1] = static_cast<std::uint8_t>(options.boots >> 8);
+  avr_eeprom_desc_t written{memory.data(), 0, static_cast<std::uint32_t>(memory.size())};
+  avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &written);
+
+  uart_ = find_uart(avr_);
+  std::uint32_t flags = 0;
+  avr_ioctl(avr_, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
+  avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_byte,
+                          this);
+  watch_port('A', Signal::kStep, 0);
+  watch_port('C', Signal::kStep, 8);
+  watch_port('L', Signal::kDir, 0);
+  watch_port('B', Signal::kDir, 8);
+  pins_[pin_count_] = {this, Signal::kEnable, 0, false};
+  watch_pin('H', 3, on_pin, &pins_[pin_count_++]);
+  watch_pin('E', 4, on_driver_enable, this);
+}
+
+AvrMcu::~AvrMcu() {
+  avr_terminate(avr_);
+  std::free(avr_);
+}
+
+void AvrMcu::watch_port(char port, Signal signal, std::uint8_t first_index) {
+  for (int pin = 0; pin < 8; ++pin) {
+    Pin& watched = pins_[pin_count_++];
+    watched = {this, signal, static_cast<std::uint8_t>(first_index + pin), false};
+    watch_pin(port, pin, on_pin, &watched);
+  }
+}
+
+void AvrMcu::watch_pin(char port, int pin, void (*notify)(avr_irq_t*, std::uint32_t, void*),
+                       void* param) {
+  avr_irq_t* irq = avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), pin);
+  if (irq == nullptr) throw std::runtime_error("simavr: a pin is missing");
+  avr_irq_register_notify(irq, notify, param);
+}
+
+TimeNs AvrMcu::time_ns() const {
+  return cycle_0_ns_ + static_cast<TimeNs>(avr_->cycle) * 125 / 2;
+}
+
+// An edge calls twice, with other bits above the level.
+void AvrMcu::on_pin(avr_irq_t*, std::uint32_t value, void* param) {
+  auto& pin = *static_cast<Pin*>(param);
+  const bool level = (value & 1) != 0;
+  if (level == pin.level) return;
+  pin.level = level;
+  AvrMcu& self = *pin.mcu;
+  if (self.sink_ == nullptr) return;
+  self.sink_->edge({self.time_ns(), self.index_, pin.signal, pin.index, level});
+}
+
+void AvrMcu::on_driver_enable(avr_irq_t*, std::uint32_t value, void* param) {
+  AvrMcu& self = *static_cast<AvrMcu*>(param);
+  self.driver_enable_ = (value & 1) != 0;
+  if (!self.driver_enable_ && self.time_ns() < self.byte_end_ns_) ++self.bytes_cut_;
+}
+
+void AvrMcu::on_byte(avr_irq_t*, std::uint32_t value, void* param) {
+  AvrMcu& self = *static_cast<AvrMcu*>(param);
+  const auto byte = static_cast<std::uint8_t>(value);
+  const TimeNs byte_ns = static_cast<TimeNs>(self.byte_cycles_) * 125 / 2;
+  // The chip takes the next byte while the last one is being sent, so that they follow each other
+  // closely. simavr asks for it at the end of that one, but counts from there all the same.
+  const TimeNs now_ns = self.time_ns();
+  const bool joined = now_ns < self.byte_end_ns_ + byte_ns;
+  self.byte_end_ns_ = (joined ? self.byte_end_ns_ : now_ns) + byte_ns;
+  if (self.driver_enable_) {
+    self.driver_.transmit(self.index_, now_ns, &byte, 1);
+  } else {
+    ++self.bytes_cut_;
+  }
+}
+
+std::array<std::uint8_t, 18> AvrMcu::eeprom() const {
+  std::array<std::uint8_t, 18> memory{};
+  avr_eeprom_desc_t read{memory.data(), 0, static_cast<std::uint32_t>(memory.size())};
+  avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &read);
+  return memory;
+}
+
+std::uint8_t AvrMcu::address() const {
+  return eeprom()[kAddressAt];
+}
+
+std::uint16_t AvrMcu::boot_number() const {
+  const auto memory = eeprom();
+  return static_cast<std::uint16_t>(memory[kBootNumberAt] | memory[kBootNumberAt + 1] << 8);
+}
+
+TimeNs AvrMcu::next_event_ns() const {
+  return time_ns();
+}
+
+void AvrMcu::advance(TimeNs now_ns) {
+  now_ns_ = now_ns;
+  while (time_ns() < now_ns) {
+    if (uart_->cycles_per_byte != byte_cycles_) {
+      byte_cycles_ = uart_->cycles_per_byte = uart_->cycles_per_byte * 10 / 11;
+    }
+    feed();
+    avr_run(avr_);
+  }
+}
+
+void AvrMcu::receive(std::uint8_t byte, TimeNs now_ns) {
+  advance(now_ns);
+  if (avr_regbit_get(avr_, uart_->rxen) == 0) return;
+  if (received_.size() == kHardwareFifo) {
+    ++overruns_;
+    return;
+  }
+  received_.push_back(byte);
+  feed();
+}
+
+// simavr forgets the interrupt of a byte that waits behind another one: it gets one at a time.
+void AvrMcu::feed() {
+  uart_fifo_t& fifo = uart_->input;
+  if (received_.empty() || fifo.read != fifo.write) return;
+  fifo.buffer[fifo.write] = received_.front();
+  fifo.write = static_cast<std::uint16_t>((fifo.write + 1) % uart_fifo_fifo_size);
+  received_.pop_front();
+  avr_raise_interrupt(avr_, &uart_->rxc);
+}
+
+void AvrMcu::reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t) {
+  advance(now_ns);
+  avr_reset(avr_);
+  driver_enable_ = false;
+  received_.clear();
+  for (std::size_t i = 0; i < pin_count_; ++i) {
+    Pin& pin = pins_[i];
+    if (pin.level && sink_ != nullptr) {
+      sink_->edge({now_ns, index_, pin.signal, pin.index, false});
+    }
+    pin.level = false;
+  }
+  out_of_reset_ns_ = boot_ns;
+  cycle_0_ns_ = boot_ns - static_cast<TimeNs>(avr_->cycle) * 125 / 2;
+}
+
+std::size_t AvrMcu::untouched_ram() const {
+  std::size_t at = stack_begin_;
+  while (at <= avr_->ramend && avr_->data[at] == kPaint) ++at;
+  return at - stack_begin_;
+}
+
+}  // namespace bushd::sim

@@ -1,0 +1,90 @@
+// An MCU on the virtual bus that is an ATmega2560: its image runs in simavr, instruction by
+// instruction, and its pins and bytes are taken with the time of the CPU cycle.
+//
+// What simavr does otherwise than the chip, and what is made up for here:
+// - bytes take 11 bit times: set to 10
+// - receives into 64 bytes: a byte is lost if three wait already, as in the chip
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <string>
+
+#include "sim/mcu.h"
+
+struct avr_t;
+struct avr_irq_t;
+struct avr_uart_t;
+
+namespace bushd::sim {
+
+struct AvrOptions {
+  std::string image;         // path of the ELF
+  std::uint8_t address = 1;  // in its EEPROM
+  std::uint64_t unique_id = 1;
+  std::uint16_t boots = 0;  // boot number of the boot before
+};
+
+class AvrMcu final : public Mcu {
+ public:
+  // Throws std::runtime_error if the image cannot be read. It boots at time 0.
+  AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, EdgeSink* sink);
+  ~AvrMcu() override;
+
+  // What the EEPROM holds.
+  std::uint8_t address() const override;
+  std::uint16_t boot_number() const override;
+
+  bool running() const override { return now_ns_ >= out_of_reset_ns_; }
+
+  TimeNs next_event_ns() const override;
+  bool announces_answers() const override { return false; }
+  void advance(TimeNs now_ns) override;
+  void receive(std::uint8_t byte, TimeNs now_ns) override;
+  void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override;
+
+  // Bytes of RAM that nothing has written to since power-on, between variables and stack.
+  std::size_t untouched_ram() const;
+  // Bytes lost in its receiver.
+  std::uint64_t overruns() const { return overruns_; }
+  // Bytes whose last stop bit was not over when driver-enable fell, or that began without it.
+  std::uint64_t bytes_cut() const { return bytes_cut_; }
+
+ private:
+  struct Pin {
+    AvrMcu* mcu;
+    Signal signal;
+    std::uint8_t index;
+    bool level;
+  };
+
+  void watch_port(char port, Signal signal, std::uint8_t first_index);
+  void watch_pin(char port, int pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param);
+  void feed();
+  std::array<std::uint8_t, 18> eeprom() const;
+  TimeNs time_ns() const;
+  static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
+  static void on_driver_enable(avr_irq_t* irq, std::uint32_t value, void* param);
+  static void on_byte(avr_irq_t* irq, std::uint32_t value, void* param);
+
+  std::size_t index_;
+  Driver& driver_;
+  EdgeSink* sink_;
+  avr_t* avr_;
+  avr_uart_t* uart_ = nullptr;
+  std::uint64_t byte_cycles_ = 0;
+  std::deque<std::uint8_t> received_;  // that the image has not been given yet
+  TimeNs cycle_0_ns_ = 0;
+  TimeNs now_ns_ = 0;
+  TimeNs out_of_reset_ns_ = 0;
+  std::size_t stack_begin_ = 0;
+  bool driver_enable_ = false;
+  TimeNs byte_end_ns_ = 0;
+  std::uint64_t overruns_ = 0;
+  std::uint64_t bytes_cut_ = 0;
+  std::array<Pin, 33> pins_{};
+  std::size_t pin_count_ = 0;
+};
+
+}  // namespace bushd::sim

@@ -1,0 +1,281 @@
+// The image for ATmega2560 beside a virtual MCU on one bus: what a master says to one it says to
+// the other, and both must answer and move alike.
+#include <cstdlib>
+#include <string>
+
+#include "sim/bus_fixture.h"
+#include "sim_avr/avr_mcu.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kBaud = 250'000;
+constexpr std::uint32_t kTickNs = 2'560'000;
+constexpr std::uint16_t kSlots = 128;
+constexpr TimeNs kSlotNs = kTickNs / kSlots;
+constexpr std::uint8_t kVirtual = 1;
+constexpr std::uint8_t kAvr = 2;
+constexpr std::uint32_t kUnitNs = 10'000;
+constexpr std::uint16_t kCruise = 90;
+
+std::vector<std::uint16_t> ramp() {
+  std::vector<std::uint16_t> codes;
+  for (std::uint16_t code = 400; code > kCruise; code = static_cast<std::uint16_t>(code * 9 / 10)) {
+    codes.push_back(code);
+  }
+  return codes;
+}
+
+class AvrImage : public testing::Test {
+ protected:
+  AvrImage() : bus_(kBaud, &recorder_), master_(bus_) {
+    McuOptions like_it;
+    like_it.address = kVirtual;
+    like_it.slots = kSlots;
+    like_it.queue_ticks = 64;
+    like_it.code_count = 952;
+    bus_.add_mcu(like_it);
+    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+      AvrOptions options;
+      options.image = AVR_IMAGE;
+      options.address = kAvr;
+      options.unique_id = 0x0102030405060708;
+      options.boots = 6;
+      auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
+      avr_ = mcu.get();
+      return mcu;
+    });
+    master_.patience_ns = 6'000'000;
+    bus_.advance_to(100'000'000);  // the EEPROM is slow
+  }
+
+  void TearDown() override {
+    EXPECT_EQ(avr_->overruns(), 0u);
+    EXPECT_EQ(avr_->bytes_cut(), 0u);
+    EXPECT_GE(avr_->untouched_ram(), 32u);
+    EXPECT_EQ(bus_.collisions(), 0u);
+    EXPECT_EQ(master_.bad_frames, 0);
+    RecordProperty("untouched_ram_bytes", static_cast<int>(avr_->untouched_ram()));
+  }
+
+  void make_ready(bushd_format format, const std::vector<std::uint8_t>& motors) {
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, format));
+    for (const std::uint8_t address : {kVirtual, kAvr}) {
+      ASSERT_NO_FATAL_FAILURE(master_.upload_table(address, 0, kUnitNs, codes_, kCruise));
+      for (const std::uint8_t motor : motors) {
+        ASSERT_NO_FATAL_FAILURE(master_.assign(address, motor, 0));
+      }
+    }
+  }
+
+  void pass_ticks(int ticks) { bus_.advance_to(bus_.now_ns() + TimeNs{kTickNs} * ticks); }
+
+  // The same request to both; it is no question.
+  void tell(bushd_type type, const Bytes& payload) {
+    master_.send(kVirtual, static_cast<std::uint8_t>(type), payload);
+    master_.send(kAvr, static_cast<std::uint8_t>(type), payload);
+  }
+
+  bushd_table table() const {
+    bushd_table view{};
+    view.accel.code = view.decel.code = codes_.data();
+    view.accel.count = view.decel.count = static_cast<std::uint32_t>(codes_.size());
+    view.cruise = kCruise;
+    view.time_unit_ns = kUnitNs;
+    return view;
+  }
+
+  void run_by_table(std::uint32_t first, const std::vector<bushd_table_run_entry>& entries) {
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_table_run(
+        0, first, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
+    tell(BUSHD_MSG_TABLE_RUN, payload);
+  }
+
+  // A move streamed in frames of `count` ticks; of every three one is a state of the run.
+  void stream(std::uint8_t motor, std::uint32_t first, std::uint32_t steps, int direction,
+              bushd_format format) {
+    const bushd_table view = table();
+    bushd_run run;
+    bushd_run_start(&run, &view, steps, direction);
+    std::uint8_t flags = BUSHD_TICKS_START;
+    if (format == BUSHD_FORMAT_FINE) flags |= BUSHD_TICKS_FINE;
+    constexpr std::uint8_t kCount = 12;
+    for (int frame = 0; !bushd_run_done(&run); ++frame) {
+      while (static_cast<std::int32_t>(first - master_.poll(kAvr).tick) > 40) pass_ticks(4);
+      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+      const bushd_table_ticks_entry entry{motor, bushd_run_save(&run, kTickNs, kCount)};
+      std::array<std::int16_t, kCount> fine;
+      std::array<std::uint8_t, kCount> coarse;
+      if (format == BUSHD_FORMAT_FINE) {
+        bushd_run_expand_fine(&run, kTickNs, kCount, fine.data(), 1);
+      } else {
+        bushd_run_expand_coarse(&run, kTickNs, kCount, coarse.data(), 1);
+      }
+      if (frame % 3 == 1) {
+        const auto state_flags = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_FINE);
+        payload.resize(
+            bushd_encode_table_ticks(0, state_flags, first, kCount, &entry, 1, payload.data()));
+        tell(BUSHD_MSG_TABLE_TICKS, payload);
+      } else {
+        const std::uint16_t delay = bushd_run_delay(&run);
+        std::size_t size = bushd_encode_ticks_head(0, flags, first, kCount,
+                                                   static_cast<std::uint16_t>(1u << motor), &delay,
+                                                   payload.data());
+        for (std::size_t i = 0; i < kCount; ++i) {
+          if (format == BUSHD_FORMAT_FINE) {
+            bushd_put_i16(payload.data() + size, fine[i]);
+            size += 2;
+          } else {
+            payload[size++] = coarse[i];
+          }
+        }
+        payload.resize(size);
+        tell(BUSHD_MSG_TICKS, payload);
+      }
+      first += kCount;
+      flags = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_START);
+    }
+  }
+
+  // Its pulses, each with the level of DIR.
+  struct Step {
+    TimeNs time_ns;
+    bool positive;
+  };
+  std::vector<Step> steps(std::size_t mcu, std::uint8_t motor) const {
+    std::vector<Step> out;
+    bool direction = false;
+    for (const Edge& edge : recorder_.edges) {
+      if (edge.mcu != mcu || edge.index != motor) continue;
+      if (edge.signal == Signal::kDir) direction = edge.level;
+      if (edge.signal == Signal::kStep && edge.level) out.push_back({edge.time_ns, direction});
+    }
+    return out;
+  }
+
+  // In number and direction.
+  void expect_the_same_steps(std::uint8_t motor, std::size_t count) {
+    SCOPED_TRACE("motor " + std::to_string(motor));
+    const auto expected = steps(0, motor);
+    const auto made = steps(1, motor);
+    ASSERT_EQ(expected.size(), count);
+    ASSERT_EQ(made.size(), count);
+    for (std::size_t i = 0; i < count; ++i) {
+      EXPECT_EQ(made[i].positive, expected[i].positive) << "step " << i;
+    }
+  }
+
+  void expect_the_same_times(std::uint8_t motor) {
+    const auto expected = steps(0, motor);
+    const auto made = steps(1, motor);
+    TimeNs furthest_ns = 0;
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      furthest_ns = std::max(furthest_ns, std::abs(made[i].time_ns - expected[i].time_ns));
+    }
+    EXPECT_LE(furthest_ns, kSlotNs);
+  }
+
+  void expect_the_same_reports() {
+    const bushd_report expected = master_.poll(kVirtual);
+    const bushd_report report = master_.poll(kAvr);
+    EXPECT_EQ(report.state, expected.state);
+    EXPECT_EQ(report.faults, expected.faults);
+    EXPECT_EQ(report.flags, expected.flags);
+    EXPECT_EQ(report.epoch, expected.epoch);
+    EXPECT_EQ(report.moving, expected.moving);
+    EXPECT_EQ(report.running, expected.running);
+    EXPECT_EQ(report.inputs, expected.inputs);
+    EXPECT_EQ(report.bad_frames, expected.bad_frames);
+    EXPECT_EQ(report.rejected_frames, expected.rejected_frames);
+    EXPECT_EQ(report.last_rejection, expected.last_rejection);
+    EXPECT_EQ(report.run_downs, expected.run_downs);
+    EXPECT_EQ(report.motor_count, expected.motor_count);
+    for (std::size_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      EXPECT_EQ(report.motor[m].position_steps, expected.motor[m].position_steps) << "motor " << m;
+    }
+  }
+
+  const std::vector<std::uint16_t> codes_ = ramp();
+  Recorder recorder_;
+  Bus bus_;
+  Master master_;
+  AvrMcu* avr_ = nullptr;
+};
+
+TEST_F(AvrImage, TellsWhoItIs) {
+  const auto reply = master_.identify(kAvr);
+  ASSERT_TRUE(reply);
+  bushd_identity identity;
+  ASSERT_EQ(bushd_decode_identity(reply->payload.data(), reply->payload.size(), &identity),
+            BUSHD_OK);
+  EXPECT_EQ(identity.protocol_version, BUSHD_PROTOCOL_VERSION);
+  EXPECT_EQ(identity.motors, 16);
+  EXPECT_EQ(identity.boot_number, 7);
+  EXPECT_EQ(identity.slots, kSlots);
+  EXPECT_EQ(identity.queue_ticks, 64);
+  EXPECT_EQ(identity.table_codes, 952);
+  EXPECT_EQ(identity.unique_id[0], 8);
+  EXPECT_EQ(identity.unique_id[7], 1);
+}
+
+TEST_F(AvrImage, KeepsItsNewAddressOverAReset) {
+  bushd_set_address message{{8, 7, 6, 5, 4, 3, 2, 1}, 77};
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(bushd_encode_set_address(&message, payload.data()));
+  master_.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS, payload);
+  EXPECT_TRUE(master_.identify(77));
+  pass_ticks(40);
+  bus_.reboot(1);
+  pass_ticks(40);
+  const auto reply = master_.identify(77);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(bushd_get_u16(reply->payload.data() + 4), 8) << "the next boot";
+}
+
+TEST_F(AvrImage, IsSilentAndAliveAfterNoise) {
+  for (int i = 0; i < 2000; ++i) {
+    const auto byte = static_cast<std::uint8_t>(i * 7919 >> 3);
+    bus_.master_send(Bytes{byte}, bus_.now_ns());
+  }
+  master_.drain();
+  EXPECT_TRUE(master_.identify(kAvr));
+}
+
+TEST_F(AvrImage, RunsATableToTheSlot) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {9}));
+  run_by_table(master_.poll(kAvr).tick + 24, {{9, 0, -1, 110}});
+  pass_ticks(160);
+  expect_the_same_steps(9, 110);
+  expect_the_same_times(9);
+  expect_the_same_reports();
+}
+
+// What two runs take is more than it has: it falls behind, and makes all of their steps.
+TEST_F(AvrImage, LosesNoStepWhenTicksCannotBePreparedInTime) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {0, 9}));
+  run_by_table(master_.poll(kAvr).tick + 24, {{0, 0, 1, 200}, {9, 0, -1, 110}});
+  pass_ticks(300);
+  expect_the_same_steps(0, 200);
+  expect_the_same_steps(9, 110);
+  expect_the_same_reports();
+}
+
+class AvrStreams : public AvrImage, public testing::WithParamInterface<bushd_format> {};
+INSTANTIATE_TEST_SUITE_P(Formats, AvrStreams,
+                         testing::Values(BUSHD_FORMAT_COARSE, BUSHD_FORMAT_FINE), [](auto& format) {
+                           return format.param == BUSHD_FORMAT_FINE ? "Fine" : "Coarse";
+                         });
+
+TEST_P(AvrStreams, MakeTheStepsOfTheVirtualOne) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(GetParam(), {3}));
+  stream(3, master_.poll(kAvr).tick + 32, 120, 1, GetParam());
+  pass_ticks(80);
+  stream(3, master_.poll(kAvr).tick + 32, 80, -1, GetParam());
+  pass_ticks(80);
+  expect_the_same_steps(3, 200);
+  expect_the_same_reports();
+}
+
+}  // namespace
+}  // namespace bushd::sim
