@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
 #include "commands.h"
+#include "json.h"
 #include "open_table.h"
 #include "tables/bushd/image.h"
 #include "tables/store/atomic_file.h"
@@ -23,6 +23,7 @@ namespace tables = bushd::tables;
 namespace image = bushd::tables::image;
 using bushd::fail;
 using bushd::Result;
+using nlohmann::ordered_json;
 
 constexpr std::size_t kImageBytes = image::kPages * image::kPageBytes;
 
@@ -93,7 +94,14 @@ Result<void> export_travel(const BushdExport& wanted, const tables::TableContent
   if (!travel) return fail(travel.error());
   const auto written = write_bytes(wanted.image, image::write_travel(*travel));
   if (!written) return fail(written.error());
-  fmt::print("{}: {} steps of {} ns a code\n", wanted.image, wanted.steps, content.time_unit_ns);
+  if (wanted.json) {
+    print_json({{"image", wanted.image},
+                {"steps", wanted.steps},
+                {"time_unit_ns", content.time_unit_ns},
+                {"reactor_delay_code", wanted.reactor_delay}});
+  } else {
+    fmt::print("{}: {} steps of {} ns a code\n", wanted.image, wanted.steps, content.time_unit_ns);
+  }
   return {};
 }
 
@@ -101,12 +109,18 @@ Result<void> export_page(const BushdExport& wanted, tables::TableContent content
   if (wanted.steps > image::kMaxSteps) {
     return fail(fmt::format("{} steps; a page counts up to {}", wanted.steps, image::kMaxSteps));
   }
+  ordered_json resampling;
   if (wanted.resample) {
     auto resampled = image::resample(content);
     if (!resampled) return fail(resampled.error());
-    fmt::print(
-        "resampled: steps up to {:.1f} % slower, top speed {:.6g} instead of {:.6g} steps/s\n",
-        100 * resampled->worst_speed_error, resampled->top_hz_after, resampled->top_hz_before);
+    resampling = {{"worst_speed_error", resampled->worst_speed_error},
+                  {"top_steps_per_s_before", resampled->top_hz_before},
+                  {"top_steps_per_s_after", resampled->top_hz_after}};
+    if (!wanted.json) {
+      fmt::print(
+          "resampled: steps up to {:.1f} % slower, top speed {:.6g} instead of {:.6g} steps/s\n",
+          100 * resampled->worst_speed_error, resampled->top_hz_after, resampled->top_hz_before);
+    }
     content = std::move(resampled->content);
   }
   const auto start_hz = image::start_hz_of(content);
@@ -128,8 +142,17 @@ Result<void> export_page(const BushdExport& wanted, tables::TableContent content
   std::vector<std::uint8_t> bytes;
   for (const image::Page& page : memory) bytes.insert(bytes.end(), page.begin(), page.end());
   if (auto written = write_bytes(wanted.image, bytes); !written) return fail(written.error());
-  fmt::print("{}: page {}, {} steps; set F_start to {:.6g} Hz\n", wanted.image, wanted.page,
-             wanted.steps, *start_hz);
+  if (wanted.json) {
+    print_json({{"image", wanted.image},
+                {"page", wanted.page},
+                {"steps", wanted.steps},
+                {"positions", hex(program.positions)},
+                {"start_hz", *start_hz},
+                {"resampled", resampling}});
+  } else {
+    fmt::print("{}: page {}, {} steps; set F_start to {:.6g} Hz\n", wanted.image, wanted.page,
+               wanted.steps, *start_hz);
+  }
   return {};
 }
 
@@ -148,7 +171,7 @@ int import_bushd(const Places& places, const BushdImport& wanted) {
   if (!home) return refuse(home.error());
   Result<tables::TableContent> content = fail("");
   std::uint32_t steps = 0;
-  nlohmann::ordered_json json;
+  ordered_json json;
   if (wanted.bushd1) {
     const auto bytes = read_bytes(wanted.image);
     if (!bytes) return refuse(bytes.error());
@@ -177,7 +200,7 @@ int import_bushd(const Places& places, const BushdImport& wanted) {
   if (wanted.json) {
     json["path"] = path;
     json["revision"] = *revision;
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    print_json(json);
   } else {
     fmt::print("{}: revision {}, for {} steps\n", path, *revision, steps);
   }

@@ -1,9 +1,9 @@
 #include <fmt/core.h>
 
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "json.h"
 #include "open_table.h"
 
 namespace bushtab {
@@ -74,7 +74,7 @@ int check(const Places& places, const Check& wanted) {
     }
   }
   if (wanted.json) {
-    fmt::print("{}\n", all.dump(2, ' ', false, ordered_json::error_handler_t::replace));
+    print_json(all);
   }
   return result;
 }

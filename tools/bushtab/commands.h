@@ -27,6 +27,8 @@ bushd::Result<std::optional<bushd::tables::laws::Motor>> load_motor(const MotorO
 
 // With `steps`, every step of the move that just comes to cruise.
 int show(const Places& places, const std::string& table, bool steps, bool json);
+// What a command that wrote a table says: its revision; with `json`, what show says of it.
+int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool json);
 
 struct Check {
   std::vector<std::string> tables;
@@ -42,6 +44,7 @@ struct Expansion {
   std::int64_t steps = 0;  // -INT32_MAX .. INT32_MAX
   std::uint32_t tick_us = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
+  bool json = false;
 };
 int expand(const Places& places, const Expansion& expansion);
 
@@ -53,21 +56,22 @@ struct New {
   std::vector<std::string> comments;
   bool print = false;    // to stdout instead of into a file
   bool replace = false;  // a table that is there: a new revision of it
+  bool json = false;
 };
 int make_new(const Places& places, const New& wanted);
 
 // A change of a table that is there: a new revision, comments kept.
 using Change =
     std::function<bushd::Result<bushd::tables::TableContent>(bushd::tables::TableContent content)>;
-int change(const Places& places, const std::string& table, const std::string& note,
+int change(const Places& places, const std::string& table, bool json, const std::string& note,
            const Change& change);
 // In $VISUAL or $EDITOR; what is no table is kept aside, and the old one stays.
-int edit(const Places& places, const std::string& table);
-int copy(const Places& places, const std::string& from, const std::string& to);
+int edit(const Places& places, const std::string& table, bool json);
+int copy(const Places& places, const std::string& from, const std::string& to, bool json);
 int log(const Places& places, const std::string& table, bool json);
-int revert(const Places& places, const std::string& table, const std::string& revision);
+int revert(const Places& places, const std::string& table, const std::string& revision, bool json);
 int tag(const Places& places, const std::string& table, const std::string& tag,
-        const std::string& revision);
+        const std::string& revision, bool json);
 
 struct BushdExport {
   std::string image;
@@ -78,6 +82,7 @@ struct BushdExport {
   bool resample = false;
   bool bushd1 = false;
   std::uint32_t reactor_delay = 0;
+  bool json = false;
 };
 int export_bushd(const Places& places, const BushdExport& wanted);
 

@@ -7,10 +7,10 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "commands.h"
+#include "json.h"
 #include "open_table.h"
 #include "tables/store/atomic_file.h"
 #include "tables/table_file.h"
@@ -23,9 +23,10 @@ namespace {
 namespace tables = bushd::tables;
 namespace fs = std::filesystem;
 
-int saved(const Home& home, const bushd::Result<std::uint32_t>& revision) {
-  if (!revision) return refuse(revision.error());
-  fmt::print("{}: revision {}\n", home.store.path_of(home.name).string(), *revision);
+int unchanged(const Home& home, bool json) {
+  const std::string path = home.store.path_of(home.name).string();
+  if (json) return show(Places{}, path, false, true);
+  fmt::print("{}: nothing to change\n", path);
   return kDone;
 }
 
@@ -54,7 +55,7 @@ std::string editor_of_user() {
 
 }  // namespace
 
-int change(const Places& places, const std::string& table, const std::string& note,
+int change(const Places& places, const std::string& table, bool json, const std::string& note,
            const Change& change) {
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
@@ -62,16 +63,13 @@ int change(const Places& places, const std::string& table, const std::string& no
   if (!old) return refuse(old.error());
   const auto content = change(old->content);
   if (!content) return refuse(content.error());
-  if (*content == old->content) {
-    fmt::print("{}: nothing to change\n", home->store.path_of(home->name).string());
-    return kDone;
-  }
+  if (*content == old->content) return unchanged(*home, json);
   const auto text = tables::rewrite(old->text, *content, home->store.path_of(home->name).string());
   if (!text) return refuse(text.error());
-  return saved(*home, home->store.save(home->name, old->text, *text, note));
+  return saved(*home, home->store.save(home->name, old->text, *text, note), json);
 }
 
-int edit(const Places& places, const std::string& table) {
+int edit(const Places& places, const std::string& table, bool json) {
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
   const auto old = home->store.read(home->name);
@@ -94,19 +92,18 @@ int edit(const Places& places, const std::string& table) {
                                               editor)});
     }
     if (!text) return refuse(text.error());
-    fmt::print("{}: nothing to change\n", path.string());
-    return kDone;
+    return unchanged(*home, json);
   }
   const auto revision = home->store.save(home->name, old->text, *text, "edit");
   if (revision) {
     fs::remove(aside, ignored);
-    return saved(*home, revision);
+    return saved(*home, revision, json);
   }
   fmt::print(stderr, "{} stays as it was; your text is in {}\n", path.string(), aside.string());
   return refuse(revision.error());
 }
 
-int copy(const Places& places, const std::string& from, const std::string& to) {
+int copy(const Places& places, const std::string& from, const std::string& to, bool json) {
   const auto source = open_table(places, from);
   if (!source) return refuse(source.error());
   auto home = home_of(places, to);
@@ -118,7 +115,7 @@ int copy(const Places& places, const std::string& from, const std::string& to) {
   content->name = home->name;
   const auto renamed = tables::rewrite(*text, *content, (*source)->path());
   if (!renamed) return refuse(renamed.error());
-  return saved(*home, home->store.create(home->name, *renamed, "copy of " + from));
+  return saved(*home, home->store.create(home->name, *renamed, "copy of " + from), json);
 }
 
 int log(const Places& places, const std::string& table, bool json) {
@@ -143,12 +140,12 @@ int log(const Places& places, const std::string& table, bool json) {
                revision.content_hash.substr(0, tables::kShortHashLength), revision.note, tags);
   }
   if (json) {
-    fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    print_json(all);
   }
   return kDone;
 }
 
-int revert(const Places& places, const std::string& table, const std::string& revision) {
+int revert(const Places& places, const std::string& table, const std::string& revision, bool json) {
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
   const auto now = home->store.read(home->name);
@@ -156,17 +153,22 @@ int revert(const Places& places, const std::string& table, const std::string& re
   if (!then) return refuse(then.error());
   const std::string note = fmt::format("revert to {}", then->content.revision);
   // The file may be gone, or be no table any more; what else stands there is not written over.
-  if (!now) return saved(*home, home->store.create(home->name, then->text, note));
-  return saved(*home, home->store.save(home->name, now->text, then->text, note));
+  if (!now) return saved(*home, home->store.create(home->name, then->text, note), json);
+  return saved(*home, home->store.save(home->name, now->text, then->text, note), json);
 }
 
 int tag(const Places& places, const std::string& table, const std::string& tag,
-        const std::string& revision) {
+        const std::string& revision, bool json) {
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
   const auto number = home->store.tag(home->name, tag, revision);
   if (!number) return refuse(number.error());
-  fmt::print("{}: revision {} is {}\n", home->name, *number, tag);
+  if (json) {
+    const nlohmann::ordered_json said = {{"name", home->name}, {"revision", *number}, {"tag", tag}};
+    print_json(said);
+  } else {
+    fmt::print("{}: revision {} is {}\n", home->name, *number, tag);
+  }
   return kDone;
 }
 

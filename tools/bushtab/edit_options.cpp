@@ -17,19 +17,28 @@ using tables::SideKey;
 using tables::TableContent;
 using tables::laws::Quantity;
 
+constexpr const char* kTable = "A table's file or name";
+
+// A table that is changed, and how what it is then is told.
+void add_changed(CLI::App* command, std::string& table, bool& json) {
+  command->add_option("TABLE", table, kTable)->required();
+  command->add_flag("--json", json, "What it is now, as show --json");
+}
+
 struct Codes {
   std::string table;
   std::size_t index = 0;
   std::size_t count = 1;
   std::vector<std::uint16_t> codes;
   bool decel = false;
+  bool json = false;
 
   SideKey side() const { return decel ? SideKey::kDecel : SideKey::kAccel; }
 };
 
 std::shared_ptr<Codes> codes_command(CLI::App* command, bool takes_codes) {
   const auto options = std::make_shared<Codes>();
-  command->add_option("TABLE", options->table, "A table's file or name")->required();
+  add_changed(command, options->table, options->json);
   command->add_option("INDEX", options->index, "Of the first code, from 0 in the order of the file")
       ->required()
       ->check(refuse_fraction);
@@ -48,7 +57,8 @@ void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
   CLI::App* set = app.add_subcommand("set", "Sets codes of a table");
   const auto set_options = codes_command(set, true);
   run(set, [&places, o = set_options] {
-    return change(places, o->table, fmt::format("set {} codes from {}", o->codes.size(), o->index),
+    return change(places, o->table, o->json,
+                  fmt::format("set {} codes from {}", o->codes.size(), o->index),
                   [&](TableContent content) {
                     return tables::set_codes(std::move(content), o->side(), o->index, o->codes);
                   });
@@ -56,7 +66,8 @@ void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
   CLI::App* insert = app.add_subcommand("insert", "Inserts codes before an index");
   const auto insert_options = codes_command(insert, true);
   run(insert, [&places, o = insert_options] {
-    return change(places, o->table, fmt::format("insert {} codes at {}", o->codes.size(), o->index),
+    return change(places, o->table, o->json,
+                  fmt::format("insert {} codes at {}", o->codes.size(), o->index),
                   [&](TableContent content) {
                     return tables::insert_codes(std::move(content), o->side(), o->index, o->codes);
                   });
@@ -64,7 +75,8 @@ void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
   CLI::App* remove = app.add_subcommand("delete", "Deletes codes");
   const auto remove_options = codes_command(remove, false);
   run(remove, [&places, o = remove_options] {
-    return change(places, o->table, fmt::format("delete {} codes from {}", o->count, o->index),
+    return change(places, o->table, o->json,
+                  fmt::format("delete {} codes from {}", o->count, o->index),
                   [&](TableContent content) {
                     return tables::delete_codes(std::move(content), o->side(), o->index, o->count);
                   });
@@ -78,10 +90,11 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
     double acceleration = 0;
     std::uint32_t time_unit_ns = 0;
     std::size_t codes = 0;
+    bool json = false;
   };
   const auto options = std::make_shared<Options>();
   CLI::App* scale = app.add_subcommand("scale", "Multiplies speeds or accelerations");
-  scale->add_option("TABLE", options->table, "A table's file or name")->required();
+  add_changed(scale, options->table, options->json);
   auto* what = scale->add_option_group("what", "One of")->require_option(1);
   what->add_option("--speed", options->speed, "All speeds times FACTOR")
       ->check(CLI::PositiveNumber)
@@ -92,12 +105,12 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
       ->type_name("FACTOR");
   run(scale, [&places, options] {
     if (options->speed > 0) {
-      return change(places, options->table, fmt::format("speeds times {:.6g}", options->speed),
-                    [&](TableContent content) {
+      return change(places, options->table, options->json,
+                    fmt::format("speeds times {:.6g}", options->speed), [&](TableContent content) {
                       return tables::scale_speed(std::move(content), options->speed);
                     });
     }
-    return change(places, options->table,
+    return change(places, options->table, options->json,
                   fmt::format("accelerations times {:.6g}", options->acceleration),
                   [&](TableContent content) {
                     return tables::scale_acceleration(std::move(content), options->acceleration);
@@ -105,7 +118,7 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
   });
 
   CLI::App* resample = app.add_subcommand("resample", "Another time unit or number of codes");
-  resample->add_option("TABLE", options->table, "A table's file or name")->required();
+  add_changed(resample, options->table, options->json);
   auto* how = resample->add_option_group("how", "One of")->require_option(1);
   add_quantity(
       how, "--time-unit", Quantity::kTimeUnit,
@@ -121,27 +134,28 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
       ->type_name("N");
   run(resample, [&places, options] {
     if (options->time_unit_ns > 0) {
-      return change(places, options->table, fmt::format("time unit {} ns", options->time_unit_ns),
+      return change(places, options->table, options->json,
+                    fmt::format("time unit {} ns", options->time_unit_ns),
                     [&](TableContent content) {
                       return tables::resample_unit(std::move(content), options->time_unit_ns);
                     });
     }
-    return change(places, options->table, fmt::format("{} codes a side", options->codes),
-                  [&](TableContent content) {
+    return change(places, options->table, options->json,
+                  fmt::format("{} codes a side", options->codes), [&](TableContent content) {
                     return tables::resample_codes(std::move(content), options->codes);
                   });
   });
 
   CLI::App* reverse = app.add_subcommand("reverse", "Swaps acceleration and deceleration");
-  reverse->add_option("TABLE", options->table, "A table's file or name")->required();
+  add_changed(reverse, options->table, options->json);
   run(reverse, [&places, options] {
-    return change(places, options->table, "reverse",
+    return change(places, options->table, options->json, "reverse",
                   [](TableContent content) { return tables::reverse(std::move(content)); });
   });
   CLI::App* edit = app.add_subcommand("edit", "Edits the file in $VISUAL or $EDITOR");
-  edit->add_option("TABLE", options->table, "A table's file or name")->required();
+  add_changed(edit, options->table, options->json);
   edit->footer("A text that is no table is kept aside; the old table stays.");
-  run(edit, [&places, options] { return bushtab::edit(places, options->table); });
+  run(edit, [&places, options] { return bushtab::edit(places, options->table, options->json); });
 }
 
 void add_history_commands(CLI::App& app, const Places& places, const Run& run) {
@@ -153,31 +167,35 @@ void add_history_commands(CLI::App& app, const Places& places, const Run& run) {
   };
   const auto options = std::make_shared<Options>();
   CLI::App* copy = app.add_subcommand("copy", "A table under another name");
-  copy->add_option("TABLE", options->table, "A table's file or name")->required();
+  add_changed(copy, options->table, options->json);
   copy->add_option("NEW", options->other, "The new table's name, or a file NAME.toml")->required();
-  run(copy, [&places, options] { return bushtab::copy(places, options->table, options->other); });
+  run(copy, [&places, options] {
+    return bushtab::copy(places, options->table, options->other, options->json);
+  });
   CLI::App* log = app.add_subcommand("log", "The revisions of a table, the newest first");
-  log->add_option("TABLE", options->table, "A table's file or name")->required();
+  log->add_option("TABLE", options->table, kTable)->required();
   log->add_flag("--json", options->json, "As JSON");
   run(log, [&places, options] { return bushtab::log(places, options->table, options->json); });
   CLI::App* revert = app.add_subcommand("revert", "Makes an old revision the newest again");
-  revert->add_option("TABLE", options->table, "A table's file or name")->required();
+  add_changed(revert, options->table, options->json);
   revert->add_option("REVISION", options->revision, "Its number or a tag")->required();
-  run(revert,
-      [&places, options] { return bushtab::revert(places, options->table, options->revision); });
+  run(revert, [&places, options] {
+    return bushtab::revert(places, options->table, options->revision, options->json);
+  });
   CLI::App* tag = app.add_subcommand("tag", "Gives a revision a name");
-  tag->add_option("TABLE", options->table, "A table's file or name")->required();
+  tag->add_option("TABLE", options->table, kTable)->required();
+  tag->add_flag("--json", options->json, "As JSON");
   tag->add_option("TAG", options->other, "The name")->required();
   tag->add_option("REVISION", options->revision, "Its number or another tag (default: the newest)");
   run(tag, [&places, options] {
-    return bushtab::tag(places, options->table, options->other, options->revision);
+    return bushtab::tag(places, options->table, options->other, options->revision, options->json);
   });
 }
 
 void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
   const auto out = std::make_shared<BushdExport>();
   CLI::App* to = app.add_subcommand("export-bushd", "Writes a table into a memory image of BUSHD");
-  to->add_option("TABLE", out->table, "A table's file or name")->required();
+  to->add_option("TABLE", out->table, kTable)->required();
   to->add_option("IMAGE", out->image, "1024 bytes; other pages of an image that is there stay")
       ->required();
   to->add_option("--page", out->page, "Of BUSHD-2, 0..3 (default 0)")->check(CLI::Range(0U, 3U));
@@ -188,6 +206,7 @@ void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
   to->add_option("--positions", out->positions, "The position area, 32 hexadecimal digits");
   to->add_flag("--resample", out->resample,
                "Round up to codes of 8 bits, cut the top speed at 238 codes, and print the error");
+  to->add_flag("--json", out->json, "What was written, as JSON");
   auto* bushd1 =
       to->add_flag("--bushd1", out->bushd1, "A travel of BUSHD-1 instead, 4 bytes and one a step");
   to->add_option("--reactor-delay", out->reactor_delay,

@@ -18,22 +18,41 @@ template <class Displacement>
 using ExpandFunction = std::size_t (*)(bushd_run*, std::uint32_t, std::size_t, Displacement*,
                                        std::size_t);
 
+bool flush(fmt::memory_buffer& text) {
+  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
+  text.clear();
+  return written;
+}
+
 template <class Displacement>
-bool print_ticks(bushd_run run, std::uint32_t tick_ns, ExpandFunction<Displacement> expand_block) {
+bool print_ticks(bushd_run run, const Expansion& wanted,
+                 ExpandFunction<Displacement> expand_block) {
   std::array<Displacement, kBlockTicks> block;
   std::uint64_t tick = 0;
   fmt::memory_buffer text;
-  fmt::format_to(fmt::appender(text), "tick,displacement\n");
+  const auto out = fmt::appender(text);
+  if (wanted.json) {
+    fmt::format_to(out, "{{\"tick_us\": {}, \"format\": \"{}\", \"displacements\": [",
+                   wanted.tick_us, wanted.format == BUSHD_FORMAT_COARSE ? "coarse" : "fine");
+  } else {
+    fmt::format_to(out, "tick,displacement\n");
+  }
   bool written = true;
   do {
-    const std::size_t active = expand_block(&run, tick_ns, kBlockTicks, block.data(), 1);
-    for (std::size_t i = 0; i < active; ++i) {
-      fmt::format_to(fmt::appender(text), "{},{}\n", tick++, static_cast<int>(block[i]));
+    const std::size_t active =
+        expand_block(&run, wanted.tick_us * 1000, kBlockTicks, block.data(), 1);
+    for (std::size_t i = 0; i < active; ++i, ++tick) {
+      const int displacement = block[i];
+      if (wanted.json) {
+        fmt::format_to(out, "{}{}", tick == 0 ? "" : ", ", displacement);
+      } else {
+        fmt::format_to(out, "{},{}\n", tick, displacement);
+      }
     }
-    written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
-    text.clear();
+    written = flush(text);
   } while (written && !bushd_run_done(&run));
-  return written && std::fflush(stdout) == 0;
+  if (wanted.json) fmt::format_to(out, "]}}\n");
+  return written && flush(text) && std::fflush(stdout) == 0;
 }
 
 }  // namespace
@@ -56,8 +75,8 @@ int expand(const Places& places, const Expansion& expansion) {
   bushd_run_start(&run, view, static_cast<std::uint32_t>(std::llabs(expansion.steps)),
                   expansion.steps < 0 ? -1 : 1);
   const bool written = expansion.format == BUSHD_FORMAT_COARSE
-                           ? print_ticks<std::uint8_t>(run, tick_ns, bushd_run_expand_coarse)
-                           : print_ticks<std::int16_t>(run, tick_ns, bushd_run_expand_fine);
+                           ? print_ticks<std::uint8_t>(run, expansion, bushd_run_expand_coarse)
+                           : print_ticks<std::int16_t>(run, expansion, bushd_run_expand_fine);
   if (written) return kDone;
   return refuse(bushd::Error{.message = "cannot write to standard output: is the disk full?"});
 }

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "commands.h"
+#include "json.h"
 #include "open_table.h"
 #include "tables/move_time.h"
 #include "tables/table_file.h"
@@ -19,10 +19,6 @@ namespace tables = bushd::tables;
 using nlohmann::ordered_json;
 
 constexpr int kSpeedsCompared = 10;
-
-void print(const ordered_json& json) {
-  fmt::print("{}\n", json.dump(2, ' ', false, ordered_json::error_handler_t::replace));
-}
 
 double hz(const tables::Table& table, std::uint16_t code) {
   return 1e9 / (static_cast<double>(code) * table.view().time_unit_ns);
@@ -83,7 +79,7 @@ int list(const Places& places, bool json) {
                  (*table)->short_hash(), start_hz, max_hz, (*table)->description());
     }
   }
-  if (json) print(all);
+  if (json) print_json(all);
   return result;
 }
 
@@ -101,7 +97,7 @@ int time(const Places& places, const std::string& name, const std::vector<std::u
                  static_cast<double>(move.time_ns) * 1e-6, peak);
     }
   }
-  if (json) print(all);
+  if (json) print_json(all);
   return kDone;
 }
 
@@ -149,7 +145,7 @@ int diff(const Places& places, const std::string& before_name, const std::string
         {{"steps_per_s", speed_hz}, {"before", entry(**before)}, {"after", entry(**after)}});
   }
   if (json) {
-    print({{"same_content", same}, {"by_step", by_step}, {"by_speed", by_speed}});
+    print_json({{"same_content", same}, {"by_step", by_step}, {"by_speed", by_speed}});
     return kDone;
   }
   if (same) {

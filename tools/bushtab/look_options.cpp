@@ -156,6 +156,7 @@ void add_expand(CLI::App& app, const Places& places, const Run& run) {
   expand->add_option("--format", options->format, "coarse (a byte) or fine (steps x 256)")
       ->required()
       ->check(CLI::IsMember({"coarse", "fine"}));
+  expand->add_flag("--json", expansion.json, "As JSON");
   run(expand, [&places, options] {
     options->expansion.format =
         options->format == "coarse" ? BUSHD_FORMAT_COARSE : BUSHD_FORMAT_FINE;

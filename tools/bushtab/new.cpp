@@ -46,9 +46,7 @@ int make_new(const Places& places, const New& wanted) {
   } else {
     revision = home->store.create(home->name, text, note);
   }
-  if (!revision) return refuse(revision.error());
-  fmt::print("{}: revision {}\n", home->store.path_of(home->name).string(), *revision);
-  return kDone;
+  return saved(*home, revision, wanted.json);
 }
 
 }  // namespace bushtab

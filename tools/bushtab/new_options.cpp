@@ -202,8 +202,10 @@ void add_new_options(CLI::App& app, const Places& places, const Run& run) {
   command->add_option("--description", spec.description, "For what motor and load");
   command->add_option("--comment", options->comments, "A comment at the head of the file")
       ->allow_extra_args(false);
-  command->add_flag("--print", options->print, "To standard output; no file, no history");
+  auto* print =
+      command->add_flag("--print", options->print, "To standard output; no file, no history");
   command->add_flag("--replace", options->replace, "If the table is there: a new revision of it");
+  command->add_flag("--json", options->json, "What was made, as show --json")->excludes(print);
   run(command, [&places, options, decel, command] {
     if (*decel) {
       laws::SideSpec side = **decel;

@@ -1,10 +1,9 @@
 #include <fmt/core.h>
 
-#include <nlohmann/json.hpp>
-
 #include "commands.h"
 #include "curve.h"
 #include "engine/run.h"
+#include "json.h"
 #include "open_table.h"
 
 namespace bushtab {
@@ -93,7 +92,7 @@ void print_steps(const std::vector<CurveStep>& curve) {
   }
 }
 
-void print_json(const Table& table, bool steps) {
+void print_as_json(const Table& table, bool steps) {
   const bushd_table& view = table.view();
   ordered_json json = {
       {"name", table.name()},
@@ -109,8 +108,7 @@ void print_json(const Table& table, bool steps) {
       {"shortest_cruising_move_steps", shortest_cruising_move(view)},
       {"longest_tick_us", longest_tick_us(view)}};
   if (steps) json["steps"] = steps_json(curve_of(table));
-  // A path need not be UTF-8.
-  fmt::print("{}\n", json.dump(2, ' ', false, ordered_json::error_handler_t::replace));
+  print_json(json);
 }
 
 std::string side_text(const Table& table, const bushd_ramp& side) {
@@ -149,11 +147,19 @@ int show(const Places& places, const std::string& name, bool steps, bool json) {
   const auto table = open_table(places, name);
   if (!table) return refuse(table.error());
   if (json) {
-    print_json(**table, steps);
+    print_as_json(**table, steps);
   } else {
     print_text(**table);
     if (steps) print_steps(curve_of(**table));
   }
+  return kDone;
+}
+
+int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool json) {
+  if (!revision) return refuse(revision.error());
+  const std::string path = home.store.path_of(home.name).string();
+  if (json) return show(Places{}, path, false, true);
+  fmt::print("{}: revision {}\n", path, *revision);
   return kDone;
 }
 
