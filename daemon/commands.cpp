@@ -206,7 +206,11 @@ void Core::start_move(std::int64_t now_us, const command_t& command) {
   }
   answer(client, reply_t::ACCEPTED, "", "accepted");
   for (const std::size_t motor : moving) take_over(motor, client);
-  client_of_move_.emplace(book_.open(motors), client);
+  OpenMove open{.client = client, .tables = {}};
+  for (const std::size_t motor : motors) {
+    open.tables.push_back(tables_[motors_[motor].config->group.value]);
+  }
+  open_moves_.emplace(book_.open(motors), std::move(open));
   for (std::size_t i = 0; i < motors.size(); ++i) {
     motion::Axis& axis = motors_[motors[i]].axis;
     if (axis.busy()) {
@@ -313,23 +317,15 @@ std::vector<std::size_t> Core::mcus_of(const std::vector<std::size_t>& motors) c
 }
 
 void Core::answer(const Client& client, std::int8_t phase, const std::string& result,
-                  const std::string& reason, const motion::MoveResult* move) {
-  reply_t reply;
+                  const std::string& reason, reply_t reply) {
   reply.utime_us = outputs_.wall_clock_us();
   reply.client_id = client.id;
   reply.number = client.number;
   reply.phase = phase;
   reply.result = result;
   reply.reason = reason;
-  reply.motor_count = 0;
-  if (move != nullptr) {
-    for (const motion::MotorOutcome& part : move->motors) {
-      reply.motors.push_back(motors_[part.motor].config->name);
-      reply.motor_results.push_back(motion::outcome_word(part.outcome));
-      reply.position_steps.push_back(part.position_steps);
-    }
-    reply.motor_count = static_cast<std::int32_t>(move->motors.size());
-  }
+  reply.motor_count = static_cast<std::int32_t>(reply.motors.size());
+  reply.table_count = static_cast<std::int32_t>(reply.tables.size());
   clients_.record(reply);
   outputs_.reply(reply);
 }

@@ -106,6 +106,10 @@ class Core {
     std::string id;
     std::int64_t number;
   };
+  struct OpenMove {
+    Client client;
+    std::vector<tables::TablePtr> tables;  // of its motors, in the command's order
+  };
   // A command that is neither answered at once nor a move: done when nothing is left to wait for.
   struct Pending {
     Client client;
@@ -142,6 +146,10 @@ class Core {
   void end_motor(std::size_t motor, motion::Outcome outcome, const std::string& reason);
   // Its part of the move only.
   void end_part(std::size_t motor, motion::Outcome outcome, const std::string& reason);
+  // The per-motor fields only.
+  reply_t reply_to(const motion::MoveResult& result,
+                   const std::vector<tables::TablePtr>& moved_by) const;
+  static table_ref_t ref_to(const tables::Table& table);
   void log_change(const Motor& motor, const motion::Change& change);
   void log_result(const Motor& motor, const std::string& result);
 
@@ -174,7 +182,7 @@ class Core {
   std::string still_wrong(const Pending& pending, const Mcu& mcu) const;
   void finish_pending(const Pending& pending, const std::string& failure);
   void answer(const Client& client, std::int8_t phase, const std::string& result,
-              const std::string& reason, const motion::MoveResult* move = nullptr);
+              const std::string& reason, reply_t reply = {});
 
   // snapshot.cpp
   void publish();
@@ -194,7 +202,7 @@ class Core {
   std::vector<Motor> motors_;
   std::unordered_map<std::string, std::size_t> motor_by_name_;
   motion::MoveBook book_;
-  std::unordered_map<std::uint64_t, Client> client_of_move_;
+  std::unordered_map<std::uint64_t, OpenMove> open_moves_;  // by number in book_
   std::list<Pending> pending_;
   ClientLog clients_;
   std::uint64_t rejected_commands_ = 0;

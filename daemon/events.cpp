@@ -1,4 +1,5 @@
 // What the bus tells: MCUs that come and go, reports, and with them the ends of moves.
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "daemon/bus.h"
@@ -237,10 +238,27 @@ void Core::end_part(std::size_t index, motion::Outcome outcome, const std::strin
                                    .position_steps = motor.position_steps,
                                    .reason = motor.config->name + ": " + reason});
   if (!finished) return;
-  const auto client = client_of_move_.find(finished->move);
-  answer(client->second, reply_t::RESULT, motion::outcome_word(finished->outcome), finished->reason,
-         &*finished);
-  client_of_move_.erase(client);
+  const auto open = open_moves_.extract(finished->move);
+  answer(open.mapped().client, reply_t::RESULT, motion::outcome_word(finished->outcome),
+         finished->reason, reply_to(*finished, open.mapped().tables));
+}
+
+reply_t Core::reply_to(const motion::MoveResult& result,
+                       const std::vector<tables::TablePtr>& moved_by) const {
+  reply_t reply{};
+  std::vector<const tables::Table*> told;
+  for (std::size_t i = 0; i < result.motors.size(); ++i) {
+    const motion::MotorOutcome& part = result.motors[i];
+    reply.motors.push_back(motors_[part.motor].config->name);
+    reply.motor_results.push_back(motion::outcome_word(part.outcome));
+    reply.position_steps.push_back(part.position_steps);
+    const auto found = std::find(told.begin(), told.end(), moved_by[i].get());
+    reply.table_of_motor.push_back(static_cast<std::int16_t>(found - told.begin()));
+    if (found != told.end()) continue;
+    told.push_back(moved_by[i].get());
+    reply.tables.push_back(ref_to(*moved_by[i]));
+  }
+  return reply;
 }
 
 }  // namespace bushd::daemon

@@ -33,6 +33,14 @@ std::string detail_of(const link::McuView& view, bool two_masters) {
 
 }  // namespace
 
+table_ref_t Core::ref_to(const tables::Table& table) {
+  table_ref_t ref{};
+  ref.name = table.name();
+  ref.revision = static_cast<std::int32_t>(table.revision());
+  ref.hash = table.short_hash();
+  return ref;
+}
+
 state_t Core::state_of(const Mcu& mcu) const {
   const link::McuView& view = view_of(mcu);
   state_t state;
@@ -50,7 +58,7 @@ state_t Core::state_of(const Mcu& mcu) const {
     motor_state_t entry;
     entry.name = motor.config->name;
     entry.group = config_.group_of(*motor.config).name;
-    entry.table = table_of(*motor.config).name();
+    entry.table = ref_to(table_of(*motor.config));
     entry.output = static_cast<std::int16_t>(output);
     entry.position_steps = motor.position_steps;
     entry.target_steps = motor.axis.busy() ? motor.axis.final_steps() : motor.position_steps;

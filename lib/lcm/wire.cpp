@@ -67,7 +67,15 @@ constexpr std::size_t kInt32 = 4;
 constexpr std::size_t kInt64 = 8;
 constexpr std::size_t kDouble = 8;
 constexpr std::size_t kMinText = 5;
-constexpr std::size_t kMinMotorState = 4 * kMinText + kInt16 + 2 * kInt64 + kDouble + 3 * kInt8;
+constexpr std::size_t kMinTableRef = 2 * kMinText + kInt32;
+constexpr std::size_t kMinMotorState =
+    3 * kMinText + kMinTableRef + kInt16 + 2 * kInt64 + kDouble + 3 * kInt8;
+
+void scan_fields(Scan& scan, std::type_identity<table_ref_t>) {
+  scan.text();         // name
+  scan.fixed(kInt32);  // revision
+  scan.text();         // hash
+}
 
 void scan_fields(Scan& scan, std::type_identity<command_t>) {
   scan.fixed(kInt64);  // utime_us
@@ -86,13 +94,17 @@ void scan_fields(Scan& scan, std::type_identity<reply_t>) {
   scan.fixed(kInt8);   // phase
   scan.text();         // result
   scan.text();         // reason
-  const std::size_t motors = scan.count(2 * kMinText + kInt64);
+  const std::size_t motors = scan.count(2 * kMinText + kInt64 + kInt16);
   for (std::size_t i = 0; i < 2 * motors; ++i) scan.text();  // motors, motor_results
-  scan.fixed(motors * kInt64);                               // position_steps
+  scan.fixed(motors * (kInt64 + kInt16));                    // position_steps, table_of_motor
+  const std::size_t tables = scan.count(kMinTableRef);
+  for (std::size_t i = 0; i < tables; ++i) scan_fields(scan, std::type_identity<table_ref_t>{});
 }
 
 void scan_fields(Scan& scan, std::type_identity<motor_state_t>) {
-  for (int i = 0; i < 3; ++i) scan.text();    // name, group, table
+  scan.text();  // name
+  scan.text();  // group
+  scan_fields(scan, std::type_identity<table_ref_t>{});
   scan.fixed(kInt16 + 2 * kInt64 + kDouble);  // output, position, target, velocity
   scan.fixed(3 * kInt8);                      // moving, enabled, input
   scan.text();                                // trust
@@ -152,7 +164,9 @@ bool counts_match(const command_t& command) {
 bool counts_match(const reply_t& reply) {
   return counted(reply.motor_count, reply.motors.size()) &&
          counted(reply.motor_count, reply.motor_results.size()) &&
-         counted(reply.motor_count, reply.position_steps.size());
+         counted(reply.motor_count, reply.position_steps.size()) &&
+         counted(reply.motor_count, reply.table_of_motor.size()) &&
+         counted(reply.table_count, reply.tables.size());
 }
 
 bool counts_match(const state_t& state) {

@@ -42,6 +42,14 @@ inline void fill(Random& random, command_t& command) {
   command.motor_count = static_cast<std::int32_t>(command.motors.size());
 }
 
+inline table_ref_t table_ref(Random& random) {
+  table_ref_t table{};
+  table.name = text(random);
+  table.revision = any<std::int32_t>(random);
+  table.hash = text(random);
+  return table;
+}
+
 inline void fill(Random& random, reply_t& reply) {
   reply.utime_us = any<std::int64_t>(random);
   reply.client_id = text(random);
@@ -53,15 +61,26 @@ inline void fill(Random& random, reply_t& reply) {
     reply.motors.push_back(text(random));
     reply.motor_results.push_back(text(random));
     reply.position_steps.push_back(any<std::int64_t>(random));
+    reply.table_of_motor.push_back(any<std::int16_t>(random));
   }
   reply.motor_count = static_cast<std::int32_t>(reply.motors.size());
+  for (std::size_t i = below(random, 4); i > 0; --i) reply.tables.push_back(table_ref(random));
+  reply.table_count = static_cast<std::int32_t>(reply.tables.size());
+}
+
+inline table_ref_t table_ref() {
+  table_ref_t table{};
+  table.name = "bushd2-constant";
+  table.revision = 3;
+  table.hash = "0a1b2c3d";
+  return table;
 }
 
 inline motor_state_t motor_state(const std::string& name) {
   motor_state_t motor{};
   motor.name = name;
   motor.group = "goniometer";
-  motor.table = "bushd2-constant";
+  motor.table = table_ref();
   motor.trust = "known";
   return motor;
 }
@@ -81,6 +100,7 @@ inline void fill(Random& random, state_t& state) {
   state.rejected_commands = any<std::int64_t>(random);
   for (std::size_t i = below(random, 4); i > 0; --i) {
     motor_state_t motor = motor_state(text(random));
+    motor.table = table_ref(random);
     motor.output = any<std::int16_t>(random);
     motor.position_steps = any<std::int64_t>(random);
     motor.target_steps = any<std::int64_t>(random);

@@ -195,9 +195,17 @@ TEST(Size, CommandAndReplyFor512MotorsFitOneDatagram) {
     reply.motors.emplace_back(63, 'x');
     reply.motor_results.emplace_back("reached");
     reply.position_steps.push_back(i);
+    reply.table_of_motor.push_back(static_cast<std::int16_t>(i % 100));
+  }
+  for (int i = 0; i < 100; ++i) {
+    table_ref_t table{};
+    table.name = std::string(63, 'x');
+    table.hash = "01234567";
+    reply.tables.push_back(table);
   }
   command.motor_count = 512;
   reply.motor_count = 512;
+  reply.table_count = 100;
   EXPECT_TRUE(encode(command));
   EXPECT_TRUE(encode(reply));
 }

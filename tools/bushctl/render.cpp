@@ -12,14 +12,22 @@ namespace {
 
 using bushd::motor_state_t;
 using bushd::state_t;
+using bushd::table_ref_t;
 using bushd::lcm::Snapshot;
+
+std::string text_of(const table_ref_t& table) {
+  const std::string revision = table.revision > 0 ? fmt::format("@{}", table.revision) : "";
+  return printable(table.name) + revision;
+}
 
 nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
   return {{"name", motor.name},
           {"mcu", mcu.mcu},
           {"output", motor.output},
           {"group", motor.group},
-          {"table", motor.table},
+          {"table", motor.table.name},
+          {"table_revision", motor.table.revision},
+          {"table_hash", motor.table.hash},
           {"position_steps", motor.position_steps},
           {"target_steps", motor.target_steps},
           {"velocity_steps_per_s", motor.velocity_steps_per_s},
@@ -54,7 +62,7 @@ std::vector<std::string> table(const Snapshot& snapshot) {
   for (const state_t& mcu : snapshot.mcus) {
     for (const motor_state_t& motor : mcu.motors) {
       motors.row({printable(motor.name), printable(mcu.mcu), fmt::to_string(motor.output),
-                  printable(motor.group), printable(motor.table),
+                  printable(motor.group), text_of(motor.table),
                   fmt::to_string(motor.position_steps), fmt::to_string(motor.target_steps),
                   fmt::format("{:.1f}", motor.velocity_steps_per_s),
                   motor.moving != 0 ? "yes" : "-", printable(motor.trust)});
@@ -94,8 +102,15 @@ std::vector<std::string> lines(const bushd::reply_t& reply) {
   if (reply.phase == bushd::reply_t::ACCEPTED) return {"accepted"};
   std::vector<std::string> out;
   for (std::size_t i = 0; i < reply.motors.size(); ++i) {
-    out.push_back(fmt::format("{}: {}, stands at {}", printable(reply.motors[i]),
-                              printable(reply.motor_results[i]), reply.position_steps[i]));
+    std::string line = fmt::format("{}: {}, stands at {}", printable(reply.motors[i]),
+                                   printable(reply.motor_results[i]), reply.position_steps[i]);
+    // Whatever the network says of an index is not believed.
+    const auto table = static_cast<std::size_t>(reply.table_of_motor[i]);
+    if (table < reply.tables.size()) {
+      line += fmt::format(" by {} ({})", text_of(reply.tables[table]),
+                          printable(reply.tables[table].hash));
+    }
+    out.push_back(std::move(line));
   }
   if (out.empty()) out.push_back(printable(reply.result));
   return out;

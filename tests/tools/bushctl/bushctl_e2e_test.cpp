@@ -61,6 +61,8 @@ TEST(Bushctl, StatusAsJsonHasTheAgreedKeys) {
   EXPECT_EQ(theta["output"], 0);
   EXPECT_EQ(theta["group"], "goniometer");
   EXPECT_EQ(theta["table"], "bushd2-constant");
+  EXPECT_EQ(theta["table_revision"], 3);
+  EXPECT_EQ(theta["table_hash"], "0a1b2c3d");
   EXPECT_EQ(theta["position_steps"], -12);
   EXPECT_EQ(theta["target_steps"], 400);
   EXPECT_EQ(theta["velocity_steps_per_s"], 2500.5);
@@ -177,7 +179,9 @@ TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
   daemon.start(always("reached"));
   const Ran ran = bushctl({"move", "theta", "-400", "chi", "20", "--wait"});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_EQ(ran.out, "accepted\ntheta: reached, stands at 7\nchi: reached, stands at 7\n");
+  EXPECT_EQ(ran.out,
+            "accepted\ntheta: reached, stands at 7 by bushd2-constant@3 (0a1b2c3d)\n"
+            "chi: reached, stands at 7 by bushd2-constant@3 (0a1b2c3d)\n");
   const auto commands = daemon.commands();
   ASSERT_EQ(commands.size(), 1u);
   EXPECT_EQ(commands[0].kind, command_t::MOVE_RELATIVE);

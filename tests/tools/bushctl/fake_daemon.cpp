@@ -106,8 +106,11 @@ reply_t result(const command_t& command, const std::string& word) {
     reply.motors = command.motors;
     reply.motor_results.assign(command.motors.size(), word);
     reply.position_steps.assign(command.motors.size(), 7);
+    reply.table_of_motor.assign(command.motors.size(), 0);
+    reply.tables = {bushd::test::table_ref()};
   }
   reply.motor_count = static_cast<std::int32_t>(reply.motors.size());
+  reply.table_count = static_cast<std::int32_t>(reply.tables.size());
   return reply;
 }
 
