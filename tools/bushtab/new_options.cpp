@@ -181,6 +181,12 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
                    "Steps, microsteps included, of a turn (default 200)")
       ->check(CLI::PositiveNumber)
       ->type_name("N");
+  command
+      ->add_option(
+          "--full-steps-per-turn", motor.full_steps_per_turn,
+          "Full steps of a turn, for the jumps of speed that the rotor can follow (default 200)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("N");
 }
 
 void add_new_options(CLI::App& app, const Places& places, const Run& run) {

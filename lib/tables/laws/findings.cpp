@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "engine/run.h"
 
@@ -21,6 +22,12 @@ struct Pair {
   double slower_s;
   double faster_s;
   std::optional<std::size_t> index;  // none: the step from the side to the cruise delay
+};
+
+// The place that asks for the greatest share of what the motor has.
+struct Demand {
+  Finding finding{};
+  double share = 0;
 };
 
 class Inspector {
@@ -54,10 +61,13 @@ class Inspector {
     const auto in_file = [&](std::size_t i) {
       return which == Side::kAccel ? i : side.count - 1 - i;
     };
-    inspect_start(side, name, in_file(0));
+    const double first_s = std::max(delay_s(side, 0), cruise_s());
+    inspect_start(hz(first_s), name, in_file(0));
     Finding ratio{.rule = "speed_ratio", .side = name, .value = speed_ratio_};
     Finding steep{.rule = "acceleration", .side = name, .value = 1};
-    Finding weak{.rule = "torque", .side = name, .value = 1};
+    Demand torque{.finding = {.rule = "torque", .side = name}};
+    Demand jump{.finding = {.rule = "jump", .side = name}};
+    if (limits_.motor) inspect_jump(0, first_s, which, in_file(0), jump);
     for (std::size_t i = 0; i < side.count && delay_s(side, i) > cruise_s(); ++i) {
       const bool last = i + 1 == side.count;
       const Pair pair{delay_s(side, i),
@@ -65,15 +75,16 @@ class Inspector {
                       in_file(last ? i : i + 1)};
       inspect_ratio(pair, ratio);
       inspect_acceleration(pair, steep);
-      inspect_torque(pair, which, weak);
+      if (!limits_.motor) continue;
+      inspect_torque(pair, which, torque);
+      inspect_jump(hz(pair.slower_s), pair.faster_s, which, pair.index, jump);
     }
-    for (Finding& finding : std::array{ratio, steep, weak}) {
+    for (Finding& finding : std::array{ratio, steep, torque.finding, jump.finding}) {
       if (!finding.message.empty()) found_.push_back(std::move(finding));
     }
   }
 
-  void inspect_start(const bushd_ramp& side, const char* name, std::size_t index) {
-    const double start_hz = hz(std::max(delay_s(side, 0), cruise_s()));
+  void inspect_start(double start_hz, const char* name, std::size_t index) {
     if (!limits_.start_hz || start_hz <= *limits_.start_hz * (1 + kNoise)) return;
     add(Severity::kError, "start_speed", name, index, start_hz, *limits_.start_hz,
         fmt::format(
@@ -119,31 +130,61 @@ class Inspector {
         acceleration, worst.limit, worst.limit / acceleration);
   }
 
-  void inspect_torque(const Pair& pair, Side which, Finding& worst) const {
-    if (!limits_.motor) return;
+  // Takes the place of what was found before if it asks for a greater share of what there is.
+  // Returns whether it does, and is more than the safety factor leaves.
+  bool is_worst(double needs, double has, Demand& worst) const {
+    const double share = has > 0 ? needs / has : std::numeric_limits<double>::infinity();
+    if (needs <= 0 || share * limits_.motor->safety <= 1 + kNoise || share <= worst.share) {
+      return false;
+    }
+    worst.share = share;
+    worst.finding.severity = share > 1 + kNoise ? Severity::kError : Severity::kWarning;
+    worst.finding.value = needs;
+    worst.finding.limit = has / limits_.motor->safety;
+    return true;
+  }
+
+  static const char* outcome(const Demand& worst) {
+    return worst.finding.severity == Severity::kError ? "it will lose steps" : "it may lose steps";
+  }
+
+  void inspect_torque(const Pair& pair, Side which, Demand& worst) const {
     const Motor& motor = *limits_.motor;
-    const double wanted = least_acceleration(pair);
-    if (wanted <= 0) return;
-    const double middle_hz = 2.0 / (pair.slower_s + pair.faster_s);
-    // Torque that the step takes, as a share of what the motor has without any safety factor.
-    const double friction = which == Side::kAccel ? motor.friction_nm : -motor.brake_friction_nm;
+    const double speed_hz = 2.0 / (pair.slower_s + pair.faster_s);
+    const double friction_nm = which == Side::kAccel ? motor.friction_nm : -motor.brake_friction_nm;
     constexpr double kTurn = 6.283185307179586;
-    const double needs_nm = wanted * kTurn / motor.steps_per_turn * motor.inertia_kgm2 + friction;
-    const double has_nm = torque_at(motor, middle_hz);
-    const double share = needs_nm / std::max(has_nm, 1e-12);
-    const bool stalls = share > 1 + kNoise;
-    if (share * motor.safety <= 1 + kNoise || (!worst.message.empty() && share <= worst.value))
-      return;
-    worst.severity = stalls ? Severity::kError : Severity::kWarning;
-    worst.index = pair.index;
-    worst.value = share;
-    worst.limit = 1 / motor.safety;
-    worst.message = fmt::format(
+    const double needs_nm =
+        least_acceleration(pair) * kTurn / motor.steps_per_turn * motor.inertia_kgm2 + friction_nm;
+    // The two delays have speeds on either side of that, and the torque of them all.
+    const double has_nm = greatest_torque(motor, hz(pair.slower_s), hz(pair.faster_s));
+    inspect_load(needs_nm, has_nm, speed_hz, pair.index,
+                 "Make the table slower, or with --law torque", worst);
+  }
+
+  void inspect_load(double needs_nm, double has_nm, double speed_hz,
+                    std::optional<std::size_t> index, const char* remedy, Demand& worst) const {
+    if (!is_worst(needs_nm, has_nm, worst)) return;
+    worst.finding.index = index;
+    worst.finding.message = fmt::format(
         "takes {:.3g} Nm at {:.6g} steps/s and the motor has {:.3g}, {:.3g} with the safety "
-        "factor: "
-        "{}. Make the table slower, or with --law torque",
-        needs_nm, middle_hz, has_nm, has_nm / motor.safety,
-        stalls ? "it will lose steps" : "it may lose steps");
+        "factor: {}. {}",
+        needs_nm, speed_hz, has_nm, worst.finding.limit, outcome(worst), remedy);
+  }
+
+  // From `from_hz`, 0 at the start. Where the motor has no torque at all, that is what is wrong.
+  void inspect_jump(double from_hz, double to_s, Side which, std::optional<std::size_t> index,
+                    Demand& worst) const {
+    const double to_hz = hz(to_s);
+    const double greatest_hz = greatest_jump_hz(*limits_.motor, which, to_hz);
+    if (greatest_hz <= 0 || !is_worst(to_hz - from_hz, greatest_hz, worst)) return;
+    worst.finding.index = index;
+    worst.finding.message = fmt::format(
+        "the speed jumps from {:.6g} to {:.6g} steps/s within a step, and the rotor catches up "
+        "{:.3g} "
+        "steps/s, {:.3g} with the safety factor: {}. {}",
+        from_hz, to_hz, greatest_hz, worst.finding.limit, outcome(worst),
+        from_hz > 0 ? "Use a shorter time unit, or put codes in between"
+                    : "Put slower codes before it");
   }
 
   void inspect_cruise() {
@@ -163,13 +204,22 @@ class Inspector {
               "shorter time_unit_ns",
               100 * resolution, 100 * limits_.resolution));
     }
-    if (limits_.motor && cruise_hz > limits_.motor->torque.back().speed_hz * (1 + kNoise)) {
-      add(Severity::kError, "torque", "cruise", std::nullopt, cruise_hz,
-          limits_.motor->torque.back().speed_hz,
-          fmt::format("cruises at {:.6g} steps/s; the torque curve ends at {:.6g}. Set a slower "
-                      "cruise",
-                      cruise_hz, limits_.motor->torque.back().speed_hz));
+    if (limits_.motor) inspect_cruise_torque(cruise_hz);
+  }
+
+  void inspect_cruise_torque(double cruise_hz) {
+    const Motor& motor = *limits_.motor;
+    const double end_hz = motor.torque.back().speed_hz;
+    if (cruise_hz > end_hz * (1 + kNoise)) {
+      return add(Severity::kError, "torque", "cruise", std::nullopt, cruise_hz, end_hz,
+                 fmt::format("cruises at {:.6g} steps/s; the torque curve ends at {:.6g}. Set a "
+                             "slower cruise",
+                             cruise_hz, end_hz));
     }
+    Demand cruise{.finding = {.rule = "torque", .side = "cruise"}};
+    inspect_load(motor.friction_nm, torque_at(motor, std::min(cruise_hz, end_hz)), cruise_hz,
+                 std::nullopt, "Set a slower cruise", cruise);
+    if (!cruise.finding.message.empty()) found_.push_back(std::move(cruise.finding));
   }
 
   void inspect_place() {

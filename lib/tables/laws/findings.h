@@ -34,7 +34,7 @@ struct Finding {
   std::string rule{};                  // speed_ratio, resolution, start_speed, max_speed, ..
   std::string side{};                  // accel, decel, cruise or empty: the whole table
   std::optional<std::size_t> index{};  // of the code, in the order of the file
-  double value = 0;
+  double value = 0;                    // in the unit of the rule; torque: Nm
   double limit = 0;
   std::string message{};  // value, rule and remedy in a sentence
 };

@@ -47,6 +47,12 @@ std::optional<Columns> header(std::string_view speed, std::string_view torque,
   return columns;
 }
 
+// The first point at that speed or beyond it.
+TorqueCurve::const_iterator from(const TorqueCurve& curve, double speed_hz) {
+  return std::lower_bound(curve.begin(), curve.end(), speed_hz,
+                          [](const TorquePoint& point, double hz) { return point.speed_hz < hz; });
+}
+
 }  // namespace
 
 Result<TorqueCurve> parse_torque_csv(std::string_view text, double steps_per_turn,
@@ -110,13 +116,20 @@ std::optional<Error> fault_of(const Motor& motor) {
   return std::nullopt;
 }
 
+double greatest_torque(const Motor& motor, double low_hz, double high_hz) {
+  double greatest_nm = std::max(torque_at(motor, low_hz), torque_at(motor, high_hz));
+  for (auto point = from(motor.torque, low_hz);
+       point != motor.torque.end() && point->speed_hz < high_hz; ++point) {
+    greatest_nm = std::max(greatest_nm, point->torque_nm);
+  }
+  return greatest_nm;
+}
+
 double torque_at(const Motor& motor, double speed_hz) {
   const TorqueCurve& curve = motor.torque;
   if (speed_hz <= curve.front().speed_hz) return curve.front().torque_nm;
   if (speed_hz > curve.back().speed_hz) return 0.0;
-  const auto above =
-      std::lower_bound(curve.begin(), curve.end(), speed_hz,
-                       [](const TorquePoint& point, double hz) { return point.speed_hz < hz; });
+  const auto above = from(curve, speed_hz);
   const auto below = above - 1;
   const double share = (speed_hz - below->speed_hz) / (above->speed_hz - below->speed_hz);
   return below->torque_nm + share * (above->torque_nm - below->torque_nm);
@@ -127,6 +140,19 @@ double acceleration_at(const Motor& motor, Side side, double speed_hz) {
   const double friction = side == Side::kAccel ? -motor.friction_nm : motor.brake_friction_nm;
   const double torque_nm = torque_at(motor, speed_hz) / motor.safety + friction;
   return torque_nm / motor.inertia_kgm2 * motor.steps_per_turn / (2.0 * std::numbers::pi);
+}
+
+double greatest_jump_hz(const Motor& motor, Side side, double speed_hz) {
+  const double torque_nm = torque_at(motor, speed_hz);
+  const double load_nm = side == Side::kAccel ? motor.friction_nm : 0.0;
+  if (torque_nm <= load_nm) return 0.0;
+  const double share = load_nm / torque_nm;
+  const double lag = std::asin(share);
+  const double depth = 1.0 + std::cos(lag) - share * (std::numbers::pi - lag);
+  const double periods = std::min(motor.full_steps_per_turn, motor.steps_per_turn) / 4.0;
+  const double jump_rad_per_s =
+      std::sqrt(2.0 * std::max(0.0, depth) * torque_nm / (periods * motor.inertia_kgm2));
+  return jump_rad_per_s * motor.steps_per_turn / (2.0 * std::numbers::pi);
 }
 
 Result<Motion> fastest(const Motor& motor, Side side, double from_hz, double to_hz) {

@@ -6,6 +6,14 @@
 //
 // F is the friction that hinders, B the part of it that may be counted on when braking (0 unless
 // told otherwise: friction can be less than measured).
+//
+// A jump of the field's speed by dw leaves the rotor behind. It catches up, even undamped, if what
+// it lacks in energy is less than what the torque T sin d does before its last equilibrium (the
+// equal-area criterion of synchronous machines, for a rotor that does not lag yet):
+//
+//     J dw^2 / 2  <=  T / p * (1 + cos s' - s (pi - s'))      s = F / T = sin s'
+//
+// with p = full steps of a turn / 4, the periods of d in a turn.
 #pragma once
 
 #include <optional>
@@ -39,7 +47,8 @@ struct Motor {
   double friction_nm = 0;
   double brake_friction_nm = 0;
   double safety = 1.5;
-  double steps_per_turn = 200;
+  double steps_per_turn = 200;       // microsteps included
+  double full_steps_per_turn = 200;  // more than steps_per_turn count as that many
 };
 
 std::optional<Error> fault_of(const Motor& motor);
@@ -47,8 +56,13 @@ std::optional<Error> fault_of(const Motor& motor);
 enum class Side { kAccel, kDecel };
 
 double torque_at(const Motor& motor, double speed_hz);
+// The greatest one between two speeds. O(log points + points in between).
+double greatest_torque(const Motor& motor, double low_hz, double high_hz);
 // Preconditions of these two: the motor has no fault. May be negative; beyond the curve it is.
 double acceleration_at(const Motor& motor, Side side, double speed_hz);
+// The greatest jump of speed, steps/s, to `speed_hz` (from rest: the start) that the rotor can
+// follow; braking counts on no friction. 0 where friction takes all the torque.
+double greatest_jump_hz(const Motor& motor, Side side, double speed_hz);
 // The fastest motion between two speeds, slow to fast; refused where the motor has no torque left.
 Result<Motion> fastest(const Motor& motor, Side side, double from_hz, double to_hz);
 

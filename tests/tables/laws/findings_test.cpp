@@ -126,5 +126,78 @@ TEST(Findings, TooFastForTheMotorByThirtyPerCent) {
   EXPECT_THAT(fast[0].message, HasSubstr("it will lose steps"));
 }
 
+TEST(Findings, TorqueIsToldInNewtonMetres) {
+  // 200 and 400 steps/s, 3.75 ms apart: 53333 steps/s^2 or 1675.5 rad/s^2, if the first code stands
+  // for a delay of 1 ns less at least.
+  const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {5000, 2500}};
+  const Motor motor{.torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 5e-5, .friction_nm = 0.01};
+  const auto weak = found(content, {.motor = motor});
+  ASSERT_EQ(weak.size(), 1U);
+  EXPECT_EQ(weak[0].rule, "torque");
+  EXPECT_EQ(weak[0].index, 1U);
+  EXPECT_EQ(weak[0].severity, Severity::kWarning);
+  EXPECT_NEAR(weak[0].value, 5e-5 * 1675.5 + 0.01, 1e-4);
+  EXPECT_DOUBLE_EQ(weak[0].limit, 0.1 / 1.5);
+}
+
+// 4 T / (p J) is the square of the greatest jump without friction, in rad/s: 1006.6 steps/s.
+const Motor kLight{.torque = {{0, 0.4}, {9000, 0.4}}, .inertia_kgm2 = 3.2e-5};
+
+TEST(Findings, StartThatTheRotorCannotFollow) {
+  const auto at_start = [](std::uint16_t code) {
+    return found({.name = "t", .time_unit_ns = 1000, .accel = {code}}, {.motor = kLight});
+  };
+  EXPECT_THAT(at_start(1500), IsEmpty());
+  const auto risky = at_start(1000);
+  ASSERT_EQ(risky.size(), 1U);
+  EXPECT_EQ(risky[0].rule, "jump");
+  EXPECT_EQ(risky[0].index, 0U);
+  EXPECT_EQ(risky[0].severity, Severity::kWarning);
+  EXPECT_DOUBLE_EQ(risky[0].value, 1000);
+  EXPECT_NEAR(risky[0].limit, 1006.6 / 1.5, 0.1);
+  const auto hopeless = at_start(990);
+  ASSERT_EQ(hopeless.size(), 1U);
+  EXPECT_EQ(hopeless[0].severity, Severity::kError);
+  EXPECT_THAT(hopeless[0].message, HasSubstr("Put slower codes before it"));
+}
+
+TEST(Findings, MicrostepsStartAsTheirFullSteps) {
+  Motor motor = kLight;
+  motor.steps_per_turn = 3200;
+  motor.torque = {{0, 0.4}, {90000, 0.4}};
+  const auto risky = found({.name = "t", .time_unit_ns = 500, .accel = {125}}, {.motor = motor});
+  ASSERT_EQ(risky.size(), 1U);
+  EXPECT_NEAR(risky[0].limit, 16 * 1006.6 / 1.5, 2);
+}
+
+TEST(Findings, JumpOfACoarseCodeThatTheRotorCannotFollow) {
+  // Rounding up may have made the code of 11, so it is no acceleration for sure; but 2273 to 2500
+  // steps/s come within a step all the same.
+  const TableContent content{.name = "t",
+                             .time_unit_ns = 40'000,
+                             .accel = {250, 100, 60, 40, 30, 24, 20, 17, 15, 14, 13, 12, 11, 10}};
+  Motor motor{.torque = {{0, 3}, {2000, 3}, {2500, 0.1}, {2600, 0.1}}, .inertia_kgm2 = 1e-4};
+  const auto jump = found(content, {.motor = motor});
+  ASSERT_EQ(jump.size(), 1U);
+  EXPECT_EQ(jump[0].rule, "jump");
+  EXPECT_EQ(jump[0].index, 13U);
+  EXPECT_NEAR(jump[0].value, 2500 - 25000 / 11., 1e-6);
+  EXPECT_THAT(jump[0].message, HasSubstr("shorter time unit"));
+}
+
+TEST(Findings, CruiseThatFrictionDoesNotLetThrough) {
+  const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {5000}};
+  Motor motor{.torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 1e-6, .friction_nm = 0.06};
+  EXPECT_THAT(found(content, {.motor = motor}), IsEmpty());
+  motor.friction_nm = 0.08;
+  const auto risky = found(content, {.motor = motor});
+  ASSERT_EQ(risky.size(), 1U);
+  EXPECT_EQ(risky[0].rule, "torque");
+  EXPECT_EQ(risky[0].side, "cruise");
+  EXPECT_EQ(risky[0].severity, Severity::kWarning);
+  motor.friction_nm = 0.11;
+  EXPECT_EQ(found(content, {.motor = motor}).at(0).severity, Severity::kError);
+}
+
 }  // namespace
 }  // namespace bushd::test

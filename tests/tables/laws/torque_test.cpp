@@ -6,7 +6,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "tables/laws/findings.h"
 #include "tables/laws/random_spec.h"
+#include "tables/move_time.h"
 
 namespace bushd::test {
 namespace {
@@ -15,6 +17,7 @@ using tables::laws::Law;
 using tables::laws::make_content;
 using tables::laws::Motor;
 using tables::laws::parse_torque_csv;
+using tables::laws::Side;
 using tables::laws::Spec;
 using testing::HasSubstr;
 
@@ -29,6 +32,7 @@ Motor random_motor(double start_hz, double max_hz) {
   const double a = max_hz * max_hz / random_scale(10, 10000);
   const double torque_nm = a * 2 * kPi / motor.steps_per_turn * motor.inertia_kgm2 * motor.safety;
   motor.friction_nm = torque_nm / motor.safety * random_between(0, 0.15);
+  motor.brake_friction_nm = motor.friction_nm * random_between(0, 1);
   double share = 1;
   const int points = *rc::gen::inRange(1, 6);
   for (int i = 0; i < points; ++i) {
@@ -40,7 +44,7 @@ Motor random_motor(double start_hz, double max_hz) {
 }
 
 // By looking for the stretch of the curve from the top.
-double acceleration(const Motor& motor, double hz) {
+double acceleration(const Motor& motor, double hz, Side side = Side::kAccel) {
   double torque_nm = motor.torque.front().torque_nm;
   for (std::size_t i = motor.torque.size() - 1; i-- > 0;) {
     const auto& low = motor.torque[i];
@@ -50,8 +54,9 @@ double acceleration(const Motor& motor, double hz) {
                                     (high.speed_hz - low.speed_hz);
     break;
   }
-  return (torque_nm / motor.safety - motor.friction_nm) / motor.inertia_kgm2 *
-         motor.steps_per_turn / (2 * kPi);
+  const double friction_nm = side == Side::kAccel ? motor.friction_nm : -motor.brake_friction_nm;
+  return (torque_nm / motor.safety - friction_nm) / motor.inertia_kgm2 * motor.steps_per_turn /
+         (2 * kPi);
 }
 
 Spec random_torque_spec() {
@@ -63,34 +68,76 @@ Spec random_torque_spec() {
   return spec;
 }
 
-// The time to make `steps` steps, always with all the torque there is, up to the maximum speed:
-// dt = dx / v, d(v^2) = 2 a dx, in a thousand parts of a step (midpoint rule).
-double optimal_time_s(const Spec& spec, double steps) {
-  const double dx = 1e-3 * std::min(1.0, steps / 100);
-  double v = spec.start_hz;
+constexpr double kStretches = 50'000;
+
+// The optimum: always all the torque there is, up to the maximum speed. Integrated over the way,
+// d(v^2) = 2 a dx by the midpoint rule. From the slow end of a side on: the speeds at every `dx`.
+std::vector<double> optimal_speeds(const Spec& spec, Side side, double steps, double dx) {
+  std::vector<double> speeds{spec.start_hz};
+  while (static_cast<double>(speeds.size() - 1) * dx < steps) {
+    const double v = speeds.back();
+    const double middle = std::sqrt(v * v + acceleration(*spec.motor, v, side) * dx);
+    const double next = std::sqrt(v * v + 2 * acceleration(*spec.motor, middle, side) * dx);
+    speeds.push_back(std::min(spec.max_hz, next));
+  }
+  return speeds;
+}
+
+double time_s(const std::vector<double>& speeds, double dx) {
   double time_s = 0;
-  for (double x = 0; x < steps; x += dx) {
-    const double a = acceleration(*spec.motor, v);
-    const double middle = std::sqrt(v * v + a * dx);
-    const double next = std::sqrt(v * v + 2 * acceleration(*spec.motor, middle) * dx);
-    const double to = std::min(spec.max_hz, next);
-    time_s += 2 * dx / (v + to);
-    v = to;
+  for (std::size_t i = 0; i + 1 < speeds.size(); ++i) {
+    time_s += 2 * dx / (speeds[i] + speeds[i + 1]);
   }
   return time_s;
 }
 
-TEST(Torque, WithinTwoPerCentOfTheOptimum) {
-  EXPECT_TRUE(rc::check("time of the ramp, and never below the optimum", [] {
+void check_ramp(const Spec& spec, Side side, const std::vector<std::uint16_t>& codes,
+                std::uint32_t time_unit_ns) {
+  if (codes.size() < 3) return;
+  const auto delays = delays_of(codes, time_unit_ns);
+  const double made_s = std::accumulate(delays.begin() + 1, delays.end(), 0.0);
+  const auto steps = static_cast<double>(delays.size() - 1);
+  const double dx = steps / kStretches;
+  const double optimal_s = time_s(optimal_speeds(spec, side, steps, dx), dx);
+  RC_ASSERT(made_s <= 1.02 * optimal_s);
+  RC_ASSERT(made_s >= (1 - 1e-4) * optimal_s);
+}
+
+TEST(Torque, RampsAreWithinTwoPerCentOfTheOptimum) {
+  EXPECT_TRUE(rc::check("time of either ramp, and never below the optimum", [] {
     const Spec spec = random_torque_spec();
     const auto content = make_content(spec);
     RC_ASSERT(content.has_value());
-    RC_PRE(content->accel.size() >= 3U);
-    const auto delays = delays_of(content->accel, content->time_unit_ns);
-    const double made_s = std::accumulate(delays.begin() + 1, delays.end(), 0.0);
-    const double optimal_s = optimal_time_s(spec, static_cast<double>(delays.size() - 1));
+    check_ramp(spec, Side::kAccel, content->accel, content->time_unit_ns);
+    std::vector<std::uint16_t> braking = content->decel.value_or(content->accel);
+    if (content->decel) std::reverse(braking.begin(), braking.end());
+    check_ramp(spec, Side::kDecel, braking, content->time_unit_ns);
+  }));
+}
+
+// The first and the last step are made at the start speed, by the optimum as by the table; what is
+// between them goes up along one curve and down along the other.
+TEST(Torque, WholeMovesAreWithinTwoPerCentOfTheOptimum) {
+  EXPECT_TRUE(rc::check("of any length from 50 steps on", [] {
+    const Spec spec = random_torque_spec();
+    const auto content = make_content(spec);
+    RC_ASSERT(content.has_value());
+    const auto longest = static_cast<std::uint32_t>(4 * content->accel.size());
+    const std::uint32_t steps = *rc::gen::inRange(50U, 51U + longest);
+    const double way = steps - 2;
+    const double dx = way / kStretches;
+    std::vector<double> speeds = optimal_speeds(spec, Side::kAccel, way, dx);
+    const std::vector<double> braking = optimal_speeds(spec, Side::kDecel, way, dx);
+    for (std::size_t i = 0; i < speeds.size(); ++i) {
+      speeds[i] = std::min(speeds[i], braking[braking.size() - 1 - i]);
+    }
+    const double optimal_s = 2 / spec.start_hz + time_s(speeds, dx);
+    const auto table = tables::make(*content);
+    RC_ASSERT(table.has_value());
+    const double made_s =
+        1e-9 * static_cast<double>(tables::move_time((*table)->view(), steps).time_ns);
     RC_ASSERT(made_s <= 1.02 * optimal_s);
-    RC_ASSERT(made_s >= (1 - 1e-4) * optimal_s);
+    RC_ASSERT(made_s >= 0.98 * optimal_s);
   }));
 }
 
@@ -140,6 +187,19 @@ TEST(Torque, NeverSlowerThanTheBestConstantAcceleration) {
       fast_units += i < fast->accel.size() ? fast->accel[i] : fast->accel.back();
       plain_units += plain->accel[i];
       RC_ASSERT(fast_units <= plain_units + i);
+    }
+  }));
+}
+
+TEST(Torque, TheCheckAgrees) {
+  EXPECT_TRUE(rc::check("no step takes more than there is", [] {
+    const Spec spec = random_torque_spec();
+    const auto content = make_content(spec);
+    RC_ASSERT(content.has_value());
+    for (const auto& finding :
+         tables::laws::findings(**tables::make(*content), {.motor = spec.motor})) {
+      RC_LOG() << finding.message << "\n";
+      RC_ASSERT(finding.rule != "torque");
     }
   }));
 }
