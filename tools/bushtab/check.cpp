@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "commands.h"
+#include "finding_text.h"
 #include "json.h"
 #include "open_table.h"
 
@@ -14,13 +15,6 @@ using nlohmann::ordered_json;
 
 bool is_error(const laws::Finding& finding) {
   return finding.severity == laws::Severity::kError;
-}
-
-std::string place(const laws::Finding& finding) {
-  if (finding.side.empty()) return "";
-  return finding.index && finding.side != "cruise"
-             ? fmt::format("{}[{}]: ", finding.side, *finding.index)
-             : finding.side + ": ";
 }
 
 ordered_json to_json(const laws::Finding& finding) {
@@ -38,10 +32,8 @@ ordered_json to_json(const laws::Finding& finding) {
 }  // namespace
 
 int check(const Places& places, const Check& wanted) {
-  auto motor = load_motor(wanted.motor);
-  if (!motor) return refuse(motor.error());
-  laws::Limits limits = wanted.limits;
-  limits.motor = std::move(*motor);
+  const auto limits = load_limits(wanted.limits);
+  if (!limits) return refuse(limits.error());
 
   int result = kDone;
   ordered_json all = ordered_json::array();
@@ -54,15 +46,14 @@ int check(const Places& places, const Check& wanted) {
       all.push_back(entry);
       continue;
     }
-    const auto found = laws::findings(**opened, limits);
+    const auto found = laws::findings(**opened, *limits);
     bool good = true;
     for (const laws::Finding& finding : found) {
       const bool refused = is_error(finding) || wanted.strict;
       good = good && !refused;
       entry["findings"].push_back(to_json(finding));
       if (!wanted.json) {
-        fmt::print("{}: {}: {}: {}{}\n", table, is_error(finding) ? "error" : "warning",
-                   finding.rule, place(finding), finding.message);
+        fmt::print("{}: {}\n", table, text_of(finding));
       }
     }
     entry["good"] = good;

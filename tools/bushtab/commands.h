@@ -30,10 +30,16 @@ int show(const Places& places, const std::string& table, bool steps, bool json);
 // What a command that wrote a table says: its revision; with `json`, what show says of it.
 int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool json);
 
-struct Check {
-  std::vector<std::string> tables;
+// What a table is checked against; `limits.motor` is that of `motor`.
+struct LimitOptions {
   bushd::tables::laws::Limits limits;
   MotorOptions motor;
+};
+bushd::Result<bushd::tables::laws::Limits> load_limits(const LimitOptions& options);
+
+struct Check {
+  std::vector<std::string> tables;
+  LimitOptions limits;
   bool strict = false;  // warnings are refusals too
   bool json = false;
 };
@@ -67,6 +73,13 @@ int change(const Places& places, const std::string& table, bool json, const std:
            const Change& change);
 // In $VISUAL or $EDITOR; what is no table is kept aside, and the old one stays.
 int edit(const Places& places, const std::string& table, bool json);
+// In the terminal; refused if there is none.
+struct Tui {
+  std::string table;
+  LimitOptions limits;
+  std::vector<std::uint32_t> steps;  // of moves whose times are shown
+};
+int tui(const Places& places, const Tui& wanted);
 int copy(const Places& places, const std::string& from, const std::string& to, bool json);
 int log(const Places& places, const std::string& table, bool json);
 int revert(const Places& places, const std::string& table, const std::string& revision, bool json);

@@ -158,6 +158,21 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
   run(edit, [&places, options] { return bushtab::edit(places, options->table, options->json); });
 }
 
+void add_tui(CLI::App& app, const Places& places, const Run& run) {
+  const auto options = std::make_shared<Tui>();
+  CLI::App* tui = app.add_subcommand("tui", "Edits a table in a full-screen editor");
+  tui->add_option("TABLE", options->table, kTable)->required();
+  options->steps = {100, 1000, 10000};
+  tui->add_option("--steps", options->steps,
+                  "Lengths of the moves whose times are shown (default 100 1000 10000)")
+      ->check(refuse_fraction)
+      ->check(CLI::Range(0U, 2147483647U))
+      ->type_name("N");
+  add_limit_options(tui, options->limits);
+  tui->footer("? lists the keys. Each save is a new revision.");
+  run(tui, [&places, options] { return bushtab::tui(places, *options); });
+}
+
 void add_history_commands(CLI::App& app, const Places& places, const Run& run) {
   struct Options {
     std::string table;
@@ -250,6 +265,7 @@ void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
 void add_edit_options(CLI::App& app, const Places& places, const Run& run) {
   add_code_commands(app, places, run);
   add_whole_commands(app, places, run);
+  add_tui(app, places, run);
   add_history_commands(app, places, run);
   add_bushd_commands(app, places, run);
 }

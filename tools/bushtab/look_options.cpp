@@ -36,37 +36,7 @@ void add_check(CLI::App& app, const Places& places, const Run& run) {
   check->add_option("TABLE", options->tables, "Tables' files or names")->required();
   check->add_flag("--strict", options->strict, "Warnings are refusals too (exit code 1)");
   check->add_flag("--json", options->json, "As JSON");
-  auto& limits = options->limits;
-  add_quantity(
-      check, "--start", Quantity::kSpeed, [&](double hz) { limits.start_hz = hz; },
-      "The fastest that the motor can start and stop at");
-  add_quantity(
-      check, "--max", Quantity::kSpeed, [&](double hz) { limits.max_hz = hz; },
-      "The fastest that it may run");
-  add_quantity(
-      check, "--acceleration", Quantity::kAcceleration,
-      [&](double value) { limits.acceleration = value; }, "The greatest acceleration");
-  check
-      ->add_option("--speed-ratio", limits.speed_ratio,
-                   "The greatest change of speed from one step to the next (default 2, with "
-                   "--torque any; 0: any)")
-      ->type_name("RATIO");
-  check->add_option("--code-bits", limits.code_bits, "8: codes must be those of BUSHD-2, 10..250")
-      ->check(CLI::IsMember({8, 16}))
-      ->type_name("8|16");
-  check->add_option("--mcu-codes", limits.mcu_codes, "Table memory of the MCU, in codes")
-      ->check(refuse_fraction)
-      ->type_name("N");
-  check
-      ->add_option_function<std::uint32_t>(
-          "--tick-us", [&](const std::uint32_t& us) { limits.tick_ns = us * 1000; },
-          "Tick of the bus")
-      ->check(refuse_fraction)
-      ->check(CLI::Range(BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000));
-  check->add_option("--slots", limits.slots, "Slots of a tick, 128..256 (with --tick-us)")
-      ->check(refuse_fraction)
-      ->check(CLI::Range(128U, 256U));
-  add_motor_options(check, options->motor);
+  add_limit_options(check, options->limits);
   run(check, [&places, options] { return bushtab::check(places, *options); });
 }
 
@@ -171,6 +141,40 @@ std::string refuse_fraction(const std::string& value) {
   const bool whole = value.size() > first_digit &&
                      value.find_first_not_of("0123456789", first_digit) == std::string::npos;
   return whole ? std::string() : value + " is not a whole number";
+}
+
+void add_limit_options(CLI::App* command, LimitOptions& options) {
+  auto& limits = options.limits;
+  add_quantity(
+      command, "--start", Quantity::kSpeed, [&](double hz) { limits.start_hz = hz; },
+      "The fastest that the motor can start and stop at");
+  add_quantity(
+      command, "--max", Quantity::kSpeed, [&](double hz) { limits.max_hz = hz; },
+      "The fastest that it may run");
+  add_quantity(
+      command, "--acceleration", Quantity::kAcceleration,
+      [&](double value) { limits.acceleration = value; }, "The greatest acceleration");
+  command
+      ->add_option("--speed-ratio", limits.speed_ratio,
+                   "The greatest change of speed from one step to the next (default 2, with "
+                   "--torque any; 0: any)")
+      ->type_name("RATIO");
+  command->add_option("--code-bits", limits.code_bits, "8: codes must be those of BUSHD-2, 10..250")
+      ->check(CLI::IsMember({8, 16}))
+      ->type_name("8|16");
+  command->add_option("--mcu-codes", limits.mcu_codes, "Table memory of the MCU, in codes")
+      ->check(refuse_fraction)
+      ->type_name("N");
+  command
+      ->add_option_function<std::uint32_t>(
+          "--tick-us", [&](const std::uint32_t& us) { limits.tick_ns = us * 1000; },
+          "Tick of the bus")
+      ->check(refuse_fraction)
+      ->check(CLI::Range(BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000));
+  command->add_option("--slots", limits.slots, "Slots of a tick, 128..256 (with --tick-us)")
+      ->check(refuse_fraction)
+      ->check(CLI::Range(128U, 256U));
+  add_motor_options(command, options.motor);
 }
 
 void add_look_options(CLI::App& app, const Places& places, const Run& run) {

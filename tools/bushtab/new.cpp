@@ -21,6 +21,14 @@ bushd::Result<std::optional<tables::laws::Motor>> load_motor(const MotorOptions&
   return motor;
 }
 
+bushd::Result<tables::laws::Limits> load_limits(const LimitOptions& options) {
+  auto motor = load_motor(options.motor);
+  if (!motor) return bushd::fail(motor.error());
+  tables::laws::Limits limits = options.limits;
+  limits.motor = std::move(*motor);
+  return limits;
+}
+
 int make_new(const Places& places, const New& wanted) {
   auto home = home_of(places, wanted.table);
   if (!home) return refuse(home.error());

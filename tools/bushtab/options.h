@@ -21,6 +21,8 @@ void add_new_options(CLI::App& app, const Places& places, const Run& run);
 
 void add_motor_options(CLI::App* command, MotorOptions& motor);
 
+void add_limit_options(CLI::App* command, LimitOptions& limits);
+
 // An option whose value has a unit.
 CLI::Option* add_quantity(CLI::App* command, const std::string& name,
                           bushd::tables::laws::Quantity quantity, std::function<void(double)> set,

@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 TABLE = 'name = "t"\ntime_unit_ns = 1000\naccel = [90, 70, 50]\n'
-PICTURES_ONLY = {"plot"}
+PICTURES_ONLY = {"plot", "tui"}
 
 
 class Json(unittest.TestCase):
