@@ -65,7 +65,7 @@ TEST(EditorView, ShowsCurveCodesTimesAndCheck) {
 
 TEST(EditorView, ShowsWhatTheCheckFinds) {
   TableEditor editor({.name = "t", .time_unit_ns = 1000, .accel = {90, 30}}, 1,
-                     {.limits = {.max_hz = 20000}});
+                     watching({}, 20000));
   const std::string text = screen(editor, {30, 80, true});
   EXPECT_THAT(text, HasSubstr("\nerror: max_speed: "));
   EXPECT_THAT(text, HasSubstr("\nwarning: speed_ratio: accel[1]: "));
@@ -126,7 +126,8 @@ TEST(EditorView, LongMessagesAreWrapped) {
 }
 
 TEST(EditorView, WithoutUnicodeAllIsAscii) {
-  TableEditor editor({.name = "стол", .time_unit_ns = 1000, .accel = {90, 70, 50}}, 1, {});
+  TableEditor editor({.name = "стол", .time_unit_ns = 1000, .accel = {90, 70, 50}}, 1,
+                     watching({}));
   type(editor, std::u32string{key::kRight});
   EXPECT_THAT(lines(editor, {24, 80, true})[0], StartsWith(" стол"));
   const CellGrid grid = render(editor, {24, 80, false});
@@ -152,7 +153,7 @@ TEST(EditorView, HelpListsEveryKeyAndGoesAway) {
 
 TEST(EditorViewProperty, FitsEveryWindow) {
   EXPECT_TRUE(rc::check("random tables, keys and windows", [] {
-    TableEditor editor(bushd::test::random_case(1000).content, 1, {.steps = {100, 1000}});
+    TableEditor editor(bushd::test::random_case(1000).content, 1, watching({100, 1000}));
     const std::u32string keys = std::u32string(U"> z-m?1gq") + key::kRight + key::kPageDown;
     for (int i = random_in(0, 30); i > 0; --i) {
       editor.press(keys[static_cast<std::size_t>(random_in(0, static_cast<int>(keys.size()) - 1))]);

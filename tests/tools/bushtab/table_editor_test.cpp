@@ -303,7 +303,7 @@ TEST(TableEditorQuit, InterruptLeavesAPromptOrAsks) {
 
 TEST(TableEditorLive, TimesAndFindingsAreThoseOfTheCodes) {
   TableEditor editor({.name = "t", .time_unit_ns = 1000, .accel = {90, 70, 50}}, 1,
-                     {.limits = {.max_hz = 20100}, .steps = {5}});
+                     watching({5}, 20100));
   EXPECT_EQ(editor.times().at(0).move.time_ns, 370'000u);
   EXPECT_THAT(editor.findings(), IsEmpty());
   type(editor, U"g2" + kEnter + U"-");
@@ -325,7 +325,7 @@ TEST(TableEditorNote, TellsWhatChanged) {
 TEST(TableEditorProperty, ContentIsAlwaysATableAndUndoLeadsBack) {
   EXPECT_TRUE(rc::check("random keys", [] {
     const TableContent content = bushd::test::random_case(1000).content;
-    TableEditor editor(content, 1, {.steps = {100}});
+    TableEditor editor(content, 1, watching({100}));
     const std::u32string keys = U"0123456789+-<>%gidmrz cd.\x08\x1b\n\n\n\n\t" +
                                 std::u32string{key::kLeft,     key::kRight, key::kUp,  key::kDown,
                                                key::kPageDown, key::kHome,  key::kEnd, key::kRight};

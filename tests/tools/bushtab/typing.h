@@ -1,7 +1,11 @@
 // Keys as they are typed, for tests of the editor.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "tools/bushtab/table_editor.h"
 
@@ -13,6 +17,14 @@ inline TableEditor::Wish type(TableEditor& editor, std::u32string_view keys) {
   return wish;
 }
 
+inline TableEditor::Watched watching(std::vector<std::uint32_t> steps,
+                                     std::optional<double> max_hz = {}) {
+  TableEditor::Watched watched;
+  watched.limits.max_hz = max_hz;
+  watched.steps = std::move(steps);
+  return watched;
+}
+
 inline TableEditor editor_of(std::vector<std::uint16_t> accel,
                              std::optional<std::vector<std::uint16_t>> decel = {},
                              std::optional<std::uint16_t> cruise = {}) {
@@ -21,7 +33,7 @@ inline TableEditor editor_of(std::vector<std::uint16_t> accel,
                       .accel = std::move(accel),
                       .decel = std::move(decel),
                       .cruise = cruise},
-                     7, {.steps = {5}});
+                     7, watching({5}));
 }
 
 }  // namespace bushtab::test
