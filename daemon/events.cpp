@@ -130,6 +130,8 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
     if (!moving) end_faulty_motor(index, mcu, view.report.faults);
     return;
   }
+  // It has not told of the emergency stop yet, with which its plan was given up.
+  if (stopping_all()) return;
   if (const auto change = motor.axis.executed(view.tick)) log_change(motor, *change);
   const std::int64_t planned = motor.axis.executed_steps();
   if (!motor.wrong && motor.position_steps != planned) {

@@ -112,11 +112,12 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
   bushd_mcu_update_state(mcu);
 }
 
-// Ticks tell when they are for; requests do not. One that a line or an adapter has kept back, or
-// made twice, must not undo what was asked later: a position, or drivers that were switched off.
-static bool changes_the_mcu(uint8_t type) {
+// What a line or an adapter has kept back, or made twice, must not undo what was asked later: a
+// position, drivers that were switched off, a start that was planned anew. Emergency stops always
+// count, marks have names of their own, and questions change nothing.
+static bool counts_in_order_only(uint8_t type) {
   return (type >= BUSHD_MSG_CONFIGURE && type <= BUSHD_MSG_SET_POSITION) ||
-         type == BUSHD_MSG_SET_ADDRESS;
+         (type >= BUSHD_MSG_TICKS && type <= BUSHD_MSG_TABLE_RUN) || type == BUSHD_MSG_SET_ADDRESS;
 }
 
 // The master counts its frames in their tags. So one whose tag is the newest or one of those before
@@ -147,7 +148,7 @@ void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, uint32_t time_in_tick_ns) {
   if (frame.type & BUSHD_TYPE_REPLY) return;
   const bool stale = is_stale(mcu, &frame);
   if (frame.address != mcu->config.address && frame.address != BUSHD_ADDRESS_BROADCAST) return;
-  if (stale && changes_the_mcu(frame.type)) {
+  if (stale && counts_in_order_only(frame.type)) {
     bushd_mcu_reject(mcu, BUSHD_E_LATE);
     return;
   }

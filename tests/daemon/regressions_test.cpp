@@ -197,5 +197,25 @@ TEST_P(Regressions, FollowersOfALostStopComeAgainAfterTheNext) {
   EXPECT_FALSE(followers.empty());
 }
 
+// An emergency stop gives up all plans, a stop that was lost on its way among them. A report that
+// was made before the MCU heard of the emergency shows steps that no plan leads to any more.
+TEST_P(Regressions, EmergencyStopWhileALostStopIsNotKnownToBeLost) {
+  for (int later_ms = 0; later_ms < 40; ++later_ms) {
+    Lab lab(hall(1, 1, every_tick(GetParam())));
+    lab.connect();
+    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+    lab.run_for(1.3);
+    lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
+    lab.send(command_t::STOP, {"m01"});
+    lab.run_for(0.045);
+    lab.on_send = nullptr;
+    lab.run_for(later_ms * 1e-3);
+    lab.send(command_t::EMERGENCY_STOP, {});
+    const reply_t result = lab.wait(move);
+    ASSERT_EQ(result.result, "stopped") << later_ms << " ms: " << result.reason;
+    ASSERT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << later_ms << " ms";
+  }
+}
+
 }  // namespace
 }  // namespace bushd::test

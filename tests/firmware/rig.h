@@ -77,6 +77,7 @@ class Rig {
   // The only answer since the last call, if any.
   std::optional<Answer> answer();
   const Bytes& last_sent() const { return last_sent_; }
+  std::uint8_t last_tag() const { return tag_; }
   // Sends a request to this MCU and returns the status that it acknowledges with.
   bushd_status request(std::uint8_t type, const Bytes& payload);
   bushd_report poll();

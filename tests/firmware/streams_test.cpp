@@ -183,6 +183,21 @@ TEST_P(Streams, FramesOfAnotherEpochAreRefused) {
   }
 }
 
+// A start that is kept back on its way may have been planned anew when it comes.
+TEST_P(Streams, FramesThatWereOvertakenAreRefused) {
+  Bytes kept_back(BUSHD_FRAME_MAX_WIRE);
+  const Bytes payload = rig.encode(ones(kStart, rig.first_open() + 4, 3, 0));
+  rig.poll();
+  kept_back.resize(bushd_frame_encode(rig.options().address, BUSHD_MSG_TICKS, rig.last_tag(),
+                                      payload.data(), payload.size(), kept_back.data()));
+  rig.poll();
+  rig.feed(kept_back);
+  EXPECT_EQ(rig.poll().last_rejection, BUSHD_E_LATE);
+  EXPECT_EQ(rig.take(ones(kStart, rig.first_open() + 4, 2, 0)), BUSHD_OK) << "planned anew";
+  rig.feed(kept_back);
+  expect_position(0, 2);
+}
+
 TEST_P(Streams, MovingBitsFollowTheLastTickOut) {
   const std::uint32_t start = rig.first_open() + 2;
   ASSERT_EQ(rig.take(ones(kStart, start, 3, 0)), BUSHD_OK);
