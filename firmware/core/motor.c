@@ -212,10 +212,10 @@ typedef struct rest_of_stream {
   uint32_t until;  // the first tick that is not known to be its
   bool goes_on;    // beyond that
   bool moves;      // makes a step or part of one from `next` on
-  uint16_t steps;  // whole ones in the next WINDOW ticks
+  int16_t steps;   // whole ones in its first TICKS_AHEAD ticks
 } rest_of_stream;
 
-enum { WINDOW = 4 };
+enum { TICKS_AHEAD = 2 };
 
 static rest_of_stream rest_of(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
@@ -229,7 +229,7 @@ static rest_of_stream rest_of(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
     const int16_t queued = *queue_at((bushd_mcu*)mcu, tick, m);
     if (queued == 0) continue;
     rest.moves = true;
-    if (tick - next < WINDOW) rest.steps += (uint16_t)((queued < 0 ? -queued : queued) / 256);
+    if (tick - next < TICKS_AHEAD) rest.steps = (int16_t)(rest.steps + queued / 256);
   }
   return rest;
 }
@@ -243,17 +243,21 @@ static uint16_t delay_for(const bushd_mcu* mcu, const bushd_mcu_motor* motor, ui
 
 // The delay of the running step of a stream. In the fine format the last displacement tells it. In
 // the coarse one a tick of one step may be of any speed from a step in two ticks to two in one, and
-// a motor that was taken for too slow a one would stop all but dead: so it is the least delay that
-// the ticks to come may have, or that which is told for their end.
-static uint16_t stream_delay(const bushd_mcu* mcu, const bushd_mcu_motor* motor,
-                             const rest_of_stream* rest, uint32_t next) {
+// a motor that was taken for too slow a one would stop all but dead, for too fast a one go on
+// accelerating: so it is the least delay that the ticks around this moment may have, as many before
+// as after it, or that which is told for their end.
+static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stream* rest,
+                             uint32_t next) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
   if (mcu->format == BUSHD_FORMAT_FINE) {
     const uint64_t time_ns = (uint64_t)mcu->tick_ns * ((uint32_t)motor->still_ticks + 1u);
     return motor->displacement == 0 ? UINT16_MAX
                                     : delay_for(mcu, motor, time_ns, motor->displacement);
   }
-  if (rest->goes_on && ticks_after(rest->until, next) < WINDOW) return motor->delay;
-  return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * WINDOW / (rest->steps + 1u), 256);
+  if (rest->goes_on && ticks_after(rest->until, next) < TICKS_AHEAD) return motor->delay;
+  const int32_t steps = rest->steps + mcu->plane[0].steps[m] + mcu->plane[1].steps[m];
+  const uint32_t most = (uint32_t)(steps < 0 ? -steps : steps) + 1u;
+  return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * (2u * TICKS_AHEAD) / most, 256);
 }
 
 static void stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how) {
@@ -264,7 +268,7 @@ static void stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how) {
   const bool at_rest =
       !motor->begun || !rest.moves ||
       (ticks_after(next, motor->rest_from) >= 0 && ticks_after(next, motor->start_tick) <= 0);
-  const uint16_t delay = at_rest || in_run ? 0 : stream_delay(mcu, motor, &rest, next);
+  const uint16_t delay = at_rest || in_run ? 0 : stream_delay(mcu, m, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
   if (how == BUSHD_CUT) {
     if (motor->mode != BUSHD_MCU_STREAM || !at_rest) motor->remainder = 0;

@@ -33,7 +33,8 @@ class Emergency : public Streams {
     return payload;
   }
   // The delay of the step that runs at the end of the first `ticks` of a plan, as the MCU takes it:
-  // from the last displacement, or in the coarse format from the steps of the next four ticks.
+  // from the last displacement, or in the coarse format from the steps of the two ticks before and
+  // after.
   std::uint16_t delay_of(const Plan& moves, std::size_t ticks) const {
     std::uint64_t time_ns = Rig::kTickNs;
     std::uint64_t share = 0;
@@ -43,7 +44,8 @@ class Emergency : public Streams {
       time_ns *= still;
       share = magnitude(moves, ticks - still);
     } else {
-      time_ns = time_ns * 4 / (steps_in(moves, ticks, ticks + 4) + 1);
+      time_ns =
+          time_ns * 4 / (steps_in(moves, ticks - std::min<std::size_t>(ticks, 2), ticks + 2) + 1);
       share = 256;
     }
     const std::uint64_t d = share * law.unit_ns;
