@@ -208,6 +208,7 @@ class Master {
   // What MCUs' reports say of the last mark.
   struct MarkSurvey {
     bool listening = false;  // somebody would hear a SYNC
+    bool all_heard = true;   // of those, each has reported
     bool waiting = false;    // an MCU does not know the time yet
     bool anybody = false;    // an MCU knows it
     bool all_asked = true;   // all who know it have reported since the mark
@@ -308,6 +309,7 @@ class Master {
   // master_sync.cpp
   std::int64_t mark_difference_ns(const bushd_report& a, const bushd_report& b) const;
   MarkSurvey survey_marks() const;
+  void survey_mark(const Mcu& mcu, MarkSurvey& survey) const;
   void note_offsets(const bushd_report* reference);
   bool send_due_sync(std::int64_t now_us);
 

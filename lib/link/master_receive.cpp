@@ -10,7 +10,7 @@ namespace bushd::link {
 namespace {
 
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
-constexpr std::int64_t kClockJumpUs = 400'000;  // more than any latency: the bus's time began anew
+constexpr std::int64_t kClockJumpUs = 400'000;  // more than any latency: it is another time
 // A master says SYNC at least as often; two of them in a row may be lost.
 constexpr std::int64_t kOtherMasterUs = 3 * kSyncPeriodUs;
 
@@ -179,19 +179,28 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     go_offline(index, "restarted", now_us);
     return;
   }
-  const bool in_step =
-      (report.flags & BUSHD_FLAG_SYNCED) != 0 && (report.flags & BUSHD_FLAG_MARK) != 0;
+  bool in_step = (report.flags & BUSHD_FLAG_SYNCED) != 0 && (report.flags & BUSHD_FLAG_MARK) != 0;
   view.report = report;
   view.reported = true;
   mcu.asked_since_mark = true;
   note_health(mcu, report);
   view.tick = clock_.unwrap(report.tick, now_us);
-  if (in_step) {
+  // An answer that lay unread while this program slept does not tell what time it is.
+  if (in_step && now_us <= exchange_->timeout_us) {
     if (clock_.valid() && std::abs(view.tick - clock_.tick_at(now_us)) > ticks_in(kClockJumpUs)) {
-      clock_.reset();
-      view.tick = report.tick;
+      // Moves are planned in the bus's time: who counts otherwise has to be told it before it gets
+      // any, and of those it has got nothing holds.
+      if (view.phase == McuPhase::kOnline) {
+        go_offline(index, "counts other ticks than before", now_us);
+        return;
+      }
+      in_step = std::none_of(mcus_.begin(), mcus_.end(), [](const Mcu& other) {
+        return other.view.phase == McuPhase::kOnline;
+      });
+      if (in_step) clock_.reset();
+      view.tick = clock_.unwrap(report.tick, now_us);
     }
-    clock_.sample(view.tick, report.tick_ns + line_us * 1000, now_us);
+    if (in_step) clock_.sample(view.tick, report.tick_ns + line_us * 1000, now_us);
   }
   for (unsigned m = 0; m < report.motor_count; ++m) {
     // Never before the present tick, whatever the line says: ticks executed cannot be asked for

@@ -4,7 +4,8 @@
 // repetition of the frame instead: its mark of that name is another one. If its time were passed
 // on, the others would be put out of step with the bus. So an answer counts only if all MCUs that
 // are in step agree about the mark, and have been asked since. If they disagree about the next mark
-// too, it is their clocks and not the mark; then the first one's time is that of the bus.
+// too, it is their clocks and not the mark; then the first one's time is that of the bus, of those
+// that have moves if there are any.
 #include <cstdlib>
 
 #include "link/master.h"
@@ -27,25 +28,31 @@ std::int64_t Master::mark_difference_ns(const bushd_report& a, const bushd_repor
 
 Master::MarkSurvey Master::survey_marks() const {
   MarkSurvey survey;
-  for (const Mcu& mcu : mcus_) {
-    if (mcu.view.phase == McuPhase::kOffline) continue;
-    survey.listening = true;
-    if (!mcu.view.reported) continue;
-    const bushd_report& report = mcu.view.report;
-    const bool synced = (report.flags & BUSHD_FLAG_SYNCED) != 0;
-    const bool marked = (report.flags & BUSHD_FLAG_MARK) != 0;
-    survey.anybody |= synced;
-    survey.waiting |= !synced || !marked;
-    if (!synced) continue;
-    survey.all_asked &= mcu.asked_since_mark;
-    if (!marked || mark_ != report.mark || report.mark_ns >= setup_.tick_ns) continue;
-    if (survey.reference == nullptr) {
-      survey.reference = &report;
-    } else if (std::abs(mark_difference_ns(report, *survey.reference)) > kAgreementNs) {
-      survey.agreed = false;
+  for (const McuPhase phase : {McuPhase::kOnline, McuPhase::kConnecting}) {
+    for (const Mcu& mcu : mcus_) {
+      if (mcu.view.phase == phase) survey_mark(mcu, survey);
     }
   }
   return survey;
+}
+
+void Master::survey_mark(const Mcu& mcu, MarkSurvey& survey) const {
+  survey.listening = true;
+  survey.all_heard &= mcu.view.reported;
+  if (!mcu.view.reported) return;
+  const bushd_report& report = mcu.view.report;
+  const bool synced = (report.flags & BUSHD_FLAG_SYNCED) != 0;
+  const bool marked = (report.flags & BUSHD_FLAG_MARK) != 0;
+  survey.anybody |= synced;
+  survey.waiting |= !synced || !marked;
+  if (!synced) return;
+  survey.all_asked &= mcu.asked_since_mark;
+  if (!marked || mark_ != report.mark || report.mark_ns >= setup_.tick_ns) return;
+  if (survey.reference == nullptr) {
+    survey.reference = &report;
+  } else if (std::abs(mark_difference_ns(report, *survey.reference)) > kAgreementNs) {
+    survey.agreed = false;
+  }
 }
 
 void Master::note_offsets(const bushd_report* reference) {
@@ -77,7 +84,7 @@ bool Master::send_due_sync(std::int64_t now_us) {
     sync.follows = true;
     sync.mark_tick = survey.reference->mark_tick;
     sync.mark_ns = survey.reference->mark_ns;
-  } else if (!survey.anybody && mark_) {
+  } else if (survey.all_heard && !survey.anybody && mark_) {
     // Nobody on the bus knows the time: it begins at the mark before.
     sync.follows = true;
     clock_.reset();

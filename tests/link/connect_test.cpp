@@ -61,6 +61,55 @@ TEST(Connect, LatecomerTakesTheTimeOfTheBus) {
   EXPECT_NEAR(static_cast<double>(bus.slaves[1].zero_us), static_cast<double>(zero), 2);
 }
 
+// Two MCUs may have got different times while each was alone with another master.
+TEST(Connect, LatecomerWithATimeOfItsOwnIsToldThatOfTheBusFirst) {
+  for (const std::size_t late : {0u, 1u}) {
+    FakeBus bus(2, 2);
+    bus.connect();
+    const std::size_t there = 1 - late;
+    bus.slaves[late].answers = false;
+    ASSERT_TRUE(bus.run_until([&] { return !bus.online(late); }));
+    bus.slaves[late].zero_us -= 100'000'000;
+    const std::int64_t zero = bus.slaves[there].zero_us;
+    bus.slaves[late].answers = true;
+    for (int waits = 0; waits < 1000 && !bus.online(late); ++waits) {
+      bus.run_for(5'000);
+      ASSERT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(there), 1);
+    }
+    EXPECT_TRUE(bus.online(late)) << bus.master->view(late).detail;
+    EXPECT_EQ(bus.slaves[there].zero_us, zero);
+    EXPECT_NEAR(static_cast<double>(bus.slaves[late].zero_us), static_cast<double>(zero), 2);
+    EXPECT_TRUE(bus.online(there));
+  }
+}
+
+// Ticks of moves that it was given before mean nothing any more.
+TEST(Connect, TimeThatJumpsIsOfflineUntilItIsToldAgain) {
+  FakeBus bus(1, 2);
+  bus.connect();
+  bus.slaves[0].zero_us -= 1'000'000;
+  EXPECT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kOffline) == 1; }, 200'000));
+  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("other ticks"));
+  ASSERT_TRUE(bus.run_until([&] { return bus.online(0); }));
+  EXPECT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(0), 1);
+}
+
+// Whoever is silent may know the time all the same.
+TEST(Connect, TimeDoesNotBeginAnewBeforeAllHaveReported) {
+  FakeBus bus(1, 2);
+  bus.connect();
+  const std::int64_t zero = bus.slaves[0].zero_us;
+  bus.slaves[0].loses = [](const Heard& heard) { return heard.type != BUSHD_MSG_SYNC; };
+  ASSERT_TRUE(bus.run_until([&] { return !bus.online(0); }));
+  int polls = 0;
+  bus.slaves[0].loses = [&](const Heard& heard) {
+    return heard.type == BUSHD_MSG_POLL && ++polls <= 2;
+  };
+  ASSERT_TRUE(bus.run_until([&] { return bus.online(0); }));
+  EXPECT_GT(polls, 2);
+  EXPECT_EQ(bus.slaves[0].zero_us, zero);
+}
+
 // An MCU that missed a SYNC and heard a repetition of it knows another mark by that name.
 TEST(Connect, MarkThatMcusDisagreeAboutIsNotPassedOn) {
   FakeBus bus(2, 2);

@@ -153,10 +153,12 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
       bushd_sync sync;
       ASSERT_EQ(bushd_decode_sync(p.data(), p.size(), &sync), BUSHD_OK);
       const bool marked = (slave.flags & BUSHD_FLAG_MARK) && sync.known_mark == slave.mark;
-      // Its clock is exact: once in step it stays so.
-      if (sync.follows && marked && (slave.flags & BUSHD_FLAG_SYNCED) == 0) {
-        slave.zero_us =
-            slave.mark_us - (std::int64_t{sync.mark_tick} * setup.tick_ns + sync.mark_ns) / 1000;
+      const std::int64_t zero_us =
+          slave.mark_us - (std::int64_t{sync.mark_tick} * setup.tick_ns + sync.mark_ns) / 1000;
+      // Its clock is exact: once in step it stays so, unless it is told another time.
+      const bool off = std::abs(zero_us - slave.zero_us) > setup.tick_ns / 2000;
+      if (sync.follows && marked && ((slave.flags & BUSHD_FLAG_SYNCED) == 0 || off)) {
+        slave.zero_us = zero_us;
         slave.flags |= BUSHD_FLAG_SYNCED;
         slave.known_until.fill(tick_of(slave) + 2);
       }
