@@ -19,6 +19,10 @@ bool is_move(std::int8_t kind) {
   return kind == command_t::MOVE_RELATIVE || kind == command_t::MOVE_ABSOLUTE;
 }
 
+bool is_table_change(std::int8_t kind) {
+  return kind == command_t::USE_TABLE || kind == command_t::RELOAD_TABLES;
+}
+
 bool valid_client_id(const std::string& id) {
   return !id.empty() && id.size() <= kMaxClientId &&
          std::all_of(id.begin(), id.end(), [](unsigned char c) { return c > 0x20 && c < 0x7F; });
@@ -51,6 +55,8 @@ void Core::command(std::int64_t now_us, const command_t& command) {
   }
   if (is_move(command.kind)) {
     start_move(now_us, command);
+  } else if (is_table_change(command.kind)) {
+    start_table_change(client, command.kind, command.group, command.table);
   } else {
     start_pending(now_us, command);
   }
@@ -65,9 +71,10 @@ std::optional<std::size_t> Core::find_motor(const std::string& name) const {
 std::string Core::refuse(const command_t& command) const {
   // Whatever else is wrong with the command: it is for all motors, and no time to be particular.
   if (command.kind == command_t::EMERGENCY_STOP) return {};
-  if (command.kind < command_t::MOVE_RELATIVE || command.kind > command_t::CLEAR_FAULTS) {
+  if (command.kind < command_t::MOVE_RELATIVE || command.kind > command_t::RELOAD_TABLES) {
     return "there is no command kind " + std::to_string(command.kind);
   }
+  if (is_table_change(command.kind)) return refuse_table_change(command);
   if (command.steps.size() != command.motors.size()) return "motors and steps differ in number";
   std::set<std::string> seen;
   for (const std::string& name : command.motors) {
@@ -127,6 +134,12 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
   const Motor& motor = motors_[index];
   const Mcu& mcu = mcus_[motor.mcu];
   const link::McuView& view = view_of(mcu);
+  // One that moves keeps its table.
+  const TableChange* change = motor.axis.busy() ? nullptr : changing(motor.mcu);
+  if (change != nullptr) {
+    return "MCU " + mcu.config->id + " is about to get another table, for group " +
+           config_.groups[change->parts.front().group].name + "; wait for that result";
+  }
   if (view.phase != link::McuPhase::kOnline) {
     return "MCU " + mcu.config->id + " is offline: " + view.detail;
   }
@@ -208,7 +221,7 @@ void Core::start_move(std::int64_t now_us, const command_t& command) {
   for (const std::size_t motor : moving) take_over(motor, client);
   OpenMove open{.client = client, .tables = {}};
   for (const std::size_t motor : motors) {
-    open.tables.push_back(tables_[motors_[motor].config->group.value]);
+    open.tables.push_back(service_[motors_[motor].config->group.value].table);
   }
   open_moves_.emplace(book_.open(motors), std::move(open));
   for (std::size_t i = 0; i < motors.size(); ++i) {
@@ -249,6 +262,7 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
                                {"address", mcu.config->address.value},
                                {"output", motor.config->output.value},
                                {"table_file", table_of(*motor.config).path()},
+                               {"table_sha256", table_of(*motor.config).content_hash()},
                                {"tick_ns", bus.tick_ns()},
                                {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
                                {"moves", by_table ? "table" : "stream"},

@@ -1,7 +1,6 @@
 #include "daemon/core.h"
 
 #include <algorithm>
-#include <set>
 
 #include "daemon/bus.h"
 
@@ -41,7 +40,9 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       outputs_(outputs),
       // The log of moves is appended to: its ids must not begin anew with every daemon.
       last_log_id_(static_cast<std::uint64_t>(outputs.wall_clock_us())) {
-  for (const config::Group& group : config.groups) tables_.push_back(group.table);
+  for (const config::Group& group : config.groups) {
+    service_.push_back({.table = group.table, .wanted = group.table_name});
+  }
   for (const config::Mcu& mcu : config.mcus) {
     Mcu entry{.config = &mcu, .bus = mcu.bus.value, .in_bus = 0, .boot_number = {}};
     entry.motor_of.fill(-1);
@@ -68,7 +69,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       if (mcus_[m].bus != b) continue;
       mcus_[m].in_bus = members.size();
       members.push_back(m);
-      setup.mcus.push_back(setup_of(mcus_[m]));
+      setup.mcus.push_back(setup_of(mcus_[m], service_));
     }
     buses_.push_back(std::make_unique<Bus>(std::move(setup), *this));
     buses_.back()->mcus = std::move(members);
@@ -78,60 +79,6 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
 motion::Axis Core::new_axis(const config::Motor& motor) const {
   const config::Bus& bus = config_.bus_of(motor);
   return {table_of(motor).view(), bus.tick_ns(), bus.format};
-}
-
-link::McuSetup Core::setup_of(const Mcu& mcu) const {
-  link::McuSetup setup{.address = mcu.config->address.value, .tables = {}};
-  setup.table_of_motor.fill(-1);
-  for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
-    const int motor = mcu.motor_of[output];
-    if (motor < 0) continue;
-    const tables::Table& table = table_of(config_.motors[static_cast<std::size_t>(motor)]);
-    const auto found =
-        std::find_if(setup.tables.begin(), setup.tables.end(),
-                     [&table](const link::TableRef& ref) { return ref.table == &table.view(); });
-    setup.table_of_motor[output] = static_cast<int>(found - setup.tables.begin());
-    if (found == setup.tables.end()) {
-      setup.tables.push_back({.table = &table.view(), .revision = table.revision()});
-    }
-  }
-  return setup;
-}
-
-Result<void> Core::reload_tables(const config::Config& fresh) {
-  if (!config::same_but_for_tables(config_, fresh)) {
-    return fail("more than tables has changed; restart the daemon to take it over");
-  }
-  std::set<std::size_t> changed_mcus;
-  std::set<std::size_t> changed_groups;
-  for (std::size_t m = 0; m < motors_.size(); ++m) {
-    const config::GroupIndex group = motors_[m].config->group;
-    const tables::Table& before = *tables_[group.value];
-    const tables::Table& after = *fresh.groups[group.value].table;
-    if (before.same_content(after) && before.revision() == after.revision()) continue;
-    changed_groups.insert(group.value);
-    changed_mcus.insert(motors_[m].mcu);
-  }
-  for (const Motor& motor : motors_) {
-    if (motor.axis.busy() && changed_mcus.contains(motor.mcu)) {
-      return fail("motor " + motor.config->name + " moves on MCU " + mcus_[motor.mcu].config->id +
-                  ", which would need a changed table; reload when it is at rest");
-    }
-  }
-  for (const std::size_t group : changed_groups) tables_[group] = fresh.groups[group].table;
-  for (Motor& motor : motors_) {
-    if (changed_groups.contains(motor.config->group.value)) motor.axis = new_axis(*motor.config);
-  }
-  for (const std::size_t index : changed_mcus) {
-    const Mcu& mcu = mcus_[index];
-    master_of(mcu).reconfigure(mcu.in_bus, setup_of(mcu));
-  }
-  for (const std::size_t group : changed_groups) {
-    outputs_.log(LogLevel::kInfo, "group " + config_.groups[group].name + " has table " +
-                                      tables_[group]->name() + " from " + tables_[group]->path());
-  }
-  changed_ = true;
-  return {};
 }
 
 Core::~Core() = default;
@@ -174,6 +121,7 @@ void Core::step(std::int64_t now_us) {
     handle_events(now_us, b);
   }
   check_pending(now_us, std::nullopt);
+  follow_table_changes(now_us);
   watch_for_other_masters(now_us);
   if (now_us >= health_due_us_) {
     publish_health();

@@ -40,6 +40,10 @@ class Outputs {
   virtual void health(const health_t& health) = 0;
   virtual void move_log(const std::string& json_line) = 0;
   virtual void log(LogLevel level, const std::string& text) = 0;
+  // Answered by Core::tables_read and Core::tables_kept, later.
+  virtual void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) = 0;
+  // For the next daemon: which table each group has, TABLE[@REV] in the order of the configuration.
+  virtual void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) = 0;
   virtual std::int64_t wall_clock_us() = 0;  // microseconds since 1970, for messages
 };
 
@@ -70,10 +74,13 @@ class Core {
   void step(std::int64_t now_us);
   std::int64_t next_wake_us() const;
 
-  // Takes over the tables of a configuration that was read anew; it need not outlive the call.
-  // Refused as a whole, with the reason, if it differs in anything else or if a motor moves on an
-  // MCU that would need a changed table.
-  Result<void> reload_tables(const config::Config& fresh);
+  // Before the first port is opened: the group has another table than the configuration says.
+  Result<void> restore(std::size_t group, const std::string& wanted, tables::TablePtr table);
+  // What RELOAD_TABLES does; how it ends is told by the log.
+  void reload_tables();
+  void tables_read(std::int64_t now_us, std::uint64_t ticket,
+                   const std::vector<Result<tables::TablePtr>>& tables);
+  void tables_kept(std::uint64_t ticket, const Result<void>& kept);
 
   // Ramps down all motors and takes no more moves.
   void shut_down(std::int64_t now_us);
@@ -121,11 +128,34 @@ class Core {
     std::string done = "done";  // the reason, if all goes well
   };
 
+  struct InService {
+    tables::TablePtr table;
+    std::string wanted;  // TABLE[@REV] that it was asked for by
+  };
+  // Other tables for groups, from the command to its result (tables.cpp).
+  struct TableChange {
+    enum class Stage { kReading, kResting, kUploading, kKeeping };
+    struct Part {
+      std::size_t group;
+      std::string wanted;
+      tables::TablePtr table{};   // once read
+      tables::TablePtr before{};  // while uploading: what it goes back to if that fails
+    };
+    Client client;  // without an id: not from a client
+    std::uint64_t ticket;
+    std::int8_t kind;
+    Stage stage = Stage::kReading;
+    std::vector<Part> parts{};
+    std::vector<std::size_t> mcus{};  // that need other tables
+    std::string refused{};            // groups that keep their tables, and why
+    std::string notes{};
+    std::int64_t deadline_us = 0;  // of the upload
+  };
+
   const tables::Table& table_of(const config::Motor& motor) const {
-    return *tables_[motor.group.value];
+    return *service_[motor.group.value].table;
   }
   motion::Axis new_axis(const config::Motor& motor) const;
-  link::McuSetup setup_of(const Mcu& mcu) const;
   link::Master& master_of(const Mcu& mcu);
   const link::Master& master_of(const Mcu& mcu) const;
   const link::McuView& view_of(const Mcu& mcu) const;
@@ -184,6 +214,30 @@ class Core {
   void answer(const Client& client, std::int8_t phase, const std::string& result,
               const std::string& reason, reply_t reply = {});
 
+  // tables.cpp
+  std::string refuse_table_change(const command_t& command) const;
+  void start_table_change(const Client& client, std::int8_t kind, const std::string& group,
+                          const std::string& wanted);
+  std::optional<std::size_t> find_group(const std::string& name) const;
+  link::McuSetup setup_of(const Mcu& mcu, const std::vector<InService>& service) const;
+  std::string misfit(const std::vector<InService>& service, std::size_t group) const;
+  std::string misfit(const std::vector<TableChange::Part>& parts) const;
+  void take_part(TableChange& change, TableChange::Part part, Result<tables::TablePtr> read);
+  void supersede(const TableChange& by);
+  void put_in_service(std::size_t group, tables::TablePtr table);
+  const TableChange* changing(std::size_t mcu) const;
+  std::vector<std::size_t> mcus_of(const std::vector<TableChange::Part>& parts) const;
+  bool unchanged(const TableChange::Part& part) const;
+  bool ready_for_change(const TableChange& change) const;
+  void begin_upload(std::int64_t now_us, TableChange& change);
+  std::int64_t upload_us(const Mcu& mcu) const;
+  bool uploaded(const TableChange& change) const;
+  void roll_back(TableChange& change);
+  void keep(TableChange& change);
+  void follow_table_changes(std::int64_t now_us);
+  void finish_table_change(std::list<TableChange>::iterator change, std::int8_t phase,
+                           const std::string& result, std::string reason);
+
   // snapshot.cpp
   void publish();
   state_t state_of(const Mcu& mcu) const;
@@ -196,7 +250,7 @@ class Core {
 
   const config::Config& config_;
   Outputs& outputs_;
-  std::vector<tables::TablePtr> tables_;  // in service, by group
+  std::vector<InService> service_;  // by group
   std::vector<std::unique_ptr<Bus>> buses_;
   std::vector<Mcu> mcus_;
   std::vector<Motor> motors_;
@@ -204,6 +258,8 @@ class Core {
   motion::MoveBook book_;
   std::unordered_map<std::uint64_t, OpenMove> open_moves_;  // by number in book_
   std::list<Pending> pending_;
+  std::list<TableChange> table_changes_;
+  std::uint64_t last_ticket_ = 0;
   ClientLog clients_;
   std::uint64_t rejected_commands_ = 0;
   std::uint64_t last_log_id_ = 0;

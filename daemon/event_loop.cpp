@@ -20,6 +20,7 @@ namespace {
 // epoll tags: buses count from 0.
 constexpr std::uint64_t kLcmTag = UINT64_MAX;
 constexpr std::uint64_t kSignalTag = UINT64_MAX - 1;
+constexpr std::uint64_t kWorkerTag = UINT64_MAX - 2;
 
 std::int64_t now_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(
@@ -61,10 +62,12 @@ Result<serial::SerialPort> open_first(const config::Bus& bus) {
 
 }  // namespace
 
-EventLoop::EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log)
+EventLoop::EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log,
+                     TableLibrary library)
     : config_(config),
       transport_(transport),
       move_log_(move_log),
+      library_(std::move(library)),
       core_(config, *this, master_number()),
       ports_(config.buses.size()),
       lost_(config.buses.size()),
@@ -100,11 +103,34 @@ Result<void> EventLoop::set_up() {
   if (signals_ < 0) return fail(std::string("signalfd: ") + std::strerror(errno));
   if (const auto watched = watch(signals_, EPOLLIN, kSignalTag); !watched) return watched;
   if (const auto watched = watch(transport_.fd(), EPOLLIN, kLcmTag); !watched) return watched;
+  if (const auto started = worker_.start(); !started) return started;
+  if (const auto watched = watch(worker_.fd(), EPOLLIN, kWorkerTag); !watched) return watched;
   return transport_.subscribe<command_t>(
       command_channel_, [this](const command_t& command) { core_.command(now_us(), command); });
 }
 
+// What groups were given before this daemon started is as binding as the configuration.
+Result<void> EventLoop::restore_tables() {
+  const auto kept = library_.kept();
+  if (!kept) return fail(kept.error());
+  for (std::size_t group = 0; group < config_.groups.size(); ++group) {
+    const auto wanted = kept->find(config_.groups[group].name);
+    if (wanted == kept->end()) continue;
+    const auto table = library_.open(wanted->second);
+    auto restored =
+        table ? core_.restore(group, wanted->second, *table) : Result<void>(fail(table.error()));
+    if (restored) continue;
+    restored.error().message +=
+        " (table " + wanted->second + " was given to group " + config_.groups[group].name + "; " +
+        library_.in_service().string() +
+        " says so: remove it, and all groups have those of the configuration)";
+    return restored;
+  }
+  return {};
+}
+
 Result<void> EventLoop::run() {
+  if (const auto restored = restore_tables(); !restored) return restored;
   if (const auto ready = set_up(); !ready) return ready;
   started_us_ = now_us();
   while (true) {
@@ -126,6 +152,8 @@ Result<void> EventLoop::run() {
       if (event.data.u64 == kLcmTag) {
         transport_.handle();
         core_.set_rejected_commands(transport_.rejected());
+      } else if (event.data.u64 == kWorkerTag) {
+        worker_.handle();
       } else if (event.data.u64 == kSignalTag) {
         handle_signal(now_us());
       } else {
@@ -210,21 +238,28 @@ void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t eve
 void EventLoop::handle_signal(std::int64_t now) {
   signalfd_siginfo info{};
   if (::read(signals_, &info, sizeof info) != sizeof info || shut_down_by_us_) return;
-  if (info.ssi_signo == SIGHUP) return reload_tables();
+  if (info.ssi_signo == SIGHUP) {
+    spdlog::info("SIGHUP: all tables are read again");
+    return core_.reload_tables();
+  }
   spdlog::info("{}: ramping all motors down", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
   core_.shut_down(now);
   shut_down_by_us_ = core_.rest_by_us(now) + kShutDownSlackUs;
 }
 
-void EventLoop::reload_tables() {
-  const auto fresh = config::load(config_.path);
-  const auto reloaded = fresh ? core_.reload_tables(*fresh) : Result<void>(fail(fresh.error()));
-  if (reloaded) {
-    spdlog::info("SIGHUP: tables reloaded from {}", config_.path);
-  } else {
-    spdlog::error("SIGHUP: tables not reloaded, the old ones stay in service: {}",
-                  reloaded.error().text());
-  }
+void EventLoop::read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
+  worker_.post([this, ticket, wanted]() -> Worker::Rest {
+    std::vector<Result<tables::TablePtr>> read;
+    for (const std::string& table : wanted) read.push_back(library_.open(table));
+    return [this, ticket, read] { core_.tables_read(now_us(), ticket, read); };
+  });
+}
+
+void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
+  worker_.post([this, ticket, wanted]() -> Worker::Rest {
+    const auto kept = library_.keep(wanted);
+    return [this, ticket, kept] { core_.tables_kept(ticket, kept); };
+  });
 }
 
 void EventLoop::update_write_interest(std::size_t bus) {

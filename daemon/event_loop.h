@@ -11,6 +11,8 @@
 #include "config/config.h"
 #include "daemon/core.h"
 #include "daemon/move_log.h"
+#include "daemon/table_library.h"
+#include "daemon/worker.h"
 #include "lcm/transport.h"
 #include "serial/serial_port.h"
 
@@ -19,7 +21,8 @@ namespace bushd::daemon {
 class EventLoop : private Outputs {
  public:
   // Everything outlives the loop. `move_log` may be null.
-  EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log);
+  EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log,
+            TableLibrary library);
   ~EventLoop() override;
 
   // Runs until SIGTERM or SIGINT, then ramps all motors down and returns. Precondition: both
@@ -45,7 +48,7 @@ class EventLoop : private Outputs {
   void lose_port(std::int64_t now_us, std::size_t bus, const std::string& cause);
   void handle_port(std::int64_t now_us, std::size_t bus, std::uint32_t events);
   void handle_signal(std::int64_t now_us);
-  void reload_tables();
+  Result<void> restore_tables();
   void update_write_interest(std::size_t bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
@@ -58,11 +61,14 @@ class EventLoop : private Outputs {
   void health(const health_t& health) override;
   void move_log(const std::string& json_line) override;
   void log(LogLevel level, const std::string& text) override;
+  void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
+  void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   std::int64_t wall_clock_us() override;
 
   const config::Config& config_;
   lcm::Transport& transport_;
   MoveLog* move_log_;
+  TableLibrary library_;
   Core core_;
   std::vector<Port> ports_;
   std::vector<std::optional<std::string>>
@@ -76,6 +82,7 @@ class EventLoop : private Outputs {
   int signals_ = -1;
   std::int64_t started_us_ = 0;
   std::optional<std::int64_t> shut_down_by_us_;
+  Worker worker_;  // the last member: its thread uses others
 };
 
 }  // namespace bushd::daemon

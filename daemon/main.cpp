@@ -36,7 +36,8 @@ void block_signals() {
   std::signal(SIGPIPE, SIG_IGN);
 }
 
-int run(const bushd::config::Config& config, const std::string& move_log_path) {
+int run(const bushd::config::Config& config, const std::string& move_log_path,
+        const std::string& in_service_path) {
   block_signals();
   std::optional<bushd::daemon::MoveLog> move_log;
   if (!move_log_path.empty()) {
@@ -53,7 +54,8 @@ int run(const bushd::config::Config& config, const std::string& move_log_path) {
     return 1;
   }
   spdlog::info("bushd: {}, LCM {}", extent(config), config.lcm.url);
-  bushd::daemon::EventLoop loop(config, **transport, move_log ? &*move_log : nullptr);
+  bushd::daemon::EventLoop loop(config, **transport, move_log ? &*move_log : nullptr,
+                                bushd::daemon::TableLibrary(config, in_service_path));
   if (const auto ended = loop.run(); !ended) {
     spdlog::error("{}", ended.error().text());
     return 1;
@@ -72,6 +74,7 @@ int main(int argc, char** argv) {
   std::string config_path;
   std::string check_path;
   std::string move_log_path;
+  std::string in_service_path;
   auto* config_option =
       app.add_option("--config", config_path, "configuration file")->type_name("FILE");
   auto* check_option = app.add_option("--check-config", check_path,
@@ -79,6 +82,11 @@ int main(int argc, char** argv) {
                            ->type_name("FILE");
   app.add_option("--move-log", move_log_path,
                  "append moves and their results to this file, as JSON lines")
+      ->type_name("FILE");
+  app.add_option("--in-service", in_service_path,
+                 "keep here which tables groups were given (default: for a configuration in "
+                 "/etc/bushd /var/lib/bushd/tables-in-service.json, else "
+                 ".tables-in-service.json beside it)")
       ->type_name("FILE");
   config_option->excludes(check_option);
   try {
@@ -103,5 +111,5 @@ int main(int argc, char** argv) {
     fmt::print("{}: good: {}\n", check_path, extent(*config));
     return 0;
   }
-  return run(*config, move_log_path);
+  return run(*config, move_log_path, in_service_path);
 }

@@ -67,6 +67,7 @@ struct Mcu {
 
 struct Group {
   std::string name;
+  std::string table_name;  // as written in the file, without ".toml"
   tables::TablePtr table;  // never null; groups with the same table share it
 };
 
@@ -99,8 +100,7 @@ Result<Config> load(const std::filesystem::path& path);
 // The same for the text of a file that would be at `path`: tables are looked for beside it.
 Result<Config> parse(std::string_view text, const std::filesystem::path& path);
 
-// Whether two configurations differ in nothing but what is in their tables: then a daemon can go
-// from one to the other without a restart.
-bool same_but_for_tables(const Config& a, const Config& b);
+// Where the tables of the configuration at this path are looked for, in this order.
+std::vector<std::filesystem::path> table_directories(const std::filesystem::path& path);
 
 }  // namespace bushd::config

@@ -259,16 +259,12 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
 // Tables by path, so that groups that name the same one share it.
 class TableShelf {
  public:
-  explicit TableShelf(const std::filesystem::path& config_path) {
-    const std::filesystem::path beside = config_path.parent_path();
-    directories_ = {beside.empty() ? std::filesystem::path(".") : beside, beside / "tables"};
-    for (auto& shipped : tables::shipped_directories()) directories_.push_back(std::move(shipped));
-  }
+  explicit TableShelf(const std::filesystem::path& config_path)
+      : directories_(table_directories(config_path)) {}
 
-  Result<tables::TablePtr> get(const TomlReader& reader, const std::string& group) {
-    const auto name = reader.string("table", "the name of a table");
-    if (!name) return fail(name.error());
-    const auto path = tables::find(*name, directories_);
+  Result<tables::TablePtr> get(const TomlReader& reader, const std::string& group,
+                               const std::string& name) {
+    const auto path = tables::find(name, directories_);
     if (!path) return fail(reader.error("table", path.error().message));
     if (const auto shelved = tables_.find(*path); shelved != tables_.end()) return shelved->second;
     auto table = tables::load(*path);
@@ -294,9 +290,13 @@ Result<void> read_groups(Loading* loading) {
     auto name = read_name(reader);
     if (!name) return fail(name.error());
     if (auto taken = names.take(reader, "name", *name, *name); !taken) return taken;
-    auto table = shelf.get(reader, *name);
+    auto table_name = reader.string("table", "the name of a table");
+    if (!table_name) return fail(table_name.error());
+    auto table = shelf.get(reader, *name, *table_name);
     if (!table) return fail(table.error());
-    loading->config.groups.push_back({.name = std::move(*name), .table = std::move(*table)});
+    loading->config.groups.push_back({.name = std::move(*name),
+                                      .table_name = std::move(*table_name),
+                                      .table = std::move(*table)});
   }
   return {};
 }

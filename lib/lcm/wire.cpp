@@ -82,6 +82,8 @@ void scan_fields(Scan& scan, std::type_identity<command_t>) {
   scan.text();         // client_id
   scan.fixed(kInt64);  // number
   scan.fixed(kInt8);   // kind
+  scan.text();         // group
+  scan.text();         // table
   const std::size_t motors = scan.count(kMinText + kInt64);
   for (std::size_t i = 0; i < motors; ++i) scan.text();
   scan.fixed(motors * kInt64);  // steps

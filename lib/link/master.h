@@ -141,6 +141,8 @@ class Master {
   // Other tables or motors for an MCU, at rest: it goes through configuration again and comes back
   // with kOnline.
   void reconfigure(std::size_t mcu, McuSetup setup);
+  // Why the MCU has no room for these tables, as far as it is known; "": it has.
+  std::string no_room(std::size_t mcu, const McuSetup& setup) const;
 
   // Sent as soon as the line allows, answered in later reports.
   void control(std::size_t mcu, std::uint8_t actions);

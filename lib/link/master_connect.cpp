@@ -22,6 +22,18 @@ bool same_id(const bushd_identity& a, const bushd_identity& b) {
   return std::memcmp(a.unique_id, b.unique_id, BUSHD_UNIQUE_ID_SIZE) == 0;
 }
 
+std::string lacks_room(const McuSetup& setup, const bushd_identity& identity) {
+  std::size_t codes = 0;
+  for (const TableRef& ref : setup.tables) {
+    codes += ref.table->accel.count;
+    if (ref.table->decel.code != ref.table->accel.code) codes += ref.table->decel.count;
+  }
+  if (codes <= identity.table_codes) return {};
+  return "has memory for " + std::to_string(identity.table_codes) +
+         " table codes, but its motors' tables need " + std::to_string(codes) +
+         ": use shorter tables or fewer on this MCU";
+}
+
 }  // namespace
 
 bool Master::send_due_identify(std::int64_t now_us) {
@@ -81,16 +93,7 @@ std::string Master::unfit(const Mcu& mcu, const bushd_identity& identity) const 
              std::to_string(m) + " is configured";
     }
   }
-  std::size_t codes = 0;
-  for (const TableRef& ref : mcu.setup.tables) {
-    codes += ref.table->accel.count;
-    if (ref.table->decel.code != ref.table->accel.code) codes += ref.table->decel.count;
-  }
-  if (codes > identity.table_codes) {
-    return "has memory for " + std::to_string(identity.table_codes) +
-           " table codes, but its motors' tables need " + std::to_string(codes) +
-           ": use shorter tables or fewer on this MCU";
-  }
+  if (const std::string why = lacks_room(mcu.setup, identity); !why.empty()) return why;
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * setup_.tick_ns / 1000;
   if (identity.queue_ticks < kMinQueueTicks || queue_us < kMinQueueUs) {
@@ -99,6 +102,11 @@ std::string Master::unfit(const Mcu& mcu, const bushd_identity& identity) const 
            " ticks and " + std::to_string(kMinQueueUs / 1000) + " ms: use a longer tick";
   }
   return {};
+}
+
+std::string Master::no_room(std::size_t index, const McuSetup& setup) const {
+  const McuView& view = mcus_[index].view;
+  return view.identified ? lacks_room(setup, view.identity) : std::string();
 }
 
 void Master::handle_identity(std::int64_t now_us, std::size_t index,

@@ -7,12 +7,14 @@
 
 namespace bushd::tables {
 
+bool is_table_name(std::string_view name) {
+  return !name.empty() && name.front() != '.' && name.find('/') == std::string_view::npos &&
+         name.find('\0') == std::string_view::npos && name.size() <= kMaxNameLength;
+}
+
 Result<std::filesystem::path> find(std::string_view name,
                                    std::span<const std::filesystem::path> directories) {
-  const bool leads_elsewhere = name.empty() || name.front() == '.' ||
-                               name.find('/') != std::string_view::npos ||
-                               name.find('\0') != std::string_view::npos;
-  if (leads_elsewhere || name.size() > kMaxNameLength) {
+  if (!is_table_name(name)) {
     return fail(
         fmt::format("\"{}\" is not a table's name; allowed: 1..{} characters without '/' and not "
                     "beginning with '.' (the name of a file without \".toml\")",

@@ -18,8 +18,11 @@ Result<TablePtr> load(const std::filesystem::path& path);
 Result<TableContent> parse_content(std::string_view text, const std::string& path);
 Result<TablePtr> parse(std::string_view text, const std::string& path);
 
-// The path of the first NAME.toml in `directories`; the error lists where it was looked for. Names
-// that lead elsewhere (with '/' or a leading '.') are refused.
+// Whether it may be the name of a file without ".toml": does not lead elsewhere, not too long.
+bool is_table_name(std::string_view name);
+
+// The path of the first NAME.toml in `directories`; the error lists where it was looked for.
+// What is not a table's name is refused.
 Result<std::filesystem::path> find(std::string_view name,
                                    std::span<const std::filesystem::path> directories);
 

@@ -63,7 +63,6 @@ TEST(Config, MannersOfABusHaveDefaults) {
   EXPECT_FALSE(chosen->buses[0].table_ticks);
   EXPECT_EQ(chosen->buses[0].emergency_stop, BUSHD_CUT);
   EXPECT_FALSE(chosen->buses[1].table_runs) << "of this bus only";
-  EXPECT_FALSE(same_but_for_tables(*plain, *chosen)) << "needs a restart";
 }
 
 TEST(Config, PortsMayBePatterns) {

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
+
+#include "tables/store/open.h"
 
 namespace bushd::test {
 
@@ -48,6 +51,7 @@ void Lab::start_daemon() {
 
 void Lab::restart_daemon() {
   core_.reset();
+  disk_.clear();
   for (SimulatedBus& bus : buses_) bus.received.clear();
   states_.clear();
   start_daemon();
@@ -57,12 +61,29 @@ void Lab::write_file(const std::string& name, const std::string& text) {
   std::ofstream(directory_ / name) << text;
 }
 
-Result<void> Lab::reload_tables() {
-  const auto fresh = config::load(directory_ / "bushd.toml");
-  if (!fresh) return fail(fresh.error());
-  auto reloaded = core_->reload_tables(*fresh);
-  run_for(0.006);  // until it is published that MCUs are configured anew
-  return reloaded;
+std::int64_t Lab::use(const std::string& group, const std::string& table) {
+  command_t command{};
+  command.kind = command_t::USE_TABLE;
+  command.group = group;
+  command.table = table;
+  return send(command);
+}
+
+void Lab::read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
+  disk_.push_back([this, ticket, wanted] {
+    std::vector<tables::store::Place> places;
+    for (const auto& directory : config::table_directories(config_.path)) {
+      places.push_back(tables::store::place_of(directory));
+    }
+    std::vector<Result<tables::TablePtr>> read;
+    for (const std::string& table : wanted) read.push_back(tables::store::open(table, places));
+    core_->tables_read(now_us(), ticket, read);
+  });
+}
+
+void Lab::keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
+  kept_ = wanted;
+  disk_.push_back([this, ticket] { core_->tables_kept(ticket, {}); });
 }
 
 void Lab::pause_daemon(double seconds) {
@@ -96,6 +117,7 @@ void Lab::log(daemon::LogLevel level, const std::string& text) {
 
 // To the next thing that happens: on a bus, or in the daemon.
 void Lab::advance() {
+  for (const auto& told : std::exchange(disk_, {})) told();
   core_->step(now_us());
   std::int64_t next = std::max(core_->next_wake_us() * 1000, now_ns_ + 1000);
   for (const SimulatedBus& bus : buses_) next = std::min(next, bus.bus->next_event_ns());
@@ -127,15 +149,18 @@ void Lab::run_for(double seconds) {
 
 std::int64_t Lab::send(std::int8_t kind, const std::vector<std::string>& motors,
                        const std::vector<std::int64_t>& steps) {
-  command_t command;
-  command.utime_us = 0;
-  command.client_id = "test";
-  command.number = ++number_;
+  command_t command{};
   command.kind = kind;
   command.motors = motors;
   command.steps = steps;
   command.steps.resize(motors.size());
-  command.motor_count = static_cast<std::int32_t>(motors.size());
+  return send(command);
+}
+
+std::int64_t Lab::send(command_t command) {
+  command.client_id = "test";
+  command.number = ++number_;
+  command.motor_count = static_cast<std::int32_t>(command.motors.size());
   core_->command(now_us(), command);
   return number_;
 }

@@ -32,6 +32,7 @@ class Lab : public daemon::Outputs {
   // Sends a command as client "test" and returns its number.
   std::int64_t send(std::int8_t kind, const std::vector<std::string>& motors,
                     const std::vector<std::int64_t>& steps = {});
+  std::int64_t send(command_t command);
   // The replies so far to a command of client "test".
   std::vector<reply_t> replies(std::int64_t number) const;
   // The last reply, which must exist.
@@ -64,14 +65,18 @@ class Lab : public daemon::Outputs {
   // Bytes on the way to MCUs are handed to this before they are sent; returning false drops them.
   std::function<bool(std::size_t bus, std::vector<std::uint8_t>& bytes)> on_send;
 
-  // A file beside bushd.toml, where tables are looked for first; then what SIGHUP does.
+  // A file beside bushd.toml, where tables are looked for first.
   void write_file(const std::string& name, const std::string& text);
-  Result<void> reload_tables();
+  // Sends USE_TABLE, RELOAD_TABLES.
+  std::int64_t use(const std::string& group, const std::string& table);
+  std::int64_t reload() { return send(command_t::RELOAD_TABLES, {}); }
 
   daemon::Core& core() { return *core_; }
   sim::Bus& bus(std::size_t index) { return *buses_[index].bus; }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   const std::vector<std::string>& move_lines() const { return move_lines_; }
+  // Which tables a restarted daemon is to have, as asked to keep last.
+  const std::vector<std::string>& kept() const { return kept_; }
 
  private:
   struct SimulatedBus {
@@ -85,6 +90,8 @@ class Lab : public daemon::Outputs {
   void health(const health_t& health) override { health_[health.bus] = health; }
   void move_log(const std::string& line) override { move_lines_.push_back(line); }
   void log(daemon::LogLevel level, const std::string& text) override;
+  void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
+  void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   std::int64_t wall_clock_us() override { return now_us(); }
   void start_daemon();
   void advance();
@@ -102,6 +109,8 @@ class Lab : public daemon::Outputs {
   std::vector<std::string> errors_;
   std::uint16_t master_ = 0;
   std::vector<std::string> move_lines_;
+  std::vector<std::string> kept_;
+  std::vector<std::function<void()>> disk_;  // what it is to tell the core
 };
 
 // One bus "hall" with `mcus` MCUs of `motors` motors each, named m01.., all in group "axes" of

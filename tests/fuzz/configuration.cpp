@@ -60,7 +60,6 @@ void run(std::string_view text) {
   }
   check_references(*config);
   check_speeds(*config);
-  BUSHD_REQUIRE(config::same_but_for_tables(*config, *config));
 }
 
 }  // namespace

@@ -35,6 +35,8 @@ inline void fill(Random& random, command_t& command) {
   command.client_id = text(random);
   command.number = any<std::int64_t>(random);
   command.kind = any<std::int8_t>(random);
+  command.group = text(random);
+  command.table = text(random);
   for (std::size_t i = below(random, 5); i > 0; --i) {
     command.motors.push_back(text(random));
     command.steps.push_back(any<std::int64_t>(random));

@@ -35,6 +35,8 @@ struct Arguments {
   bushctl::LineOptions line;
   std::uint8_t address = 0;
   std::string unique_id;
+  std::string group;
+  std::string table;
 };
 
 // Both before and after the subcommand.
@@ -108,6 +110,14 @@ command_t to_motors(std::int8_t kind, const std::vector<std::string>& motors) {
   return command;
 }
 
+command_t to_use(const std::string& group, const std::string& table) {
+  command_t command{};
+  command.kind = command_t::USE_TABLE;
+  command.group = group;
+  command.table = table;
+  return command;
+}
+
 // Commands that have the line for themselves.
 CLI::App* add_line_command(CLI::App& app, Arguments& arguments, const char* name,
                            const char* text) {
@@ -169,6 +179,20 @@ int run(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   add_timeout(health, arguments);
 
+  CLI::App* table = add_command(app, arguments, "table", "Which table each group moves by");
+  table->require_subcommand(1);
+  CLI::App* use = add_command(*table, arguments, "use", "Gives a group another table");
+  use->footer(
+      "TABLE is NAME, NAME@REVISION or NAME@TAG, as for bushtab. Motors that move keep their "
+      "table; "
+      "once those of the group's MCUs stand, the MCUs get the new one, and the next move is by it. "
+      "It stays in service when the daemon is started again.");
+  use->add_option("GROUP", arguments.group, "The group")->required();
+  use->add_option("TABLE", arguments.table, "Its table from the next move on")->required();
+  CLI::App* reload =
+      add_command(*table, arguments, "reload",
+                  "Reads all groups' tables again; bad ones leave the old in service");
+
   CLI::App* latency =
       add_line_command(app, arguments, "latency-test", "How late an adapter hands over answers");
   latency->add_option("--address", arguments.address, "Of the MCU to ask; default: any")
@@ -222,6 +246,8 @@ int run(int argc, char** argv) {
     return bushctl::set_address(arguments.line, arguments.unique_id, arguments.address);
   }
   if (estop->parsed()) return send(arguments, to_motors(command_t::EMERGENCY_STOP, {}), true);
+  if (use->parsed()) return send(arguments, to_use(arguments.group, arguments.table), true);
+  if (reload->parsed()) return send(arguments, to_motors(command_t::RELOAD_TABLES, {}), true);
   if (move->parsed())
     return send(arguments, bushctl::parse_move(move->remaining()), arguments.wait);
   if (stop->parsed()) {

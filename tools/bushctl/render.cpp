@@ -113,6 +113,11 @@ std::vector<std::string> lines(const bushd::reply_t& reply) {
     out.push_back(std::move(line));
   }
   if (out.empty()) out.push_back(printable(reply.result));
+  // Of what was done there may be more to tell.
+  if (reply.result == "done" && reply.motors.empty()) {
+    const bool repeats = reply.reason.starts_with(reply.result);
+    out.back() = printable(repeats ? reply.reason : reply.result + ": " + reply.reason);
+  }
   return out;
 }
 

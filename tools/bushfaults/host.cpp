@@ -97,10 +97,11 @@ void Host::run(TimeNs now_ns) {
     start();
   }
   if (now_ns_ < paused_until_ns_) return;
-  const bool due = now_ns_ >= wake_ns_ || !commands_.empty() ||
+  const bool due = now_ns_ >= wake_ns_ || !commands_.empty() || !disk_.empty() ||
                    (!inbox_.empty() && inbox_.front().due_ns <= now_ns_);
   if (!due) return;
   deliver();
+  for (const auto& told : std::exchange(disk_, {})) told();
   for (; !commands_.empty(); commands_.pop_front()) {
     witness_.command(now_ns_, commands_.front());
     core_->command(now_us(), commands_.front());
@@ -153,6 +154,7 @@ void Host::kill(TimeNs now_ns, TimeNs until_ns) {
   starts_ns_ = core_ ? until_ns : std::max(starts_ns_, until_ns);
   core_.reset();
   commands_.clear();
+  disk_.clear();
   paused_until_ns_ = 0;
 }
 
@@ -161,6 +163,25 @@ Host::TimeNs Host::faults_over_ns() const {
   if (!plugged_) over = std::max(over, back_ns_);
   if (!core_) over = std::max(over, starts_ns_);
   return over;
+}
+
+void Host::read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
+  disk_.push_back([this, ticket, wanted] {
+    std::vector<bushd::Result<bushd::tables::TablePtr>> read;
+    for (const std::string& name : wanted) {
+      const auto group = std::ranges::find(config_.groups, name, &bushd::config::Group::table_name);
+      if (group == config_.groups.end()) {
+        read.push_back(bushd::fail("there is no table \"" + name + "\""));
+      } else {
+        read.push_back(group->table);
+      }
+    }
+    core_->tables_read(now_us(), ticket, read);
+  });
+}
+
+void Host::keep_tables(std::uint64_t ticket, const std::vector<std::string>&) {
+  disk_.push_back([this, ticket] { core_->tables_kept(ticket, {}); });
 }
 
 void Host::log(bushd::daemon::LogLevel level, const std::string& text) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -57,6 +58,8 @@ class Host final : public bushd::daemon::Outputs {
   void health(const bushd::health_t&) override {}
   void move_log(const std::string& line) override { witness_.move_log(now_ns_, line); }
   void log(bushd::daemon::LogLevel level, const std::string& text) override;
+  void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
+  void keep_tables(std::uint64_t ticket, const std::vector<std::string>&) override;
   std::int64_t wall_clock_us() override { return now_us(); }
 
   std::int64_t now_us() const { return now_ns_ / 1000; }
@@ -80,7 +83,8 @@ class Host final : public bushd::daemon::Outputs {
   TimeNs starts_ns_ = 0;                       // when the next daemon starts
   TimeNs paused_until_ns_ = 0;
   TimeNs wake_ns_ = 0;
-  std::deque<bushd::command_t> commands_;  // not yet read by the daemon
+  std::deque<bushd::command_t> commands_;   // not yet read by the daemon
+  std::deque<std::function<void()>> disk_;  // what it is to tell the daemon
 
   bool plugged_ = false;
   TimeNs back_ns_ = 0;  // when the adapter is plugged in again

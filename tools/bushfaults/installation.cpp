@@ -49,7 +49,7 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
     if (!path) return bushd::fail(path.error());
     const auto table = bushd::tables::load(*path);
     if (!table) return bushd::fail(table.error());
-    config.groups.push_back({.name = name, .table = *table});
+    config.groups.push_back({.name = name, .table_name = name, .table = *table});
   }
   std::vector<std::uint8_t> motors_of_mcu(mcus, 0);
   for (std::size_t i = 0; i < mcus; ++i) {

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "commands.h"
+#include "tables/store/open.h"
 #include "tables/table_file.h"
 
 namespace bushtab {
@@ -15,14 +16,17 @@ namespace {
 
 using bushd::Result;
 namespace tables = bushd::tables;
+namespace store = bushd::tables::store;
 namespace fs = std::filesystem;
 
-constexpr const char* kDirectory = "/etc/bushd/tables";
-constexpr const char* kHistory = "/var/lib/bushd/tables/history.sqlite";
-constexpr const char* kHistoryBeside = ".history.sqlite";
-
 fs::path directory_of(const Places& places) {
-  return places.directory.empty() ? kDirectory : places.directory;
+  return places.directory.empty() ? store::kMachineTables : places.directory;
+}
+
+store::Place place_of(const Places& places, const fs::path& directory) {
+  store::Place place = store::place_of(directory);
+  if (!places.history.empty()) place.history = places.history;
+  return place;
 }
 
 bool is_path(const std::string& table) {
@@ -57,30 +61,26 @@ Result<Home> home_of(const Places& places, const std::string& table) {
                     "begin with '.'",
                     name.substr(0, tables::kMaxNameLength), tables::kMaxNameLength));
   }
-  fs::path history = places.history;
-  if (history.empty()) {
-    std::error_code error;
-    history = fs::equivalent(directory, kDirectory, error) || directory == kDirectory
-                  ? fs::path(kHistory)
-                  : directory / kHistoryBeside;
-  }
-  return Home{tables::store::Store(directory, history), name};
+  const store::Place place = place_of(places, directory);
+  return Home{store::Store(place.directory, place.history), name};
 }
 
 Result<tables::TablePtr> open_table(const Places& places, const std::string& table) {
   const std::size_t at = table.rfind('@');
   std::error_code error;
-  if (at != std::string::npos && !fs::exists(table, error)) {
-    const auto home = home_of(places, table.substr(0, at));
+  const bool revision = at != std::string::npos && !fs::exists(table, error);
+  const std::string file = revision ? table.substr(0, at) : table;
+  if (is_path(file)) {
+    if (!revision) return tables::load(table);
+    const auto home = home_of(places, file);
     if (!home) return bushd::fail(home.error());
     auto stored = home->store.read(home->name, table.substr(at + 1));
     if (!stored) return bushd::fail(stored.error());
     return tables::make(std::move(stored->content), table);
   }
-  if (is_path(table)) return tables::load(table);
-  const auto path = tables::find(table, directories(places));
-  if (!path) return bushd::fail(path.error());
-  return tables::load(*path);
+  std::vector<store::Place> all;
+  for (const fs::path& directory : directories(places)) all.push_back(place_of(places, directory));
+  return store::open(table, all);
 }
 
 int refuse(const bushd::Error& error) {

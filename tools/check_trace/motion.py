@@ -23,6 +23,7 @@ the first. Of a table run an edge lies in its slot: |edge - table| <= T / S.
 """
 
 import bisect
+import hashlib
 import math
 import tomllib
 from collections import namedtuple
@@ -35,16 +36,19 @@ INTERIOR, FIRST_TICK, LAST_TICK = range(3)
 
 
 class Table:
-    def __init__(self, path):
+    def __init__(self, path, text):
         try:
-            with open(path, "rb") as file:
-                content = tomllib.load(file)
+            content = tomllib.loads(text)
             self.accel = content["accel"]
             self.decel = content.get("decel", self.accel[::-1])[::-1]  # by steps before the end
             self.cruise = content.get("cruise", self.accel[-1])
             self.unit_ns = content["time_unit_ns"]
-        except (OSError, tomllib.TOMLDecodeError, KeyError, IndexError) as error:
+        except (tomllib.TOMLDecodeError, KeyError, IndexError) as error:
             raise InputError(f"{path}: table cannot be read: {error!r}") from None
+
+    def sha256(self):
+        numbers = [self.unit_ns, self.cruise, len(self.accel), *self.accel, *self.decel[::-1]]
+        return hashlib.sha256("".join(f"{number} " for number in numbers).encode()).hexdigest()
 
     def delay_from_start(self, i):
         return self.accel[i] if i < len(self.accel) else self.cruise

@@ -2,8 +2,9 @@
 
 import json
 
-from check_trace.motion import Move, Table
+from check_trace.motion import Move
 from check_trace.problems import InputError
+from check_trace.tables import find_table
 
 
 class Motor:
@@ -67,15 +68,15 @@ class MoveLog:
         if self._bus is not None and event["bus"] != self._bus:
             return
         self._ticks.add((event["bus"], event["tick_ns"]))
-        path = event["table_file"]
-        if path not in self._tables:
-            self._tables[path] = Table(path)
+        which = event["table_file"], event["table_sha256"]
+        if which not in self._tables:
+            self._tables[which] = find_table(*which)
         name = event["motor"]
         place = (event["bus"], event["address"], event["output"])
         motor = self.motors.setdefault(name, Motor(name, *place))
         if motor.place() != place:
             self._problems.add(motor, "output", f"move {event['id']} is on another output: {place}")
-        move = Move(event, self._tables[path])
+        move = Move(event, self._tables[which])
         before_steps = self._at_steps.get(name, move.from_steps)
         if move.from_steps != before_steps:
             text = f"move {move.id} starts from {move.from_steps} steps, the one before ends at {before_steps}"

@@ -119,6 +119,13 @@ Result<std::uint32_t> Store::number_of(const History& history, const std::string
 }
 
 Result<Stored> Store::read(const std::string& name, std::string_view at) const {
+  std::error_code ignored;
+  if (!std::filesystem::exists(history_path_, ignored)) {
+    // Opening it would make one, where nobody has changed a table yet.
+    return fail(Error{
+        .message = fmt::format("table \"{}\" has no history, so no revision \"{}\"", name, at),
+        .file = path_of(name).string()});
+  }
   const auto history = History::open(history_path_);
   if (!history) return fail(history.error());
   const auto number = number_of(*history, name, at);
@@ -129,7 +136,10 @@ Result<Stored> Store::read(const std::string& name, std::string_view at) const {
     return fail(fmt::format("table \"{}\" has no revision {}; \"bushtab log {}\" lists them", name,
                             *number, name));
   }
-  return stored(std::move(**text), fmt::format("{}@{}", path_of(name).string(), *number));
+  auto found = stored(std::move(**text), fmt::format("{}@{}", path_of(name).string(), *number));
+  // A text that was found and not made by bushtab need not say which revision it became.
+  if (found) found->content.revision = *number;
+  return found;
 }
 
 Result<std::vector<Revision>> Store::log(const std::string& name) const {

@@ -5,6 +5,7 @@ import json
 import pathlib
 import random
 import re
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -399,6 +400,21 @@ class WrongLogs(CheckTraceTest):
         result = self.check(scene)
         self.assertEqual(result.returncode, 2)
         self.assertIn("test.toml", result.stderr)
+
+    def test_a_table_that_has_changed_since_is_found_in_its_history(self):
+        scene = self.scene()
+        before = pathlib.Path(self.table_file).read_text(encoding="utf-8")
+        self.write_table({"time_unit_ns": 40_000, "accel": [200, 100]})
+        with sqlite3.connect(self.directory / ".history.sqlite") as history:
+            history.execute("CREATE TABLE revision (name TEXT, number INTEGER, text TEXT)")
+            history.execute("INSERT INTO revision VALUES ('other', 9, 'no table')")
+        result = self.check(scene)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn(synthetic.sha256_of(TABLE), result.stderr)
+        with sqlite3.connect(self.directory / ".history.sqlite") as history:
+            history.execute("INSERT INTO revision VALUES ('test', 1, ?)", [before])
+        result = self.check(scene)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 
 
 if __name__ == "__main__":

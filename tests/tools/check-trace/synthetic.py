@@ -3,6 +3,7 @@
 Positions are Fractions looked up step by step; nothing is shared with tools/check_trace.
 """
 
+import hashlib
 import json
 import math
 from fractions import Fraction
@@ -22,6 +23,14 @@ def delays_of(table, steps):
         down = decel[len(decel) - 1 - left] if left < len(decel) else cruise
         delays.append(max(up, down, cruise))
     return delays
+
+
+def sha256_of(table):
+    """Of what moves a motor, by the rule in docs/tables.md."""
+    accel = table["accel"]
+    decel = table.get("decel", accel[::-1])
+    numbers = [table["time_unit_ns"], table.get("cruise", accel[-1]), len(accel)] + accel + decel
+    return hashlib.sha256("".join(str(number) + " " for number in numbers).encode("ascii")).hexdigest()
 
 
 def stopped(table, delays, after_ns):
@@ -121,8 +130,8 @@ class Scene:
         event = {"id": move_id, "motor": motor}
         self.events.append({
             "event": "move", **event, "bus": "hall", "address": address, "output": output,
-            "table_file": self.table_file, "tick_ns": TICK_NS, "format": "fine" if self.fine else "coarse",
-            "start_tick": start_tick, "steps": steps, "from_steps": start,
+            "table_file": self.table_file, "table_sha256": sha256_of(self.table), "tick_ns": TICK_NS,
+            "format": "fine" if self.fine else "coarse", "start_tick": start_tick, "steps": steps, "from_steps": start,
             **({"moves": self.moves} if self.moves else {}),
         })
         self.ticks_from_ns[motor] = math.inf if self.moves == "table" else 0

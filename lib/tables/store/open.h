@@ -1,0 +1,30 @@
+// TABLE[@REV]: a table by its name, or a revision of it by number or tag, as bushtab and the daemon
+// understand it alike.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "base/result.h"
+#include "tables/table.h"
+
+namespace bushd::tables::store {
+
+inline constexpr const char* kMachineTables = "/etc/bushd/tables";
+
+// A directory of table files, and where its history is.
+struct Place {
+  std::filesystem::path directory{};
+  std::filesystem::path history{};
+};
+
+// With the history that a directory has by itself: that of the machine for kMachineTables, else a
+// file in the directory.
+Place place_of(const std::filesystem::path& directory);
+
+// From the first place that knows the table. Its path() is that of the table's file, also for a
+// revision that the file no longer has.
+Result<TablePtr> open(std::string_view table, std::span<const Place> places);
+
+}  // namespace bushd::tables::store
