@@ -1,0 +1,124 @@
+"""The tables, moves, states and messages that vectors are made of."""
+
+from definitions import Table
+
+TABLES = {
+    # Readable by hand: delays of a move of five steps are 5 4 3 3 6.
+    "small": Table(1000, [5, 4, 3], [6, 3, 2], cruise=3),
+    # One code: no ramp at all.
+    "flat": Table(40000, [20]),
+    # BUSHD-2 like: 238 codes from F_start = 100 Hz to 25 F_start in units of 40 us.
+    "bushd2": Table(40000, [250 - i - (2 * i) // 237 for i in range(237)] + [10]),
+    # The sides differ in length and shape; cruise slower than the fastest codes; a unit no tick is a multiple of.
+    "uneven": Table(777, [5000, 3100, 2400, 2010, 1800, 1650, 1550], [4000, 1500], cruise=1600),
+    # Microstepping: short delays, many steps in a tick.
+    "micro": Table(200, [400 * 12 // (12 + i) for i in range(60)]),
+    # Delays longer than a tick.
+    "slow": Table(1000000, [9, 7, 5]),
+}
+
+# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None)
+MOVES = [
+    ("small", 5, 4000, "coarse", None), ("small", 5, 4000, "fine", None), ("small", -5, 4000, "fine", None),
+    ("small", 1, 4000, "coarse", None), ("small", -1, 4000, "coarse", None), ("small", 2, 1000, "fine", None),
+    ("small", 9, 4000, "fine", 2), ("small", 9, 4000, "coarse", 0),
+    ("flat", 1, 2560000, "fine", None), ("flat", 40, 2560000, "coarse", None), ("flat", -41, 2560000, "fine", 7),
+    ("bushd2", 1, 2560000, "coarse", None), ("bushd2", 30, 2560000, "fine", None),
+    ("bushd2", -31, 2560000, "coarse", None), ("bushd2", 520, 2560000, "coarse", None),
+    ("bushd2", 476, 2560000, "coarse", 300),
+    ("uneven", 30, 2560000, "fine", None), ("uneven", -30, 1000000, "coarse", None),
+    ("uneven", 12, 1000000, "fine", 9), ("uneven", 8, 777777, "fine", None),
+    ("micro", 500, 1000000, "coarse", None), ("micro", -499, 1000000, "fine", None),
+    ("micro", 500, 1000000, "fine", 9), ("micro", 60, 1000001, "coarse", None),
+    ("slow", 6, 2560000, "fine", None), ("slow", -3, 2560000, "coarse", None), ("slow", 6, 2560000, "fine", 5),
+]
+
+# (table, delay, fraction, direction, tick_ns, format)
+TAKE_OVERS = [
+    ("small", 3, 0, 1, 4000, "coarse"), ("small", 6, 255, -1, 4000, "fine"), ("bushd2", 200, 128, 1, 2560000, "fine"),
+    ("bushd2", 230, 17, -1, 2560000, "fine"), ("bushd2", 235, 0, 1, 2560000, "coarse"),
+    ("uneven", 1600, 99, 1, 2560000, "fine"), ("micro", 100, 200, -1, 1000000, "fine"),
+    ("slow", 5, 1, 1, 2560000, "fine"),
+]
+
+# (slot_count, crossing, displacements)
+SLOTS = [
+    (128, 128, [256, -256, 512, 768, -1280, 0]), (256, 128, [256, 1792, -2816]), (128, 128, [256 * 40]),
+    (128, 256, [100, 100, 100, -44, -300, -212, 0, 900]), (256, 256, [255, 1, 1, -513, 2600, -2343]),
+    (256, 256, [1000, 1000, 1000, -3000]), (128, 256, [256 * 30 + 7, -256 * 30 - 7]),
+]
+
+# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None, saved at the beginning of tick, ticks)
+RUN_STATES = [
+    ("small", 5, 4000, "fine", None, 0, 6), ("small", -5, 4000, "fine", None, 3, 3),
+    ("flat", 40, 2560000, "coarse", None, 1, 5), ("flat", -41, 2560000, "fine", 7, 7, 1),
+    ("bushd2", 520, 2560000, "fine", None, 0, 100), ("bushd2", 520, 2560000, "coarse", None, 488, 3),
+    ("bushd2", 520, 2560000, "fine", None, 170, 190), ("bushd2", 520, 2560000, "fine", None, 488, 190),
+    ("bushd2", -476, 2560000, "coarse", 100, 100, 2), ("bushd2", 476, 2560000, "coarse", 100, 104, 40),
+    ("uneven", 30, 2560000, "fine", None, 3, 9), ("uneven", -30, 1000000, "coarse", None, 12, 2),
+    ("uneven", 12, 1000000, "fine", 9, 9, 9), ("uneven", 8, 777777, "fine", None, 5, 1),
+    ("micro", 500, 1000000, "coarse", None, 4, 100), ("slow", 6, 2560000, "fine", 5, 6, 4),
+]
+
+# (unique id, salt, slots)
+IDENTIFY_SLOTS = [
+    ("0000000000000000", 0, 1), ("0000000000000000", 0, 16), ("0000000000000001", 0, 16), ("0000000000000000", 1, 16),
+    ("62757368643a0001", 4660, 8), ("62757368643a0002", 4660, 8), ("ffffffffffffffff", 65535, 255),
+    ("0102030405060708", 513, 100),
+]
+
+ID = [98, 117, 115, 104, 0, 255, 1, 2]
+
+FRAMES = [
+    (1, 7, "identify", {"salt": 0, "slots": 1, "slot_units": 0}),
+    (0, 7, "identify", {"salt": 4660, "slots": 16, "slot_units": 120}),
+    (0, 255, "poll", {"count": 1, "entries": [[2, 50]]}),
+    (0, 1, "poll", {"count": 3, "entries": [[1, 50], [2, 260], [255, 65535]]}),
+    (1, 1, "configure", {"tick_ns": 2560000, "format": 1, "silence_ticks": 400}),
+    (3, 2, "table_begin", {"slot": 2, "accel_count": 238, "decel_count": 0, "cruise": 10, "time_unit_ns": 40000,
+                           "revision": 7}),
+    (3, 3, "table_data", {"slot": 2, "offset": 120, "count": 4, "codes": [250, 256, 1, 65535]}),
+    (3, 4, "table_end", {"slot": 2, "crc": 0xCBF43926}),
+    (1, 5, "assign", {"motor": 15, "slot": 7}),
+    (1, 6, "control", {"actions": 5}),
+    (1, 7, "set_position", {"motor": 0, "position_steps": -310}),
+    (0, 41, "sync", {"master": 4660, "mark": 1, "follows": 0, "known_mark": 0, "mark_tick": 0, "mark_ns": 0}),
+    (0, 42, "sync", {"master": 4660, "mark": 66051, "follows": 1, "known_mark": 66050, "mark_tick": 100000,
+                     "mark_ns": 1280000}),
+    (1, 8, "ticks", {"epoch": 3, "flags": 0, "first_tick": 1000, "count": 2, "mask": 0x8003, "delays": [9, 8, 0],
+                     "displacements": [0x81, 0x02, 0x80, 0x83, 0x00, 0xFF]}),
+    (1, 9, "ticks", {"epoch": 3, "flags": 4, "first_tick": 1002, "count": 3, "mask": 0x0010, "delays": [250],
+                     "displacements": [0x80, 0x80, 0x81]}),
+    (1, 9, "ticks", {"epoch": 4, "flags": 3, "first_tick": 1002, "count": 1, "mask": 0x0005, "delays": [10, 0],
+                     "displacements": [0x00, 0x01, 0x80, 0xFF]}),
+    (1, 10, "table_ticks", {"epoch": 4, "flags": 4, "first_tick": 1100, "count": 190,
+                            "entries": [[3, 1, 0, 0, 0, 0, 0, 237, 46, 237]]}),
+    # Motors that cruise, ramp down in the middle of a step, speed up.
+    (1, 11, "table_ticks", {"epoch": 4, "flags": 0, "first_tick": 1290, "count": 300,
+                            "entries": [[0, -1, 1, 9, 0, 0, 0, 0, 0, 0], [1, 1, 0, 7, 39999, 12, 200, 237, 0, 201],
+                                        [15, 1, 0, 65535, 0, 0, 5, 6, 2147483647, 65535]]}),
+    (1, 12, "table_ticks", {"epoch": 5, "flags": 2, "first_tick": 0xFFFFFFFF, "count": 1,
+                            "entries": [[7, 1, 1, 0, 1, 0, 0, 0, 0, 0]]}),
+    (1, 13, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[0, 2, 1, 200]]}),
+    (1, 14, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[1, 0, -1, 1], [15, 7, 1, 2147483647]]}),
+    (0, 15, "emergency", {"how": 0}),
+    (2, 16, "emergency", {"how": 1}),
+    (0, 17, "set_address", {"unique_id": ID, "address": 9}),
+    (9, 18, "get_tables", {}),
+    (1, 7, "identity", {"protocol_version": 2, "motors": 16, "firmware_version": 258, "boot_number": 4660,
+                        "slots": 128, "queue_ticks": 256, "table_codes": 2048, "capabilities": 15, "unique_id": ID}),
+    (2, 255, "report", {"state": 2, "faults": 0, "flags": 7, "epoch": 3, "boot_number": 4660, "tick": 1001,
+                        "tick_ns": 1999999, "mark": 66050, "mark_tick": 990, "mark_ns": 0, "rate_ppb": -48000,
+                        "moving": 3, "running": 2, "inputs": 0, "bad_frames": 1, "rejected_frames": 65535,
+                        "last_rejection": 6, "run_downs": 0, "low_water_ticks": 117, "islands": 1,
+                        "island_from": 1200, "island_until": 1390, "motor_count": 2,
+                        "motor": [[-310, 1010], [2147483647, 65535]]}),
+    (9, 18, "tables", {"valid": 5, "held": [[0xCBF43926, 7], [0, 0], [1, 4294967295], [0, 0], [0, 0], [0, 0], [0, 0],
+                                            [0, 0]]}),
+    (1, 6, "acknowledgement", {"status": 8}),
+    # The longest payload without a zero, and the longest of zeros.
+    (255, 255, "ticks", {"epoch": 255, "flags": 1, "first_tick": 0xFFFFFFFF, "count": 118, "mask": 0x0100,
+                         "delays": [257], "displacements": [1] * 236}),
+    (0, 0, "ticks", {"epoch": 0, "flags": 0, "first_tick": 0, "count": 236, "mask": 0x0001, "delays": [0],
+                     "displacements": [0] * 236}),
+]

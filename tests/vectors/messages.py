@@ -1,0 +1,71 @@
+"""The layouts of all payloads, as docs/protocol.md has them."""
+
+# A payload field: (name, bytes; negative: signed).
+LAYOUTS = {
+    "identify": (0x01, [("salt", 2), ("slots", 1), ("slot_units", 2)]),
+    "configure": (0x02, [("tick_ns", 4), ("format", 1), ("silence_ticks", 2)]),
+    "table_begin": (0x03, [("slot", 1), ("accel_count", 2), ("decel_count", 2), ("cruise", 2), ("time_unit_ns", 4),
+                           ("revision", 4)]),
+    "table_data": (0x04, [("slot", 1), ("offset", 2), ("count", 1), ("codes", [2])]),
+    "table_end": (0x05, [("slot", 1), ("crc", 4)]),
+    "assign": (0x06, [("motor", 1), ("slot", 1)]),
+    "control": (0x07, [("actions", 1)]),
+    "set_position": (0x08, [("motor", 1), ("position_steps", -4)]),
+    "poll": (0x09, [("count", 1), ("entries", [1, 2])]),
+    "sync": (0x0A, [("master", 2), ("mark", 4), ("follows", 1), ("known_mark", 4), ("mark_tick", 4), ("mark_ns", 4)]),
+    "ticks": (0x0B, [("epoch", 1), ("flags", 1), ("first_tick", 4), ("count", 1), ("mask", 2), ("delays", [2]),
+                     ("displacements", [1])]),
+    "table_ticks": (0x0C, [("epoch", 1), ("flags", 1), ("first_tick", 4), ("count", 2), ("entries", "run_state")]),
+    "table_run": (0x0D, [("epoch", 1), ("first_tick", 4), ("entries", "table_run")]),
+    "emergency": (0x0E, [("how", 1)]),
+    "set_address": (0x0F, [("unique_id", [1]), ("address", 1)]),
+    "get_tables": (0x10, []),
+    "identity": (0x81, [("protocol_version", 1), ("motors", 1), ("firmware_version", 2), ("boot_number", 2),
+                        ("slots", 2), ("queue_ticks", 2), ("table_codes", 2), ("capabilities", 2),
+                        ("unique_id", [1])]),
+    "report": (0x89, [("state", 1), ("faults", 1), ("flags", 1), ("epoch", 1), ("boot_number", 2), ("tick", 4),
+                      ("tick_ns", 4), ("mark", 4), ("mark_tick", 4), ("mark_ns", 4), ("rate_ppb", -4), ("moving", 2),
+                      ("running", 2), ("inputs", 2), ("bad_frames", 2), ("rejected_frames", 2), ("last_rejection", 1),
+                      ("run_downs", 2), ("low_water_ticks", 2), ("islands", 2), ("island_from", 2),
+                      ("island_until", 2), ("motor_count", 1), ("motor", [-4, 2])]),
+    "tables": (0x90, [("valid", 1), ("held", [4, 4])]),
+    "acknowledgement": (0x82, [("status", 1)]),
+}
+
+
+def run_state_bytes(motor, direction, cruises, since, since_ns, lead, accel_at, accel_end, cruise_left, decel_left):
+    head = motor | (0x80 if direction > 0 else 0) | (0 if cruises else 0x40)
+    out = since.to_bytes(2, "little")
+    if since_ns:
+        head |= 0x20
+        out += since_ns.to_bytes(4, "little")
+    if lead:
+        head |= 0x10
+        out += lead.to_bytes(2, "little")
+    if not cruises:
+        for value, width in ((accel_at, 2), (accel_end, 2), (cruise_left, 4), (decel_left, 2)):
+            out += value.to_bytes(width, "little")
+    return bytes([head]) + out
+
+
+def table_run_bytes(motor, slot, direction, steps):
+    return bytes([motor | slot << 4 | (0x80 if direction > 0 else 0)]) + steps.to_bytes(4, "little")
+
+
+ENTRIES = {"run_state": run_state_bytes, "table_run": table_run_bytes}
+
+
+def payload_of(layout, fields):
+    out = b""
+    for name, width in layout:
+        value = fields[name]
+        if isinstance(width, int):
+            out += value.to_bytes(abs(width), "little", signed=width < 0)
+            continue
+        if isinstance(width, str):
+            out += b"".join(ENTRIES[width](*element) for element in value)
+            continue
+        for element in value:
+            parts = element if isinstance(element, list) else [element]
+            out += b"".join(p.to_bytes(abs(w), "little", signed=w < 0) for p, w in zip(parts, width, strict=True))
+    return out
