@@ -9,7 +9,7 @@
 namespace bushd::tables::laws {
 namespace {
 
-constexpr int kBisections = 100;
+constexpr double kPrecision = 1e-12;  // of the steepness that is searched for
 constexpr double kV64IntervalS = 25e-6;
 constexpr std::int64_t kV64Dividend = 2'560'000;
 constexpr std::int64_t kV64UpdateIntervals = 625;
@@ -58,7 +58,7 @@ Result<std::vector<double>> recurrence(const SideSpec& side, double start_hz, do
         "not even a jump to the maximum after one step is as short as asked; use a longer "
         "--time or more --codes");
   }
-  for (int i = 0; i < kBisections; ++i) {
+  while (high - low > kPrecision * high) {
     const double middle = 0.5 * (low + high);
     (fits(middle) ? high : low) = middle;
   }

@@ -256,7 +256,10 @@ Result<std::vector<double>> side_delays_s(const Spec& spec, Side side) {
 Result<TableContent> make_content(const Spec& spec) {
   const auto accel = side_delays_s(spec, Side::kAccel);
   if (!accel) return fail(accel.error());
-  const auto decel = side_delays_s(spec, Side::kDecel);
+  // Only a motor brakes otherwise than it speeds up.
+  const bool mirrored =
+      !spec.decel && !spec.motor && spec.stop_hz.value_or(spec.start_hz) == spec.start_hz;
+  const auto decel = mirrored ? accel : side_delays_s(spec, Side::kDecel);
   if (!decel) return fail(decel.error());
   const auto unit_ns = unit_for(spec, *accel, *decel);
   if (!unit_ns) return fail(unit_ns.error());
