@@ -1,12 +1,14 @@
 #include "tables/toml_file.h"
 
 #include <fmt/core.h>
+#include <glib.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <optional>
 #include <system_error>
 
 namespace bushd::tables {
@@ -24,8 +26,9 @@ class DottedKeyGuard {
  public:
   explicit DottedKeyGuard(std::string_view text) : rest_(text) {}
 
-  // The line of the first key that is too deep, or 0.
-  int find() {
+  // Where the first key goes too deep, if one does.
+  std::optional<std::size_t> find() {
+    const std::size_t size = rest_.size();
     while (!rest_.empty()) {
       const char c = rest_.front();
       if (c == '"' || c == '\'') {
@@ -37,20 +40,17 @@ class DottedKeyGuard {
         continue;
       }
       if (c == '.') {
-        if (++dots_ >= kMaxDottedDepth) return line_;
+        if (++dots_ >= kMaxDottedDepth) return size - rest_.size();
       } else if (std::string_view("=,[]{}\n").find(c) != std::string_view::npos) {
         dots_ = 0;
       }
       skip(1);
     }
-    return 0;
+    return std::nullopt;
   }
 
  private:
-  void skip(std::size_t count) {
-    for (const char c : rest_.substr(0, count)) line_ += c == '\n';
-    rest_.remove_prefix(std::min(count, rest_.size()));
-  }
+  void skip(std::size_t count) { rest_.remove_prefix(std::min(count, rest_.size())); }
 
   void skip_string(char quote) {
     const std::string_view three = quote == '"' ? "\"\"\"" : "'''";
@@ -67,9 +67,22 @@ class DottedKeyGuard {
   }
 
   std::string_view rest_;
-  int line_ = 1;
   int dots_ = 0;
 };
+
+// Precondition: what comes before is UTF-8.
+tl::unexpected<Error> fail_at(std::string_view text, std::size_t offset, const std::string& path,
+                              std::string message) {
+  const std::string_view before = text.substr(0, offset);
+  const std::string_view line = before.substr(before.rfind('\n') + 1);  // npos + 1 is 0
+  const auto characters = std::count_if(line.begin(), line.end(), [](char byte) {
+    return (static_cast<unsigned char>(byte) & 0xC0) != 0x80;
+  });
+  return fail(Error{.message = std::move(message),
+                    .file = path,
+                    .line = 1 + static_cast<int>(std::count(before.begin(), before.end(), '\n')),
+                    .column = 1 + static_cast<int>(characters)});
+}
 
 tl::unexpected<Error> unreadable(const std::filesystem::path& path, std::string why) {
   return fail(Error{.message = "cannot be read: " + std::move(why), .file = path.string()});
@@ -106,13 +119,18 @@ Result<std::string> read_text(const std::filesystem::path& path) {
 }
 
 Result<toml::table> parse_toml(std::string_view text, const std::string& path) {
-  if (const int line = DottedKeyGuard(text).find()) {
-    return fail(
-        Error{.message = fmt::format("a key of more than {} parts; allowed: the keys of the "
-                                     "documentation, which have two at most",
-                                     kMaxDottedDepth),
-              .file = path,
-              .line = line});
+  const char* end = text.data();
+  if (!text.empty() &&
+      g_utf8_validate(text.data(), static_cast<gssize>(text.size()), &end) == FALSE) {
+    return fail_at(
+        text, static_cast<std::size_t>(end - text.data()), path,
+        fmt::format("byte 0x{:02x} is not text; allowed: UTF-8", static_cast<unsigned char>(*end)));
+  }
+  if (const auto offset = DottedKeyGuard(text).find()) {
+    return fail_at(text, *offset, path,
+                   fmt::format("a key of more than {} parts; allowed: the keys of the "
+                               "documentation, which have two at most",
+                               kMaxDottedDepth));
   }
   try {
     return toml::parse(text, path);

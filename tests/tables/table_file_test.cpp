@@ -202,6 +202,7 @@ TEST(HostileTableFile, DeepDottedKeysAreRefused) {
     const auto table = parse(kHead + text, "deep.toml");
     ASSERT_FALSE(table.has_value());
     EXPECT_THAT(table.error().message, HasSubstr("more than 16 parts")) << text.substr(0, 30);
+    EXPECT_GT(table.error().column, 0);
   }
 }
 
@@ -230,10 +231,16 @@ TEST(HostileTableFile, DotsThatAreNotKeysCostNothing) {
   EXPECT_EQ(floats.error().key, "accel[0]");
 }
 
-TEST(HostileTableFile, BytesThatAreNotUtf8AreRefused) {
-  const auto table = parse(kHead + "description = \"\xC3\x28\"\naccel = [9]\n", "bytes.toml");
-  ASSERT_FALSE(table.has_value());
-  EXPECT_EQ(table.error().line, 3);
+TEST(HostileTableFile, BytesThatAreNotUtf8AreRefusedWhereTheyAre) {
+  for (const std::string& bytes : {std::string("\xC3\x28"), std::string("\xFF"),
+                                   std::string("\xED\xA0\x80"), std::string(1, '\0')}) {
+    const auto table =
+        parse(kHead + "description = \"ä" + bytes + "\"\naccel = [9]\n", "bytes.toml");
+    ASSERT_FALSE(table.has_value());
+    EXPECT_EQ(table.error().line, 3);
+    EXPECT_EQ(table.error().column, 17);
+    EXPECT_THAT(table.error().message, HasSubstr("is not text; allowed: UTF-8"));
+  }
 }
 
 TEST(HostileTableFile, NulBytesAreRefused) {

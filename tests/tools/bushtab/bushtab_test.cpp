@@ -214,7 +214,8 @@ TEST(BushtabCheck, HostileFilesAreRefusedWithLineAndColumn) {
   EXPECT_THAT(refusal("[9, -5]"), HasSubstr("h.toml:3:13: accel[1]: is -5"));
   EXPECT_THAT(refusal("[9, \"7\"]"), HasSubstr("h.toml:3:13: accel[1]: is the string"));
   EXPECT_THAT(refusal("9"), HasSubstr("h.toml:3:9: accel: is 9; allowed: an array"));
-  EXPECT_THAT(refusal("[9] # \xff"), HasSubstr("h.toml:3:14: not TOML: "));
+  EXPECT_THAT(refusal("[9] # \xff"),
+              HasSubstr("h.toml:3:15: byte 0xff is not text; allowed: UTF-8"));
   EXPECT_THAT(refusal(repeated("[", 100'000)), HasSubstr("h.toml:3:"));
   EXPECT_THAT(refusal("[" + repeated("1,", 100'000) + "]"), HasSubstr("makes 100000 codes in all"));
   EXPECT_THAT(refusal("[" + repeated("1,", 1'100'000) + "]"),
