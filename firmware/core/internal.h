@@ -13,8 +13,10 @@ static inline int32_t ticks_after(uint32_t tick, uint32_t reference) {
   return (int32_t)(tick - reference);
 }
 
+// An 8-bit CPU shifts bit by bit: it looks the bit up.
+extern const uint16_t bushd_mcu_motor_bit[BUSHD_MOTORS_PER_MCU];
 static inline uint16_t motor_bit(uint8_t motor) {
-  return (uint16_t)(1u << motor);
+  return bushd_mcu_motor_bit[motor];
 }
 
 static inline uint16_t saturating_increment(uint16_t value) {
@@ -27,8 +29,8 @@ static inline void bushd_mcu_reject(bushd_mcu* mcu, bushd_status status) {
 }
 
 static inline int16_t* queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t motor) {
-  const uint32_t row = tick & (uint32_t)(mcu->config.queue_ticks - 1u);
-  return &mcu->config.queue[row * mcu->config.motors + motor];
+  const uint16_t row = (uint16_t)tick & (uint16_t)(mcu->config.queue_ticks - 1u);
+  return &mcu->config.queue[(size_t)row * mcu->config.motors + motor];
 }
 
 static inline bool has_island(const bushd_mcu_motor* motor) {
@@ -59,8 +61,8 @@ void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t motor, uint32_t tick);
 void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t motor);
 void bushd_mcu_clear_streams(bushd_mcu* mcu);
 
-// motor.c: what a motor does in the tick that is prepared, and how it stops by itself.
-int16_t bushd_mcu_emit(bushd_mcu* mcu, uint8_t motor, bushd_plane* plane);
+// motor.c: what motors do in the tick that is prepared, and how they stop by themselves.
+void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane);
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message);
 void bushd_mcu_watch_silence(bushd_mcu* mcu);  // before every tick is prepared
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message);

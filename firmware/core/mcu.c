@@ -7,13 +7,16 @@
 #define STALE_TAGS 128u
 #define STALE_NS 100000000u  // no line or adapter keeps a frame back for so long
 
+const uint16_t bushd_mcu_motor_bit[BUSHD_MOTORS_PER_MCU] = {
+    1u << 0, 1u << 1, 1u << 2,  1u << 3,  1u << 4,  1u << 5,  1u << 6,  1u << 7,
+    1u << 8, 1u << 9, 1u << 10, 1u << 11, 1u << 12, 1u << 13, 1u << 14, 1u << 15};
+
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu) {
-  uint16_t moving = 0;
+  uint16_t moving = mcu->plane[0].active | mcu->plane[1].active;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     const bushd_mcu_motor* motor = &mcu->motor[m];
-    const bool queued = ticks_after(motor->known_until, mcu->tick + 2u) > 0;
-    const bool emitted = ((mcu->plane[0].active | mcu->plane[1].active) & motor_bit(m)) != 0;
-    if (motor->mode != BUSHD_MCU_STREAM || motor->delay != 0 || queued || emitted) {
+    if (motor->mode != BUSHD_MCU_STREAM || motor->delay != 0 ||
+        ticks_after(motor->known_until, FIRST_OPEN(mcu)) > 0) {
       moving |= motor_bit(m);
     }
   }
@@ -91,24 +94,9 @@ const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   return &mcu->plane[mcu->front];
 }
 
-// Of a motor that is to move on when its queued ticks end.
-static void watch_low_water(bushd_mcu* mcu, const bushd_mcu_motor* motor) {
-  if (motor->delay == 0) return;
-  const int32_t queued = ticks_after(motor->known_until, FIRST_OPEN(mcu));
-  if (queued < mcu->low_water_ticks) mcu->low_water_ticks = (uint16_t)queued;
-}
-
 void bushd_mcu_prepare(bushd_mcu* mcu) {
-  bushd_plane* plane = &mcu->plane[mcu->front ^ 1u];
-  memset(plane->step, 0, mcu->config.slots * sizeof plane->step[0]);
-  plane->active = 0;
   bushd_mcu_watch_silence(mcu);
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    plane->steps[m] = bushd_mcu_emit(mcu, m, plane);
-    if (plane->steps[m] != 0) plane->active |= motor_bit(m);
-    watch_low_water(mcu, &mcu->motor[m]);
-  }
-  plane->direction = mcu->direction;
+  bushd_mcu_emit(mcu, &mcu->plane[mcu->front ^ 1u]);
   bushd_mcu_update_state(mcu);
 }
 

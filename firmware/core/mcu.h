@@ -18,6 +18,7 @@
 #include "engine/frame.h"
 #include "engine/message.h"
 #include "engine/run.h"
+#include "engine/run_slots.h"
 #include "engine/slots.h"
 #include "engine/table.h"
 #include "firmware/core/port.h"
@@ -46,7 +47,8 @@ typedef struct bushd_mcu_config {
   int16_t* queue;        // queue_ticks x motors displacements
   uint16_t
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
-  uint16_t* codes;  // table memory
+  uint32_t min_tick_ns;  // shorter ones are refused
+  uint16_t* codes;       // table memory
   uint16_t code_count;
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
 } bushd_mcu_config;
@@ -147,8 +149,10 @@ typedef struct bushd_mcu {
   uint8_t last_rejection;
   uint16_t direction;  // DIR levels of the plane prepared last
   uint16_t codes_used;
+  bushd_run_tick run_tick;  // for the runs' latest time unit
   bushd_mcu_clock clock;
   bushd_plane plane[2];
+  bushd_slots plans[BUSHD_MOTORS_PER_MCU];  // of the plane that is being prepared
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];
   bushd_receiver receiver;

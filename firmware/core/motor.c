@@ -3,7 +3,6 @@
 // - its queue ends while it moves
 // - no master is heard for too long while it is in a table run
 // - an emergency stop is commanded
-#include "engine/run_slots.h"
 #include "firmware/core/internal.h"
 
 static const bushd_table* table_of(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
@@ -52,27 +51,28 @@ static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   return displacement;
 }
 
-static int16_t queued_displacement(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
-  bushd_mcu_motor* motor = &mcu->motor[m];
-  int16_t* const queued = queue_at(mcu, tick, m);
+static inline int16_t queued_displacement(bushd_mcu_motor* motor, uint32_t tick, int16_t* queued) {
   const int16_t displacement = *queued;
   *queued = 0;
-  const bool at_rest =
-      ticks_after(tick, motor->rest_from) >= 0 && ticks_after(tick, motor->start_tick) <= 0;
-  if (at_rest) motor->begun = false;
-  if (displacement != 0) motor->begun = true;
+  if (displacement != 0) {
+    motor->begun = true;
+  } else if (motor->begun) {
+    const bool at_rest =
+        ticks_after(tick, motor->rest_from) >= 0 && ticks_after(tick, motor->start_tick) <= 0;
+    motor->begun = !at_rest;
+  }
   return displacement;
 }
 
-static void set_direction(bushd_mcu* mcu, uint8_t m, bool positive) {
+static inline void set_direction(bushd_mcu* mcu, uint16_t bit, bool positive) {
   if (positive) {
-    mcu->direction |= motor_bit(m);
+    mcu->direction |= bit;
   } else {
-    mcu->direction &= (uint16_t)~motor_bit(m);
+    mcu->direction &= (uint16_t)~bit;
   }
 }
 
-static void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
+static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   if (displacement == 0) {
     motor->still_ticks = saturating_increment(motor->still_ticks);
     return;
@@ -81,13 +81,15 @@ static void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   motor->displacement = (uint16_t)(displacement < 0 ? -displacement : displacement);
 }
 
-static int16_t emit_exact(bushd_mcu* mcu, uint8_t m, bushd_plane* plane) {
-  bushd_mcu_motor* motor = &mcu->motor[m];
+static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, uint16_t* masks) {
   bushd_run* run = &motor->run;
-  set_direction(mcu, m, run->direction > 0);
+  set_direction(mcu, bit, run->direction > 0);
   const int16_t before = motor->remainder;
-  const int16_t steps =
-      bushd_run_slots(run, mcu->tick_ns, mcu->config.slots, motor_bit(m), plane->step);
+  const uint32_t unit_ns = run->table->time_unit_ns;
+  if (mcu->run_tick.tick_ns != mcu->tick_ns || mcu->run_tick.unit_ns != unit_ns) {
+    mcu->run_tick = bushd_run_tick_of(mcu->tick_ns, unit_ns);
+  }
+  const int16_t steps = bushd_run_slots(run, &mcu->run_tick, mcu->config.slots, bit, masks);
   // As ticks of the format would leave it, so that they can go on from here.
   motor->remainder =
       mcu->format == BUSHD_FORMAT_FINE ? (int16_t)(run->fraction * run->direction) : (int16_t)0;
@@ -97,38 +99,86 @@ static int16_t emit_exact(bushd_mcu* mcu, uint8_t m, bushd_plane* plane) {
   return steps;
 }
 
-static int16_t emit_displacement(bushd_mcu* mcu, uint8_t m, bushd_plane* plane,
-                                 int16_t displacement) {
-  bushd_mcu_motor* motor = &mcu->motor[m];
+static inline int16_t plan_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit,
+                                        int16_t displacement, bushd_slots* plan) {
   note_speed(motor, displacement);
   if (displacement == 0) return 0;
-  set_direction(mcu, m, displacement > 0);
+  set_direction(mcu, bit, displacement > 0);
   const int16_t crossing =
       mcu->format == BUSHD_FORMAT_FINE ? BUSHD_CROSSING_FINE : BUSHD_CROSSING_COARSE;
-  return bushd_slots_add(plane->step, mcu->config.slots, motor_bit(m), displacement,
-                         &motor->remainder, crossing);
+  return bushd_slots_plan(displacement, &motor->remainder, crossing, plan);
 }
 
-int16_t bushd_mcu_emit(bushd_mcu* mcu, uint8_t m, bushd_plane* plane) {
+// Nothing is queued for this tick. `exact`: it is one of a run-down that is exact to a slot.
+static int16_t plan_without_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick, bushd_slots* plan,
+                                  bool* exact) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  const uint32_t tick = mcu->tick + 1u;
-  if (motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->run_until) >= 0) {
-    motor->mode = BUSHD_MCU_STREAM;
-  }
-  if (motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->run_from) >= 0) {
-    return emit_exact(mcu, m, plane);
-  }
-  if (ticks_after(motor->known_until, tick) > 0) {
-    return emit_displacement(mcu, m, plane, queued_displacement(mcu, m, tick));
-  }
   motor->known_until = tick + 1u;
   if (motor->delay != 0) queue_ended(mcu, m);
   if (motor->mode != BUSHD_MCU_RAMP_DOWN) {
     motor->begun = false;
     return 0;
   }
-  if (motor->exact) return emit_exact(mcu, m, plane);
-  return emit_displacement(mcu, m, plane, ramp_down_displacement(mcu, motor));
+  *exact = motor->exact;
+  if (motor->exact) return 0;
+  return plan_displacement(mcu, motor, motor_bit(m), ramp_down_displacement(mcu, motor), plan);
+}
+
+static inline bool in_run_at(bushd_mcu_motor* motor, uint32_t tick) {
+  if (motor->mode != BUSHD_MCU_TABLE_RUN) return false;
+  if (ticks_after(tick, motor->run_until) >= 0) motor->mode = BUSHD_MCU_STREAM;
+  return motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->run_from) >= 0;
+}
+
+// Of a motor that is to move on when its queued ticks end.
+static inline void watch_low_water(bushd_mcu* mcu, const bushd_mcu_motor* motor) {
+  if (motor->delay == 0) return;
+  const int32_t queued = ticks_after(motor->known_until, FIRST_OPEN(mcu));
+  if (queued < mcu->low_water_ticks) mcu->low_water_ticks = (uint16_t)queued;
+}
+
+// Steps that displacements make; returns the motors whose steps are those of a run.
+static uint16_t plan_all(bushd_mcu* mcu, bushd_plane* plane) {
+  const uint32_t tick = mcu->tick + 1u;
+  uint16_t exact = 0;
+  uint16_t active = 0;
+  uint16_t bit = 1;
+  int16_t* queued = queue_at(mcu, tick, 0);
+  int16_t* steps = plane->steps;
+  bushd_slots* plan = mcu->plans;
+  bushd_mcu_motor* const end = mcu->motor + mcu->config.motors;
+  for (bushd_mcu_motor* motor = mcu->motor; motor != end; ++motor) {
+    bool is_exact = in_run_at(motor, tick);
+    int16_t made = 0;
+    plan->distance = 0;
+    if (!is_exact) {
+      made =
+          ticks_after(motor->known_until, tick) > 0
+              ? plan_displacement(mcu, motor, bit, queued_displacement(motor, tick, queued), plan)
+              : plan_without_queue(mcu, (uint8_t)(motor - mcu->motor), tick, plan, &is_exact);
+    }
+    *steps = made;
+    if (made != 0) active |= bit;
+    if (is_exact) exact |= bit;
+    watch_low_water(mcu, motor);
+    ++queued;
+    ++steps;
+    ++plan;
+    bit = (uint16_t)(bit << 1);
+  }
+  plane->active = active;
+  return exact;
+}
+
+void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane) {
+  uint16_t exact = plan_all(mcu, plane);
+  bushd_slots_fill(plane->step, mcu->config.slots, mcu->plans, mcu->config.motors);
+  for (uint8_t m = 0; exact != 0; ++m, exact = (uint16_t)(exact >> 1)) {
+    if ((exact & 1u) == 0) continue;
+    plane->steps[m] = emit_exact(mcu, &mcu->motor[m], motor_bit(m), plane->step);
+    if (plane->steps[m] != 0) plane->active |= motor_bit(m);
+  }
+  plane->direction = mcu->direction;
 }
 
 // When a run from rest is over, in ticks; false if that is farther than tick numbers reach.

@@ -82,6 +82,7 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
   const bool same = (mcu->flags & BUSHD_FLAG_CONFIGURED) != 0 && mcu->tick_ns == message->tick_ns &&
                     mcu->format == message->format;
   if (!same && bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if (message->tick_ns < mcu->config.min_tick_ns) return BUSHD_E_CAPACITY;
   mcu->silence_ticks = message->silence_ticks;
   if (same) return BUSHD_OK;
   mcu->tick_ns = message->tick_ns;

@@ -119,12 +119,32 @@ static void open_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stret
   motor->start_tick = stretch->first_tick;
 }
 
-static void put(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t displacement) {
+// Of a stretch's ticks, as offsets from its first: those from `begin` on are not known yet, but for
+// the island's.
+typedef struct gap {
+  uint16_t begin;
+  uint16_t island_begin;
+  uint16_t island_end;
+} gap;
+
+static uint16_t offset_of(const bushd_mcu_stretch* stretch, uint32_t tick) {
+  const int32_t offset = ticks_after(tick, stretch->first_tick);
+  if (offset <= 0) return 0;
+  return offset < stretch->count ? (uint16_t)offset : stretch->count;
+}
+
+static gap gap_in(const bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
-  if (ticks_after(tick, motor->known_until) < 0) return;
-  const bool in_island = has_island(motor) && ticks_after(tick, motor->island.from) >= 0 &&
-                         ticks_after(tick, motor->island.until) < 0;
-  if (!in_island) *queue_at(mcu, tick, m) = displacement;
+  gap found = {offset_of(stretch, motor->known_until), stretch->count, stretch->count};
+  if (has_island(motor)) {
+    found.island_begin = offset_of(stretch, motor->island.from);
+    found.island_end = offset_of(stretch, motor->island.until);
+  }
+  return found;
+}
+
+static inline bool in_gap(const gap* g, uint16_t offset) {
+  return offset >= g->begin && (offset < g->island_begin || offset >= g->island_end);
 }
 
 static void grow_island(bushd_mcu_motor* motor, uint32_t from, uint32_t until, uint16_t delay) {
@@ -176,10 +196,46 @@ static bool in_range(const bushd_ticks* ticks) {
   return true;
 }
 
-static int16_t displacement_at(const bushd_ticks* ticks, uint8_t row, uint8_t column) {
-  const uint16_t index = (uint16_t)(row * ticks->motors + column);
-  if (ticks->flags & BUSHD_TICKS_FINE) return bushd_get_i16(ticks->displacements + 2u * index);
-  return bushd_coarse_to_fine(ticks->displacements[index]);
+// Rows begin .. end - 1 of a motor's column into the queue.
+static void put_rows(bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks, uint8_t column,
+                     uint8_t begin, uint8_t end) {
+  if (begin >= end) return;
+  const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
+  const uint8_t size = fine ? 2 : 1;
+  const uint8_t stride = (uint8_t)(size * ticks->motors);
+  const uint8_t* at = ticks->displacements + begin * stride + size * column;
+  const uint8_t motors = mcu->config.motors;
+  int16_t* queued = queue_at(mcu, ticks->first_tick + begin, m);
+  const int16_t* const queue_end = mcu->config.queue + (size_t)mcu->config.queue_ticks * motors;
+  for (uint8_t rows = (uint8_t)(end - begin); rows > 0; --rows, at += stride) {
+    *queued = fine ? bushd_get_i16(at) : bushd_coarse_to_fine(*at);
+    queued += motors;
+    if (queued >= queue_end) queued = &mcu->config.queue[m];
+  }
+}
+
+static void put_column(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
+                       const bushd_ticks* ticks, uint8_t column) {
+  const gap unknown = gap_in(mcu, m, stretch);
+  const uint8_t begin = (uint8_t)unknown.begin;
+  const uint8_t island_begin = (uint8_t)unknown.island_begin;
+  const uint8_t island_end = (uint8_t)unknown.island_end;
+  put_rows(mcu, m, ticks, column, begin, island_begin);
+  put_rows(mcu, m, ticks, column, begin > island_end ? begin : island_end, ticks->count);
+}
+
+// What frames do to most motors: their ticks join, and nothing waits beyond.
+static bool join(bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks, uint8_t column) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  if ((ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE)) != 0 || has_island(motor)) {
+    return false;
+  }
+  const int32_t known = ticks_after(motor->known_until, ticks->first_tick);
+  if (known < 0 || known >= ticks->count) return false;
+  put_rows(mcu, m, ticks, column, (uint8_t)known, ticks->count);
+  motor->known_until = ticks->first_tick + ticks->count;
+  motor->delay = bushd_get_u16(ticks->delays + 2u * column);
+  return true;
 }
 
 bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
@@ -194,11 +250,11 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
   uint8_t column = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((ticks->mask & motor_bit(m)) == 0) continue;
-    open_motor(mcu, m, &stretch);
-    for (uint8_t row = 0; row < ticks->count; ++row) {
-      put(mcu, m, ticks->first_tick + row, displacement_at(ticks, row, column));
+    if (!join(mcu, m, ticks, column)) {
+      open_motor(mcu, m, &stretch);
+      put_column(mcu, m, &stretch, ticks, column);
+      close_motor(mcu, m, &stretch, bushd_get_u16(ticks->delays + 2u * column));
     }
-    close_motor(mcu, m, &stretch, bushd_get_u16(ticks->delays + 2u * column));
     ++column;
   }
   close_stretch(mcu, &stretch);
@@ -213,6 +269,7 @@ static bool restore(const bushd_mcu* mcu, const bushd_table_ticks_entry* entry, 
 
 static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch, bushd_run* run) {
   enum { CHUNK = 16 };
+  const gap unknown = gap_in(mcu, m, stretch);
   int16_t fine[CHUNK];
   uint8_t coarse[CHUNK];
   for (uint16_t at = 0; at < stretch->count; at = (uint16_t)(at + CHUNK)) {
@@ -225,8 +282,9 @@ static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
       bushd_run_expand_coarse(run, mcu->tick_ns, count, coarse, 1);
     }
     for (uint16_t i = 0; i < count; ++i) {
-      put(mcu, m, stretch->first_tick + at + i,
-          in_fine ? fine[i] : bushd_coarse_to_fine(coarse[i]));
+      if (!in_gap(&unknown, (uint16_t)(at + i))) continue;
+      *queue_at(mcu, stretch->first_tick + at + i, m) =
+          in_fine ? fine[i] : bushd_coarse_to_fine(coarse[i]);
     }
   }
 }

@@ -33,41 +33,43 @@ size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint
   return size + 2;
 }
 
-// In place: data[0] is the leading distance and the raw frame stays where it is, behind it. Bytes
-// collected between delimiters are never 0, so every distance moves on.
-static bool cobs_decode(uint8_t* data, uint16_t size) {
-  uint16_t at = data[0];
-  while (at < size) {
-    const uint8_t distance = data[at];
-    data[at] = 0;
-    at = (uint16_t)(at + distance);
-  }
-  return at == size;
+void bushd_receiver_check(bushd_receiver* receiver) {
+  if (receiver->size == 0 || receiver->size == OVERLONG) return;
+  const uint16_t raw_size = (uint16_t)(receiver->size - 1u);
+  const uint8_t* const raw = receiver->buffer + 1;
+  receiver->inverted = ~bushd_crc32(~receiver->inverted, raw + receiver->checked,
+                                    (size_t)(raw_size - receiver->checked));
+  receiver->checked = raw_size;
+}
+
+static void begin_frame(bushd_receiver* receiver) {
+  receiver->size = 0;
+  receiver->run = 0;
+  receiver->checked = 0;
+  receiver->inverted = 0;
 }
 
 bushd_receive bushd_receive_byte(bushd_receiver* receiver, uint8_t byte, bushd_frame* frame) {
+  if (bushd_receiver_collect(receiver, byte)) return BUSHD_RECEIVE_MORE;
   if (byte != 0) {
-    if (receiver->size < sizeof receiver->buffer) {
-      receiver->buffer[receiver->size++] = byte;
-    } else {
-      receiver->size = OVERLONG;
-    }
+    receiver->size = OVERLONG;
     return BUSHD_RECEIVE_MORE;
   }
+  bushd_receiver_check(receiver);
   const uint16_t size = receiver->size;
-  receiver->size = 0;
+  // The delimiter must be where the last distance leads.
+  const bool whole = receiver->run == 0;
+  const uint32_t crc = ~receiver->inverted;
+  begin_frame(receiver);
   if (size == 0) return BUSHD_RECEIVE_MORE;
-  if (size == OVERLONG || size < 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC) {
+  if (size == OVERLONG || size < 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC || !whole) {
     return BUSHD_RECEIVE_BAD_LENGTH;
   }
-  if (!cobs_decode(receiver->buffer, size)) return BUSHD_RECEIVE_BAD_LENGTH;
-  const uint8_t* const raw = receiver->buffer + 1;
-  const uint16_t body = (uint16_t)(size - 1 - BUSHD_FRAME_CRC);
   // A frame and its own CRC leave the same register behind, whatever the frame.
   const uint32_t kResidue = 0xDEBB20E3;
-  if (bushd_crc32(BUSHD_CRC32_START, raw, body + BUSHD_FRAME_CRC) != kResidue) {
-    return BUSHD_RECEIVE_BAD_CRC;
-  }
+  if (crc != kResidue) return BUSHD_RECEIVE_BAD_CRC;
+  const uint8_t* const raw = receiver->buffer + 1;
+  const uint16_t body = (uint16_t)(size - 1 - BUSHD_FRAME_CRC);
   frame->address = raw[0];
   frame->type = raw[1];
   frame->tag = raw[2];

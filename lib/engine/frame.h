@@ -44,10 +44,14 @@ typedef struct bushd_frame {
   const uint8_t* payload;
 } bushd_frame;
 
-// Collects bytes of a line into frames. Zero-initialise it; resynchronises at every delimiter.
+// Collects bytes of a line into frames, decoding as they come. Zero-initialise it; resynchronises
+// at every delimiter.
 typedef struct bushd_receiver {
-  uint8_t buffer[BUSHD_FRAME_MAX_RAW + 1u];
-  uint16_t size;  // bytes collected; BUSHD_FRAME_MAX_RAW + 2 marks an overlong frame
+  uint8_t buffer[BUSHD_FRAME_MAX_RAW + 1u];  // a zero for the leading distance, then the raw frame
+  uint16_t size;      // bytes collected; BUSHD_FRAME_MAX_RAW + 2 marks an overlong frame
+  uint8_t run;        // bytes to come before the next distance
+  uint16_t checked;   // raw bytes that the CRC has gone over
+  uint32_t inverted;  // of its register
 } bushd_receiver;
 
 typedef enum bushd_receive {
@@ -56,6 +60,18 @@ typedef enum bushd_receive {
   BUSHD_RECEIVE_BAD_CRC = 2,
   BUSHD_RECEIVE_BAD_LENGTH = 3  // too long, too short, or broken COBS
 } bushd_receive;
+
+// For a small MCU's loop, which must not be held up at a frame's end.
+// The short way of a byte that ends no frame; false if it must go through bushd_receive_byte.
+static inline bool bushd_receiver_collect(bushd_receiver* receiver, uint8_t byte) {
+  if (byte == 0 || receiver->size >= sizeof receiver->buffer) return false;
+  const bool distance = receiver->run == 0;
+  receiver->run = (uint8_t)((distance ? byte : receiver->run) - 1u);
+  receiver->buffer[receiver->size++] = distance ? 0 : byte;
+  return true;
+}
+// The CRC over what has come. O(bytes since the last call).
+void bushd_receiver_check(bushd_receiver* receiver);
 
 // Feeds one byte. Empty frames (two delimiters in a row) are nothing. O(1), O(frame) at a
 // delimiter.

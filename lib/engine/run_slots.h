@@ -10,15 +10,24 @@
 extern "C" {
 #endif
 
+// A tick in the time units of a table. Made once for many ticks: it takes a division.
+typedef struct bushd_run_tick {
+  uint32_t tick_ns;
+  uint32_t unit_ns;
+  uint32_t units;
+  uint32_t rest_ns;
+} bushd_run_tick;
+bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, uint32_t unit_ns);
+
 // Makes the next tick of a run: sets `bit` in the masks of the slots floor(t x slot_count /
 // tick_ns) for the steps at the times t from the tick's start; one at exactly its end falls into
 // its last slot. Returns the signed number of steps, 0 when the run is done. The run stands at the
 // tick's end afterwards, as bushd_run_expand_fine would leave it: ticks of both kinds may be mixed.
 //   masks  slot_count entries (BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS)
-// Precondition: as for bushd_run_expand_*; then no two steps share a slot. O(steps), with 64-bit
-// divisions.
-int16_t bushd_run_slots(bushd_run* run, uint32_t tick_ns, uint16_t slot_count, uint16_t bit,
-                        uint16_t* masks);
+// Precondition: as for bushd_run_expand_*; then no two steps share a slot. `tick` is of the unit of
+// the run's table and at most BUSHD_MAX_TICK_NS. O(slots + steps), no division.
+int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t slot_count,
+                        uint16_t bit, uint16_t* masks);
 
 #ifdef __cplusplus
 }

@@ -32,8 +32,30 @@ extern "C" {
 int16_t bushd_slots_add(uint16_t* masks, uint16_t slot_count, uint16_t bit, int16_t displacement,
                         int16_t* remainder, int16_t crossing);
 
+// The same in two parts, for all motors of a tick at once.
+//
+// The steps of one motor: where its position crosses x = first + 256 i, in 1/256 step from the
+// tick's start, up to `distance`; none if that is 0.
+typedef struct bushd_slots {
+  uint16_t distance;
+  uint16_t first;  // below 512
+} bushd_slots;
+
+// Returns the signed number of steps; `remainder` is then that of the tick's end. O(1), no
+// division.
+int16_t bushd_slots_plan(int16_t displacement, int16_t* remainder, int16_t crossing,
+                         bushd_slots* plan);
+
+// Makes the masks of all slots anew; plans[m] is bit m. O(slots + steps). A small MCU may link one
+// of its own (BUSHD_OWN_SLOTS_FILL), for its number of slots only.
+void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* plans,
+                      uint8_t motors);
+
 // The coarse byte as a fine displacement: steps x 256, signed by bit 7.
-int16_t bushd_coarse_to_fine(uint8_t coarse);
+static inline int16_t bushd_coarse_to_fine(uint8_t coarse) {
+  const int16_t size = (int16_t)((coarse & 0x7F) << 8);
+  return (coarse & 0x80) ? size : (int16_t)-size;
+}
 
 #ifdef __cplusplus
 }

@@ -80,6 +80,8 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   avr_ioctl(avr_, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
   avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_byte,
                           this);
+  avr_irq_register_notify(avr_get_interrupt_irq(avr_, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING,
+                          on_interrupt, this);
   watch_port('A', Signal::kStep, 0);
   watch_port('C', Signal::kStep, 8);
   watch_port('L', Signal::kDir, 0);
@@ -144,6 +146,11 @@ void AvrMcu::on_byte(avr_irq_t*, std::uint32_t value, void* param) {
   } else {
     ++self.bytes_cut_;
   }
+}
+
+// Its vector, or 0 at the end of the last one.
+void AvrMcu::on_interrupt(avr_irq_t*, std::uint32_t value, void* param) {
+  if (value != 0) ++static_cast<AvrMcu*>(param)->interrupts_;
 }
 
 std::array<std::uint8_t, 18> AvrMcu::eeprom() const {

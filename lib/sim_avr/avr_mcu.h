@@ -46,6 +46,8 @@ class AvrMcu final : public Mcu {
 
   // Bytes of RAM that nothing has written to since power-on, between variables and stack.
   std::size_t untouched_ram() const;
+  // Entered since power-on.
+  std::uint64_t interrupts() const { return interrupts_; }
   // Bytes lost in its receiver.
   std::uint64_t overruns() const { return overruns_; }
   // Bytes whose last stop bit was not over when driver-enable fell, or that began without it.
@@ -67,6 +69,7 @@ class AvrMcu final : public Mcu {
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_driver_enable(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_byte(avr_irq_t* irq, std::uint32_t value, void* param);
+  static void on_interrupt(avr_irq_t* irq, std::uint32_t value, void* param);
 
   std::size_t index_;
   Driver& driver_;
@@ -81,6 +84,7 @@ class AvrMcu final : public Mcu {
   std::size_t stack_begin_ = 0;
   bool driver_enable_ = false;
   TimeNs byte_end_ns_ = 0;
+  std::uint64_t interrupts_ = 0;
   std::uint64_t overruns_ = 0;
   std::uint64_t bytes_cut_ = 0;
   std::array<Pin, 33> pins_{};

@@ -123,6 +123,15 @@ TEST(Requests, AnotherSilenceAloneKeepsStepAndTables) {
   EXPECT_EQ(rig.pulses(0), 5);
 }
 
+TEST(Requests, ATickThatIsTooShortForTheMcuIsRefused) {
+  RigOptions options;
+  options.min_tick_ns = Rig::kTickNs;
+  Rig rig(options);
+  EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE, Rig::kTickNs), BUSHD_OK);
+  EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE, Rig::kTickNs - 1), BUSHD_E_CAPACITY);
+  EXPECT_EQ(rig.mcu().tick_ns, Rig::kTickNs);
+}
+
 class TwoMasters : public testing::Test {
  protected:
   TwoMasters() { EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE), BUSHD_OK); }

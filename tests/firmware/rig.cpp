@@ -110,6 +110,7 @@ Rig::Rig(RigOptions options)
   config.queue_ticks = options.queue_ticks;
   config.codes = codes_.data();
   config.code_count = options.code_count;
+  config.min_tick_ns = options.min_tick_ns;
   std::ranges::copy(unique_id(), config.unique_id);
   bushd_mcu_boot(&mcu_, &port, &config);
   plane_ = bushd_mcu_swap(&mcu_);

@@ -24,6 +24,7 @@ struct RigOptions {
   std::uint16_t slots = 256;
   std::uint16_t queue_ticks = 128;
   std::uint16_t code_count = 400;
+  std::uint32_t min_tick_ns = 0;
   bool self_test = true;
   bool stores_address = true;
 };

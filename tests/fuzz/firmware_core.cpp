@@ -65,6 +65,7 @@ class Mcu {
                                      .boot_number = kBootNumber,
                                      .queue = queue_.data(),
                                      .queue_ticks = kQueueTicks,
+                                     .min_tick_ns = BUSHD_MIN_TICK_NS,
                                      .codes = codes_.data(),
                                      .code_count = kCodes,
                                      .unique_id = {'f', 'u', 'z', 'z'}};

@@ -79,11 +79,15 @@ class Master {
     return out;
   }
 
-  // Sends now, behind a delimiter as everybody who takes the line does, and lets time pass until it
-  // is silent.
-  void send(std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload) {
+  // Sends now, behind a delimiter as everybody who takes the line does.
+  void post(std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload) {
     bus_.master_send(Bytes{0}, bus_.now_ns());
     bus_.master_send(wire(address, type, ++tag_, payload), bus_.now_ns());
+  }
+
+  // The same, and lets time pass until the line is silent.
+  void send(std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload) {
+    post(address, type, payload);
     drain();
   }
 

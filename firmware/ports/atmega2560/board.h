@@ -4,7 +4,6 @@
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_BOARD_H
 
 #include <avr/io.h>
-#include <stdint.h>
 
 #define CYCLES_PER_US 16u
 
@@ -23,6 +22,7 @@
 #define DE_PORT PORTE
 #define DE_BIT 4
 
+#ifndef __ASSEMBLER__
 static inline void board_init(void) {
   // Outputs are low since reset.
   DDRA = DDRC = DDRL = DDRB = 0xFF;
@@ -32,5 +32,6 @@ static inline void board_init(void) {
   PORTK = PORTJ = 0xFF;
   PORTE = 1 << 0;
 }
+#endif
 
 #endif

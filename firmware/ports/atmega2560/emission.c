@@ -1,145 +1,166 @@
 #include "firmware/ports/atmega2560/emission.h"
 
 #include <avr/interrupt.h>
-#include <util/delay_basic.h>
+#include <stddef.h>
 
 #include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/clock.h"
+#include "firmware/ports/atmega2560/emission_slots.h"
 
-// Pulses are to last 2.5 us; this many turns of three cycles besides the work of the slot
-// interrupt.
-#define PULSE_TURNS 8
+// From a slot's beginning to its compare B. Pulses are to last 2.5 us, 40 cycles: A's edge comes 23
+// cycles after its compare and later if another interrupt is being served, B's 11 after its own.
+#define PULSE_END_CYCLES 112u
 // Until the first slot.
 #define START_CYCLES 400u
+// Of a tick without steps: the last slot, and how many of them there are at most.
+#define SHORT_SLOT_CYCLES 256u
+#define MAX_EMPTY_SLOTS 9u
+
+_Static_assert(offsetof(emission_tick, direction) == 0, "as in emission_slots.S");
+_Static_assert(offsetof(emission_tick, mask) == TICK_MASK, "as in emission_slots.S");
+_Static_assert(offsetof(emission_tick, end) == TICK_END, "as in emission_slots.S");
+_Static_assert(offsetof(emission_tick, top) == TICK_TOP, "as in emission_slots.S");
+_Static_assert(offsetof(emission_tick, last_top) == TICK_LAST_TOP, "as in emission_slots.S");
+
+emission_tick emission_present;
+const emission_tick* volatile emission_next = &emission_silent;
+const emission_tick* volatile emission_taken;
+emission_tick emission_silent;  // goes on when no plane is ready
+
+static const uint16_t kNoSteps[MAX_EMPTY_SLOTS];
+
+// Between the interrupt and the main loop.
+static volatile bool committed;  // the next tick has begun
+static uint32_t next_start;      // of the tick that follows the one being emitted
+static uint32_t begun_at;        // of the committed one
 
 typedef struct tick_length {
   uint32_t cycles;
-  uint16_t slot_cycles;
-  uint16_t last_slot_cycles;
-  uint16_t joined_slot_cycles;  // all but the last; 0: more than the timer counts
-  uint16_t residue;             // 1/1000 cycles that it is too short
-  int32_t extra_ns;             // longer than a plain tick
+  uint16_t residue;  // 1/1000 cycles that it is too short
+  int32_t extra_ns;  // longer than a plain tick
 } tick_length;
 
-// Of the slot interrupt.
-static struct {
-  const uint16_t* mask;  // of the next slot
-  uint16_t slot_cycles;
-  uint16_t last_slot_cycles;
-  uint8_t slots_left;
-  bool silent;
-  bool first;  // the next one is the first of its tick
-} slot;
-
-// Between the change of planes and the main loop.
-static volatile bool ready;      // next_plane and next_length are good
-static volatile bool committed;  // the next tick goes by them
+// Of the main loop.
+static emission_tick prepared[2];  // one of them waits or was taken last
+static uint8_t spare;
 static const bushd_plane* next_plane;
 static tick_length next_length;
-static tick_length present_length;
-static uint32_t next_start;  // of the tick that follows the one being emitted
-
-// Of the main loop.
+static tick_length plain;    // without adjustment, from residue 0
 static uint32_t core_start;  // of the core's present tick
-static uint32_t begun_at;    // of the committed one
-static uint32_t tick_ns;
-static int32_t adjust_ns;  // of the next tick
-static int32_t carry_ns;   // adjustments that came when the tick they were for was committed
+static int32_t adjust_ns;    // of the next tick
+static int32_t carry_ns;     // adjustments that came when the tick they were for had begun
 static uint16_t residue;
 
-static inline void set_slot_length(uint16_t cycles) {
-  const uint16_t top = (uint16_t)(cycles - 1u);
-  if (OCR1A != top) OCR1A = top;
+static emission_tick tick_of_plane(const bushd_plane* plane, uint32_t cycles) {
+  const uint16_t slot = (uint16_t)(cycles / EMISSION_SLOTS);
+  emission_tick tick;
+  tick.direction = plane->direction;
+  tick.mask = plane->step;
+  tick.end = (uint8_t)(uintptr_t)(plane->step + EMISSION_SLOTS);
+  tick.top = (uint16_t)(slot - 1u);
+  tick.last_top = (uint16_t)(tick.top + (uint16_t)(cycles % EMISSION_SLOTS));
+  tick.cycles = cycles;
+  return tick;
 }
 
-// In the last slot of a tick, its pulses over: what is emitted from the next one on.
-static inline void change_planes(void) {
-  slot.silent = !ready || committed;
-  bool empty = true;
-  if (!slot.silent) {
-    DIR_LOW = (uint8_t)next_plane->direction;
-    DIR_HIGH = (uint8_t)(next_plane->direction >> 8);
-    slot.mask = next_plane->step;
-    empty = next_plane->active == 0;
-    present_length = next_length;
-    begun_at = next_start;
-    committed = true;
-    ready = false;
-  }
-  // Without steps all slots but the last are one: at rest the time is left to the main loop.
-  const bool joined = empty && present_length.joined_slot_cycles != 0;
-  slot.slots_left = joined ? 2 : EMISSION_SLOTS;
-  slot.slot_cycles = joined ? present_length.joined_slot_cycles : present_length.slot_cycles;
-  slot.last_slot_cycles = present_length.last_slot_cycles;
-  slot.first = true;
-  next_start += present_length.cycles;
+// Of few slots, so that the time is left to the main loop. The last one is as short as may be: in
+// it the next tick is taken.
+static emission_tick empty_tick(uint16_t direction, uint32_t cycles) {
+  const uint32_t body = cycles - SHORT_SLOT_CYCLES;
+  const uint8_t shift = body <= UINT16_MAX ? 0 : 3;
+  const uint8_t long_slots = (uint8_t)(1u << shift);
+  emission_tick tick;
+  tick.direction = direction;
+  tick.mask = kNoSteps;
+  tick.end = (uint8_t)(uintptr_t)(kNoSteps + long_slots + 1u);
+  tick.top = (uint16_t)((body >> shift) - 1u);
+  tick.last_top = (uint16_t)(SHORT_SLOT_CYCLES - 1u + (body & (long_slots - 1u)));
+  tick.cycles = cycles;
+  return tick;
 }
 
-ISR(TIMER1_COMPA_vect) {
-  const uint16_t mask = slot.silent ? 0 : *slot.mask;
-  STEP_LOW = (uint8_t)mask;
-  STEP_HIGH = (uint8_t)(mask >> 8);
-  ++slot.mask;
-  if (slot.first) {
-    slot.first = false;
-    set_slot_length(slot.slot_cycles);
-  }
-  if (--slot.slots_left == 0) set_slot_length(slot.last_slot_cycles);
-  if (mask != 0) _delay_loop_1(PULSE_TURNS);
-  STEP_LOW = 0;
-  STEP_HIGH = 0;
-  if (slot.slots_left == 0) change_planes();
+// By TIMER1_COMPB, in the first slot of a tick.
+void __vector_emission_begun(void) __attribute__((interrupt));
+void __vector_emission_begun(void) {
+  const emission_tick* const begun = emission_taken;
+  const uint32_t start = next_start;
+  next_start += begun->cycles;
+  if (begun == &emission_silent) return;
+  emission_silent.direction = begun->direction;
+  begun_at = start;
+  committed = true;
 }
 
-static tick_length length_of_next(void) {
-  tick_length length;
-  length.extra_ns = adjust_ns + carry_ns;
-  const uint32_t parts = (tick_ns + (uint32_t)length.extra_ns) * CYCLES_PER_US + residue;
-  length.cycles = parts / 1000u;
-  length.residue = (uint16_t)(parts % 1000u);
-  length.slot_cycles = (uint16_t)(length.cycles / EMISSION_SLOTS);
-  length.last_slot_cycles = (uint16_t)(length.slot_cycles + length.cycles % EMISSION_SLOTS);
-  const uint32_t joined = length.cycles - length.last_slot_cycles;
-  length.joined_slot_cycles = joined <= UINT16_MAX ? (uint16_t)joined : 0;
+static tick_length length_of(uint32_t tick_ns) {
+  const uint32_t parts = tick_ns * CYCLES_PER_US;
+  const tick_length length = {parts / 1000u, (uint16_t)(parts % 1000u), 0};
   return length;
 }
 
+// Divides only what a tick differs by.
+static tick_length length_of_next(void) {
+  tick_length length = plain;
+  length.extra_ns = adjust_ns + carry_ns;
+  int32_t parts = length.extra_ns * (int32_t)CYCLES_PER_US + plain.residue + residue;
+  if (parts < 0 || parts >= 2000) {
+    int32_t cycles = parts / 1000;
+    if (cycles * 1000 > parts) --cycles;
+    length.cycles += (uint32_t)cycles;
+    parts -= cycles * 1000;
+  } else if (parts >= 1000) {
+    ++length.cycles;
+    parts -= 1000;
+  }
+  length.residue = (uint16_t)parts;
+  return length;
+}
+
+// `again`: in place of the one that waits; not if it was taken.
+static void give(tick_length length, bool again) {
+  emission_tick* const tick = &prepared[spare];
+  *tick = next_plane->active != 0 ? tick_of_plane(next_plane, length.cycles)
+                                  : empty_tick(next_plane->direction, length.cycles);
+  bool given = false;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    given = !again || emission_next != &emission_silent;
+    if (given) emission_next = tick;
+  }
+  if (!given) return;
+  next_length = length;
+  spare ^= 1u;
+}
+
 void emission_start(void) {
-  present_length = length_of_next();
-  slot.slot_cycles = present_length.slot_cycles;
-  slot.last_slot_cycles = present_length.last_slot_cycles;
-  slot.slots_left = EMISSION_SLOTS;
-  slot.silent = true;
-  slot.first = true;
+  emission_present = emission_silent;
+  emission_taken = &emission_silent;
+  GPIOR0 = EMISSION_BEGUN;
   OCR1A = START_CYCLES - 1u;
+  OCR1B = PULSE_END_CYCLES;
   TCNT1 = 0;
-  TIFR1 = 1 << OCF1A;
-  TIMSK1 = 1 << OCIE1A;
   TCCR1A = 0;
-  core_start = clock_now_locked() + START_CYCLES;
+  core_start = next_start = clock_now_locked() + START_CYCLES;
   TCCR1B = 1 << WGM12 | 1 << CS10;
-  next_start = core_start + present_length.cycles;
+  while (TCNT1 <= PULSE_END_CYCLES) {
+  }
+  TIFR1 = 1 << OCF1A | 1 << OCF1B;
+  TIMSK1 = 1 << OCIE1A | 1 << OCIE1B;
 }
 
 void emission_ready(const bushd_plane* plane) {
-  const tick_length length = length_of_next();
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    next_plane = plane;
-    next_length = length;
-    ready = true;
-  }
+  next_plane = plane;
+  give(length_of_next(), false);
 }
 
 bool emission_begun(uint32_t* start) {
   if (!committed) return false;
   *start = begun_at;  // does not change while `committed` is set
-  return !clock_before(clock_now(), begun_at);
+  return true;
 }
 
 void emission_swap(void) {
   core_start = begun_at;
-  residue = present_length.residue;
-  carry_ns += adjust_ns - present_length.extra_ns;
+  residue = next_length.residue;
+  carry_ns += adjust_ns - next_length.extra_ns;
   adjust_ns = 0;
   committed = false;
 }
@@ -148,16 +169,16 @@ uint32_t emission_time_in_tick_ns(uint32_t time) {
   return (time - core_start) * 125u / 2u;
 }
 
-// The next tick's plane may wait already.
 static void change_length(void) {
-  const tick_length length = length_of_next();
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    next_length = length;
-  }
+  if (next_plane != NULL) give(length_of_next(), true);
 }
 
 void emission_set_tick(uint32_t ns) {
-  tick_ns = ns;
+  plain = length_of(ns);
+  const emission_tick silent = empty_tick(emission_silent.direction, plain.cycles);
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    emission_silent = silent;
+  }
   change_length();
 }
 

@@ -1,19 +1,21 @@
-// Planes onto the pins. Timer 1 counts the cycles of a slot; its interrupt begins slots, and in the
-// last one of a tick changes over to the next plane.
+// Planes onto the pins. Timer 1 counts the cycles of a slot: compare A begins its pulses, compare B
+// ends them.
 //
 //     slot k of a tick of L cycles begins at  start + k floor(L / slots);  the last one takes the
 //     rest
 //
 // The core learns of a new tick when the main loop comes to it (emission_begun, emission_swap);
-// meanwhile its plane, prepared a tick ago, is emitted. If no plane is ready when it is wanted, the
-// present tick goes on for another tick's length without a step: no step is lost and none is half
-// prepared, but the MCU falls behind the bus by a tick, which the next SYNC shows (fault 4).
+// meanwhile its plane, prepared a tick ago, is emitted. If no plane is ready when it is wanted, an
+// empty tick follows: no step is lost and none is half prepared, but the MCU falls behind the bus
+// by a tick, which the next SYNC shows (fault 4).
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_H
 
 #include "firmware/core/mcu.h"
 
 #define EMISSION_SLOTS 128u
+// Shorter, slots would not hold their interrupts.
+#define EMISSION_MIN_TICK_NS 1250000u
 
 // All of these are for the main loop only.
 

@@ -6,13 +6,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "engine/frame.h"
+
 void line_init(void);
 
-// When the oldest delimiter that has not been taken came; false if there is none.
-bool line_delimiter_time(uint32_t* time);
-
-// The next byte; *time is set if it is a delimiter. False if there is none.
-bool line_take(uint8_t* byte, uint32_t* time);
+// Bytes that have come go to the receiver, up to one that ends a frame; that one waits: true, and
+// when it came.
+bool line_collect(bushd_receiver* receiver, uint32_t* time);
+// It. Precondition: it waits.
+uint8_t line_take(void);
 
 // Sends these bytes `delay_ns` after the delimiter taken last, or as soon as the line is ours. The
 // buffer stays valid until they are sent.

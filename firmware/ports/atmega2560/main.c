@@ -73,6 +73,7 @@ static void boot(void) {
                                    .self_test = port_self_test};
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
+                             .min_tick_ns = EMISSION_MIN_TICK_NS,
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,
@@ -98,18 +99,17 @@ int main(void) {
   emission_start();
   sei();
   for (;;) {
-    // A frame that ended in the tick before must be heard by the core in that tick.
     uint32_t start = 0;
     uint32_t time = 0;
     const bool begun = emission_begun(&start);
-    if (begun && !(line_delimiter_time(&time) && clock_before(time, start))) {
+    const bool waits = line_collect(&mcu.receiver, &time);
+    // A frame that ended in the tick before must be heard by the core in that tick.
+    if (begun && !(waits && clock_before(time, start))) {
       emission_swap();
       bushd_mcu_swap(&mcu);
       prepare();
-      continue;
+    } else if (waits) {
+      bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(time));
     }
-    uint8_t byte = 0;
-    if (!line_take(&byte, &time)) continue;
-    bushd_mcu_receive(&mcu, byte, byte == 0 ? emission_time_in_tick_ns(time) : 0);
   }
 }

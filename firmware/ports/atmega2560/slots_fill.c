@@ -1,0 +1,74 @@
+// bushd_slots_fill for 128 slots and 16 motors, in the same time however many steps there are. With
+// T the crossing of a step, in 1/256 of a motor's distance d a slot, it is the step of slot
+//
+//     floor(T / 2d),   T = 256 (first + 256 i)
+//
+// In the fine format T is counted down by 2d a slot, modulo 2^16, and borrows are steps. Steps of
+// coarse ticks lie at (256 i + 128) / 2c: a phase of 8 bits that begins at 127 and grows by 2c
+// carries there.
+#include "engine/slots.h"
+#include "firmware/ports/atmega2560/emission.h"
+
+typedef struct slots_phase {
+  uint16_t phase;
+  uint16_t step;
+} slots_phase;
+
+// slots_fill.S
+void slots_fill_coarse(uint8_t* masks, const uint8_t step[8]);
+void slots_fill_fine(uint8_t* masks, const slots_phase motor[8]);
+
+static void fill_coarse(uint8_t* masks, const bushd_slots* plans) {
+  uint8_t step[8];
+  for (uint8_t m = 0; m < 8; ++m) step[m] = (uint8_t)(plans[m].distance >> 7);
+  slots_fill_coarse(masks, step);
+}
+
+static void fill_fine(uint8_t* masks, const bushd_slots* plans) {
+  slots_phase motor[8];
+  for (uint8_t m = 0; m < 8; ++m) {
+    const bool moves = plans[m].distance != 0;
+    motor[m].phase = moves ? (uint16_t)(plans[m].first << 8) : UINT16_MAX;
+    motor[m].step = (uint16_t)(plans[m].distance << 1);
+  }
+  slots_fill_fine(masks, motor);
+  uint8_t bit = 1;
+  for (uint8_t m = 0; m < 8; ++m, bit = (uint8_t)(bit << 1)) {
+    const bushd_slots* plan = &plans[m];
+    if (plan->distance == 0) continue;
+    // Modulo 2^16 the first T is that of one step earlier, which is not made.
+    if (plan->first >= 256) {
+      uint16_t slot = (uint16_t)(plan->first - 256u);
+      if (slot != 0) slot = (uint16_t)(slot * 128u) / plan->distance;
+      masks[2 * slot] &= (uint8_t)~bit;
+    }
+    // A crossing exactly at the end of the tick belongs to it: its last slot.
+    if ((uint8_t)plan->distance == (uint8_t)plan->first) {
+      masks[2 * (EMISSION_SLOTS - 1u)] |= bit;
+    }
+  }
+}
+
+void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* plans,
+                      uint8_t motors) {
+  (void)slot_count;
+  (void)motors;
+  for (uint8_t half = 0; half < 2; ++half) {
+    uint8_t* const bytes = (uint8_t*)masks + half;
+    const bushd_slots* const eight = plans + 8 * half;
+    bool moves = false;
+    bool coarse = true;
+    for (uint8_t m = 0; m < 8; ++m) {
+      if (eight[m].distance == 0) continue;
+      moves = true;
+      coarse = coarse && (uint8_t)eight[m].distance == 0 && eight[m].first == 128;
+    }
+    if (!moves) {
+      for (uint8_t slot = 0; slot < EMISSION_SLOTS; ++slot) bytes[2 * slot] = 0;
+    } else if (coarse) {
+      fill_coarse(bytes, eight);
+    } else {
+      fill_fine(bytes, eight);
+    }
+  }
+}

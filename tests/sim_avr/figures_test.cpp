@@ -1,0 +1,145 @@
+// How many steps the image for ATmega2560 makes a second: sixteen motors, each at the most steps
+// that a tick may have and turning round after every frame, fed with frames of two ticks over a
+// line of 1 Mbaud. Every step must be made, in time, and each pulse be as long as drivers want.
+//
+// simavr enters interrupts in no time, the chip takes five cycles: they are added to the tick.
+#include <cstdio>
+#include <map>
+
+#include "sim/bus_fixture.h"
+#include "sim_avr/avr_mcu.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kBaud = 1'000'000;
+constexpr std::uint8_t kAddress = 2;
+constexpr std::uint16_t kSlots = 128;
+constexpr std::uint16_t kDelay = 100;
+constexpr std::uint8_t kTicksPerFrame = 2;
+constexpr double kCycleNs = 62.5;
+constexpr double kEntryCycles = 5;
+constexpr int kFrames = 260;
+
+struct Load {
+  bushd_format format;
+  std::uint32_t tick_ns;
+  int steps;  // of a motor in a tick
+  double goal_steps_per_s;
+};
+
+class AvrFigures : public testing::TestWithParam<Load> {
+ protected:
+  AvrFigures() : bus_(kBaud, &recorder_), master_(bus_) {
+    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+      AvrOptions options;
+      options.image = AVR_IMAGES "-1000000.elf";
+      options.address = kAddress;
+      auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
+      avr_ = mcu.get();
+      return mcu;
+    });
+    master_.patience_ns = 6'000'000;
+    bus_.advance_to(100'000'000);
+  }
+
+  void send_frame(std::uint32_t first, std::uint8_t flags, bool last, bool forward) {
+    const bool fine = GetParam().format == BUSHD_FORMAT_FINE;
+    std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delays;
+    delays.fill(last ? 0 : kDelay);
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    std::size_t size =
+        bushd_encode_ticks_head(0, static_cast<std::uint8_t>(flags | (fine ? BUSHD_TICKS_FINE : 0)),
+                                first, kTicksPerFrame, 0xFFFF, delays.data(), payload.data());
+    for (std::size_t i = 0; i < kTicksPerFrame * BUSHD_MOTORS_PER_MCU; ++i) {
+      if (fine) {
+        const int displacement = GetParam().steps * 256;
+        bushd_put_i16(payload.data() + size,
+                      static_cast<std::int16_t>(forward ? displacement : -displacement));
+        size += 2;
+      } else {
+        payload[size++] =
+            static_cast<std::uint8_t>(GetParam().steps | (forward ? BUSHD_COARSE_DIRECTION : 0));
+      }
+    }
+    payload.resize(size);
+    master_.post(kAddress, BUSHD_MSG_TICKS, payload);
+  }
+
+  Recorder recorder_;
+  Bus bus_;
+  Master master_;
+  AvrMcu* avr_ = nullptr;
+};
+
+TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
+  const Load& load = GetParam();
+  const auto tick_ns = TimeNs{load.tick_ns};
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(load.tick_ns, load.format));
+  ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 1000, {400, 300, 200}, kDelay));
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, m, 0));
+  }
+  const bushd_report before = master_.poll(kAddress);
+  const TimeNs begin_ns = bus_.now_ns();
+  const std::uint64_t entries_before = avr_->interrupts();
+  const std::uint32_t first = before.tick + 24;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    send_frame(first + static_cast<std::uint32_t>(frame * kTicksPerFrame),
+               frame == 0 ? BUSHD_TICKS_START : 0, frame + 1 == kFrames, frame % 2 == 0);
+    bus_.advance_to(begin_ns + tick_ns * kTicksPerFrame * (frame + 1));
+  }
+  const double ticks = kFrames * kTicksPerFrame;
+  const double entries = static_cast<double>(avr_->interrupts() - entries_before) / ticks;
+  bus_.advance_to(bus_.now_ns() + 60 * tick_ns);
+
+  std::array<std::vector<Edge>, BUSHD_MOTORS_PER_MCU> edges;
+  for (const Edge& edge : recorder_.edges) {
+    if (edge.signal == Signal::kStep) edges[edge.index].push_back(edge);
+  }
+  TimeNs shortest_ns = kNever;
+  // By where in its slot a pulse begins.
+  TimeNs earliest_ns = kNever;
+  TimeNs latest_ns = 0;
+  for (const auto& of_motor : edges) {
+    ASSERT_EQ(of_motor.size(), 2u * static_cast<std::size_t>(load.steps * ticks));
+    for (std::size_t i = 0; i < of_motor.size(); i += 2) {
+      shortest_ns = std::min(shortest_ns, of_motor[i + 1].time_ns - of_motor[i].time_ns);
+      const TimeNs since_ns = of_motor[i].time_ns - of_motor.front().time_ns + tick_ns;
+      const TimeNs in_slot_ns = (since_ns + tick_ns / kSlots / 2) % (tick_ns / kSlots);
+      earliest_ns = std::min(earliest_ns, in_slot_ns);
+      latest_ns = std::max(latest_ns, in_slot_ns);
+    }
+    // A tick that was not ready would have made it late.
+    const double span = static_cast<double>(of_motor.back().time_ns - of_motor.front().time_ns);
+    EXPECT_NEAR(span / static_cast<double>(tick_ns), ticks - 1.0 / load.steps, 0.1);
+  }
+  EXPECT_GE(shortest_ns, 2500);
+  const bushd_report after = master_.poll(kAddress);
+  EXPECT_EQ(after.faults, 0);
+  EXPECT_EQ(after.bad_frames, 0);
+  EXPECT_EQ(after.rejected_frames, 0);
+  for (const auto& motor : after.motor) EXPECT_EQ(motor.position_steps, 0);
+  EXPECT_EQ(avr_->overruns(), 0u);
+
+  const double chip_tick_ns = static_cast<double>(tick_ns) + entries * kEntryCycles * kCycleNs;
+  const double steps_per_s = BUSHD_MOTORS_PER_MCU * load.steps / chip_tick_ns * 1e9;
+  EXPECT_GE(steps_per_s, load.goal_steps_per_s);
+  std::printf(
+      "ATmega2560 %s: %.0f steps/s of 16 motors; tick %.0f us (%.0f interrupts), %.0f steps in "
+      "all, "
+      "pulses from %.2f us, jitter %.0f cycles, %zu bytes of stack never used\n",
+      load.format == BUSHD_FORMAT_FINE ? "fine" : "coarse", steps_per_s, chip_tick_ns / 1000,
+      entries, BUSHD_MOTORS_PER_MCU * load.steps * ticks, static_cast<double>(shortest_ns) / 1000,
+      static_cast<double>(latest_ns - earliest_ns) / kCycleNs, avr_->untouched_ram());
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, AvrFigures,
+                         testing::Values(Load{BUSHD_FORMAT_COARSE, 2'240'000, 127, 850'000},
+                                         Load{BUSHD_FORMAT_FINE, 2'640'000, 127, 700'000}),
+                         [](auto& load) {
+                           return load.param.format == BUSHD_FORMAT_FINE ? "Fine" : "Coarse";
+                         });
+
+}  // namespace
+}  // namespace bushd::sim
