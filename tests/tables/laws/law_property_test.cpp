@@ -29,9 +29,20 @@ Law random_law() {
   return *rc::gen::element(Law::kConstant, Law::kScurve, Law::kExponential);
 }
 
+Spec random_motion() {
+  switch (*rc::gen::inRange(0, 5)) {
+    case 0:
+      return random_piecewise_spec();
+    case 1:
+      return random_pto_spec();
+    default:
+      return random_spec(random_law());
+  }
+}
+
 TEST(Laws, NeverFasterThanTheMaximum) {
   EXPECT_TRUE(rc::check("every delay at least that of the maximum speed", [] {
-    const Spec spec = random_spec(random_law());
+    const Spec spec = random_motion();
     const TableContent content = made(spec);
     for (const double delay : delays_of(content.accel, content.time_unit_ns)) {
       RC_ASSERT(delay * spec.max_hz >= 1 - kNoise);
@@ -41,7 +52,7 @@ TEST(Laws, NeverFasterThanTheMaximum) {
 
 TEST(Laws, BeginAtTheStartSpeedAndReachTheMaximum) {
   EXPECT_TRUE(rc::check("first and last code", [] {
-    const Spec spec = random_spec(random_law());
+    const Spec spec = random_motion();
     const TableContent content = made(spec);
     const double unit_s = content.time_unit_ns * 1e-9;
     RC_ASSERT(content.accel.front() == std::ceil(1 / spec.start_hz / unit_s - kNoise));
@@ -51,21 +62,20 @@ TEST(Laws, BeginAtTheStartSpeedAndReachTheMaximum) {
 
 TEST(Laws, AccelerationStaysWithinItsBound) {
   EXPECT_TRUE(rc::check("between any two neighbouring codes", [] {
-    const Spec spec = random_spec(random_law());
+    const Spec spec = random_motion();
     const TableContent content = made(spec);
     const double unit_s = content.time_unit_ns * 1e-9;
     const auto delays = delays_of(content.accel, content.time_unit_ns);
     for (std::size_t i = 0; i + 1 < delays.size(); ++i) {
-      const double bound =
-          rounded_bound(*spec.accel.acceleration, delays[i], delays[i + 1], unit_s * (1 + kNoise));
+      const double bound = rounded_bound(greatest_acceleration(spec), delays[i], delays[i + 1],
+                                         unit_s * (1 + kNoise));
       RC_ASSERT(acceleration_between(delays[i], delays[i + 1]) <= bound * (1 + kNoise));
     }
   }));
 }
 
 TEST(Laws, DecelerationIsTheMirrorImage) {
-  EXPECT_TRUE(rc::check("unless told otherwise",
-                        [] { RC_ASSERT(!made(random_spec(random_law())).decel); }));
+  EXPECT_TRUE(rc::check("unless told otherwise", [] { RC_ASSERT(!made(random_motion()).decel); }));
 }
 
 TEST(Laws, DecelerationOfItsOwnIsThatLawReversed) {
@@ -121,7 +131,7 @@ struct Formula {
 Formula textbook(const Spec& spec) {
   const double v0 = spec.start_hz;
   const double v1 = spec.max_hz;
-  const double a = *spec.accel.acceleration;
+  const double a = greatest_acceleration(spec);
   switch (spec.accel.law) {
     case Law::kExponential: {
       const double rate = a * (1 - 1 / spec.accel.fall) / (v1 - v0);
@@ -137,6 +147,22 @@ Formula textbook(const Spec& spec) {
               },
               end_s};
     }
+    case Law::kPiecewise: {
+      // Linear over time between the times and speeds at the legs' ends.
+      std::vector<std::pair<double, double>> ends{{0, v0}};
+      for (const auto& [steps, to_hz] : spec.accel.legs) {
+        const auto& [time_s, from_hz] = ends.back();
+        ends.emplace_back(time_s + 2 * steps / (from_hz + to_hz), to_hz);
+      }
+      return {[=](double t) {
+                std::size_t i = 1;
+                while (i + 1 < ends.size() && t > ends[i].first) ++i;
+                const auto& [t0, from_hz] = ends[i - 1];
+                const auto& [t1, to_hz] = ends[i];
+                return from_hz + (to_hz - from_hz) * std::min(1.0, (t - t0) / (t1 - t0));
+              },
+              ends.back().first};
+    }
     default:
       return {[=](double t) { return std::min(v1, v0 + a * t); }, (v1 - v0) / a};
   }
@@ -144,7 +170,7 @@ Formula textbook(const Spec& spec) {
 
 TEST(Laws, TimeIsTheSumOfTheFormula) {
   const auto property = [] {
-    const Spec spec = random_spec(random_law());
+    const Spec spec = random_motion();
     const TableContent content = made(spec);
     const Formula formula = textbook(spec);
     const double unit_s = content.time_unit_ns * 1e-9;

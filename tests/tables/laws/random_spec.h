@@ -3,6 +3,7 @@
 
 #include <rapidcheck.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -30,6 +31,48 @@ inline tables::laws::Spec random_spec(tables::laws::Law law) {
   spec.accel.acceleration =
       (spec.max_hz * spec.max_hz - spec.start_hz * spec.start_hz) / (2 * steps);
   return spec;
+}
+
+// Its ramp in some stretches, the first may be at the start speed; back the same way.
+inline tables::laws::Spec random_piecewise_spec() {
+  tables::laws::Spec spec = random_spec(tables::laws::Law::kPiecewise);
+  spec.accel.acceleration.reset();
+  auto& legs = spec.accel.legs;
+  double speed_hz = spec.start_hz;
+  if (*rc::gen::arbitrary<bool>()) legs.push_back({random_scale(1, 100), speed_hz});
+  for (int more = *rc::gen::inRange(0, 4); more > 0; --more) {
+    speed_hz = random_between(speed_hz, spec.max_hz);
+    legs.push_back({random_scale(1, 1000), speed_hz});
+  }
+  legs.push_back({random_scale(2, 1000), spec.max_hz});
+  spec.decel = spec.accel;
+  auto& back = spec.decel->legs;
+  for (std::size_t i = 0; i < legs.size(); ++i) {
+    const std::size_t there = legs.size() - 1 - i;
+    back[i] = {legs[there].steps, there == 0 ? spec.start_hz : legs[there - 1].to_hz};
+  }
+  return spec;
+}
+
+inline tables::laws::Spec random_pto_spec() {
+  tables::laws::Spec spec = random_spec(tables::laws::Law::kPto);
+  spec.accel.time_s = (spec.max_hz - spec.start_hz) / *spec.accel.acceleration;
+  spec.accel.acceleration.reset();
+  spec.decel = spec.accel;
+  return spec;
+}
+
+// Of the accelerating side.
+inline double greatest_acceleration(const tables::laws::Spec& spec) {
+  if (spec.accel.acceleration) return *spec.accel.acceleration;
+  if (spec.accel.time_s) return (spec.max_hz - spec.start_hz) / *spec.accel.time_s;
+  double greatest = 0;
+  double from_hz = spec.start_hz;
+  for (const tables::laws::Leg& leg : spec.accel.legs) {
+    greatest = std::max(greatest, (leg.to_hz * leg.to_hz - from_hz * from_hz) / (2 * leg.steps));
+    from_hz = leg.to_hz;
+  }
+  return greatest;
 }
 
 inline std::vector<double> delays_of(const std::vector<std::uint16_t>& codes,
