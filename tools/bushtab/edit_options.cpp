@@ -97,11 +97,11 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
   add_changed(scale, options->table, options->json);
   auto* what = scale->add_option_group("what", "One of")->require_option(1);
   what->add_option("--speed", options->speed, "All speeds times FACTOR")
-      ->check(CLI::PositiveNumber)
+      ->check(refuse_not_positive)
       ->type_name("FACTOR");
   what->add_option("--acceleration", options->acceleration,
                    "The same speeds, accelerations times FACTOR, in fewer or more codes")
-      ->check(CLI::PositiveNumber)
+      ->check(refuse_not_positive)
       ->type_name("FACTOR");
   run(scale, [&places, options] {
     if (options->speed > 0) {

@@ -1,6 +1,9 @@
+#include <charconv>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "options.h"
@@ -141,6 +144,15 @@ std::string refuse_fraction(const std::string& value) {
   const bool whole = value.size() > first_digit &&
                      value.find_first_not_of("0123456789", first_digit) == std::string::npos;
   return whole ? std::string() : value + " is not a whole number";
+}
+
+std::string refuse_not_positive(const std::string& value) {
+  double number = 0;
+  const char* end = value.data() + value.size();
+  const auto parsed = std::from_chars(value.data(), end, number);
+  const bool positive =
+      parsed.ec == std::errc{} && parsed.ptr == end && std::isfinite(number) && number > 0;
+  return positive ? std::string() : value + " is not a number above 0";
 }
 
 void add_limit_options(CLI::App* command, LimitOptions& options) {

@@ -179,13 +179,13 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
   command
       ->add_option("--steps-per-turn", motor.steps_per_turn,
                    "Steps, microsteps included, of a turn (default 200)")
-      ->check(CLI::PositiveNumber)
+      ->check(refuse_not_positive)
       ->type_name("N");
   command
       ->add_option(
           "--full-steps-per-turn", motor.full_steps_per_turn,
           "Full steps of a turn, for the jumps of speed that the rotor can follow (default 200)")
-      ->check(CLI::PositiveNumber)
+      ->check(refuse_not_positive)
       ->type_name("N");
 }
 

@@ -31,4 +31,7 @@ CLI::Option* add_quantity(CLI::App* command, const std::string& name,
 // "5.5" would otherwise be called out of range.
 std::string refuse_fraction(const std::string& value);
 
+// CLI11's own check tells the range of a double in 300 digits.
+std::string refuse_not_positive(const std::string& value);
+
 }  // namespace bushtab

@@ -298,6 +298,15 @@ TEST_F(BushtabEdit, ChangeThatIsNoTableIsRefusedAndTheOldOneStays) {
   EXPECT_EQ(text(), before);
 }
 
+TEST_F(BushtabEdit, FactorThatIsNoneIsNamed) {
+  for (const char* factor : {"2x", "0", "-1", "nan", "inf"}) {
+    const Outcome outcome = run(std::string("scale t --speed ") + factor);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.err,
+                StartsWith(std::string("--speed: ") + factor + " is not a number above 0\n"));
+  }
+}
+
 TEST_F(BushtabEdit, EditorsTextIsCheckedOnReturn) {
   EXPECT_THAT(bushtab("edit t" + places_, "EDITOR='sed -i s/90/80/'").out, HasSubstr("revision 2"));
   EXPECT_THAT(text(), HasSubstr("accel = [80, 70, 50] # fast\n"));
