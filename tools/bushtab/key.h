@@ -14,6 +14,7 @@ inline constexpr Key kBackspace = 0x08;
 inline constexpr Key kTab = 0x09;
 inline constexpr Key kEnter = 0x0A;
 inline constexpr Key kCtrlR = 0x12;
+inline constexpr Key kCtrlS = 0x13;
 inline constexpr Key kEscape = 0x1B;
 inline constexpr Key kLeft = 0x110000;
 inline constexpr Key kRight = 0x110001;

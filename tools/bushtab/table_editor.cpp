@@ -224,6 +224,7 @@ TableEditor::Wish TableEditor::press_command(Key key) {
       mode_ = Mode::kHelp;
       break;
     case U's':
+    case key::kCtrlS:
       if (changed()) return Wish::kSave;
       message_ = "nothing to save";
       break;

@@ -4,6 +4,7 @@
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/signalfd.h>
+#include <termios.h>
 #include <unistd.h>
 
 // Its macros have names like erase and move.
@@ -119,6 +120,13 @@ Terminal::Terminal() : unicode_(std::strcmp(nl_langinfo(CODESET), "UTF-8") == 0)
   cbreak();
   noecho();
   nonl();
+  // Ctrl-S is a key, and not what freezes the screen.
+  termios settings{};
+  if (tcgetattr(STDIN_FILENO, &settings) == 0) {
+    settings.c_iflag &= ~static_cast<tcflag_t>(IXON);
+    tcsetattr(STDIN_FILENO, TCSANOW, &settings);
+    def_prog_mode();
+  }
   keypad(stdscr, TRUE);
   nodelay(stdscr, TRUE);
   set_escdelay(kEscapeDelayMs);

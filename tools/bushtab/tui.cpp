@@ -91,7 +91,9 @@ bool grant(const Places& places, Original& original, TableEditor& editor, TableE
     case TableEditor::Wish::kSaveAs:
       break;
   }
-  auto home = home_of(places, editor.wished_name());
+  // Another table lives beside this one, unless it is given as a path.
+  const Places beside{original.path().parent_path().string(), places.history};
+  auto home = home_of(beside, editor.wished_name());
   if (home) {
     answer(editor, original.save_as(std::move(*home), editor.content()));
   } else {

@@ -29,11 +29,14 @@ class Tui(unittest.TestCase):
             [os.environ["BUSHTAB"], "--dir", self.path, *arguments], capture_output=True, text=True, stdin=subprocess.DEVNULL
         )
 
-    def tui(self, *arguments, rows=30, columns=100, **environment):
+    def tui(self, table, *arguments, rows=30, columns=100, **environment):
         environment = {"TERM": "xterm", "LC_ALL": "C.UTF-8", "NO_COLOR": "", **environment}
-        terminal = Terminal([os.environ["BUSHTAB"], "--dir", self.path, "tui", *arguments], rows, columns, **environment)
+        terminal = Terminal([os.environ["BUSHTAB"], *self.places(table), "tui", table, *arguments], rows, columns, **environment)
         self.addCleanup(terminal.__exit__)
         return terminal
+
+    def places(self, table):
+        return [] if isinstance(table, pathlib.Path) else ["--dir", self.path]
 
     def opened(self, *arguments, **environment):
         tui = self.tui("t", *arguments, **environment)
@@ -63,7 +66,7 @@ class Tui(unittest.TestCase):
         self.assertNotIn("changed", tui.screen.text())
         text = TABLE.replace("70", "65").replace('"t"\n', '"t"\nrevision = 2\n')
         self.assertEqual(self.file.read_text(), text)
-        tui.send(UP + "s")  # what was saved is what the next change is made from
+        tui.send(UP + "\x13")  # what was saved is what the next change is made from
         tui.wait_for("saved as revision 3")
         tui.send("q")
         self.assertEqual(tui.end(), 0)
@@ -117,6 +120,14 @@ class Tui(unittest.TestCase):
         self.assertEqual(tui.end(), 0)
         self.assertIn("accel = [90, 64, 50] # fast\n", (self.path / "mine.toml").read_text())
         self.assertEqual(self.file.read_text(), theirs)
+
+    def test_table_given_as_a_path_is_saved_beside_it(self):
+        tui = self.tui(self.file)
+        tui.wait_for("accel[0]  code 90")
+        self.change_second_code(tui)
+        tui.send("wmine\r")
+        tui.wait_for("saved as revision 1")
+        self.assertIn("accel = [90, 65, 50] # fast\n", (self.path / "mine.toml").read_text())
 
     def test_check_goes_along_with_the_codes(self):
         tui = self.opened("--max", "20100Hz")
