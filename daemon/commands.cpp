@@ -53,7 +53,9 @@ void Core::command(std::int64_t now_us, const command_t& command) {
     answer(client, reply_t::REFUSED, "refused", why);
     return;
   }
-  if (is_move(command.kind)) {
+  if (is_move(command.kind) && command.dry_run != 0) {
+    dry_run(now_us, command);
+  } else if (is_move(command.kind)) {
     start_move(now_us, command);
   } else if (is_table_change(command.kind)) {
     start_table_change(client, command.kind, command.group, command.table);
@@ -88,6 +90,7 @@ std::string Core::refuse(const command_t& command) const {
   if (stopping_all() && (is_move(command.kind) || command.kind == command_t::CLEAR_FAULTS)) {
     return "an emergency stop is under way; wait for its result";
   }
+  if (command.dry_run != 0 && !is_move(command.kind)) return "only moves can be run dry";
   for (std::size_t i = 0; i < command.motors.size(); ++i) {
     const std::size_t index = *find_motor(command.motors[i]);
     const Motor& motor = motors_[index];
@@ -253,8 +256,7 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
   const std::int64_t steps = target - motor.position_steps;
   motor.log_id = ++last_log_id_;
   motor.axis.start(motor.position_steps, steps, start);
-  const bool by_table = bus.table_runs && master_of(mcu).can_run_tables(mcu.in_bus) &&
-                        std::abs(steps) <= kMaxPosition;
+  const bool whole = by_table(motor, steps);
   const nlohmann::json line = {{"event", "move"},
                                {"id", motor.log_id},
                                {"motor", motor.config->name},
@@ -265,7 +267,7 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
                                {"table_sha256", table_of(*motor.config).content_hash()},
                                {"tick_ns", bus.tick_ns()},
                                {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
-                               {"moves", by_table ? "table" : "stream"},
+                               {"moves", whole ? "table" : "stream"},
                                {"start_tick", start},
                                {"steps", steps},
                                {"from_steps", motor.position_steps}};
@@ -273,12 +275,18 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
   const std::uint8_t output = motor.config->output.value;
   if (steps == 0) {
     end_motor(index, motion::Outcome::kReached, "stands at its target already");
-  } else if (by_table) {
+  } else if (whole) {
     master_of(mcu).begin_table_run(mcu.in_bus, output, start, static_cast<std::int32_t>(steps));
   } else {
     master_of(mcu).begin(mcu.in_bus, output, start);
   }
   changed_ = true;
+}
+
+bool Core::by_table(const Motor& motor, std::int64_t steps) const {
+  const Mcu& mcu = mcus_[motor.mcu];
+  return config_.buses[motor.bus].table_runs && master_of(mcu).can_run_tables(mcu.in_bus) &&
+         std::abs(steps) <= kMaxPosition;
 }
 
 void Core::stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors) {
@@ -340,6 +348,7 @@ void Core::answer(const Client& client, std::int8_t phase, const std::string& re
   reply.reason = reason;
   reply.motor_count = static_cast<std::int32_t>(reply.motors.size());
   reply.table_count = static_cast<std::int32_t>(reply.tables.size());
+  reply.plan_count = static_cast<std::int32_t>(reply.plan.size());
   clients_.record(reply);
   outputs_.reply(reply);
 }

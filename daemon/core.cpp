@@ -13,16 +13,16 @@ motion::Axis* Core::Bus::moving_axis(std::size_t mcu, std::uint8_t motor) {
   return axis.busy() ? &axis : nullptr;
 }
 
-std::uint16_t Core::Bus::render(std::size_t mcu, std::uint8_t motor, link::Tick first,
-                                unsigned count, std::int16_t* out, std::size_t stride) {
+std::uint16_t AxisSource::render(std::size_t mcu, std::uint8_t motor, link::Tick first,
+                                 unsigned count, std::int16_t* out, std::size_t stride) {
   motion::Axis* axis = moving_axis(mcu, motor);
   if (axis != nullptr) return axis->render(first, count, out, stride);
   for (unsigned i = 0; i < count; ++i) out[i * stride] = 0;
   return 0;
 }
 
-std::optional<link::TickSource::Stretch> Core::Bus::run_at(std::size_t mcu, std::uint8_t motor,
-                                                           link::Tick first, unsigned max_ticks) {
+std::optional<link::TickSource::Stretch> AxisSource::run_at(std::size_t mcu, std::uint8_t motor,
+                                                            link::Tick first, unsigned max_ticks) {
   motion::Axis* axis = moving_axis(mcu, motor);
   if (axis == nullptr) return std::nullopt;
   const auto stretch = axis->run_at(first, max_ticks);
@@ -30,7 +30,7 @@ std::optional<link::TickSource::Stretch> Core::Bus::run_at(std::size_t mcu, std:
   return Stretch{.run = stretch->run, .ticks = stretch->ticks};
 }
 
-link::Tick Core::Bus::end_tick(std::size_t mcu, std::uint8_t motor) {
+link::Tick AxisSource::end_tick(std::size_t mcu, std::uint8_t motor) {
   const motion::Axis* axis = moving_axis(mcu, motor);
   return axis == nullptr ? 0 : axis->end_tick();
 }

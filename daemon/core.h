@@ -74,6 +74,9 @@ class Core {
   void step(std::int64_t now_us);
   std::int64_t next_wake_us() const;
 
+  // Why groups that have a table by this name, and follow its changes, could not move by this one;
+  // "": they could.
+  std::string refuse_content(const std::string& name, const tables::TablePtr& table) const;
   // Before the first port is opened: the group has another table than the configuration says.
   Result<void> restore(std::size_t group, const std::string& wanted, tables::TablePtr table);
   // What RELOAD_TABLES does; how it ends is told by the log.
@@ -195,6 +198,9 @@ class Core {
   // target.
   std::int64_t target_of(const command_t& command, std::size_t i) const;
   void start_move(std::int64_t now_us, const command_t& command);
+  void dry_run(std::int64_t now_us, const command_t& command);  // dry_run.cpp
+  move_plan_t plan_of(std::int64_t now_us, const command_t& command) const;
+  bool by_table(const Motor& motor, std::int64_t steps) const;
   // A motor that moves is given to another move: what it was moving or stopping for has ended.
   void take_over(std::size_t motor, const Client& by);
   // From rest; the motor is part of a move.

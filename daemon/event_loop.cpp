@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "config/port_pattern.h"
+#include "daemon/table_desk.h"
 
 namespace bushd::daemon {
 namespace {
@@ -21,6 +22,8 @@ namespace {
 constexpr std::uint64_t kLcmTag = UINT64_MAX;
 constexpr std::uint64_t kSignalTag = UINT64_MAX - 1;
 constexpr std::uint64_t kWorkerTag = UINT64_MAX - 2;
+
+constexpr std::size_t kMaxWaitingJobs = 64;  // anybody may ask for tables
 
 std::int64_t now_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(
@@ -74,7 +77,8 @@ EventLoop::EventLoop(const config::Config& config, lcm::Transport& transport, Mo
       state_channel_(config.lcm.prefix + "_STATE"),
       health_channel_(config.lcm.prefix + "_HEALTH"),
       reply_channel_(config.lcm.prefix + "_REPLY"),
-      command_channel_(config.lcm.prefix + "_COMMAND") {}
+      command_channel_(config.lcm.prefix + "_COMMAND"),
+      table_reply_channel_(config.lcm.prefix + "_TABLE_REPLY") {}
 
 EventLoop::~EventLoop() {
   if (epoll_ >= 0) ::close(epoll_);
@@ -105,6 +109,10 @@ Result<void> EventLoop::set_up() {
   if (const auto watched = watch(transport_.fd(), EPOLLIN, kLcmTag); !watched) return watched;
   if (const auto started = worker_.start(); !started) return started;
   if (const auto watched = watch(worker_.fd(), EPOLLIN, kWorkerTag); !watched) return watched;
+  const auto subscribed = transport_.subscribe<table_request_t>(
+      config_.lcm.prefix + "_TABLE_REQUEST",
+      [this](const table_request_t& request) { on_table_request(request); });
+  if (!subscribed) return subscribed;
   return transport_.subscribe<command_t>(
       command_channel_, [this](const command_t& command) { core_.command(now_us(), command); });
 }
@@ -259,6 +267,23 @@ void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>
   worker_.post([this, ticket, wanted]() -> Worker::Rest {
     const auto kept = library_.keep(wanted);
     return [this, ticket, kept] { core_.tables_kept(ticket, kept); };
+  });
+}
+
+void EventLoop::on_table_request(const table_request_t& request) {
+  // Who asks again is answered then.
+  if (worker_.waiting() >= kMaxWaitingJobs) return;
+  std::string why;
+  if (request.kind == table_request_t::SET) {
+    const auto table = table_of(request);
+    why = table ? core_.refuse_content(request.table, *table) : table.error().text();
+  }
+  worker_.post([this, request, why]() -> Worker::Rest {
+    table_reply_t reply = why.empty() ? answer(library_, request) : refusal(request, why);
+    return [this, reply]() mutable {
+      reply.utime_us = wall_clock_us();
+      check_published(transport_.publish(table_reply_channel_, reply));
+    };
   });
 }
 

@@ -49,6 +49,7 @@ class EventLoop : private Outputs {
   void handle_port(std::int64_t now_us, std::size_t bus, std::uint32_t events);
   void handle_signal(std::int64_t now_us);
   Result<void> restore_tables();
+  void on_table_request(const table_request_t& request);
   void update_write_interest(std::size_t bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
@@ -77,6 +78,7 @@ class EventLoop : private Outputs {
   std::string health_channel_;
   std::string reply_channel_;
   std::string command_channel_;
+  std::string table_reply_channel_;
   bool mute_ = false;  // LCM takes nothing
   int epoll_ = -1;
   int signals_ = -1;

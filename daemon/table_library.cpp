@@ -1,9 +1,14 @@
 #include "daemon/table_library.h"
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <system_error>
+#include <utility>
 
 #include "tables/store/atomic_file.h"
+#include "tables/store/store.h"
+#include "tables/table_file.h"
+#include "tables/table_text.h"
 #include "tables/toml_file.h"
 
 namespace bushd::daemon {
@@ -35,6 +40,80 @@ fs::path TableLibrary::in_service_file(const fs::path& config) {
 
 Result<tables::TablePtr> TableLibrary::open(const std::string& wanted) const {
   return tables::store::open(wanted, places_);
+}
+
+Result<tables::TableContent> TableLibrary::content(const std::string& wanted) const {
+  const auto found = tables::store::find(wanted, places_);
+  if (!found) return fail(found.error());
+  return found->content;
+}
+
+std::vector<std::string> TableLibrary::names() const {
+  std::set<std::string> names;
+  std::error_code error;
+  for (const tables::store::Place& place : places_) {
+    for (const auto& file : fs::directory_iterator(place.directory, error)) {
+      const std::string name = file.path().stem().string();
+      const bool configuration = fs::equivalent(file.path(), config_.path, error);
+      if (file.path().extension() != ".toml" || !tables::is_table_name(name) || configuration)
+        continue;
+      names.insert(name);
+    }
+  }
+  return {names.begin(), names.end()};
+}
+
+// Shipped tables belong to the installation: they are not changed.
+Result<tables::store::Place> TableLibrary::home_of(const std::string& name) const {
+  if (!tables::is_table_name(name))
+    return fail("\"" + name.substr(0, 64) + "\" is not a table's name");
+  const tables::store::Place& beside = places_[0];
+  const tables::store::Place& own = places_[1];
+  std::error_code error;
+  const std::string file = name + ".toml";
+  if (fs::equivalent(beside.directory / file, config_.path, error)) {
+    return fail("\"" + name + "\" is the configuration; use another name");
+  }
+  if (fs::exists(beside.directory / file, error)) return beside;
+  if (fs::exists(own.directory / file, error)) return own;
+  for (const tables::store::Place& place : places_) {
+    if (!fs::exists(place.directory / file, error)) continue;
+    return fail(Error{.message = "is a shipped table, which nobody changes; use another name",
+                      .file = (place.directory / file).string()});
+  }
+  fs::create_directories(own.directory, error);  // writing tells
+  return own;
+}
+
+Result<std::uint32_t> TableLibrary::set(const std::string& name, tables::TableContent content,
+                                        const std::string& expected_hash,
+                                        const std::string& note) const {
+  const auto home = home_of(name);
+  if (!home) return fail(home.error());
+  tables::store::Store store(home->directory, home->history);
+  const std::string path = store.path_of(name).string();
+  if (const auto fault = tables::check(content)) {
+    const std::string place = fault->index ? "[" + std::to_string(*fault->index) + "]" : "";
+    return fail(name + ": " + fault->key + place + ": " + fault->message);
+  }
+  std::error_code error;
+  if (!fs::exists(path, error)) {
+    if (expected_hash.empty()) return store.create(name, tables::to_text(content), note);
+    return fail(Error{.message = "is not there any more; nothing was written", .file = path});
+  }
+  const auto now = store.read(name);
+  if (!now) return fail(now.error());
+  const std::uint32_t made_from = std::exchange(content.revision, now->content.revision);
+  if (content == now->content) return now->content.revision;
+  if (made_from != content.revision || expected_hash != tables::content_hash(now->content)) {
+    return fail(Error{.message = "is another table by now, revision " +
+                                 std::to_string(content.revision) +
+                                 "; nothing was written. Get it and make your change again",
+                      .file = path});
+  }
+  const auto text = tables::rewrite(now->text, content, path);
+  if (!text) return fail(text.error());
+  return store.save(name, now->text, *text, note);
 }
 
 Result<std::map<std::string, std::string>> TableLibrary::kept() const {

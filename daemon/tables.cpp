@@ -369,6 +369,19 @@ void Core::finish_table_change(std::list<TableChange>::iterator change, std::int
   if (!finished.client.id.empty()) answer(finished.client, phase, result, reason);
 }
 
+std::string Core::refuse_content(const std::string& name, const tables::TablePtr& table) const {
+  std::vector<InService> service = service_;
+  for (InService& group : service) {
+    if (group.wanted == name) group.table = table;
+  }
+  for (std::size_t group = 0; group < service.size(); ++group) {
+    if (service[group].wanted != name) continue;
+    const std::string why = misfit(service, group);
+    if (!why.empty()) return "group " + config_.groups[group].name + " has it, and " + why;
+  }
+  return {};
+}
+
 Result<void> Core::restore(std::size_t group, const std::string& wanted, tables::TablePtr table) {
   std::vector<InService> service = service_;
   for (const InService& other : service_) {

@@ -67,6 +67,11 @@ Result<void> Client::listen() {
         if (auto complete = health_collector_.add(part)) newest_health_ = std::move(complete);
       });
   if (!health) return health;
+  auto tables = transport_->subscribe<table_reply_t>(
+      options_.prefix + "_TABLE_REPLY", [this](const table_reply_t& reply) {
+        if (reply.client_id == id_ && reply.number == number_) table_reply_ = reply;
+      });
+  if (!tables) return tables;
   return transport_->subscribe<state_t>(options_.prefix + "_STATE",
                                         [this](const state_t& state) { on_state(state); });
 }
@@ -99,8 +104,8 @@ Result<void> Client::wait(Clock::time_point deadline) {
 }
 
 void Client::drain() {
-  // Thrice: each of the three subscriptions may hold a full queue.
-  for (int i = 0; i < 3 && readable(transport_->fd()); ++i) transport_->handle();
+  // Each of the four subscriptions may hold a full queue.
+  for (int i = 0; i < 4 && readable(transport_->fd()); ++i) transport_->handle();
 }
 
 Error Client::no_daemon() const {
@@ -175,6 +180,26 @@ Result<reply_t> Client::run(command_t command, Until until,
       next_send = now + options_.ask_again_every;
     }
   }
+}
+
+Result<table_reply_t> Client::ask(table_request_t request) {
+  request.client_id = id_;
+  request.number = ++number_;
+  request.utime_us = unix_time_us();
+  request.content_count = static_cast<std::int32_t>(request.content.size());
+  table_reply_.reset();
+  const Clock::time_point give_up = Clock::now() + options_.answer_within;
+  Clock::time_point next_send = Clock::now();
+  while (!table_reply_) {
+    if (Clock::now() >= give_up) return fail(no_daemon());
+    if (Clock::now() >= next_send) {
+      const auto sent = transport_->publish(options_.prefix + "_TABLE_REQUEST", request);
+      if (!sent) return fail(sent.error());
+      next_send = Clock::now() + options_.resend_every;
+    }
+    if (auto waited = wait(std::min(next_send, give_up)); !waited) return fail(waited.error());
+  }
+  return std::move(*table_reply_);
 }
 
 template <class Whole>

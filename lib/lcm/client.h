@@ -50,6 +50,10 @@ class Client {
   Result<reply_t> run(command_t command, Until until,
                       const std::function<void(const reply_t&)>& on_reply = {});
 
+  // Sends the request, of which client_id, number, utime_us and counts are filled in here, until it
+  // is answered.
+  Result<table_reply_t> ask(table_request_t request);
+
   // The newest complete snapshot that arrives from now on.
   Result<Snapshot> snapshot(std::chrono::milliseconds timeout);
 
@@ -85,6 +89,8 @@ class Client {
   // Of the command under way.
   std::optional<reply_t> accepted_;
   std::optional<reply_t> final_;  // REFUSED or RESULT
+
+  std::optional<table_reply_t> table_reply_;  // to the request under way
 
   SnapshotCollector collector_;
   std::optional<Snapshot> newest_;

@@ -84,9 +84,20 @@ void scan_fields(Scan& scan, std::type_identity<command_t>) {
   scan.fixed(kInt8);   // kind
   scan.text();         // group
   scan.text();         // table
+  scan.fixed(kInt8);   // dry_run
   const std::size_t motors = scan.count(kMinText + kInt64);
   for (std::size_t i = 0; i < motors; ++i) scan.text();
   scan.fixed(motors * kInt64);  // steps
+}
+
+constexpr std::size_t kMinPlanMotor = kMinText + 2 * kInt64 + kDouble;
+constexpr std::size_t kMinPlan = 4 * kInt64 + kInt32;
+
+void scan_fields(Scan& scan, std::type_identity<move_plan_t>) {
+  scan.fixed(4 * kInt64);  // duration_us, ticks, frames, bytes
+  const std::size_t motors = scan.count(kMinPlanMotor);
+  for (std::size_t i = 0; i < motors; ++i) scan.text();
+  scan.fixed(motors * (2 * kInt64 + kDouble));  // steps, motor_duration_us, peak_steps_per_s
 }
 
 void scan_fields(Scan& scan, std::type_identity<reply_t>) {
@@ -101,6 +112,52 @@ void scan_fields(Scan& scan, std::type_identity<reply_t>) {
   scan.fixed(motors * (kInt64 + kInt16));                    // position_steps, table_of_motor
   const std::size_t tables = scan.count(kMinTableRef);
   for (std::size_t i = 0; i < tables; ++i) scan_fields(scan, std::type_identity<table_ref_t>{});
+  const std::size_t plans = scan.count(kMinPlan);
+  for (std::size_t i = 0; i < plans; ++i) scan_fields(scan, std::type_identity<move_plan_t>{});
+}
+
+constexpr std::size_t kMinTable = 3 * kMinText + 4 * kInt32 + kInt64;
+
+void scan_fields(Scan& scan, std::type_identity<table_t>) {
+  scan.text();                              // name
+  scan.text();                              // description
+  scan.fixed(kInt32);                       // revision
+  scan.text();                              // hash
+  scan.fixed(kInt64 + kInt32);              // time_unit_ns, cruise
+  scan.fixed(scan.count(kInt32) * kInt32);  // accel
+  scan.fixed(scan.count(kInt32) * kInt32);  // decel
+}
+
+constexpr std::size_t kMinTableEntry = 2 * kMinText + kMinTableRef + kInt32 + 2 * kDouble;
+
+void scan_fields(Scan& scan, std::type_identity<table_entry_t>) {
+  scan.text();  // name
+  scan_fields(scan, std::type_identity<table_ref_t>{});
+  scan.text();                       // fault
+  scan.fixed(kInt32 + 2 * kDouble);  // codes, start_steps_per_s, max_steps_per_s
+}
+
+void scan_fields(Scan& scan, std::type_identity<table_request_t>) {
+  scan.fixed(kInt64);  // utime_us
+  scan.text();         // client_id
+  scan.fixed(kInt64);  // number
+  scan.fixed(kInt8);   // kind
+  scan.text();         // table
+  scan.text();         // expected_hash
+  const std::size_t contents = scan.count(kMinTable);
+  for (std::size_t i = 0; i < contents; ++i) scan_fields(scan, std::type_identity<table_t>{});
+}
+
+void scan_fields(Scan& scan, std::type_identity<table_reply_t>) {
+  scan.fixed(kInt64);  // utime_us
+  scan.text();         // client_id
+  scan.fixed(kInt64);  // number
+  scan.fixed(kInt8);   // done
+  scan.text();         // reason
+  const std::size_t entries = scan.count(kMinTableEntry);
+  for (std::size_t i = 0; i < entries; ++i) scan_fields(scan, std::type_identity<table_entry_t>{});
+  const std::size_t tables = scan.count(kMinTable);
+  for (std::size_t i = 0; i < tables; ++i) scan_fields(scan, std::type_identity<table_t>{});
 }
 
 void scan_fields(Scan& scan, std::type_identity<motor_state_t>) {
@@ -163,12 +220,40 @@ bool counts_match(const command_t& command) {
          counted(command.motor_count, command.steps.size());
 }
 
+bool counts_match(const move_plan_t& plan) {
+  return counted(plan.motor_count, plan.motors.size()) &&
+         counted(plan.motor_count, plan.steps.size()) &&
+         counted(plan.motor_count, plan.motor_duration_us.size()) &&
+         counted(plan.motor_count, plan.peak_steps_per_s.size());
+}
+
+bool counts_match(const table_t& table) {
+  return counted(table.accel_count, table.accel.size()) &&
+         counted(table.decel_count, table.decel.size());
+}
+
 bool counts_match(const reply_t& reply) {
   return counted(reply.motor_count, reply.motors.size()) &&
          counted(reply.motor_count, reply.motor_results.size()) &&
          counted(reply.motor_count, reply.position_steps.size()) &&
          counted(reply.motor_count, reply.table_of_motor.size()) &&
-         counted(reply.table_count, reply.tables.size());
+         counted(reply.table_count, reply.tables.size()) &&
+         counted(reply.plan_count, reply.plan.size()) &&
+         std::ranges::all_of(reply.plan,
+                             [](const move_plan_t& plan) { return counts_match(plan); });
+}
+
+bool counts_match(const table_request_t& request) {
+  return counted(request.content_count, request.content.size()) &&
+         std::ranges::all_of(request.content,
+                             [](const table_t& table) { return counts_match(table); });
+}
+
+bool counts_match(const table_reply_t& reply) {
+  return counted(reply.entry_count, reply.entries.size()) &&
+         counted(reply.table_count, reply.tables.size()) &&
+         std::ranges::all_of(reply.tables,
+                             [](const table_t& table) { return counts_match(table); });
 }
 
 bool counts_match(const state_t& state) {
@@ -195,7 +280,8 @@ Result<std::vector<std::uint8_t>> encode(const T& message) {
   const auto size = static_cast<std::size_t>(message.getEncodedSize());
   if (size > kMaxMessageBytes) {
     return fail(
-        fmt::format("{} of {} bytes does not fit one datagram ({} bytes); name fewer motors",
+        fmt::format("{} of {} bytes does not fit one datagram ({} bytes); name fewer motors, or "
+                    "use a table of fewer codes",
                     T::getTypeName(), size, kMaxMessageBytes));
   }
   std::vector<std::uint8_t> bytes(size);
@@ -220,9 +306,13 @@ template Result<std::vector<std::uint8_t>> encode(const command_t&);
 template Result<std::vector<std::uint8_t>> encode(const health_t&);
 template Result<std::vector<std::uint8_t>> encode(const reply_t&);
 template Result<std::vector<std::uint8_t>> encode(const state_t&);
+template Result<std::vector<std::uint8_t>> encode(const table_reply_t&);
+template Result<std::vector<std::uint8_t>> encode(const table_request_t&);
 template std::optional<command_t> decode(std::span<const std::uint8_t>);
 template std::optional<health_t> decode(std::span<const std::uint8_t>);
 template std::optional<reply_t> decode(std::span<const std::uint8_t>);
 template std::optional<state_t> decode(std::span<const std::uint8_t>);
+template std::optional<table_reply_t> decode(std::span<const std::uint8_t>);
+template std::optional<table_request_t> decode(std::span<const std::uint8_t>);
 
 }  // namespace bushd::lcm

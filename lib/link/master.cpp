@@ -156,6 +156,42 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   return out_;
 }
 
+std::optional<Master::Traffic> Master::rehearse(std::int64_t now_us, TickSource& source,
+                                                std::span<const Motion> motions,
+                                                std::uint64_t max_frames) const {
+  Master other(setup_, source);
+  other.clock_ = clock_;
+  other.bus_health_ = bus_health_;
+  other.line_free_us_ = now_us;
+  for (std::size_t i = 0; i < mcus_.size(); ++i) other.mcus_[i].view = mcus_[i].view;
+  for (const Motion& motion : motions) {
+    other.begin(motion.mcu, motion.motor, motion.start);
+    other.mcus_[motion.mcu].stream[motion.motor].run_steps = motion.run_steps;
+  }
+  const auto open = [&other] {
+    return std::any_of(other.mcus_.begin(), other.mcus_.end(), [](const Mcu& mcu) {
+      return std::any_of(mcu.stream.begin(), mcu.stream.end(),
+                         [](const Stream& s) { return s.active && !s.finished; });
+    });
+  };
+  const std::int64_t target_us = kQueueTargetUs + 4 * held_back_us(bus_health_);
+  Tick end = 0;
+  for (const Motion& motion : motions) {
+    end = std::max(end, source.end_tick(motion.mcu, motion.motor));
+  }
+  Traffic traffic;
+  for (; open(); now_us += kStreamWakeUs) {
+    // Queues are filled ahead of the time: what has not gone out by its end never will.
+    if (!clock_.valid() || clock_.tick_at(now_us) > end) return std::nullopt;
+    while (other.line_free_us_ - now_us < kMaxBacklogUs && other.send_stream(now_us, target_us)) {
+      if (++traffic.frames > max_frames) return std::nullopt;
+    }
+    traffic.bytes += other.out_.size();
+    other.out_.clear();
+  }
+  return traffic;
+}
+
 std::int64_t Master::next_wake_us() const {
   if (!port_open_) return INT64_MAX;
   if (exchange_) {

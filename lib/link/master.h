@@ -129,6 +129,21 @@ class Master {
   // can (can_run_tables).
   void begin_table_run(std::size_t mcu, std::uint8_t motor, Tick start, std::int32_t steps);
   bool can_run_tables(std::size_t mcu) const;
+  // What would go out for moves of the motors that the source has ticks for, on a line that has
+  // nothing else to do and loses nothing. Preconditions as of begin().
+  struct Motion {
+    std::size_t mcu;
+    std::uint8_t motor;
+    Tick start;
+    std::optional<std::int32_t> run_steps;  // of a table run
+  };
+  struct Traffic {
+    std::uint64_t frames = 0;
+    std::uint64_t bytes = 0;
+  };
+  // Nothing beyond `max_frames`: making them all takes as long as in the moves themselves.
+  std::optional<Traffic> rehearse(std::int64_t now_us, TickSource& source,
+                                  std::span<const Motion> motions, std::uint64_t max_frames) const;
   // The source's answer for these motors has changed from `first` on.
   void replace(std::size_t mcu, std::uint16_t motors, Tick first);
   // Nothing more is sent for this motor.

@@ -113,7 +113,7 @@ TEST(Moves, StopBeforeTheStartMakesNoStep) {
 TEST(Moves, RepeatedCommandIsAnsweredAgainAndNotRunAgain) {
   Lab lab(hall(1, 1));
   lab.connect();
-  command_t command;
+  command_t command{};
   command.utime_us = 0;
   command.client_id = "test";
   command.number = 77;

@@ -4,7 +4,7 @@ import json
 import signal
 import unittest
 
-from rig import TABLE_RUNS, EndToEndTest, program
+from rig import TABLE_RUNS, TICK_US, EndToEndTest, program
 
 
 class Tables(EndToEndTest):
@@ -111,6 +111,38 @@ class Tables(EndToEndTest):
         self.assertIn('no group "axes"', self.bushctl("table", "use", "axes", "own").stderr)
         self.assertEqual(self.table_of("a0"), ("bushd2-constant", 0))
         self.command("move", "--wait", "a0", "300")
+        self.finish()
+
+    def test_list_and_show(self):
+        self.bring_up_with_tables()
+        self.command("table", "use", "group0", "own@1")
+        listed = json.loads(self.command("table", "list", "--json").stdout)
+        self.assertEqual([entry["group"] for entry in listed["groups"]], [f"group{i}" for i in range(4)])
+        self.assertEqual((listed["groups"][0]["table"], listed["groups"][0]["revision"]), ("own", 1))
+        own = next(entry for entry in listed["tables"] if entry["table"] == "own")
+        self.assertEqual((own["revision"], round(own["max_steps_per_s"], -2)), (2, 2400))
+        self.assertRegex(self.command("table", "list").stdout, r"group0 +own +1 +[0-9a-f]{8}\n")
+        # What bushtab says of the same revision.
+        for wanted in ("own", "own@1", "own@gentle"):
+            shown = json.loads(self.command("table", "show", wanted, "--json").stdout)
+            said = json.loads(self.bushtab("show", wanted, "--json").stdout)
+            self.assertEqual((shown["sha256"], shown["time_unit_ns"]), (said["sha256"], said["time_unit_ns"]))
+        self.assertIn("revision 2, SHA-256 ", self.command("table", "show", "own").stdout)
+        refused = self.bushctl("table", "show", "own@9")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn('table "own" has no revision 9', refused.stderr)
+
+    def test_dry_run_moves_nothing_and_tells_what_the_move_is(self):
+        self.bring_up_with_tables()
+        plan = json.loads(self.command("move", "--dry-run", "--json", "a0", "1000", "b0", "-30").stdout)
+        self.assertEqual([motor["steps"] for motor in plan["motors"]], [1000, -30])
+        self.assertEqual(plan["motors"][0]["peak_steps_per_s"], 2500)
+        self.assertEqual(plan["duration_us"], plan["ticks"] * TICK_US)
+        self.assertGreater(plan["bytes"], 20 * plan["frames"])
+        ran = self.command("move", "--dry-run", "a0", "1000")
+        self.assertRegex(ran.stdout, r"a0: \+1000 steps in 0\.\d{3} s, up to 2500 steps/s\n\d+ ticks, ")
+        self.assertEqual(self.moves(), [])
+        self.command("move", "--wait", "a0", "1000")
         self.finish()
 
     def test_what_was_used_stays_when_the_daemon_is_started_again(self):

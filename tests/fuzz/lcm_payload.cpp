@@ -44,7 +44,7 @@ void check_one_of(Input input) {
 
 void run(Input input) {
   // The corpus counts them in this order: a new type is added at the end.
-  check_one_of<command_t, reply_t, state_t, health_t>(input);
+  check_one_of<command_t, reply_t, state_t, health_t, table_request_t, table_reply_t>(input);
 }
 
 }  // namespace

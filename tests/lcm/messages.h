@@ -10,6 +10,8 @@
 #include "bushd/health_t.hpp"
 #include "bushd/reply_t.hpp"
 #include "bushd/state_t.hpp"
+#include "bushd/table_reply_t.hpp"
+#include "bushd/table_request_t.hpp"
 
 namespace bushd::test {
 
@@ -37,6 +39,7 @@ inline void fill(Random& random, command_t& command) {
   command.kind = any<std::int8_t>(random);
   command.group = text(random);
   command.table = text(random);
+  command.dry_run = any<std::int8_t>(random);
   for (std::size_t i = below(random, 5); i > 0; --i) {
     command.motors.push_back(text(random));
     command.steps.push_back(any<std::int64_t>(random));
@@ -50,6 +53,65 @@ inline table_ref_t table_ref(Random& random) {
   table.revision = any<std::int32_t>(random);
   table.hash = text(random);
   return table;
+}
+
+inline move_plan_t move_plan(Random& random) {
+  move_plan_t plan{};
+  plan.frames = any<std::int64_t>(random);
+  for (std::size_t i = below(random, 4); i > 0; --i) {
+    plan.motors.push_back(text(random));
+    plan.steps.push_back(any<std::int64_t>(random));
+    plan.motor_duration_us.push_back(any<std::int64_t>(random));
+    plan.peak_steps_per_s.push_back(static_cast<double>(any<std::int32_t>(random)));
+  }
+  plan.motor_count = static_cast<std::int32_t>(plan.motors.size());
+  return plan;
+}
+
+inline table_t any_table(Random& random) {
+  table_t table{};
+  table.name = text(random);
+  table.description = text(random);
+  table.revision = any<std::int32_t>(random);
+  table.hash = text(random);
+  table.time_unit_ns = any<std::int64_t>(random);
+  for (std::size_t i = below(random, 6); i > 0; --i)
+    table.accel.push_back(any<std::int32_t>(random));
+  for (std::size_t i = below(random, 4); i > 0; --i)
+    table.decel.push_back(any<std::int32_t>(random));
+  table.accel_count = static_cast<std::int32_t>(table.accel.size());
+  table.decel_count = static_cast<std::int32_t>(table.decel.size());
+  return table;
+}
+
+inline void fill(Random& random, table_request_t& request) {
+  request.utime_us = any<std::int64_t>(random);
+  request.client_id = text(random);
+  request.number = any<std::int64_t>(random);
+  request.kind = any<std::int8_t>(random);
+  request.table = text(random);
+  request.expected_hash = text(random);
+  for (std::size_t i = below(random, 3); i > 0; --i) request.content.push_back(any_table(random));
+  request.content_count = static_cast<std::int32_t>(request.content.size());
+}
+
+inline void fill(Random& random, table_reply_t& reply) {
+  reply.utime_us = any<std::int64_t>(random);
+  reply.client_id = text(random);
+  reply.number = any<std::int64_t>(random);
+  reply.done = any<std::int8_t>(random);
+  reply.reason = text(random);
+  for (std::size_t i = below(random, 4); i > 0; --i) {
+    table_entry_t entry{};
+    entry.name = text(random);
+    entry.table = table_ref(random);
+    entry.fault = text(random);
+    entry.codes = any<std::int32_t>(random);
+    reply.entries.push_back(entry);
+  }
+  reply.entry_count = static_cast<std::int32_t>(reply.entries.size());
+  for (std::size_t i = below(random, 3); i > 0; --i) reply.tables.push_back(any_table(random));
+  reply.table_count = static_cast<std::int32_t>(reply.tables.size());
 }
 
 inline void fill(Random& random, reply_t& reply) {
@@ -68,6 +130,8 @@ inline void fill(Random& random, reply_t& reply) {
   reply.motor_count = static_cast<std::int32_t>(reply.motors.size());
   for (std::size_t i = below(random, 4); i > 0; --i) reply.tables.push_back(table_ref(random));
   reply.table_count = static_cast<std::int32_t>(reply.tables.size());
+  for (std::size_t i = below(random, 3); i > 0; --i) reply.plan.push_back(move_plan(random));
+  reply.plan_count = static_cast<std::int32_t>(reply.plan.size());
 }
 
 inline table_ref_t table_ref() {

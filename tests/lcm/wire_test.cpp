@@ -62,7 +62,7 @@ class Wire : public testing::Test {
   test::Random random_{kSeed};
 };
 
-using Types = testing::Types<command_t, health_t, reply_t, state_t>;
+using Types = testing::Types<command_t, health_t, reply_t, state_t, table_reply_t, table_request_t>;
 
 class TypeNames {
  public:
@@ -162,6 +162,22 @@ TEST(Encode, RefusesCountsThatAreNotThoseOfTheArrays) {
   auto health = test::random_message<health_t>(random);
   health.latency_below_us.emplace_back();
   EXPECT_FALSE(encode(health));
+}
+
+TEST(Encode, RefusesCountsWithin) {
+  table_request_t request{};
+  request.content.emplace_back();
+  request.content[0] = table_t{};
+  request.content_count = 1;
+  EXPECT_TRUE(encode(request));
+  request.content[0].accel_count = 1;
+  EXPECT_FALSE(encode(request));
+  reply_t reply{};
+  reply.plan.push_back(move_plan_t{});
+  reply.plan_count = 1;
+  EXPECT_TRUE(encode(reply));
+  reply.plan[0].motor_count = 1;
+  EXPECT_FALSE(encode(reply));
 }
 
 TEST(Encode, RefusesTextsWithANul) {

@@ -52,4 +52,20 @@ int send(Client& client, const command_t& command, Client::Until until) {
   return kFailed;
 }
 
+int show_plan(Client& client, command_t move, bool as_json) {
+  move.dry_run = 1;
+  const auto reply = client.run(move, Client::Until::kResult);
+  if (!reply) return failure(client, reply.error());
+  if (reply->phase != reply_t::RESULT || reply->plan.empty()) {
+    fmt::print(stderr, "bushctl: {}: {}\n", printable(reply->result), printable(reply->reason));
+    return kFailed;
+  }
+  if (as_json) {
+    fmt::print("{}\n", json(reply->plan.front()));
+  } else {
+    for (const std::string& line : lines(reply->plan.front())) fmt::print("{}\n", line);
+  }
+  return kDone;
+}
+
 }  // namespace bushctl

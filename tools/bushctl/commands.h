@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <optional>
+#include <string>
 
 #include "bushd/command_t.hpp"
 #include "lcm/client.h"
@@ -23,6 +24,9 @@ int show_status(bushd::lcm::Client& client, std::chrono::milliseconds timeout, b
 int send(bushd::lcm::Client& client, const bushd::command_t& command,
          bushd::lcm::Client::Until until);
 
+// What the move would be.
+int show_plan(bushd::lcm::Client& client, bushd::command_t move, bool as_json);
+
 struct WatchOptions {
   std::chrono::milliseconds timeout{2000};  // without a snapshot
   std::optional<unsigned> count;            // snapshots to show; none: until interrupted
@@ -36,6 +40,10 @@ struct HealthOptions {
   std::optional<unsigned> count;  // with `watch`: messages to show; none: until interrupted
 };
 int show_health(bushd::lcm::Client& client, const HealthOptions& options);
+
+// All tables that the daemon finds, and which each group has; what one of them says.
+int list_tables(bushd::lcm::Client& client, bool as_json);
+int show_table(bushd::lcm::Client& client, const std::string& wanted, bool as_json);
 
 // Says on stderr why, unless it was the user who broke off.
 int failure(const bushd::lcm::Client& client, const bushd::Error& error);

@@ -37,6 +37,7 @@ struct Arguments {
   std::string unique_id;
   std::string group;
   std::string table;
+  bool dry_run = false;
 };
 
 // Both before and after the subcommand.
@@ -151,6 +152,10 @@ int run(int argc, char** argv) {
       "its present one. With --wait the exit code is 0 only if every motor reached its "
       "target.");
   move->add_flag("--wait", arguments.wait, "Wait for the result");
+  move->add_flag(
+      "--dry-run", arguments.dry_run,
+      "Say how long it would take, how fast it would be and what would go out; moves nothing");
+  move->add_flag("--json", arguments.json, "With --dry-run: as JSON");
   move->allow_extras();  // names and numbers, in their order: parse_move()
 
   CLI::App* stop = add_motors_command(app, arguments, "stop", "Ramps motors down");
@@ -181,6 +186,12 @@ int run(int argc, char** argv) {
 
   CLI::App* table = add_command(app, arguments, "table", "Which table each group moves by");
   table->require_subcommand(1);
+  CLI::App* list =
+      add_command(*table, arguments, "list", "Tables that are there, and who has which");
+  list->add_flag("--json", arguments.json, "As JSON");
+  CLI::App* show = add_command(*table, arguments, "show", "What a table says");
+  show->add_option("TABLE", arguments.table, "NAME, NAME@REVISION or NAME@TAG")->required();
+  show->add_flag("--json", arguments.json, "As JSON");
   CLI::App* use = add_command(*table, arguments, "use", "Gives a group another table");
   use->footer(
       "TABLE is NAME, NAME@REVISION or NAME@TAG, as for bushtab. Motors that move keep their "
@@ -246,8 +257,24 @@ int run(int argc, char** argv) {
     return bushctl::set_address(arguments.line, arguments.unique_id, arguments.address);
   }
   if (estop->parsed()) return send(arguments, to_motors(command_t::EMERGENCY_STOP, {}), true);
+  if (list->parsed()) {
+    return with_client(
+        arguments, [&](Client& client) { return bushctl::list_tables(client, arguments.json); });
+  }
+  if (show->parsed()) {
+    return with_client(arguments, [&](Client& client) {
+      return bushctl::show_table(client, arguments.table, arguments.json);
+    });
+  }
   if (use->parsed()) return send(arguments, to_use(arguments.group, arguments.table), true);
   if (reload->parsed()) return send(arguments, to_motors(command_t::RELOAD_TABLES, {}), true);
+  if (move->parsed() && arguments.dry_run) {
+    auto command = bushctl::parse_move(move->remaining());
+    if (!command) return send(arguments, command, true);
+    return with_client(arguments, [&](Client& client) {
+      return bushctl::show_plan(client, *command, arguments.json);
+    });
+  }
   if (move->parsed())
     return send(arguments, bushctl::parse_move(move->remaining()), arguments.wait);
   if (stop->parsed()) {

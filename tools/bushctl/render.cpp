@@ -98,6 +98,39 @@ std::string json(const Snapshot& snapshot) {
   return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
+std::string json(const bushd::move_plan_t& plan) {
+  nlohmann::json out = {{"duration_us", plan.duration_us},
+                        {"ticks", plan.ticks},
+                        {"frames", plan.frames},
+                        {"bytes", plan.bytes},
+                        {"motors", nlohmann::json::array()}};
+  // More than were counted.
+  if (plan.frames < 0) out["frames"] = out["bytes"] = nullptr;
+  for (std::size_t i = 0; i < plan.motors.size(); ++i) {
+    out["motors"].push_back({{"name", plan.motors[i]},
+                             {"steps", plan.steps[i]},
+                             {"duration_us", plan.motor_duration_us[i]},
+                             {"peak_steps_per_s", plan.peak_steps_per_s[i]}});
+  }
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::vector<std::string> lines(const bushd::move_plan_t& plan) {
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < plan.motors.size(); ++i) {
+    out.push_back(fmt::format("{}: {:+} steps in {:.3f} s, up to {:.6g} steps/s",
+                              printable(plan.motors[i]), plan.steps[i],
+                              static_cast<double>(plan.motor_duration_us[i]) * 1e-6,
+                              plan.peak_steps_per_s[i]));
+  }
+  const std::string traffic = plan.frames < 0
+                                  ? "more frames than are counted"
+                                  : fmt::format("{} frames of {} bytes", plan.frames, plan.bytes);
+  out.push_back(fmt::format("{} ticks, {:.3f} s; {}", plan.ticks,
+                            static_cast<double>(plan.duration_us) * 1e-6, traffic));
+  return out;
+}
+
 std::vector<std::string> lines(const bushd::reply_t& reply) {
   if (reply.phase == bushd::reply_t::ACCEPTED) return {"accepted"};
   std::vector<std::string> out;

@@ -21,6 +21,10 @@ std::string motor_line(const bushd::motor_state_t& motor);
 // {"motors":[...],"mcus":[...],...}; docs/lcm.md lists the keys.
 std::string json(const bushd::lcm::Snapshot& snapshot);
 
+// What a move would be, motor by motor and as a whole.
+std::string json(const bushd::move_plan_t& plan);
+std::vector<std::string> lines(const bushd::move_plan_t& plan);
+
 // A reply in one line per motor, or in one line where no motors are named.
 std::vector<std::string> lines(const bushd::reply_t& reply);
 

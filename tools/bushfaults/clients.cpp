@@ -36,7 +36,7 @@ void Clients::begin_anew() {
 
 command_t Clients::make(std::int8_t kind) {
   const auto client = static_cast<std::size_t>(random_.below(kClients));
-  command_t command;
+  command_t command{};
   command.utime_us = 0;
   command.client_id = "c" + std::to_string(client) + "-" + std::to_string(generation_);
   command.number = ++number_[client];

@@ -7,6 +7,7 @@
 
 #include "tables/store/store.h"
 #include "tables/table_file.h"
+#include "tables/toml_file.h"
 
 namespace bushd::tables::store {
 namespace {
@@ -34,15 +35,19 @@ Place place_of(const fs::path& directory) {
           .history = machine ? fs::path(kMachineHistory) : directory / kHistoryBeside};
 }
 
-Result<TablePtr> open(std::string_view table, std::span<const Place> places) {
+Result<Found> find(std::string_view table, std::span<const Place> places) {
   const std::size_t at = table.rfind('@');
   const std::string name(table.substr(0, at));
   std::vector<fs::path> directories;
   for (const Place& place : places) directories.push_back(place.directory);
-  const auto path = find(name, directories);
+  const auto path = tables::find(name, directories);
   if (at == std::string_view::npos) {
     if (!path) return fail(path.error());
-    return load(*path);
+    const auto text = read_text(*path);
+    if (!text) return fail(text.error());
+    auto content = parse_content(*text, path->string());
+    if (!content) return fail(content.error());
+    return Found{*path, std::move(*content)};
   }
   if (!is_table_name(name)) return fail(path.error());
   for (const Place& place : places) {
@@ -50,9 +55,15 @@ Result<TablePtr> open(std::string_view table, std::span<const Place> places) {
     const Store store(place.directory, place.history);
     auto stored = store.read(name, table.substr(at + 1));
     if (!stored) return fail(stored.error());
-    return make(std::move(stored->content), store.path_of(name).string());
+    return Found{store.path_of(name), std::move(stored->content)};
   }
   return fail(path.error());
+}
+
+Result<TablePtr> open(std::string_view table, std::span<const Place> places) {
+  auto found = find(table, places);
+  if (!found) return fail(found.error());
+  return make(std::move(found->content), found->path.string());
 }
 
 }  // namespace bushd::tables::store

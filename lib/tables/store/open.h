@@ -23,8 +23,14 @@ struct Place {
 // file in the directory.
 Place place_of(const std::filesystem::path& directory);
 
-// From the first place that knows the table. Its path() is that of the table's file, also for a
-// revision that the file no longer has.
+struct Found {
+  std::filesystem::path path;  // of the table's file, also for a revision that it no longer has
+  TableContent content;
+};
+
+// From the first place that knows the table.
+Result<Found> find(std::string_view table, std::span<const Place> places);
+// The same, ready for motors.
 Result<TablePtr> open(std::string_view table, std::span<const Place> places);
 
 }  // namespace bushd::tables::store
