@@ -27,7 +27,8 @@ endif()
 if(BUSHD_TESTS)
   find_package(GTest REQUIRED)
   include(GoogleTest)
-  # The image for ATmega2560 and the simulator that runs it (GPL): for tests only.
+  # The images for ATmega2560, and the simulator that runs them in tests and bushsim. It is under the GPL: what is linked
+  # with it is for trying only, not for giving away under another licence.
   pkg_check_modules(SIMAVR IMPORTED_TARGET simavr)
   find_program(AVR_GCC avr-gcc)
 endif()

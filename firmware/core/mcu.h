@@ -48,6 +48,7 @@ typedef struct bushd_mcu_config {
   uint16_t
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint32_t min_tick_ns;  // shorter ones are refused
+  uint16_t lacks;        // BUSHD_CAN_* that it is too slow for: the identity does not show them
   uint16_t* codes;       // table memory
   uint16_t code_count;
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];

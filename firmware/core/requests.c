@@ -72,8 +72,9 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   identity.slots = mcu->config.slots;
   identity.queue_ticks = mcu->config.queue_ticks;
   identity.table_codes = mcu->config.code_count;
-  identity.capabilities =
+  const uint16_t all =
       BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN;
+  identity.capabilities = (uint16_t)(all & ~mcu->config.lacks);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
   return bushd_encode_identity(&identity, payload);
 }

@@ -1,11 +1,15 @@
 #include "sim_avr/avr_mcu.h"
 
+#include <algorithm>
+#include <cstdarg>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 
 extern "C" {
 #include <avr_eeprom.h>
+#include <avr_extint.h>
 #include <avr_ioport.h>
 #include <avr_uart.h>
 #include <sim_avr.h>
@@ -21,8 +25,7 @@ namespace bushd::sim {
 namespace {
 
 constexpr std::uint32_t kFrequency = 16'000'000;
-// The CPU overshoots a time by this at most.
-constexpr avr_cycle_count_t kOvershootCycles = 8;
+constexpr std::uint8_t kExternalInterrupts = 8;
 constexpr std::size_t kRamBegin = 0x200;
 constexpr std::uint8_t kPaint = 0xC5;
 // Behind the one that simavr holds: the chip's buffer has two, its shift register one more.
@@ -32,6 +35,11 @@ constexpr std::size_t kBootNumberAt = 16;
 
 // Busy waiting is all that the image does; the simulator must not sleep for it in real time.
 void no_sleep(avr_t*, avr_cycle_count_t) {}
+
+// What is written to stdout belongs to the program.
+void print_errors(avr_t*, const int level, const char* format, va_list arguments) {
+  if (level <= LOG_ERROR) std::vfprintf(stderr, format, arguments);
+}
 
 avr_uart_t* find_uart(avr_t* avr) {
   for (avr_io_t* io = avr->io_port; io != nullptr; io = io->next) {
@@ -46,6 +54,7 @@ avr_uart_t* find_uart(avr_t* avr) {
 
 AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
     : index_(index), driver_(driver), sink_(sink) {
+  avr_global_logger_set(print_errors);
   elf_firmware_t firmware{};
   if (elf_read_firmware(options.image.c_str(), &firmware) != 0) {
     throw std::runtime_error(options.image + ": not an image for an AVR");
@@ -56,8 +65,10 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   avr_->frequency = firmware.frequency = kFrequency;
   avr_load_firmware(avr_, &firmware);
   avr_->sleep = no_sleep;
-  avr_->run_cycle_limit = kOvershootCycles;
   avr_->log = LOG_ERROR;
+  // Pins that are low would be looked at in every cycle, for interrupts that the image does not
+  // use.
+  for (std::uint8_t i = 0; i < kExternalInterrupts; ++i) avr_extint_set_strict_lvl_trig(avr_, i, 0);
   stack_begin_ = kRamBegin + firmware.datasize + firmware.bsssize;
   std::memset(avr_->data + stack_begin_, kPaint, avr_->ramend + 1u - stack_begin_);
 
@@ -180,6 +191,9 @@ void AvrMcu::advance(TimeNs now_ns) {
       byte_cycles_ = uart_->cycles_per_byte = uart_->cycles_per_byte * 10 / 11;
     }
     feed();
+    const auto left = static_cast<avr_cycle_count_t>((now_ns - time_ns()) * 2 / 125 + 1);
+    avr_->run_cycle_limit = left;
+    avr_->run_cycle_count = std::min(avr_->run_cycle_count, left);
     avr_run(avr_);
   }
 }

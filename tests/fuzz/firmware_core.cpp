@@ -66,6 +66,7 @@ class Mcu {
                                      .queue = queue_.data(),
                                      .queue_ticks = kQueueTicks,
                                      .min_tick_ns = BUSHD_MIN_TICK_NS,
+                                     .lacks = 0,
                                      .codes = codes_.data(),
                                      .code_count = kCodes,
                                      .unique_id = {'f', 'u', 'z', 'z'}};

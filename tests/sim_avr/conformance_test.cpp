@@ -221,6 +221,7 @@ TEST_F(AvrImage, TellsWhoItIs) {
   EXPECT_EQ(identity.slots, kSlots);
   EXPECT_EQ(identity.queue_ticks, 64);
   EXPECT_EQ(identity.table_codes, 952);
+  EXPECT_EQ(identity.capabilities, BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_RUN);
   EXPECT_EQ(identity.unique_id[0], 8);
   EXPECT_EQ(identity.unique_id[7], 1);
 }

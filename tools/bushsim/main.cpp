@@ -54,6 +54,11 @@ int run(int argc, char** argv) {
   app.add_option("--doubled", doubled, "One more MCU with this address, a fault worth trying")
       ->check(CLI::Range(1, 255))
       ->excludes("--trace");
+  std::vector<std::string> mcus;
+  app.add_option("--mcu", mcus,
+                 "What an MCU is, ADDRESS=KIND: virtual (the default), or atmega2560:IMAGE.elf, "
+                 "which runs in simavr. Several times for several")
+      ->allow_extra_args(false);
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
@@ -66,6 +71,9 @@ int run(int argc, char** argv) {
   const auto setup = bushsim::load_setup(config, bus);
   if (!setup) return refuse(setup.error());
   options.setup = *setup;
+  const auto images = bushsim::parse_images(mcus, *setup);
+  if (!images) return refuse(images.error());
+  options.images = *images;
   options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
   bushd::Result<void> ended;
   std::string summary;

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+
 #include "config/config.h"
 
 namespace bushsim {
@@ -28,6 +32,35 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
     return setup;
   }
   return fail({.message = fmt::format("has no bus \"{}\"; {}", bus, choice), .file = config_path});
+}
+
+Result<Images> parse_images(const std::vector<std::string>& choices, const Setup& setup) {
+  const std::string kAvr = "atmega2560:";
+  Images images;
+  for (const std::string& choice : choices) {
+    const auto fault = [&choice](const std::string& what) {
+      return fail(fmt::format("--mcu {}: {}", choice, what));
+    };
+    const std::size_t equals = choice.find('=');
+    const char* const address_end = choice.data() + std::min(equals, choice.size());
+    std::uint8_t address = 0;
+    const auto [end, error] = std::from_chars(choice.data(), address_end, address);
+    if (equals == std::string::npos || error != std::errc{} || end != address_end) {
+      return fault("must be ADDRESS=virtual or ADDRESS=atmega2560:IMAGE.elf");
+    }
+    if (std::ranges::find(setup.addresses, address) == setup.addresses.end()) {
+      return fault(fmt::format("bus \"{}\" has no MCU of this address", setup.bus));
+    }
+    const std::string kind = choice.substr(equals + 1);
+    if (kind == "virtual") continue;
+    if (!kind.starts_with(kAvr)) return fault("is neither virtual nor atmega2560:IMAGE.elf");
+#ifndef BUSHSIM_AVR
+    return fault("this bushsim was built without simavr (libsimavr-dev, libelf-dev)");
+#endif
+    images[address] = kind.substr(kAvr.size());
+    if (!std::filesystem::exists(images[address])) return fault("there is no such file");
+  }
+  return images;
 }
 
 }  // namespace bushsim

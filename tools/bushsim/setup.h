@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,5 +18,12 @@ struct Setup {
 
 // `bus` may be empty if the configuration has one bus only.
 bushd::Result<Setup> load_setup(const std::string& config_path, const std::string& bus);
+
+// What runs the firmware of an MCU that is not virtual: the path of its image, by address.
+using Images = std::map<std::uint8_t, std::string>;
+
+// From `2=atmega2560:PATH` and `1=virtual`, for addresses of the bus. Fails if this bushsim has no
+// simulator for an image.
+bushd::Result<Images> parse_images(const std::vector<std::string>& choices, const Setup& setup);
 
 }  // namespace bushsim

@@ -13,6 +13,10 @@
 #include <ctime>
 #include <iterator>
 
+#ifdef BUSHSIM_AVR
+#include "sim_avr/avr_mcu.h"
+#endif
+
 namespace bushsim {
 namespace {
 
@@ -22,8 +26,10 @@ using bushd::sim::TimeNs;
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
-// Simulated before anybody is told that the bus is there: all MCUs have booted by then.
+// Simulated before anybody is told that the bus is there: all MCUs have booted by then. A real one
+// writes to its EEPROM meanwhile.
 constexpr TimeNs kHeadStartNs = 20'000'000;
+constexpr TimeNs kRealHeadStartNs = 100'000'000;
 // MCUs come out of reset one after the other, so that their ticks begin in different phases, as on
 // a real bus.
 constexpr TimeNs kBootSpacingNs = 617'000;
@@ -34,6 +40,7 @@ constexpr TimeNs kBootSpreadNs = 2'560'000;
 constexpr TimeNs kShortestSleepNs = 50'000;
 constexpr TimeNs kBusySleepNs = 1'000'000;
 constexpr TimeNs kIdleSleepNs = 20'000'000;
+constexpr TimeNs kMostBehindNs = 5'000'000;
 
 constexpr std::size_t kReadBytes = 4096;
 // No more is read while this much still waits for the line: so whoever writes faster than the line
@@ -49,16 +56,37 @@ Simulator::Simulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim
       links_(options.links),
       pty_(std::move(pty)),
       trace_(std::move(trace)),
-      bus_(options.setup.baud, trace_.get()) {
-  TimeNs boot_ns = 0;
-  for (const std::uint8_t address : setup_.addresses) {
-    bus_.add_mcu({.address = address, .boot_number = options.boot_number, .boot_ns = boot_ns});
-    boot_ns = (boot_ns + kBootSpacingNs) % kBootSpreadNs;
-  }
+      bus_(options.setup.baud, trace_.get()),
+      has_images_(!options.images.empty()) {
+  add_mcus(options);
   bus_.on_master_byte = [this](std::uint8_t byte, TimeNs) { replies_.push_back(byte); };
   bus_.on_collision = [this](TimeNs time_ns, std::uint8_t first, std::uint8_t second) {
     report_collision(time_ns, first, second);
   };
+}
+
+void Simulator::add_mcus(const Options& options) {
+  TimeNs boot_ns = 0;
+  for (const std::uint8_t address : setup_.addresses) {
+    const auto image = options.images.find(address);
+    is_virtual_.push_back(image == options.images.end());
+    if (is_virtual_.back()) {
+      bus_.add_mcu({.address = address, .boot_number = options.boot_number, .boot_ns = boot_ns});
+      boot_ns = (boot_ns + kBootSpacingNs) % kBootSpreadNs;
+      continue;
+    }
+#ifdef BUSHSIM_AVR
+    using namespace bushd::sim;
+    bus_.add_mcu([&](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+      AvrOptions avr;
+      avr.image = image->second;
+      avr.address = address;
+      avr.unique_id = index + 1;
+      avr.boots = static_cast<std::uint16_t>(options.boot_number - 1);
+      return std::make_unique<AvrMcu>(avr, index, driver, sink);
+    });
+#endif
+  }
 }
 
 void Simulator::report_collision(TimeNs time_ns, std::uint8_t first, std::uint8_t second) {
@@ -104,9 +132,10 @@ Result<void> Simulator::watch() {
   for (const int fd : {signals_.get(), timer_.get(), pty_->fd()}) {
     if (const auto watched = watch(fd); !watched) return watched;
   }
-  bus_.advance_to(kHeadStartNs);
-  start_ns_ = wall_time_ns() - kHeadStartNs;
-  return set_timer(kHeadStartNs);
+  const TimeNs head_start_ns = has_images_ ? kRealHeadStartNs : kHeadStartNs;
+  bus_.advance_to(head_start_ns);
+  start_ns_ = wall_time_ns() - head_start_ns;
+  return set_timer(head_start_ns);
 }
 
 Result<void> Simulator::watch(int fd) {
@@ -196,7 +225,8 @@ Result<void> Simulator::set_timer(TimeNs now_ns) {
   const TimeNs wake_ns =
       busy_until_ns > now_ns
           ? std::clamp(busy_until_ns, now_ns + kShortestSleepNs, now_ns + kBusySleepNs)
-          : now_ns + kIdleSleepNs;
+          // When an image answers is not known before it does.
+          : now_ns + (has_images_ ? kBusySleepNs : kIdleSleepNs);
   const std::int64_t at_ns = start_ns_ + wake_ns;
   itimerspec when{};
   when.it_value.tv_sec = at_ns / kNsPerSecond;
@@ -207,11 +237,19 @@ Result<void> Simulator::set_timer(TimeNs now_ns) {
   return {};
 }
 
+// An image may take longer than the chip would: then simulated time falls behind, rather than that
+// there is ever more to catch up with.
+void Simulator::slip() {
+  const TimeNs late_ns = wall_time_ns() - bus_.now_ns() - kMostBehindNs;
+  if (late_ns > 0) start_ns_ += late_ns;
+}
+
 Result<void> Simulator::loop() {
   for (;;) {
     std::array<epoll_event, 3> events;
     const int count = ::epoll_wait(epoll_.get(), events.data(), std::ssize(events), -1);
     if (count < 0 && errno != EINTR) return fail(system_error("waiting failed"));
+    if (has_images_) slip();
     const TimeNs now_ns = wall_time_ns();
     bus_.advance_to(now_ns);
     for (int i = 0; i < count; ++i) {
@@ -244,6 +282,11 @@ std::string Simulator::summary() const {
   std::string text;
   const auto out = std::back_inserter(text);
   for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
+    if (!is_virtual_[i]) {
+      fmt::format_to(out, "bushsim: mcu{}: its image's steps are in the trace\n",
+                     setup_.addresses[i]);
+      continue;
+    }
     const bushd::sim::VirtualMcu& mcu = bus_.mcu(i);
     std::uint64_t total = 0;
     std::vector<std::string> motors;

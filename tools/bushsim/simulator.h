@@ -18,6 +18,7 @@ namespace bushsim {
 
 struct Options {
   Setup setup;
+  Images images;
   std::vector<std::string> links;  // at least one: the port's names, each time it is plugged in
   std::string trace;               // empty: none
   std::uint16_t boot_number = 1;
@@ -38,6 +39,7 @@ class Simulator {
 
  private:
   Simulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace);
+  void add_mcus(const Options& options);
   bushd::Result<void> watch();
   bushd::Result<void> watch(int fd);
   bushd::Result<void> plug_in();
@@ -48,6 +50,7 @@ class Simulator {
   bushd::Result<void> hand_out_replies();
   bushd::Result<void> hold_back(bushd::sim::TimeNs now_ns);
   void report_collision(bushd::sim::TimeNs time_ns, std::uint8_t first, std::uint8_t second);
+  void slip();
   bushd::Result<void> set_timer(bushd::sim::TimeNs now_ns);
   bushd::Result<void> loop();
 
@@ -57,6 +60,8 @@ class Simulator {
   std::optional<Pty> pty_;  // none: unplugged
   std::unique_ptr<bushd::sim::VcdWriter> trace_;
   bushd::sim::Bus bus_;
+  std::vector<bool> is_virtual_;  // by MCU
+  bool has_images_;
   Descriptor epoll_;
   Descriptor timer_;
   Descriptor signals_;

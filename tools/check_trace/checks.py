@@ -93,7 +93,7 @@ class MotorCheck:
             self._report("time", f"{text}, allowed are {step.bound_ns / 1000:.1f} us", edge)
 
 
-def check_pins(trace, motors, slot_ns, problems):
+def check_pins(trace, motors, slot_ns_of, problems):
     """What holds for every output, whether or not the log knows a motor there."""
     motor_at = {(motor.address, motor.output): motor for motor in motors}
 
@@ -106,7 +106,7 @@ def check_pins(trace, motors, slot_ns, problems):
         problems.add(owner(place), "pulse", "STEP rises while it is high", time_ns)
     for place, pulses in trace.pulses.items():
         for time_ns, width_ns in pulses:
-            if not 0 < width_ns <= slot_ns:
+            if not 0 < width_ns <= slot_ns_of(place[0]):
                 text = f"a STEP pulse of {width_ns} ns, longer than a slot or void"
                 problems.add(owner(place), "pulse", text, time_ns)
     for place, edges in trace.edges.items():

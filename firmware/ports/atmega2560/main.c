@@ -74,6 +74,8 @@ static void boot(void) {
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
+                             // A frame of them stands for more ticks than it could make in one.
+                             .lacks = BUSHD_CAN_TABLE_TICKS,
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,

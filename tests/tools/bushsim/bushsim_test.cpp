@@ -209,6 +209,35 @@ TEST_F(Bushsim, BothMcusAnswerAndTheTraceIsWholeAfterSigterm) {
   EXPECT_GT(vcd.stamps.back(), 0);
 }
 
+TEST_F(Bushsim, McusThatItCannotMakeAreRefused) {
+  const auto refused = [this](const std::string& mcu) {
+    return refusal({"--config", config, "--link", link, "--mcu", mcu});
+  };
+  EXPECT_THAT(refused("3=virtual"), HasSubstr("no MCU of this address"));
+  EXPECT_THAT(refused("1"), HasSubstr("must be ADDRESS=virtual or"));
+  EXPECT_THAT(refused("1=z80"), HasSubstr("neither virtual nor"));
+  EXPECT_THAT(refused("1=atmega2560:/nowhere.elf"), HasSubstr("--mcu 1=atmega2560:/nowhere.elf: "));
+  EXPECT_FALSE(there(link));
+}
+
+#ifdef AVR_IMAGE
+TEST_F(Bushsim, AnImageOfAnAtmegaAnswersBesideAVirtualMcu) {
+  start_ready({"--mcu", "1=virtual", "--mcu", std::string("2=atmega2560:") + AVR_IMAGE});
+  {
+    const Port port(link);
+    const auto plain = port.identify(1);
+    ASSERT_TRUE(plain);
+    EXPECT_EQ(plain->slots, 256);
+    const auto image = port.identify(2);
+    ASSERT_TRUE(image);
+    EXPECT_EQ(image->slots, 128);
+    EXPECT_EQ(image->queue_ticks, 64);
+  }
+  EXPECT_EQ(stop(), 0);
+  EXPECT_TRUE(bushd::sim::read_vcd(trace).wires.contains("mcu2.step15"));
+}
+#endif
+
 TEST_F(Bushsim, HostMayCloseAndComeBackEvenFromExclusiveUse) {
   start_ready();
   {

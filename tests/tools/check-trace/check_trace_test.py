@@ -166,6 +166,17 @@ class RightTraces(CheckTraceTest):
         report = json.loads(self.assert_right(scene, "--json").stdout)
         self.assertLess(report["max_off_slot_us"], 0.01)
 
+    def test_mcus_may_have_different_slots(self):
+        scene = self.scene()
+
+        def line(*slots):
+            result = self.check(scene, *(word for s in slots for word in ("--slots", s)))
+            return next(line for line in result.stdout.splitlines() if "exact slot" in line)
+
+        self.assertEqual(line("128", "1=256", "2=256"), line())
+        self.assertNotEqual(line("1=128"), line())
+        self.assertEqual(self.check(scene, "--slots", "1=many").returncode, 2)
+
     def test_positions_of_the_daemon_are_compared(self):
         scene = self.scene()
         status = self.directory / "status.json"
