@@ -1,8 +1,8 @@
 """Broken and hostile payloads on the command channel, framed by hand: what LCM's own publish() would never send.
 
 A datagram of LCM (small message): "LC02", sequence number, channel with its NUL, payload. A payload of command_t:
-fingerprint of the type, utime_us, client_id, number, kind, motor_count, motors, steps; numbers big-endian, a text
-as its length with NUL, characters, NUL. The fingerprint is taken from a command that bushctl has sent.
+fingerprint of the type, utime_us, client_id, number, kind, group, table, dry_run, motor_count, motors, steps; numbers
+big-endian, a text as its length with NUL, characters, NUL. The fingerprint is taken from a command that bushctl has sent.
 """
 
 import contextlib
@@ -67,6 +67,7 @@ class Hostile(EndToEndTest):
     def payload(self, client=b"by-hand", number=1, motors=(b"a0",), steps=(5,), count=None, texts=None):
         """A move; `count` and `texts` (all motors, encoded) replace what would be right."""
         head = struct.pack(">q", 0) + text(client) + struct.pack(">qb", number, MOVE_RELATIVE)
+        head += text(b"") + text(b"") + struct.pack(">b", 0)  # group, table, dry_run
         count = struct.pack(">i", len(motors) if count is None else count)
         texts = b"".join(map(text, motors)) if texts is None else texts
         return self.fingerprint + head + count + texts + struct.pack(f">{len(steps)}q", *steps)
