@@ -19,6 +19,10 @@ void Plant::attach(std::size_t mcu, std::size_t output, const PaceRules& rules) 
   motor_of_[mcu].at(output) = std::make_unique<Motor>(rules);
 }
 
+void Plant::couple(std::size_t mcu, std::size_t output, const RotorRules& rules) {
+  motor_of_[mcu].at(output)->rotor.emplace(rules);
+}
+
 void Plant::violated(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what) {
   if (on_violation) on_violation(time_ns, mcu, output, what);
 }
@@ -66,6 +70,7 @@ void Plant::edge(const Edge& edge) {
   }
   ++steps_made_;
   motor->position_steps += motor->forward ? 1 : -1;
+  if (motor->rotor) motor->rotor->step(edge.time_ns, motor->forward);
   if (motor->halt && edge.time_ns > motor->halt->from_ns) {
     check_halt(edge.time_ns, edge.mcu, edge.index, *motor);
   }
@@ -77,7 +82,9 @@ void Plant::settled(TimeNs until_ns) {
   for (std::size_t mcu = 0; mcu < motor_of_.size(); ++mcu) {
     for (std::size_t output = 0; output < kOutputsPerMcu; ++output) {
       Motor* motor = motor_of_[mcu][output].get();
-      if (motor == nullptr || !motor->pace.moving()) continue;
+      if (motor == nullptr) continue;
+      check_rotor(until_ns, mcu, output, *motor);
+      if (!motor->pace.moving()) continue;
       if (motor->halt && motor->halt->cut && until_ns >= motor->halt->from_ns) motor->pace.cut();
       const Jump jump = motor->pace.silent(until_ns);
       if (jump != Jump::kNone) report(until_ns, mcu, output, *motor, jump);
@@ -104,6 +111,14 @@ void Plant::release(std::size_t mcu) {
   for (const auto& motor : motor_of_[mcu]) {
     if (motor) motor->halt.reset();
   }
+}
+
+void Plant::check_rotor(TimeNs until_ns, std::size_t mcu, std::size_t output, Motor& motor) {
+  if (!motor.rotor) return;
+  motor.rotor->advance_to(until_ns);
+  if (motor.slipped || !motor.rotor->slipped_ns()) return;
+  motor.slipped = true;
+  violated(*motor.rotor->slipped_ns(), mcu, output, "the rotor does not follow and loses steps");
 }
 
 void Plant::check_halt(TimeNs time_ns, std::size_t mcu, std::size_t output, Motor& motor) {

@@ -10,6 +10,7 @@
 
 #include "sim/edge.h"
 #include "sim/pace.h"
+#include "sim/rotor.h"
 
 namespace bushd::sim {
 
@@ -19,6 +20,10 @@ class Plant final : public EdgeSink {
 
   // The motor at an output; `rules` outlive the plant. Steps at outputs without one are violations.
   void attach(std::size_t mcu, std::size_t output, const PaceRules& rules);
+
+  // Puts a rotor on that motor; `rules` outlive the plant. It slips where the torque does not hold
+  // it, which is a violation. Its driver is taken to be on all the time.
+  void couple(std::size_t mcu, std::size_t output, const RotorRules& rules);
 
   // Something that must never happen.
   std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what)>
@@ -38,6 +43,10 @@ class Plant final : public EdgeSink {
   // Where the motor stands, by its pulses since the beginning.
   std::int64_t position_steps(std::size_t mcu, std::size_t output) const {
     return motor_of_[mcu].at(output)->position_steps;
+  }
+  // Precondition: coupled.
+  const Rotor& rotor(std::size_t mcu, std::size_t output) const {
+    return *motor_of_[mcu].at(output)->rotor;
   }
   // The first pulse of its present or last movement.
   TimeNs first_step_ns(std::size_t mcu, std::size_t output) const {
@@ -62,9 +71,12 @@ class Plant final : public EdgeSink {
     std::int64_t position_steps = 0;
     bool forward = false;
     std::optional<Halt> halt;
+    std::optional<Rotor> rotor;
+    bool slipped = false;
   };
 
   void report(TimeNs time_ns, std::size_t mcu, std::size_t output, const Motor& motor, Jump jump);
+  void check_rotor(TimeNs until_ns, std::size_t mcu, std::size_t output, Motor& motor);
   void check_halt(TimeNs time_ns, std::size_t mcu, std::size_t output, Motor& motor);
   void violated(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what);
 

@@ -174,7 +174,7 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
       "The part of it that helps braking for sure (default 0)");
   command
       ->add_option("--safety", motor.safety,
-                   "The motor's torque divided by what is used of it (default 1.5)")
+                   "The motor's torque divided by what is used of it (default 2)")
       ->type_name("FACTOR");
   command
       ->add_option("--steps-per-turn", motor.steps_per_turn,

@@ -130,7 +130,8 @@ TEST(Findings, TorqueIsToldInNewtonMetres) {
   // 200 and 400 steps/s, 3.75 ms apart: 53333 steps/s^2 or 1675.5 rad/s^2, if the first code stands
   // for a delay of 1 ns less at least.
   const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {5000, 2500}};
-  const Motor motor{.torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 5e-5, .friction_nm = 0.01};
+  const Motor motor{
+      .torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 5e-5, .friction_nm = 0.01, .safety = 1.5};
   const auto weak = found(content, {.motor = motor});
   ASSERT_EQ(weak.size(), 1U);
   EXPECT_EQ(weak[0].rule, "torque");
@@ -141,7 +142,7 @@ TEST(Findings, TorqueIsToldInNewtonMetres) {
 }
 
 // 4 T / (p J) is the square of the greatest jump without friction, in rad/s: 1006.6 steps/s.
-const Motor kLight{.torque = {{0, 0.4}, {9000, 0.4}}, .inertia_kgm2 = 3.2e-5};
+const Motor kLight{.torque = {{0, 0.4}, {9000, 0.4}}, .inertia_kgm2 = 3.2e-5, .safety = 1.5};
 
 TEST(Findings, StartThatTheRotorCannotFollow) {
   const auto at_start = [](std::uint16_t code) {
@@ -187,7 +188,7 @@ TEST(Findings, JumpOfACoarseCodeThatTheRotorCannotFollow) {
 
 TEST(Findings, CruiseThatFrictionDoesNotLetThrough) {
   const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {5000}};
-  Motor motor{.torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 1e-6, .friction_nm = 0.06};
+  Motor motor{.torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 1e-6, .friction_nm = 0.045};
   EXPECT_THAT(found(content, {.motor = motor}), IsEmpty());
   motor.friction_nm = 0.08;
   const auto risky = found(content, {.motor = motor});

@@ -207,7 +207,7 @@ TEST(Torque, TheCheckAgrees) {
 TEST(Torque, BrakingDoesNotCountOnFrictionUnlessTold) {
   Spec spec{.name = "t", .start_hz = 100, .max_hz = 1000};
   spec.accel.law = Law::kTorque;
-  spec.motor = Motor{.torque = {{0, 0.3}, {2000, 0.3}}, .inertia_kgm2 = 1e-4, .friction_nm = 0};
+  spec.motor = Motor{.torque = {{0, 0.3}, {2000, 0.3}}, .inertia_kgm2 = 1e-4, .safety = 1.5};
   EXPECT_FALSE(make_content(spec)->decel);
   spec.motor->friction_nm = 0.1;
   const auto hindered = make_content(spec);
