@@ -3,6 +3,16 @@
 #include <algorithm>
 
 namespace bushd::daemon {
+namespace {
+
+constexpr std::size_t kMaxClientId = 64;
+
+}  // namespace
+
+bool valid_client_id(const std::string& id) {
+  return !id.empty() && id.size() <= kMaxClientId &&
+         std::all_of(id.begin(), id.end(), [](unsigned char c) { return c > 0x20 && c < 0x7F; });
+}
 
 ClientLog::Verdict ClientLog::note(const std::string& client_id, std::int64_t number) {
   const auto found = clients_.find(client_id);

@@ -12,6 +12,9 @@
 
 namespace bushd::daemon {
 
+// 1..64 printable characters. A message without has no one to be answered.
+bool valid_client_id(const std::string& id);
+
 class ClientLog {
  public:
   static constexpr std::size_t kClients = 256;  // the one longest silent is forgotten first

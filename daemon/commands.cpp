@@ -11,7 +11,6 @@
 namespace bushd::daemon {
 namespace {
 
-constexpr std::size_t kMaxClientId = 64;
 // MCUs count positions in 32 bits.
 constexpr std::int64_t kMaxPosition = INT32_MAX;
 
@@ -21,11 +20,6 @@ bool is_move(std::int8_t kind) {
 
 bool is_table_change(std::int8_t kind) {
   return kind == command_t::USE_TABLE || kind == command_t::RELOAD_TABLES;
-}
-
-bool valid_client_id(const std::string& id) {
-  return !id.empty() && id.size() <= kMaxClientId &&
-         std::all_of(id.begin(), id.end(), [](unsigned char c) { return c > 0x20 && c < 0x7F; });
 }
 
 }  // namespace

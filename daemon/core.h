@@ -149,8 +149,9 @@ class Core {
     std::int8_t kind;
     Stage stage = Stage::kReading;
     std::vector<Part> parts{};
-    std::vector<std::size_t> mcus{};  // that need other tables
-    std::string refused{};            // groups that keep their tables, and why
+    std::vector<std::size_t> mcus{};     // that need other tables
+    std::vector<std::size_t> awaited{};  // while uploading: those that were not offline
+    std::string refused{};               // groups that keep their tables, and why
     std::string notes{};
     std::int64_t deadline_us = 0;  // of the upload
   };

@@ -271,6 +271,7 @@ void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>
 }
 
 void EventLoop::on_table_request(const table_request_t& request) {
+  if (!valid_client_id(request.client_id)) return;
   // Who asks again is answered then.
   if (worker_.waiting() >= kMaxWaitingJobs) return;
   std::string why;

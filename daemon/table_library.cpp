@@ -52,12 +52,16 @@ std::vector<std::string> TableLibrary::names() const {
   std::set<std::string> names;
   std::error_code error;
   for (const tables::store::Place& place : places_) {
-    for (const auto& file : fs::directory_iterator(place.directory, error)) {
-      const std::string name = file.path().stem().string();
-      const bool configuration = fs::equivalent(file.path(), config_.path, error);
-      if (file.path().extension() != ".toml" || !tables::is_table_name(name) || configuration)
-        continue;
-      names.insert(name);
+    // Nothing may throw here: a directory that cannot be read to its end has the names seen so far.
+    fs::directory_iterator file(place.directory, error);
+    for (; !error && file != fs::directory_iterator(); file.increment(error)) {
+      const fs::path& path = file->path();
+      const std::string name = path.stem().string();
+      std::error_code ignored;
+      const bool configuration = fs::equivalent(path, config_.path, ignored);
+      if (path.extension() == ".toml" && tables::is_table_name(name) && !configuration) {
+        names.insert(name);
+      }
     }
   }
   return {names.begin(), names.end()};

@@ -256,20 +256,18 @@ void Core::begin_upload(std::int64_t now_us, TableChange& change) {
   }
   change.deadline_us = now_us + kConfirmUs;
   std::string absent;
-  std::vector<std::size_t> present;
   for (const std::size_t index : change.mcus) {
     const Mcu& mcu = mcus_[index];
     master_of(mcu).reconfigure(mcu.in_bus, setup_of(mcu, service_));
     if (view_of(mcu).phase == link::McuPhase::kOffline) {
       absent += " " + mcu.config->id;
     } else {
-      present.push_back(index);
+      change.awaited.push_back(index);
       change.deadline_us += upload_us(mcu);
     }
   }
   if (!absent.empty())
     add_sentence(change.notes, "not online, they get it when they come:" + absent);
-  change.mcus = std::move(present);
   change.stage = TableChange::Stage::kUploading;
   changed_ = true;
 }
@@ -286,7 +284,7 @@ std::int64_t Core::upload_us(const Mcu& mcu) const {
 }
 
 bool Core::uploaded(const TableChange& change) const {
-  return std::all_of(change.mcus.begin(), change.mcus.end(), [this](std::size_t index) {
+  return std::all_of(change.awaited.begin(), change.awaited.end(), [this](std::size_t index) {
     const Mcu& mcu = mcus_[index];
     return view_of(mcu).phase == link::McuPhase::kOnline && !master_of(mcu).busy(mcu.in_bus);
   });
@@ -294,7 +292,7 @@ bool Core::uploaded(const TableChange& change) const {
 
 void Core::roll_back(TableChange& change) {
   std::string who;
-  for (const std::size_t index : change.mcus) {
+  for (const std::size_t index : change.awaited) {
     const link::McuView& view = view_of(mcus_[index]);
     if (view.phase == link::McuPhase::kOnline) continue;
     add_sentence(who,

@@ -182,6 +182,7 @@ static bushd_status answer_set_address(bushd_mcu* mcu, const bushd_frame* frame,
 
 static bushd_status answer_tables(bushd_mcu* mcu, const bushd_frame* frame, answer* a) {
   if (frame->payload_size != 0) return BUSHD_E_LENGTH;
+  if (!a->due) return BUSHD_OK;
   const bushd_tables tables = bushd_mcu_tables(mcu);
   a->size = bushd_encode_tables(&tables, a->payload);
   return BUSHD_OK;

@@ -179,14 +179,16 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     go_offline(index, "restarted", now_us);
     return;
   }
-  bool in_step = (report.flags & BUSHD_FLAG_SYNCED) != 0 && (report.flags & BUSHD_FLAG_MARK) != 0;
+  // An answer that lay unread while this program slept does not tell what time it is.
+  const bool in_time = now_us <= exchange_->timeout_us;
+  bool in_step =
+      in_time && (report.flags & BUSHD_FLAG_SYNCED) != 0 && (report.flags & BUSHD_FLAG_MARK) != 0;
   view.report = report;
   view.reported = true;
   mcu.asked_since_mark = true;
   note_health(mcu, report);
   view.tick = clock_.unwrap(report.tick, now_us);
-  // An answer that lay unread while this program slept does not tell what time it is.
-  if (in_step && now_us <= exchange_->timeout_us) {
+  if (in_step) {
     if (clock_.valid() && std::abs(view.tick - clock_.tick_at(now_us)) > ticks_in(kClockJumpUs)) {
       // Moves are planned in the bus's time: who counts otherwise has to be told it before it gets
       // any, and of those it has got nothing holds.

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <system_error>
 
@@ -8,16 +9,18 @@
 namespace bushd::tables {
 
 bool is_table_name(std::string_view name) {
-  return !name.empty() && name.front() != '.' && name.find('/') == std::string_view::npos &&
-         name.find('\0') == std::string_view::npos && name.size() <= kMaxNameLength;
+  return !name.empty() && name.front() != '.' && name.size() <= kMaxNameLength &&
+         std::none_of(name.begin(), name.end(), [](unsigned char c) {
+           return c == '/' || c == '@' || c < 0x20 || c == 0x7F;
+         });
 }
 
 Result<std::filesystem::path> find(std::string_view name,
                                    std::span<const std::filesystem::path> directories) {
   if (!is_table_name(name)) {
     return fail(
-        fmt::format("\"{}\" is not a table's name; allowed: 1..{} characters without '/' and not "
-                    "beginning with '.' (the name of a file without \".toml\")",
+        fmt::format("\"{}\" is not a table's name; allowed: 1..{} characters without '/' and '@', "
+                    "not beginning with '.' (the name of a file without \".toml\")",
                     name.substr(0, kMaxNameLength), kMaxNameLength));
   }
   std::string looked_in;

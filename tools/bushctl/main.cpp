@@ -152,10 +152,10 @@ int run(int argc, char** argv) {
       "its present one. With --wait the exit code is 0 only if every motor reached its "
       "target.");
   move->add_flag("--wait", arguments.wait, "Wait for the result");
-  move->add_flag(
+  CLI::Option* dry_run = move->add_flag(
       "--dry-run", arguments.dry_run,
       "Say how long it would take, how fast it would be and what would go out; moves nothing");
-  move->add_flag("--json", arguments.json, "With --dry-run: as JSON");
+  move->add_flag("--json", arguments.json, "With --dry-run: as JSON")->needs(dry_run);
   move->allow_extras();  // names and numbers, in their order: parse_move()
 
   CLI::App* stop = add_motors_command(app, arguments, "stop", "Ramps motors down");
