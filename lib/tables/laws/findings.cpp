@@ -135,13 +135,13 @@ class Inspector {
 
   // Takes the place of what was found before if it asks for a greater share of what there is.
   // Returns whether it does, and is more than the safety factor leaves.
-  bool is_worst(double needs, double has, Demand& worst) const {
+  bool is_worst(double needs, double has, double noise, Demand& worst) const {
     const double share = has > 0 ? needs / has : std::numeric_limits<double>::infinity();
-    if (needs <= 0 || share * limits_.motor->safety <= 1 + kTorqueNoise || share <= worst.share) {
+    if (needs <= 0 || share * limits_.motor->safety <= 1 + noise || share <= worst.share) {
       return false;
     }
     worst.share = share;
-    worst.finding.severity = share > 1 + kTorqueNoise ? Severity::kError : Severity::kWarning;
+    worst.finding.severity = share > 1 + noise ? Severity::kError : Severity::kWarning;
     worst.finding.value = needs;
     worst.finding.limit = has / limits_.motor->safety;
     return true;
@@ -166,7 +166,7 @@ class Inspector {
 
   void inspect_load(double needs_nm, double has_nm, double speed_hz,
                     std::optional<std::size_t> index, const char* remedy, Demand& worst) const {
-    if (!is_worst(needs_nm, has_nm, worst)) return;
+    if (!is_worst(needs_nm, has_nm, kTorqueNoise, worst)) return;
     worst.finding.index = index;
     worst.finding.message = fmt::format(
         "takes {:.3g} Nm at {:.6g} steps/s and the motor has {:.3g}, {:.3g} with the safety "
@@ -179,7 +179,7 @@ class Inspector {
                     Demand& worst) const {
     const double to_hz = hz(to_s);
     const double greatest_hz = greatest_jump_hz(*limits_.motor, which, to_hz);
-    if (greatest_hz <= 0 || !is_worst(to_hz - from_hz, greatest_hz, worst)) return;
+    if (greatest_hz <= 0 || !is_worst(to_hz - from_hz, greatest_hz, kNoise, worst)) return;
     worst.finding.index = index;
     worst.finding.message = fmt::format(
         "the speed jumps from {:.6g} to {:.6g} steps/s within a step, and the rotor catches up "
