@@ -13,9 +13,6 @@ namespace bushd::tables::laws {
 namespace {
 
 constexpr double kNoise = 1e-6;
-// A motor's torque is not known to a hundredth; the law's own tables are off by less where a step
-// is long and the speed at its ends differs much.
-constexpr double kTorqueNoise = 1e-2;
 constexpr double kSpeedRatio = 2.0;
 constexpr double kBushdSlowest = 250;
 constexpr double kBushdFastest = 10;
@@ -25,6 +22,10 @@ struct Pair {
   double slower_s;
   double faster_s;
   std::optional<std::size_t> index;  // none: the step from the side to the cruise delay
+  // Of the steps before and after the pair, the same as its own where there are none: a delay tells
+  // the mean speed of its step, and the steps of the pair have all speeds between these.
+  double before_s;
+  double after_s;
 };
 
 // The place that asks for the greatest share of what the motor has.
@@ -71,11 +72,13 @@ class Inspector {
     Demand torque{.finding = {.rule = "torque", .side = name}};
     Demand jump{.finding = {.rule = "jump", .side = name}};
     if (limits_.motor) inspect_jump(0, first_s, which, in_file(0), jump);
+    const auto delay_or_cruise = [&](std::size_t i) {
+      return i < side.count ? std::max(cruise_s(), delay_s(side, i)) : cruise_s();
+    };
     for (std::size_t i = 0; i < side.count && delay_s(side, i) > cruise_s(); ++i) {
       const bool last = i + 1 == side.count;
-      const Pair pair{delay_s(side, i),
-                      last ? cruise_s() : std::max(cruise_s(), delay_s(side, i + 1)),
-                      in_file(last ? i : i + 1)};
+      const Pair pair{delay_s(side, i), delay_or_cruise(i + 1), in_file(last ? i : i + 1),
+                      delay_s(side, i == 0 ? 0 : i - 1), delay_or_cruise(i + 2)};
       inspect_ratio(pair, ratio);
       inspect_acceleration(pair, steep);
       if (!limits_.motor) continue;
@@ -135,13 +138,13 @@ class Inspector {
 
   // Takes the place of what was found before if it asks for a greater share of what there is.
   // Returns whether it does, and is more than the safety factor leaves.
-  bool is_worst(double needs, double has, double noise, Demand& worst) const {
+  bool is_worst(double needs, double has, Demand& worst) const {
     const double share = has > 0 ? needs / has : std::numeric_limits<double>::infinity();
-    if (needs <= 0 || share * limits_.motor->safety <= 1 + noise || share <= worst.share) {
+    if (needs <= 0 || share * limits_.motor->safety <= 1 + kNoise || share <= worst.share) {
       return false;
     }
     worst.share = share;
-    worst.finding.severity = share > 1 + noise ? Severity::kError : Severity::kWarning;
+    worst.finding.severity = share > 1 + kNoise ? Severity::kError : Severity::kWarning;
     worst.finding.value = needs;
     worst.finding.limit = has / limits_.motor->safety;
     return true;
@@ -158,15 +161,17 @@ class Inspector {
     constexpr double kTurn = 6.283185307179586;
     const double needs_nm =
         least_acceleration(pair) * kTurn / motor.steps_per_turn * motor.inertia_kgm2 + friction_nm;
-    // The two delays have speeds on either side of that, and the torque of them all.
-    const double has_nm = greatest_torque(motor, hz(pair.slower_s), hz(pair.faster_s));
+    // The acceleration is a mean of those from the beginning of the slower step to the end of the
+    // faster one. As above, a code may stand for a delay of up to one unit less.
+    const double fastest_hz = hz(std::max(pair.after_s - unit_s_, 0.0));
+    const double has_nm = greatest_torque(motor, hz(pair.before_s), fastest_hz);
     inspect_load(needs_nm, has_nm, speed_hz, pair.index,
                  "Make the table slower, or with --law torque", worst);
   }
 
   void inspect_load(double needs_nm, double has_nm, double speed_hz,
                     std::optional<std::size_t> index, const char* remedy, Demand& worst) const {
-    if (!is_worst(needs_nm, has_nm, kTorqueNoise, worst)) return;
+    if (!is_worst(needs_nm, has_nm, worst)) return;
     worst.finding.index = index;
     worst.finding.message = fmt::format(
         "takes {:.3g} Nm at {:.6g} steps/s and the motor has {:.3g}, {:.3g} with the safety "
@@ -179,7 +184,7 @@ class Inspector {
                     Demand& worst) const {
     const double to_hz = hz(to_s);
     const double greatest_hz = greatest_jump_hz(*limits_.motor, which, to_hz);
-    if (greatest_hz <= 0 || !is_worst(to_hz - from_hz, greatest_hz, kNoise, worst)) return;
+    if (greatest_hz <= 0 || !is_worst(to_hz - from_hz, greatest_hz, worst)) return;
     worst.finding.index = index;
     worst.finding.message = fmt::format(
         "the speed jumps from {:.6g} to {:.6g} steps/s within a step, and the rotor catches up "

@@ -204,6 +204,24 @@ TEST(Torque, TheCheckAgrees) {
   }));
 }
 
+// A step begins slower and ends faster than its delay says. Where the torque falls steeply just
+// below a step's mean speed, the law has used what is there, wherever the corner of the curve lies.
+TEST(Torque, TheCheckKnowsAllSpeedsOfAStep) {
+  for (int corner_hz = 150; corner_hz < 3000; corner_hz += 10) {
+    Spec spec{.name = "t", .start_hz = 100, .max_hz = 3000};
+    spec.accel.law = Law::kTorque;
+    spec.motor = Motor{.torque = {{100, 0.6}, {1.0 * corner_hz, 0.4}, {3000, 0.4}},
+                       .inertia_kgm2 = 1e-4,
+                       .safety = 1};
+    const auto content = make_content(spec);
+    ASSERT_TRUE(content);
+    for (const auto& finding :
+         tables::laws::findings(**tables::make(*content), {.motor = spec.motor})) {
+      EXPECT_NE(finding.rule, "torque") << corner_hz << " Hz: " << finding.message;
+    }
+  }
+}
+
 TEST(Torque, BrakingDoesNotCountOnFrictionUnlessTold) {
   Spec spec{.name = "t", .start_hz = 100, .max_hz = 1000};
   spec.accel.law = Law::kTorque;
