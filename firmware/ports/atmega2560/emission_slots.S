@@ -8,7 +8,7 @@
 #include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/emission_slots.h"
 
-#define TODO _SFR_IO_ADDR(GPIOR0)
+#define TICK_EVENT _SFR_IO_ADDR(GPIOR0)
 #define KEPT_1 _SFR_IO_ADDR(GPIOR1)
 #define KEPT_2 _SFR_IO_ADDR(GPIOR2)
 
@@ -43,7 +43,7 @@ TIMER1_COMPA_vect:
     lds r24, emission_present+TICK_LAST_TOP
     sts OCR1AL, r24
     ldi r24, EMISSION_CHANGE
-    out TODO, r24
+    out TICK_EVENT, r24
 1:
     pop r31
     pop r30
@@ -57,7 +57,7 @@ TIMER1_COMPB_vect:
     ldi r24, 0
     out _SFR_IO_ADDR(STEP_LOW), r24
     out _SFR_IO_ADDR(STEP_HIGH), r24
-    in r24, TODO
+    in r24, TICK_EVENT
     sbrc r24, 7
     rjmp 2f
     in r24, KEPT_1
@@ -88,7 +88,7 @@ TIMER1_COMPB_vect:
     copy TICK_LAST_TOP
     copy TICK_LAST_TOP+1
     ldi r24, EMISSION_BEGUN
-    out TODO, r24
+    out TICK_EVENT, r24
     pop r31
     pop r30
     in r24, KEPT_1
@@ -99,7 +99,7 @@ TIMER1_COMPB_vect:
     lds r24, emission_present+TICK_TOP
     sts OCR1AL, r24
     ldi r24, 0
-    out TODO, r24
+    out TICK_EVENT, r24
     in r24, KEPT_1
     ; Slots go on meanwhile.
     jmp __vector_emission_begun
