@@ -1,20 +1,20 @@
-// The image for ATmega2560 beside a virtual MCU on one bus: what a master says to one it says to
-// the other, and both must answer and move alike.
+// The image of a real MCU beside a virtual one on one bus: what a master says to one it says to the
+// other, and both must answer and move alike.
 #include <cstdlib>
 #include <string>
 
+#include "conformance/targets.h"
 #include "sim/bus_fixture.h"
 #include "sim/random.h"
-#include "sim_avr/avr_mcu.h"
 
 namespace bushd::sim {
 namespace {
 
 constexpr std::uint32_t kBaud = 500'000;
 constexpr std::uint32_t kTickNs = 2'560'000;
-constexpr std::uint16_t kSlots = 128;
 constexpr std::uint8_t kVirtual = 1;
-constexpr std::uint8_t kAvr = 2;
+constexpr std::uint8_t kReal = 2;
+constexpr Birth kBirth{kReal, 0x0102030405060708, 6};
 constexpr std::uint32_t kUnitNs = 10'000;
 constexpr std::uint16_t kCruise = 90;
 
@@ -26,41 +26,29 @@ std::vector<std::uint16_t> ramp() {
   return codes;
 }
 
-class AvrImage : public testing::Test {
+class Script : public testing::Test {
  protected:
-  AvrImage() : bus_(kBaud, &recorder_), master_(bus_) {
-    McuOptions like_it;
+  explicit Script(const Target& target)
+      : real_(target.make()), bus_(kBaud, &recorder_), master_(bus_) {
+    McuOptions like_it = real_->twin();
     like_it.address = kVirtual;
-    like_it.slots = kSlots;
-    like_it.queue_ticks = 64;
-    like_it.code_count = 952;
     bus_.add_mcu(like_it);
     bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
-      AvrOptions options;
-      options.image = AVR_IMAGES "-500000.elf";
-      options.address = kAvr;
-      options.unique_id = 0x0102030405060708;
-      options.boots = 6;
-      auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
-      avr_ = mcu.get();
-      return mcu;
+      return real_->make(kBirth, index, driver, sink);
     });
     master_.patience_ns = 6'000'000;
-    bus_.advance_to(100'000'000);  // the EEPROM is slow
+    bus_.advance_to(100'000'000);  // an EEPROM is slow
   }
 
   void TearDown() override {
-    EXPECT_EQ(avr_->overruns(), 0u);
-    EXPECT_EQ(avr_->bytes_cut(), 0u);
-    EXPECT_GE(avr_->untouched_ram(), 32u);
+    real_->expect_unharmed();
     EXPECT_EQ(bus_.collisions(), 0u);
     EXPECT_EQ(master_.bad_frames, 0);
-    RecordProperty("untouched_ram_bytes", static_cast<int>(avr_->untouched_ram()));
   }
 
   void make_ready(bushd_format format, const std::vector<std::uint8_t>& motors) {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, format));
-    for (const std::uint8_t address : {kVirtual, kAvr}) {
+    for (const std::uint8_t address : {kVirtual, kReal}) {
       ASSERT_NO_FATAL_FAILURE(master_.upload_table(address, 0, kUnitNs, codes_, kCruise));
       for (const std::uint8_t motor : motors) {
         ASSERT_NO_FATAL_FAILURE(master_.assign(address, motor, 0));
@@ -73,7 +61,7 @@ class AvrImage : public testing::Test {
   // The same request to both; it is no question.
   void tell(bushd_type type, const Bytes& payload) {
     master_.send(kVirtual, static_cast<std::uint8_t>(type), payload);
-    master_.send(kAvr, static_cast<std::uint8_t>(type), payload);
+    master_.send(kReal, static_cast<std::uint8_t>(type), payload);
   }
 
   bushd_table table() const {
@@ -102,7 +90,7 @@ class AvrImage : public testing::Test {
     if (format == BUSHD_FORMAT_FINE) flags |= BUSHD_TICKS_FINE;
     constexpr std::uint8_t kCount = 12;
     for (int frame = 0; !bushd_run_done(&run); ++frame) {
-      while (static_cast<std::int32_t>(first - master_.poll(kAvr).tick) > 40) pass_ticks(4);
+      while (static_cast<std::int32_t>(first - master_.poll(kReal).tick) > 40) pass_ticks(4);
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       const bushd_table_ticks_entry entry{motor, bushd_run_save(&run, tick_ns_, kCount)};
       std::array<std::int16_t, kCount> fine;
@@ -170,7 +158,7 @@ class AvrImage : public testing::Test {
   void expect_the_same_times(std::uint8_t motor) {
     const auto expected = steps(0, motor);
     const auto made = steps(1, motor);
-    const TimeNs slot_ns = tick_ns_ / kSlots;
+    const TimeNs slot_ns = tick_ns_ / real_->twin().slots;
     TimeNs least_ns = kNever;
     TimeNs most_ns = -kNever;
     for (std::size_t i = 0; i < std::min(made.size(), expected.size()); ++i) {
@@ -183,7 +171,7 @@ class AvrImage : public testing::Test {
 
   void expect_the_same_reports() {
     const bushd_report expected = master_.poll(kVirtual);
-    const bushd_report report = master_.poll(kAvr);
+    const bushd_report report = master_.poll(kReal);
     EXPECT_EQ(report.state, expected.state);
     EXPECT_EQ(report.faults, expected.faults);
     EXPECT_EQ(report.flags, expected.flags);
@@ -201,16 +189,24 @@ class AvrImage : public testing::Test {
     }
   }
 
+  const std::unique_ptr<McuUnderTest> real_;
   const std::vector<std::uint16_t> codes_ = ramp();
   std::uint32_t tick_ns_ = kTickNs;
   Recorder recorder_;
   Bus bus_;
   Master master_;
-  AvrMcu* avr_ = nullptr;
 };
 
-TEST_F(AvrImage, TellsWhoItIs) {
-  const auto reply = master_.identify(kAvr);
+class Conformance : public Script, public testing::WithParamInterface<Target> {
+ protected:
+  Conformance() : Script(GetParam()) {}
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Conformance);
+INSTANTIATE_TEST_SUITE_P(Of, Conformance, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(Conformance, TellsWhoItIs) {
+  const auto reply = master_.identify(kReal);
   ASSERT_TRUE(reply);
   bushd_identity identity;
   ASSERT_EQ(bushd_decode_identity(reply->payload.data(), reply->payload.size(), &identity),
@@ -218,15 +214,15 @@ TEST_F(AvrImage, TellsWhoItIs) {
   EXPECT_EQ(identity.protocol_version, BUSHD_PROTOCOL_VERSION);
   EXPECT_EQ(identity.motors, 16);
   EXPECT_EQ(identity.boot_number, 7);
-  EXPECT_EQ(identity.slots, kSlots);
-  EXPECT_EQ(identity.queue_ticks, 64);
-  EXPECT_EQ(identity.table_codes, 952);
-  EXPECT_EQ(identity.capabilities, BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_RUN);
+  EXPECT_EQ(identity.slots, real_->twin().slots);
+  EXPECT_EQ(identity.queue_ticks, real_->twin().queue_ticks);
+  EXPECT_EQ(identity.table_codes, real_->twin().code_count);
+  EXPECT_EQ(identity.capabilities, real_->capabilities());
   EXPECT_EQ(identity.unique_id[0], 8);
   EXPECT_EQ(identity.unique_id[7], 1);
 }
 
-TEST_F(AvrImage, KeepsItsNewAddressOverAReset) {
+TEST_P(Conformance, KeepsItsNewAddressOverAReset) {
   bushd_set_address message{{8, 7, 6, 5, 4, 3, 2, 1}, 77};
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_set_address(&message, payload.data()));
@@ -240,27 +236,27 @@ TEST_F(AvrImage, KeepsItsNewAddressOverAReset) {
   EXPECT_EQ(bushd_get_u16(reply->payload.data() + 4), 8) << "the next boot";
 }
 
-TEST_F(AvrImage, IsSilentAndAliveAfterNoise) {
+TEST_P(Conformance, IsSilentAndAliveAfterNoise) {
   for (int i = 0; i < 2000; ++i) {
     const auto byte = static_cast<std::uint8_t>(i * 7919 >> 3);
     bus_.master_send(Bytes{byte}, bus_.now_ns());
   }
   master_.drain();
-  EXPECT_TRUE(master_.identify(kAvr));
+  EXPECT_TRUE(master_.identify(kReal));
 }
 
-TEST_F(AvrImage, RunsATableToTheSlot) {
+TEST_P(Conformance, RunsATableToTheSlot) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {9}));
-  run_by_table(master_.poll(kAvr).tick + 24, {{9, 0, -1, 110}});
+  run_by_table(master_.poll(kReal).tick + 24, {{9, 0, -1, 110}});
   pass_ticks(160);
   expect_the_same_steps(9, 110);
   expect_the_same_times(9);
   expect_the_same_reports();
 }
 
-TEST_F(AvrImage, RunsFourTablesAtOnceToTheSlot) {
+TEST_P(Conformance, RunsFourTablesAtOnceToTheSlot) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {0, 5, 9, 15}));
-  const std::uint32_t first = master_.poll(kAvr).tick + 60;
+  const std::uint32_t first = master_.poll(kReal).tick + 60;
   run_by_table(first, {{0, 0, 1, 200}});
   run_by_table(first, {{5, 0, 1, 150}});
   run_by_table(first, {{9, 0, -1, 110}});
@@ -273,31 +269,41 @@ TEST_F(AvrImage, RunsFourTablesAtOnceToTheSlot) {
   expect_the_same_reports();
 }
 
-class AvrStreams : public AvrImage, public testing::WithParamInterface<bushd_format> {};
-INSTANTIATE_TEST_SUITE_P(Formats, AvrStreams,
-                         testing::Values(BUSHD_FORMAT_COARSE, BUSHD_FORMAT_FINE), [](auto& format) {
-                           return format.param == BUSHD_FORMAT_FINE ? "Fine" : "Coarse";
+class ConformanceOfStreams : public Script,
+                             public testing::WithParamInterface<std::tuple<Target, bushd_format>> {
+ protected:
+  ConformanceOfStreams() : Script(std::get<Target>(GetParam())) {}
+  bushd_format format() const { return std::get<bushd_format>(GetParam()); }
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ConformanceOfStreams);
+INSTANTIATE_TEST_SUITE_P(Of, ConformanceOfStreams,
+                         testing::Combine(testing::ValuesIn(targets()),
+                                          testing::Values(BUSHD_FORMAT_COARSE, BUSHD_FORMAT_FINE)),
+                         [](auto& test) {
+                           const bool fine =
+                               std::get<bushd_format>(test.param) == BUSHD_FORMAT_FINE;
+                           return std::get<Target>(test.param).name + (fine ? "Fine" : "Coarse");
                          });
 
-TEST_P(AvrStreams, MakeTheStepsOfTheVirtualOne) {
-  ASSERT_NO_FATAL_FAILURE(make_ready(GetParam(), {3}));
-  stream(3, master_.poll(kAvr).tick + 32, 120, 1, GetParam());
+TEST_P(ConformanceOfStreams, MakesTheStepsOfTheVirtualOne) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(format(), {3}));
+  stream(3, master_.poll(kReal).tick + 32, 120, 1, format());
   pass_ticks(80);
-  stream(3, master_.poll(kAvr).tick + 32, 80, -1, GetParam());
+  stream(3, master_.poll(kReal).tick + 32, 80, -1, format());
   pass_ticks(80);
   expect_the_same_steps(3, 200);
   expect_the_same_reports();
 }
 
 // Sixteen motors at any speeds, to and fro, up to the fastest: in the very slots.
-TEST_P(AvrStreams, OfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
-  const bool fine = GetParam() == BUSHD_FORMAT_FINE;
-  if (fine) tick_ns_ = 4'000'000;
+TEST_P(ConformanceOfStreams, StepsOfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
+  const bool fine = format() == BUSHD_FORMAT_FINE;
+  tick_ns_ = real_->full_tick_ns(format());
   std::vector<std::uint8_t> motors;
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) motors.push_back(m);
-  ASSERT_NO_FATAL_FAILURE(make_ready(GetParam(), motors));
+  ASSERT_NO_FATAL_FAILURE(make_ready(format(), motors));
   Random random(7, 0);
-  const std::uint32_t start = master_.poll(kAvr).tick + 24;
+  const std::uint32_t start = master_.poll(kReal).tick + 24;
   const TimeNs begin_ns = bus_.now_ns();
   std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delays;
   constexpr std::uint8_t kCount = 2;
@@ -323,7 +329,7 @@ TEST_P(AvrStreams, OfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
       }
     }
     payload.resize(size);
-    for (const std::uint8_t address : {kVirtual, kAvr}) {
+    for (const std::uint8_t address : {kVirtual, kReal}) {
       master_.post(address, BUSHD_MSG_TICKS, payload);
     }
     bus_.advance_to(begin_ns + TimeNs{tick_ns_} * kCount * (frame + 1));

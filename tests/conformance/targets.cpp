@@ -1,0 +1,60 @@
+#include "conformance/targets.h"
+
+#include <gtest/gtest.h>
+
+#ifdef AVR_IMAGES
+#include "sim_avr/avr_mcu.h"
+#endif
+
+namespace bushd::sim {
+namespace {
+
+#ifdef AVR_IMAGES
+class Atmega2560 final : public McuUnderTest {
+ public:
+  McuOptions twin() const override { return {.slots = 128, .queue_ticks = 64, .code_count = 952}; }
+  std::uint16_t capabilities() const override {
+    return BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_RUN;
+  }
+  std::uint32_t full_tick_ns(bushd_format format) const override {
+    return format == BUSHD_FORMAT_FINE ? 4'000'000 : 2'560'000;
+  }
+  std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
+                            EdgeSink* sink) override {
+    AvrOptions options;
+    options.image = AVR_IMAGES "-500000.elf";
+    options.address = birth.address;
+    options.unique_id = birth.unique_id;
+    options.boots = birth.boots;
+    auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
+    avr_ = mcu.get();
+    return mcu;
+  }
+  void expect_unharmed() const override {
+    EXPECT_EQ(avr_->overruns(), 0u);
+    EXPECT_EQ(avr_->bytes_cut(), 0u);
+    EXPECT_GE(avr_->untouched_ram(), 32u);
+    testing::Test::RecordProperty("untouched_ram_bytes", static_cast<int>(avr_->untouched_ram()));
+  }
+
+ private:
+  const AvrMcu* avr_ = nullptr;
+};
+#endif
+
+template <class Kind>
+Target target(const char* name) {
+  return {name, [] { return std::make_unique<Kind>(); }};
+}
+
+}  // namespace
+
+std::vector<Target> targets() {
+  return {
+#ifdef AVR_IMAGES
+      target<Atmega2560>("Atmega2560"),
+#endif
+  };
+}
+
+}  // namespace bushd::sim

@@ -1,0 +1,53 @@
+// The kinds of MCU that must all do the same. A new port adds one here.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "sim/bus.h"
+
+namespace bushd::sim {
+
+// What an MCU has been given before it boots for the first time in a test.
+struct Birth {
+  std::uint8_t address;
+  std::uint64_t unique_id;
+  std::uint16_t boots;  // boot number of the boot before
+};
+
+class McuUnderTest {
+ public:
+  McuUnderTest() = default;
+  McuUnderTest(const McuUnderTest&) = delete;
+  McuUnderTest& operator=(const McuUnderTest&) = delete;
+  virtual ~McuUnderTest() = default;
+
+  // The virtual MCU that it is compared with: as many slots, ticks and codes.
+  virtual McuOptions twin() const = 0;
+  virtual std::uint16_t capabilities() const = 0;
+  // A tick in which it can make all that a frame may ask for: of all motors, to and fro, up to 127
+  // steps.
+  virtual std::uint32_t full_tick_ns(bushd_format format) const = 0;
+
+  virtual std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
+                                    EdgeSink* sink) = 0;
+  // After a test: what its simulator knows to be wrong.
+  virtual void expect_unharmed() const = 0;
+};
+
+struct Target {
+  std::string name;
+  std::function<std::unique_ptr<McuUnderTest>()> make;
+
+  // For gtest: the names of tests must be the same in every run.
+  friend void PrintTo(const Target& target, std::ostream* out) { *out << target.name; }
+};
+
+// Those whose image and simulator were there at build time.
+std::vector<Target> targets();
+
+}  // namespace bushd::sim
