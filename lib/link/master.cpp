@@ -220,8 +220,8 @@ bool Master::send_next(std::int64_t now_us) {
   return send_emergency(now_us) || send_due_replacement(now_us) ||
          send_stream(now_us, urgent_us, true) || send_wanted_poll(now_us) ||
          send_stream(now_us, urgent_us) || send_due_poll(now_us) || send_due_sync(now_us) ||
-         send_ramp_down(now_us) || send_script(now_us) ||
-         send_stream(now_us, kQueueTargetUs + deeper_us) || send_due_identify(now_us);
+         send_ramp_down(now_us) || send_due_identify(now_us) || send_script(now_us) ||
+         send_stream(now_us, kQueueTargetUs + deeper_us);
 }
 
 void Master::send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,
@@ -281,10 +281,13 @@ bool Master::send_ramp_down(std::int64_t now_us) {
   return false;
 }
 
+// By turns: one that does not answer its request keeps nobody else waiting.
 bool Master::send_script(std::int64_t now_us) {
-  for (std::size_t i = 0; i < mcus_.size(); ++i) {
-    Mcu& mcu = mcus_[i];
+  for (std::size_t n = 0; n < mcus_.size(); ++n) {
+    const std::size_t i = (script_turn_ + n) % mcus_.size();
+    const Mcu& mcu = mcus_[i];
     if (mcu.view.phase == McuPhase::kOffline || mcu.script.empty()) continue;
+    script_turn_ = i + 1;
     const Request& request = mcu.script.front();
     ask(now_us, i, request.type, request.payload,
         request.type == BUSHD_MSG_TABLES ? BUSHD_TABLES_SIZE : 1);

@@ -353,6 +353,7 @@ class Master {
   std::optional<Emergency> emergency_;
   std::int64_t other_master_until_us_ = INT64_MIN;
   std::uint16_t salt_ = 0;
+  std::size_t script_turn_ = 0;  // whose request is sent next
   BusHealth bus_health_;
 };
 

@@ -200,6 +200,35 @@ TEST(UseTable, McuThatIsLostWhileItGetsTheTableLeavesAllWithTheOldOne) {
   EXPECT_LT(milliseconds_of_move(lab, 1000), 2000);
 }
 
+// One that comes while another gets the table may have to give it back: it begins no move by it.
+TEST(UseTable, McuThatComesDuringTheChangeWaitsForItsEnd) {
+  Lab lab(hall(2, 1), kGlacier);
+  lab.connect();
+  lab.bus(0).deafen(1, (lab.now_us() + 2'000'000) * 1000);
+  ASSERT_TRUE(lab.run_until([&] { return lab.state_of("hall:2").mcu_state == "OFFLINE"; }, 3));
+  // The first MCU hears nothing of the table.
+  lab.on_send = [](std::size_t, std::vector<std::uint8_t>& bytes) {
+    bushd_receiver receiver{};
+    bushd_frame frame;
+    for (const std::uint8_t byte : bytes) {
+      if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
+      if (frame.address == 1 && frame.type == BUSHD_MSG_TABLE_DATA) return false;
+    }
+    return true;
+  };
+  const auto use = lab.use("axes", "glacier");
+  ASSERT_TRUE(lab.run_until([&] { return lab.state_of("hall:2").mcu_state == "READY"; }, 8));
+  ASSERT_FALSE(lab.has_result(use));
+  const reply_t refused = lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {100}));
+  EXPECT_EQ(refused.phase, reply_t::REFUSED);
+  EXPECT_THAT(refused.reason, HasSubstr("about to get another table"));
+  EXPECT_EQ(lab.wait(use).result, "fault");
+  lab.on_send = {};
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {100})).result, "reached");
+  EXPECT_EQ(table_of(lab, "m02"), "bushd2-constant@0");
+}
+
 TEST(UseTable, SurvivesALineThatLosesFrames) {
   Lab lab(hall(2, 2), kGlacier);
   lab.connect();

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 
+#include "base/printable.h"
 #include "render.h"
 
 namespace bushctl {
@@ -48,7 +49,8 @@ int send(Client& client, const command_t& command, Client::Until until) {
   if (reply->phase == reply_t::ACCEPTED) return kDone;
   if (reply->phase == reply_t::RESULT && reply->result == (is_move ? "reached" : "done"))
     return kDone;
-  fmt::print(stderr, "bushctl: {}: {}\n", printable(reply->result), printable(reply->reason));
+  fmt::print(stderr, "bushctl: {}: {}\n", bushd::printable(reply->result),
+             bushd::printable(reply->reason));
   return kFailed;
 }
 
@@ -57,7 +59,8 @@ int show_plan(Client& client, command_t move, bool as_json) {
   const auto reply = client.run(move, Client::Until::kResult);
   if (!reply) return failure(client, reply.error());
   if (reply->phase != reply_t::RESULT || reply->plan.empty()) {
-    fmt::print(stderr, "bushctl: {}: {}\n", printable(reply->result), printable(reply->reason));
+    fmt::print(stderr, "bushctl: {}: {}\n", bushd::printable(reply->result),
+               bushd::printable(reply->reason));
     return kFailed;
   }
   if (as_json) {

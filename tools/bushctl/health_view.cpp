@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
+#include "base/printable.h"
 #include "grid.h"
 #include "render.h"
 
@@ -25,9 +26,10 @@ std::vector<std::string> bus_lines(const Health& health) {
   Grid grid({kLeft, kRight, kRight, kRight, kLeft});
   grid.row({"BUS", "CRC ERRORS", "STRAY", "LATENCY MS", "PORT"});
   for (const health_t& bus : health.buses) {
-    grid.row({printable(bus.bus), fmt::to_string(bus.crc_errors), fmt::to_string(bus.stray_frames),
+    grid.row({bushd::printable(bus.bus), fmt::to_string(bus.crc_errors),
+              fmt::to_string(bus.stray_frames),
               fmt::format("{:.1f}", static_cast<double>(bus.recent_latency_us) / 1000),
-              printable(bus.port_state) +
+              bushd::printable(bus.port_state) +
                   (bus.two_masters != 0 ? "; another master talks on the line" : "")});
   }
   return grid.lines();
@@ -44,7 +46,7 @@ std::vector<std::string> latency_lines(const Health& health) {
   grid.row(head);
   for (const health_t& bus : health.buses) {
     if (bus.latency_below_us != health.buses.front().latency_below_us) continue;
-    std::vector<std::string> row = {printable(bus.bus)};
+    std::vector<std::string> row = {bushd::printable(bus.bus)};
     for (const std::int64_t answers : bus.latency_answers) row.push_back(fmt::to_string(answers));
     grid.row(row);
   }
@@ -60,7 +62,8 @@ std::vector<std::string> mcu_lines(const Health& health) {
             "MISSED TICKS", "RUN-DOWNS", "RESTARTS", "LOW WATER", "RATE PPM", "OFFSET US", ""});
   for (const health_t& bus : health.buses) {
     for (const mcu_health_t& mcu : bus.mcus) {
-      grid.row({printable(mcu.mcu), mcu.unique_id.empty() ? "-" : printable(mcu.unique_id),
+      grid.row({bushd::printable(mcu.mcu),
+                mcu.unique_id.empty() ? "-" : bushd::printable(mcu.unique_id),
                 fmt::to_string(mcu.firmware_version), fmt::to_string(mcu.boot_number),
                 fmt::to_string(mcu.crc_errors), fmt::to_string(mcu.rejected_frames),
                 fmt::to_string(mcu.timeouts), fmt::to_string(mcu.repeats),

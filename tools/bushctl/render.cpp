@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "base/printable.h"
 #include "grid.h"
 
 namespace bushctl {
@@ -17,7 +17,7 @@ using bushd::lcm::Snapshot;
 
 std::string text_of(const table_ref_t& table) {
   const std::string revision = table.revision > 0 ? fmt::format("@{}", table.revision) : "";
-  return printable(table.name) + revision;
+  return bushd::printable(table.name) + revision;
 }
 
 nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
@@ -45,13 +45,6 @@ nlohmann::json mcu_json(const state_t& mcu) {
 
 }  // namespace
 
-std::string printable(const std::string& text) {
-  std::string out = text;
-  std::replace_if(
-      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, '?');
-  return out;
-}
-
 std::vector<std::string> table(const Snapshot& snapshot) {
   using enum Align;
   Grid motors({kLeft, kLeft, kRight, kLeft, kLeft, kRight, kRight, kRight, kLeft, kLeft});
@@ -61,14 +54,14 @@ std::vector<std::string> table(const Snapshot& snapshot) {
   mcus.row({"MCU", "STATE", "BOOT", "DETAIL"});
   for (const state_t& mcu : snapshot.mcus) {
     for (const motor_state_t& motor : mcu.motors) {
-      motors.row({printable(motor.name), printable(mcu.mcu), fmt::to_string(motor.output),
-                  printable(motor.group), text_of(motor.table),
+      motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
+                  fmt::to_string(motor.output), bushd::printable(motor.group), text_of(motor.table),
                   fmt::to_string(motor.position_steps), fmt::to_string(motor.target_steps),
                   fmt::format("{:.1f}", motor.velocity_steps_per_s),
-                  motor.moving != 0 ? "yes" : "-", printable(motor.trust)});
+                  motor.moving != 0 ? "yes" : "-", bushd::printable(motor.trust)});
     }
-    mcus.row({printable(mcu.mcu), printable(mcu.mcu_state), fmt::to_string(mcu.boot_number),
-              printable(mcu.detail)});
+    mcus.row({bushd::printable(mcu.mcu), bushd::printable(mcu.mcu_state),
+              fmt::to_string(mcu.boot_number), bushd::printable(mcu.detail)});
   }
   std::vector<std::string> out = motors.lines();
   out.emplace_back();
@@ -77,10 +70,11 @@ std::vector<std::string> table(const Snapshot& snapshot) {
 }
 
 std::string motor_line(const motor_state_t& motor) {
-  std::string line = fmt::format(
-      "{} position {} target {} velocity {:.1f} {}", printable(motor.name), motor.position_steps,
-      motor.target_steps, motor.velocity_steps_per_s, motor.moving != 0 ? "moving" : "at rest");
-  if (motor.trust != "known") line += " " + printable(motor.trust);
+  std::string line =
+      fmt::format("{} position {} target {} velocity {:.1f} {}", bushd::printable(motor.name),
+                  motor.position_steps, motor.target_steps, motor.velocity_steps_per_s,
+                  motor.moving != 0 ? "moving" : "at rest");
+  if (motor.trust != "known") line += " " + bushd::printable(motor.trust);
   return line;
 }
 
@@ -119,7 +113,7 @@ std::vector<std::string> lines(const bushd::move_plan_t& plan) {
   std::vector<std::string> out;
   for (std::size_t i = 0; i < plan.motors.size(); ++i) {
     out.push_back(fmt::format("{}: {:+} steps in {:.3f} s, up to {:.6g} steps/s",
-                              printable(plan.motors[i]), plan.steps[i],
+                              bushd::printable(plan.motors[i]), plan.steps[i],
                               static_cast<double>(plan.motor_duration_us[i]) * 1e-6,
                               plan.peak_steps_per_s[i]));
   }
@@ -135,21 +129,22 @@ std::vector<std::string> lines(const bushd::reply_t& reply) {
   if (reply.phase == bushd::reply_t::ACCEPTED) return {"accepted"};
   std::vector<std::string> out;
   for (std::size_t i = 0; i < reply.motors.size(); ++i) {
-    std::string line = fmt::format("{}: {}, stands at {}", printable(reply.motors[i]),
-                                   printable(reply.motor_results[i]), reply.position_steps[i]);
+    std::string line =
+        fmt::format("{}: {}, stands at {}", bushd::printable(reply.motors[i]),
+                    bushd::printable(reply.motor_results[i]), reply.position_steps[i]);
     // Whatever the network says of an index is not believed.
     const auto table = static_cast<std::size_t>(reply.table_of_motor[i]);
     if (table < reply.tables.size()) {
       line += fmt::format(" by {} ({})", text_of(reply.tables[table]),
-                          printable(reply.tables[table].hash));
+                          bushd::printable(reply.tables[table].hash));
     }
     out.push_back(std::move(line));
   }
-  if (out.empty()) out.push_back(printable(reply.result));
+  if (out.empty()) out.push_back(bushd::printable(reply.result));
   // Of what was done there may be more to tell.
   if (reply.result == "done" && reply.motors.empty()) {
     const bool repeats = reply.reason.starts_with(reply.result);
-    out.back() = printable(repeats ? reply.reason : reply.result + ": " + reply.reason);
+    out.back() = bushd::printable(repeats ? reply.reason : reply.result + ": " + reply.reason);
   }
   return out;
 }

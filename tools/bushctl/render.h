@@ -9,9 +9,6 @@
 
 namespace bushctl {
 
-// What comes from the network must not steer the terminal: control characters become '?'.
-std::string printable(const std::string& text);
-
 // Lines of a table of all motors, then of all MCUs.
 std::vector<std::string> table(const bushd::lcm::Snapshot& snapshot);
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "grid.h"
 #include "render.h"
@@ -64,15 +65,15 @@ void print(const std::map<std::string, table_ref_t>& groups,
   Grid in_service({kLeft, kLeft, kRight, kLeft});
   in_service.row({"GROUP", "TABLE", "REVISION", "HASH"});
   for (const auto& [group, table] : groups) {
-    in_service.row({printable(group), printable(table.name), revision_text(table.revision),
-                    printable(table.hash)});
+    in_service.row({bushd::printable(group), bushd::printable(table.name),
+                    revision_text(table.revision), bushd::printable(table.hash)});
   }
   Grid tables({kLeft, kRight, kLeft, kRight, kRight, kRight});
   tables.row({"TABLE", "REVISION", "HASH", "CODES", "START", "MAX STEPS/S"});
   for (const table_entry_t& entry : entries) {
     if (!entry.fault.empty()) continue;
-    tables.row({printable(entry.name), revision_text(entry.table.revision),
-                printable(entry.table.hash), fmt::to_string(entry.codes),
+    tables.row({bushd::printable(entry.name), revision_text(entry.table.revision),
+                bushd::printable(entry.table.hash), fmt::to_string(entry.codes),
                 fmt::format("{:.6g}", entry.start_steps_per_s),
                 fmt::format("{:.6g}", entry.max_steps_per_s)});
   }
@@ -80,7 +81,8 @@ void print(const std::map<std::string, table_ref_t>& groups,
   fmt::print("\n");
   for (const std::string& line : tables.lines()) fmt::print("{}\n", line);
   for (const table_entry_t& entry : entries) {
-    if (!entry.fault.empty()) fmt::print("{}: {}\n", printable(entry.name), printable(entry.fault));
+    if (!entry.fault.empty())
+      fmt::print("{}: {}\n", bushd::printable(entry.name), bushd::printable(entry.fault));
   }
 }
 
@@ -96,7 +98,7 @@ std::optional<bushd::table_reply_t> ask(bushd::lcm::Client& client, std::int8_t 
     return std::nullopt;
   }
   if (reply->done != 0) return std::move(*reply);
-  fmt::print(stderr, "bushctl: {}\n", printable(reply->reason));
+  fmt::print(stderr, "bushctl: {}\n", bushd::printable(reply->reason));
   *code = kFailed;
   return std::nullopt;
 }
@@ -135,9 +137,10 @@ int show_table(bushd::lcm::Client& client, const std::string& wanted, bool as_js
     fmt::print("{}\n", dump(json));
     return kDone;
   }
-  fmt::print("{}\n", printable(table.name));
-  if (!table.description.empty()) fmt::print("  {}\n", printable(table.description));
-  fmt::print("  revision {}, SHA-256 {}\n", revision_text(table.revision), printable(table.hash));
+  fmt::print("{}\n", bushd::printable(table.name));
+  if (!table.description.empty()) fmt::print("  {}\n", bushd::printable(table.description));
+  fmt::print("  revision {}, SHA-256 {}\n", revision_text(table.revision),
+             bushd::printable(table.hash));
   fmt::print("  time unit {} ns, cruise {}\n", table.time_unit_ns,
              table.cruise != 0 ? fmt::to_string(table.cruise) : "as the last of accel");
   fmt::print("  accel {}\n", fmt::join(table.accel, " "));

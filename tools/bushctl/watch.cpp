@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "render.h"
 #include "screen.h"
@@ -29,9 +30,9 @@ class ChangesView : public View {
  public:
   void show(const Snapshot& snapshot) override {
     for (const bushd::state_t& mcu : snapshot.mcus) {
-      line(mcu.mcu,
-           fmt::format("{} {} boot {}{}{}", printable(mcu.mcu), printable(mcu.mcu_state),
-                       mcu.boot_number, mcu.detail.empty() ? "" : " ", printable(mcu.detail)));
+      line(mcu.mcu, fmt::format("{} {} boot {}{}{}", bushd::printable(mcu.mcu),
+                                bushd::printable(mcu.mcu_state), mcu.boot_number,
+                                mcu.detail.empty() ? "" : " ", bushd::printable(mcu.detail)));
       for (const bushd::motor_state_t& motor : mcu.motors) line(motor.name, motor_line(motor));
     }
     std::fflush(stdout);

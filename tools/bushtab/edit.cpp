@@ -9,6 +9,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "json.h"
 #include "open_table.h"
@@ -137,7 +138,8 @@ int log(const Places& places, const std::string& table, bool json) {
     std::string tags;
     for (const std::string& tag : revision.tags) tags += "  [" + tag + "]";
     fmt::print("{:>5}  {}  {}  {}{}\n", revision.number, revision.time,
-               revision.content_hash.substr(0, tables::kShortHashLength), revision.note, tags);
+               revision.content_hash.substr(0, tables::kShortHashLength),
+               bushd::printable(revision.note), tags);
   }
   if (json) {
     print_json(all);

@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,18 +37,24 @@ struct Codes {
   SideKey side() const { return decel ? SideKey::kDecel : SideKey::kAccel; }
 };
 
+// A minus would be taken for a huge number.
+const CLI::Range kNotNegative(0U, std::numeric_limits<std::uint32_t>::max());
+
 std::shared_ptr<Codes> codes_command(CLI::App* command, bool takes_codes) {
   const auto options = std::make_shared<Codes>();
   add_changed(command, options->table, options->json);
   command->add_option("INDEX", options->index, "Of the first code, from 0 in the order of the file")
       ->required()
-      ->check(refuse_fraction);
+      ->check(refuse_fraction)
+      ->check(kNotNegative);
   if (takes_codes) {
     command->add_option("CODE", options->codes, "Delays in time units")
         ->required()
         ->check(refuse_fraction);
   } else {
-    command->add_option("COUNT", options->count, "How many (default 1)")->check(refuse_fraction);
+    command->add_option("COUNT", options->count, "How many (default 1)")
+        ->check(refuse_fraction)
+        ->check(kNotNegative);
   }
   command->add_flag("--decel", options->decel, "Of the decelerating side");
   return options;

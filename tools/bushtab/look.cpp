@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <set>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "json.h"
 #include "open_table.h"
@@ -76,7 +77,8 @@ int list(const Places& places, bool json) {
                      {"description", (*table)->description()}});
       if (json) continue;
       fmt::print("{:<24} {:>3}  {}  {:>7.6g}..{:<7.6g} steps/s  {}\n", name, (*table)->revision(),
-                 (*table)->short_hash(), start_hz, max_hz, (*table)->description());
+                 (*table)->short_hash(), start_hz, max_hz,
+                 bushd::printable((*table)->description()));
     }
   }
   if (json) print_json(all);

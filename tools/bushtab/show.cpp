@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "curve.h"
 #include "engine/run.h"
@@ -121,8 +122,8 @@ std::string side_text(const Table& table, const bushd_ramp& side) {
 
 void print_text(const Table& table) {
   const bushd_table& view = table.view();
-  fmt::print("{} ({})\n", table.name(), table.path());
-  if (!table.description().empty()) fmt::print("{}\n", table.description());
+  fmt::print("{} ({})\n", bushd::printable(table.name()), bushd::printable(table.path()));
+  if (!table.description().empty()) fmt::print("{}\n", bushd::printable(table.description()));
   fmt::print("\n  revision      {}, content {}\n",
              table.revision() > 0 ? fmt::format("{}", table.revision()) : "none",
              table.short_hash());

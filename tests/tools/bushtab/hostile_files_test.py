@@ -129,6 +129,21 @@ class HostileFiles(unittest.TestCase):
         os.symlink("/dev/zero", self.file)
         self.assert_refused(r": cannot be read: not a regular file", "check", "h")
 
+    def test_texts_do_not_steer_the_terminal(self):
+        self.file.write_text(GOOD + 'description = "\\u001b[2Jgone"\n')
+        for command in (["show", "h"], ["list"]):
+            with self.subTest(command[0]):
+                done = self.bushtab(*command)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertIn(b"?[2Jgone", done.stdout)
+
+    def test_a_negative_index_is_told_as_it_was_given(self):
+        self.file.write_text(GOOD)
+        done = self.bushtab("set", "h", "--", "-1", "5")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn(b"-1", done.stderr)
+        self.assertEqual(self.file.read_text(), GOOD)
+
     def test_torque_curves_too(self):
         self.file.write_text(GOOD)
         for content, place in (
