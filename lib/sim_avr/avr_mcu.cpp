@@ -27,9 +27,15 @@ namespace {
 constexpr std::uint32_t kFrequency = 16'000'000;
 constexpr std::uint8_t kExternalInterrupts = 8;
 constexpr std::size_t kRamBegin = 0x200;
-constexpr std::uint8_t kPaint = 0xC5;
+constexpr std::uint8_t kPaint = 0xC5;  // firmware/ports/atmega2560/boot_tests.h
 // Behind the one that simavr holds: the chip's buffer has two, its shift register one more.
 constexpr std::size_t kHardwareFifo = 2;
+// In the address space of data.
+constexpr std::size_t kMcusr = 0x54;
+constexpr std::size_t kTimsk1 = 0x6F;
+constexpr std::uint8_t kPowerOn = 1;
+constexpr std::uint8_t kExternalReset = 2;
+constexpr std::uint16_t kJumpToItself = 0xCFFF;
 constexpr std::size_t kAddressAt = 8;
 constexpr std::size_t kBootNumberAt = 16;
 
@@ -52,6 +58,11 @@ avr_uart_t* find_uart(avr_t* avr) {
 
 }  // namespace
 
+struct AvrMcu::ResetHook {
+  avr_io_t io;  // first: simavr knows it by this
+  AvrMcu* mcu;
+};
+
 AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
     : index_(index), driver_(driver), sink_(sink) {
   avr_global_logger_set(print_errors);
@@ -70,7 +81,7 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   // use.
   for (std::uint8_t i = 0; i < kExternalInterrupts; ++i) avr_extint_set_strict_lvl_trig(avr_, i, 0);
   stack_begin_ = kRamBegin + firmware.datasize + firmware.bsssize;
-  std::memset(avr_->data + stack_begin_, kPaint, avr_->ramend + 1u - stack_begin_);
+  avr_->data[kMcusr] = kPowerOn;
 
   std::array<std::uint8_t, 18> memory{};
   for (std::size_t i = 0; i < kAddressAt; ++i) {
@@ -100,6 +111,12 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   pins_[pin_count_] = {this, Signal::kEnable, 0, false};
   watch_pin('H', 3, on_pin, &pins_[pin_count_++]);
   watch_pin('E', 4, on_driver_enable, this);
+
+  reset_hook_ = std::make_unique<ResetHook>();
+  reset_hook_->io.kind = "board";
+  reset_hook_->io.reset = on_reset;
+  reset_hook_->mcu = this;
+  avr_register_io(avr_, &reset_hook_->io);
 }
 
 AvrMcu::~AvrMcu() {
@@ -159,6 +176,23 @@ void AvrMcu::on_byte(avr_irq_t*, std::uint32_t value, void* param) {
   }
 }
 
+// By the watchdog too.
+void AvrMcu::on_reset(avr_io_t* io) {
+  reinterpret_cast<ResetHook*>(io)->mcu->drop_outputs();
+}
+
+void AvrMcu::drop_outputs() {
+  driver_enable_ = false;
+  received_.clear();
+  for (std::size_t i = 0; i < pin_count_; ++i) {
+    Pin& pin = pins_[i];
+    if (pin.level && sink_ != nullptr) {
+      sink_->edge({time_ns(), index_, pin.signal, pin.index, false});
+    }
+    pin.level = false;
+  }
+}
+
 // Its vector, or 0 at the end of the last one.
 void AvrMcu::on_interrupt(avr_irq_t*, std::uint32_t value, void* param) {
   if (value != 0) ++static_cast<AvrMcu*>(param)->interrupts_;
@@ -191,10 +225,14 @@ void AvrMcu::advance(TimeNs now_ns) {
       byte_cycles_ = uart_->cycles_per_byte = uart_->cycles_per_byte * 10 / 11;
     }
     feed();
-    const auto left = static_cast<avr_cycle_count_t>((now_ns - time_ns()) * 2 / 125 + 1);
+    auto left = static_cast<avr_cycle_count_t>((now_ns - time_ns()) * 2 / 125 + 1);
+    if (stuck_) {
+      left = 1;
+      avr_->data[stuck_->address] &= static_cast<std::uint8_t>(~(1 << stuck_->bit));
+    }
     avr_->run_cycle_limit = left;
     avr_->run_cycle_count = std::min(avr_->run_cycle_count, left);
-    avr_run(avr_);
+    if (avr_run(avr_) == cpu_Crashed) throw std::runtime_error("simavr: the image has crashed");
   }
 }
 
@@ -222,17 +260,29 @@ void AvrMcu::feed() {
 void AvrMcu::reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t) {
   advance(now_ns);
   avr_reset(avr_);
-  driver_enable_ = false;
-  received_.clear();
-  for (std::size_t i = 0; i < pin_count_; ++i) {
-    Pin& pin = pins_[i];
-    if (pin.level && sink_ != nullptr) {
-      sink_->edge({now_ns, index_, pin.signal, pin.index, false});
-    }
-    pin.level = false;
-  }
+  avr_->data[kMcusr] = kExternalReset;
   out_of_reset_ns_ = boot_ns;
   cycle_0_ns_ = boot_ns - static_cast<TimeNs>(avr_->cycle) * 125 / 2;
+}
+
+void AvrMcu::hang() {
+  const auto* const flash = reinterpret_cast<const std::uint16_t*>(avr_->flash);
+  const auto* const end = flash + (avr_->flashend + 1) / 2;
+  const auto* const loop = std::find(flash, end, kJumpToItself);
+  if (loop == end) throw std::runtime_error("the image has no endless loop");
+  avr_->pc = static_cast<avr_flashaddr_t>((loop - flash) * 2);
+}
+
+void AvrMcu::stop_ticks() {
+  avr_->data[kTimsk1] = 0;
+}
+
+void AvrMcu::flip_flash_bit(std::uint32_t address, int bit) {
+  avr_->flash[address] ^= static_cast<std::uint8_t>(1 << bit);
+}
+
+void AvrMcu::stick_ram_bit(std::uint16_t address, int bit) {
+  stuck_ = Bit{address, bit};
 }
 
 std::size_t AvrMcu::untouched_ram() const {

@@ -9,11 +9,14 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "sim/mcu.h"
 
 struct avr_t;
+struct avr_io_t;
 struct avr_irq_t;
 struct avr_uart_t;
 
@@ -44,7 +47,14 @@ class AvrMcu final : public Mcu {
   void receive(std::uint8_t byte, TimeNs now_ns) override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override;
 
-  // Bytes of RAM that nothing has written to since power-on, between variables and stack.
+  // Faults of the chip.
+  void hang();        // jumps into an endless loop, interrupts stay as they are
+  void stop_ticks();  // the tick timer's interrupts are off
+  void flip_flash_bit(std::uint32_t address, int bit);
+  void stick_ram_bit(std::uint16_t address, int bit);  // at 0; slow
+
+  // Bytes of RAM that nothing has written to since they were tested at boot, between variables and
+  // stack.
   std::size_t untouched_ram() const;
   // Entered since power-on.
   std::uint64_t interrupts() const { return interrupts_; }
@@ -64,17 +74,21 @@ class AvrMcu final : public Mcu {
   void watch_port(char port, Signal signal, std::uint8_t first_index);
   void watch_pin(char port, int pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param);
   void feed();
+  void drop_outputs();
   std::array<std::uint8_t, 18> eeprom() const;
   TimeNs time_ns() const;
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_driver_enable(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_byte(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_interrupt(avr_irq_t* irq, std::uint32_t value, void* param);
+  static void on_reset(avr_io_t* io);
 
   std::size_t index_;
   Driver& driver_;
   EdgeSink* sink_;
   avr_t* avr_;
+  struct ResetHook;
+  std::unique_ptr<ResetHook> reset_hook_;
   avr_uart_t* uart_ = nullptr;
   std::uint64_t byte_cycles_ = 0;
   std::deque<std::uint8_t> received_;  // that the image has not been given yet
@@ -82,6 +96,11 @@ class AvrMcu final : public Mcu {
   TimeNs now_ns_ = 0;
   TimeNs out_of_reset_ns_ = 0;
   std::size_t stack_begin_ = 0;
+  struct Bit {
+    std::uint16_t address;
+    int bit;
+  };
+  std::optional<Bit> stuck_;
   bool driver_enable_ = false;
   TimeNs byte_end_ns_ = 0;
   std::uint64_t interrupts_ = 0;

@@ -40,7 +40,7 @@ class AvrFigures : public testing::TestWithParam<Load> {
       return mcu;
     });
     master_.patience_ns = 6'000'000;
-    bus_.advance_to(100'000'000);
+    bus_.advance_to(250'000'000);
   }
 
   void send_frame(std::uint32_t first, std::uint8_t flags, bool last, bool forward) {

@@ -1,8 +1,10 @@
 // The MCU program on an ATmega2560: the core, its memory, and the main loop. Interrupts emit slots,
 // collect bytes with the times of delimiters, and send; the core runs in the main loop only.
 #include <avr/interrupt.h>
+#include <avr/wdt.h>
 
 #include "firmware/ports/atmega2560/board.h"
+#include "firmware/ports/atmega2560/boot_tests.h"
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/emission.h"
 #include "firmware/ports/atmega2560/identity.h"
@@ -10,6 +12,9 @@
 
 #define QUEUE_TICKS 64u
 #define TABLE_CODES 952u  // four tables of 238 codes
+// Only a new tick keeps it quiet, which takes timer, interrupts and main loop. The longest lasts 20
+// ms.
+#define WATCHDOG WDTO_120MS
 
 static bushd_mcu mcu;
 static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
@@ -59,7 +64,7 @@ static uint16_t port_read_inputs(void* context) {
 
 static bool port_self_test(void* context) {
   (void)context;
-  return has_identity;
+  return has_identity && boot_faults() == 0;
 }
 
 static void boot(void) {
@@ -99,6 +104,7 @@ int main(void) {
   prepare();
   line_init();
   emission_start();
+  wdt_enable(WATCHDOG);
   sei();
   for (;;) {
     uint32_t start = 0;
@@ -110,6 +116,7 @@ int main(void) {
       emission_swap();
       bushd_mcu_swap(&mcu);
       prepare();
+      wdt_reset();
     } else if (waits) {
       bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(time));
     }
