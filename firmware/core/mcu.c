@@ -5,6 +5,7 @@
 #include "firmware/core/internal.h"
 
 #define STALE_TAGS 128u
+#define LAST_IN_ORDER 0x1Fu
 #define STALE_NS 100000000u  // no line or adapter keeps a frame back for so long
 
 const uint16_t bushd_mcu_motor_bit[BUSHD_MOTORS_PER_MCU] = {
@@ -73,9 +74,10 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   port->set_tick(port->context, mcu->tick_ns);
   for (uint8_t m = 0; m < config->motors; ++m) mcu->motor[m].table = -1;
   bushd_mcu_clear_streams(mcu);
-  if (!engine_self_test(mcu) || !port->self_test(port->context)) {
-    mcu->faults |= BUSHD_FAULT_SELF_TEST;
-  }
+  mcu->failed_tests = port->self_test(port->context);
+  if (!engine_self_test(mcu)) mcu->failed_tests |= BUSHD_TEST_ENGINE;
+  if (mcu->failed_tests & BUSHD_TEST_EEPROM) mcu->faults |= BUSHD_FAULT_EEPROM;
+  if (mcu->failed_tests & (uint8_t)~BUSHD_TEST_EEPROM) mcu->faults |= BUSHD_FAULT_SELF_TEST;
   bushd_mcu_update_state(mcu);
 }
 
@@ -105,7 +107,8 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
 // count, marks have names of their own, and questions change nothing.
 static bool counts_in_order_only(uint8_t type) {
   return (type >= BUSHD_MSG_CONFIGURE && type <= BUSHD_MSG_SET_POSITION) ||
-         (type >= BUSHD_MSG_TICKS && type <= BUSHD_MSG_TABLE_RUN) || type == BUSHD_MSG_SET_ADDRESS;
+         (type >= BUSHD_MSG_TICKS && type <= BUSHD_MSG_TABLE_RUN) ||
+         type == BUSHD_MSG_SET_ADDRESS || (type >= BUSHD_MSG_INPUTS && type <= LAST_IN_ORDER);
 }
 
 // The master counts its frames in their tags. So one whose tag is the newest or one of those before

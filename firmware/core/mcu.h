@@ -44,6 +44,8 @@ typedef struct bushd_mcu_config {
   uint8_t motors;        // 1..BUSHD_MOTORS_PER_MCU
   uint16_t slots;        // BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS
   uint16_t boot_number;  // differs from that of the boot before
+  uint8_t reset_cause;   // BUSHD_RESET_*
+  bool enable_at_boot;   // what keep_enable was told last, after a watchdog reset; else false
   int16_t* queue;        // queue_ticks x motors displacements
   uint16_t
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
@@ -150,6 +152,10 @@ typedef struct bushd_mcu {
   uint8_t last_rejection;
   uint16_t direction;  // DIR levels of the plane prepared last
   uint16_t codes_used;
+  uint8_t failed_tests;     // BUSHD_TEST_*
+  bushd_set_inputs inputs;  // settings
+  uint16_t forbidden_positive;
+  uint16_t forbidden_negative;
   bushd_run_tick run_tick;  // for the runs' latest time unit
   bushd_mcu_clock clock;
   bushd_plane plane[2];

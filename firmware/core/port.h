@@ -7,9 +7,18 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "engine/message.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+// What the pins say: 1 is active as the port wires it (docs/firmware.md). The core turns those
+// round whose switches rest at the other level (bushd_set_inputs).
+typedef struct bushd_inputs {
+  uint16_t motors;  // bit per motor: its limit or home switch
+  uint8_t system;   // BUSHD_INPUT_*
+} bushd_inputs;
 
 typedef struct bushd_port {
   void* context;
@@ -35,11 +44,18 @@ typedef struct bushd_port {
   // How far the present tick has gone, in ns.
   uint32_t (*time_in_tick_ns)(void* context);
 
-  // Inputs, one bit per motor.
-  uint16_t (*read_inputs)(void* context);
+  // Asked once a tick, before it is prepared.
+  bushd_inputs (*read_inputs)(void* context);
 
-  // Tests of the hardware at boot (memory, stuck inputs); true = good.
-  bool (*self_test)(void* context);
+  // The last reading of the supply current, 0..1023; 0 where nothing measures it.
+  uint16_t (*read_current)(void* context);
+
+  // Tests of the hardware at boot: BUSHD_TEST_* of all that failed.
+  uint8_t (*self_test)(void* context);
+
+  // Remembers over a watchdog reset whether EN is to be raised at once after it: then
+  // bushd_mcu_config.enable_at_boot says so.
+  void (*keep_enable)(void* context, bool on);
 } bushd_port;
 
 #ifdef __cplusplus

@@ -29,7 +29,8 @@ static void report_islands(const bushd_mcu* mcu, bushd_report* report) {
   report->island_until = (uint16_t)told->until;
 }
 
-static size_t encode_report(bushd_mcu* mcu, uint8_t* payload) {
+// Large on the stack: not a part of the frame of who calls it, below which streams are taken.
+__attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* payload) {
   bushd_mcu_update_state(mcu);
   bushd_report report;
   report.state = mcu->state;
@@ -45,7 +46,14 @@ static size_t encode_report(bushd_mcu* mcu, uint8_t* payload) {
   report.rate_ppb = mcu->clock.rate_ppb;
   report.moving = bushd_mcu_moving(mcu);
   report.running = running(mcu);
-  report.inputs = mcu->port.read_inputs(mcu->port.context);
+  const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
+  report.inputs = pins.motors ^ mcu->inputs.inverted;
+  report.system_inputs = pins.system ^ mcu->inputs.system_inverted;
+  report.forbidden_positive = mcu->forbidden_positive;
+  report.forbidden_negative = mcu->forbidden_negative;
+  report.current = mcu->port.read_current(mcu->port.context);
+  report.reset_cause = mcu->config.reset_cause;
+  report.failed_tests = mcu->failed_tests;
   report.bad_frames = mcu->bad_frames;
   report.rejected_frames = mcu->rejected_frames;
   report.last_rejection = mcu->last_rejection;
@@ -132,6 +140,12 @@ static bushd_status set_address(bushd_mcu* mcu, const bushd_set_address* message
   if (message->address == mcu->config.address) return BUSHD_OK;
   if (!mcu->port.store_address(mcu->port.context, message->address)) return BUSHD_E_STATE;
   mcu->config.address = message->address;
+  return BUSHD_OK;
+}
+
+static bushd_status set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message) {
+  if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  mcu->inputs = *message;
   return BUSHD_OK;
 }
 
@@ -246,6 +260,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, uint32_t ti
       HANDLE(control, control);
     case BUSHD_MSG_SET_POSITION:
       HANDLE(set_position, set_position);
+    case BUSHD_MSG_INPUTS:
+      HANDLE(set_inputs, set_inputs);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:

@@ -235,6 +235,39 @@ bushd_status bushd_decode_set_position(const uint8_t* payload, size_t size,
   return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU);
 }
 
+size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload) {
+  writer w = {payload};
+  put16(&w, message->limit_positive);
+  put16(&w, message->limit_negative);
+  put16(&w, message->limit_cuts);
+  put16(&w, message->inverted);
+  put8(&w, message->debounce_ticks);
+  put8(&w, message->system_inverted);
+  put8(&w, message->emergency);
+  put16(&w, message->overcurrent);
+  put8(&w, message->enable_after_watchdog ? 1 : 0);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
+                                     bushd_set_inputs* message) {
+  reader r = read_from(payload, size);
+  message->limit_positive = get16(&r);
+  message->limit_negative = get16(&r);
+  message->limit_cuts = get16(&r);
+  message->inverted = get16(&r);
+  message->debounce_ticks = get8(&r);
+  message->system_inverted = get8(&r);
+  message->emergency = get8(&r);
+  message->overcurrent = get16(&r);
+  const uint8_t enable = get8(&r);
+  message->enable_after_watchdog = enable == 1;
+  return finish(&r, message->debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS &&
+                        message->system_inverted <= BUSHD_SYSTEM_INPUTS &&
+                        message->emergency <= BUSHD_EMERGENCY_INPUT_CUTS &&
+                        message->overcurrent <= BUSHD_MAX_CURRENT && enable <= 1);
+}
+
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload) {
   payload[0] = message->status;
   return 1;

@@ -17,7 +17,7 @@
 extern "C" {
 #endif
 
-#define BUSHD_PROTOCOL_VERSION 2u
+#define BUSHD_PROTOCOL_VERSION 3u
 #define BUSHD_MOTORS_PER_MCU 16u
 #define BUSHD_TABLE_SLOTS 8u
 #define BUSHD_MIN_TICK_NS 200000u
@@ -41,7 +41,8 @@ typedef enum bushd_type {
   BUSHD_MSG_TABLE_RUN = 0x0D,     // bushd_table_run, no reply
   BUSHD_MSG_EMERGENCY = 0x0E,     // bushd_emergency, no reply
   BUSHD_MSG_SET_ADDRESS = 0x0F,   // bushd_set_address, broadcast -> acknowledgement of the one MCU
-  BUSHD_MSG_TABLES = 0x10         // empty -> reply: bushd_tables
+  BUSHD_MSG_TABLES = 0x10,        // empty -> reply: bushd_tables
+  BUSHD_MSG_INPUTS = 0x11         // bushd_set_inputs -> acknowledgement
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its tag and the MCU's address.
 
@@ -57,7 +58,10 @@ enum {
   BUSHD_FAULT_SELF_TEST = 1 << 0,  // boot self-test failed; only a reboot clears it
   BUSHD_FAULT_LINK = 1 << 1,       // the queue ended while a motor moved; it ran down its own table
   BUSHD_FAULT_SYNC = 1 << 2,       // the tick counter differs from the bus by more than it may
-  BUSHD_FAULT_EMERGENCY = 1 << 3   // an emergency stop was commanded
+  BUSHD_FAULT_EMERGENCY = 1 << 3,  // an emergency stop was commanded
+  BUSHD_FAULT_EMERGENCY_INPUT = 1 << 4,  // the emergency input was active
+  BUSHD_FAULT_OVERCURRENT = 1 << 5,      // the supply current was above its threshold; EN is low
+  BUSHD_FAULT_EEPROM = 1 << 6  // what it keeps was unreadable at boot: defaults are in use
 };
 
 enum {
@@ -66,6 +70,33 @@ enum {
   BUSHD_FLAG_CONFIGURED = 1 << 2,  // tick and format are set
   BUSHD_FLAG_MARK = 1 << 3,        // mark_* of the report are valid
   BUSHD_FLAG_TWO_MASTERS = 1 << 4  // SYNC frames of two masters come by turns
+};
+
+// Inputs that are not a motor's.
+enum {
+  BUSHD_INPUT_EMERGENCY = 1 << 0,
+  BUSHD_INPUT_FORWARD = 1 << 1,
+  BUSHD_INPUT_REVERSE = 1 << 2,
+  BUSHD_INPUT_TRIGGER = 1 << 3
+};
+#define BUSHD_SYSTEM_INPUTS 0x0Fu  // all of them
+
+// Why an MCU booted.
+typedef enum bushd_reset_cause {
+  BUSHD_RESET_UNKNOWN = 0,
+  BUSHD_RESET_POWER_ON = 1,
+  BUSHD_RESET_EXTERNAL = 2,
+  BUSHD_RESET_BROWN_OUT = 3,
+  BUSHD_RESET_WATCHDOG = 4
+} bushd_reset_cause;
+
+// What a self-test at boot found wrong.
+enum {
+  BUSHD_TEST_RAM = 1 << 0,
+  BUSHD_TEST_FLASH = 1 << 1,   // CRC of the program
+  BUSHD_TEST_EEPROM = 1 << 2,  // CRC of what it keeps
+  BUSHD_TEST_INPUTS = 1 << 3,  // pins that do not follow their pull-ups
+  BUSHD_TEST_ENGINE = 1 << 4   // answers that are known
 };
 
 typedef enum bushd_format { BUSHD_FORMAT_COARSE = 0, BUSHD_FORMAT_FINE = 1 } bushd_format;
@@ -168,6 +199,28 @@ typedef struct bushd_set_position {
   uint8_t motor;  // at rest
   int32_t position_steps;
 } bushd_set_position;
+
+// What the MCU does when a limit switch or the emergency input is active.
+enum {
+  BUSHD_EMERGENCY_INPUT_IGNORED = 0,
+  BUSHD_EMERGENCY_INPUT_RAMPS = 1,
+  BUSHD_EMERGENCY_INPUT_CUTS = 2
+};
+#define BUSHD_MAX_DEBOUNCE_TICKS 15u
+#define BUSHD_MAX_CURRENT 1023u
+typedef struct bushd_set_inputs {
+  // Motors whose input is a limit switch at this end of their travel. In both masks: one input for
+  // both ends.
+  uint16_t limit_positive;
+  uint16_t limit_negative;
+  uint16_t limit_cuts;     // motors that stop at a limit without another step; the others ramp down
+  uint16_t inverted;       // motors whose input is active when the port calls it inactive
+  uint8_t debounce_ticks;  // a motor's input counts once it has stayed for as many more ticks
+  uint8_t system_inverted;     // as `inverted`, of BUSHD_INPUT_*
+  uint8_t emergency;           // BUSHD_EMERGENCY_INPUT_*
+  uint16_t overcurrent;        // EN falls above this reading; 0: never
+  bool enable_after_watchdog;  // EN as it was before a watchdog reset; else low
+} bushd_set_inputs;
 
 // Asks `count` MCUs for reports, each in a reply slot of its own: entry i (bushd_poll_entry) names
 // an address and when, after this frame's end, its answer begins.
@@ -281,7 +334,7 @@ typedef struct bushd_report {
   int32_t rate_ppb;          // how much faster than its crystal the MCU counts, to follow the bus
   uint16_t moving;           // motors not at rest
   uint16_t running;          // of them, those in a table run
-  uint16_t inputs;           // bit per motor
+  uint16_t inputs;           // bit per motor: active
   uint16_t bad_frames;       // CRC and length errors; saturates
   uint16_t rejected_frames;  // good frames that could not be used; saturates
   uint8_t last_rejection;    // bushd_status of the last one
@@ -293,11 +346,17 @@ typedef struct bushd_report {
   uint16_t islands;
   uint16_t island_from;
   uint16_t island_until;
-  uint8_t motor_count;  // <= BUSHD_MOTORS_PER_MCU
+  uint16_t forbidden_positive;  // motors that a limit keeps from moving in this direction
+  uint16_t forbidden_negative;
+  uint8_t system_inputs;  // active, BUSHD_INPUT_*
+  uint16_t current;       // of the supply, 0..1023
+  uint8_t reset_cause;    // BUSHD_RESET_*
+  uint8_t failed_tests;   // at boot, BUSHD_TEST_*
+  uint8_t motor_count;    // <= BUSHD_MOTORS_PER_MCU
   bushd_motor_report motor[BUSHD_MOTORS_PER_MCU];
 } bushd_report;
 
-#define BUSHD_REPORT_SIZE(motors) (52u + 6u * (motors))
+#define BUSHD_REPORT_SIZE(motors) (61u + 6u * (motors))
 #define BUSHD_IDENTITY_SIZE 22u
 #define BUSHD_TABLES_SIZE (1u + 8u * BUSHD_TABLE_SLOTS)
 
@@ -317,6 +376,7 @@ size_t bushd_encode_assign(const bushd_assign* message, uint8_t* payload);
 size_t bushd_encode_control(const bushd_control* message, uint8_t* payload);
 size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* payload);
 size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* payload);
+size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload);
 size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload);
 size_t bushd_encode_poll(const bushd_poll_entry* entries, uint8_t count, uint8_t* payload);
 size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload);
@@ -353,6 +413,8 @@ bushd_status bushd_decode_set_position(const uint8_t* payload, size_t size,
                                        bushd_set_position* message);
 bushd_status bushd_decode_set_address(const uint8_t* payload, size_t size,
                                       bushd_set_address* message);
+bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
+                                     bushd_set_inputs* message);
 bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message);
 bushd_status bushd_decode_poll(const uint8_t* payload, size_t size, bushd_poll* message);
 bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message);

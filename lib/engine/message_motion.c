@@ -279,6 +279,12 @@ size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {
   put16(&w, message->islands);
   put16(&w, message->island_from);
   put16(&w, message->island_until);
+  put16(&w, message->forbidden_positive);
+  put16(&w, message->forbidden_negative);
+  put8(&w, message->system_inputs);
+  put16(&w, message->current);
+  put8(&w, message->reset_cause);
+  put8(&w, message->failed_tests);
   put8(&w, message->motor_count);
   for (uint8_t i = 0; i < message->motor_count; ++i) {
     put32(&w, (uint32_t)message->motor[i].position_steps);
@@ -311,6 +317,12 @@ bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_repo
   message->islands = get16(&r);
   message->island_from = get16(&r);
   message->island_until = get16(&r);
+  message->forbidden_positive = get16(&r);
+  message->forbidden_negative = get16(&r);
+  message->system_inputs = get8(&r);
+  message->current = get16(&r);
+  message->reset_cause = get8(&r);
+  message->failed_tests = get8(&r);
   message->motor_count = get8(&r);
   if (message->motor_count > BUSHD_MOTORS_PER_MCU) return BUSHD_E_FORMAT;
   for (uint8_t i = 0; i < message->motor_count; ++i) {

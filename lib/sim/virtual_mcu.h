@@ -42,8 +42,10 @@ class VirtualMcu final : public Mcu {
   // the start of the present tick.
   const bushd_virtual_shaft& shaft(std::size_t output) const { return port_.shaft[output]; }
 
-  void set_inputs(std::uint16_t levels) { port_.inputs = levels; }
-  void fail_next_self_test(bool fails) { port_.self_test_fails = fails; }
+  void set_inputs(bushd_inputs inputs) { port_.inputs = inputs; }
+  void set_current(std::uint16_t reading) { port_.current = reading; }
+  void fail_self_tests(std::uint8_t tests) { port_.failing_tests = tests; }     // of the next boots
+  void set_reset_cause(bushd_reset_cause cause) { port_.reset_cause = cause; }  // of the next boot
 
   // See firmware/ports/virtual/virtual.h.
   void advance(TimeNs now_ns) override { bushd_virtual_advance(&port_, now_ns); }

@@ -294,6 +294,21 @@ const std::map<std::string, Kind>& kinds() {
        {bytes_with(5, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 15); }),
         codec(bushd_decode_set_position, bushd_encode_set_position),
         {{"motor 16", set8(0, 16)}}}},
+      {"set_inputs",
+       {bytes_with(14,
+                   [](Bytes* p) {
+                     (*p)[8] = between<uint8_t>(0, BUSHD_MAX_DEBOUNCE_TICKS);
+                     (*p)[9] = between<uint8_t>(0, BUSHD_SYSTEM_INPUTS);
+                     (*p)[10] = between<uint8_t>(0, 2);
+                     bushd_put_u16(p->data() + 11, between<uint16_t>(0, 1023));
+                     (*p)[13] = between<uint8_t>(0, 1);
+                   }),
+        codec(bushd_decode_set_inputs, bushd_encode_set_inputs),
+        {{"a debounce beyond the counters", set8(8, 16)},
+         {"unknown input", set8(9, 16)},
+         {"unknown action", set8(10, 3)},
+         {"more than can be read", set16(11, 1024)},
+         {"neither on nor off", set8(13, 2)}}}},
       {"poll", {any_poll, poll_again, {}}},
       {"sync",
        {bytes_with(19,
@@ -338,11 +353,11 @@ const std::map<std::string, Kind>& kinds() {
           const auto motors = between<uint8_t>(0, 16);
           Bytes payload = random_bytes(BUSHD_REPORT_SIZE(motors));
           payload[0] = between<uint8_t>(0, 3);
-          payload[51] = motors;
+          payload[60] = motors;
           return payload;
         },
         codec(bushd_decode_report, bushd_encode_report),
-        {{"state 4", set8(0, 4)}, {"17 motors", set8(51, 17)}}}},
+        {{"state 4", set8(0, 4)}, {"17 motors", set8(60, 17)}}}},
       {"acknowledgement",
        {[] { return random_bytes(1); },
         codec(bushd_decode_acknowledgement, bushd_encode_acknowledgement),

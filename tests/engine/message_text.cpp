@@ -88,6 +88,13 @@ void put(const bushd_control& m, Fields& f) {
 void put(const bushd_set_position& m, Fields& f) {
   f.add("motor", m.motor).add("position_steps", m.position_steps);
 }
+void put(const bushd_set_inputs& m, Fields& f) {
+  f.add("limit_positive", m.limit_positive).add("limit_negative", m.limit_negative);
+  f.add("limit_cuts", m.limit_cuts).add("inverted", m.inverted);
+  f.add("debounce_ticks", m.debounce_ticks).add("system_inverted", m.system_inverted);
+  f.add("emergency", m.emergency).add("overcurrent", m.overcurrent);
+  f.add("enable_after_watchdog", m.enable_after_watchdog);
+}
 void put(const bushd_poll& m, Fields& f) {
   std::string entries;
   for (size_t i = 0; i < m.count; ++i) {
@@ -141,7 +148,11 @@ void put(const bushd_report& m, Fields& f) {
   f.add("rejected_frames", m.rejected_frames).add("last_rejection", m.last_rejection);
   f.add("run_downs", m.run_downs).add("low_water_ticks", m.low_water_ticks);
   f.add("islands", m.islands).add("island_from", m.island_from);
-  f.add("island_until", m.island_until).add("motor_count", m.motor_count);
+  f.add("island_until", m.island_until);
+  f.add("forbidden_positive", m.forbidden_positive);
+  f.add("forbidden_negative", m.forbidden_negative).add("system_inputs", m.system_inputs);
+  f.add("current", m.current).add("reset_cause", m.reset_cause);
+  f.add("failed_tests", m.failed_tests).add("motor_count", m.motor_count);
   std::string motors;
   for (size_t i = 0; i < m.motor_count; ++i) {
     append(&motors, parts({m.motor[i].position_steps, m.motor[i].known_until}));
@@ -203,6 +214,8 @@ std::string message_text(const bushd_frame& frame) {
       return text("set_address", frame, bushd_decode_set_address);
     case BUSHD_MSG_TABLES:
       return empty_text("get_tables", frame);
+    case BUSHD_MSG_INPUTS:
+      return text("set_inputs", frame, bushd_decode_set_inputs);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
       return text("tables", frame, bushd_decode_tables);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY:
@@ -221,7 +234,8 @@ std::set<std::string> message_names() {
   return {"identify",  "identity",  "configure",   "table_begin",     "table_data",
           "table_end", "assign",    "control",     "set_position",    "poll",
           "report",    "sync",      "ticks",       "acknowledgement", "table_ticks",
-          "table_run", "emergency", "set_address", "get_tables",      "tables"};
+          "table_run", "emergency", "set_address", "get_tables",      "tables",
+          "set_inputs"};
 }
 
 }  // namespace bushd::test

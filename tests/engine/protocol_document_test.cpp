@@ -131,13 +131,16 @@ class ExampleMcu {
     port.set_tick = [](void*, uint32_t) {};
     port.adjust_tick = [](void*, int32_t) {};
     port.time_in_tick_ns = [](void*) { return kTimeInTickNs; };
-    port.read_inputs = [](void*) { return uint16_t{0}; };
-    port.self_test = [](void*) { return true; };
+    port.read_inputs = [](void*) { return bushd_inputs{}; };
+    port.read_current = [](void*) { return uint16_t{0}; };
+    port.self_test = [](void*) { return uint8_t{0}; };
+    port.keep_enable = [](void*, bool) {};
     bushd_mcu_config config{};
     config.address = 1;
     config.motors = 2;
     config.slots = 128;
     config.boot_number = 4660;
+    config.reset_cause = BUSHD_RESET_POWER_ON;
     config.queue = queue_;
     config.queue_ticks = 256;
     config.codes = codes_;

@@ -8,6 +8,8 @@ namespace {
 
 TEST(Boot, BusyWithDriversOffUntilConfiguredSyncedAndEnabled) {
   Rig rig;
+  rig.pins({0x1234, BUSHD_INPUT_TRIGGER});
+  rig.current(700);
   EXPECT_FALSE(rig.enabled());
   EXPECT_GE(rig.enable_calls(), 1) << "EN is driven low, not left as reset had it";
   EXPECT_EQ(rig.port_tick_ns(), BUSHD_BOOT_TICK_NS);
@@ -18,6 +20,11 @@ TEST(Boot, BusyWithDriversOffUntilConfiguredSyncedAndEnabled) {
   EXPECT_EQ(report.epoch, 0);
   EXPECT_EQ(report.moving, 0);
   EXPECT_EQ(report.inputs, 0x1234);
+  EXPECT_EQ(report.system_inputs, BUSHD_INPUT_TRIGGER);
+  EXPECT_EQ(report.forbidden_positive | report.forbidden_negative, 0);
+  EXPECT_EQ(report.current, 700);
+  EXPECT_EQ(report.reset_cause, BUSHD_RESET_POWER_ON);
+  EXPECT_EQ(report.failed_tests, 0);
   EXPECT_EQ(report.boot_number, 77);
   EXPECT_EQ(report.motor_count, rig.options().motors);
   for (unsigned m = 0; m < report.motor_count; ++m) EXPECT_EQ(report.motor[m].position_steps, 0);
@@ -53,7 +60,7 @@ TEST(Boot, IdentitySaysWhatThePortGave) {
 }
 
 TEST(Boot, FailedSelfTestNeverRaisesEn) {
-  Rig rig({.self_test = false});
+  Rig rig({.failing_tests = BUSHD_TEST_RAM});
   EXPECT_EQ(rig.poll().state, BUSHD_STATE_FAULT);
   EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_SELF_TEST);
   EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE), BUSHD_OK);
@@ -68,6 +75,23 @@ TEST(Boot, FailedSelfTestNeverRaisesEn) {
   EXPECT_FALSE(rig.enabled());
   const Plan plan = plan_move(ramp_law(), 3, Rig::kTickNs, BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_E_STATE);
+}
+
+TEST(Boot, WithoutWhatItKeepsAnMcuMovesOnceThatIsKnown) {
+  Rig rig({.failing_tests = BUSHD_TEST_EEPROM});
+  EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_EEPROM);
+  EXPECT_EQ(rig.poll().failed_tests, BUSHD_TEST_EEPROM);
+  EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE), BUSHD_OK);
+  rig.sync_to(100);
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_ENABLE), BUSHD_OK);
+  EXPECT_EQ(rig.poll().state, BUSHD_STATE_FAULT);
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  EXPECT_EQ(rig.poll().state, BUSHD_STATE_READY);
+}
+
+TEST(Boot, TellsWhyItBooted) {
+  Rig rig({.reset_cause = BUSHD_RESET_BROWN_OUT});
+  EXPECT_EQ(rig.poll().reset_cause, BUSHD_RESET_BROWN_OUT);
 }
 
 TEST(Boot, ConfigureAgainKeepsAllAndAnotherTickBeginsAnew) {
@@ -149,7 +173,7 @@ TEST(Boot, ValuesOutOfRangeAreRefused) {
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {16}), BUSHD_E_FORMAT);
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {}), BUSHD_E_LENGTH);
   EXPECT_EQ(rig.set_position(4, 0), BUSHD_E_FORMAT) << "four motors: 0..3";
-  EXPECT_EQ(rig.request(0x11, {}), BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(rig.request(0x11, {}), BUSHD_E_LENGTH);
   EXPECT_EQ(rig.request(0x7F, {1, 2, 3}), BUSHD_E_UNKNOWN_MESSAGE);
   EXPECT_EQ(rig.poll().rejected_frames, 9);
   EXPECT_EQ(rig.poll().flags, 0) << "nothing of it had an effect";

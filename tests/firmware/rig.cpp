@@ -99,13 +99,17 @@ Rig::Rig(RigOptions options)
   };
   port.adjust_tick = [](void*, std::int32_t) {};
   port.time_in_tick_ns = [](void*) { return kTimeInTickNs; };
-  port.read_inputs = [](void*) { return std::uint16_t{0x1234}; };
-  port.self_test = [](void* context) { return static_cast<Rig*>(context)->options_.self_test; };
+  port.read_inputs = [](void* context) { return static_cast<Rig*>(context)->pins_; };
+  port.read_current = [](void* context) { return static_cast<Rig*>(context)->current_; };
+  port.self_test = [](void* context) { return static_cast<Rig*>(context)->options_.failing_tests; };
+  port.keep_enable = [](void* context, bool on) { static_cast<Rig*>(context)->enable_kept_ = on; };
   bushd_mcu_config config{};
   config.address = options.address;
   config.motors = options.motors;
   config.slots = options.slots;
   config.boot_number = 77;
+  config.reset_cause = options.reset_cause;
+  config.enable_at_boot = options.enable_at_boot;
   config.queue = queue_.data();
   config.queue_ticks = options.queue_ticks;
   config.codes = codes_.data();
@@ -192,6 +196,12 @@ bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns,
               payload_of([&](std::uint8_t* p) { return bushd_encode_configure(&message, p); }));
   if (status == BUSHD_OK) format_ = format;
   return status;
+}
+
+bushd_status Rig::set_inputs(const bushd_set_inputs& settings) {
+  return request(BUSHD_MSG_INPUTS, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_set_inputs(&settings, p);
+                 }));
 }
 
 void Rig::sync(const bushd_sync& message) {

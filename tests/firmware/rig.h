@@ -25,7 +25,9 @@ struct RigOptions {
   std::uint16_t queue_ticks = 128;
   std::uint16_t code_count = 400;
   std::uint32_t min_tick_ns = 0;
-  bool self_test = true;
+  std::uint8_t failing_tests = 0;
+  bushd_reset_cause reset_cause = BUSHD_RESET_POWER_ON;
+  bool enable_at_boot = false;
   bool stores_address = true;
 };
 
@@ -99,6 +101,10 @@ class Rig {
   bushd_status control(std::uint8_t actions);
   bushd_status set_position(std::uint8_t motor, std::int32_t position_steps);
   bushd_tables tables();
+  bushd_status set_inputs(const bushd_set_inputs& settings);
+  // The pins, from the next tick that is prepared on.
+  void pins(bushd_inputs inputs) { pins_ = inputs; }
+  void current(std::uint16_t reading) { current_ = reading; }
   // Without an answer.
   void emergency(bushd_how how, std::uint8_t address = BUSHD_ADDRESS_BROADCAST);
   // Everything up to READY, with this table for all motors.
@@ -130,6 +136,7 @@ class Rig {
   void forget_history();
   bool enabled() const { return enabled_; }
   int enable_calls() const { return enable_calls_; }
+  bool enable_kept() const { return enable_kept_; }
   int stored_address() const { return stored_address_; }
   static std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE> unique_id() {
     return {'b', 'u', 's', 'h', 0, 1, 2, 3};
@@ -155,7 +162,10 @@ class Rig {
   Bytes last_sent_;
   bool enabled_ = true;
   int enable_calls_ = 0;
+  bool enable_kept_ = false;
   int stored_address_ = -1;
+  bushd_inputs pins_{};
+  std::uint16_t current_ = 0;
   std::uint32_t mark_ = 0;
   std::uint32_t port_tick_ns_ = 0;
   std::uint16_t direction_ = 0;

@@ -57,12 +57,19 @@ class Mcu {
                        std::uint32_t tick_ns) { static_cast<Mcu*>(self)->tick_ns_ = tick_ns; },
         .adjust_tick = [](void* self, std::int32_t ns) { static_cast<Mcu*>(self)->adjusted(ns); },
         .time_in_tick_ns = [](void* self) { return static_cast<Mcu*>(self)->time_in_tick_ns(); },
-        .read_inputs = [](void*) -> std::uint16_t { return 5; },
-        .self_test = [](void*) { return true; }};
+        .read_inputs =
+            [](void*) {
+              return bushd_inputs{5, 0};
+            },
+        .read_current = [](void*) -> std::uint16_t { return 0; },
+        .self_test = [](void*) -> std::uint8_t { return 0; },
+        .keep_enable = [](void*, bool) {}};
     const bushd_mcu_config config = {.address = kAddress,
                                      .motors = kMotors,
                                      .slots = kSlots,
                                      .boot_number = kBootNumber,
+                                     .reset_cause = BUSHD_RESET_WATCHDOG,
+                                     .enable_at_boot = false,
                                      .queue = queue_.data(),
                                      .queue_ticks = kQueueTicks,
                                      .min_tick_ns = BUSHD_MIN_TICK_NS,

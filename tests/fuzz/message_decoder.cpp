@@ -87,6 +87,11 @@ void decode_for_mcu(Bytes payload) {
   if (decoded(payload, &position, bushd_decode_set_position, bushd_encode_set_position)) {
     BUSHD_REQUIRE(position.motor < BUSHD_MOTORS_PER_MCU);
   }
+  bushd_set_inputs inputs;
+  if (decoded(payload, &inputs, bushd_decode_set_inputs, bushd_encode_set_inputs)) {
+    BUSHD_REQUIRE(inputs.emergency <= BUSHD_EMERGENCY_INPUT_CUTS);
+    BUSHD_REQUIRE(inputs.debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS);
+  }
   bushd_emergency emergency;
   if (decoded(payload, &emergency, bushd_decode_emergency, bushd_encode_emergency)) {
     BUSHD_REQUIRE(emergency.how == BUSHD_RAMP_DOWN || emergency.how == BUSHD_CUT);

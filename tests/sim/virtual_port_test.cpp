@@ -155,7 +155,7 @@ TEST(VirtualPort, DeafInResetAndAnotherBootNumberAfterIt) {
 
 TEST(VirtualPort, FailedSelfTestShowsAsFault) {
   Rig rig;
-  rig.port.self_test_fails = true;
+  rig.port.failing_tests = BUSHD_TEST_FLASH;
   bushd_virtual_advance(&rig.port, 0);
   EXPECT_EQ(rig.port.mcu.faults, BUSHD_FAULT_SELF_TEST);
 }

@@ -72,8 +72,8 @@ def c_encoder(index, message, fields):
                     lines.append(f"  message.slot[{i}].revision = UINT32_C({held[1]});")
             elif name == "how":
                 lines.append(f"  message.how = {'BUSHD_CUT' if value else 'BUSHD_RAMP_DOWN'};")
-            elif name == "follows":
-                lines.append(f"  message.follows = {'true' if value else 'false'};")
+            elif name in ("follows", "enable_after_watchdog"):
+                lines.append(f"  message.{name} = {'true' if value else 'false'};")
             elif name == "format":
                 lines.append(f"  message.format = {'BUSHD_FORMAT_FINE' if value else 'BUSHD_FORMAT_COARSE'};")
             else:

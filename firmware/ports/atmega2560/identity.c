@@ -9,6 +9,7 @@
 #include "engine/frame.h"
 
 #define BOOT_NUMBER ((uint16_t*)16)
+#define ENABLE_KEPT 18u
 
 static identity image;
 static volatile uint8_t written;  // bytes of the image given to the EEPROM
@@ -59,4 +60,19 @@ bool identity_store_address(uint8_t address) {
     EECR |= 1 << EERIE;
   }
   return true;
+}
+
+bool identity_enable_kept(void) {
+  return eeprom_read_byte((const uint8_t*)ENABLE_KEPT) == 1;
+}
+
+void identity_keep_enable(bool on) {
+  if (written != sizeof image || !eeprom_is_ready()) return;
+  if (identity_enable_kept() == on) return;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    EEAR = ENABLE_KEPT;
+    EEDR = on ? 1 : 0;
+    EECR |= 1 << EEMPE;
+    EECR |= 1 << EEPE;
+  }
 }

@@ -1,5 +1,6 @@
 // What the EEPROM keeps. From address 0: unique id (8 bytes), address, CRC-32 of these nine (low
-// byte first); at 16 the boot number.
+// byte first); at 16 the boot number, at 18 whether EN
+// is to be raised after a watchdog reset.
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_IDENTITY_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_IDENTITY_H
 
@@ -20,5 +21,9 @@ bool identity_load(identity* kept, uint16_t* boot_number);
 
 // Returns at once, some 40 ms before all is written; false while an earlier one is being written.
 bool identity_store_address(uint8_t address);
+
+bool identity_enable_kept(void);
+// Returns at once. While an address is being written it does nothing: EN then stays low.
+void identity_keep_enable(bool on);
 
 #endif

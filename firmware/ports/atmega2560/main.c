@@ -55,27 +55,55 @@ static uint32_t port_time_in_tick_ns(void* context) {
   return emission_time_in_tick_ns(clock_now());
 }
 
-static uint16_t port_read_inputs(void* context) {
+static bushd_inputs port_read_inputs(void* context) {
   (void)context;
   const uint8_t low = INPUT_LOW;
   const uint8_t high = INPUT_HIGH;
-  return (uint16_t) ~((uint16_t)high << 8 | low);
+  const bushd_inputs inputs = {(uint16_t) ~((uint16_t)high << 8 | low), 0};
+  return inputs;
 }
 
-static bool port_self_test(void* context) {
+static uint16_t port_read_current(void* context) {
   (void)context;
-  return has_identity && boot_faults() == 0;
+  return 0;
+}
+
+static uint8_t port_self_test(void* context) {
+  (void)context;
+  uint8_t failed = has_identity ? 0 : BUSHD_TEST_EEPROM;
+  if (boot_faults() & BOOT_RAM_BAD) failed |= BUSHD_TEST_RAM;
+  if (boot_faults() & BOOT_FLASH_BAD) failed |= BUSHD_TEST_FLASH;
+  return failed;
+}
+
+static void port_keep_enable(void* context, bool on) {
+  (void)context;
+  identity_keep_enable(on);
+}
+
+// Of several flags the gravest counts.
+static bushd_reset_cause reset_cause(void) {
+  const uint8_t flags = boot_cause();
+  if (flags & 1 << PORF) return BUSHD_RESET_POWER_ON;
+  if (flags & 1 << BORF) return BUSHD_RESET_BROWN_OUT;
+  if (flags & 1 << EXTRF) return BUSHD_RESET_EXTERNAL;
+  return flags & 1 << WDRF ? BUSHD_RESET_WATCHDOG : BUSHD_RESET_UNKNOWN;
 }
 
 static void boot(void) {
-  static const bushd_port kPort = {.transmit = port_transmit,
-                                   .store_address = port_store_address,
-                                   .set_enable = port_set_enable,
-                                   .set_tick = port_set_tick,
-                                   .adjust_tick = port_adjust_tick,
-                                   .time_in_tick_ns = port_time_in_tick_ns,
-                                   .read_inputs = port_read_inputs,
-                                   .self_test = port_self_test};
+  // Field by field: a constant of it would lie in RAM for good.
+  bushd_port port;
+  port.context = NULL;
+  port.transmit = port_transmit;
+  port.store_address = port_store_address;
+  port.set_enable = port_set_enable;
+  port.set_tick = port_set_tick;
+  port.adjust_tick = port_adjust_tick;
+  port.time_in_tick_ns = port_time_in_tick_ns;
+  port.read_inputs = port_read_inputs;
+  port.read_current = port_read_current;
+  port.self_test = port_self_test;
+  port.keep_enable = port_keep_enable;
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
@@ -86,10 +114,12 @@ static void boot(void) {
                              .codes = codes,
                              .code_count = TABLE_CODES};
   identity kept;
+  config.reset_cause = reset_cause();
+  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && identity_enable_kept();
   has_identity = identity_load(&kept, &config.boot_number);
   config.address = kept.address;
   for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = kept.unique_id[i];
-  bushd_mcu_boot(&mcu, &kPort, &config);
+  bushd_mcu_boot(&mcu, &port, &config);
 }
 
 static void prepare(void) {

@@ -135,14 +135,24 @@ static uint32_t port_time_in_tick_ns(void* context) {
   return (uint32_t)(own_time(v, v->now_ns) - v->tick_start_own_ns);
 }
 
-static uint16_t port_read_inputs(void* context) {
+static bushd_inputs port_read_inputs(void* context) {
   const bushd_virtual* v = context;
   return v->inputs;
 }
 
-static bool port_self_test(void* context) {
+static uint16_t port_read_current(void* context) {
   const bushd_virtual* v = context;
-  return !v->self_test_fails;
+  return v->current;
+}
+
+static uint8_t port_self_test(void* context) {
+  const bushd_virtual* v = context;
+  return v->failing_tests;
+}
+
+static void port_keep_enable(void* context, bool on) {
+  bushd_virtual* v = context;
+  v->enable_kept = on;
 }
 
 static void boot(bushd_virtual* v) {
@@ -154,7 +164,13 @@ static void boot(bushd_virtual* v) {
                            .adjust_tick = port_adjust_tick,
                            .time_in_tick_ns = port_time_in_tick_ns,
                            .read_inputs = port_read_inputs,
-                           .self_test = port_self_test};
+                           .read_current = port_read_current,
+                           .self_test = port_self_test,
+                           .keep_enable = port_keep_enable};
+  v->config.mcu.reset_cause = v->reset_cause;
+  v->config.mcu.enable_at_boot = v->enable_kept && v->reset_cause == BUSHD_RESET_WATCHDOG;
+  v->enable_kept = false;
+  v->reset_cause = BUSHD_RESET_EXTERNAL;
   v->now_ns = v->config.boot_ns;
   v->running = true;
   v->plane = NULL;
@@ -171,6 +187,7 @@ void bushd_virtual_init(bushd_virtual* v, const bushd_virtual_config* config) {
   memset(v, 0, sizeof *v);
   v->config = *config;
   v->next_event_ns = config->boot_ns;
+  v->reset_cause = BUSHD_RESET_POWER_ON;
 }
 
 int64_t bushd_virtual_next_event_ns(const bushd_virtual* v) {

@@ -62,8 +62,10 @@ typedef struct bushd_virtual {
   bushd_virtual_config config;
   bushd_virtual_shaft shaft[BUSHD_VIRTUAL_OUTPUTS];  // until the start of the present tick
   bool running;                                      // out of reset
-  uint16_t inputs;                                   // set: levels of the input pins
-  bool self_test_fails;                              // set: for the next boot
+  bushd_inputs inputs;                               // set: the input pins
+  uint16_t current;                                  // set: what the current sensor reads
+  uint8_t failing_tests;                             // set: BUSHD_TEST_*, for the next boots
+  uint8_t reset_cause;  // set: BUSHD_RESET_* of the next boot; falls to external with each
 
   // Private.
   int64_t now_ns;
@@ -77,6 +79,7 @@ typedef struct bushd_virtual {
   uint16_t step_levels;
   uint16_t dir_levels;
   bool enable_level;
+  bool enable_kept;
 } bushd_virtual;
 
 // Precondition: config->mcu as bushd_mcu_boot wants it, its memory outlives *v; transmit is set.
@@ -93,8 +96,8 @@ void bushd_virtual_advance(bushd_virtual* v, int64_t now_ns);
 // A byte's stop bit ended at now_ns. Advances to that time first; lost on an MCU in reset.
 void bushd_virtual_receive(bushd_virtual* v, uint8_t byte, int64_t now_ns);
 
-// Pulls the MCU's reset at now_ns: all pins fall, all memory is lost. It boots again at boot_ns (>=
-// now_ns).
+// Pulls the MCU's reset at now_ns: all pins fall, all memory is lost but what a watchdog reset
+// leaves. It boots again at boot_ns (>= now_ns).
 void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint16_t boot_number);
 
 #ifdef __cplusplus
