@@ -1,3 +1,5 @@
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+
 # The very images that are flashed, by the toolchains of the presets, each in a build of its own below the one that
 # tests them. Where toolchain and simulator are there, <TARGET> is made and <PREFIX>_IMAGES says where its images are:
 # ${..._IMAGES}-<baud rate>.elf
@@ -11,11 +13,18 @@ function(bushd_images target prefix toolchain port)
     COMMAND ${CMAKE_COMMAND} --build ${build}
     BYPRODUCTS ${images}-500000.elf ${images}-1000000.elf
     VERBATIM)
+  add_test(NAME ${target}_is_reproducible COMMAND ${Python3_EXECUTABLE}
+    ${PROJECT_SOURCE_DIR}/tests/ports/reproducible_test.py ${PROJECT_SOURCE_DIR} ${toolchain}
+    ${build}/firmware/ports/${port})
+  set_tests_properties(${target}_is_reproducible PROPERTIES LABELS slow)
   set(${prefix}_IMAGES ${images} PARENT_SCOPE)
 endfunction()
 
 if(TARGET bushd_sim_avr AND AVR_GCC)
   bushd_images(avr_image AVR avr atmega2560)
+  add_test(NAME avr_stack_is_bounded COMMAND ${Python3_EXECUTABLE}
+    ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py avr-objdump ${AVR_IMAGES}-500000.elf)
+  set_tests_properties(avr_stack_is_bounded PROPERTIES LABELS slow)
 else()
   message(STATUS "The image for ATmega2560 is not tested: it needs gcc-avr and libsimavr-dev (tools/setup)")
 endif()
