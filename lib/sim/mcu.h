@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "firmware/core/port.h"
 #include "sim/edge.h"
 
 namespace bushd::sim {
@@ -29,6 +30,10 @@ class Mcu {
   virtual std::uint8_t address() const = 0;
   virtual std::uint16_t boot_number() const = 0;
   virtual bool running() const = 0;  // out of reset
+
+  // What its pins say from now on, as in port.h.
+  virtual void set_inputs(bushd_inputs inputs) = 0;
+  virtual void set_current(std::uint16_t reading) = 0;  // 0..BUSHD_MAX_CURRENT
 
   // When it next does something by itself.
   virtual TimeNs next_event_ns() const = 0;

@@ -42,8 +42,8 @@ class VirtualMcu final : public Mcu {
   // the start of the present tick.
   const bushd_virtual_shaft& shaft(std::size_t output) const { return port_.shaft[output]; }
 
-  void set_inputs(bushd_inputs inputs) { port_.inputs = inputs; }
-  void set_current(std::uint16_t reading) { port_.current = reading; }
+  void set_inputs(bushd_inputs inputs) override { port_.inputs = inputs; }
+  void set_current(std::uint16_t reading) override { port_.current = reading; }
   void fail_self_tests(std::uint8_t tests) { port_.failing_tests = tests; }     // of the next boots
   void set_reset_cause(bushd_reset_cause cause) { port_.reset_cause = cause; }  // of the next boot
 

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 extern "C" {
+#include <avr_adc.h>
 #include <avr_eeprom.h>
 #include <avr_extint.h>
 #include <avr_ioport.h>
@@ -32,6 +33,10 @@ constexpr std::uint8_t kPaint = 0xC5;  // firmware/ports/atmega2560/boot_tests.h
 constexpr std::size_t kHardwareFifo = 2;
 // In the address space of data.
 constexpr std::size_t kMcusr = 0x54;
+constexpr std::uint16_t kPink = 0x106;
+constexpr std::uint16_t kPortk = 0x108;
+constexpr std::uint16_t kDdrk = 0x107;
+constexpr std::uint32_t kSupplyMv = 5000;
 constexpr std::size_t kTimsk1 = 0x6F;
 constexpr std::uint8_t kPowerOn = 1;
 constexpr std::uint8_t kExternalReset = 2;
@@ -77,6 +82,7 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   avr_load_firmware(avr_, &firmware);
   avr_->sleep = no_sleep;
   avr_->log = LOG_ERROR;
+  avr_->vcc = avr_->avcc = avr_->aref = kSupplyMv;
   // Pins that are low would be looked at in every cycle, for interrupts that the image does not
   // use.
   for (std::uint8_t i = 0; i < kExternalInterrupts; ++i) avr_extint_set_strict_lvl_trig(avr_, i, 0);
@@ -117,6 +123,7 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   reset_hook_->io.reset = on_reset;
   reset_hook_->mcu = this;
   avr_register_io(avr_, &reset_hook_->io);
+  set_inputs({});
 }
 
 AvrMcu::~AvrMcu() {
@@ -137,6 +144,29 @@ void AvrMcu::watch_pin(char port, int pin, void (*notify)(avr_irq_t*, std::uint3
   avr_irq_t* irq = avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), pin);
   if (irq == nullptr) throw std::runtime_error("simavr: a pin is missing");
   avr_irq_register_notify(irq, notify, param);
+}
+
+void AvrMcu::drive(char port, int pin, bool level) {
+  avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), pin),
+                level);
+}
+
+// Switches to ground.
+void AvrMcu::set_inputs(bushd_inputs inputs) {
+  for (int i = 0; i < 8; ++i) {
+    drive('K', i, (inputs.motors >> i & 1) == 0);
+    drive('J', i, (inputs.motors >> (8 + i) & 1) == 0);
+  }
+  drive('D', 0, (inputs.system & BUSHD_INPUT_TRIGGER) == 0);
+  drive('D', 1, (inputs.system & BUSHD_INPUT_EMERGENCY) == 0);
+  drive('D', 2, (inputs.system & BUSHD_INPUT_FORWARD) == 0);
+  drive('D', 3, (inputs.system & BUSHD_INPUT_REVERSE) == 0);
+}
+
+void AvrMcu::set_current(std::uint16_t reading) {
+  // Rounded up: the converter rounds down.
+  const std::uint32_t mv = (reading * kSupplyMv + BUSHD_MAX_CURRENT - 1) / BUSHD_MAX_CURRENT;
+  avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0), mv);
 }
 
 TimeNs AvrMcu::time_ns() const {
@@ -283,6 +313,19 @@ void AvrMcu::flip_flash_bit(std::uint32_t address, int bit) {
 
 void AvrMcu::stick_ram_bit(std::uint16_t address, int bit) {
   stuck_ = Bit{address, bit};
+}
+
+void AvrMcu::short_motor_input(int motor) {
+  shorted_ = static_cast<std::uint8_t>(shorted_ | 1 << motor);
+  auto& read = avr_->io[AVR_DATA_TO_IO(kPink)].r;
+  read.c = read_shorted;
+  read.param = this;
+}
+
+std::uint8_t AvrMcu::read_shorted(avr_t* avr, std::uint16_t address, void* param) {
+  const std::uint8_t* const data = avr->data;
+  const int pins = (data[address] & ~data[kDdrk]) | (data[kPortk] & data[kDdrk]);
+  return static_cast<std::uint8_t>(pins | static_cast<AvrMcu*>(param)->shorted_);
 }
 
 std::size_t AvrMcu::untouched_ram() const {

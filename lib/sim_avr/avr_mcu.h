@@ -41,6 +41,9 @@ class AvrMcu final : public Mcu {
 
   bool running() const override { return now_ns_ >= out_of_reset_ns_; }
 
+  void set_inputs(bushd_inputs inputs) override;
+  void set_current(std::uint16_t reading) override;
+
   TimeNs next_event_ns() const override;
   bool announces_answers() const override { return false; }
   void advance(TimeNs now_ns) override;
@@ -52,6 +55,7 @@ class AvrMcu final : public Mcu {
   void stop_ticks();  // the tick timer's interrupts are off
   void flip_flash_bit(std::uint32_t address, int bit);
   void stick_ram_bit(std::uint16_t address, int bit);  // at 0; slow
+  void short_motor_input(int motor);                   // of 0..7, to the supply
 
   // Bytes of RAM that nothing has written to since they were tested at boot, between variables and
   // stack.
@@ -75,6 +79,7 @@ class AvrMcu final : public Mcu {
   void watch_pin(char port, int pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param);
   void feed();
   void drop_outputs();
+  void drive(char port, int pin, bool level);
   std::array<std::uint8_t, 18> eeprom() const;
   TimeNs time_ns() const;
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
@@ -82,6 +87,7 @@ class AvrMcu final : public Mcu {
   static void on_byte(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_interrupt(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_reset(avr_io_t* io);
+  static std::uint8_t read_shorted(avr_t* avr, std::uint16_t address, void* param);
 
   std::size_t index_;
   Driver& driver_;
@@ -101,6 +107,7 @@ class AvrMcu final : public Mcu {
     int bit;
   };
   std::optional<Bit> stuck_;
+  std::uint8_t shorted_ = 0;
   bool driver_enable_ = false;
   TimeNs byte_end_ns_ = 0;
   std::uint64_t interrupts_ = 0;

@@ -18,7 +18,9 @@ TEST_F(AvrBoot, ABitOfTheProgramThatHasFlippedKeepsMotorsOff) {
     avr_->flip_flash_bit(address, 5);
     bus_.reboot(0);
     pass(kBootNs);
-    EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_SELF_TEST) << address;
+    const bushd_report report = master_.poll(kAddress);
+    EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST) << address;
+    EXPECT_EQ(report.failed_tests, BUSHD_TEST_FLASH);
     EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
                                    bushd_control{BUSHD_CONTROL_ENABLE}),
               BUSHD_E_STATE);
@@ -33,7 +35,30 @@ TEST_F(AvrBoot, ABitOfTheProgramThatHasFlippedKeepsMotorsOff) {
 TEST_F(AvrBoot, ABitOfRamThatIsStuckKeepsMotorsOff) {
   avr_->stick_ram_bit(0x900, 3);
   pass(kBootNs);
-  EXPECT_EQ(master_.poll(kAddress).faults & BUSHD_FAULT_SELF_TEST, BUSHD_FAULT_SELF_TEST);
+  EXPECT_EQ(master_.poll(kAddress).failed_tests, BUSHD_TEST_RAM);
+}
+
+TEST_F(AvrBoot, AnInputThatIsShortedToTheSupplyKeepsMotorsOff) {
+  avr_->short_motor_input(5);
+  pass(kBootNs);
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST);
+  EXPECT_EQ(report.failed_tests, BUSHD_TEST_INPUTS);
+}
+
+// A motor may stand on its switch.
+TEST_F(AvrBoot, AnInputThatIsActiveIsNoFault) {
+  avr_->set_inputs({0xFFFF, BUSHD_SYSTEM_INPUTS});
+  pass(kBootNs);
+  EXPECT_EQ(master_.poll(kAddress).faults, 0);
+}
+
+TEST_F(AvrBoot, TellsWhyItBooted) {
+  pass(kBootNs);
+  EXPECT_EQ(master_.poll(kAddress).reset_cause, BUSHD_RESET_POWER_ON);
+  bus_.reboot(0);
+  pass(kBootNs);
+  EXPECT_EQ(master_.poll(kAddress).reset_cause, BUSHD_RESET_EXTERNAL);
 }
 
 struct Hang {
@@ -68,6 +93,7 @@ TEST_P(AvrWatchdog, BootsAnMcuThatHangsInMotionAnew) {
 
   const bushd_report after = master_.poll(kAddress);
   EXPECT_EQ(after.boot_number, before.boot_number + 1);
+  EXPECT_EQ(after.reset_cause, BUSHD_RESET_WATCHDOG);
   EXPECT_EQ(after.state, BUSHD_STATE_BUSY);
   EXPECT_EQ(after.faults, 0);
   ASSERT_NO_FATAL_FAILURE(make_ready());

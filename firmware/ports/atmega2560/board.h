@@ -13,8 +13,17 @@
 #define STEP_HIGH PORTC
 #define DIR_LOW PORTL
 #define DIR_HIGH PORTB
-#define INPUT_LOW PINK  // closed to ground: active
+// Inputs, with pull-ups; closed to ground: active.
+#define INPUT_LOW PINK
 #define INPUT_HIGH PINJ
+// Those that are no motor's. The trigger's has an interrupt of its own, INT0.
+#define INPUT_SYSTEM PIND
+#define TRIGGER_BIT 0
+#define EMERGENCY_BIT 1
+#define FORWARD_BIT 2
+#define REVERSE_BIT 3
+#define SYSTEM_BITS (1 << TRIGGER_BIT | 1 << EMERGENCY_BIT | 1 << FORWARD_BIT | 1 << REVERSE_BIT)
+// The current sensor is at ADC0.
 
 #define EN_PORT PORTH
 #define EN_BIT 3
@@ -30,6 +39,7 @@ static inline void board_init(void) {
   DDRE = 1 << DE_BIT;
   // Pull-ups: the inputs, and the receiver's line while the transceiver does not drive it.
   PORTK = PORTJ = 0xFF;
+  PORTD = SYSTEM_BITS;
   PORTE = 1 << 0;
 }
 #endif

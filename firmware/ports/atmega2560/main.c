@@ -8,6 +8,7 @@
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/emission.h"
 #include "firmware/ports/atmega2560/identity.h"
+#include "firmware/ports/atmega2560/inputs.h"
 #include "firmware/ports/atmega2560/line.h"
 
 #define QUEUE_TICKS 64u
@@ -57,15 +58,12 @@ static uint32_t port_time_in_tick_ns(void* context) {
 
 static bushd_inputs port_read_inputs(void* context) {
   (void)context;
-  const uint8_t low = INPUT_LOW;
-  const uint8_t high = INPUT_HIGH;
-  const bushd_inputs inputs = {(uint16_t) ~((uint16_t)high << 8 | low), 0};
-  return inputs;
+  return inputs_read();
 }
 
 static uint16_t port_read_current(void* context) {
   (void)context;
-  return 0;
+  return inputs_current();
 }
 
 static uint8_t port_self_test(void* context) {
@@ -73,6 +71,7 @@ static uint8_t port_self_test(void* context) {
   uint8_t failed = has_identity ? 0 : BUSHD_TEST_EEPROM;
   if (boot_faults() & BOOT_RAM_BAD) failed |= BUSHD_TEST_RAM;
   if (boot_faults() & BOOT_FLASH_BAD) failed |= BUSHD_TEST_FLASH;
+  if (!inputs_test()) failed |= BUSHD_TEST_INPUTS;
   return failed;
 }
 
@@ -130,6 +129,7 @@ static void prepare(void) {
 int main(void) {
   board_init();
   clock_init();
+  inputs_init();
   boot();
   prepare();
   line_init();
