@@ -3,6 +3,12 @@ function(bushd_target target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
     $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>
     $<$<BOOL:${BUSHD_WERROR}>:-Werror>)
+  if(CMAKE_SYSTEM_PROCESSOR STREQUAL avr)
+    # Registers of interrupts: firmware/ports/atmega2560/emission_slots.h.
+    foreach(register RANGE 2 9)
+      target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:C>:-ffixed-r${register}>)
+    endforeach()
+  endif()
   if(BUSHD_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=${BUSHD_SANITIZE} -fno-sanitize-recover=all
       -fno-omit-frame-pointer)

@@ -183,7 +183,7 @@ def main(objdump, *paths):
     for path in paths:
         image = Image(objdump, path)
         headers = subprocess.run([objdump, "-h", path], check=True, capture_output=True, text=True).stdout
-        used = sum(int(size, 16) for size in re.findall(r" \.(?:data|bss|noinit) +([0-9a-f]+)", headers))
+        used = sum(int(size, 16) for size in re.findall(r" \.(?:data|bss|noinit|line_bytes) +([0-9a-f]+)", headers))
         print(path)
         deepest = bound(image)
         print(f"  stack up to {deepest}, variables {used}: {RAM_SIZE - used - deepest} bytes of RAM are left")

@@ -1,15 +1,30 @@
 #include "firmware/ports/atmega2560/clock.h"
 
-#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <util/atomic.h>
 
-volatile uint16_t clock_overflows;
-
-ISR(TIMER5_OVF_vect) {
-  ++clock_overflows;
-}
+static uint32_t latest;  // in counts
 
 void clock_init(void) {
   TCCR5A = 0;
-  TCCR5B = 1 << CS50;
-  TIMSK5 = 1 << TOIE5;
+  TCCR5B = 1 << CS51;
+}
+
+static uint16_t count_now(void) {
+  uint16_t count = 0;
+  // The UART's interrupt reads the timer too, through the same register for its high byte.
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    count = TCNT5;
+  }
+  return count;
+}
+
+uint32_t clock_now(void) {
+  latest += (uint16_t)(count_now() - (uint16_t)latest);
+  return latest * CLOCK_CYCLES;
+}
+
+uint32_t clock_at(uint16_t count) {
+  const uint32_t now = clock_now();
+  return now - (uint16_t)((uint16_t)latest - count) * (uint32_t)CLOCK_CYCLES;
 }

@@ -1,31 +1,18 @@
-// Time in CPU cycles since boot, modulo 2^32: timer 5 runs freely, its overflows are counted.
+// Time in CPU cycles since boot, modulo 2^32: timer 5 counts every eighth.
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_CLOCK_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_CLOCK_H
 
-#include <avr/io.h>
 #include <stdbool.h>
 #include <stdint.h>
-#include <util/atomic.h>
 
-extern volatile uint16_t clock_overflows;
+#define CLOCK_CYCLES 8u
 
 void clock_init(void);
 
-// With interrupts off: an overflow may not have been counted yet.
-static inline uint32_t clock_now_locked(void) {
-  const uint16_t low = TCNT5;
-  uint16_t high = clock_overflows;
-  if ((TIFR5 & (1 << TOV5)) != 0 && low < 0x8000u) ++high;
-  return (uint32_t)high << 16 | low;
-}
-
-static inline uint32_t clock_now(void) {
-  uint32_t now = 0;
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    now = clock_now_locked();
-  }
-  return now;
-}
+// Both for the main loop only, and one of them at least every 30 ms.
+uint32_t clock_now(void);
+// When timer 5 showed `count`, in the last 30 ms.
+uint32_t clock_at(uint16_t count);
 
 static inline bool clock_before(uint32_t time, uint32_t reference) {
   return (int32_t)(time - reference) < 0;

@@ -15,7 +15,7 @@
 
 #define EMISSION_SLOTS 128u
 // Shorter, slots would not hold their interrupts.
-#define EMISSION_MIN_TICK_NS 1250000u
+#define EMISSION_MIN_TICK_NS 900000u
 
 // All of these are for the main loop only.
 

@@ -1,16 +1,32 @@
-// What the slot interrupts work by; for emission.c and emission_slots.S.
+// What the slot interrupts work by; for emission.c and the assembler files.
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_SLOTS_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_SLOTS_H
 
-// Offsets into emission_tick.
-#define TICK_MASK 2
-#define TICK_END 4
-#define TICK_TOP 5
-#define TICK_LAST_TOP 7
+// Registers that interrupts have to themselves: no C code of the image uses them
+// (cmake/warnings.cmake), and no library function that is linked (tests/sim_avr/registers). None of
+// these interrupts lets others in while it uses them.
+#define SLOT_LOW r2  // where the masks of the next slot lie
+#define SLOT_HIGH r3
+#define SAVED_LOW r4  // a pointer register of the code that was interrupted
+#define SAVED_HIGH r5
+#define DATA_LOW r6
+#define DATA_HIGH r7
+#define SLOT_MARK r8  // low byte of SLOT behind the first slot of a tick, later behind its last one
+#define ZERO r9
 
-// In GPIOR0: what compare B has to do besides. Bit 7: something.
-#define EMISSION_CHANGE 0x81
-#define EMISSION_BEGUN 0x82
+// Offsets into emission_tick.
+#define TICK_MASK 0
+#define TICK_MARK 2
+#define TICK_END 3
+#define TICK_TOP 4
+#define TICK_LAST_TOP 6
+#define TICK_DIRECTION 8
+#define TICK_CYCLES 10
+
+// Bits of GPIOR0; the low ones hold what the tests before `main` found, until the first tick
+// begins.
+#define TICK_IS_NEXT 6  // the mark that comes is that of a tick's first slot
+#define TICK_CHANGES 7  // from a tick's last slot into the next one's first
 
 #ifndef __ASSEMBLER__
 
@@ -18,20 +34,27 @@
 
 // A tick as it is emitted: slots of `top` + 1 cycles, the last one of `last_top` + 1.
 typedef struct emission_tick {
-  uint16_t direction;
-  const uint16_t* mask;  // of its first slot; of the present tick, the next one
-  uint8_t end;           // low byte of the address behind the last one
+  const uint16_t* mask;  // of its first slot
+  uint8_t mark;          // low byte of the address behind that
+  uint8_t end;           // and behind the last one
   uint16_t top;
   uint16_t last_top;
+  uint16_t direction;
   uint32_t cycles;
 } emission_tick;
 
-// A copy; of it all but direction and cycles.
-extern emission_tick emission_present;
 // In the last slot of a tick the next one is taken, and the silent one waits in its place.
 extern const emission_tick* volatile emission_next;
 extern const emission_tick* volatile emission_taken;
 extern emission_tick emission_silent;
+extern volatile uint16_t emission_last_top;  // of the present tick
+// The taken tick has begun, at `begun_at`, and is not silent. `next_start` is of the tick after it.
+extern volatile uint8_t emission_committed;
+extern uint32_t emission_begun_at;
+extern uint32_t emission_next_start;
+
+// Gives the interrupts their registers. With interrupts off.
+void emission_set_registers(const emission_tick* first);
 
 #endif
 #endif

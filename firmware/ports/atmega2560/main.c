@@ -144,6 +144,7 @@ int main(void) {
     // A frame that ended in the tick before must be heard by the core in that tick.
     if (begun && !(waits && clock_before(time, start))) {
       emission_swap();
+      clock_now();  // it must be asked every 30 ms
       bushd_mcu_swap(&mcu);
       prepare();
       wdt_reset();

@@ -1,37 +1,39 @@
 ; The inner loops of slots_fill.c. A motor's phase is changed by the same amount every slot, and where it
 ; overflows is its step; the carry is shifted into the slot's mask. Eight motors, motor 0 in bit 0; masks lie
-; two bytes apart. r18 is the mask.
+; two bytes apart. r28 is the mask.
 
 #define SLOTS 128
 
+; r0, r1, r10 and on: the others are those of interrupts.
     .macro save
-    .irp register, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17
+    .irp register, 10, 11, 12, 13, 14, 15, 16, 17, 28, 29
     push r\register
     .endr
     .endm
 
     .macro restore
-    .irp register, 17, 16, 15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2
+    .irp register, 29, 28, 17, 16, 15, 14, 13, 12, 11, 10
     pop r\register
     .endr
+    clr r1
     .endm
 
     .macro coarse phase, step
     add r\phase, r\step
-    ror r18
+    ror r28
     .endm
 
     .macro fine low, high, step_low, step_high
     sub r\low, r\step_low
     sbc r\high, r\step_high
-    ror r18
+    ror r28
     .endm
 
     .macro fine_four
-    fine 2, 3, 10, 11
-    fine 4, 5, 12, 13
-    fine 6, 7, 14, 15
-    fine 8, 9, 16, 17
+    fine 0, 1, 16, 17
+    fine 10, 11, 18, 19
+    fine 12, 13, 20, 21
+    fine 14, 15, 22, 23
     .endm
 
     .text
@@ -41,29 +43,29 @@
 slots_fill_coarse:
     save
     movw r26, r22
-    .irp register, 10, 11, 12, 13, 14, 15, 16, 17
+    movw r30, r24
+    .irp register, 16, 17, 18, 19, 20, 21, 22, 23
     ld r\register, X+
     .endr
-    ldi r18, 127
-    .irp register, 2, 3, 4, 5, 6, 7, 8, 9
-    mov r\register, r18
+    ldi r28, 127
+    .irp register, 0, 1, 10, 11, 12, 13, 14, 15
+    mov r\register, r28
     .endr
-    movw r30, r24
-    ldi r19, SLOTS / 4
+    ldi r29, SLOTS / 4
 1:
     .irp offset, 0, 2, 4, 6
-    coarse 2, 10
-    coarse 3, 11
-    coarse 4, 12
-    coarse 5, 13
-    coarse 6, 14
-    coarse 7, 15
-    coarse 8, 16
-    coarse 9, 17
-    std Z+\offset, r18
+    coarse 0, 16
+    coarse 1, 17
+    coarse 10, 18
+    coarse 11, 19
+    coarse 12, 20
+    coarse 13, 21
+    coarse 14, 22
+    coarse 15, 23
+    std Z+\offset, r28
     .endr
     adiw r30, 8
-    dec r19
+    dec r29
     breq 2f
     rjmp 1b
 2:
@@ -75,30 +77,33 @@ slots_fill_coarse:
 slots_fill_fine:
     save
     movw r26, r22
-    rcall load_four_motors
+    push r24
+    push r25
     movw r30, r24
-    ldi r19, SLOTS / 4
+    rcall load_four_motors
+    ldi r29, SLOTS / 4
 1:
     .irp offset, 0, 2, 4, 6
     fine_four
-    std Z+\offset, r18
+    std Z+\offset, r28
     .endr
     adiw r30, 8
-    dec r19
+    dec r29
     breq 2f
     rjmp 1b
 2:
+    pop r31
+    pop r30
     rcall load_four_motors
-    movw r30, r24
-    ldi r19, SLOTS / 4
+    ldi r29, SLOTS / 4
 3:
     .irp offset, 0, 2, 4, 6
-    ldd r18, Z+\offset
+    ldd r28, Z+\offset
     fine_four
-    std Z+\offset, r18
+    std Z+\offset, r28
     .endr
     adiw r30, 8
-    dec r19
+    dec r29
     breq 4f
     rjmp 3b
 4:
@@ -107,7 +112,7 @@ slots_fill_fine:
 
 ; From X on: phase and step of each.
 load_four_motors:
-    .irp register, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15, 8, 9, 16, 17
+    .irp register, 0, 1, 16, 17, 10, 11, 18, 19, 12, 13, 20, 21, 14, 15, 22, 23
     ld r\register, X+
     .endr
     ret
