@@ -67,6 +67,24 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
 void bushd_mcu_watch_silence(bushd_mcu* mcu);  // before every tick is prepared
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message);
 
+// Stops it from `next` on, the first tick that is not prepared.
+void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t next);
+void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_how how, uint32_t next);
+// Where it goes in that tick: +1, -1; 0: at rest.
+int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next);
+int8_t bushd_mcu_last_direction(const bushd_mcu* mcu, uint8_t m);
+
+// inputs.c: limit switches, the emergency input, the supply current, and EN.
+void bushd_mcu_watch_inputs(bushd_mcu* mcu);  // before every tick is prepared
+// Motors that may not move in this direction (+1, -1).
+uint16_t bushd_mcu_forbidden(const bushd_mcu* mcu, int8_t direction);
+// These ticks are starts, and the first step of one is in such a direction.
+bool bushd_mcu_starts_into_limit(const bushd_mcu* mcu, const bushd_ticks* ticks);
+bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message);
+void bushd_mcu_report_inputs(const bushd_mcu* mcu, bushd_report* report);
+void bushd_mcu_clear_faults(bushd_mcu* mcu);  // whose cause is gone
+void bushd_mcu_set_enable(bushd_mcu* mcu, bool on);
+
 // tables.c: table memory.
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message);

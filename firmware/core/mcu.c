@@ -78,6 +78,10 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   if (!engine_self_test(mcu)) mcu->failed_tests |= BUSHD_TEST_ENGINE;
   if (mcu->failed_tests & BUSHD_TEST_EEPROM) mcu->faults |= BUSHD_FAULT_EEPROM;
   if (mcu->failed_tests & (uint8_t)~BUSHD_TEST_EEPROM) mcu->faults |= BUSHD_FAULT_SELF_TEST;
+  if (config->enable_at_boot && (mcu->faults & BUSHD_FAULT_SELF_TEST) == 0) {
+    mcu->flags |= BUSHD_FLAG_ENABLED;
+    port->set_enable(port->context, true);
+  }
   bushd_mcu_update_state(mcu);
 }
 
@@ -97,6 +101,7 @@ const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
 }
 
 void bushd_mcu_prepare(bushd_mcu* mcu) {
+  bushd_mcu_watch_inputs(mcu);
   bushd_mcu_watch_silence(mcu);
   bushd_mcu_emit(mcu, &mcu->plane[mcu->front ^ 1u]);
   bushd_mcu_update_state(mcu);

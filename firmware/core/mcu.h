@@ -154,8 +154,11 @@ typedef struct bushd_mcu {
   uint16_t codes_used;
   uint8_t failed_tests;     // BUSHD_TEST_*
   bushd_set_inputs inputs;  // settings
-  uint16_t forbidden_positive;
-  uint16_t forbidden_negative;
+  uint16_t active_limits;   // of motors, as debounced
+  uint16_t unsettled;       // inputs that differ from that
+  uint16_t bounces[4];      // for how many ticks: bit by bit
+  uint16_t hit_positive;    // motors that a limit has stopped, until they have left it
+  uint16_t hit_negative;
   bushd_run_tick run_tick;  // for the runs' latest time unit
   bushd_mcu_clock clock;
   bushd_plane plane[2];
@@ -166,7 +169,7 @@ typedef struct bushd_mcu {
   uint8_t reply[BUSHD_FRAME_MAX_WIRE + 1u];
 } bushd_mcu;
 
-// Starts in state BUSY with EN low; a control message raises it.
+// Starts in state BUSY with EN low, unless it is to be high at boot; a control message raises it.
 void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_config* config);
 
 // One byte from the line. `time_in_tick_ns` is when its stop bit ended, counted from the start of

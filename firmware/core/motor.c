@@ -2,7 +2,8 @@
 // run, or of a ramp-down. It runs down its own table when
 // - its queue ends while it moves
 // - no master is heard for too long while it is in a table run
-// - an emergency stop is commanded
+// - an emergency stop is commanded, or an input asks for one
+// - it comes to a limit switch
 #include "firmware/core/internal.h"
 
 static const bushd_table* table_of(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
@@ -15,7 +16,7 @@ static void ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
   const bushd_table* table = table_of(mcu, motor);
   // A delay below cruise cannot be running; the ramp must not reach codes that no move uses.
   if (delay < table->cruise) delay = table->cruise;
-  const int direction = mcu->direction & motor_bit(m) ? 1 : -1;
+  const int direction = bushd_mcu_last_direction(mcu, m);
   // In the fine format the remainder is the elapsed share of the running delay; in the coarse one
   // that share is unknown, and taking it as 0 makes the next step late rather than early.
   const int32_t progress = (int32_t)motor->remainder * direction;
@@ -197,6 +198,9 @@ static bushd_status check_run(const bushd_mcu* mcu, uint32_t first_tick,
   if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
   // There is room for one.
   if (motor->mode == BUSHD_MCU_TABLE_RUN) return BUSHD_E_STATE;
+  if ((bushd_mcu_forbidden(mcu, entry->direction) & motor_bit(entry->motor)) != 0) {
+    return BUSHD_E_FORBIDDEN;
+  }
   bushd_run_start(run, table_of(mcu, motor), entry->steps, entry->direction);
   return ticks_of_run(run, mcu->tick_ns, ticks) ? BUSHD_OK : BUSHD_E_CAPACITY;
 }
@@ -310,9 +314,8 @@ static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stre
   return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * (2u * TICKS_AHEAD) / most, 256);
 }
 
-static void stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how) {
+void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t next) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  const uint32_t next = FIRST_OPEN(mcu);
   const bool in_run = in_table_run(motor, next);
   const rest_of_stream rest = rest_of(mcu, m, next);
   const bool at_rest =
@@ -330,8 +333,27 @@ static void stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how) {
   }
 }
 
+void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_how how, uint32_t next) {
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) bushd_mcu_stop_motor(mcu, m, how, next);
+}
+
+int8_t bushd_mcu_last_direction(const bushd_mcu* mcu, uint8_t m) {
+  return mcu->direction & motor_bit(m) ? 1 : -1;
+}
+
+int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->run_from) >= 0 &&
+                    ticks_after(motor->run_until, next) > 0;
+  if (runs || motor->mode == BUSHD_MCU_RAMP_DOWN) return motor->run.direction;
+  const int16_t queued =
+      ticks_after(motor->known_until, next) > 0 ? *queue_at((bushd_mcu*)mcu, next, m) : (int16_t)0;
+  if (queued != 0) return queued > 0 ? 1 : -1;
+  return motor->begun ? bushd_mcu_last_direction(mcu, m) : (int8_t)0;
+}
+
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message) {
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) stop_motor(mcu, m, message->how);
+  bushd_mcu_stop_all(mcu, message->how, FIRST_OPEN(mcu));
   mcu->faults |= BUSHD_FAULT_EMERGENCY;
   return BUSHD_OK;
 }

@@ -46,12 +46,7 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   report.rate_ppb = mcu->clock.rate_ppb;
   report.moving = bushd_mcu_moving(mcu);
   report.running = running(mcu);
-  const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
-  report.inputs = pins.motors ^ mcu->inputs.inverted;
-  report.system_inputs = pins.system ^ mcu->inputs.system_inverted;
-  report.forbidden_positive = mcu->forbidden_positive;
-  report.forbidden_negative = mcu->forbidden_negative;
-  report.current = mcu->port.read_current(mcu->port.context);
+  bushd_mcu_report_inputs(mcu, &report);
   report.reset_cause = mcu->config.reset_cause;
   report.failed_tests = mcu->failed_tests;
   report.bad_frames = mcu->bad_frames;
@@ -113,16 +108,12 @@ static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
   const uint8_t at_rest_only =
       BUSHD_CONTROL_DISABLE | BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES;
   if ((message->actions & at_rest_only) != 0 && bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
-  if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) mcu->faults &= BUSHD_FAULT_SELF_TEST;
+  if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) bushd_mcu_clear_faults(mcu);
   if (message->actions & BUSHD_CONTROL_FORGET_TABLES) bushd_mcu_forget_tables(mcu);
-  if (message->actions & BUSHD_CONTROL_DISABLE) {
-    mcu->flags &= (uint8_t)~BUSHD_FLAG_ENABLED;
-    mcu->port.set_enable(mcu->port.context, false);
-  }
+  if (message->actions & BUSHD_CONTROL_DISABLE) bushd_mcu_set_enable(mcu, false);
   if (message->actions & BUSHD_CONTROL_ENABLE) {
-    if (mcu->faults & BUSHD_FAULT_SELF_TEST) return BUSHD_E_STATE;
-    mcu->flags |= BUSHD_FLAG_ENABLED;
-    mcu->port.set_enable(mcu->port.context, true);
+    if (mcu->faults & (BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT)) return BUSHD_E_STATE;
+    bushd_mcu_set_enable(mcu, true);
   }
   return BUSHD_OK;
 }
@@ -140,12 +131,6 @@ static bushd_status set_address(bushd_mcu* mcu, const bushd_set_address* message
   if (message->address == mcu->config.address) return BUSHD_OK;
   if (!mcu->port.store_address(mcu->port.context, message->address)) return BUSHD_E_STATE;
   mcu->config.address = message->address;
-  return BUSHD_OK;
-}
-
-static bushd_status set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message) {
-  if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
-  mcu->inputs = *message;
   return BUSHD_OK;
 }
 
@@ -261,7 +246,7 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, uint32_t ti
     case BUSHD_MSG_SET_POSITION:
       HANDLE(set_position, set_position);
     case BUSHD_MSG_INPUTS:
-      HANDLE(set_inputs, set_inputs);
+      HANDLE(set_inputs, bushd_mcu_set_inputs);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:

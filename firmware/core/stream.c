@@ -247,6 +247,7 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
   if (fine != (mcu->format == BUSHD_FORMAT_FINE) || (fine && !in_range(ticks))) {
     return BUSHD_E_FORMAT;
   }
+  if (bushd_mcu_starts_into_limit(mcu, ticks)) return BUSHD_E_FORBIDDEN;
   uint8_t column = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((ticks->mask & motor_bit(m)) == 0) continue;
@@ -298,6 +299,10 @@ bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks*
   bushd_run run;
   for (uint16_t at = 0; bushd_next_table_ticks_entry(ticks, &at, &entry);) {
     if (!restore(mcu, &entry, &run)) return BUSHD_E_FORMAT;
+    if ((ticks->flags & BUSHD_TICKS_START) != 0 &&
+        (bushd_mcu_forbidden(mcu, run.direction) & motor_bit(entry.motor)) != 0) {
+      return BUSHD_E_FORBIDDEN;
+    }
   }
   for (uint16_t at = 0; bushd_next_table_ticks_entry(ticks, &at, &entry);) {
     restore(mcu, &entry, &run);

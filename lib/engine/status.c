@@ -34,6 +34,8 @@ const char* bushd_status_text(bushd_status status) {
       return "protocol versions differ";
     case BUSHD_E_UNKNOWN_MESSAGE:
       return "unknown message";
+    case BUSHD_E_FORBIDDEN:
+      return "a limit switch forbids this direction";
   }
   return "unknown status";
 }

@@ -16,13 +16,14 @@ typedef enum bushd_status {
   BUSHD_E_GAP = 6,       // ticks of a moving motor that do not join those already queued
   BUSHD_E_EPOCH = 7,     // a frame of another stream epoch (before or after a replacement)
   BUSHD_E_STATE = 8,  // not allowed in the present state (moving, disabled, faulty, not configured)
-  BUSHD_E_NO_TABLE = 9,         // a motor without a table cannot be asked to move
-  BUSHD_E_TABLE_EMPTY = 10,     // a table side without a code
-  BUSHD_E_TABLE_ZERO = 11,      // a delay code of 0
-  BUSHD_E_TABLE_UNSORTED = 12,  // a side that does not fall from slow to fast
-  BUSHD_E_TABLE_TOO_LONG = 13,  // a side lasts 2^31 time units or longer
-  BUSHD_E_VERSION = 14,         // protocol versions differ
-  BUSHD_E_UNKNOWN_MESSAGE = 15  // no such message type
+  BUSHD_E_NO_TABLE = 9,          // a motor without a table cannot be asked to move
+  BUSHD_E_TABLE_EMPTY = 10,      // a table side without a code
+  BUSHD_E_TABLE_ZERO = 11,       // a delay code of 0
+  BUSHD_E_TABLE_UNSORTED = 12,   // a side that does not fall from slow to fast
+  BUSHD_E_TABLE_TOO_LONG = 13,   // a side lasts 2^31 time units or longer
+  BUSHD_E_VERSION = 14,          // protocol versions differ
+  BUSHD_E_UNKNOWN_MESSAGE = 15,  // no such message type
+  BUSHD_E_FORBIDDEN = 16         // a start into a direction that a limit switch forbids
 } bushd_status;
 
 // A short English phrase for a status, never NULL; "unknown status" for any other value.

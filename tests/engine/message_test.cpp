@@ -598,10 +598,10 @@ TEST(MessageReport, OfSixteenMotorsFitsAFrame) {
 
 TEST(Status, EveryCodeHasItsOwnText) {
   std::map<std::string, int> texts;
-  for (int code = 0; code <= BUSHD_E_UNKNOWN_MESSAGE; ++code) {
+  for (int code = 0; code <= BUSHD_E_FORBIDDEN; ++code) {
     ++texts[bushd_status_text(static_cast<bushd_status>(code))];
   }
-  EXPECT_EQ(texts.size(), BUSHD_E_UNKNOWN_MESSAGE + 1u);
+  EXPECT_EQ(texts.size(), BUSHD_E_FORBIDDEN + 1u);
   EXPECT_EQ(texts.count("unknown status"), 0u);
   const uint8_t from_the_wire = 200;
   EXPECT_STREQ(bushd_status_text(static_cast<bushd_status>(from_the_wire + texts.size())),

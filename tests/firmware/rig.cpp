@@ -198,10 +198,18 @@ bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns,
   return status;
 }
 
-bushd_status Rig::set_inputs(const bushd_set_inputs& settings) {
-  return request(BUSHD_MSG_INPUTS, payload_of([&](std::uint8_t* p) {
-                   return bushd_encode_set_inputs(&settings, p);
-                 }));
+bushd_status Rig::set_inputs(const InputSettings& settings) {
+  const bushd_set_inputs message = {.limit_positive = settings.limit_positive,
+                                    .limit_negative = settings.limit_negative,
+                                    .limit_cuts = settings.limit_cuts,
+                                    .inverted = settings.inverted,
+                                    .debounce_ticks = settings.debounce_ticks,
+                                    .system_inverted = settings.system_inverted,
+                                    .emergency = settings.emergency,
+                                    .overcurrent = settings.overcurrent,
+                                    .enable_after_watchdog = settings.enable_after_watchdog};
+  return request(BUSHD_MSG_INPUTS,
+                 payload_of([&](std::uint8_t* p) { return bushd_encode_set_inputs(&message, p); }));
 }
 
 void Rig::sync(const bushd_sync& message) {

@@ -65,6 +65,19 @@ struct Ticks {
   std::uint8_t epoch = 0;
 };
 
+// bushd_set_inputs, all of it off.
+struct InputSettings {
+  std::uint16_t limit_positive = 0;
+  std::uint16_t limit_negative = 0;
+  std::uint16_t limit_cuts = 0;
+  std::uint16_t inverted = 0;
+  std::uint8_t debounce_ticks = 0;
+  std::uint8_t system_inverted = 0;
+  std::uint8_t emergency = BUSHD_EMERGENCY_INPUT_IGNORED;
+  std::uint16_t overcurrent = 0;
+  bool enable_after_watchdog = false;
+};
+
 class Rig {
  public:
   static constexpr std::uint32_t kTickNs = 2'560'000;
@@ -101,7 +114,7 @@ class Rig {
   bushd_status control(std::uint8_t actions);
   bushd_status set_position(std::uint8_t motor, std::int32_t position_steps);
   bushd_tables tables();
-  bushd_status set_inputs(const bushd_set_inputs& settings);
+  bushd_status set_inputs(const InputSettings& settings);
   // The pins, from the next tick that is prepared on.
   void pins(bushd_inputs inputs) { pins_ = inputs; }
   void current(std::uint16_t reading) { current_ = reading; }

@@ -149,7 +149,9 @@ int main(void) {
       prepare();
       wdt_reset();
     } else if (waits) {
-      bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(time));
+      // Bytes beyond the longest frame come one by one: noise must not pile up.
+      const uint8_t byte = line_take();
+      bushd_mcu_receive(&mcu, byte, byte == 0 ? emission_time_in_tick_ns(time) : 0);
     }
   }
 }
