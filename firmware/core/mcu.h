@@ -172,6 +172,17 @@ typedef struct bushd_mcu {
 // Starts in state BUSY with EN low, unless it is to be high at boot; a control message raises it.
 void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_config* config);
 
+// What a port may keep over resets: pieces of memory, from index 0 on until one is empty. Later
+// ones may be as long as earlier ones say. They hold addresses: only the same program may get them
+// back, between bushd_mcu_boot and the first tick, the earlier ones first, and then
+// bushd_mcu_restored.
+typedef struct bushd_mcu_piece {
+  void* at;
+  uint16_t size;
+} bushd_mcu_piece;
+bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index);
+void bushd_mcu_restored(bushd_mcu* mcu);
+
 // One byte from the line. `time_in_tick_ns` is when its stop bit ended, counted from the start of
 // the present tick; only used at delimiters. O(1), O(frame) at a delimiter.
 void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, uint32_t time_in_tick_ns);

@@ -41,6 +41,7 @@ constexpr std::size_t kTimsk1 = 0x6F;
 constexpr std::uint8_t kPowerOn = 1;
 constexpr std::uint8_t kExternalReset = 2;
 constexpr std::uint16_t kJumpToItself = 0xCFFF;
+constexpr std::uint32_t kEepromReady = 30;  // vector
 constexpr std::size_t kAddressAt = 8;
 constexpr std::size_t kBootNumberAt = 16;
 
@@ -225,7 +226,9 @@ void AvrMcu::drop_outputs() {
 
 // Its vector, or 0 at the end of the last one.
 void AvrMcu::on_interrupt(avr_irq_t*, std::uint32_t value, void* param) {
-  if (value != 0) ++static_cast<AvrMcu*>(param)->interrupts_;
+  auto& self = *static_cast<AvrMcu*>(param);
+  if (value != 0) ++self.interrupts_;
+  if (value == kEepromReady) ++self.eeprom_writes_;
 }
 
 std::array<std::uint8_t, 18> AvrMcu::eeprom() const {
@@ -309,6 +312,14 @@ void AvrMcu::stop_ticks() {
 
 void AvrMcu::flip_flash_bit(std::uint32_t address, int bit) {
   avr_->flash[address] ^= static_cast<std::uint8_t>(1 << bit);
+}
+
+void AvrMcu::flip_eeprom_bit(std::uint16_t address, int bit) {
+  std::uint8_t byte = 0;
+  avr_eeprom_desc_t at{&byte, address, 1};
+  avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &at);
+  byte ^= static_cast<std::uint8_t>(1 << bit);
+  avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &at);
 }
 
 void AvrMcu::stick_ram_bit(std::uint16_t address, int bit) {

@@ -54,6 +54,7 @@ class AvrMcu final : public Mcu {
   void hang();        // jumps into an endless loop, interrupts stay as they are
   void stop_ticks();  // the tick timer's interrupts are off
   void flip_flash_bit(std::uint32_t address, int bit);
+  void flip_eeprom_bit(std::uint16_t address, int bit);
   void stick_ram_bit(std::uint16_t address, int bit);  // at 0; slow
   void short_motor_input(int motor);                   // of 0..7, to the supply
 
@@ -62,6 +63,8 @@ class AvrMcu final : public Mcu {
   std::size_t untouched_ram() const;
   // Entered since power-on.
   std::uint64_t interrupts() const { return interrupts_; }
+  // Bytes written to its EEPROM while it ran.
+  std::uint64_t eeprom_writes() const { return eeprom_writes_; }
   // Bytes lost in its receiver.
   std::uint64_t overruns() const { return overruns_; }
   // Bytes whose last stop bit was not over when driver-enable fell, or that began without it.
@@ -111,6 +114,7 @@ class AvrMcu final : public Mcu {
   bool driver_enable_ = false;
   TimeNs byte_end_ns_ = 0;
   std::uint64_t interrupts_ = 0;
+  std::uint64_t eeprom_writes_ = 0;
   std::uint64_t overruns_ = 0;
   std::uint64_t bytes_cut_ = 0;
   std::array<Pin, 33> pins_{};

@@ -1,18 +1,17 @@
 #include "firmware/ports/atmega2560/identity.h"
 
-#include <avr/eeprom.h>
-#include <avr/interrupt.h>
 #include <stddef.h>
 #include <string.h>
-#include <util/atomic.h>
 
 #include "engine/frame.h"
+#include "firmware/ports/atmega2560/eeprom.h"
 
 #define BOOT_NUMBER ((uint16_t*)16)
 #define ENABLE_KEPT 18u
 
 static identity image;
-static volatile uint8_t written;  // bytes of the image given to the EEPROM
+static uint8_t written;  // bytes of it that are in the EEPROM
+static bool enable;
 
 static uint32_t image_crc(void) {
   return ~bushd_crc32(BUSHD_CRC32_START, (const uint8_t*)&image, offsetof(identity, crc));
@@ -32,47 +31,27 @@ bool identity_load(identity* kept, uint16_t* boot_number) {
   return good;
 }
 
-// The two writes to EECR must follow each other within four cycles: interrupts are off.
-static void write_next(void) {
-  EEAR = written;
-  EEDR = ((const uint8_t*)&image)[written];
-  ++written;
-  EECR |= 1 << EEMPE;
-  EECR |= 1 << EEPE;
-}
-
-ISR(EE_READY_vect) {
-  if (written == sizeof image) {
-    EECR &= (uint8_t) ~(1 << EERIE);
-  } else {
-    write_next();
-  }
+bool identity_enable_kept(void) {
+  return eeprom_byte(ENABLE_KEPT) == 1;
 }
 
 bool identity_store_address(uint8_t address) {
   if (written != sizeof image) return false;
   image.address = address;
   image.crc = image_crc();
-  eeprom_busy_wait();
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    written = 0;
-    write_next();
-    EECR |= 1 << EERIE;
-  }
+  written = 0;
   return true;
 }
 
-bool identity_enable_kept(void) {
-  return eeprom_read_byte((const uint8_t*)ENABLE_KEPT) == 1;
+void identity_keep_enable(bool on) {
+  enable = on;
 }
 
-void identity_keep_enable(bool on) {
-  if (written != sizeof image || !eeprom_is_ready()) return;
-  if (identity_enable_kept() == on) return;
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    EEAR = ENABLE_KEPT;
-    EEDR = on ? 1 : 0;
-    EECR |= 1 << EEMPE;
-    EECR |= 1 << EEPE;
+void identity_poll(void) {
+  if (written == sizeof image) {
+    eeprom_write(ENABLE_KEPT, enable);
+    return;
   }
+  eeprom_write(written, ((const uint8_t*)&image)[written]);
+  ++written;
 }

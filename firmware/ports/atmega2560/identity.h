@@ -1,6 +1,5 @@
-// What the EEPROM keeps. From address 0: unique id (8 bytes), address, CRC-32 of these nine (low
-// byte first); at 16 the boot number, at 18 whether EN
-// is to be raised after a watchdog reset.
+// Who the MCU is, in the EEPROM. From address 0: unique id (8 bytes), address, CRC-32 of these nine
+// (low byte first); at 16 the boot number, at 18 whether EN is to be raised after a watchdog reset.
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_IDENTITY_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_IDENTITY_H
 
@@ -18,12 +17,13 @@ typedef struct identity {
 // Counts the boot. False if the EEPROM holds no identity: then the address is 1 and the id all
 // zero.
 bool identity_load(identity* kept, uint16_t* boot_number);
-
-// Returns at once, some 40 ms before all is written; false while an earlier one is being written.
-bool identity_store_address(uint8_t address);
-
 bool identity_enable_kept(void);
-// Returns at once. While an address is being written it does nothing: EN then stays low.
+
+// Are written by identity_poll. False while another address is being written.
+bool identity_store_address(uint8_t address);
 void identity_keep_enable(bool on);
+
+// Writes a byte of what has changed, if one is left. Precondition: the EEPROM writes nothing.
+void identity_poll(void);
 
 #endif

@@ -6,9 +6,11 @@
 #include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/boot_tests.h"
 #include "firmware/ports/atmega2560/clock.h"
+#include "firmware/ports/atmega2560/eeprom.h"
 #include "firmware/ports/atmega2560/emission.h"
 #include "firmware/ports/atmega2560/identity.h"
 #include "firmware/ports/atmega2560/inputs.h"
+#include "firmware/ports/atmega2560/kept.h"
 #include "firmware/ports/atmega2560/line.h"
 
 #define QUEUE_TICKS 64u
@@ -20,7 +22,7 @@
 static bushd_mcu mcu;
 static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
 static uint16_t codes[TABLE_CODES];
-static bool has_identity;
+static uint8_t failed_tests;
 
 static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
   (void)context;
@@ -68,11 +70,7 @@ static uint16_t port_read_current(void* context) {
 
 static uint8_t port_self_test(void* context) {
   (void)context;
-  uint8_t failed = has_identity ? 0 : BUSHD_TEST_EEPROM;
-  if (boot_faults() & BOOT_RAM_BAD) failed |= BUSHD_TEST_RAM;
-  if (boot_faults() & BOOT_FLASH_BAD) failed |= BUSHD_TEST_FLASH;
-  if (!inputs_test()) failed |= BUSHD_TEST_INPUTS;
-  return failed;
+  return failed_tests;
 }
 
 static void port_keep_enable(void* context, bool on) {
@@ -90,6 +88,9 @@ static bushd_reset_cause reset_cause(void) {
 }
 
 static void boot(void) {
+  if (boot_faults() & BOOT_RAM_BAD) failed_tests |= BUSHD_TEST_RAM;
+  if (boot_faults() & BOOT_FLASH_BAD) failed_tests |= BUSHD_TEST_FLASH;
+  if (!inputs_test()) failed_tests |= BUSHD_TEST_INPUTS;
   // Field by field: a constant of it would lie in RAM for good.
   bushd_port port;
   port.context = NULL;
@@ -115,10 +116,21 @@ static void boot(void) {
   identity kept;
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && identity_enable_kept();
-  has_identity = identity_load(&kept, &config.boot_number);
+  const kept_found found = kept_find();
+  const bool has_identity = identity_load(&kept, &config.boot_number);
+  if (!has_identity || found == KEPT_BROKEN) failed_tests |= BUSHD_TEST_EEPROM;
   config.address = kept.address;
   for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = kept.unique_id[i];
   bushd_mcu_boot(&mcu, &port, &config);
+  if (found == KEPT_WHOLE) kept_load(&mcu);
+}
+
+static void poll_eeprom(void) {
+  if (eeprom_writes) return;
+  identity_poll();
+  const bool moves =
+      mcu.state == BUSHD_STATE_RUN || (mcu.plane[0].active | mcu.plane[1].active) != 0;
+  if (!eeprom_writes && !moves) kept_poll(&mcu);
 }
 
 static void prepare(void) {
@@ -152,6 +164,8 @@ int main(void) {
       // Bytes beyond the longest frame come one by one: noise must not pile up.
       const uint8_t byte = line_take();
       bushd_mcu_receive(&mcu, byte, byte == 0 ? emission_time_in_tick_ns(time) : 0);
+    } else {
+      poll_eeprom();
     }
   }
 }

@@ -1,0 +1,36 @@
+// What outlives a reset, if the port keeps it: tables, who runs which, and settings.
+#include "firmware/core/internal.h"
+
+static bushd_mcu_piece piece_of(void* at, size_t size) {
+  const bushd_mcu_piece piece = {at, (uint16_t)size};
+  return piece;
+}
+
+bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
+  enum { TICK, FORMAT, INPUTS, TABLES, CODES_USED, CODES, MOTORS };
+  switch (index) {
+    case TICK:
+      return piece_of(&mcu->tick_ns, sizeof mcu->tick_ns);
+    case FORMAT:
+      return piece_of(&mcu->format, sizeof mcu->format);
+    case INPUTS:
+      return piece_of(&mcu->inputs, sizeof mcu->inputs);
+    case TABLES:
+      return piece_of(mcu->table, sizeof mcu->table);
+    case CODES_USED:
+      return piece_of(&mcu->codes_used, sizeof mcu->codes_used);
+    case CODES:
+      return piece_of(mcu->config.codes, mcu->codes_used * sizeof mcu->config.codes[0]);
+    default: {
+      const uint8_t motor = (uint8_t)(index - MOTORS);
+      if (motor >= mcu->config.motors) return piece_of(NULL, 0);
+      return piece_of(&mcu->motor[motor].table, sizeof mcu->motor[motor].table);
+    }
+  }
+}
+
+void bushd_mcu_restored(bushd_mcu* mcu) {
+  const bushd_set_inputs inputs = mcu->inputs;
+  bushd_mcu_set_inputs(mcu, &inputs);
+  mcu->port.set_tick(mcu->port.context, mcu->tick_ns);
+}

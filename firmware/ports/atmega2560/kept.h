@@ -1,0 +1,27 @@
+// Tables, assignments and settings in the EEPROM, 2 KB of them. While motors stand they are
+// compared with what was written last, some bytes a millisecond; what has changed and then stays is
+// written, 3.4 ms a byte. A head tells whose it is, and that it is whole:
+//   0        HEAD_WHOLE; HEAD_BEGUN while it is written, 0xFF before the first time
+//   1 .. 4   image_seal of the program
+//   5 .. 6   size
+//   7 .. 10  CRC-32
+#ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_KEPT_H
+#define BUSHD_FIRMWARE_PORTS_ATMEGA2560_KEPT_H
+
+#include "firmware/core/mcu.h"
+
+typedef enum kept_found {
+  KEPT_NOTHING,  // or another program's
+  KEPT_WHOLE,
+  KEPT_BROKEN  // its writing was interrupted, or a byte has changed
+} kept_found;
+
+// With interrupts off.
+kept_found kept_find(void);
+// Precondition: it is whole, and the MCU has just booted.
+void kept_load(bushd_mcu* mcu);
+
+// Goes on with it by one byte. Precondition: the EEPROM writes nothing, and no motor moves.
+void kept_poll(bushd_mcu* mcu);
+
+#endif

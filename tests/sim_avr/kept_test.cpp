@@ -1,0 +1,160 @@
+// What the image for ATmega2560 keeps in its EEPROM, and what becomes of it when the power goes.
+#include "sim/random.h"
+#include "sim_avr/avr_fixture.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint16_t kContentAt = 43;  // firmware/ports/atmega2560/kept.h
+
+class AvrKept : public AvrAlone {
+ protected:
+  AvrKept() { pass(kBootNs); }
+
+  void reboot() {
+    bus_.reboot(0);
+    pass(kBootNs);
+  }
+
+  static std::vector<std::uint16_t> ramp(std::uint16_t first, std::size_t count) {
+    std::vector<std::uint16_t> codes;
+    while (codes.size() < count) codes.push_back(first--);
+    return codes;
+  }
+
+  bushd_tables tables() {
+    bushd_tables told{};
+    const auto reply = master_.request(kAddress, BUSHD_MSG_TABLES);
+    EXPECT_TRUE(reply);
+    if (reply) {
+      EXPECT_EQ(bushd_decode_tables(reply->payload.data(), reply->payload.size(), &told), BUSHD_OK);
+    }
+    return told;
+  }
+
+  std::size_t valid_tables() {
+    const bushd_tables told = tables();
+    return static_cast<std::size_t>(
+        std::count_if(std::begin(told.slot), std::end(told.slot), [](auto& t) { return t.valid; }));
+  }
+
+  bushd_status invert(std::uint8_t system_inputs) {
+    bushd_set_inputs inputs{};
+    inputs.system_inverted = system_inputs;
+    return master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs);
+  }
+};
+
+TEST_F(AvrKept, TablesAndSettingsOutliveAReset) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  master_.patience_ns = 20'000'000;  // its CRC takes a while
+  ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp(2000, 900), 1100));
+  ASSERT_EQ(invert(BUSHD_INPUT_FORWARD), BUSHD_OK);
+  const bushd_tables before = tables();
+  pass(9'000'000'000);
+  reboot();
+  const bushd_tables after = tables();
+  for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
+    EXPECT_EQ(after.slot[slot].valid, slot == 0 || slot == 5);
+    EXPECT_EQ(after.slot[slot].crc, before.slot[slot].crc);
+    EXPECT_EQ(after.slot[slot].revision, before.slot[slot].revision);
+  }
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, 0);
+  EXPECT_EQ(report.system_inputs, BUSHD_INPUT_FORWARD);
+
+  // And they move motors.
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 7, 0));
+  run(7, 50);
+  pass(200 * TimeNs{kTickNs});
+  EXPECT_EQ(steps_made(7), 50u);
+}
+
+TEST_F(AvrKept, WhatIsTheSameIsNotWrittenAgain) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(3'000'000'000);
+  const std::uint64_t written = avr_->eeprom_writes();
+  EXPECT_GT(written, 20u);
+  pass(3'000'000'000);
+  EXPECT_EQ(avr_->eeprom_writes(), written);
+  reboot();
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(3'000'000'000);
+  EXPECT_EQ(avr_->eeprom_writes(), written);
+}
+
+TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
+  constexpr std::uint32_t kShortTickNs = 1'250'000;
+  Random random(4, 0);
+  int whole = 0;
+  int broken = 0;
+  std::uint32_t kept_crc = 0;
+  for (std::uint16_t cut = 0; cut < 8; ++cut) {
+    SCOPED_TRACE("cut " + std::to_string(cut));
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kShortTickNs, BUSHD_FORMAT_FINE));
+    const auto first = static_cast<std::uint16_t>(1000 + cut);
+    ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, ramp(first, 100), 800));
+    const std::uint32_t sent_crc = tables().slot[0].crc;
+    // Before, while or after its 200 bytes and a few more are written.
+    pass(500'000'000 + static_cast<TimeNs>(random.below(1200)) * 1'000'000);
+    reboot();
+    const bushd_report report = master_.poll(kAddress);
+    const bushd_tables found = tables();
+    if (report.faults == 0 && found.slot[0].valid) {
+      ++whole;
+      EXPECT_TRUE(found.slot[0].crc == sent_crc || found.slot[0].crc == kept_crc);
+      kept_crc = found.slot[0].crc;
+    } else if (report.faults != 0) {
+      ++broken;
+      EXPECT_EQ(report.faults, BUSHD_FAULT_EEPROM);
+      EXPECT_EQ(report.failed_tests, BUSHD_TEST_EEPROM);
+      EXPECT_EQ(valid_tables(), 0u);
+      EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
+                                     bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
+                BUSHD_OK);
+    } else {
+      EXPECT_EQ(kept_crc, 0u) << "what was kept is gone";
+    }
+  }
+  EXPECT_GE(whole, 2);
+  EXPECT_GE(broken, 2);
+}
+
+TEST_F(AvrKept, ABitThatHasFlippedIsAFault) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(3'000'000'000);
+  avr_->flip_eeprom_bit(kContentAt + 30, 2);
+  reboot();
+  EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM);
+  EXPECT_EQ(valid_tables(), 0u);
+  // It is mended when there is something to keep again.
+  ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
+                                 bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
+            BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(5'000'000'000);
+  reboot();
+  EXPECT_EQ(master_.poll(kAddress).faults, 0);
+  EXPECT_EQ(valid_tables(), 1u);
+}
+
+TEST_F(AvrKept, NothingIsWrittenWhileAMotorMoves) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  while (avr_->eeprom_writes() < 10) pass(20'000'000);
+  run(3, 400);
+  pass(40 * TimeNs{kTickNs});
+  ASSERT_EQ(master_.poll(kAddress).state, BUSHD_STATE_RUN);
+  const std::uint64_t written = avr_->eeprom_writes();
+  while (master_.poll(kAddress).state == BUSHD_STATE_RUN) {
+    EXPECT_LE(avr_->eeprom_writes(), written + 1);
+    pass(20 * TimeNs{kTickNs});
+  }
+  EXPECT_EQ(steps_made(3), 400u);
+  pass(3'000'000'000);
+  reboot();
+  EXPECT_EQ(valid_tables(), 1u);
+}
+
+}  // namespace
+}  // namespace bushd::sim
