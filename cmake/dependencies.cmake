@@ -31,6 +31,9 @@ if(BUSHD_TESTS)
   # with it is for trying only, not for giving away under another licence.
   pkg_check_modules(SIMAVR IMPORTED_TARGET simavr)
   find_program(AVR_GCC avr-gcc)
+  # The same for LM3S6965.
+  find_program(ARM_GCC arm-none-eabi-gcc)
+  find_program(QEMU_SYSTEM_ARM qemu-system-arm)
 endif()
 if(BUSHD_BENCHMARKS)
   find_package(benchmark REQUIRED)

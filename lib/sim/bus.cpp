@@ -29,7 +29,6 @@ std::size_t Bus::add_mcu(const MakeMcu& make) {
   deaf_until_ns_.push_back(0);
   Mcu::Driver& driver = *this;  // here, where the private base is known
   mcus_.push_back(make(index, driver, sink_));
-  if (!mcus_.back()->announces_answers()) stride_ns_ = kBitsPerByte * 1'000'000'000 / 2 / baud_;
   return index;
 }
 
@@ -50,6 +49,12 @@ TimeNs Bus::next_event_ns() const {
   TimeNs next_ns = line_.next_end_ns();
   for (const auto& mcu : mcus_) next_ns = std::min(next_ns, mcu->next_event_ns());
   return next_ns;
+}
+
+// Half a byte: none that an unforeseen answer begins with within a stride can end in it.
+TimeNs Bus::stride_end_ns() const {
+  const bool free = std::ranges::none_of(mcus_, [](const auto& mcu) { return mcu->may_speak(); });
+  return free ? kNever : now_ns_ + kBitsPerByte * 1'000'000'000 / 2 / baud_;
 }
 
 // Ticks of different MCUs touch nothing in common, so that only those of one MCU need be in order.
@@ -88,9 +93,7 @@ void Bus::advance_to(TimeNs t_ns) {
   assert(t_ns >= now_ns_);
   for (;;) {
     const TimeNs end_ns = line_.next_end_ns();
-    // Half a byte: none that an unforeseen answer begins with within a stride can end in it.
-    const TimeNs stride_end_ns = stride_ns_ == kNever ? kNever : now_ns_ + stride_ns_;
-    const TimeNs until_ns = std::min({end_ns, t_ns, stride_end_ns});
+    const TimeNs until_ns = std::min({end_ns, t_ns, stride_end_ns()});
     while (sink_ != nullptr && next_settling_ns_ < until_ns) settle(next_settling_ns_);
     run_ticks_until(until_ns);
     now_ns_ = until_ns;

@@ -84,6 +84,7 @@ class Bus : private Mcu::Driver {
   void transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire,
                 std::size_t size) override;
   std::uint8_t talker_address(std::size_t talker) const;
+  TimeNs stride_end_ns() const;
   void run_ticks_until(TimeNs t_ns);
   void deliver(const LineByte& byte);
   void settle(TimeNs t_ns);
@@ -92,7 +93,6 @@ class Bus : private Mcu::Driver {
   EdgeSink* sink_;
   Line line_;
   std::vector<std::unique_ptr<Mcu>> mcus_;
-  TimeNs stride_ns_ = kNever;          // time moves on by this much at most
   std::vector<TimeNs> deaf_until_ns_;  // by MCU
   TimeNs now_ns_ = 0;
   TimeNs next_settling_ns_ = 0;

@@ -37,9 +37,9 @@ class Mcu {
 
   // When it next does something by itself.
   virtual TimeNs next_event_ns() const = 0;
-  // Does it speak in answer to a byte only, at a time that it gives at once? If not, it may begin
-  // at any time, and time moves on in steps of a byte.
-  virtual bool announces_answers() const { return true; }
+  // May it now begin to speak at any time? If not, it does so in answer to a byte only, at a time
+  // that it gives at once. While one may, time moves on in steps of a byte.
+  virtual bool may_speak() const { return false; }
 
   // Everything up to now_ns (included) happens. Precondition: it is not before the last time given.
   virtual void advance(TimeNs now_ns) = 0;

@@ -45,7 +45,7 @@ class AvrMcu final : public Mcu {
   void set_current(std::uint16_t reading) override;
 
   TimeNs next_event_ns() const override;
-  bool announces_answers() const override { return false; }
+  bool may_speak() const override { return true; }
   void advance(TimeNs now_ns) override;
   void receive(std::uint8_t byte, TimeNs now_ns) override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override;

@@ -5,6 +5,9 @@
 #ifdef AVR_IMAGES
 #include "sim_avr/avr_mcu.h"
 #endif
+#ifdef LM3S_IMAGES
+#include "sim_qemu/qemu_mcu.h"
+#endif
 
 namespace bushd::sim {
 namespace {
@@ -42,6 +45,37 @@ class Atmega2560 final : public McuUnderTest {
 };
 #endif
 
+#ifdef LM3S_IMAGES
+class Lm3s6965 final : public McuUnderTest {
+ public:
+  McuOptions twin() const override {
+    return {.slots = 128, .queue_ticks = 512, .code_count = 12288};
+  }
+  std::uint16_t capabilities() const override {
+    return BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_RUN | BUSHD_CAN_TABLE_TICKS;
+  }
+  std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }
+  std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
+                            EdgeSink* sink) override {
+    QemuOptions options;
+    options.image = LM3S_IMAGES "-500000.elf";
+    options.address = birth.address;
+    options.unique_id = birth.unique_id;
+    options.boots = birth.boots;
+    auto mcu = std::make_unique<QemuMcu>(options, index, driver, sink);
+    qemu_ = mcu.get();
+    return mcu;
+  }
+  void expect_unharmed() const override {
+    EXPECT_EQ(qemu_->overruns(), 0u);
+    EXPECT_EQ(qemu_->bytes_cut(), 0u);
+  }
+
+ private:
+  const QemuMcu* qemu_ = nullptr;
+};
+#endif
+
 template <class Kind>
 Target target(const char* name) {
   return {name, [] { return std::make_unique<Kind>(); }};
@@ -53,6 +87,9 @@ std::vector<Target> targets() {
   return {
 #ifdef AVR_IMAGES
       target<Atmega2560>("Atmega2560"),
+#endif
+#ifdef LM3S_IMAGES
+      target<Lm3s6965>("Lm3s6965"),
 #endif
   };
 }

@@ -56,8 +56,8 @@ int run(int argc, char** argv) {
       ->excludes("--trace");
   std::vector<std::string> mcus;
   app.add_option("--mcu", mcus,
-                 "What an MCU is, ADDRESS=KIND: virtual (the default), or atmega2560:IMAGE.elf, "
-                 "which runs in simavr. Several times for several")
+                 "What an MCU is, ADDRESS=KIND: virtual (the default), atmega2560:IMAGE.elf, which "
+                 "runs in simavr, or lm3s6965:IMAGE.elf, in QEMU. Several times for several")
       ->allow_extra_args(false);
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")

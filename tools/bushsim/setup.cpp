@@ -34,8 +34,28 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
   return fail({.message = fmt::format("has no bus \"{}\"; {}", bus, choice), .file = config_path});
 }
 
+namespace {
+
+// The package that this bushsim would have needed; empty if it can run the chip's images.
+Result<std::string> missing_for(const std::string& chip) {
+  if (chip == "atmega2560") {
+#ifndef BUSHSIM_AVR
+    return "simavr (libsimavr-dev, libelf-dev)";
+#endif
+    return "";
+  }
+  if (chip == "lm3s6965") {
+#ifndef BUSHSIM_QEMU
+    return "QEMU (qemu-system-arm)";
+#endif
+    return "";
+  }
+  return fail("is neither virtual nor atmega2560:IMAGE.elf nor lm3s6965:IMAGE.elf");
+}
+
+}  // namespace
+
 Result<Images> parse_images(const std::vector<std::string>& choices, const Setup& setup) {
-  const std::string kAvr = "atmega2560:";
   Images images;
   for (const std::string& choice : choices) {
     const auto fault = [&choice](const std::string& what) {
@@ -46,19 +66,20 @@ Result<Images> parse_images(const std::vector<std::string>& choices, const Setup
     std::uint8_t address = 0;
     const auto [end, error] = std::from_chars(choice.data(), address_end, address);
     if (equals == std::string::npos || error != std::errc{} || end != address_end) {
-      return fault("must be ADDRESS=virtual or ADDRESS=atmega2560:IMAGE.elf");
+      return fault("must be ADDRESS=virtual or ADDRESS=CHIP:IMAGE.elf");
     }
     if (std::ranges::find(setup.addresses, address) == setup.addresses.end()) {
       return fault(fmt::format("bus \"{}\" has no MCU of this address", setup.bus));
     }
     const std::string kind = choice.substr(equals + 1);
     if (kind == "virtual") continue;
-    if (!kind.starts_with(kAvr)) return fault("is neither virtual nor atmega2560:IMAGE.elf");
-#ifndef BUSHSIM_AVR
-    return fault("this bushsim was built without simavr (libsimavr-dev, libelf-dev)");
-#endif
-    images[address] = kind.substr(kAvr.size());
-    if (!std::filesystem::exists(images[address])) return fault("there is no such file");
+    const std::size_t colon = std::min(kind.find(':'), kind.size());
+    const Image image{kind.substr(0, colon), kind.substr(std::min(colon + 1, kind.size()))};
+    const auto missing = missing_for(image.chip);
+    if (!missing) return fault(missing.error().message);
+    if (!missing->empty()) return fault("this bushsim was built without " + *missing);
+    if (!std::filesystem::exists(image.path)) return fault("there is no such file");
+    images[address] = image;
   }
   return images;
 }

@@ -19,8 +19,12 @@ struct Setup {
 // `bus` may be empty if the configuration has one bus only.
 bushd::Result<Setup> load_setup(const std::string& config_path, const std::string& bus);
 
-// What runs the firmware of an MCU that is not virtual: the path of its image, by address.
-using Images = std::map<std::uint8_t, std::string>;
+// What runs the firmware of an MCU that is not virtual.
+struct Image {
+  std::string chip;  // atmega2560, lm3s6965
+  std::string path;
+};
+using Images = std::map<std::uint8_t, Image>;  // by address
 
 // From `2=atmega2560:PATH` and `1=virtual`, for addresses of the bus. Fails if this bushsim has no
 // simulator for an image.

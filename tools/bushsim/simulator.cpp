@@ -16,20 +16,25 @@
 #ifdef BUSHSIM_AVR
 #include "sim_avr/avr_mcu.h"
 #endif
+#ifdef BUSHSIM_QEMU
+#include "sim_qemu/qemu_mcu.h"
+#endif
 
 namespace bushsim {
 namespace {
 
 using bushd::fail;
 using bushd::Result;
+using bushd::sim::EdgeSink;
+using bushd::sim::Mcu;
 using bushd::sim::TimeNs;
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 // Simulated before anybody is told that the bus is there: all MCUs have booted by then. A real one
-// writes to its EEPROM meanwhile.
+// tests itself meanwhile.
 constexpr TimeNs kHeadStartNs = 20'000'000;
-constexpr TimeNs kRealHeadStartNs = 100'000'000;
+constexpr TimeNs kRealHeadStartNs = 250'000'000;
 // MCUs come out of reset one after the other, so that their ticks begin in different phases, as on
 // a real bus.
 constexpr TimeNs kBootSpacingNs = 617'000;
@@ -48,6 +53,28 @@ constexpr std::size_t kReadBytes = 4096;
 constexpr std::int64_t kBacklogBytes = 4096;
 
 constexpr std::uint64_t kCollisionsReported = 10;
+
+// Precondition: this bushsim can run the image (parse_images).
+std::unique_ptr<Mcu> make_mcu([[maybe_unused]] const Image& image,
+                              [[maybe_unused]] std::uint8_t address,
+                              [[maybe_unused]] std::uint16_t boots,
+                              [[maybe_unused]] std::size_t index,
+                              [[maybe_unused]] Mcu::Driver& driver,
+                              [[maybe_unused]] EdgeSink* sink) {
+#ifdef BUSHSIM_AVR
+  if (image.chip == "atmega2560") {
+    const bushd::sim::AvrOptions options{image.path, address, index + 1, boots};
+    return std::make_unique<bushd::sim::AvrMcu>(options, index, driver, sink);
+  }
+#endif
+#ifdef BUSHSIM_QEMU
+  if (image.chip == "lm3s6965") {
+    const bushd::sim::QemuOptions options{image.path, address, index + 1, boots};
+    return std::make_unique<bushd::sim::QemuMcu>(options, index, driver, sink);
+  }
+#endif
+  return nullptr;
+}
 
 }  // namespace
 
@@ -75,17 +102,10 @@ void Simulator::add_mcus(const Options& options) {
       boot_ns = (boot_ns + kBootSpacingNs) % kBootSpreadNs;
       continue;
     }
-#ifdef BUSHSIM_AVR
-    using namespace bushd::sim;
     bus_.add_mcu([&](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
-      AvrOptions avr;
-      avr.image = image->second;
-      avr.address = address;
-      avr.unique_id = index + 1;
-      avr.boots = static_cast<std::uint16_t>(options.boot_number - 1);
-      return std::make_unique<AvrMcu>(avr, index, driver, sink);
+      const auto boots = static_cast<std::uint16_t>(options.boot_number - 1);
+      return make_mcu(image->second, address, boots, index, driver, sink);
     });
-#endif
   }
 }
 

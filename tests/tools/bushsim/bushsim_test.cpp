@@ -220,6 +220,22 @@ TEST_F(Bushsim, McusThatItCannotMakeAreRefused) {
   EXPECT_FALSE(there(link));
 }
 
+#ifdef LM3S_IMAGE
+TEST_F(Bushsim, AnImageOfACortexMAnswersBesideAVirtualMcu) {
+  start_ready({"--mcu", std::string("2=lm3s6965:") + LM3S_IMAGE});
+  {
+    const Port port(link);
+    ASSERT_TRUE(port.identify(1));
+    const auto image = port.identify(2);
+    ASSERT_TRUE(image);
+    EXPECT_EQ(image->slots, 128);
+    EXPECT_EQ(image->queue_ticks, 512);
+  }
+  EXPECT_EQ(stop(), 0);
+  EXPECT_TRUE(bushd::sim::read_vcd(trace).wires.contains("mcu2.step15"));
+}
+#endif
+
 #ifdef AVR_IMAGE
 TEST_F(Bushsim, AnImageOfAnAtmegaAnswersBesideAVirtualMcu) {
   start_ready({"--mcu", "1=virtual", "--mcu", std::string("2=atmega2560:") + AVR_IMAGE});

@@ -1,0 +1,184 @@
+#include "firmware/ports/lm3s6965/emission.h"
+
+#include <stddef.h>
+
+#include "firmware/ports/lm3s6965/board.h"
+#include "firmware/ports/lm3s6965/clock.h"
+#include "firmware/ports/lm3s6965/interrupts.h"
+#include "firmware/ports/lm3s6965/timer.h"
+
+#define SLOT_TIMER TIMER(0)
+#define TICK_TIMER TIMER(1)
+// What the beginning of a tick and its last half slot may be late by, together.
+#define MARGIN_CYCLES 250u
+// What a timer is set to at least.
+#define SHORTEST_CYCLES 40
+// Of a tick without steps: from its only half slot, in which the next tick is taken, to its end.
+#define TAKE_CYCLES 500u
+
+typedef struct emission_tick {
+  const uint16_t* mask;  // of its slots
+  const uint16_t* end;
+  uint32_t half_slot;  // cycles
+  uint32_t cycles;
+  bool turns;  // DIR is to be latched
+} emission_tick;
+
+// What becomes of the plane that the core has prepared.
+typedef enum plane_state { PLANE_NONE, PLANE_WAITS, PLANE_TAKEN } plane_state;
+
+static const uint16_t kNoSteps[1];
+
+// Of the interrupts. The cursor is the next mask, plus 1 while its pulses last.
+static uintptr_t cursor;
+static uintptr_t end;
+static emission_tick present;
+static emission_tick silent;  // goes on when no plane is ready
+static uint32_t next_start;
+
+// Between them and the main loop.
+static emission_tick next;
+static volatile plane_state state;
+static volatile bool begun;
+static uint32_t begun_at;
+
+// Of the main loop.
+static const bushd_plane* plane;
+static uint16_t directions;  // as latched last
+static uint32_t core_start;  // of the core's present tick
+static uint32_t tick_ns;
+static int32_t adjust_ns;      // of the next tick
+static int32_t carry_ns;       // adjustments that came when the tick they were for had been taken
+static uint32_t rest_ns;       // of a cycle, not yet given
+static int32_t next_extra_ns;  // of `next`
+static uint32_t next_rest_ns;
+
+static inline void put_steps(uint32_t mask) {
+  STEP_LOW = mask & 0xFFu;
+  STEP_HIGH = mask >> 8;
+}
+
+// Pulses are over: DIR may change.
+static void take_next(void) {
+  timer_stop(SLOT_TIMER);
+  if (state == PLANE_WAITS) {
+    present = next;
+    state = PLANE_TAKEN;
+    if (present.turns) board_latch_directions();
+  } else {
+    present = silent;
+  }
+  const int32_t left = clock_since(next_start, clock_now());
+  timer_start(TICK_TIMER, TIMER_ONE_SHOT,
+              (uint32_t)(left > SHORTEST_CYCLES ? left : SHORTEST_CYCLES));
+}
+
+void emission_half_slot(void) {
+  TIMER_ICR(SLOT_TIMER) = 1;
+  const uintptr_t at = cursor;
+  cursor = at + 1;
+  if ((at & 1u) == 0) {
+    put_steps(*(const uint16_t*)at);
+  } else {
+    put_steps(0);
+    if (at + 1 == end) take_next();
+  }
+}
+
+void emission_tick_begins(void) {
+  put_steps(*present.mask);
+  timer_start(SLOT_TIMER, TIMER_PERIODIC, present.half_slot);
+  timer_stop(TICK_TIMER);
+  cursor = (uintptr_t)present.mask + 1;
+  end = (uintptr_t)present.end;
+  const uint32_t start = next_start;
+  next_start = start + present.cycles;
+  if (state == PLANE_TAKEN && !begun) {
+    begun_at = start;
+    begun = true;
+  }
+}
+
+static emission_tick tick_of(const bushd_plane* of, uint32_t cycles) {
+  const emission_tick tick = {.mask = of->step,
+                              .end = of->step + EMISSION_SLOTS,
+                              .half_slot = (cycles - MARGIN_CYCLES) / (2u * EMISSION_SLOTS),
+                              .cycles = cycles};
+  return tick;
+}
+
+// Of one slot: the time is left to the main loop.
+static emission_tick empty_tick(uint32_t cycles) {
+  const emission_tick tick = {
+      .mask = kNoSteps, .end = kNoSteps + 1, .half_slot = cycles - TAKE_CYCLES, .cycles = cycles};
+  return tick;
+}
+
+// `next` from the plane and what is known of its length, unless it has been taken.
+static void give(void) {
+  const int32_t extra_ns = adjust_ns + carry_ns;
+  const uint32_t length_ns = tick_ns + rest_ns + (uint32_t)extra_ns;
+  const uint32_t cycles = length_ns / CYCLE_NS;
+  emission_tick tick = plane->active != 0 ? tick_of(plane, cycles) : empty_tick(cycles);
+  tick.turns = plane->direction != directions;
+  interrupts_off();
+  if (state != PLANE_TAKEN) {
+    next = tick;
+    state = PLANE_WAITS;
+    next_extra_ns = extra_ns;
+    next_rest_ns = length_ns % CYCLE_NS;
+  }
+  interrupts_on();
+}
+
+void emission_start(void) {
+  timer_init(SLOT_TIMER);
+  timer_init(TICK_TIMER);
+  next_start = clock_now() + MARGIN_CYCLES;
+  core_start = next_start;
+  NVIC_ISER0 = 1u << IRQ_TIMER0A | 1u << IRQ_TIMER1A;
+  present = silent;
+  timer_start(TICK_TIMER, TIMER_ONE_SHOT, MARGIN_CYCLES);
+}
+
+void emission_ready(const bushd_plane* prepared) {
+  plane = prepared;
+  if (plane->direction != directions) board_shift_directions(plane->direction);
+  give();
+}
+
+bool emission_begun(uint32_t* start) {
+  if (!begun) return false;
+  *start = begun_at;  // does not change while `begun` is set
+  return true;
+}
+
+void emission_swap(void) {
+  core_start = begun_at;
+  directions = plane->direction;
+  rest_ns = next_rest_ns;
+  carry_ns += adjust_ns - next_extra_ns;
+  adjust_ns = 0;
+  interrupts_off();
+  state = PLANE_NONE;
+  begun = false;
+  interrupts_on();
+}
+
+uint32_t emission_time_in_tick_ns(uint32_t time) {
+  return (uint32_t)clock_since(time, core_start) * CYCLE_NS;
+}
+
+void emission_set_tick(uint32_t ns) {
+  tick_ns = ns;
+  const emission_tick tick = empty_tick(ns / CYCLE_NS);
+  interrupts_off();
+  silent = tick;
+  interrupts_on();
+  if (state == PLANE_WAITS) give();
+}
+
+void emission_adjust_tick(int32_t ns) {
+  adjust_ns = ns;
+  if (state == PLANE_WAITS) give();
+}

@@ -1,0 +1,141 @@
+// The MCU program on an LM3S6965: the core, its memory, and the main loop. Interrupts emit slots,
+// collect bytes with the times of delimiters, and send; the core runs in the main loop only.
+#include "firmware/ports/lm3s6965/board.h"
+#include "firmware/ports/lm3s6965/clock.h"
+#include "firmware/ports/lm3s6965/emission.h"
+#include "firmware/ports/lm3s6965/journal.h"
+#include "firmware/ports/lm3s6965/line.h"
+#include "firmware/ports/lm3s6965/timer.h"
+
+#define QUEUE_TICKS 512u
+#define TABLE_CODES 12288u
+
+static bushd_mcu mcu;
+static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
+static uint16_t codes[TABLE_CODES];
+static bool has_identity;
+// In memory that a watchdog reset leaves as it is.
+#define ENABLE_KEPT 0x5AC3E917u
+__attribute__((section(".kept"))) static uint32_t enable_kept;
+
+static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
+  (void)context;
+  line_transmit(wire, size, delay_ns);
+}
+
+static bool port_store_address(void* context, uint8_t address) {
+  (void)context;
+  return journal_store_address(address);
+}
+
+static void port_set_enable(void* context, bool on) {
+  (void)context;
+  ENABLE = on ? ALL_PINS : 0;
+}
+
+static void port_set_tick(void* context, uint32_t tick_ns) {
+  (void)context;
+  emission_set_tick(tick_ns);
+}
+
+static void port_adjust_tick(void* context, int32_t ns) {
+  (void)context;
+  emission_adjust_tick(ns);
+}
+
+static uint32_t port_time_in_tick_ns(void* context) {
+  (void)context;
+  return emission_time_in_tick_ns(clock_now());
+}
+
+// Switches close to ground.
+static bushd_inputs port_read_inputs(void* context) {
+  (void)context;
+  const bushd_inputs inputs = {
+      (uint16_t)~board_read_inputs(),
+      (uint8_t)(~SYSTEM_INPUTS >> SYSTEM_INPUTS_SHIFT & BUSHD_SYSTEM_INPUTS)};
+  return inputs;
+}
+
+static uint16_t port_read_current(void* context) {
+  (void)context;
+  return board_read_current();
+}
+
+static uint8_t port_self_test(void* context) {
+  (void)context;
+  return has_identity ? 0 : BUSHD_TEST_EEPROM;
+}
+
+static void port_keep_enable(void* context, bool on) {
+  (void)context;
+  enable_kept = on ? ENABLE_KEPT : 0;
+}
+
+// Of several flags the gravest counts.
+static bushd_reset_cause reset_cause(void) {
+  const uint32_t flags = SYSCTL_RESC;
+  SYSCTL_RESC = 0;
+  if (flags & RESC_POWER_ON) return BUSHD_RESET_POWER_ON;
+  if (flags & RESC_BROWN_OUT) return BUSHD_RESET_BROWN_OUT;
+  if (flags & RESC_EXTERNAL) return BUSHD_RESET_EXTERNAL;
+  return flags & RESC_WATCHDOG ? BUSHD_RESET_WATCHDOG : BUSHD_RESET_UNKNOWN;
+}
+
+static void boot(void) {
+  static const bushd_port kPort = {.transmit = port_transmit,
+                                   .store_address = port_store_address,
+                                   .set_enable = port_set_enable,
+                                   .set_tick = port_set_tick,
+                                   .adjust_tick = port_adjust_tick,
+                                   .time_in_tick_ns = port_time_in_tick_ns,
+                                   .read_inputs = port_read_inputs,
+                                   .read_current = port_read_current,
+                                   .self_test = port_self_test,
+                                   .keep_enable = port_keep_enable};
+  bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
+                             .slots = EMISSION_SLOTS,
+                             .min_tick_ns = EMISSION_MIN_TICK_NS,
+                             .queue = queue,
+                             .queue_ticks = QUEUE_TICKS,
+                             .codes = codes,
+                             .code_count = TABLE_CODES};
+  journal_state kept;
+  config.reset_cause = reset_cause();
+  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enable_kept == ENABLE_KEPT;
+  has_identity = journal_open(&kept);
+  config.address = kept.address;
+  config.boot_number = kept.boot_number;
+  for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = kept.unique_id[i];
+  bushd_mcu_boot(&mcu, &kPort, &config);
+}
+
+static void prepare(void) {
+  bushd_mcu_prepare(&mcu);
+  emission_ready(&mcu.plane[mcu.front ^ 1u]);
+}
+
+int main(void) {
+  board_init();
+  clock_init();
+  timer_measure_excess();
+  boot();
+  prepare();
+  line_init();
+  emission_start();
+  watchdog_start();
+  for (;;) {
+    uint32_t start = 0;
+    uint32_t time = 0;
+    uint8_t byte = 0;
+    // A frame that ended in the tick before must be heard by the core in that tick.
+    if (emission_begun(&start) && !line_has_frame_before(start)) {
+      emission_swap();
+      bushd_mcu_swap(&mcu);
+      prepare();
+      watchdog_reset();
+    } else if (line_take(&byte, &time)) {
+      bushd_mcu_receive(&mcu, byte, emission_time_in_tick_ns(time));
+    }
+  }
+}

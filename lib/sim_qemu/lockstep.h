@@ -1,0 +1,35 @@
+// What QemuMcu and the machine in QEMU's process (machine.c) say to each other over a socket. QEMU
+// stands still until it is told how far it may run, and says what happened on the way.
+#ifndef BUSHD_LIB_SIM_QEMU_LOCKSTEP_H
+#define BUSHD_LIB_SIM_QEMU_LOCKSTEP_H
+
+#include <stdint.h>
+
+typedef enum lockstep_command_kind {
+  LOCKSTEP_RUN = 1,     // until time_ns; answered by events, the last one LOCKSTEP_STOPPED
+  LOCKSTEP_BYTE = 2,    // value: its stop bit ends at time_ns, in the order of their times
+  LOCKSTEP_INPUTS = 3,  // value: levels of the motors' inputs; address: those of the system's
+  LOCKSTEP_FLASH = 4,   // value: the word at `address`, before the first RUN
+  LOCKSTEP_CURRENT = 5  // value: what its ADC reads
+} lockstep_command_kind;
+
+typedef enum lockstep_event_kind {
+  LOCKSTEP_STOPPED = 1,        // value: 1 if the timer of the line runs
+  LOCKSTEP_STEP = 2,           // value: level, address: motor
+  LOCKSTEP_DIRECTIONS = 3,     // value: levels of the 74HC595's outputs, bit per motor
+  LOCKSTEP_ENABLE = 4,         // value: level
+  LOCKSTEP_DRIVER_ENABLE = 5,  // value: level; address: 1 if the UART is sending
+  LOCKSTEP_SENT = 6,           // value: a byte that its UART took at this time
+  LOCKSTEP_OVERRUN = 7,        // a byte was lost in its UART
+  LOCKSTEP_STORED = 8          // value: the flash word at `address` is this now
+} lockstep_event_kind;
+
+typedef struct lockstep_message {
+  int64_t time_ns;  // since its first instruction
+  uint32_t kind;
+  uint32_t value;
+  uint32_t address;
+  uint32_t unused;
+} lockstep_message;
+
+#endif
