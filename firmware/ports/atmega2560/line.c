@@ -1,6 +1,7 @@
 #include "firmware/ports/atmega2560/line.h"
 
 #include <avr/interrupt.h>
+#include <util/atomic.h>
 
 #include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/clock.h"
@@ -99,5 +100,8 @@ void line_transmit(const uint8_t* wire, size_t size, uint32_t delay_ns) {
   line_sending_end = (uint8_t)(uintptr_t)(wire + size);
   const uint32_t now = clock_now();
   cycles_to_wait = clock_before(now + SHORTEST_CYCLES, due) ? due - now : SHORTEST_CYCLES;
-  wait_from(TCNT3);
+  // A compare that was passed meanwhile would come a turn of the timer later.
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    wait_from(TCNT3);
+  }
 }
