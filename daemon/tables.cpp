@@ -162,6 +162,7 @@ std::string Core::misfit(const std::vector<TableChange::Part>& parts) const {
 
 link::McuSetup Core::setup_of(const Mcu& mcu, const std::vector<InService>& service) const {
   link::McuSetup setup{.address = mcu.config->address.value, .tables = {}};
+  setup.emission = mcu.config->emission;
   setup.table_of_motor.fill(-1);
   for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
     const int motor = mcu.motor_of[output];

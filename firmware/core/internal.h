@@ -84,6 +84,19 @@ bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* messag
 void bushd_mcu_report_inputs(const bushd_mcu* mcu, bushd_report* report);
 void bushd_mcu_clear_faults(bushd_mcu* mcu);  // whose cause is gone
 void bushd_mcu_set_enable(bushd_mcu* mcu, bool on);
+// emission.c: how steps get to the pins.
+bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* message);
+void bushd_mcu_default_emission(bushd_mcu* mcu);
+void bushd_mcu_restore_emission(bushd_mcu* mcu);
+bool bushd_mcu_has_output(const bushd_mcu* mcu, uint8_t motor);
+// Whether each step keeps the slot of its own time; if not, `shape` makes the masks from the
+// counts.
+static inline bool bushd_mcu_steps_keep_slots(const bushd_mcu* mcu) {
+  return mcu->emission.grid.mode == BUSHD_EMISSION_EVEN ||
+         mcu->emission.grid.mode == BUSHD_EMISSION_PHASES;
+}
+// The plane is complete but for what the emission makes of it.
+void bushd_mcu_shape(bushd_mcu* mcu, bushd_plane* plane);
 
 // tables.c: table memory.
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);

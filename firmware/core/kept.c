@@ -7,7 +7,7 @@ static bushd_mcu_piece piece_of(void* at, size_t size) {
 }
 
 bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
-  enum { TICK, FORMAT, INPUTS, TABLES, CODES_USED, CODES, MOTORS };
+  enum { TICK, FORMAT, INPUTS, EMISSION, TABLES, CODES_USED, CODES, MOTORS };
   switch (index) {
     case TICK:
       return piece_of(&mcu->tick_ns, sizeof mcu->tick_ns);
@@ -15,6 +15,8 @@ bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
       return piece_of(&mcu->format, sizeof mcu->format);
     case INPUTS:
       return piece_of(&mcu->inputs, sizeof mcu->inputs);
+    case EMISSION:
+      return piece_of(&mcu->emission.settings, sizeof mcu->emission.settings);
     case TABLES:
       return piece_of(mcu->table, sizeof mcu->table);
     case CODES_USED:
@@ -32,5 +34,6 @@ bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
 void bushd_mcu_restored(bushd_mcu* mcu) {
   const bushd_set_inputs inputs = mcu->inputs;
   bushd_mcu_set_inputs(mcu, &inputs);
+  bushd_mcu_restore_emission(mcu);
   mcu->port.set_tick(mcu->port.context, mcu->tick_ns);
 }

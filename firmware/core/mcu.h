@@ -15,6 +15,7 @@
 #ifndef BUSHD_FIRMWARE_CORE_MCU_H
 #define BUSHD_FIRMWARE_CORE_MCU_H
 
+#include "engine/emission.h"
 #include "engine/frame.h"
 #include "engine/message.h"
 #include "engine/run.h"
@@ -30,10 +31,22 @@ extern "C" {
 #define BUSHD_FIRMWARE_VERSION 2u
 #define BUSHD_BOOT_TICK_NS 2560000u  // tick length until the host configures one
 
+// What the masks of a plane are.
+typedef enum bushd_outputs {
+  BUSHD_OUTPUTS_PULSES = 0,
+  // Pulses, and the common DIR is low in even slots and high in odd ones. It changes when the
+  // pulses of a slot are over; after the last one, and in planes without steps, it is low.
+  BUSHD_OUTPUTS_COMMON_DIR = 1,
+  // Levels, from the slot's beginning until others follow. A plane without steps has those of its
+  // first slot only.
+  BUSHD_OUTPUTS_LEVELS = 2
+} bushd_outputs;
+
 // What is emitted during one tick.
 typedef struct bushd_plane {
   uint16_t direction;                   // DIR levels, bit per motor, constant within the tick
   uint16_t step[BUSHD_MAX_SLOTS];       // STEP pulses of each slot, bit per motor
+  uint8_t outputs;                      // bushd_outputs
   int16_t steps[BUSHD_MOTORS_PER_MCU];  // signed steps of the tick, for the position counters
   uint16_t active;                      // motors with a step in this tick
 } bushd_plane;
@@ -50,6 +63,7 @@ typedef struct bushd_mcu_config {
   uint16_t
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint32_t min_tick_ns;  // shorter ones are refused
+  uint32_t pulse_ns;     // how long STEP pulses last; 0: half a slot
   uint16_t lacks;        // BUSHD_CAN_* that it is too slow for: the identity does not show them
   uint16_t* codes;       // table memory
   uint16_t code_count;
@@ -127,6 +141,17 @@ typedef struct bushd_mcu_clock {
   uint16_t two_masters_ticks;  // until the flag falls
 } bushd_mcu_clock;
 
+// How steps get to the pins (emission.c).
+typedef struct bushd_mcu_emission {
+  bushd_emission settings;
+  bushd_emission_grid grid;
+  bool plain;       // even, and DIR needs no setup time
+  uint8_t outputs;  // bushd_outputs
+  // Of up to four motors driven by phases.
+  uint8_t phase[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];
+  uint8_t on_ticks[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];  // its windings, after a move
+} bushd_mcu_emission;
+
 // Read-only for ports and tests; everything in here is the core's.
 typedef struct bushd_mcu {
   bushd_port port;
@@ -161,6 +186,7 @@ typedef struct bushd_mcu {
   uint16_t hit_negative;
   bushd_run_tick run_tick;  // for the runs' latest time unit
   bushd_mcu_clock clock;
+  bushd_mcu_emission emission;
   bushd_plane plane[2];
   bushd_slots plans[BUSHD_MOTORS_PER_MCU];  // of the plane that is being prepared
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];

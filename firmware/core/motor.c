@@ -82,6 +82,7 @@ static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   motor->displacement = (uint16_t)(displacement < 0 ? -displacement : displacement);
 }
 
+// Sets `bit` in the masks of its steps, or none if the emission decides where they lie.
 static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, uint16_t* masks) {
   bushd_run* run = &motor->run;
   set_direction(mcu, bit, run->direction > 0);
@@ -90,7 +91,8 @@ static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, 
   if (mcu->run_tick.tick_ns != mcu->tick_ns || mcu->run_tick.unit_ns != unit_ns) {
     mcu->run_tick = bushd_run_tick_of(mcu->tick_ns, unit_ns);
   }
-  const int16_t steps = bushd_run_slots(run, &mcu->run_tick, mcu->config.slots, bit, masks);
+  const uint16_t mark = bushd_mcu_steps_keep_slots(mcu) ? bit : 0;
+  const int16_t steps = bushd_run_slots(run, &mcu->run_tick, mcu->config.slots, mark, masks);
   // As ticks of the format would leave it, so that they can go on from here.
   motor->remainder =
       mcu->format == BUSHD_FORMAT_FINE ? (int16_t)(run->fraction * run->direction) : (int16_t)0;
@@ -173,13 +175,17 @@ static uint16_t plan_all(bushd_mcu* mcu, bushd_plane* plane) {
 
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane) {
   uint16_t exact = plan_all(mcu, plane);
-  bushd_slots_fill(plane->step, mcu->config.slots, mcu->plans, mcu->config.motors);
+  if (bushd_mcu_steps_keep_slots(mcu)) {
+    bushd_slots_fill(plane->step, mcu->config.slots, mcu->plans, mcu->config.motors);
+  }
   for (uint8_t m = 0; exact != 0; ++m, exact = (uint16_t)(exact >> 1)) {
     if ((exact & 1u) == 0) continue;
     plane->steps[m] = emit_exact(mcu, &mcu->motor[m], motor_bit(m), plane->step);
     if (plane->steps[m] != 0) plane->active |= motor_bit(m);
   }
   plane->direction = mcu->direction;
+  plane->outputs = mcu->emission.outputs;
+  if (!mcu->emission.plain) bushd_mcu_shape(mcu, plane);
 }
 
 // When a run from rest is over, in ticks; false if that is farther than tick numbers reach.

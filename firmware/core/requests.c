@@ -75,8 +75,9 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   identity.slots = mcu->config.slots;
   identity.queue_ticks = mcu->config.queue_ticks;
   identity.table_codes = mcu->config.code_count;
-  const uint16_t all =
-      BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN;
+  const uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS |
+                       BUSHD_CAN_TABLE_RUN | BUSHD_CAN_BURST | BUSHD_CAN_COMMON_DIR |
+                       BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES;
   identity.capabilities = (uint16_t)(all & ~mcu->config.lacks);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
   return bushd_encode_identity(&identity, payload);
@@ -92,10 +93,11 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
   mcu->tick_ns = message->tick_ns;
   mcu->format = message->format;
   // Another tick length is another time: the MCU must be told the bus's tick again, and its tables
-  // be checked against it again.
+  // and its emission be checked against it again.
   mcu->flags =
       (uint8_t)((mcu->flags | BUSHD_FLAG_CONFIGURED) & ~(BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK));
   bushd_mcu_new_tick_length(mcu);
+  bushd_mcu_default_emission(mcu);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     mcu->motor[m].table = -1;
     mcu->motor[m].remainder = 0;
@@ -247,6 +249,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, uint32_t ti
       HANDLE(set_position, set_position);
     case BUSHD_MSG_INPUTS:
       HANDLE(set_inputs, bushd_mcu_set_inputs);
+    case BUSHD_MSG_EMISSION:
+      HANDLE(emission, bushd_mcu_take_emission);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:

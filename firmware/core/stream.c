@@ -185,12 +185,20 @@ static void close_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
   if (stretch->flags & BUSHD_TICKS_REPLACE) mcu->epoch = stretch->epoch;
 }
 
-static bool in_range(const bushd_ticks* ticks) {
+// More steps would not find room in a tick.
+static bool in_range(const bushd_mcu* mcu, const bushd_ticks* ticks) {
   const uint16_t size = (uint16_t)(ticks->motors * ticks->count);
+  const uint8_t most = mcu->emission.grid.max_steps;
+  if ((ticks->flags & BUSHD_TICKS_FINE) == 0) {
+    if (most == BUSHD_MAX_STEPS_PER_TICK) return true;
+    for (uint16_t i = 0; i < size; ++i) {
+      if ((ticks->displacements[i] & 0x7F) > most) return false;
+    }
+    return true;
+  }
+  const int16_t limit = (int16_t)(most * 256);
   for (uint16_t i = 0; i < size; ++i) {
     const int16_t displacement = bushd_get_i16(ticks->displacements + 2u * i);
-    // More would put two steps into one slot.
-    const int16_t limit = BUSHD_MAX_STEPS_PER_TICK * 256;
     if (displacement > limit || displacement < -limit) return false;
   }
   return true;
@@ -244,9 +252,7 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
   const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
   const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
   if (status != BUSHD_OK) return status;
-  if (fine != (mcu->format == BUSHD_FORMAT_FINE) || (fine && !in_range(ticks))) {
-    return BUSHD_E_FORMAT;
-  }
+  if (fine != (mcu->format == BUSHD_FORMAT_FINE) || !in_range(mcu, ticks)) return BUSHD_E_FORMAT;
   if (bushd_mcu_starts_into_limit(mcu, ticks)) return BUSHD_E_FORBIDDEN;
   uint8_t column = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {

@@ -21,7 +21,6 @@
 #include "firmware/core/internal.h"
 
 #define MAX_ERROR_DIVISOR 2
-#define MAX_SLEW_DIVISOR 64
 #define MARK_NOISE_NS 5000
 #define NOISE_GAIN_DIVISOR 4
 #define MAX_RATE_PPB 500000
@@ -191,7 +190,7 @@ void bushd_mcu_slew(bushd_mcu* mcu) {
   clock->rate_now_ns = clock->rate_next_ns;
   clock->rate_next_ns = rate_share_ns(clock);
   const int32_t rate_ns = clock->rate_next_ns < 0 ? -clock->rate_next_ns : clock->rate_next_ns;
-  const int32_t limit_ns = (int32_t)(mcu->tick_ns / MAX_SLEW_DIVISOR) - rate_ns;
+  const int32_t limit_ns = (int32_t)(mcu->tick_ns / BUSHD_TICK_SLEW_DIVISOR) - rate_ns;
   const int32_t step_ns = clock->behind_ns > limit_ns    ? limit_ns
                           : clock->behind_ns < -limit_ns ? -limit_ns
                                                          : clock->behind_ns;

@@ -73,11 +73,11 @@ bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message)
 }
 
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
-  if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
+  if (!bushd_mcu_has_output(mcu, message->motor)) return BUSHD_E_FORMAT;
   if (bushd_mcu_moving(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
   const bushd_mcu_table* entry = &mcu->table[message->slot];
   if (!entry->valid || (mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
-  if (bushd_table_max_steps_per_tick(&entry->table, mcu->tick_ns) > BUSHD_MAX_STEPS_PER_TICK) {
+  if (bushd_table_max_steps_per_tick(&entry->table, mcu->tick_ns) > mcu->emission.grid.max_steps) {
     return BUSHD_E_CAPACITY;
   }
   mcu->motor[message->motor].table = (int8_t)message->slot;

@@ -30,6 +30,28 @@ Result<void> check_populated(const Loading& loading, std::size_t index) {
                           name, name)));
 }
 
+// T_step of its MCU leaves room for fewer steps than a tick has; slots may take another one away,
+// which only the MCU can say.
+Result<void> check_step_period(const Loading& loading, std::size_t index) {
+  const Config& config = loading.config;
+  const Motor& motor = config.motors[index];
+  const Mcu& mcu = config.mcu_of(motor);
+  const Bus& bus = config.bus_of(motor);
+  if (mcu.emission.settings.step_us == 0) return {};
+  const std::uint32_t room = bus.tick_us / mcu.emission.settings.step_us;
+  const bushd_table& view = config.table_of(motor).view();
+  const std::uint32_t steps = bushd_table_max_steps_per_tick(&view, bus.tick_ns());
+  if (steps <= room) return {};
+  Error error = mcu.emission.step_at;
+  error.message = fmt::format(
+      "is {}: room for {} steps in the {} us tick of bus \"{}\", but motor \"{}\" makes up to {} "
+      "by "
+      "table \"{}\"; allowed: {} or less. Or use a slower table",
+      mcu.emission.settings.step_us, room, bus.tick_us, bus.name, motor.name, steps,
+      config.table_of(motor).name(), bus.tick_us / steps);
+  return fail(std::move(error));
+}
+
 Result<void> check_speed(const Loading& loading, std::size_t index) {
   const Config& config = loading.config;
   const Motor& motor = config.motors[index];
@@ -128,6 +150,7 @@ Result<void> check_together(const Loading& loading) {
   }
   for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {
     if (auto checked = check_speed(loading, i); !checked) return checked;
+    if (auto checked = check_step_period(loading, i); !checked) return checked;
   }
   if (auto checked = check_table_slots(loading); !checked) return checked;
   for (std::size_t i = 0; i < loading.config.buses.size(); ++i) {

@@ -14,6 +14,7 @@
 
 #include "base/result.h"
 #include "engine/message.h"
+#include "link/emission_setup.h"
 #include "tables/table.h"
 
 namespace bushd::config {
@@ -63,6 +64,7 @@ struct Mcu {
   BusIndex bus;
   McuAddress address;
   std::string id;  // "hall:1"
+  link::EmissionSetup emission{};
 };
 
 struct Group {

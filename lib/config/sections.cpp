@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "config/checks.h"
+#include "config/emission_section.h"
 #include "config/port_pattern.h"
 #include "tables/table_file.h"
 
@@ -240,7 +241,11 @@ Result<void> read_buses(Loading* loading) {
 Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
   Taken ids;
   for (const TomlReader& reader : readers) {
-    if (auto known = reader.only({"bus", "address"}); !known) return known;
+    if (auto known = reader.only({"bus", "address", "emission", "step_us", "settle_us",
+                                  "dir_setup_us", "pulse_us", "phase_sequence", "hold_current"});
+        !known) {
+      return known;
+    }
     const auto bus = resolve<BusIndex>(reader, "bus", config->buses, &Bus::name);
     if (!bus) return fail(bus.error());
     const auto address = reader.integer("address", 1, 255);
@@ -248,6 +253,9 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     Mcu mcu{.bus = *bus,
             .address = {static_cast<std::uint8_t>(*address)},
             .id = fmt::format("{}:{}", config->buses[bus->value].name, *address)};
+    auto emission = read_emission(reader);
+    if (!emission) return fail(emission.error());
+    mcu.emission = std::move(*emission);
     const std::string what =
         fmt::format("address {} of bus \"{}\"", *address, config->buses[bus->value].name);
     if (auto taken = ids.take(reader, "address", mcu.id, what); !taken) return taken;
@@ -301,6 +309,16 @@ Result<void> read_groups(Loading* loading) {
   return {};
 }
 
+// Four outputs of the MCU are one motor.
+Result<void> check_phase_output(const TomlReader& reader, const Mcu& mcu, std::int64_t output) {
+  constexpr std::int64_t kLast = BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS - 1;
+  if (mcu.emission.settings.mode != BUSHD_EMISSION_PHASES || output <= kLast) return {};
+  return fail(reader.error(
+      "output", fmt::format("is {}; allowed: 0..{} on MCU \"{}\", where phases take {} outputs a "
+                            "motor",
+                            output, kLast, mcu.id, BUSHD_PHASE_OUTPUTS)));
+}
+
 Result<void> read_motors(Loading* loading) {
   Config& config = loading->config;
   Taken names;
@@ -314,6 +332,8 @@ Result<void> read_motors(Loading* loading) {
     if (!mcu) return fail(mcu.error());
     const auto output = reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
     if (!output) return fail(output.error());
+    if (auto room = check_phase_output(reader, config.mcus[mcu->value], *output); !room)
+      return room;
     const std::string& id = config.mcus[mcu->value].id;
     const std::string what = fmt::format("output {} of MCU \"{}\"", *output, id);
     if (auto taken = outputs.take(reader, "output", what, what); !taken) return taken;

@@ -109,6 +109,36 @@ bushd_status bushd_decode_configure(const uint8_t* payload, size_t size, bushd_c
                         message->silence_ticks >= 1);
 }
 
+size_t bushd_encode_emission(const bushd_emission* message, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, message->mode);
+  put8(&w, message->sequence);
+  put8(&w, message->hold_current ? 1 : 0);
+  put16(&w, message->step_us);
+  put16(&w, message->settle_us);
+  put16(&w, message->dir_setup_us);
+  put16(&w, message->pulse_us);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_emission(const uint8_t* payload, size_t size, bushd_emission* message) {
+  reader r = read_from(payload, size);
+  memset(message, 0, sizeof *message);  // two of them may be compared as memory
+  message->mode = get8(&r);
+  message->sequence = get8(&r);
+  const uint8_t hold_current = get8(&r);
+  message->hold_current = hold_current != 0;
+  message->step_us = get16(&r);
+  message->settle_us = get16(&r);
+  message->dir_setup_us = get16(&r);
+  message->pulse_us = get16(&r);
+  const bool has_period = message->mode >= BUSHD_EMISSION_BURST &&
+                          message->mode <= BUSHD_EMISSION_STAGGERED;
+  return finish(&r, message->mode <= BUSHD_EMISSION_PHASES &&
+                        message->sequence <= BUSHD_PHASES_THREE && hold_current <= 1 &&
+                        (!has_period || message->step_us >= 1));
+}
+
 size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* payload) {
   writer w = {payload};
   put8(&w, message->slot);

@@ -42,7 +42,8 @@ typedef enum bushd_type {
   BUSHD_MSG_EMERGENCY = 0x0E,     // bushd_emergency, no reply
   BUSHD_MSG_SET_ADDRESS = 0x0F,   // bushd_set_address, broadcast -> acknowledgement of the one MCU
   BUSHD_MSG_TABLES = 0x10,        // empty -> reply: bushd_tables
-  BUSHD_MSG_INPUTS = 0x11         // bushd_set_inputs -> acknowledgement
+  BUSHD_MSG_INPUTS = 0x11,        // bushd_set_inputs -> acknowledgement
+  BUSHD_MSG_EMISSION = 0x12       // bushd_emission -> acknowledgement
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its tag and the MCU's address.
 
@@ -117,7 +118,12 @@ enum {
   BUSHD_CAN_COARSE = 1 << 0,
   BUSHD_CAN_FINE = 1 << 1,
   BUSHD_CAN_TABLE_TICKS = 1 << 2,
-  BUSHD_CAN_TABLE_RUN = 1 << 3
+  BUSHD_CAN_TABLE_RUN = 1 << 3,
+  // Emission other than even.
+  BUSHD_CAN_BURST = 1 << 8,
+  BUSHD_CAN_COMMON_DIR = 1 << 9,
+  BUSHD_CAN_STAGGERED = 1 << 10,
+  BUSHD_CAN_PHASES = 1 << 11
 };
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
@@ -145,6 +151,34 @@ typedef struct bushd_configure {
   bushd_format format;
   uint16_t silence_ticks;  // >= 1: table runs are run down after as many without a good frame
 } bushd_configure;
+
+// How steps get to the pins (engine/emission.h).
+typedef enum bushd_emission_mode {
+  BUSHD_EMISSION_EVEN = 0,        // each step in the slot of its time
+  BUSHD_EMISSION_BURST = 1,       // all motors together, each T_step
+  BUSHD_EMISSION_COMMON_DIR = 2,  // one DIR for all: each T_step those to the left, then the others
+  BUSHD_EMISSION_STAGGERED = 3,   // one after the other, each T_step
+  BUSHD_EMISSION_PHASES = 4       // four levels a motor instead of STEP and DIR
+} bushd_emission_mode;
+
+typedef enum bushd_phase_sequence {
+  BUSHD_PHASES_WAVE = 0,  // 4-beat, one winding on
+  BUSHD_PHASES_FULL = 1,  // 4-beat, two on
+  BUSHD_PHASES_HALF = 2,  // 8-beat
+  BUSHD_PHASES_THREE = 3  // three windings, 6-beat
+} bushd_phase_sequence;
+
+#define BUSHD_PHASE_OUTPUTS 4u  // motor m has the outputs 4m .. 4m+3
+
+typedef struct bushd_emission {
+  uint8_t mode;           // bushd_emission_mode
+  uint8_t sequence;       // bushd_phase_sequence, of phases
+  bool hold_current;      // of phases: windings stay on at rest
+  uint16_t step_us;       // T_step, of burst, common-dir and staggered; >= 1 there
+  uint16_t settle_us;     // dt_p, of staggered; 0: the MCU measures it
+  uint16_t dir_setup_us;  // DIR changes as long before a step at least
+  uint16_t pulse_us;      // a STEP pulse lasts as long at least
+} bushd_emission;
 
 // A table is sent as: begin, data (accelerating side, then decelerating side unless it is the
 // same), end. `slot` 0 .. BUSHD_TABLE_SLOTS-1. Codes run from slow to fast on both sides.
@@ -368,6 +402,7 @@ typedef struct bushd_acknowledgement {
 size_t bushd_encode_identify(const bushd_identify* message, uint8_t* payload);
 size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload);
 size_t bushd_encode_configure(const bushd_configure* message, uint8_t* payload);
+size_t bushd_encode_emission(const bushd_emission* message, uint8_t* payload);
 size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* payload);
 size_t bushd_encode_table_data(uint8_t slot, uint16_t offset, uint8_t count, const uint16_t* codes,
                                uint8_t* payload);
@@ -402,6 +437,7 @@ size_t bushd_encode_table_run(uint8_t epoch, uint32_t first_tick,
 bushd_status bushd_decode_identify(const uint8_t* payload, size_t size, bushd_identify* message);
 bushd_status bushd_decode_identity(const uint8_t* payload, size_t size, bushd_identity* message);
 bushd_status bushd_decode_configure(const uint8_t* payload, size_t size, bushd_configure* message);
+bushd_status bushd_decode_emission(const uint8_t* payload, size_t size, bushd_emission* message);
 bushd_status bushd_decode_table_begin(const uint8_t* payload, size_t size,
                                       bushd_table_begin* message);
 bushd_status bushd_decode_table_data(const uint8_t* payload, size_t size,

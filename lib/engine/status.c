@@ -36,6 +36,12 @@ const char* bushd_status_text(bushd_status status) {
       return "unknown message";
     case BUSHD_E_FORBIDDEN:
       return "a limit switch forbids this direction";
+    case BUSHD_E_PULSE_WIDTH:
+      return "pulses longer than half a slot";
+    case BUSHD_E_DIR_SETUP:
+      return "no time for the DIR setup";
+    case BUSHD_E_STEP_PERIOD:
+      return "step period longer than a tick";
   }
   return "unknown status";
 }

@@ -23,7 +23,11 @@ typedef enum bushd_status {
   BUSHD_E_TABLE_TOO_LONG = 13,   // a side lasts 2^31 time units or longer
   BUSHD_E_VERSION = 14,          // protocol versions differ
   BUSHD_E_UNKNOWN_MESSAGE = 15,  // no such message type
-  BUSHD_E_FORBIDDEN = 16         // a start into a direction that a limit switch forbids
+  BUSHD_E_FORBIDDEN = 16,        // a start into a direction that a limit switch forbids
+  // Emission settings that the slots of this tick cannot keep.
+  BUSHD_E_PULSE_WIDTH = 17,  // STEP pulses longer than half a slot
+  BUSHD_E_DIR_SETUP = 18,    // DIR earlier before a step than it can be
+  BUSHD_E_STEP_PERIOD = 19   // T_step longer than a tick
 } bushd_status;
 
 // A short English phrase for a status, never NULL; "unknown status" for any other value.

@@ -17,6 +17,7 @@
 #include "engine/message.h"
 #include "engine/table.h"
 #include "link/bus_clock.h"
+#include "link/emission_setup.h"
 #include "link/health.h"
 #include "link/line_budget.h"
 
@@ -31,6 +32,7 @@ struct McuSetup {
   std::uint8_t address = 0;
   std::vector<TableRef> tables;                            // by slot, at most BUSHD_TABLE_SLOTS
   std::array<int, BUSHD_MOTORS_PER_MCU> table_of_motor{};  // slot, or -1: no motor at this output
+  EmissionSetup emission{};
 };
 
 struct BusSetup {

@@ -22,13 +22,33 @@ bool same_id(const bushd_identity& a, const bushd_identity& b) {
   return std::memcmp(a.unique_id, b.unique_id, BUSHD_UNIQUE_ID_SIZE) == 0;
 }
 
-std::string lacks_room(const McuSetup& setup, const bushd_identity& identity) {
+// A motor's table makes more steps in a tick than the emission has room for.
+std::string lacks_time(const McuSetup& setup, const bushd_identity& identity,
+                       std::uint32_t tick_ns) {
+  unsigned room = 0;
+  const std::string why = emission_misfit(setup.emission, identity, tick_ns, &room);
+  if (!why.empty()) return why;
+  for (const int slot : setup.table_of_motor) {
+    if (slot < 0) continue;
+    const bushd_table* table = setup.tables[static_cast<std::size_t>(slot)].table;
+    const std::uint32_t steps = bushd_table_max_steps_per_tick(table, tick_ns);
+    if (steps <= room) continue;
+    return "has room for " + std::to_string(room) +
+           " steps of a motor in a tick, with its emission in " + std::to_string(identity.slots) +
+           " slots, but a table makes up to " + std::to_string(steps) +
+           ": use a slower table, or less step_us or dir_setup_us";
+  }
+  return {};
+}
+
+std::string lacks_room(const McuSetup& setup, const bushd_identity& identity,
+                       std::uint32_t tick_ns) {
   std::size_t codes = 0;
   for (const TableRef& ref : setup.tables) {
     codes += ref.table->accel.count;
     if (ref.table->decel.code != ref.table->accel.code) codes += ref.table->decel.count;
   }
-  if (codes <= identity.table_codes) return {};
+  if (codes <= identity.table_codes) return lacks_time(setup, identity, tick_ns);
   return "has memory for " + std::to_string(identity.table_codes) +
          " table codes, but its motors' tables need " + std::to_string(codes) +
          ": use shorter tables or fewer on this MCU";
@@ -93,7 +113,9 @@ std::string Master::unfit(const Mcu& mcu, const bushd_identity& identity) const 
              std::to_string(m) + " is configured";
     }
   }
-  if (const std::string why = lacks_room(mcu.setup, identity); !why.empty()) return why;
+  if (const std::string why = lacks_room(mcu.setup, identity, setup_.tick_ns); !why.empty()) {
+    return why;
+  }
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * setup_.tick_ns / 1000;
   if (identity.queue_ticks < kMinQueueTicks || queue_us < kMinQueueUs) {
@@ -106,7 +128,7 @@ std::string Master::unfit(const Mcu& mcu, const bushd_identity& identity) const 
 
 std::string Master::no_room(std::size_t index, const McuSetup& setup) const {
   const McuView& view = mcus_[index].view;
-  return view.identified ? lacks_room(setup, view.identity) : std::string();
+  return view.identified ? lacks_room(setup, view.identity, setup_.tick_ns) : std::string();
 }
 
 void Master::handle_identity(std::int64_t now_us, std::size_t index,
@@ -144,6 +166,9 @@ void Master::write_script(Mcu& mcu) const {
                                          std::min<Tick>(ticks_in(kSilenceUs), UINT16_MAX))};
   add_request(mcu, BUSHD_MSG_CONFIGURE,
               [&](std::uint8_t* p) { return bushd_encode_configure(&configure, p); });
+  add_request(mcu, BUSHD_MSG_EMISSION, [&](std::uint8_t* p) {
+    return bushd_encode_emission(&mcu.setup.emission.settings, p);
+  });
   mcu.script.push_back({.type = BUSHD_MSG_TABLES, .payload = {}});
 }
 
@@ -215,10 +240,14 @@ void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std:
   if (!mcu.script.empty() && mcu.script.front().type == type) mcu.script.pop_front();
   mcu.poll_now = mcu.script.empty();
   if (status == BUSHD_OK || mcu.view.phase == McuPhase::kOnline) return;
-  go_offline(index,
-             std::string("refused its configuration: ") +
-                 bushd_status_text(static_cast<bushd_status>(status)),
-             now_us + kRetryUs);
+  const auto refusal = static_cast<bushd_status>(status);
+  go_offline(
+      index,
+      "refused its configuration: " +
+          (type == BUSHD_MSG_EMISSION ? emission_refusal(mcu.setup.emission, refusal,
+                                                         mcu.view.identity.slots, setup_.tick_ns)
+                                      : bushd_status_text(refusal)),
+      now_us + kRetryUs);
 }
 
 void Master::follow_connecting(std::size_t index, bool in_step) {

@@ -52,6 +52,12 @@ void Plant::edge(const Edge& edge) {
     enabled_[edge.mcu] = edge.level;
     return;
   }
+  if (edge.signal == Signal::kCommonDir) {
+    for (const auto& each : motor_of_[edge.mcu]) {
+      if (each) each->forward = edge.level;
+    }
+    return;
+  }
   Motor* motor = motor_of_[edge.mcu][edge.index].get();
   if (motor == nullptr) {
     if (edge.signal == Signal::kStep && edge.level) {

@@ -108,6 +108,13 @@ Result<std::int64_t> TomlReader::integer(std::string_view key, std::int64_t lowe
       key, fmt::format("is {}; allowed: {}", describe(**node), range(lowest, highest, unit))));
 }
 
+Result<bool> TomlReader::boolean(std::string_view key) const {
+  const auto node = required(key, "true or false");
+  if (!node) return fail(node.error());
+  if (const auto* value = (*node)->as_boolean()) return value->get();
+  return fail(error(key, fmt::format("is {}; allowed: true or false", describe(**node))));
+}
+
 Result<std::int64_t> TomlReader::integer(std::string_view key, std::size_t index,
                                          const toml::node& node, std::int64_t lowest,
                                          std::int64_t highest, std::string_view unit) const {

@@ -348,6 +348,23 @@ const std::map<std::string, Kind>& kinds() {
        {bytes_with(1, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 1); }),
         codec(bushd_decode_emergency, bushd_encode_emergency),
         {{"no such way", set8(0, 2)}}}},
+      {"emission",
+       {bytes_with(11,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 4);
+                     (*p)[1] = between<uint8_t>(0, 3);
+                     (*p)[2] = between<uint8_t>(0, 1);
+                     bushd_put_u16(p->data() + 3, between<uint16_t>(1, 65535));
+                   }),
+        codec(bushd_decode_emission, bushd_encode_emission),
+        {{"mode 5", set8(0, 5)},
+         {"sequence 4", set8(1, 4)},
+         {"hold current 2", set8(2, 2)},
+         {"no step period",
+          [](Bytes* p) {
+            (*p)[0] = BUSHD_EMISSION_BURST;
+            bushd_put_u16(p->data() + 3, 0);
+          }}}}},
       {"report",
        {[] {
           const auto motors = between<uint8_t>(0, 16);
@@ -598,10 +615,10 @@ TEST(MessageReport, OfSixteenMotorsFitsAFrame) {
 
 TEST(Status, EveryCodeHasItsOwnText) {
   std::map<std::string, int> texts;
-  for (int code = 0; code <= BUSHD_E_FORBIDDEN; ++code) {
+  for (int code = 0; code <= BUSHD_E_STEP_PERIOD; ++code) {
     ++texts[bushd_status_text(static_cast<bushd_status>(code))];
   }
-  EXPECT_EQ(texts.size(), BUSHD_E_FORBIDDEN + 1u);
+  EXPECT_EQ(texts.size(), BUSHD_E_STEP_PERIOD + 1u);
   EXPECT_EQ(texts.count("unknown status"), 0u);
   const uint8_t from_the_wire = 200;
   EXPECT_STREQ(bushd_status_text(static_cast<bushd_status>(from_the_wire + texts.size())),

@@ -139,6 +139,11 @@ void put(const bushd_table_run& m, Fields& f) {
 void put(const bushd_emergency& m, Fields& f) {
   f.add("how", m.how);
 }
+void put(const bushd_emission& m, Fields& f) {
+  f.add("mode", m.mode).add("sequence", m.sequence).add("hold_current", m.hold_current);
+  f.add("step_us", m.step_us).add("settle_us", m.settle_us);
+  f.add("dir_setup_us", m.dir_setup_us).add("pulse_us", m.pulse_us);
+}
 void put(const bushd_report& m, Fields& f) {
   f.add("state", m.state).add("faults", m.faults).add("flags", m.flags).add("epoch", m.epoch);
   f.add("boot_number", m.boot_number).add("tick", m.tick).add("tick_ns", m.tick_ns);
@@ -210,6 +215,8 @@ std::string message_text(const bushd_frame& frame) {
       return text("table_run", frame, bushd_decode_table_run);
     case BUSHD_MSG_EMERGENCY:
       return text("emergency", frame, bushd_decode_emergency);
+    case BUSHD_MSG_EMISSION:
+      return text("emission", frame, bushd_decode_emission);
     case BUSHD_MSG_SET_ADDRESS:
       return text("set_address", frame, bushd_decode_set_address);
     case BUSHD_MSG_TABLES:
@@ -231,11 +238,11 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {"identify",  "identity",  "configure",   "table_begin",     "table_data",
-          "table_end", "assign",    "control",     "set_position",    "poll",
-          "report",    "sync",      "ticks",       "acknowledgement", "table_ticks",
-          "table_run", "emergency", "set_address", "get_tables",      "tables",
-          "set_inputs"};
+  return {"identify",   "identity",  "configure",   "table_begin",     "table_data",
+          "table_end",  "assign",    "control",     "set_position",    "poll",
+          "report",     "sync",      "ticks",       "acknowledgement", "table_ticks",
+          "table_run",  "emergency", "set_address", "get_tables",      "tables",
+          "set_inputs", "emission"};
 }
 
 }  // namespace bushd::test

@@ -115,6 +115,8 @@ Rig::Rig(RigOptions options)
   config.codes = codes_.data();
   config.code_count = options.code_count;
   config.min_tick_ns = options.min_tick_ns;
+  config.lacks = options.lacks;
+  config.pulse_ns = options.pulse_ns;
   std::ranges::copy(unique_id(), config.unique_id);
   bushd_mcu_boot(&mcu_, &port, &config);
   plane_ = bushd_mcu_swap(&mcu_);
@@ -300,6 +302,11 @@ bushd_status Rig::control(std::uint8_t actions) {
   return request(BUSHD_MSG_CONTROL, {actions});
 }
 
+bushd_status Rig::emission(const bushd_emission& message) {
+  return request(BUSHD_MSG_EMISSION,
+                 payload_of([&](std::uint8_t* p) { return bushd_encode_emission(&message, p); }));
+}
+
 bushd_status Rig::set_position(std::uint8_t motor, std::int32_t position_steps) {
   const bushd_set_position message = {motor, position_steps};
   return request(BUSHD_MSG_SET_POSITION, payload_of([&](std::uint8_t* p) {
@@ -367,14 +374,22 @@ void Rig::run_plan(const Plan& plan, std::uint8_t motor) {
   pass_until_rest();
 }
 
+int Rig::steps_of_plane(std::uint8_t m) const {
+  if (plane_->outputs == BUSHD_OUTPUTS_LEVELS) return plane_->steps[m];
+  int steps = 0;
+  for (std::uint16_t slot = 0; slot < options_.slots; ++slot) {
+    const bool common = plane_->outputs == BUSHD_OUTPUTS_COMMON_DIR;
+    const bool right = common ? slot % 2 == 1 : (plane_->direction >> m & 1) != 0;
+    if (plane_->step[slot] >> m & 1) steps += right ? 1 : -1;
+  }
+  return steps;
+}
+
 void Rig::pass() {
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    const int sign = plane_->direction >> m & 1 ? 1 : -1;
-    int steps = 0;
-    for (std::uint16_t slot = 0; slot < options_.slots; ++slot)
-      steps += plane_->step[slot] >> m & 1;
-    pulses_[m] += sign * steps;
-    history_[m].push_back(sign * steps);
+    const int steps = steps_of_plane(m);
+    pulses_[m] += steps;
+    history_[m].push_back(steps);
     if (steps != 0 && !enabled_) ++steps_while_disabled_;
   }
   if ((plane_->step[0] & (plane_->direction ^ direction_)) != 0) ++steps_with_dir_;

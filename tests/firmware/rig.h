@@ -28,6 +28,8 @@ struct RigOptions {
   std::uint8_t failing_tests = 0;
   bushd_reset_cause reset_cause = BUSHD_RESET_POWER_ON;
   bool enable_at_boot = false;
+  std::uint16_t lacks = 0;
+  std::uint32_t pulse_ns = 0;
   bool stores_address = true;
 };
 
@@ -113,6 +115,7 @@ class Rig {
   bushd_status assign(std::uint8_t motor, std::uint8_t slot);
   bushd_status control(std::uint8_t actions);
   bushd_status set_position(std::uint8_t motor, std::int32_t position_steps);
+  bushd_status emission(const bushd_emission& message);
   bushd_tables tables();
   bushd_status set_inputs(const InputSettings& settings);
   // The pins, from the next tick that is prepared on.
@@ -142,7 +145,7 @@ class Rig {
 
   std::uint32_t tick() const { return mcu_.tick; }
   std::uint32_t first_open() const { return mcu_.tick + 2; }
-  // Steps of the planes that have ended, counted from STEP and DIR levels alone.
+  // Steps of the planes that have ended, counted from STEP and DIR levels alone (but for phases).
   std::int64_t pulses(std::uint8_t motor) const { return pulses_[motor]; }
   // Signed steps of a motor in each tick since boot; entry i is the i-th plane emitted.
   const std::vector<int>& history(std::uint8_t motor) const { return history_[motor]; }
@@ -163,6 +166,8 @@ class Rig {
   const RigOptions& options() const { return options_; }
 
  private:
+  int steps_of_plane(std::uint8_t motor) const;
+
   RigOptions options_;
   std::vector<std::int16_t> queue_;
   std::vector<std::uint16_t> codes_;

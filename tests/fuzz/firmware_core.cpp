@@ -73,6 +73,7 @@ class Mcu {
                                      .queue = queue_.data(),
                                      .queue_ticks = kQueueTicks,
                                      .min_tick_ns = BUSHD_MIN_TICK_NS,
+                                     .pulse_ns = 0,
                                      .lacks = 0,
                                      .codes = codes_.data(),
                                      .code_count = kCodes,
@@ -171,17 +172,24 @@ class Mcu {
   void count_pulses(const bushd_plane& plane) {
     std::array<std::uint32_t, kMotors> pulses{};
     unsigned all = 0;
+    if (plane.outputs == BUSHD_OUTPUTS_LEVELS) {
+      for (std::size_t m = 0; m < kMotors; ++m) counted_[m] += std::uint32_t(plane.steps[m]);
+      return;
+    }
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
       if (plane.step[slot] == 0) continue;
       all |= plane.step[slot];
-      for (std::size_t m = 0; m < kMotors; ++m) pulses[m] += plane.step[slot] >> m & 1;
+      const bool common = plane.outputs == BUSHD_OUTPUTS_COMMON_DIR;
+      const unsigned right = !common ? plane.direction : slot % 2 != 0 ? 0xFFFF : 0;
+      for (std::size_t m = 0; m < kMotors; ++m) {
+        if ((plane.step[slot] >> m & 1) == 0) continue;
+        ++pulses[m];
+        counted_[m] += (right >> m & 1) != 0 ? 1u : 0u - 1u;
+      }
     }
     BUSHD_REQUIRE(all >> kMotors == 0);
     BUSHD_REQUIRE(all == 0 || enabled_);
-    for (std::size_t m = 0; m < kMotors; ++m) {
-      BUSHD_REQUIRE(pulses[m] <= BUSHD_MAX_STEPS_PER_TICK);
-      counted_[m] += (plane.direction >> m & 1) != 0 ? pulses[m] : 0u - pulses[m];
-    }
+    for (std::size_t m = 0; m < kMotors; ++m) BUSHD_REQUIRE(pulses[m] <= BUSHD_MAX_STEPS_PER_TICK);
   }
 
   void check_state() const {

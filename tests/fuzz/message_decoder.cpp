@@ -96,6 +96,11 @@ void decode_for_mcu(Bytes payload) {
   if (decoded(payload, &emergency, bushd_decode_emergency, bushd_encode_emergency)) {
     BUSHD_REQUIRE(emergency.how == BUSHD_RAMP_DOWN || emergency.how == BUSHD_CUT);
   }
+  bushd_emission emission;
+  if (decoded(payload, &emission, bushd_decode_emission, bushd_encode_emission)) {
+    BUSHD_REQUIRE(emission.mode <= BUSHD_EMISSION_PHASES &&
+                  emission.sequence <= BUSHD_PHASES_THREE);
+  }
   bushd_sync sync;
   if (decoded(payload, &sync, bushd_decode_sync, bushd_encode_sync)) {
     BUSHD_REQUIRE(sync.mark_ns < BUSHD_MAX_TICK_NS);

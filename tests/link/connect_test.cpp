@@ -21,10 +21,10 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
       requests.push_back(heard.type);
   }
   const std::vector<int> expected = {
-      BUSHD_MSG_IDENTIFY,    BUSHD_MSG_CONFIGURE,  BUSHD_MSG_TABLES,     BUSHD_MSG_CONTROL,
-      BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA,
-      BUSHD_MSG_TABLE_END,   BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,
-      BUSHD_MSG_CONTROL};
+      BUSHD_MSG_IDENTIFY,   BUSHD_MSG_CONFIGURE,   BUSHD_MSG_EMISSION,   BUSHD_MSG_TABLES,
+      BUSHD_MSG_CONTROL,    BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA,
+      BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_END,   BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,
+      BUSHD_MSG_ASSIGN,     BUSHD_MSG_CONTROL};
   EXPECT_EQ(requests, expected);
   const Slave& slave = bus.slaves[0];
   std::vector<std::uint16_t> codes = bus.codes;
@@ -200,6 +200,47 @@ TEST(Connect, RefusedRequestsAreNamedAndTriedAgain) {
     bus.slaves[0].refusals.clear();
     bus.connect();
   }
+}
+
+TEST(Connect, EmissionThatTheMcuRefusesIsNamedWithItsPlaceInTheConfiguration) {
+  FakeBus bus;
+  bus.setup.mcus[0].emission.settings.pulse_us = 3;
+  bus.setup.mcus[0].emission.pulse_at = {
+      .message = {}, .file = "b.toml", .line = 7, .key = "mcu[0].pulse_us", .column = 12};
+  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
+  bus.master->port_opened(bus.now_us);
+  bus.slaves[0].refusals = {{BUSHD_MSG_EMISSION, BUSHD_E_PULSE_WIDTH}};
+  ASSERT_TRUE(bus.run_until(
+      [&] { return bus.master->view(0).detail.starts_with("refused its configuration"); }));
+  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("b.toml:7:12: mcu[0].pulse_us: is 3 us"));
+}
+
+TEST(Connect, EmissionThatAnMcuDoesNotKnowIsNotAskedFor) {
+  FakeBus bus;
+  bus.setup.mcus[0].emission.settings.mode = BUSHD_EMISSION_BURST;
+  bus.setup.mcus[0].emission.settings.step_us = 100;
+  bus.setup.mcus[0].emission.mode_at = {.message = {}, .file = "b.toml", .key = "mcu[0].emission"};
+  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
+  bus.master->port_opened(bus.now_us);
+  bus.run_for(1'000'000);
+  EXPECT_THAT(bus.master->view(0).detail,
+              HasSubstr("b.toml: mcu[0].emission: is \"burst\", which this MCU cannot do; allowed: "
+                        "\"even\""));
+  EXPECT_TRUE(bus.heard_of(BUSHD_MSG_EMISSION).empty());
+}
+
+TEST(Connect, TableThatIsTooFastForTheEmissionKeepsTheMcuAway) {
+  FakeBus bus;
+  bus.slaves[0].identity.capabilities |= BUSHD_CAN_BURST;
+  bus.setup.mcus[0].emission.settings.mode = BUSHD_EMISSION_BURST;
+  bus.setup.mcus[0].emission.settings.step_us = 2000;
+  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
+  bus.master->port_opened(bus.now_us);
+  bus.run_for(1'000'000);
+  EXPECT_THAT(
+      bus.master->view(0).detail,
+      HasSubstr("has room for 1 steps of a motor in a tick, with its emission in 256 slots, "
+                "but a table makes up to 2"));
 }
 
 TEST(Connect, LostRequestsAndAnswersAreRepeated) {

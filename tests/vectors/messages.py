@@ -18,6 +18,8 @@ LAYOUTS = {
     "table_ticks": (0x0C, [("epoch", 1), ("flags", 1), ("first_tick", 4), ("count", 2), ("entries", "run_state")]),
     "table_run": (0x0D, [("epoch", 1), ("first_tick", 4), ("entries", "table_run")]),
     "emergency": (0x0E, [("how", 1)]),
+    "emission": (0x12, [("mode", 1), ("sequence", 1), ("hold_current", 1), ("step_us", 2), ("settle_us", 2),
+                        ("dir_setup_us", 2), ("pulse_us", 2)]),
     "set_address": (0x0F, [("unique_id", [1]), ("address", 1)]),
     "get_tables": (0x10, []),
     "set_inputs": (0x11, [("limit_positive", 2), ("limit_negative", 2), ("limit_cuts", 2), ("inverted", 2),

@@ -14,6 +14,8 @@
 #include "firmware/core/mcu.h"
 
 #define EMISSION_SLOTS 128u
+// STEP pulses last as long at least.
+#define EMISSION_PULSE_NS 2500u
 // Shorter, slots would not hold their interrupts.
 #define EMISSION_MIN_TICK_NS 900000u
 

@@ -107,8 +107,11 @@ static void boot(void) {
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
-                             // A frame of them stands for more ticks than it could make in one.
-                             .lacks = BUSHD_CAN_TABLE_TICKS,
+                             // A frame of table ticks stands for more of them than it could make in
+                             // one; its slots have pulses only, and DIR stays for a tick.
+                             .lacks = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_COMMON_DIR |
+                                      BUSHD_CAN_PHASES,
+                             .pulse_ns = EMISSION_PULSE_NS,
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,

@@ -42,16 +42,30 @@ static int64_t edge_time(const bushd_virtual* v, uint16_t edge) {
       v, v->tick_start_own_ns + edge * v->tick_length_ns / (2 * (int64_t)v->config.mcu.slots));
 }
 
-// Calls back the STEP edges of the present tick up to until_ns.
+// What the STEP outputs have from this edge of the present tick on.
+static uint16_t step_levels_at(const bushd_virtual* v, uint16_t edge) {
+  const bool pulse_is_over = edge % 2 == 1 && v->plane->outputs != BUSHD_OUTPUTS_LEVELS;
+  return pulse_is_over ? 0 : v->plane->step[edge / 2];
+}
+
+// The same for the common DIR.
+static uint16_t common_dir_at(const bushd_virtual* v, uint16_t edge) {
+  const uint16_t slot = (uint16_t)((edge + 1) / 2);
+  return v->plane->outputs == BUSHD_OUTPUTS_COMMON_DIR && slot < v->config.mcu.slots && slot % 2;
+}
+
+// Calls back the edges of the present tick up to until_ns.
 static void emit_steps(bushd_virtual* v, int64_t until_ns) {
   const uint16_t edges = (uint16_t)(2 * v->config.mcu.slots);
   if (v->config.edge == NULL || v->plane == NULL || v->plane->active == 0) return;
   for (; v->edge_cursor < edges; ++v->edge_cursor) {
-    const uint16_t mask = v->plane->step[v->edge_cursor / 2];
-    if (mask == 0) continue;
+    const uint16_t levels = step_levels_at(v, v->edge_cursor);
+    const uint16_t common_dir = common_dir_at(v, v->edge_cursor);
+    if (levels == v->step_levels && common_dir == v->common_dir_level) continue;
     const int64_t time_ns = edge_time(v, v->edge_cursor);
     if (time_ns > until_ns) return;
-    drive(v, time_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, v->edge_cursor % 2 ? 0 : mask);
+    drive(v, time_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, levels);
+    drive(v, time_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, common_dir);
   }
 }
 
@@ -65,15 +79,31 @@ static void turn_for_whole_tick(bushd_virtual* v) {
   for (uint8_t i = 0; i < v->config.mcu.motors; ++i) turn(&v->shaft[i], v->plane->steps[i]);
 }
 
-// A reset cuts the tick short: only the pulses that have begun count.
+// Motors that step in this slot; `before` are the outputs of the slot before.
+static uint16_t steps_of_slot(const bushd_plane* plane, uint16_t slot, uint16_t before) {
+  const uint16_t mask = plane->step[slot];
+  if (plane->outputs != BUSHD_OUTPUTS_LEVELS) return mask;
+  uint16_t motors = 0;
+  for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS; ++m) {
+    const unsigned shift = BUSHD_PHASE_OUTPUTS * m;
+    const unsigned was = before >> shift & 0xFu;
+    const unsigned is = mask >> shift & 0xFu;
+    if (was != 0 && is != 0 && was != is) motors |= 1u << m;
+  }
+  return (uint16_t)motors;
+}
+
+// A reset cuts the tick short: only the steps that have begun count.
 static void turn_for_cut_tick(bushd_virtual* v) {
   if (v->plane == NULL || v->plane->active == 0) return;
+  uint16_t before = v->levels_before_tick;
   for (uint16_t slot = 0; slot < v->config.mcu.slots; ++slot) {
-    const uint16_t mask = v->plane->step[slot];
-    if (mask == 0) continue;
+    const uint16_t steps = steps_of_slot(v->plane, slot, before);
+    before = v->plane->step[slot];
+    if (steps == 0) continue;
     if (edge_time(v, (uint16_t)(2 * slot)) > v->now_ns) return;
     for (uint8_t i = 0; i < v->config.mcu.motors; ++i) {
-      if (mask >> i & 1) turn(&v->shaft[i], v->plane->steps[i] < 0 ? -1 : 1);
+      if (steps >> i & 1) turn(&v->shaft[i], v->plane->steps[i] < 0 ? -1 : 1);
     }
   }
 }
@@ -88,13 +118,24 @@ static void begin_tick(bushd_virtual* v, int64_t start_own_ns) {
   v->edge_cursor = 0;
 }
 
+// What its plane of `slots` slots leaves at the STEP outputs.
+static uint16_t last_levels(const bushd_plane* plane, uint16_t slots) {
+  if (plane->outputs != BUSHD_OUTPUTS_LEVELS) return 0;
+  return plane->step[plane->active != 0 ? slots - 1 : 0];
+}
+
 static void tick_boundary(bushd_virtual* v) {
   emit_steps(v, v->next_event_ns);
   turn_for_whole_tick(v);
   v->now_ns = v->next_event_ns;
   begin_tick(v, v->tick_start_own_ns + v->tick_length_ns);
+  if (v->plane != NULL) v->levels_before_tick = last_levels(v->plane, v->config.mcu.slots);
   v->plane = bushd_mcu_swap(&v->mcu);
   drive(v, v->now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, v->plane->direction);
+  if (v->plane->active == 0) {
+    drive(v, v->now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels,
+          last_levels(v->plane, v->config.mcu.slots));
+  }
   bushd_mcu_prepare(&v->mcu);
 }
 
@@ -217,6 +258,7 @@ void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint
   bushd_virtual_advance(v, now_ns);
   if (v->running) turn_for_cut_tick(v);
   drive(v, now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, 0);
+  drive(v, now_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, 0);
   drive(v, now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, 0);
   if (v->running) port_set_enable(v, false);
   v->running = false;

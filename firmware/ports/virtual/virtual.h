@@ -12,6 +12,7 @@
 //
 // A tick of `len` own ns with S slots makes its edges at own times  start + floor(e * len / 2S):
 // e = 2s is where the STEP pulses of slot s rise, e = 2s + 1 where they fall, half a slot later.
+// The common DIR changes where they fall; levels of phases at e = 2s.
 #ifndef BUSHD_FIRMWARE_PORTS_VIRTUAL_VIRTUAL_H
 #define BUSHD_FIRMWARE_PORTS_VIRTUAL_VIRTUAL_H
 
@@ -31,7 +32,8 @@ extern "C" {
 typedef enum bushd_virtual_signal {
   BUSHD_VIRTUAL_STEP = 0,
   BUSHD_VIRTUAL_DIR = 1,
-  BUSHD_VIRTUAL_EN = 2  // one per MCU, index 0
+  BUSHD_VIRTUAL_EN = 2,         // one per MCU, index 0
+  BUSHD_VIRTUAL_COMMON_DIR = 3  // likewise
 } bushd_virtual_signal;
 
 typedef struct bushd_virtual_config {
@@ -77,7 +79,9 @@ typedef struct bushd_virtual {
   const bushd_plane* plane;
   uint16_t edge_cursor;  // next edge e of the present tick, 2S: none left
   uint16_t step_levels;
+  uint16_t levels_before_tick;  // of phases, when the present tick began
   uint16_t dir_levels;
+  uint16_t common_dir_level;
   bool enable_level;
   bool enable_kept;
 } bushd_virtual;

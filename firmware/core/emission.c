@@ -1,0 +1,129 @@
+// How steps get to the pins: the settings that a master has chosen, and the masks of a tick's slots
+// where these are not simply the slots of the steps' own times.
+#include <string.h>
+
+#include "firmware/core/internal.h"
+
+// Windings stay on for so long after a move, until the rotor has come to rest.
+#define ROTOR_SETTLES_NS 100000000u
+
+// Capabilities of the modes follow each other as the modes do.
+static bool lacks(const bushd_mcu* mcu, uint8_t mode) {
+  const uint32_t needed = mode == BUSHD_EMISSION_EVEN ? 0 : (uint32_t)BUSHD_CAN_BURST << (mode - 1);
+  return (needed & mcu->config.lacks) != 0;
+}
+
+static bushd_status use(bushd_mcu* mcu, const bushd_emission* settings) {
+  bushd_emission_grid grid;
+  const bushd_status status = bushd_emission_fit(settings, mcu->tick_ns, mcu->config.slots, &grid);
+  if (status != BUSHD_OK) return status;
+  bushd_mcu_emission* emission = &mcu->emission;
+  memset(emission, 0, sizeof *emission);
+  emission->settings = *settings;
+  emission->grid = grid;
+  emission->plain = settings->mode == BUSHD_EMISSION_EVEN && grid.setup_slots == 0;
+  emission->outputs = settings->mode == BUSHD_EMISSION_COMMON_DIR ? BUSHD_OUTPUTS_COMMON_DIR
+                      : settings->mode == BUSHD_EMISSION_PHASES   ? BUSHD_OUTPUTS_LEVELS
+                                                                  : BUSHD_OUTPUTS_PULSES;
+  return BUSHD_OK;
+}
+
+void bushd_mcu_default_emission(bushd_mcu* mcu) {
+  bushd_emission even;
+  memset(&even, 0, sizeof even);
+  use(mcu, &even);
+}
+
+// After a reset with tables and assignments of before.
+void bushd_mcu_restore_emission(bushd_mcu* mcu) {
+  const bushd_emission kept = mcu->emission.settings;
+  if (use(mcu, &kept) != BUSHD_OK) bushd_mcu_default_emission(mcu);
+}
+
+bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* message) {
+  if ((mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
+  if (memcmp(message, &mcu->emission.settings, sizeof *message) == 0) return BUSHD_OK;
+  if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if (lacks(mcu, message->mode)) return BUSHD_E_FORMAT;
+  const uint32_t pulse_ns = mcu->config.pulse_ns;
+  if (pulse_ns != 0 && (uint32_t)message->pulse_us * 1000u > pulse_ns) return BUSHD_E_PULSE_WIDTH;
+  const bushd_status status = use(mcu, message);
+  if (status != BUSHD_OK) return status;
+  // What was good for another number of steps in a tick must be asked for again.
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) mcu->motor[m].table = -1;
+  return BUSHD_OK;
+}
+
+static uint8_t motors_of(const bushd_mcu* mcu) {
+  const bool phases = mcu->emission.grid.mode == BUSHD_EMISSION_PHASES;
+  return phases ? (uint8_t)(mcu->config.motors / BUSHD_PHASE_OUTPUTS) : mcu->config.motors;
+}
+
+bool bushd_mcu_has_output(const bushd_mcu* mcu, uint8_t motor) {
+  return motor < motors_of(mcu);
+}
+
+// Nothing of a motor is on that has been at rest for long and is not to hold.
+static bool is_on(bushd_mcu* mcu, uint8_t m, bool moves) {
+  uint8_t* const left = &mcu->emission.on_ticks[m];
+  if ((mcu->flags & BUSHD_FLAG_ENABLED) == 0) {
+    *left = 0;
+    return false;
+  }
+  if (moves) {
+    const uint32_t ticks = ROTOR_SETTLES_NS / mcu->tick_ns + 1u;
+    *left = ticks < UINT8_MAX ? (uint8_t)ticks : UINT8_MAX;
+    return true;
+  }
+  if (*left != 0) --*left;
+  return *left != 0 || mcu->emission.settings.hold_current;
+}
+
+static uint8_t next_phase(uint8_t phase, uint8_t count, bool forward) {
+  if (forward) return phase + 1u == count ? 0 : (uint8_t)(phase + 1u);
+  return phase == 0 ? (uint8_t)(count - 1u) : (uint8_t)(phase - 1u);
+}
+
+// Pulses into levels. A phase goes on with every step that is counted, so it belongs to the
+// position whatever way the motor came.
+static void shape_phases(bushd_mcu* mcu, bushd_plane* plane) {
+  const uint8_t sequence = mcu->emission.settings.sequence;
+  const uint8_t count = bushd_phase_count(sequence);
+  const uint16_t moving = bushd_mcu_moving(mcu);
+  const uint8_t motors = motors_of(mcu);
+  uint16_t on = 0;
+  uint16_t levels = 0;
+  for (uint8_t m = 0; m < motors; ++m) {
+    if (!is_on(mcu, m, (moving & motor_bit(m)) != 0)) continue;
+    on |= motor_bit(m);
+    levels |= (uint16_t)(bushd_phase_levels(sequence, mcu->emission.phase[m])
+                         << (BUSHD_PHASE_OUTPUTS * m));
+  }
+  const uint16_t slots = plane->active != 0 ? mcu->config.slots : 1;
+  for (uint16_t slot = 0; slot < slots; ++slot) {
+    uint16_t steps = plane->step[slot];
+    for (uint8_t m = 0; steps != 0; ++m, steps = (uint16_t)(steps >> 1)) {
+      if ((steps & 1u) == 0) continue;
+      uint8_t* const phase = &mcu->emission.phase[m];
+      *phase = next_phase(*phase, count, (plane->direction & motor_bit(m)) != 0);
+      if ((on & motor_bit(m)) == 0) continue;
+      const uint8_t shift = (uint8_t)(BUSHD_PHASE_OUTPUTS * m);
+      levels &= (uint16_t) ~(0xFu << shift);
+      levels |= (uint16_t)(bushd_phase_levels(sequence, *phase) << shift);
+    }
+    plane->step[slot] = levels;
+  }
+}
+
+void bushd_mcu_shape(bushd_mcu* mcu, bushd_plane* plane) {
+  const bushd_emission_grid* grid = &mcu->emission.grid;
+  if (grid->mode == BUSHD_EMISSION_PHASES) {
+    shape_phases(mcu, plane);
+  } else if (grid->mode == BUSHD_EMISSION_EVEN) {
+    const uint16_t changed = plane->direction ^ mcu->plane[mcu->front].direction;
+    bushd_emission_defer(plane->step, changed & plane->active, grid->setup_slots);
+  } else {
+    bushd_emission_fill(plane->step, mcu->config.slots, grid, plane->steps, mcu->config.motors);
+    if (grid->mode == BUSHD_EMISSION_COMMON_DIR) plane->direction = 0;
+  }
+}

@@ -1,0 +1,123 @@
+#include "config/emission_section.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <string>
+
+namespace bushd::config {
+namespace {
+
+using tables::TomlReader;
+
+constexpr std::array<std::string_view, 4> kSequences = {"wave", "full", "half", "three-phase"};
+constexpr std::int64_t kMaxUs = UINT16_MAX;
+
+template <std::size_t N>
+std::string list_of(const std::array<std::string_view, N>& words) {
+  std::string list;
+  for (const std::string_view word : words) {
+    list += fmt::format("{}\"{}\"", list.empty() ? "" : ", ", word);
+  }
+  return list;
+}
+
+template <std::size_t N>
+Result<std::uint8_t> read_word(const TomlReader& reader, std::string_view key,
+                               const std::array<std::string_view, N>& words) {
+  const auto word = reader.string(key, list_of(words));
+  if (!word) return fail(word.error());
+  for (std::size_t i = 0; i < N; ++i) {
+    if (words[i] == *word) return static_cast<std::uint8_t>(i);
+  }
+  return fail(reader.error(key, fmt::format("is \"{}\"; allowed: {}", *word, list_of(words))));
+}
+
+Result<void> read_us(const TomlReader& reader, std::string_view key, std::int64_t lowest,
+                     std::uint16_t* us) {
+  const auto value = reader.integer(key, lowest, kMaxUs, "us");
+  if (!value) return fail(value.error());
+  *us = static_cast<std::uint16_t>(*value);
+  return {};
+}
+
+struct Key {
+  std::string_view name;
+  std::uint8_t first_mode;  // the modes that know it
+  std::uint8_t last_mode;
+};
+constexpr std::array<Key, 6> kKeys = {{
+    {"step_us", BUSHD_EMISSION_BURST, BUSHD_EMISSION_STAGGERED},
+    {"settle_us", BUSHD_EMISSION_STAGGERED, BUSHD_EMISSION_STAGGERED},
+    {"dir_setup_us", BUSHD_EMISSION_EVEN, BUSHD_EMISSION_STAGGERED},
+    {"pulse_us", BUSHD_EMISSION_EVEN, BUSHD_EMISSION_STAGGERED},
+    {"phase_sequence", BUSHD_EMISSION_PHASES, BUSHD_EMISSION_PHASES},
+    {"hold_current", BUSHD_EMISSION_PHASES, BUSHD_EMISSION_PHASES},
+}};
+
+// A key that does nothing would be taken for one that does.
+Result<void> refuse_idle_keys(const TomlReader& reader, std::uint8_t mode) {
+  for (const Key& key : kKeys) {
+    if (!reader.has(key.name) || (mode >= key.first_mode && mode <= key.last_mode)) continue;
+    std::string modes;
+    for (std::uint8_t m = key.first_mode; m <= key.last_mode; ++m) {
+      modes += fmt::format("{}\"{}\"", modes.empty() ? "" : ", ", link::kEmissionNames[m]);
+    }
+    return fail(reader.error(key.name, fmt::format("says nothing with emission = \"{}\"; allowed: "
+                                                   "only with {}",
+                                                   link::kEmissionNames[mode], modes)));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<link::EmissionSetup> read_emission(const TomlReader& reader) {
+  link::EmissionSetup setup;
+  bushd_emission& settings = setup.settings;
+  if (reader.has("emission")) {
+    const auto mode = read_word(reader, "emission", link::kEmissionNames);
+    if (!mode) return fail(mode.error());
+    settings.mode = *mode;
+  }
+  if (auto idle = refuse_idle_keys(reader, settings.mode); !idle) return fail(idle.error());
+  const bool periodic =
+      settings.mode >= BUSHD_EMISSION_BURST && settings.mode <= BUSHD_EMISSION_STAGGERED;
+  if (periodic) {
+    if (auto read = read_us(reader, "step_us", 1, &settings.step_us); !read) {
+      return fail(read.error());
+    }
+  }
+  const auto optional_us = [&](std::string_view key, std::int64_t lowest,
+                               std::uint16_t* us) -> Result<void> {
+    return reader.has(key) ? read_us(reader, key, lowest, us) : Result<void>{};
+  };
+  if (auto read = optional_us("settle_us", 1, &settings.settle_us); !read) {
+    return fail(read.error());
+  }
+  if (auto read = optional_us("dir_setup_us", 0, &settings.dir_setup_us); !read) {
+    return fail(read.error());
+  }
+  if (auto read = optional_us("pulse_us", 0, &settings.pulse_us); !read) return fail(read.error());
+  if (settings.mode == BUSHD_EMISSION_PHASES) {
+    settings.sequence = BUSHD_PHASES_FULL;
+    settings.hold_current = true;
+  }
+  if (reader.has("phase_sequence")) {
+    const auto sequence = read_word(reader, "phase_sequence", kSequences);
+    if (!sequence) return fail(sequence.error());
+    settings.sequence = *sequence;
+  }
+  if (reader.has("hold_current")) {
+    const auto hold = reader.boolean("hold_current");
+    if (!hold) return fail(hold.error());
+    settings.hold_current = *hold;
+  }
+  setup.mode_at = reader.error(reader.has("emission") ? "emission" : "", "");
+  setup.step_at = reader.error("step_us", "");
+  setup.dir_setup_at = reader.error("dir_setup_us", "");
+  setup.pulse_at = reader.error("pulse_us", "");
+  return setup;
+}
+
+}  // namespace bushd::config

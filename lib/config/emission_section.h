@@ -1,0 +1,12 @@
+// Private to lib/config: the keys of [[mcu]] that say how steps get to the pins.
+#pragma once
+
+#include "base/result.h"
+#include "link/emission_setup.h"
+#include "tables/toml_reader.h"
+
+namespace bushd::config {
+
+Result<link::EmissionSetup> read_emission(const tables::TomlReader& reader);
+
+}  // namespace bushd::config

@@ -1,0 +1,116 @@
+// The keys of [[mcu]] that say how steps get to the pins.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "config/config_file.h"
+
+namespace bushd::config {
+namespace {
+
+using test::ConfigFile;
+using test::kGood;
+using test::replaced;
+using testing::EndsWith;
+using testing::HasSubstr;
+
+// The first MCU with more keys, from line 19 on.
+std::string with_keys(const std::string& keys) {
+  return replaced(kGood, "address = 1\n", "address = 1\n" + keys);
+}
+
+bushd_emission settings_of(const std::string& keys) {
+  const auto config = ConfigFile(with_keys(keys)).load();
+  if (!config) {
+    ADD_FAILURE() << config.error().text();
+    return {};
+  }
+  return config->mcus[0].emission.settings;
+}
+
+std::string error_of(const std::string& text) {
+  const ConfigFile file(text);
+  const auto config = file.load();
+  if (config) return "no error";
+  return config.error().text().substr(file.path().size() + 1);
+}
+
+TEST(EmissionKeys, EvenIsTheDefault) {
+  const bushd_emission settings = settings_of("");
+  EXPECT_EQ(settings.mode, BUSHD_EMISSION_EVEN);
+  EXPECT_EQ(settings.dir_setup_us, 0);
+  EXPECT_EQ(settings.pulse_us, 0);
+}
+
+TEST(EmissionKeys, EachModeHasItsKeys) {
+  const bushd_emission burst = settings_of("emission = \"burst\"\nstep_us = 300\npulse_us = 3\n");
+  EXPECT_EQ(burst.mode, BUSHD_EMISSION_BURST);
+  EXPECT_EQ(burst.step_us, 300);
+  EXPECT_EQ(burst.pulse_us, 3);
+  const bushd_emission common =
+      settings_of("emission = \"common-dir\"\nstep_us = 300\ndir_setup_us = 5\n");
+  EXPECT_EQ(common.mode, BUSHD_EMISSION_COMMON_DIR);
+  EXPECT_EQ(common.dir_setup_us, 5);
+  const bushd_emission staggered = settings_of("emission = \"staggered\"\nstep_us = 300\n");
+  EXPECT_EQ(staggered.mode, BUSHD_EMISSION_STAGGERED);
+  EXPECT_EQ(staggered.settle_us, 0) << "measured";
+  EXPECT_EQ(settings_of("emission = \"staggered\"\nstep_us = 300\nsettle_us = 518\n").settle_us,
+            518);
+  const bushd_emission phases = settings_of("emission = \"phases\"\n");
+  EXPECT_EQ(phases.sequence, BUSHD_PHASES_FULL);
+  EXPECT_TRUE(phases.hold_current);
+  const bushd_emission three = settings_of(
+      "emission = \"phases\"\nphase_sequence = \"three-phase\"\nhold_current = false\n");
+  EXPECT_EQ(three.sequence, BUSHD_PHASES_THREE);
+  EXPECT_FALSE(three.hold_current);
+}
+
+TEST(EmissionKeys, WhatIsWrongIsNamedWithItsLine) {
+  EXPECT_THAT(error_of(with_keys("emission = \"odd\"\n")),
+              EndsWith("19:12: mcu[0].emission: is \"odd\"; allowed: \"even\", \"burst\", "
+                       "\"common-dir\", \"staggered\", \"phases\""));
+  EXPECT_THAT(error_of(with_keys("emission = \"burst\"\n")),
+              HasSubstr("16:1: mcu[0].step_us: is missing; allowed: a whole number 1..65535 us"));
+  EXPECT_THAT(error_of(with_keys("pulse_us = 2.5\n")),
+              HasSubstr("19:12: mcu[0].pulse_us: is the floating-point number 2.5; allowed: a "
+                        "whole number 0..65535 us"));
+  EXPECT_THAT(error_of(with_keys("emission = \"phases\"\nhold_current = 1\n")),
+              HasSubstr("20:16: mcu[0].hold_current: is 1; allowed: true or false"));
+  EXPECT_THAT(error_of(with_keys("emission = \"phases\"\nphase_sequence = \"four\"\n")),
+              HasSubstr("20:18: mcu[0].phase_sequence: is \"four\"; allowed: \"wave\", \"full\", "
+                        "\"half\", \"three-phase\""));
+}
+
+TEST(EmissionKeys, KeysThatSayNothingInThisModeAreRefused) {
+  EXPECT_THAT(
+      error_of(with_keys("step_us = 300\n")),
+      HasSubstr("19:11: mcu[0].step_us: says nothing with emission = \"even\"; allowed: only "
+                "with \"burst\", \"common-dir\", \"staggered\""));
+  EXPECT_THAT(error_of(with_keys("emission = \"burst\"\nstep_us = 9\nsettle_us = 5\n")),
+              HasSubstr("mcu[0].settle_us: says nothing"));
+  EXPECT_THAT(error_of(with_keys("emission = \"phases\"\npulse_us = 5\n")),
+              HasSubstr("mcu[0].pulse_us: says nothing"));
+  EXPECT_THAT(error_of(with_keys("hold_current = true\n")),
+              HasSubstr("mcu[0].hold_current: says nothing"));
+}
+
+TEST(EmissionKeys, StepPeriodMustHaveRoomForWhatTheTablesMake) {
+  // The table makes up to seven steps in a tick.
+  EXPECT_EQ(settings_of("emission = \"burst\"\nstep_us = 365\n").step_us, 365);
+  EXPECT_THAT(
+      error_of(with_keys("emission = \"burst\"\nstep_us = 366\n")),
+      HasSubstr("20:11: mcu[0].step_us: is 366: room for 6 steps in the 2560 us tick of bus "
+                "\"hall\", but motor \"theta\" makes up to 7 by table \"bushd2-constant\"; "
+                "allowed: 365 or less. Or use a slower table"));
+}
+
+TEST(EmissionKeys, PhasesHaveFourOutputsAMotor) {
+  const std::string phases = with_keys("emission = \"phases\"\n");
+  EXPECT_EQ(error_of(replaced(phases, "output = 0\n", "output = 3\n")), "no error");
+  EXPECT_THAT(
+      error_of(replaced(phases, "output = 0\n", "output = 4\n")),
+      HasSubstr("32:10: motor[0].output: is 4; allowed: 0..3 on MCU \"hall:1\", where phases "
+                "take 4 outputs a motor"));
+}
+
+}  // namespace
+}  // namespace bushd::config
