@@ -88,9 +88,16 @@ static void follow_limits(bushd_mcu* mcu, uint16_t pins) {
   debounce(mcu, pins);
   const uint16_t now_active = mcu->active_limits & (uint16_t)~before;
   uint16_t concerned = mcu->active_limits | mcu->hit_positive | mcu->hit_negative;
+  concerned &= (uint16_t)~bushd_mcu_homing_motor(mcu);
   for (uint8_t m = 0; concerned != 0; ++m, concerned = (uint16_t)(concerned >> 1)) {
     if ((concerned & 1u) != 0) follow_limit(mcu, m, (now_active & motor_bit(m)) != 0);
   }
+}
+
+void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
+  const uint16_t limits = direction > 0 ? mcu->inputs.limit_positive : mcu->inputs.limit_negative;
+  uint16_t* const hit = direction > 0 ? &mcu->hit_positive : &mcu->hit_negative;
+  *hit |= limits & motor_bit(m);
 }
 
 static void keep_enable(bushd_mcu* mcu) {

@@ -98,6 +98,24 @@ static inline bool bushd_mcu_steps_keep_slots(const bushd_mcu* mcu) {
 // The plane is complete but for what the emission makes of it.
 void bushd_mcu_shape(bushd_mcu* mcu, bushd_plane* plane);
 
+// A motor that homes stands where its switch is active: that bars the way on.
+void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction);
+
+// A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
+// ends: it is `autonomous` until it rests.
+void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction);
+// Of a motor in a run: by the shortest way that its table allows.
+void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);
+
+// homing.c
+bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message);
+void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs);  // before every tick is prepared
+uint16_t bushd_mcu_homing_motor(const bushd_mcu* mcu);           // as a mask
+
+// local.c
+bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message);
+void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs);  // before every tick
+
 // tables.c: table memory.
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message);

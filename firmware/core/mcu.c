@@ -101,10 +101,20 @@ const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   return &mcu->plane[mcu->front];
 }
 
+static void move_by_itself(bushd_mcu* mcu) {
+  const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
+  bushd_mcu_go_home(mcu, pins.motors ^ mcu->inputs.inverted);
+  if (mcu->local.motors != 0) {
+    bushd_mcu_move_locally(mcu, pins.system ^ mcu->inputs.system_inverted);
+  }
+}
+
 void bushd_mcu_prepare(bushd_mcu* mcu) {
   bushd_mcu_watch_inputs(mcu);
+  if ((mcu->autonomous | mcu->local.motors) != 0) move_by_itself(mcu);
   bushd_mcu_watch_silence(mcu);
   bushd_mcu_emit(mcu, &mcu->plane[mcu->front ^ 1u]);
+  if (mcu->autonomous != 0) mcu->autonomous &= bushd_mcu_moving(mcu);
   bushd_mcu_update_state(mcu);
 }
 

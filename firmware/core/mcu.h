@@ -73,7 +73,9 @@ typedef struct bushd_mcu_config {
 typedef enum bushd_mcu_mode {
   BUSHD_MCU_STREAM = 0,  // the queue decides
   BUSHD_MCU_TABLE_RUN = 1,
-  BUSHD_MCU_RAMP_DOWN = 2
+  BUSHD_MCU_RAMP_DOWN = 2,
+  BUSHD_MCU_AUTONOMOUS =
+      3  // `run` is made, whatever its stage, until homing or local inputs end it
 } bushd_mcu_mode;
 
 // Ticks that are queued beyond a gap; none if they end where they begin.
@@ -152,6 +154,25 @@ typedef struct bushd_mcu_emission {
   uint8_t on_ticks[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];  // its windings, after a move
 } bushd_mcu_emission;
 
+typedef struct bushd_mcu_homing {
+  uint8_t stage;  // bushd_homing
+  uint8_t motor;
+  int8_t direction;     // towards the switch
+  uint8_t readings;     // of it in a row, as they are waited for
+  uint16_t slow_code;   // what `slow` consists of
+  uint32_t slow_steps;  // at most
+  int32_t home_steps;   // the position to be set
+  int32_t seen_steps;   // where the motor stood at the first of the readings
+  bushd_table slow;
+} bushd_mcu_homing;
+
+typedef struct bushd_mcu_local {
+  uint16_t motors;   // a setting
+  uint16_t held;     // of them, those that the button has moved or will move, until it is released
+  int8_t wish;       // +1, -1; 0: none, or both
+  uint8_t readings;  // since it changed
+} bushd_mcu_local;
+
 // Read-only for ports and tests; everything in here is the core's.
 typedef struct bushd_mcu {
   bushd_port port;
@@ -184,6 +205,10 @@ typedef struct bushd_mcu {
   uint16_t bounces[4];      // for how many ticks: bit by bit
   uint16_t hit_positive;    // motors that a limit has stopped, until they have left it
   uint16_t hit_negative;
+  uint16_t autonomous;  // motors that move by homing or local inputs
+  uint16_t homed;
+  bushd_mcu_homing homing;
+  bushd_mcu_local local;
   bushd_run_tick run_tick;  // for the runs' latest time unit
   bushd_mcu_clock clock;
   bushd_mcu_emission emission;

@@ -118,7 +118,7 @@ static int16_t plan_without_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick, bush
   bushd_mcu_motor* motor = &mcu->motor[m];
   motor->known_until = tick + 1u;
   if (motor->delay != 0) queue_ended(mcu, m);
-  if (motor->mode != BUSHD_MCU_RAMP_DOWN) {
+  if (motor->mode < BUSHD_MCU_RAMP_DOWN) {
     motor->begun = false;
     return 0;
   }
@@ -240,14 +240,25 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
   return BUSHD_OK;
 }
 
-// Not only waiting for it: the tick before `next`, the first that is not prepared, was one of it.
-static bool in_table_run(const bushd_mcu_motor* motor, uint32_t next) {
-  return motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->run_from) > 0;
+// A table run not only waited for: the tick before `next`, the first that is not prepared, was one
+// of it.
+static bool in_run(const bushd_mcu_motor* motor, uint32_t next) {
+  return motor->mode == BUSHD_MCU_AUTONOMOUS ||
+         (motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->run_from) > 0);
 }
 
-static void ramp_down_run(bushd_mcu_motor* motor) {
+void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_run_ramp_down(&motor->run);
   motor->mode = bushd_run_done(&motor->run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
+}
+
+void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_run_start(&motor->run, table_of(mcu, motor), steps, direction);
+  motor->mode = BUSHD_MCU_AUTONOMOUS;
+  motor->exact = true;
+  mcu->autonomous |= motor_bit(m);
 }
 
 void bushd_mcu_watch_silence(bushd_mcu* mcu) {
@@ -256,11 +267,11 @@ void bushd_mcu_watch_silence(bushd_mcu* mcu) {
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];
     if (motor->mode != BUSHD_MCU_TABLE_RUN || bushd_run_done(&motor->run)) continue;
-    const bool begun = in_table_run(motor, next);
+    const bool begun = in_run(motor, next);
     const uint32_t from = begun ? next : motor->run_from;
     if (begun) {
       mcu->run_downs = saturating_increment(mcu->run_downs);
-      ramp_down_run(motor);
+      bushd_mcu_ramp_down_run(mcu, m);
     }
     bushd_mcu_cut_queue(mcu, m, from);
     mcu->faults |= BUSHD_FAULT_LINK;
@@ -322,18 +333,18 @@ static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stre
 
 void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t next) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  const bool in_run = in_table_run(motor, next);
+  const bool runs = in_run(motor, next);
   const rest_of_stream rest = rest_of(mcu, m, next);
   const bool at_rest =
       !motor->begun || !rest.moves ||
       (ticks_after(next, motor->rest_from) >= 0 && ticks_after(next, motor->start_tick) <= 0);
-  const uint16_t delay = at_rest || in_run ? 0 : stream_delay(mcu, m, &rest, next);
+  const uint16_t delay = at_rest || runs ? 0 : stream_delay(mcu, m, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
   if (how == BUSHD_CUT) {
     if (motor->mode != BUSHD_MCU_STREAM || !at_rest) motor->remainder = 0;
     motor->mode = BUSHD_MCU_STREAM;
-  } else if (in_run) {
-    ramp_down_run(motor);
+  } else if (runs) {
+    bushd_mcu_ramp_down_run(mcu, m);
   } else if (motor->mode != BUSHD_MCU_RAMP_DOWN && !at_rest) {
     ramp_down_stream(mcu, m, delay);
   }
@@ -351,7 +362,7 @@ int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
   const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->run_from) >= 0 &&
                     ticks_after(motor->run_until, next) > 0;
-  if (runs || motor->mode == BUSHD_MCU_RAMP_DOWN) return motor->run.direction;
+  if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return motor->run.direction;
   const int16_t queued =
       ticks_after(motor->known_until, next) > 0 ? *queue_at((bushd_mcu*)mcu, next, m) : (int16_t)0;
   if (queued != 0) return queued > 0 ? 1 : -1;

@@ -9,7 +9,8 @@ static uint16_t running(const bushd_mcu* mcu) {
     const bushd_mcu_motor* motor = &mcu->motor[m];
     if (motor->mode != BUSHD_MCU_STREAM && motor->exact) mask |= motor_bit(m);
   }
-  return mask;
+  // What people move by local inputs is not for a master to end.
+  return (uint16_t)(mask & ~(mcu->autonomous & ~bushd_mcu_homing_motor(mcu)));
 }
 
 // One island has room in a report: that of the lowest motor, and who else has the same one.
@@ -49,6 +50,9 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   bushd_mcu_report_inputs(mcu, &report);
   report.reset_cause = mcu->config.reset_cause;
   report.failed_tests = mcu->failed_tests;
+  report.autonomous = mcu->autonomous;
+  report.homed = mcu->homed;
+  report.homing = mcu->homing.stage;
   report.bad_frames = mcu->bad_frames;
   report.rejected_frames = mcu->rejected_frames;
   report.last_rejection = mcu->last_rejection;
@@ -76,8 +80,8 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   identity.queue_ticks = mcu->config.queue_ticks;
   identity.table_codes = mcu->config.code_count;
   const uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS |
-                       BUSHD_CAN_TABLE_RUN | BUSHD_CAN_BURST | BUSHD_CAN_COMMON_DIR |
-                       BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES;
+                       BUSHD_CAN_TABLE_RUN | BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_BURST |
+                       BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES;
   identity.capabilities = (uint16_t)(all & ~mcu->config.lacks);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
   return bushd_encode_identity(&identity, payload);
@@ -251,6 +255,10 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, uint32_t ti
       HANDLE(set_inputs, bushd_mcu_set_inputs);
     case BUSHD_MSG_EMISSION:
       HANDLE(emission, bushd_mcu_take_emission);
+    case BUSHD_MSG_HOME:
+      HANDLE(home, bushd_mcu_home);
+    case BUSHD_MSG_LOCAL:
+      HANDLE(local, bushd_mcu_set_local);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:

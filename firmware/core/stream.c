@@ -89,6 +89,7 @@ bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* st
   bushd_mcu_update_state(mcu);
   const bool replace = (stretch->flags & BUSHD_TICKS_REPLACE) != 0;
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
+  if (stretch->mask & mcu->autonomous) return BUSHD_E_STATE;
   const uint8_t ahead = (uint8_t)(stretch->epoch - mcu->epoch);
   if (replace ? ahead == 0 || ahead > INT8_MAX : ahead != 0) return BUSHD_E_EPOCH;
   // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once

@@ -43,7 +43,9 @@ typedef enum bushd_type {
   BUSHD_MSG_SET_ADDRESS = 0x0F,   // bushd_set_address, broadcast -> acknowledgement of the one MCU
   BUSHD_MSG_TABLES = 0x10,        // empty -> reply: bushd_tables
   BUSHD_MSG_INPUTS = 0x11,        // bushd_set_inputs -> acknowledgement
-  BUSHD_MSG_EMISSION = 0x12       // bushd_emission -> acknowledgement
+  BUSHD_MSG_EMISSION = 0x12,      // bushd_emission -> acknowledgement
+  BUSHD_MSG_HOME = 0x13,          // bushd_home -> acknowledgement; how it goes is told by reports
+  BUSHD_MSG_LOCAL = 0x14          // bushd_local -> acknowledgement
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its tag and the MCU's address.
 
@@ -119,6 +121,8 @@ enum {
   BUSHD_CAN_FINE = 1 << 1,
   BUSHD_CAN_TABLE_TICKS = 1 << 2,
   BUSHD_CAN_TABLE_RUN = 1 << 3,
+  BUSHD_CAN_HOME = 1 << 4,
+  BUSHD_CAN_LOCAL = 1 << 5,
   // Emission other than even.
   BUSHD_CAN_BURST = 1 << 8,
   BUSHD_CAN_COMMON_DIR = 1 << 9,
@@ -256,6 +260,39 @@ typedef struct bushd_set_inputs {
   bool enable_after_watchdog;  // EN as it was before a watchdog reset; else low
 } bushd_set_inputs;
 
+// The motor finds its switch by itself: fast by its table until the switch is active, slowly back
+// until it is released, slowly towards it until it is active again; there it stands at
+// `position_steps`. With `most_steps` 0: it gives that up, and ramps down.
+#define BUSHD_HOME_UNIT_NS 10000u
+typedef struct bushd_home {
+  uint8_t motor;
+  int8_t direction;     // towards the switch: +1, -1
+  uint32_t most_steps;  // of the fast approach, below 2^31
+  uint32_t slow_steps;  // at most as many in each of the slow stages; 1 .. 2^31 - 1
+  uint16_t slow_delay;  // of a slow step, BUSHD_HOME_UNIT_NS; >= 1
+  int32_t position_steps;
+} bushd_home;
+
+// What the MCU does for its last HOME, or what came of it.
+typedef enum bushd_homing {
+  BUSHD_HOMING_NONE = 0,  // since boot
+  BUSHD_HOMING_FAST = 1,
+  BUSHD_HOMING_RAMP_DOWN = 2,
+  BUSHD_HOMING_BACK_OFF = 3,
+  BUSHD_HOMING_APPROACH = 4,
+  BUSHD_HOMING_DONE = 5,
+  BUSHD_HOMING_NOT_FOUND = 6,  // by the fast approach
+  BUSHD_HOMING_STUCK = 7,      // the switch was not released
+  BUSHD_HOMING_LOST = 8,       // not found again by the slow approach
+  BUSHD_HOMING_STOPPED = 9     // by a fault, by silence, or because it was given up
+} bushd_homing;
+
+// Motors that the MCU's FORWARD and REVERSE inputs move, by their tables, while one of them is
+// active.
+typedef struct bushd_local {
+  uint16_t motors;
+} bushd_local;
+
 // Asks `count` MCUs for reports, each in a reply slot of its own: entry i (bushd_poll_entry) names
 // an address and when, after this frame's end, its answer begins.
 #define BUSHD_POLL_MAX_ENTRIES ((BUSHD_FRAME_MAX_PAYLOAD - 1u) / 3u)
@@ -386,11 +423,14 @@ typedef struct bushd_report {
   uint16_t current;       // of the supply, 0..1023
   uint8_t reset_cause;    // BUSHD_RESET_*
   uint8_t failed_tests;   // at boot, BUSHD_TEST_*
+  uint16_t autonomous;    // motors that move by homing or by local inputs
+  uint16_t homed;         // motors whose last homing since boot was done
+  uint8_t homing;         // bushd_homing
   uint8_t motor_count;    // <= BUSHD_MOTORS_PER_MCU
   bushd_motor_report motor[BUSHD_MOTORS_PER_MCU];
 } bushd_report;
 
-#define BUSHD_REPORT_SIZE(motors) (61u + 6u * (motors))
+#define BUSHD_REPORT_SIZE(motors) (66u + 6u * (motors))
 #define BUSHD_IDENTITY_SIZE 22u
 #define BUSHD_TABLES_SIZE (1u + 8u * BUSHD_TABLE_SLOTS)
 
@@ -412,6 +452,8 @@ size_t bushd_encode_control(const bushd_control* message, uint8_t* payload);
 size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* payload);
 size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* payload);
 size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload);
+size_t bushd_encode_home(const bushd_home* message, uint8_t* payload);
+size_t bushd_encode_local(const bushd_local* message, uint8_t* payload);
 size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload);
 size_t bushd_encode_poll(const bushd_poll_entry* entries, uint8_t count, uint8_t* payload);
 size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload);
@@ -451,6 +493,8 @@ bushd_status bushd_decode_set_address(const uint8_t* payload, size_t size,
                                       bushd_set_address* message);
 bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
                                      bushd_set_inputs* message);
+bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* message);
+bushd_status bushd_decode_local(const uint8_t* payload, size_t size, bushd_local* message);
 bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message);
 bushd_status bushd_decode_poll(const uint8_t* payload, size_t size, bushd_poll* message);
 bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message);

@@ -255,6 +255,42 @@ bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_t
   return finish(&r, in_range);
 }
 
+size_t bushd_encode_home(const bushd_home* message, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, message->motor);
+  put8(&w, (uint8_t)message->direction);
+  put32(&w, message->most_steps);
+  put32(&w, message->slow_steps);
+  put16(&w, message->slow_delay);
+  put32(&w, (uint32_t)message->position_steps);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* message) {
+  reader r = read_from(payload, size);
+  message->motor = get8(&r);
+  message->direction = (int8_t)get8(&r);
+  message->most_steps = get32(&r);
+  message->slow_steps = get32(&r);
+  message->slow_delay = get16(&r);
+  message->position_steps = (int32_t)get32(&r);
+  return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU &&
+                        (message->direction == 1 || message->direction == -1) &&
+                        message->most_steps <= INT32_MAX && message->slow_steps >= 1 &&
+                        message->slow_steps <= INT32_MAX && message->slow_delay >= 1);
+}
+
+size_t bushd_encode_local(const bushd_local* message, uint8_t* payload) {
+  bushd_put_u16(payload, message->motors);
+  return 2;
+}
+
+bushd_status bushd_decode_local(const uint8_t* payload, size_t size, bushd_local* message) {
+  reader r = read_from(payload, size);
+  message->motors = get16(&r);
+  return finish(&r, true);
+}
+
 size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {
   writer w = {payload};
   put8(&w, message->state);
@@ -285,6 +321,9 @@ size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {
   put16(&w, message->current);
   put8(&w, message->reset_cause);
   put8(&w, message->failed_tests);
+  put16(&w, message->autonomous);
+  put16(&w, message->homed);
+  put8(&w, message->homing);
   put8(&w, message->motor_count);
   for (uint8_t i = 0; i < message->motor_count; ++i) {
     put32(&w, (uint32_t)message->motor[i].position_steps);
@@ -323,6 +362,9 @@ bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_repo
   message->current = get16(&r);
   message->reset_cause = get8(&r);
   message->failed_tests = get8(&r);
+  message->autonomous = get16(&r);
+  message->homed = get16(&r);
+  message->homing = get8(&r);
   message->motor_count = get8(&r);
   if (message->motor_count > BUSHD_MOTORS_PER_MCU) return BUSHD_E_FORMAT;
   for (uint8_t i = 0; i < message->motor_count; ++i) {

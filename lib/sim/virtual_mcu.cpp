@@ -26,6 +26,7 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
   config.turnaround_ns = options.turnaround_ns;
   config.context = this;
   config.edge = sink != nullptr ? on_edge : nullptr;
+  config.read_inputs = on_read_inputs;
   config.transmit = on_transmit;
   bushd_virtual_init(&port_, &config);
 }
@@ -38,6 +39,21 @@ void VirtualMcu::on_edge(void* context, std::int64_t time_ns, bushd_virtual_sign
   static_assert(static_cast<int>(Signal::kEnable) == BUSHD_VIRTUAL_EN);
   static_assert(static_cast<int>(Signal::kCommonDir) == BUSHD_VIRTUAL_COMMON_DIR);
   self.sink_->edge({time_ns, self.index_, static_cast<Signal>(signal), index, level});
+}
+
+void VirtualMcu::attach_switch(std::size_t output, const SwitchOptions& options) {
+  switches_.insert_or_assign(output, Switch(options));
+}
+
+bushd_inputs VirtualMcu::on_read_inputs(void* context, std::int64_t time_ns) {
+  auto& self = *static_cast<VirtualMcu*>(context);
+  bushd_inputs inputs = self.port_.inputs;
+  for (auto& [output, contact] : self.switches_) {
+    const auto bit = static_cast<std::uint16_t>(1u << output);
+    const bool active = contact.read(time_ns, self.port_.shaft[output].position_steps);
+    inputs.motors = static_cast<std::uint16_t>(active ? inputs.motors | bit : inputs.motors & ~bit);
+  }
+  return inputs;
 }
 
 void VirtualMcu::on_transmit(void* context, std::int64_t start_ns, const std::uint8_t* wire,

@@ -3,10 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "firmware/ports/virtual/virtual.h"
 #include "sim/mcu.h"
+#include "sim/switch.h"
 
 namespace bushd::sim {
 
@@ -43,6 +45,8 @@ class VirtualMcu final : public Mcu {
   const bushd_virtual_shaft& shaft(std::size_t output) const { return port_.shaft[output]; }
 
   void set_inputs(bushd_inputs inputs) override { port_.inputs = inputs; }
+  // From now on the input of this output's motor is what a switch at its shaft says.
+  void attach_switch(std::size_t output, const SwitchOptions& options);
   void set_current(std::uint16_t reading) override { port_.current = reading; }
   void fail_self_tests(std::uint8_t tests) { port_.failing_tests = tests; }     // of the next boots
   void set_reset_cause(bushd_reset_cause cause) { port_.reset_cause = cause; }  // of the next boot
@@ -59,6 +63,7 @@ class VirtualMcu final : public Mcu {
  private:
   static void on_edge(void* context, std::int64_t time_ns, bushd_virtual_signal signal,
                       std::uint8_t index, bool level);
+  static bushd_inputs on_read_inputs(void* context, std::int64_t time_ns);
   static void on_transmit(void* context, std::int64_t start_ns, const std::uint8_t* wire,
                           std::size_t size);
 
@@ -67,6 +72,7 @@ class VirtualMcu final : public Mcu {
   EdgeSink* sink_;
   std::vector<std::int16_t> queue_;
   std::vector<std::uint16_t> codes_;
+  std::map<std::size_t, Switch> switches_;  // by output
   bushd_virtual port_;
 };
 

@@ -309,6 +309,26 @@ const std::map<std::string, Kind>& kinds() {
          {"unknown action", set8(10, 3)},
          {"more than can be read", set16(11, 1024)},
          {"neither on nor off", set8(13, 2)}}}},
+      {"home",
+       {bytes_with(16,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 15);
+                     (*p)[1] = *rc::gen::element<uint8_t>(1, 0xFF);
+                     (*p)[5] &= 0x7F;
+                     (*p)[9] &= 0x7F;
+                     (*p)[6] |= 1;
+                     (*p)[10] |= 1;
+                   }),
+        codec(bushd_decode_home, bushd_encode_home),
+        {{"motor 16", set8(0, 16)},
+         {"no direction", set8(1, 0)},
+         {"twice the direction", set8(1, 2)},
+         {"too many steps", set32(2, 0x80000000)},
+         {"no slow steps", set32(6, 0)},
+         {"too many slow steps", set32(6, 0x80000000)},
+         {"no delay", set16(10, 0)}}}},
+      {"local",
+       {[] { return random_bytes(2); }, codec(bushd_decode_local, bushd_encode_local), {}}},
       {"poll", {any_poll, poll_again, {}}},
       {"sync",
        {bytes_with(19,
@@ -370,11 +390,11 @@ const std::map<std::string, Kind>& kinds() {
           const auto motors = between<uint8_t>(0, 16);
           Bytes payload = random_bytes(BUSHD_REPORT_SIZE(motors));
           payload[0] = between<uint8_t>(0, 3);
-          payload[60] = motors;
+          payload[65] = motors;
           return payload;
         },
         codec(bushd_decode_report, bushd_encode_report),
-        {{"state 4", set8(0, 4)}, {"17 motors", set8(60, 17)}}}},
+        {{"state 4", set8(0, 4)}, {"17 motors", set8(65, 17)}}}},
       {"acknowledgement",
        {[] { return random_bytes(1); },
         codec(bushd_decode_acknowledgement, bushd_encode_acknowledgement),

@@ -95,6 +95,14 @@ void put(const bushd_set_inputs& m, Fields& f) {
   f.add("emergency", m.emergency).add("overcurrent", m.overcurrent);
   f.add("enable_after_watchdog", m.enable_after_watchdog);
 }
+void put(const bushd_home& m, Fields& f) {
+  f.add("motor", m.motor).add("direction", m.direction).add("most_steps", m.most_steps);
+  f.add("slow_steps", m.slow_steps).add("slow_delay", m.slow_delay);
+  f.add("position_steps", m.position_steps);
+}
+void put(const bushd_local& m, Fields& f) {
+  f.add("motors", m.motors);
+}
 void put(const bushd_poll& m, Fields& f) {
   std::string entries;
   for (size_t i = 0; i < m.count; ++i) {
@@ -157,7 +165,8 @@ void put(const bushd_report& m, Fields& f) {
   f.add("forbidden_positive", m.forbidden_positive);
   f.add("forbidden_negative", m.forbidden_negative).add("system_inputs", m.system_inputs);
   f.add("current", m.current).add("reset_cause", m.reset_cause);
-  f.add("failed_tests", m.failed_tests).add("motor_count", m.motor_count);
+  f.add("failed_tests", m.failed_tests).add("autonomous", m.autonomous).add("homed", m.homed);
+  f.add("homing", m.homing).add("motor_count", m.motor_count);
   std::string motors;
   for (size_t i = 0; i < m.motor_count; ++i) {
     append(&motors, parts({m.motor[i].position_steps, m.motor[i].known_until}));
@@ -223,6 +232,10 @@ std::string message_text(const bushd_frame& frame) {
       return empty_text("get_tables", frame);
     case BUSHD_MSG_INPUTS:
       return text("set_inputs", frame, bushd_decode_set_inputs);
+    case BUSHD_MSG_HOME:
+      return text("home", frame, bushd_decode_home);
+    case BUSHD_MSG_LOCAL:
+      return text("local", frame, bushd_decode_local);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
       return text("tables", frame, bushd_decode_tables);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY:
@@ -238,11 +251,11 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {"identify",   "identity",  "configure",   "table_begin",     "table_data",
-          "table_end",  "assign",    "control",     "set_position",    "poll",
-          "report",     "sync",      "ticks",       "acknowledgement", "table_ticks",
-          "table_run",  "emergency", "set_address", "get_tables",      "tables",
-          "set_inputs", "emission"};
+  return {
+      "identify",   "identity",        "configure",    "table_begin", "table_data", "table_end",
+      "assign",     "control",         "set_position", "poll",        "report",     "sync",
+      "ticks",      "acknowledgement", "table_ticks",  "table_run",   "emergency",  "set_address",
+      "get_tables", "tables",          "set_inputs",   "emission",    "home",       "local"};
 }
 
 }  // namespace bushd::test

@@ -99,7 +99,10 @@ Rig::Rig(RigOptions options)
   };
   port.adjust_tick = [](void*, std::int32_t) {};
   port.time_in_tick_ns = [](void*) { return kTimeInTickNs; };
-  port.read_inputs = [](void* context) { return static_cast<Rig*>(context)->pins_; };
+  port.read_inputs = [](void* context) {
+    const auto& rig = *static_cast<Rig*>(context);
+    return rig.sense ? rig.sense() : rig.pins_;
+  };
   port.read_current = [](void* context) { return static_cast<Rig*>(context)->current_; };
   port.self_test = [](void* context) { return static_cast<Rig*>(context)->options_.failing_tests; };
   port.keep_enable = [](void* context, bool on) { static_cast<Rig*>(context)->enable_kept_ = on; };
@@ -212,6 +215,17 @@ bushd_status Rig::set_inputs(const InputSettings& settings) {
                                     .enable_after_watchdog = settings.enable_after_watchdog};
   return request(BUSHD_MSG_INPUTS,
                  payload_of([&](std::uint8_t* p) { return bushd_encode_set_inputs(&message, p); }));
+}
+
+bushd_status Rig::home(const bushd_home& message) {
+  return request(BUSHD_MSG_HOME,
+                 payload_of([&](std::uint8_t* p) { return bushd_encode_home(&message, p); }));
+}
+
+bushd_status Rig::local(std::uint16_t motors) {
+  const bushd_local message = {motors};
+  return request(BUSHD_MSG_LOCAL,
+                 payload_of([&](std::uint8_t* p) { return bushd_encode_local(&message, p); }));
 }
 
 void Rig::sync(const bushd_sync& message) {

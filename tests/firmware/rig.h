@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <utility>
@@ -118,8 +119,12 @@ class Rig {
   bushd_status emission(const bushd_emission& message);
   bushd_tables tables();
   bushd_status set_inputs(const InputSettings& settings);
+  bushd_status home(const bushd_home& message);
+  bushd_status local(std::uint16_t motors);
   // The pins, from the next tick that is prepared on.
   void pins(bushd_inputs inputs) { pins_ = inputs; }
+  // If set, the pins are what this says whenever they are read.
+  std::function<bushd_inputs()> sense;
   void current(std::uint16_t reading) { current_ = reading; }
   // Without an answer.
   void emergency(bushd_how how, std::uint8_t address = BUSHD_ADDRESS_BROADCAST);

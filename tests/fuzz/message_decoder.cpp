@@ -92,6 +92,13 @@ void decode_for_mcu(Bytes payload) {
     BUSHD_REQUIRE(inputs.emergency <= BUSHD_EMERGENCY_INPUT_CUTS);
     BUSHD_REQUIRE(inputs.debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS);
   }
+  bushd_home home;
+  if (decoded(payload, &home, bushd_decode_home, bushd_encode_home)) {
+    BUSHD_REQUIRE(home.motor < BUSHD_MOTORS_PER_MCU && home.direction * home.direction == 1);
+    BUSHD_REQUIRE(home.most_steps <= INT32_MAX && home.slow_steps - 1 < INT32_MAX);
+  }
+  bushd_local local;
+  decoded(payload, &local, bushd_decode_local, bushd_encode_local);
   bushd_emergency emergency;
   if (decoded(payload, &emergency, bushd_decode_emergency, bushd_encode_emergency)) {
     BUSHD_REQUIRE(emergency.how == BUSHD_RAMP_DOWN || emergency.how == BUSHD_CUT);

@@ -51,7 +51,7 @@ TEST_F(AvrKept, TablesAndSettingsOutliveAReset) {
   ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp(2000, 900), 1100));
   ASSERT_EQ(invert(BUSHD_INPUT_FORWARD), BUSHD_OK);
   const bushd_tables before = tables();
-  pass(9'000'000'000);
+  pass(12'000'000'000);
   reboot();
   const bushd_tables after = tables();
   for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
@@ -69,6 +69,26 @@ TEST_F(AvrKept, TablesAndSettingsOutliveAReset) {
   run(7, 50);
   pass(200 * TimeNs{kTickNs});
   EXPECT_EQ(steps_made(7), 50u);
+}
+
+TEST_F(AvrKept, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  ASSERT_EQ(
+      master_.acknowledged(kAddress, BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 3}),
+      BUSHD_OK);
+  pass(3'000'000'000);
+  reboot();
+  avr_->set_inputs({0, BUSHD_INPUT_REVERSE});
+  pass(100 * TimeNs{kTickNs});
+  const std::size_t held = steps_made(3);
+  EXPECT_GT(held, 100u) << "1.5 ms a step";
+  avr_->set_inputs({0, 0});
+  pass(20 * TimeNs{kTickNs});
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.moving, 0);
+  EXPECT_EQ(report.motor[3].position_steps, -static_cast<std::int32_t>(steps_made(3)));
+  EXPECT_LT(steps_made(3), held + 10);
+  EXPECT_EQ(steps_made(4), 0u);
 }
 
 TEST_F(AvrKept, WhatIsTheSameIsNotWrittenAgain) {

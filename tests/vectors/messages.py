@@ -25,6 +25,9 @@ LAYOUTS = {
     "set_inputs": (0x11, [("limit_positive", 2), ("limit_negative", 2), ("limit_cuts", 2), ("inverted", 2),
                           ("debounce_ticks", 1), ("system_inverted", 1), ("emergency", 1), ("overcurrent", 2),
                           ("enable_after_watchdog", 1)]),
+    "home": (0x13, [("motor", 1), ("direction", -1), ("most_steps", 4), ("slow_steps", 4), ("slow_delay", 2),
+                    ("position_steps", -4)]),
+    "local": (0x14, [("motors", 2)]),
     "identity": (0x81, [("protocol_version", 1), ("motors", 1), ("firmware_version", 2), ("boot_number", 2),
                         ("slots", 2), ("queue_ticks", 2), ("table_codes", 2), ("capabilities", 2),
                         ("unique_id", [1])]),
@@ -34,7 +37,7 @@ LAYOUTS = {
                       ("run_downs", 2), ("low_water_ticks", 2), ("islands", 2), ("island_from", 2),
                       ("island_until", 2), ("forbidden_positive", 2), ("forbidden_negative", 2),
                       ("system_inputs", 1), ("current", 2), ("reset_cause", 1), ("failed_tests", 1),
-                      ("motor_count", 1), ("motor", [-4, 2])]),
+                      ("autonomous", 2), ("homed", 2), ("homing", 1), ("motor_count", 1), ("motor", [-4, 2])]),
     "tables": (0x90, [("valid", 1), ("held", [4, 4])]),
     "acknowledgement": (0x82, [("status", 1)]),
 }

@@ -178,7 +178,8 @@ static uint32_t port_time_in_tick_ns(void* context) {
 
 static bushd_inputs port_read_inputs(void* context) {
   const bushd_virtual* v = context;
-  return v->inputs;
+  if (v->config.read_inputs == NULL) return v->inputs;
+  return v->config.read_inputs(v->config.context, v->now_ns);
 }
 
 static uint16_t port_read_current(void* context) {

@@ -48,6 +48,9 @@ typedef struct bushd_virtual_config {
   void (*edge)(void* context, int64_t time_ns, bushd_virtual_signal signal, uint8_t index,
                bool level);
 
+  // The inputs, now that the MCU reads them. NULL: they are as bushd_virtual.inputs says.
+  bushd_inputs (*read_inputs)(void* context, int64_t time_ns);
+
   // The MCU drives the line from start_ns on; `wire` is valid during the call only.
   void (*transmit)(void* context, int64_t start_ns, const uint8_t* wire, size_t size);
 } bushd_virtual_config;

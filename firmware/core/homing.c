@@ -1,0 +1,174 @@
+// HOME: a motor looks for its switch by itself, and its position is set there. One motor of an MCU
+// at a time; in stages, each of them a run:
+//
+//     fast        by the motor's table until the switch is active, and the ramp-down from there
+//     back-off    slowly away from it until it is released
+//     approach    slowly towards it until it is active again
+//
+// A run of the slow stages is one of a table with a single code. It is not shorter than a tick, so
+// at most one step falls between two readings of the switch: the step at which it becomes active is
+// known to a step. A contact bounces; it counts as active, or as released, after READINGS readings
+// in a row. Home is where the motor stood at the beginning of the tick with the first of them, and
+// what it makes beyond is counted from there.
+#include <string.h>
+
+#include "firmware/core/internal.h"
+
+enum { READINGS = 3 };
+
+static bool under_way(const bushd_mcu_homing* homing) {
+  return homing->stage >= BUSHD_HOMING_FAST && homing->stage <= BUSHD_HOMING_APPROACH;
+}
+
+uint16_t bushd_mcu_homing_motor(const bushd_mcu* mcu) {
+  const uint8_t m = mcu->homing.motor;
+  const bool homes = under_way(&mcu->homing) && mcu->motor[m].mode == BUSHD_MCU_AUTONOMOUS;
+  return homes ? motor_bit(m) : (uint16_t)0;
+}
+
+static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
+  bushd_mcu_homing* homing = &mcu->homing;
+  homing->stage = (uint8_t)stage;
+  homing->readings = 0;
+  bushd_run_start(&mcu->motor[homing->motor].run, &homing->slow, homing->slow_steps, direction);
+}
+
+static void end(bushd_mcu* mcu, bushd_homing stage) {
+  bushd_mcu_motor* motor = &mcu->motor[mcu->homing.motor];
+  mcu->homing.stage = (uint8_t)stage;
+  if (motor->mode != BUSHD_MCU_AUTONOMOUS) return;
+  motor->mode = BUSHD_MCU_STREAM;
+  motor->remainder = 0;
+}
+
+static void arrive(bushd_mcu* mcu) {
+  const bushd_mcu_homing* homing = &mcu->homing;
+  bushd_mcu_motor* motor = &mcu->motor[homing->motor];
+  const uint32_t beyond = (uint32_t)motor->position_steps - (uint32_t)homing->seen_steps;
+  motor->position_steps = (int32_t)((uint32_t)homing->home_steps + beyond);
+  mcu->homed |= motor_bit(homing->motor);
+  bushd_mcu_stands_at_switch(mcu, homing->motor, homing->direction);
+  end(mcu, BUSHD_HOMING_DONE);
+}
+
+// Counts the readings in a row that are as `wanted`; true if they are enough.
+static bool is_sure(bushd_mcu* mcu, bool as_wanted) {
+  bushd_mcu_homing* homing = &mcu->homing;
+  if (!as_wanted) {
+    homing->readings = 0;
+    return false;
+  }
+  if (homing->readings == 0) homing->seen_steps = mcu->motor[homing->motor].position_steps;
+  return ++homing->readings >= READINGS;
+}
+
+static void watch_silence(bushd_mcu* mcu) {
+  if (mcu->silent_ticks < mcu->silence_ticks) return;
+  mcu->faults |= BUSHD_FAULT_LINK;
+  mcu->run_downs = saturating_increment(mcu->run_downs);
+  bushd_mcu_ramp_down_run(mcu, mcu->homing.motor);
+}
+
+static void go_on(bushd_mcu* mcu, bool active) {
+  bushd_mcu_homing* homing = &mcu->homing;
+  bushd_run* run = &mcu->motor[homing->motor].run;
+  const bool done = bushd_run_done(run);
+  switch (homing->stage) {
+    case BUSHD_HOMING_FAST:
+      if (active) {
+        // One that has not made a step stands on its switch, and need not begin in order to stop.
+        if (run->steps_done != 0) {
+          bushd_run_ramp_down(run);
+        } else {
+          bushd_run_start(run, run->table, 0, homing->direction);
+        }
+        homing->stage = BUSHD_HOMING_RAMP_DOWN;
+      } else if (done) {
+        end(mcu, BUSHD_HOMING_NOT_FOUND);
+      }
+      break;
+    case BUSHD_HOMING_RAMP_DOWN:
+      if (done) begin_slow(mcu, BUSHD_HOMING_BACK_OFF, (int8_t)-homing->direction);
+      break;
+    case BUSHD_HOMING_BACK_OFF:
+      if (is_sure(mcu, !active)) {
+        begin_slow(mcu, BUSHD_HOMING_APPROACH, homing->direction);
+      } else if (done && homing->readings == 0) {
+        end(mcu, BUSHD_HOMING_STUCK);
+      }
+      break;
+    default:
+      if (is_sure(mcu, active)) {
+        arrive(mcu);
+      } else if (done && homing->readings == 0) {
+        end(mcu, BUSHD_HOMING_LOST);
+      }
+  }
+}
+
+void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs) {
+  if (!under_way(&mcu->homing)) return;
+  watch_silence(mcu);
+  const uint8_t m = mcu->homing.motor;
+  if (mcu->motor[m].mode == BUSHD_MCU_AUTONOMOUS) {
+    go_on(mcu, (active_inputs & motor_bit(m)) != 0);
+  } else {
+    end(mcu, BUSHD_HOMING_STOPPED);
+  }
+}
+
+static bool slow_enough(const bushd_mcu* mcu, const bushd_home* message) {
+  const bushd_table* table = &mcu->table[mcu->motor[message->motor].table].table;
+  const uint16_t first = bushd_table_accel(table, 0);
+  const uint16_t last = bushd_table_decel(table, 0);
+  const uint64_t slowest_ns = (uint64_t)(first > last ? first : last) * table->time_unit_ns;
+  const uint32_t slow_ns = (uint32_t)message->slow_delay * BUSHD_HOME_UNIT_NS;
+  return slow_ns >= mcu->tick_ns && slow_ns >= slowest_ns;
+}
+
+static uint16_t active_inputs(const bushd_mcu* mcu) {
+  return mcu->port.read_inputs(mcu->port.context).motors ^ mcu->inputs.inverted;
+}
+
+static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
+  const uint16_t bit = motor_bit(message->motor);
+  bushd_mcu_update_state(mcu);
+  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
+  if (mcu->motor[message->motor].table < 0) return BUSHD_E_NO_TABLE;
+  if (under_way(&mcu->homing) || (bushd_mcu_moving(mcu) & bit) != 0) return BUSHD_E_STATE;
+  if (!slow_enough(mcu, message)) return BUSHD_E_FORMAT;
+  // On its switch it will back off; but it must not look for it where it has overrun it.
+  const bool on_switch = (active_inputs(mcu) & bit) != 0;
+  const uint16_t barred = bushd_mcu_forbidden(mcu, (int8_t)-message->direction) |
+                          (on_switch ? 0u : bushd_mcu_forbidden(mcu, message->direction));
+  return (barred & bit) != 0 ? BUSHD_E_FORBIDDEN : BUSHD_OK;
+}
+
+bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
+  bushd_mcu_homing* homing = &mcu->homing;
+  if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
+  const bool same = under_way(homing) && homing->motor == message->motor;
+  if (message->most_steps == 0) {
+    if (same) bushd_mcu_ramp_down_run(mcu, message->motor);
+    return BUSHD_OK;
+  }
+  if (same) return BUSHD_OK;
+  const bushd_status status = check(mcu, message);
+  if (status != BUSHD_OK) return status;
+  memset(homing, 0, sizeof *homing);
+  homing->stage = BUSHD_HOMING_FAST;
+  homing->motor = message->motor;
+  homing->direction = message->direction;
+  homing->slow_steps = message->slow_steps;
+  homing->home_steps = message->position_steps;
+  homing->slow_code = message->slow_delay;
+  homing->slow.accel.code = homing->slow.decel.code = &homing->slow_code;
+  homing->slow.accel.count = homing->slow.decel.count = 1;
+  homing->slow.cruise = message->slow_delay;
+  homing->slow.time_unit_ns = BUSHD_HOME_UNIT_NS;
+  const uint16_t bit = motor_bit(message->motor);
+  mcu->homed &= (uint16_t)~bit;
+  mcu->local.held &= (uint16_t)~bit;
+  bushd_mcu_begin_by_itself(mcu, message->motor, message->most_steps, message->direction);
+  return BUSHD_OK;
+}

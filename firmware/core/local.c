@@ -1,0 +1,67 @@
+// LOCAL: motors that people move by two buttons at the MCU, with a host or without. While FORWARD
+// or REVERSE is held they accelerate by their tables and cruise; when it is released, or both are
+// held, they ramp down. A press counts when it has lasted for READINGS readings, a release at once.
+#include "firmware/core/internal.h"
+
+enum { READINGS = 3 };
+
+// Other faults are the host's: without one, people may still move a motor.
+static const uint8_t kForbids = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_EMERGENCY |
+                                BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_OVERCURRENT;
+
+static int8_t wish_of(uint8_t system_inputs) {
+  const bool forward = (system_inputs & BUSHD_INPUT_FORWARD) != 0;
+  const bool reverse = (system_inputs & BUSHD_INPUT_REVERSE) != 0;
+  return (int8_t)(forward - reverse);
+}
+
+static void release(bushd_mcu* mcu) {
+  uint16_t moving = (uint16_t)(mcu->local.held & mcu->autonomous);
+  mcu->local.held = 0;
+  for (uint8_t m = 0; moving != 0; ++m, moving = (uint16_t)(moving >> 1)) {
+    if (moving & 1u) bushd_mcu_ramp_down_run(mcu, m);
+  }
+}
+
+// Also those that come to rest only now. What a host moves stays the host's until the next press.
+static void begin_held(bushd_mcu* mcu) {
+  if ((mcu->local.held & ~mcu->autonomous) == 0) return;
+  mcu->local.held &= (uint16_t) ~(bushd_mcu_moving(mcu) & ~mcu->autonomous);
+  uint16_t begins =
+      (uint16_t)(mcu->local.held & ~mcu->autonomous & ~bushd_mcu_forbidden(mcu, mcu->local.wish));
+  for (uint8_t m = 0; begins != 0; ++m, begins = (uint16_t)(begins >> 1)) {
+    if ((begins & 1u) == 0 || mcu->motor[m].table < 0) continue;
+    bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish);
+  }
+}
+
+// Once a host has set the MCU up, EN is its affair: there may be hands in the mechanism.
+static bool may_enable(const bushd_mcu* mcu) {
+  const uint8_t its = mcu->flags & (BUSHD_FLAG_ENABLED | BUSHD_FLAG_CONFIGURED);
+  return its != BUSHD_FLAG_CONFIGURED;
+}
+
+void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs) {
+  bushd_mcu_local* local = &mcu->local;
+  const int8_t wish = wish_of(system_inputs);
+  const bool allowed = may_enable(mcu) && (mcu->faults & kForbids) == 0;
+  if (wish != local->wish || !allowed) {
+    release(mcu);
+    local->wish = wish;
+    local->readings = 0;
+  }
+  if (wish == 0 || !allowed) return;
+  if (local->readings < READINGS && ++local->readings == READINGS) {
+    local->held = (uint16_t)(local->motors & ~bushd_mcu_homing_motor(mcu));
+    if ((mcu->flags & BUSHD_FLAG_ENABLED) == 0) bushd_mcu_set_enable(mcu, true);
+  }
+  begin_held(mcu);
+}
+
+bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
+  const uint16_t changed = (uint16_t)(mcu->local.motors ^ message->motors);
+  if (changed & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
+  mcu->local.motors = message->motors;
+  mcu->local.held &= message->motors;
+  return BUSHD_OK;
+}

@@ -1,0 +1,183 @@
+// LOCAL: two buttons at the MCU move motors, with a host or without.
+#include <algorithm>
+
+#include "firmware/streams.h"
+
+namespace bushd::test {
+namespace {
+
+constexpr std::uint16_t kMotors = 0b0101;
+
+class Local : public Streams {
+ protected:
+  void SetUp() override { ASSERT_EQ(rig.local(kMotors), BUSHD_OK); }
+  void hold(std::uint8_t buttons, int ticks) {
+    rig.pins({0, buttons});
+    rig.pass(ticks);
+  }
+  void release() { hold(0, 1); }
+  void expect_counted() {
+    rig.pass_until_rest();
+    const bushd_report report = rig.poll();
+    EXPECT_EQ(report.autonomous, 0);
+    for (std::uint8_t m = 0; m < report.motor_count; ++m) {
+      EXPECT_EQ(report.motor[m].position_steps, rig.pulses(m));
+    }
+    EXPECT_EQ(rig.steps_with_dir(), 0);
+    EXPECT_EQ(rig.steps_while_disabled(), 0);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Formats, Local, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
+                         format_name);
+
+TEST_P(Local, WhileHeldMotorsFollowTheirTableAndThenRampDown) {
+  for (const auto& [button, direction] :
+       {std::pair{BUSHD_INPUT_FORWARD, 1}, std::pair{BUSHD_INPUT_REVERSE, -1}}) {
+    rig.forget_history();
+    hold(static_cast<std::uint8_t>(button), 130);
+    EXPECT_EQ(rig.poll().autonomous, kMotors);
+    EXPECT_EQ(rig.poll().moving, kMotors);
+    EXPECT_EQ(rig.poll().running, 0) << "not for a master to end";
+    EXPECT_EQ(rig.poll().state, BUSHD_STATE_RUN);
+    release();
+    rig.pass_until_rest();
+    // The third reading begins it, in the tick that is prepared then; the release is read in the
+    // tick after the 130th.
+    auto reference = Reference::move(law, 100000);
+    reference.ramp_down_at(128 * std::uint64_t{Rig::kTickNs});
+    std::vector<int> expected = steps_by_tick(reference, Rig::kTickNs);
+    for (int& n : expected) n *= direction;
+    std::vector<int> seen(rig.history(2).begin() + 4, rig.history(2).end());
+    ASSERT_GE(seen.size(), expected.size());
+    expected.resize(seen.size());
+    EXPECT_EQ(seen, expected);
+    EXPECT_EQ(rig.history(0), rig.history(2));
+    EXPECT_EQ(rig.pulses(1), 0) << "not one of these";
+    expect_counted();
+    EXPECT_EQ(rig.poll().faults, 0);
+  }
+}
+
+TEST_P(Local, BothButtonsRampDownAndABounceIsNoPress) {
+  hold(BUSHD_INPUT_FORWARD, 2);
+  release();
+  hold(BUSHD_INPUT_FORWARD, 2);
+  release();
+  EXPECT_EQ(rig.poll().moving, 0);
+  hold(BUSHD_INPUT_FORWARD, 60);
+  hold(BUSHD_INPUT_FORWARD | BUSHD_INPUT_REVERSE, 100);
+  EXPECT_EQ(rig.poll().moving, 0);
+  const std::int64_t at = rig.pulses(0);
+  EXPECT_GT(at, 20);
+  hold(BUSHD_INPUT_REVERSE, 60);
+  release();
+  rig.pass_until_rest();
+  EXPECT_LT(rig.pulses(0), at);
+  expect_counted();
+}
+
+// A tap on the other button: it turns only after its ramp, and only where it is still asked to.
+TEST_P(Local, PressedAgainOnTheRampItMovesOnceItRests) {
+  hold(BUSHD_INPUT_FORWARD, 100);
+  hold(BUSHD_INPUT_REVERSE, 300);
+  release();
+  EXPECT_LT(rig.pulses(0), 100);
+  rig.pass_until_rest();
+  const auto& ticks = rig.history(0);
+  const auto turned = std::find_if(ticks.begin(), ticks.end(), [](int n) { return n < 0; });
+  ASSERT_NE(turned, ticks.end());
+  EXPECT_TRUE(std::none_of(turned, ticks.end(), [](int n) { return n > 0; }));
+  expect_counted();
+}
+
+TEST_P(Local, AStreamOnSuchAMotorIsRefusedMeanwhileAndWhatStreamsIsLeftAlone) {
+  hold(BUSHD_INPUT_FORWARD, 10);
+  EXPECT_EQ(rig.take(ones(kStart, rig.first_open(), 4, 0)), BUSHD_E_STATE);
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_E_STATE);
+  EXPECT_EQ(rig.local(0), BUSHD_E_STATE);
+  release();
+  rig.pass_until_rest();
+  const std::int64_t at = rig.pulses(0);
+  const std::int64_t other = rig.pulses(2);
+  ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 30, 0)), BUSHD_OK);
+  hold(BUSHD_INPUT_REVERSE, 60);
+  EXPECT_EQ(rig.pulses(0), at + 30) << "not after it either, until the next press";
+  EXPECT_LT(rig.pulses(2), other);
+  release();
+  rig.pass_until_rest();
+  hold(BUSHD_INPUT_REVERSE, 30);
+  release();
+  rig.pass_until_rest();
+  EXPECT_LT(rig.pulses(0), at + 30);
+  expect_counted();
+}
+
+TEST_P(Local, EmergencyStopsItUntilItIsClearedAndPressedAgain) {
+  hold(BUSHD_INPUT_FORWARD, 60);
+  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.pass(200);
+  EXPECT_EQ(rig.poll().moving, 0);
+  const std::int64_t at = rig.pulses(0);
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  rig.pass(50);
+  EXPECT_GT(rig.pulses(0), at) << "held all the time: it is asked for, and allowed again";
+  release();
+  expect_counted();
+}
+
+TEST_P(Local, WorksWithoutAHostButNotWithoutDriversOrTables) {
+  ASSERT_EQ(rig.configure(format, Rig::kTickNs, 5), BUSHD_OK);
+  rig.pass(500);
+  hold(BUSHD_INPUT_FORWARD, 60);
+  release();
+  rig.pass_until_rest();
+  EXPECT_GT(rig.pulses(0), 20);
+  EXPECT_EQ(rig.poll().faults, 0) << "nobody's silence is a fault here";
+  expect_counted();
+  const std::int64_t at = rig.pulses(0);
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_OK);
+  hold(BUSHD_INPUT_FORWARD, 60);
+  release();
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_ENABLE | BUSHD_CONTROL_FORGET_TABLES), BUSHD_OK);
+  hold(BUSHD_INPUT_FORWARD, 60);
+  release();
+  EXPECT_EQ(rig.pulses(0), at);
+}
+
+TEST_P(Local, StopsAtALimitAndComesBackFromIt) {
+  ASSERT_EQ(rig.set_inputs({.limit_positive = 0b0001}), BUSHD_OK);
+  hold(BUSHD_INPUT_FORWARD, 100);
+  rig.pins({0b0001, BUSHD_INPUT_FORWARD});
+  rig.pass(200);
+  const std::int64_t at = rig.pulses(0);
+  rig.pass(100);
+  EXPECT_EQ(rig.pulses(0), at);
+  EXPECT_EQ(rig.poll().autonomous, 0b0100) << "the other one moves on";
+  rig.pins({0b0001, 0});
+  rig.pass(100);
+  rig.pins({0b0001, BUSHD_INPUT_FORWARD});
+  rig.pass(50);
+  EXPECT_EQ(rig.pulses(0), at) << "barred";
+  rig.pins({0b0001, 0});
+  rig.pass_until_rest();
+  rig.pins({0b0001, BUSHD_INPUT_REVERSE});
+  rig.pass(50);
+  release();
+  EXPECT_LT(rig.pulses(0), at);
+  expect_counted();
+}
+
+TEST_P(Local, LeavesAMotorThatHomesAlone) {
+  ASSERT_EQ(rig.home({0, -1, 5000, 400, 1000, 0}), BUSHD_OK);
+  rig.pass(20);
+  hold(BUSHD_INPUT_FORWARD, 60);
+  EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_FAST);
+  EXPECT_GT(rig.pulses(2), 0);
+  release();
+  rig.pass(20);
+  EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_FAST);
+  EXPECT_LT(rig.pulses(0), -20);
+}
+
+}  // namespace
+}  // namespace bushd::test
