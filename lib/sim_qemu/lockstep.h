@@ -6,11 +6,13 @@
 #include <stdint.h>
 
 typedef enum lockstep_command_kind {
-  LOCKSTEP_RUN = 1,     // until time_ns; answered by events, the last one LOCKSTEP_STOPPED
-  LOCKSTEP_BYTE = 2,    // value: its stop bit ends at time_ns, in the order of their times
-  LOCKSTEP_INPUTS = 3,  // value: levels of the motors' inputs; address: those of the system's
-  LOCKSTEP_FLASH = 4,   // value: the word at `address`, before the first RUN
-  LOCKSTEP_CURRENT = 5  // value: what its ADC reads
+  LOCKSTEP_RUN = 1,          // until time_ns; answered by events, the last one LOCKSTEP_STOPPED
+  LOCKSTEP_BYTE = 2,         // value: its stop bit ends at time_ns, in the order of their times
+  LOCKSTEP_INPUTS = 3,       // value: levels of the motors' inputs; address: those of the system's
+  LOCKSTEP_CURRENT = 4,      // value: what its ADC reads
+  LOCKSTEP_FLASH = 5,        // value: the word at `address`, before the first RUN
+  LOCKSTEP_RESET_CAUSE = 6,  // value: RESC, before the first RUN
+  LOCKSTEP_STOP_TICKS = 7    // the timer that begins ticks interrupts no more
 } lockstep_command_kind;
 
 typedef enum lockstep_event_kind {
@@ -21,7 +23,8 @@ typedef enum lockstep_event_kind {
   LOCKSTEP_DRIVER_ENABLE = 5,  // value: level; address: 1 if the UART is sending
   LOCKSTEP_SENT = 6,           // value: a byte that its UART took at this time
   LOCKSTEP_OVERRUN = 7,        // a byte was lost in its UART
-  LOCKSTEP_STORED = 8          // value: the flash word at `address` is this now
+  LOCKSTEP_STORED = 8,         // value: the flash word at `address` is this now
+  LOCKSTEP_WATCHDOG = 9        // it is reset, and the process ends
 } lockstep_event_kind;
 
 typedef struct lockstep_message {

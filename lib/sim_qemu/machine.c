@@ -6,7 +6,9 @@
  * model is made up for here:
  * - a UART's BUSY flag, and the time that it takes to send
  * - flash that can be written
- * - an ADC that reads what it is told */
+ * - an ADC that reads what it is told
+ * - why it was reset, and a watchdog that ends this process, as the next one has all memory fresh
+ */
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -25,13 +27,19 @@ __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t 
 #define GPIO_C "/machine/unattached/device[10]"
 #define GPIO_D "/machine/unattached/device[11]"
 #define GPIO_E "/machine/unattached/device[12]"
+#define TIMER_1 "/machine/unattached/device[4]" /* begins ticks */
 #define TIMER_2 "/machine/unattached/device[5]" /* starts and paces what is sent */
 #define UART_0 "/machine/unattached/device[16]"
 
+#define TIMER_CTL 0xCu
+#define TIMER_IMR 0x18u
+#define PAGE 0x1000u /* of registers */
 #define FLASH_CONTROL 0x400FD000u
 #define FLASH_PAGE 1024u
 #define FLASH_KEY 0xA442u
 #define ADC_AT 0x40038000u
+#define WATCHDOG_AT 0x40000000u
+#define RESET_CAUSE_AT 0x400FE05Cu
 #define UART_0_AT 0x4000C000u
 #define CYCLE_NS 20
 
@@ -72,6 +80,19 @@ static struct {
   MemoryRegion region;
   uint32_t reading;
 } adc;
+
+static struct {
+  MemoryRegion region;
+  uint32_t flags;
+} reset_cause;
+
+static struct {
+  MemoryRegion region;
+  QEMUTimer timer;
+  uint32_t load;
+  uint32_t control;
+  bool interrupt;
+} watchdog;
 
 #define SYSTEM_INPUTS 4
 static qemu_irq system_input[SYSTEM_INPUTS];
@@ -154,6 +175,8 @@ static void set_timer(void) {
   timer_mod(&lockstep.timer, byte_first ? byte->time_ns : lockstep.until_ns);
 }
 
+static MemoryRegion* tick_timer;
+
 /* Until it may run. */
 static void obey(void) {
   for (;;) {
@@ -172,6 +195,12 @@ static void obey(void) {
         for (int i = 0; i < SYSTEM_INPUTS; ++i) {
           qemu_set_irq(system_input[i], command.address >> i & 1u);
         }
+        break;
+      case LOCKSTEP_RESET_CAUSE:
+        reset_cause.flags = command.value;
+        break;
+      case LOCKSTEP_STOP_TICKS:
+        memory_region_dispatch_write(tick_timer, TIMER_IMR, 0, MO_32, MEMTXATTRS_UNSPECIFIED);
         break;
       case LOCKSTEP_CURRENT:
         adc.reading = command.value;
@@ -194,7 +223,7 @@ static void on_time(void* opaque) {
   const int64_t now_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL);
   while (next_byte() != NULL && next_byte()->time_ns <= now_ns) hear();
   if (now_ns >= lockstep.until_ns) {
-    tell(LOCKSTEP_STOPPED, register_of(uart.timer, 0xC) & 1u, 0);
+    tell(LOCKSTEP_STOPPED, register_of(uart.timer, TIMER_CTL) & 1u, 0);
     flush();
     obey();
   }
@@ -304,6 +333,52 @@ static void adc_write(void* opaque, hwaddr address, uint64_t data, unsigned size
   (void)size;
 }
 
+static uint64_t cause_read(void* opaque, hwaddr address, unsigned size) {
+  (void)opaque;
+  (void)address;
+  (void)size;
+  return reset_cause.flags;
+}
+
+static void cause_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
+  (void)opaque;
+  (void)address;
+  (void)size;
+  reset_cause.flags = (uint32_t)data;
+}
+
+static void watchdog_reload(void) {
+  if ((watchdog.control & 1u) == 0) return;
+  timer_mod(&watchdog.timer,
+            qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) + (int64_t)watchdog.load * CYCLE_NS);
+}
+
+static void on_watchdog(void* opaque) {
+  (void)opaque;
+  if (watchdog.interrupt && (watchdog.control & 2u) != 0) {
+    tell(LOCKSTEP_WATCHDOG, 0, 0);
+    flush();
+    _exit(0);
+  }
+  watchdog.interrupt = true;
+  watchdog_reload();
+}
+
+static uint64_t watchdog_read(void* opaque, hwaddr address, unsigned size) {
+  (void)opaque;
+  (void)size;
+  return address == 0x8u ? watchdog.control : 0;
+}
+
+static void watchdog_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
+  (void)opaque;
+  (void)size;
+  if (address == 0x0u) watchdog.load = (uint32_t)data;
+  if (address == 0x8u) watchdog.control |= (uint32_t)data;
+  if (address == 0xCu) watchdog.interrupt = false;
+  watchdog_reload();
+}
+
 static uint64_t flash_read(void* opaque, hwaddr address, unsigned size) {
   (void)opaque;
   (void)address;
@@ -332,8 +407,8 @@ static void flash_write(void* opaque, hwaddr address, uint64_t data, unsigned si
   }
 }
 
-static void cover(MemoryRegion* region, hwaddr at, const MemoryRegionOps* ops, const char* name) {
-  memory_region_init_io(region, NULL, ops, NULL, name, 0x1000);
+static void cover(MemoryRegion* region, hwaddr at, uint64_t size, const MemoryRegionOps* ops) {
+  memory_region_init_io(region, NULL, ops, NULL, "bushd", size);
   memory_region_add_subregion_overlap(get_system_memory(), at, region, 1);
 }
 
@@ -344,6 +419,10 @@ static void on_machine_done(Notifier* notifier, void* data) {
       .read = uart_read, .write = uart_write, .endianness = DEVICE_LITTLE_ENDIAN};
   static const MemoryRegionOps kFlash = {
       .read = flash_read, .write = flash_write, .endianness = DEVICE_LITTLE_ENDIAN};
+  static const MemoryRegionOps kWatchdog = {
+      .read = watchdog_read, .write = watchdog_write, .endianness = DEVICE_LITTLE_ENDIAN};
+  static const MemoryRegionOps kCause = {
+      .read = cause_read, .write = cause_write, .endianness = DEVICE_LITTLE_ENDIAN};
   static const MemoryRegionOps kAdc = {
       .read = adc_read, .write = adc_write, .endianness = DEVICE_LITTLE_ENDIAN};
   for (int i = 0; i < SYSTEM_INPUTS; ++i) system_input[i] = qdev_get_gpio_in(gpio(GPIO_A), 4 + i);
@@ -362,9 +441,13 @@ static void on_machine_done(Notifier* notifier, void* data) {
   if (uart.line == NULL) give_up();
   uart.real = sysbus_mmio_get_region(find(UART_0, "pl011_luminary"), 0);
   uart.timer = sysbus_mmio_get_region(find(TIMER_2, "stellaris-gptm"), 0);
-  cover(&uart.region, UART_0_AT, &kUart, "bushd-uart");
-  cover(&adc.region, ADC_AT, &kAdc, "bushd-adc");
-  cover(&flash.region, FLASH_CONTROL, &kFlash, "bushd-flash");
+  cover(&uart.region, UART_0_AT, PAGE, &kUart);
+  cover(&adc.region, ADC_AT, PAGE, &kAdc);
+  cover(&flash.region, FLASH_CONTROL, PAGE, &kFlash);
+  cover(&watchdog.region, WATCHDOG_AT, PAGE, &kWatchdog);
+  cover(&reset_cause.region, RESET_CAUSE_AT, 4, &kCause);
+  timer_init_full(&watchdog.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_watchdog, NULL);
+  tick_timer = sysbus_mmio_get_region(find(TIMER_1, "stellaris-gptm"), 0);
   timer_init_full(&lockstep.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_time, NULL);
   obey();
   set_timer();

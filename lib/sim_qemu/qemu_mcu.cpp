@@ -18,9 +18,15 @@ namespace {
 
 // As firmware/ports/lm3s6965/journal.h has it.
 constexpr std::uint32_t kJournal = 0x3F800;
+constexpr const char* kEnded = "QEMU has ended: is qemu-system-arm 7.2 installed?";
 constexpr std::uint32_t kBlank = 0xFFFFFFFF;
 constexpr std::uint32_t kKindAddress = 4;
 constexpr std::uint32_t kKindBootNumber = 5;
+
+// RESC
+constexpr std::uint32_t kExternal = 1u << 0;
+constexpr std::uint32_t kPowerOn = 1u << 1;
+constexpr std::uint32_t kWatchdog = 1u << 3;
 
 // The longest that the image takes from a frame to knowing when it will answer.
 constexpr TimeNs kDecidesNs = 5'000'000;
@@ -57,14 +63,14 @@ QemuMcu::QemuMcu(const QemuOptions& options, std::size_t index, Driver& driver, 
   }
   flash_[at] = record_of(kKindAddress, options.address);
   flash_[at + 4] = record_of(kKindBootNumber, options.boots);
-  start();
+  start(kPowerOn);
 }
 
 QemuMcu::~QemuMcu() {
   end();
 }
 
-void QemuMcu::start() {
+void QemuMcu::start(std::uint32_t reset_cause) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
     throw std::system_error(errno, std::generic_category(), "a socket for QEMU");
@@ -78,6 +84,7 @@ void QemuMcu::start() {
   if (process_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
   orders_.clear();
   for (const auto& [address, word] : flash_) order(LOCKSTEP_FLASH, word, address);
+  order(LOCKSTEP_RESET_CAUSE, reset_cause);
   set_inputs(inputs_);
   set_current(current_);
 }
@@ -100,13 +107,19 @@ void QemuMcu::order(lockstep_command_kind kind, std::uint32_t value, std::uint32
 void QemuMcu::advance(TimeNs now_ns) {
   const TimeNs from_ns = std::exchange(now_ns_, now_ns);
   if (now_ns <= boot_ns_ || now_ns == from_ns) return;
-  order(LOCKSTEP_RUN, 0, 0, now_ns - boot_ns_);
+  // A watchdog takes some time to bite.
+  while (!run()) start(kWatchdog);
+}
+
+// Up to now_ns_; false if it was reset on the way.
+bool QemuMcu::run() {
+  order(LOCKSTEP_RUN, 0, 0, now_ns_ - boot_ns_);
   const auto* out = reinterpret_cast<const char*>(orders_.data());
   std::size_t left = orders_.size() * sizeof orders_[0];
   while (left > 0) {
     const ssize_t sent = ::send(socket_, out, left, MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) throw std::runtime_error("QEMU has ended: is qemu-system-arm 7.2 installed?");
+    if (sent <= 0) throw std::runtime_error(kEnded);
     out += sent;
     left -= static_cast<std::size_t>(sent);
   }
@@ -117,12 +130,13 @@ void QemuMcu::advance(TimeNs now_ns) {
     auto* const in = reinterpret_cast<char*>(events.data());
     const ssize_t got = ::recv(socket_, in + have, sizeof events - have, 0);
     if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) throw std::runtime_error("QEMU has ended: is qemu-system-arm 7.2 installed?");
+    if (got <= 0) throw std::runtime_error(kEnded);
     have += static_cast<std::size_t>(got);
     const std::size_t count = have / sizeof events[0];
     for (std::size_t i = 0; i < count; ++i) {
       take(events[i]);
-      if (events[i].kind == LOCKSTEP_STOPPED) return;
+      if (events[i].kind == LOCKSTEP_STOPPED) return true;
+      if (events[i].kind == LOCKSTEP_WATCHDOG) return false;
     }
     const std::size_t rest = have % sizeof events[0];
     std::copy_n(in + have - rest, rest, in);
@@ -162,6 +176,10 @@ void QemuMcu::take(const lockstep_message& event) {
       }
       break;
     }
+    case LOCKSTEP_WATCHDOG:
+      fall(time_ns);
+      boot_ns_ = time_ns;
+      break;
     case LOCKSTEP_OVERRUN:
       ++overruns_;
       break;
@@ -209,15 +227,20 @@ void QemuMcu::set_current(std::uint16_t reading) {
   order(LOCKSTEP_CURRENT, reading);
 }
 
-void QemuMcu::reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t) {
-  advance(now_ns);
+// All that it drove.
+void QemuMcu::fall(TimeNs now_ns) {
   end();
   drive(now_ns, Signal::kStep, step_levels_, 0);
   drive(now_ns, Signal::kDir, direction_levels_, 0);
   drive(now_ns, Signal::kEnable, enable_level_, 0);
   driver_enable_ = line_timer_ = false;
+}
+
+void QemuMcu::reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t) {
+  advance(now_ns);
+  fall(now_ns);
   boot_ns_ = boot_ns;
-  start();
+  start(kExternal);
 }
 
 // The newest record of this kind, in the page of the newest boot number.

@@ -48,14 +48,19 @@ class QemuMcu final : public Mcu {
   void receive(std::uint8_t byte, TimeNs now_ns) override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override;
 
+  // A fault of the chip: the timer that begins ticks interrupts no more.
+  void stop_ticks() { order(LOCKSTEP_STOP_TICKS, 0); }
+
   // Bytes lost in its receiver.
   std::uint64_t overruns() const { return overruns_; }
   // Bytes whose last stop bit was not over when driver-enable fell, or that began without it.
   std::uint64_t bytes_cut() const { return bytes_cut_; }
 
  private:
-  void start();
+  void start(std::uint32_t reset_cause);
   void end();
+  void fall(TimeNs now_ns);
+  bool run();
   void order(lockstep_command_kind kind, std::uint32_t value, std::uint32_t address = 0,
              TimeNs time_ns = 0);
   void take(const lockstep_message& event);

@@ -4,6 +4,7 @@
 
 #include "firmware/ports/lm3s6965/board.h"
 #include "firmware/ports/lm3s6965/clock.h"
+#include "firmware/ports/lm3s6965/emission_slots.h"
 #include "firmware/ports/lm3s6965/interrupts.h"
 #include "firmware/ports/lm3s6965/timer.h"
 
@@ -29,9 +30,10 @@ typedef enum plane_state { PLANE_NONE, PLANE_WAITS, PLANE_TAKEN } plane_state;
 
 static const uint16_t kNoSteps[1];
 
-// Of the interrupts. The cursor is the next mask, plus 1 while its pulses last.
-static uintptr_t cursor;
-static uintptr_t end;
+// Of the interrupts.
+_Static_assert(offsetof(emission_slot_state, end) == SLOT_END, "as in emission_slots.S");
+emission_slot_state emission_slot = {
+    .timer = &TIMER_ICR(SLOT_TIMER), .step_low = &STEP_LOW, .step_high = &STEP_HIGH};
 static emission_tick present;
 static emission_tick silent;  // goes on when no plane is ready
 static uint32_t next_start;
@@ -53,13 +55,8 @@ static uint32_t rest_ns;       // of a cycle, not yet given
 static int32_t next_extra_ns;  // of `next`
 static uint32_t next_rest_ns;
 
-static inline void put_steps(uint32_t mask) {
-  STEP_LOW = mask & 0xFFu;
-  STEP_HIGH = mask >> 8;
-}
-
 // Pulses are over: DIR may change.
-static void take_next(void) {
+void emission_take_next(void) {
   timer_stop(SLOT_TIMER);
   if (state == PLANE_WAITS) {
     present = next;
@@ -73,24 +70,13 @@ static void take_next(void) {
               (uint32_t)(left > SHORTEST_CYCLES ? left : SHORTEST_CYCLES));
 }
 
-void emission_half_slot(void) {
-  TIMER_ICR(SLOT_TIMER) = 1;
-  const uintptr_t at = cursor;
-  cursor = at + 1;
-  if ((at & 1u) == 0) {
-    put_steps(*(const uint16_t*)at);
-  } else {
-    put_steps(0);
-    if (at + 1 == end) take_next();
-  }
-}
-
 void emission_tick_begins(void) {
-  put_steps(*present.mask);
+  STEP_LOW = *present.mask & 0xFFu;
+  STEP_HIGH = (uint32_t)*present.mask >> 8;
   timer_start(SLOT_TIMER, TIMER_PERIODIC, present.half_slot);
   timer_stop(TICK_TIMER);
-  cursor = (uintptr_t)present.mask + 1;
-  end = (uintptr_t)present.end;
+  emission_slot.cursor = (uintptr_t)present.mask + 1;
+  emission_slot.end = (uintptr_t)present.end;
   const uint32_t start = next_start;
   next_start = start + present.cycles;
   if (state == PLANE_TAKEN && !begun) {

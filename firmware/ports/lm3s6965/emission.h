@@ -17,7 +17,7 @@
 
 #define EMISSION_SLOTS 128u
 // Shorter, half slots would not hold their interrupts.
-#define EMISSION_MIN_TICK_NS 350000u
+#define EMISSION_MIN_TICK_NS 250000u
 
 // All of these are for the main loop only, with interrupts on unless it says otherwise.
 

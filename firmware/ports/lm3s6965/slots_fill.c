@@ -28,20 +28,26 @@ static void fill_four(uint16_t* masks, const slots_phase motor[AT_ONCE]) {
   uint32_t phase_2 = motor[2].phase;
   uint32_t phase_3 = motor[3].phase;
   do {
-    uint32_t mask = *masks;
-#define ADD(n)                                     \
-  __asm(                                           \
-      "adds %[phase], %[phase], %[step]\n\t"       \
-      "adc %[mask], %[mask], %[mask]"              \
-      : [phase] "+r"(phase_##n), [mask] "+r"(mask) \
-      : [step] "r"(motor[n].step)                  \
-      : "cc")
-    ADD(3);
-    ADD(2);
-    ADD(1);
-    ADD(0);
-#undef ADD
-    *masks++ = (uint16_t)mask;
+#pragma GCC unroll 8
+    for (int i = 0; i < 8; ++i) {
+      uint32_t mask = masks[i];
+      __asm volatile(
+          "adds %[p3], %[s3]\n\t"
+          "adc %[mask], %[mask]\n\t"
+          "adds %[p2], %[s2]\n\t"
+          "adc %[mask], %[mask]\n\t"
+          "adds %[p1], %[s1]\n\t"
+          "adc %[mask], %[mask]\n\t"
+          "adds %[p0], %[s0]\n\t"
+          "adc %[mask], %[mask]"
+          : [p0] "+r"(phase_0), [p1] "+r"(phase_1), [p2] "+r"(phase_2), [p3] "+r"(phase_3),
+            [mask] "+r"(mask)
+          : [s0] "r"(motor[0].step), [s1] "r"(motor[1].step), [s2] "r"(motor[2].step),
+            [s3] "r"(motor[3].step)
+          : "cc");
+      masks[i] = (uint16_t)mask;
+    }
+    masks += 8;
   } while (masks != end);
 }
 

@@ -1,0 +1,130 @@
+// How many steps the image for LM3S6965 makes a second, by instructions: sixteen motors, each at
+// the most steps that a tick may have and turning round after every frame, fed over a line of 1
+// Mbaud. Every step must be made, in time.
+//
+// QEMU's instructions take 16 ns, the chip's CPU at 50 MHz takes 20 ns for a cycle. So a tick here
+// holds as many instructions as a longer one of the chip would if each took one cycle: it is the
+// latter that counts for the steps a second.
+#include <cstdio>
+
+#include "sim/bus_fixture.h"
+#include "sim_qemu/qemu_mcu.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kBaud = 1'000'000;
+constexpr std::uint8_t kAddress = 2;
+constexpr std::uint16_t kDelay = 100;
+constexpr std::uint32_t kFrames = 400;
+constexpr int kSteps = 127;
+constexpr double kInstructionNs = 16;
+constexpr double kCycleNs = 20;
+
+struct Load {
+  const char* name;
+  bushd_format format;
+  std::uint32_t tick_ns;
+  std::uint8_t ticks_per_frame;
+  double goal_steps_per_s;
+};
+
+class LmFigures : public testing::TestWithParam<Load> {
+ protected:
+  LmFigures() : bus_(kBaud, &recorder_), master_(bus_) {
+    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+      QemuOptions options;
+      options.image = LM3S_IMAGES "-1000000.elf";
+      options.address = kAddress;
+      auto mcu = std::make_unique<QemuMcu>(options, index, driver, sink);
+      qemu_ = mcu.get();
+      return mcu;
+    });
+    master_.patience_ns = 6'000'000;
+    bus_.advance_to(250'000'000);
+  }
+
+  Bytes frame(std::uint32_t number, std::uint32_t first_tick) const {
+    const bool fine = GetParam().format == BUSHD_FORMAT_FINE;
+    const bool forward = number % 2 == 0;
+    const auto flags = static_cast<std::uint8_t>((number == 0 ? BUSHD_TICKS_START : 0) |
+                                                 (fine ? BUSHD_TICKS_FINE : 0));
+    std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delays;
+    delays.fill(number + 1 == kFrames ? 0 : kDelay);
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_ticks_head(0, flags, first_tick, GetParam().ticks_per_frame, 0xFFFF,
+                                           delays.data(), payload.data()));
+    for (int i = 0; i < GetParam().ticks_per_frame * int{BUSHD_MOTORS_PER_MCU}; ++i) {
+      if (fine) {
+        const int displacement = forward ? kSteps * 256 : -kSteps * 256;
+        payload.push_back(static_cast<std::uint8_t>(displacement));
+        payload.push_back(static_cast<std::uint8_t>(displacement >> 8));
+      } else {
+        payload.push_back(
+            static_cast<std::uint8_t>(kSteps | (forward ? BUSHD_COARSE_DIRECTION : 0)));
+      }
+    }
+    return payload;
+  }
+
+  Recorder recorder_;
+  Bus bus_;
+  Master master_;
+  const QemuMcu* qemu_ = nullptr;
+};
+
+TEST_P(LmFigures, SixteenMotorsLoseNoStep) {
+  const Load& load = GetParam();
+  const TimeNs frame_ns = TimeNs{load.tick_ns} * load.ticks_per_frame;
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(load.tick_ns, load.format));
+  ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 1000, {400, 300, 200}, kDelay));
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, m, 0));
+  }
+  const std::uint32_t first =
+      master_.poll(kAddress).tick + 20 + static_cast<std::uint32_t>(10'000'000 / load.tick_ns);
+  const TimeNs begin_ns = bus_.now_ns();
+  for (std::uint32_t number = 0; number < kFrames; ++number) {
+    master_.post(kAddress, BUSHD_MSG_TICKS, frame(number, first + number * load.ticks_per_frame));
+    bus_.advance_to(begin_ns + frame_ns * (number + 1));
+  }
+  bus_.advance_to(bus_.now_ns() + 200 * TimeNs{load.tick_ns});
+
+  const double ticks = kFrames * load.ticks_per_frame;
+  TimeNs shortest_ns = kNever;
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    const auto up = recorder_.times(0, Signal::kStep, m, true);
+    const auto down = recorder_.times(0, Signal::kStep, m, false);
+    ASSERT_EQ(up.size(), static_cast<std::size_t>(kSteps * ticks));
+    ASSERT_EQ(down.size(), up.size());
+    for (std::size_t i = 0; i < up.size(); ++i) {
+      shortest_ns = std::min(shortest_ns, down[i] - up[i]);
+    }
+    // A tick that was not ready would have made it late.
+    const double span = static_cast<double>(up.back() - up.front());
+    EXPECT_NEAR(span / load.tick_ns, ticks - 1.0 / kSteps, 0.1);
+  }
+  const bushd_report after = master_.poll(kAddress);
+  EXPECT_EQ(after.faults, 0);
+  EXPECT_EQ(after.bad_frames, 0);
+  EXPECT_EQ(after.rejected_frames, 0);
+  for (const auto& motor : after.motor) EXPECT_EQ(motor.position_steps, 0);
+  EXPECT_EQ(qemu_->overruns(), 0u);
+
+  const double instructions = load.tick_ns / kInstructionNs;
+  const double steps_per_s = BUSHD_MOTORS_PER_MCU * kSteps / (instructions * kCycleNs) * 1e9;
+  EXPECT_GE(steps_per_s, load.goal_steps_per_s);
+  std::printf(
+      "LM3S6965 %s: %.0f steps/s of 16 motors; %.0f instructions a tick, %.0f us of cycles; frames "
+      "of %d ticks, %.0f steps in all, pulses from %.2f us\n",
+      load.name, steps_per_s, instructions, instructions * kCycleNs / 1000, load.ticks_per_frame,
+      BUSHD_MOTORS_PER_MCU * kSteps * ticks, static_cast<double>(shortest_ns) / 1000);
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, LmFigures,
+                         testing::Values(Load{"coarse", BUSHD_FORMAT_COARSE, 270'000, 6, 6e6},
+                                         Load{"fine", BUSHD_FORMAT_FINE, 420'000, 6, 3.8e6}),
+                         [](auto& load) { return load.param.name; });
+
+}  // namespace
+}  // namespace bushd::sim

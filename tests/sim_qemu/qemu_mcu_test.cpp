@@ -1,0 +1,117 @@
+#include "sim_qemu/qemu_mcu.h"
+
+#include "sim/bus_fixture.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kBaud = 500'000;
+constexpr std::uint32_t kTickNs = 2'560'000;
+constexpr std::uint8_t kAddress = 3;
+
+class QemuImage : public testing::Test {
+ protected:
+  QemuImage() : bus_(kBaud, &recorder_), master_(bus_) {
+    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+      QemuOptions options;
+      options.image = LM3S_IMAGES "-500000.elf";
+      options.address = kAddress;
+      options.boots = 41;
+      auto mcu = std::make_unique<QemuMcu>(options, index, driver, sink);
+      qemu_ = mcu.get();
+      return mcu;
+    });
+    master_.patience_ns = 6'000'000;
+    bus_.advance_to(100'000'000);
+  }
+
+  // `ticks` of two steps each, from a rest.
+  void move(std::uint8_t motor, std::size_t ticks) {
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+    ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, {400, 300, 200}, 128));
+    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, motor, 0));
+    master_.fine_ticks(kAddress, motor, master_.poll(kAddress).tick + 20,
+                       std::vector<std::int16_t>(ticks, 512));
+  }
+
+  void pass_ticks(int ticks) { bus_.advance_to(bus_.now_ns() + TimeNs{kTickNs} * ticks); }
+
+  Recorder recorder_;
+  Bus bus_;
+  Master master_;
+  QemuMcu* qemu_ = nullptr;
+};
+
+// The edges of two runs are those of one: see below.
+class QemuRuns : public QemuImage {
+ protected:
+  std::vector<std::pair<TimeNs, int>> edges() {
+    move(5, 30);
+    pass_ticks(60);
+    std::vector<std::pair<TimeNs, int>> out;
+    for (const Edge& edge : recorder_.edges) out.emplace_back(edge.time_ns, edge.index);
+    return out;
+  }
+};
+
+TEST_F(QemuRuns, AreTheSameToTheNanosecond) {
+  struct Another : QemuRuns {
+    void TestBody() override {}
+    using QemuRuns::edges;
+  };
+  const auto first = edges();
+  EXPECT_EQ(first.size(), 1u + 1u + 120u);
+  Another again;
+  EXPECT_EQ(again.edges(), first);
+}
+
+TEST_F(QemuImage, ComesBackWhenItsTicksStandStill) {
+  ASSERT_NO_FATAL_FAILURE(move(2, 100));
+  pass_ticks(50);
+  EXPECT_EQ(master_.poll(kAddress).reset_cause, BUSHD_RESET_POWER_ON);
+  const std::size_t steps = recorder_.times(0, Signal::kStep, 2, true).size();
+  EXPECT_GT(steps, 10u);
+  qemu_->stop_ticks();
+  pass_ticks(80);
+  EXPECT_LE(recorder_.times(0, Signal::kStep, 2, true).size(), steps + 4);
+  EXPECT_EQ(recorder_.times(0, Signal::kEnable, 0, false).size(), 1u);
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.boot_number, 43);
+  EXPECT_EQ(report.reset_cause, BUSHD_RESET_WATCHDOG);
+}
+
+TEST_F(QemuImage, ReadsItsInputsAndTheSupplyCurrent) {
+  qemu_->set_inputs({0x8421, BUSHD_INPUT_FORWARD | BUSHD_INPUT_TRIGGER});
+  qemu_->set_current(345);
+  pass_ticks(3);
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.inputs, 0x8421);
+  EXPECT_EQ(report.system_inputs, BUSHD_INPUT_FORWARD | BUSHD_INPUT_TRIGGER);
+  EXPECT_EQ(report.current, 345);
+}
+
+// A page of its journal has room for some 220 boots.
+TEST_F(QemuImage, CountsItsBootsWhenItTurnsAPage) {
+  constexpr int kBoots = 240;
+  for (int i = 0; i < kBoots; ++i) {
+    bus_.reboot(0);
+    bus_.advance_to(bus_.now_ns() + 3'000'000);
+  }
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.boot_number, 42 + kBoots);
+  EXPECT_EQ(report.reset_cause, BUSHD_RESET_EXTERNAL);
+}
+
+TEST(QemuMcu, SaysSoIfThereIsNoImage) {
+  Recorder recorder;
+  Bus bus(kBaud, &recorder);
+  bus.add_mcu([](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+    QemuOptions options;
+    options.image = "/nowhere.elf";
+    return std::make_unique<QemuMcu>(options, index, driver, sink);
+  });
+  EXPECT_THROW(bus.advance_to(1'000'000), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace bushd::sim
