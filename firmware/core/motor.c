@@ -296,7 +296,11 @@ static rest_of_stream rest_of(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
     rest.until = motor->rest_from;
     rest.goes_on = rest.moves = false;
   }
-  for (uint32_t tick = next; ticks_after(rest.until, tick) > 0; ++tick) {
+  // A table run is known for longer than the queue is deep.
+  const int32_t known = ticks_after(rest.until, next);
+  const uint16_t depth = mcu->config.queue_ticks;
+  const uint32_t end = known < depth ? rest.until : next + depth;
+  for (uint32_t tick = next; ticks_after(end, tick) > 0; ++tick) {
     const int16_t queued = *queue_at((bushd_mcu*)mcu, tick, m);
     if (queued == 0) continue;
     rest.moves = true;

@@ -102,10 +102,15 @@ class Master {
   // The reply to a request; nothing if none came.
   std::optional<Frame> request(std::uint8_t address, std::uint8_t type,
                                std::span<const std::uint8_t> payload = {}) {
+    return request(address, type, payload, address);
+  }
+  // The same of one that is broadcast.
+  std::optional<Frame> request(std::uint8_t address, std::uint8_t type,
+                               std::span<const std::uint8_t> payload, std::uint8_t answering) {
     frames.clear();
     send(address, type, payload);
     for (const Frame& frame : frames) {
-      if (frame.address == address && frame.type == (type | BUSHD_TYPE_REPLY) &&
+      if (frame.address == answering && frame.type == (type | BUSHD_TYPE_REPLY) &&
           frame.tag == tag_) {
         return frame;
       }

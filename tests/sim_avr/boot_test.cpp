@@ -103,6 +103,22 @@ TEST_P(AvrWatchdog, BootsAnMcuThatHangsInMotionAnew) {
   EXPECT_EQ(master_.poll(kAddress).motor[3].position_steps, 50);
 }
 
+// The work of a stop must not grow with what is left of the run.
+TEST_F(AvrBoot, TheWatchdogLeavesAnEmergencyStopOfALongRunAlone) {
+  pass(kBootNs);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  run(3, 1'000'000);
+  pass(100 * TimeNs{kTickNs});
+  const bushd_report before = master_.poll(kAddress);
+  ASSERT_EQ(before.running, 1 << 3);
+  master_.send(kAddress, BUSHD_MSG_EMERGENCY, Bytes{BUSHD_CUT});
+  pass(10 * TimeNs{kTickNs});
+  const bushd_report after = master_.poll(kAddress);
+  EXPECT_EQ(after.boot_number, before.boot_number);
+  EXPECT_EQ(after.moving, 0);
+  EXPECT_EQ(after.motor[3].position_steps, static_cast<std::int32_t>(steps_made(3)));
+}
+
 // No request comes, for longer than the watchdog waits; nothing moves.
 TEST_F(AvrBoot, TheWatchdogLeavesAnIdleMcuAlone) {
   pass(kBootNs);
