@@ -87,7 +87,8 @@ static bushd_reset_cause reset_cause(void) {
   return flags & 1 << WDRF ? BUSHD_RESET_WATCHDOG : BUSHD_RESET_UNKNOWN;
 }
 
-static void boot(void) {
+// Not inlined: what it needs would stay on the stack for good.
+__attribute__((noinline)) static void boot(void) {
   if (boot_faults() & BOOT_RAM_BAD) failed_tests |= BUSHD_TEST_RAM;
   if (boot_faults() & BOOT_FLASH_BAD) failed_tests |= BUSHD_TEST_FLASH;
   if (!inputs_test()) failed_tests |= BUSHD_TEST_INPUTS;
