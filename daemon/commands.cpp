@@ -7,6 +7,7 @@
 
 #include "daemon/bus.h"
 #include "daemon/core.h"
+#include "daemon/faults.h"
 
 namespace bushd::daemon {
 namespace {
@@ -141,7 +142,7 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
     return "MCU " + mcu.config->id + " is offline: " + view.detail;
   }
   if (view.report.faults != 0)
-    return "MCU " + mcu.config->id + " has a fault, named by 'bushctl status'; say 'bushctl clear'";
+    return "MCU " + mcu.config->id + " has a fault: " + fault_text(view.report);
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
     return "the drivers of MCU " + mcu.config->id + " are disabled; enable them first";
   }
@@ -162,6 +163,7 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
     return "target " + std::to_string(target) + " is beyond +-" + std::to_string(kMaxPosition) +
            " steps";
   }
+  if (const std::string why = refuse_direction(motor, steps); !why.empty()) return why;
   if (motor.axis.duration_ticks(steps) > motion::Axis::kMaxDurationTicks) {
     const double tick_s = config_.buses[motor.bus].tick_us * 1e-6;
     const double days = motor.axis.duration_ticks(steps) * tick_s / 86400;

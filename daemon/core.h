@@ -103,6 +103,7 @@ class Core {
     std::int64_t position_steps = 0;  // as reported last
     std::string doubt = {};           // why the position is uncertain; empty: it is known
     bool wrong = false;               // counted otherwise than planned; it is being stopped
+    int limit = 0;                    // +1, -1: its limit switch at this end stops it
   };
   struct Mcu {
     const config::Mcu* config;
@@ -172,9 +173,10 @@ class Core {
   void on_report(std::int64_t now_us, std::size_t mcu);
   void follow_motor(std::int64_t now_us, std::size_t motor, const Mcu& mcu,
                     const link::McuView& view);
-  void end_faulty_motor(std::size_t motor, const Mcu& mcu, std::uint8_t faults);
+  void end_faulty_motor(std::size_t motor, const Mcu& mcu, const bushd_report& report);
   static std::string did_not_start(const Mcu& mcu);  // for the reason of a move's end
-  bool cuts(const Mcu& mcu) const;                   // in an emergency
+  // The MCU's motors do not ramp down in what it reports.
+  bool cuts(const Mcu& mcu, const bushd_report& report) const;
   void clear_link_fault(Mcu& mcu);
   // The motor's run has come to rest, or is lost: so has its part of the move.
   void end_motor(std::size_t motor, motion::Outcome outcome, const std::string& reason);
@@ -186,6 +188,11 @@ class Core {
   static table_ref_t ref_to(const tables::Table& table);
   void log_change(const Motor& motor, const motion::Change& change);
   void log_result(const Motor& motor, const std::string& result);
+
+  // limits.cpp
+  std::string refuse_direction(const Motor& motor, std::int64_t steps) const;
+  void notice_limit(Motor& motor, const link::McuView& view);
+  void end_at_limit(std::size_t motor);
 
   // commands.cpp
   std::string refuse(const command_t& command) const;  // "" when nothing speaks against it
@@ -226,6 +233,7 @@ class Core {
   void start_table_change(const Client& client, std::int8_t kind, const std::string& group,
                           const std::string& wanted);
   std::optional<std::size_t> find_group(const std::string& name) const;
+  bushd_set_inputs inputs_of(const Mcu& mcu) const;  // limits.cpp
   link::McuSetup setup_of(const Mcu& mcu, const std::vector<InService>& service) const;
   std::string misfit(const std::vector<InService>& service, std::size_t group) const;
   std::string misfit(const std::vector<TableChange::Part>& parts) const;

@@ -4,23 +4,29 @@
 
 #include "daemon/bus.h"
 #include "daemon/core.h"
+#include "daemon/faults.h"
+#include "link/faults.h"
 
 namespace bushd::daemon {
 namespace {
 
-const char* fault_text(std::uint8_t faults) {
-  if (faults & BUSHD_FAULT_EMERGENCY) return "an emergency stop was commanded";
-  if (faults & BUSHD_FAULT_SELF_TEST) return "its self-test failed";
-  if (faults & BUSHD_FAULT_SYNC) return "it fell out of step with the bus";
-  return "nothing more reached it in time";
+constexpr const char* kCutOff = "it was cut off by an emergency stop and may have overrun";
+// " (watchdog)"
+std::string by_cause(std::uint8_t reset_cause) {
+  const std::string word = reset_cause_word(reset_cause);
+  return word.empty() ? word : " (" + word + ")";
 }
 
-constexpr const char* kCutOff = "it was cut off by an emergency stop and may have overrun";
+constexpr const char* kUnpowered = "its drivers were switched off by overcurrent while it moved";
 
 }  // namespace
 
-bool Core::cuts(const Mcu& mcu) const {
-  return config_.buses[mcu.bus].emergency_stop == BUSHD_CUT;
+bool Core::cuts(const Mcu& mcu, const bushd_report& report) const {
+  const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0 &&
+                         config_.buses[mcu.bus].emergency_stop == BUSHD_CUT;
+  const bool by_input = (report.faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0 &&
+                        mcu.config->emergency_input == BUSHD_EMERGENCY_INPUT_CUTS;
+  return commanded || by_input;
 }
 
 std::string Core::did_not_start(const Mcu& mcu) {
@@ -47,7 +53,9 @@ void Core::handle_events(std::int64_t now_us, std::size_t bus) {
         const bool cancelled =
             motor >= 0 && motors_[static_cast<std::size_t>(motor)].axis.end_tick() <=
                               motors_[static_cast<std::size_t>(motor)].axis.start_tick();
-        if (motor >= 0 && !ran_down && !cancelled) {
+        const bool limited =
+            !forbidden_word(view_of(mcus_[mcu]).report, event.motor).empty();  // says the report
+        if (motor >= 0 && !ran_down && !cancelled && !limited) {
           end_motor(static_cast<std::size_t>(motor), motion::Outcome::kLink,
                     did_not_start(mcus_[mcu]));
         }
@@ -74,7 +82,8 @@ void Core::on_online(std::size_t index) {
   // Positions are counts since the MCU's boot; a boot that this daemon did not see the positions of
   // has lost them.
   const bool restarted = mcu.boot_number && *mcu.boot_number != view.report.boot_number;
-  const bool cut = (view.report.faults & BUSHD_FAULT_EMERGENCY) != 0 && cuts(mcu);
+  const bool cut = cuts(mcu, view.report);
+  const bool unpowered = (view.report.faults & BUSHD_FAULT_OVERCURRENT) != 0;
   const bool first = !mcu.boot_number;
   mcu.boot_number = view.report.boot_number;
   mcu.clearing = false;
@@ -85,13 +94,16 @@ void Core::on_online(std::size_t index) {
     motor.position_steps = view.report.motor[output].position_steps;
     if (restarted) motor.doubt = "MCU " + mcu.config->id + " restarted";
     // Nobody here has seen whether it moved when it was cut off.
-    if (cut && (first || motor.position_steps != before)) motor.doubt = kCutOff;
+    if ((cut || unpowered) && (first || motor.position_steps != before)) {
+      motor.doubt = cut ? kCutOff : kUnpowered;
+    }
   }
-  outputs_.log(
-      restarted ? LogLevel::kWarning : LogLevel::kInfo,
-      "MCU " + mcu.config->id + " is ready, boot number " +
-          std::to_string(view.report.boot_number) +
-          (restarted ? "; it restarted, so its motors' positions are uncertain: set them" : ""));
+  outputs_.log(restarted ? LogLevel::kWarning : LogLevel::kInfo,
+               "MCU " + mcu.config->id + " is ready, boot number " +
+                   std::to_string(view.report.boot_number) +
+                   (restarted ? "; it restarted" + by_cause(view.report.reset_cause) +
+                                    ", so its motors' positions are uncertain: set them"
+                              : ""));
   changed_ = true;
 }
 
@@ -127,12 +139,19 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
   const bool moving = (view.report.moving >> output & 1) != 0;
   if (view.report.faults != 0) {
     // The MCU takes no more ticks; what it has, it runs, and then down its own table.
-    if (!moving) end_faulty_motor(index, mcu, view.report.faults);
+    if (!moving) end_faulty_motor(index, mcu, view.report);
     return;
   }
   // It has not told of the emergency stop yet, with which its plan was given up.
   if (stopping_all()) return;
-  if (const auto change = motor.axis.executed(view.tick)) log_change(motor, *change);
+  if (motor.limit == 0) {
+    if (const auto change = motor.axis.executed(view.tick)) log_change(motor, *change);
+    notice_limit(motor, view);
+  }
+  if (motor.limit != 0) {
+    if (!moving) end_at_limit(index);
+    return;
+  }
   const std::int64_t planned = motor.axis.executed_steps();
   if (!motor.wrong && motor.position_steps != planned) {
     if (!moving && motor.position_steps == motor.axis.from_steps()) {
@@ -152,7 +171,7 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
     return;
   }
   if (motor.wrong) {
-    if (!moving) end_faulty_motor(index, mcu, 0);
+    if (!moving) end_faulty_motor(index, mcu, view.report);
   } else if (motor.position_steps == motor.axis.wanted_steps()) {
     end_motor(index, motion::Outcome::kReached, "stands at its target");
   } else if (motor.axis.stopping()) {
@@ -166,21 +185,30 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
 }
 
 // It stands, and not by its plan.
-void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, std::uint8_t faults) {
+void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, const bushd_report& report) {
   Motor& motor = motors_[index];
+  // One that has not made a step cannot overrun.
+  const bool stepped = motor.position_steps != motor.axis.from_steps();
   if (motor.wrong) {
     end_motor(index, motion::Outcome::kFault, motor.doubt + "; check the position and set it");
-  } else if ((faults & BUSHD_FAULT_EMERGENCY) == 0) {
-    end_motor(index, motion::Outcome::kLink,
-              "MCU " + mcu.config->id + " ran it down by itself because " + fault_text(faults));
-  } else {
-    // One that has not made a step cannot overrun.
-    const bool overran = cuts(mcu) && motor.position_steps != motor.axis.from_steps();
+  } else if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
+    const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
+    const std::string by =
+        commanded ? "an emergency stop" : "the emergency input of MCU " + mcu.config->id;
+    const bool overran = cuts(mcu, report) && stepped;
     if (overran) motor.doubt = kCutOff;
     end_motor(index, motion::Outcome::kStopped,
-              overran ? "cut off by an emergency stop; it may have overrun, so check the position "
-                        "and set it"
-                      : "stopped by an emergency stop");
+              overran
+                  ? "cut off by " + by + "; it may have overrun, so check the position and set it"
+                  : "stopped by " + by);
+  } else if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) {
+    motor.doubt = kUnpowered;
+    end_motor(index, motion::Outcome::kFault,
+              "MCU " + mcu.config->id + " switched its drivers off because " + stop_cause(report) +
+                  "; check the position and set it");
+  } else {
+    end_motor(index, motion::Outcome::kLink,
+              "MCU " + mcu.config->id + " ran it down by itself because " + stop_cause(report));
   }
 }
 
@@ -190,10 +218,9 @@ void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, std::uint8_t faul
 void Core::clear_link_fault(Mcu& mcu) {
   const link::McuView& view = view_of(mcu);
   const bool faulty = (view.report.faults & (BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC)) != 0 &&
-                      (view.report.faults & BUSHD_FAULT_EMERGENCY) == 0 && !stopping_all();
+                      (view.report.faults & link::kPeoplesFaults) == 0 && !stopping_all();
   if (faulty && !mcu.clearing && view.report.moving == 0) {
-    outputs_.log(LogLevel::kWarning, "MCU " + mcu.config->id + ": " +
-                                         fault_text(view.report.faults) +
+    outputs_.log(LogLevel::kWarning, "MCU " + mcu.config->id + ": " + stop_cause(view.report) +
                                          "; positions are read, clearing the fault");
     master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_CLEAR_FAULTS);
   }
@@ -208,6 +235,7 @@ void Core::end_motor(std::size_t index, motion::Outcome outcome, const std::stri
   master_of(mcu).drop(mcu.in_bus, motor.config->output.value);
   motor.axis.finish();
   motor.wrong = false;
+  motor.limit = 0;
   log_result(motor, motion::outcome_word(outcome));
   const bool planned = outcome == motion::Outcome::kReached || outcome == motion::Outcome::kStopped;
   if (!planned) outputs_.log(LogLevel::kWarning, motor.config->name + ": " + reason);

@@ -2,6 +2,7 @@
 // somebody else talks on a line.
 #include "daemon/bus.h"
 #include "daemon/core.h"
+#include "daemon/faults.h"
 #include "link/unique_id.h"
 
 namespace bushd::daemon {
@@ -39,6 +40,8 @@ mcu_health_t Core::health_of(const Mcu& mcu) const {
   out.unique_id = view.identified ? link::unique_id_text(view.identity) : std::string();
   out.firmware_version = view.identified ? view.identity.firmware_version : 0;
   out.boot_number = view.identified ? view.identity.boot_number : 0;
+  out.reset_cause = view.reported ? reset_cause_word(view.report.reset_cause) : std::string();
+  out.current = view.reported ? view.report.current : 0;
   out.crc_errors = number(health.crc_errors);
   out.rejected_frames = number(health.rejected_frames);
   out.run_downs = number(health.run_downs);

@@ -5,6 +5,7 @@
 
 #include "daemon/bus.h"
 #include "daemon/core.h"
+#include "daemon/faults.h"
 
 namespace bushd::daemon {
 namespace {
@@ -98,7 +99,9 @@ std::string Core::still_wrong(const Pending& pending, const Mcu& mcu) const {
   const bool enabled = (report.flags & BUSHD_FLAG_ENABLED) != 0;
   if (pending.kind == command_t::ENABLE && !enabled) return "did not enable its drivers";
   if (pending.kind == command_t::DISABLE && enabled) return "did not disable its drivers";
-  if (pending.kind == command_t::CLEAR_FAULTS && report.faults != 0) return "still has a fault";
+  if (pending.kind == command_t::CLEAR_FAULTS && report.faults != 0) {
+    return "still has a fault: " + fault_text(report);
+  }
   if (pending.kind == command_t::SET_POSITION) {
     for (std::size_t i = 0; i < pending.motors.size(); ++i) {
       const Motor& motor = motors_[pending.motors[i]];

@@ -1,6 +1,7 @@
 // The state as clients see it: one message per MCU.
 #include "daemon/bus.h"
 #include "daemon/core.h"
+#include "daemon/faults.h"
 
 namespace bushd::daemon {
 namespace {
@@ -22,10 +23,7 @@ const char* state_word(const link::McuView& view) {
 
 std::string detail_of(const link::McuView& view, bool two_masters) {
   if (view.phase != link::McuPhase::kOnline) return view.detail;
-  if (view.report.faults & BUSHD_FAULT_SELF_TEST) return "self-test failed";
-  if (view.report.faults & BUSHD_FAULT_EMERGENCY) return "emergency stop; say 'bushctl clear'";
-  if (view.report.faults & BUSHD_FAULT_SYNC) return "out of step with the bus";
-  if (view.report.faults & BUSHD_FAULT_LINK) return "nothing more reached it in motion";
+  if (view.report.faults != 0) return fault_text(view.report);
   if (two_masters) return "another master talks on the line";
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) return "drivers disabled";
   return {};
@@ -49,6 +47,7 @@ state_t Core::state_of(const Mcu& mcu) const {
   state.address = mcu.config->address.value;
   state.mcu_state = state_word(view);
   state.detail = detail_of(view, buses_[mcu.bus]->two_masters);
+  if (view.reported) state.inputs = system_inputs_words(view.report.system_inputs);
   state.boot_number = view.identified ? view.identity.boot_number : 0;
   state.tick = view.tick;
   state.rejected_commands = static_cast<std::int64_t>(rejected_commands_);
@@ -66,6 +65,7 @@ state_t Core::state_of(const Mcu& mcu) const {
     entry.moving = motor.axis.busy();
     entry.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;
     entry.input = view.reported && (view.report.inputs >> output & 1) != 0;
+    if (view.reported) entry.forbidden = forbidden_word(view.report, output);
     entry.trust = motor.doubt.empty() ? "known" : "uncertain";
     state.motors.push_back(std::move(entry));
   }

@@ -164,6 +164,8 @@ link::McuSetup Core::setup_of(const Mcu& mcu, const std::vector<InService>& serv
   link::McuSetup setup{.address = mcu.config->address.value, .tables = {}};
   setup.emission = mcu.config->emission;
   setup.table_of_motor.fill(-1);
+  setup.inputs = inputs_of(mcu);
+  setup.off_after_watchdog = mcu.config->enable_after_reset == config::EnableAfterReset::kNo;
   for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
     const int motor = mcu.motor_of[output];
     if (motor < 0) continue;

@@ -60,11 +60,22 @@ struct Bus {
   std::uint32_t tick_ns() const { return tick_us * 1000u; }
 };
 
+enum class EnableAfterReset {
+  kReady,   // drivers are on again as soon as the MCU is configured
+  kAtOnce,  // after a watchdog reset the MCU itself raises EN
+  kNo       // after a watchdog reset they stay off until somebody enables them
+};
+
 struct Mcu {
   BusIndex bus;
   McuAddress address;
   std::string id;  // "hall:1"
   link::EmissionSetup emission{};
+  std::uint8_t emergency_input = BUSHD_EMERGENCY_INPUT_IGNORED;
+  bool emergency_active_open = false;
+  std::uint8_t debounce_ticks = 1;
+  std::uint16_t overcurrent = 0;  // reading of the current sensor; 0: no threshold
+  EnableAfterReset enable_after_reset = EnableAfterReset::kReady;
 };
 
 struct Group {
@@ -78,6 +89,11 @@ struct Motor {
   McuIndex mcu;
   Output output;
   GroupIndex group;
+  // Its input is a switch at these ends of its travel.
+  bool limit_positive = false;
+  bool limit_negative = false;
+  bushd_how limit_action = BUSHD_RAMP_DOWN;
+  bool input_active_open = false;
 };
 
 struct Config {

@@ -11,7 +11,9 @@
 
 #include "config/checks.h"
 #include "config/emission_section.h"
+#include "config/inputs.h"
 #include "config/port_pattern.h"
+#include "config/words.h"
 #include "tables/table_file.h"
 
 namespace bushd::config {
@@ -31,12 +33,6 @@ bool is_name(std::string_view text, std::size_t longest) {
            return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') ||
                   c == '_' || c == '.' || c == '-';
          });
-}
-
-// "is X; allowed: A" for a value of the right type.
-tl::unexpected<Error> refuse(const TomlReader& reader, std::string_view key, std::string_view value,
-                             std::string_view allowed) {
-  return fail(reader.error(key, fmt::format("is \"{}\"; allowed: {}", value, allowed)));
 }
 
 Result<std::string> read_name(const TomlReader& reader, std::string_view key = "name",
@@ -129,31 +125,20 @@ Result<void> read_lcm(const TomlReader& root, Config* config) {
   return {};
 }
 
-// Which of two words stands there: 0 or 1.
-Result<int> read_word(const TomlReader& reader, std::string_view key, std::string_view first,
-                      std::string_view second) {
-  const std::string rule = fmt::format("\"{}\" or \"{}\"", first, second);
-  const auto word = reader.string(key, rule);
-  if (!word) return fail(word.error());
-  if (*word == first) return 0;
-  if (*word == second) return 1;
-  return refuse(reader, key, *word, rule);
-}
-
 // The keys of a bus that may be left out.
 Result<void> read_manners(const TomlReader& reader, Bus* bus) {
   if (reader.has("moves")) {
-    const auto moves = read_word(reader, "moves", "stream", "table");
+    const auto moves = read_word(reader, "moves", {"stream", "table"});
     if (!moves) return fail(moves.error());
     bus->table_runs = *moves == 1;
   }
   if (reader.has("frames")) {
-    const auto frames = read_word(reader, "frames", "auto", "ticks");
+    const auto frames = read_word(reader, "frames", {"auto", "ticks"});
     if (!frames) return fail(frames.error());
     bus->table_ticks = *frames == 0;
   }
   if (reader.has("emergency_stop")) {
-    const auto how = read_word(reader, "emergency_stop", "ramp", "cut");
+    const auto how = read_word(reader, "emergency_stop", {"ramp", "cut"});
     if (!how) return fail(how.error());
     bus->emergency_stop = *how == 0 ? BUSHD_RAMP_DOWN : BUSHD_CUT;
   }
@@ -229,7 +214,7 @@ Result<void> read_buses(Loading* loading) {
         reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
     if (!tick_us) return fail(tick_us.error());
     bus.tick_us = static_cast<std::uint32_t>(*tick_us);
-    const auto format = read_word(reader, "format", "fine", "coarse");
+    const auto format = read_word(reader, "format", {"fine", "coarse"});
     if (!format) return fail(format.error());
     bus.format = *format == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
     if (auto read = read_manners(reader, &bus); !read) return read;
@@ -242,7 +227,9 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
   Taken ids;
   for (const TomlReader& reader : readers) {
     if (auto known = reader.only({"bus", "address", "emission", "step_us", "settle_us",
-                                  "dir_setup_us", "pulse_us", "phase_sequence", "hold_current"});
+                                  "dir_setup_us", "pulse_us", "phase_sequence", "hold_current",
+                                  "emergency_input", "emergency_active", "debounce_ticks",
+                                  "overcurrent", "enable_after_reset"});
         !known) {
       return known;
     }
@@ -259,6 +246,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     const std::string what =
         fmt::format("address {} of bus \"{}\"", *address, config->buses[bus->value].name);
     if (auto taken = ids.take(reader, "address", mcu.id, what); !taken) return taken;
+    if (auto read = read_inputs(reader, &mcu); !read) return read;
     config->mcus.push_back(std::move(mcu));
   }
   return {};
@@ -324,7 +312,11 @@ Result<void> read_motors(Loading* loading) {
   Taken names;
   Taken outputs;
   for (const TomlReader& reader : loading->motors) {
-    if (auto known = reader.only({"name", "mcu", "output", "group"}); !known) return known;
+    if (auto known = reader.only(
+            {"name", "mcu", "output", "group", "limit", "limit_action", "input_active"});
+        !known) {
+      return known;
+    }
     auto name = read_name(reader);
     if (!name) return fail(name.error());
     if (auto taken = names.take(reader, "name", *name, *name); !taken) return taken;
@@ -339,10 +331,12 @@ Result<void> read_motors(Loading* loading) {
     if (auto taken = outputs.take(reader, "output", what, what); !taken) return taken;
     const auto group = resolve<GroupIndex>(reader, "group", config.groups, &Group::name);
     if (!group) return fail(group.error());
-    config.motors.push_back({.name = std::move(*name),
-                             .mcu = *mcu,
-                             .output = {static_cast<std::uint8_t>(*output)},
-                             .group = *group});
+    Motor motor{.name = std::move(*name),
+                .mcu = *mcu,
+                .output = {static_cast<std::uint8_t>(*output)},
+                .group = *group};
+    if (auto read = read_inputs(reader, &motor); !read) return read;
+    config.motors.push_back(std::move(motor));
   }
   return {};
 }

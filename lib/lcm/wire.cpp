@@ -69,7 +69,7 @@ constexpr std::size_t kDouble = 8;
 constexpr std::size_t kMinText = 5;
 constexpr std::size_t kMinTableRef = 2 * kMinText + kInt32;
 constexpr std::size_t kMinMotorState =
-    3 * kMinText + kMinTableRef + kInt16 + 2 * kInt64 + kDouble + 3 * kInt8;
+    4 * kMinText + kMinTableRef + kInt16 + 2 * kInt64 + kDouble + 3 * kInt8;
 
 void scan_fields(Scan& scan, std::type_identity<table_ref_t>) {
   scan.text();         // name
@@ -166,6 +166,7 @@ void scan_fields(Scan& scan, std::type_identity<motor_state_t>) {
   scan_fields(scan, std::type_identity<table_ref_t>{});
   scan.fixed(kInt16 + 2 * kInt64 + kDouble);  // output, position, target, velocity
   scan.fixed(3 * kInt8);                      // moving, enabled, input
+  scan.text();                                // forbidden
   scan.text();                                // trust
 }
 
@@ -176,18 +177,21 @@ void scan_fields(Scan& scan, std::type_identity<state_t>) {
   scan.fixed(kInt32);                   // address
   scan.text();                          // mcu_state
   scan.text();                          // detail
+  scan.text();                          // inputs
   scan.fixed(kInt32 + 2 * kInt64);      // boot_number, tick, rejected_commands
   const std::size_t motors = scan.count(kMinMotorState);
   for (std::size_t i = 0; i < motors; ++i) scan_fields(scan, std::type_identity<motor_state_t>{});
 }
 
-constexpr std::size_t kMinMcuHealth = 2 * kMinText + 4 * kInt32 + 7 * kInt64 + 2 * kDouble + kInt8;
+constexpr std::size_t kMinMcuHealth = 3 * kMinText + 5 * kInt32 + 7 * kInt64 + 2 * kDouble + kInt8;
 
 void scan_fields(Scan& scan, std::type_identity<mcu_health_t>) {
   scan.text();                      // mcu
   scan.fixed(kInt32);               // address
   scan.text();                      // unique_id
   scan.fixed(2 * kInt32);           // firmware_version, boot_number
+  scan.text();                      // reset_cause
+  scan.fixed(kInt32);               // current
   scan.fixed(7 * kInt64);           // crc_errors .. restarts
   scan.fixed(kInt32);               // low_water_ticks
   scan.fixed(2 * kDouble + kInt8);  // rate_ppm, clock_offset_us, two_masters

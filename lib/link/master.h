@@ -33,6 +33,8 @@ struct McuSetup {
   std::vector<TableRef> tables;                            // by slot, at most BUSHD_TABLE_SLOTS
   std::array<int, BUSHD_MOTORS_PER_MCU> table_of_motor{};  // slot, or -1: no motor at this output
   EmissionSetup emission{};
+  bushd_set_inputs inputs{};
+  bool off_after_watchdog = false;  // then drivers stay off until control() enables them
 };
 
 struct BusSetup {

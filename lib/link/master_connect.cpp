@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "link/faults.h"
 #include "link/master.h"
 #include "link/master_limits.h"
 #include "link/unique_id.h"
@@ -17,6 +18,8 @@ constexpr std::int64_t kMinQueueUs = 150'000;               // two lost answers 
 // Table runs go on without a word from here for as long: more than a busy PC needs to come back.
 constexpr std::int64_t kSilenceUs = 1'000'000;
 constexpr unsigned kIdentifySlots = 8;
+// While one of these is latched the MCU refuses to raise EN.
+constexpr unsigned kFaultsWithoutEnable = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT;
 
 bool same_id(const bushd_identity& a, const bushd_identity& b) {
   return std::memcmp(a.unique_id, b.unique_id, BUSHD_UNIQUE_ID_SIZE) == 0;
@@ -169,6 +172,8 @@ void Master::write_script(Mcu& mcu) const {
   add_request(mcu, BUSHD_MSG_EMISSION, [&](std::uint8_t* p) {
     return bushd_encode_emission(&mcu.setup.emission.settings, p);
   });
+  add_request(mcu, BUSHD_MSG_INPUTS,
+              [&](std::uint8_t* p) { return bushd_encode_set_inputs(&mcu.setup.inputs, p); });
   mcu.script.push_back({.type = BUSHD_MSG_TABLES, .payload = {}});
 }
 
@@ -226,11 +231,14 @@ void Master::handle_tables(std::size_t index, const bushd_tables& held) {
     add_request(mcu, BUSHD_MSG_ASSIGN,
                 [&](std::uint8_t* p) { return bushd_encode_assign(&assign, p); });
   }
-  // An emergency stop is for people to clear; the one that took the MCU over is nobody's.
-  const bool latched = (mcu.view.report.faults & BUSHD_FAULT_EMERGENCY) != 0 && !mcu.taken_over;
-  const bool emergency = emergency_ || latched;
-  std::uint8_t actions = emergency ? 0 : BUSHD_CONTROL_CLEAR_FAULTS;
-  if (mcu.powered.value_or(true)) actions |= BUSHD_CONTROL_ENABLE;
+  unsigned faults = mcu.view.report.faults;
+  // The emergency stop that took the MCU over is nobody's.
+  if (mcu.taken_over) faults &= ~unsigned{BUSHD_FAULT_EMERGENCY};
+  const bool clear = !emergency_ && (faults & kPeoplesFaults) == 0;
+  std::uint8_t actions = clear ? BUSHD_CONTROL_CLEAR_FAULTS : 0;
+  if (mcu.powered.value_or(true) && (faults & kFaultsWithoutEnable) == 0) {
+    actions |= BUSHD_CONTROL_ENABLE;
+  }
   add_control(mcu, actions);
 }
 
@@ -253,10 +261,13 @@ void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std:
 void Master::follow_connecting(std::size_t index, bool in_step) {
   Mcu& mcu = mcus_[index];
   const bushd_report& report = mcu.view.report;
+  const bool configured = (report.flags & BUSHD_FLAG_CONFIGURED) != 0;
   if (!mcu.powered) {
-    const bool switched_off =
-        (report.flags & BUSHD_FLAG_CONFIGURED) != 0 && (report.flags & BUSHD_FLAG_ENABLED) == 0;
+    const bool switched_off = configured && (report.flags & BUSHD_FLAG_ENABLED) == 0;
     mcu.powered = !switched_off;
+  }
+  if (!configured && report.reset_cause == BUSHD_RESET_WATCHDOG && mcu.setup.off_after_watchdog) {
+    mcu.powered = false;
   }
   // Tables are for motors at rest, and one may still be running down from before. But a table run
   // of an earlier master could go on for hours.

@@ -187,6 +187,8 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
   view.reported = true;
   mcu.asked_since_mark = true;
   note_health(mcu, report);
+  // The MCU has switched its drivers off, and people are to find out why.
+  if (report.faults & BUSHD_FAULT_OVERCURRENT) mcu.powered = false;
   view.tick = clock_.unwrap(report.tick, now_us);
   if (in_step) {
     if (clock_.valid() && std::abs(view.tick - clock_.tick_at(now_us)) > ticks_in(kClockJumpUs)) {

@@ -57,11 +57,8 @@ class Mcu {
                        std::uint32_t tick_ns) { static_cast<Mcu*>(self)->tick_ns_ = tick_ns; },
         .adjust_tick = [](void* self, std::int32_t ns) { static_cast<Mcu*>(self)->adjusted(ns); },
         .time_in_tick_ns = [](void* self) { return static_cast<Mcu*>(self)->time_in_tick_ns(); },
-        .read_inputs =
-            [](void*) {
-              return bushd_inputs{5, 0};
-            },
-        .read_current = [](void*) -> std::uint16_t { return 0; },
+        .read_inputs = [](void* self) { return static_cast<Mcu*>(self)->pins(); },
+        .read_current = [](void* self) { return static_cast<Mcu*>(self)->pins().motors; },
         .self_test = [](void*) -> std::uint8_t { return 0; },
         .keep_enable = [](void*, bool) {}};
     const bushd_mcu_config config = {.address = kAddress,
@@ -146,6 +143,12 @@ class Mcu {
   // Counters may be set to anything and then wrap.
   std::uint32_t position(std::size_t m) const {
     return static_cast<std::uint32_t>(mcu_.motor[m].position_steps);
+  }
+
+  // Switches and current come and go, every few ticks.
+  bushd_inputs pins() const {
+    const std::uint32_t mixed = mcu_.uptime / 4 * 2654435761u;
+    return {static_cast<std::uint16_t>(mixed >> 22), static_cast<std::uint8_t>(mixed >> 9 & 1)};
   }
 
   std::uint32_t time_in_tick_ns() const {

@@ -274,6 +274,10 @@ class Bus {
         return decodes(bushd_assign{}, bushd_decode_assign);
       case BUSHD_MSG_CONTROL:
         return decodes(bushd_control{}, bushd_decode_control);
+      case BUSHD_MSG_EMISSION:
+        return decodes(bushd_emission{}, bushd_decode_emission);
+      case BUSHD_MSG_INPUTS:
+        return decodes(bushd_set_inputs{}, bushd_decode_set_inputs);
       case BUSHD_MSG_SET_POSITION:
         return decodes(bushd_set_position{}, bushd_decode_set_position);
       case BUSHD_MSG_SYNC:

@@ -161,6 +161,7 @@ inline void fill(Random& random, state_t& state) {
   state.address = any<std::int32_t>(random);
   state.mcu_state = text(random);
   state.detail = text(random);
+  state.inputs = text(random);
   state.boot_number = any<std::int32_t>(random);
   state.tick = any<std::int64_t>(random);
   state.rejected_commands = any<std::int64_t>(random);
@@ -174,6 +175,7 @@ inline void fill(Random& random, state_t& state) {
     motor.moving = any<std::int8_t>(random);
     motor.enabled = any<std::int8_t>(random);
     motor.input = any<std::int8_t>(random);
+    motor.forbidden = text(random);
     state.motors.push_back(motor);
   }
   state.motor_count = static_cast<std::int32_t>(state.motors.size());
@@ -208,6 +210,8 @@ inline void fill(Random& random, health_t& health) {
     mcu.address = any<std::int32_t>(random);
     mcu.unique_id = text(random);
     mcu.boot_number = any<std::int32_t>(random);
+    mcu.reset_cause = text(random);
+    mcu.current = any<std::int32_t>(random);
     mcu.repeats = any<std::int64_t>(random);
     mcu.low_water_ticks = any<std::int32_t>(random);
     mcu.rate_ppm = static_cast<double>(any<std::int32_t>(random)) / 256;

@@ -21,10 +21,10 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
       requests.push_back(heard.type);
   }
   const std::vector<int> expected = {
-      BUSHD_MSG_IDENTIFY,   BUSHD_MSG_CONFIGURE,   BUSHD_MSG_EMISSION,   BUSHD_MSG_TABLES,
-      BUSHD_MSG_CONTROL,    BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA,
-      BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_END,   BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,
-      BUSHD_MSG_ASSIGN,     BUSHD_MSG_CONTROL};
+      BUSHD_MSG_IDENTIFY,   BUSHD_MSG_CONFIGURE,  BUSHD_MSG_EMISSION,    BUSHD_MSG_INPUTS,
+      BUSHD_MSG_TABLES,     BUSHD_MSG_CONTROL,    BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA,
+      BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_END,   BUSHD_MSG_ASSIGN,
+      BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,     BUSHD_MSG_CONTROL};
   EXPECT_EQ(requests, expected);
   const Slave& slave = bus.slaves[0];
   std::vector<std::uint16_t> codes = bus.codes;
@@ -38,6 +38,27 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
   EXPECT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(0), 1);
   EXPECT_EQ(bus.master->health(0).timeouts, 0u);
   EXPECT_EQ(bus.master->bus_health().crc_errors, 0u);
+}
+
+// A switch may have gone from the configuration since the last time.
+TEST(Connect, SettingsOfInputsAreToldEveryTime) {
+  FakeBus bus(1, 2);
+  bus.connect();
+  link::McuSetup setup = bus.setup.mcus[0];
+  setup.inputs.limit_positive = 0x8001;
+  setup.inputs.overcurrent = 900;
+  bus.master->reconfigure(0, setup);
+  bus.connect();
+  const auto told = bus.heard_of(BUSHD_MSG_INPUTS);
+  ASSERT_EQ(told.size(), 2u);
+  bushd_set_inputs inputs{};
+  ASSERT_EQ(bushd_decode_set_inputs(told[0].payload.data(), told[0].payload.size(), &inputs),
+            BUSHD_OK);
+  EXPECT_EQ(inputs.limit_positive, 0);
+  ASSERT_EQ(bushd_decode_set_inputs(told[1].payload.data(), told[1].payload.size(), &inputs),
+            BUSHD_OK);
+  EXPECT_EQ(inputs.limit_positive, 0x8001);
+  EXPECT_EQ(inputs.overcurrent, 900);
 }
 
 TEST(Connect, AllMcusAgreeOnTheTime) {

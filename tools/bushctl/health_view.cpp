@@ -55,20 +55,22 @@ std::vector<std::string> latency_lines(const Health& health) {
 
 std::vector<std::string> mcu_lines(const Health& health) {
   using enum Align;
-  std::vector<Align> align(15, kRight);
-  align[0] = align[1] = align[14] = kLeft;
+  std::vector<Align> align(17, kRight);
+  align[0] = align[1] = align[4] = align[16] = kLeft;
   Grid grid(align);
-  grid.row({"MCU", "UNIQUE ID", "FIRMWARE", "BOOT", "CRC ERRORS", "REJECTED", "TIMEOUTS", "REPEATS",
-            "MISSED TICKS", "RUN-DOWNS", "RESTARTS", "LOW WATER", "RATE PPM", "OFFSET US", ""});
+  grid.row({"MCU", "UNIQUE ID", "FIRMWARE", "BOOT", "RESET BY", "CURRENT", "CRC ERRORS", "REJECTED",
+            "TIMEOUTS", "REPEATS", "MISSED TICKS", "RUN-DOWNS", "RESTARTS", "LOW WATER", "RATE PPM",
+            "OFFSET US", ""});
   for (const health_t& bus : health.buses) {
     for (const mcu_health_t& mcu : bus.mcus) {
       grid.row({bushd::printable(mcu.mcu),
                 mcu.unique_id.empty() ? "-" : bushd::printable(mcu.unique_id),
                 fmt::to_string(mcu.firmware_version), fmt::to_string(mcu.boot_number),
-                fmt::to_string(mcu.crc_errors), fmt::to_string(mcu.rejected_frames),
-                fmt::to_string(mcu.timeouts), fmt::to_string(mcu.repeats),
-                fmt::to_string(mcu.missed_ticks), fmt::to_string(mcu.run_downs),
-                fmt::to_string(mcu.restarts),
+                mcu.reset_cause.empty() ? "-" : bushd::printable(mcu.reset_cause),
+                fmt::to_string(mcu.current), fmt::to_string(mcu.crc_errors),
+                fmt::to_string(mcu.rejected_frames), fmt::to_string(mcu.timeouts),
+                fmt::to_string(mcu.repeats), fmt::to_string(mcu.missed_ticks),
+                fmt::to_string(mcu.run_downs), fmt::to_string(mcu.restarts),
                 mcu.low_water_ticks < 0 ? "-" : fmt::to_string(mcu.low_water_ticks),
                 fmt::format("{:+.1f}", mcu.rate_ppm), fmt::format("{:+.1f}", mcu.clock_offset_us),
                 mcu.two_masters != 0 ? "hears two masters" : ""});
@@ -83,6 +85,8 @@ nlohmann::json mcu_json(const mcu_health_t& mcu) {
                         {"unique_id", mcu.unique_id},
                         {"firmware_version", mcu.firmware_version},
                         {"boot", mcu.boot_number},
+                        {"reset_cause", mcu.reset_cause},
+                        {"current", mcu.current},
                         {"crc_errors", mcu.crc_errors},
                         {"rejected_frames", mcu.rejected_frames},
                         {"run_downs", mcu.run_downs},

@@ -20,6 +20,10 @@ std::string text_of(const table_ref_t& table) {
   return bushd::printable(table.name) + revision;
 }
 
+std::string limit_text(const motor_state_t& motor) {
+  return motor.forbidden.empty() ? "" : "limit " + bushd::printable(motor.forbidden);
+}
+
 nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
   return {{"name", motor.name},
           {"mcu", mcu.mcu},
@@ -34,22 +38,23 @@ nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
           {"moving", motor.moving != 0},
           {"enabled", motor.enabled != 0},
           {"input", motor.input != 0},
+          {"forbidden", motor.forbidden},
           {"trust", motor.trust}};
 }
 
 nlohmann::json mcu_json(const state_t& mcu) {
-  return {{"mcu", mcu.mcu},         {"bus", mcu.bus},       {"address", mcu.address},
-          {"state", mcu.mcu_state}, {"detail", mcu.detail}, {"boot", mcu.boot_number},
-          {"tick", mcu.tick}};
+  return {{"mcu", mcu.mcu},          {"bus", mcu.bus},       {"address", mcu.address},
+          {"state", mcu.mcu_state},  {"detail", mcu.detail}, {"inputs", mcu.inputs},
+          {"boot", mcu.boot_number}, {"tick", mcu.tick}};
 }
 
 }  // namespace
 
 std::vector<std::string> table(const Snapshot& snapshot) {
   using enum Align;
-  Grid motors({kLeft, kLeft, kRight, kLeft, kLeft, kRight, kRight, kRight, kLeft, kLeft});
+  Grid motors({kLeft, kLeft, kRight, kLeft, kLeft, kRight, kRight, kRight, kLeft, kLeft, kLeft});
   motors.row({"MOTOR", "MCU", "OUTPUT", "GROUP", "TABLE", "POSITION", "TARGET", "STEPS/S", "MOVING",
-              "TRUST"});
+              "TRUST", ""});
   Grid mcus({kLeft, kLeft, kRight, kLeft});
   mcus.row({"MCU", "STATE", "BOOT", "DETAIL"});
   for (const state_t& mcu : snapshot.mcus) {
@@ -58,7 +63,8 @@ std::vector<std::string> table(const Snapshot& snapshot) {
                   fmt::to_string(motor.output), bushd::printable(motor.group), text_of(motor.table),
                   fmt::to_string(motor.position_steps), fmt::to_string(motor.target_steps),
                   fmt::format("{:.1f}", motor.velocity_steps_per_s),
-                  motor.moving != 0 ? "yes" : "-", bushd::printable(motor.trust)});
+                  motor.moving != 0 ? "yes" : "-", bushd::printable(motor.trust),
+                  limit_text(motor)});
     }
     mcus.row({bushd::printable(mcu.mcu), bushd::printable(mcu.mcu_state),
               fmt::to_string(mcu.boot_number), bushd::printable(mcu.detail)});
@@ -75,6 +81,7 @@ std::string motor_line(const motor_state_t& motor) {
                   motor.position_steps, motor.target_steps, motor.velocity_steps_per_s,
                   motor.moving != 0 ? "moving" : "at rest");
   if (motor.trust != "known") line += " " + bushd::printable(motor.trust);
+  if (!motor.forbidden.empty()) line += " " + limit_text(motor);
   return line;
 }
 

@@ -1,0 +1,71 @@
+#include "config/inputs.h"
+
+#include "config/words.h"
+
+namespace bushd::config {
+namespace {
+
+using tables::TomlReader;
+
+// Whether a switch is active when it is open.
+Result<void> read_active(const TomlReader& reader, std::string_view key, bool* open) {
+  if (!reader.has(key)) return {};
+  const auto active = read_word(reader, key, {"closed", "open"});
+  if (!active) return fail(active.error());
+  *open = *active == 1;
+  return {};
+}
+
+}  // namespace
+
+Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
+  if (reader.has("emergency_input")) {
+    const auto action = read_word(reader, "emergency_input", {"ignore", "ramp", "cut"});
+    if (!action) return fail(action.error());
+    static_assert(BUSHD_EMERGENCY_INPUT_IGNORED == 0 && BUSHD_EMERGENCY_INPUT_RAMPS == 1 &&
+                  BUSHD_EMERGENCY_INPUT_CUTS == 2);
+    mcu->emergency_input = static_cast<std::uint8_t>(*action);
+  }
+  if (auto read = read_active(reader, "emergency_active", &mcu->emergency_active_open); !read) {
+    return read;
+  }
+  if (reader.has("debounce_ticks")) {
+    const auto ticks = reader.integer("debounce_ticks", 0, BUSHD_MAX_DEBOUNCE_TICKS);
+    if (!ticks) return fail(ticks.error());
+    mcu->debounce_ticks = static_cast<std::uint8_t>(*ticks);
+  }
+  if (reader.has("overcurrent")) {
+    const auto reading = reader.integer("overcurrent", 0, BUSHD_MAX_CURRENT);
+    if (!reading) return fail(reading.error());
+    mcu->overcurrent = static_cast<std::uint16_t>(*reading);
+  }
+  if (reader.has("enable_after_reset")) {
+    const auto when = read_word(reader, "enable_after_reset", {"ready", "at_once", "no"});
+    if (!when) return fail(when.error());
+    mcu->enable_after_reset = static_cast<EnableAfterReset>(*when);
+  }
+  return {};
+}
+
+Result<void> read_inputs(const TomlReader& reader, Motor* motor) {
+  if (reader.has("limit")) {
+    const auto ends = read_word(reader, "limit", {"positive", "negative", "both"});
+    if (!ends) return fail(ends.error());
+    motor->limit_positive = *ends != 1;
+    motor->limit_negative = *ends != 0;
+  }
+  if (reader.has("limit_action")) {
+    const auto action = read_word(reader, "limit_action", {"ramp", "cut"});
+    if (!action) return fail(action.error());
+    if (!reader.has("limit")) {
+      return fail(reader.error("limit_action",
+                               "is told of a motor without a limit; allowed: "
+                               "beside limit = \"positive\", \"negative\" or "
+                               "\"both\""));
+    }
+    motor->limit_action = *action == 0 ? BUSHD_RAMP_DOWN : BUSHD_CUT;
+  }
+  return read_active(reader, "input_active", &motor->input_active_open);
+}
+
+}  // namespace bushd::config

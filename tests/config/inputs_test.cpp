@@ -1,0 +1,105 @@
+// Keys about switches, the emergency input, the supply current and EN.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "config/config.h"
+#include "config/config_file.h"
+
+namespace bushd::config {
+namespace {
+
+using test::ConfigFile;
+using test::kGood;
+using test::replaced;
+using testing::HasSubstr;
+
+std::string with_mcu(const std::string& keys) {
+  return replaced(kGood, "address = 255\n", "address = 255\n" + keys);  // from line 22 on
+}
+std::string with_motor(const std::string& keys) {
+  return replaced(kGood, "output = 15\n", "output = 15\n" + keys);  // from line 37 on
+}
+
+TEST(ConfigInputs, NothingIsWatchedUnlessItIsAskedFor) {
+  const auto config = ConfigFile(kGood).load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  const Mcu& mcu = config->mcus[0];
+  EXPECT_EQ(mcu.emergency_input, BUSHD_EMERGENCY_INPUT_IGNORED);
+  EXPECT_FALSE(mcu.emergency_active_open);
+  EXPECT_EQ(mcu.debounce_ticks, 1);
+  EXPECT_EQ(mcu.overcurrent, 0);
+  EXPECT_EQ(mcu.enable_after_reset, EnableAfterReset::kReady);
+  const Motor& motor = config->motors[0];
+  EXPECT_FALSE(motor.limit_positive || motor.limit_negative || motor.input_active_open);
+  EXPECT_EQ(motor.limit_action, BUSHD_RAMP_DOWN);
+}
+
+TEST(ConfigInputs, AnMcuHasItsOwn) {
+  const auto config = ConfigFile(with_mcu("emergency_input = \"cut\"\nemergency_active = \"open\"\n"
+                                          "debounce_ticks = 15\novercurrent = 1023\n"
+                                          "enable_after_reset = \"at_once\"\n"))
+                          .load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  const Mcu& mcu = config->mcus[1];
+  EXPECT_EQ(mcu.emergency_input, BUSHD_EMERGENCY_INPUT_CUTS);
+  EXPECT_TRUE(mcu.emergency_active_open);
+  EXPECT_EQ(mcu.debounce_ticks, 15);
+  EXPECT_EQ(mcu.overcurrent, 1023);
+  EXPECT_EQ(mcu.enable_after_reset, EnableAfterReset::kAtOnce);
+  EXPECT_EQ(config->mcus[0].emergency_input, BUSHD_EMERGENCY_INPUT_IGNORED);
+}
+
+TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
+  for (const auto& [word, positive, negative] :
+       {std::tuple{"positive", true, false}, {"negative", false, true}, {"both", true, true}}) {
+    const auto config = ConfigFile(with_motor("limit = \"" + std::string(word) +
+                                              "\"\nlimit_action = \"cut\"\n"
+                                              "input_active = \"open\"\n"))
+                            .load();
+    ASSERT_TRUE(config.has_value()) << config.error().text();
+    const Motor& motor = config->motors[1];
+    EXPECT_EQ(motor.limit_positive, positive) << word;
+    EXPECT_EQ(motor.limit_negative, negative) << word;
+    EXPECT_EQ(motor.limit_action, BUSHD_CUT);
+    EXPECT_TRUE(motor.input_active_open);
+    EXPECT_FALSE(config->motors[0].limit_positive);
+  }
+}
+
+struct BadKey {
+  std::string text;
+  int line;
+  const char* error;
+};
+
+TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
+  const BadKey bad[] = {
+      {with_mcu("emergency_input = \"stop\"\n"), 22,
+       "mcu[1].emergency_input: is \"stop\"; allowed: \"ignore\", \"ramp\" or \"cut\""},
+      {with_mcu("emergency_active = 1\n"), 22,
+       "mcu[1].emergency_active: is 1; allowed: \"closed\""},
+      {with_mcu("debounce_ticks = 16\n"), 22, "mcu[1].debounce_ticks: is 16; allowed: a whole"},
+      {with_mcu("overcurrent = 1024\n"), 22, "mcu[1].overcurrent: is 1024; allowed: a whole"},
+      {with_mcu("enable_after_reset = true\n"), 22,
+       "mcu[1].enable_after_reset: is true; allowed: \"ready\", \"at_once\" or \"no\""},
+      {with_motor("limit = \"left\"\n"), 37,
+       "motor[1].limit: is \"left\"; allowed: \"positive\", \"negative\" or \"both\""},
+      {with_motor("limit = \"both\"\nlimit_action = \"halt\"\n"), 38,
+       "motor[1].limit_action: is \"halt\"; allowed: \"ramp\" or \"cut\""},
+      {with_motor("limit_action = \"cut\"\n"), 37,
+       "motor[1].limit_action: is told of a motor without a limit"},
+      {with_motor("input_active = \"low\"\n"), 37,
+       "motor[1].input_active: is \"low\"; allowed: \"closed\" or \"open\""},
+  };
+  for (const BadKey& one : bad) {
+    const auto config = ConfigFile(one.text).load();
+    ASSERT_FALSE(config.has_value()) << one.error;
+    EXPECT_EQ(config.error().line, one.line) << config.error().text();
+    EXPECT_THAT(config.error().text(), HasSubstr(one.error));
+  }
+}
+
+}  // namespace
+}  // namespace bushd::config

@@ -1,0 +1,248 @@
+// Limit switches, emergency inputs, overcurrent and watchdog resets, from the switch to the client.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::HasSubstr;
+
+// Two motors on one MCU; `keys` are of it, `motor_keys` of m01.
+std::string lab_with(const std::string& manner, const std::string& keys,
+                     const std::string& motor_keys) {
+  std::string toml = hall(1, 2, manner);
+  const std::string motor = "output = 0\n";
+  toml.insert(toml.find(motor) + motor.size(), motor_keys);
+  const std::string mcu = "address = 1\n";
+  return toml.insert(toml.find(mcu) + mcu.size(), keys);
+}
+
+class Limits : public testing::TestWithParam<const char*> {
+ protected:
+  static void press(Lab& lab, std::uint16_t motors, std::uint8_t system = 0) {
+    lab.bus(0).mcu(0).set_inputs({motors, system});
+  }
+  // m01 and m02 move, and m01 meets its switch.
+  static reply_t meet_switch(Lab& lab, std::int64_t steps) {
+    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {steps, 3000});
+    EXPECT_TRUE(lab.run_until([&] { return std::abs(lab.shaft_steps("m01")) > 500; }));
+    press(lab, 1);
+    return lab.wait(move);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Manners, Limits,
+                         testing::Values("fine", "coarse", "fine_ticks", "coarse_ticks",
+                                         "fine_table", "coarse_table"),
+                         [](const auto& manner) { return std::string(manner.param); });
+
+TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
+  for (const int sign : {1, -1}) {
+    const std::string end = sign > 0 ? "positive" : "negative";
+    Lab lab(lab_with(GetParam(), "", "limit = \"" + end + "\"\n"));
+    lab.connect();
+    const reply_t result = meet_switch(lab, sign * 20000);
+    EXPECT_EQ(result.result, "limit") << result.reason;
+    EXPECT_THAT(result.reason, HasSubstr("m01"));
+    EXPECT_THAT(result.reason, HasSubstr(end + " end"));
+    EXPECT_EQ(result.motor_results, (std::vector<std::string>{"limit", "reached"}));
+    const std::int64_t stands = lab.shaft_steps("m01");
+    EXPECT_EQ(result.position_steps.at(0), stands);
+    EXPECT_THAT(result.reason, HasSubstr(std::to_string(stands)));
+    EXPECT_GT(std::abs(stands), 500);
+    EXPECT_LT(std::abs(stands), 1200) << "the table's ramp";
+    EXPECT_EQ(lab.shaft_steps("m02"), 3000);
+    lab.run_for(0.2);
+    EXPECT_EQ(lab.motor("m01").forbidden, end);
+    EXPECT_EQ(lab.motor("m01").trust, "known");
+    EXPECT_EQ(lab.state_of("hall:1").mcu_state, "READY") << "no fault";
+
+    const reply_t refused =
+        lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {sign * 10}));
+    EXPECT_EQ(refused.result, "refused");
+    EXPECT_THAT(refused.reason, HasSubstr("m01: its limit switch at the " + end + " end"));
+    EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {sign * -10})).result,
+              "reached");
+    const auto back = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {sign * -200});
+    lab.run_for(0.3);
+    press(lab, 0);
+    EXPECT_EQ(lab.wait(back).result, "reached");
+    lab.run_for(0.1);
+    EXPECT_EQ(lab.motor("m01").forbidden, "");
+    EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {sign * 20})).result, "reached");
+    EXPECT_EQ(lab.shaft_steps("m01"), stands - sign * 190);
+    EXPECT_EQ(lab.motor("m01").position_steps, stands - sign * 190);
+    EXPECT_TRUE(lab.errors().empty());
+  }
+}
+
+TEST_P(Limits, OneThatIsCutOffAtItsSwitchMayHaveOverrun) {
+  Lab lab(lab_with(GetParam(), "", "limit = \"both\"\nlimit_action = \"cut\"\n"));
+  lab.connect();
+  const reply_t result = meet_switch(lab, -20000);
+  EXPECT_EQ(result.result, "limit");
+  EXPECT_LE(std::abs(lab.shaft_steps("m01")), 560) << "a few ticks at 2500 steps/s";
+  EXPECT_EQ(result.position_steps.at(0), lab.shaft_steps("m01"));
+  lab.run_for(0.1);
+  EXPECT_EQ(lab.motor("m01").forbidden, "negative");
+  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+}
+
+// The switch closes while the start is on its way.
+TEST_P(Limits, AMoveThatTheSwitchForestallsEndsAtTheLimitTheSame) {
+  Lab lab(lab_with(GetParam(), "", "limit = \"positive\"\n"));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {300});
+  press(lab, 1);
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "limit") << result.reason;
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
+TEST_P(Limits, ANewTargetBeyondTheSwitchEndsThereToo) {
+  Lab lab(lab_with(GetParam(), "", "limit = \"positive\"\n"));
+  lab.connect();
+  const auto away = lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {-3000});
+  ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -600; }));
+  const auto back = lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {5000});
+  EXPECT_EQ(lab.wait(away).result, "stopped");
+  ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 300; }));
+  press(lab, 1);
+  EXPECT_EQ(lab.wait(back).result, "limit");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
+TEST_P(Limits, ASwitchThatOpensWhenItIsMetAndANewDaemon) {
+  Lab lab(lab_with(GetParam(), "", "limit = \"negative\"\ninput_active = \"open\"\n"));
+  press(lab, 1);
+  lab.connect();
+  EXPECT_FALSE(lab.motor("m01").input);
+  press(lab, 0);
+  lab.run_for(0.2);
+  EXPECT_TRUE(lab.motor("m01").input);
+  EXPECT_EQ(lab.motor("m01").forbidden, "negative");
+  lab.restart_daemon();
+  lab.connect();
+  EXPECT_EQ(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {-1})).result, "refused");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).result, "reached");
+}
+
+TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndReleased) {
+  for (const bool cut : {false, true}) {
+    Lab lab(lab_with(GetParam(),
+                     cut ? "emergency_input = \"cut\"\n" : "emergency_input = \"ramp\"\n", ""));
+    lab.connect();
+    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {20000, -20000});
+    lab.run_for(1.5);
+    const std::int64_t at = lab.shaft_steps("m01");
+    press(lab, 0, BUSHD_INPUT_EMERGENCY);
+    const reply_t result = lab.wait(move);
+    EXPECT_EQ(result.result, "stopped");
+    EXPECT_THAT(result.reason, HasSubstr("emergency input of MCU hall:1"));
+    EXPECT_EQ(result.position_steps.at(1), lab.shaft_steps("m02"));
+    EXPECT_EQ(lab.shaft_steps("m01") - at > 100, !cut);
+    lab.run_for(0.1);
+    EXPECT_EQ(lab.motor("m01").trust, cut ? "uncertain" : "known");
+    EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
+    EXPECT_EQ(lab.state_of("hall:1").inputs, "emergency");
+    EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("release it"));
+    const reply_t still = lab.wait(lab.send(command_t::CLEAR_FAULTS, {}));
+    EXPECT_EQ(still.result, "fault");
+    EXPECT_THAT(still.reason, HasSubstr("emergency input"));
+    press(lab, 0);
+    lab.restart_daemon();
+    ASSERT_TRUE(lab.run_until([&] {
+      return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "FAULT";
+    })) << "not for a daemon to clear";
+    EXPECT_THAT(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).reason,
+                HasSubstr("bushctl clear"));
+    EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+    if (cut) continue;
+    EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {10})).result, "reached");
+  }
+}
+
+TEST_P(Limits, OvercurrentTakesThePowerAndSaysSo) {
+  Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  lab.run_for(1);
+  lab.bus(0).mcu(0).set_current(801);
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "fault");
+  EXPECT_THAT(result.reason, HasSubstr("supply current"));
+  lab.run_for(0.1);
+  EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("overcurrent"));
+  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m02").trust, "known") << "it did not move";
+  EXPECT_FALSE(lab.motor("m01").enabled);
+  EXPECT_EQ(lab.mcu_health("hall:1").current, 801);
+  // Neither a lost link nor a new daemon puts it back.
+  lab.bus(0).mcu(0).set_current(0);
+  lab.unplug(0);
+  lab.run_for(2);
+  lab.plug(0);
+  lab.run_for(3);
+  EXPECT_FALSE(lab.motor("m01").enabled);
+  EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
+  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+  lab.run_for(0.1);
+  EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("drivers disabled"));
+  EXPECT_EQ(lab.wait(lab.send(command_t::ENABLE, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {10})).result, "reached");
+}
+
+class AfterReset : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Settings, AfterReset, testing::Values("ready", "at_once", "no"),
+                         [](const auto& setting) { return std::string(setting.param); });
+
+TEST_P(AfterReset, DriversAreAsConfiguredAfterTheWatchdog) {
+  const std::string setting = GetParam();
+  Lab lab(lab_with("fine", "enable_after_reset = \"" + setting + "\"\n", ""));
+  lab.connect();
+  EXPECT_EQ(lab.mcu_health("hall:1").reset_cause, "power-on");
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  lab.run_for(1);
+  const std::int32_t boot_number = lab.state_of("hall:1").boot_number;
+  sim::VirtualMcu& mcu = lab.bus(0).mcu(0);
+  mcu.set_reset_cause(BUSHD_RESET_WATCHDOG);
+  lab.bus(0).reboot(0, 100'000'000);
+  EXPECT_EQ(lab.wait(move).result, "link");
+  ASSERT_TRUE(lab.run_until([&] { return mcu.running(); }));
+  EXPECT_EQ((mcu.core().flags & BUSHD_FLAG_ENABLED) != 0, setting == "at_once");
+  lab.run_for(5);
+  EXPECT_NE(lab.state_of("hall:1").boot_number, boot_number);
+  EXPECT_EQ(lab.mcu_health("hall:1").reset_cause, "watchdog");
+  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m01").enabled, setting != "no");
+  EXPECT_EQ(lab.state_of("hall:1").mcu_state, setting == "no" ? "BUSY" : "READY");
+  if (setting != "no") return;
+  EXPECT_EQ(lab.wait(lab.send(command_t::ENABLE, {})).result, "done");
+  lab.run_for(0.1);
+  EXPECT_TRUE(lab.motor("m01").enabled);
+}
+
+TEST(SelfTest, WhatHasFailedIsNamedAndKeepsMotorsOff) {
+  Lab lab(hall(1, 1));
+  lab.bus(0).mcu(0).fail_self_tests(BUSHD_TEST_RAM | BUSHD_TEST_FLASH);
+  ASSERT_TRUE(lab.run_until(
+      [&] { return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "FAULT"; }));
+  EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("self-test failed (RAM, the program's"));
+  EXPECT_EQ(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).result, "refused");
+  EXPECT_FALSE(lab.motor("m01").enabled);
+}
+
+TEST(SelfTest, AnMcuThatLostWhatItKeepsMovesOnceThatIsKnown) {
+  Lab lab(hall(1, 1));
+  lab.bus(0).mcu(0).fail_self_tests(BUSHD_TEST_EEPROM);
+  ASSERT_TRUE(lab.run_until(
+      [&] { return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "FAULT"; }));
+  EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("EEPROM"));
+  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20})).result, "reached");
+}
+
+}  // namespace
+}  // namespace bushd::test
