@@ -24,7 +24,8 @@ typedef enum lockstep_event_kind {
   LOCKSTEP_SENT = 6,           // value: a byte that its UART took at this time
   LOCKSTEP_OVERRUN = 7,        // a byte was lost in its UART
   LOCKSTEP_STORED = 8,         // value: the flash word at `address` is this now
-  LOCKSTEP_WATCHDOG = 9        // it is reset, and the process ends
+  LOCKSTEP_WATCHDOG = 9,       // it is reset, and the process ends
+  LOCKSTEP_COMMON_DIR = 10     // value: level
 } lockstep_event_kind;
 
 typedef struct lockstep_message {

@@ -27,6 +27,7 @@ __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t 
 #define GPIO_C "/machine/unattached/device[10]"
 #define GPIO_D "/machine/unattached/device[11]"
 #define GPIO_E "/machine/unattached/device[12]"
+#define GPIO_F "/machine/unattached/device[13]"
 #define TIMER_1 "/machine/unattached/device[4]" /* begins ticks */
 #define TIMER_2 "/machine/unattached/device[5]" /* starts and paces what is sent */
 #define UART_0 "/machine/unattached/device[16]"
@@ -242,6 +243,12 @@ static void on_enable(void* opaque, int n, int level) {
   tell(LOCKSTEP_ENABLE, (uint32_t)level, 0);
 }
 
+static void on_common_dir(void* opaque, int n, int level) {
+  (void)opaque;
+  (void)n;
+  tell(LOCKSTEP_COMMON_DIR, (uint32_t)level, 0);
+}
+
 static void on_driver_enable(void* opaque, int n, int level) {
   (void)opaque;
   (void)n;
@@ -431,6 +438,7 @@ static void on_machine_done(Notifier* notifier, void* data) {
     wire(gpio(GPIO_D), i, on_step, 8 + i);
   }
   wire(gpio(GPIO_A), 2, on_enable, 0);
+  wire(gpio(GPIO_F), 0, on_common_dir, 0);
   wire(gpio(GPIO_A), 3, on_driver_enable, 0);
   wire(gpio(GPIO_E), 0, on_shift_clock, 0);
   wire(gpio(GPIO_E), 1, on_direction_data, 0);

@@ -163,6 +163,9 @@ void QemuMcu::take(const lockstep_message& event) {
     case LOCKSTEP_ENABLE:
       drive(time_ns, Signal::kEnable, enable_level_, event.value != 0);
       break;
+    case LOCKSTEP_COMMON_DIR:
+      drive(time_ns, Signal::kCommonDir, common_dir_level_, event.value != 0);
+      break;
     case LOCKSTEP_DRIVER_ENABLE:
       driver_enable_ = event.value != 0;
       bytes_cut_ += !driver_enable_ && event.address != 0;
@@ -233,6 +236,7 @@ void QemuMcu::fall(TimeNs now_ns) {
   drive(now_ns, Signal::kStep, step_levels_, 0);
   drive(now_ns, Signal::kDir, direction_levels_, 0);
   drive(now_ns, Signal::kEnable, enable_level_, 0);
+  drive(now_ns, Signal::kCommonDir, common_dir_level_, 0);
   driver_enable_ = line_timer_ = false;
 }
 

@@ -48,6 +48,10 @@ class Script : public testing::Test {
 
   void make_ready(bushd_format format, const std::vector<std::uint8_t>& motors) {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, format));
+    ASSERT_NO_FATAL_FAILURE(give_tables(motors));
+  }
+
+  void give_tables(const std::vector<std::uint8_t>& motors) {
     for (const std::uint8_t address : {kVirtual, kReal}) {
       ASSERT_NO_FATAL_FAILURE(master_.upload_table(address, 0, kUnitNs, codes_, kCruise));
       for (const std::uint8_t motor : motors) {
@@ -124,6 +128,46 @@ class Script : public testing::Test {
       first += kCount;
       flags = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_START);
     }
+  }
+
+  // When this output rises, or changes at all, each time with the common DIR.
+  struct Change {
+    TimeNs time_ns;
+    bool level;
+    bool common_dir;
+  };
+  std::vector<Change> changes(std::size_t mcu, std::uint8_t output, bool rises_only,
+                              TimeNs from_ns) const {
+    std::vector<Change> out;
+    bool common_dir = false;
+    for (const Edge& edge : recorder_.edges) {
+      if (edge.mcu != mcu) continue;
+      if (edge.signal == Signal::kCommonDir) common_dir = edge.level;
+      if (edge.signal != Signal::kStep || edge.index != output) continue;
+      if (edge.time_ns < from_ns) continue;
+      if (edge.level || !rises_only) out.push_back({edge.time_ns, edge.level, common_dir});
+    }
+    return out;
+  }
+
+  // In the same slots: to one of them, and alike for all to half of one.
+  void expect_the_same_changes(std::uint8_t output, bool rises_only, TimeNs from_ns) {
+    SCOPED_TRACE("output " + std::to_string(output));
+    const auto expected = changes(0, output, rises_only, from_ns);
+    const auto made = changes(1, output, rises_only, from_ns);
+    ASSERT_EQ(made.size(), expected.size());
+    ASSERT_FALSE(made.empty());
+    const TimeNs slot_ns = tick_ns_ / real_->twin().slots;
+    TimeNs least_ns = kNever;
+    TimeNs most_ns = -kNever;
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      EXPECT_EQ(made[i].level, expected[i].level) << i;
+      EXPECT_EQ(made[i].common_dir, expected[i].common_dir) << i;
+      least_ns = std::min(least_ns, made[i].time_ns - expected[i].time_ns);
+      most_ns = std::max(most_ns, made[i].time_ns - expected[i].time_ns);
+    }
+    EXPECT_LE(most_ns - least_ns, slot_ns / 2);
+    EXPECT_LE(std::max(std::abs(most_ns), std::abs(least_ns)), slot_ns);
   }
 
   // Its pulses, each with the level of DIR.
@@ -345,6 +389,83 @@ TEST_P(ConformanceOfStreams, StepsOfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
     EXPECT_GT(steps(0, motor).size(), 1000u);
     expect_the_same_steps(motor, steps(0, motor).size());
     expect_the_same_times(motor);
+  }
+  expect_the_same_reports();
+}
+
+struct Mode {
+  std::string name;
+  std::uint16_t needs;
+  bushd_emission settings;
+};
+
+class ConformanceOfEmission : public Script,
+                              public testing::WithParamInterface<std::tuple<Target, Mode>> {
+ protected:
+  ConformanceOfEmission() : Script(std::get<Target>(GetParam())) {}
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ConformanceOfEmission);
+
+std::vector<Mode> modes() {
+  const auto mode = [](bushd_emission_mode of) {
+    bushd_emission settings{};
+    settings.mode = of;
+    settings.step_us = 600;
+    settings.settle_us = 60;
+    settings.sequence = BUSHD_PHASES_HALF;
+    settings.hold_current = true;
+    return settings;
+  };
+  return {{"Burst", BUSHD_CAN_BURST, mode(BUSHD_EMISSION_BURST)},
+          {"CommonDir", BUSHD_CAN_COMMON_DIR, mode(BUSHD_EMISSION_COMMON_DIR)},
+          {"Staggered", BUSHD_CAN_STAGGERED, mode(BUSHD_EMISSION_STAGGERED)},
+          {"Phases", BUSHD_CAN_PHASES, mode(BUSHD_EMISSION_PHASES)}};
+}
+
+void PrintTo(const Mode& mode, std::ostream* out) {
+  *out << mode.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, ConformanceOfEmission,
+                         testing::Combine(testing::ValuesIn(targets()), testing::ValuesIn(modes())),
+                         [](auto& test) {
+                           return std::get<Target>(test.param).name +
+                                  std::get<Mode>(test.param).name;
+                         });
+
+// Four motors to and fro, in streams, where every output changes at the same slots.
+TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
+  const Mode& mode = std::get<Mode>(GetParam());
+  const bool phases = mode.settings.mode == BUSHD_EMISSION_PHASES;
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, BUSHD_FORMAT_COARSE));
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    const bool refuses = address == kReal && (real_->lacks() & mode.needs) != 0;
+    EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_EMISSION, bushd_encode_emission,
+                                   mode.settings) == BUSHD_OK,
+              !refuses);
+    if (refuses) return;
+  }
+  ASSERT_NO_FATAL_FAILURE(give_tables({0, 1, 2, 3}));
+  // Windings are on by now.
+  const TimeNs begin_ns = bus_.now_ns();
+  const std::uint32_t first = master_.poll(kReal).tick + 40;
+  constexpr std::uint8_t kCount = 8;
+  const std::array<std::uint16_t, 4> at_rest{};
+  for (std::uint32_t frame = 0; frame < 4; ++frame) {
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_ticks_head(0, BUSHD_TICKS_START, first + 12 * frame, kCount, 0xF,
+                                           at_rest.data(), payload.data()));
+    for (std::uint32_t i = 0; i < kCount * 4u; ++i) {
+      const std::uint32_t motor = i % 4;
+      const bool forward = (motor + frame) % 2 == 0;
+      payload.push_back(static_cast<std::uint8_t>((1 + (i + frame) % 2) |
+                                                  (forward ? BUSHD_COARSE_DIRECTION : 0)));
+    }
+    tell(BUSHD_MSG_TICKS, payload);
+  }
+  pass_ticks(120);
+  for (std::uint8_t output = 0; output < (phases ? 16 : 4); ++output) {
+    expect_the_same_changes(output, !phases, begin_ns);
   }
   expect_the_same_reports();
 }

@@ -42,6 +42,7 @@ void board_init(void) {
   port_init(GPIO_D, 0xFFu, 0);
   port_init(GPIO_E, 0x0Fu, 0);
   port_init(GPIO_C, 0, 1u << 4);
+  port_init(GPIO_F, 1u << 0, 0);
   port_init(GPIO_A, 1u << 2 | 1u << 3, 0xF0u);
   INPUT_LOAD = ALL_PINS;
   // The UART has its own; its receiver's line is pulled up while the transceiver does not drive it.

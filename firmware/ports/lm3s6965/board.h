@@ -22,6 +22,8 @@
 #define INPUT_LOAD GPIO_DATA(GPIO_E, 1u << 3)  // low: the 165 take over their inputs
 #define INPUT_DATA GPIO_DATA(GPIO_C, 1u << 4)
 
+#define COMMON_DIR GPIO_DATA(GPIO_F, 1u << 0)
+
 // In the order of BUSHD_INPUT_*.
 #define SYSTEM_INPUTS GPIO_DATA(GPIO_A, 0xF0u)
 #define SYSTEM_INPUTS_SHIFT 4

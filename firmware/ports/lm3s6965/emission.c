@@ -22,13 +22,12 @@ typedef struct emission_tick {
   const uint16_t* end;
   uint32_t half_slot;  // cycles
   uint32_t cycles;
-  bool turns;  // DIR is to be latched
+  bool turns;       // DIR is to be latched
+  uint8_t outputs;  // bushd_outputs
 } emission_tick;
 
 // What becomes of the plane that the core has prepared.
 typedef enum plane_state { PLANE_NONE, PLANE_WAITS, PLANE_TAKEN } plane_state;
-
-static const uint16_t kNoSteps[1];
 
 // Of the interrupts.
 _Static_assert(offsetof(emission_slot_state, end) == SLOT_END, "as in emission_slots.S");
@@ -36,6 +35,7 @@ emission_slot_state emission_slot = {
     .timer = &TIMER_ICR(SLOT_TIMER), .step_low = &STEP_LOW, .step_high = &STEP_HIGH};
 static emission_tick present;
 static emission_tick silent;  // goes on when no plane is ready
+static uint16_t held;         // its levels
 static uint32_t next_start;
 
 // Between them and the main loop.
@@ -63,6 +63,8 @@ void emission_take_next(void) {
     state = PLANE_TAKEN;
     if (present.turns) board_latch_directions();
   } else {
+    held = present.outputs == BUSHD_OUTPUTS_LEVELS ? present.end[-1] : 0;
+    silent.outputs = present.outputs;
     present = silent;
   }
   const int32_t left = clock_since(next_start, clock_now());
@@ -70,9 +72,43 @@ void emission_take_next(void) {
               (uint32_t)(left > SHORTEST_CYCLES ? left : SHORTEST_CYCLES));
 }
 
+static void put_steps(uint32_t mask) {
+  STEP_LOW = mask & 0xFFu;
+  STEP_HIGH = mask >> 8;
+}
+
+// As emission_half_slot, with the common DIR.
+static void half_slot_common_dir(void) {
+  *emission_slot.timer = 1;
+  const uintptr_t at = emission_slot.cursor++;
+  if ((at & 1u) == 0) {
+    put_steps(*(const uint16_t*)at);
+    return;
+  }
+  put_steps(0);
+  const bool last = at + 1 == emission_slot.end;
+  const uintptr_t next_slot = (at + 1 - (uintptr_t)present.mask) / sizeof present.mask[0];
+  COMMON_DIR = !last && next_slot % 2 != 0 ? ALL_PINS : 0;
+  if (last) emission_take_next();
+}
+
+// As emission_half_slot, with levels instead of pulses.
+static void half_slot_levels(void) {
+  *emission_slot.timer = 1;
+  const uintptr_t at = emission_slot.cursor++;
+  if ((at & 1u) == 0) {
+    put_steps(*(const uint16_t*)at);
+  } else if (at + 1 == emission_slot.end) {
+    emission_take_next();
+  }
+}
+
 void emission_tick_begins(void) {
-  STEP_LOW = *present.mask & 0xFFu;
-  STEP_HIGH = (uint32_t)*present.mask >> 8;
+  static const vector kHalfSlot[] = {[BUSHD_OUTPUTS_PULSES] = emission_half_slot,
+                                     [BUSHD_OUTPUTS_COMMON_DIR] = half_slot_common_dir,
+                                     [BUSHD_OUTPUTS_LEVELS] = half_slot_levels};
+  put_steps(*present.mask);
+  vectors[EXTERNAL(IRQ_TIMER0A)] = kHalfSlot[present.outputs];
   timer_start(SLOT_TIMER, TIMER_PERIODIC, present.half_slot);
   timer_stop(TICK_TIMER);
   emission_slot.cursor = (uintptr_t)present.mask + 1;
@@ -93,10 +129,10 @@ static emission_tick tick_of(const bushd_plane* of, uint32_t cycles) {
   return tick;
 }
 
-// Of one slot: the time is left to the main loop.
-static emission_tick empty_tick(uint32_t cycles) {
+// Of one slot, in which nothing happens: the time is left to the main loop.
+static emission_tick empty_tick(const uint16_t* mask, uint32_t cycles) {
   const emission_tick tick = {
-      .mask = kNoSteps, .end = kNoSteps + 1, .half_slot = cycles - TAKE_CYCLES, .cycles = cycles};
+      .mask = mask, .end = mask + 1, .half_slot = cycles - TAKE_CYCLES, .cycles = cycles};
   return tick;
 }
 
@@ -105,7 +141,9 @@ static void give(void) {
   const int32_t extra_ns = adjust_ns + carry_ns;
   const uint32_t length_ns = tick_ns + rest_ns + (uint32_t)extra_ns;
   const uint32_t cycles = length_ns / CYCLE_NS;
-  emission_tick tick = plane->active != 0 ? tick_of(plane, cycles) : empty_tick(cycles);
+  emission_tick tick =
+      plane->active != 0 ? tick_of(plane, cycles) : empty_tick(plane->step, cycles);
+  tick.outputs = plane->outputs;
   tick.turns = plane->direction != directions;
   interrupts_off();
   if (state != PLANE_TAKEN) {
@@ -157,7 +195,7 @@ uint32_t emission_time_in_tick_ns(uint32_t time) {
 
 void emission_set_tick(uint32_t ns) {
   tick_ns = ns;
-  const emission_tick tick = empty_tick(ns / CYCLE_NS);
+  const emission_tick tick = empty_tick(&held, ns / CYCLE_NS);
   interrupts_off();
   silent = tick;
   interrupts_on();

@@ -2,6 +2,11 @@
 #ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_INTERRUPTS_H
 #define BUSHD_FIRMWARE_PORTS_LM3S6965_INTERRUPTS_H
 
+typedef void (*vector)(void);
+// In RAM: those in force.
+extern vector vectors[];
+#define EXTERNAL(irq) (16u + (irq))
+
 void line_received(void);         // UART 0
 void emission_half_slot(void);    // timer 0
 void emission_tick_begins(void);  // timer 1

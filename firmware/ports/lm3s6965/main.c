@@ -96,8 +96,6 @@ static void boot(void) {
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
-                             // Its slots have pulses only, and DIR stays for a tick.
-                             .lacks = BUSHD_CAN_COMMON_DIR | BUSHD_CAN_PHASES,
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,

@@ -12,28 +12,33 @@ extern uint32_t bss_begin[];
 extern uint32_t bss_end[];
 extern uint32_t stack_end[];
 
+#define VECTORS EXTERNAL(44u)
+static const vector kVectors[VECTORS];
+
 int main(void);
 void reset(void);
+
+// Aligned as the chip wants it.
+__attribute__((aligned(256))) vector vectors[VECTORS];
 
 void reset(void) {
   const uint32_t* from = data_image;
   for (uint32_t* to = data_begin; to < data_end; ++to) *to = *from++;
   for (uint32_t* to = bss_begin; to < bss_end; ++to) *to = 0;
+  for (uint32_t i = 0; i < VECTORS; ++i) vectors[i] = kVectors[i];
+  SCB_VTOR = (uint32_t)(uintptr_t)vectors;
   main();
 }
 
 // A fault of the CPU, or an interrupt that nobody asked for: pulses and drivers off, and a reset.
 static void fail(void) {
   interrupts_off();
-  REGISTER(0xE000ED0C) = 0x05FA0004;  // AIRCR.SYSRESETREQ
+  SCB_AIRCR = 0x05FA0004;  // SYSRESETREQ
   for (;;) {
   }
 }
 
-typedef void (*vector)(void);
-#define EXTERNAL(irq) (16u + (irq))
-
-__attribute__((section(".vectors"), used)) static const vector kVectors[EXTERNAL(44u)] = {
+__attribute__((section(".vectors"), used)) static const vector kVectors[VECTORS] = {
     [0] = (vector)(uintptr_t)stack_end,
     [1] = reset,
     [2] = fail,
