@@ -105,18 +105,18 @@ __attribute__((noinline)) static void boot(void) {
   port.read_current = port_read_current;
   port.self_test = port_self_test;
   port.keep_enable = port_keep_enable;
-  bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
-                             .slots = EMISSION_SLOTS,
-                             .min_tick_ns = EMISSION_MIN_TICK_NS,
-                             // A frame of table ticks stands for more of them than it could make in
-                             // one; its slots have pulses only, and DIR stays for a tick.
-                             .lacks = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_COMMON_DIR |
-                                      BUSHD_CAN_PHASES,
-                             .pulse_ns = EMISSION_PULSE_NS,
-                             .queue = queue,
-                             .queue_ticks = QUEUE_TICKS,
-                             .codes = codes,
-                             .code_count = TABLE_CODES};
+  bushd_mcu_config config = {
+      .motors = BUSHD_MOTORS_PER_MCU,
+      .slots = EMISSION_SLOTS,
+      .min_tick_ns = EMISSION_MIN_TICK_NS,
+      // A frame of table ticks stands for more of them than it could make in
+      // one; its slots have pulses only, and DIR stays for a tick.
+      .lacks = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_COMMON_DIR | BUSHD_CAN_PHASES,
+      .pulse_ns = EMISSION_PULSE_NS,
+      .queue = queue,
+      .queue_ticks = QUEUE_TICKS,
+      .codes = codes,
+      .code_count = TABLE_CODES};
   identity kept;
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && identity_enable_kept();
