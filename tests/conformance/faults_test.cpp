@@ -1,0 +1,256 @@
+// What goes wrong on a line, told to a real MCU and to its virtual twin: both must make the same of
+// it. And the golden frames of tests/vectors, which every MCU must answer in the same way.
+#include <fstream>
+#include <string>
+
+#include "conformance/targets.h"
+#include "sim/bus_fixture.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kBaud = 500'000;
+constexpr std::uint32_t kTickNs = 2'560'000;
+constexpr TimeNs kBootNs = 250'000'000;
+constexpr std::uint8_t kVirtual = 1;
+constexpr std::uint8_t kReal = 2;
+constexpr std::uint8_t kMotor = 3;
+constexpr std::uint16_t kDelay = 150;
+constexpr std::uint8_t kTicksPerFrame = 8;  // the smallest queue holds them all
+constexpr std::size_t kFrames = 5;
+
+class Faults : public testing::TestWithParam<Target> {
+ protected:
+  Faults() : real_(GetParam().make()), bus_(kBaud, &recorder_), master_(bus_) {
+    McuOptions twin = real_->twin();
+    twin.address = kVirtual;
+    bus_.add_mcu(twin);
+    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+      return real_->make({kReal, 1, 0}, index, driver, sink);
+    });
+    master_.patience_ns = 6'000'000;
+    bus_.advance_to(kBootNs);
+  }
+
+  void SetUp() override {
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_COARSE));
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      ASSERT_NO_FATAL_FAILURE(master_.upload_table(address, 0, 10'000, {400, 300, 200}, kDelay));
+      ASSERT_NO_FATAL_FAILURE(master_.assign(address, kMotor, 0));
+    }
+  }
+  void TearDown() override { real_->expect_unharmed(); }
+
+  void pass_ticks(int ticks) { bus_.advance_to(bus_.now_ns() + TimeNs{kTickNs} * ticks); }
+
+  void tell(bushd_type type, const Bytes& payload) {
+    master_.post(kVirtual, static_cast<std::uint8_t>(type), payload);
+    master_.post(kReal, static_cast<std::uint8_t>(type), payload);
+    bus_.advance_to(bus_.line_busy_until_ns());
+  }
+  void tell_damaged(bushd_type type, const Bytes& payload) {
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      Bytes wire = Master::wire(address, static_cast<std::uint8_t>(type), 0, payload);
+      wire[wire.size() / 2] ^= 0x40;
+      bus_.master_send(wire, bus_.now_ns());
+    }
+    bus_.advance_to(bus_.line_busy_until_ns());
+  }
+  // To both in one frame.
+  void broadcast(bushd_type type, const Bytes& payload) {
+    master_.post(BUSHD_ADDRESS_BROADCAST, static_cast<std::uint8_t>(type), payload);
+    bus_.advance_to(bus_.line_busy_until_ns());
+  }
+
+  // One of kFrames of a move that makes a step a tick.
+  Bytes frame(std::size_t index) const {
+    const std::uint16_t delay = index + 1 < kFrames ? 256 : 0;
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    const std::size_t size =
+        bushd_encode_ticks_head(0, index == 0 ? BUSHD_TICKS_START : 0,
+                                first_tick_ + static_cast<std::uint32_t>(index) * kTicksPerFrame,
+                                kTicksPerFrame, 1u << kMotor, &delay, payload.data());
+    payload.resize(size);
+    payload.insert(payload.end(), kTicksPerFrame, 1 | BUSHD_COARSE_DIRECTION);
+    return payload;
+  }
+
+  void expect_alike(std::uint8_t faults, std::size_t at_least_steps, std::size_t at_most_steps) {
+    const bushd_report expected = master_.poll(kVirtual);
+    const bushd_report report = master_.poll(kReal);
+    EXPECT_EQ(expected.faults, faults);
+    EXPECT_EQ(report.faults, faults);
+    EXPECT_EQ(report.state, expected.state);
+    EXPECT_EQ(report.moving, 0);
+    EXPECT_EQ(report.bad_frames, expected.bad_frames);
+    EXPECT_EQ(report.rejected_frames, expected.rejected_frames);
+    EXPECT_EQ(report.last_rejection, expected.last_rejection);
+    EXPECT_EQ(report.run_downs, expected.run_downs);
+    const auto steps = recorder_.times(1, Signal::kStep, kMotor, true).size();
+    EXPECT_EQ(steps, recorder_.times(0, Signal::kStep, kMotor, true).size());
+    EXPECT_GE(steps, at_least_steps);
+    EXPECT_LE(steps, at_most_steps);
+    EXPECT_EQ(report.motor[kMotor].position_steps, static_cast<std::int32_t>(steps));
+    EXPECT_EQ(expected.motor[kMotor].position_steps, static_cast<std::int32_t>(steps));
+  }
+
+  static constexpr std::size_t kAllSteps = kFrames * kTicksPerFrame;
+  const std::unique_ptr<McuUnderTest> real_;
+  Recorder recorder_;
+  Bus bus_;
+  Master master_;
+  std::uint32_t first_tick_ = 0;
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Faults);
+INSTANTIATE_TEST_SUITE_P(Of, Faults, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(Faults, ADamagedFrameCountsForNothingAndIsRepaired) {
+  first_tick_ = master_.poll(kReal).tick + 16;
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    if (i == 2) tell_damaged(BUSHD_MSG_TICKS, frame(i));
+    tell(BUSHD_MSG_TICKS, frame(i));
+  }
+  pass_ticks(140);
+  expect_alike(0, kAllSteps, kAllSteps);
+  EXPECT_EQ(master_.poll(kReal).bad_frames, 2) << "its own and its neighbour's";
+}
+
+TEST_P(Faults, AFrameThatComesLateFillsItsHole) {
+  first_tick_ = master_.poll(kReal).tick + 16;
+  for (const std::size_t i : {0, 2, 3}) tell(BUSHD_MSG_TICKS, frame(i));
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    const bushd_report report = master_.poll(address);
+    EXPECT_EQ(report.islands, 1 << kMotor);
+    EXPECT_EQ(report.island_from, static_cast<std::uint16_t>(first_tick_ + 2 * kTicksPerFrame));
+    EXPECT_EQ(report.island_until, static_cast<std::uint16_t>(first_tick_ + 4 * kTicksPerFrame));
+  }
+  for (const std::size_t i : {1, 4}) tell(BUSHD_MSG_TICKS, frame(i));
+  pass_ticks(140);
+  expect_alike(0, kAllSteps, kAllSteps);
+}
+
+TEST_P(Faults, AHoleThatStaysEndsInARampDown) {
+  first_tick_ = master_.poll(kReal).tick + 16;
+  for (const std::size_t i : {0, 1, 3}) tell(BUSHD_MSG_TICKS, frame(i));
+  pass_ticks(140);
+  expect_alike(BUSHD_FAULT_LINK, 2 * kTicksPerFrame, 3 * kTicksPerFrame);
+  EXPECT_EQ(master_.poll(kReal).run_downs, 1);
+}
+
+TEST_P(Faults, ATableRunEndsWhenNobodyIsHeard) {
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    ASSERT_EQ(master_.acknowledged(address, BUSHD_MSG_CONFIGURE, bushd_encode_configure,
+                                   {kTickNs, BUSHD_FORMAT_COARSE, 50}),
+              BUSHD_OK);
+  }
+  const bushd_table_run_entry entry{kMotor, 0, 1, 5000};
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(
+      bushd_encode_table_run(0, master_.poll(kReal).tick + 24, &entry, 1, payload.data()));
+  tell(BUSHD_MSG_TABLE_RUN, payload);
+  pass_ticks(30);
+  broadcast(BUSHD_MSG_POLL, {1, 99, 0, 0});
+  pass_ticks(100);
+  expect_alike(BUSHD_FAULT_LINK, 60, 200);
+}
+
+TEST_P(Faults, AnEmergencyStopIsTheSame) {
+  for (const bushd_how how : {BUSHD_RAMP_DOWN, BUSHD_CUT}) {
+    first_tick_ = master_.poll(kReal).tick + 16;
+    for (std::size_t i = 0; i < kFrames; ++i) tell(BUSHD_MSG_TICKS, frame(i));
+    bus_.advance_to(bus_.now_ns() +
+                    TimeNs{kTickNs} *
+                        static_cast<std::int32_t>(first_tick_ + 15 - master_.poll(kReal).tick));
+    const std::size_t before = recorder_.times(1, Signal::kStep, kMotor, true).size();
+    EXPECT_GT(before, 10u);
+    broadcast(BUSHD_MSG_EMERGENCY, {static_cast<std::uint8_t>(how)});
+    pass_ticks(60);
+    expect_alike(BUSHD_FAULT_EMERGENCY, before, before + (how == BUSHD_CUT ? 2 : 8));
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      ASSERT_EQ(master_.acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
+                                     bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
+                BUSHD_OK);
+    }
+  }
+}
+
+// Everything that is said of a line in tests/vectors, to one MCU: its answers.
+class GoldenFrames : public testing::TestWithParam<Target> {
+ protected:
+  struct Answer {
+    std::uint8_t type;
+    std::uint8_t tag;
+    Bytes payload;
+  };
+
+  static std::vector<Bytes> wires() {
+    std::ifstream file(BUSHD_SOURCE_DIR "/tests/vectors/frames.csv");
+    std::vector<Bytes> out;
+    std::string line;
+    std::getline(file, line);
+    while (std::getline(file, line)) {
+      const std::string hex = line.substr(line.rfind(',') + 1);
+      Bytes wire;
+      for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
+        wire.push_back(static_cast<std::uint8_t>(std::stoi(hex.substr(i, 2), nullptr, 16)));
+      }
+      out.push_back(wire);
+    }
+    return out;
+  }
+
+  template <class Add>
+  static std::vector<Answer> answers_of(Add add) {
+    Bus bus(kBaud);
+    add(bus);
+    Master master(bus);
+    bus.advance_to(kBootNs);
+    // A second time all of them are out of date.
+    for (int round = 0; round < 2; ++round) {
+      for (const Bytes& wire : wires()) {
+        bus.master_send(wire, bus.now_ns());
+        bus.advance_to(bus.line_busy_until_ns() + 40'000'000);
+      }
+    }
+    std::vector<Answer> answers;
+    for (const Frame& frame : master.frames) {
+      answers.push_back({frame.type, frame.tag, frame.payload});
+    }
+    EXPECT_EQ(master.bad_frames, 0);
+    return answers;
+  }
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(GoldenFrames);
+INSTANTIATE_TEST_SUITE_P(Of, GoldenFrames, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(GoldenFrames, AreAnsweredLikeTheVirtualMcuDoes) {
+  const auto real = GetParam().make();
+  for (const std::uint8_t address : Bytes{1, 2, 3, 9}) {
+    SCOPED_TRACE("address " + std::to_string(address));
+    McuOptions twin = real->twin();
+    twin.address = address;
+    twin.unique_id = 0x0102030405060708;
+    const auto expected = answers_of([&](Bus& bus) { bus.add_mcu(twin); });
+    const auto answers = answers_of([&](Bus& bus) {
+      bus.add_mcu([&](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+        return real->make({address, twin.unique_id, 0}, index, driver, sink);
+      });
+    });
+    ASSERT_EQ(answers.size(), expected.size());
+    EXPECT_GT(answers.size(), 2u);
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      EXPECT_EQ(answers[i].type, expected[i].type);
+      EXPECT_EQ(answers[i].tag, expected[i].tag);
+      EXPECT_EQ(answers[i].payload.size(), expected[i].payload.size());
+      const bool acknowledges = expected[i].payload.size() == 1;
+      if (acknowledges) {
+        EXPECT_EQ(answers[i].payload, expected[i].payload) << "type " << int{answers[i].type};
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bushd::sim
