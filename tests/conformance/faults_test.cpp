@@ -75,6 +75,15 @@ class Faults : public testing::TestWithParam<Target> {
     return payload;
   }
 
+  // Of more steps than a test waits for.
+  void start_run() {
+    const bushd_table_run_entry entry{kMotor, 0, 1, 5000};
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(
+        bushd_encode_table_run(0, master_.poll(kReal).tick + 24, &entry, 1, payload.data()));
+    tell(BUSHD_MSG_TABLE_RUN, payload);
+  }
+
   void expect_alike(std::uint8_t faults, std::size_t at_least_steps, std::size_t at_most_steps) {
     const bushd_report expected = master_.poll(kVirtual);
     const bushd_report report = master_.poll(kReal);
@@ -144,11 +153,7 @@ TEST_P(Faults, ATableRunEndsWhenNobodyIsHeard) {
                                    {kTickNs, BUSHD_FORMAT_COARSE, 50}),
               BUSHD_OK);
   }
-  const bushd_table_run_entry entry{kMotor, 0, 1, 5000};
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(
-      bushd_encode_table_run(0, master_.poll(kReal).tick + 24, &entry, 1, payload.data()));
-  tell(BUSHD_MSG_TABLE_RUN, payload);
+  start_run();
   pass_ticks(30);
   broadcast(BUSHD_MSG_POLL, {1, 99, 0, 0});
   pass_ticks(100);
@@ -172,6 +177,69 @@ TEST_P(Faults, AnEmergencyStopIsTheSame) {
                                      bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
                 BUSHD_OK);
     }
+  }
+}
+
+// Inputs are looked at once a tick: they change for both in the same one.
+class Inputs : public Faults {
+ protected:
+  void SetUp() override {
+    ASSERT_NO_FATAL_FAILURE(Faults::SetUp());
+    set_inputs({});
+  }
+  void set_inputs(bushd_inputs inputs) {
+    bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4);
+    for (const std::size_t mcu : {0, 1}) bus_.node(mcu).set_inputs(inputs);
+  }
+  void configure(const bushd_set_inputs& inputs) {
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      ASSERT_EQ(master_.acknowledged(address, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
+                BUSHD_OK);
+    }
+  }
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Inputs);
+INSTANTIATE_TEST_SUITE_P(Of, Inputs, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(Inputs, ALimitStopsItsMotorAndForbidsTheDirection) {
+  bushd_set_inputs settings{};
+  settings.limit_positive = 1 << kMotor;
+  ASSERT_NO_FATAL_FAILURE(configure(settings));
+  start_run();
+  pass_ticks(60);
+  set_inputs({1 << kMotor, 0});
+  pass_ticks(40);
+  expect_alike(0, 20, 120);
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    EXPECT_EQ(master_.poll(address).forbidden_positive, 1 << kMotor);
+    EXPECT_EQ(master_.poll(address).forbidden_negative, 0);
+  }
+}
+
+TEST_P(Inputs, TheEmergencyInputCuts) {
+  bushd_set_inputs settings{};
+  settings.emergency = BUSHD_EMERGENCY_INPUT_CUTS;
+  ASSERT_NO_FATAL_FAILURE(configure(settings));
+  start_run();
+  pass_ticks(60);
+  set_inputs({0, BUSHD_INPUT_EMERGENCY});
+  pass_ticks(40);
+  expect_alike(BUSHD_FAULT_EMERGENCY_INPUT, 20, 120);
+}
+
+TEST_P(Inputs, TooMuchCurrentTakesThePowerAway) {
+  bushd_set_inputs settings{};
+  settings.overcurrent = 600;
+  ASSERT_NO_FATAL_FAILURE(configure(settings));
+  start_run();
+  pass_ticks(60);
+  bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} / 2);
+  for (const std::size_t mcu : {0, 1}) bus_.node(mcu).set_current(601);
+  pass_ticks(40);
+  expect_alike(BUSHD_FAULT_OVERCURRENT, 20, 120);
+  for (const std::size_t mcu : {0, 1}) {
+    EXPECT_EQ(recorder_.times(mcu, Signal::kEnable, 0, false).size(), 1u);
   }
 }
 
