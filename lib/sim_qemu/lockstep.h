@@ -12,7 +12,8 @@ typedef enum lockstep_command_kind {
   LOCKSTEP_CURRENT = 4,      // value: what its ADC reads
   LOCKSTEP_FLASH = 5,        // value: the word at `address`, before the first RUN
   LOCKSTEP_RESET_CAUSE = 6,  // value: RESC, before the first RUN
-  LOCKSTEP_STOP_TICKS = 7    // the timer that begins ticks interrupts no more
+  LOCKSTEP_STOP_TICKS = 7,   // the timer that begins ticks interrupts no more
+  LOCKSTEP_STICK = 8         // bit 0 of the word of RAM at `address` is 1, before the first RUN
 } lockstep_command_kind;
 
 typedef enum lockstep_event_kind {

@@ -178,6 +178,35 @@ static void set_timer(void) {
 
 static MemoryRegion* tick_timer;
 
+static void cover(MemoryRegion* region, hwaddr at, uint64_t size, const MemoryRegionOps* ops) {
+  memory_region_init_io(region, NULL, ops, NULL, "bushd", size);
+  memory_region_add_subregion_overlap(get_system_memory(), at, region, 1);
+}
+
+/* A word of RAM with a bit that is always 1. */
+static uint32_t stuck;
+
+static uint64_t stuck_read(void* opaque, hwaddr address, unsigned size) {
+  (void)opaque;
+  (void)address;
+  (void)size;
+  return stuck | 1u;
+}
+
+static void stuck_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
+  (void)opaque;
+  (void)address;
+  (void)size;
+  stuck = (uint32_t)data;
+}
+
+static void stick(uint32_t address) {
+  static MemoryRegion region;
+  static const MemoryRegionOps kStuck = {
+      .read = stuck_read, .write = stuck_write, .endianness = DEVICE_LITTLE_ENDIAN};
+  cover(&region, address, 4, &kStuck);
+}
+
 /* Until it may run. */
 static void obey(void) {
   for (;;) {
@@ -202,6 +231,9 @@ static void obey(void) {
         break;
       case LOCKSTEP_STOP_TICKS:
         memory_region_dispatch_write(tick_timer, TIMER_IMR, 0, MO_32, MEMTXATTRS_UNSPECIFIED);
+        break;
+      case LOCKSTEP_STICK:
+        stick(command.address);
         break;
       case LOCKSTEP_CURRENT:
         adc.reading = command.value;
@@ -412,11 +444,6 @@ static void flash_write(void* opaque, hwaddr address, uint64_t data, unsigned si
     const uint32_t page = flash.address & ~(FLASH_PAGE - 1u);
     for (uint32_t word = 0; word < FLASH_PAGE; word += 4) flash_store(page + word, UINT32_MAX);
   }
-}
-
-static void cover(MemoryRegion* region, hwaddr at, uint64_t size, const MemoryRegionOps* ops) {
-  memory_region_init_io(region, NULL, ops, NULL, "bushd", size);
-  memory_region_add_subregion_overlap(get_system_memory(), at, region, 1);
 }
 
 static void on_machine_done(Notifier* notifier, void* data) {

@@ -48,8 +48,10 @@ class QemuMcu final : public Mcu {
   void receive(std::uint8_t byte, TimeNs now_ns) override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override;
 
-  // A fault of the chip: the timer that begins ticks interrupts no more.
-  void stop_ticks() { order(LOCKSTEP_STOP_TICKS, 0); }
+  // Faults of the chip.
+  void stop_ticks() { order(LOCKSTEP_STOP_TICKS, 0); }  // their timer interrupts no more
+  // Bit 0 of a word is 1. Before the first advance.
+  void stick_ram(std::uint32_t address) { order(LOCKSTEP_STICK, 0, address); }
 
   // Bytes lost in its receiver.
   std::uint64_t overruns() const { return overruns_; }

@@ -1,5 +1,9 @@
 #include "sim_qemu/qemu_mcu.h"
 
+#include <fstream>
+#include <iterator>
+#include <string>
+
 #include "sim/bus_fixture.h"
 
 namespace bushd::sim {
@@ -8,13 +12,14 @@ namespace {
 constexpr std::uint32_t kBaud = 500'000;
 constexpr std::uint32_t kTickNs = 2'560'000;
 constexpr std::uint8_t kAddress = 3;
+const std::string kImage = LM3S_IMAGES "-500000.elf";
 
 class QemuImage : public testing::Test {
  protected:
-  QemuImage() : bus_(kBaud, &recorder_), master_(bus_) {
-    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+  explicit QemuImage(const std::string& image = kImage) : bus_(kBaud, &recorder_), master_(bus_) {
+    bus_.add_mcu([this, &image](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
       QemuOptions options;
-      options.image = LM3S_IMAGES "-500000.elf";
+      options.image = image;
       options.address = kAddress;
       options.boots = 41;
       auto mcu = std::make_unique<QemuMcu>(options, index, driver, sink);
@@ -22,8 +27,9 @@ class QemuImage : public testing::Test {
       return mcu;
     });
     master_.patience_ns = 6'000'000;
-    bus_.advance_to(100'000'000);
   }
+
+  void SetUp() override { bus_.advance_to(100'000'000); }
 
   // `ticks` of two steps each, from a rest.
   void move(std::uint8_t motor, std::size_t ticks) {
@@ -56,6 +62,7 @@ class QemuRuns : public QemuImage {
 
 TEST_F(QemuRuns, AreTheSameToTheNanosecond) {
   struct Another : QemuRuns {
+    Another() { SetUp(); }
     void TestBody() override {}
     using QemuRuns::edges;
   };
@@ -100,6 +107,48 @@ TEST_F(QemuImage, CountsItsBootsWhenItTurnsAPage) {
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.boot_number, 42 + kBoots);
   EXPECT_EQ(report.reset_cause, BUSHD_RESET_EXTERNAL);
+}
+
+// The same image with one bit of a text that nothing depends on turned round.
+class QemuDamagedImage : public QemuImage {
+ protected:
+  QemuDamagedImage() : QemuImage(damaged()) {}
+
+  static std::string damaged() {
+    std::ifstream in(kImage, std::ios::binary);
+    std::string bytes(std::istreambuf_iterator<char>(in), {});
+    // Filling between the program and its last 256 bytes.
+    const std::size_t at = bytes.find(std::string(32, '\xFF'));
+    EXPECT_NE(at, std::string::npos);
+    bytes.at(at + 16) = '\x7F';
+    std::string path = testing::TempDir() + "bushd-damaged.elf";
+    std::ofstream(path, std::ios::binary) << bytes;
+    return path;
+  }
+};
+
+TEST_F(QemuDamagedImage, IsFoundAtBoot) {
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST);
+  EXPECT_EQ(report.failed_tests, BUSHD_TEST_FLASH);
+}
+
+// In what would be a part of its stack.
+class QemuDamagedRam : public QemuImage {
+ protected:
+  QemuDamagedRam() { qemu_->stick_ram(0x2000F004); }
+};
+
+TEST_F(QemuDamagedRam, IsFoundAtBoot) {
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST);
+  EXPECT_EQ(report.failed_tests, BUSHD_TEST_RAM);
+}
+
+TEST_F(QemuImage, HasNoFaultWhenItIsWhole) {
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, 0);
+  EXPECT_EQ(report.failed_tests, 0);
 }
 
 TEST(QemuMcu, SaysSoIfThereIsNoImage) {

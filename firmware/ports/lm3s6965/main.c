@@ -1,6 +1,7 @@
 // The MCU program on an LM3S6965: the core, its memory, and the main loop. Interrupts emit slots,
 // collect bytes with the times of delimiters, and send; the core runs in the main loop only.
 #include "firmware/ports/lm3s6965/board.h"
+#include "firmware/ports/lm3s6965/boot.h"
 #include "firmware/ports/lm3s6965/clock.h"
 #include "firmware/ports/lm3s6965/emission.h"
 #include "firmware/ports/lm3s6965/journal.h"
@@ -64,7 +65,10 @@ static uint16_t port_read_current(void* context) {
 
 static uint8_t port_self_test(void* context) {
   (void)context;
-  return has_identity ? 0 : BUSHD_TEST_EEPROM;
+  uint8_t failed = has_identity ? 0 : BUSHD_TEST_EEPROM;
+  if (boot_ram_faults != 0) failed |= BUSHD_TEST_RAM;
+  if (!boot_flash_is_sealed()) failed |= BUSHD_TEST_FLASH;
+  return failed;
 }
 
 static void port_keep_enable(void* context, bool on) {

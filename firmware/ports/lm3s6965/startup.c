@@ -1,6 +1,8 @@
-// From reset to main: vectors, and memory as C wants it.
+// From reset to main: vectors, and memory as C wants it. RAM has been tested before (ram_test.S).
 #include <stdint.h>
 
+#include "engine/frame.h"
+#include "firmware/ports/lm3s6965/boot.h"
 #include "firmware/ports/lm3s6965/interrupts.h"
 #include "firmware/ports/lm3s6965/registers.h"
 
@@ -11,22 +13,35 @@ extern const uint32_t data_image[];
 extern uint32_t bss_begin[];
 extern uint32_t bss_end[];
 extern uint32_t stack_end[];
+extern const uint8_t image_begin[];
+extern const uint8_t image_end[];
+
+uint32_t boot_ram_faults;
+
+// What makes the CRC of the image 0: seal_image.py puts it there.
+__attribute__((section(".seal"), used)) const uint32_t image_seal;
+
+bool boot_flash_is_sealed(void) {
+  return bushd_crc32(BUSHD_CRC32_START, image_begin, (size_t)(image_end - image_begin)) == 0;
+}
 
 #define VECTORS EXTERNAL(44u)
 static const vector kVectors[VECTORS];
 
 int main(void);
-void reset(void);
+void reset(void);                 // ram_test.S
+void start(uint32_t ram_faults);  // by it
 
 // Aligned as the chip wants it.
 __attribute__((aligned(256))) vector vectors[VECTORS];
 
-void reset(void) {
+void start(uint32_t ram_faults) {
   const uint32_t* from = data_image;
   for (uint32_t* to = data_begin; to < data_end; ++to) *to = *from++;
   for (uint32_t* to = bss_begin; to < bss_end; ++to) *to = 0;
   for (uint32_t i = 0; i < VECTORS; ++i) vectors[i] = kVectors[i];
   SCB_VTOR = (uint32_t)(uintptr_t)vectors;
+  boot_ram_faults = ram_faults;
   main();
 }
 
