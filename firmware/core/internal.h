@@ -42,7 +42,7 @@ uint16_t bushd_mcu_moving(const bushd_mcu* mcu);
 void bushd_mcu_update_state(bushd_mcu* mcu);
 
 // requests.c: frames for this MCU, and their answers.
-void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns);
+void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns);
 
 // stream.c: frames of ticks into the queue.
 typedef struct bushd_mcu_stretch {
@@ -58,6 +58,9 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks);
 bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks* ticks);
 // Nothing is known of this motor from `tick` on.
 void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t motor, uint32_t tick);
+// What is left of a frame that was taken, at once; up to a tick.
+void bushd_mcu_finish_rows(bushd_mcu* mcu);
+void bushd_mcu_finish_row(bushd_mcu* mcu, uint32_t tick);
 void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t motor);
 void bushd_mcu_clear_streams(bushd_mcu* mcu);
 
@@ -125,7 +128,7 @@ bushd_tables bushd_mcu_tables(const bushd_mcu* mcu);
 void bushd_mcu_forget_tables(bushd_mcu* mcu);
 
 // sync.c: the tick counter against the bus's.
-void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, uint32_t time_in_tick_ns);
+void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick_ns);
 void bushd_mcu_slew(bushd_mcu* mcu);             // at every tick boundary
 void bushd_mcu_new_tick_length(bushd_mcu* mcu);  // mcu->tick_ns is another one
 

@@ -24,6 +24,10 @@ uint16_t bushd_mcu_moving(const bushd_mcu* mcu) {
   return moving;
 }
 
+static bool is_moving(const bushd_mcu* mcu) {
+  return (mcu->plane[0].active | mcu->plane[1].active) != 0 || bushd_mcu_moving(mcu) != 0;
+}
+
 void bushd_mcu_update_state(bushd_mcu* mcu) {
   const uint8_t ready = BUSHD_FLAG_CONFIGURED | BUSHD_FLAG_SYNCED | BUSHD_FLAG_ENABLED;
   if (mcu->faults != 0) {
@@ -31,7 +35,7 @@ void bushd_mcu_update_state(bushd_mcu* mcu) {
   } else if ((mcu->flags & ready) != ready) {
     mcu->state = BUSHD_STATE_BUSY;
   } else {
-    mcu->state = bushd_mcu_moving(mcu) != 0 ? BUSHD_STATE_RUN : BUSHD_STATE_READY;
+    mcu->state = is_moving(mcu) ? BUSHD_STATE_RUN : BUSHD_STATE_READY;
   }
 }
 
@@ -88,10 +92,12 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
 
 const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   const bushd_plane* ended = &mcu->plane[mcu->front];
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    // Unsigned: the counter may be set to any value, and then wraps.
-    const uint32_t position = (uint32_t)mcu->motor[m].position_steps + (uint32_t)ended->steps[m];
-    mcu->motor[m].position_steps = (int32_t)position;
+  if (ended->active != 0) {
+    for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+      // Unsigned: the counter may be set to any value, and then wraps.
+      const uint32_t position = (uint32_t)mcu->motor[m].position_steps + (uint32_t)ended->steps[m];
+      mcu->motor[m].position_steps = (int32_t)position;
+    }
   }
   mcu->front ^= 1u;
   ++mcu->tick;
@@ -110,6 +116,7 @@ static void move_by_itself(bushd_mcu* mcu) {
 }
 
 void bushd_mcu_prepare(bushd_mcu* mcu) {
+  bushd_mcu_finish_row(mcu, mcu->tick + 1u);
   bushd_mcu_watch_inputs(mcu);
   if ((mcu->autonomous | mcu->local.motors) != 0) move_by_itself(mcu);
   bushd_mcu_watch_silence(mcu);
@@ -131,15 +138,18 @@ static bool counts_in_order_only(uint8_t type) {
 // it has been heard, or was overtaken. After silence another master may have begun.
 static bool is_stale(bushd_mcu* mcu, const bushd_frame* frame) {
   const uint8_t age = (uint8_t)(mcu->newest_tag - frame->tag);
-  const bool silence = mcu->uptime - mcu->newest_uptime > STALE_NS / mcu->tick_ns;
-  if (mcu->frames_heard && !silence && age < STALE_TAGS) return true;
+  if (mcu->frames_heard && age < STALE_TAGS &&
+      mcu->uptime - mcu->newest_uptime <= STALE_NS / mcu->tick_ns) {
+    return true;
+  }
   mcu->frames_heard = true;
   mcu->newest_tag = frame->tag;
   mcu->newest_uptime = mcu->uptime;
   return false;
 }
 
-void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, uint32_t time_in_tick_ns) {
+void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns) {
+  bushd_mcu_finish_rows(mcu);
   bushd_frame frame;
   switch (bushd_receive_byte(&mcu->receiver, byte, &frame)) {
     case BUSHD_RECEIVE_MORE:

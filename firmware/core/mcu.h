@@ -91,9 +91,8 @@ typedef struct bushd_mcu_motor {
   int8_t table;            // table slot, -1: none
   uint8_t mode;            // bushd_mcu_mode
   bool exact;              // `run` is emitted exact to a slot, not by displacements
-  bool begun;              // moves, as far as is known
   uint16_t delay;          // of the running step when the queued ticks end; 0: at rest there
-  uint16_t displacement;   // the last one that was not 0, unsigned
+  uint16_t displacement;   // the last one that was not 0, unsigned; in the fine format only
   uint16_t still_ticks;    // made since; saturates
   uint32_t rest_from;      // at rest from here to start_tick
   uint32_t start_tick;     // of the last start taken
@@ -173,6 +172,22 @@ typedef struct bushd_mcu_local {
   uint8_t readings;  // since it changed
 } bushd_mcu_local;
 
+// What the queue holds for all motors at once, so that no tick need look at each. To be made anew
+// when a frame has come, or something was cut.
+typedef struct bushd_mcu_outlook {
+  bool stale;
+  uint16_t plain;         // of these nothing but the queue decides, until:
+  uint32_t plain_until;   // that tick
+  bool moves;             // motors are to move on when their ticks end, the first of them at:
+  uint32_t moving_until;  // that tick
+} bushd_mcu_outlook;
+
+// Rows of a frame that are still to be put into the queue. It was taken, and lies in the receiver.
+typedef struct bushd_mcu_rows {
+  uint8_t next;  // as many as ticks.count: none
+  bushd_ticks ticks;
+} bushd_mcu_rows;
+
 // Read-only for ports and tests; everything in here is the core's.
 typedef struct bushd_mcu {
   bushd_port port;
@@ -197,6 +212,9 @@ typedef struct bushd_mcu {
   uint16_t rejected_frames;
   uint8_t last_rejection;
   uint16_t direction;  // DIR levels of the plane prepared last
+  uint16_t begun;      // motors that move, as far as is known
+  bushd_mcu_outlook outlook;
+  bushd_mcu_rows rows;
   uint16_t codes_used;
   uint8_t failed_tests;     // BUSHD_TEST_*
   bushd_set_inputs inputs;  // settings
@@ -213,7 +231,6 @@ typedef struct bushd_mcu {
   bushd_mcu_clock clock;
   bushd_mcu_emission emission;
   bushd_plane plane[2];
-  bushd_slots plans[BUSHD_MOTORS_PER_MCU];  // of the plane that is being prepared
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];
   bushd_receiver receiver;
@@ -235,8 +252,14 @@ bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index);
 void bushd_mcu_restored(bushd_mcu* mcu);
 
 // One byte from the line. `time_in_tick_ns` is when its stop bit ended, counted from the start of
-// the present tick; only used at delimiters. O(1), O(frame) at a delimiter.
-void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, uint32_t time_in_tick_ns);
+// the present tick (negative: in one before); only used at delimiters. O(1), O(frame) at a
+// delimiter.
+void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns);
+
+// What a frame of many ticks asks for is done in pieces if the port wants it so: while this returns
+// true, something was left to do, and no byte is to be given to the receiver. The other functions
+// do first what they need. O(motors).
+bool bushd_mcu_work(bushd_mcu* mcu);
 
 // Tick boundary: counts the steps of the tick that ended, returns the plane of the one that begins.
 // O(motors).

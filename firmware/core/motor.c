@@ -34,7 +34,7 @@ static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   mcu->faults |= BUSHD_FAULT_LINK;
   // DIR then still shows the move before: where this one was to go is not known. It has not left
   // rest, so it may stay.
-  if (!motor->begun) return;
+  if ((mcu->begun & motor_bit(m)) == 0) return;
   mcu->run_downs = saturating_increment(mcu->run_downs);
   ramp_down_stream(mcu, m, delay);
 }
@@ -52,19 +52,6 @@ static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   return displacement;
 }
 
-static inline int16_t queued_displacement(bushd_mcu_motor* motor, uint32_t tick, int16_t* queued) {
-  const int16_t displacement = *queued;
-  *queued = 0;
-  if (displacement != 0) {
-    motor->begun = true;
-  } else if (motor->begun) {
-    const bool at_rest =
-        ticks_after(tick, motor->rest_from) >= 0 && ticks_after(tick, motor->start_tick) <= 0;
-    motor->begun = !at_rest;
-  }
-  return displacement;
-}
-
 static inline void set_direction(bushd_mcu* mcu, uint16_t bit, bool positive) {
   if (positive) {
     mcu->direction |= bit;
@@ -73,6 +60,7 @@ static inline void set_direction(bushd_mcu* mcu, uint16_t bit, bool positive) {
   }
 }
 
+// By which stream_delay goes, in the fine format only.
 static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   if (displacement == 0) {
     motor->still_ticks = saturating_increment(motor->still_ticks);
@@ -96,35 +84,10 @@ static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, 
   // As ticks of the format would leave it, so that they can go on from here.
   motor->remainder =
       mcu->format == BUSHD_FORMAT_FINE ? (int16_t)(run->fraction * run->direction) : (int16_t)0;
-  motor->begun = true;
+  mcu->begun |= bit;
   note_speed(motor, (int16_t)(steps * 256 + motor->remainder - before));
   if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) motor->mode = BUSHD_MCU_STREAM;
   return steps;
-}
-
-static inline int16_t plan_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit,
-                                        int16_t displacement, bushd_slots* plan) {
-  note_speed(motor, displacement);
-  if (displacement == 0) return 0;
-  set_direction(mcu, bit, displacement > 0);
-  const int16_t crossing =
-      mcu->format == BUSHD_FORMAT_FINE ? BUSHD_CROSSING_FINE : BUSHD_CROSSING_COARSE;
-  return bushd_slots_plan(displacement, &motor->remainder, crossing, plan);
-}
-
-// Nothing is queued for this tick. `exact`: it is one of a run-down that is exact to a slot.
-static int16_t plan_without_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick, bushd_slots* plan,
-                                  bool* exact) {
-  bushd_mcu_motor* motor = &mcu->motor[m];
-  motor->known_until = tick + 1u;
-  if (motor->delay != 0) queue_ended(mcu, m);
-  if (motor->mode < BUSHD_MCU_RAMP_DOWN) {
-    motor->begun = false;
-    return 0;
-  }
-  *exact = motor->exact;
-  if (motor->exact) return 0;
-  return plan_displacement(mcu, motor, motor_bit(m), ramp_down_displacement(mcu, motor), plan);
 }
 
 static inline bool in_run_at(bushd_mcu_motor* motor, uint32_t tick) {
@@ -133,50 +96,146 @@ static inline bool in_run_at(bushd_mcu_motor* motor, uint32_t tick) {
   return motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->run_from) >= 0;
 }
 
-// Of a motor that is to move on when its queued ticks end.
-static inline void watch_low_water(bushd_mcu* mcu, const bushd_mcu_motor* motor) {
-  if (motor->delay == 0) return;
-  const int32_t queued = ticks_after(motor->known_until, FIRST_OPEN(mcu));
-  if (queued < mcu->low_water_ticks) mcu->low_water_ticks = (uint16_t)queued;
+static void look_out(bushd_mcu* mcu, uint32_t tick) {
+  bushd_mcu_outlook* outlook = &mcu->outlook;
+  uint16_t plain = 0;
+  int32_t plain_ticks = INT32_MAX;
+  int32_t moving_ticks = INT32_MAX;
+  uint16_t bit = 1;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
+    const bushd_mcu_motor* motor = &mcu->motor[m];
+    const int32_t known_ticks = ticks_after(motor->known_until, tick);
+    if (known_ticks <= 0) continue;
+    if (motor->delay != 0 && known_ticks < moving_ticks) moving_ticks = known_ticks;
+    if (motor->mode != BUSHD_MCU_STREAM) continue;
+    plain |= bit;
+    if (known_ticks < plain_ticks) plain_ticks = known_ticks;
+  }
+  outlook->stale = false;
+  outlook->plain = plain;
+  outlook->plain_until = tick + (uint32_t)plain_ticks;
+  outlook->moves = moving_ticks != INT32_MAX;
+  outlook->moving_until = tick + (uint32_t)moving_ticks;
 }
 
-// Steps that displacements make; returns the motors whose steps are those of a run.
-static uint16_t plan_all(bushd_mcu* mcu, bushd_plane* plane) {
-  const uint32_t tick = mcu->tick + 1u;
-  uint16_t exact = 0;
-  uint16_t active = 0;
-  uint16_t bit = 1;
+// Of motors that are to move on when their queued ticks end.
+static void watch_low_water(bushd_mcu* mcu) {
+  if (!mcu->outlook.moves) return;
+  const int32_t queued = ticks_after(mcu->outlook.moving_until, FIRST_OPEN(mcu));
+  if (queued < mcu->low_water_ticks) mcu->low_water_ticks = queued > 0 ? (uint16_t)queued : 0;
+}
+
+// The tick's queued displacements, which leave the queue, into `moves` those that are not 0.
+static void take_row(bushd_mcu* mcu, uint32_t tick, int16_t* displacement, uint16_t* moves) {
   int16_t* queued = queue_at(mcu, tick, 0);
-  int16_t* steps = plane->steps;
-  bushd_slots* plan = mcu->plans;
-  bushd_mcu_motor* const end = mcu->motor + mcu->config.motors;
-  for (bushd_mcu_motor* motor = mcu->motor; motor != end; ++motor) {
-    bool is_exact = in_run_at(motor, tick);
-    int16_t made = 0;
-    plan->distance = 0;
-    if (!is_exact) {
-      made =
-          ticks_after(motor->known_until, tick) > 0
-              ? plan_displacement(mcu, motor, bit, queued_displacement(motor, tick, queued), plan)
-              : plan_without_queue(mcu, (uint8_t)(motor - mcu->motor), tick, plan, &is_exact);
-    }
-    *steps = made;
-    if (made != 0) active |= bit;
-    if (is_exact) exact |= bit;
-    watch_low_water(mcu, motor);
-    ++queued;
-    ++steps;
-    ++plan;
-    bit = (uint16_t)(bit << 1);
+  uint16_t bit = 1;
+  uint16_t found = 0;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
+    displacement[m] = *queued;
+    if (*queued != 0) found |= bit;
+    *queued++ = 0;
   }
-  plane->active = active;
+  *moves = found;
+}
+
+// A motor that begins, or stands still until a start that waits.
+static void follow_begun(bushd_mcu* mcu, uint16_t plain, uint16_t moves, uint32_t tick) {
+  mcu->begun |= plain & moves;
+  uint16_t still = mcu->begun & plain & (uint16_t)~moves;
+  for (uint8_t m = 0; still != 0; ++m, still = (uint16_t)(still >> 1)) {
+    const bushd_mcu_motor* motor = &mcu->motor[m];
+    if ((still & 1u) != 0 && ticks_after(tick, motor->rest_from) >= 0 &&
+        ticks_after(tick, motor->start_tick) <= 0) {
+      mcu->begun &= (uint16_t)~motor_bit(m);
+    }
+  }
+}
+
+// Of a motor whose steps the queue alone does not decide; false if they are those of a run, exact
+// to a slot.
+static bool displacement_of(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t* displacement) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  if (in_run_at(motor, tick)) return false;
+  if (ticks_after(motor->known_until, tick) > 0) {
+    follow_begun(mcu, motor_bit(m), *displacement != 0 ? motor_bit(m) : (uint16_t)0, tick);
+    return true;
+  }
+  motor->known_until = tick + 1u;
+  if (motor->delay != 0) queue_ended(mcu, m);
+  *displacement = 0;
+  if (motor->mode < BUSHD_MCU_RAMP_DOWN) {
+    mcu->begun &= (uint16_t)~motor_bit(m);
+    return true;
+  }
+  if (motor->exact) return false;
+  *displacement = ramp_down_displacement(mcu, motor);
+  return true;
+}
+
+// What displacements make; returns the motors whose steps are those of a run.
+static uint16_t find_displacements(bushd_mcu* mcu, int16_t* displacement, uint16_t* moves) {
+  const uint32_t tick = mcu->tick + 1u;
+  bushd_mcu_outlook* outlook = &mcu->outlook;
+  if (outlook->stale || ticks_after(tick, outlook->plain_until) >= 0) look_out(mcu, tick);
+  take_row(mcu, tick, displacement, moves);
+  follow_begun(mcu, outlook->plain, *moves, tick);
+  uint16_t exact = 0;
+  uint16_t bit = 1;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
+    if ((outlook->plain & bit) != 0) continue;
+    if (!displacement_of(mcu, m, tick, &displacement[m])) {
+      displacement[m] = 0;
+      exact |= bit;
+    }
+    *moves &= (uint16_t)~bit;
+    if (displacement[m] != 0) *moves |= bit;
+  }
+  watch_low_water(mcu);
   return exact;
 }
 
+static void emit_coarse(bushd_mcu* mcu, bushd_plane* plane, const int16_t* displacement) {
+  for (uint8_t m = 0; m < mcu->config.motors; ++m)
+    plane->steps[m] = (int16_t)(displacement[m] >> 8);
+  if (!bushd_mcu_steps_keep_slots(mcu)) return;
+  bushd_slots_fill_evenly(plane->step, mcu->config.slots, plane->steps, mcu->config.motors);
+}
+
+static void emit_fine(bushd_mcu* mcu, bushd_plane* plane, const int16_t* displacement,
+                      uint16_t exact) {
+  bushd_slots plans[BUSHD_MOTORS_PER_MCU];
+  uint16_t bit = 1;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
+    bushd_mcu_motor* motor = &mcu->motor[m];
+    if ((exact & bit) == 0) note_speed(motor, displacement[m]);
+    const int16_t steps =
+        bushd_slots_plan(displacement[m], &motor->remainder, BUSHD_CROSSING_FINE, &plans[m]);
+    plane->steps[m] = steps;
+    if (steps == 0) plane->active &= (uint16_t)~bit;
+  }
+  if (!bushd_mcu_steps_keep_slots(mcu)) return;
+  bushd_slots_fill(plane->step, mcu->config.slots, plans, mcu->config.motors);
+}
+
+static uint16_t forward(const bushd_mcu* mcu, const int16_t* displacement) {
+  uint16_t positive = 0;
+  uint16_t bit = 1;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
+    if (displacement[m] > 0) positive |= bit;
+  }
+  return positive;
+}
+
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane) {
-  uint16_t exact = plan_all(mcu, plane);
-  if (bushd_mcu_steps_keep_slots(mcu)) {
-    bushd_slots_fill(plane->step, mcu->config.slots, mcu->plans, mcu->config.motors);
+  int16_t displacement[BUSHD_MOTORS_PER_MCU];
+  uint16_t moves = 0;
+  uint16_t exact = find_displacements(mcu, displacement, &moves);
+  mcu->direction = (mcu->direction & (uint16_t)~moves) | forward(mcu, displacement);
+  plane->active = moves;
+  if (mcu->format == BUSHD_FORMAT_FINE) {
+    emit_fine(mcu, plane, displacement, exact);
+  } else {
+    emit_coarse(mcu, plane, displacement);
   }
   for (uint8_t m = 0; exact != 0; ++m, exact = (uint16_t)(exact >> 1)) {
     if ((exact & 1u) == 0) continue;
@@ -337,10 +396,11 @@ static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stre
 
 void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t next) {
   bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_mcu_finish_rows(mcu);
   const bool runs = in_run(motor, next);
   const rest_of_stream rest = rest_of(mcu, m, next);
   const bool at_rest =
-      !motor->begun || !rest.moves ||
+      (mcu->begun & motor_bit(m)) == 0 || !rest.moves ||
       (ticks_after(next, motor->rest_from) >= 0 && ticks_after(next, motor->start_tick) <= 0);
   const uint16_t delay = at_rest || runs ? 0 : stream_delay(mcu, m, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
@@ -370,7 +430,7 @@ int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const int16_t queued =
       ticks_after(motor->known_until, next) > 0 ? *queue_at((bushd_mcu*)mcu, next, m) : (int16_t)0;
   if (queued != 0) return queued > 0 ? 1 : -1;
-  return motor->begun ? bushd_mcu_last_direction(mcu, m) : (int8_t)0;
+  return (mcu->begun & motor_bit(m)) != 0 ? bushd_mcu_last_direction(mcu, m) : (int8_t)0;
 }
 
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message) {

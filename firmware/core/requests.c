@@ -193,7 +193,7 @@ static bushd_status answer_tables(bushd_mcu* mcu, const bushd_frame* frame, answ
   return BUSHD_OK;
 }
 
-static bushd_status hear_sync(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns) {
+static bushd_status hear_sync(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
   bushd_sync sync;
   const bushd_status status = bushd_decode_sync(frame->payload, frame->payload_size, &sync);
   if (status == BUSHD_OK) bushd_mcu_sync(mcu, &sync, time_in_tick_ns);
@@ -211,7 +211,7 @@ static bushd_status hear_sync(bushd_mcu* mcu, const bushd_frame* frame, uint32_t
   } while (0)
 
 // What an MCU is told of without answering it.
-static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns) {
+static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
   switch (frame->type) {
     case BUSHD_MSG_SYNC:
       return hear_sync(mcu, frame, time_in_tick_ns);
@@ -226,7 +226,7 @@ static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time
   }
 }
 
-static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns,
+static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns,
                            answer* a) {
   switch (frame->type) {
     case BUSHD_MSG_IDENTIFY:
@@ -271,13 +271,14 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, uint32_t ti
   }
 }
 
-void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, uint32_t time_in_tick_ns) {
+void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
   answer a;
   a.due = frame->address != BUSHD_ADDRESS_BROADCAST;
   a.delay_ns = 0;
   a.size = 0;
   a.payload = mcu->reply + 2 + BUSHD_FRAME_HEADER;
   const bushd_status status = handle(mcu, frame, time_in_tick_ns, &a);
+  mcu->outlook.stale = true;
   if (status != BUSHD_OK) bushd_mcu_reject(mcu, status);
   if (!a.due) return;
   if (a.size == 0) {

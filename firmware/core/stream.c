@@ -12,6 +12,9 @@
 #include "firmware/core/internal.h"
 
 void bushd_mcu_clear_streams(bushd_mcu* mcu) {
+  mcu->rows.next = mcu->rows.ticks.count;
+  mcu->outlook.stale = true;
+  mcu->begun = 0;
   memset(mcu->config.queue, 0,
          (size_t)mcu->config.queue_ticks * mcu->config.motors * sizeof mcu->config.queue[0]);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -19,17 +22,26 @@ void bushd_mcu_clear_streams(bushd_mcu* mcu) {
     motor->known_until = FIRST_OPEN(mcu);
     motor->delay = 0;
     motor->mode = BUSHD_MCU_STREAM;
-    motor->begun = false;
     motor->rest_from = motor->start_tick = motor->known_until;
     motor->island.until = motor->island.from;
   }
+}
+
+static inline int16_t* next_row(const bushd_mcu* mcu, int16_t* queued) {
+  queued += mcu->config.motors;
+  const int16_t* const end =
+      mcu->config.queue + (size_t)mcu->config.queue_ticks * mcu->config.motors;
+  return queued < end ? queued : queued - (size_t)mcu->config.queue_ticks * mcu->config.motors;
 }
 
 // A table run is known for longer than the queue is deep.
 static void clear_rows(bushd_mcu* mcu, uint8_t m, uint32_t from, uint32_t until) {
   uint32_t count = until - from;
   if (count > mcu->config.queue_ticks) count = mcu->config.queue_ticks;
-  for (; count > 0; --count) *queue_at(mcu, from++, m) = 0;
+  int16_t* queued = queue_at(mcu, from, m);
+  for (uint16_t rows = (uint16_t)count; rows > 0; --rows, queued = next_row(mcu, queued)) {
+    *queued = 0;
+  }
 }
 
 void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t m) {
@@ -40,6 +52,8 @@ void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t m) {
 
 void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
   bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_mcu_finish_rows(mcu);
+  mcu->outlook.stale = true;
   bushd_mcu_drop_island(mcu, m);
   if (ticks_after(motor->known_until, tick) > 0) {
     clear_rows(mcu, m, tick, motor->known_until);
@@ -84,7 +98,7 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu
   return BUSHD_OK;
 }
 
-bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
+static bushd_status check_head(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
   // What came since the last tick counts: without EN no step must be made, nor counted.
   bushd_mcu_update_state(mcu);
   const bool replace = (stretch->flags & BUSHD_TICKS_REPLACE) != 0;
@@ -98,7 +112,12 @@ bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* st
   if (first > (int32_t)mcu->config.queue_ticks + 1 - (int32_t)stretch->count) {
     return BUSHD_E_CAPACITY;
   }
-  if (first <= -(int32_t)UINT16_MAX) return BUSHD_E_LATE;
+  return first <= -(int32_t)UINT16_MAX ? BUSHD_E_LATE : BUSHD_OK;
+}
+
+bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
+  const bushd_status head = check_head(mcu, stretch);
+  if (head != BUSHD_OK) return head;
   bool news = false;
   for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((stretch->mask & motor_bit(m)) == 0) continue;
@@ -186,21 +205,23 @@ static void close_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
   if (stretch->flags & BUSHD_TICKS_REPLACE) mcu->epoch = stretch->epoch;
 }
 
-// More steps would not find room in a tick.
+// More steps would not find room in a tick: |displacement| > most x 256.
 static bool in_range(const bushd_mcu* mcu, const bushd_ticks* ticks) {
-  const uint16_t size = (uint16_t)(ticks->motors * ticks->count);
   const uint8_t most = mcu->emission.grid.max_steps;
+  const uint8_t* at = ticks->displacements;
+  uint16_t left = (uint16_t)(ticks->motors * ticks->count);
   if ((ticks->flags & BUSHD_TICKS_FINE) == 0) {
     if (most == BUSHD_MAX_STEPS_PER_TICK) return true;
-    for (uint16_t i = 0; i < size; ++i) {
-      if ((ticks->displacements[i] & 0x7F) > most) return false;
+    for (; left > 0; --left, ++at) {
+      if ((*at & 0x7F) > most) return false;
     }
     return true;
   }
-  const int16_t limit = (int16_t)(most * 256);
-  for (uint16_t i = 0; i < size; ++i) {
-    const int16_t displacement = bushd_get_i16(ticks->displacements + 2u * i);
-    if (displacement > limit || displacement < -limit) return false;
+  const int8_t highest = (int8_t)most;
+  const int8_t lowest = (int8_t)-highest;
+  for (; left > 0; --left, at += 2) {
+    const int8_t whole = (int8_t)at[1];  // rounded down
+    if (whole < lowest || whole > highest || (whole == highest && at[0] != 0)) return false;
   }
   return true;
 }
@@ -213,13 +234,10 @@ static void put_rows(bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks, uint8_
   const uint8_t size = fine ? 2 : 1;
   const uint8_t stride = (uint8_t)(size * ticks->motors);
   const uint8_t* at = ticks->displacements + begin * stride + size * column;
-  const uint8_t motors = mcu->config.motors;
   int16_t* queued = queue_at(mcu, ticks->first_tick + begin, m);
-  const int16_t* const queue_end = mcu->config.queue + (size_t)mcu->config.queue_ticks * motors;
   for (uint8_t rows = (uint8_t)(end - begin); rows > 0; --rows, at += stride) {
     *queued = fine ? bushd_get_i16(at) : bushd_coarse_to_fine(*at);
-    queued += motors;
-    if (queued >= queue_end) queued = &mcu->config.queue[m];
+    queued = next_row(mcu, queued);
   }
 }
 
@@ -233,38 +251,113 @@ static void put_column(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stret
   put_rows(mcu, m, ticks, column, begin > island_end ? begin : island_end, ticks->count);
 }
 
-// What frames do to most motors: their ticks join, and nothing waits beyond.
-static bool join(bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks, uint8_t column) {
-  bushd_mcu_motor* motor = &mcu->motor[m];
-  if ((ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE)) != 0 || has_island(motor)) {
-    return false;
+// What frames do to most motors: their ticks follow what is known, and nothing waits beyond.
+static bool all_follow(const bushd_mcu* mcu, const bushd_ticks* ticks) {
+  if ((ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE)) != 0) return false;
+  const bushd_mcu_motor* motor = mcu->motor;
+  uint16_t mask = ticks->mask;
+  for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor, mask = (uint16_t)(mask >> 1)) {
+    if ((mask & 1u) != 0 && (motor->known_until != ticks->first_tick || motor->delay == 0 ||
+                             has_island(motor) || motor->table < 0)) {
+      return false;
+    }
   }
-  const int32_t known = ticks_after(motor->known_until, ticks->first_tick);
-  if (known < 0 || known >= ticks->count) return false;
-  put_rows(mcu, m, ticks, column, (uint8_t)known, ticks->count);
-  motor->known_until = ticks->first_tick + ticks->count;
-  motor->delay = bushd_get_u16(ticks->delays + 2u * column);
+  return mask == 0;
+}
+
+static void put_row(bushd_mcu* mcu) {
+  const bushd_ticks* const ticks = &mcu->rows.ticks;
+  const uint8_t row = mcu->rows.next++;
+  int16_t* queued = queue_at(mcu, ticks->first_tick + row, 0);
+  uint16_t mask = ticks->mask;
+  const uint8_t* at = ticks->displacements + (uint16_t)(row * ticks->motors);
+  if (ticks->flags & BUSHD_TICKS_FINE) {
+    at += (uint16_t)(row * ticks->motors);
+    for (; mask != 0; mask = (uint16_t)(mask >> 1), ++queued) {
+      if ((mask & 1u) == 0) continue;
+      *queued = bushd_get_i16(at);
+      at += 2;
+    }
+  } else {
+    for (; mask != 0; mask = (uint16_t)(mask >> 1), ++queued) {
+      if ((mask & 1u) != 0) *queued = bushd_coarse_to_fine(*at++);
+    }
+  }
+}
+
+bool bushd_mcu_work(bushd_mcu* mcu) {
+  if (mcu->rows.next >= mcu->rows.ticks.count) return false;
+  put_row(mcu);
   return true;
+}
+
+void bushd_mcu_finish_rows(bushd_mcu* mcu) {
+  while (bushd_mcu_work(mcu)) {
+  }
+}
+
+void bushd_mcu_finish_row(bushd_mcu* mcu, uint32_t tick) {
+  while (mcu->rows.next < mcu->rows.ticks.count &&
+         ticks_after(mcu->rows.ticks.first_tick + mcu->rows.next, tick) <= 0) {
+    put_row(mcu);
+  }
+}
+
+static void put_rows_later(bushd_mcu* mcu, const bushd_ticks* ticks) {
+  mcu->rows.ticks = *ticks;
+  mcu->rows.next = 0;
+}
+
+// All in the mask go on to the frame's end.
+static void follow(bushd_mcu* mcu, const bushd_ticks* ticks) {
+  const uint32_t end = ticks->first_tick + ticks->count;
+  const uint8_t* delay = ticks->delays;
+  bushd_mcu_motor* motor = mcu->motor;
+  for (uint16_t mask = ticks->mask; mask != 0; mask = (uint16_t)(mask >> 1), ++motor) {
+    if ((mask & 1u) == 0) continue;
+    motor->known_until = end;
+    motor->delay = bushd_get_u16(delay);
+    delay += 2;
+  }
+  put_rows_later(mcu, ticks);
+}
+
+// True if all rows are new to all motors of the mask.
+static bool open_motors(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
+  const bool start = (stretch->flags & BUSHD_TICKS_START) != 0;
+  bool all_new = true;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if ((stretch->mask & motor_bit(m)) == 0) continue;
+    open_motor(mcu, m, stretch);
+    const int32_t first = ticks_after(stretch->first_tick, mcu->motor[m].known_until);
+    if (has_island(&mcu->motor[m]) || (start ? first < 0 : first != 0)) all_new = false;
+  }
+  return all_new;
 }
 
 bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
   const bushd_mcu_stretch stretch = {ticks->epoch, ticks->flags, ticks->first_tick, ticks->count,
                                      ticks->mask};
   const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
-  const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
+  const bool plain = all_follow(mcu, ticks);
+  const bushd_status status =
+      plain ? check_head(mcu, &stretch) : bushd_mcu_check_stretch(mcu, &stretch);
   if (status != BUSHD_OK) return status;
   if (fine != (mcu->format == BUSHD_FORMAT_FINE) || !in_range(mcu, ticks)) return BUSHD_E_FORMAT;
   if (bushd_mcu_starts_into_limit(mcu, ticks)) return BUSHD_E_FORBIDDEN;
+  if (plain) {
+    follow(mcu, ticks);
+    return BUSHD_OK;
+  }
+  const bool all_new = open_motors(mcu, &stretch);
   uint8_t column = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((ticks->mask & motor_bit(m)) == 0) continue;
-    if (!join(mcu, m, ticks, column)) {
-      open_motor(mcu, m, &stretch);
-      put_column(mcu, m, &stretch, ticks, column);
-      close_motor(mcu, m, &stretch, bushd_get_u16(ticks->delays + 2u * column));
-    }
+    if (!all_new) put_column(mcu, m, &stretch, ticks, column);
+    close_motor(mcu, m, &stretch, bushd_get_u16(ticks->delays + 2u * column));
     ++column;
   }
+  if (all_new) put_rows_later(mcu, ticks);
   close_stretch(mcu, &stretch);
   return BUSHD_OK;
 }

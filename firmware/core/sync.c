@@ -35,7 +35,7 @@ static int64_t span_ns(const bushd_mcu* mcu, uint32_t from_tick, uint32_t from_n
 }
 
 // Of the present tick, as the corrected clock shows it; may lie outside of the tick.
-static int64_t corrected_ns(const bushd_mcu* mcu, uint32_t time_in_tick_ns) {
+static int64_t corrected_ns(const bushd_mcu* mcu, int32_t time_in_tick_ns) {
   const bushd_mcu_clock* clock = &mcu->clock;
   const int64_t by_rate = (int64_t)clock->rate_now_ns * time_in_tick_ns / mcu->tick_ns;
   return (int64_t)time_in_tick_ns - by_rate + clock->behind_ns - clock->slew_now_ns -
@@ -73,7 +73,7 @@ static void set_rate(bushd_mcu* mcu, int32_t rate_ppb) {
 
 // Returns by how much the rate was changed, in ppb.
 static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t error_ns,
-                            uint32_t time_in_tick_ns) {
+                            int32_t time_in_tick_ns) {
   bushd_mcu_clock* clock = &mcu->clock;
   if (!clock->corrected) return 0;
   const int64_t interval_ns =
@@ -97,7 +97,7 @@ static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t erro
   return rate_ppb - old_ppb;
 }
 
-static void correct(bushd_mcu* mcu, const bushd_sync* sync, uint32_t time_in_tick_ns) {
+static void correct(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick_ns) {
   bushd_mcu_clock* clock = &mcu->clock;
   const int32_t limit_ns = (int32_t)(mcu->tick_ns / MAX_ERROR_DIVISOR);
   const int32_t ticks = ticks_after(sync->mark_tick, clock->mark_tick);
@@ -139,7 +139,7 @@ static void watch_masters(bushd_mcu* mcu, uint16_t master) {
   clock->master_uptime = mcu->uptime;
 }
 
-static void note_mark(bushd_mcu* mcu, uint32_t time_in_tick_ns) {
+static void note_mark(bushd_mcu* mcu, int32_t time_in_tick_ns) {
   bushd_mcu_clock* clock = &mcu->clock;
   const int32_t tick_ns = (int32_t)mcu->tick_ns;
   int32_t ns = (int32_t)corrected_ns(mcu, time_in_tick_ns);
@@ -150,7 +150,7 @@ static void note_mark(bushd_mcu* mcu, uint32_t time_in_tick_ns) {
   mcu->flags |= BUSHD_FLAG_MARK;
 }
 
-void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, uint32_t time_in_tick_ns) {
+void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick_ns) {
   bushd_mcu_clock* clock = &mcu->clock;
   watch_masters(mcu, sync->master);
   const bool same_master = clock->heard && clock->master == sync->master;

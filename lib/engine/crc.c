@@ -12,10 +12,17 @@
 #define BUSHD_CRC_SLICES 0
 #endif
 
-#ifdef __AVR__
-#define CONST_TABLE static const __flash
+// With BUSHD_OWN_CRC32 a small MCU brings its own loop, and only the table is here.
+#ifdef BUSHD_OWN_CRC32
+#define CONST_TABLE const
+#define kSlice bushd_crc32_table
 #else
 #define CONST_TABLE static const
+#endif
+#ifdef __AVR__
+#define IN_FLASH __flash
+#else
+#define IN_FLASH
 #endif
 
 #if BUSHD_CRC_SLICES != 1
@@ -53,7 +60,7 @@ static inline uint32_t crc_nibbles(uint32_t crc, uint8_t byte) {
         SIXTYFOUR(192, __VA_ARGS__)                                                     \
   }
 
-CONST_TABLE uint32_t kSlice[BUSHD_CRC_SLICES][256] = {
+CONST_TABLE IN_FLASH uint32_t kSlice[BUSHD_CRC_SLICES][256] = {
     ROW(0x77073096, 0xEE0E612C, 0x076DC419, 0x0EDB8832, 0x1DB71064, 0x3B6E20C8, 0x76DC4190,
         0xEDB88320),
 #if BUSHD_CRC_SLICES == 16
@@ -92,7 +99,9 @@ CONST_TABLE uint32_t kSlice[BUSHD_CRC_SLICES][256] = {
 
 #endif
 
-#if BUSHD_CRC_SLICES == 16
+#ifdef BUSHD_OWN_CRC32
+
+#elif BUSHD_CRC_SLICES == 16
 
 uint32_t bushd_crc32(uint32_t crc, const uint8_t* data, size_t size) {
   for (; size >= 16; size -= 16, data += 16) {

@@ -5,9 +5,6 @@
 
 #include <string.h>
 
-// Marks a frame that is being skipped because it is longer than any can be.
-#define OVERLONG (BUSHD_FRAME_MAX_RAW + 2u)
-
 size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint8_t* payload,
                           size_t payload_size, uint8_t* wire) {
   uint8_t* const raw = wire + 1;
@@ -34,7 +31,7 @@ size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint
 }
 
 void bushd_receiver_check(bushd_receiver* receiver) {
-  if (receiver->size == 0 || receiver->size == OVERLONG) return;
+  if (receiver->size == 0 || receiver->size == BUSHD_FRAME_OVERLONG) return;
   const uint16_t raw_size = (uint16_t)(receiver->size - 1u);
   const uint8_t* const raw = receiver->buffer + 1;
   receiver->inverted = ~bushd_crc32(~receiver->inverted, raw + receiver->checked,
@@ -51,10 +48,6 @@ static void begin_frame(bushd_receiver* receiver) {
 
 bushd_receive bushd_receive_byte(bushd_receiver* receiver, uint8_t byte, bushd_frame* frame) {
   if (bushd_receiver_collect(receiver, byte)) return BUSHD_RECEIVE_MORE;
-  if (byte != 0) {
-    receiver->size = OVERLONG;
-    return BUSHD_RECEIVE_MORE;
-  }
   bushd_receiver_check(receiver);
   const uint16_t size = receiver->size;
   // The delimiter must be where the last distance leads.
@@ -62,7 +55,7 @@ bushd_receive bushd_receive_byte(bushd_receiver* receiver, uint8_t byte, bushd_f
   const uint32_t crc = ~receiver->inverted;
   begin_frame(receiver);
   if (size == 0) return BUSHD_RECEIVE_MORE;
-  if (size == OVERLONG || size < 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC || !whole) {
+  if (size == BUSHD_FRAME_OVERLONG || size < 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC || !whole) {
     return BUSHD_RECEIVE_BAD_LENGTH;
   }
   // A frame and its own CRC leave the same register behind, whatever the frame.

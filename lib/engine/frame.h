@@ -44,11 +44,13 @@ typedef struct bushd_frame {
   const uint8_t* payload;
 } bushd_frame;
 
+#define BUSHD_FRAME_OVERLONG (BUSHD_FRAME_MAX_RAW + 2u)
+
 // Collects bytes of a line into frames, decoding as they come. Zero-initialise it; resynchronises
 // at every delimiter.
 typedef struct bushd_receiver {
   uint8_t buffer[BUSHD_FRAME_MAX_RAW + 1u];  // a zero for the leading distance, then the raw frame
-  uint16_t size;      // bytes collected; BUSHD_FRAME_MAX_RAW + 2 marks an overlong frame
+  uint16_t size;      // bytes collected; BUSHD_FRAME_OVERLONG: more than any frame has
   uint8_t run;        // bytes to come before the next distance
   uint16_t checked;   // raw bytes that the CRC has gone over
   uint32_t inverted;  // of its register
@@ -62,9 +64,14 @@ typedef enum bushd_receive {
 } bushd_receive;
 
 // For a small MCU's loop, which must not be held up at a frame's end.
-// The short way of a byte that ends no frame; false if it must go through bushd_receive_byte.
+// The short way of a byte that ends no frame; false if it does, and must go through
+// bushd_receive_byte.
 static inline bool bushd_receiver_collect(bushd_receiver* receiver, uint8_t byte) {
-  if (byte == 0 || receiver->size >= sizeof receiver->buffer) return false;
+  if (byte == 0) return false;
+  if (receiver->size >= sizeof receiver->buffer) {
+    receiver->size = BUSHD_FRAME_OVERLONG;
+    return true;
+  }
   const bool distance = receiver->run == 0;
   receiver->run = (uint8_t)((distance ? byte : receiver->run) - 1u);
   receiver->buffer[receiver->size++] = distance ? 0 : byte;

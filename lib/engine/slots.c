@@ -55,6 +55,18 @@ void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* p
 }
 #endif
 
+#ifndef BUSHD_OWN_SLOTS_FILL_EVENLY
+void bushd_slots_fill_evenly(uint16_t* masks, uint16_t slot_count, const int16_t* steps,
+                             uint8_t motors) {
+  memset(masks, 0, slot_count * sizeof masks[0]);
+  for (uint8_t m = 0; m < motors; ++m) {
+    const uint16_t count = (uint16_t)(steps[m] < 0 ? -steps[m] : steps[m]);
+    const bushd_slots plan = {(uint16_t)(count << 8), BUSHD_CROSSING_COARSE};
+    fill(masks, slot_count, (uint16_t)(1u << m), &plan);
+  }
+}
+#endif
+
 int16_t bushd_slots_add(uint16_t* masks, uint16_t slot_count, uint16_t bit, int16_t displacement,
                         int16_t* remainder, int16_t crossing) {
   bushd_slots plan;

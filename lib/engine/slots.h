@@ -51,10 +51,16 @@ int16_t bushd_slots_plan(int16_t displacement, int16_t* remainder, int16_t cross
 void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* plans,
                       uint8_t motors);
 
+// The same for ticks of whole steps from whole positions (BUSHD_CROSSING_COARSE, remainder 0):
+// motor m makes |steps[m]| of them, evenly spaced. BUSHD_OWN_SLOTS_FILL_EVENLY.
+void bushd_slots_fill_evenly(uint16_t* masks, uint16_t slot_count, const int16_t* steps,
+                             uint8_t motors);
+
 // The coarse byte as a fine displacement: steps x 256, signed by bit 7.
 static inline int16_t bushd_coarse_to_fine(uint8_t coarse) {
-  const int16_t size = (int16_t)((coarse & 0x7F) << 8);
-  return (coarse & 0x80) ? size : (int16_t)-size;
+  const uint8_t steps = coarse & 0x7F;
+  const uint8_t high = (coarse & 0x80) ? steps : (uint8_t)-steps;
+  return (int16_t)(uint16_t)(high << 8);
 }
 
 #ifdef __cplusplus

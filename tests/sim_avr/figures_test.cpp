@@ -17,10 +17,9 @@ constexpr std::uint32_t kBaud = 1'000'000;
 constexpr std::uint8_t kAddress = 2;
 constexpr std::uint16_t kSlots = 128;
 constexpr std::uint16_t kDelay = 100;
-constexpr std::uint8_t kTicksPerFrame = 2;
 constexpr double kCycleNs = 62.5;
 constexpr double kEntryCycles = 5;
-constexpr int kFrames = 260;
+constexpr int kTicks = 528;
 constexpr double kMostJitterCycles = 35;
 
 struct Load {
@@ -45,23 +44,37 @@ class AvrFigures : public testing::TestWithParam<Load> {
     bus_.advance_to(250'000'000);
   }
 
-  void send_frame(std::uint32_t first, std::uint8_t flags, bool last, bool forward) {
+  // As long as bushd makes them.
+  int ticks_per_frame() const {
+    return bushd_ticks_capacity(BUSHD_MOTORS_PER_MCU, GetParam().format == BUSHD_FORMAT_FINE);
+  }
+
+  // All motors turn round every two ticks.
+  static bool forward(int tick) { return tick % 4 < 2; }
+
+  void send_frame(std::uint32_t start, int from) {
     const bool fine = GetParam().format == BUSHD_FORMAT_FINE;
+    const int count = ticks_per_frame();
     std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delays;
-    delays.fill(last ? 0 : kDelay);
+    delays.fill(from + count == kTicks ? 0 : kDelay);
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    std::size_t size =
-        bushd_encode_ticks_head(0, static_cast<std::uint8_t>(flags | (fine ? BUSHD_TICKS_FINE : 0)),
-                                first, kTicksPerFrame, 0xFFFF, delays.data(), payload.data());
-    for (std::size_t i = 0; i < kTicksPerFrame * BUSHD_MOTORS_PER_MCU; ++i) {
-      if (fine) {
-        const int displacement = GetParam().steps * 256;
-        bushd_put_i16(payload.data() + size,
-                      static_cast<std::int16_t>(forward ? displacement : -displacement));
-        size += 2;
-      } else {
-        payload[size++] =
-            static_cast<std::uint8_t>(GetParam().steps | (forward ? BUSHD_COARSE_DIRECTION : 0));
+    std::size_t size = bushd_encode_ticks_head(
+        0,
+        static_cast<std::uint8_t>((from == 0 ? BUSHD_TICKS_START : 0) |
+                                  (fine ? BUSHD_TICKS_FINE : 0)),
+        start + static_cast<std::uint32_t>(from), static_cast<std::uint8_t>(count), 0xFFFF,
+        delays.data(), payload.data());
+    for (int tick = from; tick < from + count; ++tick) {
+      for (std::size_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+        if (fine) {
+          const int displacement = GetParam().steps * 256;
+          bushd_put_i16(payload.data() + size,
+                        static_cast<std::int16_t>(forward(tick) ? displacement : -displacement));
+          size += 2;
+        } else {
+          payload[size++] = static_cast<std::uint8_t>(GetParam().steps |
+                                                      (forward(tick) ? BUSHD_COARSE_DIRECTION : 0));
+        }
       }
     }
     payload.resize(size);
@@ -86,12 +99,11 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
   const TimeNs begin_ns = bus_.now_ns();
   const std::uint64_t entries_before = avr_->interrupts();
   const std::uint32_t first = before.tick + 24;
-  for (int frame = 0; frame < kFrames; ++frame) {
-    send_frame(first + static_cast<std::uint32_t>(frame * kTicksPerFrame),
-               frame == 0 ? BUSHD_TICKS_START : 0, frame + 1 == kFrames, frame % 2 == 0);
-    bus_.advance_to(begin_ns + tick_ns * kTicksPerFrame * (frame + 1));
+  for (int tick = 0; tick < kTicks; tick += ticks_per_frame()) {
+    send_frame(first, tick);
+    bus_.advance_to(begin_ns + tick_ns * (tick + ticks_per_frame()));
   }
-  const double ticks = kFrames * kTicksPerFrame;
+  const double ticks = kTicks;
   const double entries = static_cast<double>(avr_->interrupts() - entries_before) / ticks;
   bus_.advance_to(bus_.now_ns() + 60 * tick_ns);
 
@@ -141,8 +153,8 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, AvrFigures,
-                         testing::Values(Load{BUSHD_FORMAT_COARSE, 2'240'000, 127, 850'000},
-                                         Load{BUSHD_FORMAT_FINE, 2'640'000, 127, 700'000}),
+                         testing::Values(Load{BUSHD_FORMAT_COARSE, 1'200'000, 127, 1'500'000},
+                                         Load{BUSHD_FORMAT_FINE, 2'000'000, 127, 800'000}),
                          [](auto& load) {
                            return load.param.format == BUSHD_FORMAT_FINE ? "Fine" : "Coarse";
                          });

@@ -147,10 +147,8 @@ void emission_ready(const bushd_plane* plane) {
   give(length_of_next(), false);
 }
 
-bool emission_begun(uint32_t* start) {
-  if (!emission_committed) return false;
-  *start = emission_begun_at;  // does not change while that is set
-  return true;
+bool emission_begun(void) {
+  return emission_committed;
 }
 
 void emission_swap(void) {
@@ -161,8 +159,8 @@ void emission_swap(void) {
   emission_committed = 0;
 }
 
-uint32_t emission_time_in_tick_ns(uint32_t time) {
-  return (time - core_start) * 125u / 2u;
+int32_t emission_time_in_tick_ns(uint32_t time) {
+  return (int32_t)(time - core_start) * 125 / 2;
 }
 
 static void change_length(void) {

@@ -28,12 +28,12 @@ void emission_start(void);
 // The plane of the next tick is prepared.
 void emission_ready(const bushd_plane* plane);
 
-// The tick after the core's present one has begun, at *start.
-bool emission_begun(uint32_t* start);
+// The tick after the core's present one has begun.
+bool emission_begun(void);
 // The core's present tick is this one; before bushd_mcu_swap.
 void emission_swap(void);
-// How far the core's present tick has gone at `time` (clock.h), in ns.
-uint32_t emission_time_in_tick_ns(uint32_t time);
+// How far the core's present tick has gone at `time` (clock.h), in ns; before it: negative.
+int32_t emission_time_in_tick_ns(uint32_t time);
 
 // As in bushd_port.
 void emission_set_tick(uint32_t tick_ns);

@@ -68,27 +68,36 @@ static bool delimiter_time(uint32_t* time) {
   return true;
 }
 
-bool line_collect(bushd_receiver* receiver, uint32_t* time) {
+// At most so many bytes at a time: the main loop has a tick to prepare too.
+static void collect(bushd_receiver* receiver) {
   uint8_t out = line_out;
-  const uint8_t in = line_in;
-  while (out != in && bushd_receiver_collect(receiver, line_bytes[out])) ++out;
+  uint8_t left = (uint8_t)(line_in - out);
+  if (left > CHECK_BYTES) left = CHECK_BYTES;
+  if (left != 0 && receiver->size + left <= sizeof receiver->buffer) {
+    uint8_t* to = receiver->buffer + receiver->size;
+    out = line_decode(&to, &receiver->run, out, left);
+    receiver->size = (uint16_t)(to - receiver->buffer);
+  } else {
+    for (; left > 0 && bushd_receiver_collect(receiver, line_bytes[out]); --left) ++out;
+  }
   line_out = out;
   if ((uint16_t)(receiver->size - receiver->checked) > CHECK_BYTES) bushd_receiver_check(receiver);
-  if (out == in) return false;
-  // One byte too many for a frame must not hold up a tick: it has just come.
-  if (line_bytes[out] != 0 || !delimiter_time(time)) *time = clock_now();
+}
+
+bool line_collect(bushd_receiver* receiver, uint32_t* time) {
+  collect(receiver);
+  if (line_out == line_in || line_bytes[line_out] != 0) return false;
+  // Without it, it is not taken for a delimiter.
+  if (!delimiter_time(time)) *time = clock_now();
   return true;
 }
 
 uint8_t line_take(void) {
-  uint8_t byte = line_bytes[line_out];
-  if (byte == 0) {
-    // Without its time a delimiter is no more than a wrong byte.
-    if (!delimiter_time(&last_delimiter)) byte = 1;
-    ++stamps_out;
-  }
+  const bool has_time = delimiter_time(&last_delimiter);
+  ++stamps_out;
   line_out = (uint8_t)(line_out + 1u);
-  return byte;
+  // Without its time a delimiter is no more than a wrong byte.
+  return has_time ? 0 : 1;
 }
 
 void line_transmit(const uint8_t* wire, size_t size, uint32_t delay_ns) {

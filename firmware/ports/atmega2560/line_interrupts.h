@@ -16,6 +16,7 @@ extern volatile uint8_t line_out;
 // among the bytes.
 extern volatile uint16_t line_stamps[LINE_DELIMITERS];
 extern volatile uint8_t line_stamps_in;
+uint8_t line_decode(uint8_t** to, uint8_t* run, uint8_t out, uint8_t count);  // receive.S
 extern const uint8_t* volatile line_sending;
 extern volatile uint8_t line_sending_end;  // low byte of the address behind the last one
 

@@ -55,7 +55,7 @@ static void port_adjust_tick(void* context, int32_t ns) {
 
 static uint32_t port_time_in_tick_ns(void* context) {
   (void)context;
-  return emission_time_in_tick_ns(clock_now());
+  return (uint32_t)emission_time_in_tick_ns(clock_now());
 }
 
 static bushd_inputs port_read_inputs(void* context) {
@@ -142,6 +142,15 @@ static void prepare(void) {
   emission_ready(&mcu.plane[mcu.front ^ 1u]);
 }
 
+static void hear_line(void) {
+  uint32_t ended = 0;
+  if (line_collect(&mcu.receiver, &ended)) {
+    bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(ended));
+  } else {
+    poll_eeprom();
+  }
+}
+
 int main(void) {
   board_init();
   clock_init();
@@ -153,23 +162,14 @@ int main(void) {
   wdt_enable(WATCHDOG);
   sei();
   for (;;) {
-    uint32_t start = 0;
-    uint32_t time = 0;
-    const bool begun = emission_begun(&start);
-    const bool waits = line_collect(&mcu.receiver, &time);
-    // A frame that ended in the tick before must be heard by the core in that tick.
-    if (begun && !(waits && clock_before(time, start))) {
+    if (emission_begun()) {
       emission_swap();
       clock_now();  // it must be asked every 30 ms
       bushd_mcu_swap(&mcu);
       prepare();
       wdt_reset();
-    } else if (waits) {
-      // Bytes beyond the longest frame come one by one: noise must not pile up.
-      const uint8_t byte = line_take();
-      bushd_mcu_receive(&mcu, byte, byte == 0 ? emission_time_in_tick_ns(time) : 0);
-    } else {
-      poll_eeprom();
+    } else if (!bushd_mcu_work(&mcu)) {
+      hear_line();
     }
   }
 }

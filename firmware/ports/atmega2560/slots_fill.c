@@ -1,5 +1,6 @@
-// bushd_slots_fill for 128 slots and 16 motors, in the same time however many steps there are. With
-// T the crossing of a step, in 1/256 of a motor's distance d a slot, it is the step of slot
+// bushd_slots_fill and its like for 128 slots and 16 motors, in the same time however many steps
+// there are. With T the crossing of a step, in 1/256 of a motor's distance d a slot, it is the step
+// of slot
 //
 //     floor(T / 2d),   T = 256 (first + 256 i)
 //
@@ -17,12 +18,6 @@ typedef struct slots_phase {
 // slots_fill.S
 void slots_fill_coarse(uint8_t* masks, const uint8_t step[8]);
 void slots_fill_fine(uint8_t* masks, const slots_phase motor[8]);
-
-static void fill_coarse(uint8_t* masks, const bushd_slots* plans) {
-  uint8_t step[8];
-  for (uint8_t m = 0; m < 8; ++m) step[m] = (uint8_t)(plans[m].distance >> 7);
-  slots_fill_coarse(masks, step);
-}
 
 static void fill_fine(uint8_t* masks, const bushd_slots* plans) {
   slots_phase motor[8];
@@ -49,6 +44,10 @@ static void fill_fine(uint8_t* masks, const bushd_slots* plans) {
   }
 }
 
+static void clear(uint8_t* masks) {
+  for (uint8_t slot = EMISSION_SLOTS; slot > 0; --slot, masks += 2) *masks = 0;
+}
+
 void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* plans,
                       uint8_t motors) {
   (void)slot_count;
@@ -57,18 +56,31 @@ void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* p
     uint8_t* const bytes = (uint8_t*)masks + half;
     const bushd_slots* const eight = plans + 8 * half;
     bool moves = false;
-    bool coarse = true;
-    for (uint8_t m = 0; m < 8; ++m) {
-      if (eight[m].distance == 0) continue;
-      moves = true;
-      coarse = coarse && (uint8_t)eight[m].distance == 0 && eight[m].first == 128;
-    }
-    if (!moves) {
-      for (uint8_t slot = 0; slot < EMISSION_SLOTS; ++slot) bytes[2 * slot] = 0;
-    } else if (coarse) {
-      fill_coarse(bytes, eight);
-    } else {
+    for (uint8_t m = 0; m < 8; ++m) moves = moves || eight[m].distance != 0;
+    if (moves) {
       fill_fine(bytes, eight);
+    } else {
+      clear(bytes);
+    }
+  }
+}
+
+void bushd_slots_fill_evenly(uint16_t* masks, uint16_t slot_count, const int16_t* steps,
+                             uint8_t motors) {
+  (void)slot_count;
+  (void)motors;
+  for (uint8_t half = 0; half < 2; ++half, steps += 8) {
+    uint8_t* const bytes = (uint8_t*)masks + half;
+    uint8_t twice[8];
+    uint8_t moves = 0;
+    for (uint8_t m = 0; m < 8; ++m) {
+      twice[m] = (uint8_t)((uint8_t)(steps[m] < 0 ? -steps[m] : steps[m]) << 1);
+      moves |= twice[m];
+    }
+    if (moves != 0) {
+      slots_fill_coarse(bytes, twice);
+    } else {
+      clear(bytes);
     }
   }
 }

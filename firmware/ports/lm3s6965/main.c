@@ -139,7 +139,7 @@ int main(void) {
       prepare();
       watchdog_reset();
     } else if (line_take(&byte, &time)) {
-      bushd_mcu_receive(&mcu, byte, emission_time_in_tick_ns(time));
+      bushd_mcu_receive(&mcu, byte, (int32_t)emission_time_in_tick_ns(time));
     }
   }
 }

@@ -251,7 +251,7 @@ void bushd_virtual_advance(bushd_virtual* v, int64_t now_ns) {
 
 void bushd_virtual_receive(bushd_virtual* v, uint8_t byte, int64_t now_ns) {
   bushd_virtual_advance(v, now_ns);
-  if (v->running) bushd_mcu_receive(&v->mcu, byte, port_time_in_tick_ns(v));
+  if (v->running) bushd_mcu_receive(&v->mcu, byte, (int32_t)port_time_in_tick_ns(v));
 }
 
 void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint16_t boot_number) {
