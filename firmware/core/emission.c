@@ -43,7 +43,7 @@ void bushd_mcu_restore_emission(bushd_mcu* mcu) {
 bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* message) {
   if ((mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
   if (memcmp(message, &mcu->emission.settings, sizeof *message) == 0) return BUSHD_OK;
-  if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   if (lacks(mcu, message->mode)) return BUSHD_E_FORMAT;
   const uint32_t pulse_ns = mcu->config.pulse_ns;
   if (pulse_ns != 0 && (uint32_t)message->pulse_us * 1000u > pulse_ns) return BUSHD_E_PULSE_WIDTH;

@@ -135,7 +135,7 @@ static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
   bushd_mcu_update_state(mcu);
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
   if (mcu->motor[message->motor].table < 0) return BUSHD_E_NO_TABLE;
-  if (under_way(&mcu->homing) || (bushd_mcu_moving(mcu) & bit) != 0) return BUSHD_E_STATE;
+  if (under_way(&mcu->homing) || (bushd_mcu_engaged(mcu) & bit) != 0) return BUSHD_E_STATE;
   if (!slow_enough(mcu, message)) return BUSHD_E_FORMAT;
   // On its switch it will back off; but it must not look for it where it has overrun it.
   const bool on_switch = (active_inputs(mcu) & bit) != 0;

@@ -154,7 +154,7 @@ void bushd_mcu_clear_faults(bushd_mcu* mcu) {
 }
 
 bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message) {
-  if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   const uint16_t limits = message->limit_positive | message->limit_negative;
   mcu->inputs = *message;
   mcu->hit_positive &= message->limit_positive;

@@ -39,6 +39,10 @@ static inline bool has_island(const bushd_mcu_motor* motor) {
 
 // mcu.c
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu);
+// These, and motors that wait for the trigger: what a resting motor may be asked must wait too.
+static inline uint16_t bushd_mcu_engaged(const bushd_mcu* mcu) {
+  return (uint16_t)(bushd_mcu_moving(mcu) | mcu->trigger.armed);
+}
 void bushd_mcu_update_state(bushd_mcu* mcu);
 
 // requests.c: frames for this MCU, and their answers.
@@ -67,6 +71,12 @@ void bushd_mcu_clear_streams(bushd_mcu* mcu);
 // motor.c: what motors do in the tick that is prepared, and how they stop by themselves.
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane);
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message);
+// When a run from rest is over, in ticks; false if that is farther than tick numbers reach.
+// `spare_ns`: by how much it may begin late and still be over then; less than a tick.
+bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
+                            uint32_t* spare_ns);
+// The motor's run, just started, begins in this tick and takes as many.
+void bushd_mcu_begin_run(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t ticks);
 void bushd_mcu_watch_silence(bushd_mcu* mcu);  // before every tick is prepared
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message);
 
@@ -118,6 +128,18 @@ uint16_t bushd_mcu_homing_motor(const bushd_mcu* mcu);           // as a mask
 // local.c
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message);
 void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs);  // before every tick
+
+// trigger.c: runs that an edge at the trigger input starts.
+bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message);
+void bushd_mcu_disarm(bushd_mcu* mcu, bushd_trigger_state why);
+
+// reference.c: a pulse when a motor arrives at a position.
+bushd_status bushd_mcu_take_reference(bushd_mcu* mcu, const bushd_reference* message);
+// Precondition: a pulse may begin or is under way. `plane` has its steps.
+void bushd_mcu_emit_reference(bushd_mcu* mcu, bushd_plane* plane);
+static inline bool bushd_mcu_reference_on(const bushd_mcu* mcu) {
+  return (mcu->reference.arrivals | mcu->reference.pulse) != 0;
+}
 
 // tables.c: table memory.
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);

@@ -26,7 +26,7 @@ static void release(bushd_mcu* mcu) {
 // Also those that come to rest only now. What a host moves stays the host's until the next press.
 static void begin_held(bushd_mcu* mcu) {
   if ((mcu->local.held & ~mcu->autonomous) == 0) return;
-  mcu->local.held &= (uint16_t) ~(bushd_mcu_moving(mcu) & ~mcu->autonomous);
+  mcu->local.held &= (uint16_t) ~(bushd_mcu_engaged(mcu) & ~mcu->autonomous);
   uint16_t begins =
       (uint16_t)(mcu->local.held & ~mcu->autonomous & ~bushd_mcu_forbidden(mcu, mcu->local.wish));
   for (uint8_t m = 0; begins != 0; ++m, begins = (uint16_t)(begins >> 1)) {

@@ -122,6 +122,7 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
   bushd_mcu_watch_silence(mcu);
   bushd_mcu_emit(mcu, &mcu->plane[mcu->front ^ 1u]);
   if (mcu->autonomous != 0) mcu->autonomous &= bushd_mcu_moving(mcu);
+  if (mcu->trigger.armed != 0 && mcu->faults != 0) bushd_mcu_disarm(mcu, BUSHD_TRIGGER_FAULT);
   bushd_mcu_update_state(mcu);
 }
 

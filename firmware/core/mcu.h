@@ -49,6 +49,10 @@ typedef struct bushd_plane {
   uint8_t outputs;                      // bushd_outputs
   int16_t steps[BUSHD_MOTORS_PER_MCU];  // signed steps of the tick, for the position counters
   uint16_t active;                      // motors with a step in this tick
+  // Slots of this tick, counted from 1, at whose beginning the reference output rises and falls; 0:
+  // it does not. If both, it rises first.
+  uint16_t reference_rise;
+  uint16_t reference_fall;
 } bushd_plane;
 
 // Memory and identity, given by the port; all of it outlives the MCU struct.
@@ -188,6 +192,34 @@ typedef struct bushd_mcu_rows {
   bushd_ticks ticks;
 } bushd_mcu_rows;
 
+// Runs that wait for the trigger, and what became of the last ones (trigger.c). The runs are in
+// their motors.
+typedef struct bushd_mcu_trigger_input {
+  uint16_t armed;  // motors
+  uint8_t number;
+  uint8_t state;      // bushd_trigger_state
+  uint32_t delay_us;  // the edge's
+  uint32_t start_tick;
+  uint32_t start_ns;
+} bushd_mcu_trigger_input;
+
+// A time in whole ticks and slots.
+typedef struct bushd_mcu_slots {
+  uint16_t ticks;
+  uint16_t slots;
+} bushd_mcu_slots;
+
+// The reference output (reference.c).
+typedef struct bushd_mcu_reference {
+  uint8_t motor;
+  uint8_t arrivals;  // BUSHD_ARRIVES_*
+  uint8_t pulse;     // 0: none, or what comes next of it
+  int32_t position_steps;
+  bushd_mcu_slots delay;
+  bushd_mcu_slots width;
+  bushd_mcu_slots next;  // until then, from the beginning of the tick to be prepared
+} bushd_mcu_reference;
+
 // Read-only for ports and tests; everything in here is the core's.
 typedef struct bushd_mcu {
   bushd_port port;
@@ -230,6 +262,8 @@ typedef struct bushd_mcu {
   bushd_run_tick run_tick;  // for the runs' latest time unit
   bushd_mcu_clock clock;
   bushd_mcu_emission emission;
+  bushd_mcu_trigger_input trigger;
+  bushd_mcu_reference reference;
   bushd_plane plane[2];
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];
@@ -264,6 +298,11 @@ bool bushd_mcu_work(bushd_mcu* mcu);
 // Tick boundary: counts the steps of the tick that ended, returns the plane of the one that begins.
 // O(motors).
 const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu);
+
+// The edge that was asked for (bushd_port.set_trigger) came at this time, counted from the start of
+// the present tick: negative if that was before it. To be called between swaps as all others, at
+// the latest in the tick after the edge: noticed later, what was armed is given up. O(motors).
+void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns);
 
 // Computes the plane of the next tick. O(slots + steps).
 void bushd_mcu_prepare(bushd_mcu* mcu);

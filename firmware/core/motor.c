@@ -244,16 +244,34 @@ void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane) {
   }
   plane->direction = mcu->direction;
   plane->outputs = mcu->emission.outputs;
+  plane->reference_rise = plane->reference_fall = 0;
+  const bool reference = bushd_mcu_reference_on(mcu);
+  // Masks that have become levels do not show steps any more.
+  const bool levels = plane->outputs == BUSHD_OUTPUTS_LEVELS;
+  if (reference && levels) bushd_mcu_emit_reference(mcu, plane);
   if (!mcu->emission.plain) bushd_mcu_shape(mcu, plane);
+  if (reference && !levels) bushd_mcu_emit_reference(mcu, plane);
 }
 
-// When a run from rest is over, in ticks; false if that is farther than tick numbers reach.
-static bool ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks) {
+bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
+                            uint32_t* spare_ns) {
   const uint32_t unit_ns = run->table->time_unit_ns;
   const uint64_t units = bushd_run_units_left(run);
   if (units > (uint64_t)(INT32_MAX / 2) * tick_ns / unit_ns) return false;
-  *ticks = (uint32_t)((units * unit_ns + tick_ns - 1u) / tick_ns);
+  const uint64_t ns = units * unit_ns;
+  *ticks = (uint32_t)((ns + tick_ns - 1u) / tick_ns);
+  *spare_ns = (uint32_t)((uint64_t)*ticks * tick_ns - ns);
   return true;
+}
+
+void bushd_mcu_begin_run(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t ticks) {
+  motor->mode = BUSHD_MCU_TABLE_RUN;
+  motor->exact = true;
+  motor->rest_from = motor->known_until;
+  motor->start_tick = first_tick;
+  motor->run_from = first_tick;
+  motor->run_until = first_tick + ticks;
+  motor->known_until = motor->run_until;
 }
 
 static bushd_status check_run(const bushd_mcu* mcu, uint32_t first_tick,
@@ -267,34 +285,29 @@ static bushd_status check_run(const bushd_mcu* mcu, uint32_t first_tick,
     return BUSHD_E_FORBIDDEN;
   }
   bushd_run_start(run, table_of(mcu, motor), entry->steps, entry->direction);
-  return ticks_of_run(run, mcu->tick_ns, ticks) ? BUSHD_OK : BUSHD_E_CAPACITY;
+  uint32_t spare_ns;
+  return bushd_mcu_ticks_of_run(run, mcu->tick_ns, ticks, &spare_ns) ? BUSHD_OK : BUSHD_E_CAPACITY;
 }
 
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message) {
   bushd_mcu_stretch stretch = {message->epoch, BUSHD_TICKS_START, message->first_tick, 1, 0};
   for (uint8_t i = 0; i < message->count; ++i) {
-    stretch.mask |= motor_bit(bushd_get_table_run_entry(message, i).motor);
+    stretch.mask |= motor_bit(bushd_get_table_run_entry(message->entries, i).motor);
   }
   const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
   if (status != BUSHD_OK) return status;
   bushd_run run;
   uint32_t ticks = 0;
   for (uint8_t i = 0; i < message->count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message, i);
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
     const bushd_status run_status = check_run(mcu, message->first_tick, &entry, &run, &ticks);
     if (run_status != BUSHD_OK) return run_status;
   }
   for (uint8_t i = 0; i < message->count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message, i);
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
     bushd_mcu_motor* motor = &mcu->motor[entry.motor];
     check_run(mcu, message->first_tick, &entry, &motor->run, &ticks);
-    motor->mode = BUSHD_MCU_TABLE_RUN;
-    motor->exact = true;
-    motor->rest_from = motor->known_until;
-    motor->start_tick = message->first_tick;
-    motor->run_from = message->first_tick;
-    motor->run_until = message->first_tick + ticks;
-    motor->known_until = motor->run_until;
+    bushd_mcu_begin_run(motor, message->first_tick, ticks);
   }
   return BUSHD_OK;
 }
@@ -322,6 +335,7 @@ void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int di
 
 void bushd_mcu_watch_silence(bushd_mcu* mcu) {
   if (mcu->silent_ticks < mcu->silence_ticks) return;
+  if (mcu->trigger.armed != 0) mcu->faults |= BUSHD_FAULT_LINK;
   const uint32_t next = mcu->tick + 1u;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];

@@ -56,6 +56,11 @@ typedef struct bushd_port {
   // Remembers over a watchdog reset whether EN is to be raised at once after it: then
   // bushd_mcu_config.enable_at_boot says so.
   void (*keep_enable)(void* context, bool on);
+
+  // From now on this edge at the trigger input is captured, once, and handed over by
+  // bushd_mcu_trigger; BUSHD_EDGE_NONE: none is. Edges of before do not count. NULL: there is no
+  // such input.
+  void (*set_trigger)(void* context, bushd_edge edge);
 } bushd_port;
 
 #ifdef __cplusplus

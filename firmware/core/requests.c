@@ -60,6 +60,11 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   report.low_water_ticks = mcu->low_water_ticks;
   mcu->low_water_ticks = UINT16_MAX;
   report_islands(mcu, &report);
+  report.armed = mcu->trigger.armed;
+  report.trigger_number = mcu->trigger.number;
+  report.trigger_state = mcu->trigger.state;
+  report.start_tick = mcu->trigger.start_tick;
+  report.start_ns = mcu->trigger.start_ns;
   report.motor_count = mcu->config.motors;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     report.motor[m].position_steps = mcu->motor[m].position_steps;
@@ -79,9 +84,10 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   identity.slots = mcu->config.slots;
   identity.queue_ticks = mcu->config.queue_ticks;
   identity.table_codes = mcu->config.code_count;
-  const uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS |
-                       BUSHD_CAN_TABLE_RUN | BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_BURST |
-                       BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES;
+  uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
+                 BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_REFERENCE | BUSHD_CAN_BURST |
+                 BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES;
+  if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
   identity.capabilities = (uint16_t)(all & ~mcu->config.lacks);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
   return bushd_encode_identity(&identity, payload);
@@ -90,10 +96,12 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
 static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
   const bool same = (mcu->flags & BUSHD_FLAG_CONFIGURED) != 0 && mcu->tick_ns == message->tick_ns &&
                     mcu->format == message->format;
-  if (!same && bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if (!same && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   if (message->tick_ns < mcu->config.min_tick_ns) return BUSHD_E_CAPACITY;
   mcu->silence_ticks = message->silence_ticks;
   if (same) return BUSHD_OK;
+  // What it counts in slots lasts as long in another tick no more.
+  mcu->reference.arrivals = 0;
   mcu->tick_ns = message->tick_ns;
   mcu->format = message->format;
   // Another tick length is another time: the MCU must be told the bus's tick again, and its tables
@@ -113,7 +121,7 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
 static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
   const uint8_t at_rest_only =
       BUSHD_CONTROL_DISABLE | BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES;
-  if ((message->actions & at_rest_only) != 0 && bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if ((message->actions & at_rest_only) != 0 && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) bushd_mcu_clear_faults(mcu);
   if (message->actions & BUSHD_CONTROL_FORGET_TABLES) bushd_mcu_forget_tables(mcu);
   if (message->actions & BUSHD_CONTROL_DISABLE) bushd_mcu_set_enable(mcu, false);
@@ -126,7 +134,7 @@ static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
 
 static bushd_status set_position(bushd_mcu* mcu, const bushd_set_position* message) {
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
-  if (bushd_mcu_moving(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
+  if (bushd_mcu_engaged(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
   mcu->motor[message->motor].position_steps = message->position_steps;
   mcu->motor[message->motor].remainder = 0;
   return BUSHD_OK;
@@ -259,6 +267,10 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(home, bushd_mcu_home);
     case BUSHD_MSG_LOCAL:
       HANDLE(local, bushd_mcu_set_local);
+    case BUSHD_MSG_TRIGGER:
+      HANDLE(trigger, bushd_mcu_arm);
+    case BUSHD_MSG_REFERENCE:
+      HANDLE(reference, bushd_mcu_take_reference);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:

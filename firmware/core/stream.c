@@ -103,7 +103,7 @@ static bushd_status check_head(bushd_mcu* mcu, const bushd_mcu_stretch* stretch)
   bushd_mcu_update_state(mcu);
   const bool replace = (stretch->flags & BUSHD_TICKS_REPLACE) != 0;
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
-  if (stretch->mask & mcu->autonomous) return BUSHD_E_STATE;
+  if (stretch->mask & (mcu->autonomous | mcu->trigger.armed)) return BUSHD_E_STATE;
   const uint8_t ahead = (uint8_t)(stretch->epoch - mcu->epoch);
   if (replace ? ahead == 0 || ahead > INT8_MAX : ahead != 0) return BUSHD_E_EPOCH;
   // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once
@@ -369,23 +369,25 @@ static bool restore(const bushd_mcu* mcu, const bushd_table_ticks_entry* entry, 
 }
 
 static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch, bushd_run* run) {
-  enum { CHUNK = 16 };
+  enum { CHUNK = 8 };  // stack is short
   const gap unknown = gap_in(mcu, m, stretch);
-  int16_t fine[CHUNK];
-  uint8_t coarse[CHUNK];
+  union {
+    int16_t fine[CHUNK];
+    uint8_t coarse[CHUNK];
+  } made;
   for (uint16_t at = 0; at < stretch->count; at = (uint16_t)(at + CHUNK)) {
     const uint16_t left = (uint16_t)(stretch->count - at);
     const uint16_t count = left < CHUNK ? left : CHUNK;
     const bool in_fine = mcu->format == BUSHD_FORMAT_FINE;
     if (in_fine) {
-      bushd_run_expand_fine(run, mcu->tick_ns, count, fine, 1);
+      bushd_run_expand_fine(run, mcu->tick_ns, count, made.fine, 1);
     } else {
-      bushd_run_expand_coarse(run, mcu->tick_ns, count, coarse, 1);
+      bushd_run_expand_coarse(run, mcu->tick_ns, count, made.coarse, 1);
     }
     for (uint16_t i = 0; i < count; ++i) {
       if (!in_gap(&unknown, (uint16_t)(at + i))) continue;
       *queue_at(mcu, stretch->first_tick + at + i, m) =
-          in_fine ? fine[i] : bushd_coarse_to_fine(coarse[i]);
+          in_fine ? made.fine[i] : bushd_coarse_to_fine(made.coarse[i]);
     }
   }
 }

@@ -27,7 +27,7 @@ static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
 }
 
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message) {
-  if (bushd_mcu_moving(mcu) != 0) return BUSHD_E_STATE;
+  if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   bushd_mcu_table* entry = &mcu->table[message->slot];
   if (entry->count != 0) give_back(mcu, entry);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -74,7 +74,7 @@ bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message)
 
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
   if (!bushd_mcu_has_output(mcu, message->motor)) return BUSHD_E_FORMAT;
-  if (bushd_mcu_moving(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
+  if (bushd_mcu_engaged(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
   const bushd_mcu_table* entry = &mcu->table[message->slot];
   if (!entry->valid || (mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
   if (bushd_table_max_steps_per_tick(&entry->table, mcu->tick_ns) > mcu->emission.grid.max_steps) {

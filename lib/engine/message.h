@@ -45,7 +45,9 @@ typedef enum bushd_type {
   BUSHD_MSG_INPUTS = 0x11,        // bushd_set_inputs -> acknowledgement
   BUSHD_MSG_EMISSION = 0x12,      // bushd_emission -> acknowledgement
   BUSHD_MSG_HOME = 0x13,          // bushd_home -> acknowledgement; how it goes is told by reports
-  BUSHD_MSG_LOCAL = 0x14          // bushd_local -> acknowledgement
+  BUSHD_MSG_LOCAL = 0x14,         // bushd_local -> acknowledgement
+  BUSHD_MSG_TRIGGER = 0x15,       // bushd_trigger -> acknowledgement
+  BUSHD_MSG_REFERENCE = 0x16      // bushd_reference -> acknowledgement
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its tag and the MCU's address.
 
@@ -123,6 +125,8 @@ enum {
   BUSHD_CAN_TABLE_RUN = 1 << 3,
   BUSHD_CAN_HOME = 1 << 4,
   BUSHD_CAN_LOCAL = 1 << 5,
+  BUSHD_CAN_TRIGGER = 1 << 6,    // has a trigger input
+  BUSHD_CAN_REFERENCE = 1 << 7,  // has a reference output
   // Emission other than even.
   BUSHD_CAN_BURST = 1 << 8,
   BUSHD_CAN_COMMON_DIR = 1 << 9,
@@ -379,6 +383,55 @@ typedef struct bushd_table_run_entry {
   uint32_t steps;    // >= 1
 } bushd_table_run_entry;
 
+// Entry `index` of a table run's or a trigger's.
+bushd_table_run_entry bushd_get_table_run_entry(const uint8_t* entries, uint8_t index);
+
+typedef enum bushd_edge {
+  BUSHD_EDGE_NONE = 0,
+  BUSHD_EDGE_RISING = 1,  // the input becomes active
+  BUSHD_EDGE_FALLING = 2
+} bushd_edge;
+
+// Table runs from rest that an edge at the trigger input starts, all in the same slot: it begins
+// BUSHD_TRIGGER_FIXED_TICKS ticks and delay_us after the edge. BUSHD_EDGE_NONE: none waits for it
+// any more.
+#define BUSHD_TRIGGER_FIXED_TICKS 3u
+#define BUSHD_TRIGGER_MIN_DELAY_US 50u
+#define BUSHD_TRIGGER_MAX_DELAY_US 1500000u
+typedef struct bushd_trigger {
+  uint8_t number;  // chosen by the master, 1..255: the same one again is the same frame again; 0:
+                   // of BUSHD_EDGE_NONE
+  bushd_edge edge;
+  uint32_t delay_us;
+  uint8_t count;           // of entries, >= 1; 0: of BUSHD_EDGE_NONE
+  const uint8_t* entries;  // as in bushd_table_run
+} bushd_trigger;
+
+// What became of the last one.
+typedef enum bushd_trigger_state {
+  BUSHD_TRIGGER_NONE = 0,      // none since boot
+  BUSHD_TRIGGER_ARMED = 1,     // waits for the edge
+  BUSHD_TRIGGER_STARTED = 2,   // the edge came: the start is known
+  BUSHD_TRIGGER_DISARMED = 3,  // on request
+  BUSHD_TRIGGER_LATE = 4,      // the edge came, but was noticed too late to start in time
+  BUSHD_TRIGGER_FAULT = 5,     // a fault was latched before the edge came
+  BUSHD_TRIGGER_FORBIDDEN = 6  // the edge came, but a limit forbids the direction of one of them
+} bushd_trigger_state;
+
+enum { BUSHD_ARRIVES_POSITIVE = 1 << 0, BUSHD_ARRIVES_NEGATIVE = 1 << 1 };
+
+// A pulse at the reference output, delay_us after the step with which the motor's counter arrives
+// at the position.
+#define BUSHD_REFERENCE_MAX_DELAY_US 1500000u
+#define BUSHD_REFERENCE_MAX_WIDTH_US 1000000u
+typedef struct bushd_reference {
+  uint8_t motor;
+  uint8_t arrivals;  // BUSHD_ARRIVES_*; 0: no pulses
+  int32_t position_steps;
+  uint32_t delay_us;
+  uint32_t width_us;  // >= 1
+} bushd_reference;
+
 typedef enum bushd_how { BUSHD_RAMP_DOWN = 0, BUSHD_CUT = 1 } bushd_how;
 // All motors stop, within two ticks: by their tables' ramps, or without another step.
 typedef struct bushd_emergency {
@@ -419,18 +472,23 @@ typedef struct bushd_report {
   uint16_t island_until;
   uint16_t forbidden_positive;  // motors that a limit keeps from moving in this direction
   uint16_t forbidden_negative;
-  uint8_t system_inputs;  // active, BUSHD_INPUT_*
-  uint16_t current;       // of the supply, 0..1023
-  uint8_t reset_cause;    // BUSHD_RESET_*
-  uint8_t failed_tests;   // at boot, BUSHD_TEST_*
-  uint16_t autonomous;    // motors that move by homing or by local inputs
-  uint16_t homed;         // motors whose last homing since boot was done
-  uint8_t homing;         // bushd_homing
-  uint8_t motor_count;    // <= BUSHD_MOTORS_PER_MCU
+  uint8_t system_inputs;   // active, BUSHD_INPUT_*
+  uint16_t current;        // of the supply, 0..1023
+  uint8_t reset_cause;     // BUSHD_RESET_*
+  uint8_t failed_tests;    // at boot, BUSHD_TEST_*
+  uint16_t autonomous;     // motors that move by homing or by local inputs
+  uint16_t homed;          // motors whose last homing since boot was done
+  uint8_t homing;          // bushd_homing
+  uint16_t armed;          // motors that wait for the trigger
+  uint8_t trigger_number;  // of the last one taken; 0: none since boot
+  uint8_t trigger_state;   // bushd_trigger_state
+  uint32_t start_tick;     // when it began, or will, if BUSHD_TRIGGER_STARTED
+  uint32_t start_ns;       // after the beginning of start_tick
+  uint8_t motor_count;     // <= BUSHD_MOTORS_PER_MCU
   bushd_motor_report motor[BUSHD_MOTORS_PER_MCU];
 } bushd_report;
 
-#define BUSHD_REPORT_SIZE(motors) (66u + 6u * (motors))
+#define BUSHD_REPORT_SIZE(motors) (78u + 6u * (motors))
 #define BUSHD_IDENTITY_SIZE 22u
 #define BUSHD_TABLES_SIZE (1u + 8u * BUSHD_TABLE_SLOTS)
 
@@ -474,6 +532,9 @@ size_t bushd_encode_table_ticks(uint8_t epoch, uint8_t flags, uint32_t first_tic
 size_t bushd_encode_table_run(uint8_t epoch, uint32_t first_tick,
                               const bushd_table_run_entry* entries, uint8_t count,
                               uint8_t* payload);
+size_t bushd_encode_trigger(uint8_t number, bushd_edge edge, uint32_t delay_us,
+                            const bushd_table_run_entry* entries, uint8_t count, uint8_t* payload);
+size_t bushd_encode_reference(const bushd_reference* message, uint8_t* payload);
 
 // Decoders return BUSHD_OK, BUSHD_E_LENGTH or BUSHD_E_FORMAT.
 bushd_status bushd_decode_identify(const uint8_t* payload, size_t size, bushd_identify* message);
@@ -507,8 +568,8 @@ bushd_status bushd_decode_table_ticks(const uint8_t* payload, size_t size,
 bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at,
                                   bushd_table_ticks_entry* entry);
 bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_table_run* message);
-// Entry `index` < count.
-bushd_table_run_entry bushd_get_table_run_entry(const bushd_table_run* message, uint8_t index);
+bushd_status bushd_decode_trigger(const uint8_t* payload, size_t size, bushd_trigger* message);
+bushd_status bushd_decode_reference(const uint8_t* payload, size_t size, bushd_reference* message);
 bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_report* message);
 bushd_status bushd_decode_acknowledgement(const uint8_t* payload, size_t size,
                                           bushd_acknowledgement* message);

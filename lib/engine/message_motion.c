@@ -212,27 +212,46 @@ bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at
   return true;
 }
 
+static void put_run_entries(writer* w, const bushd_table_run_entry* entries, uint8_t count) {
+  for (uint8_t i = 0; i < count; ++i) {
+    uint8_t head = (uint8_t)(entries[i].motor | entries[i].slot << HEAD_SLOT_SHIFT);
+    if (entries[i].direction > 0) head |= HEAD_POSITIVE;
+    put8(w, head);
+    put32(w, entries[i].steps);
+  }
+}
+
+// All that is left. `in_range`: motors rise, and each is to make steps.
+static const uint8_t* get_run_entries(reader* r, uint8_t* count, bool* in_range) {
+  const size_t rest = (size_t)(r->end - r->at);
+  *count = (uint8_t)(rest / BUSHD_TABLE_RUN_ENTRY);
+  const uint8_t* const entries = take(r, (size_t)*count * BUSHD_TABLE_RUN_ENTRY);
+  uint16_t mask = 0;
+  for (uint8_t i = 0; i < *count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(entries, i);
+    const uint16_t bit = (uint16_t)(1u << entry.motor);
+    if (mask >= bit || entry.steps == 0 || entry.steps > INT32_MAX) *in_range = false;
+    mask |= bit;
+  }
+  return entries;
+}
+
+bushd_table_run_entry bushd_get_table_run_entry(const uint8_t* entries, uint8_t index) {
+  const uint8_t* const at = entries + (size_t)index * BUSHD_TABLE_RUN_ENTRY;
+  const bushd_table_run_entry entry = {(uint8_t)(at[0] & HEAD_MOTOR),
+                                       (uint8_t)(at[0] >> HEAD_SLOT_SHIFT & 7u),
+                                       at[0] & HEAD_POSITIVE ? 1 : -1, bushd_get_u32(at + 1)};
+  return entry;
+}
+
 size_t bushd_encode_table_run(uint8_t epoch, uint32_t first_tick,
                               const bushd_table_run_entry* entries, uint8_t count,
                               uint8_t* payload) {
   writer w = {payload};
   put8(&w, epoch);
   put32(&w, first_tick);
-  for (uint8_t i = 0; i < count; ++i) {
-    uint8_t head = (uint8_t)(entries[i].motor | entries[i].slot << HEAD_SLOT_SHIFT);
-    if (entries[i].direction > 0) head |= HEAD_POSITIVE;
-    put8(&w, head);
-    put32(&w, entries[i].steps);
-  }
+  put_run_entries(&w, entries, count);
   return (size_t)(w.at - payload);
-}
-
-bushd_table_run_entry bushd_get_table_run_entry(const bushd_table_run* message, uint8_t index) {
-  const uint8_t* const at = message->entries + (size_t)index * BUSHD_TABLE_RUN_ENTRY;
-  const bushd_table_run_entry entry = {(uint8_t)(at[0] & HEAD_MOTOR),
-                                       (uint8_t)(at[0] >> HEAD_SLOT_SHIFT & 7u),
-                                       at[0] & HEAD_POSITIVE ? 1 : -1, bushd_get_u32(at + 1)};
-  return entry;
 }
 
 bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_table_run* message) {
@@ -240,19 +259,63 @@ bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_t
   message->epoch = get8(&r);
   message->first_tick = get32(&r);
   if (r.short_of_bytes) return BUSHD_E_LENGTH;
-  const size_t rest = (size_t)(r.end - r.at);
-  if (rest % BUSHD_TABLE_RUN_ENTRY != 0) return BUSHD_E_LENGTH;
-  message->count = (uint8_t)(rest / BUSHD_TABLE_RUN_ENTRY);
-  message->entries = take(&r, rest);
-  uint16_t mask = 0;
-  bool in_range = message->count >= 1;
-  for (uint8_t i = 0; i < message->count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message, i);
-    const uint16_t bit = (uint16_t)(1u << entry.motor);
-    if (mask >= bit || entry.steps == 0 || entry.steps > INT32_MAX) in_range = false;
-    mask |= bit;
+  bool in_range = true;
+  message->entries = get_run_entries(&r, &message->count, &in_range);
+  return finish(&r, message->count >= 1 && in_range);
+}
+
+size_t bushd_encode_trigger(uint8_t number, bushd_edge edge, uint32_t delay_us,
+                            const bushd_table_run_entry* entries, uint8_t count, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, number);
+  put8(&w, (uint8_t)edge);
+  put32(&w, delay_us);
+  put_run_entries(&w, entries, count);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_trigger(const uint8_t* payload, size_t size, bushd_trigger* message) {
+  reader r = read_from(payload, size);
+  message->number = get8(&r);
+  const uint8_t edge = get8(&r);
+  message->edge = edge == BUSHD_EDGE_RISING    ? BUSHD_EDGE_RISING
+                  : edge == BUSHD_EDGE_FALLING ? BUSHD_EDGE_FALLING
+                                               : BUSHD_EDGE_NONE;
+  message->delay_us = get32(&r);
+  if (r.short_of_bytes) return BUSHD_E_LENGTH;
+  bool in_range = true;
+  message->entries = get_run_entries(&r, &message->count, &in_range);
+  if (edge == BUSHD_EDGE_NONE) {
+    in_range = message->number == 0 && message->delay_us == 0 && message->count == 0;
+  } else if (message->number == 0 || message->delay_us < BUSHD_TRIGGER_MIN_DELAY_US ||
+             message->delay_us > BUSHD_TRIGGER_MAX_DELAY_US || message->count == 0) {
+    in_range = false;
   }
-  return finish(&r, in_range);
+  return finish(&r, edge <= BUSHD_EDGE_FALLING && in_range);
+}
+
+size_t bushd_encode_reference(const bushd_reference* message, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, message->motor);
+  put8(&w, message->arrivals);
+  put32(&w, (uint32_t)message->position_steps);
+  put32(&w, message->delay_us);
+  put32(&w, message->width_us);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_reference(const uint8_t* payload, size_t size, bushd_reference* message) {
+  reader r = read_from(payload, size);
+  message->motor = get8(&r);
+  message->arrivals = get8(&r);
+  message->position_steps = (int32_t)get32(&r);
+  message->delay_us = get32(&r);
+  message->width_us = get32(&r);
+  const uint8_t all = BUSHD_ARRIVES_POSITIVE | BUSHD_ARRIVES_NEGATIVE;
+  return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU && message->arrivals <= all &&
+                        message->delay_us <= BUSHD_REFERENCE_MAX_DELAY_US &&
+                        message->width_us >= 1 &&
+                        message->width_us <= BUSHD_REFERENCE_MAX_WIDTH_US);
 }
 
 size_t bushd_encode_home(const bushd_home* message, uint8_t* payload) {
@@ -324,6 +387,11 @@ size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {
   put16(&w, message->autonomous);
   put16(&w, message->homed);
   put8(&w, message->homing);
+  put16(&w, message->armed);
+  put8(&w, message->trigger_number);
+  put8(&w, message->trigger_state);
+  put32(&w, message->start_tick);
+  put32(&w, message->start_ns);
   put8(&w, message->motor_count);
   for (uint8_t i = 0; i < message->motor_count; ++i) {
     put32(&w, (uint32_t)message->motor[i].position_steps);
@@ -365,11 +433,17 @@ bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_repo
   message->autonomous = get16(&r);
   message->homed = get16(&r);
   message->homing = get8(&r);
+  message->armed = get16(&r);
+  message->trigger_number = get8(&r);
+  message->trigger_state = get8(&r);
+  message->start_tick = get32(&r);
+  message->start_ns = get32(&r);
   message->motor_count = get8(&r);
   if (message->motor_count > BUSHD_MOTORS_PER_MCU) return BUSHD_E_FORMAT;
   for (uint8_t i = 0; i < message->motor_count; ++i) {
     message->motor[i].position_steps = (int32_t)get32(&r);
     message->motor[i].known_until = get16(&r);
   }
-  return finish(&r, message->state <= BUSHD_STATE_FAULT);
+  return finish(
+      &r, message->state <= BUSHD_STATE_FAULT && message->trigger_state <= BUSHD_TRIGGER_FORBIDDEN);
 }

@@ -72,6 +72,13 @@ void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, i
   cut(run, 0, steps);
 }
 
+void bushd_run_begin_late(bushd_run* run, uint32_t ns) {
+  const uint32_t unit_ns = run->table->time_unit_ns;
+  const uint32_t units = ns / unit_ns + (ns % unit_ns != 0);
+  run->since = 0u - units;
+  run->since_ns = units * unit_ns - ns;
+}
+
 static void lead_then_ramp_down(bushd_run* run, uint16_t delay) {
   run->lead_steps = 1;
   run->lead_delay = delay;
@@ -138,7 +145,7 @@ uint64_t bushd_run_units_left(const bushd_run* run) {
   return (uint64_t)run->lead_steps * run->lead_delay +
          units_between(&table->accel, run->accel_at, run->accel_end) +
          (uint64_t)run->cruise_left * table->cruise +
-         units_between(&table->decel, 0, run->decel_left) - run->since;
+         units_between(&table->decel, 0, run->decel_left) - (uint64_t)(int32_t)run->since;
 }
 
 // The greatest i with sum[i] <= units. Precondition: units < sum[count].
@@ -231,6 +238,12 @@ static inline uint32_t next_units(uint32_t* since_ns, const tick_units* tick) {
   *since_ns = carry ? sum - tick->unit_ns : sum;
   return tick->whole + carry;
 }
+
+// A small MCU makes few ticks at a time, walks its codes, and has no stack for blocks.
+#ifndef BUSHD_RUN_BLOCKS
+#define BUSHD_RUN_BLOCKS 1
+#endif
+#if BUSHD_RUN_BLOCKS
 
 // Below this many ticks the divisions that a block begins with cost more than it saves.
 #define BLOCK_TICKS 4u
@@ -355,11 +368,13 @@ static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t
 }
 
 static size_t coarse_block(bushd_run* run, const tick_units* tick, size_t ticks, coarse_out out) {
-  if (run->lead_steps != 0) return 0;
+  if (run->lead_steps != 0 || bushd_run_begins_later(run)) return 0;
   if (run->accel_at < run->accel_end) return coarse_accel_block(run, tick, ticks, out);
   if (run->cruise_left != 0) return coarse_cruise_block(run, tick, ticks, out);
   return coarse_decel_block(run, tick, ticks, out);
 }
+
+#endif
 
 size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, uint8_t* out,
                                size_t stride) {
@@ -367,12 +382,14 @@ size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, u
   const uint8_t direction_bit = run->direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
   size_t n = 0;
   while (n < ticks && !bushd_run_done(run)) {
+#if BUSHD_RUN_BLOCKS
     if (ticks - n >= BLOCK_TICKS) {
       const coarse_out rest = {out + n * stride, stride, direction_bit};
       n += coarse_block(run, &tick, ticks - n, rest);
       // The block may have made the last step: no tick is active after it.
       if (n == ticks || bushd_run_done(run)) break;
     }
+#endif
     const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
     run->steps_done += steps;
     out[n++ * stride] = (uint8_t)(steps | direction_bit);

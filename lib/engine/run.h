@@ -32,7 +32,8 @@ typedef struct bushd_run {
   uint32_t accel_end;    // and where that part ends
   uint32_t cruise_left;  // steps left at the cruise delay
   uint32_t decel_left;   // steps left on the decelerating side
-  uint32_t since;        // whole time units since the last step
+  uint32_t since;        // whole time units since the last step; before the run begins (begin_late)
+                         // negative, modulo 2^32
   uint32_t since_ns;     // and the rest, < time_unit_ns
   uint16_t lead_delay;
   uint8_t fraction;  // of the position at the end of the last fine tick, 1/256 step
@@ -43,6 +44,14 @@ typedef struct bushd_run {
 // which the move starts at its beginning. O(log steps).
 // Precondition: the table passed bushd_table_check.
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction);
+
+// Puts the beginning of a run that has just been started `ns` after the beginning of its first
+// tick. Precondition: ns < length of the ticks that it will be expanded in. O(1).
+void bushd_run_begin_late(bushd_run* run, uint32_t ns);
+// Its first tick has not been expanded: it begins later in it. O(1).
+static inline bool bushd_run_begins_later(const bushd_run* run) {
+  return (int32_t)run->since < 0;
+}
 
 // A ramp-down taken up in the middle of a step whose delay is `delay`, of which fraction/256
 // (rounded up to whole ns) is over: that step, then D(k-1) .. D(0). It is what an MCU runs when its

@@ -25,7 +25,7 @@ typedef struct bushd_run_state {
 } bushd_run_state;
 
 // The state of a run that is not done, for going on with it for `ticks` ticks. Precondition: the
-// run stands at a tick boundary. O(1).
+// run stands at a tick boundary and has begun (bushd_run_begin_late). O(1).
 bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks);
 
 // A run in that state; steps_done begins at 0. Returns false, and leaves the run undefined, if no

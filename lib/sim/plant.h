@@ -1,5 +1,6 @@
 // The motors behind the virtual MCUs' pins: they turn by STEP, DIR (or the common one) and EN alone
-// and know nothing of the firmware's counters. Every step is checked against its motor's table (sim/pace.h).
+// and know nothing of the firmware's counters. Every step is checked against its motor's table
+// (sim/pace.h).
 #pragma once
 
 #include <functional>

@@ -9,7 +9,7 @@
 namespace bushd::sim {
 namespace {
 
-constexpr std::size_t kWiresPerMcu = 2 * kOutputsPerMcu + 2;
+constexpr std::size_t kWiresPerMcu = 2 * kOutputsPerMcu + 3;
 constexpr std::size_t kTextBytes = std::size_t{1} << 18;
 
 std::size_t wire_of(const Edge& edge) {
@@ -22,15 +22,18 @@ std::size_t wire_of(const Edge& edge) {
     case Signal::kEnable:
       return first + 2 * kOutputsPerMcu;
     case Signal::kCommonDir:
+      return first + 2 * kOutputsPerMcu + 1;
+    case Signal::kReference:
       break;
   }
-  return first + 2 * kOutputsPerMcu + 1;
+  return first + 2 * kOutputsPerMcu + 2;
 }
 
 std::string wire_name(std::size_t wire) {
   if (wire < kOutputsPerMcu) return "step" + std::to_string(wire);
   if (wire < 2 * kOutputsPerMcu) return "dir" + std::to_string(wire - kOutputsPerMcu);
-  return wire == 2 * kOutputsPerMcu ? "en" : "common_dir";
+  if (wire == 2 * kOutputsPerMcu) return "en";
+  return wire == 2 * kOutputsPerMcu + 1 ? "common_dir" : "reference";
 }
 
 // The standard allows any printable characters; short codes keep the file small.

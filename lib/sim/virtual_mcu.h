@@ -44,7 +44,7 @@ class VirtualMcu final : public Mcu {
   // the start of the present tick.
   const bushd_virtual_shaft& shaft(std::size_t output) const { return port_.shaft[output]; }
 
-  void set_inputs(bushd_inputs inputs) override { port_.inputs = inputs; }
+  void set_inputs(bushd_inputs inputs) override { bushd_virtual_set_inputs(&port_, inputs); }
   // From now on the input of this output's motor is what a switch at its shaft says.
   void attach_switch(std::size_t output, const SwitchOptions& options);
   void set_current(std::uint16_t reading) override { port_.current = reading; }

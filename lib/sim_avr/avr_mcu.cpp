@@ -117,6 +117,8 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   watch_port('B', Signal::kDir, 8);
   pins_[pin_count_] = {this, Signal::kEnable, 0, false};
   watch_pin('H', 3, on_pin, &pins_[pin_count_++]);
+  pins_[pin_count_] = {this, Signal::kReference, 0, false};
+  watch_pin('G', 5, on_pin, &pins_[pin_count_++]);
   watch_pin('E', 4, on_driver_enable, this);
 
   reset_hook_ = std::make_unique<ResetHook>();

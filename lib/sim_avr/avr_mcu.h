@@ -117,7 +117,7 @@ class AvrMcu final : public Mcu {
   std::uint64_t eeprom_writes_ = 0;
   std::uint64_t overruns_ = 0;
   std::uint64_t bytes_cut_ = 0;
-  std::array<Pin, 33> pins_{};
+  std::array<Pin, 34> pins_{};
   std::size_t pin_count_ = 0;
 };
 

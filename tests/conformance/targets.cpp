@@ -51,7 +51,7 @@ class Lm3s6965 final : public McuUnderTest {
   McuOptions twin() const override {
     return {.slots = 128, .queue_ticks = 512, .code_count = 12288};
   }
-  std::uint16_t lacks() const override { return 0; }
+  std::uint16_t lacks() const override { return BUSHD_CAN_TRIGGER | BUSHD_CAN_REFERENCE; }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }
   std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
                             EdgeSink* sink) override {

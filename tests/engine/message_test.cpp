@@ -173,7 +173,7 @@ bushd_status table_run_again(const Bytes& payload, Bytes* again) {
   const bushd_status status = bushd_decode_table_run(payload.data(), payload.size(), &m);
   if (status != BUSHD_OK) return status;
   std::vector<bushd_table_run_entry> entries;
-  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_get_table_run_entry(&m, i));
+  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_get_table_run_entry(m.entries, i));
   again->resize(BUSHD_FRAME_MAX_PAYLOAD);
   again->resize(
       bushd_encode_table_run(m.epoch, m.first_tick, entries.data(), m.count, again->data()));
@@ -190,6 +190,28 @@ Bytes any_table_run() {
     bushd_put_u32(&entry[1], between<uint32_t>(1, INT32_MAX));
     payload.insert(payload.end(), entry.begin(), entry.end());
   }
+  return payload;
+}
+
+bushd_status trigger_again(const Bytes& payload, Bytes* again) {
+  bushd_trigger m{};
+  const bushd_status status = bushd_decode_trigger(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  std::vector<bushd_table_run_entry> entries;
+  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_get_table_run_entry(m.entries, i));
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(
+      bushd_encode_trigger(m.number, m.edge, m.delay_us, entries.data(), m.count, again->data()));
+  return status;
+}
+
+Bytes any_trigger() {
+  const Bytes run = any_table_run();
+  Bytes payload(6);
+  payload[0] = between<uint8_t>(1, 255);
+  payload[1] = between<uint8_t>(1, 2);
+  bushd_put_u32(&payload[2], between<uint32_t>(50, 1'500'000));
+  payload.insert(payload.end(), run.begin() + BUSHD_TABLE_RUN_HEADER, run.end());
   return payload;
 }
 
@@ -364,6 +386,31 @@ const std::map<std::string, Kind>& kinds() {
             p->insert(p->end(), entry.begin(), entry.end());
           }}},
         true}},
+      {"trigger",
+       {any_trigger,
+        trigger_again,
+        {{"no number", set8(0, 0)},
+         {"no such edge", set8(1, 3)},
+         {"entries to disarm", set8(1, 0)},
+         {"too short a delay", set32(2, 49)},
+         {"too long a delay", set32(2, 1'500'001)},
+         {"no step", set32(7, 0)},
+         {"no entry", [](Bytes* p) { p->resize(6); }}},
+        true}},
+      {"reference",
+       {bytes_with(14,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 15);
+                     (*p)[1] = between<uint8_t>(0, 3);
+                     bushd_put_u32(p->data() + 6, between<uint32_t>(0, 1'500'000));
+                     bushd_put_u32(p->data() + 10, between<uint32_t>(1, 1'000'000));
+                   }),
+        codec(bushd_decode_reference, bushd_encode_reference),
+        {{"motor 16", set8(0, 16)},
+         {"no such arrival", set8(1, 4)},
+         {"too long a delay", set32(6, 1'500'001)},
+         {"no width", set32(10, 0)},
+         {"too wide", set32(10, 1'000'001)}}}},
       {"emergency",
        {bytes_with(1, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 1); }),
         codec(bushd_decode_emergency, bushd_encode_emergency),
@@ -390,11 +437,12 @@ const std::map<std::string, Kind>& kinds() {
           const auto motors = between<uint8_t>(0, 16);
           Bytes payload = random_bytes(BUSHD_REPORT_SIZE(motors));
           payload[0] = between<uint8_t>(0, 3);
-          payload[65] = motors;
+          payload[68] = between<uint8_t>(0, 6);
+          payload[77] = motors;
           return payload;
         },
         codec(bushd_decode_report, bushd_encode_report),
-        {{"state 4", set8(0, 4)}, {"17 motors", set8(65, 17)}}}},
+        {{"state 4", set8(0, 4)}, {"trigger state 7", set8(68, 7)}, {"17 motors", set8(77, 17)}}}},
       {"acknowledgement",
        {[] { return random_bytes(1); },
         codec(bushd_decode_acknowledgement, bushd_encode_acknowledgement),

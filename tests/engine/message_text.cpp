@@ -135,14 +135,25 @@ void put(const bushd_table_ticks& m, Fields& f) {
   }
   f.add_text("entries", entries);
 }
+void put_entries(const uint8_t* entries, uint8_t count, Fields& f) {
+  std::string text;
+  for (uint8_t i = 0; i < count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(entries, i);
+    append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps}));
+  }
+  f.add_text("entries", text);
+}
 void put(const bushd_table_run& m, Fields& f) {
   f.add("epoch", m.epoch).add("first_tick", m.first_tick);
-  std::string entries;
-  for (uint8_t i = 0; i < m.count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(&m, i);
-    append(&entries, parts({entry.motor, entry.slot, entry.direction, entry.steps}));
-  }
-  f.add_text("entries", entries);
+  put_entries(m.entries, m.count, f);
+}
+void put(const bushd_trigger& m, Fields& f) {
+  f.add("number", m.number).add("edge", m.edge).add("delay_us", m.delay_us);
+  put_entries(m.entries, m.count, f);
+}
+void put(const bushd_reference& m, Fields& f) {
+  f.add("motor", m.motor).add("arrivals", m.arrivals).add("position_steps", m.position_steps);
+  f.add("delay_us", m.delay_us).add("width_us", m.width_us);
 }
 void put(const bushd_emergency& m, Fields& f) {
   f.add("how", m.how);
@@ -166,7 +177,9 @@ void put(const bushd_report& m, Fields& f) {
   f.add("forbidden_negative", m.forbidden_negative).add("system_inputs", m.system_inputs);
   f.add("current", m.current).add("reset_cause", m.reset_cause);
   f.add("failed_tests", m.failed_tests).add("autonomous", m.autonomous).add("homed", m.homed);
-  f.add("homing", m.homing).add("motor_count", m.motor_count);
+  f.add("homing", m.homing).add("armed", m.armed);
+  f.add("trigger_number", m.trigger_number).add("trigger_state", m.trigger_state);
+  f.add("start_tick", m.start_tick).add("start_ns", m.start_ns).add("motor_count", m.motor_count);
   std::string motors;
   for (size_t i = 0; i < m.motor_count; ++i) {
     append(&motors, parts({m.motor[i].position_steps, m.motor[i].known_until}));
@@ -222,6 +235,10 @@ std::string message_text(const bushd_frame& frame) {
       return text("table_ticks", frame, bushd_decode_table_ticks);
     case BUSHD_MSG_TABLE_RUN:
       return text("table_run", frame, bushd_decode_table_run);
+    case BUSHD_MSG_TRIGGER:
+      return text("trigger", frame, bushd_decode_trigger);
+    case BUSHD_MSG_REFERENCE:
+      return text("reference", frame, bushd_decode_reference);
     case BUSHD_MSG_EMERGENCY:
       return text("emergency", frame, bushd_decode_emergency);
     case BUSHD_MSG_EMISSION:
@@ -251,11 +268,12 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {
-      "identify",   "identity",        "configure",    "table_begin", "table_data", "table_end",
-      "assign",     "control",         "set_position", "poll",        "report",     "sync",
-      "ticks",      "acknowledgement", "table_ticks",  "table_run",   "emergency",  "set_address",
-      "get_tables", "tables",          "set_inputs",   "emission",    "home",       "local"};
+  return {"identify",   "identity",  "configure",   "table_begin",     "table_data",
+          "table_end",  "assign",    "control",     "set_position",    "poll",
+          "report",     "sync",      "ticks",       "acknowledgement", "table_ticks",
+          "table_run",  "emergency", "set_address", "get_tables",      "tables",
+          "set_inputs", "emission",  "home",        "local",           "trigger",
+          "reference"};
 }
 
 }  // namespace bushd::test

@@ -57,6 +57,12 @@ class Reference {
     return r;
   }
 
+  // All of it `ns` later.
+  void begin_late(uint64_t ns) {
+    origin_ += Wide{ns} * 256;
+    for (Step& step : steps_) step.end += Wide{ns} * 256;
+  }
+
   // From `ns` on: the running step, then the fewest steps k with D(k) <= its delay.
   void ramp_down_at(uint64_t ns) {
     const size_t made = steps_at(ns);

@@ -29,9 +29,12 @@ TEST(RunSlots, EveryStepFallsIntoItsSlotByTheSumOfTheDelays) {
     const auto slots = *rc::gen::element<uint16_t>(128, 199, 256);
     const auto steps = between<uint32_t>(1, 200);
     const int direction = between(0, 1) != 0 ? 1 : -1;
-    const auto reference = Reference::move(table.law(), steps);
+    const auto late_ns = between<uint32_t>(0, 2) == 0 ? between<uint32_t>(0, tick_ns - 1) : 0;
+    auto reference = Reference::move(table.law(), steps);
+    reference.begin_late(late_ns);
     bushd_run run;
     bushd_run_start(&run, table.view(), steps, direction);
+    bushd_run_begin_late(&run, late_ns);
     size_t made = 0;
     for (uint64_t tick = 0; tick < 3000 && !bushd_run_done(&run); ++tick) {
       std::vector<uint16_t> expected(slots);

@@ -188,6 +188,27 @@ TEST(Run, FineTicksAgreeWithTheDefinition) {
   holds("fine, indexed", [] { check_move(TestTable(any_law(), true), Format::kFine); });
 }
 
+TEST(Run, MayBeginInTheMiddleOfItsFirstTick) {
+  holds("begins late, to the ns", [] {
+    const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
+    const Format format = *rc::gen::element(Format::kCoarse, Format::kFine);
+    const auto steps = between<uint32_t>(1, 300);
+    const uint32_t tick_ns = any_tick_ns(table.law());
+    const auto late_ns = between<uint32_t>(0, tick_ns - 1);
+    Reference reference = Reference::move(table.law(), steps);
+    reference.begin_late(late_ns);
+    const size_t ticks = ticks_to_compare(reference, tick_ns);
+    RC_LOG() << "steps " << steps << " tick " << tick_ns << " late " << late_ns << '\n';
+    bushd_run run;
+    bushd_run_start(&run, table.view(), steps, -1);
+    bushd_run_begin_late(&run, late_ns);
+    RC_ASSERT(bushd_run_units_left(&run) == reference.units_left_at(0));
+    const auto got = expand(&run, format, tick_ns, ticks, true);
+    RC_ASSERT(got.displacements == expected(reference, format, tick_ns, 0, ticks, -1));
+    RC_ASSERT(run.steps_done == reference.steps_at(uint64_t{ticks} * tick_ns));
+  });
+}
+
 // Realistic tables are long and take many ticks: block by block through every part.
 TEST(Run, LongMovesAgreeWithTheDefinitionTickByTick) {
   Law law;

@@ -23,7 +23,10 @@ class Stranger {
   // Something that a master might send, with values that are often right, and sometimes bent.
   void speak(Rig& rig) {
     Bytes payload;
-    std::uint8_t type = static_cast<std::uint8_t>(1 + below(16));
+    std::uint8_t type = static_cast<std::uint8_t>(1 + below(18));
+    if (type > BUSHD_MSG_TABLES) {
+      type = static_cast<std::uint8_t>(BUSHD_MSG_TRIGGER + type - BUSHD_MSG_TABLES - 1);
+    }
     switch (type) {
       case BUSHD_MSG_CONFIGURE:
         put32(payload, below(4) != 0 ? Rig::kTickNs : below(21'000'000));
@@ -84,6 +87,24 @@ class Stranger {
       }
       case BUSHD_MSG_TICKS:
         payload = ticks(rig);
+        break;
+      case BUSHD_MSG_TRIGGER: {
+        const bool disarms = below(5) == 0;
+        payload = {static_cast<std::uint8_t>(disarms ? 0 : 1 + below(255)),
+                   static_cast<std::uint8_t>(disarms ? 0 : 1 + below(2))};
+        put32(payload, disarms ? 0 : 50 + below(100'000));
+        if (disarms) break;
+        const std::uint32_t motor = below(rig.options().motors);
+        payload.push_back(static_cast<std::uint8_t>(motor | 0x80 * below(2)));
+        put32(payload, 1 + below(50));
+        break;
+      }
+      case BUSHD_MSG_REFERENCE:
+        payload = {static_cast<std::uint8_t>(below(rig.options().motors)),
+                   static_cast<std::uint8_t>(below(4))};
+        put32(payload, below(20));
+        put32(payload, below(20'000));
+        put32(payload, 1 + below(20'000));
         break;
       default:
         break;
@@ -173,6 +194,7 @@ void pass_and_check(Rig& rig) {
   }
   const std::uint16_t moving = rig.poll().moving;
   RC_ASSERT((stepped & ~moving) == 0);
+  RC_ASSERT((rig.poll().armed & moving) == 0);
   rig.pass();
   const bushd_report report = rig.poll();
   for (std::uint8_t m = 0; m < rig.options().motors; ++m) {
@@ -212,6 +234,7 @@ TEST(RandomBytes, AnyRequestsInAnyOrderKeepCountsTrue) {
   // The property is worth nothing if no such stream ever moves a motor.
   std::int64_t steps = 0;
   int link_faults = 0;
+  int triggered = 0;
   holds("well-formed frames, bent ones, and noise", [&] {
     Rig rig(any_options());
     Stranger stranger(between<std::uint32_t>(0, UINT32_MAX));
@@ -230,6 +253,10 @@ TEST(RandomBytes, AnyRequestsInAnyOrderKeepCountsTrue) {
         }
         static_cast<void>(rig.answer());
       }
+      if (stranger.below(4) == 0) {
+        rig.trigger(static_cast<std::int32_t>(stranger.below(4'000'000)) - 2'000'000);
+        if (rig.poll().trigger_state == BUSHD_TRIGGER_STARTED) ++triggered;
+      }
       pass_and_check(rig);
       if (rig.poll().faults & BUSHD_FAULT_LINK) ++link_faults;
     }
@@ -241,6 +268,7 @@ TEST(RandomBytes, AnyRequestsInAnyOrderKeepCountsTrue) {
   });
   EXPECT_GT(steps, 1000);
   EXPECT_GT(link_faults, 100);
+  EXPECT_GT(triggered, 100);
 }
 
 }  // namespace

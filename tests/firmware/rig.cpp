@@ -106,6 +106,11 @@ Rig::Rig(RigOptions options)
   port.read_current = [](void* context) { return static_cast<Rig*>(context)->current_; };
   port.self_test = [](void* context) { return static_cast<Rig*>(context)->options_.failing_tests; };
   port.keep_enable = [](void* context, bool on) { static_cast<Rig*>(context)->enable_kept_ = on; };
+  if (options.trigger_input) {
+    port.set_trigger = [](void* context, bushd_edge edge) {
+      static_cast<Rig*>(context)->awaited_edge_ = edge;
+    };
+  }
   bushd_mcu_config config{};
   config.address = options.address;
   config.motors = options.motors;
@@ -305,6 +310,19 @@ bushd_tables Rig::tables() {
   if (!got) return tables;
   EXPECT_EQ(bushd_decode_tables(got->payload.data(), got->payload.size(), &tables), BUSHD_OK);
   return tables;
+}
+
+bushd_status Rig::arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
+                      const std::vector<bushd_table_run_entry>& entries) {
+  return request(BUSHD_MSG_TRIGGER, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_trigger(number, edge, delay_us, entries.data(),
+                                               static_cast<std::uint8_t>(entries.size()), p);
+                 }));
+}
+
+bushd_status Rig::reference(const bushd_reference& message) {
+  return request(BUSHD_MSG_REFERENCE,
+                 payload_of([&](std::uint8_t* p) { return bushd_encode_reference(&message, p); }));
 }
 
 void Rig::emergency(bushd_how how, std::uint8_t address) {

@@ -32,6 +32,7 @@ struct RigOptions {
   std::uint16_t lacks = 0;
   std::uint32_t pulse_ns = 0;
   bool stores_address = true;
+  bool trigger_input = true;
 };
 
 struct Answer {
@@ -126,6 +127,13 @@ class Rig {
   // If set, the pins are what this says whenever they are read.
   std::function<bushd_inputs()> sense;
   void current(std::uint16_t reading) { current_ = reading; }
+  bushd_status arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
+                   const std::vector<bushd_table_run_entry>& entries);
+  bushd_status disarm() { return arm(0, BUSHD_EDGE_NONE, 0, {}); }
+  bushd_status reference(const bushd_reference& message);
+  // What the port was told to wait for, and the edge noticed in the present tick.
+  bushd_edge awaited_edge() const { return awaited_edge_; }
+  void trigger(std::int32_t time_in_tick_ns) { bushd_mcu_trigger(&mcu_, time_in_tick_ns); }
   // Without an answer.
   void emergency(bushd_how how, std::uint8_t address = BUSHD_ADDRESS_BROADCAST);
   // Everything up to READY, with this table for all motors.
@@ -184,6 +192,7 @@ class Rig {
   std::array<Bytes, 256> table_head_;  // what TABLE_BEGIN said, by slot, as a checksum has it
   Bytes last_sent_;
   bool enabled_ = true;
+  bushd_edge awaited_edge_ = BUSHD_EDGE_NONE;
   int enable_calls_ = 0;
   bool enable_kept_ = false;
   int stored_address_ = -1;

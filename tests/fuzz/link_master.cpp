@@ -288,6 +288,8 @@ class Bus {
         return decodes(bushd_table_ticks{}, bushd_decode_table_ticks);
       case BUSHD_MSG_TABLE_RUN:
         return decodes(bushd_table_run{}, bushd_decode_table_run);
+      case BUSHD_MSG_TRIGGER:
+        return decodes(bushd_trigger{}, bushd_decode_trigger);
       case BUSHD_MSG_EMERGENCY:
         return decodes(bushd_emergency{}, bushd_decode_emergency);
       default:

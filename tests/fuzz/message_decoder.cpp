@@ -218,7 +218,7 @@ void decode_table_run(Bytes payload) {
   const auto encode = [&](const bushd_table_run* message, std::uint8_t* out) {
     BUSHD_REQUIRE(message->count >= 1 && message->count <= BUSHD_MOTORS_PER_MCU);
     for (std::uint8_t i = 0; i < message->count; ++i) {
-      entries[i] = bushd_get_table_run_entry(message, i);
+      entries[i] = bushd_get_table_run_entry(message->entries, i);
       BUSHD_REQUIRE(entries[i].steps >= 1 && entries[i].steps <= INT32_MAX);
       BUSHD_REQUIRE(entries[i].slot < BUSHD_TABLE_SLOTS);
       BUSHD_REQUIRE(i == 0 || entries[i].motor > entries[i - 1u].motor);
@@ -228,6 +228,25 @@ void decode_table_run(Bytes payload) {
   };
   bushd_table_run message;
   decoded(payload, &message, bushd_decode_table_run, encode);
+}
+
+void decode_trigger(Bytes payload) {
+  std::array<bushd_table_run_entry, BUSHD_MOTORS_PER_MCU> entries;
+  const auto encode = [&](const bushd_trigger* message, std::uint8_t* out) {
+    BUSHD_REQUIRE(message->count <= BUSHD_MOTORS_PER_MCU);
+    BUSHD_REQUIRE((message->count == 0) == (message->edge == BUSHD_EDGE_NONE));
+    for (std::uint8_t i = 0; i < message->count; ++i) {
+      entries[i] = bushd_get_table_run_entry(message->entries, i);
+      BUSHD_REQUIRE(entries[i].steps >= 1 && entries[i].steps <= INT32_MAX);
+      BUSHD_REQUIRE(i == 0 || entries[i].motor > entries[i - 1u].motor);
+    }
+    return bushd_encode_trigger(message->number, message->edge, message->delay_us, entries.data(),
+                                message->count, out);
+  };
+  bushd_trigger message;
+  decoded(payload, &message, bushd_decode_trigger, encode);
+  bushd_reference reference;
+  decoded(payload, &reference, bushd_decode_reference, bushd_encode_reference);
 }
 
 void decode_for_master(Bytes payload) {
@@ -262,6 +281,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   bushd::fuzz::decode_ticks(payload);
   bushd::fuzz::decode_table_ticks(payload);
   bushd::fuzz::decode_table_run(payload);
+  bushd::fuzz::decode_trigger(payload);
   bushd::fuzz::decode_for_master(payload);
   return 0;
 }

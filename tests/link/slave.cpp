@@ -334,7 +334,7 @@ void FakeBus::take_table_run(Slave& slave, const Heard& frame) {
   ASSERT_EQ(bushd_decode_table_run(frame.payload.data(), frame.payload.size(), &message), BUSHD_OK);
   bool good = message.epoch == slave.epoch && slave.faults == 0;
   for (std::uint8_t i = 0; i < message.count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(&message, i);
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message.entries, i);
     good &= slave.delay[entry.motor] == 0 && message.first_tick >= slave.known_until[entry.motor];
   }
   if (!good) {
@@ -342,7 +342,7 @@ void FakeBus::take_table_run(Slave& slave, const Heard& frame) {
     return;
   }
   for (std::uint8_t i = 0; i < message.count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(&message, i);
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message.entries, i);
     slave.run[entry.motor] = entry;
     slave.known_until[entry.motor] =
         static_cast<std::uint32_t>(source.end(entry.motor));  // by its table

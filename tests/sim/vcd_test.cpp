@@ -26,7 +26,7 @@ TEST_F(Vcd, HeadNamesAllWiresAndGivesTheirFirstValues) {
   ASSERT_TRUE((*writer)->close(1'000'000));
   const VcdFile file = read_vcd(path);
   EXPECT_EQ(file.timescale, "1ns");
-  EXPECT_EQ(file.wires.size(), 3u * 34u);
+  EXPECT_EQ(file.wires.size(), 3u * 35u);
   for (const char* name : {"mcu1.step0", "mcu2.dir15", "mcu200.en"}) {
     ASSERT_TRUE(file.wires.contains(name)) << name;
     ASSERT_EQ(file.wires.at(name).size(), 1u);

@@ -47,6 +47,14 @@ def c_encoder(index, message, fields):
         lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
         lines.append(f"  return bushd_encode_table_run({fields['epoch']}, UINT32_C({fields['first_tick']}), entries, "
                      f"{len(fields['entries'])}, payload);")
+    elif message == "trigger":
+        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}}}"
+                            for motor, slot, direction, steps in fields["entries"])
+        name = "entries" if entries else "NULL"
+        if entries:
+            lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
+        lines.append(f"  return bushd_encode_trigger({fields['number']}, (bushd_edge){fields['edge']}, "
+                     f"UINT32_C({fields['delay_us']}), {name}, {len(fields['entries'])}, payload);")
     elif message == "ticks":
         delays = "delays"
         lines.append(f"  static const uint16_t delays[] = {{{', '.join(map(str, fields['delays']))}}};")

@@ -6,8 +6,11 @@
 static uint32_t latest;  // in counts
 
 void clock_init(void) {
-  TCCR5A = 0;
+  // Timer 4, of the reference output, begins in the same cycle, from the same prescaler.
+  GTCCR = 1 << TSM | 1 << PSRSYNC;
   TCCR5B = 1 << CS51;
+  TCCR4B = 1 << CS41 | 1 << CS40;
+  GTCCR = 0;
 }
 
 static uint16_t count_now(void) {

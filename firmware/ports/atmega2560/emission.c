@@ -54,6 +54,7 @@ static uint32_t core_start;  // of the core's present tick
 static int32_t adjust_ns;    // of the next tick
 static int32_t carry_ns;     // adjustments that came when the tick they were for had begun
 static uint16_t residue;
+static uint32_t given_start;  // of next_plane's tick
 
 static void set_masks(emission_tick* tick, const uint16_t* masks, uint8_t slots) {
   tick->mask = masks;
@@ -144,6 +145,7 @@ void emission_start(void) {
 
 void emission_ready(const bushd_plane* plane) {
   next_plane = plane;
+  given_start = core_start + next_length.cycles;
   give(length_of_next(), false);
 }
 
@@ -161,6 +163,10 @@ void emission_swap(void) {
 
 int32_t emission_time_in_tick_ns(uint32_t time) {
   return (int32_t)(time - core_start) * 125 / 2;
+}
+
+uint32_t emission_slot_time(uint16_t slot) {
+  return given_start + slot * (next_length.cycles / EMISSION_SLOTS);
 }
 
 static void change_length(void) {

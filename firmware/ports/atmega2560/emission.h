@@ -32,6 +32,8 @@ void emission_ready(const bushd_plane* plane);
 bool emission_begun(void);
 // The core's present tick is this one; before bushd_mcu_swap.
 void emission_swap(void);
+// When a slot begins of the plane that was given last, if no other tick comes before it.
+uint32_t emission_slot_time(uint16_t slot);
 // How far the core's present tick has gone at `time` (clock.h), in ns; before it: negative.
 int32_t emission_time_in_tick_ns(uint32_t time);
 

@@ -27,6 +27,7 @@
 // begins.
 #define TICK_IS_NEXT 6  // the mark that comes is that of a tick's first slot
 #define TICK_CHANGES 7  // from a tick's last slot into the next one's first
+#define TRIGGER_CAME 5  // trigger.c
 
 #ifndef __ASSEMBLER__
 

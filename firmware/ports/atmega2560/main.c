@@ -12,6 +12,8 @@
 #include "firmware/ports/atmega2560/inputs.h"
 #include "firmware/ports/atmega2560/kept.h"
 #include "firmware/ports/atmega2560/line.h"
+#include "firmware/ports/atmega2560/reference.h"
+#include "firmware/ports/atmega2560/trigger.h"
 
 #define QUEUE_TICKS 64u
 #define TABLE_CODES 952u  // four tables of 238 codes
@@ -68,6 +70,11 @@ static uint16_t port_read_current(void* context) {
   return inputs_current();
 }
 
+static void port_set_trigger(void* context, bushd_edge edge) {
+  (void)context;
+  trigger_await(edge);
+}
+
 static uint8_t port_self_test(void* context) {
   (void)context;
   return failed_tests;
@@ -105,6 +112,7 @@ __attribute__((noinline)) static void boot(void) {
   port.read_current = port_read_current;
   port.self_test = port_self_test;
   port.keep_enable = port_keep_enable;
+  port.set_trigger = port_set_trigger;
   bushd_mcu_config config = {
       .motors = BUSHD_MOTORS_PER_MCU,
       .slots = EMISSION_SLOTS,
@@ -139,7 +147,10 @@ static void poll_eeprom(void) {
 
 static void prepare(void) {
   bushd_mcu_prepare(&mcu);
-  emission_ready(&mcu.plane[mcu.front ^ 1u]);
+  const bushd_plane* const plane = &mcu.plane[mcu.front ^ 1u];
+  emission_ready(plane);
+  if (plane->reference_rise) reference_rise(emission_slot_time(plane->reference_rise - 1u));
+  if (plane->reference_fall) reference_fall(emission_slot_time(plane->reference_fall - 1u));
 }
 
 static void hear_line(void) {
@@ -149,6 +160,11 @@ static void hear_line(void) {
   } else {
     poll_eeprom();
   }
+}
+
+static void hear_trigger(void) {
+  uint32_t came = 0;
+  if (trigger_came(&came)) bushd_mcu_trigger(&mcu, emission_time_in_tick_ns(came));
 }
 
 int main(void) {
@@ -171,5 +187,6 @@ int main(void) {
     } else if (!bushd_mcu_work(&mcu)) {
       hear_line();
     }
+    hear_trigger();
   }
 }

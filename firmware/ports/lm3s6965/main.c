@@ -100,6 +100,7 @@ static void boot(void) {
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
+                             .lacks = BUSHD_CAN_REFERENCE,
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,

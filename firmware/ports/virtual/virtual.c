@@ -54,18 +54,37 @@ static uint16_t common_dir_at(const bushd_virtual* v, uint16_t edge) {
   return v->plane->outputs == BUSHD_OUTPUTS_COMMON_DIR && slot < v->config.mcu.slots && slot % 2;
 }
 
+static void drive_reference(bushd_virtual* v, int64_t time_ns, bool level) {
+  if (level == v->reference_level) return;
+  v->reference_level = level;
+  emit(v, time_ns, BUSHD_VIRTUAL_REFERENCE, 0, level);
+}
+
+static bool has_edges(const bushd_plane* plane) {
+  return (plane->active | plane->reference_rise | plane->reference_fall) != 0;
+}
+
 // Calls back the edges of the present tick up to until_ns.
-static void emit_steps(bushd_virtual* v, int64_t until_ns) {
+static void emit_slots(bushd_virtual* v, int64_t until_ns) {
   const uint16_t edges = (uint16_t)(2 * v->config.mcu.slots);
-  if (v->config.edge == NULL || v->plane == NULL || v->plane->active == 0) return;
+  const bushd_plane* plane = v->plane;
+  if (v->config.edge == NULL || plane == NULL || !has_edges(plane)) return;
   for (; v->edge_cursor < edges; ++v->edge_cursor) {
-    const uint16_t levels = step_levels_at(v, v->edge_cursor);
-    const uint16_t common_dir = common_dir_at(v, v->edge_cursor);
-    if (levels == v->step_levels && common_dir == v->common_dir_level) continue;
+    const uint16_t slot = v->edge_cursor / 2;
+    const bool begins = v->edge_cursor % 2 == 0;
+    const bool rises = begins && plane->reference_rise == slot + 1;
+    const bool falls = begins && plane->reference_fall == slot + 1;
+    // A plane without steps has no masks.
+    const bool steps = plane->active != 0;
+    const uint16_t levels = steps ? step_levels_at(v, v->edge_cursor) : v->step_levels;
+    const uint16_t common_dir = steps ? common_dir_at(v, v->edge_cursor) : v->common_dir_level;
+    const bool same = levels == v->step_levels && common_dir == v->common_dir_level;
+    if (same && !rises && !falls) continue;
     const int64_t time_ns = edge_time(v, v->edge_cursor);
     if (time_ns > until_ns) return;
     drive(v, time_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, levels);
     drive(v, time_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, common_dir);
+    if (rises || falls) drive_reference(v, time_ns, rises);
   }
 }
 
@@ -125,7 +144,7 @@ static uint16_t last_levels(const bushd_plane* plane, uint16_t slots) {
 }
 
 static void tick_boundary(bushd_virtual* v) {
-  emit_steps(v, v->next_event_ns);
+  emit_slots(v, v->next_event_ns);
   turn_for_whole_tick(v);
   v->now_ns = v->next_event_ns;
   begin_tick(v, v->tick_start_own_ns + v->tick_length_ns);
@@ -156,7 +175,7 @@ static bool port_store_address(void* context, uint8_t address) {
 static void port_set_enable(void* context, bool on) {
   bushd_virtual* v = context;
   if (on == v->enable_level) return;
-  emit_steps(v, v->now_ns);
+  emit_slots(v, v->now_ns);
   v->enable_level = on;
   emit(v, v->now_ns, BUSHD_VIRTUAL_EN, 0, on);
 }
@@ -180,6 +199,11 @@ static bushd_inputs port_read_inputs(void* context) {
   const bushd_virtual* v = context;
   if (v->config.read_inputs == NULL) return v->inputs;
   return v->config.read_inputs(v->config.context, v->now_ns);
+}
+
+static void port_set_trigger(void* context, bushd_edge edge) {
+  bushd_virtual* v = context;
+  v->trigger_edge = edge;
 }
 
 static uint16_t port_read_current(void* context) {
@@ -208,7 +232,8 @@ static void boot(bushd_virtual* v) {
                            .read_inputs = port_read_inputs,
                            .read_current = port_read_current,
                            .self_test = port_self_test,
-                           .keep_enable = port_keep_enable};
+                           .keep_enable = port_keep_enable,
+                           .set_trigger = port_set_trigger};
   v->config.mcu.reset_cause = v->reset_cause;
   v->config.mcu.enable_at_boot = v->enable_kept && v->reset_cause == BUSHD_RESET_WATCHDOG;
   v->enable_kept = false;
@@ -218,6 +243,7 @@ static void boot(bushd_virtual* v) {
   v->plane = NULL;
   v->tick_ns = BUSHD_BOOT_TICK_NS;
   v->adjust_ns = 0;
+  v->trigger_edge = BUSHD_EDGE_NONE;
   begin_tick(v, 0);
   bushd_mcu_boot(&v->mcu, &port, &v->config.mcu);
   bushd_mcu_prepare(&v->mcu);
@@ -246,12 +272,21 @@ void bushd_virtual_advance(bushd_virtual* v, int64_t now_ns) {
     }
   }
   v->now_ns = now_ns;
-  if (v->running) emit_steps(v, now_ns);
+  if (v->running) emit_slots(v, now_ns);
 }
 
 void bushd_virtual_receive(bushd_virtual* v, uint8_t byte, int64_t now_ns) {
   bushd_virtual_advance(v, now_ns);
   if (v->running) bushd_mcu_receive(&v->mcu, byte, (int32_t)port_time_in_tick_ns(v));
+}
+
+void bushd_virtual_set_inputs(bushd_virtual* v, bushd_inputs inputs) {
+  const uint8_t changed = v->inputs.system ^ inputs.system;
+  v->inputs = inputs;
+  if (!v->running || (changed & BUSHD_INPUT_TRIGGER) == 0) return;
+  const bushd_edge edge =
+      inputs.system & BUSHD_INPUT_TRIGGER ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
+  if (edge == v->trigger_edge) bushd_mcu_trigger(&v->mcu, (int32_t)port_time_in_tick_ns(v));
 }
 
 void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint16_t boot_number) {
@@ -261,6 +296,7 @@ void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint
   drive(v, now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, 0);
   drive(v, now_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, 0);
   drive(v, now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, 0);
+  drive_reference(v, now_ns, false);
   if (v->running) port_set_enable(v, false);
   v->running = false;
   v->config.boot_ns = boot_ns;

@@ -32,8 +32,9 @@ extern "C" {
 typedef enum bushd_virtual_signal {
   BUSHD_VIRTUAL_STEP = 0,
   BUSHD_VIRTUAL_DIR = 1,
-  BUSHD_VIRTUAL_EN = 2,         // one per MCU, index 0
-  BUSHD_VIRTUAL_COMMON_DIR = 3  // likewise
+  BUSHD_VIRTUAL_EN = 2,          // one per MCU, index 0
+  BUSHD_VIRTUAL_COMMON_DIR = 3,  // likewise
+  BUSHD_VIRTUAL_REFERENCE = 4    // likewise
 } bushd_virtual_signal;
 
 typedef struct bushd_virtual_config {
@@ -67,7 +68,7 @@ typedef struct bushd_virtual {
   bushd_virtual_config config;
   bushd_virtual_shaft shaft[BUSHD_VIRTUAL_OUTPUTS];  // until the start of the present tick
   bool running;                                      // out of reset
-  bushd_inputs inputs;                               // set: the input pins
+  bushd_inputs inputs;                               // the input pins
   uint16_t current;                                  // set: what the current sensor reads
   uint8_t failing_tests;                             // set: BUSHD_TEST_*, for the next boots
   uint8_t reset_cause;  // set: BUSHD_RESET_* of the next boot; falls to external with each
@@ -87,6 +88,8 @@ typedef struct bushd_virtual {
   uint16_t common_dir_level;
   bool enable_level;
   bool enable_kept;
+  bool reference_level;
+  bushd_edge trigger_edge;  // awaited
 } bushd_virtual;
 
 // Precondition: config->mcu as bushd_mcu_boot wants it, its memory outlives *v; transmit is set.
@@ -102,6 +105,9 @@ void bushd_virtual_advance(bushd_virtual* v, int64_t now_ns);
 
 // A byte's stop bit ended at now_ns. Advances to that time first; lost on an MCU in reset.
 void bushd_virtual_receive(bushd_virtual* v, uint8_t byte, int64_t now_ns);
+
+// The inputs from the last time given on. An edge at the trigger's is captured.
+void bushd_virtual_set_inputs(bushd_virtual* v, bushd_inputs inputs);
 
 // Pulls the MCU's reset at now_ns: all pins fall, all memory is lost but what a watchdog reset
 // leaves. It boots again at boot_ns (>= now_ns).

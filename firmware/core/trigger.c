@@ -1,0 +1,116 @@
+// Table runs that an edge at the trigger input starts. With e the time of the edge as the port has
+// captured it, they begin at
+//
+//     e + BUSHD_TRIGGER_FIXED_TICKS ticks + delay
+//
+// wherever in a tick that is: the run's own time then begins there (bushd_run_begin_late). One tick
+// is being emitted and the next one is prepared when the edge is noticed; the third is the port's
+// time to notice it. Times are the bus's, so all MCUs that wait for one edge begin together.
+#include "firmware/core/internal.h"
+
+static bushd_status check_entry(const bushd_mcu* mcu, const bushd_table_run_entry* entry) {
+  if (entry->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
+  if (mcu->motor[entry->motor].table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
+  const bool forbidden =
+      (bushd_mcu_forbidden(mcu, entry->direction) & motor_bit(entry->motor)) != 0;
+  return forbidden ? BUSHD_E_FORBIDDEN : BUSHD_OK;
+}
+
+// The port knows nothing of inputs that are inverted.
+static bushd_edge edge_of_pin(const bushd_mcu* mcu, bushd_edge edge) {
+  if ((mcu->inputs.system_inverted & BUSHD_INPUT_TRIGGER) == 0) return edge;
+  return edge == BUSHD_EDGE_RISING ? BUSHD_EDGE_FALLING : BUSHD_EDGE_RISING;
+}
+
+// In the motor's own run: it is at rest, and nothing reads that. Nor its beginning and end: while
+// it waits they hold how long it takes and what it may begin late, for begin_late.
+static bool make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry) {
+  bushd_mcu_motor* motor = &mcu->motor[entry->motor];
+  bushd_run_start(&motor->run, &mcu->table[entry->slot].table, entry->steps, entry->direction);
+  return bushd_mcu_ticks_of_run(&motor->run, mcu->tick_ns, &motor->run_until, &motor->run_from);
+}
+
+bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
+  if (mcu->port.set_trigger == NULL) return BUSHD_E_UNKNOWN_MESSAGE;
+  if (message->edge == BUSHD_EDGE_NONE) {
+    if (mcu->trigger.armed != 0) bushd_mcu_disarm(mcu, BUSHD_TRIGGER_DISARMED);
+    return BUSHD_OK;
+  }
+  // Its acknowledgement was lost. The edge may have come since.
+  if (message->number == mcu->trigger.number) return BUSHD_OK;
+  bushd_mcu_update_state(mcu);
+  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
+  if (mcu->trigger.armed != 0) return BUSHD_E_STATE;
+  uint16_t mask = 0;
+  for (uint8_t i = 0; i < message->count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
+    const bushd_status status = check_entry(mcu, &entry);
+    if (status != BUSHD_OK) return status;
+    mask |= motor_bit(entry.motor);
+  }
+  if (bushd_mcu_moving(mcu) & mask) return BUSHD_E_STATE;
+  for (uint8_t i = 0; i < message->count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
+    if (!make_run(mcu, &entry)) return BUSHD_E_CAPACITY;
+  }
+  mcu->trigger.armed = mask;
+  mcu->trigger.number = message->number;
+  mcu->trigger.state = BUSHD_TRIGGER_ARMED;
+  mcu->trigger.delay_us = message->delay_us;
+  mcu->port.set_trigger(mcu->port.context, edge_of_pin(mcu, message->edge));
+  return BUSHD_OK;
+}
+
+void bushd_mcu_disarm(bushd_mcu* mcu, bushd_trigger_state why) {
+  mcu->trigger.armed = 0;
+  mcu->trigger.state = (uint8_t)why;
+  mcu->port.set_trigger(mcu->port.context, BUSHD_EDGE_NONE);
+}
+
+// A tick that is lengthened or shortened to follow the bus is as long as any other by the bus's
+// time.
+static int32_t bus_ns(const bushd_mcu* mcu, int32_t time_in_tick_ns) {
+  const int32_t longer_ns = mcu->clock.slew_now_ns + mcu->clock.rate_now_ns;
+  return time_in_tick_ns - (int32_t)((int64_t)time_in_tick_ns * longer_ns / (int32_t)mcu->tick_ns);
+}
+
+static bool is_forbidden(const bushd_mcu* mcu, uint16_t motors) {
+  const uint16_t positive = bushd_mcu_forbidden(mcu, 1) & motors;
+  const uint16_t negative = bushd_mcu_forbidden(mcu, -1) & motors;
+  for (uint8_t m = 0; (positive | negative) >> m != 0; ++m) {
+    const uint16_t barred = mcu->motor[m].run.direction > 0 ? positive : negative;
+    if (barred & motor_bit(m)) return true;
+  }
+  return false;
+}
+
+static void begin_late(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t ns) {
+  const uint32_t ticks = motor->run_until + (ns > motor->run_from);
+  bushd_run_begin_late(&motor->run, ns);
+  bushd_mcu_begin_run(motor, first_tick, ticks);
+}
+
+void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns) {
+  uint16_t armed = mcu->trigger.armed;
+  if (armed == 0) return;
+  if (mcu->faults != 0 || is_forbidden(mcu, armed)) {
+    bushd_mcu_disarm(mcu, mcu->faults != 0 ? BUSHD_TRIGGER_FAULT : BUSHD_TRIGGER_FORBIDDEN);
+    return;
+  }
+  const int32_t ns = bus_ns(mcu, time_in_tick_ns) +
+                     (int32_t)(BUSHD_TRIGGER_FIXED_TICKS * mcu->tick_ns) +
+                     (int32_t)(mcu->trigger.delay_us * 1000u);
+  const uint32_t after_ns = ns > 0 ? (uint32_t)ns : 0;
+  const uint32_t tick = mcu->tick + after_ns / mcu->tick_ns;
+  if (ticks_after(tick, FIRST_OPEN(mcu)) < 0) {
+    bushd_mcu_disarm(mcu, BUSHD_TRIGGER_LATE);
+    return;
+  }
+  bushd_mcu_disarm(mcu, BUSHD_TRIGGER_STARTED);
+  mcu->outlook.stale = true;
+  mcu->trigger.start_tick = tick;
+  mcu->trigger.start_ns = after_ns % mcu->tick_ns;
+  for (bushd_mcu_motor* motor = mcu->motor; armed != 0; ++motor, armed = (uint16_t)(armed >> 1)) {
+    if (armed & 1u) begin_late(motor, tick, mcu->trigger.start_ns);
+  }
+}

@@ -1,0 +1,38 @@
+; The trigger's edge and the reference pulse, by the registers that interrupts have to themselves (emission_slots.h):
+; slots wait for none of them longer than 25 cycles. None changes a flag of SREG.
+
+#include <avr/io.h>
+
+#include "firmware/ports/atmega2560/board.h"
+#include "firmware/ports/atmega2560/emission_slots.h"
+
+    .section .vectors, "ax", @progbits
+
+; Each edge once, with its time.
+    .global INT0_vect
+INT0_vect:
+    lds DATA_LOW, TCNT5L
+    lds DATA_HIGH, TCNT5H
+    sts trigger_count, DATA_LOW
+    sts trigger_count+1, DATA_HIGH
+    cbi _SFR_IO_ADDR(EIMSK), INT0
+    sbi _SFR_IO_ADDR(GPIOR0), TRIGGER_CAME
+    reti
+
+; Compare A of timer 4 begins the pulse, compare B ends it. Each goes off by itself, and leaves the other as it is
+; wanted: a compare comes again whenever the timer has gone round.
+    .global TIMER4_COMPA_vect
+TIMER4_COMPA_vect:
+    sbi _SFR_IO_ADDR(REFERENCE_PORT), REFERENCE_BIT
+    sts reference_rises, ZERO
+    lds DATA_LOW, reference_falls
+    sts TIMSK4, DATA_LOW
+    reti
+
+    .global TIMER4_COMPB_vect
+TIMER4_COMPB_vect:
+    cbi _SFR_IO_ADDR(REFERENCE_PORT), REFERENCE_BIT
+    sts reference_falls, ZERO
+    lds DATA_LOW, reference_rises
+    sts TIMSK4, DATA_LOW
+    reti

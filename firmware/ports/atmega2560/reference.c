@@ -1,0 +1,50 @@
+#include "firmware/ports/atmega2560/reference.h"
+
+#include <avr/io.h>
+#include <util/atomic.h>
+
+#include "firmware/ports/atmega2560/board.h"
+#include "firmware/ports/atmega2560/clock.h"
+
+#define COUNT_CYCLES 64u
+
+// Which compares are to stay on when the other one has come: its bit in TIMSK4, or 0.
+// edge_interrupts.S
+volatile uint8_t reference_rises;
+volatile uint8_t reference_falls;
+
+// A compare comes when the count ends that it names.
+static uint16_t compare_for(uint32_t time) {
+  return (uint16_t)((time + COUNT_CYCLES / 2u) / COUNT_CYCLES - 1u);
+}
+
+// Too near to be set: it would come when the timer has gone round.
+static bool is_due(uint32_t time) {
+  return clock_before(time, clock_now() + 3u * COUNT_CYCLES);
+}
+
+void reference_rise(uint32_t time) {
+  if (is_due(time)) {
+    REFERENCE_PORT |= 1 << REFERENCE_BIT;
+    return;
+  }
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    OCR4A = compare_for(time);
+    TIFR4 = 1 << OCF4A;
+    reference_rises = 1 << OCIE4A;
+    TIMSK4 |= 1 << OCIE4A;
+  }
+}
+
+void reference_fall(uint32_t time) {
+  if (is_due(time)) {
+    REFERENCE_PORT &= (uint8_t) ~(1 << REFERENCE_BIT);
+    return;
+  }
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    OCR4B = compare_for(time);
+    TIFR4 = 1 << OCF4B;
+    reference_falls = 1 << OCIE4B;
+    TIMSK4 |= 1 << OCIE4B;
+  }
+}
