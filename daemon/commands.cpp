@@ -16,7 +16,8 @@ namespace {
 constexpr std::int64_t kMaxPosition = INT32_MAX;
 
 bool is_move(std::int8_t kind) {
-  return kind == command_t::MOVE_RELATIVE || kind == command_t::MOVE_ABSOLUTE;
+  return kind == command_t::MOVE_RELATIVE || kind == command_t::MOVE_ABSOLUTE ||
+         kind == command_t::ARM;
 }
 
 bool is_table_change(std::int8_t kind) {
@@ -48,7 +49,9 @@ void Core::command(std::int64_t now_us, const command_t& command) {
     answer(client, reply_t::REFUSED, "refused", why);
     return;
   }
-  if (is_move(command.kind) && command.dry_run != 0) {
+  if (command.kind == command_t::ARM) {
+    arm(command);
+  } else if (is_move(command.kind) && command.dry_run != 0) {
     dry_run(now_us, command);
   } else if (is_move(command.kind)) {
     start_move(now_us, command);
@@ -68,7 +71,7 @@ std::optional<std::size_t> Core::find_motor(const std::string& name) const {
 std::string Core::refuse(const command_t& command) const {
   // Whatever else is wrong with the command: it is for all motors, and no time to be particular.
   if (command.kind == command_t::EMERGENCY_STOP) return {};
-  if (command.kind < command_t::MOVE_RELATIVE || command.kind > command_t::RELOAD_TABLES) {
+  if (command.kind < command_t::MOVE_RELATIVE || command.kind > command_t::REFERENCE) {
     return "there is no command kind " + std::to_string(command.kind);
   }
   if (is_table_change(command.kind)) return refuse_table_change(command);
@@ -79,13 +82,16 @@ std::string Core::refuse(const command_t& command) const {
       return "there is no motor \"" + name.substr(0, 64) + "\"; 'bushctl status' lists them";
     if (!seen.insert(name).second) return "motor " + name + " is named twice";
   }
-  const bool targets = is_move(command.kind) || command.kind == command_t::SET_POSITION;
+  const bool targets = is_move(command.kind) || command.kind == command_t::SET_POSITION ||
+                       command.kind == command_t::REFERENCE;
   if (targets && command.motors.empty()) return "no motor is named";
+  if (command.kind == command_t::REFERENCE) return refuse_reference(command);
   if (is_move(command.kind) && shutting_down_) return "the daemon is shutting down";
   if (stopping_all() && (is_move(command.kind) || command.kind == command_t::CLEAR_FAULTS)) {
     return "an emergency stop is under way; wait for its result";
   }
-  if (command.dry_run != 0 && !is_move(command.kind)) return "only moves can be run dry";
+  if (command.dry_run != 0 && (!is_move(command.kind) || command.kind == command_t::ARM))
+    return "only moves can be run dry";
   for (std::size_t i = 0; i < command.motors.size(); ++i) {
     const std::size_t index = *find_motor(command.motors[i]);
     const Motor& motor = motors_[index];
@@ -101,8 +107,7 @@ std::string Core::refuse(const command_t& command) const {
       if (!why.empty()) return motor.config->name + ": " + why;
     }
     if (command.kind == command_t::SET_POSITION) {
-      if (motor.axis.busy())
-        return motor.config->name + " moves; its position can be set at rest only";
+      if (motor.axis.busy()) return busy_text(motor) + "; its position can be set at rest only";
       if (being_set(index)) {
         return motor.config->name + ": its position is being set; wait for that result";
       }
@@ -111,7 +116,8 @@ std::string Core::refuse(const command_t& command) const {
       }
     }
   }
-  if (command.kind == command_t::STOP) return {};
+  if (command.kind == command_t::ARM) return refuse_arming(command);
+  if (command.kind == command_t::STOP || command.kind == command_t::DISARM) return {};
   for (const std::size_t m : mcus_of(motors_named(command))) {
     const link::McuView& view = view_of(mcus_[m]);
     if (view.phase != link::McuPhase::kOnline) {
@@ -121,17 +127,22 @@ std::string Core::refuse(const command_t& command) const {
         command.kind == command_t::DISABLE || command.kind == command_t::CLEAR_FAULTS;
     for (const int motor : mcus_[m].motor_of) {
       if (at_rest_only && motor >= 0 && motors_[static_cast<std::size_t>(motor)].axis.busy()) {
-        return motors_[static_cast<std::size_t>(motor)].config->name + " moves; stop it first";
+        return busy_text(motors_[static_cast<std::size_t>(motor)]) + "; stop it first";
       }
     }
   }
   return {};
 }
 
+std::string Core::busy_text(const Motor& motor) {
+  return motor.config->name + (motor.armed ? " waits for the trigger" : " moves");
+}
+
 std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64_t steps) const {
   const Motor& motor = motors_[index];
   const Mcu& mcu = mcus_[motor.mcu];
   const link::McuView& view = view_of(mcu);
+  if (motor.armed) return "waits for the trigger; disarm it first";
   // One that moves keeps its table.
   const TableChange* change = motor.axis.busy() ? nullptr : changing(motor.mcu);
   if (change != nullptr) {
@@ -248,26 +259,10 @@ void Core::take_over(std::size_t index, const Client& by) {
 void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start) {
   Motor& motor = motors_[index];
   const Mcu& mcu = mcus_[motor.mcu];
-  const config::Bus& bus = config_.buses[motor.bus];
   const std::int64_t steps = target - motor.position_steps;
-  motor.log_id = ++last_log_id_;
   motor.axis.start(motor.position_steps, steps, start);
   const bool whole = by_table(motor, steps);
-  const nlohmann::json line = {{"event", "move"},
-                               {"id", motor.log_id},
-                               {"motor", motor.config->name},
-                               {"bus", bus.name},
-                               {"address", mcu.config->address.value},
-                               {"output", motor.config->output.value},
-                               {"table_file", table_of(*motor.config).path()},
-                               {"table_sha256", table_of(*motor.config).content_hash()},
-                               {"tick_ns", bus.tick_ns()},
-                               {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
-                               {"moves", whole ? "table" : "stream"},
-                               {"start_tick", start},
-                               {"steps", steps},
-                               {"from_steps", motor.position_steps}};
-  outputs_.move_log(line.dump());
+  log_start(motor, steps, start, 0, whole);
   const std::uint8_t output = motor.config->output.value;
   if (steps == 0) {
     end_motor(index, motion::Outcome::kReached, "stands at its target already");
@@ -279,6 +274,28 @@ void Core::start_run(std::size_t index, std::int64_t target, motion::Tick start)
   changed_ = true;
 }
 
+void Core::log_start(Motor& motor, std::int64_t steps, motion::Tick start, std::uint32_t late_ns,
+                     bool by_table) {
+  const config::Bus& bus = config_.buses[motor.bus];
+  motor.log_id = ++last_log_id_;
+  nlohmann::json line = {{"event", "move"},
+                         {"id", motor.log_id},
+                         {"motor", motor.config->name},
+                         {"bus", bus.name},
+                         {"address", mcus_[motor.mcu].config->address.value},
+                         {"output", motor.config->output.value},
+                         {"table_file", table_of(*motor.config).path()},
+                         {"table_sha256", table_of(*motor.config).content_hash()},
+                         {"tick_ns", bus.tick_ns()},
+                         {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
+                         {"moves", by_table ? "table" : "stream"},
+                         {"start_tick", start},
+                         {"steps", steps},
+                         {"from_steps", motor.axis.from_steps()}};
+  if (late_ns != 0) line["late_ns"] = late_ns;
+  outputs_.move_log(line.dump());
+}
+
 bool Core::by_table(const Motor& motor, std::int64_t steps) const {
   const Mcu& mcu = mcus_[motor.mcu];
   return config_.buses[motor.bus].table_runs && master_of(mcu).can_run_tables(mcu.in_bus) &&
@@ -287,12 +304,19 @@ bool Core::by_table(const Motor& motor, std::int64_t steps) const {
 
 void Core::stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors) {
   std::vector<std::size_t> changed;
+  std::vector<std::size_t> armed;
   for (const std::size_t index : motors) {
     motion::Axis& axis = motors_[index].axis;
     if (!axis.busy()) continue;
+    if (motors_[index].armed) {
+      motors_[index].armed->stops = true;
+      armed.push_back(index);
+      continue;
+    }
     axis.stop();
     if (axis.needs_change()) changed.push_back(index);
   }
+  disarm(armed);
   change_motors(now_us, changed);
 }
 

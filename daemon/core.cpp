@@ -147,7 +147,7 @@ std::int64_t Core::rest_by_us(std::int64_t now_us) const {
   std::int64_t latest_us = now_us;
   for (const Motor& motor : motors_) {
     const link::Master& master = buses_[motor.bus]->master;
-    if (!motor.axis.busy() || !master.time_known()) continue;
+    if (!motor.axis.busy() || motor.armed || !master.time_known()) continue;
     const motion::Tick ticks = motor.axis.end_tick() - master.tick_at(now_us);
     latest_us = std::max(latest_us, now_us + ticks * config_.buses[motor.bus].tick_us);
   }

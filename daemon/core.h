@@ -104,6 +104,13 @@ class Core {
     std::string doubt = {};           // why the position is uncertain; empty: it is known
     bool wrong = false;               // counted otherwise than planned; it is being stopped
     int limit = 0;                    // +1, -1: its limit switch at this end stops it
+    // Waits for the trigger, or for the MCU to say that it does: the axis has no start yet.
+    struct Armed {
+      std::uint8_t number;  // of link::Master::arm
+      std::int64_t steps;
+      bool stops = false;  // as soon as it has started: that came before it was disarmed
+    };
+    std::optional<Armed> armed = {};
   };
   struct Mcu {
     const config::Mcu* config;
@@ -125,7 +132,7 @@ class Core {
   struct Pending {
     Client client;
     std::int8_t kind;
-    std::vector<std::size_t> motors;  // STOP: still moving; SET_POSITION: all
+    std::vector<std::size_t> motors;  // STOP: still moving; DISARM: still armed; SET_POSITION: all
     std::vector<std::int64_t> steps;  // SET_POSITION
     std::vector<std::size_t> mcus;    // whose report is awaited; EMERGENCY_STOP: that do not stand
     std::int64_t deadline_us;
@@ -173,6 +180,9 @@ class Core {
   void on_report(std::int64_t now_us, std::size_t mcu);
   void follow_motor(std::int64_t now_us, std::size_t motor, const Mcu& mcu,
                     const link::McuView& view);
+  // Of an armed motor. Returns whether the rest of the report is to be looked at: it has started,
+  // or a fault has put an end to it.
+  bool follow_armed(std::size_t motor, const Mcu& mcu, const link::McuView& view);
   void end_faulty_motor(std::size_t motor, const Mcu& mcu, const bushd_report& report);
   static std::string did_not_start(const Mcu& mcu);  // for the reason of a move's end
   // The MCU's motors do not ramp down in what it reports.
@@ -196,6 +206,7 @@ class Core {
 
   // commands.cpp
   std::string refuse(const command_t& command) const;  // "" when nothing speaks against it
+  static std::string busy_text(const Motor& motor);    // what it does
   std::string refuse_move(std::size_t motor, std::int64_t target, std::int64_t steps) const;
   bool being_set(std::size_t motor) const;     // a SET_POSITION has no result yet
   bool being_disabled(std::size_t mcu) const;  // a DISABLE is not yet confirmed by this MCU
@@ -207,12 +218,20 @@ class Core {
   std::int64_t target_of(const command_t& command, std::size_t i) const;
   void start_move(std::int64_t now_us, const command_t& command);
   void dry_run(std::int64_t now_us, const command_t& command);  // dry_run.cpp
+  // trigger.cpp
+  std::string refuse_arming(const command_t& command) const;
+  std::string refuse_reference(const command_t& command) const;
+  void arm(const command_t& command);
+  void disarm(const std::vector<std::size_t>& motors);
+  void set_reference(const command_t& command);
   move_plan_t plan_of(std::int64_t now_us, const command_t& command) const;
   bool by_table(const Motor& motor, std::int64_t steps) const;
   // A motor that moves is given to another move: what it was moving or stopping for has ended.
   void take_over(std::size_t motor, const Client& by);
   // From rest; the motor is part of a move.
   void start_run(std::size_t motor, std::int64_t target, motion::Tick start);
+  void log_start(Motor& motor, std::int64_t steps, motion::Tick start, std::uint32_t late_ns,
+                 bool by_table);
   void stop_motors(std::int64_t now_us, const std::vector<std::size_t>& motors);
   // Lets the MCUs know what is wanted of these motors now, in place of changes that they have not
   // taken.

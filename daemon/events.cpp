@@ -137,6 +137,7 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
   Motor& motor = motors_[index];
   const std::uint8_t output = motor.config->output.value;
   const bool moving = (view.report.moving >> output & 1) != 0;
+  if (motor.armed && !follow_armed(index, mcu, view)) return;
   if (view.report.faults != 0) {
     // The MCU takes no more ticks; what it has, it runs, and then down its own table.
     if (!moving) end_faulty_motor(index, mcu, view.report);
@@ -201,6 +202,9 @@ void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, const bushd_repor
               overran
                   ? "cut off by " + by + "; it may have overrun, so check the position and set it"
                   : "stopped by " + by);
+  } else if (motor.armed) {
+    end_motor(index, motion::Outcome::kLink,
+              "MCU " + mcu.config->id + " disarmed it by itself because " + stop_cause(report));
   } else if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) {
     motor.doubt = kUnpowered;
     end_motor(index, motion::Outcome::kFault,
@@ -236,7 +240,9 @@ void Core::end_motor(std::size_t index, motion::Outcome outcome, const std::stri
   motor.axis.finish();
   motor.wrong = false;
   motor.limit = 0;
-  log_result(motor, motion::outcome_word(outcome));
+  // The log of moves knows nothing of one that has not started.
+  if (!motor.armed) log_result(motor, motion::outcome_word(outcome));
+  motor.armed.reset();
   const bool planned = outcome == motion::Outcome::kReached || outcome == motion::Outcome::kStopped;
   if (!planned) outputs_.log(LogLevel::kWarning, motor.config->name + ": " + reason);
   end_part(index, outcome, reason);

@@ -25,6 +25,9 @@ void Core::start_pending(std::int64_t now_us, const command_t& command) {
   if (command.kind == command_t::STOP) {
     std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
     stop_motors(now_us, pending.motors);
+  } else if (command.kind == command_t::DISARM) {
+    std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].armed; });
+    disarm(pending.motors);
   } else if (command.kind == command_t::EMERGENCY_STOP) {
     emergency_stop(pending);
   } else {
@@ -39,6 +42,7 @@ void Core::start_pending(std::int64_t now_us, const command_t& command) {
         master_of(mcu).control(mcu.in_bus, BUSHD_CONTROL_CLEAR_FAULTS);
       }
     }
+    if (command.kind == command_t::REFERENCE) set_reference(command);
     if (command.kind == command_t::SET_POSITION) {
       for (std::size_t i = 0; i < pending.motors.size(); ++i) {
         const Motor& motor = motors_[pending.motors[i]];
@@ -119,6 +123,15 @@ void Core::check_pending(std::int64_t now_us, std::optional<std::size_t> reporte
     std::string failure;
     if (pending.kind == command_t::STOP) {
       std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
+    } else if (pending.kind == command_t::DISARM) {
+      std::erase_if(pending.motors, [this, &pending](std::size_t m) {
+        if (motors_[m].armed) return false;
+        if (motors_[m].axis.busy()) {
+          pending.done =
+              motors_[m].config->name + " moves: the trigger came before it was disarmed";
+        }
+        return true;
+      });
     } else if (pending.kind == command_t::EMERGENCY_STOP) {
       failure = follow_emergency_stop(pending, now_us);
     } else if (reported && !master_of(mcus_[*reported]).busy(mcus_[*reported].in_bus)) {
@@ -129,7 +142,7 @@ void Core::check_pending(std::int64_t now_us, std::optional<std::size_t> reporte
         pending.mcus.erase(found);
       }
     }
-    const bool stop = pending.kind == command_t::STOP;
+    const bool stop = pending.kind == command_t::STOP || pending.kind == command_t::DISARM;
     const bool done = stop ? pending.motors.empty() : pending.mcus.empty();
     // A motor that runs down a long table may take its time: the deadline is for MCUs that do not
     // answer.

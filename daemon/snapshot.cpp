@@ -61,8 +61,9 @@ state_t Core::state_of(const Mcu& mcu) const {
     entry.output = static_cast<std::int16_t>(output);
     entry.position_steps = motor.position_steps;
     entry.target_steps = motor.axis.busy() ? motor.axis.final_steps() : motor.position_steps;
-    entry.velocity_steps_per_s = motor.axis.velocity_steps_per_s();
-    entry.moving = motor.axis.busy();
+    entry.armed = motor.armed.has_value();
+    entry.moving = motor.axis.busy() && !entry.armed;
+    entry.velocity_steps_per_s = entry.moving ? motor.axis.velocity_steps_per_s() : 0.0;
     entry.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;
     entry.input = view.reported && (view.report.inputs >> output & 1) != 0;
     if (view.reported) entry.forbidden = forbidden_word(view.report, output);

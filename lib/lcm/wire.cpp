@@ -69,7 +69,7 @@ constexpr std::size_t kDouble = 8;
 constexpr std::size_t kMinText = 5;
 constexpr std::size_t kMinTableRef = 2 * kMinText + kInt32;
 constexpr std::size_t kMinMotorState =
-    4 * kMinText + kMinTableRef + kInt16 + 2 * kInt64 + kDouble + 3 * kInt8;
+    4 * kMinText + kMinTableRef + kInt16 + 2 * kInt64 + kDouble + 4 * kInt8;
 
 void scan_fields(Scan& scan, std::type_identity<table_ref_t>) {
   scan.text();         // name
@@ -78,13 +78,13 @@ void scan_fields(Scan& scan, std::type_identity<table_ref_t>) {
 }
 
 void scan_fields(Scan& scan, std::type_identity<command_t>) {
-  scan.fixed(kInt64);  // utime_us
-  scan.text();         // client_id
-  scan.fixed(kInt64);  // number
-  scan.fixed(kInt8);   // kind
-  scan.text();         // group
-  scan.text();         // table
-  scan.fixed(kInt8);   // dry_run
+  scan.fixed(kInt64);                  // utime_us
+  scan.text();                         // client_id
+  scan.fixed(kInt64);                  // number
+  scan.fixed(kInt8);                   // kind
+  scan.text();                         // group
+  scan.text();                         // table
+  scan.fixed(3 * kInt8 + 2 * kInt32);  // dry_run, edge, arrivals, delay_us, width_us
   const std::size_t motors = scan.count(kMinText + kInt64);
   for (std::size_t i = 0; i < motors; ++i) scan.text();
   scan.fixed(motors * kInt64);  // steps
@@ -165,7 +165,7 @@ void scan_fields(Scan& scan, std::type_identity<motor_state_t>) {
   scan.text();  // group
   scan_fields(scan, std::type_identity<table_ref_t>{});
   scan.fixed(kInt16 + 2 * kInt64 + kDouble);  // output, position, target, velocity
-  scan.fixed(3 * kInt8);                      // moving, enabled, input
+  scan.fixed(4 * kInt8);                      // moving, armed, enabled, input
   scan.text();                                // forbidden
   scan.text();                                // trust
 }

@@ -5,6 +5,7 @@
 #include "link/master.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "link/master_limits.h"
@@ -122,6 +123,51 @@ void Master::set_position(std::size_t mcu, std::uint8_t motor, std::int32_t posi
   const bushd_set_position message = {motor, position_steps};
   add_request(mcus_[mcu], BUSHD_MSG_SET_POSITION,
               [&](std::uint8_t* p) { return bushd_encode_set_position(&message, p); });
+}
+
+bool Master::can_trigger(std::size_t mcu) const {
+  return (mcus_[mcu].view.identity.capabilities & BUSHD_CAN_TRIGGER) != 0;
+}
+
+bool Master::has_reference(std::size_t mcu) const {
+  return (mcus_[mcu].view.identity.capabilities & BUSHD_CAN_REFERENCE) != 0;
+}
+
+std::uint8_t Master::arm(std::size_t index, bushd_edge edge, std::uint32_t delay_us,
+                         std::span<const Armed> moves) {
+  Mcu& mcu = mcus_[index];
+  std::vector<bushd_table_run_entry> entries;
+  for (const Armed& move : moves) {
+    entries.push_back(
+        {.motor = move.motor,
+         .slot = static_cast<std::uint8_t>(mcu.setup.table_of_motor[move.motor]),
+         .direction = static_cast<std::int8_t>(move.steps < 0 ? -1 : 1),
+         .steps = static_cast<std::uint32_t>(std::abs(static_cast<std::int64_t>(move.steps)))});
+  }
+  std::sort(entries.begin(), entries.end(),
+            [](const auto& a, const auto& b) { return a.motor < b.motor; });
+  // The MCU takes the number that it has for the same frame again.
+  const auto number = static_cast<std::uint8_t>(mcu.view.report.trigger_number % 255 + 1);
+  add_request(mcu, BUSHD_MSG_TRIGGER, [&](std::uint8_t* p) {
+    return bushd_encode_trigger(number, edge, delay_us, entries.data(),
+                                static_cast<std::uint8_t>(entries.size()), p);
+  });
+  return number;
+}
+
+void Master::add_disarm(Mcu& mcu) {
+  add_request(mcu, BUSHD_MSG_TRIGGER, [](std::uint8_t* p) {
+    return bushd_encode_trigger(0, BUSHD_EDGE_NONE, 0, nullptr, 0, p);
+  });
+}
+
+void Master::disarm(std::size_t mcu) {
+  add_disarm(mcus_[mcu]);
+}
+
+void Master::reference(std::size_t mcu, const bushd_reference& message) {
+  add_request(mcus_[mcu], BUSHD_MSG_REFERENCE,
+              [&](std::uint8_t* p) { return bushd_encode_reference(&message, p); });
 }
 
 void Master::emergency_stop(bushd_how how) {

@@ -148,6 +148,24 @@ class Master {
   // Nothing beyond `max_frames`: making them all takes as long as in the moves themselves.
   std::optional<Traffic> rehearse(std::int64_t now_us, TickSource& source,
                                   std::span<const Motion> motions, std::uint64_t max_frames) const;
+  // Moves of the MCU's motors, `steps` (either sign, not 0) each, that an edge at its trigger input
+  // starts. What becomes of them its reports tell, from when they have the number returned here.
+  // Preconditions: the MCU is online and can (can_trigger), the motors have tables and are at rest,
+  // no others wait (McuView::report.armed).
+  struct Armed {
+    std::uint8_t motor;
+    std::int32_t steps;
+  };
+  std::uint8_t arm(std::size_t mcu, bushd_edge edge, std::uint32_t delay_us,
+                   std::span<const Armed> moves);
+  // None of them waits any more; those that have been started go on.
+  void disarm(std::size_t mcu);
+  bool can_trigger(std::size_t mcu) const;
+  // The MCU has started one of them; from now on it is a table run like any other.
+  void follow_table_run(std::size_t mcu, std::uint8_t motor, Tick start, std::int32_t steps);
+  // When the MCU's reference output pulses from now on. Precondition: it has one.
+  void reference(std::size_t mcu, const bushd_reference& message);
+  bool has_reference(std::size_t mcu) const;
   // The source's answer for these motors has changed from `first` on.
   void replace(std::size_t mcu, std::uint16_t motors, Tick first);
   // Nothing more is sent for this motor.
@@ -167,7 +185,7 @@ class Master {
   void control(std::size_t mcu, std::uint8_t actions);
   void set_position(std::size_t mcu, std::uint8_t motor, std::int32_t position_steps);
 
-  // Requests made by the two calls above are not yet answered, or not yet seen in a report.
+  // Requests made by calls above are not yet answered, or not yet seen in a report.
   bool busy(std::size_t mcu) const { return !mcus_[mcu].script.empty() || mcus_[mcu].poll_now; }
 
   const McuHealth& health(std::size_t mcu) const { return mcus_[mcu].health; }
@@ -299,6 +317,7 @@ class Master {
   template <class Encode>
   static void add_request(Mcu& mcu, std::uint8_t type, Encode encode);
   static void add_control(Mcu& mcu, std::uint8_t actions);
+  static void add_disarm(Mcu& mcu);
   static void add_table(Mcu& mcu, std::uint8_t slot);
   void write_script(Mcu& mcu) const;
   void go_offline(std::size_t mcu, const std::string& cause, std::int64_t retry_due_us);

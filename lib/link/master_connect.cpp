@@ -167,6 +167,8 @@ void Master::write_script(Mcu& mcu) const {
                                      .format = setup_.format,
                                      .silence_ticks = static_cast<std::uint16_t>(
                                          std::min<Tick>(ticks_in(kSilenceUs), UINT16_MAX))};
+  // What a master before this one has armed nobody here knows of.
+  if (mcu.view.report.armed != 0) add_disarm(mcu);
   add_request(mcu, BUSHD_MSG_CONFIGURE,
               [&](std::uint8_t* p) { return bushd_encode_configure(&configure, p); });
   add_request(mcu, BUSHD_MSG_EMISSION, [&](std::uint8_t* p) {

@@ -38,6 +38,13 @@ void Master::begin_table_run(std::size_t mcu, std::uint8_t motor, Tick start, st
   mcus_[mcu].stream[motor].run_steps = steps;
 }
 
+void Master::follow_table_run(std::size_t mcu, std::uint8_t motor, Tick start, std::int32_t steps) {
+  begin_table_run(mcu, motor, start, steps);
+  Stream& stream = mcus_[mcu].stream[motor];
+  stream.next = stream.sent = source_.end_tick(mcu, motor);
+  stream.finished = true;
+}
+
 void Master::drop(std::size_t mcu, std::uint8_t motor) {
   Mcu& m = mcus_[mcu];
   Stream& stream = m.stream[motor];

@@ -20,9 +20,10 @@ double Axis::duration_ticks(std::int64_t steps) const {
   return std::ceil(ns / tick_ns_);
 }
 
-void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start) {
+void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns) {
   busy_ = true;
   start_ = start;
+  late_ns_ = late_ns;
   from_ = from_steps;
   wanted_ = from_steps + steps;
   stopping_ = false;
@@ -30,6 +31,7 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start) {
   change_.reset();
   const auto count = static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
   bushd_run_start(&base_.run, table_, count, steps < 0 ? -1 : 1);
+  bushd_run_begin_late(&base_.run, late_ns_);
   base_.tick = start;
   head_ = base_;
   plan_end();
@@ -86,6 +88,7 @@ void Axis::take_change(Place& place) const {
   if (change_->at <= start_) {
     const std::int64_t steps = change_->target_steps.value_or(from_) - from_;
     bushd_run_start(&run, table_, static_cast<std::uint32_t>(std::abs(steps)), steps < 0 ? -1 : 1);
+    bushd_run_begin_late(&run, late_ns_);
     return;
   }
   if (change_->target_steps) {
@@ -142,7 +145,7 @@ std::optional<Axis::Stretch> Axis::run_at(Tick first, unsigned max_ticks) {
   go_to(first);
   Place place = head_;
   take_change(place);
-  if (bushd_run_done(&place.run)) return std::nullopt;
+  if (bushd_run_done(&place.run) || bushd_run_begins_later(&place.run)) return std::nullopt;
   Tick until = std::min(first + max_ticks, end_of(place));
   if (change_ && effective() > first) until = std::min(until, effective());
   return Stretch{.run = place.run, .ticks = static_cast<unsigned>(until - first)};

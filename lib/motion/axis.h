@@ -37,9 +37,10 @@ class Axis {
   // ticks, years of the longest.
   static constexpr double kMaxDurationTicks = 1 << 30;
 
-  // From rest at `from_steps`, by `steps` (either sign), time 0 at the beginning of tick `start`.
-  // Precondition: !busy(), |steps| < 2^31, duration_ticks(steps) <= kMaxDurationTicks.
-  void start(std::int64_t from_steps, std::int64_t steps, Tick start);
+  // From rest at `from_steps`, by `steps` (either sign), time 0 at the beginning of tick `start`, or
+  // `late_ns` after it. Precondition: !busy(), |steps| < 2^31, duration_ticks(steps) <=
+  // kMaxDurationTicks, late_ns less than a tick.
+  void start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns = 0);
 
   // What is wanted of the motor from now on: rest, or another target. The plan follows with
   // change(). Precondition: busy().
@@ -63,8 +64,8 @@ class Axis {
   std::uint16_t render(Tick first, unsigned count, std::int16_t* out, std::size_t stride);
 
   // The run as it is at the beginning of tick `first`, and for how many ticks (1 .. max_ticks) it
-  // gives what render() would: up to the next change or the run's end. Nothing before the start and
-  // after the end. Preconditions as of render().
+  // gives what render() would: up to the next change or the run's end. Nothing before the start, in
+  // a start tick in whose middle it begins, and after the end. Preconditions as of render().
   struct Stretch {
     bushd_run run;
     unsigned ticks;
@@ -115,6 +116,7 @@ class Axis {
   bushd_format format_;
   bool busy_ = false;
   Tick start_ = 0;
+  std::uint32_t late_ns_ = 0;
   Tick end_ = 0;
   std::int64_t from_ = 0;
   std::int64_t target_ = 0;

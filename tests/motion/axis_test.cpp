@@ -100,6 +100,36 @@ TEST_P(AxisTest, AnySplitGivesTheTicksOfTheFormula) {
   }
 }
 
+TEST_P(AxisTest, MayBeginInTheMiddleOfItsStartTick) {
+  for (const std::uint32_t late_ns : {1u, 1'234'567u, kTickNs - 1}) {
+    for (const Tick stop_at : {0, 1, 2, 9, 1000}) {
+      auto reference = Reference::move(table.law(), 150);
+      reference.begin_late(late_ns);
+      axis.start(500, 150, 1000, late_ns);
+      EXPECT_EQ(axis.end_tick(), 1000 + ticks_until_rest(reference, kTickNs));
+      EXPECT_FALSE(axis.run_at(1000, 50)) << "no state that could be told";
+      EXPECT_TRUE(axis.run_at(1001, 50));
+      if (stop_at == 0) {
+        ramp_down(axis, 1000);
+        EXPECT_EQ(axis.end_tick(), 1000);
+        axis.finish();
+        continue;
+      }
+      if (stop_at < ticks_until_rest(reference, kTickNs)) {
+        reference.ramp_down_at(static_cast<std::uint64_t>(stop_at) * kTickNs);
+        ramp_down(axis, 1000 + stop_at);
+      }
+      EXPECT_EQ(axis.end_tick(), 1000 + ticks_until_rest(reference, kTickNs));
+      EXPECT_EQ(axis.target_steps(), 500 + static_cast<std::int64_t>(reference.steps()));
+      EXPECT_EQ(render(axis, 1000, 200), ticks_of(reference, 1, kTickNs, format, 200));
+      axis.executed(1003);
+      EXPECT_EQ(axis.executed_steps(),
+                500 + static_cast<std::int64_t>(reference.steps_at(3u * kTickNs)));
+      axis.finish();
+    }
+  }
+}
+
 TEST_P(AxisTest, EarlierTicksCanBeAskedForAgain) {
   const auto reference = Reference::move(table.law(), 150);
   const auto whole = ticks_of(reference, -1, kTickNs, format, 300);

@@ -31,8 +31,8 @@ int show_status(Client& client, std::chrono::milliseconds timeout, bool as_json)
 }
 
 int send(Client& client, const command_t& command, Client::Until until) {
-  const bool is_move =
-      command.kind == command_t::MOVE_RELATIVE || command.kind == command_t::MOVE_ABSOLUTE;
+  const bool is_move = command.kind == command_t::MOVE_RELATIVE ||
+                       command.kind == command_t::MOVE_ABSOLUTE || command.kind == command_t::ARM;
   bool accepted = false;
   const auto reply = client.run(command, until, [&](const reply_t& heard) {
     accepted = accepted || heard.phase == reply_t::ACCEPTED;

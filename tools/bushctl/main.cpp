@@ -38,6 +38,9 @@ struct Arguments {
   std::string group;
   std::string table;
   bool dry_run = false;
+  std::string edge = "rising";
+  std::int32_t delay_us = 0;
+  bushctl::Pulse pulse;
 };
 
 // Both before and after the subcommand.
@@ -158,6 +161,41 @@ int run(int argc, char** argv) {
   move->add_flag("--json", arguments.json, "With --dry-run: as JSON")->needs(dry_run);
   move->allow_extras();  // names and numbers, in their order: parse_move()
 
+  CLI::App* arm =
+      add_command(app, arguments, "arm", "Lets moves wait for the trigger of their MCU");
+  arm->footer(
+      "bushctl arm --delay-us US NAME STEPS [NAME STEPS...]\n"
+      "Motors at rest. Those of one MCU begin in the same slot, three ticks and the delay after "
+      "the "
+      "edge at its trigger input. With --wait the exit code is 0 only if every motor reached its "
+      "target.");
+  arm->add_option("--delay-us", arguments.delay_us, "From the edge on, beside the three ticks")
+      ->required()
+      ->check(CLI::Range(50, 1'500'000));
+  arm->add_option("--edge", arguments.edge, "Which edge")
+      ->check(CLI::IsMember({"rising", "falling"}))
+      ->capture_default_str();
+  arm->add_flag("--wait", arguments.wait, "Wait for the result");
+  arm->allow_extras();  // parse_arm()
+  CLI::App* disarm =
+      add_motors_command(app, arguments, "disarm", "Takes back moves that wait for the trigger");
+  disarm->footer("What waits for the same trigger is disarmed together.");
+  CLI::App* reference =
+      add_command(app, arguments, "reference", "A pulse when a motor arrives at a position");
+  reference->add_option("NAME", arguments.motor, "The motor; its MCU's reference output pulses")
+      ->required();
+  reference->add_option("POSITION", arguments.steps, "In steps, or off")->required();
+  reference->add_option("--delay-us", arguments.pulse.delay_us, "From the step to the pulse")
+      ->check(CLI::Range(0, 1'500'000))
+      ->capture_default_str();
+  reference->add_option("--width-us", arguments.pulse.width_us, "Of the pulse; at least a slot")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  reference
+      ->add_option("--direction", arguments.pulse.direction, "In which the motor arrives there")
+      ->check(CLI::IsMember({"both", "positive", "negative"}))
+      ->capture_default_str();
+
   CLI::App* stop = add_motors_command(app, arguments, "stop", "Ramps motors down");
   stop->add_flag("--wait", arguments.wait, "Wait until they stand");
   CLI::App* enable = add_motors_command(app, arguments, "enable", "Drivers of the motors' MCUs on");
@@ -277,6 +315,16 @@ int run(int argc, char** argv) {
   }
   if (move->parsed())
     return send(arguments, bushctl::parse_move(move->remaining()), arguments.wait);
+  if (arm->parsed()) {
+    return send(arguments, bushctl::parse_arm(arm->remaining(), arguments.edge, arguments.delay_us),
+                arguments.wait);
+  }
+  if (reference->parsed()) {
+    return send(arguments,
+                bushctl::parse_reference(arguments.motor, arguments.steps, arguments.pulse), true);
+  }
+  if (disarm->parsed())
+    return send(arguments, to_motors(command_t::DISARM, arguments.motors), true);
   if (stop->parsed()) {
     return send(arguments, to_motors(command_t::STOP, arguments.motors), arguments.wait);
   }

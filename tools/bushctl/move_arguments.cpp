@@ -69,6 +69,38 @@ Result<command_t> parse_move(const std::vector<std::string>& words) {
   return command;
 }
 
+Result<command_t> parse_arm(const std::vector<std::string>& words, const std::string& edge,
+                            std::int32_t delay_us) {
+  auto command = parse_move(words);
+  if (!command) return command;
+  if (command->kind != command_t::MOVE_RELATIVE) {
+    return fail("--to: what waits for the trigger is moved by steps; write NAME STEPS");
+  }
+  command->kind = command_t::ARM;
+  command->edge = edge == "falling" ? command_t::FALLING : command_t::RISING;
+  command->delay_us = delay_us;
+  return command;
+}
+
+Result<command_t> parse_reference(const std::string& motor, const std::string& where,
+                                  const Pulse& pulse) {
+  command_t command{};
+  command.kind = command_t::REFERENCE;
+  command.motors.push_back(motor);
+  command.steps.push_back(0);
+  if (where == "off") return command;
+  const auto position_steps = whole_number(where);
+  if (!position_steps) {
+    return fail(fmt::format("{}: \"{}\" is neither a whole number of steps nor off", motor, where));
+  }
+  command.steps.front() = *position_steps;
+  if (pulse.direction != "negative") command.arrivals |= command_t::POSITIVE;
+  if (pulse.direction != "positive") command.arrivals |= command_t::NEGATIVE;
+  command.delay_us = pulse.delay_us;
+  command.width_us = pulse.width_us;
+  return command;
+}
+
 Result<command_t> parse_set(const std::string& motor, const std::string& steps) {
   const auto position_steps = whole_number(steps);
   if (!position_steps) {

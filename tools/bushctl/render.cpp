@@ -24,6 +24,12 @@ std::string limit_text(const motor_state_t& motor) {
   return motor.forbidden.empty() ? "" : "limit " + bushd::printable(motor.forbidden);
 }
 
+// What it does, in a word for tables.
+const char* moving_word(const motor_state_t& motor, const char* moves, const char* rests) {
+  if (motor.armed != 0) return "armed";
+  return motor.moving != 0 ? moves : rests;
+}
+
 nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
   return {{"name", motor.name},
           {"mcu", mcu.mcu},
@@ -36,6 +42,7 @@ nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
           {"target_steps", motor.target_steps},
           {"velocity_steps_per_s", motor.velocity_steps_per_s},
           {"moving", motor.moving != 0},
+          {"armed", motor.armed != 0},
           {"enabled", motor.enabled != 0},
           {"input", motor.input != 0},
           {"forbidden", motor.forbidden},
@@ -62,9 +69,8 @@ std::vector<std::string> table(const Snapshot& snapshot) {
       motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
                   fmt::to_string(motor.output), bushd::printable(motor.group), text_of(motor.table),
                   fmt::to_string(motor.position_steps), fmt::to_string(motor.target_steps),
-                  fmt::format("{:.1f}", motor.velocity_steps_per_s),
-                  motor.moving != 0 ? "yes" : "-", bushd::printable(motor.trust),
-                  limit_text(motor)});
+                  fmt::format("{:.1f}", motor.velocity_steps_per_s), moving_word(motor, "yes", "-"),
+                  bushd::printable(motor.trust), limit_text(motor)});
     }
     mcus.row({bushd::printable(mcu.mcu), bushd::printable(mcu.mcu_state),
               fmt::to_string(mcu.boot_number), bushd::printable(mcu.detail)});
@@ -79,7 +85,7 @@ std::string motor_line(const motor_state_t& motor) {
   std::string line =
       fmt::format("{} position {} target {} velocity {:.1f} {}", bushd::printable(motor.name),
                   motor.position_steps, motor.target_steps, motor.velocity_steps_per_s,
-                  motor.moving != 0 ? "moving" : "at rest");
+                  moving_word(motor, "moving", "at rest"));
   if (motor.trust != "known") line += " " + bushd::printable(motor.trust);
   if (!motor.forbidden.empty()) line += " " + limit_text(motor);
   return line;

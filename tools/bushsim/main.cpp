@@ -37,6 +37,7 @@ int run(int argc, char** argv) {
   app.footer(
       "SIGUSR1 pulls the serial adapter out: the port and its name are gone, the MCUs live on and\n"
       "hear nothing. SIGUSR2 plugs it in again, under the next --link.\n"
+      "SIGRTMIN makes the trigger inputs of all MCUs active, the next one inactive again.\n"
       "SIGINT, SIGTERM and SIGHUP end it.\n"
       "Exit codes: 0 ended by a signal, 1 failed (reason on stderr), 2 wrong usage.");
   bushsim::Options options;

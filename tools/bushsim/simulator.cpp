@@ -139,7 +139,9 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
 Result<void> Simulator::watch() {
   sigset_t mask;
   sigemptyset(&mask);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2}) sigaddset(&mask, signal);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2, SIGRTMIN}) {
+    sigaddset(&mask, signal);
+  }
   if (::sigprocmask(SIG_BLOCK, &mask, nullptr) != 0) {
     return fail(system_error("signals cannot be blocked"));
   }
@@ -188,6 +190,12 @@ Result<void> Simulator::take_signal() {
   signalfd_siginfo info{};
   if (::read(signals_.get(), &info, sizeof info) != sizeof info) {
     return fail(system_error("a signal cannot be read"));
+  }
+  if (info.ssi_signo == static_cast<std::uint32_t>(SIGRTMIN)) {
+    triggered_ = !triggered_;
+    const std::uint8_t system = triggered_ ? BUSHD_INPUT_TRIGGER : 0;
+    for (std::size_t i = 0; i < bus_.mcu_count(); ++i) bus_.node(i).set_inputs({0, system});
+    return {};
   }
   switch (info.ssi_signo) {
     case SIGUSR1:

@@ -26,12 +26,13 @@ struct Options {
 
 class Simulator {
  public:
-  // Makes all that can fail: pty, link, trace, timers. Blocks SIGINT, SIGTERM, SIGHUP, SIGUSR1 and
-  // SIGUSR2: run() takes them.
+  // Makes all that can fail: pty, link, trace, timers. Blocks SIGINT, SIGTERM, SIGHUP, SIGUSR1,
+  // SIGUSR2 and SIGRTMIN: run() takes them.
   static bushd::Result<std::unique_ptr<Simulator>> create(const Options& options);
 
   // Until a signal ends it. SIGUSR1 takes the serial adapter away, SIGUSR2 plugs it in again; the
-  // MCUs live on. One thread, one epoll loop.
+  // MCUs live on. SIGRTMIN makes their trigger inputs active, or inactive if they are. One
+  // thread, one epoll loop.
   bushd::Result<void> run();
 
   // What was done, for people: a line per MCU and one for the line.
@@ -68,8 +69,9 @@ class Simulator {
   std::int64_t start_ns_ = 0;  // CLOCK_MONOTONIC at simulated time 0
   std::vector<std::uint8_t> replies_;
   std::uint64_t dropped_bytes_ = 0;
-  bool listening_ = true;  // to the pty
-  bool ended_ = false;     // by a signal
+  bool listening_ = true;   // to the pty
+  bool ended_ = false;      // by a signal
+  bool triggered_ = false;  // the trigger inputs are active
 };
 
 }  // namespace bushsim

@@ -1,8 +1,8 @@
 """The motion, computed anew from the table: every step's time, and the slot that an MCU makes it in.
 
 What a move is.  Delay before step j of N:  max(A(j-1), D(N-j), c), times the table's unit; the sum of the
-first j delays is the table's time of step j, counted from the beginning of the move's start tick. A stop at
-tick k lets the step that runs then go on and adds the fewest steps m with D(m) <= its delay: D(m-1) .. D(0).
+first j delays is the table's time of step j, counted from the beginning of the move's start tick, or from
+"late_ns" after it (a move that a trigger has started). A stop at tick k lets the step that runs then go on and adds the fewest steps m with D(m) <= its delay: D(m-1) .. D(0).
 
 What an MCU makes of it.  A step belongs to tick i if its time lies in (begin of i, end of i]. Position is
 linear between steps; q is the position at a tick's end, rounded down to 1/256 step (fine) or to a whole step
@@ -85,6 +85,7 @@ class Move:
         self.tick_ns = event["tick_ns"]
         self.fine = {"fine": True, "coarse": False}[event["format"]]
         self.start_tick = event["start_tick"]
+        self.late_ns = event.get("late_ns", 0)  # begins so long after the beginning of its start tick
         self.from_steps = event["from_steps"]
         self.table = table
         # From this tick on it is made of ticks.
@@ -96,7 +97,8 @@ class Move:
 
     def times_ns(self):
         """The table's times of the steps, from the beginning of the start tick."""
-        return list(accumulate(delay * self.table.unit_ns for delay in self.delays))
+        delays = (delay * self.table.unit_ns for delay in self.delays)
+        return list(accumulate(delays, initial=self.late_ns))[1:]
 
     def _go_to(self, goal_steps):
         steps = goal_steps - self.from_steps
@@ -142,7 +144,7 @@ class Move:
             after = bisect.bisect_right(times, end_ns, made)
             q1 = 256 * after
             if self.fine and after < len(times):
-                since_ns = end_ns - (times[after - 1] if after else 0)
+                since_ns = end_ns - (times[after - 1] if after else self.late_ns)
                 q1 += since_ns * 256 // (self.delays[after] * self.table.unit_ns)
             if after > made:
                 last = after == len(times)

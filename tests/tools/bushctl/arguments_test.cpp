@@ -48,6 +48,36 @@ TEST(MoveArguments, WhatIsMissingIsNamed) {
   EXPECT_THAT(parse_move({"--to", "5", "theta"}).error().text(), HasSubstr("motor's name"));
 }
 
+TEST(ArmArguments, ArePairsWithAnEdgeAndADelay) {
+  const auto command = parse_arm({"theta", "-400", "chi", "20"}, "falling", 1500);
+  ASSERT_TRUE(command);
+  EXPECT_EQ(command->kind, command_t::ARM);
+  EXPECT_THAT(command->motors, ElementsAre("theta", "chi"));
+  EXPECT_THAT(command->steps, ElementsAre(-400, 20));
+  EXPECT_EQ(command->edge, command_t::FALLING);
+  EXPECT_EQ(command->delay_us, 1500);
+  EXPECT_EQ(parse_arm({"theta", "1"}, "rising", 50)->edge, command_t::RISING);
+  EXPECT_THAT(parse_arm({"theta", "--to", "5"}, "rising", 50).error().text(),
+              HasSubstr("by steps"));
+  EXPECT_FALSE(parse_arm({}, "rising", 50));
+}
+
+TEST(ReferenceArguments, NameAMotorAndWhereItPulses) {
+  const auto command =
+      parse_reference("theta", "-7", {.direction = "negative", .delay_us = 30, .width_us = 4});
+  ASSERT_TRUE(command);
+  EXPECT_EQ(command->kind, command_t::REFERENCE);
+  EXPECT_THAT(command->motors, ElementsAre("theta"));
+  EXPECT_THAT(command->steps, ElementsAre(-7));
+  EXPECT_EQ(command->arrivals, command_t::NEGATIVE);
+  EXPECT_EQ(command->delay_us, 30);
+  EXPECT_EQ(command->width_us, 4);
+  EXPECT_EQ(parse_reference("theta", "5", {})->arrivals, 3);
+  EXPECT_EQ(parse_reference("theta", "5", {.direction = "positive"})->arrivals, 1);
+  EXPECT_EQ(parse_reference("theta", "off", {})->arrivals, 0);
+  EXPECT_FALSE(parse_reference("theta", "on", {}));
+}
+
 TEST(SetArguments, NameOneMotorAndItsPosition) {
   const auto command = parse_set("theta", "-7");
   ASSERT_TRUE(command);

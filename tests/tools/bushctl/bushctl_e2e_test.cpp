@@ -190,6 +190,23 @@ TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
   EXPECT_THAT(commands[0].client_id, HasSubstr("bushctl-"));
 }
 
+TEST(Bushctl, ArmedMovesNameTheirEdgeAndDelay) {
+  FakeDaemon daemon;
+  daemon.start(always("reached"));
+  const Ran ran = bushctl(
+      {"arm", "theta", "-400", "chi", "20", "--edge", "falling", "--delay-us", "75", "--wait"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  const auto commands = daemon.commands();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(commands[0].kind, command_t::ARM);
+  EXPECT_THAT(commands[0].motors, ElementsAre("theta", "chi"));
+  EXPECT_THAT(commands[0].steps, ElementsAre(-400, 20));
+  EXPECT_EQ(commands[0].edge, command_t::FALLING);
+  EXPECT_EQ(commands[0].delay_us, 75);
+  EXPECT_EQ(bushctl({"arm", "theta", "5"}).code, 2) << "no delay";
+  EXPECT_EQ(bushctl({"arm", "theta", "5", "--delay-us", "49"}).code, 2);
+}
+
 TEST(Bushctl, MoveToPositionsAndMotorsCalledLikeCommands) {
   FakeDaemon daemon;
   daemon.start(always("reached"));
@@ -278,8 +295,10 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   EXPECT_EQ(bushctl({"set", "theta", "-100"}).code, 0);
   EXPECT_EQ(bushctl({"clear"}).code, 0);
   EXPECT_EQ(bushctl({"estop"}).code, 0);
+  EXPECT_EQ(bushctl({"disarm", "theta"}).code, 0);
+  EXPECT_EQ(bushctl({"reference", "theta", "-5", "--width-us", "7"}).code, 0);
   const auto commands = daemon.commands();
-  ASSERT_EQ(commands.size(), 7u);
+  ASSERT_EQ(commands.size(), 9u);
   EXPECT_EQ(commands[0].kind, command_t::STOP);
   EXPECT_TRUE(commands[0].motors.empty());
   EXPECT_THAT(commands[1].motors, ElementsAre("theta"));
@@ -290,6 +309,10 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   EXPECT_THAT(commands[4].steps, ElementsAre(-100));
   EXPECT_EQ(commands[5].kind, command_t::CLEAR_FAULTS);
   EXPECT_EQ(commands[6].kind, command_t::EMERGENCY_STOP);
+  EXPECT_EQ(commands[7].kind, command_t::DISARM);
+  EXPECT_EQ(commands[8].kind, command_t::REFERENCE);
+  EXPECT_THAT(commands[8].steps, ElementsAre(-5));
+  EXPECT_EQ(commands[8].width_us, 7);
 }
 
 TEST(Bushctl, SetFailsWhenTheMcuDidNotTakeIt) {

@@ -103,7 +103,8 @@ class RightTraces(CheckTraceTest):
             for number in range(3):
                 stop = tick + chance.randint(-2, 60) if chance.random() < 0.5 else None
                 steps = chance.choice((-1, 1)) * chance.randint(1, 200)
-                scene.move("m", 1, 5, tick, steps, stop_tick=stop, move_id=number)
+                late_ns = chance.randrange(synthetic.TICK_NS) if chance.random() < 0.3 else 0
+                scene.move("m", 1, 5, tick, steps, stop_tick=stop, move_id=number, late_ns=late_ns)
                 tick += 200 * 300 * 60_000 // TICK_NS
             if scene.edges[1, 5]:
                 with self.subTest(seed=seed, round=round_number):

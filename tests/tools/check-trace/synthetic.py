@@ -73,9 +73,10 @@ def retargeted(table, delays, after_ns, target):
     return delays[:done] + [max(a, d) for a, d in zip(up, down)]
 
 
-def edges_of(table, delays, fine, ticks_from_ns):
-    """ns since time 0 of every edge of a move; before ticks_from_ns the table is run as it is."""
-    times = [0]
+def edges_of(table, delays, fine, ticks_from_ns, late_ns=0):
+    """ns since the start tick's beginning of every edge of a move, which begins late_ns after that; before ticks_from_ns the
+    table is run as it is."""
+    times = [late_ns]
     for delay in delays:
         times.append(times[-1] + delay * table["time_unit_ns"])
     ticks = -(-times[-1] // TICK_NS)
@@ -84,7 +85,7 @@ def edges_of(table, delays, fine, ticks_from_ns):
         whole = 0
         while whole < len(delays) and times[whole + 1] <= at_ns:
             whole += 1
-        if whole == len(delays) or not fine:
+        if whole == len(delays) or not fine or at_ns < late_ns:
             return Fraction(whole)
         part = Fraction(at_ns - times[whole], times[whole + 1] - times[whole])
         return whole + Fraction(int(part * 256), 256)
@@ -123,7 +124,7 @@ class Scene:
         self.en_low_ns = {}  # address: [(from, to)]
         self.raw = None  # the trace's changes in their order, if it is not to be made from the above
 
-    def move(self, motor, address, output, start_tick, steps, stop_tick=None, move_id=1):
+    def move(self, motor, address, output, start_tick, steps, stop_tick=None, move_id=1, late_ns=0):
         direction = 1 if steps >= 0 else -1
         start = self.steps.get(motor, 0)
         delays = delays_of(self.table, abs(steps))
@@ -132,12 +133,13 @@ class Scene:
             "event": "move", **event, "bus": "hall", "address": address, "output": output,
             "table_file": self.table_file, "table_sha256": sha256_of(self.table), "tick_ns": TICK_NS,
             "format": "fine" if self.fine else "coarse", "start_tick": start_tick, "steps": steps, "from_steps": start,
-            **({"moves": self.moves} if self.moves else {}),
+            **({"moves": self.moves} if self.moves else {}), **({"late_ns": late_ns} if late_ns else {}),
         })
         self.ticks_from_ns[motor] = math.inf if self.moves == "table" else 0
         result = "reached"
         if stop_tick is not None:
-            delays = stopped(self.table, delays, self._changed(motor, (stop_tick - start_tick) * TICK_NS))
+            after_ns = self._changed(motor, (stop_tick - start_tick) * TICK_NS)
+            delays = stopped(self.table, delays, after_ns if after_ns <= 0 else after_ns - late_ns)
             self.events.append({"event": "stop", **event, "tick": stop_tick})
             if len(delays) != abs(steps):
                 result = "stopped"
@@ -146,7 +148,7 @@ class Scene:
         self.delays[motor] = delays
         self.events.append({"event": "result", **event, "result": result, "position_steps": end})
         own = self.edges.setdefault((address, output), [])
-        own += self._edges(motor, delays, start_tick, direction)
+        own += self._edges(motor, delays, start_tick, direction, late_ns)
         return len(delays)
 
     def change(self, motor, event, tick, target=None):
@@ -177,8 +179,8 @@ class Scene:
         self.ticks_from_ns[motor] = min(self.ticks_from_ns[motor], after_ns)
         return after_ns
 
-    def _edges(self, motor, delays, start_tick, direction):
-        edges = edges_of(self.table, delays, self.fine, self.ticks_from_ns[motor])
+    def _edges(self, motor, delays, start_tick, direction, late_ns=0):
+        edges = edges_of(self.table, delays, self.fine, self.ticks_from_ns[motor], late_ns)
         return [[start_tick * TICK_NS + at, direction] for at in edges]
 
     def write_moves(self, path):

@@ -1,0 +1,369 @@
+// Moves that wait for the trigger, and the reference output, from the command to the pins.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "daemon/lab.h"
+#include "sim/shipped_motors.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::int64_t kTickNs = 2'560'000;
+
+// Rising edges of STEP and of the reference output.
+class Pins : public sim::EdgeSink {
+ public:
+  void edge(const sim::Edge& edge) override {
+    if (edge.signal == sim::Signal::kStep && edge.level) {
+      steps_[{edge.mcu, edge.index}].push_back(edge.time_ns);
+    }
+    if (edge.signal == sim::Signal::kReference) reference.push_back(edge);
+  }
+  void settled(sim::TimeNs) override {}
+
+  const std::vector<sim::TimeNs>& steps(std::size_t mcu, std::uint8_t output) {
+    return steps_[{mcu, output}];
+  }
+  std::vector<sim::Edge> reference;
+
+ private:
+  std::map<std::pair<std::size_t, std::uint8_t>, std::vector<sim::TimeNs>> steps_;
+};
+
+class Triggered : public testing::TestWithParam<const char*> {
+ protected:
+  Pins pins;
+  Lab lab{hall(2, 3, GetParam()), {}, &pins};
+
+  static command_t armed(const std::vector<std::string>& motors,
+                         const std::vector<std::int64_t>& steps, std::int32_t delay_us = 1000) {
+    command_t command{};
+    command.kind = command_t::ARM;
+    command.motors = motors;
+    command.steps = steps;
+    command.edge = command_t::RISING;
+    command.delay_us = delay_us;
+    return command;
+  }
+  std::int64_t arm(const std::vector<std::string>& motors, const std::vector<std::int64_t>& steps,
+                   std::int32_t delay_us = 1000) {
+    const auto number = lab.send(armed(motors, steps, delay_us));
+    EXPECT_TRUE(lab.run_until([&] { return lab.bus(0).mcu(0).core().trigger.armed != 0; }, 1));
+    lab.run_for(0.1);
+    return number;
+  }
+  // An edge now; returns when.
+  std::int64_t fire(std::size_t mcu = 0) {
+    const std::int64_t now_ns = lab.bus(0).now_ns();
+    lab.bus(0).mcu(mcu).set_inputs({});
+    lab.bus(0).mcu(mcu).set_inputs({0, BUSHD_INPUT_TRIGGER});
+    return now_ns;
+  }
+  // Does the n-th step lie in the slot where the table puts it?
+  void expect_table(const std::vector<sim::TimeNs>& steps, std::size_t count,
+                    std::int64_t begin_ns) {
+    ASSERT_EQ(steps.size(), count);
+    const bushd_table& table = lab_table().view();
+    std::int64_t at_ns = begin_ns;
+    for (std::uint32_t j = 0; j < count; ++j) {
+      const std::int64_t delay = std::max(
+          {bushd_table_accel(&table, j),
+           bushd_table_decel(&table, static_cast<std::uint32_t>(count) - 1 - j), table.cruise});
+      at_ns += delay * table.time_unit_ns;
+      // Its MCU keeps in step with the bus by a few us.
+      ASSERT_LE(steps[j], at_ns + 5'000) << j;
+      ASSERT_GE(steps[j], at_ns - kTickNs / 256 - 5'000) << j;
+    }
+  }
+  static const tables::Table& lab_table() {
+    static const auto table = tables::load(kShippedTables / "bushd2-constant.toml").value();
+    return *table;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Manners, Triggered,
+                         testing::Values("fine", "coarse", "fine_table", "coarse_ticks"));
+
+TEST_P(Triggered, MovesBeginThreeTicksAndTheirDelayAfterTheEdge) {
+  lab.connect();
+  for (const std::int64_t steps : {1, 40, -700}) {
+    const auto before = pins.steps(0, 0).size();
+    const auto from = lab.motor("m01").position_steps;
+    const auto move = arm({"m01", "m03"}, {steps, steps}, 12'345);
+    EXPECT_TRUE(lab.motor("m01").armed);
+    EXPECT_FALSE(lab.motor("m01").moving);
+    EXPECT_FALSE(lab.motor("m02").armed);
+    EXPECT_EQ(lab.state_of("hall:1").mcu_state, "READY");
+    EXPECT_EQ(lab.motor("m01").position_steps, from);
+    EXPECT_FALSE(lab.has_result(move));
+    const std::int64_t edge_ns = fire();
+    const reply_t result = lab.wait(move);
+    EXPECT_EQ(result.result, "reached") << result.reason;
+    EXPECT_EQ(lab.replies(move).size(), 2u);
+    EXPECT_EQ(lab.shaft_steps("m01"), from + steps);
+    EXPECT_EQ(lab.shaft_steps("m03"), from + steps);
+    EXPECT_FALSE(lab.motor("m01").armed);
+    const auto& all = pins.steps(0, 0);
+    expect_table({all.begin() + static_cast<std::ptrdiff_t>(before), all.end()},
+                 static_cast<std::size_t>(std::abs(steps)), edge_ns + 3 * kTickNs + 12'345'000);
+    EXPECT_EQ(pins.steps(0, 0), pins.steps(0, 2)) << "in the same slots";
+    const auto line = nlohmann::json::parse(*std::find_if(
+        lab.move_lines().rbegin(), lab.move_lines().rend(),
+        [](const std::string& text) { return text.find("\"event\":\"move\"") != text.npos; }));
+    EXPECT_EQ(line["moves"], "table");
+    EXPECT_EQ(line["from_steps"], from);
+    EXPECT_EQ(
+        (line["start_tick"].get<std::int64_t>() * kTickNs + line.value("late_ns", 0)) % kTickNs,
+        line.value("late_ns", 0));
+  }
+  EXPECT_EQ(lab.motor("m01").trust, "known");
+  EXPECT_TRUE(lab.errors().empty());
+}
+
+TEST_P(Triggered, EachMcuHasItsOwnTriggerAndTheMoveEndsWithTheLast) {
+  lab.connect();
+  const auto move = arm({"m01", "m04"}, {50, -60});
+  fire(0);
+  lab.run_for(2);
+  EXPECT_EQ(lab.shaft_steps("m01"), 50);
+  EXPECT_EQ(lab.shaft_steps("m04"), 0);
+  EXPECT_FALSE(lab.has_result(move));
+  EXPECT_TRUE(lab.motor("m04").armed);
+  fire(1);
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m04"), -60);
+}
+
+TEST_P(Triggered, DisarmedTheyEndAsStopped) {
+  lab.connect();
+  for (const std::int8_t kind : {command_t::DISARM, command_t::STOP}) {
+    const auto move = arm({"m01", "m02"}, {50, 60});
+    const auto disarm = lab.send(kind, {"m02"});
+    EXPECT_EQ(lab.wait(disarm).result, "done");
+    EXPECT_EQ(lab.last_reply(disarm).reason, "done");
+    EXPECT_EQ(lab.last_reply(move).result, "stopped");
+    EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("disarmed before the trigger came"));
+    fire();
+    lab.run_for(1);
+    EXPECT_EQ(lab.shaft_steps("m01"), 0);
+    EXPECT_FALSE(lab.motor("m01").armed);
+  }
+  EXPECT_EQ(lab.wait(lab.send(command_t::DISARM, {})).result, "done") << "nothing is armed";
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {30})).result, "reached");
+}
+
+TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
+  lab.connect();
+  auto move = arm({"m01"}, {3000});
+  fire();
+  const auto disarm = lab.send(command_t::DISARM, {"m01"});
+  EXPECT_EQ(lab.wait(disarm).result, "done");
+  EXPECT_THAT(lab.last_reply(disarm).reason, HasSubstr("the trigger came before"));
+  EXPECT_TRUE(lab.motor("m01").moving);
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  // A long delay: stopped before it has begun.
+  move = arm({"m01"}, {-3000}, 1'400'000);
+  fire();
+  EXPECT_EQ(lab.wait(lab.send(command_t::STOP, {})).result, "done");
+  EXPECT_EQ(lab.last_reply(move).result, "stopped");
+  EXPECT_EQ(lab.shaft_steps("m01"), 3000);
+  lab.run_for(1.6);
+  EXPECT_EQ(lab.shaft_steps("m01"), 3000);
+  // In flight.
+  move = arm({"m01"}, {-3000});
+  fire();
+  lab.run_for(0.8);
+  EXPECT_EQ(lab.wait(lab.send(command_t::STOP, {"m01"})).result, "done");
+  const reply_t result = lab.last_reply(move);
+  EXPECT_EQ(result.result, "stopped");
+  EXPECT_LT(result.position_steps.at(0), 3000);
+  EXPECT_GT(result.position_steps.at(0), 0);
+  EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
+}
+
+TEST_P(Triggered, AfterTheStartTheyTakeNewTargets) {
+  lab.connect();
+  for (const double later_s : {0.05, 0.3, 0.6}) {
+    const auto from = lab.shaft_steps("m01");
+    const auto move = arm({"m01"}, {2000}, 100'000);
+    fire();
+    lab.run_for(later_s);
+    const auto next = lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {from + 3333});
+    EXPECT_EQ(lab.wait(next).result, "reached") << lab.last_reply(next).reason;
+    EXPECT_EQ(lab.last_reply(move).result, "stopped");
+    EXPECT_EQ(lab.shaft_steps("m01"), from + 3333);
+  }
+  EXPECT_TRUE(lab.errors().empty());
+}
+
+TEST_P(Triggered, WhatWaitsIsRefusedOtherCommands) {
+  lab.connect();
+  const auto move = arm({"m01"}, {50});
+  for (const std::int8_t kind :
+       {command_t::MOVE_RELATIVE, command_t::MOVE_ABSOLUTE, command_t::SET_POSITION,
+        command_t::DISABLE, command_t::CLEAR_FAULTS, command_t::ARM}) {
+    command_t command = armed({"m01"}, {10});
+    command.kind = kind;
+    const reply_t reply = lab.last_reply(lab.send(command));
+    EXPECT_EQ(reply.result, "refused") << int{kind};
+    EXPECT_THAT(reply.reason, HasSubstr("waits for the trigger")) << int{kind};
+  }
+  EXPECT_THAT(lab.last_reply(lab.send(armed({"m02"}, {10}))).reason,
+              HasSubstr("m01 waits for the trigger of MCU hall:1 already"));
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {30})).result, "reached")
+      << "others move";
+  fire();
+  EXPECT_EQ(lab.wait(move).result, "reached");
+}
+
+TEST_P(Triggered, ArmingIsRefusedWithAReason) {
+  lab.connect();
+  const auto refusal = [this](const command_t& command) {
+    const reply_t reply = lab.last_reply(lab.send(command));
+    EXPECT_EQ(reply.phase, reply_t::REFUSED);
+    return reply.reason;
+  };
+  EXPECT_THAT(refusal(armed({}, {})), HasSubstr("no motor"));
+  EXPECT_THAT(refusal(armed({"m01"}, {0})), HasSubstr("no steps"));
+  EXPECT_THAT(refusal(armed({"m01"}, {5}, 49)), HasSubstr("50 to 1500000"));
+  EXPECT_THAT(refusal(armed({"m01"}, {5}, 1'500'001)), HasSubstr("50 to 1500000"));
+  command_t command = armed({"m01"}, {5});
+  command.edge = 3;
+  EXPECT_THAT(refusal(command), HasSubstr("RISING nor FALLING"));
+  command = armed({"m01"}, {5});
+  command.dry_run = 1;
+  EXPECT_THAT(refusal(command), HasSubstr("only moves can be run dry"));
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {500});
+  lab.run_for(0.3);
+  EXPECT_THAT(refusal(armed({"m01"}, {5})), HasSubstr("m01 moves"));
+  EXPECT_EQ(lab.wait(move).result, "reached");
+}
+
+TEST_P(Triggered, AnEmergencyStopEndsThem) {
+  lab.connect();
+  const auto move = arm({"m01"}, {50});
+  EXPECT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+  EXPECT_EQ(lab.last_reply(move).result, "stopped");
+  fire();
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+  const auto again = arm({"m01"}, {50});
+  fire();
+  EXPECT_EQ(lab.wait(again).result, "reached");
+}
+
+TEST_P(Triggered, LostFramesLeaveOneMoveAndOneResult) {
+  lab.connect();
+  int frames = 0;
+  for (int drop = 0; drop < 6; ++drop) {
+    const auto from = lab.shaft_steps("m01");
+    frames = 0;
+    lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return frames++ != drop; };
+    const auto move = arm({"m01"}, {50});
+    fire();
+    EXPECT_EQ(lab.wait(move).result, "reached") << "frame " << drop;
+    EXPECT_EQ(lab.shaft_steps("m01"), from + 50) << "frame " << drop;
+    lab.on_send = nullptr;
+  }
+}
+
+// It may be hours until it comes; what was armed before is nobody's any more.
+TEST_P(Triggered, ANewDaemonDisarms) {
+  lab.connect();
+  arm({"m01"}, {50});
+  lab.restart_daemon();
+  lab.connect();
+  fire();
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  const auto move = arm({"m01"}, {50});
+  fire();
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 50);
+}
+
+TEST_P(Triggered, WithoutADaemonNothingStarts) {
+  lab.connect();
+  const auto move = arm({"m01"}, {50});
+  lab.unplug(0);
+  EXPECT_EQ(lab.last_reply(move).result, "link");
+  lab.run_for(2);
+  fire();
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  lab.plug(0);
+  lab.connect();
+  const auto again = arm({"m01"}, {50});
+  fire();
+  EXPECT_EQ(lab.wait(again).result, "reached");
+}
+
+TEST_P(Triggered, ShutDownDisarms) {
+  lab.connect();
+  const auto move = arm({"m01"}, {50});
+  lab.core().shut_down(lab.now_us());
+  EXPECT_TRUE(lab.run_until([&] { return lab.core().at_rest(); }, 2));
+  EXPECT_EQ(lab.last_reply(move).result, "stopped");
+}
+
+TEST_P(Triggered, ReferencePulsesWhenTheMotorArrives) {
+  lab.connect();
+  command_t command{};
+  command.kind = command_t::REFERENCE;
+  command.motors = {"m02"};
+  command.steps = {300};
+  command.arrivals = command_t::POSITIVE;
+  command.delay_us = 20'000;
+  command.width_us = 500;
+  EXPECT_EQ(lab.wait(lab.send(command)).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {1000})).result, "reached");
+  lab.run_for(0.1);
+  ASSERT_EQ(pins.reference.size(), 2u);
+  const std::int64_t arrived_ns = pins.steps(0, 1).at(299);
+  EXPECT_NEAR(static_cast<double>(pins.reference[0].time_ns - arrived_ns), 20e6, 10'000);
+  EXPECT_NEAR(static_cast<double>(pins.reference[1].time_ns - pins.reference[0].time_ns), 500e3,
+              10'000);
+  EXPECT_TRUE(pins.reference[0].level);
+  EXPECT_FALSE(pins.reference[1].level);
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {-1000})).result, "reached");
+  EXPECT_EQ(pins.reference.size(), 2u) << "the other direction";
+  command.arrivals = 0;
+  EXPECT_EQ(lab.wait(lab.send(command)).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {1000})).result, "reached");
+  EXPECT_EQ(pins.reference.size(), 2u) << "switched off";
+}
+
+TEST_P(Triggered, ReferenceIsRefusedWithAReason) {
+  lab.connect();
+  command_t good{};
+  good.kind = command_t::REFERENCE;
+  good.motors = {"m02"};
+  good.steps = {300};
+  good.arrivals = 3;
+  good.width_us = 10;
+  const auto refusal = [this](command_t command, const auto& bend) {
+    bend(command);
+    const reply_t reply = lab.last_reply(lab.send(command));
+    EXPECT_EQ(reply.phase, reply_t::REFUSED);
+    return reply.reason;
+  };
+  EXPECT_THAT(refusal(good, [](command_t& c) { c.width_us = 0; }), HasSubstr("1 to 1000000"));
+  EXPECT_THAT(refusal(good, [](command_t& c) { c.delay_us = -1; }), HasSubstr("0 to 1500000"));
+  EXPECT_THAT(refusal(good, [](command_t& c) { c.arrivals = 4; }), HasSubstr("arrivals"));
+  EXPECT_THAT(refusal(good, [](command_t& c) { c.steps = {1ll << 40}; }), HasSubstr("lie within"));
+  EXPECT_THAT(refusal(good,
+                      [](command_t& c) {
+                        c.motors = {"m01", "m02"};
+                        c.steps = {1, 2};
+                      }),
+              HasSubstr("one motor"));
+  EXPECT_EQ(lab.wait(lab.send(good)).result, "done");
+}
+
+}  // namespace
+}  // namespace bushd::test

@@ -1,0 +1,58 @@
+"""Moves that a trigger starts, and the reference pulse, as a user has them."""
+
+import signal
+import unittest
+
+from rig import TABLE_RUNS, EndToEndTest
+
+
+class Trigger(EndToEndTest):
+    def start_armed(self, *arguments):
+        """bushctl arm --wait, until the motors wait for the trigger."""
+        names = arguments[::2]
+        armed = self.start_bushctl("arm", "--wait", "--delay-us", 700, *arguments)
+        self.wait_until("the motors to be armed", lambda: all(self.motors()[name]["armed"] for name in names))
+        return armed
+
+    def check_trigger(self, displacement_format="fine", bus_lines=()):
+        self.bring_up(displacement_format, bus_lines)
+        self.command("reference", "a1", 200, "--delay-us", 100)
+        first = self.start_armed("a0", 600, "a1", 400, "b1", -500)
+        self.assertFalse(self.motors()["a0"]["moving"])
+        self.bushsim.send(signal.SIGRTMIN)
+        self.assertEqual(first.process.wait(), 0, first.said())
+        self.assertEqual([self.positions()[name] for name in ("a0", "a1", "b1")], [600, 400, -500])
+
+        # Disarmed, it may come: nobody moves.
+        second = self.start_armed("a0", 600)
+        self.command("disarm", "a0")
+        self.assertEqual(second.process.wait(), 1)
+        self.assertIn("disarmed before the trigger came", second.said())
+        self.bushsim.send(signal.SIGRTMIN)
+        self.bushsim.send(signal.SIGRTMIN)
+
+        third = self.start_armed("a0", -600)
+        self.bushsim.send(signal.SIGRTMIN)
+        self.bushsim.send(signal.SIGRTMIN)
+        self.assertEqual(third.process.wait(), 0, third.said())
+        status = self.status()
+        self.assertEqual(self.positions()["a0"], 0)
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        self.assert_one_result_each()
+        self.assert_trace_is_right(status)
+        self.assertEqual(len(self.moves()), 8, "four moves and their results")
+        self.assertTrue(any("late_ns" in event for event in self.moves()))
+
+    def test_starts_moves_exactly_and_once(self):
+        self.check_trigger()
+
+    def test_starts_moves_exactly_and_once_in_coarse_ticks(self):
+        self.check_trigger("coarse")
+
+    def test_starts_moves_exactly_and_once_among_table_runs(self):
+        self.check_trigger(bus_lines=TABLE_RUNS)
+
+
+if __name__ == "__main__":
+    unittest.main()
