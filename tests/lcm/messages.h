@@ -40,6 +40,10 @@ inline void fill(Random& random, command_t& command) {
   command.group = text(random);
   command.table = text(random);
   command.dry_run = any<std::int8_t>(random);
+  command.edge = any<std::int8_t>(random);
+  command.arrivals = any<std::int8_t>(random);
+  command.delay_us = any<std::int32_t>(random);
+  command.width_us = any<std::int32_t>(random);
   for (std::size_t i = below(random, 5); i > 0; --i) {
     command.motors.push_back(text(random));
     command.steps.push_back(any<std::int64_t>(random));
@@ -173,6 +177,7 @@ inline void fill(Random& random, state_t& state) {
     motor.target_steps = any<std::int64_t>(random);
     motor.velocity_steps_per_s = static_cast<double>(any<std::int32_t>(random)) / 256;
     motor.moving = any<std::int8_t>(random);
+    motor.armed = any<std::int8_t>(random);
     motor.enabled = any<std::int8_t>(random);
     motor.input = any<std::int8_t>(random);
     motor.forbidden = text(random);
