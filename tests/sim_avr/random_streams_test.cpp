@@ -164,8 +164,10 @@ class AvrRandomStreams : public testing::Test {
   }
 
   void make_ready() {
-    // Tags of noise count as heard until there has been silence.
-    bus_.advance_to(bus_.now_ns() + 150'000'000);
+    // Tags of noise count as heard until there has been silence, and what it has asked for may be
+    // answered as late as a poll can say.
+    bus_.advance_to(bus_.now_ns() + TimeNs{UINT16_MAX} * BUSHD_REPLY_UNIT_NS);
+    master_.patience_ns = 5 * kPatienceNs;
     ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs,
                                    bushd_set_inputs{}),
               BUSHD_OK);
@@ -179,6 +181,7 @@ class AvrRandomStreams : public testing::Test {
     for (std::uint8_t m = 0; m < kMotorsInUse; ++m) {
       ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, m, 0));
     }
+    master_.patience_ns = kPatienceNs;
   }
 
   // All motors come to rest, by themselves or not.
