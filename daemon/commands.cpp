@@ -15,6 +15,8 @@ namespace {
 // MCUs count positions in 32 bits.
 constexpr std::int64_t kMaxPosition = INT32_MAX;
 
+constexpr std::int8_t kNoKind = 12;  // between HOME and ARM
+
 bool is_move(std::int8_t kind) {
   return kind == command_t::MOVE_RELATIVE || kind == command_t::MOVE_ABSOLUTE ||
          kind == command_t::ARM;
@@ -55,6 +57,8 @@ void Core::command(std::int64_t now_us, const command_t& command) {
     dry_run(now_us, command);
   } else if (is_move(command.kind)) {
     start_move(now_us, command);
+  } else if (command.kind == command_t::HOME) {
+    start_homing(command);
   } else if (is_table_change(command.kind)) {
     start_table_change(client, command.kind, command.group, command.table);
   } else {
@@ -71,7 +75,8 @@ std::optional<std::size_t> Core::find_motor(const std::string& name) const {
 std::string Core::refuse(const command_t& command) const {
   // Whatever else is wrong with the command: it is for all motors, and no time to be particular.
   if (command.kind == command_t::EMERGENCY_STOP) return {};
-  if (command.kind < command_t::MOVE_RELATIVE || command.kind > command_t::REFERENCE) {
+  if (command.kind < command_t::MOVE_RELATIVE || command.kind > command_t::REFERENCE ||
+      command.kind == kNoKind) {
     return "there is no command kind " + std::to_string(command.kind);
   }
   if (is_table_change(command.kind)) return refuse_table_change(command);
@@ -82,12 +87,14 @@ std::string Core::refuse(const command_t& command) const {
       return "there is no motor \"" + name.substr(0, 64) + "\"; 'bushctl status' lists them";
     if (!seen.insert(name).second) return "motor " + name + " is named twice";
   }
+  const bool homes = command.kind == command_t::HOME;
   const bool targets = is_move(command.kind) || command.kind == command_t::SET_POSITION ||
                        command.kind == command_t::REFERENCE;
-  if (targets && command.motors.empty()) return "no motor is named";
+  if ((targets || homes) && command.motors.empty()) return "no motor is named";
   if (command.kind == command_t::REFERENCE) return refuse_reference(command);
-  if (is_move(command.kind) && shutting_down_) return "the daemon is shutting down";
-  if (stopping_all() && (is_move(command.kind) || command.kind == command_t::CLEAR_FAULTS)) {
+  if ((is_move(command.kind) || homes) && shutting_down_) return "the daemon is shutting down";
+  if (stopping_all() &&
+      (is_move(command.kind) || homes || command.kind == command_t::CLEAR_FAULTS)) {
     return "an emergency stop is under way; wait for its result";
   }
   if (command.dry_run != 0 && (!is_move(command.kind) || command.kind == command_t::ARM))
@@ -106,8 +113,13 @@ std::string Core::refuse(const command_t& command) const {
       const std::string why = refuse_move(index, target, target - motor.position_steps);
       if (!why.empty()) return motor.config->name + ": " + why;
     }
+    if (homes) {
+      if (const std::string why = refuse_homing(index); !why.empty()) {
+        return motor.config->name + ": " + why;
+      }
+    }
     if (command.kind == command_t::SET_POSITION) {
-      if (motor.axis.busy()) return busy_text(motor) + "; its position can be set at rest only";
+      if (is_moving(index)) return busy_text(motor) + "; its position can be set at rest only";
       if (being_set(index)) {
         return motor.config->name + ": its position is being set; wait for that result";
       }
@@ -126,7 +138,7 @@ std::string Core::refuse(const command_t& command) const {
     const bool at_rest_only =
         command.kind == command_t::DISABLE || command.kind == command_t::CLEAR_FAULTS;
     for (const int motor : mcus_[m].motor_of) {
-      if (at_rest_only && motor >= 0 && motors_[static_cast<std::size_t>(motor)].axis.busy()) {
+      if (at_rest_only && motor >= 0 && is_moving(static_cast<std::size_t>(motor))) {
         return busy_text(motors_[static_cast<std::size_t>(motor)]) + "; stop it first";
       }
     }
@@ -138,7 +150,7 @@ std::string Core::busy_text(const Motor& motor) {
   return motor.config->name + (motor.armed ? " waits for the trigger" : " moves");
 }
 
-std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64_t steps) const {
+std::string Core::refuse_motion(std::size_t index) const {
   const Motor& motor = motors_[index];
   const Mcu& mcu = mcus_[motor.mcu];
   const link::McuView& view = view_of(mcu);
@@ -157,10 +169,6 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
     return "the drivers of MCU " + mcu.config->id + " are disabled; enable them first";
   }
-  if (!motor.doubt.empty()) {
-    return "its position is uncertain, because " + motor.doubt +
-           "; find out where it stands and say 'bushctl set NAME STEPS'";
-  }
   if (buses_[motor.bus]->two_masters) {
     return "another master talks on bus " + config_.buses[motor.bus].name +
            ": end it, or take it off the line";
@@ -169,6 +177,20 @@ std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64
   if (being_set(index)) return "its position is being set; wait for that result";
   if (being_disabled(motor.mcu)) {
     return "the drivers of MCU " + mcu.config->id + " are being disabled; enable them first";
+  }
+  if (is_homing(index)) return "it is being homed; wait for that result";
+  if (is_moved_locally(index)) return "the local inputs of MCU " + mcu.config->id + " move it";
+  return {};
+}
+
+std::string Core::refuse_move(std::size_t index, std::int64_t target, std::int64_t steps) const {
+  const Motor& motor = motors_[index];
+  if (const std::string why = refuse_motion(index); !why.empty()) return why;
+  if (!motor.doubt.empty()) {
+    return "its position is uncertain, because " + motor.doubt + "; " +
+           (motor.config->home ? "say 'bushctl home NAME', or find out where it stands and say "
+                                 "'bushctl set NAME STEPS'"
+                               : "find out where it stands and say 'bushctl set NAME STEPS'");
   }
   if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
     return "target " + std::to_string(target) + " is beyond +-" + std::to_string(kMaxPosition) +
@@ -306,6 +328,7 @@ void Core::stop_motors(std::int64_t now_us, const std::vector<std::size_t>& moto
   std::vector<std::size_t> changed;
   std::vector<std::size_t> armed;
   for (const std::size_t index : motors) {
+    stop_homing(index);
     motion::Axis& axis = motors_[index].axis;
     if (!axis.busy()) continue;
     if (motors_[index].armed) {

@@ -154,6 +154,11 @@ std::int64_t Core::rest_by_us(std::int64_t now_us) const {
   return latest_us;
 }
 
+bool Core::at_rest() const {
+  return book_.empty() && std::all_of(mcus_.begin(), mcus_.end(),
+                                      [](const Mcu& mcu) { return mcu.homings.empty(); });
+}
+
 void Core::shut_down(std::int64_t now_us) {
   shutting_down_ = true;
   std::vector<std::size_t> all(motors_.size());

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <list>
 #include <memory>
 #include <optional>
@@ -88,7 +89,7 @@ class Core {
   // Ramps down all motors and takes no more moves.
   void shut_down(std::int64_t now_us);
   // No motor moves by this core's doing.
-  bool at_rest() const { return book_.empty(); }
+  bool at_rest() const;
   // When all that moves now will have come to rest, as planned.
   std::int64_t rest_by_us(std::int64_t now_us) const;
 
@@ -112,6 +113,10 @@ class Core {
     };
     std::optional<Armed> armed = {};
   };
+  struct Homing {
+    std::size_t motor;
+    bool asked = false;  // its MCU has been
+  };
   struct Mcu {
     const config::Mcu* config;
     std::size_t bus;
@@ -119,6 +124,8 @@ class Core {
     std::array<int, BUSHD_MOTORS_PER_MCU> motor_of{};  // by output; -1: none
     std::optional<std::uint16_t> boot_number;          // of the boot that positions belong to
     bool clearing = false;                             // faults are being cleared
+    std::uint16_t autonomous = 0;                      // as reported last
+    std::deque<Homing> homings = {};                   // under way, and those that wait
   };
   struct Client {
     std::string id;
@@ -198,6 +205,7 @@ class Core {
   static table_ref_t ref_to(const tables::Table& table);
   void log_change(const Motor& motor, const motion::Change& change);
   void log_result(const Motor& motor, const std::string& result);
+  void log_set(const Motor& motor);
 
   // limits.cpp
   std::string refuse_direction(const Motor& motor, std::int64_t steps) const;
@@ -208,6 +216,8 @@ class Core {
   std::string refuse(const command_t& command) const;  // "" when nothing speaks against it
   static std::string busy_text(const Motor& motor);    // what it does
   std::string refuse_move(std::size_t motor, std::int64_t target, std::int64_t steps) const;
+  // Against any motion of this motor, as far as it is at rest.
+  std::string refuse_motion(std::size_t motor) const;
   bool being_set(std::size_t motor) const;     // a SET_POSITION has no result yet
   bool being_disabled(std::size_t mcu) const;  // a DISABLE is not yet confirmed by this MCU
   std::optional<std::size_t> find_motor(const std::string& name) const;
@@ -247,6 +257,25 @@ class Core {
   void answer(const Client& client, std::int8_t phase, const std::string& result,
               const std::string& reason, reply_t reply = {});
 
+  // homing.cpp
+  bool is_homing(std::size_t motor) const;            // or waits for it
+  bool is_moved_locally(std::size_t motor) const;     // by the inputs at its MCU
+  bool is_moving(std::size_t motor) const;            // by whatever
+  bushd_home home_command(const Motor& motor) const;  // precondition: it has a home
+  std::string refuse_homing(std::size_t motor) const;
+  void start_homing(const command_t& command);
+  void queue_homing(std::size_t motor);
+  void begin_homing(Mcu& mcu);
+  void follow_homing(Mcu& mcu);
+  void refuse_home(Mcu& mcu, std::uint8_t status);
+  void stop_homing(std::size_t motor);
+  // It ends if its MCU has not been asked yet; returns whether it did.
+  bool forget_waiting_homing(std::size_t motor);
+  void home_at_start(Mcu& mcu);
+  void end_homing(Mcu& mcu, motion::Outcome outcome, const std::string& reason);
+  // All of them, without a word to the MCU.
+  void end_homings(Mcu& mcu, motion::Outcome outcome, const std::string& reason);
+
   // tables.cpp
   std::string refuse_table_change(const command_t& command) const;
   void start_table_change(const Client& client, std::int8_t kind, const std::string& group,
@@ -275,6 +304,7 @@ class Core {
   // snapshot.cpp
   void publish();
   state_t state_of(const Mcu& mcu) const;
+  const char* activity_of(std::size_t motor) const;
 
   // health.cpp
   void watch_for_other_masters(std::int64_t now_us);

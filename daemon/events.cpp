@@ -46,6 +46,9 @@ void Core::handle_events(std::int64_t now_us, std::size_t bus) {
       case link::Event::Kind::kReport:
         on_report(now_us, mcu);
         break;
+      case link::Event::Kind::kRefused:
+        if (event.type == BUSHD_MSG_HOME) refuse_home(mcus_[mcu], event.status);
+        break;
       case link::Event::Kind::kLateStart: {
         const int motor = mcus_[mcu].motor_of[event.motor];
         const bool ran_down = view_of(mcus_[mcu]).report.faults != 0;  // says the report
@@ -102,8 +105,9 @@ void Core::on_online(std::size_t index) {
                "MCU " + mcu.config->id + " is ready, boot number " +
                    std::to_string(view.report.boot_number) +
                    (restarted ? "; it restarted" + by_cause(view.report.reset_cause) +
-                                    ", so its motors' positions are uncertain: set them"
+                                    ", so its motors' positions are uncertain: set or home them"
                               : ""));
+  home_at_start(mcu);
   changed_ = true;
 }
 
@@ -116,6 +120,7 @@ void Core::on_offline(std::size_t index) {
     end_motor(static_cast<std::size_t>(motor), motion::Outcome::kLink,
               cause + "; the position is the last one reported");
   }
+  end_homings(mcus_[index], motion::Outcome::kLink, cause + "; it was being homed");
   changed_ = true;
 }
 
@@ -128,6 +133,18 @@ void Core::on_report(std::int64_t now_us, std::size_t index) {
     motors_[motor].position_steps = view.report.motor[output].position_steps;
     if (motors_[motor].axis.busy()) follow_motor(now_us, motor, mcu, view);
   }
+  // No move has led to where these stand.
+  const unsigned ended = mcu.autonomous & ~unsigned{view.report.autonomous};
+  mcu.autonomous = view.report.autonomous;
+  for (unsigned output = 0; output < view.report.motor_count; ++output) {
+    const int motor = mcu.motor_of[output];
+    if ((ended >> output & 1) == 0 || motor < 0) continue;
+    Motor& alone = motors_[static_cast<std::size_t>(motor)];
+    if (cuts(mcu, view.report)) alone.doubt = kCutOff;
+    if (view.report.faults & BUSHD_FAULT_OVERCURRENT) alone.doubt = kUnpowered;
+    log_set(alone);
+  }
+  follow_homing(mcu);
   clear_link_fault(mcu);
   check_pending(now_us, index);
 }
@@ -138,6 +155,12 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
   const std::uint8_t output = motor.config->output.value;
   const bool moving = (view.report.moving >> output & 1) != 0;
   if (motor.armed && !follow_armed(index, mcu, view)) return;
+  if ((view.report.autonomous >> output & 1) != 0) {
+    // So it had no ticks of the move, and takes none.
+    end_motor(index, motion::Outcome::kStopped,
+              "the local inputs of MCU " + mcu.config->id + " moved it before it could start");
+    return;
+  }
   if (view.report.faults != 0) {
     // The MCU takes no more ticks; what it has, it runs, and then down its own table.
     if (!moving) end_faulty_motor(index, mcu, view.report);
@@ -263,6 +286,12 @@ void Core::log_result(const Motor& motor, const std::string& result) {
                                {"motor", motor.config->name},
                                {"result", result},
                                {"position_steps", motor.position_steps}};
+  outputs_.move_log(line.dump());
+}
+
+void Core::log_set(const Motor& motor) {
+  const nlohmann::json line = {
+      {"event", "set"}, {"motor", motor.config->name}, {"position_steps", motor.position_steps}};
   outputs_.move_log(line.dump());
 }
 

@@ -1,7 +1,6 @@
 // Commands that are neither answered at once nor moves: they wait until MCUs report what was asked
 // for.
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "daemon/bus.h"
 #include "daemon/core.h"
@@ -23,7 +22,8 @@ void Core::start_pending(std::int64_t now_us, const command_t& command) {
                   .deadline_us = now_us + kPendingUs};
   answer(pending.client, reply_t::ACCEPTED, "", "accepted");
   if (command.kind == command_t::STOP) {
-    std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
+    std::erase_if(pending.motors,
+                  [this](std::size_t m) { return !motors_[m].axis.busy() && !is_homing(m); });
     stop_motors(now_us, pending.motors);
   } else if (command.kind == command_t::DISARM) {
     std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].armed; });
@@ -60,6 +60,7 @@ void Core::emergency_stop(Pending& pending) {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     buses_[b]->master.emergency_stop(config_.buses[b].emergency_stop);
   }
+  for (std::size_t motor = 0; motor < motors_.size(); ++motor) forget_waiting_homing(motor);
   pending.motors.clear();
   std::string unknown;
   for (std::size_t m = 0; m < mcus_.size(); ++m) {
@@ -122,7 +123,8 @@ void Core::check_pending(std::int64_t now_us, std::optional<std::size_t> reporte
     Pending& pending = *it;
     std::string failure;
     if (pending.kind == command_t::STOP) {
-      std::erase_if(pending.motors, [this](std::size_t m) { return !motors_[m].axis.busy(); });
+      std::erase_if(pending.motors,
+                    [this](std::size_t m) { return !motors_[m].axis.busy() && !is_homing(m); });
     } else if (pending.kind == command_t::DISARM) {
       std::erase_if(pending.motors, [this, &pending](std::size_t m) {
         if (motors_[m].armed) return false;
@@ -165,9 +167,7 @@ void Core::finish_pending(const Pending& pending, const std::string& failure) {
     for (std::size_t i = 0; i < pending.motors.size(); ++i) {
       Motor& motor = motors_[pending.motors[i]];
       motor.doubt.clear();
-      const nlohmann::json line = {
-          {"event", "set"}, {"motor", motor.config->name}, {"position_steps", pending.steps[i]}};
-      outputs_.move_log(line.dump());
+      log_set(motor);
     }
   }
   changed_ = true;

@@ -39,6 +39,12 @@ table_ref_t Core::ref_to(const tables::Table& table) {
   return ref;
 }
 
+const char* Core::activity_of(std::size_t motor) const {
+  if (motors_[motor].axis.busy()) return "move";
+  if (is_homing(motor)) return "home";
+  return is_moved_locally(motor) ? "local" : "rest";
+}
+
 state_t Core::state_of(const Mcu& mcu) const {
   const link::McuView& view = view_of(mcu);
   state_t state;
@@ -53,7 +59,8 @@ state_t Core::state_of(const Mcu& mcu) const {
   state.rejected_commands = static_cast<std::int64_t>(rejected_commands_);
   for (unsigned output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
     if (mcu.motor_of[output] < 0) continue;
-    const Motor& motor = motors_[static_cast<std::size_t>(mcu.motor_of[output])];
+    const auto index = static_cast<std::size_t>(mcu.motor_of[output]);
+    const Motor& motor = motors_[index];
     motor_state_t entry;
     entry.name = motor.config->name;
     entry.group = config_.group_of(*motor.config).name;
@@ -62,7 +69,8 @@ state_t Core::state_of(const Mcu& mcu) const {
     entry.position_steps = motor.position_steps;
     entry.target_steps = motor.axis.busy() ? motor.axis.final_steps() : motor.position_steps;
     entry.armed = motor.armed.has_value();
-    entry.moving = motor.axis.busy() && !entry.armed;
+    entry.moving = is_moving(index) && !entry.armed;
+    entry.activity = entry.armed ? "rest" : activity_of(index);
     entry.velocity_steps_per_s = entry.moving ? motor.axis.velocity_steps_per_s() : 0.0;
     entry.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;
     entry.input = view.reported && (view.report.inputs >> output & 1) != 0;

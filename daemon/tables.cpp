@@ -169,7 +169,9 @@ link::McuSetup Core::setup_of(const Mcu& mcu, const std::vector<InService>& serv
   for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
     const int motor = mcu.motor_of[output];
     if (motor < 0) continue;
-    const config::GroupIndex group = config_.motors[static_cast<std::size_t>(motor)].group;
+    const config::Motor& config = config_.motors[static_cast<std::size_t>(motor)];
+    if (config.local) setup.local_motors |= static_cast<std::uint16_t>(1u << output);
+    const config::GroupIndex group = config.group;
     const tables::Table& table = *service[group.value].table;
     const auto found =
         std::find_if(setup.tables.begin(), setup.tables.end(),
@@ -238,7 +240,7 @@ bool Core::ready_for_change(const TableChange& change) const {
     const link::McuView& view = view_of(mcu);
     if (view.phase == link::McuPhase::kConnecting) return false;
     for (const int motor : mcu.motor_of) {
-      if (motor >= 0 && motors_[static_cast<std::size_t>(motor)].axis.busy()) return false;
+      if (motor >= 0 && is_moving(static_cast<std::size_t>(motor))) return false;
     }
     if (view.phase == link::McuPhase::kOffline) return true;
     return view.report.moving == 0 && !master_of(mcu).busy(mcu.in_bus);

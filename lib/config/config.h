@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -84,6 +85,16 @@ struct Group {
   tables::TablePtr table;  // never null; groups with the same table share it
 };
 
+// Where a motor's switch is, and how it is looked for.
+struct Home {
+  bool positive = false;            // the direction towards the switch
+  std::int32_t position_steps = 0;  // at the switch
+  std::uint32_t most_steps = 0;     // to it
+  std::uint32_t slow_steps_per_s = 100;
+  std::optional<std::uint32_t> slow_most_steps = {};
+  bool at_start = false;  // whenever its MCU comes and has not homed it
+};
+
 struct Motor {
   std::string name;
   McuIndex mcu;
@@ -94,6 +105,8 @@ struct Motor {
   bool limit_negative = false;
   bushd_how limit_action = BUSHD_RAMP_DOWN;
   bool input_active_open = false;
+  std::optional<Home> home = {};
+  bool local = false;  // its MCU's FORWARD and REVERSE inputs move it
 };
 
 struct Config {

@@ -11,6 +11,7 @@
 
 #include "config/checks.h"
 #include "config/emission_section.h"
+#include "config/home.h"
 #include "config/inputs.h"
 #include "config/port_pattern.h"
 #include "config/words.h"
@@ -307,13 +308,27 @@ Result<void> check_phase_output(const TomlReader& reader, const Mcu& mcu, std::i
                             output, kLast, mcu.id, BUSHD_PHASE_OUTPUTS)));
 }
 
+// What it does at its MCU.
+Result<void> read_motion_of_its_own(const TomlReader& reader, Motor* motor) {
+  if (reader.has("home")) {
+    const auto home = read_home(reader);
+    if (!home) return fail(home.error());
+    motor->home = *home;
+  }
+  if (!reader.has("local")) return {};
+  const auto local = reader.boolean("local");
+  if (!local) return fail(local.error());
+  motor->local = *local;
+  return {};
+}
+
 Result<void> read_motors(Loading* loading) {
   Config& config = loading->config;
   Taken names;
   Taken outputs;
   for (const TomlReader& reader : loading->motors) {
-    if (auto known = reader.only(
-            {"name", "mcu", "output", "group", "limit", "limit_action", "input_active"});
+    if (auto known = reader.only({"name", "mcu", "output", "group", "limit", "limit_action",
+                                  "input_active", "home", "local"});
         !known) {
       return known;
     }
@@ -336,6 +351,7 @@ Result<void> read_motors(Loading* loading) {
                 .output = {static_cast<std::uint8_t>(*output)},
                 .group = *group};
     if (auto read = read_inputs(reader, &motor); !read) return read;
+    if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
     config.motors.push_back(std::move(motor));
   }
   return {};

@@ -69,7 +69,7 @@ constexpr std::size_t kDouble = 8;
 constexpr std::size_t kMinText = 5;
 constexpr std::size_t kMinTableRef = 2 * kMinText + kInt32;
 constexpr std::size_t kMinMotorState =
-    4 * kMinText + kMinTableRef + kInt16 + 2 * kInt64 + kDouble + 4 * kInt8;
+    5 * kMinText + kMinTableRef + kInt16 + 2 * kInt64 + kDouble + 4 * kInt8;
 
 void scan_fields(Scan& scan, std::type_identity<table_ref_t>) {
   scan.text();         // name
@@ -165,7 +165,9 @@ void scan_fields(Scan& scan, std::type_identity<motor_state_t>) {
   scan.text();  // group
   scan_fields(scan, std::type_identity<table_ref_t>{});
   scan.fixed(kInt16 + 2 * kInt64 + kDouble);  // output, position, target, velocity
-  scan.fixed(4 * kInt8);                      // moving, armed, enabled, input
+  scan.fixed(kInt8);                          // moving
+  scan.text();                                // activity
+  scan.fixed(3 * kInt8);                      // armed, enabled, input
   scan.text();                                // forbidden
   scan.text();                                // trust
 }

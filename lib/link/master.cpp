@@ -170,6 +170,11 @@ void Master::reference(std::size_t mcu, const bushd_reference& message) {
               [&](std::uint8_t* p) { return bushd_encode_reference(&message, p); });
 }
 
+void Master::home(std::size_t mcu, const bushd_home& message) {
+  add_request(mcus_[mcu], BUSHD_MSG_HOME,
+              [&](std::uint8_t* p) { return bushd_encode_home(&message, p); });
+}
+
 void Master::emergency_stop(bushd_how how) {
   emergency_ = Emergency{.how = how};
   for (Mcu& mcu : mcus_) {

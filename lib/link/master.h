@@ -35,6 +35,7 @@ struct McuSetup {
   EmissionSetup emission{};
   bushd_set_inputs inputs{};
   bool off_after_watchdog = false;  // then drivers stay off until control() enables them
+  std::uint16_t local_motors = 0;   // that its FORWARD and REVERSE inputs move
 };
 
 struct BusSetup {
@@ -89,12 +90,15 @@ struct Event {
     kOffline,        // no answer, restarted, or port lost: McuView::detail says why
     kReport,         // McuView::report is new
     kReplaceFailed,  // a replacement was not taken; its motors go on as before. Plan it again.
+    kRefused,        // the MCU, online, refused a request of `type` with `status`
     kLateStart       // the first ticks of `motor` came too late; its stream was dropped
   };
   Kind kind;
   std::size_t mcu;
   std::uint8_t motor = 0;
   std::uint16_t motors = 0;  // kReplaceFailed: the mask
+  std::uint8_t type = 0;     // kRefused
+  std::uint8_t status = 0;   // kRefused: bushd_status
 };
 
 class Master {
@@ -184,6 +188,8 @@ class Master {
   // Sent as soon as the line allows, answered in later reports.
   void control(std::size_t mcu, std::uint8_t actions);
   void set_position(std::size_t mcu, std::uint8_t motor, std::int32_t position_steps);
+
+  void home(std::size_t mcu, const bushd_home& message);
 
   // Requests made by calls above are not yet answered, or not yet seen in a report.
   bool busy(std::size_t mcu) const { return !mcus_[mcu].script.empty() || mcus_[mcu].poll_now; }

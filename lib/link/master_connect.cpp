@@ -233,6 +233,11 @@ void Master::handle_tables(std::size_t index, const bushd_tables& held) {
     add_request(mcu, BUSHD_MSG_ASSIGN,
                 [&](std::uint8_t* p) { return bushd_encode_assign(&assign, p); });
   }
+  if (mcu.view.identity.capabilities & BUSHD_CAN_LOCAL) {
+    const bushd_local local = {mcu.setup.local_motors};
+    add_request(mcu, BUSHD_MSG_LOCAL,
+                [&](std::uint8_t* p) { return bushd_encode_local(&local, p); });
+  }
   unsigned faults = mcu.view.report.faults;
   // The emergency stop that took the MCU over is nobody's.
   if (mcu.taken_over) faults &= ~unsigned{BUSHD_FAULT_EMERGENCY};
@@ -249,7 +254,12 @@ void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std:
   Mcu& mcu = mcus_[index];
   if (!mcu.script.empty() && mcu.script.front().type == type) mcu.script.pop_front();
   mcu.poll_now = mcu.script.empty();
-  if (status == BUSHD_OK || mcu.view.phase == McuPhase::kOnline) return;
+  if (status == BUSHD_OK) return;
+  if (mcu.view.phase == McuPhase::kOnline) {
+    events_.push_back(
+        {.kind = Event::Kind::kRefused, .mcu = index, .type = type, .status = status});
+    return;
+  }
   const auto refusal = static_cast<bushd_status>(status);
   go_offline(
       index,

@@ -125,6 +125,13 @@ Result<std::int64_t> TomlReader::integer(std::string_view key, std::size_t index
       key, index, fmt::format("is {}; allowed: {}", describe(node), range(lowest, highest, unit))));
 }
 
+Result<TomlReader> TomlReader::section(std::string_view key, std::string_view allowed) const {
+  const auto node = required(key, allowed);
+  if (!node) return fail(node.error());
+  if (const auto* table = (*node)->as_table()) return TomlReader(*table, file_, full(key));
+  return fail(error(key, fmt::format("is {}; allowed: {}", describe(**node), allowed)));
+}
+
 Result<const toml::array*> TomlReader::array(std::string_view key, std::string_view allowed) const {
   const auto node = required(key, allowed);
   if (!node) return fail(node.error());

@@ -32,6 +32,7 @@ class TomlReader {
   Result<std::int64_t> integer(std::string_view key, std::int64_t lowest, std::int64_t highest,
                                std::string_view unit = {}) const;
   Result<bool> boolean(std::string_view key) const;
+  Result<TomlReader> section(std::string_view key, std::string_view allowed) const;
   Result<const toml::array*> array(std::string_view key, std::string_view allowed) const;
 
   // The same for an element of an array under `key`.

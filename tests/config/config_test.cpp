@@ -65,6 +65,38 @@ TEST(Config, MannersOfABusHaveDefaults) {
   EXPECT_FALSE(chosen->buses[1].table_runs) << "of this bus only";
 }
 
+TEST(Config, MotorsMayHaveASwitchAndButtons) {
+  const ConfigFile file(
+      replaced(kGood, "output = 0\n",
+               "output = 0\nlocal = true\nhome = { direction = \"positive\", position_steps = -7, "
+               "most_steps = "
+               "9000, slow_steps_per_s = 50, slow_most_steps = 400, at_start = true }\n"));
+  const auto config = file.load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  const config::Motor& motor = config->motors[0];
+  ASSERT_TRUE(motor.home);
+  EXPECT_TRUE(motor.home->positive);
+  EXPECT_EQ(motor.home->position_steps, -7);
+  EXPECT_EQ(motor.home->most_steps, 9000u);
+  EXPECT_EQ(motor.home->slow_steps_per_s, 50u);
+  EXPECT_EQ(motor.home->slow_most_steps, 400u);
+  EXPECT_TRUE(motor.home->at_start);
+  EXPECT_TRUE(motor.local);
+  EXPECT_FALSE(config->motors[1].home);
+  EXPECT_FALSE(config->motors[1].local);
+  const auto little =
+      ConfigFile(replaced(kGood, "output = 0\n",
+                          "output = 0\nhome = { direction = \"negative\", most_steps "
+                          "= 9 }\n"))
+          .load();
+  ASSERT_TRUE(little.has_value()) << little.error().text();
+  EXPECT_FALSE(little->motors[0].home->positive);
+  EXPECT_EQ(little->motors[0].home->position_steps, 0);
+  EXPECT_EQ(little->motors[0].home->slow_steps_per_s, 100u);
+  EXPECT_FALSE(little->motors[0].home->slow_most_steps);
+  EXPECT_FALSE(little->motors[0].home->at_start);
+}
+
 TEST(Config, PortsMayBePatterns) {
   const ConfigFile file(replaced(replaced(kGood, "no-such-port-a", "no-such-port-a*"),
                                  "no-such-port-b", "no-such-port-b[0-9]"));
@@ -157,6 +189,29 @@ INSTANTIATE_TEST_SUITE_P(
                     change("Prefix", "\"TEST\"", "\"A B\"", 3, "lcm.prefix", "1..48 characters"),
                     change("Array", "[lcm]", "[[lcm]]", 1, "lcm", "one [lcm]"),
                     Refusal{"Value", "lcm = 3\n", 1, "lcm", "one [lcm]"}),
+    kNames);
+
+Refusal home(const char* what, const std::string& value, const char* key, const char* message) {
+  return change(what, "output = 0\n", "output = 0\nhome = " + value + "\n", 32, key, message);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Home, ConfigRefusal,
+    testing::Values(
+        home("Word", "\"negative\"", "motor[0].home", "allowed: a table such as"),
+        home("DirectionMissing", "{ most_steps = 5 }", "motor[0].home.direction", "is missing"),
+        home("Direction", "{ direction = \"left\", most_steps = 5 }", "motor[0].home.direction",
+             "is \"left\"; allowed: negative, positive"),
+        home("StepsMissing", "{ direction = \"negative\" }", "motor[0].home.most_steps",
+             "is missing; allowed: a whole number 1..2147483647 steps"),
+        home("UnknownKey", "{ direction = \"negative\", most_steps = 5, speed = 3 }",
+             "motor[0].home.speed", "unknown key"),
+        home("Speed", "{ direction = \"negative\", most_steps = 5, slow_steps_per_s = 1 }",
+             "motor[0].home.slow_steps_per_s", "2..5000 steps/s"),
+        home("AtStart", "{ direction = \"negative\", most_steps = 5, at_start = 1 }",
+             "motor[0].home.at_start", "is 1; allowed: true or false"),
+        change("Local", "output = 0\n", "output = 0\nlocal = 1\n", 32, "motor[0].local",
+               "is 1; allowed: true or false")),
     kNames);
 
 INSTANTIATE_TEST_SUITE_P(

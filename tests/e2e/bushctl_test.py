@@ -70,6 +70,7 @@ class Bushctl(EndToEndTest):
             "target_steps": -12,
             "velocity_steps_per_s": 0,
             "moving": False,
+            "activity": "rest",
             "trust": "known",
         }
         self.assertEqual({key: motor[key] for key in expected}, expected)

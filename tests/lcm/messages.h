@@ -178,6 +178,7 @@ inline void fill(Random& random, state_t& state) {
     motor.velocity_steps_per_s = static_cast<double>(any<std::int32_t>(random)) / 256;
     motor.moving = any<std::int8_t>(random);
     motor.armed = any<std::int8_t>(random);
+    motor.activity = text(random);
     motor.enabled = any<std::int8_t>(random);
     motor.input = any<std::int8_t>(random);
     motor.forbidden = text(random);

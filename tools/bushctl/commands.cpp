@@ -31,8 +31,10 @@ int show_status(Client& client, std::chrono::milliseconds timeout, bool as_json)
 }
 
 int send(Client& client, const command_t& command, Client::Until until) {
+  const bool homes = command.kind == command_t::HOME;
   const bool is_move = command.kind == command_t::MOVE_RELATIVE ||
-                       command.kind == command_t::MOVE_ABSOLUTE || command.kind == command_t::ARM;
+                       command.kind == command_t::MOVE_ABSOLUTE || command.kind == command_t::ARM ||
+                       homes;
   bool accepted = false;
   const auto reply = client.run(command, until, [&](const reply_t& heard) {
     accepted = accepted || heard.phase == reply_t::ACCEPTED;
@@ -42,7 +44,8 @@ int send(Client& client, const command_t& command, Client::Until until) {
   });
   if (!reply) {
     if (client.interrupted() && accepted && is_move) {
-      fmt::print(stderr, "bushctl: the move goes on; 'bushctl stop' ends it\n");
+      fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
+                 homes ? "homing" : "move");
     }
     return failure(client, reply.error());
   }

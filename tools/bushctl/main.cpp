@@ -198,6 +198,14 @@ int run(int argc, char** argv) {
 
   CLI::App* stop = add_motors_command(app, arguments, "stop", "Ramps motors down");
   stop->add_flag("--wait", arguments.wait, "Wait until they stand");
+  CLI::App* home = add_command(app, arguments, "home",
+                               "Motors find their switches, and with them their positions");
+  home->footer(
+      "As the configuration's 'home' says. Those of one MCU are homed one after the other. With "
+      "--wait the exit code is 0 only if every motor has found its switch; 'bushctl stop' ends "
+      "it.");
+  home->add_option("NAME", arguments.motors, "Motors")->required();
+  home->add_flag("--wait", arguments.wait, "Wait for the result");
   CLI::App* enable = add_motors_command(app, arguments, "enable", "Drivers of the motors' MCUs on");
   CLI::App* disable =
       add_motors_command(app, arguments, "disable", "Drivers of the motors' MCUs off");
@@ -327,6 +335,9 @@ int run(int argc, char** argv) {
     return send(arguments, to_motors(command_t::DISARM, arguments.motors), true);
   if (stop->parsed()) {
     return send(arguments, to_motors(command_t::STOP, arguments.motors), arguments.wait);
+  }
+  if (home->parsed()) {
+    return send(arguments, to_motors(command_t::HOME, arguments.motors), arguments.wait);
   }
   // These are over in a moment, and only their result tells whether the MCUs did them.
   if (set->parsed())

@@ -30,6 +30,12 @@ const char* moving_word(const motor_state_t& motor, const char* moves, const cha
   return motor.moving != 0 ? moves : rests;
 }
 
+// By itself, or as a move says.
+const char* moves_text(const motor_state_t& motor) {
+  if (motor.activity == "home") return "home";
+  return motor.activity == "local" ? "local" : "yes";
+}
+
 nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
   return {{"name", motor.name},
           {"mcu", mcu.mcu},
@@ -43,6 +49,7 @@ nlohmann::json motor_json(const motor_state_t& motor, const state_t& mcu) {
           {"velocity_steps_per_s", motor.velocity_steps_per_s},
           {"moving", motor.moving != 0},
           {"armed", motor.armed != 0},
+          {"activity", motor.activity},
           {"enabled", motor.enabled != 0},
           {"input", motor.input != 0},
           {"forbidden", motor.forbidden},
@@ -69,8 +76,9 @@ std::vector<std::string> table(const Snapshot& snapshot) {
       motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
                   fmt::to_string(motor.output), bushd::printable(motor.group), text_of(motor.table),
                   fmt::to_string(motor.position_steps), fmt::to_string(motor.target_steps),
-                  fmt::format("{:.1f}", motor.velocity_steps_per_s), moving_word(motor, "yes", "-"),
-                  bushd::printable(motor.trust), limit_text(motor)});
+                  fmt::format("{:.1f}", motor.velocity_steps_per_s),
+                  moving_word(motor, moves_text(motor), "-"), bushd::printable(motor.trust),
+                  limit_text(motor)});
     }
     mcus.row({bushd::printable(mcu.mcu), bushd::printable(mcu.mcu_state),
               fmt::to_string(mcu.boot_number), bushd::printable(mcu.detail)});

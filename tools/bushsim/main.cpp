@@ -60,6 +60,12 @@ int run(int argc, char** argv) {
                  "What an MCU is, ADDRESS=KIND: virtual (the default), atmega2560:IMAGE.elf, which "
                  "runs in simavr, or lm3s6965:IMAGE.elf, in QEMU. Several times for several")
       ->allow_extra_args(false);
+  std::vector<std::string> switches;
+  app.add_option("--switch", switches,
+                 "A switch at a motor of a virtual MCU, ADDRESS.OUTPUT@STEPS: 1.0@-200 closes 200 "
+                 "steps from where it stands now in the negative direction, 1.0@+200 in the "
+                 "positive one. Several times for several")
+      ->allow_extra_args(false);
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
@@ -75,6 +81,9 @@ int run(int argc, char** argv) {
   const auto images = bushsim::parse_images(mcus, *setup);
   if (!images) return refuse(images.error());
   options.images = *images;
+  const auto wired = bushsim::parse_switches(switches, *setup, *images);
+  if (!wired) return refuse(wired.error());
+  options.switches = *wired;
   options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
   bushd::Result<void> ended;
   std::string summary;

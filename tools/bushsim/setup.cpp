@@ -84,4 +84,39 @@ Result<Images> parse_images(const std::vector<std::string>& choices, const Setup
   return images;
 }
 
+Result<std::vector<SwitchAt>> parse_switches(const std::vector<std::string>& choices,
+                                             const Setup& setup, const Images& images) {
+  // Mechanical ones are like this.
+  constexpr std::int64_t kHysteresisSteps = 4;
+  constexpr bushd::sim::TimeNs kBounceNs = 3'000'000;
+  std::vector<SwitchAt> switches;
+  for (const std::string& choice : choices) {
+    const auto fault = [&choice](const std::string& what) {
+      return fail(fmt::format("--switch {}: {}", choice, what));
+    };
+    SwitchAt one;
+    const char* const end = choice.data() + choice.size();
+    auto read = std::from_chars(choice.data(), end, one.address);
+    const bool has_output = read.ec == std::errc{} && read.ptr != end && *read.ptr == '.';
+    if (has_output) read = std::from_chars(read.ptr + 1, end, one.output);
+    const char* const sign = read.ptr + 1;
+    const bool has_sign = has_output && read.ec == std::errc{} && end - read.ptr > 2 &&
+                          *read.ptr == '@' && (*sign == '-' || *sign == '+');
+    if (has_sign) read = std::from_chars(*sign == '+' ? sign + 1 : sign, end, one.options.at_steps);
+    if (!has_sign || read.ec != std::errc{} || read.ptr != end || one.output > 15) {
+      return fault("must be ADDRESS.OUTPUT@-STEPS or ADDRESS.OUTPUT@+STEPS, with an output 0..15");
+    }
+    if (std::ranges::find(setup.addresses, one.address) == setup.addresses.end()) {
+      return fault(fmt::format("bus \"{}\" has no MCU of this address", setup.bus));
+    }
+    if (images.contains(one.address)) return fault("only virtual MCUs can have one");
+    one.options.positive_end = *sign == '+';
+    one.options.hysteresis_steps = kHysteresisSteps;
+    one.options.bounce_ns = kBounceNs;
+    one.options.seed = switches.size();
+    switches.push_back(one);
+  }
+  return switches;
+}
+
 }  // namespace bushsim

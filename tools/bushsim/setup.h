@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "sim/switch.h"
 
 namespace bushsim {
 
@@ -29,5 +30,17 @@ using Images = std::map<std::uint8_t, Image>;  // by address
 // From `2=atmega2560:PATH` and `1=virtual`, for addresses of the bus. Fails if this bushsim has no
 // simulator for an image.
 bushd::Result<Images> parse_images(const std::vector<std::string>& choices, const Setup& setup);
+
+// A switch at a motor of a virtual MCU.
+struct SwitchAt {
+  std::uint8_t address = 0;
+  std::uint8_t output = 0;
+  bushd::sim::SwitchOptions options;
+};
+
+// From `1.0@-200`: address, output, and where it closes; the sign is the end of the travel that it
+// is at.
+bushd::Result<std::vector<SwitchAt>> parse_switches(const std::vector<std::string>& choices,
+                                                    const Setup& setup, const Images& images);
 
 }  // namespace bushsim

@@ -99,6 +99,10 @@ void Simulator::add_mcus(const Options& options) {
     is_virtual_.push_back(image == options.images.end());
     if (is_virtual_.back()) {
       bus_.add_mcu({.address = address, .boot_number = options.boot_number, .boot_ns = boot_ns});
+      for (const SwitchAt& one : options.switches) {
+        if (one.address != address) continue;
+        bus_.mcu(bus_.mcu_count() - 1).attach_switch(one.output, one.options);
+      }
       boot_ns = (boot_ns + kBootSpacingNs) % kBootSpreadNs;
       continue;
     }

@@ -19,6 +19,7 @@ namespace bushsim {
 struct Options {
   Setup setup;
   Images images;
+  std::vector<SwitchAt> switches;
   std::vector<std::string> links;  // at least one: the port's names, each time it is plugged in
   std::string trace;               // empty: none
   std::uint16_t boot_number = 1;

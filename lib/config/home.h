@@ -1,0 +1,13 @@
+// Private to lib/config: what a motor's `home` says.
+#pragma once
+
+#include "base/result.h"
+#include "config/config.h"
+#include "tables/toml_reader.h"
+
+namespace bushd::config {
+
+// Precondition: the motor's section has the key.
+Result<Home> read_home(const tables::TomlReader& motor);
+
+}  // namespace bushd::config
