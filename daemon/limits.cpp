@@ -40,19 +40,19 @@ std::string Core::refuse_direction(const Motor& motor, std::int64_t steps) const
   return switch_at(direction) + " bars the way; move it in the other direction";
 }
 
-// Its plan goes on, or has gone on, where the MCU lets nothing move.
+// The way it goes is barred, and the MCU has not begun, or goes by a ramp of its own.
 void Core::notice_limit(Motor& motor, const link::McuView& view) {
   const std::uint8_t output = motor.config->output.value;
-  for (const int direction : {1, -1}) {
-    if (!forbids(view.report, output, direction)) continue;
-    const std::int64_t missing = (motor.axis.executed_steps() - motor.position_steps) * direction;
-    if (missing <= 0 && motor.axis.velocity_steps_per_s() * direction <= 0) continue;
-    motor.limit = direction;
-    const Mcu& mcu = mcus_[motor.mcu];
-    master_of(mcu).drop(mcu.in_bus, output);
-    changed_ = true;
-    return;
-  }
+  const int direction = motor.axis.direction();
+  if (!forbids(view.report, output, direction)) return;
+  const bool moving = (view.report.moving >> output & 1) != 0;
+  const bool given_up =
+      !moving && view.tick >= motor.axis.start_tick() && motor.axis.velocity_steps_per_s() != 0;
+  if (!given_up && motor.axis.executed_steps() == motor.position_steps) return;
+  motor.limit = direction;
+  const Mcu& mcu = mcus_[motor.mcu];
+  master_of(mcu).drop(mcu.in_bus, output);
+  changed_ = true;
 }
 
 // It stands.

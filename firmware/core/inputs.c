@@ -38,9 +38,9 @@ bool bushd_mcu_starts_into_limit(const bushd_mcu* mcu, const bushd_ticks* ticks)
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((ticks->mask & motor_bit(m)) == 0) continue;
     const int8_t direction = first_direction(ticks, column++);
-    if (direction != 0 && ((direction > 0 ? positive : negative) & motor_bit(m)) != 0) return true;
+    if (direction == 0 || ((direction > 0 ? positive : negative) & motor_bit(m)) == 0) return false;
   }
-  return false;
+  return true;
 }
 
 // How long each input has differed from what it counts as is counted for all of them at once: bit k

@@ -91,7 +91,8 @@ int8_t bushd_mcu_last_direction(const bushd_mcu* mcu, uint8_t m);
 void bushd_mcu_watch_inputs(bushd_mcu* mcu);  // before every tick is prepared
 // Motors that may not move in this direction (+1, -1).
 uint16_t bushd_mcu_forbidden(const bushd_mcu* mcu, int8_t direction);
-// These ticks are starts, and the first step of one is in such a direction.
+// These ticks are starts, and all their first steps are in such directions. Of other starts those
+// that are barred are given up where they begin.
 bool bushd_mcu_starts_into_limit(const bushd_mcu* mcu, const bushd_ticks* ticks);
 bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message);
 void bushd_mcu_report_inputs(const bushd_mcu* mcu, bushd_report* report);

@@ -281,9 +281,6 @@ static bushd_status check_run(const bushd_mcu* mcu, uint32_t first_tick,
   if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
   // There is room for one.
   if (motor->mode == BUSHD_MCU_TABLE_RUN) return BUSHD_E_STATE;
-  if ((bushd_mcu_forbidden(mcu, entry->direction) & motor_bit(entry->motor)) != 0) {
-    return BUSHD_E_FORBIDDEN;
-  }
   bushd_run_start(run, table_of(mcu, motor), entry->steps, entry->direction);
   uint32_t spare_ns;
   return bushd_mcu_ticks_of_run(run, mcu->tick_ns, ticks, &spare_ns) ? BUSHD_OK : BUSHD_E_CAPACITY;
@@ -298,11 +295,14 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
   if (status != BUSHD_OK) return status;
   bushd_run run;
   uint32_t ticks = 0;
+  bool barred = true;
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
     const bushd_status run_status = check_run(mcu, message->first_tick, &entry, &run, &ticks);
     if (run_status != BUSHD_OK) return run_status;
+    barred = barred && (bushd_mcu_forbidden(mcu, entry.direction) & motor_bit(entry.motor)) != 0;
   }
+  if (barred) return BUSHD_E_FORBIDDEN;
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
     bushd_mcu_motor* motor = &mcu->motor[entry.motor];

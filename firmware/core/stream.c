@@ -399,13 +399,12 @@ bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks*
   if (status != BUSHD_OK) return status;
   bushd_table_ticks_entry entry;
   bushd_run run;
+  bool barred = (ticks->flags & BUSHD_TICKS_START) != 0;
   for (uint16_t at = 0; bushd_next_table_ticks_entry(ticks, &at, &entry);) {
     if (!restore(mcu, &entry, &run)) return BUSHD_E_FORMAT;
-    if ((ticks->flags & BUSHD_TICKS_START) != 0 &&
-        (bushd_mcu_forbidden(mcu, run.direction) & motor_bit(entry.motor)) != 0) {
-      return BUSHD_E_FORBIDDEN;
-    }
+    barred = barred && (bushd_mcu_forbidden(mcu, run.direction) & motor_bit(entry.motor)) != 0;
   }
+  if (barred) return BUSHD_E_FORBIDDEN;
   for (uint16_t at = 0; bushd_next_table_ticks_entry(ticks, &at, &entry);) {
     restore(mcu, &entry, &run);
     open_motor(mcu, entry.motor, &stretch);

@@ -89,6 +89,8 @@ class Axis {
   std::int64_t executed_steps() const {
     return from_ + base_.run.direction * static_cast<std::int64_t>(base_.run.steps_done);
   }
+  // Of this run: +1, -1.
+  int direction() const { return base_.run.direction; }
   // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t target_steps() const { return target_; }
   std::int64_t wanted_steps() const { return wanted_; }

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "daemon/lab.h"
 
 namespace bushd::test {
@@ -192,6 +194,36 @@ TEST_P(Limits, OvercurrentTakesThePowerAndSaysSo) {
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("drivers disabled"));
   EXPECT_EQ(lab.wait(lab.send(command_t::ENABLE, {})).result, "done");
   EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {10})).result, "reached");
+}
+
+// Whatever switches do: one result a move, and the daemon knows where the motors stand.
+TEST_P(Limits, NoStepIsLostHoweverSwitchesBounce) {
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const auto below = [&random](unsigned n) { return static_cast<int>(random() % n); };
+    const char* const ends[] = {"positive", "negative", "both"};
+    Lab lab(lab_with(GetParam(), "debounce_ticks = " + std::to_string(below(4)) + "\n",
+                     "limit = \"" + std::string(ends[below(3)]) + "\"\n"));
+    lab.connect();
+    for (int i = 0; i < 8; ++i) {
+      const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"},
+                                 {below(3000) - 1500, below(3000) - 1500});
+      for (int k = below(40); k > 0 && !lab.has_result(move); --k) {
+        lab.run_for(0.01 * below(20));
+        press(lab, static_cast<std::uint16_t>(below(2)));
+      }
+      if (below(4) == 0) lab.send(command_t::STOP, {});
+      const reply_t result = lab.wait(move);
+      EXPECT_THAT(result.result, testing::AnyOf("reached", "limit", "stopped", "refused"))
+          << result.reason;
+      lab.run_for(0.2);
+      EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+      EXPECT_EQ(lab.motor("m02").position_steps, lab.shaft_steps("m02"));
+      EXPECT_EQ(lab.motor("m01").trust, "known");
+      EXPECT_EQ(lab.state_of("hall:1").mcu_state, "READY");
+    }
+  }
 }
 
 class AfterReset : public testing::TestWithParam<const char*> {};

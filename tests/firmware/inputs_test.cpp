@@ -120,6 +120,31 @@ TEST_P(Inputs, StartsByTableTicksIntoALimitAreRefused) {
   EXPECT_EQ(on->poll().forbidden_negative, 1);
 }
 
+TEST_P(Inputs, AMotorWhoseWayIsBarredDoesNotHoldUpThoseThatStartWithIt) {
+  for (const bool whole : {false, true}) {
+    const auto on = with({.limit_positive = 1});
+    on->pins(kSwitch);
+    on->pass();
+    if (whole) {
+      const bushd_table_run_entry both[] = {{0, 0, 1, 20}, {1, 0, 1, 20}};
+      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+      payload.resize(bushd_encode_table_run(0, on->first_open(), both, 2, payload.data()));
+      ASSERT_EQ(on->take(BUSHD_MSG_TABLE_RUN, payload), BUSHD_OK);
+    } else {
+      Ticks ticks = ones(kStart, on->first_open(), 4);
+      ticks.mask = 3;
+      ticks.displacements.assign(8, one());
+      ticks.delays = {64, 64};
+      ASSERT_EQ(on->take(ticks), BUSHD_OK);
+    }
+    on->pass(3);
+    EXPECT_EQ(on->poll().moving, 2);
+    rest(*on);
+    EXPECT_EQ(on->pulses(0), 0);
+    EXPECT_GE(on->pulses(1), 4);
+  }
+}
+
 TEST_P(Inputs, OneThatHasOverrunItsSwitchStillMayNotGoOn) {
   const auto on = with({.limit_positive = 1});
   ASSERT_EQ(start(*on, 50), BUSHD_OK);
