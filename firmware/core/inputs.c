@@ -156,6 +156,7 @@ void bushd_mcu_clear_faults(bushd_mcu* mcu) {
 bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message) {
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   const uint16_t limits = message->limit_positive | message->limit_negative;
+  if ((limits & ~own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
   mcu->inputs = *message;
   mcu->hit_positive &= message->limit_positive;
   mcu->hit_negative &= message->limit_negative;

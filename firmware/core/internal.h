@@ -19,6 +19,11 @@ static inline uint16_t motor_bit(uint8_t motor) {
   return bushd_mcu_motor_bit[motor];
 }
 
+// All that it has.
+static inline uint16_t own_motors(const bushd_mcu* mcu) {
+  return (uint16_t)(motor_bit((uint8_t)(mcu->config.motors - 1u)) * 2u - 1u);
+}
+
 static inline uint16_t saturating_increment(uint16_t value) {
   return value < UINT16_MAX ? (uint16_t)(value + 1u) : value;
 }
@@ -118,7 +123,8 @@ void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction);
 // A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
 // ends: it is `autonomous` until it rests.
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction);
-// Of a motor in a run: by the shortest way that its table allows.
+// Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise
+// since stays so.
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);
 
 // homing.c

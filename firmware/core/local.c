@@ -59,6 +59,7 @@ void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs) {
 }
 
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
+  if ((message->motors & ~own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
   const uint16_t changed = (uint16_t)(mcu->local.motors ^ message->motors);
   if (changed & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
   mcu->local.motors = message->motors;

@@ -321,6 +321,8 @@ static bool in_run(const bushd_mcu_motor* motor, uint32_t next) {
 
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
+  // It was cut, or does so already.
+  if (motor->mode == BUSHD_MCU_STREAM || motor->mode == BUSHD_MCU_RAMP_DOWN) return;
   bushd_run_ramp_down(&motor->run);
   motor->mode = bushd_run_done(&motor->run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
 }

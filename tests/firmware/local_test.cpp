@@ -1,5 +1,6 @@
 // LOCAL: two buttons at the MCU move motors, with a host or without.
 #include <algorithm>
+#include <functional>
 
 #include "firmware/streams.h"
 
@@ -125,6 +126,38 @@ TEST_P(Local, EmergencyStopsItUntilItIsClearedAndPressedAgain) {
   expect_counted();
 }
 
+TEST_P(Local, ACutIsNoRampWhoeverAsksForIt) {
+  ASSERT_EQ(rig.set_inputs({.limit_positive = 0b0101,
+                            .limit_cuts = 0b0101,
+                            .emergency = BUSHD_EMERGENCY_INPUT_CUTS,
+                            .overcurrent = 500}),
+            BUSHD_OK);
+  const std::vector<std::function<void()>> cuts = {
+      [&] { rig.emergency(BUSHD_CUT); },
+      [&] {
+        rig.pins({0, BUSHD_INPUT_FORWARD | BUSHD_INPUT_EMERGENCY});
+      },
+      [&] { rig.current(600); },
+      [&] {
+        rig.pins({0b0101, BUSHD_INPUT_FORWARD});
+        rig.pass(1);
+        rig.pins({0b0101, 0});
+      },
+  };
+  for (const auto& cut : cuts) {
+    hold(BUSHD_INPUT_FORWARD, 60);
+    ASSERT_EQ(rig.poll().autonomous, kMotors);
+    cut();
+    rig.pass(2);
+    const std::int64_t at = rig.pulses(0);
+    rig.pass(50);
+    EXPECT_EQ(rig.pulses(0), at);
+    rig.current(0);
+    release();
+    EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_ENABLE), BUSHD_OK);
+  }
+}
+
 TEST_P(Local, WorksWithoutAHostButNotWithoutDriversOrTables) {
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, 5), BUSHD_OK);
   rig.pass(500);
@@ -164,6 +197,14 @@ TEST_P(Local, StopsAtALimitAndComesBackFromIt) {
   rig.pass(50);
   release();
   EXPECT_LT(rig.pulses(0), at);
+  expect_counted();
+}
+
+TEST_P(Local, MotorsThatTheMcuDoesNotHaveAreRefused) {
+  EXPECT_EQ(rig.local(0b1'0001), BUSHD_E_FORMAT);
+  hold(BUSHD_INPUT_FORWARD, 60);
+  EXPECT_EQ(rig.poll().autonomous, kMotors) << "as it was told before";
+  release();
   expect_counted();
 }
 
