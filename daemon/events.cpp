@@ -215,6 +215,11 @@ void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, const bushd_repor
   const bool stepped = motor.position_steps != motor.axis.from_steps();
   if (motor.wrong) {
     end_motor(index, motion::Outcome::kFault, motor.doubt + "; check the position and set it");
+  } else if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !motor.armed) {
+    motor.doubt = kUnpowered;
+    end_motor(index, motion::Outcome::kFault,
+              "MCU " + mcu.config->id + " switched its drivers off because " + stop_cause(report) +
+                  "; check the position and set it");
   } else if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
     const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
     const std::string by =
@@ -228,11 +233,6 @@ void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, const bushd_repor
   } else if (motor.armed) {
     end_motor(index, motion::Outcome::kLink,
               "MCU " + mcu.config->id + " disarmed it by itself because " + stop_cause(report));
-  } else if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) {
-    motor.doubt = kUnpowered;
-    end_motor(index, motion::Outcome::kFault,
-              "MCU " + mcu.config->id + " switched its drivers off because " + stop_cause(report) +
-                  "; check the position and set it");
   } else {
     end_motor(index, motion::Outcome::kLink,
               "MCU " + mcu.config->id + " ran it down by itself because " + stop_cause(report));

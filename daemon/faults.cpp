@@ -54,9 +54,9 @@ std::string fault_text(const bushd_report& report) {
 
 std::string stop_cause(const bushd_report& report) {
   const std::uint8_t faults = report.faults;
+  if (faults & BUSHD_FAULT_OVERCURRENT) return "its supply current was too high";
   if (faults & BUSHD_FAULT_EMERGENCY) return "an emergency stop was commanded";
   if (faults & BUSHD_FAULT_EMERGENCY_INPUT) return "its emergency input was active";
-  if (faults & BUSHD_FAULT_OVERCURRENT) return "its supply current was too high";
   if (faults & BUSHD_FAULT_SELF_TEST) return "its self-test failed";
   if (faults & BUSHD_FAULT_SYNC) return "it fell out of step with the bus";
   return "nothing more reached it in time";

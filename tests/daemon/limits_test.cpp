@@ -226,6 +226,22 @@ TEST_P(Limits, NoStepIsLostHoweverSwitchesBounce) {
   }
 }
 
+// The ramp of an emergency stop is one without power then, and nobody knows where the motor stands.
+TEST_P(Limits, OvercurrentOnTheRampOfAnEmergencyStopLeavesThePositionUncertain) {
+  Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  lab.run_for(3);
+  lab.send(command_t::EMERGENCY_STOP, {});
+  sim::VirtualMcu& mcu = lab.bus(0).mcu(0);
+  ASSERT_TRUE(lab.run_until([&] { return (mcu.core().faults & BUSHD_FAULT_EMERGENCY) != 0; }));
+  mcu.set_current(801);
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "fault");
+  EXPECT_THAT(result.reason, HasSubstr("supply current"));
+  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+}
+
 class AfterReset : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Settings, AfterReset, testing::Values("ready", "at_once", "no"),
                          [](const auto& setting) { return std::string(setting.param); });
