@@ -73,6 +73,16 @@ void bushd_mcu_finish_row(bushd_mcu* mcu, uint32_t tick);
 void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t motor);
 void bushd_mcu_clear_streams(bushd_mcu* mcu);
 
+// A tick's row leaves the queue: of all motors, in 1/256 step or, if all are whole, in steps. A
+// small MCU may link the second of its own (BUSHD_OWN_TAKE_ROW).
+typedef struct bushd_mcu_row {
+  uint16_t moves;  // motors with other than 0
+  uint16_t back;   // with less than 0
+} bushd_mcu_row;
+void bushd_mcu_take_fine_row(int16_t* queued, int16_t* displacement, uint8_t motors,
+                             bushd_mcu_row* row);
+void bushd_mcu_take_coarse_row(int16_t* queued, int16_t* steps, uint8_t motors, bushd_mcu_row* row);
+
 // motor.c: what motors do in the tick that is prepared, and how they stop by themselves.
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane);
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message);

@@ -93,10 +93,11 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
 const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   const bushd_plane* ended = &mcu->plane[mcu->front];
   if (ended->active != 0) {
-    for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    const int16_t* steps = ended->steps;
+    bushd_mcu_motor* motor = mcu->motor;
+    for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor) {
       // Unsigned: the counter may be set to any value, and then wraps.
-      const uint32_t position = (uint32_t)mcu->motor[m].position_steps + (uint32_t)ended->steps[m];
-      mcu->motor[m].position_steps = (int32_t)position;
+      motor->position_steps = (int32_t)((uint32_t)motor->position_steps + (uint32_t)*steps++);
     }
   }
   mcu->front ^= 1u;

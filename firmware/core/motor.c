@@ -125,17 +125,24 @@ static void watch_low_water(bushd_mcu* mcu) {
   if (queued < mcu->low_water_ticks) mcu->low_water_ticks = queued > 0 ? (uint16_t)queued : 0;
 }
 
-// The tick's queued displacements, which leave the queue, into `moves` those that are not 0.
-static void take_row(bushd_mcu* mcu, uint32_t tick, int16_t* displacement, uint16_t* moves) {
-  int16_t* queued = queue_at(mcu, tick, 0);
+#ifndef BUSHD_OWN_TAKE_ROW
+void bushd_mcu_take_coarse_row(int16_t* queued, int16_t* steps, uint8_t motors,
+                               bushd_mcu_row* row) {
+  bushd_mcu_take_fine_row(queued, steps, motors, row);
+  for (uint8_t m = 0; m < motors; ++m) steps[m] = (int16_t)(steps[m] >> 8);
+}
+#endif
+
+void bushd_mcu_take_fine_row(int16_t* queued, int16_t* displacement, uint8_t motors,
+                             bushd_mcu_row* row) {
+  row->moves = row->back = 0;
   uint16_t bit = 1;
-  uint16_t found = 0;
-  for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
+  for (uint8_t m = 0; m < motors; ++m, bit = (uint16_t)(bit << 1)) {
     displacement[m] = *queued;
-    if (*queued != 0) found |= bit;
+    if (*queued != 0) row->moves |= bit;
+    if (*queued < 0) row->back |= bit;
     *queued++ = 0;
   }
-  *moves = found;
 }
 
 // A motor that begins, or stands still until a start that waits.
@@ -172,36 +179,41 @@ static bool displacement_of(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t* d
   return true;
 }
 
-// What displacements make; returns the motors whose steps are those of a run.
-static uint16_t find_displacements(bushd_mcu* mcu, int16_t* displacement, uint16_t* moves) {
+static uint16_t all_motors(const bushd_mcu* mcu) {
+  return (uint16_t)((uint32_t)motor_bit((uint8_t)(mcu->config.motors - 1u)) * 2u - 1u);
+}
+
+// What motors do in this tick, in steps if it is a coarse one, else in 1/256 step. Returns those
+// whose steps are those of a run.
+static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
   const uint32_t tick = mcu->tick + 1u;
+  const bool fine = mcu->format == BUSHD_FORMAT_FINE;
   bushd_mcu_outlook* outlook = &mcu->outlook;
   if (outlook->stale || ticks_after(tick, outlook->plain_until) >= 0) look_out(mcu, tick);
-  take_row(mcu, tick, displacement, moves);
-  follow_begun(mcu, outlook->plain, *moves, tick);
+  (fine ? bushd_mcu_take_fine_row : bushd_mcu_take_coarse_row)(queue_at(mcu, tick, 0), values,
+                                                               mcu->config.motors, row);
+  follow_begun(mcu, outlook->plain, row->moves, tick);
   uint16_t exact = 0;
-  uint16_t bit = 1;
-  for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
-    if ((outlook->plain & bit) != 0) continue;
-    if (!displacement_of(mcu, m, tick, &displacement[m])) {
-      displacement[m] = 0;
+  uint16_t others = all_motors(mcu) & (uint16_t)~outlook->plain;
+  for (uint8_t m = 0; others != 0; ++m, others = (uint16_t)(others >> 1)) {
+    if ((others & 1u) == 0) continue;
+    const uint16_t bit = motor_bit(m);
+    int16_t displacement = fine ? values[m] : (int16_t)(values[m] * 256);
+    if (!displacement_of(mcu, m, tick, &displacement)) {
+      displacement = 0;
       exact |= bit;
     }
-    *moves &= (uint16_t)~bit;
-    if (displacement[m] != 0) *moves |= bit;
+    values[m] = fine ? displacement : (int16_t)(displacement >> 8);
+    row->moves &= (uint16_t)~bit;
+    row->back &= (uint16_t)~bit;
+    if (displacement != 0) row->moves |= bit;
+    if (displacement < 0) row->back |= bit;
   }
   watch_low_water(mcu);
   return exact;
 }
 
-static void emit_coarse(bushd_mcu* mcu, bushd_plane* plane, const int16_t* displacement) {
-  for (uint8_t m = 0; m < mcu->config.motors; ++m)
-    plane->steps[m] = (int16_t)(displacement[m] >> 8);
-  if (!bushd_mcu_steps_keep_slots(mcu)) return;
-  bushd_slots_fill_evenly(plane->step, mcu->config.slots, plane->steps, mcu->config.motors);
-}
-
-static void emit_fine(bushd_mcu* mcu, bushd_plane* plane, const int16_t* displacement,
+static void plan_fine(bushd_mcu* mcu, bushd_plane* plane, const int16_t* displacement,
                       uint16_t exact) {
   bushd_slots plans[BUSHD_MOTORS_PER_MCU];
   uint16_t bit = 1;
@@ -217,26 +229,24 @@ static void emit_fine(bushd_mcu* mcu, bushd_plane* plane, const int16_t* displac
   bushd_slots_fill(plane->step, mcu->config.slots, plans, mcu->config.motors);
 }
 
-static uint16_t forward(const bushd_mcu* mcu, const int16_t* displacement) {
-  uint16_t positive = 0;
-  uint16_t bit = 1;
-  for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
-    if (displacement[m] > 0) positive |= bit;
+// Returns the motors whose steps are those of a run, and still to be made.
+static uint16_t plan(bushd_mcu* mcu, bushd_plane* plane) {
+  const bool fine = mcu->format == BUSHD_FORMAT_FINE;
+  int16_t displacement[BUSHD_MOTORS_PER_MCU];
+  bushd_mcu_row row;
+  const uint16_t exact = find_row(mcu, fine ? displacement : plane->steps, &row);
+  mcu->direction = (mcu->direction & (uint16_t)~row.moves) | (row.moves & (uint16_t)~row.back);
+  plane->active = row.moves;
+  if (fine) {
+    plan_fine(mcu, plane, displacement, exact);
+  } else if (bushd_mcu_steps_keep_slots(mcu)) {
+    bushd_slots_fill_evenly(plane->step, mcu->config.slots, plane->steps, mcu->config.motors);
   }
-  return positive;
+  return exact;
 }
 
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane) {
-  int16_t displacement[BUSHD_MOTORS_PER_MCU];
-  uint16_t moves = 0;
-  uint16_t exact = find_displacements(mcu, displacement, &moves);
-  mcu->direction = (mcu->direction & (uint16_t)~moves) | forward(mcu, displacement);
-  plane->active = moves;
-  if (mcu->format == BUSHD_FORMAT_FINE) {
-    emit_fine(mcu, plane, displacement, exact);
-  } else {
-    emit_coarse(mcu, plane, displacement);
-  }
+  uint16_t exact = plan(mcu, plane);
   for (uint8_t m = 0; exact != 0; ++m, exact = (uint16_t)(exact >> 1)) {
     if ((exact & 1u) == 0) continue;
     plane->steps[m] = emit_exact(mcu, &mcu->motor[m], motor_bit(m), plane->step);

@@ -189,12 +189,14 @@ void bushd_mcu_slew(bushd_mcu* mcu) {
   clock->slew_now_ns = clock->slew_next_ns;
   clock->rate_now_ns = clock->rate_next_ns;
   clock->rate_next_ns = rate_share_ns(clock);
-  const int32_t rate_ns = clock->rate_next_ns < 0 ? -clock->rate_next_ns : clock->rate_next_ns;
-  const int32_t limit_ns = (int32_t)(mcu->tick_ns / BUSHD_TICK_SLEW_DIVISOR) - rate_ns;
-  const int32_t step_ns = clock->behind_ns > limit_ns    ? limit_ns
-                          : clock->behind_ns < -limit_ns ? -limit_ns
-                                                         : clock->behind_ns;
-  clock->behind_ns -= step_ns;
+  int32_t step_ns = clock->behind_ns;
+  if (step_ns != 0) {
+    const int32_t rate_ns = clock->rate_next_ns < 0 ? -clock->rate_next_ns : clock->rate_next_ns;
+    const int32_t limit_ns = (int32_t)(mcu->tick_ns / BUSHD_TICK_SLEW_DIVISOR) - rate_ns;
+    if (step_ns > limit_ns) step_ns = limit_ns;
+    if (step_ns < -limit_ns) step_ns = -limit_ns;
+    clock->behind_ns -= step_ns;
+  }
   clock->slew_next_ns = -step_ns;
   const int32_t longer_ns = clock->slew_next_ns + clock->rate_next_ns;
   if (longer_ns != 0) mcu->port.adjust_tick(mcu->port.context, longer_ns);

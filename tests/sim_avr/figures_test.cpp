@@ -153,8 +153,8 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, AvrFigures,
-                         testing::Values(Load{BUSHD_FORMAT_COARSE, 1'200'000, 127, 1'500'000},
-                                         Load{BUSHD_FORMAT_FINE, 2'000'000, 127, 800'000}),
+                         testing::Values(Load{BUSHD_FORMAT_COARSE, 1'080'000, 127, 1'700'000},
+                                         Load{BUSHD_FORMAT_FINE, 1'880'000, 127, 1'000'000}),
                          [](auto& load) {
                            return load.param.format == BUSHD_FORMAT_FINE ? "Fine" : "Coarse";
                          });

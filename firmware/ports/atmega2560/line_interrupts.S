@@ -35,8 +35,8 @@ USART0_RX_vect:
     push r30
     push r31
     lds r30, TCNT5L
+    sei  ; from the next instruction but one on
     lds r31, TCNT5H
-    sei
     push r24
     in r24, _SFR_IO_ADDR(SREG)
     push r24
