@@ -315,6 +315,12 @@ void Core::log_start(Motor& motor, std::int64_t steps, motion::Tick start, std::
                          {"steps", steps},
                          {"from_steps", motor.axis.from_steps()}};
   if (late_ns != 0) line["late_ns"] = late_ns;
+  if (const bushd_emission& emission = mcus_[motor.mcu].config->emission.settings;
+      emission.mode != BUSHD_EMISSION_EVEN) {
+    line["emission"] = link::kEmissionNames.at(emission.mode);
+    line["step_us"] = emission.step_us;
+    line["dir_setup_us"] = emission.dir_setup_us;
+  }
   outputs_.move_log(line.dump());
 }
 

@@ -21,10 +21,6 @@ static bushd_status use(bushd_mcu* mcu, const bushd_emission* settings) {
   memset(emission, 0, sizeof *emission);
   emission->settings = *settings;
   emission->grid = grid;
-  emission->plain = settings->mode == BUSHD_EMISSION_EVEN && grid.setup_slots == 0;
-  emission->outputs = settings->mode == BUSHD_EMISSION_COMMON_DIR ? BUSHD_OUTPUTS_COMMON_DIR
-                      : settings->mode == BUSHD_EMISSION_PHASES   ? BUSHD_OUTPUTS_LEVELS
-                                                                  : BUSHD_OUTPUTS_PULSES;
   return BUSHD_OK;
 }
 
@@ -65,7 +61,7 @@ bool bushd_mcu_has_output(const bushd_mcu* mcu, uint8_t motor) {
 
 // Nothing of a motor is on that has been at rest for long and is not to hold.
 static bool is_on(bushd_mcu* mcu, uint8_t m, bool moves) {
-  uint8_t* const left = &mcu->emission.on_ticks[m];
+  uint8_t* const left = &mcu->emission.of.windings.on_ticks[m];
   if ((mcu->flags & BUSHD_FLAG_ENABLED) == 0) {
     *left = 0;
     return false;
@@ -96,15 +92,14 @@ static void shape_phases(bushd_mcu* mcu, bushd_plane* plane) {
   for (uint8_t m = 0; m < motors; ++m) {
     if (!is_on(mcu, m, (moving & motor_bit(m)) != 0)) continue;
     on |= motor_bit(m);
-    levels |= (uint16_t)(bushd_phase_levels(sequence, mcu->emission.phase[m])
+    levels |= (uint16_t)(bushd_phase_levels(sequence, mcu->emission.of.windings.phase[m])
                          << (BUSHD_PHASE_OUTPUTS * m));
   }
-  const uint16_t slots = plane->active != 0 ? mcu->config.slots : 1;
-  for (uint16_t slot = 0; slot < slots; ++slot) {
+  for (uint16_t slot = 0; slot < mcu->config.slots; ++slot) {
     uint16_t steps = plane->step[slot];
     for (uint8_t m = 0; steps != 0; ++m, steps = (uint16_t)(steps >> 1)) {
       if ((steps & 1u) == 0) continue;
-      uint8_t* const phase = &mcu->emission.phase[m];
+      uint8_t* const phase = &mcu->emission.of.windings.phase[m];
       *phase = next_phase(*phase, count, (plane->direction & motor_bit(m)) != 0);
       if ((on & motor_bit(m)) == 0) continue;
       const uint8_t shift = (uint8_t)(BUSHD_PHASE_OUTPUTS * m);
@@ -115,15 +110,42 @@ static void shape_phases(bushd_mcu* mcu, bushd_plane* plane) {
   }
 }
 
+// Instead of the steps of the tick: there are none while it is measured.
+static bool make_settle_step(bushd_mcu* mcu, bushd_plane* plane) {
+  // A motor that an input moves disturbs what is measured.
+  if (plane->active != 0) {
+    mcu->emission.of.settle.ticks = 0;
+    return false;
+  }
+  uint8_t m = 0;
+  const int8_t step = bushd_mcu_settle_step(mcu, &m);
+  if (step == 0) return false;
+  if (step > 0) {
+    mcu->direction |= motor_bit(m);
+  } else {
+    mcu->direction &= (uint16_t)~motor_bit(m);
+  }
+  plane->direction = mcu->direction;
+  plane->steps[m] = step;
+  plane->active = motor_bit(m);
+  memset(plane->step, 0, sizeof plane->step);
+  plane->step[bushd_mcu_settle_slot(mcu)] = motor_bit(m);
+  return true;
+}
+
 void bushd_mcu_shape(bushd_mcu* mcu, bushd_plane* plane) {
   const bushd_emission_grid* grid = &mcu->emission.grid;
   if (grid->mode == BUSHD_EMISSION_PHASES) {
+    plane->outputs = BUSHD_OUTPUTS_LEVELS;
     shape_phases(mcu, plane);
   } else if (grid->mode == BUSHD_EMISSION_EVEN) {
     const uint16_t changed = plane->direction ^ mcu->plane[mcu->front].direction;
     bushd_emission_defer(plane->step, changed & plane->active, grid->setup_slots);
   } else {
+    if (grid->mode == BUSHD_EMISSION_STAGGERED && make_settle_step(mcu, plane)) return;
     bushd_emission_fill(plane->step, mcu->config.slots, grid, plane->steps, mcu->config.motors);
-    if (grid->mode == BUSHD_EMISSION_COMMON_DIR) plane->direction = 0;
+    if (grid->mode != BUSHD_EMISSION_COMMON_DIR) return;
+    plane->outputs = BUSHD_OUTPUTS_COMMON_DIR;
+    plane->direction = 0;
   }
 }

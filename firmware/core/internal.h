@@ -145,6 +145,11 @@ uint16_t bushd_mcu_homing_motor(const bushd_mcu* mcu);           // as a mask
 // local.c
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message);
 void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs);  // before every tick
+// settle.c: how long the supply current needs after a step.
+bool bushd_mcu_settle_pending(const bushd_mcu* mcu);
+// In every tick that is prepared: the step that is to be made for it, of which motor; 0: none.
+int8_t bushd_mcu_settle_step(bushd_mcu* mcu, uint8_t* motor);
+uint16_t bushd_mcu_settle_slot(const bushd_mcu* mcu);  // where it is made
 
 // trigger.c: runs that an edge at the trigger input starts.
 bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message);

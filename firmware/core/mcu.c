@@ -32,7 +32,7 @@ void bushd_mcu_update_state(bushd_mcu* mcu) {
   const uint8_t ready = BUSHD_FLAG_CONFIGURED | BUSHD_FLAG_SYNCED | BUSHD_FLAG_ENABLED;
   if (mcu->faults != 0) {
     mcu->state = BUSHD_STATE_FAULT;
-  } else if ((mcu->flags & ready) != ready) {
+  } else if ((mcu->flags & ready) != ready || bushd_mcu_settle_pending(mcu)) {
     mcu->state = BUSHD_STATE_BUSY;
   } else {
     mcu->state = is_moving(mcu) ? BUSHD_STATE_RUN : BUSHD_STATE_READY;

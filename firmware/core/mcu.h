@@ -37,8 +37,7 @@ typedef enum bushd_outputs {
   // Pulses, and the common DIR is low in even slots and high in odd ones. It changes when the
   // pulses of a slot are over; after the last one, and in planes without steps, it is low.
   BUSHD_OUTPUTS_COMMON_DIR = 1,
-  // Levels, from the slot's beginning until others follow. A plane without steps has those of its
-  // first slot only.
+  // Levels, from the slot's beginning until others follow; also in planes without steps.
   BUSHD_OUTPUTS_LEVELS = 2
 } bushd_outputs;
 
@@ -146,15 +145,41 @@ typedef struct bushd_mcu_clock {
   uint16_t two_masters_ticks;  // until the flag falls
 } bushd_mcu_clock;
 
+// How long the supply current needs after a step (settle.c).
+typedef struct bushd_mcu_settle {
+  bool done;
+  bool away;
+  uint8_t ticks;  // since it began; 0: not under way
+  union {
+    struct {
+      uint32_t sum;
+      uint16_t samples;
+      uint16_t lowest;
+      uint16_t highest;
+    } quiet;  // before the step
+    struct {
+      uint32_t back_ns;  // 0: not known
+      uint16_t mean;     // without a step
+      uint16_t fluctuation;
+      uint16_t peak;  // farthest from the mean
+    } step;           // from then on
+  } of;
+} bushd_mcu_settle;
+
+// Of up to four motors driven by phases.
+typedef struct bushd_mcu_windings {
+  uint8_t phase[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];
+  uint8_t on_ticks[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];  // they stay on, after a move
+} bushd_mcu_windings;
+
 // How steps get to the pins (emission.c).
 typedef struct bushd_mcu_emission {
   bushd_emission settings;
   bushd_emission_grid grid;
-  bool plain;       // even, and DIR needs no setup time
-  uint8_t outputs;  // bushd_outputs
-  // Of up to four motors driven by phases.
-  uint8_t phase[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];
-  uint8_t on_ticks[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];  // its windings, after a move
+  union {
+    bushd_mcu_settle settle;      // of staggered
+    bushd_mcu_windings windings;  // of phases
+  } of;
 } bushd_mcu_emission;
 
 typedef struct bushd_mcu_homing {
@@ -306,6 +331,12 @@ void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns);
 
 // Computes the plane of the next tick. O(slots + steps).
 void bushd_mcu_prepare(bushd_mcu* mcu);
+
+// Whether samples of the supply current are wanted in the present tick, as many as the port can
+// take.
+bool bushd_mcu_wants_samples(const bushd_mcu* mcu);
+// One that was taken so long after the tick's beginning. In order of time. O(1).
+void bushd_mcu_sample(bushd_mcu* mcu, uint32_t time_in_tick_ns, uint16_t current);
 
 #ifdef __cplusplus
 }

@@ -253,13 +253,14 @@ void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane) {
     if (plane->steps[m] != 0) plane->active |= motor_bit(m);
   }
   plane->direction = mcu->direction;
-  plane->outputs = mcu->emission.outputs;
+  plane->outputs = BUSHD_OUTPUTS_PULSES;
   plane->reference_rise = plane->reference_fall = 0;
+  const bushd_emission_grid* grid = &mcu->emission.grid;
   const bool reference = bushd_mcu_reference_on(mcu);
   // Masks that have become levels do not show steps any more.
-  const bool levels = plane->outputs == BUSHD_OUTPUTS_LEVELS;
+  const bool levels = grid->mode == BUSHD_EMISSION_PHASES;
   if (reference && levels) bushd_mcu_emit_reference(mcu, plane);
-  if (!mcu->emission.plain) bushd_mcu_shape(mcu, plane);
+  if (grid->mode != BUSHD_EMISSION_EVEN || grid->setup_slots != 0) bushd_mcu_shape(mcu, plane);
   if (reference && !levels) bushd_mcu_emit_reference(mcu, plane);
 }
 

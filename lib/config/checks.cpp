@@ -38,7 +38,9 @@ Result<void> check_step_period(const Loading& loading, std::size_t index) {
   const Mcu& mcu = config.mcu_of(motor);
   const Bus& bus = config.bus_of(motor);
   if (mcu.emission.settings.step_us == 0) return {};
-  const std::uint32_t room = bus.tick_us / mcu.emission.settings.step_us;
+  const std::uint32_t dir_setup_us =
+      std::min<std::uint32_t>(mcu.emission.settings.dir_setup_us, bus.tick_us);
+  const std::uint32_t room = (bus.tick_us - dir_setup_us) / mcu.emission.settings.step_us;
   const bushd_table& view = config.table_of(motor).view();
   const std::uint32_t steps = bushd_table_max_steps_per_tick(&view, bus.tick_ns());
   if (steps <= room) return {};
@@ -48,7 +50,7 @@ Result<void> check_step_period(const Loading& loading, std::size_t index) {
       "by "
       "table \"{}\"; allowed: {} or less. Or use a slower table",
       mcu.emission.settings.step_us, room, bus.tick_us, bus.name, motor.name, steps,
-      config.table_of(motor).name(), bus.tick_us / steps);
+      config.table_of(motor).name(), (bus.tick_us - dir_setup_us) / steps);
   return fail(std::move(error));
 }
 

@@ -12,6 +12,9 @@ using tables::TomlReader;
 
 constexpr std::array<std::string_view, 4> kSequences = {"wave", "full", "half", "three-phase"};
 constexpr std::int64_t kMaxUs = UINT16_MAX;
+// Where the first step of a tick would begin together with the change of DIR: enough for slow
+// drivers.
+constexpr std::uint16_t kDirSetupUs = 5;
 
 template <std::size_t N>
 std::string list_of(const std::array<std::string_view, N>& words) {
@@ -94,6 +97,9 @@ Result<link::EmissionSetup> read_emission(const TomlReader& reader) {
   };
   if (auto read = optional_us("settle_us", 1, &settings.settle_us); !read) {
     return fail(read.error());
+  }
+  if (settings.mode == BUSHD_EMISSION_BURST || settings.mode == BUSHD_EMISSION_STAGGERED) {
+    settings.dir_setup_us = kDirSetupUs;
   }
   if (auto read = optional_us("dir_setup_us", 0, &settings.dir_setup_us); !read) {
     return fail(read.error());

@@ -132,8 +132,8 @@ bushd_status bushd_decode_emission(const uint8_t* payload, size_t size, bushd_em
   message->settle_us = get16(&r);
   message->dir_setup_us = get16(&r);
   message->pulse_us = get16(&r);
-  const bool has_period = message->mode >= BUSHD_EMISSION_BURST &&
-                          message->mode <= BUSHD_EMISSION_STAGGERED;
+  const bool has_period =
+      message->mode >= BUSHD_EMISSION_BURST && message->mode <= BUSHD_EMISSION_STAGGERED;
   return finish(&r, message->mode <= BUSHD_EMISSION_PHASES &&
                         message->sequence <= BUSHD_PHASES_THREE && hold_current <= 1 &&
                         (!has_period || message->step_us >= 1));

@@ -14,6 +14,10 @@ namespace bushd::link {
 
 struct EmissionSetup {
   bushd_emission settings{};
+  // Before work, how long the supply current needs after a step.
+  bool measures() const {
+    return settings.mode == BUSHD_EMISSION_STAGGERED && settings.settle_us == 0;
+  }
   // Where they stand; without messages.
   Error mode_at{};
   Error step_at{};

@@ -37,8 +37,8 @@ class Axis {
   // ticks, years of the longest.
   static constexpr double kMaxDurationTicks = 1 << 30;
 
-  // From rest at `from_steps`, by `steps` (either sign), time 0 at the beginning of tick `start`, or
-  // `late_ns` after it. Precondition: !busy(), |steps| < 2^31, duration_ticks(steps) <=
+  // From rest at `from_steps`, by `steps` (either sign), time 0 at the beginning of tick `start`,
+  // or `late_ns` after it. Precondition: !busy(), |steps| < 2^31, duration_ticks(steps) <=
   // kMaxDurationTicks, late_ns less than a tick.
   void start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns = 0);
 

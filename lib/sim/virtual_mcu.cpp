@@ -6,6 +6,7 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
     : index_(index),
       driver_(driver),
       sink_(sink),
+      supply_(options.supply ? std::optional<SupplyCurrent>(*options.supply) : std::nullopt),
       queue_(std::size_t{options.queue_ticks} * options.motors),
       codes_(options.code_count) {
   bushd_virtual_config config{};
@@ -25,21 +26,28 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
   config.clock_ppm = options.clock_ppm;
   config.turnaround_ns = options.turnaround_ns;
   config.context = this;
-  config.edge = sink != nullptr ? on_edge : nullptr;
   config.read_inputs = on_read_inputs;
+  config.edge = sink != nullptr || supply_ ? on_edge : nullptr;
+  config.current = supply_ ? on_current : nullptr;
   config.transmit = on_transmit;
   bushd_virtual_init(&port_, &config);
 }
 
 void VirtualMcu::on_edge(void* context, std::int64_t time_ns, bushd_virtual_signal signal,
                          std::uint8_t index, bool level) {
-  const auto& self = *static_cast<VirtualMcu*>(context);
+  auto& self = *static_cast<VirtualMcu*>(context);
   static_assert(static_cast<int>(Signal::kStep) == BUSHD_VIRTUAL_STEP);
   static_assert(static_cast<int>(Signal::kDir) == BUSHD_VIRTUAL_DIR);
   static_assert(static_cast<int>(Signal::kEnable) == BUSHD_VIRTUAL_EN);
   static_assert(static_cast<int>(Signal::kCommonDir) == BUSHD_VIRTUAL_COMMON_DIR);
   static_assert(static_cast<int>(Signal::kReference) == BUSHD_VIRTUAL_REFERENCE);
-  self.sink_->edge({time_ns, self.index_, static_cast<Signal>(signal), index, level});
+  const Edge edge = {time_ns, self.index_, static_cast<Signal>(signal), index, level};
+  if (self.supply_) self.supply_->edge(edge);
+  if (self.sink_ != nullptr) self.sink_->edge(edge);
+}
+
+std::uint16_t VirtualMcu::on_current(void* context, std::int64_t time_ns) {
+  return static_cast<const VirtualMcu*>(context)->supply_->reading(time_ns);
 }
 
 void VirtualMcu::attach_switch(std::size_t output, const SwitchOptions& options) {

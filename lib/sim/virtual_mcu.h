@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "firmware/ports/virtual/virtual.h"
 #include "sim/mcu.h"
+#include "sim/supply_current.h"
 #include "sim/switch.h"
 
 namespace bushd::sim {
@@ -24,7 +26,8 @@ struct McuOptions {
       0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
   std::int32_t clock_ppm = 0;  // > 0: its clock is fast
   std::uint32_t turnaround_ns = 20'000;
-  std::uint64_t unique_id = 0;  // 0: made of its place on the bus
+  std::uint64_t unique_id = 0;          // 0: made of its place on the bus
+  std::optional<SupplyRules> supply{};  // what its current sensor sees; else set_current says it
 };
 
 class VirtualMcu final : public Mcu {
@@ -51,6 +54,9 @@ class VirtualMcu final : public Mcu {
   void fail_self_tests(std::uint8_t tests) { port_.failing_tests = tests; }     // of the next boots
   void set_reset_cause(bushd_reset_cause cause) { port_.reset_cause = cause; }  // of the next boot
 
+  // Precondition: it has one.
+  const SupplyCurrent& supply() const { return *supply_; }
+
   // See firmware/ports/virtual/virtual.h.
   void advance(TimeNs now_ns) override { bushd_virtual_advance(&port_, now_ns); }
   void receive(std::uint8_t byte, TimeNs now_ns) override {
@@ -64,12 +70,14 @@ class VirtualMcu final : public Mcu {
   static void on_edge(void* context, std::int64_t time_ns, bushd_virtual_signal signal,
                       std::uint8_t index, bool level);
   static bushd_inputs on_read_inputs(void* context, std::int64_t time_ns);
+  static std::uint16_t on_current(void* context, std::int64_t time_ns);
   static void on_transmit(void* context, std::int64_t start_ns, const std::uint8_t* wire,
                           std::size_t size);
 
   std::size_t index_;
   Driver& driver_;
   EdgeSink* sink_;
+  std::optional<SupplyCurrent> supply_;
   std::vector<std::int16_t> queue_;
   std::vector<std::uint16_t> codes_;
   std::map<std::size_t, Switch> switches_;  // by output

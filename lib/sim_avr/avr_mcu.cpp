@@ -119,7 +119,11 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   watch_pin('H', 3, on_pin, &pins_[pin_count_++]);
   pins_[pin_count_] = {this, Signal::kReference, 0, false};
   watch_pin('G', 5, on_pin, &pins_[pin_count_++]);
+  pins_[pin_count_] = {this, Signal::kCommonDir, 0, false};
+  watch_pin('F', 2, on_pin, &pins_[pin_count_++]);
   watch_pin('E', 4, on_driver_enable, this);
+  avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER), on_adc,
+                          this);
 
   reset_hook_ = std::make_unique<ResetHook>();
   reset_hook_->io.kind = "board";
@@ -170,6 +174,11 @@ void AvrMcu::set_current(std::uint16_t reading) {
   // Rounded up: the converter rounds down.
   const std::uint32_t mv = (reading * kSupplyMv + BUSHD_MAX_CURRENT - 1) / BUSHD_MAX_CURRENT;
   avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0), mv);
+}
+
+void AvrMcu::on_adc(avr_irq_t*, std::uint32_t, void* param) {
+  auto& self = *static_cast<AvrMcu*>(param);
+  if (self.on_conversion) self.set_current(self.on_conversion(self.time_ns()));
 }
 
 TimeNs AvrMcu::time_ns() const {

@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -50,6 +51,9 @@ class AvrMcu final : public Mcu {
   void receive(std::uint8_t byte, TimeNs now_ns) override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override;
 
+  // What the current sensor reads when a conversion begins; not set: what set_current said.
+  std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
+
   // Faults of the chip.
   void hang();        // jumps into an endless loop, interrupts stay as they are
   void stop_ticks();  // the tick timer's interrupts are off
@@ -88,6 +92,7 @@ class AvrMcu final : public Mcu {
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_driver_enable(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_byte(avr_irq_t* irq, std::uint32_t value, void* param);
+  static void on_adc(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_interrupt(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_reset(avr_io_t* io);
   static std::uint8_t read_shorted(avr_t* avr, std::uint16_t address, void* param);
@@ -117,7 +122,7 @@ class AvrMcu final : public Mcu {
   std::uint64_t eeprom_writes_ = 0;
   std::uint64_t overruns_ = 0;
   std::uint64_t bytes_cut_ = 0;
-  std::array<Pin, 34> pins_{};
+  std::array<Pin, 35> pins_{};
   std::size_t pin_count_ = 0;
 };
 

@@ -46,6 +46,7 @@ TEST(EmissionKeys, EachModeHasItsKeys) {
   EXPECT_EQ(burst.mode, BUSHD_EMISSION_BURST);
   EXPECT_EQ(burst.step_us, 300);
   EXPECT_EQ(burst.pulse_us, 3);
+  EXPECT_EQ(burst.dir_setup_us, 5) << "DIR must not change together with the first step";
   const bushd_emission common =
       settings_of("emission = \"common-dir\"\nstep_us = 300\ndir_setup_us = 5\n");
   EXPECT_EQ(common.mode, BUSHD_EMISSION_COMMON_DIR);

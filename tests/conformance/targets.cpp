@@ -16,9 +16,7 @@ namespace {
 class Atmega2560 final : public McuUnderTest {
  public:
   McuOptions twin() const override { return {.slots = 128, .queue_ticks = 64, .code_count = 952}; }
-  std::uint16_t lacks() const override {
-    return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_COMMON_DIR | BUSHD_CAN_PHASES;
-  }
+  std::uint16_t lacks() const override { return BUSHD_CAN_TABLE_TICKS; }
   std::uint32_t full_tick_ns(bushd_format format) const override {
     return format == BUSHD_FORMAT_FINE ? 4'000'000 : 2'560'000;
   }

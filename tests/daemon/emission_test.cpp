@@ -83,7 +83,20 @@ TEST_P(EmissionModes, MovesReachTheirTargetsAndNoStepIsLost) {
       EXPECT_EQ(lab.shaft_steps(names[static_cast<std::size_t>(m)]), reported);
     }
     EXPECT_EQ(drivers.position[2], 90);
+    const bool told = lab.move_lines().front().find("\"emission\":") != std::string::npos;
+    EXPECT_EQ(told, std::string_view(GetParam().name) != "even") << lab.move_lines().front();
   }
+}
+
+TEST(EmissionStaggered, SupplyCurrentIsMeasuredBeforeTheMcuIsReady) {
+  Lab lab(with_keys("fine", "emission = \"staggered\"\nstep_us = 320\n"));
+  lab.connect();
+  EXPECT_NEAR(lab.bus(0).mcu(0).core().emission.of.settle.of.step.back_ns, 518'000, 60'000);
+  EXPECT_EQ(lab.motor("m01").position_steps, 0);
+  EXPECT_EQ(lab.bus(0).mcu(0).shaft(0).travel_steps, 2u) << "a step and its way back";
+  const reply_t result = lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {300, -300}));
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_EQ(lab.shaft_steps("m01"), 300);
 }
 
 TEST(EmissionPhases, MovesTurnTheWindings) {

@@ -27,9 +27,11 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
     for (std::size_t m = 0; m < config_.mcus.size(); ++m) {
       if (config_.mcus[m].bus.value != b) continue;
       // Each boots at another time, so that their ticks have nothing in common by themselves.
-      buses_[b].bus->add_mcu({.address = config_.mcus[m].address.value,
+      sim::McuOptions options{.address = config_.mcus[m].address.value,
                               .boot_number = static_cast<std::uint16_t>(100 * b + m + 1),
-                              .boot_ns = static_cast<std::int64_t>(m) * 777'777});
+                              .boot_ns = static_cast<std::int64_t>(m) * 777'777};
+      if (config_.mcus[m].emission.measures()) options.supply = sim::SupplyRules{};
+      buses_[b].bus->add_mcu(options);
     }
     buses_[b].bus->on_master_byte = [this, b](std::uint8_t byte, sim::TimeNs) {
       if (buses_[b].plugged) buses_[b].received.push_back(byte);

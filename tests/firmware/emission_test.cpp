@@ -16,6 +16,7 @@ bushd_emission of_mode(bushd_emission_mode mode) {
   bushd_emission settings = burst(100);
   settings.mode = mode;
   settings.sequence = BUSHD_PHASES_HALF;
+  settings.settle_us = 30;
   return settings;
 }
 

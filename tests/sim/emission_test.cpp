@@ -8,7 +8,7 @@
 #include <random>
 #include <set>
 
-#include "sim/bus_fixture.h"
+#include "sim/emission_bus.h"
 
 namespace bushd::sim {
 namespace {
@@ -45,64 +45,6 @@ std::int64_t sum(const std::vector<Step>& steps) {
   for (const Step& step : steps) position += step.right ? 1 : -1;
   return position;
 }
-
-class EmissionBus {
- public:
-  explicit EmissionBus(std::uint32_t tick_ns, bushd_format format = BUSHD_FORMAT_COARSE,
-                       std::uint16_t slots = 256)
-      : tick_ns_(tick_ns), format_(format), bus(1'000'000, &recorder), master(bus) {
-    bus.add_mcu({.address = 1, .slots = slots});
-    master.bring_up(tick_ns, format);
-    master.upload_table(1, 0, 1000, {60'000, 30'000}, 20'000);
-  }
-
-  void use(const bushd_emission& settings, int motors) {
-    ASSERT_EQ(master.acknowledged(1, BUSHD_MSG_EMISSION, bushd_encode_emission, settings),
-              BUSHD_OK);
-    for (int m = 0; m < motors; ++m) master.assign(1, static_cast<std::uint8_t>(m), 0);
-    recorder.edges.clear();
-  }
-
-  // One row of steps a tick, a column a motor; they begin together, from rest to rest. Fine ticks
-  // make the same steps.
-  void run(const std::vector<std::vector<int>>& rows) {
-    const std::size_t motors = rows.front().size();
-    const bool fine = format_ == BUSHD_FORMAT_FINE;
-    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-    const std::vector<std::uint16_t> delays(motors, 0);
-    first_tick = bus.mcu(0).core().tick + 20;
-    std::size_t size = bushd_encode_ticks_head(
-        0, static_cast<std::uint8_t>(BUSHD_TICKS_START | (fine ? BUSHD_TICKS_FINE : 0)), first_tick,
-        static_cast<std::uint8_t>(rows.size()), static_cast<std::uint16_t>((1u << motors) - 1),
-        delays.data(), payload.data());
-    for (const auto& row : rows) {
-      for (const int steps : row) {
-        if (fine) {
-          bushd_put_i16(payload.data() + size, static_cast<std::int16_t>(256 * steps));
-          size += 2;
-        } else {
-          payload[size++] = static_cast<std::uint8_t>(std::abs(steps) | (steps > 0 ? 0x80 : 0));
-        }
-      }
-    }
-    master.post(1, BUSHD_MSG_TICKS, {payload.data(), size});
-    while (bus.mcu(0).core().tick != first_tick) bus.advance_to(bus.next_event_ns());
-    start_ns = bus.now_ns();
-    bus.advance_to(start_ns + static_cast<TimeNs>(rows.size() + 3) * tick_ns_);
-    ASSERT_EQ(master.poll(1).moving, 0);
-  }
-
- private:
-  std::uint32_t tick_ns_;
-  bushd_format format_;
-
- public:
-  Recorder recorder;
-  Bus bus;
-  Master master;
-  std::uint32_t first_tick = 0;
-  TimeNs start_ns = 0;  // of the rows
-};
 
 bushd_emission of_mode(bushd_emission_mode mode, std::uint16_t step_us = 2048) {
   bushd_emission settings{};
@@ -176,7 +118,7 @@ TEST(EmissionOnPins, PulseWidthAndDirSetupAreKeptInEveryModeAndNoStepIsLost) {
     for (const bushd_emission_mode mode : {BUSHD_EMISSION_EVEN, BUSHD_EMISSION_BURST,
                                            BUSHD_EMISSION_COMMON_DIR, BUSHD_EMISSION_STAGGERED}) {
       for (const std::uint16_t slots : {std::uint16_t{128}, std::uint16_t{201}}) {
-        EmissionBus lab(2'560'000, format, slots);
+        EmissionBus lab(2'560'000, {.slots = slots}, format);
         bushd_emission settings = of_mode(mode, 100);
         settings.settle_us = 30;
         settings.dir_setup_us = mode == BUSHD_EMISSION_COMMON_DIR ? 6 : 50;

@@ -25,9 +25,11 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
   for (std::size_t i = 0; i < config->buses.size(); ++i) {
     const auto& candidate = config->buses[i];
     if (!bus.empty() && candidate.name != bus) continue;
-    Setup setup{candidate.name, candidate.baud, {}};
+    Setup setup{candidate.name, candidate.baud, {}, {}};
     for (const auto& mcu : config->mcus) {
-      if (mcu.bus.value == i) setup.addresses.push_back(mcu.address.value);
+      if (mcu.bus.value != i) continue;
+      setup.addresses.push_back(mcu.address.value);
+      if (mcu.emission.measures()) setup.measuring.insert(mcu.address.value);
     }
     return setup;
   }

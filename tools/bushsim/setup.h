@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct Setup {
   std::string bus;
   std::uint32_t baud = 0;
   std::vector<std::uint8_t> addresses;  // at least one
+  std::set<std::uint8_t> measuring;     // of these, the MCUs that measure their supply current
 };
 
 // `bus` may be empty if the configuration has one bus only.

@@ -98,7 +98,10 @@ void Simulator::add_mcus(const Options& options) {
     const auto image = options.images.find(address);
     is_virtual_.push_back(image == options.images.end());
     if (is_virtual_.back()) {
-      bus_.add_mcu({.address = address, .boot_number = options.boot_number, .boot_ns = boot_ns});
+      bushd::sim::McuOptions mcu{
+          .address = address, .boot_number = options.boot_number, .boot_ns = boot_ns};
+      if (setup_.measuring.contains(address)) mcu.supply = bushd::sim::SupplyRules{};
+      bus_.add_mcu(mcu);
       for (const SwitchAt& one : options.switches) {
         if (one.address != address) continue;
         bus_.mcu(bus_.mcu_count() - 1).attach_switch(one.output, one.options);

@@ -11,6 +11,9 @@ a tick, in which that line crosses n (fine) or n - 1/2 (coarse: so that c steps 
 that the MCU runs by its own table ("moves": "table") is made otherwise: every step in the slot in which its
 time lies, until the first change; from that tick on it is made of ticks as well.
 
+Emission "burst" makes the steps of a tick otherwise: one after the other, each T_step ("step_us", rounded up to
+slots), beginning "dir_setup_us" (rounded up, of a tick that is 1/64 shorter) after the tick.
+
 How far an edge may lie from the table.  T is the tick, v the speed in steps per time. Within the tick the
 true position has slopes from vmin to vmax, so it leaves its own chord by at most (vmax - vmin) T / 4.
 Rounding lowers the chord by up to r = 1/256 step; in the coarse format by up to a whole step, of which the
@@ -19,7 +22,7 @@ crossing half a step earlier takes back half: r = 1/2. The line's slope is d / T
     |edge - table|  <=  T / d * ((vmax - vmin) T / 4 + r) + T / S,  and never more than T
 
 In a move's last tick vmin is 0, as the motor comes to rest somewhere in it: it is reported apart, and so is
-the first. Of a table run an edge lies in its slot: |edge - table| <= T / S.
+the first. Of a table run an edge lies in its slot: |edge - table| <= T / S. With burst it lies in its tick: T.
 """
 
 import bisect
@@ -84,6 +87,11 @@ class Move:
         self.id = event["id"]
         self.tick_ns = event["tick_ns"]
         self.fine = {"fine": True, "coarse": False}[event["format"]]
+        self.emission = event.get("emission", "even")
+        if self.emission not in ("even", "burst"):
+            raise InputError(f"move {self.id} is emitted {self.emission}; only even and burst can be checked")
+        self.step_ns = 1000 * event.get("step_us", 0)
+        self.dir_setup_ns = 1000 * event.get("dir_setup_us", 0)
         self.start_tick = event["start_tick"]
         self.late_ns = event.get("late_ns", 0)  # begins so long after the beginning of its start tick
         self.from_steps = event["from_steps"]
@@ -153,7 +161,9 @@ class Move:
             by_table = self.start_tick + tick < self.ticks_from
             begin_ns = (self.start_tick + tick) * self.tick_ns
             for n in range(made, after):
-                if by_table:
+                if self.emission == "burst":
+                    slot = self.burst_slot(n - made, slots)
+                elif by_table:
                     slot = (times[n] - tick * self.tick_ns) * slots // self.tick_ns
                 else:
                     slot = (256 * n + crossing - q0) * slots // (q1 - q0)
@@ -167,11 +177,16 @@ class Move:
                     tick=self.start_tick + tick,
                     direction=self.direction,
                     place=place,
-                    bound_ns=self.tick_ns / slots if by_table else bound_ns,
+                    bound_ns=self.tick_ns if self.emission == "burst" else self.tick_ns / slots if by_table else bound_ns,
                 )
             made = after
             q0 = q1
             tick += 1
+
+    def burst_slot(self, n, slots):
+        """The slot of step n of a tick, n = 0 ..."""
+        shortest_ns = self.tick_ns - self.tick_ns // 64
+        return -(-self.dir_setup_ns * slots // shortest_ns) + n * -(-self.step_ns * slots // self.tick_ns)
 
     def bound_ns(self, delays, last, displacement, slots):
         """How far an edge of a tick may lie from the table (above); `delays` are those that run in it."""

@@ -13,6 +13,8 @@
 #define STEP_HIGH PORTC
 #define DIR_LOW PORTL
 #define DIR_HIGH PORTB
+#define COMMON_DIR_PIN PINF
+#define COMMON_DIR_BIT 2
 // Inputs, with pull-ups; closed to ground: active.
 #define INPUT_LOW PINK
 #define INPUT_HIGH PINJ
@@ -41,6 +43,7 @@ static inline void board_init(void) {
   DDRH = 1 << EN_BIT;
   DDRE = 1 << DE_BIT;
   DDRG = 1 << REFERENCE_BIT;
+  DDRF = 1 << COMMON_DIR_BIT;
   // Pull-ups: the inputs, and the receiver's line while the transceiver does not drive it.
   PORTK = PORTJ = 0xFF;
   PORTD = SYSTEM_BITS;

@@ -27,6 +27,7 @@ _Static_assert(offsetof(emission_tick, top) == TICK_TOP, "as in emission_slots.S
 _Static_assert(offsetof(emission_tick, last_top) == TICK_LAST_TOP, "as in emission_slots.S");
 _Static_assert(offsetof(emission_tick, direction) == TICK_DIRECTION, "as in emission_slots.S");
 _Static_assert(offsetof(emission_tick, cycles) == TICK_CYCLES, "as in emission_slots.S");
+_Static_assert(offsetof(emission_tick, begun) == TICK_BEGUN, "as in emission_slots.S");
 
 const emission_tick* volatile emission_next = &emission_silent;
 const emission_tick* volatile emission_taken;
@@ -36,7 +37,8 @@ volatile uint8_t emission_committed;
 uint32_t emission_begun_at;
 uint32_t emission_next_start;
 
-static const uint16_t kNoSteps[MAX_EMPTY_SLOTS];
+// Of ticks of few slots: no pulses, or the levels that the plane before has left.
+static uint16_t idle_masks[MAX_EMPTY_SLOTS];
 
 typedef struct tick_length {
   uint32_t cycles;
@@ -62,6 +64,13 @@ static void set_masks(emission_tick* tick, const uint16_t* masks, uint8_t slots)
   tick->end = (uint8_t)(uintptr_t)(masks + slots);
 }
 
+static uint8_t begun_flags(uint8_t outputs) {
+  const uint8_t flags = 1 << TICK_CHANGES;
+  if (outputs == BUSHD_OUTPUTS_LEVELS) return flags | 1 << TICK_SPECIAL | 1 << TICK_LEVELS;
+  if (outputs == BUSHD_OUTPUTS_COMMON_DIR) return flags | 1 << TICK_SPECIAL;
+  return flags;
+}
+
 static void set_plane(emission_tick* tick, const bushd_plane* plane, uint32_t cycles) {
   const uint16_t slot = (uint16_t)(cycles / EMISSION_SLOTS);
   set_masks(tick, plane->step, EMISSION_SLOTS);
@@ -69,19 +78,21 @@ static void set_plane(emission_tick* tick, const bushd_plane* plane, uint32_t cy
   tick->top = (uint16_t)(slot - 1u);
   tick->last_top = (uint16_t)(tick->top + (uint16_t)(cycles % EMISSION_SLOTS));
   tick->cycles = cycles;
+  tick->begun = begun_flags(plane->outputs);
 }
 
 // Of few slots, so that the time is left to the main loop. The last one is as short as may be: in
 // it the next tick is taken.
-static void set_empty(emission_tick* tick, uint16_t direction, uint32_t cycles) {
+static void set_empty(emission_tick* tick, uint16_t direction, uint8_t begun, uint32_t cycles) {
   const uint32_t body = cycles - SHORT_SLOT_CYCLES;
   const uint8_t shift = body <= UINT16_MAX ? 0 : 3;
   const uint8_t long_slots = (uint8_t)(1u << shift);
-  set_masks(tick, kNoSteps, (uint8_t)(long_slots + 1u));
+  set_masks(tick, idle_masks, (uint8_t)(long_slots + 1u));
   tick->direction = direction;
   tick->top = (uint16_t)((body >> shift) - 1u);
   tick->last_top = (uint16_t)(SHORT_SLOT_CYCLES - 1u + (body & (long_slots - 1u)));
   tick->cycles = cycles;
+  tick->begun = begun;
 }
 
 static tick_length length_of(uint32_t tick_ns) {
@@ -111,10 +122,11 @@ static tick_length length_of_next(void) {
 // `again`: in place of the one that waits; not if it was taken.
 static void give(tick_length length, bool again) {
   emission_tick* const tick = &prepared[spare];
-  if (next_plane->active != 0) {
+  // Levels are written anew in every slot.
+  if (next_plane->active != 0 || next_plane->outputs == BUSHD_OUTPUTS_LEVELS) {
     set_plane(tick, next_plane, length.cycles);
   } else {
-    set_empty(tick, next_plane->direction, length.cycles);
+    set_empty(tick, next_plane->direction, 1 << TICK_CHANGES, length.cycles);
   }
   bool given = false;
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
@@ -153,7 +165,17 @@ bool emission_begun(void) {
   return emission_committed;
 }
 
+// If no plane is ready after this one, its last levels stay.
+static void hold_levels(void) {
+  const bool levels = next_plane->outputs == BUSHD_OUTPUTS_LEVELS;
+  const uint16_t last = levels ? next_plane->step[EMISSION_SLOTS - 1u] : 0;
+  emission_silent.begun = levels ? begun_flags(BUSHD_OUTPUTS_LEVELS) : 1 << TICK_CHANGES;
+  if (idle_masks[0] == last) return;
+  for (uint8_t i = 0; i < MAX_EMPTY_SLOTS; ++i) idle_masks[i] = last;
+}
+
 void emission_swap(void) {
+  hold_levels();
   core_start = emission_begun_at;
   residue = next_length.residue;
   carry_ns += adjust_ns - next_length.extra_ns;
@@ -176,7 +198,8 @@ static void change_length(void) {
 void emission_set_tick(uint32_t ns) {
   plain = length_of(ns);
   emission_tick silent;
-  set_empty(&silent, emission_silent.direction, plain.cycles);
+  set_empty(&silent, emission_silent.direction, emission_silent.begun | 1 << TICK_CHANGES,
+            plain.cycles);
   // Not while the interrupts read it.
   bool set = false;
   do {

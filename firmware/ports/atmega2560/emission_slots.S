@@ -2,7 +2,7 @@
 ; the last slot of a tick and in the first one of the next. None of them changes a flag of SREG. In section
 ; .vectors they lie behind the vectors, so that these reach them by rjmp.
 ;
-; Cycles with entry and vector: A 23, B 14, and once a tick: A in the first slot 54 and in the last one 67,
+; Cycles with entry and vector: A 23, B 16 (19 with a common DIR), and once a tick: A in the first slot 55 and in the last one 67,
 ; C 29 and then 16 with interrupts off.
 
 #include <avr/io.h>
@@ -29,9 +29,10 @@ TIMER1_COMPA_vect:
     sbis TICK_FLAGS, TICK_IS_NEXT
     rjmp take_next_tick
     ; The first slot: timer 1 has begun it with the length of the one before.
-    cbi TICK_FLAGS, TICK_IS_NEXT
     lds r30, emission_taken
     lds r31, emission_taken+1
+    ldd DATA_LOW, Z+TICK_BEGUN
+    out TICK_FLAGS, DATA_LOW
     ldd DATA_LOW, Z+TICK_TOP+1
     sts OCR1AH, DATA_LOW
     ldd DATA_LOW, Z+TICK_TOP
@@ -70,8 +71,18 @@ take_next_tick:
 
     .global TIMER1_COMPB_vect
 TIMER1_COMPB_vect:
+    sbic TICK_FLAGS, TICK_SPECIAL
+    rjmp special_slot
     out _SFR_IO_ADDR(STEP_LOW), ZERO
     out _SFR_IO_ADDR(STEP_HIGH), ZERO
+    reti
+special_slot:
+    sbic TICK_FLAGS, TICK_LEVELS
+    reti
+    out _SFR_IO_ADDR(STEP_LOW), ZERO
+    out _SFR_IO_ADDR(STEP_HIGH), ZERO
+    ; A one turns the pin over.
+    sbi _SFR_IO_ADDR(COMMON_DIR_PIN), COMMON_DIR_BIT
     reti
 
     .global TIMER1_COMPC_vect

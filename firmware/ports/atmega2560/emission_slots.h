@@ -22,9 +22,12 @@
 #define TICK_LAST_TOP 6
 #define TICK_DIRECTION 8
 #define TICK_CYCLES 10
+#define TICK_BEGUN 14
 
 // Bits of GPIOR0; the low ones hold what the tests before `main` found, until the first tick
 // begins.
+#define TICK_LEVELS 4   // masks are levels: they stay
+#define TICK_SPECIAL 5  // that, or the common DIR changes behind every pulse
 #define TICK_IS_NEXT 6  // the mark that comes is that of a tick's first slot
 #define TICK_CHANGES 7  // from a tick's last slot into the next one's first
 #define TRIGGER_CAME 5  // trigger.c
@@ -42,6 +45,7 @@ typedef struct emission_tick {
   uint16_t last_top;
   uint16_t direction;
   uint32_t cycles;
+  uint8_t begun;  // what GPIOR0 has from its first slot on
 } emission_tick;
 
 // In the last slot of a tick the next one is taken, and the silent one waits in its place.

@@ -113,18 +113,16 @@ __attribute__((noinline)) static void boot(void) {
   port.self_test = port_self_test;
   port.keep_enable = port_keep_enable;
   port.set_trigger = port_set_trigger;
-  bushd_mcu_config config = {
-      .motors = BUSHD_MOTORS_PER_MCU,
-      .slots = EMISSION_SLOTS,
-      .min_tick_ns = EMISSION_MIN_TICK_NS,
-      // A frame of table ticks stands for more of them than it could make in
-      // one; its slots have pulses only, and DIR stays for a tick.
-      .lacks = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_COMMON_DIR | BUSHD_CAN_PHASES,
-      .pulse_ns = EMISSION_PULSE_NS,
-      .queue = queue,
-      .queue_ticks = QUEUE_TICKS,
-      .codes = codes,
-      .code_count = TABLE_CODES};
+  bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
+                             .slots = EMISSION_SLOTS,
+                             .min_tick_ns = EMISSION_MIN_TICK_NS,
+                             // A frame of them stands for more ticks than it could make in one.
+                             .lacks = BUSHD_CAN_TABLE_TICKS,
+                             .pulse_ns = EMISSION_PULSE_NS,
+                             .queue = queue,
+                             .queue_ticks = QUEUE_TICKS,
+                             .codes = codes,
+                             .code_count = TABLE_CODES};
   identity kept;
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && identity_enable_kept();
@@ -157,6 +155,9 @@ static void hear_line(void) {
   uint32_t ended = 0;
   if (line_collect(&mcu.receiver, &ended)) {
     bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(ended));
+  } else if (bushd_mcu_wants_samples(&mcu)) {
+    // The same conversion may be seen several times.
+    bushd_mcu_sample(&mcu, (uint32_t)emission_time_in_tick_ns(clock_now()), inputs_current());
   } else {
     poll_eeprom();
   }

@@ -139,12 +139,21 @@ static void begin_tick(bushd_virtual* v, int64_t start_own_ns) {
 
 // What its plane of `slots` slots leaves at the STEP outputs.
 static uint16_t last_levels(const bushd_plane* plane, uint16_t slots) {
-  if (plane->outputs != BUSHD_OUTPUTS_LEVELS) return 0;
-  return plane->step[plane->active != 0 ? slots - 1 : 0];
+  return plane->outputs == BUSHD_OUTPUTS_LEVELS ? plane->step[slots - 1] : 0;
+}
+
+// Of the tick that ends.
+static void give_samples(bushd_virtual* v) {
+  if (v->config.current == NULL || !bushd_mcu_wants_samples(&v->mcu)) return;
+  for (int64_t at_ns = 0; at_ns < v->tick_length_ns; at_ns += BUSHD_VIRTUAL_SAMPLE_NS) {
+    const int64_t time_ns = true_time(v, v->tick_start_own_ns + at_ns);
+    bushd_mcu_sample(&v->mcu, (uint32_t)at_ns, v->config.current(v->config.context, time_ns));
+  }
 }
 
 static void tick_boundary(bushd_virtual* v) {
   emit_slots(v, v->next_event_ns);
+  give_samples(v);
   turn_for_whole_tick(v);
   v->now_ns = v->next_event_ns;
   begin_tick(v, v->tick_start_own_ns + v->tick_length_ns);
@@ -208,6 +217,7 @@ static void port_set_trigger(void* context, bushd_edge edge) {
 
 static uint16_t port_read_current(void* context) {
   const bushd_virtual* v = context;
+  if (v->config.current != NULL) return v->config.current(v->config.context, v->now_ns);
   return v->current;
 }
 

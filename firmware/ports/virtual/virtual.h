@@ -28,6 +28,7 @@ extern "C" {
 
 #define BUSHD_VIRTUAL_MAX_PPM 100000
 #define BUSHD_VIRTUAL_OUTPUTS 16u
+#define BUSHD_VIRTUAL_SAMPLE_NS 20000  // from one sample of the supply current to the next
 
 typedef enum bushd_virtual_signal {
   BUSHD_VIRTUAL_STEP = 0,
@@ -51,6 +52,8 @@ typedef struct bushd_virtual_config {
 
   // The inputs, now that the MCU reads them. NULL: they are as bushd_virtual.inputs says.
   bushd_inputs (*read_inputs)(void* context, int64_t time_ns);
+  // What the current sensor reads at a time of the present tick, or now. NULL: what is set.
+  uint16_t (*current)(void* context, int64_t time_ns);
 
   // The MCU drives the line from start_ns on; `wire` is valid during the call only.
   void (*transmit)(void* context, int64_t start_ns, const uint8_t* wire, size_t size);

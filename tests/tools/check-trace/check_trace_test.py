@@ -80,6 +80,31 @@ class CheckTraceTest(unittest.TestCase):
 
 
 class RightTraces(CheckTraceTest):
+    def burst(self):
+        """T_step 385 us: 39 slots. DIR setup 15 us: two slots of a shortened tick."""
+        scene = synthetic.Scene(TABLE, self.table_file)
+        scene.emission = {"emission": "burst", "step_us": 385, "dir_setup_us": 15}
+        scene.burst_slots = 39, 2
+        scene.move("theta", 1, 0, 100, 300)
+        scene.move("omega", 2, 3, 131, -500, stop_tick=181, move_id=3)
+        scene.move("theta", 1, 0, 320, -200, move_id=4)
+        return scene
+
+    def test_burst_is_checked_to_its_slots(self):
+        self.assert_right(self.burst())
+
+    def test_edge_of_a_burst_in_another_slot_is_found(self):
+        scene = self.burst()
+        scene.edges[1, 0][100][0] += 2 * SLOT_NS
+        self.assert_problem(scene, "theta", "step 101 of 300")
+
+    def test_other_emission_is_refused(self):
+        scene = self.burst()
+        scene.events[0]["emission"] = "staggered"
+        result = self.check(scene)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("move 1 is emitted staggered; only even and burst can be checked", result.stderr)
+
     def test_every_edge_of_both_formats_is_explained(self):
         for fine, moves in itertools.product((True, False), (None, "stream", "table")):
             with self.subTest(fine=fine, moves=moves):

@@ -114,6 +114,8 @@ class Scene:
         self.table_file = table_file
         self.fine = fine
         self.moves = moves  # "stream", "table", or None: the log does not say
+        self.emission = {}  # what the log says of it, if it is not even
+        self.burst_slots = None  # T_step, and from a tick's beginning to its first step
         self.events = []
         self.edges = {}  # (address, output): [[time_ns, direction]]
         self.steps = {}  # by motor
@@ -134,6 +136,7 @@ class Scene:
             "table_file": self.table_file, "table_sha256": sha256_of(self.table), "tick_ns": TICK_NS,
             "format": "fine" if self.fine else "coarse", "start_tick": start_tick, "steps": steps, "from_steps": start,
             **({"moves": self.moves} if self.moves else {}), **({"late_ns": late_ns} if late_ns else {}),
+             **self.emission,
         })
         self.ticks_from_ns[motor] = math.inf if self.moves == "table" else 0
         result = "reached"
@@ -181,6 +184,12 @@ class Scene:
 
     def _edges(self, motor, delays, start_tick, direction, late_ns=0):
         edges = edges_of(self.table, delays, self.fine, self.ticks_from_ns[motor], late_ns)
+        if self.burst_slots:
+            step, first = self.burst_slots
+            ticks = [at // TICK_NS for at in edges]
+            edges = [
+                tick * TICK_NS + (first + (i - ticks.index(tick)) * step) * TICK_NS // SLOTS for i, tick in enumerate(ticks)
+            ]
         return [[start_tick * TICK_NS + at, direction] for at in edges]
 
     def write_moves(self, path):

@@ -1,0 +1,78 @@
+// A bus with one MCU, a way of emission, and rows of steps for its motors.
+#pragma once
+
+#include <array>
+#include <cstdlib>
+#include <vector>
+
+#include "sim/bus_fixture.h"
+
+namespace bushd::sim {
+
+class EmissionBus {
+ public:
+  explicit EmissionBus(std::uint32_t tick_ns, const McuOptions& options = {},
+                       bushd_format format = BUSHD_FORMAT_COARSE)
+      : tick_ns_(tick_ns), format_(format), bus(1'000'000, &recorder), master(bus) {
+    bus.add_mcu(options);
+    master.bring_up(tick_ns, format);
+    master.upload_table(1, 0, 1000, {60'000, 30'000}, 20'000);
+  }
+
+  void use(const bushd_emission& settings, int motors) {
+    ASSERT_EQ(master.acknowledged(1, BUSHD_MSG_EMISSION, bushd_encode_emission, settings),
+              BUSHD_OK);
+    for (int m = 0; m < motors; ++m) master.assign(1, static_cast<std::uint8_t>(m), 0);
+    recorder.edges.clear();
+  }
+
+  // One row of steps a tick, a column a motor; they begin together, from rest to rest. Fine ticks
+  // make the same steps.
+  void run(const std::vector<std::vector<int>>& rows) {
+    const std::size_t motors = rows.front().size();
+    const bool fine = format_ == BUSHD_FORMAT_FINE;
+    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+    const std::vector<std::uint16_t> delays(motors, 0);
+    first_tick = bus.mcu(0).core().tick + 20;
+    std::size_t size = bushd_encode_ticks_head(
+        0, static_cast<std::uint8_t>(BUSHD_TICKS_START | (fine ? BUSHD_TICKS_FINE : 0)), first_tick,
+        static_cast<std::uint8_t>(rows.size()), static_cast<std::uint16_t>((1u << motors) - 1),
+        delays.data(), payload.data());
+    for (const auto& row : rows) {
+      for (const int steps : row) {
+        if (fine) {
+          bushd_put_i16(payload.data() + size, static_cast<std::int16_t>(256 * steps));
+          size += 2;
+        } else {
+          payload[size++] = static_cast<std::uint8_t>(std::abs(steps) | (steps > 0 ? 0x80 : 0));
+        }
+      }
+    }
+    master.post(1, BUSHD_MSG_TICKS, {payload.data(), size});
+    while (bus.mcu(0).core().tick != first_tick) bus.advance_to(bus.next_event_ns());
+    start_ns = bus.now_ns();
+    bus.advance_to(start_ns + static_cast<TimeNs>(rows.size() + 3) * tick_ns_);
+    ASSERT_EQ(master.poll(1).moving, 0);
+  }
+
+  // Until the MCU has measured its supply current, which moves a motor and takes it back.
+  void settle() {
+    bus.advance_to(bus.now_ns() + 40 * TimeNs{tick_ns_});
+    ASSERT_EQ(master.poll(1).state, BUSHD_STATE_READY);
+    recorder.edges.clear();
+  }
+  TimeNs settle_ns() const { return bus.mcu(0).core().emission.of.settle.of.step.back_ns; }
+
+ private:
+  std::uint32_t tick_ns_;
+  bushd_format format_;
+
+ public:
+  Recorder recorder;
+  Bus bus;
+  Master master;
+  std::uint32_t first_tick = 0;
+  TimeNs start_ns = 0;  // of the rows
+};
+
+}  // namespace bushd::sim
