@@ -67,7 +67,8 @@ class Hostile(EndToEndTest):
     def payload(self, client=b"by-hand", number=1, motors=(b"a0",), steps=(5,), count=None, texts=None):
         """A move; `count` and `texts` (all motors, encoded) replace what would be right."""
         head = struct.pack(">q", 0) + text(client) + struct.pack(">qb", number, MOVE_RELATIVE)
-        head += text(b"") + text(b"") + struct.pack(">b", 0)  # group, table, dry_run
+        # group, table, dry_run, edge, arrivals, delay_us, width_us
+        head += text(b"") + text(b"") + struct.pack(">bbbii", 0, 0, 0, 0, 0)
         count = struct.pack(">i", len(motors) if count is None else count)
         texts = b"".join(map(text, motors)) if texts is None else texts
         return self.fingerprint + head + count + texts + struct.pack(f">{len(steps)}q", *steps)

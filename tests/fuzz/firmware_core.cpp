@@ -60,7 +60,8 @@ class Mcu {
         .read_inputs = [](void* self) { return static_cast<Mcu*>(self)->pins(); },
         .read_current = [](void* self) { return static_cast<Mcu*>(self)->pins().motors; },
         .self_test = [](void*) -> std::uint8_t { return 0; },
-        .keep_enable = [](void*, bool) {}};
+        .keep_enable = [](void*, bool) {},
+        .set_trigger = [](void*, bushd_edge) {}};
     const bushd_mcu_config config = {.address = kAddress,
                                      .motors = kMotors,
                                      .slots = kSlots,

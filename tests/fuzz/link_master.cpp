@@ -288,6 +288,12 @@ class Bus {
         return decodes(bushd_table_ticks{}, bushd_decode_table_ticks);
       case BUSHD_MSG_TABLE_RUN:
         return decodes(bushd_table_run{}, bushd_decode_table_run);
+      case BUSHD_MSG_HOME:
+        return decodes(bushd_home{}, bushd_decode_home);
+      case BUSHD_MSG_LOCAL:
+        return decodes(bushd_local{}, bushd_decode_local);
+      case BUSHD_MSG_REFERENCE:
+        return decodes(bushd_reference{}, bushd_decode_reference);
       case BUSHD_MSG_TRIGGER:
         return decodes(bushd_trigger{}, bushd_decode_trigger);
       case BUSHD_MSG_EMERGENCY:

@@ -116,8 +116,8 @@ TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
     const auto first = static_cast<std::uint16_t>(1000 + cut);
     ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, ramp(first, 100), 800));
     const std::uint32_t sent_crc = tables().slot[0].crc;
-    // Before, while or after its 200 bytes and a few more are written.
-    pass(500'000'000 + static_cast<TimeNs>(random.below(1200)) * 1'000'000);
+    // Before, while or after its 200 bytes and the settings are written.
+    pass(500'000'000 + static_cast<TimeNs>(random.below(1800)) * 1'000'000);
     reboot();
     const bushd_report report = master_.poll(kAddress);
     const bushd_tables found = tables();
