@@ -120,7 +120,7 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
     for (std::size_t i = 0; i < of_motor.size(); i += 2) {
       shortest_ns = std::min(shortest_ns, of_motor[i + 1].time_ns - of_motor[i].time_ns);
       const TimeNs since_ns = of_motor[i].time_ns - of_motor.front().time_ns + tick_ns;
-      const TimeNs in_slot_ns = (since_ns + tick_ns / kSlots / 2) % (tick_ns / kSlots);
+      const TimeNs in_slot_ns = (since_ns * kSlots + tick_ns / 2) % tick_ns / kSlots;
       earliest_ns = std::min(earliest_ns, in_slot_ns);
       latest_ns = std::max(latest_ns, in_slot_ns);
     }
@@ -153,8 +153,8 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, AvrFigures,
-                         testing::Values(Load{BUSHD_FORMAT_COARSE, 1'080'000, 127, 1'700'000},
-                                         Load{BUSHD_FORMAT_FINE, 1'880'000, 127, 1'000'000}),
+                         testing::Values(Load{BUSHD_FORMAT_COARSE, 1'200'000, 127, 1'500'000},
+                                         Load{BUSHD_FORMAT_FINE, 2'000'000, 127, 900'000}),
                          [](auto& load) {
                            return load.param.format == BUSHD_FORMAT_FINE ? "Fine" : "Coarse";
                          });

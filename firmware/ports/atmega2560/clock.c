@@ -1,7 +1,6 @@
 #include "firmware/ports/atmega2560/clock.h"
 
 #include <avr/io.h>
-#include <util/atomic.h>
 
 static uint32_t latest;  // in counts
 
@@ -13,12 +12,16 @@ void clock_init(void) {
   GTCCR = 0;
 }
 
+// The UART's interrupt reads the timer through the same register for its high byte. With interrupts
+// off, slots that have waited for that interrupt would wait for this too: so what it has spoilt is
+// read again.
 static uint16_t count_now(void) {
+  uint16_t before = 0;
   uint16_t count = 0;
-  // The UART's interrupt reads the timer too, through the same register for its high byte.
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+  do {
+    before = TCNT5;
     count = TCNT5;
-  }
+  } while ((uint16_t)(count - before) > UINT8_MAX / 2u);
   return count;
 }
 

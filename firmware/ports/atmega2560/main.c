@@ -154,6 +154,8 @@ static void prepare(void) {
 static void hear_line(void) {
   uint32_t ended = 0;
   if (line_collect(&mcu.receiver, &ended)) {
+    // A frame takes a while, and can wait; a tick that has begun meanwhile cannot.
+    if (emission_begun()) return;
     bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(ended));
   } else if (bushd_mcu_wants_samples(&mcu)) {
     // The same conversion may be seen several times.
