@@ -48,7 +48,9 @@ void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs) {
   if (wish != local->wish || !allowed) {
     release(mcu);
     local->wish = wish;
-    local->readings = 0;
+    // To clear a fault, or to raise EN, is not to ask for motion: what is held then must be pressed
+    // anew.
+    local->readings = allowed ? 0 : READINGS;
   }
   if (wish == 0 || !allowed) return;
   if (local->readings < READINGS && ++local->readings == READINGS) {
