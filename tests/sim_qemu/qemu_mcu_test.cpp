@@ -4,6 +4,7 @@
 #include <iterator>
 #include <string>
 
+#include "engine/message.h"
 #include "sim/bus_fixture.h"
 
 namespace bushd::sim {
@@ -102,14 +103,14 @@ TEST_F(QemuImage, CountsItsBootsWhenItTurnsAPage) {
   constexpr int kBoots = 240;
   for (int i = 0; i < kBoots; ++i) {
     bus_.reboot(0);
-    bus_.advance_to(bus_.now_ns() + 3'000'000);
+    bus_.advance_to(bus_.now_ns() + 40'000'000);
   }
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.boot_number, 42 + kBoots);
   EXPECT_EQ(report.reset_cause, BUSHD_RESET_EXTERNAL);
 }
 
-// The same image with one bit of a text that nothing depends on turned round.
+// The same image with one bit of a vector turned round that is never taken: the debug monitor's.
 class QemuDamagedImage : public QemuImage {
  protected:
   QemuDamagedImage() : QemuImage(damaged()) {}
@@ -117,13 +118,17 @@ class QemuDamagedImage : public QemuImage {
   static std::string damaged() {
     std::ifstream in(kImage, std::ios::binary);
     std::string bytes(std::istreambuf_iterator<char>(in), {});
-    // Filling between the program and its last 256 bytes.
-    const std::size_t at = bytes.find(std::string(32, '\xFF'));
-    EXPECT_NE(at, std::string::npos);
-    bytes.at(at + 16) = '\x7F';
+    // The ELF file's first segment is the flash memory, which begins with the vectors.
+    const std::size_t segment = bushd_get_u32(bytes_at(bytes, 28));
+    const std::size_t flash = bushd_get_u32(bytes_at(bytes, segment + 4));
+    bytes.at(flash + std::size_t{4} * 12) ^= 0x10;
     std::string path = testing::TempDir() + "bushd-damaged.elf";
     std::ofstream(path, std::ios::binary) << bytes;
     return path;
+  }
+
+  static const std::uint8_t* bytes_at(const std::string& bytes, std::size_t at) {
+    return reinterpret_cast<const std::uint8_t*>(&bytes.at(at));
   }
 };
 

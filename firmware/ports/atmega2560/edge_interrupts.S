@@ -16,7 +16,6 @@ INT0_vect:
     sts trigger_count, DATA_LOW
     sts trigger_count+1, DATA_HIGH
     cbi _SFR_IO_ADDR(EIMSK), INT0
-    sbi _SFR_IO_ADDR(GPIOR0), TRIGGER_CAME
     reti
 
 ; Compare A of timer 4 begins the pulse, compare B ends it. Each goes off by itself, and leaves the other as it is

@@ -30,7 +30,6 @@
 #define TICK_SPECIAL 5  // that, or the common DIR changes behind every pulse
 #define TICK_IS_NEXT 6  // the mark that comes is that of a tick's first slot
 #define TICK_CHANGES 7  // from a tick's last slot into the next one's first
-#define TRIGGER_CAME 5  // trigger.c
 
 #ifndef __ASSEMBLER__
 
