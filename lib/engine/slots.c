@@ -58,12 +58,13 @@ void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* p
 #ifndef BUSHD_OWN_SLOTS_FILL_EVENLY
 void bushd_slots_fill_evenly(uint16_t* masks, uint16_t slot_count, const int16_t* steps,
                              uint8_t motors) {
-  memset(masks, 0, slot_count * sizeof masks[0]);
+  bushd_slots plans[16];  // a mask has as many bits
   for (uint8_t m = 0; m < motors; ++m) {
     const uint16_t count = (uint16_t)(steps[m] < 0 ? -steps[m] : steps[m]);
-    const bushd_slots plan = {(uint16_t)(count << 8), BUSHD_CROSSING_COARSE};
-    fill(masks, slot_count, (uint16_t)(1u << m), &plan);
+    plans[m].distance = (uint16_t)(count << 8);
+    plans[m].first = BUSHD_CROSSING_COARSE;
   }
+  bushd_slots_fill(masks, slot_count, plans, motors);
 }
 #endif
 
