@@ -68,7 +68,7 @@ static void end_quiet(bushd_mcu_settle* settle) {
   const uint16_t samples = settle->of.quiet.samples;
   const uint16_t lowest = samples == 0 ? 0 : settle->of.quiet.lowest;
   const uint16_t highest = settle->of.quiet.highest;
-  const uint16_t mean = samples == 0 ? 0 : (uint16_t)(settle->of.quiet.sum / samples);
+  const uint16_t mean = (uint16_t)(samples == 0 ? 0 : settle->of.quiet.sum / samples);
   const uint16_t above = (uint16_t)(highest - mean);
   const uint16_t below = (uint16_t)(mean - lowest);
   settle->of.step.mean = mean;

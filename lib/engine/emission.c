@@ -57,8 +57,8 @@ static void stagger(uint16_t* masks, const bushd_emission_grid* grid, uint16_t d
   uint8_t count = 0;
   for (uint16_t left = due; left != 0; left = (uint16_t)(left & (left - 1u))) ++count;
   const bool settles = (uint32_t)grid->settle_slots * count < grid->period_slots;
-  const uint16_t apart = settles ? grid->settle_slots : (uint16_t)(grid->period_slots / count);
-  const uint16_t apart_rest = settles ? 0 : (uint16_t)(grid->period_slots % count);
+  const uint16_t apart = (uint16_t)(settles ? grid->settle_slots : grid->period_slots / count);
+  const uint16_t apart_rest = (uint16_t)(settles ? 0 : grid->period_slots % count);
   uint16_t at = 0;
   uint16_t rest = 0;
   for (uint16_t bit = 1; due != 0; bit = (uint16_t)(bit << 1)) {

@@ -105,11 +105,11 @@ static uint16_t steps_of_slot(const bushd_plane* plane, uint16_t slot, uint16_t 
   uint16_t motors = 0;
   for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS; ++m) {
     const unsigned shift = BUSHD_PHASE_OUTPUTS * m;
-    const unsigned was = before >> shift & 0xFu;
-    const unsigned is = mask >> shift & 0xFu;
-    if (was != 0 && is != 0 && was != is) motors |= 1u << m;
+    const unsigned was = (unsigned)before >> shift & 0xFu;
+    const unsigned is = (unsigned)mask >> shift & 0xFu;
+    if (was != 0 && is != 0 && was != is) motors = (uint16_t)(motors | 1u << m);
   }
-  return (uint16_t)motors;
+  return motors;
 }
 
 // A reset cuts the tick short: only the steps that have begun count.
