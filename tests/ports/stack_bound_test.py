@@ -80,14 +80,14 @@ class Path:
         self.follow([(self.entry, State(0, 0, 0))])
         return self.most
 
-    def follow(self, todo):
-        while todo:
-            address, state = todo.pop()
+    def follow(self, unvisited):
+        while unvisited:
+            address, state = unvisited.pop()
             if address in self.seen and self.seen[address].depth >= state.depth:
                 continue
             assert state.depth < RAM_SIZE, f"the stack grows without end at {address:#x}"
             self.seen[address] = state
-            todo += self.step(address, state)
+            unvisited += self.step(address, state)
             self.most = max(self.most, state.depth)
 
     def step(self, address, state):
