@@ -1,5 +1,5 @@
 // How many steps the image for ATmega2560 makes a second: sixteen motors, each at the most steps
-// that a tick may have and turning round after every frame, fed with frames of two ticks over a
+// that a tick may have and turning round every two ticks, fed with frames as long as bushd's over a
 // line of 1 Mbaud. Every step must be made, in time, and each pulse be as long as drivers want.
 //
 // simavr enters interrupts in no time, the chip takes five cycles: they are added to the tick and
