@@ -1,4 +1,4 @@
-// Messages that set an MCU up and tell what it is. Those of motion are in message_motion.c.
+// Messages that set an MCU up and tell what it is.
 #include <string.h>
 
 #include "engine/cursor.h"

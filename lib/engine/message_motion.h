@@ -1,0 +1,290 @@
+// Messages of motion: time, ticks, table runs, homing, polls and reports (engine/message.h).
+#ifndef BUSHD_ENGINE_MESSAGE_MOTION_H
+#define BUSHD_ENGINE_MESSAGE_MOTION_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "engine/frame.h"
+#include "engine/message_base.h"
+#include "engine/run_state.h"
+#include "engine/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// The motor finds its switch by itself: fast by its table until the switch is active, slowly back
+// until it is released, slowly towards it until it is active again; there it stands at
+// `position_steps`. With `most_steps` 0: it gives that up, and ramps down.
+#define BUSHD_HOME_UNIT_NS 10000u
+typedef struct bushd_home {
+  uint8_t motor;
+  int8_t direction;     // towards the switch: +1, -1
+  uint32_t most_steps;  // of the fast approach, below 2^31
+  uint32_t slow_steps;  // at most as many in each of the slow stages; 1 .. 2^31 - 1
+  uint16_t slow_delay;  // of a slow step, BUSHD_HOME_UNIT_NS; >= 1
+  int32_t position_steps;
+} bushd_home;
+
+// What the MCU does for its last HOME, or what came of it.
+typedef enum bushd_homing {
+  BUSHD_HOMING_NONE = 0,  // since boot
+  BUSHD_HOMING_FAST = 1,
+  BUSHD_HOMING_RAMP_DOWN = 2,
+  BUSHD_HOMING_BACK_OFF = 3,
+  BUSHD_HOMING_APPROACH = 4,
+  BUSHD_HOMING_DONE = 5,
+  BUSHD_HOMING_NOT_FOUND = 6,  // by the fast approach
+  BUSHD_HOMING_STUCK = 7,      // the switch was not released
+  BUSHD_HOMING_LOST = 8,       // not found again by the slow approach
+  BUSHD_HOMING_STOPPED = 9     // by a fault, by silence, or because it was given up
+} bushd_homing;
+
+// Motors that the MCU's FORWARD and REVERSE inputs move, by their tables, while one of them is
+// active.
+typedef struct bushd_local {
+  uint16_t motors;
+} bushd_local;
+
+// Asks `count` MCUs for reports, each in a reply slot of its own: entry i (bushd_poll_entry) names
+// an address and when, after this frame's end, its answer begins.
+#define BUSHD_POLL_MAX_ENTRIES ((BUSHD_FRAME_MAX_PAYLOAD - 1u) / 3u)
+typedef struct bushd_poll_entry {
+  uint8_t address;
+  uint16_t begin_units;  // BUSHD_REPLY_UNIT_NS
+} bushd_poll_entry;
+typedef struct bushd_poll {
+  uint8_t count;           // >= 1
+  const uint8_t* entries;  // count x 3 bytes
+} bushd_poll;
+// The entry with this address, if there is one.
+bool bushd_poll_find(const bushd_poll* poll, uint8_t address, bushd_poll_entry* entry);
+
+// Two-step time reference. The end of this frame is a mark named `mark`. If `follows`, the mark
+// named `known_mark` lay at (mark_tick, mark_ns into that tick) of bus time.
+typedef struct bushd_sync {
+  uint16_t master;  // who sends this: two masters on one line have different ones
+  uint32_t mark;    // never the name of another mark of this master
+  bool follows;
+  uint32_t known_mark;
+  uint32_t mark_tick;
+  uint32_t mark_ns;
+} bushd_sync;
+
+enum {
+  BUSHD_TICKS_FINE = 1 << 0,     // int16 displacements, else coarse bytes
+  BUSHD_TICKS_REPLACE = 1 << 1,  // instead of all that its motors have queued from first_tick on
+  BUSHD_TICKS_START = 1 << 2     // its motors start from rest here; without it they must be moving
+};
+
+// Displacements of `count` ticks for the motors in `mask`. Only these motors are touched.
+typedef struct bushd_ticks {
+  uint8_t epoch;  // stream epoch; a replacement carries a later one than the MCU's: it opens it
+  uint8_t flags;
+  uint32_t first_tick;
+  uint8_t count;                 // >= 1
+  uint16_t mask;                 // != 0
+  uint8_t motors;                // bits set in mask
+  const uint8_t* delays;         // motors x 16 bit: running at the end, 0: at rest
+  const uint8_t* displacements;  // count x motors, tick by tick, motors in rising order
+} bushd_ticks;
+
+// Bytes of a ticks payload before the arrays.
+#define BUSHD_TICKS_HEADER 9u
+// The most ticks of `motors` (1 .. BUSHD_MOTORS_PER_MCU) motors that one frame can carry.
+uint8_t bushd_ticks_capacity(uint8_t motors, bool fine);
+
+// The same displacements without sending them: for each motor the state of its run at the beginning
+// of first_tick. The MCU expands `count` ticks of it by its own table, in the configured format,
+// and has the displacements that the master's run gives.
+typedef struct bushd_table_ticks {
+  uint8_t epoch;
+  uint8_t flags;  // as in bushd_ticks, without BUSHD_TICKS_FINE
+  uint32_t first_tick;
+  uint16_t count;  // >= 1
+  uint16_t mask;   // of the motors, in rising order; != 0
+  const uint8_t* entries;
+  uint16_t entries_size;
+} bushd_table_ticks;
+#define BUSHD_TABLE_TICKS_HEADER 8u
+#define BUSHD_TABLE_TICKS_MAX_ENTRY 19u
+
+// An entry of it. A motor that cruises throughout is told so in three bytes.
+typedef struct bushd_table_ticks_entry {
+  uint8_t motor;
+  bushd_run_state state;
+} bushd_table_ticks_entry;
+
+// The whole move at once: from rest, at the beginning of first_tick, by the motor's own table.
+// Steps fall exact to a slot.
+typedef struct bushd_table_run {
+  uint8_t epoch;
+  uint32_t first_tick;
+  uint8_t count;           // of entries, >= 1
+  const uint8_t* entries;  // count x 5 bytes
+} bushd_table_run;
+#define BUSHD_TABLE_RUN_HEADER 5u
+#define BUSHD_TABLE_RUN_ENTRY 5u
+typedef struct bushd_table_run_entry {
+  uint8_t motor;
+  uint8_t slot;      // of the table; must be the one assigned to the motor
+  int8_t direction;  // +1, -1
+  uint32_t steps;    // >= 1
+} bushd_table_run_entry;
+
+// Entry `index` of a table run's or a trigger's.
+bushd_table_run_entry bushd_get_table_run_entry(const uint8_t* entries, uint8_t index);
+
+typedef enum bushd_edge {
+  BUSHD_EDGE_NONE = 0,
+  BUSHD_EDGE_RISING = 1,  // the input becomes active
+  BUSHD_EDGE_FALLING = 2
+} bushd_edge;
+
+// Table runs from rest that an edge at the trigger input starts, all in the same slot: it begins
+// BUSHD_TRIGGER_FIXED_TICKS ticks and delay_us after the edge. BUSHD_EDGE_NONE: none waits for it
+// any more.
+#define BUSHD_TRIGGER_FIXED_TICKS 3u
+#define BUSHD_TRIGGER_MIN_DELAY_US 50u
+#define BUSHD_TRIGGER_MAX_DELAY_US 1500000u
+typedef struct bushd_trigger {
+  uint8_t number;  // chosen by the master, 1..255: the same one again is the same frame again; 0:
+                   // of BUSHD_EDGE_NONE
+  bushd_edge edge;
+  uint32_t delay_us;
+  uint8_t count;           // of entries, >= 1; 0: of BUSHD_EDGE_NONE
+  const uint8_t* entries;  // as in bushd_table_run
+} bushd_trigger;
+
+// What became of the last one.
+typedef enum bushd_trigger_state {
+  BUSHD_TRIGGER_NONE = 0,      // none since boot
+  BUSHD_TRIGGER_ARMED = 1,     // waits for the edge
+  BUSHD_TRIGGER_STARTED = 2,   // the edge came: the start is known
+  BUSHD_TRIGGER_DISARMED = 3,  // on request
+  BUSHD_TRIGGER_LATE = 4,      // the edge came, but was noticed too late to start in time
+  BUSHD_TRIGGER_FAULT = 5,     // a fault was latched before the edge came
+  BUSHD_TRIGGER_FORBIDDEN = 6  // the edge came, but a limit forbids the direction of one of them
+} bushd_trigger_state;
+
+enum { BUSHD_ARRIVES_POSITIVE = 1 << 0, BUSHD_ARRIVES_NEGATIVE = 1 << 1 };
+
+// A pulse at the reference output, delay_us after the step with which the motor's counter arrives
+// at the position.
+#define BUSHD_REFERENCE_MAX_DELAY_US 1500000u
+#define BUSHD_REFERENCE_MAX_WIDTH_US 1000000u
+typedef struct bushd_reference {
+  uint8_t motor;
+  uint8_t arrivals;  // BUSHD_ARRIVES_*; 0: no pulses
+  int32_t position_steps;
+  uint32_t delay_us;
+  uint32_t width_us;  // >= 1
+} bushd_reference;
+
+typedef enum bushd_how { BUSHD_RAMP_DOWN = 0, BUSHD_CUT = 1 } bushd_how;
+// All motors stop, within two ticks: by their tables' ramps, or without another step.
+typedef struct bushd_emergency {
+  bushd_how how;
+} bushd_emergency;
+
+typedef struct bushd_motor_report {
+  int32_t position_steps;  // steps made until the start of `tick`
+  uint16_t known_until;    // low 16 bits of the first tick for which nothing is decided; at most
+                           // 32767 after `tick`
+} bushd_motor_report;
+
+typedef struct bushd_report {
+  uint8_t state;   // bushd_state
+  uint8_t faults;  // BUSHD_FAULT_*
+  uint8_t flags;   // BUSHD_FLAG_*
+  uint8_t epoch;
+  uint16_t boot_number;
+  uint32_t tick;     // the tick being emitted
+  uint32_t tick_ns;  // how far into it, when the poll's frame ended
+  uint32_t mark;     // the last mark heard, and when it was by the MCU's own clock
+  uint32_t mark_tick;
+  uint32_t mark_ns;
+  int32_t rate_ppb;          // how much faster than its crystal the MCU counts, to follow the bus
+  uint16_t moving;           // motors not at rest
+  uint16_t running;          // of them, those in a table run
+  uint16_t inputs;           // bit per motor: active
+  uint16_t bad_frames;       // CRC and length errors; saturates
+  uint16_t rejected_frames;  // good frames that could not be used; saturates
+  uint8_t last_rejection;    // bushd_status of the last one
+  uint16_t run_downs;        // motors that had to be run down since boot; saturates
+  uint16_t low_water_ticks;  // the fewest ticks that a moving motor had queued, since the report
+                             // before; 65535: none moved
+  // Ticks that these motors have beyond a gap: from the tick `island_from` (low 16 bits) on, until
+  // `island_until`.
+  uint16_t islands;
+  uint16_t island_from;
+  uint16_t island_until;
+  uint16_t forbidden_positive;  // motors that a limit keeps from moving in this direction
+  uint16_t forbidden_negative;
+  uint8_t system_inputs;   // active, BUSHD_INPUT_*
+  uint16_t current;        // of the supply, 0..1023
+  uint8_t reset_cause;     // BUSHD_RESET_*
+  uint8_t failed_tests;    // at boot, BUSHD_TEST_*
+  uint16_t autonomous;     // motors that move by homing or by local inputs
+  uint16_t homed;          // motors whose last homing since boot was done
+  uint8_t homing;          // bushd_homing
+  uint16_t armed;          // motors that wait for the trigger
+  uint8_t trigger_number;  // of the last one taken; 0: none since boot
+  uint8_t trigger_state;   // bushd_trigger_state
+  uint32_t start_tick;     // when it began, or will, if BUSHD_TRIGGER_STARTED
+  uint32_t start_ns;       // after the beginning of start_tick
+  uint8_t motor_count;     // <= BUSHD_MOTORS_PER_MCU
+  bushd_motor_report motor[BUSHD_MOTORS_PER_MCU];
+} bushd_report;
+
+#define BUSHD_REPORT_SIZE(motors) (78u + 6u * (motors))
+
+// Encoders return the payload's size. Preconditions are the ranges given above.
+size_t bushd_encode_home(const bushd_home* message, uint8_t* payload);
+size_t bushd_encode_local(const bushd_local* message, uint8_t* payload);
+size_t bushd_encode_poll(const bushd_poll_entry* entries, uint8_t count, uint8_t* payload);
+size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload);
+size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload);
+size_t bushd_encode_report(const bushd_report* message, uint8_t* payload);
+
+// Writes header and delays of a ticks payload and returns where the displacements go; the caller
+// writes count x motors of them there (bushd_put_i16 or plain bytes). `delays` has an entry per
+// motor of the mask. The payload's size is that offset plus the displacements.
+size_t bushd_encode_ticks_head(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint8_t count,
+                               uint16_t mask, const uint16_t* delays, uint8_t* payload);
+// `entries` by rising motor. Precondition: they fit one frame
+// (BUSHD_TABLE_TICKS_MAX_ENTRY bytes each at most).
+size_t bushd_encode_table_ticks(uint8_t epoch, uint8_t flags, uint32_t first_tick, uint16_t count,
+                                const bushd_table_ticks_entry* entries, uint8_t motors,
+                                uint8_t* payload);
+size_t bushd_encode_table_run(uint8_t epoch, uint32_t first_tick,
+                              const bushd_table_run_entry* entries, uint8_t count,
+                              uint8_t* payload);
+size_t bushd_encode_trigger(uint8_t number, bushd_edge edge, uint32_t delay_us,
+                            const bushd_table_run_entry* entries, uint8_t count, uint8_t* payload);
+size_t bushd_encode_reference(const bushd_reference* message, uint8_t* payload);
+
+// Decoders return BUSHD_OK, BUSHD_E_LENGTH or BUSHD_E_FORMAT.
+bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* message);
+bushd_status bushd_decode_local(const uint8_t* payload, size_t size, bushd_local* message);
+bushd_status bushd_decode_poll(const uint8_t* payload, size_t size, bushd_poll* message);
+bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message);
+bushd_status bushd_decode_sync(const uint8_t* payload, size_t size, bushd_sync* message);
+bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks* message);
+bushd_status bushd_decode_table_ticks(const uint8_t* payload, size_t size,
+                                      bushd_table_ticks* message);
+// The next entry of a decoded message: moves `at` (0 at first) past it and returns true, or false
+// behind the last one.
+bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at,
+                                  bushd_table_ticks_entry* entry);
+bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_table_run* message);
+bushd_status bushd_decode_trigger(const uint8_t* payload, size_t size, bushd_trigger* message);
+bushd_status bushd_decode_reference(const uint8_t* payload, size_t size, bushd_reference* message);
+bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_report* message);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,223 @@
+// Messages that set an MCU up and tell what it is (engine/message.h).
+#ifndef BUSHD_ENGINE_MESSAGE_SETUP_H
+#define BUSHD_ENGINE_MESSAGE_SETUP_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "engine/message_base.h"
+#include "engine/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Asks for identities; the one request that may be broadcast and is answered all the same. To keep
+// apart MCUs that have the same address (or all of them, on a broadcast) each answers in one of
+// `slots` reply slots, chosen by bushd_identify_slot: slot i begins i x slot_units after this
+// frame's end, in BUSHD_REPLY_UNIT_NS.
+typedef struct bushd_identify {
+  uint16_t salt;
+  uint8_t slots;  // >= 1
+  uint16_t slot_units;
+} bushd_identify;
+// Two MCUs that share a slot are apart after a few other salts.
+uint8_t bushd_identify_slot(const uint8_t* unique_id, uint16_t salt, uint8_t slots);
+
+enum {
+  BUSHD_CAN_COARSE = 1 << 0,
+  BUSHD_CAN_FINE = 1 << 1,
+  BUSHD_CAN_TABLE_TICKS = 1 << 2,
+  BUSHD_CAN_TABLE_RUN = 1 << 3,
+  BUSHD_CAN_HOME = 1 << 4,
+  BUSHD_CAN_LOCAL = 1 << 5,
+  BUSHD_CAN_TRIGGER = 1 << 6,    // has a trigger input
+  BUSHD_CAN_REFERENCE = 1 << 7,  // has a reference output
+  // Emission other than even.
+  BUSHD_CAN_BURST = 1 << 8,
+  BUSHD_CAN_COMMON_DIR = 1 << 9,
+  BUSHD_CAN_STAGGERED = 1 << 10,
+  BUSHD_CAN_PHASES = 1 << 11
+};
+
+// Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
+// which one it is.
+typedef struct bushd_identity {
+  uint8_t protocol_version;
+  uint8_t motors;  // outputs 0 .. motors-1, at most BUSHD_MOTORS_PER_MCU
+  uint16_t firmware_version;
+  uint16_t boot_number;   // changes at every boot
+  uint16_t slots;         // slots per tick
+  uint16_t queue_ticks;   // depth of the tick queue
+  uint16_t table_codes;   // table memory, in codes of 16 bits
+  uint16_t capabilities;  // BUSHD_CAN_*
+  uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
+} bushd_identity;
+
+// The MCU with this unique id answers to `address` from now on, and after its next boots.
+typedef struct bushd_set_address {
+  uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
+  uint8_t address;  // 1..255
+} bushd_set_address;
+
+typedef struct bushd_configure {
+  uint32_t tick_ns;  // BUSHD_MIN_TICK_NS .. BUSHD_MAX_TICK_NS
+  bushd_format format;
+  uint16_t silence_ticks;  // >= 1: table runs are run down after as many without a good frame
+} bushd_configure;
+
+// How steps get to the pins (engine/emission.h).
+typedef enum bushd_emission_mode {
+  BUSHD_EMISSION_EVEN = 0,        // each step in the slot of its time
+  BUSHD_EMISSION_BURST = 1,       // all motors together, each T_step
+  BUSHD_EMISSION_COMMON_DIR = 2,  // one DIR for all: each T_step those to the left, then the others
+  BUSHD_EMISSION_STAGGERED = 3,   // one after the other, each T_step
+  BUSHD_EMISSION_PHASES = 4       // four levels a motor instead of STEP and DIR
+} bushd_emission_mode;
+
+typedef enum bushd_phase_sequence {
+  BUSHD_PHASES_WAVE = 0,  // 4-beat, one winding on
+  BUSHD_PHASES_FULL = 1,  // 4-beat, two on
+  BUSHD_PHASES_HALF = 2,  // 8-beat
+  BUSHD_PHASES_THREE = 3  // three windings, 6-beat
+} bushd_phase_sequence;
+
+#define BUSHD_PHASE_OUTPUTS 4u  // motor m has the outputs 4m .. 4m+3
+
+typedef struct bushd_emission {
+  uint8_t mode;           // bushd_emission_mode
+  uint8_t sequence;       // bushd_phase_sequence, of phases
+  bool hold_current;      // of phases: windings stay on at rest
+  uint16_t step_us;       // T_step, of burst, common-dir and staggered; >= 1 there
+  uint16_t settle_us;     // dt_p, of staggered; 0: the MCU measures it
+  uint16_t dir_setup_us;  // DIR changes as long before a step at least
+  uint16_t pulse_us;      // a STEP pulse lasts as long at least
+} bushd_emission;
+
+// A table is sent as: begin, data (accelerating side, then decelerating side unless it is the
+// same), end. `slot` 0 .. BUSHD_TABLE_SLOTS-1. Codes run from slow to fast on both sides.
+typedef struct bushd_table_begin {
+  uint8_t slot;
+  uint16_t accel_count;
+  uint16_t decel_count;  // 0: the decelerating side is the accelerating one
+  uint16_t cruise;
+  uint32_t time_unit_ns;
+  uint32_t revision;  // of the table, as its file has it; told back by bushd_tables
+} bushd_table_begin;
+
+#define BUSHD_TABLE_DATA_MAX_CODES 120u
+typedef struct bushd_table_data {
+  uint8_t slot;
+  uint16_t offset;       // of the first code, counted over both sides
+  uint8_t count;         // 1 .. BUSHD_TABLE_DATA_MAX_CODES
+  const uint8_t* codes;  // count little-endian 16-bit codes, unaligned
+} bushd_table_data;
+
+typedef struct bushd_table_end {
+  uint8_t slot;
+  uint32_t crc;  // bushd_table_crc32 (engine/table.h) of the whole table
+} bushd_table_end;
+
+// What an MCU holds, by table slot.
+typedef struct bushd_table_held {
+  bool valid;
+  uint32_t crc;
+  uint32_t revision;
+} bushd_table_held;
+typedef struct bushd_tables {
+  bushd_table_held slot[BUSHD_TABLE_SLOTS];
+} bushd_tables;
+
+typedef struct bushd_assign {
+  uint8_t motor;
+  uint8_t slot;
+} bushd_assign;
+
+enum {
+  BUSHD_CONTROL_ENABLE = 1 << 0,        // EN high
+  BUSHD_CONTROL_DISABLE = 1 << 1,       // EN low; refused while a motor moves
+  BUSHD_CONTROL_CLEAR_FAULTS = 1 << 2,  // refused while a motor moves
+  BUSHD_CONTROL_FORGET_TABLES = 1 << 3  // all of them; refused while a motor moves
+};
+typedef struct bushd_control {
+  uint8_t actions;
+} bushd_control;
+
+typedef struct bushd_set_position {
+  uint8_t motor;  // at rest
+  int32_t position_steps;
+} bushd_set_position;
+
+// What the MCU does when a limit switch or the emergency input is active.
+enum {
+  BUSHD_EMERGENCY_INPUT_IGNORED = 0,
+  BUSHD_EMERGENCY_INPUT_RAMPS = 1,
+  BUSHD_EMERGENCY_INPUT_CUTS = 2
+};
+#define BUSHD_MAX_DEBOUNCE_TICKS 15u
+#define BUSHD_MAX_CURRENT 1023u
+typedef struct bushd_set_inputs {
+  // Motors whose input is a limit switch at this end of their travel. In both masks: one input for
+  // both ends.
+  uint16_t limit_positive;
+  uint16_t limit_negative;
+  uint16_t limit_cuts;     // motors that stop at a limit without another step; the others ramp down
+  uint16_t inverted;       // motors whose input is active when the port calls it inactive
+  uint8_t debounce_ticks;  // a motor's input counts once it has stayed for as many more ticks
+  uint8_t system_inverted;     // as `inverted`, of BUSHD_INPUT_*
+  uint8_t emergency;           // BUSHD_EMERGENCY_INPUT_*
+  uint16_t overcurrent;        // EN falls above this reading; 0: never
+  bool enable_after_watchdog;  // EN as it was before a watchdog reset; else low
+} bushd_set_inputs;
+
+typedef struct bushd_acknowledgement {
+  uint8_t status;  // bushd_status
+} bushd_acknowledgement;
+
+#define BUSHD_IDENTITY_SIZE 22u
+#define BUSHD_TABLES_SIZE (1u + 8u * BUSHD_TABLE_SLOTS)
+
+// Encoders return the payload's size. Preconditions are the ranges given above.
+size_t bushd_encode_identify(const bushd_identify* message, uint8_t* payload);
+size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload);
+size_t bushd_encode_configure(const bushd_configure* message, uint8_t* payload);
+size_t bushd_encode_emission(const bushd_emission* message, uint8_t* payload);
+size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* payload);
+size_t bushd_encode_table_data(uint8_t slot, uint16_t offset, uint8_t count, const uint16_t* codes,
+                               uint8_t* payload);
+size_t bushd_encode_table_end(const bushd_table_end* message, uint8_t* payload);
+size_t bushd_encode_assign(const bushd_assign* message, uint8_t* payload);
+size_t bushd_encode_control(const bushd_control* message, uint8_t* payload);
+size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* payload);
+size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* payload);
+size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload);
+size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload);
+size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload);
+
+// Decoders return BUSHD_OK, BUSHD_E_LENGTH or BUSHD_E_FORMAT.
+bushd_status bushd_decode_identify(const uint8_t* payload, size_t size, bushd_identify* message);
+bushd_status bushd_decode_identity(const uint8_t* payload, size_t size, bushd_identity* message);
+bushd_status bushd_decode_configure(const uint8_t* payload, size_t size, bushd_configure* message);
+bushd_status bushd_decode_emission(const uint8_t* payload, size_t size, bushd_emission* message);
+bushd_status bushd_decode_table_begin(const uint8_t* payload, size_t size,
+                                      bushd_table_begin* message);
+bushd_status bushd_decode_table_data(const uint8_t* payload, size_t size,
+                                     bushd_table_data* message);
+bushd_status bushd_decode_table_end(const uint8_t* payload, size_t size, bushd_table_end* message);
+bushd_status bushd_decode_assign(const uint8_t* payload, size_t size, bushd_assign* message);
+bushd_status bushd_decode_control(const uint8_t* payload, size_t size, bushd_control* message);
+bushd_status bushd_decode_set_position(const uint8_t* payload, size_t size,
+                                       bushd_set_position* message);
+bushd_status bushd_decode_set_address(const uint8_t* payload, size_t size,
+                                      bushd_set_address* message);
+bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
+                                     bushd_set_inputs* message);
+bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message);
+bushd_status bushd_decode_acknowledgement(const uint8_t* payload, size_t size,
+                                          bushd_acknowledgement* message);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

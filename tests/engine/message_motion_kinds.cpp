@@ -1,0 +1,269 @@
+#include "engine/message_kinds.h"
+
+namespace bushd::test {
+
+bushd_run_state any_run_state() {
+  bushd_run_state state{};
+  state.direction = *rc::gen::element<int8_t>(1, -1);
+  state.since = between<uint16_t>(0, 65535);
+  state.since_ns = *rc::gen::element<uint32_t>(0, 1, 39999, UINT32_MAX);
+  state.lead_delay = *rc::gen::element<uint16_t>(0, 0, 1, 250, 65535);
+  state.cruises = *rc::gen::arbitrary<bool>();
+  if (state.cruises) return state;
+  state.accel_at = between<uint16_t>(0, 65535);
+  state.accel_end = between<uint16_t>(0, 65535);
+  state.cruise_left = between<uint32_t>(0, UINT32_MAX);
+  state.decel_left = between<uint16_t>(0, 65535);
+  return state;
+}
+
+namespace {
+
+size_t bits_set(uint16_t mask) {
+  size_t bits = 0;
+  for (int b = 0; b < 16; ++b) bits += (mask >> b) & 1;
+  return bits;
+}
+
+bushd_status ticks_again(const Bytes& payload, Bytes* again) {
+  bushd_ticks m{};
+  const bushd_status status = bushd_decode_ticks(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  RC_ASSERT(m.motors == bits_set(m.mask));
+  std::vector<uint16_t> delays;
+  for (size_t i = 0; i < m.motors; ++i) delays.push_back(bushd_get_u16(m.delays + 2 * i));
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  const size_t head = bushd_encode_ticks_head(m.epoch, m.flags, m.first_tick, m.count, m.mask,
+                                              delays.data(), again->data());
+  again->resize(head);
+  const size_t width = m.flags & BUSHD_TICKS_FINE ? 2 : 1;
+  again->insert(again->end(), m.displacements, m.displacements + width * m.motors * m.count);
+  return status;
+}
+
+Bytes any_ticks() {
+  const auto flags = between<uint8_t>(0, 5);  // START and REPLACE never together
+  const auto mask = static_cast<uint16_t>(between(1, 0xFFFF));
+  const auto motors = static_cast<uint8_t>(bits_set(mask));
+  const auto count = between<uint8_t>(1, bushd_ticks_capacity(motors, flags & BUSHD_TICKS_FINE));
+  const size_t width = flags & BUSHD_TICKS_FINE ? 2 : 1;
+  Bytes payload = random_bytes(BUSHD_TICKS_HEADER + 2u * motors + width * motors * count);
+  payload[1] = flags;
+  payload[6] = count;
+  bushd_put_u16(payload.data() + 7, mask);
+  if (width == 2) {
+    for (std::size_t at = payload.size() - width * motors * count; at < payload.size();
+         at += width) {
+      if (bushd_get_i16(&payload[at]) == INT16_MIN) bushd_put_i16(&payload[at], 1);
+    }
+  }
+  return payload;
+}
+
+bushd_status poll_again(const Bytes& payload, Bytes* again) {
+  bushd_poll m{};
+  const bushd_status status = bushd_decode_poll(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  std::vector<bushd_poll_entry> entries;
+  for (size_t i = 0; i < m.count; ++i) {
+    const uint8_t* const at = m.entries + 3 * i;
+    entries.push_back({at[0], bushd_get_u16(at + 1)});
+  }
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(bushd_encode_poll(entries.data(), m.count, again->data()));
+  return status;
+}
+
+Bytes any_poll() {
+  const auto count = between<uint8_t>(1, BUSHD_POLL_MAX_ENTRIES);
+  Bytes payload = random_bytes(1u + 3u * count);
+  payload[0] = count;
+  return payload;
+}
+
+bushd_status table_ticks_again(const Bytes& payload, Bytes* again) {
+  bushd_table_ticks m{};
+  const bushd_status status = bushd_decode_table_ticks(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  std::vector<bushd_table_ticks_entry> entries;
+  uint16_t at = 0;
+  uint16_t mask = 0;
+  for (bushd_table_ticks_entry entry; bushd_next_table_ticks_entry(&m, &at, &entry);) {
+    mask = static_cast<uint16_t>(mask | 1 << entry.motor);
+    entries.push_back(entry);
+  }
+  RC_ASSERT(mask == m.mask);
+  RC_ASSERT(entries.size() == bits_set(m.mask));
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(bushd_encode_table_ticks(m.epoch, m.flags, m.first_tick, m.count, entries.data(),
+                                         static_cast<uint8_t>(entries.size()), again->data()));
+  return status;
+}
+
+// As many of the motors as fit, from the lowest on.
+Bytes any_table_ticks() {
+  const auto mask = between<uint16_t>(1, 0xFFFF);
+  const size_t most =
+      (BUSHD_FRAME_MAX_PAYLOAD - BUSHD_TABLE_TICKS_HEADER) / BUSHD_TABLE_TICKS_MAX_ENTRY;
+  std::vector<bushd_table_ticks_entry> entries;
+  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU && entries.size() < most; ++m) {
+    if ((mask >> m & 1) != 0) entries.push_back({m, any_run_state()});
+  }
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(bushd_encode_table_ticks(
+      between<uint8_t>(0, 255), *rc::gen::element<uint8_t>(0, 2, 4),
+      between<uint32_t>(0, UINT32_MAX), between<uint16_t>(1, 65535), entries.data(),
+      static_cast<uint8_t>(entries.size()), payload.data()));
+  return payload;
+}
+
+bushd_status table_run_again(const Bytes& payload, Bytes* again) {
+  bushd_table_run m{};
+  const bushd_status status = bushd_decode_table_run(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  std::vector<bushd_table_run_entry> entries;
+  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_get_table_run_entry(m.entries, i));
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(
+      bushd_encode_table_run(m.epoch, m.first_tick, entries.data(), m.count, again->data()));
+  return status;
+}
+
+Bytes any_table_run() {
+  const auto mask = between<uint16_t>(1, 0xFFFF);
+  Bytes payload = random_bytes(BUSHD_TABLE_RUN_HEADER);
+  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((mask >> m & 1) == 0) continue;
+    Bytes entry(BUSHD_TABLE_RUN_ENTRY);
+    entry[0] = static_cast<uint8_t>(m | between<uint8_t>(0, 15) << 4);
+    bushd_put_u32(&entry[1], between<uint32_t>(1, INT32_MAX));
+    payload.insert(payload.end(), entry.begin(), entry.end());
+  }
+  return payload;
+}
+
+bushd_status trigger_again(const Bytes& payload, Bytes* again) {
+  bushd_trigger m{};
+  const bushd_status status = bushd_decode_trigger(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  std::vector<bushd_table_run_entry> entries;
+  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_get_table_run_entry(m.entries, i));
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(
+      bushd_encode_trigger(m.number, m.edge, m.delay_us, entries.data(), m.count, again->data()));
+  return status;
+}
+
+Bytes any_trigger() {
+  const Bytes run = any_table_run();
+  Bytes payload(6);
+  payload[0] = between<uint8_t>(1, 255);
+  payload[1] = between<uint8_t>(1, 2);
+  bushd_put_u32(&payload[2], between<uint32_t>(50, 1'500'000));
+  payload.insert(payload.end(), run.begin() + BUSHD_TABLE_RUN_HEADER, run.end());
+  return payload;
+}
+
+}  // namespace
+
+Kinds motion_kinds() {
+  return {
+      {"home",
+       {bytes_with(16,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 15);
+                     (*p)[1] = *rc::gen::element<uint8_t>(1, 0xFF);
+                     (*p)[5] &= 0x7F;
+                     (*p)[9] &= 0x7F;
+                     (*p)[6] |= 1;
+                     (*p)[10] |= 1;
+                   }),
+        codec(bushd_decode_home, bushd_encode_home),
+        {{"motor 16", set8(0, 16)},
+         {"no direction", set8(1, 0)},
+         {"twice the direction", set8(1, 2)},
+         {"too many steps", set32(2, 0x80000000)},
+         {"no slow steps", set32(6, 0)},
+         {"too many slow steps", set32(6, 0x80000000)},
+         {"no delay", set16(10, 0)}}}},
+      {"local",
+       {[] { return random_bytes(2); }, codec(bushd_decode_local, bushd_encode_local), {}}},
+      {"poll", {any_poll, poll_again, {}}},
+      {"sync",
+       {bytes_with(19,
+                   [](Bytes* p) {
+                     (*p)[6] = between<uint8_t>(0, 1);
+                     bushd_put_u32(p->data() + 15, between(0u, BUSHD_MAX_TICK_NS - 1));
+                   }),
+        codec(bushd_decode_sync, bushd_encode_sync),
+        {{"follows 2", set8(6, 2)}, {"mark beyond any tick", set32(15, BUSHD_MAX_TICK_NS)}}}},
+      {"ticks",
+       {any_ticks,
+        ticks_again,
+        {{"unknown flag", [](Bytes* p) { (*p)[1] |= 8; }},
+         {"start and replacement at once", [](Bytes* p) { (*p)[1] |= 6; }}}}},
+      {"table_ticks",
+       {any_table_ticks,
+        table_ticks_again,
+        {{"fine", [](Bytes* p) { (*p)[1] |= 1; }},
+         {"unknown flag", [](Bytes* p) { (*p)[1] |= 8; }},
+         {"start and replacement at once", [](Bytes* p) { (*p)[1] |= 6; }},
+         {"no ticks", set16(6, 0)},
+         {"no entry", [](Bytes* p) { p->resize(BUSHD_TABLE_TICKS_HEADER); }}},
+        true}},
+      {"table_run",
+       {any_table_run,
+        table_run_again,
+        {{"no step", set32(BUSHD_TABLE_RUN_HEADER + 1, 0)},
+         {"more steps than a position has", set32(BUSHD_TABLE_RUN_HEADER + 1, 0x80000000u)},
+         {"no entry", [](Bytes* p) { p->resize(BUSHD_TABLE_RUN_HEADER); }},
+         {"a motor twice",
+          [](Bytes* p) {
+            const Bytes entry(p->end() - BUSHD_TABLE_RUN_ENTRY, p->end());
+            p->insert(p->end(), entry.begin(), entry.end());
+          }}},
+        true}},
+      {"trigger",
+       {any_trigger,
+        trigger_again,
+        {{"no number", set8(0, 0)},
+         {"no such edge", set8(1, 3)},
+         {"entries to disarm", set8(1, 0)},
+         {"too short a delay", set32(2, 49)},
+         {"too long a delay", set32(2, 1'500'001)},
+         {"no step", set32(7, 0)},
+         {"no entry", [](Bytes* p) { p->resize(6); }}},
+        true}},
+      {"reference",
+       {bytes_with(14,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 15);
+                     (*p)[1] = between<uint8_t>(0, 3);
+                     bushd_put_u32(p->data() + 6, between<uint32_t>(0, 1'500'000));
+                     bushd_put_u32(p->data() + 10, between<uint32_t>(1, 1'000'000));
+                   }),
+        codec(bushd_decode_reference, bushd_encode_reference),
+        {{"motor 16", set8(0, 16)},
+         {"no such arrival", set8(1, 4)},
+         {"too long a delay", set32(6, 1'500'001)},
+         {"no width", set32(10, 0)},
+         {"too wide", set32(10, 1'000'001)}}}},
+      {"emergency",
+       {bytes_with(1, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 1); }),
+        codec(bushd_decode_emergency, bushd_encode_emergency),
+        {{"no such way", set8(0, 2)}}}},
+      {"report",
+       {[] {
+          const auto motors = between<uint8_t>(0, 16);
+          Bytes payload = random_bytes(BUSHD_REPORT_SIZE(motors));
+          payload[0] = between<uint8_t>(0, 3);
+          payload[68] = between<uint8_t>(0, 6);
+          payload[77] = motors;
+          return payload;
+        },
+        codec(bushd_decode_report, bushd_encode_report),
+        {{"state 4", set8(0, 4)}, {"trigger state 7", set8(68, 7)}, {"17 motors", set8(77, 17)}}}},
+  };
+}
+
+}  // namespace bushd::test

@@ -1,0 +1,139 @@
+#include "engine/message_kinds.h"
+
+namespace bushd::test {
+namespace {
+
+bushd_status table_data_again(const Bytes& payload, Bytes* again) {
+  bushd_table_data m{};
+  const bushd_status status = bushd_decode_table_data(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  std::vector<uint16_t> codes;
+  for (size_t i = 0; i < m.count; ++i) codes.push_back(bushd_get_u16(m.codes + 2 * i));
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(bushd_encode_table_data(m.slot, m.offset, m.count, codes.data(), again->data()));
+  return status;
+}
+
+Bytes any_table_data() {
+  const auto count = between<uint8_t>(1, BUSHD_TABLE_DATA_MAX_CODES);
+  Bytes payload = random_bytes(4u + 2u * count);
+  payload[0] = between<uint8_t>(0, BUSHD_TABLE_SLOTS - 1);
+  payload[3] = count;
+  return payload;
+}
+
+void put_tick_ns(Bytes* payload) {
+  bushd_put_u32(payload->data(), between(BUSHD_MIN_TICK_NS, BUSHD_MAX_TICK_NS));
+}
+
+}  // namespace
+
+Kinds setup_kinds() {
+  return {
+      {"identify",
+       {bytes_with(5, [](Bytes* p) { (*p)[2] |= 1; }),
+        codec(bushd_decode_identify, bushd_encode_identify),
+        {{"no slot", set8(2, 0)}}}},
+      {"identity",
+       {bytes_with(BUSHD_IDENTITY_SIZE,
+                   [](Bytes* p) {
+                     (*p)[0] = BUSHD_PROTOCOL_VERSION;
+                     (*p)[1] = between<uint8_t>(1, 16);
+                   }),
+        codec(bushd_decode_identity, bushd_encode_identity),
+        {{"no motor", set8(1, 0)}, {"17 motors", set8(1, 17)}}}},
+      {"set_address",
+       {bytes_with(9, [](Bytes* p) { (*p)[8] = between<uint8_t>(1, 255); }),
+        codec(bushd_decode_set_address, bushd_encode_set_address),
+        {{"the broadcast address", set8(8, 0)}}}},
+      {"configure",
+       {bytes_with(7,
+                   [](Bytes* p) {
+                     put_tick_ns(p);
+                     (*p)[4] = between<uint8_t>(0, 1);
+                     (*p)[5] |= 1;
+                   }),
+        codec(bushd_decode_configure, bushd_encode_configure),
+        {{"tick too short", set32(0, BUSHD_MIN_TICK_NS - 1)},
+         {"tick too long", set32(0, BUSHD_MAX_TICK_NS + 1)},
+         {"unknown format", set8(4, 2)},
+         {"no silence at all", set16(5, 0)}}}},
+      {"table_begin",
+       {bytes_with(15,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 7);
+                     for (const size_t at : {1u, 5u, 7u}) (*p)[at] |= 1;
+                   }),
+        codec(bushd_decode_table_begin, bushd_encode_table_begin),
+        {{"slot 8", set8(0, 8)},
+         {"no codes", set16(1, 0)},
+         {"cruise 0", set16(5, 0)},
+         {"unit 0", set32(7, 0)}}}},
+      {"table_data", {any_table_data, table_data_again, {{"slot 8", set8(0, 8)}}}},
+      {"table_end",
+       {bytes_with(5, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 7); }),
+        codec(bushd_decode_table_end, bushd_encode_table_end),
+        {{"slot 8", set8(0, 8)}}}},
+      {"tables",
+       {[] { return random_bytes(BUSHD_TABLES_SIZE); },
+        codec(bushd_decode_tables, bushd_encode_tables),
+        {}}},
+      {"assign",
+       {bytes_with(2,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 15);
+                     (*p)[1] = between<uint8_t>(0, 7);
+                   }),
+        codec(bushd_decode_assign, bushd_encode_assign),
+        {{"motor 16", set8(0, 16)}, {"slot 8", set8(1, 8)}}}},
+      {"control",
+       {bytes_with(
+            1, [](Bytes* p) { (*p)[0] = *rc::gen::element<uint8_t>(0, 1, 2, 4, 5, 6, 8, 9, 14); }),
+        codec(bushd_decode_control, bushd_encode_control),
+        {{"enable and disable", set8(0, 3)},
+         {"both and clear", set8(0, 7)},
+         {"unknown", set8(0, 16)}}}},
+      {"set_position",
+       {bytes_with(5, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 15); }),
+        codec(bushd_decode_set_position, bushd_encode_set_position),
+        {{"motor 16", set8(0, 16)}}}},
+      {"set_inputs",
+       {bytes_with(14,
+                   [](Bytes* p) {
+                     (*p)[8] = between<uint8_t>(0, BUSHD_MAX_DEBOUNCE_TICKS);
+                     (*p)[9] = between<uint8_t>(0, BUSHD_SYSTEM_INPUTS);
+                     (*p)[10] = between<uint8_t>(0, 2);
+                     bushd_put_u16(p->data() + 11, between<uint16_t>(0, 1023));
+                     (*p)[13] = between<uint8_t>(0, 1);
+                   }),
+        codec(bushd_decode_set_inputs, bushd_encode_set_inputs),
+        {{"a debounce beyond the counters", set8(8, 16)},
+         {"unknown input", set8(9, 16)},
+         {"unknown action", set8(10, 3)},
+         {"more than can be read", set16(11, 1024)},
+         {"neither on nor off", set8(13, 2)}}}},
+      {"emission",
+       {bytes_with(11,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 4);
+                     (*p)[1] = between<uint8_t>(0, 3);
+                     (*p)[2] = between<uint8_t>(0, 1);
+                     bushd_put_u16(p->data() + 3, between<uint16_t>(1, 65535));
+                   }),
+        codec(bushd_decode_emission, bushd_encode_emission),
+        {{"mode 5", set8(0, 5)},
+         {"sequence 4", set8(1, 4)},
+         {"hold current 2", set8(2, 2)},
+         {"no step period",
+          [](Bytes* p) {
+            (*p)[0] = BUSHD_EMISSION_BURST;
+            bushd_put_u16(p->data() + 3, 0);
+          }}}}},
+      {"acknowledgement",
+       {[] { return random_bytes(1); },
+        codec(bushd_decode_acknowledgement, bushd_encode_acknowledgement),
+        {}}},
+  };
+}
+
+}  // namespace bushd::test
