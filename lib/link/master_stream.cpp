@@ -341,7 +341,10 @@ void Master::follow_streams(std::size_t index) {
     // Of a stream that has not begun nothing can be missing; but a busy line may keep it waiting
     // past its start.
     const bool begun = stream.sent != stream.start;
-    if (begun ? known >= stream.sent : moving || known <= stream.start) continue;
+    // A frame that it shares with others may have gone on past its end: that is rest, and no MCU
+    // takes it alone.
+    const Tick needed = std::min(stream.sent, source_.end_tick(index, m));
+    if (begun ? known >= needed : moving || known <= stream.start) continue;
     if (!moving && known > stream.start) {
       stream.active = false;
       events_.push_back({.kind = Event::Kind::kLateStart, .mcu = index, .motor = m});
