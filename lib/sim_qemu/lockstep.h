@@ -9,7 +9,7 @@ typedef enum lockstep_command_kind {
   LOCKSTEP_RUN = 1,          // until time_ns; answered by events, the last one LOCKSTEP_STOPPED
   LOCKSTEP_BYTE = 2,         // value: its stop bit ends at time_ns, in the order of their times
   LOCKSTEP_INPUTS = 3,       // value: levels of the motors' inputs; address: those of the system's
-  LOCKSTEP_CURRENT = 4,      // value: what its ADC reads
+  LOCKSTEP_CURRENT = 4,      // value: what its ADC reads; in answer to LOCKSTEP_CONVERTS
   LOCKSTEP_FLASH = 5,        // value: the word at `address`, before the first RUN
   LOCKSTEP_RESET_CAUSE = 6,  // value: RESC, before the first RUN
   LOCKSTEP_STOP_TICKS = 7,   // the timer that begins ticks interrupts no more
@@ -26,7 +26,9 @@ typedef enum lockstep_event_kind {
   LOCKSTEP_OVERRUN = 7,        // a byte was lost in its UART
   LOCKSTEP_STORED = 8,         // value: the flash word at `address` is this now
   LOCKSTEP_WATCHDOG = 9,       // it is reset, and the process ends
-  LOCKSTEP_COMMON_DIR = 10     // value: level
+  LOCKSTEP_COMMON_DIR = 10,    // value: level
+  LOCKSTEP_REFERENCE = 11,     // value: level
+  LOCKSTEP_CONVERTS = 12       // its ADC begins a conversion, and waits for LOCKSTEP_CURRENT
 } lockstep_event_kind;
 
 typedef struct lockstep_message {

@@ -6,7 +6,7 @@
  * model is made up for here:
  * - a UART's BUSY flag, and the time that it takes to send
  * - flash that can be written
- * - an ADC that reads what it is told
+ * - an ADC that reads what it is told, and takes its time
  * - why it was reset, and a watchdog that ends this process, as the next one has all memory fresh
  */
 #include <stdlib.h>
@@ -43,6 +43,7 @@ __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t 
 #define RESET_CAUSE_AT 0x400FE05Cu
 #define UART_0_AT 0x4000C000u
 #define CYCLE_NS 20
+#define ADC_SAMPLE_NS INT64_C(1000)
 
 #define EVENTS 1024
 #define BYTES 4096 /* on their way; a power of two */
@@ -79,7 +80,9 @@ static struct {
 
 static struct {
   MemoryRegion region;
-  uint32_t reading;
+  uint32_t result;
+  uint32_t averaging; /* of 2 to the power of it samples */
+  int64_t ready_ns;
 } adc;
 
 static struct {
@@ -97,6 +100,7 @@ static struct {
 
 #define SYSTEM_INPUTS 4
 static qemu_irq system_input[SYSTEM_INPUTS];
+static uint32_t system_levels;
 
 static struct {
   qemu_irq data; /* to the CPU */
@@ -207,6 +211,10 @@ static void stick(uint32_t address) {
   cover(&region, address, 4, &kStuck);
 }
 
+static void show_system_inputs(void) {
+  for (int i = 0; i < SYSTEM_INPUTS; ++i) qemu_set_irq(system_input[i], system_levels >> i & 1u);
+}
+
 /* Until it may run. */
 static void obey(void) {
   for (;;) {
@@ -222,9 +230,8 @@ static void obey(void) {
         break;
       case LOCKSTEP_INPUTS:
         shifter.inputs = command.value;
-        for (int i = 0; i < SYSTEM_INPUTS; ++i) {
-          qemu_set_irq(system_input[i], command.address >> i & 1u);
-        }
+        system_levels = command.address;
+        show_system_inputs();
         break;
       case LOCKSTEP_RESET_CAUSE:
         reset_cause.flags = command.value;
@@ -234,9 +241,6 @@ static void obey(void) {
         break;
       case LOCKSTEP_STICK:
         stick(command.address);
-        break;
-      case LOCKSTEP_CURRENT:
-        adc.reading = command.value;
         break;
       case LOCKSTEP_FLASH:
         store(command.address, command.value);
@@ -253,6 +257,8 @@ static bool uart_busy(void) {
 
 static void on_time(void* opaque) {
   (void)opaque;
+  /* The first time: QEMU resets its devices when they have been told. */
+  show_system_inputs();
   const int64_t now_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL);
   while (next_byte() != NULL && next_byte()->time_ns <= now_ns) hear();
   if (now_ns >= lockstep.until_ns) {
@@ -279,6 +285,12 @@ static void on_common_dir(void* opaque, int n, int level) {
   (void)opaque;
   (void)n;
   tell(LOCKSTEP_COMMON_DIR, (uint32_t)level, 0);
+}
+
+static void on_reference(void* opaque, int n, int level) {
+  (void)opaque;
+  (void)n;
+  tell(LOCKSTEP_REFERENCE, (uint32_t)level, 0);
 }
 
 static void on_driver_enable(void* opaque, int n, int level) {
@@ -358,18 +370,30 @@ static void uart_write(void* opaque, hwaddr address, uint64_t data, unsigned siz
   memory_region_dispatch_write(uart.real, address, data, MO_32, MEMTXATTRS_UNSPECIFIED);
 }
 
-/* The result of the last conversion is there at once. */
 static uint64_t adc_read(void* opaque, hwaddr address, unsigned size) {
   (void)opaque;
   (void)size;
-  return address == 0xA8u ? adc.reading : 0;
+  if (address == 0xACu) return qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) < adc.ready_ns ? 1u << 8 : 0;
+  if (address != 0xA8u) return 0;
+  adc.ready_ns = INT64_MAX;
+  return adc.result;
+}
+
+static void adc_convert(void) {
+  lockstep_message answer;
+  tell(LOCKSTEP_CONVERTS, 0, 0);
+  flush();
+  get_all(&answer, sizeof answer);
+  if (answer.kind != LOCKSTEP_CURRENT) give_up();
+  adc.result = answer.value;
+  adc.ready_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) + (ADC_SAMPLE_NS << adc.averaging);
 }
 
 static void adc_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
   (void)opaque;
-  (void)address;
-  (void)data;
   (void)size;
+  if (address == 0x30u) adc.averaging = (uint32_t)data & 7u;
+  if (address == 0x28u && (data & 8u) != 0) adc_convert();
 }
 
 static uint64_t cause_read(void* opaque, hwaddr address, unsigned size) {
@@ -466,6 +490,7 @@ static void on_machine_done(Notifier* notifier, void* data) {
   }
   wire(gpio(GPIO_A), 2, on_enable, 0);
   wire(gpio(GPIO_F), 0, on_common_dir, 0);
+  wire(gpio(GPIO_F), 1, on_reference, 0);
   wire(gpio(GPIO_A), 3, on_driver_enable, 0);
   wire(gpio(GPIO_E), 0, on_shift_clock, 0);
   wire(gpio(GPIO_E), 1, on_direction_data, 0);
@@ -485,7 +510,7 @@ static void on_machine_done(Notifier* notifier, void* data) {
   tick_timer = sysbus_mmio_get_region(find(TIMER_1, "stellaris-gptm"), 0);
   timer_init_full(&lockstep.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_time, NULL);
   obey();
-  set_timer();
+  timer_mod(&lockstep.timer, 0);
 }
 
 int qemu_plugin_install(qemu_plugin_id_t id, const qemu_info_t* info, int argc, char** argv) {

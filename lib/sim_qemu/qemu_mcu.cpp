@@ -86,7 +86,6 @@ void QemuMcu::start(std::uint32_t reset_cause) {
   for (const auto& [address, word] : flash_) order(LOCKSTEP_FLASH, word, address);
   order(LOCKSTEP_RESET_CAUSE, reset_cause);
   set_inputs(inputs_);
-  set_current(current_);
 }
 
 void QemuMcu::end() {
@@ -111,9 +110,7 @@ void QemuMcu::advance(TimeNs now_ns) {
   while (!run()) start(kWatchdog);
 }
 
-// Up to now_ns_; false if it was reset on the way.
-bool QemuMcu::run() {
-  order(LOCKSTEP_RUN, 0, 0, now_ns_ - boot_ns_);
+void QemuMcu::send_orders() {
   const auto* out = reinterpret_cast<const char*>(orders_.data());
   std::size_t left = orders_.size() * sizeof orders_[0];
   while (left > 0) {
@@ -124,6 +121,12 @@ bool QemuMcu::run() {
     left -= static_cast<std::size_t>(sent);
   }
   orders_.clear();
+}
+
+// Up to now_ns_; false if it was reset on the way.
+bool QemuMcu::run() {
+  order(LOCKSTEP_RUN, 0, 0, now_ns_ - boot_ns_);
+  send_orders();
   std::array<lockstep_message, 256> events;
   std::size_t have = 0;  // bytes
   for (;;) {
@@ -165,6 +168,13 @@ void QemuMcu::take(const lockstep_message& event) {
       break;
     case LOCKSTEP_COMMON_DIR:
       drive(time_ns, Signal::kCommonDir, common_dir_level_, event.value != 0);
+      break;
+    case LOCKSTEP_REFERENCE:
+      drive(time_ns, Signal::kReference, reference_level_, event.value != 0);
+      break;
+    case LOCKSTEP_CONVERTS:
+      order(LOCKSTEP_CURRENT, on_conversion ? on_conversion(time_ns) : current_);
+      send_orders();
       break;
     case LOCKSTEP_DRIVER_ENABLE:
       driver_enable_ = event.value != 0;
@@ -225,11 +235,6 @@ void QemuMcu::set_inputs(bushd_inputs inputs) {
         static_cast<std::uint8_t>(~inputs.system));
 }
 
-void QemuMcu::set_current(std::uint16_t reading) {
-  current_ = reading;
-  order(LOCKSTEP_CURRENT, reading);
-}
-
 // All that it drove.
 void QemuMcu::fall(TimeNs now_ns) {
   end();
@@ -237,6 +242,7 @@ void QemuMcu::fall(TimeNs now_ns) {
   drive(now_ns, Signal::kDir, direction_levels_, 0);
   drive(now_ns, Signal::kEnable, enable_level_, 0);
   drive(now_ns, Signal::kCommonDir, common_dir_level_, 0);
+  drive(now_ns, Signal::kReference, reference_level_, 0);
   driver_enable_ = line_timer_ = false;
 }
 

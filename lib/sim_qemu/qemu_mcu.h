@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -38,7 +39,7 @@ class QemuMcu final : public Mcu {
   std::uint16_t boot_number() const override;
 
   void set_inputs(bushd_inputs inputs) override;
-  void set_current(std::uint16_t reading) override;
+  void set_current(std::uint16_t reading) override { current_ = reading; }
 
   bool running() const override { return now_ns_ >= boot_ns_; }
   TimeNs next_event_ns() const override { return may_speak() ? now_ns_ : kNever; }
@@ -47,6 +48,9 @@ class QemuMcu final : public Mcu {
   void advance(TimeNs now_ns) override;
   void receive(std::uint8_t byte, TimeNs now_ns) override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override;
+
+  // What the current sensor reads when a conversion begins; not set: what set_current said.
+  std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
 
   // Faults of the chip.
   void stop_ticks() { order(LOCKSTEP_STOP_TICKS, 0); }  // their timer interrupts no more
@@ -63,6 +67,7 @@ class QemuMcu final : public Mcu {
   void end();
   void fall(TimeNs now_ns);
   bool run();
+  void send_orders();
   void order(lockstep_command_kind kind, std::uint32_t value, std::uint32_t address = 0,
              TimeNs time_ns = 0);
   void take(const lockstep_message& event);
@@ -87,6 +92,7 @@ class QemuMcu final : public Mcu {
   std::uint16_t direction_levels_ = 0;
   std::uint16_t enable_level_ = 0;
   std::uint16_t common_dir_level_ = 0;
+  std::uint16_t reference_level_ = 0;
   bool driver_enable_ = false;
   std::uint64_t overruns_ = 0;
   std::uint64_t bytes_cut_ = 0;

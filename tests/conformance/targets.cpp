@@ -28,6 +28,7 @@ class Atmega2560 final : public McuUnderTest {
     options.unique_id = birth.unique_id;
     options.boots = birth.boots;
     auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
+    mcu->on_conversion = on_conversion;
     avr_ = mcu.get();
     return mcu;
   }
@@ -49,7 +50,7 @@ class Lm3s6965 final : public McuUnderTest {
   McuOptions twin() const override {
     return {.slots = 128, .queue_ticks = 512, .code_count = 12288};
   }
-  std::uint16_t lacks() const override { return BUSHD_CAN_TRIGGER | BUSHD_CAN_REFERENCE; }
+  std::uint16_t lacks() const override { return 0; }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }
   std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
                             EdgeSink* sink) override {
@@ -59,6 +60,7 @@ class Lm3s6965 final : public McuUnderTest {
     options.unique_id = birth.unique_id;
     options.boots = birth.boots;
     auto mcu = std::make_unique<QemuMcu>(options, index, driver, sink);
+    mcu->on_conversion = on_conversion;
     qemu_ = mcu.get();
     return mcu;
   }

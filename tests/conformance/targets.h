@@ -35,6 +35,8 @@ class McuUnderTest {
 
   virtual std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
                                     EdgeSink* sink) = 0;
+  // Before `make`: what its current sensor reads when a conversion begins.
+  std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
   // After a test: what its simulator knows to be wrong.
   virtual void expect_unharmed() const = 0;
 };

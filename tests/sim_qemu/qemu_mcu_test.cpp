@@ -98,6 +98,12 @@ TEST_F(QemuImage, ReadsItsInputsAndTheSupplyCurrent) {
   EXPECT_EQ(report.current, 345);
 }
 
+TEST_F(QemuImage, HasNoActiveInputFromTheBeginning) {
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.inputs, 0);
+  EXPECT_EQ(report.system_inputs, 0);
+}
+
 // A page of its journal has room for some 220 boots.
 TEST_F(QemuImage, CountsItsBootsWhenItTurnsAPage) {
   constexpr int kBoots = 240;

@@ -8,7 +8,7 @@
 #define RCC_XTAL_8_MHZ (0xEu << 6)
 #define RIS_PLL_LOCK (1u << 6)
 
-#define ADC_SEQUENCER_3 (1u << 3)
+#define ADC_MEAN_OF_4 2u
 #define GPIO_LOCK_KEY 0x1ACCE551u
 
 static void clock_init(void) {
@@ -29,10 +29,10 @@ static void port_init(uint32_t port, uint32_t outputs, uint32_t inputs) {
 
 void board_init(void) {
   clock_init();
-  SYSCTL_RCGC0 = 1u << 16 | 1u << 3;                        // ADC, watchdog
-  SYSCTL_RCGC1 = 1u << 0 | 1u << 16 | 1u << 17 | 1u << 18;  // UART 0, timers 0 to 2
-  SYSCTL_RCGC2 = 0x7Fu;                                     // all ports
-  (void)SYSCTL_RCGC2;  // the clock of a port comes some cycles later
+  SYSCTL_RCGC0 = 1u << 16 | 1u << 3;    // ADC, watchdog
+  SYSCTL_RCGC1 = 1u << 0 | 0xFu << 16;  // UART 0, timers 0 to 3
+  SYSCTL_RCGC2 = 0x7Fu;                 // all ports
+  (void)SYSCTL_RCGC2;                   // the clock of a port comes some cycles later
   // PB7 is TRST of the debugger unless told otherwise.
   GPIO_LOCK(GPIO_B) = GPIO_LOCK_KEY;
   GPIO_CR(GPIO_B) = 0xFFu;
@@ -42,7 +42,7 @@ void board_init(void) {
   port_init(GPIO_D, 0xFFu, 0);
   port_init(GPIO_E, 0x0Fu, 0);
   port_init(GPIO_C, 0, 1u << 4);
-  port_init(GPIO_F, 1u << 0, 0);
+  port_init(GPIO_F, 1u << 0 | 1u << 1, 0);
   port_init(GPIO_A, 1u << 2 | 1u << 3, 0xF0u);
   INPUT_LOAD = ALL_PINS;
   // The UART has its own; its receiver's line is pulled up while the transceiver does not drive it.
@@ -50,9 +50,9 @@ void board_init(void) {
   GPIO_PUR(GPIO_A) |= 1u << 0;
   GPIO_DEN(GPIO_A) |= 1u << 0 | 1u << 1;
   // Sequencer 3 takes one sample, of input 0, when it is asked to.
+  ADC_SAC = ADC_MEAN_OF_4;
   ADC_SSCTL3 = 1u << 2 | 1u << 1;
   ADC_ACTSS = ADC_SEQUENCER_3;
-  ADC_PSSI = ADC_SEQUENCER_3;
   board_shift_directions(0);
   board_latch_directions();
 }
@@ -80,11 +80,9 @@ uint16_t board_read_inputs(void) {
   return (uint16_t)levels;
 }
 
-// The one asked for a tick ago; the first one is yet to come then.
 uint16_t board_read_current(void) {
   static uint16_t reading;
-  if ((ADC_SSFSTAT3 & ADC_SSFSTAT_EMPTY) == 0) reading = (uint16_t)(ADC_SSFIFO3 & 0x3FFu);
-  ADC_PSSI = ADC_SEQUENCER_3;
+  if (board_has_current()) reading = (uint16_t)(ADC_SSFIFO3 & 0x3FFu);
   return reading;
 }
 

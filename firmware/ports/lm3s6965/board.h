@@ -23,10 +23,12 @@
 #define INPUT_DATA GPIO_DATA(GPIO_C, 1u << 4)
 
 #define COMMON_DIR GPIO_DATA(GPIO_F, 1u << 0)
+#define REFERENCE GPIO_DATA(GPIO_F, 1u << 1)
 
 // In the order of BUSHD_INPUT_*.
 #define SYSTEM_INPUTS GPIO_DATA(GPIO_A, 0xF0u)
 #define SYSTEM_INPUTS_SHIFT 4
+#define TRIGGER_PIN (1u << 7)  // of port A, the only one that interrupts
 
 #define ENABLE GPIO_DATA(GPIO_A, 1u << 2)
 // Driver-enable of the RS-485 transceiver, and its /RE: it does not hear itself.
@@ -47,7 +49,15 @@ static inline void board_latch_directions(void) {
 // What the inputs of the motors are now, levels. What was shifted for DIR is lost.
 uint16_t board_read_inputs(void);
 
-// The supply current as ADC 0 reads it, 0..1023.
+// The supply current as ADC 0 reads it, 0..1023, the mean of 4 us. A conversion that has been begun
+// is to be read before the next one.
+static inline void board_begin_current(void) {
+  ADC_PSSI = ADC_SEQUENCER_3;
+}
+static inline bool board_has_current(void) {
+  return (ADC_SSFSTAT3 & ADC_SSFSTAT_EMPTY) == 0;
+}
+// The last one that is over.
 uint16_t board_read_current(void);
 
 // From now on the MCU is reset if watchdog_reset is not called within 60 to 120 ms.

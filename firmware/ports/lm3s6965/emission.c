@@ -6,6 +6,7 @@
 #include "firmware/ports/lm3s6965/clock.h"
 #include "firmware/ports/lm3s6965/emission_slots.h"
 #include "firmware/ports/lm3s6965/interrupts.h"
+#include "firmware/ports/lm3s6965/reference.h"
 #include "firmware/ports/lm3s6965/timer.h"
 
 #define SLOT_TIMER TIMER(0)
@@ -24,6 +25,8 @@ typedef struct emission_tick {
   uint32_t cycles;
   bool turns;       // DIR is to be latched
   uint8_t outputs;  // bushd_outputs
+  bool has_reference;
+  reference_edges reference;
 } emission_tick;
 
 // What becomes of the plane that the core has prepared.
@@ -55,9 +58,10 @@ static uint32_t rest_ns;       // of a cycle, not yet given
 static int32_t next_extra_ns;  // of `next`
 static uint32_t next_rest_ns;
 
-// Pulses are over: DIR may change.
+// Pulses are over: DIR may change. The current is wanted when the tick after the next is prepared.
 void emission_take_next(void) {
   timer_stop(SLOT_TIMER);
+  board_begin_current();
   if (state == PLANE_WAITS) {
     present = next;
     state = PLANE_TAKEN;
@@ -115,16 +119,21 @@ void emission_tick_begins(void) {
   emission_slot.end = (uintptr_t)present.end;
   const uint32_t start = next_start;
   next_start = start + present.cycles;
+  if (present.has_reference) reference_emit(&present.reference);
   if (state == PLANE_TAKEN && !begun) {
     begun_at = start;
     begun = true;
   }
 }
 
+static uint32_t half_slot_of(uint32_t cycles) {
+  return (cycles - MARGIN_CYCLES) / (2u * EMISSION_SLOTS);
+}
+
 static emission_tick tick_of(const bushd_plane* of, uint32_t cycles) {
   const emission_tick tick = {.mask = of->step,
                               .end = of->step + EMISSION_SLOTS,
-                              .half_slot = (cycles - MARGIN_CYCLES) / (2u * EMISSION_SLOTS),
+                              .half_slot = half_slot_of(cycles),
                               .cycles = cycles};
   return tick;
 }
@@ -136,6 +145,15 @@ static emission_tick empty_tick(const uint16_t* mask, uint32_t cycles) {
   return tick;
 }
 
+static reference_edges reference_of(uint32_t cycles) {
+  const uint32_t slot = 2u * half_slot_of(cycles);
+  reference_edges edges = {.rises = plane->reference_rise != 0,
+                           .falls = plane->reference_fall != 0};
+  if (edges.rises) edges.rise = (plane->reference_rise - 1u) * slot;
+  if (edges.falls) edges.fall = (plane->reference_fall - 1u) * slot;
+  return edges;
+}
+
 // `next` from the plane and what is known of its length, unless it has been taken.
 static void give(void) {
   const int32_t extra_ns = adjust_ns + carry_ns;
@@ -145,6 +163,8 @@ static void give(void) {
       plane->active != 0 ? tick_of(plane, cycles) : empty_tick(plane->step, cycles);
   tick.outputs = plane->outputs;
   tick.turns = plane->direction != directions;
+  tick.has_reference = (plane->reference_rise | plane->reference_fall) != 0;
+  if (tick.has_reference) tick.reference = reference_of(cycles);
   interrupts_off();
   if (state != PLANE_TAKEN) {
     next = tick;

@@ -6,7 +6,9 @@
 #include "firmware/ports/lm3s6965/emission.h"
 #include "firmware/ports/lm3s6965/journal.h"
 #include "firmware/ports/lm3s6965/line.h"
+#include "firmware/ports/lm3s6965/reference.h"
 #include "firmware/ports/lm3s6965/timer.h"
+#include "firmware/ports/lm3s6965/trigger.h"
 
 #define QUEUE_TICKS 512u
 #define TABLE_CODES 12288u
@@ -76,6 +78,11 @@ static void port_keep_enable(void* context, bool on) {
   enable_kept = on ? ENABLE_KEPT : 0;
 }
 
+static void port_set_trigger(void* context, bushd_edge edge) {
+  (void)context;
+  trigger_await(edge);
+}
+
 // Of several flags the gravest counts.
 static bushd_reset_cause reset_cause(void) {
   const uint32_t flags = SYSCTL_RESC;
@@ -96,11 +103,11 @@ static void boot(void) {
                                    .read_inputs = port_read_inputs,
                                    .read_current = port_read_current,
                                    .self_test = port_self_test,
-                                   .keep_enable = port_keep_enable};
+                                   .keep_enable = port_keep_enable,
+                                   .set_trigger = port_set_trigger};
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
-                             .lacks = BUSHD_CAN_REFERENCE,
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,
@@ -120,6 +127,22 @@ static void prepare(void) {
   emission_ready(&mcu.plane[mcu.front ^ 1u]);
 }
 
+static void hear_line(void) {
+  uint32_t time = 0;
+  uint8_t byte = 0;
+  if (line_take(&byte, &time)) {
+    bushd_mcu_receive(&mcu, byte, (int32_t)emission_time_in_tick_ns(time));
+  } else if (bushd_mcu_wants_samples(&mcu) && board_has_current()) {
+    bushd_mcu_sample(&mcu, emission_time_in_tick_ns(clock_now()), board_read_current());
+    board_begin_current();
+  }
+}
+
+static void hear_trigger(void) {
+  uint32_t time = 0;
+  if (trigger_came(&time)) bushd_mcu_trigger(&mcu, (int32_t)emission_time_in_tick_ns(time));
+}
+
 int main(void) {
   board_init();
   clock_init();
@@ -127,20 +150,21 @@ int main(void) {
   boot();
   prepare();
   line_init();
+  trigger_init();
+  reference_init();
   emission_start();
   watchdog_start();
   for (;;) {
     uint32_t start = 0;
-    uint32_t time = 0;
-    uint8_t byte = 0;
     // A frame that ended in the tick before must be heard by the core in that tick.
     if (emission_begun(&start) && !line_has_frame_before(start)) {
       emission_swap();
       bushd_mcu_swap(&mcu);
       prepare();
       watchdog_reset();
-    } else if (line_take(&byte, &time)) {
-      bushd_mcu_receive(&mcu, byte, (int32_t)emission_time_in_tick_ns(time));
+    } else {
+      hear_line();
     }
+    hear_trigger();
   }
 }

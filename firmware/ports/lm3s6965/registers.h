@@ -29,6 +29,11 @@
 #define GPIO_G 0x40026000u
 #define GPIO_DATA(port, pins) REGISTER((port) + ((pins) << 2))
 #define GPIO_DIR(port) REGISTER((port) + 0x400u)
+#define GPIO_IS(port) REGISTER((port) + 0x404u)
+#define GPIO_IBE(port) REGISTER((port) + 0x408u)
+#define GPIO_IEV(port) REGISTER((port) + 0x40Cu)
+#define GPIO_IM(port) REGISTER((port) + 0x410u)
+#define GPIO_ICR(port) REGISTER((port) + 0x41Cu)
 #define GPIO_AFSEL(port) REGISTER((port) + 0x420u)
 #define GPIO_PUR(port) REGISTER((port) + 0x510u)
 #define GPIO_DEN(port) REGISTER((port) + 0x51Cu)
@@ -66,9 +71,11 @@
 // ADC, its sequencer 3.
 #define ADC_ACTSS REGISTER(0x40038000)
 #define ADC_PSSI REGISTER(0x40038028)
+#define ADC_SAC REGISTER(0x40038030)
 #define ADC_SSCTL3 REGISTER(0x400380A4)
 #define ADC_SSFIFO3 REGISTER(0x400380A8)
 #define ADC_SSFSTAT3 REGISTER(0x400380AC)
+#define ADC_SEQUENCER_3 (1u << 3)
 #define ADC_SSFSTAT_EMPTY (1u << 8)
 
 // Flash.
@@ -81,14 +88,17 @@
 #define SYST_RVR REGISTER(0xE000E014)
 #define SYST_CVR REGISTER(0xE000E018)
 #define NVIC_ISER0 REGISTER(0xE000E100)
+#define NVIC_ISER1 REGISTER(0xE000E104)
 #define SCB_VTOR REGISTER(0xE000ED08)
 #define SCB_AIRCR REGISTER(0xE000ED0C)
 
 // Interrupt numbers.
+#define IRQ_GPIO_A 0u
 #define IRQ_UART0 5u
 #define IRQ_TIMER0A 19u
 #define IRQ_TIMER1A 21u
 #define IRQ_TIMER2A 23u
+#define IRQ_TIMER3A 35u
 
 static inline void interrupts_off(void) {
   __asm volatile("cpsid i" ::: "memory");
