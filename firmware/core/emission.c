@@ -80,11 +80,17 @@ static uint8_t next_phase(uint8_t phase, uint8_t count, bool forward) {
   return phase == 0 ? (uint8_t)(count - 1u) : (uint8_t)(phase - 1u);
 }
 
+// Of motor m, at the outputs that are its.
+static uint16_t levels_of(const bushd_mcu* mcu, uint8_t m) {
+  const uint8_t phase = mcu->emission.of.windings.phase[m];
+  const uint16_t levels = bushd_phase_levels(mcu->emission.settings.sequence, phase);
+  return (uint16_t)(levels << (BUSHD_PHASE_OUTPUTS * m));
+}
+
 // Pulses into levels. A phase goes on with every step that is counted, so it belongs to the
 // position whatever way the motor came.
 static void shape_phases(bushd_mcu* mcu, bushd_plane* plane) {
-  const uint8_t sequence = mcu->emission.settings.sequence;
-  const uint8_t count = bushd_phase_count(sequence);
+  const uint8_t count = bushd_phase_count(mcu->emission.settings.sequence);
   const uint16_t moving = bushd_mcu_moving(mcu);
   const uint8_t motors = motors_of(mcu);
   uint16_t on = 0;
@@ -92,8 +98,7 @@ static void shape_phases(bushd_mcu* mcu, bushd_plane* plane) {
   for (uint8_t m = 0; m < motors; ++m) {
     if (!is_on(mcu, m, (moving & motor_bit(m)) != 0)) continue;
     on |= motor_bit(m);
-    levels |= (uint16_t)(bushd_phase_levels(sequence, mcu->emission.of.windings.phase[m])
-                         << (BUSHD_PHASE_OUTPUTS * m));
+    levels |= levels_of(mcu, m);
   }
   for (uint16_t slot = 0; slot < mcu->config.slots; ++slot) {
     uint16_t steps = plane->step[slot];
@@ -102,9 +107,8 @@ static void shape_phases(bushd_mcu* mcu, bushd_plane* plane) {
       uint8_t* const phase = &mcu->emission.of.windings.phase[m];
       *phase = next_phase(*phase, count, (plane->direction & motor_bit(m)) != 0);
       if ((on & motor_bit(m)) == 0) continue;
-      const uint8_t shift = (uint8_t)(BUSHD_PHASE_OUTPUTS * m);
-      levels &= (uint16_t) ~(0xFu << shift);
-      levels |= (uint16_t)(bushd_phase_levels(sequence, *phase) << shift);
+      levels &= (uint16_t) ~(0xFu << (BUSHD_PHASE_OUTPUTS * m));
+      levels |= levels_of(mcu, m);
     }
     plane->step[slot] = levels;
   }

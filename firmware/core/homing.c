@@ -76,6 +76,8 @@ static void go_on(bushd_mcu* mcu, bool active) {
   switch (homing->stage) {
     case BUSHD_HOMING_FAST:
       if (active) {
+        // Whatever ends the homing before it has backed off.
+        bushd_mcu_stands_at_switch(mcu, homing->motor, homing->direction);
         // One that has not made a step stands on its switch, and need not begin in order to stop.
         if (run->steps_done != 0) {
           bushd_run_ramp_down(run);
@@ -92,6 +94,7 @@ static void go_on(bushd_mcu* mcu, bool active) {
       break;
     case BUSHD_HOMING_BACK_OFF:
       if (is_sure(mcu, !active)) {
+        bushd_mcu_has_left_switch(mcu, homing->motor, homing->direction);
         begin_slow(mcu, BUSHD_HOMING_APPROACH, homing->direction);
       } else if (done && homing->readings == 0) {
         end(mcu, BUSHD_HOMING_STUCK);

@@ -60,14 +60,18 @@ static void debounce(bushd_mcu* mcu, uint16_t pins) {
   mcu->unsettled = differs & (uint16_t)~settled;
 }
 
+static uint16_t* hit_towards(bushd_mcu* mcu, int8_t direction) {
+  return direction > 0 ? &mcu->hit_positive : &mcu->hit_negative;
+}
+
 // `now_active`: the motor's switch has just become so.
 static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
   const uint16_t bit = motor_bit(m);
   const uint32_t next = mcu->tick + 1u;
   const int8_t heading = bushd_mcu_heading(mcu, m, next);
   if (heading == 0) return;
-  uint16_t* const ahead = heading > 0 ? &mcu->hit_positive : &mcu->hit_negative;
-  uint16_t* const behind = heading > 0 ? &mcu->hit_negative : &mcu->hit_positive;
+  uint16_t* const ahead = hit_towards(mcu, heading);
+  uint16_t* const behind = hit_towards(mcu, (int8_t)-heading);
   const bool both_ends = (mcu->inputs.limit_positive & mcu->inputs.limit_negative & bit) != 0;
   if (both_ends && now_active && (*behind & bit) == 0) *ahead |= bit;
   if ((bushd_mcu_forbidden(mcu, heading) & bit) != 0) {
@@ -96,8 +100,11 @@ static void follow_limits(bushd_mcu* mcu, uint16_t pins) {
 
 void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
   const uint16_t limits = direction > 0 ? mcu->inputs.limit_positive : mcu->inputs.limit_negative;
-  uint16_t* const hit = direction > 0 ? &mcu->hit_positive : &mcu->hit_negative;
-  *hit |= limits & motor_bit(m);
+  *hit_towards(mcu, direction) |= limits & motor_bit(m);
+}
+
+void bushd_mcu_has_left_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
+  *hit_towards(mcu, direction) &= (uint16_t)~motor_bit(m);
 }
 
 static void keep_enable(bushd_mcu* mcu) {
@@ -161,8 +168,9 @@ bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* messag
   mcu->hit_positive &= message->limit_positive;
   mcu->hit_negative &= message->limit_negative;
   // What is active now counts at once: a start may follow.
-  const uint16_t pins = mcu->port.read_inputs(mcu->port.context).motors;
-  mcu->active_limits = (pins ^ message->inverted) & limits;
+  const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
+  mcu->active_limits = (pins.motors ^ message->inverted) & limits;
+  bushd_mcu_forget_presses(mcu, system_inputs(mcu, pins));
   mcu->unsettled = 0;
   keep_enable(mcu);
   return BUSHD_OK;

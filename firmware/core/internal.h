@@ -127,8 +127,10 @@ static inline bool bushd_mcu_steps_keep_slots(const bushd_mcu* mcu) {
 // The plane is complete but for what the emission makes of it.
 void bushd_mcu_shape(bushd_mcu* mcu, bushd_plane* plane);
 
-// A motor that homes stands where its switch is active: that bars the way on.
+// A motor that homes has come to its switch: if that is a limit, it bars the way on. It has left
+// it.
 void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction);
+void bushd_mcu_has_left_switch(bushd_mcu* mcu, uint8_t m, int8_t direction);
 
 // A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
 // ends: it is `autonomous` until it rests.
@@ -145,6 +147,8 @@ uint16_t bushd_mcu_homing_motor(const bushd_mcu* mcu);           // as a mask
 // local.c
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message);
 void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs);  // before every tick
+// What is active now counts only after it was released. No motor may be moved by it.
+void bushd_mcu_forget_presses(bushd_mcu* mcu, uint8_t system_inputs);
 // settle.c: how long the supply current needs after a step.
 bool bushd_mcu_settle_pending(const bushd_mcu* mcu);
 // In every tick that is prepared: the step that is to be made for it, of which motor; 0: none.

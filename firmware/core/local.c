@@ -1,6 +1,7 @@
 // LOCAL: motors that people move by two buttons at the MCU, with a host or without. While FORWARD
 // or REVERSE is held they accelerate by their tables and cruise; when it is released, or both are
-// held, they ramp down. A press counts when it has lasted for READINGS readings, a release at once.
+// held, they ramp down. A press counts when it has lasted for READINGS readings, a release at
+// once. What is active at boot, or when the settings come, may be stuck: it must be released first.
 #include "firmware/core/internal.h"
 
 enum { READINGS = 3 };
@@ -30,8 +31,12 @@ static void begin_held(bushd_mcu* mcu) {
   uint16_t begins =
       (uint16_t)(mcu->local.held & ~mcu->autonomous & ~bushd_mcu_forbidden(mcu, mcu->local.wish));
   for (uint8_t m = 0; begins != 0; ++m, begins = (uint16_t)(begins >> 1)) {
-    if ((begins & 1u) == 0 || mcu->motor[m].table < 0) continue;
-    bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish);
+    if ((begins & 1u) == 0) continue;
+    if (mcu->motor[m].table < 0) {
+      mcu->local.held &= (uint16_t)~motor_bit(m);
+    } else {
+      bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish);
+    }
   }
 }
 
@@ -60,10 +65,20 @@ void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs) {
   begin_held(mcu);
 }
 
+void bushd_mcu_forget_presses(bushd_mcu* mcu, uint8_t system_inputs) {
+  mcu->local.held = 0;
+  mcu->local.wish = wish_of(system_inputs);
+  mcu->local.readings = READINGS;
+}
+
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
   if ((message->motors & ~own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
   const uint16_t changed = (uint16_t)(mcu->local.motors ^ message->motors);
   if (changed & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
+  if (mcu->local.motors == 0) {
+    const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
+    bushd_mcu_forget_presses(mcu, pins.system ^ mcu->inputs.system_inverted);
+  }
   mcu->local.motors = message->motors;
   mcu->local.held &= message->motors;
   return BUSHD_OK;

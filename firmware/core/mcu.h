@@ -150,6 +150,7 @@ typedef struct bushd_mcu_settle {
   bool done;
   bool away;
   uint8_t ticks;  // since it began; 0: not under way
+  uint8_t motor;  // that makes the step
   union {
     struct {
       uint32_t sum;

@@ -10,6 +10,9 @@
 // that, or it does not come back, the time stays unknown, and pulses are spread over the whole
 // T_step.
 //
+// The motor is the first that no limit switch bars either way; if there is none, no step is made
+// and the time stays unknown. If its switch is met by the step, it stays there.
+//
 // Meanwhile the MCU is BUSY, so that nothing else moves.
 #include "firmware/core/internal.h"
 
@@ -30,9 +33,10 @@ uint16_t bushd_mcu_settle_slot(const bushd_mcu* mcu) {
   return setup_slots > middle ? setup_slots : middle;
 }
 
-static int8_t lowest_motor(const bushd_mcu* mcu) {
+// With a table, and none of these.
+static int8_t first_but(const bushd_mcu* mcu, uint16_t barred) {
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    if (mcu->motor[m].table >= 0) return (int8_t)m;
+    if (mcu->motor[m].table >= 0 && (barred & motor_bit(m)) == 0) return (int8_t)m;
   }
   return -1;
 }
@@ -40,7 +44,7 @@ static int8_t lowest_motor(const bushd_mcu* mcu) {
 bool bushd_mcu_settle_pending(const bushd_mcu* mcu) {
   const bushd_mcu_emission* emission = &mcu->emission;
   return emission->grid.mode == BUSHD_EMISSION_STAGGERED && emission->settings.settle_us == 0 &&
-         !emission->of.settle.done && lowest_motor(mcu) >= 0;
+         !emission->of.settle.done && first_but(mcu, 0) >= 0;
 }
 
 bool bushd_mcu_wants_samples(const bushd_mcu* mcu) {
@@ -115,6 +119,18 @@ static void end(bushd_mcu* mcu) {
       bushd_emission_settle_slots(settle->of.step.back_ns, mcu->tick_ns, mcu->config.slots);
 }
 
+static int8_t begin_step(bushd_mcu* mcu) {
+  bushd_mcu_settle* settle = &mcu->emission.of.settle;
+  const int8_t motor = first_but(mcu, bushd_mcu_forbidden(mcu, 1) | bushd_mcu_forbidden(mcu, -1));
+  if (motor < 0) {
+    end_quiet(settle);
+    end(mcu);
+    return 0;
+  }
+  settle->motor = (uint8_t)motor;
+  return 1;
+}
+
 int8_t bushd_mcu_settle_step(bushd_mcu* mcu, uint8_t* motor) {
   bushd_mcu_settle* settle = &mcu->emission.of.settle;
   const uint8_t ready = BUSHD_FLAG_CONFIGURED | BUSHD_FLAG_SYNCED | BUSHD_FLAG_ENABLED;
@@ -125,6 +141,11 @@ int8_t bushd_mcu_settle_step(bushd_mcu* mcu, uint8_t* motor) {
   if (settle->ticks++ == 0) begin(settle);
   if (settle->ticks == STEP_AT + 1) end_quiet(settle);
   if (settle->ticks == OVER_AT) end(mcu);
-  *motor = (uint8_t)lowest_motor(mcu);
-  return settle->ticks == STEP_AT ? 1 : settle->ticks == BACK_AT ? -1 : 0;
+  int8_t step = 0;
+  if (settle->ticks == STEP_AT) step = begin_step(mcu);
+  if (settle->ticks == BACK_AT) {
+    step = (bushd_mcu_forbidden(mcu, -1) & motor_bit(settle->motor)) != 0 ? 0 : -1;
+  }
+  *motor = settle->motor;
+  return step;
 }

@@ -215,6 +215,43 @@ TEST_P(Homing, EmergencyEndsIt) {
   }
 }
 
+// Short lever: the ramp overruns it, and the switch no longer tells that the motor is beyond.
+TEST_P(Homing, EndedBetweenOverrunAndBackOffTheSwitchBarsTheWayOn) {
+  constexpr std::uint16_t kBit = 1u << kMotor;
+  ASSERT_EQ(rig.set_inputs({.limit_negative = kBit}), BUSHD_OK);
+  rig.sense = [this] {
+    const std::int64_t at = rig.pulses(kMotor);
+    return bushd_inputs{at <= -700 && at > -708 ? kBit : std::uint16_t{0}, 0};
+  };
+  ASSERT_EQ(rig.home(command()), BUSHD_OK);
+  while (rig.poll().homing == BUSHD_HOMING_FAST) rig.pass();
+  while (rig.pulses(kMotor) > -708) rig.pass();
+  ASSERT_EQ(rig.poll().homing, BUSHD_HOMING_RAMP_DOWN);
+  rig.emergency(BUSHD_CUT);
+  rig.pass_until_rest();
+  EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_STOPPED);
+  EXPECT_EQ(rig.poll().inputs, 0);
+  EXPECT_EQ(rig.poll().forbidden_negative, kBit);
+  EXPECT_EQ(rig.poll().forbidden_positive, 0);
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  EXPECT_EQ(rig.home(command()), BUSHD_E_FORBIDDEN);
+  rig.run_plan(plan(100), kMotor);
+  EXPECT_EQ(rig.poll().forbidden_negative, 0) << "it has left it";
+}
+
+TEST_P(Homing, EndedWhereTheSwitchIsReleasedNothingIsBarred) {
+  constexpr std::uint16_t kBit = 1u << kMotor;
+  ASSERT_EQ(rig.set_inputs({.limit_negative = kBit}), BUSHD_OK);
+  put(Contact(-700, -1, 5));
+  ASSERT_EQ(rig.home(command()), BUSHD_OK);
+  while (rig.poll().homing != BUSHD_HOMING_APPROACH) rig.pass();
+  rig.emergency(BUSHD_CUT);
+  rig.pass_until_rest();
+  EXPECT_EQ(rig.poll().forbidden_negative, 0);
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  EXPECT_EQ(rig.home(command()), BUSHD_OK);
+}
+
 TEST_P(Homing, RunsDownWhenTheHostFallsSilent) {
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, 50), BUSHD_OK);
   ASSERT_EQ(rig.home(command()), BUSHD_OK);

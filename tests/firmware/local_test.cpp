@@ -213,6 +213,50 @@ TEST_P(Local, MotorsThatTheMcuDoesNotHaveAreRefused) {
   expect_counted();
 }
 
+// People expect nothing of a button that was held, or is shorted, before anybody could press it.
+TEST_P(Local, AButtonMustHaveBeenSeenReleasedSinceItWasTold) {
+  ASSERT_EQ(rig.local(0), BUSHD_OK);
+  hold(BUSHD_INPUT_FORWARD, 5);
+  ASSERT_EQ(rig.local(kMotors), BUSHD_OK);
+  rig.pass(60);
+  EXPECT_EQ(rig.pulses(0), 0) << "held when it was given motors";
+  release();
+  rig.pass_until_rest();
+  // Another wiring: what rests is a press now.
+  ASSERT_EQ(rig.set_inputs({.system_inverted = BUSHD_INPUT_FORWARD}), BUSHD_OK);
+  rig.pass(60);
+  EXPECT_EQ(rig.pulses(0), 0) << "active at rest";
+  rig.pins({0, BUSHD_INPUT_FORWARD});
+  rig.pass(1);
+  rig.pins({});
+  rig.pass(3);
+  EXPECT_EQ(rig.poll().autonomous, kMotors);
+}
+
+TEST_P(Local, AButtonHeldAtPowerUpMovesNothingUntilItIsPressedAnew) {
+  rig.pins({0, BUSHD_INPUT_FORWARD});
+  rig.restart_with_what_is_kept();
+  rig.pass(60);
+  EXPECT_EQ(rig.poll().moving, 0);
+  EXPECT_FALSE(rig.enabled());
+  release();
+  hold(BUSHD_INPUT_FORWARD, 60);
+  EXPECT_EQ(rig.poll().autonomous, kMotors);
+}
+
+// Nor of one that is held when its motor gets a table.
+TEST_P(Local, AMotorThatGetsItsTableWhileTheButtonIsHeldWaitsForThePress) {
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_FORGET_TABLES), BUSHD_OK);
+  hold(BUSHD_INPUT_FORWARD, 60);
+  ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
+  ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
+  rig.pass(60);
+  EXPECT_EQ(rig.pulses(0), 0);
+  release();
+  hold(BUSHD_INPUT_FORWARD, 60);
+  EXPECT_GT(rig.pulses(0), 0);
+}
+
 TEST_P(Local, LeavesAMotorThatHomesAlone) {
   ASSERT_EQ(rig.home({0, -1, 5000, 400, 1000, 0}), BUSHD_OK);
   rig.pass(20);

@@ -131,6 +131,25 @@ Rig::Rig(RigOptions options)
   bushd_mcu_prepare(&mcu_);
 }
 
+void Rig::restart_with_what_is_kept() {
+  std::vector<Bytes> kept;
+  for (std::uint8_t i = 0;; ++i) {
+    const bushd_mcu_piece piece = bushd_mcu_kept(&mcu_, i);
+    if (piece.size == 0) break;
+    const auto* const bytes = static_cast<const std::uint8_t*>(piece.at);
+    kept.emplace_back(bytes, bytes + piece.size);
+  }
+  const bushd_port port = mcu_.port;
+  const bushd_mcu_config config = mcu_.config;
+  bushd_mcu_boot(&mcu_, &port, &config);
+  for (std::uint8_t i = 0; i < kept.size(); ++i) {
+    std::ranges::copy(kept[i], static_cast<std::uint8_t*>(bushd_mcu_kept(&mcu_, i).at));
+  }
+  bushd_mcu_restored(&mcu_);
+  plane_ = bushd_mcu_swap(&mcu_);
+  bushd_mcu_prepare(&mcu_);
+}
+
 void Rig::feed(std::span<const std::uint8_t> bytes) {
   for (const std::uint8_t byte : bytes) bushd_mcu_receive(&mcu_, byte, kTimeInTickNs);
 }

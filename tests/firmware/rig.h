@@ -90,6 +90,8 @@ class Rig {
   Rig(const Rig&) = delete;
   Rig& operator=(const Rig&) = delete;
 
+  // A reset by a port that keeps what it may.
+  void restart_with_what_is_kept();
   void feed(std::span<const std::uint8_t> bytes);
   // A frame on the line, without looking at what comes back.
   void frame(std::uint8_t address, std::uint8_t type, const Bytes& payload);
