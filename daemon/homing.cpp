@@ -147,8 +147,7 @@ void Core::end_homings(Mcu& mcu, motion::Outcome outcome, const std::string& rea
 void Core::refuse_home(Mcu& mcu, std::uint8_t status) {
   if (mcu.homings.empty()) return;
   end_homing(mcu, motion::Outcome::kFault,
-             "MCU " + mcu.config->id +
-                 " refused to home it: " + bushd_status_text(static_cast<bushd_status>(status)));
+             "MCU " + mcu.config->id + " refused to home it: " + bushd_status_text(status));
 }
 
 bool Core::forget_waiting_homing(std::size_t index) {

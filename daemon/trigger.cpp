@@ -109,8 +109,7 @@ bool Core::follow_armed(std::size_t index, const Mcu& mcu, const link::McuView& 
               "it; it did not move");
   } else if (!told) {
     end_motor(index, motion::Outcome::kFault,
-              name + " did not arm it: " +
-                  bushd_status_text(static_cast<bushd_status>(report.last_rejection)));
+              name + " did not arm it: " + bushd_status_text(report.last_rejection));
   } else if (report.trigger_state == BUSHD_TRIGGER_DISARMED) {
     end_motor(index, motion::Outcome::kStopped, "disarmed before the trigger came");
   } else if (report.trigger_state == BUSHD_TRIGGER_LATE) {

@@ -1,6 +1,6 @@
 #include "engine/status.h"
 
-const char* bushd_status_text(bushd_status status) {
+const char* bushd_status_text(unsigned status) {
   switch (status) {
     case BUSHD_OK:
       return "ok";

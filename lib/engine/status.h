@@ -30,8 +30,9 @@ typedef enum bushd_status {
   BUSHD_E_STEP_PERIOD = 19   // T_step longer than a tick
 } bushd_status;
 
-// A short English phrase for a status, never NULL; "unknown status" for any other value.
-const char* bushd_status_text(bushd_status status);
+// A short English phrase for a bushd_status, never NULL; "unknown status" for any other value, as
+// the line may bring one.
+const char* bushd_status_text(unsigned status);
 
 #ifdef __cplusplus
 }

@@ -44,7 +44,7 @@ std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& id
   return {};
 }
 
-std::string emission_refusal(const EmissionSetup& setup, bushd_status status, std::uint16_t slots,
+std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::uint16_t slots,
                              std::uint32_t tick_ns) {
   const std::uint32_t half_slot_ns = (tick_ns - tick_ns / BUSHD_TICK_SLEW_DIVISOR) / (2u * slots);
   const std::string half_slot = us_of_ns(half_slot_ns) + ", half a slot of this MCU";

@@ -35,7 +35,7 @@ std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& id
                             std::uint32_t tick_ns, unsigned* max_steps);
 
 // What its refusal means.
-std::string emission_refusal(const EmissionSetup& setup, bushd_status status, std::uint16_t slots,
+std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::uint16_t slots,
                              std::uint32_t tick_ns);
 
 }  // namespace bushd::link

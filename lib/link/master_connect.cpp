@@ -260,13 +260,12 @@ void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std:
         {.kind = Event::Kind::kRefused, .mcu = index, .type = type, .status = status});
     return;
   }
-  const auto refusal = static_cast<bushd_status>(status);
   go_offline(
       index,
       "refused its configuration: " +
-          (type == BUSHD_MSG_EMISSION ? emission_refusal(mcu.setup.emission, refusal,
+          (type == BUSHD_MSG_EMISSION ? emission_refusal(mcu.setup.emission, status,
                                                          mcu.view.identity.slots, setup_.tick_ns)
-                                      : bushd_status_text(refusal)),
+                                      : bushd_status_text(status)),
       now_us + kRetryUs);
 }
 

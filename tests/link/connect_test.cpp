@@ -223,6 +223,16 @@ TEST(Connect, RefusedRequestsAreNamedAndTriedAgain) {
   }
 }
 
+TEST(Connect, StatusThatNobodyKnowsIsARefusalToo) {
+  for (const std::uint8_t type : {BUSHD_MSG_CONFIGURE, BUSHD_MSG_EMISSION}) {
+    FakeBus bus;
+    bus.slaves[0].refusals = {{type, 255}};
+    ASSERT_TRUE(bus.run_until([&] {
+      return bus.master->view(0).detail.find("unknown status") != std::string::npos;
+    })) << int{type};
+  }
+}
+
 TEST(Connect, EmissionThatTheMcuRefusesIsNamedWithItsPlaceInTheConfiguration) {
   FakeBus bus;
   bus.setup.mcus[0].emission.settings.pulse_us = 3;

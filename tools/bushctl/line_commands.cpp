@@ -196,8 +196,7 @@ int set_address(const LineOptions& options, const std::string& unique_id, std::u
     }
     if (reply.status != BUSHD_OK) {
       return failed(
-          {.message = fmt::format("{} refuses: {}", unique_id,
-                                  bushd_status_text(static_cast<bushd_status>(reply.status)))});
+          {.message = fmt::format("{} refuses: {}", unique_id, bushd_status_text(reply.status))});
     }
     fmt::print("{}: address {}\n", unique_id, address);
     return kDone;
