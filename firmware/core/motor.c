@@ -353,11 +353,12 @@ void bushd_mcu_watch_silence(bushd_mcu* mcu) {
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];
     if (motor->mode != BUSHD_MCU_TABLE_RUN || bushd_run_done(&motor->run)) continue;
-    const bool begun = in_run(motor, next);
-    const uint32_t from = begun ? next : motor->run_from;
-    if (begun) {
+    uint32_t from = next;
+    if (in_run(motor, next)) {
       mcu->run_downs = saturating_increment(mcu->run_downs);
       bushd_mcu_ramp_down_run(mcu, m);
+    } else if (ticks_after(motor->rest_from, next) > 0) {
+      from = motor->rest_from;  // ticks before it are still made
     }
     bushd_mcu_cut_queue(mcu, m, from);
     mcu->faults |= BUSHD_FAULT_LINK;

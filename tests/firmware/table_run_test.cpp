@@ -202,6 +202,20 @@ TEST_P(TableRun, ThatWaitsIsCancelledBySilence) {
   EXPECT_EQ(rig.pulses(0), 0);
 }
 
+TEST_P(TableRun, OneThatSilenceHasCancelledKeepsNoOtherWaiting) {
+  ASSERT_EQ(rig.configure(format, Rig::kTickNs, 30), BUSHD_OK);
+  ASSERT_EQ(start(rig, rig.first_open() + 100, 50), BUSHD_OK);
+  rig.pass(50);
+  ASSERT_EQ(rig.poll().faults, BUSHD_FAULT_LINK);
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  EXPECT_EQ(start(rig, rig.first_open(), 20), BUSHD_OK);
+  for (int i = 0; i < 80; ++i) {
+    rig.poll();
+    rig.pass();
+  }
+  EXPECT_EQ(rig.pulses(0), 20);
+}
+
 TEST_P(TableRun, SilenceWithoutARunIsNoFault) {
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, 5), BUSHD_OK);
   ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 30, 0)), BUSHD_OK);
