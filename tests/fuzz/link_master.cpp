@@ -43,6 +43,11 @@ enum class Op : std::uint8_t {
   kReconfigure,
   kTableRun,   // mcu, motor, ticks later
   kEmergency,  // how
+  kHome,       // mcu, motor, u16 steps
+  kArm,        // mcu, mask, u16 us
+  kDisarm,     // mcu
+  kStarted,    // mcu, motor, ticks later: the trigger has come
+  kReference,  // mcu, motor, arrivals
   kCount
 };
 
@@ -59,6 +64,17 @@ link::McuSetup mcu_setup(std::uint8_t address) {
   link::McuSetup setup{.address = address, .tables = {{&kTable, 3}}, .table_of_motor = {}};
   setup.table_of_motor.fill(-1);
   for (std::size_t m = 0; m < kMotors; ++m) setup.table_of_motor[m] = 0;
+  if (address == 2) {
+    setup.emission.settings = {.mode = BUSHD_EMISSION_BURST,
+                               .sequence = 0,
+                               .hold_current = false,
+                               .step_us = 50,
+                               .settle_us = 0,
+                               .dir_setup_us = 0,
+                               .pulse_us = 2};
+    setup.inputs.limit_negative = 1;
+    setup.local_motors = 2;
+  }
   return setup;
 }
 
@@ -413,6 +429,55 @@ void replace(Bus& bus, Input& input) {
   bus.master().replace(mcu, mask, first);
 }
 
+void arm(Bus& bus, Input& input) {
+  const std::size_t mcu = input.u8() % kMcus;
+  const unsigned mask = 1u + input.u8() % ((1u << kMotors) - 1u);
+  const std::uint32_t delay_us = BUSHD_TRIGGER_MIN_DELAY_US + input.u16();
+  if (!bus.online(mcu) || !bus.master().can_trigger(mcu)) return;
+  if (bus.master().view(mcu).report.armed != 0) return;
+  std::vector<link::Master::Armed> moves;
+  for (std::uint8_t m = 0; m < kMotors; ++m) {
+    if ((mask >> m & 1) != 0) moves.push_back({.motor = m, .steps = m % 2 == 0 ? 70 : -70});
+  }
+  bus.master().arm(mcu, BUSHD_EDGE_RISING, delay_us, moves);
+}
+
+void started(Bus& bus, Input& input) {
+  const std::size_t mcu = input.u8() % kMcus;
+  const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
+  const std::uint8_t later = input.u8();
+  if (!bus.online(mcu) || !bus.master().time_known()) return;
+  const link::Tick start = bus.master().earliest_start(bus.now_us(), mcu, motor) + later;
+  bus.source().start[mcu][motor] = start;
+  bus.source().length[mcu][motor] = 90;
+  bus.master().follow_table_run(mcu, motor, start, 70);
+}
+
+void reference(Bus& bus, Input& input) {
+  const std::size_t mcu = input.u8() % kMcus;
+  const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
+  const auto arrivals = static_cast<std::uint8_t>(input.u8() % 4u);
+  if (!bus.online(mcu) || !bus.master().has_reference(mcu)) return;
+  bus.master().reference(mcu, {.motor = motor,
+                               .arrivals = arrivals,
+                               .position_steps = 70,
+                               .delay_us = 100,
+                               .width_us = 40});
+}
+
+void home(Bus& bus, Input& input) {
+  const std::size_t mcu = input.u8() % kMcus;
+  const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
+  const std::uint16_t steps = input.u16();
+  if (!bus.online(mcu)) return;
+  bus.master().home(mcu, {.motor = motor,
+                          .direction = -1,
+                          .most_steps = steps,
+                          .slow_steps = 100,
+                          .slow_delay = 1000,
+                          .position_steps = 7});
+}
+
 void run_op(Op op, Bus& bus, Input& input) {
   link::Master& master = bus.master();
   switch (op) {
@@ -452,6 +517,19 @@ void run_op(Op op, Bus& bus, Input& input) {
       return begin(bus, input, true);
     case Op::kEmergency:
       return master.emergency_stop(input.u8() % 2 == 0 ? BUSHD_RAMP_DOWN : BUSHD_CUT);
+    case Op::kHome:
+      return home(bus, input);
+    case Op::kArm:
+      return arm(bus, input);
+    case Op::kDisarm: {
+      const std::size_t mcu = input.u8() % kMcus;
+      if (bus.online(mcu)) master.disarm(mcu);
+      return;
+    }
+    case Op::kStarted:
+      return started(bus, input);
+    case Op::kReference:
+      return reference(bus, input);
     case Op::kCount:
       return;
   }

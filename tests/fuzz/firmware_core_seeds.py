@@ -1,0 +1,178 @@
+#!/usr/bin/env python3
+"""Writes the hand-made inputs of the fuzz target firmware_core into its corpus.
+
+    tests/fuzz/firmware_core_seeds.py
+
+An input is a programme of operations (firmware_core.cpp, Op). Run this again when payloads or
+operations change: an input that the MCU refuses from its first frame on reaches nothing.
+"""
+import pathlib
+import struct
+
+CORPUS = pathlib.Path(__file__).parent / "corpus" / "firmware_core"
+TICK_NS = 2_560_000
+(IDENTIFY, CONFIGURE, TABLE_BEGIN, TABLE_DATA, TABLE_END, ASSIGN, CONTROL, SET_POSITION, POLL, SYNC, TICKS,
+ TABLE_TICKS, TABLE_RUN, EMERGENCY, SET_ADDRESS, TABLES, INPUTS, EMISSION, HOME, LOCAL, TRIGGER,
+ REFERENCE) = range(1, 0x17)
+FINE, REPLACE, START = 1, 2, 4
+EMERGENCY_PIN, FORWARD, REVERSE = 1, 2, 4
+
+
+def noise(data):
+    return bytes([0, len(data)]) + data
+
+
+def passes(ticks):
+    return b"".join(bytes([1, min(15, ticks - at)]) for at in range(0, ticks, 15))
+
+
+def frame(type_, payload=b"", broadcast=False, later=0):
+    return bytes([3, broadcast, type_, later, len(payload)]) + payload
+
+
+def ticks(flags, first, mask, delays, displacements, epoch=0):
+    motors = bin(mask).count("1")
+    width = "h" if flags & FINE else "B"
+    return (bytes([4, epoch, flags, first, len(displacements) // motors, mask])
+            + struct.pack(f"<{motors}H", *delays)
+            + struct.pack(f"<{len(displacements)}{width}", *displacements))
+
+
+def sync(mark, later_share=0, later_ticks=0):
+    return struct.pack("<BBHB", 5, 4 * mark, later_share, later_ticks & 0xFF)
+
+
+def table_end(slot):
+    return bytes([6, slot])
+
+
+def table_run(first, *entries, epoch=0):
+    """Entries: (slot, direction, steps < 256), for the motors from 0 on."""
+    return (bytes([8, epoch, first, len(entries) - 1])
+            + b"".join(bytes([slot | (0x80 if direction > 0 else 0), steps]) for slot, direction, steps in entries))
+
+
+def pins(motors, system=0, current=0):
+    return struct.pack("<BHBH", 9, motors, system, current)
+
+
+def trigger_edge(share=1000):
+    return struct.pack("<Bh", 10, share)
+
+
+def sample(share, current):
+    return struct.pack("<BHH", 11, share, current)
+
+
+def work(pieces):
+    return bytes([12, pieces])
+
+
+RESET = bytes([13])
+
+
+def poll(*addresses):
+    return frame(POLL, bytes([len(addresses)]) + b"".join(struct.pack("<BH", a, 10) for a in addresses), True)
+
+
+def configure(fine):
+    return frame(CONFIGURE, struct.pack("<IBH", TICK_NS, fine, 400))
+
+
+def in_step():
+    first = struct.pack("<HIBIII", 0, 0, 0, 0, 0, 0)
+    return frame(SYNC, first, True) + passes(4) + sync(1) + passes(2) + sync(1)
+
+
+def table(slot=0, codes=(250, 200, 150, 100), cruise=100, unit_ns=4000):
+    return (frame(TABLE_BEGIN, struct.pack("<BHHHII", slot, len(codes), 0, cruise, unit_ns, 1))
+            + frame(TABLE_DATA, struct.pack(f"<BHB{len(codes)}H", slot, 0, len(codes), *codes))
+            + table_end(slot))
+
+
+def assign(*motors, slot=0):
+    return b"".join(frame(ASSIGN, bytes([m, slot])) for m in motors)
+
+
+def inputs(positive=0, negative=0, cuts=0, inverted=0, debounce=1, system_inverted=0, emergency=0, overcurrent=0,
+           keep=0):
+    return frame(INPUTS, struct.pack("<HHHHBBBHB", positive, negative, cuts, inverted, debounce, system_inverted,
+                                     emergency, overcurrent, keep))
+
+
+def emission(mode, sequence=0, hold=0, step_us=250, settle_us=0, setup_us=0, pulse_us=0):
+    return frame(EMISSION, struct.pack("<BBBHHHH", mode, sequence, hold, step_us, settle_us, setup_us, pulse_us))
+
+
+def home(motor, direction, most=200, slow_steps=40, slow_delay=300, position=-5):
+    return frame(HOME, struct.pack("<BbIIHi", motor, direction, most, slow_steps, slow_delay, position))
+
+
+def entries(*motors):
+    return b"".join(struct.pack("<BI", m | 0x80, 30 + m) for m in motors)
+
+
+def trigger(number, edge, delay_us, runs):
+    return frame(TRIGGER, struct.pack("<BBI", number, edge, delay_us) + runs)
+
+
+def ready(fine=0, before=b""):
+    return (pins(0) + configure(fine) + before + in_step() + table() + assign(0, 1, 2, 3)
+            + frame(CONTROL, b"\1") + passes(2))
+
+
+MOVE = {0: ticks(START, 2, 3, (150, 150), (0x81, 0x82, 0x81, 0x83, 2, 2, 2, 2, 0x82, 0x82)),
+        1: ticks(START | FINE, 2, 3, (150, 150), (250, 300, 512, 700, -256, 511))}
+MORE = {0: ticks(0, 7, 3, (0, 0), (0x81, 1)), 1: ticks(FINE, 3, 3, (0, 0), (256, -128))}
+REPLACEMENT = ticks(REPLACE | FINE, 4, 1, (0,), (128, 64), epoch=1)
+
+SEEDS = {
+    "noise": noise(bytes(range(256))[:200]),
+    "identify": frame(IDENTIFY, struct.pack("<HBH", 7, 4, 100), True),
+    "ready-coarse": ready(0),
+    "ready-fine": ready(1),
+    "move-coarse": ready(0) + MOVE[0] + work(2) + MORE[0] + passes(15),
+    "move-fine": ready(1) + MOVE[1] + passes(2) + MORE[1] + passes(15),
+    "replace": ready(1) + MOVE[1] + passes(1) + REPLACEMENT + passes(12),
+    "queue-ends": ready(1) + MOVE[1] + passes(30) + poll(7),
+    "queue-too-far": ready(1) + ticks(START | FINE, 60, 1, (150,), (256, 256)) + passes(3) + poll(7),
+    "sync-off": ready(1) + passes(3) + sync(1, 30000, 1) + passes(4) + sync(1, 0, -3) + passes(4),
+    "two-masters": ready(1) + sync(1) + bytes([5, 3, 0, 0, 0]) + sync(1) + bytes([5, 3, 0, 0, 0]) + poll(7),
+    "disable": ready(1) + MOVE[1] + frame(CONTROL, b"\2") + passes(20) + frame(CONTROL, b"\2") + poll(7),
+    "set-position": ready(0) + frame(SET_POSITION, struct.pack("<Bi", 1, -1000)) + MOVE[0] + passes(20),
+    "set-address": frame(SET_ADDRESS, b"fuzz\0\0\0\0" + b"\x09", True) + poll(9) + frame(TABLES),
+    "table-run": ready(0) + table_run(3, (0, 1, 90), (0, -1, 5)) + passes(20) + frame(EMERGENCY, b"\0", True)
+                 + passes(10) + frame(CONTROL, b"\4") + table_run(3, (0, -1, 9)) + passes(20),
+    "table-ticks": ready(0) + bytes([7, 0, START, 2, 8, 13]) + struct.pack("<BHHHIH", 0xC0, 0, 0, 3, 40, 3) + passes(12),
+    "limits": ready(0, inputs(positive=7)) + MOVE[0] + passes(3) + pins(1) + passes(15) + poll(7),
+    "limits-cut": ready(1, inputs(positive=7, negative=7, cuts=7, debounce=0)) + MOVE[1] + passes(4) + pins(3)
+                  + passes(5) + MOVE[1] + passes(4),
+    "emergency-input": ready(1, inputs(emergency=1, system_inverted=1)) + pins(0, 1) + MOVE[1] + passes(3) + pins(0)
+                       + passes(15) + frame(CONTROL, b"\4"),
+    "overcurrent": ready(1, inputs(overcurrent=500)) + MOVE[1] + passes(3) + pins(0, 0, 900) + passes(9)
+                   + pins(0) + frame(CONTROL, b"\5") + passes(3),
+    "local": ready(0, frame(LOCAL, b"\3\0")) + passes(4) + pins(0, FORWARD) + passes(20) + pins(0) + passes(12)
+             + pins(0, REVERSE) + passes(9) + pins(0, FORWARD | REVERSE) + passes(15),
+    "local-kept": frame(LOCAL, b"\1\0") + inputs(keep=1) + configure(0) + in_step() + table() + assign(0) + frame(CONTROL, b"\1") + RESET + passes(3)
+                  + pins(0, FORWARD) + passes(12) + pins(0) + passes(9),
+    "home": ready(0, inputs(negative=1)) + home(0, -1) + passes(12) + pins(1) + passes(15) + pins(0) + passes(9)
+            + pins(1) + passes(15) + poll(7),
+    "home-given-up": ready(0, inputs(negative=1)) + home(0, -1) + passes(9) + home(0, -1, 0) + passes(15),
+    "trigger": ready(0) + trigger(1, 1, 5000, entries(0, 2)) + passes(3) + trigger_edge() + passes(20)
+               + trigger(1, 1, 5000, entries(0, 2)) + trigger(2, 2, 50, entries(1)) + trigger_edge(-30000)
+               + passes(15) + trigger(3, 1, 1_500_000, entries(0)) + frame(TRIGGER, bytes(6)),
+    "reference": ready(0) + frame(REFERENCE, struct.pack("<BBiII", 0, 3, 3, 700, 4000)) + MOVE[0] + passes(20),
+    "burst": ready(0, emission(1)) + MOVE[0] + passes(12),
+    "common-dir": ready(0, emission(2)) + MOVE[0] + passes(12),
+    "staggered": ready(0, emission(3, settle_us=60)) + MOVE[0] + passes(12),
+    "staggered-measured": ready(0, emission(3)) + b"".join(
+        sample(4096 * at, 500 + at % 2) + passes(1) for at in range(12)) + sample(40000, 900)
+                          + sample(60000, 501) + passes(15) + sample(100, 500) + passes(15) + MOVE[0] + passes(9),
+    "phases": ready(1, emission(4, 2, 1)) + ticks(START | FINE, 2, 1, (0,), (250, 600, -512, 128)) + passes(60),
+    "kept": ready(1, emission(4, 1)) + RESET + configure(1) + in_step() + frame(CONTROL, b"\1") + passes(2)
+            + passes(2) + ticks(START | FINE, 2, 1, (0,), (256, -512)) + passes(9),
+}
+
+if __name__ == "__main__":
+    for name, programme in SEEDS.items():
+        (CORPUS / name).write_bytes(programme)
