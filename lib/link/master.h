@@ -318,7 +318,7 @@ class Master {
   void handle_tables(std::size_t mcu, const bushd_tables& held);
   void handle_acknowledgement(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
                               std::uint8_t status);
-  void follow_connecting(std::size_t mcu, bool in_step);
+  void follow_connecting(std::int64_t now_us, std::size_t mcu, bool in_step);
   std::string unfit(const Mcu& mcu, const bushd_identity& identity) const;  // "" when it fits
   template <class Encode>
   static void add_request(Mcu& mcu, std::uint8_t type, Encode encode);

@@ -269,7 +269,7 @@ void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std:
       now_us + kRetryUs);
 }
 
-void Master::follow_connecting(std::size_t index, bool in_step) {
+void Master::follow_connecting(std::int64_t now_us, std::size_t index, bool in_step) {
   Mcu& mcu = mcus_[index];
   const bushd_report& report = mcu.view.report;
   const bool configured = (report.flags & BUSHD_FLAG_CONFIGURED) != 0;
@@ -288,12 +288,16 @@ void Master::follow_connecting(std::size_t index, bool in_step) {
   } else if (!mcu.scripted && report.running != 0) {
     mcu.taken_over |= (report.faults & BUSHD_FAULT_EMERGENCY) == 0;
     mcu.ramp_down_now = true;
-  } else if (mcu.scripted && mcu.script.empty() && in_step &&
-             (report.state != BUSHD_STATE_BUSY || !*mcu.powered)) {
+  } else if (!mcu.scripted || !mcu.script.empty() || !in_step) {
+    return;
+  } else if (report.state != BUSHD_STATE_BUSY || !*mcu.powered) {
     mcu.view.phase = McuPhase::kOnline;
     mcu.view.detail.clear();
     mcu.epoch = mcu.newest_epoch = report.epoch;
     events_.push_back({Event::Kind::kOnline, index});
+  } else if (configured && (report.flags & BUSHD_FLAG_ENABLED) == 0) {
+    // It had a fault with which it must not be enabled, and has it no longer.
+    go_offline(index, "has not switched its drivers on", now_us + kRetryUs);
   }
 }
 

@@ -214,7 +214,7 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     view.known_until[m] = view.tick + std::max<std::int16_t>(ahead, 0);
   }
   if (view.phase == McuPhase::kConnecting) {
-    follow_connecting(index, in_step);
+    follow_connecting(now_us, index, in_step);
     return;
   }
   if (!in_step && (report.flags & BUSHD_FLAG_CONFIGURED) == 0) {

@@ -223,6 +223,16 @@ TEST(Connect, RefusedRequestsAreNamedAndTriedAgain) {
   }
 }
 
+TEST(Connect, FaultThatVanishesByItselfKeepsNoMcuWaitingForEver) {
+  FakeBus bus;
+  Slave& slave = bus.slaves[0];
+  slave.spoils = [&](bushd_report& report) {
+    if (bus.heard_of(BUSHD_MSG_CONTROL).empty()) report.faults = BUSHD_FAULT_SELF_TEST;
+  };
+  bus.connect();
+  EXPECT_NE(slave.flags & BUSHD_FLAG_ENABLED, 0);
+}
+
 TEST(Connect, StatusThatNobodyKnowsIsARefusalToo) {
   for (const std::uint8_t type : {BUSHD_MSG_CONFIGURE, BUSHD_MSG_EMISSION}) {
     FakeBus bus;
