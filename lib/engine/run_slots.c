@@ -61,7 +61,7 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t slo
   if (delay == 0) return 0;
   uint32_t since = run->since + tick->units;
   uint32_t since_ns = run->since_ns + tick->rest_ns;
-  if (since_ns >= tick->unit_ns) {
+  if (since_ns < tick->rest_ns || since_ns >= tick->unit_ns) {
     since_ns -= tick->unit_ns;
     ++since;
   }

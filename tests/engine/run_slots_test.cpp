@@ -52,6 +52,27 @@ TEST(RunSlots, EveryStepFallsIntoItsSlotByTheSumOfTheDelays) {
   });
 }
 
+TEST(RunSlots, TimeUnitOfSecondsIsCountedToItsEnd) {
+  constexpr uint32_t kUnitNs = 4'294'963'296;  // with a tick more than 32 bits hold
+  constexpr uint32_t kTickNs = 20'000'000;
+  constexpr uint32_t kLateNs = 5000;
+  const uint16_t code = 1;
+  bushd_table table{};
+  table.accel.code = table.decel.code = &code;
+  table.accel.count = table.decel.count = 1;
+  table.cruise = 1;
+  table.time_unit_ns = kUnitNs;
+  bushd_run run;
+  bushd_run_start(&run, &table, 2, 1);
+  bushd_run_begin_late(&run, kLateNs);
+  std::vector<int> ticks_of_steps;
+  for (int tick = 0; !bushd_run_done(&run) && tick < 1000; ++tick) {
+    if (emit(&run, kTickNs, 256, 1).steps != 0) ticks_of_steps.push_back(tick);
+  }
+  EXPECT_EQ(ticks_of_steps, (std::vector<int>{(1ull * kUnitNs + kLateNs) / kTickNs,
+                                              (2ull * kUnitNs + kLateNs) / kTickNs}));
+}
+
 // So ticks of displacements may take over from any tick on, and the other way round.
 TEST(RunSlots, LeavesTheRunWhereAnExpandedTickLeavesIt) {
   holds("two runs that take turns", [] {
