@@ -179,7 +179,9 @@ std::string Core::refuse_motion(std::size_t index) const {
     return "the drivers of MCU " + mcu.config->id + " are being disabled; enable them first";
   }
   if (is_homing(index)) return "it is being homed; wait for that result";
-  if (is_moved_locally(index)) return "the local inputs of MCU " + mcu.config->id + " move it";
+  if (is_moved_locally(index)) {
+    return "the local inputs of MCU " + mcu.config->id + " move it; release them first";
+  }
   return {};
 }
 
@@ -338,14 +340,13 @@ void Core::stop_motors(std::int64_t now_us, const std::vector<std::size_t>& moto
     motion::Axis& axis = motors_[index].axis;
     if (!axis.busy()) continue;
     if (motors_[index].armed) {
-      motors_[index].armed->stops = true;
       armed.push_back(index);
       continue;
     }
     axis.stop();
     if (axis.needs_change()) changed.push_back(index);
   }
-  disarm(armed);
+  take_back(armed);
   change_motors(now_us, changed);
 }
 

@@ -109,7 +109,8 @@ class Core {
     struct Armed {
       std::uint8_t number;  // of link::Master::arm
       std::int64_t steps;
-      bool stops = false;  // as soon as it has started: that came before it was disarmed
+      bool stops = false;      // as soon as it has started: that came before it was disarmed
+      std::string ended = {};  // the motor armed with it whose end ends it too
     };
     std::optional<Armed> armed = {};
   };
@@ -233,6 +234,10 @@ class Core {
   std::string refuse_reference(const command_t& command) const;
   void arm(const command_t& command);
   void disarm(const std::vector<std::size_t>& motors);
+  // Disarmed; those whose trigger has come before that are stopped.
+  void take_back(const std::vector<std::size_t>& motors);
+  // This motor waits no more: so do those that were armed with it.
+  void take_back_companions(std::size_t motor);
   void set_reference(const command_t& command);
   move_plan_t plan_of(std::int64_t now_us, const command_t& command) const;
   bool by_table(const Motor& motor, std::int64_t steps) const;

@@ -158,7 +158,8 @@ void Core::follow_motor(std::int64_t now_us, std::size_t index, const Mcu& mcu,
   if ((view.report.autonomous >> output & 1) != 0) {
     // So it had no ticks of the move, and takes none.
     end_motor(index, motion::Outcome::kStopped,
-              "the local inputs of MCU " + mcu.config->id + " moved it before it could start");
+              "the local inputs of MCU " + mcu.config->id +
+                  " moved it before it could start; release them and move it again");
     return;
   }
   if (view.report.faults != 0) {
@@ -216,10 +217,13 @@ void Core::end_faulty_motor(std::size_t index, const Mcu& mcu, const bushd_repor
   if (motor.wrong) {
     end_motor(index, motion::Outcome::kFault, motor.doubt + "; check the position and set it");
   } else if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !motor.armed) {
-    motor.doubt = kUnpowered;
+    const std::string why =
+        "MCU " + mcu.config->id + " switched its drivers off because " + stop_cause(report);
+    if (stepped) motor.doubt = kUnpowered;
     end_motor(index, motion::Outcome::kFault,
-              "MCU " + mcu.config->id + " switched its drivers off because " + stop_cause(report) +
-                  "; check the position and set it");
+              stepped ? why + "; check the position and set it"
+                      : "it did not move: " + why +
+                            "; find the cause, then 'bushctl clear' and 'enable'");
   } else if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
     const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
     const std::string by =
@@ -265,7 +269,7 @@ void Core::end_motor(std::size_t index, motion::Outcome outcome, const std::stri
   motor.limit = 0;
   // The log of moves knows nothing of one that has not started.
   if (!motor.armed) log_result(motor, motion::outcome_word(outcome));
-  motor.armed.reset();
+  if (std::exchange(motor.armed, std::nullopt)) take_back_companions(index);
   const bool planned = outcome == motion::Outcome::kReached || outcome == motion::Outcome::kStopped;
   if (!planned) outputs_.log(LogLevel::kWarning, motor.config->name + ": " + reason);
   end_part(index, outcome, reason);

@@ -26,25 +26,40 @@ Ending ending_of(const bushd_report& report, const std::string& mcu) {
     case BUSHD_HOMING_DONE:
       return {motion::Outcome::kReached, "homed"};
     case BUSHD_HOMING_NOT_FOUND:
-      return {motion::Outcome::kFault, "its switch was not found within home.most_steps"};
+      return {motion::Outcome::kFault,
+              "its switch was not found within home.most_steps; check the switch and 'home'"};
     case BUSHD_HOMING_STUCK:
       return {motion::Outcome::kFault,
               "its switch stayed active all the way back; is it stuck, or are "
               "home.slow_most_steps too few?"};
     case BUSHD_HOMING_LOST:
-      return {motion::Outcome::kFault, "its switch was not found again by the slow approach"};
+      return {motion::Outcome::kFault,
+              "its switch was not found again by the slow approach; check its contact"};
     default:
       break;
   }
   const unsigned stops =
       BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_OVERCURRENT;
   if (report.faults & stops) {
-    return {motion::Outcome::kStopped, "homing was ended because " + stop_cause(report)};
+    return {motion::Outcome::kStopped,
+            "homing was ended because " + stop_cause(report) + "; 'bushctl clear', then home it"};
   }
   if (report.faults & BUSHD_FAULT_LINK) {
-    return {motion::Outcome::kLink, "MCU " + mcu + " gave up homing because it heard nobody"};
+    return {motion::Outcome::kLink,
+            "MCU " + mcu + " gave up homing because it heard nobody; home it again"};
   }
   return {motion::Outcome::kStopped, "homing was stopped on request"};
+}
+
+const char* remedy_of(unsigned refusal) {
+  switch (refusal) {
+    case BUSHD_E_FORBIDDEN:
+      return "move it off that switch first";
+    case BUSHD_E_STATE:
+      return "home it when the motors of this MCU stand";
+    default:
+      return "check its 'home' and its table in the configuration";
+  }
 }
 
 }  // namespace
@@ -87,7 +102,8 @@ std::string Core::refuse_homing(std::size_t index) const {
   if (motor.axis.busy()) return "it moves; stop it first";
   if (const std::string why = refuse_motion(index); !why.empty()) return why;
   if ((view_of(mcu).identity.capabilities & BUSHD_CAN_HOME) == 0) {
-    return "MCU " + mcu.config->id + " cannot home";
+    return "MCU " + mcu.config->id +
+           " cannot home; find out where it stands and say 'bushctl set NAME STEPS'";
   }
   return {};
 }
@@ -147,7 +163,8 @@ void Core::end_homings(Mcu& mcu, motion::Outcome outcome, const std::string& rea
 void Core::refuse_home(Mcu& mcu, std::uint8_t status) {
   if (mcu.homings.empty()) return;
   end_homing(mcu, motion::Outcome::kFault,
-             "MCU " + mcu.config->id + " refused to home it: " + bushd_status_text(status));
+             "MCU " + mcu.config->id + " refused to home it: " + bushd_status_text(status) + "; " +
+                 remedy_of(status));
 }
 
 bool Core::forget_waiting_homing(std::size_t index) {

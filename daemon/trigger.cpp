@@ -37,7 +37,8 @@ std::string Core::refuse_arming(const command_t& command) const {
     if (command.steps[i] == 0) return motor.config->name + ": a move of no steps";
     if (motor.axis.busy()) return motor.config->name + " moves; stop it first";
     if (!master.can_trigger(mcu.in_bus) || !master.can_run_tables(mcu.in_bus)) {
-      return "MCU " + mcu.config->id + " has no trigger input";
+      return motor.config->name + ": MCU " + mcu.config->id +
+             " has no trigger input; move it without one, or by an MCU that has";
     }
     for (const int other : mcu.motor_of) {
       if (other < 0 || !motors_[static_cast<std::size_t>(other)].armed) continue;
@@ -83,6 +84,26 @@ void Core::disarm(const std::vector<std::size_t>& motors) {
   }
 }
 
+void Core::take_back(const std::vector<std::size_t>& motors) {
+  for (const std::size_t motor : motors) motors_[motor].armed->stops = true;
+  disarm(motors);
+}
+
+void Core::take_back_companions(std::size_t index) {
+  std::vector<std::size_t> others;
+  for (std::size_t i = 0; i < motors_.size(); ++i) {
+    // Those of its own MCU have ended by what has ended it.
+    Motor& other = motors_[i];
+    if (!other.armed || other.armed->stops || other.mcu == motors_[index].mcu ||
+        book_.move_of(i) != book_.move_of(index)) {
+      continue;
+    }
+    other.armed->ended = motors_[index].config->name;
+    others.push_back(i);
+  }
+  take_back(others);
+}
+
 bool Core::follow_armed(std::size_t index, const Mcu& mcu, const link::McuView& view) {
   Motor& motor = motors_[index];
   const bushd_report& report = view.report;
@@ -106,18 +127,23 @@ bool Core::follow_armed(std::size_t index, const Mcu& mcu, const link::McuView& 
   if (refused_for_limit || (told && report.trigger_state == BUSHD_TRIGGER_FORBIDDEN)) {
     end_motor(index, motion::Outcome::kLimit,
               "a limit switch forbids that direction, or that of another motor that waited with "
-              "it; it did not move");
+              "it; it did not move. Move that motor away from its switch, and arm again");
   } else if (!told) {
     end_motor(index, motion::Outcome::kFault,
-              name + " did not arm it: " + bushd_status_text(report.last_rejection));
+              name + " did not arm it: " + bushd_status_text(report.last_rejection) +
+                  "; 'bushctl status' tells how that MCU is, arm again when it is ready");
   } else if (report.trigger_state == BUSHD_TRIGGER_DISARMED) {
-    end_motor(index, motion::Outcome::kStopped, "disarmed before the trigger came");
+    end_motor(index, motion::Outcome::kStopped,
+              armed.ended.empty()
+                  ? "disarmed before the trigger came"
+                  : "disarmed, because " + armed.ended + ", armed with it, does not wait any more");
   } else if (report.trigger_state == BUSHD_TRIGGER_LATE) {
-    end_motor(
-        index, motion::Outcome::kFault,
-        "the trigger came, but " + name + " noticed it too late to begin in time; it did not move");
+    end_motor(index, motion::Outcome::kFault,
+              "the trigger came, but " + name +
+                  " noticed it too late to begin in time; it did not move, arm it again");
   } else if (report.trigger_state == BUSHD_TRIGGER_FAULT) {
-    end_motor(index, motion::Outcome::kFault, "a fault of " + name + " disarmed it");
+    end_motor(index, motion::Outcome::kFault,
+              "a fault of " + name + " disarmed it; 'bushctl status' tells which");
   }
   return false;
 }

@@ -5,6 +5,8 @@
 #include <array>
 #include <string>
 
+#include "config/words.h"
+
 namespace bushd::config {
 namespace {
 
@@ -15,26 +17,6 @@ constexpr std::int64_t kMaxUs = UINT16_MAX;
 // Where the first step of a tick would begin together with the change of DIR: enough for slow
 // drivers.
 constexpr std::uint16_t kDirSetupUs = 5;
-
-template <std::size_t N>
-std::string list_of(const std::array<std::string_view, N>& words) {
-  std::string list;
-  for (const std::string_view word : words) {
-    list += fmt::format("{}\"{}\"", list.empty() ? "" : ", ", word);
-  }
-  return list;
-}
-
-template <std::size_t N>
-Result<std::uint8_t> read_word(const TomlReader& reader, std::string_view key,
-                               const std::array<std::string_view, N>& words) {
-  const auto word = reader.string(key, list_of(words));
-  if (!word) return fail(word.error());
-  for (std::size_t i = 0; i < N; ++i) {
-    if (words[i] == *word) return static_cast<std::uint8_t>(i);
-  }
-  return fail(reader.error(key, fmt::format("is \"{}\"; allowed: {}", *word, list_of(words))));
-}
 
 Result<void> read_us(const TomlReader& reader, std::string_view key, std::int64_t lowest,
                      std::uint16_t* us) {
@@ -81,7 +63,7 @@ Result<link::EmissionSetup> read_emission(const TomlReader& reader) {
   if (reader.has("emission")) {
     const auto mode = read_word(reader, "emission", link::kEmissionNames);
     if (!mode) return fail(mode.error());
-    settings.mode = *mode;
+    settings.mode = static_cast<std::uint8_t>(*mode);
   }
   if (auto idle = refuse_idle_keys(reader, settings.mode); !idle) return fail(idle.error());
   const bool periodic =
@@ -112,7 +94,7 @@ Result<link::EmissionSetup> read_emission(const TomlReader& reader) {
   if (reader.has("phase_sequence")) {
     const auto sequence = read_word(reader, "phase_sequence", kSequences);
     if (!sequence) return fail(sequence.error());
-    settings.sequence = *sequence;
+    settings.sequence = static_cast<std::uint8_t>(*sequence);
   }
   if (reader.has("hold_current")) {
     const auto hold = reader.boolean("hold_current");

@@ -29,6 +29,11 @@ Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
   if (auto read = read_active(reader, "emergency_active", &mcu->emergency_active_open); !read) {
     return read;
   }
+  if (reader.has("emergency_active") && !reader.has("emergency_input")) {
+    return fail(reader.error("emergency_active",
+                             "is told of an MCU without emergency_input; allowed: beside "
+                             "emergency_input = \"ramp\", \"cut\" or \"ignore\""));
+  }
   if (reader.has("debounce_ticks")) {
     const auto ticks = reader.integer("debounce_ticks", 0, BUSHD_MAX_DEBOUNCE_TICKS);
     if (!ticks) return fail(ticks.error());

@@ -13,15 +13,15 @@ tl::unexpected<Error> refuse(const tables::TomlReader& reader, std::string_view 
 }
 
 Result<int> read_word(const tables::TomlReader& reader, std::string_view key,
-                      std::initializer_list<std::string_view> words) {
+                      std::span<const std::string_view> words) {
   std::string rule;
   for (const std::string_view& word : words) {
-    const bool last = &word == words.end() - 1;
+    const bool last = &word == &words.back();
     rule += fmt::format("{}\"{}\"", rule.empty() ? "" : last ? " or " : ", ", word);
   }
   const auto word = reader.string(key, rule);
   if (!word) return fail(word.error());
-  const auto* const found = std::find(words.begin(), words.end(), *word);
+  const auto found = std::find(words.begin(), words.end(), *word);
   if (found == words.end()) return refuse(reader, key, *word, rule);
   return static_cast<int>(found - words.begin());
 }

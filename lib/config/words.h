@@ -2,6 +2,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <span>
 #include <string_view>
 
 #include "base/result.h"
@@ -15,6 +16,10 @@ tl::unexpected<Error> refuse(const tables::TomlReader& reader, std::string_view 
 
 // Which of the words stands there, counted from 0.
 Result<int> read_word(const tables::TomlReader& reader, std::string_view key,
-                      std::initializer_list<std::string_view> words);
+                      std::span<const std::string_view> words);
+inline Result<int> read_word(const tables::TomlReader& reader, std::string_view key,
+                             std::initializer_list<std::string_view> words) {
+  return read_word(reader, key, std::span(words.begin(), words.end()));
+}
 
 }  // namespace bushd::config

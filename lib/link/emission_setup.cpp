@@ -19,6 +19,12 @@ std::string us_of_ns(std::uint32_t ns) {
 
 }  // namespace
 
+const char* remedy_of(unsigned refusal) {
+  return refusal == BUSHD_E_STATE
+             ? "a motor of it moves, by its local inputs perhaps; it is asked again"
+             : "its firmware and this program do not fit each other: update the older of the two";
+}
+
 std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& identity,
                             std::uint32_t tick_ns, unsigned* max_steps) {
   const auto can = [&](std::uint8_t mode) {
@@ -35,7 +41,7 @@ std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& id
   }
   if (identity.slots < BUSHD_MIN_SLOTS) {
     return "says that it has " + std::to_string(identity.slots) + " slots a tick; needed are " +
-           std::to_string(BUSHD_MIN_SLOTS);
+           std::to_string(BUSHD_MIN_SLOTS) + ": update its firmware";
   }
   bushd_emission_grid grid;
   const bushd_status status = bushd_emission_fit(&setup.settings, tick_ns, identity.slots, &grid);
@@ -66,7 +72,8 @@ std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::u
       return at(setup.step_at, "is " + std::to_string(settings.step_us) +
                                    " us; allowed: what a tick holds besides dir_setup_us");
     default:
-      return at(setup.mode_at, std::string("is refused: ") + bushd_status_text(status));
+      return at(setup.mode_at,
+                std::string("is refused: ") + bushd_status_text(status) + "; " + remedy_of(status));
   }
 }
 

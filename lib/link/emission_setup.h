@@ -34,6 +34,9 @@ inline constexpr std::array<std::string_view, 5> kEmissionNames = {"even", "burs
 std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& identity,
                             std::uint32_t tick_ns, unsigned* max_steps);
 
+// What can be done about a refusal that the configuration is not to blame for.
+const char* remedy_of(unsigned refusal);
+
 // What its refusal means.
 std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::uint16_t slots,
                              std::uint32_t tick_ns);

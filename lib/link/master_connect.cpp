@@ -31,15 +31,16 @@ std::string lacks_time(const McuSetup& setup, const bushd_identity& identity,
   unsigned room = 0;
   const std::string why = emission_misfit(setup.emission, identity, tick_ns, &room);
   if (!why.empty()) return why;
-  for (const int slot : setup.table_of_motor) {
+  for (std::size_t output = 0; output < setup.table_of_motor.size(); ++output) {
+    const int slot = setup.table_of_motor[output];
     if (slot < 0) continue;
     const bushd_table* table = setup.tables[static_cast<std::size_t>(slot)].table;
     const std::uint32_t steps = bushd_table_max_steps_per_tick(table, tick_ns);
     if (steps <= room) continue;
     return "has room for " + std::to_string(room) +
            " steps of a motor in a tick, with its emission in " + std::to_string(identity.slots) +
-           " slots, but a table makes up to " + std::to_string(steps) +
-           ": use a slower table, or less step_us or dir_setup_us";
+           " slots, but the table of output " + std::to_string(output) + " makes up to " +
+           std::to_string(steps) + ": use a slower table, or less step_us or dir_setup_us";
   }
   return {};
 }
@@ -55,6 +56,32 @@ std::string lacks_room(const McuSetup& setup, const bushd_identity& identity,
   return "has memory for " + std::to_string(identity.table_codes) +
          " table codes, but its motors' tables need " + std::to_string(codes) +
          ": use shorter tables or fewer on this MCU";
+}
+
+// What an MCU refused of its configuration, and what can be done about it.
+std::string refusal_text(std::uint8_t type, unsigned status) {
+  struct Request {
+    std::uint8_t type;
+    const char* name;
+    const char* if_too_much;  // remedy
+  };
+  constexpr const char* kTables = "use shorter or slower tables, or fewer on this MCU";
+  static constexpr std::array<Request, 7> kRequests = {{
+      {BUSHD_MSG_CONFIGURE, "CONFIGURE", "use a longer tick_us on its bus"},
+      {BUSHD_MSG_TABLE_BEGIN, "TABLE_BEGIN", kTables},
+      {BUSHD_MSG_TABLE_DATA, "TABLE_DATA", kTables},
+      {BUSHD_MSG_TABLE_END, "TABLE_END", kTables},
+      {BUSHD_MSG_ASSIGN, "ASSIGN", kTables},
+      {BUSHD_MSG_INPUTS, "INPUTS", nullptr},
+      {BUSHD_MSG_LOCAL, "LOCAL", nullptr},
+  }};
+  const auto* const request =
+      std::find_if(kRequests.begin(), kRequests.end(),
+                   [type](const Request& candidate) { return candidate.type == type; });
+  const bool known = request != kRequests.end();
+  const bool too_much = known && status == BUSHD_E_CAPACITY && request->if_too_much != nullptr;
+  return (known ? std::string(request->name) + ": " : std::string()) + bushd_status_text(status) +
+         "; " + (too_much ? request->if_too_much : remedy_of(status));
 }
 
 }  // namespace
@@ -265,7 +292,7 @@ void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std:
       "refused its configuration: " +
           (type == BUSHD_MSG_EMISSION ? emission_refusal(mcu.setup.emission, status,
                                                          mcu.view.identity.slots, setup_.tick_ns)
-                                      : bushd_status_text(status)),
+                                      : refusal_text(type, status)),
       now_us + kRetryUs);
 }
 

@@ -68,7 +68,7 @@ TEST(EmissionKeys, EachModeHasItsKeys) {
 TEST(EmissionKeys, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THAT(error_of(with_keys("emission = \"odd\"\n")),
               EndsWith("19:12: mcu[0].emission: is \"odd\"; allowed: \"even\", \"burst\", "
-                       "\"common-dir\", \"staggered\", \"phases\""));
+                       "\"common-dir\", \"staggered\" or \"phases\""));
   EXPECT_THAT(error_of(with_keys("emission = \"burst\"\n")),
               HasSubstr("16:1: mcu[0].step_us: is missing; allowed: a whole number 1..65535 us"));
   EXPECT_THAT(error_of(with_keys("pulse_us = 2.5\n")),
@@ -78,7 +78,7 @@ TEST(EmissionKeys, WhatIsWrongIsNamedWithItsLine) {
               HasSubstr("20:16: mcu[0].hold_current: is 1; allowed: true or false"));
   EXPECT_THAT(error_of(with_keys("emission = \"phases\"\nphase_sequence = \"four\"\n")),
               HasSubstr("20:18: mcu[0].phase_sequence: is \"four\"; allowed: \"wave\", \"full\", "
-                        "\"half\", \"three-phase\""));
+                        "\"half\" or \"three-phase\""));
 }
 
 TEST(EmissionKeys, KeysThatSayNothingInThisModeAreRefused) {

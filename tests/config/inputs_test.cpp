@@ -78,6 +78,9 @@ TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
   const BadKey bad[] = {
       {with_mcu("emergency_input = \"stop\"\n"), 22,
        "mcu[1].emergency_input: is \"stop\"; allowed: \"ignore\", \"ramp\" or \"cut\""},
+      {with_mcu("emergency_active = \"open\"\n"), 22,
+       "mcu[1].emergency_active: is told of an MCU without emergency_input; allowed: beside "
+       "emergency_input = \"ramp\""},
       {with_mcu("emergency_active = 1\n"), 22,
        "mcu[1].emergency_active: is 1; allowed: \"closed\""},
       {with_mcu("debounce_ticks = 16\n"), 22, "mcu[1].debounce_ticks: is 16; allowed: a whole"},

@@ -196,6 +196,20 @@ TEST_P(Limits, OvercurrentTakesThePowerAndSaysSo) {
   EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {10})).result, "reached");
 }
 
+TEST_P(Limits, OvercurrentBeforeTheFirstStepLeavesThePositionKnown) {
+  Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
+  lab.connect();
+  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  lab.bus(0).mcu(0).set_current(801);
+  const reply_t result = lab.wait(move);
+  EXPECT_EQ(result.result, "fault");
+  EXPECT_THAT(result.reason, HasSubstr("supply current"));
+  EXPECT_THAT(result.reason, HasSubstr("m01: it did not move"));
+  lab.run_for(0.1);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(lab.motor("m01").trust, "known");
+}
+
 // Whatever switches do: one result a move, and the daemon knows where the motors stand.
 TEST_P(Limits, NoStepIsLostHoweverSwitchesBounce) {
   for (unsigned seed = 0; seed < 12; ++seed) {

@@ -156,6 +156,41 @@ TEST_P(Triggered, DisarmedTheyEndAsStopped) {
   EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {30})).result, "reached");
 }
 
+// All of them wait, or none.
+TEST_P(Triggered, WhereOneMcuCannotBeArmedTheOthersDoNotWait) {
+  std::string toml = hall(2, 3, GetParam());
+  const std::string fifth = "name = \"m05\"\n";
+  toml.insert(toml.find(fifth) + fifth.size(), "limit = \"positive\"\n");
+  Lab limited(toml, {}, &pins);
+  limited.connect();
+  const auto move = limited.send(armed({"m01", "m04", "m05"}, {50, 60, 70}));
+  limited.bus(0).mcu(1).set_inputs({0b010, 0});  // at this very moment
+  const reply_t result = limited.wait(move, 2);
+  EXPECT_EQ(result.result, "limit") << result.reason;
+  EXPECT_EQ(result.motor_results, (std::vector<std::string>{"stopped", "limit", "limit"}));
+  EXPECT_EQ(limited.bus(0).mcu(0).core().trigger.armed, 0);
+  for (const std::size_t mcu : {0u, 1u}) {
+    limited.bus(0).mcu(mcu).set_inputs({0, BUSHD_INPUT_TRIGGER});
+  }
+  limited.run_for(1);
+  for (const char* motor : {"m01", "m04", "m05"}) EXPECT_EQ(limited.shaft_steps(motor), 0);
+}
+
+TEST_P(Triggered, WhereOneMcuIsDisarmedOrLostTheOthersAreToo) {
+  lab.connect();
+  auto move = arm({"m01", "m04"}, {50, 60});
+  EXPECT_EQ(lab.wait(lab.send(command_t::DISARM, {"m04"})).result, "done");
+  EXPECT_EQ(lab.wait(move, 2).result, "stopped");
+  move = arm({"m01", "m04"}, {50, 60});
+  lab.bus(0).reboot(1, 100'000'000);
+  const reply_t result = lab.wait(move, 5);
+  EXPECT_EQ(result.result, "link");
+  EXPECT_EQ(result.motor_results, (std::vector<std::string>{"stopped", "link"}));
+  fire(0);
+  lab.run_for(1);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
 TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
   lab.connect();
   auto move = arm({"m01"}, {3000});

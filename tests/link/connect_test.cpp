@@ -218,6 +218,7 @@ TEST(Connect, RefusedRequestsAreNamedAndTriedAgain) {
                                HasSubstr("being configured")));
     ASSERT_TRUE(bus.run_until([&] { return bus.master->view(0).phase == McuPhase::kOffline; }));
     EXPECT_THAT(bus.master->view(0).detail, HasSubstr("refused its configuration"));
+    EXPECT_THAT(bus.master->view(0).detail, HasSubstr("update the older of the two"));
     bus.slaves[0].refusals.clear();
     bus.connect();
   }
@@ -240,6 +241,28 @@ TEST(Connect, StatusThatNobodyKnowsIsARefusalToo) {
     ASSERT_TRUE(bus.run_until([&] {
       return bus.master->view(0).detail.find("unknown status") != std::string::npos;
     })) << int{type};
+  }
+}
+
+TEST(Connect, WhatARefusalAsksForIsTold) {
+  struct Case {
+    std::uint8_t type;
+    bushd_status status;
+    const char* text;
+  };
+  for (const Case& c : {Case{BUSHD_MSG_CONFIGURE, BUSHD_E_CAPACITY,
+                             "CONFIGURE: capacity exceeded; use a longer tick"},
+                        Case{BUSHD_MSG_TABLE_BEGIN, BUSHD_E_CAPACITY,
+                             "TABLE_BEGIN: capacity exceeded; use shorter"},
+                        Case{BUSHD_MSG_INPUTS, BUSHD_E_STATE,
+                             "INPUTS: not allowed in this state; a motor of it moves"},
+                        Case{BUSHD_MSG_EMISSION, BUSHD_E_STATE,
+                             "is refused: not allowed in this state; a motor of it"}}) {
+    FakeBus bus;
+    bus.slaves[0].refusals = {{c.type, c.status}};
+    ASSERT_TRUE(bus.run_until(
+        [&] { return bus.master->view(0).detail.starts_with("refused its configuration"); }));
+    EXPECT_THAT(bus.master->view(0).detail, HasSubstr(c.text));
   }
 }
 
@@ -281,7 +304,7 @@ TEST(Connect, TableThatIsTooFastForTheEmissionKeepsTheMcuAway) {
   EXPECT_THAT(
       bus.master->view(0).detail,
       HasSubstr("has room for 1 steps of a motor in a tick, with its emission in 256 slots, "
-                "but a table makes up to 2"));
+                "but the table of output 0 makes up to 2"));
 }
 
 TEST(Connect, LostRequestsAndAnswersAreRepeated) {

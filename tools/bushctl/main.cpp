@@ -179,7 +179,7 @@ int run(int argc, char** argv) {
   arm->allow_extras();  // parse_arm()
   CLI::App* disarm =
       add_motors_command(app, arguments, "disarm", "Takes back moves that wait for the trigger");
-  disarm->footer("What waits for the same trigger is disarmed together.");
+  disarm->footer("What waits for the same trigger, or was armed together, is disarmed together.");
   CLI::App* reference =
       add_command(app, arguments, "reference", "A pulse when a motor arrives at a position");
   reference->add_option("NAME", arguments.motor, "The motor; its MCU's reference output pulses")
