@@ -31,6 +31,9 @@ endif()
 
 if(ARM_GCC AND QEMU_SYSTEM_ARM)
   bushd_images(cortex_m_image LM3S cortex-m lm3s6965)
+  add_test(NAME cortex_m_stack_is_bounded COMMAND ${Python3_EXECUTABLE}
+    ${PROJECT_SOURCE_DIR}/tests/ports/cortex_m_stack_bound_test.py arm-none-eabi-objdump ${LM3S_IMAGES}-500000.elf)
+  set_tests_properties(cortex_m_stack_is_bounded PROPERTIES LABELS slow)
 else()
   message(STATUS "The image for LM3S6965 is not tested: it needs gcc-arm-none-eabi and qemu-system-arm (tools/setup)")
 endif()

@@ -51,10 +51,17 @@ TimeNs Bus::next_event_ns() const {
   return next_ns;
 }
 
-// Half a byte: none that an unforeseen answer begins with within a stride can end in it.
-TimeNs Bus::stride_end_ns() const {
-  const bool free = std::ranges::none_of(mcus_, [](const auto& mcu) { return mcu->may_speak(); });
-  return free ? kNever : now_ns_ + kBitsPerByte * 1'000'000'000 / 2 / baud_;
+// How far time can move on, until_ns at most, so that nobody begins to speak before.
+TimeNs Bus::stride(TimeNs until_ns) {
+  const auto may_speak = [](const auto& mcu) { return mcu->may_speak(); };
+  const auto first = std::ranges::find_if(mcus_, may_speak);
+  if (first == mcus_.end()) return until_ns;
+  if (std::none_of(first + 1, mcus_.end(), may_speak)) {
+    const TimeNs reached_ns = (*first)->advance_until_it_speaks(until_ns);
+    if (reached_ns > now_ns_) return reached_ns;
+  }
+  // Half a byte: none that an unforeseen answer begins with within it can end in it.
+  return std::min(until_ns, now_ns_ + kBitsPerByte * 1'000'000'000 / 2 / baud_);
 }
 
 // Ticks of different MCUs touch nothing in common, so that only those of one MCU need be in order.
@@ -93,8 +100,10 @@ void Bus::advance_to(TimeNs t_ns) {
   assert(t_ns >= now_ns_);
   for (;;) {
     const TimeNs end_ns = line_.next_end_ns();
-    const TimeNs until_ns = std::min({end_ns, t_ns, stride_end_ns()});
-    while (sink_ != nullptr && next_settling_ns_ < until_ns) settle(next_settling_ns_);
+    if (sink_ != nullptr && next_settling_ns_ <= now_ns_) settle(now_ns_);
+    const TimeNs limit_ns = std::min(end_ns, t_ns);
+    const TimeNs until_ns =
+        stride(sink_ != nullptr ? std::min(limit_ns, next_settling_ns_) : limit_ns);
     run_ticks_until(until_ns);
     now_ns_ = until_ns;
     if (end_ns <= until_ns) {

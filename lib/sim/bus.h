@@ -84,7 +84,7 @@ class Bus : private Mcu::Driver {
   void transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire,
                 std::size_t size) override;
   std::uint8_t talker_address(std::size_t talker) const;
-  TimeNs stride_end_ns() const;
+  TimeNs stride(TimeNs until_ns);
   void run_ticks_until(TimeNs t_ns);
   void deliver(const LineByte& byte);
   void settle(TimeNs t_ns);

@@ -43,6 +43,12 @@ class Mcu {
 
   // Everything up to now_ns (included) happens. Precondition: it is not before the last time given.
   virtual void advance(TimeNs now_ns) = 0;
+  // The same, but not beyond the first byte that it begins to send: returns the time that has come.
+  // Kinds that cannot stop there do nothing, and return less than until_ns.
+  virtual TimeNs advance_until_it_speaks(TimeNs until_ns) {
+    (void)until_ns;
+    return 0;
+  }
   // A byte's stop bit ended at now_ns. Advances to that time first.
   virtual void receive(std::uint8_t byte, TimeNs now_ns) = 0;
   // Its reset is pulled at now_ns; it boots again at boot_ns. An MCU that counts its boots itself

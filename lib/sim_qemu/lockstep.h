@@ -6,7 +6,9 @@
 #include <stdint.h>
 
 typedef enum lockstep_command_kind {
-  LOCKSTEP_RUN = 1,          // until time_ns; answered by events, the last one LOCKSTEP_STOPPED
+  // Until time_ns, or, if value is 1, until its UART takes a byte; answered by events, the last one
+  // LOCKSTEP_STOPPED
+  LOCKSTEP_RUN = 1,
   LOCKSTEP_BYTE = 2,         // value: its stop bit ends at time_ns, in the order of their times
   LOCKSTEP_INPUTS = 3,       // value: levels of the motors' inputs; address: those of the system's
   LOCKSTEP_CURRENT = 4,      // value: what its ADC reads; in answer to LOCKSTEP_CONVERTS

@@ -5,7 +5,7 @@
  * that time: so what happens when does not depend on the machine it runs on. What QEMU does not
  * model is made up for here:
  * - a UART's BUSY flag, and the time that it takes to send
- * - flash that can be written
+ * - flash that can be written, and takes its time; not that the CPU waits for it
  * - an ADC that reads what it is told, and takes its time
  * - why it was reset, and a watchdog that ends this process, as the next one has all memory fresh
  */
@@ -54,6 +54,7 @@ static struct {
   lockstep_message events[EVENTS];
   size_t event_count;
   int64_t until_ns;
+  bool until_sent;
 } lockstep;
 
 static struct {
@@ -69,13 +70,15 @@ static struct {
 } uart;
 
 /* Flash that the image writes to. Writing only makes zeros of ones. */
-#define JOURNAL 0x3F800u
-#define JOURNAL_SIZE (2 * FLASH_PAGE)
+#define WRITTEN 0x27800u
+#define WRITTEN_SIZE (98 * FLASH_PAGE)
 static struct {
   MemoryRegion region;
   uint32_t address;
   uint32_t data;
-  uint32_t words[JOURNAL_SIZE / 4];
+  uint32_t words[WRITTEN_SIZE / 4];
+  uint32_t command;
+  int64_t busy_until_ns;
 } flash;
 
 static struct {
@@ -148,8 +151,8 @@ static void tell(uint32_t kind, uint32_t value, uint32_t address) {
 }
 
 static void store(uint32_t address, uint32_t word) {
-  if (address < JOURNAL || address >= JOURNAL + JOURNAL_SIZE) give_up();
-  flash.words[(address - JOURNAL) / 4] = word;
+  if (address < WRITTEN || address >= WRITTEN + WRITTEN_SIZE) give_up();
+  flash.words[(address - WRITTEN) / 4] = word;
   address_space_write_rom(&address_space_memory, address, MEMTXATTRS_UNSPECIFIED, &word,
                           sizeof word);
 }
@@ -223,6 +226,7 @@ static void obey(void) {
     switch (command.kind) {
       case LOCKSTEP_RUN:
         lockstep.until_ns = command.time_ns;
+        lockstep.until_sent = command.value != 0;
         return;
       case LOCKSTEP_BYTE:
         if (uart.bytes_in - uart.bytes_out == BYTES) give_up();
@@ -366,6 +370,10 @@ static void uart_write(void* opaque, hwaddr address, uint64_t data, unsigned siz
     const int64_t byte_ns = (int64_t)uart.divisor * 10 * CYCLE_NS / 4;
     uart.busy_until_ns = (uart.busy_until_ns > now_ns ? uart.busy_until_ns : now_ns) + byte_ns;
     tell(LOCKSTEP_SENT, (uint8_t)data, 0);
+    if (lockstep.until_sent) {
+      lockstep.until_ns = now_ns;
+      timer_mod(&lockstep.timer, now_ns);
+    }
   }
   memory_region_dispatch_write(uart.real, address, data, MO_32, MEMTXATTRS_UNSPECIFIED);
 }
@@ -444,9 +452,14 @@ static void watchdog_write(void* opaque, hwaddr address, uint64_t data, unsigned
 
 static uint64_t flash_read(void* opaque, hwaddr address, unsigned size) {
   (void)opaque;
-  (void)address;
   (void)size;
-  return 0;
+  const bool busy = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) < flash.busy_until_ns;
+  return address == 0x8u && busy ? flash.command : 0;
+}
+
+static void flash_takes(uint32_t command, int64_t ns) {
+  flash.command = command;
+  flash.busy_until_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) + ns;
 }
 
 static void flash_store(uint32_t address, uint32_t word) {
@@ -461,12 +474,14 @@ static void flash_write(void* opaque, hwaddr address, uint64_t data, unsigned si
   if (address == 0x4u) flash.data = (uint32_t)data;
   if (address != 0x8u || data >> 16 != FLASH_KEY) return;
   if (data & 1u) {
-    const uint32_t word = (flash.address - JOURNAL) / 4 % (JOURNAL_SIZE / 4);
+    const uint32_t word = (flash.address - WRITTEN) / 4 % (WRITTEN_SIZE / 4);
     flash_store(flash.address, flash.words[word] & flash.data);
+    flash_takes(1u, 20000);
   }
   if (data & 2u) {
     const uint32_t page = flash.address & ~(FLASH_PAGE - 1u);
     for (uint32_t word = 0; word < FLASH_PAGE; word += 4) flash_store(page + word, UINT32_MAX);
+    flash_takes(2u, 20000000);
   }
 }
 
@@ -509,6 +524,9 @@ static void on_machine_done(Notifier* notifier, void* data) {
   timer_init_full(&watchdog.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_watchdog, NULL);
   tick_timer = sysbus_mmio_get_region(find(TIMER_1, "stellaris-gptm"), 0);
   timer_init_full(&lockstep.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_time, NULL);
+  memset(flash.words, 0xFF, sizeof flash.words);
+  address_space_write_rom(&address_space_memory, WRITTEN, MEMTXATTRS_UNSPECIFIED, flash.words,
+                          sizeof flash.words);
   obey();
   timer_mod(&lockstep.timer, 0);
 }
@@ -519,7 +537,6 @@ int qemu_plugin_install(qemu_plugin_id_t id, const qemu_info_t* info, int argc, 
   static Notifier machine_done = {.notify = on_machine_done};
   if (argc != 1 || strncmp(argv[0], "fd=", 3) != 0) return 1;
   lockstep.fd = atoi(argv[0] + 3);
-  memset(flash.words, 0xFF, sizeof flash.words);
   qemu_add_machine_init_done_notifier(&machine_done);
   return 0;
 }

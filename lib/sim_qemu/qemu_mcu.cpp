@@ -29,7 +29,7 @@ constexpr std::uint32_t kPowerOn = 1u << 1;
 constexpr std::uint32_t kWatchdog = 1u << 3;
 
 // The longest that the image takes from a frame to knowing when it will answer.
-constexpr TimeNs kDecidesNs = 5'000'000;
+constexpr TimeNs kDecidesNs = 20'000'000;
 
 std::uint32_t record_of(std::uint32_t kind, std::uint32_t value) {
   const std::uint32_t check = ~(value ^ value >> 8 ^ kind) & 0xFF;
@@ -110,6 +110,13 @@ void QemuMcu::advance(TimeNs now_ns) {
   while (!run()) start(kWatchdog);
 }
 
+TimeNs QemuMcu::advance_until_it_speaks(TimeNs until_ns) {
+  until_it_speaks_ = true;
+  advance(until_ns);
+  until_it_speaks_ = false;
+  return now_ns_;
+}
+
 void QemuMcu::send_orders() {
   const auto* out = reinterpret_cast<const char*>(orders_.data());
   std::size_t left = orders_.size() * sizeof orders_[0];
@@ -125,7 +132,7 @@ void QemuMcu::send_orders() {
 
 // Up to now_ns_; false if it was reset on the way.
 bool QemuMcu::run() {
-  order(LOCKSTEP_RUN, 0, 0, now_ns_ - boot_ns_);
+  order(LOCKSTEP_RUN, until_it_speaks_, 0, now_ns_ - boot_ns_);
   send_orders();
   std::array<lockstep_message, 256> events;
   std::size_t have = 0;  // bytes
@@ -154,6 +161,7 @@ void QemuMcu::take(const lockstep_message& event) {
   switch (event.kind) {
     case LOCKSTEP_STOPPED:
       line_timer_ = event.value != 0;
+      now_ns_ = time_ns;
       break;
     case LOCKSTEP_STEP:
       drive(
@@ -201,6 +209,7 @@ void QemuMcu::take(const lockstep_message& event) {
         flash_.erase(event.address);
       } else {
         flash_[event.address] = event.value;
+        ++flash_writes_;
       }
       break;
     default:
@@ -253,12 +262,17 @@ void QemuMcu::reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t) {
   start(kExternal);
 }
 
+void QemuMcu::flip_flash_bit(std::uint32_t address, int bit) {
+  flash_[address] ^= 1u << bit;
+}
+
 // The newest record of this kind, in the page of the newest boot number.
 std::uint16_t QemuMcu::kept(std::uint32_t kind) const {
   std::array<std::uint16_t, 2> boots{};
   std::array<std::uint16_t, 2> found{};
   std::array<bool, 2> has{};
-  for (const auto& [address, word] : flash_) {
+  for (auto at = flash_.lower_bound(kJournal); at != flash_.end(); ++at) {
+    const auto& [address, word] = *at;
     const std::size_t page = (address - kJournal) / 1024;
     const std::uint32_t of = word >> 16 & 0xFF;
     const auto value = static_cast<std::uint16_t>(word);

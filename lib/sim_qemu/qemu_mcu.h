@@ -46,6 +46,7 @@ class QemuMcu final : public Mcu {
   // Once it has heard a frame, until it surely has nothing more to say to it.
   bool may_speak() const override;
   void advance(TimeNs now_ns) override;
+  TimeNs advance_until_it_speaks(TimeNs until_ns) override;
   void receive(std::uint8_t byte, TimeNs now_ns) override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override;
 
@@ -57,6 +58,11 @@ class QemuMcu final : public Mcu {
   // Bit 0 of a word is 1. Before the first advance.
   void stick_ram(std::uint32_t address) { order(LOCKSTEP_STICK, 0, address); }
 
+  // Of what the image has written; from the next boot on.
+  void flip_flash_bit(std::uint32_t address, int bit);
+
+  // Words written to its flash while it ran.
+  std::uint64_t flash_writes() const { return flash_writes_; }
   // Bytes lost in its receiver.
   std::uint64_t overruns() const { return overruns_; }
   // Bytes whose last stop bit was not over when driver-enable fell, or that began without it.
@@ -86,6 +92,7 @@ class QemuMcu final : public Mcu {
   TimeNs boot_ns_ = 0;
   TimeNs delimiter_ns_ = -1;  // that came last
   bool line_timer_ = false;
+  bool until_it_speaks_ = false;
   bushd_inputs inputs_{};
   std::uint16_t current_ = 0;
   std::uint16_t step_levels_ = 0;
@@ -94,6 +101,7 @@ class QemuMcu final : public Mcu {
   std::uint16_t common_dir_level_ = 0;
   std::uint16_t reference_level_ = 0;
   bool driver_enable_ = false;
+  std::uint64_t flash_writes_ = 0;
   std::uint64_t overruns_ = 0;
   std::uint64_t bytes_cut_ = 0;
 };

@@ -32,6 +32,11 @@ class Atmega2560 final : public McuUnderTest {
     avr_ = mcu.get();
     return mcu;
   }
+  TimeNs keeps_within_ns(std::size_t codes) const override {
+    return 3'000'000'000 + static_cast<TimeNs>(codes) * 10'000'000;
+  }
+  std::uint64_t kept_writes() const override { return avr_->eeprom_writes(); }
+  void flip_kept_bit() override { avr_->flip_eeprom_bit(43 + 30, 2); }  // kept.h
   void expect_unharmed() const override {
     EXPECT_EQ(avr_->overruns(), 0u);
     EXPECT_EQ(avr_->bytes_cut(), 0u);
@@ -40,7 +45,7 @@ class Atmega2560 final : public McuUnderTest {
   }
 
  private:
-  const AvrMcu* avr_ = nullptr;
+  AvrMcu* avr_ = nullptr;
 };
 #endif
 
@@ -64,13 +69,16 @@ class Lm3s6965 final : public McuUnderTest {
     qemu_ = mcu.get();
     return mcu;
   }
+  TimeNs keeps_within_ns(std::size_t) const override { return 2'000'000'000; }
+  std::uint64_t kept_writes() const override { return qemu_->flash_writes(); }
+  void flip_kept_bit() override { qemu_->flip_flash_bit(0x27800 + 20 + 32, 2); }  // kept.h
   void expect_unharmed() const override {
     EXPECT_EQ(qemu_->overruns(), 0u);
     EXPECT_EQ(qemu_->bytes_cut(), 0u);
   }
 
  private:
-  const QemuMcu* qemu_ = nullptr;
+  QemuMcu* qemu_ = nullptr;
 };
 #endif
 

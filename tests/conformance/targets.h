@@ -37,6 +37,11 @@ class McuUnderTest {
                                     EdgeSink* sink) = 0;
   // Before `make`: what its current sensor reads when a conversion begins.
   std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
+  // Tables and settings over resets: what has changed is kept by then.
+  virtual TimeNs keeps_within_ns(std::size_t codes) const = 0;
+  virtual std::uint64_t kept_writes() const = 0;  // since it booted for the first time
+  virtual void flip_kept_bit() = 0;               // of a table; from the next boot on
+
   // After a test: what its simulator knows to be wrong.
   virtual void expect_unharmed() const = 0;
 };

@@ -1,11 +1,10 @@
-// What the image for ATmega2560 keeps in its EEPROM, and what becomes of it when the power goes.
+// What becomes of what the image for ATmega2560 keeps in its EEPROM when the power goes;
+// tests/conformance has the rest.
 #include "sim/random.h"
 #include "sim_avr/avr_fixture.h"
 
 namespace bushd::sim {
 namespace {
-
-constexpr std::uint16_t kContentAt = 43;  // firmware/ports/atmega2560/kept.h
 
 class AvrKept : public AvrAlone {
  protected:
@@ -37,72 +36,7 @@ class AvrKept : public AvrAlone {
     return static_cast<std::size_t>(
         std::count_if(std::begin(told.slot), std::end(told.slot), [](auto& t) { return t.valid; }));
   }
-
-  bushd_status invert(std::uint8_t system_inputs) {
-    bushd_set_inputs inputs{};
-    inputs.system_inverted = system_inputs;
-    return master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs);
-  }
 };
-
-TEST_F(AvrKept, TablesAndSettingsOutliveAReset) {
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  master_.patience_ns = 20'000'000;  // its CRC takes a while
-  ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp(2000, 900), 1100));
-  ASSERT_EQ(invert(BUSHD_INPUT_FORWARD), BUSHD_OK);
-  const bushd_tables before = tables();
-  pass(12'000'000'000);
-  reboot();
-  const bushd_tables after = tables();
-  for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
-    EXPECT_EQ(after.slot[slot].valid, slot == 0 || slot == 5);
-    EXPECT_EQ(after.slot[slot].crc, before.slot[slot].crc);
-    EXPECT_EQ(after.slot[slot].revision, before.slot[slot].revision);
-  }
-  const bushd_report report = master_.poll(kAddress);
-  EXPECT_EQ(report.faults, 0);
-  EXPECT_EQ(report.system_inputs, BUSHD_INPUT_FORWARD);
-
-  // And they move motors.
-  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
-  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 7, 0));
-  run(7, 50);
-  pass(200 * TimeNs{kTickNs});
-  EXPECT_EQ(steps_made(7), 50u);
-}
-
-TEST_F(AvrKept, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  ASSERT_EQ(
-      master_.acknowledged(kAddress, BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 3}),
-      BUSHD_OK);
-  pass(3'000'000'000);
-  reboot();
-  avr_->set_inputs({0, BUSHD_INPUT_REVERSE});
-  pass(100 * TimeNs{kTickNs});
-  const std::size_t held = steps_made(3);
-  EXPECT_GT(held, 100u) << "1.5 ms a step";
-  avr_->set_inputs({0, 0});
-  pass(20 * TimeNs{kTickNs});
-  const bushd_report report = master_.poll(kAddress);
-  EXPECT_EQ(report.moving, 0);
-  EXPECT_EQ(report.motor[3].position_steps, -static_cast<std::int32_t>(steps_made(3)));
-  EXPECT_LT(steps_made(3), held + 10);
-  EXPECT_EQ(steps_made(4), 0u);
-}
-
-TEST_F(AvrKept, WhatIsTheSameIsNotWrittenAgain) {
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(3'000'000'000);
-  const std::uint64_t written = avr_->eeprom_writes();
-  EXPECT_GT(written, 20u);
-  pass(3'000'000'000);
-  EXPECT_EQ(avr_->eeprom_writes(), written);
-  reboot();
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(3'000'000'000);
-  EXPECT_EQ(avr_->eeprom_writes(), written);
-}
 
 TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
   constexpr std::uint32_t kShortTickNs = 1'250'000;
@@ -139,24 +73,6 @@ TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
   }
   EXPECT_GE(whole, 2);
   EXPECT_GE(broken, 2);
-}
-
-TEST_F(AvrKept, ABitThatHasFlippedIsAFault) {
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(3'000'000'000);
-  avr_->flip_eeprom_bit(kContentAt + 30, 2);
-  reboot();
-  EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM);
-  EXPECT_EQ(valid_tables(), 0u);
-  // It is mended when there is something to keep again.
-  ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                 bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
-            BUSHD_OK);
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(5'000'000'000);
-  reboot();
-  EXPECT_EQ(master_.poll(kAddress).faults, 0);
-  EXPECT_EQ(valid_tables(), 1u);
 }
 
 TEST_F(AvrKept, NothingIsWrittenWhileAMotorMoves) {

@@ -2,16 +2,10 @@
 
 #include <string.h>
 
-#include "firmware/ports/lm3s6965/registers.h"
+#include "firmware/ports/lm3s6965/flash.h"
 
-#define PAGE_WORDS 256u
-#define BLANK 0xFFFFFFFFu
 // Left for addresses that are given before the next boot.
 #define RESERVED_WORDS 32u
-
-#define FMC_KEY 0xA4420000u
-#define FMC_WRITE (1u << 0)
-#define FMC_ERASE (1u << 1)
 
 enum { KIND_ADDRESS = 4, KIND_BOOT_NUMBER = 5, KINDS = 6 };
 
@@ -36,7 +30,7 @@ static uint32_t record_of(uint8_t kind, uint16_t value) {
 static page_content read_page(uint8_t page) {
   page_content read;
   memset(&read, 0, sizeof read);
-  for (; read.used < PAGE_WORDS && kPage[page][read.used] != BLANK; ++read.used) {
+  for (; read.used < FLASH_PAGE_WORDS && kPage[page][read.used] != FLASH_BLANK; ++read.used) {
     const uint32_t record = kPage[page][read.used];
     const uint8_t kind = (uint8_t)(record >> 16);
     // One that was cut off by a power failure does not count.
@@ -55,21 +49,9 @@ static bool has_identity(const page_content* of) {
   return (of->kinds & 0x1Fu) == 0x1Fu && (uint8_t)of->value[KIND_ADDRESS] != 0;
 }
 
-static void flash_command(uint8_t page, uint32_t word, uint32_t data, uint32_t command) {
-  FLASH_FMA = (uint32_t)(uintptr_t)(kPage[page] + word);
-  FLASH_FMD = data;
-  FLASH_FMC = FMC_KEY | command;
-  while ((FLASH_FMC & command) != 0) {
-  }
-}
-
 static bool append(uint8_t kind, uint16_t value) {
-  if (content.used == PAGE_WORDS) return false;
-  const uint32_t record = record_of(kind, value);
-  const volatile uint32_t* const at = kPage[present] + content.used;
-  flash_command(present, content.used, record, FMC_WRITE);
-  ++content.used;
-  if (*at != record) return false;
+  if (content.used == FLASH_PAGE_WORDS) return false;
+  if (!flash_write(kPage[present] + content.used++, record_of(kind, value))) return false;
   content.value[kind] = value;
   content.kinds |= (uint8_t)(1u << kind);
   return true;
@@ -79,7 +61,7 @@ static bool append(uint8_t kind, uint16_t value) {
 static void turn_page(void) {
   const page_content old = content;
   present ^= 1u;
-  flash_command(present, 0, 0, FMC_ERASE);
+  flash_erase(kPage[present]);
   memset(&content, 0, sizeof content);
   for (uint8_t kind = 0; kind < KINDS; ++kind) {
     if (has(&old, kind)) append(kind, old.value[kind]);
@@ -101,7 +83,7 @@ bool journal_open(journal_state* state) {
   const page_content pages[2] = {read_page(0), read_page(1)};
   present = second_is_newer(&pages[0], &pages[1]) ? 1 : 0;
   content = pages[present];
-  if (content.used > PAGE_WORDS - RESERVED_WORDS) turn_page();
+  if (content.used > FLASH_PAGE_WORDS - RESERVED_WORDS) turn_page();
   append(KIND_BOOT_NUMBER, (uint16_t)(content.value[KIND_BOOT_NUMBER] + 1u));
   memset(state, 0, sizeof *state);
   state->boot_number = content.value[KIND_BOOT_NUMBER];

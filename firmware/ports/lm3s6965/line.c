@@ -5,6 +5,7 @@
 
 #include "firmware/ports/lm3s6965/board.h"
 #include "firmware/ports/lm3s6965/clock.h"
+#include "firmware/ports/lm3s6965/flash.h"
 #include "firmware/ports/lm3s6965/interrupts.h"
 #include "firmware/ports/lm3s6965/timer.h"
 
@@ -46,7 +47,8 @@ void line_init(void) {
   NVIC_ISER0 = 1u << IRQ_UART0 | 1u << IRQ_TIMER2A;
 }
 
-void line_received(void) {
+// The next but one byte would be lost while flash is written.
+IN_RAM void line_received(void) {
   const uint32_t now = clock_now();
   while ((UART_FR & UART_FR_RXFE) == 0) {
     const uint8_t byte = (uint8_t)UART_DR;

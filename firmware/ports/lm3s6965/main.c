@@ -5,6 +5,7 @@
 #include "firmware/ports/lm3s6965/clock.h"
 #include "firmware/ports/lm3s6965/emission.h"
 #include "firmware/ports/lm3s6965/journal.h"
+#include "firmware/ports/lm3s6965/kept.h"
 #include "firmware/ports/lm3s6965/line.h"
 #include "firmware/ports/lm3s6965/reference.h"
 #include "firmware/ports/lm3s6965/timer.h"
@@ -16,7 +17,7 @@
 static bushd_mcu mcu;
 static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
 static uint16_t codes[TABLE_CODES];
-static bool has_identity;
+static bool eeprom_failed;
 // In memory that a watchdog reset leaves as it is.
 #define ENABLE_KEPT 0x5AC3E917u
 __attribute__((section(".kept"))) static uint32_t enable_kept;
@@ -67,7 +68,7 @@ static uint16_t port_read_current(void* context) {
 
 static uint8_t port_self_test(void* context) {
   (void)context;
-  uint8_t failed = has_identity ? 0 : BUSHD_TEST_EEPROM;
+  uint8_t failed = eeprom_failed ? BUSHD_TEST_EEPROM : 0;
   if (boot_ram_faults != 0) failed |= BUSHD_TEST_RAM;
   if (!boot_flash_is_sealed()) failed |= BUSHD_TEST_FLASH;
   return failed;
@@ -115,11 +116,13 @@ static void boot(void) {
   journal_state kept;
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enable_kept == ENABLE_KEPT;
-  has_identity = journal_open(&kept);
+  const kept_found found = kept_find();
+  eeprom_failed = !journal_open(&kept) || found == KEPT_BROKEN;
   config.address = kept.address;
   config.boot_number = kept.boot_number;
   for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = kept.unique_id[i];
   bushd_mcu_boot(&mcu, &kPort, &config);
+  if (found == KEPT_WHOLE) kept_load(&mcu);
 }
 
 static void prepare(void) {
@@ -127,12 +130,18 @@ static void prepare(void) {
   emission_ready(&mcu.plane[mcu.front ^ 1u]);
 }
 
+static bool moves(void) {
+  return mcu.state == BUSHD_STATE_RUN || (mcu.plane[0].active | mcu.plane[1].active) != 0;
+}
+
 static void hear_line(void) {
   uint32_t time = 0;
   uint8_t byte = 0;
   if (line_take(&byte, &time)) {
     bushd_mcu_receive(&mcu, byte, (int32_t)emission_time_in_tick_ns(time));
-  } else if (bushd_mcu_wants_samples(&mcu) && board_has_current()) {
+  } else if (!bushd_mcu_wants_samples(&mcu)) {
+    if (!moves()) kept_poll(&mcu);
+  } else if (board_has_current()) {
     bushd_mcu_sample(&mcu, emission_time_in_tick_ns(clock_now()), board_read_current());
     board_begin_current();
   }

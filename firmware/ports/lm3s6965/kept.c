@@ -1,0 +1,208 @@
+#include "firmware/ports/lm3s6965/kept.h"
+
+#include <string.h>
+
+#include "engine/frame.h"
+#include "firmware/ports/lm3s6965/flash.h"
+
+#define PAGES 96u
+#define MOST_PAGES 27u  // of a writing
+#define QUIET_TICKS 512u
+#define COMPARED_BYTES 32u  // at a time
+
+typedef struct kept_head {
+  uint32_t program;
+  uint32_t number;
+  uint32_t size;
+  uint32_t crc;
+  uint32_t check;
+} kept_head;
+#define HEAD_WORDS (sizeof(kept_head) / sizeof(uint32_t))
+#define MOST_BYTES (MOST_PAGES * FLASH_PAGE_WORDS * sizeof(uint32_t) - sizeof(kept_head))
+
+static const volatile uint32_t* const kArea = (const volatile uint32_t*)0x00027800;  // lm3s6965.ld
+extern const uint32_t image_seal;                                                    // startup.c
+
+static kept_head newest;        // all zero: there is none
+static const uint8_t* content;  // of the newest, at boot
+static uint32_t next;           // page, from which on it is blank up to:
+static uint32_t room_end;
+
+static enum { COMPARES, WRITES, ENDS } phase;
+// How far it goes through the pieces.
+static uint8_t piece_index;
+static uint16_t offset;  // in the piece
+static uint32_t size;    // of all bytes so far
+static uint32_t crc;
+static uint32_t planned;  // CRC of the pass before
+static uint32_t planned_size;
+static uint32_t planned_uptime;  // since when it is the same
+static uint32_t head_words;      // written
+
+static const volatile uint32_t* page_at(uint32_t page) {
+  return kArea + page * FLASH_PAGE_WORDS;
+}
+
+static uint32_t pages_of(uint32_t content_size) {
+  const uint32_t words = HEAD_WORDS + (content_size + 3u) / 4u;
+  return (words + FLASH_PAGE_WORDS - 1u) / FLASH_PAGE_WORDS;
+}
+
+static bool is_blank(uint32_t page) {
+  const volatile uint32_t* const at = page_at(page);
+  uint32_t word = 0;
+  while (word < FLASH_PAGE_WORDS && at[word] == FLASH_BLANK) ++word;
+  return word == FLASH_PAGE_WORDS;
+}
+
+static uint32_t check_of(const kept_head* head) {
+  return ~(head->program ^ head->number ^ head->size ^ head->crc);
+}
+
+static kept_head head_at(uint32_t page) {
+  const volatile uint32_t* const at = page_at(page);
+  const kept_head head = {at[0], at[1], at[2], at[3], at[4]};
+  return head;
+}
+
+static void make_room(uint32_t from) {
+  next = from + MOST_PAGES <= PAGES ? from : 0;
+  for (uint32_t page = next; page < next + MOST_PAGES; ++page) {
+    if (!is_blank(page)) flash_erase(page_at(page));
+  }
+  room_end = next + MOST_PAGES;
+  while (room_end < PAGES && is_blank(room_end)) ++room_end;
+}
+
+static void begin_pass(void) {
+  piece_index = 0;
+  offset = 0;
+  size = 0;
+  crc = BUSHD_CRC32_START;
+}
+
+// Some of the next bytes, up to `most`; none at the end of all pieces.
+static bushd_mcu_piece next_bytes(bushd_mcu* mcu, uint32_t most) {
+  bushd_mcu_piece piece = bushd_mcu_kept(mcu, piece_index);
+  while (piece.at != NULL && offset == piece.size) {
+    piece = bushd_mcu_kept(mcu, ++piece_index);
+    offset = 0;
+  }
+  if (piece.at == NULL) return piece;
+  const uint32_t left = piece.size - (uint32_t)offset;
+  const bushd_mcu_piece bytes = {(uint8_t*)piece.at + offset,
+                                 (uint16_t)(left < most ? left : most)};
+  offset = (uint16_t)(offset + bytes.size);
+  size += bytes.size;
+  return bytes;
+}
+
+kept_found kept_find(void) {
+  uint32_t found = 0;  // page
+  for (uint32_t page = 0; page < PAGES; ++page) {
+    const kept_head head = head_at(page);
+    if (head.check != check_of(&head) || head.size > MOST_BYTES) continue;
+    if (newest.number != 0 && (int32_t)(head.number - newest.number) < 0) continue;
+    newest = head;
+    found = page;
+  }
+  begin_pass();
+  make_room(newest.number != 0 ? found + pages_of(newest.size) : 0);
+  if (newest.number == 0 || newest.program != image_seal) return KEPT_NOTHING;
+  content = (const uint8_t*)(uintptr_t)(page_at(found) + HEAD_WORDS);
+  if (bushd_crc32(BUSHD_CRC32_START, content, newest.size) == newest.crc) return KEPT_WHOLE;
+  newest.size = 0;  // what is there will be written again
+  return KEPT_BROKEN;
+}
+
+void kept_load(bushd_mcu* mcu) {
+  for (;;) {
+    const uint32_t from = size;
+    const bushd_mcu_piece bytes = next_bytes(mcu, MOST_BYTES);
+    if (bytes.at == NULL) break;
+    memcpy(bytes.at, content + from, bytes.size);
+  }
+  begin_pass();
+  bushd_mcu_restored(mcu);
+}
+
+// At the end of a pass that only compares.
+static void compare_whole(const bushd_mcu* mcu) {
+  const bool same = newest.program == image_seal && newest.size == size && newest.crc == crc;
+  const bool news = newest.number != 0 || mcu->codes_used != 0;
+  // A master that begins changes one thing after the other.
+  if (crc != planned) planned_uptime = mcu->uptime;
+  const bool quiet = mcu->uptime - planned_uptime >= QUIET_TICKS;
+  const bool room = size <= MOST_BYTES && next + pages_of(size) <= room_end;
+  if (!same && news && quiet && room) phase = WRITES;
+  planned = crc;
+  planned_size = size;
+  begin_pass();
+}
+
+static void compare(bushd_mcu* mcu) {
+  const bushd_mcu_piece bytes = next_bytes(mcu, COMPARED_BYTES);
+  if (bytes.at == NULL) {
+    compare_whole(mcu);
+  } else {
+    crc = bushd_crc32(crc, bytes.at, bytes.size);
+  }
+}
+
+// It has changed meanwhile, or flash is worn.
+static void give_up(void) {
+  next += pages_of(planned_size);
+  phase = COMPARES;
+  begin_pass();
+}
+
+static void write_word(bushd_mcu* mcu) {
+  const uint32_t at = size / 4u;
+  uint32_t word = FLASH_BLANK;
+  uint8_t* const to = (uint8_t*)&word;
+  uint32_t count = 0;
+  for (; count < sizeof word; ++count) {
+    const bushd_mcu_piece byte = next_bytes(mcu, 1);
+    if (byte.at == NULL) break;
+    to[count] = *(const uint8_t*)byte.at;
+  }
+  crc = bushd_crc32(crc, to, count);
+  if (size > planned_size) {
+    give_up();
+  } else if (count != 0) {
+    if (!flash_write(page_at(next) + HEAD_WORDS + at, word)) give_up();
+  } else if (crc == planned && size == planned_size) {
+    phase = ENDS;
+    head_words = 0;
+  } else {
+    give_up();
+  }
+}
+
+static void write_head(void) {
+  kept_head head = {image_seal, newest.number + 1u, size, crc, 0};
+  head.check = check_of(&head);
+  const uint32_t words[HEAD_WORDS] = {head.program, head.number, head.size, head.crc, head.check};
+  if (!flash_write(page_at(next) + head_words, words[head_words])) {
+    give_up();
+  } else if (++head_words == HEAD_WORDS) {
+    newest = head;
+    next += pages_of(size);
+    phase = COMPARES;
+    begin_pass();
+  }
+}
+
+void kept_poll(bushd_mcu* mcu) {
+  switch (phase) {
+    case COMPARES:
+      compare(mcu);
+      break;
+    case WRITES:
+      write_word(mcu);
+      break;
+    case ENDS:
+      write_head();
+      break;
+  }
+}

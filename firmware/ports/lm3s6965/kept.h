@@ -1,0 +1,32 @@
+// Tables, assignments and settings in flash, up to 26 KB of them. While motors stand they are
+// compared with what was written last; what has changed and then stays is written behind that, from
+// the next page on, 20 us a word. Pages are erased at boot only, where nobody minds that the CPU
+// stands for 20 ms.
+//
+// A writing is a head of five words and the content. The head comes last; its check tells that all
+// is there, so one that was cut off counts for nothing, and the one before is in use.
+//     0 image_seal of the program   1 number, counted up   2 size of the content in bytes
+//     3 its CRC-32                  4 check: ~(0 ^ 1 ^ 2 ^ 3)
+//
+// At boot there is made room for one of the largest. When there is none left, what changes is not
+// kept until after the next boot.
+#ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_KEPT_H
+#define BUSHD_FIRMWARE_PORTS_LM3S6965_KEPT_H
+
+#include "firmware/core/mcu.h"
+
+typedef enum kept_found {
+  KEPT_NOTHING,  // or another program's
+  KEPT_WHOLE,
+  KEPT_BROKEN  // a bit has changed
+} kept_found;
+
+// Once, at boot.
+kept_found kept_find(void);
+// Precondition: it is whole, and the MCU has just booted.
+void kept_load(bushd_mcu* mcu);
+
+// Goes on with it, for 20 us at most. Precondition: no motor moves.
+void kept_poll(bushd_mcu* mcu);
+
+#endif

@@ -1,0 +1,150 @@
+// Tables and settings that an image keeps over resets. Its virtual twin keeps nothing.
+#include "conformance/targets.h"
+#include "sim/bus_fixture.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kTickNs = 2'560'000;
+constexpr std::uint8_t kAddress = 2;
+constexpr TimeNs kBootNs = 250'000'000;
+constexpr std::size_t kCodes = 3;
+
+class Kept : public testing::TestWithParam<Target> {
+ protected:
+  Kept() : real_(GetParam().make()), bus_(500'000, &recorder_), master_(bus_) {
+    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+      return real_->make({kAddress, 1, 6}, index, driver, sink);
+    });
+    master_.patience_ns = 20'000'000;  // the CRC of a long table takes a while
+    pass(kBootNs);
+  }
+  void TearDown() override { real_->expect_unharmed(); }
+
+  void pass(TimeNs ns) { bus_.advance_to(bus_.now_ns() + ns); }
+  void reboot() {
+    bus_.reboot(0);
+    pass(kBootNs);
+  }
+
+  void make_ready() {
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+    ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, {400, 300, 200}, 150));
+    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
+  }
+
+  bushd_tables tables() {
+    bushd_tables told{};
+    const auto reply = master_.request(kAddress, BUSHD_MSG_TABLES);
+    EXPECT_TRUE(reply);
+    if (reply) {
+      EXPECT_EQ(bushd_decode_tables(reply->payload.data(), reply->payload.size(), &told), BUSHD_OK);
+    }
+    return told;
+  }
+  std::size_t valid_tables() {
+    const bushd_tables told = tables();
+    return static_cast<std::size_t>(
+        std::count_if(std::begin(told.slot), std::end(told.slot), [](auto& t) { return t.valid; }));
+  }
+
+  template <class Message>
+  bushd_status ask(bushd_type type, std::size_t (*encode)(const Message*, std::uint8_t*),
+                   const Message& message) {
+    return master_.acknowledged(kAddress, type, encode, message);
+  }
+  std::size_t steps_made(std::uint8_t motor) const {
+    return recorder_.times(0, Signal::kStep, motor, true).size();
+  }
+
+  const std::unique_ptr<McuUnderTest> real_;
+  Recorder recorder_;
+  Bus bus_;
+  Master master_;
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Kept);
+INSTANTIATE_TEST_SUITE_P(Of, Kept, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(Kept, TablesAndSettingsOutliveAReset) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  std::vector<std::uint16_t> ramp;
+  while (ramp.size() < 900) ramp.push_back(static_cast<std::uint16_t>(2000 - ramp.size()));
+  ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp, 1100));
+  bushd_set_inputs inputs{};
+  inputs.system_inverted = BUSHD_INPUT_FORWARD;
+  ASSERT_EQ(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs), BUSHD_OK);
+  const bushd_tables before = tables();
+  pass(real_->keeps_within_ns(ramp.size()));
+  reboot();
+  const bushd_tables after = tables();
+  for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
+    EXPECT_EQ(after.slot[slot].valid, slot == 0 || slot == 5);
+    EXPECT_EQ(after.slot[slot].crc, before.slot[slot].crc);
+    EXPECT_EQ(after.slot[slot].revision, before.slot[slot].revision);
+  }
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, 0);
+  EXPECT_EQ(report.system_inputs, BUSHD_INPUT_FORWARD);
+
+  // And they move motors.
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
+  const bushd_table_run_entry entry{3, 0, 1, 50};
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(
+      bushd_encode_table_run(0, master_.poll(kAddress).tick + 24, &entry, 1, payload.data()));
+  master_.send(kAddress, BUSHD_MSG_TABLE_RUN, payload);
+  pass(200 * TimeNs{kTickNs});
+  EXPECT_EQ(steps_made(3), 50u);
+}
+
+TEST_P(Kept, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 3}), BUSHD_OK);
+  pass(real_->keeps_within_ns(kCodes));
+  reboot();
+  bus_.node(0).set_inputs({0, BUSHD_INPUT_REVERSE});
+  pass(100 * TimeNs{kTickNs});
+  const std::size_t held = steps_made(3);
+  EXPECT_GT(held, 100u) << "1.5 ms a step";
+  bus_.node(0).set_inputs({0, 0});
+  pass(20 * TimeNs{kTickNs});
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.moving, 0);
+  EXPECT_EQ(report.motor[3].position_steps, -static_cast<std::int32_t>(steps_made(3)));
+  EXPECT_LT(steps_made(3), held + 10);
+  EXPECT_EQ(steps_made(4), 0u);
+}
+
+TEST_P(Kept, WhatIsTheSameIsNotWrittenAgain) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  const std::uint64_t written = real_->kept_writes();
+  EXPECT_GT(written, 20u);
+  pass(real_->keeps_within_ns(kCodes));
+  EXPECT_EQ(real_->kept_writes(), written);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  EXPECT_EQ(real_->kept_writes(), written);
+}
+
+TEST_P(Kept, ABitThatHasFlippedIsAFault) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  real_->flip_kept_bit();
+  reboot();
+  EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM);
+  EXPECT_EQ(valid_tables(), 0u);
+  // It is mended when there is something to keep again.
+  ASSERT_EQ(ask(BUSHD_MSG_CONTROL, bushd_encode_control, bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
+            BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  reboot();
+  EXPECT_EQ(master_.poll(kAddress).faults, 0);
+  EXPECT_EQ(valid_tables(), 1u);
+}
+
+}  // namespace
+}  // namespace bushd::sim
