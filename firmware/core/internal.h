@@ -83,7 +83,13 @@ void bushd_mcu_take_fine_row(int16_t* queued, int16_t* displacement, uint8_t mot
                              bushd_mcu_row* row);
 void bushd_mcu_take_coarse_row(int16_t* queued, int16_t* steps, uint8_t motors, bushd_mcu_row* row);
 
+// Adds its steps to the counter of each motor; the counters lie `stride` bytes apart. A small MCU
+// may link one of its own (BUSHD_OWN_ADD_STEPS).
+void bushd_mcu_add_steps(int32_t* counter, size_t stride, const int16_t* steps, uint8_t motors);
+
 // motor.c: what motors do in the tick that is prepared, and how they stop by themselves.
+// Makes the outlook from this tick on, the first that is not prepared.
+void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick);
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane);
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message);
 // When a run from rest is over, in ticks; false if that is farther than tick numbers reach.

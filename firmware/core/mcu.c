@@ -90,15 +90,20 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   bushd_mcu_update_state(mcu);
 }
 
+#ifndef BUSHD_OWN_ADD_STEPS
+void bushd_mcu_add_steps(int32_t* counter, size_t stride, const int16_t* steps, uint8_t motors) {
+  for (; motors > 0; --motors, counter = (int32_t*)(void*)((char*)counter + stride)) {
+    // Unsigned: the counter may be set to any value, and then wraps.
+    *counter = (int32_t)((uint32_t)*counter + (uint32_t)*steps++);
+  }
+}
+#endif
+
 const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   const bushd_plane* ended = &mcu->plane[mcu->front];
   if (ended->active != 0) {
-    const int16_t* steps = ended->steps;
-    bushd_mcu_motor* motor = mcu->motor;
-    for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor) {
-      // Unsigned: the counter may be set to any value, and then wraps.
-      motor->position_steps = (int32_t)((uint32_t)motor->position_steps + (uint32_t)*steps++);
-    }
+    bushd_mcu_add_steps(&mcu->motor[0].position_steps, sizeof mcu->motor[0], ended->steps,
+                        mcu->config.motors);
   }
   mcu->front ^= 1u;
   ++mcu->tick;

@@ -208,8 +208,9 @@ typedef struct bushd_mcu_outlook {
   bool stale;
   uint16_t plain;         // of these nothing but the queue decides, until:
   uint32_t plain_until;   // that tick
-  bool moves;             // motors are to move on when their ticks end, the first of them at:
+  uint16_t moves;         // these are to move on when their ticks end, the first of them at:
   uint32_t moving_until;  // that tick
+  uint16_t following;     // those that are plain and move on at plain_until, without an island
 } bushd_mcu_outlook;
 
 // Rows of a frame that are still to be put into the queue. It was taken, and lies in the receiver.

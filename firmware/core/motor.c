@@ -96,9 +96,11 @@ static inline bool in_run_at(bushd_mcu_motor* motor, uint32_t tick) {
   return motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->run_from) >= 0;
 }
 
-static void look_out(bushd_mcu* mcu, uint32_t tick) {
+void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
   bushd_mcu_outlook* outlook = &mcu->outlook;
   uint16_t plain = 0;
+  uint16_t following = 0;
+  uint16_t moves = 0;
   int32_t plain_ticks = INT32_MAX;
   int32_t moving_ticks = INT32_MAX;
   uint16_t bit = 1;
@@ -106,21 +108,28 @@ static void look_out(bushd_mcu* mcu, uint32_t tick) {
     const bushd_mcu_motor* motor = &mcu->motor[m];
     const int32_t known_ticks = ticks_after(motor->known_until, tick);
     if (known_ticks <= 0) continue;
-    if (motor->delay != 0 && known_ticks < moving_ticks) moving_ticks = known_ticks;
+    if (motor->delay != 0) {
+      moves |= bit;
+      if (known_ticks < moving_ticks) moving_ticks = known_ticks;
+    }
     if (motor->mode != BUSHD_MCU_STREAM) continue;
     plain |= bit;
-    if (known_ticks < plain_ticks) plain_ticks = known_ticks;
+    if (known_ticks > plain_ticks) continue;
+    if (known_ticks < plain_ticks) following = 0;
+    plain_ticks = known_ticks;
+    if (motor->delay != 0 && !has_island(motor)) following |= bit;
   }
   outlook->stale = false;
   outlook->plain = plain;
+  outlook->following = following;
   outlook->plain_until = tick + (uint32_t)plain_ticks;
-  outlook->moves = moving_ticks != INT32_MAX;
+  outlook->moves = moves;
   outlook->moving_until = tick + (uint32_t)moving_ticks;
 }
 
 // Of motors that are to move on when their queued ticks end.
 static void watch_low_water(bushd_mcu* mcu) {
-  if (!mcu->outlook.moves) return;
+  if (mcu->outlook.moves == 0) return;
   const int32_t queued = ticks_after(mcu->outlook.moving_until, FIRST_OPEN(mcu));
   if (queued < mcu->low_water_ticks) mcu->low_water_ticks = queued > 0 ? (uint16_t)queued : 0;
 }
@@ -179,22 +188,13 @@ static bool displacement_of(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t* d
   return true;
 }
 
-static uint16_t all_motors(const bushd_mcu* mcu) {
-  return (uint16_t)((uint32_t)motor_bit((uint8_t)(mcu->config.motors - 1u)) * 2u - 1u);
-}
-
-// What motors do in this tick, in steps if it is a coarse one, else in 1/256 step. Returns those
-// whose steps are those of a run.
-static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
+// Changes what motors do whose steps the queue alone does not decide. Not inlined, like what else
+// few ticks need: in one function with what all do it would cost those their registers.
+__attribute__((noinline)) static uint16_t find_others(bushd_mcu* mcu, uint16_t others,
+                                                      int16_t* values, bushd_mcu_row* row) {
   const uint32_t tick = mcu->tick + 1u;
   const bool fine = mcu->format == BUSHD_FORMAT_FINE;
-  bushd_mcu_outlook* outlook = &mcu->outlook;
-  if (outlook->stale || ticks_after(tick, outlook->plain_until) >= 0) look_out(mcu, tick);
-  (fine ? bushd_mcu_take_fine_row : bushd_mcu_take_coarse_row)(queue_at(mcu, tick, 0), values,
-                                                               mcu->config.motors, row);
-  follow_begun(mcu, outlook->plain, row->moves, tick);
   uint16_t exact = 0;
-  uint16_t others = all_motors(mcu) & (uint16_t)~outlook->plain;
   for (uint8_t m = 0; others != 0; ++m, others = (uint16_t)(others >> 1)) {
     if ((others & 1u) == 0) continue;
     const uint16_t bit = motor_bit(m);
@@ -209,12 +209,30 @@ static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
     if (displacement != 0) row->moves |= bit;
     if (displacement < 0) row->back |= bit;
   }
+  return exact;
+}
+
+// What motors do in this tick, in steps if it is a coarse one, else in 1/256 step. Returns those
+// whose steps are those of a run.
+static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
+  const uint32_t tick = mcu->tick + 1u;
+  bushd_mcu_outlook* outlook = &mcu->outlook;
+  if (outlook->stale || ticks_after(tick, outlook->plain_until) >= 0) bushd_mcu_look_out(mcu, tick);
+  int16_t* const queued = queue_at(mcu, tick, 0);
+  if (mcu->format == BUSHD_FORMAT_FINE) {
+    bushd_mcu_take_fine_row(queued, values, mcu->config.motors, row);
+  } else {
+    bushd_mcu_take_coarse_row(queued, values, mcu->config.motors, row);
+  }
+  follow_begun(mcu, outlook->plain, row->moves, tick);
+  const uint16_t others = own_motors(mcu) & (uint16_t)~outlook->plain;
+  const uint16_t exact = others != 0 ? find_others(mcu, others, values, row) : (uint16_t)0;
   watch_low_water(mcu);
   return exact;
 }
 
-static void plan_fine(bushd_mcu* mcu, bushd_plane* plane, const int16_t* displacement,
-                      uint16_t exact) {
+__attribute__((noinline)) static void plan_fine(bushd_mcu* mcu, bushd_plane* plane,
+                                                const int16_t* displacement, uint16_t exact) {
   bushd_slots plans[BUSHD_MOTORS_PER_MCU];
   uint16_t bit = 1;
   for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {

@@ -290,7 +290,11 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   a.size = 0;
   a.payload = mcu->reply + 2 + BUSHD_FRAME_HEADER;
   const bushd_status status = handle(mcu, frame, time_in_tick_ns, &a);
-  mcu->outlook.stale = true;
+  // Ticks look to it themselves; these two change nothing that it tells.
+  if (frame->type != BUSHD_MSG_TICKS && frame->type != BUSHD_MSG_POLL &&
+      frame->type != BUSHD_MSG_SYNC) {
+    mcu->outlook.stale = true;
+  }
   if (status != BUSHD_OK) bushd_mcu_reject(mcu, status);
   if (!a.due) return;
   if (a.size == 0) {

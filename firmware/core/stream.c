@@ -253,16 +253,10 @@ static void put_column(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stret
 
 // What frames do to most motors: their ticks follow what is known, and nothing waits beyond.
 static bool all_follow(const bushd_mcu* mcu, const bushd_ticks* ticks) {
-  if ((ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE)) != 0) return false;
-  const bushd_mcu_motor* motor = mcu->motor;
-  uint16_t mask = ticks->mask;
-  for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor, mask = (uint16_t)(mask >> 1)) {
-    if ((mask & 1u) != 0 && (motor->known_until != ticks->first_tick || motor->delay == 0 ||
-                             has_island(motor) || motor->table < 0)) {
-      return false;
-    }
-  }
-  return mask == 0;
+  const bushd_mcu_outlook* outlook = &mcu->outlook;
+  return (ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE)) == 0 && !outlook->stale &&
+         ticks->first_tick == outlook->plain_until &&
+         (ticks->mask & (uint16_t)~outlook->following) == 0;
 }
 
 static void put_row(bushd_mcu* mcu) {
@@ -286,14 +280,17 @@ static void put_row(bushd_mcu* mcu) {
 }
 
 bool bushd_mcu_work(bushd_mcu* mcu) {
+  if (mcu->outlook.stale) {
+    bushd_mcu_look_out(mcu, FIRST_OPEN(mcu));
+    return true;
+  }
   if (mcu->rows.next >= mcu->rows.ticks.count) return false;
   put_row(mcu);
   return true;
 }
 
 void bushd_mcu_finish_rows(bushd_mcu* mcu) {
-  while (bushd_mcu_work(mcu)) {
-  }
+  while (mcu->rows.next < mcu->rows.ticks.count) put_row(mcu);
 }
 
 void bushd_mcu_finish_row(bushd_mcu* mcu, uint32_t tick) {
@@ -313,13 +310,23 @@ static void follow(bushd_mcu* mcu, const bushd_ticks* ticks) {
   const uint32_t end = ticks->first_tick + ticks->count;
   const uint8_t* delay = ticks->delays;
   bushd_mcu_motor* motor = mcu->motor;
+  uint16_t moves = 0;
+  uint16_t bit = 1;
   for (uint16_t mask = ticks->mask; mask != 0; mask = (uint16_t)(mask >> 1), ++motor) {
-    if ((mask & 1u) == 0) continue;
-    motor->known_until = end;
-    motor->delay = bushd_get_u16(delay);
-    delay += 2;
+    if ((mask & 1u) != 0) {
+      motor->known_until = end;
+      motor->delay = bushd_get_u16(delay);
+      if (motor->delay != 0) moves |= bit;
+      delay += 2;
+    }
+    bit = (uint16_t)(bit << 1);
   }
   put_rows_later(mcu, ticks);
+  bushd_mcu_outlook* outlook = &mcu->outlook;
+  // Mostly these are all that there are.
+  outlook->stale = ((outlook->plain | outlook->moves) & (uint16_t)~ticks->mask) != 0;
+  outlook->plain_until = outlook->moving_until = end;
+  outlook->moves = outlook->following = moves;
 }
 
 // True if all rows are new to all motors of the mask.
@@ -349,6 +356,7 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
     follow(mcu, ticks);
     return BUSHD_OK;
   }
+  mcu->outlook.stale = true;
   const bool all_new = open_motors(mcu, &stretch);
   uint8_t column = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {

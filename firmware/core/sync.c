@@ -180,14 +180,9 @@ static int32_t rate_share_ns(bushd_mcu_clock* clock) {
   return -whole_ns;
 }
 
-void bushd_mcu_slew(bushd_mcu* mcu) {
+// Gives the next tick its share of what is known.
+__attribute__((noinline)) static void adjust_next(bushd_mcu* mcu) {
   bushd_mcu_clock* clock = &mcu->clock;
-  if (clock->settling != 0) --clock->settling;
-  if (clock->two_masters_ticks != 0 && --clock->two_masters_ticks == 0) {
-    mcu->flags &= (uint8_t)~BUSHD_FLAG_TWO_MASTERS;
-  }
-  clock->slew_now_ns = clock->slew_next_ns;
-  clock->rate_now_ns = clock->rate_next_ns;
   clock->rate_next_ns = rate_share_ns(clock);
   int32_t step_ns = clock->behind_ns;
   if (step_ns != 0) {
@@ -200,6 +195,19 @@ void bushd_mcu_slew(bushd_mcu* mcu) {
   clock->slew_next_ns = -step_ns;
   const int32_t longer_ns = clock->slew_next_ns + clock->rate_next_ns;
   if (longer_ns != 0) mcu->port.adjust_tick(mcu->port.context, longer_ns);
+}
+
+void bushd_mcu_slew(bushd_mcu* mcu) {
+  bushd_mcu_clock* clock = &mcu->clock;
+  if (clock->settling != 0) --clock->settling;
+  if (clock->two_masters_ticks != 0 && --clock->two_masters_ticks == 0) {
+    mcu->flags &= (uint8_t)~BUSHD_FLAG_TWO_MASTERS;
+  }
+  clock->slew_now_ns = clock->slew_next_ns;
+  clock->rate_now_ns = clock->rate_next_ns;
+  const int32_t any = clock->slew_next_ns | clock->rate_next_ns | clock->behind_ns |
+                      clock->rate_step | clock->rate_fraction;
+  if (any != 0) adjust_next(mcu);
 }
 
 void bushd_mcu_new_tick_length(bushd_mcu* mcu) {

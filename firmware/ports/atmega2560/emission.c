@@ -40,18 +40,21 @@ uint32_t emission_next_start;
 // Of ticks of few slots: no pulses, or the levels that the plane before has left.
 static uint16_t idle_masks[MAX_EMPTY_SLOTS];
 
-typedef struct tick_length {
-  uint32_t cycles;
+// A tick, and what its length is made of.
+typedef struct prepared_tick {
+  emission_tick tick;
   uint16_t residue;  // 1/1000 cycles that it is too short
   int32_t extra_ns;  // longer than a plain tick
-} tick_length;
+} prepared_tick;
 
 // Of the main loop.
-static emission_tick prepared[2];  // one of them waits or was taken last
-static uint8_t spare;
-static const bushd_plane* next_plane;
-static tick_length next_length;
-static tick_length plain;    // without adjustment, from residue 0
+static prepared_tick prepared[2];
+static prepared_tick* given = &prepared[0];  // waits or was taken last
+static prepared_tick* spare = &prepared[1];
+static const bushd_plane* next_plane;  // NULL: the core's present tick has the last one
+// Of a tick without adjustment, from residue 0.
+static uint32_t plain_cycles;
+static uint16_t plain_residue;
 static uint32_t core_start;  // of the core's present tick
 static int32_t adjust_ns;    // of the next tick
 static int32_t carry_ns;     // adjustments that came when the tick they were for had begun
@@ -72,7 +75,8 @@ static uint8_t begun_flags(uint8_t outputs) {
 }
 
 static void set_plane(emission_tick* tick, const bushd_plane* plane, uint32_t cycles) {
-  const uint16_t slot = (uint16_t)(cycles / EMISSION_SLOTS);
+  // By 128; shifting bit by bit takes longer.
+  const uint16_t slot = (uint16_t)((cycles << 1) >> 8);
   set_masks(tick, plane->step, EMISSION_SLOTS);
   tick->direction = plane->direction;
   tick->top = (uint16_t)(slot - 1u);
@@ -95,47 +99,49 @@ static void set_empty(emission_tick* tick, uint16_t direction, uint8_t begun, ui
   tick->begun = begun;
 }
 
-static tick_length length_of(uint32_t tick_ns) {
-  const uint32_t parts = tick_ns * CYCLES_PER_US;
-  const tick_length length = {parts / 1000u, (uint16_t)(parts % 1000u), 0};
-  return length;
+// The cycles that the tick is longer or shorter than a plain one; `parts`, in 1/1000, is what is
+// left.
+__attribute__((noinline)) static int32_t split(int32_t* parts) {
+  int32_t cycles = *parts / 1000;
+  if (cycles * 1000 > *parts) --cycles;
+  *parts -= cycles * 1000;
+  return cycles;
 }
 
-// Divides only what a tick differs by.
-static tick_length length_of_next(void) {
-  tick_length length = plain;
-  length.extra_ns = adjust_ns + carry_ns;
-  int32_t parts = length.extra_ns * (int32_t)CYCLES_PER_US + plain.residue + residue;
-  if (parts < 0 || parts >= 2000) {
-    int32_t cycles = parts / 1000;
-    if (cycles * 1000 > parts) --cycles;
-    length.cycles += (uint32_t)cycles;
-    parts -= cycles * 1000;
+// Returns the tick's cycles.
+static uint32_t set_length(prepared_tick* next) {
+  uint32_t cycles = plain_cycles;
+  const int32_t extra_ns = adjust_ns + carry_ns;
+  next->extra_ns = extra_ns;
+  uint16_t parts = plain_residue + residue;
+  if (extra_ns != 0) {
+    int32_t all = extra_ns * (int32_t)CYCLES_PER_US + parts;
+    cycles += (uint32_t)split(&all);
+    parts = (uint16_t)all;
   } else if (parts >= 1000) {
-    ++length.cycles;
+    ++cycles;
     parts -= 1000;
   }
-  length.residue = (uint16_t)parts;
-  return length;
+  next->residue = parts;
+  return cycles;
 }
 
 // `again`: in place of the one that waits; not if it was taken.
-static void give(tick_length length, bool again) {
-  emission_tick* const tick = &prepared[spare];
+static void give(bool again) {
+  prepared_tick* const next = spare;
+  const uint32_t cycles = set_length(next);
   // Levels are written anew in every slot.
   if (next_plane->active != 0 || next_plane->outputs == BUSHD_OUTPUTS_LEVELS) {
-    set_plane(tick, next_plane, length.cycles);
+    set_plane(&next->tick, next_plane, cycles);
   } else {
-    set_empty(tick, next_plane->direction, 1 << TICK_CHANGES, length.cycles);
+    set_empty(&next->tick, next_plane->direction, 1 << TICK_CHANGES, cycles);
   }
-  bool given = false;
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    given = !again || emission_next != &emission_silent;
-    if (given) emission_next = tick;
+    if (again && emission_next == &emission_silent) return;
+    emission_next = &next->tick;
   }
-  if (!given) return;
-  next_length = length;
-  spare ^= 1u;
+  spare = given;
+  given = next;
 }
 
 void emission_start(void) {
@@ -157,8 +163,8 @@ void emission_start(void) {
 
 void emission_ready(const bushd_plane* plane) {
   next_plane = plane;
-  given_start = core_start + next_length.cycles;
-  give(length_of_next(), false);
+  given_start = core_start + given->tick.cycles;
+  give(false);
 }
 
 bool emission_begun(void) {
@@ -176,9 +182,10 @@ static void hold_levels(void) {
 
 void emission_swap(void) {
   hold_levels();
+  next_plane = NULL;
   core_start = emission_begun_at;
-  residue = next_length.residue;
-  carry_ns += adjust_ns - next_length.extra_ns;
+  residue = given->residue;
+  carry_ns += adjust_ns - given->extra_ns;
   adjust_ns = 0;
   emission_committed = 0;
 }
@@ -188,18 +195,20 @@ int32_t emission_time_in_tick_ns(uint32_t time) {
 }
 
 uint32_t emission_slot_time(uint16_t slot) {
-  return given_start + slot * (next_length.cycles / EMISSION_SLOTS);
+  return given_start + slot * (given->tick.cycles / EMISSION_SLOTS);
 }
 
 static void change_length(void) {
-  if (next_plane != NULL) give(length_of_next(), true);
+  if (next_plane != NULL) give(true);
 }
 
 void emission_set_tick(uint32_t ns) {
-  plain = length_of(ns);
+  const uint32_t parts = ns * CYCLES_PER_US;
+  plain_cycles = parts / 1000u;
+  plain_residue = (uint16_t)(parts % 1000u);
   emission_tick silent;
   set_empty(&silent, emission_silent.direction, emission_silent.begun | 1 << TICK_CHANGES,
-            plain.cycles);
+            plain_cycles);
   // Not while the interrupts read it.
   bool set = false;
   do {

@@ -18,11 +18,9 @@
 #define SHORTEST_CYCLES 64UL
 #define TURN_CYCLES 30000UL
 
-// Filled by line_interrupts.S. Indices of bytes wrap with their type.
+// Filled by line_interrupts.S.
 // At the end of RAM (CMakeLists.txt), above the stack.
 uint8_t line_bytes[256] __attribute__((section(".line_bytes,\"aw\",@nobits;")));
-volatile uint8_t line_in;
-volatile uint8_t line_out;
 volatile uint16_t line_stamps[LINE_DELIMITERS];
 volatile uint8_t line_stamps_in;
 static uint8_t stamps_out;
@@ -53,6 +51,7 @@ ISR(TIMER3_COMPA_vect, ISR_NOBLOCK) {
 }
 
 void line_init(void) {
+  LINE_IN = LINE_OUT = 0;
   TCCR3B = 1 << CS30;
   UCSR0A = 1 << U2X0;
   UBRR0H = (uint8_t)(DIVISOR >> 8);
@@ -70,8 +69,8 @@ static bool delimiter_time(uint32_t* time) {
 
 // At most so many bytes at a time: the main loop has a tick to prepare too.
 static void collect(bushd_receiver* receiver) {
-  uint8_t out = line_out;
-  uint8_t left = (uint8_t)(line_in - out);
+  uint8_t out = LINE_OUT;
+  uint8_t left = (uint8_t)(LINE_IN - out);
   if (left > CHECK_BYTES) left = CHECK_BYTES;
   if (left != 0 && receiver->size + left <= sizeof receiver->buffer) {
     uint8_t* to = receiver->buffer + receiver->size;
@@ -80,13 +79,13 @@ static void collect(bushd_receiver* receiver) {
   } else {
     for (; left > 0 && bushd_receiver_collect(receiver, line_bytes[out]); --left) ++out;
   }
-  line_out = out;
+  LINE_OUT = out;
   if ((uint16_t)(receiver->size - receiver->checked) > CHECK_BYTES) bushd_receiver_check(receiver);
 }
 
 bool line_collect(bushd_receiver* receiver, uint32_t* time) {
   collect(receiver);
-  if (line_out == line_in || line_bytes[line_out] != 0) return false;
+  if (LINE_OUT == LINE_IN || line_bytes[LINE_OUT] != 0) return false;
   // Without it, it is not taken for a delimiter.
   if (!delimiter_time(time)) *time = clock_now();
   return true;
@@ -95,7 +94,7 @@ bool line_collect(bushd_receiver* receiver, uint32_t* time) {
 uint8_t line_take(void) {
   const bool has_time = delimiter_time(&last_delimiter);
   ++stamps_out;
-  line_out = (uint8_t)(line_out + 1u);
+  LINE_OUT = (uint8_t)(LINE_OUT + 1u);
   // Without its time a delimiter is no more than a wrong byte.
   return has_time ? 0 : 1;
 }

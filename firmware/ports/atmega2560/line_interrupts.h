@@ -5,13 +5,16 @@
 // Frames that may wait while a tick is prepared.
 #define LINE_DELIMITERS 16
 
+// Of line_bytes: where the next one goes, and the first that was not taken. They wrap.
+// GPIOR2 holds the reset cause before that (boot_tests.h).
+#define LINE_IN GPIOR1
+#define LINE_OUT GPIOR2
+
 #ifndef __ASSEMBLER__
 
 #include <stdint.h>
 
 extern uint8_t line_bytes[256];  // at a multiple of 256
-extern volatile uint8_t line_in;
-extern volatile uint8_t line_out;
 // When delimiters came (clock_at), each at its number modulo LINE_DELIMITERS. `in` counts those
 // among the bytes.
 extern volatile uint16_t line_stamps[LINE_DELIMITERS];

@@ -1,8 +1,9 @@
-; void bushd_mcu_take_coarse_row(int16_t* queued, int16_t* steps, uint8_t motors, bushd_mcu_row* row), of sixteen motors. The
-; low bytes of what is queued are 0.
+; What is done for every motor in a tick; there are sixteen.
 
     .text
 
+; void bushd_mcu_take_coarse_row(int16_t* queued, int16_t* steps, uint8_t motors, bushd_mcu_row* row). The low bytes of what is
+; queued are 0.
     .global bushd_mcu_take_coarse_row
 bushd_mcu_take_coarse_row:
     movw r26, r24
@@ -29,3 +30,40 @@ bushd_mcu_take_coarse_row:
     std Z+2, r22
     std Z+3, r23
     ret
+
+; void bushd_mcu_add_steps(int32_t* counter, size_t stride, const int16_t* steps, uint8_t motors). A motor makes fewer than 256
+; steps in a tick.
+    .global bushd_mcu_add_steps
+bushd_mcu_add_steps:
+    movw r30, r24
+    movw r26, r20
+1:
+    ld r20, X+
+    ld r21, X+
+    ld r24, Z
+    ldd r25, Z+1
+    add r24, r20
+    adc r25, r21
+    st Z, r24
+    std Z+1, r25
+    ; The carry, and what the sign adds beyond: mostly they make up for each other.
+    sbc r19, r19
+    cpse r19, r21
+    rjmp 3f
+2:
+    add r30, r22
+    adc r31, r23
+    dec r18
+    brne 1b
+    ret
+3:
+    ldd r24, Z+2
+    ldd r25, Z+3
+    ; Up with a carry, down without one.
+    sub r24, r19
+    sbc r25, r19
+    add r24, r21
+    adc r25, r21
+    std Z+2, r24
+    std Z+3, r25
+    rjmp 2b

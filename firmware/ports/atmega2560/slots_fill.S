@@ -1,4 +1,4 @@
-; The inner loops of slots_fill.c. A motor's phase is changed by the same amount every slot, and where it
+; The inner loop of slots_fill.c. A motor's phase is changed by the same amount every slot, and where it
 ; overflows is its step; the carry is shifted into the slot's mask. Eight motors, motor 0 in bit 0; masks lie
 ; two bytes apart. r28 is the mask.
 
@@ -18,11 +18,6 @@
     clr r1
     .endm
 
-    .macro coarse phase, step
-    add r\phase, r\step
-    ror r28
-    .endm
-
     .macro fine low, high, step_low, step_high
     sub r\low, r\step_low
     sbc r\high, r\step_high
@@ -37,40 +32,6 @@
     .endm
 
     .text
-
-; void slots_fill_coarse(uint8_t* masks, const uint8_t step[8])
-    .global slots_fill_coarse
-slots_fill_coarse:
-    save
-    movw r26, r22
-    movw r30, r24
-    .irp register, 16, 17, 18, 19, 20, 21, 22, 23
-    ld r\register, X+
-    .endr
-    ldi r28, 127
-    .irp register, 0, 1, 10, 11, 12, 13, 14, 15
-    mov r\register, r28
-    .endr
-    ldi r29, SLOTS / 4
-1:
-    .irp offset, 0, 2, 4, 6
-    coarse 0, 16
-    coarse 1, 17
-    coarse 10, 18
-    coarse 11, 19
-    coarse 12, 20
-    coarse 13, 21
-    coarse 14, 22
-    coarse 15, 23
-    std Z+\offset, r28
-    .endr
-    adiw r30, 8
-    dec r29
-    breq 2f
-    rjmp 1b
-2:
-    restore
-    ret
 
 ; void slots_fill_fine(uint8_t* masks, const slots_phase motor[8])
     .global slots_fill_fine

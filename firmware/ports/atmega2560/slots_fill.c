@@ -1,12 +1,9 @@
-// bushd_slots_fill and its like for 128 slots and 16 motors, in the same time however many steps
-// there are. With T the crossing of a step, in 1/256 of a motor's distance d a slot, it is the step
-// of slot
+// bushd_slots_fill for 128 slots and 16 motors, in the same time however many steps there are. With
+// T the crossing of a step, in 1/256 of a motor's distance d a slot, it is the step of slot
 //
 //     floor(T / 2d),   T = 256 (first + 256 i)
 //
-// In the fine format T is counted down by 2d a slot, modulo 2^16, and borrows are steps. Steps of
-// coarse ticks lie at (256 i + 128) / 2c: a phase of 8 bits that begins at 127 and grows by 2c
-// carries there.
+// T is counted down by 2d a slot, modulo 2^16, and borrows are steps.
 #include "engine/slots.h"
 #include "firmware/ports/atmega2560/emission.h"
 
@@ -16,7 +13,6 @@ typedef struct slots_phase {
 } slots_phase;
 
 // slots_fill.S
-void slots_fill_coarse(uint8_t* masks, const uint8_t step[8]);
 void slots_fill_fine(uint8_t* masks, const slots_phase motor[8]);
 
 static void fill_fine(uint8_t* masks, const bushd_slots* plans) {
@@ -59,26 +55,6 @@ void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* p
     for (uint8_t m = 0; m < 8; ++m) moves = moves || eight[m].distance != 0;
     if (moves) {
       fill_fine(bytes, eight);
-    } else {
-      clear(bytes);
-    }
-  }
-}
-
-void bushd_slots_fill_evenly(uint16_t* masks, uint16_t slot_count, const int16_t* steps,
-                             uint8_t motors) {
-  (void)slot_count;
-  (void)motors;
-  for (uint8_t half = 0; half < 2; ++half, steps += 8) {
-    uint8_t* const bytes = (uint8_t*)masks + half;
-    uint8_t twice[8];
-    uint8_t moves = 0;
-    for (uint8_t m = 0; m < 8; ++m) {
-      twice[m] = (uint8_t)((uint8_t)(steps[m] < 0 ? -steps[m] : steps[m]) << 1);
-      moves |= twice[m];
-    }
-    if (moves != 0) {
-      slots_fill_coarse(bytes, twice);
     } else {
       clear(bytes);
     }
