@@ -30,7 +30,8 @@ static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
   bushd_mcu_homing* homing = &mcu->homing;
   homing->stage = (uint8_t)stage;
   homing->readings = 0;
-  bushd_run_start(&mcu->motor[homing->motor].run, &homing->slow, homing->slow_steps, direction);
+  bushd_run_start(&mcu->motor[homing->motor].made.run, &homing->slow, homing->slow_steps,
+                  direction);
 }
 
 static void end(bushd_mcu* mcu, bushd_homing stage) {
@@ -71,7 +72,7 @@ static void watch_silence(bushd_mcu* mcu) {
 
 static void go_on(bushd_mcu* mcu, bool active) {
   bushd_mcu_homing* homing = &mcu->homing;
-  bushd_run* run = &mcu->motor[homing->motor].run;
+  bushd_run* run = &mcu->motor[homing->motor].made.run;
   const bool done = bushd_run_done(run);
   switch (homing->stage) {
     case BUSHD_HOMING_FAST:
@@ -164,10 +165,9 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   homing->direction = message->direction;
   homing->slow_steps = message->slow_steps;
   homing->home_steps = message->position_steps;
-  homing->slow_code = message->slow_delay;
-  homing->slow.accel.code = homing->slow.decel.code = &homing->slow_code;
-  homing->slow.accel.count = homing->slow.decel.count = 1;
   homing->slow.cruise = message->slow_delay;
+  homing->slow.accel.code = homing->slow.decel.code = &homing->slow.cruise;
+  homing->slow.accel.count = homing->slow.decel.count = 1;
   homing->slow.time_unit_ns = BUSHD_HOME_UNIT_NS;
   const uint16_t bit = motor_bit(message->motor);
   mcu->homed &= (uint16_t)~bit;

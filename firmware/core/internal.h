@@ -38,10 +38,6 @@ static inline int16_t* queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t motor) {
   return &mcu->config.queue[(size_t)row * mcu->config.motors + motor];
 }
 
-static inline bool has_island(const bushd_mcu_motor* motor) {
-  return motor->island.from != motor->island.until;
-}
-
 // mcu.c
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu);
 // These, and motors that wait for the trigger: what a resting motor may be asked must wait too.

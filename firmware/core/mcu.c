@@ -42,12 +42,15 @@ void bushd_mcu_update_state(bushd_mcu* mcu) {
 // The engine against known answers: a wrong compiler, a broken flash cell or bad RAM shows here
 // before a motor can move by it.
 static bool engine_self_test(bushd_mcu* mcu) {
-  static const uint8_t kDigits[9] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
-  static const uint16_t kCodes[3] = {4, 3, 2};
-  if (~bushd_crc32(BUSHD_CRC32_START, kDigits, sizeof kDigits) != 0xCBF43926) return false;
+  // Not as constants, which would take RAM for good on some MCUs.
+  uint8_t digits[9];
+  for (uint8_t i = 0; i < sizeof digits; ++i) digits[i] = (uint8_t)('1' + i);
+  if (~bushd_crc32(BUSHD_CRC32_START, digits, sizeof digits) != 0xCBF43926) return false;
+  uint16_t codes[3];
+  for (uint8_t i = 0; i < 3; ++i) codes[i] = (uint16_t)(4u - i);
   bushd_table table;
   memset(&table, 0, sizeof table);
-  table.accel.code = kCodes;
+  table.accel.code = codes;
   table.accel.count = 3;
   table.decel = table.accel;
   table.cruise = 2;

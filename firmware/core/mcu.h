@@ -81,39 +81,46 @@ typedef enum bushd_mcu_mode {
       3  // `run` is made, whatever its stage, until homing or local inputs end it
 } bushd_mcu_mode;
 
-// Ticks that are queued beyond a gap; none if they end where they begin.
+// Ticks that are queued beyond a gap.
 typedef struct bushd_mcu_island {
   uint32_t from;
   uint32_t until;
   uint16_t delay;  // of the running step at `until`
 } bushd_mcu_island;
 
+// A run that waits or is made.
+typedef struct bushd_mcu_made {
+  uint32_t from;   // the ticks that a table run makes
+  uint32_t until;  // its end, or where ticks replace it
+  bushd_run run;   // stands at the first tick that is not prepared
+} bushd_mcu_made;
+
 typedef struct bushd_mcu_motor {
   int32_t position_steps;  // until the start of the present tick
   int16_t remainder;       // exact position minus steps made, 1/256 step
   int8_t table;            // table slot, -1: none
-  uint8_t mode;            // bushd_mcu_mode
-  bool exact;              // `run` is emitted exact to a slot, not by displacements
+  uint8_t mode : 3;        // bushd_mcu_mode
+  bool exact : 1;          // `run` is emitted exact to a slot, not by displacements
+  bool has_island : 1;     // only in a stream
   uint16_t delay;          // of the running step when the queued ticks end; 0: at rest there
   uint16_t displacement;   // the last one that was not 0, unsigned; in the fine format only
   uint16_t still_ticks;    // made since; saturates
   uint32_t rest_from;      // at rest from here to start_tick
   uint32_t start_tick;     // of the last start taken
   uint32_t known_until;  // first tick for which nothing is decided; always > tick + 1 once prepared
-  bushd_mcu_island island;
-  uint32_t run_from;   // the ticks that a table run makes
-  uint32_t run_until;  // its end, or where ticks replace it
-  bushd_run run;       // stands at the first tick that is not prepared
+  // Memory is short: there is no island while a run waits or is made.
+  union {
+    bushd_mcu_island island;
+    bushd_mcu_made made;
+  };
 } bushd_mcu_motor;
 
 typedef struct bushd_mcu_table {
   bool valid;
-  uint16_t first;  // of its codes, in code memory
-  uint16_t count;  // codes announced, both sides
-  uint16_t received;
+  uint16_t received;  // codes of both sides
   uint32_t revision;
   uint32_t crc;
-  bushd_table table;
+  bushd_table table;  // as announced; no codes: none
 } bushd_mcu_table;
 
 // The tick counter against the bus's (sync.c). All adjustments are as the port takes them: > 0 is a
@@ -188,11 +195,10 @@ typedef struct bushd_mcu_homing {
   uint8_t motor;
   int8_t direction;     // towards the switch
   uint8_t readings;     // of it in a row, as they are waited for
-  uint16_t slow_code;   // what `slow` consists of
   uint32_t slow_steps;  // at most
   int32_t home_steps;   // the position to be set
   int32_t seen_steps;   // where the motor stood at the first of the readings
-  bushd_table slow;
+  bushd_table slow;     // of a single code: its cruise delay
 } bushd_mcu_homing;
 
 typedef struct bushd_mcu_local {

@@ -21,7 +21,7 @@ static void ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
   // that share is unknown, and taking it as 0 makes the next step late rather than early.
   const int32_t progress = (int32_t)motor->remainder * direction;
   const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
-  bushd_run_start_ramp_down(&motor->run, table, delay, fraction, direction);
+  bushd_run_start_ramp_down(&motor->made.run, table, delay, fraction, direction);
   motor->mode = BUSHD_MCU_RAMP_DOWN;
   motor->exact = false;
 }
@@ -42,13 +42,13 @@ static void queue_ended(bushd_mcu* mcu, uint8_t m) {
 static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   int16_t displacement = 0;
   if (mcu->format == BUSHD_FORMAT_FINE) {
-    bushd_run_expand_fine(&motor->run, mcu->tick_ns, 1, &displacement, 1);
+    bushd_run_expand_fine(&motor->made.run, mcu->tick_ns, 1, &displacement, 1);
   } else {
     uint8_t counts = 0;
-    bushd_run_expand_coarse(&motor->run, mcu->tick_ns, 1, &counts, 1);
+    bushd_run_expand_coarse(&motor->made.run, mcu->tick_ns, 1, &counts, 1);
     displacement = bushd_coarse_to_fine(counts);
   }
-  if (bushd_run_done(&motor->run)) motor->mode = BUSHD_MCU_STREAM;
+  if (bushd_run_done(&motor->made.run)) motor->mode = BUSHD_MCU_STREAM;
   return displacement;
 }
 
@@ -72,7 +72,7 @@ static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
 
 // Sets `bit` in the masks of its steps, or none if the emission decides where they lie.
 static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, uint16_t* masks) {
-  bushd_run* run = &motor->run;
+  bushd_run* run = &motor->made.run;
   set_direction(mcu, bit, run->direction > 0);
   const int16_t before = motor->remainder;
   const uint32_t unit_ns = run->table->time_unit_ns;
@@ -92,8 +92,8 @@ static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, 
 
 static inline bool in_run_at(bushd_mcu_motor* motor, uint32_t tick) {
   if (motor->mode != BUSHD_MCU_TABLE_RUN) return false;
-  if (ticks_after(tick, motor->run_until) >= 0) motor->mode = BUSHD_MCU_STREAM;
-  return motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->run_from) >= 0;
+  if (ticks_after(tick, motor->made.until) >= 0) motor->mode = BUSHD_MCU_STREAM;
+  return motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->made.from) >= 0;
 }
 
 void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
@@ -117,7 +117,7 @@ void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
     if (known_ticks > plain_ticks) continue;
     if (known_ticks < plain_ticks) following = 0;
     plain_ticks = known_ticks;
-    if (motor->delay != 0 && !has_island(motor)) following |= bit;
+    if (motor->delay != 0 && !motor->has_island) following |= bit;
   }
   outlook->stale = false;
   outlook->plain = plain;
@@ -298,9 +298,9 @@ void bushd_mcu_begin_run(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t t
   motor->exact = true;
   motor->rest_from = motor->known_until;
   motor->start_tick = first_tick;
-  motor->run_from = first_tick;
-  motor->run_until = first_tick + ticks;
-  motor->known_until = motor->run_until;
+  motor->made.from = first_tick;
+  motor->made.until = first_tick + ticks;
+  motor->known_until = motor->made.until;
 }
 
 static bushd_status check_run(const bushd_mcu* mcu, uint32_t first_tick,
@@ -335,7 +335,7 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
     bushd_mcu_motor* motor = &mcu->motor[entry.motor];
-    check_run(mcu, message->first_tick, &entry, &motor->run, &ticks);
+    check_run(mcu, message->first_tick, &entry, &motor->made.run, &ticks);
     bushd_mcu_begin_run(motor, message->first_tick, ticks);
   }
   return BUSHD_OK;
@@ -345,20 +345,20 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
 // of it.
 static bool in_run(const bushd_mcu_motor* motor, uint32_t next) {
   return motor->mode == BUSHD_MCU_AUTONOMOUS ||
-         (motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->run_from) > 0);
+         (motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->made.from) > 0);
 }
 
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   // It was cut, or does so already.
   if (motor->mode == BUSHD_MCU_STREAM || motor->mode == BUSHD_MCU_RAMP_DOWN) return;
-  bushd_run_ramp_down(&motor->run);
-  motor->mode = bushd_run_done(&motor->run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
+  bushd_run_ramp_down(&motor->made.run);
+  motor->mode = bushd_run_done(&motor->made.run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
 }
 
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  bushd_run_start(&motor->run, table_of(mcu, motor), steps, direction);
+  bushd_run_start(&motor->made.run, table_of(mcu, motor), steps, direction);
   motor->mode = BUSHD_MCU_AUTONOMOUS;
   motor->exact = true;
   mcu->autonomous |= motor_bit(m);
@@ -370,7 +370,7 @@ void bushd_mcu_watch_silence(bushd_mcu* mcu) {
   const uint32_t next = mcu->tick + 1u;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];
-    if (motor->mode != BUSHD_MCU_TABLE_RUN || bushd_run_done(&motor->run)) continue;
+    if (motor->mode != BUSHD_MCU_TABLE_RUN || bushd_run_done(&motor->made.run)) continue;
     uint32_t from = next;
     if (in_run(motor, next)) {
       mcu->run_downs = saturating_increment(mcu->run_downs);
@@ -470,9 +470,10 @@ int8_t bushd_mcu_last_direction(const bushd_mcu* mcu, uint8_t m) {
 
 int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
-  const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->run_from) >= 0 &&
-                    ticks_after(motor->run_until, next) > 0;
-  if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return motor->run.direction;
+  const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN &&
+                    ticks_after(next, motor->made.from) >= 0 &&
+                    ticks_after(motor->made.until, next) > 0;
+  if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return motor->made.run.direction;
   const int16_t queued =
       ticks_after(motor->known_until, next) > 0 ? *queue_at((bushd_mcu*)mcu, next, m) : (int16_t)0;
   if (queued != 0) return queued > 0 ? 1 : -1;

@@ -20,7 +20,7 @@ static void report_islands(const bushd_mcu* mcu, bushd_report* report) {
   report->island_until = 0;
   const bushd_mcu_island* told = NULL;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    if (!has_island(&mcu->motor[m])) continue;
+    if (!mcu->motor[m].has_island) continue;
     const bushd_mcu_island* island = &mcu->motor[m].island;
     if (told == NULL) told = island;
     if (island->from == told->from && island->until == told->until) report->islands |= motor_bit(m);

@@ -2,7 +2,8 @@
 // known to be rest. A frame is taken whole or not at all:
 // - a start is of the MCU's epoch; its motors are at rest at known_until and start there or later
 // - a continuation is of the MCU's epoch; its motors move at known_until. It joins there; or else
-//   it is kept beyond the gap as an island, one per motor, until the lost frame has come again
+//   it is kept beyond the gap as an island, one per motor that is in no run, until the lost frame
+//   has come again
 // - a replacement opens a later epoch; from its first tick on it stands instead of what was queued
 // Ticks that are known and not replaced are duplicates and left alone. That a start says so is what
 // tells a lost start from a motor that need not move yet.
@@ -23,7 +24,7 @@ void bushd_mcu_clear_streams(bushd_mcu* mcu) {
     motor->delay = 0;
     motor->mode = BUSHD_MCU_STREAM;
     motor->rest_from = motor->start_tick = motor->known_until;
-    motor->island.until = motor->island.from;
+    motor->has_island = false;
   }
 }
 
@@ -45,9 +46,10 @@ static void clear_rows(bushd_mcu* mcu, uint8_t m, uint32_t from, uint32_t until)
 }
 
 void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t m) {
-  bushd_mcu_island* island = &mcu->motor[m].island;
-  clear_rows(mcu, m, island->from, island->until);
-  island->until = island->from;
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  if (!motor->has_island) return;
+  clear_rows(mcu, m, motor->island.from, motor->island.until);
+  motor->has_island = false;
 }
 
 void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
@@ -61,8 +63,8 @@ void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
   }
   motor->delay = 0;
   if (motor->mode != BUSHD_MCU_TABLE_RUN) return;
-  if (ticks_after(motor->run_until, tick) > 0) motor->run_until = tick;
-  if (ticks_after(motor->run_until, motor->run_from) <= 0) motor->mode = BUSHD_MCU_STREAM;
+  if (ticks_after(motor->made.until, tick) > 0) motor->made.until = tick;
+  if (ticks_after(motor->made.until, motor->made.from) <= 0) motor->mode = BUSHD_MCU_STREAM;
 }
 
 // `news`: the frame holds something for this motor that is not known yet.
@@ -88,7 +90,9 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu
     return first < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
   if (!moves_on) return BUSHD_E_GAP;
-  if (first > 0 && has_island(motor)) {
+  // Its run stands where its island would be kept.
+  if (first > 0 && motor->mode != BUSHD_MCU_STREAM) return BUSHD_E_GAP;
+  if (first > 0 && motor->has_island) {
     const int32_t from = ticks_after(motor->island.from, motor->known_until);
     const int32_t until = ticks_after(motor->island.until, motor->known_until);
     if (first > until || end < from) return BUSHD_E_GAP;
@@ -156,7 +160,7 @@ static uint16_t offset_of(const bushd_mcu_stretch* stretch, uint32_t tick) {
 static gap gap_in(const bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
   gap found = {offset_of(stretch, motor->known_until), stretch->count, stretch->count};
-  if (has_island(motor)) {
+  if (motor->has_island) {
     found.island_begin = offset_of(stretch, motor->island.from);
     found.island_end = offset_of(stretch, motor->island.until);
   }
@@ -169,7 +173,10 @@ static inline bool in_gap(const gap* g, uint16_t offset) {
 
 static void grow_island(bushd_mcu_motor* motor, uint32_t from, uint32_t until, uint16_t delay) {
   bushd_mcu_island* island = &motor->island;
-  if (!has_island(motor)) island->from = island->until = from;
+  if (!motor->has_island) {
+    motor->has_island = true;
+    island->from = island->until = from;
+  }
   if (ticks_after(island->from, from) > 0) island->from = from;
   if (ticks_after(until, island->until) <= 0) return;
   island->until = until;
@@ -189,7 +196,7 @@ static void close_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stre
   if (ticks_after(end, motor->known_until) <= 0) return;
   motor->known_until = end;
   motor->delay = delay;
-  if (!has_island(motor)) return;
+  if (!motor->has_island) return;
   if (ticks_after(end, motor->island.from) < 0) {
     if (delay == 0) bushd_mcu_drop_island(mcu, m);
     return;
@@ -198,7 +205,7 @@ static void close_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stre
     motor->known_until = motor->island.until;
     motor->delay = motor->island.delay;
   }
-  motor->island.until = motor->island.from;
+  motor->has_island = false;
 }
 
 static void close_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
@@ -337,7 +344,7 @@ static bool open_motors(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
     if ((stretch->mask & motor_bit(m)) == 0) continue;
     open_motor(mcu, m, stretch);
     const int32_t first = ticks_after(stretch->first_tick, mcu->motor[m].known_until);
-    if (has_island(&mcu->motor[m]) || (start ? first < 0 : first != 0)) all_new = false;
+    if (mcu->motor[m].has_island || (start ? first < 0 : first != 0)) all_new = false;
   }
   return all_new;
 }

@@ -4,24 +4,27 @@
 
 #include "firmware/core/internal.h"
 
-static void locate_codes(const bushd_mcu* mcu, bushd_mcu_table* entry) {
-  const uint16_t* codes = mcu->config.codes + entry->first;
-  const bool symmetric = entry->table.decel.code == entry->table.accel.code;
-  entry->table.accel.code = codes;
-  entry->table.decel.code = symmetric ? codes : codes + entry->table.accel.count;
+// Codes in memory, of both sides.
+static uint16_t count_of(const bushd_table* table) {
+  const bool symmetric = table->decel.code == table->accel.code;
+  return (uint16_t)(table->accel.count + (symmetric ? 0u : table->decel.count));
+}
+
+static uint16_t* codes_of(const bushd_mcu* mcu, const bushd_table* table) {
+  return mcu->config.codes + (table->accel.code - mcu->config.codes);
 }
 
 static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
-  const uint16_t end = (uint16_t)(entry->first + entry->count);
-  memmove(mcu->config.codes + entry->first, mcu->config.codes + end,
-          (size_t)(mcu->codes_used - end) * sizeof mcu->config.codes[0]);
-  mcu->codes_used = (uint16_t)(mcu->codes_used - entry->count);
+  const uint16_t count = count_of(&entry->table);
+  uint16_t* const codes = codes_of(mcu, &entry->table);
+  const uint16_t* const end = codes + count;
+  memmove(codes, end, (size_t)(mcu->config.codes + mcu->codes_used - end) * sizeof *codes);
+  mcu->codes_used = (uint16_t)(mcu->codes_used - count);
   for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
-    bushd_mcu_table* other = &mcu->table[i];
-    if (other->count != 0 && other->first >= end) {
-      other->first = (uint16_t)(other->first - entry->count);
-      locate_codes(mcu, other);
-    }
+    bushd_table* other = &mcu->table[i].table;
+    if (other->accel.count == 0 || other->accel.code < end) continue;
+    other->accel.code -= count;
+    other->decel.code -= count;
   }
   memset(entry, 0, sizeof *entry);
 }
@@ -29,42 +32,43 @@ static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message) {
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   bushd_mcu_table* entry = &mcu->table[message->slot];
-  if (entry->count != 0) give_back(mcu, entry);
+  if (entry->table.accel.count != 0) give_back(mcu, entry);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if (mcu->motor[m].table == (int8_t)message->slot) mcu->motor[m].table = -1;
   }
   const uint32_t count = (uint32_t)message->accel_count + message->decel_count;
   if (count > (uint32_t)(mcu->config.code_count - mcu->codes_used)) return BUSHD_E_CAPACITY;
-  entry->first = mcu->codes_used;
-  entry->count = (uint16_t)count;
-  mcu->codes_used = (uint16_t)(mcu->codes_used + count);
   const bool symmetric = message->decel_count == 0;
   entry->table.accel.count = message->accel_count;
   entry->table.decel.count = symmetric ? message->accel_count : message->decel_count;
-  entry->table.accel.code = mcu->config.codes + entry->first;
+  entry->table.accel.code = mcu->config.codes + mcu->codes_used;
   entry->table.decel.code = entry->table.accel.code + (symmetric ? 0 : message->accel_count);
   entry->table.cruise = message->cruise;
   entry->table.time_unit_ns = message->time_unit_ns;
   entry->revision = message->revision;
+  mcu->codes_used = (uint16_t)(mcu->codes_used + count);
   return BUSHD_OK;
 }
 
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message) {
   bushd_mcu_table* entry = &mcu->table[message->slot];
   const uint32_t end = (uint32_t)message->offset + message->count;
+  const bushd_table* table = &entry->table;
   // Pieces come in order; one that was sent again because its acknowledgement was lost is written
   // again.
-  if (entry->valid || end > entry->count || message->offset > entry->received) return BUSHD_E_STATE;
-  for (uint8_t i = 0; i < message->count; ++i) {
-    mcu->config.codes[entry->first + message->offset + i] = bushd_get_u16(message->codes + 2u * i);
+  if (entry->valid || end > count_of(table) || message->offset > entry->received) {
+    return BUSHD_E_STATE;
   }
+  uint16_t* to = codes_of(mcu, table) + message->offset;
+  for (uint8_t i = 0; i < message->count; ++i) *to++ = bushd_get_u16(message->codes + 2u * i);
   if (end > entry->received) entry->received = (uint16_t)end;
   return BUSHD_OK;
 }
 
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message) {
   bushd_mcu_table* entry = &mcu->table[message->slot];
-  if (entry->count == 0 || entry->received != entry->count) return BUSHD_E_STATE;
+  const uint16_t count = count_of(&entry->table);
+  if (count == 0 || entry->received != count) return BUSHD_E_STATE;
   entry->crc = bushd_table_crc32(&entry->table);
   if (entry->crc != message->crc) return BUSHD_E_CRC;
   const bushd_status status = bushd_table_check(&entry->table, NULL, NULL);

@@ -26,8 +26,9 @@ static bushd_edge edge_of_pin(const bushd_mcu* mcu, bushd_edge edge) {
 // it waits they hold how long it takes and what it may begin late, for begin_late.
 static bool make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry) {
   bushd_mcu_motor* motor = &mcu->motor[entry->motor];
-  bushd_run_start(&motor->run, &mcu->table[entry->slot].table, entry->steps, entry->direction);
-  return bushd_mcu_ticks_of_run(&motor->run, mcu->tick_ns, &motor->run_until, &motor->run_from);
+  bushd_run_start(&motor->made.run, &mcu->table[entry->slot].table, entry->steps, entry->direction);
+  return bushd_mcu_ticks_of_run(&motor->made.run, mcu->tick_ns, &motor->made.until,
+                                &motor->made.from);
 }
 
 bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
@@ -78,15 +79,15 @@ static bool is_forbidden(const bushd_mcu* mcu, uint16_t motors) {
   const uint16_t positive = bushd_mcu_forbidden(mcu, 1) & motors;
   const uint16_t negative = bushd_mcu_forbidden(mcu, -1) & motors;
   for (uint8_t m = 0; (positive | negative) >> m != 0; ++m) {
-    const uint16_t barred = mcu->motor[m].run.direction > 0 ? positive : negative;
+    const uint16_t barred = mcu->motor[m].made.run.direction > 0 ? positive : negative;
     if (barred & motor_bit(m)) return true;
   }
   return false;
 }
 
 static void begin_late(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t ns) {
-  const uint32_t ticks = motor->run_until + (ns > motor->run_from);
-  bushd_run_begin_late(&motor->run, ns);
+  const uint32_t ticks = motor->made.until + (ns > motor->made.from);
+  bushd_run_begin_late(&motor->made.run, ns);
   bushd_mcu_begin_run(motor, first_tick, ticks);
 }
 

@@ -12,24 +12,27 @@ typedef struct reader {
   bool short_of_bytes;
 } reader;
 
+// NULL: there are not as many.
 static inline const uint8_t* take(reader* r, size_t size) {
-  static const uint8_t kZeros[4] = {0, 0, 0, 0};
   if (r->short_of_bytes || (size_t)(r->end - r->at) < size) {
     r->short_of_bytes = true;
-    return kZeros;
+    return NULL;
   }
   const uint8_t* const at = r->at;
   r->at += size;
   return at;
 }
 static inline uint8_t get8(reader* r) {
-  return *take(r, 1);
+  const uint8_t* const at = take(r, 1);
+  return at != NULL ? *at : 0;
 }
 static inline uint16_t get16(reader* r) {
-  return bushd_get_u16(take(r, 2));
+  const uint8_t* const at = take(r, 2);
+  return at != NULL ? bushd_get_u16(at) : 0;
 }
 static inline uint32_t get32(reader* r) {
-  return bushd_get_u32(take(r, 4));
+  const uint8_t* const at = take(r, 4);
+  return at != NULL ? bushd_get_u32(at) : 0;
 }
 static inline reader read_from(const uint8_t* payload, size_t size) {
   const reader r = {payload, payload + size, false};

@@ -13,15 +13,15 @@
 #include "engine/run.h"
 
 // First index of a side whose code is <= delay.
-static uint32_t codes_above(const bushd_ramp* ramp, uint16_t delay) {
-  uint32_t low = 0;
-  uint32_t high = ramp->count;
+static uint16_t codes_above(const bushd_ramp* ramp, uint16_t delay) {
+  uint16_t low = 0;
+  uint16_t high = ramp->count;
   while (low < high) {
-    const uint32_t middle = low + (high - low) / 2;
+    const uint16_t middle = (uint16_t)(low + (uint16_t)(high - low) / 2u);
     if (ramp->code[middle] <= delay) {
       high = middle;
     } else {
-      low = middle + 1;
+      low = (uint16_t)(middle + 1u);
     }
   }
   return low;
@@ -30,7 +30,6 @@ static uint32_t codes_above(const bushd_ramp* ramp, uint16_t delay) {
 static void clear(bushd_run* run, const bushd_table* table, int direction) {
   run->table = table;
   run->steps_done = 0;
-  run->lead_steps = 0;
   run->accel_at = 0;
   run->accel_end = 0;
   run->cruise_left = 0;
@@ -43,28 +42,33 @@ static void clear(bushd_run* run, const bushd_table* table, int direction) {
 }
 
 // `steps` to rest, the first of them with the delay A(first): max(A(first + j-1), D(steps-j), c).
-static void cut(bushd_run* run, uint32_t first, uint32_t steps) {
+static void cut(bushd_run* run, uint16_t first, uint32_t steps) {
   const bushd_table* table = run->table;
-  const uint32_t accel_codes = codes_above(&table->accel, table->cruise);
-  const uint32_t decel_codes = codes_above(&table->decel, table->cruise);
+  const uint16_t accel_codes = codes_above(&table->accel, table->cruise);
+  const uint16_t decel_codes = codes_above(&table->decel, table->cruise);
   if (first > accel_codes) first = accel_codes;  // from there on all is cruise
-  // The first `rising` steps have A(first + j-1) >= D(steps-j).
-  uint32_t low = 0;
-  uint32_t high = steps;
-  while (low < high) {
-    const uint32_t j = low + (high - low) / 2 + 1;
-    const uint32_t i = j - 1 < accel_codes - first ? first + (j - 1) : table->accel.count;
-    if (bushd_table_accel(table, i) >= bushd_table_decel(table, steps - j)) {
-      low = j;
-    } else {
-      high = j - 1;
+  uint16_t up = (uint16_t)(accel_codes - first);
+  uint16_t down = steps < decel_codes ? (uint16_t)steps : decel_codes;
+  if (steps < (uint32_t)up + down) {
+    // Too short for both. The first `low` steps have A(first + j-1) >= D(steps-j): at least those
+    // with D <= c.
+    uint16_t low = (uint16_t)(steps - down);
+    uint16_t high = steps < up ? (uint16_t)steps : up;
+    while (low < high) {
+      const uint16_t j = (uint16_t)(low + (uint16_t)(high - low) / 2u + 1u);
+      if (table->accel.code[first + j - 1u] >= bushd_table_decel(table, steps - j)) {
+        low = j;
+      } else {
+        high = (uint16_t)(j - 1u);
+      }
     }
+    up = low;
+    down = (uint16_t)(steps - low);
   }
-  const uint32_t rising = low;
   run->accel_at = first;
-  run->accel_end = rising < accel_codes - first ? first + rising : accel_codes;
-  run->decel_left = steps - rising < decel_codes ? steps - rising : decel_codes;
-  run->cruise_left = steps - (run->accel_end - run->accel_at) - run->decel_left;
+  run->accel_end = (uint16_t)(first + up);
+  run->cruise_left = steps - up - down;
+  run->decel_left = down;
 }
 
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction) {
@@ -80,11 +84,10 @@ void bushd_run_begin_late(bushd_run* run, uint32_t ns) {
 }
 
 static void lead_then_ramp_down(bushd_run* run, uint16_t delay) {
-  run->lead_steps = 1;
   run->lead_delay = delay;
   run->accel_at = run->accel_end;
   run->cruise_left = 0;
-  run->decel_left = bushd_table_steps_to_stop(run->table, delay);
+  run->decel_left = (uint16_t)bushd_table_steps_to_stop(run->table, delay);
 }
 
 void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
@@ -108,16 +111,16 @@ void bushd_run_ramp_down(bushd_run* run) {
 bool bushd_run_retarget(bushd_run* run, uint32_t steps_after) {
   const uint16_t delay = bushd_run_delay(run);
   if (delay == 0 || bushd_table_steps_to_stop(run->table, delay) > steps_after) return false;
-  run->lead_steps = 1;
   run->lead_delay = delay;
   const bushd_ramp* accel = &run->table->accel;
-  const uint32_t at = codes_above(accel, delay);
-  cut(run, at < accel->count && accel->code[at] == delay ? at + 1 : at, steps_after);
+  const uint16_t at = codes_above(accel, delay);
+  const bool there = at < accel->count && accel->code[at] == delay;
+  cut(run, there ? (uint16_t)(at + 1u) : at, steps_after);
   return true;
 }
 
 uint16_t bushd_run_delay(const bushd_run* run) {
-  if (run->lead_steps != 0) return run->lead_delay;
+  if (run->lead_delay != 0) return run->lead_delay;
   if (run->accel_at < run->accel_end) return run->table->accel.code[run->accel_at];
   if (run->cruise_left != 0) return run->table->cruise;
   if (run->decel_left != 0) return run->table->decel.code[run->decel_left - 1];
@@ -125,28 +128,32 @@ uint16_t bushd_run_delay(const bushd_run* run) {
 }
 
 uint32_t bushd_run_steps_left(const bushd_run* run) {
-  return run->lead_steps + (run->accel_end - run->accel_at) + run->cruise_left + run->decel_left;
+  return (run->lead_delay != 0) + (uint32_t)(run->accel_end - run->accel_at) + run->cruise_left +
+         run->decel_left;
 }
 
 bool bushd_run_done(const bushd_run* run) {
   return bushd_run_steps_left(run) == 0;
 }
 
-static uint64_t units_between(const bushd_ramp* ramp, uint32_t from, uint32_t to) {
+static uint32_t units_between(const bushd_ramp* ramp, uint16_t from, uint16_t to) {
+#if BUSHD_RAMP_INDEX
   if (ramp->sum != NULL) return ramp->sum[to] - ramp->sum[from];
-  uint64_t units = 0;
-  for (uint32_t i = from; i < to; ++i) units += ramp->code[i];
+#endif
+  uint32_t units = 0;  // bushd_table_check
+  for (uint16_t i = from; i < to; ++i) units += ramp->code[i];
   return units;
 }
 
 uint64_t bushd_run_units_left(const bushd_run* run) {
   if (bushd_run_done(run)) return 0;
   const bushd_table* table = run->table;
-  return (uint64_t)run->lead_steps * run->lead_delay +
-         units_between(&table->accel, run->accel_at, run->accel_end) +
+  return (uint64_t)run->lead_delay + units_between(&table->accel, run->accel_at, run->accel_end) +
          (uint64_t)run->cruise_left * table->cruise +
          units_between(&table->decel, 0, run->decel_left) - (uint64_t)(int32_t)run->since;
 }
+
+#if BUSHD_RAMP_INDEX
 
 // The greatest i with sum[i] <= units. Precondition: units < sum[count].
 static uint32_t look_up(const bushd_ramp* ramp, uint32_t units) {
@@ -155,20 +162,42 @@ static uint32_t look_up(const bushd_ramp* ramp, uint32_t units) {
   return i;
 }
 
+// These two do in constant time what advance_accel and advance_decel do step by step.
+
+static uint16_t look_up_accel(bushd_run* run) {
+  const bushd_ramp* ramp = &run->table->accel;
+  const uint32_t now = ramp->sum[run->accel_at] + run->since;
+  const bool over = now >= ramp->sum[run->accel_end];
+  const uint16_t i = over ? run->accel_end : (uint16_t)look_up(ramp, now);
+  run->since = now - ramp->sum[i];
+  return i;
+}
+
+// sum[left] is the time from the last step made to the end; after `since` of it `remaining` is to
+// come, and the steps still to be made are the fewest whose time is not less.
+static uint16_t look_up_decel(bushd_run* run) {
+  const bushd_ramp* ramp = &run->table->decel;
+  const uint32_t whole = ramp->sum[run->decel_left];
+  const uint32_t remaining = whole - run->since;
+  const bool over = run->since >= whole;
+  const uint16_t left = over ? (uint16_t)0 : (uint16_t)(look_up(ramp, remaining - 1) + 1);
+  run->since = ramp->sum[left] - remaining;
+  return left;
+}
+
+#endif
+
 // Each advance_* lets `since` (already grown by the tick) pay for steps of its part, one after the
 // other, and returns how many it paid for; what is left in `since` belongs to the next part.
 
 static uint32_t advance_accel(bushd_run* run) {
   const bushd_ramp* ramp = &run->table->accel;
-  uint32_t i = run->accel_at;
-  if (ramp->sum != NULL) {
-    const uint32_t now = ramp->sum[i] + run->since;
-    i = now >= ramp->sum[run->accel_end] ? run->accel_end : look_up(ramp, now);
-    run->since = now - ramp->sum[i];
-  } else {
-    while (i < run->accel_end && run->since >= ramp->code[i]) run->since -= ramp->code[i++];
-  }
-  const uint32_t steps = i - run->accel_at;
+  uint16_t i = run->accel_at;
+#if BUSHD_RAMP_INDEX
+  if (ramp->sum != NULL) i = look_up_accel(run);
+#endif
+  while (i < run->accel_end && run->since >= ramp->code[i]) run->since -= ramp->code[i++];
+  const uint32_t steps = (uint32_t)(i - run->accel_at);
   run->accel_at = i;
   return steps;
 }
@@ -183,21 +212,12 @@ static uint32_t advance_cruise(bushd_run* run) {
 
 static uint32_t advance_decel(bushd_run* run) {
   const bushd_ramp* ramp = &run->table->decel;
-  uint32_t left = run->decel_left;
-  if (ramp->sum != NULL) {
-    // sum[left] is the time from the last step made to the end; after `since` of it `remaining` is
-    // to come, and the steps still to be made are the fewest whose time is not less.
-    const uint32_t remaining = ramp->sum[left] - run->since;
-    if (run->since >= ramp->sum[left]) {
-      left = 0;
-    } else {
-      left = look_up(ramp, remaining - 1) + 1;
-    }
-    run->since = ramp->sum[left] - remaining;
-  } else {
-    while (left > 0 && run->since >= ramp->code[left - 1]) run->since -= ramp->code[--left];
-  }
-  const uint32_t steps = run->decel_left - left;
+  uint16_t left = run->decel_left;
+#if BUSHD_RAMP_INDEX
+  if (ramp->sum != NULL) left = look_up_decel(run);
+#endif
+  while (left > 0 && run->since >= ramp->code[left - 1]) run->since -= ramp->code[--left];
+  const uint32_t steps = (uint32_t)(run->decel_left - left);
   run->decel_left = left;
   return steps;
 }
@@ -206,13 +226,14 @@ static uint32_t advance_decel(bushd_run* run) {
 static uint32_t advance(bushd_run* run, uint32_t units) {
   uint32_t steps = 0;
   run->since += units;
-  if (run->lead_steps != 0 && run->since >= run->lead_delay) {
+  if (run->lead_delay != 0) {
+    if (run->since < run->lead_delay) return 0;
     run->since -= run->lead_delay;
-    run->lead_steps = 0;
+    run->lead_delay = 0;
     ++steps;
   }
-  if (run->lead_steps == 0 && run->accel_at < run->accel_end) steps += advance_accel(run);
-  if (run->lead_steps == 0 && run->accel_at == run->accel_end) {
+  if (run->accel_at < run->accel_end) steps += advance_accel(run);
+  if (run->accel_at == run->accel_end) {
     if (run->cruise_left != 0) steps += advance_cruise(run);
     if (run->cruise_left == 0 && run->decel_left != 0) steps += advance_decel(run);
   }
@@ -239,11 +260,8 @@ static inline uint32_t next_units(uint32_t* since_ns, const tick_units* tick) {
   return tick->whole + carry;
 }
 
-// A small MCU makes few ticks at a time, walks its codes, and has no stack for blocks.
-#ifndef BUSHD_RUN_BLOCKS
-#define BUSHD_RUN_BLOCKS 1
-#endif
-#if BUSHD_RUN_BLOCKS
+// A small MCU makes few ticks at a time, and has no stack for blocks.
+#if BUSHD_RAMP_INDEX
 
 // Below this many ticks the divisions that a block begins with cost more than it saves.
 #define BLOCK_TICKS 4u
@@ -307,7 +325,7 @@ static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t 
     ramp_ticks(ramp, tick, ticks, true, false, &now, &i, &run->since_ns, out);
   }
   run->steps_done += i - run->accel_at;
-  run->accel_at = i;
+  run->accel_at = (uint16_t)i;
   run->since = now - ramp->sum[i];
   return ticks;
 }
@@ -318,7 +336,7 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
   if (ramp->sum == NULL) return 0;
   // One unit before the time that remains, the step that runs is the fewest left, less one
   // (advance_decel).
-  uint32_t i = run->decel_left - 1;
+  uint32_t i = run->decel_left - 1u;
   uint32_t now = ramp->sum[run->decel_left] - run->since - 1;
   const uint32_t safe = safe_ramp_ticks(ramp, tick, now + 1);
   if (ticks > safe) ticks = (size_t)safe;
@@ -327,8 +345,8 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
   } else {
     ramp_ticks(ramp, tick, ticks, false, false, &now, &i, &run->since_ns, out);
   }
-  run->steps_done += run->decel_left - 1 - i;
-  run->decel_left = i + 1;
+  run->steps_done += run->decel_left - 1u - i;
+  run->decel_left = (uint16_t)(i + 1);
   run->since = ramp->sum[i + 1] - (now + 1);
   return ticks;
 }
@@ -368,7 +386,7 @@ static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t
 }
 
 static size_t coarse_block(bushd_run* run, const tick_units* tick, size_t ticks, coarse_out out) {
-  if (run->lead_steps != 0 || bushd_run_begins_later(run)) return 0;
+  if (run->lead_delay != 0 || bushd_run_begins_later(run)) return 0;
   if (run->accel_at < run->accel_end) return coarse_accel_block(run, tick, ticks, out);
   if (run->cruise_left != 0) return coarse_cruise_block(run, tick, ticks, out);
   return coarse_decel_block(run, tick, ticks, out);
@@ -382,7 +400,7 @@ size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, u
   const uint8_t direction_bit = run->direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
   size_t n = 0;
   while (n < ticks && !bushd_run_done(run)) {
-#if BUSHD_RUN_BLOCKS
+#if BUSHD_RAMP_INDEX
     if (ticks - n >= BLOCK_TICKS) {
       const coarse_out rest = {out + n * stride, stride, direction_bit};
       n += coarse_block(run, &tick, ticks - n, rest);

@@ -27,16 +27,15 @@ extern "C" {
 typedef struct bushd_run {
   const bushd_table* table;
   uint32_t steps_done;
-  uint32_t lead_steps;   // 0 or 1: a step with a delay of its own (`lead_delay`), before all others
-  uint32_t accel_at;     // next index on the accelerating side
-  uint32_t accel_end;    // and where that part ends
   uint32_t cruise_left;  // steps left at the cruise delay
-  uint32_t decel_left;   // steps left on the decelerating side
   uint32_t since;        // whole time units since the last step; before the run begins (begin_late)
                          // negative, modulo 2^32
   uint32_t since_ns;     // and the rest, < time_unit_ns
-  uint16_t lead_delay;
-  uint8_t fraction;  // of the position at the end of the last fine tick, 1/256 step
+  uint16_t lead_delay;   // of a step with a delay of its own, before all others; 0: none
+  uint16_t accel_at;     // next index on the accelerating side
+  uint16_t accel_end;    // and where that part ends
+  uint16_t decel_left;   // steps left on the decelerating side
+  uint8_t fraction;      // of the position at the end of the last fine tick, 1/256 step
   int8_t direction;
 } bushd_run;
 

@@ -16,8 +16,8 @@ typedef uint64_t scaled_ns;
 
 static void make_step(bushd_run* run) {
   ++run->steps_done;
-  if (run->lead_steps != 0) {
-    run->lead_steps = 0;
+  if (run->lead_delay != 0) {
+    run->lead_delay = 0;
   } else if (run->accel_at < run->accel_end) {
     ++run->accel_at;
   } else if (run->cruise_left != 0) {

@@ -2,7 +2,7 @@
 
 // In cruise now and for `ticks` more: then the numbers of the other parts need not be told.
 static bool cruises(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
-  if (run->lead_steps != 0 || run->accel_at != run->accel_end || run->cruise_left == 0) {
+  if (run->lead_delay != 0 || run->accel_at != run->accel_end || run->cruise_left == 0) {
     return false;
   }
   const uint64_t step_ns = (uint64_t)run->table->cruise * run->table->time_unit_ns;
@@ -11,15 +11,11 @@ static bool cruises(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
 }
 
 bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
-  const bushd_run_state state = {run->direction,
-                                 cruises(run, tick_ns, ticks),
-                                 (uint16_t)run->since,
-                                 run->since_ns,
-                                 run->lead_steps != 0 ? run->lead_delay : (uint16_t)0,
-                                 (uint16_t)run->accel_at,
-                                 (uint16_t)run->accel_end,
-                                 run->cruise_left,
-                                 (uint16_t)run->decel_left};
+  const bushd_run_state state = {run->direction,       cruises(run, tick_ns, ticks),
+                                 (uint16_t)run->since, run->since_ns,
+                                 run->lead_delay,      run->accel_at,
+                                 run->accel_end,       run->cruise_left,
+                                 run->decel_left};
   return state;
 }
 
@@ -85,7 +81,6 @@ bool bushd_run_restore(bushd_run* run, const bushd_table* table, const bushd_run
     run->cruise_left = UINT32_MAX;
   } else {
     if (!parts_fit(table, state)) return false;
-    run->lead_steps = state->lead_delay != 0;
     run->lead_delay = state->lead_delay;
     run->accel_at = state->accel_at;
     run->accel_end = state->accel_end;

@@ -94,8 +94,8 @@ static uint32_t crc32_codes(uint32_t crc, const bushd_ramp* ramp) {
 uint32_t bushd_table_crc32(const bushd_table* table) {
   const bool symmetric = table->decel.code == table->accel.code;
   uint32_t crc = BUSHD_CRC32_START;
-  crc = crc32_u16(crc, (uint16_t)table->accel.count);
-  crc = crc32_u16(crc, (uint16_t)(symmetric ? 0 : table->decel.count));
+  crc = crc32_u16(crc, table->accel.count);
+  crc = crc32_u16(crc, symmetric ? (uint16_t)0 : table->decel.count);
   crc = crc32_u16(crc, table->cruise);
   crc = crc32_u16(crc, (uint16_t)table->time_unit_ns);
   crc = crc32_u16(crc, (uint16_t)(table->time_unit_ns >> 16));
@@ -104,8 +104,10 @@ uint32_t bushd_table_crc32(const bushd_table* table) {
   return ~crc;
 }
 
+#if BUSHD_RAMP_INDEX
+
 uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp) {
-  return ramp->count + 1;
+  return ramp->count + 1u;
 }
 
 // Buckets no wider than the shortest delay hold at most one step each, so that a look-up needs one
@@ -114,7 +116,7 @@ uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp) {
 static uint8_t bucket_shift(const bushd_ramp* ramp, uint32_t total) {
   uint8_t shift = 0;
   while ((UINT32_C(2) << shift) <= ramp->code[ramp->count - 1]) ++shift;
-  while ((total >> shift) / 8 > ramp->count + 8) ++shift;
+  while ((total >> shift) / 8 > ramp->count + 8u) ++shift;
   return shift;
 }
 
@@ -146,3 +148,5 @@ void bushd_ramp_index(bushd_ramp* ramp, uint32_t* sum, uint32_t* bucket) {
   ramp->bucket = bucket;
   ramp->bucket_shift = shift;
 }
+
+#endif

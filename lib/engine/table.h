@@ -19,15 +19,22 @@
 extern "C" {
 #endif
 
+// Tables may have an index. A build for a small MCU does without, and with the memory for it.
+#ifndef BUSHD_RAMP_INDEX
+#define BUSHD_RAMP_INDEX 1
+#endif
+
 // One side of a table, ordered from slow to fast: code[0] is the delay next to rest.
-// The three index arrays are optional (all set or all NULL): with them a run finds its place in a
-// ramp in constant time (bushd_ramp_index makes them); without, it walks the codes. Results agree.
+// The index is optional (all set or all NULL): with it a run finds its place in a ramp in constant
+// time (bushd_ramp_index makes it); without, it walks the codes. Results agree.
 typedef struct bushd_ramp {
-  const uint16_t* code;    // `count` delays in time units, 1..65535, never rising
-  uint32_t count;          // >= 1
+  const uint16_t* code;  // `count` delays in time units, 1..65535, never rising
+  uint16_t count;        // >= 1
+#if BUSHD_RAMP_INDEX
   const uint32_t* sum;     // count + 1 entries: sum[i] = code[0] + ... + code[i-1]
   const uint32_t* bucket;  // entry b: the greatest i with sum[i] <= b << bucket_shift
   uint8_t bucket_shift;
+#endif
 } bushd_ramp;
 
 // A view of a table; the caller owns all memory and keeps it alive and unchanged while a run uses
@@ -65,6 +72,7 @@ uint32_t bushd_table_max_steps_per_tick(const bushd_table* table, uint32_t tick_
 // unit (32), then the codes of both sides (16), slow to fast. O(count).
 uint32_t bushd_table_crc32(const bushd_table* table);
 
+#if BUSHD_RAMP_INDEX
 // Memory for the index of a ramp: entries needed for `sum` and `bucket`. O(1) and O(count).
 uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp);
 uint32_t bushd_ramp_bucket_entries(const bushd_ramp* ramp);
@@ -72,6 +80,7 @@ uint32_t bushd_ramp_bucket_entries(const bushd_ramp* ramp);
 // Fills the caller's arrays (of at least the sizes above) and hangs them into `ramp`.
 // Precondition: the ramp passed bushd_table_check. O(count).
 void bushd_ramp_index(bushd_ramp* ramp, uint32_t* sum, uint32_t* bucket);
+#endif
 
 #ifdef __cplusplus
 }

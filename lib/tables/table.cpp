@@ -74,14 +74,14 @@ std::optional<ContentFault> check_codes(const TableContent& content) {
   std::vector<std::uint16_t> slow_to_fast;
   bushd_table view{};
   view.accel.code = content.accel.data();
-  view.accel.count = static_cast<std::uint32_t>(content.accel.size());
+  view.accel.count = static_cast<std::uint16_t>(content.accel.size());
   view.decel = view.accel;
   view.cruise = 1;
   view.time_unit_ns = 1;
   if (content.decel) {
     slow_to_fast.assign(content.decel->rbegin(), content.decel->rend());
     view.decel.code = slow_to_fast.data();
-    view.decel.count = static_cast<std::uint32_t>(slow_to_fast.size());
+    view.decel.count = static_cast<std::uint16_t>(slow_to_fast.size());
   }
   std::uint32_t index = 0;
   bool in_decel = false;
@@ -143,7 +143,7 @@ bool Table::same_content(const Table& other) const {
 bushd_ramp Table::Side::index() {
   bushd_ramp ramp{};
   ramp.code = code.data();
-  ramp.count = static_cast<std::uint32_t>(code.size());
+  ramp.count = static_cast<std::uint16_t>(code.size());
   sum.resize(bushd_ramp_sum_entries(&ramp));
   bucket.resize(bushd_ramp_bucket_entries(&ramp));
   bushd_ramp_index(&ramp, sum.data(), bucket.data());

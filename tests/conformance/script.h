@@ -91,7 +91,7 @@ class Script : public testing::Test {
   bushd_table table() const {
     bushd_table view{};
     view.accel.code = view.decel.code = codes_.data();
-    view.accel.count = view.decel.count = static_cast<std::uint32_t>(codes_.size());
+    view.accel.count = view.decel.count = static_cast<std::uint16_t>(codes_.size());
     view.cruise = kCruise;
     view.time_unit_ns = kUnitNs;
     return view;

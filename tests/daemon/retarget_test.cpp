@@ -22,7 +22,7 @@ class JudgedLab {
  public:
   JudgedLab(int motors, const std::string& format)
       : plant_(1), lab_(hall(1, motors, format, "glacier"), table_text(), &plant_) {
-    table_.accel = {kCodes.data(), static_cast<std::uint32_t>(kCodes.size()), nullptr, nullptr, 0};
+    table_.accel = {kCodes.data(), static_cast<std::uint16_t>(kCodes.size()), nullptr, nullptr, 0};
     table_.decel = table_.accel;
     table_.cruise = kCodes.back();
     table_.time_unit_ns = 40'000;

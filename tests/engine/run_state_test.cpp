@@ -134,8 +134,8 @@ std::vector<uint32_t> delays(bushd_run run, size_t most) {
   std::vector<uint32_t> all;
   while (!bushd_run_done(&run) && all.size() < most) {
     all.push_back(bushd_run_delay(&run));
-    if (run.lead_steps != 0) {
-      run.lead_steps = 0;
+    if (run.lead_delay != 0) {
+      run.lead_delay = 0;
     } else if (run.accel_at < run.accel_end) {
       ++run.accel_at;
     } else if (run.cruise_left != 0) {

@@ -16,9 +16,9 @@ namespace bushd::test {
 class TestTable {
  public:
   TestTable(Law law, bool indexed) : law_(std::move(law)) {
-    view_.accel = {law_.accel.data(), static_cast<uint32_t>(law_.accel.size()), nullptr, nullptr,
+    view_.accel = {law_.accel.data(), static_cast<uint16_t>(law_.accel.size()), nullptr, nullptr,
                    0};
-    view_.decel = {law_.decel.data(), static_cast<uint32_t>(law_.decel.size()), nullptr, nullptr,
+    view_.decel = {law_.decel.data(), static_cast<uint16_t>(law_.decel.size()), nullptr, nullptr,
                    0};
     view_.cruise = law_.cruise;
     view_.time_unit_ns = law_.unit_ns;

@@ -156,6 +156,34 @@ TEST_P(TableRun, IsReplacedByTicksAtEveryTick) {
   }
 }
 
+TEST_P(TableRun, TicksBeyondAGapAreKeptOnlyWhenItIsOver) {
+  const Plan moves = plan(-120);
+  rig.forget_history();
+  const std::uint32_t first = rig.first_open();
+  const auto part = [&](std::size_t from, std::uint8_t flags = 0) {
+    Ticks ticks = rig.part(moves, first, from, 10);
+    ticks.flags = flags;
+    ticks.epoch = 1;
+    return ticks;
+  };
+  ASSERT_EQ(start(rig, first, 120, -1), BUSHD_OK);
+  ASSERT_EQ(rig.take(part(20, kReplace)), BUSHD_OK);
+  EXPECT_EQ(rig.take(part(40)), BUSHD_E_GAP) << "the run has still to be made";
+  EXPECT_EQ(rig.poll().islands, 0);
+  while (rig.tick() != first + 20) rig.pass();
+  ASSERT_EQ(rig.take(part(40)), BUSHD_OK);
+  EXPECT_EQ(rig.poll().islands, 1);
+  for (std::size_t from = 30; from < moves.ticks(); from += 10) {
+    if (from == 40) continue;
+    ASSERT_EQ(rig.take(part(from)), BUSHD_OK) << from;
+    while (first + static_cast<std::uint32_t>(from) - rig.tick() > 5) rig.pass();
+  }
+  rig.pass_until_rest();
+  rig.pass(2);
+  expect_steps(rig, Reference::move(law, 120), -1);
+  EXPECT_EQ(rig.poll().faults, 0);
+}
+
 TEST_P(TableRun, IsRunDownWhenNoMasterIsHeard) {
   constexpr std::uint16_t kSilence = 30;
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, kSilence), BUSHD_OK) << "at any time";

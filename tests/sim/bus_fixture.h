@@ -221,7 +221,7 @@ class Master {
     }
     bushd_table table{};
     table.accel.code = table.decel.code = accel.data();
-    table.accel.count = table.decel.count = static_cast<std::uint32_t>(accel.size());
+    table.accel.count = table.decel.count = static_cast<std::uint16_t>(accel.size());
     table.cruise = cruise;
     table.time_unit_ns = time_unit_ns;
     const bushd_table_end end{slot, bushd_table_crc32(&table)};

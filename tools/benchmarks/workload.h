@@ -32,7 +32,7 @@ class Table {
           static_cast<uint16_t>(codes_.empty() ? delay : std::fmin(delay, codes_.back())));
       made += codes_.back();
     }
-    view_.accel = {codes_.data(), static_cast<uint32_t>(codes_.size()), nullptr, nullptr, 0};
+    view_.accel = {codes_.data(), static_cast<uint16_t>(codes_.size()), nullptr, nullptr, 0};
     view_.cruise = static_cast<uint16_t>(std::lround(units_per_s / top_steps_per_s));
     view_.time_unit_ns = time_unit_ns;
     sum_.resize(bushd_ramp_sum_entries(&view_.accel));

@@ -265,7 +265,7 @@ class Inspector {
     const bushd_table& view = table_.view();
     for (const auto& [code, side, index] :
          {std::tuple{view.accel.code[0], "accel", std::size_t{0}},
-          std::tuple{view.decel.code[0], "decel", std::size_t{view.decel.count - 1}},
+          std::tuple{view.decel.code[0], "decel", std::size_t{view.decel.count - 1u}},
           std::tuple{bushd_table_fastest(&view), "cruise", std::size_t{0}}}) {
       if (code >= kBushdFastest && code <= kBushdSlowest) continue;
       const bool slow = code > kBushdSlowest;
