@@ -322,6 +322,10 @@ void Core::log_start(Motor& motor, std::int64_t steps, motion::Tick start, std::
     line["emission"] = link::kEmissionNames.at(emission.mode);
     line["step_us"] = emission.step_us;
     line["dir_setup_us"] = emission.dir_setup_us;
+    if (emission.mode == BUSHD_EMISSION_STAGGERED) line["settle_us"] = emission.settle_us;
+    if (emission.mode == BUSHD_EMISSION_PHASES) {
+      line["phase_sequence"] = link::kSequenceNames.at(emission.sequence);
+    }
   }
   outputs_.move_log(line.dump());
 }

@@ -113,6 +113,14 @@ class Core {
       std::string ended = {};  // the motor armed with it whose end ends it too
     };
     std::optional<Armed> armed = {};
+    // Moves by itself: homes, or people move it.
+    struct Alone {
+      std::optional<motion::Tick> since;  // of the last report before, if there is one
+      std::int64_t from_steps;
+      bool homes;
+      bool set = false;  // the MCU's counter does not go on from there
+    };
+    std::optional<Alone> alone = {};
   };
   struct Homing {
     std::size_t motor;
@@ -126,6 +134,7 @@ class Core {
     std::optional<std::uint16_t> boot_number;          // of the boot that positions belong to
     bool clearing = false;                             // faults are being cleared
     std::uint16_t autonomous = 0;                      // as reported last
+    std::optional<motion::Tick> told = {};             // the tick of the last report
     std::deque<Homing> homings = {};                   // under way, and those that wait
   };
   struct Client {
@@ -192,6 +201,9 @@ class Core {
   // or a fault has put an end to it.
   bool follow_armed(std::size_t motor, const Mcu& mcu, const link::McuView& view);
   void end_faulty_motor(std::size_t motor, const Mcu& mcu, const bushd_report& report);
+  // alone.cpp: before and after a report's positions are taken over.
+  void notice_alone(std::size_t motor, const Mcu& mcu, const bushd_report& report);
+  void end_alone(std::size_t motor, const link::McuView& view);
   static std::string did_not_start(const Mcu& mcu);  // for the reason of a move's end
   // The MCU's motors do not ramp down in what it reports.
   bool cuts(const Mcu& mcu, const bushd_report& report) const;

@@ -90,12 +90,14 @@ void Core::on_online(std::size_t index) {
   const bool first = !mcu.boot_number;
   mcu.boot_number = view.report.boot_number;
   mcu.clearing = false;
+  mcu.told.reset();
   for (unsigned output = 0; output < view.report.motor_count; ++output) {
     if (mcu.motor_of[output] < 0) continue;
     Motor& motor = motors_[static_cast<std::size_t>(mcu.motor_of[output])];
     const std::int64_t before = motor.position_steps;
     motor.position_steps = view.report.motor[output].position_steps;
     if (restarted) motor.doubt = "MCU " + mcu.config->id + " restarted";
+    if (restarted && motor.alone) motor.alone->set = true;
     // Nobody here has seen whether it moved when it was cut off.
     if ((cut || unpowered) && (first || motor.position_steps != before)) {
       motor.doubt = cut ? kCutOff : kUnpowered;
@@ -130,6 +132,7 @@ void Core::on_report(std::int64_t now_us, std::size_t index) {
   for (unsigned output = 0; output < view.report.motor_count; ++output) {
     if (mcu.motor_of[output] < 0) continue;
     const auto motor = static_cast<std::size_t>(mcu.motor_of[output]);
+    notice_alone(motor, mcu, view.report);
     motors_[motor].position_steps = view.report.motor[output].position_steps;
     if (motors_[motor].axis.busy()) follow_motor(now_us, motor, mcu, view);
   }
@@ -142,8 +145,11 @@ void Core::on_report(std::int64_t now_us, std::size_t index) {
     Motor& alone = motors_[static_cast<std::size_t>(motor)];
     if (cuts(mcu, view.report)) alone.doubt = kCutOff;
     if (view.report.faults & BUSHD_FAULT_OVERCURRENT) alone.doubt = kUnpowered;
-    log_set(alone);
   }
+  for (const int motor : mcu.motor_of) {
+    if (motor >= 0) end_alone(static_cast<std::size_t>(motor), view);
+  }
+  mcu.told = view.tick;
   follow_homing(mcu);
   clear_link_fault(mcu);
   check_pending(now_us, index);

@@ -12,7 +12,6 @@ namespace {
 
 using tables::TomlReader;
 
-constexpr std::array<std::string_view, 4> kSequences = {"wave", "full", "half", "three-phase"};
 constexpr std::int64_t kMaxUs = UINT16_MAX;
 // Where the first step of a tick would begin together with the change of DIR: enough for slow
 // drivers.
@@ -92,7 +91,7 @@ Result<link::EmissionSetup> read_emission(const TomlReader& reader) {
     settings.hold_current = true;
   }
   if (reader.has("phase_sequence")) {
-    const auto sequence = read_word(reader, "phase_sequence", kSequences);
+    const auto sequence = read_word(reader, "phase_sequence", link::kSequenceNames);
     if (!sequence) return fail(sequence.error());
     settings.sequence = static_cast<std::uint8_t>(*sequence);
   }

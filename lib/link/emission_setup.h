@@ -29,6 +29,10 @@ struct EmissionSetup {
 inline constexpr std::array<std::string_view, 5> kEmissionNames = {"even", "burst", "common-dir",
                                                                    "staggered", "phases"};
 
+// By bushd_phase_sequence.
+inline constexpr std::array<std::string_view, 4> kSequenceNames = {"wave", "full", "half",
+                                                                   "three-phase"};
+
 // Why the MCU cannot do so, as far as it can be told without asking; "": it can. Then `*max_steps`
 // is how many steps of a motor find room in a tick.
 std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& identity,

@@ -1,8 +1,10 @@
 """Edges against steps, and what else pins and positions must fulfil."""
 
+import bisect
 import json
 import math
 
+from check_trace.clock import NO_CLOCK
 from check_trace.problems import InputError
 
 MAX_SKEW_NS = 20_000  # between the MCUs of a bus
@@ -20,9 +22,12 @@ class MotorCheck:
         self._clock = clock
         self._slot_ns = slot_ns
         self._problems = problems
+        self._planned = []  # the steps that moves which met their limit have made by the table
 
     def run(self):
-        steps, edges = self._motor.steps, self._motor.edges
+        edges = self._without_alone(self._motor.edges)
+        steps, edges = self._without_limits(edges)
+        self._motor.steps = sorted(steps + self._planned, key=lambda step: step.time_ns)
         missing, surplus = [], []
         i = j = 0
         while i < len(steps) or j < len(edges):
@@ -33,7 +38,7 @@ class MotorCheck:
             else:
                 away_ns = self._away_ns(steps[i], edges[j])
             # A nanosecond for the trace's own rounding.
-            if away_ns < -self._slot_ns - 1:
+            if self._too_early(steps, i, away_ns):
                 surplus.append(edges[j])
                 j += 1
             elif away_ns > self._slot_ns + 1:
@@ -46,6 +51,98 @@ class MotorCheck:
                 i += 1
                 j += 1
         self._explain(missing, surplus)
+
+    def _too_early(self, steps, i, away_ns):
+        early_ns = steps[i].early_ns if i < len(steps) else 0
+        return away_ns < -self._slot_ns - early_ns - 1
+
+    def _without_alone(self, edges):
+        """Looks at the edges of homing, of local motion and of the measuring step; returns the others."""
+        rest = []
+        for edge in edges:
+            at_ns = self._clock.bus_ns(edge.time_ns)
+            alone = next((a for a in self._motor.alone if a.begin_ns <= at_ns < a.end_ns), None)
+            if self._clock is NO_CLOCK and self._motor.alone:  # nothing tells when its ticks are
+                alone = self._motor.alone[0]
+            if alone is None:
+                rest.append(edge)
+                continue
+            alone.travelled += 1 if edge.direction else -1
+            self._check_other(edge, f"an edge of {alone.what}")
+        for alone in self._motor.alone:
+            if alone.sets or self._clock is NO_CLOCK:
+                continue
+            moved = alone.position_steps - alone.from_steps
+            if moved != alone.travelled:
+                text = f"{alone.what} is said to have moved it by {moved} steps, its edges by {alone.travelled}"
+                self._problems.add(self._motor, "position", text)
+        return self._without_measuring(rest)
+
+    def _without_measuring(self, edges):
+        """A step and the way back, by which an MCU measures its supply current before it moves anything."""
+        moves = self._motor.moves
+        measures = any(move.emission == "staggered" and move.settle_ns == 0 for move in moves)
+        if not measures or len(edges) < 2 or edges[0].direction == edges[1].direction:
+            return edges
+        first_ns = moves[0].start_tick * moves[0].tick_ns
+        if self._clock.bus_ns(edges[1].time_ns) >= first_ns:
+            return edges
+        for edge in edges[:2]:
+            self._check_other(edge, "an edge of the measuring step")
+        return edges[2:]
+
+    def _without_limits(self, edges):
+        """Moves that a limit switch has ended: by the table as far as they go by it, then to rest by the MCU's own ramp.
+        Returns the steps and edges of the others."""
+        steps = []
+        for number, move in enumerate(self._motor.moves):
+            own = [step for step in self._motor.steps if step.move is move]
+            if move.result != "limit":
+                steps += own
+                continue
+            begin_ns = move.start_tick * move.tick_ns - self._slot_ns
+            later = self._motor.moves[number + 1 :]
+            end_ns = later[0].start_tick * move.tick_ns - self._slot_ns if later else math.inf
+            times_ns = [self._clock.bus_ns(edge.time_ns) for edge in edges]
+            first = bisect.bisect_left(times_ns, begin_ns)
+            last = bisect.bisect_left(times_ns, end_ns)
+            self._check_limited(move, own, edges[first:last])
+            edges = edges[:first] + edges[last:]
+        return steps, edges
+
+    def _check_limited(self, move, steps, edges):
+        made = move.direction * (move.result_steps - move.from_steps)
+        if made != len(edges):
+            text = f"move {move.id} is said to have made {made} steps until its limit, its edges are {len(edges)}"
+            self._problems.add(self._motor, "position", text)
+        planned = 0
+        for step, edge in zip(steps, edges):
+            away_ns = self._away_ns(step, edge)
+            if away_ns > self._slot_ns + 1 or self._too_early(steps, planned, away_ns):
+                break
+            self._check(step, edge)
+            self._planned.append(step)
+            planned += 1
+        ramp = edges[planned:]
+        for edge in ramp:
+            self._check_other(edge, f"an edge of the ramp of move {move.id}", move.direction)
+        # In the coarse format an MCU takes its speed from the steps of a few ticks.
+        running = move.delays[max(planned - 1, 0)] if move.delays else move.table.cruise
+        unsure = 3 * move.tick_ns // (running * move.table.unit_ns) + 2
+        most = len(move.table.ramp_down(running)) + unsure
+        if len(ramp) > most:
+            text = f"move {move.id} goes on for {len(ramp)} steps after its limit, by the table for {most}"
+            self._report("limit", text, ramp[0])
+
+    def _check_other(self, edge, name, direction=None):
+        """What holds for every edge, also where its time is not known."""
+        self._motor.others += 1
+        if direction is not None and edge.direction != (direction > 0):
+            self._report("direction", f"{name} has DIR {int(edge.direction)}", edge)
+        if edge.direction_for_ns < self._slot_ns / 2 - 1:
+            self._report("direction", f"DIR changed only {edge.direction_for_ns} ns before {name}", edge)
+        if not edge.enabled:
+            self._report("enable", f"EN is low at {name}", edge)
 
     def _away_ns(self, step, edge):
         return self._clock.bus_ns(edge.time_ns) - step.emitted_ns
@@ -77,7 +174,7 @@ class MotorCheck:
 
         if edge.direction != (step.direction > 0):
             self._report("direction", f"{name_of(step)} has DIR {int(edge.direction)}", edge)
-        if edge.direction_for_ns < self._slot_ns / 2:
+        if edge.direction_for_ns < self._slot_ns / 2 - 1:
             text = f"DIR changed only {edge.direction_for_ns} ns before {name_of(step)}"
             self._report("direction", text, edge)
         if not edge.enabled:
@@ -109,6 +206,8 @@ def check_pins(trace, motors, slot_ns_of, problems):
             if not 0 < width_ns <= slot_ns_of(place[0]):
                 text = f"a STEP pulse of {width_ns} ns, longer than a slot or void"
                 problems.add(owner(place), "pulse", text, time_ns)
+    for place, time_ns in trace.torn:
+        problems.add(owner(place), "phases", "its levels are no neighbours in the sequence", time_ns)
     for place, edges in trace.edges.items():
         if place not in motor_at:
             for edge in edges:
@@ -142,7 +241,10 @@ def check_positions(path, motors, problems):
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not the output of bushctl status --json: {error!r}") from None
     for motor in motors:
-        counted = motor.moves[0].from_steps + motor.set_by_steps + motor.travelled()
+        set_by_steps = motor.set_by_steps + sum(
+            alone.position_steps - alone.from_steps - alone.travelled for alone in motor.alone if alone.sets
+        )
+        counted = motor.from_steps + set_by_steps + motor.travelled()
         if said.get(motor.name) != counted:
             text = f"the daemon says it is at {said.get(motor.name)} steps, its edges lead to {counted}"
             problems.add(motor, "position", text)

@@ -36,16 +36,46 @@ def fit_clock(motors, slot_ns):
     """
     pairs = []
     for motor in motors:
-        expected = [step.emitted_ns for step in motor.steps]
+        if motor.alone or any(move.result == "limit" for move in motor.moves):
+            pairs += pairs_by_move(motor, slot_ns)
+            continue
         seen = [edge.time_ns for edge in motor.edges]
-        pairs += [(due, at - due) for due, at in zip(expected, seen)]
-        if len(expected) != len(seen):
-            pairs += [(due, at - due) for due, at in zip(reversed(expected), reversed(seen))]
+        pairs += pairs_of(motor.steps, seen)
+        if len(motor.steps) != len(seen):
+            pairs += pairs_of(reversed(motor.steps), reversed(seen))
+    # Those whose slot is known, if there are some.
+    sure = [(at_ns, away_ns) for at_ns, away_ns, early_ns in pairs if early_ns == 0]
+    pairs = sure or [(at_ns, away_ns) for at_ns, away_ns, _ in pairs]
     if not pairs:
         return None
     rough = agreed_clock(pairs, slot_ns)
     good = [(time, away) for time, away in pairs if abs(away - rough.at(time)) <= slot_ns]
     return straight_line(good)
+
+
+def pairs_of(steps, seen):
+    return [(step.emitted_ns, at - step.emitted_ns, step.early_ns) for step, at in zip(steps, seen)]
+
+
+def pairs_by_move(motor, slot_ns):
+    """Of a motor that has edges of which nobody knows how many: where in its edges each move may lie."""
+    seen = [edge.time_ns for edge in motor.edges]
+    pairs = []
+    for move in motor.moves:
+        own = [step for step in motor.steps if step.move is move]
+        if move.result == "limit":
+            own = own[: abs(move.result_steps - move.from_steps) // 2]  # what lies after the switch is another way
+        if not own:
+            continue
+        due = [step.emitted_ns for step in own]
+        span_ns = due[-1] - due[0]
+        slack_ns = 2 * slot_ns + MAX_RATE * span_ns + max(step.early_ns for step in own)
+        middle, last = len(due) // 2, len(due) - 1
+        for first in range(len(seen) - last):
+            away_ns = seen[first] - due[0]
+            if all(abs(seen[first + i] - due[i] - away_ns) <= slack_ns for i in (middle, last)):
+                pairs += pairs_of(own, seen[first:])
+    return pairs
 
 
 def agreed_clock(pairs, slot_ns):

@@ -11,8 +11,7 @@ a tick, in which that line crosses n (fine) or n - 1/2 (coarse: so that c steps 
 that the MCU runs by its own table ("moves": "table") is made otherwise: every step in the slot in which its
 time lies, until the first change; from that tick on it is made of ticks as well.
 
-Emission "burst" makes the steps of a tick otherwise: one after the other, each T_step ("step_us", rounded up to
-slots), beginning "dir_setup_us" (rounded up, of a tick that is 1/64 shorter) after the tick.
+Emission "phases" has the same slots; the others make the steps of a tick one after the other (emission.py).
 
 How far an edge may lie from the table.  T is the tick, v the speed in steps per time. Within the tick the
 true position has slopes from vmin to vmax, so it leaves its own chord by at most (vmax - vmin) T / 4.
@@ -22,7 +21,8 @@ crossing half a step earlier takes back half: r = 1/2. The line's slope is d / T
     |edge - table|  <=  T / d * ((vmax - vmin) T / 4 + r) + T / S,  and never more than T
 
 In a move's last tick vmin is 0, as the motor comes to rest somewhere in it: it is reported apart, and so is
-the first. Of a table run an edge lies in its slot: |edge - table| <= T / S. With burst it lies in its tick: T.
+the first. Of a table run an edge lies in its slot: |edge - table| <= T / S. With burst, common-dir
+and staggered it lies in its tick: T.
 """
 
 import bisect
@@ -32,9 +32,11 @@ import tomllib
 from collections import namedtuple
 from itertools import accumulate
 
+from check_trace.emission import PERIODIC
 from check_trace.problems import InputError
 
-Step = namedtuple("Step", "move number time_ns emitted_ns tick direction place bound_ns")
+# nth: in its tick, from 0; early_ns: by so much it may be made before emitted_ns, besides the slot's width
+Step = namedtuple("Step", "move number time_ns emitted_ns early_ns tick nth direction place bound_ns")
 INTERIOR, FIRST_TICK, LAST_TICK = range(3)
 
 
@@ -88,9 +90,11 @@ class Move:
         self.tick_ns = event["tick_ns"]
         self.fine = {"fine": True, "coarse": False}[event["format"]]
         self.emission = event.get("emission", "even")
-        if self.emission not in ("even", "burst"):
-            raise InputError(f"move {self.id} is emitted {self.emission}; only even and burst can be checked")
+        if self.emission not in ("even", "phases", *PERIODIC):
+            raise InputError(f"move {self.id} is emitted {self.emission}, which is not known here")
+        self.sequence = event.get("phase_sequence")
         self.step_ns = 1000 * event.get("step_us", 0)
+        self.settle_ns = 1000 * event.get("settle_us", 0)
         self.dir_setup_ns = 1000 * event.get("dir_setup_us", 0)
         self.start_tick = event["start_tick"]
         self.late_ns = event.get("late_ns", 0)  # begins so long after the beginning of its start tick
@@ -161,9 +165,7 @@ class Move:
             by_table = self.start_tick + tick < self.ticks_from
             begin_ns = (self.start_tick + tick) * self.tick_ns
             for n in range(made, after):
-                if self.emission == "burst":
-                    slot = self.burst_slot(n - made, slots)
-                elif by_table:
+                if by_table:
                     slot = (times[n] - tick * self.tick_ns) * slots // self.tick_ns
                 else:
                     slot = (256 * n + crossing - q0) * slots // (q1 - q0)
@@ -174,19 +176,16 @@ class Move:
                     number=n + 1,
                     time_ns=self.start_tick * self.tick_ns + times[n],
                     emitted_ns=begin_ns + slot * self.tick_ns // slots,
+                    early_ns=0,
                     tick=self.start_tick + tick,
+                    nth=n - made,
                     direction=self.direction,
                     place=place,
-                    bound_ns=self.tick_ns if self.emission == "burst" else self.tick_ns / slots if by_table else bound_ns,
+                    bound_ns=self.tick_ns if self.emission in PERIODIC else self.tick_ns / slots if by_table else bound_ns,
                 )
             made = after
             q0 = q1
             tick += 1
-
-    def burst_slot(self, n, slots):
-        """The slot of step n of a tick, n = 0 ..."""
-        shortest_ns = self.tick_ns - self.tick_ns // 64
-        return -(-self.dir_setup_ns * slots // shortest_ns) + n * -(-self.step_ns * slots // self.tick_ns)
 
     def bound_ns(self, delays, last, displacement, slots):
         """How far an edge of a tick may lie from the table (above); `delays` are those that run in it."""

@@ -1,10 +1,26 @@
 """The daemon's log of moves (docs/design.md)."""
 
 import json
+import math
 
 from check_trace.motion import Move
 from check_trace.problems import InputError
 from check_trace.tables import find_table
+
+
+class Alone:
+    """Motion by homing or local inputs: the log tells when, and where from and to, but not its steps."""
+
+    def __init__(self, event):
+        self.what = event["what"]
+        self.begin_tick = event.get("from_tick", -math.inf)
+        self.end_tick = event["until_tick"] + 1
+        self.begin_ns = self.begin_tick * event["tick_ns"]
+        self.end_ns = self.end_tick * event["tick_ns"]
+        self.from_steps = event["from_steps"]
+        self.position_steps = event["position_steps"]
+        self.sets = event["set"]  # the position is not that to which its steps lead
+        self.travelled = 0
 
 
 class Motor:
@@ -15,9 +31,12 @@ class Motor:
         self.output = output
         self.mcu = f"{bus}:{address}"
         self.moves = []
+        self.alone = []
+        self.from_steps = None  # before the first of both
         self.set_by_steps = 0  # sum of what "set" has shifted the position by, without a step
         self.steps = []
         self.edges = []
+        self.others = 0  # edges of homing, local motion, and on the MCU's own way to rest
         self.errors_ns = ([], [], [])  # of the edges against the table, by place in the move
         self.off_slot_ns = 0  # farthest from the exact slot
         self.bound_share = 0.0  # largest error as a part of what it may be
@@ -49,6 +68,7 @@ class MoveLog:
             "retarget": self._change,
             "result": self._result,
             "set": self._set,
+            "alone": self._alone,
         }
         try:
             with open(path, encoding="utf-8") as file:
@@ -64,25 +84,44 @@ class MoveLog:
             raise InputError(f"{path}: moves on several buses or ticks; choose one with --bus NAME")
         self._check_each()
 
-    def _move(self, event):
+    def tick_ns(self):
+        return next(iter(self._ticks))[1]
+
+    def _motor_of(self, event, what):
+        """None: it is on a bus that is not asked for."""
         if self._bus is not None and event["bus"] != self._bus:
-            return
+            return None
         self._ticks.add((event["bus"], event["tick_ns"]))
-        which = event["table_file"], event["table_sha256"]
-        if which not in self._tables:
-            self._tables[which] = find_table(*which)
         name = event["motor"]
         place = (event["bus"], event["address"], event["output"])
         motor = self.motors.setdefault(name, Motor(name, *place))
         if motor.place() != place:
-            self._problems.add(motor, "output", f"move {event['id']} is on another output: {place}")
-        move = Move(event, self._tables[which])
-        before_steps = self._at_steps.get(name, move.from_steps)
-        if move.from_steps != before_steps:
-            text = f"move {move.id} starts from {move.from_steps} steps, the one before ends at {before_steps}"
+            self._problems.add(motor, "output", f"{what} is on another output: {place}")
+        from_steps = event["from_steps"]
+        if motor.from_steps is None:
+            motor.from_steps = from_steps
+        before_steps = self._at_steps.get(name, from_steps)
+        if from_steps != before_steps:
+            text = f"{what} starts from {from_steps} steps, the one before ends at {before_steps}"
             self._problems.add(motor, "position", text)
+        return motor
+
+    def _alone(self, event):
+        motor = self._motor_of(event, event["what"])
+        if motor is not None:
+            motor.alone.append(Alone(event))
+            self._at_steps[motor.name] = event["position_steps"]
+
+    def _move(self, event):
+        motor = self._motor_of(event, f"move {event['id']}")
+        if motor is None:
+            return
+        which = event["table_file"], event["table_sha256"]
+        if which not in self._tables:
+            self._tables[which] = find_table(*which)
+        move = Move(event, self._tables[which])
         motor.moves.append(move)
-        self._moves[name, move.id] = move
+        self._moves[motor.name, move.id] = move
 
     def _change(self, event):
         move = self._moves.get((event["motor"], event["id"]))
@@ -115,11 +154,11 @@ class MoveLog:
                 self._problems.add(motor, "output", f"shares its output with {other.name}")
             for move in motor.moves:
                 self._check_result(motor, move)
-            if motor.moves[-1].result == "turned":
+            if motor.moves and motor.moves[-1].result == "turned":
                 text = f"move {motor.moves[-1].id} turned, and no move to its target follows"
                 self._problems.add(motor, "result", text)
             for before, after in zip(motor.moves, motor.moves[1:]):
-                if after.delays and after.start_tick < before.end_tick():
+                if after.delays and before.result != "limit" and after.start_tick < before.end_tick():
                     text = f"move {after.id} starts in tick {after.start_tick}, the one before runs until"
                     self._problems.add(motor, "overlap", f"{text} {before.end_tick()}")
 
@@ -127,6 +166,8 @@ class MoveLog:
         text = None
         if move.result is None:
             text = f"move {move.id} has no result"
+        elif move.result == "limit":
+            return  # when the switch was met is not in the log: the edges tell
         elif move.result not in ("reached", "stopped", "turned"):
             text = f"move {move.id} ended as '{move.result}', so the table does not say what was to happen"
         elif move.result == "reached" and move.end_steps() != move.goal_steps:

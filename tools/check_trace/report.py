@@ -22,6 +22,7 @@ def figures(motors, trace, skew_ns):
         "mcus": len({motor.mcu for motor in motors}),
         "steps_commanded": sum(len(motor.steps) for motor in motors),
         "steps_made": sum(map(len, trace.edges.values())),
+        "steps_of_their_own": sum(motor.others for motor in motors),
         "max_edge_error_us": largest_us(interior) or 0.0,
         "rms_edge_error_us": round((sum(e * e for e in interior) / max(1, len(interior))) ** 0.5 / 1000, 1),
         "max_first_tick_error_us": largest_us(every[FIRST_TICK]),
@@ -77,6 +78,8 @@ def print_report(motors, clocks, problems, total, verbose):
         f"farthest from the exact slot {total['max_off_slot_us']} us; largest skew between MCUs "
         f"{total['max_skew_us']} us"
     )
+    if total["steps_of_their_own"]:
+        print(f"{total['steps_of_their_own']} steps of homing, of local inputs and of ramps at limit switches")
     print(
         f"{total['motors']} motors, {total['mcus']} MCUs, {total['steps_commanded']} steps commanded, "
         f"{total['steps_made']} steps made, max edge error {total['max_edge_error_us']} us"

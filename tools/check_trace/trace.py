@@ -8,11 +8,24 @@ from check_trace.problems import InputError
 
 Edge = namedtuple("Edge", "time_ns direction direction_for_ns enabled")
 
+# Levels of a motor's outputs, step by step, the first one in the lowest bit.
+SEQUENCES = {
+    "wave": (1, 2, 4, 8),
+    "full": (3, 6, 12, 9),
+    "half": (1, 3, 2, 6, 4, 12, 8, 9),
+    "three-phase": (1, 3, 2, 6, 4, 5),
+}
+PHASE_OUTPUTS = 4
+
 
 class Trace:
     """What the pins did, by (address, output)."""
 
-    def __init__(self, path):
+    def __init__(self, path, common_dirs=(), phases=None):
+        """`common_dirs`: addresses of MCUs with one DIR for all; `phases`: sequences by address."""
+        self._common_dirs = common_dirs
+        self._phases = phases or {}
+        self.torn = []  # (place, time): phases that do not follow each other
         self.edges = defaultdict(list)  # rising STEP edges, with DIR and EN as they were
         self.pulses = defaultdict(list)  # of STEP: (begin, width)
         self.double = []  # (place, time): STEP rises while it is high
@@ -46,7 +59,7 @@ class Trace:
                 scopes.pop()
             elif keyword == "$var":
                 mcu = re.fullmatch(r"mcu(\d+)", scopes[-1])
-                wire = re.fullmatch(r"(step|dir|en)(\d*)", section[3])
+                wire = re.fullmatch(r"(step|dir|en|common_dir)(\d*)", section[3])
                 if mcu and wire:
                     wires[section[2]] = (int(mcu[1]), wire[1], int(wire[2] or 0))
             elif keyword == "$enddefinitions":
@@ -63,6 +76,7 @@ class Trace:
         high_since = {}
         direction = defaultdict(lambda: (False, -math.inf))  # level, since when
         enabled = defaultdict(bool)
+        windings = Windings(self) if self._phases else None
         for token in tokens:
             if token[0] == "#":
                 time = int(token[1:])
@@ -83,6 +97,10 @@ class Trace:
                 went_back = False
             if kind == "en":
                 enabled[address] = level
+            elif kind == "common_dir":
+                direction[address, kind] = level, now
+            elif kind == "step" and address in self._phases:
+                windings.change(now, place, level, self._phases[address], enabled[address])
             elif kind == "dir":
                 if direction[place][0] != level:
                     direction[place] = level, now
@@ -90,12 +108,51 @@ class Trace:
                 if place in high_since:
                     self.double.append((place, now))
                 high_since[place] = now
-                dir_level, dir_since = direction[place]
+                shared = address in self._common_dirs
+                dir_level, dir_since = direction[(address, "common_dir") if shared else place]
                 self.edges[place].append(Edge(now, dir_level, now - dir_since, enabled[address]))
             elif place in high_since:
                 since = high_since.pop(place)
                 self.pulses[place].append((since, now - since))
+        if windings is not None:
+            windings.settle()
         for place, since in high_since.items():
             self.pulses[place].append((since, now - since))
         for edges in self.edges.values():
             edges.sort()
+
+
+class Windings:
+    """Steps of motors whose windings are switched: the way that their levels take through the sequence."""
+
+    def __init__(self, trace):
+        self._trace = trace
+        self._levels = defaultdict(int)  # by (address, motor)
+        self._at = defaultdict(int)  # place in the sequence
+        self._now = 0
+        self._changed = {}  # in this moment: (sequence, enabled) by (address, motor)
+
+    def change(self, now, place, level, sequence, enabled):
+        if now != self._now:
+            self.settle()
+            self._now = now
+        motor = place[0], place[1] // PHASE_OUTPUTS
+        bit = 1 << place[1] % PHASE_OUTPUTS
+        self._levels[motor] = self._levels[motor] | bit if level else self._levels[motor] & ~bit
+        self._changed[motor] = SEQUENCES[sequence], enabled
+
+    def settle(self):
+        """All that changes at one time is one change."""
+        for motor, (sequence, enabled) in self._changed.items():
+            levels, at = self._levels[motor], self._at[motor]
+            if levels in (0, sequence[at]):
+                continue
+            for step in (1, -1):
+                after = (at + step) % len(sequence)
+                if levels == sequence[after]:
+                    self._at[motor] = after
+                    self._trace.edges[motor].append(Edge(self._now, step > 0, math.inf, enabled))
+                    break
+            else:
+                self._trace.torn.append((motor, self._now))
+        self._changed.clear()

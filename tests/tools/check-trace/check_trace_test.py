@@ -98,12 +98,61 @@ class RightTraces(CheckTraceTest):
         scene.edges[1, 0][100][0] += 2 * SLOT_NS
         self.assert_problem(scene, "theta", "step 101 of 300")
 
+    def by_itself(self):
+        """Homing first, a move that meets its limit, local motion in both directions, a move."""
+        scene = synthetic.Scene(TABLE, self.table_file)
+        scene.alone("theta", 1, 0, 20, [-1] * 30 + [1] * 9, sets_to=-5)
+        scene.move("theta", 1, 0, 200, 400)
+        scene.meets_limit("theta", 100)
+        scene.alone("theta", 1, 0, 600, [1] * 7 + [-1] * 12)
+        scene.move("theta", 1, 0, 700, 300, move_id=2)
+        scene.move("omega", 2, 3, 230, -500, move_id=3)
+        scene.alone("chi", 2, 4, 100, [1, 1, 1])
+        return scene
+
+    def test_homing_local_motion_and_limits_are_explained(self):
+        scene = self.by_itself()
+        positions = self.directory / "status.json"
+        motors = [{"name": name, "position_steps": steps} for name, steps in scene.steps.items()]
+        positions.write_text(json.dumps({"motors": motors}), encoding="utf-8")
+        result = self.assert_right(scene, "--positions", positions)
+        self.assertIn("72 steps of homing, of local inputs and of ramps at limit switches", result.stdout)
+
+    def test_a_step_outside_of_local_motion(self):
+        scene = self.by_itself()
+        scene.edges[1, 0].append([900 * TICK_NS, 1])
+        self.assert_problem(scene, "theta", "an edge that no move explains")
+
+    def test_local_motion_that_is_counted_otherwise(self):
+        scene = self.by_itself()
+        scene.events[-1]["position_steps"] = 4
+        self.assert_problem(scene, "chi", "local is said to have moved it by 4 steps, its edges by 3")
+
+    def test_a_limit_that_is_counted_otherwise(self):
+        scene = self.by_itself()
+        next(event for event in scene.events if event.get("result") == "limit")["position_steps"] += 1
+        self.assert_problem(scene, "theta", "steps until its limit, its edges are")
+
+    def test_a_motor_that_goes_on_after_its_limit(self):
+        scene = synthetic.Scene(TABLE, self.table_file)
+        scene.move("theta", 1, 0, 200, 400)
+        scene.meets_limit("theta", 100)
+        own = scene.edges[1, 0]
+        own += [[own[-1][0] + 2 * (i + 1) * TICK_NS, 1] for i in range(60)]
+        scene.events[-1]["position_steps"] += 60
+        self.assert_problem(scene, "theta", "goes on for 71 steps after its limit")
+
+    def test_the_wrong_direction_after_a_limit(self):
+        scene = self.by_itself()
+        scene.edges[1, 0][39 + 105][1] = -1
+        self.assert_problem(scene, "theta", "the ramp of move 1 has DIR 0")
+
     def test_other_emission_is_refused(self):
         scene = self.burst()
-        scene.events[0]["emission"] = "staggered"
+        scene.events[0]["emission"] = "thundering"
         result = self.check(scene)
         self.assertEqual(result.returncode, 2)
-        self.assertIn("move 1 is emitted staggered; only even and burst can be checked", result.stderr)
+        self.assertIn("move 1 is emitted thundering, which is not known here", result.stderr)
 
     def test_every_edge_of_both_formats_is_explained(self):
         for fine, moves in itertools.product((True, False), (None, "stream", "table")):

@@ -178,6 +178,32 @@ class Scene:
         own += self._edges(motor, delays, move["start_tick"], direction)
         return len(delays)
 
+    def alone(self, motor, address, output, from_tick, directions, sets_to=None):
+        """Homing, or local motion: a step every two ticks. Only homing sets the position."""
+        before = self.steps.get(motor, 0)
+        after = before + sum(directions) if sets_to is None else sets_to
+        self.steps[motor] = after
+        self.events.append({
+            "event": "alone", "motor": motor, "bus": "hall", "address": address, "output": output, "tick_ns": TICK_NS,
+            "what": "local" if sets_to is None else "homing", "set": sets_to is not None, "from_steps": before,
+            "position_steps": after, "from_tick": from_tick - 1, "until_tick": from_tick + 2 * len(directions) + 20,
+        })
+        self.edges.setdefault((address, output), []).extend(
+            [(from_tick + 2 * i) * TICK_NS + PULSE_NS, direction] for i, direction in enumerate(directions)
+        )
+
+    def meets_limit(self, motor, after):
+        """The last move of a motor ends so many steps after its start, by a ramp of the MCU's own: a step every two ticks."""
+        move = next(e for e in reversed(self.events) if e["event"] == "move" and e["motor"] == motor)
+        ramp = len(self.table["accel"]) // 2
+        direction = 1 if move["steps"] >= 0 else -1
+        result = self.events[-1]
+        result["result"] = "limit"
+        result["position_steps"] = self.steps[motor] = move["from_steps"] + direction * (after + ramp)
+        own = self.edges[move["address"], move["output"]]
+        del own[len(own) - abs(move["steps"]) + after :]
+        own += [[own[-1][0] + 2 * (i + 1) * TICK_NS, direction] for i in range(ramp)]
+
     def _changed(self, motor, after_ns):
         self.ticks_from_ns[motor] = min(self.ticks_from_ns[motor], after_ns)
         return after_ns

@@ -1,0 +1,143 @@
+// A day in a lab, judged by tools/check-trace from the log of moves and the pins alone: moves in
+// every way of emission, homing, local motion, a limit switch.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "daemon/lab.h"
+#include "sim/shipped_motors.h"
+#include "sim/vcd.h"
+
+namespace bushd::test {
+namespace {
+
+struct Manner {
+  const char* name;
+  const char* keys;                 // of every MCU
+  const char* otherwise = nullptr;  // in a move's line of the log
+  const char* manner = "fine";
+};
+
+class Trace : public testing::TestWithParam<Manner> {
+ protected:
+  Trace() {
+    std::string name = (std::filesystem::temp_directory_path() / "bushd-trace-XXXXXX").string();
+    directory_ = ::mkdtemp(name.data());
+    const std::array<std::uint8_t, 2> addresses = {1, 2};
+    vcd_ = std::move(sim::VcdWriter::create(path("trace.vcd"), addresses).value());
+  }
+  ~Trace() override { std::filesystem::remove_all(directory_); }
+
+  std::string path(const char* file) const { return (directory_ / file).string(); }
+
+  static std::string toml() {
+    std::string text = hall(2, 3, GetParam().manner);
+    const auto add = [&text](const std::string& after, const std::string& keys) {
+      text.insert(text.find(after) + after.size(), keys);
+    };
+    add("name = \"m01\"\n",
+        "home = { direction = \"negative\", position_steps = -50, most_steps = 6000 }\n");
+    add("name = \"m02\"\n", "local = true\n");
+    add("name = \"m04\"\n", "limit = \"positive\"\n");
+    add("address = 1\n", GetParam().keys);
+    add("address = 2\n", GetParam().keys);
+    return text;
+  }
+  void move(Lab& lab, const std::vector<std::string>& motors,
+            const std::vector<std::int64_t>& steps) {
+    const reply_t result = lab.wait(lab.send(command_t::MOVE_RELATIVE, motors, steps));
+    EXPECT_EQ(result.result, "reached") << result.reason;
+  }
+  void write(Lab& lab) {
+    EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+    nlohmann::json positions;
+    for (const char* name : {"m01", "m02", "m03", "m04", "m05", "m06"}) {
+      positions["motors"].push_back(
+          {{"name", name}, {"position_steps", lab.motor(name).position_steps}});
+    }
+    std::ofstream(path("positions.json")) << positions;
+  }
+  // The exit code, with what `bend` leaves of the log's events.
+  int check(const Lab& lab, const std::function<bool(nlohmann::json&)>& bend) {
+    std::ofstream moves(path("moves.jsonl"));
+    for (const std::string& line : lab.move_lines()) {
+      auto event = nlohmann::json::parse(line);
+      if (bend(event)) moves << event << "\n";
+    }
+    moves.close();
+    const std::string tool = (kShippedTables.parent_path() / "tools" / "check-trace").string();
+    const std::string command = BUSHD_PYTHON " -B " + tool + " --moves " + path("moves.jsonl") +
+                                " --trace " + path("trace.vcd") + " --positions " +
+                                path("positions.json") + " > " + path("said");
+    const int status = std::system(command.c_str());  // NOLINT: a program of ours
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string said() const {
+    std::ifstream file(path("said"));
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  std::filesystem::path directory_;
+  std::unique_ptr<sim::VcdWriter> vcd_;
+};
+INSTANTIATE_TEST_SUITE_P(
+    Emission, Trace,
+    testing::Values(
+        Manner{"even", "", "{\"emission\": \"burst\", \"step_us\": 320}"},
+        Manner{"coarse", "", nullptr, "coarse"}, Manner{"table", "", nullptr, "fine_table"},
+        Manner{"burst", "emission = \"burst\"\nstep_us = 320\n", "{\"step_us\": 340}"},
+        Manner{"common", "emission = \"common-dir\"\nstep_us = 320\n", "{\"emission\": \"burst\"}"},
+        Manner{"staggered", "emission = \"staggered\"\nstep_us = 320\nsettle_us = 60\n",
+               "{\"settle_us\": 80}"},
+        Manner{"measured", "emission = \"staggered\"\nstep_us = 320\n", "{\"step_us\": 240}"},
+        Manner{"phases", "emission = \"phases\"\nphase_sequence = \"half\"\n",
+               "{\"phase_sequence\": \"full\"}"}),
+    [](const auto& manner) { return std::string(manner.param.name); });
+
+TEST_P(Trace, EveryEdgeIsExplained) {
+  Lab lab(toml(), {}, vcd_.get());
+  lab.bus(0).mcu(0).attach_switch(0, {.at_steps = -700, .hysteresis_steps = 4});
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(command_t::HOME, {"m01"})).result, "reached");
+  move(lab, {"m01", "m02", "m03", "m04", "m05"}, {500, -300, 200, -400, 1});
+  lab.bus(0).mcu(0).set_inputs({0, BUSHD_INPUT_FORWARD});
+  lab.run_for(0.7);
+  move(lab, {"m03", "m05"}, {-90, 250});
+  lab.bus(0).mcu(0).set_inputs({});
+  lab.run_for(1);
+  const auto limited = lab.send(command_t::MOVE_RELATIVE, {"m04", "m06"}, {20000, -700});
+  lab.run_for(1.5);
+  lab.bus(0).mcu(1).set_inputs({0b001, 0});
+  EXPECT_EQ(lab.wait(limited).result, "limit");
+  move(lab, {"m04", "m05", "m06"}, {-300, 100, 300});
+  move(lab, {"m01", "m02", "m03"}, {-100, -50, 30});
+  lab.run_for(0.1);
+  write(lab);
+  EXPECT_EQ(check(lab, [](auto&) { return true; }), 0) << said();
+  // It would say so if something else had happened.
+  EXPECT_EQ(check(lab, [](auto& event) { return event["event"] != "alone"; }), 1);
+  EXPECT_EQ(check(lab,
+                  [](auto& event) {
+                    if (event["result"] == "limit") {
+                      event["position_steps"] = event["position_steps"].template get<int>() - 1;
+                    }
+                    return true;
+                  }),
+            1);
+  if (GetParam().otherwise == nullptr) return;
+  EXPECT_EQ(check(lab,
+                  [](auto& event) {
+                    if (event["event"] == "move")
+                      event.update(nlohmann::json::parse(GetParam().otherwise));
+                    return true;
+                  }),
+            1);
+}
+
+}  // namespace
+}  // namespace bushd::test
