@@ -92,6 +92,9 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
 // `spare_ns`: by how much it may begin late and still be over then; less than a tick.
 bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
                             uint32_t* spare_ns);
+// Into the motor's own run, which nothing reads as long as it is in a stream or at rest; nor its
+// beginning and end: they hold how many ticks it takes and what it may begin late. False as above.
+bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry);
 // The motor's run, just started, begins in this tick and takes as many.
 void bushd_mcu_begin_run(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t ticks);
 void bushd_mcu_watch_silence(bushd_mcu* mcu);  // before every tick is prepared

@@ -67,7 +67,7 @@ typedef struct bushd_mcu_config {
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint32_t min_tick_ns;  // shorter ones are refused
   uint32_t pulse_ns;     // how long STEP pulses last; 0: half a slot
-  uint16_t lacks;        // BUSHD_CAN_* that it is too slow for: the identity does not show them
+  uint16_t lacks;        // BUSHD_CAN_* that it is too slow for: not in the identity, and refused
   uint16_t* codes;       // table memory
   uint16_t code_count;
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
@@ -253,6 +253,9 @@ typedef struct bushd_mcu_reference {
   bushd_mcu_slots next;  // until then, from the beginning of the tick to be prepared
 } bushd_mcu_reference;
 
+// The longest reply is a report; a delimiter stands in front.
+#define BUSHD_MCU_MAX_REPLY (1u + BUSHD_REPORT_SIZE(BUSHD_MOTORS_PER_MCU) + BUSHD_FRAME_OVERHEAD)
+
 // Read-only for ports and tests; everything in here is the core's.
 typedef struct bushd_mcu {
   bushd_port port;
@@ -301,7 +304,7 @@ typedef struct bushd_mcu {
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];
   bushd_receiver receiver;
-  uint8_t reply[BUSHD_FRAME_MAX_WIRE + 1u];
+  uint8_t reply[BUSHD_MCU_MAX_REPLY];
 } bushd_mcu;
 
 // Starts in state BUSY with EN low, unless it is to be high at boot; a control message raises it.

@@ -303,16 +303,19 @@ void bushd_mcu_begin_run(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t t
   motor->known_until = motor->made.until;
 }
 
-static bushd_status check_run(const bushd_mcu* mcu, uint32_t first_tick,
-                              const bushd_table_run_entry* entry, bushd_run* run, uint32_t* ticks) {
+bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry) {
+  bushd_mcu_made* made = &mcu->motor[entry->motor].made;
+  bushd_run_start(&made->run, &mcu->table[entry->slot].table, entry->steps, entry->direction);
+  return bushd_mcu_ticks_of_run(&made->run, mcu->tick_ns, &made->until, &made->from);
+}
+
+static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
+                                const bushd_table_run_entry* entry) {
   const bushd_mcu_motor* motor = &mcu->motor[entry->motor];
   if (ticks_after(first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
   if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
-  // There is room for one.
-  if (motor->mode == BUSHD_MCU_TABLE_RUN) return BUSHD_E_STATE;
-  bushd_run_start(run, table_of(mcu, motor), entry->steps, entry->direction);
-  uint32_t spare_ns;
-  return bushd_mcu_ticks_of_run(run, mcu->tick_ns, ticks, &spare_ns) ? BUSHD_OK : BUSHD_E_CAPACITY;
+  // There is room for one run.
+  return motor->mode == BUSHD_MCU_STREAM ? BUSHD_OK : BUSHD_E_STATE;
 }
 
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message) {
@@ -322,21 +325,24 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
   }
   const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
   if (status != BUSHD_OK) return status;
-  bushd_run run;
-  uint32_t ticks = 0;
   bool barred = true;
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
-    const bushd_status run_status = check_run(mcu, message->first_tick, &entry, &run, &ticks);
-    if (run_status != BUSHD_OK) return run_status;
+    const bushd_status entry_status = check_entry(mcu, message->first_tick, &entry);
+    if (entry_status != BUSHD_OK) return entry_status;
     barred = barred && (bushd_mcu_forbidden(mcu, entry.direction) & motor_bit(entry.motor)) != 0;
   }
   if (barred) return BUSHD_E_FORBIDDEN;
+  // All are made before one begins: the frame is taken whole or not at all.
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
-    bushd_mcu_motor* motor = &mcu->motor[entry.motor];
-    check_run(mcu, message->first_tick, &entry, &motor->made.run, &ticks);
-    bushd_mcu_begin_run(motor, message->first_tick, ticks);
+    if (!bushd_mcu_make_run(mcu, &entry)) return BUSHD_E_CAPACITY;
+  }
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    bushd_mcu_motor* motor = &mcu->motor[m];
+    if (stretch.mask & motor_bit(m)) {
+      bushd_mcu_begin_run(motor, message->first_tick, motor->made.until);
+    }
   }
   return BUSHD_OK;
 }

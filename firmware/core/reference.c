@@ -21,7 +21,6 @@ static bushd_mcu_slots in_slots(const bushd_mcu* mcu, uint32_t us) {
 
 bushd_status bushd_mcu_take_reference(bushd_mcu* mcu, const bushd_reference* message) {
   bushd_mcu_reference* reference = &mcu->reference;
-  if (mcu->config.lacks & BUSHD_CAN_REFERENCE) return BUSHD_E_UNKNOWN_MESSAGE;
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
   // One that is out ends in its time.
   if (reference->pulse == PULSE_RISES) reference->pulse = PULSE_NONE;

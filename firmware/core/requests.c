@@ -234,6 +234,30 @@ static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_
   }
 }
 
+// What a frame of this type asks for is beyond the port. Modes of emission have statuses of their
+// own.
+static bool is_lacking(const bushd_mcu* mcu, uint8_t type) {
+  switch (type) {
+    case BUSHD_MSG_TABLE_TICKS:
+      return (mcu->config.lacks & BUSHD_CAN_TABLE_TICKS) != 0;
+    case BUSHD_MSG_TABLE_RUN:
+      return (mcu->config.lacks & BUSHD_CAN_TABLE_RUN) != 0;
+    case BUSHD_MSG_HOME:
+      return (mcu->config.lacks & BUSHD_CAN_HOME) != 0;
+    case BUSHD_MSG_LOCAL:
+      return (mcu->config.lacks & BUSHD_CAN_LOCAL) != 0;
+    case BUSHD_MSG_REFERENCE:
+      return (mcu->config.lacks & BUSHD_CAN_REFERENCE) != 0;
+    default:
+      return false;
+  }
+}
+
+static bool is_answered(uint8_t type) {
+  return type != BUSHD_MSG_SYNC && type != BUSHD_MSG_TICKS && type != BUSHD_MSG_TABLE_TICKS &&
+         type != BUSHD_MSG_TABLE_RUN && type != BUSHD_MSG_EMERGENCY;
+}
+
 static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns,
                            answer* a) {
   switch (frame->type) {
@@ -276,7 +300,6 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
     case BUSHD_MSG_TABLE_TICKS:
     case BUSHD_MSG_TABLE_RUN:
     case BUSHD_MSG_EMERGENCY:
-      a->due = false;
       return hear(mcu, frame, time_in_tick_ns);
     default:
       return BUSHD_E_UNKNOWN_MESSAGE;
@@ -285,11 +308,13 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
 
 void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
   answer a;
-  a.due = frame->address != BUSHD_ADDRESS_BROADCAST;
+  a.due = frame->address != BUSHD_ADDRESS_BROADCAST && is_answered(frame->type);
   a.delay_ns = 0;
   a.size = 0;
   a.payload = mcu->reply + 2 + BUSHD_FRAME_HEADER;
-  const bushd_status status = handle(mcu, frame, time_in_tick_ns, &a);
+  const bushd_status status = is_lacking(mcu, frame->type)
+                                  ? BUSHD_E_UNKNOWN_MESSAGE
+                                  : handle(mcu, frame, time_in_tick_ns, &a);
   // Ticks look to it themselves; these two change nothing that it tells.
   if (frame->type != BUSHD_MSG_TICKS && frame->type != BUSHD_MSG_POLL &&
       frame->type != BUSHD_MSG_SYNC) {

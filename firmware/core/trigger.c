@@ -22,15 +22,6 @@ static bushd_edge edge_of_pin(const bushd_mcu* mcu, bushd_edge edge) {
   return edge == BUSHD_EDGE_RISING ? BUSHD_EDGE_FALLING : BUSHD_EDGE_RISING;
 }
 
-// In the motor's own run: it is at rest, and nothing reads that. Nor its beginning and end: while
-// it waits they hold how long it takes and what it may begin late, for begin_late.
-static bool make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry) {
-  bushd_mcu_motor* motor = &mcu->motor[entry->motor];
-  bushd_run_start(&motor->made.run, &mcu->table[entry->slot].table, entry->steps, entry->direction);
-  return bushd_mcu_ticks_of_run(&motor->made.run, mcu->tick_ns, &motor->made.until,
-                                &motor->made.from);
-}
-
 bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
   if (mcu->port.set_trigger == NULL) return BUSHD_E_UNKNOWN_MESSAGE;
   if (message->edge == BUSHD_EDGE_NONE) {
@@ -52,7 +43,7 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
   if (bushd_mcu_moving(mcu) & mask) return BUSHD_E_STATE;
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
-    if (!make_run(mcu, &entry)) return BUSHD_E_CAPACITY;
+    if (!bushd_mcu_make_run(mcu, &entry)) return BUSHD_E_CAPACITY;
   }
   mcu->trigger.armed = mask;
   mcu->trigger.number = message->number;

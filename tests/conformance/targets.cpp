@@ -15,7 +15,9 @@ namespace {
 #ifdef AVR_IMAGES
 class Atmega2560 final : public McuUnderTest {
  public:
-  McuOptions twin() const override { return {.slots = 128, .queue_ticks = 64, .code_count = 952}; }
+  McuOptions twin() const override {
+    return {.slots = 128, .queue_ticks = 64, .code_count = 952, .lacks = lacks()};
+  }
   std::uint16_t lacks() const override { return BUSHD_CAN_TABLE_TICKS; }
   std::uint32_t full_tick_ns(bushd_format format) const override {
     return format == BUSHD_FORMAT_FINE ? 4'000'000 : 2'560'000;

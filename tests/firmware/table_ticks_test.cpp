@@ -167,5 +167,17 @@ TEST_P(TableTicks, StatesThatNoRunHasAreRefusedAndChangeNothing) {
             BUSHD_E_NO_TABLE);
 }
 
+TEST_P(TableTicks, AreRefusedByAnMcuThatIsTooSlowForThem) {
+  Rig slow({.lacks = BUSHD_CAN_TABLE_TICKS});
+  EXPECT_EQ(slow.identify().capabilities & BUSHD_CAN_TABLE_TICKS, 0);
+  slow.make_ready(law, format);
+  bushd_run run;
+  bushd_run_start(&run, table.view(), 50, 1);
+  const Ticks head{.flags = kStart, .first = slow.first_open()};
+  EXPECT_EQ(take_state(slow, head, 30, {{0, bushd_run_save(&run, Rig::kTickNs, 30)}}),
+            BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(slow.poll().moving, 0);
+}
+
 }  // namespace
 }  // namespace bushd::test
