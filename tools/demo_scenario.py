@@ -13,7 +13,10 @@ import time
 TOP = pathlib.Path(__file__).resolve().parent.parent
 BIN = TOP / "build" / "release" / "bin"
 RUNS = TOP / "build" / "demo"
-AVR_IMAGE = TOP / "build/release/avr-image/firmware/ports/atmega2560/bushd-atmega2560-500000.elf"
+CHIPS = {  # image, and what runs it
+    "atmega2560": ("avr-image/firmware/ports/atmega2560/bushd-atmega2560-500000.elf", "an ATmega2560 in simavr"),
+    "lm3s6965": ("cortex-m-image/firmware/ports/lm3s6965/bushd-lm3s6965-500000.elf", "an LM3S6965 in QEMU"),
+}
 RUNS_KEPT = 3
 
 GROUPS = {
@@ -43,8 +46,8 @@ def group_of(motor):
 
 def configuration(options, port):
     lines = ["[lcm]", f'url = "{options.url}"', "", "[[bus]]", 'name = "hall"', f'port = "{port}"']
-    # What an ATmega2560 has to deal with at once must fit into a tick.
-    tick_us = 10240 if options.mcu == "atmega2560" else 2560
+    # What an image has to deal with at once, when sixteen motors start, must fit into a tick.
+    tick_us = 10240 if options.mcu in CHIPS else 2560
     lines += ["baud = 500000", f"tick_us = {tick_us}", f'format = "{options.format}"', ""]
     for address in (1, 2):
         lines += ["[[mcu]]", 'bus = "hall"', f"address = {address}", ""]
@@ -170,7 +173,10 @@ class Demo:
         port = self.file("port")
         config = self.file("bushd.toml")
         config.write_text(configuration(self._options, port), encoding="utf-8")
-        mcu = ["--mcu", f"2=atmega2560:{AVR_IMAGE}"] if self._options.mcu == "atmega2560" else []
+        mcu = []
+        if self._options.mcu in CHIPS:
+            image = TOP / "build" / "release" / CHIPS[self._options.mcu][0]
+            mcu = ["--mcu", f"2={self._options.mcu}:{image}"]
         self.start("bushsim", "--config", config, "--link", port, "--trace", self.file("trace.vcd"), *mcu)
         self.wait_until("bushsim to offer its port", port.is_symlink)
         self.start("bushd", "--config", config, "--move-log", self.file("moves.jsonl"))
@@ -275,7 +281,7 @@ class Demo:
         print("checking every edge of the trace against the tables", flush=True)
         command = [sys.executable, TOP / "tools" / "check-trace", "--moves", self.file("moves.jsonl")]
         command += ["--trace", self.file("trace.vcd"), "--positions", self.file("status.json")]
-        if self._options.mcu == "atmega2560":
+        if self._options.mcu in CHIPS:
             command += ["--slots", "2=128"]
         result = subprocess.run(command, capture_output=True, text=True, check=False)
         self.file("check.log").write_text(result.stdout + result.stderr, encoding="utf-8")
@@ -311,13 +317,13 @@ def forget_old_runs():
 def main():
     parser = argparse.ArgumentParser(prog="tools/demo")
     parser.add_argument("--format", choices=("fine", "coarse"), default="fine", help="of displacements")
-    parser.add_argument("--mcu", choices=("virtual", "atmega2560"), default="virtual", help="what the second one is")
+    parser.add_argument("--mcu", choices=("virtual", *CHIPS), default="virtual", help="what the second one is")
     parser.add_argument("--url", default="udpm://239.255.76.67:7667?ttl=0", help="of LCM")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that clean_up is not left out
     demo = Demo(options)
     forget_old_runs()
-    mcus = "2 virtual MCUs" if options.mcu == "virtual" else "a virtual MCU and an ATmega2560 in simavr"
+    mcus = f"a virtual MCU and {CHIPS[options.mcu][1]}" if options.mcu in CHIPS else "2 virtual MCUs"
     print(f"demo: 32 motors on {mcus}, 500000 baud, {options.format} displacements")
     print(f"demo: all files of this run are in {demo.directory.relative_to(TOP)}", flush=True)
     try:

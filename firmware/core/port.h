@@ -44,7 +44,7 @@ typedef struct bushd_port {
   // How far the present tick has gone, in ns.
   uint32_t (*time_in_tick_ns)(void* context);
 
-  // Asked once a tick, before it is prepared.
+  // Asked once a tick, before it is prepared, and with requests and reports at any time.
   bushd_inputs (*read_inputs)(void* context);
 
   // The last reading of the supply current, 0..1023; 0 where nothing measures it.

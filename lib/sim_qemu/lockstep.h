@@ -15,7 +15,8 @@ typedef enum lockstep_command_kind {
   LOCKSTEP_FLASH = 5,        // value: the word at `address`, before the first RUN
   LOCKSTEP_RESET_CAUSE = 6,  // value: RESC, before the first RUN
   LOCKSTEP_STOP_TICKS = 7,   // the timer that begins ticks interrupts no more
-  LOCKSTEP_STICK = 8         // bit 0 of the word of RAM at `address` is 1, before the first RUN
+  LOCKSTEP_STICK = 8,        // bit 0 of the word of RAM at `address` is 1, before the first RUN
+  LOCKSTEP_KEPT_RAM = 9      // value: the first word of RAM, before the first RUN
 } lockstep_command_kind;
 
 typedef enum lockstep_event_kind {
@@ -27,7 +28,7 @@ typedef enum lockstep_event_kind {
   LOCKSTEP_SENT = 6,           // value: a byte that its UART took at this time
   LOCKSTEP_OVERRUN = 7,        // a byte was lost in its UART
   LOCKSTEP_STORED = 8,         // value: the flash word at `address` is this now
-  LOCKSTEP_WATCHDOG = 9,       // it is reset, and the process ends
+  LOCKSTEP_WATCHDOG = 9,       // it is reset, and the process ends; value: the first word of RAM
   LOCKSTEP_COMMON_DIR = 10,    // value: level
   LOCKSTEP_REFERENCE = 11,     // value: level
   LOCKSTEP_CONVERTS = 12       // its ADC begins a conversion, and waits for LOCKSTEP_CURRENT

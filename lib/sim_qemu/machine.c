@@ -7,7 +7,8 @@
  * - a UART's BUSY flag, and the time that it takes to send
  * - flash that can be written, and takes its time; not that the CPU waits for it
  * - an ADC that reads what it is told, and takes its time
- * - why it was reset, and a watchdog that ends this process, as the next one has all memory fresh
+ * - why it was reset, and a watchdog that ends this process: the next one has all memory fresh but
+ *   the word of RAM that the image wants to outlive that
  */
 #include <stdlib.h>
 #include <string.h>
@@ -42,6 +43,7 @@ __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t 
 #define WATCHDOG_AT 0x40000000u
 #define RESET_CAUSE_AT 0x400FE05Cu
 #define UART_0_AT 0x4000C000u
+#define RAM 0x20000000u
 #define CYCLE_NS 20
 #define ADC_SAMPLE_NS INT64_C(1000)
 
@@ -243,6 +245,9 @@ static void obey(void) {
       case LOCKSTEP_STOP_TICKS:
         memory_region_dispatch_write(tick_timer, TIMER_IMR, 0, MO_32, MEMTXATTRS_UNSPECIFIED);
         break;
+      case LOCKSTEP_KEPT_RAM:
+        cpu_physical_memory_rw(RAM, &command.value, sizeof command.value, true);
+        break;
       case LOCKSTEP_STICK:
         stick(command.address);
         break;
@@ -427,7 +432,9 @@ static void watchdog_reload(void) {
 static void on_watchdog(void* opaque) {
   (void)opaque;
   if (watchdog.interrupt && (watchdog.control & 2u) != 0) {
-    tell(LOCKSTEP_WATCHDOG, 0, 0);
+    uint32_t kept = 0;
+    cpu_physical_memory_rw(RAM, &kept, sizeof kept, false);
+    tell(LOCKSTEP_WATCHDOG, kept, 0);
     flush();
     _exit(0);
   }

@@ -86,6 +86,7 @@ uint32_t memory_region_dispatch_read(MemoryRegion* region, hwaddr address, uint6
                                      MemTxAttrs attributes);
 uint32_t memory_region_dispatch_write(MemoryRegion* region, hwaddr address, uint64_t data, int op,
                                       MemTxAttrs attributes);
+void cpu_physical_memory_rw(hwaddr address, void* bytes, hwaddr size, bool write);
 uint32_t address_space_write_rom(AddressSpace* space, hwaddr address, MemTxAttrs attributes,
                                  const void* bytes, hwaddr size);
 

@@ -85,6 +85,7 @@ void QemuMcu::start(std::uint32_t reset_cause) {
   orders_.clear();
   for (const auto& [address, word] : flash_) order(LOCKSTEP_FLASH, word, address);
   order(LOCKSTEP_RESET_CAUSE, reset_cause);
+  order(LOCKSTEP_KEPT_RAM, std::exchange(kept_ram_, 0));
   set_inputs(inputs_);
 }
 
@@ -200,6 +201,7 @@ void QemuMcu::take(const lockstep_message& event) {
     case LOCKSTEP_WATCHDOG:
       fall(time_ns);
       boot_ns_ = time_ns;
+      kept_ram_ = event.value;
       break;
     case LOCKSTEP_OVERRUN:
       ++overruns_;

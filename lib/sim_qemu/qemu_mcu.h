@@ -88,6 +88,7 @@ class QemuMcu final : public Mcu {
   int socket_ = -1;
   std::vector<lockstep_message> orders_;          // not yet sent
   std::map<std::uint32_t, std::uint32_t> flash_;  // words that are not blank
+  std::uint32_t kept_ram_ = 0;                    // over a watchdog reset
   TimeNs now_ns_ = 0;
   TimeNs boot_ns_ = 0;
   TimeNs delimiter_ns_ = -1;  // that came last

@@ -83,6 +83,19 @@ TEST_P(Conformance, RunsFourTablesAtOnceToTheSlot) {
   expect_the_same_reports();
 }
 
+// Inputs are told with every report, at any time of a tick.
+TEST_P(Conformance, TurnsRoundWhilePollsCome) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {2, 9}));
+  for (int turn = 0; turn < 12; ++turn) {
+    const auto direction = static_cast<std::int8_t>(turn % 2 == 0 ? 1 : -1);
+    const std::uint32_t first = master_.poll(kReal).tick + 16;
+    run_by_table(first, {{2, 0, direction, 5}, {9, 0, static_cast<std::int8_t>(-direction), 5}});
+    for (int poll = 0; poll < 12; ++poll) master_.poll(kReal);
+  }
+  for (const std::uint8_t motor : Bytes{2, 9}) expect_the_same_steps(motor, 60);
+  expect_the_same_reports();
+}
+
 class ConformanceOfStreams : public Script,
                              public testing::WithParamInterface<std::tuple<Target, bushd_format>> {
  protected:

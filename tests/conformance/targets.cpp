@@ -38,6 +38,7 @@ class Atmega2560 final : public McuUnderTest {
     return 3'000'000'000 + static_cast<TimeNs>(codes) * 10'000'000;
   }
   std::uint64_t kept_writes() const override { return avr_->eeprom_writes(); }
+  void hang() override { avr_->hang(); }
   void flip_kept_bit() override { avr_->flip_eeprom_bit(43 + 30, 2); }  // kept.h
   void expect_unharmed() const override {
     EXPECT_EQ(avr_->overruns(), 0u);
@@ -73,6 +74,7 @@ class Lm3s6965 final : public McuUnderTest {
   }
   TimeNs keeps_within_ns(std::size_t) const override { return 2'000'000'000; }
   std::uint64_t kept_writes() const override { return qemu_->flash_writes(); }
+  void hang() override { qemu_->stop_ticks(); }
   void flip_kept_bit() override { qemu_->flip_flash_bit(0x27800 + 20 + 32, 2); }  // kept.h
   void expect_unharmed() const override {
     EXPECT_EQ(qemu_->overruns(), 0u);

@@ -42,6 +42,8 @@ class McuUnderTest {
   virtual std::uint64_t kept_writes() const = 0;  // since it booted for the first time
   virtual void flip_kept_bit() = 0;               // of a table; from the next boot on
 
+  virtual void hang() = 0;  // until its watchdog bites
+
   // After a test: what its simulator knows to be wrong.
   virtual void expect_unharmed() const = 0;
 };

@@ -200,7 +200,7 @@ TEST_F(Homing, WhereverItComesFromItIsTheSameToOneStep) {
       0, {.at_steps = -400, .hysteresis_steps = 6, .bounce_ns = 7'000'000, .seed = 5});
   lab.connect();
   sim::Random random(21, 0);
-  for (int i = 0; i < 30; ++i) {
+  for (int i = 0; i < 100; ++i) {
     const reply_t result = lab.wait(lab.send(command_t::HOME, {"m01"}));
     ASSERT_EQ(result.result, "reached") << result.reason;
     const std::int64_t off = result.position_steps.at(0) + 50 - (lab.shaft_steps("m01") + 400);

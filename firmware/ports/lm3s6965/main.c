@@ -18,6 +18,7 @@ static bushd_mcu mcu;
 static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
 static uint16_t codes[TABLE_CODES];
 static bool eeprom_failed;
+static uint16_t motor_inputs;
 // In memory that a watchdog reset leaves as it is.
 #define ENABLE_KEPT 0x5AC3E917u
 __attribute__((section(".kept"))) static uint32_t enable_kept;
@@ -52,12 +53,12 @@ static uint32_t port_time_in_tick_ns(void* context) {
   return emission_time_in_tick_ns(clock_now());
 }
 
-// Switches close to ground.
+// Switches close to ground. Those of motors as they were when the tick began: when DIR of the next
+// one has been shifted, to read them would lose it.
 static bushd_inputs port_read_inputs(void* context) {
   (void)context;
   const bushd_inputs inputs = {
-      (uint16_t)~board_read_inputs(),
-      (uint8_t)(~SYSTEM_INPUTS >> SYSTEM_INPUTS_SHIFT & BUSHD_SYSTEM_INPUTS)};
+      motor_inputs, (uint8_t)(~SYSTEM_INPUTS >> SYSTEM_INPUTS_SHIFT & BUSHD_SYSTEM_INPUTS)};
   return inputs;
 }
 
@@ -114,6 +115,7 @@ static void boot(void) {
                              .codes = codes,
                              .code_count = TABLE_CODES};
   journal_state kept;
+  motor_inputs = (uint16_t)~board_read_inputs();
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enable_kept == ENABLE_KEPT;
   const kept_found found = kept_find();
@@ -126,6 +128,7 @@ static void boot(void) {
 }
 
 static void prepare(void) {
+  motor_inputs = (uint16_t)~board_read_inputs();
   bushd_mcu_prepare(&mcu);
   emission_ready(&mcu.plane[mcu.front ^ 1u]);
 }

@@ -1,0 +1,191 @@
+// What an MCU does by itself, an image beside its virtual twin: homing with a switch that bounces,
+// motion by local inputs, and coming back after a watchdog reset in motion.
+#include <random>
+
+#include "conformance/script.h"
+#include "sim/switch.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint8_t kMotor = 6;
+
+// A motor's carriage and the switch that it runs into, by the pins of its MCU.
+class Carriage {
+ public:
+  Carriage(std::size_t mcu, const SwitchOptions& options) : mcu_(mcu), switch_(options) {}
+
+  bool sense(TimeNs now_ns, const std::vector<Edge>& edges) {
+    for (; seen_ < edges.size(); ++seen_) {
+      const Edge& edge = edges[seen_];
+      if (edge.mcu != mcu_ || edge.index != kMotor) continue;
+      if (edge.signal == Signal::kDir) positive_ = edge.level;
+      if (edge.signal == Signal::kStep && edge.level) position_steps_ += positive_ ? 1 : -1;
+    }
+    return switch_.read(now_ns, position_steps_);
+  }
+  std::int64_t position_steps() const { return position_steps_; }
+
+ private:
+  std::size_t mcu_;
+  Switch switch_;
+  std::size_t seen_ = 0;
+  bool positive_ = false;
+  std::int64_t position_steps_ = 0;
+};
+
+class Autonomous : public Script, public testing::WithParamInterface<Target> {
+ protected:
+  Autonomous() : Script(GetParam()) {}
+  void SetUp() override { ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kMotor})); }
+
+  // Inputs are looked at once a tick: they change for both in the same one.
+  void to_inputs_time() { bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4); }
+
+  void expect_alike() {
+    expect_the_same_steps(kMotor, steps(0, kMotor).size());
+    expect_the_same_times(kMotor);
+    expect_the_same_reports();
+  }
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Autonomous);
+INSTANTIATE_TEST_SUITE_P(Of, Autonomous, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+class HomingScript : public Autonomous {
+ protected:
+  static constexpr std::int64_t kAtSteps = -300;
+
+  // Three ticks of bounce are within a slow step.
+  static SwitchOptions contact() {
+    return {.at_steps = kAtSteps,
+            .positive_end = false,
+            .hysteresis_steps = 6,
+            .bounce_ns = 3 * TimeNs{kTickNs},
+            .seed = 5};
+  }
+
+  void pass_until_rest() {
+    for (int ticks = 0; ticks < 3000; ++ticks) {
+      to_inputs_time();
+      for (Carriage* carriage : {&virtual_, &real_carriage_}) {
+        const bool active = carriage->sense(bus_.now_ns(), recorder_.edges);
+        bus_.node(carriage == &virtual_ ? 0 : 1)
+            .set_inputs({static_cast<std::uint16_t>(active ? 1u << kMotor : 0u), 0});
+      }
+      if (ticks % 60 == 59 && master_.poll(kReal).moving == 0 &&
+          master_.poll(kVirtual).moving == 0) {
+        return;
+      }
+    }
+    FAIL() << "it does not come to rest";
+  }
+
+  // Both within one tick: from then on they go together.
+  void home() {
+    const bushd_home message{kMotor, -1, 5000, 400, 1000, 0};
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_home(&message, payload.data()));
+    bus_.advance_to(bus_.node(0).next_event_ns());
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      master_.post(address, BUSHD_MSG_HOME, payload);
+      bus_.advance_to(bus_.now_ns() + 1'000'000);
+    }
+  }
+
+  Carriage virtual_{0, contact()};
+  Carriage real_carriage_{1, contact()};
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(HomingScript);
+INSTANTIATE_TEST_SUITE_P(Of, HomingScript, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+// Fast approach, ramp-down on the switch, back-off, slow approach, each step in the slot of the
+// twin's.
+TEST_P(HomingScript, WhereverItComesFromItIsTheSameToOneStep) {
+  std::mt19937 random(3);
+  for (int i = 0; i < 6; ++i) {
+    SCOPED_TRACE("homing " + std::to_string(i));
+    run_by_table(master_.poll(kReal).tick + 24,
+                 {{kMotor, 0, 1, 20 + static_cast<std::uint32_t>(random() % 400)}});
+    ASSERT_NO_FATAL_FAILURE(pass_until_rest());
+    home();
+    ASSERT_NO_FATAL_FAILURE(pass_until_rest());
+    const bushd_report report = master_.poll(kReal);
+    EXPECT_EQ(report.homing, BUSHD_HOMING_DONE);
+    EXPECT_EQ(report.homed, 1 << kMotor);
+    const std::int64_t off =
+        real_carriage_.position_steps() - kAtSteps - report.motor[kMotor].position_steps;
+    EXPECT_LE(std::abs(off), 1) << "the counter is 0 where the switch closes";
+    expect_alike();
+  }
+}
+
+TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor}));
+  for (const std::uint8_t button : {BUSHD_INPUT_FORWARD, BUSHD_INPUT_REVERSE}) {
+    const std::size_t before = steps(1, kMotor).size();
+    const std::int32_t from_steps = master_.poll(kReal).motor[kMotor].position_steps;
+    to_inputs_time();
+    set_inputs({0, button});
+    pass_ticks(120);
+    const bushd_report held = master_.poll(kReal);
+    EXPECT_EQ(held.autonomous, 1 << kMotor);
+    EXPECT_EQ(held.motor[kMotor].position_steps > from_steps, button == BUSHD_INPUT_FORWARD);
+    const std::size_t until_released = steps(1, kMotor).size();
+    EXPECT_GT(until_released, before + 200) << "0.9 ms a step";
+    to_inputs_time();
+    set_inputs({});
+    pass_ticks(60);
+    EXPECT_EQ(master_.poll(kReal).moving, 0);
+    EXPECT_LT(steps(1, kMotor).size(), until_released + 30) << "it ramps down";
+    expect_alike();
+  }
+}
+
+// The image hangs; the twin is reset when the image's watchdog has bitten.
+TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
+  for (const bool keeps_enable : {false, true}) {
+    SCOPED_TRACE(keeps_enable);
+    bushd_set_inputs inputs{};
+    inputs.enable_after_watchdog = keeps_enable;
+    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs));
+    run_by_table(master_.poll(kReal).tick + 24, {{kMotor, 0, 1, 10'000}});
+    pass_ticks(60);
+    const bushd_report before = master_.poll(kReal);
+    ASSERT_EQ(before.running, 1 << kMotor);
+    real_->hang();
+    const TimeNs hung_ns = bus_.now_ns();
+    pass_ticks(60);
+    bus_.mcu(0).set_reset_cause(BUSHD_RESET_WATCHDOG);
+    bus_.reboot(0);
+    pass_ticks(120);
+    std::size_t falls = 0;
+    for (const TimeNs fall_ns : recorder_.times(1, Signal::kEnable, 0, false)) {
+      if (fall_ns < hung_ns) continue;
+      ++falls;
+      EXPECT_LT(fall_ns - hung_ns, 150'000'000);
+    }
+    EXPECT_EQ(falls, 1u);
+    const bushd_report after = master_.poll(kReal);
+    EXPECT_EQ(after.boot_number, before.boot_number + 1);
+    EXPECT_EQ(after.reset_cause, BUSHD_RESET_WATCHDOG);
+    EXPECT_EQ(after.state, BUSHD_STATE_BUSY);
+    EXPECT_EQ((after.flags & BUSHD_FLAG_ENABLED) != 0, keeps_enable);
+    EXPECT_EQ(after.motor[kMotor].position_steps, 0);
+    EXPECT_EQ(master_.poll(kVirtual).reset_cause, after.reset_cause);
+    expect_the_same_reports();
+
+    // And it goes on.
+    const std::array<std::size_t, 2> made = {steps(0, kMotor).size(), steps(1, kMotor).size()};
+    ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kMotor}));
+    run_by_table(master_.poll(kReal).tick + 24, {{kMotor, 0, -1, 50}});
+    pass_ticks(100);
+    for (const std::size_t mcu : {0, 1}) EXPECT_EQ(steps(mcu, kMotor).size(), made[mcu] + 50);
+    EXPECT_EQ(master_.poll(kReal).motor[kMotor].position_steps, -50);
+    expect_the_same_reports();
+  }
+}
+
+}  // namespace
+}  // namespace bushd::sim
