@@ -134,12 +134,20 @@ static uint16_t active_inputs(const bushd_mcu* mcu) {
   return mcu->port.read_inputs(mcu->port.context).motors ^ mcu->inputs.inverted;
 }
 
+// The last one was ended in a slow stage, and its motor makes a step by the slow table yet.
+static bool slow_table_in_use(const bushd_mcu* mcu) {
+  const bushd_mcu_motor* motor = &mcu->motor[mcu->homing.motor];
+  return motor->mode == BUSHD_MCU_RAMP_DOWN && motor->made.run.table == &mcu->homing.slow;
+}
+
 static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
   const uint16_t bit = motor_bit(message->motor);
   bushd_mcu_update_state(mcu);
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
   if (mcu->motor[message->motor].table < 0) return BUSHD_E_NO_TABLE;
-  if (under_way(&mcu->homing) || (bushd_mcu_engaged(mcu) & bit) != 0) return BUSHD_E_STATE;
+  if (under_way(&mcu->homing) || slow_table_in_use(mcu) || (bushd_mcu_engaged(mcu) & bit) != 0) {
+    return BUSHD_E_STATE;
+  }
   if (!slow_enough(mcu, message)) return BUSHD_E_FORMAT;
   // On its switch it will back off; but it must not look for it where it has overrun it.
   const bool on_switch = (active_inputs(mcu) & bit) != 0;

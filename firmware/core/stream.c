@@ -86,7 +86,8 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu
   if (end <= 0) return BUSHD_OK;
   if (stretch->flags & BUSHD_TICKS_START) {
     *news = true;
-    if (moves_on) return BUSHD_E_STATE;
+    // A limit's ramp-down is under way beyond what is queued.
+    if (moves_on || motor->mode >= BUSHD_MCU_RAMP_DOWN) return BUSHD_E_STATE;
     return first < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
   if (!moves_on) return BUSHD_E_GAP;

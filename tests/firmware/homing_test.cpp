@@ -196,6 +196,25 @@ TEST_P(Homing, CanBeGivenUpInEveryStage) {
   }
 }
 
+TEST_P(Homing, AnotherMotorWaitsUntilTheLastSlowStepIsOver) {
+  put(Contact(-300, -1, 5));
+  ASSERT_EQ(rig.home(command()), BUSHD_OK);
+  while (rig.poll().homing < BUSHD_HOMING_BACK_OFF) rig.pass();
+  rig.pass(3);
+  bushd_home other = command();
+  other.motor = 0;
+  bushd_home give_up = command();
+  give_up.most_steps = 0;
+  ASSERT_EQ(rig.home(give_up), BUSHD_OK);
+  rig.pass();
+  ASSERT_EQ(rig.poll().homing, BUSHD_HOMING_STOPPED);
+  ASSERT_EQ(rig.poll().moving, 1 << kMotor);
+  EXPECT_EQ(rig.home(other), BUSHD_E_STATE);
+  rig.pass_until_rest();
+  expect_counted(0);
+  EXPECT_EQ(rig.home(other), BUSHD_OK);
+}
+
 TEST_P(Homing, EmergencyEndsIt) {
   for (const bushd_how how : {BUSHD_RAMP_DOWN, BUSHD_CUT}) {
     Rig fresh;

@@ -106,6 +106,24 @@ TEST_P(Inputs, TheWayIntoALimitIsRefusedAndTheWayOutIsNot) {
   EXPECT_EQ(on->pulses(0), stood - 7);
 }
 
+TEST_P(Inputs, NothingStartsBeforeALimitsRampDownIsOver) {
+  for (const bool whole : {false, true}) {
+    const auto on = with({.limit_positive = 1});
+    ASSERT_EQ(start_run(*on, 50), BUSHD_OK);
+    on->pass(40);
+    on->pins(kSwitch);
+    on->pass(3);
+    ASSERT_EQ(on->poll().forbidden_positive, 1);
+    ASSERT_EQ(on->poll().moving, 1);
+    EXPECT_EQ(whole ? start_run(*on, -5) : start(*on, -5), BUSHD_E_STATE);
+    rest(*on);
+    const auto stood = on->pulses(0);
+    EXPECT_EQ(whole ? start_run(*on, -5) : start(*on, -5), BUSHD_OK);
+    rest(*on);
+    EXPECT_EQ(on->pulses(0), stood - 5);
+  }
+}
+
 TEST_P(Inputs, StartsByTableTicksIntoALimitAreRefused) {
   const auto on = with({.limit_negative = 1});
   on->pins(kSwitch);
