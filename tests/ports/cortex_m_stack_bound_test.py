@@ -121,7 +121,8 @@ class Path:
                 onward = [(code.target, depth)]
             else:
                 self.reach(depth + self.image.depth(code.target))  # in this one's place
-        if not ends_here(code):
+        fills_up = code.name == "nop" and code.next not in self.image.code  # before data
+        if not ends_here(code) and not fills_up:
             onward.append((code.next, after))
         return onward
 
