@@ -48,7 +48,9 @@ void Core::notice_limit(Motor& motor, const link::McuView& view) {
   const bool moving = (view.report.moving >> output & 1) != 0;
   const bool given_up =
       !moving && view.tick >= motor.axis.start_tick() && motor.axis.velocity_steps_per_s() != 0;
-  if (!given_up && motor.axis.executed_steps() == motor.position_steps) return;
+  // Its own ramp may be a step longer than what was planned.
+  const bool outlasts = moving && view.tick >= motor.axis.end_tick();
+  if (!given_up && !outlasts && motor.axis.executed_steps() == motor.position_steps) return;
   motor.limit = direction;
   const Mcu& mcu = mcus_[motor.mcu];
   master_of(mcu).drop(mcu.in_bus, output);
@@ -60,6 +62,10 @@ void Core::end_at_limit(std::size_t index) {
   Motor& motor = motors_[index];
   if (!motor.axis.stopping() && motor.position_steps == motor.axis.wanted_steps()) {
     end_motor(index, motion::Outcome::kReached, "stands at its target");
+    return;
+  }
+  if (motor.axis.stopping() && motor.position_steps == motor.axis.executed_steps()) {
+    end_motor(index, motion::Outcome::kStopped, "stopped on request");
     return;
   }
   std::string reason = "stopped by " + switch_at(motor.limit) + ", stands at " +

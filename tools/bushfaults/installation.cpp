@@ -77,6 +77,13 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
   return bushd::fail(fmt::format("no line can carry {} motors; use fewer", motors));
 }
 
+void add_limit_switches(bushd::config::Config& config) {
+  for (std::size_t i = 0; i < config.motors.size(); ++i) {
+    config.motors[i].limit_positive = i % 3 != 1;
+    config.motors[i].limit_negative = i % 3 != 0;
+  }
+}
+
 std::string ways_text(const bushd::config::Config& config) {
   const bushd::config::Bus& bus = config.buses[0];
   return fmt::format("--moves {} --frames {} --format {} --emergency {}",

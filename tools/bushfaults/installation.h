@@ -25,6 +25,9 @@ struct Ways {
 bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::size_t mcus,
                                                        const Ways& ways, std::uint64_t seed);
 
+// At one end of most motors, at both of the others.
+void add_limit_switches(bushd::config::Config& config);
+
 // The ways of its bus, as options of bushfaults.
 std::string ways_text(const bushd::config::Config& config);
 

@@ -21,6 +21,7 @@ constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
     {"pauses", 60, "the daemon does nothing for 0.1 .. 3 s"},
     {"kills", 30, "the daemon is killed, another starts 10 ms .. 3 s later"},
     {"resets", 30, "an MCU is reset and boots 1 ms .. 2 s later"},
+    {"limit-switches", 0, "a motor's limit switch is active for 5 ms .. 2 s"},
 }};
 
 constexpr std::array<KindInfo, kCommandKinds> kCommands = {{

@@ -26,8 +26,10 @@ enum class FaultKind : std::uint8_t {
   kPause,
   kKill,
   kReset,
+  // None unless asked for.
+  kLimitSwitch,
 };
-inline constexpr std::size_t kFaultKinds = 15;
+inline constexpr std::size_t kFaultKinds = 16;
 
 // What clients send.
 enum class CommandKind : std::uint8_t {

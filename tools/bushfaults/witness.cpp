@@ -18,6 +18,9 @@ using bushd::state_t;
 // A move of the random clients lasts some seconds, the longest fault ten, and then a link is given
 // up within one.
 constexpr bushd::sim::TimeNs kResultDueNs = 40'000'000'000;
+// A daemon may not have heard for as long that a switch bars the way, and a move may take as long
+// to its end.
+constexpr bushd::sim::TimeNs kBarredNs = kResultDueNs;
 // Commands that clients repeat are younger.
 constexpr std::int64_t kNumbersKept = 60;
 
@@ -54,7 +57,7 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
     : config_(config), bus_(bus), plant_(plant), recent_(recent) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
-    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, 0, {}, {}, {}});
+    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, 0, {}, {}, {}, {}});
   }
   states_.resize(config.mcus.size());
   boot_seen_.resize(config.mcus.size());
@@ -88,6 +91,10 @@ void Witness::mcu_reset(std::size_t mcu) {
     motor.offset.reset();
     motor.perhaps_set.clear();
   }
+}
+
+void Witness::pressed(TimeNs now_ns, std::size_t motor) {
+  motors_[motor].pressed_ns = now_ns;
 }
 
 void Witness::command(TimeNs now_ns, const command_t& command) {
@@ -234,8 +241,12 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
 void Witness::check_end(TimeNs now_ns, const Motor& motor, const End& end,
                         std::optional<std::int64_t> target) {
   const std::int64_t stands = plant_steps(motor);
-  const bool planned = end.word == "reached" || end.word == "stopped" || end.word == "turned";
-  if (end.word == "fault") {
+  const bool limited = end.word == "limit";
+  const bool planned =
+      end.word == "reached" || end.word == "stopped" || end.word == "turned" || limited;
+  if (limited && (!motor.pressed_ns || now_ns - *motor.pressed_ns > kBarredNs)) {
+    violated(now_ns, motor.name + " ended at its limit, and nobody has pressed its switch");
+  } else if (end.word == "fault") {
     violated(now_ns, fmt::format("{} ended in fault at {}", motor.name, end.position_steps));
   } else if (end.word == "reached" && target && *target != stands) {
     violated(now_ns, fmt::format("{} is said to have reached its target, and stands {} steps off",

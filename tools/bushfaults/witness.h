@@ -38,6 +38,8 @@ class Witness {
 
   void daemon_started(TimeNs now_ns);  // what clients had asked of the one before is void
   void mcu_reset(std::size_t mcu);
+  // Its limit switch is, or was until now, active.
+  void pressed(TimeNs now_ns, std::size_t motor);
   // Before the daemon gets it; after that come the replies that it makes at once.
   void command(TimeNs now_ns, const bushd::command_t& command);
   void reply(TimeNs now_ns, const bushd::reply_t& reply);
@@ -76,7 +78,8 @@ class Witness {
     std::optional<std::int64_t> offset = 0;
     // Positions that somebody asked to set and that may have been set, although nobody was told.
     std::vector<std::int64_t> perhaps_set;
-    std::optional<Key> move;  // accepted, and this motor's part of it not yet ended
+    std::optional<TimeNs> pressed_ns;  // when its limit switch was active last
+    std::optional<Key> move;           // accepted, and this motor's part of it not yet ended
     // Where it leads, as the plant counts; nothing after a stop.
     std::optional<std::int64_t> target;
   };

@@ -64,6 +64,9 @@ class World {
   void strike(FaultKind kind);
   void reset_mcu();
   void deafen_mcu();
+  void press_switch();
+  void set_switches(std::size_t mcu);
+  void release_switches();
   void note_fault(FaultKind kind, const std::string& detail);
 
   Options options_;
@@ -82,7 +85,8 @@ class World {
   FaultCounts faults_{};
   TimeNs now_ns_ = 0;
   TimeNs next_command_ns_ = 0;
-  TimeNs mcus_up_ns_ = 0;  // when the last MCU that was reset boots
+  std::vector<TimeNs> pressed_until_ns_;  // by motor, its limit switch; 0: it is not
+  TimeNs mcus_up_ns_ = 0;                 // when the last MCU that was reset boots
   TimeNs deadlines_checked_ns_ = 0;
   TimeNs skew_checked_ns_ = 0;
 };
