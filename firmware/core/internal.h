@@ -70,7 +70,7 @@ void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t motor);
 void bushd_mcu_clear_streams(bushd_mcu* mcu);
 
 // A tick's row leaves the queue: of all motors, in 1/256 step or, if all are whole, in steps. A
-// small MCU may link the second of its own (BUSHD_OWN_TAKE_ROW).
+// small MCU may link the second of its own (BUSHD_OWN_COARSE_ROWS).
 typedef struct bushd_mcu_row {
   uint16_t moves;  // motors with other than 0
   uint16_t back;   // with less than 0
@@ -78,10 +78,15 @@ typedef struct bushd_mcu_row {
 void bushd_mcu_take_fine_row(int16_t* queued, int16_t* displacement, uint8_t motors,
                              bushd_mcu_row* row);
 void bushd_mcu_take_coarse_row(int16_t* queued, int16_t* steps, uint8_t motors, bushd_mcu_row* row);
+// Into it, of the motors in the mask; likewise.
+void bushd_mcu_put_coarse_row(int16_t* queued, uint16_t mask, const uint8_t* counts);
 
 // Adds its steps to the counter of each motor; the counters lie `stride` bytes apart. A small MCU
 // may link one of its own (BUSHD_OWN_ADD_STEPS).
 void bushd_mcu_add_steps(int32_t* counter, size_t stride, const int16_t* steps, uint8_t motors);
+
+// requests.c: goes on with an answer; false if there is none.
+bool bushd_mcu_go_on_answering(bushd_mcu* mcu);
 
 // motor.c: what motors do in the tick that is prepared, and how they stop by themselves.
 // Makes the outlook from this tick on, the first that is not prepared.

@@ -14,12 +14,15 @@ const uint16_t bushd_mcu_motor_bit[BUSHD_MOTORS_PER_MCU] = {
 
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu) {
   uint16_t moving = mcu->plane[0].active | mcu->plane[1].active;
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    const bushd_mcu_motor* motor = &mcu->motor[m];
+  const uint32_t open = FIRST_OPEN(mcu);
+  const bushd_mcu_motor* motor = mcu->motor;
+  uint16_t bit = 1;
+  for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor) {
     if (motor->mode != BUSHD_MCU_STREAM || motor->delay != 0 ||
-        ticks_after(motor->known_until, FIRST_OPEN(mcu)) > 0) {
-      moving |= motor_bit(m);
+        ticks_after(motor->known_until, open) > 0) {
+      moving |= bit;
     }
+    bit = (uint16_t)(bit << 1);
   }
   return moving;
 }

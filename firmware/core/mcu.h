@@ -62,6 +62,7 @@ typedef struct bushd_mcu_config {
   uint16_t boot_number;  // differs from that of the boot before
   uint8_t reset_cause;   // BUSHD_RESET_*
   bool enable_at_boot;   // what keep_enable was told last, after a watchdog reset; else false
+  bool in_pieces;        // answers are left to bushd_mcu_work; else they are sent at once
   int16_t* queue;        // queue_ticks x motors displacements
   uint16_t
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
@@ -225,6 +226,14 @@ typedef struct bushd_mcu_rows {
   bushd_ticks ticks;
 } bushd_mcu_rows;
 
+// An answer that is to be sent. In the reply buffer the CRC's register stands behind it, until it
+// is through.
+typedef struct bushd_mcu_answer {
+  uint8_t size;     // of the frame before its CRC; 0: none
+  uint8_t checked;  // by the CRC
+  uint32_t delay_ns;
+} bushd_mcu_answer;
+
 // Runs that wait for the trigger, and what became of the last ones (trigger.c). The runs are in
 // their motors.
 typedef struct bushd_mcu_trigger_input {
@@ -304,6 +313,7 @@ typedef struct bushd_mcu {
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];
   bushd_receiver receiver;
+  bushd_mcu_answer answer;
   uint8_t reply[BUSHD_MCU_MAX_REPLY];
 } bushd_mcu;
 
@@ -326,9 +336,10 @@ void bushd_mcu_restored(bushd_mcu* mcu);
 // delimiter.
 void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns);
 
-// What a frame of many ticks asks for is done in pieces if the port wants it so: while this returns
-// true, something was left to do, and no byte is to be given to the receiver. The other functions
-// do first what they need. O(motors).
+// What a frame of many ticks asks for is done in pieces if the port wants it so, and so are answers
+// (bushd_mcu_config.in_pieces): while this returns true, something was left to do, and no byte is
+// to be given to the receiver. The other functions do first what they need. O(motors), or O(bytes
+// of an answer).
 bool bushd_mcu_work(bushd_mcu* mcu);
 
 // Tick boundary: counts the steps of the tick that ended, returns the plane of the one that begins.

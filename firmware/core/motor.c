@@ -134,7 +134,7 @@ static void watch_low_water(bushd_mcu* mcu) {
   if (queued < mcu->low_water_ticks) mcu->low_water_ticks = queued > 0 ? (uint16_t)queued : 0;
 }
 
-#ifndef BUSHD_OWN_TAKE_ROW
+#ifndef BUSHD_OWN_COARSE_ROWS
 void bushd_mcu_take_coarse_row(int16_t* queued, int16_t* steps, uint8_t motors,
                                bushd_mcu_row* row) {
   bushd_mcu_take_fine_row(queued, steps, motors, row);

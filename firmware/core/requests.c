@@ -3,31 +3,33 @@
 
 #include "firmware/core/internal.h"
 
-static uint16_t running(const bushd_mcu* mcu) {
-  uint16_t mask = 0;
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    const bushd_mcu_motor* motor = &mcu->motor[m];
-    if (motor->mode != BUSHD_MCU_STREAM && motor->exact) mask |= motor_bit(m);
-  }
-  // What people move by local inputs is not for a master to end.
-  return (uint16_t)(mask & ~(mcu->autonomous & ~bushd_mcu_homing_motor(mcu)));
-}
-
-// One island has room in a report: that of the lowest motor, and who else has the same one.
-static void report_islands(const bushd_mcu* mcu, bushd_report* report) {
-  report->islands = 0;
-  report->island_from = 0;
-  report->island_until = 0;
+// What it says of each motor. One island has room in a report: that of the lowest motor, and who
+// else has the same one.
+static inline void report_motors(const bushd_mcu* mcu, bushd_report* report) {
   const bushd_mcu_island* told = NULL;
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    if (!mcu->motor[m].has_island) continue;
-    const bushd_mcu_island* island = &mcu->motor[m].island;
-    if (told == NULL) told = island;
-    if (island->from == told->from && island->until == told->until) report->islands |= motor_bit(m);
+  const bushd_mcu_motor* motor = mcu->motor;
+  bushd_motor_report* to = report->motor;
+  uint16_t running = 0;
+  uint16_t bit = 1;
+  report->islands = 0;
+  for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor, ++to) {
+    if (motor->mode != BUSHD_MCU_STREAM && motor->exact) running |= bit;
+    if (motor->has_island) {
+      if (told == NULL) told = &motor->island;
+      if (motor->island.from == told->from && motor->island.until == told->until) {
+        report->islands |= bit;
+      }
+    }
+    to->position_steps = motor->position_steps;
+    const bool far = ticks_after(motor->known_until, mcu->tick) > INT16_MAX;
+    to->known_until = (uint16_t)(far ? mcu->tick + INT16_MAX : motor->known_until);
+    bit = (uint16_t)(bit << 1);
   }
-  if (told == NULL) return;
-  report->island_from = (uint16_t)told->from;
-  report->island_until = (uint16_t)told->until;
+  report->motor_count = mcu->config.motors;
+  // What people move by local inputs is not for a master to end.
+  report->running = (uint16_t)(running & ~(mcu->autonomous & ~bushd_mcu_homing_motor(mcu)));
+  report->island_from = told != NULL ? (uint16_t)told->from : (uint16_t)0;
+  report->island_until = told != NULL ? (uint16_t)told->until : (uint16_t)0;
 }
 
 // Large on the stack: not a part of the frame of who calls it, below which streams are taken.
@@ -46,7 +48,6 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   report.mark_ns = mcu->clock.mark_ns;
   report.rate_ppb = mcu->clock.rate_ppb;
   report.moving = bushd_mcu_moving(mcu);
-  report.running = running(mcu);
   bushd_mcu_report_inputs(mcu, &report);
   report.reset_cause = mcu->config.reset_cause;
   report.failed_tests = mcu->failed_tests;
@@ -59,19 +60,12 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   report.run_downs = mcu->run_downs;
   report.low_water_ticks = mcu->low_water_ticks;
   mcu->low_water_ticks = UINT16_MAX;
-  report_islands(mcu, &report);
+  report_motors(mcu, &report);
   report.armed = mcu->trigger.armed;
   report.trigger_number = mcu->trigger.number;
   report.trigger_state = mcu->trigger.state;
   report.start_tick = mcu->trigger.start_tick;
   report.start_ns = mcu->trigger.start_ns;
-  report.motor_count = mcu->config.motors;
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    report.motor[m].position_steps = mcu->motor[m].position_steps;
-    const bool far = ticks_after(mcu->motor[m].known_until, mcu->tick) > INT16_MAX;
-    report.motor[m].known_until =
-        (uint16_t)(far ? mcu->tick + INT16_MAX : mcu->motor[m].known_until);
-  }
   return bushd_encode_report(&report, payload);
 }
 
@@ -326,11 +320,37 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
     const bushd_acknowledgement acknowledgement = {(uint8_t)status};
     a.size = bushd_encode_acknowledgement(&acknowledgement, a.payload);
   }
+  uint8_t* const raw = mcu->reply + 2;
+  raw[0] = mcu->config.address;
+  raw[1] = (uint8_t)(frame->type | BUSHD_TYPE_REPLY);
+  raw[2] = frame->tag;
+  mcu->answer.size = (uint8_t)(BUSHD_FRAME_HEADER + a.size);
+  mcu->answer.checked = 0;
+  mcu->answer.delay_ns = a.delay_ns;
+  bushd_put_u32(raw + mcu->answer.size, BUSHD_CRC32_START);
+  if (mcu->config.in_pieces) return;
+  while (bushd_mcu_go_on_answering(mcu)) {
+  }
+}
+
+bool bushd_mcu_go_on_answering(bushd_mcu* mcu) {
+  enum { PIECE = 48 };
+  bushd_mcu_answer* reply = &mcu->answer;
+  if (reply->size == 0) return false;
+  uint8_t* const raw = mcu->reply + 2;
+  const uint8_t left = (uint8_t)(reply->size - reply->checked);
+  const uint32_t crc = bushd_get_u32(raw + reply->size);
+  if (left != 0) {
+    const uint8_t count = left < PIECE ? left : PIECE;
+    bushd_put_u32(raw + reply->size, bushd_crc32(crc, raw + reply->checked, count));
+    reply->checked = (uint8_t)(reply->checked + count);
+    return true;
+  }
   // A delimiter comes first: it ends whatever the master took, while the line was idle, for a
   // frame's beginning.
   mcu->reply[0] = 0;
-  const size_t wire =
-      bushd_frame_encode(mcu->config.address, (uint8_t)(frame->type | BUSHD_TYPE_REPLY), frame->tag,
-                         a.payload, a.size, mcu->reply + 1);
-  mcu->port.transmit(mcu->port.context, mcu->reply, wire + 1, a.delay_ns);
+  const size_t wire = bushd_frame_close(mcu->reply + 1, reply->size, crc);
+  reply->size = 0;
+  mcu->port.transmit(mcu->port.context, mcu->reply, wire + 1, reply->delay_ns);
+  return true;
 }

@@ -267,23 +267,29 @@ static bool all_follow(const bushd_mcu* mcu, const bushd_ticks* ticks) {
          (ticks->mask & (uint16_t)~outlook->following) == 0;
 }
 
+#ifndef BUSHD_OWN_COARSE_ROWS
+void bushd_mcu_put_coarse_row(int16_t* queued, uint16_t mask, const uint8_t* counts) {
+  for (; mask != 0; mask = (uint16_t)(mask >> 1), ++queued) {
+    if ((mask & 1u) != 0) *queued = bushd_coarse_to_fine(*counts++);
+  }
+}
+#endif
+
 static void put_row(bushd_mcu* mcu) {
   const bushd_ticks* const ticks = &mcu->rows.ticks;
   const uint8_t row = mcu->rows.next++;
   int16_t* queued = queue_at(mcu, ticks->first_tick + row, 0);
   uint16_t mask = ticks->mask;
   const uint8_t* at = ticks->displacements + (uint16_t)(row * ticks->motors);
-  if (ticks->flags & BUSHD_TICKS_FINE) {
-    at += (uint16_t)(row * ticks->motors);
-    for (; mask != 0; mask = (uint16_t)(mask >> 1), ++queued) {
-      if ((mask & 1u) == 0) continue;
-      *queued = bushd_get_i16(at);
-      at += 2;
-    }
-  } else {
-    for (; mask != 0; mask = (uint16_t)(mask >> 1), ++queued) {
-      if ((mask & 1u) != 0) *queued = bushd_coarse_to_fine(*at++);
-    }
+  if ((ticks->flags & BUSHD_TICKS_FINE) == 0) {
+    bushd_mcu_put_coarse_row(queued, mask, at);
+    return;
+  }
+  at += (uint16_t)(row * ticks->motors);
+  for (; mask != 0; mask = (uint16_t)(mask >> 1), ++queued) {
+    if ((mask & 1u) == 0) continue;
+    *queued = bushd_get_i16(at);
+    at += 2;
   }
 }
 
@@ -292,6 +298,7 @@ bool bushd_mcu_work(bushd_mcu* mcu) {
     bushd_mcu_look_out(mcu, FIRST_OPEN(mcu));
     return true;
   }
+  if (bushd_mcu_go_on_answering(mcu)) return true;
   if (mcu->rows.next >= mcu->rows.ticks.count) return false;
   put_row(mcu);
   return true;

@@ -13,10 +13,14 @@ size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint
   raw[2] = tag;
   uint8_t* const body = raw + BUSHD_FRAME_HEADER;
   if (payload_size != 0 && payload != body) memcpy(body, payload, payload_size);
-  size_t size = BUSHD_FRAME_HEADER + payload_size;
-  const uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, raw, size);
+  const size_t size = BUSHD_FRAME_HEADER + payload_size;
+  return bushd_frame_close(wire, size, bushd_crc32(BUSHD_CRC32_START, raw, size));
+}
+
+size_t bushd_frame_close(uint8_t* wire, size_t size, uint32_t crc) {
+  uint8_t* const raw = wire + 1;
   for (uint8_t shift = 0; shift < 32; shift = (uint8_t)(shift + 8)) {
-    raw[size++] = (uint8_t)(crc >> shift);
+    raw[size++] = (uint8_t)(~crc >> shift);
   }
   // Backwards, so that the distance to the next zero is known at each.
   size_t next = size;

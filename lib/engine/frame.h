@@ -35,6 +35,10 @@ uint32_t bushd_crc32(uint32_t crc, const uint8_t* data, size_t size);
 size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint8_t* payload,
                           size_t payload_size, uint8_t* wire);
 
+// The end of it, for who makes a frame in steps: `size` bytes of the raw frame stand at wire + 1,
+// `crc` is the register after them.
+size_t bushd_frame_close(uint8_t* wire, size_t size, uint32_t crc);
+
 // A decoded frame; `payload` points into the receiver's buffer and lives until the next byte.
 typedef struct bushd_frame {
   uint8_t address;

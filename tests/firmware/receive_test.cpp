@@ -158,5 +158,20 @@ TEST(Receive, AnswersBeginWithADelimiter) {
   EXPECT_EQ(rig.last_sent().back(), 0);
 }
 
+TEST(Receive, AnswersInPiecesAreTheSame) {
+  const auto report_of = [](bool in_pieces) {
+    Rig rig({.motors = 16, .in_pieces = in_pieces});
+    rig.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, {1, 7, 5, 0});
+    if (in_pieces) {
+      EXPECT_FALSE(rig.answer()) << "it waits until there is time for it";
+      rig.work();
+    }
+    const auto answer = rig.answer();
+    EXPECT_TRUE(answer);
+    return answer ? std::pair(answer->payload, answer->delay_ns) : std::pair(Bytes{}, 0u);
+  };
+  EXPECT_EQ(report_of(true), report_of(false));
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -118,6 +118,7 @@ Rig::Rig(RigOptions options)
   config.boot_number = 77;
   config.reset_cause = options.reset_cause;
   config.enable_at_boot = options.enable_at_boot;
+  config.in_pieces = options.in_pieces;
   config.queue = queue_.data();
   config.queue_ticks = options.queue_ticks;
   config.codes = codes_.data();

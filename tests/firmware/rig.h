@@ -29,6 +29,7 @@ struct RigOptions {
   std::uint8_t failing_tests = 0;
   bushd_reset_cause reset_cause = BUSHD_RESET_POWER_ON;
   bool enable_at_boot = false;
+  bool in_pieces = false;  // answers wait for work()
   std::uint16_t lacks = 0;
   std::uint32_t pulse_ns = 0;
   bool stores_address = true;
@@ -98,6 +99,11 @@ class Rig {
   void frame(std::uint8_t type, const Bytes& payload) { frame(options_.address, type, payload); }
   // The only answer since the last call, if any.
   std::optional<Answer> answer();
+  // Does what was left to do.
+  void work() {
+    while (bushd_mcu_work(&mcu_)) {
+    }
+  }
   const Bytes& last_sent() const { return last_sent_; }
   std::uint8_t last_tag() const { return tag_; }
   // Sends a request to this MCU and returns the status that it acknowledges with.

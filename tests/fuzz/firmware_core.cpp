@@ -192,6 +192,7 @@ class Mcu {
                                      .boot_number = boot_number_,
                                      .reset_cause = BUSHD_RESET_WATCHDOG,
                                      .enable_at_boot = enable_at_boot_,
+                                     .in_pieces = false,
                                      .queue = queue_.data(),
                                      .queue_ticks = kQueueTicks,
                                      .min_tick_ns = BUSHD_MIN_TICK_NS,

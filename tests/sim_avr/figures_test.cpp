@@ -26,7 +26,8 @@ constexpr double kMostJitterCycles = 35;
 struct Load {
   bushd_format format;
   std::uint32_t tick_ns;
-  int steps;  // of a motor in a tick
+  int steps;          // of a motor in a tick
+  int frames_a_poll;  // 0: nothing is asked
   double goal_steps_per_s;
 };
 
@@ -112,13 +113,21 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
   const TimeNs begin_ns = bus_.now_ns();
   const std::uint64_t entries_before = avr_->interrupts();
   const std::uint32_t first = before.tick + 24;
+  std::size_t polls = 0;
+  master_.frames.clear();
   for (int tick = 0; tick < kTicks; tick += ticks_per_frame()) {
     send_frame(first, tick);
+    if (load.frames_a_poll != 0 && tick / ticks_per_frame() % load.frames_a_poll == 1) {
+      ++polls;
+      master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0});
+    }
     bus_.advance_to(begin_ns + tick_ns * (tick + ticks_per_frame()));
   }
   const double ticks = kTicks;
   const double entries = static_cast<double>(avr_->interrupts() - entries_before) / ticks;
   bus_.advance_to(bus_.now_ns() + 60 * tick_ns);
+  EXPECT_EQ(master_.frames.size(), polls);
+  EXPECT_EQ(master_.bad_frames, 0);
 
   std::array<std::vector<Edge>, BUSHD_MOTORS_PER_MCU> edges;
   for (const Edge& edge : recorder_.edges) {
@@ -156,21 +165,25 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
   const double steps_per_s = BUSHD_MOTORS_PER_MCU * load.steps / chip_tick_ns * 1e9;
   EXPECT_GE(steps_per_s, load.goal_steps_per_s);
   std::printf(
-      "ATmega2560 %s, %d steps a tick: %.0f steps/s of 16 motors; tick %.0f us (%.0f interrupts), "
+      "ATmega2560 %s, %d steps a tick%s: %.0f steps/s of 16 motors; tick %.0f us (%.0f "
+      "interrupts), "
       "%.0f steps in all, "
       "pulses from %.2f us, jitter %.0f cycles, %zu bytes of stack never used\n",
-      load.format == BUSHD_FORMAT_FINE ? "fine" : "coarse", load.steps, steps_per_s,
-      chip_tick_ns / 1000, entries, BUSHD_MOTORS_PER_MCU * load.steps * ticks,
-      static_cast<double>(shortest_ns) / 1000, jitter_cycles, avr_->untouched_ram());
+      load.format == BUSHD_FORMAT_FINE ? "fine" : "coarse", load.steps,
+      polls != 0 ? ", answering" : "", steps_per_s, chip_tick_ns / 1000, entries,
+      BUSHD_MOTORS_PER_MCU * load.steps * ticks, static_cast<double>(shortest_ns) / 1000,
+      jitter_cycles, avr_->untouched_ram());
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, AvrFigures,
-                         testing::Values(Load{BUSHD_FORMAT_COARSE, 928'000, 127, 2'000'000},
-                                         Load{BUSHD_FORMAT_COARSE, 928'000, 126, 1'980'000},
-                                         Load{BUSHD_FORMAT_FINE, 1'800'000, 127, 1'000'000}),
+                         testing::Values(Load{BUSHD_FORMAT_COARSE, 928'000, 127, 0, 2'000'000},
+                                         Load{BUSHD_FORMAT_COARSE, 928'000, 126, 0, 1'980'000},
+                                         Load{BUSHD_FORMAT_COARSE, 1'000'000, 127, 2, 1'850'000},
+                                         Load{BUSHD_FORMAT_FINE, 1'800'000, 127, 0, 1'000'000}),
                          [](auto& load) {
                            return (load.param.format == BUSHD_FORMAT_FINE ? "Fine" : "Coarse") +
-                                  std::to_string(load.param.steps);
+                                  std::to_string(load.param.steps) +
+                                  (load.param.frames_a_poll != 0 ? "Answering" : "");
                          });
 
 }  // namespace

@@ -49,9 +49,8 @@ typedef struct prepared_tick {
 
 // Of the main loop.
 static prepared_tick prepared[2];
-static prepared_tick* given = &prepared[0];  // waits or was taken last
-static prepared_tick* spare = &prepared[1];
-static const bushd_plane* next_plane;  // NULL: the core's present tick has the last one
+static prepared_tick* given = prepared;  // waits or was taken last
+static const bushd_plane* next_plane;    // NULL: the core's present tick has the last one
 // Of a tick without adjustment, from residue 0.
 static uint32_t plain_cycles;
 static uint16_t plain_residue;
@@ -128,7 +127,7 @@ static uint32_t set_length(prepared_tick* next) {
 
 // `again`: in place of the one that waits; not if it was taken.
 static void give(bool again) {
-  prepared_tick* const next = spare;
+  prepared_tick* const next = given == prepared ? prepared + 1 : prepared;
   const uint32_t cycles = set_length(next);
   // Levels are written anew in every slot.
   if (next_plane->active != 0 || next_plane->outputs == BUSHD_OUTPUTS_LEVELS) {
@@ -140,7 +139,6 @@ static void give(bool again) {
     if (again && emission_next == &emission_silent) return;
     emission_next = &next->tick;
   }
-  spare = given;
   given = next;
 }
 
@@ -169,6 +167,11 @@ void emission_ready(const bushd_plane* plane) {
 
 bool emission_begun(void) {
   return emission_committed;
+}
+
+bool emission_begins_soon(void) {
+  // One that was not taken when it should have been begins a tick later.
+  return given_start - clock_now() < EMISSION_FRAME_CYCLES;
 }
 
 // If no plane is ready after this one, its last levels stay.

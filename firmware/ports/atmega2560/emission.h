@@ -16,6 +16,9 @@
 #define EMISSION_SLOTS 128u
 // STEP pulses last as long at least.
 #define EMISSION_PULSE_NS 2500u
+// Most that a frame asks for takes no longer than twice that: then the next tick is not begun too
+// late.
+#define EMISSION_FRAME_CYCLES 2000u
 // Shorter, slots would not hold their interrupts.
 #define EMISSION_MIN_TICK_NS 900000u
 
@@ -30,6 +33,8 @@ void emission_ready(const bushd_plane* plane);
 
 // The tick after the core's present one has begun.
 bool emission_begun(void);
+// It will within EMISSION_FRAME_CYCLES.
+bool emission_begins_soon(void);
 // The core's present tick is this one; before bushd_mcu_swap.
 void emission_swap(void);
 // When a slot begins of the plane that was given last, if no other tick comes before it.

@@ -26,16 +26,18 @@ volatile uint8_t line_stamps_in;
 static uint8_t stamps_out;
 static uint32_t last_delimiter;
 
-// Sent by it.
-const uint8_t* volatile line_sending;
 volatile uint8_t line_sending_end;
 static uint32_t cycles_to_wait;
 
 // Timer 3 runs freely; until an answer is due it may take several turns. None is short.
-static void wait_from(uint16_t count) {
+static uint16_t next_turn(void) {
   const uint16_t turn = (uint16_t)(cycles_to_wait < 2 * TURN_CYCLES ? cycles_to_wait : TURN_CYCLES);
   cycles_to_wait -= turn;
-  OCR3A = (uint16_t)(count + turn);
+  return turn;
+}
+
+static inline void wait_until(uint16_t count) {
+  OCR3A = count;
   TIFR3 = 1 << OCF3A;
   TIMSK3 = 1 << OCIE3A;
 }
@@ -43,7 +45,7 @@ static void wait_from(uint16_t count) {
 ISR(TIMER3_COMPA_vect, ISR_NOBLOCK) {
   TIMSK3 = 0;
   if (cycles_to_wait != 0) {
-    wait_from(OCR3A);
+    wait_until((uint16_t)(OCR3A + next_turn()));
     return;
   }
   DE_PORT |= 1 << DE_BIT;
@@ -104,12 +106,14 @@ void line_transmit(const uint8_t* wire, size_t size, uint32_t delay_ns) {
   const uint32_t delay = delay_ns / 1000u * CYCLES_PER_US;
   const uint32_t due = last_delimiter + (delay > TURNAROUND_CYCLES ? delay : TURNAROUND_CYCLES);
   TIMSK3 = 0;
-  line_sending = wire;
+  LINE_SENDING_LOW = (uint8_t)(uintptr_t)wire;
+  LINE_SENDING_HIGH = (uint8_t)((uintptr_t)wire >> 8);
   line_sending_end = (uint8_t)(uintptr_t)(wire + size);
   const uint32_t now = clock_now();
   cycles_to_wait = clock_before(now + SHORTEST_CYCLES, due) ? due - now : SHORTEST_CYCLES;
+  const uint16_t turn = next_turn();
   // A compare that was passed meanwhile would come a turn of the timer later.
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    wait_from(TCNT3);
+    wait_until((uint16_t)(TCNT3 + turn));
   }
 }

@@ -1,6 +1,6 @@
 ; The UART's interrupts, by the registers that interrupts have to themselves (emission_slots.h): slots wait for
 ; none of them longer than 35 cycles. RX has interrupts off for 25 with entry and vector, at a delimiter for 33 and
-; then on; UDRE for 31, with the last byte for 35.
+; then on; UDRE for 26, with the last byte for 34.
 
 #include <avr/io.h>
 
@@ -63,21 +63,22 @@ USART0_RX_vect:
     .global USART0_UDRE_vect
 USART0_UDRE_vect:
     movw SAVED_LOW, r30
-    lds r30, line_sending
-    lds r31, line_sending+1
+    in r30, _SFR_IO_ADDR(LINE_SENDING_LOW)
+    in r31, _SFR_IO_ADDR(LINE_SENDING_HIGH)
     ld DATA_LOW, Z+
     sts UDR0, DATA_LOW
-    sts line_sending, r30
-    sts line_sending+1, r31
+    out _SFR_IO_ADDR(LINE_SENDING_LOW), r30
+    out _SFR_IO_ADDR(LINE_SENDING_HIGH), r31
+    mov DATA_HIGH, r30
+    movw r30, SAVED_LOW
     lds DATA_LOW, line_sending_end
-    cpse r30, DATA_LOW
-    rjmp 1f
+    cpse DATA_HIGH, DATA_LOW
+    reti
     ; TXC is to tell of this byte's stop bit.
     ldi r30, 1 << U2X0 | 1 << TXC0
     sts UCSR0A, r30
     ldi r30, 1 << TXEN0 | 1 << TXCIE0
     sts UCSR0B, r30
-1:
     movw r30, SAVED_LOW
     reti
 

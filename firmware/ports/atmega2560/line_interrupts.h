@@ -10,6 +10,10 @@
 #define LINE_IN GPIOR1
 #define LINE_OUT GPIOR2
 
+// Where the next byte to be sent lies: in registers of timer 0, which is at rest.
+#define LINE_SENDING_LOW OCR0A
+#define LINE_SENDING_HIGH OCR0B
+
 #ifndef __ASSEMBLER__
 
 #include <stdint.h>
@@ -20,7 +24,6 @@ extern uint8_t line_bytes[256];  // at a multiple of 256
 extern volatile uint16_t line_stamps[LINE_DELIMITERS];
 extern volatile uint8_t line_stamps_in;
 uint8_t line_decode(uint8_t** to, uint8_t* run, uint8_t out, uint8_t count);  // receive.S
-extern const uint8_t* volatile line_sending;
 extern volatile uint8_t line_sending_end;  // low byte of the address behind the last one
 
 #endif

@@ -119,6 +119,7 @@ __attribute__((noinline)) static void boot(void) {
                              // A frame of them stands for more ticks than it could make in one.
                              .lacks = BUSHD_CAN_TABLE_TICKS,
                              .pulse_ns = EMISSION_PULSE_NS,
+                             .in_pieces = true,
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,
@@ -154,8 +155,8 @@ static void prepare(void) {
 static void hear_line(void) {
   uint32_t ended = 0;
   if (line_collect(&mcu.receiver, &ended)) {
-    // A frame takes a while, and can wait; a tick that has begun meanwhile cannot.
-    if (emission_begun()) return;
+    // A frame takes a while, and can wait; a tick that has begun meanwhile, or soon will, cannot.
+    if (emission_begun() || emission_begins_soon()) return;
     bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(ended));
   } else if (bushd_mcu_wants_samples(&mcu)) {
     // The same conversion may be seen several times.

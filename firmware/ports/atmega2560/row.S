@@ -31,6 +31,30 @@ bushd_mcu_take_coarse_row:
     std Z+3, r23
     ret
 
+; void bushd_mcu_put_coarse_row(int16_t* queued, uint16_t mask, const uint8_t* counts)
+    .global bushd_mcu_put_coarse_row
+bushd_mcu_put_coarse_row:
+    movw r30, r24
+    movw r26, r20
+    ldi r19, 16
+1:
+    lsr r23
+    ror r22
+    brcc 2f
+    ld r18, X+
+    ; Without bit 7 it goes backwards.
+    mov r24, r18
+    andi r18, 0x7F
+    sbrs r24, 7
+    neg r18
+    st Z, r1
+    std Z+1, r18
+2:
+    adiw r30, 2
+    dec r19
+    brne 1b
+    ret
+
 ; void bushd_mcu_add_steps(int32_t* counter, size_t stride, const int16_t* steps, uint8_t motors). A motor makes fewer than 256
 ; steps in a tick.
     .global bushd_mcu_add_steps
