@@ -74,18 +74,22 @@ static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
 static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, uint16_t* masks) {
   bushd_run* run = &motor->made.run;
   set_direction(mcu, bit, run->direction > 0);
-  const int16_t before = motor->remainder;
   const uint32_t unit_ns = run->table->time_unit_ns;
   if (mcu->run_tick.tick_ns != mcu->tick_ns || mcu->run_tick.unit_ns != unit_ns) {
     mcu->run_tick = bushd_run_tick_of(mcu->tick_ns, unit_ns);
   }
   const uint16_t mark = bushd_mcu_steps_keep_slots(mcu) ? bit : 0;
   const int16_t steps = bushd_run_slots(run, &mcu->run_tick, mcu->config.slots, mark, masks);
-  // As ticks of the format would leave it, so that they can go on from here.
-  motor->remainder =
-      mcu->format == BUSHD_FORMAT_FINE ? (int16_t)(run->fraction * run->direction) : (int16_t)0;
   mcu->begun |= bit;
-  note_speed(motor, (int16_t)(steps * 256 + motor->remainder - before));
+  // As ticks of the format would leave it, so that they can go on from here.
+  if (mcu->format == BUSHD_FORMAT_FINE) {
+    const int16_t before = motor->remainder;
+    bushd_run_note_fraction(run);
+    motor->remainder = (int16_t)(run->fraction * run->direction);
+    note_speed(motor, (int16_t)(steps * 256 + motor->remainder - before));
+  } else {
+    motor->remainder = 0;
+  }
   if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) motor->mode = BUSHD_MCU_STREAM;
   return steps;
 }

@@ -3,15 +3,18 @@
 //
 //     t x slot_count  =  slot x tick_ns + rest,   0 <= rest < tick_ns
 //
-// is carried from step to step by additions: on an 8-bit MCU divisions would not fit into a tick.
+// is carried from step to step by additions, and the slot is estimated by the tick's reciprocal: on
+// an 8-bit MCU divisions would not fit into a tick.
 #include "engine/run_slots.h"
 
 #include "engine/slots.h"
 
 #if BUSHD_MAX_SLOTS <= 128
-typedef uint32_t scaled_ns;  // 20 ms x 128 slots
+typedef uint32_t scaled_ns;    // 20 ms x 128 slots
+typedef uint16_t scaled_high;  // without the low 16 bits
 #else
 typedef uint64_t scaled_ns;
+typedef uint32_t scaled_high;
 #endif
 
 static void make_step(bushd_run* run) {
@@ -27,11 +30,12 @@ static void make_step(bushd_run* run) {
   }
 }
 
-static inline uint16_t whole_slots(scaled_ns* rest, uint32_t tick_ns) {
-  const scaled_ns eight = (scaled_ns)tick_ns * 8u;
-  uint16_t slots = 0;
-  for (; *rest >= eight; *rest -= eight) slots = (uint16_t)(slots + 8u);
-  for (; *rest >= tick_ns; *rest -= tick_ns) ++slots;
+// What is cut off makes the estimate too small: by at most two, unless the reciprocal is clipped.
+static inline uint16_t whole_slots(scaled_ns* rest, const bushd_run_tick* tick) {
+  const uint32_t high = (scaled_high)(*rest >> 16);
+  uint16_t slots = (uint16_t)(high * tick->reciprocal >> 16);
+  *rest -= (scaled_ns)tick->tick_ns * slots;
+  for (; *rest >= tick->tick_ns; *rest -= tick->tick_ns) ++slots;
   return slots;
 }
 
@@ -51,7 +55,9 @@ static uint8_t share(uint32_t numerator, uint8_t low, uint32_t divisor) {
 }
 
 bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, uint32_t unit_ns) {
-  const bushd_run_tick tick = {tick_ns, unit_ns, tick_ns / unit_ns, tick_ns % unit_ns};
+  const uint32_t reciprocal = UINT32_MAX / tick_ns;
+  const bushd_run_tick tick = {tick_ns, unit_ns, tick_ns / unit_ns, tick_ns % unit_ns,
+                               reciprocal < UINT16_MAX ? (uint16_t)reciprocal : UINT16_MAX};
   return tick;
 }
 
@@ -71,7 +77,7 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t slo
     scaled_ns rest = (scaled_ns)((delay - run->since) * tick->unit_ns - run->since_ns) * slot_count;
     uint16_t slot = 0;
     while (true) {
-      slot = (uint16_t)(slot + whole_slots(&rest, tick->tick_ns));
+      slot = (uint16_t)(slot + whole_slots(&rest, tick));
       masks[slot < slot_count ? slot : slot_count - 1u] |= bit;
       ++steps;
       make_step(run);
@@ -83,6 +89,12 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t slo
   }
   run->since = since;
   run->since_ns = since_ns;
-  run->fraction = delay == 0 ? (uint8_t)0 : share(since, share(since_ns, 0, tick->unit_ns), delay);
   return (int16_t)(steps * run->direction);
+}
+
+void bushd_run_note_fraction(bushd_run* run) {
+  const uint16_t delay = bushd_run_delay(run);
+  const uint32_t unit_ns = run->table->time_unit_ns;
+  run->fraction =
+      delay == 0 ? (uint8_t)0 : share(run->since, share(run->since_ns, 0, unit_ns), delay);
 }
