@@ -36,13 +36,25 @@ void bushd_mcu_restore_emission(bushd_mcu* mcu) {
   if (use(mcu, &kept) != BUSHD_OK) bushd_mcu_default_emission(mcu);
 }
 
+// STEP pulses last for so long at least, also in a tick that is shortened to follow the bus.
+static int32_t shortest_pulse_ns(const bushd_mcu* mcu) {
+  const int32_t pulse_ns = mcu->config.pulse_ns;
+  if (pulse_ns > 0) return pulse_ns;
+  const uint32_t tick_ns = mcu->tick_ns - mcu->tick_ns / BUSHD_TICK_SLEW_DIVISOR;
+  return (int32_t)(tick_ns / (2u * mcu->config.slots)) + pulse_ns;
+}
+
+static bool keeps_pulses(const bushd_mcu* mcu, const bushd_emission* of) {
+  if (of->pulse_us == 0 || of->mode == BUSHD_EMISSION_PHASES) return true;
+  return (int32_t)of->pulse_us * 1000 <= shortest_pulse_ns(mcu);
+}
+
 bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* message) {
   if ((mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
   if (memcmp(message, &mcu->emission.settings, sizeof *message) == 0) return BUSHD_OK;
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   if (lacks(mcu, message->mode)) return BUSHD_E_FORMAT;
-  const uint32_t pulse_ns = mcu->config.pulse_ns;
-  if (pulse_ns != 0 && (uint32_t)message->pulse_us * 1000u > pulse_ns) return BUSHD_E_PULSE_WIDTH;
+  if (!keeps_pulses(mcu, message)) return BUSHD_E_PULSE_WIDTH;
   const bushd_status status = use(mcu, message);
   if (status != BUSHD_OK) return status;
   // What was good for another number of steps in a tick must be asked for again.

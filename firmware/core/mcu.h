@@ -67,9 +67,9 @@ typedef struct bushd_mcu_config {
   uint16_t
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint32_t min_tick_ns;  // shorter ones are refused
-  uint32_t pulse_ns;     // how long STEP pulses last; 0: half a slot
-  uint16_t lacks;        // BUSHD_CAN_* that it is too slow for: not in the identity, and refused
-  uint16_t* codes;       // table memory
+  int32_t pulse_ns;  // how long STEP pulses last; 0: half a slot; less: so much shorter than that
+  uint16_t lacks;    // BUSHD_CAN_* that it is too slow for: not in the identity, and refused
+  uint16_t* codes;   // table memory
   uint16_t code_count;
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
 } bushd_mcu_config;

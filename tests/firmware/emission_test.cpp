@@ -141,6 +141,29 @@ TEST(Emission, PulsesAreRefusedThatThePortDoesNotMake) {
   EXPECT_EQ(rig.emission(settings), BUSHD_E_PULSE_WIDTH);
 }
 
+TEST(Emission, PulsesAreRefusedThatThePortMayMakeTooShort) {
+  Rig rig({.slots = 128, .pulse_ns = -3'000});
+  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  // A tick may be shortened to follow the bus.
+  const std::uint32_t half_slot_ns = (Rig::kTickNs - Rig::kTickNs / 64) / 256;
+  bushd_emission settings{};
+  settings.pulse_us = static_cast<std::uint8_t>((half_slot_ns - 3'000) / 1000);
+  ASSERT_GT(settings.pulse_us, 0);
+  EXPECT_EQ(rig.emission(settings), BUSHD_OK);
+  ++settings.pulse_us;
+  EXPECT_EQ(rig.emission(settings), BUSHD_E_PULSE_WIDTH);
+  settings.pulse_us = 0;
+  EXPECT_EQ(rig.emission(settings), BUSHD_OK) << "no matter how long";
+}
+
+TEST(Emission, NoLengthOfPulsesIsKeptWhereTheyMayBeginAsLateAsTheyEnd) {
+  Rig rig({.slots = 128, .pulse_ns = -1'000'000});
+  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  bushd_emission settings{};
+  settings.pulse_us = 1;
+  EXPECT_EQ(rig.emission(settings), BUSHD_E_PULSE_WIDTH);
+}
+
 TEST(Emission, PhasesTakeFourOutputsAMotor) {
   Rig rig({.motors = 11});
   rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);

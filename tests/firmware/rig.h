@@ -31,7 +31,7 @@ struct RigOptions {
   bool enable_at_boot = false;
   bool in_pieces = false;  // answers wait for work()
   std::uint16_t lacks = 0;
-  std::uint32_t pulse_ns = 0;
+  std::int32_t pulse_ns = 0;
   bool stores_address = true;
   bool trigger_input = true;
 };

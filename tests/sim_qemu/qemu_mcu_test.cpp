@@ -98,6 +98,37 @@ TEST_F(QemuImage, ReadsItsInputsAndTheSupplyCurrent) {
   EXPECT_EQ(report.current, 345);
 }
 
+// While it hears and answers: other interrupts make pulses begin late.
+TEST_F(QemuImage, PulsesLastAsLongAsItHasTakenOnToMakeThem) {
+  constexpr std::uint32_t kLongTickNs = 2'610'000;
+  constexpr std::uint8_t kMotor = 12;
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kLongTickNs, BUSHD_FORMAT_FINE));
+  const auto takes_on = [this](std::uint8_t pulse_us) {
+    bushd_emission settings{};
+    settings.pulse_us = pulse_us;
+    return master_.acknowledged(kAddress, BUSHD_MSG_EMISSION, bushd_encode_emission, settings);
+  };
+  std::uint8_t pulse_us = 12;
+  while (pulse_us > 0 && takes_on(pulse_us) != BUSHD_OK) --pulse_us;
+  ASSERT_GT(pulse_us, 0);
+  ASSERT_EQ(takes_on(0), BUSHD_OK);
+  ASSERT_EQ(takes_on(pulse_us), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 1000, {400, 300, 200}, 100));
+  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, kMotor, 0));
+  master_.fine_ticks(kAddress, kMotor, master_.poll(kAddress).tick + 10,
+                     std::vector<std::int16_t>(40, 127 * 256));
+  for (int i = 0; i < 60; ++i) master_.poll(kAddress);
+  const auto up = recorder_.times(0, Signal::kStep, kMotor, true);
+  const auto down = recorder_.times(0, Signal::kStep, kMotor, false);
+  ASSERT_EQ(up.size(), 40u * 127u);
+  ASSERT_EQ(down.size(), up.size());
+  TimeNs shortest_ns = kNever;
+  for (std::size_t i = 0; i < up.size(); ++i) {
+    shortest_ns = std::min(shortest_ns, down[i] - up[i]);
+  }
+  EXPECT_GE(shortest_ns, pulse_us * 1000);
+}
+
 TEST_F(QemuImage, HasNoActiveInputFromTheBeginning) {
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.inputs, 0);

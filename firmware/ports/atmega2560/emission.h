@@ -15,7 +15,7 @@
 
 #define EMISSION_SLOTS 128u
 // STEP pulses last as long at least.
-#define EMISSION_PULSE_NS 2500u
+#define EMISSION_PULSE_NS 2500
 // Most that a frame asks for takes no longer than twice that: then the next tick is not begun too
 // late.
 #define EMISSION_FRAME_CYCLES 2000u

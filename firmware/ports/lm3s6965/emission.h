@@ -18,6 +18,10 @@
 #define EMISSION_SLOTS 128u
 // Shorter, half slots would not hold their interrupts.
 #define EMISSION_MIN_TICK_NS 250000u
+// What a pulse may begin late by, but not end: 60 cycles in which another interrupt runs or none is
+// let through, then the trigger's, 45, and that of a byte, 120, which go before it; and the changes
+// from one to the next. Counted by the data sheet, from RAM twice.
+#define EMISSION_LATE_NS 5000
 
 // All of these are for the main loop only, with interrupts on unless it says otherwise.
 

@@ -111,6 +111,7 @@ static void boot(void) {
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
                              .queue = queue,
+                             .pulse_ns = -EMISSION_LATE_NS,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,
                              .code_count = TABLE_CODES};
