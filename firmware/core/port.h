@@ -38,7 +38,9 @@ typedef struct bushd_port {
   // Length of all later ticks, in ns, from the next tick boundary on.
   void (*set_tick)(void* context, uint32_t tick_ns);
 
-  // Makes the next tick longer (> 0) or shorter (< 0) by this much, once.
+  // Makes the next tick longer (> 0) or shorter (< 0) by this much, once; what it was told before
+  // for that tick counts no more. By up to 1/64 of it to stay in step with the bus; longer by up to
+  // a whole one to come into step, while no motor moves.
   void (*adjust_tick)(void* context, int32_t ns);
 
   // How far the present tick has gone, in ns.
