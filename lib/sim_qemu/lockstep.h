@@ -9,14 +9,16 @@ typedef enum lockstep_command_kind {
   // Until time_ns, or, if value is 1, until its UART takes a byte; answered by events, the last one
   // LOCKSTEP_STOPPED
   LOCKSTEP_RUN = 1,
-  LOCKSTEP_BYTE = 2,         // value: its stop bit ends at time_ns, in the order of their times
-  LOCKSTEP_INPUTS = 3,       // value: levels of the motors' inputs; address: those of the system's
-  LOCKSTEP_CURRENT = 4,      // value: what its ADC reads; in answer to LOCKSTEP_CONVERTS
-  LOCKSTEP_FLASH = 5,        // value: the word at `address`, before the first RUN
-  LOCKSTEP_RESET_CAUSE = 6,  // value: RESC, before the first RUN
-  LOCKSTEP_STOP_TICKS = 7,   // the timer that begins ticks interrupts no more
-  LOCKSTEP_STICK = 8,        // bit 0 of the word of RAM at `address` is 1, before the first RUN
-  LOCKSTEP_KEPT_RAM = 9      // value: the first word of RAM, before the first RUN
+  LOCKSTEP_BYTE = 2,          // value: its stop bit ends at time_ns, in the order of their times
+  LOCKSTEP_INPUTS = 3,        // value: levels of the motors' inputs; address: those of the system's
+  LOCKSTEP_CURRENT = 4,       // value: what its ADC reads; in answer to LOCKSTEP_CONVERTS
+  LOCKSTEP_FLASH = 5,         // value: the word at `address`, before the first RUN
+  LOCKSTEP_RESET_CAUSE = 6,   // value: RESC, before the first RUN
+  LOCKSTEP_STOP_TICKS = 7,    // the timer that begins ticks interrupts no more
+  LOCKSTEP_STICK = 8,         // bit 0 of the word of RAM at `address` is 1, before the first RUN
+  LOCKSTEP_KEPT_RAM = 9,      // value: the first word of RAM, before the first RUN
+  LOCKSTEP_WEAR_FLASH = 10,   // what is written to flash changes nothing
+  LOCKSTEP_STICK_INPUTS = 11  // the data line of the motors' inputs is high
 } lockstep_command_kind;
 
 typedef enum lockstep_event_kind {

@@ -81,6 +81,7 @@ static struct {
   uint32_t words[WRITTEN_SIZE / 4];
   uint32_t command;
   int64_t busy_until_ns;
+  bool worn;
 } flash;
 
 static struct {
@@ -114,6 +115,7 @@ static struct {
   bool load;
   uint32_t out;
   bool out_data;
+  bool stuck;
 } shifter;
 
 static void give_up(void) {
@@ -251,6 +253,12 @@ static void obey(void) {
       case LOCKSTEP_STICK:
         stick(command.address);
         break;
+      case LOCKSTEP_WEAR_FLASH:
+        flash.worn = true;
+        break;
+      case LOCKSTEP_STICK_INPUTS:
+        shifter.stuck = true;
+        break;
       case LOCKSTEP_FLASH:
         store(command.address, command.value);
         break;
@@ -310,7 +318,7 @@ static void on_driver_enable(void* opaque, int n, int level) {
 
 /* Of the 165 that comes last: motor 15. */
 static void show_input(void) {
-  qemu_set_irq(shifter.data, (shifter.loaded & 0x8000u) != 0);
+  qemu_set_irq(shifter.data, shifter.stuck || (shifter.loaded & 0x8000u) != 0);
 }
 
 static void on_shift_clock(void* opaque, int n, int level) {
@@ -482,7 +490,7 @@ static void flash_write(void* opaque, hwaddr address, uint64_t data, unsigned si
   if (address != 0x8u || data >> 16 != FLASH_KEY) return;
   if (data & 1u) {
     const uint32_t word = (flash.address - WRITTEN) / 4 % (WRITTEN_SIZE / 4);
-    flash_store(flash.address, flash.words[word] & flash.data);
+    if (!flash.worn) flash_store(flash.address, flash.words[word] & flash.data);
     flash_takes(1u, 20000);
   }
   if (data & 2u) {

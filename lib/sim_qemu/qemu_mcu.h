@@ -57,6 +57,9 @@ class QemuMcu final : public Mcu {
   void stop_ticks() { order(LOCKSTEP_STOP_TICKS, 0); }  // their timer interrupts no more
   // Bit 0 of a word is 1. Before the first advance.
   void stick_ram(std::uint32_t address) { order(LOCKSTEP_STICK, 0, address); }
+  // Until the next boot; before the first advance.
+  void wear_flash() { order(LOCKSTEP_WEAR_FLASH, 0); }      // it cannot be written
+  void stick_inputs() { order(LOCKSTEP_STICK_INPUTS, 0); }  // the motors' all read high
 
   // Of what the image has written; from the next boot on.
   void flip_flash_bit(std::uint32_t address, int bit);

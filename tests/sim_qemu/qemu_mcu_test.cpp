@@ -187,6 +187,30 @@ TEST_F(QemuDamagedRam, IsFoundAtBoot) {
   EXPECT_EQ(report.failed_tests, BUSHD_TEST_RAM);
 }
 
+class QemuWornFlash : public QemuImage {
+ protected:
+  QemuWornFlash() { qemu_->wear_flash(); }
+};
+
+// The next boot would have the same number: nobody could tell it from this one.
+TEST_F(QemuWornFlash, IsFoundWhenABootCannotBeCounted) {
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, BUSHD_FAULT_EEPROM);
+  EXPECT_EQ(report.failed_tests, BUSHD_TEST_EEPROM);
+  EXPECT_EQ(report.boot_number, 42);
+}
+
+class QemuStuckInputs : public QemuImage {
+ protected:
+  QemuStuckInputs() { qemu_->stick_inputs(); }
+};
+
+TEST_F(QemuStuckInputs, AreFoundAtBoot) {
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST);
+  EXPECT_EQ(report.failed_tests, BUSHD_TEST_INPUTS);
+}
+
 TEST_F(QemuImage, HasNoFaultWhenItIsWhole) {
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.faults, 0);

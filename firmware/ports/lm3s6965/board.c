@@ -80,6 +80,11 @@ uint16_t board_read_inputs(void) {
   return (uint16_t)levels;
 }
 
+bool board_test_inputs(void) {
+  board_read_inputs();
+  return INPUT_DATA == 0;
+}
+
 uint16_t board_read_current(void) {
   static uint16_t reading;
   if (board_has_current()) reading = (uint16_t)(ADC_SSFIFO3 & 0x3FFu);

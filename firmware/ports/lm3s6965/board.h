@@ -49,6 +49,10 @@ static inline void board_latch_directions(void) {
 // What the inputs of the motors are now, levels. What was shifted for DIR is lost.
 uint16_t board_read_inputs(void);
 
+// Behind them comes the ground at the end of the registers. False if it does not: their data line
+// is stuck, and no switch would ever be seen. What was shifted for DIR is lost.
+bool board_test_inputs(void);
+
 // The supply current as ADC 0 reads it, 0..1023, the mean of 4 us. A conversion that has been begun
 // is to be read before the next one.
 static inline void board_begin_current(void) {

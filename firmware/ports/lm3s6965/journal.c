@@ -83,17 +83,18 @@ bool journal_open(journal_state* state) {
   const page_content pages[2] = {read_page(0), read_page(1)};
   present = second_is_newer(&pages[0], &pages[1]) ? 1 : 0;
   content = pages[present];
+  const uint16_t boot_number = (uint16_t)(content.value[KIND_BOOT_NUMBER] + 1u);
   if (content.used > FLASH_PAGE_WORDS - RESERVED_WORDS) turn_page();
-  append(KIND_BOOT_NUMBER, (uint16_t)(content.value[KIND_BOOT_NUMBER] + 1u));
+  const bool counted = append(KIND_BOOT_NUMBER, boot_number);
   memset(state, 0, sizeof *state);
-  state->boot_number = content.value[KIND_BOOT_NUMBER];
+  state->boot_number = boot_number;
   state->address = 1;
   if (!has_identity(&content)) return false;
   state->address = (uint8_t)content.value[KIND_ADDRESS];
   for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {
     state->unique_id[i] = (uint8_t)(content.value[i / 2] >> 8 * (i % 2));
   }
-  return true;
+  return counted;
 }
 
 bool journal_store_address(uint8_t address) {

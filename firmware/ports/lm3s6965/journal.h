@@ -21,8 +21,8 @@ typedef struct journal_state {
   uint16_t boot_number;  // of this boot
 } journal_state;
 
-// Once, at boot; counts it. False if there is no identity: then the address is 1 and the id all
-// zero.
+// Once, at boot; counts it. False if there is no identity (then the address is 1 and the id all
+// zero), or if the number of this boot cannot be kept: the next one would have the same.
 bool journal_open(journal_state* state);
 
 // False if it cannot be kept: no room until the next boot, or worn flash.

@@ -72,6 +72,7 @@ static uint8_t port_self_test(void* context) {
   uint8_t failed = eeprom_failed ? BUSHD_TEST_EEPROM : 0;
   if (boot_ram_faults != 0) failed |= BUSHD_TEST_RAM;
   if (!boot_flash_is_sealed()) failed |= BUSHD_TEST_FLASH;
+  if (!board_test_inputs()) failed |= BUSHD_TEST_INPUTS;
   return failed;
 }
 
@@ -110,8 +111,8 @@ static void boot(void) {
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
-                             .queue = queue,
                              .pulse_ns = -EMISSION_LATE_NS,
+                             .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,
                              .code_count = TABLE_CODES};
