@@ -44,8 +44,8 @@ std::string fault_text(const bushd_report& report) {
   }
   if (faults & BUSHD_FAULT_EMERGENCY) return "emergency stop; say 'bushctl clear'";
   if (faults & BUSHD_FAULT_EEPROM) {
-    return "its EEPROM was unreadable, so address and id are defaults; write it anew, or say "
-           "'bushctl clear' to go on with them";
+    return "what it keeps was unreadable, defaults are in use; if its unique id is 0 in 'bushctl "
+           "health', write that anew (docs/firmware.md), then say 'bushctl clear'";
   }
   if (faults & BUSHD_FAULT_SYNC) return "out of step with the bus";
   if (faults & BUSHD_FAULT_LINK) return "nothing more reached it in motion";

@@ -301,7 +301,7 @@ TEST(SelfTest, AnMcuThatLostWhatItKeepsMovesOnceThatIsKnown) {
   lab.bus(0).mcu(0).fail_self_tests(BUSHD_TEST_EEPROM);
   ASSERT_TRUE(lab.run_until(
       [&] { return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "FAULT"; }));
-  EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("EEPROM"));
+  EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("if its unique id is 0"));
   EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
   EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20})).result, "reached");
 }
