@@ -417,7 +417,7 @@ void send_table_end(Mcu& mcu, Input& input) {
   bushd_table_end end = {.slot = static_cast<std::uint8_t>(input.u8() % BUSHD_TABLE_SLOTS),
                          .crc = 0};
   const bushd_mcu_table& table = mcu.core().table[end.slot];
-  if (table.count != 0) end.crc = bushd_table_crc32(&table.table);
+  if (table.table.accel.count != 0) end.crc = bushd_table_crc32(&table.table);
   Payload payload;
   payload.size = bushd_encode_table_end(&end, payload.bytes.data());
   mcu.frame(mcu.core().config.address, BUSHD_MSG_TABLE_END, payload.view());
