@@ -80,7 +80,7 @@ static void go_on(bushd_mcu* mcu, bool active) {
         // Whatever ends the homing before it has backed off.
         bushd_mcu_stands_at_switch(mcu, homing->motor, homing->direction);
         // One that has not made a step stands on its switch, and need not begin in order to stop.
-        if (run->steps_done != 0) {
+        if (bushd_run_steps_left(run) != homing->most_steps) {
           bushd_run_ramp_down(run);
         } else {
           bushd_run_start(run, run->table, 0, homing->direction);
@@ -171,6 +171,7 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   homing->stage = BUSHD_HOMING_FAST;
   homing->motor = message->motor;
   homing->direction = message->direction;
+  homing->most_steps = message->most_steps;
   homing->slow_steps = message->slow_steps;
   homing->home_steps = message->position_steps;
   homing->slow.cruise = message->slow_delay;

@@ -105,7 +105,7 @@ typedef struct bushd_mcu_motor {
   bool has_island : 1;     // only in a stream
   uint16_t delay;          // of the running step when the queued ticks end; 0: at rest there
   uint16_t displacement;   // the last one that was not 0, unsigned; in the fine format only
-  uint16_t still_ticks;    // made since; saturates
+  uint8_t still_ticks;     // made since; saturates
   uint32_t rest_from;      // at rest from here to start_tick
   uint32_t start_tick;     // of the last start taken
   uint32_t known_until;  // first tick for which nothing is decided; always > tick + 1 once prepared
@@ -196,7 +196,8 @@ typedef struct bushd_mcu_homing {
   uint8_t motor;
   int8_t direction;     // towards the switch
   uint8_t readings;     // of it in a row, as they are waited for
-  uint32_t slow_steps;  // at most
+  uint32_t most_steps;  // of the fast stage
+  uint32_t slow_steps;  // of each slow one, at most
   int32_t home_steps;   // the position to be set
   int32_t seen_steps;   // where the motor stood at the first of the readings
   bushd_table slow;     // of a single code: its cruise delay

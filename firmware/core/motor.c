@@ -63,7 +63,7 @@ static inline void set_direction(bushd_mcu* mcu, uint16_t bit, bool positive) {
 // By which stream_delay goes, in the fine format only.
 static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   if (displacement == 0) {
-    motor->still_ticks = saturating_increment(motor->still_ticks);
+    if (motor->still_ticks < UINT8_MAX) ++motor->still_ticks;
     return;
   }
   motor->still_ticks = 0;

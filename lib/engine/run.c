@@ -29,7 +29,9 @@ static uint16_t codes_above(const bushd_ramp* ramp, uint16_t delay) {
 
 static void clear(bushd_run* run, const bushd_table* table, int direction) {
   run->table = table;
+#if BUSHD_RUN_COUNTS
   run->steps_done = 0;
+#endif
   run->accel_at = 0;
   run->accel_end = 0;
   run->cruise_left = 0;
@@ -324,7 +326,7 @@ static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t 
   } else {
     ramp_ticks(ramp, tick, ticks, true, false, &now, &i, &run->since_ns, out);
   }
-  run->steps_done += i - run->accel_at;
+  bushd_run_count(run, i - run->accel_at);
   run->accel_at = (uint16_t)i;
   run->since = now - ramp->sum[i];
   return ticks;
@@ -345,7 +347,7 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
   } else {
     ramp_ticks(ramp, tick, ticks, false, false, &now, &i, &run->since_ns, out);
   }
-  run->steps_done += run->decel_left - 1u - i;
+  bushd_run_count(run, run->decel_left - 1u - i);
   run->decel_left = (uint16_t)(i + 1);
   run->since = ramp->sum[i + 1] - (now + 1);
   return ticks;
@@ -381,7 +383,7 @@ static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t
   if (in_ns) run->since_ns = (uint32_t)(since % scale);
   const uint32_t steps = (uint32_t)ticks * whole + extra;
   run->cruise_left -= steps;
-  run->steps_done += steps;
+  bushd_run_count(run, steps);
   return ticks;
 }
 
@@ -409,7 +411,7 @@ size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, u
     }
 #endif
     const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
-    run->steps_done += steps;
+    bushd_run_count(run, steps);
     out[n++ * stride] = (uint8_t)(steps | direction_bit);
   }
   const size_t active = n;
@@ -432,7 +434,7 @@ size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int
   size_t n = 0;
   while (n < ticks && !bushd_run_done(run)) {
     const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
-    run->steps_done += steps;
+    bushd_run_count(run, steps);
     const uint16_t delay = bushd_run_delay(run);
     const uint32_t fraction =
         delay == 0 ? 0 : (run->since * 256u + sub_units(run->since_ns, tick.unit_ns)) / delay;

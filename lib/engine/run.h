@@ -22,11 +22,18 @@ extern "C" {
 #define BUSHD_MAX_STEPS_PER_TICK 127u
 #define BUSHD_COARSE_DIRECTION 0x80u
 
+// Runs may count their steps. A build for a small MCU does without, and with the memory for it.
+#ifndef BUSHD_RUN_COUNTS
+#define BUSHD_RUN_COUNTS 1
+#endif
+
 // Plain state, copyable: a copy taken at some tick replays the same ticks. Private to run.c but for
 // the fields named here: `direction` (+1 / -1), `steps_done`.
 typedef struct bushd_run {
   const bushd_table* table;
+#if BUSHD_RUN_COUNTS
   uint32_t steps_done;
+#endif
   uint32_t cruise_left;  // steps left at the cruise delay
   uint32_t since;        // whole time units since the last step; before the run begins (begin_late)
                          // negative, modulo 2^32
@@ -38,6 +45,16 @@ typedef struct bushd_run {
   uint8_t fraction;      // of the position at the end of the last fine tick, 1/256 step
   int8_t direction;
 } bushd_run;
+
+// For run.c and run_slots.c.
+static inline void bushd_run_count(bushd_run* run, uint32_t steps) {
+#if BUSHD_RUN_COUNTS
+  run->steps_done += steps;
+#else
+  (void)run;
+  (void)steps;
+#endif
+}
 
 // A move of `steps` (>= 0) from rest; direction is +1 or -1. The first tick expanded is the one in
 // which the move starts at its beginning. O(log steps).

@@ -18,7 +18,7 @@ typedef uint32_t scaled_high;
 #endif
 
 static void make_step(bushd_run* run) {
-  ++run->steps_done;
+  bushd_run_count(run, 1);
   if (run->lead_delay != 0) {
     run->lead_delay = 0;
   } else if (run->accel_at < run->accel_end) {

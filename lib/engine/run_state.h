@@ -28,8 +28,9 @@ typedef struct bushd_run_state {
 // run stands at a tick boundary and has begun (bushd_run_begin_late). O(1).
 bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks);
 
-// A run in that state; steps_done begins at 0. Returns false, and leaves the run undefined, if no
-// run of this table can be in that state: nothing in `state` is believed. O(1).
+// A run in that state; steps_done, where it is counted, begins at 0. Returns false, and leaves the
+// run undefined, if no run of this table can be in that state: nothing in `state` is believed.
+// O(1).
 bool bushd_run_restore(bushd_run* run, const bushd_table* table, const bushd_run_state* state);
 
 #ifdef __cplusplus
