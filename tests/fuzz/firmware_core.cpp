@@ -291,7 +291,7 @@ class Mcu {
         BUSHD_REQUIRE(static_cast<std::int32_t>(motor.known_until - mcu_.tick) <= kQueueTicks + 1);
       }
       // Only a motor that moves on has an island, beyond a gap and within the queue.
-      if (motor.island.from != motor.island.until) {
+      if (motor.has_island) {
         const std::uint32_t gap = motor.island.from - motor.known_until;
         const std::uint32_t end = motor.island.until - mcu_.tick;
         BUSHD_REQUIRE(motor.delay != 0 && gap - 1 < kQueueTicks && end <= kQueueTicks + 1u);
