@@ -15,7 +15,6 @@ BIN = TOP / "build" / "release" / "bin"
 RUNS = TOP / "build" / "demo"
 CHIPS = {  # image, and what runs it
     "atmega2560": ("avr-image/firmware/ports/atmega2560/bushd-atmega2560-500000.elf", "an ATmega2560 in simavr"),
-    "lm3s6965": ("cortex-m-image/firmware/ports/lm3s6965/bushd-lm3s6965-500000.elf", "an LM3S6965 in QEMU"),
 }
 RUNS_KEPT = 3
 
