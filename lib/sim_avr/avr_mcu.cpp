@@ -33,11 +33,14 @@ constexpr std::uint8_t kPaint = 0xC5;  // firmware/ports/atmega2560/boot_tests.h
 constexpr std::size_t kHardwareFifo = 2;
 // In the address space of data.
 constexpr std::size_t kMcusr = 0x54;
+constexpr std::size_t kEecr = 0x3F;
+constexpr std::size_t kEear = 0x41;
 constexpr std::uint16_t kPink = 0x106;
 constexpr std::uint16_t kPortk = 0x108;
 constexpr std::uint16_t kDdrk = 0x107;
 constexpr std::uint32_t kSupplyMv = 5000;
 constexpr std::size_t kTimsk1 = 0x6F;
+constexpr std::uint8_t kEerie = 1 << 3;
 constexpr std::uint8_t kPowerOn = 1;
 constexpr std::uint8_t kExternalReset = 2;
 constexpr std::uint16_t kJumpToItself = 0xCFFF;
@@ -331,6 +334,13 @@ void AvrMcu::flip_eeprom_bit(std::uint16_t address, int bit) {
   avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &at);
   byte ^= static_cast<std::uint8_t>(1 << bit);
   avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &at);
+}
+
+void AvrMcu::tear_eeprom_byte() {
+  if ((avr_->data[kEecr] & kEerie) == 0) return;
+  const auto address = static_cast<std::uint16_t>(avr_->data[kEear] | avr_->data[kEear + 1] << 8);
+  flip_eeprom_bit(address, 0);
+  flip_eeprom_bit(address, 6);
 }
 
 void AvrMcu::stick_ram_bit(std::uint16_t address, int bit) {

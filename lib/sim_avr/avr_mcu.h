@@ -59,6 +59,8 @@ class AvrMcu final : public Mcu {
   void stop_ticks();  // the tick timer's interrupts are off
   void flip_flash_bit(std::uint32_t address, int bit);
   void flip_eeprom_bit(std::uint16_t address, int bit);
+  // If the image is writing one. A write ends there, as if the power went: reset it next.
+  void tear_eeprom_byte();
   void stick_ram_bit(std::uint16_t address, int bit);  // at 0; slow
   void short_motor_input(int motor);                   // of 0..7, to the supply
 

@@ -75,9 +75,42 @@ TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
   EXPECT_GE(broken, 2);
 }
 
+// The byte that is being written holds anything then.
+TEST_F(AvrKept, APowerCutLosesNoIdAndLeavesTheOldAddressOrTheNewOne) {
+  std::uint8_t address = kAddress;
+  std::array<int, 2> found{};  // old, new
+  for (std::uint64_t bytes = 0; bytes <= 12; ++bytes) {
+    for (const bool torn : {false, true}) {
+      SCOPED_TRACE("cut after " + std::to_string(bytes) + (torn ? " bytes and a half" : " bytes"));
+      const auto other = static_cast<std::uint8_t>(address ^ 0x5A);
+      const std::uint64_t before = avr_->eeprom_writes();
+      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+      const bushd_set_address message{{1}, other};
+      payload.resize(bushd_encode_set_address(&message, payload.data()));
+      master_.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS, payload);
+      for (int ms = 0; ms < 50 && avr_->eeprom_writes() < before + bytes; ++ms) pass(1'000'000);
+      if (torn) avr_->tear_eeprom_byte();
+      reboot();
+      const bool is_new = avr_->address() == other;
+      ++found[is_new];
+      if (is_new) address = other;
+      const auto reply = master_.identify(address);
+      ASSERT_TRUE(reply);
+      bushd_identity identity{};
+      ASSERT_EQ(bushd_decode_identity(reply->payload.data(), reply->payload.size(), &identity),
+                BUSHD_OK);
+      EXPECT_EQ(identity.unique_id[0], 1);
+      EXPECT_EQ(master_.poll(address).faults, 0);
+    }
+  }
+  EXPECT_GE(found[0], 5);
+  EXPECT_GE(found[1], 5);
+}
+
 TEST_F(AvrKept, NothingIsWrittenWhileAMotorMoves) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  while (avr_->eeprom_writes() < 10) pass(20'000'000);
+  const std::uint64_t before = avr_->eeprom_writes();
+  while (avr_->eeprom_writes() < before + 10) pass(20'000'000);
   run(3, 400);
   pass(40 * TimeNs{kTickNs});
   ASSERT_EQ(master_.poll(kAddress).state, BUSHD_STATE_RUN);

@@ -8,24 +8,32 @@
 
 #define BOOT_NUMBER ((uint16_t*)16)
 #define ENABLE_KEPT 18u
+#define COPY 19u
+#define ALL_WRITTEN (2u * sizeof(identity))
 
 static identity image;
-static uint8_t written;  // bytes of it that are in the EEPROM
+// Bytes of it that are in the EEPROM: first those of the copy, so that one of both is always whole.
+static uint8_t written;
 static bool enable;
 
 static uint32_t image_crc(void) {
   return ~bushd_crc32(BUSHD_CRC32_START, (const uint8_t*)&image, offsetof(identity, crc));
 }
 
+// In the one or the other place, with its CRC.
+static bool read_from(uint8_t place) {
+  eeprom_read_block(&image, (const void*)(uint16_t)place, sizeof image);
+  return image.crc == image_crc() && image.address != BUSHD_ADDRESS_BROADCAST;
+}
+
 bool identity_load(identity* kept, uint16_t* boot_number) {
   *boot_number = (uint16_t)(eeprom_read_word(BOOT_NUMBER) + 1u);
   eeprom_update_word(BOOT_NUMBER, *boot_number);
-  eeprom_read_block(&image, (const void*)0, sizeof image);
-  written = sizeof image;
-  const bool good = image.crc == image_crc() && image.address != BUSHD_ADDRESS_BROADCAST;
+  const bool good = read_from(0) || read_from(COPY);
   if (!good) {
     memset(&image, 0, sizeof image);
     image.address = 1;
+    written = ALL_WRITTEN;
   }
   *kept = image;
   return good;
@@ -36,7 +44,7 @@ bool identity_enable_kept(void) {
 }
 
 bool identity_store_address(uint8_t address) {
-  if (written != sizeof image) return false;
+  if (written != ALL_WRITTEN) return false;
   image.address = address;
   image.crc = image_crc();
   written = 0;
@@ -48,10 +56,12 @@ void identity_keep_enable(bool on) {
 }
 
 void identity_poll(void) {
-  if (written == sizeof image) {
+  if (written == ALL_WRITTEN) {
     eeprom_write(ENABLE_KEPT, enable);
     return;
   }
-  eeprom_write(written, ((const uint8_t*)&image)[written]);
+  const bool copied = written >= sizeof image;
+  const uint8_t at = (uint8_t)(copied ? written - sizeof image : written);
+  eeprom_write(copied ? at : COPY + at, ((const uint8_t*)&image)[at]);
   ++written;
 }

@@ -1,5 +1,7 @@
 // Who the MCU is, in the EEPROM. From address 0: unique id (8 bytes), address, CRC-32 of these nine
-// (low byte first); at 16 the boot number, at 18 whether EN is to be raised after a watchdog reset.
+// (low byte first); at 16 the boot number, at 18 whether EN is to be raised after a watchdog reset;
+// at 19 a copy of the first 13 bytes, which counts if these are not whole: the power went while
+// they were written.
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_IDENTITY_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_IDENTITY_H
 
@@ -19,7 +21,7 @@ typedef struct identity {
 bool identity_load(identity* kept, uint16_t* boot_number);
 bool identity_enable_kept(void);
 
-// Are written by identity_poll. False while another address is being written.
+// Are written by identity_poll. False while another address is being written, or the first copy.
 bool identity_store_address(uint8_t address);
 void identity_keep_enable(bool on);
 
