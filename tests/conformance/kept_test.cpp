@@ -33,21 +33,6 @@ class Kept : public testing::TestWithParam<Target> {
     ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
   }
 
-  bushd_tables tables() {
-    bushd_tables told{};
-    const auto reply = master_.request(kAddress, BUSHD_MSG_TABLES);
-    EXPECT_TRUE(reply);
-    if (reply) {
-      EXPECT_EQ(bushd_decode_tables(reply->payload.data(), reply->payload.size(), &told), BUSHD_OK);
-    }
-    return told;
-  }
-  std::size_t valid_tables() {
-    const bushd_tables told = tables();
-    return static_cast<std::size_t>(
-        std::count_if(std::begin(told.slot), std::end(told.slot), [](auto& t) { return t.valid; }));
-  }
-
   template <class Message>
   bushd_status ask(bushd_type type, std::size_t (*encode)(const Message*, std::uint8_t*),
                    const Message& message) {
@@ -74,10 +59,10 @@ TEST_P(Kept, TablesAndSettingsOutliveAReset) {
   bushd_set_inputs inputs{};
   inputs.system_inverted = BUSHD_INPUT_FORWARD;
   ASSERT_EQ(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs), BUSHD_OK);
-  const bushd_tables before = tables();
+  const bushd_tables before = master_.tables(kAddress);
   pass(real_->keeps_within_ns(ramp.size()));
   reboot();
-  const bushd_tables after = tables();
+  const bushd_tables after = master_.tables(kAddress);
   for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
     EXPECT_EQ(after.slot[slot].valid, slot == 0 || slot == 5);
     EXPECT_EQ(after.slot[slot].crc, before.slot[slot].crc);
@@ -135,7 +120,7 @@ TEST_P(Kept, ABitThatHasFlippedIsAFault) {
   real_->flip_kept_bit();
   reboot();
   EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM);
-  EXPECT_EQ(valid_tables(), 0u);
+  EXPECT_EQ(master_.valid_tables(kAddress), 0u);
   // It is mended when there is something to keep again.
   ASSERT_EQ(ask(BUSHD_MSG_CONTROL, bushd_encode_control, bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
             BUSHD_OK);
@@ -143,7 +128,7 @@ TEST_P(Kept, ABitThatHasFlippedIsAFault) {
   pass(real_->keeps_within_ns(kCodes));
   reboot();
   EXPECT_EQ(master_.poll(kAddress).faults, 0);
-  EXPECT_EQ(valid_tables(), 1u);
+  EXPECT_EQ(master_.valid_tables(kAddress), 1u);
 }
 
 }  // namespace

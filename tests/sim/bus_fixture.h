@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <span>
 #include <vector>
@@ -162,6 +163,22 @@ class Master {
     const Bytes& reply = frames[0].payload;
     EXPECT_EQ(bushd_decode_report(reply.data(), reply.size(), &report), BUSHD_OK);
     return report;
+  }
+
+  bushd_tables tables(std::uint8_t address) {
+    bushd_tables told{};
+    const auto reply = request(address, BUSHD_MSG_TABLES);
+    if (!reply) {
+      ADD_FAILURE() << "no tables from " << int{address};
+      return told;
+    }
+    EXPECT_EQ(bushd_decode_tables(reply->payload.data(), reply->payload.size(), &told), BUSHD_OK);
+    return told;
+  }
+  std::size_t valid_tables(std::uint8_t address) {
+    const bushd_tables told = tables(address);
+    return static_cast<std::size_t>(
+        std::count_if(std::begin(told.slot), std::end(told.slot), [](auto& t) { return t.valid; }));
   }
 
   // A SYNC to all; returns the name of its mark.

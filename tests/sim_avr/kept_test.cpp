@@ -20,22 +20,6 @@ class AvrKept : public AvrAlone {
     while (codes.size() < count) codes.push_back(first--);
     return codes;
   }
-
-  bushd_tables tables() {
-    bushd_tables told{};
-    const auto reply = master_.request(kAddress, BUSHD_MSG_TABLES);
-    EXPECT_TRUE(reply);
-    if (reply) {
-      EXPECT_EQ(bushd_decode_tables(reply->payload.data(), reply->payload.size(), &told), BUSHD_OK);
-    }
-    return told;
-  }
-
-  std::size_t valid_tables() {
-    const bushd_tables told = tables();
-    return static_cast<std::size_t>(
-        std::count_if(std::begin(told.slot), std::end(told.slot), [](auto& t) { return t.valid; }));
-  }
 };
 
 TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
@@ -49,12 +33,12 @@ TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kShortTickNs, BUSHD_FORMAT_FINE));
     const auto first = static_cast<std::uint16_t>(1000 + cut);
     ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, ramp(first, 100), 800));
-    const std::uint32_t sent_crc = tables().slot[0].crc;
+    const std::uint32_t sent_crc = master_.tables(kAddress).slot[0].crc;
     // Before, while or after its 200 bytes and the settings are written.
     pass(500'000'000 + static_cast<TimeNs>(random.below(1800)) * 1'000'000);
     reboot();
     const bushd_report report = master_.poll(kAddress);
-    const bushd_tables found = tables();
+    const bushd_tables found = master_.tables(kAddress);
     if (report.faults == 0 && found.slot[0].valid) {
       ++whole;
       EXPECT_TRUE(found.slot[0].crc == sent_crc || found.slot[0].crc == kept_crc);
@@ -63,7 +47,7 @@ TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
       ++broken;
       EXPECT_EQ(report.faults, BUSHD_FAULT_EEPROM);
       EXPECT_EQ(report.failed_tests, BUSHD_TEST_EEPROM);
-      EXPECT_EQ(valid_tables(), 0u);
+      EXPECT_EQ(master_.valid_tables(kAddress), 0u);
       EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
                                      bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
                 BUSHD_OK);
@@ -122,7 +106,7 @@ TEST_F(AvrKept, NothingIsWrittenWhileAMotorMoves) {
   EXPECT_EQ(steps_made(3), 400u);
   pass(3'000'000'000);
   reboot();
-  EXPECT_EQ(valid_tables(), 1u);
+  EXPECT_EQ(master_.valid_tables(kAddress), 1u);
 }
 
 }  // namespace

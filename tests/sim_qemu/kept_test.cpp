@@ -41,12 +41,7 @@ class QemuKept : public testing::Test {
     master_.upload_table(kAddress, slot, 10'000, ramp, 1000);
   }
   std::uint32_t table_crc() {
-    bushd_tables told{};
-    const auto reply = master_.request(kAddress, BUSHD_MSG_TABLES);
-    if (!reply ||
-        bushd_decode_tables(reply->payload.data(), reply->payload.size(), &told) != BUSHD_OK) {
-      ADD_FAILURE() << "no tables";
-    }
+    const bushd_tables told = master_.tables(kAddress);
     return told.slot[0].valid ? told.slot[0].crc : 0;
   }
 
