@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "sim/bus_fixture.h"
 #include "sim_avr/avr_mcu.h"
@@ -15,12 +16,14 @@ class AvrAlone : public testing::Test {
   static constexpr std::uint8_t kAddress = 2;
   static constexpr TimeNs kBootNs = 200'000'000;
 
-  AvrAlone() : bus_(kBaud, &recorder_), master_(bus_) {
-    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+  // `boots`: boot number of the boot before.
+  explicit AvrAlone(std::uint32_t baud = kBaud, std::uint16_t boots = 6)
+      : bus_(baud, &recorder_), master_(bus_) {
+    bus_.add_mcu([this, baud, boots](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
       AvrOptions options;
-      options.image = AVR_IMAGES "-500000.elf";
+      options.image = AVR_IMAGES "-" + std::to_string(baud) + ".elf";
       options.address = kAddress;
-      options.boots = 6;
+      options.boots = boots;
       auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
       avr_ = mcu.get();
       return mcu;
@@ -29,6 +32,10 @@ class AvrAlone : public testing::Test {
   }
 
   void pass(TimeNs ns) { bus_.advance_to(bus_.now_ns() + ns); }
+  void reboot() {
+    bus_.reboot(0);
+    pass(kBootNs);
+  }
 
   // All motors may run the table in slot 0.
   void make_ready() {

@@ -16,8 +16,7 @@ TEST_F(AvrBoot, ABitOfTheProgramThatHasFlippedKeepsMotorsOff) {
   // Vectors of interrupts that it does not use: it works all the same.
   for (const std::uint32_t address : {0x06u, 0xE2u}) {
     avr_->flip_flash_bit(address, 5);
-    bus_.reboot(0);
-    pass(kBootNs);
+    reboot();
     const bushd_report report = master_.poll(kAddress);
     EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST) << address;
     EXPECT_EQ(report.failed_tests, BUSHD_TEST_FLASH);
@@ -26,8 +25,7 @@ TEST_F(AvrBoot, ABitOfTheProgramThatHasFlippedKeepsMotorsOff) {
               BUSHD_E_STATE);
     avr_->flip_flash_bit(address, 5);
   }
-  bus_.reboot(0);
-  pass(kBootNs);
+  reboot();
   EXPECT_EQ(master_.poll(kAddress).faults, 0);
 }
 
@@ -56,8 +54,7 @@ TEST_F(AvrBoot, AnInputThatIsActiveIsNoFault) {
 TEST_F(AvrBoot, TellsWhyItBooted) {
   pass(kBootNs);
   EXPECT_EQ(master_.poll(kAddress).reset_cause, BUSHD_RESET_POWER_ON);
-  bus_.reboot(0);
-  pass(kBootNs);
+  reboot();
   EXPECT_EQ(master_.poll(kAddress).reset_cause, BUSHD_RESET_EXTERNAL);
 }
 

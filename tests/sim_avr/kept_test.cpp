@@ -10,11 +10,6 @@ class AvrKept : public AvrAlone {
  protected:
   AvrKept() { pass(kBootNs); }
 
-  void reboot() {
-    bus_.reboot(0);
-    pass(kBootNs);
-  }
-
   static std::vector<std::uint16_t> ramp(std::uint16_t first, std::size_t count) {
     std::vector<std::uint16_t> codes;
     while (codes.size() < count) codes.push_back(first--);

@@ -1,32 +1,15 @@
 // What becomes of what the image for LM3S6965 keeps in its flash when the power goes, and when the
 // room for it goes to its end; tests/conformance has the rest.
-#include <memory>
-
-#include "sim/bus_fixture.h"
 #include "sim/random.h"
-#include "sim_qemu/qemu_mcu.h"
+#include "sim_qemu/qemu_fixture.h"
 
 namespace bushd::sim {
 namespace {
 
-constexpr std::uint8_t kAddress = 3;
-
-class QemuKept : public testing::Test {
+class QemuKept : public QemuAlone {
  protected:
-  QemuKept() : bus_(500'000), master_(bus_) {
-    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
-      QemuOptions options;
-      options.image = LM3S_IMAGES "-500000.elf";
-      options.address = kAddress;
-      auto mcu = std::make_unique<QemuMcu>(options, index, driver, sink);
-      qemu_ = mcu.get();
-      return mcu;
-    });
-    master_.patience_ns = 20'000'000;  // the CRC of a long table takes a while
-    pass(100'000'000);
-  }
+  QemuKept() { master_.patience_ns = 20'000'000; }  // the CRC of a long table takes a while
 
-  void pass(TimeNs ns) { bus_.advance_to(bus_.now_ns() + ns); }
   void configure(std::uint32_t tick_ns) {
     ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONFIGURE, bushd_encode_configure,
                                    bushd_configure{tick_ns, BUSHD_FORMAT_FINE, 1000}),
@@ -44,10 +27,6 @@ class QemuKept : public testing::Test {
     const bushd_tables told = master_.tables(kAddress);
     return told.slot[0].valid ? told.slot[0].crc : 0;
   }
-
-  Bus bus_;
-  Master master_;
-  QemuMcu* qemu_ = nullptr;
 };
 
 TEST_F(QemuKept, APowerCutLeavesTheNewOnesOrThoseOfBefore) {
@@ -62,8 +41,7 @@ TEST_F(QemuKept, APowerCutLeavesTheNewOnesOrThoseOfBefore) {
     const std::uint32_t sent = table_crc();
     // It is written 128 ms after the last change, in 12 ms.
     pass(30'000'000 + static_cast<TimeNs>(random.below(80)) * 1'000'000);
-    bus_.reboot(0);
-    pass(100'000'000);
+    reboot();
     EXPECT_EQ(master_.poll(kAddress).faults, 0);
     const std::uint32_t found = table_crc();
     EXPECT_TRUE(found == sent || found == kept);
@@ -86,8 +64,7 @@ TEST_F(QemuKept, RoomIsFoundAgainAfterAReset) {
     ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
               BUSHD_OK);
     pass(600'000'000);
-    bus_.reboot(0);
-    pass(700'000'000);
+    reboot(700'000'000);
     const bushd_report report = master_.poll(kAddress);
     EXPECT_EQ(report.faults, 0);
     EXPECT_EQ(report.system_inputs, round);

@@ -5,33 +5,13 @@
 #include <string>
 
 #include "engine/message.h"
-#include "sim/bus_fixture.h"
+#include "sim_qemu/qemu_fixture.h"
 
 namespace bushd::sim {
 namespace {
 
-constexpr std::uint32_t kBaud = 500'000;
-constexpr std::uint32_t kTickNs = 2'560'000;
-constexpr std::uint8_t kAddress = 3;
-const std::string kImage = LM3S_IMAGES "-500000.elf";
-
-class QemuImage : public testing::Test {
+class QemuImage : public QemuAlone {
  protected:
-  explicit QemuImage(const std::string& image = kImage) : bus_(kBaud, &recorder_), master_(bus_) {
-    bus_.add_mcu([this, &image](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
-      QemuOptions options;
-      options.image = image;
-      options.address = kAddress;
-      options.boots = 41;
-      auto mcu = std::make_unique<QemuMcu>(options, index, driver, sink);
-      qemu_ = mcu.get();
-      return mcu;
-    });
-    master_.patience_ns = 6'000'000;
-  }
-
-  void SetUp() override { bus_.advance_to(100'000'000); }
-
   // `ticks` of two steps each, from a rest.
   void move(std::uint8_t motor, std::size_t ticks) {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
@@ -41,12 +21,7 @@ class QemuImage : public testing::Test {
                        std::vector<std::int16_t>(ticks, 512));
   }
 
-  void pass_ticks(int ticks) { bus_.advance_to(bus_.now_ns() + TimeNs{kTickNs} * ticks); }
-
-  Recorder recorder_;
-  Bus bus_;
-  Master master_;
-  QemuMcu* qemu_ = nullptr;
+  void pass_ticks(int ticks) { pass(TimeNs{kTickNs} * ticks); }
 };
 
 // The edges of two runs are those of one: see below.
@@ -77,14 +52,14 @@ TEST_F(QemuImage, ComesBackWhenItsTicksStandStill) {
   ASSERT_NO_FATAL_FAILURE(move(2, 100));
   pass_ticks(50);
   EXPECT_EQ(master_.poll(kAddress).reset_cause, BUSHD_RESET_POWER_ON);
-  const std::size_t steps = recorder_.times(0, Signal::kStep, 2, true).size();
+  const std::size_t steps = steps_made(2);
   EXPECT_GT(steps, 10u);
   qemu_->stop_ticks();
   pass_ticks(80);
-  EXPECT_LE(recorder_.times(0, Signal::kStep, 2, true).size(), steps + 4);
+  EXPECT_LE(steps_made(2), steps + 4);
   EXPECT_EQ(recorder_.times(0, Signal::kEnable, 0, false).size(), 1u);
   const bushd_report report = master_.poll(kAddress);
-  EXPECT_EQ(report.boot_number, 43);
+  EXPECT_EQ(report.boot_number, kBoots + 2);
   EXPECT_EQ(report.reset_cause, BUSHD_RESET_WATCHDOG);
 }
 
@@ -137,23 +112,20 @@ TEST_F(QemuImage, HasNoActiveInputFromTheBeginning) {
 
 // A page of its journal has room for some 220 boots.
 TEST_F(QemuImage, CountsItsBootsWhenItTurnsAPage) {
-  constexpr int kBoots = 240;
-  for (int i = 0; i < kBoots; ++i) {
-    bus_.reboot(0);
-    bus_.advance_to(bus_.now_ns() + 40'000'000);
-  }
+  constexpr int kMore = 240;
+  for (int i = 0; i < kMore; ++i) reboot(40'000'000);
   const bushd_report report = master_.poll(kAddress);
-  EXPECT_EQ(report.boot_number, 42 + kBoots);
+  EXPECT_EQ(report.boot_number, kBoots + 1 + kMore);
   EXPECT_EQ(report.reset_cause, BUSHD_RESET_EXTERNAL);
 }
 
 // The same image with one bit of a vector turned round that is never taken: the debug monitor's.
-class QemuDamagedImage : public QemuImage {
+class QemuDamagedImage : public QemuAlone {
  protected:
-  QemuDamagedImage() : QemuImage(damaged()) {}
+  QemuDamagedImage() : QemuAlone(kBaud, damaged()) {}
 
   static std::string damaged() {
-    std::ifstream in(kImage, std::ios::binary);
+    std::ifstream in(image_path(kBaud), std::ios::binary);
     std::string bytes(std::istreambuf_iterator<char>(in), {});
     // The ELF file's first segment is the flash memory, which begins with the vectors.
     const std::size_t segment = bushd_get_u32(bytes_at(bytes, 28));
@@ -176,7 +148,7 @@ TEST_F(QemuDamagedImage, IsFoundAtBoot) {
 }
 
 // In what would be a part of its stack.
-class QemuDamagedRam : public QemuImage {
+class QemuDamagedRam : public QemuAlone {
  protected:
   QemuDamagedRam() { qemu_->stick_ram(0x2000F004); }
 };
@@ -187,7 +159,7 @@ TEST_F(QemuDamagedRam, IsFoundAtBoot) {
   EXPECT_EQ(report.failed_tests, BUSHD_TEST_RAM);
 }
 
-class QemuWornFlash : public QemuImage {
+class QemuWornFlash : public QemuAlone {
  protected:
   QemuWornFlash() { qemu_->wear_flash(); }
 };
@@ -197,10 +169,10 @@ TEST_F(QemuWornFlash, IsFoundWhenABootCannotBeCounted) {
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.faults, BUSHD_FAULT_EEPROM);
   EXPECT_EQ(report.failed_tests, BUSHD_TEST_EEPROM);
-  EXPECT_EQ(report.boot_number, 42);
+  EXPECT_EQ(report.boot_number, kBoots + 1);
 }
 
-class QemuStuckInputs : public QemuImage {
+class QemuStuckInputs : public QemuAlone {
  protected:
   QemuStuckInputs() { qemu_->stick_inputs(); }
 };
@@ -219,7 +191,7 @@ TEST_F(QemuImage, HasNoFaultWhenItIsWhole) {
 
 TEST(QemuMcu, SaysSoIfThereIsNoImage) {
   Recorder recorder;
-  Bus bus(kBaud, &recorder);
+  Bus bus(500'000, &recorder);
   bus.add_mcu([](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
     QemuOptions options;
     options.image = "/nowhere.elf";
