@@ -6,14 +6,13 @@
 // to the jitter.
 #include <cmath>
 #include <cstdio>
-#include <map>
 
+#include "sim/step_slots.h"
 #include "sim_avr/avr_fixture.h"
 
 namespace bushd::sim {
 namespace {
 
-constexpr std::uint16_t kSlots = 128;
 constexpr std::uint16_t kDelay = 100;
 constexpr double kCycleNs = 62.5;
 constexpr double kEntryCycles = 5;
@@ -69,18 +68,6 @@ class AvrFigures : public AvrAlone, public testing::WithParamInterface<Load> {
     payload.resize(size);
     master_.post(kAddress, BUSHD_MSG_TICKS, payload);
   }
-
-  // The slot of a step, counted from that of the first one.
-  static TimeNs slot_of(std::size_t step) {
-    const Load& load = GetParam();
-    const auto steps = static_cast<std::size_t>(load.steps);
-    const auto in_tick = [&](std::size_t i) {
-      return load.format == BUSHD_FORMAT_FINE
-                 ? std::min((i + 1) * kSlots / steps, std::size_t{kSlots - 1})
-                 : (2 * i + 1) * kSlots / (2 * steps);
-    };
-    return static_cast<TimeNs>(step / steps * kSlots + in_tick(step % steps) - in_tick(0));
-  }
 };
 
 TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
@@ -111,27 +98,11 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
   EXPECT_EQ(master_.frames.size(), polls);
   EXPECT_EQ(master_.bad_frames, 0);
 
-  std::array<std::vector<Edge>, BUSHD_MOTORS_PER_MCU> edges;
-  for (const Edge& edge : recorder_.edges) {
-    if (edge.signal == Signal::kStep) edges[edge.index].push_back(edge);
-  }
-  TimeNs shortest_ns = kNever;
-  // How long after its slot's beginning a pulse comes, counted from the first one.
-  TimeNs earliest_ns = 0;
-  TimeNs latest_ns = 0;
-  for (const auto& of_motor : edges) {
-    ASSERT_EQ(of_motor.size(), 2u * static_cast<std::size_t>(load.steps * ticks));
-    for (std::size_t i = 0; i < of_motor.size(); i += 2) {
-      shortest_ns = std::min(shortest_ns, of_motor[i + 1].time_ns - of_motor[i].time_ns);
-      // A tick that was not ready would have made it late.
-      const TimeNs due_ns = of_motor.front().time_ns + slot_of(i / 2) * tick_ns / kSlots;
-      const TimeNs late_ns = of_motor[i].time_ns - due_ns;
-      ASSERT_LT(std::abs(late_ns), tick_ns / kSlots / 2) << "step " << i / 2;
-      earliest_ns = std::min(earliest_ns, late_ns);
-      latest_ns = std::max(latest_ns, late_ns);
-    }
-  }
-  EXPECT_GE(shortest_ns, 2500);
+  PulseFigures pulses;
+  ASSERT_NO_FATAL_FAILURE(expect_steps_in_slots(
+      recorder_.edges,
+      {load.format, kTicks, static_cast<std::size_t>(load.steps), tick_ns, tick_ns}, &pulses));
+  EXPECT_GE(pulses.shortest_ns, 2500);
   const bushd_report after = master_.poll(kAddress);
   EXPECT_EQ(after.faults, 0);
   EXPECT_EQ(after.bad_frames, 0);
@@ -141,7 +112,8 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
 
   // What keeps a slot waiting was itself entered.
   const double jitter_cycles =
-      std::round(static_cast<double>(latest_ns - earliest_ns) / kCycleNs) + kEntryCycles;
+      std::round(static_cast<double>(pulses.latest_ns - pulses.earliest_ns) / kCycleNs) +
+      kEntryCycles;
   EXPECT_LE(jitter_cycles, kMostJitterCycles);
   const double chip_tick_ns = static_cast<double>(tick_ns) + entries * kEntryCycles * kCycleNs;
   const double steps_per_s = BUSHD_MOTORS_PER_MCU * load.steps / chip_tick_ns * 1e9;
@@ -153,7 +125,7 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
       "pulses from %.2f us, jitter %.0f cycles, %zu bytes of stack never used\n",
       load.format == BUSHD_FORMAT_FINE ? "fine" : "coarse", load.steps,
       polls != 0 ? ", answering" : "", steps_per_s, chip_tick_ns / 1000, entries,
-      BUSHD_MOTORS_PER_MCU * load.steps * ticks, static_cast<double>(shortest_ns) / 1000,
+      BUSHD_MOTORS_PER_MCU * load.steps * ticks, static_cast<double>(pulses.shortest_ns) / 1000,
       jitter_cycles, avr_->untouched_ram());
 }
 
