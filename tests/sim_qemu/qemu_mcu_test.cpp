@@ -147,40 +147,35 @@ TEST_F(QemuDamagedImage, IsFoundAtBoot) {
   EXPECT_EQ(report.failed_tests, BUSHD_TEST_FLASH);
 }
 
-// In what would be a part of its stack.
-class QemuDamagedRam : public QemuAlone {
- protected:
-  QemuDamagedRam() { qemu_->stick_ram(0x2000F004); }
+struct Defect {
+  const char* name;
+  void (*begin)(QemuMcu& qemu);
+  std::uint8_t faults;
+  std::uint8_t failed_tests;
 };
 
-TEST_F(QemuDamagedRam, IsFoundAtBoot) {
-  const bushd_report report = master_.poll(kAddress);
-  EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST);
-  EXPECT_EQ(report.failed_tests, BUSHD_TEST_RAM);
-}
-
-class QemuWornFlash : public QemuAlone {
+class QemuDefects : public QemuAlone, public testing::WithParamInterface<Defect> {
  protected:
-  QemuWornFlash() { qemu_->wear_flash(); }
+  QemuDefects() { GetParam().begin(*qemu_); }
 };
+INSTANTIATE_TEST_SUITE_P(
+    Of, QemuDefects,
+    testing::Values(
+        // In what would be a part of its stack.
+        Defect{"Ram", [](QemuMcu& qemu) { qemu.stick_ram(0x2000F004); }, BUSHD_FAULT_SELF_TEST,
+               BUSHD_TEST_RAM},
+        Defect{"Inputs", [](QemuMcu& qemu) { qemu.stick_inputs(); }, BUSHD_FAULT_SELF_TEST,
+               BUSHD_TEST_INPUTS},
+        // The next boot would have the same number: nobody could tell it from this one.
+        Defect{"WornFlash", [](QemuMcu& qemu) { qemu.wear_flash(); }, BUSHD_FAULT_EEPROM,
+               BUSHD_TEST_EEPROM}),
+    [](auto& defect) { return defect.param.name; });
 
-// The next boot would have the same number: nobody could tell it from this one.
-TEST_F(QemuWornFlash, IsFoundWhenABootCannotBeCounted) {
+TEST_P(QemuDefects, AreFoundAtBoot) {
   const bushd_report report = master_.poll(kAddress);
-  EXPECT_EQ(report.faults, BUSHD_FAULT_EEPROM);
-  EXPECT_EQ(report.failed_tests, BUSHD_TEST_EEPROM);
+  EXPECT_EQ(report.faults, GetParam().faults);
+  EXPECT_EQ(report.failed_tests, GetParam().failed_tests);
   EXPECT_EQ(report.boot_number, kBoots + 1);
-}
-
-class QemuStuckInputs : public QemuAlone {
- protected:
-  QemuStuckInputs() { qemu_->stick_inputs(); }
-};
-
-TEST_F(QemuStuckInputs, AreFoundAtBoot) {
-  const bushd_report report = master_.poll(kAddress);
-  EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST);
-  EXPECT_EQ(report.failed_tests, BUSHD_TEST_INPUTS);
 }
 
 TEST_F(QemuImage, HasNoFaultWhenItIsWhole) {
