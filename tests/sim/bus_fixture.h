@@ -249,6 +249,11 @@ class Master {
     ASSERT_EQ(acknowledged(address, BUSHD_MSG_ASSIGN, bushd_encode_assign, {motor, slot}),
               BUSHD_OK);
   }
+  void assign_all(std::uint8_t address, std::uint8_t slot) {
+    for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      ASSERT_NO_FATAL_FAILURE(assign(address, m, slot));
+    }
+  }
 
   // Fine ticks for one motor, from first_tick on, at rest behind the last.
   void fine_ticks(std::uint8_t address, std::uint8_t motor, std::uint32_t first_tick,

@@ -41,9 +41,7 @@ class AvrAlone : public testing::Test {
   void make_ready() {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
     ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, {400, 300, 200}, 150));
-    for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-      ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, m, 0));
-    }
+    ASSERT_NO_FATAL_FAILURE(master_.assign_all(kAddress, 0));
   }
 
   void run(std::uint8_t motor, std::uint32_t steps) {

@@ -75,9 +75,7 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
   const auto tick_ns = TimeNs{load.tick_ns};
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(load.tick_ns, load.format));
   ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 1000, {400, 300, 200}, kDelay));
-  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, m, 0));
-  }
+  ASSERT_NO_FATAL_FAILURE(master_.assign_all(kAddress, 0));
   const bushd_report before = master_.poll(kAddress);
   const TimeNs begin_ns = bus_.now_ns();
   const std::uint64_t entries_before = avr_->interrupts();

@@ -72,9 +72,7 @@ TEST_P(LmFigures, SixteenMotorsLoseNoStep) {
   const TimeNs frame_ns = TimeNs{load.tick_ns} * load.ticks_per_frame;
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(load.tick_ns, load.format));
   ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 1000, {400, 300, 200}, kDelay));
-  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, m, 0));
-  }
+  ASSERT_NO_FATAL_FAILURE(master_.assign_all(kAddress, 0));
   const std::uint32_t first =
       master_.poll(kAddress).tick + 20 + static_cast<std::uint32_t>(10'000'000 / load.tick_ns);
   const TimeNs begin_ns = bus_.now_ns();
