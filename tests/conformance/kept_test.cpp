@@ -1,18 +1,16 @@
 // Tables and settings that an image keeps over resets. Its virtual twin keeps nothing.
 #include "conformance/targets.h"
-#include "sim/bus_fixture.h"
+#include "sim/mcu_alone.h"
 
 namespace bushd::sim {
 namespace {
 
-constexpr std::uint32_t kTickNs = 2'560'000;
-constexpr std::uint8_t kAddress = 2;
 constexpr TimeNs kBootNs = 250'000'000;
 constexpr std::size_t kCodes = 3;
 
-class Kept : public testing::TestWithParam<Target> {
+class Kept : public McuAlone, public testing::WithParamInterface<Target> {
  protected:
-  Kept() : real_(GetParam().make()), bus_(500'000, &recorder_), master_(bus_) {
+  Kept() : McuAlone(kBaud, kBootNs), real_(GetParam().make()) {
     bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
       return real_->make({kAddress, 1, 6}, index, driver, sink);
     });
@@ -20,12 +18,6 @@ class Kept : public testing::TestWithParam<Target> {
     pass(kBootNs);
   }
   void TearDown() override { real_->expect_unharmed(); }
-
-  void pass(TimeNs ns) { bus_.advance_to(bus_.now_ns() + ns); }
-  void reboot() {
-    bus_.reboot(0);
-    pass(kBootNs);
-  }
 
   void make_ready() {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
@@ -38,14 +30,8 @@ class Kept : public testing::TestWithParam<Target> {
                    const Message& message) {
     return master_.acknowledged(kAddress, type, encode, message);
   }
-  std::size_t steps_made(std::uint8_t motor) const {
-    return recorder_.times(0, Signal::kStep, motor, true).size();
-  }
 
   const std::unique_ptr<McuUnderTest> real_;
-  Recorder recorder_;
-  Bus bus_;
-  Master master_;
 };
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Kept);
 INSTANTIATE_TEST_SUITE_P(Of, Kept, testing::ValuesIn(targets()),
@@ -75,11 +61,7 @@ TEST_P(Kept, TablesAndSettingsOutliveAReset) {
   // And they move motors.
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
   ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
-  const bushd_table_run_entry entry{3, 0, 1, 50};
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(
-      bushd_encode_table_run(0, master_.poll(kAddress).tick + 24, &entry, 1, payload.data()));
-  master_.send(kAddress, BUSHD_MSG_TABLE_RUN, payload);
+  run(3, 50);
   pass(200 * TimeNs{kTickNs});
   EXPECT_EQ(steps_made(3), 50u);
 }
