@@ -92,6 +92,8 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   if (config->enable_at_boot && (mcu->faults & BUSHD_FAULT_SELF_TEST) == 0) {
     mcu->flags |= BUSHD_FLAG_ENABLED;
     port->set_enable(port->context, true);
+    // Until settings say otherwise: there may be another reset before a master tells them.
+    port->keep_enable(port->context, true);
   }
   bushd_mcu_update_state(mcu);
 }

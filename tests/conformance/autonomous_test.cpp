@@ -173,6 +173,15 @@ TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
     EXPECT_EQ(after.state, BUSHD_STATE_BUSY);
     EXPECT_EQ((after.flags & BUSHD_FLAG_ENABLED) != 0, keeps_enable);
     EXPECT_EQ(after.motor[kMotor].position_steps, 0);
+    if (keeps_enable) {
+      // Once more, before a master has told it anything.
+      real_->hang();
+      pass_ticks(60);
+      bus_.mcu(0).set_reset_cause(BUSHD_RESET_WATCHDOG);
+      bus_.reboot(0);
+      pass_ticks(120);
+      EXPECT_TRUE(master_.poll(kReal).flags & BUSHD_FLAG_ENABLED);
+    }
     EXPECT_EQ(master_.poll(kVirtual).reset_cause, after.reset_cause);
     expect_the_same_reports();
 
