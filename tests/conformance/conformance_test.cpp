@@ -83,6 +83,28 @@ TEST_P(Conformance, RunsFourTablesAtOnceToTheSlot) {
   expect_the_same_reports();
 }
 
+// The clock jumps by part of a tick: one tick is longer by up to a whole one.
+TEST_P(Conformance, ComesIntoStepInTheLongestTicks) {
+  tick_ns_ = BUSHD_MAX_TICK_NS;
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {9}));
+  std::uint32_t tick = 0;
+  std::size_t made = 0;
+  for (const std::uint32_t ns : {0, 19'900'000, 1'000, 15'000'000, 7'000'000}) {
+    SCOPED_TRACE(ns);
+    const std::uint32_t mark = master_.sync({});
+    pass_ticks(3);
+    tick += 1000;
+    master_.sync({0, 0, true, mark, tick, ns});
+    pass_ticks(10);
+    run_by_table(master_.poll(kReal).tick + 24, {{9, 0, 1, 20}});
+    pass_ticks(40);
+    made += 20;
+    expect_the_same_steps(9, made);
+  }
+  expect_the_same_times(9);
+  expect_the_same_reports();
+}
+
 // Inputs are told with every report, at any time of a tick.
 TEST_P(Conformance, TurnsRoundWhilePollsCome) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {2, 9}));

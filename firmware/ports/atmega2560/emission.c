@@ -16,9 +16,12 @@
 #define CHANGE_CYCLES 92u
 // Until the first slot.
 #define START_CYCLES 400u
-// Of a tick without steps: the last slot, and how many of them there are at most.
+// Of a tick without steps: the last slot, and how many of them there are at most. The longest tick
+// is one of BUSHD_MAX_TICK_NS that is nearly doubled to come into step with the bus.
 #define SHORT_SLOT_CYCLES 256u
-#define MAX_EMPTY_SLOTS 9u
+#define MAX_EMPTY_SLOTS 11u
+#define MOST_CYCLES (2ul * BUSHD_MAX_TICK_NS / 1000ul * CYCLES_PER_US)
+_Static_assert(MOST_CYCLES / (MAX_EMPTY_SLOTS - 1u) < UINT16_MAX, "a slot is counted in 16 bits");
 
 _Static_assert(offsetof(emission_tick, mask) == TICK_MASK, "as in emission_slots.S");
 _Static_assert(offsetof(emission_tick, mark) == TICK_MARK, "as in emission_slots.S");
@@ -88,12 +91,20 @@ static void set_plane(emission_tick* tick, const bushd_plane* plane, uint32_t cy
 // it the next tick is taken.
 static void set_empty(emission_tick* tick, uint16_t direction, uint8_t begun, uint32_t cycles) {
   const uint32_t body = cycles - SHORT_SLOT_CYCLES;
-  const uint8_t shift = body <= UINT16_MAX ? 0 : 3;
-  const uint8_t long_slots = (uint8_t)(1u << shift);
+  // Not divided but where ticks are so long that it does not matter.
+  uint8_t long_slots = 1;
+  uint32_t slot = body;
+  if (body > 8 * (uint32_t)UINT16_MAX) {
+    long_slots = MAX_EMPTY_SLOTS - 1u;
+    slot = body / long_slots;
+  } else if (body > UINT16_MAX) {
+    long_slots = 8;
+    slot = body >> 3;
+  }
   set_masks(tick, idle_masks, (uint8_t)(long_slots + 1u));
   tick->direction = direction;
-  tick->top = (uint16_t)((body >> shift) - 1u);
-  tick->last_top = (uint16_t)(SHORT_SLOT_CYCLES - 1u + (body & (long_slots - 1u)));
+  tick->top = (uint16_t)(slot - 1u);
+  tick->last_top = (uint16_t)(SHORT_SLOT_CYCLES - 1u + (uint16_t)(body - slot * long_slots));
   tick->cycles = cycles;
   tick->begun = begun;
 }

@@ -162,6 +162,7 @@ static void hear_line(void) {
     // The same conversion may be seen several times.
     bushd_mcu_sample(&mcu, (uint32_t)emission_time_in_tick_ns(clock_now()), inputs_current());
   } else {
+    clock_now();  // as there; a tick may last longer
     poll_eeprom();
   }
 }
