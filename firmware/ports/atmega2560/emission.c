@@ -32,9 +32,9 @@ _Static_assert(offsetof(emission_tick, direction) == TICK_DIRECTION, "as in emis
 _Static_assert(offsetof(emission_tick, cycles) == TICK_CYCLES, "as in emission_slots.S");
 _Static_assert(offsetof(emission_tick, begun) == TICK_BEGUN, "as in emission_slots.S");
 
-const emission_tick* volatile emission_next = &emission_silent;
-const emission_tick* volatile emission_taken;
-emission_tick emission_silent;  // goes on when no plane is ready
+volatile uint8_t emission_next;
+volatile uint8_t emission_taken;
+EMISSION_TICKS emission_tick emission_silent;  // goes on when no plane is ready
 volatile uint16_t emission_last_top;
 volatile uint8_t emission_committed;
 uint32_t emission_begun_at;
@@ -51,7 +51,7 @@ typedef struct prepared_tick {
 } prepared_tick;
 
 // Of the main loop.
-static prepared_tick prepared[2];
+EMISSION_TICKS static prepared_tick prepared[2];
 static prepared_tick* given = prepared;  // waits or was taken last
 static const bushd_plane* next_plane;    // NULL: the core's present tick has the last one
 // Of a tick without adjustment, from residue 0.
@@ -136,7 +136,11 @@ static uint32_t set_length(prepared_tick* next) {
   return cycles;
 }
 
-// `again`: in place of the one that waits; not if it was taken.
+static inline uint8_t name_of(const emission_tick* tick) {
+  return (uint8_t)(uintptr_t)tick;
+}
+
+// `again`: in place of the one that waits; not if it was taken. Asked for at rest only.
 static void give(bool again) {
   prepared_tick* const next = given == prepared ? prepared + 1 : prepared;
   const uint32_t cycles = set_length(next);
@@ -146,15 +150,20 @@ static void give(bool again) {
   } else {
     set_empty(&next->tick, next_plane->direction, 1 << TICK_CHANGES, cycles);
   }
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    if (again && emission_next == &emission_silent) return;
-    emission_next = &next->tick;
+  const uint8_t name = name_of(&next->tick);
+  if (again) {
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+      if (emission_next == name_of(&emission_silent)) return;
+      emission_next = name;
+    }
+  } else {
+    emission_next = name;
   }
   given = next;
 }
 
 void emission_start(void) {
-  emission_taken = &emission_silent;
+  emission_taken = name_of(&emission_silent);
   emission_set_registers(&emission_silent);
   GPIOR0 = 1 << TICK_IS_NEXT | 1 << TICK_CHANGES;
   OCR1A = START_CYCLES - 1u;

@@ -30,7 +30,7 @@ TIMER1_COMPA_vect:
     rjmp take_next_tick
     ; The first slot: timer 1 has begun it with the length of the one before.
     lds r30, emission_taken
-    lds r31, emission_taken+1
+    ldi r31, hi8(emission_silent)
     ldd DATA_LOW, Z+TICK_BEGUN
     out TICK_FLAGS, DATA_LOW
     ldd DATA_LOW, Z+TICK_TOP+1
@@ -56,16 +56,13 @@ take_next_tick:
     ldi r30, 1 << OCIE1A | 1 << OCIE1B | 1 << OCIE1C
     sts TIMSK1, r30
     lds r30, emission_next
-    lds r31, emission_next+1
+    ldi r31, hi8(emission_silent)
     sts emission_taken, r30
-    sts emission_taken+1, r31
     ld SLOT_LOW, Z
     ldd SLOT_HIGH, Z+TICK_MASK+1
     ldd SLOT_MARK, Z+TICK_MARK
     ldi r30, lo8(emission_silent)
-    ldi r31, hi8(emission_silent)
     sts emission_next, r30
-    sts emission_next+1, r31
     movw r30, SAVED_LOW
     reti
 
@@ -92,7 +89,7 @@ TIMER1_COMPC_vect:
     ; The tick's last pulses are over: DIR may change.
     movw SAVED_LOW, r30
     lds r30, emission_taken
-    lds r31, emission_taken+1
+    ldi r31, hi8(emission_silent)
     ldd DATA_LOW, Z+TICK_DIRECTION
     sts _SFR_MEM_ADDR(DIR_LOW), DATA_LOW
     ldd DATA_LOW, Z+TICK_DIRECTION+1
@@ -110,10 +107,8 @@ tell_main_loop:
     push r31
     push r25
     lds r30, emission_taken
-    lds r31, emission_taken+1
-    ldi r24, hi8(emission_silent)
+    ldi r31, hi8(emission_silent)
     cpi r30, lo8(emission_silent)
-    cpc r31, r24
     breq 1f
     ; A silent tick that follows holds its directions.
     ldd r24, Z+TICK_DIRECTION

@@ -47,15 +47,20 @@ typedef struct emission_tick {
   uint8_t begun;  // what GPIOR0 has from its first slot on
 } emission_tick;
 
-// In the last slot of a tick the next one is taken, and the silent one waits in its place.
-extern const emission_tick* volatile emission_next;
-extern const emission_tick* volatile emission_taken;
+// In the last slot of a tick the next one is taken, and the silent one waits in its place. These
+// are low bytes of addresses, so that a slot need not wait while one is written: all ticks lie
+// within one multiple of 256 bytes (EMISSION_TICKS; tests/sim_avr/one_page).
+extern volatile uint8_t emission_next;
+extern volatile uint8_t emission_taken;
 extern emission_tick emission_silent;
 extern volatile uint16_t emission_last_top;  // of the present tick
 // The taken tick has begun, at `begun_at`, and is not silent. `next_start` is of the tick after it.
 extern volatile uint8_t emission_committed;
 extern uint32_t emission_begun_at;
 extern uint32_t emission_next_start;
+
+// .data is where RAM begins, and short.
+#define EMISSION_TICKS __attribute__((section(".data")))
 
 // Gives the interrupts their registers. With interrupts off.
 void emission_set_registers(const emission_tick* first);

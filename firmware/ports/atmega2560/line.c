@@ -1,8 +1,8 @@
 #include "firmware/ports/atmega2560/line.h"
 
 #include <avr/interrupt.h>
-#include <util/atomic.h>
 
+#include "firmware/core/mcu.h"
 #include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/line_interrupts.h"
@@ -39,6 +39,18 @@ static uint16_t next_turn(void) {
 static inline void wait_until(uint16_t count) {
   OCR3A = count;
   TIFR3 = 1 << OCF3A;
+  TIMSK3 = 1 << OCIE3A;
+}
+
+// With interrupts on, so that no slot waits for it. One that took so long that the count was passed
+// meanwhile would make the compare come a turn of the timer later.
+static void wait_for(uint16_t cycles) {
+  uint16_t begin;
+  do {
+    begin = TCNT3;
+    TIFR3 = 1 << OCF3A;
+    OCR3A = begin + cycles;
+  } while ((uint16_t)(TCNT3 - begin) >= cycles && (TIFR3 & 1 << OCF3A) == 0);
   TIMSK3 = 1 << OCIE3A;
 }
 
@@ -111,9 +123,5 @@ void line_transmit(const uint8_t* wire, size_t size, uint32_t delay_ns) {
   line_sending_end = (uint8_t)(uintptr_t)(wire + size);
   const uint32_t now = clock_now();
   cycles_to_wait = clock_before(now + SHORTEST_CYCLES, due) ? due - now : SHORTEST_CYCLES;
-  const uint16_t turn = next_turn();
-  // A compare that was passed meanwhile would come a turn of the timer later.
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    wait_until((uint16_t)(TCNT3 + turn));
-  }
+  wait_for(next_turn());
 }

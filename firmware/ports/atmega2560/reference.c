@@ -28,10 +28,11 @@ void reference_rise(uint32_t time) {
     REFERENCE_PORT |= 1 << REFERENCE_BIT;
     return;
   }
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    OCR4A = compare_for(time);
-    TIFR4 = 1 << OCF4A;
-    reference_rises = 1 << OCIE4A;
+  OCR4A = compare_for(time);
+  TIFR4 = 1 << OCF4A;
+  reference_rises = 1 << OCIE4A;
+  // No slot is to wait for more than that.
+  ATOMIC_BLOCK(ATOMIC_FORCEON) {
     TIMSK4 |= 1 << OCIE4A;
   }
 }
@@ -41,10 +42,10 @@ void reference_fall(uint32_t time) {
     REFERENCE_PORT &= (uint8_t) ~(1 << REFERENCE_BIT);
     return;
   }
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    OCR4B = compare_for(time);
-    TIFR4 = 1 << OCF4B;
-    reference_falls = 1 << OCIE4B;
+  OCR4B = compare_for(time);
+  TIFR4 = 1 << OCF4B;
+  reference_falls = 1 << OCIE4B;
+  ATOMIC_BLOCK(ATOMIC_FORCEON) {
     TIMSK4 |= 1 << OCIE4B;
   }
 }
