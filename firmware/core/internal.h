@@ -13,6 +13,12 @@ static inline int32_t ticks_after(uint32_t tick, uint32_t reference) {
   return (int32_t)(tick - reference);
 }
 
+// The tick of which these are the low bits, less than 2^15 before or after the other one.
+static inline uint32_t near_tick(uint16_t low, uint32_t other) {
+  const int32_t after = (int16_t)(low - (uint16_t)other);
+  return other + (uint32_t)after;
+}
+
 // An 8-bit CPU shifts bit by bit: it looks the bit up.
 extern const uint16_t bushd_mcu_motor_bit[BUSHD_MOTORS_PER_MCU];
 static inline uint16_t motor_bit(uint8_t motor) {
@@ -61,6 +67,8 @@ typedef struct bushd_mcu_stretch {
 bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch);
 bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks);
 bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks* ticks);
+// The motor, at rest at its known_until, starts at that tick.
+void bushd_mcu_note_start(bushd_mcu* mcu, uint8_t m, uint32_t tick);
 // Nothing is known of this motor from `tick` on.
 void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t motor, uint32_t tick);
 // What is left of a frame that was taken, at once; up to a tick.
@@ -98,10 +106,10 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
 bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
                             uint32_t* spare_ns);
 // Into the motor's own run, which nothing reads as long as it is in a stream or at rest; nor its
-// beginning and end: they hold how many ticks it takes and what it may begin late. False as above.
-bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry);
+// end: it holds how many ticks the run takes. False as above.
+bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns);
 // The motor's run, just started, begins in this tick and takes as many.
-void bushd_mcu_begin_run(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t ticks);
+void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks);
 void bushd_mcu_watch_silence(bushd_mcu* mcu);  // before every tick is prepared
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message);
 

@@ -7,7 +7,7 @@ static bushd_mcu_piece piece_of(void* at, size_t size) {
 }
 
 bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
-  enum { TICK, FORMAT, INPUTS, EMISSION, LOCAL, TABLES, CODES_USED, CODES, MOTORS };
+  enum { TICK, FORMAT, INPUTS, EMISSION, LOCAL, TABLES, VALID_TABLES, CODES_USED, CODES, MOTORS };
   switch (index) {
     case TICK:
       return piece_of(&mcu->tick_ns, sizeof mcu->tick_ns);
@@ -21,6 +21,8 @@ bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
       return piece_of(&mcu->local.motors, sizeof mcu->local.motors);
     case TABLES:
       return piece_of(mcu->table, sizeof mcu->table);
+    case VALID_TABLES:
+      return piece_of(&mcu->valid_tables, sizeof mcu->valid_tables);
     case CODES_USED:
       return piece_of(&mcu->codes_used, sizeof mcu->codes_used);
     case CODES:

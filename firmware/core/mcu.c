@@ -15,13 +15,15 @@ const uint16_t bushd_mcu_motor_bit[BUSHD_MOTORS_PER_MCU] = {
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu) {
   uint16_t moving = mcu->plane[0].active | mcu->plane[1].active;
   const uint32_t open = FIRST_OPEN(mcu);
-  const bushd_mcu_motor* motor = mcu->motor;
+  uint16_t left = own_motors(mcu);
+  if (!mcu->outlook.stale) left &= (uint16_t)~mcu->outlook.rests;
   uint16_t bit = 1;
-  for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor) {
-    if (motor->mode != BUSHD_MCU_STREAM || motor->delay != 0 ||
-        ticks_after(motor->known_until, open) > 0) {
+  for (const bushd_mcu_motor* motor = mcu->motor; left != 0; ++motor) {
+    if ((left & 1u) != 0 && (motor->mode != BUSHD_MCU_STREAM || motor->delay != 0 ||
+                             ticks_after(motor->known_until, open) > 0)) {
       moving |= bit;
     }
+    left = (uint16_t)(left >> 1);
     bit = (uint16_t)(bit << 1);
   }
   return moving;

@@ -54,6 +54,9 @@ typedef struct bushd_plane {
   uint16_t reference_fall;
 } bushd_plane;
 
+// The longest reply is a report; a delimiter stands in front.
+#define BUSHD_MCU_MAX_REPLY (1u + BUSHD_REPORT_SIZE(BUSHD_MOTORS_PER_MCU) + BUSHD_FRAME_OVERHEAD)
+
 // Memory and identity, given by the port; all of it outlives the MCU struct.
 typedef struct bushd_mcu_config {
   uint8_t address;       // 1..255
@@ -71,15 +74,19 @@ typedef struct bushd_mcu_config {
   uint16_t lacks;    // BUSHD_CAN_* that it is too slow for: not in the identity, and refused
   uint16_t* codes;   // table memory
   uint16_t code_count;
+  // BUSHD_MCU_MAX_REPLY bytes for answers. May be the end of the receiver's buffer, if the port
+  // keeps the receiver out of it from the making of an answer until it is sent.
+  uint8_t* reply;
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
 } bushd_mcu_config;
 
 typedef enum bushd_mcu_mode {
-  BUSHD_MCU_STREAM = 0,  // the queue decides
-  BUSHD_MCU_TABLE_RUN = 1,
-  BUSHD_MCU_RAMP_DOWN = 2,
+  BUSHD_MCU_STREAM = 0,     // the queue decides
+  BUSHD_MCU_RUN_WAITS = 1,  // so it does until its start, then a table run follows
+  BUSHD_MCU_TABLE_RUN = 2,
+  BUSHD_MCU_RAMP_DOWN = 3,
   BUSHD_MCU_AUTONOMOUS =
-      3  // `run` is made, whatever its stage, until homing or local inputs end it
+      4  // `run` is made, whatever its stage, until homing or local inputs end it
 } bushd_mcu_mode;
 
 // Ticks that are queued beyond a gap.
@@ -91,10 +98,16 @@ typedef struct bushd_mcu_island {
 
 // A run that waits or is made.
 typedef struct bushd_mcu_made {
-  uint32_t from;   // the ticks that a table run makes
-  uint32_t until;  // its end, or where ticks replace it
+  uint32_t until;  // the end of a table run, or where ticks replace it
   bushd_run run;   // stands at the first tick that is not prepared
 } bushd_mcu_made;
+
+// The last start taken, while it is still to come. A small MCU has no room for whole tick numbers;
+// such as are not far (near_tick) are told by their low bits.
+typedef struct bushd_mcu_start {
+  uint16_t rest_from;  // at rest from here to `tick`
+  uint16_t tick;
+} bushd_mcu_start;
 
 typedef struct bushd_mcu_motor {
   int32_t position_steps;  // until the start of the present tick
@@ -106,8 +119,10 @@ typedef struct bushd_mcu_motor {
   uint16_t delay;          // of the running step when the queued ticks end; 0: at rest there
   uint16_t displacement;   // the last one that was not 0, unsigned; in the fine format only
   uint8_t still_ticks;     // made since; saturates
-  uint32_t rest_from;      // at rest from here to start_tick
-  uint32_t start_tick;     // of the last start taken
+  union {
+    bushd_mcu_start start;  // of those in bushd_mcu.starting
+    uint32_t spare_ns;      // of armed ones (bushd_mcu_ticks_of_run)
+  };
   uint32_t known_until;  // first tick for which nothing is decided; always > tick + 1 once prepared
   // Memory is short: there is no island while a run waits or is made.
   union {
@@ -117,10 +132,11 @@ typedef struct bushd_mcu_motor {
 } bushd_mcu_motor;
 
 typedef struct bushd_mcu_table {
-  bool valid;
-  uint16_t received;  // codes of both sides
   uint32_t revision;
-  uint32_t crc;
+  union {
+    uint32_t crc;       // of those in bushd_mcu.valid_tables
+    uint16_t received;  // of others: codes of both sides that have come
+  };
   bushd_table table;  // as announced; no codes: none
 } bushd_mcu_table;
 
@@ -214,6 +230,7 @@ typedef struct bushd_mcu_local {
 // when a frame has come, or something was cut.
 typedef struct bushd_mcu_outlook {
   bool stale;
+  uint16_t rests;         // these are at rest, and will be until something is asked of them
   uint16_t plain;         // of these nothing but the queue decides, until:
   uint32_t plain_until;   // that tick
   uint16_t moves;         // these are to move on when their ticks end, the first of them at:
@@ -263,9 +280,6 @@ typedef struct bushd_mcu_reference {
   bushd_mcu_slots next;  // until then, from the beginning of the tick to be prepared
 } bushd_mcu_reference;
 
-// The longest reply is a report; a delimiter stands in front.
-#define BUSHD_MCU_MAX_REPLY (1u + BUSHD_REPORT_SIZE(BUSHD_MOTORS_PER_MCU) + BUSHD_FRAME_OVERHEAD)
-
 // Read-only for ports and tests; everything in here is the core's.
 typedef struct bushd_mcu {
   bushd_port port;
@@ -291,9 +305,11 @@ typedef struct bushd_mcu {
   uint8_t last_rejection;
   uint16_t direction;  // DIR levels of the plane prepared last
   uint16_t begun;      // motors that move, as far as is known
+  uint16_t starting;   // motors whose `start` is not over
   bushd_mcu_outlook outlook;
   bushd_mcu_rows rows;
   uint16_t codes_used;
+  uint8_t valid_tables;     // slots whose table has come whole, and is good
   uint8_t failed_tests;     // BUSHD_TEST_*
   bushd_set_inputs inputs;  // settings
   uint16_t active_limits;   // of motors, as debounced
@@ -315,7 +331,6 @@ typedef struct bushd_mcu {
   bushd_mcu_table table[BUSHD_TABLE_SLOTS];
   bushd_receiver receiver;
   bushd_mcu_answer answer;
-  uint8_t reply[BUSHD_MCU_MAX_REPLY];
 } bushd_mcu;
 
 // Starts in state BUSY with EN low, unless it is to be high at boot; a control message raises it.

@@ -39,6 +39,11 @@ static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   ramp_down_stream(mcu, m, delay);
 }
 
+static void end_run(bushd_mcu* mcu, bushd_mcu_motor* motor) {
+  motor->mode = BUSHD_MCU_STREAM;
+  mcu->outlook.stale = true;
+}
+
 static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   int16_t displacement = 0;
   if (mcu->format == BUSHD_FORMAT_FINE) {
@@ -48,7 +53,7 @@ static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
     bushd_run_expand_coarse(&motor->made.run, mcu->tick_ns, 1, &counts, 1);
     displacement = bushd_coarse_to_fine(counts);
   }
-  if (bushd_run_done(&motor->made.run)) motor->mode = BUSHD_MCU_STREAM;
+  if (bushd_run_done(&motor->made.run)) end_run(mcu, motor);
   return displacement;
 }
 
@@ -90,18 +95,23 @@ static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, 
   } else {
     motor->remainder = 0;
   }
-  if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) motor->mode = BUSHD_MCU_STREAM;
+  if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) end_run(mcu, motor);
   return steps;
 }
 
-static inline bool in_run_at(bushd_mcu_motor* motor, uint32_t tick) {
+static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t tick) {
+  if (motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)tick) {
+    motor->mode = BUSHD_MCU_TABLE_RUN;
+  }
   if (motor->mode != BUSHD_MCU_TABLE_RUN) return false;
-  if (ticks_after(tick, motor->made.until) >= 0) motor->mode = BUSHD_MCU_STREAM;
-  return motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(tick, motor->made.from) >= 0;
+  if (ticks_after(tick, motor->made.until) < 0) return true;
+  end_run(mcu, motor);
+  return false;
 }
 
 void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
   bushd_mcu_outlook* outlook = &mcu->outlook;
+  uint16_t rests = 0;
   uint16_t plain = 0;
   uint16_t following = 0;
   uint16_t moves = 0;
@@ -111,7 +121,10 @@ void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
   for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
     const bushd_mcu_motor* motor = &mcu->motor[m];
     const int32_t known_ticks = ticks_after(motor->known_until, tick);
-    if (known_ticks <= 0) continue;
+    if (known_ticks <= 0) {
+      if (motor->mode == BUSHD_MCU_STREAM && motor->delay == 0) rests |= bit;
+      continue;
+    }
     if (motor->delay != 0) {
       moves |= bit;
       if (known_ticks < moving_ticks) moving_ticks = known_ticks;
@@ -124,6 +137,7 @@ void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
     if (motor->delay != 0 && !motor->has_island) following |= bit;
   }
   outlook->stale = false;
+  outlook->rests = rests;
   outlook->plain = plain;
   outlook->following = following;
   outlook->plain_until = tick + (uint32_t)plain_ticks;
@@ -161,12 +175,20 @@ void bushd_mcu_take_fine_row(int16_t* queued, int16_t* displacement, uint8_t mot
 // A motor that begins, or stands still until a start that waits.
 static void follow_begun(bushd_mcu* mcu, uint16_t plain, uint16_t moves, uint32_t tick) {
   mcu->begun |= plain & moves;
-  uint16_t still = mcu->begun & plain & (uint16_t)~moves;
+  uint16_t still = mcu->begun & mcu->starting & plain & (uint16_t)~moves;
   for (uint8_t m = 0; still != 0; ++m, still = (uint16_t)(still >> 1)) {
-    const bushd_mcu_motor* motor = &mcu->motor[m];
-    if ((still & 1u) != 0 && ticks_after(tick, motor->rest_from) >= 0 &&
-        ticks_after(tick, motor->start_tick) <= 0) {
+    if ((still & 1u) != 0 && (int16_t)((uint16_t)tick - mcu->motor[m].start.rest_from) >= 0) {
       mcu->begun &= (uint16_t)~motor_bit(m);
+    }
+  }
+}
+
+// Starts that are over, before their low bits look like those of one to come.
+__attribute__((noinline)) static void forget_starts(bushd_mcu* mcu, uint32_t tick) {
+  uint16_t starting = mcu->starting;
+  for (uint8_t m = 0; starting != 0; ++m, starting = (uint16_t)(starting >> 1)) {
+    if ((starting & 1u) != 0 && (int16_t)((uint16_t)tick - mcu->motor[m].start.tick) > 0) {
+      mcu->starting &= (uint16_t)~motor_bit(m);
     }
   }
 }
@@ -175,7 +197,7 @@ static void follow_begun(bushd_mcu* mcu, uint16_t plain, uint16_t moves, uint32_
 // to a slot.
 static bool displacement_of(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t* displacement) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  if (in_run_at(motor, tick)) return false;
+  if (in_run_at(mcu, motor, tick)) return false;
   if (ticks_after(motor->known_until, tick) > 0) {
     follow_begun(mcu, motor_bit(m), *displacement != 0 ? motor_bit(m) : (uint16_t)0, tick);
     return true;
@@ -216,11 +238,20 @@ __attribute__((noinline)) static uint16_t find_others(bushd_mcu* mcu, uint16_t o
   return exact;
 }
 
+__attribute__((noinline)) static void rest(bushd_mcu* mcu, uint16_t motors, uint32_t tick) {
+  mcu->begun &= (uint16_t)~motors;
+  for (bushd_mcu_motor* motor = mcu->motor; motors != 0;
+       ++motor, motors = (uint16_t)(motors >> 1)) {
+    if (motors & 1u) motor->known_until = tick + 1u;
+  }
+}
+
 // What motors do in this tick, in steps if it is a coarse one, else in 1/256 step. Returns those
 // whose steps are those of a run.
 static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
   const uint32_t tick = mcu->tick + 1u;
   bushd_mcu_outlook* outlook = &mcu->outlook;
+  if (mcu->starting != 0) forget_starts(mcu, tick);
   if (outlook->stale || ticks_after(tick, outlook->plain_until) >= 0) bushd_mcu_look_out(mcu, tick);
   int16_t* const queued = queue_at(mcu, tick, 0);
   if (mcu->format == BUSHD_FORMAT_FINE) {
@@ -229,14 +260,16 @@ static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
     bushd_mcu_take_coarse_row(queued, values, mcu->config.motors, row);
   }
   follow_begun(mcu, outlook->plain, row->moves, tick);
-  const uint16_t others = own_motors(mcu) & (uint16_t)~outlook->plain;
+  if (outlook->rests != 0) rest(mcu, outlook->rests, tick);
+  const uint16_t others = own_motors(mcu) & (uint16_t) ~(outlook->plain | outlook->rests);
   const uint16_t exact = others != 0 ? find_others(mcu, others, values, row) : (uint16_t)0;
   watch_low_water(mcu);
   return exact;
 }
 
 __attribute__((noinline)) static void plan_fine(bushd_mcu* mcu, bushd_plane* plane,
-                                                const int16_t* displacement, uint16_t exact) {
+                                                const int16_t* displacement, uint16_t exact,
+                                                bool fills) {
   bushd_slots plans[BUSHD_MOTORS_PER_MCU];
   uint16_t bit = 1;
   for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
@@ -247,7 +280,7 @@ __attribute__((noinline)) static void plan_fine(bushd_mcu* mcu, bushd_plane* pla
     plane->steps[m] = steps;
     if (steps == 0) plane->active &= (uint16_t)~bit;
   }
-  if (!bushd_mcu_steps_keep_slots(mcu)) return;
+  if (!fills) return;
   bushd_slots_fill(plane->step, mcu->config.slots, plans, mcu->config.motors);
 }
 
@@ -258,10 +291,13 @@ static uint16_t plan(bushd_mcu* mcu, bushd_plane* plane) {
   bushd_mcu_row row;
   const uint16_t exact = find_row(mcu, fine ? displacement : plane->steps, &row);
   mcu->direction = (mcu->direction & (uint16_t)~row.moves) | (row.moves & (uint16_t)~row.back);
+  // The masks of a plane without steps are 0 already.
+  const bool has_masks = plane->active != 0 || plane->outputs == BUSHD_OUTPUTS_LEVELS;
+  const bool fills = bushd_mcu_steps_keep_slots(mcu) && (has_masks || row.moves != 0);
   plane->active = row.moves;
   if (fine) {
-    plan_fine(mcu, plane, displacement, exact);
-  } else if (bushd_mcu_steps_keep_slots(mcu)) {
+    plan_fine(mcu, plane, displacement, exact, fills);
+  } else if (fills) {
     bushd_slots_fill_evenly(plane->step, mcu->config.slots, plane->steps, mcu->config.motors);
   }
   return exact;
@@ -297,20 +333,19 @@ bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ti
   return true;
 }
 
-void bushd_mcu_begin_run(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t ticks) {
-  motor->mode = BUSHD_MCU_TABLE_RUN;
+void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_mcu_note_start(mcu, m, first_tick);
+  motor->mode = BUSHD_MCU_RUN_WAITS;
   motor->exact = true;
-  motor->rest_from = motor->known_until;
-  motor->start_tick = first_tick;
-  motor->made.from = first_tick;
   motor->made.until = first_tick + ticks;
   motor->known_until = motor->made.until;
 }
 
-bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry) {
+bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns) {
   bushd_mcu_made* made = &mcu->motor[entry->motor].made;
   bushd_run_start(&made->run, &mcu->table[entry->slot].table, entry->steps, entry->direction);
-  return bushd_mcu_ticks_of_run(&made->run, mcu->tick_ns, &made->until, &made->from);
+  return bushd_mcu_ticks_of_run(&made->run, mcu->tick_ns, &made->until, spare_ns);
 }
 
 static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
@@ -340,22 +375,27 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
   // All are made before one begins: the frame is taken whole or not at all.
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
-    if (!bushd_mcu_make_run(mcu, &entry)) return BUSHD_E_CAPACITY;
+    uint32_t spare_ns;
+    if (!bushd_mcu_make_run(mcu, &entry, &spare_ns)) return BUSHD_E_CAPACITY;
   }
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    bushd_mcu_motor* motor = &mcu->motor[m];
-    if (stretch.mask & motor_bit(m)) {
-      bushd_mcu_begin_run(motor, message->first_tick, motor->made.until);
-    }
+    if ((stretch.mask & motor_bit(m)) == 0) continue;
+    bushd_mcu_begin_run(mcu, m, message->first_tick, mcu->motor[m].made.until);
   }
   return BUSHD_OK;
 }
 
-// A table run not only waited for: the tick before `next`, the first that is not prepared, was one
-// of it.
-static bool in_run(const bushd_mcu_motor* motor, uint32_t next) {
-  return motor->mode == BUSHD_MCU_AUTONOMOUS ||
-         (motor->mode == BUSHD_MCU_TABLE_RUN && ticks_after(next, motor->made.from) > 0);
+static bool in_run(const bushd_mcu_motor* motor) {
+  return motor->mode == BUSHD_MCU_AUTONOMOUS || motor->mode == BUSHD_MCU_TABLE_RUN;
+}
+
+// A start is to come at `next`, the first tick that is not prepared, or later: the motor rests
+// from *rest_from on until then.
+static bool start_waits(const bushd_mcu* mcu, uint8_t m, uint32_t next, uint32_t* rest_from) {
+  if ((mcu->starting & motor_bit(m)) == 0) return false;
+  const bushd_mcu_start* start = &mcu->motor[m].start;
+  *rest_from = near_tick(start->rest_from, next);
+  return ticks_after(next, near_tick(start->tick, next)) <= 0;
 }
 
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
@@ -372,6 +412,7 @@ void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int di
   motor->mode = BUSHD_MCU_AUTONOMOUS;
   motor->exact = true;
   mcu->autonomous |= motor_bit(m);
+  mcu->outlook.stale = true;
 }
 
 void bushd_mcu_watch_silence(bushd_mcu* mcu) {
@@ -380,13 +421,16 @@ void bushd_mcu_watch_silence(bushd_mcu* mcu) {
   const uint32_t next = mcu->tick + 1u;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];
-    if (motor->mode != BUSHD_MCU_TABLE_RUN || bushd_run_done(&motor->made.run)) continue;
+    const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN;
+    if (!runs && motor->mode != BUSHD_MCU_RUN_WAITS) continue;
+    if (bushd_run_done(&motor->made.run)) continue;
     uint32_t from = next;
-    if (in_run(motor, next)) {
+    uint32_t rest_from;
+    if (runs) {
       mcu->run_downs = saturating_increment(mcu->run_downs);
       bushd_mcu_ramp_down_run(mcu, m);
-    } else if (ticks_after(motor->rest_from, next) > 0) {
-      from = motor->rest_from;  // ticks before it are still made
+    } else if (start_waits(mcu, m, next, &rest_from) && ticks_after(rest_from, next) > 0) {
+      from = rest_from;  // ticks before it are still made
     }
     bushd_mcu_cut_queue(mcu, m, from);
     mcu->faults |= BUSHD_FAULT_LINK;
@@ -405,10 +449,10 @@ enum { TICKS_AHEAD = 2 };
 
 static rest_of_stream rest_of(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
-  const bool start_waits = ticks_after(motor->rest_from, next) > 0;
   rest_of_stream rest = {motor->known_until, motor->delay != 0, motor->delay != 0, 0};
-  if (start_waits) {
-    rest.until = motor->rest_from;
+  uint32_t rest_from;
+  if (start_waits(mcu, m, next, &rest_from) && ticks_after(rest_from, next) > 0) {
+    rest.until = rest_from;
     rest.goes_on = rest.moves = false;
   }
   // A table run is known for longer than the queue is deep.
@@ -453,11 +497,11 @@ static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stre
 void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t next) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_mcu_finish_rows(mcu);
-  const bool runs = in_run(motor, next);
+  const bool runs = in_run(motor);
   const rest_of_stream rest = rest_of(mcu, m, next);
-  const bool at_rest =
-      (mcu->begun & motor_bit(m)) == 0 || !rest.moves ||
-      (ticks_after(next, motor->rest_from) >= 0 && ticks_after(next, motor->start_tick) <= 0);
+  uint32_t rest_from;
+  const bool at_rest = (mcu->begun & motor_bit(m)) == 0 || !rest.moves ||
+                       (start_waits(mcu, m, next, &rest_from) && ticks_after(next, rest_from) >= 0);
   const uint16_t delay = at_rest || runs ? 0 : stream_delay(mcu, m, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
   if (how == BUSHD_CUT) {
@@ -480,9 +524,9 @@ int8_t bushd_mcu_last_direction(const bushd_mcu* mcu, uint8_t m) {
 
 int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
-  const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN &&
-                    ticks_after(next, motor->made.from) >= 0 &&
-                    ticks_after(motor->made.until, next) > 0;
+  const bool begins = motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)next;
+  const bool runs =
+      (begins || motor->mode == BUSHD_MCU_TABLE_RUN) && ticks_after(motor->made.until, next) > 0;
   if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return motor->made.run.direction;
   const int16_t queued =
       ticks_after(motor->known_until, next) > 0 ? *queue_at((bushd_mcu*)mcu, next, m) : (int16_t)0;

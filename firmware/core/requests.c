@@ -305,7 +305,8 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   a.due = frame->address != BUSHD_ADDRESS_BROADCAST && is_answered(frame->type);
   a.delay_ns = 0;
   a.size = 0;
-  a.payload = mcu->reply + 2 + BUSHD_FRAME_HEADER;
+  // The frame may lie in the same buffer (bushd_mcu_config.reply): it is read by then.
+  a.payload = mcu->config.reply + 2 + BUSHD_FRAME_HEADER;
   const bushd_status status = is_lacking(mcu, frame->type)
                                   ? BUSHD_E_UNKNOWN_MESSAGE
                                   : handle(mcu, frame, time_in_tick_ns, &a);
@@ -320,7 +321,7 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
     const bushd_acknowledgement acknowledgement = {(uint8_t)status};
     a.size = bushd_encode_acknowledgement(&acknowledgement, a.payload);
   }
-  uint8_t* const raw = mcu->reply + 2;
+  uint8_t* const raw = mcu->config.reply + 2;
   raw[0] = mcu->config.address;
   raw[1] = (uint8_t)(frame->type | BUSHD_TYPE_REPLY);
   raw[2] = frame->tag;
@@ -337,7 +338,7 @@ bool bushd_mcu_go_on_answering(bushd_mcu* mcu) {
   enum { PIECE = 48 };
   bushd_mcu_answer* reply = &mcu->answer;
   if (reply->size == 0) return false;
-  uint8_t* const raw = mcu->reply + 2;
+  uint8_t* const raw = mcu->config.reply + 2;
   const uint8_t left = (uint8_t)(reply->size - reply->checked);
   const uint32_t crc = bushd_get_u32(raw + reply->size);
   if (left != 0) {
@@ -348,9 +349,9 @@ bool bushd_mcu_go_on_answering(bushd_mcu* mcu) {
   }
   // A delimiter comes first: it ends whatever the master took, while the line was idle, for a
   // frame's beginning.
-  mcu->reply[0] = 0;
-  const size_t wire = bushd_frame_close(mcu->reply + 1, reply->size, crc);
+  mcu->config.reply[0] = 0;
+  const size_t wire = bushd_frame_close(mcu->config.reply + 1, reply->size, crc);
   reply->size = 0;
-  mcu->port.transmit(mcu->port.context, mcu->reply, wire + 1, reply->delay_ns);
+  mcu->port.transmit(mcu->port.context, mcu->config.reply, wire + 1, reply->delay_ns);
   return true;
 }

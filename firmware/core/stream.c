@@ -15,7 +15,7 @@
 void bushd_mcu_clear_streams(bushd_mcu* mcu) {
   mcu->rows.next = mcu->rows.ticks.count;
   mcu->outlook.stale = true;
-  mcu->begun = 0;
+  mcu->begun = mcu->starting = 0;
   memset(mcu->config.queue, 0,
          (size_t)mcu->config.queue_ticks * mcu->config.motors * sizeof mcu->config.queue[0]);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -23,7 +23,6 @@ void bushd_mcu_clear_streams(bushd_mcu* mcu) {
     motor->known_until = FIRST_OPEN(mcu);
     motor->delay = 0;
     motor->mode = BUSHD_MCU_STREAM;
-    motor->rest_from = motor->start_tick = motor->known_until;
     motor->has_island = false;
   }
 }
@@ -62,9 +61,19 @@ void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
     motor->known_until = tick;
   }
   motor->delay = 0;
-  if (motor->mode != BUSHD_MCU_TABLE_RUN) return;
+  const bool waits = motor->mode == BUSHD_MCU_RUN_WAITS;
+  if (!waits && motor->mode != BUSHD_MCU_TABLE_RUN) return;
   if (ticks_after(motor->made.until, tick) > 0) motor->made.until = tick;
-  if (ticks_after(motor->made.until, motor->made.from) <= 0) motor->mode = BUSHD_MCU_STREAM;
+  if (waits && ticks_after(near_tick(motor->start.tick, tick), tick) >= 0) {
+    motor->mode = BUSHD_MCU_STREAM;
+  }
+}
+
+void bushd_mcu_note_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  motor->start.rest_from = (uint16_t)motor->known_until;
+  motor->start.tick = (uint16_t)tick;
+  mcu->starting |= motor_bit(m);
 }
 
 // `news`: the frame holds something for this motor that is not known yet.
@@ -86,8 +95,11 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu
   if (end <= 0) return BUSHD_OK;
   if (stretch->flags & BUSHD_TICKS_START) {
     *news = true;
-    // A limit's ramp-down is under way beyond what is queued.
-    if (moves_on || motor->mode >= BUSHD_MCU_RAMP_DOWN) return BUSHD_E_STATE;
+    // A limit's ramp-down is under way beyond what is queued. One start can wait at a time if it is
+    // a run's.
+    if (moves_on || motor->mode >= BUSHD_MCU_RAMP_DOWN || motor->mode == BUSHD_MCU_RUN_WAITS) {
+      return BUSHD_E_STATE;
+    }
     return first < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
   if (!moves_on) return BUSHD_E_GAP;
@@ -140,8 +152,7 @@ static void open_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stret
   }
   const bool known = ticks_after(stretch->first_tick + stretch->count, motor->known_until) <= 0;
   if ((stretch->flags & BUSHD_TICKS_START) == 0 || known) return;
-  motor->rest_from = motor->known_until;
-  motor->start_tick = stretch->first_tick;
+  bushd_mcu_note_start(mcu, m, stretch->first_tick);
 }
 
 // Of a stretch's ticks, as offsets from its first: those from `begin` on are not known yet, but for
@@ -320,6 +331,27 @@ static void put_rows_later(bushd_mcu* mcu, const bushd_ticks* ticks) {
   mcu->rows.next = 0;
 }
 
+// And to others: their motors start from rest.
+static bool all_rest(const bushd_mcu* mcu, const bushd_ticks* ticks) {
+  const uint8_t kind = ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE);
+  if (kind != BUSHD_TICKS_START || mcu->outlook.stale ||
+      (ticks->mask & (uint16_t)~mcu->outlook.rests) != 0 ||
+      ticks_after(ticks->first_tick, FIRST_OPEN(mcu)) < 0) {
+    return false;
+  }
+  const bushd_mcu_motor* motor = mcu->motor;
+  for (uint16_t mask = ticks->mask; mask != 0; mask = (uint16_t)(mask >> 1), ++motor) {
+    if ((mask & 1u) != 0 && motor->table < 0) return false;
+  }
+  return true;
+}
+
+static void note_starts(bushd_mcu* mcu, uint16_t mask, uint32_t tick) {
+  for (uint8_t m = 0; mask != 0; ++m, mask = (uint16_t)(mask >> 1)) {
+    if (mask & 1u) bushd_mcu_note_start(mcu, m, tick);
+  }
+}
+
 // All in the mask go on to the frame's end.
 static void follow(bushd_mcu* mcu, const bushd_ticks* ticks) {
   const uint32_t end = ticks->first_tick + ticks->count;
@@ -361,14 +393,17 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
   const bushd_mcu_stretch stretch = {ticks->epoch, ticks->flags, ticks->first_tick, ticks->count,
                                      ticks->mask};
   const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
-  const bool plain = all_follow(mcu, ticks);
+  const bool starts = all_rest(mcu, ticks);
+  const bool plain = starts || all_follow(mcu, ticks);
   const bushd_status status =
       plain ? check_head(mcu, &stretch) : bushd_mcu_check_stretch(mcu, &stretch);
   if (status != BUSHD_OK) return status;
   if (fine != (mcu->format == BUSHD_FORMAT_FINE) || !in_range(mcu, ticks)) return BUSHD_E_FORMAT;
   if (bushd_mcu_starts_into_limit(mcu, ticks)) return BUSHD_E_FORBIDDEN;
+  if (starts) note_starts(mcu, ticks->mask, ticks->first_tick);
   if (plain) {
     follow(mcu, ticks);
+    mcu->outlook.stale |= starts;
     return BUSHD_OK;
   }
   mcu->outlook.stale = true;

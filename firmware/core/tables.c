@@ -14,6 +14,14 @@ static uint16_t* codes_of(const bushd_mcu* mcu, const bushd_table* table) {
   return mcu->config.codes + (table->accel.code - mcu->config.codes);
 }
 
+static inline uint8_t slot_bit(uint8_t slot) {
+  return (uint8_t)(1u << slot);
+}
+
+static bool is_valid(const bushd_mcu* mcu, uint8_t slot) {
+  return (mcu->valid_tables & slot_bit(slot)) != 0;
+}
+
 static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
   const uint16_t count = count_of(&entry->table);
   uint16_t* const codes = codes_of(mcu, &entry->table);
@@ -33,6 +41,7 @@ bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* mess
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   bushd_mcu_table* entry = &mcu->table[message->slot];
   if (entry->table.accel.count != 0) give_back(mcu, entry);
+  mcu->valid_tables &= (uint8_t)~slot_bit(message->slot);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if (mcu->motor[m].table == (int8_t)message->slot) mcu->motor[m].table = -1;
   }
@@ -46,6 +55,7 @@ bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* mess
   entry->table.cruise = message->cruise;
   entry->table.time_unit_ns = message->time_unit_ns;
   entry->revision = message->revision;
+  entry->received = 0;
   mcu->codes_used = (uint16_t)(mcu->codes_used + count);
   return BUSHD_OK;
 }
@@ -56,7 +66,7 @@ bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* messag
   const bushd_table* table = &entry->table;
   // Pieces come in order; one that was sent again because its acknowledgement was lost is written
   // again.
-  if (entry->valid || end > count_of(table) || message->offset > entry->received) {
+  if (is_valid(mcu, message->slot) || end > count_of(table) || message->offset > entry->received) {
     return BUSHD_E_STATE;
   }
   uint16_t* to = codes_of(mcu, table) + message->offset;
@@ -68,19 +78,24 @@ bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* messag
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message) {
   bushd_mcu_table* entry = &mcu->table[message->slot];
   const uint16_t count = count_of(&entry->table);
+  // Its acknowledgement was lost.
+  if (is_valid(mcu, message->slot)) return entry->crc == message->crc ? BUSHD_OK : BUSHD_E_CRC;
   if (count == 0 || entry->received != count) return BUSHD_E_STATE;
-  entry->crc = bushd_table_crc32(&entry->table);
-  if (entry->crc != message->crc) return BUSHD_E_CRC;
+  const uint32_t crc = bushd_table_crc32(&entry->table);
+  if (crc != message->crc) return BUSHD_E_CRC;
   const bushd_status status = bushd_table_check(&entry->table, NULL, NULL);
-  entry->valid = status == BUSHD_OK;
-  return status;
+  if (status != BUSHD_OK) return status;
+  entry->crc = crc;
+  mcu->valid_tables |= slot_bit(message->slot);
+  return BUSHD_OK;
 }
 
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
   if (!bushd_mcu_has_output(mcu, message->motor)) return BUSHD_E_FORMAT;
   if (bushd_mcu_engaged(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
   const bushd_mcu_table* entry = &mcu->table[message->slot];
-  if (!entry->valid || (mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
+  if (!is_valid(mcu, message->slot) || (mcu->flags & BUSHD_FLAG_CONFIGURED) == 0)
+    return BUSHD_E_STATE;
   if (bushd_table_max_steps_per_tick(&entry->table, mcu->tick_ns) > mcu->emission.grid.max_steps) {
     return BUSHD_E_CAPACITY;
   }
@@ -93,7 +108,7 @@ bushd_tables bushd_mcu_tables(const bushd_mcu* mcu) {
   memset(&tables, 0, sizeof tables);
   for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
     const bushd_mcu_table* entry = &mcu->table[i];
-    if (!entry->valid) continue;
+    if (!is_valid(mcu, i)) continue;
     tables.slot[i].valid = true;
     tables.slot[i].crc = entry->crc;
     tables.slot[i].revision = entry->revision;
@@ -104,5 +119,6 @@ bushd_tables bushd_mcu_tables(const bushd_mcu* mcu) {
 void bushd_mcu_forget_tables(bushd_mcu* mcu) {
   memset(mcu->table, 0, sizeof mcu->table);
   mcu->codes_used = 0;
+  mcu->valid_tables = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) mcu->motor[m].table = -1;
 }

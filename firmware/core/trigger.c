@@ -41,9 +41,11 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
     mask |= motor_bit(entry.motor);
   }
   if (bushd_mcu_moving(mcu) & mask) return BUSHD_E_STATE;
+  mcu->starting &= (uint16_t)~mask;
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
-    if (!bushd_mcu_make_run(mcu, &entry)) return BUSHD_E_CAPACITY;
+    uint32_t* const spare_ns = &mcu->motor[entry.motor].spare_ns;
+    if (!bushd_mcu_make_run(mcu, &entry, spare_ns)) return BUSHD_E_CAPACITY;
   }
   mcu->trigger.armed = mask;
   mcu->trigger.number = message->number;
@@ -76,10 +78,11 @@ static bool is_forbidden(const bushd_mcu* mcu, uint16_t motors) {
   return false;
 }
 
-static void begin_late(bushd_mcu_motor* motor, uint32_t first_tick, uint32_t ns) {
-  const uint32_t ticks = motor->made.until + (ns > motor->made.from);
+static void begin_late(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ns) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  const uint32_t ticks = motor->made.until + (ns > motor->spare_ns);
   bushd_run_begin_late(&motor->made.run, ns);
-  bushd_mcu_begin_run(motor, first_tick, ticks);
+  bushd_mcu_begin_run(mcu, m, first_tick, ticks);
 }
 
 void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns) {
@@ -102,7 +105,7 @@ void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns) {
   mcu->outlook.stale = true;
   mcu->trigger.start_tick = tick;
   mcu->trigger.start_ns = after_ns % mcu->tick_ns;
-  for (bushd_mcu_motor* motor = mcu->motor; armed != 0; ++motor, armed = (uint16_t)(armed >> 1)) {
-    if (armed & 1u) begin_late(motor, tick, mcu->trigger.start_ns);
+  for (uint8_t m = 0; armed != 0; ++m, armed = (uint16_t)(armed >> 1)) {
+    if (armed & 1u) begin_late(mcu, m, tick, mcu->trigger.start_ns);
   }
 }

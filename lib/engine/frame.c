@@ -43,6 +43,16 @@ void bushd_receiver_check(bushd_receiver* receiver) {
   receiver->checked = raw_size;
 }
 
+void bushd_receiver_pass_reply(bushd_receiver* receiver) {
+  enum { EMPTY = 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC };
+  if (receiver->size <= EMPTY || receiver->size == BUSHD_FRAME_OVERLONG) return;
+  const uint8_t type = receiver->buffer[2];
+  if ((type & BUSHD_TYPE_REPLY) == 0) return;
+  bushd_receiver_check(receiver);
+  receiver->size = EMPTY;
+  receiver->checked = EMPTY - 1;
+}
+
 static void begin_frame(bushd_receiver* receiver) {
   receiver->size = 0;
   receiver->run = 0;

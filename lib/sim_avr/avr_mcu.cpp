@@ -280,8 +280,8 @@ void AvrMcu::advance(TimeNs now_ns) {
     avr_->run_cycle_limit = left;
     avr_->run_cycle_count = std::min(avr_->run_cycle_count, left);
     if (avr_run(avr_) == cpu_Crashed) throw std::runtime_error("simavr: the image has crashed");
-    // After RETI and SEI the chip executes one instruction before it serves an interrupt (data sheet,
-    // reset and interrupt handling); simavr would two.
+    // After RETI and SEI the chip executes one instruction before it serves an interrupt (data
+    // sheet, reset and interrupt handling); simavr would two.
     if (avr_->interrupt_state == -1) {
       avr_->interrupt_state = avr_has_pending_interrupts(avr_) != 0 ? 1 : 0;
     }

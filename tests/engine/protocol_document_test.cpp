@@ -145,6 +145,7 @@ class ExampleMcu {
     config.queue_ticks = 256;
     config.codes = codes_;
     config.code_count = 2048;
+    config.reply = reply_;
     for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = i + 1;
     bushd_mcu_boot(&mcu_, &port, &config);
   }
@@ -172,6 +173,7 @@ class ExampleMcu {
   bushd_mcu mcu_{};
   int16_t queue_[256 * 2]{};
   uint16_t codes_[2048]{};
+  uint8_t reply_[BUSHD_MCU_MAX_REPLY]{};
   Bytes sent_;
   int delay_us_ = 0;
 };

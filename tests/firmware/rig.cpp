@@ -123,6 +123,7 @@ Rig::Rig(RigOptions options)
   config.queue_ticks = options.queue_ticks;
   config.codes = codes_.data();
   config.code_count = options.code_count;
+  config.reply = reply_.data();
   config.min_tick_ns = options.min_tick_ns;
   config.lacks = options.lacks;
   config.pulse_ns = options.pulse_ns;

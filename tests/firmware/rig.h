@@ -192,6 +192,7 @@ class Rig {
   RigOptions options_;
   std::vector<std::int16_t> queue_;
   std::vector<std::uint16_t> codes_;
+  std::array<std::uint8_t, BUSHD_MCU_MAX_REPLY> reply_{};
   bushd_mcu mcu_{};
   const bushd_plane* plane_ = nullptr;
   bushd_format format_ = BUSHD_FORMAT_COARSE;

@@ -200,6 +200,7 @@ class Mcu {
                                      .lacks = 0,
                                      .codes = codes_.data(),
                                      .code_count = kCodes,
+                                     .reply = reply_.data(),
                                      .unique_id = {'f', 'u', 'z', 'z'}};
     bushd_mcu_boot(&mcu_, &port, &config);
   }
@@ -285,9 +286,9 @@ class Mcu {
       BUSHD_REQUIRE(motor.table < static_cast<int>(BUSHD_TABLE_SLOTS));
       // The table that it must be able to run down.
       if (motor.delay != 0 || motor.mode != BUSHD_MCU_STREAM) {
-        BUSHD_REQUIRE(motor.table >= 0 && mcu_.table[motor.table].valid);
+        BUSHD_REQUIRE(motor.table >= 0 && (mcu_.valid_tables >> motor.table & 1) != 0);
       }
-      if (motor.mode != BUSHD_MCU_TABLE_RUN) {
+      if (motor.mode != BUSHD_MCU_RUN_WAITS && motor.mode != BUSHD_MCU_TABLE_RUN) {
         BUSHD_REQUIRE(static_cast<std::int32_t>(motor.known_until - mcu_.tick) <= kQueueTicks + 1);
       }
       // Only a motor that moves on has an island, beyond a gap and within the queue.
@@ -305,6 +306,7 @@ class Mcu {
   // On the heap, each by itself: there a sanitizer sees what lies beside them.
   std::vector<std::int16_t> queue_ = std::vector<std::int16_t>(kQueueTicks * kMotors);
   std::vector<std::uint16_t> codes_ = std::vector<std::uint16_t>(kCodes);
+  std::vector<std::uint8_t> reply_ = std::vector<std::uint8_t>(BUSHD_MCU_MAX_REPLY);
   bushd_mcu mcu_{};
   bushd_receiver listener_{};
   bushd_frame answer_{};

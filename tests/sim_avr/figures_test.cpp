@@ -130,7 +130,7 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
 INSTANTIATE_TEST_SUITE_P(Formats, AvrFigures,
                          testing::Values(Load{BUSHD_FORMAT_COARSE, 928'000, 127, 0, 2'000'000},
                                          Load{BUSHD_FORMAT_COARSE, 928'000, 126, 0, 1'980'000},
-                                         Load{BUSHD_FORMAT_COARSE, 1'000'000, 127, 2, 1'850'000},
+                                         Load{BUSHD_FORMAT_COARSE, 1'040'000, 127, 2, 1'790'000},
                                          Load{BUSHD_FORMAT_FINE, 1'800'000, 127, 0, 1'000'000}),
                          [](auto& load) {
                            return (load.param.format == BUSHD_FORMAT_FINE ? "Fine" : "Coarse") +

@@ -14,6 +14,10 @@
 #define TURNAROUND_CYCLES (10UL * BIT_PERIODS + 100UL)
 // So many at a time go through the CRC before a frame ends.
 #define CHECK_BYTES 24u
+// Of the receiver's buffer. What others answer needs less (bushd_receiver_pass_reply).
+#define REPLY_AT (BUSHD_FRAME_MAX_RAW + 1u - BUSHD_MCU_MAX_REPLY)
+_Static_assert(REPLY_AT >= 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC + 2 * CHECK_BYTES,
+               "as it does");
 // What timer 3 waits for at least, and at most at a time.
 #define SHORTEST_CYCLES 64UL
 #define TURN_CYCLES 30000UL
@@ -81,20 +85,35 @@ static bool delimiter_time(uint32_t* time) {
   return true;
 }
 
+uint8_t* line_reply(bushd_receiver* receiver) {
+  return receiver->buffer + REPLY_AT;
+}
+
+// One waits or is being sent; then nothing is received.
+static inline bool has_reply(void) {
+  return TIMSK3 != 0 || (UCSR0B & 1 << RXEN0) == 0;
+}
+
 // At most so many bytes at a time: the main loop has a tick to prepare too.
 static void collect(bushd_receiver* receiver) {
   uint8_t out = LINE_OUT;
   uint8_t left = (uint8_t)(LINE_IN - out);
   if (left > CHECK_BYTES) left = CHECK_BYTES;
-  if (left != 0 && receiver->size + left <= sizeof receiver->buffer) {
+  const uint16_t room = has_reply() ? REPLY_AT : sizeof receiver->buffer;
+  if (left != 0 && receiver->size + left <= room) {
     uint8_t* to = receiver->buffer + receiver->size;
     out = line_decode(&to, &receiver->run, out, left);
     receiver->size = (uint16_t)(to - receiver->buffer);
   } else {
-    for (; left > 0 && bushd_receiver_collect(receiver, line_bytes[out]); --left) ++out;
+    for (; left > 0; --left, ++out) {
+      if (receiver->size >= room) receiver->size = BUSHD_FRAME_OVERLONG;
+      if (!bushd_receiver_collect(receiver, line_bytes[out])) break;
+    }
   }
   LINE_OUT = out;
-  if ((uint16_t)(receiver->size - receiver->checked) > CHECK_BYTES) bushd_receiver_check(receiver);
+  if ((uint16_t)(receiver->size - receiver->checked) <= CHECK_BYTES) return;
+  bushd_receiver_check(receiver);
+  bushd_receiver_pass_reply(receiver);
 }
 
 bool line_collect(bushd_receiver* receiver, uint32_t* time) {

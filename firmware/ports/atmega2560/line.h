@@ -10,6 +10,10 @@
 
 void line_init(void);
 
+// Where answers are made: at the end of the receiver's buffer, which has no need of it meanwhile.
+// What a master sends before the answer is over must be short, or counts as a bad frame.
+uint8_t* line_reply(bushd_receiver* receiver);
+
 // Bytes that have come go to the receiver, up to one that ends a frame; that one waits: true, and
 // when it came.
 bool line_collect(bushd_receiver* receiver, uint32_t* time);

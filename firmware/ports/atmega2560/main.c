@@ -123,7 +123,8 @@ __attribute__((noinline)) static void boot(void) {
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,
-                             .code_count = TABLE_CODES};
+                             .code_count = TABLE_CODES,
+                             .reply = line_reply(&mcu.receiver)};
   identity kept;
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && identity_enable_kept();

@@ -17,6 +17,7 @@
 static bushd_mcu mcu;
 static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
 static uint16_t codes[TABLE_CODES];
+static uint8_t reply[BUSHD_MCU_MAX_REPLY];
 static bool eeprom_failed;
 static uint16_t motor_inputs;
 // In memory that a watchdog reset leaves as it is.
@@ -115,7 +116,8 @@ static void boot(void) {
                              .queue = queue,
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,
-                             .code_count = TABLE_CODES};
+                             .code_count = TABLE_CODES,
+                             .reply = reply};
   journal_state kept;
   motor_inputs = (uint16_t)~board_read_inputs();
   config.reset_cause = reset_cause();

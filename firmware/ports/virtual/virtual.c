@@ -264,6 +264,7 @@ void bushd_virtual_init(bushd_virtual* v, const bushd_virtual_config* config) {
   assert(config->clock_ppm >= -BUSHD_VIRTUAL_MAX_PPM && config->clock_ppm <= BUSHD_VIRTUAL_MAX_PPM);
   memset(v, 0, sizeof *v);
   v->config = *config;
+  v->config.mcu.reply = v->reply;
   v->next_event_ns = config->boot_ns;
   v->reset_cause = BUSHD_RESET_POWER_ON;
 }

@@ -91,6 +91,7 @@ typedef struct bushd_virtual {
   uint16_t common_dir_level;
   bool enable_level;
   bool enable_kept;
+  uint8_t reply[BUSHD_MCU_MAX_REPLY];
   bool reference_level;
   bushd_edge trigger_edge;  // awaited
 } bushd_virtual;
