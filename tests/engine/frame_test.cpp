@@ -221,6 +221,45 @@ TEST(Receiver, CountsAnOverlongFrameOnceAndGoesOn) {
   }
 }
 
+TEST(Receiver, ChecksRepliesThatItDoesNotKeep) {
+  holds("other frames come as they are", [] {
+    const Frame frame = any_frame();
+    const bool reply = (frame.type & BUSHD_TYPE_REPLY) != 0;
+    Bytes wire = encode(frame);
+    const bool damaged = *rc::gen::arbitrary<bool>();
+    if (damaged) {
+      uint8_t& byte = wire[between<size_t>(0, wire.size() - 2)];
+      byte ^= static_cast<uint8_t>(byte == 1 ? 2 : 1);  // not into a delimiter
+    }
+    const auto piece = between<size_t>(1, 40);
+    bushd_receiver receiver{};
+    Heard heard;
+    bool passed = false;
+    for (size_t at = 0; at < wire.size(); at += piece) {
+      const auto end = std::min(at + piece, wire.size());
+      const Heard more = receive(Bytes(wire.begin() + static_cast<std::ptrdiff_t>(at),
+                                       wire.begin() + static_cast<std::ptrdiff_t>(end)),
+                                 &receiver);
+      heard.frames.insert(heard.frames.end(), more.frames.begin(), more.frames.end());
+      heard.bad_crc += more.bad_crc;
+      heard.bad_length += more.bad_length;
+      const auto size = receiver.size;
+      bushd_receiver_pass_reply(&receiver);
+      passed = passed || receiver.size < size;
+      if (reply && !damaged) RC_ASSERT(receiver.size <= 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC);
+    }
+    if (damaged) {
+      RC_ASSERT(heard.frames.empty());
+      RC_ASSERT(heard.bad_crc + heard.bad_length == 1);
+      return;
+    }
+    RC_ASSERT(heard.frames.size() == 1u);
+    RC_ASSERT(!passed || reply);
+    if (passed) heard.frames[0].payload = frame.payload;
+    RC_ASSERT(heard.frames[0] == frame);
+  });
+}
+
 TEST(Receiver, FindsTheNextFrameAfterAnyGarbage) {
   holds("garbage, delimiter, frame -> frame", [] {
     bushd_receiver receiver{};

@@ -112,6 +112,30 @@ TEST_P(Emergency, RampsAStreamDownFromEveryTick) {
 }
 
 // Its last step is made, and its queue goes on, since frames are of some length or another motor's.
+// Tick numbers of starts have 16 bits: 2^16 ticks later the same ones come again.
+TEST_P(Emergency, RampsAStreamDownThatBeganLongAgo) {
+  const auto steps_after = [&](std::uint32_t ticks) {
+    Rig on;
+    on.make_ready(law, format, 1000);
+    const std::uint32_t first = on.first_open() + 20;
+    std::uint32_t end = first;
+    for (std::uint8_t flags = kStart; on.first_open() != first + ticks; on.pass()) {
+      while (end - on.tick() < 60) {
+        Ticks more = ones(flags, end, 30);
+        flags = 0;
+        EXPECT_EQ(on.take(more), BUSHD_OK);
+        end += 30;
+      }
+    }
+    return after_emergency(on, BUSHD_RAMP_DOWN);
+  };
+  const std::vector<int> expected = steps_after(100);
+  EXPECT_GT(std::accumulate(expected.begin(), expected.end(), 0), 1);
+  for (const std::uint32_t before : {25u, 10u, 1u, 0u}) {
+    EXPECT_EQ(steps_after(65536 - before), expected) << before;
+  }
+}
+
 TEST_P(Emergency, MotorThatStandsBeforeItsQueueEndsMakesNoStep) {
   Plan moves = plan(5);
   const std::size_t ticks = moves.ticks();

@@ -98,6 +98,19 @@ TEST_P(TableRun, SameFrameAgainIsLateAndAnotherIsRefused) {
   expect_position(0, 50);
 }
 
+TEST_P(TableRun, NoOtherStartWaitsBehindOneThatWaits) {
+  const std::uint32_t first = rig.first_open() + 20;
+  ASSERT_EQ(start(rig, first, 5), BUSHD_OK);
+  const auto ticks =
+      static_cast<std::uint32_t>(steps_by_tick(Reference::move(law, 5), Rig::kTickNs).size());
+  const std::uint32_t end = first + ticks;
+  for (; rig.first_open() <= first; rig.pass()) {
+    ASSERT_EQ(rig.take(ones(kStart, end, 5, 0)), BUSHD_E_STATE) << first - rig.tick();
+  }
+  EXPECT_EQ(rig.take(ones(kStart, end, 5, 0)), BUSHD_OK) << "it runs";
+  expect_position(0, 10);
+}
+
 TEST_P(TableRun, RulesOfAStartHold) {
   const std::uint32_t first = rig.first_open();
   EXPECT_EQ(start(rig, first - 1, 5), BUSHD_E_LATE);

@@ -28,5 +28,46 @@ TEST_F(AvrAnswers, BeginWithinATickInWhateverPhaseTheyAreAskedFor) {
   }
 }
 
+// An answer that waits for its slot lies where frames are received.
+TEST_F(AvrAnswers, AreWholeWhateverPassesByBefore) {
+  constexpr std::uint8_t kOther = 9;
+  pass(kBootNs);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  Random random(2, 0);
+  const auto longest = [&] {
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    for (std::uint8_t& byte : payload) byte = static_cast<std::uint8_t>(random.between(0, 255));
+    return payload;
+  };
+  // Polls of this MCU, to be answered after 16 ms.
+  const auto ask = [&] {
+    const Bytes poll = {1, kAddress, 1600 & 0xFF, 1600 >> 8};
+    master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, poll);
+  };
+  const auto expect_answer = [&] {
+    bushd_report report{};
+    master_.drain();
+    std::erase_if(master_.frames, [](const Frame& frame) { return frame.address != kAddress; });
+    ASSERT_EQ(master_.frames.size(), 1u);
+    const Bytes& payload = master_.frames[0].payload;
+    EXPECT_EQ(bushd_decode_report(payload.data(), payload.size(), &report), BUSHD_OK);
+    EXPECT_EQ(report.motor_count, 16);
+    master_.frames.clear();
+  };
+  for (int i = 0; i < 20; ++i) {
+    ask();
+    for (int other = 0; other < 3; ++other) {
+      master_.post(kOther, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY, longest());
+    }
+    ASSERT_NO_FATAL_FAILURE(expect_answer()) << i;
+  }
+  EXPECT_EQ(master_.poll(kAddress).bad_frames, 0);
+  // No master speaks before its time; one that does is not heard if it says much.
+  ask();
+  master_.post(kOther, BUSHD_MSG_TICKS, longest());
+  ASSERT_NO_FATAL_FAILURE(expect_answer());
+  EXPECT_EQ(master_.poll(kAddress).bad_frames, 1);
+}
+
 }  // namespace
 }  // namespace bushd::sim
