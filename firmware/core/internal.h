@@ -96,23 +96,36 @@ void bushd_mcu_add_steps(int32_t* counter, size_t stride, const int16_t* steps, 
 // requests.c: goes on with an answer; false if there is none.
 bool bushd_mcu_go_on_answering(bushd_mcu* mcu);
 
-// motor.c: what motors do in the tick that is prepared, and how they stop by themselves.
+// motor.c: what motors do in the tick that is prepared.
 // Makes the outlook from this tick on, the first that is not prepared.
 void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick);
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane);
+
+static inline const bushd_table* bushd_mcu_table_of(const bushd_mcu* mcu,
+                                                    const bushd_mcu_motor* motor) {
+  return &mcu->table[motor->table].table;
+}
+
+// table_run.c: runs of a motor's own table.
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message);
-// When a run from rest is over, in ticks; false if that is farther than tick numbers reach.
-// `spare_ns`: by how much it may begin late and still be over then; less than a tick.
-bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
-                            uint32_t* spare_ns);
 // Into the motor's own run, which nothing reads as long as it is in a stream or at rest; nor its
-// end: it holds how many ticks the run takes. False as above.
+// end: it holds how many ticks the run takes. `spare_ns`: by how much it may begin late and still
+// be over then; less than a tick. False if its end is farther than tick numbers reach.
 bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns);
 // The motor's run, just started, begins in this tick and takes as many.
 void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks);
+// A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
+// ends: it is `autonomous` until it rests.
+void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction);
+// Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise
+// since stays so.
+void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);
+
+// stop.c: how motors stop.
 void bushd_mcu_watch_silence(bushd_mcu* mcu);  // before every tick is prepared
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message);
-
+// Of a motor in a stream; `delay` is that of the running step.
+void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay);
 // Stops it from `next` on, the first tick that is not prepared.
 void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t next);
 void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_how how, uint32_t next);
@@ -149,13 +162,6 @@ void bushd_mcu_shape(bushd_mcu* mcu, bushd_plane* plane);
 // it.
 void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction);
 void bushd_mcu_has_left_switch(bushd_mcu* mcu, uint8_t m, int8_t direction);
-
-// A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
-// ends: it is `autonomous` until it rests.
-void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction);
-// Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise
-// since stays so.
-void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);
 
 // homing.c
 bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message);

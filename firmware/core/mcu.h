@@ -121,7 +121,7 @@ typedef struct bushd_mcu_motor {
   uint8_t still_ticks;     // made since; saturates
   union {
     bushd_mcu_start start;  // of those in bushd_mcu.starting
-    uint32_t spare_ns;      // of armed ones (bushd_mcu_ticks_of_run)
+    uint32_t spare_ns;      // of armed ones (bushd_mcu_make_run)
   };
   uint32_t known_until;  // first tick for which nothing is decided; always > tick + 1 once prepared
   // Memory is short: there is no island while a run waits or is made.

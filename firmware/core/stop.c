@@ -1,0 +1,159 @@
+// How motors stop, each by its own table. They do when
+// - their queue ends while they move
+// - no master is heard for too long while they are in a table run
+// - an emergency stop is commanded, or an input asks for one
+// - they come to a limit switch
+#include "firmware/core/internal.h"
+
+void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  const bushd_table* table = bushd_mcu_table_of(mcu, motor);
+  // A delay below cruise cannot be running; the ramp must not reach codes that no move uses.
+  if (delay < table->cruise) delay = table->cruise;
+  const int direction = bushd_mcu_last_direction(mcu, m);
+  // In the fine format the remainder is the elapsed share of the running delay; in the coarse one
+  // that share is unknown, and taking it as 0 makes the next step late rather than early.
+  const int32_t progress = (int32_t)motor->remainder * direction;
+  const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
+  bushd_run_start_ramp_down(&motor->made.run, table, delay, fraction, direction);
+  motor->mode = BUSHD_MCU_RAMP_DOWN;
+  motor->exact = false;
+}
+
+static bool in_run(const bushd_mcu_motor* motor) {
+  return motor->mode == BUSHD_MCU_AUTONOMOUS || motor->mode == BUSHD_MCU_TABLE_RUN;
+}
+
+// A start is to come at `next`, the first tick that is not prepared, or later: the motor rests
+// from *rest_from on until then.
+static bool start_waits(const bushd_mcu* mcu, uint8_t m, uint32_t next, uint32_t* rest_from) {
+  if ((mcu->starting & motor_bit(m)) == 0) return false;
+  const bushd_mcu_start* start = &mcu->motor[m].start;
+  *rest_from = near_tick(start->rest_from, next);
+  return ticks_after(next, near_tick(start->tick, next)) <= 0;
+}
+
+void bushd_mcu_watch_silence(bushd_mcu* mcu) {
+  if (mcu->silent_ticks < mcu->silence_ticks) return;
+  if (mcu->trigger.armed != 0) mcu->faults |= BUSHD_FAULT_LINK;
+  const uint32_t next = mcu->tick + 1u;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    bushd_mcu_motor* motor = &mcu->motor[m];
+    const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN;
+    if (!runs && motor->mode != BUSHD_MCU_RUN_WAITS) continue;
+    if (bushd_run_done(&motor->made.run)) continue;
+    uint32_t from = next;
+    uint32_t rest_from;
+    if (runs) {
+      mcu->run_downs = saturating_increment(mcu->run_downs);
+      bushd_mcu_ramp_down_run(mcu, m);
+    } else if (start_waits(mcu, m, next, &rest_from) && ticks_after(rest_from, next) > 0) {
+      from = rest_from;  // ticks before it are still made
+    }
+    bushd_mcu_cut_queue(mcu, m, from);
+    mcu->faults |= BUSHD_FAULT_LINK;
+  }
+}
+
+// Of the motion that is under way at `next`: a start may wait behind it.
+typedef struct rest_of_stream {
+  uint32_t until;  // the first tick that is not known to be its
+  bool goes_on;    // beyond that
+  bool moves;      // makes a step or part of one from `next` on
+  int16_t steps;   // whole ones in its first TICKS_AHEAD ticks
+} rest_of_stream;
+
+enum { TICKS_AHEAD = 2 };
+
+static rest_of_stream rest_of(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  rest_of_stream rest = {motor->known_until, motor->delay != 0, motor->delay != 0, 0};
+  uint32_t rest_from;
+  if (start_waits(mcu, m, next, &rest_from) && ticks_after(rest_from, next) > 0) {
+    rest.until = rest_from;
+    rest.goes_on = rest.moves = false;
+  }
+  // A table run is known for longer than the queue is deep.
+  const int32_t known = ticks_after(rest.until, next);
+  const uint16_t depth = mcu->config.queue_ticks;
+  const uint32_t end = known < depth ? rest.until : next + depth;
+  for (uint32_t tick = next; ticks_after(end, tick) > 0; ++tick) {
+    const int16_t queued = *queue_at((bushd_mcu*)mcu, tick, m);
+    if (queued == 0) continue;
+    rest.moves = true;
+    if (tick - next < TICKS_AHEAD) rest.steps = (int16_t)(rest.steps + queued / 256);
+  }
+  return rest;
+}
+
+static uint16_t delay_for(const bushd_mcu* mcu, const bushd_mcu_motor* motor, uint64_t time_ns,
+                          uint16_t displacement) {
+  const uint64_t unit = (uint64_t)bushd_mcu_table_of(mcu, motor)->time_unit_ns * displacement;
+  const uint64_t units = (time_ns * 256u + unit - 1u) / unit;
+  return units < UINT16_MAX ? (uint16_t)units : UINT16_MAX;
+}
+
+// The delay of the running step of a stream. In the fine format the last displacement tells it. In
+// the coarse one a tick of one step may be of any speed from a step in two ticks to two in one, and
+// a motor that was taken for too slow a one would stop all but dead, for too fast a one go on
+// accelerating: so it is the least delay that the ticks around this moment may have, as many before
+// as after it, or that which is told for their end.
+static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stream* rest,
+                             uint32_t next) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  if (mcu->format == BUSHD_FORMAT_FINE) {
+    const uint64_t time_ns = (uint64_t)mcu->tick_ns * ((uint32_t)motor->still_ticks + 1u);
+    return motor->displacement == 0 ? UINT16_MAX
+                                    : delay_for(mcu, motor, time_ns, motor->displacement);
+  }
+  if (rest->goes_on && ticks_after(rest->until, next) < TICKS_AHEAD) return motor->delay;
+  const int32_t steps = rest->steps + mcu->plane[0].steps[m] + mcu->plane[1].steps[m];
+  const uint32_t most = (uint32_t)(steps < 0 ? -steps : steps) + 1u;
+  return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * (2u * TICKS_AHEAD) / most, 256);
+}
+
+void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t next) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_mcu_finish_rows(mcu);
+  const bool runs = in_run(motor);
+  const rest_of_stream rest = rest_of(mcu, m, next);
+  uint32_t rest_from;
+  const bool at_rest = (mcu->begun & motor_bit(m)) == 0 || !rest.moves ||
+                       (start_waits(mcu, m, next, &rest_from) && ticks_after(next, rest_from) >= 0);
+  const uint16_t delay = at_rest || runs ? 0 : stream_delay(mcu, m, &rest, next);
+  bushd_mcu_cut_queue(mcu, m, next);
+  if (how == BUSHD_CUT) {
+    if (motor->mode != BUSHD_MCU_STREAM || !at_rest) motor->remainder = 0;
+    motor->mode = BUSHD_MCU_STREAM;
+  } else if (runs) {
+    bushd_mcu_ramp_down_run(mcu, m);
+  } else if (motor->mode != BUSHD_MCU_RAMP_DOWN && !at_rest) {
+    bushd_mcu_ramp_down_stream(mcu, m, delay);
+  }
+}
+
+void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_how how, uint32_t next) {
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) bushd_mcu_stop_motor(mcu, m, how, next);
+}
+
+int8_t bushd_mcu_last_direction(const bushd_mcu* mcu, uint8_t m) {
+  return mcu->direction & motor_bit(m) ? 1 : -1;
+}
+
+int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  const bool begins = motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)next;
+  const bool runs =
+      (begins || motor->mode == BUSHD_MCU_TABLE_RUN) && ticks_after(motor->made.until, next) > 0;
+  if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return motor->made.run.direction;
+  const int16_t queued =
+      ticks_after(motor->known_until, next) > 0 ? *queue_at((bushd_mcu*)mcu, next, m) : (int16_t)0;
+  if (queued != 0) return queued > 0 ? 1 : -1;
+  return (mcu->begun & motor_bit(m)) != 0 ? bushd_mcu_last_direction(mcu, m) : (int8_t)0;
+}
+
+bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message) {
+  bushd_mcu_stop_all(mcu, message->how, FIRST_OPEN(mcu));
+  mcu->faults |= BUSHD_FAULT_EMERGENCY;
+  return BUSHD_OK;
+}

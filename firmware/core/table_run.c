@@ -1,0 +1,82 @@
+// Runs of a motor's own table: TABLE_RUN, what the trigger has armed, and what moves by itself.
+#include "firmware/core/internal.h"
+
+static bool ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
+                         uint32_t* spare_ns) {
+  const uint32_t unit_ns = run->table->time_unit_ns;
+  const uint64_t units = bushd_run_units_left(run);
+  if (units > (uint64_t)(INT32_MAX / 2) * tick_ns / unit_ns) return false;
+  const uint64_t ns = units * unit_ns;
+  *ticks = (uint32_t)((ns + tick_ns - 1u) / tick_ns);
+  *spare_ns = (uint32_t)((uint64_t)*ticks * tick_ns - ns);
+  return true;
+}
+
+void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_mcu_note_start(mcu, m, first_tick);
+  motor->mode = BUSHD_MCU_RUN_WAITS;
+  motor->exact = true;
+  motor->made.until = first_tick + ticks;
+  motor->known_until = motor->made.until;
+}
+
+bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns) {
+  bushd_mcu_made* made = &mcu->motor[entry->motor].made;
+  bushd_run_start(&made->run, &mcu->table[entry->slot].table, entry->steps, entry->direction);
+  return ticks_of_run(&made->run, mcu->tick_ns, &made->until, spare_ns);
+}
+
+static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
+                                const bushd_table_run_entry* entry) {
+  const bushd_mcu_motor* motor = &mcu->motor[entry->motor];
+  if (ticks_after(first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
+  if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
+  // There is room for one run.
+  return motor->mode == BUSHD_MCU_STREAM ? BUSHD_OK : BUSHD_E_STATE;
+}
+
+bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message) {
+  bushd_mcu_stretch stretch = {message->epoch, BUSHD_TICKS_START, message->first_tick, 1, 0};
+  for (uint8_t i = 0; i < message->count; ++i) {
+    stretch.mask |= motor_bit(bushd_get_table_run_entry(message->entries, i).motor);
+  }
+  const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
+  if (status != BUSHD_OK) return status;
+  bool barred = true;
+  for (uint8_t i = 0; i < message->count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
+    const bushd_status entry_status = check_entry(mcu, message->first_tick, &entry);
+    if (entry_status != BUSHD_OK) return entry_status;
+    barred = barred && (bushd_mcu_forbidden(mcu, entry.direction) & motor_bit(entry.motor)) != 0;
+  }
+  if (barred) return BUSHD_E_FORBIDDEN;
+  // All are made before one begins: the frame is taken whole or not at all.
+  for (uint8_t i = 0; i < message->count; ++i) {
+    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
+    uint32_t spare_ns;
+    if (!bushd_mcu_make_run(mcu, &entry, &spare_ns)) return BUSHD_E_CAPACITY;
+  }
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if ((stretch.mask & motor_bit(m)) == 0) continue;
+    bushd_mcu_begin_run(mcu, m, message->first_tick, mcu->motor[m].made.until);
+  }
+  return BUSHD_OK;
+}
+
+void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  // It was cut, or does so already.
+  if (motor->mode == BUSHD_MCU_STREAM || motor->mode == BUSHD_MCU_RAMP_DOWN) return;
+  bushd_run_ramp_down(&motor->made.run);
+  motor->mode = bushd_run_done(&motor->made.run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
+}
+
+void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction);
+  motor->mode = BUSHD_MCU_AUTONOMOUS;
+  motor->exact = true;
+  mcu->autonomous |= motor_bit(m);
+  mcu->outlook.stale = true;
+}
