@@ -1,6 +1,8 @@
 // What outlives a reset, if the port keeps it: tables, who runs which, and settings.
 #include "firmware/core/internal.h"
 
+#define QUIET_TICKS 512u
+
 static bushd_mcu_piece piece_of(void* at, size_t size) {
   const bushd_mcu_piece piece = {at, (uint16_t)size};
   return piece;
@@ -40,4 +42,31 @@ void bushd_mcu_restored(bushd_mcu* mcu) {
   bushd_mcu_set_inputs(mcu, &inputs);
   bushd_mcu_restore_emission(mcu);
   mcu->port.set_tick(mcu->port.context, mcu->tick_ns);
+}
+
+void bushd_mcu_begin_pass(bushd_mcu_pass* pass) {
+  pass->index = 0;
+  pass->offset = pass->size = 0;
+  pass->crc = BUSHD_CRC32_START;
+}
+
+bushd_mcu_piece bushd_mcu_next_kept(bushd_mcu* mcu, bushd_mcu_pass* pass, uint16_t most) {
+  bushd_mcu_piece piece = bushd_mcu_kept(mcu, pass->index);
+  while (piece.at != NULL && pass->offset == piece.size) {
+    piece = bushd_mcu_kept(mcu, ++pass->index);
+    pass->offset = 0;
+  }
+  if (piece.at == NULL) return piece;
+  const uint16_t left = (uint16_t)(piece.size - pass->offset);
+  const bushd_mcu_piece bytes = {(uint8_t*)piece.at + pass->offset, left < most ? left : most};
+  pass->offset = (uint16_t)(pass->offset + bytes.size);
+  pass->size = (uint16_t)(pass->size + bytes.size);
+  pass->crc = bushd_crc32(pass->crc, bytes.at, bytes.size);
+  return bytes;
+}
+
+bool bushd_mcu_kept_is_quiet(const bushd_mcu* mcu, bushd_mcu_pass* pass) {
+  if (pass->crc != pass->crc_before) pass->same_uptime = (uint16_t)mcu->uptime;
+  pass->crc_before = pass->crc;
+  return (uint16_t)((uint16_t)mcu->uptime - pass->same_uptime) >= QUIET_TICKS;
 }

@@ -347,6 +347,22 @@ typedef struct bushd_mcu_piece {
 bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index);
 void bushd_mcu_restored(bushd_mcu* mcu);
 
+// For a port that goes through all pieces a little at a time, again and again.
+typedef struct bushd_mcu_pass {
+  uint8_t index;  // of the piece
+  uint16_t offset;
+  uint16_t size;         // of all bytes so far
+  uint32_t crc;          // register after them
+  uint32_t crc_before;   // of the pass before
+  uint16_t same_uptime;  // since when it is the same
+} bushd_mcu_pass;
+void bushd_mcu_begin_pass(bushd_mcu_pass* pass);
+// The next bytes, up to `most` (>= 1); empty at the end.
+bushd_mcu_piece bushd_mcu_next_kept(bushd_mcu* mcu, bushd_mcu_pass* pass, uint16_t most);
+// At the end of a pass: whether what is kept has stayed the same for so long that it may be
+// written. A master that begins changes one thing after the other.
+bool bushd_mcu_kept_is_quiet(const bushd_mcu* mcu, bushd_mcu_pass* pass);
+
 // One byte from the line. `time_in_tick_ns` is when its stop bit ended, counted from the start of
 // the present tick (negative: in one before); only used at delimiters. O(1), O(frame) at a
 // delimiter.

@@ -5,7 +5,6 @@
 
 #define HEAD_WHOLE 0xA5u
 #define HEAD_BEGUN 0x00u
-#define QUIET_TICKS 512u
 #define CONTENT (EEPROM_KEPT + sizeof(kept_head))
 
 typedef struct kept_head {
@@ -18,31 +17,9 @@ typedef struct kept_head {
 extern const __flash uint32_t image_seal;  // boot_tests.S
 
 static enum { COMPARE, WRITE, WRITE_HEAD } phase;
-// How far it goes through the pieces.
-static uint8_t piece_index;
-static uint16_t offset;  // in the piece
-static uint16_t size;    // of all bytes so far
-static uint32_t crc;
-static uint32_t planned;         // CRC of the pass before
-static uint16_t planned_uptime;  // since when it is the same
-
-static void begin_pass(void) {
-  piece_index = 0;
-  offset = 0;
-  size = 0;
-  crc = BUSHD_CRC32_START;
-}
-
-// Null at the end of all pieces.
-static uint8_t* next_byte(bushd_mcu* mcu) {
-  for (;;) {
-    const bushd_mcu_piece piece = bushd_mcu_kept(mcu, piece_index);
-    if (offset < piece.size) return (uint8_t*)piece.at + offset++;
-    if (piece.at == NULL) return NULL;
-    ++piece_index;
-    offset = 0;
-  }
-}
+static bushd_mcu_pass pass;
+static uint32_t planned;  // CRC of what is being written
+static uint8_t in_head;   // bytes of it that are written
 
 static kept_head read_head(void) {
   kept_head head;
@@ -51,7 +28,7 @@ static kept_head read_head(void) {
 }
 
 kept_found kept_find(void) {
-  begin_pass();
+  bushd_mcu_begin_pass(&pass);
   const kept_head head = read_head();
   if (head.state == 0xFF) return KEPT_NOTHING;
   if (head.state != HEAD_WHOLE || head.size > E2END + 1u - CONTENT) return KEPT_BROKEN;
@@ -68,39 +45,41 @@ kept_found kept_find(void) {
 }
 
 void kept_load(bushd_mcu* mcu) {
-  uint8_t* byte;
-  while ((byte = next_byte(mcu)) != NULL) *byte = eeprom_byte((uint16_t)(CONTENT + size++));
-  begin_pass();
+  for (;;) {
+    const uint16_t at = (uint16_t)(CONTENT + pass.size);
+    const bushd_mcu_piece byte = bushd_mcu_next_kept(mcu, &pass, 1);
+    if (byte.at == NULL) break;
+    *(uint8_t*)byte.at = eeprom_byte(at);
+  }
+  bushd_mcu_begin_pass(&pass);
   bushd_mcu_restored(mcu);
 }
 
 // At the end of a pass that only compares.
 static void compare_whole(const bushd_mcu* mcu) {
   const kept_head head = read_head();
-  const bool same = head.state == HEAD_WHOLE && head.program == image_seal && head.size == size &&
-                    head.crc == crc;
+  const bool same = head.state == HEAD_WHOLE && head.program == image_seal &&
+                    head.size == pass.size && head.crc == pass.crc;
   const bool news = head.state != 0xFF || mcu->codes_used != 0;
-  // A master that begins changes one thing after the other.
-  if (crc != planned) planned_uptime = (uint16_t)mcu->uptime;
-  const bool quiet = (uint16_t)((uint16_t)mcu->uptime - planned_uptime) >= QUIET_TICKS;
-  if (!same && news && quiet && size <= E2END + 1u - CONTENT) {
+  const bool quiet = bushd_mcu_kept_is_quiet(mcu, &pass);
+  if (!same && news && quiet && pass.size <= E2END + 1u - CONTENT) {
     phase = WRITE;
+    planned = pass.crc;
     eeprom_write(EEPROM_KEPT, HEAD_BEGUN);
   }
-  planned = crc;
-  begin_pass();
+  bushd_mcu_begin_pass(&pass);
 }
 
 static void write_head(void) {
-  const kept_head head = {HEAD_WHOLE, image_seal, size, crc};
-  ++offset;
-  if (offset < sizeof head) {
-    eeprom_write((uint16_t)(EEPROM_KEPT + offset), ((const uint8_t*)&head)[offset]);
+  const kept_head head = {HEAD_WHOLE, image_seal, pass.size, pass.crc};
+  ++in_head;
+  if (in_head < sizeof head) {
+    eeprom_write((uint16_t)(EEPROM_KEPT + in_head), ((const uint8_t*)&head)[in_head]);
     return;
   }
   eeprom_write(EEPROM_KEPT, HEAD_WHOLE);
   phase = COMPARE;
-  begin_pass();
+  bushd_mcu_begin_pass(&pass);
 }
 
 void kept_poll(bushd_mcu* mcu) {
@@ -108,18 +87,17 @@ void kept_poll(bushd_mcu* mcu) {
     write_head();
     return;
   }
-  const uint8_t* byte = next_byte(mcu);
-  if (byte != NULL) {
-    crc = bushd_crc32(crc, byte, 1);
-    if (phase == WRITE) eeprom_write((uint16_t)(CONTENT + size), *byte);
-    ++size;
+  const uint16_t at = (uint16_t)(CONTENT + pass.size);
+  const bushd_mcu_piece byte = bushd_mcu_next_kept(mcu, &pass, 1);
+  if (byte.at != NULL) {
+    if (phase == WRITE) eeprom_write(at, *(const uint8_t*)byte.at);
   } else if (phase == COMPARE) {
     compare_whole(mcu);
-  } else if (crc == planned) {
+  } else if (pass.crc == planned) {
     phase = WRITE_HEAD;
-    offset = 0;
+    in_head = 0;
   } else {
     phase = COMPARE;  // it has changed meanwhile
-    begin_pass();
+    bushd_mcu_begin_pass(&pass);
   }
 }

@@ -6,8 +6,7 @@
 #include "firmware/ports/lm3s6965/flash.h"
 
 #define PAGES 96u
-#define MOST_PAGES 27u  // of a writing
-#define QUIET_TICKS 512u
+#define MOST_PAGES 27u      // of a writing
 #define COMPARED_BYTES 32u  // at a time
 
 typedef struct kept_head {
@@ -29,15 +28,10 @@ static uint32_t next;           // page, from which on it is blank up to:
 static uint32_t room_end;
 
 static enum { COMPARES, WRITES, ENDS } phase;
-// How far it goes through the pieces.
-static uint8_t piece_index;
-static uint16_t offset;  // in the piece
-static uint32_t size;    // of all bytes so far
-static uint32_t crc;
-static uint32_t planned;  // CRC of the pass before
+static bushd_mcu_pass pass;
+static uint32_t planned;  // CRC of what is being written
 static uint32_t planned_size;
-static uint32_t planned_uptime;  // since when it is the same
-static uint32_t head_words;      // written
+static uint32_t head_words;  // written
 
 static const volatile uint32_t* page_at(uint32_t page) {
   return kArea + page * FLASH_PAGE_WORDS;
@@ -74,29 +68,6 @@ static void make_room(uint32_t from) {
   while (room_end < PAGES && is_blank(room_end)) ++room_end;
 }
 
-static void begin_pass(void) {
-  piece_index = 0;
-  offset = 0;
-  size = 0;
-  crc = BUSHD_CRC32_START;
-}
-
-// Some of the next bytes, up to `most`; none at the end of all pieces.
-static bushd_mcu_piece next_bytes(bushd_mcu* mcu, uint32_t most) {
-  bushd_mcu_piece piece = bushd_mcu_kept(mcu, piece_index);
-  while (piece.at != NULL && offset == piece.size) {
-    piece = bushd_mcu_kept(mcu, ++piece_index);
-    offset = 0;
-  }
-  if (piece.at == NULL) return piece;
-  const uint32_t left = piece.size - (uint32_t)offset;
-  const bushd_mcu_piece bytes = {(uint8_t*)piece.at + offset,
-                                 (uint16_t)(left < most ? left : most)};
-  offset = (uint16_t)(offset + bytes.size);
-  size += bytes.size;
-  return bytes;
-}
-
 kept_found kept_find(void) {
   uint32_t found = 0;  // page
   for (uint32_t page = 0; page < PAGES; ++page) {
@@ -106,7 +77,7 @@ kept_found kept_find(void) {
     newest = head;
     found = page;
   }
-  begin_pass();
+  bushd_mcu_begin_pass(&pass);
   make_room(newest.number != 0 ? found + pages_of(newest.size) : 0);
   if (newest.number == 0 || newest.program != image_seal) return KEPT_NOTHING;
   content = (const uint8_t*)(uintptr_t)(page_at(found) + HEAD_WORDS);
@@ -117,61 +88,50 @@ kept_found kept_find(void) {
 
 void kept_load(bushd_mcu* mcu) {
   for (;;) {
-    const uint32_t from = size;
-    const bushd_mcu_piece bytes = next_bytes(mcu, MOST_BYTES);
+    const uint32_t from = pass.size;
+    const bushd_mcu_piece bytes = bushd_mcu_next_kept(mcu, &pass, MOST_BYTES);
     if (bytes.at == NULL) break;
     memcpy(bytes.at, content + from, bytes.size);
   }
-  begin_pass();
+  bushd_mcu_begin_pass(&pass);
   bushd_mcu_restored(mcu);
 }
 
 // At the end of a pass that only compares.
 static void compare_whole(const bushd_mcu* mcu) {
-  const bool same = newest.program == image_seal && newest.size == size && newest.crc == crc;
+  const bool same =
+      newest.program == image_seal && newest.size == pass.size && newest.crc == pass.crc;
   const bool news = newest.number != 0 || mcu->codes_used != 0;
-  // A master that begins changes one thing after the other.
-  if (crc != planned) planned_uptime = mcu->uptime;
-  const bool quiet = mcu->uptime - planned_uptime >= QUIET_TICKS;
-  const bool room = size <= MOST_BYTES && next + pages_of(size) <= room_end;
+  const bool quiet = bushd_mcu_kept_is_quiet(mcu, &pass);
+  const bool room = pass.size <= MOST_BYTES && next + pages_of(pass.size) <= room_end;
   if (!same && news && quiet && room) phase = WRITES;
-  planned = crc;
-  planned_size = size;
-  begin_pass();
-}
-
-static void compare(bushd_mcu* mcu) {
-  const bushd_mcu_piece bytes = next_bytes(mcu, COMPARED_BYTES);
-  if (bytes.at == NULL) {
-    compare_whole(mcu);
-  } else {
-    crc = bushd_crc32(crc, bytes.at, bytes.size);
-  }
+  planned = pass.crc;
+  planned_size = pass.size;
+  bushd_mcu_begin_pass(&pass);
 }
 
 // It has changed meanwhile, or flash is worn.
 static void give_up(void) {
   next += pages_of(planned_size);
   phase = COMPARES;
-  begin_pass();
+  bushd_mcu_begin_pass(&pass);
 }
 
 static void write_word(bushd_mcu* mcu) {
-  const uint32_t at = size / 4u;
+  const uint32_t at = pass.size / 4u;
   uint32_t word = FLASH_BLANK;
   uint8_t* const to = (uint8_t*)&word;
   uint32_t count = 0;
   for (; count < sizeof word; ++count) {
-    const bushd_mcu_piece byte = next_bytes(mcu, 1);
+    const bushd_mcu_piece byte = bushd_mcu_next_kept(mcu, &pass, 1);
     if (byte.at == NULL) break;
     to[count] = *(const uint8_t*)byte.at;
   }
-  crc = bushd_crc32(crc, to, count);
-  if (size > planned_size) {
+  if (pass.size > planned_size) {
     give_up();
   } else if (count != 0) {
     if (!flash_write(page_at(next) + HEAD_WORDS + at, word)) give_up();
-  } else if (crc == planned && size == planned_size) {
+  } else if (pass.crc == planned && pass.size == planned_size) {
     phase = ENDS;
     head_words = 0;
   } else {
@@ -180,23 +140,23 @@ static void write_word(bushd_mcu* mcu) {
 }
 
 static void write_head(void) {
-  kept_head head = {image_seal, newest.number + 1u, size, crc, 0};
+  kept_head head = {image_seal, newest.number + 1u, pass.size, pass.crc, 0};
   head.check = check_of(&head);
   const uint32_t words[HEAD_WORDS] = {head.program, head.number, head.size, head.crc, head.check};
   if (!flash_write(page_at(next) + head_words, words[head_words])) {
     give_up();
   } else if (++head_words == HEAD_WORDS) {
     newest = head;
-    next += pages_of(size);
+    next += pages_of(pass.size);
     phase = COMPARES;
-    begin_pass();
+    bushd_mcu_begin_pass(&pass);
   }
 }
 
 void kept_poll(bushd_mcu* mcu) {
   switch (phase) {
     case COMPARES:
-      compare(mcu);
+      if (bushd_mcu_next_kept(mcu, &pass, COMPARED_BYTES).at == NULL) compare_whole(mcu);
       break;
     case WRITES:
       write_word(mcu);
