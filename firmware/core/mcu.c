@@ -70,8 +70,9 @@ static bool engine_self_test(bushd_mcu* mcu) {
   uint16_t* const masks = mcu->plane[0].step;
   int16_t remainder = 0;
   const uint16_t slots = mcu->config.slots;
-  if (bushd_slots_add(masks, slots, 1, 512, &remainder, BUSHD_CROSSING_COARSE) != 2) return false;
-  const bool good = masks[slots / 4] == 1 && masks[3 * slots / 4] == 1 && remainder == 0;
+  const int16_t steps = bushd_slots_add(masks, slots, 1, 512, &remainder, BUSHD_CROSSING_COARSE);
+  const bool good =
+      steps == 2 && masks[slots / 4] == 1 && masks[3 * slots / 4] == 1 && remainder == 0;
   memset(masks, 0, sizeof mcu->plane[0].step);
   return good;
 }

@@ -214,7 +214,7 @@ __attribute__((noinline)) static uint16_t find_others(bushd_mcu* mcu, uint16_t o
   return exact;
 }
 
-__attribute__((noinline)) static void rest(bushd_mcu* mcu, uint16_t motors, uint32_t tick) {
+__attribute__((noinline)) static void stay_at_rest(bushd_mcu* mcu, uint16_t motors, uint32_t tick) {
   mcu->begun &= (uint16_t)~motors;
   for (bushd_mcu_motor* motor = mcu->motor; motors != 0;
        ++motor, motors = (uint16_t)(motors >> 1)) {
@@ -236,7 +236,7 @@ static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
     bushd_mcu_take_coarse_row(queued, values, mcu->config.motors, row);
   }
   follow_begun(mcu, outlook->plain, row->moves, tick);
-  if (outlook->rests != 0) rest(mcu, outlook->rests, tick);
+  if (outlook->rests != 0) stay_at_rest(mcu, outlook->rests, tick);
   const uint16_t others = own_motors(mcu) & (uint16_t) ~(outlook->plain | outlook->rests);
   const uint16_t exact = others != 0 ? find_others(mcu, others, values, row) : (uint16_t)0;
   watch_low_water(mcu);

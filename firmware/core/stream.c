@@ -34,12 +34,14 @@ static inline int16_t* next_row(const bushd_mcu* mcu, int16_t* queued) {
   return queued < end ? queued : queued - (size_t)mcu->config.queue_ticks * mcu->config.motors;
 }
 
-// A table run is known for longer than the queue is deep.
+// A table run is known for longer than the queue is deep: beyond its end lie the rows of ticks that
+// are still to be made.
 static void clear_rows(bushd_mcu* mcu, uint8_t m, uint32_t from, uint32_t until) {
-  uint32_t count = until - from;
-  if (count > mcu->config.queue_ticks) count = mcu->config.queue_ticks;
+  const uint32_t end = mcu->tick + 1u + mcu->config.queue_ticks;
+  if (ticks_after(until, end) > 0) until = end;
+  if (ticks_after(until, from) <= 0) return;
   int16_t* queued = queue_at(mcu, from, m);
-  for (uint16_t rows = (uint16_t)count; rows > 0; --rows, queued = next_row(mcu, queued)) {
+  for (uint16_t rows = (uint16_t)(until - from); rows > 0; --rows, queued = next_row(mcu, queued)) {
     *queued = 0;
   }
 }
@@ -49,6 +51,18 @@ void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t m) {
   if (!motor->has_island) return;
   clear_rows(mcu, m, motor->island.from, motor->island.until);
   motor->has_island = false;
+}
+
+// One that was to come from that tick on does not; the rest before it may last until then.
+static void cut_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  if ((mcu->starting & motor_bit(m)) == 0) return;
+  if (ticks_after(near_tick(motor->start.tick, tick), tick) < 0) return;
+  if (motor->mode == BUSHD_MCU_RUN_WAITS) motor->mode = BUSHD_MCU_STREAM;
+  motor->start.tick = (uint16_t)tick;
+  if (ticks_after(near_tick(motor->start.rest_from, tick), tick) >= 0) {
+    mcu->starting &= (uint16_t)~motor_bit(m);
+  }
 }
 
 void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
@@ -61,12 +75,9 @@ void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
     motor->known_until = tick;
   }
   motor->delay = 0;
-  const bool waits = motor->mode == BUSHD_MCU_RUN_WAITS;
-  if (!waits && motor->mode != BUSHD_MCU_TABLE_RUN) return;
-  if (ticks_after(motor->made.until, tick) > 0) motor->made.until = tick;
-  if (waits && ticks_after(near_tick(motor->start.tick, tick), tick) >= 0) {
-    motor->mode = BUSHD_MCU_STREAM;
-  }
+  cut_start(mcu, m, tick);
+  const bool runs = motor->mode == BUSHD_MCU_RUN_WAITS || motor->mode == BUSHD_MCU_TABLE_RUN;
+  if (runs && ticks_after(motor->made.until, tick) > 0) motor->made.until = tick;
 }
 
 void bushd_mcu_note_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {

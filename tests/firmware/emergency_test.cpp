@@ -111,7 +111,6 @@ TEST_P(Emergency, RampsAStreamDownFromEveryTick) {
   }
 }
 
-// Its last step is made, and its queue goes on, since frames are of some length or another motor's.
 // Tick numbers of starts have 16 bits: 2^16 ticks later the same ones come again.
 TEST_P(Emergency, RampsAStreamDownThatBeganLongAgo) {
   const auto steps_after = [&](std::uint32_t ticks) {
@@ -136,6 +135,21 @@ TEST_P(Emergency, RampsAStreamDownThatBeganLongAgo) {
   }
 }
 
+// What was replaced knew of a rest where the motor moves now.
+TEST_P(Emergency, RampsAStreamDownThatWasPutInPlaceOfARest) {
+  const std::uint32_t first = rig.first_open();
+  ASSERT_EQ(rig.take(ones(kStart, first, 20, 0)), BUSHD_OK);
+  ASSERT_EQ(rig.take(ones(kStart, first + 40, 10, 0)), BUSHD_OK);
+  Ticks moves = ones(kReplace, first + 10, 40);
+  moves.epoch = static_cast<std::uint8_t>(moves.epoch + 1);
+  moves.displacements[15] = 0;
+  ASSERT_EQ(rig.take(moves), BUSHD_OK);
+  while (rig.first_open() != first + 26) rig.pass();
+  const std::vector<int> after = after_emergency(rig, BUSHD_RAMP_DOWN);
+  EXPECT_GT(std::accumulate(after.begin(), after.end(), 0), 0);
+}
+
+// Its last step is made, and its queue goes on, since frames are of some length or another motor's.
 TEST_P(Emergency, MotorThatStandsBeforeItsQueueEndsMakesNoStep) {
   Plan moves = plan(5);
   const std::size_t ticks = moves.ticks();

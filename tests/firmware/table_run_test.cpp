@@ -243,6 +243,16 @@ TEST_P(TableRun, ThatWaitsIsCancelledBySilence) {
   EXPECT_EQ(rig.pulses(0), 0);
 }
 
+TEST_P(TableRun, LongerThanTheQueueThatIsCancelledLeavesTheTicksBefore) {
+  ASSERT_EQ(rig.configure(format, Rig::kTickNs, 30), BUSHD_OK);
+  const std::uint32_t first = rig.first_open();
+  ASSERT_EQ(rig.take(ones(kStart, first, 100, 0)), BUSHD_OK);
+  ASSERT_EQ(start(rig, first + 100, 3000), BUSHD_OK);
+  rig.pass(150);
+  EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_LINK);
+  EXPECT_EQ(rig.pulses(0), 100);
+}
+
 TEST_P(TableRun, OneThatSilenceHasCancelledKeepsNoOtherWaiting) {
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, 30), BUSHD_OK);
   ASSERT_EQ(start(rig, rig.first_open() + 100, 50), BUSHD_OK);

@@ -14,10 +14,10 @@
 #define TURNAROUND_CYCLES (10UL * BIT_PERIODS + 100UL)
 // So many at a time go through the CRC before a frame ends.
 #define CHECK_BYTES 24u
-// Of the receiver's buffer. What others answer needs less (bushd_receiver_pass_reply).
+// Of the receiver's buffer (bushd_receiver_pass_reply).
 #define REPLY_AT (BUSHD_FRAME_MAX_RAW + 1u - BUSHD_MCU_MAX_REPLY)
 _Static_assert(REPLY_AT >= 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC + 2 * CHECK_BYTES,
-               "as it does");
+               "what others answer needs less");
 // What timer 3 waits for at least, and at most at a time.
 #define SHORTEST_CYCLES 64UL
 #define TURN_CYCLES 30000UL
@@ -43,18 +43,6 @@ static uint16_t next_turn(void) {
 static inline void wait_until(uint16_t count) {
   OCR3A = count;
   TIFR3 = 1 << OCF3A;
-  TIMSK3 = 1 << OCIE3A;
-}
-
-// With interrupts on, so that no slot waits for it. One that took so long that the count was passed
-// meanwhile would make the compare come a turn of the timer later.
-static void wait_for(uint16_t cycles) {
-  uint16_t begin;
-  do {
-    begin = TCNT3;
-    TIFR3 = 1 << OCF3A;
-    OCR3A = begin + cycles;
-  } while ((uint16_t)(TCNT3 - begin) >= cycles && (TIFR3 & 1 << OCF3A) == 0);
   TIMSK3 = 1 << OCIE3A;
 }
 
@@ -89,9 +77,13 @@ uint8_t* line_reply(bushd_receiver* receiver) {
   return receiver->buffer + REPLY_AT;
 }
 
-// One waits or is being sent; then nothing is received.
+static inline bool is_sending(void) {
+  return (UCSR0B & 1 << RXEN0) == 0;
+}
+
+// An answer waits, or is being sent.
 static inline bool has_reply(void) {
-  return TIMSK3 != 0 || (UCSR0B & 1 << RXEN0) == 0;
+  return TIMSK3 != 0 || is_sending();
 }
 
 // At most so many bytes at a time: the main loop has a tick to prepare too.
@@ -106,8 +98,9 @@ static void collect(bushd_receiver* receiver) {
     receiver->size = (uint16_t)(to - receiver->buffer);
   } else {
     for (; left > 0; --left, ++out) {
-      if (receiver->size >= room) receiver->size = BUSHD_FRAME_OVERLONG;
-      if (!bushd_receiver_collect(receiver, line_bytes[out])) break;
+      const uint8_t byte = line_bytes[out];
+      if (byte != 0 && receiver->size >= room) receiver->size = BUSHD_FRAME_OVERLONG;
+      if (!bushd_receiver_collect(receiver, byte)) break;
     }
   }
   LINE_OUT = out;
@@ -122,6 +115,12 @@ bool line_collect(bushd_receiver* receiver, uint32_t* time) {
   // Without it, it is not taken for a delimiter.
   if (!delimiter_time(time)) *time = clock_now();
   return true;
+}
+
+bool line_may_take(const bushd_receiver* receiver) {
+  const bool reply = receiver->size > 2 && (receiver->buffer[2] & BUSHD_TYPE_REPLY) != 0;
+  if (receiver->size != 0 && !reply) TIMSK3 = 0;
+  return !is_sending();
 }
 
 uint8_t line_take(void) {
@@ -142,5 +141,14 @@ void line_transmit(const uint8_t* wire, size_t size, uint32_t delay_ns) {
   line_sending_end = (uint8_t)(uintptr_t)(wire + size);
   const uint32_t now = clock_now();
   cycles_to_wait = clock_before(now + SHORTEST_CYCLES, due) ? due - now : SHORTEST_CYCLES;
-  wait_for(next_turn());
+  const uint16_t turn = next_turn();
+  // With interrupts on, so that no slot waits for it. If they took so long that the count was
+  // passed before it was set, the compare would come a turn of the timer later.
+  for (;;) {
+    const uint16_t begin = TCNT3;
+    wait_until((uint16_t)(begin + turn));
+    if ((uint16_t)(TCNT3 - begin) < turn) return;
+    TIMSK3 = 0;
+    if (is_sending()) return;
+  }
 }

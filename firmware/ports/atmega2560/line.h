@@ -11,13 +11,17 @@
 void line_init(void);
 
 // Where answers are made: at the end of the receiver's buffer, which has no need of it meanwhile.
-// What a master sends before the answer is over must be short, or counts as a bad frame.
+// What a master sends before an answer's time must be short, or counts as a bad frame.
 uint8_t* line_reply(bushd_receiver* receiver);
 
 // Bytes that have come go to the receiver, up to one that ends a frame; that one waits: true, and
 // when it came.
 bool line_collect(bushd_receiver* receiver, uint32_t* time);
-// It. Precondition: it waits.
+// Whether it may be taken now: not while an answer is being sent, whose place the next one would
+// take. One that waits is given up if this frame is a master's: who speaks before an answer's time
+// waits for it no more.
+bool line_may_take(const bushd_receiver* receiver);
+// It. Precondition: it waits, and may be taken.
 uint8_t line_take(void);
 
 // Sends these bytes `delay_ns` after the delimiter taken last, or as soon as the line is ours. The

@@ -29,15 +29,21 @@ has_room:
     movw r30, SAVED_LOW
     cpse DATA_LOW, ZERO
     reti
-    ; No slot is to wait for the rest.
+    ; No slot is to wait for the rest; the time is a slot's interrupts later at worst.
     sei
     push r30
     push r31
-    lds r30, TCNT5L
-    lds r31, TCNT5H
     push r24
     in r24, _SFR_IO_ADDR(SREG)
     push r24
+1:
+    ; The trigger's interrupt reads the timer through the same register for its high byte, which counts then if the low
+    ; one has begun anew.
+    lds r30, TCNT5L
+    lds r31, TCNT5H
+    lds r24, TCNT5L
+    cp r24, r30
+    brlo 1b
     push r26
     push r27
     cli

@@ -157,13 +157,13 @@ static void hear_line(void) {
   uint32_t ended = 0;
   if (line_collect(&mcu.receiver, &ended)) {
     // A frame takes a while, and can wait; a tick that has begun meanwhile, or soon will, cannot.
-    if (emission_begun() || emission_begins_soon()) return;
+    if (emission_begun() || emission_begins_soon() || !line_may_take(&mcu.receiver)) return;
     bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(ended));
   } else if (bushd_mcu_wants_samples(&mcu)) {
     // The same conversion may be seen several times.
     bushd_mcu_sample(&mcu, (uint32_t)emission_time_in_tick_ns(clock_now()), inputs_current());
   } else {
-    clock_now();  // as there; a tick may last longer
+    clock_now();  // a tick may last longer than it may go unasked
     poll_eeprom();
   }
 }

@@ -24,12 +24,12 @@ static bool is_due(uint32_t time) {
 }
 
 void reference_rise(uint32_t time) {
+  OCR4A = compare_for(time);
+  TIFR4 = 1 << OCF4A;
   if (is_due(time)) {
     REFERENCE_PORT |= 1 << REFERENCE_BIT;
     return;
   }
-  OCR4A = compare_for(time);
-  TIFR4 = 1 << OCF4A;
   reference_rises = 1 << OCIE4A;
   // No slot is to wait for more than that.
   ATOMIC_BLOCK(ATOMIC_FORCEON) {
@@ -38,12 +38,12 @@ void reference_rise(uint32_t time) {
 }
 
 void reference_fall(uint32_t time) {
+  OCR4B = compare_for(time);
+  TIFR4 = 1 << OCF4B;
   if (is_due(time)) {
     REFERENCE_PORT &= (uint8_t) ~(1 << REFERENCE_BIT);
     return;
   }
-  OCR4B = compare_for(time);
-  TIFR4 = 1 << OCF4B;
   reference_falls = 1 << OCIE4B;
   ATOMIC_BLOCK(ATOMIC_FORCEON) {
     TIMSK4 |= 1 << OCIE4B;
