@@ -86,7 +86,6 @@ static inline bool has_reply(void) {
   return TIMSK3 != 0 || is_sending();
 }
 
-// At most so many bytes at a time: the main loop has a tick to prepare too.
 static void collect(bushd_receiver* receiver) {
   uint8_t out = LINE_OUT;
   uint8_t left = (uint8_t)(LINE_IN - out);
@@ -104,17 +103,28 @@ static void collect(bushd_receiver* receiver) {
     }
   }
   LINE_OUT = out;
-  if ((uint16_t)(receiver->size - receiver->checked) <= CHECK_BYTES) return;
-  bushd_receiver_check(receiver);
-  bushd_receiver_pass_reply(receiver);
+}
+
+static inline bool has_unchecked(const bushd_receiver* receiver) {
+  return receiver->size != BUSHD_FRAME_OVERLONG &&
+         (uint16_t)(receiver->size - receiver->checked) > CHECK_BYTES;
 }
 
 bool line_collect(bushd_receiver* receiver, uint32_t* time) {
-  collect(receiver);
+  if (has_unchecked(receiver)) {
+    bushd_receiver_check(receiver);
+    bushd_receiver_pass_reply(receiver);
+  } else {
+    collect(receiver);
+  }
   if (LINE_OUT == LINE_IN || line_bytes[LINE_OUT] != 0) return false;
   // Without it, it is not taken for a delimiter.
   if (!delimiter_time(time)) *time = clock_now();
   return true;
+}
+
+bool line_is_idle(void) {
+  return LINE_OUT == LINE_IN;
 }
 
 bool line_may_take(const bushd_receiver* receiver) {

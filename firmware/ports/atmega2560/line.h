@@ -14,9 +14,11 @@ void line_init(void);
 // What a master sends before an answer's time must be short, or counts as a bad frame.
 uint8_t* line_reply(bushd_receiver* receiver);
 
-// Bytes that have come go to the receiver, up to one that ends a frame; that one waits: true, and
-// when it came.
+// Some of the bytes that have come go to the receiver, up to one that ends a frame; that one waits:
+// true, and when it came. Never much at a time: the main loop has a tick to prepare too.
 bool line_collect(bushd_receiver* receiver, uint32_t* time);
+// All that has come was collected.
+bool line_is_idle(void);
 // Whether it may be taken now: not while an answer is being sent, whose place the next one would
 // take. One that waits is given up if this frame is a master's: who speaks before an answer's time
 // waits for it no more.

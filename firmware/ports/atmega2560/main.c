@@ -162,7 +162,7 @@ static void hear_line(void) {
   } else if (bushd_mcu_wants_samples(&mcu)) {
     // The same conversion may be seen several times.
     bushd_mcu_sample(&mcu, (uint32_t)emission_time_in_tick_ns(clock_now()), inputs_current());
-  } else {
+  } else if (line_is_idle()) {
     clock_now();  // a tick may last longer than it may go unasked
     poll_eeprom();
   }
