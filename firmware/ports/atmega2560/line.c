@@ -128,8 +128,9 @@ bool line_is_idle(void) {
 }
 
 bool line_may_take(const bushd_receiver* receiver) {
-  const bool reply = receiver->size > 2 && (receiver->buffer[2] & BUSHD_TYPE_REPLY) != 0;
-  if (receiver->size != 0 && !reply) TIMSK3 = 0;
+  // Less is no frame, but what a transceiver makes of its switching on.
+  const bool whole = receiver->size >= 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC;
+  if (whole && (receiver->buffer[2] & BUSHD_TYPE_REPLY) == 0) TIMSK3 = 0;
   return !is_sending();
 }
 
