@@ -241,8 +241,8 @@ class Scene:
                 at = self.trace_time(address, bus_ns)
                 if level != (direction > 0):
                     level = int(direction > 0)
-                    # As an MCU does: at the beginning of the tick.
-                    begin = self.trace_time(address, bus_ns // TICK_NS * TICK_NS)
+                    # As an MCU does: when the pulses of the tick before are over.
+                    begin = self.trace_time(address, bus_ns // TICK_NS * TICK_NS - TICK_NS // SLOTS // 2)
                     changes.append((begin, 1, address, f"dir{output}", level))
                 changes.append((at, 2, address, f"step{output}", 1))
                 changes.append((at + PULSE_NS, 2, address, f"step{output}", 0))
