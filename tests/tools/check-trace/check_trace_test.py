@@ -166,7 +166,12 @@ class RightTraces(CheckTraceTest):
                 self.assertIn("slot 0.0 us", result.stdout)
 
     def test_any_table_and_any_stop_keeps_the_derived_bound(self):
-        seed = random.randrange(2**32)
+        self.any_tables_and_stops(random.randrange(2**32))
+
+    def test_a_first_step_in_the_first_slot_of_a_later_tick(self):
+        self.any_tables_and_stops(2601170235)
+
+    def any_tables_and_stops(self, seed):
         chance = random.Random(seed)
         for round_number in range(12):
             table = any_table(chance)
