@@ -2,8 +2,8 @@
 ; the last slot of a tick and in the first one of the next. None of them changes a flag of SREG. In section
 ; .vectors they lie behind the vectors, so that these reach them by rjmp.
 ;
-; Cycles with entry and vector: A 23, B 16 (19 with a common DIR), and once a tick: A in the first slot 55 and in the last one 67,
-; C 29 and then 16 with interrupts off.
+; Cycles with entry and vector: A 23, B 16 (19 with a common DIR), and once a tick: A in the first slot 51 and in the last one 59,
+; C 26 and then 16 with interrupts off.
 
 #include <avr/io.h>
 

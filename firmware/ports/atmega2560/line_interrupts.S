@@ -1,7 +1,7 @@
 ; The UART's interrupts, by the registers that interrupts have to themselves (emission_slots.h). A slot that comes
 ; as one of them begins waits until it is over, and then for one instruction of the main loop, of up to 5 cycles. So
-; that this is no more than 35, RX has interrupts off for 26 cycles with entry and vector, UDRE for 28, with the last
-; byte for 31.
+; that this is no more than 35, RX has interrupts off for 26 cycles with entry and vector, UDRE for 27, with the last
+; byte for 30.
 
 #include <avr/io.h>
 
