@@ -94,8 +94,8 @@ bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
   if (!bushd_mcu_has_output(mcu, message->motor)) return BUSHD_E_FORMAT;
   if (bushd_mcu_engaged(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
   const bushd_mcu_table* entry = &mcu->table[message->slot];
-  if (!is_valid(mcu, message->slot) || (mcu->flags & BUSHD_FLAG_CONFIGURED) == 0)
-    return BUSHD_E_STATE;
+  const bool configured = (mcu->flags & BUSHD_FLAG_CONFIGURED) != 0;
+  if (!is_valid(mcu, message->slot) || !configured) return BUSHD_E_STATE;
   if (bushd_table_max_steps_per_tick(&entry->table, mcu->tick_ns) > mcu->emission.grid.max_steps) {
     return BUSHD_E_CAPACITY;
   }
