@@ -42,6 +42,15 @@ class Autonomous : public Script, public testing::WithParamInterface<Target> {
   // Inputs are looked at once a tick: they change for both in the same one.
   void to_inputs_time() { bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4); }
 
+  // The image hangs; the twin is reset when the image's watchdog has bitten.
+  void bite() {
+    real_->hang();
+    pass_ticks(60);
+    bus_.mcu(0).set_reset_cause(BUSHD_RESET_WATCHDOG);
+    bus_.reboot(0);
+    pass_ticks(120);
+  }
+
   void expect_alike() {
     expect_the_same_steps(kMotor, steps(0, kMotor).size());
     expect_the_same_times(kMotor);
@@ -143,7 +152,6 @@ TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
   }
 }
 
-// The image hangs; the twin is reset when the image's watchdog has bitten.
 TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
   for (const bool keeps_enable : {false, true}) {
     SCOPED_TRACE(keeps_enable);
@@ -154,12 +162,8 @@ TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
     pass_ticks(60);
     const bushd_report before = master_.poll(kReal);
     ASSERT_EQ(before.running, 1 << kMotor);
-    real_->hang();
     const TimeNs hung_ns = bus_.now_ns();
-    pass_ticks(60);
-    bus_.mcu(0).set_reset_cause(BUSHD_RESET_WATCHDOG);
-    bus_.reboot(0);
-    pass_ticks(120);
+    bite();
     std::size_t falls = 0;
     for (const TimeNs fall_ns : recorder_.times(1, Signal::kEnable, 0, false)) {
       if (fall_ns < hung_ns) continue;
@@ -174,12 +178,7 @@ TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
     EXPECT_EQ((after.flags & BUSHD_FLAG_ENABLED) != 0, keeps_enable);
     EXPECT_EQ(after.motor[kMotor].position_steps, 0);
     if (keeps_enable) {
-      // Once more, before a master has told it anything.
-      real_->hang();
-      pass_ticks(60);
-      bus_.mcu(0).set_reset_cause(BUSHD_RESET_WATCHDOG);
-      bus_.reboot(0);
-      pass_ticks(120);
+      bite();  // once more, before a master has told it anything
       EXPECT_TRUE(master_.poll(kReal).flags & BUSHD_FLAG_ENABLED);
     }
     EXPECT_EQ(master_.poll(kVirtual).reset_cause, after.reset_cause);
