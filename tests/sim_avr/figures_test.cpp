@@ -109,6 +109,7 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
   for (const auto& motor : after.motor) EXPECT_EQ(motor.position_steps, 0);
   EXPECT_EQ(avr_->overruns(), 0u);
 
+  EXPECT_LT(pulses.latest_ns - pulses.earliest_ns, tick_ns / TimeNs{kSlots} / 2);
   // What keeps a slot waiting was itself entered.
   const double jitter_cycles =
       std::round(static_cast<double>(pulses.latest_ns - pulses.earliest_ns) / kCycleNs) +
