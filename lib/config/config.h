@@ -4,7 +4,6 @@
 // line is asked for more than it can carry.
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/ids.h"
 #include "base/result.h"
 #include "engine/message.h"
 #include "link/emission_setup.h"
@@ -20,28 +20,12 @@
 
 namespace bushd::config {
 
-// Positions in the vectors of Config, and what is on the wire. Each its own type: a mix-up moves
-// the wrong motor.
-struct BusIndex {
-  std::size_t value = 0;
-  auto operator<=>(const BusIndex&) const = default;
-};
-struct McuIndex {
-  std::size_t value = 0;
-  auto operator<=>(const McuIndex&) const = default;
-};
-struct GroupIndex {
-  std::size_t value = 0;
-  auto operator<=>(const GroupIndex&) const = default;
-};
-struct McuAddress {
-  std::uint8_t value = 0;  // 1..255
-  auto operator<=>(const McuAddress&) const = default;
-};
-struct Output {
-  std::uint8_t value = 0;  // 0..15
-  auto operator<=>(const Output&) const = default;
-};
+// Positions in the vectors of Config.
+using BusIndex = BusId;
+using McuIndex = McuId;
+using GroupIndex = GroupId;
+using bushd::McuAddress;
+using bushd::Output;
 
 struct Lcm {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
