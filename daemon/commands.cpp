@@ -47,6 +47,11 @@ void Core::command(std::int64_t now_us, const command_t& command) {
     case ClientLog::Verdict::kNew:
       break;
   }
+  carry_out(now_us, command);
+}
+
+void Core::carry_out(std::int64_t now_us, const command_t& command) {
+  const Client client{command.client_id, command.number};
   if (const std::string why = refuse(command); !why.empty()) {
     answer(client, reply_t::REFUSED, "refused", why);
     return;

@@ -68,6 +68,8 @@ class Core {
   void receive(std::int64_t now_us, std::size_t bus, std::span<const std::uint8_t> bytes);
 
   void command(std::int64_t now_us, const command_t& command);
+  // The same for a command that is known to be no repetition.
+  void carry_out(std::int64_t now_us, const command_t& command);
   // Payloads that were no valid command, so far; shown in the state.
   void set_rejected_commands(std::uint64_t count) { rejected_commands_ = count; }
 

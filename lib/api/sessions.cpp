@@ -14,9 +14,9 @@ std::uint64_t mix(std::uint64_t value) {
 }
 
 Reply unknown_session() {
-  return Refused{
-      "the session is unknown: it has been forgotten, or the daemon has restarted; this request "
-      "may have been carried out earlier. Look at the state and open a new session"};
+  return Refused{std::string(kUnknownSession) +
+                 ": it has been forgotten, or the daemon has restarted; this request "
+                 "may have been carried out earlier. Look at the state and open a new session"};
 }
 
 Reply too_old(std::int64_t number) {

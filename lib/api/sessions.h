@@ -16,6 +16,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 
 #include "api/number_window.h"
@@ -23,6 +24,9 @@
 #include "api/request.h"
 
 namespace bushd::api {
+
+// How the refusal of a request in an unknown session begins: its client is to open a new one.
+inline constexpr std::string_view kUnknownSession = "the session is unknown";
 
 class Sessions {
  public:
