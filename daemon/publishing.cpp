@@ -43,10 +43,11 @@ void Publishing::send(Topic topic, Slot<Snapshot>& slot, Result<lcm::Packet> pac
 
 void Publishing::publish(McuId mcu, const api::StateSnapshot& state) {
   auto& slot = states_[mcu.value];
-  const bool changed = !slot.snapshot || !same(*slot.snapshot, state);
+  const bool changed = !slot.snapshot || !same(*slot.snapshot, state) || slot.dropped != dropped_;
   const bool due = clocks_.now_us() - slot.sent_us >= kRestingPeriodUs;
   if (!changed && !due && !moves(state)) return;
   slot.snapshot = state;
+  slot.dropped = dropped_;
   send(Topic::kState, slot, lcm::encode(part(mcu.value, states_.size()), dropped_, state));
 }
 

@@ -55,6 +55,7 @@ class Publishing : public api::Publisher {
     std::optional<Snapshot> snapshot;
     std::optional<lcm::Packet> packet;
     std::int64_t sent_us = 0;
+    std::int64_t dropped = 0;  // messages, as told with it
   };
 
   lcm::Part part(std::size_t index, std::size_t parts);
