@@ -257,7 +257,7 @@ void Core::start_move(std::int64_t now_us, const command_t& command) {
   for (const std::size_t motor : motors) {
     open.tables.push_back(service_[motors_[motor].config->group.value].table);
   }
-  open_moves_.emplace(book_.open(motors), std::move(open));
+  open_moves_.emplace(book_.open(ids_of(motors)), std::move(open));
   for (std::size_t i = 0; i < motors.size(); ++i) {
     motion::Axis& axis = motors_[motors[i]].axis;
     if (axis.busy()) {

@@ -236,6 +236,11 @@ class Core {
   std::optional<std::size_t> find_motor(const std::string& name) const;
   std::vector<std::size_t> motors_named(const command_t& command) const;  // none named: all
   std::vector<std::size_t> mcus_of(const std::vector<std::size_t>& motors) const;
+  static std::vector<MotorId> ids_of(const std::vector<std::size_t>& motors) {
+    std::vector<MotorId> ids;
+    for (const std::size_t motor : motors) ids.push_back({motor});
+    return ids;
+  }
   // Where the i-th motor of a move shall go. Of one that moves, "by" counts from its present
   // target.
   std::int64_t target_of(const command_t& command, std::size_t i) const;

@@ -274,7 +274,7 @@ void Core::end_motor(std::size_t index, motion::Outcome outcome, const std::stri
   motor.wrong = false;
   motor.limit = 0;
   // The log of moves knows nothing of one that has not started.
-  if (!motor.armed) log_result(motor, motion::outcome_word(outcome));
+  if (!motor.armed) log_result(motor, std::string(api::word(outcome)));
   if (std::exchange(motor.armed, std::nullopt)) take_back_companions(index);
   const bool planned = outcome == motion::Outcome::kReached || outcome == motion::Outcome::kStopped;
   if (!planned) outputs_.log(LogLevel::kWarning, motor.config->name + ": " + reason);
@@ -308,13 +308,13 @@ void Core::log_set(const Motor& motor) {
 void Core::end_part(std::size_t index, motion::Outcome outcome, const std::string& reason) {
   const Motor& motor = motors_[index];
   changed_ = true;
-  const auto finished = book_.end({.motor = index,
+  const auto finished = book_.end({.motor = MotorId{index},
                                    .outcome = outcome,
                                    .position_steps = motor.position_steps,
                                    .reason = motor.config->name + ": " + reason});
   if (!finished) return;
   const auto open = open_moves_.extract(finished->move);
-  answer(open.mapped().client, reply_t::RESULT, motion::outcome_word(finished->outcome),
+  answer(open.mapped().client, reply_t::RESULT, std::string(api::word(finished->outcome)),
          finished->reason, reply_to(*finished, open.mapped().tables));
 }
 
@@ -324,8 +324,8 @@ reply_t Core::reply_to(const motion::MoveResult& result,
   std::vector<const tables::Table*> told;
   for (std::size_t i = 0; i < result.motors.size(); ++i) {
     const motion::MotorOutcome& part = result.motors[i];
-    reply.motors.push_back(motors_[part.motor].config->name);
-    reply.motor_results.push_back(motion::outcome_word(part.outcome));
+    reply.motors.push_back(motors_[part.motor.value].config->name);
+    reply.motor_results.emplace_back(api::word(part.outcome));
     reply.position_steps.push_back(part.position_steps);
     const auto found = std::find(told.begin(), told.end(), moved_by[i].get());
     reply.table_of_motor.push_back(static_cast<std::int16_t>(found - told.begin()));

@@ -116,7 +116,7 @@ void Core::start_homing(const command_t& command) {
     open.tables.push_back(service_[motors_[motors.back()].config->group.value].table);
   }
   answer(open.client, reply_t::ACCEPTED, "", "accepted");
-  open_moves_.emplace(book_.open(motors), std::move(open));
+  open_moves_.emplace(book_.open(ids_of(motors)), std::move(open));
   for (const std::size_t motor : motors) queue_homing(motor);
 }
 

@@ -64,7 +64,7 @@ void Core::arm(const command_t& command) {
     motor.axis.start(motor.position_steps, command.steps[i], kNever);
     motor.armed = Motor::Armed{.number = 0, .steps = command.steps[i]};
   }
-  open_moves_.emplace(book_.open(motors), std::move(open));
+  open_moves_.emplace(book_.open(ids_of(motors)), std::move(open));
   std::unordered_map<std::size_t, std::uint8_t> numbers;
   for (const auto& [index, of_mcu] : moves) {
     const Mcu& mcu = mcus_[index];
@@ -95,7 +95,7 @@ void Core::take_back_companions(std::size_t index) {
     // Those of its own MCU have ended by what has ended it.
     Motor& other = motors_[i];
     if (!other.armed || other.armed->stops || other.mcu == motors_[index].mcu ||
-        book_.move_of(i) != book_.move_of(index)) {
+        book_.move_of(MotorId{i}) != book_.move_of(MotorId{index})) {
       continue;
     }
     other.armed->ended = motors_[index].config->name;
