@@ -192,10 +192,9 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
                         " where the table leads to " + std::to_string(planned);
     events.emplace_back(event::Mismatch{});
     axis_.stop();
-    replan(report.first_changeable, events);
   }
   if (report.tick < axis_.end_tick()) {
-    replan(report.first_changeable, events);
+    if (axis_.needs_change()) events.emplace_back(event::Replan{});
   } else if (now.position_mismatch) {
     if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
   } else if (position_ == axis_.wanted_steps()) {
@@ -206,12 +205,6 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
     // It was given a target that its table could not lead to without a rest.
     events.emplace_back(event::Turn{});
   }
-}
-
-void Motor::replan(Tick first_changeable, std::vector<Event>& events) {
-  if (!needs_change()) return;
-  const Tick at = changeable_from(first_changeable);
-  if (axis_.change(at)) events.emplace_back(event::Replace{at});
 }
 
 // Returns whether the rest of the report is to be looked at: it has started, or a fault has put an

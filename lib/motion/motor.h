@@ -51,7 +51,6 @@ using Activity = std::variant<Resting, Moving, Armed, Homing, Local>;
 struct Report {
   const bushd_report& of_mcu;
   Tick tick;                 // of_mcu.tick, unwrapped
-  Tick first_changeable;     // from here on a plan can still be changed
   bool requests_open;        // the MCU has not yet answered all that it was asked
   bool emergency_stop_open;  // commanded, and not yet known to be obeyed everywhere
 };
@@ -66,10 +65,8 @@ struct Started {  // by the trigger: from now on it is a table run like any othe
 struct Executed {  // a change of plan
   Change change;
 };
-struct Replace {  // the plan has changed from this tick on
-  Tick at;
-};
-struct Drop {};  // its MCU takes no more ticks for this motion
+struct Replan {};  // the plan is not what was requested any more
+struct Drop {};    // its MCU takes no more ticks for this motion
 struct Mismatch {};
 struct Turn {};  // it stands on the way to a target that takes a second run
 struct Ended {
@@ -78,7 +75,7 @@ struct Ended {
   bool was_armed = false;
 };
 }  // namespace event
-using Event = std::variant<event::Started, event::Executed, event::Replace, event::Drop,
+using Event = std::variant<event::Started, event::Executed, event::Replan, event::Drop,
                            event::Mismatch, event::Turn, event::Ended>;
 
 class Motor {
@@ -162,7 +159,6 @@ class Motor {
   event::Ended end_by_fault(const bushd_report& report);
   event::Ended ended(Outcome outcome, std::string reason);
   void follow_autonomous(const bushd_report& report);
-  void replan(Tick first_changeable, std::vector<Event>& events);
   void rest();
   std::string did_not_start() const;
 

@@ -43,7 +43,6 @@ class MotorTest : public testing::Test {
     if (position) mcu.motor[3].position_steps = static_cast<std::int32_t>(*position);
     return motor.report({.of_mcu = mcu,
                          .tick = tick,
-                         .first_changeable = tick + 10,
                          .requests_open = requests_open,
                          .emergency_stop_open = false});
   }
@@ -116,7 +115,7 @@ TEST_F(MotorTest, ACountThatDiffersStopsItAndMakesItsPositionUncertain) {
   motor.start(kSteps, kStart);
   const auto events = report(kStart + 20, 1);
   EXPECT_NE(find<event::Mismatch>(events), nullptr);
-  EXPECT_NE(find<event::Replace>(events), nullptr);
+  EXPECT_NE(find<event::Replan>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events), nullptr) << "it moves";
   mcu.moving = 0;
   const auto last = report(motor.axis().end_tick(), 7);
@@ -131,11 +130,8 @@ TEST_F(MotorTest, ACountThatDiffersStopsItAndMakesItsPositionUncertain) {
 TEST_F(MotorTest, AStartThatNeverCameIsNoMismatch) {
   motor.start(kSteps, kStart);
   mcu.motor[3].position_steps = 0;
-  const auto events = motor.report({.of_mcu = mcu,
-                                    .tick = kStart + 30,
-                                    .first_changeable = 0,
-                                    .requests_open = false,
-                                    .emergency_stop_open = false});
+  const auto events = motor.report(
+      {.of_mcu = mcu, .tick = kStart + 30, .requests_open = false, .emergency_stop_open = false});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLink);
   EXPECT_EQ(motor.uncertain_reason(), std::nullopt);
@@ -159,7 +155,7 @@ TEST_F(MotorTest, WaitsForTheTriggerAndStopsIfThatCameFirst) {
   ASSERT_NE(started, nullptr);
   EXPECT_EQ(started->start, kStart + 2);
   EXPECT_EQ(started->late_ns, 1000u);
-  EXPECT_NE(find<event::Replace>(events), nullptr);
+  EXPECT_NE(find<event::Replan>(events), nullptr);
   EXPECT_TRUE(motor.is<Moving>());
 }
 
@@ -190,11 +186,8 @@ TEST_F(MotorTest, ALimitSwitchInFlightEndsTheMoveWhereItStands) {
   EXPECT_NE(find<event::Drop>(met), nullptr);
   EXPECT_THAT(refusal(kSteps), HasSubstr("is stopping it"));
   set(mcu.moving, false);
-  const auto events = motor.report({.of_mcu = mcu,
-                                    .tick = kStart + 40,
-                                    .first_changeable = kStart + 50,
-                                    .requests_open = false,
-                                    .emergency_stop_open = false});
+  const auto events = motor.report(
+      {.of_mcu = mcu, .tick = kStart + 40, .requests_open = false, .emergency_stop_open = false});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLimit);
   EXPECT_THAT(refusal(-10), HasSubstr("cut off at its limit switch"));
@@ -206,11 +199,8 @@ TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
   mcu.faults = BUSHD_FAULT_EMERGENCY;
   EXPECT_TRUE(report(kStart + 21).empty()) << "it may still move";
   set(mcu.moving, false);
-  const auto events = motor.report({.of_mcu = mcu,
-                                    .tick = kStart + 22,
-                                    .first_changeable = 0,
-                                    .requests_open = false,
-                                    .emergency_stop_open = true});
+  const auto events = motor.report(
+      {.of_mcu = mcu, .tick = kStart + 22, .requests_open = false, .emergency_stop_open = true});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
   EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("cut off by an emergency stop"));
