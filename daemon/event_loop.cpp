@@ -79,12 +79,8 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
       core_(config, *this, master_number(run_)),
       publishing_(run_, config.mcus.size(), config.buses.size(),
                   {.now_us = now_us, .unix_us = unix_time_us}),
-      shim_(config, publishing_,
-            [this](const api::Asker& asker, const api::Request& request) {
-              if (is_logged(request)) this->move_log(request_line(unix_time_us(), asker, request));
-            }),
       reception_([this](const api::Asker& asker, const api::Request& request) {
-        carry_out(asker, request);
+        core_.request(now_us(), logged(asker, request, *this), request);
       }),
       lcm_front_({.transport = fronts.lcm,
                   .stops = fronts.stops,
@@ -172,8 +168,8 @@ Result<void> EventLoop::restore_tables() {
     const auto wanted = kept->find(config_.groups[group].name);
     if (wanted == kept->end()) continue;
     const auto table = library_.open(wanted->second);
-    auto restored =
-        table ? core_.restore(group, wanted->second, *table) : Result<void>(fail(table.error()));
+    auto restored = table ? core_.tables().restore({group}, wanted->second, *table)
+                          : Result<void>(fail(table.error()));
     if (restored) continue;
     restored.error().message +=
         " (table " + wanted->second + " was given to group " + config_.groups[group].name + "; " +
@@ -246,14 +242,14 @@ void EventLoop::open_port(std::int64_t now, std::size_t bus) {
     if (error != port.last_error) {
       spdlog::error("bus {}: {}; trying again twice a second", config.name, error);
       port.last_error = error;
-      core_.port_lost(now, bus, "is out of reach: port " + error);
+      core_.port_lost(now, {bus}, "is out of reach: port " + error);
     }
     return;
   }
   port.serial = std::move(*opened);
   port.last_error.clear();
   spdlog::info("bus {}: port {} opened at {} baud", config.name, port.serial->path(), config.baud);
-  core_.port_opened(now, bus);
+  core_.port_opened(now, {bus});
 }
 
 void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& cause) {
@@ -265,7 +261,7 @@ void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& 
   port.open_due_us = now + kReopenUs;
   port.last_error = path + ": " + cause;
   spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, path, cause);
-  core_.port_lost(now, bus, "is out of reach: port " + port.last_error);
+  core_.port_lost(now, {bus}, "is out of reach: port " + port.last_error);
 }
 
 void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t events) {
@@ -274,7 +270,7 @@ void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t eve
   if (events & EPOLLIN) {
     std::vector<std::uint8_t> bytes;
     const auto read = serial.read(bytes);
-    if (!bytes.empty()) core_.receive(now, bus, bytes);
+    if (!bytes.empty()) core_.receive(now, {bus}, bytes);
     if (!read) return lose_port(now, bus, read.error().text());
   } else if (events & (EPOLLHUP | EPOLLERR)) {
     return lose_port(now, bus, "hung up");
@@ -291,7 +287,7 @@ void EventLoop::handle_signal(std::int64_t now) {
   if (::read(signals_, &info, sizeof info) != sizeof info || shut_down_by_us_) return;
   if (info.ssi_signo == SIGHUP) {
     spdlog::info("SIGHUP: all tables are read again");
-    return core_.reload_tables();
+    return core_.tables().request({}, api::ReloadTables{});
   }
   spdlog::info("{}: ramping all motors down", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
   core_.shut_down(now);
@@ -302,14 +298,14 @@ void EventLoop::read_tables(std::uint64_t ticket, const std::vector<std::string>
   worker_.post([this, ticket, wanted]() -> Worker::Rest {
     std::vector<Result<tables::TablePtr>> read;
     for (const std::string& table : wanted) read.push_back(library_.open(table));
-    return [this, ticket, read] { core_.tables_read(now_us(), ticket, read); };
+    return [this, ticket, read] { core_.tables().read(now_us(), ticket, read); };
   });
 }
 
 void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
   worker_.post([this, ticket, wanted]() -> Worker::Rest {
     const auto kept = library_.keep(wanted);
-    return [this, ticket, kept] { core_.tables_kept(ticket, kept); };
+    return [this, ticket, kept] { core_.tables().kept(ticket, kept); };
   });
 }
 
@@ -321,30 +317,25 @@ void EventLoop::carry_out_some() {
   }
 }
 
-void EventLoop::carry_out(const api::Asker& asker, const api::Request& request) {
-  if (ApiShim::is_about_table_files(request)) return on_table_request(asker, request);
-  core_.carry_out(now_us(), shim_.command(asker, request));
-}
-
-void EventLoop::on_table_request(const api::Asker& asker, const api::Request& request) {
+void EventLoop::serve_tables(const api::Asker& asker, const api::Request& request) {
   const std::string client = asker.session->text();
-  if (worker_.waiting() >= kMaxTableJobs || table_jobs_[client] >= kMaxTableJobsPerClient) {
-    if (table_jobs_[client] == 0) table_jobs_.erase(client);
+  const auto jobs = table_jobs_.find(client);
+  if (worker_.waiting() >= kMaxTableJobs ||
+      (jobs != table_jobs_.end() && jobs->second >= kMaxTableJobsPerClient)) {
     return asker.answer(api::Refused{"too many requests about tables wait; try again in a moment"});
   }
-  const table_request_t message = ApiShim::table_request(asker, request);
-  std::string why;
-  if (message.kind == table_request_t::SET) {
-    const auto table = table_of(message);
-    why = table ? core_.refuse_content(message.table, *table) : table.error().text();
+  if (const auto* set = std::get_if<api::SetTable>(&request)) {
+    const auto table = tables::make(set->content);
+    const auto good =
+        table ? core_.tables().check_content(set->table, *table) : fail(table.error());
+    if (!good) return asker.answer(api::Refused{good.error().text()});
   }
   ++table_jobs_[client];
-  worker_.post([this, asker, request, client, message, why]() -> Worker::Rest {
-    const table_reply_t reply =
-        why.empty() ? daemon::answer(library_, message) : refusal(message, why);
-    return [this, asker, request, client, reply] {
+  worker_.post([this, asker, request, client]() -> Worker::Rest {
+    const api::Reply reply = daemon::answer(library_, request, asker.session->client_id());
+    return [this, asker, client, reply] {
       if (--table_jobs_[client] == 0) table_jobs_.erase(client);
-      asker.answer(ApiShim::reply_of(reply, request));
+      asker.answer(reply);
     };
   });
 }
@@ -364,7 +355,8 @@ void EventLoop::log_cpu_share() const {
                100.0 * cpu_s / elapsed_s);
 }
 
-void EventLoop::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
+void EventLoop::send(BusId id, std::span<const std::uint8_t> bytes) {
+  const std::size_t bus = id.value;
   if (!ports_[bus].serial) return;
   const bool waited = ports_[bus].serial->wants_to_write();
   if (const auto written = ports_[bus].serial->write(bytes); !written) {
@@ -374,16 +366,16 @@ void EventLoop::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
   }
 }
 
-void EventLoop::health(const health_t& health) {
-  shim_.health(health);
+void EventLoop::publish(McuId mcu, const api::StateSnapshot& state) {
+  publishing_.publish(mcu, state);
 }
 
-void EventLoop::reply(const reply_t& reply) {
-  shim_.reply(reply);
+void EventLoop::publish(McuId mcu, const api::Description& description) {
+  publishing_.publish(mcu, description);
 }
 
-void EventLoop::state(const state_t& state) {
-  shim_.state(state);
+void EventLoop::publish(BusId bus, const api::HealthSnapshot& health) {
+  publishing_.publish(bus, health);
 }
 
 // Said once when it begins and once when it is over, not twenty times a second.

@@ -13,7 +13,6 @@
 
 #include "config/config.h"
 #include "control/server.h"
-#include "daemon/api_shim.h"
 #include "daemon/core.h"
 #include "daemon/lcm_front.h"
 #include "daemon/move_log.h"
@@ -69,22 +68,21 @@ class EventLoop : private Outputs {
   Result<void> restore_tables();
   // Some of the requests that wait, for as long as nothing else has to wait for that.
   void carry_out_some();
-  void carry_out(const api::Asker& asker, const api::Request& request);
-  void on_table_request(const api::Asker& asker, const api::Request& request);
   void update_write_interest(std::size_t bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
   void check_published();
 
   // Outputs
-  void send(std::size_t bus, std::span<const std::uint8_t> bytes) override;
-  void reply(const reply_t& reply) override;
-  void state(const state_t& state) override;
-  void health(const health_t& health) override;
+  void send(BusId bus, std::span<const std::uint8_t> bytes) override;
+  void publish(McuId mcu, const api::StateSnapshot& state) override;
+  void publish(McuId mcu, const api::Description& description) override;
+  void publish(BusId bus, const api::HealthSnapshot& health) override;
   void move_log(const std::string& json_line) override;
   void log(LogLevel level, const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
+  void serve_tables(const api::Asker& asker, const api::Request& request) override;
   std::int64_t wall_clock_us() override;
 
   const config::Config& config_;
@@ -94,7 +92,6 @@ class EventLoop : private Outputs {
   std::int64_t run_;  // tells this run of the daemon from others
   Core core_;
   Publishing publishing_;
-  ApiShim shim_;
   Reception reception_;
   LcmFront lcm_front_;
   std::unique_ptr<SocketFront> socket_front_;  // null: no control socket

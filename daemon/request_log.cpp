@@ -1,6 +1,8 @@
 #include "daemon/request_log.h"
 
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace bushd::daemon {
 namespace {
@@ -15,22 +17,19 @@ void put_motors(nlohmann::json& line, const auto& request) {
   }
 }
 
-}  // namespace
-
 bool is_logged(const api::Request& request) {
   const auto* move = std::get_if<api::Move>(&request);
   if (move != nullptr) return !move->dry_run;
   return api::is_stop(request) || !api::is_repeatable(request);
 }
 
-std::string request_line(std::int64_t unix_us, const api::Asker& asker,
-                         const api::Request& request) {
-  const api::Session& session = *asker.session;
+std::string line_of(std::int64_t unix_us, const api::Session& session, std::int64_t number,
+                    const api::Request& request) {
   nlohmann::json line = {{"event", "request"},
                          {"utime_us", unix_us},
                          {"request", api::name_of(request)},
                          {"client", session.client_id()},
-                         {"number", asker.number},
+                         {"number", number},
                          {"by", session.transport() == api::Transport::kSocket ? "socket" : "lcm"}};
   if (const auto& credentials = session.credentials()) {
     line["uid"] = credentials->uid;
@@ -39,6 +38,37 @@ std::string request_line(std::int64_t unix_us, const api::Asker& asker,
   std::visit([&line](const auto& content) { put_motors(line, content); }, request);
   // Names are as clients wrote them; what is not UTF-8 must not end the daemon.
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+// Stands for the session of one request until that is accepted or refused.
+class Logged : public api::Session {
+ public:
+  Logged(std::shared_ptr<api::Session> session, const api::Request& request, Outputs& outputs)
+      : Session(session->transport(), session->client_id(), session->may_command(),
+                session->credentials()),
+        session_(std::move(session)),
+        request_(request),
+        outputs_(outputs) {}
+
+  void answer(std::int64_t number, const api::Reply& reply) override {
+    if (std::holds_alternative<api::Accepted>(reply)) {
+      outputs_.move_log(line_of(outputs_.wall_clock_us(), *this, number, request_));
+    }
+    session_->answer(number, reply);
+  }
+
+ private:
+  std::shared_ptr<api::Session> session_;
+  api::Request request_;
+  Outputs& outputs_;
+};
+
+}  // namespace
+
+api::Asker logged(const api::Asker& asker, const api::Request& request, Outputs& outputs) {
+  if (!is_logged(request)) return asker;
+  return {.session = std::make_shared<Logged>(asker.session, request, outputs),
+          .number = asker.number};
 }
 
 }  // namespace bushd::daemon

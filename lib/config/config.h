@@ -111,9 +111,14 @@ struct Config {
   std::vector<Group> groups;
   std::vector<Motor> motors;
 
-  const Bus& bus_of(const Mcu& mcu) const { return buses[mcu.bus.value]; }
-  const Mcu& mcu_of(const Motor& motor) const { return mcus[motor.mcu.value]; }
-  const Group& group_of(const Motor& motor) const { return groups[motor.group.value]; }
+  const Bus& operator[](BusId id) const { return buses[id.value]; }
+  const Mcu& operator[](McuId id) const { return mcus[id.value]; }
+  const Group& operator[](GroupId id) const { return groups[id.value]; }
+  const Motor& operator[](MotorId id) const { return motors[id.value]; }
+
+  const Bus& bus_of(const Mcu& mcu) const { return (*this)[mcu.bus]; }
+  const Mcu& mcu_of(const Motor& motor) const { return (*this)[motor.mcu]; }
+  const Group& group_of(const Motor& motor) const { return (*this)[motor.group]; }
   const Bus& bus_of(const Motor& motor) const { return bus_of(mcu_of(motor)); }
   const tables::Table& table_of(const Motor& motor) const { return *group_of(motor).table; }
 };

@@ -57,7 +57,7 @@ class ControlSocket(EndToEndTest):
         self.bring_up()
         self.command("move", "--wait", "a0", 5)
         self.command("move", "--wait", "--lcm", "a0", 5)
-        local, network = [event for event in self.moves() if event["event"] == "request"]
+        local, network = [event for event in self.logged() if event["event"] == "request"]
         self.assertEqual((local["by"], local["uid"], local["motors"]), ("socket", os.getuid(), ["a0"]))
         self.assertEqual(network["by"], "lcm")
         self.assertNotIn("uid", network)

@@ -132,8 +132,8 @@ class EndToEndTest(unittest.TestCase):
         self.wait_until("bushsim to offer its port", lambda: "bushsim: ready" in bushsim.said())
         return bushsim
 
-    def start_bushd(self, moves="moves.jsonl"):
-        command = [program("BUSHD"), "--config", self.file("bushd.toml"), "--move-log", self.file(moves)]
+    def start_bushd(self, moves="moves.jsonl", config="bushd.toml"):
+        command = [program("BUSHD"), "--config", self.file(config), "--move-log", self.file(moves)]
         return self.start(command, f"bushd-{len(self.programs)}.log", True)
 
     def bring_up(self, displacement_format="fine", bus_lines=(), port="port", links=("port",), lcm_lines=()):
@@ -209,8 +209,12 @@ class EndToEndTest(unittest.TestCase):
 
         self.wait_until(f"{names} to be {steps} steps under way", travelled)
 
-    def moves(self, log="moves.jsonl"):
+    def logged(self, log="moves.jsonl"):
         return [json.loads(line) for line in self.file(log).read_text().splitlines()]
+
+    def moves(self, log="moves.jsonl"):
+        """What motors did, without who asked for it."""
+        return [event for event in self.logged(log) if event["event"] != "request"]
 
     def assert_one_result_each(self, log="moves.jsonl"):
         events = self.moves(log)
