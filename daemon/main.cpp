@@ -85,6 +85,18 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
     spdlog::error("{}", transport.error().text());
     return 1;
   }
+  // Of their own, so that no flood of other requests is before them. What is not on a network has
+  // one place for all.
+  std::unique_ptr<bushd::lcm::Transport> stops;
+  if (config.lcm.commands && config.lcm.url.starts_with("udpm://")) {
+    auto opened = bushd::lcm::Transport::open(
+        config.lcm.url, {config.lcm.prefix + "_STOP", config.lcm.prefix + "_EMERGENCY_STOP"});
+    if (!opened) {
+      spdlog::error("{}", opened.error().text());
+      return 1;
+    }
+    stops = std::move(*opened);
+  }
   auto control = open_control(config.control);
   if (!control) {
     spdlog::error("{}", control.error().text());
@@ -92,9 +104,9 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
   }
   spdlog::info("bushd: {}, LCM {}, control socket {}", extent(config), config.lcm.url,
                *control ? (*control)->path() : "none");
-  bushd::daemon::EventLoop loop(config, {.lcm = **transport, .control = control->get()},
-                                move_log ? &*move_log : nullptr,
-                                bushd::daemon::TableLibrary(config, in_service_path));
+  bushd::daemon::EventLoop loop(
+      config, {.lcm = **transport, .stops = stops.get(), .control = control->get()},
+      move_log ? &*move_log : nullptr, bushd::daemon::TableLibrary(config, in_service_path));
   if (const auto ended = loop.run(); !ended) {
     spdlog::error("{}", ended.error().text());
     return 1;

@@ -17,6 +17,10 @@ namespace bushd::daemon {
 
 class Reception {
  public:
+  // The caller lets requests that wait be carried out for so long, then looks for stops and after
+  // the motors again.
+  static constexpr std::int64_t kSliceUs = 250;
+
   struct Limits {
     std::size_t requests_per_client = 64;
     std::size_t bytes_per_client = 512 * 1024;
