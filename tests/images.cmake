@@ -24,6 +24,8 @@ endfunction()
 
 if(TARGET bushd_sim_avr AND AVR_GCC)
   bushd_images(avr_image AVR avr atmega2560)
+  set(AVR_DEFINITIONS AVR_IMAGES="${AVR_IMAGES}"
+    AVR_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega2560/memory_owners")
   bushd_check(avr_stack_is_bounded LABEL slow NEEDS avr_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py avr-objdump ${AVR_IMAGES}-500000.elf)
 else()

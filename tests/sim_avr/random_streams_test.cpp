@@ -55,6 +55,7 @@ class AvrRandomStreams : public testing::Test {
       AvrOptions options;
       options.image = AVR_IMAGES "-1000000.elf";
       options.address = kAddress;
+      options.memory_owners = AVR_MEMORY_OWNERS;
       options.unique_id = 0x1122334455667788;
       return std::make_unique<AvrMcu>(options, index, driver, sink);
     });
