@@ -12,7 +12,10 @@
 // The very files. Sections and such mean nothing here.
 #define __attribute__(list)
 #define BUSHD_AVR_BAUD 1000000UL
+// Structs of an 8-bit CPU have no gaps.
+#pragma pack(push, 1)
 #include "firmware/ports/atmega2560/kept.c"
+#pragma pack(pop)
 #include "firmware/ports/atmega2560/line.c"
 #undef __attribute__
 
