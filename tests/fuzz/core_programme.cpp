@@ -17,21 +17,22 @@ struct Payload {
   Bytes view() const { return Bytes(bytes).first(size); }
 };
 
-void send_frame(CoreRig& mcu, Input& input) {
-  const std::uint8_t address = (input.u8() & 1) != 0 ? BUSHD_ADDRESS_BROADCAST : CoreRig::kAddress;
+void send_frame(Programmed& mcu, Input& input) {
+  const bool broadcast = (input.u8() & 1) != 0;
   const std::uint8_t type = input.u8();
   const std::uint8_t later = input.u8();
   Payload payload;
   payload.take(input, input.u8());
-  mcu.frame(address == CoreRig::kAddress ? mcu.core().config.address : address, type,
-            payload.view(), later);
+  const std::uint8_t address = broadcast ? BUSHD_ADDRESS_BROADCAST : mcu.sight().address;
+  mcu.frame(address, type, payload.view(), later);
 }
 
-void send_ticks(CoreRig& mcu, Input& input) {
-  const std::uint8_t epoch = static_cast<std::uint8_t>(mcu.core().epoch + input.u8());
+void send_ticks(Programmed& mcu, Input& input) {
+  const Sight sight = mcu.sight();
+  const std::uint8_t epoch = static_cast<std::uint8_t>(sight.epoch + input.u8());
   const std::uint8_t flags = input.u8();
   const std::uint32_t first =
-      mcu.core().tick + static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
+      sight.tick + static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
   const std::uint8_t count = input.u8();
   const std::uint8_t mask = input.u8();
   Payload payload;
@@ -43,27 +44,29 @@ void send_ticks(CoreRig& mcu, Input& input) {
   const std::size_t width = (flags & BUSHD_TICKS_FINE) != 0 ? 2 : 1;
   payload.take(input, 2 * motors);
   payload.take(input, width * motors * count);
-  mcu.frame(mcu.core().config.address, BUSHD_MSG_TICKS, payload.view());
+  mcu.frame(sight.address, BUSHD_MSG_TICKS, payload.view());
 }
 
-void send_table_ticks(CoreRig& mcu, Input& input) {
-  const std::uint8_t epoch = static_cast<std::uint8_t>(mcu.core().epoch + input.u8());
+void send_table_ticks(Programmed& mcu, Input& input) {
+  const Sight sight = mcu.sight();
+  const std::uint8_t epoch = static_cast<std::uint8_t>(sight.epoch + input.u8());
   const std::uint8_t flags = input.u8();
   const std::uint32_t first =
-      mcu.core().tick + static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
+      sight.tick + static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
   const std::uint16_t count = input.u8();
   Payload payload;
   payload.size =
       bushd_encode_table_ticks(epoch, flags, first, count, nullptr, 0, payload.bytes.data());
   payload.take(input, input.u8() % (2 * BUSHD_TABLE_TICKS_MAX_ENTRY));
-  mcu.frame(mcu.core().config.address, BUSHD_MSG_TABLE_TICKS, payload.view());
+  mcu.frame(sight.address, BUSHD_MSG_TABLE_TICKS, payload.view());
 }
 
-void send_table_run(CoreRig& mcu, Input& input) {
-  const std::uint8_t epoch = static_cast<std::uint8_t>(mcu.core().epoch + input.u8() % 2u);
-  const std::uint32_t first = mcu.core().tick + input.u8() % 24u;
+void send_table_run(Programmed& mcu, Input& input) {
+  const Sight sight = mcu.sight();
+  const std::uint8_t epoch = static_cast<std::uint8_t>(sight.epoch + input.u8() % 2u);
+  const std::uint32_t first = sight.tick + input.u8() % 24u;
   std::array<bushd_table_run_entry, BUSHD_MOTORS_PER_MCU> entries{};
-  const auto count = static_cast<std::uint8_t>(1 + input.u8() % mcu.motors());
+  const auto count = static_cast<std::uint8_t>(1 + input.u8() % sight.motors);
   for (std::uint8_t i = 0; i < count; ++i) {
     const std::uint8_t how = input.u8();
     entries[i] = {.motor = i,
@@ -73,39 +76,38 @@ void send_table_run(CoreRig& mcu, Input& input) {
   }
   Payload payload;
   payload.size = bushd_encode_table_run(epoch, first, entries.data(), count, payload.bytes.data());
-  mcu.frame(mcu.core().config.address, BUSHD_MSG_TABLE_RUN, payload.view());
+  mcu.frame(sight.address, BUSHD_MSG_TABLE_RUN, payload.view());
 }
 
-void send_sync(CoreRig& mcu, Input& input) {
+void send_sync(Programmed& mcu, Input& input) {
   const std::uint8_t mark = input.u8();
-  const std::uint32_t tick_ns = mcu.core().tick_ns;
-  const bushd_mcu_clock& clock = mcu.core().clock;
+  const Sight sight = mcu.sight();
+  const std::uint32_t tick_ns = sight.tick_ns;
   const std::uint32_t later_ns =
       static_cast<std::uint32_t>(std::uint64_t{tick_ns} * input.u16() >> 16);
   const std::uint32_t later_ticks =
       static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
-  const bushd_sync sync = {.master = static_cast<std::uint16_t>(clock.master + mark % 4 / 3),
-                           .mark = clock.mark + mark / 4u,
+  const bushd_sync sync = {.master = static_cast<std::uint16_t>(sight.master + mark % 4 / 3),
+                           .mark = sight.mark + mark / 4u,
                            .follows = true,
-                           .known_mark = clock.mark,
-                           .mark_tick = clock.mark_tick + later_ticks,
-                           .mark_ns = (clock.mark_ns + later_ns) % tick_ns};
+                           .known_mark = sight.mark,
+                           .mark_tick = sight.mark_tick + later_ticks,
+                           .mark_ns = (sight.mark_ns + later_ns) % tick_ns};
   Payload payload;
   payload.size = bushd_encode_sync(&sync, payload.bytes.data());
   mcu.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, payload.view());
 }
 
-void send_table_end(CoreRig& mcu, Input& input) {
+void send_table_end(Programmed& mcu, Input& input) {
   bushd_table_end end = {.slot = static_cast<std::uint8_t>(input.u8() % BUSHD_TABLE_SLOTS),
                          .crc = 0};
-  const bushd_mcu_table& table = mcu.core().table[end.slot];
-  if (table.table.accel.count != 0) end.crc = bushd_table_crc32(&table.table);
+  end.crc = mcu.table_crc(end.slot);
   Payload payload;
   payload.size = bushd_encode_table_end(&end, payload.bytes.data());
-  mcu.frame(mcu.core().config.address, BUSHD_MSG_TABLE_END, payload.view());
+  mcu.frame(mcu.sight().address, BUSHD_MSG_TABLE_END, payload.view());
 }
 
-void do_one(Op op, CoreRig& mcu, Input& input) {
+void do_one(Op op, Programmed& mcu, Input& input) {
   switch (op) {
     case Op::kNoise:
       return mcu.feed(input.bytes(input.u8()));
@@ -148,7 +150,7 @@ void do_one(Op op, CoreRig& mcu, Input& input) {
 
 }  // namespace
 
-void run(CoreRig& mcu, Input input, const OwnOps& own) {
+void run(Programmed& mcu, Input input, const OwnOps& own) {
   const unsigned ops = static_cast<unsigned>(Op::kCount) + static_cast<unsigned>(own.size());
   mcu.begin();
   while (!input.empty()) {

@@ -12,6 +12,17 @@ CoreRig::CoreRig(const CoreConfiguration& configuration)
       queue_(std::size_t{configuration.queue_ticks} * configuration.motors),
       codes_(configuration.codes) {}
 
+Sight CoreRig::sight() {
+  const bushd_mcu_clock& clock = mcu_.clock;
+  return {mcu_.config.address, motors(),   mcu_.epoch,      mcu_.tick,    mcu_.tick_ns,
+          clock.master,        clock.mark, clock.mark_tick, clock.mark_ns};
+}
+
+std::uint32_t CoreRig::table_crc(std::uint8_t slot) {
+  const bushd_table& table = mcu_.table[slot].table;
+  return table.accel.count != 0 ? bushd_table_crc32(&table) : 0;
+}
+
 void CoreRig::boot() {
   static constexpr auto self = [](void* context) { return static_cast<CoreRig*>(context); };
   const bushd_port port = {
@@ -34,22 +45,23 @@ void CoreRig::boot() {
       .self_test = [](void*) -> std::uint8_t { return 0; },
       .keep_enable = [](void* context, bool on) { self(context)->enable_at_boot_ = on; },
       .set_trigger = [](void* context, bushd_edge edge) { self(context)->awaited_ = edge; }};
-  const bushd_mcu_config config = {.address = address_,
-                                   .motors = configuration_.motors,
-                                   .slots = kSlots,
-                                   .boot_number = boot_number_++,
-                                   .reset_cause = BUSHD_RESET_WATCHDOG,
-                                   .enable_at_boot = enable_at_boot_,
-                                   .in_pieces = configuration_.in_pieces,
-                                   .queue = queue_.data(),
-                                   .queue_ticks = configuration_.queue_ticks,
-                                   .min_tick_ns = configuration_.min_tick_ns,
-                                   .pulse_ns = configuration_.pulse_ns,
-                                   .lacks = configuration_.lacks,
-                                   .codes = codes_.data(),
-                                   .code_count = configuration_.codes,
-                                   .reply = reply(),
-                                   .unique_id = {'f', 'u', 'z', 'z'}};
+  bushd_mcu_config config = {.address = address_,
+                             .motors = configuration_.motors,
+                             .slots = kSlots,
+                             .boot_number = boot_number_++,
+                             .reset_cause = BUSHD_RESET_WATCHDOG,
+                             .enable_at_boot = enable_at_boot_,
+                             .in_pieces = configuration_.in_pieces,
+                             .queue = queue_.data(),
+                             .queue_ticks = configuration_.queue_ticks,
+                             .min_tick_ns = configuration_.min_tick_ns,
+                             .pulse_ns = configuration_.pulse_ns,
+                             .lacks = configuration_.lacks,
+                             .codes = codes_.data(),
+                             .code_count = configuration_.codes,
+                             .reply = reply(),
+                             .unique_id = {}};
+  std::copy(kUniqueId.begin(), kUniqueId.end(), config.unique_id);
   bushd_mcu_boot(&mcu_, &port, &config);
 }
 
@@ -159,11 +171,8 @@ void CoreRig::check_answers() {
   }
 }
 
-// Switches and current come and go, every few ticks, until the programme sets them.
 bushd_inputs CoreRig::pins() const {
-  if (pins_) return pins_->inputs;
-  const std::uint32_t mixed = mcu_.uptime / 4 * 2654435761u;
-  return {static_cast<std::uint16_t>(mixed >> 22), static_cast<std::uint8_t>(mixed >> 9 & 1)};
+  return pins_ ? pins_->inputs : moving_pins(mcu_.uptime);
 }
 
 // The motor is where it was; the position has another name.

@@ -11,12 +11,9 @@
 #include <optional>
 #include <vector>
 
-#include "firmware/core/mcu.h"
-#include "fuzz/fuzz.h"
+#include "fuzz/core_programme.h"
 
 namespace bushd::fuzz {
-
-using Bytes = std::span<const std::uint8_t>;
 
 struct CoreConfiguration {
   std::uint8_t motors;
@@ -28,40 +25,30 @@ struct CoreConfiguration {
   bool in_pieces = false;
 };
 
-class CoreRig {
+class CoreRig : public Programmed {
  public:
-  static constexpr std::uint8_t kAddress = 7;
-
   explicit CoreRig(const CoreConfiguration& configuration);
-  CoreRig(const CoreRig&) = delete;
-  CoreRig& operator=(const CoreRig&) = delete;
-  virtual ~CoreRig() = default;
 
-  // The first boot; before all else.
-  void begin();
-  virtual void pass();  // of a tick
-  // Bytes come; what they ask for may be left for later. As it is here, the core gets them at once.
-  virtual void feed(Bytes bytes);
-  // What the port does while nothing else is to do.
-  virtual void work(unsigned pieces);
-  // All that the port keeps comes back.
-  virtual void reset() = 0;
-
-  // The master counts its frames in their tags; `later` is how far this one is off.
-  void frame(std::uint8_t address, std::uint8_t type, Bytes payload, std::uint8_t later = 0);
-  void set_pins(std::uint16_t motors, std::uint8_t system, std::uint16_t current);
-  // At most a tick after the edge; only if one is waited for.
-  virtual void trigger(std::int16_t share);
-  virtual void sample(std::uint16_t share, std::uint16_t current);
-  void set_time(std::uint16_t share) { share_ = share; }
-
+  Sight sight() override;
+  std::uint32_t table_crc(std::uint8_t slot) override;
+  void begin() override;
+  void pass() override;
+  // As it is here, the core gets bytes at once.
+  void feed(Bytes bytes) override;
+  void frame(std::uint8_t address, std::uint8_t type, Bytes payload,
+             std::uint8_t later = 0) override;
+  void set_time(std::uint16_t share) override { share_ = share; }
+  void set_pins(std::uint16_t motors, std::uint8_t system, std::uint16_t current) override;
+  void trigger(std::int16_t share) override;
+  void sample(std::uint16_t share, std::uint16_t current) override;
+  void work(unsigned pieces) override;
   // The queue runs out, and motors begin to run down; then it answers.
-  void check_answers();
+  void check_answers() override;
 
   const bushd_mcu& core() const { return mcu_; }
-  std::uint8_t motors() const { return configuration_.motors; }
 
  protected:
+  std::uint8_t motors() const { return configuration_.motors; }
   // Where answers are made; here, in memory of their own.
   virtual std::uint8_t* reply() { return reply_.data(); }
   virtual void transmit(Bytes wire, std::uint32_t delay_ns);

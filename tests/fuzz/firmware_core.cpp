@@ -1,6 +1,6 @@
 // The core with few motors and little memory, so that an input reaches much of it; what it keeps
 // comes back at once.
-#include "fuzz/core_programme.h"
+#include "fuzz/core_rig.h"
 
 namespace bushd::fuzz {
 namespace {

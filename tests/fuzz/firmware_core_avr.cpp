@@ -7,7 +7,7 @@
 // byte is collected; the walk touches no codes but those of tables; what a reset finds whole is as
 // long as its head says, and what the core had.
 #include "fuzz/atmega2560/port.h"
-#include "fuzz/core_programme.h"
+#include "fuzz/core_rig.h"
 #include "fuzz/poison.h"
 
 namespace bushd::fuzz {

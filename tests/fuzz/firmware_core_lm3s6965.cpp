@@ -4,7 +4,7 @@
 // Promises checked beside those of core_rig.h: the walk touches no codes but those of tables; flash
 // is written where it may be; what a reset finds whole is as long as its head says, and what the
 // core had.
-#include "fuzz/core_programme.h"
+#include "fuzz/core_rig.h"
 #include "fuzz/lm3s6965/port.h"
 #include "fuzz/poison.h"
 
