@@ -234,8 +234,11 @@ class AvrRandomStreams : public testing::Test {
 
 TEST_F(AvrRandomStreams, LeaveItAliveAnsweringAndCountingRight) {
   const std::uint64_t streams = from_environment("BUSHD_STREAMS", 500);
-  std::printf("seed %llu\n", static_cast<unsigned long long>(seed_));
-  SCOPED_TRACE("BUSHD_SEED=" + std::to_string(seed_));
+  const std::string again = "BUSHD_SEED=" + std::to_string(seed_) +
+                            " BUSHD_STREAMS=" + std::to_string(streams) +
+                            " sim_avr_test --gtest_filter='AvrRandomStreams.*'";
+  std::printf("%s\n", again.c_str());  // before what may be thrown
+  SCOPED_TRACE("again: " + again);
   std::uint64_t moves = 0;
   const std::uint16_t boot_number = master_.poll(kAddress).boot_number;
   for (std::uint64_t done = 0; done < streams && !HasFailure(); ++done) {
