@@ -16,10 +16,9 @@
 
 #include "engine/message.h"
 #include "engine/table.h"
+#include "fieldbus/emission_setup.h"
 #include "link/bus_clock.h"
-#include "link/emission_setup.h"
 #include "link/health.h"
-#include "link/line_budget.h"
 
 namespace bushd::link {
 
@@ -32,7 +31,7 @@ struct McuSetup {
   std::uint8_t address = 0;
   std::vector<TableRef> tables;                            // by slot, at most BUSHD_TABLE_SLOTS
   std::array<int, BUSHD_MOTORS_PER_MCU> table_of_motor{};  // slot, or -1: no motor at this output
-  EmissionSetup emission{};
+  fieldbus::EmissionSetup emission{};
   bushd_set_inputs inputs{};
   bool off_after_watchdog = false;  // then drivers stay off until control() enables them
   std::uint16_t local_motors = 0;   // that its FORWARD and REVERSE inputs move

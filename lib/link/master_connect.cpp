@@ -29,7 +29,7 @@ bool same_id(const bushd_identity& a, const bushd_identity& b) {
 std::string lacks_time(const McuSetup& setup, const bushd_identity& identity,
                        std::uint32_t tick_ns) {
   unsigned room = 0;
-  const std::string why = emission_misfit(setup.emission, identity, tick_ns, &room);
+  const std::string why = fieldbus::emission_misfit(setup.emission, identity, tick_ns, &room);
   if (!why.empty()) return why;
   for (std::size_t output = 0; output < setup.table_of_motor.size(); ++output) {
     const int slot = setup.table_of_motor[output];
@@ -81,7 +81,7 @@ std::string refusal_text(std::uint8_t type, unsigned status) {
   const bool known = request != kRequests.end();
   const bool too_much = known && status == BUSHD_E_CAPACITY && request->if_too_much != nullptr;
   return (known ? std::string(request->name) + ": " : std::string()) + bushd_status_text(status) +
-         "; " + (too_much ? request->if_too_much : remedy_of(status));
+         "; " + (too_much ? request->if_too_much : fieldbus::remedy_of(status));
 }
 
 }  // namespace
@@ -287,13 +287,13 @@ void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std:
         {.kind = Event::Kind::kRefused, .mcu = index, .type = type, .status = status});
     return;
   }
-  go_offline(
-      index,
-      "refused its configuration: " +
-          (type == BUSHD_MSG_EMISSION ? emission_refusal(mcu.setup.emission, status,
-                                                         mcu.view.identity.slots, setup_.tick_ns)
-                                      : refusal_text(type, status)),
-      now_us + kRetryUs);
+  go_offline(index,
+             "refused its configuration: " +
+                 (type == BUSHD_MSG_EMISSION
+                      ? fieldbus::emission_refusal(mcu.setup.emission, status,
+                                                   mcu.view.identity.slots, setup_.tick_ns)
+                      : refusal_text(type, status)),
+             now_us + kRetryUs);
 }
 
 void Master::follow_connecting(std::int64_t now_us, std::size_t index, bool in_step) {

@@ -9,6 +9,7 @@
 #include <cstdlib>
 
 #include "link/master.h"
+#include "link/master_limits.h"
 
 namespace bushd::link {
 namespace {
