@@ -15,11 +15,11 @@ namespace {
 constexpr std::uint64_t kMaxFrames = 3000;
 
 struct Rehearsed : AxisSource {
-  motion::Axis* moving_axis(std::size_t mcu, std::uint8_t motor) override {
+  motion::Axis* moving_axis(link::McuIndex mcu, std::uint8_t motor) override {
     const auto found = axes.find({mcu, motor});
     return found == axes.end() ? nullptr : &found->second;
   }
-  std::map<std::pair<std::size_t, std::uint8_t>, motion::Axis> axes;
+  std::map<std::pair<link::McuIndex, std::uint8_t>, motion::Axis> axes;
   std::vector<link::Master::Motion> motions;
 };
 

@@ -10,9 +10,9 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace bushd::link {
+#include "link/tick.h"
 
-using Tick = std::int64_t;  // absolute, unwrapped from the 32 bits on the line
+namespace bushd::link {
 
 class BusClock {
  public:

@@ -19,7 +19,6 @@ constexpr std::int64_t kStartLeadUs =
     100'000;  // two polls: one lost first frame can still be repaired
 constexpr std::int64_t kReplaceLeadUs =
     12'000;  // a frame in flight, an answer awaited; adapter latency comes on top
-constexpr std::int64_t kMaxBacklogUs = 5'000;  // bytes handed to the port but not yet on the line
 constexpr std::int64_t kStreamWakeUs = 5'000;
 // More than any adapter holds back. An answer that was read later still waited for this program,
 // which had been stopped: moves and stops must not be put off by seconds for that.
@@ -35,18 +34,22 @@ std::int64_t held_back_us(const BusHealth& health) {
 }  // namespace
 
 Master::Master(BusSetup setup, TickSource& source)
-    : setup_(std::move(setup)), source_(source), clock_(setup_.tick_ns) {
+    : setup_(std::move(setup)),
+      source_(source),
+      clock_(setup_.tick_ns),
+      writer_(setup_.baud),
+      transactions_(writer_, *this) {
   for (const McuSetup& mcu : setup_.mcus) {
-    mcus_.emplace_back();
-    mcus_.back().setup = mcu;
+    Mcu entry;
+    entry.setup = mcu;
+    mcus_.push_back(std::move(entry));
   }
 }
 
 void Master::port_opened(std::int64_t now_us) {
   port_open_ = true;
-  receiver_ = {};
-  exchange_.reset();
-  line_free_us_ = now_us;
+  transactions_.reset();
+  writer_.reset(now_us);
   sync_due_us_ = now_us;
   for (Mcu& mcu : mcus_) {
     mcu.view.detail = "no answer yet";
@@ -56,8 +59,8 @@ void Master::port_opened(std::int64_t now_us) {
 
 void Master::port_lost(std::int64_t now_us, const std::string& cause) {
   port_open_ = false;
-  exchange_.reset();
-  for (std::size_t i = 0; i < mcus_.size(); ++i) go_offline(i, cause, now_us);
+  transactions_.abandon();
+  for (const McuIndex i : mcus_.indices()) go_offline(i, cause, now_us);
   clock_.reset();
 }
 
@@ -65,14 +68,10 @@ Tick Master::ticks_in(std::int64_t us) const {
   return (us * 1000 + setup_.tick_ns - 1) / setup_.tick_ns;
 }
 
-std::int64_t Master::line_us(std::size_t bytes) const {
-  return static_cast<std::int64_t>(bytes) * 10'000'000 / setup_.baud + 1;
-}
-
 // What an adapter holds back is late on the line, and its answer is later still: queues are deeper
 // by that, and changes are planned further ahead.
-Tick Master::earliest_start(std::int64_t now_us, std::size_t mcu, std::uint8_t motor) const {
-  const std::int64_t lead_us = kStartLeadUs + 4 * held_back_us(bus_health_);
+Tick Master::earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const {
+  const std::int64_t lead_us = kStartLeadUs + 4 * held_back_us(transactions_.health());
   return std::max(tick_at(now_us) + ticks_in(lead_us), mcus_[mcu].stream[motor].next);
 }
 
@@ -80,12 +79,12 @@ Tick Master::earliest_replace(std::int64_t now_us) const {
   // An MCU can change its next tick but one; this clock lags by a part of a tick.
   constexpr Tick kMcuTicks = 3;
   const std::int64_t waits_us =
-      exchange_ ? std::max<std::int64_t>(exchange_->line_quiet_us - now_us, 0) : 0;
-  const std::int64_t lead_us = kReplaceLeadUs + waits_us + 2 * held_back_us(bus_health_);
+      transactions_.open() ? std::max<std::int64_t>(transactions_.quiet_us() - now_us, 0) : 0;
+  const std::int64_t lead_us = kReplaceLeadUs + waits_us + 2 * held_back_us(transactions_.health());
   return tick_at(now_us) + ticks_in(lead_us) + kMcuTicks;
 }
 
-bool Master::can_run_tables(std::size_t mcu) const {
+bool Master::can_run_tables(McuIndex mcu) const {
   return (mcus_[mcu].view.identity.capabilities & BUSHD_CAN_TABLE_RUN) != 0;
 }
 
@@ -101,7 +100,7 @@ void Master::reset_low_water() {
   for (Mcu& mcu : mcus_) mcu.health.low_water_ticks.reset();
 }
 
-void Master::reconfigure(std::size_t mcu, McuSetup setup) {
+void Master::reconfigure(McuIndex mcu, McuSetup setup) {
   Mcu& m = mcus_[mcu];
   m.setup = std::move(setup);
   if (m.view.phase == McuPhase::kOffline) return;
@@ -110,37 +109,37 @@ void Master::reconfigure(std::size_t mcu, McuSetup setup) {
   m.view.detail = "being configured";
   m.scripted = false;
   m.script.clear();
-  m.poll_now = true;
+  m.poll_wanted = true;
 }
 
-void Master::control(std::size_t mcu, std::uint8_t actions) {
+void Master::control(McuIndex mcu, std::uint8_t actions) {
   if (actions & BUSHD_CONTROL_ENABLE) mcus_[mcu].powered = true;
   if (actions & BUSHD_CONTROL_DISABLE) mcus_[mcu].powered = false;
   add_control(mcus_[mcu], actions);
 }
 
-void Master::set_position(std::size_t mcu, std::uint8_t motor, std::int32_t position_steps) {
+void Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) {
   const bushd_set_position message = {motor, position_steps};
   add_request(mcus_[mcu], BUSHD_MSG_SET_POSITION,
               [&](std::uint8_t* p) { return bushd_encode_set_position(&message, p); });
 }
 
-bool Master::can_trigger(std::size_t mcu) const {
+bool Master::can_trigger(McuIndex mcu) const {
   return (mcus_[mcu].view.identity.capabilities & BUSHD_CAN_TRIGGER) != 0;
 }
 
-bool Master::has_reference(std::size_t mcu) const {
+bool Master::has_reference(McuIndex mcu) const {
   return (mcus_[mcu].view.identity.capabilities & BUSHD_CAN_REFERENCE) != 0;
 }
 
-std::uint8_t Master::arm(std::size_t index, bushd_edge edge, std::uint32_t delay_us,
+std::uint8_t Master::arm(McuIndex index, bushd_edge edge, std::uint32_t delay_us,
                          std::span<const Armed> moves) {
   Mcu& mcu = mcus_[index];
   std::vector<bushd_table_run_entry> entries;
   for (const Armed& move : moves) {
     entries.push_back(
         {.motor = move.motor,
-         .slot = static_cast<std::uint8_t>(mcu.setup.table_of_motor[move.motor]),
+         .slot = mcu.setup.table_of_motor[move.motor].value_or(0),
          .direction = static_cast<std::int8_t>(move.steps < 0 ? -1 : 1),
          .steps = static_cast<std::uint32_t>(std::abs(static_cast<std::int64_t>(move.steps)))});
   }
@@ -161,16 +160,16 @@ void Master::add_disarm(Mcu& mcu) {
   });
 }
 
-void Master::disarm(std::size_t mcu) {
+void Master::disarm(McuIndex mcu) {
   add_disarm(mcus_[mcu]);
 }
 
-void Master::reference(std::size_t mcu, const bushd_reference& message) {
+void Master::reference(McuIndex mcu, const bushd_reference& message) {
   add_request(mcus_[mcu], BUSHD_MSG_REFERENCE,
               [&](std::uint8_t* p) { return bushd_encode_reference(&message, p); });
 }
 
-void Master::home(std::size_t mcu, const bushd_home& message) {
+void Master::home(McuIndex mcu, const bushd_home& message) {
   add_request(mcus_[mcu], BUSHD_MSG_HOME,
               [&](std::uint8_t* p) { return bushd_encode_home(&message, p); });
 }
@@ -194,17 +193,21 @@ std::vector<Event> Master::take_events() {
   return std::exchange(events_, {});
 }
 
+void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
+  transactions_.receive(now_us, bytes);
+}
+
 std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
-  out_.clear();
+  writer_.clear();
   stepped_us_ = now_us;
-  if (!port_open_) return out_;
-  if (exchange_ && now_us >= exchange_->timeout_us) handle_timeout(now_us);
-  if (fail_late_replacements(now_us)) return out_;
+  if (!port_open_) return {};
+  transactions_.expire(now_us);
+  if (fail_late_replacements(now_us)) return {};
   // Nobody should be talking any more, and an answer that is late all the same may be lost.
-  if (exchange_ && now_us >= exchange_->line_quiet_us) send_emergency(now_us);
-  while (!exchange_ && line_free_us_ - now_us < kMaxBacklogUs && send_next(now_us)) {
+  if (transactions_.open() && now_us >= transactions_.quiet_us()) send_emergency(now_us);
+  while (!transactions_.open() && writer_.has_room(now_us) && send_next(now_us)) {
   }
-  return out_;
+  return writer_.bytes();
 }
 
 std::optional<Master::Traffic> Master::rehearse(std::int64_t now_us, TickSource& source,
@@ -212,9 +215,8 @@ std::optional<Master::Traffic> Master::rehearse(std::int64_t now_us, TickSource&
                                                 std::uint64_t max_frames) const {
   Master other(setup_, source);
   other.clock_ = clock_;
-  other.bus_health_ = bus_health_;
-  other.line_free_us_ = now_us;
-  for (std::size_t i = 0; i < mcus_.size(); ++i) other.mcus_[i].view = mcus_[i].view;
+  other.writer_.reset(now_us);
+  for (const McuIndex i : mcus_.indices()) other.mcus_[i].view = mcus_[i].view;
   for (const Motion& motion : motions) {
     other.begin(motion.mcu, motion.motor, motion.start);
     other.mcus_[motion.mcu].stream[motion.motor].run_steps = motion.run_steps;
@@ -225,7 +227,7 @@ std::optional<Master::Traffic> Master::rehearse(std::int64_t now_us, TickSource&
                          [](const Stream& s) { return s.active && !s.finished; });
     });
   };
-  const std::int64_t target_us = kQueueTargetUs + 4 * held_back_us(bus_health_);
+  const std::int64_t target_us = kQueueTargetUs + 4 * held_back_us(transactions_.health());
   Tick end = 0;
   for (const Motion& motion : motions) {
     end = std::max(end, source.end_tick(motion.mcu, motion.motor));
@@ -234,20 +236,21 @@ std::optional<Master::Traffic> Master::rehearse(std::int64_t now_us, TickSource&
   for (; open(); now_us += kStreamWakeUs) {
     // Queues are filled ahead of the time: what has not gone out by its end never will.
     if (!clock_.valid() || clock_.tick_at(now_us) > end) return std::nullopt;
-    while (other.line_free_us_ - now_us < kMaxBacklogUs && other.send_stream(now_us, target_us)) {
+    while (other.writer_.has_room(now_us) && other.send_stream(now_us, target_us)) {
       if (++traffic.frames > max_frames) return std::nullopt;
     }
-    traffic.bytes += other.out_.size();
-    other.out_.clear();
+    traffic.bytes += other.writer_.bytes().size();
+    other.writer_.clear();
   }
   return traffic;
 }
 
 std::int64_t Master::next_wake_us() const {
   if (!port_open_) return INT64_MAX;
-  if (exchange_) {
-    if (!emergency_) return exchange_->timeout_us;
-    return std::min(exchange_->timeout_us, std::max(emergency_->due_us, exchange_->line_quiet_us));
+  if (transactions_.open()) {
+    const std::int64_t timeout_us = transactions_.timeout_us();
+    if (!emergency_) return timeout_us;
+    return std::min(timeout_us, std::max(emergency_->due_us, transactions_.quiet_us()));
   }
   std::int64_t wake = sync_due_us_;
   if (emergency_) wake = std::min(wake, emergency_->due_us);
@@ -260,44 +263,19 @@ std::int64_t Master::next_wake_us() const {
     const bool streaming = std::any_of(mcu.stream.begin(), mcu.stream.end(),
                                        [](const Stream& s) { return s.active && !s.finished; });
     if (streaming || !mcu.script.empty()) wake = std::min(wake, stepped_us_ + kStreamWakeUs);
-    if (mcu.replacing != 0 || mcu.poll_now) wake = stepped_us_;
+    if (mcu.replacing != 0 || mcu.poll_wanted) wake = stepped_us_;
   }
-  return std::max(wake, line_free_us_ - kMaxBacklogUs + 1);
+  return std::max(wake, writer_.room_from_us());
 }
 
 bool Master::send_next(std::int64_t now_us) {
-  const std::int64_t deeper_us = 4 * held_back_us(bus_health_);
+  const std::int64_t deeper_us = 4 * held_back_us(transactions_.health());
   const std::int64_t urgent_us = kQueueUrgentUs + deeper_us;
   return send_emergency(now_us) || send_due_replacement(now_us) ||
          send_stream(now_us, urgent_us, true) || send_wanted_poll(now_us) ||
          send_stream(now_us, urgent_us) || send_due_poll(now_us) || send_due_sync(now_us) ||
          send_ramp_down(now_us) || send_due_identify(now_us) || send_script(now_us) ||
          send_stream(now_us, kQueueTargetUs + deeper_us);
-}
-
-void Master::send(std::int64_t now_us, std::uint8_t address, std::uint8_t type,
-                  std::span<const std::uint8_t> payload) {
-  // After silence a delimiter comes first: it ends whatever noise the receivers took for the
-  // beginning of a frame.
-  if (line_free_us_ < now_us) out_.push_back(0);
-  const std::size_t before = out_.size();
-  out_.resize(before + BUSHD_FRAME_MAX_WIRE);
-  const std::size_t size = bushd_frame_encode(address, type, ++tag_, payload.data(), payload.size(),
-                                              out_.data() + before);
-  out_.resize(before + size);
-  line_free_us_ = std::max(line_free_us_, now_us) + line_us(size + 1);
-}
-
-void Master::ask(std::int64_t now_us, std::size_t mcu, std::uint8_t type,
-                 std::span<const std::uint8_t> payload, std::size_t reply_payload) {
-  send(now_us, mcus_[mcu].setup.address, type, payload);
-  const std::int64_t end = line_free_us_ + line_us(reply_payload + BUSHD_FRAME_OVERHEAD + 1);
-  exchange_ = Exchange{.type = type,
-                       .tag = tag_,
-                       .awaited = {{.mcu = mcu, .expected_us = end}},
-                       .line_quiet_us = end,
-                       .timeout_us = end + patience_us_,
-                       .identities = {}};
 }
 
 // Said three times in a row, as nobody answers, and again until every report shows it.
@@ -316,8 +294,8 @@ bool Master::send_emergency(std::int64_t now_us) {
   if (!said) emergency_->until_us = now_us + kEmergencyUs;
   emergency_->due_us = now_us + kEmergencyRepeatUs;
   const std::array<std::uint8_t, 1> payload = {static_cast<std::uint8_t>(emergency_->how)};
-  for (int i = 0; i < 3; ++i) send(now_us, BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_EMERGENCY, payload);
-  for (Mcu& mcu : mcus_) mcu.poll_now |= mcu.view.phase != McuPhase::kOffline;
+  for (int i = 0; i < 3; ++i) writer_.send(now_us, kBroadcast, BUSHD_MSG_EMERGENCY, payload);
+  for (Mcu& mcu : mcus_) mcu.poll_wanted |= mcu.view.phase != McuPhase::kOffline;
   return true;
 }
 
@@ -326,7 +304,7 @@ bool Master::send_ramp_down(std::int64_t now_us) {
     if (mcu.view.phase != McuPhase::kConnecting || !mcu.ramp_down_now) continue;
     mcu.ramp_down_now = false;
     const std::array<std::uint8_t, 1> payload = {BUSHD_RAMP_DOWN};
-    send(now_us, mcu.setup.address, BUSHD_MSG_EMERGENCY, payload);
+    writer_.send(now_us, mcu.setup.address, BUSHD_MSG_EMERGENCY, payload);
     return true;
   }
   return false;
@@ -335,13 +313,17 @@ bool Master::send_ramp_down(std::int64_t now_us) {
 // By turns: one that does not answer its request keeps nobody else waiting.
 bool Master::send_script(std::int64_t now_us) {
   for (std::size_t n = 0; n < mcus_.size(); ++n) {
-    const std::size_t i = (script_turn_ + n) % mcus_.size();
+    const McuIndex i{(script_turn_ + n) % mcus_.size()};
     const Mcu& mcu = mcus_[i];
     if (mcu.view.phase == McuPhase::kOffline || mcu.script.empty()) continue;
-    script_turn_ = i + 1;
+    script_turn_ = i.value + 1;
     const Request& request = mcu.script.front();
-    ask(now_us, i, request.type, request.payload,
-        request.type == BUSHD_MSG_TABLES ? BUSHD_TABLES_SIZE : 1);
+    transactions_.ask(now_us,
+                      {.mcu = i,
+                       .address = mcu.setup.address,
+                       .type = request.type,
+                       .payload = request.payload,
+                       .reply_payload = request.type == BUSHD_MSG_TABLES ? BUSHD_TABLES_SIZE : 1u});
     return true;
   }
   return false;

@@ -18,6 +18,7 @@ constexpr std::int64_t kMinQueueUs = 150'000;               // two lost answers 
 // Table runs go on without a word from here for as long: more than a busy PC needs to come back.
 constexpr std::int64_t kSilenceUs = 1'000'000;
 constexpr unsigned kIdentifySlots = 8;
+constexpr std::int64_t kReplyUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 // While one of these is latched the MCU refuses to raise EN.
 constexpr unsigned kFaultsWithoutEnable = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT;
 
@@ -29,12 +30,12 @@ bool same_id(const bushd_identity& a, const bushd_identity& b) {
 std::string lacks_time(const McuSetup& setup, const bushd_identity& identity,
                        std::uint32_t tick_ns) {
   unsigned room = 0;
-  const std::string why = emission_misfit(setup.emission, identity, tick_ns, &room);
+  const std::string why = fieldbus::emission_misfit(setup.emission, identity, tick_ns, &room);
   if (!why.empty()) return why;
   for (std::size_t output = 0; output < setup.table_of_motor.size(); ++output) {
-    const int slot = setup.table_of_motor[output];
-    if (slot < 0) continue;
-    const bushd_table* table = setup.tables[static_cast<std::size_t>(slot)].table;
+    const auto slot = setup.table_of_motor[output];
+    if (!slot) continue;
+    const bushd_table* table = setup.tables[*slot].table;
     const std::uint32_t steps = bushd_table_max_steps_per_tick(table, tick_ns);
     if (steps <= room) continue;
     return "has room for " + std::to_string(room) +
@@ -81,44 +82,49 @@ std::string refusal_text(std::uint8_t type, unsigned status) {
   const bool known = request != kRequests.end();
   const bool too_much = known && status == BUSHD_E_CAPACITY && request->if_too_much != nullptr;
   return (known ? std::string(request->name) + ": " : std::string()) + bushd_status_text(status) +
-         "; " + (too_much ? request->if_too_much : remedy_of(status));
+         "; " + (too_much ? request->if_too_much : fieldbus::remedy_of(status));
 }
 
 }  // namespace
 
 bool Master::send_due_identify(std::int64_t now_us) {
-  for (std::size_t i = 0; i < mcus_.size(); ++i) {
+  for (const McuIndex i : mcus_.indices()) {
     Mcu& mcu = mcus_[i];
     if (mcu.view.phase != McuPhase::kOffline || mcu.retry_due_us > now_us) continue;
     const unsigned slots = mcu.looks++ % 2 == 0 ? 1 : kIdentifySlots;
     const std::int64_t slot_us =
-        line_us(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + kSlotGuardUs;
+        writer_.line_us(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + kSlotGuardUs;
     const bushd_identify identify = {
         .salt = ++salt_,
         .slots = static_cast<std::uint8_t>(slots),
         .slot_units = static_cast<std::uint16_t>(slot_us * 1000 / BUSHD_REPLY_UNIT_NS + 1)};
     std::array<std::uint8_t, 8> payload;
     const std::size_t size = bushd_encode_identify(&identify, payload.data());
-    ask(now_us, i, BUSHD_MSG_IDENTIFY, {payload.data(), size}, BUSHD_IDENTITY_SIZE);
-    exchange_->slots = slots;
-    exchange_->line_quiet_us += slots * (slot_us + 10);
-    exchange_->timeout_us += slots * (slot_us + 10);
+    identities_.clear();
+    // Slots are counted in whole units, so each may last one longer.
+    transactions_.ask(now_us, {.mcu = i,
+                               .address = mcu.setup.address,
+                               .type = BUSHD_MSG_IDENTIFY,
+                               .payload = {payload.data(), size},
+                               .reply_payload = BUSHD_IDENTITY_SIZE,
+                               .reply_slots = slots,
+                               .reply_slots_us = slots * (slot_us + kReplyUnitUs)});
     return true;
   }
   return false;
 }
 
-void Master::finish_identify(std::int64_t now_us, std::size_t index,
-                             const std::vector<bushd_identity>& identities) {
+void Master::finish_identify(std::int64_t now_us, McuIndex index) {
+  if (identities_.empty()) return;
   Mcu& mcu = mcus_[index];
-  const bushd_identity& first = identities.front();
-  const auto other = std::find_if(identities.begin(), identities.end(),
+  const bushd_identity& first = identities_.front();
+  const auto other = std::find_if(identities_.begin(), identities_.end(),
                                   [&first](const bushd_identity& i) { return !same_id(first, i); });
-  if (other == identities.end()) {
+  if (other == identities_.end()) {
     handle_identity(now_us, index, first);
     return;
   }
-  mcu.view.detail = "shares its address " + std::to_string(mcu.setup.address) +
+  mcu.view.detail = "shares its address " + std::to_string(mcu.setup.address.value) +
                     " with another: unique ids " + unique_id_text(first) + " and " +
                     unique_id_text(*other) +
                     "; unplug one, or give one another address with 'bushctl address'";
@@ -138,7 +144,7 @@ std::string Master::unfit(const Mcu& mcu, const bushd_identity& identity) const 
            " format: choose the other one for this bus";
   }
   for (unsigned m = identity.motors; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if (mcu.setup.table_of_motor[m] >= 0) {
+    if (mcu.setup.table_of_motor[m]) {
       return "has only " + std::to_string(identity.motors) + " outputs, but output " +
              std::to_string(m) + " is configured";
     }
@@ -156,13 +162,12 @@ std::string Master::unfit(const Mcu& mcu, const bushd_identity& identity) const 
   return {};
 }
 
-std::string Master::no_room(std::size_t index, const McuSetup& setup) const {
+std::string Master::no_room(McuIndex index, const McuSetup& setup) const {
   const McuView& view = mcus_[index].view;
   return view.identified ? lacks_room(setup, view.identity, setup_.tick_ns) : std::string();
 }
 
-void Master::handle_identity(std::int64_t now_us, std::size_t index,
-                             const bushd_identity& identity) {
+void Master::handle_identity(std::int64_t now_us, McuIndex index, const bushd_identity& identity) {
   Mcu& mcu = mcus_[index];
   mcu.view.identity = identity;
   mcu.view.identified = true;
@@ -178,7 +183,7 @@ void Master::handle_identity(std::int64_t now_us, std::size_t index,
   mcu.taken_over = false;
   mcu.script.clear();
   mcu.looks = 0;
-  mcu.poll_now = true;
+  mcu.poll_wanted = true;
   sync_due_us_ = std::min(sync_due_us_, now_us);
 }
 
@@ -237,7 +242,7 @@ void Master::add_table(Mcu& mcu, std::uint8_t slot) {
 
 // If the MCU has other tables than it should, it gets all of them anew: so none that nobody needs
 // any more takes up its memory. Then it is told whose motor each one is.
-void Master::handle_tables(std::size_t index, const bushd_tables& held) {
+void Master::handle_tables(McuIndex index, const bushd_tables& held) {
   Mcu& mcu = mcus_[index];
   if (mcu.script.empty() || mcu.script.front().type != BUSHD_MSG_TABLES) return;
   mcu.script.pop_front();
@@ -255,8 +260,8 @@ void Master::handle_tables(std::size_t index, const bushd_tables& held) {
     for (std::uint8_t slot = 0; slot < mcu.setup.tables.size(); ++slot) add_table(mcu, slot);
   }
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if (mcu.setup.table_of_motor[m] < 0) continue;
-    const bushd_assign assign = {m, static_cast<std::uint8_t>(mcu.setup.table_of_motor[m])};
+    if (!mcu.setup.table_of_motor[m]) continue;
+    const bushd_assign assign = {m, *mcu.setup.table_of_motor[m]};
     add_request(mcu, BUSHD_MSG_ASSIGN,
                 [&](std::uint8_t* p) { return bushd_encode_assign(&assign, p); });
   }
@@ -276,27 +281,26 @@ void Master::handle_tables(std::size_t index, const bushd_tables& held) {
   add_control(mcu, actions);
 }
 
-void Master::handle_acknowledgement(std::int64_t now_us, std::size_t index, std::uint8_t type,
+void Master::handle_acknowledgement(std::int64_t now_us, McuIndex index, std::uint8_t type,
                                     std::uint8_t status) {
   Mcu& mcu = mcus_[index];
   if (!mcu.script.empty() && mcu.script.front().type == type) mcu.script.pop_front();
-  mcu.poll_now = mcu.script.empty();
+  mcu.poll_wanted = mcu.script.empty();
   if (status == BUSHD_OK) return;
   if (mcu.view.phase == McuPhase::kOnline) {
-    events_.push_back(
-        {.kind = Event::Kind::kRefused, .mcu = index, .type = type, .status = status});
+    events_.push_back(RequestRefused{.mcu = index, .type = type, .status = status});
     return;
   }
-  go_offline(
-      index,
-      "refused its configuration: " +
-          (type == BUSHD_MSG_EMISSION ? emission_refusal(mcu.setup.emission, status,
-                                                         mcu.view.identity.slots, setup_.tick_ns)
-                                      : refusal_text(type, status)),
-      now_us + kRetryUs);
+  go_offline(index,
+             "refused its configuration: " +
+                 (type == BUSHD_MSG_EMISSION
+                      ? fieldbus::emission_refusal(mcu.setup.emission, status,
+                                                   mcu.view.identity.slots, setup_.tick_ns)
+                      : refusal_text(type, status)),
+             now_us + kRetryUs);
 }
 
-void Master::follow_connecting(std::int64_t now_us, std::size_t index, bool in_step) {
+void Master::follow_connecting(std::int64_t now_us, McuIndex index, bool in_step) {
   Mcu& mcu = mcus_[index];
   const bushd_report& report = mcu.view.report;
   const bool configured = (report.flags & BUSHD_FLAG_CONFIGURED) != 0;
@@ -321,14 +325,14 @@ void Master::follow_connecting(std::int64_t now_us, std::size_t index, bool in_s
     mcu.view.phase = McuPhase::kOnline;
     mcu.view.detail.clear();
     mcu.epoch = mcu.newest_epoch = report.epoch;
-    events_.push_back({Event::Kind::kOnline, index});
+    events_.push_back(McuOnline{index});
   } else if (configured && (report.flags & BUSHD_FLAG_ENABLED) == 0) {
     // It had a fault with which it must not be enabled, and has it no longer.
     go_offline(index, "has not switched its drivers on", now_us + kRetryUs);
   }
 }
 
-void Master::go_offline(std::size_t index, const std::string& cause, std::int64_t retry_due_us) {
+void Master::go_offline(McuIndex index, const std::string& cause, std::int64_t retry_due_us) {
   Mcu& mcu = mcus_[index];
   const bool was_online = mcu.view.phase == McuPhase::kOnline;
   mcu.view.phase = McuPhase::kOffline;
@@ -336,10 +340,10 @@ void Master::go_offline(std::size_t index, const std::string& cause, std::int64_
   mcu.retry_due_us = retry_due_us;
   mcu.looks = 0;
   mcu.silent = 0;
-  mcu.poll_now = false;
+  mcu.poll_wanted = false;
   mcu.script.clear();
   drop_streams(mcu);
-  if (was_online) events_.push_back({Event::Kind::kOffline, index});
+  if (was_online) events_.push_back(McuOffline{index});
 }
 
 }  // namespace bushd::link

@@ -3,17 +3,19 @@
 
 #include <cstdint>
 
-#include "link/line_budget.h"
+#include "fieldbus/line_times.h"
 
 namespace bushd::link {
+
+using fieldbus::kFirstSlotUs;
+using fieldbus::kMaxTicksPerFrame;
+using fieldbus::kPollPeriodUs;
+using fieldbus::kSlotGuardUs;
+using fieldbus::kSyncPeriodUs;
 
 inline constexpr int kMaxSilent = 10;  // unanswered requests in a row: about half a second
 inline constexpr std::int64_t kRetryUs = 500'000;  // between two looks for a silent MCU
 inline constexpr std::int64_t kRefusedRetryUs =
     2'000'000;  // for an MCU that does not fit: no hurry
-// From a poll's end to the first answer, and from one answer to the next: what an MCU may need to
-// begin (docs/protocol.md, Line) and to let the line go.
-inline constexpr std::int64_t kFirstSlotUs = 1'000;
-inline constexpr std::int64_t kSlotGuardUs = 600;
 
 }  // namespace bushd::link

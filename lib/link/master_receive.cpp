@@ -21,120 +21,49 @@ std::uint16_t grown(std::uint16_t now, std::uint16_t before) {
 
 }  // namespace
 
-void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
-  for (const std::uint8_t byte : bytes) {
-    bushd_frame frame;
-    switch (bushd_receive_byte(&receiver_, byte, &frame)) {
-      case BUSHD_RECEIVE_MORE:
-        break;
-      case BUSHD_RECEIVE_FRAME:
-        handle_frame(now_us, frame);
-        break;
-      case BUSHD_RECEIVE_BAD_CRC:
-      case BUSHD_RECEIVE_BAD_LENGTH:
-        ++bus_health_.crc_errors;
-        break;
-    }
+void Master::overheard(std::int64_t now_us, const bushd_frame& frame) {
+  bushd_sync sync;
+  if (frame.type == BUSHD_MSG_SYNC &&
+      bushd_decode_sync(frame.payload, frame.payload_size, &sync) == BUSHD_OK &&
+      sync.master != setup_.master) {
+    other_master_until_us_ = now_us + kOtherMasterUs;
   }
 }
 
-void Master::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
-  if ((frame.type & BUSHD_TYPE_REPLY) == 0) {
-    // Another master's, or the echo of an own one.
-    bushd_sync sync;
-    if (frame.type == BUSHD_MSG_SYNC &&
-        bushd_decode_sync(frame.payload, frame.payload_size, &sync) == BUSHD_OK &&
-        sync.master != setup_.master) {
-      other_master_until_us_ = now_us + kOtherMasterUs;
-    }
-    return;
-  }
-  // Only answers that are awaited count: an old one, or one to another master, would be taken for
-  // them.
-  if (!exchange_ || frame.tag != exchange_->tag ||
-      frame.type != (exchange_->type | BUSHD_TYPE_REPLY)) {
-    ++bus_health_.stray_frames;
-    return;
-  }
-  const auto awaited =
-      std::find_if(exchange_->awaited.begin(), exchange_->awaited.end(),
-                   [&](const Awaited& a) { return mcus_[a.mcu].setup.address == frame.address; });
-  const bool several = exchange_->slots > 1;  // MCUs may answer
-  if (awaited == exchange_->awaited.end() || (awaited->answered && !several)) {
-    ++bus_health_.stray_frames;
-    return;
-  }
-  // What an answer leads to may end the exchange: nothing of it is used afterwards.
-  const Awaited from = *awaited;
-  answered(now_us, *awaited);
-  if (!handle_answer(now_us, from, frame)) ++bus_health_.crc_errors;
-  // Answers come in the order of their slots: after the last one nobody is waited for.
-  if (!several && exchange_ && from.mcu == exchange_->awaited.back().mcu) finish_exchange(now_us);
-}
-
-// Who has not answered is silent.
-void Master::finish_exchange(std::int64_t now_us) {
-  const Exchange exchange = *std::exchange(exchange_, std::nullopt);
-  for (const Awaited& awaited : exchange.awaited) {
-    if (!awaited.answered) handle_silence(now_us, awaited.mcu, exchange.type);
-  }
-}
-
-void Master::answered(std::int64_t now_us, Awaited& awaited) {
-  awaited.answered = true;
-  mcus_[awaited.mcu].silent = 0;
-  // In which of several slots it came is not known here.
-  if (exchange_->slots > 1) return;
-  const std::int64_t latency_us = std::max<std::int64_t>(now_us - awaited.expected_us, 0);
-  bus_health_.latency.add(latency_us);
-  patience_us_ = std::clamp(std::max(4 * latency_us, patience_us_ - patience_us_ / 8),
-                            kMinPatienceUs, kMaxPatienceUs);
-}
-
-// Returns false if the payload makes no sense.
-bool Master::handle_answer(std::int64_t now_us, const Awaited& from, const bushd_frame& frame) {
-  const std::size_t mcu = from.mcu;
-  const std::uint8_t* const payload = frame.payload;
-  const std::size_t size = frame.payload_size;
-  switch (exchange_->type) {
+bool Master::answered(std::int64_t now_us, const Transactions::Answer& answer) {
+  mcus_[answer.mcu].silent = 0;
+  const auto decoded = [&answer](auto decode, auto* message) {
+    return decode(answer.payload.data(), answer.payload.size(), message) == BUSHD_OK;
+  };
+  switch (answer.type) {
     case BUSHD_MSG_POLL: {
       bushd_report report;
-      if (bushd_decode_report(payload, size, &report) != BUSHD_OK) return false;
-      handle_report(now_us, mcu, report, from.expected_us - exchange_->sent_us);
+      if (!decoded(bushd_decode_report, &report)) return false;
+      handle_report(now_us, answer, report);
       return true;
     }
     case BUSHD_MSG_IDENTIFY: {
       bushd_identity identity;
-      if (bushd_decode_identity(payload, size, &identity) != BUSHD_OK) return false;
-      exchange_->identities.push_back(identity);
-      if (exchange_->slots == 1) finish_identify(now_us, mcu, exchange_->identities);
+      if (!decoded(bushd_decode_identity, &identity)) return false;
+      identities_.push_back(identity);
       return true;
     }
     case BUSHD_MSG_TABLES: {
       bushd_tables held;
-      if (bushd_decode_tables(payload, size, &held) != BUSHD_OK) return false;
-      handle_tables(mcu, held);
+      if (!decoded(bushd_decode_tables, &held)) return false;
+      handle_tables(answer.mcu, held);
       return true;
     }
     default: {
       bushd_acknowledgement acknowledgement;
-      if (bushd_decode_acknowledgement(payload, size, &acknowledgement) != BUSHD_OK) return false;
-      handle_acknowledgement(now_us, mcu, exchange_->type, acknowledgement.status);
+      if (!decoded(bushd_decode_acknowledgement, &acknowledgement)) return false;
+      handle_acknowledgement(now_us, answer.mcu, answer.type, acknowledgement.status);
       return true;
     }
   }
 }
 
-void Master::handle_timeout(std::int64_t now_us) {
-  if (exchange_->identities.empty()) {
-    finish_exchange(now_us);
-    return;
-  }
-  const Exchange exchange = *std::exchange(exchange_, std::nullopt);
-  finish_identify(now_us, exchange.awaited.front().mcu, exchange.identities);
-}
-
-void Master::handle_silence(std::int64_t now_us, std::size_t index, std::uint8_t type) {
+bool Master::unanswered(std::int64_t now_us, McuIndex index, std::uint8_t type) {
   Mcu& mcu = mcus_[index];
   if (mcu.view.phase == McuPhase::kOffline) {
     // Each look at a silent MCU costs the line a time-out: the more are silent, the rarer.
@@ -142,16 +71,20 @@ void Master::handle_silence(std::int64_t now_us, std::size_t index, std::uint8_t
       return m.view.phase == McuPhase::kOffline;
     });
     mcu.retry_due_us = now_us + kRetryUs * silent;
-    return;
+    return false;
   }
   ++mcu.health.timeouts;
-  patience_us_ = std::min(2 * patience_us_, kMaxPatienceUs);
   if (++mcu.silent >= kMaxSilent) {
     go_offline(index, "does not answer", now_us + kRetryUs);
   } else if (type == BUSHD_MSG_POLL) {
     // Sooner than usual; but a dead MCU must not starve the others.
     mcu.poll_due_us = now_us + kPollAgainUs;
   }
+  return true;
+}
+
+void Master::ended(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
+  if (type == BUSHD_MSG_IDENTIFY) finish_identify(now_us, mcu);
 }
 
 void Master::note_health(Mcu& mcu, const bushd_report& report) {
@@ -168,9 +101,9 @@ void Master::note_health(Mcu& mcu, const bushd_report& report) {
   }
 }
 
-// `line_us`: since the poll's end, of which the report tells; adapter latency comes on top.
-void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_report& report,
-                           std::int64_t line_us) {
+void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answer,
+                           const bushd_report& report) {
+  const McuIndex index = answer.mcu;
   Mcu& mcu = mcus_[index];
   McuView& view = mcu.view;
   if (view.phase == McuPhase::kOffline) return;
@@ -180,9 +113,8 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
     return;
   }
   // An answer that lay unread while this program slept does not tell what time it is.
-  const bool in_time = now_us <= exchange_->timeout_us;
-  bool in_step =
-      in_time && (report.flags & BUSHD_FLAG_SYNCED) != 0 && (report.flags & BUSHD_FLAG_MARK) != 0;
+  bool in_step = answer.in_time && (report.flags & BUSHD_FLAG_SYNCED) != 0 &&
+                 (report.flags & BUSHD_FLAG_MARK) != 0;
   view.report = report;
   view.reported = true;
   mcu.asked_since_mark = true;
@@ -204,7 +136,8 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
       if (in_step) clock_.reset();
       view.tick = clock_.unwrap(report.tick, now_us);
     }
-    if (in_step) clock_.sample(view.tick, report.tick_ns + line_us * 1000, now_us);
+    // It tells of the poll's end.
+    if (in_step) clock_.sample(view.tick, report.tick_ns + answer.line_us * 1000, now_us);
   }
   for (unsigned m = 0; m < report.motor_count; ++m) {
     // Never before the present tick, whatever the line says: ticks executed cannot be asked for
@@ -223,7 +156,7 @@ void Master::handle_report(std::int64_t now_us, std::size_t index, const bushd_r
   }
   follow_replacements(index);
   follow_streams(index);
-  events_.push_back({Event::Kind::kReport, index});
+  events_.push_back(McuReported{index});
 }
 
 }  // namespace bushd::link

@@ -25,7 +25,7 @@ std::uint16_t bit(unsigned motor) {
 
 }  // namespace
 
-void Master::begin(std::size_t mcu, std::uint8_t motor, Tick start) {
+void Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   drop(mcu, motor);
   Stream& stream = mcus_[mcu].stream[motor];
   stream = {};
@@ -33,19 +33,19 @@ void Master::begin(std::size_t mcu, std::uint8_t motor, Tick start) {
   stream.start = stream.next = stream.sent = start;
 }
 
-void Master::begin_table_run(std::size_t mcu, std::uint8_t motor, Tick start, std::int32_t steps) {
+void Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps) {
   begin(mcu, motor, start);
   mcus_[mcu].stream[motor].run_steps = steps;
 }
 
-void Master::follow_table_run(std::size_t mcu, std::uint8_t motor, Tick start, std::int32_t steps) {
+void Master::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps) {
   begin_table_run(mcu, motor, start, steps);
   Stream& stream = mcus_[mcu].stream[motor];
   stream.next = stream.sent = source_.end_tick(mcu, motor);
   stream.finished = true;
 }
 
-void Master::drop(std::size_t mcu, std::uint8_t motor) {
+void Master::drop(McuIndex mcu, std::uint8_t motor) {
   Mcu& m = mcus_[mcu];
   Stream& stream = m.stream[motor];
   stream.active = false;
@@ -55,7 +55,7 @@ void Master::drop(std::size_t mcu, std::uint8_t motor) {
   m.replacing &= static_cast<std::uint16_t>(~bit(motor));
 }
 
-void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
+void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
   Mcu& m = mcus_[mcu];
   std::uint16_t sent = 0;  // motors of which ticks from `first` on have been sent already
   Tick earliest = first;
@@ -84,18 +84,18 @@ void Master::replace(std::size_t mcu, std::uint16_t motors, Tick first) {
 // sent: so nothing is, in the step in which one fails.
 bool Master::fail_late_replacements(std::int64_t now_us) {
   bool failed = false;
-  for (std::size_t i = 0; i < mcus_.size(); ++i) {
+  for (const McuIndex i : mcus_.indices()) {
     Mcu& mcu = mcus_[i];
     if (mcu.replacing == 0 || !too_late(mcu.replace_at, tick_at(now_us))) continue;
     const std::uint16_t motors = std::exchange(mcu.replacing, std::uint16_t{0});
-    events_.push_back({.kind = Event::Kind::kReplaceFailed, .mcu = i, .motors = motors});
+    events_.push_back(ReplacementFailed{.mcu = i, .motors = motors});
     failed = true;
   }
   return failed;
 }
 
 bool Master::send_due_replacement(std::int64_t now_us) {
-  for (std::size_t i = 0; i < mcus_.size(); ++i) {
+  for (const McuIndex i : mcus_.indices()) {
     Mcu& mcu = mcus_[i];
     if (mcu.replacing == 0 || mcu.replaced != 0) continue;
     const std::uint16_t mask = std::exchange(mcu.replacing, std::uint16_t{0});
@@ -116,7 +116,7 @@ bool Master::send_due_replacement(std::int64_t now_us) {
     }
     send_ticks(now_us, i, mask, mcu.replace_at, count, BUSHD_TICKS_REPLACE);
     mcu.replaced = mask;
-    mcu.poll_now = true;
+    mcu.poll_wanted = true;
     return true;
   }
   return false;
@@ -129,8 +129,8 @@ bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_re
   if (!clock_.valid()) return false;
   const Tick now = tick_at(now_us);
   // The neediest first; one whose queue is full must not keep the others waiting.
-  std::vector<std::pair<Tick, std::size_t>> needy;
-  for (std::size_t i = 0; i < mcus_.size(); ++i) {
+  std::vector<std::pair<Tick, McuIndex>> needy;
+  for (const McuIndex i : mcus_.indices()) {
     const Mcu& mcu = mcus_[i];
     if (mcu.view.phase != McuPhase::kOnline || (only_replaced && mcu.replaced == 0)) continue;
     Tick next = INT64_MAX;
@@ -147,7 +147,7 @@ bool Master::send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_re
 
 // One frame for the motors of an MCU whose next tick is the oldest. Motors that start, start later
 // or are ahead have frames of their own until the others have caught up.
-bool Master::send_ticks_of(std::int64_t now_us, std::size_t index, Tick now, Tick lead) {
+bool Master::send_ticks_of(std::int64_t now_us, McuIndex index, Tick now, Tick lead) {
   Mcu& mcu = mcus_[index];
   Tick first = INT64_MAX;
   for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
@@ -192,8 +192,7 @@ bool Master::send_ticks_of(std::int64_t now_us, std::size_t index, Tick now, Tic
   return true;
 }
 
-bool Master::send_table_runs(std::int64_t now_us, std::size_t index, std::uint16_t mask,
-                             Tick first) {
+bool Master::send_table_runs(std::int64_t now_us, McuIndex index, std::uint16_t mask, Tick first) {
   Mcu& mcu = mcus_[index];
   std::array<bushd_table_run_entry, BUSHD_MOTORS_PER_MCU> entries;
   std::uint8_t count = 0;
@@ -203,7 +202,7 @@ bool Master::send_table_runs(std::int64_t now_us, std::size_t index, std::uint16
     const std::int32_t steps = *stream.run_steps;
     entries[count++] = {
         .motor = m,
-        .slot = static_cast<std::uint8_t>(mcu.setup.table_of_motor[m]),
+        .slot = mcu.setup.table_of_motor[m].value_or(0),
         .direction = static_cast<std::int8_t>(steps < 0 ? -1 : 1),
         .steps = static_cast<std::uint32_t>(std::abs(static_cast<std::int64_t>(steps)))};
     note_sent(index, m, first, source_.end_tick(index, m));
@@ -211,13 +210,13 @@ bool Master::send_table_runs(std::int64_t now_us, std::size_t index, std::uint16
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
   const std::size_t size = bushd_encode_table_run(mcu.epoch, static_cast<std::uint32_t>(first),
                                                   entries.data(), count, payload.data());
-  send(now_us, mcu.setup.address, BUSHD_MSG_TABLE_RUN, {payload.data(), size});
+  writer_.send(now_us, mcu.setup.address, BUSHD_MSG_TABLE_RUN, {payload.data(), size});
   return true;
 }
 
 // As many of these ticks as all motors run by their tables, if that is worth it.
-bool Master::send_table_ticks(std::int64_t now_us, std::size_t index, std::uint16_t mask,
-                              Tick first, Tick max_ticks, unsigned flags) {
+bool Master::send_table_ticks(std::int64_t now_us, McuIndex index, std::uint16_t mask, Tick first,
+                              Tick max_ticks, unsigned flags) {
   const Mcu& mcu = mcus_[index];
   if (!setup_.table_ticks) return false;
   if ((mcu.view.identity.capabilities & BUSHD_CAN_TABLE_TICKS) == 0) return false;
@@ -225,10 +224,10 @@ bool Master::send_table_ticks(std::int64_t now_us, std::size_t index, std::uint1
   std::array<bushd_run, BUSHD_MOTORS_PER_MCU> run;
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((mask >> m & 1) == 0) continue;
-    const auto stretch = source_.run_at(index, m, first, ticks);
-    if (!stretch) return false;
-    run[m] = stretch->run;
-    ticks = std::min(ticks, stretch->ticks);
+    const auto segment = source_.run_at(index, m, first, ticks);
+    if (!segment) return false;
+    run[m] = segment->run;
+    ticks = std::min(ticks, segment->ticks);
   }
   std::array<bushd_table_ticks_entry, BUSHD_MOTORS_PER_MCU> entries;
   std::uint8_t motors = 0;
@@ -250,11 +249,11 @@ bool Master::send_table_ticks(std::int64_t now_us, std::size_t index, std::uint1
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((mask >> m & 1) != 0) note_sent(index, m, first, first + ticks);
   }
-  send(now_us, mcu.setup.address, BUSHD_MSG_TABLE_TICKS, {payload.data(), size});
+  writer_.send(now_us, mcu.setup.address, BUSHD_MSG_TABLE_TICKS, {payload.data(), size});
   return true;
 }
 
-void Master::send_ticks(std::int64_t now_us, std::size_t index, std::uint16_t mask, Tick first,
+void Master::send_ticks(std::int64_t now_us, McuIndex index, std::uint16_t mask, Tick first,
                         unsigned count, unsigned flags) {
   Mcu& mcu = mcus_[index];
   const auto motors = static_cast<std::size_t>(std::popcount(mask));
@@ -281,10 +280,10 @@ void Master::send_ticks(std::int64_t now_us, std::size_t index, std::uint16_t ma
       payload[size++] = static_cast<std::uint8_t>(displacement[i]);
     }
   }
-  send(now_us, mcu.setup.address, BUSHD_MSG_TICKS, {payload.data(), size});
+  writer_.send(now_us, mcu.setup.address, BUSHD_MSG_TICKS, {payload.data(), size});
 }
 
-void Master::note_sent(std::size_t index, std::uint8_t motor, Tick first, Tick until) {
+void Master::note_sent(McuIndex index, std::uint8_t motor, Tick first, Tick until) {
   Mcu& mcu = mcus_[index];
   Stream& stream = mcu.stream[motor];
   if (first < stream.sent) ++mcu.health.repeats;
@@ -298,7 +297,7 @@ void Master::note_sent(std::size_t index, std::uint8_t motor, Tick first, Tick u
 }
 
 // A replacement was taken if the MCU is in the epoch that it opened.
-void Master::follow_replacements(std::size_t index) {
+void Master::follow_replacements(McuIndex index) {
   Mcu& mcu = mcus_[index];
   const bool taken = mcu.view.report.epoch == mcu.epoch;
   std::uint16_t failed = taken ? std::uint16_t{0} : mcu.replaced;
@@ -322,13 +321,13 @@ void Master::follow_replacements(std::size_t index) {
     failed |= std::exchange(mcu.replacing, std::uint16_t{0});
   }
   if (failed != 0) {
-    events_.push_back({.kind = Event::Kind::kReplaceFailed, .mcu = index, .motors = failed});
+    events_.push_back(ReplacementFailed{.mcu = index, .motors = failed});
   }
 }
 
 // All frames sent before the poll were handled before its answer was made: what is not known is
 // lost.
-void Master::follow_streams(std::size_t index) {
+void Master::follow_streams(McuIndex index) {
   Mcu& mcu = mcus_[index];
   const bushd_report& report = mcu.view.report;
   for (std::uint8_t m = 0; m < report.motor_count; ++m) {
@@ -347,7 +346,7 @@ void Master::follow_streams(std::size_t index) {
     if (begun ? known >= needed : moving || known <= stream.start) continue;
     if (!moving && known > stream.start) {
       stream.active = false;
-      events_.push_back({.kind = Event::Kind::kLateStart, .mcu = index, .motor = m});
+      events_.push_back(StartMissed{.mcu = index, .motor = m});
       continue;
     }
     go_back(mcu, m);

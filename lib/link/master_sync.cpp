@@ -9,6 +9,7 @@
 #include <cstdlib>
 
 #include "link/master.h"
+#include "link/master_limits.h"
 
 namespace bushd::link {
 namespace {
@@ -92,12 +93,12 @@ bool Master::send_due_sync(std::int64_t now_us) {
   disagreed_ = doubtful;
   std::array<std::uint8_t, 24> payload;
   const std::size_t size = bushd_encode_sync(&sync, payload.data());
-  send(now_us, BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, {payload.data(), size});
+  writer_.send(now_us, kBroadcast, BUSHD_MSG_SYNC, {payload.data(), size});
   mark_ = sync.mark;
   for (Mcu& mcu : mcus_) {
     mcu.asked_since_mark = false;
     // MCUs that wait are asked at once, so that the next mark can follow this one.
-    if (survey.waiting && mcu.view.phase == McuPhase::kConnecting) mcu.poll_now = true;
+    if (survey.waiting && mcu.view.phase == McuPhase::kConnecting) mcu.poll_wanted = true;
   }
   return true;
 }

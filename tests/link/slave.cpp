@@ -14,13 +14,12 @@ FakeBus::FakeBus(int count, int motors, bushd_format format, std::uint32_t tick_
   setup = {.baud = kBaud, .tick_ns = tick_ns, .format = format, .mcus = {}};
   for (int i = 0; i < count; ++i) {
     link::McuSetup mcu;
-    mcu.address = static_cast<std::uint8_t>(i + 1);
+    mcu.address = {static_cast<std::uint8_t>(i + 1)};
     mcu.tables = {{&table, 7}};
-    mcu.table_of_motor.fill(-1);
-    std::fill_n(mcu.table_of_motor.begin(), motors, 0);
+    std::fill_n(mcu.table_of_motor.begin(), motors, std::uint8_t{0});
     setup.mcus.push_back(mcu);
     Slave slave;
-    slave.address = mcu.address;
+    slave.address = mcu.address.value;
     slave.identity.motors = static_cast<std::uint8_t>(motors);
     slave.identity.unique_id[0] = static_cast<std::uint8_t>(100 + i);
     slave.zero_us = -1'000'000 - 12'345 * i;
@@ -40,18 +39,7 @@ void FakeBus::connect() {
       if (!online(i)) return false;
     }
     return true;
-  })) << master->view(0).detail;
-}
-
-int FakeBus::count(link::Event::Kind kind) const {
-  return static_cast<int>(
-      std::count_if(events.begin(), events.end(), [&](const auto& e) { return e.kind == kind; }));
-}
-
-std::optional<link::Event> FakeBus::last(link::Event::Kind kind) const {
-  const auto found =
-      std::find_if(events.rbegin(), events.rend(), [&](const auto& e) { return e.kind == kind; });
-  return found == events.rend() ? std::nullopt : std::optional(*found);
+  })) << master->view(McuIndex{0}).detail;
 }
 
 std::vector<Heard> FakeBus::heard_of(std::uint8_t type) const {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -11,11 +12,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "link/master.h"
 
 namespace bushd::test {
+
+using link::McuIndex;
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -83,22 +87,22 @@ class FakeSource : public link::TickSource {
   std::function<std::uint16_t(std::uint8_t motor, link::Tick tick)> delay =
       [](std::uint8_t, link::Tick tick) { return static_cast<std::uint16_t>(100 + tick % 100); };
 
-  std::uint16_t render(std::size_t, std::uint8_t motor, link::Tick first, unsigned count,
+  std::uint16_t render(McuIndex, std::uint8_t motor, link::Tick first, unsigned count,
                        std::int16_t* out, std::size_t stride) override {
     for (unsigned i = 0; i < count; ++i) out[i * stride] = displacement(motor, first + i);
     return delay(motor, first + count);
   }
 
   // None: what the displacements are follows no table.
-  std::function<std::optional<Stretch>(std::uint8_t motor, link::Tick first, unsigned max_ticks)>
-      stretch = [](std::uint8_t, link::Tick, unsigned) { return std::nullopt; };
+  std::function<std::optional<RunSegment>(std::uint8_t motor, link::Tick first, unsigned max_ticks)>
+      segment = [](std::uint8_t, link::Tick, unsigned) { return std::nullopt; };
   std::function<link::Tick(std::uint8_t motor)> end = [](std::uint8_t) { return INT64_MAX; };
 
-  std::optional<Stretch> run_at(std::size_t, std::uint8_t motor, link::Tick first,
-                                unsigned max_ticks) override {
-    return stretch(motor, first, max_ticks);
+  std::optional<RunSegment> run_at(McuIndex, std::uint8_t motor, link::Tick first,
+                                   unsigned max_ticks) override {
+    return segment(motor, first, max_ticks);
   }
-  link::Tick end_tick(std::size_t, std::uint8_t motor) override { return end(motor); }
+  link::Tick end_tick(McuIndex, std::uint8_t motor) override { return end(motor); }
 };
 
 class FakeBus {
@@ -114,10 +118,21 @@ class FakeBus {
   bool run_until(const std::function<bool()>& done, std::int64_t limit_us = 20'000'000);
   void connect();
   bool online(std::size_t mcu = 0) const {
-    return master->view(mcu).phase == link::McuPhase::kOnline;
+    return master->view(McuIndex{mcu}).phase == link::McuPhase::kOnline;
   }
-  int count(link::Event::Kind kind) const;
-  std::optional<link::Event> last(link::Event::Kind kind) const;
+  template <class Event>
+  int count() const {
+    return static_cast<int>(std::count_if(events.begin(), events.end(), [](const auto& event) {
+      return std::holds_alternative<Event>(event);
+    }));
+  }
+  template <class Event>
+  std::optional<Event> last() const {
+    const auto found = std::find_if(events.rbegin(), events.rend(), [](const auto& event) {
+      return std::holds_alternative<Event>(event);
+    });
+    return found == events.rend() ? std::nullopt : std::optional(std::get<Event>(*found));
+  }
   std::uint32_t tick(std::size_t slave) const { return tick_of(slaves[slave]); }
   std::uint32_t tick_of(const Slave& slave) const;
   std::vector<Heard> heard_of(std::uint8_t type) const;

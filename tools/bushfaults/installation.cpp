@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "link/line_budget.h"
+#include "fieldbus/line_budget.h"
 #include "sim/random.h"
 #include "tables/table_file.h"
 
@@ -66,8 +66,8 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
   }
   bushd::config::Bus bus = make_bus(ways, seed);
   for (const std::uint32_t baud : kBauds) {
-    if (bushd::link::line_load(baud, bus.tick_ns(), bus.format, motors_of_mcu) >
-        bushd::link::kMaxLineLoad) {
+    if (bushd::fieldbus::line_load(baud, bus.tick_ns(), bus.format, motors_of_mcu) >
+        bushd::fieldbus::kMaxLineLoad) {
       continue;
     }
     bus.baud = baud;
