@@ -147,6 +147,7 @@ void Host::unplug(TimeNs now_ns, TimeNs until_ns) {
 
 void Host::pause(TimeNs now_ns, TimeNs until_ns) {
   paused_until_ns_ = std::max({paused_until_ns_, now_ns, until_ns});
+  witness_.positions().pause(now_ns, until_ns);
 }
 
 void Host::kill(TimeNs now_ns, TimeNs until_ns) {

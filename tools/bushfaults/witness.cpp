@@ -54,13 +54,12 @@ std::string text_of(const reply_t& reply) {
 
 Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus,
                  const bushd::sim::Plant& plant, Recent& recent)
-    : config_(config), bus_(bus), plant_(plant), recent_(recent) {
+    : config_(config), plant_(plant), recent_(recent), positions_(config, bus, plant) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
-    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, 0, {}, {}, {}, {}});
+    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, {}, {}, {}});
   }
   states_.resize(config.mcus.size());
-  boot_seen_.resize(config.mcus.size());
 }
 
 void Witness::violated(TimeNs now_ns, const std::string& what) {
@@ -82,15 +81,7 @@ void Witness::daemon_started(TimeNs) {
   repeating_.reset();
   for (Motor& motor : motors_) motor.move.reset();
   std::fill(states_.begin(), states_.end(), std::nullopt);
-  std::fill(boot_seen_.begin(), boot_seen_.end(), std::nullopt);
-}
-
-void Witness::mcu_reset(std::size_t mcu) {
-  for (Motor& motor : motors_) {
-    if (motor.mcu != mcu) continue;
-    motor.offset.reset();
-    motor.perhaps_set.clear();
-  }
+  positions_.daemon_started();
 }
 
 void Witness::pressed(TimeNs now_ns, std::size_t motor) {
@@ -154,12 +145,14 @@ void Witness::accepted(const Key& key, Asked& asked) {
   for (std::size_t i = 0; i < command.motors.size(); ++i) {
     Motor& motor = *find(command.motors[i]);
     const std::int64_t stands = plant_steps(motor);
-    if (command.kind == command_t::SET_POSITION) motor.perhaps_set.push_back(command.steps[i]);
+    if (command.kind == command_t::SET_POSITION) {
+      positions_.may_be_set(index_of(motor), command.steps[i]);
+    }
     if (command.kind == command_t::MOVE_RELATIVE) {
       const std::optional<std::int64_t> base = motor.move ? motor.target : stands;
       asked.target.push_back(base ? std::optional(*base + command.steps[i]) : std::nullopt);
-    } else if (command.kind == command_t::MOVE_ABSOLUTE && motor.offset) {
-      asked.target.emplace_back(*motor.offset + command.steps[i]);
+    } else if (command.kind == command_t::MOVE_ABSOLUTE && offset(motor)) {
+      asked.target.emplace_back(*offset(motor) + command.steps[i]);
     } else {
       asked.target.emplace_back();
     }
@@ -187,9 +180,7 @@ void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result)
   const command_t& command = asked.command;
   if (command.kind == command_t::SET_POSITION && result.result == "done") {
     for (std::size_t i = 0; i < command.motors.size(); ++i) {
-      Motor& motor = *find(command.motors[i]);
-      motor.offset = plant_steps(motor) - command.steps[i];
-      motor.perhaps_set.clear();
+      positions_.was_set(index_of(*find(command.motors[i])), command.steps[i]);
     }
   }
   if (!is_move(command)) return;
@@ -251,9 +242,9 @@ void Witness::check_end(TimeNs now_ns, const Motor& motor, const End& end,
   } else if (end.word == "reached" && target && *target != stands) {
     violated(now_ns, fmt::format("{} is said to have reached its target, and stands {} steps off",
                                  motor.name, stands - *target));
-  } else if (planned && motor.offset && stands - *motor.offset != end.position_steps) {
+  } else if (planned && offset(motor) && stands - *offset(motor) != end.position_steps) {
     violated(now_ns, fmt::format("{} {} at {}, but stands at {}", motor.name, end.word,
-                                 end.position_steps, stands - *motor.offset));
+                                 end.position_steps, stands - *offset(motor)));
   }
 }
 
@@ -265,35 +256,7 @@ void Witness::state(TimeNs now_ns, const state_t& state) {
     recent_.note(now_ns, fmt::format("{} {} {}", state.mcu, state.mcu_state, state.detail));
   }
   states_[mcu] = state;
-  const bool online =
-      state.mcu_state == "READY" || state.mcu_state == "RUN" || state.mcu_state == "FAULT";
-  if (!online || state.boot_number != bus_.mcu(mcu).boot_number()) return;
-  for (const motor_state_t& claim : state.motors) {
-    if (!claim.moving && claim.trust == "known") check_motor(now_ns, mcu, claim);
-  }
-  boot_seen_[mcu] = state.boot_number;
-}
-
-void Witness::check_motor(TimeNs now_ns, std::size_t mcu, const motor_state_t& claim) {
-  Motor& motor = *find(claim.name);
-  const std::int64_t stands = plant_steps(motor);
-  if (!motor.offset) {
-    // A daemon that has met this boot only cannot know that there was one before.
-    const bool first = !boot_seen_[mcu] || *boot_seen_[mcu] == bus_.mcu(mcu).boot_number();
-    if (!first) {
-      return violated(now_ns, motor.name + " is said to be known although its MCU was reset");
-    }
-    motor.offset = stands - claim.position_steps;
-    return;
-  }
-  if (stands - *motor.offset == claim.position_steps) return;
-  const auto& perhaps = motor.perhaps_set;
-  if (std::find(perhaps.begin(), perhaps.end(), claim.position_steps) != perhaps.end()) {
-    motor.offset = stands - claim.position_steps;
-    return;
-  }
-  violated(now_ns, fmt::format("{} is said to be at rest at {}, but stands at {}", motor.name,
-                               claim.position_steps, stands - *motor.offset));
+  if (const auto wrong = positions_.check(now_ns, mcu, state)) violated(now_ns, *wrong);
 }
 
 void Witness::check_deadlines(TimeNs now_ns) {
@@ -336,9 +299,9 @@ std::uint64_t Witness::steps_unaccounted() const {
     if (!state) continue;
     for (const motor_state_t& claim : state->motors) {
       const Motor& motor = *find(claim.name);
-      if (!motor.offset || claim.trust != "known" || claim.moving) continue;
+      if (!offset(motor) || claim.trust != "known" || claim.moving) continue;
       steps += static_cast<std::uint64_t>(
-          std::abs(plant_steps(motor) - *motor.offset - claim.position_steps));
+          std::abs(plant_steps(motor) - *offset(motor) - claim.position_steps));
     }
   }
   return steps;

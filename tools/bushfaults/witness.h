@@ -14,6 +14,7 @@
 #include "bushd/reply_t.hpp"
 #include "bushd/state_t.hpp"
 #include "config/config.h"
+#include "positions.h"
 #include "recent.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
@@ -37,7 +38,6 @@ class Witness {
   const std::optional<Violation>& violation() const { return violation_; }  // the first
 
   void daemon_started(TimeNs now_ns);  // what clients had asked of the one before is void
-  void mcu_reset(std::size_t mcu);
   // Its limit switch is, or was until now, active.
   void pressed(TimeNs now_ns, std::size_t motor);
   // Before the daemon gets it; after that come the replies that it makes at once.
@@ -55,6 +55,8 @@ class Witness {
   std::string not_ready() const;  // which MCUs, and why
   bool commands_open() const;
 
+  Positions& positions() { return positions_; }
+  const Positions& positions() const { return positions_; }
   const std::map<std::string, std::uint64_t>& moves_by_result() const { return moves_by_result_; }
   std::uint64_t steps_commanded() const { return steps_commanded_; }
   // Between the last states and the motors, where the daemon claims to know.
@@ -74,10 +76,6 @@ class Witness {
     std::string name;
     std::size_t mcu;
     std::size_t output;
-    // Plant's count minus daemon's; nothing once a reset has made the MCU forget its count.
-    std::optional<std::int64_t> offset = 0;
-    // Positions that somebody asked to set and that may have been set, although nobody was told.
-    std::vector<std::int64_t> perhaps_set;
     std::optional<TimeNs> pressed_ns;  // when its limit switch was active last
     std::optional<Key> move;           // accepted, and this motor's part of it not yet ended
     // Where it leads, as the plant counts; nothing after a stop.
@@ -107,25 +105,30 @@ class Witness {
   std::int64_t plant_steps(const Motor& motor) const {
     return plant_.position_steps(motor.mcu, motor.output);
   }
+  std::size_t index_of(const Motor& motor) const {
+    return static_cast<std::size_t>(&motor - motors_.data());
+  }
+  // Plant's count minus daemon's.
+  std::optional<std::int64_t> offset(const Motor& motor) const {
+    return positions_.offset(index_of(motor));
+  }
   void accepted(const Key& key, Asked& asked);
   void finished(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
   void check_start(TimeNs now_ns, const Asked& asked);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void check_end(TimeNs now_ns, const Motor& motor, const End& end,
                  std::optional<std::int64_t> target);
-  void check_motor(TimeNs now_ns, std::size_t mcu, const bushd::motor_state_t& claim);
 
   const bushd::config::Config& config_;
-  const bushd::sim::Bus& bus_;
   const bushd::sim::Plant& plant_;
   Recent& recent_;
+  Positions positions_;
   std::optional<Violation> violation_;
   std::vector<Motor> motors_;
   std::map<std::string, std::size_t> motor_by_name_;
   std::map<Key, Asked> asked_;
   std::optional<Key> repeating_;  // the command being given was given before
   std::vector<std::optional<bushd::state_t>> states_;
-  std::vector<std::optional<int>> boot_seen_;  // by MCU: the boot that this daemon has dealt with
   std::map<std::string, std::uint64_t> moves_by_result_;
   std::uint64_t steps_commanded_ = 0;
 };

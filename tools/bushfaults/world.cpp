@@ -45,7 +45,7 @@ World::World(const Options& options, bushd::config::Config config)
       pressed_until_ns_(config_.motors.size(), 0) {
   add_mcus();
   add_motors();
-  overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_);
+  overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
   for (std::size_t i = 0; i < kFaultKinds; ++i) {
     chance_.emplace_back(options.seed, kFaultStream + static_cast<std::uint32_t>(i));
   }
@@ -166,7 +166,7 @@ void World::reset_mcu() {
   const TimeNs down_ns = random.magnitude(kMs, 2 * kSecond);
   bus_.reboot(mcu, down_ns);
   plant_.cut(mcu);
-  witness_.mcu_reset(mcu);
+  witness_.positions().mcu_reset(mcu);
   overheard_->mcu_reset(mcu);
   mcus_up_ns_ = std::max(mcus_up_ns_, now_ns_ + down_ns);
   note_fault(FaultKind::kReset, fmt::format("{} for {} ms", config_.mcus[mcu].id, down_ns / kMs));
