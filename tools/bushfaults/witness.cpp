@@ -10,7 +10,6 @@
 namespace bushfaults {
 namespace {
 
-using bushd::command_t;
 using bushd::motor_state_t;
 using bushd::reply_t;
 using bushd::state_t;
@@ -24,24 +23,10 @@ constexpr bushd::sim::TimeNs kBarredNs = kResultDueNs;
 // Commands that clients repeat are younger.
 constexpr std::int64_t kNumbersKept = 60;
 
-bool is_move(const command_t& command) {
-  return command.kind == command_t::MOVE_RELATIVE || command.kind == command_t::MOVE_ABSOLUTE;
-}
-
 bool same(const reply_t& a, const reply_t& b) {
   return a.utime_us == b.utime_us && a.phase == b.phase && a.result == b.result &&
          a.reason == b.reason && a.motors == b.motors && a.motor_results == b.motor_results &&
          a.position_steps == b.position_steps;
-}
-
-std::string text_of(const command_t& command) {
-  static constexpr std::array<const char*, 9> kWords = {
-      "?",       "move by",      "move to",      "stop",          "enable",
-      "disable", "set position", "clear faults", "emergency stop"};
-  const bool known = command.kind > 0 && command.kind < static_cast<int>(kWords.size());
-  const char* word = kWords[known ? static_cast<std::size_t>(command.kind) : 0];
-  return fmt::format("{} #{}: {} {} {}", command.client_id.substr(0, 16), command.number, word,
-                     fmt::join(command.motors, ","), fmt::join(command.steps, ","));
 }
 
 std::string text_of(const reply_t& reply) {
@@ -88,17 +73,17 @@ void Witness::pressed(TimeNs now_ns, std::size_t motor) {
   motors_[motor].pressed_ns = now_ns;
 }
 
-void Witness::command(TimeNs now_ns, const command_t& command) {
-  recent_.note(now_ns, text_of(command));
-  const Key key{command.client_id, command.number};
+void Witness::request(TimeNs now_ns, const Request& request) {
+  recent_.note(now_ns, text_of(request));
+  const Key key{request.client, request.number};
   const auto [asked, fresh] = asked_.try_emplace(key);
   repeating_.reset();
   if (!fresh) {
     repeating_ = key;
     return;
   }
-  asked->second.command = command;
-  const auto old = asked_.find({command.client_id, command.number - kNumbersKept});
+  asked->second.request = request;
+  const auto old = asked_.find({request.client, request.number - kNumbersKept});
   if (old != asked_.end() && old->second.finished()) asked_.erase(old);
 }
 
@@ -127,40 +112,40 @@ void Witness::reply(TimeNs now_ns, const reply_t& reply) {
     accepted(found->first, asked);
   } else if (reply.phase == reply_t::RESULT) {
     finished(now_ns, asked, reply);
-  } else if (is_move(asked.command)) {
+  } else if (asked.request.is_move()) {
     ++moves_by_result_["refused"];
   }
 }
 
 void Witness::accepted(const Key& key, Asked& asked) {
-  const command_t& command = asked.command;
-  if (command.kind == command_t::STOP || command.kind == command_t::EMERGENCY_STOP) {
+  const Request& request = asked.request;
+  if (request.ask == Ask::kStop || request.ask == Ask::kEmergencyStop) {
     for (Motor& motor : motors_) {
-      const auto& named = command.motors;
+      const auto& named = request.motors;
       const bool stops =
           named.empty() || std::find(named.begin(), named.end(), motor.name) != named.end();
       if (stops) motor.target.reset();
     }
   }
-  for (std::size_t i = 0; i < command.motors.size(); ++i) {
-    Motor& motor = *find(command.motors[i]);
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    Motor& motor = *find(request.motors[i]);
     const std::int64_t stands = plant_steps(motor);
-    if (command.kind == command_t::SET_POSITION) {
-      positions_.may_be_set(index_of(motor), command.steps[i]);
+    if (request.ask == Ask::kSetPosition) {
+      positions_.may_be_set(index_of(motor), request.steps[i]);
     }
-    if (command.kind == command_t::MOVE_RELATIVE) {
+    if (request.ask == Ask::kMoveBy) {
       const std::optional<std::int64_t> base = motor.move ? motor.target : stands;
-      asked.target.push_back(base ? std::optional(*base + command.steps[i]) : std::nullopt);
-    } else if (command.kind == command_t::MOVE_ABSOLUTE && offset(motor)) {
-      asked.target.emplace_back(*offset(motor) + command.steps[i]);
+      asked.target.push_back(base ? std::optional(*base + request.steps[i]) : std::nullopt);
+    } else if (request.ask == Ask::kMoveTo && offset(motor)) {
+      asked.target.emplace_back(*offset(motor) + request.steps[i]);
     } else {
       asked.target.emplace_back();
     }
     asked.from.push_back(motor.move ? std::nullopt : std::optional(stands));
     asked.end.emplace_back();
     asked.first_step_ns.emplace_back();
-    if (is_move(command)) take_over(motor, key, asked.target.back());
-    if (is_move(command) && asked.target.back()) {
+    if (request.is_move()) take_over(motor, key, asked.target.back());
+    if (request.is_move() && asked.target.back()) {
       steps_commanded_ += static_cast<std::uint64_t>(std::abs(*asked.target.back() - stands));
     }
   }
@@ -177,15 +162,15 @@ void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t>
 }
 
 void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result) {
-  const command_t& command = asked.command;
-  if (command.kind == command_t::SET_POSITION && result.result == "done") {
-    for (std::size_t i = 0; i < command.motors.size(); ++i) {
-      positions_.was_set(index_of(*find(command.motors[i])), command.steps[i]);
+  const Request& request = asked.request;
+  if (request.ask == Ask::kSetPosition && result.result == "done") {
+    for (std::size_t i = 0; i < request.motors.size(); ++i) {
+      positions_.was_set(index_of(*find(request.motors[i])), request.steps[i]);
     }
   }
-  if (!is_move(command)) return;
+  if (!request.is_move()) return;
   ++moves_by_result_[result.result];
-  if (result.motors != command.motors) {
+  if (result.motors != request.motors) {
     return violated(now_ns, "a result of other motors:" + text_of(result));
   }
   for (std::size_t i = 0; i < result.motors.size(); ++i) {
@@ -207,7 +192,7 @@ void Witness::check_start(TimeNs now_ns, const Asked& asked) {
   const auto [earliest, latest] = std::minmax_element(first.begin(), first.end());
   if (*latest - *earliest < config_.buses[0].tick_ns() / 2) return;
   violated(now_ns, fmt::format("motors of one move started {} us apart: {}",
-                               (*latest - *earliest) / 1000, text_of(asked.command)));
+                               (*latest - *earliest) / 1000, text_of(asked.request)));
 }
 
 void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
@@ -262,11 +247,11 @@ void Witness::state(TimeNs now_ns, const state_t& state) {
 void Witness::check_deadlines(TimeNs now_ns) {
   for (const auto& [key, asked] : asked_) {
     if (asked.replies.empty() && key.first.size() <= 64 && !key.first.empty()) {
-      violated(now_ns, "no reply to " + text_of(asked.command));
+      violated(now_ns, "no reply to " + text_of(asked.request));
     } else if (asked.accepted() && !asked.finished() && now_ns - asked.accepted_ns > kResultDueNs) {
       violated(now_ns,
                fmt::format("no result {} s after it was accepted: {}",
-                           (now_ns - asked.accepted_ns) / 1'000'000'000, text_of(asked.command)));
+                           (now_ns - asked.accepted_ns) / 1'000'000'000, text_of(asked.request)));
     }
   }
 }

@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include "bushd/command_t.hpp"
 #include "bushd/reply_t.hpp"
 #include "bushd/state_t.hpp"
 #include "config/config.h"
 #include "positions.h"
 #include "recent.h"
+#include "request.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
 
@@ -41,7 +41,7 @@ class Witness {
   // Its limit switch is, or was until now, active.
   void pressed(TimeNs now_ns, std::size_t motor);
   // Before the daemon gets it; after that come the replies that it makes at once.
-  void command(TimeNs now_ns, const bushd::command_t& command);
+  void request(TimeNs now_ns, const Request& request);
   void reply(TimeNs now_ns, const bushd::reply_t& reply);
   void state(TimeNs now_ns, const bushd::state_t& state);
   // A line of the log of moves: there each motor of a group ends by itself.
@@ -82,7 +82,7 @@ class Witness {
     std::optional<std::int64_t> target;
   };
   struct Asked {
-    bushd::command_t command;
+    Request request;
     std::vector<bushd::reply_t> replies;
     TimeNs accepted_ns = 0;
     // Of moves, by motor: where the plant stood (nothing if it moved) and must stand in the end,
@@ -92,7 +92,7 @@ class Witness {
     std::vector<std::optional<End>> end;
     std::vector<std::optional<TimeNs>> first_step_ns;
     std::size_t index_of(const std::string& motor) const {
-      const auto& all = command.motors;
+      const auto& all = request.motors;
       return static_cast<std::size_t>(std::find(all.begin(), all.end(), motor) - all.begin());
     }
     bool accepted() const { return !replies.empty() && replies[0].phase == reply_accepted(); }

@@ -99,7 +99,7 @@ void World::spell_of_trouble(TimeNs until_ns) {
       *next = now_ns_ + chance_[kind].wait(static_cast<double>(kHour) / options_.fault_rates[kind]);
     }
     if (now_ns_ >= next_command_ns_) {
-      host_.command(now_ns_, clients_.next());
+      host_.request(now_ns_, clients_.next());
       next_command_ns_ = clients_.next_after(now_ns_);
     }
     if (now_ns_ - deadlines_checked_ns_ >= kSecond) {
@@ -114,7 +114,7 @@ void World::calm() {
   run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_,
                       *std::max_element(pressed_until_ns_.begin(), pressed_until_ns_.end())}));
   const TimeNs began_ns = now_ns_;
-  host_.command(now_ns_, clients_.stop_all());
+  host_.request(now_ns_, clients_.stop_all());
   be_well(began_ns);
   if (witness_.violation()) return;
   run_until(now_ns_ + kSecond);
@@ -134,7 +134,7 @@ void World::be_well(TimeNs began_ns) {
   while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
     run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
     // What a client has switched off or stopped only a client sets going again.
-    host_.command(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
+    host_.request(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
   }
   if (ready() || witness_.violation()) return;
   witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready());
