@@ -110,7 +110,9 @@ void Plant::settled(TimeNs until_ns) {
       if (motor == nullptr) continue;
       check_rotor(until_ns, mcu, output, *motor);
       if (!motor->pace.moving()) continue;
-      if (motor->halt && motor->halt->cut && until_ns >= motor->halt->from_ns) motor->pace.cut();
+      if (motor->halt && motor->halt->cut && until_ns >= motor->halt->from_ns) {
+        if (motor->pace.cut_off() && on_cut_off) on_cut_off(until_ns, mcu, output);
+      }
       const Jump jump = motor->pace.silent(until_ns);
       if (jump != Jump::kNone) report(until_ns, mcu, output, *motor, jump);
     }

@@ -31,6 +31,9 @@ class Plant final : public EdgeSink {
   std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what)>
       on_violation;
 
+  // A motor that an emergency stop has cut off in motion: a real one may have overrun.
+  std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output)> on_cut_off;
+
   void edge(const Edge& edge) override;
   void settled(TimeNs until_ns) override;
 

@@ -48,7 +48,8 @@ std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) c
   for (const auto& state : witness_.states()) {
     if (!state) continue;
     for (const bushd::motor_state_t& motor : state->motors) {
-      if ((motor.moving != 0) == moving && (motor.trust == "uncertain") == uncertain) {
+      if (motor.armed == 0 && (motor.moving != 0) == moving &&
+          (motor.trust == "uncertain") == uncertain) {
         found.push_back({motor.name, motor.position_steps, motor.target_steps});
       }
     }
@@ -167,6 +168,41 @@ Request Clients::switch_drivers() {
   return request;
 }
 
+Request Clients::home() {
+  Request request = make(Ask::kHome);
+  for (std::int64_t n = random_.between(1, 4); n > 0; --n) {
+    const auto index = static_cast<std::size_t>(random_.below(config_.motors.size()));
+    const bushd::config::Motor& motor = config_.motors[index];
+    const bool named = std::ranges::find(request.motors, motor.name) != request.motors.end();
+    // Now and then one that has no switch.
+    if (!named && (motor.home || random_.one_in(20))) request.add(motor.name, 0);
+  }
+  if (request.motors.empty()) request.add(config_.motors.front().name, 0);
+  return request;
+}
+
+Request Clients::arm() {
+  Request request = make(Ask::kArm);
+  request.rising = random_.one_in(2);
+  request.delay_us = static_cast<std::int32_t>(random_.magnitude(50, 1'500'000));
+  std::vector<Choice> free = motors_that(false, false);
+  for (std::int64_t n = random_.between(1, 8); n > 0 && !free.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(free.size()));
+    std::int64_t steps = random_.magnitude(1, kLongestMove) * (random_.one_in(2) ? 1 : -1);
+    if (std::abs(free[index].position_steps + steps) > kFarthest) steps = -steps;
+    request.add(free[index].name, steps);
+    free.erase(free.begin() + static_cast<std::ptrdiff_t>(index));
+  }
+  if (request.motors.empty()) request.add(any_motor(), 1);
+  return request;
+}
+
+Request Clients::disarm() {
+  Request request = make(Ask::kDisarm);
+  if (!random_.one_in(3)) request.add(any_motor(), 0);
+  return request;
+}
+
 bool Clients::says(const char* detail) const {
   return std::any_of(witness_.states().begin(), witness_.states().end(), [&](const auto& state) {
     return state && state->detail.find(detail) != std::string::npos;
@@ -208,6 +244,12 @@ Request Clients::compose(CommandKind kind) {
       return sent_.empty() ? nonsense() : random_.pick(sent_);
     case CommandKind::kNonsense:
       return nonsense();
+    case CommandKind::kHome:
+      return home();
+    case CommandKind::kArm:
+      return arm();
+    case CommandKind::kDisarm:
+      return disarm();
   }
   return nonsense();
 }

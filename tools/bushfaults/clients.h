@@ -28,8 +28,8 @@ class Clients {
   Request stop_all() { return make(Ask::kStop); }
   Request enable_all() { return make(Ask::kEnable); }
   Request clear_all() { return make(Ask::kClearFaults); }
-  // Some MCU stands still after an emergency stop, as far as the daemon has said.
-  bool emergency() const { return says("emergency stop"); }
+  // Some MCU stands still after an emergency stop or input, as far as the daemon has said.
+  bool emergency() const { return says("emergency"); }
 
   const CommandCounts& sent() const { return sent_by_kind_; }
   // A new daemon does not know what was asked of the old one: clients begin anew.
@@ -52,6 +52,9 @@ class Clients {
   Request set(const std::vector<Choice>& motors);
   Request switch_drivers();
   Request nonsense();
+  Request home();
+  Request arm();
+  Request disarm();
   std::string any_motor();
   // Motors that the daemon says are at rest (or moving), uncertain (or known).
   std::vector<Choice> motors_that(bool moving, bool uncertain) const;

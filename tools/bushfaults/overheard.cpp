@@ -41,7 +41,8 @@ void Overheard::frame(TimeNs now_ns, std::size_t mcu, const bushd_frame& frame) 
     if (bushd_decode_control(frame.payload, frame.payload_size, &control) != BUSHD_OK) return;
     if ((control.actions & BUSHD_CONTROL_CLEAR_FAULTS) == 0) return;
     // It refuses while a motor moves.
-    if ((bus_.mcu(mcu).core().faults & BUSHD_FAULT_EMERGENCY) == 0) plant_.release(mcu);
+    const unsigned halts = BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT;
+    if ((bus_.mcu(mcu).core().faults & halts) == 0) plant_.release(mcu);
   }
 }
 

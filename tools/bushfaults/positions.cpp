@@ -64,13 +64,18 @@ void Positions::reported(TimeNs now_ns, std::size_t mcu) {
 
 void Positions::mcu_reset(std::size_t mcu) {
   for (std::size_t i = 0; i < motors_.size(); ++i) {
-    if (config_.motors[i].mcu.value == mcu)
-      motors_[i] = {.offset = std::nullopt, .perhaps_set = {}};
+    if (config_.motors[i].mcu.value != mcu) continue;
+    const auto home_offset = motors_[i].home_offset;
+    motors_[i] = {};
+    motors_[i].offset.reset();
+    motors_[i].home_offset = home_offset;
   }
 }
 
 void Positions::daemon_started() {
   std::fill(boot_seen_.begin(), boot_seen_.end(), std::nullopt);
+  // It cannot know of what the one before has seen.
+  for (Motor& motor : motors_) motor.cut_off_ns.reset();
 }
 
 void Positions::may_be_set(std::size_t motor, std::int64_t position_steps) {
@@ -80,6 +85,31 @@ void Positions::may_be_set(std::size_t motor, std::int64_t position_steps) {
 void Positions::was_set(std::size_t motor, std::int64_t position_steps) {
   motors_[motor].offset = plant_steps(motor) - position_steps;
   motors_[motor].perhaps_set.clear();
+  motors_[motor].cut_off_ns.reset();
+}
+
+void Positions::has_switch(std::size_t motor, std::int64_t at_steps) {
+  motors_[motor].home_offset = at_steps - config_.motors[motor].home->position_steps;
+}
+
+std::optional<std::string> Positions::was_homed(std::size_t index, std::int64_t position_steps) {
+  Motor& motor = motors_[index];
+  const std::int64_t stands = plant_steps(index);
+  if (!motor.at_home(stands, position_steps)) {
+    return fmt::format("{} is said to be homed, and stands at {} by its switch, not at {}",
+                       config_.motors[index].name, stands - *motor.home_offset, position_steps);
+  }
+  motor.offset = stands - position_steps;
+  motor.perhaps_set.clear();
+  motor.cut_off_ns.reset();
+  return std::nullopt;
+}
+
+void Positions::cut_off(TimeNs now_ns, std::size_t mcu, std::size_t output) {
+  for (std::size_t i = 0; i < motors_.size(); ++i) {
+    const bushd::config::Motor& motor = config_.motors[i];
+    if (motor.mcu.value == mcu && motor.output.value == output) motors_[i].cut_off_ns = now_ns;
+  }
 }
 
 std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
@@ -118,7 +148,7 @@ bool Positions::agrees(Motor& motor, std::int64_t position_steps, std::int64_t p
   const auto set = std::find_if(perhaps.begin(), perhaps.end(), [&](const Motor::Set& s) {
     return pulses - s.offset == position_steps || s.position_steps == position_steps;
   });
-  if (set == perhaps.end()) return false;
+  if (set == perhaps.end() && !motor.at_home(pulses, position_steps)) return false;
   motor.offset = pulses - position_steps;
   return true;
 }
@@ -137,6 +167,9 @@ std::optional<std::string> Positions::check_motor(std::size_t mcu,
     if (!first) return claim.name + " is said to be known although its MCU was reset";
     motor.offset = pulses - claim.position_steps;
     return std::nullopt;
+  }
+  if (motor.cut_off_ns && report.made_ns > *motor.cut_off_ns) {
+    return claim.name + " is said to be known although it was cut off in motion";
   }
   if (!agrees(motor, claim.position_steps, pulses)) {
     return fmt::format("{} is said to be at {} in its MCU's tick {}, but stood at {}", claim.name,

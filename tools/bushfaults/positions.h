@@ -9,11 +9,13 @@
 //     position_steps  =  P(T) - offset                                      exactly, to the step
 //
 // The offset is that between the motor and the MCU's counter. It changes only at rest and only by
-// what somebody asked for: by SET_POSITION, when the counter takes another value; and by the end of
-// a reset, from which the counter begins at 0. So a state may lag behind the motor by the age of
-// its report, and by nothing else; and this age is bounded too: an MCU that has not answered for
-// kMaxAgeNs of the daemon's time is not online any more. A motor that is said to be at rest stands
-// there now, not only at T.
+// what somebody asked for: by SET_POSITION, when the counter takes another value; by homing, when
+// it is counted from the switch, to one step; and by the end of a reset, from which the counter
+// begins at 0. So a state may lag behind the motor by the age of its report, and by nothing else;
+// and this age is bounded too: an MCU that has not answered for kMaxAgeNs of the daemon's time is
+// not online any more. A motor that is said to be at rest stands there now, not only at T. And a
+// motor that an emergency stop has cut off in motion is not called known by the daemon that was
+// there, from the first report after that until somebody says where it stands, or homes it.
 //
 // Where T's pulses are taken from: the poll as the MCU hears it (Overheard), for it makes its
 // report at once. Of the firmware only its tick's number and beginning are used.
@@ -21,6 +23,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <deque>
 #include <optional>
 #include <string>
@@ -49,6 +52,12 @@ class Positions {
   // Somebody may set the motor's position to this one, now that it rests, and perhaps nobody is
   // ever told.
   void may_be_set(std::size_t motor, std::int64_t position_steps);
+  void may_be_homed(std::size_t motor) { motors_[motor].perhaps_homed = true; }
+  // What is wrong with that, if something is.
+  std::optional<std::string> was_homed(std::size_t motor, std::int64_t position_steps);
+  // Where the plant has the motor's switch.
+  void has_switch(std::size_t motor, std::int64_t at_steps);
+  void cut_off(TimeNs now_ns, std::size_t mcu, std::size_t output);
   void was_set(std::size_t motor, std::int64_t position_steps);
 
   // The daemon does nothing until then; that may come while it does nothing already.
@@ -65,6 +74,7 @@ class Positions {
   TimeNs worst_age_ns() const { return worst_age_ns_; }
 
  private:
+  static constexpr std::int64_t kHomeSteps = 1;  // how exactly a switch is found
   struct Motor {
     std::optional<std::int64_t> offset = 0;
     struct Set {
@@ -72,6 +82,13 @@ class Positions {
       std::int64_t offset;  // if it takes effect where the motor stood when it was asked for
     };
     std::vector<Set> perhaps_set;
+    std::optional<std::int64_t> home_offset;  // that between switch and `home`
+    bool perhaps_homed = false;
+    std::optional<TimeNs> cut_off_ns;
+
+    bool at_home(std::int64_t pulses, std::int64_t position_steps) const {
+      return perhaps_homed && std::abs(pulses - position_steps - *home_offset) <= kHomeSteps;
+    }
   };
   struct Report {
     TimeNs made_ns;

@@ -39,7 +39,9 @@ struct Request {
     steps.push_back(steps_of_it);
   }
   // Of motors that then have a part in it, each with a result of its own.
-  bool is_move() const { return ask == Ask::kMoveBy || ask == Ask::kMoveTo; }
+  bool is_move() const { return ask == Ask::kMoveBy || ask == Ask::kMoveTo || ask == Ask::kArm; }
+  // For other motors' homing, or the trigger: nobody knows for how long.
+  bool may_wait() const { return ask == Ask::kHome || ask == Ask::kArm; }
 };
 
 // To the daemon. Replies may come before it returns.

@@ -52,6 +52,10 @@ std::string summary_text(const World& world, double processor_s) {
   for (const auto& [result, count] : world.witness().moves_by_result()) {
     text += fmt::format("           {:<17}{:>9}\n", result, count);
   }
+  if (!world.witness().homings_by_result().empty()) text += "homings    by result\n";
+  for (const auto& [result, count] : world.witness().homings_by_result()) {
+    text += fmt::format("           {:<17}{:>9}\n", result, count);
+  }
   text += fmt::format("steps      {} commanded, {} made, {} unaccounted\n",
                       world.witness().steps_commanded(), world.plant().steps_made(),
                       world.witness().steps_unaccounted());
@@ -71,6 +75,7 @@ std::string summary_json(const World& world) {
       {"faults_total", total(world.faults())},
       {"commands", json_of<CommandKind>(world.commands())},
       {"moves", world.witness().moves_by_result()},
+      {"homings", world.witness().homings_by_result()},
       {"steps_commanded", world.witness().steps_commanded()},
       {"steps_made", world.plant().steps_made()},
       {"steps_unaccounted", world.witness().steps_unaccounted()},

@@ -39,7 +39,11 @@ std::string text_of(const reply_t& reply) {
 
 Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus,
                  const bushd::sim::Plant& plant, Recent& recent)
-    : config_(config), plant_(plant), recent_(recent), positions_(config, bus, plant) {
+    : config_(config),
+      plant_(plant),
+      recent_(recent),
+      positions_(config, bus, plant),
+      starts_(config) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
     motors_.push_back({motor.name, motor.mcu.value, motor.output.value, {}, {}, {}});
@@ -111,9 +115,11 @@ void Witness::reply(TimeNs now_ns, const reply_t& reply) {
     asked.accepted_ns = now_ns;
     accepted(found->first, asked);
   } else if (reply.phase == reply_t::RESULT) {
-    finished(now_ns, asked, reply);
+    finished(now_ns, found->first, asked, reply);
   } else if (asked.request.is_move()) {
     ++moves_by_result_["refused"];
+  } else if (asked.request.ask == Ask::kHome) {
+    ++homings_by_result_["refused"];
   }
 }
 
@@ -133,7 +139,8 @@ void Witness::accepted(const Key& key, Asked& asked) {
     if (request.ask == Ask::kSetPosition) {
       positions_.may_be_set(index_of(motor), request.steps[i]);
     }
-    if (request.ask == Ask::kMoveBy) {
+    if (request.ask == Ask::kHome) positions_.may_be_homed(index_of(motor));
+    if (request.ask == Ask::kMoveBy || request.ask == Ask::kArm) {
       const std::optional<std::int64_t> base = motor.move ? motor.target : stands;
       asked.target.push_back(base ? std::optional(*base + request.steps[i]) : std::nullopt);
     } else if (request.ask == Ask::kMoveTo && offset(motor)) {
@@ -144,6 +151,7 @@ void Witness::accepted(const Key& key, Asked& asked) {
     asked.from.push_back(motor.move ? std::nullopt : std::optional(stands));
     asked.end.emplace_back();
     asked.first_step_ns.emplace_back();
+    asked.began.push_back(request.ask != Ask::kArm);
     if (request.is_move()) take_over(motor, key, asked.target.back());
     if (request.is_move() && asked.target.back()) {
       steps_commanded_ += static_cast<std::uint64_t>(std::abs(*asked.target.back() - stands));
@@ -155,19 +163,21 @@ void Witness::accepted(const Key& key, Asked& asked) {
 void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target) {
   if (motor.move) {
     Asked& before = asked_.at(*motor.move);
-    before.end[before.index_of(motor.name)] = End{"stopped", 0, true};
+    const std::size_t index = before.index_of(motor.name);
+    if (before.began[index]) before.end[index] = End{"stopped", 0, true};
   }
   motor.move = by;
   motor.target = target;
 }
 
-void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result) {
+void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked, const reply_t& result) {
   const Request& request = asked.request;
   if (request.ask == Ask::kSetPosition && result.result == "done") {
     for (std::size_t i = 0; i < request.motors.size(); ++i) {
       positions_.was_set(index_of(*find(request.motors[i])), request.steps[i]);
     }
   }
+  if (request.ask == Ask::kHome) return homed(now_ns, asked, result);
   if (!request.is_move()) return;
   ++moves_by_result_[result.result];
   if (result.motors != request.motors) {
@@ -175,30 +185,42 @@ void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result)
   }
   for (std::size_t i = 0; i < result.motors.size(); ++i) {
     const auto& end = asked.end[i];
+    if (request.ask == Ask::kArm && !asked.began[i]) {
+      // No line of the log tells how it ended, and it can have reached nothing.
+      Motor& motor = *find(result.motors[i]);
+      if (motor.move == key) motor.move.reset();
+      if (result.motor_results[i] != "reached") continue;
+    }
     if (end && end->agrees(result.motor_results[i], result.position_steps[i])) continue;
     violated(now_ns, result.motors[i] + " ended otherwise than its result says:" + text_of(result));
   }
-  check_start(now_ns, asked);
+  const auto wrong = starts_.check(request, asked.first_step_ns);
+  if (wrong) violated(now_ns, *wrong);
 }
 
-// All motors of a move start in the same tick, whichever MCUs they are on; and all tables have the
-// same first delay, so their first steps come together.
-void Witness::check_start(TimeNs now_ns, const Asked& asked) {
-  std::vector<TimeNs> first;
-  for (const auto& step : asked.first_step_ns) {
-    if (step) first.push_back(*step);
+void Witness::homed(TimeNs now_ns, const Asked& asked, const reply_t& result) {
+  ++homings_by_result_[result.result];
+  if (result.motors != asked.request.motors) {
+    return violated(now_ns, "a result of other motors:" + text_of(result));
   }
-  if (first.empty()) return;
-  const auto [earliest, latest] = std::minmax_element(first.begin(), first.end());
-  if (*latest - *earliest < config_.buses[0].tick_ns() / 2) return;
-  violated(now_ns, fmt::format("motors of one move started {} us apart: {}",
-                               (*latest - *earliest) / 1000, text_of(asked.request)));
+  for (std::size_t i = 0; i < result.motors.size(); ++i) {
+    if (result.motor_results[i] != "reached") continue;
+    const auto wrong =
+        positions_.was_homed(index_of(*find(result.motors[i])), result.position_steps[i]);
+    if (wrong) violated(now_ns, *wrong);
+  }
 }
 
 void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const nlohmann::json line = nlohmann::json::parse(json_line);
-  if (line.at("event") != "result") return;
+  const bool begins = line.at("event") == "move";
+  if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
+  if (begins && motor.move) {
+    Asked& asked = asked_.at(*motor.move);
+    asked.began[asked.index_of(motor.name)] = true;
+  }
+  if (begins) return;
   if (!motor.move) return violated(now_ns, motor.name + " ended without a move");
   Asked& asked = asked_.at(*motor.move);
   const End end{line.at("result"), line.at("position_steps")};
@@ -248,7 +270,8 @@ void Witness::check_deadlines(TimeNs now_ns) {
   for (const auto& [key, asked] : asked_) {
     if (asked.replies.empty() && key.first.size() <= 64 && !key.first.empty()) {
       violated(now_ns, "no reply to " + text_of(asked.request));
-    } else if (asked.accepted() && !asked.finished() && now_ns - asked.accepted_ns > kResultDueNs) {
+    } else if (asked.accepted() && !asked.finished() && !asked.request.may_wait() &&
+               now_ns - asked.accepted_ns > kResultDueNs) {
       violated(now_ns,
                fmt::format("no result {} s after it was accepted: {}",
                            (now_ns - asked.accepted_ns) / 1'000'000'000, text_of(asked.request)));

@@ -18,6 +18,7 @@
 #include "request.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
+#include "starts.h"
 
 namespace bushfaults {
 
@@ -55,8 +56,12 @@ class Witness {
   std::string not_ready() const;  // which MCUs, and why
   bool commands_open() const;
 
+  Starts& starts() { return starts_; }
   Positions& positions() { return positions_; }
   const Positions& positions() const { return positions_; }
+  const std::map<std::string, std::uint64_t>& homings_by_result() const {
+    return homings_by_result_;
+  }
   const std::map<std::string, std::uint64_t>& moves_by_result() const { return moves_by_result_; }
   std::uint64_t steps_commanded() const { return steps_commanded_; }
   // Between the last states and the motors, where the daemon claims to know.
@@ -91,6 +96,7 @@ class Witness {
     std::vector<std::optional<std::int64_t>> target;
     std::vector<std::optional<End>> end;
     std::vector<std::optional<TimeNs>> first_step_ns;
+    std::vector<bool> began;  // one that waits for the trigger may not
     std::size_t index_of(const std::string& motor) const {
       const auto& all = request.motors;
       return static_cast<std::size_t>(std::find(all.begin(), all.end(), motor) - all.begin());
@@ -113,8 +119,8 @@ class Witness {
     return positions_.offset(index_of(motor));
   }
   void accepted(const Key& key, Asked& asked);
-  void finished(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
-  void check_start(TimeNs now_ns, const Asked& asked);
+  void finished(TimeNs now_ns, const Key& key, const Asked& asked, const bushd::reply_t& result);
+  void homed(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void check_end(TimeNs now_ns, const Motor& motor, const End& end,
                  std::optional<std::int64_t> target);
@@ -123,6 +129,7 @@ class Witness {
   const bushd::sim::Plant& plant_;
   Recent& recent_;
   Positions positions_;
+  Starts starts_;
   std::optional<Violation> violation_;
   std::vector<Motor> motors_;
   std::map<std::string, std::size_t> motor_by_name_;
@@ -130,6 +137,7 @@ class Witness {
   std::optional<Key> repeating_;  // the command being given was given before
   std::vector<std::optional<bushd::state_t>> states_;
   std::map<std::string, std::uint64_t> moves_by_result_;
+  std::map<std::string, std::uint64_t> homings_by_result_;
   std::uint64_t steps_commanded_ = 0;
 };
 
