@@ -19,7 +19,7 @@ constexpr unsigned kIdentifySlots = 8;
 constexpr std::int64_t kReplyUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 // While one of these is latched the MCU refuses to raise EN.
 constexpr unsigned kFaultsWithoutEnable = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT;
-constexpr std::int64_t kRetryUs = 500'000;           // between two looks for an MCU
+constexpr std::int64_t kRetryUs = 500'000;           // between two IDENTIFYs to an MCU
 constexpr std::int64_t kRefusedRetryUs = 2'000'000;  // that does not fit: no hurry
 
 bool same_id(const bushd_identity& a, const bushd_identity& b) {
@@ -145,12 +145,12 @@ void Connector::identify_ended(std::int64_t now_us, McuIndex mcu) {
   links_[mcu].identify_attempts = 1;  // in slots again
 }
 
-// Each look at a silent MCU costs the line a time-out: the more are silent, the rarer.
+// An IDENTIFY without an answer costs the line a time-out: the more MCUs are offline, the rarer.
 void Connector::not_found(std::int64_t now_us, McuIndex mcu) {
-  const auto silent = std::count_if(mcus_.begin(), mcus_.end(), [](const McuRecord& record) {
+  const auto offline = std::count_if(mcus_.begin(), mcus_.end(), [](const McuRecord& record) {
     return record.view.phase == McuPhase::kOffline;
   });
-  links_[mcu].retry_due_us = now_us + kRetryUs * silent;
+  links_[mcu].retry_due_us = now_us + kRetryUs * offline;
 }
 
 void Connector::take(std::int64_t now_us, McuIndex mcu, const bushd_identity& identity) {
@@ -302,7 +302,7 @@ void Connector::give_up(McuIndex mcu, const std::string& cause, std::int64_t ret
   listener_.went_offline(mcu, was_online);
 }
 
-void Connector::give_up_silent(std::int64_t now_us, McuIndex mcu) {
+void Connector::give_up_unanswering(std::int64_t now_us, McuIndex mcu) {
   give_up(mcu, "does not answer", now_us + kRetryUs);
 }
 

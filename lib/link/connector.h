@@ -1,4 +1,4 @@
-// From silence to a configured MCU in step with its tables in place, and back.
+// From no answer to a configured MCU in step with its tables in place, and back.
 //
 // An MCU that is looked for is asked once directly and once in reply slots, by turns: two MCUs that
 // have the same address talk over each other, but rarely choose the same slot.
@@ -39,7 +39,7 @@ class Connector {
   void port_opened(std::int64_t now_us);
   // The MCU is offline, and looked for again from `retry_due_us` on.
   void give_up(McuIndex mcu, const std::string& cause, std::int64_t retry_due_us);
-  void give_up_silent(std::int64_t now_us, McuIndex mcu);
+  void give_up_unanswering(std::int64_t now_us, McuIndex mcu);
   // Other tables or motors. Returns false if the MCU is offline: they will be found then.
   bool reconfigure(McuIndex mcu, McuSetup setup);
   // Why the MCU has no room for these tables, as far as it is known; "": it has.

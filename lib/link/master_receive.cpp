@@ -64,7 +64,7 @@ bool Master::unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
     connector_.not_found(now_us, mcu);
     return false;
   }
-  if (poller_.missed(now_us, mcu, type)) connector_.give_up_silent(now_us, mcu);
+  if (poller_.missed(now_us, mcu, type)) connector_.give_up_unanswering(now_us, mcu);
   return true;
 }
 

@@ -24,8 +24,8 @@ constexpr int kMaxMissedReplies = 10;  // about half a second
 Poller::Poller(PerMcu<McuRecord>& mcus, Transactions& transactions, const FrameWriter& writer)
     : mcus_(mcus), transactions_(transactions), writer_(writer), polled_(mcus.size()) {}
 
-// Those whose turn comes soon are asked along, and all if one may be silent: somebody must answer
-// after it.
+// Those whose turn comes soon are asked along, and all if one may miss its reply: somebody must
+// answer after it.
 std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   bool doubtful = false;
   for (const McuIndex i : mcus_.indices()) {

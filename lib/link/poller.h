@@ -1,6 +1,6 @@
 // Polls: one request for the reports of many MCUs, each in a slot of its own, so that the adapter's
-// latency is paid once. Whoever was silent last time answers first: if it is silent again, the one
-// after it ends the waiting.
+// latency is paid once. Whoever missed its last reply answers first: if it misses this one too, the
+// one after it ends the waiting.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ class Poller {
 
   // An answer to whatever request.
   void answered(McuIndex mcu) { polled_[mcu].missed_replies = 0; }
-  // Or none. Returns true if the MCU has been silent for so long that it is taken for lost.
+  // Or none. Returns true if the MCU has missed so many replies that it is taken for lost.
   bool missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type);
   // The MCU's record has a new report: what has become of its counters.
   void follow_report(McuIndex mcu);
