@@ -136,6 +136,7 @@ void Witness::accepted(const Key& key, Asked& asked) {
   for (std::size_t i = 0; i < request.motors.size(); ++i) {
     Motor& motor = *find(request.motors[i]);
     const std::int64_t stands = plant_steps(motor);
+    forget_unbegun(motor);
     if (request.ask == Ask::kSetPosition) {
       positions_.may_be_set(index_of(motor), request.steps[i]);
     }
@@ -159,12 +160,19 @@ void Witness::accepted(const Key& key, Asked& asked) {
   }
 }
 
+// One that has waited for the trigger in vain is at rest again before the others that waited with
+// it have ended, and with them the move.
+void Witness::forget_unbegun(Motor& motor) {
+  if (!motor.move) return;
+  const Asked& asked = asked_.at(*motor.move);
+  if (!asked.began[asked.index_of(motor.name)]) motor.move.reset();
+}
+
 // A motor that moves belongs to the newest move; its part of the one before has ended.
 void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target) {
   if (motor.move) {
     Asked& before = asked_.at(*motor.move);
-    const std::size_t index = before.index_of(motor.name);
-    if (before.began[index]) before.end[index] = End{"stopped", 0, true};
+    before.end[before.index_of(motor.name)] = End{"stopped", 0, true};
   }
   motor.move = by;
   motor.target = target;
@@ -213,6 +221,11 @@ void Witness::homed(TimeNs now_ns, const Asked& asked, const reply_t& result) {
 
 void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const nlohmann::json line = nlohmann::json::parse(json_line);
+  if (line.at("event") == "alone") {
+    const std::size_t index = index_of(*find(line.at("motor").get<std::string>()));
+    if (line.at("set")) positions_.homed(index, line.at("position_steps"));
+    return;
+  }
   const bool begins = line.at("event") == "move";
   if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());

@@ -121,6 +121,7 @@ class Witness {
   void accepted(const Key& key, Asked& asked);
   void finished(TimeNs now_ns, const Key& key, const Asked& asked, const bushd::reply_t& result);
   void homed(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
+  void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void check_end(TimeNs now_ns, const Motor& motor, const End& end,
                  std::optional<std::int64_t> target);
