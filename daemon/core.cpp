@@ -6,14 +6,14 @@
 
 namespace bushd::daemon {
 
-motion::Axis* Core::Bus::moving_axis(std::size_t mcu, std::uint8_t motor) {
-  const int index = core.mcus_[mcus[mcu]].motor_of[motor];
+motion::Axis* Core::Bus::moving_axis(link::McuIndex mcu, std::uint8_t motor) {
+  const int index = core.mcus_[mcus[mcu.value]].motor_of[motor];
   if (index < 0) return nullptr;
   motion::Axis& axis = core.motors_[static_cast<std::size_t>(index)].axis;
   return axis.busy() ? &axis : nullptr;
 }
 
-std::uint16_t AxisSource::render(std::size_t mcu, std::uint8_t motor, link::Tick first,
+std::uint16_t AxisSource::render(link::McuIndex mcu, std::uint8_t motor, link::Tick first,
                                  unsigned count, std::int16_t* out, std::size_t stride) {
   motion::Axis* axis = moving_axis(mcu, motor);
   if (axis != nullptr) return axis->render(first, count, out, stride);
@@ -21,16 +21,17 @@ std::uint16_t AxisSource::render(std::size_t mcu, std::uint8_t motor, link::Tick
   return 0;
 }
 
-std::optional<link::TickSource::Stretch> AxisSource::run_at(std::size_t mcu, std::uint8_t motor,
-                                                            link::Tick first, unsigned max_ticks) {
+std::optional<link::TickSource::RunSegment> AxisSource::run_at(link::McuIndex mcu,
+                                                               std::uint8_t motor, link::Tick first,
+                                                               unsigned max_ticks) {
   motion::Axis* axis = moving_axis(mcu, motor);
   if (axis == nullptr) return std::nullopt;
-  const auto stretch = axis->run_at(first, max_ticks);
-  if (!stretch) return std::nullopt;
-  return Stretch{.run = stretch->run, .ticks = stretch->ticks};
+  const auto segment = axis->run_at(first, max_ticks);
+  if (!segment) return std::nullopt;
+  return RunSegment{.run = segment->run, .ticks = segment->ticks};
 }
 
-link::Tick AxisSource::end_tick(std::size_t mcu, std::uint8_t motor) {
+link::Tick AxisSource::end_tick(link::McuIndex mcu, std::uint8_t motor) {
   const motion::Axis* axis = moving_axis(mcu, motor);
   return axis == nullptr ? 0 : axis->end_tick();
 }
@@ -44,7 +45,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
     service_.push_back({.table = group.table, .wanted = group.table_name});
   }
   for (const config::Mcu& mcu : config.mcus) {
-    Mcu entry{.config = &mcu, .bus = mcu.bus.value, .in_bus = 0, .boot_number = {}};
+    Mcu entry{.config = &mcu, .bus = mcu.bus.value, .in_bus = {}, .boot_number = {}};
     entry.motor_of.fill(-1);
     mcus_.push_back(entry);
   }
@@ -67,7 +68,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
     std::vector<std::size_t> members;
     for (std::size_t m = 0; m < mcus_.size(); ++m) {
       if (mcus_[m].bus != b) continue;
-      mcus_[m].in_bus = members.size();
+      mcus_[m].in_bus = link::McuIndex{members.size()};
       members.push_back(m);
       setup.mcus.push_back(setup_of(mcus_[m], service_));
     }
@@ -92,8 +93,8 @@ const link::Master& Core::master_of(const Mcu& mcu) const {
 const link::McuView& Core::view_of(const Mcu& mcu) const {
   return master_of(mcu).view(mcu.in_bus);
 }
-std::size_t Core::mcu_at(std::size_t bus, std::size_t in_bus) const {
-  return buses_[bus]->mcus[in_bus];
+std::size_t Core::mcu_at(std::size_t bus, link::McuIndex in_bus) const {
+  return buses_[bus]->mcus[in_bus.value];
 }
 
 void Core::port_opened(std::int64_t now_us, std::size_t bus) {

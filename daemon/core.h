@@ -129,7 +129,7 @@ class Core {
   struct Mcu {
     const config::Mcu* config;
     std::size_t bus;
-    std::size_t in_bus;                                // index within the bus's master
+    link::McuIndex in_bus;
     std::array<int, BUSHD_MOTORS_PER_MCU> motor_of{};  // by output; -1: none
     std::optional<std::uint16_t> boot_number;          // of the boot that positions belong to
     bool clearing = false;                             // faults are being cleared
@@ -188,12 +188,14 @@ class Core {
   link::Master& master_of(const Mcu& mcu);
   const link::Master& master_of(const Mcu& mcu) const;
   const link::McuView& view_of(const Mcu& mcu) const;
-  std::size_t mcu_at(std::size_t bus, std::size_t in_bus) const;
+  std::size_t mcu_at(std::size_t bus, link::McuIndex in_bus) const;
 
   // events.cpp
   void handle_events(std::int64_t now_us, std::size_t bus);
   void on_online(std::size_t mcu);
   void on_offline(std::size_t mcu);
+  void on_start_missed(const Mcu& mcu, std::uint8_t output);
+  void on_replacement_failed(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs);
   void on_report(std::int64_t now_us, std::size_t mcu);
   void follow_motor(std::int64_t now_us, std::size_t motor, const Mcu& mcu,
                     const link::McuView& view);

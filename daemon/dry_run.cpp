@@ -15,12 +15,12 @@ namespace {
 constexpr std::uint64_t kMaxFrames = 3000;
 
 struct Rehearsed : AxisSource {
-  motion::Axis* moving_axis(std::size_t mcu, std::uint8_t motor) override {
+  motion::Axis* moving_axis(link::McuIndex mcu, std::uint8_t motor) override {
     const auto found = axes.find({mcu, motor});
     return found == axes.end() ? nullptr : &found->second;
   }
-  std::map<std::pair<std::size_t, std::uint8_t>, motion::Axis> axes;
-  std::vector<link::Master::Motion> motions;
+  std::map<std::pair<link::McuIndex, std::uint8_t>, motion::Axis> axes;
+  std::vector<link::PlannedMove> moves;
 };
 
 }  // namespace
@@ -49,12 +49,12 @@ move_plan_t Core::plan_of(std::int64_t now_us, const command_t& command) const {
         std::max(plan.duration_us, (axis.end_tick() - start) * config_.buses[motor.bus].tick_us);
     Rehearsed& bus = buses[motor.bus];
     bus.axes.emplace(std::pair{mcu.in_bus, output}, axis);
-    link::Master::Motion motion{mcu.in_bus, output, start, {}};
-    if (by_table(motor, steps)) motion.run_steps = static_cast<std::int32_t>(steps);
-    bus.motions.push_back(motion);
+    link::PlannedMove move{mcu.in_bus, output, start, {}};
+    if (by_table(motor, steps)) move.run_steps = static_cast<std::int32_t>(steps);
+    bus.moves.push_back(move);
   }
   for (auto& [index, bus] : buses) {
-    const auto traffic = buses_[index]->master.rehearse(now_us, bus, bus.motions, kMaxFrames);
+    const auto traffic = buses_[index]->master.rehearse(now_us, bus, bus.moves, kMaxFrames);
     if (!traffic || plan.frames < 0) {
       plan.frames = plan.bytes = -1;
       continue;

@@ -1,6 +1,7 @@
 // What the bus tells: MCUs that come and go, reports, and with them the ends of moves.
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <variant>
 
 #include "daemon/bus.h"
 #include "daemon/core.h"
@@ -16,6 +17,13 @@ std::string by_cause(std::uint8_t reset_cause) {
   const std::string word = reset_cause_word(reset_cause);
   return word.empty() ? word : " (" + word + ")";
 }
+
+template <class... Handlers>
+struct Overloaded : Handlers... {
+  using Handlers::operator()...;
+};
+template <class... Handlers>
+Overloaded(Handlers...) -> Overloaded<Handlers...>;
 
 constexpr const char* kUnpowered = "its drivers were switched off by overcurrent while it moved";
 
@@ -34,49 +42,45 @@ std::string Core::did_not_start(const Mcu& mcu) {
 }
 
 void Core::handle_events(std::int64_t now_us, std::size_t bus) {
-  for (const link::Event& event : buses_[bus]->master.take_events()) {
-    const std::size_t mcu = mcu_at(bus, event.mcu);
-    switch (event.kind) {
-      case link::Event::Kind::kOnline:
-        on_online(mcu);
-        break;
-      case link::Event::Kind::kOffline:
-        on_offline(mcu);
-        break;
-      case link::Event::Kind::kReport:
-        on_report(now_us, mcu);
-        break;
-      case link::Event::Kind::kRefused:
-        if (event.type == BUSHD_MSG_HOME) refuse_home(mcus_[mcu], event.status);
-        break;
-      case link::Event::Kind::kLateStart: {
-        const int motor = mcus_[mcu].motor_of[event.motor];
-        const bool ran_down = view_of(mcus_[mcu]).report.faults != 0;  // says the report
-        // Of a move that was cancelled before its start no tick is missed.
-        const bool cancelled =
-            motor >= 0 && motors_[static_cast<std::size_t>(motor)].axis.end_tick() <=
-                              motors_[static_cast<std::size_t>(motor)].axis.start_tick();
-        const bool limited =
-            !forbidden_word(view_of(mcus_[mcu]).report, event.motor).empty();  // says the report
-        if (motor >= 0 && !ran_down && !cancelled && !limited) {
-          end_motor(static_cast<std::size_t>(motor), motion::Outcome::kLink,
-                    did_not_start(mcus_[mcu]));
-        }
-        break;
-      }
-      case link::Event::Kind::kReplaceFailed: {
-        std::vector<std::size_t> again;
-        for (unsigned output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
-          const int motor = mcus_[mcu].motor_of[output];
-          if ((event.motors >> output & 1) != 0 && motor >= 0) {
-            again.push_back(static_cast<std::size_t>(motor));
-          }
-        }
-        change_motors(now_us, again);
-        break;
-      }
+  const auto handle =
+      Overloaded{[&](const link::McuOnline& event) { on_online(mcu_at(bus, event.mcu)); },
+                 [&](const link::McuOffline& event) { on_offline(mcu_at(bus, event.mcu)); },
+                 [&](const link::McuReported& event) { on_report(now_us, mcu_at(bus, event.mcu)); },
+                 [&](const link::RequestRefused& event) {
+                   if (event.type == BUSHD_MSG_HOME)
+                     refuse_home(mcus_[mcu_at(bus, event.mcu)], event.status);
+                 },
+                 [&](const link::StartMissed& event) {
+                   on_start_missed(mcus_[mcu_at(bus, event.mcu)], event.motor);
+                 },
+                 [&](const link::ReplacementFailed& event) {
+                   on_replacement_failed(now_us, mcus_[mcu_at(bus, event.mcu)], event.motors);
+                 }};
+  for (const link::Event& event : buses_[bus]->master.take_events()) std::visit(handle, event);
+}
+
+void Core::on_start_missed(const Mcu& mcu, std::uint8_t output) {
+  if (mcu.motor_of[output] < 0) return;
+  const auto index = static_cast<std::size_t>(mcu.motor_of[output]);
+  const motion::Axis& axis = motors_[index].axis;
+  const bushd_report& report = view_of(mcu).report;
+  const bool ran_down = report.faults != 0;  // says the report
+  // Of a move that was cancelled before its start no tick is missed.
+  const bool cancelled = axis.end_tick() <= axis.start_tick();
+  const bool limited = !forbidden_word(report, output).empty();  // says the report
+  if (ran_down || cancelled || limited) return;
+  end_motor(index, motion::Outcome::kLink, did_not_start(mcu));
+}
+
+void Core::on_replacement_failed(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs) {
+  std::vector<std::size_t> again;
+  for (unsigned output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
+    const int motor = mcu.motor_of[output];
+    if ((outputs >> output & 1) != 0 && motor >= 0) {
+      again.push_back(static_cast<std::size_t>(motor));
     }
   }
+  change_motors(now_us, again);
 }
 
 void Core::on_online(std::size_t index) {

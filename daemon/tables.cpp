@@ -161,9 +161,8 @@ std::string Core::misfit(const std::vector<TableChange::Part>& parts) const {
 }
 
 link::McuSetup Core::setup_of(const Mcu& mcu, const std::vector<InService>& service) const {
-  link::McuSetup setup{.address = mcu.config->address.value, .tables = {}};
+  link::McuSetup setup{.address = mcu.config->address, .tables = {}};
   setup.emission = mcu.config->emission;
-  setup.table_of_motor.fill(-1);
   setup.inputs = inputs_of(mcu);
   setup.off_after_watchdog = mcu.config->enable_after_reset == config::EnableAfterReset::kNo;
   for (std::size_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
@@ -176,7 +175,7 @@ link::McuSetup Core::setup_of(const Mcu& mcu, const std::vector<InService>& serv
     const auto found =
         std::find_if(setup.tables.begin(), setup.tables.end(),
                      [&table](const link::TableRef& ref) { return ref.table == &table.view(); });
-    setup.table_of_motor[output] = static_cast<int>(found - setup.tables.begin());
+    setup.table_of_motor[output] = static_cast<std::uint8_t>(found - setup.tables.begin());
     if (found == setup.tables.end()) {
       setup.tables.push_back({.table = &table.view(), .revision = table.revision()});
     }

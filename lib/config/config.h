@@ -15,10 +15,13 @@
 
 #include "base/result.h"
 #include "engine/message.h"
-#include "link/emission_setup.h"
+#include "fieldbus/address.h"
+#include "fieldbus/emission_setup.h"
 #include "tables/table.h"
 
 namespace bushd::config {
+
+using fieldbus::McuAddress;
 
 // Positions in the vectors of Config, and what is on the wire. Each its own type: a mix-up moves
 // the wrong motor.
@@ -33,10 +36,6 @@ struct McuIndex {
 struct GroupIndex {
   std::size_t value = 0;
   auto operator<=>(const GroupIndex&) const = default;
-};
-struct McuAddress {
-  std::uint8_t value = 0;  // 1..255
-  auto operator<=>(const McuAddress&) const = default;
 };
 struct Output {
   std::uint8_t value = 0;  // 0..15
@@ -71,7 +70,7 @@ struct Mcu {
   BusIndex bus;
   McuAddress address;
   std::string id;  // "hall:1"
-  link::EmissionSetup emission{};
+  fieldbus::EmissionSetup emission{};
   std::uint8_t emergency_input = BUSHD_EMERGENCY_INPUT_IGNORED;
   bool emergency_active_open = false;
   std::uint8_t debounce_ticks = 1;

@@ -17,6 +17,7 @@
 #include "fuzz/core_programme.h"
 #include "sim/bus_fixture.h"
 #include "sim/pulse_counter.h"
+#include "source_path.h"
 
 namespace bushd::sim {
 namespace {
@@ -335,7 +336,7 @@ std::vector<fs::path> inputs_of(const CorpusOn& what) {
   const char* const only = std::getenv("BUSHD_CORPUS");
   if (only != nullptr) return {only};
   for (const auto& entry :
-       fs::directory_iterator(fs::path(BUSHD_SOURCE_DIR) / "tests/fuzz/corpus" / what.corpus)) {
+       fs::directory_iterator(fs::path(test::source_path("tests/fuzz/corpus")) / what.corpus)) {
     files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());

@@ -139,7 +139,8 @@ class AvrRig final : public CoreRig {
     if (ends) {
       if (!line_may_take(&mcu_.receiver)) return send();
       const Poisoned answer = foreign_answer();
-      bushd_mcu_receive(&mcu_, line_take(), static_cast<std::int32_t>(time_in_tick_ns()));
+      line_take(&mcu_.receiver);
+      bushd_mcu_receive(&mcu_, 0, static_cast<std::int32_t>(time_in_tick_ns()));
     } else if (is_idle()) {
       poll_eeprom(1);
     }

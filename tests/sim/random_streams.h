@@ -45,7 +45,7 @@ class RandomStreams : public testing::Test {
   // What a test of it does; this many streams if the environment asks for no other number.
   void leave_it_alive(std::uint64_t by_default) {
     const std::uint64_t streams = from_environment("BUSHD_STREAMS", by_default);
-    std::printf("seed %llu\n", static_cast<unsigned long long>(seed_));
+    std::printf("%s\n", again(streams).c_str());  // before what may be thrown
     SCOPED_TRACE(again(streams));
     std::uint64_t moves = 0;
     const std::uint16_t boot_number = master_.poll(kAddress).boot_number;

@@ -14,6 +14,7 @@ class AvrRandomStreams : public RandomStreams {
           options.image = AVR_IMAGES "-1000000.elf";
           options.address = kAddress;
           options.unique_id = 0x1122334455667788;
+          options.memory_owners = AVR_MEMORY_OWNERS;
           return std::make_unique<AvrMcu>(options, index, driver, sink);
         }) {}
 };

@@ -1,13 +1,13 @@
-#include "link/line_budget.h"
+#include "fieldbus/line_budget.h"
 
 #include <algorithm>
 
-#include "link/master_limits.h"
+#include "fieldbus/line_times.h"
 
-namespace bushd::link {
+namespace bushd::fieldbus {
 namespace {
 
-// Whoever takes the line begins with a delimiter.
+// Every transmitter sends a delimiter first.
 constexpr double kFrameCost = BUSHD_FRAME_OVERHEAD + 1.0;
 constexpr double kSyncBytes = 19.0;
 constexpr double kPollEntryBytes = 3.0;
@@ -35,4 +35,4 @@ double line_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
   return bytes_per_s * 10.0 / baud;
 }
 
-}  // namespace bushd::link
+}  // namespace bushd::fieldbus

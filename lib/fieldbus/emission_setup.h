@@ -10,7 +10,7 @@
 #include "base/result.h"
 #include "engine/emission.h"
 
-namespace bushd::link {
+namespace bushd::fieldbus {
 
 struct EmissionSetup {
   bushd_emission settings{};
@@ -45,4 +45,4 @@ const char* remedy_of(unsigned refusal);
 std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::uint16_t slots,
                              std::uint32_t tick_ns);
 
-}  // namespace bushd::link
+}  // namespace bushd::fieldbus

@@ -7,11 +7,8 @@
 
 #include "engine/message.h"
 
-namespace bushd::link {
+namespace bushd::fieldbus {
 
-inline constexpr std::int64_t kPollPeriodUs = 50'000;  // each MCU is asked this often
-inline constexpr std::int64_t kSyncPeriodUs = 500'000;
-inline constexpr unsigned kMaxTicksPerFrame = 16;  // what one lost frame can cost
 // Share of the line that may be planned: the rest is for repeats, turnaround and adapter latency.
 inline constexpr double kMaxLineLoad = 0.85;
 
@@ -21,4 +18,4 @@ inline constexpr double kMaxLineLoad = 0.85;
 double line_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
                  std::span<const std::uint8_t> motors_per_mcu);
 
-}  // namespace bushd::link
+}  // namespace bushd::fieldbus

@@ -1,8 +1,8 @@
-#include "link/emission_setup.h"
+#include "fieldbus/emission_setup.h"
 
 #include "engine/slots.h"
 
-namespace bushd::link {
+namespace bushd::fieldbus {
 namespace {
 
 constexpr std::array<std::uint16_t, 5> kCapabilities = {0, BUSHD_CAN_BURST, BUSHD_CAN_COMMON_DIR,
@@ -77,4 +77,4 @@ std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::u
   }
 }
 
-}  // namespace bushd::link
+}  // namespace bushd::fieldbus
