@@ -34,11 +34,11 @@ static inline void name_parts(void) {
   NAME_PART("receiver", receiver);
   NAME_PART("receiver.buffer", receiver.buffer);
   NAME_PART("answer", answer);
-  NAME_PART("rows", rows);
+  NAME_PART("rows", stream.rows);
   NAME_PART("config", config);
   NAME_PART("planes", plane);
   NAME_PART("motors", motor);
-  NAME_PART("tables", table);
+  NAME_PART("tables", tables);
 }
 
 static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
