@@ -260,7 +260,10 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const std::size_t index = asked.index_of(motor.name);
   asked.end[index] = end;
   check_end(now_ns, motor, end, asked.target[index]);
-  const bool planned = asked.end[index]->word == "reached" || asked.end[index]->word == "stopped";
+  // One that waited for the trigger and was stopped before its first step makes it in a streamed
+  // tick, up to one late.
+  const bool exact = asked.request.ask != Ask::kArm;
+  const bool planned = end.word == "reached" || (end.word == "stopped" && exact);
   const auto& from = asked.from[index];
   if (planned && from && plant_steps(motor) != *from) {
     asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
