@@ -130,8 +130,8 @@ TEST(Connect, TimeDoesNotBeginAnewBeforeAllHaveReported) {
   EXPECT_EQ(bus.slaves[0].zero_us, zero);
 }
 
-// An MCU that missed a SYNC and heard a repetition of it knows another mark by that name.
-TEST(Connect, MarkThatMcusDisagreeAboutIsNotPassedOn) {
+// An MCU that missed a SYNC and heard a repetition of it knows another instant by that sync_id.
+TEST(Connect, SyncThatMcusDisagreeAboutIsNotPassedOn) {
   FakeBus bus(2, 2);
   bus.connect();
   bus.run_for(2'000'000);
@@ -142,10 +142,10 @@ TEST(Connect, MarkThatMcusDisagreeAboutIsNotPassedOn) {
     return syncs().back();
   };
   EXPECT_EQ(next_sync().payload[6], 1) << "follows, as a rule";
-  bus.slaves[1].mark_us += 30'000;
+  bus.slaves[1].sync_us += 30'000;
   EXPECT_EQ(next_sync().payload[6], 0);
-  EXPECT_EQ(next_sync().payload[6], 1) << "about the next mark they agree";
-  // A clock that is off is so at every mark: then the first MCU's time is that of the bus.
+  EXPECT_EQ(next_sync().payload[6], 1) << "about the next SYNC they agree";
+  // A clock that is off is so at every SYNC: then the first MCU's time is that of the bus.
   bus.slaves[1].zero_us -= 30'000;
   EXPECT_EQ(next_sync().payload[6], 0);
   EXPECT_EQ(next_sync().payload[6], 1);
@@ -520,11 +520,11 @@ TEST(Connect, StrangeAnswersAreNotTaken) {
   forged.motor[0].position_steps = 99;
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_report(&forged, payload.data()));
-  for (int tag = 0; tag < 256; ++tag) {
+  for (int sequence = 0; sequence < 256; ++sequence) {
     Bytes wire(BUSHD_FRAME_MAX_WIRE);
     wire.resize(bushd_frame_encode(1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY,
-                                   static_cast<std::uint8_t>(tag), payload.data(), payload.size(),
-                                   wire.data()));
+                                   static_cast<std::uint8_t>(sequence), payload.data(),
+                                   payload.size(), wire.data()));
     bus.master->receive(bus.now_us, wire);  // nothing was asked
   }
   EXPECT_EQ(bus.master->view(McuIndex{0}).report.motor[0].position_steps, before);

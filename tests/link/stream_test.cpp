@@ -138,7 +138,7 @@ TEST_P(Stream, OnlyWhatWasLostIsSentAgain) {
 }
 
 // What an MCU claims to have beyond a gap is believed only as far as it can be true.
-TEST_P(Stream, IslandThatCannotBeIsNotBelieved) {
+TEST_P(Stream, OutOfOrderRangeThatCannotBeIsNotBelieved) {
   int n = 0;
   bus.slaves[0].loses = [&n](const Heard& h) { return h.type == BUSHD_MSG_TICKS && n++ == 1; };
   bus.slaves[0].spoils = [](bushd_report& report) {

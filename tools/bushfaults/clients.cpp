@@ -254,17 +254,28 @@ Request Clients::compose(CommandKind kind) {
   return nonsense();
 }
 
-Request Clients::next() {
-  if (auto request = remedy()) return *request;
+CommandKind Clients::choose() {
   double chance = random_.unit() * per_hour_;
   std::size_t kind = 0;
   while (kind + 1 < kCommandKinds && chance >= rates_[kind]) chance -= rates_[kind++];
-  ++sent_by_kind_[kind];
-  const auto chosen = static_cast<CommandKind>(kind);
+  return static_cast<CommandKind>(kind);
+}
+
+Request Clients::next() {
+  if (auto request = remedy()) return *request;
+  const CommandKind chosen = choose();
+  ++sent_by_kind_[static_cast<std::size_t>(chosen)];
   Request request = compose(chosen);
   if (chosen == CommandKind::kAgain || chosen == CommandKind::kNonsense) return request;
   if (sent_.size() == kRemembered) sent_.pop_front();
   sent_.push_back(request);
+  return request;
+}
+
+Request Clients::one_of_flood(std::size_t client) {
+  Request request = compose(choose());
+  request.client = "f" + std::to_string(client) + "-" + std::to_string(generation_);
+  request.number = ++flood_number_;
   return request;
 }
 

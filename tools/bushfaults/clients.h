@@ -32,6 +32,10 @@ class Clients {
   bool emergency() const { return says("emergency"); }
 
   const CommandCounts& sent() const { return sent_by_kind_; }
+  // Of a flood of requests, by this client of the flood's own.
+  Request one_of_flood(std::size_t client);
+  // Counts the daemons.
+  std::uint64_t generation() const { return generation_; }
   // A new daemon does not know what was asked of the old one: clients begin anew.
   void begin_anew();
 
@@ -43,6 +47,7 @@ class Clients {
   };
   Request make(Ask ask);
   Request compose(CommandKind kind);
+  CommandKind choose();
   // Drivers that are off, positions in doubt and emergencies are seen to soon.
   std::optional<Request> remedy();
   bool says(const char* detail) const;
@@ -69,6 +74,7 @@ class Clients {
   bushd::sim::Random random_;
   std::uint64_t generation_ = 0;
   std::vector<std::int64_t> number_;  // by client
+  std::int64_t flood_number_ = 0;
   std::deque<Request> sent_;
   CommandCounts sent_by_kind_{};
 };

@@ -53,7 +53,9 @@ class Positions {
   // ever told.
   void may_be_set(std::size_t motor, std::int64_t position_steps);
   void may_be_homed(std::size_t motor) { motors_[motor].perhaps_homed = true; }
-  // What is wrong with that, if something is.
+  // It is, and has not been moved since.
+  void homed(std::size_t motor, std::int64_t position_steps);
+  // It was, and perhaps has been moved since. What is wrong with that, if something is.
   std::optional<std::string> was_homed(std::size_t motor, std::int64_t position_steps);
   // Where the plant has the motor's switch.
   void has_switch(std::size_t motor, std::int64_t at_steps);

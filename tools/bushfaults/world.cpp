@@ -41,7 +41,8 @@ World::World(const Options& options, bushd::config::Config config)
       witness_(config_, bus_, plant_, recent_),
       skew_(config_, bus_, witness_),
       clients_(config_, witness_, options.command_rates, options.seed),
-      host_(config_, bus_, witness_, clients_, recent_, options.seed) {
+      host_(config_, bus_, witness_, clients_, recent_, options.seed),
+      mail_(clients_, host_) {
   add_mcus();
   add_motors();
   overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
@@ -102,7 +103,7 @@ void World::spell_of_trouble(TimeNs until_ns) {
       *next = now_ns_ + chance_[kind].wait(static_cast<double>(kHour) / options_.fault_rates[kind]);
     }
     if (now_ns_ >= next_command_ns_) {
-      host_.request(now_ns_, clients_.next());
+      mail_.send(now_ns_, clients_.next());
       next_command_ns_ = clients_.next_after(now_ns_);
     }
     if (now_ns_ - deadlines_checked_ns_ >= kSecond) {
@@ -114,7 +115,8 @@ void World::spell_of_trouble(TimeNs until_ns) {
 
 void World::calm() {
   if (witness_.violation()) return;
-  run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns()}));
+  run_until(std::max(
+      {now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(), mail_.quiet_ns()}));
   const TimeNs began_ns = now_ns_;
   host_.request(now_ns_, clients_.stop_all());
   be_well(began_ns);
@@ -152,6 +154,7 @@ void World::advance(TimeNs until_ns) {
   bus_.advance_to(now_ns_);
   host_.run(now_ns_);
   inputs_->run(now_ns_);
+  mail_.run(now_ns_);
   if (now_ns_ - skew_checked_ns_ < kSkewPeriodNs) return;
   skew_checked_ns_ = now_ns_;
   if (const auto wrong = skew_.check(now_ns_)) witness_.violated(now_ns_, *wrong);
@@ -197,6 +200,16 @@ void World::strike(FaultKind kind) {
       return note_fault(kind, inputs_->press_emergency(now_ns_, random));
     case FaultKind::kTrigger:
       return note_fault(kind, inputs_->trigger(now_ns_, random));
+    case FaultKind::kSlowRequest:
+      return note_fault(kind, mail_.delay_next(random));
+    case FaultKind::kLateRepeat:
+      return note_fault(kind, mail_.repeat(now_ns_, random));
+    case FaultKind::kStaleRepeat:
+      return note_fault(kind, mail_.repeat_stale(now_ns_, random));
+    case FaultKind::kFlood:
+      return note_fault(kind, mail_.flood(now_ns_, random, 200));
+    case FaultKind::kCrowd:
+      return note_fault(kind, mail_.flood(now_ns_, random, 2'000));
     case FaultKind::kSilence:
       length_ns = random.magnitude(kMs, 10 * kSecond);
       host_.silence(now_ns_ + length_ns);

@@ -16,6 +16,7 @@
 #include "inputs.h"
 #include "installation.h"
 #include "kinds.h"
+#include "mail.h"
 #include "overheard.h"
 #include "recent.h"
 #include "sim/bus.h"
@@ -76,6 +77,7 @@ class World {
   Skew skew_;
   Clients clients_;
   Host host_;
+  Mail mail_;
   std::vector<std::unique_ptr<bushd::sim::PaceRules>> rules_;  // by group
   std::vector<bushd::sim::Random> chance_;                     // by fault kind
   std::array<TimeNs, kFaultKinds> next_fault_ns_{};
