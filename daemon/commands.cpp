@@ -360,9 +360,12 @@ void Core::change_motors(std::int64_t now_us, const std::vector<std::size_t>& mo
   std::unordered_map<std::size_t, motion::Tick> at;  // by MCU
   for (const std::size_t index : motors) {
     const Motor& motor = motors_[index];
-    const motion::Tick earliest = master_of(mcus_[motor.mcu]).earliest_replace(now_us);
+    const link::Master& master = master_of(mcus_[motor.mcu]);
+    const motion::Tick earliest = motor.axis.stopping()
+                                      ? master.earliest_replace(now_us)
+                                      : master.earliest_retarget(now_us, motor.axis.start_tick());
     motion::Tick& common = at.try_emplace(motor.mcu, earliest).first->second;
-    if (!motor.axis.stopping()) common = std::max(common, motor.axis.start_tick());
+    common = std::max(common, earliest);
   }
   std::unordered_map<std::size_t, std::uint16_t> masks;  // by MCU
   for (const std::size_t index : motors) {

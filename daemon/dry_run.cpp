@@ -20,7 +20,7 @@ struct Rehearsed : AxisSource {
     return found == axes.end() ? nullptr : &found->second;
   }
   std::map<std::pair<link::McuIndex, std::uint8_t>, motion::Axis> axes;
-  std::vector<link::Master::Motion> motions;
+  std::vector<link::PlannedMove> moves;
 };
 
 }  // namespace
@@ -49,12 +49,12 @@ move_plan_t Core::plan_of(std::int64_t now_us, const command_t& command) const {
         std::max(plan.duration_us, (axis.end_tick() - start) * config_.buses[motor.bus].tick_us);
     Rehearsed& bus = buses[motor.bus];
     bus.axes.emplace(std::pair{mcu.in_bus, output}, axis);
-    link::Master::Motion motion{mcu.in_bus, output, start, {}};
-    if (by_table(motor, steps)) motion.run_steps = static_cast<std::int32_t>(steps);
-    bus.motions.push_back(motion);
+    link::PlannedMove move{mcu.in_bus, output, start, {}};
+    if (by_table(motor, steps)) move.run_steps = static_cast<std::int32_t>(steps);
+    bus.moves.push_back(move);
   }
   for (auto& [index, bus] : buses) {
-    const auto traffic = buses_[index]->master.rehearse(now_us, bus, bus.motions, kMaxFrames);
+    const auto traffic = buses_[index]->master.rehearse(now_us, bus, bus.moves, kMaxFrames);
     if (!traffic || plan.frames < 0) {
       plan.frames = plan.bytes = -1;
       continue;

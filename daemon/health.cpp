@@ -44,7 +44,7 @@ mcu_health_t Core::health_of(const Mcu& mcu) const {
   out.current = view.reported ? view.report.current : 0;
   out.crc_errors = number(health.crc_errors);
   out.rejected_frames = number(health.rejected_frames);
-  out.run_downs = number(health.run_downs);
+  out.run_downs = number(health.ramp_downs);
   out.timeouts = number(health.timeouts);
   out.repeats = number(health.repeats);
   out.missed_ticks = number(health.missed_ticks);

@@ -156,7 +156,7 @@ std::string Core::refuse_reference(const command_t& command) const {
   if (view.phase != link::McuPhase::kOnline) {
     return "MCU " + mcu.config->id + " is offline: " + view.detail;
   }
-  if (!master_of(mcu).has_reference(mcu.in_bus)) {
+  if (!master_of(mcu).can_compare_position(mcu.in_bus)) {
     return "MCU " + mcu.config->id + " has no reference output";
   }
   if (!within<int>(command.arrivals, 0, command_t::POSITIVE + command_t::NEGATIVE)) {
@@ -181,7 +181,7 @@ void Core::set_reference(const command_t& command) {
   const Motor& motor = motors_[*find_motor(command.motors.front())];
   const Mcu& mcu = mcus_[motor.mcu];
   const bool on = command.arrivals != 0;
-  master_of(mcu).reference(
+  master_of(mcu).position_compare(
       mcu.in_bus, {.motor = motor.config->output.value,
                    .arrivals = static_cast<std::uint8_t>(command.arrivals),
                    .position_steps = on ? static_cast<std::int32_t>(command.steps.front()) : 0,

@@ -31,7 +31,7 @@ struct AvrOptions {
   std::uint16_t boots = 0;  // boot number of the boot before
   // Path of who may write where (memory_watch.h): then the image stops at the first wrong access.
   // "": unwatched, and faster.
-  std::string memory_owners;
+  std::string memory_owners = {};
 };
 
 class AvrMcu final : public Mcu {

@@ -464,12 +464,12 @@ void reference(Bus& bus, Input& input) {
   const link::McuIndex mcu{input.u8() % kMcus};
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const auto arrivals = static_cast<std::uint8_t>(input.u8() % 4u);
-  if (!bus.online(mcu) || !bus.master().has_reference(mcu)) return;
-  bus.master().reference(mcu, {.motor = motor,
-                               .arrivals = arrivals,
-                               .position_steps = 70,
-                               .delay_us = 100,
-                               .width_us = 40});
+  if (!bus.online(mcu) || !bus.master().can_compare_position(mcu)) return;
+  bus.master().position_compare(mcu, {.motor = motor,
+                                      .arrivals = arrivals,
+                                      .position_steps = 70,
+                                      .delay_us = 100,
+                                      .width_us = 40});
 }
 
 void home(Bus& bus, Input& input) {

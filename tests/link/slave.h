@@ -55,19 +55,19 @@ struct Slave {
   std::uint8_t epoch = 0;
   std::uint8_t faults = 0;
   std::int64_t zero_us = -1'000'000;  // when its tick 0 began
-  std::uint32_t mark = 0;
-  std::int64_t mark_us = 0;
+  std::uint32_t sync_id = 0;          // of the last SYNC heard, and when that was
+  std::int64_t sync_us = 0;
   std::map<std::uint8_t, std::vector<std::uint16_t>> tables;
   std::map<std::uint8_t, bushd_table_held> held;
   std::array<int, BUSHD_MOTORS_PER_MCU> table_of{};
   std::array<std::uint32_t, BUSHD_MOTORS_PER_MCU> known_until{};
   std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delay{};
-  struct Island {
+  struct OutOfOrderRange {
     std::uint32_t from;
     std::uint32_t until;
     std::uint16_t delay;
   };
-  std::array<std::optional<Island>, BUSHD_MOTORS_PER_MCU> island;
+  std::array<std::optional<OutOfOrderRange>, BUSHD_MOTORS_PER_MCU> out_of_order;
   std::array<std::optional<bushd_table_run_entry>, BUSHD_MOTORS_PER_MCU> run;  // taken
   std::array<std::int32_t, BUSHD_MOTORS_PER_MCU> position{};
   // Everything it took, by motor and tick.
@@ -153,8 +153,8 @@ class FakeBus {
 
  private:
   void advance(std::int64_t limit_us);
-  void hear(const Heard& frame, std::uint8_t tag);
-  void act(Slave& slave, const Heard& frame, std::uint8_t tag);
+  void hear(const Heard& frame, std::uint8_t sequence);
+  void act(Slave& slave, const Heard& frame, std::uint8_t sequence);
   // A frame of ticks, however it was coded: by motor, the displacements and the delay at the end.
   struct Ticks {
     std::uint8_t epoch;
@@ -169,7 +169,7 @@ class FakeBus {
   void take_motor_ticks(Slave& slave, unsigned motor, const Ticks& ticks) const;
   void take_table_run(Slave& slave, const Heard& frame);
   // `delay_us` after the request's end.
-  void answer(const Slave& slave, const Heard& frame, std::uint8_t tag, const Bytes& payload,
+  void answer(const Slave& slave, const Heard& frame, std::uint8_t sequence, const Bytes& payload,
               std::int64_t delay_us = 0);
   void follow_time(Slave& slave);
   Bytes report(Slave& slave);

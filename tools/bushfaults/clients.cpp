@@ -39,6 +39,16 @@ Request Clients::make(Ask ask) {
           .ask = ask};
 }
 
+Request Clients::of_all_online(Ask ask) {
+  Request request = make(ask);
+  const auto offline = [](const auto& state) { return !state || state->mcu_state == "OFFLINE"; };
+  if (std::ranges::none_of(witness_.states(), offline)) return request;
+  for (const auto& state : witness_.states()) {
+    if (!offline(state) && !state->motors.empty()) request.add(state->motors.front().name, 0);
+  }
+  return request;
+}
+
 std::string Clients::any_motor() {
   return config_.motors[static_cast<std::size_t>(random_.below(config_.motors.size()))].name;
 }
@@ -254,17 +264,28 @@ Request Clients::compose(CommandKind kind) {
   return nonsense();
 }
 
-Request Clients::next() {
-  if (auto request = remedy()) return *request;
+CommandKind Clients::choose() {
   double chance = random_.unit() * per_hour_;
   std::size_t kind = 0;
   while (kind + 1 < kCommandKinds && chance >= rates_[kind]) chance -= rates_[kind++];
-  ++sent_by_kind_[kind];
-  const auto chosen = static_cast<CommandKind>(kind);
+  return static_cast<CommandKind>(kind);
+}
+
+Request Clients::next() {
+  if (auto request = remedy()) return *request;
+  const CommandKind chosen = choose();
+  ++sent_by_kind_[static_cast<std::size_t>(chosen)];
   Request request = compose(chosen);
   if (chosen == CommandKind::kAgain || chosen == CommandKind::kNonsense) return request;
   if (sent_.size() == kRemembered) sent_.pop_front();
   sent_.push_back(request);
+  return request;
+}
+
+Request Clients::one_of_flood(std::size_t client) {
+  Request request = compose(choose());
+  request.client = "f" + std::to_string(client) + "-" + std::to_string(generation_);
+  request.number = ++flood_number_;
   return request;
 }
 

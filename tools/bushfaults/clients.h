@@ -26,12 +26,16 @@ class Clients {
   bushd::sim::TimeNs next_after(bushd::sim::TimeNs now_ns);
   // What only clients can mend: everything stops, drivers on, an emergency is over. Before quiet.
   Request stop_all() { return make(Ask::kStop); }
-  Request enable_all() { return make(Ask::kEnable); }
-  Request clear_all() { return make(Ask::kClearFaults); }
+  Request enable_all() { return of_all_online(Ask::kEnable); }
+  Request clear_all() { return of_all_online(Ask::kClearFaults); }
   // Some MCU stands still after an emergency stop or input, as far as the daemon has said.
   bool emergency() const { return says("emergency"); }
 
   const CommandCounts& sent() const { return sent_by_kind_; }
+  // Of a flood of requests, by this client of the flood's own.
+  Request one_of_flood(std::size_t client);
+  // Counts the daemons.
+  std::uint64_t generation() const { return generation_; }
   // A new daemon does not know what was asked of the old one: clients begin anew.
   void begin_anew();
 
@@ -42,7 +46,10 @@ class Clients {
     std::int64_t target_steps;
   };
   Request make(Ask ask);
+  // The daemon refuses them if an MCU of theirs is offline.
+  Request of_all_online(Ask ask);
   Request compose(CommandKind kind);
+  CommandKind choose();
   // Drivers that are off, positions in doubt and emergencies are seen to soon.
   std::optional<Request> remedy();
   bool says(const char* detail) const;
@@ -69,6 +76,7 @@ class Clients {
   bushd::sim::Random random_;
   std::uint64_t generation_ = 0;
   std::vector<std::int64_t> number_;  // by client
+  std::int64_t flood_number_ = 0;
   std::deque<Request> sent_;
   CommandCounts sent_by_kind_{};
 };

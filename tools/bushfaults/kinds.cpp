@@ -24,6 +24,11 @@ constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
     {"limit-switches", 0, "a motor's limit switch is active for 5 ms .. 2 s"},
     {"emergency-inputs", 0, "an MCU's emergency input is active for 5 ms .. 2 s"},
     {"triggers", 0, "an edge at the trigger input of one MCU or of all"},
+    {"slow-requests", 0, "a request comes 1 ms .. 10 s late, after others of its client"},
+    {"late-repeats", 0, "a request comes again, up to half an hour later"},
+    {"stale-repeats", 0, "a request that an earlier daemon has got comes to this one"},
+    {"floods", 0, "50 .. 2000 requests at once, of up to 200 clients"},
+    {"crowds", 0, "likewise, of up to 2000 clients"},
 }};
 
 constexpr std::array<KindInfo, kCommandKinds> kCommands = {{

@@ -30,8 +30,13 @@ enum class FaultKind : std::uint8_t {
   kLimitSwitch,
   kEmergencyInput,
   kTrigger,
+  kSlowRequest,
+  kLateRepeat,
+  kStaleRepeat,
+  kFlood,
+  kCrowd,
 };
-inline constexpr std::size_t kFaultKinds = 18;
+inline constexpr std::size_t kFaultKinds = 23;
 
 // What clients send.
 enum class CommandKind : std::uint8_t {

@@ -79,6 +79,7 @@ void Positions::daemon_started() {
 }
 
 void Positions::may_be_set(std::size_t motor, std::int64_t position_steps) {
+  motors_[motor].perhaps_homed = false;
   motors_[motor].perhaps_set.push_back({position_steps, plant_steps(motor) - position_steps});
 }
 
@@ -92,17 +93,23 @@ void Positions::has_switch(std::size_t motor, std::int64_t at_steps) {
   motors_[motor].home_offset = at_steps - config_.motors[motor].home->position_steps;
 }
 
-std::optional<std::string> Positions::was_homed(std::size_t index, std::int64_t position_steps) {
+void Positions::homed(std::size_t index, std::int64_t position_steps) {
   Motor& motor = motors_[index];
   const std::int64_t stands = plant_steps(index);
-  if (!motor.at_home(stands, position_steps)) {
-    return fmt::format("{} is said to be homed, and stands at {} by its switch, not at {}",
-                       config_.motors[index].name, stands - *motor.home_offset, position_steps);
-  }
+  if (!motor.at_home(stands, position_steps)) return;
   motor.offset = stands - position_steps;
-  motor.perhaps_set.clear();
   motor.cut_off_ns.reset();
-  return std::nullopt;
+}
+
+std::optional<std::string> Positions::was_homed(std::size_t index, std::int64_t position_steps) {
+  Motor& motor = motors_[index];
+  if (!motor.perhaps_homed) return std::nullopt;  // it has been set since
+  const bool seen = motor.offset && std::abs(*motor.offset - *motor.home_offset) <= kHomeSteps;
+  if (!seen) homed(index, position_steps);
+  if (seen || motor.offset == plant_steps(index) - position_steps) return std::nullopt;
+  return fmt::format("{} is said to be homed at {}, and would be at {} by its switch",
+                     config_.motors[index].name, position_steps,
+                     plant_steps(index) - *motor.home_offset);
 }
 
 void Positions::cut_off(TimeNs now_ns, std::size_t mcu, std::size_t output) {
@@ -114,6 +121,7 @@ void Positions::cut_off(TimeNs now_ns, std::size_t mcu, std::size_t output) {
 
 std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
                                             const bushd::state_t& state) {
+  if (strict_ && !is_online(state)) return check_offline(state);
   if (!is_online(state) || state.boot_number != bus_.mcu(mcu).boot_number()) return std::nullopt;
   const auto tick = static_cast<std::uint32_t>(state.tick);
   const auto& reports = reports_[mcu];
@@ -130,6 +138,23 @@ std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
   }
   boot_seen_[mcu] = state.boot_number;
   return wrong;
+}
+
+std::optional<std::string> Positions::check_offline(const bushd::state_t& state) const {
+  for (const bushd::motor_state_t& claim : state.motors) {
+    if (claim.trust != "known") continue;
+    const auto found = std::ranges::find(config_.motors, claim.name, &bushd::config::Motor::name);
+    if (found == config_.motors.end()) return "a state of an unknown motor " + claim.name;
+    const auto index = static_cast<std::size_t>(found - config_.motors.begin());
+    if (state.boot_number == 0) {
+      return claim.name + " is said to be known, and its MCU has never been heard";
+    }
+    const auto& offset = motors_[index].offset;
+    if (offset && plant_steps(index) - *offset == claim.position_steps) continue;
+    return fmt::format("{} is said to be known to be at {} while {} is {}, and is not", claim.name,
+                       claim.position_steps, state.mcu, state.mcu_state);
+  }
+  return std::nullopt;
 }
 
 std::optional<std::string> Positions::check_age(TimeNs now_ns, std::size_t mcu,

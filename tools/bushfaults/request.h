@@ -40,6 +40,8 @@ struct Request {
   }
   // Of motors that then have a part in it, each with a result of its own.
   bool is_move() const { return ask == Ask::kMoveBy || ask == Ask::kMoveTo || ask == Ask::kArm; }
+  // Twice is not the same as once.
+  bool counts_once() const { return is_move() || ask == Ask::kHome || ask == Ask::kSetPosition; }
   // For other motors' homing, or the trigger: nobody knows for how long.
   bool may_wait() const { return ask == Ask::kHome || ask == Ask::kArm; }
 };

@@ -20,8 +20,10 @@ constexpr bushd::sim::TimeNs kResultDueNs = 40'000'000'000;
 // A daemon may not have heard for as long that a switch bars the way, and a move may take as long
 // to its end.
 constexpr bushd::sim::TimeNs kBarredNs = kResultDueNs;
-// Commands that clients repeat are younger.
-constexpr std::int64_t kNumbersKept = 60;
+// The daemon answers a command again while 64 newer ones of the client have come; here it is known
+// for longer, even if some of those have been overtaken.
+constexpr std::int64_t kNumbersAnswered = 64;
+constexpr std::int64_t kNumbersKept = 200;
 
 bool same(const reply_t& a, const reply_t& b) {
   return a.utime_us == b.utime_us && a.phase == b.phase && a.result == b.result &&
@@ -49,6 +51,7 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
     motors_.push_back({motor.name, motor.mcu.value, motor.output.value, {}, {}, {}});
   }
   states_.resize(config.mcus.size());
+  present_.resize(config.mcus.size(), true);
 }
 
 void Witness::violated(TimeNs now_ns, const std::string& what) {
@@ -66,7 +69,9 @@ Witness::Motor* Witness::find(const std::string& name) {
 }
 
 void Witness::daemon_started(TimeNs) {
+  for (const auto& [key, asked] : asked_) forget(key, asked);
   asked_.clear();
+  newest_.clear();
   repeating_.reset();
   for (Motor& motor : motors_) motor.move.reset();
   std::fill(states_.begin(), states_.end(), std::nullopt);
@@ -87,8 +92,17 @@ void Witness::request(TimeNs now_ns, const Request& request) {
     return;
   }
   asked->second.request = request;
+  std::int64_t& newest = newest_[request.client];
+  newest = std::max(newest, request.number);
   const auto old = asked_.find({request.client, request.number - kNumbersKept});
-  if (old != asked_.end() && old->second.finished()) asked_.erase(old);
+  if (old != asked_.end() && old->second.finished()) {
+    forget(old->first, old->second);
+    asked_.erase(old);
+  }
+}
+
+void Witness::forget(const Key& key, const Asked& asked) {
+  if (asked.accepted() && asked.request.counts_once()) carried_out_.insert(key);
 }
 
 void Witness::reply(TimeNs now_ns, const reply_t& reply) {
@@ -101,8 +115,9 @@ void Witness::reply(TimeNs now_ns, const reply_t& reply) {
                                  [&](const reply_t& before) { return same(before, reply); });
   const bool repeating = repeating_ == found->first;
   // A number from before the daemon's memory is refused whenever it comes.
-  const bool too_old = !asked.replies.empty() && asked.replies[0].phase == reply_t::REFUSED &&
-                       reply.phase == reply_t::REFUSED;
+  const bool forgotten = newest_[reply.client_id] - reply.number >= kNumbersAnswered;
+  const bool too_old = !asked.replies.empty() && reply.phase == reply_t::REFUSED &&
+                       (asked.replies[0].phase == reply_t::REFUSED || forgotten);
   if (repeating && (known || too_old)) return;
   recent_.note(now_ns, text_of(reply));
   const bool first = asked.replies.empty();
@@ -112,6 +127,9 @@ void Witness::reply(TimeNs now_ns, const reply_t& reply) {
   if (!in_order) return violated(now_ns, "one reply too many:" + text_of(reply));
   asked.replies.push_back(reply);
   if (reply.phase == reply_t::ACCEPTED) {
+    if (carried_out_.contains(found->first)) {
+      violated(now_ns, "carried out a second time: " + text_of(asked.request));
+    }
     asked.accepted_ns = now_ns;
     accepted(found->first, asked);
   } else if (reply.phase == reply_t::RESULT) {
@@ -136,6 +154,7 @@ void Witness::accepted(const Key& key, Asked& asked) {
   for (std::size_t i = 0; i < request.motors.size(); ++i) {
     Motor& motor = *find(request.motors[i]);
     const std::int64_t stands = plant_steps(motor);
+    if (request.is_move()) forget_unbegun(motor);
     if (request.ask == Ask::kSetPosition) {
       positions_.may_be_set(index_of(motor), request.steps[i]);
     }
@@ -159,12 +178,19 @@ void Witness::accepted(const Key& key, Asked& asked) {
   }
 }
 
+// One that has waited for the trigger in vain is at rest again before the others that waited with
+// it have ended, and with them the move.
+void Witness::forget_unbegun(Motor& motor) {
+  if (!motor.move) return;
+  const Asked& asked = asked_.at(*motor.move);
+  if (!asked.began[asked.index_of(motor.name)]) motor.move.reset();
+}
+
 // A motor that moves belongs to the newest move; its part of the one before has ended.
 void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target) {
   if (motor.move) {
     Asked& before = asked_.at(*motor.move);
-    const std::size_t index = before.index_of(motor.name);
-    if (before.began[index]) before.end[index] = End{"stopped", 0, true};
+    before.end[before.index_of(motor.name)] = End{"stopped", 0, true};
   }
   motor.move = by;
   motor.target = target;
@@ -213,6 +239,11 @@ void Witness::homed(TimeNs now_ns, const Asked& asked, const reply_t& result) {
 
 void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const nlohmann::json line = nlohmann::json::parse(json_line);
+  if (line.at("event") == "alone") {
+    const std::size_t index = index_of(*find(line.at("motor").get<std::string>()));
+    if (line.at("set")) positions_.homed(index, line.at("position_steps"));
+    return;
+  }
   const bool begins = line.at("event") == "move";
   if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
@@ -229,7 +260,10 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const std::size_t index = asked.index_of(motor.name);
   asked.end[index] = end;
   check_end(now_ns, motor, end, asked.target[index]);
-  const bool planned = asked.end[index]->word == "reached" || asked.end[index]->word == "stopped";
+  // One that waited for the trigger and was stopped before its first step makes it in a streamed
+  // tick, up to one late.
+  const bool exact = asked.request.ask != Ask::kArm;
+  const bool planned = end.word == "reached" || (end.word == "stopped" && exact);
   const auto& from = asked.from[index];
   if (planned && from && plant_steps(motor) != *from) {
     asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
@@ -279,15 +313,21 @@ void Witness::check_deadlines(TimeNs now_ns) {
   }
 }
 
+bool Witness::ready(std::size_t mcu) const {
+  return !present_[mcu] || (states_[mcu] && states_[mcu]->mcu_state == "READY");
+}
+
 bool Witness::all_ready() const {
-  return std::all_of(states_.begin(), states_.end(),
-                     [](const auto& state) { return state && state->mcu_state == "READY"; });
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (!ready(i)) return false;
+  }
+  return true;
 }
 
 std::string Witness::not_ready() const {
   std::string text;
   for (std::size_t i = 0; i < states_.size(); ++i) {
-    if (states_[i] && states_[i]->mcu_state == "READY") continue;
+    if (ready(i)) continue;
     text += text.empty() ? "" : ", ";
     text += config_.mcus[i].id + " is ";
     text += states_[i] ? states_[i]->mcu_state + " " + states_[i]->detail : "unknown";

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,6 +53,8 @@ class Witness {
 
   // As the daemon said last, by MCU; empty before it has said anything in this life.
   const std::vector<std::optional<bushd::state_t>>& states() const { return states_; }
+  // Whether it can be READY at all.
+  void expect(std::size_t mcu, bool present) { present_[mcu] = present; }
   bool all_ready() const;
   std::string not_ready() const;  // which MCUs, and why
   bool commands_open() const;
@@ -121,6 +124,8 @@ class Witness {
   void accepted(const Key& key, Asked& asked);
   void finished(TimeNs now_ns, const Key& key, const Asked& asked, const bushd::reply_t& result);
   void homed(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
+  void forget(const Key& key, const Asked& asked);
+  void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void check_end(TimeNs now_ns, const Motor& motor, const End& end,
                  std::optional<std::int64_t> target);
@@ -134,8 +139,13 @@ class Witness {
   std::vector<Motor> motors_;
   std::map<std::string, std::size_t> motor_by_name_;
   std::map<Key, Asked> asked_;
+  std::map<std::string, std::int64_t> newest_;  // number by client
+  // Of those that are forgotten, which were accepted; by whichever daemon.
+  std::set<Key> carried_out_;
   std::optional<Key> repeating_;  // the command being given was given before
   std::vector<std::optional<bushd::state_t>> states_;
+  std::vector<bool> present_;  // by MCU
+  bool ready(std::size_t mcu) const;
   std::map<std::string, std::uint64_t> moves_by_result_;
   std::map<std::string, std::uint64_t> homings_by_result_;
   std::uint64_t steps_commanded_ = 0;

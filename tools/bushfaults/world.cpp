@@ -16,8 +16,9 @@ constexpr TimeNs kHour = 3600 * kSecond;
 
 constexpr TimeNs kWellAfterNs = 5 * kSecond;  // the promise: READY by itself
 constexpr TimeNs kSkewPeriodNs = 20 * kMs;
-constexpr TimeNs kMoveNs = 12 * kSecond;     // the clients' longest, with a start and a result
-constexpr std::uint32_t kWorldStream = 1;    // of randomness
+constexpr TimeNs kMoveNs = 12 * kSecond;   // the clients' longest, with a start and a result
+constexpr std::uint32_t kWorldStream = 1;  // of randomness
+constexpr std::uint32_t kLateStream = 403;
 constexpr std::uint32_t kFaultStream = 300;  // and one for each kind of fault
 
 bushd::sim::McuOptions mcu_options(const bushd::config::Mcu& mcu, std::size_t index,
@@ -41,9 +42,11 @@ World::World(const Options& options, bushd::config::Config config)
       witness_(config_, bus_, plant_, recent_),
       skew_(config_, bus_, witness_),
       clients_(config_, witness_, options.command_rates, options.seed),
-      host_(config_, bus_, witness_, clients_, recent_, options.seed) {
+      host_(config_, bus_, witness_, clients_, recent_, options.seed),
+      mail_(clients_, host_) {
   add_mcus();
   add_motors();
+  witness_.positions().be_strict(options.strict_known);
   overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
   inputs_ = std::make_unique<Inputs>(config_, bus_, plant_, witness_, options.seed);
   for (std::size_t i = 0; i < kFaultKinds; ++i) {
@@ -53,8 +56,15 @@ World::World(const Options& options, bushd::config::Config config)
 
 void World::add_mcus() {
   bushd::sim::Random random(options_.seed, kWorldStream);
+  bushd::sim::Random late(options_.seed, kLateStream);
+  const std::size_t present = config_.mcus.size() - options_.absent_mcus;
   for (std::size_t i = 0; i < config_.mcus.size(); ++i) {
-    bus_.add_mcu(mcu_options(config_.mcus[i], i, options_.crystal_ppm, random));
+    auto options = mcu_options(config_.mcus[i], i, options_.crystal_ppm, random);
+    if (i >= present) options.boot_ns = kNever / 2;
+    if (i < present && i + options_.late_mcus >= present) {
+      options.boot_ns = late.between(kSecond, kHour / 6);
+    }
+    bus_.add_mcu(options);
   }
 }
 
@@ -102,7 +112,7 @@ void World::spell_of_trouble(TimeNs until_ns) {
       *next = now_ns_ + chance_[kind].wait(static_cast<double>(kHour) / options_.fault_rates[kind]);
     }
     if (now_ns_ >= next_command_ns_) {
-      host_.request(now_ns_, clients_.next());
+      mail_.send(now_ns_, clients_.next());
       next_command_ns_ = clients_.next_after(now_ns_);
     }
     if (now_ns_ - deadlines_checked_ns_ >= kSecond) {
@@ -114,7 +124,8 @@ void World::spell_of_trouble(TimeNs until_ns) {
 
 void World::calm() {
   if (witness_.violation()) return;
-  run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns()}));
+  run_until(std::max(
+      {now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(), mail_.quiet_ns()}));
   const TimeNs began_ns = now_ns_;
   host_.request(now_ns_, clients_.stop_all());
   be_well(began_ns);
@@ -132,6 +143,7 @@ void World::calm() {
 }
 
 void World::be_well(TimeNs began_ns) {
+  for (std::size_t i = 0; i < config_.mcus.size(); ++i) witness_.expect(i, is_up(i));
   const auto ready = [this] { return witness_.all_ready(); };
   while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
     run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
@@ -152,6 +164,7 @@ void World::advance(TimeNs until_ns) {
   bus_.advance_to(now_ns_);
   host_.run(now_ns_);
   inputs_->run(now_ns_);
+  mail_.run(now_ns_);
   if (now_ns_ - skew_checked_ns_ < kSkewPeriodNs) return;
   skew_checked_ns_ = now_ns_;
   if (const auto wrong = skew_.check(now_ns_)) witness_.violated(now_ns_, *wrong);
@@ -162,10 +175,16 @@ void World::note_fault(FaultKind kind, const std::string& detail) {
   recent_.note(now_ns_, fmt::format("fault: {} {}", info(kind).name, detail));
 }
 
+// Those that have not come yet, or never do, are in their first reset.
+bool World::is_up(std::size_t mcu) const {
+  return bus_.mcu(mcu).running() || bus_.mcu(mcu).next_event_ns() < now_ns_ + 5 * kSecond;
+}
+
 void World::reset_mcu() {
   bushd::sim::Random& random = chance_[static_cast<std::size_t>(FaultKind::kReset)];
   const auto mcu = static_cast<std::size_t>(random.below(bus_.mcu_count()));
   const TimeNs down_ns = random.magnitude(kMs, 2 * kSecond);
+  if (!is_up(mcu)) return;
   bus_.reboot(mcu, down_ns);
   plant_.cut(mcu);
   witness_.positions().mcu_reset(mcu);
@@ -197,6 +216,16 @@ void World::strike(FaultKind kind) {
       return note_fault(kind, inputs_->press_emergency(now_ns_, random));
     case FaultKind::kTrigger:
       return note_fault(kind, inputs_->trigger(now_ns_, random));
+    case FaultKind::kSlowRequest:
+      return note_fault(kind, mail_.delay_next(random));
+    case FaultKind::kLateRepeat:
+      return note_fault(kind, mail_.repeat(now_ns_, random));
+    case FaultKind::kStaleRepeat:
+      return note_fault(kind, mail_.repeat_stale(now_ns_, random));
+    case FaultKind::kFlood:
+      return note_fault(kind, mail_.flood(now_ns_, random, 200));
+    case FaultKind::kCrowd:
+      return note_fault(kind, mail_.flood(now_ns_, random, 2'000));
     case FaultKind::kSilence:
       length_ns = random.magnitude(kMs, 10 * kSecond);
       host_.silence(now_ns_ + length_ns);

@@ -16,6 +16,7 @@
 #include "inputs.h"
 #include "installation.h"
 #include "kinds.h"
+#include "mail.h"
 #include "overheard.h"
 #include "recent.h"
 #include "sim/bus.h"
@@ -30,6 +31,9 @@ struct Options {
   double hours = 0.1;
   std::size_t motors = 32;
   std::size_t mcus = 2;
+  std::size_t absent_mcus = 0;  // of these, the last ones
+  std::size_t late_mcus = 0;    // likewise, those before
+  bool strict_known = false;
   Ways ways;
   FaultRates fault_rates = usual_fault_rates();
   CommandRates command_rates = usual_command_rates();
@@ -65,6 +69,7 @@ class World {
   void strike(FaultKind kind);
   void reset_mcu();
   void deafen_mcu();
+  bool is_up(std::size_t mcu) const;
   void note_fault(FaultKind kind, const std::string& detail);
 
   Options options_;
@@ -76,6 +81,7 @@ class World {
   Skew skew_;
   Clients clients_;
   Host host_;
+  Mail mail_;
   std::vector<std::unique_ptr<bushd::sim::PaceRules>> rules_;  // by group
   std::vector<bushd::sim::Random> chance_;                     // by fault kind
   std::array<TimeNs, kFaultKinds> next_fault_ns_{};

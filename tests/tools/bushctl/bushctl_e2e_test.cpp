@@ -378,7 +378,7 @@ TEST(Examples, MoveAndWaitInCpp) {
 TEST(Examples, MoveAndWaitInPython) {
   if (access(EXAMPLE_PYTHON, X_OK) != 0) {
     GTEST_SKIP() << "no " EXAMPLE_PYTHON
-                    "; the target example_python makes it (needs a package index)";
+                    "; the test e2e.python_environment makes it (needs a package index)";
   }
   FakeDaemon daemon;
   daemon.start(always("reached"));
