@@ -1,4 +1,5 @@
 // What outlives a reset, if the port keeps it: tables, who runs which, and settings.
+#include "firmware/core/assertion.h"
 #include "firmware/core/internal.h"
 
 #define QUIET_TICKS 512u
@@ -52,11 +53,13 @@ void bushd_mcu_begin_pass(bushd_mcu_pass* pass) {
 
 bushd_mcu_piece bushd_mcu_next_kept(bushd_mcu* mcu, bushd_mcu_pass* pass, uint16_t most) {
   bushd_mcu_piece piece = bushd_mcu_kept(mcu, pass->index);
-  while (piece.at != NULL && pass->offset == piece.size) {
+  while (piece.at != NULL && pass->offset >= piece.size) {
     piece = bushd_mcu_kept(mcu, ++pass->index);
     pass->offset = 0;
   }
   if (piece.at == NULL) return piece;
+  BUSHD_ASSERT(pass->offset < piece.size);
+  BUSHD_ASSERT(pass->size < BUSHD_MCU_MOST_KEPT(mcu->config.code_count));
   const uint16_t left = (uint16_t)(piece.size - pass->offset);
   const bushd_mcu_piece bytes = {(uint8_t*)piece.at + pass->offset, left < most ? left : most};
   pass->offset = (uint16_t)(pass->offset + bytes.size);

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "firmware/core/assertion.h"
 #include "firmware/core/internal.h"
 
 #define STALE_TAGS 128u
@@ -168,6 +169,7 @@ static bool is_stale(bushd_mcu* mcu, const bushd_frame* frame) {
 
 void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns) {
   bushd_mcu_finish_rows(mcu);
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_RECEIVER);
   bushd_frame frame;
   switch (bushd_receive_byte(&mcu->receiver, byte, &frame)) {
     case BUSHD_RECEIVE_MORE:

@@ -333,6 +333,19 @@ typedef struct bushd_mcu {
   bushd_mcu_answer answer;
 } bushd_mcu;
 
+// Who may use the receiver's buffer. Nobody else writes to it until the owner is another one: rows
+// of a frame that was taken are read from it, and an answer may be made at its end
+// (bushd_mcu_config.reply). What a port does with an answer that it was handed is its own.
+typedef enum bushd_mcu_buffer_owner {
+  BUSHD_MCU_BUFFER_RECEIVER = 0,
+  BUSHD_MCU_BUFFER_ROWS = 1,
+  BUSHD_MCU_BUFFER_ANSWER = 2
+} bushd_mcu_buffer_owner;
+static inline bushd_mcu_buffer_owner bushd_mcu_owner_of_buffer(const bushd_mcu* mcu) {
+  if (mcu->rows.next < mcu->rows.ticks.count) return BUSHD_MCU_BUFFER_ROWS;
+  return mcu->answer.size != 0 ? BUSHD_MCU_BUFFER_ANSWER : BUSHD_MCU_BUFFER_RECEIVER;
+}
+
 // Starts in state BUSY with EN low, unless it is to be high at boot; a control message raises it.
 void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_config* config);
 
@@ -345,6 +358,11 @@ typedef struct bushd_mcu_piece {
   uint16_t size;
 } bushd_mcu_piece;
 bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index);
+// Bytes of all pieces together, with this much table memory and all motors.
+#define BUSHD_MCU_MOST_KEPT(code_count)                                                          \
+  (sizeof(uint32_t) + sizeof(bushd_format) + sizeof(bushd_set_inputs) + sizeof(bushd_emission) + \
+   sizeof(uint16_t) + BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) +            \
+   sizeof(uint16_t) + (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t))
 void bushd_mcu_restored(bushd_mcu* mcu);
 
 // For a port that goes through all pieces a little at a time, again and again.
@@ -357,7 +375,9 @@ typedef struct bushd_mcu_pass {
   uint16_t same_uptime;  // since when it is the same
 } bushd_mcu_pass;
 void bushd_mcu_begin_pass(bushd_mcu_pass* pass);
-// The next bytes, up to `most` (>= 1); empty at the end.
+// The next bytes, up to `most` (>= 1); empty at the end. Pieces may change between two calls: of
+// one that has become shorter than the pass has come, nothing is left. Never more bytes in all than
+// BUSHD_MCU_MOST_KEPT.
 bushd_mcu_piece bushd_mcu_next_kept(bushd_mcu* mcu, bushd_mcu_pass* pass, uint16_t most);
 // At the end of a pass: whether what is kept has stayed the same for so long that it may be
 // written. A master that begins changes one thing after the other.

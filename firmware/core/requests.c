@@ -1,6 +1,7 @@
 // Frames for this MCU: what they ask for, and what is answered.
 #include <string.h>
 
+#include "firmware/core/assertion.h"
 #include "firmware/core/internal.h"
 
 // What it says of each motor. One island has room in a report: that of the lowest motor, and who
@@ -301,6 +302,7 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
 }
 
 void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_RECEIVER);
   answer a;
   a.due = frame->address != BUSHD_ADDRESS_BROADCAST && is_answered(frame->type);
   a.delay_ns = 0;
@@ -321,6 +323,9 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
     const bushd_acknowledgement acknowledgement = {(uint8_t)status};
     a.size = bushd_encode_acknowledgement(&acknowledgement, a.payload);
   }
+  // What is answered reads no more of the frame.
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_RECEIVER);
+  BUSHD_ASSERT(BUSHD_FRAME_HEADER + a.size + BUSHD_FRAME_CRC + 3u <= BUSHD_MCU_MAX_REPLY);
   uint8_t* const raw = mcu->config.reply + 2;
   raw[0] = mcu->config.address;
   raw[1] = (uint8_t)(frame->type | BUSHD_TYPE_REPLY);

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "engine/slots.h"
+#include "firmware/core/assertion.h"
 #include "firmware/core/internal.h"
 
 void bushd_mcu_clear_streams(bushd_mcu* mcu) {
@@ -299,6 +300,7 @@ void bushd_mcu_put_coarse_row(int16_t* queued, uint16_t mask, const uint8_t* cou
 
 static void put_row(bushd_mcu* mcu) {
   const bushd_ticks* const ticks = &mcu->rows.ticks;
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_ROWS);
   const uint8_t row = mcu->rows.next++;
   int16_t* queued = queue_at(mcu, ticks->first_tick + row, 0);
   uint16_t mask = ticks->mask;
@@ -338,6 +340,7 @@ void bushd_mcu_finish_row(bushd_mcu* mcu, uint32_t tick) {
 }
 
 static void put_rows_later(bushd_mcu* mcu, const bushd_ticks* ticks) {
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_RECEIVER);
   mcu->rows.ticks = *ticks;
   mcu->rows.next = 0;
 }

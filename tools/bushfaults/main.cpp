@@ -89,8 +89,7 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "bushfaults: {}\n", config.error().text());
     return kUsage;
   }
-  const auto switches = static_cast<std::size_t>(bushfaults::FaultKind::kLimitSwitch);
-  if (options.fault_rates[switches] > 0) bushfaults::add_limit_switches(*config);
+  bushfaults::furnish(*config, options.fault_rates, options.command_rates, options.seed);
   fmt::print(stderr, "seed {}\n", options.seed);
 
   const std::clock_t began = std::clock();

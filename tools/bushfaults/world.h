@@ -13,8 +13,10 @@
 #include "clients.h"
 #include "config/config.h"
 #include "host.h"
+#include "inputs.h"
 #include "installation.h"
 #include "kinds.h"
+#include "mail.h"
 #include "overheard.h"
 #include "recent.h"
 #include "sim/bus.h"
@@ -64,9 +66,6 @@ class World {
   void strike(FaultKind kind);
   void reset_mcu();
   void deafen_mcu();
-  void press_switch();
-  void set_switches(std::size_t mcu);
-  void release_switches();
   void note_fault(FaultKind kind, const std::string& detail);
 
   Options options_;
@@ -78,15 +77,16 @@ class World {
   Skew skew_;
   Clients clients_;
   Host host_;
+  Mail mail_;
   std::vector<std::unique_ptr<bushd::sim::PaceRules>> rules_;  // by group
   std::vector<bushd::sim::Random> chance_;                     // by fault kind
   std::array<TimeNs, kFaultKinds> next_fault_ns_{};
   std::unique_ptr<Overheard> overheard_;  // once the MCUs are on the bus
+  std::unique_ptr<Inputs> inputs_;        // likewise
   FaultCounts faults_{};
   TimeNs now_ns_ = 0;
   TimeNs next_command_ns_ = 0;
-  std::vector<TimeNs> pressed_until_ns_;  // by motor, its limit switch; 0: it is not
-  TimeNs mcus_up_ns_ = 0;                 // when the last MCU that was reset boots
+  TimeNs mcus_up_ns_ = 0;  // when the last MCU that was reset boots
   TimeNs deadlines_checked_ns_ = 0;
   TimeNs skew_checked_ns_ = 0;
 };
