@@ -1,6 +1,8 @@
 // What outlives a reset, if the port keeps it: tables, who runs which, and settings.
+#include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
-#include "firmware/core/internal.h"
+#include "firmware/core/emission.h"
+#include "firmware/core/inputs.h"
 
 #define QUIET_TICKS 512u
 
@@ -23,13 +25,13 @@ bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
     case LOCAL:
       return piece_of(&mcu->local.motors, sizeof mcu->local.motors);
     case TABLES:
-      return piece_of(mcu->table, sizeof mcu->table);
+      return piece_of(mcu->tables.slot, sizeof mcu->tables.slot);
     case VALID_TABLES:
-      return piece_of(&mcu->valid_tables, sizeof mcu->valid_tables);
+      return piece_of(&mcu->tables.valid, sizeof mcu->tables.valid);
     case CODES_USED:
-      return piece_of(&mcu->codes_used, sizeof mcu->codes_used);
+      return piece_of(&mcu->tables.codes_used, sizeof mcu->tables.codes_used);
     case CODES:
-      return piece_of(mcu->config.codes, mcu->codes_used * sizeof mcu->config.codes[0]);
+      return piece_of(mcu->config.codes, mcu->tables.codes_used * sizeof mcu->config.codes[0]);
     default: {
       const uint8_t motor = (uint8_t)(index - MOTORS);
       if (motor >= mcu->config.motors) return piece_of(NULL, 0);

@@ -9,6 +9,7 @@
 // those that have moves if there are any.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -30,7 +31,7 @@ class Synchroniser {
   void port_opened(std::int64_t now_us) { due_us_ = now_us; }
   void port_lost() { clock_.reset(); }
   // An MCU has been found that may have to be told the time.
-  void hurry(std::int64_t now_us) { due_us_ = due_us_ < now_us ? due_us_ : now_us; }
+  void hurry(std::int64_t now_us) { due_us_ = std::min(due_us_, now_us); }
 
   // A frame that is not an answer.
   void overheard(std::int64_t now_us, const bushd_frame& frame);

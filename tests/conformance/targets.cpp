@@ -65,6 +65,7 @@ class Lm3s6965 final : public McuUnderTest {
                             EdgeSink* sink) override {
     QemuOptions options;
     options.image = LM3S_IMAGES "-500000.elf";
+    options.memory_owners = LM3S_MEMORY_OWNERS;
     options.address = birth.address;
     options.unique_id = birth.unique_id;
     options.boots = birth.boots;

@@ -67,7 +67,7 @@ TEST_F(Kept, AWalkGoesOverAllOfIt) {
   const Walk found = walk(7, 0, [] {});
   EXPECT_TRUE(found.ended);
   expect_own(found);
-  const std::size_t used = rig.mcu().codes_used;
+  const std::size_t used = rig.mcu().tables.codes_used;
   ASSERT_GT(used, 0u);
   EXPECT_EQ(found.bytes,
             most() - 2 * (kCodes - used) - (BUSHD_MOTORS_PER_MCU - rig.options().motors));

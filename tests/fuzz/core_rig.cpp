@@ -14,12 +14,12 @@ CoreRig::CoreRig(const CoreConfiguration& configuration)
 
 Sight CoreRig::sight() {
   const bushd_mcu_clock& clock = mcu_.clock;
-  return {mcu_.config.address, motors(),   mcu_.epoch,      mcu_.tick,    mcu_.tick_ns,
+  return {mcu_.config.address, motors(),   mcu_.stream.epoch,      mcu_.tick,    mcu_.tick_ns,
           clock.master,        clock.mark, clock.mark_tick, clock.mark_ns};
 }
 
 std::uint32_t CoreRig::table_crc(std::uint8_t slot) {
-  const bushd_table& table = mcu_.table[slot].table;
+  const bushd_table& table = mcu_.tables.slot[slot].table;
   return table.accel.count != 0 ? bushd_table_crc32(&table) : 0;
 }
 
@@ -240,7 +240,7 @@ void CoreRig::check_motor(const bushd_mcu_motor& motor) const {
   BUSHD_REQUIRE(motor.table < static_cast<int>(BUSHD_TABLE_SLOTS));
   // The table that it must be able to run down.
   if (motor.delay != 0 || motor.mode != BUSHD_MCU_STREAM) {
-    BUSHD_REQUIRE(motor.table >= 0 && (mcu_.valid_tables >> motor.table & 1) != 0);
+    BUSHD_REQUIRE(motor.table >= 0 && (mcu_.tables.valid >> motor.table & 1) != 0);
   }
   if (motor.mode != BUSHD_MCU_RUN_WAITS && motor.mode != BUSHD_MCU_TABLE_RUN) {
     const auto known = static_cast<std::int32_t>(motor.known_until - mcu_.tick);
@@ -258,7 +258,7 @@ void CoreRig::check_state() const {
   BUSHD_REQUIRE(mcu_.state <= BUSHD_STATE_FAULT);
   BUSHD_REQUIRE(enabled_ == ((mcu_.flags & BUSHD_FLAG_ENABLED) != 0));
   BUSHD_REQUIRE(mcu_.config.address == address_);
-  BUSHD_REQUIRE(mcu_.codes_used <= configuration_.codes && mcu_.tick_ns == tick_ns_);
+  BUSHD_REQUIRE(mcu_.tables.codes_used <= configuration_.codes && mcu_.tick_ns == tick_ns_);
   for (std::size_t m = 0; m < motors(); ++m) check_motor(mcu_.motor[m]);
   for (std::size_t m = motors(); m < BUSHD_MOTORS_PER_MCU; ++m) {
     BUSHD_REQUIRE(mcu_.motor[m].position_steps == 0 && mcu_.motor[m].known_until == 0);

@@ -113,7 +113,7 @@ class AvrRig final : public CoreRig {
   }
 
   bool frame_is_worked_off() const {
-    return mcu_.answer.size == 0 && mcu_.rows.next == mcu_.rows.ticks.count;
+    return mcu_.answer.size == 0 && mcu_.stream.rows.next == mcu_.stream.rows.ticks.count;
   }
 
   // A turn of the main loop in which no tick begins, as in main.c.
@@ -155,8 +155,8 @@ class AvrRig final : public CoreRig {
         mcu_.state == BUSHD_STATE_RUN || (mcu_.plane[0].active | mcu_.plane[1].active) != 0;
     if (moves) return;
     const Poisoned receiver(&mcu_.receiver, sizeof mcu_.receiver);
-    const Poisoned free_codes(codes_.data() + mcu_.codes_used,
-                              (codes_.size() - mcu_.codes_used) * sizeof codes_[0]);
+    const Poisoned free_codes(codes_.data() + mcu_.tables.codes_used,
+                              (codes_.size() - mcu_.tables.codes_used) * sizeof codes_[0]);
     for (; times > 0; --times) {
       if (++polls_ % kPollsPerWrittenByte == 0) host_end_write();
       if (host_writes()) continue;

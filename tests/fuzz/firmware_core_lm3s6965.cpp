@@ -59,8 +59,8 @@ class Lm3s6965Rig final : public CoreRig {
     const bool moves =
         mcu_.state == BUSHD_STATE_RUN || (mcu_.plane[0].active | mcu_.plane[1].active) != 0;
     if (moves || bushd_mcu_wants_samples(&mcu_)) return;
-    const Poisoned free_codes(codes_.data() + mcu_.codes_used,
-                              (codes_.size() - mcu_.codes_used) * sizeof codes_[0]);
+    const Poisoned free_codes(codes_.data() + mcu_.tables.codes_used,
+                              (codes_.size() - mcu_.tables.codes_used) * sizeof codes_[0]);
     for (; times > 0; --times) {
       kept_poll(&mcu_);
       check_walk(host_walk());

@@ -172,7 +172,7 @@ TEST_P(Stream, ReplacementSwitchesThePlanAtItsTick) {
 // out before the source knows and has planned anew.
 TEST_P(Stream, LateReplacementIsToldBeforeAnythingElseIsSent) {
   int late = 0;
-  for (int silent_ms = 150; silent_ms < 230; silent_ms += 2) {
+  for (int unanswered_ms = 150; unanswered_ms < 230; unanswered_ms += 2) {
     FakeBus fresh(1, 4, GetParam());
     fresh.source.displacement = bus.source.displacement;
     fresh.connect();
@@ -180,7 +180,7 @@ TEST_P(Stream, LateReplacementIsToldBeforeAnythingElseIsSent) {
     fresh.master->begin(McuIndex{0}, 0, start);
     fresh.run_for(600'000);
     fresh.slaves[0].loses = [](const Heard& frame) { return frame.type == BUSHD_MSG_POLL; };
-    fresh.run_for(silent_ms * 1000);
+    fresh.run_for(unanswered_ms * 1000);
     const Tick at = fresh.master->earliest_replace(fresh.now_us);
     fresh.source.displacement = [at](std::uint8_t m, Tick t) { return value(m, t, t >= at); };
     fresh.master->replace(McuIndex{0}, 1, at);
@@ -193,7 +193,7 @@ TEST_P(Stream, LateReplacementIsToldBeforeAnythingElseIsSent) {
     fresh.source.displacement = bus.source.displacement;
     fresh.run_for(500'000);
     for (const auto& [tick, taken] : fresh.slaves[0].taken[0]) {
-      ASSERT_EQ(taken, value(0, tick, 0)) << silent_ms << " ms, tick " << tick - start;
+      ASSERT_EQ(taken, value(0, tick, 0)) << unanswered_ms << " ms, tick " << tick - start;
     }
   }
   EXPECT_GT(late, 0);

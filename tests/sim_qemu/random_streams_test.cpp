@@ -12,6 +12,7 @@ class QemuRandomStreams : public RandomStreams {
       : RandomStreams(100'000'000, [](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
           QemuOptions options;
           options.image = LM3S_IMAGES "-1000000.elf";
+          options.memory_owners = LM3S_MEMORY_OWNERS;
           options.address = kAddress;
           options.unique_id = 0x1122334455667788;
           return std::make_unique<QemuMcu>(options, index, driver, sink);

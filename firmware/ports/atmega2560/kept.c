@@ -62,7 +62,7 @@ static void compare_whole(const bushd_mcu* mcu) {
   const kept_head head = read_head();
   const bool same = head.state == HEAD_WHOLE && head.program == image_seal &&
                     head.size == pass.size && head.crc == pass.crc;
-  const bool news = head.state != 0xFF || mcu->codes_used != 0;
+  const bool news = head.state != 0xFF || mcu->tables.codes_used != 0;
   const bool quiet = bushd_mcu_kept_is_quiet(mcu, &pass);
   if (!same && news && quiet) {
     phase = WRITE;

@@ -39,16 +39,16 @@ static inline void name_parts(void) {
   NAME_BYTES("reply", offsetof(bushd_mcu, receiver.buffer) + LINE_REPLY_AT, BUSHD_MCU_MAX_REPLY);
   NAME_PART("answer", answer);
   NAME_PART("answer.size", answer.size);
-  NAME_PART("rows", rows);
-  NAME_PART("rows.next", rows.next);
-  NAME_PART("rows.count", rows.ticks.count);
+  NAME_PART("rows", stream.rows);
+  NAME_PART("rows.next", stream.rows.next);
+  NAME_PART("rows.count", stream.rows.ticks.count);
   NAME_PART("config", config);
   NAME_PART("config.queue", config.queue);
   NAME_PART("config.codes", config.codes);
   NAME_PART("config.reply", config.reply);
   NAME_PART("planes", plane);
   NAME_PART("motors", motor);
-  NAME_PART("tables", table);
+  NAME_PART("tables", tables);
 }
 
 static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
