@@ -71,7 +71,8 @@ EventLoop::EventLoop(const config::Config& config, lcm::Transport& transport, Mo
       transport_(transport),
       move_log_(move_log),
       library_(std::move(library)),
-      core_(config, *this, master_number()),
+      shim_(config, *this, master_number()),
+      core_(shim_.core()),
       ports_(config.buses.size()),
       lost_(config.buses.size()),
       state_channel_(config.lcm.prefix + "_STATE"),
@@ -114,7 +115,7 @@ Result<void> EventLoop::set_up() {
       [this](const table_request_t& request) { on_table_request(request); });
   if (!subscribed) return subscribed;
   return transport_.subscribe<command_t>(
-      command_channel_, [this](const command_t& command) { core_.command(now_us(), command); });
+      command_channel_, [this](const command_t& command) { shim_.command(now_us(), command); });
 }
 
 // What groups were given before this daemon started is as binding as the configuration.
@@ -125,8 +126,8 @@ Result<void> EventLoop::restore_tables() {
     const auto wanted = kept->find(config_.groups[group].name);
     if (wanted == kept->end()) continue;
     const auto table = library_.open(wanted->second);
-    auto restored =
-        table ? core_.restore(group, wanted->second, *table) : Result<void>(fail(table.error()));
+    auto restored = table ? core_.tables().restore({group}, wanted->second, *table)
+                          : Result<void>(fail(table.error()));
     if (restored) continue;
     restored.error().message +=
         " (table " + wanted->second + " was given to group " + config_.groups[group].name + "; " +
@@ -159,7 +160,7 @@ Result<void> EventLoop::run() {
       const epoll_event& event = events[static_cast<std::size_t>(i)];
       if (event.data.u64 == kLcmTag) {
         transport_.handle();
-        core_.set_rejected_commands(transport_.rejected());
+        shim_.set_rejected_commands(transport_.rejected());
       } else if (event.data.u64 == kWorkerTag) {
         worker_.handle();
       } else if (event.data.u64 == kSignalTag) {
@@ -203,14 +204,14 @@ void EventLoop::open_port(std::int64_t now, std::size_t bus) {
     if (error != port.last_error) {
       spdlog::error("bus {}: {}; trying again twice a second", config.name, error);
       port.last_error = error;
-      core_.port_lost(now, bus, "is out of reach: port " + error);
+      core_.port_lost(now, {bus}, "is out of reach: port " + error);
     }
     return;
   }
   port.serial = std::move(*opened);
   port.last_error.clear();
   spdlog::info("bus {}: port {} opened at {} baud", config.name, port.serial->path(), config.baud);
-  core_.port_opened(now, bus);
+  core_.port_opened(now, {bus});
 }
 
 void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& cause) {
@@ -222,7 +223,7 @@ void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& 
   port.open_due_us = now + kReopenUs;
   port.last_error = path + ": " + cause;
   spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, path, cause);
-  core_.port_lost(now, bus, "is out of reach: port " + port.last_error);
+  core_.port_lost(now, {bus}, "is out of reach: port " + port.last_error);
 }
 
 void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t events) {
@@ -231,7 +232,7 @@ void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t eve
   if (events & EPOLLIN) {
     std::vector<std::uint8_t> bytes;
     const auto read = serial.read(bytes);
-    if (!bytes.empty()) core_.receive(now, bus, bytes);
+    if (!bytes.empty()) core_.receive(now, {bus}, bytes);
     if (!read) return lose_port(now, bus, read.error().text());
   } else if (events & (EPOLLHUP | EPOLLERR)) {
     return lose_port(now, bus, "hung up");
@@ -248,7 +249,7 @@ void EventLoop::handle_signal(std::int64_t now) {
   if (::read(signals_, &info, sizeof info) != sizeof info || shut_down_by_us_) return;
   if (info.ssi_signo == SIGHUP) {
     spdlog::info("SIGHUP: all tables are read again");
-    return core_.reload_tables();
+    return core_.tables().request({}, api::ReloadTables{});
   }
   spdlog::info("{}: ramping all motors down", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
   core_.shut_down(now);
@@ -259,14 +260,14 @@ void EventLoop::read_tables(std::uint64_t ticket, const std::vector<std::string>
   worker_.post([this, ticket, wanted]() -> Worker::Rest {
     std::vector<Result<tables::TablePtr>> read;
     for (const std::string& table : wanted) read.push_back(library_.open(table));
-    return [this, ticket, read] { core_.tables_read(now_us(), ticket, read); };
+    return [this, ticket, read] { core_.tables().read(now_us(), ticket, read); };
   });
 }
 
 void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
   worker_.post([this, ticket, wanted]() -> Worker::Rest {
     const auto kept = library_.keep(wanted);
-    return [this, ticket, kept] { core_.tables_kept(ticket, kept); };
+    return [this, ticket, kept] { core_.tables().kept(ticket, kept); };
   });
 }
 
@@ -277,7 +278,9 @@ void EventLoop::on_table_request(const table_request_t& request) {
   std::string why;
   if (request.kind == table_request_t::SET) {
     const auto table = table_of(request);
-    why = table ? core_.refuse_content(request.table, *table) : table.error().text();
+    const auto good =
+        table ? core_.tables().check_content(request.table, *table) : fail(table.error());
+    if (!good) why = good.error().text();
   }
   worker_.post([this, request, why]() -> Worker::Rest {
     table_reply_t reply = why.empty() ? answer(library_, request) : refusal(request, why);
@@ -303,7 +306,8 @@ void EventLoop::log_cpu_share() const {
                100.0 * cpu_s / elapsed_s);
 }
 
-void EventLoop::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
+void EventLoop::send(BusId id, std::span<const std::uint8_t> bytes) {
+  const std::size_t bus = id.value;
   if (!ports_[bus].serial) return;
   const bool waited = ports_[bus].serial->wants_to_write();
   if (const auto written = ports_[bus].serial->write(bytes); !written) {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "config/config.h"
-#include "daemon/core.h"
+#include "daemon/lcm_shim.h"
 #include "daemon/move_log.h"
 #include "daemon/table_library.h"
 #include "daemon/worker.h"
@@ -18,7 +18,7 @@
 
 namespace bushd::daemon {
 
-class EventLoop : private Outputs {
+class EventLoop : private LcmOutputs {
  public:
   // Everything outlives the loop. `move_log` may be null.
   EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log,
@@ -56,7 +56,7 @@ class EventLoop : private Outputs {
   void check_published(const Result<void>& published);
 
   // Outputs
-  void send(std::size_t bus, std::span<const std::uint8_t> bytes) override;
+  void send(BusId id, std::span<const std::uint8_t> bytes) override;
   void reply(const reply_t& reply) override;
   void state(const state_t& state) override;
   void health(const health_t& health) override;
@@ -70,7 +70,8 @@ class EventLoop : private Outputs {
   lcm::Transport& transport_;
   MoveLog* move_log_;
   TableLibrary library_;
-  Core core_;
+  LcmShim shim_;
+  Core& core_;
   std::vector<Port> ports_;
   std::vector<std::optional<std::string>>
       lost_;  // by bus: a write failed, to be handled outside the core

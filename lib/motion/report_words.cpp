@@ -1,9 +1,9 @@
-#include "daemon/faults.h"
+#include "motion/report_words.h"
 
 #include <array>
 #include <utility>
 
-namespace bushd::daemon {
+namespace bushd::motion {
 namespace {
 
 void append(std::string& list, const char* word, const char* separator) {
@@ -103,4 +103,4 @@ std::string forbidden_word(const bushd_report& report, unsigned output) {
   return negative ? "negative" : "";
 }
 
-}  // namespace bushd::daemon
+}  // namespace bushd::motion

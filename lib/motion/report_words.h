@@ -5,7 +5,7 @@
 
 #include "engine/message.h"
 
-namespace bushd::daemon {
+namespace bushd::motion {
 
 // The gravest fault that is latched, and what to do about it; "" if none is.
 std::string fault_text(const bushd_report& report);
@@ -17,4 +17,4 @@ std::string system_inputs_words(std::uint8_t inputs);  // as in state_t
 bool forbids(const bushd_report& report, unsigned output, int direction);
 std::string forbidden_word(const bushd_report& report, unsigned output);  // as in motor_state_t
 
-}  // namespace bushd::daemon
+}  // namespace bushd::motion
