@@ -3,5 +3,9 @@ set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR avr)
 set(CMAKE_C_COMPILER avr-gcc)
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
-set(CMAKE_C_FLAGS_INIT "-mmcu=atmega2560 -ffunction-sections -fdata-sections")
-set(CMAKE_ASM_FLAGS_INIT "-mmcu=atmega2560")
+# Line numbers, for whoever finds a program counter; of paths they hold nothing that depends on where it was built.
+get_filename_component(source_dir ${CMAKE_CURRENT_LIST_DIR}/.. ABSOLUTE)
+# A path may have spaces; this compiler would note it with the flags.
+set(debug_flags "-gdwarf-2 -gno-record-gcc-switches \"-fdebug-prefix-map=${source_dir}=.\" \"-fdebug-prefix-map=${CMAKE_BINARY_DIR}=.\"")
+set(CMAKE_C_FLAGS_INIT "-mmcu=atmega2560 -ffunction-sections -fdata-sections ${debug_flags}")
+set(CMAKE_ASM_FLAGS_INIT "-mmcu=atmega2560 ${debug_flags}")

@@ -2,15 +2,9 @@
 
 #include <algorithm>
 
+#include "base/overloaded.h"
+
 namespace bushd::daemon {
-namespace {
-
-template <class... Functions>
-struct Overloaded : Functions... {
-  using Functions::operator()...;
-};
-
-}  // namespace
 
 Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
     : outputs_(outputs),

@@ -14,29 +14,30 @@ std::string shortened(const std::string& text) {
 
 }  // namespace
 
-std::uint16_t AxisSource::render(std::size_t mcu, std::uint8_t motor, link::Tick first,
+std::uint16_t AxisSource::render(link::McuIndex mcu, std::uint8_t motor, link::Tick first,
                                  unsigned count, std::int16_t* out, std::size_t stride) {
-  motion::Axis* axis = axis_of(McuOnBus{mcu}, Output{motor});
+  motion::Axis* axis = axis_of(mcu, Output{motor});
   if (axis != nullptr) return axis->render(first, count, out, stride);
   for (unsigned i = 0; i < count; ++i) out[i * stride] = 0;
   return 0;
 }
 
-std::optional<link::TickSource::Stretch> AxisSource::run_at(std::size_t mcu, std::uint8_t motor,
-                                                            link::Tick first, unsigned max_ticks) {
-  motion::Axis* axis = axis_of(McuOnBus{mcu}, Output{motor});
+std::optional<link::TickSource::RunSegment> AxisSource::run_at(link::McuIndex mcu,
+                                                               std::uint8_t motor, link::Tick first,
+                                                               unsigned max_ticks) {
+  motion::Axis* axis = axis_of(mcu, Output{motor});
   if (axis == nullptr) return std::nullopt;
-  const auto stretch = axis->run_at(first, max_ticks);
-  if (!stretch) return std::nullopt;
-  return Stretch{.run = stretch->run, .ticks = stretch->ticks};
+  const auto segment = axis->run_at(first, max_ticks);
+  if (!segment) return std::nullopt;
+  return RunSegment{.run = segment->run, .ticks = segment->ticks};
 }
 
-link::Tick AxisSource::end_tick(std::size_t mcu, std::uint8_t motor) {
-  const motion::Axis* axis = axis_of(McuOnBus{mcu}, Output{motor});
+link::Tick AxisSource::end_tick(link::McuIndex mcu, std::uint8_t motor) {
+  const motion::Axis* axis = axis_of(mcu, Output{motor});
   return axis == nullptr ? 0 : axis->end_tick();
 }
 
-motion::Axis* Bus::axis_of(McuOnBus mcu, Output output) {
+motion::Axis* Bus::axis_of(link::McuIndex mcu, Output output) {
   const auto id = installation_[mcus[mcu.value]].motor_at(output);
   if (!id) return nullptr;
   motion::Motor& motor = installation_[*id];
@@ -49,7 +50,7 @@ Result<void> Mcu::must_be_online() const {
 }
 
 Result<void> Mcu::has_room(const link::McuSetup& setup) const {
-  const std::string why = master_.no_room(on_bus_.value, setup);
+  const std::string why = master_.no_room(on_bus_, setup);
   if (why.empty()) return {};
   return fail("MCU " + name() + " " + why);
 }
@@ -86,7 +87,7 @@ void Installation::add_mcus() {
     const McuId id{mcus_.size()};
     Bus& bus = *buses_[mcu.bus];
     const auto place = std::ranges::find(bus.mcus, id) - bus.mcus.begin();
-    mcus_.add(id, mcu, bus.master, McuOnBus{static_cast<std::size_t>(place)});
+    mcus_.add(id, mcu, bus.master, link::McuIndex{static_cast<std::size_t>(place)});
   }
 }
 

@@ -29,13 +29,13 @@ class Installation;
 class AxisSource : public link::TickSource {
  public:
   // Null where no motor is or where it has no plan.
-  virtual motion::Axis* axis_of(McuOnBus mcu, Output output) = 0;
+  virtual motion::Axis* axis_of(link::McuIndex mcu, Output output) = 0;
 
-  std::uint16_t render(std::size_t mcu, std::uint8_t motor, link::Tick first, unsigned count,
+  std::uint16_t render(link::McuIndex mcu, std::uint8_t motor, link::Tick first, unsigned count,
                        std::int16_t* out, std::size_t stride) final;
-  std::optional<Stretch> run_at(std::size_t mcu, std::uint8_t motor, link::Tick first,
-                                unsigned max_ticks) final;
-  link::Tick end_tick(std::size_t mcu, std::uint8_t motor) final;
+  std::optional<RunSegment> run_at(link::McuIndex mcu, std::uint8_t motor, link::Tick first,
+                                   unsigned max_ticks) final;
+  link::Tick end_tick(link::McuIndex mcu, std::uint8_t motor) final;
 };
 
 class Bus final : public AxisSource {
@@ -43,11 +43,11 @@ class Bus final : public AxisSource {
   Bus(const config::Bus& as_configured, link::BusSetup setup, Installation& of)
       : config(as_configured), master(std::move(setup), *this), installation_(of) {}
 
-  motion::Axis* axis_of(McuOnBus mcu, Output output) override;
+  motion::Axis* axis_of(link::McuIndex mcu, Output output) override;
 
   const config::Bus& config;
   link::Master master;
-  std::vector<McuId> mcus;  // by McuOnBus
+  std::vector<McuId> mcus;  // by link::McuIndex
   std::string port_state = "not yet opened";
   bool two_masters = false;  // as told in the log last
 
@@ -58,7 +58,7 @@ class Bus final : public AxisSource {
 // One MCU, and what can be asked of it; link::Master says what each function does.
 class Mcu {
  public:
-  Mcu(McuId its_id, const config::Mcu& as_configured, link::Master& master, McuOnBus on_bus)
+  Mcu(McuId its_id, const config::Mcu& as_configured, link::Master& master, link::McuIndex on_bus)
       : id(its_id), config(as_configured), master_(master), on_bus_(on_bus) {}
 
   const McuId id;
@@ -66,58 +66,61 @@ class Mcu {
   const std::string& name() const { return config.id; }
   const std::vector<MotorId>& motors() const { return motors_; }  // in the order of outputs
   std::optional<MotorId> motor_at(Output output) const { return motor_at_[output.value]; }
-  McuOnBus on_bus() const { return on_bus_; }
+  link::McuIndex on_bus() const { return on_bus_; }
 
-  const link::McuView& view() const { return master_.view(on_bus_.value); }
+  const link::McuView& view() const { return master_.view(on_bus_); }
   const bushd_report& report() const { return view().report; }
   bool online() const { return view().phase == link::McuPhase::kOnline; }
   bool offline() const { return view().phase == link::McuPhase::kOffline; }
   Result<void> must_be_online() const;
   // It has not yet answered all that it was asked, or not yet reported since.
-  bool busy() const { return master_.busy(on_bus_.value); }
-  const link::McuHealth& health() const { return master_.health(on_bus_.value); }
-  bool can_run_tables() const { return master_.can_run_tables(on_bus_.value); }
-  bool can_trigger() const { return master_.can_trigger(on_bus_.value); }
-  bool can_compare_positions() const { return master_.has_reference(on_bus_.value); }
+  bool busy() const { return master_.busy(on_bus_); }
+  const link::McuHealth& health() const { return master_.health(on_bus_); }
+  bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
+  bool can_trigger() const { return master_.can_trigger(on_bus_); }
+  bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }
   bool can_home() const { return (view().identity.capabilities & BUSHD_CAN_HOME) != 0; }
 
   link::Tick earliest_start(std::int64_t now_us, Output output) const {
-    return master_.earliest_start(now_us, on_bus_.value, output.value);
+    return master_.earliest_start(now_us, on_bus_, output.value);
   }
   link::Tick earliest_replace(std::int64_t now_us) const {
     return master_.earliest_replace(now_us);
   }
-  void begin(Output output, link::Tick start) { master_.begin(on_bus_.value, output.value, start); }
+  link::Tick earliest_retarget(std::int64_t now_us, link::Tick start) const {
+    return master_.earliest_retarget(now_us, start);
+  }
+  void begin(Output output, link::Tick start) { master_.begin(on_bus_, output.value, start); }
   void begin_table_run(Output output, link::Tick start, std::int32_t steps) {
-    master_.begin_table_run(on_bus_.value, output.value, start, steps);
+    master_.begin_table_run(on_bus_, output.value, start, steps);
   }
   void follow_table_run(Output output, link::Tick start, std::int32_t steps) {
-    master_.follow_table_run(on_bus_.value, output.value, start, steps);
+    master_.follow_table_run(on_bus_, output.value, start, steps);
   }
   void replace(std::uint16_t outputs, link::Tick first) {
-    master_.replace(on_bus_.value, outputs, first);
+    master_.replace(on_bus_, outputs, first);
   }
-  void drop(Output output) { master_.drop(on_bus_.value, output.value); }
+  void drop(Output output) { master_.drop(on_bus_, output.value); }
   std::uint8_t arm(bushd_edge edge, std::uint32_t delay_us,
                    std::span<const link::Master::Armed> moves) {
-    return master_.arm(on_bus_.value, edge, delay_us, moves);
+    return master_.arm(on_bus_, edge, delay_us, moves);
   }
-  void disarm() { master_.disarm(on_bus_.value); }
+  void disarm() { master_.disarm(on_bus_); }
   void compare_positions(const bushd_reference& message) {
-    master_.reference(on_bus_.value, message);
+    master_.position_compare(on_bus_, message);
   }
-  void home(const bushd_home& message) { master_.home(on_bus_.value, message); }
-  void control(std::uint8_t actions) { master_.control(on_bus_.value, actions); }
+  void home(const bushd_home& message) { master_.home(on_bus_, message); }
+  void control(std::uint8_t actions) { master_.control(on_bus_, actions); }
   void set_position(Output output, std::int32_t position_steps) {
-    master_.set_position(on_bus_.value, output.value, position_steps);
+    master_.set_position(on_bus_, output.value, position_steps);
   }
-  void reconfigure(link::McuSetup setup) { master_.reconfigure(on_bus_.value, std::move(setup)); }
+  void reconfigure(link::McuSetup setup) { master_.reconfigure(on_bus_, std::move(setup)); }
   Result<void> has_room(const link::McuSetup& setup) const;
 
  private:
   friend class Installation;
   link::Master& master_;
-  McuOnBus on_bus_;
+  link::McuIndex on_bus_;
   std::vector<MotorId> motors_;
   std::array<std::optional<MotorId>, BUSHD_MOTORS_PER_MCU> motor_at_{};
 };

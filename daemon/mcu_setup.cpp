@@ -32,7 +32,7 @@ void add_table(link::McuSetup& setup, Output output, const tables::Table& table)
   const auto found =
       std::find_if(setup.tables.begin(), setup.tables.end(),
                    [&table](const link::TableRef& ref) { return ref.table == &table.view(); });
-  setup.table_of_motor[output.value] = static_cast<int>(found - setup.tables.begin());
+  setup.table_of_motor[output.value] = static_cast<std::uint8_t>(found - setup.tables.begin());
   if (found != setup.tables.end()) return;
   setup.tables.push_back({.table = &table.view(), .revision = table.revision()});
 }
@@ -41,9 +41,8 @@ void add_table(link::McuSetup& setup, Output output, const tables::Table& table)
 
 link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& tables) {
   const config::Mcu& mcu = config[id];
-  link::McuSetup setup{.address = mcu.address.value, .tables = {}};
+  link::McuSetup setup{.address = mcu.address, .tables = {}};
   setup.emission = mcu.emission;
-  setup.table_of_motor.fill(-1);
   setup.inputs = inputs_of(mcu);
   setup.off_after_watchdog = mcu.enable_after_reset == config::EnableAfterReset::kNo;
   std::vector<const config::Motor*> motors;

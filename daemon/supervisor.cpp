@@ -2,7 +2,9 @@
 
 #include <string>
 #include <utility>
+#include <variant>
 
+#include "base/overloaded.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -35,37 +37,30 @@ Supervisor::Supervisor(Installation& installation, Journal& journal, Moves& move
 }
 
 void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
-  for (const link::Event& event : bus.master.take_events()) {
-    handle(now_us, installation_[bus.mcus[event.mcu]], event);
-  }
+  const auto mcu_of = [&](const auto& event) -> Mcu& {
+    return installation_[bus.mcus[event.mcu.value]];
+  };
+  const auto handle = Overloaded{
+      [&](const link::McuOnline& event) { goes_online(mcu_of(event)); },
+      [&](const link::McuOffline& event) { goes_offline(mcu_of(event)); },
+      [&](const link::McuReported& event) { reports(now_us, mcu_of(event)); },
+      [&](const link::RequestRefused& event) {
+        for (Service* service : services_) {
+          service->refuses(mcu_of(event), event.type, event.status);
+        }
+      },
+      [&](const link::StartMissed& event) { starts_late(mcu_of(event), Output{event.motor}); },
+      [&](const link::ReplacementFailed& event) { replans(now_us, mcu_of(event), event.motors); }};
+  for (const link::Event& event : bus.master.take_events()) std::visit(handle, event);
 }
 
-void Supervisor::handle(std::int64_t now_us, Mcu& mcu, const link::Event& event) {
-  switch (event.kind) {
-    case link::Event::Kind::kOnline:
-      goes_online(mcu);
-      break;
-    case link::Event::Kind::kOffline:
-      goes_offline(mcu);
-      break;
-    case link::Event::Kind::kReport:
-      reports(now_us, mcu);
-      break;
-    case link::Event::Kind::kRefused:
-      for (Service* service : services_) service->refuses(mcu, event.type, event.status);
-      break;
-    case link::Event::Kind::kLateStart:
-      starts_late(mcu, Output{event.motor});
-      break;
-    case link::Event::Kind::kReplaceFailed: {
-      std::vector<MotorId> again;
-      for (const MotorId motor : mcu.motors()) {
-        if ((event.motors >> installation_[motor].output().value & 1) != 0) again.push_back(motor);
-      }
-      moves_.replan(now_us, again);
-      break;
-    }
+// The MCU did not take what was planned: its motors go on as before.
+void Supervisor::replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs) {
+  std::vector<MotorId> again;
+  for (const MotorId motor : mcu.motors()) {
+    if ((outputs >> installation_[motor].output().value & 1) != 0) again.push_back(motor);
   }
+  moves_.replan(now_us, again);
 }
 
 void Supervisor::goes_online(Mcu& mcu) {

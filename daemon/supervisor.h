@@ -25,11 +25,11 @@ class Supervisor {
   void watch_for_other_masters(std::int64_t now_us);
 
  private:
-  void handle(std::int64_t now_us, Mcu& mcu, const link::Event& event);
   void goes_online(Mcu& mcu);
   void goes_offline(Mcu& mcu);
   void reports(std::int64_t now_us, Mcu& mcu);
   void starts_late(Mcu& mcu, Output output);
+  void replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs);
 
   Installation& installation_;
   Journal& journal_;

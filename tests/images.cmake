@@ -1,10 +1,13 @@
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
-# The very images that are flashed, by the toolchains of the presets, each in a build of its own below the one that
-# tests them. Where toolchain and simulator are there, <TARGET> is made and <PREFIX>_IMAGES says where its images are:
+# The very images that are flashed, by the toolchains of the presets. With the presets all builds, and the presets `avr`
+# and `cortex-m`, share one folder for the images of a toolchain, so that they are built once.
+set(BUSHD_IMAGES_DIR ${CMAKE_BINARY_DIR}/images CACHE PATH "Where the builds of the images for MCUs are, a folder each")
+
+# Where toolchain and simulator are there, <TARGET> is made and <PREFIX>_IMAGES says where its images are:
 # ${..._IMAGES}-<baud rate>.elf
 function(bushd_images target prefix toolchain port)
-  string(REPLACE _ - build ${CMAKE_BINARY_DIR}/${target})
+  set(build ${BUSHD_IMAGES_DIR}/${toolchain})
   set(images ${build}/firmware/ports/${port}/bushd-${port})
   add_custom_target(${target}
     COMMAND ${CMAKE_COMMAND} -S ${PROJECT_SOURCE_DIR} -B ${build} -G Ninja --log-level=WARNING
@@ -13,27 +16,26 @@ function(bushd_images target prefix toolchain port)
     COMMAND ${CMAKE_COMMAND} --build ${build}
     BYPRODUCTS ${images}-500000.elf ${images}-1000000.elf
     VERBATIM)
-  add_test(NAME ${target}_is_reproducible COMMAND ${Python3_EXECUTABLE}
-    ${PROJECT_SOURCE_DIR}/tests/ports/reproducible_test.py ${PROJECT_SOURCE_DIR} ${toolchain}
-    ${build}/firmware/ports/${port})
-  set_tests_properties(${target}_is_reproducible PROPERTIES LABELS slow)
+  bushd_check(${target}_is_reproducible LABEL slow STAGE nightly NEEDS ${target}
+    COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/ports/reproducible_test.py ${PROJECT_SOURCE_DIR}
+      ${toolchain} ${build}/firmware/ports/${port})
   set(${prefix}_IMAGES ${images} PARENT_SCOPE)
 endfunction()
 
 if(TARGET bushd_sim_avr AND AVR_GCC)
   bushd_images(avr_image AVR avr atmega2560)
-  add_test(NAME avr_stack_is_bounded COMMAND ${Python3_EXECUTABLE}
+  set(AVR_DEFINITIONS AVR_IMAGES="${AVR_IMAGES}"
+    AVR_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega2560/memory_owners")
+  bushd_check(avr_stack_is_bounded LABEL slow NEEDS avr_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py avr-objdump ${AVR_IMAGES}-500000.elf)
-  set_tests_properties(avr_stack_is_bounded PROPERTIES LABELS slow)
 else()
   message(STATUS "The image for ATmega2560 is not tested: it needs gcc-avr and libsimavr-dev (tools/setup)")
 endif()
 
 if(ARM_GCC AND QEMU_SYSTEM_ARM)
   bushd_images(cortex_m_image LM3S cortex-m lm3s6965)
-  add_test(NAME cortex_m_stack_is_bounded COMMAND ${Python3_EXECUTABLE}
+  bushd_check(cortex_m_stack_is_bounded LABEL slow NEEDS cortex_m_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/cortex_m_stack_bound_test.py arm-none-eabi-objdump ${LM3S_IMAGES}-500000.elf)
-  set_tests_properties(cortex_m_stack_is_bounded PROPERTIES LABELS slow)
 else()
   message(STATUS "The image for LM3S6965 is not tested: it needs gcc-arm-none-eabi and qemu-system-arm (tools/setup)")
 endif()

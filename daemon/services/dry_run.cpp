@@ -16,12 +16,12 @@ constexpr std::uint64_t kMaxFrames = 3000;
 
 // The motors of one bus.
 struct Rehearsed : AxisSource {
-  motion::Axis* axis_of(McuOnBus mcu, Output output) override {
+  motion::Axis* axis_of(link::McuIndex mcu, Output output) override {
     const auto found = axes.find({mcu, output});
     return found == axes.end() ? nullptr : &found->second;
   }
-  std::map<std::pair<McuOnBus, Output>, motion::Axis> axes;
-  std::vector<link::Master::Motion> motions;
+  std::map<std::pair<link::McuIndex, Output>, motion::Axis> axes;
+  std::vector<link::PlannedMove> moves;
 };
 
 api::MovePlan::Motor plan_of(const std::string& name, const bushd_table& table,
@@ -53,13 +53,13 @@ api::MovePlan DryRun::plan(std::int64_t now_us, const std::vector<Part>& parts) 
     plan.duration_us = std::max(plan.duration_us, (axis.end_tick() - start) * bus.tick_us);
     Rehearsed& rehearsed = buses[mcu.config.bus];
     rehearsed.axes.emplace(std::pair{mcu.on_bus(), motor.output()}, axis);
-    link::Master::Motion motion{mcu.on_bus().value, motor.output().value, start, {}};
-    if (installation_.by_table(mcu, steps)) motion.run_steps = static_cast<std::int32_t>(steps);
-    rehearsed.motions.push_back(motion);
+    link::PlannedMove move{mcu.on_bus(), motor.output().value, start, {}};
+    if (installation_.by_table(mcu, steps)) move.run_steps = static_cast<std::int32_t>(steps);
+    rehearsed.moves.push_back(move);
   }
   plan.traffic.emplace();
   for (auto& [id, bus] : buses) {
-    const auto traffic = installation_[id].master.rehearse(now_us, bus, bus.motions, kMaxFrames);
+    const auto traffic = installation_[id].master.rehearse(now_us, bus, bus.moves, kMaxFrames);
     if (!traffic) {
       plan.traffic.reset();
       break;

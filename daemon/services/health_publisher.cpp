@@ -23,7 +23,7 @@ api::McuHealth health_of(const Mcu& mcu) {
   }
   out.crc_errors = health.crc_errors;
   out.rejected_frames = health.rejected_frames;
-  out.ramp_downs = health.run_downs;
+  out.ramp_downs = health.ramp_downs;
   out.timeouts = health.timeouts;
   out.repeats = health.repeats;
   out.missed_ticks = health.missed_ticks;

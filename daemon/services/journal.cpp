@@ -41,12 +41,12 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
   if (late_ns != 0) line["late_ns"] = late_ns;
   if (const bushd_emission& emission = mcu.config.emission.settings;
       emission.mode != BUSHD_EMISSION_EVEN) {
-    line["emission"] = link::kEmissionNames.at(emission.mode);
+    line["emission"] = fieldbus::kEmissionNames.at(emission.mode);
     line["step_us"] = emission.step_us;
     line["dir_setup_us"] = emission.dir_setup_us;
     if (emission.mode == BUSHD_EMISSION_STAGGERED) line["settle_us"] = emission.settle_us;
     if (emission.mode == BUSHD_EMISSION_PHASES) {
-      line["phase_sequence"] = link::kSequenceNames.at(emission.sequence);
+      line["phase_sequence"] = fieldbus::kSequenceNames.at(emission.sequence);
     }
   }
   outputs_.move_log(line.dump());

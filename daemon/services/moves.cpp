@@ -4,13 +4,10 @@
 #include <map>
 #include <utility>
 
+#include "base/overloaded.h"
+
 namespace bushd::daemon {
 namespace {
-
-template <class... Functions>
-struct Overloaded : Functions... {
-  using Functions::operator()...;
-};
 
 constexpr std::int64_t kMaxPosition = motion::Motor::kMaxPosition;
 
@@ -156,7 +153,9 @@ void Moves::replan(std::int64_t now_us, const std::vector<MotorId>& motors) {
   std::map<McuId, motion::Tick> at;
   for (const MotorId id : motors) {
     const Mcu& mcu = installation_.mcu_of(id);
-    const motion::Tick first = installation_[id].changeable_from(mcu.earliest_replace(now_us));
+    const motion::Axis& axis = installation_[id].axis();
+    const motion::Tick first = axis.stopping() ? mcu.earliest_replace(now_us)
+                                               : mcu.earliest_retarget(now_us, axis.start_tick());
     motion::Tick& common = at.try_emplace(mcu.id, first).first->second;
     common = std::max(common, first);
   }

@@ -1,8 +1,12 @@
 // How steps get to the pins: the settings that a master has chosen, and the masks of a tick's slots
 // where these are not simply the slots of the steps' own times.
+#include "firmware/core/emission.h"
+
 #include <string.h>
 
-#include "firmware/core/internal.h"
+#include "firmware/core/access.h"
+#include "firmware/core/settle.h"
+#include "firmware/core/state.h"
 
 // Windings stay on for so long after a move, until the rotor has come to rest.
 #define ROTOR_SETTLES_NS 100000000u

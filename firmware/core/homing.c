@@ -10,9 +10,14 @@
 // known to a step. A contact bounces; it counts as active, or as released, after READINGS readings
 // in a row. Home is where the motor stood at the beginning of the tick with the first of them, and
 // what it makes beyond is counted from there.
+#include "firmware/core/homing.h"
+
 #include <string.h>
 
-#include "firmware/core/internal.h"
+#include "firmware/core/access.h"
+#include "firmware/core/limits.h"
+#include "firmware/core/state.h"
+#include "firmware/core/table_run.h"
 
 enum { READINGS = 3 };
 
@@ -64,7 +69,7 @@ static bool is_sure(bushd_mcu* mcu, bool as_wanted) {
 }
 
 static void watch_silence(bushd_mcu* mcu) {
-  if (mcu->silent_ticks < mcu->silence_ticks) return;
+  if (mcu->reception.silent_ticks < mcu->reception.silence_ticks) return;
   mcu->faults |= BUSHD_FAULT_LINK;
   mcu->run_downs = saturating_increment(mcu->run_downs);
   bushd_mcu_ramp_down_run(mcu, mcu->homing.motor);
@@ -122,7 +127,7 @@ void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs) {
 }
 
 static bool slow_enough(const bushd_mcu* mcu, const bushd_home* message) {
-  const bushd_table* table = &mcu->table[mcu->motor[message->motor].table].table;
+  const bushd_table* table = &mcu->tables.slot[mcu->motor[message->motor].table].table;
   const uint16_t first = bushd_table_accel(table, 0);
   const uint16_t last = bushd_table_decel(table, 0);
   const uint64_t slowest_ns = (uint64_t)(first > last ? first : last) * table->time_unit_ns;

@@ -1,5 +1,8 @@
 // What outlives a reset, if the port keeps it: tables, who runs which, and settings.
-#include "firmware/core/internal.h"
+#include "firmware/core/access.h"
+#include "firmware/core/assertion.h"
+#include "firmware/core/emission.h"
+#include "firmware/core/inputs.h"
 
 #define QUIET_TICKS 512u
 
@@ -22,13 +25,13 @@ bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
     case LOCAL:
       return piece_of(&mcu->local.motors, sizeof mcu->local.motors);
     case TABLES:
-      return piece_of(mcu->table, sizeof mcu->table);
+      return piece_of(mcu->tables.slot, sizeof mcu->tables.slot);
     case VALID_TABLES:
-      return piece_of(&mcu->valid_tables, sizeof mcu->valid_tables);
+      return piece_of(&mcu->tables.valid, sizeof mcu->tables.valid);
     case CODES_USED:
-      return piece_of(&mcu->codes_used, sizeof mcu->codes_used);
+      return piece_of(&mcu->tables.codes_used, sizeof mcu->tables.codes_used);
     case CODES:
-      return piece_of(mcu->config.codes, mcu->codes_used * sizeof mcu->config.codes[0]);
+      return piece_of(mcu->config.codes, mcu->tables.codes_used * sizeof mcu->config.codes[0]);
     default: {
       const uint8_t motor = (uint8_t)(index - MOTORS);
       if (motor >= mcu->config.motors) return piece_of(NULL, 0);
@@ -52,11 +55,13 @@ void bushd_mcu_begin_pass(bushd_mcu_pass* pass) {
 
 bushd_mcu_piece bushd_mcu_next_kept(bushd_mcu* mcu, bushd_mcu_pass* pass, uint16_t most) {
   bushd_mcu_piece piece = bushd_mcu_kept(mcu, pass->index);
-  while (piece.at != NULL && pass->offset == piece.size) {
+  while (piece.at != NULL && pass->offset >= piece.size) {
     piece = bushd_mcu_kept(mcu, ++pass->index);
     pass->offset = 0;
   }
   if (piece.at == NULL) return piece;
+  BUSHD_ASSERT(pass->offset < piece.size);
+  BUSHD_ASSERT(pass->size < BUSHD_MCU_MOST_KEPT(mcu->config.code_count));
   const uint16_t left = (uint16_t)(piece.size - pass->offset);
   const bushd_mcu_piece bytes = {(uint8_t*)piece.at + pass->offset, left < most ? left : most};
   pass->offset = (uint16_t)(pass->offset + bytes.size);

@@ -2,7 +2,14 @@
 // or REVERSE is held they accelerate by their tables and cruise; when it is released, or both are
 // held, they ramp down. A press counts when it has lasted for READINGS readings, a release at
 // once. What is active at boot, or when the settings come, may be stuck: it must be released first.
-#include "firmware/core/internal.h"
+#include "firmware/core/local.h"
+
+#include "firmware/core/access.h"
+#include "firmware/core/drivers.h"
+#include "firmware/core/homing.h"
+#include "firmware/core/limits.h"
+#include "firmware/core/state.h"
+#include "firmware/core/table_run.h"
 
 enum { READINGS = 3 };
 
@@ -72,7 +79,7 @@ void bushd_mcu_forget_presses(bushd_mcu* mcu, uint8_t system_inputs) {
 }
 
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
-  if ((message->motors & ~own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
+  if ((message->motors & ~bushd_mcu_own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
   const uint16_t changed = (uint16_t)(mcu->local.motors ^ message->motors);
   if (changed & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
   if (mcu->local.motors == 0) {

@@ -2,47 +2,23 @@
 
 #include <string.h>
 
-#include "firmware/core/internal.h"
+#include "firmware/core/access.h"
+#include "firmware/core/assertion.h"
+#include "firmware/core/emission.h"
+#include "firmware/core/homing.h"
+#include "firmware/core/inputs.h"
+#include "firmware/core/local.h"
+#include "firmware/core/motor.h"
+#include "firmware/core/requests.h"
+#include "firmware/core/state.h"
+#include "firmware/core/stop.h"
+#include "firmware/core/stream.h"
+#include "firmware/core/sync.h"
+#include "firmware/core/trigger.h"
 
 #define STALE_TAGS 128u
 #define LAST_IN_ORDER 0x1Fu
 #define STALE_NS 100000000u  // no line or adapter keeps a frame back for so long
-
-const uint16_t bushd_mcu_motor_bit[BUSHD_MOTORS_PER_MCU] = {
-    1u << 0, 1u << 1, 1u << 2,  1u << 3,  1u << 4,  1u << 5,  1u << 6,  1u << 7,
-    1u << 8, 1u << 9, 1u << 10, 1u << 11, 1u << 12, 1u << 13, 1u << 14, 1u << 15};
-
-uint16_t bushd_mcu_moving(const bushd_mcu* mcu) {
-  uint16_t moving = mcu->plane[0].active | mcu->plane[1].active;
-  const uint32_t open = FIRST_OPEN(mcu);
-  uint16_t left = own_motors(mcu);
-  if (!mcu->outlook.stale) left &= (uint16_t)~mcu->outlook.rests;
-  uint16_t bit = 1;
-  for (const bushd_mcu_motor* motor = mcu->motor; left != 0; ++motor) {
-    if ((left & 1u) != 0 && (motor->mode != BUSHD_MCU_STREAM || motor->delay != 0 ||
-                             ticks_after(motor->known_until, open) > 0)) {
-      moving |= bit;
-    }
-    left = (uint16_t)(left >> 1);
-    bit = (uint16_t)(bit << 1);
-  }
-  return moving;
-}
-
-static bool is_moving(const bushd_mcu* mcu) {
-  return (mcu->plane[0].active | mcu->plane[1].active) != 0 || bushd_mcu_moving(mcu) != 0;
-}
-
-void bushd_mcu_update_state(bushd_mcu* mcu) {
-  const uint8_t ready = BUSHD_FLAG_CONFIGURED | BUSHD_FLAG_SYNCED | BUSHD_FLAG_ENABLED;
-  if (mcu->faults != 0) {
-    mcu->state = BUSHD_STATE_FAULT;
-  } else if ((mcu->flags & ready) != ready || bushd_mcu_settle_pending(mcu)) {
-    mcu->state = BUSHD_STATE_BUSY;
-  } else {
-    mcu->state = is_moving(mcu) ? BUSHD_STATE_RUN : BUSHD_STATE_READY;
-  }
-}
 
 // The engine against known answers: a wrong compiler, a broken flash cell or bad RAM shows here
 // before a motor can move by it.
@@ -119,7 +95,7 @@ const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   mcu->front ^= 1u;
   ++mcu->tick;
   ++mcu->uptime;
-  mcu->silent_ticks = saturating_increment(mcu->silent_ticks);
+  mcu->reception.silent_ticks = saturating_increment(mcu->reception.silent_ticks);
   bushd_mcu_slew(mcu);
   return &mcu->plane[mcu->front];
 }
@@ -155,26 +131,27 @@ static bool counts_in_order_only(uint8_t type) {
 // The master counts its frames in their tags. So one whose tag is the newest or one of those before
 // it has been heard, or was overtaken. After silence another master may have begun.
 static bool is_stale(bushd_mcu* mcu, const bushd_frame* frame) {
-  const uint8_t age = (uint8_t)(mcu->newest_tag - frame->tag);
-  if (mcu->frames_heard && age < STALE_TAGS &&
-      mcu->uptime - mcu->newest_uptime <= STALE_NS / mcu->tick_ns) {
+  const uint8_t age = (uint8_t)(mcu->reception.newest_tag - frame->tag);
+  if (mcu->reception.frames_heard && age < STALE_TAGS &&
+      mcu->uptime - mcu->reception.newest_uptime <= STALE_NS / mcu->tick_ns) {
     return true;
   }
-  mcu->frames_heard = true;
-  mcu->newest_tag = frame->tag;
-  mcu->newest_uptime = mcu->uptime;
+  mcu->reception.frames_heard = true;
+  mcu->reception.newest_tag = frame->tag;
+  mcu->reception.newest_uptime = mcu->uptime;
   return false;
 }
 
 void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns) {
   bushd_mcu_finish_rows(mcu);
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_RECEIVER);
   bushd_frame frame;
   switch (bushd_receive_byte(&mcu->receiver, byte, &frame)) {
     case BUSHD_RECEIVE_MORE:
       return;
     case BUSHD_RECEIVE_BAD_CRC:
     case BUSHD_RECEIVE_BAD_LENGTH:
-      mcu->bad_frames = saturating_increment(mcu->bad_frames);
+      mcu->reception.bad_frames = saturating_increment(mcu->reception.bad_frames);
       return;
     case BUSHD_RECEIVE_FRAME:
       break;
@@ -187,6 +164,15 @@ void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns) {
     bushd_mcu_reject(mcu, BUSHD_E_LATE);
     return;
   }
-  mcu->silent_ticks = 0;
+  mcu->reception.silent_ticks = 0;
   bushd_mcu_handle_frame(mcu, &frame, time_in_tick_ns);
+}
+
+// The port's background work: what a frame has left to do, the most urgent first.
+bool bushd_mcu_work(bushd_mcu* mcu) {
+  if (mcu->stream.outlook.stale) {
+    bushd_mcu_look_out(mcu, bushd_mcu_first_open(mcu));
+    return true;
+  }
+  return bushd_mcu_go_on_answering(mcu) || bushd_mcu_put_next_row(mcu);
 }

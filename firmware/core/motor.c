@@ -1,6 +1,12 @@
 // What a motor does in the tick that is prepared: a displacement of its queue, a tick of its table
 // run, or of a ramp-down.
-#include "firmware/core/internal.h"
+#include "firmware/core/motor.h"
+
+#include "firmware/core/access.h"
+#include "firmware/core/emission.h"
+#include "firmware/core/reference.h"
+#include "firmware/core/stop.h"
+#include "firmware/core/stream.h"
 
 static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
@@ -10,14 +16,14 @@ static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   mcu->faults |= BUSHD_FAULT_LINK;
   // DIR then still shows the move before: where this one was to go is not known. It has not left
   // rest, so it may stay.
-  if ((mcu->begun & motor_bit(m)) == 0) return;
+  if ((mcu->stream.begun & motor_bit(m)) == 0) return;
   mcu->run_downs = saturating_increment(mcu->run_downs);
   bushd_mcu_ramp_down_stream(mcu, m, delay);
 }
 
 static void end_run(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   motor->mode = BUSHD_MCU_STREAM;
-  mcu->outlook.stale = true;
+  mcu->stream.outlook.stale = true;
 }
 
 static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
@@ -61,7 +67,7 @@ static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, 
   }
   const uint16_t mark = bushd_mcu_steps_keep_slots(mcu) ? bit : 0;
   const int16_t steps = bushd_run_slots(run, &mcu->run_tick, mcu->config.slots, mark, masks);
-  mcu->begun |= bit;
+  mcu->stream.begun |= bit;
   // As ticks of the format would leave it, so that they can go on from here.
   if (mcu->format == BUSHD_FORMAT_FINE) {
     const int16_t before = motor->remainder;
@@ -86,7 +92,7 @@ static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t ti
 }
 
 void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
-  bushd_mcu_outlook* outlook = &mcu->outlook;
+  bushd_mcu_outlook* outlook = &mcu->stream.outlook;
   uint16_t rests = 0;
   uint16_t plain = 0;
   uint16_t following = 0;
@@ -123,8 +129,8 @@ void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
 
 // Of motors that are to move on when their queued ticks end.
 static void watch_low_water(bushd_mcu* mcu) {
-  if (mcu->outlook.moves == 0) return;
-  const int32_t queued = ticks_after(mcu->outlook.moving_until, FIRST_OPEN(mcu));
+  if (mcu->stream.outlook.moves == 0) return;
+  const int32_t queued = ticks_after(mcu->stream.outlook.moving_until, bushd_mcu_first_open(mcu));
   if (queued < mcu->low_water_ticks) mcu->low_water_ticks = queued > 0 ? (uint16_t)queued : 0;
 }
 
@@ -150,21 +156,21 @@ void bushd_mcu_take_fine_row(int16_t* queued, int16_t* displacement, uint8_t mot
 
 // A motor that begins, or stands still until a start that waits.
 static void follow_begun(bushd_mcu* mcu, uint16_t plain, uint16_t moves, uint32_t tick) {
-  mcu->begun |= plain & moves;
-  uint16_t still = mcu->begun & mcu->starting & plain & (uint16_t)~moves;
+  mcu->stream.begun |= plain & moves;
+  uint16_t still = mcu->stream.begun & mcu->stream.starting & plain & (uint16_t)~moves;
   for (uint8_t m = 0; still != 0; ++m, still = (uint16_t)(still >> 1)) {
     if ((still & 1u) != 0 && (int16_t)((uint16_t)tick - mcu->motor[m].start.rest_from) >= 0) {
-      mcu->begun &= (uint16_t)~motor_bit(m);
+      mcu->stream.begun &= (uint16_t)~motor_bit(m);
     }
   }
 }
 
 // Starts that are over, before their low bits look like those of one to come.
 __attribute__((noinline)) static void forget_starts(bushd_mcu* mcu, uint32_t tick) {
-  uint16_t starting = mcu->starting;
+  uint16_t starting = mcu->stream.starting;
   for (uint8_t m = 0; starting != 0; ++m, starting = (uint16_t)(starting >> 1)) {
     if ((starting & 1u) != 0 && (int16_t)((uint16_t)tick - mcu->motor[m].start.tick) > 0) {
-      mcu->starting &= (uint16_t)~motor_bit(m);
+      mcu->stream.starting &= (uint16_t)~motor_bit(m);
     }
   }
 }
@@ -182,7 +188,7 @@ static bool displacement_of(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t* d
   if (motor->delay != 0) queue_ended(mcu, m);
   *displacement = 0;
   if (motor->mode < BUSHD_MCU_RAMP_DOWN) {
-    mcu->begun &= (uint16_t)~motor_bit(m);
+    mcu->stream.begun &= (uint16_t)~motor_bit(m);
     return true;
   }
   if (motor->exact) return false;
@@ -215,7 +221,7 @@ __attribute__((noinline)) static uint16_t find_others(bushd_mcu* mcu, uint16_t o
 }
 
 __attribute__((noinline)) static void stay_at_rest(bushd_mcu* mcu, uint16_t motors, uint32_t tick) {
-  mcu->begun &= (uint16_t)~motors;
+  mcu->stream.begun &= (uint16_t)~motors;
   for (bushd_mcu_motor* motor = mcu->motor; motors != 0;
        ++motor, motors = (uint16_t)(motors >> 1)) {
     if (motors & 1u) motor->known_until = tick + 1u;
@@ -226,10 +232,10 @@ __attribute__((noinline)) static void stay_at_rest(bushd_mcu* mcu, uint16_t moto
 // whose steps are those of a run.
 static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
   const uint32_t tick = mcu->tick + 1u;
-  bushd_mcu_outlook* outlook = &mcu->outlook;
-  if (mcu->starting != 0) forget_starts(mcu, tick);
+  bushd_mcu_outlook* outlook = &mcu->stream.outlook;
+  if (mcu->stream.starting != 0) forget_starts(mcu, tick);
   if (outlook->stale || ticks_after(tick, outlook->plain_until) >= 0) bushd_mcu_look_out(mcu, tick);
-  int16_t* const queued = queue_at(mcu, tick, 0);
+  int16_t* const queued = bushd_mcu_queue_at(mcu, tick, 0);
   if (mcu->format == BUSHD_FORMAT_FINE) {
     bushd_mcu_take_fine_row(queued, values, mcu->config.motors, row);
   } else {
@@ -237,7 +243,7 @@ static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
   }
   follow_begun(mcu, outlook->plain, row->moves, tick);
   if (outlook->rests != 0) stay_at_rest(mcu, outlook->rests, tick);
-  const uint16_t others = own_motors(mcu) & (uint16_t) ~(outlook->plain | outlook->rests);
+  const uint16_t others = bushd_mcu_own_motors(mcu) & (uint16_t) ~(outlook->plain | outlook->rests);
   const uint16_t exact = others != 0 ? find_others(mcu, others, values, row) : (uint16_t)0;
   watch_low_water(mcu);
   return exact;
@@ -290,7 +296,7 @@ void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane) {
   plane->outputs = BUSHD_OUTPUTS_PULSES;
   plane->reference_rise = plane->reference_fall = 0;
   const bushd_emission_grid* grid = &mcu->emission.grid;
-  const bool reference = bushd_mcu_reference_on(mcu);
+  const bool reference = (mcu->reference.arrivals | mcu->reference.pulse) != 0;
   // Masks that have become levels do not show steps any more.
   const bool levels = grid->mode == BUSHD_EMISSION_PHASES;
   if (reference && levels) bushd_mcu_emit_reference(mcu, plane);

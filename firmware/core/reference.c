@@ -1,7 +1,9 @@
 // The reference output: a pulse, a chosen time after the step with which a motor's counter arrives
 // at a chosen position. Steps lie in slots, so the pulse does: it begins within half a slot of its
 // time. One pulse at a time; a motor that arrives while one waits or is out makes none.
-#include "firmware/core/internal.h"
+#include "firmware/core/reference.h"
+
+#include "firmware/core/access.h"
 
 enum { PULSE_NONE = 0, PULSE_RISES, PULSE_FALLS };
 

@@ -1,7 +1,23 @@
 // Frames for this MCU: what they ask for, and what is answered.
+#include "firmware/core/requests.h"
+
 #include <string.h>
 
-#include "firmware/core/internal.h"
+#include "firmware/core/access.h"
+#include "firmware/core/assertion.h"
+#include "firmware/core/drivers.h"
+#include "firmware/core/emission.h"
+#include "firmware/core/homing.h"
+#include "firmware/core/inputs.h"
+#include "firmware/core/local.h"
+#include "firmware/core/reference.h"
+#include "firmware/core/state.h"
+#include "firmware/core/stop.h"
+#include "firmware/core/stream.h"
+#include "firmware/core/sync.h"
+#include "firmware/core/table_run.h"
+#include "firmware/core/tables.h"
+#include "firmware/core/trigger.h"
 
 // What it says of each motor. One island has room in a report: that of the lowest motor, and who
 // else has the same one.
@@ -39,7 +55,7 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   report.state = mcu->state;
   report.faults = mcu->faults;
   report.flags = mcu->flags;
-  report.epoch = mcu->epoch;
+  report.epoch = mcu->stream.epoch;
   report.boot_number = mcu->config.boot_number;
   report.tick = mcu->tick;
   report.tick_ns = mcu->port.time_in_tick_ns(mcu->port.context);
@@ -54,9 +70,9 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   report.autonomous = mcu->autonomous;
   report.homed = mcu->homed;
   report.homing = mcu->homing.stage;
-  report.bad_frames = mcu->bad_frames;
-  report.rejected_frames = mcu->rejected_frames;
-  report.last_rejection = mcu->last_rejection;
+  report.bad_frames = mcu->reception.bad_frames;
+  report.rejected_frames = mcu->reception.rejected_frames;
+  report.last_rejection = mcu->reception.last_rejection;
   report.run_downs = mcu->run_downs;
   report.low_water_ticks = mcu->low_water_ticks;
   mcu->low_water_ticks = UINT16_MAX;
@@ -92,7 +108,7 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
                     mcu->format == message->format;
   if (!same && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   if (message->tick_ns < mcu->config.min_tick_ns) return BUSHD_E_CAPACITY;
-  mcu->silence_ticks = message->silence_ticks;
+  mcu->reception.silence_ticks = message->silence_ticks;
   if (same) return BUSHD_OK;
   // What it counts in slots lasts as long in another tick no more.
   mcu->reference.arrivals = 0;
@@ -301,6 +317,7 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
 }
 
 void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_RECEIVER);
   answer a;
   a.due = frame->address != BUSHD_ADDRESS_BROADCAST && is_answered(frame->type);
   a.delay_ns = 0;
@@ -313,7 +330,7 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   // Ticks look to it themselves; these two change nothing that it tells.
   if (frame->type != BUSHD_MSG_TICKS && frame->type != BUSHD_MSG_POLL &&
       frame->type != BUSHD_MSG_SYNC) {
-    mcu->outlook.stale = true;
+    mcu->stream.outlook.stale = true;
   }
   if (status != BUSHD_OK) bushd_mcu_reject(mcu, status);
   if (!a.due) return;
@@ -321,6 +338,9 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
     const bushd_acknowledgement acknowledgement = {(uint8_t)status};
     a.size = bushd_encode_acknowledgement(&acknowledgement, a.payload);
   }
+  // What is answered reads no more of the frame.
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_RECEIVER);
+  BUSHD_ASSERT(BUSHD_FRAME_HEADER + a.size + BUSHD_FRAME_CRC + 3u <= BUSHD_MCU_MAX_REPLY);
   uint8_t* const raw = mcu->config.reply + 2;
   raw[0] = mcu->config.address;
   raw[1] = (uint8_t)(frame->type | BUSHD_TYPE_REPLY);

@@ -14,7 +14,10 @@
 // and the time stays unknown. If its switch is met by the step, it stays there.
 //
 // Meanwhile the MCU is BUSY, so that nothing else moves.
-#include "firmware/core/internal.h"
+#include "firmware/core/settle.h"
+
+#include "firmware/core/access.h"
+#include "firmware/core/limits.h"
 
 enum {
   QUIET_TICKS = 10,

@@ -3,7 +3,11 @@
 // - no master is heard for too long while they are in a table run
 // - an emergency stop is commanded, or an input asks for one
 // - they come to a limit switch
-#include "firmware/core/internal.h"
+#include "firmware/core/stop.h"
+
+#include "firmware/core/access.h"
+#include "firmware/core/stream.h"
+#include "firmware/core/table_run.h"
 
 void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
   bushd_mcu_motor* motor = &mcu->motor[m];
@@ -27,14 +31,14 @@ static bool in_run(const bushd_mcu_motor* motor) {
 // A start is to come at `next`, the first tick that is not prepared, or later: the motor rests
 // from *rest_from on until then.
 static bool start_waits(const bushd_mcu* mcu, uint8_t m, uint32_t next, uint32_t* rest_from) {
-  if ((mcu->starting & motor_bit(m)) == 0) return false;
+  if ((mcu->stream.starting & motor_bit(m)) == 0) return false;
   const bushd_mcu_start* start = &mcu->motor[m].start;
   *rest_from = near_tick(start->rest_from, next);
   return ticks_after(next, near_tick(start->tick, next)) <= 0;
 }
 
 void bushd_mcu_watch_silence(bushd_mcu* mcu) {
-  if (mcu->silent_ticks < mcu->silence_ticks) return;
+  if (mcu->reception.silent_ticks < mcu->reception.silence_ticks) return;
   if (mcu->trigger.armed != 0) mcu->faults |= BUSHD_FAULT_LINK;
   const uint32_t next = mcu->tick + 1u;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -78,7 +82,7 @@ static rest_of_stream rest_of(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const uint16_t depth = mcu->config.queue_ticks;
   const uint32_t end = known < depth ? rest.until : next + depth;
   for (uint32_t tick = next; ticks_after(end, tick) > 0; ++tick) {
-    const int16_t queued = *queue_at((bushd_mcu*)mcu, tick, m);
+    const int16_t queued = *bushd_mcu_queue_at((bushd_mcu*)mcu, tick, m);
     if (queued == 0) continue;
     rest.moves = true;
     if (tick - next < TICKS_AHEAD) rest.steps = (int16_t)(rest.steps + queued / 256);
@@ -118,7 +122,7 @@ void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t nex
   const bool runs = in_run(motor);
   const rest_of_stream rest = rest_of(mcu, m, next);
   uint32_t rest_from;
-  const bool at_rest = (mcu->begun & motor_bit(m)) == 0 || !rest.moves ||
+  const bool at_rest = (mcu->stream.begun & motor_bit(m)) == 0 || !rest.moves ||
                        (start_waits(mcu, m, next, &rest_from) && ticks_after(next, rest_from) >= 0);
   const uint16_t delay = at_rest || runs ? 0 : stream_delay(mcu, m, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
@@ -146,14 +150,15 @@ int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const bool runs =
       (begins || motor->mode == BUSHD_MCU_TABLE_RUN) && ticks_after(motor->made.until, next) > 0;
   if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return motor->made.run.direction;
-  const int16_t queued =
-      ticks_after(motor->known_until, next) > 0 ? *queue_at((bushd_mcu*)mcu, next, m) : (int16_t)0;
+  const int16_t queued = ticks_after(motor->known_until, next) > 0
+                             ? *bushd_mcu_queue_at((bushd_mcu*)mcu, next, m)
+                             : (int16_t)0;
   if (queued != 0) return queued > 0 ? 1 : -1;
-  return (mcu->begun & motor_bit(m)) != 0 ? bushd_mcu_last_direction(mcu, m) : (int8_t)0;
+  return (mcu->stream.begun & motor_bit(m)) != 0 ? bushd_mcu_last_direction(mcu, m) : (int8_t)0;
 }
 
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message) {
-  bushd_mcu_stop_all(mcu, message->how, FIRST_OPEN(mcu));
+  bushd_mcu_stop_all(mcu, message->how, bushd_mcu_first_open(mcu));
   mcu->faults |= BUSHD_FAULT_EMERGENCY;
   return BUSHD_OK;
 }

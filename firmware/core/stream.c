@@ -7,20 +7,25 @@
 // - a replacement opens a later epoch; from its first tick on it stands instead of what was queued
 // Ticks that are known and not replaced are duplicates and left alone. That a start says so is what
 // tells a lost start from a motor that need not move yet.
+#include "firmware/core/stream.h"
+
 #include <string.h>
 
 #include "engine/slots.h"
-#include "firmware/core/internal.h"
+#include "firmware/core/access.h"
+#include "firmware/core/assertion.h"
+#include "firmware/core/limits.h"
+#include "firmware/core/state.h"
 
 void bushd_mcu_clear_streams(bushd_mcu* mcu) {
-  mcu->rows.next = mcu->rows.ticks.count;
-  mcu->outlook.stale = true;
-  mcu->begun = mcu->starting = 0;
+  mcu->stream.rows.next = mcu->stream.rows.ticks.count;
+  mcu->stream.outlook.stale = true;
+  mcu->stream.begun = mcu->stream.starting = 0;
   memset(mcu->config.queue, 0,
          (size_t)mcu->config.queue_ticks * mcu->config.motors * sizeof mcu->config.queue[0]);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];
-    motor->known_until = FIRST_OPEN(mcu);
+    motor->known_until = bushd_mcu_first_open(mcu);
     motor->delay = 0;
     motor->mode = BUSHD_MCU_STREAM;
     motor->has_island = false;
@@ -40,7 +45,7 @@ static void clear_rows(bushd_mcu* mcu, uint8_t m, uint32_t from, uint32_t until)
   const uint32_t end = mcu->tick + 1u + mcu->config.queue_ticks;
   if (ticks_after(until, end) > 0) until = end;
   if (ticks_after(until, from) <= 0) return;
-  int16_t* queued = queue_at(mcu, from, m);
+  int16_t* queued = bushd_mcu_queue_at(mcu, from, m);
   for (uint16_t rows = (uint16_t)(until - from); rows > 0; --rows, queued = next_row(mcu, queued)) {
     *queued = 0;
   }
@@ -56,19 +61,19 @@ void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t m) {
 // One that was to come from that tick on does not; the rest before it may last until then.
 static void cut_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  if ((mcu->starting & motor_bit(m)) == 0) return;
+  if ((mcu->stream.starting & motor_bit(m)) == 0) return;
   if (ticks_after(near_tick(motor->start.tick, tick), tick) < 0) return;
   if (motor->mode == BUSHD_MCU_RUN_WAITS) motor->mode = BUSHD_MCU_STREAM;
   motor->start.tick = (uint16_t)tick;
   if (ticks_after(near_tick(motor->start.rest_from, tick), tick) >= 0) {
-    mcu->starting &= (uint16_t)~motor_bit(m);
+    mcu->stream.starting &= (uint16_t)~motor_bit(m);
   }
 }
 
 void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_mcu_finish_rows(mcu);
-  mcu->outlook.stale = true;
+  mcu->stream.outlook.stale = true;
   bushd_mcu_drop_island(mcu, m);
   if (ticks_after(motor->known_until, tick) > 0) {
     clear_rows(mcu, m, tick, motor->known_until);
@@ -84,7 +89,7 @@ void bushd_mcu_note_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   motor->start.rest_from = (uint16_t)motor->known_until;
   motor->start.tick = (uint16_t)tick;
-  mcu->starting |= motor_bit(m);
+  mcu->stream.starting |= motor_bit(m);
 }
 
 // `news`: the frame holds something for this motor that is not known yet.
@@ -101,7 +106,8 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu
     // from.
     if (moves_on ? first > 0 : first >= 0) return BUSHD_E_GAP;
     *news = true;
-    return ticks_after(stretch->first_tick, FIRST_OPEN(mcu)) < 0 ? BUSHD_E_LATE : BUSHD_OK;
+    return ticks_after(stretch->first_tick, bushd_mcu_first_open(mcu)) < 0 ? BUSHD_E_LATE
+                                                                           : BUSHD_OK;
   }
   if (end <= 0) return BUSHD_OK;
   if (stretch->flags & BUSHD_TICKS_START) {
@@ -132,7 +138,7 @@ static bushd_status check_head(bushd_mcu* mcu, const bushd_mcu_stretch* stretch)
   const bool replace = (stretch->flags & BUSHD_TICKS_REPLACE) != 0;
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
   if (stretch->mask & (mcu->autonomous | mcu->trigger.armed)) return BUSHD_E_STATE;
-  const uint8_t ahead = (uint8_t)(stretch->epoch - mcu->epoch);
+  const uint8_t ahead = (uint8_t)(stretch->epoch - mcu->stream.epoch);
   if (replace ? ahead == 0 || ahead > INT8_MAX : ahead != 0) return BUSHD_E_EPOCH;
   // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once
   // both ends are checked; a frame so old that it holds nothing but past ticks is done with here.
@@ -232,7 +238,7 @@ static void close_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stre
 }
 
 static void close_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
-  if (stretch->flags & BUSHD_TICKS_REPLACE) mcu->epoch = stretch->epoch;
+  if (stretch->flags & BUSHD_TICKS_REPLACE) mcu->stream.epoch = stretch->epoch;
 }
 
 // More steps would not find room in a tick: |displacement| > most x 256.
@@ -264,7 +270,7 @@ static void put_rows(bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks, uint8_
   const uint8_t size = fine ? 2 : 1;
   const uint8_t stride = (uint8_t)(size * ticks->motors);
   const uint8_t* at = ticks->displacements + begin * stride + size * column;
-  int16_t* queued = queue_at(mcu, ticks->first_tick + begin, m);
+  int16_t* queued = bushd_mcu_queue_at(mcu, ticks->first_tick + begin, m);
   for (uint8_t rows = (uint8_t)(end - begin); rows > 0; --rows, at += stride) {
     *queued = fine ? bushd_get_i16(at) : bushd_coarse_to_fine(*at);
     queued = next_row(mcu, queued);
@@ -283,7 +289,7 @@ static void put_column(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stret
 
 // What frames do to most motors: their ticks follow what is known, and nothing waits beyond.
 static bool all_follow(const bushd_mcu* mcu, const bushd_ticks* ticks) {
-  const bushd_mcu_outlook* outlook = &mcu->outlook;
+  const bushd_mcu_outlook* outlook = &mcu->stream.outlook;
   return (ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE)) == 0 && !outlook->stale &&
          ticks->first_tick == outlook->plain_until &&
          (ticks->mask & (uint16_t)~outlook->following) == 0;
@@ -298,9 +304,10 @@ void bushd_mcu_put_coarse_row(int16_t* queued, uint16_t mask, const uint8_t* cou
 #endif
 
 static void put_row(bushd_mcu* mcu) {
-  const bushd_ticks* const ticks = &mcu->rows.ticks;
-  const uint8_t row = mcu->rows.next++;
-  int16_t* queued = queue_at(mcu, ticks->first_tick + row, 0);
+  const bushd_ticks* const ticks = &mcu->stream.rows.ticks;
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_ROWS);
+  const uint8_t row = mcu->stream.rows.next++;
+  int16_t* queued = bushd_mcu_queue_at(mcu, ticks->first_tick + row, 0);
   uint16_t mask = ticks->mask;
   const uint8_t* at = ticks->displacements + (uint16_t)(row * ticks->motors);
   if ((ticks->flags & BUSHD_TICKS_FINE) == 0) {
@@ -315,39 +322,35 @@ static void put_row(bushd_mcu* mcu) {
   }
 }
 
-bool bushd_mcu_work(bushd_mcu* mcu) {
-  if (mcu->outlook.stale) {
-    bushd_mcu_look_out(mcu, FIRST_OPEN(mcu));
-    return true;
-  }
-  if (bushd_mcu_go_on_answering(mcu)) return true;
-  if (mcu->rows.next >= mcu->rows.ticks.count) return false;
+bool bushd_mcu_put_next_row(bushd_mcu* mcu) {
+  if (mcu->stream.rows.next >= mcu->stream.rows.ticks.count) return false;
   put_row(mcu);
   return true;
 }
 
 void bushd_mcu_finish_rows(bushd_mcu* mcu) {
-  while (mcu->rows.next < mcu->rows.ticks.count) put_row(mcu);
+  while (mcu->stream.rows.next < mcu->stream.rows.ticks.count) put_row(mcu);
 }
 
 void bushd_mcu_finish_row(bushd_mcu* mcu, uint32_t tick) {
-  while (mcu->rows.next < mcu->rows.ticks.count &&
-         ticks_after(mcu->rows.ticks.first_tick + mcu->rows.next, tick) <= 0) {
+  while (mcu->stream.rows.next < mcu->stream.rows.ticks.count &&
+         ticks_after(mcu->stream.rows.ticks.first_tick + mcu->stream.rows.next, tick) <= 0) {
     put_row(mcu);
   }
 }
 
 static void put_rows_later(bushd_mcu* mcu, const bushd_ticks* ticks) {
-  mcu->rows.ticks = *ticks;
-  mcu->rows.next = 0;
+  BUSHD_ASSERT(bushd_mcu_owner_of_buffer(mcu) == BUSHD_MCU_BUFFER_RECEIVER);
+  mcu->stream.rows.ticks = *ticks;
+  mcu->stream.rows.next = 0;
 }
 
 // And to others: their motors start from rest.
 static bool all_rest(const bushd_mcu* mcu, const bushd_ticks* ticks) {
   const uint8_t kind = ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE);
-  if (kind != BUSHD_TICKS_START || mcu->outlook.stale ||
-      (ticks->mask & (uint16_t)~mcu->outlook.rests) != 0 ||
-      ticks_after(ticks->first_tick, FIRST_OPEN(mcu)) < 0) {
+  if (kind != BUSHD_TICKS_START || mcu->stream.outlook.stale ||
+      (ticks->mask & (uint16_t)~mcu->stream.outlook.rests) != 0 ||
+      ticks_after(ticks->first_tick, bushd_mcu_first_open(mcu)) < 0) {
     return false;
   }
   const bushd_mcu_motor* motor = mcu->motor;
@@ -380,7 +383,7 @@ static void follow(bushd_mcu* mcu, const bushd_ticks* ticks) {
     bit = (uint16_t)(bit << 1);
   }
   put_rows_later(mcu, ticks);
-  bushd_mcu_outlook* outlook = &mcu->outlook;
+  bushd_mcu_outlook* outlook = &mcu->stream.outlook;
   // Mostly these are all that there are.
   outlook->stale = ((outlook->plain | outlook->moves) & (uint16_t)~ticks->mask) != 0;
   outlook->plain_until = outlook->moving_until = end;
@@ -414,10 +417,10 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
   if (starts) note_starts(mcu, ticks->mask, ticks->first_tick);
   if (plain) {
     follow(mcu, ticks);
-    mcu->outlook.stale |= starts;
+    mcu->stream.outlook.stale |= starts;
     return BUSHD_OK;
   }
-  mcu->outlook.stale = true;
+  mcu->stream.outlook.stale = true;
   const bool all_new = open_motors(mcu, &stretch);
   uint8_t column = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -434,7 +437,7 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
 // The run of an entry: what its motor's table makes of it.
 static bool restore(const bushd_mcu* mcu, const bushd_table_ticks_entry* entry, bushd_run* run) {
   const int8_t slot = mcu->motor[entry->motor].table;
-  return bushd_run_restore(run, &mcu->table[slot].table, &entry->state);
+  return bushd_run_restore(run, &mcu->tables.slot[slot].table, &entry->state);
 }
 
 static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch, bushd_run* run) {
@@ -455,7 +458,7 @@ static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
     }
     for (uint16_t i = 0; i < count; ++i) {
       if (!in_gap(&unknown, (uint16_t)(at + i))) continue;
-      *queue_at(mcu, stretch->first_tick + at + i, m) =
+      *bushd_mcu_queue_at(mcu, stretch->first_tick + at + i, m) =
           in_fine ? made.fine[i] : bushd_coarse_to_fine(made.coarse[i]);
     }
   }

@@ -18,7 +18,11 @@
 //
 // The rate's share of each tick is added up in 1/4096 ns and given out in whole ns. With the rate
 // changes what the clock has drifted from the mark until now: that is made up at once too.
-#include "firmware/core/internal.h"
+#include "firmware/core/sync.h"
+
+#include "firmware/core/access.h"
+#include "firmware/core/state.h"
+#include "firmware/core/stream.h"
 
 #define MAX_ERROR_DIVISOR 2
 #define MARK_NOISE_NS 5000

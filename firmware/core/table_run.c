@@ -1,5 +1,9 @@
 // Runs of a motor's own table: TABLE_RUN, what the trigger has armed, and what moves by itself.
-#include "firmware/core/internal.h"
+#include "firmware/core/table_run.h"
+
+#include "firmware/core/access.h"
+#include "firmware/core/limits.h"
+#include "firmware/core/stream.h"
 
 static bool ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
                          uint32_t* spare_ns) {
@@ -23,7 +27,7 @@ void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_
 
 bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns) {
   bushd_mcu_made* made = &mcu->motor[entry->motor].made;
-  bushd_run_start(&made->run, &mcu->table[entry->slot].table, entry->steps, entry->direction);
+  bushd_run_start(&made->run, &mcu->tables.slot[entry->slot].table, entry->steps, entry->direction);
   return ticks_of_run(&made->run, mcu->tick_ns, &made->until, spare_ns);
 }
 
@@ -78,5 +82,5 @@ void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int di
   motor->mode = BUSHD_MCU_AUTONOMOUS;
   motor->exact = true;
   mcu->autonomous |= motor_bit(m);
-  mcu->outlook.stale = true;
+  mcu->stream.outlook.stale = true;
 }

@@ -1,8 +1,12 @@
 // Table memory: the tables' codes lie one behind the other; a table that is sent anew first gives
 // its place back.
+#include "firmware/core/tables.h"
+
 #include <string.h>
 
-#include "firmware/core/internal.h"
+#include "firmware/core/access.h"
+#include "firmware/core/emission.h"
+#include "firmware/core/state.h"
 
 // Codes in memory, of both sides.
 static uint16_t count_of(const bushd_table* table) {
@@ -19,17 +23,17 @@ static inline uint8_t slot_bit(uint8_t slot) {
 }
 
 static bool is_valid(const bushd_mcu* mcu, uint8_t slot) {
-  return (mcu->valid_tables & slot_bit(slot)) != 0;
+  return (mcu->tables.valid & slot_bit(slot)) != 0;
 }
 
 static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
   const uint16_t count = count_of(&entry->table);
   uint16_t* const codes = codes_of(mcu, &entry->table);
   const uint16_t* const end = codes + count;
-  memmove(codes, end, (size_t)(mcu->config.codes + mcu->codes_used - end) * sizeof *codes);
-  mcu->codes_used = (uint16_t)(mcu->codes_used - count);
+  memmove(codes, end, (size_t)(mcu->config.codes + mcu->tables.codes_used - end) * sizeof *codes);
+  mcu->tables.codes_used = (uint16_t)(mcu->tables.codes_used - count);
   for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
-    bushd_table* other = &mcu->table[i].table;
+    bushd_table* other = &mcu->tables.slot[i].table;
     if (other->accel.count == 0 || other->accel.code < end) continue;
     other->accel.code -= count;
     other->decel.code -= count;
@@ -39,29 +43,29 @@ static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
 
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message) {
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
-  bushd_mcu_table* entry = &mcu->table[message->slot];
+  bushd_mcu_table* entry = &mcu->tables.slot[message->slot];
   if (entry->table.accel.count != 0) give_back(mcu, entry);
-  mcu->valid_tables &= (uint8_t)~slot_bit(message->slot);
+  mcu->tables.valid &= (uint8_t)~slot_bit(message->slot);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if (mcu->motor[m].table == (int8_t)message->slot) mcu->motor[m].table = -1;
   }
   const uint32_t count = (uint32_t)message->accel_count + message->decel_count;
-  if (count > (uint32_t)(mcu->config.code_count - mcu->codes_used)) return BUSHD_E_CAPACITY;
+  if (count > (uint32_t)(mcu->config.code_count - mcu->tables.codes_used)) return BUSHD_E_CAPACITY;
   const bool symmetric = message->decel_count == 0;
   entry->table.accel.count = message->accel_count;
   entry->table.decel.count = symmetric ? message->accel_count : message->decel_count;
-  entry->table.accel.code = mcu->config.codes + mcu->codes_used;
+  entry->table.accel.code = mcu->config.codes + mcu->tables.codes_used;
   entry->table.decel.code = entry->table.accel.code + (symmetric ? 0 : message->accel_count);
   entry->table.cruise = message->cruise;
   entry->table.time_unit_ns = message->time_unit_ns;
   entry->revision = message->revision;
   entry->received = 0;
-  mcu->codes_used = (uint16_t)(mcu->codes_used + count);
+  mcu->tables.codes_used = (uint16_t)(mcu->tables.codes_used + count);
   return BUSHD_OK;
 }
 
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message) {
-  bushd_mcu_table* entry = &mcu->table[message->slot];
+  bushd_mcu_table* entry = &mcu->tables.slot[message->slot];
   const uint32_t end = (uint32_t)message->offset + message->count;
   const bushd_table* table = &entry->table;
   // Pieces come in order; one that was sent again because its acknowledgement was lost is written
@@ -76,7 +80,7 @@ bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* messag
 }
 
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message) {
-  bushd_mcu_table* entry = &mcu->table[message->slot];
+  bushd_mcu_table* entry = &mcu->tables.slot[message->slot];
   const uint16_t count = count_of(&entry->table);
   // Its acknowledgement was lost.
   if (is_valid(mcu, message->slot)) return entry->crc == message->crc ? BUSHD_OK : BUSHD_E_CRC;
@@ -86,14 +90,14 @@ bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message)
   const bushd_status status = bushd_table_check(&entry->table, NULL, NULL);
   if (status != BUSHD_OK) return status;
   entry->crc = crc;
-  mcu->valid_tables |= slot_bit(message->slot);
+  mcu->tables.valid |= slot_bit(message->slot);
   return BUSHD_OK;
 }
 
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
   if (!bushd_mcu_has_output(mcu, message->motor)) return BUSHD_E_FORMAT;
   if (bushd_mcu_engaged(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
-  const bushd_mcu_table* entry = &mcu->table[message->slot];
+  const bushd_mcu_table* entry = &mcu->tables.slot[message->slot];
   const bool configured = (mcu->flags & BUSHD_FLAG_CONFIGURED) != 0;
   if (!is_valid(mcu, message->slot) || !configured) return BUSHD_E_STATE;
   if (bushd_table_max_steps_per_tick(&entry->table, mcu->tick_ns) > mcu->emission.grid.max_steps) {
@@ -107,7 +111,7 @@ bushd_tables bushd_mcu_tables(const bushd_mcu* mcu) {
   bushd_tables tables;
   memset(&tables, 0, sizeof tables);
   for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
-    const bushd_mcu_table* entry = &mcu->table[i];
+    const bushd_mcu_table* entry = &mcu->tables.slot[i];
     if (!is_valid(mcu, i)) continue;
     tables.slot[i].valid = true;
     tables.slot[i].crc = entry->crc;
@@ -117,8 +121,8 @@ bushd_tables bushd_mcu_tables(const bushd_mcu* mcu) {
 }
 
 void bushd_mcu_forget_tables(bushd_mcu* mcu) {
-  memset(mcu->table, 0, sizeof mcu->table);
-  mcu->codes_used = 0;
-  mcu->valid_tables = 0;
+  memset(mcu->tables.slot, 0, sizeof mcu->tables.slot);
+  mcu->tables.codes_used = 0;
+  mcu->tables.valid = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) mcu->motor[m].table = -1;
 }

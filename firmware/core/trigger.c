@@ -6,7 +6,12 @@
 // wherever in a tick that is: the run's own time then begins there (bushd_run_begin_late). One tick
 // is being emitted and the next one is prepared when the edge is noticed; the third is the port's
 // time to notice it. Times are the bus's, so all MCUs that wait for one edge begin together.
-#include "firmware/core/internal.h"
+#include "firmware/core/trigger.h"
+
+#include "firmware/core/access.h"
+#include "firmware/core/limits.h"
+#include "firmware/core/state.h"
+#include "firmware/core/table_run.h"
 
 static bushd_status check_entry(const bushd_mcu* mcu, const bushd_table_run_entry* entry) {
   if (entry->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
@@ -41,7 +46,7 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
     mask |= motor_bit(entry.motor);
   }
   if (bushd_mcu_moving(mcu) & mask) return BUSHD_E_STATE;
-  mcu->starting &= (uint16_t)~mask;
+  mcu->stream.starting &= (uint16_t)~mask;
   for (uint8_t i = 0; i < message->count; ++i) {
     const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
     uint32_t* const spare_ns = &mcu->motor[entry.motor].spare_ns;
@@ -97,12 +102,12 @@ void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns) {
                      (int32_t)(mcu->trigger.delay_us * 1000u);
   const uint32_t after_ns = ns > 0 ? (uint32_t)ns : 0;
   const uint32_t tick = mcu->tick + after_ns / mcu->tick_ns;
-  if (ticks_after(tick, FIRST_OPEN(mcu)) < 0) {
+  if (ticks_after(tick, bushd_mcu_first_open(mcu)) < 0) {
     bushd_mcu_disarm(mcu, BUSHD_TRIGGER_LATE);
     return;
   }
   bushd_mcu_disarm(mcu, BUSHD_TRIGGER_STARTED);
-  mcu->outlook.stale = true;
+  mcu->stream.outlook.stale = true;
   mcu->trigger.start_tick = tick;
   mcu->trigger.start_ns = after_ns % mcu->tick_ns;
   for (uint8_t m = 0; armed != 0; ++m, armed = (uint16_t)(armed >> 1)) {

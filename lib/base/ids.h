@@ -22,9 +22,6 @@ using McuId = Id<struct McuTag>;
 using GroupId = Id<struct GroupTag>;
 using MotorId = Id<struct MotorTag>;
 
-// Position of an MCU among those of its bus, as link::Master counts them.
-using McuOnBus = Id<struct McuOnBusTag>;
-
 // Number of an MCU on the line, 1..255.
 struct McuAddress {
   std::uint8_t value = 0;

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "engine/run.h"
-#include "link/line_budget.h"
+#include "fieldbus/line_budget.h"
 
 namespace bushd::config {
 namespace {
@@ -21,7 +21,7 @@ constexpr std::array<std::uint32_t, 30> kBaudRates = {
 Result<void> check_populated(const Loading& loading, std::size_t index) {
   const Config& config = loading.config;
   const bool populated =
-      std::ranges::any_of(config.mcus, [&](const Mcu& mcu) { return mcu.bus == BusIndex{index}; });
+      std::ranges::any_of(config.mcus, [&](const Mcu& mcu) { return mcu.bus == BusId{index}; });
   if (populated) return {};
   const std::string& name = config.buses[index].name;
   return fail(loading.buses[index].error(
@@ -96,7 +96,7 @@ Result<void> check_table_slots(const Loading& loading) {
 // What would help, by itself: the lowest faster rate, the shortest longer tick.
 std::string line_remedy(const Bus& bus, std::span<const std::uint8_t> motors) {
   const auto fits = [&](std::uint32_t baud, std::uint32_t tick_us) {
-    return link::line_load(baud, tick_us * 1000u, bus.format, motors) <= link::kMaxLineLoad;
+    return fieldbus::line_load(baud, tick_us * 1000u, bus.format, motors) <= fieldbus::kMaxLineLoad;
   };
   std::string remedy;
   for (const std::uint32_t baud : kBaudRates) {
@@ -114,7 +114,8 @@ std::string line_remedy(const Bus& bus, std::span<const std::uint8_t> motors) {
     remedy += fmt::format("{}tick_us = {} or more", remedy.empty() ? "" : ", or ", high);
   }
   if (bus.format == BUSHD_FORMAT_FINE &&
-      link::line_load(bus.baud, bus.tick_ns(), BUSHD_FORMAT_COARSE, motors) <= link::kMaxLineLoad) {
+      fieldbus::line_load(bus.baud, bus.tick_ns(), BUSHD_FORMAT_COARSE, motors) <=
+          fieldbus::kMaxLineLoad) {
     remedy += fmt::format("{}format = \"coarse\"", remedy.empty() ? "" : ", or ");
   }
   return remedy.empty() ? "Spread the MCUs over more buses" : "Use " + remedy;
@@ -125,18 +126,18 @@ Result<void> check_line(const Loading& loading, std::size_t index) {
   const Bus& bus = config.buses[index];
   std::vector<std::uint8_t> motors;
   for (std::size_t i = 0; i < config.mcus.size(); ++i) {
-    if (config.mcus[i].bus != BusIndex{index}) continue;
+    if (config.mcus[i].bus != BusId{index}) continue;
     motors.push_back(static_cast<std::uint8_t>(
         std::count_if(config.motors.begin(), config.motors.end(),
-                      [&](const Motor& motor) { return motor.mcu == McuIndex{i}; })));
+                      [&](const Motor& motor) { return motor.mcu == McuId{i}; })));
   }
-  const double load = link::line_load(bus.baud, bus.tick_ns(), bus.format, motors);
-  if (load <= link::kMaxLineLoad) return {};
+  const double load = fieldbus::line_load(bus.baud, bus.tick_ns(), bus.format, motors);
+  if (load <= fieldbus::kMaxLineLoad) return {};
   return fail(loading.buses[index].error(
       "tick_us",
       fmt::format("is {}: ticks, polls and sync would take {:.1f} % of the line at {} baud; "
                   "allowed: {:.0f} %. {}",
-                  bus.tick_us, load * 100, bus.baud, link::kMaxLineLoad * 100,
+                  bus.tick_us, load * 100, bus.baud, fieldbus::kMaxLineLoad * 100,
                   line_remedy(bus, motors))));
 }
 

@@ -15,17 +15,10 @@
 #include "base/ids.h"
 #include "base/result.h"
 #include "engine/message.h"
-#include "link/emission_setup.h"
+#include "fieldbus/emission_setup.h"
 #include "tables/table.h"
 
 namespace bushd::config {
-
-// Positions in the vectors of Config.
-using BusIndex = BusId;
-using McuIndex = McuId;
-using GroupIndex = GroupId;
-using bushd::McuAddress;
-using bushd::Output;
 
 struct Lcm {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
@@ -60,10 +53,10 @@ enum class EnableAfterReset {
 };
 
 struct Mcu {
-  BusIndex bus;
+  BusId bus;
   McuAddress address;
   std::string id;  // "hall:1"
-  link::EmissionSetup emission{};
+  fieldbus::EmissionSetup emission{};
   std::uint8_t emergency_input = BUSHD_EMERGENCY_INPUT_IGNORED;
   bool emergency_active_open = false;
   std::uint8_t debounce_ticks = 1;
@@ -89,9 +82,9 @@ struct Home {
 
 struct Motor {
   std::string name;
-  McuIndex mcu;
+  McuId mcu;
   Output output;
-  GroupIndex group;
+  GroupId group;
   // Its input is a switch at these ends of its travel.
   bool limit_positive = false;
   bool limit_negative = false;

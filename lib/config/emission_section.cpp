@@ -45,22 +45,22 @@ Result<void> refuse_idle_keys(const TomlReader& reader, std::uint8_t mode) {
     if (!reader.has(key.name) || (mode >= key.first_mode && mode <= key.last_mode)) continue;
     std::string modes;
     for (std::uint8_t m = key.first_mode; m <= key.last_mode; ++m) {
-      modes += fmt::format("{}\"{}\"", modes.empty() ? "" : ", ", link::kEmissionNames[m]);
+      modes += fmt::format("{}\"{}\"", modes.empty() ? "" : ", ", fieldbus::kEmissionNames[m]);
     }
     return fail(reader.error(key.name, fmt::format("says nothing with emission = \"{}\"; allowed: "
                                                    "only with {}",
-                                                   link::kEmissionNames[mode], modes)));
+                                                   fieldbus::kEmissionNames[mode], modes)));
   }
   return {};
 }
 
 }  // namespace
 
-Result<link::EmissionSetup> read_emission(const TomlReader& reader) {
-  link::EmissionSetup setup;
+Result<fieldbus::EmissionSetup> read_emission(const TomlReader& reader) {
+  fieldbus::EmissionSetup setup;
   bushd_emission& settings = setup.settings;
   if (reader.has("emission")) {
-    const auto mode = read_word(reader, "emission", link::kEmissionNames);
+    const auto mode = read_word(reader, "emission", fieldbus::kEmissionNames);
     if (!mode) return fail(mode.error());
     settings.mode = static_cast<std::uint8_t>(*mode);
   }
@@ -91,7 +91,7 @@ Result<link::EmissionSetup> read_emission(const TomlReader& reader) {
     settings.hold_current = true;
   }
   if (reader.has("phase_sequence")) {
-    const auto sequence = read_word(reader, "phase_sequence", link::kSequenceNames);
+    const auto sequence = read_word(reader, "phase_sequence", fieldbus::kSequenceNames);
     if (!sequence) return fail(sequence.error());
     settings.sequence = static_cast<std::uint8_t>(*sequence);
   }

@@ -2,11 +2,11 @@
 #pragma once
 
 #include "base/result.h"
-#include "link/emission_setup.h"
+#include "fieldbus/emission_setup.h"
 #include "tables/toml_reader.h"
 
 namespace bushd::config {
 
-Result<link::EmissionSetup> read_emission(const tables::TomlReader& reader);
+Result<fieldbus::EmissionSetup> read_emission(const tables::TomlReader& reader);
 
 }  // namespace bushd::config

@@ -267,7 +267,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
         !known) {
       return known;
     }
-    const auto bus = resolve<BusIndex>(reader, "bus", config->buses, &Bus::name);
+    const auto bus = resolve<BusId>(reader, "bus", config->buses, &Bus::name);
     if (!bus) return fail(bus.error());
     const auto address = reader.integer("address", 1, 255);
     if (!address) return fail(address.error());
@@ -368,7 +368,7 @@ Result<void> read_motors(Loading* loading) {
     auto name = read_name(reader);
     if (!name) return fail(name.error());
     if (auto taken = names.take(reader, "name", *name, *name); !taken) return taken;
-    const auto mcu = resolve<McuIndex>(reader, "mcu", config.mcus, &Mcu::id);
+    const auto mcu = resolve<McuId>(reader, "mcu", config.mcus, &Mcu::id);
     if (!mcu) return fail(mcu.error());
     const auto output = reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
     if (!output) return fail(output.error());
@@ -377,7 +377,7 @@ Result<void> read_motors(Loading* loading) {
     const std::string& id = config.mcus[mcu->value].id;
     const std::string what = fmt::format("output {} of MCU \"{}\"", *output, id);
     if (auto taken = outputs.take(reader, "output", what, what); !taken) return taken;
-    const auto group = resolve<GroupIndex>(reader, "group", config.groups, &Group::name);
+    const auto group = resolve<GroupId>(reader, "group", config.groups, &Group::name);
     if (!group) return fail(group.error());
     Motor motor{.name = std::move(*name),
                 .mcu = *mcu,

@@ -10,9 +10,9 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace bushd::link {
+#include "link/tick.h"
 
-using Tick = std::int64_t;  // absolute, unwrapped from the 32 bits on the line
+namespace bushd::link {
 
 class BusClock {
  public:
@@ -28,6 +28,8 @@ class BusClock {
   void sample(Tick tick, std::int64_t ns_in_tick, std::int64_t now_us);
   // The tick that the bus is in; precondition: valid().
   Tick tick_at(std::int64_t now_us) const;
+  // Rounded up; needs no sample.
+  Tick ticks_in(std::int64_t us) const { return (us * 1000 + tick_ns_ - 1) / tick_ns_; }
 
  private:
   // At one report per 50 ms: under two seconds, in which crystals drift by less than 0.2 ms.

@@ -7,13 +7,15 @@
 #include <cstdint>
 #include <optional>
 
+#include "engine/message.h"
+
 namespace bushd::link {
 
 struct McuHealth {
   // Told by the MCU, over all its boots that were seen.
   std::uint64_t crc_errors = 0;       // frames that reached it broken
-  std::uint64_t rejected_frames = 0;  // good frames that it could not use
-  std::uint64_t run_downs = 0;        // motors that ran dry and came to rest by their own table
+  std::uint64_t rejected_frames = 0;  // valid frames that it could not use
+  std::uint64_t ramp_downs = 0;       // motors that ran dry and came to rest by their own table
   // Seen by the master.
   std::uint64_t timeouts = 0;      // requests without an answer
   std::uint64_t repeats = 0;       // stream frames sent again
@@ -22,8 +24,19 @@ struct McuHealth {
   // The fewest ticks that a moving motor had queued, since reset_low_water(); none: none moved.
   std::optional<std::uint16_t> low_water_ticks;
   double rate_ppm = 0.0;  // how much faster than its crystal the MCU counts, to follow the bus
-  // By how much its last time mark differed from that of the first MCU that is in step.
+  // By how much later it heard the last SYNC than the first MCU that is in step, by its clock.
   double clock_offset_us = 0.0;
+};
+
+// The counters of an MCU as last reported: what they have grown by goes into its health.
+class ReportedCounters {
+ public:
+  void follow(const bushd_report& report, McuHealth& health);
+
+ private:
+  std::uint16_t crc_errors_ = 0;
+  std::uint16_t rejected_frames_ = 0;
+  std::uint16_t ramp_downs_ = 0;
 };
 
 // Of an adapter: from when the line has carried an answer's last byte to when the program had it.
@@ -39,7 +52,7 @@ struct Latency {
 
 struct BusHealth {
   std::uint64_t crc_errors = 0;    // frames that reached the master broken
-  std::uint64_t stray_frames = 0;  // good frames that nobody had been asked for
+  std::uint64_t stray_frames = 0;  // valid frames that nobody had been asked for
   Latency latency;
 };
 

@@ -86,10 +86,6 @@ void Motor::stop(std::optional<std::string> ended_by) {
   }
 }
 
-Tick Motor::changeable_from(Tick first) const {
-  return axis_.stopping() ? first : std::max(first, axis_.start_tick());
-}
-
 void Motor::end_homing(bool found) {
   if (!is<Homing>()) return;
   if (found) uncertain_reason_.reset();

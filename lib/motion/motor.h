@@ -127,9 +127,6 @@ class Motor {
   void stop(std::optional<std::string> ended_by = {});
   // The plan is not yet what was requested, and can be changed.
   bool needs_change() const { return is<Moving>() && axis_.needs_change(); }
-  // From when on, if the bus can change plans from `first` on: another beginning only where the
-  // motor was to begin.
-  Tick changeable_from(Tick first) const;
   // Whether the plan is another one now from this tick on.
   bool change(Tick at) { return has_plan() && axis_.change(at); }
   void home() { activity_ = Homing{}; }

@@ -24,6 +24,7 @@ std::size_t Bus::add_mcu(const McuOptions& options) {
 }
 
 std::size_t Bus::add_mcu(const MakeMcu& make) {
+  assert(second_master_ == kMaster);
   const std::size_t index = mcus_.size();
   line_.add_talker();
   deaf_until_ns_.push_back(0);
@@ -37,12 +38,23 @@ void Bus::master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns) {
   line_.send(kMaster, bytes, at_ns);
 }
 
+void Bus::add_second_master() {
+  assert(second_master_ == kMaster);
+  second_master_ = line_.add_talker();
+}
+
+void Bus::second_master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns) {
+  assert(second_master_ != kMaster && at_ns >= now_ns_);
+  line_.send(second_master_, bytes, at_ns);
+}
+
 void Bus::transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire, std::size_t size) {
   line_.send(mcu + 1, {wire, size}, start_ns);
 }
 
 std::uint8_t Bus::talker_address(std::size_t talker) const {
-  return talker == kMaster ? BUSHD_ADDRESS_BROADCAST : mcus_[talker - 1]->address();
+  return talker == kMaster || talker == second_master_ ? BUSHD_ADDRESS_BROADCAST
+                                                       : mcus_[talker - 1]->address();
 }
 
 TimeNs Bus::next_event_ns() const {
@@ -88,6 +100,9 @@ void Bus::deliver(const LineByte& byte) {
     if (on_mcu_byte && mcus_[i]->running()) on_mcu_byte(i, byte.value, byte.end_ns);
   }
   if (byte.talker != kMaster && on_master_byte) on_master_byte(byte.value, byte.end_ns);
+  if (byte.talker != second_master_ && on_second_master_byte) {
+    on_second_master_byte(byte.value, byte.end_ns);
+  }
 }
 
 void Bus::settle(TimeNs t_ns) {

@@ -3,7 +3,7 @@
 //
 // Who hears what: an MCU hears every byte of the others and of the master, at the end of its stop
 // bit, unless it drives the line itself meanwhile (its receiver is off then) or is in reset. The
-// master's port hears every byte of the MCUs and not its own.
+// master's port hears every byte of the MCUs (and of a second master) and not its own.
 //
 // Order of events: by time. What happens at the same ns goes thus: boots and tick boundaries, in
 // the order in which the MCUs were added; then ends of bytes, the master's first, then the
@@ -41,6 +41,12 @@ class Bus : private Mcu::Driver {
 
   // A byte for the master: called when its stop bit has ended. May call master_send.
   std::function<void(std::uint8_t byte, TimeNs end_ns)> on_master_byte;
+
+  // A second master on the line, behind an adapter of its own: it talks as the first one does,
+  // without listening, and each hears the other. Call after the MCUs have been added.
+  void add_second_master();
+  void second_master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns);
+  std::function<void(std::uint8_t byte, TimeNs end_ns)> on_second_master_byte;
 
   // An MCU that runs has heard a byte. Looks on only: what it does must not reach the bus.
   std::function<void(std::size_t mcu, std::uint8_t byte, TimeNs end_ns)> on_mcu_byte;
@@ -90,6 +96,7 @@ class Bus : private Mcu::Driver {
   void settle(TimeNs t_ns);
 
   std::uint32_t baud_;
+  std::size_t second_master_ = kMaster;  // as a talker; kMaster: there is none
   EdgeSink* sink_;
   Line line_;
   std::vector<std::unique_ptr<Mcu>> mcus_;

@@ -15,6 +15,24 @@ Plant::Plant(std::size_t mcus) : motor_of_(mcus), enabled_(mcus, false) {
   for (auto& motors : motor_of_) motors.resize(kOutputsPerMcu);
 }
 
+void Plant::Motor::count(TimeNs time_ns) {
+  const int direction = forward ? 1 : -1;
+  position_steps += direction;
+  latest[steps_made++ % kLatest] = {time_ns, direction};
+}
+
+std::int64_t Plant::position_steps_before(std::size_t mcu, std::size_t output, TimeNs t_ns) const {
+  const Motor& motor = *motor_of_[mcu].at(output);
+  std::int64_t position_steps = motor.position_steps;
+  const std::size_t oldest = motor.steps_made - std::min(motor.steps_made, kLatest);
+  for (std::size_t i = motor.steps_made; i-- > oldest;) {
+    const Step& step = motor.latest[i % kLatest];
+    if (step.time_ns < t_ns) break;
+    position_steps -= step.direction;
+  }
+  return position_steps;
+}
+
 void Plant::attach(std::size_t mcu, std::size_t output, const PaceRules& rules) {
   motor_of_[mcu].at(output) = std::make_unique<Motor>(rules);
 }
@@ -76,7 +94,7 @@ void Plant::edge(const Edge& edge) {
     return;
   }
   ++steps_made_;
-  motor->position_steps += motor->forward ? 1 : -1;
+  motor->count(edge.time_ns);
   if (motor->rotor) motor->rotor->step(edge.time_ns, motor->forward);
   if (motor->halt && edge.time_ns > motor->halt->from_ns) {
     check_halt(edge.time_ns, edge.mcu, edge.index, *motor);
@@ -92,7 +110,9 @@ void Plant::settled(TimeNs until_ns) {
       if (motor == nullptr) continue;
       check_rotor(until_ns, mcu, output, *motor);
       if (!motor->pace.moving()) continue;
-      if (motor->halt && motor->halt->cut && until_ns >= motor->halt->from_ns) motor->pace.cut();
+      if (motor->halt && motor->halt->cut && until_ns >= motor->halt->from_ns) {
+        if (motor->pace.cut_off() && on_cut_off) on_cut_off(until_ns, mcu, output);
+      }
       const Jump jump = motor->pace.silent(until_ns);
       if (jump != Jump::kNone) report(until_ns, mcu, output, *motor, jump);
     }

@@ -3,6 +3,7 @@
 // (sim/pace.h).
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -30,6 +31,9 @@ class Plant final : public EdgeSink {
   std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what)>
       on_violation;
 
+  // A motor that an emergency stop has cut off in motion: a real one may have overrun.
+  std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output)> on_cut_off;
+
   void edge(const Edge& edge) override;
   void settled(TimeNs until_ns) override;
 
@@ -45,6 +49,8 @@ class Plant final : public EdgeSink {
   std::int64_t position_steps(std::size_t mcu, std::size_t output) const {
     return motor_of_[mcu].at(output)->position_steps;
   }
+  // The same, by the pulses before t_ns. Precondition: that was at most a tick ago.
+  std::int64_t position_steps_before(std::size_t mcu, std::size_t output, TimeNs t_ns) const;
   // Precondition: coupled.
   const Rotor& rotor(std::size_t mcu, std::size_t output) const {
     return *motor_of_[mcu].at(output)->rotor;
@@ -65,11 +71,20 @@ class Plant final : public EdgeSink {
     TimeNs run_down_ns;
     bool seen = false;  // a step after from_ns
   };
+  // No motor makes more steps in a tick (docs/protocol.md, TICKS).
+  static constexpr std::size_t kLatest = 128;
+  struct Step {
+    TimeNs time_ns;
+    int direction;
+  };
   struct Motor {
     explicit Motor(const PaceRules& motor_rules) : rules(&motor_rules), pace(motor_rules) {}
+    void count(TimeNs time_ns);
     const PaceRules* rules;
     Pace pace;
     std::int64_t position_steps = 0;
+    std::array<Step, kLatest> latest{};  // a ring
+    std::size_t steps_made = 0;
     bool forward = false;
     std::optional<Halt> halt;
     std::optional<Rotor> rotor;

@@ -47,6 +47,8 @@ class VirtualMcu final : public Mcu {
   // What the motor on this output has done, whatever the MCU believes: it outlives reboots. Until
   // the start of the present tick.
   const bushd_virtual_shaft& shaft(std::size_t output) const { return port_.shaft[output]; }
+  // When the present tick began. A step in its first slot is made at just this time.
+  TimeNs tick_start_ns() const { return port_.tick_start_ns; }
 
   void set_inputs(bushd_inputs inputs) override { bushd_virtual_set_inputs(&port_, inputs); }
   // From now on the input of this output's motor is what a switch at its shaft says.

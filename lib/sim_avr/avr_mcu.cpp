@@ -133,10 +133,14 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   reset_hook_->io.reset = on_reset;
   reset_hook_->mcu = this;
   avr_register_io(avr_, &reset_hook_->io);
+  if (!options.memory_owners.empty()) {
+    watch_ = std::make_unique<AvrMemoryWatch>(avr_, options.image, options.memory_owners);
+  }
   set_inputs({});
 }
 
 AvrMcu::~AvrMcu() {
+  watch_.reset();
   avr_terminate(avr_);
   std::free(avr_);
 }
@@ -223,7 +227,9 @@ void AvrMcu::on_byte(avr_irq_t*, std::uint32_t value, void* param) {
 
 // By the watchdog too.
 void AvrMcu::on_reset(avr_io_t* io) {
-  reinterpret_cast<ResetHook*>(io)->mcu->drop_outputs();
+  AvrMcu& self = *reinterpret_cast<ResetHook*>(io)->mcu;
+  if (self.watch_) self.watch_->reset();
+  self.drop_outputs();
 }
 
 void AvrMcu::drop_outputs() {
@@ -279,7 +285,10 @@ void AvrMcu::advance(TimeNs now_ns) {
     }
     avr_->run_cycle_limit = left;
     avr_->run_cycle_count = std::min(avr_->run_cycle_count, left);
-    if (avr_run(avr_) == cpu_Crashed) throw std::runtime_error("simavr: the image has crashed");
+    if (avr_run(avr_) == cpu_Crashed) {
+      const bool seen = watch_ && watch_->violation();
+      throw std::runtime_error(seen ? *watch_->violation() : "simavr: the image has crashed");
+    }
     // After RETI and SEI the chip executes one instruction before it serves an interrupt (data
     // sheet, reset and interrupt handling); simavr would two.
     if (avr_->interrupt_state == -1) {
@@ -346,6 +355,10 @@ void AvrMcu::tear_eeprom_byte() {
   const auto address = static_cast<std::uint16_t>(avr_->data[kEear] | avr_->data[kEear + 1] << 8);
   flip_eeprom_bit(address, 0);
   flip_eeprom_bit(address, 6);
+}
+
+void AvrMcu::poke(std::uint16_t address, std::uint8_t value) {
+  avr_->data[address] = value;
 }
 
 void AvrMcu::stick_ram_bit(std::uint16_t address, int bit) {

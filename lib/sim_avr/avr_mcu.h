@@ -15,6 +15,7 @@
 #include <string>
 
 #include "sim/mcu.h"
+#include "sim_avr/memory_watch.h"
 
 struct avr_t;
 struct avr_io_t;
@@ -28,11 +29,15 @@ struct AvrOptions {
   std::uint8_t address = 1;  // in its EEPROM
   std::uint64_t unique_id = 1;
   std::uint16_t boots = 0;  // boot number of the boot before
+  // Path of who may write where (memory_watch.h): then the image stops at the first wrong access.
+  // "": unwatched, and faster.
+  std::string memory_owners = {};
 };
 
 class AvrMcu final : public Mcu {
  public:
-  // Throws std::runtime_error if the image cannot be read. It boots at time 0.
+  // Throws std::runtime_error if the image cannot be read; and later, whenever time goes on, what
+  // the watch found. It boots at time 0.
   AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, EdgeSink* sink);
   ~AvrMcu() override;
 
@@ -61,8 +66,9 @@ class AvrMcu final : public Mcu {
   void flip_eeprom_bit(std::uint16_t address, int bit);
   // If the image is writing one. A write ends there, as if the power went: reset it next.
   void tear_eeprom_byte();
-  void stick_ram_bit(std::uint16_t address, int bit);  // at 0; slow
-  void short_motor_input(int motor);                   // of 0..7, to the supply
+  void poke(std::uint16_t address, std::uint8_t value);  // in RAM
+  void stick_ram_bit(std::uint16_t address, int bit);    // at 0; slow
+  void short_motor_input(int motor);                     // of 0..7, to the supply
 
   // Bytes of RAM that nothing has written to since they were tested at boot, between variables and
   // stack.
@@ -105,6 +111,7 @@ class AvrMcu final : public Mcu {
   avr_t* avr_;
   struct ResetHook;
   std::unique_ptr<ResetHook> reset_hook_;
+  std::unique_ptr<AvrMemoryWatch> watch_;
   avr_uart_t* uart_ = nullptr;
   std::uint64_t byte_cycles_ = 0;
   std::deque<std::uint8_t> received_;  // that the image has not been given yet

@@ -16,6 +16,7 @@
 
 #include "sim_qemu/lockstep.h"
 #include "sim_qemu/qemu_api.h"
+#include "sim_qemu/watch.h"
 
 __attribute__((visibility("default"))) const int qemu_plugin_version = QEMU_PLUGIN_VERSION;
 __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t id,
@@ -151,11 +152,31 @@ static void flush(void) {
 static void tell(uint32_t kind, uint32_t value, uint32_t address) {
   if (lockstep.event_count == EVENTS) flush();
   lockstep.events[lockstep.event_count++] =
-      (lockstep_message){qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL), kind, value, address, 0};
+      (lockstep_message){.time_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL),
+                         .kind = kind,
+                         .value = value,
+                         .address = address};
+}
+
+static bool watches;
+
+/* Within a block of translated code QEMU's clock cannot be read: the event has no time. */
+static void on_violation(const watch_violation* violation) {
+  flush();
+  lockstep.events[lockstep.event_count++] = (lockstep_message){.kind = LOCKSTEP_VIOLATION,
+                                                               .value = violation->kind,
+                                                               .address = violation->address,
+                                                               .pc = violation->pc,
+                                                               .caller = violation->caller};
+  flush();
+  _exit(1);
 }
 
 static void store(uint32_t address, uint32_t word) {
-  if (address < WRITTEN || address >= WRITTEN + WRITTEN_SIZE) give_up();
+  if (address < WRITTEN || address >= WRITTEN + WRITTEN_SIZE) {
+    if (!watches) give_up();
+    on_violation(&(watch_violation){.kind = LOCKSTEP_STORES_FOREIGN, .address = address});
+  }
   flash.words[(address - WRITTEN) / 4] = word;
   address_space_write_rom(&address_space_memory, address, MEMTXATTRS_UNSPECIFIED, &word,
                           sizeof word);
@@ -261,6 +282,19 @@ static void obey(void) {
         break;
       case LOCKSTEP_FLASH:
         store(command.address, command.value);
+        break;
+      case LOCKSTEP_WATCH_CODE:
+        watch_code(command.address, command.value, (uint8_t)command.time_ns);
+        break;
+      case LOCKSTEP_WATCH_OBJECT:
+        watch_object(command.address, command.value, (uint64_t)command.time_ns);
+        break;
+      case LOCKSTEP_WATCH_FROM:
+        watch_from(command.address);
+        break;
+      case LOCKSTEP_POKE:
+        address_space_write_rom(&address_space_memory, command.address, MEMTXATTRS_UNSPECIFIED,
+                                &command.value, 2);
         break;
       default:
         give_up();
@@ -547,11 +581,12 @@ static void on_machine_done(Notifier* notifier, void* data) {
 }
 
 int qemu_plugin_install(qemu_plugin_id_t id, const qemu_info_t* info, int argc, char** argv) {
-  (void)id;
   (void)info;
   static Notifier machine_done = {.notify = on_machine_done};
-  if (argc != 1 || strncmp(argv[0], "fd=", 3) != 0) return 1;
+  if (argc < 1 || strncmp(argv[0], "fd=", 3) != 0) return 1;
   lockstep.fd = atoi(argv[0] + 3);
+  watches = argc > 1 && strcmp(argv[1], "watch=on") == 0;
+  if (watches) watch_install(id, on_violation);
   qemu_add_machine_init_done_notifier(&machine_done);
   return 0;
 }

@@ -12,6 +12,28 @@
 typedef uint64_t qemu_plugin_id_t;
 typedef struct qemu_info_t qemu_info_t;
 #define QEMU_PLUGIN_VERSION 1
+typedef uint32_t qemu_plugin_meminfo_t;
+struct qemu_plugin_tb;
+struct qemu_plugin_insn;
+#define QEMU_PLUGIN_CB_NO_REGS 0
+#define QEMU_PLUGIN_MEM_RW 3
+void qemu_plugin_register_vcpu_tb_trans_cb(qemu_plugin_id_t id,
+                                           void (*callback)(qemu_plugin_id_t id,
+                                                            struct qemu_plugin_tb* block));
+size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb* block);
+struct qemu_plugin_insn* qemu_plugin_tb_get_insn(const struct qemu_plugin_tb* block, size_t i);
+const void* qemu_plugin_insn_data(const struct qemu_plugin_insn* instruction);
+size_t qemu_plugin_insn_size(const struct qemu_plugin_insn* instruction);
+uint64_t qemu_plugin_insn_vaddr(const struct qemu_plugin_insn* instruction);
+void qemu_plugin_register_vcpu_insn_exec_cb(struct qemu_plugin_insn* instruction,
+                                            void (*callback)(unsigned cpu, void* data), int flags,
+                                            void* data);
+void qemu_plugin_register_vcpu_mem_cb(struct qemu_plugin_insn* instruction,
+                                      void (*callback)(unsigned cpu, qemu_plugin_meminfo_t info,
+                                                       uint64_t address, void* data),
+                                      int flags, int accesses, void* data);
+unsigned qemu_plugin_mem_size_shift(qemu_plugin_meminfo_t info);
+bool qemu_plugin_mem_is_store(qemu_plugin_meminfo_t info);
 
 /* Objects and devices. */
 typedef struct Object Object;

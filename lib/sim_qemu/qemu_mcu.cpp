@@ -53,6 +53,31 @@ std::uint32_t record_of(std::uint32_t kind, std::uint32_t value) {
   ::_exit(127);
 }
 
+// Each image's is read once.
+std::shared_ptr<const QemuMemoryMap> map_of(const QemuOptions& options) {
+  static std::map<std::string, std::shared_ptr<const QemuMemoryMap>> maps;
+  auto& map = maps[options.image + '\n' + options.memory_owners];
+  if (!map) map = std::make_shared<QemuMemoryMap>(options.image, options.memory_owners);
+  return map;
+}
+
+const char* meaning_of(std::uint32_t violation) {
+  switch (violation) {
+    case LOCKSTEP_WRITES_FOREIGN:
+      return "writes what is others'";
+    case LOCKSTEP_WRITES_GAP:
+      return "writes between objects";
+    case LOCKSTEP_WRITES_NOWHERE:
+      return "writes where there is no memory";
+    case LOCKSTEP_READS_GAP:
+      return "reads between objects";
+    case LOCKSTEP_READS_NOWHERE:
+      return "reads where there is no memory";
+    default:
+      return "stores into flash that is not for writing";
+  }
+}
+
 }  // namespace
 
 QemuMcu::QemuMcu(const QemuOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
@@ -63,6 +88,7 @@ QemuMcu::QemuMcu(const QemuOptions& options, std::size_t index, Driver& driver, 
   }
   flash_[at] = record_of(kKindAddress, options.address);
   flash_[at + 4] = record_of(kKindBootNumber, options.boots);
+  if (!options.memory_owners.empty()) map_ = map_of(options);
   start(kPowerOn);
 }
 
@@ -75,7 +101,7 @@ void QemuMcu::start(std::uint32_t reset_cause) {
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
     throw std::system_error(errno, std::generic_category(), "a socket for QEMU");
   }
-  const std::string plugin = std::string(BUSHD_QEMU_MACHINE) + ",fd=0";
+  const std::string plugin = std::string(BUSHD_QEMU_MACHINE) + ",fd=0" + (map_ ? ",watch=on" : "");
   const pid_t parent = ::getpid();
   process_ = ::fork();
   if (process_ == 0) become_qemu(options_.image.c_str(), ends[1], plugin.c_str(), parent);
@@ -86,7 +112,25 @@ void QemuMcu::start(std::uint32_t reset_cause) {
   for (const auto& [address, word] : flash_) order(LOCKSTEP_FLASH, word, address);
   order(LOCKSTEP_RESET_CAUSE, reset_cause);
   order(LOCKSTEP_KEPT_RAM, std::exchange(kept_ram_, 0));
+  if (map_) order_watch();
   set_inputs(inputs_);
+}
+
+void QemuMcu::order_watch() {
+  for (const auto& code : map_->codes()) {
+    order(LOCKSTEP_WATCH_CODE, code.size, code.address, code.unit);
+  }
+  for (const auto& object : map_->objects()) {
+    order(LOCKSTEP_WATCH_OBJECT, object.size, object.address, static_cast<TimeNs>(object.writers));
+  }
+  order(LOCKSTEP_WATCH_FROM, 0, map_->main_at());
+}
+
+void QemuMcu::violated(const lockstep_message& event) const {
+  std::string text = options_.image + ": " + map_->place_of(event.pc);
+  if (event.caller != 0) text += " called by " + map_->place_of(event.caller);
+  throw std::runtime_error(text + " " + meaning_of(event.value) + ": " +
+                           map_->thing_at(event.address));
 }
 
 void QemuMcu::end() {
@@ -101,7 +145,13 @@ void QemuMcu::end() {
 
 void QemuMcu::order(lockstep_command_kind kind, std::uint32_t value, std::uint32_t address,
                     TimeNs time_ns) {
-  orders_.push_back({time_ns, kind, value, address, 0});
+  orders_.push_back({.time_ns = time_ns,
+                     .kind = static_cast<std::uint32_t>(kind),
+                     .value = value,
+                     .address = address,
+                     .pc = 0,
+                     .caller = 0,
+                     .unused = 0});
 }
 
 void QemuMcu::advance(TimeNs now_ns) {
@@ -203,6 +253,8 @@ void QemuMcu::take(const lockstep_message& event) {
       boot_ns_ = time_ns;
       kept_ram_ = event.value;
       break;
+    case LOCKSTEP_VIOLATION:
+      violated(event);
     case LOCKSTEP_OVERRUN:
       ++overruns_;
       break;

@@ -11,12 +11,14 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "sim/line.h"
 #include "sim/mcu.h"
 #include "sim_qemu/lockstep.h"
+#include "sim_qemu/memory_map.h"
 
 namespace bushd::sim {
 
@@ -25,6 +27,9 @@ struct QemuOptions {
   std::uint8_t address = 1;  // in its flash
   std::uint64_t unique_id = 1;
   std::uint16_t boots = 0;  // boot number of the boot before
+  // The port's file of owners (memory_map.h): then every access to memory is watched, and `advance`
+  // throws at the first that must not be. Empty: none is.
+  std::string memory_owners{};
 };
 
 class QemuMcu final : public Mcu {
@@ -54,6 +59,10 @@ class QemuMcu final : public Mcu {
   std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
 
   // Faults of the chip.
+  // A halfword of the program is another one.
+  void poke(std::uint32_t address, std::uint16_t halfword) {
+    order(LOCKSTEP_POKE, halfword, address);
+  }
   void stop_ticks() { order(LOCKSTEP_STOP_TICKS, 0); }  // their timer interrupts no more
   // Bit 0 of a word is 1. Before the first advance.
   void stick_ram(std::uint32_t address) { order(LOCKSTEP_STICK, 0, address); }
@@ -83,7 +92,11 @@ class QemuMcu final : public Mcu {
   void drive(TimeNs time_ns, Signal signal, std::uint16_t& levels, std::uint16_t to);
   std::uint16_t kept(std::uint32_t kind) const;
 
+  void order_watch();
+  [[noreturn]] void violated(const lockstep_message& event) const;
+
   QemuOptions options_;
+  std::shared_ptr<const QemuMemoryMap> map_;
   std::size_t index_;
   Driver& driver_;
   EdgeSink* sink_;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "config/config_file.h"
+#include "source_path.h"
 
 namespace bushd::config {
 namespace {
@@ -33,7 +34,7 @@ TEST(Config, GoodFileIsReadInItsOrder) {
   EXPECT_EQ(config->buses[0].format, BUSHD_FORMAT_FINE);
   EXPECT_EQ(config->buses[1].format, BUSHD_FORMAT_COARSE);
   ASSERT_EQ(config->mcus.size(), 2u);
-  EXPECT_EQ(config->mcus[1].bus, BusIndex{1});
+  EXPECT_EQ(config->mcus[1].bus, BusId{1});
   EXPECT_EQ(config->mcus[1].address, McuAddress{255});
   EXPECT_EQ(config->mcus[1].id, "roof:255");
   ASSERT_EQ(config->groups.size(), 2u);
@@ -153,7 +154,7 @@ TEST(Config, GroupsWithTheSameTableShareIt) {
 
 TEST(Config, TablesAreLookedUpBesideTheFileThenInItsTablesThenAmongTheShipped) {
   const ConfigFile file(kGood);
-  EXPECT_EQ(file.load()->groups[0].table->path(), BUSHD_SOURCE_DIR "/tables/bushd2-constant.toml");
+  EXPECT_EQ(file.load()->groups[0].table->path(), test::source_path("tables/bushd2-constant.toml"));
   const auto below = file.directory().write("tables/bushd2-constant.toml", kTable);
   EXPECT_EQ(file.load()->groups[0].table->path(), below.string());
   const auto beside = file.directory().write("bushd2-constant.toml", kTable);
@@ -161,7 +162,7 @@ TEST(Config, TablesAreLookedUpBesideTheFileThenInItsTablesThenAmongTheShipped) {
 }
 
 TEST(Config, ExampleOfTheDocumentationIsGood) {
-  std::ifstream page(BUSHD_SOURCE_DIR "/docs/configuration.md");
+  std::ifstream page(test::source_path("docs/configuration.md"));
   const std::string text{std::istreambuf_iterator<char>(page), std::istreambuf_iterator<char>()};
   const std::size_t from = text.find("```toml\n") + 8;
   const ConfigFile file(text.substr(from, text.find("```", from) - from));

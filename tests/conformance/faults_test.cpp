@@ -5,6 +5,7 @@
 
 #include "conformance/targets.h"
 #include "sim/bus_fixture.h"
+#include "source_path.h"
 
 namespace bushd::sim {
 namespace {
@@ -249,7 +250,7 @@ class GoldenFrames : public testing::TestWithParam<Target> {
   };
 
   static std::vector<Bytes> wires() {
-    std::ifstream file(BUSHD_SOURCE_DIR "/tests/vectors/frames.csv");
+    std::ifstream file(test::source_path("tests/vectors/frames.csv"));
     std::vector<Bytes> out;
     std::string line;
     std::getline(file, line);

@@ -29,6 +29,7 @@ class Atmega2560 final : public McuUnderTest {
     options.address = birth.address;
     options.unique_id = birth.unique_id;
     options.boots = birth.boots;
+    options.memory_owners = AVR_MEMORY_OWNERS;
     auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
     mcu->on_conversion = on_conversion;
     avr_ = mcu.get();
@@ -43,7 +44,7 @@ class Atmega2560 final : public McuUnderTest {
   void expect_unharmed() const override {
     EXPECT_EQ(avr_->overruns(), 0u);
     EXPECT_EQ(avr_->bytes_cut(), 0u);
-    EXPECT_GE(avr_->untouched_ram(), 32u);
+    EXPECT_GE(avr_->untouched_ram(), AvrMemoryWatch::kReserve);
     testing::Test::RecordProperty("untouched_ram_bytes", static_cast<int>(avr_->untouched_ram()));
   }
 
@@ -64,6 +65,7 @@ class Lm3s6965 final : public McuUnderTest {
                             EdgeSink* sink) override {
     QemuOptions options;
     options.image = LM3S_IMAGES "-500000.elf";
+    options.memory_owners = LM3S_MEMORY_OWNERS;
     options.address = birth.address;
     options.unique_id = birth.unique_id;
     options.boots = birth.boots;

@@ -51,7 +51,7 @@ TEST_P(Faults, FlippedBitsAreDroppedCountedAndRepaired) {
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 4000);
   EXPECT_EQ(lab.shaft_steps("m02"), -4000);
-  EXPECT_GT(lab.bus(0).mcu(0).core().bad_frames, 0);
+  EXPECT_GT(lab.bus(0).mcu(0).core().reception.bad_frames, 0);
 }
 
 // Whatever is lost of a stop, a motor ends where its result says.

@@ -45,8 +45,8 @@ TEST(Moves, AllMotorsOfTwoMcusAtOnce) {
     EXPECT_EQ(result.result, "reached") << result.reason;
     for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(lab.shaft_steps(names[i]), steps[i]);
     EXPECT_EQ(lab.bus(0).collisions(), 0u);
-    EXPECT_EQ(lab.bus(0).mcu(0).core().bad_frames, 0);
-    EXPECT_EQ(lab.bus(0).mcu(0).core().rejected_frames, 0);
+    EXPECT_EQ(lab.bus(0).mcu(0).core().reception.bad_frames, 0);
+    EXPECT_EQ(lab.bus(0).mcu(0).core().reception.rejected_frames, 0);
   }
 }
 

@@ -251,7 +251,7 @@ TEST_P(Retarget, GroupWithMotorsAtRestAndInMotion) {
   EXPECT_TRUE(lab->has_result(late));
   EXPECT_EQ(lab->wait(second).result, "reached");
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(lab->shaft_steps(all[i]), steps[i]);
-  EXPECT_EQ(lab->bus(0).mcu(0).core().rejected_frames, 0);
+  EXPECT_EQ(lab->bus(0).mcu(0).core().reception.rejected_frames, 0);
 }
 
 TEST_P(Retarget, OfOneMotorOfAGroupLeavesTheOthersAsTheyWere) {

@@ -17,6 +17,7 @@
 #include "engine/frame.h"
 #include "engine/message_text.h"
 #include "firmware/core/mcu.h"
+#include "source_path.h"
 
 namespace bushd::test {
 namespace {
@@ -40,7 +41,7 @@ struct Line {
 
 // The lines of all blocks of a kind; a line that is indented continues the one before.
 std::vector<Line> lines_of(const std::string& kind) {
-  std::ifstream file(BUSHD_SOURCE_DIR "/docs/protocol.md");
+  std::ifstream file(source_path("docs/protocol.md"));
   EXPECT_TRUE(file) << "docs/protocol.md";
   std::vector<Line> lines;
   bool inside = false;

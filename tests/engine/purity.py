@@ -83,7 +83,7 @@ def check_cross(preset, source, build):
 
     faults = run("cmake", "-S", source, "-B", build, f"-DCMAKE_TOOLCHAIN_FILE={source}/cmake/{preset}.cmake",
                  "-DBUSHD_FIRMWARE_ONLY=ON", "-DBUSHD_WERROR=ON", "-DCMAKE_BUILD_TYPE=MinSizeRel")
-    faults = faults or run("cmake", "--build", build)
+    faults = faults or run("cmake", "--build", build, "--target", "bushd_engine", "bushd_firmware")
     if faults:
         return faults
     faults += run(sys.executable, source / "tests/vectors/make_vectors.py", "--header", build / "golden_vectors.h")

@@ -16,6 +16,7 @@
 #include "engine/run_state.h"
 #include "engine/slots.h"
 #include "engine/tables.h"
+#include "source_path.h"
 
 namespace bushd::test {
 namespace {
@@ -35,7 +36,7 @@ std::vector<std::string> split(const std::string& text, char separator) {
 }
 
 std::vector<Row> read_csv(const std::string& name) {
-  const std::string path = std::string(BUSHD_SOURCE_DIR) + "/tests/vectors/" + name;
+  const std::string path = source_path("tests/vectors/" + name);
   std::ifstream file(path);
   EXPECT_TRUE(file) << path;
   std::string line;

@@ -149,7 +149,7 @@ class Stranger {
                                                   : static_cast<std::int16_t>(below(900)));
     }
     made.delays.assign(columns, static_cast<std::uint16_t>(below(2) == 0 ? 0 : below(300)));
-    made.epoch = static_cast<std::uint8_t>(mcu.epoch + (replace ? 1 : 0));
+    made.epoch = static_cast<std::uint8_t>(mcu.stream.epoch + (replace ? 1 : 0));
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     std::size_t size = bushd_encode_ticks_head(
         made.epoch, static_cast<std::uint8_t>(made.flags | (fine ? BUSHD_TICKS_FINE : 0)),

@@ -414,7 +414,7 @@ Ticks Rig::part(const Plan& plan, std::uint32_t start, std::size_t from, std::si
           .displacements = {plan.displacement.begin() + static_cast<std::ptrdiff_t>(from),
                             plan.displacement.begin() + static_cast<std::ptrdiff_t>(end)},
           .delays = {plan.delay[end - 1]},
-          .epoch = mcu_.epoch};
+          .epoch = mcu_.stream.epoch};
 }
 
 void Rig::run_plan(const Plan& plan, std::uint8_t motor) {

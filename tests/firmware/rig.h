@@ -184,6 +184,7 @@ class Rig {
   std::uint32_t port_tick_ns() const { return port_tick_ns_; }
   const bushd_plane& plane() const { return *plane_; }
   const bushd_mcu& mcu() const { return mcu_; }
+  bushd_mcu* mutable_mcu() { return &mcu_; }  // for functions of the core that ports call
   const RigOptions& options() const { return options_; }
 
  private:

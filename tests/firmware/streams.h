@@ -24,7 +24,7 @@ class Streams : public testing::TestWithParam<bushd_format> {
             .mask = 1,
             .displacements = std::vector<std::int16_t>(count, one()),
             .delays = {delay},
-            .epoch = rig.mcu().epoch};
+            .epoch = rig.mcu().stream.epoch};
   }
   std::int16_t one() const { return format == BUSHD_FORMAT_FINE ? 256 : 0x81; }
   std::int16_t two_back() const { return format == BUSHD_FORMAT_FINE ? -512 : 0x02; }

@@ -58,7 +58,7 @@ TEST_P(TableTicks, EqualTicksForAnyRunFromAnyTick) {
     int sent = 0;
     while (!bushd_run_done(&run)) {
       const auto count = between<std::uint8_t>(1, 25);
-      head.epoch = by_ticks.mcu().epoch;
+      head.epoch = by_ticks.mcu().stream.epoch;
       if (sent > cut_tick &&
           sent < cut_tick + 25) {  // a stop, from the middle of what is queued on
         bushd_run_ramp_down(&run);

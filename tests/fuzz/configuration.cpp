@@ -8,8 +8,8 @@
 
 #include "config/config.h"
 #include "engine/run.h"
+#include "fieldbus/line_budget.h"
 #include "fuzz/fuzz.h"
-#include "link/line_budget.h"
 
 namespace bushd::fuzz {
 namespace {
@@ -46,8 +46,8 @@ void check_speeds(const config::Config& config) {
     for (std::size_t m = 0; m < config.mcus.size(); ++m) {
       if (config.mcus[m].bus.value == b) motors.push_back(motors_of_mcu[m]);
     }
-    BUSHD_REQUIRE(link::line_load(bus.baud, bus.tick_ns(), bus.format, motors) <=
-                  link::kMaxLineLoad);
+    BUSHD_REQUIRE(fieldbus::line_load(bus.baud, bus.tick_ns(), bus.format, motors) <=
+                  fieldbus::kMaxLineLoad);
   }
 }
 

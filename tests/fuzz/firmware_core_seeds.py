@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""Writes the hand-made inputs of the fuzz target firmware_core into its corpus.
+"""Writes the hand-made inputs of the fuzz targets firmware_core, _avr and _lm3s6965 into their corpora.
 
     tests/fuzz/firmware_core_seeds.py
 
-An input is a programme of operations (firmware_core.cpp, Op). Run this again when payloads or
+An input is a programme of operations (core_programme.h, Op; what firmware_core_avr.cpp adds). Run this again when payloads or
 operations change: an input that the MCU refuses from its first frame on reaches nothing.
 """
 import pathlib
 import struct
 
-CORPUS = pathlib.Path(__file__).parent / "corpus" / "firmware_core"
+CORPORA = pathlib.Path(__file__).parent / "corpus"
 TICK_NS = 2_560_000
 (IDENTIFY, CONFIGURE, TABLE_BEGIN, TABLE_DATA, TABLE_END, ASSIGN, CONTROL, SET_POSITION, POLL, SYNC, TICKS,
  TABLE_TICKS, TABLE_RUN, EMERGENCY, SET_ADDRESS, TABLES, INPUTS, EMISSION, HOME, LOCAL, TRIGGER,
@@ -69,6 +69,15 @@ def work(pieces):
 
 
 RESET = bytes([13])
+
+
+def pace(turns):
+    return bytes([14, turns])
+
+
+def rest(ticks):
+    """Below 240, or a multiple of 64 up to 1024."""
+    return bytes([15, ticks if ticks < 240 else 239 + ticks // 64])
 
 
 def poll(*addresses):
@@ -173,6 +182,27 @@ SEEDS = {
             + passes(2) + ticks(START | FINE, 2, 1, (0,), (256, -512)) + passes(9),
 }
 
+CODES = tuple(range(400, 300, -1))
+FORGET_TABLES = frame(CONTROL, b"\x08")
+
+# Operations of targets with a port of their own; they replay the others too.
+SEEDS_AVR = {
+    "kept-written": ready(1, table(1, CODES, 350)) + rest(1024) + RESET + frame(TABLES) + passes(3),
+    "kept-changed": ready(1) + rest(896) + table(1, CODES, 350) + rest(160) + inputs(positive=3) + rest(640) + RESET,
+    "tables-forgotten": ready(1, table(1, CODES, 350)) + rest(30) + passes(2) + FORGET_TABLES + table(2) + passes(9),
+    "paced": ready(1) + pace(1) + MOVE[1] + passes(1) + MORE[1] + poll(7) + poll(7) + pace(3) + passes(15),
+    "answer-waits": ready(1) + poll(7) + noise(bytes(range(1, 200))) + poll(7) + work(15) + noise(bytes(255)) + passes(2),
+    "answer-is-sent": ready(1) + poll(7) + work(3) + pace(2) + MOVE[1] + poll(7) + work(9) + frame(TABLES) + passes(3),
+}
+
+# Many codes: the walk compares 32 bytes at a time.
+SEEDS_LM3S6965 = {
+    "kept-written": ready(1, b"".join(table(slot, CODES, 350) for slot in range(1, 4))) + rest(1024) + RESET + frame(TABLES),
+    "kept-changed": ready(1) + rest(896) + table(1, CODES, 350) + rest(160) + inputs(positive=3) + rest(640) + RESET,
+}
+
 if __name__ == "__main__":
-    for name, programme in SEEDS.items():
-        (CORPUS / name).write_bytes(programme)
+    for target, seeds in {"firmware_core": SEEDS, "firmware_core_avr": SEEDS_AVR,
+                          "firmware_core_lm3s6965": SEEDS_LM3S6965}.items():
+        for name, programme in seeds.items():
+            (CORPORA / target / name).write_bytes(programme)

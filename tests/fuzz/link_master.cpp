@@ -61,8 +61,7 @@ const bushd_table kTable = {
     .time_unit_ns = 40000};
 
 link::McuSetup mcu_setup(std::uint8_t address) {
-  link::McuSetup setup{.address = address, .tables = {{&kTable, 3}}, .table_of_motor = {}};
-  setup.table_of_motor.fill(-1);
+  link::McuSetup setup{.address = {address}, .tables = {{&kTable, 3}}, .table_of_motor = {}};
   for (std::size_t m = 0; m < kMotors; ++m) setup.table_of_motor[m] = 0;
   if (address == 2) {
     setup.emission.settings = {.mode = BUSHD_EMISSION_BURST,
@@ -81,32 +80,34 @@ link::McuSetup mcu_setup(std::uint8_t address) {
 // Every motor moves until a tick of its own.
 class Source : public link::TickSource {
  public:
-  std::uint16_t render(std::size_t mcu, std::uint8_t motor, link::Tick first, unsigned count,
+  std::uint16_t render(link::McuIndex index, std::uint8_t motor, link::Tick first, unsigned count,
                        std::int16_t* out, std::size_t stride) override {
+    const std::size_t mcu = index.value;
     BUSHD_REQUIRE(mcu < kMcus && motor < kMotors && count >= 1 && stride >= 1);
     BUSHD_REQUIRE(first >= start[mcu][motor]);
     for (unsigned i = 0; i < count; ++i) out[i * stride] = 65;
-    return first + count < end_tick(mcu, motor) ? 100 : 0;
+    return first + count < end_tick(index, motor) ? 100 : 0;
   }
 
   // Odd motors run by their table, at its cruise delay.
-  std::optional<Stretch> run_at(std::size_t mcu, std::uint8_t motor, link::Tick first,
-                                unsigned max_ticks) override {
+  std::optional<RunSegment> run_at(link::McuIndex index, std::uint8_t motor, link::Tick first,
+                                   unsigned max_ticks) override {
+    const std::size_t mcu = index.value;
     BUSHD_REQUIRE(mcu < kMcus && motor < kMotors && max_ticks >= 1);
     BUSHD_REQUIRE(first >= start[mcu][motor]);
-    if (motor % 2 == 0 || first >= end_tick(mcu, motor)) return std::nullopt;
+    if (motor % 2 == 0 || first >= end_tick(index, motor)) return std::nullopt;
     bushd_run_state state{};
     state.direction = 1;
     state.cruises = true;
-    Stretch stretch{};
-    BUSHD_REQUIRE(bushd_run_restore(&stretch.run, &kTable, &state));
-    const link::Tick left = end_tick(mcu, motor) - first;
-    stretch.ticks = static_cast<unsigned>(std::min<link::Tick>(left, max_ticks));
-    return stretch;
+    RunSegment segment{};
+    BUSHD_REQUIRE(bushd_run_restore(&segment.run, &kTable, &state));
+    const link::Tick left = end_tick(index, motor) - first;
+    segment.ticks = static_cast<unsigned>(std::min<link::Tick>(left, max_ticks));
+    return segment;
   }
 
-  link::Tick end_tick(std::size_t mcu, std::uint8_t motor) override {
-    return start[mcu][motor] + length[mcu][motor];
+  link::Tick end_tick(link::McuIndex index, std::uint8_t motor) override {
+    return start[index.value][motor] + length[index.value][motor];
   }
 
   std::array<std::array<link::Tick, kMotors>, kMcus> start{};
@@ -179,7 +180,11 @@ class Bus {
   link::Master& master() { return master_; }
   Source& source() { return source_; }
   std::int64_t now_us() const { return now_us_; }
-  bool online(std::size_t mcu) const { return master_.view(mcu).phase == link::McuPhase::kOnline; }
+  bool online(link::McuIndex mcu) const {
+    return master_.view(mcu).phase == link::McuPhase::kOnline;
+  }
+
+  bool all_online() const { return online(link::McuIndex{0}) && online(link::McuIndex{1}); }
 
   void step() {
     const Bytes sent = master_.step(now_us_);
@@ -192,9 +197,11 @@ class Bus {
     }
     BUSHD_REQUIRE(receiver_.size == 0);
     for (const link::Event& event : master_.take_events()) {
-      BUSHD_REQUIRE(event.mcu < kMcus && event.motor < BUSHD_MOTORS_PER_MCU);
+      std::visit([](const auto& what) { BUSHD_REQUIRE(what.mcu.value < kMcus); }, event);
+      const auto* const missed = std::get_if<link::StartMissed>(&event);
+      BUSHD_REQUIRE(missed == nullptr || missed->motor < BUSHD_MOTORS_PER_MCU);
     }
-    for (std::size_t i = 0; i < kMcus; ++i) check(master_.view(i));
+    for (std::size_t i = 0; i < kMcus; ++i) check(master_.view(link::McuIndex{i}));
   }
 
  private:
@@ -404,14 +411,14 @@ void answer_spoilt(Bus& bus, Input& input) {
 }
 
 void begin(Bus& bus, Input& input, bool whole) {
-  const std::size_t mcu = input.u8() % kMcus;
+  const link::McuIndex mcu{input.u8() % kMcus};
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const std::uint8_t later = input.u8();
   const std::uint8_t length = input.u8();
   if (!bus.online(mcu) || !bus.master().time_known()) return;
   const link::Tick start = bus.master().earliest_start(bus.now_us(), mcu, motor) + later;
-  bus.source().start[mcu][motor] = start;
-  bus.source().length[mcu][motor] = length;
+  bus.source().start[mcu.value][motor] = start;
+  bus.source().length[mcu.value][motor] = length;
   if (whole) {
     bus.master().begin_table_run(mcu, motor, start, length - 128 == 0 ? 1 : length - 128);
   } else {
@@ -420,17 +427,17 @@ void begin(Bus& bus, Input& input, bool whole) {
 }
 
 void replace(Bus& bus, Input& input) {
-  const std::size_t mcu = input.u8() % kMcus;
+  const link::McuIndex mcu{input.u8() % kMcus};
   const auto mask = static_cast<std::uint16_t>(input.u8() % (1u << kMotors));
   const std::uint8_t later = input.u8();
   if (!bus.online(mcu) || !bus.master().time_known()) return;
   link::Tick first = bus.master().earliest_replace(bus.now_us()) + later;
-  for (const link::Tick start : bus.source().start[mcu]) first = std::max(first, start);
+  for (const link::Tick start : bus.source().start[mcu.value]) first = std::max(first, start);
   bus.master().replace(mcu, mask, first);
 }
 
 void arm(Bus& bus, Input& input) {
-  const std::size_t mcu = input.u8() % kMcus;
+  const link::McuIndex mcu{input.u8() % kMcus};
   const unsigned mask = 1u + input.u8() % ((1u << kMotors) - 1u);
   const std::uint32_t delay_us = BUSHD_TRIGGER_MIN_DELAY_US + input.u16();
   if (!bus.online(mcu) || !bus.master().can_trigger(mcu)) return;
@@ -443,30 +450,30 @@ void arm(Bus& bus, Input& input) {
 }
 
 void started(Bus& bus, Input& input) {
-  const std::size_t mcu = input.u8() % kMcus;
+  const link::McuIndex mcu{input.u8() % kMcus};
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const std::uint8_t later = input.u8();
   if (!bus.online(mcu) || !bus.master().time_known()) return;
   const link::Tick start = bus.master().earliest_start(bus.now_us(), mcu, motor) + later;
-  bus.source().start[mcu][motor] = start;
-  bus.source().length[mcu][motor] = 90;
+  bus.source().start[mcu.value][motor] = start;
+  bus.source().length[mcu.value][motor] = 90;
   bus.master().follow_table_run(mcu, motor, start, 70);
 }
 
 void reference(Bus& bus, Input& input) {
-  const std::size_t mcu = input.u8() % kMcus;
+  const link::McuIndex mcu{input.u8() % kMcus};
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const auto arrivals = static_cast<std::uint8_t>(input.u8() % 4u);
-  if (!bus.online(mcu) || !bus.master().has_reference(mcu)) return;
-  bus.master().reference(mcu, {.motor = motor,
-                               .arrivals = arrivals,
-                               .position_steps = 70,
-                               .delay_us = 100,
-                               .width_us = 40});
+  if (!bus.online(mcu) || !bus.master().can_compare_position(mcu)) return;
+  bus.master().position_compare(mcu, {.motor = motor,
+                                      .arrivals = arrivals,
+                                      .position_steps = 70,
+                                      .delay_us = 100,
+                                      .width_us = 40});
 }
 
 void home(Bus& bus, Input& input) {
-  const std::size_t mcu = input.u8() % kMcus;
+  const link::McuIndex mcu{input.u8() % kMcus};
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const std::uint16_t steps = input.u16();
   if (!bus.online(mcu)) return;
@@ -494,24 +501,24 @@ void run_op(Op op, Bus& bus, Input& input) {
     case Op::kReplace:
       return replace(bus, input);
     case Op::kDrop: {
-      const std::size_t mcu = input.u8() % kMcus;
+      const link::McuIndex mcu{input.u8() % kMcus};
       return master.drop(mcu, static_cast<std::uint8_t>(input.u8() % kMotors));
     }
     case Op::kPosition: {
-      const std::size_t mcu = input.u8() % kMcus;
+      const link::McuIndex mcu{input.u8() % kMcus};
       const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
       return master.set_position(mcu, motor, input.u16() - 32768);
     }
     case Op::kControl: {
       constexpr std::array<std::uint8_t, 4> kActions = {1, 2, 4, 5};
-      const std::size_t mcu = input.u8() % kMcus;
+      const link::McuIndex mcu{input.u8() % kMcus};
       return master.control(mcu, kActions[input.u8() % kActions.size()]);
     }
     case Op::kPort:
       return bus.lose_port();
     case Op::kReconfigure: {
-      const std::size_t mcu = input.u8() % kMcus;
-      return master.reconfigure(mcu, mcu_setup(static_cast<std::uint8_t>(mcu + 1)));
+      const link::McuIndex mcu{input.u8() % kMcus};
+      return master.reconfigure(mcu, mcu_setup(static_cast<std::uint8_t>(mcu.value + 1)));
     }
     case Op::kTableRun:
       return begin(bus, input, true);
@@ -522,7 +529,7 @@ void run_op(Op op, Bus& bus, Input& input) {
     case Op::kArm:
       return arm(bus, input);
     case Op::kDisarm: {
-      const std::size_t mcu = input.u8() % kMcus;
+      const link::McuIndex mcu{input.u8() % kMcus};
       if (bus.online(mcu)) master.disarm(mcu);
       return;
     }
@@ -538,11 +545,11 @@ void run_op(Op op, Bus& bus, Input& input) {
 // Answers everything at once, as it should be.
 void recover(Bus& bus) {
   constexpr int kMaxAnswers = 3000;
-  for (int i = 0; i < kMaxAnswers && !(bus.online(0) && bus.online(1)); ++i) {
+  for (int i = 0; i < kMaxAnswers && !bus.all_online(); ++i) {
     bus.answer(bus.fitting_answer());
     bus.wait(10'000);
   }
-  BUSHD_REQUIRE(bus.online(0) && bus.online(1));
+  BUSHD_REQUIRE(bus.all_online());
 }
 
 void run(Input input) {

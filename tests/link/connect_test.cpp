@@ -6,15 +6,14 @@
 namespace bushd::test {
 namespace {
 
-using link::Event;
 using link::McuPhase;
 using testing::HasSubstr;
 
 TEST(Connect, FindsConfiguresSyncsAndEnables) {
   FakeBus bus(1, 3);
-  EXPECT_EQ(bus.master->view(0).phase, McuPhase::kOffline);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
   bus.connect();
-  EXPECT_EQ(bus.count(Event::Kind::kOnline), 1);
+  EXPECT_EQ(bus.count<link::McuOnline>(), 1);
   std::vector<int> requests;
   for (const Heard& heard : bus.heard) {
     if (heard.type != BUSHD_MSG_POLL && heard.type != BUSHD_MSG_SYNC)
@@ -33,10 +32,10 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
   EXPECT_EQ(slave.flags, 15);
   const Bytes control = bus.heard_of(BUSHD_MSG_CONTROL).back().payload;
   EXPECT_EQ(control, (Bytes{BUSHD_CONTROL_ENABLE | BUSHD_CONTROL_CLEAR_FAULTS}));
-  EXPECT_EQ(bus.master->view(0).detail, "");
+  EXPECT_EQ(bus.master->view(McuIndex{0}).detail, "");
   EXPECT_TRUE(bus.master->time_known());
   EXPECT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(0), 1);
-  EXPECT_EQ(bus.master->health(0).timeouts, 0u);
+  EXPECT_EQ(bus.master->health(McuIndex{0}).timeouts, 0u);
   EXPECT_EQ(bus.master->bus_health().crc_errors, 0u);
 }
 
@@ -47,7 +46,7 @@ TEST(Connect, SettingsOfInputsAreToldEveryTime) {
   link::McuSetup setup = bus.setup.mcus[0];
   setup.inputs.limit_positive = 0x8001;
   setup.inputs.overcurrent = 900;
-  bus.master->reconfigure(0, setup);
+  bus.master->reconfigure(McuIndex{0}, setup);
   bus.connect();
   const auto told = bus.heard_of(BUSHD_MSG_INPUTS);
   ASSERT_EQ(told.size(), 2u);
@@ -64,7 +63,7 @@ TEST(Connect, SettingsOfInputsAreToldEveryTime) {
 TEST(Connect, AllMcusAgreeOnTheTime) {
   FakeBus bus(5, 2);
   bus.connect();
-  EXPECT_EQ(bus.count(Event::Kind::kOnline), 5);
+  EXPECT_EQ(bus.count<link::McuOnline>(), 5);
   for (std::size_t i = 1; i < 5; ++i)
     EXPECT_NEAR(static_cast<double>(bus.slaves[i].zero_us),
                 static_cast<double>(bus.slaves[0].zero_us), 2);
@@ -97,7 +96,7 @@ TEST(Connect, LatecomerWithATimeOfItsOwnIsToldThatOfTheBusFirst) {
       bus.run_for(5'000);
       ASSERT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(there), 1);
     }
-    EXPECT_TRUE(bus.online(late)) << bus.master->view(late).detail;
+    EXPECT_TRUE(bus.online(late)) << bus.master->view(McuIndex{late}).detail;
     EXPECT_EQ(bus.slaves[there].zero_us, zero);
     EXPECT_NEAR(static_cast<double>(bus.slaves[late].zero_us), static_cast<double>(zero), 2);
     EXPECT_TRUE(bus.online(there));
@@ -109,13 +108,13 @@ TEST(Connect, TimeThatJumpsIsOfflineUntilItIsToldAgain) {
   FakeBus bus(1, 2);
   bus.connect();
   bus.slaves[0].zero_us -= 1'000'000;
-  EXPECT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kOffline) == 1; }, 200'000));
-  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("other ticks"));
+  EXPECT_TRUE(bus.run_until([&] { return bus.count<link::McuOffline>() == 1; }, 200'000));
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail, HasSubstr("other ticks"));
   ASSERT_TRUE(bus.run_until([&] { return bus.online(0); }));
   EXPECT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(0), 1);
 }
 
-// Whoever is silent may know the time all the same.
+// An MCU that does not answer may know the time all the same.
 TEST(Connect, TimeDoesNotBeginAnewBeforeAllHaveReported) {
   FakeBus bus(1, 2);
   bus.connect();
@@ -131,8 +130,8 @@ TEST(Connect, TimeDoesNotBeginAnewBeforeAllHaveReported) {
   EXPECT_EQ(bus.slaves[0].zero_us, zero);
 }
 
-// An MCU that missed a SYNC and heard a repetition of it knows another mark by that name.
-TEST(Connect, MarkThatMcusDisagreeAboutIsNotPassedOn) {
+// An MCU that missed a SYNC and heard a repetition of it knows another instant by that sync_id.
+TEST(Connect, SyncThatMcusDisagreeAboutIsNotPassedOn) {
   FakeBus bus(2, 2);
   bus.connect();
   bus.run_for(2'000'000);
@@ -143,10 +142,10 @@ TEST(Connect, MarkThatMcusDisagreeAboutIsNotPassedOn) {
     return syncs().back();
   };
   EXPECT_EQ(next_sync().payload[6], 1) << "follows, as a rule";
-  bus.slaves[1].mark_us += 30'000;
+  bus.slaves[1].sync_us += 30'000;
   EXPECT_EQ(next_sync().payload[6], 0);
-  EXPECT_EQ(next_sync().payload[6], 1) << "about the next mark they agree";
-  // A clock that is off is so at every mark: then the first MCU's time is that of the bus.
+  EXPECT_EQ(next_sync().payload[6], 1) << "about the next SYNC they agree";
+  // A clock that is off is so at every SYNC: then the first MCU's time is that of the bus.
   bus.slaves[1].zero_us -= 30'000;
   EXPECT_EQ(next_sync().payload[6], 0);
   EXPECT_EQ(next_sync().payload[6], 1);
@@ -159,178 +158,30 @@ TEST(Connect, SymmetricTableIsSentOnce) {
   EXPECT_EQ(bus.slaves[0].tables.at(0), bus.codes);
 }
 
-struct Misfit {
-  const char* name;
-  void (*change)(bushd_identity& identity);
-  std::vector<std::string> said;
-};
-
-class Unfit : public testing::TestWithParam<Misfit> {};
-INSTANTIATE_TEST_SUITE_P(Identities, Unfit,
-                         testing::Values(Misfit{"Version",
-                                                [](bushd_identity& i) { i.protocol_version = 9; },
-                                                {"protocol version 9", "this program version 3",
-                                                 "update"}},
-                                         Misfit{"Outputs",
-                                                [](bushd_identity& i) { i.motors = 3; },
-                                                {"has only 3 outputs", "output 3 is configured"}},
-                                         Misfit{"Memory",
-                                                [](bushd_identity& i) { i.table_codes = 349; },
-                                                {"memory for 349", "need 350"}},
-                                         Misfit{"Queue",
-                                                [](bushd_identity& i) { i.queue_ticks = 8; },
-                                                {"queue of 8 ticks", "use a longer tick"}}),
-                         [](const auto& misfit) { return misfit.param.name; });
-
-TEST_P(Unfit, IsSaidAndAskedAgainWithoutHurry) {
-  FakeBus bus(1, 4);
-  const bushd_identity good = bus.slaves[0].identity;
-  GetParam().change(bus.slaves[0].identity);
-  bus.run_for(3'000'000);
-  EXPECT_EQ(bus.master->view(0).phase, McuPhase::kOffline);
-  for (const std::string& text : GetParam().said) {
-    EXPECT_THAT(bus.master->view(0).detail, HasSubstr(text));
-  }
-  EXPECT_TRUE(bus.master->view(0).identified);
-  EXPECT_EQ(bus.heard_of(BUSHD_MSG_IDENTIFY).size(), 2u);
-  EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONFIGURE).size(), 0u) << "nothing is done to it";
-  EXPECT_TRUE(bus.events.empty());
-  // Another MCU in its place.
-  bus.slaves[0].identity = good;
-  bus.connect();
-}
-
-TEST(Connect, ExactlyEnoughMemoryIsEnough) {
-  FakeBus bus(1, 4);
-  bus.slaves[0].identity.table_codes = 350;
-  bus.connect();
-}
-
-TEST(Connect, RefusedRequestsAreNamedAndTriedAgain) {
-  for (const std::uint8_t type : {BUSHD_MSG_CONFIGURE, BUSHD_MSG_TABLE_BEGIN, BUSHD_MSG_TABLE_DATA,
-                                  BUSHD_MSG_TABLE_END, BUSHD_MSG_ASSIGN, BUSHD_MSG_CONTROL}) {
-    FakeBus bus;
-    bus.slaves[0].refusals = {{type, BUSHD_E_TABLE_UNSORTED}};
-    bus.run_for(1'000'000);
-    EXPECT_EQ(bus.count(Event::Kind::kOnline), 0) << int{type};
-    EXPECT_THAT(bus.master->view(0).detail,
-                testing::AnyOf(HasSubstr(bushd_status_text(BUSHD_E_TABLE_UNSORTED)),
-                               HasSubstr("being configured")));
-    ASSERT_TRUE(bus.run_until([&] { return bus.master->view(0).phase == McuPhase::kOffline; }));
-    EXPECT_THAT(bus.master->view(0).detail, HasSubstr("refused its configuration"));
-    EXPECT_THAT(bus.master->view(0).detail, HasSubstr("update the older of the two"));
-    bus.slaves[0].refusals.clear();
-    bus.connect();
-  }
-}
-
-TEST(Connect, FaultThatVanishesByItselfKeepsNoMcuWaitingForEver) {
-  FakeBus bus;
-  Slave& slave = bus.slaves[0];
-  slave.spoils = [&](bushd_report& report) {
-    if (bus.heard_of(BUSHD_MSG_CONTROL).empty()) report.faults = BUSHD_FAULT_SELF_TEST;
-  };
-  bus.connect();
-  EXPECT_NE(slave.flags & BUSHD_FLAG_ENABLED, 0);
-}
-
-TEST(Connect, StatusThatNobodyKnowsIsARefusalToo) {
-  for (const std::uint8_t type : {BUSHD_MSG_CONFIGURE, BUSHD_MSG_EMISSION}) {
-    FakeBus bus;
-    bus.slaves[0].refusals = {{type, 255}};
-    ASSERT_TRUE(bus.run_until([&] {
-      return bus.master->view(0).detail.find("unknown status") != std::string::npos;
-    })) << int{type};
-  }
-}
-
-TEST(Connect, WhatARefusalAsksForIsTold) {
-  struct Case {
-    std::uint8_t type;
-    bushd_status status;
-    const char* text;
-  };
-  for (const Case& c : {Case{BUSHD_MSG_CONFIGURE, BUSHD_E_CAPACITY,
-                             "CONFIGURE: capacity exceeded; use a longer tick"},
-                        Case{BUSHD_MSG_TABLE_BEGIN, BUSHD_E_CAPACITY,
-                             "TABLE_BEGIN: capacity exceeded; use shorter"},
-                        Case{BUSHD_MSG_INPUTS, BUSHD_E_STATE,
-                             "INPUTS: not allowed in this state; a motor of it moves"},
-                        Case{BUSHD_MSG_EMISSION, BUSHD_E_STATE,
-                             "is refused: not allowed in this state; a motor of it"}}) {
-    FakeBus bus;
-    bus.slaves[0].refusals = {{c.type, c.status}};
-    ASSERT_TRUE(bus.run_until(
-        [&] { return bus.master->view(0).detail.starts_with("refused its configuration"); }));
-    EXPECT_THAT(bus.master->view(0).detail, HasSubstr(c.text));
-  }
-}
-
-TEST(Connect, EmissionThatTheMcuRefusesIsNamedWithItsPlaceInTheConfiguration) {
-  FakeBus bus;
-  bus.setup.mcus[0].emission.settings.pulse_us = 3;
-  bus.setup.mcus[0].emission.pulse_at = {
-      .message = {}, .file = "b.toml", .line = 7, .key = "mcu[0].pulse_us", .column = 12};
-  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
-  bus.master->port_opened(bus.now_us);
-  bus.slaves[0].refusals = {{BUSHD_MSG_EMISSION, BUSHD_E_PULSE_WIDTH}};
-  ASSERT_TRUE(bus.run_until(
-      [&] { return bus.master->view(0).detail.starts_with("refused its configuration"); }));
-  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("b.toml:7:12: mcu[0].pulse_us: is 3 us"));
-}
-
-TEST(Connect, EmissionThatAnMcuDoesNotKnowIsNotAskedFor) {
-  FakeBus bus;
-  bus.setup.mcus[0].emission.settings.mode = BUSHD_EMISSION_BURST;
-  bus.setup.mcus[0].emission.settings.step_us = 100;
-  bus.setup.mcus[0].emission.mode_at = {.message = {}, .file = "b.toml", .key = "mcu[0].emission"};
-  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
-  bus.master->port_opened(bus.now_us);
-  bus.run_for(1'000'000);
-  EXPECT_THAT(bus.master->view(0).detail,
-              HasSubstr("b.toml: mcu[0].emission: is \"burst\", which this MCU cannot do; allowed: "
-                        "\"even\""));
-  EXPECT_TRUE(bus.heard_of(BUSHD_MSG_EMISSION).empty());
-}
-
-TEST(Connect, TableThatIsTooFastForTheEmissionKeepsTheMcuAway) {
-  FakeBus bus;
-  bus.slaves[0].identity.capabilities |= BUSHD_CAN_BURST;
-  bus.setup.mcus[0].emission.settings.mode = BUSHD_EMISSION_BURST;
-  bus.setup.mcus[0].emission.settings.step_us = 2000;
-  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
-  bus.master->port_opened(bus.now_us);
-  bus.run_for(1'000'000);
-  EXPECT_THAT(
-      bus.master->view(0).detail,
-      HasSubstr("has room for 1 steps of a motor in a tick, with its emission in 256 slots, "
-                "but the table of output 0 makes up to 2"));
-}
-
 TEST(Connect, LostRequestsAndAnswersAreRepeated) {
   FakeBus bus;
   int n = 0;
   bus.slaves[0].loses = [&](const Heard&) { return ++n % 3 == 0; };
   bus.connect();
-  EXPECT_GT(bus.master->health(0).timeouts, 3u);
+  EXPECT_GT(bus.master->health(McuIndex{0}).timeouts, 3u);
   std::vector<std::uint16_t> codes = bus.codes;
   codes.insert(codes.end(), bus.codes.begin() + 50, bus.codes.end());
   EXPECT_EQ(bus.slaves[0].tables.at(0), codes);
 }
 
-TEST(Connect, SilenceMakesOfflineOnceAndAfterALimit) {
+TEST(Connect, MissedRepliesMakeOfflineOnceAndAfterALimit) {
   FakeBus bus(2);
   bus.connect();
   bus.run_for(1'000'000);
   bus.slaves[0].answers = false;
   const std::int64_t from_us = bus.now_us;
-  ASSERT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kOffline) > 0; }));
+  ASSERT_TRUE(bus.run_until([&] { return bus.count<link::McuOffline>() > 0; }));
   EXPECT_GE(bus.now_us - from_us, 100'000) << "ten answers missing, each awaited 10 ms or more";
   EXPECT_LE(bus.now_us - from_us, 1'200'000);
-  EXPECT_EQ(bus.master->view(0).phase, McuPhase::kOffline);
-  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("does not answer"));
+  EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail, HasSubstr("does not answer"));
   bus.run_for(3'000'000);
-  EXPECT_EQ(bus.count(Event::Kind::kOffline), 1);
+  EXPECT_EQ(bus.count<link::McuOffline>(), 1);
   EXPECT_TRUE(bus.online(1)) << "the other is not disturbed";
   bus.slaves[0].answers = true;
   bus.connect();
@@ -344,8 +195,8 @@ TEST(Connect, SomeLostAnswersAreNoOffline) {
     return heard.type == BUSHD_MSG_POLL && ++n % 10 != 0;  // nine of ten
   };
   bus.run_for(10'000'000);
-  EXPECT_EQ(bus.count(Event::Kind::kOffline), 0);
-  EXPECT_GT(bus.master->health(0).timeouts, 50u);
+  EXPECT_EQ(bus.count<link::McuOffline>(), 0);
+  EXPECT_GT(bus.master->health(McuIndex{0}).timeouts, 50u);
 }
 
 TEST(Connect, RestartIsSeenAndConfiguredAgain) {
@@ -357,14 +208,14 @@ TEST(Connect, RestartIsSeenAndConfiguredAgain) {
   ++fresh.identity.boot_number;
   fresh.zero_us = bus.now_us;
   bus.slaves[0] = fresh;
-  ASSERT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kOffline) > 0; }, 200'000));
-  EXPECT_EQ(bus.master->view(0).detail, "restarted");
+  ASSERT_TRUE(bus.run_until([&] { return bus.count<link::McuOffline>() > 0; }, 200'000));
+  EXPECT_EQ(bus.master->view(McuIndex{0}).detail, "restarted");
   bus.connect();
   EXPECT_EQ(bus.slaves[0].flags, 15);
-  EXPECT_EQ(bus.count(Event::Kind::kOnline), 2);
+  EXPECT_EQ(bus.count<link::McuOnline>(), 2);
 }
 
-TEST(Connect, PortLostIsOfflineWithItsCauseAndSilence) {
+TEST(Connect, PortLostIsOfflineWithItsCauseAndSendsNothing) {
   FakeBus bus(2);
   bus.connect();
   bus.events.clear();
@@ -374,11 +225,11 @@ TEST(Connect, PortLostIsOfflineWithItsCauseAndSilence) {
   EXPECT_TRUE(bus.master->step(bus.now_us).empty());
   bus.run_for(1'000'000);
   EXPECT_EQ(bus.heard.size(), frames);
-  EXPECT_EQ(bus.count(Event::Kind::kOffline), 2);
-  EXPECT_EQ(bus.master->view(1).detail, "unplugged");
+  EXPECT_EQ(bus.count<link::McuOffline>(), 2);
+  EXPECT_EQ(bus.master->view(McuIndex{1}).detail, "unplugged");
   EXPECT_FALSE(bus.master->time_known());
   bus.master->port_opened(bus.now_us);
-  EXPECT_EQ(bus.master->view(1).detail, "no answer yet");
+  EXPECT_EQ(bus.master->view(McuIndex{1}).detail, "no answer yet");
   bus.connect();
 }
 
@@ -400,11 +251,11 @@ TEST(Connect, OnePollTwentyTimesASecondAsksAll) {
   EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_POLL).size()), 40, 3);
   for (int address = 1; address <= 3; ++address) EXPECT_NEAR(polls_by_address(bus)[address], 40, 3);
   EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_SYNC).size()), 4, 1);
-  EXPECT_EQ(bus.master->health(0).timeouts, 0u) << "answers do not collide";
+  EXPECT_EQ(bus.master->health(McuIndex{0}).timeouts, 0u) << "answers do not collide";
 }
 
 // It is asked for its report first, so the answers after it end the waiting.
-TEST(Connect, SilentMcuCostsItsSlotAndNotTheCycle) {
+TEST(Connect, McuThatDoesNotAnswerCostsItsSlotAndNotTheCycle) {
   FakeBus bus(4);
   bus.connect();
   bus.run_for(500'000);
@@ -423,7 +274,7 @@ TEST(Connect, SilentMcuCostsItsSlotAndNotTheCycle) {
   const auto polls = bus.heard_of(BUSHD_MSG_POLL).size();
   ASSERT_TRUE(bus.run_until([&] { return bus.heard_of(BUSHD_MSG_POLL).size() > polls; }));
   const std::int64_t from_us = bus.now_us;
-  bus.master->control(0, BUSHD_CONTROL_ENABLE);
+  bus.master->control(McuIndex{0}, BUSHD_CONTROL_ENABLE);
   ASSERT_TRUE(bus.run_until([&] { return bus.heard.back().type == BUSHD_MSG_CONTROL; }));
   EXPECT_LE(bus.now_us - from_us, 13'000);
 }
@@ -439,7 +290,7 @@ TEST(Connect, TablesThatAreThereAreNotSentAgain) {
   // Another revision is another table.
   link::McuSetup changed = bus.setup.mcus[0];
   changed.tables[0].revision = 8;
-  bus.master->reconfigure(0, changed);
+  bus.master->reconfigure(McuIndex{0}, changed);
   bus.connect();
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_DATA).size(), 2 * sent);
   EXPECT_EQ(bus.slaves[0].held.at(0).revision, 8u);
@@ -450,11 +301,13 @@ TEST(Connect, TwoMcusWithOneAddressAreNamed) {
   bus.slaves[1].address = 1;
   bus.slaves[1].zero_us = bus.slaves[0].zero_us;
   ASSERT_TRUE(bus.run_until(
-      [&] { return bus.master->view(0).detail.find("shares its address") != std::string::npos; },
+      [&] {
+        return bus.master->view(McuIndex{0}).detail.find("shares its address") != std::string::npos;
+      },
       10'000'000));
-  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("64000000000000"));
-  EXPECT_THAT(bus.master->view(0).detail, HasSubstr("65000000000000"));
-  EXPECT_EQ(bus.count(Event::Kind::kOnline), 0);
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail, HasSubstr("64000000000000"));
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail, HasSubstr("65000000000000"));
+  EXPECT_EQ(bus.count<link::McuOnline>(), 0);
   bus.slaves[1].answers = false;  // unplugged
   ASSERT_TRUE(bus.run_until([&] { return bus.online(0); }));
 }
@@ -510,19 +363,19 @@ TEST(Connect, AdapterLatencyIsMeasured) {
 TEST(Connect, StrangeAnswersAreNotTaken) {
   FakeBus bus;
   bus.connect();
-  const std::int32_t before = bus.master->view(0).report.motor[0].position_steps;
-  bushd_report forged = bus.master->view(0).report;
+  const std::int32_t before = bus.master->view(McuIndex{0}).report.motor[0].position_steps;
+  bushd_report forged = bus.master->view(McuIndex{0}).report;
   forged.motor[0].position_steps = 99;
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_report(&forged, payload.data()));
-  for (int tag = 0; tag < 256; ++tag) {
+  for (int sequence = 0; sequence < 256; ++sequence) {
     Bytes wire(BUSHD_FRAME_MAX_WIRE);
     wire.resize(bushd_frame_encode(1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY,
-                                   static_cast<std::uint8_t>(tag), payload.data(), payload.size(),
-                                   wire.data()));
+                                   static_cast<std::uint8_t>(sequence), payload.data(),
+                                   payload.size(), wire.data()));
     bus.master->receive(bus.now_us, wire);  // nothing was asked
   }
-  EXPECT_EQ(bus.master->view(0).report.motor[0].position_steps, before);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).report.motor[0].position_steps, before);
   bus.master->receive(bus.now_us, Bytes{1, 2, 3, 0, 9, 9, 9, 9, 9, 9, 9, 9, 0});
   EXPECT_EQ(bus.master->bus_health().crc_errors, 2u);
   bus.run_for(1'000'000);
@@ -533,13 +386,13 @@ TEST(Connect, ControlAndPositionAreAskedForOnceAndSeen) {
   FakeBus bus;
   bus.connect();
   bus.heard.clear();
-  bus.master->set_position(0, 2, -77);
-  bus.master->control(0, BUSHD_CONTROL_DISABLE);
-  EXPECT_TRUE(bus.master->busy(0));
-  ASSERT_TRUE(bus.run_until([&] { return !bus.master->busy(0); }));
+  bus.master->set_position(McuIndex{0}, 2, -77);
+  bus.master->control(McuIndex{0}, BUSHD_CONTROL_DISABLE);
+  EXPECT_TRUE(bus.master->busy(McuIndex{0}));
+  ASSERT_TRUE(bus.run_until([&] { return !bus.master->busy(McuIndex{0}); }));
   bus.run_for(100'000);
-  EXPECT_EQ(bus.master->view(0).report.motor[2].position_steps, -77);
-  EXPECT_EQ(bus.master->view(0).report.flags & BUSHD_FLAG_ENABLED, 0);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).report.motor[2].position_steps, -77);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).report.flags & BUSHD_FLAG_ENABLED, 0);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_SET_POSITION).size(), 1u);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONTROL).size(), 1u);
 }

@@ -14,13 +14,12 @@ FakeBus::FakeBus(int count, int motors, bushd_format format, std::uint32_t tick_
   setup = {.baud = kBaud, .tick_ns = tick_ns, .format = format, .mcus = {}};
   for (int i = 0; i < count; ++i) {
     link::McuSetup mcu;
-    mcu.address = static_cast<std::uint8_t>(i + 1);
+    mcu.address = {static_cast<std::uint8_t>(i + 1)};
     mcu.tables = {{&table, 7}};
-    mcu.table_of_motor.fill(-1);
-    std::fill_n(mcu.table_of_motor.begin(), motors, 0);
+    std::fill_n(mcu.table_of_motor.begin(), motors, std::uint8_t{0});
     setup.mcus.push_back(mcu);
     Slave slave;
-    slave.address = mcu.address;
+    slave.address = mcu.address.value;
     slave.identity.motors = static_cast<std::uint8_t>(motors);
     slave.identity.unique_id[0] = static_cast<std::uint8_t>(100 + i);
     slave.zero_us = -1'000'000 - 12'345 * i;
@@ -40,18 +39,7 @@ void FakeBus::connect() {
       if (!online(i)) return false;
     }
     return true;
-  })) << master->view(0).detail;
-}
-
-int FakeBus::count(link::Event::Kind kind) const {
-  return static_cast<int>(
-      std::count_if(events.begin(), events.end(), [&](const auto& e) { return e.kind == kind; }));
-}
-
-std::optional<link::Event> FakeBus::last(link::Event::Kind kind) const {
-  const auto found =
-      std::find_if(events.rbegin(), events.rend(), [&](const auto& e) { return e.kind == kind; });
-  return found == events.rend() ? std::nullopt : std::optional(*found);
+  })) << master->view(McuIndex{0}).detail;
 }
 
 std::vector<Heard> FakeBus::heard_of(std::uint8_t type) const {
@@ -95,10 +83,10 @@ void FakeBus::advance(std::int64_t limit_us) {
   if (!arrivals_.empty()) next = std::min(next, arrivals_.begin()->first + adapter_latency_us);
   now_us = std::max(next, now_us);
   while (!frames_.empty() && frames_.begin()->first <= now_us) {
-    const auto [frame, tag] = frames_.begin()->second;
+    const auto [frame, sequence] = frames_.begin()->second;
     frames_.erase(frames_.begin());
     heard.push_back(frame);
-    hear(frame, tag);
+    hear(frame, sequence);
   }
   while (!arrivals_.empty() && arrivals_.begin()->first + adapter_latency_us <= now_us) {
     const Bytes bytes = arrivals_.begin()->second;
@@ -108,11 +96,11 @@ void FakeBus::advance(std::int64_t limit_us) {
   for (const link::Event& event : master->take_events()) events.push_back(event);
 }
 
-void FakeBus::hear(const Heard& frame, std::uint8_t tag) {
+void FakeBus::hear(const Heard& frame, std::uint8_t sequence) {
   for (Slave& slave : slaves) {
     follow_time(slave);
     const bool for_it = frame.address == slave.address || frame.address == BUSHD_ADDRESS_BROADCAST;
-    if (for_it && slave.answers && !slave.loses(frame)) act(slave, frame, tag);
+    if (for_it && slave.answers && !slave.loses(frame)) act(slave, frame, sequence);
   }
 }
 
@@ -123,12 +111,12 @@ void FakeBus::follow_time(Slave& slave) {
     slave.known_until[m] = open;
     if (slave.delay[m] != 0) slave.faults |= BUSHD_FAULT_LINK;
     slave.delay[m] = 0;
-    slave.island[m].reset();
+    slave.out_of_order[m].reset();
     slave.run[m].reset();
   }
 }
 
-void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
+void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
   const auto refusal = slave.refusals.find(frame.type);
   const std::uint8_t status = refusal == slave.refusals.end() ? 0 : refusal->second;
   const Bytes& p = frame.payload;
@@ -140,21 +128,21 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
           bushd_identify_slot(slave.identity.unique_id, identify.salt, identify.slots);
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       payload.resize(bushd_encode_identity(&slave.identity, payload.data()));
-      return answer(slave, frame, tag, payload, std::int64_t{slot} * identify.slot_units * 10);
+      return answer(slave, frame, sequence, payload, std::int64_t{slot} * identify.slot_units * 10);
     }
     case BUSHD_MSG_POLL: {
       bushd_poll poll;
       ASSERT_EQ(bushd_decode_poll(p.data(), p.size(), &poll), BUSHD_OK);
       bushd_poll_entry entry;
       if (!bushd_poll_find(&poll, slave.address, &entry)) return;
-      return answer(slave, frame, tag, report(slave), std::int64_t{entry.begin_units} * 10);
+      return answer(slave, frame, sequence, report(slave), std::int64_t{entry.begin_units} * 10);
     }
     case BUSHD_MSG_SYNC: {
       bushd_sync sync;
       ASSERT_EQ(bushd_decode_sync(p.data(), p.size(), &sync), BUSHD_OK);
-      const bool marked = (slave.flags & BUSHD_FLAG_MARK) && sync.known_mark == slave.mark;
+      const bool marked = (slave.flags & BUSHD_FLAG_MARK) && sync.known_mark == slave.sync_id;
       const std::int64_t zero_us =
-          slave.mark_us - (std::int64_t{sync.mark_tick} * setup.tick_ns + sync.mark_ns) / 1000;
+          slave.sync_us - (std::int64_t{sync.mark_tick} * setup.tick_ns + sync.mark_ns) / 1000;
       // Its clock is exact: once in step it stays so, unless it is told another time.
       const bool off = std::abs(zero_us - slave.zero_us) > setup.tick_ns / 2000;
       if (sync.follows && marked && ((slave.flags & BUSHD_FLAG_SYNCED) == 0 || off)) {
@@ -162,8 +150,8 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
         slave.flags |= BUSHD_FLAG_SYNCED;
         slave.known_until.fill(tick_of(slave) + 2);
       }
-      slave.mark = sync.mark;
-      slave.mark_us = frame.at_us;
+      slave.sync_id = sync.mark;
+      slave.sync_us = frame.at_us;
       slave.flags |= BUSHD_FLAG_MARK;
       return;
     }
@@ -184,7 +172,7 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
       for (const auto& [slot, held] : slave.held) tables.slot[slot] = held;
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       payload.resize(bushd_encode_tables(&tables, payload.data()));
-      return answer(slave, frame, tag, payload);
+      return answer(slave, frame, sequence, payload);
     }
     default:
       break;
@@ -219,7 +207,7 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t tag) {
       slave.position[p[0]] = static_cast<std::int32_t>(bushd_get_u32(&p[1]));
     }
   }
-  answer(slave, frame, tag, {status});
+  answer(slave, frame, sequence, {status});
 }
 
 FakeBus::Ticks FakeBus::read_ticks(const Heard& frame) {
@@ -277,14 +265,15 @@ void FakeBus::take_ticks(Slave& slave, const Ticks& ticks) {
     const unsigned m = entry.first;
     const auto first = static_cast<std::int32_t>(ticks.first_tick - slave.known_until[m]);
     const bool moves = slave.delay[m] != 0;
-    const auto& island = slave.island[m];
+    const auto& out_of_order = slave.out_of_order[m];
     if (replace) {
       good &= (moves ? first <= 0 : first < 0) &&
               static_cast<std::int32_t>(ticks.first_tick - tick_of(slave)) >= 2;
       news = true;
     } else if (first + count > 0) {
-      const bool joins = first <= 0 || !island ||
-                         (ticks.first_tick >= island->from && ticks.first_tick <= island->until);
+      const bool joins =
+          first <= 0 || !out_of_order ||
+          (ticks.first_tick >= out_of_order->from && ticks.first_tick <= out_of_order->until);
       good &= start ? !moves && first >= 0 : moves && joins;
       news = true;
     }
@@ -307,25 +296,26 @@ void FakeBus::take_motor_ticks(Slave& slave, unsigned m, const Ticks& ticks) con
     if (!replace && static_cast<std::int32_t>(tick - slave.known_until[m]) < 0) continue;
     slave.taken[m][tick] = displacements[i];
   }
-  auto& island = slave.island[m];
+  auto& out_of_order = slave.out_of_order[m];
   if (replace) {
     slave.run[m].reset();
-    island.reset();
+    out_of_order.reset();
   } else if (!start && ticks.first_tick > slave.known_until[m]) {
-    if (!island) island = Slave::Island{ticks.first_tick, end, delay};
-    if (end > island->until) island = Slave::Island{island->from, end, delay};
+    if (!out_of_order) out_of_order = Slave::OutOfOrderRange{ticks.first_tick, end, delay};
+    if (end > out_of_order->until)
+      out_of_order = Slave::OutOfOrderRange{out_of_order->from, end, delay};
     return;
   }
   if (replace || end > slave.known_until[m]) {
     slave.known_until[m] = end;
     slave.delay[m] = delay;
   }
-  if (island && slave.known_until[m] >= island->from) {
-    if (island->until > slave.known_until[m]) {
-      slave.known_until[m] = island->until;
-      slave.delay[m] = island->delay;
+  if (out_of_order && slave.known_until[m] >= out_of_order->from) {
+    if (out_of_order->until > slave.known_until[m]) {
+      slave.known_until[m] = out_of_order->until;
+      slave.delay[m] = out_of_order->delay;
     }
-    island.reset();
+    out_of_order.reset();
   }
 }
 
@@ -360,9 +350,9 @@ Bytes FakeBus::report(Slave& slave) {
     }
     if (slave.run[m]) r.running |= static_cast<std::uint16_t>(1u << m);
     r.motor[m] = {slave.position[m], static_cast<std::uint16_t>(slave.known_until[m])};
-    if (!slave.island[m]) continue;
-    const auto from = static_cast<std::uint16_t>(slave.island[m]->from);
-    const auto until = static_cast<std::uint16_t>(slave.island[m]->until);
+    if (!slave.out_of_order[m]) continue;
+    const auto from = static_cast<std::uint16_t>(slave.out_of_order[m]->from);
+    const auto until = static_cast<std::uint16_t>(slave.out_of_order[m]->until);
     if (r.islands != 0 && (r.island_from != from || r.island_until != until)) continue;
     r.islands |= static_cast<std::uint16_t>(1u << m);
     r.island_from = from;
@@ -378,10 +368,10 @@ Bytes FakeBus::report(Slave& slave) {
   r.epoch = slave.epoch;
   r.boot_number = slave.identity.boot_number;
   r.tick_ns = static_cast<std::uint32_t>((now_us - slave.zero_us) * 1000 % setup.tick_ns);
-  r.mark = slave.mark;
-  const std::int64_t mark_ns = (slave.mark_us - slave.zero_us) * 1000;
-  r.mark_tick = static_cast<std::uint32_t>(mark_ns / setup.tick_ns);
-  r.mark_ns = static_cast<std::uint32_t>(mark_ns % setup.tick_ns);
+  r.mark = slave.sync_id;
+  const std::int64_t sync_ns = (slave.sync_us - slave.zero_us) * 1000;
+  r.mark_tick = static_cast<std::uint32_t>(sync_ns / setup.tick_ns);
+  r.mark_ns = static_cast<std::uint32_t>(sync_ns % setup.tick_ns);
   r.rejected_frames = slave.rejected;
   r.motor_count = slave.identity.motors;
   slave.spoils(r);
@@ -390,13 +380,13 @@ Bytes FakeBus::report(Slave& slave) {
   return payload;
 }
 
-void FakeBus::answer(const Slave& slave, const Heard& frame, std::uint8_t tag, const Bytes& payload,
-                     std::int64_t delay_us) {
+void FakeBus::answer(const Slave& slave, const Heard& frame, std::uint8_t sequence,
+                     const Bytes& payload, std::int64_t delay_us) {
   Bytes wire(1 + BUSHD_FRAME_MAX_WIRE);
   wire[0] = 0;
   wire.resize(1 + bushd_frame_encode(slave.address,
-                                     static_cast<std::uint8_t>(frame.type | BUSHD_TYPE_REPLY), tag,
-                                     payload.data(), payload.size(), wire.data() + 1));
+                                     static_cast<std::uint8_t>(frame.type | BUSHD_TYPE_REPLY),
+                                     sequence, payload.data(), payload.size(), wire.data() + 1));
   slave_bytes += static_cast<std::int64_t>(wire.size());
   const std::int64_t begin = frame.at_us + std::max(turnaround_us, delay_us);
   const std::int64_t end = begin + static_cast<std::int64_t>(wire.size()) * 10'000'000 / kBaud;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -11,11 +12,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "link/master.h"
 
 namespace bushd::test {
+
+using link::McuIndex;
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -51,19 +55,19 @@ struct Slave {
   std::uint8_t epoch = 0;
   std::uint8_t faults = 0;
   std::int64_t zero_us = -1'000'000;  // when its tick 0 began
-  std::uint32_t mark = 0;
-  std::int64_t mark_us = 0;
+  std::uint32_t sync_id = 0;          // of the last SYNC heard, and when that was
+  std::int64_t sync_us = 0;
   std::map<std::uint8_t, std::vector<std::uint16_t>> tables;
   std::map<std::uint8_t, bushd_table_held> held;
   std::array<int, BUSHD_MOTORS_PER_MCU> table_of{};
   std::array<std::uint32_t, BUSHD_MOTORS_PER_MCU> known_until{};
   std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delay{};
-  struct Island {
+  struct OutOfOrderRange {
     std::uint32_t from;
     std::uint32_t until;
     std::uint16_t delay;
   };
-  std::array<std::optional<Island>, BUSHD_MOTORS_PER_MCU> island;
+  std::array<std::optional<OutOfOrderRange>, BUSHD_MOTORS_PER_MCU> out_of_order;
   std::array<std::optional<bushd_table_run_entry>, BUSHD_MOTORS_PER_MCU> run;  // taken
   std::array<std::int32_t, BUSHD_MOTORS_PER_MCU> position{};
   // Everything it took, by motor and tick.
@@ -83,22 +87,22 @@ class FakeSource : public link::TickSource {
   std::function<std::uint16_t(std::uint8_t motor, link::Tick tick)> delay =
       [](std::uint8_t, link::Tick tick) { return static_cast<std::uint16_t>(100 + tick % 100); };
 
-  std::uint16_t render(std::size_t, std::uint8_t motor, link::Tick first, unsigned count,
+  std::uint16_t render(McuIndex, std::uint8_t motor, link::Tick first, unsigned count,
                        std::int16_t* out, std::size_t stride) override {
     for (unsigned i = 0; i < count; ++i) out[i * stride] = displacement(motor, first + i);
     return delay(motor, first + count);
   }
 
   // None: what the displacements are follows no table.
-  std::function<std::optional<Stretch>(std::uint8_t motor, link::Tick first, unsigned max_ticks)>
-      stretch = [](std::uint8_t, link::Tick, unsigned) { return std::nullopt; };
+  std::function<std::optional<RunSegment>(std::uint8_t motor, link::Tick first, unsigned max_ticks)>
+      segment = [](std::uint8_t, link::Tick, unsigned) { return std::nullopt; };
   std::function<link::Tick(std::uint8_t motor)> end = [](std::uint8_t) { return INT64_MAX; };
 
-  std::optional<Stretch> run_at(std::size_t, std::uint8_t motor, link::Tick first,
-                                unsigned max_ticks) override {
-    return stretch(motor, first, max_ticks);
+  std::optional<RunSegment> run_at(McuIndex, std::uint8_t motor, link::Tick first,
+                                   unsigned max_ticks) override {
+    return segment(motor, first, max_ticks);
   }
-  link::Tick end_tick(std::size_t, std::uint8_t motor) override { return end(motor); }
+  link::Tick end_tick(McuIndex, std::uint8_t motor) override { return end(motor); }
 };
 
 class FakeBus {
@@ -114,10 +118,21 @@ class FakeBus {
   bool run_until(const std::function<bool()>& done, std::int64_t limit_us = 20'000'000);
   void connect();
   bool online(std::size_t mcu = 0) const {
-    return master->view(mcu).phase == link::McuPhase::kOnline;
+    return master->view(McuIndex{mcu}).phase == link::McuPhase::kOnline;
   }
-  int count(link::Event::Kind kind) const;
-  std::optional<link::Event> last(link::Event::Kind kind) const;
+  template <class Event>
+  int count() const {
+    return static_cast<int>(std::count_if(events.begin(), events.end(), [](const auto& event) {
+      return std::holds_alternative<Event>(event);
+    }));
+  }
+  template <class Event>
+  std::optional<Event> last() const {
+    const auto found = std::find_if(events.rbegin(), events.rend(), [](const auto& event) {
+      return std::holds_alternative<Event>(event);
+    });
+    return found == events.rend() ? std::nullopt : std::optional(std::get<Event>(*found));
+  }
   std::uint32_t tick(std::size_t slave) const { return tick_of(slaves[slave]); }
   std::uint32_t tick_of(const Slave& slave) const;
   std::vector<Heard> heard_of(std::uint8_t type) const;
@@ -138,8 +153,8 @@ class FakeBus {
 
  private:
   void advance(std::int64_t limit_us);
-  void hear(const Heard& frame, std::uint8_t tag);
-  void act(Slave& slave, const Heard& frame, std::uint8_t tag);
+  void hear(const Heard& frame, std::uint8_t sequence);
+  void act(Slave& slave, const Heard& frame, std::uint8_t sequence);
   // A frame of ticks, however it was coded: by motor, the displacements and the delay at the end.
   struct Ticks {
     std::uint8_t epoch;
@@ -154,7 +169,7 @@ class FakeBus {
   void take_motor_ticks(Slave& slave, unsigned motor, const Ticks& ticks) const;
   void take_table_run(Slave& slave, const Heard& frame);
   // `delay_us` after the request's end.
-  void answer(const Slave& slave, const Heard& frame, std::uint8_t tag, const Bytes& payload,
+  void answer(const Slave& slave, const Heard& frame, std::uint8_t sequence, const Bytes& payload,
               std::int64_t delay_us = 0);
   void follow_time(Slave& slave);
   Bytes report(Slave& slave);

@@ -4,7 +4,6 @@
 namespace bushd::test {
 namespace {
 
-using link::Event;
 using link::Tick;
 
 class Stream : public testing::TestWithParam<bushd_format> {
@@ -18,8 +17,8 @@ class Stream : public testing::TestWithParam<bushd_format> {
     return static_cast<std::int16_t>((t * 13 + m * 5 + plan * 101) % 251);
   }
   Tick begin(std::uint8_t motor, std::size_t mcu = 0) {
-    const Tick start = bus.master->earliest_start(bus.now_us, mcu, motor);
-    bus.master->begin(mcu, motor, start);
+    const Tick start = bus.master->earliest_start(bus.now_us, McuIndex{mcu}, motor);
+    bus.master->begin(McuIndex{mcu}, motor, start);
     return start;
   }
   double ahead_ms(std::uint8_t motor, std::size_t slave = 0) const {
@@ -84,11 +83,11 @@ TEST_P(Stream, EndOfAMoveEndsItsStream) {
   bus.source.delay = [](std::uint8_t m, Tick t) {
     return std::uint16_t(m == 1 && t % 256 > 100 ? 0 : 50);
   };
-  Tick start = bus.master->earliest_start(bus.now_us, 0, 1);
+  Tick start = bus.master->earliest_start(bus.now_us, McuIndex{0}, 1);
   start += 256 - start % 256;  // so that rest comes after some 100 ticks
   bus.source.end = [start](std::uint8_t) { return start + 101; };
   bus.run_for((start - bus.tick(0) - 60) * 2560);
-  bus.master->begin(0, 1, start);
+  bus.master->begin(McuIndex{0}, 1, start);
   bus.run_for(1'500'000);
   EXPECT_EQ(bus.slaves[0].faults, 0) << "told to be at rest";
   const auto frames = bus.heard_of(BUSHD_MSG_TICKS).size();
@@ -109,16 +108,16 @@ TEST_P(Stream, LostFramesAreSentAgain) {
     expect_taken(0, a, a + 700);
     expect_taken(3, b, b + 700);
     ASSERT_EQ(bus.slaves[0].faults, 0) << "one frame in " << every << " lost";
-    EXPECT_EQ(bus.count(Event::Kind::kLateStart), 0);
+    EXPECT_EQ(bus.count<link::StartMissed>(), 0);
     // Brought to rest for the next round.
     bus.slaves[0].loses = [](const Heard&) { return false; };
     const Tick stop = bus.master->earliest_replace(bus.now_us);
     bus.source.delay = [stop](std::uint8_t, Tick t) { return std::uint16_t(t > stop ? 0 : 50); };
     bus.source.end = [stop](std::uint8_t) { return stop + 1; };
-    bus.master->replace(0, 0b1001, stop);
+    bus.master->replace(McuIndex{0}, 0b1001, stop);
     bus.run_for(200'000);
-    bus.master->drop(0, 0);
-    bus.master->drop(0, 3);
+    bus.master->drop(McuIndex{0}, 0);
+    bus.master->drop(McuIndex{0}, 3);
     bus.source.delay = [](std::uint8_t, Tick) { return std::uint16_t{50}; };
     bus.source.end = [](std::uint8_t) { return INT64_MAX; };
     bus.run_for(500'000);
@@ -133,13 +132,13 @@ TEST_P(Stream, OnlyWhatWasLostIsSentAgain) {
   const Tick start = begin(0);
   bus.run_for(1'000'000);
   expect_taken(0, start, start + 300);
-  EXPECT_EQ(bus.master->health(0).repeats, 1u);
-  EXPECT_EQ(bus.master->health(0).missed_ticks, 16u) << "a frame";
+  EXPECT_EQ(bus.master->health(McuIndex{0}).repeats, 1u);
+  EXPECT_EQ(bus.master->health(McuIndex{0}).missed_ticks, 16u) << "a frame";
   EXPECT_EQ(bus.slaves[0].rejected, 0);
 }
 
 // What an MCU claims to have beyond a gap is believed only as far as it can be true.
-TEST_P(Stream, IslandThatCannotBeIsNotBelieved) {
+TEST_P(Stream, OutOfOrderRangeThatCannotBeIsNotBelieved) {
   int n = 0;
   bus.slaves[0].loses = [&n](const Heard& h) { return h.type == BUSHD_MSG_TICKS && n++ == 1; };
   bus.slaves[0].spoils = [](bushd_report& report) {
@@ -148,7 +147,7 @@ TEST_P(Stream, IslandThatCannotBeIsNotBelieved) {
   const Tick start = begin(0);
   bus.run_for(1'000'000);
   expect_taken(0, start, start + 300);
-  EXPECT_GT(bus.master->health(0).repeats, 1u) << "all from the gap on";
+  EXPECT_GT(bus.master->health(McuIndex{0}).repeats, 1u) << "all from the gap on";
 }
 
 TEST_P(Stream, ReplacementSwitchesThePlanAtItsTick) {
@@ -158,13 +157,13 @@ TEST_P(Stream, ReplacementSwitchesThePlanAtItsTick) {
   const Tick at = bus.master->earliest_replace(bus.now_us);
   EXPECT_LE(at - bus.tick(0), 15) << "well before the end of the queue";
   bus.source.displacement = [at](std::uint8_t m, Tick t) { return value(m, t, m == 0 && t >= at); };
-  bus.master->replace(0, 1, at);
+  bus.master->replace(McuIndex{0}, 1, at);
   bus.run_for(1'000'000);
   EXPECT_EQ(bus.slaves[0].epoch, 1);
   expect_taken(0, start, at, 0);
   expect_taken(0, at, at + 350, 1);
   expect_taken(1, other, other + 500, 0);
-  EXPECT_EQ(bus.count(Event::Kind::kReplaceFailed), 0);
+  EXPECT_EQ(bus.count<link::ReplacementFailed>(), 0);
   EXPECT_EQ(bus.slaves[0].faults, 0);
   EXPECT_EQ(bus.slaves[1].epoch, 0);
 }
@@ -173,28 +172,28 @@ TEST_P(Stream, ReplacementSwitchesThePlanAtItsTick) {
 // out before the source knows and has planned anew.
 TEST_P(Stream, LateReplacementIsToldBeforeAnythingElseIsSent) {
   int late = 0;
-  for (int silent_ms = 150; silent_ms < 230; silent_ms += 2) {
+  for (int unanswered_ms = 150; unanswered_ms < 230; unanswered_ms += 2) {
     FakeBus fresh(1, 4, GetParam());
     fresh.source.displacement = bus.source.displacement;
     fresh.connect();
-    const Tick start = fresh.master->earliest_start(fresh.now_us, 0, 0);
-    fresh.master->begin(0, 0, start);
+    const Tick start = fresh.master->earliest_start(fresh.now_us, McuIndex{0}, 0);
+    fresh.master->begin(McuIndex{0}, 0, start);
     fresh.run_for(600'000);
     fresh.slaves[0].loses = [](const Heard& frame) { return frame.type == BUSHD_MSG_POLL; };
-    fresh.run_for(silent_ms * 1000);
+    fresh.run_for(unanswered_ms * 1000);
     const Tick at = fresh.master->earliest_replace(fresh.now_us);
     fresh.source.displacement = [at](std::uint8_t m, Tick t) { return value(m, t, t >= at); };
-    fresh.master->replace(0, 1, at);
+    fresh.master->replace(McuIndex{0}, 1, at);
     fresh.slaves[0].loses = [](const Heard&) { return false; };
     fresh.run_until(
-        [&] { return fresh.count(Event::Kind::kReplaceFailed) > 0 || fresh.slaves[0].epoch != 0; },
+        [&] { return fresh.count<link::ReplacementFailed>() > 0 || fresh.slaves[0].epoch != 0; },
         200'000);
     if (fresh.slaves[0].epoch != 0) continue;
     ++late;
     fresh.source.displacement = bus.source.displacement;
     fresh.run_for(500'000);
     for (const auto& [tick, taken] : fresh.slaves[0].taken[0]) {
-      ASSERT_EQ(taken, value(0, tick, 0)) << silent_ms << " ms, tick " << tick - start;
+      ASSERT_EQ(taken, value(0, tick, 0)) << unanswered_ms << " ms, tick " << tick - start;
     }
   }
   EXPECT_GT(late, 0);
@@ -208,20 +207,20 @@ TEST_P(Stream, LostReplacementIsToldAndTheOldPlanStandsUntilThen) {
   bus.slaves[0].loses = [](const Heard& heard) {
     return heard.type == BUSHD_MSG_TICKS && (heard.payload[1] & BUSHD_TICKS_REPLACE);
   };
-  bus.master->replace(0, 3, at);
-  ASSERT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kReplaceFailed) > 0; }, 200'000));
-  EXPECT_EQ(bus.last(Event::Kind::kReplaceFailed)->motors, 3);
+  bus.master->replace(McuIndex{0}, 3, at);
+  ASSERT_TRUE(bus.run_until([&] { return bus.count<link::ReplacementFailed>() > 0; }, 200'000));
+  EXPECT_EQ(bus.last<link::ReplacementFailed>()->motors, 3);
   EXPECT_EQ(bus.slaves[0].epoch, 0);
   bus.slaves[0].loses = [](const Heard&) { return false; };
   // Planned again from a later tick.
   const Tick again = bus.master->earliest_replace(bus.now_us);
   bus.source.displacement = [again](std::uint8_t m, Tick t) { return value(m, t, t >= again); };
-  bus.master->replace(0, 3, again);
+  bus.master->replace(McuIndex{0}, 3, again);
   bus.run_for(1'000'000);
   EXPECT_EQ(bus.slaves[0].epoch, 2) << "what followed the first may still be on its way";
   expect_taken(0, start, again, 0);
   expect_taken(0, again, again + 350, 1);
-  EXPECT_EQ(bus.count(Event::Kind::kReplaceFailed), 1);
+  EXPECT_EQ(bus.count<link::ReplacementFailed>(), 1);
   EXPECT_EQ(bus.slaves[0].faults, 0);
 }
 
@@ -230,21 +229,21 @@ TEST_P(Stream, LostConfirmationOfAReplacementIsAskedForAgain) {
   bus.run_for(600'000);
   const Tick at = bus.master->earliest_replace(bus.now_us);
   bus.source.displacement = [at](std::uint8_t m, Tick t) { return value(m, t, t >= at); };
-  bus.master->replace(0, 1, at);
+  bus.master->replace(McuIndex{0}, 1, at);
   int polls = 0;
   bus.slaves[0].loses = [&](const Heard& heard) {
     return heard.type == BUSHD_MSG_POLL && ++polls <= 2;
   };
   bus.run_for(1'000'000);
   EXPECT_EQ(bus.slaves[0].epoch, 1);
-  EXPECT_EQ(bus.count(Event::Kind::kReplaceFailed), 0);
+  EXPECT_EQ(bus.count<link::ReplacementFailed>(), 0);
   expect_taken(0, start, at, 0);
   expect_taken(0, at, at + 350, 1);
 }
 
 TEST_P(Stream, ReplacementOfWhatWasNotYetSentNeedsNone) {
-  bus.master->begin(0, 0, bus.master->earliest_start(bus.now_us, 0, 0));
-  bus.master->replace(0, 1, bus.master->earliest_replace(bus.now_us));
+  bus.master->begin(McuIndex{0}, 0, bus.master->earliest_start(bus.now_us, McuIndex{0}, 0));
+  bus.master->replace(McuIndex{0}, 1, bus.master->earliest_replace(bus.now_us));
   bus.run_for(500'000);
   EXPECT_EQ(bus.slaves[0].epoch, 0);
   EXPECT_EQ(bus.slaves[0].faults, 0);
@@ -253,13 +252,13 @@ TEST_P(Stream, ReplacementOfWhatWasNotYetSentNeedsNone) {
 TEST_P(Stream, LateStartIsToldAndDropped) {
   bus.slaves[0].loses = [](const Heard& heard) { return heard.type == BUSHD_MSG_TICKS; };
   begin(2);
-  ASSERT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kLateStart) > 0; }, 1'000'000));
-  EXPECT_EQ(bus.last(Event::Kind::kLateStart)->motor, 2);
-  EXPECT_EQ(bus.last(Event::Kind::kLateStart)->mcu, 0u);
+  ASSERT_TRUE(bus.run_until([&] { return bus.count<link::StartMissed>() > 0; }, 1'000'000));
+  EXPECT_EQ(bus.last<link::StartMissed>()->motor, 2);
+  EXPECT_EQ(bus.last<link::StartMissed>()->mcu, McuIndex{0});
   bus.slaves[0].loses = [](const Heard&) { return false; };
   bus.run_for(500'000);
   EXPECT_TRUE(bus.slaves[0].taken[2].empty()) << "not started by a later frame";
-  EXPECT_EQ(bus.count(Event::Kind::kLateStart), 1);
+  EXPECT_EQ(bus.count<link::StartMissed>(), 1);
   const Tick start = begin(2);
   bus.run_for(1'000'000);
   expect_taken(2, start, start + 300);

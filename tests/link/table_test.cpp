@@ -4,7 +4,6 @@
 namespace bushd::test {
 namespace {
 
-using link::Event;
 using link::Tick;
 
 class Tables : public testing::TestWithParam<bushd_format> {
@@ -16,13 +15,13 @@ class Tables : public testing::TestWithParam<bushd_format> {
       return run ? bushd_run_delay(&*run) : std::uint16_t{0};
     };
     bus.source.end = [this](std::uint8_t m) { return end(m); };
-    bus.source.stretch = [this](std::uint8_t m, Tick first,
-                                unsigned max_ticks) -> std::optional<link::TickSource::Stretch> {
+    bus.source.segment = [this](std::uint8_t m, Tick first,
+                                unsigned max_ticks) -> std::optional<link::TickSource::RunSegment> {
       const auto run = at(m, first);
       if (!run) return std::nullopt;
       const bool stops = plan[m].stop && *plan[m].stop > first;
       const auto left = static_cast<unsigned>((stops ? *plan[m].stop : end(m)) - first);
-      return link::TickSource::Stretch{*run, std::min(left, max_ticks)};
+      return link::TickSource::RunSegment{*run, std::min(left, max_ticks)};
     };
     bus.connect();
   }
@@ -74,11 +73,11 @@ class Tables : public testing::TestWithParam<bushd_format> {
   }
 
   void start(std::uint8_t m, std::uint32_t steps, bool whole) {
-    plan_run(m, bus.master->earliest_start(bus.now_us, 0, m), steps);
+    plan_run(m, bus.master->earliest_start(bus.now_us, McuIndex{0}, m), steps);
     if (whole) {
-      bus.master->begin_table_run(0, m, plan[m].start, static_cast<std::int32_t>(steps));
+      bus.master->begin_table_run(McuIndex{0}, m, plan[m].start, static_cast<std::int32_t>(steps));
     } else {
-      bus.master->begin(0, m, plan[m].start);
+      bus.master->begin(McuIndex{0}, m, plan[m].start);
     }
   }
   void expect_taken(std::uint8_t m, Tick from, Tick until) const {
@@ -109,7 +108,7 @@ TEST_P(Tables, StatesGiveTheSameTicksInFewFrames) {
   expect_taken(2, plan[2].start, end(2));
   EXPECT_EQ(bus.slaves[0].faults, 0);
   EXPECT_EQ(bus.slaves[0].rejected, 0);
-  EXPECT_EQ(bus.master->health(0).repeats, 0u);
+  EXPECT_EQ(bus.master->health(McuIndex{0}).repeats, 0u);
 }
 
 TEST_P(Tables, LostStatesAreSentAgain) {
@@ -130,7 +129,7 @@ TEST_P(Tables, StopReplacesStatesFromItsTickOn) {
   start(0, 3000, false);
   bus.run_for(1'500'000);
   plan_stop(0, bus.master->earliest_replace(bus.now_us));
-  bus.master->replace(0, 1, *plan[0].stop);
+  bus.master->replace(McuIndex{0}, 1, *plan[0].stop);
   bus.run_for(4'000'000);
   expect_taken(0, plan[0].start, end(0));
   EXPECT_EQ(bus.slaves[0].faults, 0);
@@ -148,7 +147,7 @@ TEST_P(Tables, WholeMoveIsOneFrame) {
   bus.run_for(6'000'000);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_RUN).size(), 1u);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_TICKS).size() + bus.heard_of(BUSHD_MSG_TABLE_TICKS).size(), 0u);
-  EXPECT_EQ(bus.count(Event::Kind::kLateStart), 0);
+  EXPECT_EQ(bus.count<link::StartMissed>(), 0);
 }
 
 TEST_P(Tables, LostWholeMoveIsSentAgainInTime) {
@@ -163,14 +162,14 @@ TEST_P(Tables, LostWholeMoveIsSentAgainInTime) {
 TEST_P(Tables, WholeMoveThatIsTooLateIsTold) {
   bus.slaves[0].loses = [](const Heard& h) { return h.type == BUSHD_MSG_TABLE_RUN; };
   start(1, 2000, true);
-  ASSERT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kLateStart) > 0; }, 1'000'000));
+  ASSERT_TRUE(bus.run_until([&] { return bus.count<link::StartMissed>() > 0; }, 1'000'000));
 }
 
 TEST_P(Tables, StopOfAWholeMoveGoesOnAsAStream) {
   start(1, 5000, true);
   bus.run_for(1'500'000);
   plan_stop(1, bus.master->earliest_replace(bus.now_us));
-  bus.master->replace(0, 2, *plan[1].stop);
+  bus.master->replace(McuIndex{0}, 2, *plan[1].stop);
   bus.run_for(3'000'000);
   EXPECT_EQ(bus.slaves[0].epoch, 1);
   EXPECT_FALSE(bus.slaves[0].run[1].has_value());
@@ -186,11 +185,11 @@ TEST_P(Tables, StopOfAWholeMoveThatIsLostIsToldAndTriedAgain) {
     return h.type == BUSHD_MSG_TICKS && (h.payload[1] & BUSHD_TICKS_REPLACE) && n++ == 0;
   };
   plan_stop(1, bus.master->earliest_replace(bus.now_us));
-  bus.master->replace(0, 2, *plan[1].stop);
-  ASSERT_TRUE(bus.run_until([&] { return bus.count(Event::Kind::kReplaceFailed) > 0; }, 500'000));
+  bus.master->replace(McuIndex{0}, 2, *plan[1].stop);
+  ASSERT_TRUE(bus.run_until([&] { return bus.count<link::ReplacementFailed>() > 0; }, 500'000));
   EXPECT_TRUE(bus.slaves[0].run[1].has_value()) << "goes on";
   plan_stop(1, bus.master->earliest_replace(bus.now_us));
-  bus.master->replace(0, 2, *plan[1].stop);
+  bus.master->replace(McuIndex{0}, 2, *plan[1].stop);
   bus.run_for(3'000'000);
   expect_taken(1, *plan[1].stop, end(1));
   EXPECT_EQ(bus.slaves[0].faults, 0);
@@ -199,7 +198,7 @@ TEST_P(Tables, StopOfAWholeMoveThatIsLostIsToldAndTriedAgain) {
 TEST_P(Tables, StopBeforeAWholeMoveWasSentMakesItAStream) {
   start(1, 5000, true);
   plan_stop(1, plan[1].start + 20);
-  bus.master->replace(0, 2, *plan[1].stop);
+  bus.master->replace(McuIndex{0}, 2, *plan[1].stop);
   bus.run_for(3'000'000);
   EXPECT_FALSE(bus.slaves[0].run[1].has_value());
   expect_taken(1, plan[1].start, end(1));
@@ -226,7 +225,7 @@ TEST_P(Tables, EmergencyIsSaidUntilAllHaveHeardIt) {
   bus.master->port_opened(bus.now_us);
   bus.connect();
   EXPECT_EQ(bus.slaves[0].faults, BUSHD_FAULT_EMERGENCY);
-  bus.master->control(0, BUSHD_CONTROL_CLEAR_FAULTS);
+  bus.master->control(McuIndex{0}, BUSHD_CONTROL_CLEAR_FAULTS);
   bus.run_for(300'000);
   EXPECT_EQ(bus.slaves[0].faults, 0);
 }

@@ -89,7 +89,7 @@ TEST_F(MotorTest, AStopIsPlannedAtOnceAndToldWhenExecuted) {
   report(kStart + 20);
   motor.stop();
   EXPECT_TRUE(motor.needs_change());
-  EXPECT_TRUE(motor.change(motor.changeable_from(kStart + 30)));
+  EXPECT_TRUE(motor.change(kStart + 30));
   EXPECT_FALSE(motor.needs_change());
   const auto events = report(motor.axis().end_tick());
   ASSERT_NE(find<event::Executed>(events), nullptr);
@@ -102,7 +102,7 @@ TEST_F(MotorTest, ATargetBehindTakesASecondRun) {
   motor.start(kSteps, kStart);
   report(kStart + 40);
   motor.aim(-5);
-  EXPECT_TRUE(motor.change(motor.changeable_from(kStart + 50)));
+  EXPECT_TRUE(motor.change(kStart + 50));
   EXPECT_EQ(motor.target_steps(), -5);
   const auto events = report(motor.axis().end_tick());
   EXPECT_NE(find<event::Turn>(events), nullptr);

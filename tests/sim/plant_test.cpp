@@ -98,5 +98,22 @@ TEST_F(PlantTest, ReleasedMotorsMoveAgain) {
   EXPECT_TRUE(violations.empty()) << violations.front();
 }
 
+// A step at just that time comes after it.
+TEST_F(PlantTest, PositionBeforeATimeLeavesOutWhatCameSince) {
+  EXPECT_EQ(plant.position_steps_before(0, 0, 0), 0);
+  accelerate();
+  const TimeNs fourth_ns = now_ns - (66 + 73) * TimeNs{40'000};
+  EXPECT_EQ(plant.position_steps_before(0, 0, now_ns + 1), 6);
+  EXPECT_EQ(plant.position_steps_before(0, 0, now_ns), 5);
+  EXPECT_EQ(plant.position_steps_before(0, 0, fourth_ns + 1), 4);
+  EXPECT_EQ(plant.position_steps_before(0, 0, fourth_ns), 3);
+  ramp_down();
+  rest();
+  plant.edge({now_ns, 0, Signal::kDir, 0, false});
+  for (int i = 0; i < 200; ++i) step_after(250 * TimeNs{40'000});
+  EXPECT_EQ(plant.position_steps(0, 0), 12 - 200);
+  EXPECT_EQ(plant.position_steps_before(0, 0, now_ns - 99 * 250 * TimeNs{40'000}), 12 - 100);
+}
+
 }  // namespace
 }  // namespace bushd::sim

@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "sim/rotor.h"
+#include "source_path.h"
 #include "tables/laws/motor.h"
 #include "tables/table_file.h"
 
 namespace bushd::test {
 
-inline const std::filesystem::path kShippedTables =
-    std::filesystem::path(BUSHD_SOURCE_DIR) / "tables";
+inline const std::filesystem::path kShippedTables = source_path("tables");
 
 inline std::vector<std::string> shipped_tables() {
   std::vector<std::string> names;

@@ -17,6 +17,7 @@ class AvrAlone : public McuAlone {
     AvrOptions options;
     options.image = AVR_IMAGES "-" + std::to_string(baud) + ".elf";
     options.address = kAddress;
+    options.memory_owners = AVR_MEMORY_OWNERS;
     options.boots = boots;
     avr_ = add<AvrMcu>(options);
   }

@@ -86,6 +86,37 @@ TEST_F(AvrKept, APowerCutLosesNoIdAndLeavesTheOldAddressOrTheNewOne) {
   EXPECT_GE(found[1], 5);
 }
 
+// What is kept becomes shorter behind the byte that is being compared or written.
+TEST_F(AvrKept, TablesThatAreForgottenMeanwhileLeaveTheRestAlone) {
+  constexpr std::uint16_t kCodes = 100;
+  constexpr std::uint64_t kBytesOfOthers = 300;  // more than all but the codes
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+  Random random(5, 0);
+  for (int round = 0; round < 12; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    const auto first = static_cast<std::uint16_t>(1000 + round);
+    ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, ramp(first, kCodes), 800));
+    if (round % 2 == 0) {
+      // Compared: a walk takes some 300 ms, and is made for a second before anything is written.
+      pass(static_cast<TimeNs>(random.below(1000)) * 1'000'000);
+    } else {
+      // Written: the codes come after all else but the motors' tables.
+      const std::uint64_t before = avr_->eeprom_writes();
+      const std::uint64_t written = kBytesOfOthers + random.below(kCodes);
+      for (int ms = 0; ms < 3000 && avr_->eeprom_writes() < before + written; ++ms) pass(1'000'000);
+    }
+    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
+                                   bushd_control{BUSHD_CONTROL_FORGET_TABLES}),
+              BUSHD_OK);
+    pass(1'000'000'000);
+  }
+  reboot();
+  const auto reply = master_.identify(kAddress);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(master_.poll(kAddress).faults, 0);
+  EXPECT_EQ(avr_->boot_number(), 8);
+}
+
 TEST_F(AvrKept, NothingIsWrittenWhileAMotorMoves) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   const std::uint64_t before = avr_->eeprom_writes();

@@ -17,6 +17,7 @@ class QemuAlone : public McuAlone {
   QemuAlone(std::uint32_t baud, const std::string& image) : McuAlone(baud, kBootNs) {
     QemuOptions options;
     options.image = image;
+    options.memory_owners = LM3S_MEMORY_OWNERS;
     options.address = kAddress;
     options.boots = kBoots;
     qemu_ = add<QemuMcu>(options);

@@ -7,8 +7,6 @@
 namespace bushfaults {
 namespace {
 
-using bushd::command_t;
-
 constexpr std::int64_t kLongestMove = 6000;
 constexpr std::int64_t kFarthest = 20'000;
 constexpr std::uint32_t kStream = 100;  // of randomness
@@ -34,21 +32,21 @@ void Clients::begin_anew() {
   std::fill(number_.begin(), number_.end(), 0);
 }
 
-command_t Clients::make(std::int8_t kind) {
+Request Clients::make(Ask ask) {
   const auto client = static_cast<std::size_t>(random_.below(kClients));
-  command_t command{};
-  command.utime_us = 0;
-  command.client_id = "c" + std::to_string(client) + "-" + std::to_string(generation_);
-  command.number = ++number_[client];
-  command.kind = kind;
-  command.motor_count = 0;
-  return command;
+  return {.client = "c" + std::to_string(client) + "-" + std::to_string(generation_),
+          .number = ++number_[client],
+          .ask = ask};
 }
 
-void Clients::add(command_t& command, const std::string& motor, std::int64_t steps) {
-  command.motors.push_back(motor);
-  command.steps.push_back(steps);
-  ++command.motor_count;
+Request Clients::of_all_online(Ask ask) {
+  Request request = make(ask);
+  const auto offline = [](const auto& state) { return !state || state->mcu_state == "OFFLINE"; };
+  if (std::ranges::none_of(witness_.states(), offline)) return request;
+  for (const auto& state : witness_.states()) {
+    if (!offline(state) && !state->motors.empty()) request.add(state->motors.front().name, 0);
+  }
+  return request;
 }
 
 std::string Clients::any_motor() {
@@ -60,7 +58,8 @@ std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) c
   for (const auto& state : witness_.states()) {
     if (!state) continue;
     for (const bushd::motor_state_t& motor : state->motors) {
-      if ((motor.moving != 0) == moving && (motor.trust == "uncertain") == uncertain) {
+      if (motor.armed == 0 && (motor.moving != 0) == moving &&
+          (motor.trust == "uncertain") == uncertain) {
         found.push_back({motor.name, motor.position_steps, motor.target_steps});
       }
     }
@@ -68,14 +67,14 @@ std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) c
   return found;
 }
 
-command_t Clients::move(std::size_t wanted) {
+Request Clients::move(std::size_t wanted) {
   const bool absolute = random_.one_in(3);
-  command_t command = make(absolute ? command_t::MOVE_ABSOLUTE : command_t::MOVE_RELATIVE);
+  Request request = make(absolute ? Ask::kMoveTo : Ask::kMoveBy);
   std::vector<Choice> free = motors_that(false, false);
   // Now and then one that may be moving: a new target, or a race.
   if (free.empty() || random_.one_in(20)) {
-    add(command, any_motor(), random_.between(-100, 100));
-    return command;
+    request.add(any_motor(), random_.between(-100, 100));
+    return request;
   }
   for (; wanted > 0 && !free.empty(); --wanted) {
     const auto index = static_cast<std::size_t>(random_.below(free.size()));
@@ -85,16 +84,16 @@ command_t Clients::move(std::size_t wanted) {
     if (motor.position_steps + steps > kFarthest) steps = -std::abs(steps);
     if (motor.position_steps + steps < -kFarthest) steps = std::abs(steps);
     if (random_.one_in(50)) steps = 0;
-    add(command, motor.name, absolute ? motor.position_steps + steps : steps);
+    request.add(motor.name, absolute ? motor.position_steps + steps : steps);
   }
-  return command;
+  return request;
 }
 
 // A new target for some that move: around their old one, or around where they are, so that it is
 // ahead, near or behind. Sometimes one at rest joins them.
-command_t Clients::retarget() {
+Request Clients::retarget() {
   const bool absolute = !random_.one_in(3);
-  command_t command = make(absolute ? command_t::MOVE_ABSOLUTE : command_t::MOVE_RELATIVE);
+  Request request = make(absolute ? Ask::kMoveTo : Ask::kMoveBy);
   std::vector<Choice> some = motors_that(true, false);
   if (some.empty()) return move(1);
   const auto at_rest = motors_that(false, false);
@@ -106,77 +105,112 @@ command_t Clients::retarget() {
     const std::int64_t base = random_.one_in(2) ? motor.position_steps : motor.target_steps;
     const std::int64_t away = random_.magnitude(1, kLongestMove) * (random_.one_in(2) ? 1 : -1);
     const std::int64_t target = std::clamp(base + away, -kFarthest, kFarthest);
-    add(command, motor.name, absolute ? target : target - motor.target_steps);
+    request.add(motor.name, absolute ? target : target - motor.target_steps);
   }
-  return command;
+  return request;
 }
 
-command_t Clients::stop() {
+Request Clients::stop() {
   if (random_.one_in(6)) return stop_all();
-  command_t command = make(command_t::STOP);
+  Request request = make(Ask::kStop);
   std::vector<Choice> moving = motors_that(true, false);
   if (moving.empty()) {
-    add(command, any_motor(), 0);
-    return command;
+    request.add(any_motor(), 0);
+    return request;
   }
   for (std::int64_t n = random_.magnitude(1, 8); n > 0 && !moving.empty(); --n) {
     const auto index = static_cast<std::size_t>(random_.below(moving.size()));
-    add(command, moving[index].name, 0);
+    request.add(moving[index].name, 0);
     moving.erase(moving.begin() + static_cast<std::ptrdiff_t>(index));
   }
-  return command;
+  return request;
 }
 
-command_t Clients::set(const std::vector<Choice>& motors) {
-  command_t command = make(command_t::SET_POSITION);
+Request Clients::set(const std::vector<Choice>& motors) {
+  Request request = make(Ask::kSetPosition);
   for (const Choice& motor : motors) {
-    add(command, motor.name, random_.between(-kFarthest / 2, kFarthest / 2));
-    if (command.motor_count == 16) break;
+    request.add(motor.name, random_.between(-kFarthest / 2, kFarthest / 2));
+    if (request.motors.size() == 16) break;
   }
-  return command;
+  return request;
 }
 
-command_t Clients::nonsense() {
+Request Clients::nonsense() {
   constexpr std::int64_t kHuge = std::numeric_limits<std::int64_t>::max();
-  command_t command = make(static_cast<std::int8_t>(random_.between(-128, 127)));
+  Request request = make(static_cast<Ask>(random_.between(-128, 127)));
   switch (random_.below(8)) {
     case 0:
       break;
     case 1:
-      command.kind = command_t::MOVE_RELATIVE;
-      add(command, "no such motor", 1);
+      request.ask = Ask::kMoveBy;
+      request.add("no such motor", 1);
       break;
     case 2:
-      command.kind = static_cast<std::int8_t>(random_.between(1, 7));
-      command.motors.push_back(any_motor());
+      request.ask = static_cast<Ask>(random_.between(1, 7));
+      request.motors.push_back(any_motor());
       break;
     case 3:
-      command.kind = command_t::MOVE_RELATIVE;
-      add(command, any_motor(), random_.one_in(2) ? kHuge : -kHuge);
+      request.ask = Ask::kMoveBy;
+      request.add(any_motor(), random_.one_in(2) ? kHuge : -kHuge);
       break;
     case 4:
-      command.kind = random_.one_in(2) ? command_t::MOVE_ABSOLUTE : command_t::SET_POSITION;
-      add(command, any_motor(), random_.one_in(2) ? kHuge : -kHuge - 1);
+      request.ask = random_.one_in(2) ? Ask::kMoveTo : Ask::kSetPosition;
+      request.add(any_motor(), random_.one_in(2) ? kHuge : -kHuge - 1);
       break;
     case 5:
-      command.kind = command_t::MOVE_RELATIVE;
-      add(command, any_motor(), 5);
-      add(command, command.motors.front(), 5);
+      request.ask = Ask::kMoveBy;
+      request.add(any_motor(), 5);
+      request.add(request.motors.front(), 5);
       break;
     case 6:
-      command.client_id = random_.one_in(2) ? "" : std::string(200, 'x');
+      request.client = random_.one_in(2) ? "" : std::string(200, 'x');
       break;
     default:
-      command.number = -random_.between(0, 1000);
+      request.number = -random_.between(0, 1000);
       break;
   }
-  return command;
+  return request;
 }
 
-command_t Clients::switch_drivers() {
-  command_t command = make(random_.one_in(2) ? command_t::ENABLE : command_t::DISABLE);
-  if (!random_.one_in(3)) add(command, any_motor(), 0);
-  return command;
+Request Clients::switch_drivers() {
+  Request request = make(random_.one_in(2) ? Ask::kEnable : Ask::kDisable);
+  if (!random_.one_in(3)) request.add(any_motor(), 0);
+  return request;
+}
+
+Request Clients::home() {
+  Request request = make(Ask::kHome);
+  for (std::int64_t n = random_.between(1, 4); n > 0; --n) {
+    const auto index = static_cast<std::size_t>(random_.below(config_.motors.size()));
+    const bushd::config::Motor& motor = config_.motors[index];
+    const bool named = std::ranges::find(request.motors, motor.name) != request.motors.end();
+    // Now and then one that has no switch.
+    if (!named && (motor.home || random_.one_in(20))) request.add(motor.name, 0);
+  }
+  if (request.motors.empty()) request.add(config_.motors.front().name, 0);
+  return request;
+}
+
+Request Clients::arm() {
+  Request request = make(Ask::kArm);
+  request.rising = random_.one_in(2);
+  request.delay_us = static_cast<std::int32_t>(random_.magnitude(50, 1'500'000));
+  std::vector<Choice> free = motors_that(false, false);
+  for (std::int64_t n = random_.between(1, 8); n > 0 && !free.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(free.size()));
+    std::int64_t steps = random_.magnitude(1, kLongestMove) * (random_.one_in(2) ? 1 : -1);
+    if (std::abs(free[index].position_steps + steps) > kFarthest) steps = -steps;
+    request.add(free[index].name, steps);
+    free.erase(free.begin() + static_cast<std::ptrdiff_t>(index));
+  }
+  if (request.motors.empty()) request.add(any_motor(), 1);
+  return request;
+}
+
+Request Clients::disarm() {
+  Request request = make(Ask::kDisarm);
+  if (!random_.one_in(3)) request.add(any_motor(), 0);
+  return request;
 }
 
 bool Clients::says(const char* detail) const {
@@ -185,7 +219,7 @@ bool Clients::says(const char* detail) const {
   });
 }
 
-std::optional<command_t> Clients::remedy() {
+std::optional<Request> Clients::remedy() {
   if (!random_.one_in(3)) return std::nullopt;
   if (emergency()) return clear_all();
   if (says("drivers disabled")) return enable_all();
@@ -194,7 +228,7 @@ std::optional<command_t> Clients::remedy() {
   return std::nullopt;
 }
 
-command_t Clients::compose(CommandKind kind) {
+Request Clients::compose(CommandKind kind) {
   switch (kind) {
     case CommandKind::kMove:
       return move(1);
@@ -206,7 +240,7 @@ command_t Clients::compose(CommandKind kind) {
     case CommandKind::kStop:
       return stop();
     case CommandKind::kEmergencyStop:
-      return make(command_t::EMERGENCY_STOP);
+      return make(Ask::kEmergencyStop);
     case CommandKind::kSetPosition: {
       std::vector<Choice> some = motors_that(false, false);
       if (some.size() > 2) some.resize(2);
@@ -220,22 +254,39 @@ command_t Clients::compose(CommandKind kind) {
       return sent_.empty() ? nonsense() : random_.pick(sent_);
     case CommandKind::kNonsense:
       return nonsense();
+    case CommandKind::kHome:
+      return home();
+    case CommandKind::kArm:
+      return arm();
+    case CommandKind::kDisarm:
+      return disarm();
   }
   return nonsense();
 }
 
-command_t Clients::next() {
-  if (auto command = remedy()) return *command;
+CommandKind Clients::choose() {
   double chance = random_.unit() * per_hour_;
   std::size_t kind = 0;
   while (kind + 1 < kCommandKinds && chance >= rates_[kind]) chance -= rates_[kind++];
-  ++sent_by_kind_[kind];
-  const auto chosen = static_cast<CommandKind>(kind);
-  command_t command = compose(chosen);
-  if (chosen == CommandKind::kAgain || chosen == CommandKind::kNonsense) return command;
+  return static_cast<CommandKind>(kind);
+}
+
+Request Clients::next() {
+  if (auto request = remedy()) return *request;
+  const CommandKind chosen = choose();
+  ++sent_by_kind_[static_cast<std::size_t>(chosen)];
+  Request request = compose(chosen);
+  if (chosen == CommandKind::kAgain || chosen == CommandKind::kNonsense) return request;
   if (sent_.size() == kRemembered) sent_.pop_front();
-  sent_.push_back(command);
-  return command;
+  sent_.push_back(request);
+  return request;
+}
+
+Request Clients::one_of_flood(std::size_t client) {
+  Request request = compose(choose());
+  request.client = "f" + std::to_string(client) + "-" + std::to_string(generation_);
+  request.number = ++flood_number_;
+  return request;
 }
 
 }  // namespace bushfaults

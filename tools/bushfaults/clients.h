@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "bushd/command_t.hpp"
 #include "kinds.h"
+#include "request.h"
 #include "sim/line.h"
 #include "sim/random.h"
 #include "witness.h"
@@ -22,16 +22,20 @@ class Clients {
           std::uint64_t seed);
 
   // The next command, and when the one after it is due.
-  bushd::command_t next();
+  Request next();
   bushd::sim::TimeNs next_after(bushd::sim::TimeNs now_ns);
   // What only clients can mend: everything stops, drivers on, an emergency is over. Before quiet.
-  bushd::command_t stop_all() { return make(bushd::command_t::STOP); }
-  bushd::command_t enable_all() { return make(bushd::command_t::ENABLE); }
-  bushd::command_t clear_all() { return make(bushd::command_t::CLEAR_FAULTS); }
-  // Some MCU stands still after an emergency stop, as far as the daemon has said.
-  bool emergency() const { return says("emergency stop"); }
+  Request stop_all() { return make(Ask::kStop); }
+  Request enable_all() { return of_all_online(Ask::kEnable); }
+  Request clear_all() { return of_all_online(Ask::kClearFaults); }
+  // Some MCU stands still after an emergency stop or input, as far as the daemon has said.
+  bool emergency() const { return says("emergency"); }
 
   const CommandCounts& sent() const { return sent_by_kind_; }
+  // Of a flood of requests, by this client of the flood's own.
+  Request one_of_flood(std::size_t client);
+  // Counts the daemons.
+  std::uint64_t generation() const { return generation_; }
   // A new daemon does not know what was asked of the old one: clients begin anew.
   void begin_anew();
 
@@ -41,18 +45,23 @@ class Clients {
     std::int64_t position_steps;
     std::int64_t target_steps;
   };
-  bushd::command_t make(std::int8_t kind);
-  void add(bushd::command_t& command, const std::string& motor, std::int64_t steps);
-  bushd::command_t compose(CommandKind kind);
+  Request make(Ask ask);
+  // The daemon refuses them if an MCU of theirs is offline.
+  Request of_all_online(Ask ask);
+  Request compose(CommandKind kind);
+  CommandKind choose();
   // Drivers that are off, positions in doubt and emergencies are seen to soon.
-  std::optional<bushd::command_t> remedy();
+  std::optional<Request> remedy();
   bool says(const char* detail) const;
-  bushd::command_t move(std::size_t motors);
-  bushd::command_t retarget();
-  bushd::command_t stop();
-  bushd::command_t set(const std::vector<Choice>& motors);
-  bushd::command_t switch_drivers();
-  bushd::command_t nonsense();
+  Request move(std::size_t motors);
+  Request retarget();
+  Request stop();
+  Request set(const std::vector<Choice>& motors);
+  Request switch_drivers();
+  Request nonsense();
+  Request home();
+  Request arm();
+  Request disarm();
   std::string any_motor();
   // Motors that the daemon says are at rest (or moving), uncertain (or known).
   std::vector<Choice> motors_that(bool moving, bool uncertain) const;
@@ -67,7 +76,8 @@ class Clients {
   bushd::sim::Random random_;
   std::uint64_t generation_ = 0;
   std::vector<std::int64_t> number_;  // by client
-  std::deque<bushd::command_t> sent_;
+  std::int64_t flood_number_ = 0;
+  std::deque<Request> sent_;
   CommandCounts sent_by_kind_{};
 };
 

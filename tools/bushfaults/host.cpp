@@ -97,14 +97,14 @@ void Host::run(TimeNs now_ns) {
     start();
   }
   if (now_ns_ < paused_until_ns_) return;
-  const bool due = now_ns_ >= wake_ns_ || !commands_.empty() || !disk_.empty() ||
+  const bool due = now_ns_ >= wake_ns_ || !requests_.empty() || !disk_.empty() ||
                    (!inbox_.empty() && inbox_.front().due_ns <= now_ns_);
   if (!due) return;
   deliver();
   for (const auto& told : std::exchange(disk_, {})) told();
-  for (; !commands_.empty(); commands_.pop_front()) {
-    witness_.command(now_ns_, commands_.front());
-    daemon_->command(now_us(), commands_.front());
+  for (; !requests_.empty(); requests_.pop_front()) {
+    witness_.request(now_ns_, requests_.front());
+    give(*daemon_, now_us(), requests_.front());
   }
   step();
 }
@@ -118,8 +118,8 @@ Host::TimeNs Host::next_ns() const {
   return std::max(std::min(next, wake_ns_), now_ns_ + 1000);
 }
 
-void Host::command(TimeNs, const bushd::command_t& command) {
-  if (daemon_) commands_.push_back(command);  // else nobody listens
+void Host::request(TimeNs, const Request& request) {
+  if (daemon_) requests_.push_back(request);  // else nobody listens
 }
 
 void Host::garble(Direction direction, bushd::sim::Garbling what) {
@@ -147,13 +147,14 @@ void Host::unplug(TimeNs now_ns, TimeNs until_ns) {
 
 void Host::pause(TimeNs now_ns, TimeNs until_ns) {
   paused_until_ns_ = std::max({paused_until_ns_, now_ns, until_ns});
+  witness_.positions().pause(now_ns, until_ns);
 }
 
 void Host::kill(TimeNs now_ns, TimeNs until_ns) {
   now_ns_ = now_ns;
   starts_ns_ = daemon_ ? until_ns : std::max(starts_ns_, until_ns);
   daemon_.reset();
-  commands_.clear();
+  requests_.clear();
   disk_.clear();
   paused_until_ns_ = 0;
 }

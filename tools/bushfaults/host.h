@@ -34,7 +34,7 @@ class Host final : public bushd::daemon::LcmOutputs {
   // When something is to be done next, if nothing comes from outside.
   TimeNs next_ns() const;
 
-  void command(TimeNs now_ns, const bushd::command_t& command);
+  void request(TimeNs now_ns, const Request& request);
 
   // Faults. They may overlap: what is over last counts.
   enum class Direction { kOut, kIn };
@@ -84,7 +84,7 @@ class Host final : public bushd::daemon::LcmOutputs {
   TimeNs starts_ns_ = 0;                            // when the next daemon starts
   TimeNs paused_until_ns_ = 0;
   TimeNs wake_ns_ = 0;
-  std::deque<bushd::command_t> commands_;   // not yet read by the daemon
+  std::deque<Request> requests_;            // not yet read by the daemon
   std::deque<std::function<void()>> disk_;  // what it is to tell the daemon
 
   bool plugged_ = false;

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "link/line_budget.h"
+#include "fieldbus/line_budget.h"
 #include "sim/random.h"
 #include "tables/table_file.h"
 
@@ -17,6 +17,9 @@ constexpr std::array<const char*, 4> kTables = {"bushd2-constant", "bushd2-scurv
                                                 "bushd2-exponential", "bushd2-resonance"};
 constexpr std::array<std::uint32_t, 4> kBauds = {500'000, 1'000'000, 2'000'000, 4'000'000};
 constexpr std::uint32_t kStream = 400;  // of randomness
+constexpr std::uint32_t kHomeStream = 401;
+constexpr std::uint32_t kEmergencyStream = 402;
+constexpr std::uint32_t kSwitchStream = 500;  // and the next ones, one for each motor
 
 // Every choice is drawn, also where the way is given: so a run told all its ways is the same run.
 bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
@@ -66,8 +69,8 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
   }
   bushd::config::Bus bus = make_bus(ways, seed);
   for (const std::uint32_t baud : kBauds) {
-    if (bushd::link::line_load(baud, bus.tick_ns(), bus.format, motors_of_mcu) >
-        bushd::link::kMaxLineLoad) {
+    if (bushd::fieldbus::line_load(baud, bus.tick_ns(), bus.format, motors_of_mcu) >
+        bushd::fieldbus::kMaxLineLoad) {
       continue;
     }
     bus.baud = baud;
@@ -77,8 +80,56 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
   return bushd::fail(fmt::format("no line can carry {} motors; use fewer", motors));
 }
 
+void furnish(bushd::config::Config& config, const FaultRates& faults, const CommandRates& commands,
+             std::uint64_t seed) {
+  if (rate(commands, CommandKind::kHome) > 0) add_homes(config, seed);
+  if (rate(faults, FaultKind::kLimitSwitch) > 0) add_limit_switches(config);
+  if (rate(faults, FaultKind::kEmergencyInput) > 0) add_emergency_inputs(config, seed);
+}
+
+void add_homes(bushd::config::Config& config, std::uint64_t seed) {
+  bushd::sim::Random random(seed, kHomeStream);
+  for (std::size_t i = 0; i < config.motors.size(); i += 2) {
+    bushd::config::Motor& motor = config.motors[i];
+    bushd::config::Home home;
+    home.positive = random.one_in(2);
+    home.position_steps =
+        static_cast<std::int32_t>(random.between(8'000, 15'000)) * (home.positive ? 1 : -1);
+    home.most_steps = static_cast<std::uint32_t>(random.between(5'000, 40'000));
+    const bool limit = !random.one_in(4);
+    motor.limit_positive = limit && home.positive;
+    motor.limit_negative = limit && !home.positive;
+    motor.home = home;
+  }
+}
+
+// The contact settles within a slow step, which lasts 10 ms: longer, and nobody could find it to a
+// step.
+std::optional<bushd::sim::SwitchOptions> home_switch(const bushd::config::Config& config,
+                                                     std::size_t motor, std::uint64_t seed) {
+  const auto& home = config.motors[motor].home;
+  if (!home) return std::nullopt;
+  bushd::sim::Random random(seed, kSwitchStream + static_cast<std::uint32_t>(motor));
+  bushd::sim::SwitchOptions options;
+  options.at_steps = random.between(1'000, 6'000) * (home->positive ? 1 : -1);
+  options.positive_end = home->positive;
+  options.hysteresis_steps = random.between(0, 20);
+  options.bounce_ns = random.between(0, 6'000'000);
+  options.seed = seed + motor;
+  return options;
+}
+
+void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed) {
+  bushd::sim::Random random(seed, kEmergencyStream);
+  for (bushd::config::Mcu& mcu : config.mcus) {
+    mcu.emergency_input =
+        random.one_in(2) ? BUSHD_EMERGENCY_INPUT_CUTS : BUSHD_EMERGENCY_INPUT_RAMPS;
+  }
+}
+
 void add_limit_switches(bushd::config::Config& config) {
   for (std::size_t i = 0; i < config.motors.size(); ++i) {
+    if (config.motors[i].home) continue;
     config.motors[i].limit_positive = i % 3 != 1;
     config.motors[i].limit_negative = i % 3 != 0;
   }

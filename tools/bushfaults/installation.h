@@ -8,6 +8,8 @@
 
 #include "base/result.h"
 #include "config/config.h"
+#include "kinds.h"
+#include "sim/switch.h"
 
 namespace bushfaults {
 
@@ -24,6 +26,20 @@ struct Ways {
 // Refuses what does not fit: more motors than outputs, or than any line can carry.
 bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::size_t mcus,
                                                        const Ways& ways, std::uint64_t seed);
+
+// With what faults and commands of these rates need: see below.
+void furnish(bushd::config::Config& config, const FaultRates& faults, const CommandRates& commands,
+             std::uint64_t seed);
+
+// Every second motor has a switch to run into and can be homed; most of these switches are limits
+// too.
+void add_homes(bushd::config::Config& config, std::uint64_t seed);
+// Of such a motor, by its index: where the plant has its switch.
+std::optional<bushd::sim::SwitchOptions> home_switch(const bushd::config::Config& config,
+                                                     std::size_t motor, std::uint64_t seed);
+
+// Of all MCUs; they ramp or cut.
+void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed);
 
 // At one end of most motors, at both of the others.
 void add_limit_switches(bushd::config::Config& config);

@@ -22,6 +22,13 @@ constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
     {"kills", 30, "the daemon is killed, another starts 10 ms .. 3 s later"},
     {"resets", 30, "an MCU is reset and boots 1 ms .. 2 s later"},
     {"limit-switches", 0, "a motor's limit switch is active for 5 ms .. 2 s"},
+    {"emergency-inputs", 0, "an MCU's emergency input is active for 5 ms .. 2 s"},
+    {"triggers", 0, "an edge at the trigger input of one MCU or of all"},
+    {"slow-requests", 0, "a request comes 1 ms .. 10 s late, after others of its client"},
+    {"late-repeats", 0, "a request comes again, up to half an hour later"},
+    {"stale-repeats", 0, "a request that an earlier daemon has got comes to this one"},
+    {"floods", 0, "50 .. 2000 requests at once, of up to 200 clients"},
+    {"crowds", 0, "likewise, of up to 2000 clients"},
 }};
 
 constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
@@ -35,6 +42,9 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"clears", 500, "of faults"},
     {"repeats", 1900, "a command again that was sent before"},
     {"nonsense", 1700, "what no client should send"},
+    {"homings", 0, "of 1 .. 4 motors; half of all have a switch then, which bounces"},
+    {"armings", 0, "1 .. 8 motors wait for the trigger"},
+    {"disarmings", 0, "of one motor or of all"},
 }};
 
 template <std::size_t kSize>

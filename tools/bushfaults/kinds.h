@@ -28,8 +28,15 @@ enum class FaultKind : std::uint8_t {
   kReset,
   // None unless asked for.
   kLimitSwitch,
+  kEmergencyInput,
+  kTrigger,
+  kSlowRequest,
+  kLateRepeat,
+  kStaleRepeat,
+  kFlood,
+  kCrowd,
 };
-inline constexpr std::size_t kFaultKinds = 16;
+inline constexpr std::size_t kFaultKinds = 23;
 
 // What clients send.
 enum class CommandKind : std::uint8_t {
@@ -43,8 +50,12 @@ enum class CommandKind : std::uint8_t {
   kClear,
   kAgain,
   kNonsense,
+  // None unless asked for.
+  kHome,
+  kArm,
+  kDisarm,
 };
-inline constexpr std::size_t kCommandKinds = 10;
+inline constexpr std::size_t kCommandKinds = 13;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary
@@ -60,6 +71,13 @@ using FaultRates = std::array<double, kFaultKinds>;
 using CommandRates = std::array<double, kCommandKinds>;
 FaultRates usual_fault_rates();
 CommandRates usual_command_rates();
+
+inline double rate(const FaultRates& rates, FaultKind kind) {
+  return rates[static_cast<std::size_t>(kind)];
+}
+inline double rate(const CommandRates& rates, CommandKind kind) {
+  return rates[static_cast<std::size_t>(kind)];
+}
 
 using FaultCounts = std::array<std::uint64_t, kFaultKinds>;
 using CommandCounts = std::array<std::uint64_t, kCommandKinds>;

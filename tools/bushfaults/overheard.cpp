@@ -4,8 +4,9 @@
 
 namespace bushfaults {
 
-Overheard::Overheard(bushd::sim::Bus& bus, bushd::sim::Plant& plant, Skew& skew)
-    : bus_(bus), plant_(plant), skew_(skew), receiver_(bus.mcu_count()) {
+Overheard::Overheard(bushd::sim::Bus& bus, bushd::sim::Plant& plant, Skew& skew,
+                     Positions& positions)
+    : bus_(bus), plant_(plant), skew_(skew), positions_(positions), receiver_(bus.mcu_count()) {
   bus_.on_mcu_byte = [this](std::size_t mcu, std::uint8_t byte, TimeNs end_ns) {
     bushd_frame heard;
     if (bushd_receive_byte(&receiver_[mcu], byte, &heard) != BUSHD_RECEIVE_FRAME) return;
@@ -25,6 +26,11 @@ void Overheard::frame(TimeNs now_ns, std::size_t mcu, const bushd_frame& frame) 
     bushd_sync sync;
     if (bushd_decode_sync(frame.payload, frame.payload_size, &sync) != BUSHD_OK) return;
     skew_.heard(now_ns, mcu, sync);
+  } else if (frame.type == BUSHD_MSG_POLL) {
+    bushd_poll poll;
+    bushd_poll_entry entry;
+    if (bushd_decode_poll(frame.payload, frame.payload_size, &poll) != BUSHD_OK) return;
+    if (bushd_poll_find(&poll, bus_.mcu(mcu).address(), &entry)) positions_.reported(now_ns, mcu);
   } else if (frame.type == BUSHD_MSG_EMERGENCY) {
     bushd_emergency emergency;
     if (bushd_decode_emergency(frame.payload, frame.payload_size, &emergency) != BUSHD_OK) return;
@@ -35,7 +41,8 @@ void Overheard::frame(TimeNs now_ns, std::size_t mcu, const bushd_frame& frame) 
     if (bushd_decode_control(frame.payload, frame.payload_size, &control) != BUSHD_OK) return;
     if ((control.actions & BUSHD_CONTROL_CLEAR_FAULTS) == 0) return;
     // It refuses while a motor moves.
-    if ((bus_.mcu(mcu).core().faults & BUSHD_FAULT_EMERGENCY) == 0) plant_.release(mcu);
+    const unsigned halts = BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT;
+    if ((bus_.mcu(mcu).core().faults & halts) == 0) plant_.release(mcu);
   }
 }
 

@@ -1,11 +1,12 @@
 // What each MCU hears on the line, read by another pair of ears than its firmware's: of the frames
-// that mean something to all motors or clocks at once.
+// that mean something to all motors or clocks at once, or make it report.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "engine/frame.h"
+#include "positions.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
 #include "skew.h"
@@ -15,7 +16,7 @@ namespace bushfaults {
 class Overheard {
  public:
   // All of them outlive it. Takes Bus::on_mcu_byte.
-  Overheard(bushd::sim::Bus& bus, bushd::sim::Plant& plant, Skew& skew);
+  Overheard(bushd::sim::Bus& bus, bushd::sim::Plant& plant, Skew& skew, Positions& positions);
   ~Overheard();
   Overheard(const Overheard&) = delete;
   Overheard& operator=(const Overheard&) = delete;
@@ -31,6 +32,7 @@ class Overheard {
   bushd::sim::Bus& bus_;
   bushd::sim::Plant& plant_;
   Skew& skew_;
+  Positions& positions_;
   std::vector<bushd_receiver> receiver_;  // by MCU
   std::uint64_t emergencies_ = 0;
 };

@@ -52,27 +52,36 @@ std::string summary_text(const World& world, double processor_s) {
   for (const auto& [result, count] : world.witness().moves_by_result()) {
     text += fmt::format("           {:<17}{:>9}\n", result, count);
   }
+  if (!world.witness().homings_by_result().empty()) text += "homings    by result\n";
+  for (const auto& [result, count] : world.witness().homings_by_result()) {
+    text += fmt::format("           {:<17}{:>9}\n", result, count);
+  }
   text += fmt::format("steps      {} commanded, {} made, {} unaccounted\n",
                       world.witness().steps_commanded(), world.plant().steps_made(),
                       world.witness().steps_unaccounted());
   text += fmt::format("skew       {:.1f} us between MCUs in step, at most\n",
                       static_cast<double>(world.skew().worst_ns()) / 1000);
+  text += fmt::format("age        {:.0f} ms of the report behind a state, at most\n",
+                      static_cast<double>(world.witness().positions().worst_age_ns()) / 1e6);
   text += fmt::format("violations {}\n", world.witness().violation() ? 1 : 0);
   return text;
 }
 
 std::string summary_json(const World& world) {
-  const nlohmann::json all = {{"sim_hours", hours(world)},
-                              {"bus", ways_text(world.config())},
-                              {"faults", json_of<FaultKind>(world.faults())},
-                              {"faults_total", total(world.faults())},
-                              {"commands", json_of<CommandKind>(world.commands())},
-                              {"moves", world.witness().moves_by_result()},
-                              {"steps_commanded", world.witness().steps_commanded()},
-                              {"steps_made", world.plant().steps_made()},
-                              {"steps_unaccounted", world.witness().steps_unaccounted()},
-                              {"skew_us", static_cast<double>(world.skew().worst_ns()) / 1000},
-                              {"violations", world.witness().violation() ? 1 : 0}};
+  const nlohmann::json all = {
+      {"sim_hours", hours(world)},
+      {"bus", ways_text(world.config())},
+      {"faults", json_of<FaultKind>(world.faults())},
+      {"faults_total", total(world.faults())},
+      {"commands", json_of<CommandKind>(world.commands())},
+      {"moves", world.witness().moves_by_result()},
+      {"homings", world.witness().homings_by_result()},
+      {"steps_commanded", world.witness().steps_commanded()},
+      {"steps_made", world.plant().steps_made()},
+      {"steps_unaccounted", world.witness().steps_unaccounted()},
+      {"skew_us", static_cast<double>(world.skew().worst_ns()) / 1000},
+      {"report_age_ms", static_cast<double>(world.witness().positions().worst_age_ns()) / 1e6},
+      {"violations", world.witness().violation() ? 1 : 0}};
   return all.dump() + "\n";
 }
 

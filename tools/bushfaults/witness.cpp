@@ -10,7 +10,6 @@
 namespace bushfaults {
 namespace {
 
-using bushd::command_t;
 using bushd::motor_state_t;
 using bushd::reply_t;
 using bushd::state_t;
@@ -21,27 +20,15 @@ constexpr bushd::sim::TimeNs kResultDueNs = 40'000'000'000;
 // A daemon may not have heard for as long that a switch bars the way, and a move may take as long
 // to its end.
 constexpr bushd::sim::TimeNs kBarredNs = kResultDueNs;
-// Commands that clients repeat are younger.
-constexpr std::int64_t kNumbersKept = 60;
-
-bool is_move(const command_t& command) {
-  return command.kind == command_t::MOVE_RELATIVE || command.kind == command_t::MOVE_ABSOLUTE;
-}
+// The daemon answers a command again while 64 newer ones of the client have come; here it is known
+// for longer, even if some of those have been overtaken.
+constexpr std::int64_t kNumbersAnswered = 64;
+constexpr std::int64_t kNumbersKept = 200;
 
 bool same(const reply_t& a, const reply_t& b) {
   return a.utime_us == b.utime_us && a.phase == b.phase && a.result == b.result &&
          a.reason == b.reason && a.motors == b.motors && a.motor_results == b.motor_results &&
          a.position_steps == b.position_steps;
-}
-
-std::string text_of(const command_t& command) {
-  static constexpr std::array<const char*, 9> kWords = {
-      "?",       "move by",      "move to",      "stop",          "enable",
-      "disable", "set position", "clear faults", "emergency stop"};
-  const bool known = command.kind > 0 && command.kind < static_cast<int>(kWords.size());
-  const char* word = kWords[known ? static_cast<std::size_t>(command.kind) : 0];
-  return fmt::format("{} #{}: {} {} {}", command.client_id.substr(0, 16), command.number, word,
-                     fmt::join(command.motors, ","), fmt::join(command.steps, ","));
 }
 
 std::string text_of(const reply_t& reply) {
@@ -54,13 +41,17 @@ std::string text_of(const reply_t& reply) {
 
 Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus,
                  const bushd::sim::Plant& plant, Recent& recent)
-    : config_(config), bus_(bus), plant_(plant), recent_(recent) {
+    : config_(config),
+      plant_(plant),
+      recent_(recent),
+      positions_(config, bus, plant),
+      starts_(config) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
-    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, 0, {}, {}, {}, {}});
+    motors_.push_back({motor.name, motor.mcu.value, motor.output.value, {}, {}, {}});
   }
   states_.resize(config.mcus.size());
-  boot_seen_.resize(config.mcus.size());
+  present_.resize(config.mcus.size(), true);
 }
 
 void Witness::violated(TimeNs now_ns, const std::string& what) {
@@ -78,37 +69,40 @@ Witness::Motor* Witness::find(const std::string& name) {
 }
 
 void Witness::daemon_started(TimeNs) {
+  for (const auto& [key, asked] : asked_) forget(key, asked);
   asked_.clear();
+  newest_.clear();
   repeating_.reset();
   for (Motor& motor : motors_) motor.move.reset();
   std::fill(states_.begin(), states_.end(), std::nullopt);
-  std::fill(boot_seen_.begin(), boot_seen_.end(), std::nullopt);
-}
-
-void Witness::mcu_reset(std::size_t mcu) {
-  for (Motor& motor : motors_) {
-    if (motor.mcu != mcu) continue;
-    motor.offset.reset();
-    motor.perhaps_set.clear();
-  }
+  positions_.daemon_started();
 }
 
 void Witness::pressed(TimeNs now_ns, std::size_t motor) {
   motors_[motor].pressed_ns = now_ns;
 }
 
-void Witness::command(TimeNs now_ns, const command_t& command) {
-  recent_.note(now_ns, text_of(command));
-  const Key key{command.client_id, command.number};
+void Witness::request(TimeNs now_ns, const Request& request) {
+  recent_.note(now_ns, text_of(request));
+  const Key key{request.client, request.number};
   const auto [asked, fresh] = asked_.try_emplace(key);
   repeating_.reset();
   if (!fresh) {
     repeating_ = key;
     return;
   }
-  asked->second.command = command;
-  const auto old = asked_.find({command.client_id, command.number - kNumbersKept});
-  if (old != asked_.end() && old->second.finished()) asked_.erase(old);
+  asked->second.request = request;
+  std::int64_t& newest = newest_[request.client];
+  newest = std::max(newest, request.number);
+  const auto old = asked_.find({request.client, request.number - kNumbersKept});
+  if (old != asked_.end() && old->second.finished()) {
+    forget(old->first, old->second);
+    asked_.erase(old);
+  }
+}
+
+void Witness::forget(const Key& key, const Asked& asked) {
+  if (asked.accepted() && asked.request.counts_once()) carried_out_.insert(key);
 }
 
 void Witness::reply(TimeNs now_ns, const reply_t& reply) {
@@ -121,8 +115,9 @@ void Witness::reply(TimeNs now_ns, const reply_t& reply) {
                                  [&](const reply_t& before) { return same(before, reply); });
   const bool repeating = repeating_ == found->first;
   // A number from before the daemon's memory is refused whenever it comes.
-  const bool too_old = !asked.replies.empty() && asked.replies[0].phase == reply_t::REFUSED &&
-                       reply.phase == reply_t::REFUSED;
+  const bool forgotten = newest_[reply.client_id] - reply.number >= kNumbersAnswered;
+  const bool too_old = !asked.replies.empty() && reply.phase == reply_t::REFUSED &&
+                       (asked.replies[0].phase == reply_t::REFUSED || forgotten);
   if (repeating && (known || too_old)) return;
   recent_.note(now_ns, text_of(reply));
   const bool first = asked.replies.empty();
@@ -132,45 +127,63 @@ void Witness::reply(TimeNs now_ns, const reply_t& reply) {
   if (!in_order) return violated(now_ns, "one reply too many:" + text_of(reply));
   asked.replies.push_back(reply);
   if (reply.phase == reply_t::ACCEPTED) {
+    if (carried_out_.contains(found->first)) {
+      violated(now_ns, "carried out a second time: " + text_of(asked.request));
+    }
     asked.accepted_ns = now_ns;
     accepted(found->first, asked);
   } else if (reply.phase == reply_t::RESULT) {
-    finished(now_ns, asked, reply);
-  } else if (is_move(asked.command)) {
+    finished(now_ns, found->first, asked, reply);
+  } else if (asked.request.is_move()) {
     ++moves_by_result_["refused"];
+  } else if (asked.request.ask == Ask::kHome) {
+    ++homings_by_result_["refused"];
   }
 }
 
 void Witness::accepted(const Key& key, Asked& asked) {
-  const command_t& command = asked.command;
-  if (command.kind == command_t::STOP || command.kind == command_t::EMERGENCY_STOP) {
+  const Request& request = asked.request;
+  if (request.ask == Ask::kStop || request.ask == Ask::kEmergencyStop) {
     for (Motor& motor : motors_) {
-      const auto& named = command.motors;
+      const auto& named = request.motors;
       const bool stops =
           named.empty() || std::find(named.begin(), named.end(), motor.name) != named.end();
       if (stops) motor.target.reset();
     }
   }
-  for (std::size_t i = 0; i < command.motors.size(); ++i) {
-    Motor& motor = *find(command.motors[i]);
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    Motor& motor = *find(request.motors[i]);
     const std::int64_t stands = plant_steps(motor);
-    if (command.kind == command_t::SET_POSITION) motor.perhaps_set.push_back(command.steps[i]);
-    if (command.kind == command_t::MOVE_RELATIVE) {
+    if (request.is_move()) forget_unbegun(motor);
+    if (request.ask == Ask::kSetPosition) {
+      positions_.may_be_set(index_of(motor), request.steps[i]);
+    }
+    if (request.ask == Ask::kHome) positions_.may_be_homed(index_of(motor));
+    if (request.ask == Ask::kMoveBy || request.ask == Ask::kArm) {
       const std::optional<std::int64_t> base = motor.move ? motor.target : stands;
-      asked.target.push_back(base ? std::optional(*base + command.steps[i]) : std::nullopt);
-    } else if (command.kind == command_t::MOVE_ABSOLUTE && motor.offset) {
-      asked.target.emplace_back(*motor.offset + command.steps[i]);
+      asked.target.push_back(base ? std::optional(*base + request.steps[i]) : std::nullopt);
+    } else if (request.ask == Ask::kMoveTo && offset(motor)) {
+      asked.target.emplace_back(*offset(motor) + request.steps[i]);
     } else {
       asked.target.emplace_back();
     }
     asked.from.push_back(motor.move ? std::nullopt : std::optional(stands));
     asked.end.emplace_back();
     asked.first_step_ns.emplace_back();
-    if (is_move(command)) take_over(motor, key, asked.target.back());
-    if (is_move(command) && asked.target.back()) {
+    asked.began.push_back(request.ask != Ask::kArm);
+    if (request.is_move()) take_over(motor, key, asked.target.back());
+    if (request.is_move() && asked.target.back()) {
       steps_commanded_ += static_cast<std::uint64_t>(std::abs(*asked.target.back() - stands));
     }
   }
+}
+
+// One that has waited for the trigger in vain is at rest again before the others that waited with
+// it have ended, and with them the move.
+void Witness::forget_unbegun(Motor& motor) {
+  if (!motor.move) return;
+  const Asked& asked = asked_.at(*motor.move);
+  if (!asked.began[asked.index_of(motor.name)]) motor.move.reset();
 }
 
 // A motor that moves belongs to the newest move; its part of the one before has ended.
@@ -183,46 +196,62 @@ void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t>
   motor.target = target;
 }
 
-void Witness::finished(TimeNs now_ns, const Asked& asked, const reply_t& result) {
-  const command_t& command = asked.command;
-  if (command.kind == command_t::SET_POSITION && result.result == "done") {
-    for (std::size_t i = 0; i < command.motors.size(); ++i) {
-      Motor& motor = *find(command.motors[i]);
-      motor.offset = plant_steps(motor) - command.steps[i];
-      motor.perhaps_set.clear();
+void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked, const reply_t& result) {
+  const Request& request = asked.request;
+  if (request.ask == Ask::kSetPosition && result.result == "done") {
+    for (std::size_t i = 0; i < request.motors.size(); ++i) {
+      positions_.was_set(index_of(*find(request.motors[i])), request.steps[i]);
     }
   }
-  if (!is_move(command)) return;
+  if (request.ask == Ask::kHome) return homed(now_ns, asked, result);
+  if (!request.is_move()) return;
   ++moves_by_result_[result.result];
-  if (result.motors != command.motors) {
+  if (result.motors != request.motors) {
     return violated(now_ns, "a result of other motors:" + text_of(result));
   }
   for (std::size_t i = 0; i < result.motors.size(); ++i) {
     const auto& end = asked.end[i];
+    if (request.ask == Ask::kArm && !asked.began[i]) {
+      // No line of the log tells how it ended, and it can have reached nothing.
+      Motor& motor = *find(result.motors[i]);
+      if (motor.move == key) motor.move.reset();
+      if (result.motor_results[i] != "reached") continue;
+    }
     if (end && end->agrees(result.motor_results[i], result.position_steps[i])) continue;
     violated(now_ns, result.motors[i] + " ended otherwise than its result says:" + text_of(result));
   }
-  check_start(now_ns, asked);
+  const auto wrong = starts_.check(request, asked.first_step_ns);
+  if (wrong) violated(now_ns, *wrong);
 }
 
-// All motors of a move start in the same tick, whichever MCUs they are on; and all tables have the
-// same first delay, so their first steps come together.
-void Witness::check_start(TimeNs now_ns, const Asked& asked) {
-  std::vector<TimeNs> first;
-  for (const auto& step : asked.first_step_ns) {
-    if (step) first.push_back(*step);
+void Witness::homed(TimeNs now_ns, const Asked& asked, const reply_t& result) {
+  ++homings_by_result_[result.result];
+  if (result.motors != asked.request.motors) {
+    return violated(now_ns, "a result of other motors:" + text_of(result));
   }
-  if (first.empty()) return;
-  const auto [earliest, latest] = std::minmax_element(first.begin(), first.end());
-  if (*latest - *earliest < config_.buses[0].tick_ns() / 2) return;
-  violated(now_ns, fmt::format("motors of one move started {} us apart: {}",
-                               (*latest - *earliest) / 1000, text_of(asked.command)));
+  for (std::size_t i = 0; i < result.motors.size(); ++i) {
+    if (result.motor_results[i] != "reached") continue;
+    const auto wrong =
+        positions_.was_homed(index_of(*find(result.motors[i])), result.position_steps[i]);
+    if (wrong) violated(now_ns, *wrong);
+  }
 }
 
 void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const nlohmann::json line = nlohmann::json::parse(json_line);
-  if (line.at("event") != "result") return;
+  if (line.at("event") == "alone") {
+    const std::size_t index = index_of(*find(line.at("motor").get<std::string>()));
+    if (line.at("set")) positions_.homed(index, line.at("position_steps"));
+    return;
+  }
+  const bool begins = line.at("event") == "move";
+  if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
+  if (begins && motor.move) {
+    Asked& asked = asked_.at(*motor.move);
+    asked.began[asked.index_of(motor.name)] = true;
+  }
+  if (begins) return;
   if (!motor.move) return violated(now_ns, motor.name + " ended without a move");
   Asked& asked = asked_.at(*motor.move);
   const End end{line.at("result"), line.at("position_steps")};
@@ -231,7 +260,10 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const std::size_t index = asked.index_of(motor.name);
   asked.end[index] = end;
   check_end(now_ns, motor, end, asked.target[index]);
-  const bool planned = asked.end[index]->word == "reached" || asked.end[index]->word == "stopped";
+  // One that waited for the trigger and was stopped before its first step makes it in a streamed
+  // tick, up to one late.
+  const bool exact = asked.request.ask != Ask::kArm;
+  const bool planned = end.word == "reached" || (end.word == "stopped" && exact);
   const auto& from = asked.from[index];
   if (planned && from && plant_steps(motor) != *from) {
     asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
@@ -251,9 +283,9 @@ void Witness::check_end(TimeNs now_ns, const Motor& motor, const End& end,
   } else if (end.word == "reached" && target && *target != stands) {
     violated(now_ns, fmt::format("{} is said to have reached its target, and stands {} steps off",
                                  motor.name, stands - *target));
-  } else if (planned && motor.offset && stands - *motor.offset != end.position_steps) {
+  } else if (planned && offset(motor) && stands - *offset(motor) != end.position_steps) {
     violated(now_ns, fmt::format("{} {} at {}, but stands at {}", motor.name, end.word,
-                                 end.position_steps, stands - *motor.offset));
+                                 end.position_steps, stands - *offset(motor)));
   }
 }
 
@@ -265,58 +297,37 @@ void Witness::state(TimeNs now_ns, const state_t& state) {
     recent_.note(now_ns, fmt::format("{} {} {}", state.mcu, state.mcu_state, state.detail));
   }
   states_[mcu] = state;
-  const bool online =
-      state.mcu_state == "READY" || state.mcu_state == "RUN" || state.mcu_state == "FAULT";
-  if (!online || state.boot_number != bus_.mcu(mcu).boot_number()) return;
-  for (const motor_state_t& claim : state.motors) {
-    if (!claim.moving && claim.trust == "known") check_motor(now_ns, mcu, claim);
-  }
-  boot_seen_[mcu] = state.boot_number;
-}
-
-void Witness::check_motor(TimeNs now_ns, std::size_t mcu, const motor_state_t& claim) {
-  Motor& motor = *find(claim.name);
-  const std::int64_t stands = plant_steps(motor);
-  if (!motor.offset) {
-    // A daemon that has met this boot only cannot know that there was one before.
-    const bool first = !boot_seen_[mcu] || *boot_seen_[mcu] == bus_.mcu(mcu).boot_number();
-    if (!first) {
-      return violated(now_ns, motor.name + " is said to be known although its MCU was reset");
-    }
-    motor.offset = stands - claim.position_steps;
-    return;
-  }
-  if (stands - *motor.offset == claim.position_steps) return;
-  const auto& perhaps = motor.perhaps_set;
-  if (std::find(perhaps.begin(), perhaps.end(), claim.position_steps) != perhaps.end()) {
-    motor.offset = stands - claim.position_steps;
-    return;
-  }
-  violated(now_ns, fmt::format("{} is said to be at rest at {}, but stands at {}", motor.name,
-                               claim.position_steps, stands - *motor.offset));
+  if (const auto wrong = positions_.check(now_ns, mcu, state)) violated(now_ns, *wrong);
 }
 
 void Witness::check_deadlines(TimeNs now_ns) {
   for (const auto& [key, asked] : asked_) {
     if (asked.replies.empty() && key.first.size() <= 64 && !key.first.empty()) {
-      violated(now_ns, "no reply to " + text_of(asked.command));
-    } else if (asked.accepted() && !asked.finished() && now_ns - asked.accepted_ns > kResultDueNs) {
+      violated(now_ns, "no reply to " + text_of(asked.request));
+    } else if (asked.accepted() && !asked.finished() && !asked.request.may_wait() &&
+               now_ns - asked.accepted_ns > kResultDueNs) {
       violated(now_ns,
                fmt::format("no result {} s after it was accepted: {}",
-                           (now_ns - asked.accepted_ns) / 1'000'000'000, text_of(asked.command)));
+                           (now_ns - asked.accepted_ns) / 1'000'000'000, text_of(asked.request)));
     }
   }
 }
 
+bool Witness::ready(std::size_t mcu) const {
+  return !present_[mcu] || (states_[mcu] && states_[mcu]->mcu_state == "READY");
+}
+
 bool Witness::all_ready() const {
-  return std::all_of(states_.begin(), states_.end(),
-                     [](const auto& state) { return state && state->mcu_state == "READY"; });
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (!ready(i)) return false;
+  }
+  return true;
 }
 
 std::string Witness::not_ready() const {
   std::string text;
   for (std::size_t i = 0; i < states_.size(); ++i) {
-    if (states_[i] && states_[i]->mcu_state == "READY") continue;
+    if (ready(i)) continue;
     text += text.empty() ? "" : ", ";
     text += config_.mcus[i].id + " is ";
     text += states_[i] ? states_[i]->mcu_state + " " + states_[i]->detail : "unknown";
@@ -336,9 +347,9 @@ std::uint64_t Witness::steps_unaccounted() const {
     if (!state) continue;
     for (const motor_state_t& claim : state->motors) {
       const Motor& motor = *find(claim.name);
-      if (!motor.offset || claim.trust != "known" || claim.moving) continue;
+      if (!offset(motor) || claim.trust != "known" || claim.moving) continue;
       steps += static_cast<std::uint64_t>(
-          std::abs(plant_steps(motor) - *motor.offset - claim.position_steps));
+          std::abs(plant_steps(motor) - *offset(motor) - claim.position_steps));
     }
   }
   return steps;

@@ -6,17 +6,20 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "bushd/command_t.hpp"
 #include "bushd/reply_t.hpp"
 #include "bushd/state_t.hpp"
 #include "config/config.h"
+#include "positions.h"
 #include "recent.h"
+#include "request.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
+#include "starts.h"
 
 namespace bushfaults {
 
@@ -37,11 +40,10 @@ class Witness {
   const std::optional<Violation>& violation() const { return violation_; }  // the first
 
   void daemon_started(TimeNs now_ns);  // what clients had asked of the one before is void
-  void mcu_reset(std::size_t mcu);
   // Its limit switch is, or was until now, active.
   void pressed(TimeNs now_ns, std::size_t motor);
   // Before the daemon gets it; after that come the replies that it makes at once.
-  void command(TimeNs now_ns, const bushd::command_t& command);
+  void request(TimeNs now_ns, const Request& request);
   void reply(TimeNs now_ns, const bushd::reply_t& reply);
   void state(TimeNs now_ns, const bushd::state_t& state);
   // A line of the log of moves: there each motor of a group ends by itself.
@@ -51,10 +53,18 @@ class Witness {
 
   // As the daemon said last, by MCU; empty before it has said anything in this life.
   const std::vector<std::optional<bushd::state_t>>& states() const { return states_; }
+  // Whether it can be READY at all.
+  void expect(std::size_t mcu, bool present) { present_[mcu] = present; }
   bool all_ready() const;
   std::string not_ready() const;  // which MCUs, and why
   bool commands_open() const;
 
+  Starts& starts() { return starts_; }
+  Positions& positions() { return positions_; }
+  const Positions& positions() const { return positions_; }
+  const std::map<std::string, std::uint64_t>& homings_by_result() const {
+    return homings_by_result_;
+  }
   const std::map<std::string, std::uint64_t>& moves_by_result() const { return moves_by_result_; }
   std::uint64_t steps_commanded() const { return steps_commanded_; }
   // Between the last states and the motors, where the daemon claims to know.
@@ -74,17 +84,13 @@ class Witness {
     std::string name;
     std::size_t mcu;
     std::size_t output;
-    // Plant's count minus daemon's; nothing once a reset has made the MCU forget its count.
-    std::optional<std::int64_t> offset = 0;
-    // Positions that somebody asked to set and that may have been set, although nobody was told.
-    std::vector<std::int64_t> perhaps_set;
     std::optional<TimeNs> pressed_ns;  // when its limit switch was active last
     std::optional<Key> move;           // accepted, and this motor's part of it not yet ended
     // Where it leads, as the plant counts; nothing after a stop.
     std::optional<std::int64_t> target;
   };
   struct Asked {
-    bushd::command_t command;
+    Request request;
     std::vector<bushd::reply_t> replies;
     TimeNs accepted_ns = 0;
     // Of moves, by motor: where the plant stood (nothing if it moved) and must stand in the end,
@@ -93,8 +99,9 @@ class Witness {
     std::vector<std::optional<std::int64_t>> target;
     std::vector<std::optional<End>> end;
     std::vector<std::optional<TimeNs>> first_step_ns;
+    std::vector<bool> began;  // one that waits for the trigger may not
     std::size_t index_of(const std::string& motor) const {
-      const auto& all = command.motors;
+      const auto& all = request.motors;
       return static_cast<std::size_t>(std::find(all.begin(), all.end(), motor) - all.begin());
     }
     bool accepted() const { return !replies.empty() && replies[0].phase == reply_accepted(); }
@@ -107,26 +114,40 @@ class Witness {
   std::int64_t plant_steps(const Motor& motor) const {
     return plant_.position_steps(motor.mcu, motor.output);
   }
+  std::size_t index_of(const Motor& motor) const {
+    return static_cast<std::size_t>(&motor - motors_.data());
+  }
+  // Plant's count minus daemon's.
+  std::optional<std::int64_t> offset(const Motor& motor) const {
+    return positions_.offset(index_of(motor));
+  }
   void accepted(const Key& key, Asked& asked);
-  void finished(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
-  void check_start(TimeNs now_ns, const Asked& asked);
+  void finished(TimeNs now_ns, const Key& key, const Asked& asked, const bushd::reply_t& result);
+  void homed(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
+  void forget(const Key& key, const Asked& asked);
+  void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void check_end(TimeNs now_ns, const Motor& motor, const End& end,
                  std::optional<std::int64_t> target);
-  void check_motor(TimeNs now_ns, std::size_t mcu, const bushd::motor_state_t& claim);
 
   const bushd::config::Config& config_;
-  const bushd::sim::Bus& bus_;
   const bushd::sim::Plant& plant_;
   Recent& recent_;
+  Positions positions_;
+  Starts starts_;
   std::optional<Violation> violation_;
   std::vector<Motor> motors_;
   std::map<std::string, std::size_t> motor_by_name_;
   std::map<Key, Asked> asked_;
+  std::map<std::string, std::int64_t> newest_;  // number by client
+  // Of those that are forgotten, which were accepted; by whichever daemon.
+  std::set<Key> carried_out_;
   std::optional<Key> repeating_;  // the command being given was given before
   std::vector<std::optional<bushd::state_t>> states_;
-  std::vector<std::optional<int>> boot_seen_;  // by MCU: the boot that this daemon has dealt with
+  std::vector<bool> present_;  // by MCU
+  bool ready(std::size_t mcu) const;
   std::map<std::string, std::uint64_t> moves_by_result_;
+  std::map<std::string, std::uint64_t> homings_by_result_;
   std::uint64_t steps_commanded_ = 0;
 };
 

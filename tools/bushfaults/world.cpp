@@ -16,8 +16,9 @@ constexpr TimeNs kHour = 3600 * kSecond;
 
 constexpr TimeNs kWellAfterNs = 5 * kSecond;  // the promise: READY by itself
 constexpr TimeNs kSkewPeriodNs = 20 * kMs;
-constexpr TimeNs kMoveNs = 12 * kSecond;     // the clients' longest, with a start and a result
-constexpr std::uint32_t kWorldStream = 1;    // of randomness
+constexpr TimeNs kMoveNs = 12 * kSecond;   // the clients' longest, with a start and a result
+constexpr std::uint32_t kWorldStream = 1;  // of randomness
+constexpr std::uint32_t kLateStream = 403;
 constexpr std::uint32_t kFaultStream = 300;  // and one for each kind of fault
 
 bushd::sim::McuOptions mcu_options(const bushd::config::Mcu& mcu, std::size_t index,
@@ -42,10 +43,12 @@ World::World(const Options& options, bushd::config::Config config)
       skew_(config_, bus_, witness_),
       clients_(config_, witness_, options.command_rates, options.seed),
       host_(config_, bus_, witness_, clients_, recent_, options.seed),
-      pressed_until_ns_(config_.motors.size(), 0) {
+      mail_(clients_, host_) {
   add_mcus();
   add_motors();
-  overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_);
+  witness_.positions().be_strict(options.strict_known);
+  overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
+  inputs_ = std::make_unique<Inputs>(config_, bus_, plant_, witness_, options.seed);
   for (std::size_t i = 0; i < kFaultKinds; ++i) {
     chance_.emplace_back(options.seed, kFaultStream + static_cast<std::uint32_t>(i));
   }
@@ -53,8 +56,15 @@ World::World(const Options& options, bushd::config::Config config)
 
 void World::add_mcus() {
   bushd::sim::Random random(options_.seed, kWorldStream);
+  bushd::sim::Random late(options_.seed, kLateStream);
+  const std::size_t present = config_.mcus.size() - options_.absent_mcus;
   for (std::size_t i = 0; i < config_.mcus.size(); ++i) {
-    bus_.add_mcu(mcu_options(config_.mcus[i], i, options_.crystal_ppm, random));
+    auto options = mcu_options(config_.mcus[i], i, options_.crystal_ppm, random);
+    if (i >= present) options.boot_ns = kNever / 2;
+    if (i < present && i + options_.late_mcus >= present) {
+      options.boot_ns = late.between(kSecond, kHour / 6);
+    }
+    bus_.add_mcu(options);
   }
 }
 
@@ -70,6 +80,9 @@ void World::add_motors() {
   plant_.on_violation = [this](TimeNs time_ns, std::size_t mcu, std::size_t output,
                                const std::string& what) {
     witness_.violated(time_ns, fmt::format("{} output {}: {}", config_.mcus[mcu].id, output, what));
+  };
+  plant_.on_cut_off = [this](TimeNs time_ns, std::size_t mcu, std::size_t output) {
+    witness_.positions().cut_off(time_ns, mcu, output);
   };
 }
 
@@ -99,7 +112,7 @@ void World::spell_of_trouble(TimeNs until_ns) {
       *next = now_ns_ + chance_[kind].wait(static_cast<double>(kHour) / options_.fault_rates[kind]);
     }
     if (now_ns_ >= next_command_ns_) {
-      host_.command(now_ns_, clients_.next());
+      mail_.send(now_ns_, clients_.next());
       next_command_ns_ = clients_.next_after(now_ns_);
     }
     if (now_ns_ - deadlines_checked_ns_ >= kSecond) {
@@ -111,10 +124,10 @@ void World::spell_of_trouble(TimeNs until_ns) {
 
 void World::calm() {
   if (witness_.violation()) return;
-  run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_,
-                      *std::max_element(pressed_until_ns_.begin(), pressed_until_ns_.end())}));
+  run_until(std::max(
+      {now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(), mail_.quiet_ns()}));
   const TimeNs began_ns = now_ns_;
-  host_.command(now_ns_, clients_.stop_all());
+  host_.request(now_ns_, clients_.stop_all());
   be_well(began_ns);
   if (witness_.violation()) return;
   run_until(now_ns_ + kSecond);
@@ -130,11 +143,12 @@ void World::calm() {
 }
 
 void World::be_well(TimeNs began_ns) {
+  for (std::size_t i = 0; i < config_.mcus.size(); ++i) witness_.expect(i, is_up(i));
   const auto ready = [this] { return witness_.all_ready(); };
   while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
     run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
     // What a client has switched off or stopped only a client sets going again.
-    host_.command(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
+    host_.request(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
   }
   if (ready() || witness_.violation()) return;
   witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready());
@@ -149,7 +163,8 @@ void World::advance(TimeNs until_ns) {
   now_ns_ = std::max(now_ns_, std::min(until_ns, host_.next_ns()));
   bus_.advance_to(now_ns_);
   host_.run(now_ns_);
-  release_switches();
+  inputs_->run(now_ns_);
+  mail_.run(now_ns_);
   if (now_ns_ - skew_checked_ns_ < kSkewPeriodNs) return;
   skew_checked_ns_ = now_ns_;
   if (const auto wrong = skew_.check(now_ns_)) witness_.violated(now_ns_, *wrong);
@@ -160,45 +175,22 @@ void World::note_fault(FaultKind kind, const std::string& detail) {
   recent_.note(now_ns_, fmt::format("fault: {} {}", info(kind).name, detail));
 }
 
+// Those that have not come yet, or never do, are in their first reset.
+bool World::is_up(std::size_t mcu) const {
+  return bus_.mcu(mcu).running() || bus_.mcu(mcu).next_event_ns() < now_ns_ + 5 * kSecond;
+}
+
 void World::reset_mcu() {
   bushd::sim::Random& random = chance_[static_cast<std::size_t>(FaultKind::kReset)];
   const auto mcu = static_cast<std::size_t>(random.below(bus_.mcu_count()));
   const TimeNs down_ns = random.magnitude(kMs, 2 * kSecond);
+  if (!is_up(mcu)) return;
   bus_.reboot(mcu, down_ns);
   plant_.cut(mcu);
-  witness_.mcu_reset(mcu);
+  witness_.positions().mcu_reset(mcu);
   overheard_->mcu_reset(mcu);
   mcus_up_ns_ = std::max(mcus_up_ns_, now_ns_ + down_ns);
   note_fault(FaultKind::kReset, fmt::format("{} for {} ms", config_.mcus[mcu].id, down_ns / kMs));
-}
-
-void World::press_switch() {
-  bushd::sim::Random& random = chance_[static_cast<std::size_t>(FaultKind::kLimitSwitch)];
-  const auto motor = static_cast<std::size_t>(random.below(config_.motors.size()));
-  const TimeNs length_ns = random.magnitude(5 * kMs, 2 * kSecond);
-  pressed_until_ns_[motor] = now_ns_ + length_ns;
-  set_switches(config_.motors[motor].mcu.value);
-  note_fault(FaultKind::kLimitSwitch,
-             fmt::format("of {} for {} ms", config_.motors[motor].name, length_ns / kMs));
-}
-
-void World::set_switches(std::size_t mcu) {
-  unsigned active = 0;
-  for (std::size_t i = 0; i < config_.motors.size(); ++i) {
-    if (config_.motors[i].mcu.value != mcu || pressed_until_ns_[i] == 0) continue;
-    active |= 1u << config_.motors[i].output.value;
-    witness_.pressed(now_ns_, i);
-  }
-  bus_.mcu(mcu).set_inputs({static_cast<std::uint16_t>(active), 0});
-}
-
-void World::release_switches() {
-  for (std::size_t i = 0; i < pressed_until_ns_.size(); ++i) {
-    if (pressed_until_ns_[i] == 0 || pressed_until_ns_[i] > now_ns_) continue;
-    witness_.pressed(now_ns_, i);
-    pressed_until_ns_[i] = 0;
-    set_switches(config_.motors[i].mcu.value);
-  }
 }
 
 void World::deafen_mcu() {
@@ -219,7 +211,21 @@ void World::strike(FaultKind kind) {
     case FaultKind::kReset:
       return reset_mcu();
     case FaultKind::kLimitSwitch:
-      return press_switch();
+      return note_fault(kind, inputs_->press_limit(now_ns_, random));
+    case FaultKind::kEmergencyInput:
+      return note_fault(kind, inputs_->press_emergency(now_ns_, random));
+    case FaultKind::kTrigger:
+      return note_fault(kind, inputs_->trigger(now_ns_, random));
+    case FaultKind::kSlowRequest:
+      return note_fault(kind, mail_.delay_next(random));
+    case FaultKind::kLateRepeat:
+      return note_fault(kind, mail_.repeat(now_ns_, random));
+    case FaultKind::kStaleRepeat:
+      return note_fault(kind, mail_.repeat_stale(now_ns_, random));
+    case FaultKind::kFlood:
+      return note_fault(kind, mail_.flood(now_ns_, random, 200));
+    case FaultKind::kCrowd:
+      return note_fault(kind, mail_.flood(now_ns_, random, 2'000));
     case FaultKind::kSilence:
       length_ns = random.magnitude(kMs, 10 * kSecond);
       host_.silence(now_ns_ + length_ns);

@@ -13,8 +13,10 @@
 #include "clients.h"
 #include "config/config.h"
 #include "host.h"
+#include "inputs.h"
 #include "installation.h"
 #include "kinds.h"
+#include "mail.h"
 #include "overheard.h"
 #include "recent.h"
 #include "sim/bus.h"
@@ -29,6 +31,9 @@ struct Options {
   double hours = 0.1;
   std::size_t motors = 32;
   std::size_t mcus = 2;
+  std::size_t absent_mcus = 0;  // of these, the last ones
+  std::size_t late_mcus = 0;    // likewise, those before
+  bool strict_known = false;
   Ways ways;
   FaultRates fault_rates = usual_fault_rates();
   CommandRates command_rates = usual_command_rates();
@@ -64,9 +69,7 @@ class World {
   void strike(FaultKind kind);
   void reset_mcu();
   void deafen_mcu();
-  void press_switch();
-  void set_switches(std::size_t mcu);
-  void release_switches();
+  bool is_up(std::size_t mcu) const;
   void note_fault(FaultKind kind, const std::string& detail);
 
   Options options_;
@@ -78,15 +81,16 @@ class World {
   Skew skew_;
   Clients clients_;
   Host host_;
+  Mail mail_;
   std::vector<std::unique_ptr<bushd::sim::PaceRules>> rules_;  // by group
   std::vector<bushd::sim::Random> chance_;                     // by fault kind
   std::array<TimeNs, kFaultKinds> next_fault_ns_{};
   std::unique_ptr<Overheard> overheard_;  // once the MCUs are on the bus
+  std::unique_ptr<Inputs> inputs_;        // likewise
   FaultCounts faults_{};
   TimeNs now_ns_ = 0;
   TimeNs next_command_ns_ = 0;
-  std::vector<TimeNs> pressed_until_ns_;  // by motor, its limit switch; 0: it is not
-  TimeNs mcus_up_ns_ = 0;                 // when the last MCU that was reset boots
+  TimeNs mcus_up_ns_ = 0;  // when the last MCU that was reset boots
   TimeNs deadlines_checked_ns_ = 0;
   TimeNs skew_checked_ns_ = 0;
 };

@@ -1,4 +1,4 @@
-"""The daemon's log of moves (docs/design.md)."""
+"""The daemon's log of moves (docs/move-log.md)."""
 
 import json
 import math

@@ -14,6 +14,8 @@ typedef struct kept_head {
   uint32_t crc;
 } kept_head;
 
+_Static_assert(sizeof(kept_head) == KEPT_HEAD_BYTES, "as laid down");
+
 extern const __flash uint32_t image_seal;  // boot_tests.S
 
 static enum { COMPARE, WRITE, WRITE_HEAD } phase;
@@ -31,7 +33,7 @@ kept_found kept_find(void) {
   bushd_mcu_begin_pass(&pass);
   const kept_head head = read_head();
   if (head.state == 0xFF) return KEPT_NOTHING;
-  if (head.state != HEAD_WHOLE || head.size > E2END + 1u - CONTENT) return KEPT_BROKEN;
+  if (head.state != HEAD_WHOLE || head.size > KEPT_MOST_BYTES) return KEPT_BROKEN;
   if (head.program != image_seal) return KEPT_NOTHING;
   uint32_t sum = BUSHD_CRC32_START;
   for (uint16_t i = 0; i < head.size; ++i) {
@@ -60,9 +62,9 @@ static void compare_whole(const bushd_mcu* mcu) {
   const kept_head head = read_head();
   const bool same = head.state == HEAD_WHOLE && head.program == image_seal &&
                     head.size == pass.size && head.crc == pass.crc;
-  const bool news = head.state != 0xFF || mcu->codes_used != 0;
+  const bool news = head.state != 0xFF || mcu->tables.codes_used != 0;
   const bool quiet = bushd_mcu_kept_is_quiet(mcu, &pass);
-  if (!same && news && quiet && pass.size <= E2END + 1u - CONTENT) {
+  if (!same && news && quiet) {
     phase = WRITE;
     planned = pass.crc;
     eeprom_write(EEPROM_KEPT, HEAD_BEGUN);

@@ -9,6 +9,10 @@
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_KEPT_H
 
 #include "firmware/core/mcu.h"
+#include "firmware/ports/atmega2560/eeprom.h"
+
+#define KEPT_HEAD_BYTES 11u
+#define KEPT_MOST_BYTES (E2END + 1u - EEPROM_KEPT - KEPT_HEAD_BYTES)
 
 typedef enum kept_found {
   KEPT_NOTHING,  // or another program's

@@ -2,7 +2,6 @@
 
 #include <avr/interrupt.h>
 
-#include "firmware/core/mcu.h"
 #include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/line_interrupts.h"
@@ -14,10 +13,9 @@
 #define TURNAROUND_CYCLES (10UL * BIT_PERIODS + 100UL)
 // So many at a time go through the CRC before a frame ends.
 #define CHECK_BYTES 24u
-// Of the receiver's buffer (bushd_receiver_pass_reply).
-#define REPLY_AT (BUSHD_FRAME_MAX_RAW + 1u - BUSHD_MCU_MAX_REPLY)
-_Static_assert(REPLY_AT >= 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC + 2 * CHECK_BYTES,
-               "what others answer needs less");
+#define SKIPPED_BYTES 64u
+_Static_assert(LINE_REPLY_AT >= 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC + 2 * CHECK_BYTES,
+               "what others answer needs less (bushd_receiver_pass_reply)");
 // What timer 3 waits for at least, and at most at a time.
 #define SHORTEST_CYCLES 64UL
 #define TURN_CYCLES 30000UL
@@ -74,7 +72,7 @@ static bool delimiter_time(uint32_t* time) {
 }
 
 uint8_t* line_reply(bushd_receiver* receiver) {
-  return receiver->buffer + REPLY_AT;
+  return receiver->buffer + LINE_REPLY_AT;
 }
 
 static inline bool is_sending(void) {
@@ -90,7 +88,7 @@ static void collect(bushd_receiver* receiver) {
   uint8_t out = LINE_OUT;
   uint8_t left = (uint8_t)(LINE_IN - out);
   if (left > CHECK_BYTES) left = CHECK_BYTES;
-  const uint16_t room = has_reply() ? REPLY_AT : sizeof receiver->buffer;
+  const uint16_t room = has_reply() ? LINE_REPLY_AT : sizeof receiver->buffer;
   if (left != 0 && receiver->size + left <= room) {
     uint8_t* to = receiver->buffer + receiver->size;
     out = line_decode(&to, &receiver->run, out, left);
@@ -105,6 +103,17 @@ static void collect(bushd_receiver* receiver) {
   LINE_OUT = out;
 }
 
+// Those that end no frame: every transmitter sends one first, and noise may be nothing else. The
+// way through the core takes several byte times for each; MCUs would fall behind a line full of
+// them.
+static void skip_delimiters(void) {
+  uint8_t out = LINE_OUT;
+  uint8_t left = (uint8_t)(LINE_IN - out);
+  if (left > SKIPPED_BYTES) left = SKIPPED_BYTES;
+  for (; left > 0 && line_bytes[out] == 0; --left, ++out) ++stamps_out;
+  LINE_OUT = out;
+}
+
 static inline bool has_unchecked(const bushd_receiver* receiver) {
   return receiver->size != BUSHD_FRAME_OVERLONG &&
          (uint16_t)(receiver->size - receiver->checked) > CHECK_BYTES;
@@ -115,10 +124,11 @@ bool line_collect(bushd_receiver* receiver, uint32_t* time) {
     bushd_receiver_check(receiver);
     bushd_receiver_pass_reply(receiver);
   } else {
+    if (receiver->size == 0) skip_delimiters();
     collect(receiver);
   }
-  if (LINE_OUT == LINE_IN || line_bytes[LINE_OUT] != 0) return false;
-  // Without it, it is not taken for a delimiter.
+  if (receiver->size == 0 || LINE_OUT == LINE_IN || line_bytes[LINE_OUT] != 0) return false;
+  // Without it, its frame will not be good.
   if (!delimiter_time(time)) *time = clock_now();
   return true;
 }
@@ -134,12 +144,11 @@ bool line_may_take(const bushd_receiver* receiver) {
   return !is_sending();
 }
 
-uint8_t line_take(void) {
-  const bool has_time = delimiter_time(&last_delimiter);
+void line_take(bushd_receiver* receiver) {
+  // Nobody may go by a frame whose end's time is not known.
+  if (!delimiter_time(&last_delimiter)) receiver->size = BUSHD_FRAME_OVERLONG;
   ++stamps_out;
   LINE_OUT = (uint8_t)(LINE_OUT + 1u);
-  // Without its time a delimiter is no more than a wrong byte.
-  return has_time ? 0 : 1;
 }
 
 void line_transmit(const uint8_t* wire, size_t size, uint32_t delay_ns) {

@@ -6,12 +6,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "engine/frame.h"
+#include "firmware/core/mcu.h"
 
 void line_init(void);
 
 // Where answers are made: at the end of the receiver's buffer, which has no need of it meanwhile.
 // What a master sends before an answer's time must be short, or counts as a bad frame.
+#define LINE_REPLY_AT (BUSHD_FRAME_MAX_RAW + 1u - BUSHD_MCU_MAX_REPLY)
 uint8_t* line_reply(bushd_receiver* receiver);
 
 // Some of the bytes that have come go to the receiver, up to one that ends a frame; that one waits:
@@ -23,8 +24,9 @@ bool line_is_idle(void);
 // take. One that waits is given up if this frame is a master's: who speaks before an answer's time
 // waits for it no more.
 bool line_may_take(const bushd_receiver* receiver);
-// It. Precondition: it waits, and may be taken.
-uint8_t line_take(void);
+// The byte that ends it, which the receiver is to get next. Precondition: it waits, and may be
+// taken.
+void line_take(bushd_receiver* receiver);
 
 // Sends these bytes `delay_ns` after the delimiter taken last, or as soon as the line is ours. The
 // buffer stays valid until they are sent.

@@ -17,6 +17,7 @@
 
 #define QUEUE_TICKS 64u
 #define TABLE_CODES 952u  // four tables of 238 codes
+_Static_assert(BUSHD_MCU_MOST_KEPT(TABLE_CODES) <= KEPT_MOST_BYTES, "the EEPROM holds all of it");
 // Only a new tick keeps it quiet, which takes timer, interrupts and main loop. The longest lasts 20
 // ms.
 #define WATCHDOG WDTO_120MS
@@ -25,6 +26,30 @@ static bushd_mcu mcu;
 static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
 static uint16_t codes[TABLE_CODES];
 static uint8_t failed_tests;
+
+// Symbols of the ELF, for memory_owners and for who watches memory: they cost no byte.
+#define NAME_BYTES(name, at, size)                                                    \
+  __asm__ volatile(".global mcu." name "\n.set mcu." name ", mcu+%0\n.type mcu." name \
+                   ", @object\n.size mcu." name ", %1" ::"i"(at),                     \
+                   "i"(size))
+#define NAME_PART(name, part) NAME_BYTES(name, offsetof(bushd_mcu, part), sizeof mcu.part)
+static inline void name_parts(void) {
+  NAME_PART("receiver", receiver);
+  NAME_PART("receiver.buffer", receiver.buffer);
+  NAME_BYTES("reply", offsetof(bushd_mcu, receiver.buffer) + LINE_REPLY_AT, BUSHD_MCU_MAX_REPLY);
+  NAME_PART("answer", answer);
+  NAME_PART("answer.size", answer.size);
+  NAME_PART("rows", stream.rows);
+  NAME_PART("rows.next", stream.rows.next);
+  NAME_PART("rows.count", stream.rows.ticks.count);
+  NAME_PART("config", config);
+  NAME_PART("config.queue", config.queue);
+  NAME_PART("config.codes", config.codes);
+  NAME_PART("config.reply", config.reply);
+  NAME_PART("planes", plane);
+  NAME_PART("motors", motor);
+  NAME_PART("tables", tables);
+}
 
 static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
   (void)context;
@@ -96,6 +121,7 @@ static bushd_reset_cause reset_cause(void) {
 
 // Not inlined: what it needs would stay on the stack for good.
 __attribute__((noinline)) static void boot(void) {
+  name_parts();
   if (boot_faults() & BOOT_RAM_BAD) failed_tests |= BUSHD_TEST_RAM;
   if (boot_faults() & BOOT_FLASH_BAD) failed_tests |= BUSHD_TEST_FLASH;
   if (!inputs_test()) failed_tests |= BUSHD_TEST_INPUTS;
@@ -158,7 +184,8 @@ static void hear_line(void) {
   if (line_collect(&mcu.receiver, &ended)) {
     // A frame takes a while, and can wait; a tick that has begun meanwhile, or soon will, cannot.
     if (emission_begun() || emission_begins_soon() || !line_may_take(&mcu.receiver)) return;
-    bushd_mcu_receive(&mcu, line_take(), emission_time_in_tick_ns(ended));
+    line_take(&mcu.receiver);
+    bushd_mcu_receive(&mcu, 0, emission_time_in_tick_ns(ended));
   } else if (bushd_mcu_wants_samples(&mcu)) {
     // The same conversion may be seen several times.
     bushd_mcu_sample(&mcu, (uint32_t)emission_time_in_tick_ns(clock_now()), inputs_current());

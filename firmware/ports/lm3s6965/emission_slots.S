@@ -36,3 +36,4 @@ emission_half_slot:
     bx      lr
 2:
     b       emission_take_next
+    .size emission_half_slot, . - emission_half_slot

@@ -101,7 +101,7 @@ void kept_load(bushd_mcu* mcu) {
 static void compare_whole(const bushd_mcu* mcu) {
   const bool same =
       newest.program == image_seal && newest.size == pass.size && newest.crc == pass.crc;
-  const bool news = newest.number != 0 || mcu->codes_used != 0;
+  const bool news = newest.number != 0 || mcu->tables.codes_used != 0;
   const bool quiet = bushd_mcu_kept_is_quiet(mcu, &pass);
   const bool room = pass.size <= MOST_BYTES && next + pages_of(pass.size) <= room_end;
   if (!same && news && quiet && room) phase = WRITES;

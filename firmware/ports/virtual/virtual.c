@@ -129,6 +129,7 @@ static void turn_for_cut_tick(bushd_virtual* v) {
 
 static void begin_tick(bushd_virtual* v, int64_t start_own_ns) {
   v->tick_start_own_ns = start_own_ns;
+  v->tick_start_ns = v->now_ns;
   v->tick_length_ns = (int64_t)v->tick_ns + v->adjust_ns;
   v->adjust_ns = 0;
   // Shorter, two edges would fall together: the core must never ask for it.

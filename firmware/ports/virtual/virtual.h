@@ -71,6 +71,7 @@ typedef struct bushd_virtual {
   bushd_virtual_config config;
   bushd_virtual_shaft shaft[BUSHD_VIRTUAL_OUTPUTS];  // until the start of the present tick
   bool running;                                      // out of reset
+  int64_t tick_start_ns;                             // of the present tick, true time
   bushd_inputs inputs;                               // the input pins
   uint16_t current;                                  // set: what the current sensor reads
   uint8_t failing_tests;                             // set: BUSHD_TEST_*, for the next boots

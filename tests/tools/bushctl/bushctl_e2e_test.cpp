@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "lcm/wire.h"
+#include "source_path.h"
 #include "tools/bushctl/fake_daemon.h"
 #include "tools/bushctl/program.h"
 
@@ -390,11 +391,11 @@ TEST(Examples, MoveAndWaitInCpp) {
 TEST(Examples, MoveAndWaitInPython) {
   if (access(EXAMPLE_PYTHON, X_OK) != 0) {
     GTEST_SKIP() << "no " EXAMPLE_PYTHON
-                    "; the target example_python makes it (needs a package index)";
+                    "; the test e2e.python_environment makes it (needs a package index)";
   }
   FakeDaemon daemon;
   daemon.start(always(Outcome::kReached));
-  const std::string script = BUSHD_SOURCE_DIR "/tools/examples/python/move_and_wait.py";
+  const std::string script = bushd::test::source_path("tools/examples/python/move_and_wait.py");
   Program example({EXAMPLE_PYTHON, script, "theta", "-400", "chi", "5"});
   EXPECT_EQ(example.finish(), 0) << example.err();
   EXPECT_THAT(example.out(), HasSubstr("chi: reached, stands at 7"));
@@ -411,7 +412,7 @@ int main(int argc, char** argv) {
     setenv("BUSHCTL_TEST_IN_NAMESPACE", "yes", 1);
     // A daemon of this machine, if there is one, is not meant.
     setenv("BUSHD_CONTROL", "/nonexistent/control", 1);
-    std::string helper = BUSHD_SOURCE_DIR "/tests/tools/with-loopback-multicast";
+    std::string helper = bushd::test::source_path("tests/tools/with-loopback-multicast");
     again.insert(again.begin(), helper.data());
     execv(helper.c_str(), again.data());
     return 1;

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "source_path.h"
 #include "tables/random_table.h"
 #include "tables/reference_move.h"
 #include "tables/temp_directory.h"
@@ -82,7 +83,7 @@ TEST(BushtabExpand, FineIsStepsTimes256) {
 
 // The n-th fenced block of a language in docs/tables.md.
 std::string documented(const std::string& language, int n) {
-  const std::string text = read_file(BUSHD_SOURCE_DIR "/docs/tables.md");
+  const std::string text = read_file(source_path("docs/tables.md"));
   const std::string fence = "```" + language + "\n";
   std::size_t from = 0;
   for (int i = 0; i <= n; ++i) from = text.find(fence, from) + fence.size();
@@ -170,7 +171,7 @@ TEST(BushtabExpand, FullDiskIsAnError) {
 }
 
 TEST(BushtabCheck, GoodFilesPass) {
-  const Outcome outcome = bushtab("check " BUSHD_SOURCE_DIR "/tables/*.toml");
+  const Outcome outcome = bushtab("check " + source_path("tables/*.toml"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("bushd2-resonance.toml: good\n"));
 }

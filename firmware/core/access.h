@@ -1,0 +1,35 @@
+// What modules of the core read of the whole MCU in one line.
+#ifndef BUSHD_FIRMWARE_CORE_ACCESS_H
+#define BUSHD_FIRMWARE_CORE_ACCESS_H
+
+#include "firmware/core/bits.h"
+#include "firmware/core/mcu.h"
+
+// The first tick that can still be changed: the next one is already prepared.
+static inline uint32_t bushd_mcu_first_open(const bushd_mcu* mcu) {
+  return mcu->tick + 2u;
+}
+
+// All that it has.
+static inline uint16_t bushd_mcu_own_motors(const bushd_mcu* mcu) {
+  return (uint16_t)(motor_bit((uint8_t)(mcu->config.motors - 1u)) * 2u - 1u);
+}
+
+static inline int16_t* bushd_mcu_queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t motor) {
+  const uint16_t row = (uint16_t)tick & (uint16_t)(mcu->config.queue_ticks - 1u);
+  return &mcu->config.queue[(size_t)row * mcu->config.motors + motor];
+}
+
+static inline const bushd_table* bushd_mcu_table_of(const bushd_mcu* mcu,
+                                                    const bushd_mcu_motor* motor) {
+  return &mcu->tables.slot[motor->table].table;
+}
+
+// Whether each step keeps the slot of its own time; if not, the emission makes the masks from the
+// counts.
+static inline bool bushd_mcu_steps_keep_slots(const bushd_mcu* mcu) {
+  return mcu->emission.grid.mode == BUSHD_EMISSION_EVEN ||
+         mcu->emission.grid.mode == BUSHD_EMISSION_PHASES;
+}
+
+#endif

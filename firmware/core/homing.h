@@ -1,0 +1,28 @@
+// HOME: a motor that looks for its switch by itself.
+#ifndef BUSHD_FIRMWARE_CORE_HOMING_H
+#define BUSHD_FIRMWARE_CORE_HOMING_H
+
+#include <stdint.h>
+
+#include "engine/message.h"
+#include "engine/table.h"
+
+typedef struct bushd_mcu bushd_mcu;
+
+typedef struct bushd_mcu_homing {
+  uint8_t stage;  // bushd_homing
+  uint8_t motor;
+  int8_t direction;     // towards the switch
+  uint8_t readings;     // of it in a row, as they are waited for
+  uint32_t most_steps;  // of the fast stage
+  uint32_t slow_steps;  // of each slow one, at most
+  int32_t home_steps;   // the position to be set
+  int32_t seen_steps;   // where the motor stood at the first of the readings
+  bushd_table slow;     // of a single code: its cruise delay
+} bushd_mcu_homing;
+
+bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message);
+void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs);  // before every tick is prepared
+uint16_t bushd_mcu_homing_motor(const bushd_mcu* mcu);           // as a mask
+
+#endif

@@ -1,0 +1,14 @@
+// Limit switches, the emergency input and the supply current, and what they stop.
+#ifndef BUSHD_FIRMWARE_CORE_INPUTS_H
+#define BUSHD_FIRMWARE_CORE_INPUTS_H
+
+#include "engine/message.h"
+
+typedef struct bushd_mcu bushd_mcu;
+
+void bushd_mcu_watch_inputs(bushd_mcu* mcu);  // before every tick is prepared
+bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message);
+void bushd_mcu_report_inputs(const bushd_mcu* mcu, bushd_report* report);
+void bushd_mcu_clear_faults(bushd_mcu* mcu);  // whose cause is gone
+
+#endif

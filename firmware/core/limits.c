@@ -1,0 +1,89 @@
+// A limit switch inhibits motion in its direction
+// - while it is active, if it is at one end
+// - from when a motor has been stopped by it until that motor has moved away and it is inactive: so
+//   one that was overrun, or stands at both ends' switch, still inhibits it
+#include "firmware/core/limits.h"
+
+#include "firmware/core/access.h"
+
+#define DEBOUNCE_BITS (sizeof((bushd_mcu_limits*)0)->bounces / sizeof(uint16_t))
+
+uint16_t bushd_mcu_forbidden(const bushd_mcu* mcu, int8_t direction) {
+  const bushd_set_inputs* settings = &mcu->inputs;
+  return direction > 0 ? mcu->limits.hit_positive | (mcu->limits.active & settings->limit_positive &
+                                                     (uint16_t)~settings->limit_negative)
+                       : mcu->limits.hit_negative | (mcu->limits.active & settings->limit_negative &
+                                                     (uint16_t)~settings->limit_positive);
+}
+
+static int8_t first_direction(const bushd_ticks* ticks, uint8_t column) {
+  const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
+  for (uint8_t row = 0; row < ticks->count; ++row) {
+    const uint16_t at = (uint16_t)((uint16_t)row * ticks->motors + column);
+    const int16_t displacement = fine ? bushd_get_i16(ticks->displacements + 2u * at)
+                                      : bushd_coarse_to_fine(ticks->displacements[at]);
+    if (displacement != 0) return displacement > 0 ? 1 : -1;
+  }
+  return 0;
+}
+
+bool bushd_mcu_starts_into_limit(const bushd_mcu* mcu, const bushd_ticks* ticks) {
+  const uint16_t positive = bushd_mcu_forbidden(mcu, 1);
+  const uint16_t negative = bushd_mcu_forbidden(mcu, -1);
+  if ((ticks->flags & BUSHD_TICKS_START) == 0 || ((positive | negative) & ticks->mask) == 0) {
+    return false;
+  }
+  uint8_t column = 0;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if ((ticks->mask & motor_bit(m)) == 0) continue;
+    const int8_t direction = first_direction(ticks, column++);
+    if (direction == 0 || ((direction > 0 ? positive : negative) & motor_bit(m)) == 0) return false;
+  }
+  return true;
+}
+
+// How long each input has differed from what it counts as is counted for all of them at once: bit k
+// of motor m's counter is bit m of bounces[k].
+uint16_t bushd_mcu_debounce_limits(bushd_mcu* mcu, uint16_t pins) {
+  const uint16_t before = mcu->limits.active;
+  const uint16_t differs = pins ^ mcu->limits.active;
+  const uint16_t fresh = differs & (uint16_t)~mcu->limits.unsettled;
+  uint16_t settled = differs;
+  uint16_t carry = differs;
+  for (uint8_t k = 0; k < DEBOUNCE_BITS; ++k) {
+    const uint16_t counter = mcu->limits.bounces[k] & (uint16_t)~fresh;
+    settled &= (mcu->inputs.debounce_ticks >> k & 1) != 0 ? counter : (uint16_t)~counter;
+    mcu->limits.bounces[k] = counter ^ carry;
+    carry &= counter;
+  }
+  mcu->limits.active ^= settled;
+  mcu->limits.unsettled = differs & (uint16_t)~settled;
+  return mcu->limits.active & (uint16_t)~before;
+}
+
+static uint16_t* hit_towards(bushd_mcu* mcu, int8_t direction) {
+  return direction > 0 ? &mcu->limits.hit_positive : &mcu->limits.hit_negative;
+}
+
+bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active) {
+  const uint16_t bit = motor_bit(m);
+  uint16_t* const ahead = hit_towards(mcu, heading);
+  uint16_t* const behind = hit_towards(mcu, (int8_t)-heading);
+  const bool both_ends = (mcu->inputs.limit_positive & mcu->inputs.limit_negative & bit) != 0;
+  if (both_ends && now_active && (*behind & bit) == 0) *ahead |= bit;
+  if ((bushd_mcu_forbidden(mcu, heading) & bit) != 0) {
+    *ahead |= bit;
+    return true;
+  }
+  if ((mcu->limits.active & bit) == 0) *behind &= (uint16_t)~bit;
+  return false;
+}
+
+void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
+  const uint16_t limits = direction > 0 ? mcu->inputs.limit_positive : mcu->inputs.limit_negative;
+  *hit_towards(mcu, direction) |= limits & motor_bit(m);
+}
+
+void bushd_mcu_has_left_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
+  *hit_towards(mcu, direction) &= (uint16_t)~motor_bit(m);
+}

@@ -1,0 +1,23 @@
+// LOCAL: motors that people move by two buttons at the MCU.
+#ifndef BUSHD_FIRMWARE_CORE_LOCAL_H
+#define BUSHD_FIRMWARE_CORE_LOCAL_H
+
+#include <stdint.h>
+
+#include "engine/message.h"
+
+typedef struct bushd_mcu bushd_mcu;
+
+typedef struct bushd_mcu_local {
+  uint16_t motors;   // a setting
+  uint16_t held;     // of them, those that the button has moved or will move, until it is released
+  int8_t wish;       // +1, -1; 0: none, or both
+  uint8_t readings;  // since it changed
+} bushd_mcu_local;
+
+bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message);
+void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs);  // before every tick
+// What is active now counts only after it was released. No motor may be moved by it.
+void bushd_mcu_forget_presses(bushd_mcu* mcu, uint8_t system_inputs);
+
+#endif

@@ -1,0 +1,33 @@
+// The reference output: a pulse when a motor arrives at a position.
+#ifndef BUSHD_FIRMWARE_CORE_REFERENCE_H
+#define BUSHD_FIRMWARE_CORE_REFERENCE_H
+
+#include <stdint.h>
+
+#include "engine/message.h"
+#include "firmware/core/plane.h"
+
+typedef struct bushd_mcu bushd_mcu;
+
+// A time in whole ticks and slots.
+typedef struct bushd_mcu_slots {
+  uint16_t ticks;
+  uint16_t slots;
+} bushd_mcu_slots;
+
+// The reference output (reference.c).
+typedef struct bushd_mcu_reference {
+  uint8_t motor;
+  uint8_t arrivals;  // BUSHD_ARRIVES_*
+  uint8_t pulse;     // 0: none, or what comes next of it
+  int32_t position_steps;
+  bushd_mcu_slots delay;
+  bushd_mcu_slots width;
+  bushd_mcu_slots next;  // until then, from the beginning of the tick to be prepared
+} bushd_mcu_reference;
+
+bushd_status bushd_mcu_take_reference(bushd_mcu* mcu, const bushd_reference* message);
+// Precondition: a pulse may begin or is under way. `plane` has its steps.
+void bushd_mcu_emit_reference(bushd_mcu* mcu, bushd_plane* plane);
+
+#endif

@@ -1,0 +1,36 @@
+// Frames for this MCU, and their answers.
+#ifndef BUSHD_FIRMWARE_CORE_REQUESTS_H
+#define BUSHD_FIRMWARE_CORE_REQUESTS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "engine/frame.h"
+
+typedef struct bushd_mcu bushd_mcu;
+
+// What was heard of the line.
+typedef struct bushd_mcu_reception {
+  uint16_t silence_ticks;  // after as many without a good frame, table runs are run down
+  uint16_t silent_ticks;   // since the last good frame; saturates
+  bool frames_heard;
+  uint8_t newest_tag;      // of the master's frames, whomever they were for
+  uint32_t newest_uptime;  // when it was heard
+  uint16_t bad_frames;
+  uint16_t rejected_frames;
+  uint8_t last_rejection;
+} bushd_mcu_reception;
+
+// An answer that is to be sent. In the reply buffer the CRC's register stands behind it, until it
+// is through.
+typedef struct bushd_mcu_answer {
+  uint8_t size;     // of the frame before its CRC; 0: none
+  uint8_t checked;  // by the CRC
+  uint32_t delay_ns;
+} bushd_mcu_answer;
+
+void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns);
+// Goes on with an answer; false if there is none.
+bool bushd_mcu_go_on_answering(bushd_mcu* mcu);
+
+#endif

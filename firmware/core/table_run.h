@@ -1,0 +1,26 @@
+// Runs of a motor's own table.
+#ifndef BUSHD_FIRMWARE_CORE_TABLE_RUN_H
+#define BUSHD_FIRMWARE_CORE_TABLE_RUN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "engine/message.h"
+
+typedef struct bushd_mcu bushd_mcu;
+
+bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message);
+// Into the motor's own run, which nothing reads as long as it is in a stream or at rest; nor its
+// end: it holds how many ticks the run takes. `spare_ns`: by how much it may begin late and still
+// be over then; less than a tick. False if its end is farther than tick numbers reach.
+bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns);
+// The motor's run, just started, begins in this tick and takes as many.
+void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks);
+// A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
+// ends: it is `autonomous` until it rests.
+void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction);
+// Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise
+// since stays so.
+void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);
+
+#endif

@@ -1,0 +1,34 @@
+// Table memory.
+#ifndef BUSHD_FIRMWARE_CORE_TABLES_H
+#define BUSHD_FIRMWARE_CORE_TABLES_H
+
+#include <stdint.h>
+
+#include "engine/message.h"
+#include "engine/table.h"
+
+typedef struct bushd_mcu bushd_mcu;
+
+typedef struct bushd_mcu_table {
+  uint32_t revision;
+  union {
+    uint32_t crc;       // of those in bushd_mcu.valid_tables
+    uint16_t received;  // of others: codes of both sides that have come
+  };
+  bushd_table table;  // as announced; no codes: none
+} bushd_mcu_table;
+
+typedef struct bushd_mcu_table_memory {
+  bushd_mcu_table slot[BUSHD_TABLE_SLOTS];
+  uint8_t valid;        // slots whose table has come whole, and is good
+  uint16_t codes_used;  // of the port's table memory
+} bushd_mcu_table_memory;
+
+bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);
+bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message);
+bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message);
+bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message);
+bushd_tables bushd_mcu_tables(const bushd_mcu* mcu);
+void bushd_mcu_forget_tables(bushd_mcu* mcu);
+
+#endif

@@ -1,0 +1,25 @@
+// Runs that an edge at the trigger input starts.
+#ifndef BUSHD_FIRMWARE_CORE_TRIGGER_H
+#define BUSHD_FIRMWARE_CORE_TRIGGER_H
+
+#include <stdint.h>
+
+#include "engine/message.h"
+
+typedef struct bushd_mcu bushd_mcu;
+
+// Runs that wait for the trigger, and what became of the last ones (trigger.c). The runs are in
+// their motors.
+typedef struct bushd_mcu_trigger_input {
+  uint16_t armed;  // motors
+  uint8_t number;
+  uint8_t state;      // bushd_trigger_state
+  uint32_t delay_us;  // the edge's
+  uint32_t start_tick;
+  uint32_t start_ns;
+} bushd_mcu_trigger_input;
+
+bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message);
+void bushd_mcu_disarm(bushd_mcu* mcu, bushd_trigger_state why);
+
+#endif

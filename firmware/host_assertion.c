@@ -1,0 +1,9 @@
+#include "firmware/core/assertion.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+void bushd_assertion_failed(const char* condition, const char* file, int line) {
+  fprintf(stderr, "%s:%d: assertion failed: %s\n", file, line, condition);
+  abort();
+}

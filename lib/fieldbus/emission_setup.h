@@ -1,0 +1,48 @@
+// How an MCU is to emit steps, as the configuration has it, and what an MCU that cannot do so means
+// for the one who wrote it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "engine/emission.h"
+
+namespace bushd::fieldbus {
+
+struct EmissionSetup {
+  bushd_emission settings{};
+  // Before work, how long the supply current needs after a step.
+  bool measures() const {
+    return settings.mode == BUSHD_EMISSION_STAGGERED && settings.settle_us == 0;
+  }
+  // Where they stand; without messages.
+  Error mode_at{};
+  Error step_at{};
+  Error dir_setup_at{};
+  Error pulse_at{};
+};
+
+// By bushd_emission_mode.
+inline constexpr std::array<std::string_view, 5> kEmissionNames = {"even", "burst", "common-dir",
+                                                                   "staggered", "phases"};
+
+// By bushd_phase_sequence.
+inline constexpr std::array<std::string_view, 4> kSequenceNames = {"wave", "full", "half",
+                                                                   "three-phase"};
+
+// Why the MCU cannot do so, as far as it can be told without asking; "": it can. Then `*max_steps`
+// is how many steps of a motor find room in a tick.
+std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& identity,
+                            std::uint32_t tick_ns, unsigned* max_steps);
+
+// What can be done about a refusal that the configuration is not to blame for.
+const char* remedy_of(unsigned refusal);
+
+// What its refusal means.
+std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::uint16_t slots,
+                             std::uint32_t tick_ns);
+
+}  // namespace bushd::fieldbus

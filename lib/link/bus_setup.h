@@ -1,0 +1,45 @@
+// A bus and its MCUs as configured.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/message.h"
+#include "engine/table.h"
+#include "fieldbus/address.h"
+#include "fieldbus/emission_setup.h"
+
+namespace bushd::link {
+
+using fieldbus::McuAddress;
+
+struct TableRef {
+  const bushd_table* table = nullptr;  // outlives the master
+  std::uint32_t revision = 0;
+};
+
+struct McuSetup {
+  McuAddress address;
+  std::vector<TableRef> tables;  // by slot, at most BUSHD_TABLE_SLOTS
+  // Slot of its motor's table, by output; none: no motor there.
+  std::array<std::optional<std::uint8_t>, BUSHD_MOTORS_PER_MCU> table_of_motor{};
+  fieldbus::EmissionSetup emission{};
+  bushd_set_inputs inputs{};
+  bool off_after_watchdog = false;  // then drivers stay off until control() enables them
+  std::uint16_t local_motors = 0;   // that its FORWARD and REVERSE inputs move
+};
+
+struct BusSetup {
+  std::uint32_t baud = 0;
+  std::uint32_t tick_ns = 0;
+  bushd_format format = BUSHD_FORMAT_FINE;
+  // Ticks of motors that run by their table are sent as states of the run where that is shorter;
+  // otherwise each as its displacement.
+  bool table_ticks = true;
+  std::uint16_t master = 0;  // tells this master from another on the same line
+  std::vector<McuSetup> mcus;
+};
+
+}  // namespace bushd::link

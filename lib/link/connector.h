@@ -1,0 +1,105 @@
+// From no answer to a configured MCU in step with its tables in place, and back.
+//
+// An MCU that is looked for is asked once directly and once in reply slots, by turns: two MCUs that
+// have the same address talk over each other, but rarely choose the same slot.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/message.h"
+#include "link/bus_setup.h"
+#include "link/mcu_record.h"
+#include "link/setup_queue.h"
+#include "link/transactions.h"
+
+namespace bushd::link {
+
+class Connector {
+ public:
+  // Who is told that an MCU's phase has changed. Called from within the functions below, after the
+  // record has changed.
+  class Listener {
+   public:
+    virtual ~Listener() = default;
+    // It has answered and fits: it is being set up from now on.
+    virtual void found(std::int64_t now_us, McuIndex mcu) = 0;
+    virtual void came_online(McuIndex mcu) = 0;
+    virtual void went_offline(McuIndex mcu, bool was_online) = 0;
+    // The MCU, online, refused a request.
+    virtual void refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) = 0;
+  };
+
+  // All of them outlive it.
+  Connector(const BusSetup& setup, PerMcu<McuRecord>& mcus, Transactions& transactions,
+            FrameWriter& writer, Listener& listener);
+
+  void port_opened(std::int64_t now_us);
+  // The MCU is offline, and looked for again from `retry_due_us` on.
+  void give_up(McuIndex mcu, const std::string& cause, std::int64_t retry_due_us);
+  void give_up_unanswering(std::int64_t now_us, McuIndex mcu);
+  // Other tables or motors. Returns false if the MCU is offline: they will be found then.
+  bool reconfigure(McuIndex mcu, McuSetup setup);
+  // Why the MCU has no room for these tables, as far as it is known; "": it has.
+  std::string no_room(McuIndex mcu, const McuSetup& setup) const;
+  void emergency_stop();
+
+  // Requests beside the setup.
+  SetupQueue& queue(McuIndex mcu) { return links_[mcu].queue; }
+  const SetupQueue& queue(McuIndex mcu) const { return links_[mcu].queue; }
+  void control(McuIndex mcu, std::uint8_t actions);
+
+  bool send_due_identify(std::int64_t now_us);
+  // Table runs of an earlier master are ramped down before the setup.
+  bool send_ramp_down(std::int64_t now_us);
+  // By turns: one that does not answer its request keeps nobody else waiting.
+  bool send_request(std::int64_t now_us);
+  // When the next MCU is to be looked for. Precondition: it is offline.
+  std::int64_t retry_due_us(McuIndex mcu) const { return links_[mcu].retry_due_us; }
+
+  // Answers.
+  void identity(const bushd_identity& identity) { identities_.push_back(identity); }
+  void identify_ended(std::int64_t now_us, McuIndex mcu);
+  void not_found(std::int64_t now_us, McuIndex mcu);
+  // `may_clear`: no emergency stop is under way.
+  void tables(McuIndex mcu, const bushd_tables& held, bool may_clear);
+  void acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t type, std::uint8_t status);
+  // The record of an MCU that connects has a new report. `in_step`: with bus time.
+  void follow_report(std::int64_t now_us, McuIndex mcu, bool in_step);
+  // The MCU has switched its drivers off, and people are to find out why.
+  void drivers_off(McuIndex mcu) { links_[mcu].powered = false; }
+
+ private:
+  struct Link {
+    SetupQueue queue;
+    bool setup_written = false;  // while connecting: into the queue
+    // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
+    // switched off stay off through restarts and lost links: there may be hands in the mechanism.
+    std::optional<bool> powered;
+    // While connecting: table runs of an earlier master are to be stopped, and were.
+    bool ramp_down_now = false;
+    bool taken_over = false;
+    std::int64_t retry_due_us = 0;
+    unsigned identify_attempts = 0;  // in a row without an MCU that fits
+  };
+
+  void take(std::int64_t now_us, McuIndex mcu, const bushd_identity& identity);
+  void write_setup(McuIndex mcu);
+  bool holds_its_tables(McuIndex mcu, const bushd_tables& held) const;
+  std::uint8_t first_actions(McuIndex mcu, bool may_clear) const;
+  void note_power(McuIndex mcu);
+
+  const BusSetup& setup_;
+  PerMcu<McuRecord>& mcus_;
+  Transactions& transactions_;
+  FrameWriter& writer_;
+  Listener& listener_;
+  PerMcu<Link> links_;
+  std::uint16_t salt_ = 0;
+  std::vector<bushd_identity> identities_;  // that the last IDENTIFY was answered with
+  std::size_t turn_ = 0;                    // whose request is sent next
+};
+
+}  // namespace bushd::link

@@ -1,0 +1,37 @@
+// What is known of an MCU of a bus.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "engine/message.h"
+#include "link/bus_setup.h"
+#include "link/health.h"
+#include "link/mcu_index.h"
+#include "link/tick.h"
+
+namespace bushd::link {
+
+enum class McuPhase { kOffline, kConnecting, kOnline };
+
+struct McuView {
+  McuPhase phase = McuPhase::kOffline;
+  std::string detail = "not heard yet";  // why it is not online
+  bool identified = false;
+  bushd_identity identity{};
+  bool reported = false;  // the fields below are valid
+  bushd_report report{};
+  Tick tick = 0;                                         // report.tick, unwrapped
+  std::array<Tick, BUSHD_MOTORS_PER_MCU> known_until{};  // likewise
+};
+
+// Common to the machines of a master. Each keeps for itself what only it needs to know.
+struct McuRecord {
+  McuSetup setup;
+  McuView view;
+  McuHealth health;
+  bool poll_wanted = false;  // its report is needed sooner than its turn would come
+};
+
+}  // namespace bushd::link

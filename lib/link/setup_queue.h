@@ -1,0 +1,57 @@
+// Requests to one MCU, made in this order, each acknowledged before the next: the setup of an MCU
+// that connects, and what is asked of it later.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "engine/message.h"
+#include "link/bus_setup.h"
+
+namespace bushd::link {
+
+class SetupQueue {
+ public:
+  struct Request {
+    std::uint8_t type;
+    std::vector<std::uint8_t> payload;
+
+    std::size_t reply_payload() const { return type == BUSHD_MSG_TABLES ? BUSHD_TABLES_SIZE : 1; }
+  };
+
+  bool empty() const { return requests_.empty(); }
+  const Request& front() const { return requests_.front(); }
+  void clear() { requests_.clear(); }
+  // The first request has been answered, if it is of this type. Returns false if it is not.
+  bool done(std::uint8_t type);
+
+  void configure(const bushd_configure& message);
+  void emission(const bushd_emission& message);
+  void inputs(const bushd_set_inputs& message);
+  void local(const bushd_local& message);
+  // Which tables it has.
+  void ask_for_tables();
+  void upload_table(std::uint8_t slot, const TableRef& ref);
+  void assign(std::uint8_t motor, std::uint8_t slot);
+
+  void control(std::uint8_t actions);
+  // What was asked before an emergency stop must not clear it.
+  void discard_clearing();
+  void set_position(std::uint8_t motor, std::int32_t position_steps);
+  void home(const bushd_home& message);
+  void position_compare(const bushd_reference& message);
+  // `entries` by rising motor.
+  void arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
+           std::span<const bushd_table_run_entry> entries);
+  void disarm();
+
+ private:
+  template <class Encode>
+  void add(std::uint8_t type, Encode encode);
+
+  std::deque<Request> requests_;
+};
+
+}  // namespace bushd::link

@@ -1,0 +1,202 @@
+#include "link/stream_scheduler.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "link/horizon.h"
+
+namespace bushd::link {
+namespace {
+
+constexpr std::uint16_t bit(unsigned motor) {
+  return static_cast<std::uint16_t>(1u << motor);
+}
+
+}  // namespace
+
+StreamScheduler::StreamScheduler(const Surroundings& around)
+    : setup_(around.setup),
+      records_(around.mcus),
+      clock_(around.clock),
+      source_(around.source),
+      writer_(around.writer),
+      events_(around.events),
+      mcus_(around.setup.mcus.size()) {}
+
+void StreamScheduler::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
+  drop(mcu, motor);
+  Stream& stream = mcus_[mcu].stream[motor];
+  stream = {};
+  stream.active = true;
+  stream.start = stream.next = stream.sent = start;
+}
+
+void StreamScheduler::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start,
+                                      std::int32_t steps) {
+  begin(mcu, motor, start);
+  mcus_[mcu].stream[motor].run_steps = steps;
+}
+
+void StreamScheduler::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start,
+                                       std::int32_t steps) {
+  begin_table_run(mcu, motor, start, steps);
+  Stream& stream = mcus_[mcu].stream[motor];
+  stream.next = stream.sent = source_.end_tick(mcu, motor);
+  stream.finished = true;
+}
+
+void StreamScheduler::drop(McuIndex mcu, std::uint8_t motor) {
+  Mcu& m = mcus_[mcu];
+  Stream& stream = m.stream[motor];
+  stream.active = false;
+  // A run that the MCU has broken off does not occupy the motor until where it was to end.
+  if (stream.run_steps) stream.next = records_[mcu].view.known_until[motor];
+  // Nor is a replacement that has been asked for and not yet sent.
+  m.replacing &= static_cast<std::uint16_t>(~bit(motor));
+}
+
+void StreamScheduler::drop_all(McuIndex mcu) {
+  mcus_[mcu].stream.fill({});
+  mcus_[mcu].replacing = 0;
+  mcus_[mcu].replaced = 0;
+}
+
+void StreamScheduler::came_online(McuIndex mcu) {
+  mcus_[mcu].epoch = mcus_[mcu].newest_epoch = records_[mcu].view.report.epoch;
+}
+
+bool StreamScheduler::has_ticks_to_send(McuIndex mcu) const {
+  const auto& streams = mcus_[mcu].stream;
+  return std::any_of(streams.begin(), streams.end(),
+                     [](const Stream& s) { return s.active && !s.finished; });
+}
+
+std::optional<Tick> StreamScheduler::Mcu::next_tick() const {
+  std::optional<Tick> next;
+  for (unsigned motor = 0; motor < BUSHD_MOTORS_PER_MCU; ++motor) {
+    if (sendable(motor)) next = std::min(next.value_or(INT64_MAX), stream[motor].next);
+  }
+  return next;
+}
+
+void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, Tick now) {
+  Mcu& m = mcus_[mcu];
+  std::uint16_t sent = 0;  // motors of which ticks from `first` on have been sent already
+  Tick earliest = first;
+  for (unsigned i = 0; i < BUSHD_MOTORS_PER_MCU; ++i) {
+    Stream& stream = m.stream[i];
+    if ((motors >> i & 1) == 0 || !stream.active) continue;
+    if (stream.begun() && (stream.sent > first || stream.unsure)) {
+      sent |= bit(i);
+      // Where it has become too late for that, the MCU refuses the other tick until it runs dry.
+      if (!too_late(stream.sent, now)) earliest = std::min(earliest, stream.sent);
+    } else {
+      // A table run of which nothing has been sent is another one now; it goes out as a stream.
+      stream.run_steps.reset();
+    }
+    stream.finished = false;
+  }
+  if (sent == 0) return;
+  // Two wishes before the first was sent: one replacement must serve both, so it takes the earlier
+  // tick. If that is too late by now, it fails as a whole and is planned again.
+  m.replace_at = m.replacing == 0 ? earliest : std::min(m.replace_at, earliest);
+  m.replacing |= sent;
+}
+
+bool StreamScheduler::fail_late_replacements(std::int64_t now_us) {
+  bool failed = false;
+  for (const McuIndex i : mcus_.indices()) {
+    Mcu& mcu = mcus_[i];
+    if (mcu.replacing == 0 || !too_late(mcu.replace_at, clock_.tick_at(now_us))) continue;
+    const std::uint16_t motors = std::exchange(mcu.replacing, std::uint16_t{0});
+    events_.push_back(ReplacementFailed{.mcu = i, .motors = motors});
+    failed = true;
+  }
+  return failed;
+}
+
+void StreamScheduler::follow_report(McuIndex mcu) {
+  follow_replacements(mcu);
+  follow_streams(mcu);
+}
+
+// A replacement was taken if the MCU is in the epoch that it opened.
+void StreamScheduler::follow_replacements(McuIndex index) {
+  Mcu& mcu = mcus_[index];
+  const McuView& view = records_[index].view;
+  const bool taken = view.report.epoch == mcu.epoch;
+  std::uint16_t failed = taken ? std::uint16_t{0} : mcu.replaced;
+  for (unsigned m = 0; taken && m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((mcu.replaced >> m & 1) != 0) mcu.stream[m].unsure = false;
+  }
+  mcu.replaced = 0;
+  mcu.epoch = view.report.epoch;
+  // What was queued before stays in force, whatever has been sent since. If not even the start has
+  // come, it has to be sent again, as one.
+  for (unsigned m = 0; m < view.report.motor_count; ++m) {
+    if ((failed >> m & 1) == 0) continue;
+    Stream& stream = mcu.stream[m];
+    stream.next = stream.sent = std::max(view.known_until[m], stream.start);
+    stream.unsure = stream.begun();
+    stream.beyond_gap.reset();
+    stream.finished = false;
+  }
+  // One not even sent must be known to have failed before its tick is taken for executed.
+  if (mcu.replacing != 0 && too_late(mcu.replace_at, view.tick)) {
+    failed |= std::exchange(mcu.replacing, std::uint16_t{0});
+  }
+  if (failed != 0) events_.push_back(ReplacementFailed{.mcu = index, .motors = failed});
+}
+
+// All frames sent before the poll were handled before its answer was made: what is not known is
+// lost.
+void StreamScheduler::follow_streams(McuIndex index) {
+  const McuView& view = records_[index].view;
+  const bushd_report& report = view.report;
+  for (std::uint8_t m = 0; m < report.motor_count; ++m) {
+    Stream& stream = mcus_[index].stream[m];
+    if (!stream.active) continue;
+    // It has the whole move.
+    if (stream.run_steps && (report.running >> m & 1) != 0) continue;
+    const Tick known = view.known_until[m];
+    const bool moving = (report.moving >> m & 1) != 0;
+    // A frame that it shares with others may have gone on past its end: that is rest, and no MCU
+    // takes it alone.
+    const Tick needed = std::min(stream.sent, source_.end_tick(index, m));
+    // Of a stream that has not begun nothing can be missing; but a busy line may keep it waiting
+    // past its start.
+    if (stream.begun() ? known >= needed : moving || known <= stream.start) continue;
+    if (!moving && known > stream.start) {
+      stream.active = false;
+      events_.push_back(StartMissed{.mcu = index, .motor = m});
+      continue;
+    }
+    go_back(index, m);
+  }
+}
+
+// To the first tick that the MCU does not have.
+void StreamScheduler::go_back(McuIndex index, std::uint8_t motor) {
+  Stream& stream = mcus_[index].stream[motor];
+  const McuView& view = records_[index].view;
+  const bushd_report& report = view.report;
+  stream.next = std::max(view.known_until[motor], stream.start);
+  stream.beyond_gap.reset();
+  stream.finished = false;
+  Tick missing = stream.run_steps ? 0 : stream.sent - stream.next;
+  if ((report.islands >> motor & 1) != 0) {
+    const auto unwrap = [&](std::uint16_t tick) {
+      return view.tick + static_cast<std::int16_t>(tick - static_cast<std::uint16_t>(report.tick));
+    };
+    const OutOfOrderRange range = {.from = unwrap(report.island_from),
+                                   .until = unwrap(report.island_until)};
+    // What an MCU says is believed only as far as it can be true.
+    if (stream.next < range.from && range.from < range.until && range.until <= stream.sent) {
+      stream.beyond_gap = range;
+      missing -= range.until - range.from;
+    }
+  }
+  records_[index].health.missed_ticks += static_cast<std::uint64_t>(std::max<Tick>(missing, 0));
+}
+
+}  // namespace bushd::link

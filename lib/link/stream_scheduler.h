@@ -1,0 +1,141 @@
+// Streams: ticks on their way to the MCUs, and what reports say of those sent.
+//
+// A motor that runs by its table is told its run's state (TABLE_TICKS) where that is shorter than
+// its displacements, and so as many ticks at once as its MCU can hold. What a report shows as
+// missing is sent again, and only that: an MCU keeps what it has beyond a gap.
+//
+// Which frame goes out is decided by records and clock alone, so a dry run gives it copies and a
+// writer of its own.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/message.h"
+#include "link/bus_clock.h"
+#include "link/bus_setup.h"
+#include "link/event.h"
+#include "link/frame_writer.h"
+#include "link/mcu_index.h"
+#include "link/mcu_record.h"
+#include "link/tick_source.h"
+
+namespace bushd::link {
+
+// While there is something to send, it is looked for this often.
+inline constexpr std::int64_t kStreamWakeUs = 5'000;
+
+class StreamScheduler {
+ public:
+  // All of them outlive it.
+  struct Surroundings {
+    const BusSetup& setup;
+    PerMcu<McuRecord>& mcus;
+    const BusClock& clock;
+    TickSource& source;
+    FrameWriter& writer;
+    std::vector<Event>& events;
+  };
+  explicit StreamScheduler(const Surroundings& around);
+
+  // See Master for these. Preconditions: as there.
+  void begin(McuIndex mcu, std::uint8_t motor, Tick start);
+  void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps);
+  void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps);
+  void replace(McuIndex mcu, std::uint16_t motors, Tick first, Tick now);
+  void drop(McuIndex mcu, std::uint8_t motor);
+
+  // Nothing more is sent to this MCU.
+  void drop_all(McuIndex mcu);
+  // The MCU takes streams from now on.
+  void came_online(McuIndex mcu);
+  // The MCU's record has a new report.
+  void follow_report(McuIndex mcu);
+
+  // Until its source has planned anew, a motor whose replacement failed has no ticks that could be
+  // sent: so nothing should be, in the step in which this returns true.
+  bool fail_late_replacements(std::int64_t now_us);
+  bool send_due_replacement(std::int64_t now_us);
+  // One frame for the MCU whose queue is emptiest, if it is not filled `lead_us` ahead.
+  // `only_replaced`: of those whose replacement is not confirmed.
+  bool send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced = false);
+
+  // The first tick of this motor that has not been sent.
+  Tick next_tick(McuIndex mcu, std::uint8_t motor) const { return mcus_[mcu].stream[motor].next; }
+  bool has_ticks_to_send(McuIndex mcu) const;
+  bool has_replacement_to_send(McuIndex mcu) const { return mcus_[mcu].replacing != 0; }
+
+ private:
+  // Ticks that an MCU has beyond a gap.
+  struct OutOfOrderRange {
+    Tick from = 0;
+    Tick until = 0;
+  };
+  struct Stream {
+    bool active = false;
+    bool finished = false;  // all is sent; until dropped it may still be repeated or replaced
+    Tick start = 0;
+    Tick next = 0;                              // first tick not yet sent, or to be sent again
+    Tick sent = 0;                              // first tick never sent
+    std::optional<OutOfOrderRange> beyond_gap;  // while what lies before it is sent again
+    // Since a replacement failed: beyond `sent` the MCU may have ticks of the plan before it,
+    // behind a gap. Reports need not show them, so the next replacement takes them away.
+    bool unsure = false;
+    // Of a table run, until it is replaced.
+    std::optional<std::int32_t> run_steps;
+
+    bool begun() const { return sent != start; }
+  };
+  struct Mcu {
+    std::array<Stream, BUSHD_MOTORS_PER_MCU> stream;
+    std::uint8_t epoch = 0;         // of frames
+    std::uint8_t newest_epoch = 0;  // of all replacements, whether taken or not
+    std::uint16_t replacing = 0;    // motors of a replacement to be sent
+    Tick replace_at = 0;
+    std::uint16_t replaced = 0;  // motors of a replacement sent and not yet confirmed
+
+    // Of a motor whose replacement still waits, the next ticks belong to a plan that the MCU does
+    // not know.
+    bool sendable(unsigned motor) const {
+      return stream[motor].active && !stream[motor].finished && (replacing >> motor & 1) == 0;
+    }
+    // Of all motors that are sendable; none: there is none.
+    std::optional<Tick> next_tick() const;
+  };
+  // What the next frame to an MCU may hold: the motors whose next tick is the oldest.
+  struct Choice {
+    Tick first;
+    std::uint16_t runs = 0;     // table runs to begin
+    std::uint16_t starts = 0;   // streams to begin
+    std::uint16_t goes_on = 0;  // streams to continue
+    Tick join = INT64_MAX;      // where another motor, or ticks beyond a gap, join in
+  };
+
+  // stream_scheduler.cpp
+  void follow_replacements(McuIndex mcu);
+  void follow_streams(McuIndex mcu);
+  void go_back(McuIndex mcu, std::uint8_t motor);
+
+  // stream_frames.cpp
+  static Choice choose(const Mcu& mcu, Tick first);
+  bool send_ticks_of(std::int64_t now_us, McuIndex mcu, Tick now, Tick lead);
+  void send_table_runs(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first);
+  bool send_table_ticks(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first,
+                        Tick max_ticks, unsigned flags);
+  void send_ticks(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first, unsigned count,
+                  unsigned flags);
+  void note_sent(McuIndex mcu, std::uint8_t motor, Tick first, Tick until);
+  Tick ticks_per_frame(std::uint16_t mask) const;
+
+  const BusSetup& setup_;
+  PerMcu<McuRecord>& records_;
+  const BusClock& clock_;
+  TickSource& source_;
+  FrameWriter& writer_;
+  std::vector<Event>& events_;
+  PerMcu<Mcu> mcus_;
+};
+
+}  // namespace bushd::link

@@ -1,0 +1,156 @@
+#include "link/synchroniser.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+
+#include "fieldbus/line_times.h"
+
+namespace bushd::link {
+namespace {
+
+using fieldbus::kSyncPeriodUs;
+
+constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be told the time
+// A SYNC frame lasts longer on most lines, so its repetition is told apart. Crystals that are 100
+// ppm apart need a second without a SYNC for it, those whose rate is known much longer.
+constexpr std::int64_t kAgreementNs = 100'000;
+constexpr std::int64_t kClockJumpUs = 400'000;  // more than any latency: it is another time
+// A master says SYNC at least as often; two of them in a row may be lost.
+constexpr std::int64_t kOtherMasterUs = 3 * kSyncPeriodUs;
+
+}  // namespace
+
+Synchroniser::Synchroniser(const BusSetup& setup, PerMcu<McuRecord>& mcus, FrameWriter& writer)
+    : setup_(setup),
+      mcus_(mcus),
+      writer_(writer),
+      clock_(setup.tick_ns),
+      since_sync_(mcus.size()) {}
+
+void Synchroniser::overheard(std::int64_t now_us, const bushd_frame& frame) {
+  bushd_sync sync;
+  if (frame.type == BUSHD_MSG_SYNC &&
+      bushd_decode_sync(frame.payload, frame.payload_size, &sync) == BUSHD_OK &&
+      sync.master != setup_.master) {
+    other_master_until_us_ = now_us + kOtherMasterUs;
+  }
+}
+
+bool Synchroniser::two_masters(std::int64_t now_us) const {
+  if (now_us < other_master_until_us_) return true;
+  return std::any_of(mcus_.begin(), mcus_.end(), [](const McuRecord& mcu) {
+    return mcu.view.phase != McuPhase::kOffline && mcu.view.reported &&
+           (mcu.view.report.flags & BUSHD_FLAG_TWO_MASTERS) != 0;
+  });
+}
+
+bool Synchroniser::anybody_online() const {
+  return std::any_of(mcus_.begin(), mcus_.end(),
+                     [](const McuRecord& mcu) { return mcu.view.phase == McuPhase::kOnline; });
+}
+
+Synchroniser::Agreement Synchroniser::follow_report(std::int64_t now_us, McuIndex mcu,
+                                                    std::int64_t line_us, bool in_time) {
+  McuView& view = mcus_[mcu].view;
+  const bushd_report& report = view.report;
+  since_sync_[mcu].reported = true;
+  view.tick = clock_.unwrap(report.tick, now_us);
+  constexpr std::uint8_t kKnowsTime = BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK;
+  if (!in_time || (report.flags & kKnowsTime) != kKnowsTime) return Agreement::kUnsynced;
+  if (clock_.valid() &&
+      std::abs(view.tick - clock_.tick_at(now_us)) > clock_.ticks_in(kClockJumpUs)) {
+    if (anybody_online()) return Agreement::kOtherTime;
+    // Nobody has moves in the time before.
+    clock_.reset();
+    view.tick = clock_.unwrap(report.tick, now_us);
+  }
+  clock_.sample(view.tick, report.tick_ns + line_us * 1000, now_us);
+  return Agreement::kInStep;
+}
+
+// When two MCUs heard the same SYNC, a minus b.
+std::int64_t Synchroniser::difference_ns(const bushd_report& a, const bushd_report& b) const {
+  const auto ticks = static_cast<std::int32_t>(a.mark_tick - b.mark_tick);
+  return std::int64_t{ticks} * setup_.tick_ns + a.mark_ns - b.mark_ns;
+}
+
+Synchroniser::Survey Synchroniser::survey() const {
+  Survey survey;
+  for (const McuPhase phase : {McuPhase::kOnline, McuPhase::kConnecting}) {
+    for (const McuIndex i : mcus_.indices()) {
+      if (mcus_[i].view.phase == phase) survey_mcu(i, survey);
+    }
+  }
+  return survey;
+}
+
+void Synchroniser::survey_mcu(McuIndex mcu, Survey& survey) const {
+  const McuView& view = mcus_[mcu].view;
+  survey.listening = true;
+  survey.all_heard &= view.reported;
+  if (!view.reported) return;
+  const bushd_report& report = view.report;
+  const bool synced = (report.flags & BUSHD_FLAG_SYNCED) != 0;
+  const bool marked = (report.flags & BUSHD_FLAG_MARK) != 0;
+  survey.anybody |= synced;
+  survey.waiting |= !synced || !marked;
+  if (!synced) return;
+  survey.all_asked &= since_sync_[mcu].reported;
+  if (!marked || sync_id_ != report.mark || report.mark_ns >= setup_.tick_ns) return;
+  if (survey.reference == nullptr) {
+    survey.reference = &report;
+  } else if (std::abs(difference_ns(report, *survey.reference)) > kAgreementNs) {
+    survey.agreed = false;
+  }
+}
+
+void Synchroniser::note_offsets(const bushd_report* reference) {
+  if (reference == nullptr) return;
+  for (McuRecord& mcu : mcus_) {
+    const bushd_report& report = mcu.view.report;
+    const bool comparable = mcu.view.reported && (report.flags & BUSHD_FLAG_MARK) != 0 &&
+                            report.mark == reference->mark;
+    if (!comparable) continue;
+    mcu.health.clock_offset_us = static_cast<double>(difference_ns(report, *reference)) * 1e-3;
+  }
+}
+
+bool Synchroniser::send_due(std::int64_t now_us) {
+  if (now_us < due_us_) return false;
+  const Survey found = survey();
+  note_offsets(found.reference);
+  const bool doubtful = !found.agreed && !disagreed_;
+  const bool soon = found.waiting || doubtful;
+  due_us_ = now_us + (soon ? kFirstSyncPeriodUs : kSyncPeriodUs);
+  if (!found.listening) return false;
+  // By the clock, so that no two SYNCs of a master have the same id.
+  const auto id = static_cast<std::uint32_t>(now_us / 1000);
+  bushd_sync sync{};
+  sync.master = setup_.master;
+  sync.mark = sync_id_ == id ? id + 1 : id;
+  if (sync_id_) sync.known_mark = *sync_id_;  // the follow-up's
+  if (found.reference != nullptr && found.all_asked && !doubtful) {
+    sync.follows = true;
+    sync.mark_tick = found.reference->mark_tick;
+    sync.mark_ns = found.reference->mark_ns;
+  } else if (found.all_heard && !found.anybody && sync_id_) {
+    // Nobody on the bus knows the time: it begins at the SYNC before.
+    sync.follows = true;
+    clock_.reset();
+  }
+  disagreed_ = doubtful;
+  std::array<std::uint8_t, 24> payload;
+  const std::size_t size = bushd_encode_sync(&sync, payload.data());
+  writer_.send(now_us, kBroadcast, BUSHD_MSG_SYNC, {payload.data(), size});
+  sync_id_ = sync.mark;
+  for (const McuIndex i : mcus_.indices()) {
+    since_sync_[i].reported = false;
+    // MCUs that wait are asked at once, so that the next SYNC can follow this one.
+    const bool connecting = mcus_[i].view.phase == McuPhase::kConnecting;
+    if (found.waiting && connecting) mcus_[i].poll_wanted = true;
+  }
+  return true;
+}
+
+}  // namespace bushd::link

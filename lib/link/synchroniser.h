@@ -1,0 +1,85 @@
+// Time synchronisation: when the next SYNC is due and what it says of the one before, and the
+// master's own idea of bus time (docs/design.md).
+//
+// A SYNC is heard by all at once, but not by an MCU that a disturbance hit, and that one may hear a
+// repetition of the frame instead: it knows another instant by that sync_id. If its time were
+// passed on, the others would be put out of step with the bus. So an answer counts only if all MCUs
+// that are in step agree about the SYNC, and have been asked since. If they disagree about the next
+// one too, it is their clocks and not the SYNC; then the first one's time is that of the bus, of
+// those that have moves if there are any.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+
+#include "engine/message.h"
+#include "link/bus_clock.h"
+#include "link/bus_setup.h"
+#include "link/frame_writer.h"
+#include "link/mcu_record.h"
+
+namespace bushd::link {
+
+class Synchroniser {
+ public:
+  // All of them outlive it.
+  Synchroniser(const BusSetup& setup, PerMcu<McuRecord>& mcus, FrameWriter& writer);
+
+  const BusClock& clock() const { return clock_; }
+
+  void port_opened(std::int64_t now_us) { due_us_ = now_us; }
+  void port_lost() { clock_.reset(); }
+  // An MCU has been found that may have to be told the time.
+  void hurry(std::int64_t now_us) { due_us_ = std::min(due_us_, now_us); }
+
+  // A frame that is not an answer.
+  void overheard(std::int64_t now_us, const bushd_frame& frame);
+  // Another master was heard on this line within the last seconds, by this one or by an MCU.
+  bool two_masters(std::int64_t now_us) const;
+
+  enum class Agreement {
+    kInStep,    // the clock has been set by it
+    kUnsynced,  // the MCU does not know bus time, or its report is too old
+    kOtherTime  // it counts other ticks than the others
+  };
+  // The MCU's record has a new report; its `tick` is set here. `line_us`: from the instant that the
+  // report tells of to its last byte, if only the line takes time.
+  Agreement follow_report(std::int64_t now_us, McuIndex mcu, std::int64_t line_us, bool in_time);
+
+  std::int64_t due_us() const { return due_us_; }
+  bool send_due(std::int64_t now_us);
+
+ private:
+  // What MCUs' reports say of the last SYNC.
+  struct Survey {
+    bool listening = false;  // somebody would hear a SYNC
+    bool all_heard = true;   // of those, each has reported
+    bool waiting = false;    // an MCU does not know the time yet
+    bool anybody = false;    // an MCU knows it
+    bool all_asked = true;   // all who know it have reported since that SYNC
+    bool agreed = true;      // and agree when it was
+    const bushd_report* reference = nullptr;
+  };
+
+  std::int64_t difference_ns(const bushd_report& a, const bushd_report& b) const;
+  Survey survey() const;
+  void survey_mcu(McuIndex mcu, Survey& survey) const;
+  void note_offsets(const bushd_report* reference);
+  bool anybody_online() const;
+
+  const BusSetup& setup_;
+  PerMcu<McuRecord>& mcus_;
+  FrameWriter& writer_;
+  BusClock clock_;
+  std::int64_t due_us_ = 0;
+  std::optional<std::uint32_t> sync_id_;  // of the last SYNC sent
+  bool disagreed_ = false;                // MCUs, about the SYNC before
+  struct Mcu {
+    bool reported = false;  // since the last SYNC
+  };
+  PerMcu<Mcu> since_sync_;
+  std::int64_t other_master_until_us_ = INT64_MIN;
+};
+
+}  // namespace bushd::link

@@ -1,0 +1,9 @@
+#pragma once
+
+#include <cstdint>
+
+namespace bushd::link {
+
+using Tick = std::int64_t;  // absolute, unwrapped from the 32 bits on the line
+
+}  // namespace bushd::link

@@ -1,0 +1,26 @@
+// The LM3S6965's kept.c on the host, the walk through what its flash keeps. The flash lies where
+// the chip has it.
+#ifndef BUSHD_FUZZ_LM3S6965_PORT_H
+#define BUSHD_FUZZ_LM3S6965_PORT_H
+
+#include "firmware/core/mcu.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#include "firmware/ports/lm3s6965/kept.h"
+
+// A reset: all but the flash is as after power-on.
+void host_reset(void);
+void host_blank_flash(void);
+// Of what is kept, as its head says. Precondition: it is whole, and was found.
+uint32_t host_kept_size(void);
+uint32_t host_kept_crc(void);
+// Where kept_poll stands.
+bushd_mcu_pass host_walk(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,224 @@
+// From no answer to online, request by request, without a bus.
+#include "link/connector.h"
+
+#include <gmock/gmock.h>
+
+#include "link/machines.h"
+
+namespace bushd::test {
+namespace {
+
+using link::McuPhase;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class Connecting : public testing::Test,
+                   protected link::Connector::Listener,
+                   protected link::Transactions::Listener {
+ protected:
+  Connecting() {
+    mcus[kFirst].view = {};
+    connector.port_opened(0);
+  }
+  void found(std::int64_t, McuIndex) override { story += "found "; }
+  void came_online(McuIndex) override { story += "online "; }
+  void went_offline(McuIndex, bool was_online) override {
+    story += was_online ? "offline " : "still-offline ";
+  }
+  void refused(McuIndex, std::uint8_t, std::uint8_t) override { story += "refused "; }
+  bool answered(std::int64_t, const link::Transactions::Answer&) override { return true; }
+  bool unanswered(std::int64_t, McuIndex, std::uint8_t) override { return false; }
+  void ended(std::int64_t, McuIndex, std::uint8_t) override {}
+  void overheard(std::int64_t, const bushd_frame&) override {}
+
+  static bushd_identity fitting() { return online_mcus(1)[kFirst].view.identity; }
+  std::string detail() const { return mcus[kFirst].view.detail; }
+  bushd_report& report() { return mcus[kFirst].view.report; }
+
+  // How many slots the IDENTIFY has that is sent now; none: none is sent.
+  std::optional<int> identify(std::int64_t us) {
+    if (!connector.send_due_identify(us)) return std::nullopt;
+    bushd_identify message{};
+    const auto sent = take_sent(writer);
+    bushd_decode_identify(sent[0].payload.data(), sent[0].payload.size(), &message);
+    transactions.abandon();
+    return message.slots;
+  }
+  void find(const bushd_identity& identity = fitting()) {
+    identify(0);
+    connector.identity(identity);
+    connector.identify_ended(0, kFirst);
+  }
+  // Sends what the queue holds and takes it for done; the types, by the order of sending.
+  std::vector<int> setup_requests() {
+    std::vector<int> types;
+    while (connector.send_request(0)) {
+      const Sent sent = take_sent(writer).back();
+      types.push_back(sent.type);
+      last_payload = sent.payload;
+      transactions.abandon();
+      if (sent.type == BUSHD_MSG_TABLES) {
+        connector.tables(kFirst, held, true);
+      } else {
+        connector.acknowledged(0, kFirst, sent.type, BUSHD_OK);
+      }
+    }
+    return types;
+  }
+
+  PerMcu<McuRecord> mcus = online_mcus(1);
+  link::BusSetup setup = bus_setup(mcus);
+  link::FrameWriter writer{kBaud};
+  link::Transactions transactions{writer, *this};
+  link::Connector connector{setup, mcus, transactions, writer, *this};
+  bushd_tables held{};
+  Bytes last_payload;
+  std::string story;
+};
+
+TEST_F(Connecting, AskedDirectlyAndInSlotsByTurns) {
+  EXPECT_EQ(identify(0), 1);
+  connector.not_found(0, kFirst);
+  EXPECT_EQ(identify(499'999), std::nullopt);
+  EXPECT_EQ(identify(500'000), 8);
+  connector.not_found(500'000, kFirst);
+  EXPECT_EQ(identify(1'000'000), 1);
+}
+
+TEST_F(Connecting, FittingMcuIsSetUpAndPolled) {
+  find();
+  EXPECT_EQ(story, "found ");
+  EXPECT_EQ(mcus[kFirst].view.phase, McuPhase::kConnecting);
+  EXPECT_TRUE(mcus[kFirst].poll_wanted);
+  EXPECT_THAT(setup_requests(), ElementsAre()) << "not before its first report";
+}
+
+TEST_F(Connecting, MisfitStaysOfflineAndSaysWhy) {
+  bushd_identity identity = fitting();
+  identity.queue_ticks = 8;
+  find(identity);
+  EXPECT_EQ(story, "");
+  EXPECT_EQ(mcus[kFirst].view.phase, McuPhase::kOffline);
+  EXPECT_THAT(detail(), HasSubstr("queue of 8 ticks"));
+  EXPECT_EQ(connector.retry_due_us(kFirst), 2'000'000);
+}
+
+TEST_F(Connecting, TwoAtOneAddressAreBothNamed) {
+  identify(0);
+  bushd_identity one = fitting();
+  bushd_identity other = fitting();
+  one.unique_id[0] = 0xAB;
+  other.unique_id[0] = 0xCD;
+  connector.identity(one);
+  connector.identity(one);
+  connector.identity(other);
+  connector.identify_ended(0, kFirst);
+  EXPECT_THAT(detail(), testing::AllOf(HasSubstr("ab00"), HasSubstr("cd00")));
+  EXPECT_EQ(identify(2'000'000), 8) << "in slots again";
+}
+
+TEST_F(Connecting, SetupEndsOnlineOnceItIsInStepAndDriversAreOn) {
+  find();
+  connector.follow_report(0, kFirst, false);
+  EXPECT_THAT(setup_requests(),
+              ElementsAre(BUSHD_MSG_CONFIGURE, BUSHD_MSG_EMISSION, BUSHD_MSG_INPUTS,
+                          BUSHD_MSG_TABLES, BUSHD_MSG_CONTROL, BUSHD_MSG_TABLE_BEGIN,
+                          BUSHD_MSG_TABLE_DATA, BUSHD_MSG_TABLE_END, BUSHD_MSG_ASSIGN,
+                          BUSHD_MSG_ASSIGN, BUSHD_MSG_ASSIGN, BUSHD_MSG_ASSIGN, BUSHD_MSG_CONTROL));
+  EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_ENABLE});
+  report().flags = BUSHD_FLAG_CONFIGURED | BUSHD_FLAG_ENABLED;
+  report().state = BUSHD_STATE_READY;
+  connector.follow_report(0, kFirst, false);
+  EXPECT_EQ(story, "found ") << "not in step";
+  connector.follow_report(0, kFirst, true);
+  EXPECT_EQ(story, "found online ");
+  EXPECT_EQ(detail(), "");
+}
+
+TEST_F(Connecting, TablesThatAreThereAreNotSentAgain) {
+  held.slot[0] = {.valid = true, .crc = bushd_table_crc32(&small_table()), .revision = 1};
+  find();
+  connector.follow_report(0, kFirst, false);
+  EXPECT_THAT(setup_requests(), testing::Not(testing::Contains(BUSHD_MSG_TABLE_BEGIN)));
+}
+
+// Who finds drivers off leaves them so: there may be hands in the mechanism.
+TEST_F(Connecting, DriversFoundOffStayOff) {
+  find();
+  report().flags = BUSHD_FLAG_CONFIGURED;
+  connector.follow_report(0, kFirst, false);
+  setup_requests();
+  EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_CLEAR_FAULTS});
+  report().state = BUSHD_STATE_BUSY;
+  connector.follow_report(0, kFirst, true);
+  EXPECT_EQ(story, "found online ");
+}
+
+TEST_F(Connecting, PeoplesFaultsAreNotCleared) {
+  find();
+  report().faults = BUSHD_FAULT_EMERGENCY;
+  connector.follow_report(0, kFirst, false);
+  setup_requests();
+  EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_ENABLE});
+}
+
+TEST_F(Connecting, TableRunOfAnEarlierMasterIsRampedDownBeforeTheSetup) {
+  find();
+  report().moving = report().running = 1;
+  connector.follow_report(0, kFirst, true);
+  EXPECT_FALSE(connector.send_request(0));
+  ASSERT_TRUE(connector.send_ramp_down(0));
+  const Sent sent = take_sent(writer).back();
+  EXPECT_EQ(sent.type, BUSHD_MSG_EMERGENCY);
+  EXPECT_EQ(sent.address, McuAddress{1});
+  EXPECT_FALSE(connector.send_ramp_down(0)) << "once per report";
+  report().moving = report().running = 0;
+  report().faults = BUSHD_FAULT_EMERGENCY;
+  connector.follow_report(0, kFirst, true);
+  setup_requests();
+  EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_ENABLE})
+      << "that emergency stop was nobody's";
+}
+
+TEST_F(Connecting, RefusalEndsTheSetupAndOfAnOnlineMcuIsOnlyTold) {
+  find();
+  connector.follow_report(0, kFirst, false);
+  connector.acknowledged(0, kFirst, BUSHD_MSG_CONFIGURE, BUSHD_E_CAPACITY);
+  EXPECT_EQ(story, "found still-offline ");
+  EXPECT_THAT(detail(), HasSubstr("CONFIGURE: capacity exceeded; use a longer tick"));
+  EXPECT_TRUE(connector.queue(kFirst).empty());
+  story.clear();
+  mcus[kFirst].view.phase = McuPhase::kOnline;
+  connector.queue(kFirst).control(BUSHD_CONTROL_ENABLE);
+  connector.acknowledged(0, kFirst, BUSHD_MSG_CONTROL, BUSHD_E_STATE);
+  EXPECT_EQ(story, "refused ");
+  EXPECT_TRUE(connector.queue(kFirst).empty());
+}
+
+TEST_F(Connecting, UnsentClearingIsDiscardedByAnEmergencyStop) {
+  mcus[kFirst].view.phase = McuPhase::kOnline;
+  connector.control(kFirst, BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_ENABLE);
+  connector.emergency_stop();
+  EXPECT_EQ(connector.queue(kFirst).front().payload, Bytes{BUSHD_CONTROL_ENABLE});
+}
+
+TEST_F(Connecting, GivenUpMcuIsForgottenWithItsRequests) {
+  mcus[kFirst].view.phase = McuPhase::kOnline;
+  connector.control(kFirst, BUSHD_CONTROL_ENABLE);
+  connector.give_up(kFirst, "unplugged", 700);
+  EXPECT_EQ(story, "offline ");
+  EXPECT_EQ(detail(), "unplugged");
+  EXPECT_EQ(connector.retry_due_us(kFirst), 700);
+  EXPECT_TRUE(connector.queue(kFirst).empty());
+}
+
+TEST_F(Connecting, ReconfigurationIsForThoseWhoAreThere) {
+  EXPECT_FALSE(connector.reconfigure(kFirst, mcus[kFirst].setup));
+  mcus[kFirst].view.phase = McuPhase::kOnline;
+  EXPECT_TRUE(connector.reconfigure(kFirst, mcus[kFirst].setup));
+  EXPECT_EQ(mcus[kFirst].view.phase, McuPhase::kConnecting);
+  EXPECT_TRUE(mcus[kFirst].poll_wanted);
+}
+
+}  // namespace
+}  // namespace bushd::test

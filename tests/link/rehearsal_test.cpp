@@ -1,0 +1,65 @@
+// What a dry run counts is what the moves then send.
+#include "link/rehearsal.h"
+
+#include "link/slave.h"
+
+namespace bushd::test {
+namespace {
+
+using link::PlannedMove;
+using link::Tick;
+
+class Rehearsal : public testing::Test {
+ protected:
+  Rehearsal() {
+    bus.connect();
+    bus.run_for(1'000'000);
+    start = bus.master->earliest_start(bus.now_us, McuIndex{0}, 0);
+    bus.source.end = [this](std::uint8_t) { return start + 300; };
+    bus.source.delay = [this](std::uint8_t, Tick tick) {
+      return std::uint16_t(tick < start + 300 ? 50 : 0);
+    };
+    moves = {{McuIndex{0}, 0, start, {}}, {McuIndex{0}, 2, start, {}}, {McuIndex{1}, 1, start, {}}};
+  }
+  FakeBus bus{2, 4};
+  Tick start = 0;
+  std::vector<PlannedMove> moves;
+};
+
+TEST_F(Rehearsal, CountsWhatIsThenSent) {
+  const auto traffic = bus.master->rehearse(bus.now_us, bus.source, moves, 1000);
+  ASSERT_TRUE(traffic);
+  bus.heard.clear();
+  for (const PlannedMove& move : moves) bus.master->begin(move.mcu, move.motor, move.start);
+  bus.run_for(1'500'000);
+  const auto sent = bus.heard_of(BUSHD_MSG_TICKS);
+  EXPECT_EQ(traffic->frames, sent.size());
+  std::size_t bytes = 0;
+  for (const Heard& heard : sent) bytes += heard.payload.size() + BUSHD_FRAME_OVERHEAD;
+  EXPECT_GE(traffic->bytes, bytes);
+  EXPECT_LE(traffic->bytes, bytes + sent.size()) << "a delimiter before each, at most";
+}
+
+TEST_F(Rehearsal, TableRunsAreOneFrameForTheMotorsOfAnMcu) {
+  for (PlannedMove& move : moves) move.run_steps = 500;
+  const auto traffic = bus.master->rehearse(bus.now_us, bus.source, moves, 1000);
+  ASSERT_TRUE(traffic);
+  EXPECT_EQ(traffic->frames, 2u);
+}
+
+TEST_F(Rehearsal, TooManyFramesAreNotCounted) {
+  EXPECT_FALSE(bus.master->rehearse(bus.now_us, bus.source, moves, 10));
+}
+
+TEST_F(Rehearsal, NothingIsSentAndNothingChanges) {
+  const Tick before = bus.master->earliest_start(bus.now_us, McuIndex{0}, 0);
+  bus.heard.clear();
+  bus.master->rehearse(bus.now_us, bus.source, moves, 1000);
+  EXPECT_EQ(bus.master->earliest_start(bus.now_us, McuIndex{0}, 0), before);
+  bus.run_for(500'000);
+  EXPECT_TRUE(bus.heard_of(BUSHD_MSG_TICKS).empty());
+  EXPECT_EQ(bus.master->health(McuIndex{0}).repeats, 0u);
+}
+
+}  // namespace
+}  // namespace bushd::test

@@ -1,0 +1,242 @@
+// Which frames go out for which reports, without a bus.
+#include "link/stream_scheduler.h"
+
+#include "link/machines.h"
+#include "link/slave.h"
+
+namespace bushd::test {
+namespace {
+
+using link::Tick;
+
+constexpr std::int64_t kNowUs = 2'560'000;  // tick 1000
+constexpr std::int64_t kLeadUs = 300'000;
+
+class Scheduling : public testing::Test {
+ protected:
+  Scheduling() {
+    clock.sample(1000, 0, kNowUs);
+    for (std::uint8_t m = 0; m < 4; ++m) known_until(m, 1002);
+    report().motor_count = 4;
+  }
+
+  bushd_report& report() { return mcus[kFirst].view.report; }
+  void known_until(std::uint8_t motor, Tick tick) {
+    mcus[kFirst].view.known_until[motor] = tick;
+    if (tick > 1002) report().moving |= static_cast<std::uint16_t>(1u << motor);
+  }
+  struct Ticks {
+    int mask;
+    Tick first;
+    int count;
+    int flags;
+    int epoch;
+    bool operator==(const Ticks&) const = default;
+  };
+  // One frame, decoded; none if nothing is to be sent.
+  std::optional<Ticks> next(bool only_replaced = false) {
+    if (!streams.send_stream(kNowUs, kLeadUs, only_replaced)) return std::nullopt;
+    return frame();
+  }
+  std::optional<Ticks> frame() {
+    const auto sent = take_sent(writer);
+    EXPECT_EQ(sent.size(), 1u);
+    EXPECT_EQ(sent[0].type, BUSHD_MSG_TICKS);
+    bushd_ticks ticks;
+    EXPECT_EQ(bushd_decode_ticks(sent[0].payload.data(), sent[0].payload.size(), &ticks), BUSHD_OK);
+    return Ticks{ticks.mask, ticks.first_tick, ticks.count, ticks.flags & ~BUSHD_TICKS_FINE,
+                 ticks.epoch};
+  }
+  int fill() {
+    int frames = 0;
+    while (next()) ++frames;
+    return frames;
+  }
+
+  PerMcu<McuRecord> mcus = online_mcus(1);
+  link::BusSetup setup = bus_setup(mcus);
+  link::BusClock clock{kTickNs};
+  FakeSource source;
+  link::FrameWriter writer{kBaud};
+  std::vector<link::Event> events;
+  link::StreamScheduler streams{{.setup = setup,
+                                 .mcus = mcus,
+                                 .clock = clock,
+                                 .source = source,
+                                 .writer = writer,
+                                 .events = events}};
+};
+
+TEST_F(Scheduling, NothingIsSentWithoutAMove) {
+  EXPECT_FALSE(next());
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+}
+
+TEST_F(Scheduling, FirstFrameIsAStartAndTheOthersGoOn) {
+  streams.begin(kFirst, 2, 1040);
+  EXPECT_EQ(next(), (Ticks{4, 1040, 16, BUSHD_TICKS_START, 0}));
+  EXPECT_EQ(next(), (Ticks{4, 1056, 16, 0, 0}));
+  fill();
+  EXPECT_LE(streams.next_tick(kFirst, 2), 1000 + clock.ticks_in(kLeadUs));
+  EXPECT_TRUE(streams.has_ticks_to_send(kFirst));
+}
+
+TEST_F(Scheduling, MotorsOfOneTickShareAFrame) {
+  streams.begin(kFirst, 0, 1040);
+  streams.begin(kFirst, 3, 1040);
+  EXPECT_EQ(next(), (Ticks{0b1001, 1040, 16, BUSHD_TICKS_START, 0}));
+}
+
+TEST_F(Scheduling, LaterMotorJoinsWhereItsStreamBegins) {
+  streams.begin(kFirst, 0, 1040);
+  streams.begin(kFirst, 1, 1050);
+  EXPECT_EQ(next(), (Ticks{1, 1040, 10, BUSHD_TICKS_START, 0})) << "up to the other's start";
+  EXPECT_EQ(next(), (Ticks{2, 1050, 16, BUSHD_TICKS_START, 0})) << "a start has a frame of its own";
+  EXPECT_EQ(next(), (Ticks{1, 1050, 16, 0, 0}));
+  EXPECT_EQ(next(), (Ticks{3, 1066, 16, 0, 0})) << "from here on both";
+}
+
+TEST_F(Scheduling, StreamEndsWithItsMove) {
+  source.end = [](std::uint8_t) { return Tick{1045}; };
+  streams.begin(kFirst, 0, 1040);
+  EXPECT_EQ(next(), (Ticks{1, 1040, 5, BUSHD_TICKS_START, 0}));
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+}
+
+TEST_F(Scheduling, WhatAReportMissesIsSentAgain) {
+  streams.begin(kFirst, 0, 1010);
+  fill();
+  known_until(0, 1026);
+  streams.follow_report(kFirst);
+  EXPECT_EQ(next(), (Ticks{1, 1026, 16, 0, 0}));
+  EXPECT_EQ(mcus[kFirst].health.repeats, 1u);
+}
+
+TEST_F(Scheduling, TicksBeyondAGapAreNotSentAgain) {
+  streams.begin(kFirst, 0, 1010);
+  fill();
+  const Tick sent = streams.next_tick(kFirst, 0);
+  known_until(0, 1026);
+  report().tick = 1000;
+  report().islands = 1;
+  report().island_from = 1042;
+  report().island_until = static_cast<std::uint16_t>(sent);
+  mcus[kFirst].view.tick = 1000;
+  streams.follow_report(kFirst);
+  EXPECT_EQ(next(), (Ticks{1, 1026, 16, 0, 0}));
+  EXPECT_EQ(streams.next_tick(kFirst, 0), sent);
+  EXPECT_EQ(mcus[kFirst].health.missed_ticks, 16u);
+}
+
+TEST_F(Scheduling, StartThatCameTooLateIsToldAndDropped) {
+  streams.begin(kFirst, 0, 1010);
+  fill();
+  report().moving = 0;
+  mcus[kFirst].view.known_until[0] = 1020;  // its start has passed, and it does not move
+  streams.follow_report(kFirst);
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(std::get<link::StartMissed>(events[0]).motor, 0);
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+}
+
+class Replacing : public Scheduling {
+ protected:
+  Replacing() {
+    streams.begin(kFirst, 0, 1010);
+    fill();
+    sent = streams.next_tick(kFirst, 0);
+    known_until(0, sent);
+  }
+  Tick sent = 0;
+};
+
+TEST_F(Replacing, OpensAnEpochAndItsFollowersDoNotWait) {
+  streams.replace(kFirst, 1, 1020, 1000);
+  EXPECT_TRUE(streams.has_replacement_to_send(kFirst));
+  EXPECT_FALSE(next()) << "the plan in the source is one that the MCU does not know";
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  EXPECT_EQ(frame(), (Ticks{1, 1020, 16, BUSHD_TICKS_REPLACE, 1}));
+  EXPECT_TRUE(mcus[kFirst].poll_wanted) << "to see whether it was taken";
+  EXPECT_EQ(next(true), (Ticks{1, 1036, 16, 0, 1}));
+}
+
+TEST_F(Replacing, TakenOnceTheReportShowsItsEpoch) {
+  streams.replace(kFirst, 1, 1020, 1000);
+  streams.send_due_replacement(kNowUs);
+  report().epoch = 1;
+  known_until(0, 1036);
+  streams.follow_report(kFirst);
+  EXPECT_TRUE(events.empty());
+  EXPECT_FALSE(streams.send_stream(kNowUs, kLeadUs, true)) << "nothing is unconfirmed";
+}
+
+TEST_F(Replacing, NotTakenIsToldAndTheNextTryHasAnEpochOfItsOwn) {
+  streams.replace(kFirst, 1, 1020, 1000);
+  streams.send_due_replacement(kNowUs);
+  streams.follow_report(kFirst);  // in epoch 0
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(std::get<link::ReplacementFailed>(events[0]).motors, 1);
+  take_sent(writer);
+  streams.replace(kFirst, 1, 1024, 1000);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  EXPECT_EQ(frame()->epoch, 2);
+}
+
+// Behind a gap that no report shows the MCU may have ticks of the plan before the one that failed.
+TEST_F(Replacing, AfterOneThatFailedTheNextTakesAwayWhatTheMcuMayHave) {
+  streams.replace(kFirst, 1, 1020, 1000);
+  streams.send_due_replacement(kNowUs);
+  take_sent(writer);
+  known_until(0, 1040);
+  streams.follow_report(kFirst);  // in epoch 0
+  streams.replace(kFirst, 1, 1060, 1000);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs)) << "though nothing from 1060 on was sent";
+  EXPECT_EQ(frame()->first, 1040);
+}
+
+TEST_F(Replacing, DroppedMotorIsNotReplaced) {
+  streams.begin(kFirst, 1, 1010);
+  fill();
+  streams.replace(kFirst, 3, 1020, 1000);
+  streams.drop(kFirst, 0);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  EXPECT_EQ(frame()->mask, 2);
+}
+
+TEST_F(Replacing, TooLateToSendFailsUnsent) {
+  streams.replace(kFirst, 1, 1002, 1000);
+  EXPECT_FALSE(streams.fail_late_replacements(kNowUs));
+  EXPECT_TRUE(streams.fail_late_replacements(kNowUs + 2'560)) << "a tick later";
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_FALSE(streams.send_due_replacement(kNowUs));
+}
+
+TEST_F(Replacing, WhatWasNeverSentNeedsNone) {
+  streams.begin(kFirst, 1, 1040);
+  streams.replace(kFirst, 2, 1040, 1000);
+  EXPECT_FALSE(streams.has_replacement_to_send(kFirst));
+}
+
+TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
+  source.end = [](std::uint8_t) { return Tick{5000}; };
+  streams.begin_table_run(kFirst, 0, 1040, -700);
+  ASSERT_TRUE(streams.send_stream(kNowUs, kLeadUs));
+  const auto sent = take_sent(writer);
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_EQ(sent[0].type, BUSHD_MSG_TABLE_RUN);
+  EXPECT_EQ(streams.next_tick(kFirst, 0), 5000);
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+  // Broken off by the MCU: the motor is free from where that ends.
+  known_until(0, 1100);
+  streams.drop(kFirst, 0);
+  EXPECT_EQ(streams.next_tick(kFirst, 0), 1100);
+}
+
+TEST_F(Scheduling, McuThatIsNotOnlineGetsNothing) {
+  streams.begin(kFirst, 0, 1040);
+  mcus[kFirst].view.phase = link::McuPhase::kConnecting;
+  EXPECT_FALSE(next());
+}
+
+}  // namespace
+}  // namespace bushd::test
