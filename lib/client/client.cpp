@@ -245,6 +245,9 @@ Result<Status> Client::status(std::chrono::milliseconds timeout) {
     }
     if (auto waited = wait(std::min(next_send, deadline)); !waited) return fail(waited.error());
   }
+  // What is told here is not told again by next_state() and next_health().
+  state_heard_ = false;
+  health_heard_ = false;
   return collector_.status();
 }
 

@@ -316,7 +316,8 @@ TEST_F(ClientTest, NextStateKeepsWhatHasNotChanged) {
     health(1);
   };
   ASSERT_TRUE(client_->status(std::chrono::minutes(5)));
-  ASSERT_TRUE(client_->next_state(std::chrono::minutes(5)));
+  EXPECT_FALSE(client_->next_state(milliseconds(1)));
+  EXPECT_FALSE(client_->next_health(milliseconds(1)));
   state(9, 1, 2);
   const auto next = client_->next_state(std::chrono::minutes(5));
   ASSERT_TRUE(next);
