@@ -21,7 +21,7 @@ constexpr std::array<std::uint32_t, 30> kBaudRates = {
 Result<void> check_populated(const Loading& loading, std::size_t index) {
   const Config& config = loading.config;
   const bool populated =
-      std::ranges::any_of(config.mcus, [&](const Mcu& mcu) { return mcu.bus == BusIndex{index}; });
+      std::ranges::any_of(config.mcus, [&](const Mcu& mcu) { return mcu.bus == BusId{index}; });
   if (populated) return {};
   const std::string& name = config.buses[index].name;
   return fail(loading.buses[index].error(
@@ -126,10 +126,10 @@ Result<void> check_line(const Loading& loading, std::size_t index) {
   const Bus& bus = config.buses[index];
   std::vector<std::uint8_t> motors;
   for (std::size_t i = 0; i < config.mcus.size(); ++i) {
-    if (config.mcus[i].bus != BusIndex{index}) continue;
+    if (config.mcus[i].bus != BusId{index}) continue;
     motors.push_back(static_cast<std::uint8_t>(
         std::count_if(config.motors.begin(), config.motors.end(),
-                      [&](const Motor& motor) { return motor.mcu == McuIndex{i}; })));
+                      [&](const Motor& motor) { return motor.mcu == McuId{i}; })));
   }
   const double load = fieldbus::line_load(bus.baud, bus.tick_ns(), bus.format, motors);
   if (load <= fieldbus::kMaxLineLoad) return {};

@@ -4,7 +4,6 @@
 // line is asked for more than it can carry.
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -13,38 +12,25 @@
 #include <string_view>
 #include <vector>
 
+#include "base/ids.h"
 #include "base/result.h"
 #include "engine/message.h"
-#include "fieldbus/address.h"
 #include "fieldbus/emission_setup.h"
 #include "tables/table.h"
 
 namespace bushd::config {
 
-using fieldbus::McuAddress;
-
-// Positions in the vectors of Config, and what is on the wire. Each its own type: a mix-up moves
-// the wrong motor.
-struct BusIndex {
-  std::size_t value = 0;
-  auto operator<=>(const BusIndex&) const = default;
-};
-struct McuIndex {
-  std::size_t value = 0;
-  auto operator<=>(const McuIndex&) const = default;
-};
-struct GroupIndex {
-  std::size_t value = 0;
-  auto operator<=>(const GroupIndex&) const = default;
-};
-struct Output {
-  std::uint8_t value = 0;  // 0..15
-  auto operator<=>(const Output&) const = default;
-};
-
 struct Lcm {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string prefix = "BUSHD";
+  bool commands = true;  // false: LCM only publishes
+};
+
+// The control socket.
+struct Control {
+  // Empty: none. Without a value: where the daemon may make one (control/path.h).
+  std::optional<std::string> path = {};
+  std::string group = {};  // that may use it; empty: that of the daemon
 };
 
 struct Bus {
@@ -67,7 +53,7 @@ enum class EnableAfterReset {
 };
 
 struct Mcu {
-  BusIndex bus;
+  BusId bus;
   McuAddress address;
   std::string id;  // "hall:1"
   fieldbus::EmissionSetup emission{};
@@ -96,9 +82,9 @@ struct Home {
 
 struct Motor {
   std::string name;
-  McuIndex mcu;
+  McuId mcu;
   Output output;
-  GroupIndex group;
+  GroupId group;
   // Its input is a switch at these ends of its travel.
   bool limit_positive = false;
   bool limit_negative = false;
@@ -111,15 +97,21 @@ struct Motor {
 struct Config {
   std::string path;
   Lcm lcm;
+  Control control;
   // In the order of the file.
   std::vector<Bus> buses;
   std::vector<Mcu> mcus;
   std::vector<Group> groups;
   std::vector<Motor> motors;
 
-  const Bus& bus_of(const Mcu& mcu) const { return buses[mcu.bus.value]; }
-  const Mcu& mcu_of(const Motor& motor) const { return mcus[motor.mcu.value]; }
-  const Group& group_of(const Motor& motor) const { return groups[motor.group.value]; }
+  const Bus& operator[](BusId id) const { return buses[id.value]; }
+  const Mcu& operator[](McuId id) const { return mcus[id.value]; }
+  const Group& operator[](GroupId id) const { return groups[id.value]; }
+  const Motor& operator[](MotorId id) const { return motors[id.value]; }
+
+  const Bus& bus_of(const Mcu& mcu) const { return (*this)[mcu.bus]; }
+  const Mcu& mcu_of(const Motor& motor) const { return (*this)[motor.mcu]; }
+  const Group& group_of(const Motor& motor) const { return (*this)[motor.group]; }
   const Bus& bus_of(const Motor& motor) const { return bus_of(mcu_of(motor)); }
   const tables::Table& table_of(const Motor& motor) const { return *group_of(motor).table; }
 };

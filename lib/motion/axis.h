@@ -30,6 +30,8 @@ class Axis {
   Axis(const bushd_table& table, std::uint32_t tick_ns, bushd_format format)
       : table_(&table), tick_ns_(tick_ns), format_(format) {}
 
+  std::uint32_t tick_ns() const { return tick_ns_; }
+
   // How long a move of `steps` takes, in ticks, rounded up; for any number of steps.
   double duration_ticks(std::int64_t steps) const;
 

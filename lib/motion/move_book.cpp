@@ -4,30 +4,12 @@
 
 namespace bushd::motion {
 
-const char* outcome_word(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::kReached:
-      return "reached";
-    case Outcome::kStopped:
-      return "stopped";
-    case Outcome::kLimit:
-      return "limit";
-    case Outcome::kStall:
-      return "stall";
-    case Outcome::kLink:
-      return "link";
-    case Outcome::kFault:
-      return "fault";
-  }
-  return "fault";
-}
-
-std::uint64_t MoveBook::open(const std::vector<std::size_t>& motors) {
+std::uint64_t MoveBook::open(const std::vector<MotorId>& motors) {
   const std::uint64_t id = ++last_;
   Open move;
   move.result.move = id;
   move.left = motors.size();
-  for (const std::size_t motor : motors) {
+  for (const MotorId motor : motors) {
     move.result.motors.push_back({.motor = motor, .reason = {}});
     of_motor_[motor] = id;
   }
@@ -57,7 +39,7 @@ std::optional<MoveResult> MoveBook::end(MotorOutcome outcome) {
   return result;
 }
 
-std::optional<std::uint64_t> MoveBook::move_of(std::size_t motor) const {
+std::optional<std::uint64_t> MoveBook::move_of(MotorId motor) const {
   const auto found = of_motor_.find(motor);
   if (found == of_motor_.end()) return std::nullopt;
   return found->second;

@@ -9,13 +9,15 @@
 #include <unordered_map>
 #include <vector>
 
+#include "api/words.h"
+#include "base/ids.h"
+
 namespace bushd::motion {
 
-enum class Outcome { kReached, kStopped, kLimit, kStall, kLink, kFault };
-const char* outcome_word(Outcome outcome);  // "reached", ...
+using api::Outcome;
 
 struct MotorOutcome {
-  std::size_t motor = 0;
+  MotorId motor;
   Outcome outcome = Outcome::kFault;
   std::int64_t position_steps = 0;
   std::string reason;
@@ -31,14 +33,14 @@ struct MoveResult {
 class MoveBook {
  public:
   // Precondition: no motor twice, none in a move that is open.
-  std::uint64_t open(const std::vector<std::size_t>& motors);
+  std::uint64_t open(const std::vector<MotorId>& motors);
 
   // This motor's part has ended; returns the move's result if it was the last part. A motor without
   // an open move is ignored.
   std::optional<MoveResult> end(MotorOutcome outcome);
 
   // The open move of a motor.
-  std::optional<std::uint64_t> move_of(std::size_t motor) const;
+  std::optional<std::uint64_t> move_of(MotorId motor) const;
   bool empty() const { return open_.empty(); }
 
  private:
@@ -47,7 +49,7 @@ class MoveBook {
     std::size_t left = 0;
   };
   std::unordered_map<std::uint64_t, Open> open_;
-  std::unordered_map<std::size_t, std::uint64_t> of_motor_;
+  std::unordered_map<MotorId, std::uint64_t> of_motor_;
   std::uint64_t last_ = 0;
 };
 

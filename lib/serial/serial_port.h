@@ -1,6 +1,6 @@
 // One serial port, opened and set up with libserial, then read and written without blocking on a
 // descriptor of its own: libserial's reads poll with sleeps, its writes spin, and its destructor
-// ends the process after a hang-up (docs/design.md, "Serial ports").
+// ends the process after a hang-up (docs/decisions/0021-serial-ports.md).
 #pragma once
 
 #include <cstdint>

@@ -34,7 +34,7 @@ TEST(Config, GoodFileIsReadInItsOrder) {
   EXPECT_EQ(config->buses[0].format, BUSHD_FORMAT_FINE);
   EXPECT_EQ(config->buses[1].format, BUSHD_FORMAT_COARSE);
   ASSERT_EQ(config->mcus.size(), 2u);
-  EXPECT_EQ(config->mcus[1].bus, BusIndex{1});
+  EXPECT_EQ(config->mcus[1].bus, BusId{1});
   EXPECT_EQ(config->mcus[1].address, McuAddress{255});
   EXPECT_EQ(config->mcus[1].id, "roof:255");
   ASSERT_EQ(config->groups.size(), 2u);

@@ -259,7 +259,7 @@ TEST_P(Faults, NoiseFromTheLineDoesNoHarm) {
   for (int i = 0; i < 400; ++i) {
     std::vector<std::uint8_t> noise(random() % 300);
     for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random());
-    lab.core().receive(lab.now_us(), 0, noise);
+    lab.core().receive(lab.now_us(), BusId{}, noise);
     lab.run_for(0.005);
   }
   EXPECT_EQ(lab.wait(move).result, "reached");

@@ -45,14 +45,14 @@ Lab::~Lab() {
 }
 
 void Lab::start_daemon() {
-  core_ = std::make_unique<daemon::Core>(config_, *this, ++master_);
+  shim_ = std::make_unique<daemon::LcmShim>(config_, *this, ++master_);
   for (std::size_t b = 0; b < buses_.size(); ++b) {
-    if (buses_[b].plugged) core_->port_opened(now_us(), b);
+    if (buses_[b].plugged) core().port_opened(now_us(), BusId{b});
   }
 }
 
 void Lab::restart_daemon() {
-  core_.reset();
+  shim_.reset();
   disk_.clear();
   for (SimulatedBus& bus : buses_) bus.received.clear();
   states_.clear();
@@ -79,13 +79,13 @@ void Lab::read_tables(std::uint64_t ticket, const std::vector<std::string>& want
     }
     std::vector<Result<tables::TablePtr>> read;
     for (const std::string& table : wanted) read.push_back(tables::store::open(table, places));
-    core_->tables_read(now_us(), ticket, read);
+    core().tables().read(now_us(), ticket, read);
   });
 }
 
 void Lab::keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
   kept_ = wanted;
-  disk_.push_back([this, ticket] { core_->tables_kept(ticket, {}); });
+  disk_.push_back([this, ticket] { core().tables().kept(ticket, {}); });
 }
 
 void Lab::pause_daemon(double seconds) {
@@ -95,19 +95,19 @@ void Lab::pause_daemon(double seconds) {
 
 void Lab::unplug(std::size_t bus) {
   buses_[bus].plugged = false;
-  core_->port_lost(now_us(), bus, "unplugged");
+  core().port_lost(now_us(), BusId{bus}, "unplugged");
 }
 
 void Lab::plug(std::size_t bus) {
   buses_[bus].plugged = true;
   buses_[bus].received.clear();
-  core_->port_opened(now_us(), bus);
+  core().port_opened(now_us(), BusId{bus});
 }
 
-void Lab::send(std::size_t bus, std::span<const std::uint8_t> bytes) {
+void Lab::send(BusId bus, std::span<const std::uint8_t> bytes) {
   std::vector<std::uint8_t> copy(bytes.begin(), bytes.end());
-  if (on_send && !on_send(bus, copy)) return;
-  if (buses_[bus].plugged) buses_[bus].bus->master_send(copy, now_ns_);
+  if (on_send && !on_send(bus.value, copy)) return;
+  if (buses_[bus.value].plugged) buses_[bus.value].bus->master_send(copy, now_ns_);
 }
 
 void Lab::log(daemon::LogLevel level, const std::string& text) {
@@ -120,8 +120,8 @@ void Lab::log(daemon::LogLevel level, const std::string& text) {
 // To the next thing that happens: on a bus, or in the daemon.
 void Lab::advance() {
   for (const auto& told : std::exchange(disk_, {})) told();
-  core_->step(now_us());
-  std::int64_t next = std::max(core_->next_wake_us() * 1000, now_ns_ + 1000);
+  core().step(now_us());
+  std::int64_t next = std::max(core().next_wake_us() * 1000, now_ns_ + 1000);
   for (const SimulatedBus& bus : buses_) next = std::min(next, bus.bus->next_event_ns());
   now_ns_ = std::max(next, now_ns_);
   run_buses();
@@ -132,7 +132,7 @@ void Lab::run_buses() {
     buses_[b].bus->advance_to(now_ns_);
     if (buses_[b].received.empty()) continue;
     const std::vector<std::uint8_t> bytes = std::exchange(buses_[b].received, {});
-    core_->receive(now_us(), b, bytes);
+    core().receive(now_us(), BusId{b}, bytes);
   }
 }
 
@@ -163,7 +163,7 @@ std::int64_t Lab::send(command_t command) {
   command.client_id = "test";
   command.number = ++number_;
   command.motor_count = static_cast<std::int32_t>(command.motors.size());
-  core_->command(now_us(), command);
+  shim_->command(now_us(), command);
   return number_;
 }
 

@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core.h"
+#include "daemon/lcm_shim.h"
 #include "sim/bus.h"
 
 namespace bushd::test {
 
-class Lab : public daemon::Outputs {
+class Lab : public daemon::LcmOutputs {
  public:
   // `toml` as in bushd.toml; its ports are only names here. Every MCU of it exists.
   // `glacier` is the text of a table file of that name beside it, if not empty.
@@ -71,7 +71,8 @@ class Lab : public daemon::Outputs {
   std::int64_t use(const std::string& group, const std::string& table);
   std::int64_t reload() { return send(command_t::RELOAD_TABLES, {}); }
 
-  daemon::Core& core() { return *core_; }
+  daemon::Core& core() { return shim_->core(); }
+  void command(const command_t& command) { shim_->command(now_us(), command); }
   sim::Bus& bus(std::size_t index) { return *buses_[index].bus; }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   const std::vector<std::string>& move_lines() const { return move_lines_; }
@@ -84,7 +85,7 @@ class Lab : public daemon::Outputs {
     std::vector<std::uint8_t> received;
     bool plugged = true;
   };
-  void send(std::size_t bus, std::span<const std::uint8_t> bytes) override;
+  void send(BusId bus, std::span<const std::uint8_t> bytes) override;
   void reply(const reply_t& reply) override { replies_.push_back(reply); }
   void state(const state_t& state) override { states_[state.mcu] = state; }
   void health(const health_t& health) override { health_[health.bus] = health; }
@@ -99,7 +100,7 @@ class Lab : public daemon::Outputs {
 
   std::filesystem::path directory_;
   config::Config config_;
-  std::unique_ptr<daemon::Core> core_;
+  std::unique_ptr<daemon::LcmShim> shim_;
   std::vector<SimulatedBus> buses_;
   std::int64_t now_ns_ = 0;
   std::int64_t number_ = 0;

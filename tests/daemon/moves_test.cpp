@@ -121,11 +121,11 @@ TEST(Moves, RepeatedCommandIsAnsweredAgainAndNotRunAgain) {
   command.motor_count = 1;
   command.motors = {"m01"};
   command.steps = {50};
-  lab.core().command(lab.now_us(), command);
-  lab.core().command(lab.now_us(), command);
+  lab.command(command);
+  lab.command(command);
   EXPECT_EQ(lab.replies(77).size(), 2u) << "accepted, twice";
   lab.wait(77);
-  lab.core().command(lab.now_us(), command);
+  lab.command(command);
   EXPECT_EQ(lab.replies(77).size(), 5u) << "and both answers again";
   lab.run_for(2);
   EXPECT_EQ(lab.shaft_steps("m01"), 50);

@@ -191,9 +191,9 @@ class Master {
     return mark_;
   }
 
-  // Sets tick and format and puts all MCUs in step with the first one, as docs/design.md has it:
-  // mark, question to the first, mark with the answer. On a fresh bus the first mark is named tick
-  // 0.
+  // Sets tick and format and puts all MCUs in step with the first one, as
+  // docs/decisions/0002-time-synchronisation.md has it: mark, question to the first, mark with the
+  // answer. On a fresh bus the first mark is named tick 0.
   void bring_up(std::uint32_t tick_ns, bushd_format format) {
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});  // all have booted
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {

@@ -39,6 +39,16 @@ Request Clients::make(Ask ask) {
           .ask = ask};
 }
 
+Request Clients::of_all_online(Ask ask) {
+  Request request = make(ask);
+  const auto offline = [](const auto& state) { return !state || state->mcu_state == "OFFLINE"; };
+  if (std::ranges::none_of(witness_.states(), offline)) return request;
+  for (const auto& state : witness_.states()) {
+    if (!offline(state) && !state->motors.empty()) request.add(state->motors.front().name, 0);
+  }
+  return request;
+}
+
 std::string Clients::any_motor() {
   return config_.motors[static_cast<std::size_t>(random_.below(config_.motors.size()))].name;
 }

@@ -26,8 +26,8 @@ class Clients {
   bushd::sim::TimeNs next_after(bushd::sim::TimeNs now_ns);
   // What only clients can mend: everything stops, drivers on, an emergency is over. Before quiet.
   Request stop_all() { return make(Ask::kStop); }
-  Request enable_all() { return make(Ask::kEnable); }
-  Request clear_all() { return make(Ask::kClearFaults); }
+  Request enable_all() { return of_all_online(Ask::kEnable); }
+  Request clear_all() { return of_all_online(Ask::kClearFaults); }
   // Some MCU stands still after an emergency stop or input, as far as the daemon has said.
   bool emergency() const { return says("emergency"); }
 
@@ -46,6 +46,8 @@ class Clients {
     std::int64_t target_steps;
   };
   Request make(Ask ask);
+  // The daemon refuses them if an MCU of theirs is offline.
+  Request of_all_online(Ask ask);
   Request compose(CommandKind kind);
   CommandKind choose();
   // Drivers that are off, positions in doubt and emergencies are seen to soon.

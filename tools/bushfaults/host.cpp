@@ -33,22 +33,22 @@ Host::~Host() {
 }
 
 void Host::start() {
-  core_ = std::make_unique<bushd::daemon::Core>(
+  daemon_ = std::make_unique<bushd::daemon::LcmShim>(
       config_, *this, static_cast<std::uint16_t>(random_.between(1, 0xFFFF)));
   witness_.daemon_started(now_ns_);
   clients_.begin_anew();
   inbox_.clear();
-  if (plugged_) core_->port_opened(now_us(), 0);
+  if (plugged_) core().port_opened(now_us(), {});
   step();
 }
 
 void Host::plug_in() {
   plugged_ = true;
   latency_ns_ = random_.magnitude(kStrideNs, kMaxLatencyNs);
-  if (core_) core_->port_opened(now_us(), 0);
+  if (daemon_) core().port_opened(now_us(), {});
 }
 
-void Host::send(std::size_t, std::span<const std::uint8_t> bytes) {
+void Host::send(bushd::BusId, std::span<const std::uint8_t> bytes) {
   const auto pieces = garbler_[static_cast<std::size_t>(Direction::kOut)].pass(now_ns_, bytes);
   if (!plugged_ || silent()) return;
   TimeNs at_ns = std::max(free_ns_, now_ns_ + random_.between(20'000, latency_ns_ / 4));
@@ -73,14 +73,14 @@ void Host::take_in() {
 
 void Host::deliver() {
   while (!inbox_.empty() && inbox_.front().due_ns <= now_ns_) {
-    core_->receive(now_us(), 0, inbox_.front().bytes);
+    core().receive(now_us(), {}, inbox_.front().bytes);
     inbox_.pop_front();
   }
 }
 
 void Host::step() {
-  core_->step(now_us());
-  wake_ns_ = std::max(core_->next_wake_us(), now_us() + 1) * 1000;
+  core().step(now_us());
+  wake_ns_ = std::max(core().next_wake_us(), now_us() + 1) * 1000;
 }
 
 void Host::run(TimeNs now_ns) {
@@ -91,7 +91,7 @@ void Host::run(TimeNs now_ns) {
     plug_in();
     wake_ns_ = now_ns_;
   }
-  if (!core_) {
+  if (!daemon_) {
     if (now_ns_ < starts_ns_) return;
     recent_.note(now_ns_, "a new daemon starts");
     start();
@@ -104,7 +104,7 @@ void Host::run(TimeNs now_ns) {
   for (const auto& told : std::exchange(disk_, {})) told();
   for (; !requests_.empty(); requests_.pop_front()) {
     witness_.request(now_ns_, requests_.front());
-    give(*core_, now_us(), requests_.front());
+    give(*daemon_, now_us(), requests_.front());
   }
   step();
 }
@@ -112,14 +112,14 @@ void Host::run(TimeNs now_ns) {
 Host::TimeNs Host::next_ns() const {
   TimeNs next = now_ns_ + kStrideNs;
   if (!plugged_) next = std::min(next, back_ns_);
-  if (!core_) return std::min(next, starts_ns_);
+  if (!daemon_) return std::min(next, starts_ns_);
   if (now_ns_ < paused_until_ns_) return std::min(next, paused_until_ns_);
   if (!inbox_.empty()) next = std::min(next, inbox_.front().due_ns);
   return std::max(std::min(next, wake_ns_), now_ns_ + 1000);
 }
 
 void Host::request(TimeNs, const Request& request) {
-  if (core_) requests_.push_back(request);  // else nobody listens
+  if (daemon_) requests_.push_back(request);  // else nobody listens
 }
 
 void Host::garble(Direction direction, bushd::sim::Garbling what) {
@@ -140,8 +140,8 @@ void Host::unplug(TimeNs now_ns, TimeNs until_ns) {
   free_ns_ = 0;
   bus_.break_off_master();
   // A paused daemon learns of it later; that is the same as a later unplugging to it.
-  if (!core_) return;
-  core_->port_lost(now_us(), 0, "the adapter was unplugged");
+  if (!daemon_) return;
+  core().port_lost(now_us(), {}, "the adapter was unplugged");
   step();
 }
 
@@ -152,8 +152,8 @@ void Host::pause(TimeNs now_ns, TimeNs until_ns) {
 
 void Host::kill(TimeNs now_ns, TimeNs until_ns) {
   now_ns_ = now_ns;
-  starts_ns_ = core_ ? until_ns : std::max(starts_ns_, until_ns);
-  core_.reset();
+  starts_ns_ = daemon_ ? until_ns : std::max(starts_ns_, until_ns);
+  daemon_.reset();
   requests_.clear();
   disk_.clear();
   paused_until_ns_ = 0;
@@ -162,7 +162,7 @@ void Host::kill(TimeNs now_ns, TimeNs until_ns) {
 Host::TimeNs Host::faults_over_ns() const {
   TimeNs over = std::max(silent_until_ns_, paused_until_ns_);
   if (!plugged_) over = std::max(over, back_ns_);
-  if (!core_) over = std::max(over, starts_ns_);
+  if (!daemon_) over = std::max(over, starts_ns_);
   return over;
 }
 
@@ -177,12 +177,12 @@ void Host::read_tables(std::uint64_t ticket, const std::vector<std::string>& wan
         read.push_back(group->table);
       }
     }
-    core_->tables_read(now_us(), ticket, read);
+    core().tables().read(now_us(), ticket, read);
   });
 }
 
 void Host::keep_tables(std::uint64_t ticket, const std::vector<std::string>&) {
-  disk_.push_back([this, ticket] { core_->tables_kept(ticket, {}); });
+  disk_.push_back([this, ticket] { core().tables().kept(ticket, {}); });
 }
 
 void Host::log(bushd::daemon::LogLevel level, const std::string& text) {

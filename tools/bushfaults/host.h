@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "clients.h"
-#include "daemon/core.h"
+#include "daemon/lcm_shim.h"
 #include "recent.h"
 #include "sim/bus.h"
 #include "sim/garbler.h"
@@ -18,7 +18,7 @@
 
 namespace bushfaults {
 
-class Host final : public bushd::daemon::Outputs {
+class Host final : public bushd::daemon::LcmOutputs {
  public:
   using TimeNs = bushd::sim::TimeNs;
   // No adapter answers sooner, so that time can be moved in strides of this length.
@@ -52,7 +52,7 @@ class Host final : public bushd::daemon::Outputs {
     std::vector<std::uint8_t> bytes;
   };
 
-  void send(std::size_t bus, std::span<const std::uint8_t> bytes) override;
+  void send(bushd::BusId bus, std::span<const std::uint8_t> bytes) override;
   void reply(const bushd::reply_t& reply) override { witness_.reply(now_ns_, reply); }
   void state(const bushd::state_t& state) override { witness_.state(now_ns_, state); }
   void health(const bushd::health_t&) override {}
@@ -62,6 +62,7 @@ class Host final : public bushd::daemon::Outputs {
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>&) override;
   std::int64_t wall_clock_us() override { return now_us(); }
 
+  bushd::daemon::Core& core() { return daemon_->core(); }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   bool silent() const { return now_ns_ < silent_until_ns_; }
   void start();
@@ -79,8 +80,8 @@ class Host final : public bushd::daemon::Outputs {
   std::array<bushd::sim::Garbler, 2> garbler_;  // by Direction
   TimeNs now_ns_ = 0;
 
-  std::unique_ptr<bushd::daemon::Core> core_;  // none: killed
-  TimeNs starts_ns_ = 0;                       // when the next daemon starts
+  std::unique_ptr<bushd::daemon::LcmShim> daemon_;  // none: killed
+  TimeNs starts_ns_ = 0;                            // when the next daemon starts
   TimeNs paused_until_ns_ = 0;
   TimeNs wake_ns_ = 0;
   std::deque<Request> requests_;            // not yet read by the daemon

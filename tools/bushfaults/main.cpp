@@ -62,6 +62,12 @@ int run(int argc, char** argv) {
   app.add_option("--hours", options.hours, "Simulated time")->capture_default_str();
   app.add_option("--motors", options.motors, "All of them")->capture_default_str();
   app.add_option("--mcus", options.mcus, "On one bus")->capture_default_str();
+  app.add_option("--absent-mcus", options.absent_mcus, "Of --mcus, that never come")
+      ->capture_default_str();
+  app.add_option("--late-mcus", options.late_mcus, "Of --mcus, that come within 10 minutes")
+      ->capture_default_str();
+  app.add_flag("--strict-known", options.strict_known,
+               "Positions called known must be right while MCUs are not online, too");
   add_way<bool>(app, "--moves", ways.table_runs, {{"stream", false}, {"table", true}});
   add_way<bool>(app, "--frames", ways.table_ticks, {{"ticks", false}, {"auto", true}});
   add_way<bushd_format>(app, "--format", ways.format,
@@ -87,6 +93,10 @@ int run(int argc, char** argv) {
       bushfaults::make_installation(options.motors, options.mcus, options.ways, options.seed);
   if (!config) {
     fmt::print(stderr, "bushfaults: {}\n", config.error().text());
+    return kUsage;
+  }
+  if (options.absent_mcus + options.late_mcus >= options.mcus) {
+    fmt::print(stderr, "bushfaults: of --mcus one must be there from the beginning\n");
     return kUsage;
   }
   bushfaults::furnish(*config, options.fault_rates, options.command_rates, options.seed);

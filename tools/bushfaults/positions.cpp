@@ -121,6 +121,7 @@ void Positions::cut_off(TimeNs now_ns, std::size_t mcu, std::size_t output) {
 
 std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
                                             const bushd::state_t& state) {
+  if (strict_ && !is_online(state)) return check_offline(state);
   if (!is_online(state) || state.boot_number != bus_.mcu(mcu).boot_number()) return std::nullopt;
   const auto tick = static_cast<std::uint32_t>(state.tick);
   const auto& reports = reports_[mcu];
@@ -137,6 +138,23 @@ std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
   }
   boot_seen_[mcu] = state.boot_number;
   return wrong;
+}
+
+std::optional<std::string> Positions::check_offline(const bushd::state_t& state) const {
+  for (const bushd::motor_state_t& claim : state.motors) {
+    if (claim.trust != "known") continue;
+    const auto found = std::ranges::find(config_.motors, claim.name, &bushd::config::Motor::name);
+    if (found == config_.motors.end()) return "a state of an unknown motor " + claim.name;
+    const auto index = static_cast<std::size_t>(found - config_.motors.begin());
+    if (state.boot_number == 0) {
+      return claim.name + " is said to be known, and its MCU has never been heard";
+    }
+    const auto& offset = motors_[index].offset;
+    if (offset && plant_steps(index) - *offset == claim.position_steps) continue;
+    return fmt::format("{} is said to be known to be at {} while {} is {}, and is not", claim.name,
+                       claim.position_steps, state.mcu, state.mcu_state);
+  }
+  return std::nullopt;
 }
 
 std::optional<std::string> Positions::check_age(TimeNs now_ns, std::size_t mcu,

@@ -44,6 +44,8 @@ class Positions {
   Positions(const bushd::config::Config& config, const bushd::sim::Bus& bus,
             const bushd::sim::Plant& plant);
 
+  // What is called known must be where the motor stands now, also while its MCU is not online.
+  void be_strict(bool strict) { strict_ = strict; }
   // The MCU makes a report now.
   void reported(TimeNs now_ns, std::size_t mcu);
   void mcu_reset(std::size_t mcu);
@@ -101,6 +103,7 @@ class Positions {
   };
 
   TimeNs paused_by_ns(TimeNs now_ns) const;
+  std::optional<std::string> check_offline(const bushd::state_t& state) const;
   std::optional<std::string> check_age(TimeNs now_ns, std::size_t mcu, const Report& report);
   std::optional<std::string> check_motor(std::size_t mcu, const bushd::motor_state_t& claim,
                                          const Report& report);
@@ -115,6 +118,7 @@ class Positions {
   TimeNs paused_ns_ = 0;                       // in all, until paused_until_ns_
   TimeNs paused_until_ns_ = 0;
   TimeNs worst_age_ns_ = 0;
+  bool strict_ = false;
 };
 
 }  // namespace bushfaults

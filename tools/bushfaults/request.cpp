@@ -21,7 +21,7 @@ static_assert(static_cast<int>(Ask::kHome) == command_t::HOME);
 static_assert(static_cast<int>(Ask::kArm) == command_t::ARM);
 static_assert(static_cast<int>(Ask::kDisarm) == command_t::DISARM);
 
-void give(bushd::daemon::Core& core, std::int64_t now_us, const Request& request) {
+void give(bushd::daemon::LcmShim& daemon, std::int64_t now_us, const Request& request) {
   command_t command{};
   command.client_id = request.client;
   command.number = request.number;
@@ -33,7 +33,7 @@ void give(bushd::daemon::Core& core, std::int64_t now_us, const Request& request
     command.edge = request.rising ? command_t::RISING : command_t::FALLING;
     command.delay_us = request.delay_us;
   }
-  core.command(now_us, command);
+  daemon.command(now_us, command);
 }
 
 std::string text_of(const Request& request) {

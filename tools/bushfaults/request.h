@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core.h"
+#include "daemon/lcm_shim.h"
 
 namespace bushfaults {
 
@@ -47,7 +47,7 @@ struct Request {
 };
 
 // To the daemon. Replies may come before it returns.
-void give(bushd::daemon::Core& core, std::int64_t now_us, const Request& request);
+void give(bushd::daemon::LcmShim& daemon, std::int64_t now_us, const Request& request);
 std::string text_of(const Request& request);
 
 }  // namespace bushfaults

@@ -37,8 +37,7 @@ std::optional<std::string> Starts::check(
                      text_of(request));
 }
 
-// Half a tick is more than a crystal can be off in the longest delay, and than a slot. A motor that
-// is stopped before its first step makes it in its last tick, where it may be late by up to one.
+// Half a tick is more than a crystal can be off in the longest delay, and than a slot.
 std::optional<std::string> Starts::check_triggered(const Request& request, const std::string& name,
                                                    TimeNs first_step_ns) const {
   const auto motor = std::ranges::find(config_.motors, name, &bushd::config::Motor::name);
@@ -48,8 +47,8 @@ std::optional<std::string> Starts::check_triggered(const Request& request, const
                           TimeNs{table.accel.code[0]} * table.time_unit_ns;
   const auto& edges = edges_[motor->mcu.value];
   const bool found = std::any_of(edges.begin(), edges.end(), [&](const Edge& edge) {
-    const TimeNs late_ns = first_step_ns - edge.time_ns - after_ns;
-    return edge.rising == request.rising && late_ns > -tick_ns / 2 && late_ns < tick_ns;
+    return edge.rising == request.rising &&
+           std::abs(first_step_ns - edge.time_ns - after_ns) < tick_ns / 2;
   });
   if (found) return std::nullopt;
   return fmt::format("{} began, and no edge had come {} us before its first step: {}", name,

@@ -51,6 +51,7 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
     motors_.push_back({motor.name, motor.mcu.value, motor.output.value, {}, {}, {}});
   }
   states_.resize(config.mcus.size());
+  present_.resize(config.mcus.size(), true);
 }
 
 void Witness::violated(TimeNs now_ns, const std::string& what) {
@@ -153,7 +154,7 @@ void Witness::accepted(const Key& key, Asked& asked) {
   for (std::size_t i = 0; i < request.motors.size(); ++i) {
     Motor& motor = *find(request.motors[i]);
     const std::int64_t stands = plant_steps(motor);
-    forget_unbegun(motor);
+    if (request.is_move()) forget_unbegun(motor);
     if (request.ask == Ask::kSetPosition) {
       positions_.may_be_set(index_of(motor), request.steps[i]);
     }
@@ -259,7 +260,10 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const std::size_t index = asked.index_of(motor.name);
   asked.end[index] = end;
   check_end(now_ns, motor, end, asked.target[index]);
-  const bool planned = asked.end[index]->word == "reached" || asked.end[index]->word == "stopped";
+  // One that waited for the trigger and was stopped before its first step makes it in a streamed
+  // tick, up to one late.
+  const bool exact = asked.request.ask != Ask::kArm;
+  const bool planned = end.word == "reached" || (end.word == "stopped" && exact);
   const auto& from = asked.from[index];
   if (planned && from && plant_steps(motor) != *from) {
     asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
@@ -309,15 +313,21 @@ void Witness::check_deadlines(TimeNs now_ns) {
   }
 }
 
+bool Witness::ready(std::size_t mcu) const {
+  return !present_[mcu] || (states_[mcu] && states_[mcu]->mcu_state == "READY");
+}
+
 bool Witness::all_ready() const {
-  return std::all_of(states_.begin(), states_.end(),
-                     [](const auto& state) { return state && state->mcu_state == "READY"; });
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (!ready(i)) return false;
+  }
+  return true;
 }
 
 std::string Witness::not_ready() const {
   std::string text;
   for (std::size_t i = 0; i < states_.size(); ++i) {
-    if (states_[i] && states_[i]->mcu_state == "READY") continue;
+    if (ready(i)) continue;
     text += text.empty() ? "" : ", ";
     text += config_.mcus[i].id + " is ";
     text += states_[i] ? states_[i]->mcu_state + " " + states_[i]->detail : "unknown";

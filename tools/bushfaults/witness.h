@@ -53,6 +53,8 @@ class Witness {
 
   // As the daemon said last, by MCU; empty before it has said anything in this life.
   const std::vector<std::optional<bushd::state_t>>& states() const { return states_; }
+  // Whether it can be READY at all.
+  void expect(std::size_t mcu, bool present) { present_[mcu] = present; }
   bool all_ready() const;
   std::string not_ready() const;  // which MCUs, and why
   bool commands_open() const;
@@ -142,6 +144,8 @@ class Witness {
   std::set<Key> carried_out_;
   std::optional<Key> repeating_;  // the command being given was given before
   std::vector<std::optional<bushd::state_t>> states_;
+  std::vector<bool> present_;  // by MCU
+  bool ready(std::size_t mcu) const;
   std::map<std::string, std::uint64_t> moves_by_result_;
   std::map<std::string, std::uint64_t> homings_by_result_;
   std::uint64_t steps_commanded_ = 0;

@@ -16,8 +16,9 @@ constexpr TimeNs kHour = 3600 * kSecond;
 
 constexpr TimeNs kWellAfterNs = 5 * kSecond;  // the promise: READY by itself
 constexpr TimeNs kSkewPeriodNs = 20 * kMs;
-constexpr TimeNs kMoveNs = 12 * kSecond;     // the clients' longest, with a start and a result
-constexpr std::uint32_t kWorldStream = 1;    // of randomness
+constexpr TimeNs kMoveNs = 12 * kSecond;   // the clients' longest, with a start and a result
+constexpr std::uint32_t kWorldStream = 1;  // of randomness
+constexpr std::uint32_t kLateStream = 403;
 constexpr std::uint32_t kFaultStream = 300;  // and one for each kind of fault
 
 bushd::sim::McuOptions mcu_options(const bushd::config::Mcu& mcu, std::size_t index,
@@ -45,6 +46,7 @@ World::World(const Options& options, bushd::config::Config config)
       mail_(clients_, host_) {
   add_mcus();
   add_motors();
+  witness_.positions().be_strict(options.strict_known);
   overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
   inputs_ = std::make_unique<Inputs>(config_, bus_, plant_, witness_, options.seed);
   for (std::size_t i = 0; i < kFaultKinds; ++i) {
@@ -54,8 +56,15 @@ World::World(const Options& options, bushd::config::Config config)
 
 void World::add_mcus() {
   bushd::sim::Random random(options_.seed, kWorldStream);
+  bushd::sim::Random late(options_.seed, kLateStream);
+  const std::size_t present = config_.mcus.size() - options_.absent_mcus;
   for (std::size_t i = 0; i < config_.mcus.size(); ++i) {
-    bus_.add_mcu(mcu_options(config_.mcus[i], i, options_.crystal_ppm, random));
+    auto options = mcu_options(config_.mcus[i], i, options_.crystal_ppm, random);
+    if (i >= present) options.boot_ns = kNever / 2;
+    if (i < present && i + options_.late_mcus >= present) {
+      options.boot_ns = late.between(kSecond, kHour / 6);
+    }
+    bus_.add_mcu(options);
   }
 }
 
@@ -134,6 +143,7 @@ void World::calm() {
 }
 
 void World::be_well(TimeNs began_ns) {
+  for (std::size_t i = 0; i < config_.mcus.size(); ++i) witness_.expect(i, is_up(i));
   const auto ready = [this] { return witness_.all_ready(); };
   while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
     run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
@@ -165,10 +175,16 @@ void World::note_fault(FaultKind kind, const std::string& detail) {
   recent_.note(now_ns_, fmt::format("fault: {} {}", info(kind).name, detail));
 }
 
+// Those that have not come yet, or never do, are in their first reset.
+bool World::is_up(std::size_t mcu) const {
+  return bus_.mcu(mcu).running() || bus_.mcu(mcu).next_event_ns() < now_ns_ + 5 * kSecond;
+}
+
 void World::reset_mcu() {
   bushd::sim::Random& random = chance_[static_cast<std::size_t>(FaultKind::kReset)];
   const auto mcu = static_cast<std::size_t>(random.below(bus_.mcu_count()));
   const TimeNs down_ns = random.magnitude(kMs, 2 * kSecond);
+  if (!is_up(mcu)) return;
   bus_.reboot(mcu, down_ns);
   plant_.cut(mcu);
   witness_.positions().mcu_reset(mcu);

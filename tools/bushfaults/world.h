@@ -31,6 +31,9 @@ struct Options {
   double hours = 0.1;
   std::size_t motors = 32;
   std::size_t mcus = 2;
+  std::size_t absent_mcus = 0;  // of these, the last ones
+  std::size_t late_mcus = 0;    // likewise, those before
+  bool strict_known = false;
   Ways ways;
   FaultRates fault_rates = usual_fault_rates();
   CommandRates command_rates = usual_command_rates();
@@ -66,6 +69,7 @@ class World {
   void strike(FaultKind kind);
   void reset_mcu();
   void deafen_mcu();
+  bool is_up(std::size_t mcu) const;
   void note_fault(FaultKind kind, const std::string& detail);
 
   Options options_;

@@ -1,0 +1,42 @@
+#include "daemon/confirmation.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace bushd::daemon {
+namespace {
+
+constexpr std::int64_t kPatienceUs = 5'000'000;
+
+}  // namespace
+
+Confirmation::Confirmation(api::Asker asker, std::vector<McuId> mcus, std::int64_t now_us)
+    : asker_(std::move(asker)), awaited_(std::move(mcus)), deadline_us_(now_us + kPatienceUs) {
+  asker_.answer(api::Accepted{});
+}
+
+bool Confirmation::awaits(McuId mcu) const {
+  return std::ranges::find(awaited_, mcu) != awaited_.end();
+}
+
+std::optional<Result<void>> Confirmation::follow(std::int64_t now_us, const Mcu* reported,
+                                                 const Installation& installation,
+                                                 const Check& check) {
+  if (reported != nullptr && !reported->busy() && std::erase(awaited_, reported->id) != 0) {
+    if (const auto good = check(*reported); !good) {
+      return fail("MCU " + reported->name() + " " + good.error().text());
+    }
+  }
+  if (awaited_.empty()) return Result<void>();
+  if (now_us <= deadline_us_) return std::nullopt;
+  return fail("MCU " + installation[awaited_.front()].name() + " did not confirm it in time");
+}
+
+void Confirmation::answer(const Result<void>& ended) const {
+  asker_.answer(
+      ended ? api::Completed{.outcome = api::Outcome::kDone, .reason = "done", .detail = {}}
+            : api::Completed{
+                  .outcome = api::Outcome::kFault, .reason = ended.error().text(), .detail = {}});
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,35 @@
+// An accepted request that is done when MCUs have answered it and reported since.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "api/session.h"
+#include "base/result.h"
+#include "daemon/installation.h"
+
+namespace bushd::daemon {
+
+class Confirmation {
+ public:
+  // The request is accepted, and told so.
+  Confirmation(api::Asker asker, std::vector<McuId> mcus, std::int64_t now_us);
+
+  bool awaits(McuId mcu) const;
+  // `reported`: an MCU that has just done so. `check` is what its report shows against the request
+  // ("did not ..."). Returns whether it has ended, and how.
+  using Check = std::function<Result<void>(const Mcu&)>;
+  std::optional<Result<void>> follow(std::int64_t now_us, const Mcu* reported,
+                                     const Installation& installation, const Check& check);
+  // Tells who asked.
+  void answer(const Result<void>& ended) const;
+
+ private:
+  api::Asker asker_;
+  std::vector<McuId> awaited_;
+  std::int64_t deadline_us_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,178 @@
+#include "daemon/installation.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+#include <utility>
+
+namespace bushd::daemon {
+namespace {
+
+std::string shortened(const std::string& text) {
+  return text.substr(0, 64);
+}
+
+}  // namespace
+
+std::uint16_t AxisSource::render(link::McuIndex mcu, std::uint8_t motor, link::Tick first,
+                                 unsigned count, std::int16_t* out, std::size_t stride) {
+  motion::Axis* axis = axis_of(mcu, Output{motor});
+  if (axis != nullptr) return axis->render(first, count, out, stride);
+  for (unsigned i = 0; i < count; ++i) out[i * stride] = 0;
+  return 0;
+}
+
+std::optional<link::TickSource::RunSegment> AxisSource::run_at(link::McuIndex mcu,
+                                                               std::uint8_t motor, link::Tick first,
+                                                               unsigned max_ticks) {
+  motion::Axis* axis = axis_of(mcu, Output{motor});
+  if (axis == nullptr) return std::nullopt;
+  const auto segment = axis->run_at(first, max_ticks);
+  if (!segment) return std::nullopt;
+  return RunSegment{.run = segment->run, .ticks = segment->ticks};
+}
+
+link::Tick AxisSource::end_tick(link::McuIndex mcu, std::uint8_t motor) {
+  const motion::Axis* axis = axis_of(mcu, Output{motor});
+  return axis == nullptr ? 0 : axis->end_tick();
+}
+
+motion::Axis* Bus::axis_of(link::McuIndex mcu, Output output) {
+  const auto id = installation_[mcus[mcu.value]].motor_at(output);
+  if (!id) return nullptr;
+  motion::Motor& motor = installation_[*id];
+  return motor.has_plan() ? &motor.axis() : nullptr;
+}
+
+Result<void> Mcu::must_be_online() const {
+  if (online()) return {};
+  return fail("MCU " + name() + " is offline: " + view().detail);
+}
+
+Result<void> Mcu::has_room(const link::McuSetup& setup) const {
+  const std::string why = master_.no_room(on_bus_, setup);
+  if (why.empty()) return {};
+  return fail("MCU " + name() + " " + why);
+}
+
+Installation::Installation(const config::Config& config, std::uint16_t master) : config_(config) {
+  for (const config::Group& group : config.groups) tables_.add(group.table);
+  add_buses(master);
+  add_mcus();
+  add_motors();
+}
+
+void Installation::add_buses(std::uint16_t master) {
+  for (const config::Bus& bus : config_.buses) {
+    const BusId id{buses_.size()};
+    link::BusSetup setup{.baud = bus.baud,
+                         .tick_ns = bus.tick_ns(),
+                         .format = bus.format,
+                         .table_ticks = bus.table_ticks,
+                         .master = master,
+                         .mcus = {}};
+    std::vector<McuId> members;
+    for (std::size_t m = 0; m < config_.mcus.size(); ++m) {
+      if (config_.mcus[m].bus != id) continue;
+      members.push_back({m});
+      setup.mcus.push_back(setup_of(config_, {m}, tables_));
+    }
+    buses_.add(std::make_unique<Bus>(bus, std::move(setup), *this));
+    buses_[id]->mcus = std::move(members);
+  }
+}
+
+void Installation::add_mcus() {
+  for (const config::Mcu& mcu : config_.mcus) {
+    const McuId id{mcus_.size()};
+    Bus& bus = *buses_[mcu.bus];
+    const auto place = std::ranges::find(bus.mcus, id) - bus.mcus.begin();
+    mcus_.add(id, mcu, bus.master, link::McuIndex{static_cast<std::size_t>(place)});
+  }
+}
+
+void Installation::add_motors() {
+  for (const config::Motor& config : config_.motors) {
+    const config::Mcu& mcu = config_.mcu_of(config);
+    const config::Bus& bus = config_.bus_of(mcu);
+    const MotorId id =
+        motors_.add(motion::MotorSetup{.name = config.name,
+                                       .mcu = mcu.id,
+                                       .output = config.output,
+                                       .has_home = config.home.has_value(),
+                                       .limit_cuts = config.limit_action == BUSHD_CUT,
+                                       .emergency_stop_cuts = bus.emergency_stop == BUSHD_CUT,
+                                       .emergency_input_cuts =
+                                           mcu.emergency_input == BUSHD_EMERGENCY_INPUT_CUTS},
+                    new_axis({motors_.size()}));
+    motor_by_name_[config.name] = id;
+    mcus_[config.mcu].motor_at_[config.output.value] = id;
+  }
+  for (Mcu& mcu : mcus_) {
+    for (const auto& motor : mcu.motor_at_) {
+      if (motor) mcu.motors_.push_back(*motor);
+    }
+  }
+}
+
+std::vector<McuId> Installation::mcus_of(const std::vector<MotorId>& motors) const {
+  std::set<McuId> mcus;
+  for (const MotorId motor : motors) mcus.insert(config_[motor].mcu);
+  return {mcus.begin(), mcus.end()};
+}
+
+bool Installation::any_moves(const Mcu& mcu) const {
+  return std::ranges::any_of(
+      mcu.motors(), [this](MotorId motor) { return !motors_[motor].is<motion::Resting>(); });
+}
+
+bool Installation::by_table(const Mcu& mcu, std::int64_t steps) const {
+  return bus_of(mcu).config.table_runs && mcu.can_run_tables() &&
+         std::abs(steps) <= motion::Motor::kMaxPosition;
+}
+
+Result<MotorId> Installation::find(const std::string& name) const {
+  const auto found = motor_by_name_.find(name);
+  if (found != motor_by_name_.end()) return found->second;
+  return fail("there is no motor \"" + shortened(name) + "\"; 'bushctl status' lists them");
+}
+
+Result<std::vector<MotorId>> Installation::find(const api::MotorNames& names) const {
+  std::vector<MotorId> motors;
+  std::set<MotorId> seen;
+  for (const std::string& name : names) {
+    const auto motor = find(name);
+    if (!motor) return fail(motor.error());
+    if (!seen.insert(*motor).second) return fail("motor " + name + " is named twice");
+    motors.push_back(*motor);
+  }
+  if (motors.empty()) return fail("no motor is named");
+  return motors;
+}
+
+Result<std::vector<MotorId>> Installation::find(const std::vector<api::MotorSteps>& motors) const {
+  api::MotorNames names;
+  for (const api::MotorSteps& motor : motors) names.push_back(motor.motor);
+  return find(names);
+}
+
+Result<std::vector<MotorId>> Installation::find_or_all(const api::MotorNames& names) const {
+  if (!names.empty()) return find(names);
+  std::vector<MotorId> all;
+  for (const MotorId motor : motors()) all.push_back(motor);
+  return all;
+}
+
+motion::Axis Installation::new_axis(MotorId id) const {
+  const config::Bus& bus = config_.bus_of(config_[id]);
+  return {table_of(id)->view(), bus.tick_ns(), bus.format};
+}
+
+void Installation::put_in_service(GroupId group, tables::TablePtr table) {
+  tables_[group] = std::move(table);
+  for (const MotorId id : motors_.ids()) {
+    if (config_[id].group == group) motors_[id].set_axis(new_axis(id));
+  }
+}
+
+}  // namespace bushd::daemon

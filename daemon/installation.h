@@ -1,0 +1,184 @@
+// What the services see of the world: buses, MCUs and motors, each found by its own kind of id.
+// Which place an MCU has in its bus's master is known here only.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "api/request.h"
+#include "base/by_id.h"
+#include "base/ids.h"
+#include "base/result.h"
+#include "config/config.h"
+#include "daemon/mcu_setup.h"
+#include "link/master.h"
+#include "motion/motor.h"
+
+namespace bushd::daemon {
+
+class Installation;
+
+// Answers the master's question what motors shall do.
+class AxisSource : public link::TickSource {
+ public:
+  // Null where no motor is or where it has no plan.
+  virtual motion::Axis* axis_of(link::McuIndex mcu, Output output) = 0;
+
+  std::uint16_t render(link::McuIndex mcu, std::uint8_t motor, link::Tick first, unsigned count,
+                       std::int16_t* out, std::size_t stride) final;
+  std::optional<RunSegment> run_at(link::McuIndex mcu, std::uint8_t motor, link::Tick first,
+                                   unsigned max_ticks) final;
+  link::Tick end_tick(link::McuIndex mcu, std::uint8_t motor) final;
+};
+
+class Bus final : public AxisSource {
+ public:
+  Bus(const config::Bus& as_configured, link::BusSetup setup, Installation& of)
+      : config(as_configured), master(std::move(setup), *this), installation_(of) {}
+
+  motion::Axis* axis_of(link::McuIndex mcu, Output output) override;
+
+  const config::Bus& config;
+  link::Master master;
+  std::vector<McuId> mcus;  // by link::McuIndex
+  std::string port_state = "not yet opened";
+  bool two_masters = false;  // as told in the log last
+
+ private:
+  Installation& installation_;
+};
+
+// One MCU, and what can be asked of it; link::Master says what each function does.
+class Mcu {
+ public:
+  Mcu(McuId its_id, const config::Mcu& as_configured, link::Master& master, link::McuIndex on_bus)
+      : id(its_id), config(as_configured), master_(master), on_bus_(on_bus) {}
+
+  const McuId id;
+  const config::Mcu& config;
+  const std::string& name() const { return config.id; }
+  const std::vector<MotorId>& motors() const { return motors_; }  // in the order of outputs
+  std::optional<MotorId> motor_at(Output output) const { return motor_at_[output.value]; }
+  link::McuIndex on_bus() const { return on_bus_; }
+
+  const link::McuView& view() const { return master_.view(on_bus_); }
+  const bushd_report& report() const { return view().report; }
+  bool online() const { return view().phase == link::McuPhase::kOnline; }
+  bool offline() const { return view().phase == link::McuPhase::kOffline; }
+  Result<void> must_be_online() const;
+  // It has not yet answered all that it was asked, or not yet reported since.
+  bool busy() const { return master_.busy(on_bus_); }
+  const link::McuHealth& health() const { return master_.health(on_bus_); }
+  bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
+  bool can_trigger() const { return master_.can_trigger(on_bus_); }
+  bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }
+  bool can_home() const { return (view().identity.capabilities & BUSHD_CAN_HOME) != 0; }
+
+  link::Tick earliest_start(std::int64_t now_us, Output output) const {
+    return master_.earliest_start(now_us, on_bus_, output.value);
+  }
+  link::Tick earliest_replace(std::int64_t now_us) const {
+    return master_.earliest_replace(now_us);
+  }
+  link::Tick earliest_retarget(std::int64_t now_us, link::Tick start) const {
+    return master_.earliest_retarget(now_us, start);
+  }
+  void begin(Output output, link::Tick start) { master_.begin(on_bus_, output.value, start); }
+  void begin_table_run(Output output, link::Tick start, std::int32_t steps) {
+    master_.begin_table_run(on_bus_, output.value, start, steps);
+  }
+  void follow_table_run(Output output, link::Tick start, std::int32_t steps) {
+    master_.follow_table_run(on_bus_, output.value, start, steps);
+  }
+  void replace(std::uint16_t outputs, link::Tick first) {
+    master_.replace(on_bus_, outputs, first);
+  }
+  void drop(Output output) { master_.drop(on_bus_, output.value); }
+  std::uint8_t arm(bushd_edge edge, std::uint32_t delay_us,
+                   std::span<const link::Master::Armed> moves) {
+    return master_.arm(on_bus_, edge, delay_us, moves);
+  }
+  void disarm() { master_.disarm(on_bus_); }
+  void compare_positions(const bushd_reference& message) {
+    master_.position_compare(on_bus_, message);
+  }
+  void home(const bushd_home& message) { master_.home(on_bus_, message); }
+  void control(std::uint8_t actions) { master_.control(on_bus_, actions); }
+  void set_position(Output output, std::int32_t position_steps) {
+    master_.set_position(on_bus_, output.value, position_steps);
+  }
+  void reconfigure(link::McuSetup setup) { master_.reconfigure(on_bus_, std::move(setup)); }
+  Result<void> has_room(const link::McuSetup& setup) const;
+
+ private:
+  friend class Installation;
+  link::Master& master_;
+  link::McuIndex on_bus_;
+  std::vector<MotorId> motors_;
+  std::array<std::optional<MotorId>, BUSHD_MOTORS_PER_MCU> motor_at_{};
+};
+
+class Installation {
+ public:
+  // The configuration outlives it. `master` tells this daemon from others on the same lines.
+  Installation(const config::Config& config, std::uint16_t master);
+  Installation(const Installation&) = delete;
+  Installation& operator=(const Installation&) = delete;
+
+  const config::Config& config() const { return config_; }
+
+  Bus& operator[](BusId id) { return *buses_[id]; }
+  const Bus& operator[](BusId id) const { return *buses_[id]; }
+  Mcu& operator[](McuId id) { return mcus_[id]; }
+  const Mcu& operator[](McuId id) const { return mcus_[id]; }
+  motion::Motor& operator[](MotorId id) { return motors_[id]; }
+  const motion::Motor& operator[](MotorId id) const { return motors_[id]; }
+  auto buses() const { return buses_.ids(); }
+  auto mcus() const { return mcus_.ids(); }
+  auto motors() const { return motors_.ids(); }
+
+  Mcu& mcu_of(MotorId id) { return mcus_[config_[id].mcu]; }
+  const Mcu& mcu_of(MotorId id) const { return mcus_[config_[id].mcu]; }
+  const Bus& bus_of(const Mcu& mcu) const { return *buses_[mcu.config.bus]; }
+  std::vector<McuId> mcus_of(const std::vector<MotorId>& motors) const;  // each once, in order
+  bool any_moves(const Mcu& mcu) const;                                  // or is not at rest
+  // The MCU gets such a move as a whole and runs it by the motor's table.
+  bool by_table(const Mcu& mcu, std::int64_t steps) const;
+
+  // By the names that clients use; none of them twice.
+  Result<MotorId> find(const std::string& name) const;
+  Result<std::vector<MotorId>> find(const api::MotorNames& names) const;
+  Result<std::vector<MotorId>> find(const std::vector<api::MotorSteps>& motors) const;
+  Result<std::vector<MotorId>> find_or_all(const api::MotorNames& names) const;  // none named: all
+
+  const Tables& tables() const { return tables_; }
+  const tables::TablePtr& table_of(MotorId id) const { return tables_[config_[id].group]; }
+  // Precondition: none of the group's motors has a plan. MCUs are set up by the caller.
+  void put_in_service(GroupId group, tables::TablePtr table);
+  motion::Axis new_axis(MotorId id) const;
+
+  // Something that clients see is not what was published last.
+  bool changed = true;
+  bool shutting_down = false;  // nothing new is begun
+
+ private:
+  void add_buses(std::uint16_t master);
+  void add_mcus();
+  void add_motors();
+
+  const config::Config& config_;
+  Tables tables_;  // in service
+  ById<BusId, std::unique_ptr<Bus>> buses_;
+  ById<McuId, Mcu> mcus_;
+  ById<MotorId, motion::Motor> motors_;
+  std::unordered_map<std::string, MotorId> motor_by_name_;
+};
+
+}  // namespace bushd::daemon

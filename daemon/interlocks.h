@@ -1,0 +1,37 @@
+// Why no motion may begin now: asked by everything that is about to move a motor. A service that
+// holds motions back adds its reason here, and no other service knows of it.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "base/ids.h"
+#include "base/result.h"
+#include "daemon/installation.h"
+
+namespace bushd::daemon {
+
+class Interlocks {
+ public:
+  explicit Interlocks(const Installation& installation) : installation_(installation) {}
+
+  using ForAll = std::function<Result<void>()>;
+  using ForMotor = std::function<Result<void>(MotorId)>;
+  void add(ForAll check) { for_all_.push_back(std::move(check)); }
+  void add(ForMotor check) { for_motor_.push_back(std::move(check)); }
+
+  // Whatever is to move.
+  Result<void> may_move() const;
+  // Any motion of this motor: what it does itself, its MCU, and whoever else holds it back. One
+  // that moves may be given another target.
+  Result<void> may_move(MotorId motor) const;
+
+ private:
+  Result<void> may_move_by(const Mcu& mcu) const;
+
+  const Installation& installation_;
+  std::vector<ForAll> for_all_;
+  std::vector<ForMotor> for_motor_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,62 @@
+#include "daemon/mcu_setup.h"
+
+#include <algorithm>
+
+namespace bushd::daemon {
+namespace {
+
+std::uint16_t bit_of(Output output) {
+  return static_cast<std::uint16_t>(1u << output.value);
+}
+
+bushd_set_inputs inputs_of(const config::Mcu& mcu) {
+  bushd_set_inputs inputs{};
+  inputs.debounce_ticks = mcu.debounce_ticks;
+  inputs.emergency = mcu.emergency_input;
+  inputs.overcurrent = mcu.overcurrent;
+  inputs.enable_after_watchdog = mcu.enable_after_reset == config::EnableAfterReset::kAtOnce;
+  if (mcu.emergency_active_open) inputs.system_inverted |= BUSHD_INPUT_EMERGENCY;
+  return inputs;
+}
+
+void add_inputs(bushd_set_inputs& inputs, const config::Motor& motor) {
+  const std::uint16_t bit = bit_of(motor.output);
+  if (motor.limit_positive) inputs.limit_positive |= bit;
+  if (motor.limit_negative) inputs.limit_negative |= bit;
+  if (motor.limit_action == BUSHD_CUT) inputs.limit_cuts |= bit;
+  if (motor.input_active_open) inputs.inverted |= bit;
+}
+
+// Motors with the same table share it.
+void add_table(link::McuSetup& setup, Output output, const tables::Table& table) {
+  const auto found =
+      std::find_if(setup.tables.begin(), setup.tables.end(),
+                   [&table](const link::TableRef& ref) { return ref.table == &table.view(); });
+  setup.table_of_motor[output.value] = static_cast<std::uint8_t>(found - setup.tables.begin());
+  if (found != setup.tables.end()) return;
+  setup.tables.push_back({.table = &table.view(), .revision = table.revision()});
+}
+
+}  // namespace
+
+link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& tables) {
+  const config::Mcu& mcu = config[id];
+  link::McuSetup setup{.address = mcu.address, .tables = {}};
+  setup.emission = mcu.emission;
+  setup.inputs = inputs_of(mcu);
+  setup.off_after_watchdog = mcu.enable_after_reset == config::EnableAfterReset::kNo;
+  std::vector<const config::Motor*> motors;
+  for (const config::Motor& motor : config.motors) {
+    if (motor.mcu == id) motors.push_back(&motor);
+  }
+  // Slots are given in the order of outputs.
+  std::ranges::sort(motors, {}, [](const config::Motor* motor) { return motor->output; });
+  for (const config::Motor* motor : motors) {
+    add_inputs(setup.inputs, *motor);
+    if (motor->local) setup.local_motors |= bit_of(motor->output);
+    add_table(setup, motor->output, *tables[motor->group]);
+  }
+  return setup;
+}
+
+}  // namespace bushd::daemon

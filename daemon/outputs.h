@@ -1,0 +1,32 @@
+// Where the core's output goes. Called from within the core's functions; must not call back into
+// the core.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "api/session.h"
+#include "api/snapshot.h"
+#include "base/ids.h"
+
+namespace bushd::daemon {
+
+enum class LogLevel { kInfo, kWarning, kError };
+
+class Outputs : public api::Publisher {
+ public:
+  virtual void send(BusId bus, std::span<const std::uint8_t> bytes) = 0;
+  virtual void move_log(const std::string& json_line) = 0;
+  virtual void log(LogLevel level, const std::string& text) = 0;
+  // Answered by Core::tables_read and Core::tables_kept, later.
+  virtual void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) = 0;
+  // For the next daemon: which table each group has, TABLE[@REV] in the order of the configuration.
+  virtual void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) = 0;
+  // ListTables, GetTable, SetTable: carried out where the disk is, and answered later.
+  virtual void serve_tables(const api::Asker& asker, const api::Request& request) = 0;
+  virtual std::int64_t wall_clock_us() = 0;  // microseconds since 1970, for messages
+};
+
+}  // namespace bushd::daemon

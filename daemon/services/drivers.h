@@ -1,0 +1,42 @@
+// The drivers and faults of MCUs, as people switch and clear them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <list>
+
+#include "daemon/confirmation.h"
+#include "daemon/interlocks.h"
+#include "daemon/service.h"
+#include "daemon/services/emergency_stop.h"
+
+namespace bushd::daemon {
+
+class Drivers final : public Service {
+ public:
+  Drivers(Installation& installation, Interlocks& interlocks, const EmergencyStop& emergency_stop);
+
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Enable& request);
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Disable& request);
+  void request(std::int64_t now_us, const api::Asker& asker, const api::ClearFaults& request);
+
+  void reports(std::int64_t now_us, Mcu& mcu) override { follow(now_us, &mcu); }
+  void step(std::int64_t now_us) override { follow(now_us, nullptr); }
+
+ private:
+  struct Operation {
+    Confirmation confirmation;
+    std::uint8_t action;  // BUSHD_CONTROL_*
+  };
+  void begin(std::int64_t now_us, const api::Asker& asker, const api::MotorNames& names,
+             std::uint8_t action);
+  Result<std::vector<McuId>> mcus_of(const api::MotorNames& names, bool at_rest_only) const;
+  bool being_disabled(McuId mcu) const;
+  void follow(std::int64_t now_us, const Mcu* reported);
+
+  Installation& installation_;
+  const EmergencyStop& emergency_stop_;
+  std::list<Operation> open_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,202 @@
+#include "daemon/services/homing_queue.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "motion/report_words.h"
+
+namespace bushd::daemon {
+namespace {
+
+using api::Outcome;
+
+constexpr std::uint32_t kMoreSlowSteps = 1000;  // than a ramp has
+
+struct Ending {
+  Outcome outcome;
+  std::string reason;
+};
+
+Ending ending_of(const bushd_report& report, const std::string& mcu) {
+  switch (report.homing) {
+    case BUSHD_HOMING_DONE:
+      return {Outcome::kReached, "homed"};
+    case BUSHD_HOMING_NOT_FOUND:
+      return {Outcome::kFault,
+              "its switch was not found within home.most_steps; check the switch and 'home'"};
+    case BUSHD_HOMING_STUCK:
+      return {Outcome::kFault,
+              "its switch stayed active all the way back; is it stuck, or are "
+              "home.slow_most_steps too few?"};
+    case BUSHD_HOMING_LOST:
+      return {Outcome::kFault,
+              "its switch was not found again by the slow approach; check its contact"};
+    default:
+      break;
+  }
+  const unsigned stops =
+      BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_OVERCURRENT;
+  if (report.faults & stops) {
+    return {Outcome::kStopped, "homing was ended because " + motion::stop_cause(report) +
+                                   "; 'bushctl clear', then home it"};
+  }
+  if (report.faults & BUSHD_FAULT_LINK) {
+    return {Outcome::kLink,
+            "MCU " + mcu + " gave up homing because it heard nobody; home it again"};
+  }
+  return {Outcome::kStopped, "homing was stopped on request"};
+}
+
+const char* remedy_of(unsigned refusal) {
+  switch (refusal) {
+    case BUSHD_E_FORBIDDEN:
+      return "move it off that switch first";
+    case BUSHD_E_STATE:
+      return "home it when the motors of this MCU stand";
+    default:
+      return "check its 'home' and its table in the configuration";
+  }
+}
+
+}  // namespace
+
+HomingQueue::HomingQueue(Installation& installation, const Interlocks& interlocks,
+                         OpenMoves& open_moves, Outputs& outputs)
+    : installation_(installation), interlocks_(interlocks), open_(open_moves), outputs_(outputs) {
+  for ([[maybe_unused]] const McuId mcu : installation.mcus()) queues_.add();
+}
+
+void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
+  const auto motors = motors_of(request);
+  if (!motors) return asker.answer(api::Refused{motors.error().text()});
+  asker.answer(api::Accepted{});
+  open_.open(asker, *motors);
+  for (const MotorId motor : *motors) add(motor);
+}
+
+Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) const {
+  auto motors = installation_.find(request.motors);
+  if (!motors) return motors;
+  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
+  for (const MotorId motor : *motors) {
+    if (const auto may = may_home(motor); !may) {
+      return fail(installation_[motor].name() + ": " + may.error().text());
+    }
+  }
+  return motors;
+}
+
+Result<void> HomingQueue::may_home(MotorId id) const {
+  const Mcu& mcu = installation_.mcu_of(id);
+  if (!installation_.config()[id].home) {
+    return fail("its configuration has no 'home', so nobody knows where to look");
+  }
+  if (installation_[id].has_plan()) return fail("it moves; stop it first");
+  if (auto may = interlocks_.may_move(id); !may) return may;
+  if (mcu.can_home()) return {};
+  return fail("MCU " + mcu.name() +
+              " cannot home; find out where it stands and say 'bushctl set NAME STEPS'");
+}
+
+bushd_home HomingQueue::message_for(MotorId id) const {
+  const config::Motor& motor = installation_.config()[id];
+  const config::Home& home = *motor.home;
+  const bushd_table& table = installation_.table_of(id)->view();
+  const std::uint64_t first = std::max(table.accel.code[0], table.decel.code[0]);
+  const std::uint64_t slow_ns = std::max<std::uint64_t>(
+      {first * table.time_unit_ns, installation_.config().bus_of(motor).tick_ns(),
+       1'000'000'000u / home.slow_steps_per_s});
+  const std::uint64_t units = (slow_ns + BUSHD_HOME_UNIT_NS - 1) / BUSHD_HOME_UNIT_NS;
+  return {.motor = motor.output.value,
+          .direction = static_cast<std::int8_t>(home.positive ? 1 : -1),
+          .most_steps = home.most_steps,
+          .slow_steps = home.slow_most_steps.value_or(table.decel.count + kMoreSlowSteps),
+          .slow_delay = static_cast<std::uint16_t>(std::min<std::uint64_t>(units, UINT16_MAX)),
+          .position_steps = home.position_steps};
+}
+
+bool HomingQueue::empty() const {
+  return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.empty(); });
+}
+
+void HomingQueue::add(MotorId motor) {
+  Mcu& mcu = installation_.mcu_of(motor);
+  installation_[motor].home();
+  queues_[mcu.id].push_back(motor);
+  if (queues_[mcu.id].size() == 1) begin(mcu);
+  installation_.changed = true;
+}
+
+void HomingQueue::begin(Mcu& mcu) {
+  mcu.home(message_for(queues_[mcu.id].front()));
+}
+
+void HomingQueue::reports(std::int64_t, Mcu& mcu) {
+  if (queues_[mcu.id].empty() || mcu.busy()) return;
+  const unsigned output = installation_[queues_[mcu.id].front()].output().value;
+  if (((mcu.report().autonomous | mcu.report().moving) >> output & 1) != 0) return;
+  const Ending ending = ending_of(mcu.report(), mcu.name());
+  end(mcu, ending.outcome, ending.reason);
+}
+
+void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
+  Queue& queue = queues_[mcu.id];
+  const MotorId id = queue.front();
+  queue.pop_front();
+  motion::Motor& motor = installation_[id];
+  motor.end_homing(outcome == Outcome::kReached);
+  outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning,
+               motor.name() + ": " + reason);
+  open_.end(id, outcome, reason);
+  if (!queue.empty()) begin(mcu);
+}
+
+void HomingQueue::goes_offline(Mcu& mcu, const std::string& cause) {
+  for (const MotorId motor : std::exchange(queues_[mcu.id], {})) {
+    installation_[motor].end_homing(false);
+    open_.end(motor, Outcome::kLink, cause + "; it was being homed");
+  }
+}
+
+void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
+  if (type != BUSHD_MSG_HOME || queues_[mcu.id].empty()) return;
+  end(mcu, Outcome::kFault,
+      "MCU " + mcu.name() + " refused to home it: " + bushd_status_text(status) + "; " +
+          remedy_of(status));
+}
+
+bool HomingQueue::end_if_waiting(MotorId motor) {
+  Queue& queue = queues_[installation_.config()[motor].mcu];
+  if (queue.empty() || queue.front() == motor || std::erase(queue, motor) == 0) return false;
+  installation_[motor].end_homing(false);
+  open_.end(motor, Outcome::kStopped, "stopped before it was its turn to be homed");
+  return true;
+}
+
+void HomingQueue::end_waiting() {
+  for (const MotorId motor : installation_.motors()) end_if_waiting(motor);
+}
+
+void HomingQueue::stop(MotorId motor) {
+  if (!installation_[motor].is<motion::Homing>() || end_if_waiting(motor)) return;
+  bushd_home give_up = message_for(motor);
+  give_up.most_steps = 0;
+  installation_.mcu_of(motor).home(give_up);
+}
+
+// Those that shall be homed whenever their MCU comes and has not homed them.
+void HomingQueue::goes_online(Mcu& mcu) {
+  for (const MotorId id : mcu.motors()) {
+    const auto& home = installation_.config()[id].home;
+    const motion::Motor& motor = installation_[id];
+    const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
+    if (!home || !home->at_start || (homed && !motor.uncertain_reason())) continue;
+    if (const auto may = may_home(id); !may) {
+      outputs_.log(LogLevel::kWarning, motor.name() + " is not homed: " + may.error().text());
+      continue;
+    }
+    add(id);
+  }
+}
+
+}  // namespace bushd::daemon

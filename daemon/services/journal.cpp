@@ -1,0 +1,128 @@
+#include "daemon/services/journal.h"
+
+#include <nlohmann/json.hpp>
+#include <utility>
+
+namespace bushd::daemon {
+
+Journal::Journal(const Installation& installation, Outputs& outputs)
+    : installation_(installation),
+      outputs_(outputs),
+      // The log of moves is appended to: its ids must not begin anew with every daemon.
+      last_id_(static_cast<std::uint64_t>(outputs.wall_clock_us())) {
+  for ([[maybe_unused]] const MotorId motor : installation.motors()) {
+    id_.add(std::uint64_t{0});
+    autonomous_.add();
+  }
+  for ([[maybe_unused]] const McuId mcu : installation.mcus()) told_.add();
+}
+
+void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::uint32_t late_ns,
+                      bool by_table) {
+  const motion::Motor& motor = installation_[id];
+  const Mcu& mcu = installation_.mcu_of(id);
+  const config::Bus& bus = installation_.bus_of(mcu).config;
+  const tables::Table& table = *installation_.table_of(id);
+  id_[id] = ++last_id_;
+  nlohmann::json line = {{"event", "move"},
+                         {"id", id_[id]},
+                         {"motor", motor.name()},
+                         {"bus", bus.name},
+                         {"address", mcu.config.address.value},
+                         {"output", motor.output().value},
+                         {"table_file", table.path()},
+                         {"table_sha256", table.content_hash()},
+                         {"tick_ns", bus.tick_ns()},
+                         {"format", bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse"},
+                         {"moves", by_table ? "table" : "stream"},
+                         {"start_tick", start},
+                         {"steps", steps},
+                         {"from_steps", motor.axis().from_steps()}};
+  if (late_ns != 0) line["late_ns"] = late_ns;
+  if (const bushd_emission& emission = mcu.config.emission.settings;
+      emission.mode != BUSHD_EMISSION_EVEN) {
+    line["emission"] = fieldbus::kEmissionNames.at(emission.mode);
+    line["step_us"] = emission.step_us;
+    line["dir_setup_us"] = emission.dir_setup_us;
+    if (emission.mode == BUSHD_EMISSION_STAGGERED) line["settle_us"] = emission.settle_us;
+    if (emission.mode == BUSHD_EMISSION_PHASES) {
+      line["phase_sequence"] = fieldbus::kSequenceNames.at(emission.sequence);
+    }
+  }
+  outputs_.move_log(line.dump());
+}
+
+void Journal::changed(MotorId motor, const motion::Change& change) {
+  nlohmann::json line = {{"event", change.target_steps ? "retarget" : "stop"},
+                         {"id", id_[motor]},
+                         {"motor", installation_[motor].name()},
+                         {"tick", change.at}};
+  if (change.target_steps) line["target_steps"] = *change.target_steps;
+  outputs_.move_log(line.dump());
+}
+
+void Journal::ended(MotorId motor, std::string_view result) {
+  const nlohmann::json line = {{"event", "result"},
+                               {"id", id_[motor]},
+                               {"motor", installation_[motor].name()},
+                               {"result", result},
+                               {"position_steps", installation_[motor].position_steps()}};
+  outputs_.move_log(line.dump());
+}
+
+void Journal::position_set(MotorId motor) {
+  const nlohmann::json line = {{"event", "set"},
+                               {"motor", installation_[motor].name()},
+                               {"position_steps", installation_[motor].position_steps()}};
+  outputs_.move_log(line.dump());
+}
+
+void Journal::before_report(MotorId id, bool being_set) {
+  if (autonomous_[id]) return;
+  const motion::Motor& motor = installation_[id];
+  const Mcu& mcu = installation_.mcu_of(id);
+  const unsigned output = motor.output().value;
+  const bool autonomous = (mcu.report().autonomous >> output & 1) != 0;
+  // Somebody has tapped a button between two reports.
+  const bool tapped = installation_.config()[id].local && !motor.has_plan() && !being_set &&
+                      mcu.report().motor[output].position_steps != motor.position_steps();
+  if (!autonomous && !tapped) return;
+  autonomous_[id] = Autonomous{.since = told_[mcu.id],
+                               .from_steps = motor.position_steps(),
+                               .homes = motor.is<motion::Homing>()};
+}
+
+void Journal::after_report(const Mcu& mcu) {
+  for (const MotorId motor : mcu.motors()) {
+    const unsigned output = installation_[motor].output().value;
+    if ((mcu.report().autonomous >> output & 1) == 0) end_autonomous(motor, mcu);
+  }
+  told_[mcu.id] = mcu.view().tick;
+}
+
+void Journal::end_autonomous(MotorId id, const Mcu& mcu) {
+  if (!autonomous_[id]) return;
+  const Autonomous autonomous = *std::exchange(autonomous_[id], std::nullopt);
+  const motion::Motor& motor = installation_[id];
+  const config::Bus& bus = installation_.bus_of(mcu).config;
+  const bool homed = autonomous.homes && mcu.report().homing == BUSHD_HOMING_DONE;
+  nlohmann::json line = {{"event", "alone"},
+                         {"motor", motor.name()},
+                         {"bus", bus.name},
+                         {"address", mcu.config.address.value},
+                         {"output", motor.output().value},
+                         {"tick_ns", bus.tick_ns()},
+                         {"what", autonomous.homes ? "homing" : "local"},
+                         {"until_tick", mcu.view().tick},
+                         {"from_steps", autonomous.from_steps},
+                         {"set", homed || autonomous.set},
+                         {"position_steps", motor.position_steps()}};
+  if (autonomous.since) line["from_tick"] = *autonomous.since;
+  outputs_.move_log(line.dump());
+}
+
+void Journal::position_lost(MotorId motor) {
+  if (autonomous_[motor]) autonomous_[motor]->set = true;
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,52 @@
+// The log of moves (docs/design.md): which motor began what, at which tick, and what became of it,
+// one JSON object a line.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "base/by_id.h"
+#include "daemon/outputs.h"
+#include "daemon/service.h"
+
+namespace bushd::daemon {
+
+class Journal final : public Service {
+ public:
+  Journal(const Installation& installation, Outputs& outputs);
+
+  void started(MotorId motor, std::int64_t steps, motion::Tick start, std::uint32_t late_ns,
+               bool by_table);
+  void changed(MotorId motor, const motion::Change& change);
+  void ended(MotorId motor, std::string_view result);
+  void position_set(MotorId motor);
+
+  // Motion that MCUs make by themselves, homing and local inputs: no move has led to where these
+  // motors stand. To be called before and after motors follow a report; `being_set`: positions that
+  // change because somebody sets them.
+  void before_report(MotorId motor, bool being_set);
+  void after_report(const Mcu& mcu);
+
+  void goes_online(Mcu& mcu) override { told_[mcu.id].reset(); }
+  void position_lost(MotorId motor);
+
+ private:
+  // Of a motor that moves by itself.
+  struct Autonomous {
+    std::optional<motion::Tick> since;  // of the last report before, if there is one
+    std::int64_t from_steps;
+    bool homes;
+    bool set = false;  // the MCU's counter does not go on from there
+  };
+  void end_autonomous(MotorId motor, const Mcu& mcu);
+
+  const Installation& installation_;
+  Outputs& outputs_;
+  std::uint64_t last_id_;
+  ById<MotorId, std::uint64_t> id_;  // of its present move in the log
+  ById<MotorId, std::optional<Autonomous>> autonomous_;
+  ById<McuId, std::optional<motion::Tick>> told_;  // the tick of the last report
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,236 @@
+#include "daemon/services/moves.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "base/overloaded.h"
+
+namespace bushd::daemon {
+namespace {
+
+constexpr std::int64_t kMaxPosition = motion::Motor::kMaxPosition;
+
+}  // namespace
+
+void Moves::request(std::int64_t now_us, const api::Asker& asker, const api::Move& move) {
+  const auto parts = parts_of(move);
+  if (!parts) return asker.answer(api::Refused{parts.error().text()});
+  if (!move.dry_run) return start(now_us, asker, *parts);
+  std::vector<DryRun::Part> planned;
+  for (const Part& part : *parts) {
+    const motion::Motor& motor = installation_[part.motor];
+    if (motor.has_plan()) {
+      return asker.answer(api::Refused{motor.name() + " moves; a dry run is of moves from rest"});
+    }
+    planned.push_back({part.motor, part.target - motor.position_steps()});
+  }
+  asker.answer(api::Accepted{});
+  asker.answer(api::Completed{.outcome = api::Outcome::kDone,
+                              .reason = "nothing has moved",
+                              .detail = dry_run_.plan(now_us, planned)});
+}
+
+Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
+  const auto motors = installation_.find(move.motors);
+  if (!motors) return fail(motors.error());
+  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
+  std::vector<Part> parts;
+  for (std::size_t i = 0; i < motors->size(); ++i) {
+    const auto target = target_of((*motors)[i], move.motors[i].steps, move.kind);
+    if (!target) return fail(target.error());
+    parts.push_back({(*motors)[i], *target});
+  }
+  return parts;
+}
+
+Result<std::int64_t> Moves::target_of(MotorId id, std::int64_t steps, api::Move::Kind kind) const {
+  const motion::Motor& motor = installation_[id];
+  // Compared before any arithmetic: the sum of two values from outside could overflow.
+  if (steps > 2 * kMaxPosition || steps < -2 * kMaxPosition) {
+    return fail(motor.name() + ": " + std::to_string(steps) +
+                " steps is out of range; allowed: +-" + std::to_string(kMaxPosition));
+  }
+  const std::int64_t from = kind == api::Move::Kind::kAbsolute ? 0 : motor.target_steps();
+  auto may = interlocks_.may_move(id);
+  if (may) may = motor.may_move_to(from + steps);
+  if (!may) return fail(motor.name() + ": " + may.error().text());
+  return from + steps;
+}
+
+void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts) {
+  std::vector<MotorId> motors;
+  std::vector<MotorId> moving;
+  // All motors of a bus that are at rest start in the same tick: the earliest that suits every one
+  // of them.
+  std::map<BusId, motion::Tick> start;
+  for (const Part& part : parts) {
+    motors.push_back(part.motor);
+    if (installation_[part.motor].has_plan()) {
+      moving.push_back(part.motor);
+      continue;
+    }
+    const Mcu& mcu = installation_.mcu_of(part.motor);
+    const motion::Tick earliest = mcu.earliest_start(now_us, installation_[part.motor].output());
+    motion::Tick& common = start.try_emplace(mcu.config.bus, earliest).first->second;
+    common = std::max(common, earliest);
+  }
+  asker.answer(api::Accepted{});
+  for (const MotorId motor : moving) take_over(motor, asker);
+  open_.open(asker, motors);
+  for (const Part& part : parts) {
+    motion::Motor& motor = installation_[part.motor];
+    if (motor.has_plan()) {
+      motor.aim(part.target);
+    } else {
+      start_run(part.motor, part.target, start[installation_.mcu_of(part.motor).config.bus]);
+    }
+  }
+  std::erase_if(moving, [this](MotorId motor) { return !installation_[motor].needs_change(); });
+  replan(now_us, moving);
+}
+
+// A motor that moves is given to another move: what it was moving or stopping for has ended.
+void Moves::take_over(MotorId motor, const api::Asker& by) {
+  open_.end(motor, api::Outcome::kStopped,
+            "was given a new target by " + text_of(by) + "; it moves on");
+}
+
+void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start) {
+  motion::Motor& motor = installation_[id];
+  Mcu& mcu = installation_.mcu_of(id);
+  const std::int64_t steps = target - motor.position_steps();
+  const bool by_table = installation_.by_table(mcu, steps);
+  motor.start(target, start);
+  journal_.started(id, steps, start, 0, by_table);
+  if (steps == 0) {
+    end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));
+  } else if (by_table) {
+    mcu.begin_table_run(motor.output(), start, static_cast<std::int32_t>(steps));
+  } else {
+    mcu.begin(motor.output(), start);
+  }
+  installation_.changed = true;
+}
+
+void Moves::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  std::vector<MotorId> changed;
+  std::vector<MotorId> armed;
+  for (const MotorId id : motors) {
+    motion::Motor& motor = installation_[id];
+    motor.stop();
+    if (motor.is<motion::Armed>()) armed.push_back(id);
+    if (motor.needs_change()) changed.push_back(id);
+  }
+  take_back(armed);
+  replan(now_us, changed);
+}
+
+void Moves::take_back(const std::vector<MotorId>& motors) {
+  for (const McuId mcu : installation_.mcus_of(motors)) installation_[mcu].disarm();
+}
+
+// This motor waits no more: so do those that were armed with it. Those of its own MCU have ended by
+// what has ended it.
+void Moves::take_back_companions(MotorId ended) {
+  std::vector<MotorId> others;
+  for (const MotorId id : installation_.motors()) {
+    motion::Motor& motor = installation_[id];
+    const motion::Armed* armed = motor.as<motion::Armed>();
+    if (armed == nullptr || armed->stops || !open_.together(id, ended) ||
+        installation_.config()[id].mcu == installation_.config()[ended].mcu) {
+      continue;
+    }
+    motor.stop(installation_[ended].name());
+    others.push_back(id);
+  }
+  take_back(others);
+}
+
+void Moves::replan(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  // One replacement serves all motors of an MCU. It can bring a motor that has not begun to rest at
+  // any tick, but another beginning only at the tick where it was to begin.
+  std::map<McuId, motion::Tick> at;
+  for (const MotorId id : motors) {
+    const Mcu& mcu = installation_.mcu_of(id);
+    const motion::Axis& axis = installation_[id].axis();
+    const motion::Tick first = axis.stopping() ? mcu.earliest_replace(now_us)
+                                               : mcu.earliest_retarget(now_us, axis.start_tick());
+    motion::Tick& common = at.try_emplace(mcu.id, first).first->second;
+    common = std::max(common, first);
+  }
+  std::map<McuId, std::uint16_t> masks;
+  for (const MotorId id : motors) {
+    motion::Motor& motor = installation_[id];
+    const McuId mcu = installation_.config()[id].mcu;
+    if (!motor.change(at[mcu])) continue;
+    masks[mcu] |= static_cast<std::uint16_t>(1u << motor.output().value);
+  }
+  for (const auto& [mcu, mask] : masks) installation_[mcu].replace(mask, at[mcu]);
+  installation_.changed = true;
+}
+
+void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Event>& events) {
+  motion::Motor& motor = installation_[id];
+  Mcu& mcu = installation_.mcu_of(id);
+  for (const motion::Event& event : events) {
+    if (!std::holds_alternative<motion::event::Executed>(event)) installation_.changed = true;
+    std::visit(
+        Overloaded{
+            [&](const motion::event::Started& started) {
+              journal_.started(id, started.steps, started.start, started.late_ns, true);
+              mcu.follow_table_run(motor.output(), started.start,
+                                   static_cast<std::int32_t>(started.steps));
+            },
+            [&](const motion::event::Executed& executed) { journal_.changed(id, executed.change); },
+            [&](const motion::event::Replan&) { replan(now_us, {id}); },
+            [&](const motion::event::Drop&) { mcu.drop(motor.output()); },
+            [&](const motion::event::Mismatch&) {
+              outputs_.log(LogLevel::kError,
+                           motor.name() + ": " + *motor.uncertain_reason() + "; it is stopped");
+            },
+            [&](const motion::event::Turn&) {
+              journal_.ended(id, "turned");
+              start_run(id, motor.axis().wanted_steps(),
+                        mcu.earliest_start(now_us, motor.output()));
+            },
+            [&](const motion::event::Ended& ended) { end(id, ended); }},
+        event);
+  }
+}
+
+void Moves::end(MotorId id, const motion::event::Ended& ended) {
+  const motion::Motor& motor = installation_[id];
+  installation_.mcu_of(id).drop(motor.output());
+  if (ended.was_armed) {
+    take_back_companions(id);
+  } else {  // the log of moves knows nothing of one that has not started
+    journal_.ended(id, api::word(ended.outcome));
+  }
+  const bool planned =
+      ended.outcome == api::Outcome::kReached || ended.outcome == api::Outcome::kStopped;
+  if (!planned) outputs_.log(LogLevel::kWarning, motor.name() + ": " + ended.reason);
+  open_.end(id, ended.outcome, ended.reason);
+}
+
+void Moves::goes_offline(Mcu& mcu, const std::string& cause) {
+  for (const MotorId id : mcu.motors()) {
+    const auto ended = installation_[id].end(api::Outcome::kLink,
+                                             cause + "; the position is the last one reported");
+    if (ended) end(id, *ended);
+  }
+}
+
+std::int64_t Moves::rest_by_us(std::int64_t now_us) const {
+  std::int64_t latest_us = now_us;
+  for (const MotorId id : installation_.motors()) {
+    const motion::Motor& motor = installation_[id];
+    const Bus& bus = installation_.bus_of(installation_.mcu_of(id));
+    if (!motor.is<motion::Moving>() || !bus.master.time_known()) continue;
+    const motion::Tick ticks = motor.axis().end_tick() - bus.master.tick_at(now_us);
+    latest_us = std::max(latest_us, now_us + ticks * bus.config.tick_us);
+  }
+  return latest_us;
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,70 @@
+// Moves: from a request by a run per motor to its result. Here is also what every other service
+// needs of motors that have a plan: stopping them, and doing what follows from their reports.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "daemon/interlocks.h"
+#include "daemon/outputs.h"
+#include "daemon/service.h"
+#include "daemon/services/dry_run.h"
+#include "daemon/services/journal.h"
+#include "daemon/services/open_moves.h"
+
+namespace bushd::daemon {
+
+class Moves final : public Service {
+ public:
+  Moves(Installation& installation, const Interlocks& interlocks, Journal& journal,
+        OpenMoves& open_moves, Outputs& outputs)
+      : installation_(installation),
+        interlocks_(interlocks),
+        journal_(journal),
+        open_(open_moves),
+        outputs_(outputs),
+        dry_run_(installation) {}
+
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Move& move);
+
+  // Checks where a motor of a request may go, "NAME: WHY" if not. `by` counts from where it stands,
+  // or from its present target.
+  Result<std::int64_t> target_of(MotorId motor, std::int64_t steps, api::Move::Kind kind) const;
+
+  // Ramps down those that move; those that wait for the trigger wait no more.
+  void stop(std::int64_t now_us, const std::vector<MotorId>& motors);
+  // Lets the MCUs know what is wanted of these motors now, in place of changes that they have not
+  // taken.
+  void replan(std::int64_t now_us, const std::vector<MotorId>& motors);
+  // What follows from a report of a motor.
+  void take(std::int64_t now_us, MotorId motor, const std::vector<motion::Event>& events);
+  void end(MotorId motor, const motion::event::Ended& ended);
+
+  // When all that moves now will have come to rest, as planned.
+  std::int64_t rest_by_us(std::int64_t now_us) const;
+
+  void goes_offline(Mcu& mcu, const std::string& cause) override;
+
+ private:
+  struct Part {
+    MotorId motor;
+    std::int64_t target;
+  };
+  Result<std::vector<Part>> parts_of(const api::Move& move) const;
+  void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);
+  void take_over(MotorId motor, const api::Asker& by);
+  // From rest; the motor is part of an open move.
+  void start_run(MotorId motor, std::int64_t target, motion::Tick start);
+  void take_back(const std::vector<MotorId>& motors);
+  void take_back_companions(MotorId motor);
+
+  Installation& installation_;
+  const Interlocks& interlocks_;
+  Journal& journal_;
+  OpenMoves& open_;
+  Outputs& outputs_;
+  DryRun dry_run_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,46 @@
+#include "daemon/services/open_moves.h"
+
+#include <utility>
+
+namespace bushd::daemon {
+
+std::string text_of(const api::Asker& asker) {
+  if (!asker.session) return "SIGHUP";
+  return "command " + std::to_string(asker.number) + " of " + asker.session->text();
+}
+
+void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors) {
+  Open open{.asker = std::move(asker), .tables = {}};
+  for (const MotorId motor : motors) {
+    open.tables.push_back(api::ref_to(*installation_.table_of(motor)));
+  }
+  open_.emplace(book_.open(motors), std::move(open));
+}
+
+void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason) {
+  installation_.changed = true;
+  const motion::Motor& motor = installation_[id];
+  const auto finished = book_.end({.motor = id,
+                                   .outcome = outcome,
+                                   .position_steps = motor.position_steps(),
+                                   .reason = motor.name() + ": " + reason});
+  if (!finished) return;
+  const auto open = open_.extract(finished->move);
+  std::vector<api::MotorResult> results;
+  for (std::size_t i = 0; i < finished->motors.size(); ++i) {
+    const motion::MotorOutcome& part = finished->motors[i];
+    results.push_back({.motor = installation_[part.motor].name(),
+                       .outcome = part.outcome,
+                       .position_steps = part.position_steps,
+                       .table = open.mapped().tables[i]});
+  }
+  open.mapped().asker.answer(api::Completed{
+      .outcome = finished->outcome, .reason = finished->reason, .detail = std::move(results)});
+}
+
+const api::Asker* OpenMoves::asker_of(MotorId motor) const {
+  const auto move = book_.move_of(motor);
+  return move ? &open_.at(*move).asker : nullptr;
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,70 @@
+#include "daemon/services/position_compare.h"
+
+#include <string>
+
+namespace bushd::daemon {
+namespace {
+
+bool within(std::int64_t value, std::int64_t least, std::int64_t most) {
+  return value >= least && value <= most;
+}
+
+bushd_reference message_of(const api::PositionCompare& request, Output output) {
+  bushd_reference message{};
+  message.motor = output.value;
+  message.width_us = 1;
+  if (!request.arrivals.any()) return message;
+  if (request.arrivals.positive) message.arrivals |= BUSHD_ARRIVES_POSITIVE;
+  if (request.arrivals.negative) message.arrivals |= BUSHD_ARRIVES_NEGATIVE;
+  message.position_steps = static_cast<std::int32_t>(request.position_steps);
+  message.delay_us = static_cast<std::uint32_t>(request.delay_us);
+  message.width_us = static_cast<std::uint32_t>(request.width_us);
+  return message;
+}
+
+}  // namespace
+
+void PositionCompare::request(std::int64_t now_us, const api::Asker& asker,
+                              const api::PositionCompare& request) {
+  const auto motor = check(request);
+  if (!motor) return asker.answer(api::Refused{motor.error().text()});
+  Mcu& mcu = installation_.mcu_of(*motor);
+  open_.emplace_back(asker, std::vector{mcu.id}, now_us);
+  mcu.compare_positions(message_of(request, installation_[*motor].output()));
+}
+
+Result<MotorId> PositionCompare::check(const api::PositionCompare& request) const {
+  const auto id = installation_.find(request.motor);
+  if (!id) return id;
+  const Mcu& mcu = installation_.mcu_of(*id);
+  if (const auto online = mcu.must_be_online(); !online) return fail(online.error());
+  if (!mcu.can_compare_positions()) {
+    return fail("MCU " + mcu.name() + " has no reference output");
+  }
+  if (!request.arrivals.any()) return id;
+  if (!within(request.position_steps, -motion::Motor::kMaxPosition, motion::Motor::kMaxPosition)) {
+    return fail(request.motor + ": positions lie within +-" +
+                std::to_string(motion::Motor::kMaxPosition));
+  }
+  if (!within(request.delay_us, 0, BUSHD_REFERENCE_MAX_DELAY_US)) {
+    return fail("a delay of " + std::to_string(request.delay_us) +
+                " us before the pulse; allowed: 0 to " +
+                std::to_string(BUSHD_REFERENCE_MAX_DELAY_US));
+  }
+  if (!within(request.width_us, 1, BUSHD_REFERENCE_MAX_WIDTH_US)) {
+    return fail("a pulse of " + std::to_string(request.width_us) + " us; allowed: 1 to " +
+                std::to_string(BUSHD_REFERENCE_MAX_WIDTH_US));
+  }
+  return id;
+}
+
+void PositionCompare::follow(std::int64_t now_us, const Mcu* reported) {
+  std::erase_if(open_, [&](Confirmation& confirmation) {
+    const auto ended = confirmation.follow(now_us, reported, installation_,
+                                           [](const Mcu&) { return Result<void>(); });
+    if (ended) confirmation.answer(*ended);
+    return ended.has_value();
+  });
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,100 @@
+#include "daemon/services/positions.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace bushd::daemon {
+namespace {
+
+constexpr std::int64_t kMaxPosition = motion::Motor::kMaxPosition;
+
+}  // namespace
+
+Positions::Positions(Installation& installation, Interlocks& interlocks, Journal& journal)
+    : installation_(installation), journal_(journal) {
+  // A move begins where the motor stands when it is accepted.
+  interlocks.add([this](MotorId motor) -> Result<void> {
+    if (!being_set(motor)) return {};
+    return fail("its position is being set; wait for that result");
+  });
+}
+
+bool Positions::being_set(MotorId motor) const {
+  return std::ranges::any_of(open_, [motor](const Setting& setting) {
+    return std::ranges::find(setting.parts, motor, &Part::motor) != setting.parts.end();
+  });
+}
+
+void Positions::request(std::int64_t now_us, const api::Asker& asker,
+                        const api::SetPosition& request) {
+  auto parts = parts_of(request);
+  if (!parts) return asker.answer(api::Refused{parts.error().text()});
+  std::vector<MotorId> motors;
+  for (const Part& part : *parts) motors.push_back(part.motor);
+  open_.push_back({Confirmation(asker, installation_.mcus_of(motors), now_us), {}});
+  for (const auto& [id, steps] : *parts) {
+    installation_.mcu_of(id).set_position(installation_[id].output(), steps);
+  }
+  open_.back().parts = std::move(*parts);
+}
+
+Result<std::vector<Positions::Part>> Positions::parts_of(const api::SetPosition& request) const {
+  const auto motors = installation_.find(request.motors);
+  if (!motors) return fail(motors.error());
+  std::vector<Part> parts;
+  for (std::size_t i = 0; i < motors->size(); ++i) {
+    const MotorId id = (*motors)[i];
+    const motion::Motor& motor = installation_[id];
+    const std::int64_t steps = request.motors[i].steps;
+    if (!motor.is<motion::Resting>()) {
+      return fail(motor.busy_text() + "; its position can be set at rest only");
+    }
+    if (being_set(id)) {
+      return fail(motor.name() + ": its position is being set; wait for that result");
+    }
+    if (steps > kMaxPosition || steps < -kMaxPosition) {
+      return fail(motor.name() + ": positions lie within +-" + std::to_string(kMaxPosition));
+    }
+    parts.push_back({id, static_cast<std::int32_t>(steps)});
+  }
+  for (const MotorId id : *motors) {
+    if (const auto online = installation_.mcu_of(id).must_be_online(); !online) {
+      return fail(online.error());
+    }
+  }
+  return parts;
+}
+
+void Positions::follow(std::int64_t now_us, const Mcu* reported) {
+  for (auto it = open_.begin(); it != open_.end();) {
+    const auto check = [&](const Mcu& mcu) -> Result<void> {
+      for (const auto& [id, steps] : it->parts) {
+        const motion::Motor& motor = installation_[id];
+        if (installation_.config()[id].mcu == mcu.id && motor.position_steps() != steps) {
+          return fail("did not take the position of " + motor.name());
+        }
+      }
+      return {};
+    };
+    const auto ended = it->confirmation.follow(now_us, reported, installation_, check);
+    if (!ended) {
+      ++it;
+      continue;
+    }
+    const Setting finished = std::move(*it);
+    it = open_.erase(it);
+    end(finished, *ended);
+  }
+}
+
+void Positions::end(const Setting& setting, const Result<void>& ended) {
+  for (const Part& part : setting.parts) {
+    if (!ended) break;
+    installation_[part.motor].position_is_known();
+    journal_.position_set(part.motor);
+  }
+  installation_.changed = true;
+  setting.confirmation.answer(ended);
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,136 @@
+#include "daemon/services/state_publisher.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "motion/report_words.h"
+
+namespace bushd::daemon {
+namespace {
+
+api::McuState state_word(const link::McuView& view) {
+  if (view.phase == link::McuPhase::kOffline) return api::McuState::kOffline;
+  if (view.phase == link::McuPhase::kConnecting) return api::McuState::kBusy;
+  switch (view.report.state) {
+    case BUSHD_STATE_READY:
+      return api::McuState::kReady;
+    case BUSHD_STATE_RUN:
+      return api::McuState::kRunning;
+    case BUSHD_STATE_FAULT:
+      return api::McuState::kFault;
+    default:
+      return api::McuState::kBusy;
+  }
+}
+
+std::string detail_of(const link::McuView& view, bool two_masters) {
+  if (view.phase != link::McuPhase::kOnline) return view.detail;
+  if (view.report.faults != 0) return motion::fault_text(view.report);
+  if (two_masters) return "another master talks on the line";
+  if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) return "drivers disabled";
+  return {};
+}
+
+api::Activity activity_of(const motion::Motor& motor) {
+  if (motor.is<motion::Moving>()) return api::Activity::kMoving;
+  if (motor.is<motion::Armed>()) return api::Activity::kArmed;
+  if (motor.is<motion::Homing>()) return api::Activity::kHoming;
+  return motor.is<motion::Local>() ? api::Activity::kLocal : api::Activity::kResting;
+}
+
+}  // namespace
+
+StatePublisher::StatePublisher(Installation& installation, Outputs& outputs)
+    : installation_(installation), outputs_(outputs) {
+  for ([[maybe_unused]] const McuId mcu : installation.mcus()) described_.add();
+}
+
+void StatePublisher::step(std::int64_t now_us) {
+  due_us_ = std::min(due_us_, next_wake_us());
+  if (now_us < due_us_) return;
+  for (const McuId mcu : installation_.mcus()) publish(now_us, installation_[mcu]);
+  installation_.changed = false;
+  sent_us_ = now_us;
+  due_us_ = now_us + kPeriodUs;
+}
+
+std::int64_t StatePublisher::next_wake_us() const {
+  return installation_.changed ? std::min(due_us_, sent_us_ + kMinPeriodUs) : due_us_;
+}
+
+void StatePublisher::publish(std::int64_t now_us, const Mcu& mcu) {
+  Described& described = described_[mcu.id];
+  api::Description description = description_of(mcu);
+  if (now_us >= described.due_us || description != described.last) {
+    outputs_.publish(mcu.id, description);
+    described = {.last = std::move(description), .due_us = now_us + kDescriptionPeriodUs};
+  }
+  outputs_.publish(mcu.id, state_of(mcu));
+}
+
+api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& motor) const {
+  const link::McuView& view = mcu.view();
+  const unsigned output = motor.output().value;
+  const auto reports = [&view, output](unsigned mask) {
+    return view.reported && (mask >> output & 1) != 0;
+  };
+  api::MotorState state;
+  state.name = motor.name();
+  state.position_steps = motor.position_steps();
+  state.target_steps = motor.target_steps();
+  state.velocity_steps_per_s = motor.velocity_steps_per_s();
+  state.activity = activity_of(motor);
+  // Motors follow reports only once their MCU is online.
+  if (view.phase == link::McuPhase::kConnecting && reports(view.report.autonomous)) {
+    state.activity = api::Activity::kLocal;
+  }
+  state.moving =
+      state.activity != api::Activity::kResting && state.activity != api::Activity::kArmed;
+  state.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;
+  state.input = reports(view.report.inputs);
+  state.inhibited = {.positive = reports(view.report.forbidden_positive),
+                     .negative = reports(view.report.forbidden_negative)};
+  state.trust = motor.uncertain_reason() ? api::Trust::kUncertain : api::Trust::kKnown;
+  state.uncertain_reason = motor.uncertain_reason().value_or("");
+  return state;
+}
+
+api::StateSnapshot StatePublisher::state_of(const Mcu& mcu) const {
+  const link::McuView& view = mcu.view();
+  const Bus& bus = installation_.bus_of(mcu);
+  api::StateSnapshot state;
+  state.bus = bus.config.name;
+  state.mcu = mcu.name();
+  state.state = state_word(view);
+  state.detail = detail_of(view, bus.two_masters);
+  if (view.reported) state.inputs = motion::system_inputs_words(view.report.system_inputs);
+  state.boot = view.identified ? view.identity.boot_number : 0;
+  state.tick = view.tick;
+  for (const MotorId motor : mcu.motors()) {
+    state.motors.push_back(state_of(mcu, installation_[motor]));
+  }
+  return state;
+}
+
+api::Description StatePublisher::description_of(const Mcu& mcu) const {
+  const config::Bus& bus = installation_.bus_of(mcu).config;
+  api::Description description{.bus = bus.name,
+                               .mcu = mcu.name(),
+                               .address = mcu.config.address.value,
+                               .tick_ns = bus.tick_ns(),
+                               .emergency_stop = bus.emergency_stop == BUSHD_CUT
+                                                     ? api::StopMode::kImmediate
+                                                     : api::StopMode::kRamp,
+                               .motors = {}};
+  for (const MotorId motor : mcu.motors()) {
+    const config::Motor& config = installation_.config()[motor];
+    description.motors.push_back({.name = config.name,
+                                  .output = config.output.value,
+                                  .group = installation_.config().group_of(config).name,
+                                  .table = api::ref_to(*installation_.table_of(motor))});
+  }
+  return description;
+}
+
+}  // namespace bushd::daemon

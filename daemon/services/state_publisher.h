@@ -1,0 +1,43 @@
+// Tells clients what motors and MCUs do: 20 times a second, and at once on change; and what rarely
+// changes, every few seconds and on change.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "daemon/installation.h"
+#include "daemon/outputs.h"
+
+namespace bushd::daemon {
+
+class StatePublisher {
+ public:
+  static constexpr std::int64_t kPeriodUs = 50'000;
+  // "At once on change", but not more often than this: a client that sends many requests must not
+  // make the daemon flood the network.
+  static constexpr std::int64_t kMinPeriodUs = 5'000;
+  static constexpr std::int64_t kDescriptionPeriodUs = 2'000'000;
+
+  StatePublisher(Installation& installation, Outputs& outputs);
+
+  void step(std::int64_t now_us);
+  std::int64_t next_wake_us() const;
+
+ private:
+  api::StateSnapshot state_of(const Mcu& mcu) const;
+  api::MotorState state_of(const Mcu& mcu, const motion::Motor& motor) const;
+  api::Description description_of(const Mcu& mcu) const;
+  void publish(std::int64_t now_us, const Mcu& mcu);
+
+  struct Described {
+    std::optional<api::Description> last;
+    std::int64_t due_us = 0;
+  };
+  Installation& installation_;
+  Outputs& outputs_;
+  ById<McuId, Described> described_;
+  std::int64_t due_us_ = 0;
+  std::int64_t sent_us_ = INT64_MIN / 2;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,42 @@
+// Ramps motors down, whatever moves them but people at their MCU.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <string>
+#include <vector>
+
+#include "daemon/service.h"
+#include "daemon/services/homing_queue.h"
+#include "daemon/services/moves.h"
+
+namespace bushd::daemon {
+
+class Stops final : public Service {
+ public:
+  Stops(Installation& installation, Moves& moves, HomingQueue& homing, const OpenMoves& open_moves)
+      : installation_(installation), moves_(moves), homing_(homing), open_moves_(open_moves) {}
+
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Stop& request);
+  void stop(std::int64_t now_us, const std::vector<MotorId>& motors);
+
+  void reports(std::int64_t, Mcu&) override { follow(); }
+  void step(std::int64_t) override { follow(); }
+
+ private:
+  struct Stopping {
+    api::Asker asker;
+    std::vector<MotorId> motors;  // that do not stand yet
+    std::string done = "done";    // the reason, when all stand
+  };
+  bool can_be_stopped(MotorId motor) const;
+  void follow();
+
+  Installation& installation_;
+  Moves& moves_;
+  HomingQueue& homing_;
+  const OpenMoves& open_moves_;
+  std::list<Stopping> open_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,89 @@
+// Which table each group has, and how it gets another one: the table is read and checked against
+// the buses and MCUs of its motors, the MCUs come to rest, get it and confirm it, and the choice is
+// kept for the next daemon. Until then the old one stays in service. A motor that moves keeps its
+// table; while a change waits for MCUs to come to rest no motor of theirs begins a move, or it
+// might wait for ever.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <string>
+#include <vector>
+
+#include "daemon/interlocks.h"
+#include "daemon/outputs.h"
+#include "daemon/service.h"
+
+namespace bushd::daemon {
+
+class TablesInService final : public Service {
+ public:
+  TablesInService(Installation& installation, Interlocks& interlocks, Outputs& outputs);
+
+  void request(const api::Asker& asker, const api::UseTable& request);
+  void request(const api::Asker& asker, const api::ReloadTables& request);
+  void request(const api::Asker& asker, const api::SetTable& request);
+
+  // Answers to Outputs::read_tables and keep_tables.
+  void read(std::int64_t now_us, std::uint64_t ticket,
+            const std::vector<Result<tables::TablePtr>>& tables);
+  void kept(std::uint64_t ticket, const Result<void>& kept);
+
+  // Whether groups that have a table by this name, and follow its changes, could move by this one.
+  Result<void> check_content(const std::string& name, const tables::TablePtr& table) const;
+  // Before the first port is opened: the group has another table than the configuration says.
+  Result<void> restore(GroupId group, const std::string& wanted, tables::TablePtr table);
+
+  void step(std::int64_t now_us) override;
+
+ private:
+  struct Part {
+    GroupId group;
+    std::string wanted;         // TABLE[@REV] that it is asked for by
+    tables::TablePtr table{};   // once read
+    tables::TablePtr before{};  // while uploading: what it goes back to if that fails
+  };
+  // From the request to its result.
+  struct Change {
+    enum class Stage { kReading, kResting, kUploading, kKeeping };
+    api::Asker asker;  // without a session: not from a client
+    std::uint64_t ticket;
+    bool reload = false;  // groups whose table is what it was are left out
+    Stage stage = Stage::kReading;
+    std::vector<Part> parts{};
+    std::vector<McuId> mcus{};     // that need other tables
+    std::vector<McuId> awaited{};  // while uploading: those that were not offline
+    std::string refused{};         // groups that keep their tables, and why
+    std::string notes{};
+    std::int64_t deadline_us = 0;  // of the upload
+  };
+  using Changes = std::list<Change>;
+
+  const std::string& name_of(GroupId group) const;
+  void begin(Change change);
+  Changes::iterator find(std::uint64_t ticket);
+  bool unchanged(const Part& part) const;
+  void take_part(Change& change, Part part, const Result<tables::TablePtr>& read);
+  tables::TablePtr shared(const Tables& tables, tables::TablePtr table) const;
+  Result<void> fits(const Tables& tables, GroupId group) const;
+  Result<void> fits(const std::vector<Part>& parts) const;
+  void supersede(const Change& by);
+  const Change* changing(McuId mcu) const;
+  std::vector<McuId> mcus_of(const std::vector<Part>& parts) const;
+  bool ready(const Change& change) const;
+  void begin_upload(std::int64_t now_us, Change& change);
+  std::int64_t upload_us(const Mcu& mcu) const;
+  bool uploaded(const Change& change) const;
+  void roll_back(Change& change);
+  void keep(Change& change);
+  void refuse(Changes::iterator change);
+  void complete(Changes::iterator change, api::Outcome outcome, const std::string& reason);
+
+  Installation& installation_;
+  Outputs& outputs_;
+  ById<GroupId, std::string> wanted_;  // TABLE[@REV] that each group's table was asked for by
+  Changes changes_;
+  std::uint64_t last_ticket_ = 0;
+};
+
+}  // namespace bushd::daemon

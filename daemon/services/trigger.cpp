@@ -1,0 +1,99 @@
+#include "daemon/services/trigger.h"
+
+#include <map>
+#include <utility>
+
+namespace bushd::daemon {
+
+void Trigger::request(const api::Asker& asker, const api::Arm& request) {
+  const auto motors = motors_of(request);
+  if (!motors) return asker.answer(api::Refused{motors.error().text()});
+  asker.answer(api::Accepted{});
+  open_moves_.open(asker, *motors);
+  std::map<McuId, std::vector<link::Master::Armed>> moves;
+  for (std::size_t i = 0; i < motors->size(); ++i) {
+    const MotorId motor = (*motors)[i];
+    moves[installation_.config()[motor].mcu].push_back(
+        {.motor = installation_[motor].output().value,
+         .steps = static_cast<std::int32_t>(request.motors[i].steps)});
+  }
+  const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
+  std::map<McuId, std::uint8_t> numbers;
+  for (const auto& [mcu, of_mcu] : moves) {
+    numbers[mcu] =
+        installation_[mcu].arm(edge, static_cast<std::uint32_t>(request.delay_us), of_mcu);
+  }
+  for (std::size_t i = 0; i < motors->size(); ++i) {
+    const MotorId motor = (*motors)[i];
+    installation_[motor].arm(numbers[installation_.config()[motor].mcu], request.motors[i].steps);
+  }
+  installation_.changed = true;
+}
+
+Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
+  auto motors = installation_.find(request.motors);
+  if (!motors) return motors;
+  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
+  for (std::size_t i = 0; i < motors->size(); ++i) {
+    const auto target =
+        moves_.target_of((*motors)[i], request.motors[i].steps, api::Move::Kind::kRelative);
+    if (!target) return fail(target.error());
+  }
+  if (request.delay_us < BUSHD_TRIGGER_MIN_DELAY_US ||
+      request.delay_us > BUSHD_TRIGGER_MAX_DELAY_US) {
+    return fail("a delay of " + std::to_string(request.delay_us) +
+                " us after the trigger; allowed: " + std::to_string(BUSHD_TRIGGER_MIN_DELAY_US) +
+                " to " + std::to_string(BUSHD_TRIGGER_MAX_DELAY_US));
+  }
+  for (std::size_t i = 0; i < motors->size(); ++i) {
+    if (auto may = may_arm((*motors)[i], request.motors[i].steps); !may) return fail(may.error());
+  }
+  return motors;
+}
+
+Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {
+  const motion::Motor& motor = installation_[id];
+  const Mcu& mcu = installation_.mcu_of(id);
+  if (steps == 0) return fail(motor.name() + ": a move of no steps");
+  if (motor.has_plan()) return fail(motor.name() + " moves; stop it first");
+  if (!mcu.can_trigger() || !mcu.can_run_tables()) {
+    return fail(motor.name() + ": MCU " + mcu.name() +
+                " has no trigger input; move it without one, or by an MCU that has");
+  }
+  for (const MotorId other : mcu.motors()) {
+    if (!installation_[other].is<motion::Armed>()) continue;
+    return fail(installation_[other].name() + " waits for the trigger of MCU " + mcu.name() +
+                " already; disarm it first");
+  }
+  return {};
+}
+
+void Trigger::request(const api::Asker& asker, const api::Disarm& request) {
+  auto motors = installation_.find_or_all(request.motors);
+  if (!motors) return asker.answer(api::Refused{motors.error().text()});
+  asker.answer(api::Accepted{});
+  std::erase_if(*motors,
+                [this](MotorId motor) { return !installation_[motor].is<motion::Armed>(); });
+  for (const McuId mcu : installation_.mcus_of(*motors)) installation_[mcu].disarm();
+  open_.push_back({.asker = asker, .motors = std::move(*motors)});
+}
+
+void Trigger::follow() {
+  std::erase_if(open_, [this](Disarming& disarming) {
+    std::erase_if(disarming.motors, [&](MotorId id) {
+      const motion::Motor& motor = installation_[id];
+      if (motor.is<motion::Armed>()) return false;
+      if (motor.is<motion::Moving>()) {
+        disarming.done = motor.name() + " moves: the trigger came before it was disarmed";
+      }
+      return true;
+    });
+    if (!disarming.motors.empty()) return false;
+    installation_.changed = true;
+    disarming.asker.answer(
+        api::Completed{.outcome = api::Outcome::kDone, .reason = disarming.done, .detail = {}});
+    return true;
+  });
+}
+
+}  // namespace bushd::daemon

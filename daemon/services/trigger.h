@@ -1,0 +1,47 @@
+// Moves that wait for the trigger of their MCU. From when a report tells that the MCU has begun one
+// it is a table run like any other.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <string>
+#include <vector>
+
+#include "daemon/service.h"
+#include "daemon/services/moves.h"
+
+namespace bushd::daemon {
+
+class Trigger final : public Service {
+ public:
+  Trigger(Installation& installation, const Interlocks& interlocks, const Moves& moves,
+          OpenMoves& open_moves)
+      : installation_(installation),
+        interlocks_(interlocks),
+        moves_(moves),
+        open_moves_(open_moves) {}
+
+  void request(const api::Asker& asker, const api::Arm& request);
+  void request(const api::Asker& asker, const api::Disarm& request);
+
+  void reports(std::int64_t, Mcu&) override { follow(); }
+  void step(std::int64_t) override { follow(); }
+
+ private:
+  struct Disarming {
+    api::Asker asker;
+    std::vector<MotorId> motors;  // that wait still
+    std::string done = "done";
+  };
+  Result<std::vector<MotorId>> motors_of(const api::Arm& request) const;
+  Result<void> may_arm(MotorId motor, std::int64_t steps) const;
+  void follow();
+
+  Installation& installation_;
+  const Interlocks& interlocks_;
+  const Moves& moves_;
+  OpenMoves& open_moves_;
+  std::list<Disarming> open_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,130 @@
+#include "daemon/supervisor.h"
+
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "base/overloaded.h"
+#include "motion/report_words.h"
+
+namespace bushd::daemon {
+namespace {
+
+// " (watchdog)"
+std::string by_cause(std::uint8_t reset_cause) {
+  const std::string word = motion::reset_cause_word(reset_cause);
+  return word.empty() ? word : " (" + word + ")";
+}
+
+// Of the motors that the MCU has, as far as they are configured.
+bool is_reported(const Mcu& mcu, const motion::Motor& motor) {
+  return motor.output().value < mcu.report().motor_count;
+}
+
+}  // namespace
+
+Supervisor::Supervisor(Installation& installation, Journal& journal, Moves& moves,
+                       const Positions& positions, const EmergencyStop& emergency_stop,
+                       std::vector<Service*> services, Outputs& outputs)
+    : installation_(installation),
+      journal_(journal),
+      moves_(moves),
+      positions_(positions),
+      emergency_stop_(emergency_stop),
+      services_(std::move(services)),
+      outputs_(outputs) {
+  for ([[maybe_unused]] const McuId mcu : installation.mcus()) boot_number_.add();
+}
+
+void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
+  const auto mcu_of = [&](const auto& event) -> Mcu& {
+    return installation_[bus.mcus[event.mcu.value]];
+  };
+  const auto handle = Overloaded{
+      [&](const link::McuOnline& event) { goes_online(mcu_of(event)); },
+      [&](const link::McuOffline& event) { goes_offline(mcu_of(event)); },
+      [&](const link::McuReported& event) { reports(now_us, mcu_of(event)); },
+      [&](const link::RequestRefused& event) {
+        for (Service* service : services_) {
+          service->refuses(mcu_of(event), event.type, event.status);
+        }
+      },
+      [&](const link::StartMissed& event) { starts_late(mcu_of(event), Output{event.motor}); },
+      [&](const link::ReplacementFailed& event) { replans(now_us, mcu_of(event), event.motors); }};
+  for (const link::Event& event : bus.master.take_events()) std::visit(handle, event);
+}
+
+// The MCU did not take what was planned: its motors go on as before.
+void Supervisor::replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs) {
+  std::vector<MotorId> again;
+  for (const MotorId motor : mcu.motors()) {
+    if ((outputs >> installation_[motor].output().value & 1) != 0) again.push_back(motor);
+  }
+  moves_.replan(now_us, again);
+}
+
+void Supervisor::goes_online(Mcu& mcu) {
+  const std::uint16_t boot_number = mcu.report().boot_number;
+  const auto before = std::exchange(boot_number_[mcu.id], boot_number);
+  const bool restarted = before && *before != boot_number;
+  for (const MotorId id : mcu.motors()) {
+    if (!is_reported(mcu, installation_[id])) continue;
+    installation_[id].goes_online(mcu.report(), !before, restarted);
+    if (restarted) journal_.position_lost(id);
+  }
+  outputs_.log(restarted ? LogLevel::kWarning : LogLevel::kInfo,
+               "MCU " + mcu.name() + " is ready, boot number " + std::to_string(boot_number) +
+                   (restarted ? "; it restarted" + by_cause(mcu.report().reset_cause) +
+                                    ", so its motors' positions are uncertain: set or home them"
+                              : ""));
+  for (Service* service : services_) service->goes_online(mcu);
+  installation_.changed = true;
+}
+
+void Supervisor::goes_offline(Mcu& mcu) {
+  const std::string cause = "MCU " + mcu.name() + " " + mcu.view().detail;
+  outputs_.log(LogLevel::kError, cause);
+  for (Service* service : services_) service->goes_offline(mcu, cause);
+  for (const MotorId motor : mcu.motors()) installation_[motor].goes_offline();
+  installation_.changed = true;
+}
+
+void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
+  for (const MotorId id : mcu.motors()) {
+    motion::Motor& motor = installation_[id];
+    if (!is_reported(mcu, motor)) continue;
+    journal_.before_report(id, positions_.being_set(id));
+    moves_.take(now_us, id,
+                motor.report({.of_mcu = mcu.report(),
+                              .tick = mcu.view().tick,
+                              .requests_open = mcu.busy(),
+                              .emergency_stop_open = emergency_stop_.under_way()}));
+  }
+  journal_.after_report(mcu);
+  for (Service* service : services_) service->reports(now_us, mcu);
+}
+
+void Supervisor::starts_late(Mcu& mcu, Output output) {
+  const auto id = mcu.motor_at(output);
+  if (!id) return;
+  const auto ended = installation_[*id].starts_late(mcu.report());
+  if (ended) moves_.end(*id, *ended);
+}
+
+void Supervisor::watch_for_other_masters(std::int64_t now_us) {
+  for (const BusId id : installation_.buses()) {
+    Bus& bus = installation_[id];
+    const bool now = bus.master.two_masters(now_us);
+    if (std::exchange(bus.two_masters, now) == now) continue;
+    installation_.changed = true;
+    if (now) {
+      outputs_.log(LogLevel::kError, "bus " + bus.config.name +
+                                         ": another master talks on the line; no moves are taken "
+                                         "until it is silent");
+    } else {
+      outputs_.log(LogLevel::kInfo, "bus " + bus.config.name + ": the other master is silent");
+    }
+  }
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,45 @@
+// What buses tell: MCUs that go online and offline, reports, late starts. The motors follow it
+// first, then the services.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "daemon/outputs.h"
+#include "daemon/services/emergency_stop.h"
+#include "daemon/services/journal.h"
+#include "daemon/services/moves.h"
+#include "daemon/services/positions.h"
+
+namespace bushd::daemon {
+
+class Supervisor {
+ public:
+  // `services` are told in their order.
+  Supervisor(Installation& installation, Journal& journal, Moves& moves, const Positions& positions,
+             const EmergencyStop& emergency_stop, std::vector<Service*> services, Outputs& outputs);
+
+  void handle_events(std::int64_t now_us, Bus& bus);
+  // Tells people at once that somebody else talks on a line, and when it is over.
+  void watch_for_other_masters(std::int64_t now_us);
+
+ private:
+  void goes_online(Mcu& mcu);
+  void goes_offline(Mcu& mcu);
+  void reports(std::int64_t now_us, Mcu& mcu);
+  void starts_late(Mcu& mcu, Output output);
+  void replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs);
+
+  Installation& installation_;
+  Journal& journal_;
+  Moves& moves_;
+  const Positions& positions_;
+  const EmergencyStop& emergency_stop_;
+  std::vector<Service*> services_;
+  Outputs& outputs_;
+  // Of the boot that positions belong to.
+  ById<McuId, std::optional<std::uint16_t>> boot_number_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,63 @@
+#include "api/reply.h"
+
+namespace bushd::api {
+namespace {
+
+std::size_t memory_of(const std::string& text) {
+  return sizeof(std::string) + text.capacity();
+}
+
+std::size_t memory_of(const TableRef& table) {
+  return sizeof table + table.name.capacity() + table.hash.capacity();
+}
+
+std::size_t memory_of(std::monostate) {
+  return 0;
+}
+
+std::size_t memory_of(const std::vector<MotorResult>& motors) {
+  std::size_t bytes = 0;
+  for (const MotorResult& motor : motors) {
+    bytes += sizeof motor + memory_of(motor.motor) + memory_of(motor.table);
+  }
+  return bytes;
+}
+
+std::size_t memory_of(const MovePlan& plan) {
+  std::size_t bytes = sizeof plan;
+  for (const MovePlan::Motor& motor : plan.motors) bytes += sizeof motor + memory_of(motor.motor);
+  return bytes;
+}
+
+std::size_t memory_of(const TableList& list) {
+  std::size_t bytes = 0;
+  for (const TableEntry& entry : list.entries) {
+    bytes += sizeof entry + memory_of(entry.name) + memory_of(entry.fault) + memory_of(entry.table);
+  }
+  return bytes;
+}
+
+std::size_t memory_of(const tables::TableContent& content) {
+  std::size_t codes = content.accel.capacity();
+  if (content.decel) codes += content.decel->capacity();
+  return sizeof content + memory_of(content.name) + memory_of(content.description) +
+         codes * sizeof(std::uint16_t);
+}
+
+}  // namespace
+
+TableRef ref_to(const tables::Table& table) {
+  return {.name = table.name(), .revision = table.revision(), .hash = table.short_hash()};
+}
+
+std::size_t memory_of(const Reply& reply) {
+  std::size_t bytes = sizeof reply;
+  if (const auto* refused = std::get_if<Refused>(&reply)) bytes += memory_of(refused->reason);
+  if (const auto* result = std::get_if<Completed>(&reply)) {
+    bytes += memory_of(result->reason) +
+             std::visit([](const auto& detail) { return memory_of(detail); }, result->detail);
+  }
+  return bytes;
+}
+
+}  // namespace bushd::api

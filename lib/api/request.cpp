@@ -1,0 +1,30 @@
+#include "api/request.h"
+
+#include <array>
+
+namespace bushd::api {
+namespace {
+
+// In the order of the variant.
+constexpr std::array<std::string_view, std::variant_size_v<Request>> kNames = {
+    "move",         "stop",         "emergency stop",   "enable",        "disable",
+    "set position", "clear faults", "use table",        "reload tables", "home",
+    "arm",          "disarm",       "position compare", "list tables",   "get table",
+    "set table"};
+
+}  // namespace
+
+std::string_view name_of(const Request& request) {
+  return kNames[request.index()];
+}
+
+bool is_stop(const Request& request) {
+  return std::holds_alternative<Stop>(request) || std::holds_alternative<EmergencyStop>(request);
+}
+
+bool is_repeatable(const Request& request) {
+  return is_stop(request) || std::holds_alternative<ListTables>(request) ||
+         std::holds_alternative<GetTable>(request);
+}
+
+}  // namespace bushd::api

@@ -1,0 +1,140 @@
+// Everything that can be asked of the daemon: one type per request. A new request is a new type
+// here, a service in the core and a message in the front ends; no other request changes.
+//
+// Motors and groups are named as in the configuration. Front ends pass names and numbers as they
+// come, however wrong: the core resolves them, checks every range and refuses with a reason. So the
+// ranges below are those that are accepted, not preconditions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "api/words.h"
+#include "tables/table.h"
+
+namespace bushd::api {
+
+// One motor and a number of steps: where to, or by how many. Within +-(2^31 - 1).
+struct MotorSteps {
+  std::string motor{};
+  std::int64_t steps = 0;
+  friend bool operator==(const MotorSteps&, const MotorSteps&) = default;
+};
+
+using MotorNames = std::vector<std::string>;
+
+// One group move: the motors of one bus start in the same tick. A motor that moves is given a new
+// target; its part in the move before ends with kStopped.
+// Result: the worst outcome of its motors, and one MotorResult each. Refused as a whole if one
+// motor cannot move.
+struct Move {
+  enum class Kind {
+    kRelative,  // by so many steps, of a motor that moves from its present target
+    kAbsolute   // to this position
+  };
+  Kind kind = Kind::kRelative;
+  std::vector<MotorSteps> motors{};  // at least one, none twice
+  bool dry_run = false;  // from rest only: result kDone with a MovePlan, and nothing moves
+};
+
+// Ramps these motors down; none named: all. Result kDone once they stand. Also disarms, and ends
+// homing. Never refused, but for an unknown motor.
+struct Stop {
+  MotorNames motors{};
+};
+
+// Stops all motors of all buses as the configuration says (StopMode), and latches the stop in every
+// MCU until ClearFaults. Never refused. Result kDone once all MCUs that are online stand.
+struct EmergencyStop {};
+
+// Drivers of the MCUs of these motors on or off; none named: of all. Disable is refused while one
+// of them moves.
+struct Enable {
+  MotorNames motors{};
+};
+struct Disable {
+  MotorNames motors{};
+};
+
+// Sets where these motors, at rest, stand. Makes their positions known.
+struct SetPosition {
+  std::vector<MotorSteps> motors{};  // at least one
+};
+
+// Clears latched faults of the MCUs of these motors, none named: of all. Refused while one moves.
+struct ClearFaults {
+  MotorNames motors{};
+};
+
+// Gives the group another table from its next move on, as soon as its MCUs stand. A later request
+// for the same group ends this one with kStopped.
+struct UseTable {
+  std::string group{};
+  std::string table{};  // NAME, NAME@REVISION or NAME@TAG
+};
+
+// Reads all groups' tables again. Result kFault if the table of a group was bad and the old one
+// stays.
+struct ReloadTables {};
+
+// Motors, at rest, look for their switches, those of one MCU one after the other.
+struct Home {
+  MotorNames motors{};  // at least one, each with `home` in the configuration
+};
+
+// Motors, at rest, wait for an edge at the trigger input of their MCU and begin together after it.
+struct Arm {
+  Edge edge = Edge::kRising;
+  std::int64_t delay_us = 0;         // 50..1500000, three ticks come on top
+  std::vector<MotorSteps> motors{};  // by so many steps, not 0
+};
+
+// Motors that wait for the trigger do so no more, nor do those armed with them; none named: all.
+struct Disarm {
+  MotorNames motors{};
+};
+
+// The position compare output of the motor's MCU pulses when the motor arrives at the position.
+struct PositionCompare {
+  std::string motor{};
+  std::int64_t position_steps = 0;
+  Directions arrivals{};      // by steps in these directions; none: no pulses any more
+  std::int64_t delay_us = 0;  // from the step to the pulse, 0..1500000
+  std::int64_t width_us = 0;  // of the pulse, 1..1000000; of no meaning without arrivals
+};
+
+// Result: TableList.
+struct ListTables {};
+
+// Result: tables::TableContent as its file says.
+struct GetTable {
+  std::string table{};  // NAME, NAME@REVISION or NAME@TAG
+};
+
+// A new revision of a table file, or a new one; puts nothing in service. A file that has the
+// content already stays as it is. Result: TableList with the one as it is now.
+struct SetTable {
+  std::string table{};  // NAME
+  tables::TableContent content{};
+  // Of the table that this one was made from, as GetTable told it (its revision is in the content);
+  // if the table is another by now it is left alone. "": the table is new.
+  std::string expected_hash{};
+};
+
+using Request =
+    std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
+                 ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables, GetTable, SetTable>;
+
+// For logs and counts: "move", "stop", "emergency stop", ...
+std::string_view name_of(const Request& request);
+
+// Taken before anything that waits.
+bool is_stop(const Request& request);
+
+// Carrying it out twice does what once does, so it needs no session: stops, and what only reads.
+bool is_repeatable(const Request& request);
+
+}  // namespace bushd::api

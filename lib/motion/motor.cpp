@@ -1,0 +1,341 @@
+#include "motion/motor.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "motion/report_words.h"
+
+namespace bushd::motion {
+namespace {
+
+constexpr Tick kNever = INT64_MAX / 2;
+
+constexpr const char* kCutOff = "it was cut off by an emergency stop and may have overrun";
+constexpr const char* kUnpowered = "its drivers were switched off by overcurrent while it moved";
+
+std::string switch_at(int direction) {
+  return std::string("its limit switch at the ") + (direction > 0 ? "positive" : "negative") +
+         " end";
+}
+
+bool has_bit(unsigned mask, Output output) {
+  return (mask >> output.value & 1) != 0;
+}
+
+}  // namespace
+
+std::string Motor::busy_text() const {
+  return name() + (is<Armed>() ? " waits for the trigger" : " moves");
+}
+
+Result<void> Motor::may_be_used() const {
+  if (is<Armed>()) return fail("waits for the trigger; disarm it first");
+  if (is<Homing>()) return fail("it is being homed; wait for that result");
+  if (is<Local>()) {
+    return fail("the local inputs of MCU " + setup_.mcu + " move it; release them first");
+  }
+  return {};
+}
+
+Result<void> Motor::may_move_to(std::int64_t target) const {
+  if (uncertain_reason_) {
+    return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
+                (setup_.has_home ? "say 'bushctl home NAME', or find out where it stands and say "
+                                   "'bushctl set NAME STEPS'"
+                                 : "find out where it stands and say 'bushctl set NAME STEPS'"));
+  }
+  const std::int64_t steps = target - position_;
+  if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
+    return fail("target " + std::to_string(target) + " is beyond +-" +
+                std::to_string(kMaxPosition) + " steps");
+  }
+  if (const Moving* moving = as<Moving>(); moving != nullptr && moving->limit != 0) {
+    return fail(switch_at(moving->limit) + " is stopping it; wait for that result");
+  }
+  const int direction = steps < 0 ? -1 : 1;
+  if (steps != 0 && forbidden(direction)) {
+    return fail(switch_at(direction) + " bars the way; move it in the other direction");
+  }
+  if (axis_.duration_ticks(steps) > Axis::kMaxDurationTicks) {
+    const double tick_days = axis_.tick_ns() * 1e-9 / 86400;
+    const auto days = [tick_days](double ticks) { return std::llround(ticks * tick_days); };
+    return fail(std::to_string(steps) + " steps would take " +
+                std::to_string(days(axis_.duration_ticks(steps))) +
+                " days with this table; the longest move is " +
+                std::to_string(days(Axis::kMaxDurationTicks)) + " days");
+  }
+  return {};
+}
+
+void Motor::start(std::int64_t target, Tick start) {
+  activity_ = Moving{};
+  axis_.start(position_, target - position_, start);
+}
+
+void Motor::arm(std::uint8_t number, std::int64_t steps) {
+  activity_ = Armed{.number = number, .steps = steps};
+  axis_.start(position_, steps, kNever);
+}
+
+void Motor::stop(std::optional<std::string> ended_by) {
+  if (is<Moving>()) axis_.stop();
+  if (auto* armed = std::get_if<Armed>(&activity_)) {
+    armed->stops = true;
+    if (ended_by) armed->ended_by = std::move(ended_by);
+  }
+}
+
+void Motor::end_homing(bool found) {
+  if (!is<Homing>()) return;
+  if (found) uncertain_reason_.reset();
+  rest();
+}
+
+void Motor::rest() {
+  if (autonomous_) {
+    activity_ = Local{};
+  } else {
+    activity_ = Resting{};
+  }
+}
+
+bool Motor::cuts(const bushd_report& report) const {
+  return ((report.faults & BUSHD_FAULT_EMERGENCY) != 0 && setup_.emergency_stop_cuts) ||
+         ((report.faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0 && setup_.emergency_input_cuts);
+}
+
+void Motor::take_limits(const bushd_report& report) {
+  forbidden_up_ = has_bit(report.forbidden_positive, output());
+  forbidden_down_ = has_bit(report.forbidden_negative, output());
+}
+
+// Positions are counts since the MCU's boot: a boot whose positions nobody has seen has lost them.
+void Motor::goes_online(const bushd_report& report, bool first, bool restarted) {
+  const std::int64_t before = std::exchange(position_, report.motor[output().value].position_steps);
+  if (restarted) uncertain_reason_ = "MCU " + setup_.mcu + " restarted";
+  // Nobody here has seen whether it moved when it was cut off.
+  const bool cut = cuts(report);
+  const bool unpowered = (report.faults & BUSHD_FAULT_OVERCURRENT) != 0;
+  if ((cut || unpowered) && (first || position_ != before)) {
+    uncertain_reason_ = cut ? kCutOff : kUnpowered;
+  }
+  take_limits(report);
+  follow_autonomous(report);
+}
+
+void Motor::goes_offline() {
+  if (is<Local>()) activity_ = Resting{};
+}
+
+std::vector<Event> Motor::report(const Report& report) {
+  std::vector<Event> events;
+  position_ = report.of_mcu.motor[output().value].position_steps;
+  take_limits(report.of_mcu);
+  if (has_plan()) follow(report, events);
+  follow_autonomous(report.of_mcu);
+  return events;
+}
+
+// No move has led to where it stands.
+void Motor::follow_autonomous(const bushd_report& report) {
+  const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output()));
+  if (before && !autonomous_) {
+    if (cuts(report)) uncertain_reason_ = kCutOff;
+    if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) uncertain_reason_ = kUnpowered;
+  }
+  if (is<Resting>() || is<Local>()) rest();
+}
+
+void Motor::follow(const Report& report, std::vector<Event>& events) {
+  const bool moving = has_bit(report.of_mcu.moving, output());
+  if (is<Armed>() && !follow_armed(report, events)) return;
+  if (has_bit(report.of_mcu.autonomous, output())) {
+    // So it had no ticks of the move, and takes none.
+    events.emplace_back(
+        ended(Outcome::kStopped, "the local inputs of MCU " + setup_.mcu +
+                                     " moved it before it could start; release them and move it "
+                                     "again"));
+    return;
+  }
+  if (report.of_mcu.faults != 0) {
+    // The MCU takes no more ticks; what it has, it runs, and then down its own table.
+    if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
+    return;
+  }
+  // It has not told of the emergency stop yet, with which its plan was given up.
+  if (report.emergency_stop_open) return;
+  auto& now = std::get<Moving>(activity_);
+  if (now.limit == 0) {
+    if (const auto change = axis_.executed(report.tick)) {
+      events.emplace_back(event::Executed{*change});
+    }
+    notice_limit(report, events);
+  }
+  if (now.limit != 0) {
+    if (!moving) events.emplace_back(end_at_limit());
+    return;
+  }
+  const std::int64_t planned = axis_.executed_steps();
+  if (!now.position_mismatch && position_ != planned) {
+    if (!moving && position_ == axis_.from_steps()) {
+      // A motor at rest looks the same whether its start came and is over or never came.
+      events.emplace_back(ended(Outcome::kLink, did_not_start()));
+      return;
+    }
+    now.position_mismatch = true;
+    uncertain_reason_ = "MCU " + setup_.mcu + " counted position " + std::to_string(position_) +
+                        " where the table leads to " + std::to_string(planned);
+    events.emplace_back(event::Mismatch{});
+    axis_.stop();
+  }
+  if (report.tick < axis_.end_tick()) {
+    if (axis_.needs_change()) events.emplace_back(event::Replan{});
+  } else if (now.position_mismatch) {
+    if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
+  } else if (position_ == axis_.wanted_steps()) {
+    events.emplace_back(ended(Outcome::kReached, "stands at its target"));
+  } else if (axis_.stopping()) {
+    events.emplace_back(ended(Outcome::kStopped, "stopped on request"));
+  } else {
+    // It was given a target that its table could not lead to without a rest.
+    events.emplace_back(event::Turn{});
+  }
+}
+
+// Returns whether the rest of the report is to be looked at: it has started, or a fault has put an
+// end to it.
+bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
+  const bushd_report& mcu = report.of_mcu;
+  const Armed armed = std::get<Armed>(activity_);
+  const bool told = mcu.trigger_number == armed.number;
+  if (told && mcu.trigger_state == BUSHD_TRIGGER_STARTED) {
+    const Tick start = report.tick + static_cast<std::int32_t>(mcu.start_tick - mcu.tick);
+    activity_ = Moving{};
+    axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns);
+    if (armed.stops) axis_.stop();
+    events.emplace_back(
+        event::Started{.start = start, .late_ns = mcu.start_ns, .steps = armed.steps});
+    return true;
+  }
+  if (mcu.faults != 0) return true;
+  if (report.requests_open) return false;
+  const std::string name = "MCU " + setup_.mcu;
+  const bool refused_for_limit = !told && mcu.last_rejection == BUSHD_E_FORBIDDEN;
+  if (refused_for_limit || (told && mcu.trigger_state == BUSHD_TRIGGER_FORBIDDEN)) {
+    events.emplace_back(
+        ended(Outcome::kLimit,
+              "a limit switch forbids that direction, or that of another motor that waited with "
+              "it; it did not move. Move that motor away from its switch, and arm again"));
+  } else if (!told) {
+    events.emplace_back(
+        ended(Outcome::kFault,
+              name + " did not arm it: " + bushd_status_text(mcu.last_rejection) +
+                  "; 'bushctl status' tells how that MCU is, arm again when it is ready"));
+  } else if (mcu.trigger_state == BUSHD_TRIGGER_DISARMED) {
+    events.emplace_back(
+        ended(Outcome::kStopped, !armed.ended_by ? "disarmed before the trigger came"
+                                                 : "disarmed, because " + *armed.ended_by +
+                                                       ", armed with it, does not wait any more"));
+  } else if (mcu.trigger_state == BUSHD_TRIGGER_LATE) {
+    events.emplace_back(
+        ended(Outcome::kFault,
+              "the trigger came, but " + name +
+                  " noticed it too late to begin in time; it did not move, arm it again"));
+  } else if (mcu.trigger_state == BUSHD_TRIGGER_FAULT) {
+    events.emplace_back(ended(Outcome::kFault,
+                              "a fault of " + name + " disarmed it; 'bushctl status' tells which"));
+  }
+  return false;
+}
+
+// The way it goes is barred, and the MCU has not begun, or goes by a ramp of its own.
+void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
+  const int direction = axis_.direction();
+  if (!forbidden(direction)) return;
+  const bool moving = has_bit(report.of_mcu.moving, output());
+  const bool given_up =
+      !moving && report.tick >= axis_.start_tick() && axis_.velocity_steps_per_s() != 0;
+  // Its own ramp may be a step longer than what was planned.
+  const bool outlasts = moving && report.tick >= axis_.end_tick();
+  if (!given_up && !outlasts && axis_.executed_steps() == position_) return;
+  std::get<Moving>(activity_).limit = direction;
+  events.emplace_back(event::Drop{});
+}
+
+// It stands.
+event::Ended Motor::end_at_limit() {
+  if (!axis_.stopping() && position_ == axis_.wanted_steps()) {
+    return ended(Outcome::kReached, "stands at its target");
+  }
+  if (axis_.stopping() && position_ == axis_.executed_steps()) {
+    return ended(Outcome::kStopped, "stopped on request");
+  }
+  std::string reason = "stopped by " + switch_at(std::get<Moving>(activity_).limit) +
+                       ", stands at " + std::to_string(position_);
+  if (setup_.limit_cuts && position_ != axis_.from_steps()) {
+    uncertain_reason_ = "it was cut off at its limit switch and may have overrun";
+    reason += "; cut off, it may have overrun, so check the position and set it";
+  }
+  return ended(Outcome::kLimit, std::move(reason));
+}
+
+// It stands, and not by its plan.
+event::Ended Motor::end_by_fault(const bushd_report& report) {
+  // One that has not made a step cannot overrun.
+  const bool stepped = position_ != axis_.from_steps();
+  const std::string mcu = "MCU " + setup_.mcu;
+  if (const Moving* moving = as<Moving>(); moving != nullptr && moving->position_mismatch) {
+    return ended(Outcome::kFault, *uncertain_reason_ + "; check the position and set it");
+  }
+  if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
+    const std::string why = mcu + " switched its drivers off because " + stop_cause(report);
+    if (stepped) uncertain_reason_ = kUnpowered;
+    return ended(Outcome::kFault, stepped
+                                      ? why + "; check the position and set it"
+                                      : "it did not move: " + why +
+                                            "; find the cause, then 'bushctl clear' and 'enable'");
+  }
+  if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
+    const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
+    const std::string by = commanded ? "an emergency stop" : "the emergency input of " + mcu;
+    const bool overran = cuts(report) && stepped;
+    if (overran) uncertain_reason_ = kCutOff;
+    return ended(
+        Outcome::kStopped,
+        overran ? "cut off by " + by + "; it may have overrun, so check the position and set it"
+                : "stopped by " + by);
+  }
+  if (is<Armed>()) {
+    return ended(Outcome::kLink, mcu + " disarmed it by itself because " + stop_cause(report));
+  }
+  return ended(Outcome::kLink, mcu + " ran it down by itself because " + stop_cause(report));
+}
+
+std::optional<event::Ended> Motor::starts_late(const bushd_report& report) {
+  const bool ran_down = report.faults != 0;  // says the next report
+  // Of a move that was cancelled before its start no tick is missed.
+  const bool cancelled = axis_.end_tick() <= axis_.start_tick();
+  take_limits(report);
+  const bool limited = forbidden_up_ || forbidden_down_;  // says the next report
+  if (ran_down || cancelled || limited) return std::nullopt;
+  return end(Outcome::kLink, did_not_start());
+}
+
+std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {
+  if (!has_plan()) return std::nullopt;
+  return ended(outcome, std::move(reason));
+}
+
+event::Ended Motor::ended(Outcome outcome, std::string reason) {
+  const bool was_armed = is<Armed>();
+  axis_.finish();
+  rest();
+  return {.outcome = outcome, .reason = std::move(reason), .was_armed = was_armed};
+}
+
+std::string Motor::did_not_start() const {
+  return "its first ticks did not reach MCU " + setup_.mcu + " in time; it did not move";
+}
+
+}  // namespace bushd::motion

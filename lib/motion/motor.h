@@ -1,0 +1,172 @@
+// One motor: where it stands and whether that is certain, what it does, and what it may do now.
+// Requests and reports of its MCU go in; what is to be done on the bus and to be told to clients
+// comes out. It has no I/O and knows no other motor.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "api/words.h"
+#include "base/ids.h"
+#include "base/result.h"
+#include "engine/message.h"
+#include "motion/axis.h"
+
+namespace bushd::motion {
+
+using api::Outcome;
+
+struct MotorSetup {
+  std::string name;
+  std::string mcu;  // for texts, as the name
+  Output output;
+  bool has_home = false;
+  // Without a ramp, so that it may overrun.
+  bool limit_cuts = false;
+  bool emergency_stop_cuts = false;
+  bool emergency_input_cuts = false;
+};
+
+// What a motor does. Any other than Resting keeps other motions away from it.
+struct Resting {};
+struct Moving {
+  bool position_mismatch = false;  // counted otherwise than planned; it is being stopped
+  int limit = 0;                   // +1, -1: its limit switch at this end stops it
+};
+// Waits for the trigger, or for the MCU to say that it does: the axis has no start yet.
+struct Armed {
+  std::uint8_t number;  // of link::Master::arm
+  std::int64_t steps;
+  bool stops = false;                     // as soon as it has started: that came before disarming
+  std::optional<std::string> ended_by{};  // the motor armed with it whose end ends it too
+};
+struct Homing {};  // by its MCU, or it waits for its turn
+struct Local {};   // the inputs at its MCU move it
+using Activity = std::variant<Resting, Moving, Armed, Homing, Local>;
+
+// What an MCU reports, and what is known beside.
+struct Report {
+  const bushd_report& of_mcu;
+  Tick tick;                 // of_mcu.tick, unwrapped
+  bool requests_open;        // the MCU has not yet answered all that it was asked
+  bool emergency_stop_open;  // commanded, and not yet known to be obeyed everywhere
+};
+
+// What follows from a report, to be done in this order.
+namespace event {
+struct Started {  // by the trigger: from now on it is a table run like any other
+  Tick start;
+  std::uint32_t late_ns;
+  std::int64_t steps;
+};
+struct Executed {  // a change of plan
+  Change change;
+};
+struct Replan {};  // the plan is not what was requested any more
+struct Drop {};    // its MCU takes no more ticks for this motion
+struct Mismatch {};
+struct Turn {};  // it stands on the way to a target that takes a second run
+struct Ended {
+  Outcome outcome;
+  std::string reason;
+  bool was_armed = false;
+};
+}  // namespace event
+using Event = std::variant<event::Started, event::Executed, event::Replan, event::Drop,
+                           event::Mismatch, event::Turn, event::Ended>;
+
+class Motor {
+ public:
+  // MCUs count positions in 32 bits.
+  static constexpr std::int64_t kMaxPosition = INT32_MAX;
+
+  Motor(MotorSetup setup, Axis axis) : setup_(std::move(setup)), axis_(axis) {}
+
+  const std::string& name() const { return setup_.name; }
+  Output output() const { return setup_.output; }
+
+  const Activity& activity() const { return activity_; }
+  template <class A>
+  const A* as() const {
+    return std::get_if<A>(&activity_);
+  }
+  template <class A>
+  bool is() const {
+    return std::holds_alternative<A>(activity_);
+  }
+  // Its axis has a plan: it moves, or will when the trigger comes.
+  bool has_plan() const { return is<Moving>() || is<Armed>(); }
+  std::string busy_text() const;  // "theta moves"
+
+  std::int64_t position_steps() const { return position_; }  // as reported last
+  // Where it will stand when all is done.
+  std::int64_t target_steps() const { return has_plan() ? axis_.final_steps() : position_; }
+  double velocity_steps_per_s() const { return is<Moving>() ? axis_.velocity_steps_per_s() : 0.0; }
+  // Nothing: the position is known.
+  const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
+
+  // The plan; only while has_plan().
+  Axis& axis() { return axis_; }
+  const Axis& axis() const { return axis_; }
+
+  // What it may do now, as far as it depends on the motor alone. A motor that moves may be given
+  // another target, and nothing else.
+  Result<void> may_be_used() const;                     // for any motion
+  Result<void> may_move_to(std::int64_t target) const;  // beyond that
+
+  // Requests. Preconditions: it may.
+  // From rest, or from the turning point of a motion.
+  void start(std::int64_t target, Tick start);
+  void aim(std::int64_t target) { axis_.aim(target); }
+  void arm(std::uint8_t number, std::int64_t steps);
+  // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
+  // `ended_by` is whose end ends it too.
+  void stop(std::optional<std::string> ended_by = {});
+  // The plan is not yet what was requested, and can be changed.
+  bool needs_change() const { return is<Moving>() && axis_.needs_change(); }
+  // Whether the plan is another one now from this tick on.
+  bool change(Tick at) { return has_plan() && axis_.change(at); }
+  void home() { activity_ = Homing{}; }
+  void end_homing(bool found);
+  void position_is_known() { uncertain_reason_.reset(); }
+  // Another table. Precondition: !has_plan().
+  void set_axis(Axis axis) { axis_ = axis; }
+
+  // Its MCU is configured and in step: for the first time, or again; `restarted` if positions do
+  // not go on from before.
+  void goes_online(const bushd_report& report, bool first, bool restarted);
+  void goes_offline();
+  std::vector<Event> report(const Report& report);
+  // The MCU did not get the first ticks in time.
+  std::optional<event::Ended> starts_late(const bushd_report& report);
+  // Its motion is over, if there is one.
+  std::optional<event::Ended> end(Outcome outcome, std::string reason);
+
+ private:
+  bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
+  bool cuts(const bushd_report& report) const;
+  void take_limits(const bushd_report& report);
+  void follow(const Report& report, std::vector<Event>& events);
+  bool follow_armed(const Report& report, std::vector<Event>& events);
+  void notice_limit(const Report& report, std::vector<Event>& events);
+  event::Ended end_at_limit();
+  event::Ended end_by_fault(const bushd_report& report);
+  event::Ended ended(Outcome outcome, std::string reason);
+  void follow_autonomous(const bushd_report& report);
+  void rest();
+  std::string did_not_start() const;
+
+  MotorSetup setup_;
+  Axis axis_;
+  Activity activity_;
+  std::int64_t position_ = 0;
+  std::optional<std::string> uncertain_reason_;
+  bool autonomous_ = false;  // as reported last: its MCU moves it by itself
+  bool forbidden_up_ = false;
+  bool forbidden_down_ = false;
+};
+
+}  // namespace bushd::motion

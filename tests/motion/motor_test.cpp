@@ -1,0 +1,243 @@
+// What a motor does and may do, from requests and reports alone.
+#include "motion/motor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "engine/tables.h"
+#include "motion/ramp.h"
+
+namespace bushd::motion {
+namespace {
+
+using test::kTickNs;
+using testing::HasSubstr;
+
+constexpr Tick kStart = 100;
+constexpr std::int64_t kSteps = 400;
+
+class MotorTest : public testing::Test {
+ protected:
+  static MotorSetup setup() {
+    return {.name = "theta",
+            .mcu = "hall:1",
+            .output = Output{3},
+            .has_home = true,
+            .limit_cuts = true,
+            .emergency_stop_cuts = true};
+  }
+  MotorTest() {
+    mcu.motor_count = 16;
+    motor.goes_online(mcu, true, false);
+  }
+
+  // What the MCU says when its motors have done their plans up to `tick`.
+  std::vector<Event> report(Tick tick, std::optional<std::int64_t> position = {}) {
+    mcu.tick = static_cast<std::uint32_t>(tick);
+    if (motor.is<Moving>()) {
+      Axis ahead = motor.axis();
+      ahead.executed(tick);
+      if (!position) position = ahead.executed_steps();
+      set(mcu.moving, tick >= ahead.start_tick() && tick < ahead.end_tick());
+    }
+    if (position) mcu.motor[3].position_steps = static_cast<std::int32_t>(*position);
+    return motor.report({.of_mcu = mcu,
+                         .tick = tick,
+                         .requests_open = requests_open,
+                         .emergency_stop_open = false});
+  }
+  static void set(std::uint16_t& mask, bool on) {
+    mask = static_cast<std::uint16_t>(on ? mask | 1u << 3 : mask & ~(1u << 3));
+  }
+  template <class E>
+  static const E* find(const std::vector<Event>& events) {
+    for (const Event& event : events) {
+      if (const E* found = std::get_if<E>(&event)) return found;
+    }
+    return nullptr;
+  }
+  std::string refusal(std::int64_t target) const {
+    if (const auto used = motor.may_be_used(); !used) return used.error().text();
+    const auto may = motor.may_move_to(target);
+    return may ? "" : may.error().text();
+  }
+
+  test::TestTable table{test::ramp(), true};
+  Motor motor{setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE)};
+  bushd_report mcu{};
+  bool requests_open = false;
+};
+
+TEST_F(MotorTest, MovesAndEndsWhereItWasSent) {
+  EXPECT_TRUE(motor.is<Resting>());
+  motor.start(kSteps, kStart);
+  EXPECT_TRUE(motor.has_plan());
+  EXPECT_EQ(motor.target_steps(), kSteps);
+  EXPECT_TRUE(report(kStart + 5).empty());
+  EXPECT_GT(motor.position_steps(), 0);
+  const auto events = report(motor.axis().end_tick());
+  const auto* ended = find<event::Ended>(events);
+  ASSERT_NE(ended, nullptr);
+  EXPECT_EQ(ended->outcome, Outcome::kReached);
+  EXPECT_TRUE(motor.is<Resting>());
+  EXPECT_EQ(motor.position_steps(), kSteps);
+  EXPECT_FALSE(motor.end(Outcome::kLink, "it has ended already"));
+}
+
+TEST_F(MotorTest, AStopIsPlannedAtOnceAndToldWhenExecuted) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  motor.stop();
+  EXPECT_TRUE(motor.needs_change());
+  EXPECT_TRUE(motor.change(kStart + 30));
+  EXPECT_FALSE(motor.needs_change());
+  const auto events = report(motor.axis().end_tick());
+  ASSERT_NE(find<event::Executed>(events), nullptr);
+  EXPECT_EQ(find<event::Executed>(events)->change.at, kStart + 30);
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
+}
+
+TEST_F(MotorTest, ATargetBehindTakesASecondRun) {
+  motor.start(kSteps, kStart);
+  report(kStart + 40);
+  motor.aim(-5);
+  EXPECT_TRUE(motor.change(kStart + 50));
+  EXPECT_EQ(motor.target_steps(), -5);
+  const auto events = report(motor.axis().end_tick());
+  EXPECT_NE(find<event::Turn>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events), nullptr);
+  motor.start(motor.axis().wanted_steps(), motor.axis().end_tick() + 20);
+  EXPECT_EQ(motor.target_steps(), -5);
+}
+
+TEST_F(MotorTest, ACountThatDiffersStopsItAndMakesItsPositionUncertain) {
+  motor.start(kSteps, kStart);
+  const auto events = report(kStart + 20, 1);
+  EXPECT_NE(find<event::Mismatch>(events), nullptr);
+  EXPECT_NE(find<event::Replan>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events), nullptr) << "it moves";
+  mcu.moving = 0;
+  const auto last = report(motor.axis().end_tick(), 7);
+  ASSERT_NE(find<event::Ended>(last), nullptr);
+  EXPECT_EQ(find<event::Ended>(last)->outcome, Outcome::kFault);
+  EXPECT_THAT(find<event::Ended>(last)->reason, HasSubstr("counted position 1"));
+  EXPECT_THAT(refusal(10), HasSubstr("position is uncertain"));
+  motor.position_is_known();
+  EXPECT_EQ(refusal(10), "");
+}
+
+TEST_F(MotorTest, AStartThatNeverCameIsNoMismatch) {
+  motor.start(kSteps, kStart);
+  mcu.motor[3].position_steps = 0;
+  const auto events = motor.report(
+      {.of_mcu = mcu, .tick = kStart + 30, .requests_open = false, .emergency_stop_open = false});
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLink);
+  EXPECT_EQ(motor.uncertain_reason(), std::nullopt);
+}
+
+TEST_F(MotorTest, WaitsForTheTriggerAndStopsIfThatCameFirst) {
+  motor.arm(9, kSteps);
+  EXPECT_TRUE(motor.is<Armed>());
+  EXPECT_THAT(refusal(10), HasSubstr("waits for the trigger"));
+  requests_open = true;
+  EXPECT_TRUE(report(kStart).empty()) << "it may not have been armed yet";
+  requests_open = false;
+  motor.stop();
+  mcu.trigger_number = 9;
+  mcu.trigger_state = BUSHD_TRIGGER_STARTED;
+  mcu.start_tick = kStart + 2;
+  mcu.start_ns = 1000;
+  const auto events = report(kStart + 3, 0);
+  ASSERT_FALSE(events.empty());
+  const auto* started = std::get_if<event::Started>(&events.front());
+  ASSERT_NE(started, nullptr);
+  EXPECT_EQ(started->start, kStart + 2);
+  EXPECT_EQ(started->late_ns, 1000u);
+  EXPECT_NE(find<event::Replan>(events), nullptr);
+  EXPECT_TRUE(motor.is<Moving>());
+}
+
+TEST_F(MotorTest, WhatDisarmsItEndsIt) {
+  motor.arm(9, kSteps);
+  motor.stop("phi");
+  mcu.trigger_number = 9;
+  mcu.trigger_state = BUSHD_TRIGGER_DISARMED;
+  const auto events = report(kStart);
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_TRUE(find<event::Ended>(events)->was_armed);
+  EXPECT_THAT(find<event::Ended>(events)->reason, HasSubstr("because phi, armed with it"));
+  EXPECT_TRUE(motor.is<Resting>());
+}
+
+TEST_F(MotorTest, ItsLimitSwitchKeepsItFromOneDirection) {
+  set(mcu.forbidden_positive, true);
+  report(kStart);
+  EXPECT_THAT(refusal(10), HasSubstr("limit switch at the positive end"));
+  EXPECT_EQ(refusal(-10), "");
+}
+
+TEST_F(MotorTest, ALimitSwitchInFlightEndsTheMoveWhereItStands) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  set(mcu.forbidden_positive, true);
+  const auto met = report(kStart + 34, motor.position_steps());
+  EXPECT_NE(find<event::Drop>(met), nullptr);
+  EXPECT_THAT(refusal(kSteps), HasSubstr("is stopping it"));
+  set(mcu.moving, false);
+  const auto events = motor.report(
+      {.of_mcu = mcu, .tick = kStart + 40, .requests_open = false, .emergency_stop_open = false});
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLimit);
+  EXPECT_THAT(refusal(-10), HasSubstr("cut off at its limit switch"));
+}
+
+TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  mcu.faults = BUSHD_FAULT_EMERGENCY;
+  EXPECT_TRUE(report(kStart + 21).empty()) << "it may still move";
+  set(mcu.moving, false);
+  const auto events = motor.report(
+      {.of_mcu = mcu, .tick = kStart + 22, .requests_open = false, .emergency_stop_open = true});
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
+  EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("cut off by an emergency stop"));
+}
+
+TEST_F(MotorTest, HomingKeepsOthersAwayAndMakesThePositionKnown) {
+  motor.goes_online(mcu, false, true);
+  EXPECT_THAT(refusal(1), HasSubstr("MCU hall:1 restarted"));
+  motor.home();
+  EXPECT_THAT(refusal(1), HasSubstr("being homed"));
+  motor.end_homing(true);
+  EXPECT_TRUE(motor.is<Resting>());
+  EXPECT_EQ(refusal(1), "");
+}
+
+TEST_F(MotorTest, LocalInputsHaveItAsLongAsTheyMoveIt) {
+  set(mcu.autonomous, true);
+  report(kStart, 5);
+  EXPECT_TRUE(motor.is<Local>());
+  EXPECT_THAT(refusal(1), HasSubstr("local inputs of MCU hall:1"));
+  set(mcu.autonomous, false);
+  report(kStart + 10, 9);
+  EXPECT_TRUE(motor.is<Resting>());
+  EXPECT_EQ(motor.position_steps(), 9);
+  EXPECT_EQ(motor.uncertain_reason(), std::nullopt);
+}
+
+TEST_F(MotorTest, LocalInputsThatCameFirstEndAMove) {
+  motor.start(kSteps, kStart);
+  set(mcu.autonomous, true);
+  const auto events = report(kStart - 5, 0);
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
+  EXPECT_TRUE(motor.is<Local>());
+  motor.goes_offline();
+  EXPECT_TRUE(motor.is<Resting>()) << "nobody knows of it any more";
+}
+
+}  // namespace
+}  // namespace bushd::motion
