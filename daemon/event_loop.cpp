@@ -11,19 +11,19 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <random>
 
 #include "config/port_pattern.h"
+#include "daemon/request_log.h"
 #include "daemon/table_desk.h"
 
 namespace bushd::daemon {
 namespace {
 
-// epoll tags: buses count from 0.
-constexpr std::uint64_t kLcmTag = UINT64_MAX;
-constexpr std::uint64_t kSignalTag = UINT64_MAX - 1;
-constexpr std::uint64_t kWorkerTag = UINT64_MAX - 2;
-
-constexpr std::size_t kMaxWaitingJobs = 64;  // anybody may ask for tables
+constexpr std::size_t kMaxTableJobs = 64;  // anybody may ask for tables
+constexpr int kMaxTableJobsPerClient = 4;
+// Requests that wait are carried out for so long before stops and motors are looked after again.
+constexpr std::int64_t kSliceUs = 500;
 
 std::int64_t now_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(
@@ -44,11 +44,15 @@ std::int64_t unix_time_us() {
       .count();
 }
 
-// Another one in every run, and in every process on every machine as far as 16 bits go.
-std::uint16_t master_number() {
-  const auto seed =
-      static_cast<std::uint64_t>(unix_time_us()) ^ static_cast<std::uint64_t>(::getpid()) << 32;
-  return static_cast<std::uint16_t>(seed * 0x9E3779B97F4A7C15u >> 48);
+// Another one in every run, and in every process on every machine as far as 63 bits go.
+std::int64_t new_run() {
+  std::random_device random;
+  const std::uint64_t number = std::uint64_t{random()} << 32 | random();
+  return static_cast<std::int64_t>(number >> 1 | 1u);
+}
+
+std::uint16_t master_number(std::int64_t run) {
+  return static_cast<std::uint16_t>(static_cast<std::uint64_t>(run) * 0x9E3779B97F4A7C15u >> 48);
 }
 
 // Of the ports that the configuration may mean, the first that opens; else why the first does not.
@@ -65,31 +69,55 @@ Result<serial::SerialPort> open_first(const config::Bus& bus) {
 
 }  // namespace
 
-EventLoop::EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log,
+EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_log,
                      TableLibrary library)
     : config_(config),
-      transport_(transport),
+      fronts_(fronts),
       move_log_(move_log),
       library_(std::move(library)),
-      shim_(config, *this, master_number()),
-      core_(shim_.core()),
+      run_(new_run()),
+      core_(config, *this, master_number(run_)),
+      publishing_(run_, config.mcus.size(), config.buses.size(),
+                  {.now_us = now_us, .unix_us = unix_time_us}),
+      reception_([this](const api::Asker& asker, const api::Request& request) {
+        core_.request(now_us(), logged(asker, request, *this), request);
+      }),
+      lcm_front_({.transport = fronts.lcm,
+                  .stops = fronts.stops,
+                  .prefix = config.lcm.prefix,
+                  .commands = config.lcm.commands,
+                  .run = run_,
+                  .seed = static_cast<std::uint64_t>(run_)},
+                 reception_, publishing_, unix_time_us),
       ports_(config.buses.size()),
-      lost_(config.buses.size()),
-      state_channel_(config.lcm.prefix + "_STATE"),
-      health_channel_(config.lcm.prefix + "_HEALTH"),
-      reply_channel_(config.lcm.prefix + "_REPLY"),
-      command_channel_(config.lcm.prefix + "_COMMAND"),
-      table_reply_channel_(config.lcm.prefix + "_TABLE_REPLY") {}
+      lost_(config.buses.size()) {
+  publishing_.add(lcm_front_);
+  if (fronts.control == nullptr) return;
+  socket_front_ =
+      std::make_unique<SocketFront>(*fronts.control, run_, reception_, publishing_, unix_time_us);
+  publishing_.add(*socket_front_);
+}
 
 EventLoop::~EventLoop() {
   if (epoll_ >= 0) ::close(epoll_);
   if (signals_ >= 0) ::close(signals_);
 }
 
-Result<void> EventLoop::watch(int fd, std::uint32_t events, std::uint64_t tag) {
+Result<void> EventLoop::watch(int fd, Source source) {
   epoll_event event{};
-  event.events = events;
-  event.data.u64 = tag;
+  event.events = EPOLLIN;
+  event.data.u64 = sources_.size();
+  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) {
+    return fail(std::string("epoll: ") + std::strerror(errno));
+  }
+  sources_.push_back(std::move(source));
+  return {};
+}
+
+Result<void> EventLoop::watch_port(int fd, std::size_t bus) {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = bus;
   if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) {
     return fail(std::string("epoll: ") + std::strerror(errno));
   }
@@ -106,16 +134,30 @@ Result<void> EventLoop::set_up() {
   sigaddset(&set, SIGHUP);
   signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
   if (signals_ < 0) return fail(std::string("signalfd: ") + std::strerror(errno));
-  if (const auto watched = watch(signals_, EPOLLIN, kSignalTag); !watched) return watched;
-  if (const auto watched = watch(transport_.fd(), EPOLLIN, kLcmTag); !watched) return watched;
   if (const auto started = worker_.start(); !started) return started;
-  if (const auto watched = watch(worker_.fd(), EPOLLIN, kWorkerTag); !watched) return watched;
-  const auto subscribed = transport_.subscribe<table_request_t>(
-      config_.lcm.prefix + "_TABLE_REQUEST",
-      [this](const table_request_t& request) { on_table_request(request); });
-  if (!subscribed) return subscribed;
-  return transport_.subscribe<command_t>(
-      command_channel_, [this](const command_t& command) { shim_.command(now_us(), command); });
+  for (std::size_t bus = 0; bus < ports_.size(); ++bus) {
+    sources_.emplace_back(
+        [this, bus](std::uint32_t events) { handle_port(now_us(), bus, events); });
+  }
+  const Source lcm = [this](std::uint32_t) { lcm_front_.handle(); };
+  if (const auto watched = watch(fronts_.lcm.fd(), lcm); !watched) return watched;
+  if (fronts_.stops != nullptr) {
+    if (const auto watched = watch(fronts_.stops->fd(), lcm); !watched) return watched;
+  }
+  if (fronts_.control != nullptr) {
+    const auto watched =
+        watch(fronts_.control->fd(), [this](std::uint32_t) { socket_front_->handle(); });
+    if (!watched) return watched;
+  }
+  if (const auto watched = watch(signals_, [this](std::uint32_t) { handle_signal(now_us()); });
+      !watched) {
+    return watched;
+  }
+  if (const auto watched = watch(worker_.fd(), [this](std::uint32_t) { worker_.handle(); });
+      !watched) {
+    return watched;
+  }
+  return lcm_front_.subscribe();
 }
 
 // What groups were given before this daemon started is as binding as the configuration.
@@ -148,9 +190,13 @@ Result<void> EventLoop::run() {
       if (lost_[bus]) lose_port(now, bus, *std::exchange(lost_[bus], std::nullopt));
     }
     open_due_ports(now);
+    carry_out_some();
+    publishing_.set_dropped_messages(lcm_front_.dropped() +
+                                     (socket_front_ ? socket_front_->dropped() : 0));
     core_.step(now);
+    check_published();
     if (shut_down_by_us_ && (core_.at_rest() || now >= *shut_down_by_us_)) break;
-    std::array<epoll_event, 16> events;
+    std::array<epoll_event, 64> events;
     const std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
     const timespec wait = {.tv_sec = wait_us / 1'000'000, .tv_nsec = wait_us % 1'000'000 * 1000};
     const int n =
@@ -158,16 +204,7 @@ Result<void> EventLoop::run() {
     if (n < 0 && errno != EINTR) return fail(std::string("epoll: ") + std::strerror(errno));
     for (int i = 0; i < n; ++i) {
       const epoll_event& event = events[static_cast<std::size_t>(i)];
-      if (event.data.u64 == kLcmTag) {
-        transport_.handle();
-        shim_.set_rejected_commands(transport_.rejected());
-      } else if (event.data.u64 == kWorkerTag) {
-        worker_.handle();
-      } else if (event.data.u64 == kSignalTag) {
-        handle_signal(now_us());
-      } else {
-        handle_port(now_us(), event.data.u64, event.events);
-      }
+      sources_[event.data.u64](event.events);
     }
   }
   log_cpu_share();
@@ -176,6 +213,7 @@ Result<void> EventLoop::run() {
 }
 
 std::int64_t EventLoop::next_wake_us() const {
+  if (!reception_.idle()) return 0;
   std::int64_t wake = core_.next_wake_us();
   for (const Port& port : ports_) {
     if (!port.serial) wake = std::min(wake, port.open_due_us);
@@ -198,7 +236,7 @@ void EventLoop::open_port(std::int64_t now, std::size_t bus) {
   port.open_due_us = now + kReopenUs;
   auto opened = open_first(config);
   Result<void> watched;
-  if (opened) watched = watch(opened->fd(), EPOLLIN, bus);
+  if (opened) watched = watch_port(opened->fd(), bus);
   if (!opened || !watched) {
     const std::string error = opened ? watched.error().text() : opened.error().text();
     if (error != port.last_error) {
@@ -271,22 +309,33 @@ void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>
   });
 }
 
-void EventLoop::on_table_request(const table_request_t& request) {
-  if (!valid_client_id(request.client_id)) return;
-  // Who asks again is answered then.
-  if (worker_.waiting() >= kMaxWaitingJobs) return;
-  std::string why;
-  if (request.kind == table_request_t::SET) {
-    const auto table = table_of(request);
-    const auto good =
-        table ? core_.tables().check_content(request.table, *table) : fail(table.error());
-    if (!good) why = good.error().text();
+void EventLoop::carry_out_some() {
+  const std::int64_t until = now_us() + kSliceUs;
+  while (!reception_.idle()) {
+    reception_.carry_out_next();
+    if (now_us() >= until) return;
   }
-  worker_.post([this, request, why]() -> Worker::Rest {
-    table_reply_t reply = why.empty() ? answer(library_, request) : refusal(request, why);
-    return [this, reply]() mutable {
-      reply.utime_us = wall_clock_us();
-      check_published(transport_.publish(table_reply_channel_, reply));
+}
+
+void EventLoop::serve_tables(const api::Asker& asker, const api::Request& request) {
+  const std::string client = asker.session->text();
+  const auto jobs = table_jobs_.find(client);
+  if (worker_.waiting() >= kMaxTableJobs ||
+      (jobs != table_jobs_.end() && jobs->second >= kMaxTableJobsPerClient)) {
+    return asker.answer(api::Refused{"too many requests about tables wait; try again in a moment"});
+  }
+  if (const auto* set = std::get_if<api::SetTable>(&request)) {
+    const auto table = tables::make(set->content);
+    const auto good =
+        table ? core_.tables().check_content(set->table, *table) : fail(table.error());
+    if (!good) return asker.answer(api::Refused{good.error().text()});
+  }
+  ++table_jobs_[client];
+  worker_.post([this, asker, request, client]() -> Worker::Rest {
+    const api::Reply reply = daemon::answer(library_, request, asker.session->client_id());
+    return [this, asker, client, reply] {
+      if (--table_jobs_[client] == 0) table_jobs_.erase(client);
+      asker.answer(reply);
     };
   });
 }
@@ -317,24 +366,25 @@ void EventLoop::send(BusId id, std::span<const std::uint8_t> bytes) {
   }
 }
 
-void EventLoop::health(const health_t& health) {
-  check_published(transport_.publish(health_channel_, health));
+void EventLoop::publish(McuId mcu, const api::StateSnapshot& state) {
+  publishing_.publish(mcu, state);
 }
 
-void EventLoop::reply(const reply_t& reply) {
-  check_published(transport_.publish(reply_channel_, reply));
+void EventLoop::publish(McuId mcu, const api::Description& description) {
+  publishing_.publish(mcu, description);
 }
 
-void EventLoop::state(const state_t& state) {
-  check_published(transport_.publish(state_channel_, state));
+void EventLoop::publish(BusId bus, const api::HealthSnapshot& health) {
+  publishing_.publish(bus, health);
 }
 
 // Said once when it begins and once when it is over, not twenty times a second.
-void EventLoop::check_published(const Result<void>& published) {
-  if (mute_ == !published) return;
-  mute_ = !published;
+void EventLoop::check_published() {
+  const std::string& trouble = lcm_front_.trouble();
+  if (mute_ == !trouble.empty()) return;
+  mute_ = !trouble.empty();
   if (mute_) {
-    spdlog::error("LCM does not take messages: {}; clients hear nothing", published.error().text());
+    spdlog::error("LCM does not take messages: {}; clients there hear nothing", trouble);
   } else {
     spdlog::info("LCM takes messages again");
   }

@@ -1,16 +1,24 @@
-// The loop around the core: serial ports, LCM, signals and the clock, one thread, one epoll.
+// The loop around the core: serial ports, front ends, signals and the clock, one thread, one epoll.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "config/config.h"
-#include "daemon/lcm_shim.h"
+#include "control/server.h"
+#include "daemon/core.h"
+#include "daemon/lcm_front.h"
 #include "daemon/move_log.h"
+#include "daemon/publishing.h"
+#include "daemon/reception.h"
+#include "daemon/socket_front.h"
 #include "daemon/table_library.h"
 #include "daemon/worker.h"
 #include "lcm/transport.h"
@@ -18,11 +26,16 @@
 
 namespace bushd::daemon {
 
-class EventLoop : private LcmOutputs {
+class EventLoop : private Outputs {
  public:
+  // What clients come by. Without `stops`, `lcm` takes those too; `control` may be null.
+  struct Fronts {
+    lcm::Transport& lcm;
+    lcm::Transport* stops = nullptr;
+    control::Server* control = nullptr;
+  };
   // Everything outlives the loop. `move_log` may be null.
-  EventLoop(const config::Config& config, lcm::Transport& transport, MoveLog* move_log,
-            TableLibrary library);
+  EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_log, TableLibrary library);
   ~EventLoop() override;
 
   // Runs until SIGTERM or SIGINT, then ramps all motors down and returns. Precondition: both
@@ -41,48 +54,55 @@ class EventLoop : private LcmOutputs {
     std::string last_error;  // so that a missing port is logged once, not twice a second
   };
 
+  // What is watched, and what is done when there is something.
+  using Source = std::function<void(std::uint32_t events)>;
+
   Result<void> set_up();
-  Result<void> watch(int fd, std::uint32_t events, std::uint64_t tag);
+  Result<void> watch(int fd, Source source);
+  Result<void> watch_port(int fd, std::size_t bus);
   void open_due_ports(std::int64_t now_us);
   void open_port(std::int64_t now_us, std::size_t bus);
   void lose_port(std::int64_t now_us, std::size_t bus, const std::string& cause);
   void handle_port(std::int64_t now_us, std::size_t bus, std::uint32_t events);
   void handle_signal(std::int64_t now_us);
   Result<void> restore_tables();
-  void on_table_request(const table_request_t& request);
+  // Some of the requests that wait, for as long as nothing else has to wait for that.
+  void carry_out_some();
   void update_write_interest(std::size_t bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
-  void check_published(const Result<void>& published);
+  void check_published();
 
   // Outputs
-  void send(BusId id, std::span<const std::uint8_t> bytes) override;
-  void reply(const reply_t& reply) override;
-  void state(const state_t& state) override;
-  void health(const health_t& health) override;
+  void send(BusId bus, std::span<const std::uint8_t> bytes) override;
+  void publish(McuId mcu, const api::StateSnapshot& state) override;
+  void publish(McuId mcu, const api::Description& description) override;
+  void publish(BusId bus, const api::HealthSnapshot& health) override;
   void move_log(const std::string& json_line) override;
   void log(LogLevel level, const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
+  void serve_tables(const api::Asker& asker, const api::Request& request) override;
   std::int64_t wall_clock_us() override;
 
   const config::Config& config_;
-  lcm::Transport& transport_;
+  Fronts fronts_;
   MoveLog* move_log_;
   TableLibrary library_;
-  LcmShim shim_;
-  Core& core_;
+  std::int64_t run_;  // tells this run of the daemon from others
+  Core core_;
+  Publishing publishing_;
+  Reception reception_;
+  LcmFront lcm_front_;
+  std::unique_ptr<SocketFront> socket_front_;  // null: no control socket
   std::vector<Port> ports_;
   std::vector<std::optional<std::string>>
       lost_;  // by bus: a write failed, to be handled outside the core
-  std::string state_channel_;
-  std::string health_channel_;
-  std::string reply_channel_;
-  std::string command_channel_;
-  std::string table_reply_channel_;
-  bool mute_ = false;  // LCM takes nothing
+  std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
+  bool mute_ = false;                                // LCM takes nothing
   int epoll_ = -1;
   int signals_ = -1;
+  std::deque<Source> sources_;  // epoll's tags count them; the first ones are those of the buses
   std::int64_t started_us_ = 0;
   std::optional<std::int64_t> shut_down_by_us_;
   Worker worker_;  // the last member: its thread uses others

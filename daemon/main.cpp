@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <optional>
 #include <string>
 
+#include "control/path.h"
 #include "daemon/event_loop.h"
 
 namespace {
@@ -36,9 +39,38 @@ void block_signals() {
   std::signal(SIGPIPE, SIG_IGN);
 }
 
+// The default limit of 1024 is less than the connections that the control socket may have.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 8192);
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+// Null without one. The one that the configuration names has to be there; of the default ones the
+// first that can be made is taken.
+bushd::Result<std::unique_ptr<bushd::control::Server>> open_control(
+    const bushd::config::Control& config) {
+  using bushd::control::Server;
+  if (config.path) {
+    if (config.path->empty()) return nullptr;
+    return Server::open(*config.path, config.group);
+  }
+  std::string why;
+  for (const std::string& path : bushd::control::default_paths()) {
+    auto opened = Server::open(path, config.group);
+    if (opened) return opened;
+    if (!why.empty()) why += "; ";
+    why += opened.error().text();
+  }
+  spdlog::warn("no control socket, clients need LCM: {}", why);
+  return nullptr;
+}
+
 int run(const bushd::config::Config& config, const std::string& move_log_path,
         const std::string& in_service_path) {
   block_signals();
+  raise_descriptor_limit();
   std::optional<bushd::daemon::MoveLog> move_log;
   if (!move_log_path.empty()) {
     auto opened = bushd::daemon::MoveLog::open(move_log_path);
@@ -53,8 +85,15 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
     spdlog::error("{}", transport.error().text());
     return 1;
   }
-  spdlog::info("bushd: {}, LCM {}", extent(config), config.lcm.url);
-  bushd::daemon::EventLoop loop(config, **transport, move_log ? &*move_log : nullptr,
+  auto control = open_control(config.control);
+  if (!control) {
+    spdlog::error("{}", control.error().text());
+    return 1;
+  }
+  spdlog::info("bushd: {}, LCM {}, control socket {}", extent(config), config.lcm.url,
+               *control ? (*control)->path() : "none");
+  bushd::daemon::EventLoop loop(config, {.lcm = **transport, .control = control->get()},
+                                move_log ? &*move_log : nullptr,
                                 bushd::daemon::TableLibrary(config, in_service_path));
   if (const auto ended = loop.run(); !ended) {
     spdlog::error("{}", ended.error().text());

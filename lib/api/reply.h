@@ -14,25 +14,25 @@ namespace bushd::api {
 
 // Which table it is, in short.
 struct TableRef {
-  std::string name;
+  std::string name{};
   std::uint32_t revision = 0;  // counted by bushtab from 1; 0: the table's file tells none
-  std::string hash;            // first 8 digits of the SHA-256 of what moves a motor
+  std::string hash{};          // first 8 digits of the SHA-256 of what moves a motor
   friend bool operator==(const TableRef&, const TableRef&) = default;
 };
 TableRef ref_to(const tables::Table& table);
 
 // What became of one motor of a move.
 struct MotorResult {
-  std::string motor;
+  std::string motor{};
   Outcome outcome = Outcome::kFault;
   std::int64_t position_steps = 0;  // where its MCU says that it stands
-  TableRef table;                   // by which it has moved
+  TableRef table{};                 // by which it has moved
 };
 
 // What a move would be.
 struct MovePlan {
   struct Motor {
-    std::string motor;
+    std::string motor{};
     std::int64_t steps = 0;
     std::int64_t duration_us = 0;  // to its last step
     double peak_steps_per_s = 0;
@@ -44,36 +44,36 @@ struct MovePlan {
   };
   std::int64_t duration_us = 0;  // from the first tick to the end of the last one
   std::int64_t ticks = 0;
-  std::optional<Traffic> traffic;  // none: it is too much to be counted
-  std::vector<Motor> motors;       // in the request's order
+  std::optional<Traffic> traffic{};  // none: it is too much to be counted
+  std::vector<Motor> motors{};       // in the request's order
 };
 
 // One of the tables that the daemon finds.
 struct TableEntry {
-  std::string name;   // its file's name without ".toml"
-  std::string fault;  // why it cannot be used; "": it can, and the rest means something
-  TableRef table;
+  std::string name{};   // its file's name without ".toml"
+  std::string fault{};  // why it cannot be used; "": it can, and the rest means something
+  TableRef table{};
   std::int32_t codes = 0;  // of both sides, of one if they mirror each other
   double start_steps_per_s = 0;
   double max_steps_per_s = 0;
 };
 struct TableList {
-  std::vector<TableEntry> entries;
+  std::vector<TableEntry> entries{};
 };
 
 struct Accepted {};
 
 struct Refused {
-  std::string reason;  // what, why with the figure, what to do
+  std::string reason{};  // what, why with the figure, what to do
 };
 
 struct Completed {
   Outcome outcome = Outcome::kDone;
-  std::string reason;  // names motor and cause; never empty
+  std::string reason{};  // names motor and cause; never empty
   // Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
   // table requests.
   std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList, tables::TableContent>
-      detail;
+      detail{};
 };
 
 using Reply = std::variant<Accepted, Refused, Completed>;

@@ -19,7 +19,7 @@ namespace bushd::api {
 
 // One motor and a number of steps: where to, or by how many. Within +-(2^31 - 1).
 struct MotorSteps {
-  std::string motor;
+  std::string motor{};
   std::int64_t steps = 0;
   friend bool operator==(const MotorSteps&, const MotorSteps&) = default;
 };
@@ -36,14 +36,14 @@ struct Move {
     kAbsolute   // to this position
   };
   Kind kind = Kind::kRelative;
-  std::vector<MotorSteps> motors;  // at least one, none twice
+  std::vector<MotorSteps> motors{};  // at least one, none twice
   bool dry_run = false;  // from rest only: result kDone with a MovePlan, and nothing moves
 };
 
 // Ramps these motors down; none named: all. Result kDone once they stand. Also disarms, and ends
 // homing. Never refused, but for an unknown motor.
 struct Stop {
-  MotorNames motors;
+  MotorNames motors{};
 };
 
 // Stops all motors of all buses as the configuration says (StopMode), and latches the stop in every
@@ -53,27 +53,27 @@ struct EmergencyStop {};
 // Drivers of the MCUs of these motors on or off; none named: of all. Disable is refused while one
 // of them moves.
 struct Enable {
-  MotorNames motors;
+  MotorNames motors{};
 };
 struct Disable {
-  MotorNames motors;
+  MotorNames motors{};
 };
 
 // Sets where these motors, at rest, stand. Makes their positions known.
 struct SetPosition {
-  std::vector<MotorSteps> motors;  // at least one
+  std::vector<MotorSteps> motors{};  // at least one
 };
 
 // Clears latched faults of the MCUs of these motors, none named: of all. Refused while one moves.
 struct ClearFaults {
-  MotorNames motors;
+  MotorNames motors{};
 };
 
 // Gives the group another table from its next move on, as soon as its MCUs stand. A later request
 // for the same group ends this one with kStopped.
 struct UseTable {
-  std::string group;
-  std::string table;  // NAME, NAME@REVISION or NAME@TAG
+  std::string group{};
+  std::string table{};  // NAME, NAME@REVISION or NAME@TAG
 };
 
 // Reads all groups' tables again. Result kFault if the table of a group was bad and the old one
@@ -82,26 +82,26 @@ struct ReloadTables {};
 
 // Motors, at rest, look for their switches, those of one MCU one after the other.
 struct Home {
-  MotorNames motors;  // at least one, each with `home` in the configuration
+  MotorNames motors{};  // at least one, each with `home` in the configuration
 };
 
 // Motors, at rest, wait for an edge at the trigger input of their MCU and begin together after it.
 struct Arm {
   Edge edge = Edge::kRising;
-  std::int64_t delay_us = 0;       // 50..1500000, three ticks come on top
-  std::vector<MotorSteps> motors;  // by so many steps, not 0
+  std::int64_t delay_us = 0;         // 50..1500000, three ticks come on top
+  std::vector<MotorSteps> motors{};  // by so many steps, not 0
 };
 
 // Motors that wait for the trigger do so no more, nor do those armed with them; none named: all.
 struct Disarm {
-  MotorNames motors;
+  MotorNames motors{};
 };
 
 // The position compare output of the motor's MCU pulses when the motor arrives at the position.
 struct PositionCompare {
-  std::string motor;
+  std::string motor{};
   std::int64_t position_steps = 0;
-  Directions arrivals;        // by steps in these directions; none: no pulses any more
+  Directions arrivals{};      // by steps in these directions; none: no pulses any more
   std::int64_t delay_us = 0;  // from the step to the pulse, 0..1500000
   std::int64_t width_us = 0;  // of the pulse, 1..1000000; of no meaning without arrivals
 };
@@ -111,17 +111,17 @@ struct ListTables {};
 
 // Result: tables::TableContent as its file says.
 struct GetTable {
-  std::string table;  // NAME, NAME@REVISION or NAME@TAG
+  std::string table{};  // NAME, NAME@REVISION or NAME@TAG
 };
 
 // A new revision of a table file, or a new one; puts nothing in service. A file that has the
 // content already stays as it is. Result: TableList with the one as it is now.
 struct SetTable {
-  std::string table;  // NAME
-  tables::TableContent content;
+  std::string table{};  // NAME
+  tables::TableContent content{};
   // Of the table that this one was made from, as GetTable told it (its revision is in the content);
   // if the table is another by now it is left alone. "": the table is new.
-  std::string expected_hash;
+  std::string expected_hash{};
 };
 
 using Request =

@@ -15,61 +15,61 @@
 namespace bushd::api {
 
 struct MotorState {
-  std::string name;
+  std::string name{};
   std::int64_t position_steps = 0;  // as its MCU reported last
   // Where it will stand in the end, also after a stop; without a move of the daemon's where it is.
   std::int64_t target_steps = 0;
   double velocity_steps_per_s = 0;  // signed, of the running step; 0 unless Activity::kMoving
   Activity activity = Activity::kResting;
-  bool moving = false;   // it makes steps, or is about to; not while armed
-  bool enabled = false;  // drivers powered
-  bool input = false;    // its switch is active
-  Directions inhibited;  // by its limit switches
+  bool moving = false;     // it makes steps, or is about to; not while armed
+  bool enabled = false;    // drivers powered
+  bool input = false;      // its switch is active
+  Directions inhibited{};  // by its limit switches
   Trust trust = Trust::kKnown;
-  std::string uncertain_reason;  // "" while known
+  std::string uncertain_reason{};  // "" while known
   friend bool operator==(const MotorState&, const MotorState&) = default;
 };
 
 // One MCU and its motors.
 struct StateSnapshot {
-  std::string bus;
-  std::string mcu;  // "<bus>:<address>"
+  std::string bus{};
+  std::string mcu{};  // "<bus>:<address>"
   McuState state = McuState::kOffline;
-  std::string detail;     // cause of kOffline or kFault, else ""
-  std::string inputs;     // active ones: of emergency, forward, reverse, trigger, blanks between
+  std::string detail{};   // cause of kOffline or kFault, else ""
+  std::string inputs{};   // active ones: of emergency, forward, reverse, trigger, blanks between
   std::int32_t boot = 0;  // its boot number; 0 until it was heard
   std::int64_t tick = 0;  // bus tick of the report behind this
-  std::vector<MotorState> motors;  // by output
+  std::vector<MotorState> motors{};  // by output
   friend bool operator==(const StateSnapshot&, const StateSnapshot&) = default;
 };
 
 struct MotorDescription {
-  std::string name;
+  std::string name{};
   std::uint8_t output = 0;
-  std::string group;
-  TableRef table;  // in service, for the next move
+  std::string group{};
+  TableRef table{};  // in service, for the next move
   friend bool operator==(const MotorDescription&, const MotorDescription&) = default;
 };
 
 struct Description {
-  std::string bus;
-  std::string mcu;
+  std::string bus{};
+  std::string mcu{};
   std::int32_t address = 0;
   std::int64_t tick_ns = 0;
   StopMode emergency_stop = StopMode::kRamp;
-  std::vector<MotorDescription> motors;  // by output
+  std::vector<MotorDescription> motors{};  // by output
   friend bool operator==(const Description&, const Description&) = default;
 };
 
 // Counted since the daemon's start, over all boots of the MCU that it saw.
 struct McuHealth {
-  std::string mcu;
+  std::string mcu{};
   std::int32_t address = 0;
-  std::string unique_id;  // 16 hexadecimal digits; "" until the MCU was heard
+  std::string unique_id{};  // 16 hexadecimal digits; "" until the MCU was heard
   std::int32_t firmware_version = 0;
   std::int32_t boot = 0;
-  std::string reset_cause;   // "power-on", "external", "brown-out", "watchdog"; "" if unknown
-  std::int32_t current = 0;  // of the supply, as read last: 0..1023 of what the MCU can measure
+  std::string reset_cause{};  // "power-on", "external", "brown-out", "watchdog"; "" if unknown
+  std::int32_t current = 0;   // of the supply, as read last: 0..1023 of what the MCU can measure
   std::uint64_t crc_errors = 0;
   std::uint64_t rejected_frames = 0;
   std::uint64_t ramp_downs = 0;  // motors that ran dry and came to rest by their own table
@@ -77,7 +77,7 @@ struct McuHealth {
   std::uint64_t repeats = 0;
   std::uint64_t missed_ticks = 0;
   std::uint64_t restarts = 0;
-  std::optional<std::int32_t> low_water_ticks;  // since the snapshot before; none: nothing moved
+  std::optional<std::int32_t> low_water_ticks{};  // since the snapshot before; none: nothing moved
   double rate_ppm = 0;
   double clock_offset_us = 0;
   bool two_masters = false;
@@ -89,14 +89,14 @@ struct HealthSnapshot {
     std::int64_t below_us = 0;  // the last one is INT64_MAX
     std::uint64_t answers = 0;  // below this and not below the one before
   };
-  std::string bus;
-  std::string port_state;  // "open", or why it is not
+  std::string bus{};
+  std::string port_state{};  // "open", or why it is not
   bool two_masters = false;
   std::uint64_t crc_errors = 0;
   std::uint64_t stray_frames = 0;
   std::int64_t recent_latency_us = 0;
-  std::vector<Latency> latency;
-  std::vector<McuHealth> mcus;
+  std::vector<Latency> latency{};
+  std::vector<McuHealth> mcus{};
 };
 
 // Where the core publishes to. Called from within the core; must not call back into it.

@@ -23,6 +23,14 @@ namespace bushd::config {
 struct Lcm {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string prefix = "BUSHD";
+  bool commands = true;  // false: LCM only publishes
+};
+
+// The control socket.
+struct Control {
+  // Empty: none. Without a value: where the daemon may make one (control/path.h).
+  std::optional<std::string> path = {};
+  std::string group = {};  // that may use it; empty: that of the daemon
 };
 
 struct Bus {
@@ -89,6 +97,7 @@ struct Motor {
 struct Config {
   std::string path;
   Lcm lcm;
+  Control control;
   // In the order of the file.
   std::vector<Bus> buses;
   std::vector<Mcu> mcus;

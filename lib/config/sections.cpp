@@ -107,7 +107,7 @@ Result<void> read_lcm(const TomlReader& root, Config* config) {
   const toml::table* section = root.table("lcm");
   if (section == nullptr) return fail(root.error("lcm", "is not a section; allowed: one [lcm]"));
   const TomlReader reader(*section, config->path, "lcm");
-  if (auto known = reader.only({"url", "prefix"}); !known) return known;
+  if (auto known = reader.only({"url", "prefix", "commands"}); !known) return known;
   if (reader.has("url")) {
     constexpr std::string_view kUrlRule = "a URL beginning with udpm://, tcpq:// or memq://";
     auto url = reader.string("url", kUrlRule);
@@ -122,6 +122,39 @@ Result<void> read_lcm(const TomlReader& root, Config* config) {
     auto prefix = read_name(reader, "prefix", kMaxPrefix, kPrefixRule);
     if (!prefix) return fail(prefix.error());
     config->lcm.prefix = std::move(*prefix);
+  }
+  if (reader.has("commands")) {
+    const auto commands = reader.boolean("commands");
+    if (!commands) return fail(commands.error());
+    config->lcm.commands = *commands;
+  }
+  return {};
+}
+
+Result<void> read_control(const TomlReader& root, Config* config) {
+  if (!root.has("control")) return {};
+  const toml::table* section = root.table("control");
+  if (section == nullptr) {
+    return fail(root.error("control", "is not a section; allowed: one [control]"));
+  }
+  const TomlReader reader(*section, config->path, "control");
+  if (auto known = reader.only({"path", "group"}); !known) return known;
+  if (reader.has("path")) {
+    // As long as the kernel takes.
+    constexpr std::size_t kMaxPath = 107;
+    constexpr std::string_view kPathRule =
+        "an absolute path of up to 107 characters, or \"\" for no socket";
+    auto path = reader.string("path", kPathRule);
+    if (!path) return fail(path.error());
+    if (!path->empty() && (!path->starts_with('/') || path->size() > kMaxPath)) {
+      return refuse(reader, "path", *path, kPathRule);
+    }
+    config->control.path = std::move(*path);
+  }
+  if (reader.has("group")) {
+    auto group = reader.string("group", "the name of a group of users");
+    if (!group) return fail(group.error());
+    config->control.group = std::move(*group);
   }
   return {};
 }
@@ -361,8 +394,10 @@ Result<void> read_motors(Loading* loading) {
 
 Result<void> read_sections(const TomlReader& root, Loading* loading) {
   const std::string& file = loading->config.path;
-  if (auto known = root.only({"lcm", "bus", "mcu", "group", "motor"}); !known) return known;
+  if (auto known = root.only({"lcm", "control", "bus", "mcu", "group", "motor"}); !known)
+    return known;
   if (auto read = read_lcm(root, &loading->config); !read) return read;
+  if (auto read = read_control(root, &loading->config); !read) return read;
   auto buses = read_array(root, file, "bus", true);
   if (!buses) return fail(buses.error());
   loading->buses = std::move(*buses);

@@ -68,21 +68,21 @@ class Transport {
     return publish_bytes(channel, *bytes);
   }
 
-  // As they are; for tests of what broken senders do.
+  // The same with payloads as they are. `handler` has to survive any of them.
+  using BytesHandler = std::function<void(std::span<const std::uint8_t>)>;
+  Result<void> subscribe_bytes(const std::string& channel, BytesHandler handler);
   Result<void> publish_bytes(const std::string& channel, std::span<const std::uint8_t> bytes);
 
   // Payloads on subscribed channels that were no message of the channel's type.
   std::uint64_t rejected() const { return rejected_; }
 
  private:
-  using BytesHandler = std::function<void(std::span<const std::uint8_t>)>;
   struct Subscription {
     Transport* transport;
     BytesHandler handler;
   };
 
   Transport(lcm_t* lcm, int fd) : lcm_(lcm), fd_(fd) {}
-  Result<void> subscribe_bytes(const std::string& channel, BytesHandler handler);
   static void on_message(const lcm_recv_buf_t* buffer, const char* channel, void* subscription);
 
   lcm_t* lcm_;

@@ -3,51 +3,90 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <type_traits>
+
+#include "lcm/layout.h"
 
 namespace bushd::lcm {
 namespace {
 
-// Walks over a payload, field by field in the order of the .lcm file; numbers are big-endian.
+constexpr std::size_t kFingerprint = 8;
+
+std::size_t size_of(char number) {
+  switch (number) {
+    case 'b':
+    case 'B':
+      return 1;
+    case 'h':
+    case 'H':
+      return 2;
+    case 'i':
+    case 'I':
+      return 4;
+    default:
+      return 8;
+  }
+}
+
+// Walks over a payload, field by field; numbers are big-endian. Once something is wrong it stays
+// so, and nothing is left to be walked over.
 class Scan {
  public:
   explicit Scan(std::span<const std::uint8_t> payload) : rest_(payload) {}
 
   void fixed(std::size_t bytes) {
-    if (bytes > rest_.size()) {
-      good_ = false;
-      rest_ = {};
-    } else {
-      rest_ = rest_.subspan(bytes);
-    }
+    if (bytes > rest_.size()) return fail_here();
+    rest_ = rest_.subspan(bytes);
   }
 
-  // Length with the NUL, characters, NUL.
-  void text() {
-    const std::size_t length = number();
-    if (length == 0 || length > rest_.size()) {
-      good_ = false;
-      return;
+  void walk(const Layout& layout) {
+    std::size_t count = 0;
+    auto nested = layout.nested.begin();
+    for (const char field : layout.fields) {
+      if (!good_) return;
+      switch (field) {
+        case 's':
+          text();
+          break;
+        case 't':
+          walk(**nested++);
+          break;
+        case 'n':
+          count = number();
+          break;
+        case 'S':
+          for (std::size_t i = 0; good_ && i < count; ++i) text();
+          break;
+        case 'T':
+          for (std::size_t i = 0; good_ && i < count; ++i) walk(**nested);
+          ++nested;
+          break;
+        default:  // Below 2^32 elements of up to 8 bytes: no overflow.
+          fixed(field >= 'a' ? size_of(field) : count * size_of(field));
+      }
     }
-    const auto nul = std::find(rest_.begin(), rest_.end(), std::uint8_t{0});
-    good_ = good_ && nul == rest_.begin() + static_cast<std::ptrdiff_t>(length - 1);
-    fixed(length);
-  }
-
-  // An array length, of elements that take at least so many bytes; 0 once something is wrong.
-  std::size_t count(std::size_t min_element_bytes) {
-    const std::size_t elements = number();
-    if (elements > rest_.size() / min_element_bytes) good_ = false;
-    return good_ ? elements : 0;
   }
 
   bool ended_well() const { return good_ && rest_.empty(); }
 
  private:
+  void fail_here() {
+    good_ = false;
+    rest_ = {};
+  }
+
+  // Length with the NUL, characters, NUL.
+  void text() {
+    const std::size_t length = number();
+    if (length == 0 || length > rest_.size()) return fail_here();
+    const auto nul = std::find(rest_.begin(), rest_.end(), std::uint8_t{0});
+    if (nul != rest_.begin() + static_cast<std::ptrdiff_t>(length - 1)) return fail_here();
+    fixed(length);
+  }
+
   // An int32 seen as unsigned, so that a negative length is one that is far too long.
   std::size_t number() {
     if (rest_.size() < 4) {
-      fixed(4);
+      fail_here();
       return 0;
     }
     const std::size_t value = std::size_t{rest_[0]} << 24 | std::size_t{rest_[1]} << 16 |
@@ -60,217 +99,62 @@ class Scan {
   bool good_ = true;
 };
 
-constexpr std::size_t kFingerprint = 8;
-constexpr std::size_t kInt8 = 1;
-constexpr std::size_t kInt16 = 2;
-constexpr std::size_t kInt32 = 4;
-constexpr std::size_t kInt64 = 8;
-constexpr std::size_t kDouble = 8;
-constexpr std::size_t kMinText = 5;
-constexpr std::size_t kMinTableRef = 2 * kMinText + kInt32;
-constexpr std::size_t kMinMotorState =
-    5 * kMinText + kMinTableRef + kInt16 + 2 * kInt64 + kDouble + 4 * kInt8;
-
-void scan_fields(Scan& scan, std::type_identity<table_ref_t>) {
-  scan.text();         // name
-  scan.fixed(kInt32);  // revision
-  scan.text();         // hash
-}
-
-void scan_fields(Scan& scan, std::type_identity<command_t>) {
-  scan.fixed(kInt64);                  // utime_us
-  scan.text();                         // client_id
-  scan.fixed(kInt64);                  // number
-  scan.fixed(kInt8);                   // kind
-  scan.text();                         // group
-  scan.text();                         // table
-  scan.fixed(3 * kInt8 + 2 * kInt32);  // dry_run, edge, arrivals, delay_us, width_us
-  const std::size_t motors = scan.count(kMinText + kInt64);
-  for (std::size_t i = 0; i < motors; ++i) scan.text();
-  scan.fixed(motors * kInt64);  // steps
-}
-
-constexpr std::size_t kMinPlanMotor = kMinText + 2 * kInt64 + kDouble;
-constexpr std::size_t kMinPlan = 4 * kInt64 + kInt32;
-
-void scan_fields(Scan& scan, std::type_identity<move_plan_t>) {
-  scan.fixed(4 * kInt64);  // duration_us, ticks, frames, bytes
-  const std::size_t motors = scan.count(kMinPlanMotor);
-  for (std::size_t i = 0; i < motors; ++i) scan.text();
-  scan.fixed(motors * (2 * kInt64 + kDouble));  // steps, motor_duration_us, peak_steps_per_s
-}
-
-void scan_fields(Scan& scan, std::type_identity<reply_t>) {
-  scan.fixed(kInt64);  // utime_us
-  scan.text();         // client_id
-  scan.fixed(kInt64);  // number
-  scan.fixed(kInt8);   // phase
-  scan.text();         // result
-  scan.text();         // reason
-  const std::size_t motors = scan.count(2 * kMinText + kInt64 + kInt16);
-  for (std::size_t i = 0; i < 2 * motors; ++i) scan.text();  // motors, motor_results
-  scan.fixed(motors * (kInt64 + kInt16));                    // position_steps, table_of_motor
-  const std::size_t tables = scan.count(kMinTableRef);
-  for (std::size_t i = 0; i < tables; ++i) scan_fields(scan, std::type_identity<table_ref_t>{});
-  const std::size_t plans = scan.count(kMinPlan);
-  for (std::size_t i = 0; i < plans; ++i) scan_fields(scan, std::type_identity<move_plan_t>{});
-}
-
-constexpr std::size_t kMinTable = 3 * kMinText + 4 * kInt32 + kInt64;
-
-void scan_fields(Scan& scan, std::type_identity<table_t>) {
-  scan.text();                              // name
-  scan.text();                              // description
-  scan.fixed(kInt32);                       // revision
-  scan.text();                              // hash
-  scan.fixed(kInt64 + kInt32);              // time_unit_ns, cruise
-  scan.fixed(scan.count(kInt32) * kInt32);  // accel
-  scan.fixed(scan.count(kInt32) * kInt32);  // decel
-}
-
-constexpr std::size_t kMinTableEntry = 2 * kMinText + kMinTableRef + kInt32 + 2 * kDouble;
-
-void scan_fields(Scan& scan, std::type_identity<table_entry_t>) {
-  scan.text();  // name
-  scan_fields(scan, std::type_identity<table_ref_t>{});
-  scan.text();                       // fault
-  scan.fixed(kInt32 + 2 * kDouble);  // codes, start_steps_per_s, max_steps_per_s
-}
-
-void scan_fields(Scan& scan, std::type_identity<table_request_t>) {
-  scan.fixed(kInt64);  // utime_us
-  scan.text();         // client_id
-  scan.fixed(kInt64);  // number
-  scan.fixed(kInt8);   // kind
-  scan.text();         // table
-  scan.text();         // expected_hash
-  const std::size_t contents = scan.count(kMinTable);
-  for (std::size_t i = 0; i < contents; ++i) scan_fields(scan, std::type_identity<table_t>{});
-}
-
-void scan_fields(Scan& scan, std::type_identity<table_reply_t>) {
-  scan.fixed(kInt64);  // utime_us
-  scan.text();         // client_id
-  scan.fixed(kInt64);  // number
-  scan.fixed(kInt8);   // done
-  scan.text();         // reason
-  const std::size_t entries = scan.count(kMinTableEntry);
-  for (std::size_t i = 0; i < entries; ++i) scan_fields(scan, std::type_identity<table_entry_t>{});
-  const std::size_t tables = scan.count(kMinTable);
-  for (std::size_t i = 0; i < tables; ++i) scan_fields(scan, std::type_identity<table_t>{});
-}
-
-void scan_fields(Scan& scan, std::type_identity<motor_state_t>) {
-  scan.text();  // name
-  scan.text();  // group
-  scan_fields(scan, std::type_identity<table_ref_t>{});
-  scan.fixed(kInt16 + 2 * kInt64 + kDouble);  // output, position, target, velocity
-  scan.fixed(kInt8);                          // moving
-  scan.text();                                // activity
-  scan.fixed(3 * kInt8);                      // armed, enabled, input
-  scan.text();                                // forbidden
-  scan.text();                                // trust
-}
-
-void scan_fields(Scan& scan, std::type_identity<state_t>) {
-  scan.fixed(2 * kInt64 + 2 * kInt32);  // utime_us, sequence, part, parts
-  scan.text();                          // bus
-  scan.text();                          // mcu
-  scan.fixed(kInt32);                   // address
-  scan.text();                          // mcu_state
-  scan.text();                          // detail
-  scan.text();                          // inputs
-  scan.fixed(kInt32 + 2 * kInt64);      // boot_number, tick, rejected_commands
-  const std::size_t motors = scan.count(kMinMotorState);
-  for (std::size_t i = 0; i < motors; ++i) scan_fields(scan, std::type_identity<motor_state_t>{});
-}
-
-constexpr std::size_t kMinMcuHealth = 3 * kMinText + 5 * kInt32 + 7 * kInt64 + 2 * kDouble + kInt8;
-
-void scan_fields(Scan& scan, std::type_identity<mcu_health_t>) {
-  scan.text();                      // mcu
-  scan.fixed(kInt32);               // address
-  scan.text();                      // unique_id
-  scan.fixed(2 * kInt32);           // firmware_version, boot_number
-  scan.text();                      // reset_cause
-  scan.fixed(kInt32);               // current
-  scan.fixed(7 * kInt64);           // crc_errors .. restarts
-  scan.fixed(kInt32);               // low_water_ticks
-  scan.fixed(2 * kDouble + kInt8);  // rate_ppm, clock_offset_us, two_masters
-}
-
-void scan_fields(Scan& scan, std::type_identity<health_t>) {
-  scan.fixed(2 * kInt64 + 2 * kInt32);  // utime_us, sequence, part, parts
-  scan.text();                          // bus
-  scan.text();                          // port_state
-  scan.fixed(kInt8 + 3 * kInt64);       // two_masters, crc_errors, stray_frames, recent_latency_us
-  scan.fixed(scan.count(2 * kInt64) * 2 * kInt64);  // latency_below_us, latency_answers
-  const std::size_t mcus = scan.count(kMinMcuHealth);
-  for (std::size_t i = 0; i < mcus; ++i) scan_fields(scan, std::type_identity<mcu_health_t>{});
-}
-
 template <class T>
 bool well_formed(std::span<const std::uint8_t> payload) {
   Scan scan(payload);
   scan.fixed(kFingerprint);  // compared by the decoder, before anything else
-  scan_fields(scan, std::type_identity<T>{});
+  scan.walk(layout_of<T>());
   return scan.ended_well();
 }
 
-bool counted(std::int32_t count, std::size_t elements) {
-  return count >= 0 && static_cast<std::size_t>(count) == elements;
+// Whether this count is the length of these arrays.
+template <class... Array>
+bool counted(std::int32_t count, const Array&... arrays) {
+  return count >= 0 && ((static_cast<std::size_t>(count) == arrays.size()) && ...);
 }
 
-bool counts_match(const command_t& command) {
-  return counted(command.motor_count, command.motors.size()) &&
-         counted(command.motor_count, command.steps.size());
+template <class T>
+bool counts_match(const T& message);
+
+template <class Element>
+bool all_match(const std::vector<Element>& elements) {
+  return std::ranges::all_of(elements,
+                             [](const Element& element) { return counts_match(element); });
 }
 
-bool counts_match(const move_plan_t& plan) {
-  return counted(plan.motor_count, plan.motors.size()) &&
-         counted(plan.motor_count, plan.steps.size()) &&
-         counted(plan.motor_count, plan.motor_duration_us.size()) &&
-         counted(plan.motor_count, plan.peak_steps_per_s.size());
+#define BUSHD_COUNTED(count, array)                 \
+  if constexpr (requires { message.array.size(); }) \
+    if (!counted(message.count, message.array)) return false
+
+// One function for all types, by the names of their fields: a type of a new field is added here.
+template <class T>
+bool counts_match(const T& message) {
+  BUSHD_COUNTED(motor_count, motors);
+  BUSHD_COUNTED(motor_count, steps);
+  BUSHD_COUNTED(motor_count, position_steps);
+  BUSHD_COUNTED(motor_count, outcomes);
+  BUSHD_COUNTED(motor_count, motor_results);
+  BUSHD_COUNTED(motor_count, table_of_motor);
+  BUSHD_COUNTED(motor_count, motor_duration_us);
+  BUSHD_COUNTED(motor_count, peak_steps_per_s);
+  BUSHD_COUNTED(entry_count, entries);
+  BUSHD_COUNTED(table_count, tables);
+  BUSHD_COUNTED(content_count, content);
+  BUSHD_COUNTED(plan_count, plan);
+  BUSHD_COUNTED(accel_count, accel);
+  BUSHD_COUNTED(decel_count, decel);
+  BUSHD_COUNTED(latency_count, latency_below_us);
+  BUSHD_COUNTED(latency_count, latency_answers);
+  BUSHD_COUNTED(mcu_count, mcus);
+  // What is nested and has counts of its own.
+  if constexpr (requires { message.plan.size(); }) return all_match(message.plan);
+  if constexpr (requires { message.tables.front().accel; }) return all_match(message.tables);
+  if constexpr (requires { message.content.size(); }) return all_match(message.content);
+  if constexpr (requires { message.content.accel; }) return counts_match(message.content);
+  return true;
 }
 
-bool counts_match(const table_t& table) {
-  return counted(table.accel_count, table.accel.size()) &&
-         counted(table.decel_count, table.decel.size());
-}
-
-bool counts_match(const reply_t& reply) {
-  return counted(reply.motor_count, reply.motors.size()) &&
-         counted(reply.motor_count, reply.motor_results.size()) &&
-         counted(reply.motor_count, reply.position_steps.size()) &&
-         counted(reply.motor_count, reply.table_of_motor.size()) &&
-         counted(reply.table_count, reply.tables.size()) &&
-         counted(reply.plan_count, reply.plan.size()) &&
-         std::ranges::all_of(reply.plan,
-                             [](const move_plan_t& plan) { return counts_match(plan); });
-}
-
-bool counts_match(const table_request_t& request) {
-  return counted(request.content_count, request.content.size()) &&
-         std::ranges::all_of(request.content,
-                             [](const table_t& table) { return counts_match(table); });
-}
-
-bool counts_match(const table_reply_t& reply) {
-  return counted(reply.entry_count, reply.entries.size()) &&
-         counted(reply.table_count, reply.tables.size()) &&
-         std::ranges::all_of(reply.tables,
-                             [](const table_t& table) { return counts_match(table); });
-}
-
-bool counts_match(const state_t& state) {
-  return counted(state.motor_count, state.motors.size());
-}
-
-bool counts_match(const health_t& health) {
-  return counted(health.latency_count, health.latency_below_us.size()) &&
-         counted(health.latency_count, health.latency_answers.size()) &&
-         counted(health.mcu_count, health.mcus.size());
-}
+#undef BUSHD_COUNTED
 
 }  // namespace
 
@@ -308,17 +192,41 @@ std::optional<T> decode(std::span<const std::uint8_t> payload) {
   return message;
 }
 
-template Result<std::vector<std::uint8_t>> encode(const command_t&);
-template Result<std::vector<std::uint8_t>> encode(const health_t&);
-template Result<std::vector<std::uint8_t>> encode(const reply_t&);
-template Result<std::vector<std::uint8_t>> encode(const state_t&);
-template Result<std::vector<std::uint8_t>> encode(const table_reply_t&);
-template Result<std::vector<std::uint8_t>> encode(const table_request_t&);
-template std::optional<command_t> decode(std::span<const std::uint8_t>);
-template std::optional<health_t> decode(std::span<const std::uint8_t>);
-template std::optional<reply_t> decode(std::span<const std::uint8_t>);
-template std::optional<state_t> decode(std::span<const std::uint8_t>);
-template std::optional<table_reply_t> decode(std::span<const std::uint8_t>);
-template std::optional<table_request_t> decode(std::span<const std::uint8_t>);
+#define BUSHD_TRAVELS(type)                                       \
+  template Result<std::vector<std::uint8_t>> encode(const type&); \
+  template std::optional<type> decode(std::span<const std::uint8_t>);
+
+BUSHD_TRAVELS(answer_t)
+BUSHD_TRAVELS(arm_t)
+BUSHD_TRAVELS(clear_faults_t)
+BUSHD_TRAVELS(command_t)
+BUSHD_TRAVELS(disable_t)
+BUSHD_TRAVELS(disarm_t)
+BUSHD_TRAVELS(emergency_stop_t)
+BUSHD_TRAVELS(enable_t)
+BUSHD_TRAVELS(get_status_t)
+BUSHD_TRAVELS(get_table_t)
+BUSHD_TRAVELS(health_t)
+BUSHD_TRAVELS(hello_t)
+BUSHD_TRAVELS(home_t)
+BUSHD_TRAVELS(list_tables_t)
+BUSHD_TRAVELS(mcu_description_t)
+BUSHD_TRAVELS(mcu_state_t)
+BUSHD_TRAVELS(move_t)
+BUSHD_TRAVELS(position_compare_t)
+BUSHD_TRAVELS(reload_tables_t)
+BUSHD_TRAVELS(reply_t)
+BUSHD_TRAVELS(set_position_t)
+BUSHD_TRAVELS(set_table_t)
+BUSHD_TRAVELS(state_t)
+BUSHD_TRAVELS(stop_t)
+BUSHD_TRAVELS(subscribe_t)
+BUSHD_TRAVELS(table_answer_t)
+BUSHD_TRAVELS(table_reply_t)
+BUSHD_TRAVELS(table_request_t)
+BUSHD_TRAVELS(use_table_t)
+BUSHD_TRAVELS(welcome_t)
+
+#undef BUSHD_TRAVELS
 
 }  // namespace bushd::lcm

@@ -4,8 +4,7 @@
 // payload is first walked through without copying anything; only one whose every length fits the
 // bytes that are there is decoded.
 //
-// T is one of the types that travel by themselves: command_t, health_t, reply_t, state_t,
-// table_reply_t, table_request_t.
+// T is one of the types that travel by themselves (lcm/types.h).
 #pragma once
 
 #include <cstddef>
@@ -15,12 +14,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "bushd/command_t.hpp"
-#include "bushd/health_t.hpp"
-#include "bushd/reply_t.hpp"
-#include "bushd/state_t.hpp"
-#include "bushd/table_reply_t.hpp"
-#include "bushd/table_request_t.hpp"
+#include "lcm/types.h"
 
 namespace bushd::lcm {
 

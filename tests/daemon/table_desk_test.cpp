@@ -7,7 +7,8 @@
 #include <filesystem>
 #include <functional>
 
-#include "lcm/wire.h"
+#include "lcm/codec.h"
+#include "lcm/table_codec.h"
 #include "tables/store/store.h"
 #include "tables/temp_directory.h"
 
@@ -33,31 +34,26 @@ class TableDesk : public testing::Test {
     config.path = path.string();
     return config;
   }
-  static table_request_t request(std::int8_t kind, const std::string& table = {}) {
-    table_request_t request{};
-    request.client_id = "test";
-    request.number = 7;
-    request.kind = kind;
-    request.table = table;
-    return request;
+  // By way of the message, as clients send it.
+  static api::Request set(const std::string& name, const table_t& table) {
+    return api::SetTable{
+        .table = name, .content = lcm::content_of(table), .expected_hash = table.hash};
   }
-  static table_request_t set(const std::string& name, const table_t& table) {
-    table_request_t set = request(table_request_t::SET, name);
-    set.expected_hash = table.hash;
-    set.content.push_back(table);
-    set.content_count = 1;
-    return set;
+  api::Reply ask(const api::Request& request) const { return answer(library_, request, "test"); }
+  api::TableEntry entry(const api::Request& request) const {
+    const api::Reply reply = ask(request);
+    EXPECT_TRUE(std::holds_alternative<api::Completed>(reply));
+    return std::get<api::TableList>(std::get<api::Completed>(reply).detail).entries.at(0);
+  }
+  bool done(const api::Request& request) const {
+    return std::holds_alternative<api::Completed>(ask(request));
   }
   table_t get(const std::string& table) const {
-    const table_reply_t reply = answer(library_, request(table_request_t::GET, table));
-    EXPECT_EQ(reply.done, 1) << reply.reason;
-    return reply.tables.at(0);
+    const api::Reply reply = ask(api::GetTable{table});
+    return lcm::message_of(std::get<tables::TableContent>(std::get<api::Completed>(reply).detail));
   }
-  std::string refused(const table_request_t& request) const {
-    const table_reply_t reply = answer(library_, request);
-    EXPECT_EQ(reply.done, 0);
-    EXPECT_TRUE(lcm::encode(reply));
-    return reply.reason;
+  std::string refused(const api::Request& request) const {
+    return std::get<api::Refused>(ask(request)).reason;
   }
 
   TempDirectory directory_;
@@ -77,12 +73,12 @@ TEST_F(TableDesk, GetsWhatTheFileSaysAndEarlierRevisions) {
   EXPECT_THAT(table.accel, ElementsAre(9, 7, 5));
   EXPECT_THAT(table.decel, IsEmpty());
   table.accel[0] = 8;
-  EXPECT_EQ(answer(library_, set("own", table)).done, 1);
+  EXPECT_TRUE(done(set("own", table)));
   EXPECT_THAT(get("own").accel, ElementsAre(8, 7, 5));
   EXPECT_THAT(get("own@1").accel, ElementsAre(9, 7, 5));
-  EXPECT_THAT(refused(request(table_request_t::GET, "own@3")), HasSubstr("has no revision 3"));
-  EXPECT_THAT(refused(request(table_request_t::GET, "none")), HasSubstr("no table \"none\""));
-  EXPECT_THAT(refused(request(table_request_t::GET, "../own")), HasSubstr("not a table's name"));
+  EXPECT_THAT(refused(api::GetTable{"own@3"}), HasSubstr("has no revision 3"));
+  EXPECT_THAT(refused(api::GetTable{"none"}), HasSubstr("no table \"none\""));
+  EXPECT_THAT(refused(api::GetTable{"../own"}), HasSubstr("not a table's name"));
 }
 
 TEST_F(TableDesk, SetIsARevisionThatKeepsComments) {
@@ -90,12 +86,9 @@ TEST_F(TableDesk, SetIsARevisionThatKeepsComments) {
   table.decel = {6, 9};
   table.decel_count = 2;
   table.description = "slower to stop";
-  const table_reply_t reply = answer(library_, set("own", table));
-  EXPECT_EQ(reply.done, 1) << reply.reason;
-  EXPECT_EQ(reply.number, 7);
-  ASSERT_EQ(reply.entries.size(), 1u);
-  EXPECT_EQ(reply.entries[0].table.revision, 2);
-  EXPECT_EQ(reply.entries[0].codes, 5);
+  const api::TableEntry now = entry(set("own", table));
+  EXPECT_EQ(now.table.revision, 2u);
+  EXPECT_EQ(now.codes, 5);
   EXPECT_EQ(store_.read("own")->text,
             "# mine\nname = \"own\"\ndescription = \"slower to stop\"\nrevision = 2\n"
             "time_unit_ns = 1000\naccel = [9, 7, 5]\ndecel = [6, 9]\n");
@@ -105,10 +98,8 @@ TEST_F(TableDesk, SetIsARevisionThatKeepsComments) {
 TEST_F(TableDesk, RepeatedSetIsCarriedOutOnce) {
   table_t table = get("own");
   table.accel[0] = 8;
-  EXPECT_EQ(answer(library_, set("own", table)).done, 1);
-  const table_reply_t again = answer(library_, set("own", table));
-  EXPECT_EQ(again.done, 1);
-  EXPECT_EQ(again.entries.at(0).table.revision, 2);
+  EXPECT_TRUE(done(set("own", table)));
+  EXPECT_EQ(entry(set("own", table)).table.revision, 2u);
   EXPECT_EQ(store_.log("own")->size(), 2u);
 }
 
@@ -116,7 +107,7 @@ TEST_F(TableDesk, TableThatSomebodyElseChangedMeanwhileIsLeftAlone) {
   table_t mine = get("own");
   table_t theirs = mine;
   theirs.accel[0] = 8;
-  ASSERT_EQ(answer(library_, set("own", theirs)).done, 1);
+  ASSERT_TRUE(done(set("own", theirs)));
   mine.accel[0] = 10;
   EXPECT_THAT(refused(set("own", mine)), HasSubstr("is another table by now, revision 2"));
   mine.hash.clear();
@@ -128,7 +119,7 @@ TEST_F(TableDesk, NewTablesAreMadeInTheFolderOfTables) {
   table_t table = get("own");
   table.name = "other";
   table.hash.clear();
-  EXPECT_EQ(answer(library_, set("other", table)).done, 1);
+  EXPECT_TRUE(done(set("other", table)));
   EXPECT_TRUE(std::filesystem::exists(directory_.path() / "tables" / "other.toml"));
   EXPECT_EQ(get("other").revision, 1);
   EXPECT_THAT(refused(set("bushd", table)), HasSubstr("is the configuration"));
@@ -148,16 +139,15 @@ TEST_F(TableDesk, WhatIsNoTableIsRefusedWithItsPlace) {
   EXPECT_THAT(with([](table_t& t) { t.time_unit_ns = -1; }), HasSubstr("time_unit_ns"));
   EXPECT_THAT(with([](table_t& t) { t.cruise = -3; }), HasSubstr("own: cruise: "));
   EXPECT_THAT(with([](table_t& t) { t.name = "a\nb"; }), HasSubstr("own: name: "));
-  EXPECT_FALSE(daemon::table_of(request(table_request_t::SET, "own"))) << "without content";
   EXPECT_THAT(get("own").accel, ElementsAre(9, 7, 5));
 }
 
 TEST_F(TableDesk, ListsAllTablesAndWhatIsWrongWithBadOnes) {
   directory_.write("tables/bad.toml", "name = 3\n");
-  const table_reply_t reply = answer(library_, request(table_request_t::LIST));
-  EXPECT_EQ(reply.done, 1);
+  const api::Reply reply = ask(api::ListTables{});
   std::vector<std::string> good;
-  for (const table_entry_t& entry : reply.entries) {
+  for (const auto& entry :
+       std::get<api::TableList>(std::get<api::Completed>(reply).detail).entries) {
     EXPECT_THAT(entry.fault, HasSubstr(entry.name == "bad" ? "bad.toml:1:" : ""));
     if (entry.fault.empty()) good.push_back(entry.name);
     if (entry.name != "own") continue;
@@ -172,7 +162,9 @@ TEST_F(TableDesk, TableTooLongForAMessageIsRefused) {
   std::string text = "name = \"long\"\ntime_unit_ns = 1000\naccel = [";
   for (int i = 0; i < 20000; ++i) text += std::to_string(30000 - i) + ", ";
   directory_.write("tables/long.toml", text + "9]\n");
-  EXPECT_THAT(refused(request(table_request_t::GET, "long")), HasSubstr("too many codes"));
+  const auto packet = lcm::encode(0, {}, ask(api::GetTable{"long"}));
+  ASSERT_FALSE(packet);
+  EXPECT_THAT(packet.error().text(), HasSubstr("use a table of fewer codes"));
 }
 
 }  // namespace

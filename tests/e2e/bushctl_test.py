@@ -122,6 +122,9 @@ class Examples(EndToEndTest):
     def test_in_python(self):
         self.check_example(*self.python_with("move_and_wait.py"))
 
+    def test_in_python_over_the_socket(self):
+        self.check_example(*self.python_with("move_and_wait.py"), "--socket", self.file("control"))
+
     def test_health_in_python(self):
         example = self.python_with("show_health.py")
         self.bring_up()

@@ -1,8 +1,9 @@
-"""Broken and hostile payloads on the command channel, framed by hand: what LCM's own publish() would never send.
+"""Broken and hostile payloads on a channel of requests, framed by hand: what LCM's own publish() would never send.
 
-A datagram of LCM (small message): "LC02", sequence number, channel with its NUL, payload. A payload of command_t:
-fingerprint of the type, utime_us, client_id, number, kind, group, table, dry_run, motor_count, motors, steps; numbers
-big-endian, a text as its length with NUL, characters, NUL. The fingerprint is taken from a command that bushctl has sent.
+A datagram of LCM (small message): "LC02", sequence number, channel with its NUL, payload. A payload of move_t:
+fingerprint of the type, utime_us, session, client_id, number, kind, dry_run, motor_count, motors, steps; numbers
+big-endian, a text as its length with NUL, characters, NUL. Fingerprint, session and client are those of a move that
+bushctl has sent.
 """
 
 import contextlib
@@ -15,7 +16,7 @@ import unittest
 from rig import EndToEndTest
 
 GROUP = ("239.255.76.67", 7667)
-CHANNEL = b"BUSHD_COMMAND"
+CHANNEL = b"BUSHD_MOVE"
 MAGIC = 0x4C433032
 MOVE_RELATIVE = 1
 # Few enough that the kernel's buffer for them never overflows while the daemon is busy.
@@ -48,8 +49,8 @@ class Wire:
         self._sequence += 1
         self.send_datagram(struct.pack(">II", MAGIC, self._sequence) + channel + b"\0" + payload)
 
-    def next_command(self):
-        """The payload of the next command that anybody sends."""
+    def next_move(self):
+        """The payload of the next move that anybody sends."""
         while True:
             datagram = self._socket.recv(65536)
             channel, _, payload = datagram[8:].partition(b"\0")
@@ -61,20 +62,23 @@ class Hostile(EndToEndTest):
     def setUp(self):
         self.bring_up()
         self.wire = self.enterContext(contextlib.closing(Wire()))
-        self.command("stop")
-        self.fingerprint = self.wire.next_command()[:8]
+        self.command("move", "--dry-run", "--lcm", "a0", 5)
+        move = self.wire.next_move()
+        self.fingerprint = move[:8]
+        _, self.session, length = struct.unpack_from(">qqi", move, 8)
+        self.client = move[28 : 28 + length - 1]
 
-    def payload(self, client=b"by-hand", number=1, motors=(b"a0",), steps=(5,), count=None, texts=None):
+    def payload(self, client=None, number=100, motors=(b"a0",), steps=(5,), count=None, texts=None, session=None):
         """A move; `count` and `texts` (all motors, encoded) replace what would be right."""
-        head = struct.pack(">q", 0) + text(client) + struct.pack(">qb", number, MOVE_RELATIVE)
-        # group, table, dry_run, edge, arrivals, delay_us, width_us
-        head += text(b"") + text(b"") + struct.pack(">bbbii", 0, 0, 0, 0, 0)
+        session = self.session if session is None else session
+        head = struct.pack(">qq", 0, session) + text(self.client if client is None else client)
+        head += struct.pack(">qbb", number, MOVE_RELATIVE, 0)
         count = struct.pack(">i", len(motors) if count is None else count)
         texts = b"".join(map(text, motors)) if texts is None else texts
         return self.fingerprint + head + count + texts + struct.pack(f">{len(steps)}q", *steps)
 
     def rejected(self):
-        return self.status()["rejected_commands"]
+        return self.status()["dropped_messages"]
 
     def assert_all_rejected(self, payloads):
         for begin in range(0, len(payloads), BATCH):
@@ -99,6 +103,14 @@ class Hostile(EndToEndTest):
         self.wait_until("the move to be made", lambda: self.positions()["a0"] == 5)
         self.assertEqual(self.rejected(), 0)
         self.assertEqual(self.assert_works()["a0"], 5)
+
+    def test_moves_of_unknown_sessions_are_refused(self):
+        self.wire.send(self.payload(session=self.session ^ 1))
+        self.wire.send(self.payload(session=0))
+        self.wire.send(self.payload(client=b"another"))
+        self.command("table", "list", "--lcm")  # answered, so all before it were looked at
+        self.assertEqual(self.rejected(), 0)
+        self.assertEqual(set(self.assert_works().values()), {0})
 
     def test_broken_payloads_are_rejected_and_counted(self):
         good = self.payload()
@@ -126,29 +138,28 @@ class Hostile(EndToEndTest):
         seed = int(os.environ.get("BUSHD_TEST_SEED", random.randrange(2**32)))
         print(f"BUSHD_TEST_SEED={seed} repeats this", flush=True)
         chance = random.Random(seed)
-        for number in range(10):
+        for number in range(100, 110):
             for _ in range(BATCH):
                 # Of motors that do not exist: what is still a command after that is refused, so none may move.
                 mutant = bytearray(self.payload(number=number, motors=(b"nobody", b"none"), steps=(5, 6)))
                 for _ in range(chance.randrange(1, 4)):
                     mutant[chance.randrange(8, len(mutant))] = chance.choice((0, 1, 0x7F, 0x80, 0xFF))
                 self.wire.send(bytes(mutant))
-            self.command("stop")  # answered, so all before it were looked at
+            self.command("table", "list", "--lcm")  # answered, so all before it were looked at
         self.assertEqual(set(self.assert_works().values()), {0})
 
     def test_commands_without_sense_are_refused(self):
         limits = [-(2**63), -(2**31) - 1, 2**31, 2**63 - 1]
-        for number, steps in enumerate(limits, 1):
+        for number, steps in enumerate(limits, 101):
             self.wire.send(self.payload(number=number, steps=(steps,)))
-        self.wire.send(self.payload(client=b"", number=10))
-        self.wire.send(self.payload(client=b"x" * 65, number=10))
-        self.wire.send(self.payload(client=b"two words", number=10))
-        self.wire.send(self.payload(number=11, motors=(), steps=()))
-        self.wire.send(self.payload(number=12, motors=(b"a0",) * 1000, steps=(1,) * 1000))
-        self.wire.send(self.payload(number=13, motors=(b"x" * 50000,)))
-        self.command("stop")  # answered, so all before it were looked at
-        self.assertEqual(self.rejected(), 0)
-        self.assertEqual(self.bushd.said().count("without a usable client_id"), 3)
+        self.wire.send(self.payload(client=b"", number=110))
+        self.wire.send(self.payload(client=b"x" * 65, number=110))
+        self.wire.send(self.payload(client=b"two words", number=110))
+        self.wire.send(self.payload(number=111, motors=(), steps=()))
+        self.wire.send(self.payload(number=112, motors=(b"a0",) * 1000, steps=(1,) * 1000))
+        self.wire.send(self.payload(number=113, motors=(b"x" * 50000,)))
+        self.command("table", "list", "--lcm")  # answered, so all before it were looked at
+        self.wait_until("those without a usable client_id to be counted", lambda: self.rejected() == 3)
         self.assertEqual(self.moves(), [])
         self.assert_works()
 

@@ -126,7 +126,9 @@ class Port(EndToEndTest):
 
     def test_in_use_by_another_daemon(self):
         self.bring_up()
-        second = self.start_bushd("moves-second.jsonl")
+        config = self.file("bushd.toml").read_text()
+        self.file("second.toml").write_text(config.replace(str(self.file("control")), str(self.file("control-second"))))
+        second = self.start_bushd("moves-second.jsonl", "second.toml")
         self.wait_until("the second daemon to complain", lambda: "trying again" in second.said())
         self.assertIn(str(self.file("port")), second.said())
         self.assertEqual(second.end(), 0)

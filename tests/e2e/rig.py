@@ -43,8 +43,9 @@ def program(name):
     return os.environ[name]
 
 
-def configuration(port, displacement_format="fine", bus_lines=()):
-    lines = ['[lcm]\nurl = "udpm://239.255.76.67:7667?ttl=0"\nprefix = "BUSHD"']
+def configuration(port, displacement_format="fine", bus_lines=(), control="", lcm_lines=()):
+    lines = ['[lcm]\nurl = "udpm://239.255.76.67:7667?ttl=0"\nprefix = "BUSHD"', *lcm_lines]
+    lines += [f'[control]\npath = "{control}"']
     lines += [f'[[bus]]\nname = "hall"\nport = "{port}"\nbaud = 500000\ntick_us = {TICK_US}']
     lines += [f'format = "{displacement_format}"', *bus_lines]
     lines += [f'[[mcu]]\nbus = "hall"\naddress = {address}' for address in (1, 2)]
@@ -90,6 +91,8 @@ class Running:
 class EndToEndTest(unittest.TestCase):
     def run(self, result=None):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="bushd-e2e-"))
+        # For clients: the daemon of this test, and no other of this machine.
+        os.environ["BUSHD_CONTROL"] = str(self.folder / "control")
         self.programs = []
         result = result if result is not None else self.defaultTestResult()
         bad_before = len(result.failures) + len(result.errors)
@@ -119,8 +122,9 @@ class EndToEndTest(unittest.TestCase):
         self.programs.append(running)
         return running
 
-    def write_config(self, displacement_format="fine", bus_lines=(), port="port"):
-        self.file("bushd.toml").write_text(configuration(self.file(port), displacement_format, bus_lines))
+    def write_config(self, displacement_format="fine", bus_lines=(), port="port", lcm_lines=()):
+        text = configuration(self.file(port), displacement_format, bus_lines, self.file("control"), lcm_lines)
+        self.file("bushd.toml").write_text(text)
 
     def start_bushsim(self, trace="trace.vcd", link="port", options=()):
         command = [program("BUSHSIM"), "--config", self.file("bushd.toml"), "--link", self.file(link), *options]
@@ -128,13 +132,13 @@ class EndToEndTest(unittest.TestCase):
         self.wait_until("bushsim to offer its port", lambda: "bushsim: ready" in bushsim.said())
         return bushsim
 
-    def start_bushd(self, moves="moves.jsonl"):
-        command = [program("BUSHD"), "--config", self.file("bushd.toml"), "--move-log", self.file(moves)]
+    def start_bushd(self, moves="moves.jsonl", config="bushd.toml"):
+        command = [program("BUSHD"), "--config", self.file(config), "--move-log", self.file(moves)]
         return self.start(command, f"bushd-{len(self.programs)}.log", True)
 
-    def bring_up(self, displacement_format="fine", bus_lines=(), port="port", links=("port",)):
+    def bring_up(self, displacement_format="fine", bus_lines=(), port="port", links=("port",), lcm_lines=()):
         """`links`: the port's names, each time it is plugged in; `port` is how the configuration calls it."""
-        self.write_config(displacement_format, bus_lines, port)
+        self.write_config(displacement_format, bus_lines, port, lcm_lines)
         more = [word for link in links[1:] for word in ("--link", self.file(link))]
         self.bushsim = self.start_bushsim(link=links[0], options=more)
         self.bushd = self.start_bushd()
@@ -205,8 +209,12 @@ class EndToEndTest(unittest.TestCase):
 
         self.wait_until(f"{names} to be {steps} steps under way", travelled)
 
-    def moves(self, log="moves.jsonl"):
+    def logged(self, log="moves.jsonl"):
         return [json.loads(line) for line in self.file(log).read_text().splitlines()]
+
+    def moves(self, log="moves.jsonl"):
+        """What motors did, without who asked for it."""
+        return [event for event in self.logged(log) if event["event"] != "request"]
 
     def assert_one_result_each(self, log="moves.jsonl"):
         events = self.moves(log)

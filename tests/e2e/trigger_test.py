@@ -11,7 +11,7 @@ class Trigger(EndToEndTest):
         """bushctl arm --wait, until the motors wait for the trigger."""
         names = arguments[::2]
         armed = self.start_bushctl("arm", "--wait", "--delay-us", 700, *arguments)
-        self.wait_until("the motors to be armed", lambda: all(self.motors()[name]["armed"] for name in names))
+        self.wait_until("the motors to be armed", lambda: all(self.motors()[name]["activity"] == "armed" for name in names))
         return armed
 
     def check_trigger(self, displacement_format="fine", bus_lines=()):

@@ -182,6 +182,27 @@ TEST_F(Replacing, NotTakenIsToldAndTheNextTryHasAnEpochOfItsOwn) {
   EXPECT_EQ(frame()->epoch, 2);
 }
 
+// Behind a gap that no report shows the MCU may have ticks of the plan before the one that failed.
+TEST_F(Replacing, AfterOneThatFailedTheNextTakesAwayWhatTheMcuMayHave) {
+  streams.replace(kFirst, 1, 1020, 1000);
+  streams.send_due_replacement(kNowUs);
+  take_sent(writer);
+  known_until(0, 1040);
+  streams.follow_report(kFirst);  // in epoch 0
+  streams.replace(kFirst, 1, 1060, 1000);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs)) << "though nothing from 1060 on was sent";
+  EXPECT_EQ(frame()->first, 1040);
+}
+
+TEST_F(Replacing, DroppedMotorIsNotReplaced) {
+  streams.begin(kFirst, 1, 1010);
+  fill();
+  streams.replace(kFirst, 3, 1020, 1000);
+  streams.drop(kFirst, 0);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  EXPECT_EQ(frame()->mask, 2);
+}
+
 TEST_F(Replacing, TooLateToSendFailsUnsent) {
   streams.replace(kFirst, 1, 1002, 1000);
   EXPECT_FALSE(streams.fail_late_replacements(kNowUs));

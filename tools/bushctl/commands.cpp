@@ -1,17 +1,50 @@
 #include "commands.h"
 
 #include <fmt/format.h>
+#include <sys/signalfd.h>
 
+#include <cmath>
+#include <csignal>
 #include <cstdio>
 
 #include "base/printable.h"
 #include "render.h"
 
 namespace bushctl {
+namespace {
 
-using bushd::command_t;
-using bushd::reply_t;
-using bushd::lcm::Client;
+namespace api = bushd::api;
+using bushd::client::Client;
+
+// SIGINT and SIGTERM from a descriptor. Before LCM starts its thread, which inherits the mask.
+int block_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  sigprocmask(SIG_BLOCK, &signals, nullptr);
+  return signalfd(-1, &signals, SFD_CLOEXEC);
+}
+
+bool as_hoped(const api::Reply& reply, Hope hope) {
+  const auto* completed = std::get_if<api::Completed>(&reply);
+  if (completed == nullptr) return std::holds_alternative<api::Accepted>(reply);
+  return completed->outcome ==
+         (hope == Hope::kReached ? api::Outcome::kReached : api::Outcome::kDone);
+}
+
+}  // namespace
+
+int with_client(const Connection& connection, const std::function<int(Client&)>& action) {
+  auto options = connection.options();
+  options.interrupt_fd = block_signals();
+  auto client = Client::open(std::move(options));
+  if (!client) {
+    fmt::print(stderr, "bushctl: {}\n", client.error().text());
+    return kFailed;
+  }
+  return action(**client);
+}
 
 int failure(const Client& client, const bushd::Error& error) {
   if (client.interrupted()) return kInterrupted;
@@ -19,59 +52,44 @@ int failure(const Client& client, const bushd::Error& error) {
   return kFailed;
 }
 
-int show_status(Client& client, std::chrono::milliseconds timeout, bool as_json) {
-  const auto snapshot = client.snapshot(timeout);
-  if (!snapshot) return failure(client, snapshot.error());
-  if (as_json) {
-    fmt::print("{}\n", json(*snapshot));
-  } else {
-    for (const std::string& line : table(*snapshot)) fmt::print("{}\n", line);
-  }
-  return kDone;
+int wrong_usage(const bushd::Error& error) {
+  fmt::print(stderr, "bushctl: {}\n", error.text());
+  return kUsage;
 }
 
-int send(Client& client, const command_t& command, Client::Until until) {
-  const bool homes = command.kind == command_t::HOME;
-  const bool is_move = command.kind == command_t::MOVE_RELATIVE ||
-                       command.kind == command_t::MOVE_ABSOLUTE || command.kind == command_t::ARM ||
-                       homes;
-  bool accepted = false;
-  const auto reply = client.run(command, until, [&](const reply_t& heard) {
-    accepted = accepted || heard.phase == reply_t::ACCEPTED;
-    if (heard.phase == reply_t::REFUSED) return;
-    for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
-    std::fflush(stdout);
-  });
-  if (!reply) {
-    if (client.interrupted() && accepted && is_move) {
-      fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
-                 homes ? "homing" : "move");
-    }
-    return failure(client, reply.error());
+int refused(const api::Reply& reply) {
+  if (const auto* completed = std::get_if<api::Completed>(&reply)) {
+    fmt::print(stderr, "bushctl: {}: {}\n", word(completed->outcome),
+               bushd::printable(completed->reason));
+  } else if (const auto* refused = std::get_if<api::Refused>(&reply)) {
+    fmt::print(stderr, "bushctl: refused: {}\n", bushd::printable(refused->reason));
   }
-  if (reply->phase == reply_t::ACCEPTED) return kDone;
-  if (reply->phase == reply_t::RESULT && reply->result == (is_move ? "reached" : "done"))
-    return kDone;
-  fmt::print(stderr, "bushctl: {}: {}\n", bushd::printable(reply->result),
-             bushd::printable(reply->reason));
   return kFailed;
 }
 
-int show_plan(Client& client, command_t move, bool as_json) {
-  move.dry_run = 1;
-  const auto reply = client.run(move, Client::Until::kResult);
-  if (!reply) return failure(client, reply.error());
-  if (reply->phase != reply_t::RESULT || reply->plan.empty()) {
-    fmt::print(stderr, "bushctl: {}: {}\n", bushd::printable(reply->result),
-               bushd::printable(reply->reason));
-    return kFailed;
-  }
-  if (as_json) {
-    fmt::print("{}\n", json(reply->plan.front()));
-  } else {
-    for (const std::string& line : lines(reply->plan.front())) fmt::print("{}\n", line);
-  }
-  return kDone;
+int send(const Connection& connection, const api::Request& request, Client::Until until,
+         Hope hope) {
+  return with_client(connection, [&](Client& client) {
+    bool accepted = false;
+    const auto reply = client.run(request, until, [&](const api::Reply& heard) {
+      accepted = accepted || std::holds_alternative<api::Accepted>(heard);
+      for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
+      std::fflush(stdout);
+    });
+    if (!reply) {
+      if (client.interrupted() && accepted && hope == Hope::kReached) {
+        const bool homes = std::holds_alternative<api::Home>(request);
+        fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
+                   homes ? "homing" : "move");
+      }
+      return failure(client, reply.error());
+    }
+    return as_hoped(*reply, hope) ? static_cast<int>(kDone) : refused(*reply);
+  });
+}
+
+std::chrono::milliseconds milliseconds(double seconds) {
+  return std::chrono::milliseconds(std::lround(seconds * 1000));
 }
 
 }  // namespace bushctl

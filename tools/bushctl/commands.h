@@ -1,12 +1,11 @@
-// What bushctl's subcommands do. All return the exit code.
+// What bushctl's subcommands share, and where they come from: one function per family puts its
+// subcommands on the command line.
 #pragma once
 
-#include <chrono>
-#include <optional>
-#include <string>
+#include <functional>
 
-#include "bushd/command_t.hpp"
-#include "lcm/client.h"
+#include "client/client.h"
+#include "command_line.h"
 
 namespace bushctl {
 
@@ -17,35 +16,34 @@ enum Exit : int {
   kInterrupted = 130
 };
 
-int show_status(bushd::lcm::Client& client, std::chrono::milliseconds timeout, bool as_json);
+// status, watch, health
+void add_view_commands(CommandLine& line);
+// move, arm, disarm, stop, estop, home, set, reference
+void add_motion_commands(CommandLine& line);
+// enable, disable, clear
+void add_driver_commands(CommandLine& line);
+// table list, show, use, reload
+void add_table_commands(CommandLine& line);
+// latency-test, scan, address: on a line that no daemon has
+void add_line_commands(CommandLine& line);
 
-// kAnswered: done when accepted. kResult: done when every motor reached its target, or the command
-// was carried out.
-int send(bushd::lcm::Client& client, const bushd::command_t& command,
-         bushd::lcm::Client::Until until);
+// Runs the action with a client that SIGINT and SIGTERM interrupt; without a daemon it says so.
+int with_client(const Connection& connection,
+                const std::function<int(bushd::client::Client&)>& action);
 
-// What the move would be.
-int show_plan(bushd::lcm::Client& client, bushd::command_t move, bool as_json);
+enum class Hope { kReached, kDone };  // what the result is when all is well
 
-struct WatchOptions {
-  std::chrono::milliseconds timeout{2000};  // without a snapshot
-  std::optional<unsigned> count;            // snapshots to show; none: until interrupted
-};
-int watch(bushd::lcm::Client& client, const WatchOptions& options);
-
-struct HealthOptions {
-  std::chrono::milliseconds timeout{2000};
-  bool json = false;
-  bool watch = false;
-  std::optional<unsigned> count;  // with `watch`: messages to show; none: until interrupted
-};
-int show_health(bushd::lcm::Client& client, const HealthOptions& options);
-
-// All tables that the daemon finds, and which each group has; what one of them says.
-int list_tables(bushd::lcm::Client& client, bool as_json);
-int show_table(bushd::lcm::Client& client, const std::string& wanted, bool as_json);
+// kAnswered: done when accepted. kResult: done when the result is as hoped for. All returns are
+// exit codes.
+int send(const Connection& connection, const bushd::api::Request& request,
+         bushd::client::Client::Until until, Hope hope);
 
 // Says on stderr why, unless it was the user who broke off.
-int failure(const bushd::lcm::Client& client, const bushd::Error& error);
+int failure(const bushd::client::Client& client, const bushd::Error& error);
+// Of words that make no request.
+int wrong_usage(const bushd::Error& error);
+int refused(const bushd::api::Reply& reply);
+
+std::chrono::milliseconds milliseconds(double seconds);
 
 }  // namespace bushctl

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
@@ -12,48 +13,57 @@
 namespace bushctl {
 namespace {
 
-using bushd::health_t;
-using bushd::mcu_health_t;
-using bushd::lcm::Health;
+namespace api = bushd::api;
+using Healths = std::vector<api::HealthSnapshot>;
+
+// By bus; the daemon has one at least.
+Healths healths_of(const bushd::client::Status& status) {
+  Healths healths;
+  for (const bushd::lcm::HealthMessage& bus : status.healths) healths.push_back(bus.snapshot);
+  return healths;
+}
 
 std::string bound(std::int64_t below_us) {
   if (below_us == INT64_MAX) return "more";
   return fmt::format("<{} ms", static_cast<double>(below_us) / 1000);
 }
 
-std::vector<std::string> bus_lines(const Health& health) {
+std::vector<std::string> bus_lines(const Healths& health) {
   using enum Align;
   Grid grid({kLeft, kRight, kRight, kRight, kLeft});
   grid.row({"BUS", "CRC ERRORS", "STRAY", "LATENCY MS", "PORT"});
-  for (const health_t& bus : health.buses) {
+  for (const api::HealthSnapshot& bus : health) {
     grid.row({bushd::printable(bus.bus), fmt::to_string(bus.crc_errors),
               fmt::to_string(bus.stray_frames),
               fmt::format("{:.1f}", static_cast<double>(bus.recent_latency_us) / 1000),
               bushd::printable(bus.port_state) +
-                  (bus.two_masters != 0 ? "; another master talks on the line" : "")});
+                  (bus.two_masters ? "; another master talks on the line" : "")});
   }
   return grid.lines();
 }
 
-std::vector<std::string> latency_lines(const Health& health) {
-  std::vector<Align> align(health.buses.front().latency_answers.size() + 1, Align::kRight);
+bool same_columns(const api::HealthSnapshot& a, const api::HealthSnapshot& b) {
+  return std::ranges::equal(a.latency, b.latency, {}, &api::HealthSnapshot::Latency::below_us,
+                            &api::HealthSnapshot::Latency::below_us);
+}
+
+std::vector<std::string> latency_lines(const Healths& health) {
+  std::vector<Align> align(health.front().latency.size() + 1, Align::kRight);
   align.front() = Align::kLeft;
   Grid grid(align);
   std::vector<std::string> head = {"ANSWERS AFTER"};
-  for (const std::int64_t below_us : health.buses.front().latency_below_us) {
-    head.push_back(bound(below_us));
-  }
+  for (const auto& column : health.front().latency) head.push_back(bound(column.below_us));
   grid.row(head);
-  for (const health_t& bus : health.buses) {
-    if (bus.latency_below_us != health.buses.front().latency_below_us) continue;
+  for (const api::HealthSnapshot& bus : health) {
+    if (!same_columns(bus, health.front())) continue;
     std::vector<std::string> row = {bushd::printable(bus.bus)};
-    for (const std::int64_t answers : bus.latency_answers) row.push_back(fmt::to_string(answers));
+    for (const auto& column : bus.latency) row.push_back(fmt::to_string(column.answers));
     grid.row(row);
   }
   return grid.lines();
 }
 
-std::vector<std::string> mcu_lines(const Health& health) {
+std::vector<std::string> mcu_lines(const Healths& health) {
   using enum Align;
   std::vector<Align> align(17, kRight);
   align[0] = align[1] = align[4] = align[16] = kLeft;
@@ -61,35 +71,35 @@ std::vector<std::string> mcu_lines(const Health& health) {
   grid.row({"MCU", "UNIQUE ID", "FIRMWARE", "BOOT", "RESET BY", "CURRENT", "CRC ERRORS", "REJECTED",
             "TIMEOUTS", "REPEATS", "MISSED TICKS", "RUN-DOWNS", "RESTARTS", "LOW WATER", "RATE PPM",
             "OFFSET US", ""});
-  for (const health_t& bus : health.buses) {
-    for (const mcu_health_t& mcu : bus.mcus) {
+  for (const api::HealthSnapshot& bus : health) {
+    for (const api::McuHealth& mcu : bus.mcus) {
       grid.row({bushd::printable(mcu.mcu),
                 mcu.unique_id.empty() ? "-" : bushd::printable(mcu.unique_id),
-                fmt::to_string(mcu.firmware_version), fmt::to_string(mcu.boot_number),
+                fmt::to_string(mcu.firmware_version), fmt::to_string(mcu.boot),
                 mcu.reset_cause.empty() ? "-" : bushd::printable(mcu.reset_cause),
                 fmt::to_string(mcu.current), fmt::to_string(mcu.crc_errors),
                 fmt::to_string(mcu.rejected_frames), fmt::to_string(mcu.timeouts),
                 fmt::to_string(mcu.repeats), fmt::to_string(mcu.missed_ticks),
-                fmt::to_string(mcu.run_downs), fmt::to_string(mcu.restarts),
-                mcu.low_water_ticks < 0 ? "-" : fmt::to_string(mcu.low_water_ticks),
+                fmt::to_string(mcu.ramp_downs), fmt::to_string(mcu.restarts),
+                mcu.low_water_ticks ? fmt::to_string(*mcu.low_water_ticks) : "-",
                 fmt::format("{:+.1f}", mcu.rate_ppm), fmt::format("{:+.1f}", mcu.clock_offset_us),
-                mcu.two_masters != 0 ? "hears two masters" : ""});
+                mcu.two_masters ? "hears two masters" : ""});
     }
   }
   return grid.lines();
 }
 
-nlohmann::json mcu_json(const mcu_health_t& mcu) {
+nlohmann::json mcu_json(const api::McuHealth& mcu) {
   nlohmann::json out = {{"mcu", mcu.mcu},
                         {"address", mcu.address},
                         {"unique_id", mcu.unique_id},
                         {"firmware_version", mcu.firmware_version},
-                        {"boot", mcu.boot_number},
+                        {"boot", mcu.boot},
                         {"reset_cause", mcu.reset_cause},
                         {"current", mcu.current},
                         {"crc_errors", mcu.crc_errors},
                         {"rejected_frames", mcu.rejected_frames},
-                        {"run_downs", mcu.run_downs},
+                        {"run_downs", mcu.ramp_downs},
                         {"timeouts", mcu.timeouts},
                         {"repeats", mcu.repeats},
                         {"missed_ticks", mcu.missed_ticks},
@@ -97,32 +107,33 @@ nlohmann::json mcu_json(const mcu_health_t& mcu) {
                         {"low_water_ticks", nullptr},
                         {"rate_ppm", mcu.rate_ppm},
                         {"clock_offset_us", mcu.clock_offset_us},
-                        {"two_masters", mcu.two_masters != 0}};
-  if (mcu.low_water_ticks >= 0) out["low_water_ticks"] = mcu.low_water_ticks;
+                        {"two_masters", mcu.two_masters}};
+  if (mcu.low_water_ticks) out["low_water_ticks"] = *mcu.low_water_ticks;
   return out;
 }
 
-nlohmann::json bus_json(const health_t& bus) {
+nlohmann::json bus_json(const api::HealthSnapshot& bus) {
   nlohmann::json out = {{"bus", bus.bus},
                         {"port_state", bus.port_state},
-                        {"two_masters", bus.two_masters != 0},
+                        {"two_masters", bus.two_masters},
                         {"crc_errors", bus.crc_errors},
                         {"stray_frames", bus.stray_frames},
                         {"recent_latency_us", bus.recent_latency_us},
                         {"latency", nlohmann::json::array()},
                         {"mcus", nlohmann::json::array()}};
-  for (std::size_t i = 0; i < bus.latency_answers.size(); ++i) {
-    nlohmann::json column = {{"below_us", nullptr}, {"answers", bus.latency_answers[i]}};
-    if (bus.latency_below_us[i] != INT64_MAX) column["below_us"] = bus.latency_below_us[i];
-    out["latency"].push_back(column);
+  for (const auto& column : bus.latency) {
+    nlohmann::json json = {{"below_us", nullptr}, {"answers", column.answers}};
+    if (column.below_us != INT64_MAX) json["below_us"] = column.below_us;
+    out["latency"].push_back(json);
   }
-  for (const mcu_health_t& mcu : bus.mcus) out["mcus"].push_back(mcu_json(mcu));
+  for (const api::McuHealth& mcu : bus.mcus) out["mcus"].push_back(mcu_json(mcu));
   return out;
 }
 
 }  // namespace
 
-std::vector<std::string> health_table(const Health& health) {
+std::vector<std::string> health_table(const bushd::client::Status& status) {
+  const Healths health = healths_of(status);
   std::vector<std::string> out;
   for (const auto& part : {bus_lines(health), latency_lines(health), mcu_lines(health)}) {
     if (!out.empty()) out.emplace_back();
@@ -131,11 +142,11 @@ std::vector<std::string> health_table(const Health& health) {
   return out;
 }
 
-std::string health_json(const Health& health) {
+std::string health_json(const bushd::client::Status& status) {
   nlohmann::json out = {{"buses", nlohmann::json::array()},
-                        {"sequence", health.sequence},
-                        {"utime_us", health.buses.front().utime_us}};
-  for (const health_t& bus : health.buses) out["buses"].push_back(bus_json(bus));
+                        {"sequence", status.healths.front().part.sequence},
+                        {"utime_us", status.healths.front().part.utime_us}};
+  for (const api::HealthSnapshot& bus : healths_of(status)) out["buses"].push_back(bus_json(bus));
   // Texts from the network need not be UTF-8; by default dump() throws then.
   return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

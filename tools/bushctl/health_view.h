@@ -4,14 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "lcm/snapshot.h"
+#include "client/status.h"
 
 namespace bushctl {
 
 // Tables of the buses, of their adapters' latencies and of the MCUs.
-std::vector<std::string> health_table(const bushd::lcm::Health& health);
+std::vector<std::string> health_table(const bushd::client::Status& status);
 
 // {"buses":[...],...}; docs/lcm.md lists the keys.
-std::string health_json(const bushd::lcm::Health& health);
+std::string health_json(const bushd::client::Status& status);
 
 }  // namespace bushctl

@@ -9,7 +9,7 @@
 namespace bushctl {
 namespace {
 
-using bushd::command_t;
+namespace api = bushd::api;
 using bushd::fail;
 using bushd::Result;
 
@@ -34,8 +34,9 @@ Result<std::int64_t> steps_of(const std::string& motor, const std::string& word)
 
 }  // namespace
 
-Result<command_t> parse_move(const std::vector<std::string>& words) {
-  command_t command{};
+Result<api::Move> parse_move(const std::vector<std::string>& words) {
+  using Kind = api::Move::Kind;
+  api::Move move;
   for (std::size_t i = 0; i < words.size();) {
     const std::string& motor = words[i++];
     if (motor.starts_with("--")) {
@@ -54,63 +55,54 @@ Result<command_t> parse_move(const std::vector<std::string>& words) {
     }
     const auto steps = steps_of(motor, number);
     if (!steps) return fail(steps.error());
-    const std::int8_t kind = absolute ? command_t::MOVE_ABSOLUTE : command_t::MOVE_RELATIVE;
-    if (command.kind != 0 && command.kind != kind) {
+    const Kind kind = absolute ? Kind::kAbsolute : Kind::kRelative;
+    if (!move.motors.empty() && move.kind != kind) {
       return fail(fmt::format(
           "{} is moved {}, the motors before it {}: one command is either. Give --to to "
           "all or to none, or send two commands",
           motor, absolute ? "to a position" : "by steps", absolute ? "by steps" : "to positions"));
     }
-    command.kind = kind;
-    command.motors.push_back(motor);
-    command.steps.push_back(*steps);
+    move.kind = kind;
+    move.motors.push_back({motor, *steps});
   }
-  if (command.motors.empty()) return fail(fmt::format("no motor is named; {}", kMoveUsage));
-  return command;
+  if (move.motors.empty()) return fail(fmt::format("no motor is named; {}", kMoveUsage));
+  return move;
 }
 
-Result<command_t> parse_arm(const std::vector<std::string>& words, const std::string& edge,
-                            std::int32_t delay_us) {
-  auto command = parse_move(words);
-  if (!command) return command;
-  if (command->kind != command_t::MOVE_RELATIVE) {
+Result<api::Arm> parse_arm(const std::vector<std::string>& words, const std::string& edge,
+                           std::int64_t delay_us) {
+  const auto move = parse_move(words);
+  if (!move) return fail(move.error());
+  if (move->kind != api::Move::Kind::kRelative) {
     return fail("--to: what waits for the trigger is moved by steps; write NAME STEPS");
   }
-  command->kind = command_t::ARM;
-  command->edge = edge == "falling" ? command_t::FALLING : command_t::RISING;
-  command->delay_us = delay_us;
-  return command;
+  return api::Arm{.edge = edge == "falling" ? api::Edge::kFalling : api::Edge::kRising,
+                  .delay_us = delay_us,
+                  .motors = move->motors};
 }
 
-Result<command_t> parse_reference(const std::string& motor, const std::string& where,
-                                  const Pulse& pulse) {
-  command_t command{};
-  command.kind = command_t::REFERENCE;
-  command.motors.push_back(motor);
-  command.steps.push_back(0);
-  if (where == "off") return command;
+Result<api::PositionCompare> parse_reference(const std::string& motor, const std::string& where,
+                                             const Pulse& pulse) {
+  api::PositionCompare compare{.motor = motor};
+  if (where == "off") return compare;
   const auto position_steps = whole_number(where);
   if (!position_steps) {
     return fail(fmt::format("{}: \"{}\" is neither a whole number of steps nor off", motor, where));
   }
-  command.steps.front() = *position_steps;
-  if (pulse.direction != "negative") command.arrivals |= command_t::POSITIVE;
-  if (pulse.direction != "positive") command.arrivals |= command_t::NEGATIVE;
-  command.delay_us = pulse.delay_us;
-  command.width_us = pulse.width_us;
-  return command;
+  compare.position_steps = *position_steps;
+  compare.arrivals = {.positive = pulse.direction != "negative",
+                      .negative = pulse.direction != "positive"};
+  compare.delay_us = pulse.delay_us;
+  compare.width_us = pulse.width_us;
+  return compare;
 }
 
-Result<command_t> parse_set(const std::string& motor, const std::string& steps) {
+Result<api::SetPosition> parse_set(const std::string& motor, const std::string& steps) {
   const auto position_steps = whole_number(steps);
   if (!position_steps) {
     return fail(fmt::format("{}: \"{}\" is not a whole number of steps", motor, steps));
   }
-  command_t command{};
-  command.kind = command_t::SET_POSITION;
-  command.motors.push_back(motor);
-  command.steps.push_back(*position_steps);
-  return command;
+  return api::SetPosition{{{motor, *position_steps}}};
 }
 
 }  // namespace bushctl

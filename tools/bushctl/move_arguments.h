@@ -5,29 +5,31 @@
 #include <string>
 #include <vector>
 
+#include "api/request.h"
 #include "base/result.h"
-#include "bushd/command_t.hpp"
 
 namespace bushctl {
 
 // "theta 400 chi -20" moves by so many steps, "theta --to 400 chi --to -20" to these positions; in
 // any case all motors as one group. A mixture is refused: one command is relative or absolute.
-bushd::Result<bushd::command_t> parse_move(const std::vector<std::string>& words);
+bushd::Result<bushd::api::Move> parse_move(const std::vector<std::string>& words);
 
 // "theta 400 chi -20": the same by steps, when the trigger comes.
-bushd::Result<bushd::command_t> parse_arm(const std::vector<std::string>& words,
-                                          const std::string& edge, std::int32_t delay_us);
+bushd::Result<bushd::api::Arm> parse_arm(const std::vector<std::string>& words,
+                                         const std::string& edge, std::int64_t delay_us);
 
 struct Pulse {
   std::string direction = "both";  // or "positive", "negative"
-  std::int32_t delay_us = 0;
-  std::int32_t width_us = 10;
+  std::int64_t delay_us = 0;
+  std::int64_t width_us = 10;
 };
 // "theta", "400": a pulse when theta arrives at 400; "theta", "off": none.
-bushd::Result<bushd::command_t> parse_reference(const std::string& motor, const std::string& where,
-                                                const Pulse& pulse);
+bushd::Result<bushd::api::PositionCompare> parse_reference(const std::string& motor,
+                                                           const std::string& where,
+                                                           const Pulse& pulse);
 
 // "theta", "400": theta stands at 400.
-bushd::Result<bushd::command_t> parse_set(const std::string& motor, const std::string& steps);
+bushd::Result<bushd::api::SetPosition> parse_set(const std::string& motor,
+                                                 const std::string& steps);
 
 }  // namespace bushctl

@@ -4,25 +4,26 @@
 #include <string>
 #include <vector>
 
-#include "bushd/reply_t.hpp"
-#include "lcm/snapshot.h"
+#include "api/reply.h"
+#include "client/status.h"
 
 namespace bushctl {
 
 // Lines of a table of all motors, then of all MCUs.
-std::vector<std::string> table(const bushd::lcm::Snapshot& snapshot);
+std::vector<std::string> table(const bushd::client::Status& status);
 
 // One line: name, position, target, velocity, moving or at rest, trust when it is not "known".
-std::string motor_line(const bushd::motor_state_t& motor);
+std::string motor_line(const bushd::api::MotorState& motor);
 
 // {"motors":[...],"mcus":[...],...}; docs/lcm.md lists the keys.
-std::string json(const bushd::lcm::Snapshot& snapshot);
+std::string json(const bushd::client::Status& status);
 
 // What a move would be, motor by motor and as a whole.
-std::string json(const bushd::move_plan_t& plan);
-std::vector<std::string> lines(const bushd::move_plan_t& plan);
+std::string json(const bushd::api::MovePlan& plan);
+std::vector<std::string> lines(const bushd::api::MovePlan& plan);
 
-// A reply in one line per motor, or in one line where no motors are named.
-std::vector<std::string> lines(const bushd::reply_t& reply);
+// A reply in one line per motor, or in one line where no motors are named. Nothing of Refused,
+// which is for stderr.
+std::vector<std::string> lines(const bushd::api::Reply& reply);
 
 }  // namespace bushctl

@@ -1,10 +1,11 @@
-// Live view: in a terminal a table that is drawn anew, elsewhere a line for every motor that has
-// changed.
+#include "watch.h"
+
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -16,24 +17,25 @@
 namespace bushctl {
 namespace {
 
-using bushd::lcm::Snapshot;
+using bushd::client::Status;
 
 class View {
  public:
   virtual ~View() = default;
-  virtual void show(const Snapshot& snapshot) = 0;
+  virtual void show(const Status& status) = 0;
   // No snapshot came in time. Whether to go on waiting.
   virtual bool silent() = 0;
 };
 
 class ChangesView : public View {
  public:
-  void show(const Snapshot& snapshot) override {
-    for (const bushd::state_t& mcu : snapshot.mcus) {
-      line(mcu.mcu, fmt::format("{} {} boot {}{}{}", bushd::printable(mcu.mcu),
-                                bushd::printable(mcu.mcu_state), mcu.boot_number,
-                                mcu.detail.empty() ? "" : " ", bushd::printable(mcu.detail)));
-      for (const bushd::motor_state_t& motor : mcu.motors) line(motor.name, motor_line(motor));
+  void show(const Status& status) override {
+    for (const bushd::lcm::StateMessage& state : status.states) {
+      const bushd::api::StateSnapshot& mcu = state.snapshot;
+      line(mcu.mcu,
+           fmt::format("{} {} boot {}{}{}", bushd::printable(mcu.mcu), word(mcu.state), mcu.boot,
+                       mcu.detail.empty() ? "" : " ", bushd::printable(mcu.detail)));
+      for (const bushd::api::MotorState& motor : mcu.motors) line(motor.name, motor_line(motor));
     }
     std::fflush(stdout);
   }
@@ -52,7 +54,7 @@ class ChangesView : public View {
 
 class TerminalView : public View {
  public:
-  void show(const Snapshot& snapshot) override { screen_.show(table(snapshot)); }
+  void show(const Status& status) override { screen_.show(table(status)); }
   bool silent() override {
     screen_.notice("no state from bushd; what is shown is old");
     return true;
@@ -64,10 +66,10 @@ class TerminalView : public View {
 
 }  // namespace
 
-int watch(bushd::lcm::Client& client, const WatchOptions& options) {
+int watch(bushd::client::Client& client, const WatchOptions& options) {
   // Before the terminal is touched: without a daemon the message belongs on the first screen.
-  auto snapshot = client.snapshot(options.timeout);
-  if (!snapshot) return failure(client, snapshot.error());
+  auto status = client.status(options.timeout);
+  if (!status) return failure(client, status.error());
   std::unique_ptr<View> view;
   if (isatty(STDOUT_FILENO) != 0) {
     view = std::make_unique<TerminalView>();
@@ -75,15 +77,15 @@ int watch(bushd::lcm::Client& client, const WatchOptions& options) {
     view = std::make_unique<ChangesView>();
   }
   for (unsigned shown = 0;;) {
-    if (snapshot) {
-      view->show(*snapshot);
-      if (options.count && ++shown >= *options.count) return kDone;
+    if (status) {
+      view->show(*status);
+      if (options.count > 0 && ++shown >= options.count) return kDone;
     } else if (client.interrupted()) {
       return kDone;
     } else if (!view->silent()) {
-      return failure(client, snapshot.error());
+      return failure(client, status.error());
     }
-    snapshot = client.snapshot(options.timeout);
+    status = client.next_state(options.timeout);
   }
 }
 

@@ -334,7 +334,7 @@ std::string Simulator::summary() const {
     }
     fmt::format_to(out, "bushsim: mcu{}: {} steps made{}{}; bad frames {}, rejected {}\n",
                    mcu.address(), total, motors.empty() ? "" : ": ", fmt::join(motors, ", "),
-                   mcu.core().bad_frames, mcu.core().rejected_frames);
+                   mcu.core().reception.bad_frames, mcu.core().reception.rejected_frames);
   }
   fmt::format_to(out, "bushsim: {:.3f} s; collisions {}, corrupted bytes {}, dropped bytes {}\n",
                  static_cast<double>(bus_.now_ns()) / 1e9, bus_.collisions(),

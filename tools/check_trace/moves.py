@@ -63,6 +63,7 @@ class MoveLog:
 
     def read(self, path):
         take = {
+            "request": lambda event: None,  # who has asked for it
             "move": self._move,
             "stop": self._change,
             "retarget": self._change,

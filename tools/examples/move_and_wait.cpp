@@ -1,6 +1,6 @@
 // Example of a client in C++: moves motors as one group and waits until all stand.
 //
-//   move_and_wait [--url URL] [--prefix PREFIX] NAME STEPS [NAME STEPS...]
+//   move_and_wait [--socket PATH | --url URL] [--prefix PREFIX] NAME STEPS [NAME STEPS...]
 //
 // Prints every reply of the daemon; exit code 0 only if all motors reached their targets.
 #include <cstdint>
@@ -10,59 +10,67 @@
 #include <string>
 #include <vector>
 
-#include "lcm/client.h"
+#include "client/client.h"
 
 namespace {
 
-using bushd::command_t;
-using bushd::reply_t;
-using bushd::lcm::Client;
-using bushd::lcm::ClientOptions;
+namespace api = bushd::api;
+using bushd::client::Client;
+using bushd::client::ClientOptions;
 
-void print(const reply_t& reply) {
-  const char* phase = reply.phase == reply_t::ACCEPTED  ? "accepted"
-                      : reply.phase == reply_t::REFUSED ? "refused"
-                                                        : "result";
-  std::cout << phase << ": " << reply.reason << std::endl;
-  for (std::size_t i = 0; i < reply.motors.size(); ++i) {
-    std::cout << "  " << reply.motors[i] << ": " << reply.motor_results[i] << ", stands at "
-              << reply.position_steps[i] << std::endl;
+void print(const api::Reply& reply) {
+  if (std::holds_alternative<api::Accepted>(reply)) std::cout << "accepted" << std::endl;
+  if (const auto* refused = std::get_if<api::Refused>(&reply)) {
+    std::cout << "refused: " << refused->reason << std::endl;
+  }
+  if (const auto* completed = std::get_if<api::Completed>(&reply)) {
+    std::cout << word(completed->outcome) << ": " << completed->reason << std::endl;
+    const auto* motors = std::get_if<std::vector<api::MotorResult>>(&completed->detail);
+    if (motors == nullptr) return;
+    for (const api::MotorResult& motor : *motors) {
+      std::cout << "  " << motor.motor << ": " << word(motor.outcome) << ", stands at "
+                << motor.position_steps << std::endl;
+    }
   }
 }
 
 int usage() {
-  std::cerr << "usage: move_and_wait [--url URL] [--prefix PREFIX] NAME STEPS [NAME STEPS...]\n";
+  std::cerr << "usage: move_and_wait [--socket PATH | --url URL] [--prefix PREFIX] NAME STEPS "
+               "[NAME STEPS...]\n";
   return 2;
 }
 
 int run(const std::vector<std::string>& arguments) {
+  // By the control socket if there is one, else by LCM.
   ClientOptions options{.program = "example-c++"};
-  command_t command{};  // the braces matter: types made by lcm-gen do not initialise their numbers
-  command.kind = command_t::MOVE_RELATIVE;
+  api::Move move;  // by so many steps
   if (arguments.size() % 2 != 0) return usage();
   for (std::size_t i = 0; i < arguments.size(); i += 2) {
-    if (arguments[i] == "--url") {
-      options.url = arguments[i + 1];
-    } else if (arguments[i] == "--prefix") {
-      options.prefix = arguments[i + 1];
+    const std::string& value = arguments[i + 1];
+    if (arguments[i] == "--socket") {
+      options.way = ClientOptions::Way::kSocket;
+      options.socket = value;
+    } else if (arguments[i] == "--url" || arguments[i] == "--prefix") {
+      options.way = ClientOptions::Way::kLcm;
+      (arguments[i] == "--url" ? options.url : options.prefix) = value;
     } else {
-      command.motors.push_back(arguments[i]);
-      command.steps.push_back(std::stoll(arguments[i + 1]));
+      move.motors.push_back({arguments[i], std::stoll(value)});
     }
   }
-  if (command.motors.empty()) return usage();
+  if (move.motors.empty()) return usage();
 
-  auto client = Client::open(options);
+  const auto client = Client::open(options);
   if (!client) {
     std::cerr << "move_and_wait: " << client.error().text() << "\n";
     return 1;
   }
-  const auto reply = (*client)->run(command, Client::Until::kResult, print);
+  const auto reply = (*client)->run(move, Client::Until::kResult, print);
   if (!reply) {
     std::cerr << "move_and_wait: " << reply.error().text() << "\n";
     return 1;
   }
-  return reply->result == "reached" ? 0 : 1;
+  const auto* completed = std::get_if<api::Completed>(&*reply);
+  return completed != nullptr && completed->outcome == api::Outcome::kReached ? 0 : 1;
 }
 
 }  // namespace

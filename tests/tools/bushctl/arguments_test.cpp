@@ -6,31 +6,30 @@
 namespace bushctl {
 namespace {
 
-using bushd::command_t;
-using testing::ElementsAre;
+namespace api = bushd::api;
 using testing::HasSubstr;
+using Motors = std::vector<api::MotorSteps>;
 
 TEST(MoveArguments, PairsAreRelative) {
-  const auto command = parse_move({"theta", "-400", "chi", "+20"});
-  ASSERT_TRUE(command);
-  EXPECT_EQ(command->kind, command_t::MOVE_RELATIVE);
-  EXPECT_THAT(command->motors, ElementsAre("theta", "chi"));
-  EXPECT_THAT(command->steps, ElementsAre(-400, 20));
+  const auto move = parse_move({"theta", "-400", "chi", "+20"});
+  ASSERT_TRUE(move);
+  EXPECT_EQ(move->kind, api::Move::Kind::kRelative);
+  EXPECT_EQ(move->motors, (Motors{{"theta", -400}, {"chi", 20}}));
 }
 
 TEST(MoveArguments, ToIsAbsolute) {
-  const auto command = parse_move({"theta", "--to", "-400", "chi", "--to=20"});
-  ASSERT_TRUE(command);
-  EXPECT_EQ(command->kind, command_t::MOVE_ABSOLUTE);
-  EXPECT_THAT(command->steps, ElementsAre(-400, 20));
+  const auto move = parse_move({"theta", "--to", "-400", "chi", "--to=20"});
+  ASSERT_TRUE(move);
+  EXPECT_EQ(move->kind, api::Move::Kind::kAbsolute);
+  EXPECT_EQ(move->motors, (Motors{{"theta", -400}, {"chi", 20}}));
 }
 
 TEST(MoveArguments, AMixtureIsRefusedAndSaysWhichMotor) {
   for (const auto& words : {std::vector<std::string>{"theta", "5", "chi", "--to", "6"},
                             std::vector<std::string>{"theta", "--to", "6", "chi", "5"}}) {
-    const auto command = parse_move(words);
-    ASSERT_FALSE(command);
-    EXPECT_THAT(command.error().text(), HasSubstr("chi"));
+    const auto move = parse_move(words);
+    ASSERT_FALSE(move);
+    EXPECT_THAT(move.error().text(), HasSubstr("chi"));
   }
 }
 
@@ -49,41 +48,38 @@ TEST(MoveArguments, WhatIsMissingIsNamed) {
 }
 
 TEST(ArmArguments, ArePairsWithAnEdgeAndADelay) {
-  const auto command = parse_arm({"theta", "-400", "chi", "20"}, "falling", 1500);
-  ASSERT_TRUE(command);
-  EXPECT_EQ(command->kind, command_t::ARM);
-  EXPECT_THAT(command->motors, ElementsAre("theta", "chi"));
-  EXPECT_THAT(command->steps, ElementsAre(-400, 20));
-  EXPECT_EQ(command->edge, command_t::FALLING);
-  EXPECT_EQ(command->delay_us, 1500);
-  EXPECT_EQ(parse_arm({"theta", "1"}, "rising", 50)->edge, command_t::RISING);
+  const auto arm = parse_arm({"theta", "-400", "chi", "20"}, "falling", 1500);
+  ASSERT_TRUE(arm);
+  EXPECT_EQ(arm->motors, (Motors{{"theta", -400}, {"chi", 20}}));
+  EXPECT_EQ(arm->edge, api::Edge::kFalling);
+  EXPECT_EQ(arm->delay_us, 1500);
+  EXPECT_EQ(parse_arm({"theta", "1"}, "rising", 50)->edge, api::Edge::kRising);
   EXPECT_THAT(parse_arm({"theta", "--to", "5"}, "rising", 50).error().text(),
               HasSubstr("by steps"));
   EXPECT_FALSE(parse_arm({}, "rising", 50));
 }
 
 TEST(ReferenceArguments, NameAMotorAndWhereItPulses) {
-  const auto command =
+  const auto compare =
       parse_reference("theta", "-7", {.direction = "negative", .delay_us = 30, .width_us = 4});
-  ASSERT_TRUE(command);
-  EXPECT_EQ(command->kind, command_t::REFERENCE);
-  EXPECT_THAT(command->motors, ElementsAre("theta"));
-  EXPECT_THAT(command->steps, ElementsAre(-7));
-  EXPECT_EQ(command->arrivals, command_t::NEGATIVE);
-  EXPECT_EQ(command->delay_us, 30);
-  EXPECT_EQ(command->width_us, 4);
-  EXPECT_EQ(parse_reference("theta", "5", {})->arrivals, 3);
-  EXPECT_EQ(parse_reference("theta", "5", {.direction = "positive"})->arrivals, 1);
-  EXPECT_EQ(parse_reference("theta", "off", {})->arrivals, 0);
+  ASSERT_TRUE(compare);
+  EXPECT_EQ(compare->motor, "theta");
+  EXPECT_EQ(compare->position_steps, -7);
+  EXPECT_EQ(compare->arrivals, api::Directions{.negative = true});
+  EXPECT_EQ(compare->delay_us, 30);
+  EXPECT_EQ(compare->width_us, 4);
+  EXPECT_EQ(parse_reference("theta", "5", {})->arrivals,
+            (api::Directions{.positive = true, .negative = true}));
+  EXPECT_EQ(parse_reference("theta", "5", {.direction = "positive"})->arrivals,
+            api::Directions{.positive = true});
+  EXPECT_FALSE(parse_reference("theta", "off", {})->arrivals.any());
   EXPECT_FALSE(parse_reference("theta", "on", {}));
 }
 
 TEST(SetArguments, NameOneMotorAndItsPosition) {
-  const auto command = parse_set("theta", "-7");
-  ASSERT_TRUE(command);
-  EXPECT_EQ(command->kind, command_t::SET_POSITION);
-  EXPECT_THAT(command->motors, ElementsAre("theta"));
-  EXPECT_THAT(command->steps, ElementsAre(-7));
+  const auto set = parse_set("theta", "-7");
+  ASSERT_TRUE(set);
+  EXPECT_EQ(set->motors, (Motors{{"theta", -7}}));
 }
 
 }  // namespace

@@ -21,7 +21,7 @@
 namespace bushctl::test {
 namespace {
 
-using bushd::command_t;
+using api::Outcome;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
@@ -43,10 +43,24 @@ Ran bushctl(const std::vector<std::string>& arguments) {
   return {code, program.out(), program.err()};
 }
 
-FakeDaemon::Answer always(const std::string& word) {
-  return [word](const command_t& command, int) {
-    return std::vector{accepted(), result(command, word)};
+using Replies = std::vector<api::Reply>;
+
+FakeDaemon::Answer always(Outcome outcome) {
+  return [outcome](const api::Request& request, int) {
+    return Replies{api::Accepted{}, result(request, outcome)};
   };
+}
+
+// The only request, of this type.
+template <class Request>
+Request only(const FakeDaemon& daemon) {
+  const auto requests = daemon.requests();
+  EXPECT_EQ(requests.size(), 1u);
+  return std::get<Request>(requests.at(0));
+}
+
+std::vector<api::MotorSteps> steps(const std::vector<api::MotorSteps>& motors) {
+  return motors;
 }
 
 TEST(Bushctl, StatusAsJsonHasTheAgreedKeys) {
@@ -89,10 +103,10 @@ TEST(Bushctl, StatusIsATableOfMotorsAndMcus) {
 
 TEST(Bushctl, StatusSurvivesHostileStates) {
   FakeDaemon daemon;
-  auto cut = bushd::lcm::encode(bushd::state_t{}).value();
+  auto cut = bushd::lcm::encode(bushd::mcu_state_t{}).value();
   auto huge = cut;
   cut.resize(20);
-  huge[32] = 0x80;  // the length of `bus` becomes INT32_MIN + 1
+  huge[40] = 0x80;  // the length of `bus` becomes INT32_MIN + 1
   daemon.set_hostile_states({{}, cut, huge, std::vector<std::uint8_t>(65000, 0xFF)});
   daemon.start();
   EXPECT_EQ(bushctl({"status"}).code, 0);
@@ -117,7 +131,7 @@ class RawSender {
 
 TEST(Bushctl, SurvivesDatagramsThatCrashLcm) {
   FakeDaemon daemon;
-  daemon.start(always("reached"));
+  daemon.start(always(Outcome::kReached));
   Program watch(with_program({"watch", "--count", "10"}));
   ASSERT_TRUE(watch.wait_for("theta"));
   const RawSender sender;
@@ -159,6 +173,15 @@ TEST(Bushctl, WithoutDaemonSaysSoAndFails) {
   EXPECT_THAT(move.err, HasSubstr("no bushd answers"));
 }
 
+TEST(Bushctl, ASocketThatIsNamedIsMeant) {
+  FakeDaemon daemon;
+  daemon.start();
+  const Ran ran = bushctl({"status", "--socket", "/nonexistent/control"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("no bushd at this control socket"));
+  EXPECT_EQ(bushctl({"status", "--lcm", "--socket", "/x"}).code, 2);
+}
+
 TEST(Bushctl, ListensOnTheGivenPrefixOnly) {
   FakeDaemon daemon;
   daemon.start();
@@ -177,69 +200,63 @@ TEST(Bushctl, TakesTheUrlFromTheEnvironmentUnlessGiven) {
 
 TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
   FakeDaemon daemon;
-  daemon.start(always("reached"));
+  daemon.start(always(Outcome::kReached));
   const Ran ran = bushctl({"move", "theta", "-400", "chi", "20", "--wait"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
             "accepted\ntheta: reached, stands at 7 by bushd2-constant@3 (0a1b2c3d)\n"
             "chi: reached, stands at 7 by bushd2-constant@3 (0a1b2c3d)\n");
-  const auto commands = daemon.commands();
-  ASSERT_EQ(commands.size(), 1u);
-  EXPECT_EQ(commands[0].kind, command_t::MOVE_RELATIVE);
-  EXPECT_THAT(commands[0].motors, ElementsAre("theta", "chi"));
-  EXPECT_THAT(commands[0].steps, ElementsAre(-400, 20));
-  EXPECT_THAT(commands[0].client_id, HasSubstr("bushctl-"));
+  const auto move = only<api::Move>(daemon);
+  EXPECT_EQ(move.kind, api::Move::Kind::kRelative);
+  EXPECT_EQ(move.motors, steps({{"theta", -400}, {"chi", 20}}));
+  EXPECT_THAT(daemon.client_ids().at(0), HasSubstr("bushctl-"));
 }
 
 TEST(Bushctl, ArmedMovesNameTheirEdgeAndDelay) {
   FakeDaemon daemon;
-  daemon.start(always("reached"));
+  daemon.start(always(Outcome::kReached));
   const Ran ran = bushctl(
       {"arm", "theta", "-400", "chi", "20", "--edge", "falling", "--delay-us", "75", "--wait"});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  const auto commands = daemon.commands();
-  ASSERT_EQ(commands.size(), 1u);
-  EXPECT_EQ(commands[0].kind, command_t::ARM);
-  EXPECT_THAT(commands[0].motors, ElementsAre("theta", "chi"));
-  EXPECT_THAT(commands[0].steps, ElementsAre(-400, 20));
-  EXPECT_EQ(commands[0].edge, command_t::FALLING);
-  EXPECT_EQ(commands[0].delay_us, 75);
+  const auto arm = only<api::Arm>(daemon);
+  EXPECT_EQ(arm.motors, steps({{"theta", -400}, {"chi", 20}}));
+  EXPECT_EQ(arm.edge, api::Edge::kFalling);
+  EXPECT_EQ(arm.delay_us, 75);
   EXPECT_EQ(bushctl({"arm", "theta", "5"}).code, 2) << "no delay";
   EXPECT_EQ(bushctl({"arm", "theta", "5", "--delay-us", "49"}).code, 2);
 }
 
 TEST(Bushctl, MoveToPositionsAndMotorsCalledLikeCommands) {
   FakeDaemon daemon;
-  daemon.start(always("reached"));
+  daemon.start(always(Outcome::kReached));
   EXPECT_EQ(bushctl({"move", "--wait", "stop", "--to", "-5", "phi", "--to=6"}).code, 0);
-  const auto commands = daemon.commands();
-  ASSERT_EQ(commands.size(), 1u);
-  EXPECT_EQ(commands[0].kind, command_t::MOVE_ABSOLUTE);
-  EXPECT_THAT(commands[0].motors, ElementsAre("stop", "phi"));
-  EXPECT_THAT(commands[0].steps, ElementsAre(-5, 6));
+  const auto move = only<api::Move>(daemon);
+  EXPECT_EQ(move.kind, api::Move::Kind::kAbsolute);
+  EXPECT_EQ(move.motors, steps({{"stop", -5}, {"phi", 6}}));
 }
 
 TEST(Bushctl, WithoutWaitingAcceptedIsEnough) {
   FakeDaemon daemon;
-  daemon.start([](const command_t&, int) { return std::vector{accepted()}; });
+  daemon.start([](const api::Request&, int) { return Replies{api::Accepted{}}; });
   const Ran ran = bushctl({"move", "theta", "5"});
   EXPECT_EQ(ran.code, 0);
   EXPECT_EQ(ran.out, "accepted\n");
 }
 
 TEST(Bushctl, EveryResultButReachedFails) {
-  for (const char* word : {"limit", "stopped", "link", "stall", "fault"}) {
+  for (const Outcome outcome :
+       {Outcome::kLimit, Outcome::kStopped, Outcome::kLink, Outcome::kFault}) {
     FakeDaemon daemon;
-    daemon.start(always(word));
+    daemon.start(always(outcome));
     const Ran ran = bushctl({"move", "theta", "5", "--wait"});
-    EXPECT_EQ(ran.code, 1) << word;
-    EXPECT_THAT(ran.err, HasSubstr(std::string(word) + " for a reason"));
+    EXPECT_EQ(ran.code, 1) << word(outcome);
+    EXPECT_THAT(ran.err, HasSubstr(std::string(word(outcome)) + " for a reason"));
   }
 }
 
 TEST(Bushctl, RefusedPrintsTheReason) {
   FakeDaemon daemon;
-  daemon.start([](const command_t&, int) { return std::vector{refused("theta is moving")}; });
+  daemon.start([](const api::Request&, int) { return Replies{api::Refused{"theta is moving"}}; });
   const Ran ran = bushctl({"move", "theta", "5"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("theta is moving"));
@@ -247,26 +264,25 @@ TEST(Bushctl, RefusedPrintsTheReason) {
 
 TEST(Bushctl, RepeatsACommandThatGotLost) {
   FakeDaemon daemon;
-  daemon.start([](const command_t& command, int times) {
-    return times < 3 ? std::vector<bushd::reply_t>{}
-                     : std::vector{accepted(), result(command, "reached")};
+  daemon.start([](const api::Request& command, int times) {
+    return times < 3 ? Replies{} : Replies{api::Accepted{}, result(command, Outcome::kReached)};
   });
   EXPECT_EQ(bushctl({"move", "theta", "5", "--wait"}).code, 0);
-  EXPECT_EQ(daemon.commands().size(), 1u);
+  EXPECT_EQ(daemon.requests().size(), 1u);
 }
 
 TEST(Bushctl, AsksAgainForALostResult) {
   FakeDaemon daemon;
-  daemon.start([](const command_t& command, int times) {
-    return times < 2 ? std::vector{accepted()}
-                     : std::vector{accepted(), result(command, "reached")};
+  daemon.start([](const api::Request& command, int times) {
+    return times < 2 ? Replies{api::Accepted{}}
+                     : Replies{api::Accepted{}, result(command, Outcome::kReached)};
   });
   EXPECT_EQ(bushctl({"move", "theta", "5", "--wait"}).code, 0);
 }
 
 TEST(Bushctl, DoesNotRepeatAMoveToARestartedDaemon) {
   FakeDaemon daemon;
-  daemon.start([&daemon](const command_t&, int) { return std::vector{accepted()}; });
+  daemon.start([&daemon](const api::Request&, int) { return Replies{api::Accepted{}}; });
   Program move(with_program({"move", "theta", "5", "--wait"}));
   ASSERT_TRUE(move.wait_for("accepted"));
   daemon.restart();
@@ -288,7 +304,7 @@ TEST(Bushctl, MixedMovesAndWrongWordsAreUsageErrors) {
 
 TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   FakeDaemon daemon;
-  daemon.start(always("done"));
+  daemon.start(always(Outcome::kDone));
   EXPECT_EQ(bushctl({"stop"}).code, 0);
   EXPECT_EQ(bushctl({"stop", "theta", "--wait"}).code, 0);
   EXPECT_EQ(bushctl({"enable", "theta", "phi"}).code, 0);
@@ -298,33 +314,30 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   EXPECT_EQ(bushctl({"estop"}).code, 0);
   EXPECT_EQ(bushctl({"disarm", "theta"}).code, 0);
   EXPECT_EQ(bushctl({"reference", "theta", "-5", "--width-us", "7"}).code, 0);
-  const auto commands = daemon.commands();
-  ASSERT_EQ(commands.size(), 9u);
-  EXPECT_EQ(commands[0].kind, command_t::STOP);
-  EXPECT_TRUE(commands[0].motors.empty());
-  EXPECT_THAT(commands[1].motors, ElementsAre("theta"));
-  EXPECT_EQ(commands[2].kind, command_t::ENABLE);
-  EXPECT_THAT(commands[2].motors, ElementsAre("theta", "phi"));
-  EXPECT_EQ(commands[3].kind, command_t::DISABLE);
-  EXPECT_EQ(commands[4].kind, command_t::SET_POSITION);
-  EXPECT_THAT(commands[4].steps, ElementsAre(-100));
-  EXPECT_EQ(commands[5].kind, command_t::CLEAR_FAULTS);
-  EXPECT_EQ(commands[6].kind, command_t::EMERGENCY_STOP);
-  EXPECT_EQ(commands[7].kind, command_t::DISARM);
-  EXPECT_EQ(commands[8].kind, command_t::REFERENCE);
-  EXPECT_THAT(commands[8].steps, ElementsAre(-5));
-  EXPECT_EQ(commands[8].width_us, 7);
+  const auto requests = daemon.requests();
+  ASSERT_EQ(requests.size(), 9u);
+  EXPECT_TRUE(std::get<api::Stop>(requests[0]).motors.empty());
+  EXPECT_THAT(std::get<api::Stop>(requests[1]).motors, ElementsAre("theta"));
+  EXPECT_THAT(std::get<api::Enable>(requests[2]).motors, ElementsAre("theta", "phi"));
+  EXPECT_TRUE(std::get<api::Disable>(requests[3]).motors.empty());
+  EXPECT_EQ(std::get<api::SetPosition>(requests[4]).motors, steps({{"theta", -100}}));
+  EXPECT_TRUE(std::holds_alternative<api::ClearFaults>(requests[5]));
+  EXPECT_TRUE(std::holds_alternative<api::EmergencyStop>(requests[6]));
+  EXPECT_THAT(std::get<api::Disarm>(requests[7]).motors, ElementsAre("theta"));
+  const auto compare = std::get<api::PositionCompare>(requests[8]);
+  EXPECT_EQ(compare.position_steps, -5);
+  EXPECT_EQ(compare.width_us, 7);
 }
 
 TEST(Bushctl, SetFailsWhenTheMcuDidNotTakeIt) {
   FakeDaemon daemon;
-  daemon.start(always("fault"));
+  daemon.start(always(Outcome::kFault));
   EXPECT_EQ(bushctl({"set", "theta", "0"}).code, 1);
 }
 
 TEST(Bushctl, InterruptedMoveSaysThatItGoesOn) {
   FakeDaemon daemon;
-  daemon.start([](const command_t&, int) { return std::vector{accepted()}; });
+  daemon.start([](const api::Request&, int) { return Replies{api::Accepted{}}; });
   Program move(with_program({"move", "theta", "5", "--wait"}));
   ASSERT_TRUE(move.wait_for("accepted"));
   move.send_signal(SIGINT);
@@ -368,11 +381,11 @@ TEST(Bushctl, WatchLeavesTheTerminalAsItWas) {
 
 TEST(Examples, MoveAndWaitInCpp) {
   FakeDaemon daemon;
-  daemon.start(always("reached"));
+  daemon.start(always(Outcome::kReached));
   Program example({EXAMPLE_MOVE_AND_WAIT, "theta", "-400", "chi", "5"});
   EXPECT_EQ(example.finish(), 0) << example.err();
   EXPECT_THAT(example.out(), HasSubstr("chi: reached, stands at 7"));
-  EXPECT_THAT(daemon.commands().at(0).steps, ElementsAre(-400, 5));
+  EXPECT_EQ(only<api::Move>(daemon).motors, steps({{"theta", -400}, {"chi", 5}}));
 }
 
 TEST(Examples, MoveAndWaitInPython) {
@@ -381,12 +394,12 @@ TEST(Examples, MoveAndWaitInPython) {
                     "; the test e2e.python_environment makes it (needs a package index)";
   }
   FakeDaemon daemon;
-  daemon.start(always("reached"));
+  daemon.start(always(Outcome::kReached));
   const std::string script = bushd::test::source_path("tools/examples/python/move_and_wait.py");
   Program example({EXAMPLE_PYTHON, script, "theta", "-400", "chi", "5"});
   EXPECT_EQ(example.finish(), 0) << example.err();
   EXPECT_THAT(example.out(), HasSubstr("chi: reached, stands at 7"));
-  EXPECT_THAT(daemon.commands().at(0).steps, ElementsAre(-400, 5));
+  EXPECT_EQ(only<api::Move>(daemon).motors, steps({{"theta", -400}, {"chi", 5}}));
 }
 
 }  // namespace
@@ -397,6 +410,8 @@ int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   if (!testing::GTEST_FLAG(list_tests) && std::getenv("BUSHCTL_TEST_IN_NAMESPACE") == nullptr) {
     setenv("BUSHCTL_TEST_IN_NAMESPACE", "yes", 1);
+    // A daemon of this machine, if there is one, is not meant.
+    setenv("BUSHD_CONTROL", "/nonexistent/control", 1);
     std::string helper = bushd::test::source_path("tests/tools/with-loopback-multicast");
     again.insert(again.begin(), helper.data());
     execv(helper.c_str(), again.data());

@@ -5,17 +5,14 @@
 #include <chrono>
 #include <stdexcept>
 
-#include "lcm/client.h"
-#include "lcm/messages.h"
+#include "client/client.h"
 
 namespace bushctl::test {
 
-using bushd::command_t;
-using bushd::reply_t;
-using bushd::state_t;
+namespace lcm = bushd::lcm;
 
 FakeDaemon::FakeDaemon() {
-  auto transport = bushd::lcm::Transport::open(bushd::lcm::kDefaultUrl);
+  auto transport = lcm::Transport::open(bushd::client::kDefaultUrl);
   if (!transport) throw std::runtime_error(transport.error().text());
   transport_ = std::move(*transport);
 }
@@ -27,14 +24,22 @@ FakeDaemon::~FakeDaemon() {
 
 void FakeDaemon::start(Answer answer) {
   answer_ = std::move(answer);
-  transport_->subscribe<command_t>("BUSHD_COMMAND",
-                                   [this](const command_t& command) { on_command(command); });
+  for (const std::string_view channel : lcm::client_channels()) {
+    transport_->subscribe_bytes(
+        "BUSHD_" + std::string(channel),
+        [this, channel](lcm::Payload payload) { on_message(channel, payload); });
+  }
   thread_ = std::thread([this] { run(); });
 }
 
-std::vector<command_t> FakeDaemon::commands() const {
+std::vector<api::Request> FakeDaemon::requests() const {
   const std::lock_guard lock(mutex_);
-  return commands_;
+  return requests_;
+}
+
+std::vector<std::string> FakeDaemon::client_ids() const {
+  const std::lock_guard lock(mutex_);
+  return client_ids_;
 }
 
 void FakeDaemon::run() {
@@ -50,68 +55,89 @@ void FakeDaemon::run() {
   }
 }
 
+lcm::Part FakeDaemon::part(std::int32_t index, std::int32_t parts) {
+  return {.utime_us = 1, .run = run_, .sequence = ++sequence_, .part = index, .parts = parts};
+}
+
+void FakeDaemon::publish(const bushd::Result<lcm::Packet>& packet) {
+  (void)transport_->publish_bytes("BUSHD_" + packet->channel, packet->payload);
+}
+
 void FakeDaemon::publish_state() {
-  const std::int64_t sequence = ++sequence_;
-  for (std::int32_t part = 0; part < 2; ++part) {
-    state_t state = bushd::test::state_part(sequence, part, 2, 2);
-    state.boot_number = 41 + part;
-    state.motors[0].name = part == 0 ? name_ : "phi";
-    state.motors[1].name = part == 0 ? "chi" : "stop";
-    state.motors[0].position_steps = -12;
-    state.motors[0].target_steps = 400;
-    state.motors[0].velocity_steps_per_s = 2500.5;
-    state.motors[0].moving = 1;
-    state.motors[1].trust = "uncertain";
+  for (std::int32_t mcu = 0; mcu < 2; ++mcu) {
+    const api::StateSnapshot state{
+        .bus = "hall",
+        .mcu = "hall:" + std::to_string(mcu + 1),
+        .state = api::McuState::kReady,
+        .boot = 41 + mcu,
+        .motors = {{.name = mcu == 0 ? name_ : "phi",
+                    .position_steps = -12,
+                    .target_steps = 400,
+                    .velocity_steps_per_s = 2500.5,
+                    .activity = api::Activity::kMoving,
+                    .moving = true},
+                   {.name = mcu == 0 ? "chi" : "stop", .trust = api::Trust::kUncertain}}};
     for (const auto& payload : hostile_) (void)transport_->publish_bytes("BUSHD_STATE", payload);
-    (void)transport_->publish("BUSHD_STATE", state);
+    publish(lcm::encode(part(mcu, 2), 0, state));
   }
 }
 
-void FakeDaemon::on_command(const command_t& command) {
-  const int times = ++times_[{command.client_id, command.number}];
+void FakeDaemon::publish_rest() {
+  for (std::int32_t mcu = 0; mcu < 2; ++mcu) {
+    const api::TableRef table{.name = "bushd2-constant", .revision = 3, .hash = "0a1b2c3d"};
+    const api::Description description{
+        .bus = "hall",
+        .mcu = "hall:" + std::to_string(mcu + 1),
+        .address = mcu + 1,
+        .motors = {{.name = mcu == 0 ? name_ : "phi", .group = "goniometer", .table = table},
+                   {.name = mcu == 0 ? "chi" : "stop",
+                    .output = 1,
+                    .group = "goniometer",
+                    .table = table}}};
+    publish(lcm::encode(part(mcu, 2), description));
+  }
+  publish(lcm::encode(part(0, 1), api::HealthSnapshot{.bus = "hall", .port_state = "open"}));
+}
+
+void FakeDaemon::on_message(std::string_view channel, lcm::Payload payload) {
+  const auto message = lcm::decode_client_message(channel, payload);
+  if (!message) return;
+  if (const auto* hello = std::get_if<lcm::Hello>(&message->content)) {
+    publish(lcm::encode(1, lcm::Welcome{.hello = *hello, .run = run_, .session = 77}));
+  } else if (const auto* request = std::get_if<api::Request>(&message->content)) {
+    on_request(message->id, *request);
+  } else {
+    publish_rest();
+    publish_state();
+  }
+}
+
+void FakeDaemon::on_request(const lcm::RequestId& id, const api::Request& request) {
+  const int times = ++times_[{id.client_id, id.number}];
   if (times == 1) {
     const std::lock_guard lock(mutex_);
-    commands_.push_back(command);
+    requests_.push_back(request);
+    client_ids_.push_back(id.client_id);
   }
   publish_state();  // as bushd does on any change
   if (!answer_) return;
-  for (reply_t reply : answer_(command, times)) {
-    reply.client_id = command.client_id;
-    reply.number = command.number;
-    (void)transport_->publish("BUSHD_REPLY", reply);
+  for (const api::Reply& reply : answer_(request, times)) publish(lcm::encode(1, id, reply));
+}
+
+api::Reply result(const api::Request& request, api::Outcome outcome) {
+  api::Completed completed{
+      .outcome = outcome, .reason = std::string(word(outcome)) + " for a reason", .detail = {}};
+  if (const auto* move = std::get_if<api::Move>(&request)) {
+    std::vector<api::MotorResult> motors;
+    for (const api::MotorSteps& motor : move->motors) {
+      motors.push_back({.motor = motor.motor,
+                        .outcome = outcome,
+                        .position_steps = 7,
+                        .table = {.name = "bushd2-constant", .revision = 3, .hash = "0a1b2c3d"}});
+    }
+    completed.detail = std::move(motors);
   }
-}
-
-reply_t accepted() {
-  reply_t reply{};
-  reply.phase = reply_t::ACCEPTED;
-  reply.reason = "accepted";
-  return reply;
-}
-
-reply_t refused(const std::string& reason) {
-  reply_t reply{};
-  reply.phase = reply_t::REFUSED;
-  reply.result = "refused";
-  reply.reason = reason;
-  return reply;
-}
-
-reply_t result(const command_t& command, const std::string& word) {
-  reply_t reply{};
-  reply.phase = reply_t::RESULT;
-  reply.result = word;
-  reply.reason = word + " for a reason";
-  if (command.kind == command_t::MOVE_RELATIVE || command.kind == command_t::MOVE_ABSOLUTE) {
-    reply.motors = command.motors;
-    reply.motor_results.assign(command.motors.size(), word);
-    reply.position_steps.assign(command.motors.size(), 7);
-    reply.table_of_motor.assign(command.motors.size(), 0);
-    reply.tables = {bushd::test::table_ref()};
-  }
-  reply.motor_count = static_cast<std::int32_t>(reply.motors.size());
-  reply.table_count = static_cast<std::int32_t>(reply.tables.size());
-  return reply;
+  return completed;
 }
 
 }  // namespace bushctl::test

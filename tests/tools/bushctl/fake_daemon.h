@@ -1,5 +1,5 @@
-// What a client sees of bushd, in a thread of its own: a state 50 times a second, and replies as
-// told.
+// What a client sees of bushd on LCM, in a thread of its own: a state 50 times a second, and
+// replies as told.
 #pragma once
 
 #include <atomic>
@@ -13,12 +13,14 @@
 #include <utility>
 #include <vector>
 
-#include "bushd/command_t.hpp"
-#include "bushd/reply_t.hpp"
-#include "bushd/state_t.hpp"
+#include "api/reply.h"
+#include "api/request.h"
+#include "lcm/codec.h"
 #include "lcm/transport.h"
 
 namespace bushctl::test {
+
+namespace api = bushd::api;
 
 class FakeDaemon {
  public:
@@ -28,15 +30,16 @@ class FakeDaemon {
   FakeDaemon(const FakeDaemon&) = delete;
   FakeDaemon& operator=(const FakeDaemon&) = delete;
 
-  // Replies to a command; `times` counts how often just this one has come (1: the first time).
-  // Phase, result and the per-motor fields matter, the rest is filled in. Set before start().
-  using Answer = std::function<std::vector<bushd::reply_t>(const bushd::command_t&, int times)>;
+  // Replies to a request; `times` counts how often just this one has come (1: the first time). Set
+  // before start().
+  using Answer = std::function<std::vector<api::Reply>(const api::Request&, int times)>;
   void start(Answer answer = {});
 
   // Each once, however often it came.
-  std::vector<bushd::command_t> commands() const;
-  // From now on snapshots are counted as after a restart.
-  void restart() { sequence_ = 0; }
+  std::vector<api::Request> requests() const;
+  std::vector<std::string> client_ids() const;
+  // From now on it is another run of the daemon.
+  void restart() { ++run_; }
   void set_name(const std::string& name) { name_ = name; }  // of the first motor, before start()
   // Sent along with every state, before start().
   void set_hostile_states(std::vector<std::vector<std::uint8_t>> payloads) {
@@ -45,24 +48,28 @@ class FakeDaemon {
 
  private:
   void run();
-  void on_command(const bushd::command_t& command);
+  void on_message(std::string_view channel, bushd::lcm::Payload payload);
+  void on_request(const bushd::lcm::RequestId& id, const api::Request& request);
   void publish_state();
+  void publish_rest();
+  void publish(const bushd::Result<bushd::lcm::Packet>& packet);
+  bushd::lcm::Part part(std::int32_t index, std::int32_t parts);
 
   std::unique_ptr<bushd::lcm::Transport> transport_;
   Answer answer_;
   std::string name_ = "theta";
   std::vector<std::vector<std::uint8_t>> hostile_;
-  std::atomic<std::int64_t> sequence_{1000};
+  std::atomic<std::int64_t> run_{7};
+  std::int64_t sequence_ = 0;
   std::atomic<bool> ended_{false};
   mutable std::mutex mutex_;
-  std::vector<bushd::command_t> commands_;                     // guarded by mutex_
+  std::vector<api::Request> requests_;                         // guarded by mutex_
+  std::vector<std::string> client_ids_;                        // so are these
   std::map<std::pair<std::string, std::int64_t>, int> times_;  // by client_id and number
   std::thread thread_;
 };
 
-bushd::reply_t accepted();
-bushd::reply_t refused(const std::string& reason);
-// One result for all motors of the command, which stand at 7.
-bushd::reply_t result(const bushd::command_t& command, const std::string& word);
+// One result for all motors of a move, which stand at 7.
+api::Reply result(const api::Request& request, api::Outcome outcome);
 
 }  // namespace bushctl::test

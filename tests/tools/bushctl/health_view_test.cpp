@@ -5,19 +5,22 @@
 
 #include <nlohmann/json.hpp>
 
-#include "lcm/messages.h"
-
 namespace bushctl {
 namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
 
-bushd::lcm::Health health() {
-  bushd::lcm::Health all{.sequence = 4, .buses = {bushd::test::health_part(4, 0, 1, 2)}};
-  all.buses[0].mcus[1].low_water_ticks = 117;
-  all.buses[0].mcus[1].repeats = 9;
-  return all;
+bushd::client::Status health() {
+  bushd::client::Status status;
+  status.healths.push_back(
+      {.part = {},
+       .snapshot = {
+           .bus = "hall",
+           .port_state = "open",
+           .latency = {{1000, 7}, {INT64_MAX, 1}},
+           .mcus = {{.mcu = "hall:1"}, {.mcu = "hall:2", .repeats = 9, .low_water_ticks = 117}}}});
+  return status;
 }
 
 TEST(HealthView, TableHasBusesLatenciesAndMcus) {
@@ -38,8 +41,8 @@ TEST(HealthView, WhatIsNotThereIsNullInJson) {
 
 TEST(HealthView, TextsDoNotSteerTheTerminal) {
   auto hostile = health();
-  hostile.buses[0].port_state = "\x1b[2J";
-  hostile.buses[0].mcus[0].unique_id = "\x07";
+  hostile.healths[0].snapshot.port_state = "\x1b[2J";
+  hostile.healths[0].snapshot.mcus[0].unique_id = "\x07";
   for (const std::string& line : health_table(hostile)) {
     EXPECT_EQ(line.find_first_of("\x1b\x07"), std::string::npos);
   }

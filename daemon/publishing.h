@@ -1,0 +1,76 @@
+// What is published, as packets, and when: changes at once, an MCU whose motors all rest twice a
+// second, descriptions every few seconds. The newest of each is kept for who asks.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "api/snapshot.h"
+#include "lcm/codec.h"
+
+namespace bushd::daemon {
+
+enum class Topic { kState, kDescription, kHealth };
+
+// A front end's ears.
+class Listener {
+ public:
+  virtual ~Listener() = default;
+  virtual void hear(Topic topic, const lcm::Packet& packet) = 0;
+};
+
+class Publishing : public api::Publisher {
+ public:
+  static constexpr std::int64_t kRestingPeriodUs = 500'000;
+  static constexpr std::int64_t kDescriptionPeriodUs = 3'000'000;
+
+  struct Clocks {
+    std::function<std::int64_t()> now_us;   // monotonic
+    std::function<std::int64_t()> unix_us;  // since 1970
+  };
+  // `run` tells this run of the daemon from others.
+  Publishing(std::int64_t run, std::size_t mcus, std::size_t buses, Clocks clocks);
+
+  // Outlives this.
+  void add(Listener& listener) { listeners_.push_back(&listener); }
+  void set_dropped_messages(std::uint64_t count) { dropped_ = static_cast<std::int64_t>(count); }
+
+  // The core may publish as often as it likes: a state that has not changed is passed on when its
+  // period is over.
+  void publish(McuId mcu, const api::StateSnapshot& state) override;
+  void publish(McuId mcu, const api::Description& description) override;
+  void publish(BusId bus, const api::HealthSnapshot& health) override;
+
+  // Description, state and health of everything, as published last.
+  std::vector<const lcm::Packet*> newest() const;
+  // The same to all listeners, but not more often than ten times a second.
+  void publish_newest();
+
+ private:
+  template <class Snapshot>
+  struct Slot {
+    std::optional<Snapshot> snapshot;
+    std::optional<lcm::Packet> packet;
+    std::int64_t sent_us = 0;
+    std::int64_t dropped = 0;  // messages, as told with it
+  };
+
+  lcm::Part part(std::size_t index, std::size_t parts);
+  template <class Snapshot>
+  void send(Topic topic, Slot<Snapshot>& slot, Result<lcm::Packet> packet);
+
+  std::int64_t run_;
+  Clocks clocks_;
+  std::vector<Listener*> listeners_;
+  std::vector<Slot<api::StateSnapshot>> states_;  // by MCU
+  std::vector<Slot<api::Description>> descriptions_;
+  std::vector<Slot<api::HealthSnapshot>> healths_;  // by bus
+  std::int64_t sequence_ = 0;
+  std::int64_t dropped_ = 0;
+  std::int64_t newest_sent_us_ = INT64_MIN / 2;
+};
+
+}  // namespace bushd::daemon

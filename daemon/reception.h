@@ -1,0 +1,62 @@
+// Requests on their way from the front ends to the core: stops at once, the others in turn, one
+// client after the other. How many may wait is bounded, per client and in all; what is too many is
+// refused.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <list>
+#include <string>
+#include <unordered_map>
+
+#include "api/session.h"
+
+namespace bushd::daemon {
+
+class Reception {
+ public:
+  struct Limits {
+    std::size_t requests_per_client = 64;
+    std::size_t bytes_per_client = 512 * 1024;
+    std::size_t requests = 4096;
+    std::size_t bytes = 8 * 1024 * 1024;
+  };
+  using CarryOut = std::function<void(const api::Asker&, const api::Request&)>;
+
+  explicit Reception(CarryOut carry_out) : Reception(std::move(carry_out), Limits()) {}
+  Reception(CarryOut carry_out, Limits limits)
+      : limits_(limits), carry_out_(std::move(carry_out)) {}
+
+  // Carries out a stop before it returns. Others wait, or are refused. `bytes`: of its message.
+  // Precondition: the asker has a session.
+  void take(api::Asker asker, api::Request request, std::size_t bytes);
+
+  bool idle() const { return turns_.empty(); }
+  // Carries out the next one, if there is one.
+  void carry_out_next();
+
+  std::size_t requests() const { return requests_; }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  struct Waiting {
+    api::Asker asker;
+    api::Request request;
+    std::size_t bytes;
+  };
+  struct Client {
+    std::deque<Waiting> waiting;
+    std::size_t bytes = 0;
+  };
+
+  Limits limits_;
+  CarryOut carry_out_;
+  std::unordered_map<std::string, Client> clients_;  // that have something waiting
+  std::list<std::string> turns_;                     // the next one first
+  std::size_t requests_ = 0;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,74 @@
+#include "daemon/request_log.h"
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+namespace bushd::daemon {
+namespace {
+
+void put_motors(nlohmann::json& line, const auto& request) {
+  if constexpr (requires { request.motors.front().steps; }) {
+    for (const api::MotorSteps& motor : request.motors) line["motors"].push_back(motor.motor);
+  } else if constexpr (requires { request.motors; }) {
+    for (const std::string& motor : request.motors) line["motors"].push_back(motor);
+  } else if constexpr (requires { request.motor; }) {
+    line["motors"].push_back(request.motor);
+  }
+}
+
+bool is_logged(const api::Request& request) {
+  const auto* move = std::get_if<api::Move>(&request);
+  if (move != nullptr) return !move->dry_run;
+  return api::is_stop(request) || !api::is_repeatable(request);
+}
+
+std::string line_of(std::int64_t unix_us, const api::Session& session, std::int64_t number,
+                    const api::Request& request) {
+  nlohmann::json line = {{"event", "request"},
+                         {"utime_us", unix_us},
+                         {"request", api::name_of(request)},
+                         {"client", session.client_id()},
+                         {"number", number},
+                         {"by", session.transport() == api::Transport::kSocket ? "socket" : "lcm"}};
+  if (const auto& credentials = session.credentials()) {
+    line["uid"] = credentials->uid;
+    line["pid"] = credentials->pid;
+  }
+  std::visit([&line](const auto& content) { put_motors(line, content); }, request);
+  // Names are as clients wrote them; what is not UTF-8 must not end the daemon.
+  return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+// Stands for the session of one request until that is accepted or refused.
+class Logged : public api::Session {
+ public:
+  Logged(std::shared_ptr<api::Session> session, const api::Request& request, Outputs& outputs)
+      : Session(session->transport(), session->client_id(), session->may_command(),
+                session->credentials()),
+        session_(std::move(session)),
+        request_(request),
+        outputs_(outputs) {}
+
+  void answer(std::int64_t number, const api::Reply& reply) override {
+    if (std::holds_alternative<api::Accepted>(reply)) {
+      outputs_.move_log(line_of(outputs_.wall_clock_us(), *this, number, request_));
+    }
+    session_->answer(number, reply);
+  }
+
+ private:
+  std::shared_ptr<api::Session> session_;
+  api::Request request_;
+  Outputs& outputs_;
+};
+
+}  // namespace
+
+api::Asker logged(const api::Asker& asker, const api::Request& request, Outputs& outputs) {
+  if (!is_logged(request)) return asker;
+  return {.session = std::make_shared<Logged>(asker.session, request, outputs),
+          .number = asker.number};
+}
+
+}  // namespace bushd::daemon

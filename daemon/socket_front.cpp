@@ -1,0 +1,112 @@
+#include "daemon/socket_front.h"
+
+#include <utility>
+
+namespace bushd::daemon {
+
+class SocketFront::SocketSession : public api::Session {
+ public:
+  SocketSession(SocketFront& front, Connection connection, std::string client_id,
+                const api::Credentials& credentials)
+      : Session(api::Transport::kSocket, std::move(client_id), true, credentials),
+        front_(front),
+        connection_(connection) {}
+
+  void answer(std::int64_t number, const api::Reply& reply) override {
+    front_.answer(connection_, client_id(), number, reply);
+  }
+
+ private:
+  SocketFront& front_;
+  Connection connection_;  // never used again: after its end this is nobody's
+};
+
+SocketFront::SocketFront(control::Server& server, std::int64_t run, Reception& reception,
+                         Publishing& publishing, std::function<std::int64_t()> unix_us)
+    : server_(server),
+      run_(run),
+      reception_(reception),
+      publishing_(publishing),
+      unix_us_(std::move(unix_us)) {
+  server_.set_handlers({.opened =
+                            [this](Connection connection, const api::Credentials& credentials) {
+                              clients_.emplace(connection, Client{.credentials = credentials});
+                            },
+                        .packet = [this](Connection connection,
+                                         control::View packet) { on_packet(connection, packet); },
+                        .closed = [this](Connection connection) { clients_.erase(connection); }});
+}
+
+SocketFront::~SocketFront() {
+  server_.set_handlers({});
+}
+
+void SocketFront::on_packet(Connection connection, control::View packet) {
+  const auto message = lcm::decode_client_message(packet.channel, packet.payload);
+  Client& client = clients_.at(connection);
+  if (!message) return server_.reject(connection);
+  if (const auto* subscription = std::get_if<lcm::Subscription>(&message->content)) {
+    client.subscription = *subscription;
+    return;
+  }
+  if (!known(connection, client, message->id.client_id)) return;
+  const lcm::RequestId& id = message->id;
+  if (const auto* hello = std::get_if<lcm::Hello>(&message->content)) {
+    on_hello(connection, *hello);
+  } else if (std::holds_alternative<lcm::GetStatus>(message->content)) {
+    for (const lcm::Packet* newest : publishing_.newest()) send(connection, *newest);
+    answer(connection, id.client_id, id.number,
+           api::Completed{.outcome = api::Outcome::kDone, .reason = "told", .detail = {}});
+  } else {
+    reception_.take({.session = client.session, .number = id.number},
+                    std::get<api::Request>(message->content), packet.payload.size());
+  }
+}
+
+// A connection has one name for its life: answers and logs name it.
+bool SocketFront::known(Connection connection, Client& client, const std::string& client_id) {
+  if (!client.session && api::is_client_id(client_id)) {
+    client.session =
+        std::make_shared<SocketSession>(*this, connection, client_id, client.credentials);
+  }
+  if (client.session && client.session->client_id() == client_id) return true;
+  server_.reject(connection);
+  return false;
+}
+
+// Not needed here, but a client need not know that.
+void SocketFront::on_hello(Connection connection, const lcm::Hello& hello) {
+  const lcm::Welcome welcome{
+      .hello = hello, .run = run_, .session = static_cast<std::int64_t>(connection)};
+  if (const auto packet = lcm::encode(unix_us_(), welcome)) send(connection, *packet);
+}
+
+void SocketFront::answer(Connection connection, const std::string& client_id, std::int64_t number,
+                         const api::Reply& reply) {
+  const lcm::RequestId id{
+      .session = static_cast<std::int64_t>(connection), .client_id = client_id, .number = number};
+  auto packet = lcm::encode(unix_us_(), id, reply);
+  if (!packet) packet = lcm::encode(unix_us_(), id, api::Refused{packet.error().text()});
+  if (packet) send(connection, *packet);
+}
+
+void SocketFront::send(Connection connection, const lcm::Packet& packet) {
+  server_.send(connection,
+               std::make_shared<const std::vector<std::uint8_t>>(control::packet_of(packet)));
+}
+
+void SocketFront::hear(Topic topic, const lcm::Packet& packet) {
+  std::shared_ptr<const std::vector<std::uint8_t>> shared;  // made once for all
+  for (const auto& [connection, client] : clients_) {
+    const bool wanted = topic == Topic::kState         ? client.subscription.state
+                        : topic == Topic::kDescription ? client.subscription.description
+                                                       : client.subscription.health;
+    if (!wanted) continue;
+    if (!shared) {
+      shared = std::make_shared<const std::vector<std::uint8_t>>(control::packet_of(packet));
+    }
+    server_.send(connection, shared);
+  }
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,274 @@
+#include "client/client.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdlib>
+#include <random>
+#include <utility>
+
+#include "api/sessions.h"
+#include "control/path.h"
+
+namespace bushd::client {
+namespace {
+
+constexpr std::size_t kMaxClientId = 64;  // api::is_client_id
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  if (gethostname(name.data(), name.size() - 1) != 0) return "unknown";
+  return name.data();
+}
+
+std::int64_t random_number() {
+  std::random_device random;
+  return static_cast<std::int64_t>(std::uint64_t{random()} << 32 | random());
+}
+
+// Unique among running clients: process numbers repeat, and containers may share a host's name.
+std::string make_id(const std::string& program) {
+  const std::string tail =
+      fmt::format("-{}-{:08x}", getpid(), static_cast<std::uint32_t>(random_number()));
+  std::string head = program + "-" + host_name();
+  head.resize(std::min(head.size(), kMaxClientId - tail.size()));
+  std::replace_if(
+      head.begin(), head.end(), [](unsigned char c) { return c >= 0x80 || std::isgraph(c) == 0; },
+      '_');
+  return head + tail;
+}
+
+std::int64_t unix_time_us() {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count();
+}
+
+std::vector<std::string> socket_paths(const ClientOptions& options) {
+  if (!options.socket.empty()) return {options.socket};
+  const char* path = std::getenv("BUSHD_CONTROL");
+  if (path != nullptr && *path != '\0') return {path};
+  return control::default_paths();
+}
+
+Result<std::unique_ptr<Link>> open_link(const ClientOptions& options) {
+  using Way = ClientOptions::Way;
+  if (options.way != Way::kLcm) {
+    std::optional<Error> first;
+    for (const std::string& path : socket_paths(options)) {
+      auto link = open_socket(path);
+      if (link) return link;
+      if (!first) first = link.error();
+    }
+    if (options.way == Way::kSocket) return fail(*first);
+  }
+  return open_lcm(options.url, options.prefix);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Client>> Client::open(ClientOptions options) {
+  auto link = open_link(options);
+  if (!link) return fail(link.error());
+  return std::make_unique<Client>(std::move(*link), std::move(options));
+}
+
+Client::Client(std::unique_ptr<Link> link, ClientOptions options)
+    : link_(std::move(link)),
+      options_(std::move(options)),
+      id_(make_id(options_.program)),
+      nonce_(random_number()) {}
+
+void Client::on_run(std::int64_t run) {
+  if (run_ && *run_ != run) restarted_ = true;
+  run_ = run;
+}
+
+void Client::on_message(const lcm::DaemonMessage& message) {
+  if (const auto* state = std::get_if<lcm::StateMessage>(&message)) {
+    on_run(state->part.run);
+    state_heard_ = true;
+    state_heard_at_ = Clock::now();
+    collector_.add(*state);
+  } else if (const auto* description = std::get_if<lcm::DescriptionMessage>(&message)) {
+    collector_.add(*description);
+  } else if (const auto* health = std::get_if<lcm::HealthMessage>(&message)) {
+    health_heard_ = true;
+    collector_.add(*health);
+  } else if (const auto* welcome = std::get_if<lcm::Welcome>(&message)) {
+    if (welcome->hello.client_id == id_ && welcome->hello.nonce == nonce_) {
+      session_ = welcome->session;
+    }
+  } else if (const auto* reply = std::get_if<lcm::ReplyMessage>(&message)) {
+    if (reply->id.client_id != id_ || reply->id.number != waiting_.number) return;
+    if (link_->loses() && reply->id.session != session_) return;
+    auto& place = api::is_final(reply->reply) ? waiting_.final : waiting_.accepted;
+    if (!place) place = reply->reply;
+  }
+}
+
+Result<void> Client::wait(Clock::time_point deadline) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+  std::array<pollfd, 2> polled{{{.fd = link_->fd(), .events = POLLIN, .revents = 0},
+                                {.fd = options_.interrupt_fd, .events = POLLIN, .revents = 0}}};
+  const auto ms = std::clamp<std::int64_t>(left.count(), 0, 3'600'000);
+  if (poll(polled.data(), polled.size(), static_cast<int>(ms)) > 0 &&
+      (polled[1].revents & POLLIN) != 0) {
+    interrupted_ = true;
+    return fail("interrupted");
+  }
+  return link_->handle([this](const lcm::DaemonMessage& message) { on_message(message); });
+}
+
+// Only where messages may be lost.
+Result<void> Client::greet(Clock::time_point give_up) {
+  Clock::time_point next_send = Clock::now();
+  while (session_ == 0) {
+    if (Clock::now() >= give_up) return fail(link_->remedy());
+    if (Clock::now() >= next_send) {
+      const auto hello = lcm::encode(unix_time_us(), lcm::Hello{.client_id = id_, .nonce = nonce_});
+      if (!hello) return fail(hello.error());
+      if (auto sent = link_->send(*hello); !sent) return sent;
+      next_send = Clock::now() + options_.resend_every;
+    }
+    if (auto waited = wait(std::min(next_send, give_up)); !waited) return waited;
+  }
+  return {};
+}
+
+Result<api::Reply> Client::run(const api::Request& request, Until until,
+                               const std::function<void(const api::Reply&)>& on_reply) {
+  // What happened to the daemon before this request is no concern of it.
+  if (auto drained = wait(Clock::now()); !drained) return fail(drained.error());
+  run_.reset();
+  restarted_ = false;
+  // Whoever can speak may stop, without waiting for a session.
+  if (link_->loses() && !api::is_repeatable(request)) {
+    if (auto greeted = greet(Clock::now() + options_.answer_within); !greeted) {
+      return fail(greeted.error());
+    }
+  }
+  waiting_ = {.number = ++number_};
+  const auto packet = lcm::encode(
+      unix_time_us(), {.session = session_, .client_id = id_, .number = number_}, request);
+  if (!packet) return fail(packet.error());
+  auto reply = await_reply(*packet, until, on_reply);
+  // Of a daemon that has forgotten it, the next request needs another session.
+  const auto* refused = reply ? std::get_if<api::Refused>(&*reply) : nullptr;
+  const bool forgotten = refused != nullptr && refused->reason.starts_with(api::kUnknownSession);
+  if (!reply || forgotten) {
+    session_ = 0;
+    nonce_ = random_number();
+  }
+  return reply;
+}
+
+Result<void> Client::check_alive(Clock::time_point answered) const {
+  if (restarted_) {
+    return fail(
+        "the daemon has restarted meanwhile (or two of them use this prefix), so the result is "
+        "lost; 'bushctl status' shows where the motors are");
+  }
+  if (link_->loses() &&
+      Clock::now() >= std::max(state_heard_at_, answered) + options_.silence_limit) {
+    return fail(
+        "the daemon accepted the command and has fallen silent since; what became of it is "
+        "unknown");
+  }
+  return {};
+}
+
+Result<api::Reply> Client::await_reply(const lcm::Packet& packet, Until until,
+                                       const std::function<void(const api::Reply&)>& on_reply) {
+  const Clock::time_point give_up = Clock::now() + options_.answer_within;
+  Clock::time_point next_send = Clock::now();
+  Clock::time_point answered{};
+  bool sent_once = false;
+  bool reported = false;
+  for (;;) {
+    // Over a link that loses nothing once is enough.
+    if (Clock::now() >= next_send && (link_->loses() || !sent_once)) {
+      if (auto sent = link_->send(packet); !sent) return fail(sent.error());
+      sent_once = true;
+      next_send =
+          Clock::now() + (waiting_.accepted ? options_.ask_again_every : options_.resend_every);
+    }
+    const Clock::time_point wake = std::max(next_send, Clock::now());
+    auto waited = wait(waiting_.accepted ? wake : std::min(wake, give_up));
+    // What came before the end of the link counts.
+    if (waiting_.accepted && !std::exchange(reported, true)) {
+      answered = Clock::now();
+      next_send = answered + options_.ask_again_every;
+      if (on_reply) on_reply(*waiting_.accepted);
+    }
+    if (waiting_.final) {
+      if (on_reply) on_reply(*waiting_.final);
+      return *waiting_.final;
+    }
+    if (waiting_.accepted && until == Until::kAnswered) return *waiting_.accepted;
+    if (!waited) return fail(waited.error());
+    if (auto alive = check_alive(waiting_.accepted ? answered : Clock::now()); !alive) {
+      return fail(alive.error());
+    }
+    if (!waiting_.accepted && Clock::now() >= give_up) return fail(link_->remedy());
+  }
+}
+
+Result<Status> Client::wait_for(const bool& heard, bool (StatusCollector::*enough)() const,
+                                std::chrono::milliseconds timeout) {
+  const Clock::time_point deadline = Clock::now() + timeout;
+  while (!heard || !(collector_.*enough)()) {
+    if (auto waited = wait(deadline); !waited) return fail(waited.error());
+    if (heard && (collector_.*enough)()) break;
+    if (Clock::now() >= deadline) return fail(link_->remedy());
+  }
+  return collector_.status();
+}
+
+Result<Status> Client::status(std::chrono::milliseconds timeout) {
+  if (auto drained = wait(Clock::now()); !drained) return fail(drained.error());
+  collector_.clear();
+  const Clock::time_point deadline = Clock::now() + timeout;
+  Clock::time_point next_send = Clock::now();
+  waiting_ = {.number = ++number_};
+  const auto packet = lcm::encode(
+      unix_time_us(), {.session = session_, .client_id = id_, .number = number_}, lcm::GetStatus{});
+  if (!packet) return fail(packet.error());
+  while (!collector_.has_everything()) {
+    if (Clock::now() >= deadline) return fail(link_->remedy());
+    if (Clock::now() >= next_send) {
+      if (auto sent = link_->send(*packet); !sent) return fail(sent.error());
+      next_send = Clock::now() + options_.resend_every;
+    }
+    if (auto waited = wait(std::min(next_send, deadline)); !waited) return fail(waited.error());
+  }
+  return collector_.status();
+}
+
+Result<void> Client::subscribe() {
+  if (link_->loses() || subscribed_) return {};
+  const auto packet =
+      lcm::encode(lcm::Subscription{.state = true, .description = true, .health = true});
+  if (!packet) return fail(packet.error());
+  subscribed_ = true;
+  return link_->send(*packet);
+}
+
+Result<Status> Client::next_state(std::chrono::milliseconds timeout) {
+  if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error());
+  auto status = wait_for(state_heard_, &StatusCollector::has_motors, timeout);
+  state_heard_ = false;
+  return status;
+}
+
+Result<Status> Client::next_health(std::chrono::milliseconds timeout) {
+  if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error());
+  auto status = wait_for(health_heard_, &StatusCollector::has_health, timeout);
+  health_heard_ = false;
+  return status;
+}
+
+}  // namespace bushd::client

@@ -1,0 +1,115 @@
+// What a client of the daemon needs, over the control socket or LCM: requests that are carried out
+// exactly once although datagrams may be lost, and snapshots. docs/lcm.md has the rules that this
+// follows.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "api/reply.h"
+#include "api/request.h"
+#include "base/result.h"
+#include "client/link.h"
+#include "client/status.h"
+
+namespace bushd::client {
+
+inline constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
+inline constexpr const char* kDefaultPrefix = "BUSHD";
+
+struct ClientOptions {
+  enum class Way {
+    kAny,  // the control socket if there is one, else LCM
+    kSocket,
+    kLcm
+  };
+  Way way = Way::kAny;
+  std::string socket = {};  // path; empty: $BUSHD_CONTROL, else the default ones (control/path.h)
+  std::string url = kDefaultUrl;
+  std::string prefix = kDefaultPrefix;            // of the channels, [lcm] prefix in bushd.toml
+  std::string program = "client";                 // begins the client_id
+  int interrupt_fd = -1;                          // once readable, waiting ends; -1: never
+  std::chrono::milliseconds resend_every{300};    // until the daemon has answered
+  std::chrono::milliseconds answer_within{3000};  // then it is given up
+  // While a result is awaited: how often it is asked for again, should the answer be lost, and how
+  // long the daemon's state may stay away.
+  std::chrono::milliseconds ask_again_every{1000};
+  std::chrono::milliseconds silence_limit{5000};
+};
+
+// One thread.
+class Client {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  static Result<std::unique_ptr<Client>> open(ClientOptions options);
+  // Over a link that is there already.
+  Client(std::unique_ptr<Link> link, ClientOptions options);
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  enum class Until { kAnswered, kResult };
+
+  // Sends the request and waits. kAnswered: returns Accepted or Refused (or Completed, when that
+  // came first). kResult: Refused or Completed. `on_reply` sees each different reply once. Fails
+  // when no daemon answers, when it falls silent or restarts meanwhile (what the request did is
+  // then unknown), when interrupted, and for requests that cannot be sent.
+  Result<api::Reply> run(const api::Request& request, Until until,
+                         const std::function<void(const api::Reply&)>& on_reply = {});
+
+  // Description, state and health of everything as they are now: the daemon is asked.
+  Result<Status> status(std::chrono::milliseconds timeout);
+
+  // As soon as a state, or a health, has been published since the last call of ours. Descriptions
+  // are in the former.
+  Result<Status> next_state(std::chrono::milliseconds timeout);
+  Result<Status> next_health(std::chrono::milliseconds timeout);
+
+  // interrupt_fd has become readable during one of the calls above.
+  bool interrupted() const { return interrupted_; }
+
+  const std::string& id() const { return id_; }
+  Link& link() { return *link_; }
+
+ private:
+  struct Waiting {
+    std::int64_t number = 0;
+    std::optional<api::Reply> accepted{};
+    std::optional<api::Reply> final{};  // Refused or Completed
+  };
+
+  void on_message(const lcm::DaemonMessage& message);
+  void on_run(std::int64_t run);
+  Result<void> greet(Clock::time_point give_up);
+  Result<void> subscribe();
+  Result<Status> wait_for(const bool& heard, bool (StatusCollector::*enough)() const,
+                          std::chrono::milliseconds timeout);
+  Result<api::Reply> await_reply(const lcm::Packet& packet, Until until,
+                                 const std::function<void(const api::Reply&)>& on_reply);
+  Result<void> check_alive(Clock::time_point answered) const;
+  // Handles messages until `deadline`, or until there were some. Fails when interrupted.
+  Result<void> wait(Clock::time_point deadline);
+
+  std::unique_ptr<Link> link_;
+  ClientOptions options_;
+  std::string id_;
+  std::int64_t nonce_;
+  std::int64_t session_ = 0;  // 0: none yet
+  std::int64_t number_ = 0;
+  Waiting waiting_;
+  bool interrupted_ = false;
+  bool subscribed_ = false;
+
+  StatusCollector collector_;
+  bool state_heard_ = false;  // since it was set to false
+  bool health_heard_ = false;
+  Clock::time_point state_heard_at_{};
+  std::optional<std::int64_t> run_;  // of the daemon that is heard
+  bool restarted_ = false;
+};
+
+}  // namespace bushd::client

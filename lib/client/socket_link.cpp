@@ -1,0 +1,91 @@
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+#include "client/link.h"
+#include "control/packet.h"
+
+namespace bushd::client {
+namespace {
+
+constexpr int kSendWithinMs = 3000;
+constexpr int kPacketsAtOnce = 256;
+
+class SocketLink : public Link {
+ public:
+  SocketLink(int fd, std::string path)
+      : fd_(fd), path_(std::move(path)), buffer_(control::kMaxPacketBytes) {}
+  ~SocketLink() override { ::close(fd_); }
+
+  int fd() const override { return fd_; }
+
+  Result<void> send(const lcm::Packet& packet) override {
+    const auto bytes = control::packet_of(packet);
+    // A daemon that is busy takes it a moment later.
+    pollfd polled{.fd = fd_, .events = POLLOUT, .revents = 0};
+    ::poll(&polled, 1, kSendWithinMs);
+    if (::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT) < 0) {
+      return fail(
+          fmt::format("the daemon does not take messages at {}: {}", path_, std::strerror(errno)));
+    }
+    return {};
+  }
+
+  Result<void> handle(const Handler& handler) override {
+    for (int i = 0; i < kPacketsAtOnce; ++i) {
+      iovec part{.iov_base = buffer_.data(), .iov_len = buffer_.size()};
+      msghdr header{};
+      header.msg_iov = &part;
+      header.msg_iovlen = 1;
+      const ssize_t n = ::recvmsg(fd_, &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+      if (n < 0 && (errno == EAGAIN || errno == EINTR)) return {};
+      if (n <= 0) return fail(fmt::format("the daemon has ended, or closed {}", path_));
+      if ((header.msg_flags & MSG_TRUNC) != 0) continue;
+      const auto view = control::view_of({buffer_.data(), static_cast<std::size_t>(n)});
+      if (!view) continue;
+      if (const auto message = lcm::decode_daemon_message(view->channel, view->payload)) {
+        handler(*message);
+      }
+    }
+    return {};
+  }
+
+  bool loses() const override { return false; }
+  std::string remedy() const override {
+    return fmt::format("bushd does not answer at {}; its log may tell why", path_);
+  }
+
+ private:
+  int fd_;
+  std::string path_;
+  std::vector<std::uint8_t> buffer_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Link>> open_socket(const std::string& path) {
+  sockaddr_un address{};
+  if (path.size() >= sizeof address.sun_path) {
+    return fail(Error{.message = "the path of the control socket is too long", .file = path});
+  }
+  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+  if (fd < 0) return fail(std::string("no socket: ") + std::strerror(errno));
+  auto link = std::make_unique<SocketLink>(fd, path);
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, path.c_str(), path.size());
+  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    const std::string why = std::strerror(errno);
+    return fail(Error{.message = "no bushd at this control socket: " + why +
+                                 ". Start `bushd --config FILE`, or use LCM with --lcm",
+                      .file = path});
+  }
+  return link;
+}
+
+}  // namespace bushd::client

@@ -1,0 +1,275 @@
+#include "control/server.h"
+
+#include <fcntl.h>
+#include <grp.h>
+#include <sys/epoll.h>
+#include <sys/file.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+namespace bushd::control {
+namespace {
+
+constexpr Server::Connection kListener = 0;
+constexpr int kBacklog = 256;
+constexpr std::size_t kEventsAtOnce = 64;
+
+Error system_error(const std::string& what, const std::string& path) {
+  return {.message = what + ": " + std::strerror(errno), .file = path};
+}
+
+// Closed unless it is released.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
+
+ private:
+  int fd_;
+};
+
+int open_spare() {
+  return ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+}
+
+Result<void> give_to_group(const std::string& path, const std::string& group) {
+  if (group.empty()) return {};
+  const struct group* entry = ::getgrnam(group.c_str());
+  if (entry == nullptr) {
+    return fail(Error{.message = "there is no group \"" + group +
+                                 "\" of users; make it, or "
+                                 "change [control] group",
+                      .file = path});
+  }
+  if (::chown(path.c_str(), static_cast<uid_t>(-1), entry->gr_gid) != 0) {
+    return fail(system_error("the socket cannot be given to group " + group, path));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Server>> Server::open(const std::string& path, const std::string& group,
+                                             Limits limits) {
+  sockaddr_un address{};
+  if (path.size() >= sizeof address.sun_path) {
+    return fail(Error{.message = "the path of the control socket is too long", .file = path});
+  }
+  std::error_code ignored;  // if it fails, so does what follows
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (std::filesystem::create_directory(folder, ignored)) ::chmod(folder.c_str(), 0755);
+  // Who holds the lock may replace a socket that a daemon has left behind.
+  const std::string lock_path = path + ".lock";
+  Descriptor lock(::open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
+  if (lock.get() < 0) return fail(system_error("the control socket cannot be made", lock_path));
+  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
+    return fail(Error{.message = "another daemon has this control socket; end it, or give this one "
+                                 "another [control] path",
+                      .file = path});
+  }
+  Descriptor listener(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (listener.get() < 0) return fail(system_error("the control socket cannot be made", path));
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, path.c_str(), path.size());
+  ::unlink(path.c_str());
+  const mode_t mask = ::umask(0177);
+  const int bound =
+      ::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
+  ::umask(mask);
+  if (bound != 0) return fail(system_error("the control socket cannot be made", path));
+  if (const auto given = give_to_group(path, group); !given) return fail(given.error());
+  if (::chmod(path.c_str(), 0660) != 0 || ::listen(listener.get(), kBacklog) != 0) {
+    return fail(system_error("the control socket cannot be opened", path));
+  }
+  Descriptor epoll(::epoll_create1(EPOLL_CLOEXEC));
+  if (epoll.get() < 0) return fail(system_error("epoll", path));
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = kListener;
+  if (::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, listener.get(), &event) != 0) {
+    return fail(system_error("epoll", path));
+  }
+  return std::unique_ptr<Server>(
+      new Server(path, lock.release(), listener.release(), epoll.release(), limits));
+}
+
+Server::Server(std::string path, int lock, int listener, int epoll, Limits limits)
+    : path_(std::move(path)),
+      lock_(lock),
+      listener_(listener),
+      epoll_(epoll),
+      spare_(open_spare()),
+      limits_(limits),
+      buffer_(kMaxPacketBytes) {}
+
+Server::~Server() {
+  for (const auto& [connection, peer] : peers_) ::close(peer.fd);
+  ::unlink(path_.c_str());
+  ::close(listener_);
+  ::close(epoll_);
+  if (spare_ >= 0) ::close(spare_);
+  ::close(lock_);
+}
+
+void Server::watch(Connection connection, const Peer& peer, int operation) const {
+  epoll_event event{};
+  event.events = EPOLLIN | (peer.unread.empty() ? 0u : static_cast<std::uint32_t>(EPOLLOUT));
+  event.data.u64 = connection;
+  static_cast<void>(::epoll_ctl(epoll_, operation, peer.fd, &event));
+}
+
+void Server::handle() {
+  std::array<epoll_event, kEventsAtOnce> events;
+  const int n = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), 0);
+  for (int i = 0; i < n; ++i) {
+    const epoll_event& event = events[static_cast<std::size_t>(i)];
+    const Connection connection = event.data.u64;
+    if (connection == kListener) {
+      accept_all();
+      continue;
+    }
+    const auto found = peers_.find(connection);
+    if (found == peers_.end()) continue;
+    Peer& peer = found->second;
+    bool goes_on = !peer.doomed;
+    if (goes_on && (event.events & EPOLLOUT) != 0) goes_on = flush(peer);
+    if (goes_on && (event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) {
+      goes_on = read(connection, peer);
+    }
+    if (!goes_on || peer.doomed) {
+      close(connection);
+    } else if ((event.events & EPOLLOUT) != 0) {
+      watch(connection, peer, EPOLL_CTL_MOD);
+    }
+  }
+  for (const Connection connection : std::exchange(doomed_, {})) close(connection);
+}
+
+void Server::accept_all() {
+  for (std::size_t i = 0; i < kEventsAtOnce; ++i) {
+    const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (fd >= 0) {
+      accept_one(fd);
+    } else if (errno == EMFILE || errno == ENFILE) {
+      // A connection that is not accepted would wake the loop for ever.
+      ::close(std::exchange(spare_, -1));
+      const int turned_away = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
+      if (turned_away >= 0) ::close(turned_away);
+      spare_ = open_spare();
+      if (turned_away < 0) return;
+      ++dropped_;
+    } else if (errno != ECONNABORTED && errno != EINTR) {
+      return;
+    }
+  }
+}
+
+void Server::accept_one(int fd) {
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  if (peers_.size() >= limits_.connections ||
+      ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) {
+    ::close(fd);
+    ++dropped_;
+    return;
+  }
+  const Connection connection = ++last_;
+  const Peer& peer = peers_.emplace(connection, Peer{.fd = fd}).first->second;
+  watch(connection, peer, EPOLL_CTL_ADD);
+  if (handlers_.opened) {
+    handlers_.opened(connection,
+                     {.pid = credentials.pid, .uid = credentials.uid, .gid = credentials.gid});
+  }
+}
+
+bool Server::read(Connection connection, Peer& peer) {
+  for (unsigned i = 0; i < limits_.packets_at_once && !peer.doomed; ++i) {
+    iovec part{.iov_base = buffer_.data(), .iov_len = buffer_.size()};
+    // Descriptors that somebody sends along are closed by the kernel: there is no room for them.
+    msghdr message{};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    const ssize_t n = ::recvmsg(peer.fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+    if (n < 0) return errno == EAGAIN || errno == EINTR;
+    if (n == 0) return false;
+    const std::span<const std::uint8_t> bytes(buffer_.data(), static_cast<std::size_t>(n));
+    const auto view = (message.msg_flags & MSG_TRUNC) != 0 ? std::nullopt : view_of(bytes);
+    if (!view) {
+      reject(connection);
+    } else if (handlers_.packet) {
+      handlers_.packet(connection, *view);
+    }
+  }
+  return true;
+}
+
+void Server::reject(Connection connection) {
+  ++dropped_;
+  const auto found = peers_.find(connection);
+  if (found != peers_.end() && ++found->second.bad >= limits_.bad_packets) {
+    doom(connection, found->second);
+  }
+}
+
+void Server::doom(Connection connection, Peer& peer) {
+  if (std::exchange(peer.doomed, true)) return;
+  ++dropped_;
+  doomed_.push_back(connection);
+  // Wakes the loop, should this not be within handle().
+  ::shutdown(peer.fd, SHUT_RDWR);
+}
+
+void Server::close(Connection connection) {
+  const auto found = peers_.find(connection);
+  if (found == peers_.end()) return;
+  unread_bytes_ -= found->second.unread_bytes;
+  ::close(found->second.fd);  // takes it out of the epoll set
+  peers_.erase(found);
+  if (handlers_.closed) handlers_.closed(connection);
+}
+
+void Server::send(Connection connection, std::shared_ptr<const std::vector<std::uint8_t>> packet) {
+  const auto found = peers_.find(connection);
+  if (found == peers_.end() || found->second.doomed) return;
+  Peer& peer = found->second;
+  const std::size_t size = packet->size();
+  const bool waited = !peer.unread.empty();
+  if (peer.unread_bytes + size > limits_.unread_bytes ||
+      unread_bytes_ + size > limits_.unread_bytes_in_all) {
+    return doom(connection, peer);
+  }
+  peer.unread.push_back(std::move(packet));
+  peer.unread_bytes += size;
+  unread_bytes_ += size;
+  if (waited) return;
+  if (!flush(peer)) return doom(connection, peer);
+  if (!peer.unread.empty()) watch(connection, peer, EPOLL_CTL_MOD);
+}
+
+bool Server::flush(Peer& peer) {
+  while (!peer.unread.empty()) {
+    const std::vector<std::uint8_t>& packet = *peer.unread.front();
+    const ssize_t n = ::send(peer.fd, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (n < 0) return errno == EAGAIN || errno == EINTR;
+    peer.unread_bytes -= packet.size();
+    unread_bytes_ -= packet.size();
+    peer.unread.pop_front();
+  }
+  return true;
+}
+
+}  // namespace bushd::control

@@ -1,0 +1,106 @@
+// The daemon's end of the control socket: connections, their packets, and bounds for both. What the
+// packets mean is for others.
+//
+// Rights are those of the socket's file. A connection that sends what is no packet, or does not
+// read what it is sent, is closed. One thread; nothing blocks.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "api/session.h"
+#include "base/result.h"
+#include "control/packet.h"
+
+namespace bushd::control {
+
+struct Limits {
+  std::size_t connections = 1100;
+  // Of packets that a client has not read yet: of one, and of all.
+  std::size_t unread_bytes = 1024 * 1024;
+  std::size_t unread_bytes_in_all = 32 * 1024 * 1024;
+  // Packets that were none, before the connection is closed.
+  unsigned bad_packets = 16;
+  // Per connection and call of handle(), so that none keeps others waiting.
+  unsigned packets_at_once = 8;
+};
+
+class Server {
+ public:
+  using Connection = std::uint64_t;  // never used again
+
+  // Called from within handle(); they may send and close.
+  struct Handlers {
+    std::function<void(Connection, const api::Credentials&)> opened;
+    std::function<void(Connection, View)> packet;
+    std::function<void(Connection)> closed;
+  };
+
+  // Makes the socket, in a folder that is made too. `group`: may use it too; empty: nobody else.
+  // Fails if a daemon that lives has it already.
+  static Result<std::unique_ptr<Server>> open(const std::string& path, const std::string& group,
+                                              Limits limits = {});
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  void set_handlers(Handlers handlers) { handlers_ = std::move(handlers); }
+
+  // Readable (level-triggered) while there is something to handle.
+  int fd() const { return epoll_; }
+  void handle();
+
+  // Packets arrive whole and in order, or the connection is closed. Of one that has gone it does
+  // nothing. Cheap: a packet made once may be sent to many.
+  void send(Connection connection, std::shared_ptr<const std::vector<std::uint8_t>> packet);
+  // Counts a packet that meant nothing.
+  void reject(Connection connection);
+
+  const std::string& path() const { return path_; }
+  std::size_t connections() const { return peers_.size(); }
+  // Packets that were none, and connections that were not taken or closed for what they did.
+  std::uint64_t dropped() const { return dropped_; }
+  std::size_t unread_bytes() const { return unread_bytes_; }
+
+ private:
+  struct Peer {
+    int fd;
+    std::deque<std::shared_ptr<const std::vector<std::uint8_t>>> unread{};
+    std::size_t unread_bytes = 0;
+    unsigned bad = 0;
+    bool doomed = false;
+  };
+
+  Server(std::string path, int lock, int listener, int epoll, Limits limits);
+  void accept_all();
+  void accept_one(int fd);
+  // Returns whether the connection may go on.
+  bool read(Connection connection, Peer& peer);
+  bool flush(Peer& peer);
+  void doom(Connection connection, Peer& peer);
+  void close(Connection connection);
+  void watch(Connection connection, const Peer& peer, int operation) const;
+
+  std::string path_;
+  int lock_;
+  int listener_;
+  int epoll_;
+  int spare_;  // given up for a moment to turn a connection away when there are no descriptors left
+  Limits limits_;
+  Handlers handlers_;
+  Connection last_ = 0;  // 0 is the listener
+  std::map<Connection, Peer> peers_;
+  std::vector<Connection> doomed_;
+  std::size_t unread_bytes_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::vector<std::uint8_t> buffer_;
+};
+
+}  // namespace bushd::control

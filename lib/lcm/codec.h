@@ -1,0 +1,116 @@
+// Requests, replies and snapshots of lib/api as messages, and back. Both transports carry the same
+// packets: LCM as a channel and a payload, the control socket as both in one packet.
+//
+// Channels are named without the prefix here: "MOVE", "REPLY", ...
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "api/reply.h"
+#include "api/request.h"
+#include "api/snapshot.h"
+#include "base/result.h"
+
+namespace bushd::lcm {
+
+using Payload = std::span<const std::uint8_t>;
+
+struct Packet {
+  std::string channel{};
+  std::vector<std::uint8_t> payload{};
+};
+
+// Whose request it is: what begins every request and is repeated in every answer.
+struct RequestId {
+  std::int64_t session = 0;
+  std::string client_id{};
+  std::int64_t number = 0;
+  friend bool operator==(const RequestId&, const RequestId&) = default;
+};
+
+struct Hello {
+  std::string client_id{};
+  std::int64_t nonce = 0;
+};
+struct Welcome {
+  Hello hello;
+  std::int64_t run = 0;
+  std::int64_t session = 0;
+};
+// What a connection of the control socket hears without asking.
+struct Subscription {
+  bool state = false;
+  bool description = false;
+  bool health = false;
+};
+// Description, state and health of everything, at once.
+struct GetStatus {};
+
+// All that a client may say, in the order of `kClientChannels`.
+struct ClientMessage {
+  RequestId id;  // of a request, or of GetStatus
+  std::variant<Hello, Subscription, GetStatus, api::Request> content;
+};
+
+// Channels that clients speak on, and those of stops alone.
+std::span<const std::string_view> client_channels();
+bool is_stop_channel(std::string_view channel);
+
+// Nothing for a payload that is not exactly one message of the channel's type, and for a channel
+// that clients do not speak on. What is in it is as wrong as it may be: the core looks at it.
+std::optional<ClientMessage> decode_client_message(std::string_view channel, Payload payload);
+
+// Fails where the message does not fit a packet, or a text contains a NUL.
+bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id,
+                             const api::Request& request);
+bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id, GetStatus);
+bushd::Result<Packet> encode(std::int64_t utime_us, const Hello& hello);
+bushd::Result<Packet> encode(const Subscription& subscription);
+
+// A list of tables is shortened to what fits a packet, and says so.
+bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id, const api::Reply& reply);
+bushd::Result<Packet> encode(std::int64_t utime_us, const Welcome& welcome);
+
+// Which one of the snapshots that together are the whole.
+struct Part {
+  std::int64_t utime_us = 0;  // of the daemon's clock
+  std::int64_t run = 0;       // of the daemon; 0 with health
+  std::int64_t sequence = 0;  // of the message
+  std::int32_t part = 0;
+  std::int32_t parts = 1;
+};
+bushd::Result<Packet> encode(const Part& part, std::int64_t dropped_messages,
+                             const api::StateSnapshot& state);
+bushd::Result<Packet> encode(const Part& part, const api::Description& description);
+bushd::Result<Packet> encode(const Part& part, const api::HealthSnapshot& health);
+
+struct ReplyMessage {
+  RequestId id;
+  api::Reply reply;
+};
+template <class Snapshot>
+struct SnapshotMessage {
+  Part part;
+  Snapshot snapshot;
+};
+struct StateMessage : SnapshotMessage<api::StateSnapshot> {
+  std::int64_t dropped_messages = 0;
+};
+using DescriptionMessage = SnapshotMessage<api::Description>;
+using HealthMessage = SnapshotMessage<api::HealthSnapshot>;
+
+// All that the daemon may say.
+using DaemonMessage =
+    std::variant<Welcome, ReplyMessage, StateMessage, DescriptionMessage, HealthMessage>;
+
+std::span<const std::string_view> daemon_channels();
+
+// Nothing for what is no message of the daemon's; an enumeration's unknown word counts as one.
+std::optional<DaemonMessage> decode_daemon_message(std::string_view channel, Payload payload);
+
+}  // namespace bushd::lcm

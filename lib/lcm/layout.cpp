@@ -1,0 +1,70 @@
+#include "lcm/layout.h"
+
+#include "lcm/types.h"
+
+namespace bushd::lcm {
+namespace {
+
+constexpr Layout kTableRef{"sis"};
+constexpr Layout kMovePlan{"llllnSLLD"};
+constexpr Layout kTable{"ssislinInI"};
+constexpr Layout kTableEntry{"stsidd", {&kTableRef}};
+
+constexpr Layout kRequest{"llsl"};
+constexpr Layout kBare{"t", {&kRequest}};
+constexpr Layout kMotors{"tnS", {&kRequest}};
+constexpr Layout kReplyHeader{"llslbss"};
+constexpr Layout kMotor{"slldbsbbsss"};
+constexpr Layout kMotorDescription{"shst", {&kTableRef}};
+constexpr Layout kMcuHealth{"sisiisillllllliddb"};
+
+// Of the daemon's inside, until it does without.
+constexpr Layout kMotorState{"ssthlldbsbbbss", {&kTableRef}};
+
+}  // namespace
+
+#define BUSHD_LAYOUT(type, ...)                   \
+  template <>                                     \
+  const Layout& layout_of<type>() {               \
+    static constexpr Layout kLayout{__VA_ARGS__}; \
+    return kLayout;                               \
+  }
+
+BUSHD_LAYOUT(hello_t, "lsl")
+BUSHD_LAYOUT(welcome_t, "llsll")
+BUSHD_LAYOUT(subscribe_t, "bbb")
+
+BUSHD_LAYOUT(arm_t, "tblnSL", {&kRequest})
+BUSHD_LAYOUT(clear_faults_t, kMotors)
+BUSHD_LAYOUT(disable_t, kMotors)
+BUSHD_LAYOUT(disarm_t, kMotors)
+BUSHD_LAYOUT(emergency_stop_t, kBare)
+BUSHD_LAYOUT(enable_t, kMotors)
+BUSHD_LAYOUT(get_status_t, kBare)
+BUSHD_LAYOUT(get_table_t, "ts", {&kRequest})
+BUSHD_LAYOUT(home_t, kMotors)
+BUSHD_LAYOUT(list_tables_t, kBare)
+BUSHD_LAYOUT(move_t, "tbbnSL", {&kRequest})
+BUSHD_LAYOUT(position_compare_t, "tslbll", {&kRequest})
+BUSHD_LAYOUT(reload_tables_t, kBare)
+BUSHD_LAYOUT(set_position_t, "tnSL", {&kRequest})
+BUSHD_LAYOUT(set_table_t, "tsst", {&kRequest, &kTable})
+BUSHD_LAYOUT(stop_t, kMotors)
+BUSHD_LAYOUT(use_table_t, "tss", {&kRequest})
+
+BUSHD_LAYOUT(answer_t, "tnSSLHnTnT", {&kReplyHeader, &kTableRef, &kMovePlan})
+BUSHD_LAYOUT(table_answer_t, "tnTnT", {&kReplyHeader, &kTableEntry, &kTable})
+
+BUSHD_LAYOUT(mcu_state_t, "llliisssssillnT", {&kMotor})
+BUSHD_LAYOUT(mcu_description_t, "llliissilsnT", {&kMotorDescription})
+BUSHD_LAYOUT(health_t, "lliissblllnLLnT", {&kMcuHealth})
+
+BUSHD_LAYOUT(command_t, "lslbssbbbiinSL")
+BUSHD_LAYOUT(reply_t, "lslbssnSSLHnTnT", {&kTableRef, &kMovePlan})
+BUSHD_LAYOUT(state_t, "lliississsillnT", {&kMotorState})
+BUSHD_LAYOUT(table_request_t, "lslbssnT", {&kTable})
+BUSHD_LAYOUT(table_reply_t, "lslbsnTnT", {&kTableEntry, &kTable})
+
+#undef BUSHD_LAYOUT
+
+}  // namespace bushd::lcm

@@ -1,0 +1,324 @@
+// What clients say.
+#include <array>
+#include <type_traits>
+
+#include "lcm/codec.h"
+#include "lcm/table_codec.h"
+#include "lcm/wire.h"
+
+namespace bushd::lcm {
+namespace {
+
+RequestId id_of(const request_t& request) {
+  return {.session = request.session, .client_id = request.client_id, .number = request.number};
+}
+
+std::int32_t count(const auto& elements) {
+  return static_cast<std::int32_t>(elements.size());
+}
+
+std::vector<api::MotorSteps> motor_steps(const std::vector<std::string>& motors,
+                                         const std::vector<std::int64_t>& steps) {
+  std::vector<api::MotorSteps> out;
+  out.reserve(motors.size());
+  for (std::size_t i = 0; i < motors.size(); ++i) out.push_back({motors[i], steps[i]});
+  return out;
+}
+
+void put_motors(auto& message, std::vector<std::int64_t>& steps,
+                const std::vector<api::MotorSteps>& motors) {
+  for (const api::MotorSteps& motor : motors) {
+    message.motors.push_back(motor.motor);
+    steps.push_back(motor.steps);
+  }
+  message.motor_count = count(motors);
+}
+
+void put_motors(auto& message, const api::MotorNames& motors) {
+  message.motors = motors;
+  message.motor_count = count(motors);
+}
+
+// One of these per request: to the message, and back.
+move_t to_message(const api::Move& move) {
+  move_t message{};
+  message.kind = move.kind == api::Move::Kind::kAbsolute ? move_t::ABSOLUTE : move_t::RELATIVE;
+  message.dry_run = move.dry_run ? 1 : 0;
+  put_motors(message, message.steps, move.motors);
+  return message;
+}
+std::optional<api::Request> from_message(const move_t& message) {
+  if (message.kind != move_t::RELATIVE && message.kind != move_t::ABSOLUTE) return std::nullopt;
+  return api::Move{.kind = message.kind == move_t::ABSOLUTE ? api::Move::Kind::kAbsolute
+                                                            : api::Move::Kind::kRelative,
+                   .motors = motor_steps(message.motors, message.steps),
+                   .dry_run = message.dry_run != 0};
+}
+
+template <class Message>
+Message motors_message(const api::MotorNames& motors) {
+  Message message{};
+  put_motors(message, motors);
+  return message;
+}
+stop_t to_message(const api::Stop& stop) {
+  return motors_message<stop_t>(stop.motors);
+}
+std::optional<api::Request> from_message(const stop_t& message) {
+  return api::Stop{message.motors};
+}
+enable_t to_message(const api::Enable& enable) {
+  return motors_message<enable_t>(enable.motors);
+}
+std::optional<api::Request> from_message(const enable_t& message) {
+  return api::Enable{message.motors};
+}
+disable_t to_message(const api::Disable& disable) {
+  return motors_message<disable_t>(disable.motors);
+}
+std::optional<api::Request> from_message(const disable_t& message) {
+  return api::Disable{message.motors};
+}
+clear_faults_t to_message(const api::ClearFaults& clear) {
+  return motors_message<clear_faults_t>(clear.motors);
+}
+std::optional<api::Request> from_message(const clear_faults_t& message) {
+  return api::ClearFaults{message.motors};
+}
+home_t to_message(const api::Home& home) {
+  return motors_message<home_t>(home.motors);
+}
+std::optional<api::Request> from_message(const home_t& message) {
+  return api::Home{message.motors};
+}
+disarm_t to_message(const api::Disarm& disarm) {
+  return motors_message<disarm_t>(disarm.motors);
+}
+std::optional<api::Request> from_message(const disarm_t& message) {
+  return api::Disarm{message.motors};
+}
+
+emergency_stop_t to_message(const api::EmergencyStop&) {
+  return {};
+}
+std::optional<api::Request> from_message(const emergency_stop_t&) {
+  return api::EmergencyStop{};
+}
+
+set_position_t to_message(const api::SetPosition& set) {
+  set_position_t message{};
+  put_motors(message, message.position_steps, set.motors);
+  return message;
+}
+std::optional<api::Request> from_message(const set_position_t& message) {
+  return api::SetPosition{motor_steps(message.motors, message.position_steps)};
+}
+
+use_table_t to_message(const api::UseTable& use) {
+  use_table_t message{};
+  message.group = use.group;
+  message.table = use.table;
+  return message;
+}
+std::optional<api::Request> from_message(const use_table_t& message) {
+  return api::UseTable{.group = message.group, .table = message.table};
+}
+reload_tables_t to_message(const api::ReloadTables&) {
+  return {};
+}
+std::optional<api::Request> from_message(const reload_tables_t&) {
+  return api::ReloadTables{};
+}
+
+arm_t to_message(const api::Arm& arm) {
+  arm_t message{};
+  message.edge = arm.edge == api::Edge::kRising ? arm_t::RISING : arm_t::FALLING;
+  message.delay_us = arm.delay_us;
+  put_motors(message, message.steps, arm.motors);
+  return message;
+}
+std::optional<api::Request> from_message(const arm_t& message) {
+  if (message.edge != arm_t::RISING && message.edge != arm_t::FALLING) return std::nullopt;
+  return api::Arm{.edge = message.edge == arm_t::RISING ? api::Edge::kRising : api::Edge::kFalling,
+                  .delay_us = message.delay_us,
+                  .motors = motor_steps(message.motors, message.steps)};
+}
+
+position_compare_t to_message(const api::PositionCompare& compare) {
+  position_compare_t message{};
+  message.motor = compare.motor;
+  message.position_steps = compare.position_steps;
+  message.arrivals =
+      static_cast<std::int8_t>((compare.arrivals.positive ? position_compare_t::POSITIVE : 0) |
+                               (compare.arrivals.negative ? position_compare_t::NEGATIVE : 0));
+  message.delay_us = compare.delay_us;
+  message.width_us = compare.width_us;
+  return message;
+}
+std::optional<api::Request> from_message(const position_compare_t& message) {
+  constexpr int kBoth = position_compare_t::POSITIVE | position_compare_t::NEGATIVE;
+  if ((message.arrivals & ~kBoth) != 0) return std::nullopt;
+  return api::PositionCompare{
+      .motor = message.motor,
+      .position_steps = message.position_steps,
+      .arrivals = {.positive = (message.arrivals & position_compare_t::POSITIVE) != 0,
+                   .negative = (message.arrivals & position_compare_t::NEGATIVE) != 0},
+      .delay_us = message.delay_us,
+      .width_us = message.width_us};
+}
+
+list_tables_t to_message(const api::ListTables&) {
+  return {};
+}
+std::optional<api::Request> from_message(const list_tables_t&) {
+  return api::ListTables{};
+}
+get_table_t to_message(const api::GetTable& get) {
+  get_table_t message{};
+  message.table = get.table;
+  return message;
+}
+std::optional<api::Request> from_message(const get_table_t& message) {
+  return api::GetTable{message.table};
+}
+set_table_t to_message(const api::SetTable& set) {
+  set_table_t message{};
+  message.table = set.table;
+  message.expected_hash = set.expected_hash;
+  message.content = message_of(set.content);
+  return message;
+}
+std::optional<api::Request> from_message(const set_table_t& message) {
+  return api::SetTable{.table = message.table,
+                       .content = content_of(message.content),
+                       .expected_hash = message.expected_hash};
+}
+
+template <class Message>
+std::optional<ClientMessage> decode_request(Payload payload) {
+  const auto message = decode<Message>(payload);
+  if (!message) return std::nullopt;
+  auto request = from_message(*message);
+  if (!request) return std::nullopt;
+  return ClientMessage{.id = id_of(message->request), .content = std::move(*request)};
+}
+
+std::optional<ClientMessage> decode_hello(Payload payload) {
+  const auto message = decode<hello_t>(payload);
+  if (!message) return std::nullopt;
+  return ClientMessage{.id = {.client_id = message->client_id},
+                       .content = Hello{message->client_id, message->nonce}};
+}
+
+std::optional<ClientMessage> decode_subscription(Payload payload) {
+  const auto message = decode<subscribe_t>(payload);
+  if (!message) return std::nullopt;
+  return ClientMessage{.id = {},
+                       .content = Subscription{.state = message->state != 0,
+                                               .description = message->description != 0,
+                                               .health = message->health != 0}};
+}
+
+std::optional<ClientMessage> decode_get_status(Payload payload) {
+  const auto message = decode<get_status_t>(payload);
+  if (!message) return std::nullopt;
+  return ClientMessage{.id = id_of(message->request), .content = GetStatus{}};
+}
+
+using Decoder = std::optional<ClientMessage> (*)(Payload);
+
+// A new request is a line here. Requests first, in the order of api::Request.
+constexpr std::array<std::pair<std::string_view, Decoder>, 19> kDecoders = {{
+    {"MOVE", decode_request<move_t>},
+    {"STOP", decode_request<stop_t>},
+    {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
+    {"ENABLE", decode_request<enable_t>},
+    {"DISABLE", decode_request<disable_t>},
+    {"SET_POSITION", decode_request<set_position_t>},
+    {"CLEAR_FAULTS", decode_request<clear_faults_t>},
+    {"USE_TABLE", decode_request<use_table_t>},
+    {"RELOAD_TABLES", decode_request<reload_tables_t>},
+    {"HOME", decode_request<home_t>},
+    {"ARM", decode_request<arm_t>},
+    {"DISARM", decode_request<disarm_t>},
+    {"POSITION_COMPARE", decode_request<position_compare_t>},
+    {"LIST_TABLES", decode_request<list_tables_t>},
+    {"GET_TABLE", decode_request<get_table_t>},
+    {"SET_TABLE", decode_request<set_table_t>},
+    {"HELLO", decode_hello},
+    {"SUBSCRIBE", decode_subscription},
+    {"GET_STATUS", decode_get_status},
+}};
+static_assert(std::variant_size_v<api::Request> == 16);
+
+constexpr auto kClientChannels = [] {
+  std::array<std::string_view, kDecoders.size()> channels;
+  for (std::size_t i = 0; i < channels.size(); ++i) channels[i] = kDecoders[i].first;
+  return channels;
+}();
+
+template <class Message>
+bushd::Result<Packet> packet(std::string_view channel, const Message& message) {
+  auto payload = encode(message);
+  if (!payload) return fail(payload.error());
+  return Packet{.channel = std::string(channel), .payload = std::move(*payload)};
+}
+
+void put_id(request_t& request, std::int64_t utime_us, const RequestId& id) {
+  request.utime_us = utime_us;
+  request.session = id.session;
+  request.client_id = id.client_id;
+  request.number = id.number;
+}
+
+}  // namespace
+
+std::span<const std::string_view> client_channels() {
+  return kClientChannels;
+}
+
+bool is_stop_channel(std::string_view channel) {
+  return channel == "STOP" || channel == "EMERGENCY_STOP";
+}
+
+std::optional<ClientMessage> decode_client_message(std::string_view channel, Payload payload) {
+  for (const auto& [name, decoder] : kDecoders) {
+    if (name == channel) return decoder(payload);
+  }
+  return std::nullopt;
+}
+
+bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id,
+                             const api::Request& request) {
+  return std::visit(
+      [&](const auto& content) {
+        auto message = to_message(content);
+        put_id(message.request, utime_us, id);
+        return packet(kDecoders[request.index()].first, message);
+      },
+      request);
+}
+
+bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id, GetStatus) {
+  get_status_t message{};
+  put_id(message.request, utime_us, id);
+  return packet("GET_STATUS", message);
+}
+
+bushd::Result<Packet> encode(std::int64_t utime_us, const Hello& hello) {
+  hello_t message{};
+  message.utime_us = utime_us;
+  message.client_id = hello.client_id;
+  message.nonce = hello.nonce;
+  return packet("HELLO", message);
+}
+
+bushd::Result<Packet> encode(const Subscription& subscription) {
+  subscribe_t message{};
+  message.state = subscription.state ? 1 : 0;
+  message.description = subscription.description ? 1 : 0;
+  message.health = subscription.health ? 1 : 0;
+  return packet("SUBSCRIBE", message);
+}
+
+}  // namespace bushd::lcm

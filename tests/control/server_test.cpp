@@ -1,0 +1,295 @@
+// The daemon's end of the control socket, with clients of all kinds in the same thread: everything
+// that was sent has arrived once handle() has nothing more to do.
+#include "control/server.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <string>
+
+#include "tables/temp_directory.h"
+
+namespace bushd::control {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+Bytes bytes(const std::string& channel, std::size_t payload = 0) {
+  return packet_of({.channel = channel, .payload = Bytes(payload)});
+}
+
+class Peer {
+ public:
+  explicit Peer(const std::string& path)
+      : fd_(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::memcpy(address.sun_path, path.c_str(), path.size());
+    connected_ = ::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  }
+  ~Peer() { leave(); }
+  Peer(Peer&& other) noexcept : fd_(std::exchange(other.fd_, -1)), connected_(other.connected_) {}
+  Peer(const Peer&) = delete;
+  Peer& operator=(const Peer&) = delete;
+
+  bool connected() const { return connected_; }
+  bool send(const Bytes& packet) const {
+    return ::send(fd_, packet.data(), packet.size(), MSG_NOSIGNAL | MSG_DONTWAIT) ==
+           static_cast<ssize_t>(packet.size());
+  }
+  // Empty: nothing waits.
+  Bytes read() const {
+    Bytes packet(kMaxPacketBytes);
+    const ssize_t n = ::recv(fd_, packet.data(), packet.size(), MSG_DONTWAIT);
+    packet.resize(n < 0 ? 0 : static_cast<std::size_t>(n));
+    return packet;
+  }
+  bool hung_up() const {
+    pollfd polled{.fd = fd_, .events = POLLIN, .revents = 0};
+    return ::poll(&polled, 1, 0) > 0 && (polled.revents & POLLHUP) != 0;
+  }
+  void leave() {
+    if (fd_ >= 0) ::close(std::exchange(fd_, -1));
+  }
+
+ private:
+  int fd_;
+  bool connected_ = false;
+};
+
+class ServerTest : public testing::Test {
+ protected:
+  void open(Limits limits = {}) {
+    auto opened = Server::open(path_, "", limits);
+    ASSERT_TRUE(opened) << opened.error().text();
+    server_ = std::move(*opened);
+    server_->set_handlers({.opened =
+                               [this](Server::Connection connection, const api::Credentials& who) {
+                                 last_ = connection;
+                                 who_ = who;
+                               },
+                           .packet =
+                               [this](Server::Connection, View view) {
+                                 heard_.emplace_back(view.channel);
+                                 if (on_packet_) on_packet_();
+                               },
+                           .closed = [this](Server::Connection) { ++closed_; }});
+  }
+  void settle() {
+    pollfd polled{.fd = server_->fd(), .events = POLLIN, .revents = 0};
+    for (int i = 0; i < 100'000 && ::poll(&polled, 1, 0) > 0; ++i) server_->handle();
+  }
+  void send(Server::Connection connection, const Bytes& packet) {
+    server_->send(connection, std::make_shared<const Bytes>(packet));
+  }
+
+  test::TempDirectory directory_;
+  std::string path_ = (directory_.path() / "run" / "control").string();
+  std::unique_ptr<Server> server_;
+  std::vector<std::string> heard_;
+  std::function<void()> on_packet_;
+  Server::Connection last_ = 0;
+  api::Credentials who_;
+  int closed_ = 0;
+};
+
+TEST_F(ServerTest, PacketsArriveInOrderAndAreAnswered) {
+  open();
+  const Peer peer(path_);
+  ASSERT_TRUE(peer.connected());
+  for (const char* channel : {"A", "B", "C"}) EXPECT_TRUE(peer.send(bytes(channel)));
+  settle();
+  EXPECT_THAT(heard_, ElementsAre("A", "B", "C"));
+  send(last_, bytes("REPLY", 5));
+  EXPECT_EQ(peer.read(), bytes("REPLY", 5));
+}
+
+TEST_F(ServerTest, TellsWhoIsThere) {
+  open();
+  const Peer peer(path_);
+  settle();
+  EXPECT_EQ(who_.pid, ::getpid());
+  EXPECT_EQ(who_.uid, ::getuid());
+}
+
+TEST_F(ServerTest, TheFileHasItsRights) {
+  open();
+  struct stat status {};
+  ASSERT_EQ(::stat(path_.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777u, 0660u);
+  server_.reset();
+  EXPECT_NE(::stat(path_.c_str(), &status), 0);
+}
+
+TEST_F(ServerTest, OnlyOneDaemonHasIt) {
+  open();
+  const auto second = Server::open(path_, "");
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().text(), HasSubstr("another daemon has this control socket"));
+  EXPECT_TRUE(Peer(path_).connected());
+}
+
+TEST_F(ServerTest, WhatADeadDaemonHasLeftIsReplaced) {
+  open();
+  const Peer before(path_);
+  server_.reset();
+  EXPECT_TRUE(before.hung_up());
+  std::ofstream(path_) << "left behind";
+  open();
+  EXPECT_TRUE(Peer(path_).connected());
+}
+
+TEST_F(ServerTest, AnUnknownGroupIsRefused) {
+  const auto opened = Server::open(path_, "no-such-group-of-users");
+  ASSERT_FALSE(opened);
+  EXPECT_THAT(opened.error().text(), HasSubstr("no-such-group-of-users"));
+}
+
+TEST_F(ServerTest, WhatIsNoPacketIsCountedAndTooManyEndTheConnection) {
+  open({.bad_packets = 3});
+  const Peer peer(path_);
+  EXPECT_TRUE(peer.send(Bytes(5, 'x')));
+  EXPECT_TRUE(peer.send(bytes("GOOD")));
+  settle();
+  EXPECT_THAT(heard_, ElementsAre("GOOD"));
+  EXPECT_EQ(server_->dropped(), 1u);
+  for (int i = 0; i < 5; ++i) peer.send(Bytes(5, 'x'));
+  settle();
+  EXPECT_EQ(server_->connections(), 0u);
+  EXPECT_TRUE(peer.hung_up());
+  EXPECT_EQ(closed_, 1);
+}
+
+TEST_F(ServerTest, APacketThatIsTooLongIsDroppedWhole) {
+  open();
+  const Peer peer(path_);
+  EXPECT_TRUE(peer.send(bytes("LONGEST", lcm::kMaxMessageBytes)));
+  EXPECT_TRUE(peer.send(bytes("TOO_LONG", kMaxPacketBytes)));
+  EXPECT_TRUE(peer.send(bytes("NEXT")));
+  settle();
+  EXPECT_THAT(heard_, ElementsAre("LONGEST", "NEXT"));
+  EXPECT_EQ(server_->dropped(), 1u);
+}
+
+TEST_F(ServerTest, WhoNeverReadsIsDropped) {
+  open({.unread_bytes = 200'000});
+  const Peer deaf(path_);
+  settle();
+  const Server::Connection connection = last_;
+  const Peer other(path_);
+  settle();
+  for (int i = 0; i < 1000; ++i) {
+    send(connection, bytes("STATE", 4000));
+    EXPECT_LE(server_->unread_bytes(), 200'000u);
+  }
+  settle();
+  EXPECT_EQ(server_->connections(), 1u);
+  EXPECT_EQ(server_->unread_bytes(), 0u);
+  send(last_, bytes("STATE"));
+  EXPECT_EQ(other.read(), bytes("STATE"));
+}
+
+TEST_F(ServerTest, WhoReadsLateGetsEverything) {
+  open();
+  const Peer slow(path_);
+  settle();
+  for (int i = 0; i < 200; ++i) send(last_, bytes("STATE" + std::to_string(i), 4000));
+  EXPECT_GT(server_->unread_bytes(), 0u);
+  int next = 0;
+  for (int i = 0; i < 1000 && next < 200; ++i) {
+    for (Bytes packet = slow.read(); !packet.empty(); packet = slow.read()) {
+      EXPECT_EQ(packet, bytes("STATE" + std::to_string(next++), 4000));
+    }
+    settle();
+  }
+  EXPECT_EQ(next, 200);
+  EXPECT_EQ(server_->unread_bytes(), 0u);
+}
+
+TEST_F(ServerTest, MemoryOfAllIsBounded) {
+  open({.unread_bytes_in_all = 500'000});
+  std::vector<Peer> deaf;
+  std::vector<Server::Connection> connections;
+  for (int i = 0; i < 20; ++i) {
+    deaf.emplace_back(path_);
+    settle();
+    connections.push_back(last_);
+  }
+  for (int i = 0; i < 100; ++i) {
+    for (const Server::Connection connection : connections) {
+      send(connection, bytes("STATE", 4000));
+      ASSERT_LE(server_->unread_bytes(), 500'000u);
+    }
+  }
+}
+
+TEST_F(ServerTest, ClosingWithinAHandlerIsSafe) {
+  open({.unread_bytes = 10});
+  const Peer peer(path_);
+  on_packet_ = [this] { send(last_, bytes("MORE_THAN_ALLOWED", 100)); };
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(peer.send(bytes("A")));
+  settle();
+  EXPECT_THAT(heard_, ElementsAre("A"));
+  EXPECT_EQ(server_->connections(), 0u);
+  send(last_, bytes("LATE"));
+}
+
+TEST_F(ServerTest, AThousandConnectionsSurviveAndOneMoreIsTurnedAway) {
+  rlimit files{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &files), 0);
+  files.rlim_cur = files.rlim_max;
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &files), 0);
+  if (files.rlim_max < 2200) GTEST_SKIP() << "too few descriptors allowed here";
+  open({.connections = 1000});
+  std::vector<Peer> peers;
+  for (int i = 0; i < 1000; ++i) {
+    peers.emplace_back(path_);
+    if (i % 100 == 99) settle();
+  }
+  settle();
+  EXPECT_EQ(server_->connections(), 1000u);
+  const Peer more(path_);
+  settle();
+  EXPECT_TRUE(more.hung_up());
+  EXPECT_EQ(server_->dropped(), 1u);
+  for (const Peer& peer : peers) EXPECT_TRUE(peer.send(bytes("HELLO")));
+  settle();
+  EXPECT_EQ(heard_.size(), 1000u);
+  peers.clear();
+  settle();
+  EXPECT_EQ(server_->connections(), 0u);
+  EXPECT_TRUE(Peer(path_).connected());
+}
+
+TEST_F(ServerTest, WithoutDescriptorsConnectionsAreTurnedAway) {
+  open();
+  std::vector<Peer> waiting;
+  for (int i = 0; i < 5; ++i) waiting.emplace_back(path_);
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const rlimit few{.rlim_cur = 100, .rlim_max = before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &few), 0);
+  std::vector<int> taken;
+  for (int fd = ::dup(0); fd >= 0; fd = ::dup(0)) taken.push_back(fd);
+  settle();
+  for (const int fd : taken) ::close(fd);
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  settle();
+  for (const Peer& peer : waiting) EXPECT_TRUE(peer.hung_up());
+  EXPECT_EQ(server_->dropped(), 5u);
+  EXPECT_TRUE(Peer(path_).connected());
+}
+
+}  // namespace
+}  // namespace bushd::control

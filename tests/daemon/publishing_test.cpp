@@ -1,0 +1,119 @@
+// What is published when.
+#include "daemon/publishing.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace bushd::daemon {
+namespace {
+
+constexpr McuId kFirst{0};
+constexpr McuId kSecond{1};
+constexpr BusId kBus{0};
+
+class PublishingTest : public testing::Test, public Listener {
+ protected:
+  PublishingTest() { publishing_.add(*this); }
+  void hear(Topic topic, const lcm::Packet& packet) override {
+    heard_.push_back(topic);
+    newest_ = *lcm::decode_daemon_message(packet.channel, packet.payload);
+  }
+  // How many messages this makes.
+  template <class Id, class Snapshot>
+  std::size_t publish(Id id, const Snapshot& snapshot) {
+    heard_.clear();
+    publishing_.publish(id, snapshot);
+    return heard_.size();
+  }
+
+  std::int64_t now_us_ = 1'000'000;
+  std::vector<Topic> heard_;
+  lcm::DaemonMessage newest_;
+  Publishing publishing_{
+      7, 2, 1, {.now_us = [this] { return now_us_; }, .unix_us = [] { return std::int64_t{42}; }}};
+  api::StateSnapshot state_{.bus = "hall", .mcu = "hall:1", .motors = {{.name = "theta"}}};
+};
+
+TEST_F(PublishingTest, AStateThatRestsIsPublishedTwiceASecond) {
+  EXPECT_EQ(publish(kFirst, state_), 1u);
+  std::size_t count = 0;
+  for (int i = 0; i < 100; ++i) {
+    now_us_ += 50'000;
+    ++state_.tick;
+    count += publish(kFirst, state_);
+  }
+  EXPECT_EQ(count, 10u);
+}
+
+TEST_F(PublishingTest, AChangeIsPublishedAtOnce) {
+  publish(kFirst, state_);
+  state_.motors[0].input = true;
+  EXPECT_EQ(publish(kFirst, state_), 1u);
+  EXPECT_EQ(publish(kFirst, state_), 0u);
+  state_.detail = "drivers disabled";
+  EXPECT_EQ(publish(kFirst, state_), 1u);
+}
+
+TEST_F(PublishingTest, OnlyTheMcuThatMovesIsPublishedOften) {
+  api::StateSnapshot moving = state_;
+  moving.motors[0].moving = true;
+  publish(kFirst, state_);
+  publish(kSecond, moving);
+  for (int i = 0; i < 5; ++i) {
+    now_us_ += 50'000;
+    EXPECT_EQ(publish(kFirst, state_), 0u);
+    EXPECT_EQ(publish(kSecond, moving), 1u);
+  }
+}
+
+TEST_F(PublishingTest, DroppedMessagesAreToldSoon) {
+  publish(kFirst, state_);
+  publishing_.set_dropped_messages(3);
+  EXPECT_EQ(publish(kFirst, state_), 1u);
+  EXPECT_EQ(std::get<lcm::StateMessage>(newest_).dropped_messages, 3);
+}
+
+TEST_F(PublishingTest, DescriptionsComeOnChangeAndEveryThreeSeconds) {
+  api::Description description{.bus = "hall", .mcu = "hall:1"};
+  EXPECT_EQ(publish(kFirst, description), 1u);
+  now_us_ += 2'900'000;
+  EXPECT_EQ(publish(kFirst, description), 0u);
+  now_us_ += 100'000;
+  EXPECT_EQ(publish(kFirst, description), 1u);
+  description.tick_ns = 5;
+  EXPECT_EQ(publish(kFirst, description), 1u);
+}
+
+TEST_F(PublishingTest, PartsTellTheWholeAndTheRun) {
+  publish(kSecond, state_);
+  const lcm::Part part = std::get<lcm::StateMessage>(newest_).part;
+  EXPECT_EQ(part.part, 1);
+  EXPECT_EQ(part.parts, 2);
+  EXPECT_EQ(part.run, 7);
+  EXPECT_EQ(part.utime_us, 42);
+}
+
+TEST_F(PublishingTest, TheNewestOfEachIsKept) {
+  EXPECT_TRUE(publishing_.newest().empty());
+  publish(kFirst, state_);
+  publish(kBus, api::HealthSnapshot{.bus = "hall"});
+  state_.tick = 9;
+  now_us_ += 1'000'000;
+  publish(kFirst, state_);
+  EXPECT_EQ(publishing_.newest().size(), 2u);
+}
+
+TEST_F(PublishingTest, AskingForItAgainAndAgainFloodsNobody) {
+  publish(kFirst, state_);
+  heard_.clear();
+  for (int i = 0; i < 1000; ++i) {
+    now_us_ += 1000;
+    publishing_.publish_newest();
+  }
+  EXPECT_LE(heard_.size(), 10u);
+  EXPECT_GE(heard_.size(), 9u);
+}
+
+}  // namespace
+}  // namespace bushd::daemon

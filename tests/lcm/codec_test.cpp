@@ -1,0 +1,271 @@
+// What front ends and clients say to each other arrives as it was meant.
+#include "lcm/codec.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+
+#include "lcm/payloads.h"
+#include "lcm/wire.h"
+
+namespace bushd::lcm {
+namespace {
+
+const RequestId kId{.session = -7, .client_id = "scan-hall-4711", .number = 1};
+
+// By way of the messages: encoded, decoded and encoded again it is the same.
+ClientMessage over_the_wire(const api::Request& request) {
+  const auto packet = encode(12, kId, request);
+  EXPECT_TRUE(packet) << packet.error().text();
+  const auto message = decode_client_message(packet->channel, packet->payload);
+  EXPECT_TRUE(message);
+  EXPECT_EQ(message->id, kId);
+  const auto again = encode(12, message->id, std::get<api::Request>(message->content));
+  EXPECT_EQ(again->payload, packet->payload);
+  EXPECT_EQ(again->channel, packet->channel);
+  return *message;
+}
+
+template <class T>
+T request_over_the_wire(const T& request) {
+  return std::get<T>(std::get<api::Request>(over_the_wire(request).content));
+}
+
+ReplyMessage reply_over_the_wire(const api::Reply& reply) {
+  const auto packet = encode(12, kId, reply);
+  EXPECT_TRUE(packet) << packet.error().text();
+  const auto message = decode_daemon_message(packet->channel, packet->payload);
+  EXPECT_TRUE(message);
+  auto out = std::get<ReplyMessage>(*message);
+  EXPECT_EQ(out.id, kId);
+  EXPECT_EQ(encode(12, out.id, out.reply)->payload, packet->payload);
+  return out;
+}
+
+TEST(Codec, EveryRequestHasAChannelOfItsOwn) {
+  EXPECT_EQ(client_channels().size(), std::variant_size_v<api::Request> + 3);
+  for (const std::string_view channel : client_channels()) {
+    EXPECT_EQ(std::ranges::count(client_channels(), channel), 1) << channel;
+  }
+  EXPECT_EQ(encode(0, kId, api::Request(api::Move{}))->channel, "MOVE");
+  EXPECT_EQ(encode(0, kId, api::Request(api::SetTable{}))->channel, "SET_TABLE");
+  EXPECT_TRUE(is_stop_channel(encode(0, kId, api::Request(api::Stop{}))->channel));
+  EXPECT_TRUE(is_stop_channel(encode(0, kId, api::Request(api::EmergencyStop{}))->channel));
+  EXPECT_FALSE(is_stop_channel("MOVE"));
+}
+
+TEST(Codec, MovesArriveAsTheyWereMeant) {
+  const auto move = request_over_the_wire(api::Move{.kind = api::Move::Kind::kAbsolute,
+                                                    .motors = {{"theta", -400}, {"chi", 20}},
+                                                    .dry_run = true});
+  EXPECT_EQ(move.kind, api::Move::Kind::kAbsolute);
+  EXPECT_EQ(move.motors, (std::vector<api::MotorSteps>{{"theta", -400}, {"chi", 20}}));
+  EXPECT_TRUE(move.dry_run);
+}
+
+TEST(Codec, OtherRequestsDoToo) {
+  EXPECT_EQ(request_over_the_wire(api::Stop{{"a", "b"}}).motors, (api::MotorNames{"a", "b"}));
+  request_over_the_wire(api::EmergencyStop{});
+  EXPECT_EQ(request_over_the_wire(api::Enable{{"a"}}).motors, api::MotorNames{"a"});
+  EXPECT_EQ(request_over_the_wire(api::Disable{}).motors, api::MotorNames{});
+  EXPECT_EQ(request_over_the_wire(api::SetPosition{{{"a", 5}}}).motors.front().steps, 5);
+  EXPECT_EQ(request_over_the_wire(api::ClearFaults{{"a"}}).motors, api::MotorNames{"a"});
+  EXPECT_EQ(request_over_the_wire(api::UseTable{"group", "own@2"}).table, "own@2");
+  request_over_the_wire(api::ReloadTables{});
+  EXPECT_EQ(request_over_the_wire(api::Home{{"a"}}).motors, api::MotorNames{"a"});
+  const auto arm = request_over_the_wire(
+      api::Arm{.edge = api::Edge::kFalling, .delay_us = 100, .motors = {{"a", 3}}});
+  EXPECT_EQ(arm.edge, api::Edge::kFalling);
+  EXPECT_EQ(arm.delay_us, 100);
+  EXPECT_EQ(request_over_the_wire(api::Disarm{{"a"}}).motors, api::MotorNames{"a"});
+  const auto compare = request_over_the_wire(api::PositionCompare{.motor = "a",
+                                                                  .position_steps = 9,
+                                                                  .arrivals = {.negative = true},
+                                                                  .delay_us = 5,
+                                                                  .width_us = 6});
+  EXPECT_FALSE(compare.arrivals.positive);
+  EXPECT_TRUE(compare.arrivals.negative);
+  EXPECT_EQ(compare.width_us, 6);
+  request_over_the_wire(api::ListTables{});
+  EXPECT_EQ(request_over_the_wire(api::GetTable{"own"}).table, "own");
+  const auto set = request_over_the_wire(
+      api::SetTable{.table = "own",
+                    .content = {.name = "own",
+                                .time_unit_ns = 4000,
+                                .accel = {2500, 1200},
+                                .decel = std::vector<std::uint16_t>{1200, 2500},
+                                .cruise = std::uint16_t{900},
+                                .revision = 2},
+                    .expected_hash = "abc"});
+  EXPECT_EQ(set.expected_hash, "abc");
+  EXPECT_EQ(set.content.accel, (std::vector<std::uint16_t>{2500, 1200}));
+  EXPECT_EQ(set.content.cruise, 900);
+  EXPECT_EQ(set.content.revision, 2u);
+}
+
+TEST(Codec, HelloSubscriptionAndStatusArrive) {
+  const auto hello = encode(1, Hello{.client_id = "scan", .nonce = -5});
+  const auto said = decode_client_message(hello->channel, hello->payload);
+  EXPECT_EQ(std::get<Hello>(said->content).nonce, -5);
+  const auto subscribe = encode(Subscription{.state = true, .health = true});
+  const auto wanted = decode_client_message(subscribe->channel, subscribe->payload);
+  EXPECT_TRUE(std::get<Subscription>(wanted->content).state);
+  EXPECT_FALSE(std::get<Subscription>(wanted->content).description);
+  const auto status = encode(1, kId, GetStatus{});
+  EXPECT_EQ(decode_client_message(status->channel, status->payload)->id, kId);
+  const auto welcome =
+      encode(1, Welcome{.hello = {.client_id = "scan", .nonce = -5}, .run = 3, .session = 4});
+  const auto answer = decode_daemon_message(welcome->channel, welcome->payload);
+  EXPECT_EQ(std::get<Welcome>(*answer).session, 4);
+  EXPECT_EQ(std::get<Welcome>(*answer).hello.nonce, -5);
+}
+
+TEST(Codec, WhatNoMessageMeansIsRefused) {
+  EXPECT_FALSE(decode_client_message("COMMAND", {}));
+  EXPECT_FALSE(decode_client_message("", {}));
+  EXPECT_FALSE(decode_daemon_message("MOVE", {}));
+  move_t move{};
+  move.kind = 3;
+  EXPECT_FALSE(decode_client_message("MOVE", *encode(move)));
+  arm_t arm{};
+  arm.edge = 0;
+  EXPECT_FALSE(decode_client_message("ARM", *encode(arm)));
+  position_compare_t compare{};
+  compare.arrivals = 4;
+  EXPECT_FALSE(decode_client_message("POSITION_COMPARE", *encode(compare)));
+}
+
+TEST(Codec, RepliesArriveAsTheyWereMeant) {
+  EXPECT_TRUE(std::holds_alternative<api::Accepted>(reply_over_the_wire(api::Accepted{}).reply));
+  EXPECT_EQ(std::get<api::Refused>(reply_over_the_wire(api::Refused{"why"}).reply).reason, "why");
+  const api::TableRef table{.name = "own", .revision = 2, .hash = "0123abcd"};
+  const auto moved =
+      std::get<api::Completed>(
+          reply_over_the_wire(api::Completed{.outcome = api::Outcome::kLimit,
+                                             .reason = "theta: stopped",
+                                             .detail =
+                                                 std::vector<api::MotorResult>{
+                                                     {"theta", api::Outcome::kLimit, 7, table},
+                                                     {"chi", api::Outcome::kReached, 9, table}}})
+              .reply);
+  EXPECT_EQ(moved.outcome, api::Outcome::kLimit);
+  const auto& motors = std::get<std::vector<api::MotorResult>>(moved.detail);
+  EXPECT_EQ(motors.at(1).motor, "chi");
+  EXPECT_EQ(motors.at(1).table, table);
+  EXPECT_EQ(motors.at(0).position_steps, 7);
+}
+
+TEST(Codec, PlansAndTablesDoToo) {
+  api::MovePlan plan;
+  plan.ticks = 5;
+  plan.motors.push_back({.motor = "a", .steps = 3, .duration_us = 4, .peak_steps_per_s = 5});
+  const auto planned = std::get<api::Completed>(
+      reply_over_the_wire(api::Completed{.reason = "r", .detail = plan}).reply);
+  EXPECT_FALSE(std::get<api::MovePlan>(planned.detail).traffic);
+  EXPECT_EQ(std::get<api::MovePlan>(planned.detail).motors.front().steps, 3);
+  const auto list = std::get<api::Completed>(
+      reply_over_the_wire(
+          api::Completed{.reason = "r", .detail = api::TableList{{{.name = "own", .fault = "f"}}}})
+          .reply);
+  EXPECT_EQ(std::get<api::TableList>(list.detail).entries.front().fault, "f");
+  const tables::TableContent own{.name = "own", .time_unit_ns = 4000, .accel = {2500, 1200}};
+  const auto content = std::get<api::Completed>(
+      reply_over_the_wire(api::Completed{.reason = "r", .detail = own}).reply);
+  EXPECT_EQ(std::get<tables::TableContent>(content.detail), own);
+}
+
+TEST(Codec, AListOfTablesIsShortenedToAPacket) {
+  api::TableList list;
+  for (int i = 0; i < 5000; ++i) list.entries.push_back({.name = std::string(60, 'x')});
+  const auto packet = encode(1, kId, api::Completed{.reason = "all tables", .detail = list});
+  ASSERT_TRUE(packet);
+  const auto reply =
+      std::get<ReplyMessage>(*decode_daemon_message(packet->channel, packet->payload)).reply;
+  const auto& completed = std::get<api::Completed>(reply);
+  EXPECT_GT(std::get<api::TableList>(completed.detail).entries.size(), 300u);
+  EXPECT_NE(completed.reason.find("more do not fit"), std::string::npos);
+}
+
+TEST(Codec, SnapshotsArriveAsTheyAre) {
+  const Part part{.utime_us = 1, .run = 2, .sequence = 3, .part = 4, .parts = 5};
+  const api::StateSnapshot state{.bus = "hall",
+                                 .mcu = "hall:1",
+                                 .state = api::McuState::kRunning,
+                                 .detail = "d",
+                                 .inputs = "forward",
+                                 .boot = 6,
+                                 .tick = 7,
+                                 .motors = {{.name = "theta",
+                                             .position_steps = -8,
+                                             .target_steps = 9,
+                                             .velocity_steps_per_s = 10.5,
+                                             .activity = api::Activity::kMoving,
+                                             .moving = true,
+                                             .inhibited = {.positive = true},
+                                             .trust = api::Trust::kUncertain,
+                                             .uncertain_reason = "restarted"}}};
+  const auto packet = encode(part, 11, state);
+  const auto message = std::get<StateMessage>(*decode_daemon_message("STATE", packet->payload));
+  EXPECT_EQ(message.snapshot, state);
+  EXPECT_EQ(message.dropped_messages, 11);
+  EXPECT_EQ(message.part.sequence, 3);
+  const api::Description description{
+      .bus = "hall",
+      .mcu = "hall:1",
+      .address = 1,
+      .tick_ns = 2'560'000,
+      .emergency_stop = api::StopMode::kImmediate,
+      .motors = {{.name = "theta", .output = 15, .group = "g", .table = {"own", 2, "abc"}}}};
+  const auto rare = encode(part, description);
+  EXPECT_EQ(
+      std::get<DescriptionMessage>(*decode_daemon_message("DESCRIPTION", rare->payload)).snapshot,
+      description);
+  const api::HealthSnapshot health{.bus = "hall",
+                                   .port_state = "open",
+                                   .latency = {{1000, 7}, {INT64_MAX, 1}},
+                                   .mcus = {{.mcu = "hall:1", .ramp_downs = 3}}};
+  const auto sick = encode(part, health);
+  const auto heard = std::get<HealthMessage>(*decode_daemon_message("HEALTH", sick->payload));
+  EXPECT_EQ(heard.snapshot.latency.at(1).answers, 1u);
+  EXPECT_EQ(heard.snapshot.mcus.at(0).ramp_downs, 3u);
+  EXPECT_FALSE(heard.snapshot.mcus.at(0).low_water_ticks);
+}
+
+TEST(Codec, TheStateOfSixteenMotorsFitsAnEthernetFrameTwice) {
+  api::StateSnapshot state{.bus = "hall", .mcu = "hall:1"};
+  for (int i = 0; i < 16; ++i) state.motors.push_back({.name = "motor" + std::to_string(i)});
+  EXPECT_LT(encode(Part{}, 0, state)->payload.size(), 2 * 1400u);
+}
+
+// Whatever decodes can be encoded.
+TEST(Codec, RandomMessagesOfEveryChannelDoNoHarm) {
+  test::Random random(20040518);
+  test::PayloadMaker maker(random);
+  for (int i = 0; i < 300; ++i) {
+    for (const auto& payload :
+         {maker.make<move_t>(), maker.make<arm_t>(), maker.make<stop_t>(),
+          maker.make<set_table_t>(), maker.make<answer_t>(), maker.make<table_answer_t>(),
+          maker.make<mcu_state_t>(), maker.make<mcu_description_t>(), maker.make<health_t>(),
+          maker.make<position_compare_t>()}) {
+      for (const std::string_view channel : client_channels()) {
+        const auto message = decode_client_message(channel, payload);
+        if (!message) continue;
+        if (const auto* request = std::get_if<api::Request>(&message->content)) {
+          EXPECT_TRUE(encode(0, message->id, *request));
+        }
+      }
+      for (const std::string_view channel : daemon_channels()) {
+        const auto message = decode_daemon_message(channel, payload);
+        if (!message) continue;
+        if (const auto* reply = std::get_if<ReplyMessage>(&*message)) {
+          EXPECT_TRUE(encode(0, reply->id, reply->reply));
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bushd::lcm

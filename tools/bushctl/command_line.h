@@ -1,0 +1,84 @@
+// Subcommands and their options. A thin layer over CLI11, which only command_line.cpp includes: it
+// is slow to compile.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace bushctl {
+
+// How to reach the daemon, as all subcommands take it.
+struct Connection {
+  std::string socket;
+  bool lcm = false;
+  std::string url;
+  std::string prefix = bushd::client::kDefaultPrefix;
+  bool lcm_options = false;  // --url or --prefix was given, so LCM is meant
+
+  bushd::client::ClientOptions options() const;
+};
+
+// One subcommand. What is pointed to outlives the command line.
+class Command {
+ public:
+  explicit Command(CLI::App* app) : app_(app) {}
+
+  Command& footer(const std::string& text);
+  Command& flag(const std::string& name, bool* value, const std::string& text);
+  // Only together with the option `with`.
+  Command& flag_with(const std::string& with, const std::string& name, bool* value,
+                     const std::string& text);
+  // `name` without dashes: in its place among the words, and needed.
+  Command& option(const std::string& name, std::string* value, const std::string& text);
+  Command& choice(const std::string& name, std::string* value,
+                  const std::vector<std::string>& allowed, const std::string& text);
+  enum class Needed { kNo, kYes };
+  template <class Number>
+  Command& number(const std::string& name, Number* value, Number least, Number most,
+                  const std::string& text, Needed needed = Needed::kNo);
+  // All words that are left.
+  Command& words(const std::string& name, std::vector<std::string>* value, const std::string& text,
+                 Needed needed);
+  // The same, with options of their own among them.
+  Command& raw_words(std::vector<std::string>* value);
+
+  void run(std::function<int()> action);
+
+ private:
+  CLI::App* app_;
+  std::vector<std::string>* raw_words_ = nullptr;
+};
+
+class CommandLine {
+ public:
+  CommandLine();
+  ~CommandLine();
+
+  // `group`: of a command that has commands of its own; "": none.
+  Command add(const std::string& name, const std::string& text, const std::string& group = {});
+  void add_group(const std::string& name, const std::string& text);
+  // Without a daemon.
+  Command add_local(const std::string& name, const std::string& text);
+
+  const Connection& connection() const { return connection_; }
+  // The exit code of the subcommand that was chosen.
+  int run(int argc, char** argv);
+
+ private:
+  void add_connection(CLI::App* app);
+
+  std::unique_ptr<CLI::App> app_;
+  Connection connection_;
+};
+
+}  // namespace bushctl

@@ -1,0 +1,199 @@
+// Subcommands that move motors, stop them, and say where they stand.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "commands.h"
+#include "move_arguments.h"
+#include "render.h"
+
+namespace bushctl {
+namespace {
+
+namespace api = bushd::api;
+using bushd::client::Client;
+using Until = Client::Until;
+
+Until until(bool wait) {
+  return wait ? Until::kResult : Until::kAnswered;
+}
+
+// What the move would be.
+int show_plan(const Connection& connection, api::Move move, bool as_json) {
+  return with_client(connection, [&](Client& client) {
+    move.dry_run = true;
+    const auto reply = client.run(move, Until::kResult);
+    if (!reply) return failure(client, reply.error());
+    const auto* completed = std::get_if<api::Completed>(&*reply);
+    const auto* plan =
+        completed == nullptr ? nullptr : std::get_if<api::MovePlan>(&completed->detail);
+    if (plan == nullptr) return refused(*reply);
+    if (as_json) {
+      fmt::print("{}\n", json(*plan));
+    } else {
+      for (const std::string& line : lines(*plan)) fmt::print("{}\n", line);
+    }
+    return static_cast<int>(kDone);
+  });
+}
+
+void add_move(CommandLine& line) {
+  struct Options {
+    bool wait = false;
+    bool dry_run = false;
+    bool json = false;
+    std::vector<std::string> words;
+  };
+  const auto options = std::make_shared<Options>();
+  line.add("move", "Move motors; those on one bus start in the same tick")
+      .footer(
+          "bushctl move [--wait] NAME STEPS [NAME STEPS...]            by so many steps\n"
+          "bushctl move [--wait] NAME --to STEPS [NAME --to STEPS...]  to these positions\n"
+          "STEPS may be negative. A motor that moves is given a new target; by STEPS then counts "
+          "from its present one. With --wait the exit code is 0 only if every motor reached its "
+          "target.")
+      .flag("--wait", &options->wait, "Wait for the result")
+      .flag("--dry-run", &options->dry_run,
+            "Say how long it would take, how fast it would be and what would go out; moves nothing")
+      .flag_with("--dry-run", "--json", &options->json, "With --dry-run: as JSON")
+      .raw_words(&options->words)
+      .run([&line, options] {
+        const auto move = parse_move(options->words);
+        if (!move) return wrong_usage(move.error());
+        if (options->dry_run) return show_plan(line.connection(), *move, options->json);
+        return send(line.connection(), *move, until(options->wait), Hope::kReached);
+      });
+}
+
+void add_arm(CommandLine& line) {
+  struct Options {
+    std::string edge = "rising";
+    std::int64_t delay_us = 0;
+    bool wait = false;
+    std::vector<std::string> words;
+  };
+  const auto options = std::make_shared<Options>();
+  line.add("arm", "Let moves wait for the trigger of their MCU")
+      .footer(
+          "bushctl arm --delay-us US NAME STEPS [NAME STEPS...]\n"
+          "Motors at rest. Those of one MCU begin in the same slot, three ticks and the delay "
+          "after "
+          "the edge at its trigger input. With --wait the exit code is 0 only if every motor "
+          "reached its target.")
+      .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'500'000,
+                            "From the edge on, beside the three ticks", Command::Needed::kYes)
+      .choice("--edge", &options->edge, {"rising", "falling"}, "Which edge")
+      .flag("--wait", &options->wait, "Wait for the result")
+      .raw_words(&options->words)
+      .run([&line, options] {
+        const auto arm = parse_arm(options->words, options->edge, options->delay_us);
+        if (!arm) return wrong_usage(arm.error());
+        return send(line.connection(), *arm, until(options->wait), Hope::kReached);
+      });
+}
+
+void add_disarm(CommandLine& line) {
+  const auto motors = std::make_shared<api::MotorNames>();
+  line.add("disarm", "Cancel moves that wait for the trigger")
+      .footer("What waits for the same trigger, or was armed together, is disarmed together.")
+      .words("NAME", motors.get(), "Motors; none: all", Command::Needed::kNo)
+      .run([&line, motors] {
+        return send(line.connection(), api::Disarm{*motors}, Until::kResult, Hope::kDone);
+      });
+}
+
+void add_reference(CommandLine& line) {
+  struct Options {
+    std::string motor;
+    std::string position;
+    Pulse pulse;
+  };
+  const auto options = std::make_shared<Options>();
+  line.add("reference", "Pulse when a motor arrives at a position")
+      .option("NAME", &options->motor, "The motor; its MCU's position compare output pulses")
+      .option("POSITION", &options->position, "In steps, or off")
+      .number<std::int64_t>("--delay-us", &options->pulse.delay_us, 0, 1'500'000,
+                            "From the step to the pulse")
+      .number<std::int64_t>("--width-us", &options->pulse.width_us, 1, 1'000'000,
+                            "Of the pulse; at least a slot")
+      .choice("--direction", &options->pulse.direction, {"both", "positive", "negative"},
+              "In which the motor arrives there")
+      .run([&line, options] {
+        const auto request = parse_reference(options->motor, options->position, options->pulse);
+        if (!request) return wrong_usage(request.error());
+        return send(line.connection(), *request, Until::kResult, Hope::kDone);
+      });
+}
+
+void add_stop(CommandLine& line) {
+  struct Options {
+    api::MotorNames motors;
+    bool wait = false;
+  };
+  const auto options = std::make_shared<Options>();
+  line.add("stop", "Ramp motors down")
+      .words("NAME", &options->motors, "Motors; none: all", Command::Needed::kNo)
+      .flag("--wait", &options->wait, "Wait until they stand")
+      .run([&line, options] {
+        return send(line.connection(), api::Stop{options->motors}, until(options->wait),
+                    Hope::kDone);
+      });
+}
+
+void add_estop(CommandLine& line) {
+  line.add("estop", "Stop all motors of all buses at once, until 'clear'").run([&line] {
+    return send(line.connection(), api::EmergencyStop{}, Until::kResult, Hope::kDone);
+  });
+}
+
+void add_home(CommandLine& line) {
+  struct Options {
+    api::MotorNames motors;
+    bool wait = false;
+  };
+  const auto options = std::make_shared<Options>();
+  line.add("home", "Find the motors' switches, and with them their positions")
+      .footer(
+          "As the configuration's 'home' says. Those of one MCU are homed one after the other. "
+          "With "
+          "--wait the exit code is 0 only if every motor has found its switch; 'bushctl stop' ends "
+          "it.")
+      .words("NAME", &options->motors, "Motors", Command::Needed::kYes)
+      .flag("--wait", &options->wait, "Wait for the result")
+      .run([&line, options] {
+        return send(line.connection(), api::Home{options->motors}, until(options->wait),
+                    Hope::kReached);
+      });
+}
+
+void add_set(CommandLine& line) {
+  struct Options {
+    std::string motor;
+    std::string steps;
+  };
+  const auto options = std::make_shared<Options>();
+  line.add("set", "Set the current position without moving")
+      .option("NAME", &options->motor, "The motor, at rest")
+      .option("STEPS", &options->steps, "Its position from now on")
+      .run([&line, options] {
+        const auto request = parse_set(options->motor, options->steps);
+        if (!request) return wrong_usage(request.error());
+        // Over in a moment, and only the result tells whether the MCU did it.
+        return send(line.connection(), *request, Until::kResult, Hope::kDone);
+      });
+}
+
+}  // namespace
+
+void add_motion_commands(CommandLine& line) {
+  add_move(line);
+  add_arm(line);
+  add_disarm(line);
+  add_reference(line);
+  add_stop(line);
+  add_estop(line);
+  add_home(line);
+  add_set(line);
+}
+
+}  // namespace bushctl

@@ -1,0 +1,215 @@
+// Subcommands about tables: which there are, which each group has, and what one says.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "base/printable.h"
+#include "commands.h"
+#include "grid.h"
+#include "render.h"
+
+namespace bushctl {
+namespace {
+
+namespace api = bushd::api;
+using bushd::client::Client;
+using nlohmann::ordered_json;
+
+std::string dump(const ordered_json& json) {
+  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+std::map<std::string, api::TableRef> by_group(const bushd::client::Status& status) {
+  std::map<std::string, api::TableRef> groups;
+  for (const bushd::lcm::DescriptionMessage& mcu : status.descriptions) {
+    for (const api::MotorDescription& motor : mcu.snapshot.motors) {
+      groups.emplace(motor.group, motor.table);
+    }
+  }
+  return groups;
+}
+
+std::string revision_text(std::uint32_t revision) {
+  return revision > 0 ? fmt::to_string(revision) : "-";
+}
+
+void print_json(const std::map<std::string, api::TableRef>& groups,
+                const std::vector<api::TableEntry>& entries) {
+  ordered_json json = {{"groups", ordered_json::array()}, {"tables", ordered_json::array()}};
+  for (const auto& [group, table] : groups) {
+    json["groups"].push_back({{"group", group},
+                              {"table", table.name},
+                              {"revision", table.revision},
+                              {"hash", table.hash}});
+  }
+  for (const api::TableEntry& entry : entries) {
+    if (!entry.fault.empty()) {
+      json["tables"].push_back({{"table", entry.name}, {"fault", entry.fault}});
+      continue;
+    }
+    json["tables"].push_back({{"table", entry.name},
+                              {"revision", entry.table.revision},
+                              {"hash", entry.table.hash},
+                              {"codes", entry.codes},
+                              {"start_steps_per_s", entry.start_steps_per_s},
+                              {"max_steps_per_s", entry.max_steps_per_s}});
+  }
+  fmt::print("{}\n", dump(json));
+}
+
+void print(const std::map<std::string, api::TableRef>& groups,
+           const std::vector<api::TableEntry>& entries) {
+  using enum Align;
+  Grid in_service({kLeft, kLeft, kRight, kLeft});
+  in_service.row({"GROUP", "TABLE", "REVISION", "HASH"});
+  for (const auto& [group, table] : groups) {
+    in_service.row({bushd::printable(group), bushd::printable(table.name),
+                    revision_text(table.revision), bushd::printable(table.hash)});
+  }
+  Grid tables({kLeft, kRight, kLeft, kRight, kRight, kRight});
+  tables.row({"TABLE", "REVISION", "HASH", "CODES", "START", "MAX STEPS/S"});
+  for (const api::TableEntry& entry : entries) {
+    if (!entry.fault.empty()) continue;
+    tables.row({bushd::printable(entry.name), revision_text(entry.table.revision),
+                bushd::printable(entry.table.hash), fmt::to_string(entry.codes),
+                fmt::format("{:.6g}", entry.start_steps_per_s),
+                fmt::format("{:.6g}", entry.max_steps_per_s)});
+  }
+  for (const std::string& line : in_service.lines()) fmt::print("{}\n", line);
+  fmt::print("\n");
+  for (const std::string& line : tables.lines()) fmt::print("{}\n", line);
+  for (const api::TableEntry& entry : entries) {
+    if (!entry.fault.empty())
+      fmt::print("{}: {}\n", bushd::printable(entry.name), bushd::printable(entry.fault));
+  }
+}
+
+// Nothing when the daemon did not answer, or not with what was asked for; stderr says which.
+template <class Detail>
+std::optional<Detail> ask(Client& client, const api::Request& request, int* code) {
+  const auto reply = client.run(request, Client::Until::kResult);
+  if (!reply) {
+    *code = failure(client, reply.error());
+    return std::nullopt;
+  }
+  if (const auto* completed = std::get_if<api::Completed>(&*reply)) {
+    if (const auto* detail = std::get_if<Detail>(&completed->detail)) return *detail;
+  }
+  *code = refused(*reply);
+  return std::nullopt;
+}
+
+int list_tables(Client& client, bool as_json) {
+  constexpr std::chrono::milliseconds kWithin{4000};
+  int code = kDone;
+  const auto list = ask<api::TableList>(client, api::ListTables{}, &code);
+  if (!list) return code;
+  const auto status = client.status(kWithin);
+  if (!status) return failure(client, status.error());
+  (as_json ? print_json : print)(by_group(*status), list->entries);
+  return kDone;
+}
+
+void print_json(const bushd::tables::TableContent& table) {
+  ordered_json json = {{"name", table.name},
+                       {"description", table.description},
+                       {"revision", table.revision},
+                       {"sha256", bushd::tables::content_hash(table)},
+                       {"time_unit_ns", table.time_unit_ns}};
+  if (table.cruise) json["cruise"] = *table.cruise;
+  json["accel"] = table.accel;
+  if (table.decel) json["decel"] = *table.decel;
+  fmt::print("{}\n", dump(json));
+}
+
+void print(const bushd::tables::TableContent& table) {
+  fmt::print("{}\n", bushd::printable(table.name));
+  if (!table.description.empty()) fmt::print("  {}\n", bushd::printable(table.description));
+  fmt::print("  revision {}, SHA-256 {}\n", revision_text(table.revision),
+             bushd::tables::content_hash(table));
+  fmt::print("  time unit {} ns, cruise {}\n", table.time_unit_ns,
+             table.cruise ? fmt::to_string(*table.cruise) : "as the last of accel");
+  fmt::print("  accel {}\n", fmt::join(table.accel, " "));
+  if (table.decel) fmt::print("  decel {}\n", fmt::join(*table.decel, " "));
+}
+
+int show_table(Client& client, const std::string& wanted, bool as_json) {
+  int code = kDone;
+  const auto table = ask<bushd::tables::TableContent>(client, api::GetTable{wanted}, &code);
+  if (!table) return code;
+  // Computed here, so that it is what is shown that is hashed.
+  if (const auto fault = bushd::tables::check(*table)) {
+    fmt::print(stderr, "bushctl: the daemon's answer brings no table: {}: {}\n",
+               bushd::printable(fault->key), bushd::printable(fault->message));
+    return kFailed;
+  }
+  if (as_json) {
+    print_json(*table);
+  } else {
+    print(*table);
+  }
+  return kDone;
+}
+
+void add_list(CommandLine& line) {
+  const auto json = std::make_shared<bool>(false);
+  line.add("list", "Show the tables that are there, and who has which", "table")
+      .flag("--json", json.get(), "As JSON")
+      .run([&line, json] {
+        return with_client(line.connection(),
+                           [&](Client& client) { return list_tables(client, *json); });
+      });
+}
+
+void add_show(CommandLine& line) {
+  struct Options {
+    std::string table;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  line.add("show", "Show what a table says", "table")
+      .option("TABLE", &options->table, "NAME, NAME@REVISION or NAME@TAG")
+      .flag("--json", &options->json, "As JSON")
+      .run([&line, options] {
+        return with_client(line.connection(), [&](Client& client) {
+          return show_table(client, options->table, options->json);
+        });
+      });
+}
+
+void add_use(CommandLine& line) {
+  const auto request = std::make_shared<api::UseTable>();
+  line.add("use", "Give a group another table", "table")
+      .footer(
+          "TABLE is NAME, NAME@REVISION or NAME@TAG, as for bushtab. Motors that move keep their "
+          "table; once those of the group's MCUs stand, the MCUs get the new one, and the next "
+          "move "
+          "is by it. It stays in service when the daemon is started again.")
+      .option("GROUP", &request->group, "The group")
+      .option("TABLE", &request->table, "Its table from the next move on")
+      .run([&line, request] {
+        return send(line.connection(), *request, Client::Until::kResult, Hope::kDone);
+      });
+}
+
+void add_reload(CommandLine& line) {
+  line.add("reload", "Read all groups' tables again; bad ones leave the old in service", "table")
+      .run([&line] {
+        return send(line.connection(), api::ReloadTables{}, Client::Until::kResult, Hope::kDone);
+      });
+}
+
+}  // namespace
+
+void add_table_commands(CommandLine& line) {
+  line.add_group("table", "Show and change which table each group moves by");
+  add_list(line);
+  add_show(line);
+  add_use(line);
+  add_reload(line);
+}
+
+}  // namespace bushctl
