@@ -41,6 +41,13 @@ void EmergencyStop::request(std::int64_t now_us, const api::Asker& asker,
   if (!unknown.empty()) {
     stopping.done = "done; not online, so it is unknown whether they stand:" + unknown;
   }
+  if (open_.size() >= kMaxOpen) {
+    open_.front().asker.answer(api::Completed{
+        .outcome = api::Outcome::kStopped,
+        .reason = "carried out; so many stops are under way that its end is not waited for",
+        .detail = {}});
+    open_.pop_front();
+  }
   open_.push_back(std::move(stopping));
 }
 

@@ -16,6 +16,10 @@ namespace bushd::daemon {
 
 class EmergencyStop final : public Service {
  public:
+  // Whose end is waited for at a time: anybody may send them, as fast as can be. Beyond, they are
+  // carried out all the same.
+  static constexpr std::size_t kMaxOpen = 256;
+
   EmergencyStop(Installation& installation, Interlocks& interlocks, HomingQueue& homing,
                 Outputs& outputs);
 

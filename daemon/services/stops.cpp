@@ -10,6 +10,13 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
   asker.answer(api::Accepted{});
   std::erase_if(*motors, [this](MotorId motor) { return !can_be_stopped(motor); });
   stop(now_us, *motors);
+  if (open_.size() >= kMaxOpen) {
+    open_.front().asker.answer(api::Completed{
+        .outcome = api::Outcome::kStopped,
+        .reason = "carried out; so many stops are under way that its end is not waited for",
+        .detail = {}});
+    open_.pop_front();
+  }
   open_.push_back({.asker = asker, .motors = std::move(*motors)});
 }
 

@@ -14,6 +14,10 @@ namespace bushd::daemon {
 
 class Stops final : public Service {
  public:
+  // Whose end is waited for at a time: anybody may send stops, as fast as can be. Beyond, they are
+  // carried out all the same.
+  static constexpr std::size_t kMaxOpen = 256;
+
   Stops(Installation& installation, Moves& moves, HomingQueue& homing, const OpenMoves& open_moves)
       : installation_(installation), moves_(moves), homing_(homing), open_moves_(open_moves) {}
 

@@ -8,6 +8,8 @@
 #include "daemon/bench.h"
 #include "daemon/confirmation.h"
 #include "daemon/interlocks.h"
+#include "daemon/services/emergency_stop.h"
+#include "daemon/services/homing_queue.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/open_moves.h"
 #include "daemon/services/state_publisher.h"
@@ -88,6 +90,27 @@ TEST(OpenMoves, AMoveIsAnsweredOnceWhenItsLastMotorHasEnded) {
   EXPECT_EQ(results[1].outcome, api::Outcome::kLimit);
   EXPECT_EQ(results[1].table.name, "bushd2-constant");
   EXPECT_TRUE(moves.empty());
+}
+
+TEST(EmergencyStop, AFloodIsCarriedOutAndItsMemoryIsBounded) {
+  Bench bench;
+  Interlocks interlocks(bench.installation);
+  OpenMoves moves(bench.installation);
+  HomingQueue homing(bench.installation, interlocks, moves, bench);
+  EmergencyStop emergency_stop(bench.installation, interlocks, homing, bench);
+  constexpr std::size_t kMore = 10;
+  for (std::size_t i = 0; i < EmergencyStop::kMaxOpen + kMore; ++i) {
+    emergency_stop.request(0, bench.asker(static_cast<std::int64_t>(i)), {});
+  }
+  EXPECT_TRUE(emergency_stop.under_way());
+  std::size_t given_up = 0;
+  for (const auto& [number, reply] : bench.client->answers) {
+    if (std::holds_alternative<api::Completed>(reply)) ++given_up;
+  }
+  EXPECT_EQ(given_up, kMore) << "the oldest are not waited for any more";
+  emergency_stop.step(1);
+  EXPECT_FALSE(emergency_stop.under_way());
+  EXPECT_EQ(bench.completed().outcome, api::Outcome::kDone);
 }
 
 TEST(Journal, AMoveAndItsEndHaveOneId) {
