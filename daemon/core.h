@@ -45,6 +45,9 @@ class Core {
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
 
+  // Publishes the state as it is now, whether due or not.
+  void publish_state(std::int64_t now_us) { state_.publish_all(now_us); }
+
   // Does what is due; to be called after every call above and at next_wake_us() at the latest.
   void step(std::int64_t now_us);
   std::int64_t next_wake_us() const;

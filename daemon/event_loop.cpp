@@ -22,8 +22,6 @@ namespace {
 
 constexpr std::size_t kMaxTableJobs = 64;  // anybody may ask for tables
 constexpr int kMaxTableJobsPerClient = 4;
-// Requests that wait are carried out for so long before stops and motors are looked after again.
-constexpr std::int64_t kSliceUs = 500;
 
 std::int64_t now_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(
@@ -95,6 +93,7 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
                  reception_, publishing_, unix_time_us),
       ports_(config.buses.size()),
       lost_(config.buses.size()) {
+  publishing_.set_refresh([this] { core_.publish_state(now_us()); });
   publishing_.add(lcm_front_);
   if (fronts.control == nullptr) return;
   socket_front_ =
@@ -336,7 +335,7 @@ void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>
 }
 
 void EventLoop::carry_out_some() {
-  const std::int64_t until = now_us() + kSliceUs;
+  const std::int64_t until = now_us() + Reception::kSliceUs;
   while (!reception_.idle()) {
     reception_.carry_out_next();
     if (now_us() >= until) return;

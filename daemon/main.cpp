@@ -67,6 +67,32 @@ bushd::Result<std::unique_ptr<bushd::control::Server>> open_control(
   return nullptr;
 }
 
+struct Lcm {
+  std::unique_ptr<bushd::lcm::Transport> all;
+  std::unique_ptr<bushd::lcm::Transport> stops;  // null: `all` takes those too
+};
+
+// Without a network the control socket alone will do. Stops come by a transport of their own, so
+// that no flood of other requests is before them; what is not on a network has one place for all.
+bushd::Result<Lcm> open_lcm(const bushd::config::Lcm& config, bool has_control) {
+  using bushd::lcm::Transport;
+  auto all = Transport::open(config.url);
+  if (!all && has_control) {
+    spdlog::error("{}; only clients of the control socket are served", all.error().text());
+    all = Transport::open("memq://");
+    if (!all) return bushd::fail(all.error());
+    return Lcm{.all = std::move(*all), .stops = nullptr};
+  }
+  if (!all) return bushd::fail(all.error());
+  if (!config.commands || !config.url.starts_with("udpm://")) {
+    return Lcm{.all = std::move(*all), .stops = nullptr};
+  }
+  auto stops =
+      Transport::open(config.url, {config.prefix + "_STOP", config.prefix + "_EMERGENCY_STOP"});
+  if (!stops) return bushd::fail(stops.error());
+  return Lcm{.all = std::move(*all), .stops = std::move(*stops)};
+}
+
 int run(const bushd::config::Config& config, const std::string& move_log_path,
         const std::string& in_service_path) {
   block_signals();
@@ -80,21 +106,21 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
     }
     move_log.emplace(std::move(*opened));
   }
-  auto transport = bushd::lcm::Transport::open(config.lcm.url);
-  if (!transport) {
-    spdlog::error("{}", transport.error().text());
-    return 1;
-  }
-  auto control = open_control(config.control);
+  const auto control = open_control(config.control);
   if (!control) {
     spdlog::error("{}", control.error().text());
     return 1;
   }
+  const auto lcm = open_lcm(config.lcm, *control != nullptr);
+  if (!lcm) {
+    spdlog::error("{}", lcm.error().text());
+    return 1;
+  }
   spdlog::info("bushd: {}, LCM {}, control socket {}", extent(config), config.lcm.url,
                *control ? (*control)->path() : "none");
-  bushd::daemon::EventLoop loop(config, {.lcm = **transport, .control = control->get()},
-                                move_log ? &*move_log : nullptr,
-                                bushd::daemon::TableLibrary(config, in_service_path));
+  bushd::daemon::EventLoop loop(
+      config, {.lcm = *lcm->all, .stops = lcm->stops.get(), .control = control->get()},
+      move_log ? &*move_log : nullptr, bushd::daemon::TableLibrary(config, in_service_path));
   if (const auto ended = loop.run(); !ended) {
     spdlog::error("{}", ended.error().text());
     return 1;

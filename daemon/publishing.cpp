@@ -64,7 +64,8 @@ void Publishing::publish(BusId bus, const api::HealthSnapshot& health) {
   send(Topic::kHealth, slot, lcm::encode(part(bus.value, healths_.size()), health));
 }
 
-std::vector<const lcm::Packet*> Publishing::newest() const {
+std::vector<const lcm::Packet*> Publishing::newest() {
+  if (refresh_) refresh_();
   std::vector<const lcm::Packet*> all;
   const auto add = [&all](const auto& slots) {
     for (const auto& slot : slots) {
@@ -81,6 +82,7 @@ void Publishing::publish_newest() {
   const std::int64_t now_us = clocks_.now_us();
   if (now_us - newest_sent_us_ < kNewestPeriodUs) return;
   newest_sent_us_ = now_us;
+  if (refresh_) refresh_();
   const auto again = [this](Topic topic, const auto& slots) {
     for (const auto& slot : slots) {
       if (!slot.packet) continue;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "api/snapshot.h"
@@ -31,11 +32,14 @@ class Publishing : public api::Publisher {
     std::function<std::int64_t()> now_us;   // monotonic
     std::function<std::int64_t()> unix_us;  // since 1970
   };
+  // Lets the core publish the state as it is now.
+  using Refresh = std::function<void()>;
   // `run` tells this run of the daemon from others.
   Publishing(std::int64_t run, std::size_t mcus, std::size_t buses, Clocks clocks);
 
   // Outlives this.
   void add(Listener& listener) { listeners_.push_back(&listener); }
+  void set_refresh(Refresh refresh) { refresh_ = std::move(refresh); }
   void set_dropped_messages(std::uint64_t count) { dropped_ = static_cast<std::int64_t>(count); }
 
   // The core may publish as often as it likes: a state that has not changed is passed on when its
@@ -44,8 +48,8 @@ class Publishing : public api::Publisher {
   void publish(McuId mcu, const api::Description& description) override;
   void publish(BusId bus, const api::HealthSnapshot& health) override;
 
-  // Description, state and health of everything, as published last.
-  std::vector<const lcm::Packet*> newest() const;
+  // Description, state and health of everything, the state as it is now.
+  std::vector<const lcm::Packet*> newest();
   // The same to all listeners, but not more often than ten times a second.
   void publish_newest();
 
@@ -64,6 +68,7 @@ class Publishing : public api::Publisher {
 
   std::int64_t run_;
   Clocks clocks_;
+  Refresh refresh_;
   std::vector<Listener*> listeners_;
   std::vector<Slot<api::StateSnapshot>> states_;  // by MCU
   std::vector<Slot<api::Description>> descriptions_;

@@ -48,7 +48,10 @@ StatePublisher::StatePublisher(Installation& installation, Outputs& outputs)
 
 void StatePublisher::step(std::int64_t now_us) {
   due_us_ = std::min(due_us_, next_wake_us());
-  if (now_us < due_us_) return;
+  if (now_us >= due_us_) publish_all(now_us);
+}
+
+void StatePublisher::publish_all(std::int64_t now_us) {
   for (const McuId mcu : installation_.mcus()) publish(now_us, installation_[mcu]);
   installation_.changed = false;
   sent_us_ = now_us;

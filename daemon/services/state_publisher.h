@@ -21,6 +21,8 @@ class StatePublisher {
   StatePublisher(Installation& installation, Outputs& outputs);
 
   void step(std::int64_t now_us);
+  // As it is now, whether due or not.
+  void publish_all(std::int64_t now_us);
   std::int64_t next_wake_us() const;
 
  private:

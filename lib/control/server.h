@@ -28,8 +28,8 @@ struct Limits {
   std::size_t unread_bytes_in_all = 32 * 1024 * 1024;
   // Packets that were none, before the connection is closed.
   unsigned bad_packets = 16;
-  // Per connection and call of handle(), so that none keeps others waiting.
-  unsigned packets_at_once = 8;
+  // Per connection and call of handle(), so that none keeps the stop of another waiting.
+  unsigned packets_at_once = 1;
 };
 
 class Server {

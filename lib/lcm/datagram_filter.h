@@ -8,6 +8,8 @@
 #pragma once
 
 #include <set>
+#include <string>
+#include <vector>
 
 #include "base/result.h"
 
@@ -17,7 +19,9 @@ namespace bushd::lcm {
 // those that are there after it was opened and were not before.
 std::set<int> udp_sockets();
 
-// Only datagrams with the magic of a whole LCM message reach the socket from now on.
-Result<void> accept_whole_messages_only(int udp_socket);
+// Only datagrams with the magic of a whole LCM message reach the socket from now on; with
+// `channels`, only those on one of these. Precondition: up to 4 names of 1..63 characters.
+Result<void> accept_whole_messages_only(int udp_socket,
+                                        const std::vector<std::string>& channels = {});
 
 }  // namespace bushd::lcm

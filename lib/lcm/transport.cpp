@@ -63,7 +63,8 @@ Result<void> check_channel(const std::string& channel) {
 
 }  // namespace
 
-Result<std::unique_ptr<Transport>> Transport::open(const std::string& url) {
+Result<std::unique_ptr<Transport>> Transport::open(const std::string& url,
+                                                   const std::vector<std::string>& channels) {
   const std::set<int> others = udp_sockets();
   lcm_t* lcm = lcm_create(url.c_str());
   if (lcm == nullptr) return fail(cannot_open(url));
@@ -76,7 +77,7 @@ Result<std::unique_ptr<Transport>> Transport::open(const std::string& url) {
   std::unique_ptr<Transport> transport(new Transport(lcm, fd));
   for (const int udp_socket : udp_sockets()) {
     if (others.contains(udp_socket)) continue;
-    if (auto filtered = accept_whole_messages_only(udp_socket); !filtered)
+    if (auto filtered = accept_whole_messages_only(udp_socket, channels); !filtered)
       return fail(filtered.error());
   }
   return transport;

@@ -33,7 +33,10 @@ class Transport {
   // is an error too. LCM starts a receiving thread here, which inherits the signal mask and the
   // scheduling policy: block signals that are to be taken from a descriptor before, become
   // real-time after.
-  static Result<std::unique_ptr<Transport>> open(const std::string& url);
+  // With `channels` the kernel keeps everything else away, so that a flood on other channels is
+  // none here. Up to 4.
+  static Result<std::unique_ptr<Transport>> open(const std::string& url,
+                                                 const std::vector<std::string>& channels = {});
   ~Transport();
   Transport(const Transport&) = delete;
   Transport& operator=(const Transport&) = delete;

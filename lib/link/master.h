@@ -59,7 +59,6 @@ class Master : private Transactions::Listener, private Connector::Listener {
   std::vector<Event> take_events();
 
   const McuView& view(McuIndex mcu) const { return mcus_[mcu].view; }
-  std::size_t mcu_count() const { return mcus_.size(); }
   bool time_known() const { return clock().valid(); }
   Tick tick_at(std::int64_t now_us) const { return clock().tick_at(now_us); }
   // Earliest tick at which a move of this motor can start and all its first frames still arrive

@@ -38,7 +38,7 @@ void Synchroniser::overheard(std::int64_t now_us, const bushd_frame& frame) {
 }
 
 bool Synchroniser::two_masters(std::int64_t now_us) const {
-  if (now_us < other_master_until_us_) return true;
+  if (other_master_until_us_ && now_us < *other_master_until_us_) return true;
   return std::any_of(mcus_.begin(), mcus_.end(), [](const McuRecord& mcu) {
     return mcu.view.phase != McuPhase::kOffline && mcu.view.reported &&
            (mcu.view.report.flags & BUSHD_FLAG_TWO_MASTERS) != 0;

@@ -79,7 +79,7 @@ class Synchroniser {
     bool reported = false;  // since the last SYNC
   };
   PerMcu<Mcu> since_sync_;
-  std::int64_t other_master_until_us_ = INT64_MIN;
+  std::optional<std::int64_t> other_master_until_us_;  // since it was heard
 };
 
 }  // namespace bushd::link

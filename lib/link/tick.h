@@ -1,3 +1,4 @@
+// Time on a bus, as its master counts it.
 #pragma once
 
 #include <cstdint>

@@ -112,6 +112,28 @@ TEST(Config, LcmHasDefaults) {
   ASSERT_TRUE(config.has_value()) << config.error().text();
   EXPECT_EQ(config->lcm.url, "udpm://239.255.76.67:7667?ttl=0");
   EXPECT_EQ(config->lcm.prefix, "BUSHD");
+  EXPECT_TRUE(config->lcm.commands);
+}
+
+TEST(Config, TheControlSocketIsWhereTheFileSays) {
+  const auto plain = ConfigFile(kGood).load();
+  ASSERT_TRUE(plain.has_value()) << plain.error().text();
+  EXPECT_FALSE(plain->control.path);
+  EXPECT_EQ(plain->control.group, "");
+  const auto named =
+      ConfigFile("[control]\npath = \"/run/lab/control\"\ngroup = \"lab\"\n" + kGood).load();
+  ASSERT_TRUE(named.has_value()) << named.error().text();
+  EXPECT_EQ(named->control.path, "/run/lab/control");
+  EXPECT_EQ(named->control.group, "lab");
+  const auto none = ConfigFile("[control]\npath = \"\"\n" + kGood).load();
+  ASSERT_TRUE(none.has_value()) << none.error().text();
+  EXPECT_EQ(none->control.path, "");
+}
+
+TEST(Config, LcmMayOnlyPublish) {
+  const auto config = ConfigFile(replaced(kGood, "url =", "commands = false\nurl =")).load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_FALSE(config->lcm.commands);
 }
 
 TEST(Config, BusWithAnMcuIsEnough) {
@@ -183,13 +205,31 @@ const auto kNames = [](const auto& tested) { return std::string(tested.param.wha
 INSTANTIATE_TEST_SUITE_P(
     Lcm, ConfigRefusal,
     testing::Values(change("UnknownKey", "url =", "uri =", 2, "lcm.uri",
-                           "unknown key; allowed here: url, prefix"),
+                           "unknown key; allowed here: url, prefix, commands"),
                     change("UrlIsNumber", "\"memq://\"", "7667", 2, "lcm.url",
                            "is 7667; allowed: a URL"),
                     change("UrlOfUnknownProvider", "memq://", "http://x", 2, "lcm.url", "udpm://"),
                     change("Prefix", "\"TEST\"", "\"A B\"", 3, "lcm.prefix", "1..48 characters"),
+                    change("Commands", "url =", "commands = 1\nurl =", 2, "lcm.commands",
+                           "is 1; allowed: true or false"),
                     change("Array", "[lcm]", "[[lcm]]", 1, "lcm", "one [lcm]"),
                     Refusal{"Value", "lcm = 3\n", 1, "lcm", "one [lcm]"}),
+    kNames);
+
+Refusal control(const char* what, const std::string& lines, const char* key, const char* message) {
+  return {what, "[control]\n" + lines + "\n" + kGood, 2, key, message};
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Control, ConfigRefusal,
+    testing::Values(control("UnknownKey", "mode = 438", "control.mode",
+                            "unknown key; allowed here: path, group"),
+                    control("RelativePath", "path = \"control\"", "control.path",
+                            "allowed: an absolute path"),
+                    control("LongPath", "path = \"/" + std::string(107, 'x') + "\"", "control.path",
+                            "up to 107 characters"),
+                    control("GroupIsNumber", "group = 5", "control.group", "is 5; allowed"),
+                    Refusal{"Value", "control = 3\n", 1, "control", "one [control]"}),
     kNames);
 
 Refusal home(const char* what, const std::string& value, const char* key, const char* message) {
@@ -224,7 +264,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"Empty", "bus = []\n", 1, "bus", "is empty"},
         Refusal{"Numbers", "bus = [1]\n", 1, "bus[0]", "is 1; allowed: sections [[bus]]"},
         change("UnknownSection", "[[mcu]]", "[[motors]]", 16, "motors",
-               "unknown key; allowed here: lcm, bus, mcu, group, motor"),
+               "unknown key; allowed here: lcm, control, bus, mcu, group, motor"),
         change("UnknownKey", "tick_us", "tick_ms", 8, "bus[0].tick_ms",
                "unknown key; allowed here: name, port, baud, tick_us, format, moves, frames, "
                "emergency_stop"),

@@ -104,6 +104,17 @@ TEST_F(PublishingTest, TheNewestOfEachIsKept) {
   EXPECT_EQ(publishing_.newest().size(), 2u);
 }
 
+TEST_F(PublishingTest, WhoAsksIsToldTheStateAsItIsNow) {
+  publish(kFirst, state_);
+  state_.tick = 5;
+  state_.motors[0].position_steps = 9;
+  publishing_.set_refresh([this] { publishing_.publish(kFirst, state_); });
+  const auto newest = publishing_.newest();
+  ASSERT_EQ(newest.size(), 1u);
+  const auto message = *lcm::decode_daemon_message("STATE", newest[0]->payload);
+  EXPECT_EQ(std::get<lcm::StateMessage>(message).snapshot.motors.at(0).position_steps, 9);
+}
+
 TEST_F(PublishingTest, AskingForItAgainAndAgainFloodsNobody) {
   publish(kFirst, state_);
   heard_.clear();

@@ -106,6 +106,17 @@ class ControlSocket(EndToEndTest):
         self.wait_until("all of them to be read", lambda: self.dropped() >= 1000)
         self.assert_undisturbed()
 
+    def test_without_a_network_the_socket_serves(self):
+        self.write_config()
+        config = self.file("bushd.toml")
+        config.write_text(config.read_text().replace("239.255.76.67", "239.255.76.999"))
+        self.start_bushsim()
+        self.bushd = self.start_bushd()
+        self.wait_until("bushd to offer its socket", self.file("control").exists)
+        self.wait_until_ready()
+        self.command("move", "--wait", "a0", 5)
+        self.assertIn("only clients of the control socket are served", self.bushd.said())
+
     def test_without_commands_lcm_only_publishes(self):
         self.bring_up(lcm_lines=["commands = false"])
         refused = self.bushctl("move", "--lcm", "a0", 5)

@@ -14,8 +14,8 @@ CoreRig::CoreRig(const CoreConfiguration& configuration)
 
 Sight CoreRig::sight() {
   const bushd_mcu_clock& clock = mcu_.clock;
-  return {mcu_.config.address, motors(),   mcu_.stream.epoch,      mcu_.tick,    mcu_.tick_ns,
-          clock.master,        clock.mark, clock.mark_tick, clock.mark_ns};
+  return {mcu_.config.address, motors(),   mcu_.stream.epoch, mcu_.tick,    mcu_.tick_ns,
+          clock.master,        clock.mark, clock.mark_tick,   clock.mark_ns};
 }
 
 std::uint32_t CoreRig::table_crc(std::uint8_t slot) {
