@@ -90,9 +90,8 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
                   .commands = config.lcm.commands,
                   .run = run_,
                   .seed = static_cast<std::uint64_t>(run_)},
-                 reception_, publishing_, unix_time_us),
-      ports_(config.buses.size()),
-      lost_(config.buses.size()) {
+                 reception_, publishing_, unix_time_us) {
+  for ([[maybe_unused]] const config::Bus& bus : config.buses) ports_.add();
   publishing_.set_refresh([this] { core_.publish_state(now_us()); });
   publishing_.add(lcm_front_);
   if (fronts.control == nullptr) return;
@@ -137,7 +136,7 @@ class EventLoop::Source {
 
 EventLoop::~EventLoop() {
   sources_.clear();
-  ports_.clear();
+  for (Port& port : ports_) port.source.reset();
   sd_event_unref(event_);
 }
 
@@ -212,8 +211,8 @@ Result<void> EventLoop::run() {
   static_cast<void>(sd_notify(0, "READY=1"));
   while (true) {
     const std::int64_t now = now_us();
-    for (std::size_t bus = 0; bus < lost_.size(); ++bus) {
-      if (lost_[bus]) lose_port(now, bus, *std::exchange(lost_[bus], std::nullopt));
+    for (const BusId bus : ports_.ids()) {
+      if (ports_[bus].lost) lose_port(now, bus, *std::exchange(ports_[bus].lost, std::nullopt));
     }
     open_due_ports(now);
     carry_out_some();
@@ -235,23 +234,22 @@ std::int64_t EventLoop::next_wake_us() const {
   if (!reception_.idle()) return 0;
   std::int64_t wake = core_.next_wake_us();
   for (const Port& port : ports_) {
+    if (port.lost) return 0;
     if (!port.serial) wake = std::min(wake, port.open_due_us);
   }
   if (shut_down_by_us_) wake = std::min(wake, *shut_down_by_us_);
-  if (std::any_of(lost_.begin(), lost_.end(), [](const auto& lost) { return lost.has_value(); }))
-    wake = 0;
   return wake;
 }
 
 void EventLoop::open_due_ports(std::int64_t now) {
-  for (std::size_t bus = 0; bus < ports_.size(); ++bus) {
+  for (const BusId bus : ports_.ids()) {
     if (!ports_[bus].serial && ports_[bus].open_due_us <= now) open_port(now, bus);
   }
 }
 
-void EventLoop::open_port(std::int64_t now, std::size_t bus) {
+void EventLoop::open_port(std::int64_t now, BusId bus) {
   Port& port = ports_[bus];
-  const config::Bus& config = config_.buses[bus];
+  const config::Bus& config = config_[bus];
   port.open_due_us = now + kReopenUs;
   auto opened = open_first(config);
   Result<std::unique_ptr<Source>> watched;
@@ -264,7 +262,7 @@ void EventLoop::open_port(std::int64_t now, std::size_t bus) {
     if (error != port.last_error) {
       spdlog::error("bus {}: {}; trying again twice a second", config.name, error);
       port.last_error = error;
-      core_.port_lost(now, {bus}, "is out of reach: port " + error);
+      core_.port_lost(now, bus, "is out of reach: port " + error);
     }
     return;
   }
@@ -272,37 +270,37 @@ void EventLoop::open_port(std::int64_t now, std::size_t bus) {
   port.source = std::move(*watched);
   port.last_error.clear();
   spdlog::info("bus {}: port {} opened at {} baud", config.name, port.serial->path(), config.baud);
-  core_.port_opened(now, {bus});
+  core_.port_opened(now, bus);
 }
 
-void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& cause) {
+void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause) {
   Port& port = ports_[bus];
   if (!port.serial) return;
-  const config::Bus& config = config_.buses[bus];
+  const config::Bus& config = config_[bus];
   const std::string path = port.serial->path();
   port.source.reset();
   port.serial.reset();
   port.open_due_us = now + kReopenUs;
   port.last_error = path + ": " + cause;
   spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, path, cause);
-  core_.port_lost(now, {bus}, "is out of reach: port " + port.last_error);
+  core_.port_lost(now, bus, "is out of reach: port " + port.last_error);
 }
 
 // What is lost is given up in the loop: its source cannot go while it is being handled.
-void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t events) {
+void EventLoop::handle_port(std::int64_t now, BusId bus, std::uint32_t events) {
   if (!ports_[bus].serial) return;
   serial::SerialPort& serial = *ports_[bus].serial;
   if (events & EPOLLIN) {
     std::vector<std::uint8_t> bytes;
     const auto read = serial.read(bytes);
-    if (!bytes.empty()) core_.receive(now, {bus}, bytes);
-    if (!read) lost_[bus] = read.error().text();
+    if (!bytes.empty()) core_.receive(now, bus, bytes);
+    if (!read) ports_[bus].lost = read.error().text();
   } else if (events & (EPOLLHUP | EPOLLERR)) {
-    lost_[bus] = "hung up";
+    ports_[bus].lost = "hung up";
   }
   if (events & EPOLLOUT) {
     const auto flushed = serial.flush();
-    if (!flushed) lost_[bus] = flushed.error().text();
+    if (!flushed) ports_[bus].lost = flushed.error().text();
     update_write_interest(bus);
   }
 }
@@ -365,7 +363,7 @@ void EventLoop::serve_tables(const api::Asker& asker, const api::Request& reques
   });
 }
 
-void EventLoop::update_write_interest(std::size_t bus) {
+void EventLoop::update_write_interest(BusId bus) {
   const bool writes = ports_[bus].serial->wants_to_write();
   ports_[bus].source->await(EPOLLIN | (writes ? static_cast<std::uint32_t>(EPOLLOUT) : 0u));
 }
@@ -377,12 +375,11 @@ void EventLoop::log_cpu_share() const {
                100.0 * cpu_s / elapsed_s);
 }
 
-void EventLoop::send(BusId id, std::span<const std::uint8_t> bytes) {
-  const std::size_t bus = id.value;
+void EventLoop::send(BusId bus, std::span<const std::uint8_t> bytes) {
   if (!ports_[bus].serial) return;
   const bool waited = ports_[bus].serial->wants_to_write();
   if (const auto written = ports_[bus].serial->write(bytes); !written) {
-    lost_[bus] = written.error().text();
+    ports_[bus].lost = written.error().text();
   } else if (waited != ports_[bus].serial->wants_to_write()) {
     update_write_interest(bus);
   }

@@ -11,6 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "base/by_id.h"
 #include "config/config.h"
 #include "control/server.h"
 #include "daemon/core.h"
@@ -59,6 +60,8 @@ class EventLoop : private Outputs {
     std::unique_ptr<Source> source;  // of its descriptor
     std::int64_t open_due_us = 0;
     std::string last_error;  // so that a missing port is logged once, not twice a second
+    // Why it is to be given up, as soon as neither the core nor its source is at work.
+    std::optional<std::string> lost;
   };
 
   Result<void> set_up();
@@ -66,14 +69,14 @@ class EventLoop : private Outputs {
   Result<std::unique_ptr<Source>> watch(int fd, Handler handler);
   Result<void> keep_watching(int fd, Handler handler);
   void open_due_ports(std::int64_t now_us);
-  void open_port(std::int64_t now_us, std::size_t bus);
-  void lose_port(std::int64_t now_us, std::size_t bus, const std::string& cause);
-  void handle_port(std::int64_t now_us, std::size_t bus, std::uint32_t events);
+  void open_port(std::int64_t now_us, BusId bus);
+  void lose_port(std::int64_t now_us, BusId bus, const std::string& cause);
+  void handle_port(std::int64_t now_us, BusId bus, std::uint32_t events);
   void handle_signal(std::int64_t now_us, int signal);
   Result<void> restore_tables();
   // Some of the requests that wait, for as long as nothing else has to wait for that.
   void carry_out_some();
-  void update_write_interest(std::size_t bus);
+  void update_write_interest(BusId bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
   void check_published();
@@ -100,9 +103,7 @@ class EventLoop : private Outputs {
   Reception reception_;
   LcmFront lcm_front_;
   std::unique_ptr<SocketFront> socket_front_;  // null: no control socket
-  std::vector<Port> ports_;
-  std::vector<std::optional<std::string>>
-      lost_;  // by bus: a write failed, to be handled outside the core
+  ById<BusId, Port> ports_;
   std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
   bool mute_ = false;                                // LCM takes nothing
   sd_event* event_ = nullptr;
