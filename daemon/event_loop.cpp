@@ -3,8 +3,8 @@
 #include <spdlog/spdlog.h>
 #include <sys/epoll.h>
 #include <sys/resource.h>
-#include <sys/signalfd.h>
-#include <unistd.h>
+#include <systemd/sd-daemon.h>
+#include <systemd/sd-event.h>
 
 #include <algorithm>
 #include <array>
@@ -53,6 +53,10 @@ std::uint16_t master_number(std::int64_t run) {
   return static_cast<std::uint16_t>(static_cast<std::uint64_t>(run) * 0x9E3779B97F4A7C15u >> 48);
 }
 
+std::string loop_text(int error) {
+  return std::string("event loop: ") + std::strerror(-error);
+}
+
 // Of the ports that the configuration may mean, the first that opens; else why the first does not.
 Result<serial::SerialPort> open_first(const config::Bus& bus) {
   std::optional<Error> first_error;
@@ -86,9 +90,8 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
                   .commands = config.lcm.commands,
                   .run = run_,
                   .seed = static_cast<std::uint64_t>(run_)},
-                 reception_, publishing_, unix_time_us),
-      ports_(config.buses.size()),
-      lost_(config.buses.size()) {
+                 reception_, publishing_, unix_time_us) {
+  for ([[maybe_unused]] const config::Bus& bus : config.buses) ports_.add();
   publishing_.set_refresh([this] { core_.publish_state(now_us()); });
   publishing_.add(lcm_front_);
   if (fronts.control == nullptr) return;
@@ -97,65 +100,87 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
   publishing_.add(*socket_front_);
 }
 
+class EventLoop::Source {
+ public:
+  explicit Source(Handler handler) : handler_(std::move(handler)) {}
+  ~Source() { sd_event_source_disable_unref(source_); }
+  Source(const Source&) = delete;
+  Source& operator=(const Source&) = delete;
+
+  int watch(sd_event* event, int fd) {
+    return sd_event_add_io(
+        event, &source_, fd, EPOLLIN,
+        [](sd_event_source*, int, std::uint32_t events, void* self) {
+          static_cast<Source*>(self)->handler_(events);
+          return 0;
+        },
+        this);
+  }
+  int watch_signal(sd_event* event, int signal) {
+    return sd_event_add_signal(
+        event, &source_, signal,
+        [](sd_event_source*, const signalfd_siginfo*, void* self) {
+          static_cast<Source*>(self)->handler_(0);
+          return 0;
+        },
+        this);
+  }
+  void await(std::uint32_t events) {
+    static_cast<void>(sd_event_source_set_io_events(source_, events));
+  }
+
+ private:
+  Handler handler_;
+  sd_event_source* source_ = nullptr;
+};
+
 EventLoop::~EventLoop() {
-  if (epoll_ >= 0) ::close(epoll_);
-  if (signals_ >= 0) ::close(signals_);
+  sources_.clear();
+  for (Port& port : ports_) port.source.reset();
+  sd_event_unref(event_);
 }
 
-Result<void> EventLoop::watch(int fd, Source source) {
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.u64 = sources_.size();
-  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) {
-    return fail(std::string("epoll: ") + std::strerror(errno));
-  }
-  sources_.push_back(std::move(source));
+Result<std::unique_ptr<EventLoop::Source>> EventLoop::watch(int fd, Handler handler) {
+  auto source = std::make_unique<Source>(std::move(handler));
+  if (const int error = source->watch(event_, fd); error < 0) return fail(loop_text(error));
+  return source;
+}
+
+Result<void> EventLoop::keep_watching(int fd, Handler handler) {
+  auto source = watch(fd, std::move(handler));
+  if (!source) return fail(source.error());
+  sources_.push_back(std::move(*source));
   return {};
 }
 
-Result<void> EventLoop::watch_port(int fd, std::size_t bus) {
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.u64 = bus;
-  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) {
-    return fail(std::string("epoll: ") + std::strerror(errno));
+Result<void> EventLoop::set_up_signals() {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+    sources_.push_back(std::make_unique<Source>(
+        [this, signal](std::uint32_t) { handle_signal(now_us(), signal); }));
+    if (const int error = sources_.back()->watch_signal(event_, signal); error < 0) {
+      return fail(loop_text(error));
+    }
   }
   return {};
 }
 
 Result<void> EventLoop::set_up() {
-  epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
-  if (epoll_ < 0) return fail(std::string("epoll: ") + std::strerror(errno));
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGTERM);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGHUP);
-  signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-  if (signals_ < 0) return fail(std::string("signalfd: ") + std::strerror(errno));
+  if (const int error = sd_event_new(&event_); error < 0) return fail(loop_text(error));
+  if (const int error = sd_event_set_watchdog(event_, 1); error < 0) return fail(loop_text(error));
+  if (const auto watched = set_up_signals(); !watched) return watched;
   if (const auto started = worker_.start(); !started) return started;
-  for (std::size_t bus = 0; bus < ports_.size(); ++bus) {
-    sources_.emplace_back(
-        [this, bus](std::uint32_t events) { handle_port(now_us(), bus, events); });
-  }
-  const Source lcm = [this](std::uint32_t) { lcm_front_.handle(); };
-  if (const auto watched = watch(fronts_.lcm.fd(), lcm); !watched) return watched;
+  const Handler lcm = [this](std::uint32_t) { lcm_front_.handle(); };
+  if (const auto watched = keep_watching(fronts_.lcm.fd(), lcm); !watched) return watched;
   if (fronts_.stops != nullptr) {
-    if (const auto watched = watch(fronts_.stops->fd(), lcm); !watched) return watched;
+    if (const auto watched = keep_watching(fronts_.stops->fd(), lcm); !watched) return watched;
   }
   if (fronts_.control != nullptr) {
     const auto watched =
-        watch(fronts_.control->fd(), [this](std::uint32_t) { socket_front_->handle(); });
+        keep_watching(fronts_.control->fd(), [this](std::uint32_t) { socket_front_->handle(); });
     if (!watched) return watched;
   }
-  if (const auto watched = watch(signals_, [this](std::uint32_t) { handle_signal(now_us()); });
-      !watched) {
-    return watched;
-  }
-  if (const auto watched = watch(worker_.fd(), [this](std::uint32_t) { worker_.handle(); });
-      !watched) {
-    return watched;
-  }
+  const auto watched = keep_watching(worker_.fd(), [this](std::uint32_t) { worker_.handle(); });
+  if (!watched) return watched;
   return lcm_front_.subscribe();
 }
 
@@ -183,10 +208,11 @@ Result<void> EventLoop::run() {
   if (const auto restored = restore_tables(); !restored) return restored;
   if (const auto ready = set_up(); !ready) return ready;
   started_us_ = now_us();
+  static_cast<void>(sd_notify(0, "READY=1"));
   while (true) {
     const std::int64_t now = now_us();
-    for (std::size_t bus = 0; bus < lost_.size(); ++bus) {
-      if (lost_[bus]) lose_port(now, bus, *std::exchange(lost_[bus], std::nullopt));
+    for (const BusId bus : ports_.ids()) {
+      if (ports_[bus].lost) lose_port(now, bus, *std::exchange(ports_[bus].lost, std::nullopt));
     }
     open_due_ports(now);
     carry_out_some();
@@ -195,16 +221,9 @@ Result<void> EventLoop::run() {
     core_.step(now);
     check_published();
     if (shut_down_by_us_ && (core_.at_rest() || now >= *shut_down_by_us_)) break;
-    std::array<epoll_event, 64> events;
     const std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
-    const timespec wait = {.tv_sec = wait_us / 1'000'000, .tv_nsec = wait_us % 1'000'000 * 1000};
-    const int n =
-        ::epoll_pwait2(epoll_, events.data(), static_cast<int>(events.size()), &wait, nullptr);
-    if (n < 0 && errno != EINTR) return fail(std::string("epoll: ") + std::strerror(errno));
-    for (int i = 0; i < n; ++i) {
-      const epoll_event& event = events[static_cast<std::size_t>(i)];
-      sources_[event.data.u64](event.events);
-    }
+    const int error = sd_event_run(event_, static_cast<std::uint64_t>(wait_us));
+    if (error < 0 && error != -EINTR) return fail(loop_text(error));
   }
   log_cpu_share();
   if (core_.at_rest()) return {};
@@ -215,80 +234,85 @@ std::int64_t EventLoop::next_wake_us() const {
   if (!reception_.idle()) return 0;
   std::int64_t wake = core_.next_wake_us();
   for (const Port& port : ports_) {
+    if (port.lost) return 0;
     if (!port.serial) wake = std::min(wake, port.open_due_us);
   }
   if (shut_down_by_us_) wake = std::min(wake, *shut_down_by_us_);
-  if (std::any_of(lost_.begin(), lost_.end(), [](const auto& lost) { return lost.has_value(); }))
-    wake = 0;
   return wake;
 }
 
 void EventLoop::open_due_ports(std::int64_t now) {
-  for (std::size_t bus = 0; bus < ports_.size(); ++bus) {
+  for (const BusId bus : ports_.ids()) {
     if (!ports_[bus].serial && ports_[bus].open_due_us <= now) open_port(now, bus);
   }
 }
 
-void EventLoop::open_port(std::int64_t now, std::size_t bus) {
+void EventLoop::open_port(std::int64_t now, BusId bus) {
   Port& port = ports_[bus];
-  const config::Bus& config = config_.buses[bus];
+  const config::Bus& config = config_[bus];
   port.open_due_us = now + kReopenUs;
   auto opened = open_first(config);
-  Result<void> watched;
-  if (opened) watched = watch_port(opened->fd(), bus);
+  Result<std::unique_ptr<Source>> watched;
+  if (opened) {
+    watched = watch(opened->fd(),
+                    [this, bus](std::uint32_t events) { handle_port(now_us(), bus, events); });
+  }
   if (!opened || !watched) {
     const std::string error = opened ? watched.error().text() : opened.error().text();
     if (error != port.last_error) {
       spdlog::error("bus {}: {}; trying again twice a second", config.name, error);
       port.last_error = error;
-      core_.port_lost(now, {bus}, "is out of reach: port " + error);
+      core_.port_lost(now, bus, "is out of reach: port " + error);
     }
     return;
   }
   port.serial = std::move(*opened);
+  port.source = std::move(*watched);
   port.last_error.clear();
   spdlog::info("bus {}: port {} opened at {} baud", config.name, port.serial->path(), config.baud);
-  core_.port_opened(now, {bus});
+  core_.port_opened(now, bus);
 }
 
-void EventLoop::lose_port(std::int64_t now, std::size_t bus, const std::string& cause) {
+void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause) {
   Port& port = ports_[bus];
   if (!port.serial) return;
-  const config::Bus& config = config_.buses[bus];
+  const config::Bus& config = config_[bus];
   const std::string path = port.serial->path();
-  port.serial.reset();  // closing takes it out of the epoll set
+  port.source.reset();
+  port.serial.reset();
   port.open_due_us = now + kReopenUs;
   port.last_error = path + ": " + cause;
   spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, path, cause);
-  core_.port_lost(now, {bus}, "is out of reach: port " + port.last_error);
+  core_.port_lost(now, bus, "is out of reach: port " + port.last_error);
 }
 
-void EventLoop::handle_port(std::int64_t now, std::size_t bus, std::uint32_t events) {
+// What is lost is given up in the loop: its source cannot go while it is being handled.
+void EventLoop::handle_port(std::int64_t now, BusId bus, std::uint32_t events) {
   if (!ports_[bus].serial) return;
   serial::SerialPort& serial = *ports_[bus].serial;
   if (events & EPOLLIN) {
     std::vector<std::uint8_t> bytes;
     const auto read = serial.read(bytes);
-    if (!bytes.empty()) core_.receive(now, {bus}, bytes);
-    if (!read) return lose_port(now, bus, read.error().text());
+    if (!bytes.empty()) core_.receive(now, bus, bytes);
+    if (!read) ports_[bus].lost = read.error().text();
   } else if (events & (EPOLLHUP | EPOLLERR)) {
-    return lose_port(now, bus, "hung up");
+    ports_[bus].lost = "hung up";
   }
   if (events & EPOLLOUT) {
     const auto flushed = serial.flush();
-    if (!flushed) return lose_port(now, bus, flushed.error().text());
+    if (!flushed) ports_[bus].lost = flushed.error().text();
     update_write_interest(bus);
   }
 }
 
-void EventLoop::handle_signal(std::int64_t now) {
-  signalfd_siginfo info{};
-  if (::read(signals_, &info, sizeof info) != sizeof info || shut_down_by_us_) return;
-  if (info.ssi_signo == SIGHUP) {
+void EventLoop::handle_signal(std::int64_t now, int signal) {
+  if (shut_down_by_us_) return;
+  if (signal == SIGHUP) {
     spdlog::info("SIGHUP: all tables are read again");
     return core_.tables().request({}, api::ReloadTables{});
   }
-  spdlog::info("{}: ramping all motors down", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
+  spdlog::info("{}: ramping all motors down", signal == SIGTERM ? "SIGTERM" : "SIGINT");
+  static_cast<void>(sd_notify(0, "STOPPING=1"));
   core_.shut_down(now);
   shut_down_by_us_ = core_.rest_by_us(now) + kShutDownSlackUs;
 }
@@ -339,12 +363,9 @@ void EventLoop::serve_tables(const api::Asker& asker, const api::Request& reques
   });
 }
 
-void EventLoop::update_write_interest(std::size_t bus) {
-  const serial::SerialPort& serial = *ports_[bus].serial;
-  epoll_event event{};
-  event.events = EPOLLIN | (serial.wants_to_write() ? static_cast<std::uint32_t>(EPOLLOUT) : 0u);
-  event.data.u64 = bus;
-  static_cast<void>(::epoll_ctl(epoll_, EPOLL_CTL_MOD, serial.fd(), &event));
+void EventLoop::update_write_interest(BusId bus) {
+  const bool writes = ports_[bus].serial->wants_to_write();
+  ports_[bus].source->await(EPOLLIN | (writes ? static_cast<std::uint32_t>(EPOLLOUT) : 0u));
 }
 
 void EventLoop::log_cpu_share() const {
@@ -354,12 +375,11 @@ void EventLoop::log_cpu_share() const {
                100.0 * cpu_s / elapsed_s);
 }
 
-void EventLoop::send(BusId id, std::span<const std::uint8_t> bytes) {
-  const std::size_t bus = id.value;
+void EventLoop::send(BusId bus, std::span<const std::uint8_t> bytes) {
   if (!ports_[bus].serial) return;
   const bool waited = ports_[bus].serial->wants_to_write();
   if (const auto written = ports_[bus].serial->write(bytes); !written) {
-    lost_[bus] = written.error().text();
+    ports_[bus].lost = written.error().text();
   } else if (waited != ports_[bus].serial->wants_to_write()) {
     update_write_interest(bus);
   }

@@ -1,9 +1,9 @@
-// The loop around the core: serial ports, front ends, signals and the clock, one thread, one epoll.
+// The loop around the core: serial ports, front ends, signals and the clock, in one thread. Run by
+// systemd it tells when it is ready, and feeds the watchdog that the unit may ask for.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -11,6 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "base/by_id.h"
 #include "config/config.h"
 #include "control/server.h"
 #include "daemon/core.h"
@@ -23,6 +24,8 @@
 #include "daemon/worker.h"
 #include "lcm/transport.h"
 #include "serial/serial_port.h"
+
+struct sd_event;
 
 namespace bushd::daemon {
 
@@ -48,27 +51,32 @@ class EventLoop : private Outputs {
   // from ending.
   static constexpr std::int64_t kShutDownSlackUs = 3'000'000;
 
+  // What is done when there is something; lives as long as it is watched.
+  class Source;
+  using Handler = std::function<void(std::uint32_t events)>;
+
   struct Port {
     std::optional<serial::SerialPort> serial;
+    std::unique_ptr<Source> source;  // of its descriptor
     std::int64_t open_due_us = 0;
     std::string last_error;  // so that a missing port is logged once, not twice a second
+    // Why it is to be given up, as soon as neither the core nor its source is at work.
+    std::optional<std::string> lost;
   };
 
-  // What is watched, and what is done when there is something.
-  using Source = std::function<void(std::uint32_t events)>;
-
   Result<void> set_up();
-  Result<void> watch(int fd, Source source);
-  Result<void> watch_port(int fd, std::size_t bus);
+  Result<void> set_up_signals();
+  Result<std::unique_ptr<Source>> watch(int fd, Handler handler);
+  Result<void> keep_watching(int fd, Handler handler);
   void open_due_ports(std::int64_t now_us);
-  void open_port(std::int64_t now_us, std::size_t bus);
-  void lose_port(std::int64_t now_us, std::size_t bus, const std::string& cause);
-  void handle_port(std::int64_t now_us, std::size_t bus, std::uint32_t events);
-  void handle_signal(std::int64_t now_us);
+  void open_port(std::int64_t now_us, BusId bus);
+  void lose_port(std::int64_t now_us, BusId bus, const std::string& cause);
+  void handle_port(std::int64_t now_us, BusId bus, std::uint32_t events);
+  void handle_signal(std::int64_t now_us, int signal);
   Result<void> restore_tables();
   // Some of the requests that wait, for as long as nothing else has to wait for that.
   void carry_out_some();
-  void update_write_interest(std::size_t bus);
+  void update_write_interest(BusId bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
   void check_published();
@@ -95,14 +103,11 @@ class EventLoop : private Outputs {
   Reception reception_;
   LcmFront lcm_front_;
   std::unique_ptr<SocketFront> socket_front_;  // null: no control socket
-  std::vector<Port> ports_;
-  std::vector<std::optional<std::string>>
-      lost_;  // by bus: a write failed, to be handled outside the core
+  ById<BusId, Port> ports_;
   std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
   bool mute_ = false;                                // LCM takes nothing
-  int epoll_ = -1;
-  int signals_ = -1;
-  std::deque<Source> sources_;  // epoll's tags count them; the first ones are those of the buses
+  sd_event* event_ = nullptr;
+  std::vector<std::unique_ptr<Source>> sources_;  // those of ports aside
   std::int64_t started_us_ = 0;
   std::optional<std::int64_t> shut_down_by_us_;
   Worker worker_;  // the last member: its thread uses others

@@ -75,7 +75,8 @@ class Port(EndToEndTest):
         self.wait_until("the port to be lost", lambda: lost in self.bushd.said())
         results = {event["motor"]: event["result"] for event in self.moves() if event["event"] == "result"}
         self.assertEqual(results, dict.fromkeys(OUTWARD, "link"))
-        self.assertEqual(self.mcu_states(), ["OFFLINE", "OFFLINE"])
+        # The log tells it before clients are told.
+        self.wait_until("clients to be told", lambda: self.mcu_states() == ["OFFLINE", "OFFLINE"])
 
         self.bushsim.send(signal.SIGUSR2)
         self.wait_until_ready()
