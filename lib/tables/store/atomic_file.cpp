@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <string>
+#include <system_error>
+#include <utility>
 
 namespace bushd::tables::store {
 namespace {
@@ -39,7 +41,57 @@ bool sync_directory(const std::filesystem::path& directory) {
   return synced;
 }
 
+constexpr int kMaxKept = 1000;
+
+std::filesystem::path aside_path(const std::filesystem::path& directory, const std::string& name,
+                                 int number) {
+  const std::string count = number == 1 ? "" : "-" + std::to_string(number);
+  return directory / ("." + name + ".edited" + count + ".toml");
+}
+
+Result<std::filesystem::path> keep_in(const std::filesystem::path& directory,
+                                      const std::string& name, std::string_view text) {
+  for (int number = 1; number <= kMaxKept; ++number) {
+    std::filesystem::path path = aside_path(directory, name, number);
+    // The empty file reserves the name: of two editors, each has its own.
+    const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kNewFileMode);
+    if (fd < 0 && errno == EEXIST) continue;
+    if (fd < 0) return failed(path, "cannot be written");
+    close(fd);
+    if (auto written = replace_file(path, text); !written) {
+      unlink(path.c_str());
+      return fail(written.error());
+    }
+    return path;
+  }
+  return fail(
+      Error{.message = "so many texts are kept beside it already; remove what is not needed",
+            .file = aside_path(directory, name, 1).string()});
+}
+
 }  // namespace
+
+Result<std::filesystem::path> keep_aside(const std::filesystem::path& directory,
+                                         const std::string& name, std::string_view text) {
+  auto kept = keep_in(directory, name, text);
+  if (kept) return kept;
+  std::error_code error;
+  const auto elsewhere = std::filesystem::temp_directory_path(error);
+  if (error) return kept;
+  auto kept_elsewhere = keep_in(elsewhere, name, text);
+  return kept_elsewhere ? kept_elsewhere : kept;
+}
+
+std::vector<std::filesystem::path> kept_aside(const std::filesystem::path& directory,
+                                              const std::string& name) {
+  std::vector<std::filesystem::path> kept;
+  std::error_code error;
+  for (int number = 1; number <= kMaxKept; ++number) {
+    std::filesystem::path path = aside_path(directory, name, number);
+    if (std::filesystem::exists(path, error)) kept.push_back(std::move(path));
+  }
+  return kept;
+}
 
 Result<void> replace_file(const std::filesystem::path& path, std::string_view text) {
   const std::filesystem::path directory = path.has_parent_path() ? path.parent_path() : ".";

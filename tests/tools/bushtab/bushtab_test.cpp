@@ -321,6 +321,29 @@ TEST_F(BushtabEdit, EditorsTextIsCheckedOnReturn) {
   EXPECT_THAT(bushtab("edit t" + places_, "EDITOR=false").err, HasSubstr("nothing was changed"));
 }
 
+TEST_F(BushtabEdit, TextThatWasKeptIsToldAndNotWrittenOver) {
+  const std::string kept = directory_.path() / ".t.edited.toml";
+  directory_.write(".t.edited.toml", "my evening's work\n");
+  const Outcome good = bushtab("edit t" + places_, "EDITOR='sed -i s/90/80/'");
+  EXPECT_THAT(good.out, HasSubstr("revision 2"));
+  EXPECT_THAT(good.err, HasSubstr("never saved is in " + kept));
+  const Outcome bad = bushtab("edit t" + places_, "EDITOR='sed -i s/80/8x/'");
+  EXPECT_THAT(bad.err,
+              HasSubstr("your text is in " + (directory_.path() / ".t.edited-2.toml").string()));
+  EXPECT_EQ(read_file(kept), "my evening's work\n");
+}
+
+TEST_F(BushtabEdit, TextOfAnEditorThatFailsAfterWritingIsKept) {
+  const std::string before = text();
+  const Outcome outcome =
+      bushtab("edit t" + places_, "EDITOR='f() { sed -i s/90/80/ \"$1\"; false; }; f'");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("your text is in "));
+  EXPECT_THAT(outcome.err, HasSubstr("failed; nothing was changed"));
+  EXPECT_THAT(read_file(directory_.path() / ".t.edited.toml"), HasSubstr("80"));
+  EXPECT_EQ(text(), before);
+}
+
 TEST_F(BushtabEdit, CopyHasANameAndAHistoryOfItsOwn) {
   EXPECT_EQ(run("copy t other").exit_code, 0);
   EXPECT_THAT(read_file(directory_.path() / "other.toml"),
