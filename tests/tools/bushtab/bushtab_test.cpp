@@ -321,6 +321,24 @@ TEST_F(BushtabEdit, EditorsTextIsCheckedOnReturn) {
   EXPECT_THAT(bushtab("edit t" + places_, "EDITOR=false").err, HasSubstr("nothing was changed"));
 }
 
+TEST_F(BushtabEdit, ScaleAndResampleSayWhatRoundingMadeOfIt) {
+  const Outcome coarse = run("resample t --time-unit 40us");
+  EXPECT_EQ(coarse.exit_code, 0);
+  EXPECT_EQ(
+      coarse.err,
+      "delays are rounded up to whole time units: speeds are up to 37.5 % lower than asked\n");
+  EXPECT_THAT(text(), HasSubstr("accel = [3, 2, 2] # fast\n"));
+  EXPECT_THAT(run("scale t --speed 1.5").err, HasSubstr("33.3 % lower"));
+  const std::string before = text();
+  for (const char* command : {"scale t --speed 1e9", "resample t --time-unit 1s"}) {
+    const Outcome refused = run(command);
+    EXPECT_EQ(refused.exit_code, 1) << command;
+    EXPECT_THAT(refused.err, HasSubstr("time units; allowed: 1 or more"));
+  }
+  EXPECT_EQ(text(), before);
+  EXPECT_THAT(run("scale t --speed 0.5").err, IsEmpty());
+}
+
 TEST_F(BushtabEdit, TextThatWasKeptIsToldAndNotWrittenOver) {
   const std::string kept = directory_.path() / ".t.edited.toml";
   directory_.write(".t.edited.toml", "my evening's work\n");
