@@ -11,8 +11,12 @@
 namespace bushd::tables::store {
 
 // Writes to a temporary file in the same directory, syncs it, renames it and syncs the directory.
-// Keeps the permissions of the file that is replaced. Directories are not made.
+// Keeps the permissions of the file that is replaced, and its owner where that is allowed. Of a
+// link the file that it leads to is replaced; a link to nothing is refused. Directories are not
+// made.
 Result<void> replace_file(const std::filesystem::path& path, std::string_view text);
+// Removes the temporary files that crashes have left. Precondition: nobody else replaces that file.
+void remove_leftovers(const std::filesystem::path& path);
 
 // Keeps a text that is not saved yet in DIRECTORY/.NAME.edited.toml, or, if something is kept
 // there, in .NAME.edited-2.toml and so on: what was kept before is never written over. Where the
