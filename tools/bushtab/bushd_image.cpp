@@ -194,7 +194,7 @@ int import_bushd(const Places& places, const BushdImport& wanted) {
   const std::string text = tables::to_text(*content);
   const auto old = home->store.read(home->name);
   const auto revision = old && wanted.replace ? home->store.save(home->name, old->text, text, note)
-                                              : home->store.create(home->name, text, note);
+                                              : create_in(*home, text, note);
   if (!revision) return refuse(revision.error());
   const std::string path = home->store.path_of(home->name).string();
   if (wanted.json) {

@@ -78,7 +78,7 @@ int change(const Places& places, const std::string& table, bool json, const std:
            const Change& change) {
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
-  const auto old = home->store.read(home->name);
+  const auto old = read_home(*home);
   if (!old) return refuse(old.error());
   const auto content = change(old->content);
   if (!content) return refuse(content.error());
@@ -98,7 +98,7 @@ void tell_kept(const fs::path& table, const std::string& name) {
 int edit(const Places& places, const std::string& table, bool json) {
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
-  const auto old = home->store.read(home->name);
+  const auto old = read_home(*home);
   if (!old) return refuse(old.error());
   const fs::path path = home->store.path_of(home->name);
   tell_kept(path, home->name);
@@ -138,7 +138,7 @@ int copy(const Places& places, const std::string& from, const std::string& to, b
   content->name = home->name;
   const auto renamed = tables::rewrite(*text, *content, (*source)->path());
   if (!renamed) return refuse(renamed.error());
-  return saved(*home, home->store.create(home->name, *renamed, "copy of " + from), json);
+  return saved(*home, create_in(*home, *renamed, "copy of " + from), json);
 }
 
 int log(const Places& places, const std::string& table, bool json) {
@@ -177,7 +177,7 @@ int revert(const Places& places, const std::string& table, const std::string& re
   if (!then) return refuse(then.error());
   const std::string note = fmt::format("revert to {}", then->content.revision);
   // The file may be gone, or be no table any more; what else stands there is not written over.
-  if (!now) return saved(*home, home->store.create(home->name, then->text, note), json);
+  if (!now) return saved(*home, create_in(*home, then->text, note), json);
   return saved(*home, home->store.save(home->name, now->text, then->text, note), json);
 }
 
@@ -186,7 +186,10 @@ int tag(const Places& places, const std::string& table, const std::string& tag,
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
   const auto number = home->store.tag(home->name, tag, revision);
-  if (!number) return refuse(number.error());
+  if (!number) {
+    const auto now = read_home(*home);
+    return refuse(now ? number.error() : now.error());
+  }
   if (json) {
     const nlohmann::ordered_json said = {{"name", home->name}, {"revision", *number}, {"tag", tag}};
     print_json(said);

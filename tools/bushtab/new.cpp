@@ -52,7 +52,7 @@ int make_new(const Places& places, const New& wanted) {
   if (old && wanted.replace) {
     revision = home->store.save(home->name, old->text, text, note);
   } else {
-    revision = home->store.create(home->name, text, note);
+    revision = create_in(*home, text, note);
   }
   return saved(*home, revision, wanted.json);
 }

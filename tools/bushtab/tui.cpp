@@ -39,8 +39,7 @@ class Original {
     other.name_ = other.home_.name;
     const auto text = other.text_with(content);
     if (!text) return bushd::fail(text.error());
-    auto created = other.taken(
-        other.home_.store.create(other.home_.name, *text, "tui, copy of " + home_.name));
+    auto created = other.taken(create_in(other.home_, *text, "tui, copy of " + home_.name));
     if (created) *this = std::move(other);
     return created;
   }
@@ -146,7 +145,7 @@ int tui(const Places& places, const Tui& wanted) {
   if (!limits) return refuse(limits.error());
   auto home = home_of(places, wanted.table);
   if (!home) return refuse(home.error());
-  auto stored = home->store.read(home->name);
+  auto stored = read_home(*home);
   if (!stored) return refuse(stored.error());
   TableEditor editor(stored->content, stored->content.revision,
                      {.limits = std::move(*limits), .steps = wanted.steps});

@@ -441,6 +441,33 @@ TEST(BushtabNew, NamesLiveInTheDirectoryOfTables) {
   EXPECT_THAT(bushtab("show mine@2" + places).err, HasSubstr("has no revision 2"));
 }
 
+TEST(BushtabNew, DirectoryThatIsNotThereIsMadeAndSaid) {
+  const TempDirectory directory;
+  const std::string tables = directory.path() / "a/b";
+  const Outcome refused =
+      bushtab("new mine --law constant --start 1kHz --max 100Hz --time 1s --dir " + tables);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_FALSE(std::filesystem::exists(tables));
+  const Outcome made = bushtab("new mine" + std::string(kLaw) + " --json --dir " + tables);
+  EXPECT_EQ(made.exit_code, 0);
+  EXPECT_THAT(made.out, StartsWith("{"));
+  EXPECT_EQ(made.err, "made the directory " + tables + "\n");
+  const std::string others = directory.path() / "c";
+  EXPECT_EQ(bushtab("copy bushd2-constant mine --dir " + others).exit_code, 0);
+  EXPECT_EQ(bushtab("copy bushd2-scurve other --dir " + others).err, "");
+}
+
+TEST_F(BushtabEdit, ShippedTableIsToBeCopiedFirst) {
+  for (const char* command : {"set bushd2-constant 0 200", "scale bushd2-constant --speed 0.5",
+                              "edit bushd2-constant", "tag bushd2-constant good"}) {
+    const Outcome outcome = run(command);
+    EXPECT_EQ(outcome.exit_code, 1) << command;
+    EXPECT_THAT(outcome.err, HasSubstr("is a shipped table, which stays as it is; copy it first: "
+                                       "\"bushtab copy bushd2-constant NEW\""));
+  }
+  EXPECT_THAT(run("set nosuch 0 200").err, Not(HasSubstr("shipped")));
+}
+
 TEST(BushtabNew, PrintLeavesNothingBehind) {
   const TempDirectory directory;
   const std::string places = " --dir " + directory.path().string();
