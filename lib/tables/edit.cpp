@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "tables/rounding.h"
+
 namespace bushd::tables {
 namespace {
 
@@ -50,7 +52,7 @@ Result<Codes*> editable(TableContent& content, SideKey side, std::size_t index, 
 }
 
 Result<std::uint16_t> rounded_up(double units) {
-  const double code = std::ceil(units - kNoise);
+  const double code = rounded_up_units(units);
   if (code < 1 || units < 1 - kNoise) {
     return fail(
         fmt::format("a delay becomes {:.3g} time units; allowed: 1 or more, as nothing shorter can "

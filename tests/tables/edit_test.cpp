@@ -184,6 +184,13 @@ TEST(TableEdit, ResampledUpwardsHasNoStairsEither) {
   }));
 }
 
+TEST(TableEdit, SpeedsAreNotFasterThanAskedByTheLeastShare) {
+  const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {2107}};
+  EXPECT_THAT(scale_speed(content, 1 - 2e-10)->accel, ElementsAre(2108));
+  EXPECT_THAT(scale_speed(content, 1)->accel, ElementsAre(2107));
+  EXPECT_THAT(scale_speed(content, 0.7)->accel, ElementsAre(3010));
+}
+
 TEST(TableEdit, DelaysShorterThanAUnitAreRefused) {
   EXPECT_THAT(scale_speed(kMirrored, 1e9).error().text(), HasSubstr("a delay becomes 9e-07"));
   EXPECT_THAT(scale_speed(kMirrored, 501).error().text(), HasSubstr("Use a shorter time unit"));
