@@ -33,6 +33,27 @@ def options_in(section):
     return {option for head in heads for option in re.findall(r"--[a-z][a-z0-9-]*", head)}
 
 
+TYPE = re.compile(r"(?:(?!Needs|Excludes)\S+(?: in \[-?\d+ - \d+\])?(?: \.\.\.)?(?: REQUIRED)?)?(?: ?(?:Needs|Excludes): \S+)?")
+
+
+def entries_in_help(*command):
+    """Each option with its type and description."""
+    text = bushtab_help(*command).split("Options:\n", 1)[1]
+    entries = re.findall(r"^ +(--[a-z][a-z0-9-]*)\b(.*(?:\n {20,}.*)?)", text, re.MULTILINE)
+    return {name: " ".join(rest.split()) for name, rest in entries}
+
+
+def descriptions_in(section):
+    entries = [entry.split("\n", 1) for entry in section.split(".TP\n")[1:]]
+    found = {}
+    for head, body in entries:
+        if names := re.findall(r"--[a-z][a-z0-9-]*", head):
+            body = re.split(r"^\.(?:PP|SS|TS)", body, maxsplit=1, flags=re.MULTILINE)[0]
+            body = re.sub(r"^\.[A-Z]+ ?", "", re.sub(r"\\f.", "", body).replace(r"\(aq", "'"), flags=re.MULTILINE)
+            found[names[0]] = " ".join(body.split())
+    return found
+
+
 class ManPage(unittest.TestCase):
     def setUp(self):
         text = PAGE.read_text().replace(r"\-", "-")
@@ -49,6 +70,14 @@ class ManPage(unittest.TestCase):
         for name, section in self.commands.items():
             with self.subTest(name):
                 self.assertEqual(options_in(section), options_in_help(name))
+
+    def test_descriptions_defaults_and_units_are_the_same(self):
+        for name, section in self.commands.items():
+            described = descriptions_in(section)
+            for option, entry in entries_in_help(name).items():
+                with self.subTest(f"{name} {option}"):
+                    self.assertTrue(entry.endswith(described[option]), f"{entry}\n{described[option]}")
+                    self.assertRegex(entry.removesuffix(described[option]).strip(), rf"\A{TYPE.pattern}\Z")
 
     def test_examples_work_in_an_empty_folder(self):
         self.assertGreaterEqual(len(self.examples), 3)
