@@ -42,6 +42,7 @@ bool run_editor(const std::string& editor, const fs::path& file) {
   if (child == 0) {
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGQUIT, on_quit);
+    std::signal(SIGPIPE, SIG_DFL);
     const std::string command = editor + " \"$1\"";
     execl("/bin/sh", "sh", "-c", command.c_str(), "sh", file.c_str(), nullptr);
     _exit(127);

@@ -3,6 +3,7 @@
 #include <exception>
 #include <functional>
 
+#include "base/standard_output.h"
 #include "options.h"
 
 namespace {
@@ -40,10 +41,12 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  bushd::expect_closed_output();
   try {
-    return run(argc, argv);
+    return bushd::finished_output(run(argc, argv));
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "bushtab: %s\n", error.what());
-    return bushtab::kRefused;
+    // An output that is closed throws as well; that is told, or not, below.
+    if (std::ferror(stdout) == 0) std::fprintf(stderr, "bushtab: %s\n", error.what());
+    return bushd::finished_output(bushtab::kRefused);
   }
 }
