@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 int unchanged(const Home& home, bool json) {
   const std::string path = home.store.path_of(home.name).string();
   if (json) return show(Places{}, path, false, true);
-  fmt::print("{}: nothing to change\n", path);
+  fmt::print("{}: nothing to change\n", bushd::printable(path));
   return kDone;
 }
 
@@ -61,7 +61,8 @@ bushd::Error editor_failure(const std::string& editor) {
 }
 
 int kept_there(const fs::path& table, const fs::path& aside, const bushd::Error& why) {
-  fmt::print(stderr, "{} stays as it was; your text is in {}\n", table.string(), aside.string());
+  fmt::print(stderr, "{} stays as it was; your text is in {}\n", bushd::printable(table.string()),
+             bushd::printable(aside.string()));
   return refuse(why);
 }
 
@@ -92,7 +93,7 @@ int change(const Places& places, const std::string& table, bool json, const std:
 void tell_kept(const fs::path& table, const std::string& name) {
   for (const fs::path& kept : tables::store::kept_aside(table.parent_path(), name)) {
     fmt::print(stderr, "{}: a text of this table that was never saved is in {}; it stays there\n",
-               table.string(), kept.string());
+               bushd::printable(table.string()), bushd::printable(kept.string()));
   }
 }
 
@@ -159,7 +160,7 @@ int log(const Places& places, const std::string& table, bool json) {
                    {"tags", revision.tags}});
     if (json) continue;
     std::string tags;
-    for (const std::string& tag : revision.tags) tags += "  [" + tag + "]";
+    for (const std::string& tag : revision.tags) tags += "  [" + bushd::printable(tag) + "]";
     fmt::print("{:>5}  {}  {}  {}{}\n", revision.number, revision.time,
                revision.content_hash.substr(0, tables::kShortHashLength),
                bushd::printable(revision.note), tags);
@@ -195,7 +196,8 @@ int tag(const Places& places, const std::string& table, const std::string& tag,
     const nlohmann::ordered_json said = {{"name", home->name}, {"revision", *number}, {"tag", tag}};
     print_json(said);
   } else {
-    fmt::print("{}: revision {} is {}\n", home->name, *number, tag);
+    fmt::print("{}: revision {} is {}\n", bushd::printable(home->name), *number,
+               bushd::printable(tag));
   }
   return kDone;
 }

@@ -2,7 +2,9 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <sstream>
 
+#include "base/printable.h"
 #include "base/standard_output.h"
 #include "options.h"
 
@@ -33,7 +35,12 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? bushtab::kDone : kUsage;
+    std::ostringstream help;
+    std::ostringstream fault;
+    const bool asked = app.exit(error, help, fault) == 0;
+    std::fputs(help.str().c_str(), stdout);
+    std::fputs(bushd::printable_lines(fault.str()).c_str(), stderr);
+    return asked ? bushtab::kDone : kUsage;
   }
   return chosen();
 }
@@ -46,7 +53,8 @@ int main(int argc, char** argv) {
     return bushd::finished_output(run(argc, argv));
   } catch (const std::exception& error) {
     // An output that is closed throws as well; that is told, or not, below.
-    if (std::ferror(stdout) == 0) std::fprintf(stderr, "bushtab: %s\n", error.what());
+    if (std::ferror(stdout) == 0)
+      std::fprintf(stderr, "bushtab: %s\n", bushd::printable(error.what()).c_str());
     return bushd::finished_output(bushtab::kRefused);
   }
 }

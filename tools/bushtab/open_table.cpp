@@ -7,6 +7,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "tables/store/open.h"
 #include "tables/table_file.h"
@@ -84,7 +85,7 @@ Result<std::uint32_t> create_in(Home& home, const std::string& text, const std::
       return bushd::fail(bushd::Error{.message = "cannot be made: " + error.message(),
                                       .file = directory.string()});
     }
-    fmt::print(stderr, "made the directory {}\n", directory.string());
+    fmt::print(stderr, "made the directory {}\n", bushd::printable(directory.string()));
   }
   return home.store.create(home.name, text, note);
 }
@@ -108,7 +109,7 @@ Result<tables::TablePtr> open_table(const Places& places, const std::string& tab
 }
 
 int refuse(const bushd::Error& error) {
-  fmt::print(stderr, "{}\n", error.text());
+  fmt::print(stderr, "{}\n", bushd::printable_lines(error.text()));
   return kRefused;
 }
 
