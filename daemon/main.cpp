@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "base/standard_output.h"
 #include "control/path.h"
 #include "daemon/event_loop.h"
 
@@ -157,7 +158,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kUsage;
+    return bushd::finished_output(app.exit(error) == 0 ? 0 : kUsage);
   }
 
   spdlog::set_default_logger(spdlog::stderr_color_mt("bushd"));
@@ -174,7 +175,7 @@ int main(int argc, char** argv) {
   }
   if (check) {
     fmt::print("{}: good: {}\n", check_path, extent(*config));
-    return 0;
+    return bushd::finished_output(0);
   }
   return run(*config, move_log_path, in_service_path);
 }

@@ -8,12 +8,16 @@
 #include <utility>
 #include <vector>
 
+#include "tables/rounding.h"
+
 namespace bushd::tables {
 namespace {
 
 using Codes = std::vector<std::uint16_t>;
 
 constexpr double kNoise = 1e-6;
+constexpr double kPathNoise = 1e-9;  // of a step; a side's path is up to 131070 steps
+constexpr int kHalvings = 60;        // of a path that a double holds
 constexpr double kMaxCode = std::numeric_limits<std::uint16_t>::max();
 
 Result<TableContent> checked(TableContent content) {
@@ -48,7 +52,13 @@ Result<Codes*> editable(TableContent& content, SideKey side, std::size_t index, 
 }
 
 Result<std::uint16_t> rounded_up(double units) {
-  const double code = std::max(1.0, std::ceil(units - kNoise));
+  const double code = rounded_up_units(units);
+  if (code < 1 || units < 1 - kNoise) {
+    return fail(
+        fmt::format("a delay becomes {:.3g} time units; allowed: 1 or more, as nothing shorter can "
+                    "be said. Use a shorter time unit (\"bushtab resample --time-unit\")",
+                    units));
+  }
   if (code <= kMaxCode) return static_cast<std::uint16_t>(code);
   return fail(
       fmt::format("a delay becomes {:.0f} time units; allowed: up to 65535. Use a longer time "
@@ -75,53 +85,119 @@ Result<TableContent> with_all_codes(TableContent content, double factor) {
   return checked(std::move(content));
 }
 
-// A side of `count` codes with the same speeds, slow to fast. Its first step is that of the old
-// one; from there on time over steps is the old function t(x), straight between steps, shrunk in
-// both directions. t(x) is concave, so the delays never rise; and no delay is shorter than the
-// last.
-Codes stretched(const Codes& codes, std::size_t count) {
-  if (codes.size() == 1 || count == 1) return Codes(count, codes.back());
-  std::vector<double> time{0.0};
-  for (std::size_t i = 1; i < codes.size(); ++i) time.push_back(time.back() + codes[i]);
-  const double ratio = static_cast<double>(codes.size() - 1) / static_cast<double>(count - 1);
-  const auto time_at = [&](std::size_t k) {
-    const double x = std::min(static_cast<double>(k) * ratio, static_cast<double>(time.size() - 1));
-    const auto whole = std::min(static_cast<std::size_t>(x), time.size() - 2);
-    return (time[whole] + (x - static_cast<double>(whole)) * (time[whole + 1] - time[whole])) /
-           ratio;
+// A side as a curve: the square of the speed over the path, straight between the nodes of its
+// codes, so of constant acceleration there. Speeds in steps a time unit; slow to fast.
+struct Curve {
+  std::vector<double> path;
+  std::vector<double> square;
+
+  // Precondition: `segment` is that of the path or one before it; it goes along.
+  double square_at(double at, std::size_t& segment) const {
+    while (segment + 2 < path.size() && path[segment + 1] < at) ++segment;
+    const double share = (at - path[segment]) / (path[segment + 1] - path[segment]);
+    return square[segment] + std::clamp(share, 0.0, 1.0) * (square[segment + 1] - square[segment]);
+  }
+};
+
+// The path between the middles, in time, of two neighbouring steps: their mean speed times half of
+// both delays. A little more than one step, as the faster one gets further in its half.
+double path_between(double speed, double next_speed) {
+  const double sum = speed + next_speed;
+  return sum * sum / (4 * speed * next_speed);
+}
+
+// A delay tells the speed in the middle of its time, and the acceleration from there to the next
+// middle is constant (as in "bushtab check" and "show --steps"): the nodes lie in these middles.
+Curve curve_of(const Codes& codes, double stretch) {
+  Curve curve{{0.0}, {1.0 / codes[0] / codes[0]}};
+  for (std::size_t i = 1; i < codes.size(); ++i) {
+    const double way = path_between(1.0 / codes[i - 1], 1.0 / codes[i]);
+    curve.path.push_back(curve.path.back() + way * stretch);
+    curve.square.push_back(1.0 / codes[i] / codes[i]);
+  }
+  return curve;
+}
+
+// The place on the curve of the step after that at `from`: where the path between the two is what
+// lies between them. Infinity: beyond the end.
+double next_place(const Curve& curve, double from, std::size_t segment) {
+  const double speed = std::sqrt(curve.square_at(from, segment));
+  const auto beyond = [&](double at) {
+    std::size_t there = segment;
+    return at - from - path_between(speed, std::sqrt(curve.square_at(at, there)));
   };
+  // No step is nearer than one step. In a segment there is one such place at most.
+  std::size_t end = segment + 1;
+  while (end < curve.path.size() && beyond(curve.path[end]) < -kPathNoise) ++end;
+  if (end == curve.path.size()) return std::numeric_limits<double>::infinity();
+  if (beyond(curve.path[end]) <= kPathNoise) return curve.path[end];
+  double low = std::max(from, curve.path[end - 1]);
+  double high = curve.path[end];
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (beyond(middle) < 0 ? low : high) = middle;
+  }
+  return high;
+}
+
+// Appends the delay of that speed, never slower than the step before: rounding must not do that.
+void append_delay(Codes& codes, double square) {
+  const double delay = std::ceil(1 / std::sqrt(square) - kNoise);
+  codes.push_back(std::min(codes.back(), static_cast<std::uint16_t>(delay)));
+}
+
+// The speeds of a side on a curve that is `stretch` times as long, slow to fast. The squares of the
+// speeds rise by 1 / stretch of what they did over the same path, so no acceleration is greater
+// than 1 / stretch of the greatest before, but for the rounding of codes.
+Result<Codes> stretched(const Codes& codes, double stretch) {
+  if (codes.size() == 1) return codes;
+  const Curve curve = curve_of(codes, stretch);
+  const auto too_many = [&] {
+    return fail(fmt::format("a side would have {:.0f} codes; allowed: 1..{}",
+                            1 + static_cast<double>(codes.size() - 1) * stretch, kMaxCodes));
+  };
+  if (curve.path.back() > 2 * static_cast<double>(kMaxCodes)) return too_many();
   Codes out{codes.front()};
-  for (std::size_t k = 1; k + 1 < count; ++k) {
-    const double delay = std::ceil(time_at(k) - time_at(k - 1) - kNoise);
-    out.push_back(std::min(out.back(), static_cast<std::uint16_t>(delay)));
+  std::size_t segment = 0;
+  for (double at = next_place(curve, 0, 0); at < curve.path.back() - kPathNoise;
+       at = next_place(curve, at, segment)) {
+    append_delay(out, curve.square_at(at, segment));
+    if (out.size() >= kMaxCodes) return too_many();
   }
   out.push_back(codes.back());
   return out;
 }
 
-Result<TableContent> with_sides(TableContent content, double count_factor,
-                                std::optional<std::size_t> count) {
-  const auto stretch = [&](Codes codes, bool fast_to_slow) -> Result<Codes> {
-    const double wanted =
-        count ? static_cast<double>(*count)
-              : 1 + std::ceil(static_cast<double>(codes.size() - 1) * count_factor - kNoise);
-    if (wanted < 1 || wanted > static_cast<double>(kMaxCodes)) {
-      return fail(fmt::format("a side would have {:.0f} codes; allowed: 1..{}", wanted, kMaxCodes));
-    }
-    if (fast_to_slow) std::reverse(codes.begin(), codes.end());
-    Codes out = stretched(codes, static_cast<std::size_t>(wanted));
-    if (fast_to_slow) std::reverse(out.begin(), out.end());
-    return out;
-  };
-  // The cruise delay follows from the last code only as long as that is the fastest one.
-  auto accel = stretch(content.accel, false);
-  if (!accel) return fail(accel.error());
-  content.accel = std::move(*accel);
-  if (content.decel) {
-    auto decel = stretch(*content.decel, true);
-    if (!decel) return fail(decel.error());
-    content.decel = std::move(*decel);
+// A side of `count` codes with the same speeds, slow to fast: the square of the speed is that of
+// the old side at the same share of its steps.
+Codes resampled(const Codes& codes, std::size_t count) {
+  if (codes.size() == 1 || count == 1) return Codes(count, codes.back());
+  Curve curve;
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    curve.path.push_back(static_cast<double>(i));
+    curve.square.push_back(1.0 / codes[i] / codes[i]);
   }
+  const double ratio = static_cast<double>(codes.size() - 1) / static_cast<double>(count - 1);
+  Codes out{codes.front()};
+  std::size_t segment = 0;
+  for (std::size_t k = 1; k + 1 < count; ++k) {
+    append_delay(out, curve.square_at(static_cast<double>(k) * ratio, segment));
+  }
+  out.push_back(codes.back());
+  return out;
+}
+
+// Changes both sides, given slow to fast.
+template <class Change>
+Result<TableContent> with_sides(TableContent content, const Change& change) {
+  auto accel = change(content.accel);
+  if (!accel) return fail(accel.error());
+  if (content.decel) {
+    auto decel = change(Codes(content.decel->rbegin(), content.decel->rend()));
+    if (!decel) return fail(decel.error());
+    content.decel = Codes(decel->rbegin(), decel->rend());
+  }
+  content.accel = std::move(*accel);
   return checked(std::move(content));
 }
 
@@ -167,7 +243,15 @@ Result<TableContent> scale_speed(TableContent content, double factor) {
 
 Result<TableContent> scale_acceleration(TableContent content, double factor) {
   if (auto fault = factor_fault(factor)) return fail(*fault);
-  return with_sides(std::move(content), 1 / factor, std::nullopt);
+  // A cruise delay that is faster than a side is its last step: that one is accelerated to as well.
+  const std::uint16_t cruise = content.cruise.value_or(content.accel.back());
+  return with_sides(std::move(content), [&](Codes codes) -> Result<Codes> {
+    const bool to_cruise = cruise < codes.back();
+    if (to_cruise) codes.push_back(cruise);
+    auto out = stretched(codes, 1 / factor);
+    if (out && to_cruise) out->pop_back();
+    return out;
+  });
 }
 
 Result<TableContent> resample_unit(TableContent content, std::uint32_t time_unit_ns) {
@@ -180,7 +264,27 @@ Result<TableContent> resample_unit(TableContent content, std::uint32_t time_unit
 }
 
 Result<TableContent> resample_codes(TableContent content, std::size_t codes) {
-  return with_sides(std::move(content), 1, codes);
+  if (codes < 1 || codes > kMaxCodes) {
+    return fail(fmt::format("a side would have {} codes; allowed: 1..{}", codes, kMaxCodes));
+  }
+  return with_sides(std::move(content),
+                    [codes](const Codes& side) -> Result<Codes> { return resampled(side, codes); });
+}
+
+double greatest_shortfall(const TableContent& before, const TableContent& after, double factor) {
+  double greatest = 0;
+  const double units = static_cast<double>(before.time_unit_ns) / after.time_unit_ns / factor;
+  const auto compare = [&](std::uint16_t old_code, std::uint16_t new_code) {
+    greatest = std::max(greatest, 1 - old_code * units / new_code);
+  };
+  for (std::size_t i = 0; i < before.accel.size(); ++i) compare(before.accel[i], after.accel[i]);
+  if (before.decel && after.decel) {
+    for (std::size_t i = 0; i < before.decel->size(); ++i) {
+      compare((*before.decel)[i], (*after.decel)[i]);
+    }
+  }
+  if (before.cruise && after.cruise) compare(*before.cruise, *after.cruise);
+  return greatest;
 }
 
 Result<TableContent> reverse(TableContent content) {

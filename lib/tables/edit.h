@@ -24,12 +24,18 @@ Result<TableContent> delete_codes(TableContent content, SideKey side, std::size_
 
 // All speeds times `factor`, by new codes in the same time unit.
 Result<TableContent> scale_speed(TableContent content, double factor);
-// The same speeds with `factor` times the acceleration, so in 1 / factor of the steps and the time.
+// The same speeds with `factor` times the acceleration: the square of the speed over the path,
+// which becomes 1 / factor as long. The greatest acceleration becomes at most `factor` times what
+// it was, but for the rounding of codes; steps and time become about 1 / factor of what they were.
+// A cruise delay that is faster than a side counts as its last step.
 Result<TableContent> scale_acceleration(TableContent content, double factor);
 // The same delays in another time unit.
 Result<TableContent> resample_unit(TableContent content, std::uint32_t time_unit_ns);
 // Each side with `codes` codes and the same speeds: the acceleration changes accordingly.
 Result<TableContent> resample_codes(TableContent content, std::size_t codes);
+// The greatest share by which a speed of `after` falls below that of `before` times `factor`, code
+// by code. Precondition: as many codes.
+double greatest_shortfall(const TableContent& before, const TableContent& after, double factor);
 // Accelerates as it braked, and brakes as it accelerated.
 Result<TableContent> reverse(TableContent content);
 

@@ -5,7 +5,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-#include <numeric>
+#include <algorithm>
+#include <cmath>
 
 #include "tables/random_table.h"
 
@@ -65,28 +66,137 @@ TEST(TableEdit, AnotherUnitKeepsTheDelaysOrMakesThemLonger) {
   EXPECT_EQ(resample_unit(kMirrored, 300'000)->time_unit_ns, 300'000U);
 }
 
-TEST(TableEdit, AccelerationIsScaledAtTheSameSpeeds) {
-  EXPECT_TRUE(rc::check("ends stay, time and steps shrink or grow by the factor", [] {
-    TableContent content = random_case(1000).content;
+// Steps/s^2, of the pair of delays slower, faster: from the middle of one to that of the other.
+double acceleration(double slower_s, double faster_s) {
+  return (1 / faster_s - 1 / slower_s) / (0.5 * (slower_s + faster_s));
+}
+
+// The codes of a side in use, slow to fast, and the cruise delay if that is another one.
+std::vector<double> run_codes(const TableContent& content, bool decel) {
+  std::vector<double> codes(content.accel.begin(), content.accel.end());
+  if (decel && content.decel) codes.assign(content.decel->rbegin(), content.decel->rend());
+  const double cruise = content.cruise.value_or(content.accel.back());
+  if (cruise < codes.back()) codes.push_back(cruise);
+  return codes;
+}
+
+double peak(const std::vector<double>& codes) {
+  double peak = 0;
+  for (std::size_t i = 1; i < codes.size(); ++i) {
+    peak = std::max(peak, acceleration(codes[i - 1], codes[i]));
+  }
+  return peak;
+}
+
+// A code stands for a delay of up to a unit less: what any such delays have at least.
+double least_peak(const std::vector<double>& codes) {
+  double peak = 0;
+  for (std::size_t i = 1; i < codes.size(); ++i) {
+    if (codes[i - 1] - 1 <= codes[i]) continue;
+    peak =
+        std::max(peak, (1 / codes[i] - 1 / (codes[i - 1] - 1)) / (0.5 * (codes[i - 1] + codes[i])));
+  }
+  return peak;
+}
+
+TEST(TableEdit, ScaledAccelerationIsTheFactorAtMost) {
+  EXPECT_TRUE(rc::check("ends stay, and the greatest acceleration falls by the factor", [] {
+    const TableContent content = random_case(1000).content;
     const double factor = random_in(25, 400) / 100.0;
     const auto scaled = scale_acceleration(content, factor);
     RC_ASSERT(scaled.has_value());
-    RC_ASSERT(scaled->accel.front() == content.accel.front());
-    RC_ASSERT(scaled->accel.back() == content.accel.back());
-    const auto steps = static_cast<double>(content.accel.size() - 1);
-    RC_ASSERT(scaled->accel.size() == 1 + std::ceil(steps / factor - 1e-6));
-    const auto sum = [](const std::vector<std::uint16_t>& codes) {
-      return std::accumulate(codes.begin() + 1, codes.end(), 0.0);
-    };
-    // Where steps / factor is no whole number, the side is stretched to the next one.
-    const double ratio = static_cast<double>(scaled->accel.size() - 1) / std::max(1.0, steps);
-    if (steps >= 1) {
-      // The last code is that of before, which may be faster than the mean of the last stretch.
-      RC_ASSERT(sum(scaled->accel) <=
-                sum(content.accel) * ratio + static_cast<double>(scaled->accel.size()));
-      RC_ASSERT(sum(scaled->accel) >= sum(content.accel) * ratio - content.accel.front());
+    for (const bool decel : {false, true}) {
+      const auto before = run_codes(content, decel);
+      const auto after = run_codes(*scaled, decel);
+      RC_ASSERT(after.front() == before.front());
+      RC_ASSERT(after.back() == before.back());
+      RC_ASSERT(least_peak(after) <= factor * peak(before) * (1 + 1e-6));
     }
   }));
+}
+
+TEST(TableEdit, ScalingByOneChangesNothing) {
+  EXPECT_TRUE(rc::check("and back in place", [] {
+    const TableContent content = random_case(1000).content;
+    const auto scaled = scale_acceleration(content, 1);
+    RC_ASSERT(scaled.has_value());
+    RC_ASSERT(run_codes(*scaled, false) == run_codes(content, false));
+    RC_ASSERT(run_codes(*scaled, true) == run_codes(content, true));
+  }));
+}
+
+// The codes of constant acceleration from rest: the mean speeds of steps whose ends have the speeds
+// sqrt(2 a k).
+TableContent constant_acceleration(double acceleration, std::size_t count) {
+  TableContent content{.name = "t", .time_unit_ns = 100};
+  const auto time_at = [&](std::size_t k) {
+    return std::sqrt(2.0 * static_cast<double>(k) / acceleration);
+  };
+  for (std::size_t k = 1; k <= count; ++k) {
+    content.accel.push_back(
+        static_cast<std::uint16_t>(std::ceil((time_at(k + 1) - time_at(k)) * 1e7)));
+  }
+  return content;
+}
+
+TEST(TableEdit, ScaledRampHasNoStairs) {
+  const TableContent content = constant_acceleration(20'000, 400);
+  for (const double factor : {0.05, 0.3, 0.5, 0.8, 1.5, 3.0}) {
+    const auto scaled = scale_acceleration(content, factor);
+    ASSERT_TRUE(scaled.has_value());
+    const auto& codes = scaled->accel;
+    // Steps and the time of the ramp grow by what the acceleration shrinks.
+    EXPECT_NEAR(static_cast<double>(codes.size()), 400 / factor, 0.02 * 400 / factor + 2);
+    for (std::size_t i = 1; i + 1 < codes.size(); ++i) {
+      const double slower_s = codes[i - 1] * 1e-7;
+      const double faster_s = codes[i] * 1e-7;
+      const double wanted = factor * 20'000;
+      // What a unit of the old codes and one of the new ones may make.
+      const double noise = 2 * 1e-7 / (faster_s * faster_s * faster_s);
+      EXPECT_NEAR(acceleration(slower_s, faster_s), wanted, noise * (1 + factor) + 0.01 * wanted)
+          << "factor " << factor << ", code " << i << ": " << codes[i - 1] << ", " << codes[i];
+    }
+  }
+}
+
+TEST(TableEdit, ResampledUpwardsHasNoStairsEither) {
+  EXPECT_TRUE(rc::check("the rise of the speed's square falls by the steps", [] {
+    const TableContent content = random_case(1000).content;
+    const auto before = std::vector<double>(content.accel.begin(), content.accel.end());
+    const auto count = before.size() * static_cast<std::size_t>(random_in(1, 5));
+    const auto made = resample_codes(content, count);
+    RC_ASSERT(made.has_value());
+    const std::vector<double> after(made->accel.begin(), made->accel.end());
+    RC_ASSERT(after.size() == count);
+    const auto rise = [](double slower, double faster) {
+      return 1 / (faster * faster) - 1 / (slower * slower);
+    };
+    double greatest = 0;
+    for (std::size_t i = 1; i < before.size(); ++i) {
+      greatest = std::max(greatest, rise(before[i - 1], before[i]));
+    }
+    const double ratio =
+        static_cast<double>(before.size() - 1) / std::max(1.0, static_cast<double>(count - 1));
+    for (std::size_t i = 1; i < after.size(); ++i) {
+      if (after[i - 1] - 1 < after[i]) continue;
+      RC_ASSERT(rise(after[i - 1] - 1, after[i]) <= greatest * ratio * (1 + 1e-6));
+    }
+  }));
+}
+
+TEST(TableEdit, SpeedsAreNotFasterThanAskedByTheLeastShare) {
+  const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {2107}};
+  EXPECT_THAT(scale_speed(content, 1 - 2e-10)->accel, ElementsAre(2108));
+  EXPECT_THAT(scale_speed(content, 1)->accel, ElementsAre(2107));
+  EXPECT_THAT(scale_speed(content, 0.7)->accel, ElementsAre(3010));
+}
+
+TEST(TableEdit, DelaysShorterThanAUnitAreRefused) {
+  EXPECT_THAT(scale_speed(kMirrored, 1e9).error().text(), HasSubstr("a delay becomes 9e-07"));
+  EXPECT_THAT(scale_speed(kMirrored, 501).error().text(), HasSubstr("Use a shorter time unit"));
+  EXPECT_THAT(resample_unit(kMirrored, 1'000'000'000).error().text(),
+              HasSubstr("allowed: 1 or more"));
+  EXPECT_THAT(scale_speed(kMirrored, 500)->accel, ElementsAre(2, 2, 1));
 }
 
 TEST(TableEdit, ResampledSidesHaveTheNumberOfCodesAskedFor) {

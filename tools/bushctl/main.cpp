@@ -4,9 +4,11 @@
 #include <cstdio>
 #include <exception>
 
+#include "base/standard_output.h"
 #include "commands.h"
 
 int main(int argc, char** argv) {
+  bushd::expect_closed_output();
   try {
     bushctl::CommandLine line;
     bushctl::add_view_commands(line);
@@ -14,7 +16,7 @@ int main(int argc, char** argv) {
     bushctl::add_driver_commands(line);
     bushctl::add_table_commands(line);
     bushctl::add_line_commands(line);
-    return line.run(argc, argv);
+    return bushd::finished_output(line.run(argc, argv));
   } catch (const std::exception& error) {
     fmt::print(stderr, "bushctl: {}\n", error.what());
     return bushctl::kFailed;

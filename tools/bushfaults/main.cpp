@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/standard_output.h"
 #include "installation.h"
 #include "summary.h"
 #include "world.h"
@@ -116,8 +117,9 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  bushd::expect_closed_output();
   try {
-    return run(argc, argv);
+    return bushd::finished_output(run(argc, argv));
   } catch (const std::exception& error) {
     fmt::print(stderr, "bushfaults: {}\n", error.what());
     return kUsage;

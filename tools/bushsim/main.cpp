@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "base/standard_output.h"
 #include "simulator.h"
 
 namespace {
@@ -105,8 +106,9 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  bushd::expect_closed_output();
   try {
-    return run(argc, argv);
+    return bushd::finished_output(run(argc, argv));
   } catch (const std::exception& error) {
     fmt::print(stderr, "bushsim: {}\n", error.what());
     return kFailed;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "json.h"
 #include "open_table.h"
@@ -100,7 +101,8 @@ Result<void> export_travel(const BushdExport& wanted, const tables::TableContent
                 {"time_unit_ns", content.time_unit_ns},
                 {"reactor_delay_code", wanted.reactor_delay}});
   } else {
-    fmt::print("{}: {} steps of {} ns a code\n", wanted.image, wanted.steps, content.time_unit_ns);
+    fmt::print("{}: {} steps of {} ns a code\n", bushd::printable(wanted.image), wanted.steps,
+               content.time_unit_ns);
   }
   return {};
 }
@@ -150,8 +152,8 @@ Result<void> export_page(const BushdExport& wanted, tables::TableContent content
                 {"start_hz", *start_hz},
                 {"resampled", resampling}});
   } else {
-    fmt::print("{}: page {}, {} steps; set F_start to {:.6g} Hz\n", wanted.image, wanted.page,
-               wanted.steps, *start_hz);
+    fmt::print("{}: page {}, {} steps; set F_start to {:.6g} Hz\n", bushd::printable(wanted.image),
+               wanted.page, wanted.steps, *start_hz);
   }
   return {};
 }
@@ -194,7 +196,7 @@ int import_bushd(const Places& places, const BushdImport& wanted) {
   const std::string text = tables::to_text(*content);
   const auto old = home->store.read(home->name);
   const auto revision = old && wanted.replace ? home->store.save(home->name, old->text, text, note)
-                                              : home->store.create(home->name, text, note);
+                                              : create_in(*home, text, note);
   if (!revision) return refuse(revision.error());
   const std::string path = home->store.path_of(home->name).string();
   if (wanted.json) {
@@ -202,7 +204,7 @@ int import_bushd(const Places& places, const BushdImport& wanted) {
     json["revision"] = *revision;
     print_json(json);
   } else {
-    fmt::print("{}: revision {}, for {} steps\n", path, *revision, steps);
+    fmt::print("{}: revision {}, for {} steps\n", bushd::printable(path), *revision, steps);
   }
   return kDone;
 }

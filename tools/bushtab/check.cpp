@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "finding_text.h"
 #include "json.h"
@@ -53,7 +54,7 @@ int check(const Places& places, const Check& wanted) {
       good = good && !refused;
       entry["findings"].push_back(to_json(finding));
       if (!wanted.json) {
-        fmt::print("{}: {}\n", table, text_of(finding));
+        fmt::print("{}: {}\n", bushd::printable(table), text_of(finding));
       }
     }
     entry["good"] = good;
@@ -61,7 +62,7 @@ int check(const Places& places, const Check& wanted) {
     if (!good) {
       result = kRefused;
     } else if (!wanted.json) {
-      fmt::print("{}: good\n", table);
+      fmt::print("{}: good\n", bushd::printable(table));
     }
   }
   if (wanted.json) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -71,6 +72,8 @@ using Change =
     std::function<bushd::Result<bushd::tables::TableContent>(bushd::tables::TableContent content)>;
 int change(const Places& places, const std::string& table, bool json, const std::string& note,
            const Change& change);
+// Says on stderr which texts of the table were kept and never saved, if any were.
+void tell_kept(const std::filesystem::path& table, const std::string& name);
 // In $VISUAL or $EDITOR; what is no table is kept aside, and the old one stays.
 int edit(const Places& places, const std::string& table, bool json);
 // In the terminal; refused if there is none.

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -27,15 +28,21 @@ namespace fs = std::filesystem;
 int unchanged(const Home& home, bool json) {
   const std::string path = home.store.path_of(home.name).string();
   if (json) return show(Places{}, path, false, true);
-  fmt::print("{}: nothing to change\n", path);
+  fmt::print("{}: nothing to change\n", bushd::printable(path));
   return kDone;
 }
 
 // The editor may have arguments of its own ("code --wait"), so a shell runs it; the file is a
 // parameter of that shell and not part of its text.
 bool run_editor(const std::string& editor, const fs::path& file) {
+  // Ctrl-C is the editor's, as long as it runs.
+  const auto on_interrupt = std::signal(SIGINT, SIG_IGN);
+  const auto on_quit = std::signal(SIGQUIT, SIG_IGN);
   const pid_t child = fork();
   if (child == 0) {
+    std::signal(SIGINT, on_interrupt);
+    std::signal(SIGQUIT, on_quit);
+    std::signal(SIGPIPE, SIG_DFL);
     const std::string command = editor + " \"$1\"";
     execl("/bin/sh", "sh", "-c", command.c_str(), "sh", file.c_str(), nullptr);
     _exit(127);
@@ -43,7 +50,20 @@ bool run_editor(const std::string& editor, const fs::path& file) {
   int status = -1;
   while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGQUIT, on_quit);
   return child > 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+bushd::Error editor_failure(const std::string& editor) {
+  return {.message = fmt::format(
+              "the editor \"{}\" failed; nothing was changed. Set VISUAL or EDITOR", editor)};
+}
+
+int kept_there(const fs::path& table, const fs::path& aside, const bushd::Error& why) {
+  fmt::print(stderr, "{} stays as it was; your text is in {}\n", bushd::printable(table.string()),
+             bushd::printable(aside.string()));
+  return refuse(why);
 }
 
 std::string editor_of_user() {
@@ -60,7 +80,7 @@ int change(const Places& places, const std::string& table, bool json, const std:
            const Change& change) {
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
-  const auto old = home->store.read(home->name);
+  const auto old = read_home(*home);
   if (!old) return refuse(old.error());
   const auto content = change(old->content);
   if (!content) return refuse(content.error());
@@ -70,38 +90,42 @@ int change(const Places& places, const std::string& table, bool json, const std:
   return saved(*home, home->store.save(home->name, old->text, *text, note), json);
 }
 
+void tell_kept(const fs::path& table, const std::string& name) {
+  for (const fs::path& kept : tables::store::kept_aside(table.parent_path(), name)) {
+    fmt::print(stderr, "{}: a text of this table that was never saved is in {}; it stays there\n",
+               bushd::printable(table.string()), bushd::printable(kept.string()));
+  }
+}
+
 int edit(const Places& places, const std::string& table, bool json) {
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
-  const auto old = home->store.read(home->name);
+  const auto old = read_home(*home);
   if (!old) return refuse(old.error());
   const fs::path path = home->store.path_of(home->name);
-  const fs::path aside = path.parent_path() / ("." + home->name + ".edited.toml");
-  if (auto written = tables::store::replace_file(aside, old->text); !written) {
-    return refuse(written.error());
-  }
+  tell_kept(path, home->name);
+  const auto aside = tables::store::keep_aside(path.parent_path(), home->name, old->text);
+  if (!aside) return refuse(aside.error());
   const std::string editor = editor_of_user();
-  const bool edited = run_editor(editor, aside);
-  const auto text = tables::read_text(aside);
+  const bool edited = run_editor(editor, *aside);
+  const auto text = tables::read_text(*aside);
   std::error_code ignored;
-  if (!edited || !text || *text == old->text) {
-    fs::remove(aside, ignored);
-    if (!edited) {
-      return refuse(
-          bushd::Error{.message = fmt::format("the editor \"{}\" failed; nothing was changed. "
-                                              "Set VISUAL or EDITOR",
-                                              editor)});
+  if (text && *text == old->text) {
+    fs::remove(*aside, ignored);
+    return edited ? unchanged(*home, json) : refuse(editor_failure(editor));
+  }
+  if (text && edited) {
+    const auto revision = home->store.save(home->name, old->text, *text, "edit");
+    if (revision) {
+      fs::remove(*aside, ignored);
+      return saved(*home, revision, json);
     }
-    if (!text) return refuse(text.error());
-    return unchanged(*home, json);
+    return kept_there(path, *aside, revision.error());
   }
-  const auto revision = home->store.save(home->name, old->text, *text, "edit");
-  if (revision) {
-    fs::remove(aside, ignored);
-    return saved(*home, revision, json);
-  }
-  fmt::print(stderr, "{} stays as it was; your text is in {}\n", path.string(), aside.string());
-  return refuse(revision.error());
+  // An editor may fail after it has written; what cannot be read may still be what was typed.
+  if (!fs::exists(*aside, ignored)) return refuse(editor_failure(editor));
+  if (!text) return kept_there(path, *aside, text.error());
+  return kept_there(path, *aside, editor_failure(editor));
 }
 
 int copy(const Places& places, const std::string& from, const std::string& to, bool json) {
@@ -116,7 +140,7 @@ int copy(const Places& places, const std::string& from, const std::string& to, b
   content->name = home->name;
   const auto renamed = tables::rewrite(*text, *content, (*source)->path());
   if (!renamed) return refuse(renamed.error());
-  return saved(*home, home->store.create(home->name, *renamed, "copy of " + from), json);
+  return saved(*home, create_in(*home, *renamed, "copy of " + from), json);
 }
 
 int log(const Places& places, const std::string& table, bool json) {
@@ -136,7 +160,7 @@ int log(const Places& places, const std::string& table, bool json) {
                    {"tags", revision.tags}});
     if (json) continue;
     std::string tags;
-    for (const std::string& tag : revision.tags) tags += "  [" + tag + "]";
+    for (const std::string& tag : revision.tags) tags += "  [" + bushd::printable(tag) + "]";
     fmt::print("{:>5}  {}  {}  {}{}\n", revision.number, revision.time,
                revision.content_hash.substr(0, tables::kShortHashLength),
                bushd::printable(revision.note), tags);
@@ -155,7 +179,7 @@ int revert(const Places& places, const std::string& table, const std::string& re
   if (!then) return refuse(then.error());
   const std::string note = fmt::format("revert to {}", then->content.revision);
   // The file may be gone, or be no table any more; what else stands there is not written over.
-  if (!now) return saved(*home, home->store.create(home->name, then->text, note), json);
+  if (!now) return saved(*home, create_in(*home, then->text, note), json);
   return saved(*home, home->store.save(home->name, now->text, then->text, note), json);
 }
 
@@ -164,12 +188,16 @@ int tag(const Places& places, const std::string& table, const std::string& tag,
   auto home = home_of(places, table);
   if (!home) return refuse(home.error());
   const auto number = home->store.tag(home->name, tag, revision);
-  if (!number) return refuse(number.error());
+  if (!number) {
+    const auto now = read_home(*home);
+    return refuse(now ? number.error() : now.error());
+  }
   if (json) {
     const nlohmann::ordered_json said = {{"name", home->name}, {"revision", *number}, {"tag", tag}};
     print_json(said);
   } else {
-    fmt::print("{}: revision {} is {}\n", home->name, *number, tag);
+    fmt::print("{}: revision {} is {}\n", bushd::printable(home->name), *number,
+               bushd::printable(tag));
   }
   return kDone;
 }

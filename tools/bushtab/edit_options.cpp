@@ -90,6 +90,25 @@ void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
   });
 }
 
+// A change of all codes, which says how much slower than asked rounding up has made it.
+int change_speeds(const Places& places, const std::string& table, bool json,
+                  const std::string& note, double factor, const Change& change_content) {
+  constexpr double kToldFrom = 0.001;
+  double shortfall = 0;
+  const int done = change(places, table, json, note, [&](const TableContent& before) {
+    auto after = change_content(before);
+    if (after) shortfall = tables::greatest_shortfall(before, *after, factor);
+    return after;
+  });
+  if (done == kDone && shortfall >= kToldFrom) {
+    fmt::print(stderr,
+               "delays are rounded up to whole time units: speeds are up to {:.3g} % lower than "
+               "asked\n",
+               100 * shortfall);
+  }
+  return done;
+}
+
 void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
   struct Options {
     std::string table;
@@ -112,10 +131,11 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
       ->type_name("FACTOR");
   run(scale, [&places, options] {
     if (options->speed > 0) {
-      return change(places, options->table, options->json,
-                    fmt::format("speeds times {:.6g}", options->speed), [&](TableContent content) {
-                      return tables::scale_speed(std::move(content), options->speed);
-                    });
+      return change_speeds(places, options->table, options->json,
+                           fmt::format("speeds times {:.6g}", options->speed), options->speed,
+                           [&](TableContent content) {
+                             return tables::scale_speed(std::move(content), options->speed);
+                           });
     }
     return change(places, options->table, options->json,
                   fmt::format("accelerations times {:.6g}", options->acceleration),
@@ -141,11 +161,11 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
       ->type_name("N");
   run(resample, [&places, options] {
     if (options->time_unit_ns > 0) {
-      return change(places, options->table, options->json,
-                    fmt::format("time unit {} ns", options->time_unit_ns),
-                    [&](TableContent content) {
-                      return tables::resample_unit(std::move(content), options->time_unit_ns);
-                    });
+      return change_speeds(
+          places, options->table, options->json,
+          fmt::format("time unit {} ns", options->time_unit_ns), 1, [&](TableContent content) {
+            return tables::resample_unit(std::move(content), options->time_unit_ns);
+          });
     }
     return change(places, options->table, options->json,
                   fmt::format("{} codes a side", options->codes), [&](TableContent content) {

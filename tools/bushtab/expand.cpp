@@ -78,7 +78,7 @@ int expand(const Places& places, const Expansion& expansion) {
                            ? print_ticks<std::uint8_t>(run, expansion, bushd_run_expand_coarse)
                            : print_ticks<std::int16_t>(run, expansion, bushd_run_expand_fine);
   if (written) return kDone;
-  return refuse(bushd::Error{.message = "cannot write to standard output: is the disk full?"});
+  return kRefused;  // main says why
 }
 
 }  // namespace bushtab

@@ -76,8 +76,8 @@ int list(const Places& places, bool json) {
                      {"max_steps_per_s", max_hz},
                      {"description", (*table)->description()}});
       if (json) continue;
-      fmt::print("{:<24} {:>3}  {}  {:>7.6g}..{:<7.6g} steps/s  {}\n", name, (*table)->revision(),
-                 (*table)->short_hash(), start_hz, max_hz,
+      fmt::print("{:<24} {:>3}  {}  {:>7.6g}..{:<7.6g} steps/s  {}\n", bushd::printable(name),
+                 (*table)->revision(), (*table)->short_hash(), start_hz, max_hz,
                  bushd::printable((*table)->description()));
     }
   }

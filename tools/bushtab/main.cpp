@@ -2,7 +2,10 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <sstream>
 
+#include "base/printable.h"
+#include "base/standard_output.h"
 #include "options.h"
 
 namespace {
@@ -32,7 +35,12 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? bushtab::kDone : kUsage;
+    std::ostringstream help;
+    std::ostringstream fault;
+    const bool asked = app.exit(error, help, fault) == 0;
+    std::fputs(help.str().c_str(), stdout);
+    std::fputs(bushd::printable_lines(fault.str()).c_str(), stderr);
+    return asked ? bushtab::kDone : kUsage;
   }
   return chosen();
 }
@@ -40,10 +48,13 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  bushd::expect_closed_output();
   try {
-    return run(argc, argv);
+    return bushd::finished_output(run(argc, argv));
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "bushtab: %s\n", error.what());
-    return bushtab::kRefused;
+    // An output that is closed throws as well; that is told, or not, below.
+    if (std::ferror(stdout) == 0)
+      std::fprintf(stderr, "bushtab: %s\n", bushd::printable(error.what()).c_str());
+    return bushd::finished_output(bushtab::kRefused);
   }
 }

@@ -44,7 +44,7 @@ int make_new(const Places& places, const New& wanted) {
   if (wanted.print) {
     const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
     if (written && std::fflush(stdout) == 0) return kDone;
-    return refuse(bushd::Error{.message = "cannot write to standard output: is the disk full?"});
+    return kRefused;  // main says why
   }
   const std::string note = fmt::format("new, law {}", tables::laws::name_of(spec.accel.law));
   bushd::Result<std::uint32_t> revision{0};
@@ -52,7 +52,7 @@ int make_new(const Places& places, const New& wanted) {
   if (old && wanted.replace) {
     revision = home->store.save(home->name, old->text, text, note);
   } else {
-    revision = home->store.create(home->name, text, note);
+    revision = create_in(*home, text, note);
   }
   return saved(*home, revision, wanted.json);
 }

@@ -100,7 +100,8 @@ void add_speed_options(CLI::App* command, laws::Spec& spec) {
             skip_of(spec).low_hz = quantity_or_throw("--skip", Quantity::kSpeed, low);
             skip_of(spec).high_hz = quantity_or_throw("--skip", Quantity::kSpeed, high);
           },
-          "A band of speeds to be passed quickly and not to cruise in (resonance)")
+          "A band of speeds to be passed quickly and not to cruise in (resonance) [" +
+              laws::units_text(Quantity::kSpeed) + "]")
       ->type_name("LO:HI");
   command
       ->add_option_function<std::string>(
@@ -151,7 +152,7 @@ CLI::Option* add_quantity(CLI::App* command, const std::string& name, Quantity q
           [name, quantity, set](const std::string& text) {
             set(quantity_or_throw(name, quantity, text));
           },
-          help)
+          help + " [" + laws::units_text(quantity) + "]")
       ->type_name(kTypes.at(static_cast<std::size_t>(quantity)));
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "tables/store/open.h"
 #include "tables/table_file.h"
@@ -65,6 +66,30 @@ Result<Home> home_of(const Places& places, const std::string& table) {
   return Home{store::Store(place.directory, place.history), name};
 }
 
+Result<store::Stored> read_home(const Home& home) {
+  auto stored = home.store.read(home.name);
+  std::error_code error;
+  if (stored || fs::exists(home.store.path_of(home.name), error)) return stored;
+  if (!tables::find(home.name, tables::shipped_directories())) return stored;
+  return bushd::fail(fmt::format(
+      "\"{0}\" is a shipped table, which stays as it is; copy it first: \"bushtab copy {0} "
+      "NEW\"",
+      home.name));
+}
+
+Result<std::uint32_t> create_in(Home& home, const std::string& text, const std::string& note) {
+  const fs::path directory = home.store.path_of(home.name).parent_path();
+  std::error_code error;
+  if (!directory.empty() && !fs::exists(directory, error)) {
+    if (fs::create_directories(directory, error); error) {
+      return bushd::fail(bushd::Error{.message = "cannot be made: " + error.message(),
+                                      .file = directory.string()});
+    }
+    fmt::print(stderr, "made the directory {}\n", bushd::printable(directory.string()));
+  }
+  return home.store.create(home.name, text, note);
+}
+
 Result<tables::TablePtr> open_table(const Places& places, const std::string& table) {
   const std::size_t at = table.rfind('@');
   std::error_code error;
@@ -84,7 +109,7 @@ Result<tables::TablePtr> open_table(const Places& places, const std::string& tab
 }
 
 int refuse(const bushd::Error& error) {
-  fmt::print(stderr, "{}\n", error.text());
+  fmt::print(stderr, "{}\n", bushd::printable_lines(error.text()));
   return kRefused;
 }
 

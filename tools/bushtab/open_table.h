@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "base/result.h"
@@ -26,6 +27,12 @@ struct Home {
   std::string name;
 };
 bushd::Result<Home> home_of(const Places& places, const std::string& table);
+
+// The table in its file. Of one that is only shipped, the error says how to get one's own.
+bushd::Result<bushd::tables::store::Stored> read_home(const Home& home);
+// Makes a new table in it; its directory too, which is said on stderr.
+bushd::Result<std::uint32_t> create_in(Home& home, const std::string& text,
+                                       const std::string& note);
 
 // The directories in which names are looked for.
 std::vector<std::filesystem::path> directories(const Places& places);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/printable.h"
 #include "canvas.h"
 #include "commands.h"
 #include "curve.h"
@@ -92,9 +93,9 @@ int plot(const Places& places, const std::vector<std::string>& names) {
   fmt::print("{:>9} └{}\n{:>11}0{:>{}}\n", "", axis, "", end, width - 1);
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (coloured) {
-      fmt::print("\033[{}m{}\033[0m\n", colour_of(static_cast<int>(i)), names[i]);
+      fmt::print("\033[{}m{}\033[0m\n", colour_of(static_cast<int>(i)), bushd::printable(names[i]));
     } else {
-      fmt::print("{}\n", names[i]);
+      fmt::print("{}\n", bushd::printable(names[i]));
     }
   }
   return kDone;

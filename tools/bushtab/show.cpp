@@ -160,7 +160,7 @@ int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool j
   if (!revision) return refuse(revision.error());
   const std::string path = home.store.path_of(home.name).string();
   if (json) return show(Places{}, path, false, true);
-  fmt::print("{}: revision {}\n", path, *revision);
+  fmt::print("{}: revision {}\n", bushd::printable(path), *revision);
   return kDone;
 }
 

@@ -143,6 +143,9 @@ Terminal::Terminal() : unicode_(std::strcmp(nl_langinfo(CODESET), "UTF-8") == 0)
 Terminal::~Terminal() {
   endwin();
   close(signals_);
+  // A program that is told to end is often told twice, by its shell and by the terminal. The second
+  // time must not take the last words from it.
+  if (gone_) return;
   const sigset_t set = signals_taken();
   sigprocmask(SIG_UNBLOCK, &set, nullptr);
 }
@@ -206,6 +209,12 @@ Terminal::Input Terminal::take_signal() {
 }
 
 Terminal::Input Terminal::wait() {
+  const Input input = next();
+  if (input.event == Event::kGone) gone_ = true;
+  return input;
+}
+
+Terminal::Input Terminal::next() {
   while (waiting_.empty()) {
     std::array<pollfd, 2> sources{{{STDIN_FILENO, POLLIN, 0}, {signals_, POLLIN, 0}}};
     // Interrupted by being stopped and continued (Ctrl-Z): ncurses has drawn all again.

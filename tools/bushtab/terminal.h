@@ -29,17 +29,20 @@ class Terminal {
     Event event = Event::kKey;
     Key key = key::kEscape;
   };
-  // Waits. kInterrupted: Ctrl-C. kGone: the terminal is, or somebody wants the program to end.
+  // Waits. kInterrupted: Ctrl-C. kGone: the terminal is, or somebody wants the program to end; the
+  // signals that say so then stay blocked.
   Input wait();
 
  private:
   Terminal();
+  Input next();
   void take_keys();
   Input take_signal();
 
   int signals_ = -1;
   bool unicode_ = false;
   bool coloured_ = false;
+  bool gone_ = false;
   std::deque<Input> waiting_;
 };
 

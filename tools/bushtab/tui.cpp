@@ -39,16 +39,13 @@ class Original {
     other.name_ = other.home_.name;
     const auto text = other.text_with(content);
     if (!text) return bushd::fail(text.error());
-    auto created = other.taken(
-        other.home_.store.create(other.home_.name, *text, "tui, copy of " + home_.name));
+    auto created = other.taken(create_in(other.home_, *text, "tui, copy of " + home_.name));
     if (created) *this = std::move(other);
     return created;
   }
 
   std::filesystem::path path() const { return home_.store.path_of(home_.name); }
-  std::filesystem::path aside() const {
-    return path().parent_path() / ("." + home_.name + ".edited.toml");
-  }
+  const std::string& name() const { return home_.name; }
 
  private:
   // What the next save starts from is what this one wrote, not what may stand there by now.
@@ -122,16 +119,18 @@ bool edit_in(Terminal& terminal, const Places& places, Original& original, Table
   }
 }
 
-int keep_aside(const Original& original, const TableEditor& editor) {
-  if (!editor.changed()) return kDone;
+// What is to be said once the terminal is as it was; nothing: all was saved.
+std::optional<bushd::Error> keep_aside(const Original& original, const TableEditor& editor) {
+  if (!editor.changed()) return std::nullopt;
   const auto text = original.text_with(editor.content());
-  if (!text) return refuse(text.error());
-  const auto kept = tables::store::replace_file(original.aside(), *text);
-  if (!kept) return refuse(kept.error());
-  return refuse(bushd::Error{
+  if (!text) return text.error();
+  const auto kept =
+      tables::store::keep_aside(original.path().parent_path(), original.name(), *text);
+  if (!kept) return kept.error();
+  return bushd::Error{
       .message = fmt::format("was not saved and stays as it was; what it would be is in {}",
-                             original.aside().string()),
-      .file = original.path().string()});
+                             kept->string()),
+      .file = original.path().string()};
 }
 
 }  // namespace
@@ -146,19 +145,21 @@ int tui(const Places& places, const Tui& wanted) {
   if (!limits) return refuse(limits.error());
   auto home = home_of(places, wanted.table);
   if (!home) return refuse(home.error());
-  auto stored = home->store.read(home->name);
+  auto stored = read_home(*home);
   if (!stored) return refuse(stored.error());
   TableEditor editor(stored->content, stored->content.revision,
                      {.limits = std::move(*limits), .steps = wanted.steps});
   Original original(std::move(*home), std::move(*stored));
 
-  bool ended = false;
+  tell_kept(original.path(), original.name());
+  std::optional<bushd::Error> unsaved;
   {
     auto terminal = Terminal::open();
     if (!terminal) return refuse(terminal.error());
-    ended = edit_in(**terminal, places, original, editor);
+    // Kept before the terminal is given back: that lets signals through, and the next may kill.
+    if (!edit_in(**terminal, places, original, editor)) unsaved = keep_aside(original, editor);
   }
-  return ended ? kDone : keep_aside(original, editor);
+  return unsaved ? refuse(*unsaved) : kDone;
 }
 
 }  // namespace bushtab

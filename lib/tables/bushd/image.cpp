@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/table.h"
+#include "tables/rounding.h"
 
 namespace bushd::tables::image {
 namespace {
@@ -97,8 +98,7 @@ Result<TableContent> table_of(const std::vector<std::uint8_t>& codes, double sta
     return fail(fmt::format("F_start = {:.6g} Hz; allowed: 1..100 Hz", start_hz));
   }
   TableContent content{.name = "page"};
-  content.time_unit_ns =
-      static_cast<std::uint32_t>(std::ceil(1e9 / (kSlowest * start_hz) - kNoise));
+  content.time_unit_ns = static_cast<std::uint32_t>(rounded_up_units(1e9 / (kSlowest * start_hz)));
   for (std::size_t i = 0; i < codes.size(); ++i) {
     const bool rises = i > 0 && codes[i] > codes[i - 1];
     if (codes[i] < kFastest || codes[i] > kSlowest || rises) {
@@ -134,7 +134,7 @@ Result<Resampled> resample(const TableContent& content) {
     const std::uint16_t old = std::max(
         cruise_of(content), i < content.accel.size() ? content.accel[i] : cruise_of(content));
     const double exact = old * unit_ns / new_unit_ns;
-    const double code = std::max<double>(kFastest, std::ceil(exact - kNoise));
+    const double code = std::max<double>(kFastest, rounded_up_units(exact));
     if (i == content.accel.size() && code == out.content.accel.back()) break;
     out.content.accel.push_back(static_cast<std::uint16_t>(code));
     out.worst_speed_error = std::max(out.worst_speed_error, 1 - exact / code);

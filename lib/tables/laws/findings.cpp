@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "engine/run.h"
+#include "tables/edit.h"
 
 namespace bushd::tables::laws {
 namespace {
@@ -16,6 +17,10 @@ constexpr double kNoise = 1e-6;
 constexpr double kSpeedRatio = 2.0;
 constexpr double kBushdSlowest = 250;
 constexpr double kBushdFastest = 10;
+constexpr int kMostRounds = 30;  // of looking for a factor
+// Of the factor from one round to the next. What coarse codes make of it falls in jumps.
+constexpr double kShrink = 0.9;
+constexpr double kLeastShrink = 0.5;
 
 // A pair of neighbouring delays, the slower one before the faster one, and where the faster stands.
 struct Pair {
@@ -44,6 +49,7 @@ class Inspector {
   std::vector<Finding> inspect() {
     inspect_side(table_.view().accel, Side::kAccel);
     if (!table_.symmetric()) inspect_side(table_.view().decel, Side::kDecel);
+    advise_scaling();
     inspect_cruise();
     inspect_place();
     return std::move(found_);
@@ -113,16 +119,63 @@ class Inspector {
 
   // The least acceleration that rounding up leaves possible: a code may stand for a delay of up to
   // one unit less.
-  double least_acceleration(const Pair& pair) const {
-    const double slower_s = pair.slower_s - unit_s_ * (1 - kNoise);
-    if (slower_s <= pair.faster_s) return 0;
-    return (hz(pair.faster_s) - hz(slower_s)) / (0.5 * (pair.slower_s + pair.faster_s));
+  double least_acceleration(double slower_s, double faster_s) const {
+    const double least_s = slower_s - unit_s_ * (1 - kNoise);
+    if (least_s <= faster_s) return 0;
+    return (hz(faster_s) - hz(least_s)) / (0.5 * (slower_s + faster_s));
+  }
+
+  double greatest_acceleration() const {
+    double greatest = 0;
+    for (const bushd_ramp& side : {table_.view().accel, table_.view().decel}) {
+      for (std::size_t i = 0; i < side.count && delay_s(side, i) > cruise_s(); ++i) {
+        const double next_s =
+            i + 1 < side.count ? std::max(cruise_s(), delay_s(side, i + 1)) : cruise_s();
+        greatest = std::max(greatest, least_acceleration(delay_s(side, i), next_s));
+      }
+    }
+    return greatest;
+  }
+
+  // The factor is tried out: codes that are coarse hide how steep the ramp between them is.
+  std::optional<double> factor_that_helps() const {
+    TableContent content{.name = table_.name(), .time_unit_ns = table_.view().time_unit_ns};
+    const auto codes = [](const bushd_ramp& side) {
+      return std::vector<std::uint16_t>(side.code, side.code + side.count);
+    };
+    content.accel = codes(table_.view().accel);
+    content.decel = codes(table_.view().decel);
+    std::reverse(content.decel->begin(), content.decel->end());
+    content.cruise = table_.view().cruise;
+    double factor = *limits_.acceleration / greatest_acceleration();
+    for (int round = 0; round < kMostRounds; ++round) {
+      const double digit = std::pow(10.0, std::floor(std::log10(factor)) - 2);
+      factor = std::floor(factor / digit) * digit;
+      auto scaled = scale_acceleration(content, factor);
+      if (!scaled) return std::nullopt;
+      const auto table = make(std::move(*scaled));
+      if (!table) return std::nullopt;
+      const double greatest = Inspector(**table, limits_).greatest_acceleration();
+      if (greatest <= *limits_.acceleration * (1 + kNoise)) return factor;
+      factor *= std::clamp(*limits_.acceleration / greatest, kLeastShrink, kShrink);
+    }
+    return std::nullopt;
+  }
+
+  void advise_scaling() {
+    const auto steep = [](const Finding& finding) { return finding.rule == "acceleration"; };
+    if (std::none_of(found_.begin(), found_.end(), steep)) return;
+    const auto factor = factor_that_helps();
+    for (Finding& finding : found_) {
+      if (!factor || !steep(finding)) continue;
+      finding.message += fmt::format(", or \"bushtab scale --acceleration {:.3g}\"", *factor);
+    }
   }
 
   // `worst.value` is the share of what is allowed until the finding is made.
   void inspect_acceleration(const Pair& pair, Finding& worst) const {
     if (!limits_.acceleration) return;
-    const double acceleration = least_acceleration(pair);
+    const double acceleration = least_acceleration(pair.slower_s, pair.faster_s);
     if (acceleration <= *limits_.acceleration * (1 + kNoise) ||
         (!worst.message.empty() && acceleration <= worst.value)) {
       return;
@@ -130,10 +183,9 @@ class Inspector {
     worst.index = pair.index;
     worst.value = acceleration;
     worst.limit = *limits_.acceleration;
-    worst.message = fmt::format(
-        "accelerates by {:.6g} steps/s^2; allowed: {:.6g}. Put codes in "
-        "between, or \"bushtab scale --acceleration {:.3f}\"",
-        acceleration, worst.limit, worst.limit / acceleration);
+    worst.message =
+        fmt::format("accelerates by {:.6g} steps/s^2; allowed: {:.6g}. Put codes in between",
+                    acceleration, worst.limit);
   }
 
   // Takes the place of what was found before if it asks for a greater share of what there is.
@@ -159,8 +211,9 @@ class Inspector {
     const double speed_hz = 2.0 / (pair.slower_s + pair.faster_s);
     const double friction_nm = which == Side::kAccel ? motor.friction_nm : -motor.brake_friction_nm;
     constexpr double kTurn = 6.283185307179586;
-    const double needs_nm =
-        least_acceleration(pair) * kTurn / motor.steps_per_turn * motor.inertia_kgm2 + friction_nm;
+    const double needs_nm = least_acceleration(pair.slower_s, pair.faster_s) * kTurn /
+                                motor.steps_per_turn * motor.inertia_kgm2 +
+                            friction_nm;
     // The acceleration is a mean of those from the beginning of the slower step to the end of the
     // faster one. As above, a code may stand for a delay of up to one unit less.
     const double fastest_hz = hz(std::max(pair.after_s - unit_s_, 0.0));

@@ -10,6 +10,7 @@
 
 #include "tables/laws/discrete.h"
 #include "tables/laws/shapes.h"
+#include "tables/rounding.h"
 
 namespace bushd::tables::laws {
 namespace {
@@ -175,8 +176,7 @@ Result<std::uint32_t> unit_for(const Spec& spec, const Delays& accel, const Dela
   if (uses_v64(spec)) return kV64UnitNs;
   const double slowest_ns = std::max(accel.front(), decel.front()) * 1e9;
   if (spec.code_bits == 8) {
-    return static_cast<std::uint32_t>(
-        std::max(1.0, std::ceil(slowest_ns / kBushdSlowest - kNoiseUnits)));
+    return static_cast<std::uint32_t>(std::max(1.0, rounded_up_units(slowest_ns / kBushdSlowest)));
   }
   const auto side_ns = [](const Delays& delays) {
     return std::accumulate(delays.begin(), delays.end(), 0.0) * 1e9;
@@ -201,7 +201,12 @@ Result<std::vector<std::uint16_t>> rounded(const Spec& spec, const Delays& delay
     const double units = delay_s * 1e9 / unit_ns;
     return spec.published ? std::floor(units + kNoiseUnits) : std::ceil(units - kNoiseUnits);
   };
-  const double cruise = code(delays.back());
+  // The speeds that were asked for are those at both ends; between them a delay is a difference of
+  // two times, in which the noise of a double is greater.
+  const auto end_code = [&](double delay_s) {
+    return spec.published ? code(delay_s) : rounded_up_units(delay_s * 1e9 / unit_ns);
+  };
+  const double cruise = end_code(delays.back());
   if (cruise < lowest) {
     return fail(fmt::format(
         "the maximum speed is code {:.0f} of {} ns; allowed: {:.0f} or more{}. Use a shorter "
@@ -209,15 +214,19 @@ Result<std::vector<std::uint16_t>> rounded(const Spec& spec, const Delays& delay
         cruise, unit_ns, lowest,
         coarse ? "" : ", so that one code changes the speed by 10 % at most"));
   }
-  if (code(delays.front()) > highest) {
+  const double start = end_code(delays.front());
+  if (start > highest) {
     return fail(
         fmt::format("the start speed is code {:.0f} of {} ns; allowed: up to {:.0f}. Use a "
                     "longer --time-unit or start faster",
-                    code(delays.front()), unit_ns, highest));
+                    start, unit_ns, highest));
   }
   std::vector<std::uint16_t> codes;
   codes.reserve(delays.size());
-  for (const double delay_s : delays) codes.push_back(static_cast<std::uint16_t>(code(delay_s)));
+  for (const double delay_s : delays) {
+    codes.push_back(static_cast<std::uint16_t>(std::clamp(code(delay_s), cruise, start)));
+  }
+  codes.front() = static_cast<std::uint16_t>(start);
   return codes;
 }
 

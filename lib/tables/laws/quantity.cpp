@@ -30,12 +30,30 @@ std::vector<Unit> units_of(Quantity quantity) {
     case Quantity::kTorque:
       return {{"Nm", 1}, {"Ncm", 1e-2}, {"mNm", 1e-3}};
     case Quantity::kInertia:
-      return {{"kgm2", 1}, {"gcm2", 1e-7}, {"kgcm2", 1e-4}};
+      return {{"kg m2", 1}, {"g cm2", 1e-7}, {"kg cm2", 1e-4}};
   }
   return {};
 }
 
+bool needs_unit(Quantity quantity) {
+  return quantity == Quantity::kTorque || quantity == Quantity::kInertia;
+}
+
+std::string without_blanks(std::string_view text) {
+  std::string out(text);
+  std::erase(out, ' ');
+  return out;
+}
+
 }  // namespace
+
+std::string units_text(Quantity quantity) {
+  std::string names;
+  for (const Unit& unit : units_of(quantity)) {
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", unit.name);
+  }
+  return names;
+}
 
 Result<double> parse_quantity(Quantity quantity, std::string_view text) {
   const std::string copy(text);
@@ -47,15 +65,17 @@ Result<double> parse_quantity(Quantity quantity, std::string_view text) {
   const bool starts_as_number =
       !copy.empty() && std::string_view("+-.0123456789").find(copy[0]) != std::string_view::npos;
   if (starts_as_number && end != copy.c_str() && std::isfinite(value)) {
-    if (rest.empty()) return value;
+    if (rest.empty() && !needs_unit(quantity)) return value;
     for (const Unit& unit : units) {
-      if (rest == unit.name) return value * unit.factor;
+      if (!rest.ends_with(' ') && without_blanks(rest) == without_blanks(unit.name)) {
+        return value * unit.factor;
+      }
     }
   }
-  std::string names;
-  for (const Unit& unit : units) names += fmt::format("{}{}", names.empty() ? "" : ", ", unit.name);
-  return fail(fmt::format("\"{}\"; allowed: a number with one of the units {} (none: {})",
-                          copy.substr(0, 40), names, units.front().name));
+  const std::string none =
+      needs_unit(quantity) ? "" : fmt::format(" (none: {})", units.front().name);
+  return fail(fmt::format("\"{}\"; allowed: a number with one of the units {}{}",
+                          copy.substr(0, 40), units_text(quantity), none));
 }
 
 }  // namespace bushd::tables::laws

@@ -26,6 +26,17 @@ CREATE TABLE IF NOT EXISTS tag (
   PRIMARY KEY (name, tag)) WITHOUT ROWID;
 )";
 
+// Later than the others: a history may be there without it, and be readable only.
+constexpr const char* kPendingSchema = R"(
+CREATE TABLE IF NOT EXISTS pending (
+  name TEXT NOT NULL PRIMARY KEY,
+  number INTEGER NOT NULL,
+  time TEXT NOT NULL,
+  note TEXT NOT NULL,
+  content_hash TEXT NOT NULL,
+  text TEXT NOT NULL) WITHOUT ROWID;
+)";
+
 class Statement {
  public:
   Statement(sqlite3* database, const char* sql) {
@@ -45,6 +56,7 @@ class Statement {
     return *this;
   }
 
+  bool is_prepared() const { return statement_ != nullptr; }
   // SQLITE_ROW, SQLITE_DONE or an error; a statement that could not be prepared is an error too.
   int step() { return statement_ == nullptr ? SQLITE_ERROR : sqlite3_step(statement_); }
 
@@ -83,6 +95,9 @@ Result<History> History::open(const std::filesystem::path& path) {
   if (opened != SQLITE_OK) return history.failed();
   sqlite3_busy_timeout(database, kBusyTimeoutMs);
   if (auto made = history.run(kSchema); !made) return fail(made.error());
+  if (auto made = history.run(kPendingSchema); !made) {
+    if (sqlite3_errcode(database) != SQLITE_READONLY) return fail(made.error());
+  }
   return history;
 }
 
@@ -97,6 +112,10 @@ Result<void> History::begin() {
 
 Result<void> History::commit() {
   return run("COMMIT");
+}
+
+void History::roll_back() {
+  (void)run("ROLLBACK");
 }
 
 Result<void> History::add(const std::string& table, const Revision& revision,
@@ -152,6 +171,49 @@ Result<std::vector<Revision>> History::log(const std::string& table) const {
   }
   if (row != SQLITE_DONE) return failed();
   return log;
+}
+
+Result<void> History::announce(const std::string& table, const Revision& revision,
+                               const std::string& text) {
+  Statement insert(database_.get(),
+                   "INSERT OR REPLACE INTO pending (name, number, time, note, content_hash, text)"
+                   " VALUES (?, ?, strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?, ?, ?)");
+  insert.bind(table)
+      .bind(revision.number)
+      .bind(revision.note)
+      .bind(revision.content_hash)
+      .bind(text);
+  if (insert.step() != SQLITE_DONE) return failed();
+  return {};
+}
+
+Result<std::optional<History::Pending>> History::announced(const std::string& table) const {
+  Statement select(database_.get(),
+                   "SELECT number, time, note, content_hash, text FROM pending WHERE name = ?");
+  if (!select.is_prepared()) return std::nullopt;  // of a time before there were such
+  const int row = select.bind(table).step();
+  if (row == SQLITE_DONE) return std::nullopt;
+  if (row != SQLITE_ROW) return failed();
+  return Pending{.revision = {.number = select.number(0),
+                              .time = select.text(1),
+                              .note = select.text(2),
+                              .content_hash = select.text(3)},
+                 .text = select.text(4)};
+}
+
+Result<void> History::confirm(const std::string& table) {
+  Statement insert(database_.get(),
+                   "INSERT OR REPLACE INTO revision (name, number, time, note, content_hash, text)"
+                   " SELECT name, number, time, note, content_hash, text FROM pending"
+                   " WHERE name = ?");
+  if (insert.bind(table).step() != SQLITE_DONE) return failed();
+  return withdraw(table);
+}
+
+Result<void> History::withdraw(const std::string& table) {
+  Statement remove(database_.get(), "DELETE FROM pending WHERE name = ?");
+  if (remove.bind(table).step() != SQLITE_DONE) return failed();
+  return {};
 }
 
 Result<void> History::tag(const std::string& table, const std::string& tag,

@@ -31,12 +31,27 @@ class History {
   // is undone.
   Result<void> begin();
   Result<void> commit();
+  void roll_back();
 
   Result<void> add(const std::string& table, const Revision& revision, const std::string& text);
   Result<std::uint32_t> last(const std::string& table) const;  // 0: none
   // The file's text as it was; empty: there is no such revision.
   Result<std::optional<std::string>> text(const std::string& table, std::uint32_t revision) const;
   Result<std::vector<Revision>> log(const std::string& table) const;  // newest first
+
+  // A revision that is about to be put in place: written before the file is, so that whenever a
+  // crash comes, the history knows the text. One for each table.
+  struct Pending {
+    Revision revision;
+    std::string text;
+  };
+  Result<void> announce(const std::string& table, const Revision& revision,
+                        const std::string& text);
+  Result<std::optional<Pending>> announced(const std::string& table) const;
+  // It is in place: a revision like the others.
+  Result<void> confirm(const std::string& table);
+  // It never came in place.
+  Result<void> withdraw(const std::string& table);
 
   // A tag names one revision; setting it again moves it.
   Result<void> tag(const std::string& table, const std::string& tag, std::uint32_t revision);

@@ -51,6 +51,32 @@ Result<std::uint32_t> Store::record_found(History& history, const std::string& n
   return number;
 }
 
+Result<void> Store::settle(History& history, const std::string& name) const {
+  const auto announced = history.announced(name);
+  if (!announced) return fail(announced.error());
+  if (!*announced) return {};
+  const auto now = read_text(path_of(name));
+  if (now && *now == (*announced)->text) return history.confirm(name);
+  const auto last = history.last(name);
+  if (!last) return fail(last.error());
+  const auto before = history.text(name, *last);
+  if (!before) return fail(before.error());
+  const bool never_came = now ? *before == *now : *last == 0;
+  return never_came ? history.withdraw(name) : history.confirm(name);
+}
+
+void Store::settle_if_allowed(History& history, const std::string& name) const {
+  const auto announced = history.announced(name);
+  if (!announced || !*announced) return;
+  const auto lock = FileLock::take(directory_ / ".lock");
+  if (!lock || !history.begin()) return;
+  if (settle(history, name)) {
+    (void)history.commit();
+  } else {
+    history.roll_back();
+  }
+}
+
 Result<std::uint32_t> Store::write(const std::string& name, const std::optional<std::string>& from,
                                    const std::string& text, const std::string& note) {
   const std::filesystem::path path = path_of(name);
@@ -75,20 +101,27 @@ Result<std::uint32_t> Store::write(const std::string& name, const std::optional<
     }
   }
 
+  remove_leftovers(path);
   auto history = History::open(history_path_);
   if (!history) return fail(history.error());
   if (auto begun = history->begin(); !begun) return fail(begun.error());
+  if (auto settled = settle(*history, name); !settled) return fail(settled.error());
   const auto last = record_found(*history, name);
   if (!last) return fail(last.error());
   content->revision = *last + 1;
   const auto numbered = rewrite(text, *content, path.string());
   if (!numbered) return fail(numbered.error());
-  const auto added = history->add(
+  const auto announced = history->announce(
       name, {.number = content->revision, .note = note, .content_hash = content_hash(*content)},
       *numbered);
-  if (!added) return fail(added.error());
-  if (auto replaced = replace_file(path, *numbered); !replaced) return fail(replaced.error());
+  if (!announced) return fail(announced.error());
   if (auto committed = history->commit(); !committed) return fail(committed.error());
+  if (auto replaced = replace_file(path, *numbered); !replaced) {
+    (void)history->withdraw(name);  // else the next use does
+    return fail(replaced.error());
+  }
+  // The revision is in the history already; what cannot be confirmed now is at the next use.
+  if (history->begin() && history->confirm(name)) (void)history->commit();
   return content->revision;
 }
 
@@ -126,8 +159,9 @@ Result<Stored> Store::read(const std::string& name, std::string_view at) const {
         .message = fmt::format("table \"{}\" has no history, so no revision \"{}\"", name, at),
         .file = path_of(name).string()});
   }
-  const auto history = History::open(history_path_);
+  auto history = History::open(history_path_);
   if (!history) return fail(history.error());
+  settle_if_allowed(*history, name);
   const auto number = number_of(*history, name, at);
   if (!number) return fail(number.error());
   auto text = history->text(name, *number);
@@ -143,8 +177,11 @@ Result<Stored> Store::read(const std::string& name, std::string_view at) const {
 }
 
 Result<std::vector<Revision>> Store::log(const std::string& name) const {
-  const auto history = History::open(history_path_);
+  std::error_code ignored;
+  if (!std::filesystem::exists(history_path_, ignored)) return std::vector<Revision>{};
+  auto history = History::open(history_path_);
   if (!history) return fail(history.error());
+  settle_if_allowed(*history, name);
   return history->log(name);
 }
 
@@ -162,6 +199,7 @@ Result<std::uint32_t> Store::tag(const std::string& name, const std::string& tag
   auto history = History::open(history_path_);
   if (!history) return fail(history.error());
   if (auto begun = history->begin(); !begun) return fail(begun.error());
+  if (auto settled = settle(*history, name); !settled) return fail(settled.error());
   const auto newest = record_found(*history, name);
   if (!newest) return fail(newest.error());
   const auto number = at.empty() ? newest : number_of(*history, name, at);

@@ -1,9 +1,10 @@
 // A directory of table files with their history: every change is a new revision.
 //
 // A save takes the directory's lock, compares the file with the text that the change was made from,
-// and replaces it atomically; the history is committed after the file. If a crash comes between
-// the two, or someone edits the file by other means, the next save first records what it finds. So
-// the history never misses a text that a bushtab has seen in place.
+// announces the new revision in the history, replaces the file atomically, and confirms the
+// revision. If a crash comes in between, the next use confirms or withdraws what was announced, by
+// what stands in the file. If someone edits the file by other means, the next save first records
+// what it finds. So the history never misses a text that a bushtab has put or seen in place.
 #pragma once
 
 #include <cstdint>
@@ -55,6 +56,11 @@ class Store {
                               const std::string& text, const std::string& note);
   Result<std::uint32_t> number_of(const History& history, const std::string& name,
                                   std::string_view at) const;
+  // Ends what a crash has left: an announced revision is confirmed, unless the file is still the
+  // one before. Preconditions: the lock is held, in a transaction.
+  Result<void> settle(History& history, const std::string& name) const;
+  // The same, for those who only read: where they may not, nothing is settled.
+  void settle_if_allowed(History& history, const std::string& name) const;
   // What stands in the file, if it is a table that the history does not have.
   Result<std::uint32_t> record_found(History& history, const std::string& name) const;
 

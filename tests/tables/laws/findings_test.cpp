@@ -4,7 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "tables/edit.h"
 #include "tables/laws/random_spec.h"
+#include "tables/random_table.h"
 
 namespace bushd::test {
 namespace {
@@ -87,6 +93,27 @@ TEST(Findings, TablesOfALawKeepItsBound) {
     RC_ASSERT(content.has_value());
     RC_ASSERT(
         found(*content, {.speed_ratio = 0, .acceleration = *spec.accel.acceleration}).empty());
+  }));
+}
+
+TEST(Findings, AdvisedScalingIsEnough) {
+  EXPECT_TRUE(rc::check("of any table", [] {
+    const TableContent content = random_case(1000).content;
+    Limits limits{.speed_ratio = 0, .resolution = 1, .acceleration = 1};
+    const auto steep = found(content, limits);
+    if (steep.empty()) return;
+    // Below that, what is left of a code by the noise of its rounding would count.
+    const double least = 1e-5 / std::pow(content.time_unit_ns * 1e-9, 2);
+    limits.acceleration = std::max(least, steep[0].value * random_in(5, 99) / 100.0);
+    for (const Finding& finding : found(content, limits)) {
+      const std::string advice = "scale --acceleration ";
+      const std::size_t at = finding.message.find(advice);
+      RC_ASSERT(at != std::string::npos);
+      const double factor = std::stod(finding.message.substr(at + advice.size()));
+      const auto scaled = scale_acceleration(content, factor);
+      RC_ASSERT(scaled.has_value());
+      RC_ASSERT(found(*scaled, limits).empty());
+    }
   }));
 }
 

@@ -3,6 +3,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <cmath>
+
+#include "tables/random_table.h"
 
 namespace bushd::test {
 namespace {
@@ -132,6 +137,37 @@ TEST(MakeTable, StartTooSlowForTheUnitNamesTheRemedy) {
   Spec spec = constant(10, 200, 1000);
   spec.time_unit_ns = 100;
   EXPECT_THAT(refusal(spec), HasSubstr("longer --time-unit or start faster"));
+}
+
+TEST(MakeTable, EndsAreNotFasterByTheLeastShare) {
+  EXPECT_TRUE(rc::check("of a code", [] {
+    const int fast = random_in(100, 3000);
+    const int slow = random_in(2 * fast, 20 * fast);
+    const double share = std::pow(10.0, -random_in(1, 9));  // above a whole number of units
+    const std::uint32_t unit_ns = 200;
+    Spec spec{.name = "t",
+              .start_hz = 1e9 / (unit_ns * (slow + share)),
+              .max_hz = 1e9 / (unit_ns * (fast + share)),
+              .time_unit_ns = unit_ns};
+    spec.accel = {.law = Law::kConstant, .codes = static_cast<std::uint32_t>(random_in(3, 500))};
+    const auto content = make_content(spec);
+    RC_ASSERT(content.has_value());
+    RC_ASSERT(content->accel.front() == slow + 1);
+    RC_ASSERT(content->accel.back() == fast + 1);
+  }));
+}
+
+TEST(MakeTable, EndsThatAreWholeCodesStayThese) {
+  EXPECT_TRUE(rc::check("with speeds as a double holds them", [] {
+    const int fast = random_in(100, 3000);
+    const int slow = random_in(2 * fast, 20 * fast);
+    Spec spec{.name = "t", .start_hz = 5e6 / slow, .max_hz = 5e6 / fast, .time_unit_ns = 200};
+    spec.accel = {.law = Law::kConstant, .codes = static_cast<std::uint32_t>(random_in(3, 500))};
+    const auto content = make_content(spec);
+    RC_ASSERT(content.has_value());
+    RC_ASSERT(content->accel.front() == slow);
+    RC_ASSERT(content->accel.back() == fast);
+  }));
 }
 
 }  // namespace

@@ -17,6 +17,17 @@ TEST(Quantity, UnitsAreConverted) {
   EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kTimeUnit, "25us"), 25000);
   EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kTorque, "12Ncm"), 0.12);
   EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kInertia, "38gcm2"), 38e-7);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kInertia, "120 g cm2"), 120e-7);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kInertia, "1.2e-5 kg m2"), 1.2e-5);
+  EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kInertia, "0.5 kg cm2"), 0.5e-4);
+}
+
+TEST(Quantity, PhysicsOfTheMotorNeedsItsUnit) {
+  EXPECT_EQ(parse_quantity(Quantity::kInertia, "1.2e-5").error().message,
+            "\"1.2e-5\"; allowed: a number with one of the units kg m2, g cm2, kg cm2");
+  EXPECT_FALSE(parse_quantity(Quantity::kTorque, "0.12"));
+  EXPECT_FALSE(parse_quantity(Quantity::kInertia, "12 kg"));
+  EXPECT_FALSE(parse_quantity(Quantity::kInertia, "12 kg m2 "));
 }
 
 TEST(Quantity, AnythingElseIsRefused) {

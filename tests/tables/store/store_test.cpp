@@ -3,8 +3,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "tables/temp_directory.h"
@@ -120,6 +124,39 @@ TEST_F(TableStore, PermissionsOfTheFileStay) {
   const std::string text = store_.read("t")->text;
   ASSERT_TRUE(store_.save("t", text, with_first_code(text, "8"), "set"));
   EXPECT_EQ(fs::status(store_.path_of("t")).permissions(), wanted);
+}
+
+TEST_F(TableStore, LinkedTableKeepsItsLinkOwnerAndMode) {
+  const auto real = directory_.path() / "real";
+  std::filesystem::create_directory(real);
+  const auto file = real / "kept elsewhere.toml";
+  std::ofstream(file) << kText;
+  std::filesystem::permissions(file, std::filesystem::perms(0640));
+  const bool root = geteuid() == 0;
+  if (root) {
+    ASSERT_EQ(chown(file.c_str(), 4321, 1234), 0);
+  }
+  std::filesystem::create_symlink("real/kept elsewhere.toml", store_.path_of("t"));
+  ASSERT_TRUE(store_.save("t", kText, with_first_code(kText, "8"), "set"));
+  EXPECT_TRUE(std::filesystem::is_symlink(store_.path_of("t")));
+  EXPECT_EQ(store_.read("t")->content.accel.front(), 8);
+  struct stat now {};
+  ASSERT_EQ(stat(file.c_str(), &now), 0);
+  EXPECT_EQ(now.st_mode & 07777, 0640U);
+  EXPECT_EQ(now.st_uid, root ? 4321U : geteuid());
+  EXPECT_EQ(now.st_gid, root ? 1234U : getegid());
+}
+
+TEST_F(TableStore, LinkToNothingIsLeftAlone) {
+  std::filesystem::create_symlink("nowhere", store_.path_of("t"));
+  EXPECT_THAT(store_.create("t", kText, "new").error().text(), HasSubstr("is a link to nothing"));
+  EXPECT_TRUE(std::filesystem::is_symlink(store_.path_of("t")));
+  EXPECT_THAT(notes(), testing::IsEmpty());
+}
+
+TEST_F(TableStore, LookingAtTheLogMakesNoHistory) {
+  EXPECT_THAT(notes(), testing::IsEmpty());
+  EXPECT_TRUE(std::filesystem::is_empty(directory_.path()));
 }
 
 TEST_F(TableStore, HistoryThatCannotBeWrittenChangesNothing) {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "run_bushtab.h"
 #include "source_path.h"
 #include "tables/random_table.h"
 #include "tables/reference_move.h"
@@ -24,26 +25,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
-
-struct Outcome {
-  int exit_code = -1;
-  std::string out;
-  std::string err;
-};
-
-std::string read_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-Outcome bushtab(const std::string& arguments, const std::string& environment = "") {
-  const TempDirectory directory;
-  const std::string out = directory.path() / "out";
-  const std::string err = directory.path() / "err";
-  const int status = std::system(
-      (environment + " " BUSHTAB " " + arguments + " </dev/null >" + out + " 2>" + err).c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
-}
 
 std::string csv(const std::vector<int>& displacements) {
   std::string text = "tick,displacement\n";
@@ -321,6 +302,47 @@ TEST_F(BushtabEdit, EditorsTextIsCheckedOnReturn) {
   EXPECT_THAT(bushtab("edit t" + places_, "EDITOR=false").err, HasSubstr("nothing was changed"));
 }
 
+TEST_F(BushtabEdit, ScaleAndResampleSayWhatRoundingMadeOfIt) {
+  const Outcome coarse = run("resample t --time-unit 40us");
+  EXPECT_EQ(coarse.exit_code, 0);
+  EXPECT_EQ(
+      coarse.err,
+      "delays are rounded up to whole time units: speeds are up to 37.5 % lower than asked\n");
+  EXPECT_THAT(text(), HasSubstr("accel = [3, 2, 2] # fast\n"));
+  EXPECT_THAT(run("scale t --speed 1.5").err, HasSubstr("33.3 % lower"));
+  const std::string before = text();
+  for (const char* command : {"scale t --speed 1e9", "resample t --time-unit 1s"}) {
+    const Outcome refused = run(command);
+    EXPECT_EQ(refused.exit_code, 1) << command;
+    EXPECT_THAT(refused.err, HasSubstr("time units; allowed: 1 or more"));
+  }
+  EXPECT_EQ(text(), before);
+  EXPECT_THAT(run("scale t --speed 0.5").err, IsEmpty());
+}
+
+TEST_F(BushtabEdit, TextThatWasKeptIsToldAndNotWrittenOver) {
+  const std::string kept = directory_.path() / ".t.edited.toml";
+  directory_.write(".t.edited.toml", "my evening's work\n");
+  const Outcome good = bushtab("edit t" + places_, "EDITOR='sed -i s/90/80/'");
+  EXPECT_THAT(good.out, HasSubstr("revision 2"));
+  EXPECT_THAT(good.err, HasSubstr("never saved is in " + kept));
+  const Outcome bad = bushtab("edit t" + places_, "EDITOR='sed -i s/80/8x/'");
+  EXPECT_THAT(bad.err,
+              HasSubstr("your text is in " + (directory_.path() / ".t.edited-2.toml").string()));
+  EXPECT_EQ(read_file(kept), "my evening's work\n");
+}
+
+TEST_F(BushtabEdit, TextOfAnEditorThatFailsAfterWritingIsKept) {
+  const std::string before = text();
+  const Outcome outcome =
+      bushtab("edit t" + places_, "EDITOR='f() { sed -i s/90/80/ \"$1\"; false; }; f'");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("your text is in "));
+  EXPECT_THAT(outcome.err, HasSubstr("failed; nothing was changed"));
+  EXPECT_THAT(read_file(directory_.path() / ".t.edited.toml"), HasSubstr("80"));
+  EXPECT_EQ(text(), before);
+}
+
 TEST_F(BushtabEdit, CopyHasANameAndAHistoryOfItsOwn) {
   EXPECT_EQ(run("copy t other").exit_code, 0);
   EXPECT_THAT(read_file(directory_.path() / "other.toml"),
@@ -376,50 +398,15 @@ TEST_F(BushtabEdit, BushdImagesGoOutAndComeBack) {
               HasSubstr("a page counts up to 65535"));
 }
 
-const char* const kLaw = " --law constant --start 100Hz --max 1kHz --acceleration 5kHz/s";
-
-TEST(BushtabNew, MakesAFileThatIsRevisionOne) {
-  const TempDirectory directory;
-  const std::string table = directory.path() / "mine.toml";
-  const Outcome made = bushtab("new " + table + kLaw + " --comment why --description 'a motor'");
-  EXPECT_EQ(made.exit_code, 0) << made.err;
-  EXPECT_EQ(made.out, table + ": revision 1\n");
-  EXPECT_THAT(read_file(table), StartsWith("# why\nname = \"mine\"\ndescription = \"a motor\"\n"
-                                           "revision = 1\ntime_unit_ns = 200\naccel = [\n"));
-  EXPECT_EQ(bushtab("check " + table).exit_code, 0);
-  EXPECT_THAT(bushtab("new " + table + kLaw).err, HasSubstr("is there already"));
-  EXPECT_EQ(bushtab("new --replace " + table + kLaw).out, table + ": revision 2\n");
-}
-
-TEST(BushtabNew, NamesLiveInTheDirectoryOfTables) {
-  const TempDirectory directory;
-  const std::string places = " --dir " + directory.path().string();
-  EXPECT_EQ(bushtab("new mine" + std::string(kLaw) + places).exit_code, 0);
-  EXPECT_THAT(bushtab("show mine" + places).out, HasSubstr("100..1000 steps/s"));
-  EXPECT_EQ(bushtab("show mine@1" + places).exit_code, 0);
-  EXPECT_THAT(bushtab("show mine@2" + places).err, HasSubstr("has no revision 2"));
-}
-
-TEST(BushtabNew, PrintLeavesNothingBehind) {
-  const TempDirectory directory;
-  const std::string places = " --dir " + directory.path().string();
-  EXPECT_THAT(bushtab("new mine --print" + std::string(kLaw) + places).out,
-              StartsWith("name = \"mine\"\n"));
-  EXPECT_TRUE(std::filesystem::is_empty(directory.path()));
-}
-
-TEST(BushtabNew, WrongUnitsAreWrongUsage) {
-  const Outcome outcome =
-      bushtab("new ./x.toml --law constant --start 100rpm --max 1kHz --time 1s");
-  EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("--start: \"100rpm\"; allowed: a number with one of the units "
-                                     "steps/s, Hz, kHz"));
-}
-
-TEST(BushtabNew, WhatCannotWorkIsRefused) {
-  const Outcome outcome = bushtab("new ./x.toml --law constant --start 1kHz --max 100Hz --time 1s");
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("allowed: up to the maximum, 100"));
+TEST_F(BushtabEdit, ShippedTableIsToBeCopiedFirst) {
+  for (const char* command : {"set bushd2-constant 0 200", "scale bushd2-constant --speed 0.5",
+                              "edit bushd2-constant", "tag bushd2-constant good"}) {
+    const Outcome outcome = run(command);
+    EXPECT_EQ(outcome.exit_code, 1) << command;
+    EXPECT_THAT(outcome.err, HasSubstr("is a shipped table, which stays as it is; copy it first: "
+                                       "\"bushtab copy bushd2-constant NEW\""));
+  }
+  EXPECT_THAT(run("set nosuch 0 200").err, Not(HasSubstr("shipped")));
 }
 
 TEST(BushtabShow, TellsSpeedsTimesAndCounts) {

@@ -135,7 +135,7 @@ class HostileFiles(unittest.TestCase):
             with self.subTest(command[0]):
                 done = self.bushtab(*command)
                 self.assertEqual(done.returncode, 0, done.stderr)
-                self.assertIn(b"?[2Jgone", done.stdout)
+                self.assertIn(rb"\x1b[2Jgone", done.stdout)
 
     def test_a_negative_index_is_told_as_it_was_given(self):
         self.file.write_text(GOOD)
@@ -158,6 +158,33 @@ class HostileFiles(unittest.TestCase):
                 done = self.bushtab("check", "h", "--torque", "m.csv", "--inertia", "38gcm2")
                 self.assertEqual(done.returncode, 1)
                 self.assertIn(place, done.stderr)
+
+    def test_what_steers_a_terminal_is_shown_escaped(self):
+        hostile = "e\x1b[2J\x7f\x9b31m\u202edcba\u2066"
+        shown = r"e\x1b[2J\x7f\u009b31m\u202edcba\u2066"
+        path = self.path / f"{hostile}.toml"
+        path.write_text(GOOD + 'description = "\u202eback"\n')
+        for arguments, code in (
+            (["show", path], 0),
+            (["check", path], 0),
+            (["plot", path], 0),
+            (["set", path, "0", "0"], 1),
+            (["set", path, "0", "89"], 0),
+            (["tag", path, "good\u202e"], 0),
+            (["log", path], 0),
+            (["list"], 0),
+            (["show", path, "--json"], 0),
+            (["show", hostile], 1),
+            (["check", path.parent / f"no-{hostile}.toml"], 1),
+            (["show", path, f"--{hostile}"], 2),
+        ):
+            with self.subTest(arguments):
+                done = self.bushtab(*arguments)
+                self.assertEqual(done.returncode, code, done.stderr)
+                said = (done.stdout + done.stderr).decode()
+                self.assertFalse(set(said) & set("\x1b\x7f\x9b\u202e\u2066"), said)
+                if "--json" not in arguments and arguments[0] not in ("log", "tag") and code != 1 or arguments[0] == "check":
+                    self.assertIn(shown, said)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,9 @@
 import os
 import pathlib
 import re
+import shlex
 import subprocess
+import tempfile
 import unittest
 
 PAGE = pathlib.Path(os.environ["BUSHD_SOURCE_DIR"]) / "docs/man/bushtab.1"
@@ -31,9 +33,31 @@ def options_in(section):
     return {option for head in heads for option in re.findall(r"--[a-z][a-z0-9-]*", head)}
 
 
+TYPE = re.compile(r"(?:(?!Needs|Excludes)\S+(?: in \[-?\d+ - \d+\])?(?: \.\.\.)?(?: REQUIRED)?)?(?: ?(?:Needs|Excludes): \S+)?")
+
+
+def entries_in_help(*command):
+    """Each option with its type and description."""
+    text = bushtab_help(*command).split("Options:\n", 1)[1]
+    entries = re.findall(r"^ +(--[a-z][a-z0-9-]*)\b(.*(?:\n {20,}.*)?)", text, re.MULTILINE)
+    return {name: " ".join(rest.split()) for name, rest in entries}
+
+
+def descriptions_in(section):
+    entries = [entry.split("\n", 1) for entry in section.split(".TP\n")[1:]]
+    found = {}
+    for head, body in entries:
+        if names := re.findall(r"--[a-z][a-z0-9-]*", head):
+            body = re.split(r"^\.(?:PP|SS|TS)", body, maxsplit=1, flags=re.MULTILINE)[0]
+            body = re.sub(r"^\.[A-Z]+ ?", "", re.sub(r"\\f.", "", body).replace(r"\(aq", "'"), flags=re.MULTILINE)
+            found[names[0]] = " ".join(body.split())
+    return found
+
+
 class ManPage(unittest.TestCase):
     def setUp(self):
         text = PAGE.read_text().replace(r"\-", "-")
+        self.examples = re.search(r"\.SH EXAMPLES\n\.nf\n(.*?)\.fi\n", text, re.DOTALL)[1].splitlines()
         self.options = text.split(".SH OPTIONS\n")[1].split("\n.SH ")[0]
         sections = text.split(".SH COMMANDS\n")[1].split("\n.SH ")[0].split(".SS ")[1:]
         self.commands = {section.split("\n")[0]: section for section in sections}
@@ -46,6 +70,24 @@ class ManPage(unittest.TestCase):
         for name, section in self.commands.items():
             with self.subTest(name):
                 self.assertEqual(options_in(section), options_in_help(name))
+
+    def test_descriptions_defaults_and_units_are_the_same(self):
+        for name, section in self.commands.items():
+            described = descriptions_in(section)
+            for option, entry in entries_in_help(name).items():
+                with self.subTest(f"{name} {option}"):
+                    self.assertTrue(entry.endswith(described[option]), f"{entry}\n{described[option]}")
+                    self.assertRegex(entry.removesuffix(described[option]).strip(), rf"\A{TYPE.pattern}\Z")
+
+    def test_examples_work_in_an_empty_folder(self):
+        self.assertGreaterEqual(len(self.examples), 3)
+        with tempfile.TemporaryDirectory() as directory:
+            for line in self.examples:
+                with self.subTest(line):
+                    program, *arguments = shlex.split(line)
+                    self.assertEqual(program, "bushtab")
+                    done = subprocess.run([os.environ["BUSHTAB"], *arguments], capture_output=True, text=True, cwd=directory)
+                    self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
 
     def test_operands_are_the_same(self):
         for name, section in self.commands.items():

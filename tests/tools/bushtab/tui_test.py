@@ -172,6 +172,52 @@ class Tui(unittest.TestCase):
                 self.assertIn(f"what it would be is in {aside}", tui.raw.decode())
                 self.assertEqual(aside.read_text(), TABLE.replace("70", "65"))
                 self.assertEqual(self.file.read_text(), TABLE)
+                aside.unlink()
+
+    def test_told_twice_to_end_it_still_keeps_changes_and_says_where(self):
+        tui = self.opened()
+        self.change_second_code(tui)
+        for number in (signal.SIGSTOP, signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGCONT):
+            os.kill(tui.pid, number)  # the last lets all come at once
+        self.assertEqual(tui.end(), 1)
+        aside = self.path / ".t.edited.toml"
+        self.assertIn(f"what it would be is in {aside}", tui.raw.decode())
+        self.assertEqual(aside.read_text(), TABLE.replace("70", "65"))
+
+    def test_window_of_a_shell_that_is_closed_loses_nothing(self):
+        for shell in (["sh"], ["bash", "--norc", "--noprofile"]):
+            with self.subTest(shell):
+                ended, alive = os.pipe()  # its end comes when the shell and all it started are gone
+                os.set_inheritable(alive, True)
+                environment = {"TERM": "xterm", "LC_ALL": "C.UTF-8", "NO_COLOR": "", "PS1": "ready> "}
+                tui = Terminal([*shell, "-i"], 30, 100, **environment)
+                self.addCleanup(tui.__exit__)
+                os.close(alive)
+                tui.wait_for("ready>")
+                tui.send(f"'{os.environ['BUSHTAB']}' --dir '{self.path}' tui t\r")
+                tui.wait_for("accel[0]  code 90", "q quit")
+                self.change_second_code(tui)
+                tui.close()
+                self.assertEqual(os.read(ended, 1), b"")
+                os.close(ended)
+                tui.wait_status()
+                aside = self.path / ".t.edited.toml"
+                self.assertEqual(aside.read_text(), TABLE.replace("70", "65"))
+                aside.unlink()
+
+    def test_what_was_kept_before_is_told_and_not_written_over(self):
+        kept = self.path / ".t.edited.toml"
+        kept.write_text("my evening's work\n")
+        tui = self.tui("t")
+        tui.wait_for("accel[0]  code 90", "q quit")
+        self.assertIn(f"a text of this table that was never saved is in {kept}", tui.raw.decode())
+        self.change_second_code(tui)
+        os.kill(tui.pid, signal.SIGTERM)
+        self.assertEqual(tui.end(), 1)
+        self.assertEqual(kept.read_text(), "my evening's work\n")
+        second = self.path / ".t.edited-2.toml"
+        self.assertIn(f"what it would be is in {second}", tui.raw.decode())
+        self.assertEqual(second.read_text(), TABLE.replace("70", "65"))
 
     def test_terminal_that_is_closed_ends_it(self):
         tui = self.opened()

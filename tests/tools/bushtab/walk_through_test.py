@@ -29,7 +29,6 @@ class WalkThrough(unittest.TestCase):
         directory = tempfile.TemporaryDirectory()
         self.addCleanup(directory.cleanup)
         self.directory = pathlib.Path(directory.name)
-        (self.directory / "tables").mkdir()
 
     def run_all(self):
         """Yields (command, output in the page, output). One shell runs them all, as a user's does."""
