@@ -95,16 +95,16 @@ void Installation::add_motors() {
   for (const config::Motor& config : config_.motors) {
     const config::Mcu& mcu = config_.mcu_of(config);
     const config::Bus& bus = config_.bus_of(mcu);
-    const MotorId id =
-        motors_.add(motion::MotorSetup{.name = config.name,
-                                       .mcu = mcu.id,
-                                       .output = config.output,
-                                       .has_home = config.home.has_value(),
-                                       .limit_cuts = config.limit_action == BUSHD_CUT,
-                                       .emergency_stop_cuts = bus.emergency_stop == BUSHD_CUT,
-                                       .emergency_input_cuts =
-                                           mcu.emergency_input == BUSHD_EMERGENCY_INPUT_CUTS},
-                    new_axis({motors_.size()}));
+    const MotorId id = motors_.add(
+        motion::MotorSetup{
+            .name = config.name,
+            .mcu = mcu.id,
+            .output = config.output,
+            .has_home = config.home.has_value(),
+            .limit_immediate = config.limit_action == BUSHD_STOP_IMMEDIATE,
+            .emergency_stop_cuts = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
+            .emergency_input_cuts = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE},
+        new_axis({motors_.size()}));
     motor_by_name_[config.name] = id;
     mcus_[config.mcu].motor_at_[config.output.value] = id;
   }

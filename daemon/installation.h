@@ -106,7 +106,7 @@ class Mcu {
     return master_.arm(on_bus_, edge, delay_us, moves);
   }
   void disarm() { master_.disarm(on_bus_); }
-  void compare_positions(const bushd_reference& message) {
+  void compare_positions(const bushd_position_compare& message) {
     master_.position_compare(on_bus_, message);
   }
   void home(const bushd_home& message) { master_.home(on_bus_, message); }

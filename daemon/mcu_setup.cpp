@@ -23,7 +23,7 @@ void add_inputs(bushd_set_inputs& inputs, const config::Motor& motor) {
   const std::uint16_t bit = bit_of(motor.output);
   if (motor.limit_positive) inputs.limit_positive |= bit;
   if (motor.limit_negative) inputs.limit_negative |= bit;
-  if (motor.limit_action == BUSHD_CUT) inputs.limit_cuts |= bit;
+  if (motor.limit_action == BUSHD_STOP_IMMEDIATE) inputs.limit_immediate |= bit;
   if (motor.input_active_open) inputs.inverted |= bit;
 }
 

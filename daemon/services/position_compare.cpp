@@ -9,8 +9,8 @@ bool within(std::int64_t value, std::int64_t least, std::int64_t most) {
   return value >= least && value <= most;
 }
 
-bushd_reference message_of(const api::PositionCompare& request, Output output) {
-  bushd_reference message{};
+bushd_position_compare message_of(const api::PositionCompare& request, Output output) {
+  bushd_position_compare message{};
   message.motor = output.value;
   message.width_us = 1;
   if (!request.arrivals.any()) return message;
@@ -46,14 +46,14 @@ Result<MotorId> PositionCompare::check(const api::PositionCompare& request) cons
     return fail(request.motor + ": positions lie within +-" +
                 std::to_string(motion::Motor::kMaxPosition));
   }
-  if (!within(request.delay_us, 0, BUSHD_REFERENCE_MAX_DELAY_US)) {
+  if (!within(request.delay_us, 0, BUSHD_POSITION_COMPARE_MAX_DELAY_US)) {
     return fail("a delay of " + std::to_string(request.delay_us) +
                 " us before the pulse; allowed: 0 to " +
-                std::to_string(BUSHD_REFERENCE_MAX_DELAY_US));
+                std::to_string(BUSHD_POSITION_COMPARE_MAX_DELAY_US));
   }
-  if (!within(request.width_us, 1, BUSHD_REFERENCE_MAX_WIDTH_US)) {
+  if (!within(request.width_us, 1, BUSHD_POSITION_COMPARE_MAX_WIDTH_US)) {
     return fail("a pulse of " + std::to_string(request.width_us) + " us; allowed: 1 to " +
-                std::to_string(BUSHD_REFERENCE_MAX_WIDTH_US));
+                std::to_string(BUSHD_POSITION_COMPARE_MAX_WIDTH_US));
   }
   return id;
 }

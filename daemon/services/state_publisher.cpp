@@ -122,7 +122,7 @@ api::Description StatePublisher::description_of(const Mcu& mcu) const {
                                .mcu = mcu.name(),
                                .address = mcu.config.address.value,
                                .tick_ns = bus.tick_ns(),
-                               .emergency_stop = bus.emergency_stop == BUSHD_CUT
+                               .emergency_stop = bus.emergency_stop == BUSHD_STOP_IMMEDIATE
                                                      ? api::StopMode::kImmediate
                                                      : api::StopMode::kRamp,
                                .motors = {}};

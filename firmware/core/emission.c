@@ -14,7 +14,7 @@
 // Capabilities of the modes follow each other as the modes do.
 static bool lacks(const bushd_mcu* mcu, uint8_t mode) {
   const uint32_t needed = mode == BUSHD_EMISSION_EVEN ? 0 : (uint32_t)BUSHD_CAN_BURST << (mode - 1);
-  return (needed & mcu->config.lacks) != 0;
+  return (needed & mcu->config.disabled_capabilities) != 0;
 }
 
 static bushd_status use(bushd_mcu* mcu, const bushd_emission* settings) {
@@ -105,7 +105,7 @@ static uint16_t levels_of(const bushd_mcu* mcu, uint8_t m) {
 
 // Pulses into levels. A phase goes on with every step that is counted, so it belongs to the
 // position whatever way the motor came.
-static void shape_phases(bushd_mcu* mcu, bushd_plane* plane) {
+static void shape_phases(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   const uint8_t count = bushd_phase_count(mcu->emission.settings.sequence);
   const uint16_t moving = bushd_mcu_moving(mcu);
   const uint8_t motors = motors_of(mcu);
@@ -117,23 +117,23 @@ static void shape_phases(bushd_mcu* mcu, bushd_plane* plane) {
     levels |= levels_of(mcu, m);
   }
   for (uint16_t slot = 0; slot < mcu->config.slots; ++slot) {
-    uint16_t steps = plane->step[slot];
+    uint16_t steps = slot_buffer->step[slot];
     for (uint8_t m = 0; steps != 0; ++m, steps = (uint16_t)(steps >> 1)) {
       if ((steps & 1u) == 0) continue;
       uint8_t* const phase = &mcu->emission.of.windings.phase[m];
-      *phase = next_phase(*phase, count, (plane->direction & motor_bit(m)) != 0);
+      *phase = next_phase(*phase, count, (slot_buffer->direction & motor_bit(m)) != 0);
       if ((on & motor_bit(m)) == 0) continue;
       levels &= (uint16_t) ~(0xFu << (BUSHD_PHASE_OUTPUTS * m));
       levels |= levels_of(mcu, m);
     }
-    plane->step[slot] = levels;
+    slot_buffer->step[slot] = levels;
   }
 }
 
 // Instead of the steps of the tick: there are none while it is measured.
-static bool make_settle_step(bushd_mcu* mcu, bushd_plane* plane) {
+static bool make_settle_step(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   // A motor that an input moves disturbs what is measured.
-  if (plane->active != 0) {
+  if (slot_buffer->active != 0) {
     mcu->emission.of.settle.ticks = 0;
     return false;
   }
@@ -145,27 +145,28 @@ static bool make_settle_step(bushd_mcu* mcu, bushd_plane* plane) {
   } else {
     mcu->direction &= (uint16_t)~motor_bit(m);
   }
-  plane->direction = mcu->direction;
-  plane->steps[m] = step;
-  plane->active = motor_bit(m);
-  memset(plane->step, 0, sizeof plane->step);
-  plane->step[bushd_mcu_settle_slot(mcu)] = motor_bit(m);
+  slot_buffer->direction = mcu->direction;
+  slot_buffer->steps[m] = step;
+  slot_buffer->active = motor_bit(m);
+  memset(slot_buffer->step, 0, sizeof slot_buffer->step);
+  slot_buffer->step[bushd_mcu_settle_slot(mcu)] = motor_bit(m);
   return true;
 }
 
-void bushd_mcu_shape(bushd_mcu* mcu, bushd_plane* plane) {
+void bushd_mcu_shape(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   const bushd_emission_grid* grid = &mcu->emission.grid;
   if (grid->mode == BUSHD_EMISSION_PHASES) {
-    plane->outputs = BUSHD_OUTPUTS_LEVELS;
-    shape_phases(mcu, plane);
+    slot_buffer->outputs = BUSHD_OUTPUTS_LEVELS;
+    shape_phases(mcu, slot_buffer);
   } else if (grid->mode == BUSHD_EMISSION_EVEN) {
-    const uint16_t changed = plane->direction ^ mcu->plane[mcu->front].direction;
-    bushd_emission_defer(plane->step, changed & plane->active, grid->setup_slots);
+    const uint16_t changed = slot_buffer->direction ^ mcu->slot_buffer[mcu->front].direction;
+    bushd_emission_defer(slot_buffer->step, changed & slot_buffer->active, grid->setup_slots);
   } else {
-    if (grid->mode == BUSHD_EMISSION_STAGGERED && make_settle_step(mcu, plane)) return;
-    bushd_emission_fill(plane->step, mcu->config.slots, grid, plane->steps, mcu->config.motors);
+    if (grid->mode == BUSHD_EMISSION_STAGGERED && make_settle_step(mcu, slot_buffer)) return;
+    bushd_emission_fill(slot_buffer->step, mcu->config.slots, grid, slot_buffer->steps,
+                        mcu->config.motors);
     if (grid->mode != BUSHD_EMISSION_COMMON_DIR) return;
-    plane->outputs = BUSHD_OUTPUTS_COMMON_DIR;
-    plane->direction = 0;
+    slot_buffer->outputs = BUSHD_OUTPUTS_COMMON_DIR;
+    slot_buffer->direction = 0;
   }
 }

@@ -7,8 +7,8 @@
 
 #include "engine/emission.h"
 #include "engine/message.h"
-#include "firmware/core/plane.h"
 #include "firmware/core/settle.h"
+#include "firmware/core/slot_buffer.h"
 
 typedef struct bushd_mcu bushd_mcu;
 
@@ -32,7 +32,7 @@ bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* messa
 void bushd_mcu_default_emission(bushd_mcu* mcu);
 void bushd_mcu_restore_emission(bushd_mcu* mcu);
 bool bushd_mcu_has_output(const bushd_mcu* mcu, uint8_t motor);
-// The plane is complete but for what the emission makes of it.
-void bushd_mcu_shape(bushd_mcu* mcu, bushd_plane* plane);
+// The slot_buffer is complete but for what the emission makes of it.
+void bushd_mcu_shape(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer);
 
 #endif

@@ -69,9 +69,9 @@ static bool is_sure(bushd_mcu* mcu, bool as_wanted) {
 }
 
 static void watch_silence(bushd_mcu* mcu) {
-  if (mcu->reception.silent_ticks < mcu->reception.silence_ticks) return;
+  if (mcu->reception.silent_ticks < mcu->reception.comm_timeout_ticks) return;
   mcu->faults |= BUSHD_FAULT_LINK;
-  mcu->run_downs = saturating_increment(mcu->run_downs);
+  mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
   bushd_mcu_ramp_down_run(mcu, mcu->homing.motor);
 }
 

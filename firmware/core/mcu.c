@@ -16,7 +16,7 @@
 #include "firmware/core/sync.h"
 #include "firmware/core/trigger.h"
 
-#define STALE_TAGS 128u
+#define STALE_SEQUENCES 128u
 #define LAST_IN_ORDER 0x1Fu
 #define STALE_NS 100000000u  // no line or adapter keeps a frame back for so long
 
@@ -43,13 +43,13 @@ static bool engine_self_test(bushd_mcu* mcu) {
   if (bushd_run_expand_coarse(&run, 6, 3, counts, 1) != 3) return false;
   if (counts[0] != 0x81 || counts[1] != 0x83 || counts[2] != 0x81) return false;
   // Two steps in a tick lie at a quarter and at three quarters of it.
-  uint16_t* const masks = mcu->plane[0].step;
+  uint16_t* const masks = mcu->slot_buffer[0].step;
   int16_t remainder = 0;
   const uint16_t slots = mcu->config.slots;
   const int16_t steps = bushd_slots_add(masks, slots, 1, 512, &remainder, BUSHD_CROSSING_COARSE);
   const bool good =
       steps == 2 && masks[slots / 4] == 1 && masks[3 * slots / 4] == 1 && remainder == 0;
-  memset(masks, 0, sizeof mcu->plane[0].step);
+  memset(masks, 0, sizeof mcu->slot_buffer[0].step);
   return good;
 }
 
@@ -86,8 +86,8 @@ void bushd_mcu_add_steps(int32_t* counter, size_t stride, const int16_t* steps, 
 }
 #endif
 
-const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
-  const bushd_plane* ended = &mcu->plane[mcu->front];
+const bushd_slot_buffer* bushd_mcu_swap(bushd_mcu* mcu) {
+  const bushd_slot_buffer* ended = &mcu->slot_buffer[mcu->front];
   if (ended->active != 0) {
     bushd_mcu_add_steps(&mcu->motor[0].position_steps, sizeof mcu->motor[0], ended->steps,
                         mcu->config.motors);
@@ -97,7 +97,7 @@ const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu) {
   ++mcu->uptime;
   mcu->reception.silent_ticks = saturating_increment(mcu->reception.silent_ticks);
   bushd_mcu_slew(mcu);
-  return &mcu->plane[mcu->front];
+  return &mcu->slot_buffer[mcu->front];
 }
 
 static void move_by_itself(bushd_mcu* mcu) {
@@ -112,8 +112,8 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
   bushd_mcu_finish_row(mcu, mcu->tick + 1u);
   bushd_mcu_watch_inputs(mcu);
   if ((mcu->autonomous | mcu->local.motors) != 0) move_by_itself(mcu);
-  bushd_mcu_watch_silence(mcu);
-  bushd_mcu_emit(mcu, &mcu->plane[mcu->front ^ 1u]);
+  bushd_mcu_watch_comm_timeout(mcu);
+  bushd_mcu_emit(mcu, &mcu->slot_buffer[mcu->front ^ 1u]);
   if (mcu->autonomous != 0) mcu->autonomous &= bushd_mcu_moving(mcu);
   if (mcu->trigger.armed != 0 && mcu->faults != 0) bushd_mcu_disarm(mcu, BUSHD_TRIGGER_FAULT);
   bushd_mcu_update_state(mcu);
@@ -128,16 +128,16 @@ static bool counts_in_order_only(uint8_t type) {
          type == BUSHD_MSG_SET_ADDRESS || (type >= BUSHD_MSG_INPUTS && type <= LAST_IN_ORDER);
 }
 
-// The master counts its frames in their tags. So one whose tag is the newest or one of those before
-// it has been heard, or was overtaken. After silence another master may have begun.
+// The master counts its frames in their sequences. So one whose sequence is the newest or one of
+// those before it has been heard, or was overtaken. After silence another master may have begun.
 static bool is_stale(bushd_mcu* mcu, const bushd_frame* frame) {
-  const uint8_t age = (uint8_t)(mcu->reception.newest_tag - frame->tag);
-  if (mcu->reception.frames_heard && age < STALE_TAGS &&
+  const uint8_t age = (uint8_t)(mcu->reception.newest_sequence - frame->sequence);
+  if (mcu->reception.frames_heard && age < STALE_SEQUENCES &&
       mcu->uptime - mcu->reception.newest_uptime <= STALE_NS / mcu->tick_ns) {
     return true;
   }
   mcu->reception.frames_heard = true;
-  mcu->reception.newest_tag = frame->tag;
+  mcu->reception.newest_sequence = frame->sequence;
   mcu->reception.newest_uptime = mcu->uptime;
   return false;
 }
@@ -170,8 +170,8 @@ void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns) {
 
 // The port's background work: what a frame has left to do, the most urgent first.
 bool bushd_mcu_work(bushd_mcu* mcu) {
-  if (mcu->stream.outlook.stale) {
-    bushd_mcu_look_out(mcu, bushd_mcu_first_open(mcu));
+  if (mcu->stream.queue_summary.stale) {
+    bushd_mcu_summarise_queue(mcu, bushd_mcu_first_open(mcu));
     return true;
   }
   return bushd_mcu_go_on_answering(mcu) || bushd_mcu_put_next_row(mcu);

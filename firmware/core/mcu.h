@@ -5,9 +5,11 @@
 // Who calls what:
 // - bushd_mcu_boot: once after reset
 // - bushd_mcu_receive: for every byte on the line
-// - bushd_mcu_swap: at every tick boundary; the returned plane is emitted during the tick that
+// - bushd_mcu_swap: at every tick boundary; the returned slot_buffer is emitted during the tick
+// that
 //   begins
-// - bushd_mcu_prepare: after every swap and before the next; computes the plane of the tick that
+// - bushd_mcu_prepare: after every swap and before the next; computes the slot_buffer of the tick
+// that
 //   follows
 // The functions are not reentrant; a port that calls `swap` from an interrupt may do so between two
 // calls of the others only (or masks it). Ticks run from boot on, whether or not the host has been
@@ -29,10 +31,10 @@ extern "C" {
 #include "firmware/core/limits.h"
 #include "firmware/core/local.h"
 #include "firmware/core/motor.h"
-#include "firmware/core/plane.h"
 #include "firmware/core/port.h"
-#include "firmware/core/reference.h"
+#include "firmware/core/position_compare.h"
 #include "firmware/core/requests.h"
+#include "firmware/core/slot_buffer.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/sync.h"
 #include "firmware/core/tables.h"
@@ -65,8 +67,9 @@ typedef struct bushd_mcu_config {
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint32_t min_tick_ns;  // shorter ones are refused
   int32_t pulse_ns;  // how long STEP pulses last; 0: half a slot; less: so much shorter than that
-  uint16_t lacks;    // BUSHD_CAN_* that it is too slow for: not in the identity, and refused
-  uint16_t* codes;   // table memory
+  uint16_t disabled_capabilities;  // BUSHD_CAN_* that it is too slow for: not in the identity, and
+                                   // refused
+  uint16_t* codes;                 // table memory
   uint16_t code_count;
   // BUSHD_MCU_MAX_REPLY bytes for answers. May be the end of the receiver's buffer, if the port
   // keeps the receiver out of it from the making of an answer until it is sent.
@@ -86,10 +89,10 @@ typedef struct bushd_mcu {
   uint8_t flags;
   uint8_t failed_tests;  // BUSHD_TEST_*
   bushd_format format;
-  uint8_t front;  // plane[front] is being emitted
-  uint16_t run_downs;
+  uint8_t front;  // slot_buffer[front] is being emitted
+  uint16_t ramp_downs;
   uint16_t low_water_ticks;
-  uint16_t direction;   // DIR levels of the plane prepared last
+  uint16_t direction;   // DIR levels of the slot_buffer prepared last
   uint16_t autonomous;  // motors that move by homing or local inputs
   uint16_t homed;
   bushd_run_tick run_tick;  // for the runs' latest time unit
@@ -102,8 +105,8 @@ typedef struct bushd_mcu {
   bushd_mcu_clock clock;
   bushd_mcu_emission emission;
   bushd_mcu_trigger_input trigger;
-  bushd_mcu_reference reference;
-  bushd_plane plane[2];
+  bushd_mcu_position_compare position_compare;
+  bushd_slot_buffer slot_buffer[2];
   bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_table_memory tables;
   bushd_receiver receiver;
@@ -129,36 +132,37 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
 // What a port may keep over resets: pieces of memory, from index 0 on until one is empty. Later
 // ones may be as long as earlier ones say. They hold addresses: only the same program may get them
 // back, between bushd_mcu_boot and the first tick, the earlier ones first, and then
-// bushd_mcu_restored.
-typedef struct bushd_mcu_piece {
+// bushd_mcu_nvm_restored.
+typedef struct bushd_mcu_nvm_region {
   void* at;
   uint16_t size;
-} bushd_mcu_piece;
-bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index);
+} bushd_mcu_nvm_region;
+bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
 // Bytes of all pieces together, with this much table memory and all motors.
-#define BUSHD_MCU_MOST_KEPT(code_count)                                                          \
+#define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                      \
   (sizeof(uint32_t) + sizeof(bushd_format) + sizeof(bushd_set_inputs) + sizeof(bushd_emission) + \
    sizeof(uint16_t) + BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) +            \
    sizeof(uint16_t) + (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t))
-void bushd_mcu_restored(bushd_mcu* mcu);
+void bushd_mcu_nvm_restored(bushd_mcu* mcu);
 
 // For a port that goes through all pieces a little at a time, again and again.
-typedef struct bushd_mcu_pass {
+typedef struct bushd_mcu_nvm_scan {
   uint8_t index;  // of the piece
   uint16_t offset;
   uint16_t size;         // of all bytes so far
   uint32_t crc;          // register after them
-  uint32_t crc_before;   // of the pass before
+  uint32_t crc_before;   // of the scan before
   uint16_t same_uptime;  // since when it is the same
-} bushd_mcu_pass;
-void bushd_mcu_begin_pass(bushd_mcu_pass* pass);
+} bushd_mcu_nvm_scan;
+void bushd_mcu_nvm_begin_scan(bushd_mcu_nvm_scan* scan);
 // The next bytes, up to `most` (>= 1); empty at the end. Pieces may change between two calls: of
-// one that has become shorter than the pass has come, nothing is left. Never more bytes in all than
-// BUSHD_MCU_MOST_KEPT.
-bushd_mcu_piece bushd_mcu_next_kept(bushd_mcu* mcu, bushd_mcu_pass* pass, uint16_t most);
-// At the end of a pass: whether what is kept has stayed the same for so long that it may be
+// one that has become shorter than the scan has come, nothing is left. Never more bytes in all than
+// BUSHD_MCU_NVM_MAX_BYTES.
+bushd_mcu_nvm_region bushd_mcu_nvm_scan_next(bushd_mcu* mcu, bushd_mcu_nvm_scan* scan,
+                                             uint16_t most);
+// At the end of a scan: whether what is kept has stayed the same for so long that it may be
 // written. A master that begins changes one thing after the other.
-bool bushd_mcu_kept_is_quiet(const bushd_mcu* mcu, bushd_mcu_pass* pass);
+bool bushd_mcu_nvm_is_quiet(const bushd_mcu* mcu, bushd_mcu_nvm_scan* scan);
 
 // One byte from the line. `time_in_tick_ns` is when its stop bit ended, counted from the start of
 // the present tick (negative: in one before); only used at delimiters. O(1), O(frame) at a
@@ -171,16 +175,16 @@ void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns);
 // of an answer).
 bool bushd_mcu_work(bushd_mcu* mcu);
 
-// Tick boundary: counts the steps of the tick that ended, returns the plane of the one that begins.
-// O(motors).
-const bushd_plane* bushd_mcu_swap(bushd_mcu* mcu);
+// Tick boundary: counts the steps of the tick that ended, returns the slot_buffer of the one that
+// begins. O(motors).
+const bushd_slot_buffer* bushd_mcu_swap(bushd_mcu* mcu);
 
 // The edge that was asked for (bushd_port.set_trigger) came at this time, counted from the start of
 // the present tick: negative if that was before it. To be called between swaps as all others, at
 // the latest in the tick after the edge: noticed later, what was armed is given up. O(motors).
 void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns);
 
-// Computes the plane of the next tick. O(slots + steps).
+// Computes the slot_buffer of the next tick. O(slots + steps).
 void bushd_mcu_prepare(bushd_mcu* mcu);
 
 // Whether samples of the supply current are wanted in the present tick, as many as the port can

@@ -4,26 +4,26 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/emission.h"
-#include "firmware/core/reference.h"
+#include "firmware/core/position_compare.h"
 #include "firmware/core/stop.h"
 #include "firmware/core/stream.h"
 
 static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   const uint16_t delay = motor->delay;
-  bushd_mcu_drop_island(mcu, m);
+  bushd_mcu_drop_out_of_order(mcu, m);
   motor->delay = 0;
   mcu->faults |= BUSHD_FAULT_LINK;
   // DIR then still shows the move before: where this one was to go is not known. It has not left
   // rest, so it may stay.
   if ((mcu->stream.begun & motor_bit(m)) == 0) return;
-  mcu->run_downs = saturating_increment(mcu->run_downs);
+  mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
   bushd_mcu_ramp_down_stream(mcu, m, delay);
 }
 
 static void end_run(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   motor->mode = BUSHD_MCU_STREAM;
-  mcu->stream.outlook.stale = true;
+  mcu->stream.queue_summary.stale = true;
 }
 
 static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
@@ -91,8 +91,8 @@ static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t ti
   return false;
 }
 
-void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
-  bushd_mcu_outlook* outlook = &mcu->stream.outlook;
+void bushd_mcu_summarise_queue(bushd_mcu* mcu, uint32_t tick) {
+  bushd_mcu_queue_summary* queue_summary = &mcu->stream.queue_summary;
   uint16_t rests = 0;
   uint16_t plain = 0;
   uint16_t following = 0;
@@ -116,21 +116,22 @@ void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick) {
     if (known_ticks > plain_ticks) continue;
     if (known_ticks < plain_ticks) following = 0;
     plain_ticks = known_ticks;
-    if (motor->delay != 0 && !motor->has_island) following |= bit;
+    if (motor->delay != 0 && !motor->has_out_of_order) following |= bit;
   }
-  outlook->stale = false;
-  outlook->rests = rests;
-  outlook->plain = plain;
-  outlook->following = following;
-  outlook->plain_until = tick + (uint32_t)plain_ticks;
-  outlook->moves = moves;
-  outlook->moving_until = tick + (uint32_t)moving_ticks;
+  queue_summary->stale = false;
+  queue_summary->rests = rests;
+  queue_summary->plain = plain;
+  queue_summary->following = following;
+  queue_summary->plain_until = tick + (uint32_t)plain_ticks;
+  queue_summary->moves = moves;
+  queue_summary->moving_until = tick + (uint32_t)moving_ticks;
 }
 
 // Of motors that are to move on when their queued ticks end.
 static void watch_low_water(bushd_mcu* mcu) {
-  if (mcu->stream.outlook.moves == 0) return;
-  const int32_t queued = ticks_after(mcu->stream.outlook.moving_until, bushd_mcu_first_open(mcu));
+  if (mcu->stream.queue_summary.moves == 0) return;
+  const int32_t queued =
+      ticks_after(mcu->stream.queue_summary.moving_until, bushd_mcu_first_open(mcu));
   if (queued < mcu->low_water_ticks) mcu->low_water_ticks = queued > 0 ? (uint16_t)queued : 0;
 }
 
@@ -232,24 +233,26 @@ __attribute__((noinline)) static void stay_at_rest(bushd_mcu* mcu, uint16_t moto
 // whose steps are those of a run.
 static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
   const uint32_t tick = mcu->tick + 1u;
-  bushd_mcu_outlook* outlook = &mcu->stream.outlook;
+  bushd_mcu_queue_summary* queue_summary = &mcu->stream.queue_summary;
   if (mcu->stream.starting != 0) forget_starts(mcu, tick);
-  if (outlook->stale || ticks_after(tick, outlook->plain_until) >= 0) bushd_mcu_look_out(mcu, tick);
+  if (queue_summary->stale || ticks_after(tick, queue_summary->plain_until) >= 0)
+    bushd_mcu_summarise_queue(mcu, tick);
   int16_t* const queued = bushd_mcu_queue_at(mcu, tick, 0);
   if (mcu->format == BUSHD_FORMAT_FINE) {
     bushd_mcu_take_fine_row(queued, values, mcu->config.motors, row);
   } else {
     bushd_mcu_take_coarse_row(queued, values, mcu->config.motors, row);
   }
-  follow_begun(mcu, outlook->plain, row->moves, tick);
-  if (outlook->rests != 0) stay_at_rest(mcu, outlook->rests, tick);
-  const uint16_t others = bushd_mcu_own_motors(mcu) & (uint16_t) ~(outlook->plain | outlook->rests);
+  follow_begun(mcu, queue_summary->plain, row->moves, tick);
+  if (queue_summary->rests != 0) stay_at_rest(mcu, queue_summary->rests, tick);
+  const uint16_t others =
+      bushd_mcu_own_motors(mcu) & (uint16_t) ~(queue_summary->plain | queue_summary->rests);
   const uint16_t exact = others != 0 ? find_others(mcu, others, values, row) : (uint16_t)0;
   watch_low_water(mcu);
   return exact;
 }
 
-__attribute__((noinline)) static void plan_fine(bushd_mcu* mcu, bushd_plane* plane,
+__attribute__((noinline)) static void plan_fine(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer,
                                                 const int16_t* displacement, uint16_t exact,
                                                 bool fills) {
   bushd_slots plans[BUSHD_MOTORS_PER_MCU];
@@ -259,47 +262,49 @@ __attribute__((noinline)) static void plan_fine(bushd_mcu* mcu, bushd_plane* pla
     if ((exact & bit) == 0) note_speed(motor, displacement[m]);
     const int16_t steps =
         bushd_slots_plan(displacement[m], &motor->remainder, BUSHD_CROSSING_FINE, &plans[m]);
-    plane->steps[m] = steps;
-    if (steps == 0) plane->active &= (uint16_t)~bit;
+    slot_buffer->steps[m] = steps;
+    if (steps == 0) slot_buffer->active &= (uint16_t)~bit;
   }
   if (!fills) return;
-  bushd_slots_fill(plane->step, mcu->config.slots, plans, mcu->config.motors);
+  bushd_slots_fill(slot_buffer->step, mcu->config.slots, plans, mcu->config.motors);
 }
 
 // Returns the motors whose steps are those of a run, and still to be made.
-static uint16_t plan(bushd_mcu* mcu, bushd_plane* plane) {
+static uint16_t plan(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   const bool fine = mcu->format == BUSHD_FORMAT_FINE;
   int16_t displacement[BUSHD_MOTORS_PER_MCU];
   bushd_mcu_row row;
-  const uint16_t exact = find_row(mcu, fine ? displacement : plane->steps, &row);
+  const uint16_t exact = find_row(mcu, fine ? displacement : slot_buffer->steps, &row);
   mcu->direction = (mcu->direction & (uint16_t)~row.moves) | (row.moves & (uint16_t)~row.back);
-  // The masks of a plane without steps are 0 already.
-  const bool has_masks = plane->active != 0 || plane->outputs == BUSHD_OUTPUTS_LEVELS;
+  // The masks of a slot_buffer without steps are 0 already.
+  const bool has_masks = slot_buffer->active != 0 || slot_buffer->outputs == BUSHD_OUTPUTS_LEVELS;
   const bool fills = bushd_mcu_steps_keep_slots(mcu) && (has_masks || row.moves != 0);
-  plane->active = row.moves;
+  slot_buffer->active = row.moves;
   if (fine) {
-    plan_fine(mcu, plane, displacement, exact, fills);
+    plan_fine(mcu, slot_buffer, displacement, exact, fills);
   } else if (fills) {
-    bushd_slots_fill_evenly(plane->step, mcu->config.slots, plane->steps, mcu->config.motors);
+    bushd_slots_fill_evenly(slot_buffer->step, mcu->config.slots, slot_buffer->steps,
+                            mcu->config.motors);
   }
   return exact;
 }
 
-void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane) {
-  uint16_t exact = plan(mcu, plane);
+void bushd_mcu_emit(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
+  uint16_t exact = plan(mcu, slot_buffer);
   for (uint8_t m = 0; exact != 0; ++m, exact = (uint16_t)(exact >> 1)) {
     if ((exact & 1u) == 0) continue;
-    plane->steps[m] = emit_exact(mcu, &mcu->motor[m], motor_bit(m), plane->step);
-    if (plane->steps[m] != 0) plane->active |= motor_bit(m);
+    slot_buffer->steps[m] = emit_exact(mcu, &mcu->motor[m], motor_bit(m), slot_buffer->step);
+    if (slot_buffer->steps[m] != 0) slot_buffer->active |= motor_bit(m);
   }
-  plane->direction = mcu->direction;
-  plane->outputs = BUSHD_OUTPUTS_PULSES;
-  plane->reference_rise = plane->reference_fall = 0;
+  slot_buffer->direction = mcu->direction;
+  slot_buffer->outputs = BUSHD_OUTPUTS_PULSES;
+  slot_buffer->compare_rise = slot_buffer->compare_fall = 0;
   const bushd_emission_grid* grid = &mcu->emission.grid;
-  const bool reference = (mcu->reference.arrivals | mcu->reference.pulse) != 0;
+  const bool compares = (mcu->position_compare.arrivals | mcu->position_compare.pulse) != 0;
   // Masks that have become levels do not show steps any more.
   const bool levels = grid->mode == BUSHD_EMISSION_PHASES;
-  if (reference && levels) bushd_mcu_emit_reference(mcu, plane);
-  if (grid->mode != BUSHD_EMISSION_EVEN || grid->setup_slots != 0) bushd_mcu_shape(mcu, plane);
-  if (reference && !levels) bushd_mcu_emit_reference(mcu, plane);
+  if (compares && levels) bushd_mcu_emit_position_compare(mcu, slot_buffer);
+  if (grid->mode != BUSHD_EMISSION_EVEN || grid->setup_slots != 0)
+    bushd_mcu_shape(mcu, slot_buffer);
+  if (compares && !levels) bushd_mcu_emit_position_compare(mcu, slot_buffer);
 }

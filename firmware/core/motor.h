@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 #include "engine/run.h"
-#include "firmware/core/plane.h"
+#include "firmware/core/slot_buffer.h"
 
 typedef struct bushd_mcu bushd_mcu;
 
@@ -20,11 +20,11 @@ typedef enum bushd_mcu_mode {
 } bushd_mcu_mode;
 
 // Ticks that are queued beyond a gap.
-typedef struct bushd_mcu_island {
+typedef struct bushd_mcu_out_of_order {
   uint32_t from;
   uint32_t until;
   uint16_t delay;  // of the running step at `until`
-} bushd_mcu_island;
+} bushd_mcu_out_of_order;
 
 // A run that waits or is made.
 typedef struct bushd_mcu_made {
@@ -40,31 +40,31 @@ typedef struct bushd_mcu_start {
 } bushd_mcu_start;
 
 typedef struct bushd_mcu_motor {
-  int32_t position_steps;  // until the start of the present tick
-  int16_t remainder;       // exact position minus steps made, 1/256 step
-  int8_t table;            // table slot, -1: none
-  uint8_t mode : 3;        // bushd_mcu_mode
-  bool exact : 1;          // `run` is emitted exact to a slot, not by displacements
-  bool has_island : 1;     // only in a stream
-  uint16_t delay;          // of the running step when the queued ticks end; 0: at rest there
-  uint16_t displacement;   // the last one that was not 0, unsigned; in the fine format only
-  uint8_t still_ticks;     // made since; saturates
+  int32_t position_steps;     // until the start of the present tick
+  int16_t remainder;          // exact position minus steps made, 1/256 step
+  int8_t table;               // table slot, -1: none
+  uint8_t mode : 3;           // bushd_mcu_mode
+  bool exact : 1;             // `run` is emitted exact to a slot, not by displacements
+  bool has_out_of_order : 1;  // only in a stream
+  uint16_t delay;             // of the running step when the queued ticks end; 0: at rest there
+  uint16_t displacement;      // the last one that was not 0, unsigned; in the fine format only
+  uint8_t still_ticks;        // made since; saturates
   union {
     bushd_mcu_start start;  // of those in bushd_mcu.starting
     uint32_t spare_ns;      // of armed ones (bushd_mcu_make_run)
   };
   uint32_t known_until;  // first tick for which nothing is decided; always > tick + 1 once prepared
-  // Memory is short: there is no island while a run waits or is made.
+  // Memory is short: there is no out-of-order range while a run waits or is made.
   union {
-    bushd_mcu_island island;
+    bushd_mcu_out_of_order out_of_order;
     bushd_mcu_made made;
   };
 } bushd_mcu_motor;
 
-// Makes the outlook from this tick on, the first that is not prepared.
-void bushd_mcu_look_out(bushd_mcu* mcu, uint32_t tick);
+// Makes the queue_summary from this tick on, the first that is not prepared.
+void bushd_mcu_summarise_queue(bushd_mcu* mcu, uint32_t tick);
 // What all motors do in the tick that is prepared.
-void bushd_mcu_emit(bushd_mcu* mcu, bushd_plane* plane);
+void bushd_mcu_emit(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer);
 
 // A tick's row leaves the queue: of all motors, in 1/256 step or, if all are whole, in steps. A
 // small MCU may link the second of its own (BUSHD_OWN_COARSE_ROWS).

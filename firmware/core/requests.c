@@ -10,7 +10,7 @@
 #include "firmware/core/homing.h"
 #include "firmware/core/inputs.h"
 #include "firmware/core/local.h"
-#include "firmware/core/reference.h"
+#include "firmware/core/position_compare.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
 #include "firmware/core/stream.h"
@@ -19,21 +19,21 @@
 #include "firmware/core/tables.h"
 #include "firmware/core/trigger.h"
 
-// What it says of each motor. One island has room in a report: that of the lowest motor, and who
-// else has the same one.
+// What it says of each motor. One out-of-order range has room in a report: that of the lowest
+// motor, and who else has the same one.
 static inline void report_motors(const bushd_mcu* mcu, bushd_report* report) {
-  const bushd_mcu_island* told = NULL;
+  const bushd_mcu_out_of_order* told = NULL;
   const bushd_mcu_motor* motor = mcu->motor;
   bushd_motor_report* to = report->motor;
   uint16_t running = 0;
   uint16_t bit = 1;
-  report->islands = 0;
+  report->out_of_order = 0;
   for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor, ++to) {
     if (motor->mode != BUSHD_MCU_STREAM && motor->exact) running |= bit;
-    if (motor->has_island) {
-      if (told == NULL) told = &motor->island;
-      if (motor->island.from == told->from && motor->island.until == told->until) {
-        report->islands |= bit;
+    if (motor->has_out_of_order) {
+      if (told == NULL) told = &motor->out_of_order;
+      if (motor->out_of_order.from == told->from && motor->out_of_order.until == told->until) {
+        report->out_of_order |= bit;
       }
     }
     to->position_steps = motor->position_steps;
@@ -44,8 +44,8 @@ static inline void report_motors(const bushd_mcu* mcu, bushd_report* report) {
   report->motor_count = mcu->config.motors;
   // What people move by local inputs is not for a master to end.
   report->running = (uint16_t)(running & ~(mcu->autonomous & ~bushd_mcu_homing_motor(mcu)));
-  report->island_from = told != NULL ? (uint16_t)told->from : (uint16_t)0;
-  report->island_until = told != NULL ? (uint16_t)told->until : (uint16_t)0;
+  report->out_of_order_from = told != NULL ? (uint16_t)told->from : (uint16_t)0;
+  report->out_of_order_until = told != NULL ? (uint16_t)told->until : (uint16_t)0;
 }
 
 // Large on the stack: not a part of the frame of who calls it, below which streams are taken.
@@ -59,9 +59,9 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   report.boot_number = mcu->config.boot_number;
   report.tick = mcu->tick;
   report.tick_ns = mcu->port.time_in_tick_ns(mcu->port.context);
-  report.mark = mcu->clock.mark;
-  report.mark_tick = mcu->clock.mark_tick;
-  report.mark_ns = mcu->clock.mark_ns;
+  report.sync_id = mcu->clock.sync_id;
+  report.sync_tick = mcu->clock.sync_tick;
+  report.sync_ns = mcu->clock.sync_ns;
   report.rate_ppb = mcu->clock.rate_ppb;
   report.moving = bushd_mcu_moving(mcu);
   bushd_mcu_report_inputs(mcu, &report);
@@ -73,7 +73,7 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   report.bad_frames = mcu->reception.bad_frames;
   report.rejected_frames = mcu->reception.rejected_frames;
   report.last_rejection = mcu->reception.last_rejection;
-  report.run_downs = mcu->run_downs;
+  report.ramp_downs = mcu->ramp_downs;
   report.low_water_ticks = mcu->low_water_ticks;
   mcu->low_water_ticks = UINT16_MAX;
   report_motors(mcu, &report);
@@ -95,10 +95,10 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   identity.queue_ticks = mcu->config.queue_ticks;
   identity.table_codes = mcu->config.code_count;
   uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
-                 BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_REFERENCE | BUSHD_CAN_BURST |
+                 BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
                  BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
-  identity.capabilities = (uint16_t)(all & ~mcu->config.lacks);
+  identity.capabilities = (uint16_t)(all & ~mcu->config.disabled_capabilities);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
   return bushd_encode_identity(&identity, payload);
 }
@@ -108,16 +108,16 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
                     mcu->format == message->format;
   if (!same && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   if (message->tick_ns < mcu->config.min_tick_ns) return BUSHD_E_CAPACITY;
-  mcu->reception.silence_ticks = message->silence_ticks;
+  mcu->reception.comm_timeout_ticks = message->comm_timeout_ticks;
   if (same) return BUSHD_OK;
   // What it counts in slots lasts as long in another tick no more.
-  mcu->reference.arrivals = 0;
+  mcu->position_compare.arrivals = 0;
   mcu->tick_ns = message->tick_ns;
   mcu->format = message->format;
   // Another tick length is another time: the MCU must be told the bus's tick again, and its tables
   // and its emission be checked against it again.
-  mcu->flags =
-      (uint8_t)((mcu->flags | BUSHD_FLAG_CONFIGURED) & ~(BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK));
+  mcu->flags = (uint8_t)((mcu->flags | BUSHD_FLAG_CONFIGURED) &
+                         ~(BUSHD_FLAG_SYNCED | BUSHD_FLAG_SYNC_HEARD));
   bushd_mcu_new_tick_length(mcu);
   bushd_mcu_default_emission(mcu);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -249,15 +249,15 @@ static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_
 static bool is_lacking(const bushd_mcu* mcu, uint8_t type) {
   switch (type) {
     case BUSHD_MSG_TABLE_TICKS:
-      return (mcu->config.lacks & BUSHD_CAN_TABLE_TICKS) != 0;
+      return (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
     case BUSHD_MSG_TABLE_RUN:
-      return (mcu->config.lacks & BUSHD_CAN_TABLE_RUN) != 0;
+      return (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_RUN) != 0;
     case BUSHD_MSG_HOME:
-      return (mcu->config.lacks & BUSHD_CAN_HOME) != 0;
+      return (mcu->config.disabled_capabilities & BUSHD_CAN_HOME) != 0;
     case BUSHD_MSG_LOCAL:
-      return (mcu->config.lacks & BUSHD_CAN_LOCAL) != 0;
-    case BUSHD_MSG_REFERENCE:
-      return (mcu->config.lacks & BUSHD_CAN_REFERENCE) != 0;
+      return (mcu->config.disabled_capabilities & BUSHD_CAN_LOCAL) != 0;
+    case BUSHD_MSG_POSITION_COMPARE:
+      return (mcu->config.disabled_capabilities & BUSHD_CAN_POSITION_COMPARE) != 0;
     default:
       return false;
   }
@@ -303,8 +303,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(local, bushd_mcu_set_local);
     case BUSHD_MSG_TRIGGER:
       HANDLE(trigger, bushd_mcu_arm);
-    case BUSHD_MSG_REFERENCE:
-      HANDLE(reference, bushd_mcu_take_reference);
+    case BUSHD_MSG_POSITION_COMPARE:
+      HANDLE(position_compare, bushd_mcu_take_position_compare);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:
@@ -330,7 +330,7 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   // Ticks look to it themselves; these two change nothing that it tells.
   if (frame->type != BUSHD_MSG_TICKS && frame->type != BUSHD_MSG_POLL &&
       frame->type != BUSHD_MSG_SYNC) {
-    mcu->stream.outlook.stale = true;
+    mcu->stream.queue_summary.stale = true;
   }
   if (status != BUSHD_OK) bushd_mcu_reject(mcu, status);
   if (!a.due) return;
@@ -344,7 +344,7 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   uint8_t* const raw = mcu->config.reply + 2;
   raw[0] = mcu->config.address;
   raw[1] = (uint8_t)(frame->type | BUSHD_TYPE_REPLY);
-  raw[2] = frame->tag;
+  raw[2] = frame->sequence;
   mcu->answer.size = (uint8_t)(BUSHD_FRAME_HEADER + a.size);
   mcu->answer.checked = 0;
   mcu->answer.delay_ns = a.delay_ns;

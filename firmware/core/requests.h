@@ -11,11 +11,11 @@ typedef struct bushd_mcu bushd_mcu;
 
 // What was heard of the line.
 typedef struct bushd_mcu_reception {
-  uint16_t silence_ticks;  // after as many without a good frame, table runs are run down
-  uint16_t silent_ticks;   // since the last good frame; saturates
+  uint16_t comm_timeout_ticks;  // after as many without a valid frame, table runs are run down
+  uint16_t silent_ticks;        // since the last valid frame; saturates
   bool frames_heard;
-  uint8_t newest_tag;      // of the master's frames, whomever they were for
-  uint32_t newest_uptime;  // when it was heard
+  uint8_t newest_sequence;  // of the master's frames, whomever they were for
+  uint32_t newest_uptime;   // when it was heard
   uint16_t bad_frames;
   uint16_t rejected_frames;
   uint8_t last_rejection;

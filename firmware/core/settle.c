@@ -21,7 +21,7 @@
 
 enum {
   QUIET_TICKS = 10,
-  FIRST_QUIET = 3,  // a plane is emitted in the tick after that in which it is prepared
+  FIRST_QUIET = 3,  // a slot_buffer is emitted in the tick after that in which it is prepared
   STEP_AT = FIRST_QUIET + QUIET_TICKS - 1,
   BACK_AT = STEP_AT + QUIET_TICKS,
   OVER_AT = BACK_AT + QUIET_TICKS

@@ -5,10 +5,10 @@
 #include "firmware/core/settle.h"
 
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu) {
-  uint16_t moving = mcu->plane[0].active | mcu->plane[1].active;
+  uint16_t moving = mcu->slot_buffer[0].active | mcu->slot_buffer[1].active;
   const uint32_t open = bushd_mcu_first_open(mcu);
   uint16_t left = bushd_mcu_own_motors(mcu);
-  if (!mcu->stream.outlook.stale) left &= (uint16_t)~mcu->stream.outlook.rests;
+  if (!mcu->stream.queue_summary.stale) left &= (uint16_t)~mcu->stream.queue_summary.rests;
   uint16_t bit = 1;
   for (const bushd_mcu_motor* motor = mcu->motor; left != 0; ++motor) {
     if ((left & 1u) != 0 && (motor->mode != BUSHD_MCU_STREAM || motor->delay != 0 ||
@@ -26,7 +26,8 @@ uint16_t bushd_mcu_engaged(const bushd_mcu* mcu) {
 }
 
 static bool is_moving(const bushd_mcu* mcu) {
-  return (mcu->plane[0].active | mcu->plane[1].active) != 0 || bushd_mcu_moving(mcu) != 0;
+  return (mcu->slot_buffer[0].active | mcu->slot_buffer[1].active) != 0 ||
+         bushd_mcu_moving(mcu) != 0;
 }
 
 void bushd_mcu_update_state(bushd_mcu* mcu) {

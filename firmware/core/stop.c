@@ -37,8 +37,8 @@ static bool start_waits(const bushd_mcu* mcu, uint8_t m, uint32_t next, uint32_t
   return ticks_after(next, near_tick(start->tick, next)) <= 0;
 }
 
-void bushd_mcu_watch_silence(bushd_mcu* mcu) {
-  if (mcu->reception.silent_ticks < mcu->reception.silence_ticks) return;
+void bushd_mcu_watch_comm_timeout(bushd_mcu* mcu) {
+  if (mcu->reception.silent_ticks < mcu->reception.comm_timeout_ticks) return;
   if (mcu->trigger.armed != 0) mcu->faults |= BUSHD_FAULT_LINK;
   const uint32_t next = mcu->tick + 1u;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -49,7 +49,7 @@ void bushd_mcu_watch_silence(bushd_mcu* mcu) {
     uint32_t from = next;
     uint32_t rest_from;
     if (runs) {
-      mcu->run_downs = saturating_increment(mcu->run_downs);
+      mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
       bushd_mcu_ramp_down_run(mcu, m);
     } else if (start_waits(mcu, m, next, &rest_from) && ticks_after(rest_from, next) > 0) {
       from = rest_from;  // ticks before it are still made
@@ -111,12 +111,12 @@ static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stre
                                     : delay_for(mcu, motor, time_ns, motor->displacement);
   }
   if (rest->goes_on && ticks_after(rest->until, next) < TICKS_AHEAD) return motor->delay;
-  const int32_t steps = rest->steps + mcu->plane[0].steps[m] + mcu->plane[1].steps[m];
+  const int32_t steps = rest->steps + mcu->slot_buffer[0].steps[m] + mcu->slot_buffer[1].steps[m];
   const uint32_t most = (uint32_t)(steps < 0 ? -steps : steps) + 1u;
   return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * (2u * TICKS_AHEAD) / most, 256);
 }
 
-void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t next) {
+void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode how, uint32_t next) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_mcu_finish_rows(mcu);
   const bool runs = in_run(motor);
@@ -126,7 +126,7 @@ void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t nex
                        (start_waits(mcu, m, next, &rest_from) && ticks_after(next, rest_from) >= 0);
   const uint16_t delay = at_rest || runs ? 0 : stream_delay(mcu, m, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
-  if (how == BUSHD_CUT) {
+  if (how == BUSHD_STOP_IMMEDIATE) {
     if (motor->mode != BUSHD_MCU_STREAM || !at_rest) motor->remainder = 0;
     motor->mode = BUSHD_MCU_STREAM;
   } else if (runs) {
@@ -136,7 +136,7 @@ void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_how how, uint32_t nex
   }
 }
 
-void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_how how, uint32_t next) {
+void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_stop_mode how, uint32_t next) {
   for (uint8_t m = 0; m < mcu->config.motors; ++m) bushd_mcu_stop_motor(mcu, m, how, next);
 }
 

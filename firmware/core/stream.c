@@ -2,8 +2,8 @@
 // known to be rest. A frame is taken whole or not at all:
 // - a start is of the MCU's epoch; its motors are at rest at known_until and start there or later
 // - a continuation is of the MCU's epoch; its motors move at known_until. It joins there; or else
-//   it is kept beyond the gap as an island, one per motor that is in no run, until the lost frame
-//   has come again
+//   it is kept beyond the gap as an out-of-order range, one per motor that is in no run, until the
+//   lost frame has come again
 // - a replacement opens a later epoch; from its first tick on it stands instead of what was queued
 // Ticks that are known and not replaced are duplicates and left alone. That a start says so is what
 // tells a lost start from a motor that need not move yet.
@@ -19,7 +19,7 @@
 
 void bushd_mcu_clear_streams(bushd_mcu* mcu) {
   mcu->stream.rows.next = mcu->stream.rows.ticks.count;
-  mcu->stream.outlook.stale = true;
+  mcu->stream.queue_summary.stale = true;
   mcu->stream.begun = mcu->stream.starting = 0;
   memset(mcu->config.queue, 0,
          (size_t)mcu->config.queue_ticks * mcu->config.motors * sizeof mcu->config.queue[0]);
@@ -28,7 +28,7 @@ void bushd_mcu_clear_streams(bushd_mcu* mcu) {
     motor->known_until = bushd_mcu_first_open(mcu);
     motor->delay = 0;
     motor->mode = BUSHD_MCU_STREAM;
-    motor->has_island = false;
+    motor->has_out_of_order = false;
   }
 }
 
@@ -51,11 +51,11 @@ static void clear_rows(bushd_mcu* mcu, uint8_t m, uint32_t from, uint32_t until)
   }
 }
 
-void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t m) {
+void bushd_mcu_drop_out_of_order(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  if (!motor->has_island) return;
-  clear_rows(mcu, m, motor->island.from, motor->island.until);
-  motor->has_island = false;
+  if (!motor->has_out_of_order) return;
+  clear_rows(mcu, m, motor->out_of_order.from, motor->out_of_order.until);
+  motor->has_out_of_order = false;
 }
 
 // One that was to come from that tick on does not; the rest before it may last until then.
@@ -73,8 +73,8 @@ static void cut_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
 void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_mcu_finish_rows(mcu);
-  mcu->stream.outlook.stale = true;
-  bushd_mcu_drop_island(mcu, m);
+  mcu->stream.queue_summary.stale = true;
+  bushd_mcu_drop_out_of_order(mcu, m);
   if (ticks_after(motor->known_until, tick) > 0) {
     clear_rows(mcu, m, tick, motor->known_until);
     motor->known_until = tick;
@@ -93,24 +93,23 @@ void bushd_mcu_note_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
 }
 
 // `news`: the frame holds something for this motor that is not known yet.
-static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
+static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu_tick_range* range,
                                 bool* news) {
   if (m >= mcu->config.motors) return BUSHD_E_FORMAT;
   const bushd_mcu_motor* motor = &mcu->motor[m];
   if (motor->table < 0) return BUSHD_E_NO_TABLE;
-  const int32_t first = ticks_after(stretch->first_tick, motor->known_until);
-  const int32_t end = first + stretch->count;
+  const int32_t first = ticks_after(range->first_tick, motor->known_until);
+  const int32_t end = first + range->count;
   const bool moves_on = motor->delay != 0;  // at known_until
-  if (stretch->flags & BUSHD_TICKS_REPLACE) {
+  if (range->flags & BUSHD_TICKS_REPLACE) {
     // Something must be queued to be replaced: if the start was lost, there is nothing to go on
     // from.
     if (moves_on ? first > 0 : first >= 0) return BUSHD_E_GAP;
     *news = true;
-    return ticks_after(stretch->first_tick, bushd_mcu_first_open(mcu)) < 0 ? BUSHD_E_LATE
-                                                                           : BUSHD_OK;
+    return ticks_after(range->first_tick, bushd_mcu_first_open(mcu)) < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
   if (end <= 0) return BUSHD_OK;
-  if (stretch->flags & BUSHD_TICKS_START) {
+  if (range->flags & BUSHD_TICKS_START) {
     *news = true;
     // A limit's ramp-down is under way beyond what is queued. One start can wait at a time if it is
     // a run's.
@@ -120,11 +119,11 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu
     return first < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
   if (!moves_on) return BUSHD_E_GAP;
-  // Its run stands where its island would be kept.
+  // Its run stands where its out-of-order range would be kept.
   if (first > 0 && motor->mode != BUSHD_MCU_STREAM) return BUSHD_E_GAP;
-  if (first > 0 && motor->has_island) {
-    const int32_t from = ticks_after(motor->island.from, motor->known_until);
-    const int32_t until = ticks_after(motor->island.until, motor->known_until);
+  if (first > 0 && motor->has_out_of_order) {
+    const int32_t from = ticks_after(motor->out_of_order.from, motor->known_until);
+    const int32_t until = ticks_after(motor->out_of_order.until, motor->known_until);
     if (first > until || end < from) return BUSHD_E_GAP;
     if (first >= from && end <= until) return BUSHD_OK;
   }
@@ -132,113 +131,114 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu
   return BUSHD_OK;
 }
 
-static bushd_status check_head(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
+static bushd_status check_head(bushd_mcu* mcu, const bushd_mcu_tick_range* range) {
   // What came since the last tick counts: without EN no step must be made, nor counted.
   bushd_mcu_update_state(mcu);
-  const bool replace = (stretch->flags & BUSHD_TICKS_REPLACE) != 0;
+  const bool replace = (range->flags & BUSHD_TICKS_REPLACE) != 0;
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
-  if (stretch->mask & (mcu->autonomous | mcu->trigger.armed)) return BUSHD_E_STATE;
-  const uint8_t ahead = (uint8_t)(stretch->epoch - mcu->stream.epoch);
+  if (range->mask & (mcu->autonomous | mcu->trigger.armed)) return BUSHD_E_STATE;
+  const uint8_t ahead = (uint8_t)(range->epoch - mcu->stream.epoch);
   if (replace ? ahead == 0 || ahead > INT8_MAX : ahead != 0) return BUSHD_E_EPOCH;
   // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once
   // both ends are checked; a frame so old that it holds nothing but past ticks is done with here.
-  const int32_t first = ticks_after(stretch->first_tick, mcu->tick);
-  if (first > (int32_t)mcu->config.queue_ticks + 1 - (int32_t)stretch->count) {
+  const int32_t first = ticks_after(range->first_tick, mcu->tick);
+  if (first > (int32_t)mcu->config.queue_ticks + 1 - (int32_t)range->count) {
     return BUSHD_E_CAPACITY;
   }
   return first <= -(int32_t)UINT16_MAX ? BUSHD_E_LATE : BUSHD_OK;
 }
 
-bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
-  const bushd_status head = check_head(mcu, stretch);
+bushd_status bushd_mcu_check_tick_range(bushd_mcu* mcu, const bushd_mcu_tick_range* range) {
+  const bushd_status head = check_head(mcu, range);
   if (head != BUSHD_OK) return head;
   bool news = false;
   for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((stretch->mask & motor_bit(m)) == 0) continue;
-    const bushd_status status = check_motor(mcu, m, stretch, &news);
+    if ((range->mask & motor_bit(m)) == 0) continue;
+    const bushd_status status = check_motor(mcu, m, range, &news);
     if (status != BUSHD_OK) return status;
   }
   return news ? BUSHD_OK : BUSHD_E_LATE;
 }
 
-// Before its displacements: makes room for a motor's part of a stretch that was found good.
-static void open_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch) {
+// Before its displacements: makes room for a motor's part of a range that was found good.
+static void open_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_tick_range* range) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  if (stretch->flags & BUSHD_TICKS_REPLACE) {
-    bushd_mcu_cut_queue(mcu, m, stretch->first_tick);
+  if (range->flags & BUSHD_TICKS_REPLACE) {
+    bushd_mcu_cut_queue(mcu, m, range->first_tick);
   }
-  const bool known = ticks_after(stretch->first_tick + stretch->count, motor->known_until) <= 0;
-  if ((stretch->flags & BUSHD_TICKS_START) == 0 || known) return;
-  bushd_mcu_note_start(mcu, m, stretch->first_tick);
+  const bool known = ticks_after(range->first_tick + range->count, motor->known_until) <= 0;
+  if ((range->flags & BUSHD_TICKS_START) == 0 || known) return;
+  bushd_mcu_note_start(mcu, m, range->first_tick);
 }
 
-// Of a stretch's ticks, as offsets from its first: those from `begin` on are not known yet, but for
-// the island's.
+// Of a range's ticks, as offsets from its first: those from `begin` on are not known yet, but for
+// the out-of-order range's.
 typedef struct gap {
   uint16_t begin;
-  uint16_t island_begin;
-  uint16_t island_end;
+  uint16_t out_of_order_begin;
+  uint16_t out_of_order_end;
 } gap;
 
-static uint16_t offset_of(const bushd_mcu_stretch* stretch, uint32_t tick) {
-  const int32_t offset = ticks_after(tick, stretch->first_tick);
+static uint16_t offset_of(const bushd_mcu_tick_range* range, uint32_t tick) {
+  const int32_t offset = ticks_after(tick, range->first_tick);
   if (offset <= 0) return 0;
-  return offset < stretch->count ? (uint16_t)offset : stretch->count;
+  return offset < range->count ? (uint16_t)offset : range->count;
 }
 
-static gap gap_in(const bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch) {
+static gap gap_in(const bushd_mcu* mcu, uint8_t m, const bushd_mcu_tick_range* range) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
-  gap found = {offset_of(stretch, motor->known_until), stretch->count, stretch->count};
-  if (motor->has_island) {
-    found.island_begin = offset_of(stretch, motor->island.from);
-    found.island_end = offset_of(stretch, motor->island.until);
+  gap found = {offset_of(range, motor->known_until), range->count, range->count};
+  if (motor->has_out_of_order) {
+    found.out_of_order_begin = offset_of(range, motor->out_of_order.from);
+    found.out_of_order_end = offset_of(range, motor->out_of_order.until);
   }
   return found;
 }
 
 static inline bool in_gap(const gap* g, uint16_t offset) {
-  return offset >= g->begin && (offset < g->island_begin || offset >= g->island_end);
+  return offset >= g->begin && (offset < g->out_of_order_begin || offset >= g->out_of_order_end);
 }
 
-static void grow_island(bushd_mcu_motor* motor, uint32_t from, uint32_t until, uint16_t delay) {
-  bushd_mcu_island* island = &motor->island;
-  if (!motor->has_island) {
-    motor->has_island = true;
-    island->from = island->until = from;
+static void grow_out_of_order(bushd_mcu_motor* motor, uint32_t from, uint32_t until,
+                              uint16_t delay) {
+  bushd_mcu_out_of_order* ahead = &motor->out_of_order;
+  if (!motor->has_out_of_order) {
+    motor->has_out_of_order = true;
+    ahead->from = ahead->until = from;
   }
-  if (ticks_after(island->from, from) > 0) island->from = from;
-  if (ticks_after(until, island->until) <= 0) return;
-  island->until = until;
-  island->delay = delay;
+  if (ticks_after(ahead->from, from) > 0) ahead->from = from;
+  if (ticks_after(until, ahead->until) <= 0) return;
+  ahead->until = until;
+  ahead->delay = delay;
 }
 
 // After them: they are known now, and what lies behind a gap that they have filled.
-static void close_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
+static void close_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_tick_range* range,
                         uint16_t delay) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  const uint32_t end = stretch->first_tick + stretch->count;
-  const bool start = (stretch->flags & BUSHD_TICKS_START) != 0;
-  if (!start && ticks_after(stretch->first_tick, motor->known_until) > 0) {
-    grow_island(motor, stretch->first_tick, end, delay);
+  const uint32_t end = range->first_tick + range->count;
+  const bool start = (range->flags & BUSHD_TICKS_START) != 0;
+  if (!start && ticks_after(range->first_tick, motor->known_until) > 0) {
+    grow_out_of_order(motor, range->first_tick, end, delay);
     return;
   }
   if (ticks_after(end, motor->known_until) <= 0) return;
   motor->known_until = end;
   motor->delay = delay;
-  if (!motor->has_island) return;
-  if (ticks_after(end, motor->island.from) < 0) {
-    if (delay == 0) bushd_mcu_drop_island(mcu, m);
+  if (!motor->has_out_of_order) return;
+  if (ticks_after(end, motor->out_of_order.from) < 0) {
+    if (delay == 0) bushd_mcu_drop_out_of_order(mcu, m);
     return;
   }
-  if (ticks_after(motor->island.until, end) > 0) {
-    motor->known_until = motor->island.until;
-    motor->delay = motor->island.delay;
+  if (ticks_after(motor->out_of_order.until, end) > 0) {
+    motor->known_until = motor->out_of_order.until;
+    motor->delay = motor->out_of_order.delay;
   }
-  motor->has_island = false;
+  motor->has_out_of_order = false;
 }
 
-static void close_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
-  if (stretch->flags & BUSHD_TICKS_REPLACE) mcu->stream.epoch = stretch->epoch;
+static void close_tick_range(bushd_mcu* mcu, const bushd_mcu_tick_range* range) {
+  if (range->flags & BUSHD_TICKS_REPLACE) mcu->stream.epoch = range->epoch;
 }
 
 // More steps would not find room in a tick: |displacement| > most x 256.
@@ -277,22 +277,23 @@ static void put_rows(bushd_mcu* mcu, uint8_t m, const bushd_ticks* ticks, uint8_
   }
 }
 
-static void put_column(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
+static void put_column(bushd_mcu* mcu, uint8_t m, const bushd_mcu_tick_range* range,
                        const bushd_ticks* ticks, uint8_t column) {
-  const gap unknown = gap_in(mcu, m, stretch);
+  const gap unknown = gap_in(mcu, m, range);
   const uint8_t begin = (uint8_t)unknown.begin;
-  const uint8_t island_begin = (uint8_t)unknown.island_begin;
-  const uint8_t island_end = (uint8_t)unknown.island_end;
-  put_rows(mcu, m, ticks, column, begin, island_begin);
-  put_rows(mcu, m, ticks, column, begin > island_end ? begin : island_end, ticks->count);
+  const uint8_t out_of_order_begin = (uint8_t)unknown.out_of_order_begin;
+  const uint8_t out_of_order_end = (uint8_t)unknown.out_of_order_end;
+  put_rows(mcu, m, ticks, column, begin, out_of_order_begin);
+  put_rows(mcu, m, ticks, column, begin > out_of_order_end ? begin : out_of_order_end,
+           ticks->count);
 }
 
 // What frames do to most motors: their ticks follow what is known, and nothing waits beyond.
 static bool all_follow(const bushd_mcu* mcu, const bushd_ticks* ticks) {
-  const bushd_mcu_outlook* outlook = &mcu->stream.outlook;
-  return (ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE)) == 0 && !outlook->stale &&
-         ticks->first_tick == outlook->plain_until &&
-         (ticks->mask & (uint16_t)~outlook->following) == 0;
+  const bushd_mcu_queue_summary* queue_summary = &mcu->stream.queue_summary;
+  return (ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE)) == 0 && !queue_summary->stale &&
+         ticks->first_tick == queue_summary->plain_until &&
+         (ticks->mask & (uint16_t)~queue_summary->following) == 0;
 }
 
 #ifndef BUSHD_OWN_COARSE_ROWS
@@ -348,8 +349,8 @@ static void put_rows_later(bushd_mcu* mcu, const bushd_ticks* ticks) {
 // And to others: their motors start from rest.
 static bool all_rest(const bushd_mcu* mcu, const bushd_ticks* ticks) {
   const uint8_t kind = ticks->flags & (BUSHD_TICKS_START | BUSHD_TICKS_REPLACE);
-  if (kind != BUSHD_TICKS_START || mcu->stream.outlook.stale ||
-      (ticks->mask & (uint16_t)~mcu->stream.outlook.rests) != 0 ||
+  if (kind != BUSHD_TICKS_START || mcu->stream.queue_summary.stale ||
+      (ticks->mask & (uint16_t)~mcu->stream.queue_summary.rests) != 0 ||
       ticks_after(ticks->first_tick, bushd_mcu_first_open(mcu)) < 0) {
     return false;
   }
@@ -383,54 +384,55 @@ static void follow(bushd_mcu* mcu, const bushd_ticks* ticks) {
     bit = (uint16_t)(bit << 1);
   }
   put_rows_later(mcu, ticks);
-  bushd_mcu_outlook* outlook = &mcu->stream.outlook;
+  bushd_mcu_queue_summary* queue_summary = &mcu->stream.queue_summary;
   // Mostly these are all that there are.
-  outlook->stale = ((outlook->plain | outlook->moves) & (uint16_t)~ticks->mask) != 0;
-  outlook->plain_until = outlook->moving_until = end;
-  outlook->moves = outlook->following = moves;
+  queue_summary->stale =
+      ((queue_summary->plain | queue_summary->moves) & (uint16_t)~ticks->mask) != 0;
+  queue_summary->plain_until = queue_summary->moving_until = end;
+  queue_summary->moves = queue_summary->following = moves;
 }
 
 // True if all rows are new to all motors of the mask.
-static bool open_motors(bushd_mcu* mcu, const bushd_mcu_stretch* stretch) {
-  const bool start = (stretch->flags & BUSHD_TICKS_START) != 0;
+static bool open_motors(bushd_mcu* mcu, const bushd_mcu_tick_range* range) {
+  const bool start = (range->flags & BUSHD_TICKS_START) != 0;
   bool all_new = true;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    if ((stretch->mask & motor_bit(m)) == 0) continue;
-    open_motor(mcu, m, stretch);
-    const int32_t first = ticks_after(stretch->first_tick, mcu->motor[m].known_until);
-    if (mcu->motor[m].has_island || (start ? first < 0 : first != 0)) all_new = false;
+    if ((range->mask & motor_bit(m)) == 0) continue;
+    open_motor(mcu, m, range);
+    const int32_t first = ticks_after(range->first_tick, mcu->motor[m].known_until);
+    if (mcu->motor[m].has_out_of_order || (start ? first < 0 : first != 0)) all_new = false;
   }
   return all_new;
 }
 
 bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
-  const bushd_mcu_stretch stretch = {ticks->epoch, ticks->flags, ticks->first_tick, ticks->count,
-                                     ticks->mask};
+  const bushd_mcu_tick_range range = {ticks->epoch, ticks->flags, ticks->first_tick, ticks->count,
+                                      ticks->mask};
   const bool fine = (ticks->flags & BUSHD_TICKS_FINE) != 0;
   const bool starts = all_rest(mcu, ticks);
   const bool plain = starts || all_follow(mcu, ticks);
   const bushd_status status =
-      plain ? check_head(mcu, &stretch) : bushd_mcu_check_stretch(mcu, &stretch);
+      plain ? check_head(mcu, &range) : bushd_mcu_check_tick_range(mcu, &range);
   if (status != BUSHD_OK) return status;
   if (fine != (mcu->format == BUSHD_FORMAT_FINE) || !in_range(mcu, ticks)) return BUSHD_E_FORMAT;
   if (bushd_mcu_starts_into_limit(mcu, ticks)) return BUSHD_E_FORBIDDEN;
   if (starts) note_starts(mcu, ticks->mask, ticks->first_tick);
   if (plain) {
     follow(mcu, ticks);
-    mcu->stream.outlook.stale |= starts;
+    mcu->stream.queue_summary.stale |= starts;
     return BUSHD_OK;
   }
-  mcu->stream.outlook.stale = true;
-  const bool all_new = open_motors(mcu, &stretch);
+  mcu->stream.queue_summary.stale = true;
+  const bool all_new = open_motors(mcu, &range);
   uint8_t column = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((ticks->mask & motor_bit(m)) == 0) continue;
-    if (!all_new) put_column(mcu, m, &stretch, ticks, column);
-    close_motor(mcu, m, &stretch, bushd_get_u16(ticks->delays + 2u * column));
+    if (!all_new) put_column(mcu, m, &range, ticks, column);
+    close_motor(mcu, m, &range, bushd_get_u16(ticks->delays + 2u * column));
     ++column;
   }
   if (all_new) put_rows_later(mcu, ticks);
-  close_stretch(mcu, &stretch);
+  close_tick_range(mcu, &range);
   return BUSHD_OK;
 }
 
@@ -440,15 +442,15 @@ static bool restore(const bushd_mcu* mcu, const bushd_table_ticks_entry* entry, 
   return bushd_run_restore(run, &mcu->tables.slot[slot].table, &entry->state);
 }
 
-static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch, bushd_run* run) {
+static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_tick_range* range, bushd_run* run) {
   enum { CHUNK = 8 };  // stack is short
-  const gap unknown = gap_in(mcu, m, stretch);
+  const gap unknown = gap_in(mcu, m, range);
   union {
     int16_t fine[CHUNK];
     uint8_t coarse[CHUNK];
   } made;
-  for (uint16_t at = 0; at < stretch->count; at = (uint16_t)(at + CHUNK)) {
-    const uint16_t left = (uint16_t)(stretch->count - at);
+  for (uint16_t at = 0; at < range->count; at = (uint16_t)(at + CHUNK)) {
+    const uint16_t left = (uint16_t)(range->count - at);
     const uint16_t count = left < CHUNK ? left : CHUNK;
     const bool in_fine = mcu->format == BUSHD_FORMAT_FINE;
     if (in_fine) {
@@ -458,16 +460,16 @@ static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stretch* stretch,
     }
     for (uint16_t i = 0; i < count; ++i) {
       if (!in_gap(&unknown, (uint16_t)(at + i))) continue;
-      *bushd_mcu_queue_at(mcu, stretch->first_tick + at + i, m) =
+      *bushd_mcu_queue_at(mcu, range->first_tick + at + i, m) =
           in_fine ? made.fine[i] : bushd_coarse_to_fine(made.coarse[i]);
     }
   }
 }
 
 bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks* ticks) {
-  const bushd_mcu_stretch stretch = {ticks->epoch, ticks->flags, ticks->first_tick, ticks->count,
-                                     ticks->mask};
-  const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
+  const bushd_mcu_tick_range range = {ticks->epoch, ticks->flags, ticks->first_tick, ticks->count,
+                                      ticks->mask};
+  const bushd_status status = bushd_mcu_check_tick_range(mcu, &range);
   if (status != BUSHD_OK) return status;
   bushd_table_ticks_entry entry;
   bushd_run run;
@@ -479,10 +481,10 @@ bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks*
   if (barred) return BUSHD_E_FORBIDDEN;
   for (uint16_t at = 0; bushd_next_table_ticks_entry(ticks, &at, &entry);) {
     restore(mcu, &entry, &run);
-    open_motor(mcu, entry.motor, &stretch);
-    put_run(mcu, entry.motor, &stretch, &run);
-    close_motor(mcu, entry.motor, &stretch, bushd_run_delay(&run));
+    open_motor(mcu, entry.motor, &range);
+    put_run(mcu, entry.motor, &range, &run);
+    close_motor(mcu, entry.motor, &range, bushd_run_delay(&run));
   }
-  close_stretch(mcu, &stretch);
+  close_tick_range(mcu, &range);
   return BUSHD_OK;
 }

@@ -11,15 +11,16 @@ typedef struct bushd_mcu bushd_mcu;
 
 // What the queue holds for all motors at once, so that no tick need look at each. To be made anew
 // when a frame has come, or something was cut.
-typedef struct bushd_mcu_outlook {
+typedef struct bushd_mcu_queue_summary {
   bool stale;
   uint16_t rests;         // these are at rest, and will be until something is asked of them
   uint16_t plain;         // of these nothing but the queue decides, until:
   uint32_t plain_until;   // that tick
   uint16_t moves;         // these are to move on when their ticks end, the first of them at:
   uint32_t moving_until;  // that tick
-  uint16_t following;     // those that are plain and move on at plain_until, without an island
-} bushd_mcu_outlook;
+  uint16_t
+      following;  // those that are plain and move on at plain_until, without an out-of-order range
+} bushd_mcu_queue_summary;
 
 // Rows of a frame that are still to be put into the queue. It was taken, and lies in the receiver.
 typedef struct bushd_mcu_rows {
@@ -31,19 +32,19 @@ typedef struct bushd_mcu_stream {
   uint8_t epoch;
   uint16_t begun;     // motors that move, as far as is known
   uint16_t starting;  // motors whose `start` is not over
-  bushd_mcu_outlook outlook;
+  bushd_mcu_queue_summary queue_summary;
   bushd_mcu_rows rows;
 } bushd_mcu_stream;
 
-typedef struct bushd_mcu_stretch {
+typedef struct bushd_mcu_tick_range {
   uint8_t epoch;
   uint8_t flags;
   uint32_t first_tick;
   uint16_t count;
   uint16_t mask;
-} bushd_mcu_stretch;
+} bushd_mcu_tick_range;
 // What all frames that move motors must keep to. BUSHD_E_LATE: good, and holds nothing new.
-bushd_status bushd_mcu_check_stretch(bushd_mcu* mcu, const bushd_mcu_stretch* stretch);
+bushd_status bushd_mcu_check_tick_range(bushd_mcu* mcu, const bushd_mcu_tick_range* range);
 bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks);
 bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks* ticks);
 // The motor, at rest at its known_until, starts at that tick.
@@ -55,7 +56,7 @@ void bushd_mcu_cut_queue(bushd_mcu* mcu, uint8_t motor, uint32_t tick);
 bool bushd_mcu_put_next_row(bushd_mcu* mcu);
 void bushd_mcu_finish_rows(bushd_mcu* mcu);
 void bushd_mcu_finish_row(bushd_mcu* mcu, uint32_t tick);
-void bushd_mcu_drop_island(bushd_mcu* mcu, uint8_t motor);
+void bushd_mcu_drop_out_of_order(bushd_mcu* mcu, uint8_t motor);
 void bushd_mcu_clear_streams(bushd_mcu* mcu);
 
 // A row of coarse ticks into the queue, of the motors in the mask. A small MCU may link one of its

@@ -48,17 +48,17 @@ static int64_t corrected_ns(const bushd_mcu* mcu, int32_t time_in_tick_ns) {
 
 static void note_correction(bushd_mcu_clock* clock, const bushd_sync* sync) {
   clock->corrected = true;
-  clock->corrected_tick = sync->mark_tick;
-  clock->corrected_ns = sync->mark_ns;
+  clock->corrected_tick = sync->sync_tick;
+  clock->corrected_ns = sync->sync_ns;
 }
 
 static void adopt(bushd_mcu* mcu, const bushd_sync* sync) {
   bushd_mcu_clock* clock = &mcu->clock;
   const int32_t tick_ns = (int32_t)mcu->tick_ns;
   // Takes the place of what was given to the port for the next tick, but for the rate's share.
-  const int32_t behind_ns = (int32_t)sync->mark_ns - (int32_t)clock->mark_ns + clock->behind_ns;
+  const int32_t behind_ns = (int32_t)sync->sync_ns - (int32_t)clock->sync_ns + clock->behind_ns;
   int32_t longer_ns = clock->slew_next_ns + clock->rate_next_ns - behind_ns;
-  mcu->tick += sync->mark_tick - clock->mark_tick;
+  mcu->tick += sync->sync_tick - clock->sync_tick;
   for (; longer_ns < 0; longer_ns += tick_ns) ++mcu->tick;
   for (; longer_ns >= tick_ns; longer_ns -= tick_ns) --mcu->tick;
   clock->slew_next_ns = longer_ns - clock->rate_next_ns;
@@ -81,7 +81,7 @@ static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t erro
   bushd_mcu_clock* clock = &mcu->clock;
   if (!clock->corrected) return 0;
   const int64_t interval_ns =
-      span_ns(mcu, clock->corrected_tick, clock->corrected_ns, sync->mark_tick, sync->mark_ns);
+      span_ns(mcu, clock->corrected_tick, clock->corrected_ns, sync->sync_tick, sync->sync_ns);
   if (interval_ns <= 0 || interval_ns > MAX_INTERVAL_NS) return 0;
   const int64_t error_ppb = error_ns * BILLION / interval_ns;
   if (error_ppb > MAX_RATE_PPB || error_ppb < -MAX_RATE_PPB) return 0;
@@ -104,12 +104,12 @@ static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t erro
 static void correct(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick_ns) {
   bushd_mcu_clock* clock = &mcu->clock;
   const int32_t limit_ns = (int32_t)(mcu->tick_ns / MAX_ERROR_DIVISOR);
-  const int32_t ticks = ticks_after(sync->mark_tick, clock->mark_tick);
+  const int32_t ticks = ticks_after(sync->sync_tick, clock->sync_tick);
   if (ticks >= -1 && ticks <= 1) {
     const int32_t error_ns =
-        (int32_t)span_ns(mcu, clock->mark_tick, clock->mark_ns, sync->mark_tick, sync->mark_ns);
+        (int32_t)span_ns(mcu, clock->sync_tick, clock->sync_ns, sync->sync_tick, sync->sync_ns);
     if (error_ns <= limit_ns && error_ns >= -limit_ns) {
-      int64_t since_ns = span_ns(mcu, clock->mark_tick, clock->mark_ns, mcu->tick,
+      int64_t since_ns = span_ns(mcu, clock->sync_tick, clock->sync_ns, mcu->tick,
                                  corrected_ns(mcu, time_in_tick_ns));
       if (since_ns > MAX_INTERVAL_NS) since_ns = MAX_INTERVAL_NS;
       const int32_t change_ppb = correct_rate(mcu, sync, error_ns, time_in_tick_ns);
@@ -147,11 +147,11 @@ static void note_mark(bushd_mcu* mcu, int32_t time_in_tick_ns) {
   bushd_mcu_clock* clock = &mcu->clock;
   const int32_t tick_ns = (int32_t)mcu->tick_ns;
   int32_t ns = (int32_t)corrected_ns(mcu, time_in_tick_ns);
-  clock->mark_tick = mcu->tick;
-  for (; ns < 0; ns += tick_ns) --clock->mark_tick;
-  for (; ns >= tick_ns; ns -= tick_ns) ++clock->mark_tick;
-  clock->mark_ns = (uint32_t)ns;
-  mcu->flags |= BUSHD_FLAG_MARK;
+  clock->sync_tick = mcu->tick;
+  for (; ns < 0; ns += tick_ns) --clock->sync_tick;
+  for (; ns >= tick_ns; ns -= tick_ns) ++clock->sync_tick;
+  clock->sync_ns = (uint32_t)ns;
+  mcu->flags |= BUSHD_FLAG_SYNC_HEARD;
 }
 
 void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick_ns) {
@@ -159,9 +159,9 @@ void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick
   watch_masters(mcu, sync->master);
   const bool same_master = clock->heard && clock->master == sync->master;
   // A frame that comes twice is one mark, and the first time is the one that the others heard.
-  if (same_master && clock->mark == sync->mark) return;
-  const bool known = same_master && sync->follows && (mcu->flags & BUSHD_FLAG_MARK) != 0 &&
-                     clock->mark == sync->known_mark && sync->mark_ns < mcu->tick_ns;
+  if (same_master && clock->sync_id == sync->sync_id) return;
+  const bool known = same_master && sync->follows && (mcu->flags & BUSHD_FLAG_SYNC_HEARD) != 0 &&
+                     clock->sync_id == sync->follow_up_id && sync->sync_ns < mcu->tick_ns;
   if (known && (mcu->flags & BUSHD_FLAG_SYNCED) != 0) {
     correct(mcu, sync, time_in_tick_ns);
   } else if (known && bushd_mcu_moving(mcu) == 0) {
@@ -169,8 +169,8 @@ void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick
   }
   clock->heard = true;
   clock->master = sync->master;
-  clock->mark = sync->mark;
-  mcu->flags &= (uint8_t)~BUSHD_FLAG_MARK;
+  clock->sync_id = sync->sync_id;
+  mcu->flags &= (uint8_t)~BUSHD_FLAG_SYNC_HEARD;
   if (clock->settling == 0 && (mcu->flags & BUSHD_FLAG_CONFIGURED) != 0) {
     note_mark(mcu, time_in_tick_ns);
   }

@@ -15,9 +15,9 @@ typedef struct bushd_mcu_clock {
   uint8_t settling;    // ticks until the tick timer has another length; marks are void till then
   bool heard;          // a SYNC frame; the last one's mark is:
   uint16_t master;     // whose it is
-  uint32_t mark;       // its name
-  uint32_t mark_tick;  // when it was, if BUSHD_FLAG_MARK
-  uint32_t mark_ns;
+  uint32_t sync_id;    // its name
+  uint32_t sync_tick;  // when it was, if BUSHD_FLAG_SYNC_HEARD
+  uint32_t sync_ns;
   int32_t behind_ns;     // the bus, not yet given to the port
   int32_t slew_now_ns;   // of the present tick
   int32_t slew_next_ns;  // of the next one, given

@@ -41,11 +41,11 @@ static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
 }
 
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message) {
-  bushd_mcu_stretch stretch = {message->epoch, BUSHD_TICKS_START, message->first_tick, 1, 0};
+  bushd_mcu_tick_range range = {message->epoch, BUSHD_TICKS_START, message->first_tick, 1, 0};
   for (uint8_t i = 0; i < message->count; ++i) {
-    stretch.mask |= motor_bit(bushd_get_table_run_entry(message->entries, i).motor);
+    range.mask |= motor_bit(bushd_get_table_run_entry(message->entries, i).motor);
   }
-  const bushd_status status = bushd_mcu_check_stretch(mcu, &stretch);
+  const bushd_status status = bushd_mcu_check_tick_range(mcu, &range);
   if (status != BUSHD_OK) return status;
   bool barred = true;
   for (uint8_t i = 0; i < message->count; ++i) {
@@ -62,7 +62,7 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
     if (!bushd_mcu_make_run(mcu, &entry, &spare_ns)) return BUSHD_E_CAPACITY;
   }
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    if ((stretch.mask & motor_bit(m)) == 0) continue;
+    if ((range.mask & motor_bit(m)) == 0) continue;
     bushd_mcu_begin_run(mcu, m, message->first_tick, mcu->motor[m].made.until);
   }
   return BUSHD_OK;
@@ -82,5 +82,5 @@ void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int di
   motor->mode = BUSHD_MCU_AUTONOMOUS;
   motor->exact = true;
   mcu->autonomous |= motor_bit(m);
-  mcu->stream.outlook.stale = true;
+  mcu->stream.queue_summary.stale = true;
 }

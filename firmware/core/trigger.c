@@ -107,7 +107,7 @@ void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns) {
     return;
   }
   bushd_mcu_disarm(mcu, BUSHD_TRIGGER_STARTED);
-  mcu->stream.outlook.stale = true;
+  mcu->stream.queue_summary.stale = true;
   mcu->trigger.start_tick = tick;
   mcu->trigger.start_ns = after_ns % mcu->tick_ns;
   for (uint8_t m = 0; armed != 0; ++m, armed = (uint16_t)(armed >> 1)) {

@@ -41,7 +41,7 @@ struct Bus {
   bushd_format format = BUSHD_FORMAT_FINE;
   bool table_runs = false;  // a move from rest is given to the MCU as a whole, if the MCU can
   bool table_ticks = true;  // streamed ticks may be told as states of the run
-  bushd_how emergency_stop = BUSHD_RAMP_DOWN;
+  bushd_stop_mode emergency_stop = BUSHD_STOP_RAMP;
 
   std::uint32_t tick_ns() const { return tick_us * 1000u; }
 };
@@ -88,7 +88,7 @@ struct Motor {
   // Its input is a switch at these ends of its travel.
   bool limit_positive = false;
   bool limit_negative = false;
-  bushd_how limit_action = BUSHD_RAMP_DOWN;
+  bushd_stop_mode limit_action = BUSHD_STOP_RAMP;
   bool input_active_open = false;
   std::optional<Home> home = {};
   bool local = false;  // its MCU's FORWARD and REVERSE inputs move it

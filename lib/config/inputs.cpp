@@ -22,8 +22,8 @@ Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
   if (reader.has("emergency_input")) {
     const auto action = read_word(reader, "emergency_input", {"ignore", "ramp", "cut"});
     if (!action) return fail(action.error());
-    static_assert(BUSHD_EMERGENCY_INPUT_IGNORED == 0 && BUSHD_EMERGENCY_INPUT_RAMPS == 1 &&
-                  BUSHD_EMERGENCY_INPUT_CUTS == 2);
+    static_assert(BUSHD_EMERGENCY_INPUT_IGNORED == 0 && BUSHD_EMERGENCY_INPUT_RAMP == 1 &&
+                  BUSHD_EMERGENCY_INPUT_IMMEDIATE == 2);
     mcu->emergency_input = static_cast<std::uint8_t>(*action);
   }
   if (auto read = read_active(reader, "emergency_active", &mcu->emergency_active_open); !read) {
@@ -68,7 +68,7 @@ Result<void> read_inputs(const TomlReader& reader, Motor* motor) {
                                "beside limit = \"positive\", \"negative\" or "
                                "\"both\""));
     }
-    motor->limit_action = *action == 0 ? BUSHD_RAMP_DOWN : BUSHD_CUT;
+    motor->limit_action = *action == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE;
   }
   return read_active(reader, "input_active", &motor->input_active_open);
 }

@@ -174,7 +174,7 @@ Result<void> read_manners(const TomlReader& reader, Bus* bus) {
   if (reader.has("emergency_stop")) {
     const auto how = read_word(reader, "emergency_stop", {"ramp", "cut"});
     if (!how) return fail(how.error());
-    bus->emergency_stop = *how == 0 ? BUSHD_RAMP_DOWN : BUSHD_CUT;
+    bus->emergency_stop = *how == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE;
   }
   return {};
 }

@@ -5,12 +5,12 @@
 
 #include <string.h>
 
-size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint8_t* payload,
+size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t sequence, const uint8_t* payload,
                           size_t payload_size, uint8_t* wire) {
   uint8_t* const raw = wire + 1;
   raw[0] = address;
   raw[1] = type;
-  raw[2] = tag;
+  raw[2] = sequence;
   uint8_t* const body = raw + BUSHD_FRAME_HEADER;
   if (payload_size != 0 && payload != body) memcpy(body, payload, payload_size);
   const size_t size = BUSHD_FRAME_HEADER + payload_size;
@@ -79,7 +79,7 @@ bushd_receive bushd_receive_byte(bushd_receiver* receiver, uint8_t byte, bushd_f
   const uint16_t body = (uint16_t)(size - 1 - BUSHD_FRAME_CRC);
   frame->address = raw[0];
   frame->type = raw[1];
-  frame->tag = raw[2];
+  frame->sequence = raw[2];
   frame->payload = raw + BUSHD_FRAME_HEADER;
   frame->payload_size = (uint8_t)(body - BUSHD_FRAME_HEADER);
   return BUSHD_RECEIVE_FRAME;

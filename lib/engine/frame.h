@@ -1,7 +1,7 @@
-// Framing: raw frame = address, type, tag, payload, CRC-32 (low byte first); on the line it is COBS
-// encoded and ended by a zero byte. A raw frame has at most 254 bytes, so COBS costs exactly one
-// byte. CRC-32/ISO-HDLC: polynomial 0x04C11DB7, reflected, start 0xFFFFFFFF, inverted at the end;
-// check value 0xCBF43926.
+// Framing: raw frame = address, type, sequence, payload, CRC-32 (low byte first); on the line it is
+// COBS encoded and ended by a zero byte. A raw frame has at most 254 bytes, so COBS costs exactly
+// one byte. CRC-32/ISO-HDLC: polynomial 0x04C11DB7, reflected, start 0xFFFFFFFF, inverted at the
+// end; check value 0xCBF43926.
 #ifndef BUSHD_ENGINE_FRAME_H
 #define BUSHD_ENGINE_FRAME_H
 
@@ -32,7 +32,7 @@ uint32_t bushd_crc32(uint32_t crc, const uint8_t* data, size_t size);
 // Encodes one frame into `wire` (BUSHD_FRAME_MAX_WIRE bytes suffice for any); returns the number of
 // bytes including the delimiter. The payload may stand in its place already, at wire + 1 +
 // BUSHD_FRAME_HEADER. Precondition: payload_size <= BUSHD_FRAME_MAX_PAYLOAD. O(size).
-size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t tag, const uint8_t* payload,
+size_t bushd_frame_encode(uint8_t address, uint8_t type, uint8_t sequence, const uint8_t* payload,
                           size_t payload_size, uint8_t* wire);
 
 // The end of it, for who makes a frame in steps: `size` bytes of the raw frame stand at wire + 1,
@@ -43,7 +43,7 @@ size_t bushd_frame_close(uint8_t* wire, size_t size, uint32_t crc);
 typedef struct bushd_frame {
   uint8_t address;
   uint8_t type;
-  uint8_t tag;
+  uint8_t sequence;
   uint8_t payload_size;
   const uint8_t* payload;
 } bushd_frame;

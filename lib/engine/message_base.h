@@ -38,9 +38,9 @@ typedef enum bushd_type {
   BUSHD_MSG_HOME = 0x13,          // bushd_home -> acknowledgement; how it goes is told by reports
   BUSHD_MSG_LOCAL = 0x14,         // bushd_local -> acknowledgement
   BUSHD_MSG_TRIGGER = 0x15,       // bushd_trigger -> acknowledgement
-  BUSHD_MSG_REFERENCE = 0x16      // bushd_reference -> acknowledgement
+  BUSHD_MSG_POSITION_COMPARE = 0x16  // bushd_position_compare -> acknowledgement
 } bushd_type;
-// A reply has the request's type with BUSHD_TYPE_REPLY set, its tag and the MCU's address.
+// A reply has the request's type with BUSHD_TYPE_REPLY set, its sequence and the MCU's address.
 
 typedef enum bushd_state {
   // Takes no moves yet: not configured, not in step with the bus, or EN is low.
@@ -64,7 +64,7 @@ enum {
   BUSHD_FLAG_ENABLED = 1 << 0,     // EN is high
   BUSHD_FLAG_SYNCED = 1 << 1,      // the tick counter is the bus's
   BUSHD_FLAG_CONFIGURED = 1 << 2,  // tick and format are set
-  BUSHD_FLAG_MARK = 1 << 3,        // mark_* of the report are valid
+  BUSHD_FLAG_SYNC_HEARD = 1 << 3,  // sync_id_* of the report are valid
   BUSHD_FLAG_TWO_MASTERS = 1 << 4  // SYNC frames of two masters come by turns
 };
 

@@ -34,24 +34,24 @@ bool bushd_poll_find(const bushd_poll* poll, uint8_t address, bushd_poll_entry* 
 size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload) {
   writer w = {payload};
   put16(&w, message->master);
-  put32(&w, message->mark);
+  put32(&w, message->sync_id);
   put8(&w, message->follows ? 1 : 0);
-  put32(&w, message->known_mark);
-  put32(&w, message->mark_tick);
-  put32(&w, message->mark_ns);
+  put32(&w, message->follow_up_id);
+  put32(&w, message->sync_tick);
+  put32(&w, message->sync_ns);
   return (size_t)(w.at - payload);
 }
 
 bushd_status bushd_decode_sync(const uint8_t* payload, size_t size, bushd_sync* message) {
   reader r = read_from(payload, size);
   message->master = get16(&r);
-  message->mark = get32(&r);
+  message->sync_id = get32(&r);
   const uint8_t follows = get8(&r);
   message->follows = follows == 1;
-  message->known_mark = get32(&r);
-  message->mark_tick = get32(&r);
-  message->mark_ns = get32(&r);
-  return finish(&r, follows <= 1 && message->mark_ns < BUSHD_MAX_TICK_NS);
+  message->follow_up_id = get32(&r);
+  message->sync_tick = get32(&r);
+  message->sync_ns = get32(&r);
+  return finish(&r, follows <= 1 && message->sync_ns < BUSHD_MAX_TICK_NS);
 }
 
 size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload) {
@@ -62,8 +62,8 @@ size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload) 
 bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message) {
   reader r = read_from(payload, size);
   const uint8_t how = get8(&r);
-  message->how = how == BUSHD_CUT ? BUSHD_CUT : BUSHD_RAMP_DOWN;
-  return finish(&r, how <= BUSHD_CUT);
+  message->how = how == BUSHD_STOP_IMMEDIATE ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP;
+  return finish(&r, how <= BUSHD_STOP_IMMEDIATE);
 }
 
 static uint8_t bits_set(uint16_t mask) {
@@ -294,7 +294,7 @@ bushd_status bushd_decode_trigger(const uint8_t* payload, size_t size, bushd_tri
   return finish(&r, edge <= BUSHD_EDGE_FALLING && in_range);
 }
 
-size_t bushd_encode_reference(const bushd_reference* message, uint8_t* payload) {
+size_t bushd_encode_position_compare(const bushd_position_compare* message, uint8_t* payload) {
   writer w = {payload};
   put8(&w, message->motor);
   put8(&w, message->arrivals);
@@ -304,7 +304,8 @@ size_t bushd_encode_reference(const bushd_reference* message, uint8_t* payload) 
   return (size_t)(w.at - payload);
 }
 
-bushd_status bushd_decode_reference(const uint8_t* payload, size_t size, bushd_reference* message) {
+bushd_status bushd_decode_position_compare(const uint8_t* payload, size_t size,
+                                           bushd_position_compare* message) {
   reader r = read_from(payload, size);
   message->motor = get8(&r);
   message->arrivals = get8(&r);
@@ -313,9 +314,9 @@ bushd_status bushd_decode_reference(const uint8_t* payload, size_t size, bushd_r
   message->width_us = get32(&r);
   const uint8_t all = BUSHD_ARRIVES_POSITIVE | BUSHD_ARRIVES_NEGATIVE;
   return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU && message->arrivals <= all &&
-                        message->delay_us <= BUSHD_REFERENCE_MAX_DELAY_US &&
+                        message->delay_us <= BUSHD_POSITION_COMPARE_MAX_DELAY_US &&
                         message->width_us >= 1 &&
-                        message->width_us <= BUSHD_REFERENCE_MAX_WIDTH_US);
+                        message->width_us <= BUSHD_POSITION_COMPARE_MAX_WIDTH_US);
 }
 
 size_t bushd_encode_home(const bushd_home* message, uint8_t* payload) {
@@ -363,9 +364,9 @@ size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {
   put16(&w, message->boot_number);
   put32(&w, message->tick);
   put32(&w, message->tick_ns);
-  put32(&w, message->mark);
-  put32(&w, message->mark_tick);
-  put32(&w, message->mark_ns);
+  put32(&w, message->sync_id);
+  put32(&w, message->sync_tick);
+  put32(&w, message->sync_ns);
   put32(&w, (uint32_t)message->rate_ppb);
   put16(&w, message->moving);
   put16(&w, message->running);
@@ -373,11 +374,11 @@ size_t bushd_encode_report(const bushd_report* message, uint8_t* payload) {
   put16(&w, message->bad_frames);
   put16(&w, message->rejected_frames);
   put8(&w, message->last_rejection);
-  put16(&w, message->run_downs);
+  put16(&w, message->ramp_downs);
   put16(&w, message->low_water_ticks);
-  put16(&w, message->islands);
-  put16(&w, message->island_from);
-  put16(&w, message->island_until);
+  put16(&w, message->out_of_order);
+  put16(&w, message->out_of_order_from);
+  put16(&w, message->out_of_order_until);
   put16(&w, message->forbidden_positive);
   put16(&w, message->forbidden_negative);
   put8(&w, message->system_inputs);
@@ -409,9 +410,9 @@ bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_repo
   message->boot_number = get16(&r);
   message->tick = get32(&r);
   message->tick_ns = get32(&r);
-  message->mark = get32(&r);
-  message->mark_tick = get32(&r);
-  message->mark_ns = get32(&r);
+  message->sync_id = get32(&r);
+  message->sync_tick = get32(&r);
+  message->sync_ns = get32(&r);
   message->rate_ppb = (int32_t)get32(&r);
   message->moving = get16(&r);
   message->running = get16(&r);
@@ -419,11 +420,11 @@ bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_repo
   message->bad_frames = get16(&r);
   message->rejected_frames = get16(&r);
   message->last_rejection = get8(&r);
-  message->run_downs = get16(&r);
+  message->ramp_downs = get16(&r);
   message->low_water_ticks = get16(&r);
-  message->islands = get16(&r);
-  message->island_from = get16(&r);
-  message->island_until = get16(&r);
+  message->out_of_order = get16(&r);
+  message->out_of_order_from = get16(&r);
+  message->out_of_order_until = get16(&r);
   message->forbidden_positive = get16(&r);
   message->forbidden_negative = get16(&r);
   message->system_inputs = get8(&r);

@@ -63,14 +63,14 @@ typedef struct bushd_poll {
 bool bushd_poll_find(const bushd_poll* poll, uint8_t address, bushd_poll_entry* entry);
 
 // Two-step time reference. The end of this frame is a mark named `mark`. If `follows`, the mark
-// named `known_mark` lay at (mark_tick, mark_ns into that tick) of bus time.
+// named `follow_up_id` lay at (sync_tick, sync_ns into that tick) of bus time.
 typedef struct bushd_sync {
-  uint16_t master;  // who sends this: two masters on one line have different ones
-  uint32_t mark;    // never the name of another mark of this master
+  uint16_t master;   // who sends this: two masters on one line have different ones
+  uint32_t sync_id;  // never the name of another mark of this master
   bool follows;
-  uint32_t known_mark;
-  uint32_t mark_tick;
-  uint32_t mark_ns;
+  uint32_t follow_up_id;
+  uint32_t sync_tick;
+  uint32_t sync_ns;
 } bushd_sync;
 
 enum {
@@ -173,20 +173,20 @@ enum { BUSHD_ARRIVES_POSITIVE = 1 << 0, BUSHD_ARRIVES_NEGATIVE = 1 << 1 };
 
 // A pulse at the reference output, delay_us after the step with which the motor's counter arrives
 // at the position.
-#define BUSHD_REFERENCE_MAX_DELAY_US 1500000u
-#define BUSHD_REFERENCE_MAX_WIDTH_US 1000000u
-typedef struct bushd_reference {
+#define BUSHD_POSITION_COMPARE_MAX_DELAY_US 1500000u
+#define BUSHD_POSITION_COMPARE_MAX_WIDTH_US 1000000u
+typedef struct bushd_position_compare {
   uint8_t motor;
   uint8_t arrivals;  // BUSHD_ARRIVES_*; 0: no pulses
   int32_t position_steps;
   uint32_t delay_us;
   uint32_t width_us;  // >= 1
-} bushd_reference;
+} bushd_position_compare;
 
-typedef enum bushd_how { BUSHD_RAMP_DOWN = 0, BUSHD_CUT = 1 } bushd_how;
+typedef enum bushd_stop_mode { BUSHD_STOP_RAMP = 0, BUSHD_STOP_IMMEDIATE = 1 } bushd_stop_mode;
 // All motors stop, within two ticks: by their tables' ramps, or without another step.
 typedef struct bushd_emergency {
-  bushd_how how;
+  bushd_stop_mode how;
 } bushd_emergency;
 
 typedef struct bushd_motor_report {
@@ -203,24 +203,24 @@ typedef struct bushd_report {
   uint16_t boot_number;
   uint32_t tick;     // the tick being emitted
   uint32_t tick_ns;  // how far into it, when the poll's frame ended
-  uint32_t mark;     // the last mark heard, and when it was by the MCU's own clock
-  uint32_t mark_tick;
-  uint32_t mark_ns;
+  uint32_t sync_id;  // the last mark heard, and when it was by the MCU's own clock
+  uint32_t sync_tick;
+  uint32_t sync_ns;
   int32_t rate_ppb;          // how much faster than its crystal the MCU counts, to follow the bus
   uint16_t moving;           // motors not at rest
   uint16_t running;          // of them, those in a table run
   uint16_t inputs;           // bit per motor: active
   uint16_t bad_frames;       // CRC and length errors; saturates
-  uint16_t rejected_frames;  // good frames that could not be used; saturates
+  uint16_t rejected_frames;  // valid frames that could not be used; saturates
   uint8_t last_rejection;    // bushd_status of the last one
-  uint16_t run_downs;        // motors that had to be run down since boot; saturates
+  uint16_t ramp_downs;       // motors that had to be run down since boot; saturates
   uint16_t low_water_ticks;  // the fewest ticks that a moving motor had queued, since the report
                              // before; 65535: none moved
-  // Ticks that these motors have beyond a gap: from the tick `island_from` (low 16 bits) on, until
-  // `island_until`.
-  uint16_t islands;
-  uint16_t island_from;
-  uint16_t island_until;
+  // Ticks that these motors have beyond a gap: from the tick `out_of_order_from` (low 16 bits) on,
+  // until `out_of_order_until`.
+  uint16_t out_of_order;
+  uint16_t out_of_order_from;
+  uint16_t out_of_order_until;
   uint16_t forbidden_positive;  // motors that a limit keeps from moving in this direction
   uint16_t forbidden_negative;
   uint8_t system_inputs;   // active, BUSHD_INPUT_*
@@ -264,7 +264,7 @@ size_t bushd_encode_table_run(uint8_t epoch, uint32_t first_tick,
                               uint8_t* payload);
 size_t bushd_encode_trigger(uint8_t number, bushd_edge edge, uint32_t delay_us,
                             const bushd_table_run_entry* entries, uint8_t count, uint8_t* payload);
-size_t bushd_encode_reference(const bushd_reference* message, uint8_t* payload);
+size_t bushd_encode_position_compare(const bushd_position_compare* message, uint8_t* payload);
 
 // Decoders return BUSHD_OK, BUSHD_E_LENGTH or BUSHD_E_FORMAT.
 bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* message);
@@ -281,7 +281,8 @@ bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at
                                   bushd_table_ticks_entry* entry);
 bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_table_run* message);
 bushd_status bushd_decode_trigger(const uint8_t* payload, size_t size, bushd_trigger* message);
-bushd_status bushd_decode_reference(const uint8_t* payload, size_t size, bushd_reference* message);
+bushd_status bushd_decode_position_compare(const uint8_t* payload, size_t size,
+                                           bushd_position_compare* message);
 bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_report* message);
 
 #ifdef __cplusplus

@@ -94,7 +94,7 @@ size_t bushd_encode_configure(const bushd_configure* message, uint8_t* payload) 
   writer w = {payload};
   put32(&w, message->tick_ns);
   put8(&w, (uint8_t)message->format);
-  put16(&w, message->silence_ticks);
+  put16(&w, message->comm_timeout_ticks);
   return (size_t)(w.at - payload);
 }
 
@@ -103,10 +103,10 @@ bushd_status bushd_decode_configure(const uint8_t* payload, size_t size, bushd_c
   message->tick_ns = get32(&r);
   const uint8_t format = get8(&r);
   message->format = format == BUSHD_FORMAT_FINE ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
-  message->silence_ticks = get16(&r);
+  message->comm_timeout_ticks = get16(&r);
   return finish(&r, message->tick_ns >= BUSHD_MIN_TICK_NS &&
                         message->tick_ns <= BUSHD_MAX_TICK_NS && format <= BUSHD_FORMAT_FINE &&
-                        message->silence_ticks >= 1);
+                        message->comm_timeout_ticks >= 1);
 }
 
 size_t bushd_encode_emission(const bushd_emission* message, uint8_t* payload) {
@@ -269,7 +269,7 @@ size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload
   writer w = {payload};
   put16(&w, message->limit_positive);
   put16(&w, message->limit_negative);
-  put16(&w, message->limit_cuts);
+  put16(&w, message->limit_immediate);
   put16(&w, message->inverted);
   put8(&w, message->debounce_ticks);
   put8(&w, message->system_inverted);
@@ -284,7 +284,7 @@ bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
   reader r = read_from(payload, size);
   message->limit_positive = get16(&r);
   message->limit_negative = get16(&r);
-  message->limit_cuts = get16(&r);
+  message->limit_immediate = get16(&r);
   message->inverted = get16(&r);
   message->debounce_ticks = get8(&r);
   message->system_inverted = get8(&r);
@@ -294,7 +294,7 @@ bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
   message->enable_after_watchdog = enable == 1;
   return finish(&r, message->debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS &&
                         message->system_inverted <= BUSHD_SYSTEM_INPUTS &&
-                        message->emergency <= BUSHD_EMERGENCY_INPUT_CUTS &&
+                        message->emergency <= BUSHD_EMERGENCY_INPUT_IMMEDIATE &&
                         message->overcurrent <= BUSHD_MAX_CURRENT && enable <= 1);
 }
 

@@ -32,8 +32,8 @@ enum {
   BUSHD_CAN_TABLE_RUN = 1 << 3,
   BUSHD_CAN_HOME = 1 << 4,
   BUSHD_CAN_LOCAL = 1 << 5,
-  BUSHD_CAN_TRIGGER = 1 << 6,    // has a trigger input
-  BUSHD_CAN_REFERENCE = 1 << 7,  // has a reference output
+  BUSHD_CAN_TRIGGER = 1 << 6,           // has a trigger input
+  BUSHD_CAN_POSITION_COMPARE = 1 << 7,  // has a reference output
   // Emission other than even.
   BUSHD_CAN_BURST = 1 << 8,
   BUSHD_CAN_COMMON_DIR = 1 << 9,
@@ -64,7 +64,7 @@ typedef struct bushd_set_address {
 typedef struct bushd_configure {
   uint32_t tick_ns;  // BUSHD_MIN_TICK_NS .. BUSHD_MAX_TICK_NS
   bushd_format format;
-  uint16_t silence_ticks;  // >= 1: table runs are run down after as many without a good frame
+  uint16_t comm_timeout_ticks;  // >= 1: table runs are run down after as many without a valid frame
 } bushd_configure;
 
 // How steps get to the pins (engine/emission.h).
@@ -152,8 +152,8 @@ typedef struct bushd_set_position {
 // What the MCU does when a limit switch or the emergency input is active.
 enum {
   BUSHD_EMERGENCY_INPUT_IGNORED = 0,
-  BUSHD_EMERGENCY_INPUT_RAMPS = 1,
-  BUSHD_EMERGENCY_INPUT_CUTS = 2
+  BUSHD_EMERGENCY_INPUT_RAMP = 1,
+  BUSHD_EMERGENCY_INPUT_IMMEDIATE = 2
 };
 #define BUSHD_MAX_DEBOUNCE_TICKS 15u
 #define BUSHD_MAX_CURRENT 1023u
@@ -162,7 +162,8 @@ typedef struct bushd_set_inputs {
   // both ends.
   uint16_t limit_positive;
   uint16_t limit_negative;
-  uint16_t limit_cuts;     // motors that stop at a limit without another step; the others ramp down
+  uint16_t
+      limit_immediate;     // motors that stop at a limit without another step; the others ramp down
   uint16_t inverted;       // motors whose input is active when the port calls it inactive
   uint8_t debounce_ticks;  // a motor's input counts once it has stayed for as many more ticks
   uint8_t system_inverted;     // as `inverted`, of BUSHD_INPUT_*

@@ -104,7 +104,7 @@ bool Connector::send_ramp_down(std::int64_t now_us) {
   for (const McuIndex i : mcus_.indices()) {
     if (mcus_[i].view.phase != McuPhase::kConnecting || !links_[i].ramp_down_now) continue;
     links_[i].ramp_down_now = false;
-    const std::array<std::uint8_t, 1> payload = {BUSHD_RAMP_DOWN};
+    const std::array<std::uint8_t, 1> payload = {BUSHD_STOP_RAMP};
     writer_.send(now_us, mcus_[i].setup.address, BUSHD_MSG_EMERGENCY, payload);
     return true;
   }
@@ -184,7 +184,7 @@ void Connector::write_setup(McuIndex mcu) {
   if (record.view.report.armed != 0) queue.disarm();
   queue.configure({.tick_ns = setup_.tick_ns,
                    .format = setup_.format,
-                   .silence_ticks = static_cast<std::uint16_t>(
+                   .comm_timeout_ticks = static_cast<std::uint16_t>(
                        std::min<std::int64_t>(comm_timeout_ticks, UINT16_MAX))});
   queue.emission(record.setup.emission.settings);
   queue.inputs(record.setup.inputs);

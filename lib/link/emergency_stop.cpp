@@ -12,7 +12,7 @@ constexpr std::int64_t kLongestUs = 2'000'000;  // after this an MCU that says n
 
 }  // namespace
 
-void EmergencyStop::begin(bushd_how how) {
+void EmergencyStop::begin(bushd_stop_mode how) {
   stop_ = Stop{.how = how, .until_us = {}};
   // One that was latched before says nothing of this one.
   for (McuRecord& mcu : mcus_) {

@@ -17,7 +17,7 @@ void ReportedCounters::follow(const bushd_report& report, McuHealth& health) {
   health.crc_errors += grown(report.bad_frames, std::exchange(crc_errors_, report.bad_frames));
   health.rejected_frames +=
       grown(report.rejected_frames, std::exchange(rejected_frames_, report.rejected_frames));
-  health.ramp_downs += grown(report.run_downs, std::exchange(ramp_downs_, report.run_downs));
+  health.ramp_downs += grown(report.ramp_downs, std::exchange(ramp_downs_, report.ramp_downs));
   health.rate_ppm = report.rate_ppb * 1e-3;
   if (report.low_water_ticks != UINT16_MAX) {
     health.low_water_ticks =

@@ -160,7 +160,7 @@ std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
   return number;
 }
 
-void Master::position_compare(McuIndex mcu, const bushd_reference& message) {
+void Master::position_compare(McuIndex mcu, const bushd_position_compare& message) {
   connector_.queue(mcu).position_compare(message);
 }
 
@@ -168,7 +168,7 @@ void Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t positio
   connector_.queue(mcu).set_position(motor, position_steps);
 }
 
-void Master::emergency_stop(bushd_how how) {
+void Master::emergency_stop(bushd_stop_mode how) {
   emergency_.begin(how);
   for (const McuIndex i : mcus_.indices()) streams_.drop_all(i);
   connector_.emergency_stop();

@@ -100,8 +100,8 @@ class Master : private Transactions::Listener, private Connector::Listener {
   // The MCU has started one of them; from now on it is a table run like any other.
   void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps);
   // When the MCU's position compare output pulses from now on. Precondition: it has one.
-  void position_compare(McuIndex mcu, const bushd_reference& message);
-  bool can_compare_position(McuIndex mcu) const { return can(mcu, BUSHD_CAN_REFERENCE); }
+  void position_compare(McuIndex mcu, const bushd_position_compare& message);
+  bool can_compare_position(McuIndex mcu) const { return can(mcu, BUSHD_CAN_POSITION_COMPARE); }
   // The source's answer for these motors has changed from `first` on.
   void replace(McuIndex mcu, std::uint16_t motors, Tick first);
   // Nothing more is sent for this motor.
@@ -109,7 +109,7 @@ class Master : private Transactions::Listener, private Connector::Listener {
 
   // Every motor of every MCU stops within two ticks of hearing it, and nothing more is sent for
   // any. Said again until all MCUs that are online have latched BUSHD_FAULT_EMERGENCY.
-  void emergency_stop(bushd_how how);
+  void emergency_stop(bushd_stop_mode how);
 
   // Other tables or motors for an MCU, at rest: it goes through configuration again and comes back
   // with McuOnline.

@@ -91,8 +91,9 @@ void SetupQueue::home(const bushd_home& message) {
   add(BUSHD_MSG_HOME, [&](std::uint8_t* p) { return bushd_encode_home(&message, p); });
 }
 
-void SetupQueue::position_compare(const bushd_reference& message) {
-  add(BUSHD_MSG_REFERENCE, [&](std::uint8_t* p) { return bushd_encode_reference(&message, p); });
+void SetupQueue::position_compare(const bushd_position_compare& message) {
+  add(BUSHD_MSG_POSITION_COMPARE,
+      [&](std::uint8_t* p) { return bushd_encode_position_compare(&message, p); });
 }
 
 void SetupQueue::arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,

@@ -184,12 +184,12 @@ void StreamScheduler::go_back(McuIndex index, std::uint8_t motor) {
   stream.beyond_gap.reset();
   stream.finished = false;
   Tick missing = stream.run_steps ? 0 : stream.sent - stream.next;
-  if ((report.islands >> motor & 1) != 0) {
+  if ((report.out_of_order >> motor & 1) != 0) {
     const auto unwrap = [&](std::uint16_t tick) {
       return view.tick + static_cast<std::int16_t>(tick - static_cast<std::uint16_t>(report.tick));
     };
-    const OutOfOrderRange range = {.from = unwrap(report.island_from),
-                                   .until = unwrap(report.island_until)};
+    const OutOfOrderRange range = {.from = unwrap(report.out_of_order_from),
+                                   .until = unwrap(report.out_of_order_until)};
     // What an MCU says is believed only as far as it can be true.
     if (stream.next < range.from && range.from < range.until && range.until <= stream.sent) {
       stream.beyond_gap = range;

@@ -56,7 +56,7 @@ Synchroniser::Agreement Synchroniser::follow_report(std::int64_t now_us, McuInde
   const bushd_report& report = view.report;
   since_sync_[mcu].reported = true;
   view.tick = clock_.unwrap(report.tick, now_us);
-  constexpr std::uint8_t kKnowsTime = BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK;
+  constexpr std::uint8_t kKnowsTime = BUSHD_FLAG_SYNCED | BUSHD_FLAG_SYNC_HEARD;
   if (!in_time || (report.flags & kKnowsTime) != kKnowsTime) return Agreement::kUnsynced;
   if (clock_.valid() &&
       std::abs(view.tick - clock_.tick_at(now_us)) > clock_.ticks_in(kClockJumpUs)) {
@@ -71,8 +71,8 @@ Synchroniser::Agreement Synchroniser::follow_report(std::int64_t now_us, McuInde
 
 // When two MCUs heard the same SYNC, a minus b.
 std::int64_t Synchroniser::difference_ns(const bushd_report& a, const bushd_report& b) const {
-  const auto ticks = static_cast<std::int32_t>(a.mark_tick - b.mark_tick);
-  return std::int64_t{ticks} * setup_.tick_ns + a.mark_ns - b.mark_ns;
+  const auto ticks = static_cast<std::int32_t>(a.sync_tick - b.sync_tick);
+  return std::int64_t{ticks} * setup_.tick_ns + a.sync_ns - b.sync_ns;
 }
 
 Synchroniser::Survey Synchroniser::survey() const {
@@ -92,12 +92,12 @@ void Synchroniser::survey_mcu(McuIndex mcu, Survey& survey) const {
   if (!view.reported) return;
   const bushd_report& report = view.report;
   const bool synced = (report.flags & BUSHD_FLAG_SYNCED) != 0;
-  const bool marked = (report.flags & BUSHD_FLAG_MARK) != 0;
+  const bool marked = (report.flags & BUSHD_FLAG_SYNC_HEARD) != 0;
   survey.anybody |= synced;
   survey.waiting |= !synced || !marked;
   if (!synced) return;
   survey.all_asked &= since_sync_[mcu].reported;
-  if (!marked || sync_id_ != report.mark || report.mark_ns >= setup_.tick_ns) return;
+  if (!marked || sync_id_ != report.sync_id || report.sync_ns >= setup_.tick_ns) return;
   if (survey.reference == nullptr) {
     survey.reference = &report;
   } else if (std::abs(difference_ns(report, *survey.reference)) > kAgreementNs) {
@@ -109,8 +109,8 @@ void Synchroniser::note_offsets(const bushd_report* reference) {
   if (reference == nullptr) return;
   for (McuRecord& mcu : mcus_) {
     const bushd_report& report = mcu.view.report;
-    const bool comparable = mcu.view.reported && (report.flags & BUSHD_FLAG_MARK) != 0 &&
-                            report.mark == reference->mark;
+    const bool comparable = mcu.view.reported && (report.flags & BUSHD_FLAG_SYNC_HEARD) != 0 &&
+                            report.sync_id == reference->sync_id;
     if (!comparable) continue;
     mcu.health.clock_offset_us = static_cast<double>(difference_ns(report, *reference)) * 1e-3;
   }
@@ -128,12 +128,12 @@ bool Synchroniser::send_due(std::int64_t now_us) {
   const auto id = static_cast<std::uint32_t>(now_us / 1000);
   bushd_sync sync{};
   sync.master = setup_.master;
-  sync.mark = sync_id_ == id ? id + 1 : id;
-  if (sync_id_) sync.known_mark = *sync_id_;  // the follow-up's
+  sync.sync_id = sync_id_ == id ? id + 1 : id;
+  if (sync_id_) sync.follow_up_id = *sync_id_;  // the follow-up's
   if (found.reference != nullptr && found.all_asked && !doubtful) {
     sync.follows = true;
-    sync.mark_tick = found.reference->mark_tick;
-    sync.mark_ns = found.reference->mark_ns;
+    sync.sync_tick = found.reference->sync_tick;
+    sync.sync_ns = found.reference->sync_ns;
   } else if (found.all_heard && !found.anybody && sync_id_) {
     // Nobody on the bus knows the time: it begins at the SYNC before.
     sync.follows = true;
@@ -143,7 +143,7 @@ bool Synchroniser::send_due(std::int64_t now_us) {
   std::array<std::uint8_t, 24> payload;
   const std::size_t size = bushd_encode_sync(&sync, payload.data());
   writer_.send(now_us, kBroadcast, BUSHD_MSG_SYNC, {payload.data(), size});
-  sync_id_ = sync.mark;
+  sync_id_ = sync.sync_id;
   for (const McuIndex i : mcus_.indices()) {
     since_sync_[i].reported = false;
     // MCUs that wait are asked at once, so that the next SYNC can follow this one.

@@ -86,7 +86,7 @@ void Transactions::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
 
 Transactions::Awaited* Transactions::awaited_from(const bushd_frame& frame) {
   const bool fits =
-      open_ && frame.tag == open_->sequence && frame.type == (open_->type | BUSHD_TYPE_REPLY);
+      open_ && frame.sequence == open_->sequence && frame.type == (open_->type | BUSHD_TYPE_REPLY);
   if (!fits) return nullptr;
   const auto found = std::find_if(
       open_->awaited.begin(), open_->awaited.end(),

@@ -273,7 +273,7 @@ event::Ended Motor::end_at_limit() {
   }
   std::string reason = "stopped by " + switch_at(std::get<Moving>(activity_).limit) +
                        ", stands at " + std::to_string(position_);
-  if (setup_.limit_cuts && position_ != axis_.from_steps()) {
+  if (setup_.limit_immediate && position_ != axis_.from_steps()) {
     uncertain_reason_ = "it was cut off at its limit switch and may have overrun";
     reason += "; cut off, it may have overrun, so check the position and set it";
   }

@@ -25,7 +25,7 @@ struct MotorSetup {
   Output output;
   bool has_home = false;
   // Without a ramp, so that it may overrun.
-  bool limit_cuts = false;
+  bool limit_immediate = false;
   bool emergency_stop_cuts = false;
   bool emergency_input_cuts = false;
 };

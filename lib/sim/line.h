@@ -81,7 +81,7 @@ class Line {
     TimeNs free_ns = 0;
   };
 
-  // The stretch of `talker` that overlaps with [start_ns, end_ns); nothing if there is none.
+  // The range of `talker` that overlaps with [start_ns, end_ns); nothing if there is none.
   static const Byte* overlap(const Talker& talker, TimeNs start_ns, TimeNs end_ns);
   void find_next();
 

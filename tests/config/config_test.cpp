@@ -54,7 +54,7 @@ TEST(Config, MannersOfABusHaveDefaults) {
   ASSERT_TRUE(plain.has_value()) << plain.error().text();
   EXPECT_FALSE(plain->buses[0].table_runs);
   EXPECT_TRUE(plain->buses[0].table_ticks);
-  EXPECT_EQ(plain->buses[0].emergency_stop, BUSHD_RAMP_DOWN);
+  EXPECT_EQ(plain->buses[0].emergency_stop, BUSHD_STOP_RAMP);
   const auto chosen = ConfigFile(replaced(kGood, "format = \"fine\"\n",
                                           "format = \"fine\"\nmoves = \"table\"\n"
                                           "frames = \"ticks\"\nemergency_stop = \"cut\"\n"))
@@ -62,7 +62,7 @@ TEST(Config, MannersOfABusHaveDefaults) {
   ASSERT_TRUE(chosen.has_value()) << chosen.error().text();
   EXPECT_TRUE(chosen->buses[0].table_runs);
   EXPECT_FALSE(chosen->buses[0].table_ticks);
-  EXPECT_EQ(chosen->buses[0].emergency_stop, BUSHD_CUT);
+  EXPECT_EQ(chosen->buses[0].emergency_stop, BUSHD_STOP_IMMEDIATE);
   EXPECT_FALSE(chosen->buses[1].table_runs) << "of this bus only";
 }
 

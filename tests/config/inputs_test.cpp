@@ -33,7 +33,7 @@ TEST(ConfigInputs, NothingIsWatchedUnlessItIsAskedFor) {
   EXPECT_EQ(mcu.enable_after_reset, EnableAfterReset::kReady);
   const Motor& motor = config->motors[0];
   EXPECT_FALSE(motor.limit_positive || motor.limit_negative || motor.input_active_open);
-  EXPECT_EQ(motor.limit_action, BUSHD_RAMP_DOWN);
+  EXPECT_EQ(motor.limit_action, BUSHD_STOP_RAMP);
 }
 
 TEST(ConfigInputs, AnMcuHasItsOwn) {
@@ -43,7 +43,7 @@ TEST(ConfigInputs, AnMcuHasItsOwn) {
                           .load();
   ASSERT_TRUE(config.has_value()) << config.error().text();
   const Mcu& mcu = config->mcus[1];
-  EXPECT_EQ(mcu.emergency_input, BUSHD_EMERGENCY_INPUT_CUTS);
+  EXPECT_EQ(mcu.emergency_input, BUSHD_EMERGENCY_INPUT_IMMEDIATE);
   EXPECT_TRUE(mcu.emergency_active_open);
   EXPECT_EQ(mcu.debounce_ticks, 15);
   EXPECT_EQ(mcu.overcurrent, 1023);
@@ -62,7 +62,7 @@ TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
     const Motor& motor = config->motors[1];
     EXPECT_EQ(motor.limit_positive, positive) << word;
     EXPECT_EQ(motor.limit_negative, negative) << word;
-    EXPECT_EQ(motor.limit_action, BUSHD_CUT);
+    EXPECT_EQ(motor.limit_action, BUSHD_STOP_IMMEDIATE);
     EXPECT_TRUE(motor.input_active_open);
     EXPECT_FALSE(config->motors[0].limit_positive);
   }

@@ -31,7 +31,7 @@ TEST_P(Conformance, TellsWhoItIs) {
   EXPECT_EQ(identity.slots, expected.slots);
   EXPECT_EQ(identity.queue_ticks, expected.queue_ticks);
   EXPECT_EQ(identity.table_codes, expected.table_codes);
-  EXPECT_EQ(identity.capabilities, expected.capabilities & ~real_->lacks());
+  EXPECT_EQ(identity.capabilities, expected.capabilities & ~real_->disabled_capabilities());
   EXPECT_EQ(identity.unique_id[0], 8);
   EXPECT_EQ(identity.unique_id[7], 1);
 }
@@ -238,7 +238,7 @@ TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
   const bool phases = mode.settings.mode == BUSHD_EMISSION_PHASES;
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, BUSHD_FORMAT_COARSE));
   for (const std::uint8_t address : {kVirtual, kReal}) {
-    const bool refuses = address == kReal && (real_->lacks() & mode.needs) != 0;
+    const bool refuses = address == kReal && (real_->disabled_capabilities() & mode.needs) != 0;
     EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_EMISSION, bushd_encode_emission,
                                    mode.settings) == BUSHD_OK,
               !refuses);

@@ -86,9 +86,9 @@ class ImageReplay final : public fuzz::Programmed {
     }
     // A report takes a few ticks to come, and what is asked for then has to come too.
     const auto passed = static_cast<std::uint32_t>((bus_.now_ns() - asked_ns_) / tick_ns_);
-    return {address(),    BUSHD_MOTORS_PER_MCU, last_.epoch, last_.tick + passed + 1,
-            tick_ns_,     sync_master_,         last_.mark,  last_.mark_tick,
-            last_.mark_ns};
+    return {address(),    BUSHD_MOTORS_PER_MCU, last_.epoch,   last_.tick + passed + 1,
+            tick_ns_,     sync_master_,         last_.sync_id, last_.sync_tick,
+            last_.sync_ns};
   }
 
   std::uint32_t table_crc(std::uint8_t slot) override { return tables_.crc(slot); }
@@ -106,7 +106,7 @@ class ImageReplay final : public fuzz::Programmed {
   void frame(std::uint8_t address, std::uint8_t type, fuzz::Bytes payload,
              std::uint8_t later) override {
     if (type == BUSHD_MSG_SYNC) note_master(payload);
-    next_tag_ = static_cast<std::uint8_t>(next_tag_ + later);
+    next_sequence_ = static_cast<std::uint8_t>(next_sequence_ + later);
     const bool taken = acknowledges(type) && send(address, type, payload) &&
                        !answer_.payload.empty() && answer_.payload[0] == BUSHD_OK;
     if (!acknowledges(type)) post(address, type, payload);
@@ -157,7 +157,8 @@ class ImageReplay final : public fuzz::Programmed {
     set_pins(0, 0, 0);
     // Some answers may come as late as a poll can say.
     advance(TimeNs{UINT16_MAX} * BUSHD_REPLY_UNIT_NS);
-    post(address(), BUSHD_MSG_EMERGENCY, fuzz::Bytes(std::array<std::uint8_t, 1>{BUSHD_CUT}));
+    post(address(), BUSHD_MSG_EMERGENCY,
+         fuzz::Bytes(std::array<std::uint8_t, 1>{BUSHD_STOP_IMMEDIATE}));
     advance(100'000'000);
     const std::array<std::uint8_t, 5> at_once = {0, 0, 1, 0, 0};
     ASSERT_TRUE(send(address(), BUSHD_MSG_IDENTIFY, at_once)) << "no identity";
@@ -196,18 +197,18 @@ class ImageReplay final : public fuzz::Programmed {
 
   void post(std::uint8_t address, std::uint8_t type, fuzz::Bytes payload) {
     feed(Bytes{0});
-    feed(Master::wire(address, type, next_tag_++, payload));
+    feed(Master::wire(address, type, next_sequence_++, payload));
   }
 
   // Whether it is answered; the answer is answer_.
   bool send(std::uint8_t address, std::uint8_t type, fuzz::Bytes payload) {
-    const std::uint8_t tag = next_tag_;
+    const std::uint8_t sequence = next_sequence_;
     master_.frames.clear();
     post(address, type, payload);
     asked_ns_ = bus_.now_ns();
     for (TimeNs waited = 0; waited < kPatienceNs; waited += 200'000) {
       for (const Frame& frame : master_.frames) {
-        if (frame.type != (type | BUSHD_TYPE_REPLY) || frame.tag != tag) continue;
+        if (frame.type != (type | BUSHD_TYPE_REPLY) || frame.sequence != sequence) continue;
         answer_ = frame;
         return true;
       }
@@ -303,7 +304,7 @@ class ImageReplay final : public fuzz::Programmed {
   Frame answer_{};
   bushd_report last_{};
   std::uint16_t boot_number_ = 0;
-  std::uint8_t next_tag_ = 0;
+  std::uint8_t next_sequence_ = 0;
   TimeNs asked_ns_ = 0;  // the last question's end
   std::uint16_t sync_master_ = 0;
   std::uint32_t tick_ns_ = BUSHD_BOOT_TICK_NS;

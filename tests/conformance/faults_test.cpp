@@ -95,7 +95,7 @@ class Faults : public testing::TestWithParam<Target> {
     EXPECT_EQ(report.bad_frames, expected.bad_frames);
     EXPECT_EQ(report.rejected_frames, expected.rejected_frames);
     EXPECT_EQ(report.last_rejection, expected.last_rejection);
-    EXPECT_EQ(report.run_downs, expected.run_downs);
+    EXPECT_EQ(report.ramp_downs, expected.ramp_downs);
     const auto steps = recorder_.times(1, Signal::kStep, kMotor, true).size();
     EXPECT_EQ(steps, recorder_.times(0, Signal::kStep, kMotor, true).size());
     EXPECT_GE(steps, at_least_steps);
@@ -131,9 +131,11 @@ TEST_P(Faults, AFrameThatComesLateFillsItsHole) {
   for (const std::size_t i : {0, 2, 3}) tell(BUSHD_MSG_TICKS, frame(i));
   for (const std::uint8_t address : {kVirtual, kReal}) {
     const bushd_report report = master_.poll(address);
-    EXPECT_EQ(report.islands, 1 << kMotor);
-    EXPECT_EQ(report.island_from, static_cast<std::uint16_t>(first_tick_ + 2 * kTicksPerFrame));
-    EXPECT_EQ(report.island_until, static_cast<std::uint16_t>(first_tick_ + 4 * kTicksPerFrame));
+    EXPECT_EQ(report.out_of_order, 1 << kMotor);
+    EXPECT_EQ(report.out_of_order_from,
+              static_cast<std::uint16_t>(first_tick_ + 2 * kTicksPerFrame));
+    EXPECT_EQ(report.out_of_order_until,
+              static_cast<std::uint16_t>(first_tick_ + 4 * kTicksPerFrame));
   }
   for (const std::size_t i : {1, 4}) tell(BUSHD_MSG_TICKS, frame(i));
   pass_ticks(140);
@@ -145,7 +147,7 @@ TEST_P(Faults, AHoleThatStaysEndsInARampDown) {
   for (const std::size_t i : {0, 1, 3}) tell(BUSHD_MSG_TICKS, frame(i));
   pass_ticks(140);
   expect_alike(BUSHD_FAULT_LINK, 2 * kTicksPerFrame, 3 * kTicksPerFrame);
-  EXPECT_EQ(master_.poll(kReal).run_downs, 1);
+  EXPECT_EQ(master_.poll(kReal).ramp_downs, 1);
 }
 
 TEST_P(Faults, ATableRunEndsWhenNobodyIsHeard) {
@@ -162,7 +164,7 @@ TEST_P(Faults, ATableRunEndsWhenNobodyIsHeard) {
 }
 
 TEST_P(Faults, AnEmergencyStopIsTheSame) {
-  for (const bushd_how how : {BUSHD_RAMP_DOWN, BUSHD_CUT}) {
+  for (const bushd_stop_mode how : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
     first_tick_ = master_.poll(kReal).tick + 16;
     for (std::size_t i = 0; i < kFrames; ++i) tell(BUSHD_MSG_TICKS, frame(i));
     bus_.advance_to(bus_.now_ns() +
@@ -172,7 +174,7 @@ TEST_P(Faults, AnEmergencyStopIsTheSame) {
     EXPECT_GT(before, 10u);
     broadcast(BUSHD_MSG_EMERGENCY, {static_cast<std::uint8_t>(how)});
     pass_ticks(60);
-    expect_alike(BUSHD_FAULT_EMERGENCY, before, before + (how == BUSHD_CUT ? 2 : 8));
+    expect_alike(BUSHD_FAULT_EMERGENCY, before, before + (how == BUSHD_STOP_IMMEDIATE ? 2 : 8));
     for (const std::uint8_t address : {kVirtual, kReal}) {
       ASSERT_EQ(master_.acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
                                      bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
@@ -216,7 +218,7 @@ TEST_P(Inputs, ALimitStopsItsMotorAndForbidsTheDirection) {
 
 TEST_P(Inputs, TheEmergencyInputCuts) {
   bushd_set_inputs settings{};
-  settings.emergency = BUSHD_EMERGENCY_INPUT_CUTS;
+  settings.emergency = BUSHD_EMERGENCY_INPUT_IMMEDIATE;
   ASSERT_NO_FATAL_FAILURE(configure(settings));
   start_run();
   pass_ticks(60);
@@ -245,7 +247,7 @@ class GoldenFrames : public testing::TestWithParam<Target> {
  protected:
   struct Answer {
     std::uint8_t type;
-    std::uint8_t tag;
+    std::uint8_t sequence;
     Bytes payload;
   };
 
@@ -280,7 +282,7 @@ class GoldenFrames : public testing::TestWithParam<Target> {
     }
     std::vector<Answer> answers;
     for (const Frame& frame : master.frames) {
-      answers.push_back({frame.type, frame.tag, frame.payload});
+      answers.push_back({frame.type, frame.sequence, frame.payload});
     }
     EXPECT_EQ(master.bad_frames, 0);
     return answers;
@@ -307,7 +309,7 @@ TEST_P(GoldenFrames, AreAnsweredLikeTheVirtualMcuDoes) {
     EXPECT_GT(answers.size(), 2u);
     for (std::size_t i = 0; i < answers.size(); ++i) {
       EXPECT_EQ(answers[i].type, expected[i].type);
-      EXPECT_EQ(answers[i].tag, expected[i].tag);
+      EXPECT_EQ(answers[i].sequence, expected[i].sequence);
       EXPECT_EQ(answers[i].payload.size(), expected[i].payload.size());
       const bool acknowledges = expected[i].payload.size() == 1;
       if (acknowledges) {

@@ -124,7 +124,7 @@ class Script : public testing::Test {
       } else {
         bushd_run_expand_coarse(&run, tick_ns_, kCount, coarse.data(), 1);
       }
-      if (frame % 3 == 1 && (real_->lacks() & BUSHD_CAN_TABLE_TICKS) == 0) {
+      if (frame % 3 == 1 && (real_->disabled_capabilities() & BUSHD_CAN_TABLE_TICKS) == 0) {
         const auto state_flags = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_FINE);
         payload.resize(
             bushd_encode_table_ticks(0, state_flags, first, kCount, &entry, 1, payload.data()));
@@ -246,7 +246,7 @@ class Script : public testing::Test {
     EXPECT_EQ(report.bad_frames, expected.bad_frames);
     EXPECT_EQ(report.rejected_frames, expected.rejected_frames);
     EXPECT_EQ(report.last_rejection, expected.last_rejection);
-    EXPECT_EQ(report.run_downs, expected.run_downs);
+    EXPECT_EQ(report.ramp_downs, expected.ramp_downs);
     EXPECT_EQ(report.motor_count, expected.motor_count);
     for (std::size_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
       EXPECT_EQ(report.motor[m].position_steps, expected.motor[m].position_steps) << "motor " << m;

@@ -16,9 +16,12 @@ namespace {
 class Atmega2560 final : public McuUnderTest {
  public:
   McuOptions twin() const override {
-    return {.slots = 128, .queue_ticks = 64, .code_count = 952, .lacks = lacks()};
+    return {.slots = 128,
+            .queue_ticks = 64,
+            .code_count = 952,
+            .disabled_capabilities = disabled_capabilities()};
   }
-  std::uint16_t lacks() const override { return BUSHD_CAN_TABLE_TICKS; }
+  std::uint16_t disabled_capabilities() const override { return BUSHD_CAN_TABLE_TICKS; }
   std::uint32_t full_tick_ns(bushd_format format) const override {
     return format == BUSHD_FORMAT_FINE ? 4'000'000 : 2'560'000;
   }
@@ -59,7 +62,7 @@ class Lm3s6965 final : public McuUnderTest {
   McuOptions twin() const override {
     return {.slots = 128, .queue_ticks = 512, .code_count = 12288};
   }
-  std::uint16_t lacks() const override { return 0; }
+  std::uint16_t disabled_capabilities() const override { return 0; }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }
   std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
                             EdgeSink* sink) override {

@@ -114,8 +114,8 @@ TEST_P(Triggers, TheReferencePulseFollowsItsStep) {
     for (const std::uint32_t width_us : {20u, 3'000u, 50'000u}) {
       SCOPED_TRACE(std::to_string(delay_us) + " us, " + std::to_string(width_us) + " us");
       ASSERT_NO_FATAL_FAILURE(
-          ask(BUSHD_MSG_REFERENCE, bushd_encode_reference,
-              bushd_reference{2, BUSHD_ARRIVES_POSITIVE, position + 4, delay_us, width_us}));
+          ask(BUSHD_MSG_POSITION_COMPARE, bushd_encode_position_compare,
+              bushd_position_compare{2, BUSHD_ARRIVES_POSITIVE, position + 4, delay_us, width_us}));
       const TimeNs begin_ns = bus_.now_ns();
       run_by_table(master_.poll(kReal).tick + 24, {{2, 0, 1, 6}});
       pass(400'000'000);

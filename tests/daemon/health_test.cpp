@@ -83,7 +83,7 @@ TEST(TwoMasters, AreToldAndMovesRefusedWhileItLasts) {
     due_us = lab.now_us() + 300'000;
     bushd_sync sync{};
     sync.master = 4711;
-    sync.mark = ++mark;
+    sync.sync_id = ++mark;
     std::array<std::uint8_t, 32> payload{};
     std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire{};
     const std::size_t size = bushd_encode_sync(&sync, payload.data());

@@ -16,7 +16,7 @@ constexpr uint8_t kFills[] = {0x00, 0x01, 0xA5, 0xFF};
 struct Frame {
   uint8_t address = 0;
   uint8_t type = 0;
-  uint8_t tag = 0;
+  uint8_t sequence = 0;
   Bytes payload;
 
   bool operator==(const Frame&) const = default;
@@ -24,7 +24,7 @@ struct Frame {
 
 Bytes encode(const Frame& frame) {
   Bytes wire(BUSHD_FRAME_MAX_WIRE);
-  wire.resize(bushd_frame_encode(frame.address, frame.type, frame.tag, frame.payload.data(),
+  wire.resize(bushd_frame_encode(frame.address, frame.type, frame.sequence, frame.payload.data(),
                                  frame.payload.size(), wire.data()));
   return wire;
 }
@@ -44,7 +44,7 @@ Heard receive(const Bytes& bytes, bushd_receiver* receiver) {
       case BUSHD_RECEIVE_MORE:
         break;
       case BUSHD_RECEIVE_FRAME:
-        heard.frames.push_back({frame.address, frame.type, frame.tag,
+        heard.frames.push_back({frame.address, frame.type, frame.sequence,
                                 Bytes(frame.payload, frame.payload + frame.payload_size)});
         break;
       case BUSHD_RECEIVE_BAD_CRC:
@@ -111,7 +111,7 @@ TEST(Frame, IsStandardCobsWithTheCrcBehindTheRawBytes) {
     wire.pop_back();
     for (const uint8_t byte : wire) RC_ASSERT(byte != 0);
     Bytes raw = frame.payload;
-    raw.insert(raw.begin(), {frame.address, frame.type, frame.tag});
+    raw.insert(raw.begin(), {frame.address, frame.type, frame.sequence});
     const uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, raw.data(), raw.size());
     for (int shift = 0; shift < 32; shift += 8) raw.push_back(static_cast<uint8_t>(crc >> shift));
     RC_ASSERT(cobs_decode(wire) == raw);

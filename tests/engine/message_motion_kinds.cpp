@@ -234,7 +234,7 @@ Kinds motion_kinds() {
          {"no step", set32(7, 0)},
          {"no entry", [](Bytes* p) { p->resize(6); }}},
         true}},
-      {"reference",
+      {"position_compare",
        {bytes_with(14,
                    [](Bytes* p) {
                      (*p)[0] = between<uint8_t>(0, 15);
@@ -242,7 +242,7 @@ Kinds motion_kinds() {
                      bushd_put_u32(p->data() + 6, between<uint32_t>(0, 1'500'000));
                      bushd_put_u32(p->data() + 10, between<uint32_t>(1, 1'000'000));
                    }),
-        codec(bushd_decode_reference, bushd_encode_reference),
+        codec(bushd_decode_position_compare, bushd_encode_position_compare),
         {{"motor 16", set8(0, 16)},
          {"no such arrival", set8(1, 4)},
          {"too long a delay", set32(6, 1'500'001)},

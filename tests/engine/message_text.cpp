@@ -57,7 +57,9 @@ void put(const bushd_set_address& m, Fields& f) {
   f.add_list("unique_id", m.unique_id, BUSHD_UNIQUE_ID_SIZE, 1).add("address", m.address);
 }
 void put(const bushd_configure& m, Fields& f) {
-  f.add("tick_ns", m.tick_ns).add("format", m.format).add("silence_ticks", m.silence_ticks);
+  f.add("tick_ns", m.tick_ns)
+      .add("format", m.format)
+      .add("comm_timeout_ticks", m.comm_timeout_ticks);
 }
 void put(const bushd_table_begin& m, Fields& f) {
   f.add("slot", m.slot).add("accel_count", m.accel_count).add("decel_count", m.decel_count);
@@ -90,7 +92,7 @@ void put(const bushd_set_position& m, Fields& f) {
 }
 void put(const bushd_set_inputs& m, Fields& f) {
   f.add("limit_positive", m.limit_positive).add("limit_negative", m.limit_negative);
-  f.add("limit_cuts", m.limit_cuts).add("inverted", m.inverted);
+  f.add("limit_immediate", m.limit_immediate).add("inverted", m.inverted);
   f.add("debounce_ticks", m.debounce_ticks).add("system_inverted", m.system_inverted);
   f.add("emergency", m.emergency).add("overcurrent", m.overcurrent);
   f.add("enable_after_watchdog", m.enable_after_watchdog);
@@ -112,9 +114,9 @@ void put(const bushd_poll& m, Fields& f) {
   f.add("count", m.count).add_text("entries", entries);
 }
 void put(const bushd_sync& m, Fields& f) {
-  f.add("master", m.master).add("mark", m.mark).add("follows", m.follows);
-  f.add("known_mark", m.known_mark);
-  f.add("mark_tick", m.mark_tick).add("mark_ns", m.mark_ns);
+  f.add("master", m.master).add("sync_id", m.sync_id).add("follows", m.follows);
+  f.add("follow_up_id", m.follow_up_id);
+  f.add("sync_tick", m.sync_tick).add("sync_ns", m.sync_ns);
 }
 void put(const bushd_ticks& m, Fields& f) {
   f.add("epoch", m.epoch).add("flags", m.flags).add("first_tick", m.first_tick);
@@ -151,7 +153,7 @@ void put(const bushd_trigger& m, Fields& f) {
   f.add("number", m.number).add("edge", m.edge).add("delay_us", m.delay_us);
   put_entries(m.entries, m.count, f);
 }
-void put(const bushd_reference& m, Fields& f) {
+void put(const bushd_position_compare& m, Fields& f) {
   f.add("motor", m.motor).add("arrivals", m.arrivals).add("position_steps", m.position_steps);
   f.add("delay_us", m.delay_us).add("width_us", m.width_us);
 }
@@ -166,13 +168,13 @@ void put(const bushd_emission& m, Fields& f) {
 void put(const bushd_report& m, Fields& f) {
   f.add("state", m.state).add("faults", m.faults).add("flags", m.flags).add("epoch", m.epoch);
   f.add("boot_number", m.boot_number).add("tick", m.tick).add("tick_ns", m.tick_ns);
-  f.add("mark", m.mark).add("mark_tick", m.mark_tick).add("mark_ns", m.mark_ns);
+  f.add("sync_id", m.sync_id).add("sync_tick", m.sync_tick).add("sync_ns", m.sync_ns);
   f.add("rate_ppb", m.rate_ppb).add("moving", m.moving).add("running", m.running);
   f.add("inputs", m.inputs).add("bad_frames", m.bad_frames);
   f.add("rejected_frames", m.rejected_frames).add("last_rejection", m.last_rejection);
-  f.add("run_downs", m.run_downs).add("low_water_ticks", m.low_water_ticks);
-  f.add("islands", m.islands).add("island_from", m.island_from);
-  f.add("island_until", m.island_until);
+  f.add("ramp_downs", m.ramp_downs).add("low_water_ticks", m.low_water_ticks);
+  f.add("out_of_order", m.out_of_order).add("out_of_order_from", m.out_of_order_from);
+  f.add("out_of_order_until", m.out_of_order_until);
   f.add("forbidden_positive", m.forbidden_positive);
   f.add("forbidden_negative", m.forbidden_negative).add("system_inputs", m.system_inputs);
   f.add("current", m.current).add("reset_cause", m.reset_cause);
@@ -237,8 +239,8 @@ std::string message_text(const bushd_frame& frame) {
       return text("table_run", frame, bushd_decode_table_run);
     case BUSHD_MSG_TRIGGER:
       return text("trigger", frame, bushd_decode_trigger);
-    case BUSHD_MSG_REFERENCE:
-      return text("reference", frame, bushd_decode_reference);
+    case BUSHD_MSG_POSITION_COMPARE:
+      return text("position_compare", frame, bushd_decode_position_compare);
     case BUSHD_MSG_EMERGENCY:
       return text("emergency", frame, bushd_decode_emergency);
     case BUSHD_MSG_EMISSION:
@@ -268,12 +270,12 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {"identify",   "identity",  "configure",   "table_begin",     "table_data",
-          "table_end",  "assign",    "control",     "set_position",    "poll",
-          "report",     "sync",      "ticks",       "acknowledgement", "table_ticks",
-          "table_run",  "emergency", "set_address", "get_tables",      "tables",
-          "set_inputs", "emission",  "home",        "local",           "trigger",
-          "reference"};
+  return {"identify",        "identity",  "configure",   "table_begin",     "table_data",
+          "table_end",       "assign",    "control",     "set_position",    "poll",
+          "report",          "sync",      "ticks",       "acknowledgement", "table_ticks",
+          "table_run",       "emergency", "set_address", "get_tables",      "tables",
+          "set_inputs",      "emission",  "home",        "local",           "trigger",
+          "position_compare"};
 }
 
 }  // namespace bushd::test

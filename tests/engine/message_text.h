@@ -8,7 +8,7 @@
 
 namespace bushd::test {
 
-// "sync master=7 mark=41 ...", or "sync: impossible length" if the payload is refused.
+// "sync master=7 sync_id=41 ...", or "sync: impossible length" if the payload is refused.
 std::string message_text(const bushd_frame& frame);
 
 // All names that message_text can give.

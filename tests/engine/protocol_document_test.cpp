@@ -86,7 +86,7 @@ std::string meaning(const Bytes& wire) {
     if (received == BUSHD_RECEIVE_MORE) continue;
     if (received != BUSHD_RECEIVE_FRAME) return "broken frame";
     out += (out.empty() ? "" : " and ") + std::string("address=") + std::to_string(frame.address) +
-           " tag=" + std::to_string(frame.tag) + " " + message_text(frame);
+           " sequence=" + std::to_string(frame.sequence) + " " + message_text(frame);
   }
   return out;
 }

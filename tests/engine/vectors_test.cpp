@@ -226,11 +226,11 @@ TEST(Vectors, Frames) {
     }
     EXPECT_EQ(frame.address, number<int>(row, "address"));
     EXPECT_EQ(frame.type, number<int>(row, "type"));
-    EXPECT_EQ(frame.tag, number<int>(row, "tag"));
+    EXPECT_EQ(frame.sequence, number<int>(row, "sequence"));
     EXPECT_EQ(message_text(frame),
               row.at("message") + (row.at("fields").empty() ? "" : " ") + row.at("fields"));
     std::vector<uint8_t> again(BUSHD_FRAME_MAX_WIRE);
-    again.resize(bushd_frame_encode(frame.address, frame.type, frame.tag, frame.payload,
+    again.resize(bushd_frame_encode(frame.address, frame.type, frame.sequence, frame.payload,
                                     frame.payload_size, again.data()));
     EXPECT_EQ(again, wire);
   }

@@ -10,7 +10,7 @@ namespace {
 class Emergency : public Streams {
  protected:
   // Steps from the first open tick on until rest.
-  static std::vector<int> after_emergency(Rig& on, bushd_how how) {
+  static std::vector<int> after_emergency(Rig& on, bushd_stop_mode how) {
     const std::size_t open = on.history(0).size() + 2;
     on.emergency(how);
     EXPECT_EQ(on.poll().state, BUSHD_STATE_FAULT);
@@ -83,7 +83,7 @@ TEST_P(Emergency, RampsATableRunDownFromEveryTick) {
                      expected.begin() + static_cast<std::ptrdiff_t>(std::min(n, expected.size())));
     }
     SCOPED_TRACE(n);
-    expect_steps(after_emergency(fresh, BUSHD_RAMP_DOWN), expected, -1);
+    expect_steps(after_emergency(fresh, BUSHD_STOP_RAMP), expected, -1);
   }
 }
 
@@ -107,7 +107,7 @@ TEST_P(Emergency, RampsAStreamDownFromEveryTick) {
                                Rig::kTickNs);
     }
     SCOPED_TRACE(n);
-    expect_steps(after_emergency(fresh, BUSHD_RAMP_DOWN), expected, 1);
+    expect_steps(after_emergency(fresh, BUSHD_STOP_RAMP), expected, 1);
   }
 }
 
@@ -126,7 +126,7 @@ TEST_P(Emergency, RampsAStreamDownThatBeganLongAgo) {
         end += 30;
       }
     }
-    return after_emergency(on, BUSHD_RAMP_DOWN);
+    return after_emergency(on, BUSHD_STOP_RAMP);
   };
   const std::vector<int> expected = steps_after(100);
   EXPECT_GT(std::accumulate(expected.begin(), expected.end(), 0), 1);
@@ -145,7 +145,7 @@ TEST_P(Emergency, RampsAStreamDownThatWasPutInPlaceOfARest) {
   moves.displacements[15] = 0;
   ASSERT_EQ(rig.take(moves), BUSHD_OK);
   while (rig.first_open() != first + 26) rig.pass();
-  const std::vector<int> after = after_emergency(rig, BUSHD_RAMP_DOWN);
+  const std::vector<int> after = after_emergency(rig, BUSHD_STOP_RAMP);
   EXPECT_GT(std::accumulate(after.begin(), after.end(), 0), 0);
 }
 
@@ -161,7 +161,7 @@ TEST_P(Emergency, MotorThatStandsBeforeItsQueueEndsMakesNoStep) {
     ASSERT_EQ(fresh.take(fresh.part(moves, fresh.first_open(), 0, ticks + 20)), BUSHD_OK);
     fresh.pass(static_cast<int>(n));
     SCOPED_TRACE(n);
-    expect_steps(after_emergency(fresh, BUSHD_RAMP_DOWN), {}, 1);
+    expect_steps(after_emergency(fresh, BUSHD_STOP_RAMP), {}, 1);
     EXPECT_EQ(fresh.pulses(0), 5);
   }
 }
@@ -180,7 +180,7 @@ TEST_P(Emergency, CutsWithoutAnotherStep) {
         ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 40)), BUSHD_OK);
       }
       fresh.pass(n);
-      expect_steps(after_emergency(fresh, BUSHD_CUT), {}, 1);
+      expect_steps(after_emergency(fresh, BUSHD_STOP_IMMEDIATE), {}, 1);
       // And it moves again from there, by whole steps.
       ASSERT_EQ(fresh.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
       const std::int64_t stands = fresh.pulses(0);
@@ -193,9 +193,9 @@ TEST_P(Emergency, CutsWithoutAnotherStep) {
 TEST_P(Emergency, CutsARampDownShortToo) {
   ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(rig.first_open(), 500, 1)), BUSHD_OK);
   rig.pass(100);
-  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.emergency(BUSHD_STOP_RAMP);
   rig.pass(4);
-  expect_steps(after_emergency(rig, BUSHD_CUT), {}, 1);
+  expect_steps(after_emergency(rig, BUSHD_STOP_IMMEDIATE), {}, 1);
 }
 
 TEST_P(Emergency, RepeatedFramesChangeNothing) {
@@ -216,10 +216,10 @@ TEST_P(Emergency, RepeatedFramesChangeNothing) {
                          }()),
               BUSHD_OK);
     fresh.pass(40);
-    fresh.emergency(BUSHD_RAMP_DOWN);
+    fresh.emergency(BUSHD_STOP_RAMP);
     for (int i = 0; i < repeats; ++i) {
       fresh.pass();
-      fresh.emergency(BUSHD_RAMP_DOWN, i % 2 ? BUSHD_ADDRESS_BROADCAST : fresh.options().address);
+      fresh.emergency(BUSHD_STOP_RAMP, i % 2 ? BUSHD_ADDRESS_BROADCAST : fresh.options().address);
     }
     fresh.pass(150 - repeats);
     EXPECT_EQ(fresh.poll().moving, 0);
@@ -238,8 +238,8 @@ TEST_P(Emergency, WaitingStartsAreEmptied) {
   run[BUSHD_TABLE_RUN_HEADER] |= 1;
   ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run), BUSHD_OK);
   rig.pass(5);
-  expect_steps(after_emergency(rig, BUSHD_RAMP_DOWN), {}, 1);
-  EXPECT_EQ(rig.poll().islands, 0);
+  expect_steps(after_emergency(rig, BUSHD_STOP_RAMP), {}, 1);
+  EXPECT_EQ(rig.poll().out_of_order, 0);
   EXPECT_EQ(rig.pulses(1), 0);
 }
 
@@ -249,19 +249,19 @@ TEST_P(Emergency, MotorThatRestsBetweenTwoQueuedMovesStays) {
   ASSERT_EQ(rig.take(ones(kStart, start, 5, 0)), BUSHD_OK);
   ASSERT_EQ(rig.take(ones(kStart, start + 20, 5, 0)), BUSHD_OK);
   rig.pass(5);
-  expect_steps(after_emergency(rig, BUSHD_RAMP_DOWN), {}, 1);
+  expect_steps(after_emergency(rig, BUSHD_STOP_RAMP), {}, 1);
   EXPECT_EQ(rig.pulses(0), 5);
 }
 
 TEST_P(Emergency, IsLatchedAtRestTooAndClearedByControl) {
-  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.emergency(BUSHD_STOP_RAMP);
   EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_EMERGENCY);
   EXPECT_EQ(rig.take(ones(kStart, rig.first_open(), 5, 0)), BUSHD_E_STATE);
   EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(rig.first_open(), 5, 1)), BUSHD_E_STATE);
   ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
   ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 5, 0)), BUSHD_OK);
   rig.pass(2);
-  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.emergency(BUSHD_STOP_RAMP);
   EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_E_STATE) << "it still moves";
   rig.pass_until_rest();
   EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);

@@ -125,7 +125,7 @@ TEST(Emission, SettingsThatSlotsCannotKeepAreRefusedWithTheirStatus) {
 }
 
 TEST(Emission, ModeThatThePortLacksIsRefused) {
-  Rig rig({.lacks = BUSHD_CAN_PHASES});
+  Rig rig({.disabled_capabilities = BUSHD_CAN_PHASES});
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_PHASES, 0);
   rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
   EXPECT_EQ(rig.emission(of_mode(BUSHD_EMISSION_PHASES)), BUSHD_E_FORMAT);

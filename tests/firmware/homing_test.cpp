@@ -216,7 +216,7 @@ TEST_P(Homing, AnotherMotorWaitsUntilTheLastSlowStepIsOver) {
 }
 
 TEST_P(Homing, EmergencyEndsIt) {
-  for (const bushd_how how : {BUSHD_RAMP_DOWN, BUSHD_CUT}) {
+  for (const bushd_stop_mode how : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
     Rig fresh;
     fresh.make_ready(law, format, 1000);
     ASSERT_EQ(fresh.home(command()), BUSHD_OK);
@@ -227,7 +227,7 @@ TEST_P(Homing, EmergencyEndsIt) {
     EXPECT_EQ(fresh.poll().homing, BUSHD_HOMING_STOPPED);
     EXPECT_EQ(fresh.poll().faults, BUSHD_FAULT_EMERGENCY);
     EXPECT_EQ(fresh.poll().motor[kMotor].position_steps, fresh.pulses(kMotor));
-    if (how == BUSHD_CUT) {
+    if (how == BUSHD_STOP_IMMEDIATE) {
       EXPECT_LE(at - fresh.pulses(kMotor), 7) << "two ticks at cruise";
     }
     EXPECT_EQ(fresh.home(command()), BUSHD_E_STATE) << "latched";
@@ -246,7 +246,7 @@ TEST_P(Homing, EndedBetweenOverrunAndBackOffTheSwitchBarsTheWayOn) {
   while (rig.poll().homing == BUSHD_HOMING_FAST) rig.pass();
   while (rig.pulses(kMotor) > -708) rig.pass();
   ASSERT_EQ(rig.poll().homing, BUSHD_HOMING_RAMP_DOWN);
-  rig.emergency(BUSHD_CUT);
+  rig.emergency(BUSHD_STOP_IMMEDIATE);
   rig.pass_until_rest();
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_STOPPED);
   EXPECT_EQ(rig.poll().inputs, 0);
@@ -264,7 +264,7 @@ TEST_P(Homing, EndedWhereTheSwitchIsReleasedNothingIsBarred) {
   put(Contact(-700, -1, 5));
   ASSERT_EQ(rig.home(command()), BUSHD_OK);
   while (rig.poll().homing != BUSHD_HOMING_APPROACH) rig.pass();
-  rig.emergency(BUSHD_CUT);
+  rig.emergency(BUSHD_STOP_IMMEDIATE);
   rig.pass_until_rest();
   EXPECT_EQ(rig.poll().forbidden_negative, 0);
   ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
@@ -278,7 +278,7 @@ TEST_P(Homing, RunsDownWhenTheHostFallsSilent) {
   const bushd_report report = rig.poll();
   EXPECT_EQ(report.homing, BUSHD_HOMING_STOPPED);
   EXPECT_EQ(report.faults, BUSHD_FAULT_LINK);
-  EXPECT_EQ(report.run_downs, 1);
+  EXPECT_EQ(report.ramp_downs, 1);
   EXPECT_LT(report.motor[kMotor].position_steps, -20);
   EXPECT_GT(report.motor[kMotor].position_steps, -200);
   expect_counted(0);
@@ -314,7 +314,7 @@ TEST_P(Homing, TheSwitchMayBeALimitAndBarsTheWayAfterwards) {
   for (const bool both_ends : {false, true}) {
     ASSERT_EQ(rig.set_inputs({.limit_positive = both_ends ? kBit : std::uint16_t{0},
                               .limit_negative = kBit,
-                              .limit_cuts = kBit}),
+                              .limit_immediate = kBit}),
               BUSHD_OK);
     put(Contact(rig.pulses(kMotor) - 500, -1, 5));
     ASSERT_EQ(rig.home(command()), BUSHD_OK);

@@ -55,15 +55,15 @@ INSTANTIATE_TEST_SUITE_P(Formats, Inputs, testing::Values(BUSHD_FORMAT_FINE, BUS
                          format_name);
 
 TEST_P(Inputs, ALimitRampsAMotorDownByItsTableOrCutsItAtAnyTick) {
-  for (const bushd_how how : {BUSHD_RAMP_DOWN, BUSHD_CUT}) {
+  for (const bushd_stop_mode how : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
     for (const int steps : {50, -50}) {
       for (int ticks = 0; ticks < 90; ticks += 3) {
         for (const bool whole : {false, true}) {
           SCOPED_TRACE(testing::Message() << how << " " << steps << " " << ticks << " " << whole);
-          const std::uint16_t cuts = how == BUSHD_CUT ? 1 : 0;
+          const std::uint16_t cuts = how == BUSHD_STOP_IMMEDIATE ? 1 : 0;
           const auto limited = with({.limit_positive = static_cast<std::uint16_t>(steps > 0),
                                      .limit_negative = static_cast<std::uint16_t>(steps < 0),
-                                     .limit_cuts = cuts});
+                                     .limit_immediate = cuts});
           const auto twin = with({});
           for (Rig* on : {limited.get(), twin.get()}) {
             ASSERT_EQ(whole ? start_run(*on, steps) : start(*on, steps), BUSHD_OK);
@@ -290,7 +290,7 @@ TEST_P(Inputs, NoStepIsLostHoweverSwitchesBounce) {
     const auto below = [&random](unsigned n) { return static_cast<int>(random() % n); };
     const auto on = with({.limit_positive = static_cast<std::uint16_t>(1 + below(3)),
                           .limit_negative = static_cast<std::uint16_t>(below(4)),
-                          .limit_cuts = static_cast<std::uint16_t>(below(4)),
+                          .limit_immediate = static_cast<std::uint16_t>(below(4)),
                           .debounce_ticks = static_cast<std::uint8_t>(below(3))});
     for (int move = 0; move < 12; ++move) {
       const int steps = below(80) - 40;
@@ -316,11 +316,11 @@ INSTANTIATE_TEST_SUITE_P(Formats, SystemInputs,
                          testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
 
 TEST_P(SystemInputs, TheEmergencyInputStopsAllMotorsAsEmergencyDoes) {
-  for (const bushd_how how : {BUSHD_RAMP_DOWN, BUSHD_CUT}) {
+  for (const bushd_stop_mode how : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
     for (const std::uint8_t rests_at : {std::uint8_t{0}, std::uint8_t{1}}) {
       const auto stopped =
           with({.system_inverted = rests_at,
-                .emergency = how == BUSHD_CUT ? std::uint8_t{2} : std::uint8_t{1}});
+                .emergency = how == BUSHD_STOP_IMMEDIATE ? std::uint8_t{2} : std::uint8_t{1}});
       const auto twin = with({});
       stopped->pins({0, rests_at});
       stopped->control(BUSHD_CONTROL_CLEAR_FAULTS);
@@ -344,7 +344,7 @@ TEST_P(SystemInputs, TheEmergencyInputStopsAllMotorsAsEmergencyDoes) {
 }
 
 TEST_P(SystemInputs, TheEmergencyInputIsLatchedAndClearedWhenItIsReleased) {
-  const auto on = with({.emergency = BUSHD_EMERGENCY_INPUT_RAMPS});
+  const auto on = with({.emergency = BUSHD_EMERGENCY_INPUT_RAMP});
   on->pins({0, BUSHD_INPUT_EMERGENCY});
   on->pass();
   EXPECT_EQ(on->poll().system_inputs, BUSHD_INPUT_EMERGENCY);

@@ -115,7 +115,7 @@ TEST_P(Local, AStreamOnSuchAMotorIsRefusedMeanwhileAndWhatStreamsIsLeftAlone) {
 
 TEST_P(Local, EmergencyStopsItUntilItIsClearedAndPressedAgain) {
   hold(BUSHD_INPUT_FORWARD, 60);
-  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.emergency(BUSHD_STOP_RAMP);
   rig.pass(200);
   EXPECT_EQ(rig.poll().moving, 0);
   const std::int64_t at = rig.pulses(0);
@@ -131,12 +131,12 @@ TEST_P(Local, EmergencyStopsItUntilItIsClearedAndPressedAgain) {
 
 TEST_P(Local, ACutIsNoRampWhoeverAsksForIt) {
   ASSERT_EQ(rig.set_inputs({.limit_positive = 0b0101,
-                            .limit_cuts = 0b0101,
-                            .emergency = BUSHD_EMERGENCY_INPUT_CUTS,
+                            .limit_immediate = 0b0101,
+                            .emergency = BUSHD_EMERGENCY_INPUT_IMMEDIATE,
                             .overcurrent = 500}),
             BUSHD_OK);
   const std::vector<std::function<void()>> cuts = {
-      [&] { rig.emergency(BUSHD_CUT); },
+      [&] { rig.emergency(BUSHD_STOP_IMMEDIATE); },
       [&] {
         rig.pins({0, BUSHD_INPUT_FORWARD | BUSHD_INPUT_EMERGENCY});
       },

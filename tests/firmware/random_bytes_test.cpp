@@ -77,11 +77,11 @@ class Stranger {
       case BUSHD_MSG_SYNC: {
         const bushd_report report = rig.poll();
         put16(payload, below(2));
-        put32(payload, below(9) != 0 ? ++mark_ : mark_);
+        put32(payload, below(9) != 0 ? ++sync_id_ : sync_id_);
         payload.push_back(static_cast<std::uint8_t>(below(3) != 0));
-        put32(payload, report.mark);
-        put32(payload, below(3) != 0 ? report.mark_tick : report.mark_tick + below(5) - 2);
-        put32(payload, below(3) != 0 ? report.mark_ns : below(2'600'000));
+        put32(payload, report.sync_id);
+        put32(payload, below(3) != 0 ? report.sync_tick : report.sync_tick + below(5) - 2);
+        put32(payload, below(3) != 0 ? report.sync_ns : below(2'600'000));
         if (below(200) == 0) payload[11 + below(4)] = byte();
         break;
       }
@@ -99,7 +99,7 @@ class Stranger {
         put32(payload, 1 + below(50));
         break;
       }
-      case BUSHD_MSG_REFERENCE:
+      case BUSHD_MSG_POSITION_COMPARE:
         payload = {static_cast<std::uint8_t>(below(rig.options().motors)),
                    static_cast<std::uint8_t>(below(4))};
         put32(payload, below(20));
@@ -172,25 +172,25 @@ class Stranger {
   std::uint8_t slot_ = 0;
   Bytes head_;
   Bytes sent_;
-  std::uint32_t mark_ = 100;
+  std::uint32_t sync_id_ = 100;
 };
 
 // A tick in which all that must hold is looked at from outside.
 void pass_and_check(Rig& rig) {
   std::array<std::uint32_t, BUSHD_MOTORS_PER_MCU> expected{};
-  const bushd_plane& plane = rig.plane();
+  const bushd_slot_buffer& slot_buffer = rig.slot_buffer();
   std::uint16_t stepped = 0;
   for (std::uint8_t m = 0; m < rig.options().motors; ++m) {
     std::uint32_t steps = 0;
     for (std::uint16_t slot = 0; slot < rig.options().slots; ++slot)
-      steps += plane.step[slot] >> m & 1u;
-    const bool forward = plane.direction >> m & 1;
+      steps += slot_buffer.step[slot] >> m & 1u;
+    const bool forward = slot_buffer.direction >> m & 1;
     expected[m] = static_cast<std::uint32_t>(rig.mcu().motor[m].position_steps) +
                   (forward ? steps : 0u - steps);
     if (steps != 0) stepped |= static_cast<std::uint16_t>(1u << m);
   }
   for (std::uint16_t slot = 0; slot < rig.options().slots; ++slot) {
-    RC_ASSERT((plane.step[slot] & ~stepped) == 0);  // outputs that do not exist
+    RC_ASSERT((slot_buffer.step[slot] & ~stepped) == 0);  // outputs that do not exist
   }
   const std::uint16_t moving = rig.poll().moving;
   RC_ASSERT((stepped & ~moving) == 0);

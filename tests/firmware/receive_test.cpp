@@ -7,18 +7,19 @@ namespace bushd::test {
 namespace {
 
 Bytes wire_of(std::uint8_t address, std::uint8_t type, const Bytes& payload = {},
-              std::uint8_t tag = 100) {
+              std::uint8_t sequence = 100) {
   Bytes wire(BUSHD_FRAME_MAX_WIRE);
-  wire.resize(bushd_frame_encode(address, type, tag, payload.data(), payload.size(), wire.data()));
+  wire.resize(
+      bushd_frame_encode(address, type, sequence, payload.data(), payload.size(), wire.data()));
   return wire;
 }
 
 // To all, so that nobody answers.
-Bytes set_position_wire(std::int32_t steps, std::uint8_t tag) {
+Bytes set_position_wire(std::int32_t steps, std::uint8_t sequence) {
   const bushd_set_position message = {0, steps};
   Bytes payload(8);
   payload.resize(bushd_encode_set_position(&message, payload.data()));
-  return wire_of(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_POSITION, payload, tag);
+  return wire_of(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_POSITION, payload, sequence);
 }
 
 // A line or an adapter may keep a frame back, or make it twice. What it asked for is then no longer
@@ -29,8 +30,8 @@ TEST(Receive, RequestsThatWereOvertakenChangeNothing) {
   rig.feed(set_position_wire(22, 251));
   rig.feed(set_position_wire(11, 250));
   rig.feed(set_position_wire(22, 251));
-  const auto control = [](std::uint8_t action, std::uint8_t tag) {
-    return wire_of(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_CONTROL, {action}, tag);
+  const auto control = [](std::uint8_t action, std::uint8_t sequence) {
+    return wire_of(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_CONTROL, {action}, sequence);
   };
   rig.feed(control(BUSHD_CONTROL_DISABLE, 3));
   rig.feed(control(BUSHD_CONTROL_ENABLE, 2));

@@ -135,13 +135,13 @@ TEST(Requests, ATickThatIsTooShortForTheMcuIsRefused) {
 class TwoMasters : public testing::Test {
  protected:
   TwoMasters() { EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE), BUSHD_OK); }
-  void sync_of(std::uint16_t master) { rig.sync({master, ++mark_, false, 0, 0, 0}); }
+  void sync_of(std::uint16_t master) { rig.sync({master, ++sync_id_, false, 0, 0, 0}); }
   bool told() { return (rig.poll().flags & BUSHD_FLAG_TWO_MASTERS) != 0; }
   static constexpr int kTwoSeconds = 2'000'000'000 / static_cast<int>(Rig::kTickNs);
   Rig rig;
 
  private:
-  std::uint32_t mark_ = 100;
+  std::uint32_t sync_id_ = 100;
 };
 
 TEST_F(TwoMasters, ThatTakeTurnsAreToldUntilTwoSecondsAfter) {
@@ -188,7 +188,7 @@ TEST(Requests, LowWaterIsThatOfMovingMotorsSinceTheReportBefore) {
   rig.pass();
   EXPECT_EQ(rig.poll().low_water_ticks, 49) << "take() has asked for the lower one";
   rig.pass_until_rest();
-  EXPECT_EQ(rig.poll().run_downs, 1);
+  EXPECT_EQ(rig.poll().ramp_downs, 1);
 }
 
 }  // namespace

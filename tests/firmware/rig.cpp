@@ -125,18 +125,18 @@ Rig::Rig(RigOptions options)
   config.code_count = options.code_count;
   config.reply = reply_.data();
   config.min_tick_ns = options.min_tick_ns;
-  config.lacks = options.lacks;
+  config.disabled_capabilities = options.disabled_capabilities;
   config.pulse_ns = options.pulse_ns;
   std::ranges::copy(unique_id(), config.unique_id);
   bushd_mcu_boot(&mcu_, &port, &config);
-  plane_ = bushd_mcu_swap(&mcu_);
+  slot_buffer_ = bushd_mcu_swap(&mcu_);
   bushd_mcu_prepare(&mcu_);
 }
 
 void Rig::restart_with_what_is_kept() {
   std::vector<Bytes> kept;
   for (std::uint8_t i = 0;; ++i) {
-    const bushd_mcu_piece piece = bushd_mcu_kept(&mcu_, i);
+    const bushd_mcu_nvm_region piece = bushd_mcu_nvm_region_at(&mcu_, i);
     if (piece.size == 0) break;
     const auto* const bytes = static_cast<const std::uint8_t*>(piece.at);
     kept.emplace_back(bytes, bytes + piece.size);
@@ -145,10 +145,10 @@ void Rig::restart_with_what_is_kept() {
   const bushd_mcu_config config = mcu_.config;
   bushd_mcu_boot(&mcu_, &port, &config);
   for (std::uint8_t i = 0; i < kept.size(); ++i) {
-    std::ranges::copy(kept[i], static_cast<std::uint8_t*>(bushd_mcu_kept(&mcu_, i).at));
+    std::ranges::copy(kept[i], static_cast<std::uint8_t*>(bushd_mcu_nvm_region_at(&mcu_, i).at));
   }
-  bushd_mcu_restored(&mcu_);
-  plane_ = bushd_mcu_swap(&mcu_);
+  bushd_mcu_nvm_restored(&mcu_);
+  slot_buffer_ = bushd_mcu_swap(&mcu_);
   bushd_mcu_prepare(&mcu_);
 }
 
@@ -159,7 +159,7 @@ void Rig::feed(std::span<const std::uint8_t> bytes) {
 void Rig::frame(std::uint8_t address, std::uint8_t type, const Bytes& payload) {
   std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire;
   const std::size_t size =
-      bushd_frame_encode(address, type, ++tag_, payload.data(), payload.size(), wire.data());
+      bushd_frame_encode(address, type, ++sequence_, payload.data(), payload.size(), wire.data());
   feed(std::span(wire).first(size));
 }
 
@@ -177,9 +177,9 @@ std::optional<Answer> Rig::answer() {
     EXPECT_EQ(received, BUSHD_RECEIVE_FRAME);
     EXPECT_FALSE(answer) << "one frame per answer";
     EXPECT_EQ(frame.address, mcu_.config.address);
-    EXPECT_EQ(frame.tag, tag_);
+    EXPECT_EQ(frame.sequence, sequence_);
     EXPECT_NE(frame.type & BUSHD_TYPE_REPLY, 0);
-    answer = Answer{static_cast<std::uint8_t>(frame.type & ~BUSHD_TYPE_REPLY), frame.tag,
+    answer = Answer{static_cast<std::uint8_t>(frame.type & ~BUSHD_TYPE_REPLY), frame.sequence,
                     Bytes(frame.payload, frame.payload + frame.payload_size), sent.front().second};
   }
   return answer;
@@ -220,8 +220,8 @@ bushd_identity Rig::identify() {
 }
 
 bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns,
-                            std::uint16_t silence_ticks) {
-  const bushd_configure message = {tick_ns, format, silence_ticks};
+                            std::uint16_t comm_timeout_ticks) {
+  const bushd_configure message = {tick_ns, format, comm_timeout_ticks};
   const bushd_status status =
       request(BUSHD_MSG_CONFIGURE,
               payload_of([&](std::uint8_t* p) { return bushd_encode_configure(&message, p); }));
@@ -232,7 +232,7 @@ bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns,
 bushd_status Rig::set_inputs(const InputSettings& settings) {
   const bushd_set_inputs message = {.limit_positive = settings.limit_positive,
                                     .limit_negative = settings.limit_negative,
-                                    .limit_cuts = settings.limit_cuts,
+                                    .limit_immediate = settings.limit_immediate,
                                     .inverted = settings.inverted,
                                     .debounce_ticks = settings.debounce_ticks,
                                     .system_inverted = settings.system_inverted,
@@ -262,7 +262,7 @@ void Rig::sync(const bushd_sync& message) {
 
 void Rig::sync_to(std::uint32_t tick) {
   pass(4);  // a new tick length has settled
-  const std::uint32_t mark = mark_ += 2;
+  const std::uint32_t mark = sync_id_ += 2;
   sync({1, mark, false, 0, 0, 0});
   sync({1, mark + 1, true, mark, tick, kTimeInTickNs});
   EXPECT_EQ(this->tick(), tick);
@@ -341,12 +341,13 @@ bushd_status Rig::arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_
                  }));
 }
 
-bushd_status Rig::reference(const bushd_reference& message) {
-  return request(BUSHD_MSG_REFERENCE,
-                 payload_of([&](std::uint8_t* p) { return bushd_encode_reference(&message, p); }));
+bushd_status Rig::reference(const bushd_position_compare& message) {
+  return request(BUSHD_MSG_POSITION_COMPARE, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_position_compare(&message, p);
+                 }));
 }
 
-void Rig::emergency(bushd_how how, std::uint8_t address) {
+void Rig::emergency(bushd_stop_mode how, std::uint8_t address) {
   frame(address, BUSHD_MSG_EMERGENCY, {static_cast<std::uint8_t>(how)});
   EXPECT_FALSE(answer()) << "EMERGENCY is not answered";
 }
@@ -428,12 +429,12 @@ void Rig::run_plan(const Plan& plan, std::uint8_t motor) {
 }
 
 int Rig::steps_of_plane(std::uint8_t m) const {
-  if (plane_->outputs == BUSHD_OUTPUTS_LEVELS) return plane_->steps[m];
+  if (slot_buffer_->outputs == BUSHD_OUTPUTS_LEVELS) return slot_buffer_->steps[m];
   int steps = 0;
   for (std::uint16_t slot = 0; slot < options_.slots; ++slot) {
-    const bool common = plane_->outputs == BUSHD_OUTPUTS_COMMON_DIR;
-    const bool right = common ? slot % 2 == 1 : (plane_->direction >> m & 1) != 0;
-    if (plane_->step[slot] >> m & 1) steps += right ? 1 : -1;
+    const bool common = slot_buffer_->outputs == BUSHD_OUTPUTS_COMMON_DIR;
+    const bool right = common ? slot % 2 == 1 : (slot_buffer_->direction >> m & 1) != 0;
+    if (slot_buffer_->step[slot] >> m & 1) steps += right ? 1 : -1;
   }
   return steps;
 }
@@ -445,9 +446,9 @@ void Rig::pass() {
     history_[m].push_back(steps);
     if (steps != 0 && !enabled_) ++steps_while_disabled_;
   }
-  if ((plane_->step[0] & (plane_->direction ^ direction_)) != 0) ++steps_with_dir_;
-  direction_ = plane_->direction;
-  plane_ = bushd_mcu_swap(&mcu_);
+  if ((slot_buffer_->step[0] & (slot_buffer_->direction ^ direction_)) != 0) ++steps_with_dir_;
+  direction_ = slot_buffer_->direction;
+  slot_buffer_ = bushd_mcu_swap(&mcu_);
   bushd_mcu_prepare(&mcu_);
 }
 

@@ -1,5 +1,5 @@
 // One MCU program behind a port that only records: what it sends, what it does to EN, and every
-// STEP pulse of the planes it hands out. Ticks pass when a test says so.
+// STEP pulse of the slot_buffers it hands out. Ticks pass when a test says so.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ struct RigOptions {
   bushd_reset_cause reset_cause = BUSHD_RESET_POWER_ON;
   bool enable_at_boot = false;
   bool in_pieces = false;  // answers wait for work()
-  std::uint16_t lacks = 0;
+  std::uint16_t disabled_capabilities = 0;
   std::int32_t pulse_ns = 0;
   bool stores_address = true;
   bool trigger_input = true;
@@ -38,7 +38,7 @@ struct RigOptions {
 
 struct Answer {
   std::uint8_t type;  // without BUSHD_TYPE_REPLY
-  std::uint8_t tag;
+  std::uint8_t sequence;
   Bytes payload;
   std::uint32_t delay_ns;  // as the port was told
 };
@@ -74,7 +74,7 @@ struct Ticks {
 struct InputSettings {
   std::uint16_t limit_positive = 0;
   std::uint16_t limit_negative = 0;
-  std::uint16_t limit_cuts = 0;
+  std::uint16_t limit_immediate = 0;
   std::uint16_t inverted = 0;
   std::uint8_t debounce_ticks = 0;
   std::uint8_t system_inverted = 0;
@@ -105,14 +105,14 @@ class Rig {
     }
   }
   const Bytes& last_sent() const { return last_sent_; }
-  std::uint8_t last_tag() const { return tag_; }
+  std::uint8_t last_sequence() const { return sequence_; }
   // Sends a request to this MCU and returns the status that it acknowledges with.
   bushd_status request(std::uint8_t type, const Bytes& payload);
   bushd_report poll();
   bushd_identity identify();
 
   bushd_status configure(bushd_format format, std::uint32_t tick_ns = kTickNs,
-                         std::uint16_t silence_ticks = 65535);
+                         std::uint16_t comm_timeout_ticks = 65535);
   // Two SYNC frames: afterwards the MCU is in step and the tick being emitted is `tick`.
   void sync_to(std::uint32_t tick);
   void sync(const bushd_sync& message);
@@ -138,12 +138,12 @@ class Rig {
   bushd_status arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
                    const std::vector<bushd_table_run_entry>& entries);
   bushd_status disarm() { return arm(0, BUSHD_EDGE_NONE, 0, {}); }
-  bushd_status reference(const bushd_reference& message);
+  bushd_status reference(const bushd_position_compare& message);
   // What the port was told to wait for, and the edge noticed in the present tick.
   bushd_edge awaited_edge() const { return awaited_edge_; }
   void trigger(std::int32_t time_in_tick_ns) { bushd_mcu_trigger(&mcu_, time_in_tick_ns); }
   // Without an answer.
-  void emergency(bushd_how how, std::uint8_t address = BUSHD_ADDRESS_BROADCAST);
+  void emergency(bushd_stop_mode how, std::uint8_t address = BUSHD_ADDRESS_BROADCAST);
   // Everything up to READY, with this table for all motors.
   void make_ready(const Law& law, bushd_format format, std::uint32_t tick = 1000);
 
@@ -157,7 +157,8 @@ class Rig {
   // Keeps the queue filled with a plan and lets time pass until the motor is at rest.
   void run_plan(const Plan& plan, std::uint8_t motor);
 
-  // One tick boundary: the plane in force is counted, the next one emitted, the one after prepared.
+  // One tick boundary: the slot_buffer in force is counted, the next one emitted, the one after
+  // prepared.
   void pass();
   void pass(int ticks) {
     for (int i = 0; i < ticks; ++i) pass();
@@ -166,9 +167,10 @@ class Rig {
 
   std::uint32_t tick() const { return mcu_.tick; }
   std::uint32_t first_open() const { return mcu_.tick + 2; }
-  // Steps of the planes that have ended, counted from STEP and DIR levels alone (but for phases).
+  // Steps of the slot_buffers that have ended, counted from STEP and DIR levels alone (but for
+  // phases).
   std::int64_t pulses(std::uint8_t motor) const { return pulses_[motor]; }
-  // Signed steps of a motor in each tick since boot; entry i is the i-th plane emitted.
+  // Signed steps of a motor in each tick since boot; entry i is the i-th slot_buffer emitted.
   const std::vector<int>& history(std::uint8_t motor) const { return history_[motor]; }
   void forget_history();
   bool enabled() const { return enabled_; }
@@ -182,7 +184,7 @@ class Rig {
   int steps_with_dir() const { return steps_with_dir_; }
   int steps_while_disabled() const { return steps_while_disabled_; }
   std::uint32_t port_tick_ns() const { return port_tick_ns_; }
-  const bushd_plane& plane() const { return *plane_; }
+  const bushd_slot_buffer& slot_buffer() const { return *slot_buffer_; }
   const bushd_mcu& mcu() const { return mcu_; }
   bushd_mcu* mutable_mcu() { return &mcu_; }  // for functions of the core that ports call
   const RigOptions& options() const { return options_; }
@@ -195,9 +197,9 @@ class Rig {
   std::vector<std::uint16_t> codes_;
   std::array<std::uint8_t, BUSHD_MCU_MAX_REPLY> reply_{};
   bushd_mcu mcu_{};
-  const bushd_plane* plane_ = nullptr;
+  const bushd_slot_buffer* slot_buffer_ = nullptr;
   bushd_format format_ = BUSHD_FORMAT_COARSE;
-  std::uint8_t tag_ = 0;
+  std::uint8_t sequence_ = 0;
   std::vector<std::pair<Bytes, std::uint32_t>> sent_;
   std::array<Bytes, 256> table_head_;  // what TABLE_BEGIN said, by slot, as a checksum has it
   Bytes last_sent_;
@@ -208,7 +210,7 @@ class Rig {
   int stored_address_ = -1;
   bushd_inputs pins_{};
   std::uint16_t current_ = 0;
-  std::uint32_t mark_ = 0;
+  std::uint32_t sync_id_ = 0;
   std::uint32_t port_tick_ns_ = 0;
   std::uint16_t direction_ = 0;
   std::array<std::int64_t, BUSHD_MOTORS_PER_MCU> pulses_{};

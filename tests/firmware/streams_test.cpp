@@ -188,7 +188,7 @@ TEST_P(Streams, FramesThatWereOvertakenAreRefused) {
   Bytes kept_back(BUSHD_FRAME_MAX_WIRE);
   const Bytes payload = rig.encode(ones(kStart, rig.first_open() + 4, 3, 0));
   rig.poll();
-  kept_back.resize(bushd_frame_encode(rig.options().address, BUSHD_MSG_TICKS, rig.last_tag(),
+  kept_back.resize(bushd_frame_encode(rig.options().address, BUSHD_MSG_TICKS, rig.last_sequence(),
                                       payload.data(), payload.size(), kept_back.data()));
   rig.poll();
   rig.feed(kept_back);
@@ -213,13 +213,13 @@ TEST_P(Streams, MovingBitsFollowTheLastTickOut) {
 
 TEST_P(Streams, DirIsConstantInATickAndStaysAtRest) {
   rig.run_plan(plan(-4), 2);
-  EXPECT_EQ(rig.plane().direction & 4, 0);
+  EXPECT_EQ(rig.slot_buffer().direction & 4, 0);
   rig.run_plan(plan(4), 2);
-  EXPECT_EQ(rig.plane().direction & 4, 4);
+  EXPECT_EQ(rig.slot_buffer().direction & 4, 4);
   rig.pass(10);
-  EXPECT_EQ(rig.plane().direction & 4, 4);
+  EXPECT_EQ(rig.slot_buffer().direction & 4, 4);
   rig.run_plan(plan(-4), 2);
-  EXPECT_EQ(rig.plane().direction & 4, 0);
+  EXPECT_EQ(rig.slot_buffer().direction & 4, 0);
   EXPECT_EQ(rig.steps_with_dir(), 0);
 }
 

@@ -49,7 +49,8 @@ TEST_P(TableRun, EveryStepFallsIntoTheSlotOfTheSumOfItsDelays) {
             static_cast<std::size_t>((reference.step(made).end - begin) * 256 / length);
         expected[std::min<std::size_t>(slot, 255)] = 1;
       }
-      ASSERT_TRUE(std::ranges::equal(std::span(rig.plane().step).first(256), expected)) << tick;
+      ASSERT_TRUE(std::ranges::equal(std::span(rig.slot_buffer().step).first(256), expected))
+          << tick;
     }
     EXPECT_EQ(made, steps);
     EXPECT_EQ(rig.poll().faults, 0);
@@ -182,10 +183,10 @@ TEST_P(TableRun, TicksBeyondAGapAreKeptOnlyWhenItIsOver) {
   ASSERT_EQ(start(rig, first, 120, -1), BUSHD_OK);
   ASSERT_EQ(rig.take(part(20, kReplace)), BUSHD_OK);
   EXPECT_EQ(rig.take(part(40)), BUSHD_E_GAP) << "the run has still to be made";
-  EXPECT_EQ(rig.poll().islands, 0);
+  EXPECT_EQ(rig.poll().out_of_order, 0);
   while (rig.tick() != first + 20) rig.pass();
   ASSERT_EQ(rig.take(part(40)), BUSHD_OK);
-  EXPECT_EQ(rig.poll().islands, 1);
+  EXPECT_EQ(rig.poll().out_of_order, 1);
   for (std::size_t from = 30; from < moves.ticks(); from += 10) {
     if (from == 40) continue;
     ASSERT_EQ(rig.take(part(from)), BUSHD_OK) << from;
@@ -216,7 +217,7 @@ TEST_P(TableRun, IsRunDownWhenNoMasterIsHeard) {
   expect_steps(rig, reference, 1);
   const bushd_report report = rig.poll();
   EXPECT_EQ(report.faults, BUSHD_FAULT_LINK);
-  EXPECT_EQ(report.run_downs, 1);
+  EXPECT_EQ(report.ramp_downs, 1);
   EXPECT_EQ(report.moving, 0);
   EXPECT_EQ(report.motor[0].position_steps, rig.pulses(0));
 }
@@ -238,7 +239,7 @@ TEST_P(TableRun, ThatWaitsIsCancelledBySilence) {
   rig.pass(150);
   const bushd_report report = rig.poll();
   EXPECT_EQ(report.faults, BUSHD_FAULT_LINK);
-  EXPECT_EQ(report.run_downs, 0);
+  EXPECT_EQ(report.ramp_downs, 0);
   EXPECT_EQ(report.moving, 0);
   EXPECT_EQ(rig.pulses(0), 0);
 }

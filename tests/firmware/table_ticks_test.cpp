@@ -76,7 +76,7 @@ TEST_P(TableTicks, EqualTicksForAnyRunFromAnyTick) {
         RC_ASSERT(by_ticks.mcu().motor[0].delay == by_states.mcu().motor[0].delay);
         RC_ASSERT(by_ticks.mcu().motor[0].known_until == by_states.mcu().motor[0].known_until);
         for (std::size_t slot = 0; slot < 256; ++slot) {
-          RC_ASSERT(by_ticks.plane().step[slot] == by_states.plane().step[slot]);
+          RC_ASSERT(by_ticks.slot_buffer().step[slot] == by_states.slot_buffer().step[slot]);
         }
         by_ticks.pass();
         by_states.pass();
@@ -168,7 +168,7 @@ TEST_P(TableTicks, StatesThatNoRunHasAreRefusedAndChangeNothing) {
 }
 
 TEST_P(TableTicks, AreRefusedByAnMcuThatIsTooSlowForThem) {
-  Rig slow({.lacks = BUSHD_CAN_TABLE_TICKS});
+  Rig slow({.disabled_capabilities = BUSHD_CAN_TABLE_TICKS});
   EXPECT_EQ(slow.identify().capabilities & BUSHD_CAN_TABLE_TICKS, 0);
   slow.make_ready(law, format);
   bushd_run run;

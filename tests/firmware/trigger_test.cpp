@@ -16,7 +16,7 @@ class Trigger : public Streams {
     std::vector<std::int64_t> slots;
     for (int i = 0; i < limit && rig.poll().moving != 0; ++i) {
       for (std::int64_t slot = 0; slot < kSlots; ++slot) {
-        if (rig.plane().step[slot] >> motor & 1) slots.push_back(rig.tick() * kSlots + slot);
+        if (rig.slot_buffer().step[slot] >> motor & 1) slots.push_back(rig.tick() * kSlots + slot);
       }
       rig.pass();
     }
@@ -101,7 +101,7 @@ TEST_P(Trigger, StartsSeveralMotorsInTheSameSlotWhileOthersStream) {
   std::vector<std::int64_t> first;
   while (rig.poll().moving != 0) {
     for (std::int64_t slot = 0; slot < kSlots; ++slot) {
-      const auto both = rig.plane().step[slot] & 0b1010;
+      const auto both = rig.slot_buffer().step[slot] & 0b1010;
       EXPECT_TRUE(both == 0 || both == 0b1010);
       if (both != 0) first.push_back(rig.tick() * kSlots + slot);
     }
@@ -205,14 +205,14 @@ TEST_P(Trigger, IsForMotorsAtRestWithTheirTablesInAnMcuThatIsReady) {
 
 TEST_P(Trigger, AFaultDisarms) {
   ASSERT_EQ(arm(1), BUSHD_OK);
-  rig.emergency(BUSHD_CUT);
+  rig.emergency(BUSHD_STOP_IMMEDIATE);
   rig.trigger(100);
   EXPECT_EQ(rig.poll().trigger_state, BUSHD_TRIGGER_FAULT);
   rig.pass(30);
   EXPECT_EQ(rig.pulses(0), 0);
   ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
   ASSERT_EQ(arm(2), BUSHD_OK);
-  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.emergency(BUSHD_STOP_RAMP);
   rig.pass();
   EXPECT_EQ(rig.poll().armed, 0);
   EXPECT_EQ(rig.awaited_edge(), BUSHD_EDGE_NONE);
@@ -275,14 +275,14 @@ TEST_P(Trigger, AfterTheEdgeItIsATableRun) {
   EXPECT_EQ(rig.poll().trigger_state, BUSHD_TRIGGER_STARTED);
   EXPECT_EQ(rig.poll().running, 1) << "too late to disarm";
   EXPECT_EQ(arm(2), BUSHD_E_STATE);
-  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.emergency(BUSHD_STOP_RAMP);
   rig.pass_until_rest();
   EXPECT_EQ(rig.pulses(0), 0) << "but not for an emergency stop";
   ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
   ASSERT_EQ(arm(3, 500), BUSHD_OK);
   rig.trigger(1'300'000);
   rig.pass(60);
-  rig.emergency(BUSHD_RAMP_DOWN);
+  rig.emergency(BUSHD_STOP_RAMP);
   rig.pass_until_rest();
   EXPECT_GT(rig.pulses(0), 20);
   EXPECT_LT(rig.pulses(0), 200);
@@ -315,8 +315,8 @@ TEST_P(Trigger, ItsRunIsReplacedByTicks) {
     ASSERT_EQ(fresh.take(rest), BUSHD_OK);
     for (std::uint32_t n = 0; n + 1 < k + 60; ++n) {
       while (fresh.tick() < start + n) fresh.pass();
-      ASSERT_EQ(fresh.plane().steps[0], static_cast<int>(reference.steps_at((n + 1) * kTick) -
-                                                         reference.steps_at(n * kTick)))
+      ASSERT_EQ(fresh.slot_buffer().steps[0], static_cast<int>(reference.steps_at((n + 1) * kTick) -
+                                                               reference.steps_at(n * kTick)))
           << "replaced from " << k << ", tick " << n;
     }
   }

@@ -88,11 +88,11 @@ void send_sync(Programmed& mcu, Input& input) {
   const std::uint32_t later_ticks =
       static_cast<std::uint32_t>(static_cast<std::int8_t>(input.u8()));
   const bushd_sync sync = {.master = static_cast<std::uint16_t>(sight.master + mark % 4 / 3),
-                           .mark = sight.mark + mark / 4u,
+                           .sync_id = sight.sync_id + mark / 4u,
                            .follows = true,
-                           .known_mark = sight.mark,
-                           .mark_tick = sight.mark_tick + later_ticks,
-                           .mark_ns = (sight.mark_ns + later_ns) % tick_ns};
+                           .follow_up_id = sight.sync_id,
+                           .sync_tick = sight.sync_tick + later_ticks,
+                           .sync_ns = (sight.sync_ns + later_ns) % tick_ns};
   Payload payload;
   payload.size = bushd_encode_sync(&sync, payload.bytes.data());
   mcu.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, payload.view());

@@ -23,9 +23,9 @@ struct Sight {
   std::uint32_t tick;
   std::uint32_t tick_ns;
   std::uint16_t master;  // of the last mark
-  std::uint32_t mark;
-  std::uint32_t mark_tick;
-  std::uint32_t mark_ns;
+  std::uint32_t sync_id;
+  std::uint32_t sync_tick;
+  std::uint32_t sync_ns;
 };
 
 // An MCU that it happens to: the core itself, or an image of it.
@@ -47,7 +47,7 @@ class Programmed {
   virtual void pass() = 0;   // of a tick
   // Bytes come; what they ask for may be left for later.
   virtual void feed(Bytes bytes) = 0;
-  // The master counts its frames in their tags; `later` is how far this one is off.
+  // The master counts its frames in their sequences; `later` is how far this one is off.
   virtual void frame(std::uint8_t address, std::uint8_t type, Bytes payload,
                      std::uint8_t later = 0) = 0;
   virtual void set_time(std::uint16_t share) = 0;
@@ -73,7 +73,7 @@ enum class Op : std::uint8_t {
   kNoise,       // count, bytes
   kTicksPass,   // count
   kTimeInTick,  // u16, share of the tick
-  kFrame,       // flag: broadcast; type, how much later than the next tag, count, payload
+  kFrame,       // flag: broadcast; type, how much later than the next sequence, count, payload
   kTicks,       // TICKS whose first tick and epoch count from the MCU's
   kSync,        // SYNC that follows the last mark, this far off it
   kTableEnd,    // TABLE_END with the checksum of what is there

@@ -14,8 +14,8 @@ CoreRig::CoreRig(const CoreConfiguration& configuration)
 
 Sight CoreRig::sight() {
   const bushd_mcu_clock& clock = mcu_.clock;
-  return {mcu_.config.address, motors(),   mcu_.stream.epoch, mcu_.tick,    mcu_.tick_ns,
-          clock.master,        clock.mark, clock.mark_tick,   clock.mark_ns};
+  return {mcu_.config.address, motors(),      mcu_.stream.epoch, mcu_.tick,    mcu_.tick_ns,
+          clock.master,        clock.sync_id, clock.sync_tick,   clock.sync_ns};
 }
 
 std::uint32_t CoreRig::table_crc(std::uint8_t slot) {
@@ -56,7 +56,7 @@ void CoreRig::boot() {
                              .queue_ticks = configuration_.queue_ticks,
                              .min_tick_ns = configuration_.min_tick_ns,
                              .pulse_ns = configuration_.pulse_ns,
-                             .lacks = configuration_.lacks,
+                             .disabled_capabilities = configuration_.disabled_capabilities,
                              .codes = codes_.data(),
                              .code_count = configuration_.codes,
                              .reply = reply(),
@@ -77,7 +77,7 @@ void CoreRig::boot_is_over() {
 }
 
 void CoreRig::pass() {
-  const bushd_plane* emitted = bushd_mcu_swap(&mcu_);
+  const bushd_slot_buffer* emitted = bushd_mcu_swap(&mcu_);
   begun_ = counted_;
   for (std::size_t m = 0; m < motors(); ++m) BUSHD_REQUIRE(position(m) == begun_[m]);
   count_pulses(*emitted);
@@ -113,11 +113,11 @@ void CoreRig::check_after_frames() {
 }
 
 void CoreRig::frame(std::uint8_t address, std::uint8_t type, Bytes payload, std::uint8_t later) {
-  const auto tag = static_cast<std::uint8_t>(next_tag_ + later);
-  next_tag_ = static_cast<std::uint8_t>(tag + 1);
+  const auto sequence = static_cast<std::uint8_t>(next_sequence_ + later);
+  next_sequence_ = static_cast<std::uint8_t>(sequence + 1);
   std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire;
   const std::size_t size =
-      bushd_frame_encode(address, type, tag, payload.data(), payload.size(), wire.data());
+      bushd_frame_encode(address, type, sequence, payload.data(), payload.size(), wire.data());
   feed(Bytes(wire).first(size));
 }
 
@@ -143,10 +143,10 @@ bushd_frame CoreRig::ask(std::uint8_t address, std::uint8_t type, Bytes payload)
   feed({&delimiter, 1});
   finish();
   answers_ = 0;
-  const std::uint8_t tag = next_tag_;
+  const std::uint8_t sequence = next_sequence_;
   frame(address, type, payload);
   finish();
-  BUSHD_REQUIRE(answers_ == 1 && answer_.tag == tag);
+  BUSHD_REQUIRE(answers_ == 1 && answer_.sequence == sequence);
   BUSHD_REQUIRE(answer_.type == (type | BUSHD_TYPE_REPLY));
   return answer_;
 }
@@ -194,14 +194,14 @@ void CoreRig::check_transmission(Bytes wire) {
   ++answers_;
 }
 
-void CoreRig::check_walk(const bushd_mcu_pass& walk) {
-  BUSHD_REQUIRE(walk.offset <= bushd_mcu_kept(&mcu_, walk.index).size);
+void CoreRig::check_walk(const bushd_mcu_nvm_scan& walk) {
+  BUSHD_REQUIRE(walk.offset <= bushd_mcu_nvm_region_at(&mcu_, walk.index).size);
 }
 
 void CoreRig::check_restored(std::size_t size, std::uint32_t crc) {
-  bushd_mcu_pass walk;
-  bushd_mcu_begin_pass(&walk);
-  while (bushd_mcu_next_kept(&mcu_, &walk, UINT16_MAX).at != nullptr) {
+  bushd_mcu_nvm_scan walk;
+  bushd_mcu_nvm_begin_scan(&walk);
+  while (bushd_mcu_nvm_scan_next(&mcu_, &walk, UINT16_MAX).at != nullptr) {
   }
   BUSHD_REQUIRE(walk.size == size && walk.crc == crc);
 }
@@ -211,20 +211,20 @@ void CoreRig::adjusted(std::int32_t ns) const {
   BUSHD_REQUIRE(ns >= -tick_ns / 64 && ns < tick_ns);
 }
 
-void CoreRig::count_pulses(const bushd_plane& plane) {
+void CoreRig::count_pulses(const bushd_slot_buffer& slot_buffer) {
   std::array<std::uint32_t, BUSHD_MOTORS_PER_MCU> pulses{};
   unsigned all = 0;
-  if (plane.outputs == BUSHD_OUTPUTS_LEVELS) {
-    for (std::size_t m = 0; m < motors(); ++m) counted_[m] += std::uint32_t(plane.steps[m]);
+  if (slot_buffer.outputs == BUSHD_OUTPUTS_LEVELS) {
+    for (std::size_t m = 0; m < motors(); ++m) counted_[m] += std::uint32_t(slot_buffer.steps[m]);
     return;
   }
   for (std::size_t slot = 0; slot < kSlots; ++slot) {
-    if (plane.step[slot] == 0) continue;
-    all |= plane.step[slot];
-    const bool common = plane.outputs == BUSHD_OUTPUTS_COMMON_DIR;
-    const unsigned right = !common ? plane.direction : slot % 2 != 0 ? 0xFFFF : 0;
+    if (slot_buffer.step[slot] == 0) continue;
+    all |= slot_buffer.step[slot];
+    const bool common = slot_buffer.outputs == BUSHD_OUTPUTS_COMMON_DIR;
+    const unsigned right = !common ? slot_buffer.direction : slot % 2 != 0 ? 0xFFFF : 0;
     for (std::size_t m = 0; m < motors(); ++m) {
-      if ((plane.step[slot] >> m & 1) == 0) continue;
+      if ((slot_buffer.step[slot] >> m & 1) == 0) continue;
       ++pulses[m];
       counted_[m] += (right >> m & 1) != 0 ? 1u : 0u - 1u;
     }
@@ -246,10 +246,10 @@ void CoreRig::check_motor(const bushd_mcu_motor& motor) const {
     const auto known = static_cast<std::int32_t>(motor.known_until - mcu_.tick);
     BUSHD_REQUIRE(known <= static_cast<std::int32_t>(queue_ticks) + 1);
   }
-  // Only a motor that moves on has an island, beyond a gap and within the queue.
-  if (motor.has_island) {
-    const std::uint32_t gap = motor.island.from - motor.known_until;
-    const std::uint32_t end = motor.island.until - mcu_.tick;
+  // Only a motor that moves on has an out-of-order range, beyond a gap and within the queue.
+  if (motor.has_out_of_order) {
+    const std::uint32_t gap = motor.out_of_order.from - motor.known_until;
+    const std::uint32_t end = motor.out_of_order.until - mcu_.tick;
     BUSHD_REQUIRE(motor.delay != 0 && gap - 1 < queue_ticks && end <= queue_ticks + 1);
   }
 }

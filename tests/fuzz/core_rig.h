@@ -3,8 +3,8 @@
 //
 // Promises checked: counters are the sum of the STEP pulses, whatever comes, and are set at rest
 // only, or where homing ends; no pulse without EN; corrections of the clock within their bounds;
-// every transmission is one good frame; after all of it the MCU still identifies itself and reports
-// those counters. What it keeps over a reset comes back.
+// every transmission is one valid frame; after all of it the MCU still identifies itself and
+// reports those counters. What it keeps over a reset comes back.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ struct CoreConfiguration {
   std::uint16_t codes;
   std::uint32_t min_tick_ns = BUSHD_MIN_TICK_NS;
   std::int32_t pulse_ns = 0;
-  std::uint16_t lacks = 0;
+  std::uint16_t disabled_capabilities = 0;
   bool in_pieces = false;
 };
 
@@ -60,8 +60,8 @@ class CoreRig : public Programmed {
   // Of bytes that were handed over to the core.
   void check_after_frames();
   void check_transmission(Bytes wire);
-  // A walk through what is kept (bushd_mcu_next_kept) stands within it.
-  void check_walk(const bushd_mcu_pass& walk);
+  // A walk through what is kept (bushd_mcu_nvm_scan_next) stands within it.
+  void check_walk(const bushd_mcu_nvm_scan& walk);
   // What was kept is there again, all of it.
   void check_restored(std::size_t size, std::uint32_t crc);
   std::uint32_t time_in_tick_ns() const {
@@ -91,7 +91,7 @@ class CoreRig : public Programmed {
   bushd_inputs pins() const;
   void take_home();
   void adjusted(std::int32_t ns) const;
-  void count_pulses(const bushd_plane& plane);
+  void count_pulses(const bushd_slot_buffer& slot_buffer);
   void check_state() const;
   void check_motor(const bushd_mcu_motor& motor) const;
 
@@ -99,7 +99,7 @@ class CoreRig : public Programmed {
   bushd_frame answer_{};
   int answers_ = 0;
   std::uint16_t boot_number_ = 4660;
-  std::uint8_t next_tag_ = 0;
+  std::uint8_t next_sequence_ = 0;
   bool enable_at_boot_ = false;
   bushd_edge awaited_ = BUSHD_EDGE_NONE;
   std::optional<Pins> pins_;

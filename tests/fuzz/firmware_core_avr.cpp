@@ -27,11 +27,11 @@ class AvrRig final : public CoreRig {
                  .codes = 952,
                  .min_tick_ns = 900'000,
                  .pulse_ns = 2500,
-                 .lacks = BUSHD_CAN_TABLE_TICKS,
+                 .disabled_capabilities = BUSHD_CAN_TABLE_TICKS,
                  .in_pieces = true}) {
     host_blank_eeprom();
     host_reset();
-    kept_find();
+    nvm_find();
   }
 
   void pass() override {
@@ -69,11 +69,11 @@ class AvrRig final : public CoreRig {
   void reset() override {
     host_reset();
     pending_ = 0;
-    const kept_found found = kept_find();
+    const nvm_found found = nvm_find();
     boot();
-    if (found == KEPT_WHOLE) {
+    if (found == NVM_WHOLE) {
       // What the walk has come to by then decides how much more there is.
-      kept_load(&mcu_);
+      nvm_load(&mcu_);
       check_restored(host_kept_size(), host_kept_crc());
     }
     boot_is_over();
@@ -151,8 +151,8 @@ class AvrRig final : public CoreRig {
   }
 
   void poll_eeprom(unsigned times) {
-    const bool moves =
-        mcu_.state == BUSHD_STATE_RUN || (mcu_.plane[0].active | mcu_.plane[1].active) != 0;
+    const bool moves = mcu_.state == BUSHD_STATE_RUN ||
+                       (mcu_.slot_buffer[0].active | mcu_.slot_buffer[1].active) != 0;
     if (moves) return;
     const Poisoned receiver(&mcu_.receiver, sizeof mcu_.receiver);
     const Poisoned free_codes(codes_.data() + mcu_.tables.codes_used,
@@ -160,7 +160,7 @@ class AvrRig final : public CoreRig {
     for (; times > 0; --times) {
       if (++polls_ % kPollsPerWrittenByte == 0) host_end_write();
       if (host_writes()) continue;
-      kept_poll(&mcu_);
+      nvm_poll(&mcu_);
       check_walk(host_walk());
     }
   }

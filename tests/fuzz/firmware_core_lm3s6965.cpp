@@ -25,7 +25,7 @@ class Lm3s6965Rig final : public CoreRig {
                  .pulse_ns = -5000}) {
     host_blank_flash();
     host_reset();
-    kept_find();
+    nvm_find();
   }
 
   void pass() override {
@@ -37,10 +37,10 @@ class Lm3s6965Rig final : public CoreRig {
 
   void reset() override {
     host_reset();
-    const kept_found found = kept_find();
+    const nvm_found found = nvm_find();
     boot();
-    if (found == KEPT_WHOLE) {
-      kept_load(&mcu_);
+    if (found == NVM_WHOLE) {
+      nvm_load(&mcu_);
       check_restored(host_kept_size(), host_kept_crc());
     }
     boot_is_over();
@@ -56,13 +56,13 @@ class Lm3s6965Rig final : public CoreRig {
 
  private:
   void poll(unsigned times) {
-    const bool moves =
-        mcu_.state == BUSHD_STATE_RUN || (mcu_.plane[0].active | mcu_.plane[1].active) != 0;
+    const bool moves = mcu_.state == BUSHD_STATE_RUN ||
+                       (mcu_.slot_buffer[0].active | mcu_.slot_buffer[1].active) != 0;
     if (moves || bushd_mcu_wants_samples(&mcu_)) return;
     const Poisoned free_codes(codes_.data() + mcu_.tables.codes_used,
                               (codes_.size() - mcu_.tables.codes_used) * sizeof codes_[0]);
     for (; times > 0; --times) {
-      kept_poll(&mcu_);
+      nvm_poll(&mcu_);
       check_walk(host_walk());
     }
   }

@@ -1,8 +1,9 @@
 // The frame decoder against a slow one, written from docs/protocol.md. Whatever came before, a good
 // frame after a delimiter is heard.
 //
-// Input: a mode, then bytes as they are on the line; with an odd mode these are address, type, tag
-// and payload of a frame that is sent right, or with one byte spoilt where the mode is not 1.
+// Input: a mode, then bytes as they are on the line; with an odd mode these are address, type,
+// sequence and payload of a frame that is sent right, or with one byte spoilt where the mode is
+// not 1.
 #include <array>
 #include <cstring>
 #include <vector>
@@ -72,13 +73,13 @@ class Line {
     if (result != BUSHD_RECEIVE_FRAME) return result;
     BUSHD_REQUIRE(frame.address == expected.raw[0]);
     BUSHD_REQUIRE(frame.type == expected.raw[1]);
-    BUSHD_REQUIRE(frame.tag == expected.raw[2]);
+    BUSHD_REQUIRE(frame.sequence == expected.raw[2]);
     BUSHD_REQUIRE(frame.payload_size == expected.size - BUSHD_FRAME_HEADER - BUSHD_FRAME_CRC);
     BUSHD_REQUIRE(std::memcmp(frame.payload, &expected.raw[3], frame.payload_size) == 0);
     // There is one way only to put a frame on the line.
     std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire;
     const std::size_t wire_size = bushd_frame_encode(
-        frame.address, frame.type, frame.tag, frame.payload, frame.payload_size, wire.data());
+        frame.address, frame.type, frame.sequence, frame.payload, frame.payload_size, wire.data());
     BUSHD_REQUIRE(wire_size == stuffed.size() + 1 && wire[wire_size - 1] == 0);
     BUSHD_REQUIRE(std::memcmp(wire.data(), stuffed.data(), stuffed.size()) == 0);
     return result;
@@ -98,12 +99,12 @@ void run(Input input) {
   } else {
     const std::uint8_t address = input.u8();
     const std::uint8_t type = input.u8();
-    const std::uint8_t tag = input.u8();
+    const std::uint8_t sequence = input.u8();
     const Bytes payload = input.bytes(BUSHD_FRAME_MAX_PAYLOAD);
     std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire;
     const std::size_t size =
-        bushd_frame_encode(address, type, tag, payload.data(), payload.size(), wire.data());
-    if (mode != 1) wire[(mode >> 1) % size] ^= static_cast<std::uint8_t>(tag | 1);
+        bushd_frame_encode(address, type, sequence, payload.data(), payload.size(), wire.data());
+    if (mode != 1) wire[(mode >> 1) % size] ^= static_cast<std::uint8_t>(sequence | 1);
     for (std::size_t i = 0; i + 1 < size; ++i) line.feed(wire[i]);
     const bushd_receive result = line.feed(wire[size - 1]);
     if (mode == 1) BUSHD_REQUIRE(result == BUSHD_RECEIVE_FRAME);

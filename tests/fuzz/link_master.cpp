@@ -3,7 +3,7 @@
 //
 // Input: a programme. Noise goes in as it is. An answer is a frame to the request that is awaited,
 // with a payload of the input's own, or with a fitting one of which a few bytes are overwritten:
-// no fuzzer guesses a tag and a checksum.
+// no fuzzer guesses a sequence and a checksum.
 //
 // Promises checked: what is sent are frames that an MCU's decoders accept, nothing is sent while an
 // answer is awaited, ticks are asked for within the source's promise, and what is seen of an MCU is
@@ -119,7 +119,7 @@ struct SaneMcu {
   bool configured = false;
   bool synced = false;
   bool enabled = false;
-  std::uint32_t mark = 0;
+  std::uint32_t sync_id = 0;
   bool marked = false;
   std::int64_t marked_at_us = 0;
 };
@@ -145,7 +145,7 @@ class Bus {
     for (const std::uint8_t byte : bytes) {
       bushd_frame frame;
       const bool complete = bushd_receive_byte(&answers_, byte, &frame) == BUSHD_RECEIVE_FRAME;
-      if (complete && awaited_ && frame.tag == awaited_->tag) answered(frame.address);
+      if (complete && awaited_ && frame.sequence == awaited_->sequence) answered(frame.address);
     }
     master_.receive(now_us_, bytes);
     step();
@@ -166,8 +166,9 @@ class Bus {
     std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE + 1> wire;
     const auto type = static_cast<std::uint8_t>(awaited_->type | BUSHD_TYPE_REPLY);
     wire[0] = 0;  // ends whatever noise was before
-    const std::size_t size = bushd_frame_encode(awaited_->addresses.front(), type, awaited_->tag,
-                                                payload.data(), payload.size(), &wire[1]);
+    const std::size_t size =
+        bushd_frame_encode(awaited_->addresses.front(), type, awaited_->sequence, payload.data(),
+                           payload.size(), &wire[1]);
     receive(Bytes(wire).first(size + 1));
   }
 
@@ -208,7 +209,7 @@ class Bus {
   struct Awaited {
     std::vector<std::uint8_t> addresses;  // who has not answered yet, by slot
     std::uint8_t type;
-    std::uint8_t tag;
+    std::uint8_t sequence;
     std::int64_t sent_us;
   };
 
@@ -252,10 +253,10 @@ class Bus {
       case BUSHD_MSG_EMERGENCY:
         return;
       case BUSHD_MSG_POLL:
-        awaited_ = Awaited{polled(frame), frame.type, frame.tag, now_us_};
+        awaited_ = Awaited{polled(frame), frame.type, frame.sequence, now_us_};
         return;
       default:
-        awaited_ = Awaited{{frame.address}, frame.type, frame.tag, now_us_};
+        awaited_ = Awaited{{frame.address}, frame.type, frame.sequence, now_us_};
         obey(frame, &mcus_[frame.address - 1u]);
     }
   }
@@ -315,8 +316,8 @@ class Bus {
         return decodes(bushd_home{}, bushd_decode_home);
       case BUSHD_MSG_LOCAL:
         return decodes(bushd_local{}, bushd_decode_local);
-      case BUSHD_MSG_REFERENCE:
-        return decodes(bushd_reference{}, bushd_decode_reference);
+      case BUSHD_MSG_POSITION_COMPARE:
+        return decodes(bushd_position_compare{}, bushd_decode_position_compare);
       case BUSHD_MSG_TRIGGER:
         return decodes(bushd_trigger{}, bushd_decode_trigger);
       case BUSHD_MSG_EMERGENCY:
@@ -331,9 +332,9 @@ class Bus {
     bushd_decode_sync(frame.payload, frame.payload_size, &message);
     for (SaneMcu& mcu : mcus_) {
       if (!mcu.configured) continue;
-      if (mcu.marked && message.follows && message.known_mark == mcu.mark) mcu.synced = true;
+      if (mcu.marked && message.follows && message.follow_up_id == mcu.sync_id) mcu.synced = true;
       mcu.marked = true;
-      mcu.mark = message.mark;
+      mcu.sync_id = message.sync_id;
       mcu.marked_at_us = now_us_;
     }
   }
@@ -377,13 +378,13 @@ class Bus {
     report.state = ready ? BUSHD_STATE_READY : BUSHD_STATE_BUSY;
     report.flags = static_cast<std::uint8_t>(
         (mcu.configured ? BUSHD_FLAG_CONFIGURED : 0) | (mcu.synced ? BUSHD_FLAG_SYNCED : 0) |
-        (mcu.enabled ? BUSHD_FLAG_ENABLED : 0) | (mcu.marked ? BUSHD_FLAG_MARK : 0));
+        (mcu.enabled ? BUSHD_FLAG_ENABLED : 0) | (mcu.marked ? BUSHD_FLAG_SYNC_HEARD : 0));
     report.boot_number = kBootNumber;
     report.tick = static_cast<std::uint32_t>(now_us_ / tick_us);
     report.tick_ns = static_cast<std::uint32_t>(now_us_ % tick_us * 1000);
-    report.mark = mcu.mark;
-    report.mark_tick = static_cast<std::uint32_t>(mcu.marked_at_us / tick_us);
-    report.mark_ns = static_cast<std::uint32_t>(mcu.marked_at_us % tick_us * 1000);
+    report.sync_id = mcu.sync_id;
+    report.sync_tick = static_cast<std::uint32_t>(mcu.marked_at_us / tick_us);
+    report.sync_ns = static_cast<std::uint32_t>(mcu.marked_at_us % tick_us * 1000);
     report.motor_count = kMotors;
     for (std::size_t m = 0; m < kMotors; ++m) {
       report.motor[m].known_until = static_cast<std::uint16_t>(report.tick + 2);
@@ -523,7 +524,7 @@ void run_op(Op op, Bus& bus, Input& input) {
     case Op::kTableRun:
       return begin(bus, input, true);
     case Op::kEmergency:
-      return master.emergency_stop(input.u8() % 2 == 0 ? BUSHD_RAMP_DOWN : BUSHD_CUT);
+      return master.emergency_stop(input.u8() % 2 == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE);
     case Op::kHome:
       return home(bus, input);
     case Op::kArm:

@@ -50,7 +50,7 @@ void decode_for_mcu(Bytes payload) {
   if (decoded(payload, &configure, bushd_decode_configure, bushd_encode_configure)) {
     BUSHD_REQUIRE(configure.tick_ns >= BUSHD_MIN_TICK_NS && configure.tick_ns <= BUSHD_MAX_TICK_NS);
     BUSHD_REQUIRE(configure.format == BUSHD_FORMAT_COARSE || configure.format == BUSHD_FORMAT_FINE);
-    BUSHD_REQUIRE(configure.silence_ticks >= 1);
+    BUSHD_REQUIRE(configure.comm_timeout_ticks >= 1);
   }
   bushd_table_begin begin;
   if (decoded(payload, &begin, bushd_decode_table_begin, bushd_encode_table_begin)) {
@@ -89,7 +89,7 @@ void decode_for_mcu(Bytes payload) {
   }
   bushd_set_inputs inputs;
   if (decoded(payload, &inputs, bushd_decode_set_inputs, bushd_encode_set_inputs)) {
-    BUSHD_REQUIRE(inputs.emergency <= BUSHD_EMERGENCY_INPUT_CUTS);
+    BUSHD_REQUIRE(inputs.emergency <= BUSHD_EMERGENCY_INPUT_IMMEDIATE);
     BUSHD_REQUIRE(inputs.debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS);
   }
   bushd_home home;
@@ -101,7 +101,7 @@ void decode_for_mcu(Bytes payload) {
   decoded(payload, &local, bushd_decode_local, bushd_encode_local);
   bushd_emergency emergency;
   if (decoded(payload, &emergency, bushd_decode_emergency, bushd_encode_emergency)) {
-    BUSHD_REQUIRE(emergency.how == BUSHD_RAMP_DOWN || emergency.how == BUSHD_CUT);
+    BUSHD_REQUIRE(emergency.how == BUSHD_STOP_RAMP || emergency.how == BUSHD_STOP_IMMEDIATE);
   }
   bushd_emission emission;
   if (decoded(payload, &emission, bushd_decode_emission, bushd_encode_emission)) {
@@ -110,7 +110,7 @@ void decode_for_mcu(Bytes payload) {
   }
   bushd_sync sync;
   if (decoded(payload, &sync, bushd_decode_sync, bushd_encode_sync)) {
-    BUSHD_REQUIRE(sync.mark_ns < BUSHD_MAX_TICK_NS);
+    BUSHD_REQUIRE(sync.sync_ns < BUSHD_MAX_TICK_NS);
   }
 }
 
@@ -245,8 +245,8 @@ void decode_trigger(Bytes payload) {
   };
   bushd_trigger message;
   decoded(payload, &message, bushd_decode_trigger, encode);
-  bushd_reference reference;
-  decoded(payload, &reference, bushd_decode_reference, bushd_encode_reference);
+  bushd_position_compare reference;
+  decoded(payload, &reference, bushd_decode_position_compare, bushd_encode_position_compare);
 }
 
 void decode_for_master(Bytes payload) {

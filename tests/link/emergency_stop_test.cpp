@@ -16,21 +16,21 @@ class Emergency : public testing::Test {
 
 TEST_F(Emergency, ThreeFramesToAllAndPollsToSee) {
   EXPECT_FALSE(stop.send_due(1'000));
-  stop.begin(BUSHD_CUT);
+  stop.begin(BUSHD_STOP_IMMEDIATE);
   ASSERT_TRUE(stop.send_due(1'000));
   const auto sent = take_sent(writer);
   ASSERT_EQ(sent.size(), 3u);
   for (const Sent& frame : sent) {
     EXPECT_EQ(frame.address, link::kBroadcast);
     EXPECT_EQ(frame.type, BUSHD_MSG_EMERGENCY);
-    EXPECT_EQ(frame.payload, Bytes{BUSHD_CUT});
+    EXPECT_EQ(frame.payload, Bytes{BUSHD_STOP_IMMEDIATE});
   }
   EXPECT_TRUE(mcus[kFirst].poll_wanted && mcus[kSecond].poll_wanted);
   EXPECT_FALSE(stop.send_due(stop.due_us() - 1));
 }
 
 TEST_F(Emergency, RepeatedUntilTheLastMcuHasLatchedIt) {
-  stop.begin(BUSHD_RAMP_DOWN);
+  stop.begin(BUSHD_STOP_RAMP);
   ASSERT_TRUE(stop.send_due(1'000));
   latch(kFirst);
   EXPECT_TRUE(stop.send_due(stop.due_us()));
@@ -42,21 +42,21 @@ TEST_F(Emergency, RepeatedUntilTheLastMcuHasLatchedIt) {
 TEST_F(Emergency, OneThatWasLatchedBeforeSaysNothingOfThisOne) {
   latch(kFirst);
   latch(kSecond);
-  stop.begin(BUSHD_RAMP_DOWN);
+  stop.begin(BUSHD_STOP_RAMP);
   EXPECT_TRUE(stop.send_due(1'000));
   EXPECT_TRUE(stop.send_due(stop.due_us()));
 }
 
 TEST_F(Emergency, SaidAtLeastOnceEvenIfNobodyIsThere) {
   for (McuRecord& mcu : mcus) mcu.view.phase = link::McuPhase::kOffline;
-  stop.begin(BUSHD_RAMP_DOWN);
+  stop.begin(BUSHD_STOP_RAMP);
   EXPECT_TRUE(stop.send_due(1'000));
   EXPECT_FALSE(mcus[kFirst].poll_wanted);
   EXPECT_FALSE(stop.send_due(stop.due_us()));
 }
 
 TEST_F(Emergency, McuThatNeverAnswersIsLeftAloneAfterTwoSeconds) {
-  stop.begin(BUSHD_RAMP_DOWN);
+  stop.begin(BUSHD_STOP_RAMP);
   ASSERT_TRUE(stop.send_due(0));
   std::int64_t last_us = 0;
   while (stop.active()) {

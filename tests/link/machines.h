@@ -39,7 +39,7 @@ inline std::vector<Sent> take_sent(link::FrameWriter& writer) {
     const bushd_receive received = bushd_receive_byte(&receiver, byte, &frame);
     EXPECT_TRUE(received == BUSHD_RECEIVE_MORE || received == BUSHD_RECEIVE_FRAME);
     if (received != BUSHD_RECEIVE_FRAME) continue;
-    sent.push_back({McuAddress{frame.address}, frame.type, frame.tag,
+    sent.push_back({McuAddress{frame.address}, frame.type, frame.sequence,
                     Bytes(frame.payload, frame.payload + frame.payload_size)});
   }
   writer.clear();

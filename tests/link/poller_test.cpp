@@ -106,7 +106,7 @@ TEST_F(Polling, CountersOfReportsAddUpOverRestarts) {
   for (const std::uint16_t bad :
        std::initializer_list<std::uint16_t>{5, 7, 2}) {  // the third by another boot
     report.bad_frames = bad;
-    report.run_downs = 1;
+    report.ramp_downs = 1;
     poller.follow_report(kFirst);
   }
   EXPECT_EQ(mcus[kFirst].health.crc_errors, 9u);

@@ -73,7 +73,7 @@ void FakeBus::advance(std::int64_t limit_us) {
     ASSERT_EQ(received, BUSHD_RECEIVE_FRAME) << "the master sends whole frames";
     const Heard h{
         at, frame.address, frame.type, {frame.payload, frame.payload + frame.payload_size}};
-    frames_.emplace(at, std::pair{h, frame.tag});
+    frames_.emplace(at, std::pair{h, frame.sequence});
   }
   line_free_us_ = std::max(line_free_us_, at);
   for (const link::Event& event : master->take_events()) events.push_back(event);
@@ -140,9 +140,10 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
     case BUSHD_MSG_SYNC: {
       bushd_sync sync;
       ASSERT_EQ(bushd_decode_sync(p.data(), p.size(), &sync), BUSHD_OK);
-      const bool marked = (slave.flags & BUSHD_FLAG_MARK) && sync.known_mark == slave.sync_id;
+      const bool marked =
+          (slave.flags & BUSHD_FLAG_SYNC_HEARD) && sync.follow_up_id == slave.sync_id;
       const std::int64_t zero_us =
-          slave.sync_us - (std::int64_t{sync.mark_tick} * setup.tick_ns + sync.mark_ns) / 1000;
+          slave.sync_us - (std::int64_t{sync.sync_tick} * setup.tick_ns + sync.sync_ns) / 1000;
       // Its clock is exact: once in step it stays so, unless it is told another time.
       const bool off = std::abs(zero_us - slave.zero_us) > setup.tick_ns / 2000;
       if (sync.follows && marked && ((slave.flags & BUSHD_FLAG_SYNCED) == 0 || off)) {
@@ -150,9 +151,9 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
         slave.flags |= BUSHD_FLAG_SYNCED;
         slave.known_until.fill(tick_of(slave) + 2);
       }
-      slave.sync_id = sync.mark;
+      slave.sync_id = sync.sync_id;
       slave.sync_us = frame.at_us;
-      slave.flags |= BUSHD_FLAG_MARK;
+      slave.flags |= BUSHD_FLAG_SYNC_HEARD;
       return;
     }
     case BUSHD_MSG_TICKS:
@@ -353,10 +354,11 @@ Bytes FakeBus::report(Slave& slave) {
     if (!slave.out_of_order[m]) continue;
     const auto from = static_cast<std::uint16_t>(slave.out_of_order[m]->from);
     const auto until = static_cast<std::uint16_t>(slave.out_of_order[m]->until);
-    if (r.islands != 0 && (r.island_from != from || r.island_until != until)) continue;
-    r.islands |= static_cast<std::uint16_t>(1u << m);
-    r.island_from = from;
-    r.island_until = until;
+    if (r.out_of_order != 0 && (r.out_of_order_from != from || r.out_of_order_until != until))
+      continue;
+    r.out_of_order |= static_cast<std::uint16_t>(1u << m);
+    r.out_of_order_from = from;
+    r.out_of_order_until = until;
   }
   r.low_water_ticks = slave.low_water;
   r.state = slave.faults != 0                ? BUSHD_STATE_FAULT
@@ -368,10 +370,10 @@ Bytes FakeBus::report(Slave& slave) {
   r.epoch = slave.epoch;
   r.boot_number = slave.identity.boot_number;
   r.tick_ns = static_cast<std::uint32_t>((now_us - slave.zero_us) * 1000 % setup.tick_ns);
-  r.mark = slave.sync_id;
+  r.sync_id = slave.sync_id;
   const std::int64_t sync_ns = (slave.sync_us - slave.zero_us) * 1000;
-  r.mark_tick = static_cast<std::uint32_t>(sync_ns / setup.tick_ns);
-  r.mark_ns = static_cast<std::uint32_t>(sync_ns % setup.tick_ns);
+  r.sync_tick = static_cast<std::uint32_t>(sync_ns / setup.tick_ns);
+  r.sync_ns = static_cast<std::uint32_t>(sync_ns % setup.tick_ns);
   r.rejected_frames = slave.rejected;
   r.motor_count = slave.identity.motors;
   slave.spoils(r);

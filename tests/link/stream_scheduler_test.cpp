@@ -118,9 +118,9 @@ TEST_F(Scheduling, TicksBeyondAGapAreNotSentAgain) {
   const Tick sent = streams.next_tick(kFirst, 0);
   known_until(0, 1026);
   report().tick = 1000;
-  report().islands = 1;
-  report().island_from = 1042;
-  report().island_until = static_cast<std::uint16_t>(sent);
+  report().out_of_order = 1;
+  report().out_of_order_from = 1042;
+  report().out_of_order_until = static_cast<std::uint16_t>(sent);
   mcus[kFirst].view.tick = 1000;
   streams.follow_report(kFirst);
   EXPECT_EQ(next(), (Ticks{1, 1026, 16, 0, 0}));

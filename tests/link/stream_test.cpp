@@ -142,7 +142,8 @@ TEST_P(Stream, OutOfOrderRangeThatCannotBeIsNotBelieved) {
   int n = 0;
   bus.slaves[0].loses = [&n](const Heard& h) { return h.type == BUSHD_MSG_TICKS && n++ == 1; };
   bus.slaves[0].spoils = [](bushd_report& report) {
-    if (report.islands != 0) report.island_until = static_cast<std::uint16_t>(report.tick + 5000);
+    if (report.out_of_order != 0)
+      report.out_of_order_until = static_cast<std::uint16_t>(report.tick + 5000);
   };
   const Tick start = begin(0);
   bus.run_for(1'000'000);

@@ -27,13 +27,13 @@ class Syncing : public testing::Test {
                    std::int64_t ahead_us = 0, bool in_time = true) {
     bushd_report& r = mcus[mcu].view.report;
     mcus[mcu].view.reported = true;
-    r.flags = BUSHD_FLAG_SYNCED | BUSHD_FLAG_MARK;
+    r.flags = BUSHD_FLAG_SYNCED | BUSHD_FLAG_SYNC_HEARD;
     const std::int64_t ns = (us + ahead_us) * 1000;
     r.tick = static_cast<std::uint32_t>(ns / kTickNs);
     r.tick_ns = static_cast<std::uint32_t>(ns % kTickNs);
-    r.mark = sync_id;
-    r.mark_tick = static_cast<std::uint32_t>((sync_us + ahead_us) * 1000 / kTickNs);
-    r.mark_ns = static_cast<std::uint32_t>((sync_us + ahead_us) * 1000 % kTickNs);
+    r.sync_id = sync_id;
+    r.sync_tick = static_cast<std::uint32_t>((sync_us + ahead_us) * 1000 / kTickNs);
+    r.sync_ns = static_cast<std::uint32_t>((sync_us + ahead_us) * 1000 % kTickNs);
     return synchroniser.follow_report(us, mcu, 0, in_time);
   }
 
@@ -52,8 +52,8 @@ TEST_F(Syncing, NobodyListensNothingIsSaid) {
 TEST_F(Syncing, SyncIdsNeverRepeatAndFollowUpNamesTheLast) {
   const bushd_sync first = sync_at(1'000'000);
   const bushd_sync second = sync_at(1'500'000);
-  EXPECT_NE(first.mark, second.mark);
-  EXPECT_EQ(second.known_mark, first.mark);
+  EXPECT_NE(first.sync_id, second.sync_id);
+  EXPECT_EQ(second.follow_up_id, first.sync_id);
   EXPECT_EQ(first.master, 77);
 }
 
@@ -66,29 +66,29 @@ TEST_F(Syncing, TimeBeginsAtASyncOnceAllSayThatTheyDoNotKnowIt) {
   mcus[kSecond].view.reported = true;
   const bushd_sync begun = next_sync();
   EXPECT_TRUE(begun.follows);
-  EXPECT_EQ(begun.mark_tick, 0u);
+  EXPECT_EQ(begun.sync_tick, 0u);
   EXPECT_TRUE(mcus[kFirst].poll_wanted) << "asked at once, so that the next can follow";
 }
 
 TEST_F(Syncing, InstantOfTheLastSyncIsPassedOnOnceAllHaveReportedSince) {
   report(kSecond, 990'000, 0, 980'000);
   const bushd_sync first = sync_at(1'000'000);
-  report(kFirst, 1'020'000, first.mark, 1'000'400);
+  report(kFirst, 1'020'000, first.sync_id, 1'000'400);
   EXPECT_FALSE(sync_at(1'500'000).follows) << "the second has not reported since";
   const bushd_sync before = sync_at(2'000'000);
-  report(kFirst, 2'020'000, before.mark, 2'000'400);
-  report(kSecond, 2'020'000, before.mark, 2'000'400);
+  report(kFirst, 2'020'000, before.sync_id, 2'000'400);
+  report(kSecond, 2'020'000, before.sync_id, 2'000'400);
   const bushd_sync told = next_sync();
   ASSERT_TRUE(told.follows);
-  EXPECT_EQ(told.mark_tick, 2'000'400'000u / kTickNs);
-  EXPECT_EQ(told.mark_ns, 2'000'400'000u % kTickNs);
+  EXPECT_EQ(told.sync_tick, 2'000'400'000u / kTickNs);
+  EXPECT_EQ(told.sync_ns, 2'000'400'000u % kTickNs);
 }
 
 // 1: one has heard a repetition. 2: their clocks differ, so the first one's time counts.
 TEST_F(Syncing, DisagreementIsNotPassedOnOnceAndThenIs) {
   const auto disagree = [this](const bushd_sync& sync, std::int64_t us) {
-    report(kFirst, us, sync.mark, us - 1'000);
-    report(kSecond, us, sync.mark, us - 800);
+    report(kFirst, us, sync.sync_id, us - 1'000);
+    report(kSecond, us, sync.sync_id, us - 800);
   };
   disagree(sync_at(1'000'000), 1'010'000);
   const std::int64_t due_us = synchroniser.due_us();
@@ -98,7 +98,7 @@ TEST_F(Syncing, DisagreementIsNotPassedOnOnceAndThenIs) {
   disagree(doubtful, due_us + 10'000);
   const bushd_sync told = next_sync();
   EXPECT_TRUE(told.follows);
-  EXPECT_EQ(told.mark_tick, mcus[kFirst].view.report.mark_tick);
+  EXPECT_EQ(told.sync_tick, mcus[kFirst].view.report.sync_tick);
   EXPECT_NEAR(mcus[kSecond].health.clock_offset_us, 200, 1);
 }
 
@@ -107,12 +107,12 @@ TEST_F(Syncing, MovingMcusTimeGoesBeforeThatOfOneThatConnects) {
   bushd_sync sync = sync_at(1'000'000);
   for (int i = 0; i < 2; ++i) {
     const std::int64_t us = synchroniser.due_us() - 10'000;
-    report(kSecond, us, sync.mark, us - 1'000);
-    report(kFirst, us, sync.mark, us - 1'000, 100'000);
+    report(kSecond, us, sync.sync_id, us - 1'000);
+    report(kFirst, us, sync.sync_id, us - 1'000, 100'000);
     sync = next_sync();
   }
   ASSERT_TRUE(sync.follows);
-  EXPECT_EQ(sync.mark_tick, mcus[kSecond].view.report.mark_tick);
+  EXPECT_EQ(sync.sync_tick, mcus[kSecond].view.report.sync_tick);
 }
 
 TEST_F(Syncing, ReportsSetTheClock) {

@@ -212,13 +212,13 @@ TEST_P(Tables, EmergencyIsSaidUntilAllHaveHeardIt) {
   int n = 0;
   bus.slaves[0].loses = [&](const Heard& h) { return h.type == BUSHD_MSG_EMERGENCY && n++ < 4; };
   bus.heard.clear();
-  bus.master->emergency_stop(BUSHD_CUT);
+  bus.master->emergency_stop(BUSHD_STOP_IMMEDIATE);
   const std::int64_t from_us = bus.now_us;
   ASSERT_TRUE(bus.run_until([&] { return bus.slaves[0].faults != 0; }, 1'000'000));
   EXPECT_LE(bus.now_us - from_us, 100'000);
   bus.run_for(1'000'000);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_EMERGENCY).size(), 6u) << "three, and three more";
-  EXPECT_EQ(bus.heard_of(BUSHD_MSG_EMERGENCY)[0].payload, Bytes{BUSHD_CUT});
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_EMERGENCY)[0].payload, Bytes{BUSHD_STOP_IMMEDIATE});
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_TICKS).size(), 0u) << "nothing more for any motor";
   // It stays latched through a lost link: people clear it.
   bus.master->port_lost(bus.now_us, "unplugged");

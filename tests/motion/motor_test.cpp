@@ -23,7 +23,7 @@ class MotorTest : public testing::Test {
             .mcu = "hall:1",
             .output = Output{3},
             .has_home = true,
-            .limit_cuts = true,
+            .limit_immediate = true,
             .emergency_stop_cuts = true};
   }
   MotorTest() {

@@ -53,7 +53,7 @@ class Recorder final : public EdgeSink {
 struct Frame {
   std::uint8_t address;
   std::uint8_t type;
-  std::uint8_t tag;
+  std::uint8_t sequence;
   Bytes payload;
   TimeNs end_ns;
 };
@@ -65,7 +65,7 @@ class Master {
       bushd_frame frame;
       const bushd_receive got = bushd_receive_byte(&receiver_, byte, &frame);
       if (got == BUSHD_RECEIVE_FRAME) {
-        frames.push_back({frame.address, frame.type, frame.tag,
+        frames.push_back({frame.address, frame.type, frame.sequence,
                           Bytes(frame.payload, frame.payload + frame.payload_size), end_ns});
       } else if (got != BUSHD_RECEIVE_MORE) {
         ++bad_frames;
@@ -73,17 +73,18 @@ class Master {
     };
   }
 
-  static Bytes wire(std::uint8_t address, std::uint8_t type, std::uint8_t tag,
+  static Bytes wire(std::uint8_t address, std::uint8_t type, std::uint8_t sequence,
                     std::span<const std::uint8_t> payload) {
     Bytes out(BUSHD_FRAME_MAX_WIRE);
-    out.resize(bushd_frame_encode(address, type, tag, payload.data(), payload.size(), out.data()));
+    out.resize(
+        bushd_frame_encode(address, type, sequence, payload.data(), payload.size(), out.data()));
     return out;
   }
 
   // Sends now, behind a delimiter as everybody who takes the line does.
   void post(std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload) {
     bus_.master_send(Bytes{0}, bus_.now_ns());
-    bus_.master_send(wire(address, type, ++tag_, payload), bus_.now_ns());
+    bus_.master_send(wire(address, type, ++sequence_, payload), bus_.now_ns());
   }
 
   // The same, and lets time pass until the line is silent.
@@ -112,7 +113,7 @@ class Master {
     send(address, type, payload);
     for (const Frame& frame : frames) {
       if (frame.address == answering && frame.type == (type | BUSHD_TYPE_REPLY) &&
-          frame.tag == tag_) {
+          frame.sequence == sequence_) {
         return frame;
       }
     }
@@ -185,10 +186,10 @@ class Master {
   std::uint32_t sync(bushd_sync message) {
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
     message.master = 1;
-    message.mark = ++mark_;
+    message.sync_id = ++sync_id_;
     send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC,
          {payload.data(), bushd_encode_sync(&message, payload.data())});
-    return mark_;
+    return sync_id_;
   }
 
   // Sets tick and format and puts all MCUs in step with the first one, as
@@ -219,7 +220,7 @@ class Master {
   // One mark that also tells where, by the first MCU's clock, the mark before was.
   void discipline(std::uint8_t reference_address) {
     const bushd_report report = poll(reference_address);
-    sync({0, 0, true, report.mark, report.mark_tick, report.mark_ns});
+    sync({0, 0, true, report.sync_id, report.sync_tick, report.sync_ns});
   }
 
   void upload_table(std::uint8_t address, std::uint8_t slot, std::uint32_t time_unit_ns,
@@ -278,8 +279,8 @@ class Master {
  private:
   Bus& bus_;
   bushd_receiver receiver_{};
-  std::uint8_t tag_ = 0;
-  std::uint32_t mark_ = 0;
+  std::uint8_t sequence_ = 0;
+  std::uint32_t sync_id_ = 0;
 };
 
 }  // namespace bushd::sim

@@ -129,8 +129,8 @@ TEST(EmissionOnPins, PulseWidthAndDirSetupAreKeptInEveryModeAndNoStepIsLost) {
         for (int part = 0; part < 8; ++part) {
           // The bus's time moves, too: ticks get shorter and longer.
           const bushd_report report = lab.master.poll(1);
-          lab.master.sync({0, 0, true, report.mark, report.mark_tick,
-                           report.mark_ns + (part % 2 ? 50'000u : 0u)});
+          lab.master.sync({0, 0, true, report.sync_id, report.sync_tick,
+                           report.sync_ns + (part % 2 ? 50'000u : 0u)});
           std::vector<std::vector<int>> rows(15);
           for (auto& row : rows) {
             for (std::size_t m = 0; m < 6; ++m) {

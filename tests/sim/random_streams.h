@@ -143,8 +143,8 @@ class RandomStreams : public testing::Test {
     return payload;
   }
 
-  // A frame of the master's, its payload bent now and then; for somebody else or with a tag out of
-  // order now and then.
+  // A frame of the master's, its payload bent now and then; for somebody else or with a sequence
+  // out of order now and then.
   void send_frame() {
     std::uint8_t type = 0;
     do {
@@ -190,8 +190,8 @@ class RandomStreams : public testing::Test {
   }
 
   void make_ready() {
-    // Tags of noise count as heard until there has been silence, and what it has asked for may be
-    // answered as late as a poll can say.
+    // Sequences of noise count as heard until there has been silence, and what it has asked for may
+    // be answered as late as a poll can say.
     bus_.advance_to(bus_.now_ns() + TimeNs{UINT16_MAX} * BUSHD_REPLY_UNIT_NS);
     master_.patience_ns = 5 * kPatienceNs;
     ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs,
@@ -214,7 +214,7 @@ class RandomStreams : public testing::Test {
   void settle() {
     if (random_.one_in(4)) bus_.advance_to(bus_.now_ns() + 300'000'000);
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    const bushd_emergency cut{BUSHD_CUT};
+    const bushd_emergency cut{BUSHD_STOP_IMMEDIATE};
     payload.resize(bushd_encode_emergency(&cut, payload.data()));
     master_.send(kAddress, BUSHD_MSG_EMERGENCY, payload);
     bus_.advance_to(bus_.now_ns() + 100'000'000);

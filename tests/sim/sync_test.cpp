@@ -68,7 +68,7 @@ TEST(Sync, RepeatedFrameIsNoOtherMark) {
                                  {payload.data(), bushd_encode_sync(&message, payload.data())}),
                     bus.now_ns());
     master.drain();
-    return bus.mcu(0).core().clock.mark_tick;
+    return bus.mcu(0).core().clock.sync_tick;
   };
   const std::uint32_t first = mark_after(1'000'000, 1000);
   EXPECT_EQ(mark_after(0, 1000), first);
@@ -138,9 +138,9 @@ class Hour {
   }
   // Half a second, with a mark at its end.
   void half_second(bool loss) {
-    const TimeNs mark_ns = bus_.now_ns() + 500'000'000;
-    while (bus_.now_ns() < mark_ns) {
-      bus_.advance_to(std::min(mark_ns, bus_.now_ns() + 20'000'000));
+    const TimeNs sync_ns = bus_.now_ns() + 500'000'000;
+    while (bus_.now_ns() < sync_ns) {
+      bus_.advance_to(std::min(sync_ns, bus_.now_ns() + 20'000'000));
       if (measured_) worst_ns_ = std::max(worst_ns_, std::abs(skew_ns(bus_, tick_ns_)));
     }
     if (loss && silent_ == 0 && random_() % 200 == 0) silent_ = 20;
@@ -152,8 +152,8 @@ class Hour {
     for (std::size_t i = 0; i < 2; ++i) {
       if (loss && random_() % 10 < 3) bus_.deafen(i, bus_.now_ns() + 3'000'000);
     }
-    const bool known = (report.flags & BUSHD_FLAG_MARK) != 0;
-    master_.sync({0, 0, known, report.mark, report.mark_tick, report.mark_ns});
+    const bool known = (report.flags & BUSHD_FLAG_SYNC_HEARD) != 0;
+    master_.sync({0, 0, known, report.sync_id, report.sync_tick, report.sync_ns});
   }
   void measure() { measured_ = true; }
   TimeNs worst_ns() const { return worst_ns_; }

@@ -22,8 +22,8 @@ TEST_F(AvrAnswers, BeginWithinATickInWhateverPhaseTheyAreAskedFor) {
     master_.drain();
     ASSERT_EQ(master_.frames.size(), 1u);
     const Frame& answer = master_.frames[0];
-    const auto bytes =
-        static_cast<TimeNs>(Master::wire(kAddress, answer.type, answer.tag, answer.payload).size());
+    const auto bytes = static_cast<TimeNs>(
+        Master::wire(kAddress, answer.type, answer.sequence, answer.payload).size());
     ASSERT_LT(answer.end_ns - bytes * kByteNs - asked_ns, TimeNs{kTickNs}) << "poll " << i;
   }
 }

@@ -108,7 +108,7 @@ TEST_F(AvrBoot, TheWatchdogLeavesAnEmergencyStopOfALongRunAlone) {
   pass(100 * TimeNs{kTickNs});
   const bushd_report before = master_.poll(kAddress);
   ASSERT_EQ(before.running, 1 << 3);
-  master_.send(kAddress, BUSHD_MSG_EMERGENCY, Bytes{BUSHD_CUT});
+  master_.send(kAddress, BUSHD_MSG_EMERGENCY, Bytes{BUSHD_STOP_IMMEDIATE});
   pass(10 * TimeNs{kTickNs});
   const bushd_report after = master_.poll(kAddress);
   EXPECT_EQ(after.boot_number, before.boot_number);

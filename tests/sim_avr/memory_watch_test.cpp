@@ -80,8 +80,9 @@ TEST_F(AvrMemoryWatched, NamesWhoReadsRegistersThroughAPointer) {
 
 TEST_F(AvrMemoryWatched, NamesWhoLeavesTheEeprom) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  poke(static_cast<std::uint16_t>(map_.object("pass").address + 3), 4090);  // bushd_mcu_pass.size
-  avr_->poke(map_.object("phase").address, 1);                              // it writes
+  poke(static_cast<std::uint16_t>(map_.object("scan").address + 3),
+       4090);                                   // bushd_mcu_nvm_scan.size
+  avr_->poke(map_.object("phase").address, 1);  // it writes
   EXPECT_THAT(violation_of([&] { pass(2'000'000'000); }),
               HasSubstr("of the EEPROM, beyond its end"));
 }

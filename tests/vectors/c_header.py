@@ -79,7 +79,7 @@ def c_encoder(index, message, fields):
                     lines.append(f"  message.slot[{i}].crc = UINT32_C({held[0]});")
                     lines.append(f"  message.slot[{i}].revision = UINT32_C({held[1]});")
             elif name == "how":
-                lines.append(f"  message.how = {'BUSHD_CUT' if value else 'BUSHD_RAMP_DOWN'};")
+                lines.append(f"  message.how = {'BUSHD_STOP_IMMEDIATE' if value else 'BUSHD_STOP_RAMP'};")
             elif name in ("follows", "enable_after_watchdog"):
                 lines.append(f"  message.{name} = {'true' if value else 'false'};")
             elif name == "format":
@@ -146,11 +146,11 @@ def c_header():
     out += ["static const slots_vector kSlots[] = {", *rows, "};", ""]
 
     rows = []
-    for i, (address, tag, message, fields) in enumerate(FRAMES):
+    for i, (address, sequence, message, fields) in enumerate(FRAMES):
         kind, layout = LAYOUTS[message]
-        wire = frame(address, kind, tag, payload_of(layout, fields))
+        wire = frame(address, kind, sequence, payload_of(layout, fields))
         out.append(c_encoder(i, message, fields))
         out.append(c_array("uint8_t", f"kWire_{i}", wire))
-        rows.append(f"    {{{address}, {kind}, {tag}, encode_{i}, kWire_{i}, {len(wire)}}},")
+        rows.append(f"    {{{address}, {kind}, {sequence}, encode_{i}, kWire_{i}, {len(wire)}}},")
     out += ["static const frame_vector kFrames[] = {", *rows, "};", ""]
     return "\n".join(out)

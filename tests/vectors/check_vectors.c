@@ -67,7 +67,7 @@ typedef struct slots_vector {
 typedef struct frame_vector {
   uint8_t address;
   uint8_t type;
-  uint8_t tag;
+  uint8_t sequence;
   size_t (*encode)(uint8_t* payload);
   const uint8_t* wire;
   uint16_t size;
@@ -164,8 +164,8 @@ static bool check_frame(const frame_vector* vector) {
   uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
   uint8_t wire[BUSHD_FRAME_MAX_WIRE];
   const size_t payload_size = vector->encode(payload);
-  const size_t size =
-      bushd_frame_encode(vector->address, vector->type, vector->tag, payload, payload_size, wire);
+  const size_t size = bushd_frame_encode(vector->address, vector->type, vector->sequence, payload,
+                                         payload_size, wire);
   if (size != vector->size || memcmp(wire, vector->wire, size) != 0) return false;
   bushd_receiver receiver;
   memset(&receiver, 0, sizeof receiver);
@@ -175,7 +175,7 @@ static bool check_frame(const frame_vector* vector) {
   }
   if (bushd_receive_byte(&receiver, wire[size - 1], &frame) != BUSHD_RECEIVE_FRAME) return false;
   return frame.address == vector->address && frame.type == vector->type &&
-         frame.tag == vector->tag && frame.payload_size == payload_size &&
+         frame.sequence == vector->sequence && frame.payload_size == payload_size &&
          memcmp(frame.payload, payload, payload_size) == 0;
 }
 

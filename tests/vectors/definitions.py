@@ -108,8 +108,8 @@ def cobs(raw):
     return bytes(out)
 
 
-def frame(address, kind, tag, payload):
-    raw = bytes([address, kind, tag]) + payload
+def frame(address, kind, sequence, payload):
+    raw = bytes([address, kind, sequence]) + payload
     raw += zlib.crc32(raw).to_bytes(4, "little")
     assert len(raw) <= 254
     return cobs(raw) + b"\0"

@@ -62,11 +62,11 @@ def csv_files():
         slots.append([slot_count, crossing, join(values), ";".join(join(one) for one in lists), remainder])
     write("slots.csv", ["slot_count", "crossing", "displacements", "slots", "remainder"], slots)
     frames = []
-    for address, tag, message, fields in FRAMES:
+    for address, sequence, message, fields in FRAMES:
         kind, layout = LAYOUTS[message]
-        frames.append([message, address, kind, tag, " ".join(f"{k}={field_text(v)}" for k, v in fields.items()),
-                       frame(address, kind, tag, payload_of(layout, fields)).hex()])
-    write("frames.csv", ["message", "address", "type", "tag", "fields", "wire"], frames)
+        frames.append([message, address, kind, sequence, " ".join(f"{k}={field_text(v)}" for k, v in fields.items()),
+                       frame(address, kind, sequence, payload_of(layout, fields)).hex()])
+    write("frames.csv", ["message", "address", "type", "sequence", "fields", "wire"], frames)
     return files
 
 

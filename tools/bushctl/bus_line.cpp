@@ -55,7 +55,7 @@ Result<std::vector<BusLine::Answer>> BusLine::ask(
     for (const std::uint8_t byte : received_) {
       bushd_frame frame;
       if (bushd_receive_byte(&receiver_, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
-      if (frame.tag != tag_ || frame.type != (type | BUSHD_TYPE_REPLY)) continue;
+      if (frame.sequence != tag_ || frame.type != (type | BUSHD_TYPE_REPLY)) continue;
       const auto late = std::chrono::duration_cast<microseconds>(now - sent - reply_time).count();
       answers.push_back({.address = frame.address,
                          .payload = {frame.payload, frame.payload + frame.payload_size},

@@ -32,7 +32,7 @@ bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
   bus.table_runs = ways.table_runs.value_or(table_runs);
   bus.table_ticks = ways.table_ticks.value_or(table_ticks);
   bus.format = ways.format.value_or(coarse ? BUSHD_FORMAT_COARSE : BUSHD_FORMAT_FINE);
-  bus.emergency_stop = ways.emergency_stop.value_or(cut ? BUSHD_CUT : BUSHD_RAMP_DOWN);
+  bus.emergency_stop = ways.emergency_stop.value_or(cut ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP);
   return bus;
 }
 
@@ -123,7 +123,7 @@ void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed) {
   bushd::sim::Random random(seed, kEmergencyStream);
   for (bushd::config::Mcu& mcu : config.mcus) {
     mcu.emergency_input =
-        random.one_in(2) ? BUSHD_EMERGENCY_INPUT_CUTS : BUSHD_EMERGENCY_INPUT_RAMPS;
+        random.one_in(2) ? BUSHD_EMERGENCY_INPUT_IMMEDIATE : BUSHD_EMERGENCY_INPUT_RAMP;
   }
 }
 
@@ -140,7 +140,7 @@ std::string ways_text(const bushd::config::Config& config) {
   return fmt::format("--moves {} --frames {} --format {} --emergency {}",
                      bus.table_runs ? "table" : "stream", bus.table_ticks ? "auto" : "ticks",
                      bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse",
-                     bus.emergency_stop == BUSHD_CUT ? "cut" : "ramp");
+                     bus.emergency_stop == BUSHD_STOP_IMMEDIATE ? "cut" : "ramp");
 }
 
 }  // namespace bushfaults

@@ -20,7 +20,7 @@ struct Ways {
   std::optional<bool> table_runs;   // moves = "table", or "stream"
   std::optional<bool> table_ticks;  // frames = "auto", or "ticks"
   std::optional<bushd_format> format;
-  std::optional<bushd_how> emergency_stop;
+  std::optional<bushd_stop_mode> emergency_stop;
 };
 
 // Refuses what does not fit: more motors than outputs, or than any line can carry.

@@ -73,8 +73,8 @@ int run(int argc, char** argv) {
   add_way<bool>(app, "--frames", ways.table_ticks, {{"ticks", false}, {"auto", true}});
   add_way<bushd_format>(app, "--format", ways.format,
                         {{"coarse", BUSHD_FORMAT_COARSE}, {"fine", BUSHD_FORMAT_FINE}});
-  add_way<bushd_how>(app, "--emergency", ways.emergency_stop,
-                     {{"ramp", BUSHD_RAMP_DOWN}, {"cut", BUSHD_CUT}});
+  add_way<bushd_stop_mode>(app, "--emergency", ways.emergency_stop,
+                           {{"ramp", BUSHD_STOP_RAMP}, {"cut", BUSHD_STOP_IMMEDIATE}});
   app.add_option("--crystal-ppm", options.crystal_ppm, "MCUs' clocks are off by up to this")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();

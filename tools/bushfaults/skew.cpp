@@ -32,8 +32,8 @@ Skew::Skew(const bushd::config::Config& config, const bushd::sim::Bus& bus, cons
 void Skew::heard(TimeNs now_ns, std::size_t index, const bushd_sync& sync) {
   Mcu& mcu = mcus_[index];
   const bool same_master = mcu.last && mcu.last->master == sync.master;
-  if (same_master && mcu.last->mark == sync.mark) return;  // a repeated frame
-  if (same_master && sync.follows && mcu.last->mark == sync.known_mark) {
+  if (same_master && mcu.last->sync_id == sync.sync_id) return;  // a repeated frame
+  if (same_master && sync.follows && mcu.last->sync_id == sync.follow_up_id) {
     mcu.corrected_before_ns = mcu.corrected_ns;
     mcu.corrected_ns = now_ns;
     ++mcu.corrections;

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define EEPROM_KEPT 32u
+#define EEPROM_NVM 32u
 
 static inline uint8_t eeprom_byte(uint16_t address) {
   return eeprom_read_byte((const uint8_t*)address);

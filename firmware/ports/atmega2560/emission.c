@@ -34,13 +34,13 @@ _Static_assert(offsetof(emission_tick, begun) == TICK_BEGUN, "as in emission_slo
 
 volatile uint8_t emission_next;
 volatile uint8_t emission_taken;
-EMISSION_TICKS emission_tick emission_silent;  // goes on when no plane is ready
+EMISSION_TICKS emission_tick emission_silent;  // goes on when no slot_buffer is ready
 volatile uint16_t emission_last_top;
 volatile uint8_t emission_committed;
 uint32_t emission_begun_at;
 uint32_t emission_next_start;
 
-// Of ticks of few slots: no pulses, or the levels that the plane before has left.
+// Of ticks of few slots: no pulses, or the levels that the slot_buffer before has left.
 static uint16_t idle_masks[MAX_EMPTY_SLOTS];
 
 // A tick, and what its length is made of.
@@ -52,8 +52,8 @@ typedef struct prepared_tick {
 
 // Of the main loop.
 EMISSION_TICKS static prepared_tick prepared[2];
-static prepared_tick* given = prepared;  // waits or was taken last
-static const bushd_plane* next_plane;    // NULL: the core's present tick has the last one
+static prepared_tick* given = prepared;      // waits or was taken last
+static const bushd_slot_buffer* next_plane;  // NULL: the core's present tick has the last one
 // Of a tick without adjustment, from residue 0.
 static uint32_t plain_cycles;
 static uint16_t plain_residue;
@@ -76,15 +76,15 @@ static uint8_t begun_flags(uint8_t outputs) {
   return flags;
 }
 
-static void set_plane(emission_tick* tick, const bushd_plane* plane, uint32_t cycles) {
+static void set_plane(emission_tick* tick, const bushd_slot_buffer* slot_buffer, uint32_t cycles) {
   // By 128; shifting bit by bit takes longer.
   const uint16_t slot = (uint16_t)((cycles << 1) >> 8);
-  set_masks(tick, plane->step, EMISSION_SLOTS);
-  tick->direction = plane->direction;
+  set_masks(tick, slot_buffer->step, EMISSION_SLOTS);
+  tick->direction = slot_buffer->direction;
   tick->top = (uint16_t)(slot - 1u);
   tick->last_top = (uint16_t)(tick->top + (uint16_t)(cycles % EMISSION_SLOTS));
   tick->cycles = cycles;
-  tick->begun = begun_flags(plane->outputs);
+  tick->begun = begun_flags(slot_buffer->outputs);
 }
 
 // Of few slots, so that the time is left to the main loop. The last one is as short as may be: in
@@ -179,8 +179,8 @@ void emission_start(void) {
   TIMSK1 = 1 << OCIE1A | 1 << OCIE1B | 1 << OCIE1C;
 }
 
-void emission_ready(const bushd_plane* plane) {
-  next_plane = plane;
+void emission_ready(const bushd_slot_buffer* slot_buffer) {
+  next_plane = slot_buffer;
   given_start = core_start + given->tick.cycles;
   give(false);
 }
@@ -194,7 +194,7 @@ bool emission_begins_soon(void) {
   return given_start - clock_now() < EMISSION_FRAME_CYCLES;
 }
 
-// If no plane is ready after this one, its last levels stay.
+// If no slot_buffer is ready after this one, its last levels stay.
 static void hold_levels(void) {
   const bool levels = next_plane->outputs == BUSHD_OUTPUTS_LEVELS;
   const uint16_t last = levels ? next_plane->step[EMISSION_SLOTS - 1u] : 0;

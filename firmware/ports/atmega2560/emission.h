@@ -5,9 +5,9 @@
 //     rest
 //
 // The core learns of a new tick when the main loop comes to it (emission_begun, emission_swap);
-// meanwhile its plane, prepared a tick ago, is emitted. If no plane is ready when it is wanted, an
-// empty tick follows: no step is lost and none is half prepared, but the MCU falls behind the bus
-// by a tick, which the next SYNC shows (fault 4).
+// meanwhile its slot_buffer, prepared a tick ago, is emitted. If no slot_buffer is ready when it is
+// wanted, an empty tick follows: no step is lost and none is half prepared, but the MCU falls
+// behind the bus by a tick, which the next SYNC shows (fault 4).
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_H
 
@@ -28,8 +28,8 @@
 // they stay off.
 void emission_start(void);
 
-// The plane of the next tick is prepared.
-void emission_ready(const bushd_plane* plane);
+// The slot_buffer of the next tick is prepared.
+void emission_ready(const bushd_slot_buffer* slot_buffer);
 
 // The tick after the core's present one has begun.
 bool emission_begun(void);
@@ -37,7 +37,7 @@ bool emission_begun(void);
 bool emission_begins_soon(void);
 // The core's present tick is this one; before bushd_mcu_swap.
 void emission_swap(void);
-// When a slot begins of the plane that was given last, if no other tick comes before it.
+// When a slot begins of the slot_buffer that was given last, if no other tick comes before it.
 uint32_t emission_slot_time(uint16_t slot);
 // How far the core's present tick has gone at `time` (clock.h), in ns; before it: negative.
 int32_t emission_time_in_tick_ns(uint32_t time);

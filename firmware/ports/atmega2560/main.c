@@ -6,18 +6,19 @@
 #include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/boot_tests.h"
 #include "firmware/ports/atmega2560/clock.h"
+#include "firmware/ports/atmega2560/compare_output.h"
 #include "firmware/ports/atmega2560/eeprom.h"
 #include "firmware/ports/atmega2560/emission.h"
 #include "firmware/ports/atmega2560/identity.h"
 #include "firmware/ports/atmega2560/inputs.h"
-#include "firmware/ports/atmega2560/kept.h"
 #include "firmware/ports/atmega2560/line.h"
-#include "firmware/ports/atmega2560/reference.h"
+#include "firmware/ports/atmega2560/nvm.h"
 #include "firmware/ports/atmega2560/trigger.h"
 
 #define QUEUE_TICKS 64u
 #define TABLE_CODES 952u  // four tables of 238 codes
-_Static_assert(BUSHD_MCU_MOST_KEPT(TABLE_CODES) <= KEPT_MOST_BYTES, "the EEPROM holds all of it");
+_Static_assert(BUSHD_MCU_NVM_MAX_BYTES(TABLE_CODES) <= NVM_MOST_BYTES,
+               "the EEPROM holds all of it");
 // Only a new tick keeps it quiet, which takes timer, interrupts and main loop. The longest lasts 20
 // ms.
 #define WATCHDOG WDTO_120MS
@@ -46,7 +47,7 @@ static inline void name_parts(void) {
   NAME_PART("config.queue", config.queue);
   NAME_PART("config.codes", config.codes);
   NAME_PART("config.reply", config.reply);
-  NAME_PART("planes", plane);
+  NAME_PART("slot_buffers", slot_buffer);
   NAME_PART("motors", motor);
   NAME_PART("tables", tables);
 }
@@ -143,7 +144,7 @@ __attribute__((noinline)) static void boot(void) {
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
                              // A frame of them stands for more ticks than it could make in one.
-                             .lacks = BUSHD_CAN_TABLE_TICKS,
+                             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS,
                              .pulse_ns = EMISSION_PULSE_NS,
                              .in_pieces = true,
                              .queue = queue,
@@ -154,29 +155,29 @@ __attribute__((noinline)) static void boot(void) {
   identity kept;
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && identity_enable_kept();
-  const kept_found found = kept_find();
+  const nvm_found found = nvm_find();
   const bool has_identity = identity_load(&kept, &config.boot_number);
-  if (!has_identity || found == KEPT_BROKEN) failed_tests |= BUSHD_TEST_EEPROM;
+  if (!has_identity || found == NVM_BROKEN) failed_tests |= BUSHD_TEST_EEPROM;
   config.address = kept.address;
   for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = kept.unique_id[i];
   bushd_mcu_boot(&mcu, &port, &config);
-  if (found == KEPT_WHOLE) kept_load(&mcu);
+  if (found == NVM_WHOLE) nvm_load(&mcu);
 }
 
 static void poll_eeprom(void) {
   if (eeprom_writes) return;
   identity_poll();
   const bool moves =
-      mcu.state == BUSHD_STATE_RUN || (mcu.plane[0].active | mcu.plane[1].active) != 0;
-  if (!eeprom_writes && !moves) kept_poll(&mcu);
+      mcu.state == BUSHD_STATE_RUN || (mcu.slot_buffer[0].active | mcu.slot_buffer[1].active) != 0;
+  if (!eeprom_writes && !moves) nvm_poll(&mcu);
 }
 
 static void prepare(void) {
   bushd_mcu_prepare(&mcu);
-  const bushd_plane* const plane = &mcu.plane[mcu.front ^ 1u];
-  emission_ready(plane);
-  if (plane->reference_rise) reference_rise(emission_slot_time(plane->reference_rise - 1u));
-  if (plane->reference_fall) reference_fall(emission_slot_time(plane->reference_fall - 1u));
+  const bushd_slot_buffer* const slot_buffer = &mcu.slot_buffer[mcu.front ^ 1u];
+  emission_ready(slot_buffer);
+  if (slot_buffer->compare_rise) compare_rise(emission_slot_time(slot_buffer->compare_rise - 1u));
+  if (slot_buffer->compare_fall) compare_fall(emission_slot_time(slot_buffer->compare_fall - 1u));
 }
 
 static void hear_line(void) {

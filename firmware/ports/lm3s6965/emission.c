@@ -4,9 +4,9 @@
 
 #include "firmware/ports/lm3s6965/board.h"
 #include "firmware/ports/lm3s6965/clock.h"
+#include "firmware/ports/lm3s6965/compare_output.h"
 #include "firmware/ports/lm3s6965/emission_slots.h"
 #include "firmware/ports/lm3s6965/interrupts.h"
-#include "firmware/ports/lm3s6965/reference.h"
 #include "firmware/ports/lm3s6965/timer.h"
 
 #define SLOT_TIMER TIMER(0)
@@ -29,7 +29,7 @@ typedef struct emission_tick {
   reference_edges reference;
 } emission_tick;
 
-// What becomes of the plane that the core has prepared.
+// What becomes of the slot_buffer that the core has prepared.
 typedef enum plane_state { PLANE_NONE, PLANE_WAITS, PLANE_TAKEN } plane_state;
 
 // Of the interrupts.
@@ -37,7 +37,7 @@ _Static_assert(offsetof(emission_slot_state, end) == SLOT_END, "as in emission_s
 emission_slot_state emission_slot = {
     .timer = &TIMER_ICR(SLOT_TIMER), .step_low = &STEP_LOW, .step_high = &STEP_HIGH};
 static emission_tick present;
-static emission_tick silent;  // goes on when no plane is ready
+static emission_tick silent;  // goes on when no slot_buffer is ready
 static uint16_t held;         // its levels
 static uint32_t next_start;
 
@@ -48,7 +48,7 @@ static volatile bool begun;
 static uint32_t begun_at;
 
 // Of the main loop.
-static const bushd_plane* plane;
+static const bushd_slot_buffer* slot_buffer;
 static uint16_t directions;  // as latched last
 static uint32_t core_start;  // of the core's present tick
 static uint32_t tick_ns;
@@ -130,7 +130,7 @@ static uint32_t half_slot_of(uint32_t cycles) {
   return (cycles - MARGIN_CYCLES) / (2u * EMISSION_SLOTS);
 }
 
-static emission_tick tick_of(const bushd_plane* of, uint32_t cycles) {
+static emission_tick tick_of(const bushd_slot_buffer* of, uint32_t cycles) {
   const emission_tick tick = {.mask = of->step,
                               .end = of->step + EMISSION_SLOTS,
                               .half_slot = half_slot_of(cycles),
@@ -147,23 +147,23 @@ static emission_tick empty_tick(const uint16_t* mask, uint32_t cycles) {
 
 static reference_edges reference_of(uint32_t cycles) {
   const uint32_t slot = 2u * half_slot_of(cycles);
-  reference_edges edges = {.rises = plane->reference_rise != 0,
-                           .falls = plane->reference_fall != 0};
-  if (edges.rises) edges.rise = (plane->reference_rise - 1u) * slot;
-  if (edges.falls) edges.fall = (plane->reference_fall - 1u) * slot;
+  reference_edges edges = {.rises = slot_buffer->compare_rise != 0,
+                           .falls = slot_buffer->compare_fall != 0};
+  if (edges.rises) edges.rise = (slot_buffer->compare_rise - 1u) * slot;
+  if (edges.falls) edges.fall = (slot_buffer->compare_fall - 1u) * slot;
   return edges;
 }
 
-// `next` from the plane and what is known of its length, unless it has been taken.
+// `next` from the slot_buffer and what is known of its length, unless it has been taken.
 static void give(void) {
   const int32_t extra_ns = adjust_ns + carry_ns;
   const uint32_t length_ns = tick_ns + rest_ns + (uint32_t)extra_ns;
   const uint32_t cycles = length_ns / CYCLE_NS;
-  emission_tick tick =
-      plane->active != 0 ? tick_of(plane, cycles) : empty_tick(plane->step, cycles);
-  tick.outputs = plane->outputs;
-  tick.turns = plane->direction != directions;
-  tick.has_reference = (plane->reference_rise | plane->reference_fall) != 0;
+  emission_tick tick = slot_buffer->active != 0 ? tick_of(slot_buffer, cycles)
+                                                : empty_tick(slot_buffer->step, cycles);
+  tick.outputs = slot_buffer->outputs;
+  tick.turns = slot_buffer->direction != directions;
+  tick.has_reference = (slot_buffer->compare_rise | slot_buffer->compare_fall) != 0;
   if (tick.has_reference) tick.reference = reference_of(cycles);
   interrupts_off();
   if (state != PLANE_TAKEN) {
@@ -185,9 +185,9 @@ void emission_start(void) {
   timer_start(TICK_TIMER, TIMER_ONE_SHOT, MARGIN_CYCLES);
 }
 
-void emission_ready(const bushd_plane* prepared) {
-  plane = prepared;
-  if (plane->direction != directions) board_shift_directions(plane->direction);
+void emission_ready(const bushd_slot_buffer* prepared) {
+  slot_buffer = prepared;
+  if (slot_buffer->direction != directions) board_shift_directions(slot_buffer->direction);
   give();
 }
 
@@ -199,7 +199,7 @@ bool emission_begun(uint32_t* start) {
 
 void emission_swap(void) {
   core_start = begun_at;
-  directions = plane->direction;
+  directions = slot_buffer->direction;
   rest_ns = next_rest_ns;
   carry_ns += adjust_ns - next_extra_ns;
   adjust_ns = 0;

@@ -7,9 +7,9 @@
 // the margin is for what interrupts are late by, so that a tick is over before the next one begins.
 //
 // The core learns of a new tick when the main loop comes to it (emission_begun, emission_swap);
-// meanwhile its plane, prepared a tick ago, is emitted. If no plane is ready when it is wanted, an
-// empty tick follows: no step is lost and none is half prepared, but the MCU falls behind the bus
-// by a tick, which the next SYNC shows (fault 4).
+// meanwhile its slot_buffer, prepared a tick ago, is emitted. If no slot_buffer is ready when it is
+// wanted, an empty tick follows: no step is lost and none is half prepared, but the MCU falls
+// behind the bus by a tick, which the next SYNC shows (fault 4).
 #ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_EMISSION_H
 #define BUSHD_FIRMWARE_PORTS_LM3S6965_EMISSION_H
 
@@ -28,8 +28,8 @@
 // The first tick begins, one without steps. With interrupts off, after set_tick.
 void emission_start(void);
 
-// The plane of the next tick is prepared.
-void emission_ready(const bushd_plane* plane);
+// The slot_buffer of the next tick is prepared.
+void emission_ready(const bushd_slot_buffer* slot_buffer);
 
 // The tick after the core's present one has begun, at *start.
 bool emission_begun(uint32_t* start);

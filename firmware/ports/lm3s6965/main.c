@@ -3,11 +3,11 @@
 #include "firmware/ports/lm3s6965/board.h"
 #include "firmware/ports/lm3s6965/boot.h"
 #include "firmware/ports/lm3s6965/clock.h"
+#include "firmware/ports/lm3s6965/compare_output.h"
 #include "firmware/ports/lm3s6965/emission.h"
 #include "firmware/ports/lm3s6965/journal.h"
-#include "firmware/ports/lm3s6965/kept.h"
 #include "firmware/ports/lm3s6965/line.h"
-#include "firmware/ports/lm3s6965/reference.h"
+#include "firmware/ports/lm3s6965/nvm.h"
 #include "firmware/ports/lm3s6965/timer.h"
 #include "firmware/ports/lm3s6965/trigger.h"
 
@@ -36,7 +36,7 @@ static inline void name_parts(void) {
   NAME_PART("answer", answer);
   NAME_PART("rows", stream.rows);
   NAME_PART("config", config);
-  NAME_PART("planes", plane);
+  NAME_PART("slot_buffers", slot_buffer);
   NAME_PART("motors", motor);
   NAME_PART("tables", tables);
 }
@@ -140,23 +140,24 @@ static void boot(void) {
   motor_inputs = (uint16_t)~board_read_inputs();
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enable_kept == ENABLE_KEPT;
-  const kept_found found = kept_find();
-  eeprom_failed = !journal_open(&kept) || found == KEPT_BROKEN;
+  const nvm_found found = nvm_find();
+  eeprom_failed = !journal_open(&kept) || found == NVM_BROKEN;
   config.address = kept.address;
   config.boot_number = kept.boot_number;
   for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = kept.unique_id[i];
   bushd_mcu_boot(&mcu, &kPort, &config);
-  if (found == KEPT_WHOLE) kept_load(&mcu);
+  if (found == NVM_WHOLE) nvm_load(&mcu);
 }
 
 static void prepare(void) {
   motor_inputs = (uint16_t)~board_read_inputs();
   bushd_mcu_prepare(&mcu);
-  emission_ready(&mcu.plane[mcu.front ^ 1u]);
+  emission_ready(&mcu.slot_buffer[mcu.front ^ 1u]);
 }
 
 static bool moves(void) {
-  return mcu.state == BUSHD_STATE_RUN || (mcu.plane[0].active | mcu.plane[1].active) != 0;
+  return mcu.state == BUSHD_STATE_RUN ||
+         (mcu.slot_buffer[0].active | mcu.slot_buffer[1].active) != 0;
 }
 
 static void hear_line(void) {
@@ -165,7 +166,7 @@ static void hear_line(void) {
   if (line_take(&byte, &time)) {
     bushd_mcu_receive(&mcu, byte, (int32_t)emission_time_in_tick_ns(time));
   } else if (!bushd_mcu_wants_samples(&mcu)) {
-    if (!moves()) kept_poll(&mcu);
+    if (!moves()) nvm_poll(&mcu);
   } else if (board_has_current()) {
     bushd_mcu_sample(&mcu, emission_time_in_tick_ns(clock_now()), board_read_current());
     board_begin_current();

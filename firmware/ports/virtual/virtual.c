@@ -44,14 +44,15 @@ static int64_t edge_time(const bushd_virtual* v, uint16_t edge) {
 
 // What the STEP outputs have from this edge of the present tick on.
 static uint16_t step_levels_at(const bushd_virtual* v, uint16_t edge) {
-  const bool pulse_is_over = edge % 2 == 1 && v->plane->outputs != BUSHD_OUTPUTS_LEVELS;
-  return pulse_is_over ? 0 : v->plane->step[edge / 2];
+  const bool pulse_is_over = edge % 2 == 1 && v->slot_buffer->outputs != BUSHD_OUTPUTS_LEVELS;
+  return pulse_is_over ? 0 : v->slot_buffer->step[edge / 2];
 }
 
 // The same for the common DIR.
 static uint16_t common_dir_at(const bushd_virtual* v, uint16_t edge) {
   const uint16_t slot = (uint16_t)((edge + 1) / 2);
-  return v->plane->outputs == BUSHD_OUTPUTS_COMMON_DIR && slot < v->config.mcu.slots && slot % 2;
+  return v->slot_buffer->outputs == BUSHD_OUTPUTS_COMMON_DIR && slot < v->config.mcu.slots &&
+         slot % 2;
 }
 
 static void drive_reference(bushd_virtual* v, int64_t time_ns, bool level) {
@@ -60,22 +61,22 @@ static void drive_reference(bushd_virtual* v, int64_t time_ns, bool level) {
   emit(v, time_ns, BUSHD_VIRTUAL_REFERENCE, 0, level);
 }
 
-static bool has_edges(const bushd_plane* plane) {
-  return (plane->active | plane->reference_rise | plane->reference_fall) != 0;
+static bool has_edges(const bushd_slot_buffer* slot_buffer) {
+  return (slot_buffer->active | slot_buffer->compare_rise | slot_buffer->compare_fall) != 0;
 }
 
 // Calls back the edges of the present tick up to until_ns.
 static void emit_slots(bushd_virtual* v, int64_t until_ns) {
   const uint16_t edges = (uint16_t)(2 * v->config.mcu.slots);
-  const bushd_plane* plane = v->plane;
-  if (v->config.edge == NULL || plane == NULL || !has_edges(plane)) return;
+  const bushd_slot_buffer* slot_buffer = v->slot_buffer;
+  if (v->config.edge == NULL || slot_buffer == NULL || !has_edges(slot_buffer)) return;
   for (; v->edge_cursor < edges; ++v->edge_cursor) {
     const uint16_t slot = v->edge_cursor / 2;
     const bool begins = v->edge_cursor % 2 == 0;
-    const bool rises = begins && plane->reference_rise == slot + 1;
-    const bool falls = begins && plane->reference_fall == slot + 1;
-    // A plane without steps has no masks.
-    const bool steps = plane->active != 0;
+    const bool rises = begins && slot_buffer->compare_rise == slot + 1;
+    const bool falls = begins && slot_buffer->compare_fall == slot + 1;
+    // A slot_buffer without steps has no masks.
+    const bool steps = slot_buffer->active != 0;
     const uint16_t levels = steps ? step_levels_at(v, v->edge_cursor) : v->step_levels;
     const uint16_t common_dir = steps ? common_dir_at(v, v->edge_cursor) : v->common_dir_level;
     const bool same = levels == v->step_levels && common_dir == v->common_dir_level;
@@ -94,14 +95,15 @@ static void turn(bushd_virtual_shaft* shaft, int steps) {
 }
 
 static void turn_for_whole_tick(bushd_virtual* v) {
-  if (v->plane == NULL || v->plane->active == 0) return;
-  for (uint8_t i = 0; i < v->config.mcu.motors; ++i) turn(&v->shaft[i], v->plane->steps[i]);
+  if (v->slot_buffer == NULL || v->slot_buffer->active == 0) return;
+  for (uint8_t i = 0; i < v->config.mcu.motors; ++i) turn(&v->shaft[i], v->slot_buffer->steps[i]);
 }
 
 // Motors that step in this slot; `before` are the outputs of the slot before.
-static uint16_t steps_of_slot(const bushd_plane* plane, uint16_t slot, uint16_t before) {
-  const uint16_t mask = plane->step[slot];
-  if (plane->outputs != BUSHD_OUTPUTS_LEVELS) return mask;
+static uint16_t steps_of_slot(const bushd_slot_buffer* slot_buffer, uint16_t slot,
+                              uint16_t before) {
+  const uint16_t mask = slot_buffer->step[slot];
+  if (slot_buffer->outputs != BUSHD_OUTPUTS_LEVELS) return mask;
   uint16_t motors = 0;
   for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS; ++m) {
     const unsigned shift = BUSHD_PHASE_OUTPUTS * m;
@@ -114,15 +116,15 @@ static uint16_t steps_of_slot(const bushd_plane* plane, uint16_t slot, uint16_t 
 
 // A reset cuts the tick short: only the steps that have begun count.
 static void turn_for_cut_tick(bushd_virtual* v) {
-  if (v->plane == NULL || v->plane->active == 0) return;
+  if (v->slot_buffer == NULL || v->slot_buffer->active == 0) return;
   uint16_t before = v->levels_before_tick;
   for (uint16_t slot = 0; slot < v->config.mcu.slots; ++slot) {
-    const uint16_t steps = steps_of_slot(v->plane, slot, before);
-    before = v->plane->step[slot];
+    const uint16_t steps = steps_of_slot(v->slot_buffer, slot, before);
+    before = v->slot_buffer->step[slot];
     if (steps == 0) continue;
     if (edge_time(v, (uint16_t)(2 * slot)) > v->now_ns) return;
     for (uint8_t i = 0; i < v->config.mcu.motors; ++i) {
-      if (steps >> i & 1) turn(&v->shaft[i], v->plane->steps[i] < 0 ? -1 : 1);
+      if (steps >> i & 1) turn(&v->shaft[i], v->slot_buffer->steps[i] < 0 ? -1 : 1);
     }
   }
 }
@@ -138,9 +140,9 @@ static void begin_tick(bushd_virtual* v, int64_t start_own_ns) {
   v->edge_cursor = 0;
 }
 
-// What its plane of `slots` slots leaves at the STEP outputs.
-static uint16_t last_levels(const bushd_plane* plane, uint16_t slots) {
-  return plane->outputs == BUSHD_OUTPUTS_LEVELS ? plane->step[slots - 1] : 0;
+// What its slot_buffer of `slots` slots leaves at the STEP outputs.
+static uint16_t last_levels(const bushd_slot_buffer* slot_buffer, uint16_t slots) {
+  return slot_buffer->outputs == BUSHD_OUTPUTS_LEVELS ? slot_buffer->step[slots - 1] : 0;
 }
 
 // Of the tick that ends.
@@ -158,12 +160,13 @@ static void tick_boundary(bushd_virtual* v) {
   turn_for_whole_tick(v);
   v->now_ns = v->next_event_ns;
   begin_tick(v, v->tick_start_own_ns + v->tick_length_ns);
-  if (v->plane != NULL) v->levels_before_tick = last_levels(v->plane, v->config.mcu.slots);
-  v->plane = bushd_mcu_swap(&v->mcu);
-  drive(v, v->now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, v->plane->direction);
-  if (v->plane->active == 0) {
+  if (v->slot_buffer != NULL)
+    v->levels_before_tick = last_levels(v->slot_buffer, v->config.mcu.slots);
+  v->slot_buffer = bushd_mcu_swap(&v->mcu);
+  drive(v, v->now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, v->slot_buffer->direction);
+  if (v->slot_buffer->active == 0) {
     drive(v, v->now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels,
-          last_levels(v->plane, v->config.mcu.slots));
+          last_levels(v->slot_buffer, v->config.mcu.slots));
   }
   bushd_mcu_prepare(&v->mcu);
 }
@@ -251,7 +254,7 @@ static void boot(bushd_virtual* v) {
   v->reset_cause = BUSHD_RESET_EXTERNAL;
   v->now_ns = v->config.boot_ns;
   v->running = true;
-  v->plane = NULL;
+  v->slot_buffer = NULL;
   v->tick_ns = BUSHD_BOOT_TICK_NS;
   v->adjust_ns = 0;
   v->trigger_edge = BUSHD_EDGE_NONE;

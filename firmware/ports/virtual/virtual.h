@@ -84,7 +84,7 @@ typedef struct bushd_virtual {
   int64_t tick_length_ns;  // of the present tick, in own time
   uint32_t tick_ns;        // of later ticks
   int32_t adjust_ns;       // of the next tick, once
-  const bushd_plane* plane;
+  const bushd_slot_buffer* slot_buffer;
   uint16_t edge_cursor;  // next edge e of the present tick, 2S: none left
   uint16_t step_levels;
   uint16_t levels_before_tick;  // of phases, when the present tick began

@@ -14,7 +14,7 @@
 #define BUSHD_AVR_BAUD 1000000UL
 // Structs of an 8-bit CPU have no gaps.
 #pragma pack(push, 1)
-#include "firmware/ports/atmega2560/kept.c"
+#include "firmware/ports/atmega2560/nvm.c"
 #pragma pack(pop)
 #include "firmware/ports/atmega2560/line.c"
 #undef __attribute__
@@ -34,9 +34,9 @@ volatile bool eeprom_writes;
 static uint8_t eeprom[EEPROM_SIZE];
 static uint32_t cycles;
 
-// Beyond it an address wraps, and hits the identity. Below EEPROM_KEPT that is whose it is.
+// Beyond it an address wraps, and hits the identity. Below EEPROM_NVM that is whose it is.
 static void require_kept_area(size_t address, size_t size) {
-  if (address < EEPROM_KEPT || address + size > EEPROM_SIZE) abort();
+  if (address < EEPROM_NVM || address + size > EEPROM_SIZE) abort();
 }
 
 void eeprom_read_block(void* to, const void* from, size_t size) {
@@ -84,7 +84,7 @@ uint8_t line_decode(uint8_t** to, uint8_t* run, uint8_t out, uint8_t count) {
 
 void host_reset(void) {
   phase = COMPARE;
-  memset(&pass, 0, sizeof pass);
+  memset(&scan, 0, sizeof scan);
   planned = 0;
   in_head = 0;
   stamps_out = line_stamps_in = line_sending_end = 0;
@@ -106,8 +106,8 @@ uint32_t host_kept_crc(void) {
   return read_head().crc;
 }
 
-bushd_mcu_pass host_walk(void) {
-  return pass;
+bushd_mcu_nvm_scan host_walk(void) {
+  return scan;
 }
 
 void host_receive(uint8_t byte) {

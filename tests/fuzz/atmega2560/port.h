@@ -10,8 +10,8 @@
 extern "C" {
 #endif
 
-#include "firmware/ports/atmega2560/kept.h"
 #include "firmware/ports/atmega2560/line.h"
+#include "firmware/ports/atmega2560/nvm.h"
 
 // A reset: all but the EEPROM is as after power-on.
 void host_reset(void);
@@ -19,8 +19,8 @@ void host_blank_eeprom(void);
 // Of what is kept, as its head says. Precondition: it is whole.
 uint16_t host_kept_size(void);
 uint32_t host_kept_crc(void);
-// Where kept_poll stands.
-bushd_mcu_pass host_walk(void);
+// Where nvm_poll stands.
+bushd_mcu_nvm_scan host_walk(void);
 
 // A byte comes; it is lost while an answer is sent, and if the ring is full.
 void host_receive(uint8_t byte);

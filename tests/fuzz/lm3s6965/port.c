@@ -7,7 +7,7 @@
 #include <sys/mman.h>
 
 // The very file.
-#include "firmware/ports/lm3s6965/kept.c"
+#include "firmware/ports/lm3s6965/nvm.c"
 
 #define AREA 0x27800u
 #define AREA_END 0x3F800u
@@ -33,7 +33,7 @@ void flash_erase(const volatile uint32_t* page) {
 
 void host_reset(void) {
   memset(&newest, 0, sizeof newest);
-  memset(&pass, 0, sizeof pass);
+  memset(&scan, 0, sizeof scan);
   content = NULL;
   next = room_end = planned = planned_size = head_words = 0;
   phase = COMPARES;
@@ -59,6 +59,6 @@ uint32_t host_kept_crc(void) {
   return newest.crc;
 }
 
-bushd_mcu_pass host_walk(void) {
-  return pass;
+bushd_mcu_nvm_scan host_walk(void) {
+  return scan;
 }

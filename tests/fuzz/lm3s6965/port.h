@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-#include "firmware/ports/lm3s6965/kept.h"
+#include "firmware/ports/lm3s6965/nvm.h"
 
 // A reset: all but the flash is as after power-on.
 void host_reset(void);
@@ -17,8 +17,8 @@ void host_blank_flash(void);
 // Of what is kept, as its head says. Precondition: it is whole, and was found.
 uint32_t host_kept_size(void);
 uint32_t host_kept_crc(void);
-// Where kept_poll stands.
-bushd_mcu_pass host_walk(void);
+// Where nvm_poll stands.
+bushd_mcu_nvm_scan host_walk(void);
 
 #ifdef __cplusplus
 }

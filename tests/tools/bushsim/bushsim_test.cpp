@@ -100,7 +100,7 @@ class Port {
     bushd_identity identity{};
     EXPECT_EQ(frame.address, address);
     EXPECT_EQ(frame.type, BUSHD_MSG_IDENTIFY | BUSHD_TYPE_REPLY);
-    EXPECT_EQ(frame.tag, 77);
+    EXPECT_EQ(frame.sequence, 77);
     EXPECT_EQ(bushd_decode_identity(frame.payload, frame.payload_size, &identity), BUSHD_OK);
     return identity;
   }

@@ -1,11 +1,11 @@
 // The reference output: a pulse when a motor arrives at a position.
-#ifndef BUSHD_FIRMWARE_CORE_REFERENCE_H
-#define BUSHD_FIRMWARE_CORE_REFERENCE_H
+#ifndef BUSHD_FIRMWARE_CORE_POSITION_COMPARE_H
+#define BUSHD_FIRMWARE_CORE_POSITION_COMPARE_H
 
 #include <stdint.h>
 
 #include "engine/message.h"
-#include "firmware/core/plane.h"
+#include "firmware/core/slot_buffer.h"
 
 typedef struct bushd_mcu bushd_mcu;
 
@@ -16,7 +16,7 @@ typedef struct bushd_mcu_slots {
 } bushd_mcu_slots;
 
 // The reference output (reference.c).
-typedef struct bushd_mcu_reference {
+typedef struct bushd_mcu_position_compare {
   uint8_t motor;
   uint8_t arrivals;  // BUSHD_ARRIVES_*
   uint8_t pulse;     // 0: none, or what comes next of it
@@ -24,10 +24,10 @@ typedef struct bushd_mcu_reference {
   bushd_mcu_slots delay;
   bushd_mcu_slots width;
   bushd_mcu_slots next;  // until then, from the beginning of the tick to be prepared
-} bushd_mcu_reference;
+} bushd_mcu_position_compare;
 
-bushd_status bushd_mcu_take_reference(bushd_mcu* mcu, const bushd_reference* message);
-// Precondition: a pulse may begin or is under way. `plane` has its steps.
-void bushd_mcu_emit_reference(bushd_mcu* mcu, bushd_plane* plane);
+bushd_status bushd_mcu_take_position_compare(bushd_mcu* mcu, const bushd_position_compare* message);
+// Precondition: a pulse may begin or is under way. `slot_buffer` has its steps.
+void bushd_mcu_emit_position_compare(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer);
 
 #endif

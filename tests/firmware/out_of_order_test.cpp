@@ -33,18 +33,18 @@ TEST_P(Islands, FrameBehindALostOneIsKeptAndJoinedWhenThatComesAgain) {
   ASSERT_EQ(rig.take(part(20)), BUSHD_OK);
   bushd_report report = rig.poll();
   EXPECT_EQ(report.motor[0].known_until, static_cast<std::uint16_t>(start + 10));
-  EXPECT_EQ(report.islands, 1);
-  EXPECT_EQ(report.island_from, static_cast<std::uint16_t>(start + 20));
-  EXPECT_EQ(report.island_until, static_cast<std::uint16_t>(start + 30));
+  EXPECT_EQ(report.out_of_order, 1);
+  EXPECT_EQ(report.out_of_order_from, static_cast<std::uint16_t>(start + 20));
+  EXPECT_EQ(report.out_of_order_until, static_cast<std::uint16_t>(start + 30));
   ASSERT_EQ(rig.take(part(30)), BUSHD_OK);
-  EXPECT_EQ(rig.poll().island_until, static_cast<std::uint16_t>(start + 40)) << "it grows";
+  EXPECT_EQ(rig.poll().out_of_order_until, static_cast<std::uint16_t>(start + 40)) << "it grows";
   EXPECT_EQ(rig.take(part(20)), BUSHD_E_LATE) << "known";
   EXPECT_EQ(rig.take(rig.part(moves, start, 25, 10)), BUSHD_E_LATE) << "known";
-  EXPECT_EQ(rig.take(part(50)), BUSHD_E_GAP) << "one island a motor";
-  EXPECT_EQ(rig.poll().island_until, static_cast<std::uint16_t>(start + 40));
+  EXPECT_EQ(rig.take(part(50)), BUSHD_E_GAP) << "one ahead a motor";
+  EXPECT_EQ(rig.poll().out_of_order_until, static_cast<std::uint16_t>(start + 40));
   ASSERT_EQ(rig.take(part(10)), BUSHD_OK);
   report = rig.poll();
-  EXPECT_EQ(report.islands, 0);
+  EXPECT_EQ(report.out_of_order, 0);
   EXPECT_EQ(report.motor[0].known_until, static_cast<std::uint16_t>(start + 40));
   for (std::size_t from = 40; from < moves.ticks(); from += 10) {
     ASSERT_EQ(rig.take(part(from)), BUSHD_OK);
@@ -83,9 +83,9 @@ TEST_P(Islands, GapMayBeFilledInPiecesFromBothEnds) {
   ASSERT_EQ(rig.take(rig.part(moves, start, 0, 10)), BUSHD_OK);
   ASSERT_EQ(rig.take(rig.part(moves, start, 30, 10)), BUSHD_OK);
   ASSERT_EQ(rig.take(rig.part(moves, start, 22, 12)), BUSHD_OK);
-  EXPECT_EQ(rig.poll().island_from, static_cast<std::uint16_t>(start + 22));
+  EXPECT_EQ(rig.poll().out_of_order_from, static_cast<std::uint16_t>(start + 22));
   ASSERT_EQ(rig.take(rig.part(moves, start, 8, 8)), BUSHD_OK);
-  EXPECT_EQ(rig.poll().islands, 1);
+  EXPECT_EQ(rig.poll().out_of_order, 1);
   ASSERT_EQ(rig.take(rig.part(moves, start, 16, 8)), BUSHD_OK);
   EXPECT_EQ(rig.poll().motor[0].known_until, static_cast<std::uint16_t>(start + 40));
   for (std::size_t from = 40; from < moves.ticks(); from += 20) {
@@ -103,8 +103,8 @@ TEST_P(Islands, IsDroppedWhenTheQueueRunsDryBeforeTheGapIsFilled) {
   rig.pass_until_rest();
   bushd_report report = rig.poll();
   EXPECT_EQ(report.faults, BUSHD_FAULT_LINK);
-  EXPECT_EQ(report.islands, 0);
-  EXPECT_EQ(report.run_downs, 1);
+  EXPECT_EQ(report.out_of_order, 0);
+  EXPECT_EQ(report.ramp_downs, 1);
   const auto down = Reference::ramp_down(
       law, moves.delay[29], format == BUSHD_FORMAT_FINE ? moves.fraction[29] : std::uint8_t{0});
   const std::int64_t stands = moves.made[29] + static_cast<std::int64_t>(down.steps());
@@ -123,7 +123,7 @@ TEST_P(Islands, AreCutAwayByAReplacement) {
   Ticks replacement = ones(kReplace, start + 15, 2, 0);
   replacement.epoch = 1;
   ASSERT_EQ(rig.take(replacement), BUSHD_OK);
-  EXPECT_EQ(rig.poll().islands, 0);
+  EXPECT_EQ(rig.poll().out_of_order, 0);
   ASSERT_EQ(rig.take(ones(kStart, start + 60, 1, 0)), BUSHD_OK);
   expect_position(0, 18);
 }
@@ -133,7 +133,7 @@ TEST_P(Islands, OfAMotorAtRestAreRefused) {
   EXPECT_EQ(rig.take(ones(0, start + 5, 5)), BUSHD_E_GAP);
   ASSERT_EQ(rig.take(ones(kStart, start, 5, 0)), BUSHD_OK);
   EXPECT_EQ(rig.take(ones(0, start + 8, 5)), BUSHD_E_GAP) << "at rest before the gap";
-  EXPECT_EQ(rig.poll().islands, 0);
+  EXPECT_EQ(rig.poll().out_of_order, 0);
   expect_position(0, 5);
 }
 
@@ -151,9 +151,9 @@ TEST_P(Islands, ReportTellsThatOfTheLowestMotorAndWhoHasTheSame) {
   ASSERT_EQ(rig.take(of(ones(0, start + 30, 6), 1 << 2)), BUSHD_OK);
   ASSERT_EQ(rig.take(of(ones(0, start + 30, 5), 1 << 3)), BUSHD_OK);
   const bushd_report report = rig.poll();
-  EXPECT_EQ(report.islands, 1 << 1 | 1 << 3);
-  EXPECT_EQ(report.island_from, static_cast<std::uint16_t>(start + 30));
-  EXPECT_EQ(report.island_until, static_cast<std::uint16_t>(start + 35));
+  EXPECT_EQ(report.out_of_order, 1 << 1 | 1 << 3);
+  EXPECT_EQ(report.out_of_order_from, static_cast<std::uint16_t>(start + 30));
+  EXPECT_EQ(report.out_of_order_until, static_cast<std::uint16_t>(start + 35));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "firmware/ports/lm3s6965/reference.h"
+#include "firmware/ports/lm3s6965/compare_output.h"
 
 #include "firmware/ports/lm3s6965/board.h"
 #include "firmware/ports/lm3s6965/interrupts.h"

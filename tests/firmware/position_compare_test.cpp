@@ -23,13 +23,13 @@ class ReferencePulse : public Streams {
   // Lets ticks pass, watches the output, and the slots in which motor 0 arrives at each position.
   void watch(int ticks) {
     for (int i = 0; i < ticks; ++i, rig.pass()) {
-      const bushd_plane& plane = rig.plane();
+      const bushd_slot_buffer& slot_buffer = rig.slot_buffer();
       const std::int64_t first = rig.tick() * kSlots;
       for (std::int64_t slot = 0; slot < kSlots; ++slot) {
-        if (plane.reference_rise == slot + 1) pulses_.push_back({first + slot, -1});
-        if (plane.reference_fall == slot + 1) pulses_.back().falls = first + slot;
-        if (plane.step[slot] & 1) {
-          position_ += plane.direction & 1 ? 1 : -1;
+        if (slot_buffer.compare_rise == slot + 1) pulses_.push_back({first + slot, -1});
+        if (slot_buffer.compare_fall == slot + 1) pulses_.back().falls = first + slot;
+        if (slot_buffer.step[slot] & 1) {
+          position_ += slot_buffer.direction & 1 ? 1 : -1;
           arrivals_.push_back({position_, first + slot});
         }
       }

@@ -6,12 +6,12 @@
 
 #define QUIET_TICKS 512u
 
-static bushd_mcu_piece piece_of(void* at, size_t size) {
-  const bushd_mcu_piece piece = {at, (uint16_t)size};
+static bushd_mcu_nvm_region piece_of(void* at, size_t size) {
+  const bushd_mcu_nvm_region piece = {at, (uint16_t)size};
   return piece;
 }
 
-bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
+bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
   enum { TICK, FORMAT, INPUTS, EMISSION, LOCAL, TABLES, VALID_TABLES, CODES_USED, CODES, MOTORS };
   switch (index) {
     case TICK:
@@ -40,38 +40,39 @@ bushd_mcu_piece bushd_mcu_kept(bushd_mcu* mcu, uint8_t index) {
   }
 }
 
-void bushd_mcu_restored(bushd_mcu* mcu) {
+void bushd_mcu_nvm_restored(bushd_mcu* mcu) {
   const bushd_set_inputs inputs = mcu->inputs;
   bushd_mcu_set_inputs(mcu, &inputs);
   bushd_mcu_restore_emission(mcu);
   mcu->port.set_tick(mcu->port.context, mcu->tick_ns);
 }
 
-void bushd_mcu_begin_pass(bushd_mcu_pass* pass) {
-  pass->index = 0;
-  pass->offset = pass->size = 0;
-  pass->crc = BUSHD_CRC32_START;
+void bushd_mcu_nvm_begin_scan(bushd_mcu_nvm_scan* scan) {
+  scan->index = 0;
+  scan->offset = scan->size = 0;
+  scan->crc = BUSHD_CRC32_START;
 }
 
-bushd_mcu_piece bushd_mcu_next_kept(bushd_mcu* mcu, bushd_mcu_pass* pass, uint16_t most) {
-  bushd_mcu_piece piece = bushd_mcu_kept(mcu, pass->index);
-  while (piece.at != NULL && pass->offset >= piece.size) {
-    piece = bushd_mcu_kept(mcu, ++pass->index);
-    pass->offset = 0;
+bushd_mcu_nvm_region bushd_mcu_nvm_scan_next(bushd_mcu* mcu, bushd_mcu_nvm_scan* scan,
+                                             uint16_t most) {
+  bushd_mcu_nvm_region piece = bushd_mcu_nvm_region_at(mcu, scan->index);
+  while (piece.at != NULL && scan->offset >= piece.size) {
+    piece = bushd_mcu_nvm_region_at(mcu, ++scan->index);
+    scan->offset = 0;
   }
   if (piece.at == NULL) return piece;
-  BUSHD_ASSERT(pass->offset < piece.size);
-  BUSHD_ASSERT(pass->size < BUSHD_MCU_MOST_KEPT(mcu->config.code_count));
-  const uint16_t left = (uint16_t)(piece.size - pass->offset);
-  const bushd_mcu_piece bytes = {(uint8_t*)piece.at + pass->offset, left < most ? left : most};
-  pass->offset = (uint16_t)(pass->offset + bytes.size);
-  pass->size = (uint16_t)(pass->size + bytes.size);
-  pass->crc = bushd_crc32(pass->crc, bytes.at, bytes.size);
+  BUSHD_ASSERT(scan->offset < piece.size);
+  BUSHD_ASSERT(scan->size < BUSHD_MCU_NVM_MAX_BYTES(mcu->config.code_count));
+  const uint16_t left = (uint16_t)(piece.size - scan->offset);
+  const bushd_mcu_nvm_region bytes = {(uint8_t*)piece.at + scan->offset, left < most ? left : most};
+  scan->offset = (uint16_t)(scan->offset + bytes.size);
+  scan->size = (uint16_t)(scan->size + bytes.size);
+  scan->crc = bushd_crc32(scan->crc, bytes.at, bytes.size);
   return bytes;
 }
 
-bool bushd_mcu_kept_is_quiet(const bushd_mcu* mcu, bushd_mcu_pass* pass) {
-  if (pass->crc != pass->crc_before) pass->same_uptime = (uint16_t)mcu->uptime;
-  pass->crc_before = pass->crc;
-  return (uint16_t)((uint16_t)mcu->uptime - pass->same_uptime) >= QUIET_TICKS;
+bool bushd_mcu_nvm_is_quiet(const bushd_mcu* mcu, bushd_mcu_nvm_scan* scan) {
+  if (scan->crc != scan->crc_before) scan->same_uptime = (uint16_t)mcu->uptime;
+  scan->crc_before = scan->crc;
+  return (uint16_t)((uint16_t)mcu->uptime - scan->same_uptime) >= QUIET_TICKS;
 }

@@ -1,7 +1,7 @@
 // The reference output. Timer 3 waits for the edges of a tick, from the tick's beginning on: a tick
 // that comes late takes its pulse along.
-#ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_REFERENCE_H
-#define BUSHD_FIRMWARE_PORTS_LM3S6965_REFERENCE_H
+#ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_COMPARE_OUTPUT_H
+#define BUSHD_FIRMWARE_PORTS_LM3S6965_COMPARE_OUTPUT_H
 
 #include <stdbool.h>
 #include <stdint.h>

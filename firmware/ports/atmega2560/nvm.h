@@ -5,27 +5,27 @@
 //   1 .. 4   image_seal of the program
 //   5 .. 6   size
 //   7 .. 10  CRC-32
-#ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_KEPT_H
-#define BUSHD_FIRMWARE_PORTS_ATMEGA2560_KEPT_H
+#ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_NVM_H
+#define BUSHD_FIRMWARE_PORTS_ATMEGA2560_NVM_H
 
 #include "firmware/core/mcu.h"
 #include "firmware/ports/atmega2560/eeprom.h"
 
-#define KEPT_HEAD_BYTES 11u
-#define KEPT_MOST_BYTES (E2END + 1u - EEPROM_KEPT - KEPT_HEAD_BYTES)
+#define NVM_HEAD_BYTES 11u
+#define NVM_MOST_BYTES (E2END + 1u - EEPROM_NVM - NVM_HEAD_BYTES)
 
-typedef enum kept_found {
-  KEPT_NOTHING,  // or another program's
-  KEPT_WHOLE,
-  KEPT_BROKEN  // its writing was interrupted, or a byte has changed
-} kept_found;
+typedef enum nvm_found {
+  NVM_NOTHING,  // or another program's
+  NVM_WHOLE,
+  NVM_BROKEN  // its writing was interrupted, or a byte has changed
+} nvm_found;
 
 // With interrupts off.
-kept_found kept_find(void);
+nvm_found nvm_find(void);
 // Precondition: it is whole, and the MCU has just booted.
-void kept_load(bushd_mcu* mcu);
+void nvm_load(bushd_mcu* mcu);
 
 // Goes on with it by one byte. Precondition: the EEPROM writes nothing, and no motor moves.
-void kept_poll(bushd_mcu* mcu);
+void nvm_poll(bushd_mcu* mcu);
 
 #endif

@@ -10,23 +10,23 @@
 //
 // At boot there is made room for one of the largest. When there is none left, what changes is not
 // kept until after the next boot.
-#ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_KEPT_H
-#define BUSHD_FIRMWARE_PORTS_LM3S6965_KEPT_H
+#ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_NVM_H
+#define BUSHD_FIRMWARE_PORTS_LM3S6965_NVM_H
 
 #include "firmware/core/mcu.h"
 
-typedef enum kept_found {
-  KEPT_NOTHING,  // or another program's
-  KEPT_WHOLE,
-  KEPT_BROKEN  // a bit has changed
-} kept_found;
+typedef enum nvm_found {
+  NVM_NOTHING,  // or another program's
+  NVM_WHOLE,
+  NVM_BROKEN  // a bit has changed
+} nvm_found;
 
 // Once, at boot.
-kept_found kept_find(void);
+nvm_found nvm_find(void);
 // Precondition: it is whole, and the MCU has just booted.
-void kept_load(bushd_mcu* mcu);
+void nvm_load(bushd_mcu* mcu);
 
 // Goes on with it, for 20 us at most. Precondition: no motor moves.
-void kept_poll(bushd_mcu* mcu);
+void nvm_poll(bushd_mcu* mcu);
 
 #endif

@@ -1,12 +1,12 @@
 // The reference output. Timer 4 counts every 64th cycle, in step with timer 5 (clock.c).
-#ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_REFERENCE_H
-#define BUSHD_FIRMWARE_PORTS_ATMEGA2560_REFERENCE_H
+#ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_COMPARE_OUTPUT_H
+#define BUSHD_FIRMWARE_PORTS_ATMEGA2560_COMPARE_OUTPUT_H
 
 #include <stdint.h>
 
 // The pin rises, or falls, at this time (clock.h), less than 260 ms from now. One of each may wait;
 // they come by turns. For the main loop.
-void reference_rise(uint32_t time);
-void reference_fall(uint32_t time);
+void compare_rise(uint32_t time);
+void compare_fall(uint32_t time);
 
 #endif

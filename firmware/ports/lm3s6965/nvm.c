@@ -1,4 +1,4 @@
-#include "firmware/ports/lm3s6965/kept.h"
+#include "firmware/ports/lm3s6965/nvm.h"
 
 #include <string.h>
 
@@ -9,26 +9,26 @@
 #define MOST_PAGES 27u      // of a writing
 #define COMPARED_BYTES 32u  // at a time
 
-typedef struct kept_head {
+typedef struct nvm_head {
   uint32_t program;
   uint32_t number;
   uint32_t size;
   uint32_t crc;
   uint32_t check;
-} kept_head;
-#define HEAD_WORDS (sizeof(kept_head) / sizeof(uint32_t))
-#define MOST_BYTES (MOST_PAGES * FLASH_PAGE_WORDS * sizeof(uint32_t) - sizeof(kept_head))
+} nvm_head;
+#define HEAD_WORDS (sizeof(nvm_head) / sizeof(uint32_t))
+#define MOST_BYTES (MOST_PAGES * FLASH_PAGE_WORDS * sizeof(uint32_t) - sizeof(nvm_head))
 
 static const volatile uint32_t* const kArea = (const volatile uint32_t*)0x00027800;  // lm3s6965.ld
 extern const uint32_t image_seal;                                                    // startup.c
 
-static kept_head newest;        // all zero: there is none
+static nvm_head newest;         // all zero: there is none
 static const uint8_t* content;  // of the newest, at boot
 static uint32_t next;           // page, from which on it is blank up to:
 static uint32_t room_end;
 
 static enum { COMPARES, WRITES, ENDS } phase;
-static bushd_mcu_pass pass;
+static bushd_mcu_nvm_scan scan;
 static uint32_t planned;  // CRC of what is being written
 static uint32_t planned_size;
 static uint32_t head_words;  // written
@@ -49,13 +49,13 @@ static bool is_blank(uint32_t page) {
   return word == FLASH_PAGE_WORDS;
 }
 
-static uint32_t check_of(const kept_head* head) {
+static uint32_t check_of(const nvm_head* head) {
   return ~(head->program ^ head->number ^ head->size ^ head->crc);
 }
 
-static kept_head head_at(uint32_t page) {
+static nvm_head head_at(uint32_t page) {
   const volatile uint32_t* const at = page_at(page);
-  const kept_head head = {at[0], at[1], at[2], at[3], at[4]};
+  const nvm_head head = {at[0], at[1], at[2], at[3], at[4]};
   return head;
 }
 
@@ -68,70 +68,70 @@ static void make_room(uint32_t from) {
   while (room_end < PAGES && is_blank(room_end)) ++room_end;
 }
 
-kept_found kept_find(void) {
+nvm_found nvm_find(void) {
   uint32_t found = 0;  // page
   for (uint32_t page = 0; page < PAGES; ++page) {
-    const kept_head head = head_at(page);
+    const nvm_head head = head_at(page);
     if (head.check != check_of(&head) || head.size > MOST_BYTES) continue;
     if (newest.number != 0 && (int32_t)(head.number - newest.number) < 0) continue;
     newest = head;
     found = page;
   }
-  bushd_mcu_begin_pass(&pass);
+  bushd_mcu_nvm_begin_scan(&scan);
   make_room(newest.number != 0 ? found + pages_of(newest.size) : 0);
-  if (newest.number == 0 || newest.program != image_seal) return KEPT_NOTHING;
+  if (newest.number == 0 || newest.program != image_seal) return NVM_NOTHING;
   content = (const uint8_t*)(uintptr_t)(page_at(found) + HEAD_WORDS);
-  if (bushd_crc32(BUSHD_CRC32_START, content, newest.size) == newest.crc) return KEPT_WHOLE;
+  if (bushd_crc32(BUSHD_CRC32_START, content, newest.size) == newest.crc) return NVM_WHOLE;
   newest.size = 0;  // what is there will be written again
-  return KEPT_BROKEN;
+  return NVM_BROKEN;
 }
 
-void kept_load(bushd_mcu* mcu) {
+void nvm_load(bushd_mcu* mcu) {
   for (;;) {
-    const uint32_t from = pass.size;
-    const bushd_mcu_piece bytes = bushd_mcu_next_kept(mcu, &pass, MOST_BYTES);
+    const uint32_t from = scan.size;
+    const bushd_mcu_nvm_region bytes = bushd_mcu_nvm_scan_next(mcu, &scan, MOST_BYTES);
     if (bytes.at == NULL) break;
     memcpy(bytes.at, content + from, bytes.size);
   }
-  bushd_mcu_begin_pass(&pass);
-  bushd_mcu_restored(mcu);
+  bushd_mcu_nvm_begin_scan(&scan);
+  bushd_mcu_nvm_restored(mcu);
 }
 
-// At the end of a pass that only compares.
+// At the end of a scan that only compares.
 static void compare_whole(const bushd_mcu* mcu) {
   const bool same =
-      newest.program == image_seal && newest.size == pass.size && newest.crc == pass.crc;
+      newest.program == image_seal && newest.size == scan.size && newest.crc == scan.crc;
   const bool news = newest.number != 0 || mcu->tables.codes_used != 0;
-  const bool quiet = bushd_mcu_kept_is_quiet(mcu, &pass);
-  const bool room = pass.size <= MOST_BYTES && next + pages_of(pass.size) <= room_end;
+  const bool quiet = bushd_mcu_nvm_is_quiet(mcu, &scan);
+  const bool room = scan.size <= MOST_BYTES && next + pages_of(scan.size) <= room_end;
   if (!same && news && quiet && room) phase = WRITES;
-  planned = pass.crc;
-  planned_size = pass.size;
-  bushd_mcu_begin_pass(&pass);
+  planned = scan.crc;
+  planned_size = scan.size;
+  bushd_mcu_nvm_begin_scan(&scan);
 }
 
 // It has changed meanwhile, or flash is worn.
 static void give_up(void) {
   next += pages_of(planned_size);
   phase = COMPARES;
-  bushd_mcu_begin_pass(&pass);
+  bushd_mcu_nvm_begin_scan(&scan);
 }
 
 static void write_word(bushd_mcu* mcu) {
-  const uint32_t at = pass.size / 4u;
+  const uint32_t at = scan.size / 4u;
   uint32_t word = FLASH_BLANK;
   uint8_t* const to = (uint8_t*)&word;
   uint32_t count = 0;
   for (; count < sizeof word; ++count) {
-    const bushd_mcu_piece byte = bushd_mcu_next_kept(mcu, &pass, 1);
+    const bushd_mcu_nvm_region byte = bushd_mcu_nvm_scan_next(mcu, &scan, 1);
     if (byte.at == NULL) break;
     to[count] = *(const uint8_t*)byte.at;
   }
-  if (pass.size > planned_size) {
+  if (scan.size > planned_size) {
     give_up();
   } else if (count != 0) {
     if (!flash_write(page_at(next) + HEAD_WORDS + at, word)) give_up();
-  } else if (pass.crc == planned && pass.size == planned_size) {
+  } else if (scan.crc == planned && scan.size == planned_size) {
     phase = ENDS;
     head_words = 0;
   } else {
@@ -140,23 +140,23 @@ static void write_word(bushd_mcu* mcu) {
 }
 
 static void write_head(void) {
-  kept_head head = {image_seal, newest.number + 1u, pass.size, pass.crc, 0};
+  nvm_head head = {image_seal, newest.number + 1u, scan.size, scan.crc, 0};
   head.check = check_of(&head);
   const uint32_t words[HEAD_WORDS] = {head.program, head.number, head.size, head.crc, head.check};
   if (!flash_write(page_at(next) + head_words, words[head_words])) {
     give_up();
   } else if (++head_words == HEAD_WORDS) {
     newest = head;
-    next += pages_of(pass.size);
+    next += pages_of(scan.size);
     phase = COMPARES;
-    bushd_mcu_begin_pass(&pass);
+    bushd_mcu_nvm_begin_scan(&scan);
   }
 }
 
-void kept_poll(bushd_mcu* mcu) {
+void nvm_poll(bushd_mcu* mcu) {
   switch (phase) {
     case COMPARES:
-      if (bushd_mcu_next_kept(mcu, &pass, COMPARED_BYTES).at == NULL) compare_whole(mcu);
+      if (bushd_mcu_nvm_scan_next(mcu, &scan, COMPARED_BYTES).at == NULL) compare_whole(mcu);
       break;
     case WRITES:
       write_word(mcu);

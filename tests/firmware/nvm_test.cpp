@@ -24,20 +24,21 @@ class Kept : public testing::Test {
     EXPECT_EQ(rig.upload(0, ramp_law()), BUSHD_OK);
   }
 
-  std::size_t most() const { return BUSHD_MCU_MOST_KEPT(kCodes); }
+  std::size_t most() const { return BUSHD_MCU_NVM_MAX_BYTES(kCodes); }
 
   // `meanwhile` comes after this many bytes.
   Walk walk(std::uint16_t most_at_once, std::size_t after, const std::function<void()>& meanwhile) {
     Walk found;
-    bushd_mcu_pass pass{};
-    bushd_mcu_begin_pass(&pass);
+    bushd_mcu_nvm_scan pass{};
+    bushd_mcu_nvm_begin_scan(&pass);
     bool done = false;
     while (found.bytes <= most()) {
       if (!done && found.bytes >= after) {
         meanwhile();
         done = true;
       }
-      const bushd_mcu_piece part = bushd_mcu_next_kept(rig.mutable_mcu(), &pass, most_at_once);
+      const bushd_mcu_nvm_region part =
+          bushd_mcu_nvm_scan_next(rig.mutable_mcu(), &pass, most_at_once);
       if (part.at == nullptr) {
         found.ended = true;
         break;

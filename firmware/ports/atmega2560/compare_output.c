@@ -1,4 +1,4 @@
-#include "firmware/ports/atmega2560/reference.h"
+#include "firmware/ports/atmega2560/compare_output.h"
 
 #include <avr/io.h>
 #include <util/atomic.h>
@@ -23,7 +23,7 @@ static bool is_due(uint32_t time) {
   return clock_before(time, clock_now() + 3u * COUNT_CYCLES);
 }
 
-void reference_rise(uint32_t time) {
+void compare_rise(uint32_t time) {
   OCR4A = compare_for(time);
   TIFR4 = 1 << OCF4A;
   if (is_due(time)) {
@@ -37,7 +37,7 @@ void reference_rise(uint32_t time) {
   }
 }
 
-void reference_fall(uint32_t time) {
+void compare_fall(uint32_t time) {
   OCR4B = compare_for(time);
   TIFR4 = 1 << OCF4B;
   if (is_due(time)) {
