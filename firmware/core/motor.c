@@ -73,7 +73,9 @@ static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, 
     const int16_t before = motor->remainder;
     bushd_run_note_fraction(run);
     motor->remainder = (int16_t)(run->fraction * run->direction);
-    note_speed(motor, (int16_t)(steps * 256 + motor->remainder - before));
+    // Unsigned: an `int` of 16 bits does not hold every sum on the way.
+    const uint16_t whole = (uint16_t)((uint16_t)steps << 8);
+    note_speed(motor, (int16_t)(uint16_t)(whole + (uint16_t)motor->remainder - (uint16_t)before));
   } else {
     motor->remainder = 0;
   }

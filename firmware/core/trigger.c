@@ -76,7 +76,8 @@ static int32_t bus_ns(const bushd_mcu* mcu, int32_t time_in_tick_ns) {
 static bool is_forbidden(const bushd_mcu* mcu, uint16_t motors) {
   const uint16_t positive = bushd_mcu_forbidden(mcu, 1) & motors;
   const uint16_t negative = bushd_mcu_forbidden(mcu, -1) & motors;
-  for (uint8_t m = 0; (positive | negative) >> m != 0; ++m) {
+  uint16_t left = positive | negative;
+  for (uint8_t m = 0; left != 0; ++m, left = (uint16_t)(left >> 1)) {
     const uint16_t barred = mcu->motor[m].made.run.direction > 0 ? positive : negative;
     if (barred & motor_bit(m)) return true;
   }
