@@ -104,6 +104,8 @@ std::optional<std::uint32_t> AvrMemoryWatch::library_caller() const {
 }
 
 AvrMemoryMap::Unit AvrMemoryWatch::writer() const {
+  const AvrMemoryMap::Unit unit = map_->unit_at(avr_->pc);
+  if (unit != AvrMemoryMap::kNoUnit) return unit;
   return map_->unit_at(library_caller().value_or(avr_->pc));
 }
 
@@ -132,14 +134,14 @@ void AvrMemoryWatch::check_borrowed(AvrMemoryMap::Unit unit, std::uint16_t addre
 void AvrMemoryWatch::write(std::uint16_t address, std::uint8_t) {
   if (violation_) return;
   if (address < kRamBegin) return;
-  const AvrMemoryMap::Unit unit = writer();
-  if (unit == main_) in_main_ = true;
+  if (!in_main_) in_main_ = writer() == main_;
   if (!in_main_) return;
   if (address > avr_->ramend) return violate("writes to " + hex(address) + ", beyond RAM");
   const AvrMemoryMap::Object* const object = map_->object_at(address);
   if (object == nullptr && address > map_->variables_end() && address <= map_->stack_top()) {
     return check_stack(address);
   }
+  const AvrMemoryMap::Unit unit = writer();
   if (!map_->may_write(unit, address)) {
     return violate("of " + map_->name_of(unit) + " writes to " + hex(address) + ", in " +
                    (object != nullptr ? object->name : "no object"));
