@@ -38,7 +38,7 @@ MotionFrames sent_for(const Way& way) {
     sent.add(bytes);
     return true;
   };
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {way.steps})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {way.steps})).result, "reached");
   return sent;
 }
 
