@@ -11,14 +11,14 @@
 namespace bushtab {
 namespace {
 
-namespace laws = bushd::tables::laws;
+namespace profiles = bushd::tables::profiles;
 using nlohmann::ordered_json;
 
-bool is_error(const laws::Finding& finding) {
-  return finding.severity == laws::Severity::kError;
+bool is_error(const profiles::Finding& finding) {
+  return finding.severity == profiles::Severity::kError;
 }
 
-ordered_json to_json(const laws::Finding& finding) {
+ordered_json to_json(const profiles::Finding& finding) {
   ordered_json json = {{"severity", is_error(finding) ? "error" : "warning"},
                        {"rule", finding.rule},
                        {"side", finding.side},
@@ -47,9 +47,9 @@ int check(const Places& places, const Check& wanted) {
       all.push_back(entry);
       continue;
     }
-    const auto found = laws::findings(**opened, *limits);
+    const auto found = profiles::findings(**opened, *limits);
     bool good = true;
-    for (const laws::Finding& finding : found) {
+    for (const profiles::Finding& finding : found) {
       const bool refused = is_error(finding) || wanted.strict;
       good = good && !refused;
       entry["findings"].push_back(to_json(finding));

@@ -16,7 +16,7 @@ namespace {
 namespace tables = bushd::tables;
 using tables::SideKey;
 using tables::TableContent;
-using tables::laws::Quantity;
+using tables::profiles::Quantity;
 
 constexpr const char* kTable = "A table's file or name";
 

@@ -13,7 +13,7 @@
 namespace bushtab {
 namespace {
 
-using bushd::tables::laws::Severity;
+using bushd::tables::profiles::Severity;
 
 constexpr int kRoomyRows = 12;  // from here on messages have a line of their own
 constexpr int kTallRows = 20;   // from here on there is room for several findings

@@ -5,8 +5,8 @@
 namespace bushtab {
 namespace {
 
-using bushd::tables::laws::Finding;
-using bushd::tables::laws::Severity;
+using bushd::tables::profiles::Finding;
+using bushd::tables::profiles::Severity;
 
 std::string place(const Finding& finding) {
   if (finding.side.empty()) return "";

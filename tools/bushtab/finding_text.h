@@ -2,11 +2,11 @@
 
 #include <string>
 
-#include "tables/laws/findings.h"
+#include "tables/profiles/findings.h"
 
 namespace bushtab {
 
 // "error: torque: accel[97]: takes 1.11 Nm at .."
-std::string text_of(const bushd::tables::laws::Finding& finding);
+std::string text_of(const bushd::tables::profiles::Finding& finding);
 
 }  // namespace bushtab

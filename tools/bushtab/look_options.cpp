@@ -11,7 +11,7 @@
 namespace bushtab {
 namespace {
 
-using bushd::tables::laws::Quantity;
+using bushd::tables::profiles::Quantity;
 
 constexpr const char* kTable = "A table's file or name";
 

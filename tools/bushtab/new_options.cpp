@@ -10,11 +10,11 @@
 namespace bushtab {
 namespace {
 
-namespace laws = bushd::tables::laws;
-using laws::Quantity;
+namespace profiles = bushd::tables::profiles;
+using profiles::Quantity;
 
 double quantity_or_throw(const std::string& option, Quantity quantity, const std::string& text) {
-  const auto value = laws::parse_quantity(quantity, text);
+  const auto value = profiles::parse_quantity(quantity, text);
   if (!value) throw CLI::ValidationError(option, value.error().message);
   return *value;
 }
@@ -31,16 +31,17 @@ std::pair<std::string, std::string> halves(const std::string& option, const std:
 
 // `prefix` is "" or "decel-". `side` gives the side to be set.
 void add_side_options(CLI::App* command, const std::string& prefix,
-                      const std::function<laws::SideSpec&()>& side) {
+                      const std::function<profiles::SideSpec&()>& side) {
   const std::string of = prefix.empty() ? "" : " of the decelerating side";
   const std::string dashes = "--" + prefix;
   const std::vector<std::string> names{"constant",    "recurrence", "v64",    "scurve",
                                        "exponential", "pto",        "torque", "piecewise"};
-  auto* law = command->add_option_function<std::string>(
-      dashes + "law", [side](const std::string& name) { side().law = *laws::law_of(name); },
-      "Law of acceleration" + of);
-  law->check(CLI::IsMember(names));
-  if (prefix.empty()) law->required();
+  auto* profile = command->add_option_function<std::string>(
+      dashes + "law",
+      [side](const std::string& name) { side().profile = *profiles::profile_of(name); },
+      "Acceleration profile" + of);
+  profile->check(CLI::IsMember(names));
+  if (prefix.empty()) profile->required();
   add_quantity(
       command, dashes + "acceleration", Quantity::kAcceleration,
       [side](double value) { side().acceleration = value; }, "The greatest acceleration" + of);
@@ -71,17 +72,17 @@ void add_side_options(CLI::App* command, const std::string& prefix,
                                      quantity_or_throw(segment, Quantity::kSpeed, speed)});
             }
           },
-          "piecewise: over STEPS steps go to SPEED, once for each stretch" + of)
+          "piecewise: over STEPS steps go to SPEED, once for each segment" + of)
       ->allow_extra_args(false)
       ->type_name("STEPS:SPEED");
 }
 
-laws::Skip& skip_of(laws::Spec& spec) {
+profiles::Skip& skip_of(profiles::Spec& spec) {
   if (!spec.skip) spec.skip.emplace();
   return *spec.skip;
 }
 
-void add_speed_options(CLI::App* command, laws::Spec& spec) {
+void add_speed_options(CLI::App* command, profiles::Spec& spec) {
   add_quantity(
       command, "--start", Quantity::kSpeed, [&](double hz) { spec.start_hz = hz; },
       "Speed of the first step: what the motor can do from rest")
@@ -101,7 +102,7 @@ void add_speed_options(CLI::App* command, laws::Spec& spec) {
             skip_of(spec).high_hz = quantity_or_throw("--skip", Quantity::kSpeed, high);
           },
           "A band of speeds to be passed quickly and not to cruise in (resonance) [" +
-              laws::units_text(Quantity::kSpeed) + "]")
+              profiles::units_text(Quantity::kSpeed) + "]")
       ->type_name("LO:HI");
   command
       ->add_option_function<std::string>(
@@ -115,12 +116,12 @@ void add_speed_options(CLI::App* command, laws::Spec& spec) {
                   quantity_or_throw("--skip-acceleration", Quantity::kAcceleration, text);
             }
           },
-          "Acceleration in that band, or xFACTOR times that of the law; default: all that the "
+          "Acceleration in that band, or xFACTOR times that of the profile; default: all that the "
           "motor of --torque has")
       ->type_name("ACCELERATION|xFACTOR");
 }
 
-void add_code_options(CLI::App* command, laws::Spec& spec) {
+void add_code_options(CLI::App* command, profiles::Spec& spec) {
   add_quantity(
       command, "--time-unit", Quantity::kTimeUnit,
       [&](double ns) {
@@ -152,7 +153,7 @@ CLI::Option* add_quantity(CLI::App* command, const std::string& name, Quantity q
           [name, quantity, set](const std::string& text) {
             set(quantity_or_throw(name, quantity, text));
           },
-          help + " [" + laws::units_text(quantity) + "]")
+          help + " [" + profiles::units_text(quantity) + "]")
       ->type_name(kTypes.at(static_cast<std::size_t>(quantity)));
 }
 
@@ -162,7 +163,7 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
                    "CSV of pull-out torque against speed: header speed_hz|speed_rpm,"
                    "torque_nm|torque_ncm|torque_mnm")
       ->type_name("FILE");
-  laws::Motor& motor = options.motor;
+  profiles::Motor& motor = options.motor;
   add_quantity(
       command, "--inertia", Quantity::kInertia, [&](double value) { motor.inertia_kgm2 = value; },
       "Of rotor and load together");
@@ -192,15 +193,15 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
 
 void add_new_options(CLI::App& app, const Places& places, const Run& run) {
   const auto options = std::make_shared<New>();
-  CLI::App* command = app.add_subcommand("new", "Makes a table from a law of acceleration");
+  CLI::App* command = app.add_subcommand("new", "Makes a table from an acceleration profile");
   command->add_option("TABLE", options->table, "The new table's name, or a file NAME.toml")
       ->required();
-  laws::Spec& spec = options->spec;
-  add_side_options(command, "", [&spec]() -> laws::SideSpec& { return spec.accel; });
+  profiles::Spec& spec = options->spec;
+  add_side_options(command, "", [&spec]() -> profiles::SideSpec& { return spec.accel; });
   add_speed_options(command, spec);
   // What is not said of the decelerating side is as on the other; how steep it is counts as one.
-  const auto decel = std::make_shared<std::optional<laws::SideSpec>>();
-  add_side_options(command, "decel-", [decel]() -> laws::SideSpec& {
+  const auto decel = std::make_shared<std::optional<profiles::SideSpec>>();
+  add_side_options(command, "decel-", [decel]() -> profiles::SideSpec& {
     if (!*decel) decel->emplace();
     return **decel;
   });
@@ -215,11 +216,11 @@ void add_new_options(CLI::App& app, const Places& places, const Run& run) {
   command->add_flag("--json", options->json, "What was made, as show --json")->excludes(print);
   run(command, [&places, options, decel, command] {
     if (*decel) {
-      laws::SideSpec side = **decel;
-      const laws::SideSpec& accel = options->spec.accel;
-      if (command->count("--decel-law") == 0) side.law = accel.law;
+      profiles::SideSpec side = **decel;
+      const profiles::SideSpec& accel = options->spec.accel;
+      if (command->count("--decel-law") == 0) side.profile = accel.profile;
       if (command->count("--decel-fall") == 0) side.fall = accel.fall;
-      if (!side.acceleration && !side.time_s && !side.codes && side.law == accel.law) {
+      if (!side.acceleration && !side.time_s && !side.codes && side.profile == accel.profile) {
         side.acceleration = accel.acceleration;
         side.time_s = accel.time_s;
         side.codes = accel.codes;

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "tables/laws/motor.h"
+#include "tables/profiles/motor.h"
 #include "tables/table.h"
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 
 struct Limits {
   // Between neighbouring delays; 0: any. None: 2, or any if the motor is known, which says more.
@@ -42,4 +42,4 @@ struct Finding {
 // At most one finding for each rule and side: its worst place. O(codes).
 std::vector<Finding> findings(const Table& table, const Limits& limits);
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

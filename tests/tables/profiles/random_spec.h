@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "tables/laws/make.h"
+#include "tables/profiles/make.h"
 
 namespace bushd::test {
 
@@ -21,21 +21,22 @@ inline double random_scale(double low, double high) {
   return std::exp(random_between(std::log(low), std::log(high)));
 }
 
-// A start of 1..2000 steps/s and up to 100 times that, with a law that reaches it in 2..5000 steps.
-inline tables::laws::Spec random_spec(tables::laws::Law law) {
-  tables::laws::Spec spec{.name = "random"};
+// A start of 1..2000 steps/s and up to 100 times that, with a profile that reaches it in 2..5000
+// steps.
+inline tables::profiles::Spec random_spec(tables::profiles::Profile profile) {
+  tables::profiles::Spec spec{.name = "random"};
   spec.start_hz = random_scale(1, 2000);
   spec.max_hz = spec.start_hz * random_scale(1.01, 100);
   const double steps = random_scale(2, 5000);
-  spec.accel.law = law;
+  spec.accel.profile = profile;
   spec.accel.acceleration =
       (spec.max_hz * spec.max_hz - spec.start_hz * spec.start_hz) / (2 * steps);
   return spec;
 }
 
 // Its ramp in some stretches, the first may be at the start speed; back the same way.
-inline tables::laws::Spec random_piecewise_spec() {
-  tables::laws::Spec spec = random_spec(tables::laws::Law::kPiecewise);
+inline tables::profiles::Spec random_piecewise_spec() {
+  tables::profiles::Spec spec = random_spec(tables::profiles::Profile::kPiecewise);
   spec.accel.acceleration.reset();
   auto& legs = spec.accel.legs;
   double speed_hz = spec.start_hz;
@@ -54,8 +55,8 @@ inline tables::laws::Spec random_piecewise_spec() {
   return spec;
 }
 
-inline tables::laws::Spec random_pto_spec() {
-  tables::laws::Spec spec = random_spec(tables::laws::Law::kPto);
+inline tables::profiles::Spec random_pto_spec() {
+  tables::profiles::Spec spec = random_spec(tables::profiles::Profile::kPto);
   spec.accel.time_s = (spec.max_hz - spec.start_hz) / *spec.accel.acceleration;
   spec.accel.acceleration.reset();
   spec.decel = spec.accel;
@@ -63,12 +64,12 @@ inline tables::laws::Spec random_pto_spec() {
 }
 
 // Of the accelerating side.
-inline double greatest_acceleration(const tables::laws::Spec& spec) {
+inline double greatest_acceleration(const tables::profiles::Spec& spec) {
   if (spec.accel.acceleration) return *spec.accel.acceleration;
   if (spec.accel.time_s) return (spec.max_hz - spec.start_hz) / *spec.accel.time_s;
   double greatest = 0;
   double from_hz = spec.start_hz;
-  for (const tables::laws::Leg& leg : spec.accel.legs) {
+  for (const tables::profiles::Leg& leg : spec.accel.legs) {
     greatest = std::max(greatest, (leg.to_hz * leg.to_hz - from_hz * from_hz) / (2 * leg.steps));
     from_hz = leg.to_hz;
   }

@@ -1,4 +1,4 @@
-#include "tables/laws/discrete.h"
+#include "tables/profiles/discrete.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 namespace {
 
 constexpr double kPrecision = 1e-12;  // of the steepness that is searched for
@@ -67,14 +67,14 @@ Result<std::vector<double>> recurrence(const SideSpec& side, double start_hz, do
 
 Result<std::vector<double>> v64(const SideSpec& side, double start_hz, double max_hz,
                                 bool published) {
-  if (side.codes) return fail("law v64 takes --acceleration or --time, not --codes");
+  if (side.codes) return fail("profile v64 takes --acceleration or --time, not --codes");
   const auto minimum = static_cast<std::int64_t>(std::floor(start_hz * 64 + 1e-6));
   const auto maximum = static_cast<std::int64_t>(std::floor(max_hz * 64 + 1e-6));
   const double wanted = side.acceleration ? *side.acceleration : (max_hz - start_hz) / *side.time_s;
   const auto change = static_cast<std::int64_t>(std::min(std::floor(wanted + 1e-6), 1e7));
   if (minimum < 1 || maximum > kV64MaxSpeed || change < 1) {
     return fail(
-        fmt::format("law v64 counts speed in 1/64 step/s up to {} and acceleration in whole "
+        fmt::format("profile v64 counts speed in 1/64 step/s up to {} and acceleration in whole "
                     "steps/s^2; allowed: speeds of 1/64..{} steps/s and 1 steps/s^2 or more",
                     kV64MaxSpeed, kV64MaxSpeed / 64));
   }
@@ -86,7 +86,7 @@ Result<std::vector<double>> v64(const SideSpec& side, double start_hz, double ma
         published ? kV64Dividend / speed : (kV64Dividend + speed - 1) / speed;
     if (delay < 1)
       return fail(
-          "law v64: the maximum is less than one interval of 25 us a step; "
+          "profile v64: the maximum is less than one interval of 25 us a step; "
           "allowed: up to 40000 steps/s");
     delays.push_back(static_cast<double>(delay) * kV64IntervalS);
     if (speed == maximum) return delays;
@@ -96,4 +96,4 @@ Result<std::vector<double>> v64(const SideSpec& side, double start_hz, double ma
   }
 }
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

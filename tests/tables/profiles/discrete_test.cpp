@@ -1,18 +1,18 @@
-// The two laws that are programs, against their sources' loops written down anew.
+// The two profiles that are programs, against their sources' loops written down anew.
 #include <gtest/gtest.h>
 
-#include "tables/laws/random_spec.h"
+#include "tables/profiles/random_spec.h"
 
 namespace bushd::test {
 namespace {
 
-using tables::laws::Law;
-using tables::laws::make_content;
-using tables::laws::Spec;
+using tables::profiles::make_content;
+using tables::profiles::Profile;
+using tables::profiles::Spec;
 
 TEST(Recurrence, DivisorsAreThoseOfThePaper) {
   EXPECT_TRUE(rc::check("N_n = floor(f_ref / f_n), f_n = f_(n-1) + k T_(n-1)", [] {
-    Spec spec = random_spec(Law::kRecurrence);
+    Spec spec = random_spec(Profile::kRecurrence);
     spec.published = true;
     spec.time_unit_ns = 1000;
     spec.start_hz = random_between(20, 2000);
@@ -32,7 +32,7 @@ TEST(Recurrence, DivisorsAreThoseOfThePaper) {
 
 TEST(Recurrence, RoundsUpUnlessToldOtherwise) {
   Spec spec{.name = "r", .start_hz = 300, .max_hz = 700};
-  spec.accel = {.law = Law::kRecurrence, .acceleration = 2000};
+  spec.accel = {.profile = Profile::kRecurrence, .acceleration = 2000};
   spec.time_unit_ns = 1'000'000;
   EXPECT_EQ(make_content(spec)->accel.front(), 4);
   spec.published = true;
@@ -41,10 +41,10 @@ TEST(Recurrence, RoundsUpUnlessToldOtherwise) {
 
 TEST(Recurrence, TimeAndCodesAskedForAreNotExceeded) {
   EXPECT_TRUE(rc::check("by the steepness k", [] {
-    Spec spec = random_spec(Law::kRecurrence);
+    Spec spec = random_spec(Profile::kRecurrence);
     spec.accel.acceleration.reset();
     spec.accel.codes = *rc::gen::inRange(3U, 2000U);
-    const auto delays = side_delays_s(spec, tables::laws::Side::kAccel);
+    const auto delays = side_delays_s(spec, tables::profiles::Side::kAccel);
     RC_ASSERT(delays.has_value());
     RC_ASSERT(delays->size() <= *spec.accel.codes);
     RC_ASSERT(delays->size() + 1 >= *spec.accel.codes);
@@ -75,7 +75,7 @@ TEST(V64, DelaysAreThoseOfTheControllersLoop) {
     const long change = *rc::gen::inRange(100, 20000);
     spec.start_hz = static_cast<double>(start) / 64;
     spec.max_hz = static_cast<double>(maximum) / 64;
-    spec.accel = {.law = Law::kV64, .acceleration = static_cast<double>(change)};
+    spec.accel = {.profile = Profile::kV64, .acceleration = static_cast<double>(change)};
     spec.published = true;
     const auto content = make_content(spec);
     RC_ASSERT(content.has_value());
@@ -89,7 +89,7 @@ TEST(V64, DelaysAreThoseOfTheControllersLoop) {
 
 TEST(V64, NeverFasterThanTheMaximumUnlessAsPublished) {
   Spec spec{.name = "v", .start_hz = 50, .max_hz = 3000};
-  spec.accel = {.law = Law::kV64, .acceleration = 8000};
+  spec.accel = {.profile = Profile::kV64, .acceleration = 8000};
   EXPECT_EQ(make_content(spec)->accel.back(), 14);  // 350 us: 2857 steps/s
   spec.published = true;
   EXPECT_EQ(make_content(spec)->accel.back(), 13);  // 325 us: 3077 steps/s
@@ -97,7 +97,7 @@ TEST(V64, NeverFasterThanTheMaximumUnlessAsPublished) {
 
 TEST(V64, HasATimeUnitOfItsOwn) {
   Spec spec{.name = "v", .start_hz = 50, .max_hz = 3000, .time_unit_ns = 1000};
-  spec.accel = {.law = Law::kV64, .acceleration = 8000};
+  spec.accel = {.profile = Profile::kV64, .acceleration = 8000};
   EXPECT_NE(make_content(spec).error().message.find("25us"), std::string::npos);
 }
 

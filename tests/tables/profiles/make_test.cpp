@@ -1,5 +1,5 @@
-// Single cases of making tables: what is refused, and the laws that take other parameters.
-#include "tables/laws/make.h"
+// Single cases of making tables: what is refused, and the profiles that take other parameters.
+#include "tables/profiles/make.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,15 +12,15 @@
 namespace bushd::test {
 namespace {
 
-using tables::laws::Law;
-using tables::laws::make_content;
-using tables::laws::Spec;
+using tables::profiles::make_content;
+using tables::profiles::Profile;
+using tables::profiles::Spec;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
 Spec constant(double start_hz, double max_hz, double acceleration) {
   Spec spec{.name = "t", .start_hz = start_hz, .max_hz = max_hz};
-  spec.accel = {.law = Law::kConstant, .acceleration = acceleration};
+  spec.accel = {.profile = Profile::kConstant, .acceleration = acceleration};
   return spec;
 }
 
@@ -65,8 +65,8 @@ TEST(MakeTable, ThirtyTwoBitsAreRefusedWithTheRemedy) {
 
 TEST(MakeTable, PiecewiseTakesUpBacklashAndApproachesSlowly) {
   Spec spec{.name = "t", .start_hz = 100, .max_hz = 1000, .stop_hz = 200, .time_unit_ns = 1000};
-  spec.accel = {.law = Law::kPiecewise, .legs = {{20, 100}, {99, 1000}}};
-  spec.decel = {.law = Law::kPiecewise, .legs = {{96, 200}, {50, 200}}};
+  spec.accel = {.profile = Profile::kPiecewise, .legs = {{20, 100}, {99, 1000}}};
+  spec.decel = {.profile = Profile::kPiecewise, .legs = {{96, 200}, {50, 200}}};
   const auto content = make_content(spec);
   ASSERT_TRUE(content) << content.error().text();
   for (std::size_t i = 0; i <= 20; ++i) EXPECT_EQ(content->accel[i], 10000) << i;
@@ -80,9 +80,9 @@ TEST(MakeTable, PiecewiseTakesUpBacklashAndApproachesSlowly) {
 
 TEST(MakeTable, PtoTakesTimesOfBothSides) {
   Spec spec{.name = "t", .start_hz = 100, .max_hz = 1000};
-  spec.accel = {.law = Law::kPto, .time_s = 0.2};
+  spec.accel = {.profile = Profile::kPto, .time_s = 0.2};
   EXPECT_THAT(refusal(spec), HasSubstr("--decel-time"));
-  spec.decel = {.law = Law::kPto, .time_s = 0.1};
+  spec.decel = {.profile = Profile::kPto, .time_s = 0.1};
   const auto content = make_content(spec);
   ASSERT_TRUE(content);
   EXPECT_EQ(content->accel.size(), 112U);  // (100 + 1000) / 2 * 0.2 = 110 steps
@@ -91,15 +91,15 @@ TEST(MakeTable, PtoTakesTimesOfBothSides) {
 
 TEST(MakeTable, ScurveWithAJerkHasAStraightPart) {
   Spec spec{.name = "t", .start_hz = 100, .max_hz = 2100};
-  spec.accel = {.law = Law::kScurve, .acceleration = 10000, .jerk = 100000};
+  spec.accel = {.profile = Profile::kScurve, .acceleration = 10000, .jerk = 100000};
   // 0.1 s up to 10000, 0.1 s at it, 0.1 s down: 500 + 1000 + 500 steps/s; by symmetry 330 steps.
   EXPECT_EQ(make_content(spec)->accel.size(), 332U);
 }
 
 TEST(MakeTable, LongestSideThatAnMcuCanAddressIsMade) {
-  for (const Law law : {Law::kConstant, Law::kScurve, Law::kExponential}) {
+  for (const Profile profile : {Profile::kConstant, Profile::kScurve, Profile::kExponential}) {
     Spec spec{.name = "t", .start_hz = 100, .max_hz = 20000};
-    spec.accel = {.law = law, .codes = 65535};
+    spec.accel = {.profile = profile, .codes = 65535};
     const auto content = make_content(spec);
     ASSERT_TRUE(content) << content.error().text();
     EXPECT_EQ(content->accel.size(), 65535U);
@@ -149,7 +149,8 @@ TEST(MakeTable, EndsAreNotFasterByTheLeastShare) {
               .start_hz = 1e9 / (unit_ns * (slow + share)),
               .max_hz = 1e9 / (unit_ns * (fast + share)),
               .time_unit_ns = unit_ns};
-    spec.accel = {.law = Law::kConstant, .codes = static_cast<std::uint32_t>(random_in(3, 500))};
+    spec.accel = {.profile = Profile::kConstant,
+                  .codes = static_cast<std::uint32_t>(random_in(3, 500))};
     const auto content = make_content(spec);
     RC_ASSERT(content.has_value());
     RC_ASSERT(content->accel.front() == slow + 1);
@@ -162,7 +163,8 @@ TEST(MakeTable, EndsThatAreWholeCodesStayThese) {
     const int fast = random_in(100, 3000);
     const int slow = random_in(2 * fast, 20 * fast);
     Spec spec{.name = "t", .start_hz = 5e6 / slow, .max_hz = 5e6 / fast, .time_unit_ns = 200};
-    spec.accel = {.law = Law::kConstant, .codes = static_cast<std::uint32_t>(random_in(3, 500))};
+    spec.accel = {.profile = Profile::kConstant,
+                  .codes = static_cast<std::uint32_t>(random_in(3, 500))};
     const auto content = make_content(spec);
     RC_ASSERT(content.has_value());
     RC_ASSERT(content->accel.front() == slow);

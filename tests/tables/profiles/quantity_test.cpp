@@ -1,12 +1,12 @@
-#include "tables/laws/quantity.h"
+#include "tables/profiles/quantity.h"
 
 #include <gtest/gtest.h>
 
 namespace bushd::test {
 namespace {
 
-using tables::laws::parse_quantity;
-using tables::laws::Quantity;
+using tables::profiles::parse_quantity;
+using tables::profiles::Quantity;
 
 TEST(Quantity, UnitsAreConverted) {
   EXPECT_DOUBLE_EQ(*parse_quantity(Quantity::kSpeed, "2.5kHz"), 2500);

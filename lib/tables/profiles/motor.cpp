@@ -1,4 +1,4 @@
-#include "tables/laws/motor.h"
+#include "tables/profiles/motor.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 
 #include "tables/toml_file.h"
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 namespace {
 
 constexpr std::size_t kMaxPoints = 10000;
@@ -185,4 +185,4 @@ Result<Motion> fastest(const Motor& motor, Side side, double from_hz, double to_
   return motion;
 }
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

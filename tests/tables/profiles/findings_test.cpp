@@ -1,5 +1,5 @@
 // What the check finds, and where.
-#include "tables/laws/findings.h"
+#include "tables/profiles/findings.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,19 +9,19 @@
 #include <string>
 
 #include "tables/edit.h"
-#include "tables/laws/random_spec.h"
+#include "tables/profiles/random_spec.h"
 #include "tables/random_table.h"
 
 namespace bushd::test {
 namespace {
 
 using tables::TableContent;
-using tables::laws::Finding;
-using tables::laws::Law;
-using tables::laws::Limits;
-using tables::laws::Motor;
-using tables::laws::Severity;
-using tables::laws::Spec;
+using tables::profiles::Finding;
+using tables::profiles::Limits;
+using tables::profiles::Motor;
+using tables::profiles::Profile;
+using tables::profiles::Severity;
+using tables::profiles::Spec;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -86,9 +86,9 @@ TEST(Findings, AccelerationCountsWithoutWhatRoundingMayMake) {
   EXPECT_EQ(steep[0].index, 2U);
 }
 
-TEST(Findings, TablesOfALawKeepItsBound) {
+TEST(Findings, TablesOfAProfileKeepItsBound) {
   EXPECT_TRUE(rc::check("no false alarm", [] {
-    const Spec spec = random_spec(*rc::gen::element(Law::kConstant, Law::kScurve));
+    const Spec spec = random_spec(*rc::gen::element(Profile::kConstant, Profile::kScurve));
     const auto content = make_content(spec);
     RC_ASSERT(content.has_value());
     RC_ASSERT(
@@ -154,7 +154,7 @@ TEST(Findings, McuAndBus) {
 
 TEST(Findings, TooFastForTheMotorByThirtyPerCent) {
   Spec spec{.name = "t", .start_hz = 200, .max_hz = 3000};
-  spec.accel.law = Law::kTorque;
+  spec.accel.profile = Profile::kTorque;
   spec.motor = Motor{.torque = {{0, 0.4}, {2000, 0.3}, {6000, 0.1}},
                      .inertia_kgm2 = 2e-5,
                      .friction_nm = 0.02,

@@ -1,9 +1,9 @@
-// The two laws that are programs, not motions: they are run as their sources run them.
+// The two profiles that are programs, not motions: they are run as their sources run them.
 #pragma once
 
-#include "tables/laws/make.h"
+#include "tables/profiles/make.h"
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 
 // Ivanov 2023, eq. 7-9: f_n = f_(n-1) + k T_(n-1) with T = 1 / f and k = df0 / T0, an acceleration,
 // until the maximum is reached.
@@ -16,4 +16,4 @@ inline constexpr std::uint32_t kV64UnitNs = 25'000;
 Result<std::vector<double>> v64(const SideSpec& side, double start_hz, double max_hz,
                                 bool published);
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

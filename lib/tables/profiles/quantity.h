@@ -8,7 +8,7 @@
 
 #include "base/result.h"
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 
 enum class Quantity {
   kSpeed,         // steps/s, Hz, kHz
@@ -26,4 +26,4 @@ std::string units_text(Quantity quantity);
 // In the quantity's SI unit (steps/s, s, Nm, kg m^2) but for kTimeUnit.
 Result<double> parse_quantity(Quantity quantity, std::string_view text);
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

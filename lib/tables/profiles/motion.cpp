@@ -1,9 +1,9 @@
-#include "tables/laws/motion.h"
+#include "tables/profiles/motion.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 namespace {
 
 constexpr int kNewtonIterations = 60;
@@ -193,4 +193,4 @@ std::vector<double> delays_s(const Motion& motion, std::size_t most) {
   return delays;
 }
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

@@ -1,4 +1,4 @@
-#include "tables/laws/quantity.h"
+#include "tables/profiles/quantity.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 namespace {
 
 struct Unit {
@@ -78,4 +78,4 @@ Result<double> parse_quantity(Quantity quantity, std::string_view text) {
                           copy.substr(0, 40), units_text(quantity), none));
 }
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

@@ -1,4 +1,4 @@
-#include "tables/laws/findings.h"
+#include "tables/profiles/findings.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include "engine/run.h"
 #include "tables/edit.h"
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 namespace {
 
 constexpr double kNoise = 1e-6;
@@ -342,4 +342,4 @@ std::vector<Finding> findings(const Table& table, const Limits& limits) {
   return Inspector(table, limits).inspect();
 }
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

@@ -6,19 +6,19 @@
 #include <cmath>
 #include <numeric>
 
-#include "tables/laws/findings.h"
-#include "tables/laws/random_spec.h"
 #include "tables/move_time.h"
+#include "tables/profiles/findings.h"
+#include "tables/profiles/random_spec.h"
 
 namespace bushd::test {
 namespace {
 
-using tables::laws::Law;
-using tables::laws::make_content;
-using tables::laws::Motor;
-using tables::laws::parse_torque_csv;
-using tables::laws::Side;
-using tables::laws::Spec;
+using tables::profiles::make_content;
+using tables::profiles::Motor;
+using tables::profiles::parse_torque_csv;
+using tables::profiles::Profile;
+using tables::profiles::Side;
+using tables::profiles::Spec;
 using testing::HasSubstr;
 
 constexpr double kPi = 3.14159265358979323846;
@@ -63,7 +63,7 @@ Spec random_torque_spec() {
   Spec spec{.name = "t"};
   spec.start_hz = random_scale(20, 2000);
   spec.max_hz = spec.start_hz * random_scale(1.5, 40);
-  spec.accel.law = Law::kTorque;
+  spec.accel.profile = Profile::kTorque;
   spec.motor = random_motor(spec.start_hz, spec.max_hz);
   return spec;
 }
@@ -175,7 +175,7 @@ TEST(Torque, NeverSlowerThanTheBestConstantAcceleration) {
       }
     }
     Spec constant = spec;
-    constant.accel = {.law = Law::kConstant, .acceleration = least};
+    constant.accel = {.profile = Profile::kConstant, .acceleration = least};
     const auto fast = make_content(spec);
     RC_ASSERT(fast.has_value());
     constant.time_unit_ns = fast->time_unit_ns;
@@ -197,7 +197,7 @@ TEST(Torque, TheCheckAgrees) {
     const auto content = make_content(spec);
     RC_ASSERT(content.has_value());
     for (const auto& finding :
-         tables::laws::findings(**tables::make(*content), {.motor = spec.motor})) {
+         tables::profiles::findings(**tables::make(*content), {.motor = spec.motor})) {
       RC_LOG() << finding.message << "\n";
       RC_ASSERT(finding.rule != "torque");
     }
@@ -205,18 +205,19 @@ TEST(Torque, TheCheckAgrees) {
 }
 
 // A step begins slower and ends faster than its delay says. Where the torque falls steeply just
-// below a step's mean speed, the law has used what is there, wherever the corner of the curve lies.
+// below a step's mean speed, the profile has used what is there, wherever the corner of the curve
+// lies.
 TEST(Torque, TheCheckKnowsAllSpeedsOfAStep) {
   for (int corner_hz = 150; corner_hz < 3000; corner_hz += 10) {
     Spec spec{.name = "t", .start_hz = 100, .max_hz = 3000};
-    spec.accel.law = Law::kTorque;
+    spec.accel.profile = Profile::kTorque;
     spec.motor = Motor{.torque = {{100, 0.6}, {1.0 * corner_hz, 0.4}, {3000, 0.4}},
                        .inertia_kgm2 = 1e-4,
                        .safety = 1};
     const auto content = make_content(spec);
     ASSERT_TRUE(content);
     for (const auto& finding :
-         tables::laws::findings(**tables::make(*content), {.motor = spec.motor})) {
+         tables::profiles::findings(**tables::make(*content), {.motor = spec.motor})) {
       EXPECT_NE(finding.rule, "torque") << corner_hz << " Hz: " << finding.message;
     }
   }
@@ -224,7 +225,7 @@ TEST(Torque, TheCheckKnowsAllSpeedsOfAStep) {
 
 TEST(Torque, BrakingDoesNotCountOnFrictionUnlessTold) {
   Spec spec{.name = "t", .start_hz = 100, .max_hz = 1000};
-  spec.accel.law = Law::kTorque;
+  spec.accel.profile = Profile::kTorque;
   spec.motor = Motor{.torque = {{0, 0.3}, {2000, 0.3}}, .inertia_kgm2 = 1e-4, .safety = 1.5};
   EXPECT_FALSE(make_content(spec)->decel);
   spec.motor->friction_nm = 0.1;
@@ -238,7 +239,7 @@ TEST(Torque, BrakingDoesNotCountOnFrictionUnlessTold) {
 
 TEST(Torque, WithoutTorqueLeftTheLimitIsNamed) {
   Spec spec{.name = "t", .start_hz = 100, .max_hz = 1900};
-  spec.accel.law = Law::kTorque;
+  spec.accel.profile = Profile::kTorque;
   spec.motor = Motor{.torque = {{0, 0.4}, {2000, 0}}, .inertia_kgm2 = 1e-4, .safety = 2};
   spec.motor->friction_nm = 0.1;
   EXPECT_THAT(make_content(spec).error().message, HasSubstr("no torque left from 1000 steps/s on"));
@@ -250,7 +251,7 @@ TEST(Torque, WithoutTorqueLeftTheLimitIsNamed) {
 
 TEST(Torque, BandIsPassedWithAllTheTorqueThereIs) {
   Spec spec{.name = "t", .start_hz = 100, .max_hz = 2000};
-  spec.accel = {.law = Law::kConstant, .acceleration = 1000};
+  spec.accel = {.profile = Profile::kConstant, .acceleration = 1000};
   spec.motor = Motor{.torque = {{0, 0.3}, {3000, 0.3}}, .inertia_kgm2 = 1e-4, .safety = 1};
   spec.skip = {.low_hz = 500, .high_hz = 1000};
   const double a = 0.3 / 1e-4 * 200 / (2 * kPi);

@@ -26,9 +26,9 @@
 #include <vector>
 
 #include "base/result.h"
-#include "tables/laws/motion.h"
+#include "tables/profiles/motion.h"
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 
 struct TorquePoint {
   double speed_hz = 0;
@@ -70,4 +70,4 @@ double greatest_jump_hz(const Motor& motor, Side side, double speed_hz);
 // The fastest motion between two speeds, slow to fast; refused where the motor has no torque left.
 Result<Motion> fastest(const Motor& motor, Side side, double from_hz, double to_hz);
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

@@ -1,6 +1,6 @@
 // One side of a table as a continuous motion from its slow end to its fast end.
 //
-// Every continuous law says how the acceleration depends on the speed; a motion is a chain of
+// Every continuous profile says how the acceleration depends on the speed; a motion is a chain of
 // segments in which that dependence has a closed form:
 //
 //   linear   a(v) = a0 + b (v - v0)       v(t) = v0 + a0 (e^(b t) - 1) / b    (b = 0: constant)
@@ -14,7 +14,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 
 struct Segment {
   enum class Kind { kLinear, kJerk, kHold };
@@ -54,4 +54,4 @@ Motion between(const Motion& motion, double low_hz, double high_hz);
 // `most`. O(steps).
 std::vector<double> delays_s(const Motion& motion, std::size_t most);
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

@@ -1,7 +1,8 @@
-// From what is known of a motor to a table: laws of acceleration, pure functions.
+// From what is known of a motor to a table: acceleration profiles, pure functions.
 //
-// A table never makes a step faster than its law asks: delays are rounded up to whole time units,
-// except in the two laws whose sources round down, and only if that is asked for (`published`).
+// A table never makes a step faster than its profile asks: delays are rounded up to whole time
+// units, except in the two profiles whose sources round down, and only if that is asked for
+// (`published`).
 #pragma once
 
 #include <cstdint>
@@ -10,12 +11,12 @@
 #include <vector>
 
 #include "base/result.h"
-#include "tables/laws/motor.h"
+#include "tables/profiles/motor.h"
 #include "tables/table.h"
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 
-enum class Law {
+enum class Profile {
   kConstant,     // constant acceleration, exact
   kRecurrence,   // f_n = f_(n-1) + k / f_(n-1)          (Ivanov 2023, eq. 7-9)
   kV64,          // 64 speed updates a second, 25 us      (the AVR controller)
@@ -25,8 +26,8 @@ enum class Law {
   kTorque,       // the fastest that a motor can follow
   kPiecewise,    // constant acceleration over each of several stretches of steps
 };
-std::string_view name_of(Law law);
-std::optional<Law> law_of(std::string_view name);
+std::string_view name_of(Profile profile);
+std::optional<Profile> profile_of(std::string_view name);
 
 // Over `steps` steps the speed goes at constant acceleration to `to_hz`.
 struct Leg {
@@ -35,9 +36,9 @@ struct Leg {
 };
 
 struct SideSpec {
-  Law law = Law::kConstant;
+  Profile profile = Profile::kConstant;
   // One of these three says how steep; not for torque and piecewise.
-  std::optional<double> acceleration{};  // steps/s^2, the greatest of the law without `skip`
+  std::optional<double> acceleration{};  // steps/s^2, the greatest of the profile without `skip`
   std::optional<double> time_s{};        // from start to maximum speed
   std::optional<std::uint32_t> codes{};  // how many the side shall have
   std::optional<double> jerk{};          // steps/s^3, scurve with `acceleration` only
@@ -51,7 +52,7 @@ struct Skip {
   double low_hz = 0;
   double high_hz = 0;
   std::optional<double> acceleration{};
-  std::optional<double> factor{};  // times what the law would do there
+  std::optional<double> factor{};  // times what the profile would do there
 };
 
 struct Spec {
@@ -70,9 +71,9 @@ struct Spec {
 };
 
 // The exact delays of one side before rounding, slow to fast, in seconds. `published` tells the
-// laws that divide whole numbers to round as their sources do.
+// profiles that divide whole numbers to round as their sources do.
 Result<std::vector<double>> side_delays_s(const Spec& spec, Side side);
 
 Result<TableContent> make_content(const Spec& spec);
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

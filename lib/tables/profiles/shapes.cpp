@@ -1,4 +1,4 @@
-#include "tables/laws/shapes.h"
+#include "tables/profiles/shapes.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 namespace {
 
 constexpr int kBisections = 200;  // more than a double has digits
@@ -28,7 +28,7 @@ Result<Motion> scurve(const SideSpec& spec, double from_hz, double to_hz) {
 
 Result<Motion> piecewise(std::vector<Leg> legs, Side side, double from_hz, double to_hz) {
   const char* option = side == Side::kAccel ? "--segment" : "--decel-segment";
-  if (legs.empty()) return fail(fmt::format("law piecewise needs {} STEPS:SPEED", option));
+  if (legs.empty()) return fail(fmt::format("profile piecewise needs {} STEPS:SPEED", option));
   const double end_hz = side == Side::kAccel ? to_hz : from_hz;
   if (std::abs(legs.back().to_hz - end_hz) > 1e-9 * end_hz) {
     return fail(fmt::format("the last {} ends at {:.6g} steps/s; allowed: the {} speed, {:.6g}",
@@ -60,7 +60,7 @@ Result<Motion> piecewise(std::vector<Leg> legs, Side side, double from_hz, doubl
   return motion;
 }
 
-// A law with its greatest acceleration 1, or finished (`scalable` false).
+// A profile with its greatest acceleration 1, or finished (`scalable` false).
 struct Shape {
   Motion motion;
   bool scalable = true;
@@ -68,24 +68,24 @@ struct Shape {
 
 Result<Shape> shape(const Spec& spec, const SideSpec& side_spec, Side side, double from_hz) {
   const double to_hz = spec.max_hz;
-  switch (side_spec.law) {
-    case Law::kScurve: {
+  switch (side_spec.profile) {
+    case Profile::kScurve: {
       auto motion = scurve(side_spec, from_hz, to_hz);
       if (!motion) return fail(motion.error());
       return Shape{std::move(*motion), !side_spec.jerk};
     }
-    case Law::kExponential:
+    case Profile::kExponential:
       if (!(side_spec.fall > 1))
         return fail(
             "--fall is the acceleration at start divided by that at "
             "the top; allowed: above 1");
       return Shape{{linear(from_hz, to_hz, 1.0, 1.0 / side_spec.fall)}};
-    case Law::kPiecewise: {
+    case Profile::kPiecewise: {
       auto motion = piecewise(side_spec.legs, side, from_hz, to_hz);
       if (!motion) return fail(motion.error());
       return Shape{std::move(*motion), false};
     }
-    case Law::kTorque: {
+    case Profile::kTorque: {
       auto motion = fastest(*spec.motor, side, from_hz, to_hz);
       if (!motion) return fail(motion.error());
       return Shape{std::move(*motion), false};
@@ -95,12 +95,12 @@ Result<Shape> shape(const Spec& spec, const SideSpec& side_spec, Side side, doub
   }
 }
 
-Result<Motion> through_band(const Motion& law, const Skip& skip, const Spec& spec, Side side) {
-  Motion motion = between(law, 0.0, skip.low_hz);
-  Motion inside = between(law, skip.low_hz, skip.high_hz);
-  const double from_hz = std::max(law.front().from_hz, skip.low_hz);
-  const double to_hz = std::min(law.back().to_hz, skip.high_hz);
-  if (to_hz <= from_hz) return law;
+Result<Motion> through_band(const Motion& profile, const Skip& skip, const Spec& spec, Side side) {
+  Motion motion = between(profile, 0.0, skip.low_hz);
+  Motion inside = between(profile, skip.low_hz, skip.high_hz);
+  const double from_hz = std::max(profile.front().from_hz, skip.low_hz);
+  const double to_hz = std::min(profile.back().to_hz, skip.high_hz);
+  if (to_hz <= from_hz) return profile;
   std::erase_if(inside, [&](const Segment& s) { return s.kind == Segment::Kind::kHold; });
   if (skip.acceleration) {
     inside = {linear(from_hz, to_hz, *skip.acceleration, *skip.acceleration)};
@@ -112,7 +112,7 @@ Result<Motion> through_band(const Motion& law, const Skip& skip, const Spec& spe
     inside = std::move(*quick);
   }
   motion.insert(motion.end(), inside.begin(), inside.end());
-  const Motion rest = between(law, skip.high_hz, std::numeric_limits<double>::infinity());
+  const Motion rest = between(profile, skip.high_hz, std::numeric_limits<double>::infinity());
   motion.insert(motion.end(), rest.begin(), rest.end());
   return motion;
 }
@@ -131,13 +131,13 @@ Result<Motion> continuous(const Spec& spec, const SideSpec& side_spec, Side side
   if (spec.skip && holds_in(made->motion, *spec.skip)) {
     return fail("a segment holds a speed inside the band of --skip; allowed: outside of it");
   }
-  const auto finish = [&](const Motion& law) -> Result<Motion> {
-    return spec.skip ? through_band(law, *spec.skip, spec, side) : law;
+  const auto finish = [&](const Motion& profile) -> Result<Motion> {
+    return spec.skip ? through_band(profile, *spec.skip, spec, side) : profile;
   };
   if (!made->scalable) return finish(made->motion);
   if (side_spec.acceleration) return finish(stretched(made->motion, 1.0 / *side_spec.acceleration));
 
-  // The law stretched until its time, or its number of steps, is the one asked for. One code is
+  // The profile stretched until its time, or its number of steps, is the one asked for. One code is
   // the first step's, one is the first at maximum speed.
   const double wanted =
       side_spec.time_s ? *side_spec.time_s : static_cast<double>(*side_spec.codes) - 2.0;
@@ -172,4 +172,4 @@ Result<Motion> continuous(const Spec& spec, const SideSpec& side_spec, Side side
   return motion;
 }
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

@@ -1,4 +1,4 @@
-#include "tables/laws/make.h"
+#include "tables/profiles/make.h"
 
 #include <fmt/format.h>
 
@@ -8,11 +8,11 @@
 #include <limits>
 #include <numeric>
 
-#include "tables/laws/discrete.h"
-#include "tables/laws/shapes.h"
+#include "tables/profiles/discrete.h"
+#include "tables/profiles/shapes.h"
 #include "tables/rounding.h"
 
-namespace bushd::tables::laws {
+namespace bushd::tables::profiles {
 namespace {
 
 // Binary fractions cannot hold most delays: this much of a unit beside a whole number is noise.
@@ -28,12 +28,13 @@ bool is_positive(double value) {
   return std::isfinite(value) && value > 0;
 }
 
-bool is_discrete(Law law) {
-  return law == Law::kRecurrence || law == Law::kV64;
+bool is_discrete(Profile profile) {
+  return profile == Profile::kRecurrence || profile == Profile::kV64;
 }
 
 bool uses_v64(const Spec& spec) {
-  return spec.accel.law == Law::kV64 || (spec.decel && spec.decel->law == Law::kV64);
+  return spec.accel.profile == Profile::kV64 ||
+         (spec.decel && spec.decel->profile == Profile::kV64);
 }
 
 std::optional<Error> speeds_fault(const Spec& spec) {
@@ -66,8 +67,8 @@ std::optional<Error> skip_fault(const Spec& spec) {
                                  "be skipped; allowed: outside of it",
                                  what, hz, skip.low_hz, skip.high_hz)};
   }
-  if (is_discrete(spec.accel.law) || (spec.decel && is_discrete(spec.decel->law))) {
-    return Error{.message = "laws recurrence and v64 know no --skip; use constant"};
+  if (is_discrete(spec.accel.profile) || (spec.decel && is_discrete(spec.decel->profile))) {
+    return Error{.message = "profiles recurrence and v64 know no --skip; use constant"};
   }
   if (skip.acceleration && skip.factor) {
     return Error{.message = "--skip-acceleration is an acceleration or xFACTOR, not both"};
@@ -87,27 +88,27 @@ std::optional<Error> skip_fault(const Spec& spec) {
 std::optional<Error> side_fault(const Spec& spec, const SideSpec& side) {
   const int given =
       side.acceleration.has_value() + side.time_s.has_value() + side.codes.has_value();
-  const std::string_view law = name_of(side.law);
-  if (side.law == Law::kTorque || side.law == Law::kPiecewise) {
+  const std::string_view profile = name_of(side.profile);
+  if (side.profile == Profile::kTorque || side.profile == Profile::kPiecewise) {
     if (given > 0) {
-      return Error{.message =
-                       fmt::format("law {} takes no acceleration, time or number of codes: they "
-                                   "follow from the {}",
-                                   law, side.law == Law::kTorque ? "motor" : "segments")};
+      return Error{
+          .message = fmt::format("profile {} takes no acceleration, time or number of codes: they "
+                                 "follow from the {}",
+                                 profile, side.profile == Profile::kTorque ? "motor" : "segments")};
     }
-    if (side.law == Law::kTorque && !spec.motor) {
-      return Error{.message = "law torque needs the motor: --torque FILE and --inertia"};
+    if (side.profile == Profile::kTorque && !spec.motor) {
+      return Error{.message = "profile torque needs the motor: --torque FILE and --inertia"};
     }
     return std::nullopt;
   }
   if (given != 1) {
-    return Error{.message =
-                     fmt::format("law {} needs one of --acceleration, --time and --codes, for each "
-                                 "side at most one",
-                                 law)};
+    return Error{.message = fmt::format(
+                     "profile {} needs one of --acceleration, --time and --codes, for each "
+                     "side at most one",
+                     profile)};
   }
-  if (side.law == Law::kPto && !side.time_s) {
-    return Error{.message = "law pto takes times: --time and --decel-time"};
+  if (side.profile == Profile::kPto && !side.time_s) {
+    return Error{.message = "profile pto takes times: --time and --decel-time"};
   }
   if ((side.acceleration && !is_positive(*side.acceleration)) ||
       (side.time_s && !is_positive(*side.time_s)) || (side.jerk && !is_positive(*side.jerk))) {
@@ -116,8 +117,8 @@ std::optional<Error> side_fault(const Spec& spec, const SideSpec& side) {
   if (side.codes && (*side.codes < 3 || *side.codes > kMaxCodes)) {
     return Error{.message = fmt::format("--codes {}; allowed: 3..{}", *side.codes, kMaxCodes)};
   }
-  if (side.jerk && side.law != Law::kScurve) {
-    return Error{.message = fmt::format("law {} has no --jerk; use scurve", law)};
+  if (side.jerk && side.profile != Profile::kScurve) {
+    return Error{.message = fmt::format("profile {} has no --jerk; use scurve", profile)};
   }
   return std::nullopt;
 }
@@ -138,14 +139,16 @@ std::optional<Error> fault_of(const Spec& spec) {
   if (spec.decel) {
     if (auto fault = side_fault(spec, *spec.decel)) return fault;
   }
-  if (spec.accel.law == Law::kPto && !spec.decel) {
-    return Error{.message = "law pto takes times: --time and --decel-time"};
+  if (spec.accel.profile == Profile::kPto && !spec.decel) {
+    return Error{.message = "profile pto takes times: --time and --decel-time"};
   }
   if (uses_v64(spec) && spec.time_unit_ns.value_or(kV64UnitNs) != kV64UnitNs) {
-    return Error{.message = "law v64 counts in 25 us; allowed: --time-unit 25us, or leave it out"};
+    return Error{.message =
+                     "profile v64 counts in 25 us; allowed: --time-unit 25us, or leave it out"};
   }
-  if (spec.published && !is_discrete(spec.accel.law)) {
-    return Error{.message = "--published is for laws recurrence and v64, whose sources round down"};
+  if (spec.published && !is_discrete(spec.accel.profile)) {
+    return Error{.message =
+                     "--published is for profiles recurrence and v64, whose sources round down"};
   }
   return skip_fault(spec);
 }
@@ -232,14 +235,14 @@ Result<std::vector<std::uint16_t>> rounded(const Spec& spec, const Delays& delay
 
 }  // namespace
 
-std::string_view name_of(Law law) {
-  return kNames.at(static_cast<std::size_t>(law));
+std::string_view name_of(Profile profile) {
+  return kNames.at(static_cast<std::size_t>(profile));
 }
 
-std::optional<Law> law_of(std::string_view name) {
+std::optional<Profile> profile_of(std::string_view name) {
   const auto* found = std::find(kNames.begin(), kNames.end(), name);
   if (found == kNames.end()) return std::nullopt;
-  return static_cast<Law>(found - kNames.begin());
+  return static_cast<Profile>(found - kNames.begin());
 }
 
 Result<std::vector<double>> side_delays_s(const Spec& spec, Side side) {
@@ -247,9 +250,11 @@ Result<std::vector<double>> side_delays_s(const Spec& spec, Side side) {
   const SideSpec& side_spec = spec_of(spec, side);
   const double from_hz =
       side == Side::kDecel ? spec.stop_hz.value_or(spec.start_hz) : spec.start_hz;
-  if (from_hz == spec.max_hz && side_spec.law != Law::kPiecewise) return Delays{1.0 / from_hz};
-  if (side_spec.law == Law::kRecurrence) return recurrence(side_spec, from_hz, spec.max_hz);
-  if (side_spec.law == Law::kV64) return v64(side_spec, from_hz, spec.max_hz, spec.published);
+  if (from_hz == spec.max_hz && side_spec.profile != Profile::kPiecewise)
+    return Delays{1.0 / from_hz};
+  if (side_spec.profile == Profile::kRecurrence) return recurrence(side_spec, from_hz, spec.max_hz);
+  if (side_spec.profile == Profile::kV64)
+    return v64(side_spec, from_hz, spec.max_hz, spec.published);
   const auto motion = continuous(spec, side_spec, side, from_hz);
   if (!motion) return fail(motion.error());
   auto delays = delays_s(*motion, kMaxCodes);
@@ -291,4 +296,4 @@ Result<TableContent> make_content(const Spec& spec) {
   return content;
 }
 
-}  // namespace bushd::tables::laws
+}  // namespace bushd::tables::profiles

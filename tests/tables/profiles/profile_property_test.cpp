@@ -1,18 +1,18 @@
-// The continuous laws against their textbook formulas, for random parameters.
+// The continuous profiles against their textbook formulas, for random parameters.
 #include <gtest/gtest.h>
 
 #include <functional>
 #include <numeric>
 
-#include "tables/laws/random_spec.h"
+#include "tables/profiles/random_spec.h"
 
 namespace bushd::test {
 namespace {
 
 using tables::TableContent;
-using tables::laws::Law;
-using tables::laws::make_content;
-using tables::laws::Spec;
+using tables::profiles::make_content;
+using tables::profiles::Profile;
+using tables::profiles::Spec;
 
 constexpr double kNoise = 1e-6;  // of a time unit, or relative
 
@@ -25,8 +25,8 @@ TableContent made(const Spec& spec) {
 }
 
 // Codes of 16 bits cannot hold every ratio of speeds with the units that follow from the start.
-Law random_law() {
-  return *rc::gen::element(Law::kConstant, Law::kScurve, Law::kExponential);
+Profile random_profile() {
+  return *rc::gen::element(Profile::kConstant, Profile::kScurve, Profile::kExponential);
 }
 
 Spec random_motion() {
@@ -36,11 +36,11 @@ Spec random_motion() {
     case 1:
       return random_pto_spec();
     default:
-      return random_spec(random_law());
+      return random_spec(random_profile());
   }
 }
 
-TEST(Laws, NeverFasterThanTheMaximum) {
+TEST(Profiles, NeverFasterThanTheMaximum) {
   EXPECT_TRUE(rc::check("every delay at least that of the maximum speed", [] {
     const Spec spec = random_motion();
     const TableContent content = made(spec);
@@ -50,7 +50,7 @@ TEST(Laws, NeverFasterThanTheMaximum) {
   }));
 }
 
-TEST(Laws, BeginAtTheStartSpeedAndReachTheMaximum) {
+TEST(Profiles, BeginAtTheStartSpeedAndReachTheMaximum) {
   EXPECT_TRUE(rc::check("first and last code", [] {
     const Spec spec = random_motion();
     const TableContent content = made(spec);
@@ -60,7 +60,7 @@ TEST(Laws, BeginAtTheStartSpeedAndReachTheMaximum) {
   }));
 }
 
-TEST(Laws, AccelerationStaysWithinItsBound) {
+TEST(Profiles, AccelerationStaysWithinItsBound) {
   EXPECT_TRUE(rc::check("between any two neighbouring codes", [] {
     const Spec spec = random_motion();
     const TableContent content = made(spec);
@@ -74,15 +74,15 @@ TEST(Laws, AccelerationStaysWithinItsBound) {
   }));
 }
 
-TEST(Laws, DecelerationIsTheMirrorImage) {
+TEST(Profiles, DecelerationIsTheMirrorImage) {
   EXPECT_TRUE(rc::check("unless told otherwise", [] { RC_ASSERT(!made(random_motion()).decel); }));
 }
 
-TEST(Laws, DecelerationOfItsOwnIsThatLawReversed) {
+TEST(Profiles, DecelerationOfItsOwnIsThatProfileReversed) {
   EXPECT_TRUE(rc::check("as if it were the accelerating one", [] {
-    Spec spec = random_spec(random_law());
+    Spec spec = random_spec(random_profile());
     spec.decel = spec.accel;
-    spec.decel->law = random_law();
+    spec.decel->profile = random_profile();
     spec.decel->acceleration = *spec.accel.acceleration * random_between(0.5, 2);
     spec.time_unit_ns = 20'000;
     const auto both = make_content(spec);
@@ -132,14 +132,14 @@ Formula textbook(const Spec& spec) {
   const double v0 = spec.start_hz;
   const double v1 = spec.max_hz;
   const double a = greatest_acceleration(spec);
-  switch (spec.accel.law) {
-    case Law::kExponential: {
+  switch (spec.accel.profile) {
+    case Profile::kExponential: {
       const double rate = a * (1 - 1 / spec.accel.fall) / (v1 - v0);
       const double end_s = std::log(spec.accel.fall) / rate;
       return {[=](double t) { return t >= end_s ? v1 : v0 + a / rate * (1 - std::exp(-rate * t)); },
               end_s};
     }
-    case Law::kScurve: {
+    case Profile::kScurve: {
       const double end_s = 2 * (v1 - v0) / a;
       return {[=](double t) {
                 const double u = std::min(1.0, t / end_s);
@@ -147,7 +147,7 @@ Formula textbook(const Spec& spec) {
               },
               end_s};
     }
-    case Law::kPiecewise: {
+    case Profile::kPiecewise: {
       // Linear over time between the times and speeds at the legs' ends.
       std::vector<std::pair<double, double>> ends{{0, v0}};
       for (const auto& [steps, to_hz] : spec.accel.legs) {
@@ -168,7 +168,7 @@ Formula textbook(const Spec& spec) {
   }
 }
 
-TEST(Laws, TimeIsTheSumOfTheFormula) {
+TEST(Profiles, TimeIsTheSumOfTheFormula) {
   const auto property = [] {
     const Spec spec = random_motion();
     const TableContent content = made(spec);
@@ -187,18 +187,18 @@ TEST(Laws, TimeIsTheSumOfTheFormula) {
   EXPECT_TRUE(rc::check("every step at its time, late by its roundings at most", property));
 }
 
-TEST(Laws, TimeOrCodesAskedForAreMet) {
-  EXPECT_TRUE(rc::check("by scaling the law", [] {
-    Spec spec = random_spec(random_law());
+TEST(Profiles, TimeOrCodesAskedForAreMet) {
+  EXPECT_TRUE(rc::check("by scaling the profile", [] {
+    Spec spec = random_spec(random_profile());
     spec.accel.acceleration.reset();
     if (*rc::gen::arbitrary<bool>()) {
       spec.accel.codes = *rc::gen::inRange(3U, 3000U);
-      const auto delays = side_delays_s(spec, tables::laws::Side::kAccel);
+      const auto delays = side_delays_s(spec, tables::profiles::Side::kAccel);
       RC_ASSERT(delays.has_value());
       RC_ASSERT(delays->size() == *spec.accel.codes);
     } else {
       spec.accel.time_s = random_between(4, 4000) / (spec.start_hz + spec.max_hz);
-      const auto delays = side_delays_s(spec, tables::laws::Side::kAccel);
+      const auto delays = side_delays_s(spec, tables::profiles::Side::kAccel);
       RC_ASSERT(delays.has_value());
       // All but the first step, and of the last two only what lies within the time.
       const double whole = std::accumulate(delays->begin() + 1, delays->end(), 0.0);
@@ -209,16 +209,16 @@ TEST(Laws, TimeOrCodesAskedForAreMet) {
   }));
 }
 
-TEST(Laws, SkippedBandIsPassedInNoMoreStepsAndTheRestIsAsBefore) {
+TEST(Profiles, SkippedBandIsPassedInNoMoreStepsAndTheRestIsAsBefore) {
   EXPECT_TRUE(rc::check("band inside the ramp", [] {
-    Spec spec = random_spec(random_law());
+    Spec spec = random_spec(random_profile());
     RC_PRE(spec.max_hz > 1.5 * spec.start_hz);
-    const auto plain = side_delays_s(spec, tables::laws::Side::kAccel);
+    const auto plain = side_delays_s(spec, tables::profiles::Side::kAccel);
     const double low = random_between(spec.start_hz * 1.05, 0.9 * spec.max_hz);
     const double high = random_between(low * 1.01, 0.99 * spec.max_hz);
     RC_PRE(low < high && high < spec.max_hz);
     spec.skip = {.low_hz = low, .high_hz = high, .factor = random_between(1, 10)};
-    const auto quick = side_delays_s(spec, tables::laws::Side::kAccel);
+    const auto quick = side_delays_s(spec, tables::profiles::Side::kAccel);
     RC_ASSERT(plain.has_value() && quick.has_value());
     RC_ASSERT(quick->size() <= plain->size());
     for (std::size_t i = 0; i < quick->size() && 1 / (*plain)[i] < low; ++i) {
