@@ -7,13 +7,13 @@
 #include <cmath>
 
 #include "sim/shipped_motors.h"
-#include "tables/profiles/findings.h"
+#include "tables/profiles/diagnostics.h"
 #include "tables/profiles/random_spec.h"
 
 namespace bushd::test {
 namespace {
 
-using tables::profiles::findings;
+using tables::profiles::diagnostics;
 using tables::profiles::Motor;
 using tables::profiles::Profile;
 using tables::profiles::Severity;
@@ -82,14 +82,15 @@ std::vector<sim::RotorRules> rotors(const Motor& motor) {
 }
 
 bool warned(const tables::Table& table, const Motor& motor) {
-  return !findings(table, {.motor = motor}).empty();
+  return !diagnostics(table, {.motor = motor}).empty();
 }
 
 bool has_error(const tables::Table& table, const Motor& motor) {
-  const auto found = findings(table, {.motor = motor});
-  return std::any_of(found.begin(), found.end(), [](const tables::profiles::Finding& finding) {
-    return finding.rule == "torque" && finding.severity == Severity::kError;
-  });
+  const auto found = diagnostics(table, {.motor = motor});
+  return std::any_of(
+      found.begin(), found.end(), [](const tables::profiles::Diagnostic& diagnostic) {
+        return diagnostic.rule == "torque" && diagnostic.severity == Severity::kError;
+      });
 }
 
 class ShippedMotor : public testing::TestWithParam<std::string> {

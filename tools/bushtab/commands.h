@@ -11,7 +11,7 @@
 
 #include "engine/message.h"
 #include "open_table.h"
-#include "tables/profiles/findings.h"
+#include "tables/profiles/diagnostics.h"
 #include "tables/profiles/make.h"
 
 namespace bushtab {

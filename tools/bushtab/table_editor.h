@@ -14,7 +14,7 @@
 #include "curve.h"
 #include "key.h"
 #include "tables/move_time.h"
-#include "tables/profiles/findings.h"
+#include "tables/profiles/diagnostics.h"
 #include "tables/table.h"
 
 namespace bushtab {
@@ -58,7 +58,9 @@ class TableEditor {
   bool zoomed() const { return zoomed_; }
 
   const std::vector<CurveStep>& curve() const { return curve_; }
-  const std::vector<bushd::tables::profiles::Finding>& findings() const { return findings_; }
+  const std::vector<bushd::tables::profiles::Diagnostic>& diagnostics() const {
+    return diagnostics_;
+  }
   struct Time {
     std::uint32_t steps = 0;
     bushd::tables::MoveTime move{};
@@ -122,7 +124,7 @@ class TableEditor {
 
   bushd::tables::TablePtr table_;
   std::vector<CurveStep> curve_;
-  std::vector<bushd::tables::profiles::Finding> findings_;
+  std::vector<bushd::tables::profiles::Diagnostic> diagnostics_;
   std::vector<Time> times_;
 };
 

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "tables/move_time.h"
-#include "tables/profiles/findings.h"
+#include "tables/profiles/diagnostics.h"
 #include "tables/profiles/random_spec.h"
 
 namespace bushd::test {
@@ -196,10 +196,10 @@ TEST(Torque, TheCheckAgrees) {
     const Spec spec = random_torque_spec();
     const auto content = make_content(spec);
     RC_ASSERT(content.has_value());
-    for (const auto& finding :
-         tables::profiles::findings(**tables::make(*content), {.motor = spec.motor})) {
-      RC_LOG() << finding.message << "\n";
-      RC_ASSERT(finding.rule != "torque");
+    for (const auto& diagnostic :
+         tables::profiles::diagnostics(**tables::make(*content), {.motor = spec.motor})) {
+      RC_LOG() << diagnostic.message << "\n";
+      RC_ASSERT(diagnostic.rule != "torque");
     }
   }));
 }
@@ -216,9 +216,9 @@ TEST(Torque, TheCheckKnowsAllSpeedsOfAStep) {
                        .safety = 1};
     const auto content = make_content(spec);
     ASSERT_TRUE(content);
-    for (const auto& finding :
-         tables::profiles::findings(**tables::make(*content), {.motor = spec.motor})) {
-      EXPECT_NE(finding.rule, "torque") << corner_hz << " Hz: " << finding.message;
+    for (const auto& diagnostic :
+         tables::profiles::diagnostics(**tables::make(*content), {.motor = spec.motor})) {
+      EXPECT_NE(diagnostic.rule, "torque") << corner_hz << " Hz: " << diagnostic.message;
     }
   }
 }

@@ -1,4 +1,4 @@
-#include "tables/profiles/findings.h"
+#include "tables/profiles/diagnostics.h"
 
 #include <fmt/format.h>
 
@@ -35,7 +35,7 @@ struct Pair {
 
 // The place that asks for the greatest share of what the motor has.
 struct Demand {
-  Finding finding{};
+  Diagnostic diagnostic{};
   double share = 0;
 };
 
@@ -46,7 +46,7 @@ class Inspector {
     speed_ratio_ = limits.speed_ratio.value_or(limits.motor ? 0.0 : kSpeedRatio);
   }
 
-  std::vector<Finding> inspect() {
+  std::vector<Diagnostic> inspect() {
     inspect_side(table_.view().accel, Side::kAccel);
     if (!table_.symmetric()) inspect_side(table_.view().decel, Side::kDecel);
     advise_scaling();
@@ -73,10 +73,10 @@ class Inspector {
     };
     const double first_s = std::max(delay_s(side, 0), cruise_s());
     inspect_start(hz(first_s), name, in_file(0));
-    Finding ratio{.rule = "speed_ratio", .side = name, .value = speed_ratio_};
-    Finding steep{.rule = "acceleration", .side = name, .value = 1};
-    Demand torque{.finding = {.rule = "torque", .side = name}};
-    Demand jump{.finding = {.rule = "jump", .side = name}};
+    Diagnostic ratio{.rule = "speed_ratio", .side = name, .value = speed_ratio_};
+    Diagnostic steep{.rule = "acceleration", .side = name, .value = 1};
+    Demand torque{.diagnostic = {.rule = "torque", .side = name}};
+    Demand jump{.diagnostic = {.rule = "jump", .side = name}};
     if (limits_.motor) inspect_jump(0, first_s, which, in_file(0), jump);
     const auto delay_or_cruise = [&](std::size_t i) {
       return i < side.count ? std::max(cruise_s(), delay_s(side, i)) : cruise_s();
@@ -91,8 +91,8 @@ class Inspector {
       inspect_torque(pair, which, torque);
       inspect_jump(hz(pair.slower_s), pair.faster_s, which, pair.index, jump);
     }
-    for (Finding& finding : std::array{ratio, steep, torque.finding, jump.finding}) {
-      if (!finding.message.empty()) found_.push_back(std::move(finding));
+    for (Diagnostic& diagnostic : std::array{ratio, steep, torque.diagnostic, jump.diagnostic}) {
+      if (!diagnostic.message.empty()) found_.push_back(std::move(diagnostic));
     }
   }
 
@@ -105,7 +105,7 @@ class Inspector {
             start_hz, *limits_.start_hz));
   }
 
-  void inspect_ratio(const Pair& pair, Finding& worst) const {
+  void inspect_ratio(const Pair& pair, Diagnostic& worst) const {
     const double ratio = pair.slower_s / pair.faster_s;
     if (speed_ratio_ <= 0 || ratio <= worst.value * (1 + kNoise)) return;
     worst.index = pair.index;
@@ -163,17 +163,19 @@ class Inspector {
   }
 
   void advise_scaling() {
-    const auto steep = [](const Finding& finding) { return finding.rule == "acceleration"; };
+    const auto steep = [](const Diagnostic& diagnostic) {
+      return diagnostic.rule == "acceleration";
+    };
     if (std::none_of(found_.begin(), found_.end(), steep)) return;
     const auto factor = factor_that_helps();
-    for (Finding& finding : found_) {
-      if (!factor || !steep(finding)) continue;
-      finding.message += fmt::format(", or \"bushtab scale --acceleration {:.3g}\"", *factor);
+    for (Diagnostic& diagnostic : found_) {
+      if (!factor || !steep(diagnostic)) continue;
+      diagnostic.message += fmt::format(", or \"bushtab scale --acceleration {:.3g}\"", *factor);
     }
   }
 
-  // `worst.value` is the share of what is allowed until the finding is made.
-  void inspect_acceleration(const Pair& pair, Finding& worst) const {
+  // `worst.value` is the share of what is allowed until the diagnostic is made.
+  void inspect_acceleration(const Pair& pair, Diagnostic& worst) const {
     if (!limits_.acceleration) return;
     const double acceleration = least_acceleration(pair.slower_s, pair.faster_s);
     if (acceleration <= *limits_.acceleration * (1 + kNoise) ||
@@ -196,14 +198,15 @@ class Inspector {
       return false;
     }
     worst.share = share;
-    worst.finding.severity = share > 1 + kNoise ? Severity::kError : Severity::kWarning;
-    worst.finding.value = needs;
-    worst.finding.limit = has / limits_.motor->safety;
+    worst.diagnostic.severity = share > 1 + kNoise ? Severity::kError : Severity::kWarning;
+    worst.diagnostic.value = needs;
+    worst.diagnostic.limit = has / limits_.motor->safety;
     return true;
   }
 
   static const char* outcome(const Demand& worst) {
-    return worst.finding.severity == Severity::kError ? "it will lose steps" : "it may lose steps";
+    return worst.diagnostic.severity == Severity::kError ? "it will lose steps"
+                                                         : "it may lose steps";
   }
 
   void inspect_torque(const Pair& pair, Side which, Demand& worst) const {
@@ -225,11 +228,11 @@ class Inspector {
   void inspect_load(double needs_nm, double has_nm, double speed_hz,
                     std::optional<std::size_t> index, const char* remedy, Demand& worst) const {
     if (!is_worst(needs_nm, has_nm, worst)) return;
-    worst.finding.index = index;
-    worst.finding.message = fmt::format(
+    worst.diagnostic.index = index;
+    worst.diagnostic.message = fmt::format(
         "takes {:.3g} Nm at {:.6g} steps/s and the motor has {:.3g}, {:.3g} with the safety "
         "factor: {}. {}",
-        needs_nm, speed_hz, has_nm, worst.finding.limit, outcome(worst), remedy);
+        needs_nm, speed_hz, has_nm, worst.diagnostic.limit, outcome(worst), remedy);
   }
 
   // From `from_hz`, 0 at the start. Where the motor has no torque at all, that is what is wrong.
@@ -238,12 +241,12 @@ class Inspector {
     const double to_hz = hz(to_s);
     const double greatest_hz = greatest_jump_hz(*limits_.motor, which, to_hz);
     if (greatest_hz <= 0 || !is_worst(to_hz - from_hz, greatest_hz, worst)) return;
-    worst.finding.index = index;
-    worst.finding.message = fmt::format(
+    worst.diagnostic.index = index;
+    worst.diagnostic.message = fmt::format(
         "the speed jumps from {:.6g} to {:.6g} steps/s within a step, and the rotor catches up "
         "{:.3g} "
         "steps/s, {:.3g} with the safety factor: {}. {}",
-        from_hz, to_hz, greatest_hz, worst.finding.limit, outcome(worst),
+        from_hz, to_hz, greatest_hz, worst.diagnostic.limit, outcome(worst),
         from_hz > 0 ? "Use a shorter time unit, or put codes in between"
                     : "Put slower codes before it");
   }
@@ -277,10 +280,10 @@ class Inspector {
                              "slower cruise",
                              cruise_hz, end_hz));
     }
-    Demand cruise{.finding = {.rule = "torque", .side = "cruise"}};
+    Demand cruise{.diagnostic = {.rule = "torque", .side = "cruise"}};
     inspect_load(motor.friction_nm, torque_at(motor, std::min(cruise_hz, end_hz)), cruise_hz,
                  std::nullopt, "Set a slower cruise", cruise);
-    if (!cruise.finding.message.empty()) found_.push_back(std::move(cruise.finding));
+    if (!cruise.diagnostic.message.empty()) found_.push_back(std::move(cruise.diagnostic));
   }
 
   void inspect_place() {
@@ -333,12 +336,12 @@ class Inspector {
   const Limits& limits_;
   double unit_s_ = 0;
   double speed_ratio_ = 0;
-  std::vector<Finding> found_;
+  std::vector<Diagnostic> found_;
 };
 
 }  // namespace
 
-std::vector<Finding> findings(const Table& table, const Limits& limits) {
+std::vector<Diagnostic> diagnostics(const Table& table, const Limits& limits) {
   return Inspector(table, limits).inspect();
 }
 

@@ -1,5 +1,5 @@
 // What the check finds, and where.
-#include "tables/profiles/findings.h"
+#include "tables/profiles/diagnostics.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace bushd::test {
 namespace {
 
 using tables::TableContent;
-using tables::profiles::Finding;
+using tables::profiles::Diagnostic;
 using tables::profiles::Limits;
 using tables::profiles::Motor;
 using tables::profiles::Profile;
@@ -28,11 +28,11 @@ using testing::IsEmpty;
 // 100, 200, 400 steps/s
 const TableContent kTable{.name = "t", .time_unit_ns = 100'000, .accel = {100, 50, 25}};
 
-std::vector<Finding> found(const TableContent& content, const Limits& limits) {
-  return findings(**tables::make(content), limits);
+std::vector<Diagnostic> found(const TableContent& content, const Limits& limits) {
+  return diagnostics(**tables::make(content), limits);
 }
 
-TEST(Findings, GoodTableHasNone) {
+TEST(Diagnostics, GoodTableHasNone) {
   EXPECT_THAT(found(kTable, {.start_hz = 100,
                              .max_hz = 400,
                              .acceleration = 53'000,
@@ -42,7 +42,7 @@ TEST(Findings, GoodTableHasNone) {
               IsEmpty());
 }
 
-TEST(Findings, StartAndMaximumSpeed) {
+TEST(Diagnostics, StartAndMaximumSpeed) {
   const auto start = found(kTable, {.start_hz = 99});
   ASSERT_EQ(start.size(), 1U);
   EXPECT_EQ(start[0].rule, "start_speed");
@@ -55,7 +55,7 @@ TEST(Findings, StartAndMaximumSpeed) {
   EXPECT_THAT(max[0].message, HasSubstr("Set cruise = 26 or more"));
 }
 
-TEST(Findings, BothSidesAreLookedAtInTheOrderOfTheFile) {
+TEST(Diagnostics, BothSidesAreLookedAtInTheOrderOfTheFile) {
   TableContent content = kTable;
   content.decel = {{25, 30, 90}};
   const auto stop = found(content, {.start_hz = 105});
@@ -68,7 +68,7 @@ TEST(Findings, BothSidesAreLookedAtInTheOrderOfTheFile) {
   EXPECT_DOUBLE_EQ(stop[1].value, 3);
 }
 
-TEST(Findings, JumpFromASideToItsCruiseIsOneToo) {
+TEST(Diagnostics, JumpFromASideToItsCruiseIsOneToo) {
   TableContent content = kTable;
   content.cruise = 12;
   const auto jump = found(content, {});
@@ -77,7 +77,7 @@ TEST(Findings, JumpFromASideToItsCruiseIsOneToo) {
   EXPECT_EQ(jump[0].index, 2U);
 }
 
-TEST(Findings, AccelerationCountsWithoutWhatRoundingMayMake) {
+TEST(Diagnostics, AccelerationCountsWithoutWhatRoundingMayMake) {
   // From 10 ms to 5 ms: 100 steps/s within 7.5 ms; the first code may stand for 9.9 ms.
   EXPECT_THAT(found(kTable, {.acceleration = 26'500}), testing::SizeIs(1));
   const auto steep = found(kTable, {.acceleration = 12'000});
@@ -86,7 +86,7 @@ TEST(Findings, AccelerationCountsWithoutWhatRoundingMayMake) {
   EXPECT_EQ(steep[0].index, 2U);
 }
 
-TEST(Findings, TablesOfAProfileKeepItsBound) {
+TEST(Diagnostics, TablesOfAProfileKeepItsBound) {
   EXPECT_TRUE(rc::check("no false alarm", [] {
     const Spec spec = random_spec(*rc::gen::element(Profile::kConstant, Profile::kScurve));
     const auto content = make_content(spec);
@@ -96,7 +96,7 @@ TEST(Findings, TablesOfAProfileKeepItsBound) {
   }));
 }
 
-TEST(Findings, AdvisedScalingIsEnough) {
+TEST(Diagnostics, AdvisedScalingIsEnough) {
   EXPECT_TRUE(rc::check("of any table", [] {
     const TableContent content = random_case(1000).content;
     Limits limits{.speed_ratio = 0, .resolution = 1, .acceleration = 1};
@@ -107,16 +107,16 @@ TEST(Findings, AdvisedScalingIsEnough) {
     limits.acceleration = std::max(least, steep[0].value * random_in(5, 99) / 100.0);
     // No advice is right only where scaling makes more codes than a side may have. The factor is
     // looked for from limit / greatest down; a tenth of that is far enough for any table.
-    const double greatest = std::ranges::max(steep, std::less{}, [](const Finding& finding) {
-                              return finding.value;
+    const double greatest = std::ranges::max(steep, std::less{}, [](const Diagnostic& diagnostic) {
+                              return diagnostic.value;
                             }).value;
     const auto far = scale_acceleration(content, *limits.acceleration / greatest / 10);
-    for (const Finding& finding : found(content, limits)) {
+    for (const Diagnostic& diagnostic : found(content, limits)) {
       const std::string advice = "scale --acceleration ";
-      const std::size_t at = finding.message.find(advice);
+      const std::size_t at = diagnostic.message.find(advice);
       if (at == std::string::npos && !far) continue;
       RC_ASSERT(at != std::string::npos);
-      const double factor = std::stod(finding.message.substr(at + advice.size()));
+      const double factor = std::stod(diagnostic.message.substr(at + advice.size()));
       const auto scaled = scale_acceleration(content, factor);
       RC_ASSERT(scaled.has_value());
       RC_ASSERT(found(*scaled, limits).empty());
@@ -124,7 +124,7 @@ TEST(Findings, AdvisedScalingIsEnough) {
   }));
 }
 
-TEST(Findings, NoScalingIsAdvisedThatWouldMakeTooManyCodes) {
+TEST(Diagnostics, NoScalingIsAdvisedThatWouldMakeTooManyCodes) {
   // From 1000 to 3000 steps/s within 2/3 ms: for 1 step/s^2 four million steps would be needed.
   const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {1000}, .cruise = 333};
   const auto steep = found(content, {.speed_ratio = 0, .resolution = 1, .acceleration = 1});
@@ -133,7 +133,7 @@ TEST(Findings, NoScalingIsAdvisedThatWouldMakeTooManyCodes) {
   EXPECT_THAT(steep[0].message, testing::Not(testing::HasSubstr("scale")));
 }
 
-TEST(Findings, CodesThatAreNotThoseOfBushd) {
+TEST(Diagnostics, CodesThatAreNotThoseOfBushd) {
   TableContent content{.name = "t", .time_unit_ns = 40'000, .accel = {251, 100, 9}};
   const auto wide = found(content, {.speed_ratio = 0, .code_bits = 8});
   ASSERT_EQ(wide.size(), 3U);
@@ -142,7 +142,7 @@ TEST(Findings, CodesThatAreNotThoseOfBushd) {
   EXPECT_EQ(wide[2].side, "cruise");
 }
 
-TEST(Findings, McuAndBus) {
+TEST(Diagnostics, McuAndBus) {
   EXPECT_EQ(found(kTable, {.mcu_codes = 2}).at(0).rule, "mcu_memory");
   TableContent fast{.name = "t", .time_unit_ns = 100, .accel = {1000, 500}};
   EXPECT_EQ(found(fast, {.tick_ns = 10'000'000}).at(0).rule, "tick");
@@ -152,7 +152,7 @@ TEST(Findings, McuAndBus) {
   EXPECT_EQ(slots[0].severity, Severity::kWarning);
 }
 
-TEST(Findings, TooFastForTheMotorByThirtyPerCent) {
+TEST(Diagnostics, TooFastForTheMotorByThirtyPerCent) {
   Spec spec{.name = "t", .start_hz = 200, .max_hz = 3000};
   spec.accel.profile = Profile::kTorque;
   spec.motor = Motor{.torque = {{0, 0.4}, {2000, 0.3}, {6000, 0.1}},
@@ -169,7 +169,7 @@ TEST(Findings, TooFastForTheMotorByThirtyPerCent) {
   EXPECT_THAT(fast[0].message, HasSubstr("it will lose steps"));
 }
 
-TEST(Findings, TorqueIsToldInNewtonMetres) {
+TEST(Diagnostics, TorqueIsToldInNewtonMetres) {
   // 200 and 400 steps/s, 3.75 ms apart: 53333 steps/s^2 or 1675.5 rad/s^2, if the first code stands
   // for a delay of 1 ns less at least.
   const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {5000, 2500}};
@@ -187,7 +187,7 @@ TEST(Findings, TorqueIsToldInNewtonMetres) {
 // 4 T / (p J) is the square of the greatest jump without friction, in rad/s: 1006.6 steps/s.
 const Motor kLight{.torque = {{0, 0.4}, {9000, 0.4}}, .inertia_kgm2 = 3.2e-5, .safety = 1.5};
 
-TEST(Findings, StartThatTheRotorCannotFollow) {
+TEST(Diagnostics, StartThatTheRotorCannotFollow) {
   const auto at_start = [](std::uint16_t code) {
     return found({.name = "t", .time_unit_ns = 1000, .accel = {code}}, {.motor = kLight});
   };
@@ -205,7 +205,7 @@ TEST(Findings, StartThatTheRotorCannotFollow) {
   EXPECT_THAT(hopeless[0].message, HasSubstr("Put slower codes before it"));
 }
 
-TEST(Findings, MicrostepsStartAsTheirFullSteps) {
+TEST(Diagnostics, MicrostepsStartAsTheirFullSteps) {
   Motor motor = kLight;
   motor.steps_per_turn = 3200;
   motor.torque = {{0, 0.4}, {90000, 0.4}};
@@ -214,7 +214,7 @@ TEST(Findings, MicrostepsStartAsTheirFullSteps) {
   EXPECT_NEAR(risky[0].limit, 16 * 1006.6 / 1.5, 2);
 }
 
-TEST(Findings, JumpOfACoarseCodeThatTheRotorCannotFollow) {
+TEST(Diagnostics, JumpOfACoarseCodeThatTheRotorCannotFollow) {
   // Rounding up may have made the code of 11, so it is no acceleration for sure; but 2273 to 2500
   // steps/s come within a step all the same.
   const TableContent content{.name = "t",
@@ -229,7 +229,7 @@ TEST(Findings, JumpOfACoarseCodeThatTheRotorCannotFollow) {
   EXPECT_THAT(jump[0].message, HasSubstr("shorter time unit"));
 }
 
-TEST(Findings, CruiseThatFrictionDoesNotLetThrough) {
+TEST(Diagnostics, CruiseThatFrictionDoesNotLetThrough) {
   const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {5000}};
   Motor motor{.torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 1e-6, .friction_nm = 0.045};
   EXPECT_THAT(found(content, {.motor = motor}), IsEmpty());

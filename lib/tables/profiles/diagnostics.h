@@ -29,7 +29,7 @@ struct Limits {
 
 enum class Severity { kWarning, kError };
 
-struct Finding {
+struct Diagnostic {
   Severity severity = Severity::kWarning;
   std::string rule{};                  // speed_ratio, resolution, start_speed, max_speed, ..
   std::string side{};                  // accel, decel, cruise or empty: the whole table
@@ -39,7 +39,7 @@ struct Finding {
   std::string message{};  // value, rule and remedy in a sentence
 };
 
-// At most one finding for each rule and side: its worst place. O(codes).
-std::vector<Finding> findings(const Table& table, const Limits& limits);
+// At most one diagnostic for each rule and side: its worst place. O(codes).
+std::vector<Diagnostic> diagnostics(const Table& table, const Limits& limits);
 
 }  // namespace bushd::tables::profiles
