@@ -1,5 +1,5 @@
 // Tables asked for and set by other programs: the same files, checks and history as bushtab's.
-#include "daemon/table_desk.h"
+#include "daemon/table_service.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,9 +22,9 @@ using testing::IsEmpty;
 
 constexpr const char* kText = "# mine\nname = \"own\"\ntime_unit_ns = 1000\naccel = [9, 7, 5]\n";
 
-class TableDesk : public testing::Test {
+class TableService : public testing::Test {
  protected:
-  TableDesk() {
+  TableService() {
     std::filesystem::create_directories(store_.path_of("own").parent_path());
     EXPECT_TRUE(store_.create("own", kText, "new"));
   }
@@ -63,7 +63,7 @@ class TableDesk : public testing::Test {
   daemon::TableLibrary library_{config_, {}};
 };
 
-TEST_F(TableDesk, GetsWhatTheFileSaysAndEarlierRevisions) {
+TEST_F(TableService, GetsWhatTheFileSaysAndEarlierRevisions) {
   table_t table = get("own");
   EXPECT_EQ(table.name, "own");
   EXPECT_EQ(table.revision, 1);
@@ -81,7 +81,7 @@ TEST_F(TableDesk, GetsWhatTheFileSaysAndEarlierRevisions) {
   EXPECT_THAT(refused(api::GetTable{"../own"}), HasSubstr("not a table's name"));
 }
 
-TEST_F(TableDesk, SetIsARevisionThatKeepsComments) {
+TEST_F(TableService, SetIsARevisionThatKeepsComments) {
   table_t table = get("own");
   table.decel = {6, 9};
   table.decel_count = 2;
@@ -95,7 +95,7 @@ TEST_F(TableDesk, SetIsARevisionThatKeepsComments) {
   EXPECT_EQ(store_.log("own")->front().note, "set by test");
 }
 
-TEST_F(TableDesk, RepeatedSetIsCarriedOutOnce) {
+TEST_F(TableService, RepeatedSetIsCarriedOutOnce) {
   table_t table = get("own");
   table.accel[0] = 8;
   EXPECT_TRUE(done(set("own", table)));
@@ -103,7 +103,7 @@ TEST_F(TableDesk, RepeatedSetIsCarriedOutOnce) {
   EXPECT_EQ(store_.log("own")->size(), 2u);
 }
 
-TEST_F(TableDesk, TableThatSomebodyElseChangedMeanwhileIsLeftAlone) {
+TEST_F(TableService, TableThatSomebodyElseChangedMeanwhileIsLeftAlone) {
   table_t mine = get("own");
   table_t theirs = mine;
   theirs.accel[0] = 8;
@@ -115,7 +115,7 @@ TEST_F(TableDesk, TableThatSomebodyElseChangedMeanwhileIsLeftAlone) {
   EXPECT_THAT(get("own").accel, ElementsAre(8, 7, 5));
 }
 
-TEST_F(TableDesk, NewTablesAreMadeInTheFolderOfTables) {
+TEST_F(TableService, NewTablesAreMadeInTheFolderOfTables) {
   table_t table = get("own");
   table.name = "other";
   table.hash.clear();
@@ -127,7 +127,7 @@ TEST_F(TableDesk, NewTablesAreMadeInTheFolderOfTables) {
   EXPECT_THAT(refused(set("../other", table)), HasSubstr("not a table's name"));
 }
 
-TEST_F(TableDesk, WhatIsNoTableIsRefusedWithItsPlace) {
+TEST_F(TableService, WhatIsNoTableIsRefusedWithItsPlace) {
   const auto with = [this](const std::function<void(table_t&)>& spoil) {
     table_t table = get("own");
     spoil(table);
@@ -142,7 +142,7 @@ TEST_F(TableDesk, WhatIsNoTableIsRefusedWithItsPlace) {
   EXPECT_THAT(get("own").accel, ElementsAre(9, 7, 5));
 }
 
-TEST_F(TableDesk, ListsAllTablesAndWhatIsWrongWithBadOnes) {
+TEST_F(TableService, ListsAllTablesAndWhatIsWrongWithBadOnes) {
   directory_.write("tables/bad.toml", "name = 3\n");
   const api::Reply reply = ask(api::ListTables{});
   std::vector<std::string> good;
@@ -158,7 +158,7 @@ TEST_F(TableDesk, ListsAllTablesAndWhatIsWrongWithBadOnes) {
   EXPECT_THAT(good, testing::Not(testing::Contains("bushd")));
 }
 
-TEST_F(TableDesk, TableTooLongForAMessageIsRefused) {
+TEST_F(TableService, TableTooLongForAMessageIsRefused) {
   std::string text = "name = \"long\"\ntime_unit_ns = 1000\naccel = [";
   for (int i = 0; i < 20000; ++i) text += std::to_string(30000 - i) + ", ";
   directory_.write("tables/long.toml", text + "9]\n");

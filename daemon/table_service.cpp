@@ -1,4 +1,4 @@
-#include "daemon/table_desk.h"
+#include "daemon/table_service.h"
 
 #include <utility>
 
