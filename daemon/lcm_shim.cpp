@@ -29,7 +29,7 @@ Result<api::Request> arm_of(const command_t& command) {
 }
 
 Result<api::Request> compare_of(const command_t& command) {
-  if (command.motors.size() != 1) return fail("a reference output follows one motor");
+  if (command.motors.size() != 1) return fail("position compare follows one motor");
   if (command.arrivals < 0 || command.arrivals > command_t::POSITIVE + command_t::NEGATIVE) {
     return fail("arrivals is neither POSITIVE, NEGATIVE nor both");
   }
@@ -177,7 +177,7 @@ mcu_health_t message_of(const api::McuHealth& health) {
   message.current = health.current;
   message.crc_errors = number(health.crc_errors);
   message.rejected_frames = number(health.rejected_frames);
-  message.run_downs = number(health.ramp_downs);
+  message.ramp_downs = number(health.ramp_downs);
   message.timeouts = number(health.timeouts);
   message.repeats = number(health.repeats);
   message.missed_ticks = number(health.missed_ticks);

@@ -89,7 +89,8 @@ Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) co
 Result<void> HomingQueue::may_home(MotorId id) const {
   const Mcu& mcu = installation_.mcu_of(id);
   if (!installation_.config()[id].home) {
-    return fail("its configuration has no 'home', so nobody knows where to look");
+    return fail("no home switch configured: add 'home = {...}' to motor \"" +
+                installation_[id].name() + "\"");
   }
   if (installation_[id].has_plan()) return fail("it moves; stop it first");
   if (auto may = interlocks_.may_move(id); !may) return may;

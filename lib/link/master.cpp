@@ -168,8 +168,8 @@ void Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t positio
   connector_.queue(mcu).set_position(motor, position_steps);
 }
 
-void Master::emergency_stop(bushd_stop_mode how) {
-  emergency_.begin(how);
+void Master::emergency_stop(bushd_stop_mode mode) {
+  emergency_.begin(mode);
   for (const McuIndex i : mcus_.indices()) streams_.drop_all(i);
   connector_.emergency_stop();
 }

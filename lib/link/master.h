@@ -109,7 +109,7 @@ class Master : private Transactions::Listener, private Connector::Listener {
 
   // Every motor of every MCU stops within two ticks of hearing it, and nothing more is sent for
   // any. Said again until all MCUs that are online have latched BUSHD_FAULT_EMERGENCY.
-  void emergency_stop(bushd_stop_mode how);
+  void emergency_stop(bushd_stop_mode mode);
 
   // Other tables or motors for an MCU, at rest: it goes through configuration again and comes back
   // with McuOnline.

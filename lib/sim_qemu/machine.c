@@ -338,10 +338,10 @@ static void on_common_dir(void* opaque, int n, int level) {
   tell(LOCKSTEP_COMMON_DIR, (uint32_t)level, 0);
 }
 
-static void on_reference(void* opaque, int n, int level) {
+static void on_compare(void* opaque, int n, int level) {
   (void)opaque;
   (void)n;
-  tell(LOCKSTEP_REFERENCE, (uint32_t)level, 0);
+  tell(LOCKSTEP_COMPARE, (uint32_t)level, 0);
 }
 
 static void on_driver_enable(void* opaque, int n, int level) {
@@ -554,7 +554,7 @@ static void on_machine_done(Notifier* notifier, void* data) {
   }
   wire(gpio(GPIO_A), 2, on_enable, 0);
   wire(gpio(GPIO_F), 0, on_common_dir, 0);
-  wire(gpio(GPIO_F), 1, on_reference, 0);
+  wire(gpio(GPIO_F), 1, on_compare, 0);
   wire(gpio(GPIO_A), 3, on_driver_enable, 0);
   wire(gpio(GPIO_E), 0, on_shift_clock, 0);
   wire(gpio(GPIO_E), 1, on_direction_data, 0);

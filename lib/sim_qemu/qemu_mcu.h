@@ -116,7 +116,7 @@ class QemuMcu final : public Mcu {
   std::uint16_t direction_levels_ = 0;
   std::uint16_t enable_level_ = 0;
   std::uint16_t common_dir_level_ = 0;
-  std::uint16_t reference_level_ = 0;
+  std::uint16_t compare_level_ = 0;
   bool driver_enable_ = false;
   std::uint64_t flash_writes_ = 0;
   std::uint64_t overruns_ = 0;

@@ -87,7 +87,7 @@ TEST_F(Homing, MeanwhileNothingElseIsDoneWithTheMotor) {
   EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {50})).result, "reached");
   EXPECT_EQ(lab.wait(home).result, "reached");
   EXPECT_THAT(lab.last_reply(lab.send(command_t::HOME, {"m02"})).reason,
-              HasSubstr("has no 'home'"));
+              HasSubstr("no home switch configured"));
   EXPECT_EQ(lab.last_reply(lab.send(command_t::HOME, {})).result, "refused");
 }
 

@@ -80,7 +80,7 @@ TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
 }
 
 TEST_P(Limits, OneThatIsCutOffAtItsSwitchMayHaveOverrun) {
-  Lab lab(lab_with(GetParam(), "", "limit = \"both\"\nlimit_action = \"cut\"\n"));
+  Lab lab(lab_with(GetParam(), "", "limit = \"both\"\nlimit_action = \"immediate\"\n"));
   lab.connect();
   const reply_t result = meet_switch(lab, -20000);
   EXPECT_EQ(result.result, "limit");
@@ -132,9 +132,10 @@ TEST_P(Limits, ASwitchThatOpensWhenItIsMetAndANewDaemon) {
 }
 
 TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndReleased) {
-  for (const bool cut : {false, true}) {
-    Lab lab(lab_with(GetParam(),
-                     cut ? "emergency_input = \"cut\"\n" : "emergency_input = \"ramp\"\n", ""));
+  for (const bool immediate : {false, true}) {
+    Lab lab(lab_with(
+        GetParam(),
+        immediate ? "emergency_input = \"immediate\"\n" : "emergency_input = \"ramp\"\n", ""));
     lab.connect();
     const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {20000, -20000});
     lab.run_for(1.5);
@@ -144,9 +145,9 @@ TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndRelease
     EXPECT_EQ(result.result, "stopped");
     EXPECT_THAT(result.reason, HasSubstr("emergency input of MCU hall:1"));
     EXPECT_EQ(result.position_steps.at(1), lab.shaft_steps("m02"));
-    EXPECT_EQ(lab.shaft_steps("m01") - at > 100, !cut);
+    EXPECT_EQ(lab.shaft_steps("m01") - at > 100, !immediate);
     lab.run_for(0.1);
-    EXPECT_EQ(lab.motor("m01").trust, cut ? "uncertain" : "known");
+    EXPECT_EQ(lab.motor("m01").trust, immediate ? "uncertain" : "known");
     EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
     EXPECT_EQ(lab.state_of("hall:1").inputs, "emergency");
     EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("release it"));
@@ -161,7 +162,7 @@ TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndRelease
     EXPECT_THAT(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).reason,
                 HasSubstr("bushctl clear"));
     EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
-    if (cut) continue;
+    if (immediate) continue;
     EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {10})).result, "reached");
   }
 }

@@ -102,14 +102,14 @@ void add_disarm(CommandLine& line) {
       });
 }
 
-void add_reference(CommandLine& line) {
+void add_compare(CommandLine& line) {
   struct Options {
     std::string motor;
     std::string position;
     Pulse pulse;
   };
   const auto options = std::make_shared<Options>();
-  line.add("reference", "Pulse when a motor arrives at a position")
+  line.add("compare", "Pulse when a motor arrives at a position")
       .option("NAME", &options->motor, "The motor; its MCU's position compare output pulses")
       .option("POSITION", &options->position, "In steps, or off")
       .number<std::int64_t>("--delay-us", &options->pulse.delay_us, 0, 1'500'000,
@@ -119,7 +119,8 @@ void add_reference(CommandLine& line) {
       .choice("--direction", &options->pulse.direction, {"both", "positive", "negative"},
               "In which the motor arrives there")
       .run([&line, options] {
-        const auto request = parse_reference(options->motor, options->position, options->pulse);
+        const auto request =
+            parse_position_compare(options->motor, options->position, options->pulse);
         if (!request) return wrong_usage(request.error());
         return send(line.connection(), *request, Until::kResult, Hope::kDone);
       });
@@ -189,7 +190,7 @@ void add_motion_commands(CommandLine& line) {
   add_move(line);
   add_arm(line);
   add_disarm(line);
-  add_reference(line);
+  add_compare(line);
   add_stop(line);
   add_estop(line);
   add_home(line);

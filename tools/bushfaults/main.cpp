@@ -74,7 +74,7 @@ int run(int argc, char** argv) {
   add_way<bushd_format>(app, "--format", ways.format,
                         {{"coarse", BUSHD_FORMAT_COARSE}, {"fine", BUSHD_FORMAT_FINE}});
   add_way<bushd_stop_mode>(app, "--emergency", ways.emergency_stop,
-                           {{"ramp", BUSHD_STOP_RAMP}, {"cut", BUSHD_STOP_IMMEDIATE}});
+                           {{"ramp", BUSHD_STOP_RAMP}, {"immediate", BUSHD_STOP_IMMEDIATE}});
   app.add_option("--crystal-ppm", options.crystal_ppm, "MCUs' clocks are off by up to this")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();

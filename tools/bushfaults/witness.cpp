@@ -17,7 +17,7 @@ using bushd::state_t;
 // A move of the random clients lasts some seconds, the longest fault ten, and then a link is given
 // up within one.
 constexpr bushd::sim::TimeNs kResultDueNs = 40'000'000'000;
-// A daemon may not have heard for as long that a switch bars the way, and a move may take as long
+// A daemon may not have heard for as long that a switch is active, and a move may take as long
 // to its end.
 constexpr bushd::sim::TimeNs kBarredNs = kResultDueNs;
 // The daemon answers a command again while 64 newer ones of the client have come; here it is known
@@ -239,7 +239,7 @@ void Witness::homed(TimeNs now_ns, const Asked& asked, const reply_t& result) {
 
 void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const nlohmann::json line = nlohmann::json::parse(json_line);
-  if (line.at("event") == "alone") {
+  if (line.at("event") == "autonomous") {
     const std::size_t index = index_of(*find(line.at("motor").get<std::string>()));
     if (line.at("set")) positions_.homed(index, line.at("position_steps"));
     return;

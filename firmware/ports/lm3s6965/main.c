@@ -186,7 +186,7 @@ int main(void) {
   prepare();
   line_init();
   trigger_init();
-  reference_init();
+  compare_init();
   emission_start();
   watchdog_start();
   for (;;) {

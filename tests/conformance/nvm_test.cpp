@@ -8,9 +8,9 @@ namespace {
 constexpr TimeNs kBootNs = 250'000'000;
 constexpr std::size_t kCodes = 3;
 
-class Kept : public McuAlone, public testing::WithParamInterface<Target> {
+class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
  protected:
-  Kept() : McuAlone(kBaud, kBootNs), real_(GetParam().make()) {
+  Nvm() : McuAlone(kBaud, kBootNs), real_(GetParam().make()) {
     bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
       return real_->make({kAddress, 1, 6}, index, driver, sink);
     });
@@ -33,11 +33,11 @@ class Kept : public McuAlone, public testing::WithParamInterface<Target> {
 
   const std::unique_ptr<McuUnderTest> real_;
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Kept);
-INSTANTIATE_TEST_SUITE_P(Of, Kept, testing::ValuesIn(targets()),
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Nvm);
+INSTANTIATE_TEST_SUITE_P(Of, Nvm, testing::ValuesIn(targets()),
                          [](auto& target) { return target.param.name; });
 
-TEST_P(Kept, TablesAndSettingsOutliveAReset) {
+TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   std::vector<std::uint16_t> ramp;
   while (ramp.size() < 900) ramp.push_back(static_cast<std::uint16_t>(2000 - ramp.size()));
@@ -66,7 +66,7 @@ TEST_P(Kept, TablesAndSettingsOutliveAReset) {
   EXPECT_EQ(steps_made(3), 50u);
 }
 
-TEST_P(Kept, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
+TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 3}), BUSHD_OK);
   pass(real_->keeps_within_ns(kCodes));
@@ -84,22 +84,22 @@ TEST_P(Kept, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
   EXPECT_EQ(steps_made(4), 0u);
 }
 
-TEST_P(Kept, WhatIsTheSameIsNotWrittenAgain) {
+TEST_P(Nvm, WhatIsTheSameIsNotWrittenAgain) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   pass(real_->keeps_within_ns(kCodes));
-  const std::uint64_t written = real_->kept_writes();
+  const std::uint64_t written = real_->nvm_writes();
   EXPECT_GT(written, 20u);
   pass(real_->keeps_within_ns(kCodes));
-  EXPECT_EQ(real_->kept_writes(), written);
+  EXPECT_EQ(real_->nvm_writes(), written);
   ASSERT_NO_FATAL_FAILURE(make_ready());
   pass(real_->keeps_within_ns(kCodes));
-  EXPECT_EQ(real_->kept_writes(), written);
+  EXPECT_EQ(real_->nvm_writes(), written);
 }
 
-TEST_P(Kept, ABitThatHasFlippedIsAFault) {
+TEST_P(Nvm, ABitThatHasFlippedIsAFault) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   pass(real_->keeps_within_ns(kCodes));
-  real_->flip_kept_bit();
+  real_->flip_nvm_bit();
   reboot();
   EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM);
   EXPECT_EQ(master_.valid_tables(kAddress), 0u);

@@ -6,9 +6,9 @@
 namespace bushd::sim {
 namespace {
 
-class AvrKept : public AvrAlone {
+class AvrNvm : public AvrAlone {
  protected:
-  AvrKept() { pass(kBootNs); }
+  AvrNvm() { pass(kBootNs); }
 
   static std::vector<std::uint16_t> ramp(std::uint16_t first, std::size_t count) {
     std::vector<std::uint16_t> codes;
@@ -17,7 +17,7 @@ class AvrKept : public AvrAlone {
   }
 };
 
-TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
+TEST_F(AvrNvm, APowerCutLeavesAllOrAFault) {
   constexpr std::uint32_t kShortTickNs = 1'250'000;
   Random random(4, 0);
   int whole = 0;
@@ -55,7 +55,7 @@ TEST_F(AvrKept, APowerCutLeavesAllOrAFault) {
 }
 
 // The byte that is being written holds anything then.
-TEST_F(AvrKept, APowerCutLosesNoIdAndLeavesTheOldAddressOrTheNewOne) {
+TEST_F(AvrNvm, APowerCutLosesNoIdAndLeavesTheOldAddressOrTheNewOne) {
   std::uint8_t address = kAddress;
   std::array<int, 2> found{};  // old, new
   for (std::uint64_t bytes = 0; bytes <= 12; ++bytes) {
@@ -87,7 +87,7 @@ TEST_F(AvrKept, APowerCutLosesNoIdAndLeavesTheOldAddressOrTheNewOne) {
 }
 
 // What is kept becomes shorter behind the byte that is being compared or written.
-TEST_F(AvrKept, TablesThatAreForgottenMeanwhileLeaveTheRestAlone) {
+TEST_F(AvrNvm, TablesThatAreForgottenMeanwhileLeaveTheRestAlone) {
   constexpr std::uint16_t kCodes = 100;
   constexpr std::uint64_t kBytesOfOthers = 300;  // more than all but the codes
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
@@ -117,7 +117,7 @@ TEST_F(AvrKept, TablesThatAreForgottenMeanwhileLeaveTheRestAlone) {
   EXPECT_EQ(avr_->boot_number(), 8);
 }
 
-TEST_F(AvrKept, NothingIsWrittenWhileAMotorMoves) {
+TEST_F(AvrNvm, NothingIsWrittenWhileAMotorMoves) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   const std::uint64_t before = avr_->eeprom_writes();
   while (avr_->eeprom_writes() < before + 10) pass(20'000'000);

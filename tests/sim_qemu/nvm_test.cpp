@@ -6,9 +6,9 @@
 namespace bushd::sim {
 namespace {
 
-class QemuKept : public QemuAlone {
+class QemuNvm : public QemuAlone {
  protected:
-  QemuKept() { master_.patience_ns = 20'000'000; }  // the CRC of a long table takes a while
+  QemuNvm() { master_.patience_ns = 20'000'000; }  // the CRC of a long table takes a while
 
   void configure(std::uint32_t tick_ns) {
     ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONFIGURE, bushd_encode_configure,
@@ -29,7 +29,7 @@ class QemuKept : public QemuAlone {
   }
 };
 
-TEST_F(QemuKept, APowerCutLeavesTheNewOnesOrThoseOfBefore) {
+TEST_F(QemuNvm, APowerCutLeavesTheNewOnesOrThoseOfBefore) {
   Random random(4, 0);
   int fresh = 0;
   int old = 0;
@@ -53,7 +53,7 @@ TEST_F(QemuKept, APowerCutLeavesTheNewOnesOrThoseOfBefore) {
 }
 
 // A change of anything is a writing of all: 24 of 96 pages. The fifth begins anew.
-TEST_F(QemuKept, RoomIsFoundAgainAfterAReset) {
+TEST_F(QemuNvm, RoomIsFoundAgainAfterAReset) {
   ASSERT_NO_FATAL_FAILURE(configure(640'000));
   for (const std::uint8_t slot : Bytes{0, 1}) ASSERT_NO_FATAL_FAILURE(upload(slot, 0, 6000));
   const std::uint32_t sent = table_crc();
