@@ -50,9 +50,9 @@ Result<void> Mcu::must_be_online() const {
 }
 
 Result<void> Mcu::has_room(const link::McuSetup& setup) const {
-  const std::string why = master_.no_room(on_bus_, setup);
-  if (why.empty()) return {};
-  return fail("MCU " + name() + " " + why);
+  const auto room = master_.check_room(on_bus_, setup);
+  if (room) return {};
+  return fail("MCU " + name() + " " + room.error().text());
 }
 
 Installation::Installation(const config::Config& config, std::uint16_t master) : config_(config) {

@@ -42,8 +42,8 @@ class Connector {
   void give_up_unanswering(std::int64_t now_us, McuIndex mcu);
   // Other tables or motors. Returns false if the MCU is offline: they will be found then.
   bool reconfigure(McuIndex mcu, McuSetup setup);
-  // Why the MCU has no room for these tables, as far as it is known; "": it has.
-  std::string no_room(McuIndex mcu, const McuSetup& setup) const;
+  // The MCU has room for these tables, as far as it is known; or why not.
+  Result<void> check_room(McuIndex mcu, const McuSetup& setup) const;
   void emergency_stop();
 
   // Requests beside the setup.

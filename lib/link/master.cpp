@@ -178,8 +178,8 @@ void Master::reconfigure(McuIndex mcu, McuSetup setup) {
   if (connector_.reconfigure(mcu, std::move(setup))) streams_.drop_all(mcu);
 }
 
-std::string Master::no_room(McuIndex mcu, const McuSetup& setup) const {
-  return connector_.no_room(mcu, setup);
+Result<void> Master::check_room(McuIndex mcu, const McuSetup& setup) const {
+  return connector_.check_room(mcu, setup);
 }
 
 void Master::reset_low_water() {

@@ -114,8 +114,8 @@ class Master : private Transactions::Listener, private Connector::Listener {
   // Other tables or motors for an MCU, at rest: it goes through configuration again and comes back
   // with McuOnline.
   void reconfigure(McuIndex mcu, McuSetup setup);
-  // Why the MCU has no room for these tables, as far as it is known; "": it has.
-  std::string no_room(McuIndex mcu, const McuSetup& setup) const;
+  // The MCU has room for these tables, as far as it is known; or why not.
+  Result<void> check_room(McuIndex mcu, const McuSetup& setup) const;
 
   // Sent as soon as the line allows, answered in later reports.
   void control(McuIndex mcu, std::uint8_t actions) { connector_.control(mcu, actions); }

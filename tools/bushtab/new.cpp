@@ -17,7 +17,7 @@ bushd::Result<std::optional<tables::profiles::Motor>> load_motor(const MotorOpti
   auto curve = tables::profiles::load_torque_csv(options.torque_file, motor.steps_per_turn);
   if (!curve) return bushd::fail(curve.error());
   motor.torque = std::move(*curve);
-  if (auto fault = tables::profiles::fault_of(motor)) return bushd::fail(*fault);
+  if (const auto good = tables::profiles::check(motor); !good) return bushd::fail(good.error());
   return motor;
 }
 

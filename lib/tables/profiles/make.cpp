@@ -37,120 +37,117 @@ bool uses_v64(const Spec& spec) {
          (spec.decel && spec.decel->profile == Profile::kV64);
 }
 
-std::optional<Error> speeds_fault(const Spec& spec) {
+Result<void> check_speeds(const Spec& spec) {
   const double stop_hz = spec.stop_hz.value_or(spec.start_hz);
   if (!is_positive(spec.start_hz) || !is_positive(spec.max_hz) || !is_positive(stop_hz)) {
-    return Error{.message = "start, stop and maximum speed are needed; allowed: above 0"};
+    return fail("start, stop and maximum speed are needed; allowed: above 0");
   }
   if (std::max(spec.start_hz, stop_hz) > spec.max_hz) {
-    return Error{.message =
-                     fmt::format("starts at {:.6g} and stops at {:.6g} steps/s; allowed: up to "
-                                 "the maximum, {:.6g}",
-                                 spec.start_hz, stop_hz, spec.max_hz)};
+    return fail(
+        fmt::format("starts at {:.6g} and stops at {:.6g} steps/s; allowed: up to "
+                    "the maximum, {:.6g}",
+                    spec.start_hz, stop_hz, spec.max_hz));
   }
-  return std::nullopt;
+  return {};
 }
 
-std::optional<Error> skip_fault(const Spec& spec) {
-  if (!spec.skip) return std::nullopt;
+Result<void> check_skip(const Spec& spec) {
+  if (!spec.skip) return {};
   const Skip& skip = *spec.skip;
   if (!is_positive(skip.low_hz) || !(skip.high_hz > skip.low_hz) || !std::isfinite(skip.high_hz)) {
-    return Error{.message = "--skip is a band LO:HI with 0 < LO < HI"};
+    return fail("--skip is a band LO:HI with 0 < LO < HI");
   }
   const auto inside = [&](double hz) { return hz > skip.low_hz && hz < skip.high_hz; };
   for (const auto& [what, hz] : {std::pair{"start", spec.start_hz},
                                  {"stop", spec.stop_hz.value_or(spec.start_hz)},
                                  {"maximum", spec.max_hz}}) {
     if (!inside(hz)) continue;
-    return Error{.message =
-                     fmt::format("the {} speed {:.6g} lies in the band {:.6g}:{:.6g} that is to "
-                                 "be skipped; allowed: outside of it",
-                                 what, hz, skip.low_hz, skip.high_hz)};
+    return fail(
+        fmt::format("the {} speed {:.6g} lies in the band {:.6g}:{:.6g} that is to "
+                    "be skipped; allowed: outside of it",
+                    what, hz, skip.low_hz, skip.high_hz));
   }
   if (is_discrete(spec.accel.profile) || (spec.decel && is_discrete(spec.decel->profile))) {
-    return Error{.message = "profiles recurrence and v64 know no --skip; use constant"};
+    return fail("profiles recurrence and v64 know no --skip; use constant");
   }
   if (skip.acceleration && skip.factor) {
-    return Error{.message = "--skip-acceleration is an acceleration or xFACTOR, not both"};
+    return fail("--skip-acceleration is an acceleration or xFACTOR, not both");
   }
   if ((skip.acceleration && !is_positive(*skip.acceleration)) ||
       (skip.factor && !(is_positive(*skip.factor) && *skip.factor >= 1))) {
-    return Error{.message = "--skip-acceleration; allowed: above 0, a factor of 1 or more"};
+    return fail("--skip-acceleration; allowed: above 0, a factor of 1 or more");
   }
   if (!skip.acceleration && !skip.factor && !spec.motor) {
-    return Error{.message =
-                     "--skip needs to know how quickly the band can be passed: "
-                     "--skip-acceleration A or xFACTOR, or the motor (--torque, --inertia)"};
+    return fail(
+        "--skip needs to know how quickly the band can be passed: "
+        "--skip-acceleration A or xFACTOR, or the motor (--torque, --inertia)");
   }
-  return std::nullopt;
+  return {};
 }
 
-std::optional<Error> side_fault(const Spec& spec, const SideSpec& side) {
+Result<void> check_side(const Spec& spec, const SideSpec& side) {
   const int given =
       side.acceleration.has_value() + side.time_s.has_value() + side.codes.has_value();
   const std::string_view profile = name_of(side.profile);
   if (side.profile == Profile::kTorque || side.profile == Profile::kPiecewise) {
     if (given > 0) {
-      return Error{
-          .message = fmt::format("profile {} takes no acceleration, time or number of codes: they "
-                                 "follow from the {}",
-                                 profile, side.profile == Profile::kTorque ? "motor" : "segments")};
+      return fail(
+          fmt::format("profile {} takes no acceleration, time or number of codes: they "
+                      "follow from the {}",
+                      profile, side.profile == Profile::kTorque ? "motor" : "segments"));
     }
     if (side.profile == Profile::kTorque && !spec.motor) {
-      return Error{.message = "profile torque needs the motor: --torque FILE and --inertia"};
+      return fail("profile torque needs the motor: --torque FILE and --inertia");
     }
-    return std::nullopt;
+    return {};
   }
   if (given != 1) {
-    return Error{.message = fmt::format(
-                     "profile {} needs one of --acceleration, --time and --codes, for each "
-                     "side at most one",
-                     profile)};
+    return fail(
+        fmt::format("profile {} needs one of --acceleration, --time and --codes, for each "
+                    "side at most one",
+                    profile));
   }
   if (side.profile == Profile::kPto && !side.time_s) {
-    return Error{.message = "profile pto takes times: --time and --decel-time"};
+    return fail("profile pto takes times: --time and --decel-time");
   }
   if ((side.acceleration && !is_positive(*side.acceleration)) ||
       (side.time_s && !is_positive(*side.time_s)) || (side.jerk && !is_positive(*side.jerk))) {
-    return Error{.message = "accelerations, times and jerks; allowed: above 0"};
+    return fail("accelerations, times and jerks; allowed: above 0");
   }
   if (side.codes && (*side.codes < 3 || *side.codes > kMaxCodes)) {
-    return Error{.message = fmt::format("--codes {}; allowed: 3..{}", *side.codes, kMaxCodes)};
+    return fail(fmt::format("--codes {}; allowed: 3..{}", *side.codes, kMaxCodes));
   }
   if (side.jerk && side.profile != Profile::kScurve) {
-    return Error{.message = fmt::format("profile {} has no --jerk; use scurve", profile)};
+    return fail(fmt::format("profile {} has no --jerk; use scurve", profile));
   }
-  return std::nullopt;
+  return {};
 }
 
-std::optional<Error> fault_of(const Spec& spec) {
-  if (auto fault = speeds_fault(spec)) return fault;
+Result<void> check(const Spec& spec) {
+  if (auto good = check_speeds(spec); !good) return good;
   if (spec.code_bits != 8 && spec.code_bits != 16) {
-    return Error{
-        .message = fmt::format(
-            "{} bits a code; allowed: 16, or 8 as BUSHD has them. Codes on the bus and in an "
-            "MCU have 16 bits; a slower start takes a longer --time-unit",
-            spec.code_bits)};
+    return fail(fmt::format(
+        "{} bits a code; allowed: 16, or 8 as BUSHD has them. Codes on the bus and in an "
+        "MCU have 16 bits; a slower start takes a longer --time-unit",
+        spec.code_bits));
   }
   if (spec.motor) {
-    if (auto fault = fault_of(*spec.motor)) return fault;
+    if (auto good = check(*spec.motor); !good) return good;
   }
-  if (auto fault = side_fault(spec, spec.accel)) return fault;
+  if (auto good = check_side(spec, spec.accel); !good) return good;
   if (spec.decel) {
-    if (auto fault = side_fault(spec, *spec.decel)) return fault;
+    if (auto good = check_side(spec, *spec.decel); !good) return good;
   }
   if (spec.accel.profile == Profile::kPto && !spec.decel) {
-    return Error{.message = "profile pto takes times: --time and --decel-time"};
+    return fail("profile pto takes times: --time and --decel-time");
   }
   if (uses_v64(spec) && spec.time_unit_ns.value_or(kV64UnitNs) != kV64UnitNs) {
-    return Error{.message =
-                     "profile v64 counts in 25 us; allowed: --time-unit 25us, or leave it out"};
+    return fail("profile v64 counts in 25 us; allowed: --time-unit 25us, or leave it out");
   }
   if (spec.published && !is_discrete(spec.accel.profile)) {
-    return Error{.message =
-                     "--published is for profiles recurrence and v64, whose sources round down"};
+    return fail("--published is for profiles recurrence and v64, whose sources round down");
   }
-  return skip_fault(spec);
+  return check_skip(spec);
 }
 
 const SideSpec& spec_of(const Spec& spec, Side side) {
@@ -246,7 +243,7 @@ std::optional<Profile> profile_of(std::string_view name) {
 }
 
 Result<std::vector<double>> side_delays_s(const Spec& spec, Side side) {
-  if (auto fault = fault_of(spec)) return fail(*fault);
+  if (const auto good = check(spec); !good) return fail(good.error());
   const SideSpec& side_spec = spec_of(spec, side);
   const double from_hz =
       side == Side::kDecel ? spec.stop_hz.value_or(spec.start_hz) : spec.start_hz;

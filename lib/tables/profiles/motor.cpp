@@ -103,17 +103,17 @@ Result<TorqueCurve> load_torque_csv(const std::string& path, double steps_per_tu
   return parse_torque_csv(*text, steps_per_turn, path);
 }
 
-std::optional<Error> fault_of(const Motor& motor) {
-  if (motor.torque.empty()) return Error{.message = "a motor needs a torque curve: --torque FILE"};
+Result<void> check(const Motor& motor) {
+  if (motor.torque.empty()) return fail("a motor needs a torque curve: --torque FILE");
   if (!(motor.inertia_kgm2 > 0)) {
-    return Error{.message = "a motor needs the inertia of rotor and load, above 0: --inertia"};
+    return fail("a motor needs the inertia of rotor and load, above 0: --inertia");
   }
   if (!(motor.safety >= 1)) {
-    return Error{.message = fmt::format("the safety factor is {:.6g}; allowed: 1 or more, because "
-                                        "below 1 the motor loses steps",
-                                        motor.safety)};
+    return fail(fmt::format(
+        "the safety factor is {:.6g}; allowed: 1 or more, because below 1 the motor loses steps",
+        motor.safety));
   }
-  return std::nullopt;
+  return {};
 }
 
 double greatest_torque(const Motor& motor, double low_hz, double high_hz) {

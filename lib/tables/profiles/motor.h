@@ -55,7 +55,7 @@ struct Motor {
   double full_steps_per_turn = 200;  // more than steps_per_turn count as that many
 };
 
-std::optional<Error> fault_of(const Motor& motor);
+Result<void> check(const Motor& motor);
 
 enum class Side { kAccel, kDecel };
 
