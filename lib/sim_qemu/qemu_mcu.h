@@ -2,7 +2,7 @@
 // its own that goes on only when and as far as the bus does. Its time is its instructions, 16 ns
 // each; so the same calls give the same edges, to the ns, whatever else the machine has to do.
 //
-// QEMU's board is not all of the chip; machine.c adds what is missing, and the shift registers.
+// QEMU's board is not all of the chip; machine.h adds what is missing, and the shift registers.
 #pragma once
 
 #include <sys/types.h>
