@@ -182,7 +182,7 @@ TEST_F(Homing, IsLostWithItsMcuAndCountedAllTheSame) {
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
   EXPECT_EQ(lab.motor("m01").trust, "known");
   EXPECT_LT(lab.shaft_steps("m01"), -100);
-  EXPECT_GT(lab.shaft_steps("m01"), -6000) << "it ran down when it heard nobody";
+  EXPECT_GT(lab.shaft_steps("m01"), -6000) << "it ramped down when it heard nobody";
 }
 
 // Wherever it comes from, with a contact that bounces for as long as a slow step lasts: the place
