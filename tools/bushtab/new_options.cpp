@@ -44,7 +44,7 @@ void add_side_options(CLI::App* command, const std::string& prefix,
   if (prefix.empty()) profile->required();
   add_quantity(
       command, dashes + "acceleration", Quantity::kAcceleration,
-      [side](double value) { side().acceleration = value; }, "The greatest acceleration" + of);
+      [side](double value) { side().acceleration = value; }, "Greatest acceleration" + of);
   add_quantity(
       command, dashes + "time", Quantity::kTime, [side](double value) { side().time_s = value; },
       "Time between start (or stop) and maximum speed" + of);
@@ -55,7 +55,7 @@ void add_side_options(CLI::App* command, const std::string& prefix,
       ->type_name("N");
   add_quantity(
       command, dashes + "jerk", Quantity::kJerk, [side](double value) { side().jerk = value; },
-      "scurve: the greatest change of acceleration a second" + of);
+      "scurve: greatest change of acceleration a second" + of);
   command
       ->add_option_function<double>(
           dashes + "fall", [side](const double& value) { side().fall = value; },
@@ -166,21 +166,21 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
   profiles::Motor& motor = options.motor;
   add_quantity(
       command, "--inertia", Quantity::kInertia, [&](double value) { motor.inertia_kgm2 = value; },
-      "Of rotor and load together");
+      "Inertia of rotor and load together");
   add_quantity(
       command, "--friction", Quantity::kTorque, [&](double value) { motor.friction_nm = value; },
       "Torque of friction and load against the motion (default 0)");
   add_quantity(
       command, "--brake-friction", Quantity::kTorque,
       [&](double value) { motor.brake_friction_nm = value; },
-      "The part of it that helps braking for sure (default 0)");
+      "Part of the friction that surely helps braking (default 0)");
   command
       ->add_option("--safety", motor.safety,
-                   "The motor's torque divided by what is used of it (default 2)")
+                   "Safety factor: torque of the motor / torque used (default 2)")
       ->type_name("FACTOR");
   command
       ->add_option("--steps-per-turn", motor.steps_per_turn,
-                   "Steps, microsteps included, of a turn (default 200)")
+                   "Steps of a turn, microsteps included (default 200)")
       ->check(refuse_not_positive)
       ->type_name("N");
   command
@@ -193,7 +193,7 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
 
 void add_new_options(CLI::App& app, const Places& places, const Run& run) {
   const auto options = std::make_shared<New>();
-  CLI::App* command = app.add_subcommand("new", "Makes a table from an acceleration profile");
+  CLI::App* command = app.add_subcommand("new", "Make a table from an acceleration profile");
   command->add_option("TABLE", options->table, "The new table's name, or a file NAME.toml")
       ->required();
   profiles::Spec& spec = options->spec;
@@ -207,13 +207,14 @@ void add_new_options(CLI::App& app, const Places& places, const Run& run) {
   });
   add_motor_options(command, options->motor);
   add_code_options(command, spec);
-  command->add_option("--description", spec.description, "For what motor and load");
-  command->add_option("--comment", options->comments, "A comment at the head of the file")
+  command->add_option("--description", spec.description, "Motor and load that the table is for");
+  command->add_option("--comment", options->comments, "Comment at the head of the file")
       ->allow_extra_args(false);
-  auto* print =
-      command->add_flag("--print", options->print, "To standard output; no file, no history");
-  command->add_flag("--replace", options->replace, "If the table is there: a new revision of it");
-  command->add_flag("--json", options->json, "What was made, as show --json")->excludes(print);
+  auto* print = command->add_flag("--print", options->print,
+                                  "Print the table instead of writing it: no file, no history");
+  command->add_flag("--replace", options->replace, "Make a new revision if the table exists");
+  command->add_flag("--json", options->json, "Print the table as show --json does")
+      ->excludes(print);
   run(command, [&places, options, decel, command] {
     if (*decel) {
       profiles::SideSpec side = **decel;
