@@ -42,7 +42,8 @@ Ending ending_of(const bushd_report& report, const std::string& mcu) {
   }
   if (report.faults & BUSHD_FAULT_LINK) {
     return {Outcome::kLink,
-            "MCU " + mcu + " gave up homing because it heard nobody; home it again"};
+            "MCU " + mcu +
+                " ended homing because it received nothing from the daemon; home the motor again"};
   }
   return {Outcome::kStopped, "homing was stopped on request"};
 }
@@ -96,7 +97,7 @@ Result<void> HomingQueue::may_home(MotorId id) const {
   if (auto may = interlocks_.may_move(id); !may) return may;
   if (mcu.can_home()) return {};
   return fail("MCU " + mcu.name() +
-              " cannot home; find out where it stands and say 'bushctl set NAME STEPS'");
+              " cannot home; find out where it stands and run 'bushctl set NAME STEPS'");
 }
 
 bushd_home HomingQueue::message_for(MotorId id) const {

@@ -288,7 +288,7 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
   } else if ((report.flags & BUSHD_FLAG_CONFIGURED) != 0 &&
              (report.flags & BUSHD_FLAG_ENABLED) == 0) {
     // It had a fault with which it must not be enabled, and has it no longer.
-    give_up(mcu, "has not switched its drivers on", now_us + kRetryUs);
+    give_up(mcu, "has not enabled its drivers", now_us + kRetryUs);
   }
 }
 

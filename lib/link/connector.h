@@ -68,7 +68,7 @@ class Connector {
   void acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t type, std::uint8_t status);
   // The record of an MCU that connects has a new report. `in_step`: with bus time.
   void follow_report(std::int64_t now_us, McuIndex mcu, bool in_step);
-  // The MCU has switched its drivers off, and people are to find out why.
+  // The MCU has disabled its drivers, and people are to find out why.
   void drivers_off(McuIndex mcu) { links_[mcu].powered = false; }
 
  private:

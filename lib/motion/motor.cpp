@@ -13,7 +13,7 @@ constexpr Tick kNever = INT64_MAX / 2;
 
 constexpr const char* kStoppedImmediately =
     "it was stopped immediately by an emergency stop and may have overrun";
-constexpr const char* kUnpowered = "its drivers were switched off by overcurrent while it moved";
+constexpr const char* kUnpowered = "its drivers were disabled by overcurrent while it moved";
 
 std::string switch_at(int direction) {
   return std::string("its limit switch at the ") + (direction > 0 ? "positive" : "negative") +
@@ -42,9 +42,9 @@ Result<void> Motor::may_be_used() const {
 Result<void> Motor::may_move_to(std::int64_t target) const {
   if (uncertain_reason_) {
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
-                (setup_.has_home ? "say 'bushctl home NAME', or find out where it stands and say "
+                (setup_.has_home ? "run 'bushctl home NAME', or find out where it stands and run "
                                    "'bushctl set NAME STEPS'"
-                                 : "find out where it stands and say 'bushctl set NAME STEPS'"));
+                                 : "find out where it stands and run 'bushctl set NAME STEPS'"));
   }
   const std::int64_t steps = target - position_;
   if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
@@ -292,7 +292,7 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
     return ended(Outcome::kFault, *uncertain_reason_ + "; check the position and set it");
   }
   if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
-    const std::string why = mcu + " switched its drivers off because " + stop_cause(report);
+    const std::string why = mcu + " disabled its drivers because " + stop_cause(report);
     if (stepped) uncertain_reason_ = kUnpowered;
     return ended(Outcome::kFault, stepped
                                       ? why + "; check the position and set it"
