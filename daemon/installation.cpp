@@ -102,8 +102,8 @@ void Installation::add_motors() {
             .output = config.output,
             .has_home = config.home.has_value(),
             .limit_immediate = config.limit_action == BUSHD_STOP_IMMEDIATE,
-            .emergency_stop_cuts = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
-            .emergency_input_cuts = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE},
+            .emergency_stop_immediate = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
+            .emergency_input_immediate = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE},
         new_axis({motors_.size()}));
     motor_by_name_[config.name] = id;
     mcus_[config.mcu].motor_at_[config.output.value] = id;

@@ -104,8 +104,8 @@ void Motor::rest() {
 }
 
 bool Motor::stops_immediately(const bushd_report& report) const {
-  return ((report.faults & BUSHD_FAULT_EMERGENCY) != 0 && setup_.emergency_stop_cuts) ||
-         ((report.faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0 && setup_.emergency_input_cuts);
+  return ((report.faults & BUSHD_FAULT_EMERGENCY) != 0 && setup_.emergency_stop_immediate) ||
+         ((report.faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0 && setup_.emergency_input_immediate);
 }
 
 void Motor::take_limits(const bushd_report& report) {

@@ -26,8 +26,8 @@ struct MotorSetup {
   bool has_home = false;
   // Without a ramp, so that it may overrun.
   bool limit_immediate = false;
-  bool emergency_stop_cuts = false;
-  bool emergency_input_cuts = false;
+  bool emergency_stop_immediate = false;
+  bool emergency_input_immediate = false;
 };
 
 // What a motor does. Any other than Resting keeps other motions away from it.

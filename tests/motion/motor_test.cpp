@@ -24,7 +24,7 @@ class MotorTest : public testing::Test {
             .output = Output{3},
             .has_home = true,
             .limit_immediate = true,
-            .emergency_stop_cuts = true};
+            .emergency_stop_immediate = true};
   }
   MotorTest() {
     mcu.motor_count = 16;
