@@ -39,8 +39,9 @@ TEST(PositionCompareService, WhatNoMcuCanDoIsRefusedWithItsFigure) {
                                   .arrivals = {.positive = true, .negative = true},
                                   .delay_us = 10,
                                   .width_us = 500};
-  const auto refusal = [&, number = std::int64_t{0}](const api::PositionCompare& bad) mutable {
-    bench.compare.request(bench.now_us(), bench.asker(++number), bad);
+  std::int64_t number = 0;
+  const auto refusal = [&](const api::PositionCompare& request) {
+    bench.compare.request(bench.now_us(), bench.asker(++number), request);
     return bench.refusal(number);
   };
   api::PositionCompare bad = good;
