@@ -101,7 +101,7 @@ void add_speed_options(CLI::App* command, profiles::Spec& spec) {
             skip_of(spec).low_hz = quantity_or_throw("--skip", Quantity::kSpeed, low);
             skip_of(spec).high_hz = quantity_or_throw("--skip", Quantity::kSpeed, high);
           },
-          "A band of speeds to be passed quickly and not to cruise in (resonance) [" +
+          "Band of speeds to pass quickly and not to cruise in (resonance) [" +
               profiles::units_text(Quantity::kSpeed) + "]")
       ->type_name("LO:HI");
   command
