@@ -15,7 +15,7 @@
 
 #include "config/port_pattern.h"
 #include "daemon/request_log.h"
-#include "daemon/table_desk.h"
+#include "daemon/table_service.h"
 
 namespace bushd::daemon {
 namespace {
@@ -318,7 +318,7 @@ void EventLoop::handle_signal(std::int64_t now, int signal) {
 }
 
 void EventLoop::read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
-  worker_.post([this, ticket, wanted]() -> Worker::Rest {
+  worker_.post([this, ticket, wanted]() -> Worker::Completion {
     std::vector<Result<tables::TablePtr>> read;
     for (const std::string& table : wanted) read.push_back(library_.open(table));
     return [this, ticket, read] { core_.tables().read(now_us(), ticket, read); };
@@ -326,7 +326,7 @@ void EventLoop::read_tables(std::uint64_t ticket, const std::vector<std::string>
 }
 
 void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
-  worker_.post([this, ticket, wanted]() -> Worker::Rest {
+  worker_.post([this, ticket, wanted]() -> Worker::Completion {
     const auto kept = library_.keep(wanted);
     return [this, ticket, kept] { core_.tables().kept(ticket, kept); };
   });
@@ -354,7 +354,7 @@ void EventLoop::serve_tables(const api::Asker& asker, const api::Request& reques
     if (!good) return asker.answer(api::Refused{good.error().text()});
   }
   ++table_jobs_[client];
-  worker_.post([this, asker, request, client]() -> Worker::Rest {
+  worker_.post([this, asker, request, client]() -> Worker::Completion {
     const api::Reply reply = daemon::answer(library_, request, asker.session->client_id());
     return [this, asker, client, reply] {
       if (--table_jobs_[client] == 0) table_jobs_.erase(client);

@@ -50,9 +50,9 @@ Result<void> Mcu::must_be_online() const {
 }
 
 Result<void> Mcu::has_room(const link::McuSetup& setup) const {
-  const std::string why = master_.no_room(on_bus_, setup);
-  if (why.empty()) return {};
-  return fail("MCU " + name() + " " + why);
+  const auto room = master_.check_room(on_bus_, setup);
+  if (room) return {};
+  return fail("MCU " + name() + " " + room.error().text());
 }
 
 Installation::Installation(const config::Config& config, std::uint16_t master) : config_(config) {
@@ -102,8 +102,8 @@ void Installation::add_motors() {
             .output = config.output,
             .has_home = config.home.has_value(),
             .limit_immediate = config.limit_action == BUSHD_STOP_IMMEDIATE,
-            .emergency_stop_cuts = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
-            .emergency_input_cuts = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE},
+            .emergency_stop_immediate = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
+            .emergency_input_immediate = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE},
         new_axis({motors_.size()}));
     motor_by_name_[config.name] = id;
     mcus_[config.mcu].motor_at_[config.output.value] = id;

@@ -132,7 +132,7 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"bushd moves stepper motors from acceleration tables"};
+  CLI::App app{"bushd: move stepper motors by acceleration tables"};
   app.footer(
       "Exit codes: 0 ended on request or the configuration is good, 1 it could not start or go on "
       "(reason on stderr), 2 wrong usage.");
@@ -142,15 +142,15 @@ int main(int argc, char** argv) {
   std::string move_log_path;
   std::string in_service_path;
   auto* config_option =
-      app.add_option("--config", config_path, "configuration file")->type_name("FILE");
-  auto* check_option = app.add_option("--check-config", check_path,
-                                      "say whether this configuration is good, and end")
-                           ->type_name("FILE");
+      app.add_option("--config", config_path, "Configuration file")->type_name("FILE");
+  auto* check_option =
+      app.add_option("--check-config", check_path, "Check a configuration and exit")
+          ->type_name("FILE");
   app.add_option("--move-log", move_log_path,
-                 "append moves and their results to this file, as JSON lines")
+                 "Append moves and their results to this file as JSON lines")
       ->type_name("FILE");
   app.add_option("--in-service", in_service_path,
-                 "keep here which tables groups were given (default: for a configuration in "
+                 "File of the tables given to groups (default: for a configuration in "
                  "/etc/bushd /var/lib/bushd/tables-in-service.json, else "
                  ".tables-in-service.json beside it)")
       ->type_name("FILE");

@@ -27,7 +27,7 @@ void Reception::take(api::Asker asker, api::Request request, std::size_t bytes) 
   if (requests_ >= limits_.requests || bytes_ + bytes > limits_.bytes) {
     return asker.answer(
         api::Refused{"the daemon has " + std::to_string(requests_) +
-                     " requests waiting and takes no more now; try again in a moment"});
+                     " requests waiting and accepts no more now; try again in a moment"});
   }
   const std::string key = asker.session->text();
   const auto [client, first] = clients_.try_emplace(key);

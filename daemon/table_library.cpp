@@ -82,7 +82,7 @@ Result<tables::store::Place> TableLibrary::home_of(const std::string& name) cons
   if (fs::exists(own.directory / file, error)) return own;
   for (const tables::store::Place& place : places_) {
     if (!fs::exists(place.directory / file, error)) continue;
-    return fail(Error{.message = "is a shipped table, which nobody changes; use another name",
+    return fail(Error{.message = "is a shipped table and cannot be changed; use another name",
                       .file = (place.directory / file).string()});
   }
   fs::create_directories(own.directory, error);  // writing tells

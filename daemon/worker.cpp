@@ -49,9 +49,9 @@ void Worker::run() {
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();
     lock.unlock();
-    Rest rest = job();
+    Completion completion = job();
     lock.lock();
-    rests_.push_back(std::move(rest));
+    completions_.push_back(std::move(completion));
     const std::uint64_t one = 1;
     static_cast<void>(::write(fd_, &one, sizeof one));
   }
@@ -60,13 +60,13 @@ void Worker::run() {
 void Worker::handle() {
   std::uint64_t count = 0;
   static_cast<void>(::read(fd_, &count, sizeof count));
-  std::vector<Rest> rests;
+  std::vector<Completion> completions;
   {
     const std::lock_guard lock(mutex_);
-    rests = std::exchange(rests_, {});
-    waiting_ -= rests.size();
+    completions = std::exchange(completions_, {});
+    waiting_ -= completions.size();
   }
-  for (const Rest& rest : rests) rest();
+  for (const Completion& completion : completions) completion();
 }
 
 }  // namespace bushd::daemon

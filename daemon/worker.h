@@ -15,8 +15,8 @@ namespace bushd::daemon {
 class Worker {
  public:
   // What is left to be done, in the thread of handle().
-  using Rest = std::function<void()>;
-  using Job = std::function<Rest()>;
+  using Completion = std::function<void()>;
+  using Job = std::function<Completion()>;
 
   Worker() = default;
   // Waits for the jobs that were posted; what is left of them is not done any more.
@@ -42,7 +42,7 @@ class Worker {
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Job> jobs_;  // guarded by mutex_, as all below
-  std::vector<Rest> rests_;
+  std::vector<Completion> completions_;
   std::size_t waiting_ = 0;
   bool ending_ = false;
   std::thread thread_;

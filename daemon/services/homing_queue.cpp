@@ -42,7 +42,8 @@ Ending ending_of(const bushd_report& report, const std::string& mcu) {
   }
   if (report.faults & BUSHD_FAULT_LINK) {
     return {Outcome::kLink,
-            "MCU " + mcu + " gave up homing because it heard nobody; home it again"};
+            "MCU " + mcu +
+                " ended homing because it received nothing from the daemon; home the motor again"};
   }
   return {Outcome::kStopped, "homing was stopped on request"};
 }
@@ -89,13 +90,14 @@ Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) co
 Result<void> HomingQueue::may_home(MotorId id) const {
   const Mcu& mcu = installation_.mcu_of(id);
   if (!installation_.config()[id].home) {
-    return fail("its configuration has no 'home', so nobody knows where to look");
+    return fail("no home switch configured: add 'home = {...}' to motor \"" +
+                installation_[id].name() + "\"");
   }
   if (installation_[id].has_plan()) return fail("it moves; stop it first");
   if (auto may = interlocks_.may_move(id); !may) return may;
   if (mcu.can_home()) return {};
   return fail("MCU " + mcu.name() +
-              " cannot home; find out where it stands and say 'bushctl set NAME STEPS'");
+              " cannot home; find out where it stands and run 'bushctl set NAME STEPS'");
 }
 
 bushd_home HomingQueue::message_for(MotorId id) const {

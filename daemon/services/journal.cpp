@@ -106,7 +106,7 @@ void Journal::end_autonomous(MotorId id, const Mcu& mcu) {
   const motion::Motor& motor = installation_[id];
   const config::Bus& bus = installation_.bus_of(mcu).config;
   const bool homed = autonomous.homes && mcu.report().homing == BUSHD_HOMING_DONE;
-  nlohmann::json line = {{"event", "alone"},
+  nlohmann::json line = {{"event", "autonomous"},
                          {"motor", motor.name()},
                          {"bus", bus.name},
                          {"address", mcu.config.address.value},

@@ -122,17 +122,17 @@ void Moves::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
     if (motor.is<motion::Armed>()) armed.push_back(id);
     if (motor.needs_change()) changed.push_back(id);
   }
-  take_back(armed);
+  disarm(armed);
   replan(now_us, changed);
 }
 
-void Moves::take_back(const std::vector<MotorId>& motors) {
+void Moves::disarm(const std::vector<MotorId>& motors) {
   for (const McuId mcu : installation_.mcus_of(motors)) installation_[mcu].disarm();
 }
 
 // This motor waits no more: so do those that were armed with it. Those of its own MCU have ended by
 // what has ended it.
-void Moves::take_back_companions(MotorId ended) {
+void Moves::cancel_armed_group(MotorId ended) {
   std::vector<MotorId> others;
   for (const MotorId id : installation_.motors()) {
     motion::Motor& motor = installation_[id];
@@ -144,7 +144,7 @@ void Moves::take_back_companions(MotorId ended) {
     motor.stop(installation_[ended].name());
     others.push_back(id);
   }
-  take_back(others);
+  disarm(others);
 }
 
 void Moves::replan(std::int64_t now_us, const std::vector<MotorId>& motors) {
@@ -191,7 +191,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             },
             [&](const motion::event::Turn&) {
               journal_.ended(id, "turned");
-              start_run(id, motor.axis().wanted_steps(),
+              start_run(id, motor.axis().target_steps(),
                         mcu.earliest_start(now_us, motor.output()));
             },
             [&](const motion::event::Ended& ended) { end(id, ended); }},
@@ -203,7 +203,7 @@ void Moves::end(MotorId id, const motion::event::Ended& ended) {
   const motion::Motor& motor = installation_[id];
   installation_.mcu_of(id).drop(motor.output());
   if (ended.was_armed) {
-    take_back_companions(id);
+    cancel_armed_group(id);
   } else {  // the log of moves knows nothing of one that has not started
     journal_.ended(id, api::word(ended.outcome));
   }

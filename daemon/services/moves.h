@@ -56,8 +56,8 @@ class Moves final : public Service {
   void take_over(MotorId motor, const api::Asker& by);
   // From rest; the motor is part of an open move.
   void start_run(MotorId motor, std::int64_t target, motion::Tick start);
-  void take_back(const std::vector<MotorId>& motors);
-  void take_back_companions(MotorId motor);
+  void disarm(const std::vector<MotorId>& motors);
+  void cancel_armed_group(MotorId motor);
 
   Installation& installation_;
   const Interlocks& interlocks_;

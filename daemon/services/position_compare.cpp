@@ -39,7 +39,7 @@ Result<MotorId> PositionCompare::check(const api::PositionCompare& request) cons
   const Mcu& mcu = installation_.mcu_of(*id);
   if (const auto online = mcu.must_be_online(); !online) return fail(online.error());
   if (!mcu.can_compare_positions()) {
-    return fail("MCU " + mcu.name() + " has no reference output");
+    return fail("MCU " + mcu.name() + " has no position compare output");
   }
   if (!request.arrivals.any()) return id;
   if (!within(request.position_steps, -motion::Motor::kMaxPosition, motion::Motor::kMaxPosition)) {

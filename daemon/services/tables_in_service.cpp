@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "daemon/services/open_moves.h"
-#include "tables/laws/findings.h"
+#include "tables/profiles/diagnostics.h"
 
 namespace bushd::daemon {
 namespace {
@@ -163,10 +163,11 @@ Result<void> TablesInService::fits(const Tables& tables, GroupId group) const {
   for (const MotorId id : installation_.motors()) {
     if (installation_.config()[id].group != group) continue;
     const Mcu& mcu = installation_.mcu_of(id);
-    const tables::laws::Limits limits{.tick_ns = installation_.bus_of(mcu).config.tick_ns()};
-    for (const tables::laws::Finding& finding : tables::laws::findings(table, limits)) {
-      if (finding.severity != tables::laws::Severity::kError) continue;
-      return fail("table " + table.name() + ": " + finding.rule + ": " + finding.message);
+    const tables::profiles::Limits limits{.tick_ns = installation_.bus_of(mcu).config.tick_ns()};
+    for (const tables::profiles::Diagnostic& diagnostic :
+         tables::profiles::diagnostics(table, limits)) {
+      if (diagnostic.severity != tables::profiles::Severity::kError) continue;
+      return fail("table " + table.name() + ": " + diagnostic.rule + ": " + diagnostic.message);
     }
     const link::McuSetup setup = setup_of(installation_.config(), mcu.id, tables);
     if (setup.tables.size() > BUSHD_TABLE_SLOTS) {

@@ -12,7 +12,7 @@
 #define ROTOR_SETTLES_NS 100000000u
 
 // Capabilities of the modes follow each other as the modes do.
-static bool lacks(const bushd_mcu* mcu, uint8_t mode) {
+static bool is_disabled(const bushd_mcu* mcu, uint8_t mode) {
   const uint32_t needed = mode == BUSHD_EMISSION_EVEN ? 0 : (uint32_t)BUSHD_CAN_BURST << (mode - 1);
   return (needed & mcu->config.disabled_capabilities) != 0;
 }
@@ -57,7 +57,7 @@ bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* messa
   if ((mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
   if (memcmp(message, &mcu->emission.settings, sizeof *message) == 0) return BUSHD_OK;
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
-  if (lacks(mcu, message->mode)) return BUSHD_E_FORMAT;
+  if (is_disabled(mcu, message->mode)) return BUSHD_E_FORMAT;
   if (!keeps_pulses(mcu, message)) return BUSHD_E_PULSE_WIDTH;
   const bushd_status status = use(mcu, message);
   if (status != BUSHD_OK) return status;

@@ -17,9 +17,9 @@ static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
   if (heading == 0 || !bushd_mcu_limit_stops(mcu, m, heading, now_active)) return;
   // One that only turns towards the switch is at rest as far as this direction goes.
   const bool turns = heading != bushd_mcu_last_direction(mcu, m);
-  const bool cut = turns || (mcu->inputs.limit_immediate & motor_bit(m)) != 0;
-  if (cut || mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) {
-    bushd_mcu_stop_motor(mcu, m, cut ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP, next);
+  const bool immediate = turns || (mcu->inputs.limit_immediate & motor_bit(m)) != 0;
+  if (immediate || mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) {
+    bushd_mcu_stop_motor(mcu, m, immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP, next);
   }
 }
 
@@ -41,8 +41,8 @@ static void watch_emergency(bushd_mcu* mcu, bushd_inputs pins, uint32_t next) {
   if (settings->emergency == BUSHD_EMERGENCY_INPUT_IGNORED) return;
   if ((system_inputs(mcu, pins) & BUSHD_INPUT_EMERGENCY) == 0) return;
   if (mcu->faults & BUSHD_FAULT_EMERGENCY_INPUT) return;
-  const bool cuts = settings->emergency == BUSHD_EMERGENCY_INPUT_IMMEDIATE;
-  bushd_mcu_stop_all(mcu, cuts ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP, next);
+  const bool immediate = settings->emergency == BUSHD_EMERGENCY_INPUT_IMMEDIATE;
+  bushd_mcu_stop_all(mcu, immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP, next);
   mcu->faults |= BUSHD_FAULT_EMERGENCY_INPUT;
 }
 

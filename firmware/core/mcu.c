@@ -121,7 +121,7 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
 
 // What a line or an adapter has kept back, or made twice, must not undo what was asked later: a
 // position, drivers that were switched off, a start that was planned anew. Emergency stops always
-// count, marks have names of their own, and questions change nothing.
+// count, SYNCs have ids of their own, and questions change nothing.
 static bool counts_in_order_only(uint8_t type) {
   return (type >= BUSHD_MSG_CONFIGURE && type <= BUSHD_MSG_SET_POSITION) ||
          (type >= BUSHD_MSG_TICKS && type <= BUSHD_MSG_TABLE_RUN) ||

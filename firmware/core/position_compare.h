@@ -1,4 +1,4 @@
-// The reference output: a pulse when a motor arrives at a position.
+// The position compare output: a pulse when a motor arrives at a position.
 #ifndef BUSHD_FIRMWARE_CORE_POSITION_COMPARE_H
 #define BUSHD_FIRMWARE_CORE_POSITION_COMPARE_H
 
@@ -15,7 +15,7 @@ typedef struct bushd_mcu_slots {
   uint16_t slots;
 } bushd_mcu_slots;
 
-// The reference output (reference.c).
+// The position compare output (position_compare.c).
 typedef struct bushd_mcu_position_compare {
   uint8_t motor;
   uint8_t arrivals;  // BUSHD_ARRIVES_*

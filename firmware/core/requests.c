@@ -246,7 +246,7 @@ static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_
 
 // What a frame of this type asks for is beyond the port. Modes of emission have statuses of their
 // own.
-static bool is_lacking(const bushd_mcu* mcu, uint8_t type) {
+static bool is_disabled(const bushd_mcu* mcu, uint8_t type) {
   switch (type) {
     case BUSHD_MSG_TABLE_TICKS:
       return (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
@@ -324,7 +324,7 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   a.size = 0;
   // The frame may lie in the same buffer (bushd_mcu_config.reply): it is read by then.
   a.payload = mcu->config.reply + 2 + BUSHD_FRAME_HEADER;
-  const bushd_status status = is_lacking(mcu, frame->type)
+  const bushd_status status = is_disabled(mcu, frame->type)
                                   ? BUSHD_E_UNKNOWN_MESSAGE
                                   : handle(mcu, frame, time_in_tick_ns, &a);
   // Ticks look to it themselves; these two change nothing that it tells.

@@ -11,7 +11,7 @@ typedef struct bushd_mcu bushd_mcu;
 
 // What was heard of the line.
 typedef struct bushd_mcu_reception {
-  uint16_t comm_timeout_ticks;  // after as many without a valid frame, table runs are run down
+  uint16_t comm_timeout_ticks;  // after as many without a valid frame, table runs are ramped down
   uint16_t silent_ticks;        // since the last valid frame; saturates
   bool frames_heard;
   uint8_t newest_sequence;  // of the master's frames, whomever they were for

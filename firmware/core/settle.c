@@ -10,8 +10,8 @@
 // that, or it does not come back, the time stays unknown, and pulses are spread over the whole
 // T_step.
 //
-// The motor is the first that no limit switch bars either way; if there is none, no step is made
-// and the time stays unknown. If its switch is met by the step, it stays there.
+// The motor is the first that no limit switch inhibits in either direction; if there is none, no
+// step is made and the time stays unknown. If its switch is met by the step, it stays there.
 //
 // Meanwhile the MCU is BUSY, so that nothing else moves.
 #include "firmware/core/settle.h"

@@ -24,8 +24,8 @@ typedef struct bushd_slot_buffer {
   uint8_t outputs;                      // bushd_outputs
   int16_t steps[BUSHD_MOTORS_PER_MCU];  // signed steps of the tick, for the position counters
   uint16_t active;                      // motors with a step in this tick
-  // Slots of this tick, counted from 1, at whose beginning the reference output rises and falls; 0:
-  // it does not. If both, it rises first.
+  // Slots of this tick, counted from 1, at whose beginning the position compare output rises and
+  // falls; 0: it does not. If both, it rises first.
   uint16_t compare_rise;
   uint16_t compare_fall;
 } bushd_slot_buffer;

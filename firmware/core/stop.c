@@ -116,7 +116,7 @@ static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stre
   return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * (2u * TICKS_AHEAD) / most, 256);
 }
 
-void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode how, uint32_t next) {
+void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode mode, uint32_t next) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_mcu_finish_rows(mcu);
   const bool runs = in_run(motor);
@@ -126,7 +126,7 @@ void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode how, uint32
                        (start_waits(mcu, m, next, &rest_from) && ticks_after(next, rest_from) >= 0);
   const uint16_t delay = at_rest || runs ? 0 : stream_delay(mcu, m, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
-  if (how == BUSHD_STOP_IMMEDIATE) {
+  if (mode == BUSHD_STOP_IMMEDIATE) {
     if (motor->mode != BUSHD_MCU_STREAM || !at_rest) motor->remainder = 0;
     motor->mode = BUSHD_MCU_STREAM;
   } else if (runs) {
@@ -136,8 +136,8 @@ void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode how, uint32
   }
 }
 
-void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_stop_mode how, uint32_t next) {
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) bushd_mcu_stop_motor(mcu, m, how, next);
+void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_stop_mode mode, uint32_t next) {
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) bushd_mcu_stop_motor(mcu, m, mode, next);
 }
 
 int8_t bushd_mcu_last_direction(const bushd_mcu* mcu, uint8_t m) {
@@ -158,7 +158,7 @@ int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
 }
 
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message) {
-  bushd_mcu_stop_all(mcu, message->how, bushd_mcu_first_open(mcu));
+  bushd_mcu_stop_all(mcu, message->mode, bushd_mcu_first_open(mcu));
   mcu->faults |= BUSHD_FAULT_EMERGENCY;
   return BUSHD_OK;
 }

@@ -1,23 +1,22 @@
-// The tick counter against the bus's. A SYNC frame's end is a mark that all MCUs hear at once; a
-// later SYNC tells when, in bus time, that mark was. The difference to the own time of the mark is
-// the error.
+// The tick counter against the bus's. All MCUs hear the end of a SYNC frame at once; a later SYNC
+// tells when, in bus time, that was. The difference to the own time of it is the error.
 //
 // Not yet in step: the counter jumps, and the rest of the difference is made up by lengthening one
 // tick (a timer can always wait longer, but not go back). In step: the next ticks are made longer
 // or shorter until the error is made up, each by at most 1/64, so that no step shifts by more.
 //
-// Every mark is noted as the corrected clock shows it: with the corrections that are known but not
-// yet carried out. So the error of a mark is what the clock has drifted since the last mark whose
+// The time of a SYNC is noted as the corrected clock shows it: with the corrections that are known
+// but not yet carried out. So its error is what the clock has drifted since the last SYNC whose
 // error was corrected, and
 //
-//     rate += gain x error / (time between these marks)
+//     rate += gain x error / (time between the two)
 //
-// A mark is noted to some microseconds only. An error within these may be nothing else, so a
+// The time is noted to some microseconds only. An error within these may be nothing else, so a
 // quarter of it is taken; all of a larger one: that is drift, of a rate not yet known or of another
 // reference.
 //
 // The rate's share of each tick is added up in 1/4096 ns and given out in whole ns. With the rate
-// changes what the clock has drifted from the mark until now: that is made up at once too.
+// changes what the clock has drifted from the SYNC until now: that is made up at once too.
 #include "firmware/core/sync.h"
 
 #include "firmware/core/access.h"
@@ -25,7 +24,7 @@
 #include "firmware/core/stream.h"
 
 #define MAX_ERROR_DIVISOR 2
-#define MARK_NOISE_NS 5000
+#define SYNC_NOISE_NS 5000
 #define NOISE_GAIN_DIVISOR 4
 #define MAX_RATE_PPB 500000
 #define MAX_INTERVAL_NS INT64_C(60000000000)
@@ -88,7 +87,7 @@ static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t erro
   const int32_t old_ppb = clock->rate_ppb;
   const int32_t old_step = clock->rate_step;
   // The first estimate is better than none, however short the time that it was made in.
-  const bool drift = !clock->rate_known || error_ns > MARK_NOISE_NS || error_ns < -MARK_NOISE_NS;
+  const bool drift = !clock->rate_known || error_ns > SYNC_NOISE_NS || error_ns < -SYNC_NOISE_NS;
   clock->rate_known = true;
   int32_t rate_ppb = old_ppb + (int32_t)(drift ? error_ppb : error_ppb / NOISE_GAIN_DIVISOR);
   if (rate_ppb > MAX_RATE_PPB) rate_ppb = MAX_RATE_PPB;
@@ -158,7 +157,7 @@ void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick
   bushd_mcu_clock* clock = &mcu->clock;
   watch_masters(mcu, sync->master);
   const bool same_master = clock->heard && clock->master == sync->master;
-  // A frame that comes twice is one mark, and the first time is the one that the others heard.
+  // A frame that comes twice is one SYNC, and the first time is the one that the others heard.
   if (same_master && clock->sync_id == sync->sync_id) return;
   const bool known = same_master && sync->follows && (mcu->flags & BUSHD_FLAG_SYNC_HEARD) != 0 &&
                      clock->sync_id == sync->follow_up_id && sync->sync_ns < mcu->tick_ns;

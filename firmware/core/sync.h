@@ -12,10 +12,11 @@ typedef struct bushd_mcu bushd_mcu;
 // The tick counter against the bus's (sync.c). All adjustments are as the port takes them: > 0 is a
 // longer tick.
 typedef struct bushd_mcu_clock {
-  uint8_t settling;    // ticks until the tick timer has another length; marks are void till then
-  bool heard;          // a SYNC frame; the last one's mark is:
+  uint8_t
+      settling;  // ticks until the tick timer has another length; times of SYNCs are void till then
+  bool heard;    // a SYNC frame; of the last one:
   uint16_t master;     // whose it is
-  uint32_t sync_id;    // its name
+  uint32_t sync_id;    // its id
   uint32_t sync_tick;  // when it was, if BUSHD_FLAG_SYNC_HEARD
   uint32_t sync_ns;
   int32_t behind_ns;     // the bus, not yet given to the port

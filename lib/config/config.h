@@ -1,7 +1,7 @@
-// bushd.toml (docs/configuration.md): which motor hangs on which output of which MCU on which bus,
-// and which table it runs. A Config that exists is consistent: every index below is valid, every
-// bus has an MCU, no output is used twice, every table is slow enough for its bus's tick and no
-// line is asked for more than it can carry.
+// bushd.toml (docs/configuration.md): which motor is connected to which output of which MCU on
+// which bus, and which table it runs. A Config that exists is consistent: every index below is
+// valid, every bus has an MCU, no output is used twice, every table is slow enough for its bus's
+// tick and no line is asked for more than it can carry.
 #pragma once
 
 #include <cstddef>

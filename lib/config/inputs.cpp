@@ -20,7 +20,7 @@ Result<void> read_active(const TomlReader& reader, std::string_view key, bool* o
 
 Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
   if (reader.has("emergency_input")) {
-    const auto action = read_word(reader, "emergency_input", {"ignore", "ramp", "cut"});
+    const auto action = read_word(reader, "emergency_input", {"ignore", "ramp", "immediate"});
     if (!action) return fail(action.error());
     static_assert(BUSHD_EMERGENCY_INPUT_IGNORED == 0 && BUSHD_EMERGENCY_INPUT_RAMP == 1 &&
                   BUSHD_EMERGENCY_INPUT_IMMEDIATE == 2);
@@ -31,8 +31,8 @@ Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
   }
   if (reader.has("emergency_active") && !reader.has("emergency_input")) {
     return fail(reader.error("emergency_active",
-                             "is told of an MCU without emergency_input; allowed: beside "
-                             "emergency_input = \"ramp\", \"cut\" or \"ignore\""));
+                             "applies only with emergency_input; allowed: beside "
+                             "emergency_input = \"ramp\", \"immediate\" or \"ignore\""));
   }
   if (reader.has("debounce_ticks")) {
     const auto ticks = reader.integer("debounce_ticks", 0, BUSHD_MAX_DEBOUNCE_TICKS);
@@ -60,11 +60,11 @@ Result<void> read_inputs(const TomlReader& reader, Motor* motor) {
     motor->limit_negative = *ends != 0;
   }
   if (reader.has("limit_action")) {
-    const auto action = read_word(reader, "limit_action", {"ramp", "cut"});
+    const auto action = read_word(reader, "limit_action", {"ramp", "immediate"});
     if (!action) return fail(action.error());
     if (!reader.has("limit")) {
       return fail(reader.error("limit_action",
-                               "is told of a motor without a limit; allowed: "
+                               "applies only with a limit; allowed: "
                                "beside limit = \"positive\", \"negative\" or "
                                "\"both\""));
     }

@@ -172,9 +172,9 @@ Result<void> read_manners(const TomlReader& reader, Bus* bus) {
     bus->table_ticks = *frames == 0;
   }
   if (reader.has("emergency_stop")) {
-    const auto how = read_word(reader, "emergency_stop", {"ramp", "cut"});
-    if (!how) return fail(how.error());
-    bus->emergency_stop = *how == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE;
+    const auto mode = read_word(reader, "emergency_stop", {"ramp", "immediate"});
+    if (!mode) return fail(mode.error());
+    bus->emergency_stop = *mode == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE;
   }
   return {};
 }

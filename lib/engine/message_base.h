@@ -26,18 +26,18 @@ typedef enum bushd_type {
   BUSHD_MSG_CONTROL = 0x07,       // bushd_control -> acknowledgement
   BUSHD_MSG_SET_POSITION = 0x08,  // bushd_set_position -> acknowledgement
   BUSHD_MSG_POLL = 0x09,          // bushd_poll, broadcast -> a bushd_report of each MCU it names
-  BUSHD_MSG_SYNC = 0x0A,          // bushd_sync, broadcast, no reply; the frame's end is a time mark
-  BUSHD_MSG_TICKS = 0x0B,         // bushd_ticks, no reply: its effect shows in the next report
-  BUSHD_MSG_TABLE_TICKS = 0x0C,   // bushd_table_ticks, no reply
-  BUSHD_MSG_TABLE_RUN = 0x0D,     // bushd_table_run, no reply
-  BUSHD_MSG_EMERGENCY = 0x0E,     // bushd_emergency, no reply
-  BUSHD_MSG_SET_ADDRESS = 0x0F,   // bushd_set_address, broadcast -> acknowledgement of the one MCU
-  BUSHD_MSG_TABLES = 0x10,        // empty -> reply: bushd_tables
-  BUSHD_MSG_INPUTS = 0x11,        // bushd_set_inputs -> acknowledgement
-  BUSHD_MSG_EMISSION = 0x12,      // bushd_emission -> acknowledgement
-  BUSHD_MSG_HOME = 0x13,          // bushd_home -> acknowledgement; how it goes is told by reports
-  BUSHD_MSG_LOCAL = 0x14,         // bushd_local -> acknowledgement
-  BUSHD_MSG_TRIGGER = 0x15,       // bushd_trigger -> acknowledgement
+  BUSHD_MSG_SYNC = 0x0A,   // bushd_sync, broadcast, no reply; its time is the end of the frame
+  BUSHD_MSG_TICKS = 0x0B,  // bushd_ticks, no reply: its effect shows in the next report
+  BUSHD_MSG_TABLE_TICKS = 0x0C,  // bushd_table_ticks, no reply
+  BUSHD_MSG_TABLE_RUN = 0x0D,    // bushd_table_run, no reply
+  BUSHD_MSG_EMERGENCY = 0x0E,    // bushd_emergency, no reply
+  BUSHD_MSG_SET_ADDRESS = 0x0F,  // bushd_set_address, broadcast -> acknowledgement of the one MCU
+  BUSHD_MSG_TABLES = 0x10,       // empty -> reply: bushd_tables
+  BUSHD_MSG_INPUTS = 0x11,       // bushd_set_inputs -> acknowledgement
+  BUSHD_MSG_EMISSION = 0x12,     // bushd_emission -> acknowledgement
+  BUSHD_MSG_HOME = 0x13,         // bushd_home -> acknowledgement; how it goes is told by reports
+  BUSHD_MSG_LOCAL = 0x14,        // bushd_local -> acknowledgement
+  BUSHD_MSG_TRIGGER = 0x15,      // bushd_trigger -> acknowledgement
   BUSHD_MSG_POSITION_COMPARE = 0x16  // bushd_position_compare -> acknowledgement
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its sequence and the MCU's address.

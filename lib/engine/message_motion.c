@@ -55,15 +55,15 @@ bushd_status bushd_decode_sync(const uint8_t* payload, size_t size, bushd_sync* 
 }
 
 size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload) {
-  payload[0] = (uint8_t)message->how;
+  payload[0] = (uint8_t)message->mode;
   return 1;
 }
 
 bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message) {
   reader r = read_from(payload, size);
-  const uint8_t how = get8(&r);
-  message->how = how == BUSHD_STOP_IMMEDIATE ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP;
-  return finish(&r, how <= BUSHD_STOP_IMMEDIATE);
+  const uint8_t mode = get8(&r);
+  message->mode = mode == BUSHD_STOP_IMMEDIATE ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP;
+  return finish(&r, mode <= BUSHD_STOP_IMMEDIATE);
 }
 
 static uint8_t bits_set(uint16_t mask) {

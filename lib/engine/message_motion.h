@@ -62,11 +62,11 @@ typedef struct bushd_poll {
 // The entry with this address, if there is one.
 bool bushd_poll_find(const bushd_poll* poll, uint8_t address, bushd_poll_entry* entry);
 
-// Two-step time reference. The end of this frame is a mark named `mark`. If `follows`, the mark
-// named `follow_up_id` lay at (sync_tick, sync_ns into that tick) of bus time.
+// Two-step synchronisation. `sync_id` identifies this SYNC; its time is the end of its frame. If
+// `follows`, the time of `follow_up_id` was (sync_tick, sync_ns into that tick) of bus time.
 typedef struct bushd_sync {
   uint16_t master;   // who sends this: two masters on one line have different ones
-  uint32_t sync_id;  // never the name of another mark of this master
+  uint32_t sync_id;  // never that of another SYNC of this master
   bool follows;
   uint32_t follow_up_id;
   uint32_t sync_tick;
@@ -171,8 +171,8 @@ typedef enum bushd_trigger_state {
 
 enum { BUSHD_ARRIVES_POSITIVE = 1 << 0, BUSHD_ARRIVES_NEGATIVE = 1 << 1 };
 
-// A pulse at the reference output, delay_us after the step with which the motor's counter arrives
-// at the position.
+// A pulse at the position compare output, delay_us after the step with which the motor's counter
+// arrives at the position.
 #define BUSHD_POSITION_COMPARE_MAX_DELAY_US 1500000u
 #define BUSHD_POSITION_COMPARE_MAX_WIDTH_US 1000000u
 typedef struct bushd_position_compare {
@@ -186,7 +186,7 @@ typedef struct bushd_position_compare {
 typedef enum bushd_stop_mode { BUSHD_STOP_RAMP = 0, BUSHD_STOP_IMMEDIATE = 1 } bushd_stop_mode;
 // All motors stop, within two ticks: by their tables' ramps, or without another step.
 typedef struct bushd_emergency {
-  bushd_stop_mode how;
+  bushd_stop_mode mode;
 } bushd_emergency;
 
 typedef struct bushd_motor_report {
@@ -203,7 +203,7 @@ typedef struct bushd_report {
   uint16_t boot_number;
   uint32_t tick;     // the tick being emitted
   uint32_t tick_ns;  // how far into it, when the poll's frame ended
-  uint32_t sync_id;  // the last mark heard, and when it was by the MCU's own clock
+  uint32_t sync_id;  // the last SYNC heard, and when it ended by the MCU's own clock
   uint32_t sync_tick;
   uint32_t sync_ns;
   int32_t rate_ppb;          // how much faster than its crystal the MCU counts, to follow the bus
@@ -213,7 +213,7 @@ typedef struct bushd_report {
   uint16_t bad_frames;       // CRC and length errors; saturates
   uint16_t rejected_frames;  // valid frames that could not be used; saturates
   uint8_t last_rejection;    // bushd_status of the last one
-  uint16_t ramp_downs;       // motors that had to be run down since boot; saturates
+  uint16_t ramp_downs;       // motors that had to be ramped down since boot; saturates
   uint16_t low_water_ticks;  // the fewest ticks that a moving motor had queued, since the report
                              // before; 65535: none moved
   // Ticks that these motors have beyond a gap: from the tick `out_of_order_from` (low 16 bits) on,

@@ -33,7 +33,7 @@ enum {
   BUSHD_CAN_HOME = 1 << 4,
   BUSHD_CAN_LOCAL = 1 << 5,
   BUSHD_CAN_TRIGGER = 1 << 6,           // has a trigger input
-  BUSHD_CAN_POSITION_COMPARE = 1 << 7,  // has a reference output
+  BUSHD_CAN_POSITION_COMPARE = 1 << 7,  // has a position compare output
   // Emission other than even.
   BUSHD_CAN_BURST = 1 << 8,
   BUSHD_CAN_COMMON_DIR = 1 << 9,
@@ -64,7 +64,8 @@ typedef struct bushd_set_address {
 typedef struct bushd_configure {
   uint32_t tick_ns;  // BUSHD_MIN_TICK_NS .. BUSHD_MAX_TICK_NS
   bushd_format format;
-  uint16_t comm_timeout_ticks;  // >= 1: table runs are run down after as many without a valid frame
+  uint16_t
+      comm_timeout_ticks;  // >= 1: table runs are ramped down after as many without a valid frame
 } bushd_configure;
 
 // How steps get to the pins (engine/emission.h).

@@ -85,7 +85,7 @@ void bushd_run_ramp_down(bushd_run* run);
 //
 //     max( A(a+j-1), D(n-j), c )
 //
-// so that the run goes on speeding up, holds cruise, or runs down, whatever it did before. Returns
+// so that the run goes on speeding up, holds cruise, or ramps down, whatever it did before. Returns
 // false, and changes nothing, if a ramp-down takes more steps than that (the run would overshoot)
 // or the run is done. O(log steps).
 bool bushd_run_retarget(bushd_run* run, uint32_t steps_after);

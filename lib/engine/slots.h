@@ -14,7 +14,7 @@ extern "C" {
 #endif
 
 #define BUSHD_MIN_SLOTS 128u
-// A build for a small MCU may have fewer: planes are made for as many.
+// A build for a small MCU may have fewer: slot buffers are made for as many.
 #ifndef BUSHD_MAX_SLOTS
 #define BUSHD_MAX_SLOTS 256u
 #endif

@@ -77,7 +77,7 @@ uint32_t bushd_table_crc32(const bushd_table* table);
 uint32_t bushd_ramp_sum_entries(const bushd_ramp* ramp);
 uint32_t bushd_ramp_bucket_entries(const bushd_ramp* ramp);
 
-// Fills the caller's arrays (of at least the sizes above) and hangs them into `ramp`.
+// Fills the caller's arrays (of at least the sizes above) and attaches them to `ramp`.
 // Precondition: the ramp passed bushd_table_check. O(count).
 void bushd_ramp_index(bushd_ramp* ramp, uint32_t* sum, uint32_t* bucket);
 #endif

@@ -25,8 +25,8 @@ const char* remedy_of(unsigned refusal) {
              : "its firmware and this program do not fit each other: update the older of the two";
 }
 
-std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& identity,
-                            std::uint32_t tick_ns, unsigned* max_steps) {
+Result<unsigned> max_steps_per_tick(const EmissionSetup& setup, const bushd_identity& identity,
+                                    std::uint32_t tick_ns) {
   const auto can = [&](std::uint8_t mode) {
     return (kCapabilities.at(mode) & ~identity.capabilities) == 0;
   };
@@ -36,18 +36,18 @@ std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& id
       if (!can(mode)) continue;
       allowed.append(allowed.empty() ? "\"" : ", \"").append(kEmissionNames[mode]).append("\"");
     }
-    return at(setup.mode_at, "is \"" + std::string(kEmissionNames.at(setup.settings.mode)) +
-                                 "\", which this MCU cannot do; allowed: " + allowed);
+    return fail(at(setup.mode_at, "is \"" + std::string(kEmissionNames.at(setup.settings.mode)) +
+                                      "\", which this MCU cannot do; allowed: " + allowed));
   }
   if (identity.slots < BUSHD_MIN_SLOTS) {
-    return "says that it has " + std::to_string(identity.slots) + " slots a tick; needed are " +
-           std::to_string(BUSHD_MIN_SLOTS) + ": update its firmware";
+    return fail("says that it has " + std::to_string(identity.slots) +
+                " slots a tick; needed are " + std::to_string(BUSHD_MIN_SLOTS) +
+                ": update its firmware");
   }
   bushd_emission_grid grid;
   const bushd_status status = bushd_emission_fit(&setup.settings, tick_ns, identity.slots, &grid);
-  if (status != BUSHD_OK) return emission_refusal(setup, status, identity.slots, tick_ns);
-  *max_steps = grid.max_steps;
-  return {};
+  if (status != BUSHD_OK) return fail(emission_refusal(setup, status, identity.slots, tick_ns));
+  return grid.max_steps;
 }
 
 std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::uint16_t slots,

@@ -33,10 +33,10 @@ inline constexpr std::array<std::string_view, 5> kEmissionNames = {"even", "burs
 inline constexpr std::array<std::string_view, 4> kSequenceNames = {"wave", "full", "half",
                                                                    "three-phase"};
 
-// Why the MCU cannot do so, as far as it can be told without asking; "": it can. Then `*max_steps`
-// is how many steps of a motor find room in a tick.
-std::string emission_misfit(const EmissionSetup& setup, const bushd_identity& identity,
-                            std::uint32_t tick_ns, unsigned* max_steps);
+// How many steps of a motor find room in a tick; or why the MCU cannot do so, as far as it can be
+// told without asking.
+Result<unsigned> max_steps_per_tick(const EmissionSetup& setup, const bushd_identity& identity,
+                                    std::uint32_t tick_ns);
 
 // What can be done about a refusal that the configuration is not to blame for.
 const char* remedy_of(unsigned refusal);

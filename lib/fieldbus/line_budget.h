@@ -13,7 +13,7 @@ namespace bushd::fieldbus {
 inline constexpr double kMaxLineLoad = 0.85;
 
 // Share (1.0 = all) of a line of `baud` that ticks of `tick_ns` need with `motors_per_mcu` motors
-// on each MCU, everything moving: tick frames with running delays, polls and reports, sync marks. A
+// on each MCU, everything moving: tick frames with running delays, polls and reports, SYNCs. A
 // byte takes 10 bits.
 double line_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
                  std::span<const std::uint8_t> motors_per_mcu);

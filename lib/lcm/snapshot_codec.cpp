@@ -89,7 +89,7 @@ mcu_health_t message_of(const api::McuHealth& health) {
   message.current = health.current;
   message.crc_errors = number(health.crc_errors);
   message.rejected_frames = number(health.rejected_frames);
-  message.run_downs = number(health.ramp_downs);
+  message.ramp_downs = number(health.ramp_downs);
   message.timeouts = number(health.timeouts);
   message.repeats = number(health.repeats);
   message.missed_ticks = number(health.missed_ticks);
@@ -111,7 +111,7 @@ api::McuHealth health_of(const mcu_health_t& message) {
                         .current = message.current,
                         .crc_errors = counted(message.crc_errors),
                         .rejected_frames = counted(message.rejected_frames),
-                        .ramp_downs = counted(message.run_downs),
+                        .ramp_downs = counted(message.ramp_downs),
                         .timeouts = counted(message.timeouts),
                         .repeats = counted(message.repeats),
                         .missed_ticks = counted(message.missed_ticks),

@@ -56,9 +56,10 @@ bool Connector::reconfigure(McuIndex mcu, McuSetup setup) {
   return true;
 }
 
-std::string Connector::no_room(McuIndex mcu, const McuSetup& setup) const {
+Result<void> Connector::check_room(McuIndex mcu, const McuSetup& setup) const {
   const McuView& view = mcus_[mcu].view;
-  return view.identified ? lacks_room(setup, view.identity, setup_.tick_ns) : std::string();
+  if (!view.identified) return {};
+  return link::check_room(setup, view.identity, setup_.tick_ns);
 }
 
 void Connector::control(McuIndex mcu, std::uint8_t actions) {
@@ -158,8 +159,8 @@ void Connector::take(std::int64_t now_us, McuIndex mcu, const bushd_identity& id
   Link& link = links_[mcu];
   record.view.identity = identity;
   record.view.identified = true;
-  if (const std::string why = misfit(setup_, record.setup, identity); !why.empty()) {
-    record.view.detail = why;
+  if (const auto fit = check_fit(setup_, record.setup, identity); !fit) {
+    record.view.detail = fit.error().text();
     link.retry_due_us = now_us + kRefusedRetryUs;
     return;
   }
@@ -287,7 +288,7 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
   } else if ((report.flags & BUSHD_FLAG_CONFIGURED) != 0 &&
              (report.flags & BUSHD_FLAG_ENABLED) == 0) {
     // It had a fault with which it must not be enabled, and has it no longer.
-    give_up(mcu, "has not switched its drivers on", now_us + kRetryUs);
+    give_up(mcu, "has not enabled its drivers", now_us + kRetryUs);
   }
 }
 

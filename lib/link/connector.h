@@ -42,8 +42,8 @@ class Connector {
   void give_up_unanswering(std::int64_t now_us, McuIndex mcu);
   // Other tables or motors. Returns false if the MCU is offline: they will be found then.
   bool reconfigure(McuIndex mcu, McuSetup setup);
-  // Why the MCU has no room for these tables, as far as it is known; "": it has.
-  std::string no_room(McuIndex mcu, const McuSetup& setup) const;
+  // The MCU has room for these tables, as far as it is known; or why not.
+  Result<void> check_room(McuIndex mcu, const McuSetup& setup) const;
   void emergency_stop();
 
   // Requests beside the setup.
@@ -68,7 +68,7 @@ class Connector {
   void acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t type, std::uint8_t status);
   // The record of an MCU that connects has a new report. `in_step`: with bus time.
   void follow_report(std::int64_t now_us, McuIndex mcu, bool in_step);
-  // The MCU has switched its drivers off, and people are to find out why.
+  // The MCU has disabled its drivers, and people are to find out why.
   void drivers_off(McuIndex mcu) { links_[mcu].powered = false; }
 
  private:

@@ -12,8 +12,8 @@ constexpr std::int64_t kLongestUs = 2'000'000;  // after this an MCU that says n
 
 }  // namespace
 
-void EmergencyStop::begin(bushd_stop_mode how) {
-  stop_ = Stop{.how = how, .until_us = {}};
+void EmergencyStop::begin(bushd_stop_mode mode) {
+  stop_ = Stop{.mode = mode, .until_us = {}};
   // One that was latched before says nothing of this one.
   for (McuRecord& mcu : mcus_) {
     mcu.view.report.faults &= static_cast<std::uint8_t>(~BUSHD_FAULT_EMERGENCY);
@@ -33,7 +33,7 @@ bool EmergencyStop::send_due(std::int64_t now_us) {
   if (now_us < stop_->due_us) return false;
   if (!stop_->until_us) stop_->until_us = now_us + kLongestUs;
   stop_->due_us = now_us + kRepeatUs;
-  const std::array<std::uint8_t, 1> payload = {static_cast<std::uint8_t>(stop_->how)};
+  const std::array<std::uint8_t, 1> payload = {static_cast<std::uint8_t>(stop_->mode)};
   for (int i = 0; i < kFrames; ++i) {
     writer_.send(now_us, kBroadcast, BUSHD_MSG_EMERGENCY, payload);
   }

@@ -15,7 +15,7 @@ class EmergencyStop {
   // Both outlive it.
   EmergencyStop(PerMcu<McuRecord>& mcus, FrameWriter& writer) : mcus_(mcus), writer_(writer) {}
 
-  void begin(bushd_stop_mode how);
+  void begin(bushd_stop_mode mode);
   bool active() const { return stop_.has_value(); }
 
   // Precondition: active().
@@ -25,7 +25,7 @@ class EmergencyStop {
 
  private:
   struct Stop {
-    bushd_stop_mode how;
+    bushd_stop_mode mode;
     std::int64_t due_us = 0;
     std::optional<std::int64_t> until_us;  // once it has been said
   };

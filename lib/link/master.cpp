@@ -170,8 +170,8 @@ void Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t positio
   connector_.queue(mcu).set_position(motor, position_steps);
 }
 
-void Master::emergency_stop(bushd_stop_mode how) {
-  emergency_.begin(how);
+void Master::emergency_stop(bushd_stop_mode mode) {
+  emergency_.begin(mode);
   for (const McuIndex i : mcus_.indices()) streams_.drop_all(i);
   connector_.emergency_stop();
 }
@@ -180,8 +180,8 @@ void Master::reconfigure(McuIndex mcu, McuSetup setup) {
   if (connector_.reconfigure(mcu, std::move(setup))) streams_.drop_all(mcu);
 }
 
-std::string Master::no_room(McuIndex mcu, const McuSetup& setup) const {
-  return connector_.no_room(mcu, setup);
+Result<void> Master::check_room(McuIndex mcu, const McuSetup& setup) const {
+  return connector_.check_room(mcu, setup);
 }
 
 void Master::reset_low_water() {

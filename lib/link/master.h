@@ -109,13 +109,13 @@ class Master : private Transactions::Listener, private Connector::Listener {
 
   // Every motor of every MCU stops within two ticks of hearing it, and nothing more is sent for
   // any. Said again until all MCUs that are online have latched BUSHD_FAULT_EMERGENCY.
-  void emergency_stop(bushd_stop_mode how);
+  void emergency_stop(bushd_stop_mode mode);
 
   // Other tables or motors for an MCU, at rest: it goes through configuration again and comes back
   // with McuOnline.
   void reconfigure(McuIndex mcu, McuSetup setup);
-  // Why the MCU has no room for these tables, as far as it is known; "": it has.
-  std::string no_room(McuIndex mcu, const McuSetup& setup) const;
+  // The MCU has room for these tables, as far as it is known; or why not.
+  Result<void> check_room(McuIndex mcu, const McuSetup& setup) const;
 
   // Sent as soon as the line allows, answered in later reports.
   void control(McuIndex mcu, std::uint8_t actions) { connector_.control(mcu, actions); }

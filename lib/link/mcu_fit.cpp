@@ -12,67 +12,66 @@ constexpr unsigned kMinQueueTicks =
     2 * fieldbus::kMaxTicksPerFrame;           // one runs while the next arrives
 constexpr std::int64_t kMinQueueUs = 150'000;  // two lost answers and a frame
 
-// A motor's table makes more steps in a tick than the emission has room for.
-std::string lacks_time(const McuSetup& setup, const bushd_identity& identity,
-                       std::uint32_t tick_ns) {
-  unsigned room = 0;
-  const std::string why = fieldbus::emission_misfit(setup.emission, identity, tick_ns, &room);
-  if (!why.empty()) return why;
+// No motor's table makes more steps in a tick than the emission has room for.
+Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
+                        std::uint32_t tick_ns) {
+  const auto room = fieldbus::max_steps_per_tick(setup.emission, identity, tick_ns);
+  if (!room) return fail(room.error());
   for (std::size_t output = 0; output < setup.table_of_motor.size(); ++output) {
     const auto slot = setup.table_of_motor[output];
     if (!slot) continue;
     const bushd_table* table = setup.tables[*slot].table;
     const std::uint32_t steps = bushd_table_max_steps_per_tick(table, tick_ns);
-    if (steps <= room) continue;
-    return "has room for " + std::to_string(room) +
-           " steps of a motor in a tick, with its emission in " + std::to_string(identity.slots) +
-           " slots, but the table of output " + std::to_string(output) + " makes up to " +
-           std::to_string(steps) + ": use a slower table, or less step_us or dir_setup_us";
+    if (steps <= *room) continue;
+    return fail("has room for " + std::to_string(*room) +
+                " steps of a motor in a tick, with its emission in " +
+                std::to_string(identity.slots) + " slots, but the table of output " +
+                std::to_string(output) + " makes up to " + std::to_string(steps) +
+                ": use a slower table, or less step_us or dir_setup_us");
   }
   return {};
 }
 
 }  // namespace
 
-std::string lacks_room(const McuSetup& setup, const bushd_identity& identity,
-                       std::uint32_t tick_ns) {
+Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
+                        std::uint32_t tick_ns) {
   std::size_t codes = 0;
   for (const TableRef& ref : setup.tables) {
     codes += ref.table->accel.count;
     if (ref.table->decel.code != ref.table->accel.code) codes += ref.table->decel.count;
   }
-  if (codes <= identity.table_codes) return lacks_time(setup, identity, tick_ns);
-  return "has memory for " + std::to_string(identity.table_codes) +
-         " table codes, but its motors' tables need " + std::to_string(codes) +
-         ": use shorter tables or fewer on this MCU";
+  if (codes <= identity.table_codes) return check_time(setup, identity, tick_ns);
+  return fail("has memory for " + std::to_string(identity.table_codes) +
+              " table codes, but its motors' tables need " + std::to_string(codes) +
+              ": use shorter tables or fewer on this MCU");
 }
 
-std::string misfit(const BusSetup& bus, const McuSetup& setup, const bushd_identity& identity) {
+Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_identity& identity) {
   if (identity.protocol_version != BUSHD_PROTOCOL_VERSION) {
-    return "speaks protocol version " + std::to_string(identity.protocol_version) +
-           ", this program version " + std::to_string(BUSHD_PROTOCOL_VERSION) +
-           ": update the older of the two";
+    return fail("speaks protocol version " + std::to_string(identity.protocol_version) +
+                ", this program version " + std::to_string(BUSHD_PROTOCOL_VERSION) +
+                ": update the older of the two");
   }
   const bool fine = bus.format == BUSHD_FORMAT_FINE;
   if ((identity.capabilities & (fine ? BUSHD_CAN_FINE : BUSHD_CAN_COARSE)) == 0) {
-    return std::string("does not know the ") + (fine ? "fine" : "coarse") +
-           " format: choose the other one for this bus";
+    return fail(std::string("does not know the ") + (fine ? "fine" : "coarse") +
+                " format: choose the other one for this bus");
   }
   for (unsigned m = identity.motors; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if (setup.table_of_motor[m]) {
-      return "has only " + std::to_string(identity.motors) + " outputs, but output " +
-             std::to_string(m) + " is configured";
+      return fail("has only " + std::to_string(identity.motors) + " outputs, but output " +
+                  std::to_string(m) + " is configured");
     }
   }
-  if (const std::string why = lacks_room(setup, identity, bus.tick_ns); !why.empty()) {
-    return why;
-  }
+  if (auto room = check_room(setup, identity, bus.tick_ns); !room) return room;
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * bus.tick_ns / 1000;
   if (identity.queue_ticks < kMinQueueTicks || queue_us < kMinQueueUs) {
-    return "has a queue of " + std::to_string(identity.queue_ticks) + " ticks, " +
-           std::to_string(queue_us / 1000) + " ms; needed are " + std::to_string(kMinQueueTicks) +
-           " ticks and " + std::to_string(kMinQueueUs / 1000) + " ms: use a longer tick";
+    return fail("has a queue of " + std::to_string(identity.queue_ticks) + " ticks, " +
+                std::to_string(queue_us / 1000) + " ms; needed are " +
+                std::to_string(kMinQueueTicks) + " ticks and " +
+                std::to_string(kMinQueueUs / 1000) + " ms: use a longer tick");
   }
   return {};
 }

@@ -25,7 +25,7 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::u
   start_ = start;
   late_ns_ = late_ns;
   from_ = from_steps;
-  wanted_ = from_steps + steps;
+  target_ = from_steps + steps;
   stopping_ = false;
   stale_ = false;
   change_.reset();
@@ -45,7 +45,7 @@ void Axis::stop() {
 
 void Axis::aim(std::int64_t target_steps) {
   stopping_ = false;
-  wanted_ = target_steps;
+  target_ = target_steps;
   stale_ = true;
 }
 
@@ -55,12 +55,12 @@ bool Axis::change(Tick at) {
   head_ = base_;
   if (bushd_run_done(&base_.run)) return false;  // over, but for the report that says so
   plan_end();
-  const std::int64_t target = target_;
+  const std::int64_t planned_end = planned_end_;
   if (at >= std::max(end_, start_ + 1)) return false;
   change_ = Change{.at = at, .target_steps = {}};
-  if (!stopping_) change_->target_steps = wanted_;
+  if (!stopping_) change_->target_steps = target_;
   plan_end();
-  if (target_ != target) return true;
+  if (planned_end_ != planned_end) return true;
   change_.reset();
   plan_end();
   return false;
@@ -130,8 +130,8 @@ void Axis::plan_end() {
     advance(place, effective());
     take_change(place);
   }
-  target_ = from_ + place.run.direction * (static_cast<std::int64_t>(place.run.steps_done) +
-                                           bushd_run_steps_left(&place.run));
+  planned_end_ = from_ + place.run.direction * (static_cast<std::int64_t>(place.run.steps_done) +
+                                                bushd_run_steps_left(&place.run));
   end_ = end_of(place);
 }
 
@@ -140,7 +140,7 @@ void Axis::go_to(Tick first) {
   advance(head_, first);
 }
 
-std::optional<Axis::Stretch> Axis::run_at(Tick first, unsigned max_ticks) {
+std::optional<Axis::RunSegment> Axis::run_at(Tick first, unsigned max_ticks) {
   if (!busy_ || first < start_) return std::nullopt;
   go_to(first);
   Place place = head_;
@@ -148,7 +148,7 @@ std::optional<Axis::Stretch> Axis::run_at(Tick first, unsigned max_ticks) {
   if (bushd_run_done(&place.run) || bushd_run_begins_later(&place.run)) return std::nullopt;
   Tick until = std::min(first + max_ticks, end_of(place));
   if (change_ && effective() > first) until = std::min(until, effective());
-  return Stretch{.run = place.run, .ticks = static_cast<unsigned>(until - first)};
+  return RunSegment{.run = place.run, .ticks = static_cast<unsigned>(until - first)};
 }
 
 std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::size_t stride) {

@@ -68,11 +68,11 @@ class Axis {
   // The run as it is at the beginning of tick `first`, and for how many ticks (1 .. max_ticks) it
   // gives what render() would: up to the next change or the run's end. Nothing before the start, in
   // a start tick in whose middle it begins, and after the end. Preconditions as of render().
-  struct Stretch {
+  struct RunSegment {
     bushd_run run;
     unsigned ticks;
   };
-  std::optional<Stretch> run_at(Tick first, unsigned max_ticks);
+  std::optional<RunSegment> run_at(Tick first, unsigned max_ticks);
 
   // The ticks before `until` are over and will not be asked for again. Returns the change that was
   // among them.
@@ -94,10 +94,10 @@ class Axis {
   // Of this run: +1, -1.
   int direction() const { return base_.run.direction; }
   // Where this run ends, as planned now, and where the motor was last told to go.
+  std::int64_t planned_end_steps() const { return planned_end_; }
   std::int64_t target_steps() const { return target_; }
-  std::int64_t wanted_steps() const { return wanted_; }
   // Where the motor will stand when all is done: after a second run, if it takes one.
-  std::int64_t final_steps() const { return stopping_ ? target_ : wanted_; }
+  std::int64_t end_steps() const { return stopping_ ? planned_end_ : target_; }
   // Of the step that runs at the last executed tick; 0 when not moving.
   double velocity_steps_per_s() const;
 
@@ -123,8 +123,8 @@ class Axis {
   std::uint32_t late_ns_ = 0;
   Tick end_ = 0;
   std::int64_t from_ = 0;
+  std::int64_t planned_end_ = 0;
   std::int64_t target_ = 0;
-  std::int64_t wanted_ = 0;
   bool stopping_ = false;
   bool stale_ = false;            // what is wanted has changed since the last change()
   std::optional<Change> change_;  // planned and not yet executed

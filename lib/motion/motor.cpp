@@ -11,8 +11,9 @@ namespace {
 
 constexpr Tick kNever = INT64_MAX / 2;
 
-constexpr const char* kCutOff = "it was cut off by an emergency stop and may have overrun";
-constexpr const char* kUnpowered = "its drivers were switched off by overcurrent while it moved";
+constexpr const char* kStoppedImmediately =
+    "it was stopped immediately by an emergency stop and may have overrun";
+constexpr const char* kUnpowered = "its drivers were disabled by overcurrent while it moved";
 
 std::string switch_at(int direction) {
   return std::string("its limit switch at the ") + (direction > 0 ? "positive" : "negative") +
@@ -41,9 +42,9 @@ Result<void> Motor::may_be_used() const {
 Result<void> Motor::may_move_to(std::int64_t target) const {
   if (uncertain_reason_) {
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
-                (setup_.has_home ? "say 'bushctl home NAME', or find out where it stands and say "
+                (setup_.has_home ? "run 'bushctl home NAME', or find out where it stands and run "
                                    "'bushctl set NAME STEPS'"
-                                 : "find out where it stands and say 'bushctl set NAME STEPS'"));
+                                 : "find out where it stands and run 'bushctl set NAME STEPS'"));
   }
   const std::int64_t steps = target - position_;
   if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
@@ -55,7 +56,9 @@ Result<void> Motor::may_move_to(std::int64_t target) const {
   }
   const int direction = steps < 0 ? -1 : 1;
   if (steps != 0 && forbidden(direction)) {
-    return fail(switch_at(direction) + " bars the way; move it in the other direction");
+    return fail(
+        switch_at(direction) +
+        " is active: motion in this direction is inhibited; move it in the other direction");
   }
   if (axis_.duration_ticks(steps) > Axis::kMaxDurationTicks) {
     const double tick_days = axis_.tick_ns() * 1e-9 / 86400;
@@ -100,9 +103,9 @@ void Motor::rest() {
   }
 }
 
-bool Motor::cuts(const bushd_report& report) const {
-  return ((report.faults & BUSHD_FAULT_EMERGENCY) != 0 && setup_.emergency_stop_cuts) ||
-         ((report.faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0 && setup_.emergency_input_cuts);
+bool Motor::stops_immediately(const bushd_report& report) const {
+  return ((report.faults & BUSHD_FAULT_EMERGENCY) != 0 && setup_.emergency_stop_immediate) ||
+         ((report.faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0 && setup_.emergency_input_immediate);
 }
 
 void Motor::take_limits(const bushd_report& report) {
@@ -114,11 +117,11 @@ void Motor::take_limits(const bushd_report& report) {
 void Motor::goes_online(const bushd_report& report, bool first, bool restarted) {
   const std::int64_t before = std::exchange(position_, report.motor[output().value].position_steps);
   if (restarted) uncertain_reason_ = "MCU " + setup_.mcu + " restarted";
-  // Nobody here has seen whether it moved when it was cut off.
-  const bool cut = cuts(report);
+  // Nobody here has seen whether it moved when it was stopped.
+  const bool immediate = stops_immediately(report);
   const bool unpowered = (report.faults & BUSHD_FAULT_OVERCURRENT) != 0;
-  if ((cut || unpowered) && (first || position_ != before)) {
-    uncertain_reason_ = cut ? kCutOff : kUnpowered;
+  if ((immediate || unpowered) && (first || position_ != before)) {
+    uncertain_reason_ = immediate ? kStoppedImmediately : kUnpowered;
   }
   take_limits(report);
   follow_autonomous(report);
@@ -141,7 +144,7 @@ std::vector<Event> Motor::report(const Report& report) {
 void Motor::follow_autonomous(const bushd_report& report) {
   const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output()));
   if (before && !autonomous_) {
-    if (cuts(report)) uncertain_reason_ = kCutOff;
+    if (stops_immediately(report)) uncertain_reason_ = kStoppedImmediately;
     if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) uncertain_reason_ = kUnpowered;
   }
   if (is<Resting>() || is<Local>()) rest();
@@ -193,7 +196,7 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
     if (axis_.needs_change()) events.emplace_back(event::Replan{});
   } else if (now.position_mismatch) {
     if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
-  } else if (position_ == axis_.wanted_steps()) {
+  } else if (position_ == axis_.target_steps()) {
     events.emplace_back(ended(Outcome::kReached, "stands at its target"));
   } else if (axis_.stopping()) {
     events.emplace_back(ended(Outcome::kStopped, "stopped on request"));
@@ -265,7 +268,7 @@ void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
 
 // It stands.
 event::Ended Motor::end_at_limit() {
-  if (!axis_.stopping() && position_ == axis_.wanted_steps()) {
+  if (!axis_.stopping() && position_ == axis_.target_steps()) {
     return ended(Outcome::kReached, "stands at its target");
   }
   if (axis_.stopping() && position_ == axis_.executed_steps()) {
@@ -274,8 +277,8 @@ event::Ended Motor::end_at_limit() {
   std::string reason = "stopped by " + switch_at(std::get<Moving>(activity_).limit) +
                        ", stands at " + std::to_string(position_);
   if (setup_.limit_immediate && position_ != axis_.from_steps()) {
-    uncertain_reason_ = "it was cut off at its limit switch and may have overrun";
-    reason += "; cut off, it may have overrun, so check the position and set it";
+    uncertain_reason_ = "it was stopped immediately at its limit switch and may have overrun";
+    reason += "; stopped immediately, it may have overrun, so check the position and set it";
   }
   return ended(Outcome::kLimit, std::move(reason));
 }
@@ -289,7 +292,7 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
     return ended(Outcome::kFault, *uncertain_reason_ + "; check the position and set it");
   }
   if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
-    const std::string why = mcu + " switched its drivers off because " + stop_cause(report);
+    const std::string why = mcu + " disabled its drivers because " + stop_cause(report);
     if (stepped) uncertain_reason_ = kUnpowered;
     return ended(Outcome::kFault, stepped
                                       ? why + "; check the position and set it"
@@ -299,12 +302,12 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
     const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
     const std::string by = commanded ? "an emergency stop" : "the emergency input of " + mcu;
-    const bool overran = cuts(report) && stepped;
-    if (overran) uncertain_reason_ = kCutOff;
-    return ended(
-        Outcome::kStopped,
-        overran ? "cut off by " + by + "; it may have overrun, so check the position and set it"
-                : "stopped by " + by);
+    const bool overran = stops_immediately(report) && stepped;
+    if (overran) uncertain_reason_ = kStoppedImmediately;
+    return ended(Outcome::kStopped,
+                 overran ? "stopped immediately by " + by +
+                               "; it may have overrun, so check the position and set it"
+                         : "stopped by " + by);
   }
   if (is<Armed>()) {
     return ended(Outcome::kLink, mcu + " disarmed it by itself because " + stop_cause(report));

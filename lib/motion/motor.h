@@ -26,8 +26,8 @@ struct MotorSetup {
   bool has_home = false;
   // Without a ramp, so that it may overrun.
   bool limit_immediate = false;
-  bool emergency_stop_cuts = false;
-  bool emergency_input_cuts = false;
+  bool emergency_stop_immediate = false;
+  bool emergency_input_immediate = false;
 };
 
 // What a motor does. Any other than Resting keeps other motions away from it.
@@ -103,7 +103,7 @@ class Motor {
 
   std::int64_t position_steps() const { return position_; }  // as reported last
   // Where it will stand when all is done.
-  std::int64_t target_steps() const { return has_plan() ? axis_.final_steps() : position_; }
+  std::int64_t target_steps() const { return has_plan() ? axis_.end_steps() : position_; }
   double velocity_steps_per_s() const { return is<Moving>() ? axis_.velocity_steps_per_s() : 0.0; }
   // Nothing: the position is known.
   const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
@@ -147,7 +147,7 @@ class Motor {
 
  private:
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
-  bool cuts(const bushd_report& report) const;
+  bool stops_immediately(const bushd_report& report) const;
   void take_limits(const bushd_report& report);
   void follow(const Report& report, std::vector<Event>& events);
   bool follow_armed(const Report& report, std::vector<Event>& events);

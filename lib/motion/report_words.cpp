@@ -34,18 +34,19 @@ std::string fault_text(const bushd_report& report) {
            "; only a reboot that finds it good lets it move";
   }
   if (faults & BUSHD_FAULT_OVERCURRENT) {
-    return "overcurrent, its drivers are off (reading now: " + std::to_string(report.current) +
-           "); find the cause, say 'bushctl clear', then 'bushctl enable'";
+    return "overcurrent, its drivers are disabled (reading now: " + std::to_string(report.current) +
+           "); find the cause, run 'bushctl clear', then 'bushctl enable'";
   }
   if (faults & BUSHD_FAULT_EMERGENCY_INPUT) {
     return (report.system_inputs & BUSHD_INPUT_EMERGENCY) != 0
-               ? "emergency input; release it, then say 'bushctl clear'"
-               : "emergency input, released by now; say 'bushctl clear'";
+               ? "emergency input; release it, then run 'bushctl clear'"
+               : "emergency input, released by now; run 'bushctl clear'";
   }
-  if (faults & BUSHD_FAULT_EMERGENCY) return "emergency stop; say 'bushctl clear'";
+  if (faults & BUSHD_FAULT_EMERGENCY) return "emergency stop; run 'bushctl clear'";
   if (faults & BUSHD_FAULT_EEPROM) {
-    return "what it keeps was unreadable, defaults are in use; if its unique id is 0 in 'bushctl "
-           "health', write that anew (docs/firmware.md), then say 'bushctl clear'";
+    return "its stored settings were unreadable, defaults are in use; if its unique id is 0 in "
+           "'bushctl "
+           "health', write that anew (docs/firmware.md), then run 'bushctl clear'";
   }
   if (faults & BUSHD_FAULT_SYNC) return "out of step with the bus";
   if (faults & BUSHD_FAULT_LINK) return "nothing more reached it in motion";

@@ -10,7 +10,7 @@ namespace bushd::sim {
 // the wall.
 using TimeNs = std::int64_t;
 
-enum class Signal : std::uint8_t { kStep, kDir, kEnable, kCommonDir, kReference };
+enum class Signal : std::uint8_t { kStep, kDir, kEnable, kCommonDir, kPositionCompare };
 
 inline constexpr std::size_t kOutputsPerMcu = 16;
 
@@ -18,7 +18,7 @@ struct Edge {
   TimeNs time_ns;
   std::size_t mcu;  // position on the bus, in the order of Bus::add_mcu
   Signal signal;
-  std::uint8_t index;  // output 0..15; 0 for kEnable, kCommonDir and kReference
+  std::uint8_t index;  // output 0..15; 0 for kEnable, kCommonDir and kPositionCompare
   bool level;
 };
 

@@ -42,7 +42,7 @@ std::vector<TimeNs> coarse_tolerances(const std::vector<TimeNs>& delay_ns, TimeN
   return tolerance;
 }
 
-// For every delay of the accelerating side, how long a run-down from it or from a slower one takes
+// For every delay of the accelerating side, how long a ramp-down from it or from a slower one takes
 // at most. Just below D(n-1) the running step is longest of all that n steps follow.
 // An MCU may take it for faster: by 1/256 step a tick in the fine format. In the coarse one it
 // counts the steps of four ticks, at most one more than pass in that time, and adds one.
@@ -87,9 +87,9 @@ PaceRules::PaceRules(const bushd_table& table, std::uint32_t tick_ns, std::uint1
   }
   rest_ns_ = std::max(delay_ns_.front(), stop_delay_ns.front()) + tick_ns_ + 2 * worst;
   rest_ns_ += rest_ns_ / kFaster;
-  run_down_ns_ = fine ? ramp_downs(delay_ns_, stop_delay_ns, 256 * tick_ns_, 1)
-                      : ramp_downs(delay_ns_, stop_delay_ns, 4 * tick_ns_, 2);
-  for (TimeNs& ns : run_down_ns_) ns += ns / kFaster + 2 * worst + tick_ns_;
+  ramp_down_ns_ = fine ? ramp_downs(delay_ns_, stop_delay_ns, 256 * tick_ns_, 1)
+                       : ramp_downs(delay_ns_, stop_delay_ns, 4 * tick_ns_, 2);
+  for (TimeNs& ns : ramp_down_ns_) ns += ns / kFaster + 2 * worst + tick_ns_;
   stop_ns_.push_back(0);
   for (const TimeNs delay : stop_delay_ns) stop_ns_.push_back(stop_ns_.back() + delay);
   for (TimeNs& ns : stop_ns_) ns -= ns / kFaster;

@@ -1,5 +1,5 @@
 // Whether a motor's steps, seen from outside, keep to its table: no jump in speed, neither up nor
-// down, whoever made the steps (streamed ticks, a stop, an MCU's own run-down).
+// down, whoever made the steps (streamed ticks, a stop, an MCU's own ramp-down).
 //
 // Let tau_j be the exact time of step j by the table and t_j when its pulse came. Within
 // tolerances derived below, t_j = tau_j + e with |e| <= E. From rest, the exact delay before step j
@@ -56,9 +56,9 @@ class PaceRules {
   TimeNs tolerance_ns(std::size_t k) const { return tolerance_ns_[k]; }  // for A(k) and shorter
   std::size_t stop_steps() const { return stop_ns_.size() - 1; }
   TimeNs stop_ns(std::size_t n) const { return stop_ns_[n]; }  // the least time of the last n
-  // The longest run-down, tolerances included, of a motor whose exact delay is at least A(k): it
+  // The longest ramp-down, tolerances included, of a motor whose exact delay is at least A(k): it
   // completes the running step, of delay x, and makes the fewest steps n with D(n) <= x.
-  TimeNs run_down_ns(std::size_t k) const { return run_down_ns_[k]; }
+  TimeNs ramp_down_ns(std::size_t k) const { return ramp_down_ns_[k]; }
   // Silent for longer, the motor is surely at rest.
   TimeNs rest_ns() const { return rest_ns_; }
 
@@ -67,7 +67,7 @@ class PaceRules {
   std::vector<TimeNs> delay_ns_;
   std::vector<TimeNs> tolerance_ns_;
   std::vector<TimeNs> stop_ns_;
-  std::vector<TimeNs> run_down_ns_;
+  std::vector<TimeNs> ramp_down_ns_;
   TimeNs rest_ns_;
 };
 
@@ -75,7 +75,7 @@ enum class Jump {
   kNone,
   kTooFast,     // a step earlier than the table allows after those before
   kTurned,      // the direction changed without a rest
-  kStoppedDead  // at rest without a run-down
+  kStoppedDead  // at rest without a ramp-down
 };
 
 class Pace {
@@ -95,10 +95,10 @@ class Pace {
   bool cut_off() { return count_ != 0 && come_to_rest() == Jump::kStoppedDead; }
 
   bool moving() const { return count_ != 0; }
-  // If it runs down from now on, it rests after this time. At rest: it may have begun, and then
+  // If it ramps down from now on, it rests after this time. At rest: it may have begun, and then
   // completes its first step.
-  TimeNs run_down_ns() const {
-    return rules_->run_down_ns(count_ == 0 ? 0 : std::min(k_ + 1, rules_->last()));
+  TimeNs ramp_down_ns() const {
+    return rules_->ramp_down_ns(count_ == 0 ? 0 : std::min(k_ + 1, rules_->last()));
   }
   TimeNs last_ns() const { return time_ns_[newest_]; }
   // The first step since the last rest.

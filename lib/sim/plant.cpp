@@ -60,13 +60,13 @@ void Plant::report(TimeNs time_ns, std::size_t mcu, std::size_t output, const Mo
                "turned without a rest, " + in_us(motor.pace.too_early_ns()) + " too early");
       break;
     case Jump::kStoppedDead:
-      violated(time_ns, mcu, output, "stopped without the run-down of its table");
+      violated(time_ns, mcu, output, "stopped without the ramp-down of its table");
       break;
   }
 }
 
 void Plant::edge(const Edge& edge) {
-  if (edge.signal == Signal::kReference) return;
+  if (edge.signal == Signal::kPositionCompare) return;
   if (edge.signal == Signal::kEnable) {
     enabled_[edge.mcu] = edge.level;
     return;
@@ -110,7 +110,7 @@ void Plant::settled(TimeNs until_ns) {
       if (motor == nullptr) continue;
       check_rotor(until_ns, mcu, output, *motor);
       if (!motor->pace.moving()) continue;
-      if (motor->halt && motor->halt->cut && until_ns >= motor->halt->from_ns) {
+      if (motor->halt && motor->halt->immediate && until_ns >= motor->halt->from_ns) {
         if (motor->pace.cut_off() && on_cut_off) on_cut_off(until_ns, mcu, output);
       }
       const Jump jump = motor->pace.silent(until_ns);
@@ -126,11 +126,11 @@ void Plant::cut(std::size_t mcu) {
   release(mcu);
 }
 
-void Plant::halt(std::size_t mcu, TimeNs now_ns, bool cut) {
+void Plant::halt(std::size_t mcu, TimeNs now_ns, bool immediate) {
   for (const auto& motor : motor_of_[mcu]) {
-    if (!motor || (motor->halt && motor->halt->cut >= cut)) continue;
+    if (!motor || (motor->halt && motor->halt->immediate >= immediate)) continue;
     const TimeNs tick_ns = motor->rules->tick_ns();
-    motor->halt = Halt{now_ns + 2 * tick_ns + tick_ns / 16, cut, motor->pace.run_down_ns()};
+    motor->halt = Halt{now_ns + 2 * tick_ns + tick_ns / 16, immediate, motor->pace.ramp_down_ns()};
   }
 }
 
@@ -150,10 +150,10 @@ void Plant::check_rotor(TimeNs until_ns, std::size_t mcu, std::size_t output, Mo
 
 void Plant::check_halt(TimeNs time_ns, std::size_t mcu, std::size_t output, Motor& motor) {
   Halt& halt = *motor.halt;
-  if (halt.cut) return violated(time_ns, mcu, output, "a step after it was cut off");
-  if (!halt.seen) halt.run_down_ns = std::max(halt.run_down_ns, motor.pace.run_down_ns());
+  if (halt.immediate) return violated(time_ns, mcu, output, "a step after an immediate stop");
+  if (!halt.seen) halt.ramp_down_ns = std::max(halt.ramp_down_ns, motor.pace.ramp_down_ns());
   halt.seen = true;
-  const TimeNs late_ns = time_ns - halt.from_ns - halt.run_down_ns;
+  const TimeNs late_ns = time_ns - halt.from_ns - halt.ramp_down_ns;
   if (late_ns <= 0) return;
   violated(time_ns, mcu, output,
            "still moving " + in_us(late_ns) + " after an emergency stop's ramp");

@@ -31,7 +31,7 @@ class Plant final : public EdgeSink {
   std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what)>
       on_violation;
 
-  // A motor that an emergency stop has cut off in motion: a real one may have overrun.
+  // A motor that an emergency stop has stopped immediately in motion: a real one may have overrun.
   std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output)> on_cut_off;
 
   void edge(const Edge& edge) override;
@@ -40,9 +40,9 @@ class Plant final : public EdgeSink {
   // The MCU was reset: whatever moved was cut off, and is excused until it starts again.
   void cut(std::size_t mcu);
 
-  // An emergency stop has reached the MCU. From two ticks later on its motors make no step (`cut`),
-  // or run down; none starts until release().
-  void halt(std::size_t mcu, TimeNs now_ns, bool cut);
+  // An emergency stop has reached the MCU. From two ticks later on its motors make no step
+  // (`immediate`), or ramp down; none starts until release().
+  void halt(std::size_t mcu, TimeNs now_ns, bool immediate);
   void release(std::size_t mcu);
 
   // Where the motor stands, by its pulses since the beginning.
@@ -65,10 +65,10 @@ class Plant final : public EdgeSink {
  private:
   struct Halt {
     TimeNs from_ns;
-    bool cut;
-    // The longest run-down from what it has been seen to do: while the stop takes effect it may
+    bool immediate;
+    // The longest ramp-down from what it has been seen to do: while the stop takes effect it may
     // still speed up.
-    TimeNs run_down_ns;
+    TimeNs ramp_down_ns;
     bool seen = false;  // a step after from_ns
   };
   // No motor makes more steps in a tick (docs/protocol.md, TICKS).

@@ -23,7 +23,7 @@ std::size_t wire_of(const Edge& edge) {
       return first + 2 * kOutputsPerMcu;
     case Signal::kCommonDir:
       return first + 2 * kOutputsPerMcu + 1;
-    case Signal::kReference:
+    case Signal::kPositionCompare:
       break;
   }
   return first + 2 * kOutputsPerMcu + 2;
@@ -33,7 +33,7 @@ std::string wire_name(std::size_t wire) {
   if (wire < kOutputsPerMcu) return "step" + std::to_string(wire);
   if (wire < 2 * kOutputsPerMcu) return "dir" + std::to_string(wire - kOutputsPerMcu);
   if (wire == 2 * kOutputsPerMcu) return "en";
-  return wire == 2 * kOutputsPerMcu + 1 ? "common_dir" : "reference";
+  return wire == 2 * kOutputsPerMcu + 1 ? "common_dir" : "position_compare";
 }
 
 // The standard allows any printable characters; short codes keep the file small.

@@ -41,7 +41,7 @@ void VirtualMcu::on_edge(void* context, std::int64_t time_ns, bushd_virtual_sign
   static_assert(static_cast<int>(Signal::kDir) == BUSHD_VIRTUAL_DIR);
   static_assert(static_cast<int>(Signal::kEnable) == BUSHD_VIRTUAL_EN);
   static_assert(static_cast<int>(Signal::kCommonDir) == BUSHD_VIRTUAL_COMMON_DIR);
-  static_assert(static_cast<int>(Signal::kReference) == BUSHD_VIRTUAL_REFERENCE);
+  static_assert(static_cast<int>(Signal::kPositionCompare) == BUSHD_VIRTUAL_COMPARE);
   const Edge edge = {time_ns, self.index_, static_cast<Signal>(signal), index, level};
   if (self.supply_) self.supply_->edge(edge);
   if (self.sink_ != nullptr) self.sink_->edge(edge);

@@ -120,7 +120,7 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   watch_port('B', Signal::kDir, 8);
   pins_[pin_count_] = {this, Signal::kEnable, 0, false};
   watch_pin('H', 3, on_pin, &pins_[pin_count_++]);
-  pins_[pin_count_] = {this, Signal::kReference, 0, false};
+  pins_[pin_count_] = {this, Signal::kPositionCompare, 0, false};
   watch_pin('G', 5, on_pin, &pins_[pin_count_++]);
   pins_[pin_count_] = {this, Signal::kCommonDir, 0, false};
   watch_pin('F', 2, on_pin, &pins_[pin_count_++]);

@@ -3,12 +3,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdio>
-#include <fstream>
-#include <functional>
 #include <memory>
-#include <sstream>
 #include <stdexcept>
 
 namespace bushd::sim {
@@ -18,42 +14,14 @@ namespace {
 constexpr std::uint64_t kRam = 0x800000;
 constexpr std::uint64_t kRamEnd = kRam + 0x10000;
 
-void for_lines(const std::string& command, const std::function<void(const std::string&)>& take) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"),
-                                                             ::pclose);
-  if (!pipe) throw std::runtime_error(command + ": cannot be run");
-  std::string line;
-  for (int c; (c = std::fgetc(pipe.get())) != EOF;) {
-    if (c != '\n') {
-      line += static_cast<char>(c);
-      continue;
-    }
-    take(line);
-    line.clear();
-  }
-}
-
-std::string quoted(const std::string& path) {
-  return "'" + path + "'";
-}
-
-bool ends_with_path(const std::string& path, const std::string& end) {
-  if (path == end) return true;
-  return path.size() > end.size() && path.ends_with(end) &&
-         path[path.size() - end.size() - 1] == '/';
-}
-
 }  // namespace
 
-AvrMemoryMap::AvrMemoryMap(const std::string& image, const std::string& owners) : image_(image) {
+AvrMemoryMap::AvrMemoryMap(const std::string& image, const std::string& owners) : MemoryMap(image) {
   read_units();
   read_symbols();
-  read_owners(owners);
-  // Parts after what they are parts of.
-  std::stable_sort(objects_.begin(), objects_.end(),
-                   [](const Object& a, const Object& b) { return a.size > b.size; });
-  for (std::size_t i = 0; i < objects_.size(); ++i) {
-    const Object& object = objects_[i];
+  assign_writers(owners);
+  for (std::size_t i = 0; i < objects().size(); ++i) {
+    const Object& object = objects()[i];
     for (std::size_t at = object.address; at < std::size_t{object.address} + object.size; ++at) {
       object_at_.at(at) = static_cast<std::int16_t>(i);
       writers_.at(at) = object.writers;
@@ -64,12 +32,9 @@ AvrMemoryMap::AvrMemoryMap(const std::string& image, const std::string& owners) 
 // Rows are `FILE LINE 0xADDRESS`, below the compilation unit that they are of.
 void AvrMemoryMap::read_units() {
   Unit unit = kNoUnit;
-  for_lines("avr-objdump --dwarf=decodedline " + quoted(image_), [&](const std::string& line) {
+  for_lines("avr-objdump --dwarf=decodedline " + quoted(image()), [&](const std::string& line) {
     if (line.starts_with("CU: ")) {
-      std::string file = line.substr(4, line.find_last_not_of(": \r") - 3);
-      while (file.starts_with("./") || file.starts_with("../")) file.erase(0, file.find('/') + 1);
-      units_.push_back(file);
-      unit = static_cast<Unit>(units_.size() - 1);
+      unit = unit_of(line.substr(4, line.find_last_not_of(": \r") - 3));
       return;
     }
     const std::size_t hex = line.rfind("0x");
@@ -78,8 +43,7 @@ void AvrMemoryMap::read_units() {
     if (unit_at_.size() <= word) unit_at_.resize(word + 1, kNoUnit);
     unit_at_[word] = unit;
   });
-  if (units_.size() == 1) throw std::runtime_error(image_ + ": has no line numbers");
-  if (units_.size() > kUnits) throw std::runtime_error(image_ + ": has too many source files");
+  if (units() == 1) throw std::runtime_error(image() + ": has no line numbers");
 }
 
 // A row stands for the instructions up to the next one, or to a symbol without one: a library's.
@@ -95,15 +59,15 @@ void AvrMemoryMap::take_symbol(const std::string& name, const GElf_Sym& symbol,
   if (name == "__stack") stack_top_ = static_cast<std::uint16_t>(symbol.st_value);
   if (GELF_ST_TYPE(symbol.st_info) != STT_OBJECT) return;
   if (symbol.st_value < kRam || symbol.st_value >= kRamEnd) return;
-  objects_.push_back({name, static_cast<std::uint16_t>(symbol.st_value - kRam),
-                      static_cast<std::uint16_t>(symbol.st_size), 0});
+  add({name, static_cast<std::uint32_t>(symbol.st_value - kRam),
+       static_cast<std::uint32_t>(symbol.st_size), 0});
   if (GELF_ST_BIND(symbol.st_info) == STB_LOCAL) defined_in_[name] = source;
 }
 
 void AvrMemoryMap::read_symbols() {
   elf_version(EV_CURRENT);
-  const int file = ::open(image_.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) throw std::runtime_error(image_ + ": cannot be read");
+  const int file = ::open(image().c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) throw std::runtime_error(image() + ": cannot be read");
   const std::unique_ptr<Elf, int (*)(Elf*)> elf(elf_begin(file, ELF_C_READ, nullptr), elf_end);
   std::set<std::size_t> code;
   std::string source;
@@ -122,76 +86,33 @@ void AvrMemoryMap::read_symbols() {
   ::close(file);
   fill_units(code);
   if (variables_end_ == 0 || stack_top_ == 0) {
-    throw std::runtime_error(image_ + ": does not tell where its variables and its stack end");
+    throw std::runtime_error(image() + ": does not tell where its variables and its stack end");
   }
 }
 
-std::uint64_t AvrMemoryMap::units_ending(const std::string& end) const {
-  std::uint64_t found = 0;
-  for (std::size_t i = 1; i < units_.size(); ++i) {
-    if (end == "*" || ends_with_path(units_[i], end)) found |= std::uint64_t{1} << i;
-  }
-  return found;
-}
-
-AvrMemoryMap::Unit AvrMemoryMap::unit_named(const std::string& end) const {
-  for (std::size_t i = 1; i < units_.size(); ++i) {
-    if (ends_with_path(units_[i], end)) return static_cast<Unit>(i);
-  }
-  throw std::out_of_range(image_ + ": is not made of " + end);
-}
-
-void AvrMemoryMap::read_owners(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw std::runtime_error(path + ": cannot be read");
-  std::map<std::string, std::uint64_t> owners;
-  std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
-    const std::string at = path + ":" + std::to_string(number) + ": ";
-    std::istringstream words(line.substr(0, line.find('#')));
-    std::string object;
-    if (!(words >> object)) continue;
-    if (std::none_of(objects_.begin(), objects_.end(),
-                     [&](const Object& o) { return o.name == object; })) {
-      throw std::runtime_error(at + "the image has no object " + object);
+void AvrMemoryMap::assign_writers(const std::string& owners) {
+  const std::set<std::string> named = read_owners(owners);
+  for (std::size_t i = 0; i < objects().size(); ++i) {
+    const std::string& name = objects()[i].name;
+    if (named.contains(name)) continue;
+    const auto defined = defined_in_.find(name);
+    if (defined == defined_in_.end()) {
+      throw std::runtime_error(owners + ": does not say who may write " + name);
     }
-    owners[object];  // without a file it is nobody's
-    for (std::string end; words >> end;) {
-      const std::uint64_t units = units_ending(end);
-      if (units == 0) throw std::runtime_error(at + "the image has no source file " + end);
-      owners[object] |= units;
-    }
-  }
-  for (Object& object : objects_) {
-    const auto named = owners.find(object.name);
-    const auto defined = defined_in_.find(object.name);
-    if (named != owners.end()) {
-      object.writers = named->second;
-    } else if (defined != defined_in_.end()) {
-      object.writers = units_ending(defined->second);
-    } else {
-      throw std::runtime_error(path + ": says not who may write " + object.name);
-    }
+    set_writers(i, units_ending(defined->second));
   }
 }
 
 const AvrMemoryMap::Object* AvrMemoryMap::object_at(std::uint16_t address) const {
   const std::int16_t index = object_at_.at(address);
-  return index < 0 ? nullptr : &objects_[static_cast<std::size_t>(index)];
-}
-
-const AvrMemoryMap::Object& AvrMemoryMap::object(const std::string& name) const {
-  for (const Object& object : objects_) {
-    if (object.name == name) return object;
-  }
-  throw std::out_of_range(image_ + ": has no object " + name);
+  return index < 0 ? nullptr : &objects()[static_cast<std::size_t>(index)];
 }
 
 std::string AvrMemoryMap::place_of(std::uint32_t pc) const {
   char command[32];
   std::snprintf(command, sizeof command, " -f 0x%x", static_cast<unsigned>(pc));
   std::vector<std::string> lines;
-  for_lines("avr-addr2line -s -e " + quoted(image_) + command,
+  for_lines("avr-addr2line -s -e " + quoted(image()) + command,
             [&](const std::string& line) { lines.push_back(line); });
   if (lines.size() != 2) return std::string(command + 4);
   return lines[0] + " (" + lines[1].substr(0, lines[1].find(' ')) + ")";

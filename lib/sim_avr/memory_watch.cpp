@@ -55,9 +55,9 @@ struct AvrMemoryWatch::Borrowed {
   explicit Borrowed(const AvrMemoryMap& map)
       : buffer(map.object("mcu.receiver.buffer")),
         reply(map.object("mcu.reply")),
-        rows_next(map.object("mcu.rows.next").address),
-        rows_count(map.object("mcu.rows.count").address),
-        answer(map.object("mcu.answer.size").address),
+        rows_next(map.address_of("mcu.rows.next")),
+        rows_count(map.address_of("mcu.rows.count")),
+        answer(map.address_of("mcu.answer.size")),
         line(map.unit_named("atmega2560/line.c")),
         decoder(map.unit_named("atmega2560/receive.S")),
         frames(map.unit_named("engine/frame.c")) {}

@@ -37,7 +37,7 @@ typedef enum lockstep_event_kind {
   LOCKSTEP_STORED = 8,         // value: the flash word at `address` is this now
   LOCKSTEP_WATCHDOG = 9,       // it is reset, and the process ends; value: the first word of RAM
   LOCKSTEP_COMMON_DIR = 10,    // value: level
-  LOCKSTEP_REFERENCE = 11,     // value: level
+  LOCKSTEP_COMPARE = 11,       // value: level
   LOCKSTEP_CONVERTS = 12,      // its ADC begins a conversion, and waits for LOCKSTEP_CURRENT
   LOCKSTEP_VIOLATION = 13      // value: lockstep_violation; `address` of memory; pc and caller:
                                // watch.h. The process ends

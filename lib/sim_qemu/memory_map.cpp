@@ -1,11 +1,8 @@
 #include "sim_qemu/memory_map.h"
 
-#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cstdio>
-#include <fstream>
-#include <memory>
 #include <sstream>
 #include <stdexcept>
 
@@ -14,20 +11,7 @@ namespace {
 
 constexpr std::uint32_t kRam = 0x20000000;
 constexpr std::uint32_t kRamSize = 0x10000;
-constexpr std::size_t kMostUnits = 64;
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
-
-// What the command says.
-std::string output_of(const std::string& command) {
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(::popen(command.c_str(), "r"), ::pclose);
-  if (!pipe) throw std::runtime_error(command + ": cannot be run");
-  std::string out;
-  std::array<char, 4096> some;
-  while (const std::size_t got = std::fread(some.data(), 1, some.size(), pipe.get())) {
-    out.append(some.data(), got);
-  }
-  return out;
-}
+constexpr std::uint64_t kEverybody = ~std::uint64_t{0};
 
 std::string hex(std::uint32_t value) {
   std::array<char, 16> text;
@@ -41,22 +25,15 @@ bool in_ram(std::uint32_t address) {
 
 }  // namespace
 
-QemuMemoryMap::QemuMemoryMap(const std::string& image, const std::string& owners) : image_(image) {
-  read_symbols();
-  if (main_at_ == 0 || stack_limit_ == 0 || stack_end_ == 0 || units_.size() < 2) {
+QemuMemoryMap::QemuMemoryMap(const std::string& image, const std::string& owners)
+    : MemoryMap(image) {
+  for_lines("arm-none-eabi-nm -S -l " + quoted(image),
+            [this](const std::string& line) { take_symbol(line); });
+  if (main_at_ == 0 || stack_limit_ == 0 || stack_end_ == 0 || units() < 2) {
     throw std::runtime_error(image + ": arm-none-eabi-nm finds no symbols with line numbers");
   }
-  objects_.push_back({"stack", stack_limit_, stack_end_ - stack_limit_, kAll});
-  // Of those that begin together the larger one is the whole.
-  std::stable_sort(objects_.begin(), objects_.end(), [](const Object& a, const Object& b) {
-    return a.address != b.address ? a.address < b.address : a.size > b.size;
-  });
+  add({"stack", stack_limit_, stack_end_ - stack_limit_, kEverybody});
   read_owners(owners);
-}
-
-void QemuMemoryMap::read_symbols() {
-  std::istringstream lines(output_of("arm-none-eabi-nm -S -l '" + image_ + "'"));
-  for (std::string line; std::getline(lines, line);) take_symbol(line);
 }
 
 // ADDRESS [SIZE] TYPE NAME<tab>FILE:LINE
@@ -76,91 +53,36 @@ void QemuMemoryMap::take_symbol(const std::string& line) {
       tab == std::string::npos ? std::string() : line.substr(tab + 1, line.rfind(':') - tab - 1);
   const char type = static_cast<char>(std::tolower(word[2][0]));
   // Ours are relative to where they were built (cmake/cortex-m.cmake); the others are libraries.
-  const std::uint8_t unit = file.starts_with(".") ? unit_of(file) : std::uint8_t{0};
+  const Unit unit = file.starts_with(".") ? unit_of(file) : kNoUnit;
   if (type == 't') {
     if (name == "main") main_at_ = address & ~1u;
     functions_[name] = address & ~1u;
-    if (unit != 0) codes_.push_back({address & ~1u, size, unit});
+    if (unit != kNoUnit) codes_.push_back({address & ~1u, size, unit});
     // Code in RAM is read, and not written.
-    if (in_ram(address)) objects_.push_back({name, address & ~1u, size, 0});
+    if (in_ram(address)) add({name, address & ~1u, size, 0});
   } else if (in_ram(address)) {
-    objects_.push_back({name, address, size, std::uint64_t{unit != 0} << unit});
+    add({name, address, size, std::uint64_t{unit != kNoUnit} << unit});
   }
-}
-
-std::uint8_t QemuMemoryMap::unit_of(const std::string& file) {
-  const auto found = std::find(units_.begin(), units_.end(), file);
-  if (found == units_.end()) {
-    if (units_.size() == kMostUnits) throw std::runtime_error(image_ + ": too many source files");
-    units_.push_back(file);
-    return static_cast<std::uint8_t>(units_.size() - 1);
-  }
-  return static_cast<std::uint8_t>(found - units_.begin());
-}
-
-std::uint64_t QemuMemoryMap::units_ending(const std::string& end) const {
-  if (end == "*") return kAll;
-  std::uint64_t out = 0;
-  for (std::size_t unit = 1; unit < units_.size(); ++unit) {
-    if (units_[unit].ends_with(end)) out |= std::uint64_t{1} << unit;
-  }
-  return out;
-}
-
-void QemuMemoryMap::read_owners(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw std::runtime_error(path + ": cannot be read");
-  std::map<std::string, std::uint64_t> writers;
-  int number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
-    std::istringstream words(line.substr(0, line.find('#')));
-    std::string name;
-    if (!(words >> name)) continue;
-    for (std::string end; words >> end;) {
-      const std::uint64_t units = units_ending(end);
-      if (units == 0) {
-        throw std::runtime_error(path + ":" + std::to_string(number) +
-                                 ": the image has no code of " + end);
-      }
-      writers[name] |= units;
-    }
-    if (std::none_of(objects_.begin(), objects_.end(),
-                     [&](const Object& object) { return object.name == name; })) {
-      throw std::runtime_error(path + ":" + std::to_string(number) + ": the image has no " + name);
-    }
-  }
-  for (Object& object : objects_) {
-    const auto found = writers.find(object.name);
-    if (found != writers.end()) object.writers = found->second;
-  }
-}
-
-const QemuMemoryMap::Object& QemuMemoryMap::object(const std::string& name) const {
-  const auto found = std::find_if(objects_.begin(), objects_.end(),
-                                  [&](const Object& object) { return object.name == name; });
-  if (found == objects_.end()) throw std::out_of_range(image_ + " has no " + name);
-  return *found;
 }
 
 std::string QemuMemoryMap::place_of(std::uint32_t pc) const {
-  std::istringstream lines(output_of("arm-none-eabi-addr2line -f -e '" + image_ + "' " + hex(pc)));
-  std::string function;
-  std::string line;
-  std::getline(lines, function);
-  std::getline(lines, line);
+  std::vector<std::string> lines;
+  for_lines("arm-none-eabi-addr2line -f -e " + quoted(image()) + " " + hex(pc),
+            [&](const std::string& line) { lines.push_back(line); });
+  if (lines.size() != 2) return hex(pc);
+  const std::string& function = lines[0];
+  std::string line = lines[1];
   line.erase(0, line.find_first_not_of("./"));
   std::string unit = "a library";
   for (const Code& code : codes_) {
-    if (pc - code.address < code.size) unit = units_[code.unit];
+    if (pc - code.address < code.size) unit = name_of(code.unit);
   }
-  unit.erase(0, unit.find_first_not_of("./"));
   return function + " (" + line + ", in " + unit + " at " + hex(pc) + ")";
 }
 
 std::string QemuMemoryMap::thing_at(std::uint32_t address) const {
   const Object* innermost = nullptr;
-  for (const Object& object : objects_) {
+  for (const Object& object : objects()) {
     if (address - object.address < object.size) innermost = &object;
   }
   if (innermost != nullptr) {
@@ -170,7 +92,7 @@ std::string QemuMemoryMap::thing_at(std::uint32_t address) const {
     return hex(address) + ", below the stack's bound";
   }
   const Object* before = nullptr;
-  for (const Object& object : objects_) {
+  for (const Object& object : objects()) {
     if (object.address <= address) before = &object;
   }
   if (!in_ram(address) || before == nullptr) return hex(address);

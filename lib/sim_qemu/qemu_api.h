@@ -1,4 +1,4 @@
-/* What machine.c uses of QEMU 7.2, whose headers are not in any package: declared here by hand.
+/* What the machine uses of QEMU 7.2, whose headers are not in any package: declared here by hand.
  * Structs that are only handed through are opaque; where QEMU wants memory for one, there is more
  * than it needs. */
 #ifndef BUSHD_LIB_SIM_QEMU_QEMU_API_H

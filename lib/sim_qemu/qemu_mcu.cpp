@@ -228,8 +228,8 @@ void QemuMcu::take(const lockstep_message& event) {
     case LOCKSTEP_COMMON_DIR:
       drive(time_ns, Signal::kCommonDir, common_dir_level_, event.value != 0);
       break;
-    case LOCKSTEP_REFERENCE:
-      drive(time_ns, Signal::kReference, reference_level_, event.value != 0);
+    case LOCKSTEP_COMPARE:
+      drive(time_ns, Signal::kPositionCompare, compare_level_, event.value != 0);
       break;
     case LOCKSTEP_CONVERTS:
       order(LOCKSTEP_CURRENT, on_conversion ? on_conversion(time_ns) : current_);
@@ -305,7 +305,7 @@ void QemuMcu::fall(TimeNs now_ns) {
   drive(now_ns, Signal::kDir, direction_levels_, 0);
   drive(now_ns, Signal::kEnable, enable_level_, 0);
   drive(now_ns, Signal::kCommonDir, common_dir_level_, 0);
-  drive(now_ns, Signal::kReference, reference_level_, 0);
+  drive(now_ns, Signal::kPositionCompare, compare_level_, 0);
   driver_enable_ = line_timer_ = false;
 }
 

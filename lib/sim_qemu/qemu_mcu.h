@@ -2,7 +2,7 @@
 // its own that goes on only when and as far as the bus does. Its time is its instructions, 16 ns
 // each; so the same calls give the same edges, to the ns, whatever else the machine has to do.
 //
-// QEMU's board is not all of the chip; machine.c adds what is missing, and the shift registers.
+// QEMU's board is not all of the chip; machine.h adds what is missing, and the shift registers.
 #pragma once
 
 #include <sys/types.h>
@@ -116,7 +116,7 @@ class QemuMcu final : public Mcu {
   std::uint16_t direction_levels_ = 0;
   std::uint16_t enable_level_ = 0;
   std::uint16_t common_dir_level_ = 0;
-  std::uint16_t reference_level_ = 0;
+  std::uint16_t compare_level_ = 0;
   bool driver_enable_ = false;
   std::uint64_t flash_writes_ = 0;
   std::uint64_t overruns_ = 0;

@@ -201,9 +201,9 @@ Result<TableContent> with_sides(TableContent content, const Change& change) {
   return checked(std::move(content));
 }
 
-std::optional<Error> factor_fault(double factor) {
-  if (std::isfinite(factor) && factor > 0) return std::nullopt;
-  return Error{.message = fmt::format("a factor of {}; allowed: above 0", factor)};
+Result<void> check_factor(double factor) {
+  if (std::isfinite(factor) && factor > 0) return {};
+  return fail(fmt::format("a factor of {}; allowed: above 0", factor));
 }
 
 }  // namespace
@@ -237,12 +237,12 @@ Result<TableContent> delete_codes(TableContent content, SideKey side, std::size_
 }
 
 Result<TableContent> scale_speed(TableContent content, double factor) {
-  if (auto fault = factor_fault(factor)) return fail(*fault);
+  if (const auto good = check_factor(factor); !good) return fail(good.error());
   return with_all_codes(std::move(content), 1 / factor);
 }
 
 Result<TableContent> scale_acceleration(TableContent content, double factor) {
-  if (auto fault = factor_fault(factor)) return fail(*fault);
+  if (const auto good = check_factor(factor); !good) return fail(good.error());
   // A cruise delay that is faster than a side is its last step: that one is accelerated to as well.
   const std::uint16_t cruise = content.cruise.value_or(content.accel.back());
   return with_sides(std::move(content), [&](Codes codes) -> Result<Codes> {

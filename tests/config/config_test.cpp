@@ -57,7 +57,7 @@ TEST(Config, MannersOfABusHaveDefaults) {
   EXPECT_EQ(plain->buses[0].emergency_stop, BUSHD_STOP_RAMP);
   const auto chosen = ConfigFile(replaced(kGood, "format = \"fine\"\n",
                                           "format = \"fine\"\nmoves = \"table\"\n"
-                                          "frames = \"ticks\"\nemergency_stop = \"cut\"\n"))
+                                          "frames = \"ticks\"\nemergency_stop = \"immediate\"\n"))
                           .load();
   ASSERT_TRUE(chosen.has_value()) << chosen.error().text();
   EXPECT_TRUE(chosen->buses[0].table_runs);
@@ -305,11 +305,11 @@ INSTANTIATE_TEST_SUITE_P(
         change("FramesIsArray", "format = \"fine\"\n", "format = \"fine\"\nframes = [\"ticks\"]\n",
                10, "bus[0].frames", "allowed: \"auto\" or \"ticks\""),
         change("EmergencyStopUnknown", "format = \"fine\"\n",
-               "format = \"fine\"\nemergency_stop = \"Cut\"\n", 10, "bus[0].emergency_stop",
-               "is \"Cut\"; allowed: \"ramp\" or \"cut\""),
+               "format = \"fine\"\nemergency_stop = \"Immediate\"\n", 10, "bus[0].emergency_stop",
+               "is \"Immediate\"; allowed: \"ramp\" or \"immediate\""),
         change("EmergencyStopIsNumber", "format = \"fine\"\n",
                "format = \"fine\"\nemergency_stop = 1\n", 10, "bus[0].emergency_stop",
-               "is 1; allowed: \"ramp\" or \"cut\"")),
+               "is 1; allowed: \"ramp\" or \"immediate\"")),
     kNames);
 
 INSTANTIATE_TEST_SUITE_P(

@@ -37,10 +37,11 @@ TEST(ConfigInputs, NothingIsWatchedUnlessItIsAskedFor) {
 }
 
 TEST(ConfigInputs, AnMcuHasItsOwn) {
-  const auto config = ConfigFile(with_mcu("emergency_input = \"cut\"\nemergency_active = \"open\"\n"
-                                          "debounce_ticks = 15\novercurrent = 1023\n"
-                                          "enable_after_reset = \"at_once\"\n"))
-                          .load();
+  const auto config =
+      ConfigFile(with_mcu("emergency_input = \"immediate\"\nemergency_active = \"open\"\n"
+                          "debounce_ticks = 15\novercurrent = 1023\n"
+                          "enable_after_reset = \"at_once\"\n"))
+          .load();
   ASSERT_TRUE(config.has_value()) << config.error().text();
   const Mcu& mcu = config->mcus[1];
   EXPECT_EQ(mcu.emergency_input, BUSHD_EMERGENCY_INPUT_IMMEDIATE);
@@ -55,7 +56,7 @@ TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
   for (const auto& [word, positive, negative] :
        {std::tuple{"positive", true, false}, {"negative", false, true}, {"both", true, true}}) {
     const auto config = ConfigFile(with_motor("limit = \"" + std::string(word) +
-                                              "\"\nlimit_action = \"cut\"\n"
+                                              "\"\nlimit_action = \"immediate\"\n"
                                               "input_active = \"open\"\n"))
                             .load();
     ASSERT_TRUE(config.has_value()) << config.error().text();
@@ -77,9 +78,9 @@ struct BadKey {
 TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
   const BadKey bad[] = {
       {with_mcu("emergency_input = \"stop\"\n"), 22,
-       "mcu[1].emergency_input: is \"stop\"; allowed: \"ignore\", \"ramp\" or \"cut\""},
+       "mcu[1].emergency_input: is \"stop\"; allowed: \"ignore\", \"ramp\" or \"immediate\""},
       {with_mcu("emergency_active = \"open\"\n"), 22,
-       "mcu[1].emergency_active: is told of an MCU without emergency_input; allowed: beside "
+       "mcu[1].emergency_active: applies only with emergency_input; allowed: beside "
        "emergency_input = \"ramp\""},
       {with_mcu("emergency_active = 1\n"), 22,
        "mcu[1].emergency_active: is 1; allowed: \"closed\""},
@@ -90,9 +91,9 @@ TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_motor("limit = \"left\"\n"), 37,
        "motor[1].limit: is \"left\"; allowed: \"positive\", \"negative\" or \"both\""},
       {with_motor("limit = \"both\"\nlimit_action = \"halt\"\n"), 38,
-       "motor[1].limit_action: is \"halt\"; allowed: \"ramp\" or \"cut\""},
-      {with_motor("limit_action = \"cut\"\n"), 37,
-       "motor[1].limit_action: is told of a motor without a limit"},
+       "motor[1].limit_action: is \"halt\"; allowed: \"ramp\" or \"immediate\""},
+      {with_motor("limit_action = \"immediate\"\n"), 37,
+       "motor[1].limit_action: applies only with a limit"},
       {with_motor("input_active = \"low\"\n"), 37,
        "motor[1].input_active: is \"low\"; allowed: \"closed\" or \"open\""},
   };

@@ -91,10 +91,10 @@ TEST_P(Conformance, ComesIntoStepInTheLongestTicks) {
   std::size_t made = 0;
   for (const std::uint32_t ns : {0, 19'900'000, 1'000, 15'000'000, 7'000'000}) {
     SCOPED_TRACE(ns);
-    const std::uint32_t mark = master_.sync({});
+    const std::uint32_t sync_id = master_.sync({});
     pass_ticks(3);
     tick += 1000;
-    master_.sync({0, 0, true, mark, tick, ns});
+    master_.sync({0, 0, true, sync_id, tick, ns});
     pass_ticks(10);
     run_by_table(master_.poll(kReal).tick + 24, {{9, 0, 1, 20}});
     pass_ticks(40);

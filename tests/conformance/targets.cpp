@@ -41,9 +41,9 @@ class Atmega2560 final : public McuUnderTest {
   TimeNs keeps_within_ns(std::size_t codes) const override {
     return 3'000'000'000 + static_cast<TimeNs>(codes) * 10'000'000;
   }
-  std::uint64_t kept_writes() const override { return avr_->eeprom_writes(); }
+  std::uint64_t nvm_writes() const override { return avr_->eeprom_writes(); }
   void hang() override { avr_->hang(); }
-  void flip_kept_bit() override { avr_->flip_eeprom_bit(43 + 30, 2); }  // kept.h
+  void flip_nvm_bit() override { avr_->flip_eeprom_bit(43 + 30, 2); }  // nvm.h
   void expect_unharmed() const override {
     EXPECT_EQ(avr_->overruns(), 0u);
     EXPECT_EQ(avr_->bytes_cut(), 0u);
@@ -78,9 +78,9 @@ class Lm3s6965 final : public McuUnderTest {
     return mcu;
   }
   TimeNs keeps_within_ns(std::size_t) const override { return 2'000'000'000; }
-  std::uint64_t kept_writes() const override { return qemu_->flash_writes(); }
+  std::uint64_t nvm_writes() const override { return qemu_->flash_writes(); }
   void hang() override { qemu_->stop_ticks(); }
-  void flip_kept_bit() override { qemu_->flip_flash_bit(0x27800 + 20 + 32, 2); }  // kept.h
+  void flip_nvm_bit() override { qemu_->flip_flash_bit(0x27800 + 20 + 32, 2); }  // nvm.h
   void expect_unharmed() const override {
     EXPECT_EQ(qemu_->overruns(), 0u);
     EXPECT_EQ(qemu_->bytes_cut(), 0u);

@@ -39,8 +39,8 @@ class McuUnderTest {
   std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
   // Tables and settings over resets: what has changed is kept by then.
   virtual TimeNs keeps_within_ns(std::size_t codes) const = 0;
-  virtual std::uint64_t kept_writes() const = 0;  // since it booted for the first time
-  virtual void flip_kept_bit() = 0;               // of a table; from the next boot on
+  virtual std::uint64_t nvm_writes() const = 0;  // since it booted for the first time
+  virtual void flip_nvm_bit() = 0;               // of a table; from the next boot on
 
   virtual void hang() = 0;  // until its watchdog bites
 

@@ -1,5 +1,5 @@
-// The trigger input, the reference output and the current sensor, by pins alone: of the image and
-// of its virtual twin.
+// The trigger input, the position compare output and the current sensor, by pins alone: of the
+// image and of its virtual twin.
 #include <random>
 
 #include "conformance/script.h"
@@ -107,7 +107,7 @@ TEST_P(Triggers, OnlyTheAwaitedEdgeCountsAndOnce) {
   expect_the_same_reports();
 }
 
-TEST_P(Triggers, TheReferencePulseFollowsItsStep) {
+TEST_P(Triggers, TheComparePulseFollowsItsStep) {
   std::int32_t position = 0;
   std::size_t pulses = 0;
   for (const std::uint32_t delay_us : {0u, 30u, 777u, 5'000u, 123'456u}) {
@@ -125,8 +125,8 @@ TEST_P(Triggers, TheReferencePulseFollowsItsStep) {
         SCOPED_TRACE(mcu == 0 ? "virtual" : "real");
         const auto made = steps_since(mcu, 2, begin_ns);
         ASSERT_EQ(made.size(), 6u);
-        const auto rises = recorder_.times(mcu, Signal::kReference, 0, true);
-        const auto falls = recorder_.times(mcu, Signal::kReference, 0, false);
+        const auto rises = recorder_.times(mcu, Signal::kPositionCompare, 0, true);
+        const auto falls = recorder_.times(mcu, Signal::kPositionCompare, 0, false);
         ASSERT_EQ(rises.size(), pulses);
         ASSERT_EQ(falls.size(), pulses);
         EXPECT_LE(std::abs(rises.back() - made[3] - TimeNs{delay_us} * 1000), kSlotNs);

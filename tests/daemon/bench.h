@@ -41,11 +41,17 @@ class Bench : public daemon::Outputs {
   void publish(McuId, const api::Description& description) override {
     descriptions.push_back(description);
   }
-  void publish(BusId, const api::HealthSnapshot&) override {}
+  void publish(BusId, const api::HealthSnapshot& snapshot) override { health.push_back(snapshot); }
   void move_log(const std::string& line) override { lines.push_back(line); }
-  void log(daemon::LogLevel, const std::string&) override {}
-  void read_tables(std::uint64_t, const std::vector<std::string>&) override {}
-  void keep_tables(std::uint64_t, const std::vector<std::string>&) override {}
+  void log(daemon::LogLevel level, const std::string& text) override {
+    if (level != daemon::LogLevel::kInfo) warnings.push_back(text);
+  }
+  void read_tables(std::uint64_t ticket, const std::vector<std::string>& names) override {
+    to_read.emplace_back(ticket, names);
+  }
+  void keep_tables(std::uint64_t ticket, const std::vector<std::string>& names) override {
+    to_keep.emplace_back(ticket, names);
+  }
   void serve_tables(const api::Asker&, const api::Request&) override {}
   std::int64_t wall_clock_us() override { return 1'000'000; }
 
@@ -54,7 +60,12 @@ class Bench : public daemon::Outputs {
   std::shared_ptr<Client> client;
   std::vector<api::StateSnapshot> states;
   std::vector<api::Description> descriptions;
-  std::vector<std::string> lines;  // of the log of moves
+  std::vector<api::HealthSnapshot> health;
+  std::vector<std::string> lines;                                     // of the log of moves
+  std::vector<std::string> warnings;                                  // and errors, of the log
+  using Tables = std::pair<std::uint64_t, std::vector<std::string>>;  // ticket, names
+  std::vector<Tables> to_read;
+  std::vector<Tables> to_keep;
 
  private:
   static config::Config load(const std::string& toml) {

@@ -12,24 +12,25 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string emergency_hall(int mcus, int motors, const std::string& manner, bool cut) {
+std::string emergency_hall(int mcus, int motors, const std::string& manner, bool immediate) {
   std::string toml = hall(mcus, motors, manner);
   const std::string before = "[[group]]";
-  return toml.insert(toml.find(before), cut ? "emergency_stop = \"cut\"\n" : "");
+  return toml.insert(toml.find(before), immediate ? "emergency_stop = \"immediate\"\n" : "");
 }
 
 class Emergency : public testing::TestWithParam<std::tuple<const char*, bool>> {
  protected:
   const std::string manner = std::get<0>(GetParam());
-  const bool cut = std::get<1>(GetParam());
-  Lab lab{emergency_hall(2, 2, manner, cut)};  // m01, m02 on the first MCU, m03, m04 on the second
+  const bool immediate = std::get<1>(GetParam());
+  Lab lab{emergency_hall(2, 2, manner,
+                         immediate)};  // m01, m02 on the first MCU, m03, m04 on the second
 };
 INSTANTIATE_TEST_SUITE_P(Manners, Emergency,
                          testing::Combine(testing::Values("fine", "fine_table", "coarse_table"),
                                           testing::Bool()),
                          [](const auto& p) {
                            return std::string(std::get<0>(p.param)) +
-                                  (std::get<1>(p.param) ? "_cut" : "_ramp");
+                                  (std::get<1>(p.param) ? "_immediate" : "_ramp");
                          });
 
 TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
@@ -46,12 +47,12 @@ TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
   EXPECT_THAT(result.reason, HasSubstr("emergency stop"));
   EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
   EXPECT_EQ(lab.shaft_steps("m03"), result.position_steps.at(1));
-  if (cut) {
+  if (immediate) {
     EXPECT_LE(lab.shaft_steps("m01") - at, 60) << "a few ticks at 2500 steps/s";
   } else {
     EXPECT_GT(lab.shaft_steps("m01") - at, 100) << "the table's ramp";
   }
-  EXPECT_EQ(lab.motor("m01").trust, cut ? api::Trust::kUncertain : api::Trust::kKnown);
+  EXPECT_EQ(lab.motor("m01").trust, immediate ? api::Trust::kUncertain : api::Trust::kKnown);
   EXPECT_EQ(lab.motor("m02").trust, api::Trust::kKnown) << "it did not move";
   EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
   EXPECT_THAT(lab.state_of("hall:2").detail, HasSubstr("emergency stop"));
@@ -68,7 +69,7 @@ TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
   EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "reached");
   const auto again = lab.send(Ask::kMoveBy, {"m01"}, {5});
-  if (cut) {
+  if (immediate) {
     EXPECT_THAT(lab.last_reply(again).reason, HasSubstr("may have overrun"));
     EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
   } else {
@@ -116,7 +117,7 @@ TEST_P(Emergency, IsNotLiftedByAClearThatWasUnderWay) {
 TEST_P(Emergency, HeardByAnMcuThatIsBeingConfiguredStaysLatched) {
   int seen = 0;
   for (int ms = 0; ms < 400; ms += 9) {
-    Lab fresh{emergency_hall(1, 2, manner, cut)};
+    Lab fresh{emergency_hall(1, 2, manner, immediate)};
     fresh.run_for(ms * 1e-3);
     if (!fresh.has_state("hall:1")) continue;
     if (fresh.state_of("hall:1").detail != "being configured") continue;

@@ -148,7 +148,7 @@ TEST_P(Faults, DaemonPausedLongerThanTheQueue) {
   pause_when_asked(lab, 1.7);
   const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "link") << result.reason;
-  EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << "read after the run-down";
+  EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << "read after the ramp-down";
   lab.connect();
   // At once, not where the broken-off move was to end, nor later by what the daemon was stopped.
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {3}), 1).result, "reached");

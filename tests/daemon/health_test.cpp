@@ -76,7 +76,7 @@ TEST(TwoMasters, AreToldAndMovesRefusedWhileItLasts) {
   Lab lab(hall(1, 1));
   lab.connect();
   // The other's SYNC frames reach the MCU between ours, now and then.
-  std::uint32_t mark = 77;
+  std::uint32_t sync_id = 77;
   bool other = true;
   std::int64_t due_us = 0;
   lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
@@ -84,7 +84,7 @@ TEST(TwoMasters, AreToldAndMovesRefusedWhileItLasts) {
     due_us = lab.now_us() + 300'000;
     bushd_sync sync{};
     sync.master = 4711;
-    sync.sync_id = ++mark;
+    sync.sync_id = ++sync_id;
     std::array<std::uint8_t, 32> payload{};
     std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire{};
     const std::size_t size = bushd_encode_sync(&sync, payload.data());

@@ -86,7 +86,8 @@ TEST_F(Homing, MeanwhileNothingElseIsDoneWithTheMotor) {
   }
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {50})).result, "reached");
   EXPECT_EQ(lab.wait(home).result, "reached");
-  EXPECT_THAT(lab.last_reply(lab.send(Ask::kHome, {"m02"})).reason, HasSubstr("has no 'home'"));
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kHome, {"m02"})).reason,
+              HasSubstr("no home switch configured"));
   EXPECT_EQ(lab.last_reply(lab.send(Ask::kHome, {})).result, "refused");
 }
 
@@ -181,7 +182,7 @@ TEST_F(Homing, IsLostWithItsMcuAndCountedAllTheSame) {
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_LT(lab.shaft_steps("m01"), -100);
-  EXPECT_GT(lab.shaft_steps("m01"), -6000) << "it ran down when it heard nobody";
+  EXPECT_GT(lab.shaft_steps("m01"), -6000) << "it ramped down when it heard nobody";
 }
 
 // Wherever it comes from, with a contact that bounces for as long as a slow step lasts: the place

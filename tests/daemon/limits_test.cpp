@@ -78,7 +78,7 @@ TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
 }
 
 TEST_P(Limits, OneThatIsCutOffAtItsSwitchMayHaveOverrun) {
-  Lab lab(lab_with(GetParam(), "", "limit = \"both\"\nlimit_action = \"cut\"\n"));
+  Lab lab(lab_with(GetParam(), "", "limit = \"both\"\nlimit_action = \"immediate\"\n"));
   lab.connect();
   const Answer result = meet_switch(lab, -20000);
   EXPECT_EQ(result.result, "limit");
@@ -130,9 +130,10 @@ TEST_P(Limits, ASwitchThatOpensWhenItIsMetAndANewDaemon) {
 }
 
 TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndReleased) {
-  for (const bool cut : {false, true}) {
-    Lab lab(lab_with(GetParam(),
-                     cut ? "emergency_input = \"cut\"\n" : "emergency_input = \"ramp\"\n", ""));
+  for (const bool immediate : {false, true}) {
+    Lab lab(lab_with(
+        GetParam(),
+        immediate ? "emergency_input = \"immediate\"\n" : "emergency_input = \"ramp\"\n", ""));
     lab.connect();
     const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {20000, -20000});
     lab.run_for(1.5);
@@ -142,9 +143,9 @@ TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndRelease
     EXPECT_EQ(result.result, "stopped");
     EXPECT_THAT(result.reason, HasSubstr("emergency input of MCU hall:1"));
     EXPECT_EQ(result.position_steps.at(1), lab.shaft_steps("m02"));
-    EXPECT_EQ(lab.shaft_steps("m01") - at > 100, !cut);
+    EXPECT_EQ(lab.shaft_steps("m01") - at > 100, !immediate);
     lab.run_for(0.1);
-    EXPECT_EQ(lab.motor("m01").trust, cut ? api::Trust::kUncertain : api::Trust::kKnown);
+    EXPECT_EQ(lab.motor("m01").trust, immediate ? api::Trust::kUncertain : api::Trust::kKnown);
     EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
     EXPECT_EQ(lab.state_of("hall:1").inputs, "emergency");
     EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("release it"));
@@ -159,7 +160,7 @@ TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndRelease
     EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).reason,
                 HasSubstr("bushctl clear"));
     EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
-    if (cut) continue;
+    if (immediate) continue;
     EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).result, "reached");
   }
 }

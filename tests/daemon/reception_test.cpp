@@ -109,7 +109,7 @@ TEST_F(ReceptionTest, ManyClientsTogetherAreBounded) {
     take(clients.back(), api::Move{});
     EXPECT_LE(reception_.requests(), 5u);
   }
-  EXPECT_THAT(clients.back()->refusals.at(0), HasSubstr("takes no more now"));
+  EXPECT_THAT(clients.back()->refusals.at(0), HasSubstr("accepts no more now"));
 }
 
 TEST_F(ReceptionTest, WhoMayNotCommandIsRefusedEvenAStop) {

@@ -120,7 +120,7 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   write(lab);
   EXPECT_EQ(check(lab, [](auto&) { return true; }), 0) << said();
   // It would say so if something else had happened.
-  EXPECT_EQ(check(lab, [](auto& event) { return event["event"] != "alone"; }), 1);
+  EXPECT_EQ(check(lab, [](auto& event) { return event["event"] != "autonomous"; }), 1);
   EXPECT_EQ(check(lab,
                   [](auto& event) {
                     if (event["result"] == "limit") {

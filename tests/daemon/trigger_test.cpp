@@ -1,4 +1,4 @@
-// Moves that wait for the trigger, and the reference output, from the command to the pins.
+// Moves that wait for the trigger, and the position compare output, from the command to the pins.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,21 +15,21 @@ using testing::HasSubstr;
 
 constexpr std::int64_t kTickNs = 2'560'000;
 
-// Rising edges of STEP and of the reference output.
+// Rising edges of STEP and of the position compare output.
 class Pins : public sim::EdgeSink {
  public:
   void edge(const sim::Edge& edge) override {
     if (edge.signal == sim::Signal::kStep && edge.level) {
       steps_[{edge.mcu, edge.index}].push_back(edge.time_ns);
     }
-    if (edge.signal == sim::Signal::kReference) reference.push_back(edge);
+    if (edge.signal == sim::Signal::kPositionCompare) compare.push_back(edge);
   }
   void settled(sim::TimeNs) override {}
 
   const std::vector<sim::TimeNs>& steps(std::size_t mcu, std::uint8_t output) {
     return steps_[{mcu, output}];
   }
-  std::vector<sim::Edge> reference;
+  std::vector<sim::Edge> compare;
 
  private:
   std::map<std::pair<std::size_t, std::uint8_t>, std::vector<sim::TimeNs>> steps_;
@@ -335,7 +335,7 @@ TEST_P(Triggered, ShutDownDisarms) {
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
 }
 
-TEST_P(Triggered, ReferencePulsesWhenTheMotorArrives) {
+TEST_P(Triggered, PulseWhenTheMotorArrives) {
   lab.connect();
   api::PositionCompare compare{.motor = "m02",
                                .position_steps = 300,
@@ -345,22 +345,22 @@ TEST_P(Triggered, ReferencePulsesWhenTheMotorArrives) {
   EXPECT_EQ(lab.wait(lab.send(compare)).result, "done");
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {1000})).result, "reached");
   lab.run_for(0.1);
-  ASSERT_EQ(pins.reference.size(), 2u);
+  ASSERT_EQ(pins.compare.size(), 2u);
   const std::int64_t arrived_ns = pins.steps(0, 1).at(299);
-  EXPECT_NEAR(static_cast<double>(pins.reference[0].time_ns - arrived_ns), 20e6, 10'000);
-  EXPECT_NEAR(static_cast<double>(pins.reference[1].time_ns - pins.reference[0].time_ns), 500e3,
+  EXPECT_NEAR(static_cast<double>(pins.compare[0].time_ns - arrived_ns), 20e6, 10'000);
+  EXPECT_NEAR(static_cast<double>(pins.compare[1].time_ns - pins.compare[0].time_ns), 500e3,
               10'000);
-  EXPECT_TRUE(pins.reference[0].level);
-  EXPECT_FALSE(pins.reference[1].level);
+  EXPECT_TRUE(pins.compare[0].level);
+  EXPECT_FALSE(pins.compare[1].level);
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {-1000})).result, "reached");
-  EXPECT_EQ(pins.reference.size(), 2u) << "the other direction";
+  EXPECT_EQ(pins.compare.size(), 2u) << "the other direction";
   compare.arrivals = {};
   EXPECT_EQ(lab.wait(lab.send(compare)).result, "done");
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {1000})).result, "reached");
-  EXPECT_EQ(pins.reference.size(), 2u) << "switched off";
+  EXPECT_EQ(pins.compare.size(), 2u) << "switched off";
 }
 
-TEST_P(Triggered, ReferenceIsRefusedWithAReason) {
+TEST_P(Triggered, PositionCompareIsRefusedWithAReason) {
   lab.connect();
   using Compare = api::PositionCompare;
   const Compare good{.motor = "m02",

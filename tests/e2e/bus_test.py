@@ -33,8 +33,8 @@ class EmergencyStop(EndToEndTest):
     def test_ramps_down(self):
         self.check()
 
-    def test_cuts_table_runs(self):
-        self.check(*TABLE_RUNS, 'emergency_stop = "cut"')
+    def test_immediate_stop_of_table_runs(self):
+        self.check(*TABLE_RUNS, 'emergency_stop = "immediate"')
 
 
 class Health(EndToEndTest):

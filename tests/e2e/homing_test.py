@@ -44,7 +44,7 @@ class Homing(EndToEndTest):
         self.command("stop", "a0", "--wait")
         self.assertEqual(home.process.wait(), 1)
         self.assertIn("stopped", home.said())
-        self.assertIn("has no 'home'", self.bushctl("home", "a1").stderr)
+        self.assertIn("no home switch configured", self.bushctl("home", "a1").stderr)
 
     def test_at_start(self):
         self.bring_up_with_switch(", at_start = true")

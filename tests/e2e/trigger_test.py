@@ -1,4 +1,4 @@
-"""Moves that a trigger starts, and the reference pulse, as a user has them."""
+"""Moves that a trigger starts, and the position compare pulse, as a user has them."""
 
 import signal
 import unittest
@@ -16,7 +16,7 @@ class Trigger(EndToEndTest):
 
     def check_trigger(self, displacement_format="fine", bus_lines=()):
         self.bring_up(displacement_format, bus_lines)
-        self.command("reference", "a1", 200, "--delay-us", 100)
+        self.command("compare", "a1", 200, "--delay-us", 100)
         first = self.start_armed("a0", 600, "a1", 400, "b1", -500)
         self.assertFalse(self.motors()["a0"]["moving"])
         self.bushsim.send(signal.SIGRTMIN)

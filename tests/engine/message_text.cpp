@@ -158,7 +158,7 @@ void put(const bushd_position_compare& m, Fields& f) {
   f.add("delay_us", m.delay_us).add("width_us", m.width_us);
 }
 void put(const bushd_emergency& m, Fields& f) {
-  f.add("how", m.how);
+  f.add("mode", m.mode);
 }
 void put(const bushd_emission& m, Fields& f) {
   f.add("mode", m.mode).add("sequence", m.sequence).add("hold_current", m.hold_current);

@@ -10,9 +10,9 @@ namespace {
 class Emergency : public Streams {
  protected:
   // Steps from the first open tick on until rest.
-  static std::vector<int> after_emergency(Rig& on, bushd_stop_mode how) {
+  static std::vector<int> after_emergency(Rig& on, bushd_stop_mode mode) {
     const std::size_t open = on.history(0).size() + 2;
-    on.emergency(how);
+    on.emergency(mode);
     EXPECT_EQ(on.poll().state, BUSHD_STATE_FAULT);
     on.pass_until_rest();
     on.pass(3);

@@ -208,7 +208,7 @@ TEST(Emission, TableRunsMakeTheSameStepsInEachTickInEveryMode) {
   }
 }
 
-TEST(Emission, RunDownsMakeTheSameStepsInEachTickInEveryMode) {
+TEST(Emission, RampDownsMakeTheSameStepsInEachTickInEveryMode) {
   for (const bushd_format format : {BUSHD_FORMAT_COARSE, BUSHD_FORMAT_FINE}) {
     expect_same_steps(format, [&](Rig& rig) {
       const Plan plan = plan_move(ramp_law(), 200, Rig::kTickNs, format);

@@ -216,18 +216,18 @@ TEST_P(Homing, AnotherMotorWaitsUntilTheLastSlowStepIsOver) {
 }
 
 TEST_P(Homing, EmergencyEndsIt) {
-  for (const bushd_stop_mode how : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
+  for (const bushd_stop_mode mode : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
     Rig fresh;
     fresh.make_ready(law, format, 1000);
     ASSERT_EQ(fresh.home(command()), BUSHD_OK);
     fresh.pass(100);
     const std::int64_t at = fresh.pulses(kMotor);
-    fresh.emergency(how);
+    fresh.emergency(mode);
     fresh.pass_until_rest();
     EXPECT_EQ(fresh.poll().homing, BUSHD_HOMING_STOPPED);
     EXPECT_EQ(fresh.poll().faults, BUSHD_FAULT_EMERGENCY);
     EXPECT_EQ(fresh.poll().motor[kMotor].position_steps, fresh.pulses(kMotor));
-    if (how == BUSHD_STOP_IMMEDIATE) {
+    if (mode == BUSHD_STOP_IMMEDIATE) {
       EXPECT_LE(at - fresh.pulses(kMotor), 7) << "two ticks at cruise";
     }
     EXPECT_EQ(fresh.home(command()), BUSHD_E_STATE) << "latched";

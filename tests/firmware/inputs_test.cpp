@@ -55,12 +55,12 @@ INSTANTIATE_TEST_SUITE_P(Formats, Inputs, testing::Values(BUSHD_FORMAT_FINE, BUS
                          format_name);
 
 TEST_P(Inputs, ALimitRampsAMotorDownByItsTableOrCutsItAtAnyTick) {
-  for (const bushd_stop_mode how : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
+  for (const bushd_stop_mode mode : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
     for (const int steps : {50, -50}) {
       for (int ticks = 0; ticks < 90; ticks += 3) {
         for (const bool whole : {false, true}) {
-          SCOPED_TRACE(testing::Message() << how << " " << steps << " " << ticks << " " << whole);
-          const std::uint16_t cuts = how == BUSHD_STOP_IMMEDIATE ? 1 : 0;
+          SCOPED_TRACE(testing::Message() << mode << " " << steps << " " << ticks << " " << whole);
+          const std::uint16_t cuts = mode == BUSHD_STOP_IMMEDIATE ? 1 : 0;
           const auto limited = with({.limit_positive = static_cast<std::uint16_t>(steps > 0),
                                      .limit_negative = static_cast<std::uint16_t>(steps < 0),
                                      .limit_immediate = cuts});
@@ -70,7 +70,7 @@ TEST_P(Inputs, ALimitRampsAMotorDownByItsTableOrCutsItAtAnyTick) {
             on->pass(ticks);
           }
           limited->pins(kSwitch);
-          twin->emergency(how);
+          twin->emergency(mode);
           rest(*limited);
           rest(*twin);
           twin->pass(static_cast<int>(limited->history(0).size()) -
@@ -316,11 +316,11 @@ INSTANTIATE_TEST_SUITE_P(Formats, SystemInputs,
                          testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
 
 TEST_P(SystemInputs, TheEmergencyInputStopsAllMotorsAsEmergencyDoes) {
-  for (const bushd_stop_mode how : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
+  for (const bushd_stop_mode mode : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
     for (const std::uint8_t rests_at : {std::uint8_t{0}, std::uint8_t{1}}) {
       const auto stopped =
           with({.system_inverted = rests_at,
-                .emergency = how == BUSHD_STOP_IMMEDIATE ? std::uint8_t{2} : std::uint8_t{1}});
+                .emergency = mode == BUSHD_STOP_IMMEDIATE ? std::uint8_t{2} : std::uint8_t{1}});
       const auto twin = with({});
       stopped->pins({0, rests_at});
       stopped->control(BUSHD_CONTROL_CLEAR_FAULTS);
@@ -330,7 +330,7 @@ TEST_P(SystemInputs, TheEmergencyInputStopsAllMotorsAsEmergencyDoes) {
         on->pass(25);
       }
       stopped->pins({0, static_cast<std::uint8_t>(1 - rests_at)});
-      twin->emergency(how);
+      twin->emergency(mode);
       for (Rig* on : {stopped.get(), twin.get()}) on->pass(60);
       EXPECT_EQ(stopped->history(0), twin->history(0));
       EXPECT_EQ(stopped->history(2), twin->history(2));

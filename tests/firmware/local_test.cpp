@@ -235,7 +235,7 @@ TEST_P(Local, AButtonMustHaveBeenSeenReleasedSinceItWasTold) {
 
 TEST_P(Local, AButtonHeldAtPowerUpMovesNothingUntilItIsPressedAnew) {
   rig.pins({0, BUSHD_INPUT_FORWARD});
-  rig.restart_with_what_is_kept();
+  rig.restart_with_nvm();
   rig.pass(60);
   EXPECT_EQ(rig.poll().moving, 0);
   EXPECT_FALSE(rig.enabled());

@@ -16,9 +16,9 @@ struct Walk {
   bool ended = false;
 };
 
-class Kept : public testing::Test {
+class Nvm : public testing::Test {
  protected:
-  Kept() {
+  Nvm() {
     EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE), BUSHD_OK);
     rig.sync_to(1000);
     EXPECT_EQ(rig.upload(0, ramp_law()), BUSHD_OK);
@@ -64,7 +64,7 @@ class Kept : public testing::Test {
   Rig rig{RigOptions{.code_count = kCodes}};
 };
 
-TEST_F(Kept, AWalkGoesOverAllOfIt) {
+TEST_F(Nvm, AWalkGoesOverAllOfIt) {
   const Walk found = walk(7, 0, [] {});
   EXPECT_TRUE(found.ended);
   expect_own(found);
@@ -75,7 +75,7 @@ TEST_F(Kept, AWalkGoesOverAllOfIt) {
 }
 
 // A walk that stood behind the last code went on through all memory, and the ports wrote it down.
-TEST_F(Kept, AWalkEndsWhenTablesAreForgottenMeanwhile) {
+TEST_F(Nvm, AWalkEndsWhenTablesAreForgottenMeanwhile) {
   for (const std::uint16_t at_once : std::array<std::uint16_t, 3>{1, 3, 16}) {
     for (std::size_t after = 0; after <= most(); ++after) {
       SCOPED_TRACE(std::to_string(at_once) + " bytes at once, forgotten after " +
@@ -89,7 +89,7 @@ TEST_F(Kept, AWalkEndsWhenTablesAreForgottenMeanwhile) {
   }
 }
 
-TEST_F(Kept, AWalkEndsWhenATableGivesItsCodesBackMeanwhile) {
+TEST_F(Nvm, AWalkEndsWhenATableGivesItsCodesBackMeanwhile) {
   Law longer = ramp_law();
   Law shorter = longer;
   shorter.accel.resize(1);

@@ -6,7 +6,7 @@
 namespace bushd::test {
 namespace {
 
-class Islands : public Streams {
+class OutOfOrder : public Streams {
  protected:
   void expect_made(const Plan& moves) {
     rig.pass_until_rest();
@@ -21,10 +21,10 @@ class Islands : public Streams {
     EXPECT_EQ(std::vector<int>(seen.begin() + 2, seen.end()), expected);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Islands, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+INSTANTIATE_TEST_SUITE_P(Formats, OutOfOrder,
+                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
 
-TEST_P(Islands, FrameBehindALostOneIsKeptAndJoinedWhenThatComesAgain) {
+TEST_P(OutOfOrder, FrameBehindALostOneIsKeptAndJoinedWhenThatComesAgain) {
   const Plan moves = plan(-90);
   const std::uint32_t start = rig.first_open();
   rig.forget_history();
@@ -53,7 +53,7 @@ TEST_P(Islands, FrameBehindALostOneIsKeptAndJoinedWhenThatComesAgain) {
   expect_made(moves);
 }
 
-TEST_P(Islands, MoveIsCompleteThoughEveryThirdFrameIsLostAtFirst) {
+TEST_P(OutOfOrder, MoveIsCompleteThoughEveryThirdFrameIsLostAtFirst) {
   const Plan moves = plan(300);
   const std::uint32_t start = rig.first_open();
   rig.forget_history();
@@ -76,7 +76,7 @@ TEST_P(Islands, MoveIsCompleteThoughEveryThirdFrameIsLostAtFirst) {
   expect_made(moves);
 }
 
-TEST_P(Islands, GapMayBeFilledInPiecesFromBothEnds) {
+TEST_P(OutOfOrder, GapMayBeFilledInPiecesFromBothEnds) {
   const Plan moves = plan(60);
   const std::uint32_t start = rig.first_open();
   rig.forget_history();
@@ -95,7 +95,7 @@ TEST_P(Islands, GapMayBeFilledInPiecesFromBothEnds) {
   expect_made(moves);
 }
 
-TEST_P(Islands, IsDroppedWhenTheQueueRunsDryBeforeTheGapIsFilled) {
+TEST_P(OutOfOrder, IsDroppedWhenTheQueueRunsDryBeforeTheGapIsFilled) {
   const Plan moves = plan(90);
   const std::uint32_t start = rig.first_open();
   ASSERT_EQ(rig.take(rig.part(moves, start, 0, 30)), BUSHD_OK);
@@ -116,7 +116,7 @@ TEST_P(Islands, IsDroppedWhenTheQueueRunsDryBeforeTheGapIsFilled) {
   expect_position(0, stands + 1);
 }
 
-TEST_P(Islands, AreCutAwayByAReplacement) {
+TEST_P(OutOfOrder, RangesAreCutAwayByAReplacement) {
   const std::uint32_t start = rig.first_open();
   ASSERT_EQ(rig.take(ones(kStart, start, 20)), BUSHD_OK);
   ASSERT_EQ(rig.take(ones(0, start + 30, 20)), BUSHD_OK);
@@ -128,7 +128,7 @@ TEST_P(Islands, AreCutAwayByAReplacement) {
   expect_position(0, 18);
 }
 
-TEST_P(Islands, OfAMotorAtRestAreRefused) {
+TEST_P(OutOfOrder, RangesOfAMotorAtRestAreRefused) {
   const std::uint32_t start = rig.first_open();
   EXPECT_EQ(rig.take(ones(0, start + 5, 5)), BUSHD_E_GAP);
   ASSERT_EQ(rig.take(ones(kStart, start, 5, 0)), BUSHD_OK);
@@ -137,7 +137,7 @@ TEST_P(Islands, OfAMotorAtRestAreRefused) {
   expect_position(0, 5);
 }
 
-TEST_P(Islands, ReportTellsThatOfTheLowestMotorAndWhoHasTheSame) {
+TEST_P(OutOfOrder, ReportTellsThatOfTheLowestMotorAndWhoHasTheSame) {
   const std::uint32_t start = rig.first_open();
   const auto of = [&](Ticks ticks, std::uint16_t mask) {
     ticks.mask = mask;

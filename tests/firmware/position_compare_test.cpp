@@ -1,4 +1,4 @@
-// REFERENCE: a pulse at the reference output when a motor arrives at a position.
+// POSITION_COMPARE: a pulse at the position compare output when a motor arrives at a position.
 #include <cstdlib>
 #include <random>
 
@@ -18,7 +18,7 @@ struct Pulse {
   bool operator==(const Pulse&) const = default;
 };
 
-class ReferencePulse : public Streams {
+class PositionCompare : public Streams {
  protected:
   // Lets ticks pass, watches the output, and the slots in which motor 0 arrives at each position.
   void watch(int ticks) {
@@ -57,10 +57,10 @@ class ReferencePulse : public Streams {
   std::vector<std::pair<std::int64_t, std::int64_t>> arrivals_;
   std::int64_t position_ = 0;
 };
-INSTANTIATE_TEST_SUITE_P(Formats, ReferencePulse,
+INSTANTIATE_TEST_SUITE_P(Formats, PositionCompare,
                          testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
 
-TEST_P(ReferencePulse, FollowsTheArrivalAfterItsDelayWithinASlot) {
+TEST_P(PositionCompare, FollowsTheArrivalAfterItsDelayWithinASlot) {
   std::mt19937 random(5);
   const auto below = [&random](std::uint32_t n) {
     return static_cast<std::uint32_t>(random() % n);
@@ -73,7 +73,7 @@ TEST_P(ReferencePulse, FollowsTheArrivalAfterItsDelayWithinASlot) {
             static_cast<std::int32_t>(1 + below(static_cast<std::uint32_t>(std::abs(steps))));
     const std::uint32_t delay_us = i % 4 == 0 ? 0 : below(i % 9 == 0 ? 1'500'001 : 12'000);
     const std::uint32_t width_us = 1 + below(i % 5 == 0 ? 1'000'000 : 3000);
-    ASSERT_EQ(rig.reference({0, kBoth, at, delay_us, width_us}), BUSHD_OK);
+    ASSERT_EQ(rig.position_compare({0, kBoth, at, delay_us, width_us}), BUSHD_OK);
     pulses_.clear();
     arrivals_.clear();
     if (i % 3 == 0) {
@@ -101,10 +101,10 @@ TEST_P(ReferencePulse, FollowsTheArrivalAfterItsDelayWithinASlot) {
   }
 }
 
-TEST_P(ReferencePulse, LooksAtItsDirectionAndItsMotor) {
+TEST_P(PositionCompare, LooksAtItsDirectionAndItsMotor) {
   const auto pulses_of = [this](std::uint8_t arrivals, std::uint8_t motor) {
     pulses_.clear();
-    EXPECT_EQ(rig.reference({motor, arrivals, 5, 100, 50}), BUSHD_OK);
+    EXPECT_EQ(rig.position_compare({motor, arrivals, 5, 100, 50}), BUSHD_OK);
     for (const std::int32_t steps : {10, -10}) {
       EXPECT_EQ(run(steps), BUSHD_OK);
       watch_until_rest();
@@ -119,9 +119,9 @@ TEST_P(ReferencePulse, LooksAtItsDirectionAndItsMotor) {
   EXPECT_EQ(pulses_of(0, 0), 0u) << "switched off";
 }
 
-TEST_P(ReferencePulse, DepartureIsNoArrival) {
+TEST_P(PositionCompare, DepartureIsNoArrival) {
   ASSERT_EQ(rig.set_position(0, 100), BUSHD_OK);
-  ASSERT_EQ(rig.reference({0, kBoth, 100, 0, 50}), BUSHD_OK);
+  ASSERT_EQ(rig.position_compare({0, kBoth, 100, 0, 50}), BUSHD_OK);
   ASSERT_EQ(run(10), BUSHD_OK);
   watch_until_rest();
   EXPECT_TRUE(pulses_.empty());
@@ -130,8 +130,8 @@ TEST_P(ReferencePulse, DepartureIsNoArrival) {
   EXPECT_EQ(pulses_.size(), 1u);
 }
 
-TEST_P(ReferencePulse, OneAtATime) {
-  ASSERT_EQ(rig.reference({0, kBoth, 5, 1'400'000, 1000}), BUSHD_OK);
+TEST_P(PositionCompare, OneAtATime) {
+  ASSERT_EQ(rig.position_compare({0, kBoth, 5, 1'400'000, 1000}), BUSHD_OK);
   for (const std::int32_t steps : {10, -10}) {
     ASSERT_EQ(run(steps), BUSHD_OK);
     watch_until_rest();
@@ -144,24 +144,24 @@ TEST_P(ReferencePulse, OneAtATime) {
   EXPECT_EQ(pulses_.size(), 2u);
 }
 
-TEST_P(ReferencePulse, SwitchedOffOneThatWaitsIsNotMadeAndOneThatIsOutEnds) {
-  ASSERT_EQ(rig.reference({0, kBoth, 5, 200'000, 100'000}), BUSHD_OK);
+TEST_P(PositionCompare, SwitchedOffOneThatWaitsIsNotMadeAndOneThatIsOutEnds) {
+  ASSERT_EQ(rig.position_compare({0, kBoth, 5, 200'000, 100'000}), BUSHD_OK);
   ASSERT_EQ(run(5), BUSHD_OK);
   watch_until_rest();
-  ASSERT_EQ(rig.reference({0, 0, 0, 0, 1}), BUSHD_OK);
+  ASSERT_EQ(rig.position_compare({0, 0, 0, 0, 1}), BUSHD_OK);
   watch(200);
   EXPECT_TRUE(pulses_.empty());
-  ASSERT_EQ(rig.reference({0, kBoth, 0, 0, 100'000}), BUSHD_OK);
+  ASSERT_EQ(rig.position_compare({0, kBoth, 0, 0, 100'000}), BUSHD_OK);
   ASSERT_EQ(run(-5), BUSHD_OK);
   while (pulses_.empty()) watch(1);
-  ASSERT_EQ(rig.reference({0, 0, 0, 0, 1}), BUSHD_OK);
+  ASSERT_EQ(rig.position_compare({0, 0, 0, 0, 1}), BUSHD_OK);
   watch(100);
   ASSERT_EQ(pulses_.size(), 1u);
   EXPECT_EQ((pulses_[0].falls - pulses_[0].rises) * kSlotNs, 100'000'000);
 }
 
-TEST_P(ReferencePulse, AnotherTickSwitchesItOff) {
-  ASSERT_EQ(rig.reference({0, kBoth, 2, 0, 50}), BUSHD_OK);
+TEST_P(PositionCompare, AnotherTickSwitchesItOff) {
+  ASSERT_EQ(rig.position_compare({0, kBoth, 2, 0, 50}), BUSHD_OK);
   ASSERT_EQ(rig.configure(format, 2 * Rig::kTickNs), BUSHD_OK);
   rig.make_ready(law, format, 9000);
   ASSERT_EQ(run(5), BUSHD_OK);
@@ -169,13 +169,13 @@ TEST_P(ReferencePulse, AnotherTickSwitchesItOff) {
   EXPECT_TRUE(pulses_.empty());
 }
 
-TEST(Reference, IsForMotorsThatExist) {
+TEST(PositionCompareRequest, IsForMotorsThatExist) {
   Rig rig;
-  EXPECT_EQ(rig.reference({4, kBoth, 0, 0, 1}), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.reference({0, 4, 0, 0, 1}), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.reference({0, kBoth, 0, 0, 0}), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.reference({0, kBoth, 0, 1'500'001, 1}), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.reference({0, kBoth, 0, 0, 1'000'001}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.position_compare({4, kBoth, 0, 0, 1}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.position_compare({0, 4, 0, 0, 1}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.position_compare({0, kBoth, 0, 0, 0}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.position_compare({0, kBoth, 0, 1'500'001, 1}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.position_compare({0, kBoth, 0, 0, 1'000'001}), BUSHD_E_FORMAT);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// When the queue ends while a motor moves: it runs down its own table from wherever it is, loses no
-// count, and says so until told that it was heard.
+// When the queue ends while a motor moves: it ramps down by its own table from wherever it is,
+// loses no count, and says so until told that it was heard.
 #include <algorithm>
 #include <numeric>
 
@@ -8,7 +8,7 @@
 namespace bushd::test {
 namespace {
 
-class RunDown : public Streams {
+class RampDown : public Streams {
  protected:
   // The steps of every tick after the cut, from the formula.
   std::vector<int> expected_after(const Plan& moves, std::size_t cut) const {
@@ -35,10 +35,10 @@ class RunDown : public Streams {
     return {on.history(motor).begin() + 2, on.history(motor).end()};
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, RunDown, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
+INSTANTIATE_TEST_SUITE_P(Formats, RampDown, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
                          format_name);
 
-TEST_P(RunDown, FollowsTheTableFromEveryTickOfALongMove) {
+TEST_P(RampDown, FollowsTheTableFromEveryTickOfALongMove) {
   for (const std::int64_t steps : {260, -260}) {
     const Plan moves = plan(steps);
     ASSERT_GT(moves.ticks(), 120u);
@@ -64,14 +64,14 @@ TEST_P(RunDown, FollowsTheTableFromEveryTickOfALongMove) {
   }
 }
 
-TEST_P(RunDown, CompleteMoveIsNoFault) {
+TEST_P(RampDown, CompleteMoveIsNoFault) {
   const Plan moves = plan(30);
   cut_off(rig, moves, moves.ticks(), 0);
   EXPECT_EQ(rig.poll().faults, 0);
   EXPECT_EQ(rig.pulses(0), 30);
 }
 
-TEST_P(RunDown, FaultIsLatchedRefusesTicksAndIsClearedAtRestOnly) {
+TEST_P(RampDown, FaultIsLatchedRefusesTicksAndIsClearedAtRestOnly) {
   const Plan moves = plan(200);
   ASSERT_EQ(rig.take(rig.part(moves, rig.first_open(), 0, 40)), BUSHD_OK);
   rig.pass(45);
@@ -97,7 +97,7 @@ TEST_P(RunDown, FaultIsLatchedRefusesTicksAndIsClearedAtRestOnly) {
   EXPECT_EQ(rig.pulses(0), 0);
 }
 
-TEST_P(RunDown, OthersFinishWhatIsQueued) {
+TEST_P(RampDown, OthersFinishWhatIsQueued) {
   const Plan cut = plan(200);
   const Plan whole = plan(-60);
   const std::uint32_t start = rig.first_open();
@@ -113,7 +113,7 @@ TEST_P(RunDown, OthersFinishWhatIsQueued) {
 }
 
 // Each motor by itself, all at once, each with another table and cut in another place.
-TEST_P(RunDown, SixteenMotorsByFourTables) {
+TEST_P(RampDown, SixteenMotorsByFourTables) {
   Rig all({.motors = 16, .slots = 128, .code_count = 1000});
   all.make_ready(law, format, 0xFFFFFFD0u);
   std::vector<Law> laws(4, law);
@@ -150,7 +150,7 @@ TEST_P(RunDown, SixteenMotorsByFourTables) {
 
 // The start was heard, but the queue ended before its first displacement: which way the move was to
 // go is not known, and the motor stands. DIR still shows the move before.
-TEST_P(RunDown, MotorThatHasNotBegunStays) {
+TEST_P(RampDown, MotorThatHasNotBegunStays) {
   rig.run_plan(plan(-20), 0);
   const std::int16_t nothing = format == BUSHD_FORMAT_FINE ? 0 : 0x80;
   ASSERT_EQ(rig.take({.flags = kStart,
@@ -170,7 +170,7 @@ TEST_P(RunDown, MotorThatHasNotBegunStays) {
 }
 
 // A pause within a move, slower than the tick, is no rest.
-TEST_P(RunDown, SlowMoveRunsDownFromATickWithoutAStep) {
+TEST_P(RampDown, SlowMoveRampsDownFromATickWithoutAStep) {
   Law slow = law;
   slow.accel = slow.decel = {3000, 2500, 2000};
   slow.cruise = 2000;
@@ -185,7 +185,7 @@ TEST_P(RunDown, SlowMoveRunsDownFromATickWithoutAStep) {
 
 // A delay below the cruise delay cannot be running; it must not let the MCU use codes that no move
 // reaches and no check of the table's speed has seen.
-TEST_P(RunDown, DelayThatNoMoveHasIsTakenAsCruise) {
+TEST_P(RampDown, DelayThatNoMoveHasIsTakenAsCruise) {
   Law steep = law;
   steep.decel.assign(200, 2);
   steep.decel[0] = 100;

@@ -46,7 +46,7 @@ TEST(Receive, RequestsThatWereOvertakenChangeNothing) {
 }
 
 // A new master counts from anywhere.
-TEST(Receive, AfterSilenceAnyTagIsNew) {
+TEST(Receive, AfterSilenceAnySequenceNumberIsNew) {
   Rig rig({.address = 7});
   rig.feed(set_position_wire(11, 200));
   rig.pass(41);  // 105 ms

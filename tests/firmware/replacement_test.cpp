@@ -126,7 +126,7 @@ TEST_P(Replacement, TickNumbersWrapInMotion) {
   }
 }
 
-TEST_P(Replacement, ReplacedAndRunDownAcrossTheWrap) {
+TEST_P(Replacement, ReplacedAndRampedDownAcrossTheWrap) {
   const Plan moves = plan(200);
   for (std::uint32_t before = 1; before < 40; ++before) {
     Rig wrapping;

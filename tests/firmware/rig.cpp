@@ -133,7 +133,7 @@ Rig::Rig(RigOptions options)
   bushd_mcu_prepare(&mcu_);
 }
 
-void Rig::restart_with_what_is_kept() {
+void Rig::restart_with_nvm() {
   std::vector<Bytes> kept;
   for (std::uint8_t i = 0;; ++i) {
     const bushd_mcu_nvm_region piece = bushd_mcu_nvm_region_at(&mcu_, i);
@@ -262,9 +262,9 @@ void Rig::sync(const bushd_sync& message) {
 
 void Rig::sync_to(std::uint32_t tick) {
   pass(4);  // a new tick length has settled
-  const std::uint32_t mark = sync_id_ += 2;
-  sync({1, mark, false, 0, 0, 0});
-  sync({1, mark + 1, true, mark, tick, kTimeInTickNs});
+  const std::uint32_t sync_id = sync_id_ += 2;
+  sync({1, sync_id, false, 0, 0, 0});
+  sync({1, sync_id + 1, true, sync_id, tick, kTimeInTickNs});
   EXPECT_EQ(this->tick(), tick);
 }
 
@@ -341,14 +341,14 @@ bushd_status Rig::arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_
                  }));
 }
 
-bushd_status Rig::reference(const bushd_position_compare& message) {
+bushd_status Rig::position_compare(const bushd_position_compare& message) {
   return request(BUSHD_MSG_POSITION_COMPARE, payload_of([&](std::uint8_t* p) {
                    return bushd_encode_position_compare(&message, p);
                  }));
 }
 
-void Rig::emergency(bushd_stop_mode how, std::uint8_t address) {
-  frame(address, BUSHD_MSG_EMERGENCY, {static_cast<std::uint8_t>(how)});
+void Rig::emergency(bushd_stop_mode mode, std::uint8_t address) {
+  frame(address, BUSHD_MSG_EMERGENCY, {static_cast<std::uint8_t>(mode)});
   EXPECT_FALSE(answer()) << "EMERGENCY is not answered";
 }
 

@@ -92,7 +92,7 @@ class Rig {
   Rig& operator=(const Rig&) = delete;
 
   // A reset by a port that keeps what it may.
-  void restart_with_what_is_kept();
+  void restart_with_nvm();
   void feed(std::span<const std::uint8_t> bytes);
   // A frame on the line, without looking at what comes back.
   void frame(std::uint8_t address, std::uint8_t type, const Bytes& payload);
@@ -138,12 +138,12 @@ class Rig {
   bushd_status arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
                    const std::vector<bushd_table_run_entry>& entries);
   bushd_status disarm() { return arm(0, BUSHD_EDGE_NONE, 0, {}); }
-  bushd_status reference(const bushd_position_compare& message);
+  bushd_status position_compare(const bushd_position_compare& message);
   // What the port was told to wait for, and the edge noticed in the present tick.
   bushd_edge awaited_edge() const { return awaited_edge_; }
   void trigger(std::int32_t time_in_tick_ns) { bushd_mcu_trigger(&mcu_, time_in_tick_ns); }
   // Without an answer.
-  void emergency(bushd_stop_mode how, std::uint8_t address = BUSHD_ADDRESS_BROADCAST);
+  void emergency(bushd_stop_mode mode, std::uint8_t address = BUSHD_ADDRESS_BROADCAST);
   // Everything up to READY, with this table for all motors.
   void make_ready(const Law& law, bushd_format format, std::uint32_t tick = 1000);
 

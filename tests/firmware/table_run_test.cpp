@@ -198,7 +198,7 @@ TEST_P(TableRun, TicksBeyondAGapAreKeptOnlyWhenItIsOver) {
   EXPECT_EQ(rig.poll().faults, 0);
 }
 
-TEST_P(TableRun, IsRunDownWhenNoMasterIsHeard) {
+TEST_P(TableRun, IsRampedDownWhenNoMasterIsHeard) {
   constexpr std::uint16_t kSilence = 30;
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, kSilence), BUSHD_OK) << "at any time";
   rig.forget_history();

@@ -111,7 +111,7 @@ TEST_P(TableTicks, SeveralMotorsShareAFrameAndDuplicatesChangeNothing) {
   EXPECT_EQ(rig.poll().faults, 0);
 }
 
-TEST_P(TableTicks, LostFrameLeavesAnIslandToo) {
+TEST_P(TableTicks, LostFrameLeavesAnOutOfOrderRangeToo) {
   bushd_run run;
   bushd_run_start(&run, table.view(), 60, 1);
   Ticks head{.flags = kStart, .first = rig.first_open()};

@@ -1,4 +1,4 @@
-// Table memory: whatever order a master sends things in, an MCU never runs down by anything but a
+// Table memory: whatever order a master sends things in, an MCU never ramps down by anything but a
 // table that was checked whole.
 #include <array>
 #include <string>
@@ -28,7 +28,7 @@ std::vector<std::uint16_t> codes_of(const Law& law) {
   return codes;
 }
 
-// Lets the motor run into the end of its queue at cruise and compares every tick of the run-down
+// Lets the motor run into the end of its queue at cruise and compares every tick of the ramp-down
 // with what the law says: the MCU's own table decides it.
 void expect_runs_down_by(Rig& rig, std::uint8_t motor, const Law& law) {
   rig.pass(3);
@@ -295,7 +295,7 @@ TEST_F(TableUpload, AllAreForgottenAtOnceAndTheirMemoryIsFree) {
   expect_runs_down_by(rig, 0, law);
 }
 
-TEST_F(TableUpload, RefusedDuringARunDown) {
+TEST_F(TableUpload, RefusedDuringARampDown) {
   const Law law = flat_law(250, 20, 10);
   ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
   ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);

@@ -1,6 +1,6 @@
 // The core as the ATmega2560 has it: its configuration, answers at the end of the receiver's
 // buffer, frames worked off in pieces, and the walk through what its EEPROM keeps. The port's own
-// line.c and kept.c run here (atmega2560/port.h), in a main loop like that of its main.c.
+// line.c and nvm.c run here (atmega2560/port.h), in a main loop like that of its main.c.
 //
 // Promises checked beside those of core_rig.h: who may use the memory that is borrowed. While an
 // answer waits or is sent, nobody but its sender touches its bytes; while a frame is worked off, no
@@ -74,7 +74,7 @@ class AvrRig final : public CoreRig {
     if (found == NVM_WHOLE) {
       // What the walk has come to by then decides how much more there is.
       nvm_load(&mcu_);
-      check_restored(host_kept_size(), host_kept_crc());
+      check_restored(host_nvm_size(), host_nvm_crc());
     }
     boot_is_over();
   }

@@ -41,7 +41,7 @@ class Lm3s6965Rig final : public CoreRig {
     boot();
     if (found == NVM_WHOLE) {
       nvm_load(&mcu_);
-      check_restored(host_kept_size(), host_kept_crc());
+      check_restored(host_nvm_size(), host_nvm_crc());
     }
     boot_is_over();
   }

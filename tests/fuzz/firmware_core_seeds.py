@@ -13,7 +13,7 @@ CORPORA = pathlib.Path(__file__).parent / "corpus"
 TICK_NS = 2_560_000
 (IDENTIFY, CONFIGURE, TABLE_BEGIN, TABLE_DATA, TABLE_END, ASSIGN, CONTROL, SET_POSITION, POLL, SYNC, TICKS,
  TABLE_TICKS, TABLE_RUN, EMERGENCY, SET_ADDRESS, TABLES, INPUTS, EMISSION, HOME, LOCAL, TRIGGER,
- REFERENCE) = range(1, 0x17)
+ POSITION_COMPARE) = range(1, 0x17)
 FINE, REPLACE, START = 1, 2, 4
 EMERGENCY_PIN, FORWARD, REVERSE = 1, 2, 4
 
@@ -170,7 +170,7 @@ SEEDS = {
     "trigger": ready(0) + trigger(1, 1, 5000, entries(0, 2)) + passes(3) + trigger_edge() + passes(20)
                + trigger(1, 1, 5000, entries(0, 2)) + trigger(2, 2, 50, entries(1)) + trigger_edge(-30000)
                + passes(15) + trigger(3, 1, 1_500_000, entries(0)) + frame(TRIGGER, bytes(6)),
-    "reference": ready(0) + frame(REFERENCE, struct.pack("<BBiII", 0, 3, 3, 700, 4000)) + MOVE[0] + passes(20),
+    "position-compare": ready(0) + frame(POSITION_COMPARE, struct.pack("<BBiII", 0, 3, 3, 700, 4000)) + MOVE[0] + passes(20),
     "burst": ready(0, emission(1)) + MOVE[0] + passes(12),
     "common-dir": ready(0, emission(2)) + MOVE[0] + passes(12),
     "staggered": ready(0, emission(3, settle_us=60)) + MOVE[0] + passes(12),

@@ -41,13 +41,13 @@ enum class Op : std::uint8_t {
   kControl,   // mcu, actions
   kPort,      // lost and opened again
   kReconfigure,
-  kTableRun,   // mcu, motor, ticks later
-  kEmergency,  // how
-  kHome,       // mcu, motor, u16 steps
-  kArm,        // mcu, mask, u16 us
-  kDisarm,     // mcu
-  kStarted,    // mcu, motor, ticks later: the trigger has come
-  kReference,  // mcu, motor, arrivals
+  kTableRun,         // mcu, motor, ticks later
+  kEmergency,        // how
+  kHome,             // mcu, motor, u16 steps
+  kArm,              // mcu, mask, u16 us
+  kDisarm,           // mcu
+  kStarted,          // mcu, motor, ticks later: the trigger has come
+  kPositionCompare,  // mcu, motor, arrivals
   kCount
 };
 
@@ -461,7 +461,7 @@ void started(Bus& bus, Input& input) {
   bus.master().follow_table_run(mcu, motor, start, 70);
 }
 
-void reference(Bus& bus, Input& input) {
+void position_compare(Bus& bus, Input& input) {
   const link::McuIndex mcu{input.u8() % kMcus};
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const auto arrivals = static_cast<std::uint8_t>(input.u8() % 4u);
@@ -536,8 +536,8 @@ void run_op(Op op, Bus& bus, Input& input) {
     }
     case Op::kStarted:
       return started(bus, input);
-    case Op::kReference:
-      return reference(bus, input);
+    case Op::kPositionCompare:
+      return position_compare(bus, input);
     case Op::kCount:
       return;
   }

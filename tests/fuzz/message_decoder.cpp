@@ -101,7 +101,7 @@ void decode_for_mcu(Bytes payload) {
   decoded(payload, &local, bushd_decode_local, bushd_encode_local);
   bushd_emergency emergency;
   if (decoded(payload, &emergency, bushd_decode_emergency, bushd_encode_emergency)) {
-    BUSHD_REQUIRE(emergency.how == BUSHD_STOP_RAMP || emergency.how == BUSHD_STOP_IMMEDIATE);
+    BUSHD_REQUIRE(emergency.mode == BUSHD_STOP_RAMP || emergency.mode == BUSHD_STOP_IMMEDIATE);
   }
   bushd_emission emission;
   if (decoded(payload, &emission, bushd_decode_emission, bushd_encode_emission)) {
@@ -245,8 +245,8 @@ void decode_trigger(Bytes payload) {
   };
   bushd_trigger message;
   decoded(payload, &message, bushd_decode_trigger, encode);
-  bushd_position_compare reference;
-  decoded(payload, &reference, bushd_decode_position_compare, bushd_encode_position_compare);
+  bushd_position_compare compare;
+  decoded(payload, &compare, bushd_decode_position_compare, bushd_encode_position_compare);
 }
 
 void decode_for_master(Bytes payload) {

@@ -79,7 +79,7 @@ class AxisChange : public testing::TestWithParam<bushd_format> {
     return out;
   }
   void expect_plan(const Plan& plan, Tick start, Tick from_tick) {
-    EXPECT_EQ(axis.target_steps(), plan.end_steps());
+    EXPECT_EQ(axis.planned_end_steps(), plan.end_steps());
     EXPECT_EQ(axis.end_tick(), start + plan.end_tick());
     std::vector<std::int16_t> want;
     for (Tick t = from_tick; t < axis.end_tick() + 5; ++t) {
@@ -110,7 +110,7 @@ TEST_P(AxisChange, NewTargetsAtEveryTickOfAMove) {
         ASSERT_TRUE(axis.needs_change());
         ASSERT_EQ(axis.change(1000 + at), differs) << way << " at " << at;
         ASSERT_FALSE(axis.needs_change());
-        ASSERT_EQ(axis.final_steps(), target);
+        ASSERT_EQ(axis.end_steps(), target);
         if (differs) expect_plan(plan, 1000, 1000 + at / 2);
         axis.finish();
       }
@@ -139,8 +139,8 @@ TEST_P(AxisChange, TooLateChangesNothing) {
   const Tick end = axis.end_tick();
   axis.aim(40);
   EXPECT_FALSE(axis.change(end));
-  EXPECT_EQ(axis.target_steps(), 20);
-  EXPECT_EQ(axis.wanted_steps(), 40);
+  EXPECT_EQ(axis.planned_end_steps(), 20);
+  EXPECT_EQ(axis.target_steps(), 40);
   EXPECT_FALSE(axis.needs_change());
   EXPECT_FALSE(axis.executed(end));
 }
@@ -191,7 +191,7 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
         before.reset();
         const Tick at = now + between<Tick>(1, 12);
         Plan changed = plan;
-        random.stopping() ? changed.stop(at) : changed.aim(at, random.wanted_steps());
+        random.stopping() ? changed.stop(at) : changed.aim(at, random.target_steps());
         const bool over = at >= std::max<Tick>(plan.end_tick(), 1);
         const bool differs = !over && changed.end_steps() != plan.end_steps();
         RC_ASSERT(random.change(at) == differs);
@@ -201,7 +201,7 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
           change_at = at;
         }
       }
-      RC_ASSERT(random.target_steps() == plan.end_steps());
+      RC_ASSERT(random.planned_end_steps() == plan.end_steps());
       RC_ASSERT(random.end_tick() == plan.end_tick());
       const Tick first = now + between<Tick>(0, 20);
       std::vector<std::int16_t> got(between<std::size_t>(1, 30));

@@ -53,21 +53,21 @@ TEST_P(AxisRun, MakesTheTicksThatAreRendered) {
       if (axis.needs_change()) axis.change(now + between<Tick>(1, 12));
       const Tick first = now + between<Tick>(0, 30);
       const auto most = between(1u, 60u);
-      const auto stretch = axis.run_at(first, most);
-      RC_ASSERT(stretch.has_value() == (first >= 100 && first < axis.end_tick()));
-      if (stretch) {
-        RC_ASSERT(stretch->ticks >= 1 && stretch->ticks <= most);
-        std::vector<std::int16_t> rendered(stretch->ticks);
-        const auto delay = axis.render(first, stretch->ticks, rendered.data(), 1);
-        bushd_run run = stretch->run;
-        RC_ASSERT(expanded(&run, tick_ns, stretch->ticks) == rendered);
+      const auto segment = axis.run_at(first, most);
+      RC_ASSERT(segment.has_value() == (first >= 100 && first < axis.end_tick()));
+      if (segment) {
+        RC_ASSERT(segment->ticks >= 1 && segment->ticks <= most);
+        std::vector<std::int16_t> rendered(segment->ticks);
+        const auto delay = axis.render(first, segment->ticks, rendered.data(), 1);
+        bushd_run run = segment->run;
+        RC_ASSERT(expanded(&run, tick_ns, segment->ticks) == rendered);
         // At a change the step that runs goes on, so its delay is the same before and after.
         RC_ASSERT(bushd_run_delay(&run) == delay);
         const auto state =
-            bushd_run_save(&stretch->run, tick_ns, static_cast<std::uint16_t>(stretch->ticks));
+            bushd_run_save(&segment->run, tick_ns, static_cast<std::uint16_t>(segment->ticks));
         bushd_run there;
         RC_ASSERT(bushd_run_restore(&there, table.view(), &state));
-        RC_ASSERT(expanded(&there, tick_ns, stretch->ticks) == rendered);
+        RC_ASSERT(expanded(&there, tick_ns, segment->ticks) == rendered);
       }
       // The steps that are over are those of the ticks that are over.
       for (const Tick until = now + between<Tick>(0, 20); now < until; ++now) {

@@ -120,7 +120,7 @@ TEST_P(AxisTest, MayBeginInTheMiddleOfItsStartTick) {
         ramp_down(axis, 1000 + stop_at);
       }
       EXPECT_EQ(axis.end_tick(), 1000 + ticks_until_rest(reference, kTickNs));
-      EXPECT_EQ(axis.target_steps(), 500 + static_cast<std::int64_t>(reference.steps()));
+      EXPECT_EQ(axis.planned_end_steps(), 500 + static_cast<std::int64_t>(reference.steps()));
       EXPECT_EQ(render(axis, 1000, 200), ticks_of(reference, 1, kTickNs, format, 200));
       axis.executed(1003);
       EXPECT_EQ(axis.executed_steps(),
@@ -160,8 +160,8 @@ TEST_P(AxisTest, EndAndTargetAreThoseOfTheFormula) {
     const auto reference = Reference::move(table.law(), static_cast<std::size_t>(steps));
     axis.start(-1000, steps % 2 ? steps : -steps, 70);
     EXPECT_EQ(axis.end_tick(), 70 + ticks_until_rest(reference, kTickNs)) << steps;
-    EXPECT_EQ(axis.target_steps(), -1000 + (steps % 2 ? steps : -steps));
-    EXPECT_EQ(axis.wanted_steps(), axis.target_steps());
+    EXPECT_EQ(axis.planned_end_steps(), -1000 + (steps % 2 ? steps : -steps));
+    EXPECT_EQ(axis.target_steps(), axis.planned_end_steps());
     EXPECT_FALSE(axis.stopping());
     axis.executed(100);
     EXPECT_EQ(axis.end_tick(), 70 + ticks_until_rest(reference, kTickNs)) << "whatever is over";
@@ -205,10 +205,10 @@ TEST_P(AxisTest, RampDownAtEveryTickOfShortAndLongMoves) {
         axis.executed(3000 + executed);
         ramp_down(axis, 3000 + at);
         const Reference reference = stopped_move(table.law(), steps, at);
-        ASSERT_EQ(axis.target_steps(),
+        ASSERT_EQ(axis.planned_end_steps(),
                   50 + direction * static_cast<std::int64_t>(reference.steps()))
             << steps << " at " << at;
-        ASSERT_EQ(axis.wanted_steps(), 50 + steps);
+        ASSERT_EQ(axis.target_steps(), 50 + steps);
         ASSERT_EQ(axis.end_tick(), 3000 + ticks_until_rest(reference, kTickNs));
         const auto count = static_cast<std::size_t>(length) + 30;
         auto expected = ticks_of(reference, direction, kTickNs, format, count);
@@ -230,7 +230,7 @@ TEST_P(AxisTest, LaterStopForgetsTheEarlierOne) {
       axis.executed(first);  // up to the stop, which has not yet been
       ramp_down(axis, later);
       const Reference reference = stopped_move(table.law(), 240, later);
-      EXPECT_EQ(axis.target_steps(), static_cast<std::int64_t>(reference.steps()));
+      EXPECT_EQ(axis.planned_end_steps(), static_cast<std::int64_t>(reference.steps()));
       auto expected = ticks_of(reference, 1, kTickNs, format, 400);
       expected.erase(expected.begin(), expected.begin() + first);
       ASSERT_EQ(render(axis, first, 400 - static_cast<unsigned>(first)), expected)
@@ -245,8 +245,8 @@ TEST_P(AxisTest, StopAtOrBeforeTheStartMakesNoStep) {
     axis.start(5, 300, 100);
     render(axis, 90, 40);
     ramp_down(axis, at);
-    EXPECT_EQ(axis.target_steps(), 5);
-    EXPECT_EQ(axis.wanted_steps(), 305);
+    EXPECT_EQ(axis.planned_end_steps(), 5);
+    EXPECT_EQ(axis.target_steps(), 305);
     EXPECT_EQ(axis.end_tick(), 100);
     EXPECT_EQ(axis.velocity_steps_per_s(), 0);
     std::vector<std::int16_t> out(60, 1);
@@ -259,9 +259,9 @@ TEST_P(AxisTest, StopAtOrBeforeTheStartMakesNoStep) {
 TEST_P(AxisTest, StopOneTickAfterTheStartMakesTheFirstStepOnly) {
   axis.start(5, 300, 100);
   ramp_down(axis, 101);
-  EXPECT_EQ(axis.target_steps(),
+  EXPECT_EQ(axis.planned_end_steps(),
             5 + static_cast<std::int64_t>(stopped_move(table.law(), 300, 1).steps()));
-  EXPECT_GE(axis.target_steps(), 6);
+  EXPECT_GE(axis.planned_end_steps(), 6);
 }
 
 TEST_P(AxisTest, ExecutedThenRenderGoesOnWhereItWas) {
@@ -311,7 +311,7 @@ TEST_P(AxisTest, AnyTableAnyStop) {
     if (test::between(0, 1) != 0) random.executed(test::between<Tick>(0, at));
     ramp_down(random, at);
     reference.ramp_down_at(static_cast<std::uint64_t>(at) * tick_ns);
-    RC_ASSERT(random.target_steps() == static_cast<std::int64_t>(reference.steps()));
+    RC_ASSERT(random.planned_end_steps() == static_cast<std::int64_t>(reference.steps()));
     const Tick end = ticks_until_rest(reference, tick_ns);
     RC_ASSERT(random.end_tick() == end);
     const auto count = static_cast<std::size_t>(std::max(end, at)) + 3;

@@ -24,7 +24,7 @@ class MotorTest : public testing::Test {
             .output = Output{3},
             .has_home = true,
             .limit_immediate = true,
-            .emergency_stop_cuts = true};
+            .emergency_stop_immediate = true};
   }
   MotorTest() {
     mcu.motor_count = 16;
@@ -107,7 +107,7 @@ TEST_F(MotorTest, ATargetBehindTakesASecondRun) {
   const auto events = report(motor.axis().end_tick());
   EXPECT_NE(find<event::Turn>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events), nullptr);
-  motor.start(motor.axis().wanted_steps(), motor.axis().end_tick() + 20);
+  motor.start(motor.axis().target_steps(), motor.axis().end_tick() + 20);
   EXPECT_EQ(motor.target_steps(), -5);
 }
 
@@ -190,7 +190,7 @@ TEST_F(MotorTest, ALimitSwitchInFlightEndsTheMoveWhereItStands) {
       {.of_mcu = mcu, .tick = kStart + 40, .requests_open = false, .emergency_stop_open = false});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLimit);
-  EXPECT_THAT(refusal(-10), HasSubstr("cut off at its limit switch"));
+  EXPECT_THAT(refusal(-10), HasSubstr("stopped immediately at its limit switch"));
 }
 
 TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
@@ -203,7 +203,7 @@ TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
       {.of_mcu = mcu, .tick = kStart + 22, .requests_open = false, .emergency_stop_open = true});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
-  EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("cut off by an emergency stop"));
+  EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("stopped immediately by an emergency stop"));
 }
 
 TEST_F(MotorTest, HomingKeepsOthersAwayAndMakesThePositionKnown) {

@@ -182,7 +182,7 @@ class Master {
         std::count_if(std::begin(told.slot), std::end(told.slot), [](auto& t) { return t.valid; }));
   }
 
-  // A SYNC to all; returns the name of its mark.
+  // A SYNC to all; returns its sync id.
   std::uint32_t sync(bushd_sync message) {
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
     message.master = 1;
@@ -193,8 +193,8 @@ class Master {
   }
 
   // Sets tick and format and puts all MCUs in step with the first one, as
-  // docs/decisions/0002-time-synchronisation.md has it: mark, question to the first, mark with the
-  // answer. On a fresh bus the first mark is named tick 0.
+  // docs/decisions/0002-time-synchronisation.md has it: SYNC, question to the first, SYNC with the
+  // answer. On a fresh bus the first SYNC is tick 0.
   void bring_up(std::uint32_t tick_ns, bushd_format format) {
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});  // all have booted
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
@@ -204,9 +204,9 @@ class Master {
                 BUSHD_OK);
     }
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
-    const std::uint32_t mark = sync({});
+    const std::uint32_t sync_id = sync({});
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
-    sync({0, 0, true, mark, 0, 0});
+    sync({0, 0, true, sync_id, 0, 0});
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
       const std::uint8_t address = bus_.node(i).address();
@@ -217,7 +217,7 @@ class Master {
     }
   }
 
-  // One mark that also tells where, by the first MCU's clock, the mark before was.
+  // One SYNC that also tells where, by the first MCU's clock, the one before was.
   void discipline(std::uint8_t reference_address) {
     const bushd_report report = poll(reference_address);
     sync({0, 0, true, report.sync_id, report.sync_tick, report.sync_ns});

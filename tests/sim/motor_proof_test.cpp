@@ -1,5 +1,5 @@
-// Shipped tables on the motors that they are for, and tables made by the torque law on any motor:
-// the rotor keeps up, and where it does not, the check has said so.
+// Shipped tables on the motors that they are for, and tables made by the torque profile on any
+// motor: the rotor keeps up, and where it does not, the check has said so.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,17 +7,17 @@
 #include <cmath>
 
 #include "sim/shipped_motors.h"
-#include "tables/laws/findings.h"
-#include "tables/laws/random_spec.h"
+#include "tables/profiles/diagnostics.h"
+#include "tables/profiles/random_spec.h"
 
 namespace bushd::test {
 namespace {
 
-using tables::laws::findings;
-using tables::laws::Law;
-using tables::laws::Motor;
-using tables::laws::Severity;
-using tables::laws::Spec;
+using tables::profiles::diagnostics;
+using tables::profiles::Motor;
+using tables::profiles::Profile;
+using tables::profiles::Severity;
+using tables::profiles::Spec;
 
 // From little to much for a motor without a damper. With half of that little, swings of the start,
 // of the turn and of the end can add up in moves of an unlucky length.
@@ -82,14 +82,15 @@ std::vector<sim::RotorRules> rotors(const Motor& motor) {
 }
 
 bool warned(const tables::Table& table, const Motor& motor) {
-  return !findings(table, {.motor = motor}).empty();
+  return !diagnostics(table, {.motor = motor}).empty();
 }
 
 bool has_error(const tables::Table& table, const Motor& motor) {
-  const auto found = findings(table, {.motor = motor});
-  return std::any_of(found.begin(), found.end(), [](const tables::laws::Finding& finding) {
-    return finding.rule == "torque" && finding.severity == Severity::kError;
-  });
+  const auto found = diagnostics(table, {.motor = motor});
+  return std::any_of(
+      found.begin(), found.end(), [](const tables::profiles::Diagnostic& diagnostic) {
+        return diagnostic.rule == "torque" && diagnostic.severity == Severity::kError;
+      });
 }
 
 class ShippedMotor : public testing::TestWithParam<std::string> {
@@ -138,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(, ShippedMotor, testing::ValuesIn(shipped_tables()), []
 // These use half of the torque T: T/2 with friction F. At 1.3 times the speed the acceleration is
 // 1.69 times as much, which takes 1.69 (T/2 - F) + F = 0.85 T - 0.69 F, and T is less there. That
 // is more than what a rotor follows without damping: 0.72 T at the start, 0.54 T where a short move
-// turns (tables/laws/motor.h). The other tables ask less of their motors, and some follow.
+// turns (tables/profiles/motor.h). The other tables ask less of their motors, and some follow.
 class ShippedAtItsLimit : public ShippedMotor {};
 
 TEST_P(ShippedAtItsLimit, ThirtyPerCentTooFastItIsWarnedOfAndStalls) {
@@ -165,16 +166,16 @@ Spec random_torque_spec() {
                   {max_hz * random_between(0.2, 0.5), torque_nm * random_between(0.75, 1)},
                   {max_hz * 1.4, torque_nm * random_between(0.25, 0.5)}};
   Spec spec{.name = "random", .start_hz = micro * random_between(40, 100), .max_hz = max_hz};
-  spec.accel.law = Law::kTorque;
+  spec.accel.profile = Profile::kTorque;
   spec.motor = motor;
   return spec;
 }
 
 tables::TablePtr made(const Spec& spec) {
-  return tables::make(tables::laws::make_content(spec).value()).value();
+  return tables::make(tables::profiles::make_content(spec).value()).value();
 }
 
-TEST(TorqueLaw, IsFollowedByAnyMotor) {
+TEST(TorqueProfile, IsFollowedByAnyMotor) {
   EXPECT_TRUE(rc::check("with half of its torque", [] {
     const Spec spec = random_torque_spec();
     const tables::TablePtr table = made(spec);
@@ -184,7 +185,7 @@ TEST(TorqueLaw, IsFollowedByAnyMotor) {
   }));
 }
 
-TEST(TorqueLaw, ThirtyPerCentMoreThanTheMotorHasStallsAnyMotor) {
+TEST(TorqueProfile, ThirtyPerCentMoreThanTheMotorHasStallsAnyMotor) {
   EXPECT_TRUE(rc::check("and is an error", [] {
     Spec spec = random_torque_spec();
     const Motor motor = *spec.motor;

@@ -11,7 +11,7 @@
 
 #include "sim/rotor.h"
 #include "source_path.h"
-#include "tables/laws/motor.h"
+#include "tables/profiles/motor.h"
 #include "tables/table_file.h"
 
 namespace bushd::test {
@@ -27,27 +27,27 @@ inline std::vector<std::string> shipped_tables() {
   return names;
 }
 
-inline tables::laws::Motor shipped_motor(const std::string& table) {
+inline tables::profiles::Motor shipped_motor(const std::string& table) {
   std::ifstream file(kShippedTables / "motors/loads.csv");
   for (std::string line; std::getline(file, line);) {
     std::istringstream row(line);
     std::vector<std::string> cells;
     for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
     if (cells.size() != 7 || cells[0] != table) continue;
-    tables::laws::Motor motor{.inertia_kgm2 = std::stod(cells[2]) * 1e-7,
-                              .friction_nm = std::stod(cells[3]) * 1e-2,
-                              .brake_friction_nm = std::stod(cells[4]) * 1e-2,
-                              .steps_per_turn = std::stod(cells[5]),
-                              .full_steps_per_turn = std::stod(cells[6])};
-    motor.torque = tables::laws::load_torque_csv(kShippedTables / "motors" / (cells[1] + ".csv"),
-                                                 motor.steps_per_turn)
+    tables::profiles::Motor motor{.inertia_kgm2 = std::stod(cells[2]) * 1e-7,
+                                  .friction_nm = std::stod(cells[3]) * 1e-2,
+                                  .brake_friction_nm = std::stod(cells[4]) * 1e-2,
+                                  .steps_per_turn = std::stod(cells[5]),
+                                  .full_steps_per_turn = std::stod(cells[6])};
+    motor.torque = tables::profiles::load_torque_csv(
+                       kShippedTables / "motors" / (cells[1] + ".csv"), motor.steps_per_turn)
                        .value();
     return motor;
   }
   throw std::runtime_error("tables/motors/loads.csv has no motor for " + table);
 }
 
-inline sim::RotorRules rotor_rules(const tables::laws::Motor& motor, double friction_nm,
+inline sim::RotorRules rotor_rules(const tables::profiles::Motor& motor, double friction_nm,
                                    double damping_ratio) {
   sim::RotorRules rules{.inertia_kgm2 = motor.inertia_kgm2,
                         .friction_nm = friction_nm,

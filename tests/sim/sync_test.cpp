@@ -53,7 +53,7 @@ TEST(Sync, LateComerJoinsTheOthers) {
   EXPECT_EQ(skew_ns(bus), 0);
 }
 
-// A frame that an adapter sends twice, whenever, is one mark: the first, which the others heard
+// A frame that an adapter sends twice, whenever, is one SYNC: the first, which the others heard
 // too.
 TEST(Sync, RepeatedFrameIsNoOtherMark) {
   Bus bus(500'000);
@@ -77,9 +77,9 @@ TEST(Sync, RepeatedFrameIsNoOtherMark) {
   EXPECT_GT(mark_after(1'000'000, 1001), first);
 }
 
-// Two crystals 100 ppm apart part by 50 us in the half second between two marks, until the rate is
-// known; then by no more than a tick's correction. A correction is spread over several ticks where
-// 1/64 of a tick is less.
+// Two crystals 100 ppm apart part by 50 us in the half second between two SYNC frames, until the
+// rate is known; then by no more than a tick's correction. A correction is spread over several
+// ticks where 1/64 of a tick is less.
 TEST(Sync, ClocksThatDifferAreHeldTogether) {
   for (const std::uint32_t tick_ns : {500'000u, 1'000'000u, kTickNs, BUSHD_MAX_TICK_NS}) {
     for (const std::int32_t ppm : {50, -50}) {
@@ -117,13 +117,13 @@ class Hour {
   }
   void refer_to(std::uint8_t address) { reference_ = address; }
   // The first MCU has lost its time and its rate, and joins the second.
-  void reboot_first(int marks = 2) {
+  void reboot_first(int syncs = 2) {
     bus_.reboot(0);
     bus_.advance_to(bus_.now_ns() + 100'000'000);
     const bushd_configure configure{tick_ns_, BUSHD_FORMAT_FINE, 1000};
     ASSERT_EQ(master_.acknowledged(1, BUSHD_MSG_CONFIGURE, bushd_encode_configure, configure),
               BUSHD_OK);
-    for (int i = 0; i < marks; ++i) {
+    for (int i = 0; i < syncs; ++i) {
       bus_.advance_to(bus_.now_ns() + 60'000'000);
       master_.discipline(2);
     }
@@ -136,7 +136,7 @@ class Hour {
       if (measured_) worst_ns_ = std::max(worst_ns_, std::abs(skew_ns(bus_, tick_ns_)));
     }
   }
-  // Half a second, with a mark at its end.
+  // Half a second, with a SYNC at its end.
   void half_second(bool loss) {
     const TimeNs sync_ns = bus_.now_ns() + 500'000'000;
     while (bus_.now_ns() < sync_ns) {
@@ -203,7 +203,7 @@ TEST(Sync, ReferenceThatJoinedLaterIsFollowedWithinThreeSeconds) {
 
 // Also where ticks are short or long: a tick's share of the rate is no whole number of ns.
 // A daemon that stands still just after an MCU has come into step: its rate was estimated from
-// marks that lie close together.
+// SYNC frames that lie close together.
 TEST(Sync, FirstEstimateOfTheRateHoldsThroughSilence) {
   for (const std::int32_t ppm : {14, -14, 50, -50}) {
     Hour hour(ppm, -ppm, kTickNs);

@@ -47,15 +47,14 @@ TEST_F(AvrMemoryWatched, FindsNothingInGoodWork) {
 
 TEST_F(AvrMemoryWatched, NamesWhoWritesIntoAnothersObject) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  poke(map_.object("mcu.config.queue").address, map_.object("codes").address);
+  poke(map_.address_of("mcu.config.queue"), map_.address_of("codes"));
   const std::string found = violation_of([&] { start_moving(); });
   EXPECT_THAT(found, HasSubstr("in codes"));
   EXPECT_THAT(found, testing::MatchesRegex(".+ \\(.+:[0-9]+\\).*: of .+ writes to 0x.+"));
 }
 
 TEST_F(AvrMemoryWatched, NamesWhoWritesWhereNothingIs) {
-  poke(map_.object("mcu.config.reply").address,
-       static_cast<std::uint16_t>(map_.variables_end() + 16));
+  poke(map_.address_of("mcu.config.reply"), static_cast<std::uint16_t>(map_.variables_end() + 16));
   EXPECT_THAT(violation_of([&] { master_.poll(kAddress); }), HasSubstr("which is no variable's"));
 }
 
@@ -64,8 +63,8 @@ TEST_F(AvrMemoryWatched, NamesWhoWritesToAnAnswerThatIsBeingSent) {
   const std::string found = violation_of([&] {
     master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0});
     pass(2'000'000);
-    poke(map_.object("mcu.receiver.buffer").address, 0);
-    avr_->poke(map_.object("mcu.answer.size").address, 20);
+    poke(map_.address_of("mcu.receiver.buffer"), 0);
+    avr_->poke(map_.address_of("mcu.answer.size"), 20);
     pass(10'000'000);
   });
   EXPECT_THAT(found, HasSubstr("in the reply, which the line is sending"));
@@ -73,16 +72,16 @@ TEST_F(AvrMemoryWatched, NamesWhoWritesToAnAnswerThatIsBeingSent) {
 
 TEST_F(AvrMemoryWatched, NamesWhoReadsRegistersThroughAPointer) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  poke(map_.object("mcu.config.codes").address, 0x00C0);  // what is kept is read through it
+  poke(map_.address_of("mcu.config.codes"), 0x00C0);  // what is kept is read through it
   EXPECT_THAT(violation_of([&] { pass(2'000'000'000); }),
               HasSubstr("reads the I/O register 0x00c0"));
 }
 
 TEST_F(AvrMemoryWatched, NamesWhoLeavesTheEeprom) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  poke(static_cast<std::uint16_t>(map_.object("scan").address + 3),
-       4090);                                   // bushd_mcu_nvm_scan.size
-  avr_->poke(map_.object("phase").address, 1);  // it writes
+  poke(static_cast<std::uint16_t>(map_.address_of("scan") + 3),
+       4090);                               // bushd_mcu_nvm_scan.size
+  avr_->poke(map_.address_of("phase"), 1);  // it writes
   EXPECT_THAT(violation_of([&] { pass(2'000'000'000); }),
               HasSubstr("of the EEPROM, beyond its end"));
 }

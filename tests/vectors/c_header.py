@@ -78,8 +78,8 @@ def c_encoder(index, message, fields):
                     lines.append(f"  message.slot[{i}].valid = {'true' if fields['valid'] >> i & 1 else 'false'};")
                     lines.append(f"  message.slot[{i}].crc = UINT32_C({held[0]});")
                     lines.append(f"  message.slot[{i}].revision = UINT32_C({held[1]});")
-            elif name == "how":
-                lines.append(f"  message.how = {'BUSHD_STOP_IMMEDIATE' if value else 'BUSHD_STOP_RAMP'};")
+            elif message == "emergency" and name == "mode":
+                lines.append(f"  message.mode = {'BUSHD_STOP_IMMEDIATE' if value else 'BUSHD_STOP_RAMP'};")
             elif name in ("follows", "enable_after_watchdog"):
                 lines.append(f"  message.{name} = {'true' if value else 'false'};")
             elif name == "format":

@@ -19,7 +19,7 @@ LAYOUTS = {
     "table_run": (0x0D, [("epoch", 1), ("first_tick", 4), ("entries", "table_run")]),
     "trigger": (0x15, [("number", 1), ("edge", 1), ("delay_us", 4), ("entries", "table_run")]),
     "position_compare": (0x16, [("motor", 1), ("arrivals", 1), ("position_steps", -4), ("delay_us", 4), ("width_us", 4)]),
-    "emergency": (0x0E, [("how", 1)]),
+    "emergency": (0x0E, [("mode", 1)]),
     "emission": (0x12, [("mode", 1), ("sequence", 1), ("hold_current", 1), ("step_us", 2), ("settle_us", 2),
                         ("dir_setup_us", 2), ("pulse_us", 2)]),
     "set_address": (0x0F, [("unique_id", [1]), ("address", 1)]),

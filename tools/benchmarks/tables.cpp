@@ -1,5 +1,5 @@
 // What the longest table costs on the host: 65535 codes, mirrored, so 131070 steps of ramps. Made
-// by each law, checked and indexed, as a file, and used: the time of a move and all its ticks.
+// by each profile, checked and indexed, as a file, and used: the time of a move and all its ticks.
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "engine/run.h"
-#include "tables/laws/make.h"
 #include "tables/move_time.h"
+#include "tables/profiles/make.h"
 #include "tables/table_file.h"
 #include "tables/table_text.h"
 
@@ -19,8 +19,8 @@ namespace bushd::bench {
 namespace {
 
 using tables::TableContent;
-using tables::laws::Law;
-using tables::laws::Spec;
+using tables::profiles::Profile;
+using tables::profiles::Spec;
 
 constexpr double kStartHz = 200;
 constexpr double kMaxHz = 20'000;
@@ -29,22 +29,22 @@ constexpr std::uint32_t kTickNs = 2'560'000;
 // All ramp, and then a little cruise.
 constexpr std::uint32_t kSteps = 2 * kCodes + 1000;
 
-// A few codes less than allowed, where a law cannot be told how many to make.
+// A few codes less than allowed, where a profile cannot be told how many to make.
 constexpr double kAlmostAll = kCodes - 10;
 
-Spec spec_of(Law law) {
+Spec spec_of(Profile profile) {
   Spec spec{.name = "longest", .start_hz = kStartHz, .max_hz = kMaxHz};
-  spec.accel.law = law;
+  spec.accel.profile = profile;
   const double acceleration = (kMaxHz * kMaxHz - kStartHz * kStartHz) / (2 * kAlmostAll);
-  switch (law) {
-    case Law::kPto:
+  switch (profile) {
+    case Profile::kPto:
       spec.accel.time_s = 2 * kAlmostAll / (kMaxHz + kStartHz);
       spec.decel = spec.accel;
       break;
-    case Law::kTorque: {
-      // Constant torque without friction: constant acceleration, found by the law's own way.
+    case Profile::kTorque: {
+      // Constant torque without friction: constant acceleration, found by the profile's own way.
       constexpr double kPi = 3.14159265358979323846;
-      tables::laws::Motor motor;
+      tables::profiles::Motor motor;
       motor.inertia_kgm2 = 1e-5;
       motor.safety = 1;
       const double torque_nm = acceleration * 2 * kPi / motor.steps_per_turn * motor.inertia_kgm2;
@@ -52,12 +52,12 @@ Spec spec_of(Law law) {
       spec.motor = motor;
       break;
     }
-    case Law::kPiecewise:
+    case Profile::kPiecewise:
       spec.accel.legs = {{100, kStartHz}, {30'000, 8'000}, {kAlmostAll - 30'100, kMaxHz}};
       spec.decel = spec.accel;
       spec.decel->legs = {{kAlmostAll - 30'100, 8'000}, {30'000, kStartHz}, {100, kStartHz}};
       break;
-    case Law::kV64:
+    case Profile::kV64:
       spec.accel.acceleration = acceleration;
       break;
     default:
@@ -74,11 +74,11 @@ T value_or_exit(Result<T> result) {
 }
 
 TableContent longest() {
-  return value_or_exit(make_content(spec_of(Law::kConstant)));
+  return value_or_exit(make_content(spec_of(Profile::kConstant)));
 }
 
-void make_by_law(benchmark::State& state, Law law) {
-  const Spec spec = spec_of(law);
+void make_by_profile(benchmark::State& state, Profile profile) {
+  const Spec spec = spec_of(profile);
   std::size_t codes = 0;
   for (auto _ : state) {
     const TableContent content = value_or_exit(make_content(spec));
@@ -135,14 +135,14 @@ void expand_fine(benchmark::State& state) {
 }
 
 constexpr auto kUnit = benchmark::kMillisecond;
-BENCHMARK_CAPTURE(make_by_law, constant, Law::kConstant)->Unit(kUnit);
-BENCHMARK_CAPTURE(make_by_law, scurve, Law::kScurve)->Unit(kUnit);
-BENCHMARK_CAPTURE(make_by_law, exponential, Law::kExponential)->Unit(kUnit);
-BENCHMARK_CAPTURE(make_by_law, pto, Law::kPto)->Unit(kUnit);
-BENCHMARK_CAPTURE(make_by_law, torque, Law::kTorque)->Unit(kUnit);
-BENCHMARK_CAPTURE(make_by_law, piecewise, Law::kPiecewise)->Unit(kUnit);
-BENCHMARK_CAPTURE(make_by_law, recurrence, Law::kRecurrence)->Unit(kUnit);
-BENCHMARK_CAPTURE(make_by_law, v64, Law::kV64)->Unit(kUnit);
+BENCHMARK_CAPTURE(make_by_profile, constant, Profile::kConstant)->Unit(kUnit);
+BENCHMARK_CAPTURE(make_by_profile, scurve, Profile::kScurve)->Unit(kUnit);
+BENCHMARK_CAPTURE(make_by_profile, exponential, Profile::kExponential)->Unit(kUnit);
+BENCHMARK_CAPTURE(make_by_profile, pto, Profile::kPto)->Unit(kUnit);
+BENCHMARK_CAPTURE(make_by_profile, torque, Profile::kTorque)->Unit(kUnit);
+BENCHMARK_CAPTURE(make_by_profile, piecewise, Profile::kPiecewise)->Unit(kUnit);
+BENCHMARK_CAPTURE(make_by_profile, recurrence, Profile::kRecurrence)->Unit(kUnit);
+BENCHMARK_CAPTURE(make_by_profile, v64, Profile::kV64)->Unit(kUnit);
 BENCHMARK(check_and_index)->Unit(kUnit);
 BENCHMARK(write_text)->Unit(kUnit);
 BENCHMARK(read_text)->Unit(kUnit);

@@ -88,7 +88,7 @@ void Command::run(std::function<int()> action) {
 }
 
 CommandLine::CommandLine()
-    : app_(std::make_unique<CLI::App>("bushctl: moves and watches the motors of a running bushd")) {
+    : app_(std::make_unique<CLI::App>("bushctl: move and watch the motors of a running bushd")) {
   const char* url = std::getenv("LCM_DEFAULT_URL");
   connection_.url = url != nullptr && *url != '\0' ? url : bushd::client::kDefaultUrl;
   app_->footer(

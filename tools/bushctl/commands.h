@@ -18,7 +18,7 @@ enum Exit : int {
 
 // status, watch, health
 void add_view_commands(CommandLine& line);
-// move, arm, disarm, stop, estop, home, set, reference
+// move, arm, disarm, stop, estop, home, set, compare
 void add_motion_commands(CommandLine& line);
 // enable, disable, clear
 void add_driver_commands(CommandLine& line);

@@ -99,7 +99,7 @@ nlohmann::json mcu_json(const api::McuHealth& mcu) {
                         {"current", mcu.current},
                         {"crc_errors", mcu.crc_errors},
                         {"rejected_frames", mcu.rejected_frames},
-                        {"run_downs", mcu.ramp_downs},
+                        {"ramp_downs", mcu.ramp_downs},
                         {"timeouts", mcu.timeouts},
                         {"repeats", mcu.repeats},
                         {"missed_ticks", mcu.missed_ticks},

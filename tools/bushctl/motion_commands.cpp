@@ -55,7 +55,7 @@ void add_move(CommandLine& line) {
       .flag("--wait", &options->wait, "Wait for the result")
       .flag("--dry-run", &options->dry_run,
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
-      .flag_with("--dry-run", "--json", &options->json, "With --dry-run: as JSON")
+      .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
       .raw_words(&options->words)
       .run([&line, options] {
         const auto move = parse_move(options->words);
@@ -81,8 +81,8 @@ void add_arm(CommandLine& line) {
           "the edge at its trigger input. With --wait the exit code is 0 only if every motor "
           "reached its target.")
       .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'500'000,
-                            "From the edge on, beside the three ticks", Command::Needed::kYes)
-      .choice("--edge", &options->edge, {"rising", "falling"}, "Which edge")
+                            "Delay from the edge, beyond the three ticks", Command::Needed::kYes)
+      .choice("--edge", &options->edge, {"rising", "falling"}, "Edge that starts the moves")
       .flag("--wait", &options->wait, "Wait for the result")
       .raw_words(&options->words)
       .run([&line, options] {
@@ -96,30 +96,31 @@ void add_disarm(CommandLine& line) {
   const auto motors = std::make_shared<api::MotorNames>();
   line.add("disarm", "Cancel moves that wait for the trigger")
       .footer("What waits for the same trigger, or was armed together, is disarmed together.")
-      .words("NAME", motors.get(), "Motors; none: all", Command::Needed::kNo)
+      .words("NAME", motors.get(), "Motors (default: all)", Command::Needed::kNo)
       .run([&line, motors] {
         return send(line.connection(), api::Disarm{*motors}, Until::kResult, Hope::kDone);
       });
 }
 
-void add_reference(CommandLine& line) {
+void add_compare(CommandLine& line) {
   struct Options {
     std::string motor;
     std::string position;
     Pulse pulse;
   };
   const auto options = std::make_shared<Options>();
-  line.add("reference", "Pulse when a motor arrives at a position")
+  line.add("compare", "Make a pulse when a motor arrives at a position")
       .option("NAME", &options->motor, "The motor; its MCU's position compare output pulses")
-      .option("POSITION", &options->position, "In steps, or off")
+      .option("POSITION", &options->position, "Position in steps, or off")
       .number<std::int64_t>("--delay-us", &options->pulse.delay_us, 0, 1'500'000,
-                            "From the step to the pulse")
+                            "Delay from the step to the pulse")
       .number<std::int64_t>("--width-us", &options->pulse.width_us, 1, 1'000'000,
-                            "Of the pulse; at least a slot")
+                            "Width of the pulse, at least a slot")
       .choice("--direction", &options->pulse.direction, {"both", "positive", "negative"},
-              "In which the motor arrives there")
+              "Direction of arrival")
       .run([&line, options] {
-        const auto request = parse_reference(options->motor, options->position, options->pulse);
+        const auto request =
+            parse_position_compare(options->motor, options->position, options->pulse);
         if (!request) return wrong_usage(request.error());
         return send(line.connection(), *request, Until::kResult, Hope::kDone);
       });
@@ -132,8 +133,8 @@ void add_stop(CommandLine& line) {
   };
   const auto options = std::make_shared<Options>();
   line.add("stop", "Ramp motors down")
-      .words("NAME", &options->motors, "Motors; none: all", Command::Needed::kNo)
-      .flag("--wait", &options->wait, "Wait until they stand")
+      .words("NAME", &options->motors, "Motors (default: all)", Command::Needed::kNo)
+      .flag("--wait", &options->wait, "Wait until the motors stand")
       .run([&line, options] {
         return send(line.connection(), api::Stop{options->motors}, until(options->wait),
                     Hope::kDone);
@@ -152,7 +153,7 @@ void add_home(CommandLine& line) {
     bool wait = false;
   };
   const auto options = std::make_shared<Options>();
-  line.add("home", "Find the motors' switches, and with them their positions")
+  line.add("home", "Home motors at their switches")
       .footer(
           "As the configuration's 'home' says. Those of one MCU are homed one after the other. "
           "With "
@@ -174,7 +175,7 @@ void add_set(CommandLine& line) {
   const auto options = std::make_shared<Options>();
   line.add("set", "Set the current position without moving")
       .option("NAME", &options->motor, "The motor, at rest")
-      .option("STEPS", &options->steps, "Its position from now on")
+      .option("STEPS", &options->steps, "New position")
       .run([&line, options] {
         const auto request = parse_set(options->motor, options->steps);
         if (!request) return wrong_usage(request.error());
@@ -189,7 +190,7 @@ void add_motion_commands(CommandLine& line) {
   add_move(line);
   add_arm(line);
   add_disarm(line);
-  add_reference(line);
+  add_compare(line);
   add_stop(line);
   add_estop(line);
   add_home(line);

@@ -81,8 +81,8 @@ Result<api::Arm> parse_arm(const std::vector<std::string>& words, const std::str
                   .motors = move->motors};
 }
 
-Result<api::PositionCompare> parse_reference(const std::string& motor, const std::string& where,
-                                             const Pulse& pulse) {
+Result<api::PositionCompare> parse_position_compare(const std::string& motor,
+                                                    const std::string& where, const Pulse& pulse) {
   api::PositionCompare compare{.motor = motor};
   if (where == "off") return compare;
   const auto position_steps = whole_number(where);

@@ -1,4 +1,4 @@
-// The words after `bushctl move`, `arm`, `reference` and `set`.
+// The words after `bushctl move`, `arm`, `compare` and `set`.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +24,9 @@ struct Pulse {
   std::int64_t width_us = 10;
 };
 // "theta", "400": a pulse when theta arrives at 400; "theta", "off": none.
-bushd::Result<bushd::api::PositionCompare> parse_reference(const std::string& motor,
-                                                           const std::string& where,
-                                                           const Pulse& pulse);
+bushd::Result<bushd::api::PositionCompare> parse_position_compare(const std::string& motor,
+                                                                  const std::string& where,
+                                                                  const Pulse& pulse);
 
 // "theta", "400": theta stands at 400.
 bushd::Result<bushd::api::SetPosition> parse_set(const std::string& motor,

@@ -156,8 +156,8 @@ int show_table(Client& client, const std::string& wanted, bool as_json) {
 
 void add_list(CommandLine& line) {
   const auto json = std::make_shared<bool>(false);
-  line.add("list", "Show the tables that are there, and who has which", "table")
-      .flag("--json", json.get(), "As JSON")
+  line.add("list", "List the tables, and the table of each group", "table")
+      .flag("--json", json.get(), "Print JSON")
       .run([&line, json] {
         return with_client(line.connection(),
                            [&](Client& client) { return list_tables(client, *json); });
@@ -170,9 +170,9 @@ void add_show(CommandLine& line) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  line.add("show", "Show what a table says", "table")
+  line.add("show", "Show a table", "table")
       .option("TABLE", &options->table, "NAME, NAME@REVISION or NAME@TAG")
-      .flag("--json", &options->json, "As JSON")
+      .flag("--json", &options->json, "Print JSON")
       .run([&line, options] {
         return with_client(line.connection(), [&](Client& client) {
           return show_table(client, options->table, options->json);
@@ -189,14 +189,15 @@ void add_use(CommandLine& line) {
           "move "
           "is by it. It stays in service when the daemon is started again.")
       .option("GROUP", &request->group, "The group")
-      .option("TABLE", &request->table, "Its table from the next move on")
+      .option("TABLE", &request->table, "Table of the group from the next move on")
       .run([&line, request] {
         return send(line.connection(), *request, Client::Until::kResult, Hope::kDone);
       });
 }
 
 void add_reload(CommandLine& line) {
-  line.add("reload", "Read all groups' tables again; bad ones leave the old in service", "table")
+  line.add("reload",
+           "Reload the tables of all groups; an invalid one leaves the old one in service", "table")
       .run([&line] {
         return send(line.connection(), api::ReloadTables{}, Client::Until::kResult, Hope::kDone);
       });

@@ -22,7 +22,7 @@ constexpr std::uint32_t kMany = 1'000'000'000;
 
 Command& add_timeout(Command& command, double* timeout_s) {
   return command.number("--timeout-s", timeout_s, 0.01, 3600.0,
-                        "How long to wait for the daemon's state");
+                        "Longest wait for the state of the daemon");
 }
 
 int show_status(Client& client, std::chrono::milliseconds timeout, bool as_json) {
@@ -79,7 +79,7 @@ void add_status(CommandLine& line) {
   };
   const auto options = std::make_shared<Options>();
   Command command = line.add("status", "Show all motors and MCUs");
-  command.flag("--json", &options->json, "As JSON");
+  command.flag("--json", &options->json, "Print JSON");
   add_timeout(command, &options->timeout_s).run([&line, options] {
     return with_client(line.connection(), [&](Client& client) {
       return show_status(client, milliseconds(options->timeout_s), options->json);
@@ -95,7 +95,7 @@ void add_watch(CommandLine& line) {
   const auto options = std::make_shared<Options>();
   Command command = line.add("watch", "Show a live table; in a pipe: lines of what changes");
   command.number<std::uint32_t>("--count", &options->count, 1, kMany,
-                                "End after so many snapshots");
+                                "Exit after so many snapshots");
   add_timeout(command, &options->timeout_s).run([&line, options] {
     return with_client(line.connection(), [&](Client& client) {
       return watch(client, {.timeout = milliseconds(options->timeout_s), .count = options->count});
@@ -106,10 +106,10 @@ void add_watch(CommandLine& line) {
 void add_health(CommandLine& line) {
   const auto options = std::make_shared<HealthOptions>();
   Command command = line.add("health", "Show bus and MCU diagnostics");
-  command.flag("--json", &options->json, "As JSON")
-      .flag("--watch", &options->watch, "Again every second")
+  command.flag("--json", &options->json, "Print JSON")
+      .flag("--watch", &options->watch, "Print again every second")
       .number<std::uint32_t>("--count", &options->count, 1, kMany,
-                             "With --watch: end after so many");
+                             "With --watch: exit after so many");
   add_timeout(command, &options->timeout_s).run([&line, options] {
     return with_client(line.connection(),
                        [&](Client& client) { return show_health(client, *options); });

@@ -28,11 +28,12 @@ bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
   const bool table_runs = random.one_in(2);
   const bool table_ticks = random.one_in(2);
   const bool coarse = random.one_in(2);
-  const bool cut = random.one_in(2);
+  const bool immediate = random.one_in(2);
   bus.table_runs = ways.table_runs.value_or(table_runs);
   bus.table_ticks = ways.table_ticks.value_or(table_ticks);
   bus.format = ways.format.value_or(coarse ? BUSHD_FORMAT_COARSE : BUSHD_FORMAT_FINE);
-  bus.emergency_stop = ways.emergency_stop.value_or(cut ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP);
+  bus.emergency_stop =
+      ways.emergency_stop.value_or(immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP);
   return bus;
 }
 
@@ -140,7 +141,7 @@ std::string ways_text(const bushd::config::Config& config) {
   return fmt::format("--moves {} --frames {} --format {} --emergency {}",
                      bus.table_runs ? "table" : "stream", bus.table_ticks ? "auto" : "ticks",
                      bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse",
-                     bus.emergency_stop == BUSHD_STOP_IMMEDIATE ? "cut" : "ramp");
+                     bus.emergency_stop == BUSHD_STOP_IMMEDIATE ? "immediate" : "ramp");
 }
 
 }  // namespace bushfaults

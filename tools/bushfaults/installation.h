@@ -38,7 +38,7 @@ void add_homes(bushd::config::Config& config, std::uint64_t seed);
 std::optional<bushd::sim::SwitchOptions> home_switch(const bushd::config::Config& config,
                                                      std::size_t motor, std::uint64_t seed);
 
-// Of all MCUs; they ramp or cut.
+// Of all MCUs; they ramp or stop immediately.
 void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed);
 
 // At one end of most motors, at both of the others.

@@ -31,7 +31,7 @@ void add_way(CLI::App& app, const std::string& name, std::optional<Value>& way,
   for (const auto& [word, value] : words) allowed.push_back(word);
   app.add_option_function<std::string>(
          name, [&way, words](const std::string& word) { way = words.at(word); },
-         "As in bushd.toml; by default the seed decides")
+         "As in bushd.toml (default: by the seed)")
       ->check(CLI::IsMember(allowed));
 }
 
@@ -58,27 +58,28 @@ int run(int argc, char** argv) {
   bool json = false;
   std::string seed = "fresh";
   bushfaults::Ways& ways = options.ways;
-  app.add_option("--seed", seed, "A number; `fresh`: another one each time, printed")
+  app.add_option("--seed", seed, "Seed, a number; `fresh`: another one each time, printed")
       ->capture_default_str();
-  app.add_option("--hours", options.hours, "Simulated time")->capture_default_str();
-  app.add_option("--motors", options.motors, "All of them")->capture_default_str();
-  app.add_option("--mcus", options.mcus, "On one bus")->capture_default_str();
-  app.add_option("--absent-mcus", options.absent_mcus, "Of --mcus, that never come")
+  app.add_option("--hours", options.hours, "Simulated hours")->capture_default_str();
+  app.add_option("--motors", options.motors, "Number of motors")->capture_default_str();
+  app.add_option("--mcus", options.mcus, "Number of MCUs on the bus")->capture_default_str();
+  app.add_option("--absent-mcus", options.absent_mcus, "MCUs of --mcus that are never heard")
       ->capture_default_str();
-  app.add_option("--late-mcus", options.late_mcus, "Of --mcus, that come within 10 minutes")
+  app.add_option("--late-mcus", options.late_mcus,
+                 "MCUs of --mcus that go online within 10 minutes")
       ->capture_default_str();
   app.add_flag("--strict-known", options.strict_known,
-               "Positions called known must be right while MCUs are not online, too");
+               "Require known positions to be right also while MCUs are offline");
   add_way<bool>(app, "--moves", ways.table_runs, {{"stream", false}, {"table", true}});
   add_way<bool>(app, "--frames", ways.table_ticks, {{"ticks", false}, {"auto", true}});
   add_way<bushd_format>(app, "--format", ways.format,
                         {{"coarse", BUSHD_FORMAT_COARSE}, {"fine", BUSHD_FORMAT_FINE}});
   add_way<bushd_stop_mode>(app, "--emergency", ways.emergency_stop,
-                           {{"ramp", BUSHD_STOP_RAMP}, {"cut", BUSHD_STOP_IMMEDIATE}});
-  app.add_option("--crystal-ppm", options.crystal_ppm, "MCUs' clocks are off by up to this")
+                           {{"ramp", BUSHD_STOP_RAMP}, {"immediate", BUSHD_STOP_IMMEDIATE}});
+  app.add_option("--crystal-ppm", options.crystal_ppm, "Largest error of the MCUs' clocks")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
-  app.add_flag("--json", json, "Summary as one JSON object");
+  app.add_flag("--json", json, "Print the summary as a JSON object");
   add_rates<bushfaults::FaultKind>(app, options.fault_rates, "Faults per hour");
   add_rates<bushfaults::CommandKind>(app, options.command_rates, "Commands per hour");
   try {

@@ -194,7 +194,7 @@ std::optional<std::string> Positions::check_motor(std::size_t mcu,
     return std::nullopt;
   }
   if (motor.cut_off_ns && report.made_ns > *motor.cut_off_ns) {
-    return claim.name + " is said to be known although it was cut off in motion";
+    return claim.name + " is said to be known although it was stopped immediately in motion";
   }
   if (!agrees(motor, claim.position_steps, pulses)) {
     return fmt::format("{} is said to be at {} in its MCU's tick {}, but stood at {}", claim.name,

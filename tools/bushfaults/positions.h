@@ -14,8 +14,9 @@
 // begins at 0. So a state may lag behind the motor by the age of its report, and by nothing else;
 // and this age is bounded too: an MCU that has not answered for kMaxAgeNs of the daemon's time is
 // not online any more. A motor that is said to be at rest stands there now, not only at T. And a
-// motor that an emergency stop has cut off in motion is not called known by the daemon that was
-// there, from the first report after that until somebody says where it stands, or homes it.
+// motor that an emergency stop has stopped immediately in motion is not called known by the daemon
+// that was there, from the first report after that until somebody says where it stands, or homes
+// it.
 //
 // Where T's pulses are taken from: the poll as the MCU hears it (Overheard), for it makes its
 // report at once. Of the firmware only its tick's number and beginning are used.

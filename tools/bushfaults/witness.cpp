@@ -15,7 +15,7 @@ namespace api = bushd::api;
 // A move of the random clients lasts some seconds, the longest fault ten, and then a link is given
 // up within one.
 constexpr bushd::sim::TimeNs kResultDueNs = 40'000'000'000;
-// A daemon may not have heard for as long that a switch bars the way, and a move may take as long
+// A daemon may not have heard for as long that a switch is active, and a move may take as long
 // to its end.
 constexpr bushd::sim::TimeNs kBarredNs = kResultDueNs;
 // Until no request waits to be carried out; daemons pause in between.
@@ -215,7 +215,7 @@ void Witness::homed(TimeNs now_ns, const Motors& motors) {
 
 void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const nlohmann::json line = nlohmann::json::parse(json_line);
-  if (line.at("event") == "alone") {
+  if (line.at("event") == "autonomous") {
     const std::size_t index = index_of(*find(line.at("motor").get<std::string>()));
     if (line.at("set")) positions_.homed(index, line.at("position_steps"));
     return;

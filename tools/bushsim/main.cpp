@@ -45,15 +45,17 @@ int run(int argc, char** argv) {
   options.boot_number = fresh_boot_number();
   std::string config;
   std::string bus;
-  app.add_option("--config", config, "bushd.toml: baud rate and MCUs of the bus")->required();
+  app.add_option("--config", config, "Configuration of bushd: baud rate and MCUs of the bus")
+      ->required();
   app.add_option("--link", options.links,
                  "Symlink to make, the bus's serial port. Given several times: its names in turn, "
                  "each time that it is plugged in")
       ->required()
       ->allow_extra_args(false);
-  app.add_option("--trace", options.trace, "VCD file for all edges of STEP, DIR and EN");
+  app.add_option("--trace", options.trace,
+                 "Write all edges of STEP, DIR, EN and position compare outputs to this VCD file");
   std::vector<std::uint8_t> doubled;
-  app.add_option("--doubled", doubled, "One more MCU with this address, a fault worth trying")
+  app.add_option("--doubled", doubled, "Add a second MCU with this address: a fault to try")
       ->check(CLI::Range(1, 255))
       ->excludes("--trace");
   std::vector<std::string> mcus;

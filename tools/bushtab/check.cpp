@@ -4,29 +4,29 @@
 
 #include "base/printable.h"
 #include "commands.h"
-#include "finding_text.h"
+#include "diagnostic_text.h"
 #include "json.h"
 #include "open_table.h"
 
 namespace bushtab {
 namespace {
 
-namespace laws = bushd::tables::laws;
+namespace profiles = bushd::tables::profiles;
 using nlohmann::ordered_json;
 
-bool is_error(const laws::Finding& finding) {
-  return finding.severity == laws::Severity::kError;
+bool is_error(const profiles::Diagnostic& diagnostic) {
+  return diagnostic.severity == profiles::Severity::kError;
 }
 
-ordered_json to_json(const laws::Finding& finding) {
-  ordered_json json = {{"severity", is_error(finding) ? "error" : "warning"},
-                       {"rule", finding.rule},
-                       {"side", finding.side},
+ordered_json to_json(const profiles::Diagnostic& diagnostic) {
+  ordered_json json = {{"severity", is_error(diagnostic) ? "error" : "warning"},
+                       {"rule", diagnostic.rule},
+                       {"side", diagnostic.side},
                        {"index", nullptr},
-                       {"value", finding.value},
-                       {"limit", finding.limit},
-                       {"message", finding.message}};
-  if (finding.index) json["index"] = *finding.index;
+                       {"value", diagnostic.value},
+                       {"limit", diagnostic.limit},
+                       {"message", diagnostic.message}};
+  if (diagnostic.index) json["index"] = *diagnostic.index;
   return json;
 }
 
@@ -40,21 +40,22 @@ int check(const Places& places, const Check& wanted) {
   ordered_json all = ordered_json::array();
   for (const std::string& table : wanted.tables) {
     const auto opened = open_table(places, table);
-    ordered_json entry = {{"table", table}, {"good", false}, {"findings", ordered_json::array()}};
+    ordered_json entry = {
+        {"table", table}, {"good", false}, {"diagnostics", ordered_json::array()}};
     if (!opened) {
       entry["error"] = opened.error().text();
       result = refuse(opened.error());
       all.push_back(entry);
       continue;
     }
-    const auto found = laws::findings(**opened, *limits);
+    const auto found = profiles::diagnostics(**opened, *limits);
     bool good = true;
-    for (const laws::Finding& finding : found) {
-      const bool refused = is_error(finding) || wanted.strict;
+    for (const profiles::Diagnostic& diagnostic : found) {
+      const bool refused = is_error(diagnostic) || wanted.strict;
       good = good && !refused;
-      entry["findings"].push_back(to_json(finding));
+      entry["diagnostics"].push_back(to_json(diagnostic));
       if (!wanted.json) {
-        fmt::print("{}: {}\n", bushd::printable(table), text_of(finding));
+        fmt::print("{}: {}\n", bushd::printable(table), text_of(diagnostic));
       }
     }
     entry["good"] = good;

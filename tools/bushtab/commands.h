@@ -11,20 +11,21 @@
 
 #include "engine/message.h"
 #include "open_table.h"
-#include "tables/laws/findings.h"
-#include "tables/laws/make.h"
+#include "tables/profiles/diagnostics.h"
+#include "tables/profiles/make.h"
 
 namespace bushtab {
 
 inline constexpr int kDone = 0;
 inline constexpr int kRefused = 1;
 
-// What is known of the motor, for laws and checks that ask for it.
+// What is known of the motor, for profiles and checks that ask for it.
 struct MotorOptions {
   std::string torque_file;  // empty: nothing is known
-  bushd::tables::laws::Motor motor;
+  bushd::tables::profiles::Motor motor;
 };
-bushd::Result<std::optional<bushd::tables::laws::Motor>> load_motor(const MotorOptions& options);
+bushd::Result<std::optional<bushd::tables::profiles::Motor>> load_motor(
+    const MotorOptions& options);
 
 // With `steps`, every step of the move that just comes to cruise.
 int show(const Places& places, const std::string& table, bool steps, bool json);
@@ -33,10 +34,10 @@ int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool j
 
 // What a table is checked against; `limits.motor` is that of `motor`.
 struct LimitOptions {
-  bushd::tables::laws::Limits limits;
+  bushd::tables::profiles::Limits limits;
   MotorOptions motor;
 };
-bushd::Result<bushd::tables::laws::Limits> load_limits(const LimitOptions& options);
+bushd::Result<bushd::tables::profiles::Limits> load_limits(const LimitOptions& options);
 
 struct Check {
   std::vector<std::string> tables;
@@ -57,7 +58,7 @@ int expand(const Places& places, const Expansion& expansion);
 
 // The table of a spec whose name is a table as on the command line.
 struct New {
-  bushd::tables::laws::Spec spec;
+  bushd::tables::profiles::Spec spec;
   MotorOptions motor;
   std::string table;
   std::vector<std::string> comments;

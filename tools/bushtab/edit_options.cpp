@@ -16,14 +16,14 @@ namespace {
 namespace tables = bushd::tables;
 using tables::SideKey;
 using tables::TableContent;
-using tables::laws::Quantity;
+using tables::profiles::Quantity;
 
 constexpr const char* kTable = "A table's file or name";
 
 // A table that is changed, and how what it is then is told.
 void add_changed(CLI::App* command, std::string& table, bool& json) {
   command->add_option("TABLE", table, kTable)->required();
-  command->add_flag("--json", json, "What it is now, as show --json");
+  command->add_flag("--json", json, "Print the changed table as show --json does");
 }
 
 struct Codes {
@@ -43,7 +43,9 @@ const CLI::Range kNotNegative(0U, std::numeric_limits<std::uint32_t>::max());
 std::shared_ptr<Codes> codes_command(CLI::App* command, bool takes_codes) {
   const auto options = std::make_shared<Codes>();
   add_changed(command, options->table, options->json);
-  command->add_option("INDEX", options->index, "Of the first code, from 0 in the order of the file")
+  command
+      ->add_option("INDEX", options->index,
+                   "Index of the first code, from 0 in the order of the file")
       ->required()
       ->check(refuse_fraction)
       ->check(kNotNegative);
@@ -52,16 +54,16 @@ std::shared_ptr<Codes> codes_command(CLI::App* command, bool takes_codes) {
         ->required()
         ->check(refuse_fraction);
   } else {
-    command->add_option("COUNT", options->count, "How many (default 1)")
+    command->add_option("COUNT", options->count, "Number of codes (default 1)")
         ->check(refuse_fraction)
         ->check(kNotNegative);
   }
-  command->add_flag("--decel", options->decel, "Of the decelerating side");
+  command->add_flag("--decel", options->decel, "Change the decelerating side");
   return options;
 }
 
 void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
-  CLI::App* set = app.add_subcommand("set", "Sets codes of a table");
+  CLI::App* set = app.add_subcommand("set", "Set codes of a table");
   const auto set_options = codes_command(set, true);
   run(set, [&places, o = set_options] {
     return change(places, o->table, o->json,
@@ -70,7 +72,7 @@ void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
                     return tables::set_codes(std::move(content), o->side(), o->index, o->codes);
                   });
   });
-  CLI::App* insert = app.add_subcommand("insert", "Inserts codes before an index");
+  CLI::App* insert = app.add_subcommand("insert", "Insert codes before an index");
   const auto insert_options = codes_command(insert, true);
   run(insert, [&places, o = insert_options] {
     return change(places, o->table, o->json,
@@ -79,7 +81,7 @@ void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
                     return tables::insert_codes(std::move(content), o->side(), o->index, o->codes);
                   });
   });
-  CLI::App* remove = app.add_subcommand("delete", "Deletes codes");
+  CLI::App* remove = app.add_subcommand("delete", "Delete codes");
   const auto remove_options = codes_command(remove, false);
   run(remove, [&places, o = remove_options] {
     return change(places, o->table, o->json,
@@ -119,14 +121,14 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  CLI::App* scale = app.add_subcommand("scale", "Multiplies speeds or accelerations");
+  CLI::App* scale = app.add_subcommand("scale", "Multiply speeds or accelerations");
   add_changed(scale, options->table, options->json);
   auto* what = scale->add_option_group("what", "One of")->require_option(1);
-  what->add_option("--speed", options->speed, "All speeds times FACTOR")
+  what->add_option("--speed", options->speed, "Multiply all speeds by FACTOR")
       ->check(refuse_not_positive)
       ->type_name("FACTOR");
   what->add_option("--acceleration", options->acceleration,
-                   "The same speeds, accelerations times FACTOR, in fewer or more codes")
+                   "Multiply accelerations by FACTOR: the same speeds in fewer or more codes")
       ->check(refuse_not_positive)
       ->type_name("FACTOR");
   run(scale, [&places, options] {
@@ -144,7 +146,8 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
                   });
   });
 
-  CLI::App* resample = app.add_subcommand("resample", "Another time unit or number of codes");
+  CLI::App* resample =
+      app.add_subcommand("resample", "Change the time unit or the number of codes");
   add_changed(resample, options->table, options->json);
   auto* how = resample->add_option_group("how", "One of")->require_option(1);
   add_quantity(
@@ -155,8 +158,8 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
         }
         options->time_unit_ns = static_cast<std::uint32_t>(ns);
       },
-      "The same delays, rounded up to this unit");
-  how->add_option("--codes", options->codes, "The same speeds over this number of codes a side")
+      "Keep the delays, rounded up to this unit");
+  how->add_option("--codes", options->codes, "Keep the speeds, over this number of codes a side")
       ->check(refuse_fraction)
       ->type_name("N");
   run(resample, [&places, options] {
@@ -173,21 +176,21 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
                   });
   });
 
-  CLI::App* reverse = app.add_subcommand("reverse", "Swaps acceleration and deceleration");
+  CLI::App* reverse = app.add_subcommand("reverse", "Swap acceleration and deceleration");
   add_changed(reverse, options->table, options->json);
   run(reverse, [&places, options] {
     return change(places, options->table, options->json, "reverse",
                   [](TableContent content) { return tables::reverse(std::move(content)); });
   });
-  CLI::App* edit = app.add_subcommand("edit", "Edits the file in $VISUAL or $EDITOR");
+  CLI::App* edit = app.add_subcommand("edit", "Edit the file in $VISUAL or $EDITOR");
   add_changed(edit, options->table, options->json);
-  edit->footer("A text that is no table is kept aside; the old table stays.");
+  edit->footer("A text that is not a valid table is kept aside; the old table stays.");
   run(edit, [&places, options] { return bushtab::edit(places, options->table, options->json); });
 }
 
 void add_tui(CLI::App& app, const Places& places, const Run& run) {
   const auto options = std::make_shared<Tui>();
-  CLI::App* tui = app.add_subcommand("tui", "Edits a table in a full-screen editor");
+  CLI::App* tui = app.add_subcommand("tui", "Edit a table in a full-screen editor");
   tui->add_option("TABLE", options->table, kTable)->required();
   options->steps = {100, 1000, 10000};
   tui->add_option("--steps", options->steps,
@@ -208,26 +211,26 @@ void add_history_commands(CLI::App& app, const Places& places, const Run& run) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  CLI::App* copy = app.add_subcommand("copy", "A table under another name");
+  CLI::App* copy = app.add_subcommand("copy", "Copy a table to another name");
   add_changed(copy, options->table, options->json);
   copy->add_option("NEW", options->other, "The new table's name, or a file NAME.toml")->required();
   run(copy, [&places, options] {
     return bushtab::copy(places, options->table, options->other, options->json);
   });
-  CLI::App* log = app.add_subcommand("log", "The revisions of a table, the newest first");
+  CLI::App* log = app.add_subcommand("log", "Show the revisions of a table, the newest first");
   log->add_option("TABLE", options->table, kTable)->required();
-  log->add_flag("--json", options->json, "As JSON");
+  log->add_flag("--json", options->json, "Print JSON");
   run(log, [&places, options] { return bushtab::log(places, options->table, options->json); });
-  CLI::App* revert = app.add_subcommand("revert", "Makes an old revision the newest again");
+  CLI::App* revert = app.add_subcommand("revert", "Make an old revision the newest again");
   add_changed(revert, options->table, options->json);
   revert->add_option("REVISION", options->revision, "Its number or a tag")->required();
   run(revert, [&places, options] {
     return bushtab::revert(places, options->table, options->revision, options->json);
   });
-  CLI::App* tag = app.add_subcommand("tag", "Gives a revision a name");
+  CLI::App* tag = app.add_subcommand("tag", "Give a revision a name");
   tag->add_option("TABLE", options->table, kTable)->required();
-  tag->add_flag("--json", options->json, "As JSON");
-  tag->add_option("TAG", options->other, "The name")->required();
+  tag->add_flag("--json", options->json, "Print JSON");
+  tag->add_option("TAG", options->other, "Name of the revision")->required();
   tag->add_option("REVISION", options->revision, "Its number or another tag (default: the newest)");
   run(tag, [&places, options] {
     return bushtab::tag(places, options->table, options->other, options->revision, options->json);
@@ -236,11 +239,12 @@ void add_history_commands(CLI::App& app, const Places& places, const Run& run) {
 
 void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
   const auto out = std::make_shared<BushdExport>();
-  CLI::App* to = app.add_subcommand("export-bushd", "Writes a table into a memory image of BUSHD");
+  CLI::App* to = app.add_subcommand("export-bushd", "Write a table into a memory image of BUSHD");
   to->add_option("TABLE", out->table, kTable)->required();
   to->add_option("IMAGE", out->image, "1024 bytes; other pages of an image that is there stay")
       ->required();
-  to->add_option("--page", out->page, "Of BUSHD-2, 0..3 (default 0)")->check(CLI::Range(0U, 3U));
+  to->add_option("--page", out->page, "Page of BUSHD-2, 0..3 (default 0)")
+      ->check(CLI::Range(0U, 3U));
   to->add_option("--steps", out->steps,
                  "Number of steps of the program, 0..65535 (BUSHD-1: 1..126)")
       ->required()
@@ -248,9 +252,9 @@ void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
   to->add_option("--positions", out->positions, "The position area, 32 hexadecimal digits");
   to->add_flag("--resample", out->resample,
                "Round up to codes of 8 bits, cut the top speed at 238 codes, and print the error");
-  to->add_flag("--json", out->json, "What was written, as JSON");
-  auto* bushd1 =
-      to->add_flag("--bushd1", out->bushd1, "A travel of BUSHD-1 instead, 4 bytes and one a step");
+  to->add_flag("--json", out->json, "Print what was written as JSON");
+  auto* bushd1 = to->add_flag("--bushd1", out->bushd1,
+                              "Write a travel of BUSHD-1 instead, 4 bytes and one a step");
   to->add_option("--reactor-delay", out->reactor_delay,
                  "BUSHD-1: code of the delay from reactor start")
       ->needs(bushd1)
@@ -258,13 +262,14 @@ void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
   run(to, [&places, out] { return export_bushd(places, *out); });
 
   const auto in = std::make_shared<BushdImport>();
-  CLI::App* from = app.add_subcommand("import-bushd", "Makes a table of a memory image of BUSHD");
+  CLI::App* from = app.add_subcommand("import-bushd", "Make a table from a memory image of BUSHD");
   from->add_option("IMAGE", in->image, "1024 bytes, or with --bushd1 4 and one a step")->required();
   from->add_option("TABLE", in->table, "The new table's name, or a file NAME.toml")->required();
-  from->add_option("--page", in->page, "Of BUSHD-2, 0..3 (default 0)")->check(CLI::Range(0U, 3U));
+  from->add_option("--page", in->page, "Page of BUSHD-2, 0..3 (default 0)")
+      ->check(CLI::Range(0U, 3U));
   auto* start = add_quantity(
       from, "--start", Quantity::kSpeed, [in](double value) { in->start_hz = value; },
-      "F_start, to which the hardware is set: 1..100 Hz");
+      "F_start that the hardware is set to: 1..100 Hz");
   auto* unit = add_quantity(
       from, "--time-unit", Quantity::kTimeUnit,
       [in](double ns) {
@@ -273,10 +278,10 @@ void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
         }
         in->time_unit_ns = static_cast<std::uint32_t>(ns);
       },
-      "BUSHD-1: of its codes");
-  from->add_flag("--bushd1", in->bushd1, "A travel of BUSHD-1");
-  from->add_flag("--replace", in->replace, "If the table is there: a new revision of it");
-  from->add_flag("--json", in->json, "Steps and positions of the image as JSON");
+      "BUSHD-1: time unit of its codes");
+  from->add_flag("--bushd1", in->bushd1, "Read a travel of BUSHD-1");
+  from->add_flag("--replace", in->replace, "Make a new revision if the table exists");
+  from->add_flag("--json", in->json, "Print steps and positions of the image as JSON");
   run(from, [&places, in, start, unit] {
     if (in->bushd1 ? unit->count() == 0 : start->count() == 0) {
       return refuse(bushd::Error{.message = in->bushd1

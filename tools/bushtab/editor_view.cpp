@@ -7,17 +7,17 @@
 #include <utility>
 
 #include "curve_view.h"
-#include "finding_text.h"
+#include "diagnostic_text.h"
 #include "utf8.h"
 
 namespace bushtab {
 namespace {
 
-using bushd::tables::laws::Severity;
+using bushd::tables::profiles::Severity;
 
 constexpr int kRoomyRows = 12;  // from here on messages have a line of their own
-constexpr int kTallRows = 20;   // from here on there is room for several findings
-constexpr int kMaxFindings = 4;
+constexpr int kTallRows = 20;   // from here on there is room for several diagnostics
+constexpr int kMaxDiagnostics = 4;
 constexpr int kMaxMessageLines = 4;
 constexpr int kMinCurveRows = 5;
 constexpr int kCodeLabelColumns = 13;  // "accel[65534] "
@@ -42,12 +42,12 @@ struct Layout {
   int info = 0;
   int codes = 0;
   int times = 0;
-  int findings = 0;
+  int diagnostics = 0;
   int message = 0;
   int help = 0;
 };
 
-Layout lay_out(int rows, int message_lines, int finding_lines, int code_rows) {
+Layout lay_out(int rows, int message_lines, int diagnostic_lines, int code_rows) {
   Layout layout;
   int left = rows;
   const auto take = [&left](int wanted) {
@@ -65,9 +65,10 @@ Layout lay_out(int rows, int message_lines, int finding_lines, int code_rows) {
   layout.codes = take(1);
   layout.info = take(1);
   layout.title = take(1);
-  layout.findings = take(1);
+  layout.diagnostics = take(1);
   layout.times = take(1);
-  if (rows >= kTallRows) layout.findings += take(std::min(finding_lines, kMaxFindings) - 1);
+  if (rows >= kTallRows)
+    layout.diagnostics += take(std::min(diagnostic_lines, kMaxDiagnostics) - 1);
   const int codes_too = std::min(left / 3, code_rows - layout.codes);
   if (left - codes_too >= kMinCurveRows) layout.curve = take(left - codes_too);
   layout.codes += take(left);
@@ -148,12 +149,12 @@ class View {
     const auto lines = wrapped(said(editor_), grid_.columns());
     const Layout layout =
         lay_out(grid_.rows(), static_cast<int>(lines.size()),
-                static_cast<int>(std::max<std::size_t>(editor_.findings().size(), 1)),
+                static_cast<int>(std::max<std::size_t>(editor_.diagnostics().size(), 1)),
                 static_cast<int>(code_rows_.rows.size()));
     int row = 0;
     if (layout.title > 0) draw_title(row);
     row += layout.title;
-    const int body = layout.curve + layout.info + layout.codes + layout.times + layout.findings;
+    const int body = layout.curve + layout.info + layout.codes + layout.times + layout.diagnostics;
     if (editor_.mode() == TableEditor::Mode::kHelp) {
       draw_keys(row, body);
     } else {
@@ -178,7 +179,7 @@ class View {
     row += layout.codes;
     if (layout.times > 0) draw_times(row);
     row += layout.times;
-    draw_findings(row, layout.findings);
+    draw_diagnostics(row, layout.diagnostics);
   }
 
   void draw_title(int row) {
@@ -239,15 +240,16 @@ class View {
     grid_.put_text(row, 0, line, Style::kPlain);
   }
 
-  void draw_findings(int row, int rows) {
-    const auto& findings = editor_.findings();
-    if (rows > 0 && findings.empty()) grid_.put_text(row, 0, "check: nothing found", Style::kFaint);
-    for (std::size_t i = 0; i < findings.size() && rows-- > 0; ++i) {
-      const bool more = rows == 0 && i + 1 < findings.size();
-      grid_.put_text(
-          row++, 0,
-          (more ? fmt::format("({} more) ", findings.size() - i - 1) : "") + text_of(findings[i]),
-          findings[i].severity == Severity::kError ? Style::kError : Style::kWarning);
+  void draw_diagnostics(int row, int rows) {
+    const auto& diagnostics = editor_.diagnostics();
+    if (rows > 0 && diagnostics.empty())
+      grid_.put_text(row, 0, "check: nothing found", Style::kFaint);
+    for (std::size_t i = 0; i < diagnostics.size() && rows-- > 0; ++i) {
+      const bool more = rows == 0 && i + 1 < diagnostics.size();
+      grid_.put_text(row++, 0,
+                     (more ? fmt::format("({} more) ", diagnostics.size() - i - 1) : "") +
+                         text_of(diagnostics[i]),
+                     diagnostics[i].severity == Severity::kError ? Style::kError : Style::kWarning);
     }
   }
 

@@ -11,7 +11,7 @@
 namespace bushtab {
 namespace {
 
-using bushd::tables::laws::Quantity;
+using bushd::tables::profiles::Quantity;
 
 constexpr const char* kTable = "A table's file or name";
 
@@ -22,12 +22,12 @@ void add_show(CLI::App& app, const Places& places, const Run& run) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  CLI::App* show = app.add_subcommand("show", "Speeds, times and sizes of a table");
+  CLI::App* show = app.add_subcommand("show", "Show speeds, times and sizes of a table");
   show->add_option("TABLE", options->table, kTable)->required();
   show->add_flag(
       "--steps", options->steps,
-      "Every step of the move that just comes to cruise: delay, time, speed, acceleration");
-  show->add_flag("--json", options->json, "As JSON");
+      "Print every step of the move that just reaches cruise: delay, time, speed, acceleration");
+  show->add_flag("--json", options->json, "Print JSON");
   run(show, [&places, options] {
     return bushtab::show(places, options->table, options->steps, options->json);
   });
@@ -35,18 +35,18 @@ void add_show(CLI::App& app, const Places& places, const Run& run) {
 
 void add_check(CLI::App& app, const Places& places, const Run& run) {
   const auto options = std::make_shared<Check>();
-  CLI::App* check = app.add_subcommand("check", "Says of every table whether it is good");
+  CLI::App* check = app.add_subcommand("check", "Check tables against rules, a motor and a bus");
   check->add_option("TABLE", options->tables, "Tables' files or names")->required();
-  check->add_flag("--strict", options->strict, "Warnings are refusals too (exit code 1)");
-  check->add_flag("--json", options->json, "As JSON");
+  check->add_flag("--strict", options->strict, "Refuse tables with warnings too (exit code 1)");
+  check->add_flag("--json", options->json, "Print JSON");
   add_limit_options(check, options->limits);
   run(check, [&places, options] { return bushtab::check(places, *options); });
 }
 
 void add_list(CLI::App& app, const Places& places, const Run& run) {
   const auto json = std::make_shared<bool>(false);
-  CLI::App* list = app.add_subcommand("list", "The tables that are there, shipped ones too");
-  list->add_flag("--json", *json, "As JSON");
+  CLI::App* list = app.add_subcommand("list", "List all tables, shipped ones too");
+  list->add_flag("--json", *json, "Print JSON");
   run(list, [&places, json] { return bushtab::list(places, *json); });
 }
 
@@ -57,14 +57,14 @@ void add_time(CLI::App& app, const Places& places, const Run& run) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  CLI::App* time = app.add_subcommand("time", "How long moves take");
+  CLI::App* time = app.add_subcommand("time", "Show how long moves take");
   time->add_option("TABLE", options->table, kTable)->required();
-  time->add_option("--steps", options->steps, "Lengths of moves")
+  time->add_option("--steps", options->steps, "Lengths of the moves, in steps")
       ->required()
       ->check(refuse_fraction)
       ->check(CLI::Range(0U, 2147483647U))
       ->type_name("N");
-  time->add_flag("--json", options->json, "As JSON");
+  time->add_flag("--json", options->json, "Print JSON");
   run(time, [&places, options] {
     return bushtab::time(places, options->table, options->steps, options->json);
   });
@@ -73,11 +73,12 @@ void add_time(CLI::App& app, const Places& places, const Run& run) {
 void add_plot(CLI::App& app, const Places& places, const Run& run) {
   const auto options = std::make_shared<Plot>();
   CLI::App* plot =
-      app.add_subcommand("plot", "Draws tables in one picture, in the terminal or into files");
+      app.add_subcommand("plot", "Draw tables in one picture, in the terminal or into files");
   plot->add_option("TABLE", options->tables, "Tables' files or names")->required();
-  plot->add_option("--svg", options->svg, "Speed over steps and time, acceleration, as SVG")
+  plot->add_option("--svg", options->svg,
+                   "Write speed over steps and time, and acceleration, as SVG")
       ->type_name("FILE");
-  plot->add_option("--png", options->png, "The same as PNG")->type_name("FILE");
+  plot->add_option("--png", options->png, "Write the same as PNG")->type_name("FILE");
   plot->footer(
       "In the terminal: speed over time, as wide as that is, else $COLUMNS, else 80. No colours\n"
       "with $NO_COLOR or in a file.");
@@ -94,10 +95,10 @@ void add_diff(CLI::App& app, const Places& places, const Run& run) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  CLI::App* diff = app.add_subcommand("diff", "Two tables, by step and by speed");
+  CLI::App* diff = app.add_subcommand("diff", "Compare two tables by step and by speed");
   diff->add_option("BEFORE", options->before, kTable)->required();
   diff->add_option("AFTER", options->after, kTable)->required();
-  diff->add_flag("--json", options->json, "As JSON");
+  diff->add_flag("--json", options->json, "Print JSON");
   run(diff, [&places, options] {
     return bushtab::diff(places, options->before, options->after, options->json);
   });
@@ -111,7 +112,7 @@ void add_expand(CLI::App& app, const Places& places, const Run& run) {
   const auto options = std::make_shared<Options>();
   Expansion& expansion = options->expansion;
   CLI::App* expand = app.add_subcommand(
-      "expand", "A move as CSV tick,displacement: exactly what the daemon would send");
+      "expand", "Print a move as CSV tick,displacement: exactly what the daemon would send");
   expand->footer(
       "Displacements of format coarse are the bytes on the line: bit 7 is 1 if the motor goes\n"
       "forward, bits 6..0 count its steps in the tick: 130 is +2, 2 is -2. Those of format fine\n"
@@ -129,7 +130,7 @@ void add_expand(CLI::App& app, const Places& places, const Run& run) {
   expand->add_option("--format", options->format, "coarse (a byte) or fine (steps x 256)")
       ->required()
       ->check(CLI::IsMember({"coarse", "fine"}));
-  expand->add_flag("--json", expansion.json, "As JSON");
+  expand->add_flag("--json", expansion.json, "Print JSON");
   run(expand, [&places, options] {
     options->expansion.format =
         options->format == "coarse" ? BUSHD_FORMAT_COARSE : BUSHD_FORMAT_FINE;
@@ -159,16 +160,16 @@ void add_limit_options(CLI::App* command, LimitOptions& options) {
   auto& limits = options.limits;
   add_quantity(
       command, "--start", Quantity::kSpeed, [&](double hz) { limits.start_hz = hz; },
-      "The fastest that the motor can start and stop at");
+      "Highest speed at which the motor can start and stop");
   add_quantity(
       command, "--max", Quantity::kSpeed, [&](double hz) { limits.max_hz = hz; },
-      "The fastest that it may run");
+      "Highest speed of the motor");
   add_quantity(
       command, "--acceleration", Quantity::kAcceleration,
-      [&](double value) { limits.acceleration = value; }, "The greatest acceleration");
+      [&](double value) { limits.acceleration = value; }, "Greatest acceleration");
   command
       ->add_option("--speed-ratio", limits.speed_ratio,
-                   "The greatest change of speed from one step to the next (default 2, with "
+                   "Greatest change of speed from one step to the next (default 2, with "
                    "--torque any; 0: any)")
       ->type_name("RATIO");
   command->add_option("--code-bits", limits.code_bits, "8: codes must be those of BUSHD-2, 10..250")

@@ -13,7 +13,7 @@ namespace {
 constexpr int kUsage = 2;
 
 int run(int argc, char** argv) {
-  CLI::App app{"bushtab: makes, shows, edits and checks acceleration tables"};
+  CLI::App app{"bushtab: make, show, edit and check acceleration tables"};
   app.footer("Exit codes: 0 done, 1 refused (reason on stderr), 2 wrong usage.");
   app.require_subcommand(1);
   app.fallthrough();
@@ -21,7 +21,7 @@ int run(int argc, char** argv) {
   app.add_option("--dir", places.directory, "Directory of tables (default /etc/bushd/tables)")
       ->type_name("DIRECTORY");
   app.add_option("--history", places.history,
-                 "Where revisions are kept (default: /var/lib/bushd/tables/history.sqlite for the "
+                 "File of the revisions (default: /var/lib/bushd/tables/history.sqlite for the "
                  "default directory, else .history.sqlite beside the table)")
       ->type_name("FILE");
 

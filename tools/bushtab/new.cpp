@@ -4,27 +4,27 @@
 
 #include "commands.h"
 #include "open_table.h"
-#include "tables/laws/make.h"
+#include "tables/profiles/make.h"
 #include "tables/table_text.h"
 
 namespace bushtab {
 
 namespace tables = bushd::tables;
 
-bushd::Result<std::optional<tables::laws::Motor>> load_motor(const MotorOptions& options) {
+bushd::Result<std::optional<tables::profiles::Motor>> load_motor(const MotorOptions& options) {
   if (options.torque_file.empty()) return std::nullopt;
-  tables::laws::Motor motor = options.motor;
-  auto curve = tables::laws::load_torque_csv(options.torque_file, motor.steps_per_turn);
+  tables::profiles::Motor motor = options.motor;
+  auto curve = tables::profiles::load_torque_csv(options.torque_file, motor.steps_per_turn);
   if (!curve) return bushd::fail(curve.error());
   motor.torque = std::move(*curve);
-  if (auto fault = tables::laws::fault_of(motor)) return bushd::fail(*fault);
+  if (const auto good = tables::profiles::check(motor); !good) return bushd::fail(good.error());
   return motor;
 }
 
-bushd::Result<tables::laws::Limits> load_limits(const LimitOptions& options) {
+bushd::Result<tables::profiles::Limits> load_limits(const LimitOptions& options) {
   auto motor = load_motor(options.motor);
   if (!motor) return bushd::fail(motor.error());
-  tables::laws::Limits limits = options.limits;
+  tables::profiles::Limits limits = options.limits;
   limits.motor = std::move(*motor);
   return limits;
 }
@@ -32,12 +32,12 @@ bushd::Result<tables::laws::Limits> load_limits(const LimitOptions& options) {
 int make_new(const Places& places, const New& wanted) {
   auto home = home_of(places, wanted.table);
   if (!home) return refuse(home.error());
-  tables::laws::Spec spec = wanted.spec;
+  tables::profiles::Spec spec = wanted.spec;
   spec.name = home->name;
   auto motor = load_motor(wanted.motor);
   if (!motor) return refuse(motor.error());
   spec.motor = std::move(*motor);
-  auto content = tables::laws::make_content(spec);
+  auto content = tables::profiles::make_content(spec);
   if (!content) return refuse(content.error());
   content->revision = 1;
   const std::string text = tables::to_text(*content, wanted.comments);
@@ -46,7 +46,8 @@ int make_new(const Places& places, const New& wanted) {
     if (written && std::fflush(stdout) == 0) return kDone;
     return kRefused;  // main says why
   }
-  const std::string note = fmt::format("new, law {}", tables::laws::name_of(spec.accel.law));
+  const std::string note =
+      fmt::format("new, profile {}", tables::profiles::name_of(spec.accel.profile));
   bushd::Result<std::uint32_t> revision{0};
   const auto old = home->store.read(home->name);
   if (old && wanted.replace) {

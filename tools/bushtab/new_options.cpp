@@ -10,11 +10,11 @@
 namespace bushtab {
 namespace {
 
-namespace laws = bushd::tables::laws;
-using laws::Quantity;
+namespace profiles = bushd::tables::profiles;
+using profiles::Quantity;
 
 double quantity_or_throw(const std::string& option, Quantity quantity, const std::string& text) {
-  const auto value = laws::parse_quantity(quantity, text);
+  const auto value = profiles::parse_quantity(quantity, text);
   if (!value) throw CLI::ValidationError(option, value.error().message);
   return *value;
 }
@@ -31,19 +31,20 @@ std::pair<std::string, std::string> halves(const std::string& option, const std:
 
 // `prefix` is "" or "decel-". `side` gives the side to be set.
 void add_side_options(CLI::App* command, const std::string& prefix,
-                      const std::function<laws::SideSpec&()>& side) {
+                      const std::function<profiles::SideSpec&()>& side) {
   const std::string of = prefix.empty() ? "" : " of the decelerating side";
   const std::string dashes = "--" + prefix;
   const std::vector<std::string> names{"constant",    "recurrence", "v64",    "scurve",
                                        "exponential", "pto",        "torque", "piecewise"};
-  auto* law = command->add_option_function<std::string>(
-      dashes + "law", [side](const std::string& name) { side().law = *laws::law_of(name); },
-      "Law of acceleration" + of);
-  law->check(CLI::IsMember(names));
-  if (prefix.empty()) law->required();
+  auto* profile = command->add_option_function<std::string>(
+      dashes + "law",
+      [side](const std::string& name) { side().profile = *profiles::profile_of(name); },
+      "Acceleration profile" + of);
+  profile->check(CLI::IsMember(names));
+  if (prefix.empty()) profile->required();
   add_quantity(
       command, dashes + "acceleration", Quantity::kAcceleration,
-      [side](double value) { side().acceleration = value; }, "The greatest acceleration" + of);
+      [side](double value) { side().acceleration = value; }, "Greatest acceleration" + of);
   add_quantity(
       command, dashes + "time", Quantity::kTime, [side](double value) { side().time_s = value; },
       "Time between start (or stop) and maximum speed" + of);
@@ -54,7 +55,7 @@ void add_side_options(CLI::App* command, const std::string& prefix,
       ->type_name("N");
   add_quantity(
       command, dashes + "jerk", Quantity::kJerk, [side](double value) { side().jerk = value; },
-      "scurve: the greatest change of acceleration a second" + of);
+      "scurve: greatest change of acceleration a second" + of);
   command
       ->add_option_function<double>(
           dashes + "fall", [side](const double& value) { side().fall = value; },
@@ -71,17 +72,17 @@ void add_side_options(CLI::App* command, const std::string& prefix,
                                      quantity_or_throw(segment, Quantity::kSpeed, speed)});
             }
           },
-          "piecewise: over STEPS steps go to SPEED, once for each stretch" + of)
+          "piecewise: over STEPS steps go to SPEED, once for each segment" + of)
       ->allow_extra_args(false)
       ->type_name("STEPS:SPEED");
 }
 
-laws::Skip& skip_of(laws::Spec& spec) {
+profiles::Skip& skip_of(profiles::Spec& spec) {
   if (!spec.skip) spec.skip.emplace();
   return *spec.skip;
 }
 
-void add_speed_options(CLI::App* command, laws::Spec& spec) {
+void add_speed_options(CLI::App* command, profiles::Spec& spec) {
   add_quantity(
       command, "--start", Quantity::kSpeed, [&](double hz) { spec.start_hz = hz; },
       "Speed of the first step: what the motor can do from rest")
@@ -100,8 +101,8 @@ void add_speed_options(CLI::App* command, laws::Spec& spec) {
             skip_of(spec).low_hz = quantity_or_throw("--skip", Quantity::kSpeed, low);
             skip_of(spec).high_hz = quantity_or_throw("--skip", Quantity::kSpeed, high);
           },
-          "A band of speeds to be passed quickly and not to cruise in (resonance) [" +
-              laws::units_text(Quantity::kSpeed) + "]")
+          "Band of speeds to pass quickly and not to cruise in (resonance) [" +
+              profiles::units_text(Quantity::kSpeed) + "]")
       ->type_name("LO:HI");
   command
       ->add_option_function<std::string>(
@@ -115,12 +116,12 @@ void add_speed_options(CLI::App* command, laws::Spec& spec) {
                   quantity_or_throw("--skip-acceleration", Quantity::kAcceleration, text);
             }
           },
-          "Acceleration in that band, or xFACTOR times that of the law; default: all that the "
+          "Acceleration in that band, or xFACTOR times that of the profile; default: all that the "
           "motor of --torque has")
       ->type_name("ACCELERATION|xFACTOR");
 }
 
-void add_code_options(CLI::App* command, laws::Spec& spec) {
+void add_code_options(CLI::App* command, profiles::Spec& spec) {
   add_quantity(
       command, "--time-unit", Quantity::kTimeUnit,
       [&](double ns) {
@@ -152,7 +153,7 @@ CLI::Option* add_quantity(CLI::App* command, const std::string& name, Quantity q
           [name, quantity, set](const std::string& text) {
             set(quantity_or_throw(name, quantity, text));
           },
-          help + " [" + laws::units_text(quantity) + "]")
+          help + " [" + profiles::units_text(quantity) + "]")
       ->type_name(kTypes.at(static_cast<std::size_t>(quantity)));
 }
 
@@ -162,24 +163,24 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
                    "CSV of pull-out torque against speed: header speed_hz|speed_rpm,"
                    "torque_nm|torque_ncm|torque_mnm")
       ->type_name("FILE");
-  laws::Motor& motor = options.motor;
+  profiles::Motor& motor = options.motor;
   add_quantity(
       command, "--inertia", Quantity::kInertia, [&](double value) { motor.inertia_kgm2 = value; },
-      "Of rotor and load together");
+      "Inertia of rotor and load together");
   add_quantity(
       command, "--friction", Quantity::kTorque, [&](double value) { motor.friction_nm = value; },
       "Torque of friction and load against the motion (default 0)");
   add_quantity(
       command, "--brake-friction", Quantity::kTorque,
       [&](double value) { motor.brake_friction_nm = value; },
-      "The part of it that helps braking for sure (default 0)");
+      "Part of the friction that surely helps braking (default 0)");
   command
       ->add_option("--safety", motor.safety,
-                   "The motor's torque divided by what is used of it (default 2)")
+                   "Safety factor: torque of the motor / torque used (default 2)")
       ->type_name("FACTOR");
   command
       ->add_option("--steps-per-turn", motor.steps_per_turn,
-                   "Steps, microsteps included, of a turn (default 200)")
+                   "Steps of a turn, microsteps included (default 200)")
       ->check(refuse_not_positive)
       ->type_name("N");
   command
@@ -192,34 +193,35 @@ void add_motor_options(CLI::App* command, MotorOptions& options) {
 
 void add_new_options(CLI::App& app, const Places& places, const Run& run) {
   const auto options = std::make_shared<New>();
-  CLI::App* command = app.add_subcommand("new", "Makes a table from a law of acceleration");
+  CLI::App* command = app.add_subcommand("new", "Make a table from an acceleration profile");
   command->add_option("TABLE", options->table, "The new table's name, or a file NAME.toml")
       ->required();
-  laws::Spec& spec = options->spec;
-  add_side_options(command, "", [&spec]() -> laws::SideSpec& { return spec.accel; });
+  profiles::Spec& spec = options->spec;
+  add_side_options(command, "", [&spec]() -> profiles::SideSpec& { return spec.accel; });
   add_speed_options(command, spec);
   // What is not said of the decelerating side is as on the other; how steep it is counts as one.
-  const auto decel = std::make_shared<std::optional<laws::SideSpec>>();
-  add_side_options(command, "decel-", [decel]() -> laws::SideSpec& {
+  const auto decel = std::make_shared<std::optional<profiles::SideSpec>>();
+  add_side_options(command, "decel-", [decel]() -> profiles::SideSpec& {
     if (!*decel) decel->emplace();
     return **decel;
   });
   add_motor_options(command, options->motor);
   add_code_options(command, spec);
-  command->add_option("--description", spec.description, "For what motor and load");
-  command->add_option("--comment", options->comments, "A comment at the head of the file")
+  command->add_option("--description", spec.description, "Motor and load that the table is for");
+  command->add_option("--comment", options->comments, "Comment at the head of the file")
       ->allow_extra_args(false);
-  auto* print =
-      command->add_flag("--print", options->print, "To standard output; no file, no history");
-  command->add_flag("--replace", options->replace, "If the table is there: a new revision of it");
-  command->add_flag("--json", options->json, "What was made, as show --json")->excludes(print);
+  auto* print = command->add_flag("--print", options->print,
+                                  "Print the table instead of writing it: no file, no history");
+  command->add_flag("--replace", options->replace, "Make a new revision if the table exists");
+  command->add_flag("--json", options->json, "Print the table as show --json does")
+      ->excludes(print);
   run(command, [&places, options, decel, command] {
     if (*decel) {
-      laws::SideSpec side = **decel;
-      const laws::SideSpec& accel = options->spec.accel;
-      if (command->count("--decel-law") == 0) side.law = accel.law;
+      profiles::SideSpec side = **decel;
+      const profiles::SideSpec& accel = options->spec.accel;
+      if (command->count("--decel-law") == 0) side.profile = accel.profile;
       if (command->count("--decel-fall") == 0) side.fall = accel.fall;
-      if (!side.acceleration && !side.time_s && !side.codes && side.law == accel.law) {
+      if (!side.acceleration && !side.time_s && !side.codes && side.profile == accel.profile) {
         side.acceleration = accel.acceleration;
         side.time_s = accel.time_s;
         side.codes = accel.codes;

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "commands.h"
-#include "tables/laws/quantity.h"
+#include "tables/profiles/quantity.h"
 
 namespace bushtab {
 
@@ -25,8 +25,8 @@ void add_limit_options(CLI::App* command, LimitOptions& limits);
 
 // An option whose value has a unit.
 CLI::Option* add_quantity(CLI::App* command, const std::string& name,
-                          bushd::tables::laws::Quantity quantity, std::function<void(double)> set,
-                          const std::string& help);
+                          bushd::tables::profiles::Quantity quantity,
+                          std::function<void(double)> set, const std::string& help);
 
 // "5.5" would otherwise be called out of range.
 std::string refuse_fraction(const std::string& value);

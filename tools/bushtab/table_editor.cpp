@@ -387,7 +387,7 @@ bool TableEditor::show(TableContent content) {
   now_.cursor = std::min(now_.cursor, last);
   if (mark_) mark_ = std::min(*mark_, last);
   curve_ = curve_of(*table_);
-  findings_ = tables::laws::findings(*table_, watched_.limits);
+  diagnostics_ = tables::profiles::diagnostics(*table_, watched_.limits);
   times_.clear();
   for (const std::uint32_t steps : watched_.steps) {
     times_.push_back({steps, tables::move_time(table_->view(), steps)});

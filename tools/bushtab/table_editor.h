@@ -13,8 +13,8 @@
 #include "code_line.h"
 #include "curve.h"
 #include "key.h"
-#include "tables/laws/findings.h"
 #include "tables/move_time.h"
+#include "tables/profiles/diagnostics.h"
 #include "tables/table.h"
 
 namespace bushtab {
@@ -23,7 +23,7 @@ class TableEditor {
  public:
   // What is looked at while codes change.
   struct Watched {
-    bushd::tables::laws::Limits limits{};
+    bushd::tables::profiles::Limits limits{};
     std::vector<std::uint32_t> steps{};  // of moves whose times are shown
   };
   // Precondition: check(content) finds nothing.
@@ -58,7 +58,9 @@ class TableEditor {
   bool zoomed() const { return zoomed_; }
 
   const std::vector<CurveStep>& curve() const { return curve_; }
-  const std::vector<bushd::tables::laws::Finding>& findings() const { return findings_; }
+  const std::vector<bushd::tables::profiles::Diagnostic>& diagnostics() const {
+    return diagnostics_;
+  }
   struct Time {
     std::uint32_t steps = 0;
     bushd::tables::MoveTime move{};
@@ -122,7 +124,7 @@ class TableEditor {
 
   bushd::tables::TablePtr table_;
   std::vector<CurveStep> curve_;
-  std::vector<bushd::tables::laws::Finding> findings_;
+  std::vector<bushd::tables::profiles::Diagnostic> diagnostics_;
   std::vector<Time> times_;
 };
 

@@ -25,7 +25,7 @@ class MotorCheck:
         self._planned = []  # the steps that moves which met their limit have made by the table
 
     def run(self):
-        edges = self._without_alone(self._motor.edges)
+        edges = self._without_autonomous(self._motor.edges)
         steps, edges = self._without_limits(edges)
         self._motor.steps = sorted(steps + self._planned, key=lambda step: step.time_ns)
         missing, surplus = [], []
@@ -56,25 +56,25 @@ class MotorCheck:
         early_ns = steps[i].early_ns if i < len(steps) else 0
         return away_ns < -self._slot_ns - early_ns - 1
 
-    def _without_alone(self, edges):
+    def _without_autonomous(self, edges):
         """Looks at the edges of homing, of local motion and of the measuring step; returns the others."""
         rest = []
         for edge in edges:
             at_ns = self._clock.bus_ns(edge.time_ns)
-            alone = next((a for a in self._motor.alone if a.begin_ns <= at_ns < a.end_ns), None)
-            if self._clock is NO_CLOCK and self._motor.alone:  # nothing tells when its ticks are
-                alone = self._motor.alone[0]
-            if alone is None:
+            autonomous = next((a for a in self._motor.autonomous if a.begin_ns <= at_ns < a.end_ns), None)
+            if self._clock is NO_CLOCK and self._motor.autonomous:  # nothing tells when its ticks are
+                autonomous = self._motor.autonomous[0]
+            if autonomous is None:
                 rest.append(edge)
                 continue
-            alone.travelled += 1 if edge.direction else -1
-            self._check_other(edge, f"an edge of {alone.what}")
-        for alone in self._motor.alone:
-            if alone.sets or self._clock is NO_CLOCK:
+            autonomous.travelled += 1 if edge.direction else -1
+            self._check_other(edge, f"an edge of {autonomous.what}")
+        for autonomous in self._motor.autonomous:
+            if autonomous.sets or self._clock is NO_CLOCK:
                 continue
-            moved = alone.position_steps - alone.from_steps
-            if moved != alone.travelled:
-                text = f"{alone.what} is said to have moved it by {moved} steps, its edges by {alone.travelled}"
+            moved = autonomous.position_steps - autonomous.from_steps
+            if moved != autonomous.travelled:
+                text = f"{autonomous.what} is said to have moved it by {moved} steps, its edges by {autonomous.travelled}"
                 self._problems.add(self._motor, "position", text)
         return self._without_measuring(rest)
 
@@ -242,7 +242,7 @@ def check_positions(path, motors, problems):
         raise InputError(f"{path}: not the output of bushctl status --json: {error!r}") from None
     for motor in motors:
         set_by_steps = motor.set_by_steps + sum(
-            alone.position_steps - alone.from_steps - alone.travelled for alone in motor.alone if alone.sets
+            autonomous.position_steps - autonomous.from_steps - autonomous.travelled for autonomous in motor.autonomous if autonomous.sets
         )
         counted = motor.from_steps + set_by_steps + motor.travelled()
         if said.get(motor.name) != counted:

@@ -36,7 +36,7 @@ def fit_clock(motors, slot_ns):
     """
     pairs = []
     for motor in motors:
-        if motor.alone or any(move.result == "limit" for move in motor.moves):
+        if motor.autonomous or any(move.result == "limit" for move in motor.moves):
             pairs += pairs_by_move(motor, slot_ns)
             continue
         seen = [edge.time_ns for edge in motor.edges]

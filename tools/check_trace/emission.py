@@ -43,8 +43,8 @@ def arrange(motors, slots):
 
 def spans_by_itself(motor):
     """From tick, to tick."""
-    for alone in motor.alone:
-        yield alone.begin_tick, alone.end_tick
+    for autonomous in motor.autonomous:
+        yield autonomous.begin_tick, autonomous.end_tick
     for move, after in zip(motor.moves, [*motor.moves[1:], None]):
         if move.result == "limit":
             yield move.start_tick, math.inf if after is None else after.start_tick

@@ -8,7 +8,7 @@ from check_trace.problems import InputError
 from check_trace.tables import find_table
 
 
-class Alone:
+class Autonomous:
     """Motion by homing or local inputs: the log tells when, and where from and to, but not its steps."""
 
     def __init__(self, event):
@@ -31,7 +31,7 @@ class Motor:
         self.output = output
         self.mcu = f"{bus}:{address}"
         self.moves = []
-        self.alone = []
+        self.autonomous = []
         self.from_steps = None  # before the first of both
         self.set_by_steps = 0  # sum of what "set" has shifted the position by, without a step
         self.steps = []
@@ -69,7 +69,7 @@ class MoveLog:
             "retarget": self._change,
             "result": self._result,
             "set": self._set,
-            "alone": self._alone,
+            "autonomous": self._autonomous,
         }
         try:
             with open(path, encoding="utf-8") as file:
@@ -107,10 +107,10 @@ class MoveLog:
             self._problems.add(motor, "position", text)
         return motor
 
-    def _alone(self, event):
+    def _autonomous(self, event):
         motor = self._motor_of(event, event["what"])
         if motor is not None:
-            motor.alone.append(Alone(event))
+            motor.autonomous.append(Autonomous(event))
             self._at_steps[motor.name] = event["position_steps"]
 
     def _move(self, event):

@@ -27,9 +27,9 @@
 #define SYSTEM_BITS (1 << TRIGGER_BIT | 1 << EMERGENCY_BIT | 1 << FORWARD_BIT | 1 << REVERSE_BIT)
 // The current sensor is at ADC0.
 
-// Output of the reference pulse.
-#define REFERENCE_PORT PORTG
-#define REFERENCE_BIT 5
+// Output of the position compare pulse.
+#define COMPARE_PORT PORTG
+#define COMPARE_BIT 5
 #define EN_PORT PORTH
 #define EN_BIT 3
 // Driver-enable of the RS-485 transceiver, and its /RE: it does not hear itself.
@@ -42,7 +42,7 @@ static inline void board_init(void) {
   DDRA = DDRC = DDRL = DDRB = 0xFF;
   DDRH = 1 << EN_BIT;
   DDRE = 1 << DE_BIT;
-  DDRG = 1 << REFERENCE_BIT;
+  DDRG = 1 << COMPARE_BIT;
   DDRF = 1 << COMMON_DIR_BIT;
   // Pull-ups: the inputs, and the receiver's line while the transceiver does not drive it.
   PORTK = PORTJ = 0xFF;

@@ -5,7 +5,7 @@
 static uint32_t latest;  // in counts
 
 void clock_init(void) {
-  // Timer 4, of the reference output, begins in the same cycle, from the same prescaler.
+  // Timer 4, of the position compare output, begins in the same cycle, from the same prescaler.
   GTCCR = 1 << TSM | 1 << PSRSYNC;
   TCCR5B = 1 << CS51;
   TCCR4B = 1 << CS41 | 1 << CS40;

@@ -10,8 +10,8 @@
 
 // Which compares are to stay on when the other one has come: its bit in TIMSK4, or 0.
 // edge_interrupts.S
-volatile uint8_t reference_rises;
-volatile uint8_t reference_falls;
+volatile uint8_t compare_rises;
+volatile uint8_t compare_falls;
 
 // A compare comes when the count ends that it names.
 static uint16_t compare_for(uint32_t time) {
@@ -27,10 +27,10 @@ void compare_rise(uint32_t time) {
   OCR4A = compare_for(time);
   TIFR4 = 1 << OCF4A;
   if (is_due(time)) {
-    REFERENCE_PORT |= 1 << REFERENCE_BIT;
+    COMPARE_PORT |= 1 << COMPARE_BIT;
     return;
   }
-  reference_rises = 1 << OCIE4A;
+  compare_rises = 1 << OCIE4A;
   // No slot is to wait for more than that.
   ATOMIC_BLOCK(ATOMIC_FORCEON) {
     TIMSK4 |= 1 << OCIE4A;
@@ -41,10 +41,10 @@ void compare_fall(uint32_t time) {
   OCR4B = compare_for(time);
   TIFR4 = 1 << OCF4B;
   if (is_due(time)) {
-    REFERENCE_PORT &= (uint8_t) ~(1 << REFERENCE_BIT);
+    COMPARE_PORT &= (uint8_t) ~(1 << COMPARE_BIT);
     return;
   }
-  reference_falls = 1 << OCIE4B;
+  compare_falls = 1 << OCIE4B;
   ATOMIC_BLOCK(ATOMIC_FORCEON) {
     TIMSK4 |= 1 << OCIE4B;
   }

@@ -1,4 +1,4 @@
-// The reference output. Timer 4 counts every 64th cycle, in step with timer 5 (clock.c).
+// The position compare output. Timer 4 counts every 64th cycle, in step with timer 5 (clock.c).
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_COMPARE_OUTPUT_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_COMPARE_OUTPUT_H
 

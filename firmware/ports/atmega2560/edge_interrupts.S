@@ -1,4 +1,4 @@
-; The trigger's edge and the reference pulse, by the registers that interrupts have to themselves (emission_slots.h):
+; The trigger's edge and the position compare pulse, by the registers that interrupts have to themselves (emission_slots.h):
 ; slots wait for none of them longer than 25 cycles. None changes a flag of SREG.
 
 #include <avr/io.h>
@@ -22,16 +22,16 @@ INT0_vect:
 ; wanted: a compare comes again whenever the timer has gone round.
     .global TIMER4_COMPA_vect
 TIMER4_COMPA_vect:
-    sbi _SFR_IO_ADDR(REFERENCE_PORT), REFERENCE_BIT
-    sts reference_rises, ZERO
-    lds DATA_LOW, reference_falls
+    sbi _SFR_IO_ADDR(COMPARE_PORT), COMPARE_BIT
+    sts compare_rises, ZERO
+    lds DATA_LOW, compare_falls
     sts TIMSK4, DATA_LOW
     reti
 
     .global TIMER4_COMPB_vect
 TIMER4_COMPB_vect:
-    cbi _SFR_IO_ADDR(REFERENCE_PORT), REFERENCE_BIT
-    sts reference_falls, ZERO
-    lds DATA_LOW, reference_rises
+    cbi _SFR_IO_ADDR(COMPARE_PORT), COMPARE_BIT
+    sts compare_falls, ZERO
+    lds DATA_LOW, compare_rises
     sts TIMSK4, DATA_LOW
     reti

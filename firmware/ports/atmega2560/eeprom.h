@@ -1,6 +1,6 @@
 // The EEPROM, a byte at a time without waiting for it. Who has which part of it:
 //   0 .. 31   identity.h
-//   32 ..     kept.h
+//   32 ..     nvm.h
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_EEPROM_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_EEPROM_H
 

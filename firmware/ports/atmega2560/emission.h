@@ -1,5 +1,5 @@
-// Planes onto the pins. Timer 1 counts the cycles of a slot: compare A begins its pulses, compare B
-// ends them.
+// Slot buffers onto the pins. Timer 1 counts the cycles of a slot: compare A begins its pulses,
+// compare B ends them.
 //
 //     slot k of a tick of L cycles begins at  start + k floor(L / slots);  the last one takes the
 //     rest

@@ -14,6 +14,7 @@
 #include "firmware/ports/atmega2560/line.h"
 #include "firmware/ports/atmega2560/nvm.h"
 #include "firmware/ports/atmega2560/trigger.h"
+#include "firmware/ports/memory_names.h"
 
 #define QUEUE_TICKS 64u
 #define TABLE_CODES 952u  // four tables of 238 codes
@@ -28,28 +29,15 @@ static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
 static uint16_t codes[TABLE_CODES];
 static uint8_t failed_tests;
 
-// Symbols of the ELF, for memory_owners and for who watches memory: they cost no byte.
-#define NAME_BYTES(name, at, size)                                                    \
-  __asm__ volatile(".global mcu." name "\n.set mcu." name ", mcu+%0\n.type mcu." name \
-                   ", @object\n.size mcu." name ", %1" ::"i"(at),                     \
-                   "i"(size))
-#define NAME_PART(name, part) NAME_BYTES(name, offsetof(bushd_mcu, part), sizeof mcu.part)
 static inline void name_parts(void) {
-  NAME_PART("receiver", receiver);
-  NAME_PART("receiver.buffer", receiver.buffer);
+  name_parts_of_core();
   NAME_BYTES("reply", offsetof(bushd_mcu, receiver.buffer) + LINE_REPLY_AT, BUSHD_MCU_MAX_REPLY);
-  NAME_PART("answer", answer);
   NAME_PART("answer.size", answer.size);
-  NAME_PART("rows", stream.rows);
   NAME_PART("rows.next", stream.rows.next);
   NAME_PART("rows.count", stream.rows.ticks.count);
-  NAME_PART("config", config);
   NAME_PART("config.queue", config.queue);
   NAME_PART("config.codes", config.codes);
   NAME_PART("config.reply", config.reply);
-  NAME_PART("slot_buffers", slot_buffer);
-  NAME_PART("motors", motor);
-  NAME_PART("tables", tables);
 }
 
 static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {

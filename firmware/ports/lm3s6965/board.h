@@ -23,7 +23,7 @@
 #define INPUT_DATA GPIO_DATA(GPIO_C, 1u << 4)
 
 #define COMMON_DIR GPIO_DATA(GPIO_F, 1u << 0)
-#define REFERENCE GPIO_DATA(GPIO_F, 1u << 1)
+#define COMPARE_PIN GPIO_DATA(GPIO_F, 1u << 1)
 
 // In the order of BUSHD_INPUT_*.
 #define SYSTEM_INPUTS GPIO_DATA(GPIO_A, 0xF0u)

@@ -4,7 +4,7 @@
 #include "firmware/ports/lm3s6965/interrupts.h"
 #include "firmware/ports/lm3s6965/timer.h"
 
-#define REFERENCE_TIMER TIMER(3)
+#define COMPARE_TIMER TIMER(3)
 #define SHORTEST_CYCLES 40u
 
 // Of the interrupts.
@@ -12,23 +12,23 @@ static bool rises;
 static uint32_t width;  // of the pulse that rises; 0: it falls in another tick
 
 static void wait(uint32_t cycles) {
-  timer_start(REFERENCE_TIMER, TIMER_ONE_SHOT, cycles > SHORTEST_CYCLES ? cycles : SHORTEST_CYCLES);
+  timer_start(COMPARE_TIMER, TIMER_ONE_SHOT, cycles > SHORTEST_CYCLES ? cycles : SHORTEST_CYCLES);
 }
 
-void reference_init(void) {
-  timer_init(REFERENCE_TIMER);
+void compare_init(void) {
+  timer_init(COMPARE_TIMER);
   NVIC_ISER1 = 1u << (IRQ_TIMER3A - 32u);
 }
 
-void reference_emit(const reference_edges* edges) {
+void compare_emit(const compare_edges* edges) {
   rises = edges->rises;
   width = edges->rises && edges->falls ? edges->fall - edges->rise : 0;
   wait(edges->rises ? edges->rise : edges->fall);
 }
 
-void reference_due(void) {
-  timer_stop(REFERENCE_TIMER);
-  REFERENCE = rises ? ALL_PINS : 0;
+void compare_due(void) {
+  timer_stop(COMPARE_TIMER);
+  COMPARE_PIN = rises ? ALL_PINS : 0;
   if (rises && width != 0) wait(width);
   rises = false;
 }

@@ -1,21 +1,21 @@
-// The reference output. Timer 3 waits for the edges of a tick, from the tick's beginning on: a tick
-// that comes late takes its pulse along.
+// The position compare output. Timer 3 waits for the edges of a tick, from the tick's beginning on:
+// a tick that comes late takes its pulse along.
 #ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_COMPARE_OUTPUT_H
 #define BUSHD_FIRMWARE_PORTS_LM3S6965_COMPARE_OUTPUT_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef struct reference_edges {
+typedef struct compare_edges {
   bool rises;
   bool falls;
   uint32_t rise;  // cycles from the tick's beginning
   uint32_t fall;  // later, if both
-} reference_edges;
+} compare_edges;
 
-void reference_init(void);
+void compare_init(void);
 
 // The tick that has them begins: for its interrupt. Those of the one before are over.
-void reference_emit(const reference_edges* edges);
+void compare_emit(const compare_edges* edges);
 
 #endif

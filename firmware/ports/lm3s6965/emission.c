@@ -25,8 +25,8 @@ typedef struct emission_tick {
   uint32_t cycles;
   bool turns;       // DIR is to be latched
   uint8_t outputs;  // bushd_outputs
-  bool has_reference;
-  reference_edges reference;
+  bool has_compare;
+  compare_edges compare;
 } emission_tick;
 
 // What becomes of the slot_buffer that the core has prepared.
@@ -119,7 +119,7 @@ void emission_tick_begins(void) {
   emission_slot.end = (uintptr_t)present.end;
   const uint32_t start = next_start;
   next_start = start + present.cycles;
-  if (present.has_reference) reference_emit(&present.reference);
+  if (present.has_compare) compare_emit(&present.compare);
   if (state == PLANE_TAKEN && !begun) {
     begun_at = start;
     begun = true;
@@ -145,10 +145,10 @@ static emission_tick empty_tick(const uint16_t* mask, uint32_t cycles) {
   return tick;
 }
 
-static reference_edges reference_of(uint32_t cycles) {
+static compare_edges compare_of(uint32_t cycles) {
   const uint32_t slot = 2u * half_slot_of(cycles);
-  reference_edges edges = {.rises = slot_buffer->compare_rise != 0,
-                           .falls = slot_buffer->compare_fall != 0};
+  compare_edges edges = {.rises = slot_buffer->compare_rise != 0,
+                         .falls = slot_buffer->compare_fall != 0};
   if (edges.rises) edges.rise = (slot_buffer->compare_rise - 1u) * slot;
   if (edges.falls) edges.fall = (slot_buffer->compare_fall - 1u) * slot;
   return edges;
@@ -163,8 +163,8 @@ static void give(void) {
                                                 : empty_tick(slot_buffer->step, cycles);
   tick.outputs = slot_buffer->outputs;
   tick.turns = slot_buffer->direction != directions;
-  tick.has_reference = (slot_buffer->compare_rise | slot_buffer->compare_fall) != 0;
-  if (tick.has_reference) tick.reference = reference_of(cycles);
+  tick.has_compare = (slot_buffer->compare_rise | slot_buffer->compare_fall) != 0;
+  if (tick.has_compare) tick.compare = compare_of(cycles);
   interrupts_off();
   if (state != PLANE_TAKEN) {
     next = tick;

@@ -1,5 +1,5 @@
-// Planes onto the pins. Timer 1 begins a tick, timer 0 then comes every half slot: pulses begin and
-// end by turns.
+// Slot buffers onto the pins. Timer 1 begins a tick, timer 0 then comes every half slot: pulses
+// begin and end by turns.
 //
 //     a tick of L cycles that begins at S:  slot k at about  S + k (L - margin) / slots
 //

@@ -12,6 +12,6 @@ void line_received(void);         // UART 0
 void emission_half_slot(void);    // timer 0
 void emission_tick_begins(void);  // timer 1
 void line_due(void);              // timer 2
-void reference_due(void);         // timer 3
+void compare_due(void);           // timer 3
 
 #endif

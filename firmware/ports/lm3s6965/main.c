@@ -10,6 +10,7 @@
 #include "firmware/ports/lm3s6965/nvm.h"
 #include "firmware/ports/lm3s6965/timer.h"
 #include "firmware/ports/lm3s6965/trigger.h"
+#include "firmware/ports/memory_names.h"
 
 #define QUEUE_TICKS 512u
 #define TABLE_CODES 12288u
@@ -23,23 +24,6 @@ static uint16_t motor_inputs;
 // In memory that a watchdog reset leaves as it is.
 #define ENABLE_KEPT 0x5AC3E917u
 __attribute__((section(".kept"))) static uint32_t enable_kept;
-
-// Parts of it as symbols of the ELF, for memory_owners and for who watches memory: they cost no
-// byte.
-#define NAME_PART(name, part)                                                              \
-  __asm__ volatile(".global mcu." name "\n.set mcu." name ", mcu+%c0\n.type mcu." name     \
-                   ", %%object\n.size mcu." name ", %c1" ::"i"(offsetof(bushd_mcu, part)), \
-                   "i"(sizeof mcu.part))
-static inline void name_parts(void) {
-  NAME_PART("receiver", receiver);
-  NAME_PART("receiver.buffer", receiver.buffer);
-  NAME_PART("answer", answer);
-  NAME_PART("rows", stream.rows);
-  NAME_PART("config", config);
-  NAME_PART("slot_buffers", slot_buffer);
-  NAME_PART("motors", motor);
-  NAME_PART("tables", tables);
-}
 
 static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
   (void)context;
@@ -136,7 +120,7 @@ static void boot(void) {
                              .code_count = TABLE_CODES,
                              .reply = reply};
   journal_state kept;
-  name_parts();
+  name_parts_of_core();
   motor_inputs = (uint16_t)~board_read_inputs();
   config.reset_cause = reset_cause();
   config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enable_kept == ENABLE_KEPT;
@@ -186,7 +170,7 @@ int main(void) {
   prepare();
   line_init();
   trigger_init();
-  reference_init();
+  compare_init();
   emission_start();
   watchdog_start();
   for (;;) {

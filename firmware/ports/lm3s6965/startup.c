@@ -66,4 +66,4 @@ __attribute__((section(".vectors"), used)) static const vector kVectors[VECTORS]
     [EXTERNAL(IRQ_TIMER0A)] = emission_half_slot,
     [EXTERNAL(IRQ_TIMER1A)] = emission_tick_begins,
     [EXTERNAL(IRQ_TIMER2A)] = line_due,
-    [EXTERNAL(IRQ_TIMER3A)] = reference_due};
+    [EXTERNAL(IRQ_TIMER3A)] = compare_due};

@@ -55,10 +55,10 @@ static uint16_t common_dir_at(const bushd_virtual* v, uint16_t edge) {
          slot % 2;
 }
 
-static void drive_reference(bushd_virtual* v, int64_t time_ns, bool level) {
-  if (level == v->reference_level) return;
-  v->reference_level = level;
-  emit(v, time_ns, BUSHD_VIRTUAL_REFERENCE, 0, level);
+static void drive_compare(bushd_virtual* v, int64_t time_ns, bool level) {
+  if (level == v->compare_level) return;
+  v->compare_level = level;
+  emit(v, time_ns, BUSHD_VIRTUAL_COMPARE, 0, level);
 }
 
 static bool has_edges(const bushd_slot_buffer* slot_buffer) {
@@ -85,7 +85,7 @@ static void emit_slots(bushd_virtual* v, int64_t until_ns) {
     if (time_ns > until_ns) return;
     drive(v, time_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, levels);
     drive(v, time_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, common_dir);
-    if (rises || falls) drive_reference(v, time_ns, rises);
+    if (rises || falls) drive_compare(v, time_ns, rises);
   }
 }
 
@@ -311,7 +311,7 @@ void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint
   drive(v, now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, 0);
   drive(v, now_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, 0);
   drive(v, now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, 0);
-  drive_reference(v, now_ns, false);
+  drive_compare(v, now_ns, false);
   if (v->running) port_set_enable(v, false);
   v->running = false;
   v->config.boot_ns = boot_ns;

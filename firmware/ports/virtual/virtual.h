@@ -35,7 +35,7 @@ typedef enum bushd_virtual_signal {
   BUSHD_VIRTUAL_DIR = 1,
   BUSHD_VIRTUAL_EN = 2,          // one per MCU, index 0
   BUSHD_VIRTUAL_COMMON_DIR = 3,  // likewise
-  BUSHD_VIRTUAL_REFERENCE = 4    // likewise
+  BUSHD_VIRTUAL_COMPARE = 4      // likewise
 } bushd_virtual_signal;
 
 typedef struct bushd_virtual_config {
@@ -93,7 +93,7 @@ typedef struct bushd_virtual {
   bool enable_level;
   bool enable_kept;
   uint8_t reply[BUSHD_MCU_MAX_REPLY];
-  bool reference_level;
+  bool compare_level;
   bushd_edge trigger_edge;  // awaited
 } bushd_virtual;
 

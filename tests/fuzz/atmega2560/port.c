@@ -35,22 +35,22 @@ static uint8_t eeprom[EEPROM_SIZE];
 static uint32_t cycles;
 
 // Beyond it an address wraps, and hits the identity. Below EEPROM_NVM that is whose it is.
-static void require_kept_area(size_t address, size_t size) {
+static void require_nvm_area(size_t address, size_t size) {
   if (address < EEPROM_NVM || address + size > EEPROM_SIZE) abort();
 }
 
 void eeprom_read_block(void* to, const void* from, size_t size) {
-  require_kept_area((size_t)from, size);
+  require_nvm_area((size_t)from, size);
   memcpy(to, eeprom + (size_t)from, size);
 }
 
 uint8_t eeprom_read_byte(const uint8_t* at) {
-  require_kept_area((size_t)at, 1);
+  require_nvm_area((size_t)at, 1);
   return eeprom[(size_t)at];
 }
 
 void eeprom_write_byte(uint8_t* at, uint8_t byte) {
-  require_kept_area((size_t)at, 1);
+  require_nvm_area((size_t)at, 1);
   eeprom[(size_t)at] = byte;
 }
 
@@ -98,11 +98,11 @@ void host_blank_eeprom(void) {
   memset(eeprom, 0xFF, sizeof eeprom);
 }
 
-uint16_t host_kept_size(void) {
+uint16_t host_nvm_size(void) {
   return read_head().size;
 }
 
-uint32_t host_kept_crc(void) {
+uint32_t host_nvm_crc(void) {
   return read_head().crc;
 }
 

@@ -1,5 +1,5 @@
 // The ATmega2560's C files that deal with borrowed memory, on the host: line.c, the reply at the
-// end of the receiver's buffer; and kept.c, the walk through what the EEPROM keeps. What surrounds
+// end of the receiver's buffer; and nvm.c, the walk through what the EEPROM keeps. What surrounds
 // them (interrupts in assembler, timer 3, the EEPROM) is made up here.
 #ifndef BUSHD_FUZZ_ATMEGA2560_PORT_H
 #define BUSHD_FUZZ_ATMEGA2560_PORT_H
@@ -17,8 +17,8 @@ extern "C" {
 void host_reset(void);
 void host_blank_eeprom(void);
 // Of what is kept, as its head says. Precondition: it is whole.
-uint16_t host_kept_size(void);
-uint32_t host_kept_crc(void);
+uint16_t host_nvm_size(void);
+uint32_t host_nvm_crc(void);
 // Where nvm_poll stands.
 bushd_mcu_nvm_scan host_walk(void);
 

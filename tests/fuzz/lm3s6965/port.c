@@ -51,11 +51,11 @@ void host_blank_flash(void) {
   memset((void*)(uintptr_t)AREA, 0xFF, AREA_END - AREA);
 }
 
-uint32_t host_kept_size(void) {
+uint32_t host_nvm_size(void) {
   return newest.size;
 }
 
-uint32_t host_kept_crc(void) {
+uint32_t host_nvm_crc(void) {
   return newest.crc;
 }
 

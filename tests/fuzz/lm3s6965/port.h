@@ -1,4 +1,4 @@
-// The LM3S6965's kept.c on the host, the walk through what its flash keeps. The flash lies where
+// The LM3S6965's nvm.c on the host, the walk through what its flash keeps. The flash lies where
 // the chip has it.
 #ifndef BUSHD_FUZZ_LM3S6965_PORT_H
 #define BUSHD_FUZZ_LM3S6965_PORT_H
@@ -15,8 +15,8 @@ extern "C" {
 void host_reset(void);
 void host_blank_flash(void);
 // Of what is kept, as its head says. Precondition: it is whole, and was found.
-uint32_t host_kept_size(void);
-uint32_t host_kept_crc(void);
+uint32_t host_nvm_size(void);
+uint32_t host_nvm_crc(void);
 // Where nvm_poll stands.
 bushd_mcu_nvm_scan host_walk(void);
 

@@ -60,20 +60,20 @@ TEST(ArmArguments, ArePairsWithAnEdgeAndADelay) {
 }
 
 TEST(ReferenceArguments, NameAMotorAndWhereItPulses) {
-  const auto compare =
-      parse_reference("theta", "-7", {.direction = "negative", .delay_us = 30, .width_us = 4});
+  const auto compare = parse_position_compare(
+      "theta", "-7", {.direction = "negative", .delay_us = 30, .width_us = 4});
   ASSERT_TRUE(compare);
   EXPECT_EQ(compare->motor, "theta");
   EXPECT_EQ(compare->position_steps, -7);
   EXPECT_EQ(compare->arrivals, api::Directions{.negative = true});
   EXPECT_EQ(compare->delay_us, 30);
   EXPECT_EQ(compare->width_us, 4);
-  EXPECT_EQ(parse_reference("theta", "5", {})->arrivals,
+  EXPECT_EQ(parse_position_compare("theta", "5", {})->arrivals,
             (api::Directions{.positive = true, .negative = true}));
-  EXPECT_EQ(parse_reference("theta", "5", {.direction = "positive"})->arrivals,
+  EXPECT_EQ(parse_position_compare("theta", "5", {.direction = "positive"})->arrivals,
             api::Directions{.positive = true});
-  EXPECT_FALSE(parse_reference("theta", "off", {})->arrivals.any());
-  EXPECT_FALSE(parse_reference("theta", "on", {}));
+  EXPECT_FALSE(parse_position_compare("theta", "off", {})->arrivals.any());
+  EXPECT_FALSE(parse_position_compare("theta", "on", {}));
 }
 
 TEST(SetArguments, NameOneMotorAndItsPosition) {

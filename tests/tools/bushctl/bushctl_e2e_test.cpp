@@ -313,7 +313,7 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   EXPECT_EQ(bushctl({"clear"}).code, 0);
   EXPECT_EQ(bushctl({"estop"}).code, 0);
   EXPECT_EQ(bushctl({"disarm", "theta"}).code, 0);
-  EXPECT_EQ(bushctl({"reference", "theta", "-5", "--width-us", "7"}).code, 0);
+  EXPECT_EQ(bushctl({"compare", "theta", "-5", "--width-us", "7"}).code, 0);
   const auto requests = daemon.requests();
   ASSERT_EQ(requests.size(), 9u);
   EXPECT_TRUE(std::get<api::Stop>(requests[0]).motors.empty());

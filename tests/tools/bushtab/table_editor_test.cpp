@@ -301,15 +301,15 @@ TEST(TableEditorQuit, InterruptLeavesAPromptOrAsks) {
   EXPECT_EQ(editor.interrupt(), Wish::kQuit);
 }
 
-TEST(TableEditorLive, TimesAndFindingsAreThoseOfTheCodes) {
+TEST(TableEditorLive, TimesAndDiagnosticsAreThoseOfTheCodes) {
   TableEditor editor({.name = "t", .time_unit_ns = 1000, .accel = {90, 70, 50}}, 1,
                      watching({5}, 20100));
   EXPECT_EQ(editor.times().at(0).move.time_ns, 370'000u);
-  EXPECT_THAT(editor.findings(), IsEmpty());
+  EXPECT_THAT(editor.diagnostics(), IsEmpty());
   type(editor, U"g2" + kEnter + U"-");
   EXPECT_EQ(editor.times().at(0).move.time_ns, 369'000u);
-  ASSERT_FALSE(editor.findings().empty());
-  EXPECT_EQ(editor.findings().at(0).rule, "max_speed");
+  ASSERT_FALSE(editor.diagnostics().empty());
+  EXPECT_EQ(editor.diagnostics().at(0).rule, "max_speed");
   EXPECT_EQ(editor.curve().at(2).delay_ns, 49'000u);
 }
 

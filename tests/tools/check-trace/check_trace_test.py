@@ -101,13 +101,13 @@ class RightTraces(CheckTraceTest):
     def by_itself(self):
         """Homing first, a move that meets its limit, local motion in both directions, a move."""
         scene = synthetic.Scene(TABLE, self.table_file)
-        scene.alone("theta", 1, 0, 20, [-1] * 30 + [1] * 9, sets_to=-5)
+        scene.autonomous("theta", 1, 0, 20, [-1] * 30 + [1] * 9, sets_to=-5)
         scene.move("theta", 1, 0, 200, 400)
         scene.meets_limit("theta", 100)
-        scene.alone("theta", 1, 0, 600, [1] * 7 + [-1] * 12)
+        scene.autonomous("theta", 1, 0, 600, [1] * 7 + [-1] * 12)
         scene.move("theta", 1, 0, 700, 300, move_id=2)
         scene.move("omega", 2, 3, 230, -500, move_id=3)
-        scene.alone("chi", 2, 4, 100, [1, 1, 1])
+        scene.autonomous("chi", 2, 4, 100, [1, 1, 1])
         return scene
 
     def test_homing_local_motion_and_limits_are_explained(self):

@@ -178,13 +178,13 @@ class Scene:
         own += self._edges(motor, delays, move["start_tick"], direction)
         return len(delays)
 
-    def alone(self, motor, address, output, from_tick, directions, sets_to=None):
+    def autonomous(self, motor, address, output, from_tick, directions, sets_to=None):
         """Homing, or local motion: a step every two ticks. Only homing sets the position."""
         before = self.steps.get(motor, 0)
         after = before + sum(directions) if sets_to is None else sets_to
         self.steps[motor] = after
         self.events.append({
-            "event": "alone", "motor": motor, "bus": "hall", "address": address, "output": output, "tick_ns": TICK_NS,
+            "event": "autonomous", "motor": motor, "bus": "hall", "address": address, "output": output, "tick_ns": TICK_NS,
             "what": "local" if sets_to is None else "homing", "set": sets_to is not None, "from_steps": before,
             "position_steps": after, "from_tick": from_tick - 1, "until_tick": from_tick + 2 * len(directions) + 20,
         })

@@ -18,7 +18,7 @@ def show(_channel, data):
     for mcu in health.mcus:
         low_water = f"{mcu.low_water_ticks} ticks" if mcu.low_water_ticks >= 0 else "none moved"
         print(
-            f"{mcu.mcu}: {mcu.crc_errors} CRC errors, {mcu.repeats} repeats, {mcu.run_downs} run-downs, "
+            f"{mcu.mcu}: {mcu.crc_errors} CRC errors, {mcu.repeats} repeats, {mcu.ramp_downs} ramp-downs, "
             f"low water {low_water}, crystal {-mcu.rate_ppm:+.1f} ppm",
             flush=True,
         )

@@ -1,0 +1,117 @@
+// Tables and settings that an image keeps over resets. Its virtual twin keeps nothing.
+#include "conformance/targets.h"
+#include "sim/mcu_alone.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr TimeNs kBootNs = 250'000'000;
+constexpr std::size_t kCodes = 3;
+
+class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
+ protected:
+  Nvm() : McuAlone(kBaud, kBootNs), real_(GetParam().make()) {
+    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+      return real_->make({kAddress, 1, 6}, index, driver, sink);
+    });
+    master_.patience_ns = 20'000'000;  // the CRC of a long table takes a while
+    pass(kBootNs);
+  }
+  void TearDown() override { real_->expect_unharmed(); }
+
+  void make_ready() {
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+    ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, {400, 300, 200}, 150));
+    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
+  }
+
+  template <class Message>
+  bushd_status ask(bushd_type type, std::size_t (*encode)(const Message*, std::uint8_t*),
+                   const Message& message) {
+    return master_.acknowledged(kAddress, type, encode, message);
+  }
+
+  const std::unique_ptr<McuUnderTest> real_;
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Nvm);
+INSTANTIATE_TEST_SUITE_P(Of, Nvm, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  std::vector<std::uint16_t> ramp;
+  while (ramp.size() < 900) ramp.push_back(static_cast<std::uint16_t>(2000 - ramp.size()));
+  ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp, 1100));
+  bushd_set_inputs inputs{};
+  inputs.system_inverted = BUSHD_INPUT_FORWARD;
+  ASSERT_EQ(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs), BUSHD_OK);
+  const bushd_tables before = master_.tables(kAddress);
+  pass(real_->keeps_within_ns(ramp.size()));
+  reboot();
+  const bushd_tables after = master_.tables(kAddress);
+  for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
+    EXPECT_EQ(after.slot[slot].valid, slot == 0 || slot == 5);
+    EXPECT_EQ(after.slot[slot].crc, before.slot[slot].crc);
+    EXPECT_EQ(after.slot[slot].revision, before.slot[slot].revision);
+  }
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.faults, 0);
+  EXPECT_EQ(report.system_inputs, BUSHD_INPUT_FORWARD);
+
+  // And they move motors.
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
+  run(3, 50);
+  pass(200 * TimeNs{kTickNs});
+  EXPECT_EQ(steps_made(3), 50u);
+}
+
+TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 3}), BUSHD_OK);
+  pass(real_->keeps_within_ns(kCodes));
+  reboot();
+  bus_.node(0).set_inputs({0, BUSHD_INPUT_REVERSE});
+  pass(100 * TimeNs{kTickNs});
+  const std::size_t held = steps_made(3);
+  EXPECT_GT(held, 100u) << "1.5 ms a step";
+  bus_.node(0).set_inputs({0, 0});
+  pass(20 * TimeNs{kTickNs});
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.moving, 0);
+  EXPECT_EQ(report.motor[3].position_steps, -static_cast<std::int32_t>(steps_made(3)));
+  EXPECT_LT(steps_made(3), held + 10);
+  EXPECT_EQ(steps_made(4), 0u);
+}
+
+TEST_P(Nvm, WhatIsTheSameIsNotWrittenAgain) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  const std::uint64_t written = real_->nvm_writes();
+  EXPECT_GT(written, 20u);
+  pass(real_->keeps_within_ns(kCodes));
+  EXPECT_EQ(real_->nvm_writes(), written);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  EXPECT_EQ(real_->nvm_writes(), written);
+}
+
+TEST_P(Nvm, ABitThatHasFlippedIsAFault) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  real_->flip_nvm_bit();
+  reboot();
+  EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM);
+  EXPECT_EQ(master_.valid_tables(kAddress), 0u);
+  // It is mended when there is something to keep again.
+  ASSERT_EQ(ask(BUSHD_MSG_CONTROL, bushd_encode_control, bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
+            BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  reboot();
+  EXPECT_EQ(master_.poll(kAddress).faults, 0);
+  EXPECT_EQ(master_.valid_tables(kAddress), 1u);
+}
+
+}  // namespace
+}  // namespace bushd::sim

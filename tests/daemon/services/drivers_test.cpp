@@ -1,0 +1,68 @@
+#include "daemon/services/drivers.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/live_bench.h"
+
+namespace bushd::daemon {
+namespace {
+
+using test::Bench;
+using test::LiveBench;
+using testing::HasSubstr;
+
+struct DriversBench : LiveBench {
+  DriversBench() { connect(drivers); }
+  Drivers drivers{installation, interlocks, emergency_stop};
+  bool enabled(const std::string& motor) {
+    return (report_of(motor).flags & BUSHD_FLAG_ENABLED) != 0;
+  }
+};
+
+TEST(Drivers, AreDisabledAndEnabledByMcu) {
+  DriversBench bench;
+  ASSERT_TRUE(bench.enabled("m01"));
+  bench.drivers.request(bench.now_us(), bench.asker(1), api::Disable{{"m02"}});
+  EXPECT_EQ(bench.result(1).outcome, api::Outcome::kDone);
+  EXPECT_FALSE(bench.enabled("m01")) << "the MCU has one output for all of them";
+  EXPECT_TRUE(bench.enabled("m03"));
+  bench.drivers.request(bench.now_us(), bench.asker(2), api::Enable{});
+  EXPECT_EQ(bench.result(2).outcome, api::Outcome::kDone);
+  EXPECT_TRUE(bench.enabled("m01"));
+}
+
+TEST(Drivers, StayEnabledWhileAMotorMoves) {
+  DriversBench bench;
+  bench.move(1, "m02", 500);
+  bench.drivers.request(bench.now_us(), bench.asker(2), api::Disable{{"m01"}});
+  EXPECT_THAT(bench.refusal(2), HasSubstr("m02 moves; stop it first"));
+  bench.drivers.request(bench.now_us(), bench.asker(3), api::Disable{{"m03"}});
+  EXPECT_EQ(bench.result(3).outcome, api::Outcome::kDone) << "nothing moves there";
+  EXPECT_EQ(bench.result(1).outcome, api::Outcome::kReached);
+}
+
+TEST(Drivers, NoMoveBeginsWhileTheyAreBeingDisabled) {
+  DriversBench bench;
+  bench.drivers.request(bench.now_us(), bench.asker(1), api::Disable{{"m01"}});
+  EXPECT_THAT(bench.interlocks.may_move(bench.motor("m02")).error().text(),
+              HasSubstr("the drivers of MCU hall:1 are being disabled"));
+  EXPECT_TRUE(bench.interlocks.may_move(bench.motor("m03")));
+  bench.result(1);
+}
+
+TEST(Drivers, OfAnMcuThatIsOfflineAreRefused) {
+  Bench bench;
+  Interlocks interlocks(bench.installation);
+  OpenMoves open_moves(bench.installation);
+  HomingQueue homing(bench.installation, interlocks, open_moves, bench);
+  EmergencyStop emergency_stop(bench.installation, interlocks, homing, bench);
+  Drivers drivers(bench.installation, interlocks, emergency_stop);
+  drivers.request(0, bench.asker(), api::Enable{{"m03"}});
+  EXPECT_THAT(bench.refusal(), HasSubstr("MCU hall:2 is offline"));
+  drivers.request(0, bench.asker(), api::ClearFaults{{"m09"}});
+  EXPECT_THAT(bench.refusal(), HasSubstr("there is no motor"));
+}
+
+}  // namespace
+}  // namespace bushd::daemon

@@ -1,0 +1,70 @@
+#include "daemon/services/homing_queue.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/live_bench.h"
+#include "daemon/services/stops.h"
+
+namespace bushd::daemon {
+namespace {
+
+using test::Bench;
+using test::LiveBench;
+using testing::HasSubstr;
+
+// One MCU with two motors, each with a home switch.
+std::string homes() {
+  std::string toml = test::hall(1, 2);
+  const std::string group = "group = \"axes\"\n";
+  for (std::size_t at = toml.find(group); at != std::string::npos; at = toml.find(group, at + 1)) {
+    toml.insert(at + group.size(),
+                "home = { direction = \"negative\", position_steps = -50, most_steps = 6000 }\n");
+  }
+  return toml;
+}
+
+struct HomingBench : LiveBench {
+  HomingBench() : LiveBench(homes()) {
+    for (std::size_t output = 0; output < 2; ++output) {
+      line.mcu(0).attach_switch(output, {.at_steps = -150});
+    }
+    connect(stops);
+  }
+  Stops stops{installation, moves, homing, open_moves};
+};
+
+TEST(HomingQueue, MotorsOfAnMcuAreHomedOneAfterTheOther) {
+  HomingBench bench;
+  bench.homing.request(bench.asker(1), api::Home{{"m01", "m02"}});
+  EXPECT_FALSE(bench.homing.empty());
+  ASSERT_TRUE(bench.run_until([&] { return bench.shaft_steps("m01") < -20; }));
+  EXPECT_EQ(bench.shaft_steps("m02"), 0) << "it waits";
+  EXPECT_TRUE(bench.of("m02").is<motion::Homing>());
+  const api::Completed result = bench.result(1);
+  EXPECT_EQ(result.outcome, api::Outcome::kReached) << result.reason;
+  EXPECT_TRUE(bench.homing.empty());
+  EXPECT_FALSE(bench.of("m02").uncertain_reason());
+}
+
+TEST(HomingQueue, StopEndsIt) {
+  HomingBench bench;
+  bench.homing.request(bench.asker(1), api::Home{{"m01", "m02"}});
+  ASSERT_TRUE(bench.run_until([&] { return bench.shaft_steps("m01") < -20; }));
+  bench.stops.request(bench.now_us(), bench.asker(2), {});
+  EXPECT_EQ(bench.result(2).outcome, api::Outcome::kDone);
+  EXPECT_EQ(bench.result(1).outcome, api::Outcome::kStopped);
+  EXPECT_EQ(bench.shaft_steps("m02"), 0);
+}
+
+TEST(HomingQueue, AMotorWithoutAHomeIsRefusedWithTheRemedy) {
+  LiveBench bench;
+  Stops stops(bench.installation, bench.moves, bench.homing, bench.open_moves);
+  bench.connect(stops);
+  bench.homing.request(bench.asker(1), api::Home{{"m02"}});
+  EXPECT_THAT(bench.refusal(1), HasSubstr("no home switch configured: add 'home = {...}' to motor "
+                                          "\"m02\""));
+}
+
+}  // namespace
+}  // namespace bushd::daemon

@@ -1,0 +1,67 @@
+#include "daemon/services/positions.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/live_bench.h"
+#include "daemon/services/stops.h"
+
+namespace bushd::daemon {
+namespace {
+
+using test::LiveBench;
+using testing::HasSubstr;
+
+struct PositionsBench : LiveBench {
+  PositionsBench() { connect(stops); }  // what connect() serves besides is all that is needed
+  void set(std::int64_t number, std::vector<api::MotorSteps> motors) {
+    positions.request(now_us(), asker(number), api::SetPosition{std::move(motors)});
+  }
+  Stops stops{installation, moves, homing, open_moves};
+};
+
+TEST(Positions, AreSetInTheMcusAndLogged) {
+  PositionsBench bench;
+  bench.set(1, {{"m01", -77}, {"m04", 123456}});
+  EXPECT_TRUE(bench.positions.being_set(bench.motor("m01")));
+  EXPECT_FALSE(bench.positions.being_set(bench.motor("m02")));
+  EXPECT_THAT(bench.interlocks.may_move(bench.motor("m04")).error().text(),
+              HasSubstr("its position is being set"));
+  EXPECT_EQ(bench.result(1).outcome, api::Outcome::kDone);
+  EXPECT_FALSE(bench.positions.being_set(bench.motor("m01")));
+  EXPECT_EQ(bench.of("m01").position_steps(), -77);
+  EXPECT_EQ(bench.of("m04").position_steps(), 123456);
+  EXPECT_EQ(bench.shaft_steps("m01"), 0) << "nothing has moved";
+  ASSERT_EQ(bench.lines.size(), 2u);
+  EXPECT_THAT(bench.lines[0], HasSubstr("\"event\":\"set\""));
+}
+
+TEST(Positions, SettingMakesThemKnown) {
+  PositionsBench bench;
+  bench.line.reboot(0, 10'000'000);
+  ASSERT_TRUE(bench.run_until([&] { return !bench.all_online(); }));
+  ASSERT_TRUE(bench.run_until([&] { return bench.all_online(); }));
+  ASSERT_TRUE(bench.of("m01").uncertain_reason()) << "its MCU has booted anew";
+  bench.set(1, {{"m01", 5}});
+  EXPECT_EQ(bench.result(1).outcome, api::Outcome::kDone);
+  EXPECT_FALSE(bench.of("m01").uncertain_reason());
+  EXPECT_TRUE(bench.of("m02").uncertain_reason()) << "that one was not set";
+}
+
+TEST(Positions, AreSetAtRestOnlyAndWithinTheirRange) {
+  PositionsBench bench;
+  bench.move(1, "m01", 200);
+  bench.set(2, {{"m02", 1}, {"m01", 1}});
+  EXPECT_THAT(bench.refusal(2), HasSubstr("m01 moves; its position can be set at rest only"));
+  EXPECT_EQ(bench.result(1).outcome, api::Outcome::kReached);
+  bench.set(3, {{"m01", motion::Motor::kMaxPosition + 1}});
+  EXPECT_THAT(bench.refusal(3), HasSubstr("positions lie within +-2147483647"));
+  bench.set(4, {{"m01", 1}});
+  bench.set(5, {{"m01", 2}});
+  EXPECT_THAT(bench.refusal(5), HasSubstr("its position is being set"));
+  bench.result(4);
+  EXPECT_EQ(bench.of("m01").position_steps(), 1);
+}
+
+}  // namespace
+}  // namespace bushd::daemon
