@@ -116,6 +116,10 @@ Tick Master::earliest_retarget(std::int64_t now_us, Tick start) const {
   return std::max(earliest_replace(now_us), start);
 }
 
+bool Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const {
+  return !streams_.replacement_open(mcu) && !streams_.behind(now_us, horizon_.queue_urgent_us());
+}
+
 void Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   streams_.begin(mcu, motor, start);
 }
@@ -132,13 +136,12 @@ void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
   streams_.replace(mcu, motors, first, clock().tick_at(stepped_us_));
 }
 
-std::optional<Traffic> Master::rehearse(std::int64_t now_us, TickSource& source,
-                                        std::span<const PlannedMove> moves,
-                                        std::uint64_t max_frames) const {
-  return link::rehearse(
-      now_us,
-      {.setup = setup_, .mcus = mcus_, .clock = clock(), .queue_us = horizon_.queue_target_us()},
-      source, moves, max_frames);
+BusSnapshot Master::snapshot(std::int64_t now_us) const {
+  return {.setup = &setup_,
+          .mcus = mcus_,
+          .clock = clock(),
+          .queue_us = horizon_.queue_target_us(),
+          .now_us = now_us};
 }
 
 std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
