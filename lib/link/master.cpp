@@ -8,6 +8,10 @@
 namespace bushd::link {
 namespace {
 
+// A queue with less than this would be empty after some frames. However many stops are wanted, the
+// motors that they leave alone go on.
+constexpr std::int64_t kQueueCriticalUs = 30'000;
+
 PerMcu<McuRecord> records_of(const BusSetup& setup) {
   PerMcu<McuRecord> records;
   for (const McuSetup& mcu : setup.mcus)
@@ -66,15 +70,17 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   return writer_.bytes();
 }
 
-// By urgency: an emergency; replacements, what follows them, and the polls that confirm them;
-// queues about to run empty; reports; SYNCs; configuration; filling queues.
+// By urgency: an emergency; queues that are all but empty; replacements, what follows them, and the
+// polls that confirm them; queues about to run empty; reports; SYNCs; configuration; filling
+// queues.
 bool Master::send_next(std::int64_t now_us) {
   const std::int64_t urgent_us = horizon_.queue_urgent_us();
-  return emergency_.send_due(now_us) || streams_.send_due_replacement(now_us) ||
-         streams_.send_stream(now_us, urgent_us, true) || poller_.send_wanted(now_us) ||
-         streams_.send_stream(now_us, urgent_us) || poller_.send_due(now_us) ||
-         synchroniser_.send_due(now_us) || connector_.send_ramp_down(now_us) ||
-         connector_.send_due_identify(now_us) || connector_.send_request(now_us) ||
+  return emergency_.send_due(now_us) || streams_.send_stream(now_us, kQueueCriticalUs) ||
+         streams_.send_due_replacement(now_us) || streams_.send_stream(now_us, urgent_us, true) ||
+         poller_.send_wanted(now_us) || streams_.send_stream(now_us, urgent_us) ||
+         poller_.send_due(now_us) || synchroniser_.send_due(now_us) ||
+         connector_.send_ramp_down(now_us) || connector_.send_due_identify(now_us) ||
+         connector_.send_request(now_us) ||
          streams_.send_stream(now_us, horizon_.queue_target_us());
 }
 
