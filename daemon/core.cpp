@@ -12,8 +12,9 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       interlocks_(installation_),
       open_moves_(installation_),
       journal_(installation_, outputs),
+      dry_runs_(installation_),
       tables_(installation_, interlocks_, outputs),
-      moves_(installation_, interlocks_, journal_, open_moves_, outputs),
+      moves_(installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs),
       homing_(installation_, interlocks_, open_moves_, outputs),
       stops_(installation_, moves_, homing_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, outputs),
@@ -69,7 +70,7 @@ void Core::request(std::int64_t now, const api::Asker& asker, const api::Request
              request);
 }
 
-void Core::step(std::int64_t now_us) {
+void Core::keep_up(std::int64_t now_us) {
   for (const BusId id : installation_.buses()) {
     const std::span<const std::uint8_t> bytes = installation_[id].master.step(now_us);
     if (!bytes.empty()) outputs_.send(id, bytes);
@@ -82,6 +83,7 @@ void Core::step(std::int64_t now_us) {
 }
 
 std::int64_t Core::next_wake_us() const {
+  if (!dry_runs_.idle()) return 0;
   std::int64_t wake = std::min(state_.next_wake_us(), health_.next_wake_us());
   for (const BusId id : installation_.buses()) {
     wake = std::min(wake, installation_[id].master.next_wake_us());

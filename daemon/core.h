@@ -14,6 +14,7 @@
 #include "api/session.h"
 #include "daemon/outputs.h"
 #include "daemon/services/drivers.h"
+#include "daemon/services/dry_run.h"
 #include "daemon/services/emergency_stop.h"
 #include "daemon/services/health_publisher.h"
 #include "daemon/services/homing_queue.h"
@@ -48,9 +49,19 @@ class Core {
   // Publishes the state as it is now, whether due or not.
   void publish_state(std::int64_t now_us) { state_.publish_all(now_us); }
 
-  // Does what is due; to be called after every call above and at next_wake_us() at the latest.
-  void step(std::int64_t now_us);
+  // Does what is due, and one slice of what takes long; to be called after every call above and at
+  // next_wake_us() at the latest.
+  void step(std::int64_t now_us) {
+    keep_up(now_us);
+    work();
+  }
   std::int64_t next_wake_us() const;
+  // The two by themselves, for who listens to others in between: what motors and clients wait for,
+  // and one slice of dry runs, far less than a millisecond.
+  void keep_up(std::int64_t now_us);
+  void work() { dry_runs_.work(); }
+  // Units of work done so far in slices.
+  std::uint64_t units_of_work() const { return dry_runs_.units(); }
 
   // Answers to what the outputs were asked, what the daemon has kept from before, and checks.
   TablesInService& tables() { return tables_; }
@@ -68,6 +79,7 @@ class Core {
   Interlocks interlocks_;
   OpenMoves open_moves_;
   Journal journal_;
+  DryRuns dry_runs_;
   TablesInService tables_;
   Moves moves_;
   HomingQueue homing_;

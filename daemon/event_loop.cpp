@@ -215,19 +215,31 @@ Result<void> EventLoop::run() {
       if (ports_[bus].lost) lose_port(now, bus, *std::exchange(ports_[bus].lost, std::nullopt));
     }
     open_due_ports(now);
-    carry_out_some();
     publishing_.set_dropped_messages(lcm_front_.dropped() +
                                      (socket_front_ ? socket_front_->dropped() : 0));
-    core_.step(now);
+    core_.keep_up(now);
     check_published();
     if (shut_down_by_us_ && (core_.at_rest() || now >= *shut_down_by_us_)) break;
-    const std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
-    const int error = sd_event_run(event_, static_cast<std::uint64_t>(wait_us));
-    if (error < 0 && error != -EINTR) return fail(loop_text(error));
+    if (const auto handled = handle_sources(); !handled) return handled;
+    carry_out_some();
+    core_.work();
   }
   log_cpu_share();
   if (core_.at_rest()) return {};
   return fail("not all motors are known to be at rest; their MCUs run them down by themselves");
+}
+
+Result<void> EventLoop::handle_sources() {
+  std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
+  // One call dispatches one source, the one that has waited longest.
+  for (std::size_t i = 0; i < sources_.size() + ports_.size(); ++i) {
+    const int dispatched = sd_event_run(event_, static_cast<std::uint64_t>(wait_us));
+    if (dispatched < 0 && dispatched != -EINTR) return fail(loop_text(dispatched));
+    if (dispatched <= 0) return {};
+    core_.keep_up(now_us());
+    wait_us = 0;
+  }
+  return {};
 }
 
 std::int64_t EventLoop::next_wake_us() const {
@@ -347,20 +359,30 @@ void EventLoop::serve_tables(const api::Asker& asker, const api::Request& reques
       (jobs != table_jobs_.end() && jobs->second >= kMaxTableJobsPerClient)) {
     return asker.answer(api::Refused{"too many requests about tables wait; try again in a moment"});
   }
-  if (const auto* set = std::get_if<api::SetTable>(&request)) {
-    const auto table = tables::make(set->content);
-    const auto good =
-        table ? core_.tables().check_content(set->table, *table) : fail(table.error());
-    if (!good) return asker.answer(api::Refused{good.error().text()});
-  }
   ++table_jobs_[client];
-  worker_.post([this, asker, request, client]() -> Worker::Completion {
-    const api::Reply reply = daemon::answer(library_, request, asker.session->client_id());
-    return [this, asker, client, reply] {
-      if (--table_jobs_[client] == 0) table_jobs_.erase(client);
-      asker.answer(reply);
+  const auto* set = std::get_if<api::SetTable>(&request);
+  if (set == nullptr) return post_table_job(asker, request);
+  // A table's sums are made there too; whether it suits the motors the core knows.
+  worker_.post([this, asker, request, set = *set]() -> Worker::Completion {
+    return [this, asker, request, name = set.table, table = tables::make(set.content)] {
+      const auto good = table ? core_.tables().check_content(name, *table) : fail(table.error());
+      if (good) return post_table_job(asker, request);
+      answer_table_job(asker, api::Refused{good.error().text()});
     };
   });
+}
+
+void EventLoop::post_table_job(const api::Asker& asker, const api::Request& request) {
+  worker_.post([this, asker, request]() -> Worker::Completion {
+    const api::Reply reply = daemon::answer(library_, request, asker.session->client_id());
+    return [this, asker, reply] { answer_table_job(asker, reply); };
+  });
+}
+
+void EventLoop::answer_table_job(const api::Asker& asker, const api::Reply& reply) {
+  const auto jobs = table_jobs_.find(asker.session->text());
+  if (--jobs->second == 0) table_jobs_.erase(jobs);
+  asker.answer(reply);
 }
 
 void EventLoop::update_write_interest(BusId bus) {

@@ -74,8 +74,13 @@ class EventLoop : private Outputs {
   void handle_port(std::int64_t now_us, BusId bus, std::uint32_t events);
   void handle_signal(std::int64_t now_us, int signal);
   Result<void> restore_tables();
+  // Waits until something comes, then handles each source that has something, once: a stop among
+  // them comes before any more of the requests that wait.
+  Result<void> handle_sources();
   // Some of the requests that wait, for as long as nothing else has to wait for that.
   void carry_out_some();
+  void post_table_job(const api::Asker& asker, const api::Request& request);
+  void answer_table_job(const api::Asker& asker, const api::Reply& reply);
   void update_write_interest(BusId bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;

@@ -90,6 +90,9 @@ class Mcu {
   link::Tick earliest_retarget(std::int64_t now_us, link::Tick start) const {
     return master_.earliest_retarget(now_us, start);
   }
+  bool has_time_to_retarget(std::int64_t now_us) const {
+    return master_.has_time_to_retarget(now_us, on_bus_);
+  }
   void begin(Output output, link::Tick start) { master_.begin(on_bus_, output.value, start); }
   void begin_table_run(Output output, link::Tick start, std::int32_t steps) {
     master_.begin_table_run(on_bus_, output.value, start, steps);

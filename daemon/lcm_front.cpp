@@ -3,6 +3,12 @@
 #include <utility>
 
 namespace bushd::daemon {
+namespace {
+
+// Decoded in less than a millisecond.
+constexpr std::size_t kBytesAtOnce = 64 * 1024;
+
+}  // namespace
 
 // One request's way back: all hear it, who asked knows it by session and number.
 class LcmFront::LcmSession : public api::Session {
@@ -46,8 +52,8 @@ Result<void> LcmFront::subscribe() {
 }
 
 void LcmFront::handle() {
-  if (setup_.stops != nullptr) setup_.stops->handle();
-  setup_.transport.handle();
+  if (setup_.stops != nullptr) setup_.stops->handle(kBytesAtOnce);
+  setup_.transport.handle(kBytesAtOnce);
 }
 
 std::uint64_t LcmFront::dropped() const {
@@ -86,9 +92,10 @@ void LcmFront::on_request(const lcm::RequestId& id, const api::Request& request,
 
 void LcmFront::answer(const lcm::RequestId& id, bool record, const api::Reply& reply) {
   if (record) sessions_.record(id.session, id.number, reply);
-  auto packet = lcm::encode(unix_us_(), id, reply);
-  if (!packet) packet = lcm::encode(unix_us_(), id, api::Refused{packet.error().text()});
-  if (packet) publish(*packet);
+  auto packets = lcm::encode(unix_us_(), id, reply);
+  if (!packets) packets = lcm::encode(unix_us_(), id, api::Refused{packets.error().text()});
+  if (!packets) return;
+  for (const lcm::Packet& packet : *packets) publish(packet);
 }
 
 void LcmFront::publish(const lcm::Packet& packet) {

@@ -3,18 +3,8 @@
 #include <utility>
 
 namespace bushd::daemon {
-namespace {
 
-bool is_dry_run(const api::Request& request) {
-  const auto* move = std::get_if<api::Move>(&request);
-  return move != nullptr && move->dry_run;
-}
-
-}  // namespace
-
-bool Reception::takes_more(const Client& client, const api::Request& request,
-                           std::size_t bytes) const {
-  if (is_dry_run(request) && client.dry_runs >= limits_.dry_runs_per_client) return false;
+bool Reception::takes_more(const Client& client, std::size_t bytes) const {
   return client.waiting.size() < limits_.requests_per_client &&
          client.bytes + bytes <= limits_.bytes_per_client;
 }
@@ -31,14 +21,13 @@ void Reception::take(api::Asker asker, api::Request request, std::size_t bytes) 
   }
   const std::string key = asker.session->text();
   const auto [client, first] = clients_.try_emplace(key);
-  if (!takes_more(client->second, request, bytes)) {
+  if (!takes_more(client->second, bytes)) {
     const std::size_t count = client->second.waiting.size();
     if (first) clients_.erase(client);
     return asker.answer(api::Refused{std::to_string(count) +
                                      " requests of this client wait already; wait for answers"});
   }
   if (first) turns_.push_back(key);
-  if (is_dry_run(request)) ++client->second.dry_runs;
   client->second.waiting.push_back({std::move(asker), std::move(request), bytes});
   client->second.bytes += bytes;
   ++requests_;
@@ -51,7 +40,6 @@ void Reception::carry_out_next() {
   const Waiting next = std::move(client->second.waiting.front());
   client->second.waiting.pop_front();
   client->second.bytes -= next.bytes;
-  if (is_dry_run(next.request)) --client->second.dry_runs;
   --requests_;
   bytes_ -= next.bytes;
   if (client->second.waiting.empty()) {

@@ -24,8 +24,6 @@ class Reception {
   struct Limits {
     std::size_t requests_per_client = 64;
     std::size_t bytes_per_client = 512 * 1024;
-    // Of those, dry runs: they are planned tick by tick, which takes milliseconds.
-    std::size_t dry_runs_per_client = 2;
     std::size_t requests = 4096;
     std::size_t bytes = 8 * 1024 * 1024;
   };
@@ -55,10 +53,9 @@ class Reception {
   struct Client {
     std::deque<Waiting> waiting;
     std::size_t bytes = 0;
-    std::size_t dry_runs = 0;
   };
 
-  bool takes_more(const Client& client, const api::Request& request, std::size_t bytes) const;
+  bool takes_more(const Client& client, std::size_t bytes) const;
 
   Limits limits_;
   CarryOut carry_out_;

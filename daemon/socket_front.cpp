@@ -34,6 +34,7 @@ SocketFront::SocketFront(control::Server& server, std::int64_t run, Reception& r
                             },
                         .packet = [this](Connection connection,
                                          control::View packet) { on_packet(connection, packet); },
+                        .is_urgent = lcm::is_stop_channel,
                         .closed = [this](Connection connection) { clients_.erase(connection); }});
 }
 
@@ -85,9 +86,10 @@ void SocketFront::answer(Connection connection, const std::string& client_id, st
                          const api::Reply& reply) {
   const lcm::RequestId id{
       .session = static_cast<std::int64_t>(connection), .client_id = client_id, .number = number};
-  auto packet = lcm::encode(unix_us_(), id, reply);
-  if (!packet) packet = lcm::encode(unix_us_(), id, api::Refused{packet.error().text()});
-  if (packet) send(connection, *packet);
+  auto packets = lcm::encode(unix_us_(), id, reply);
+  if (!packets) packets = lcm::encode(unix_us_(), id, api::Refused{packets.error().text()});
+  if (!packets) return;
+  for (const lcm::Packet& packet : *packets) send(connection, packet);
 }
 
 void SocketFront::send(Connection connection, const lcm::Packet& packet) {

@@ -11,7 +11,7 @@
 namespace bushd::daemon {
 
 Result<void> Worker::start() {
-  fd_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  fd_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK | EFD_SEMAPHORE);
   if (fd_ < 0) return fail(std::string("eventfd: ") + std::strerror(errno));
   thread_ = std::thread([this] { run(); });
   return {};
@@ -58,15 +58,16 @@ void Worker::run() {
 }
 
 void Worker::handle() {
-  std::uint64_t count = 0;
-  static_cast<void>(::read(fd_, &count, sizeof count));
-  std::vector<Completion> completions;
+  std::uint64_t count = 0;  // one, and the descriptor stays readable while there are more
+  if (::read(fd_, &count, sizeof count) != sizeof count) return;
+  Completion completion;
   {
     const std::lock_guard lock(mutex_);
-    completions = std::exchange(completions_, {});
-    waiting_ -= completions.size();
+    completion = std::move(completions_.front());
+    completions_.pop_front();
+    --waiting_;
   }
-  for (const Completion& completion : completions) completion();
+  completion();
 }
 
 }  // namespace bushd::daemon

@@ -6,7 +6,6 @@
 #include <functional>
 #include <mutex>
 #include <thread>
-#include <vector>
 
 #include "base/result.h"
 
@@ -33,6 +32,7 @@ class Worker {
 
   // Readable while there is something to handle.
   int fd() const { return fd_; }
+  // What is left of one job.
   void handle();
 
  private:
@@ -42,7 +42,7 @@ class Worker {
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Job> jobs_;  // guarded by mutex_, as all below
-  std::vector<Completion> completions_;
+  std::deque<Completion> completions_;
   std::size_t waiting_ = 0;
   bool ending_ = false;
   std::thread thread_;

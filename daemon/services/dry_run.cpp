@@ -2,27 +2,14 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <map>
-#include <optional>
-#include <utility>
+#include <iterator>
 
 #include "tables/move_time.h"
 
 namespace bushd::daemon {
 namespace {
 
-// Frames take up to 20 us each, and the loop has to feed motors meanwhile.
 constexpr std::uint64_t kMaxFrames = 3000;
-
-// The motors of one bus.
-struct Rehearsed : AxisSource {
-  motion::Axis* axis_of(link::McuIndex mcu, Output output) override {
-    const auto found = axes.find({mcu, output});
-    return found == axes.end() ? nullptr : &found->second;
-  }
-  std::map<std::pair<link::McuIndex, Output>, motion::Axis> axes;
-  std::vector<link::PlannedMove> moves;
-};
 
 api::MovePlan::Motor plan_of(const std::string& name, const bushd_table& table,
                              std::int64_t steps) {
@@ -37,37 +24,110 @@ api::MovePlan::Motor plan_of(const std::string& name, const bushd_table& table,
 
 }  // namespace
 
-api::MovePlan DryRun::plan(std::int64_t now_us, const std::vector<Part>& parts) const {
-  api::MovePlan plan;
-  std::map<BusId, Rehearsed> buses;
+motion::Axis* DryRun::Bus::axis_of(link::McuIndex mcu, Output output) {
+  const auto found = axes.find({mcu, output});
+  return found == axes.end() ? nullptr : &found->second;
+}
+
+DryRun::DryRun(const Installation& installation, std::int64_t now_us,
+               const std::vector<Part>& parts) {
+  motors_.reserve(parts.size());
   for (const auto& [id, steps] : parts) {
-    const motion::Motor& motor = installation_[id];
-    const Mcu& mcu = installation_.mcu_of(id);
-    const config::Bus& bus = installation_.bus_of(mcu).config;
-    plan.motors.push_back(plan_of(motor.name(), installation_.table_of(id)->view(), steps));
-    if (steps == 0) continue;
-    motion::Axis axis = installation_.new_axis(id);
-    const link::Tick start = mcu.earliest_start(now_us, motor.output());
-    axis.start(motor.position_steps(), steps, start);
-    plan.ticks = std::max(plan.ticks, axis.end_tick() - start);
-    plan.duration_us = std::max(plan.duration_us, (axis.end_tick() - start) * bus.tick_us);
-    Rehearsed& rehearsed = buses[mcu.config.bus];
-    rehearsed.axes.emplace(std::pair{mcu.on_bus(), motor.output()}, axis);
-    link::PlannedMove move{mcu.on_bus(), motor.output().value, start, {}};
-    if (installation_.by_table(mcu, steps)) move.run_steps = static_cast<std::int32_t>(steps);
-    rehearsed.moves.push_back(move);
+    const motion::Motor& motor = installation[id];
+    const Mcu& mcu = installation.mcu_of(id);
+    const config::Bus& bus = installation.bus_of(mcu).config;
+    motors_.push_back({.name = motor.name(),
+                       .bus = mcu.config.bus,
+                       .mcu = mcu.on_bus(),
+                       .output = motor.output(),
+                       .from_steps = motor.position_steps(),
+                       .steps = steps,
+                       .start = mcu.earliest_start(now_us, motor.output()),
+                       .by_table = installation.by_table(mcu, steps),
+                       .tick_ns = bus.tick_ns(),
+                       .format = bus.format,
+                       .table = installation.table_of(id)});
+    if (steps == 0 || buses_.contains(mcu.config.bus)) continue;
+    buses_.try_emplace(mcu.config.bus, installation[mcu.config.bus].master.snapshot(now_us));
   }
-  plan.traffic.emplace();
-  for (auto& [id, bus] : buses) {
-    const auto traffic = installation_[id].master.rehearse(now_us, bus, bus.moves, kMaxFrames);
-    if (!traffic) {
-      plan.traffic.reset();
-      break;
-    }
-    plan.traffic->frames += static_cast<std::int64_t>(traffic->frames);
-    plan.traffic->bytes += static_cast<std::int64_t>(traffic->bytes);
+  rehearsed_ = buses_.begin();
+  plan_.traffic.emplace();
+}
+
+bool DryRun::step() {
+  if (planned_ < motors_.size()) {
+    plan_motor(motors_[planned_++]);
+  } else if (rehearsed_ != buses_.end() && !rehearse(rehearsed_->second)) {
+    // If one bus is too much to be counted, so are all.
+    rehearsed_ = plan_.traffic ? std::next(rehearsed_) : buses_.end();
   }
-  return plan;
+  return planned_ < motors_.size() || rehearsed_ != buses_.end();
+}
+
+void DryRun::plan_motor(const Motor& motor) {
+  plan_.motors.push_back(plan_of(motor.name, motor.table->view(), motor.steps));
+  if (motor.steps == 0) return;
+  motion::Axis axis(motor.table->view(), motor.tick_ns, motor.format);
+  axis.start(motor.from_steps, motor.steps, motor.start);
+  const link::Tick ticks = axis.end_tick() - motor.start;
+  plan_.ticks = std::max(plan_.ticks, ticks);
+  plan_.duration_us = std::max(plan_.duration_us, ticks * motor.tick_ns / 1000);
+  Bus& bus = buses_.at(motor.bus);
+  bus.axes.emplace(std::pair{motor.mcu, motor.output}, axis);
+  link::PlannedMove move{motor.mcu, motor.output.value, motor.start, {}};
+  if (motor.by_table) move.run_steps = static_cast<std::int32_t>(motor.steps);
+  bus.moves.push_back(move);
+}
+
+// Returns false when all frames of the bus are counted, or too many.
+bool DryRun::rehearse(Bus& bus) {
+  if (!bus.rehearsal) {
+    bus.rehearsal =
+        std::make_unique<link::Rehearsal>(std::move(bus.snapshot), bus, bus.moves, kMaxFrames);
+    return true;
+  }
+  if (bus.rehearsal->step()) return true;
+  if (const auto& traffic = bus.rehearsal->traffic()) {
+    plan_.traffic->frames += static_cast<std::int64_t>(traffic->frames);
+    plan_.traffic->bytes += static_cast<std::int64_t>(traffic->bytes);
+  } else {
+    plan_.traffic.reset();
+  }
+  return false;
+}
+
+std::size_t DryRuns::waiting_of(const std::string& client) const {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      waiting_, [&](const Waiting& one) { return one.asker.session->text() == client; }));
+}
+
+void DryRuns::request(std::int64_t now_us, const api::Asker& asker,
+                      const std::vector<DryRun::Part>& parts) {
+  if (const std::size_t count = waiting_of(asker.session->text()); count >= kMaxPerClient) {
+    return asker.answer(api::Refused{std::to_string(count) +
+                                     " dry runs of this client wait already; wait for answers"});
+  }
+  if (waiting_.size() >= kMax) {
+    return asker.answer(api::Refused{std::to_string(waiting_.size()) +
+                                     " dry runs wait already; try again in a moment"});
+  }
+  asker.answer(api::Accepted{});
+  waiting_.emplace_back(asker, installation_, now_us, parts);
+}
+
+void DryRuns::work() {
+  if (waiting_.empty()) return;
+  Waiting& oldest = waiting_.front();
+  for (unsigned i = 0; i < kUnitsPerSlice; ++i) {
+    ++units_;
+    if (oldest.dry_run.step()) continue;
+    oldest.asker.answer(
+        api::Completed{.outcome = api::Outcome::kDone,
+                       .reason = "nothing has moved; planned from the state at its acceptance",
+                       .detail = oldest.dry_run.take_plan()});
+    waiting_.pop_front();
+    return;
+  }
 }
 
 }  // namespace bushd::daemon

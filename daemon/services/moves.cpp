@@ -25,10 +25,7 @@ void Moves::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
     }
     planned.push_back({part.motor, part.target - motor.position_steps()});
   }
-  asker.answer(api::Accepted{});
-  asker.answer(api::Completed{.outcome = api::Outcome::kDone,
-                              .reason = "nothing has moved",
-                              .detail = dry_run_.plan(now_us, planned)});
+  dry_runs_.request(now_us, asker, planned);
 }
 
 Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
@@ -86,8 +83,7 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
       start_run(part.motor, part.target, start[installation_.mcu_of(part.motor).config.bus]);
     }
   }
-  std::erase_if(moving, [this](MotorId motor) { return !installation_[motor].needs_change(); });
-  replan(now_us, moving);
+  retarget(now_us, moving);
 }
 
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
@@ -170,6 +166,22 @@ void Moves::replan(std::int64_t now_us, const std::vector<MotorId>& motors) {
   installation_.changed = true;
 }
 
+void Moves::retarget(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  to_retarget_.insert(motors.begin(), motors.end());
+  step(now_us);
+}
+
+void Moves::step(std::int64_t now_us) {
+  std::vector<MotorId> now;
+  std::erase_if(to_retarget_, [&](MotorId id) {
+    const bool needed = installation_[id].needs_change();
+    if (needed && !installation_.mcu_of(id).has_time_to_retarget(now_us)) return false;
+    if (needed) now.push_back(id);
+    return true;
+  });
+  if (!now.empty()) replan(now_us, now);
+}
+
 void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Event>& events) {
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);
@@ -183,7 +195,10 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
                                    static_cast<std::int32_t>(started.steps));
             },
             [&](const motion::event::Executed& executed) { journal_.changed(id, executed.change); },
-            [&](const motion::event::Replan&) { replan(now_us, {id}); },
+            [&](const motion::event::Replan&) {
+              if (motor.axis().stopping()) return replan(now_us, {id});
+              retarget(now_us, {id});
+            },
             [&](const motion::event::Drop&) { mcu.drop(motor.output()); },
             [&](const motion::event::Mismatch&) {
               outputs_.log(LogLevel::kError,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,13 +19,13 @@ namespace bushd::daemon {
 class Moves final : public Service {
  public:
   Moves(Installation& installation, const Interlocks& interlocks, Journal& journal,
-        OpenMoves& open_moves, Outputs& outputs)
+        OpenMoves& open_moves, DryRuns& dry_runs, Outputs& outputs)
       : installation_(installation),
         interlocks_(interlocks),
         journal_(journal),
         open_(open_moves),
-        outputs_(outputs),
-        dry_run_(installation) {}
+        dry_runs_(dry_runs),
+        outputs_(outputs) {}
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Move& move);
 
@@ -45,6 +46,7 @@ class Moves final : public Service {
   std::int64_t rest_by_us(std::int64_t now_us) const;
 
   void goes_offline(Mcu& mcu, const std::string& cause) override;
+  void step(std::int64_t now_us) override;
 
  private:
   struct Part {
@@ -56,6 +58,8 @@ class Moves final : public Service {
   void take_over(MotorId motor, const api::Asker& by);
   // From rest; the motor is part of an open move.
   void start_run(MotorId motor, std::int64_t target, motion::Tick start);
+  // Motors with another target: as soon as the line has time for it, and to the newest one only.
+  void retarget(std::int64_t now_us, const std::vector<MotorId>& motors);
   void disarm(const std::vector<MotorId>& motors);
   void cancel_armed_group(MotorId motor);
 
@@ -63,8 +67,9 @@ class Moves final : public Service {
   const Interlocks& interlocks_;
   Journal& journal_;
   OpenMoves& open_;
+  DryRuns& dry_runs_;
   Outputs& outputs_;
-  DryRun dry_run_;
+  std::set<MotorId> to_retarget_;  // waiting for the line
 };
 
 }  // namespace bushd::daemon

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "daemon/services/open_moves.h"
@@ -158,16 +159,23 @@ void TablesInService::take_part(Change& change, Part part, const Result<tables::
 }
 
 // Whether these groups' motors could all move by these tables, looking at one group.
+// Each tick and each MCU is looked at once, however many motors there are.
 Result<void> TablesInService::fits(const Tables& tables, GroupId group) const {
   const tables::Table& table = *tables[group];
+  std::set<std::uint32_t> ticks;
+  std::set<McuId> mcus;
   for (const MotorId id : installation_.motors()) {
     if (installation_.config()[id].group != group) continue;
     const Mcu& mcu = installation_.mcu_of(id);
-    const tables::profiles::Limits limits{.tick_ns = installation_.bus_of(mcu).config.tick_ns()};
-    for (const tables::profiles::Diagnostic& diagnostic :
-         tables::profiles::diagnostics(table, limits)) {
-      if (diagnostic.severity != tables::profiles::Severity::kError) continue;
-      return fail("table " + table.name() + ": " + diagnostic.rule + ": " + diagnostic.message);
+    if (!mcus.insert(mcu.id).second) continue;
+    const std::uint32_t tick_ns = installation_.bus_of(mcu).config.tick_ns();
+    if (ticks.insert(tick_ns).second) {
+      const tables::profiles::Limits limits{.tick_ns = tick_ns};
+      for (const tables::profiles::Diagnostic& diagnostic :
+           tables::profiles::diagnostics(table, limits)) {
+        if (diagnostic.severity != tables::profiles::Severity::kError) continue;
+        return fail("table " + table.name() + ": " + diagnostic.rule + ": " + diagnostic.message);
+      }
     }
     const link::McuSetup setup = setup_of(installation_.config(), mcu.id, tables);
     if (setup.tables.size() > BUSHD_TABLE_SLOTS) {

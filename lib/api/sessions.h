@@ -37,7 +37,7 @@ class Sessions {
     std::size_t idle_sessions = 256;
     // Of answers kept. Beyond, the oldest of that session goes; for all sessions together, the
     // oldest of the session that keeps most.
-    std::size_t bytes_per_session = 256 * 1024;
+    std::size_t bytes_per_session = 1024 * 1024;  // that of 2048 motors takes half of it
     std::size_t bytes = 16 * 1024 * 1024;
   };
   // What an answer takes beside its own memory.

@@ -105,8 +105,11 @@ void Client::on_message(const lcm::DaemonMessage& message) {
   } else if (const auto* reply = std::get_if<lcm::ReplyMessage>(&message)) {
     if (reply->id.client_id != id_ || reply->id.number != waiting_.number) return;
     if (link_->loses() && reply->id.session != session_) return;
-    auto& place = api::is_final(reply->reply) ? waiting_.final : waiting_.accepted;
-    if (!place) place = reply->reply;
+    if (!api::is_final(reply->reply)) {
+      if (!waiting_.accepted) waiting_.accepted = reply->reply;
+    } else if (!waiting_.final) {
+      waiting_.final = waiting_.parts.add(*reply);
+    }
   }
 }
 

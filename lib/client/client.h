@@ -80,6 +80,7 @@ class Client {
     std::int64_t number = 0;
     std::optional<api::Reply> accepted{};
     std::optional<api::Reply> final{};  // Refused or Completed
+    lcm::ReplyParts parts{};            // of the final one
   };
 
   void on_message(const lcm::DaemonMessage& message);

@@ -9,6 +9,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -20,7 +21,7 @@ namespace {
 
 constexpr Server::Connection kListener = 0;
 constexpr int kBacklog = 256;
-constexpr std::size_t kEventsAtOnce = 64;
+constexpr std::size_t kAcceptedAtOnce = 64;
 
 Error system_error(const std::string& what, const std::string& path) {
   return {.message = what + ": " + std::strerror(errno), .file = path};
@@ -133,34 +134,55 @@ void Server::watch(Connection connection, const Peer& peer, int operation) const
 }
 
 void Server::handle() {
-  std::array<epoll_event, kEventsAtOnce> events;
+  std::vector<epoll_event> events(peers_.size() + 1);
   const int n = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), 0);
-  for (int i = 0; i < n; ++i) {
-    const epoll_event& event = events[static_cast<std::size_t>(i)];
-    const Connection connection = event.data.u64;
-    if (connection == kListener) {
+  events.resize(static_cast<std::size_t>(std::max(n, 0)));
+  bytes_left_ = limits_.bytes_at_once;
+  // In turns, beginning behind who was served last.
+  std::sort(events.begin(), events.end(), [this](const epoll_event& a, const epoll_event& b) {
+    return a.data.u64 - turn_ - 1 < b.data.u64 - turn_ - 1;
+  });
+  for (const epoll_event& event : events) {
+    const auto found = peers_.find(event.data.u64);
+    if (bytes_left_ == 0 || found == peers_.end() || !is_urgent(found->second)) continue;
+    handle_peer(found->first, event.events);
+  }
+  for (const epoll_event& event : events) {
+    if (event.data.u64 == kListener) {
       accept_all();
-      continue;
-    }
-    const auto found = peers_.find(connection);
-    if (found == peers_.end()) continue;
-    Peer& peer = found->second;
-    bool goes_on = !peer.doomed;
-    if (goes_on && (event.events & EPOLLOUT) != 0) goes_on = flush(peer);
-    if (goes_on && (event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) {
-      goes_on = read(connection, peer);
-    }
-    if (!goes_on || peer.doomed) {
-      close(connection);
-    } else if ((event.events & EPOLLOUT) != 0) {
-      watch(connection, peer, EPOLL_CTL_MOD);
+    } else if (bytes_left_ > 0) {
+      turn_ = event.data.u64;
+      handle_peer(event.data.u64, event.events);
     }
   }
   for (const Connection connection : std::exchange(doomed_, {})) close(connection);
 }
 
+void Server::handle_peer(Connection connection, std::uint32_t events) {
+  const auto found = peers_.find(connection);
+  if (found == peers_.end()) return;
+  Peer& peer = found->second;
+  bool goes_on = !peer.doomed;
+  if (goes_on && (events & EPOLLOUT) != 0) goes_on = flush(peer);
+  if (goes_on && (events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) goes_on = read(connection, peer);
+  if (!goes_on || peer.doomed) {
+    close(connection);
+  } else if ((events & EPOLLOUT) != 0) {
+    watch(connection, peer, EPOLL_CTL_MOD);
+  }
+}
+
+bool Server::is_urgent(const Peer& peer) const {
+  if (!handlers_.is_urgent || peer.doomed) return false;
+  std::array<std::uint8_t, kMaxChannel + 1> head;
+  const ssize_t n = ::recv(peer.fd, head.data(), head.size(), MSG_PEEK | MSG_DONTWAIT);
+  if (n <= 0) return false;
+  const auto view = view_of({head.data(), static_cast<std::size_t>(n)});
+  return view && handlers_.is_urgent(view->channel);
+}
+
 void Server::accept_all() {
-  for (std::size_t i = 0; i < kEventsAtOnce; ++i) {
+  for (std::size_t i = 0; i < kAcceptedAtOnce; ++i) {
     const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd >= 0) {
       accept_one(fd);
@@ -197,22 +219,22 @@ void Server::accept_one(int fd) {
 }
 
 bool Server::read(Connection connection, Peer& peer) {
-  for (unsigned i = 0; i < limits_.packets_at_once && !peer.doomed; ++i) {
-    iovec part{.iov_base = buffer_.data(), .iov_len = buffer_.size()};
-    // Descriptors that somebody sends along are closed by the kernel: there is no room for them.
-    msghdr message{};
-    message.msg_iov = &part;
-    message.msg_iovlen = 1;
-    const ssize_t n = ::recvmsg(peer.fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
-    if (n < 0) return errno == EAGAIN || errno == EINTR;
-    if (n == 0) return false;
-    const std::span<const std::uint8_t> bytes(buffer_.data(), static_cast<std::size_t>(n));
-    const auto view = (message.msg_flags & MSG_TRUNC) != 0 ? std::nullopt : view_of(bytes);
-    if (!view) {
-      reject(connection);
-    } else if (handlers_.packet) {
-      handlers_.packet(connection, *view);
-    }
+  constexpr std::size_t kPerPacket = 512;
+  iovec part{.iov_base = buffer_.data(), .iov_len = buffer_.size()};
+  // Descriptors that somebody sends along are closed by the kernel: there is no room for them.
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  const ssize_t n = ::recvmsg(peer.fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+  if (n < 0) return errno == EAGAIN || errno == EINTR;
+  if (n == 0) return false;
+  const std::span<const std::uint8_t> bytes(buffer_.data(), static_cast<std::size_t>(n));
+  bytes_left_ -= std::min(bytes_left_, bytes.size() + kPerPacket);
+  const auto view = (message.msg_flags & MSG_TRUNC) != 0 ? std::nullopt : view_of(bytes);
+  if (!view) {
+    reject(connection);
+  } else if (handlers_.packet) {
+    handlers_.packet(connection, *view);
   }
   return true;
 }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -72,8 +73,9 @@ bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id, GetStat
 bushd::Result<Packet> encode(std::int64_t utime_us, const Hello& hello);
 bushd::Result<Packet> encode(const Subscription& subscription);
 
-// A list of tables is shortened to what fits a packet, and says so.
-bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id, const api::Reply& reply);
+// As many packets as it takes: a long list comes in parts.
+bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId& id,
+                                          const api::Reply& reply);
 bushd::Result<Packet> encode(std::int64_t utime_us, const Welcome& welcome);
 
 // Which one of the snapshots that together are the whole.
@@ -91,7 +93,19 @@ bushd::Result<Packet> encode(const Part& part, const api::HealthSnapshot& health
 
 struct ReplyMessage {
   RequestId id;
-  api::Reply reply;
+  api::Reply reply;  // with its piece of the list
+  std::int32_t part = 0;
+  std::int32_t parts = 1;
+};
+
+// Puts a reply together again, whatever is lost, repeated and reordered.
+class ReplyParts {
+ public:
+  // Returns the reply once the last of its parts has come.
+  std::optional<api::Reply> add(ReplyMessage message);
+
+ private:
+  std::map<std::int32_t, api::Reply> parts_;
 };
 template <class Snapshot>
 struct SnapshotMessage {

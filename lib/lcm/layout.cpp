@@ -13,7 +13,7 @@ constexpr Layout kTableEntry{"stsidd", {&kTableRef}};
 constexpr Layout kRequest{"llsl"};
 constexpr Layout kBare{"t", {&kRequest}};
 constexpr Layout kMotors{"tnS", {&kRequest}};
-constexpr Layout kReplyHeader{"llslbss"};
+constexpr Layout kReplyHeader{"llslbssii"};
 constexpr Layout kMotor{"slldbsbbsss"};
 constexpr Layout kMotorDescription{"shst", {&kTableRef}};
 constexpr Layout kMcuHealth{"sisiisillllllliddb"};

@@ -1,5 +1,8 @@
 // What the daemon answers.
 #include <algorithm>
+#include <iterator>
+#include <span>
+#include <utility>
 
 #include "lcm/codec.h"
 #include "lcm/snapshot_codec.h"
@@ -30,6 +33,7 @@ reply_header_t header(std::int64_t utime_us, const RequestId& id, const api::Rep
   out.session = id.session;
   out.client_id = id.client_id;
   out.number = id.number;
+  out.parts = 1;
   std::visit(Overloaded{[&](const api::Accepted&) { out.phase = reply_header_t::ACCEPTED; },
                         [&](const api::Refused& refused) {
                           out.phase = reply_header_t::REFUSED;
@@ -44,19 +48,22 @@ reply_header_t header(std::int64_t utime_us, const RequestId& id, const api::Rep
   return out;
 }
 
-move_plan_t plan_message(const api::MovePlan& plan) {
+template <class T>
+using Piece = std::span<const T>;
+
+move_plan_t plan_message(const api::MovePlan& plan, Piece<api::MovePlan::Motor> motors) {
   move_plan_t message{};
   message.duration_us = plan.duration_us;
   message.ticks = plan.ticks;
   message.frames = plan.traffic ? plan.traffic->frames : -1;
   message.bytes = plan.traffic ? plan.traffic->bytes : -1;
-  for (const api::MovePlan::Motor& motor : plan.motors) {
+  for (const api::MovePlan::Motor& motor : motors) {
     message.motors.push_back(motor.motor);
     message.steps.push_back(motor.steps);
     message.motor_duration_us.push_back(motor.duration_us);
     message.peak_steps_per_s.push_back(motor.peak_steps_per_s);
   }
-  message.motor_count = count(plan.motors);
+  message.motor_count = count(motors);
   return message;
 }
 
@@ -77,7 +84,7 @@ api::MovePlan plan_of(const move_plan_t& message) {
 }
 
 // Each table is told once.
-void put(answer_t& answer, const std::vector<api::MotorResult>& motors) {
+void put(answer_t& answer, Piece<api::MotorResult> motors) {
   std::vector<api::TableRef> told;
   for (const api::MotorResult& motor : motors) {
     answer.motors.push_back(motor.motor);
@@ -111,26 +118,60 @@ table_entry_t entry_message(const api::TableEntry& entry) {
   return message;
 }
 
-bushd::Result<Packet> encode_list(table_answer_t answer, const api::TableList& list) {
-  constexpr std::size_t kRoomForReason = 64;
-  std::size_t size = static_cast<std::size_t>(answer.getEncodedSize()) + kRoomForReason;
-  for (const api::TableEntry& entry : list.entries) {
-    const table_entry_t message = entry_message(entry);
-    size += static_cast<std::size_t>(message._getEncodedSizeNoHash());
-    if (size > kMaxMessageBytes) break;
-    answer.entries.push_back(message);
-  }
-  answer.entry_count = count(answer.entries);
-  if (const std::size_t left = list.entries.size() - answer.entries.size(); left > 0) {
-    answer.reply.reason = std::to_string(left) + " more do not fit one message";
-  }
-  return packet("TABLE_REPLY", answer);
+// Of an array of strings.
+std::size_t size_of(std::string_view string) {
+  return sizeof(std::int32_t) + string.size() + 1;
 }
 
-bushd::Result<Packet> encode_content(table_answer_t answer, const tables::TableContent& content) {
-  answer.tables.push_back(message_of(content));
-  answer.table_count = 1;
-  return packet("TABLE_REPLY", answer);
+// What an element takes in a message, or a little more: its table may have been told already.
+std::size_t size_of(const api::MotorResult& motor) {
+  const auto table = static_cast<std::size_t>(message_of(motor.table)._getEncodedSizeNoHash());
+  return size_of(motor.motor) + size_of(word(motor.outcome)) + sizeof(std::int64_t) +
+         sizeof(std::int16_t) + table;
+}
+std::size_t size_of(const api::MovePlan::Motor& motor) {
+  return size_of(motor.motor) + 2 * sizeof(std::int64_t) + sizeof(double);
+}
+std::size_t size_of(const api::TableEntry& entry) {
+  return static_cast<std::size_t>(entry_message(entry)._getEncodedSizeNoHash());
+}
+
+// A list in pieces that fit a message each, beside `rest` bytes. At least one piece, maybe empty.
+template <class T>
+std::vector<Piece<T>> pieces(const std::vector<T>& list, std::size_t rest) {
+  std::vector<Piece<T>> out;
+  std::size_t begin = 0;
+  std::size_t size = rest;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::size_t more = size_of(list[i]);
+    if (size + more > kMaxMessageBytes && i > begin) {
+      out.push_back(Piece<T>(list).subspan(begin, i - begin));
+      begin = i;
+      size = rest;
+    }
+    size += more;
+  }
+  out.push_back(Piece<T>(list).subspan(begin));
+  return out;
+}
+
+// A message for each piece; `put` puts it there.
+template <class Answer, class T>
+bushd::Result<std::vector<Packet>> in_parts(const char* channel, const Answer& answer,
+                                            const std::vector<T>& list, auto put) {
+  constexpr std::size_t kFixed = 256;  // what `put` adds beside the elements
+  std::vector<Packet> out;
+  const auto all = pieces(list, static_cast<std::size_t>(answer.getEncodedSize()) + kFixed);
+  for (const Piece<T> piece : all) {
+    Answer part = answer;
+    part.reply.part = count(out);
+    part.reply.parts = count(all);
+    put(part, piece);
+    auto made = packet(channel, part);
+    if (!made) return fail(made.error());
+    out.push_back(std::move(*made));
+  }
+  return out;
 }
 
 api::TableEntry entry_of(const table_entry_t& message) {
@@ -143,9 +184,12 @@ api::TableEntry entry_of(const table_entry_t& message) {
 }
 
 std::optional<ReplyMessage> with_phase(const reply_header_t& header) {
+  if (header.part < 0 || header.part >= header.parts) return std::nullopt;
   ReplyMessage out{
       .id = {.session = header.session, .client_id = header.client_id, .number = header.number},
-      .reply = api::Accepted{}};
+      .reply = api::Accepted{},
+      .part = header.part,
+      .parts = header.parts};
   if (header.phase == reply_header_t::ACCEPTED) return out;
   if (header.phase == reply_header_t::REFUSED) {
     out.reply = api::Refused{header.reason};
@@ -175,29 +219,48 @@ std::optional<std::vector<api::MotorResult>> motors_of(const answer_t& message) 
 
 }  // namespace
 
-bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id, const api::Reply& reply) {
+bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId& id,
+                                          const api::Reply& reply) {
   answer_t answer{};
   answer.reply = header(utime_us, id, reply);
-  const auto* completed = std::get_if<api::Completed>(&reply);
-  if (completed == nullptr) return packet("REPLY", answer);
   table_answer_t table_answer{};
   table_answer.reply = answer.reply;
-  return std::visit(
-      Overloaded{[&](std::monostate) { return packet("REPLY", answer); },
-                 [&](const std::vector<api::MotorResult>& motors) {
-                   put(answer, motors);
-                   return packet("REPLY", answer);
-                 },
-                 [&](const api::MovePlan& plan) {
-                   answer.plan.push_back(plan_message(plan));
-                   answer.plan_count = 1;
-                   return packet("REPLY", answer);
-                 },
-                 [&](const api::TableList& list) { return encode_list(table_answer, list); },
-                 [&](const tables::TableContent& content) {
-                   return encode_content(table_answer, content);
-                 }},
-      completed->detail);
+  const auto alone = [&](const char* channel,
+                         const auto& message) -> bushd::Result<std::vector<Packet>> {
+    auto made = packet(channel, message);
+    if (!made) return fail(made.error());
+    return std::vector<Packet>{std::move(*made)};
+  };
+  const auto* completed = std::get_if<api::Completed>(&reply);
+  if (completed == nullptr) return alone("REPLY", answer);
+  return std::visit(Overloaded{[&](std::monostate) { return alone("REPLY", answer); },
+                               [&](const std::vector<api::MotorResult>& motors) {
+                                 return in_parts(
+                                     "REPLY", answer, motors,
+                                     [](answer_t& part, auto piece) { put(part, piece); });
+                               },
+                               [&](const api::MovePlan& plan) {
+                                 return in_parts("REPLY", answer, plan.motors,
+                                                 [&plan](answer_t& part, auto piece) {
+                                                   part.plan.push_back(plan_message(plan, piece));
+                                                   part.plan_count = 1;
+                                                 });
+                               },
+                               [&](const api::TableList& list) {
+                                 return in_parts("TABLE_REPLY", table_answer, list.entries,
+                                                 [](table_answer_t& part, auto piece) {
+                                                   for (const auto& entry : piece) {
+                                                     part.entries.push_back(entry_message(entry));
+                                                   }
+                                                   part.entry_count = count(piece);
+                                                 });
+                               },
+                               [&](const tables::TableContent& content) {
+                                 table_answer.tables.push_back(message_of(content));
+                                 table_answer.table_count = 1;
+                                 return alone("TABLE_REPLY", table_answer);
+                               }},
+                    completed->detail);
 }
 
 bushd::Result<Packet> encode(std::int64_t utime_us, const Welcome& welcome) {
@@ -250,6 +313,43 @@ std::optional<DaemonMessage> decode_welcome(Payload payload) {
   return Welcome{.hello = {.client_id = message->client_id, .nonce = message->nonce},
                  .run = message->run,
                  .session = message->session};
+}
+
+namespace {
+
+void append(auto& list, auto&& more) {
+  list.insert(list.end(), std::make_move_iterator(more.begin()),
+              std::make_move_iterator(more.end()));
+}
+
+// Lists go on; of all else each part says the same.
+void append(api::Reply& reply, api::Reply&& part) {
+  auto* whole = std::get_if<api::Completed>(&reply);
+  auto* more = std::get_if<api::Completed>(&part);
+  if (whole == nullptr || more == nullptr) return;
+  std::visit(
+      Overloaded{[](std::vector<api::MotorResult>& to, std::vector<api::MotorResult>& from) {
+                   append(to, from);
+                 },
+                 [](api::MovePlan& to, api::MovePlan& from) { append(to.motors, from.motors); },
+                 [](api::TableList& to, api::TableList& from) { append(to.entries, from.entries); },
+                 [](auto&, auto&) {}},
+      whole->detail, more->detail);
+}
+
+}  // namespace
+
+std::optional<api::Reply> ReplyParts::add(ReplyMessage message) {
+  // A reply of 2048 motors has three; who says more is not to be believed.
+  constexpr std::int32_t kMaxParts = 64;
+  if (message.parts > kMaxParts) return std::nullopt;
+  parts_.try_emplace(message.part, std::move(message.reply));
+  if (count(parts_) < message.parts) return std::nullopt;
+  auto part = parts_.begin();
+  api::Reply whole = std::move(part->second);
+  while (++part != parts_.end()) append(whole, std::move(part->second));
+  parts_.clear();
+  return whole;
 }
 
 }  // namespace bushd::lcm

@@ -87,15 +87,18 @@ Transport::~Transport() {
   lcm_destroy(lcm_);
 }
 
-void Transport::handle() {
-  for (int i = 0; i < kQueueCapacity; ++i) {
+void Transport::handle(std::size_t max_bytes) {
+  handled_bytes_ = 0;
+  for (int i = 0; i < kQueueCapacity && handled_bytes_ < max_bytes; ++i) {
     if (lcm_handle_timeout(lcm_, 0) <= 0) return;
     if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
   }
 }
 
 void Transport::on_message(const lcm_recv_buf_t* buffer, const char*, void* subscription) {
+  constexpr std::size_t kPerMessage = 256;
   auto& self = *static_cast<Subscription*>(subscription);
+  self.transport->handled_bytes_ += buffer->data_size + kPerMessage;
   // C code calls this. An exception that passed through it would leave LCM believing that a handler
   // still runs, and the next lcm_handle() would abort.
   try {

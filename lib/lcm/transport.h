@@ -44,10 +44,11 @@ class Transport {
   // Readable (level-triggered) while messages wait.
   int fd() const { return fd_; }
 
-  // Calls the handlers of the messages that wait, at most kQueueCapacity of them, so that a flood
-  // cannot keep the caller here; never blocks. An exception of a handler comes out here, after the
+  // Calls the handlers of the messages that wait, at most kQueueCapacity of them and about
+  // `max_bytes`, counted with a little more for each, so that a flood cannot keep the caller here;
+  // never blocks. An exception of a handler comes out here, after the
   // library was left in order. Not to be called from a handler.
-  void handle();
+  void handle(std::size_t max_bytes = SIZE_MAX);
 
   // `handler` is called from handle() for every valid message on exactly this channel, for as long
   // as this object lives: there is no unsubscribing, which within a handler would corrupt LCM's
@@ -93,6 +94,7 @@ class Transport {
   std::vector<std::unique_ptr<Subscription>> subscriptions_;  // LCM holds pointers to them
   std::uint64_t rejected_ = 0;
   std::exception_ptr thrown_;
+  std::size_t handled_bytes_ = 0;  // by this call of handle()
 };
 
 }  // namespace bushd::lcm

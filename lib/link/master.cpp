@@ -8,6 +8,10 @@
 namespace bushd::link {
 namespace {
 
+// A queue with less than this would be empty after some frames. However many stops are wanted, the
+// motors that they leave alone go on.
+constexpr std::int64_t kQueueCriticalUs = 30'000;
+
 PerMcu<McuRecord> records_of(const BusSetup& setup) {
   PerMcu<McuRecord> records;
   for (const McuSetup& mcu : setup.mcus)
@@ -66,18 +70,21 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   return writer_.bytes();
 }
 
-// By urgency: an emergency; replacements, what follows them, and the polls that confirm them;
-// queues about to run empty; reports; SYNCs; configuration; filling queues.
+// By urgency: an emergency; queues that are all but empty; replacements, what follows them, and the
+// polls that confirm them; queues about to run empty; reports; SYNCs; configuration; filling
+// queues.
 bool Master::send_next(std::int64_t now_us) {
   const std::int64_t target_us = horizon_.queue_target_us();
-  const StreamScheduler::Filling urgent{.lead_us = horizon_.queue_urgent_us(),
-                                        .target_us = target_us};
-  return emergency_.send_due(now_us) || streams_.send_due_replacement(now_us) ||
-         streams_.send_stream(now_us, urgent, true) || poller_.send_wanted(now_us) ||
-         streams_.send_stream(now_us, urgent) || poller_.send_due(now_us) ||
-         synchroniser_.send_due(now_us) || connector_.send_ramp_down(now_us) ||
-         connector_.send_due_identify(now_us) || connector_.send_request(now_us) ||
-         streams_.send_stream(now_us, {.lead_us = target_us, .target_us = target_us});
+  const auto below = [target_us](std::int64_t lead_us) {
+    return StreamScheduler::Filling{.lead_us = lead_us, .target_us = target_us};
+  };
+  const StreamScheduler::Filling urgent = below(horizon_.queue_urgent_us());
+  return emergency_.send_due(now_us) || streams_.send_stream(now_us, below(kQueueCriticalUs)) ||
+         streams_.send_due_replacement(now_us) || streams_.send_stream(now_us, urgent, true) ||
+         poller_.send_wanted(now_us) || streams_.send_stream(now_us, urgent) ||
+         poller_.send_due(now_us) || synchroniser_.send_due(now_us) ||
+         connector_.send_ramp_down(now_us) || connector_.send_due_identify(now_us) ||
+         connector_.send_request(now_us) || streams_.send_stream(now_us, below(target_us));
 }
 
 std::int64_t Master::next_wake_us() const {
@@ -118,6 +125,10 @@ Tick Master::earliest_retarget(std::int64_t now_us, Tick start) const {
   return std::max(earliest_replace(now_us), start);
 }
 
+bool Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const {
+  return !streams_.replacement_open(mcu) && !streams_.behind(now_us, horizon_.queue_urgent_us());
+}
+
 void Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   streams_.begin(mcu, motor, start);
 }
@@ -134,13 +145,12 @@ void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
   streams_.replace(mcu, motors, first, clock().tick_at(stepped_us_));
 }
 
-std::optional<Traffic> Master::rehearse(std::int64_t now_us, TickSource& source,
-                                        std::span<const PlannedMove> moves,
-                                        std::uint64_t max_frames) const {
-  return link::rehearse(
-      now_us,
-      {.setup = setup_, .mcus = mcus_, .clock = clock(), .queue_us = horizon_.queue_target_us()},
-      source, moves, max_frames);
+BusSnapshot Master::snapshot(std::int64_t now_us) const {
+  return {.setup = &setup_,
+          .mcus = mcus_,
+          .clock = clock(),
+          .queue_us = horizon_.queue_target_us(),
+          .now_us = now_us};
 }
 
 std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,

@@ -80,10 +80,8 @@ class Master : private Transactions::Listener, private Connector::Listener {
   // can (can_run_tables).
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps);
   bool can_run_tables(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TABLE_RUN); }
-  // What would go out for moves that `source` has ticks for (rehearsal.h).
-  std::optional<Traffic> rehearse(std::int64_t now_us, TickSource& source,
-                                  std::span<const PlannedMove> moves,
-                                  std::uint64_t max_frames) const;
+  // Everything that decides what would go out now (rehearsal.h).
+  BusSnapshot snapshot(std::int64_t now_us) const;
   // Moves of the MCU's motors, `steps` (either sign, not 0) each, that an edge at its trigger input
   // starts. What becomes of them its reports tell, from when they have the number returned here.
   // Preconditions: the MCU is online and can (can_trigger), the motors have tables and are at rest,
@@ -102,6 +100,10 @@ class Master : private Transactions::Listener, private Connector::Listener {
   // When the MCU's position compare output pulses from now on. Precondition: it has one.
   void position_compare(McuIndex mcu, const bushd_position_compare& message);
   bool can_compare_position(McuIndex mcu) const { return can(mcu, BUSHD_CAN_POSITION_COMPARE); }
+  // The line has time for a replacement that is not urgent, such as another target: none of this
+  // MCU is on its way, and no queue of the bus is about to run empty. Each replacement takes back
+  // ticks that have been sent, so too many of them would leave no time for ticks.
+  bool has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const;
   // The source's answer for these motors has changed from `first` on.
   void replace(McuIndex mcu, std::uint16_t motors, Tick first);
   // Nothing more is sent for this motor.

@@ -1,13 +1,17 @@
-// What would go out for moves, without sending it: the stream scheduler on copies.
+// What would go out for moves, without sending it: the stream scheduler on copies, a frame at a
+// time.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "link/bus_clock.h"
 #include "link/bus_setup.h"
+#include "link/frame_writer.h"
 #include "link/mcu_record.h"
+#include "link/stream_scheduler.h"
 #include "link/tick_source.h"
 
 namespace bushd::link {
@@ -25,18 +29,42 @@ struct Traffic {
   std::uint64_t bytes = 0;
 };
 
-// The bus as it is when the moves are asked for.
-struct RehearsalStage {
-  const BusSetup& setup;
-  const PerMcu<McuRecord>& mcus;
-  const BusClock& clock;
+// A bus as it is at one moment. Only the setup is not copied, and outlives this: it never changes.
+struct BusSnapshot {
+  const BusSetup* setup;
+  PerMcu<McuRecord> mcus;
+  BusClock clock;
   std::int64_t queue_us;  // queues are filled this far ahead
+  std::int64_t now_us;
 };
 
-// On a line that has nothing else to do and loses nothing. Preconditions as of Master::begin.
-// Nothing beyond `max_frames`: making them all takes as long as in the moves themselves.
-std::optional<Traffic> rehearse(std::int64_t now_us, const RehearsalStage& stage,
-                                TickSource& source, std::span<const PlannedMove> moves,
-                                std::uint64_t max_frames);
+// On a line that has nothing else to do and loses nothing.
+class Rehearsal {
+ public:
+  // `source` outlives it. Preconditions as of Master::begin, at the moment of the snapshot.
+  // Nothing is told beyond `max_frames`: making them all takes as long as in the moves themselves.
+  Rehearsal(BusSnapshot bus, TickSource& source, std::span<const PlannedMove> moves,
+            std::uint64_t max_frames);
+  Rehearsal(const Rehearsal&) = delete;
+  Rehearsal& operator=(const Rehearsal&) = delete;
+
+  // Makes one frame, or lets time pass until one may be due. Returns false when nothing is left to
+  // do. Microseconds: O(motors of the bus).
+  bool step();
+  // Precondition: step() has returned false. Nothing: it is too much to be counted.
+  const std::optional<Traffic>& traffic() const { return traffic_; }
+
+ private:
+  bool ticks_to_send();
+
+  BusSnapshot bus_;
+  FrameWriter writer_;
+  std::vector<Event> unused_;
+  StreamScheduler streams_;
+  std::uint64_t max_frames_;
+  Tick end_ = 0;
+  std::vector<McuIndex> open_;  // that may have ticks left to be sent
+  std::optional<Traffic> traffic_ = Traffic{};
+};
 
 }  // namespace bushd::link

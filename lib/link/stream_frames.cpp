@@ -39,6 +39,8 @@ bool StreamScheduler::send_due_replacement(std::int64_t now_us) {
       mcu.stream[m].run_steps.reset();
       mcu.stream[m].beyond_gap.reset();
       mcu.stream[m].sent = mcu.replace_at;
+      mcu.stream[m].from_before = mcu.stream[m].from;
+      mcu.stream[m].from = std::min(mcu.stream[m].from, mcu.replace_at);
     }
     send_ticks(now_us, i, mask, mcu.replace_at, static_cast<unsigned>(ticks_per_frame(mask)),
                BUSHD_TICKS_REPLACE);
@@ -68,6 +70,20 @@ bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling, b
   });
 }
 
+bool StreamScheduler::behind(std::int64_t now_us, std::int64_t lead_us) const {
+  if (!clock_.valid()) return false;
+  const Tick now = clock_.tick_at(now_us);
+  const Tick lead = clock_.ticks_in(lead_us);
+  for (const McuIndex i : mcus_.indices()) {
+    if (records_[i].view.phase != McuPhase::kOnline) continue;
+    const auto next = mcus_[i].next_tick();
+    // A small queue takes whole frames only, so it is never kept fuller than that.
+    const Tick depth = (records_[i].view.identity.queue_ticks - kSpareTicks) / 2;
+    if (next && *next < now + std::min(lead, depth)) return true;
+  }
+  return false;
+}
+
 // Motors that start, start later or are ahead have frames of their own until the others have caught
 // up.
 StreamScheduler::Choice StreamScheduler::choose(const Mcu& mcu, Tick first) {
@@ -80,8 +96,7 @@ StreamScheduler::Choice StreamScheduler::choose(const Mcu& mcu, Tick first) {
       continue;
     }
     if (stream.beyond_gap) choice.join = std::min(choice.join, stream.beyond_gap->from);
-    const bool starts = stream.next == stream.start;
-    (starts ? (stream.run_steps ? choice.runs : choice.starts) : choice.goes_on) |=
+    (stream.starts() ? (stream.run_steps ? choice.runs : choice.starts) : choice.goes_on) |=
         static_cast<std::uint16_t>(1u << m);
   }
   return choice;
@@ -195,6 +210,9 @@ void StreamScheduler::send_ticks(std::int64_t now_us, McuIndex index, std::uint1
     if (!has(mask, m)) continue;
     delay[column] = source_.render(index, m, first, count, &displacement[column], motors);
     note_sent(index, m, first, first + count);
+    // At rest for good, before its end if the run was cancelled before its start. An MCU refuses
+    // more for it, and with it all that the frame has for others.
+    if (delay[column] == 0) mcus_[index].stream[m].finished = true;
     ++column;
   }
   const bool fine = setup_.format == BUSHD_FORMAT_FINE;

@@ -1,6 +1,7 @@
 #include "link/stream_scheduler.h"
 
 #include <algorithm>
+#include <bit>
 #include <utility>
 
 #include "link/horizon.h"
@@ -28,7 +29,7 @@ void StreamScheduler::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   Stream& stream = mcus_[mcu].stream[motor];
   stream = {};
   stream.active = true;
-  stream.start = stream.next = stream.sent = start;
+  stream.start = stream.from = stream.from_before = stream.next = stream.sent = start;
 }
 
 void StreamScheduler::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start,
@@ -103,11 +104,21 @@ void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, Ti
   m.replacing |= sent;
 }
 
+// Sent in vain it would take line and followers with it, for nothing.
+std::int64_t StreamScheduler::arrival_us(std::int64_t now_us, std::uint16_t mask) const {
+  const std::size_t motors = static_cast<std::size_t>(std::popcount(mask));
+  const std::size_t width = setup_.format == BUSHD_FORMAT_FINE ? 2 : 1;
+  const auto ticks = static_cast<std::size_t>(ticks_per_frame(mask));
+  const std::size_t payload = BUSHD_TICKS_HEADER + motors * (2 + width * ticks);
+  return std::max(now_us, writer_.free_us()) + writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
+}
+
 bool StreamScheduler::fail_late_replacements(std::int64_t now_us) {
   bool failed = false;
   for (const McuIndex i : mcus_.indices()) {
     Mcu& mcu = mcus_[i];
-    if (mcu.replacing == 0 || !too_late(mcu.replace_at, clock_.tick_at(now_us))) continue;
+    if (mcu.replacing == 0) continue;
+    if (!too_late(mcu.replace_at, clock_.tick_at(arrival_us(now_us, mcu.replacing)))) continue;
     const std::uint16_t motors = std::exchange(mcu.replacing, std::uint16_t{0});
     events_.push_back(ReplacementFailed{.mcu = i, .motors = motors});
     failed = true;
@@ -136,7 +147,8 @@ void StreamScheduler::follow_replacements(McuIndex index) {
   for (unsigned m = 0; m < view.report.motor_count; ++m) {
     if ((failed >> m & 1) == 0) continue;
     Stream& stream = mcu.stream[m];
-    stream.next = stream.sent = std::max(view.known_until[m], stream.start);
+    stream.from = stream.from_before;
+    stream.next = stream.sent = std::max(view.known_until[m], stream.from);
     stream.unsure = stream.begun();
     stream.beyond_gap.reset();
     stream.finished = false;
@@ -180,7 +192,7 @@ void StreamScheduler::go_back(McuIndex index, std::uint8_t motor) {
   Stream& stream = mcus_[index].stream[motor];
   const McuView& view = records_[index].view;
   const bushd_report& report = view.report;
-  stream.next = std::max(view.known_until[motor], stream.start);
+  stream.next = std::max(view.known_until[motor], stream.from);
   stream.beyond_gap.reset();
   stream.finished = false;
   Tick missing = stream.run_steps ? 0 : stream.sent - stream.next;

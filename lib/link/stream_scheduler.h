@@ -71,6 +71,10 @@ class StreamScheduler {
   Tick next_tick(McuIndex mcu, std::uint8_t motor) const { return mcus_[mcu].stream[motor].next; }
   bool has_ticks_to_send(McuIndex mcu) const;
   bool has_replacement_to_send(McuIndex mcu) const { return mcus_[mcu].replacing != 0; }
+  // A replacement has been sent to this MCU and is not yet confirmed.
+  bool replacement_open(McuIndex mcu) const { return mcus_[mcu].replaced != 0; }
+  // An MCU has a queue filled less than `lead_us` ahead, as far as its queue goes.
+  bool behind(std::int64_t now_us, std::int64_t lead_us) const;
 
  private:
   // Ticks that an MCU has beyond a gap.
@@ -82,6 +86,10 @@ class StreamScheduler {
     bool active = false;
     bool finished = false;  // all is sent; until dropped it may still be repeated or replaced
     Tick start = 0;
+    // First tick that the MCU gets of it: the start, or that of a replacement before it, which
+    // leads up to the start. What follows one is no start, wherever it ends.
+    Tick from = 0;
+    Tick from_before = 0;                       // the same, without the newest replacement
     Tick next = 0;                              // first tick not yet sent, or to be sent again
     Tick sent = 0;                              // first tick never sent
     std::optional<OutOfOrderRange> beyond_gap;  // while what lies before it is sent again
@@ -91,7 +99,8 @@ class StreamScheduler {
     // Of a table run, until it is replaced.
     std::optional<std::int32_t> run_steps;
 
-    bool begun() const { return sent != start; }
+    bool begun() const { return sent != from; }
+    bool starts() const { return next == start && from == start; }
   };
   struct Mcu {
     std::array<Stream, BUSHD_MOTORS_PER_MCU> stream;
@@ -119,6 +128,8 @@ class StreamScheduler {
   };
 
   // stream_scheduler.cpp
+  // When a replacement for these motors would be at its MCU, sent now.
+  std::int64_t arrival_us(std::int64_t now_us, std::uint16_t mask) const;
   void follow_replacements(McuIndex mcu);
   void follow_streams(McuIndex mcu);
   void go_back(McuIndex mcu, std::uint8_t motor);

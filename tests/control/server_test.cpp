@@ -11,6 +11,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <functional>
@@ -84,6 +85,7 @@ class ServerTest : public testing::Test {
                                  heard_.emplace_back(view.channel);
                                  if (on_packet_) on_packet_();
                                },
+                           .is_urgent = [](std::string_view channel) { return channel == "STOP"; },
                            .closed = [this](Server::Connection) { ++closed_; }});
   }
   void settle() {
@@ -113,6 +115,43 @@ TEST_F(ServerTest, PacketsArriveInOrderAndAreAnswered) {
   EXPECT_THAT(heard_, ElementsAre("A", "B", "C"));
   send(last_, bytes("REPLY", 5));
   EXPECT_EQ(peer.read(), bytes("REPLY", 5));
+}
+
+TEST_F(ServerTest, UrgentPacketsComeBeforeThoseOfOthers) {
+  open();
+  std::vector<Peer> peers;
+  for (int i = 0; i < 100; ++i) peers.emplace_back(path_);
+  settle();
+  for (const Peer& peer : peers) EXPECT_TRUE(peer.send(bytes("MOVE", 30'000)));
+  const Peer stops(path_);
+  EXPECT_TRUE(stops.send(bytes("STOP")));
+  server_->handle();  // takes the connection
+  heard_.clear();
+  server_->handle();
+  EXPECT_EQ(heard_.at(0), "STOP");
+  EXPECT_LT(heard_.size(), 10u) << "the others have their turn later";
+  settle();
+}
+
+TEST_F(ServerTest, ReadsALittleAtOnceAndConnectionsTakeTurns) {
+  open({.bytes_at_once = 64 * 1024});
+  std::vector<Peer> peers;
+  for (int i = 0; i < 9; ++i) peers.emplace_back(path_);
+  settle();
+  for (int i = 0; i < 9; ++i) {
+    for (int n = 0; n < 2; ++n) {
+      EXPECT_TRUE(peers[static_cast<std::size_t>(i)].send(bytes("P" + std::to_string(i), 30'000)));
+    }
+  }
+  std::vector<std::string> heard;
+  for (int call = 0; call < 3; ++call) {
+    server_->handle();
+    EXPECT_EQ(heard_.size(), 3u);
+    heard.insert(heard.end(), heard_.begin(), heard_.end());
+    heard_.clear();
+  }
+  std::ranges::sort(heard);
+  EXPECT_THAT(heard, ElementsAre("P0", "P1", "P2", "P3", "P4", "P5", "P6", "P7", "P8"));
 }
 
 TEST_F(ServerTest, TellsWhoIsThere) {

@@ -91,17 +91,6 @@ TEST_F(ReceptionTest, BytesAreBoundedToo) {
   EXPECT_THAT(carried_out_, ElementsAre("a move"));
 }
 
-TEST_F(ReceptionTest, DryRunsAreBoundedByThemselves) {
-  for (int i = 0; i < 3; ++i)
-    take(a_, api::Move{.kind = api::Move::Kind::kRelative, .motors = {}, .dry_run = true});
-  EXPECT_EQ(a_->refusals.size(), 1u);
-  take(a_, api::Move{});
-  EXPECT_EQ(a_->refusals.size(), 1u);
-  carry_out_all();
-  take(a_, api::Move{.kind = api::Move::Kind::kRelative, .motors = {}, .dry_run = true});
-  EXPECT_EQ(a_->refusals.size(), 1u);
-}
-
 TEST_F(ReceptionTest, ManyClientsTogetherAreBounded) {
   std::vector<std::shared_ptr<Client>> clients;
   for (int i = 0; i < 100; ++i) {

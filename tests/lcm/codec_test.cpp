@@ -34,13 +34,15 @@ T request_over_the_wire(const T& request) {
 }
 
 ReplyMessage reply_over_the_wire(const api::Reply& reply) {
-  const auto packet = encode(12, kId, reply);
-  EXPECT_TRUE(packet) << packet.error().text();
-  const auto message = decode_daemon_message(packet->channel, packet->payload);
+  const auto packets = encode(12, kId, reply);
+  EXPECT_TRUE(packets) << packets.error().text();
+  EXPECT_EQ(packets->size(), 1u);
+  const Packet& packet = packets->front();
+  const auto message = decode_daemon_message(packet.channel, packet.payload);
   EXPECT_TRUE(message);
   auto out = std::get<ReplyMessage>(*message);
   EXPECT_EQ(out.id, kId);
-  EXPECT_EQ(encode(12, out.id, out.reply)->payload, packet->payload);
+  EXPECT_EQ(encode(12, out.id, out.reply)->front().payload, packet.payload);
   return out;
 }
 
@@ -176,16 +178,82 @@ TEST(Codec, PlansAndTablesDoToo) {
   EXPECT_EQ(std::get<tables::TableContent>(content.detail), own);
 }
 
-TEST(Codec, AListOfTablesIsShortenedToAPacket) {
+// Decodes the parts of a reply in this order of their indices, and puts them together.
+api::Completed put_together(const api::Reply& reply, const std::vector<std::size_t>& order) {
+  const auto packets = encode(1, kId, reply);
+  EXPECT_TRUE(packets);
+  ReplyParts parts;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Packet& packet = packets->at(order[i]);
+    EXPECT_LE(packet.payload.size(), kMaxMessageBytes);
+    const auto message =
+        std::get<ReplyMessage>(*decode_daemon_message(packet.channel, packet.payload));
+    EXPECT_EQ(message.id, kId);
+    EXPECT_EQ(message.parts, static_cast<std::int32_t>(packets->size()));
+    const auto whole = parts.add(message);
+    EXPECT_EQ(whole.has_value(), i + 1 == order.size());
+    if (whole) return std::get<api::Completed>(*whole);
+  }
+  return {};
+}
+
+TEST(Codec, ResultsOf2048MotorsComeInParts) {
+  std::vector<api::MotorResult> motors;
+  for (int i = 0; i < 2048; ++i) {
+    const std::string name =
+        "motor" + std::to_string(i) + std::string(static_cast<std::size_t>(i) % 50, 'x');
+    motors.push_back(
+        {.motor = name,
+         .outcome = i % 3 == 0 ? api::Outcome::kLink : api::Outcome::kReached,
+         .position_steps = 1000 - i,
+         .table = {.name = i % 2 == 0 ? "own" : "other", .revision = 7, .hash = "89abcdef"}});
+  }
+  const api::Completed reply{.outcome = api::Outcome::kLink, .reason = "r", .detail = motors};
+  const auto whole = put_together(reply, {2, 0, 0, 2, 1});
+  EXPECT_EQ(whole.outcome, api::Outcome::kLink);
+  EXPECT_EQ(whole.reason, "r");
+  const auto& arrived = std::get<std::vector<api::MotorResult>>(whole.detail);
+  ASSERT_EQ(arrived.size(), motors.size());
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    EXPECT_EQ(arrived[i].motor, motors[i].motor);
+    EXPECT_EQ(arrived[i].outcome, motors[i].outcome);
+    EXPECT_EQ(arrived[i].position_steps, motors[i].position_steps);
+    EXPECT_EQ(arrived[i].table, motors[i].table);
+  }
+}
+
+TEST(Codec, APlanOf2048MotorsComesInParts) {
+  api::MovePlan plan{.duration_us = 5, .ticks = 6, .traffic = api::MovePlan::Traffic{7, 8}};
+  for (int i = 0; i < 2048; ++i) {
+    plan.motors.push_back({.motor = "motor" + std::to_string(i), .steps = i, .duration_us = 2 * i});
+  }
+  const auto whole = put_together(api::Completed{.reason = "r", .detail = plan}, {1, 0});
+  const auto& arrived = std::get<api::MovePlan>(whole.detail);
+  EXPECT_EQ(arrived.ticks, 6);
+  EXPECT_EQ(arrived.traffic->bytes, 8);
+  ASSERT_EQ(arrived.motors.size(), 2048u);
+  for (int i = 0; i < 2048; ++i) EXPECT_EQ(arrived.motors[static_cast<std::size_t>(i)].steps, i);
+}
+
+TEST(Codec, AListOfManyTablesComesInParts) {
   api::TableList list;
   for (int i = 0; i < 5000; ++i) list.entries.push_back({.name = std::string(60, 'x')});
-  const auto packet = encode(1, kId, api::Completed{.reason = "all tables", .detail = list});
-  ASSERT_TRUE(packet);
-  const auto reply =
-      std::get<ReplyMessage>(*decode_daemon_message(packet->channel, packet->payload)).reply;
-  const auto& completed = std::get<api::Completed>(reply);
-  EXPECT_GT(std::get<api::TableList>(completed.detail).entries.size(), 300u);
-  EXPECT_NE(completed.reason.find("more do not fit"), std::string::npos);
+  const api::Completed reply{.reason = "all tables", .detail = list};
+  std::vector<std::size_t> order(encode(1, kId, reply)->size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = order.size() - 1 - i;
+  EXPECT_GT(order.size(), 5u);
+  const auto whole = put_together(reply, order);
+  EXPECT_EQ(std::get<api::TableList>(whole.detail).entries.size(), 5000u);
+  EXPECT_EQ(whole.reason, "all tables");
+}
+
+// Nobody can make a client keep more than a reply.
+TEST(Codec, PartsThatCannotBeAreNoReply) {
+  ReplyParts parts;
+  for (int part = 0; part < 1000; ++part) {
+    EXPECT_FALSE(parts.add({.id = kId, .reply = api::Completed{}, .part = part, .parts = 1000}));
+  }
+  EXPECT_TRUE(parts.add({.id = kId, .reply = api::Completed{}}));
 }
 
 TEST(Codec, SnapshotsArriveAsTheyAre) {

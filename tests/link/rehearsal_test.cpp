@@ -9,9 +9,9 @@ namespace {
 using link::PlannedMove;
 using link::Tick;
 
-class Rehearsal : public testing::Test {
+class RehearsalTest : public testing::Test {
  protected:
-  Rehearsal() {
+  RehearsalTest() {
     bus.connect();
     bus.run_for(1'000'000);
     start = bus.master->earliest_start(bus.now_us, McuIndex{0}, 0);
@@ -21,13 +21,19 @@ class Rehearsal : public testing::Test {
     };
     moves = {{McuIndex{0}, 0, start, {}}, {McuIndex{0}, 2, start, {}}, {McuIndex{1}, 1, start, {}}};
   }
+  std::optional<link::Traffic> rehearse(std::uint64_t max_frames = 1000) {
+    link::Rehearsal rehearsal(bus.master->snapshot(bus.now_us), bus.source, moves, max_frames);
+    while (rehearsal.step()) {
+    }
+    return rehearsal.traffic();
+  }
   FakeBus bus{2, 4};
   Tick start = 0;
   std::vector<PlannedMove> moves;
 };
 
-TEST_F(Rehearsal, CountsWhatIsThenSent) {
-  const auto traffic = bus.master->rehearse(bus.now_us, bus.source, moves, 1000);
+TEST_F(RehearsalTest, CountsWhatIsThenSent) {
+  const auto traffic = rehearse();
   ASSERT_TRUE(traffic);
   bus.heard.clear();
   for (const PlannedMove& move : moves) bus.master->begin(move.mcu, move.motor, move.start);
@@ -40,21 +46,36 @@ TEST_F(Rehearsal, CountsWhatIsThenSent) {
   EXPECT_LE(traffic->bytes, bytes + sent.size()) << "a delimiter before each, at most";
 }
 
-TEST_F(Rehearsal, TableRunsAreOneFrameForTheMotorsOfAnMcu) {
+TEST_F(RehearsalTest, TableRunsAreOneFrameForTheMotorsOfAnMcu) {
   for (PlannedMove& move : moves) move.run_steps = 500;
-  const auto traffic = bus.master->rehearse(bus.now_us, bus.source, moves, 1000);
+  const auto traffic = rehearse();
   ASSERT_TRUE(traffic);
   EXPECT_EQ(traffic->frames, 2u);
 }
 
-TEST_F(Rehearsal, TooManyFramesAreNotCounted) {
-  EXPECT_FALSE(bus.master->rehearse(bus.now_us, bus.source, moves, 10));
+TEST_F(RehearsalTest, TooManyFramesAreNotCounted) {
+  EXPECT_FALSE(rehearse(10));
 }
 
-TEST_F(Rehearsal, NothingIsSentAndNothingChanges) {
+// What becomes of the bus while a rehearsal is under way is no concern of it.
+TEST_F(RehearsalTest, CountsWhatWasAtItsBegin) {
+  const auto traffic = rehearse();
+  link::Rehearsal rehearsal(bus.master->snapshot(bus.now_us), bus.source, moves, 1000);
+  rehearsal.step();
+  bus.master->begin(McuIndex{0}, 3, start);
+  bus.run_for(500'000);
+  bus.master->port_lost(bus.now_us, "unplugged");
+  while (rehearsal.step()) {
+  }
+  ASSERT_TRUE(rehearsal.traffic());
+  EXPECT_EQ(rehearsal.traffic()->frames, traffic->frames);
+  EXPECT_EQ(rehearsal.traffic()->bytes, traffic->bytes);
+}
+
+TEST_F(RehearsalTest, NothingIsSentAndNothingChanges) {
   const Tick before = bus.master->earliest_start(bus.now_us, McuIndex{0}, 0);
   bus.heard.clear();
-  bus.master->rehearse(bus.now_us, bus.source, moves, 1000);
+  rehearse();
   EXPECT_EQ(bus.master->earliest_start(bus.now_us, McuIndex{0}, 0), before);
   bus.run_for(500'000);
   EXPECT_TRUE(bus.heard_of(BUSHD_MSG_TICKS).empty());

@@ -145,6 +145,7 @@ class Replacing : public Scheduling {
   Replacing() {
     streams.begin(kFirst, 0, 1010);
     fill();
+    writer.reset(kNowUs);  // all of it has left the line
     sent = streams.next_tick(kFirst, 0);
     known_until(0, sent);
   }
@@ -216,6 +217,51 @@ TEST_F(Replacing, WhatWasNeverSentNeedsNone) {
   streams.begin(kFirst, 1, 1040);
   streams.replace(kFirst, 2, 1040, 1000);
   EXPECT_FALSE(streams.has_replacement_to_send(kFirst));
+}
+
+// The MCU has the rest before the start already, so it refuses another start.
+TEST_F(Replacing, BeforeTheStartIsFollowedByNoStart) {
+  streams.begin(kFirst, 1, 1040);
+  next();
+  streams.replace(kFirst, 2, 1024, 1000);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  EXPECT_EQ(frame(), (Ticks{2, 1024, 16, BUSHD_TICKS_REPLACE, 1})) << "just up to the start";
+  EXPECT_EQ(next(), (Ticks{2, 1040, 16, 0, 1}));
+  report().epoch = 1;
+  known_until(1, 1030);
+  streams.follow_report(kFirst);
+  EXPECT_EQ(next(), (Ticks{2, 1030, 16, 0, 1})) << "what is missing before the start, too";
+}
+
+TEST_F(Replacing, BeforeTheStartThatFailedLeavesTheStartAsItWas) {
+  streams.begin(kFirst, 1, 1040);
+  next();
+  streams.replace(kFirst, 2, 1024, 1000);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  frame();
+  streams.follow_report(kFirst);  // in epoch 0, and the start was lost too
+  EXPECT_EQ(next(), (Ticks{2, 1040, 16, BUSHD_TICKS_START, 0}));
+}
+
+// An MCU refuses ticks of a motor that rests for good, and with them those of the others.
+TEST_F(Replacing, OfARunCancelledBeforeItsStartHasNoFollowers) {
+  streams.begin(kFirst, 1, 1060);
+  next();
+  source.delay = [](std::uint8_t motor, Tick) { return std::uint16_t(motor == 1 ? 0 : 50); };
+  streams.replace(kFirst, 2, 1024, 1000);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  EXPECT_EQ(frame(), (Ticks{2, 1024, 16, BUSHD_TICKS_REPLACE, 1}));
+  while (const auto ticks = next()) EXPECT_EQ(ticks->mask & 2, 0);
+}
+
+// Its frame may take longer than until its tick.
+TEST_F(Replacing, TooLateToArriveFailsUnsent) {
+  streams.replace(kFirst, 1, 1010, 1000);
+  EXPECT_FALSE(streams.fail_late_replacements(kNowUs));
+  std::vector<std::uint8_t> payload(200);
+  for (int i = 0; i < 8; ++i) writer.send(kNowUs, McuAddress{9}, BUSHD_MSG_TICKS, payload);
+  take_sent(writer);
+  EXPECT_TRUE(streams.fail_late_replacements(kNowUs)) << "behind what waits for the line";
 }
 
 TEST_F(Scheduling, TableRunIsGivenAsAWhole) {

@@ -1,6 +1,7 @@
-// How long an emergency stop waits in the daemon while other clients of the control socket send as
-// much as they can: from the client's send() to the core's door. Prints the median, the 99th of a
-// hundred and the longest.
+// How long an emergency stop waits in the daemon while other clients of the control socket, or of
+// LCM, send as much as they can: from the client's send() to the core's door. Prints the median,
+// the 99th of a hundred and the longest. LCM is measured where its packets find a way
+// (tests/tools/with-loopback-multicast).
 //
 // The front end, the reception and the slices are the daemon's; in place of the core each request
 // takes as long as the move of a group does.
@@ -13,11 +14,14 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "client/link.h"
+#include "daemon/lcm_front.h"
 #include "daemon/reception.h"
 #include "daemon/socket_front.h"
 
@@ -36,37 +40,37 @@ std::int64_t now_ns() {
       .count();
 }
 
-void flood(const std::string& path, int number, const std::atomic<bool>& ended) {
-  auto link = bushd::client::open_socket(path);
+// Opens a link of a client, or nothing.
+using Open = std::function<std::unique_ptr<bushd::client::Link>()>;
+
+void flood(const Open& open, int number, const std::atomic<bool>& ended) {
+  auto link = open();
   api::Move move;
   for (int i = 0; i < 16; ++i) move.motors.push_back({"motor" + std::to_string(i), 100});
   const bushd::lcm::RequestId id{.client_id = "flood" + std::to_string(number), .number = 1};
   const auto packet = bushd::lcm::encode(0, id, api::Request(move));
-  while (!ended) {
-    if (!(*link)->send(*packet) || !(*link)->handle([](const auto&) {})) {
-      link = bushd::client::open_socket(path);
-      if (!link) return;
-    }
+  while (!ended && link) {
+    if (!link->send(*packet) || !link->handle([](const auto&) {})) link = open();
   }
 }
 
-void send_stops(const std::string& path, std::atomic<bool>& ended) {
-  const auto link = bushd::client::open_socket(path);
-  for (int i = 0; i < kStops; ++i) {
+void send_stops(const Open& open, std::atomic<bool>& ended) {
+  const auto link = open();
+  for (int i = 0; i < kStops && link; ++i) {
     std::this_thread::sleep_for(kBetweenStops);
     // The number is the time.
     const bushd::lcm::RequestId id{.client_id = "stop", .number = now_ns()};
-    static_cast<void>(
-        (*link)->send(*bushd::lcm::encode(0, id, api::Request(api::EmergencyStop{}))));
-    static_cast<void>((*link)->handle([](const auto&) {}));
+    static_cast<void>(link->send(*bushd::lcm::encode(0, id, api::Request(api::EmergencyStop{}))));
+    static_cast<void>(link->handle([](const auto&) {}));
   }
   ended = true;
 }
 
-void measure(const std::string& path, int floods) {
-  std::vector<double> waited_us;
+// The daemon's side without its core.
+struct Daemon {
+  std::vector<double> waited_us{};
   std::int64_t carried_out = 0;
-  bushd::daemon::Reception reception([&](const api::Asker& asker, const api::Request& request) {
+  bushd::daemon::Reception reception{[this](const api::Asker& asker, const api::Request& request) {
     if (api::is_stop(request)) {
       waited_us.push_back(static_cast<double>(now_ns() - asker.number) * 1e-3);
       return asker.answer(api::Accepted{});
@@ -76,30 +80,71 @@ void measure(const std::string& path, int floods) {
     while (Clock::now() < until) {
     }
     asker.answer(api::Accepted{});
-  });
-  const auto unix_us = [] { return std::int64_t{0}; };
-  bushd::daemon::Publishing publishing(1, 1, 1, {.now_us = unix_us, .unix_us = unix_us});
-  auto server = std::move(*bushd::control::Server::open(path, ""));
-  bushd::daemon::SocketFront front(*server, 1, reception, publishing, unix_us);
+  }};
+  bushd::daemon::Publishing publishing{1, 1, 1, {.now_us = unix_us, .unix_us = unix_us}};
+
+  static std::int64_t unix_us() { return 0; }
+};
+
+void measure(const char* way, Daemon& daemon, const Open& open, std::vector<pollfd> fds,
+             const std::function<void()>& handle, int floods) {
   std::atomic<bool> ended{false};
   std::vector<std::thread> clients;
-  for (int i = 0; i < floods; ++i) clients.emplace_back(flood, path, i, std::cref(ended));
-  clients.emplace_back(send_stops, path, std::ref(ended));
+  for (int i = 0; i < floods; ++i)
+    clients.emplace_back(flood, std::cref(open), i, std::cref(ended));
+  clients.emplace_back(send_stops, std::cref(open), std::ref(ended));
   while (!ended) {
-    pollfd polled{.fd = server->fd(), .events = POLLIN, .revents = 0};
-    if (poll(&polled, 1, reception.idle() ? 10 : 0) > 0) front.handle();
+    if (poll(fds.data(), fds.size(), daemon.reception.idle() ? 10 : 0) > 0) handle();
     const auto until = Clock::now() + kSlice;
-    while (!reception.idle() && Clock::now() < until) reception.carry_out_next();
+    while (!daemon.reception.idle() && Clock::now() < until) daemon.reception.carry_out_next();
   }
-  server.reset();
   for (std::thread& client : clients) client.join();
+  std::vector<double>& waited_us = daemon.waited_us;
+  if (waited_us.empty()) return;
   std::sort(waited_us.begin(), waited_us.end());
   fmt::print(
-      "{:2} flooding clients, {:7} requests carried out: stop after {:6.0f} us (median), {:6.0f} "
-      "us "
-      "(99 %), {:6.0f} us (longest)\n",
-      floods, carried_out, waited_us[waited_us.size() / 2], waited_us[waited_us.size() * 99 / 100],
-      waited_us.back());
+      "{}, {:2} flooding clients, {:7} requests carried out: stop after {:6.0f} us (median), "
+      "{:6.0f} us (99 %), {:6.0f} us (longest)\n",
+      way, floods, daemon.carried_out, waited_us[waited_us.size() / 2],
+      waited_us[waited_us.size() * 99 / 100], waited_us.back());
+}
+
+void measure_socket(const std::string& path, int floods) {
+  Daemon daemon;
+  auto server = std::move(*bushd::control::Server::open(path, ""));
+  bushd::daemon::SocketFront front(*server, 1, daemon.reception, daemon.publishing,
+                                   Daemon::unix_us);
+  const Open open = [&path] {
+    auto link = bushd::client::open_socket(path);
+    return link ? std::move(*link) : nullptr;
+  };
+  measure(
+      "socket", daemon, open, {{.fd = server->fd(), .events = POLLIN, .revents = 0}},
+      [&front] { front.handle(); }, floods);
+}
+
+// As daemon/main.cpp has it: stops by a transport of their own.
+bool measure_lcm(int floods) {
+  using bushd::lcm::Transport;
+  constexpr const char* kUrl = "udpm://239.255.76.67:7667?ttl=0";
+  const auto all = Transport::open(kUrl);
+  const auto stops = Transport::open(kUrl, {"BENCH_STOP", "BENCH_EMERGENCY_STOP"});
+  if (!all || !stops) return false;
+  Daemon daemon;
+  bushd::daemon::LcmFront front(
+      {.transport = **all, .stops = stops->get(), .prefix = "BENCH", .run = 1, .seed = 1},
+      daemon.reception, daemon.publishing, Daemon::unix_us);
+  if (!front.subscribe()) return false;
+  const Open open = [] {
+    auto link = bushd::client::open_lcm(kUrl, "BENCH");
+    return link ? std::move(*link) : nullptr;
+  };
+  measure(
+      "LCM", daemon, open,
+      {{.fd = (*stops)->fd(), .events = POLLIN, .revents = 0},
+       {.fd = (*all)->fd(), .events = POLLIN, .revents = 0}},
+      [&front] { front.handle(); }, floods);
+  return true;
 }
 
 }  // namespace
@@ -108,7 +153,12 @@ int main() {
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("bushd-bench-" + std::to_string(::getpid()));
   std::filesystem::create_directory(folder);
-  for (const int floods : {0, 1, 4, 16}) measure((folder / "control").string(), floods);
+  for (const int floods : {0, 1, 4, 16}) measure_socket((folder / "control").string(), floods);
   std::filesystem::remove_all(folder);
+  for (const int floods : {0, 1, 4, 16}) {
+    if (measure_lcm(floods)) continue;
+    fmt::print("LCM: no network for it here\n");
+    break;
+  }
   return 0;
 }

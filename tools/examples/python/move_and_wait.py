@@ -77,6 +77,7 @@ class Client:
         self.session = 0
         self.number = 0
         self.answers = {}  # phase -> answer_t, to the request under way
+        self.parts = {}  # phase -> part -> answer_t
         self.state_heard = 0.0
         self.run = None  # of the daemon
         self.restarted = False
@@ -102,8 +103,12 @@ class Client:
         reply = answer.reply
         mine = reply.client_id == self.id and reply.number == self.number
         if mine and reply.session == self.session and reply.phase not in self.answers:
-            self.answers[reply.phase] = answer
-            show(answer)
+            # A result of very many motors comes in parts.
+            parts = self.parts.setdefault(reply.phase, {})
+            parts[reply.part] = answer
+            if len(parts) == reply.parts:
+                self.answers[reply.phase] = answer
+                show([parts[part] for part in sorted(parts)])
 
     def _on_state(self, state):
         if self.run is not None and state.run != self.run:
@@ -127,6 +132,7 @@ class Client:
         self.open_session()
         self.number += 1
         self.answers = {}
+        self.parts = {}
         self.run = None
         self.restarted = False
         message.request = request_t()
@@ -157,12 +163,13 @@ class Client:
             self.transport.handle(0.05)
 
 
-def show(answer):
-    reply = answer.reply
+def show(parts):
+    reply = parts[0].reply
     phase = {reply_header_t.ACCEPTED: "accepted", reply_header_t.REFUSED: "refused"}.get(reply.phase, reply.outcome)
     print(f"{phase}: {reply.reason}" if reply.reason else phase, flush=True)
-    for motor, outcome, position_steps in zip(answer.motors, answer.outcomes, answer.position_steps):
-        print(f"  {motor}: {outcome}, stands at {position_steps}", flush=True)
+    for answer in parts:
+        for motor, outcome, position_steps in zip(answer.motors, answer.outcomes, answer.position_steps):
+            print(f"  {motor}: {outcome}, stands at {position_steps}", flush=True)
 
 
 def main():
