@@ -95,7 +95,7 @@ typedef struct bushd_mcu {
   uint16_t direction;   // DIR levels of the slot_buffer prepared last
   uint16_t autonomous;  // motors that move by homing or local inputs
   uint16_t homed;
-  bushd_run_tick run_tick[BUSHD_TABLE_SLOTS];  // in the time unit of each table
+  bushd_run_tick run_tick[BUSHD_TABLE_SLOTS];  // in the terms of each table
   bushd_set_inputs inputs;                     // settings
   bushd_mcu_stream stream;
   bushd_mcu_reception reception;

@@ -49,16 +49,16 @@ static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   motor->displacement = (uint16_t)(displacement < 0 ? -displacement : displacement);
 }
 
-__attribute__((noinline)) static void make_run_tick(const bushd_mcu* mcu, uint32_t unit_ns,
+__attribute__((noinline)) static void make_run_tick(const bushd_mcu* mcu, const bushd_table* table,
                                                     bushd_run_tick* tick) {
-  *tick = bushd_run_tick_of(mcu->tick_ns, unit_ns, mcu->config.slots);
+  *tick = bushd_run_tick_of(mcu->tick_ns, table, mcu->config.slots);
 }
 
-// Divisions: in the first tick of a run at most, and where homing goes by a time unit of its own.
+// Divisions: in the first tick of a run at most, and where homing changes to its slow table.
 static inline const bushd_run_tick* run_tick_of(bushd_mcu* mcu, const bushd_mcu_motor* motor) {
-  const uint32_t unit_ns = motor->made.run.table->time_unit_ns;
+  const bushd_table* table = motor->made.run.table;
   bushd_run_tick* tick = &mcu->run_tick[motor->table];
-  if (tick->unit_ns != unit_ns || tick->tick_ns != mcu->tick_ns) make_run_tick(mcu, unit_ns, tick);
+  if (!bushd_run_tick_fits(tick, mcu->tick_ns, table)) make_run_tick(mcu, table, tick);
   return tick;
 }
 

@@ -63,7 +63,8 @@ static uint8_t share(uint32_t numerator, uint8_t low, uint32_t divisor) {
   return quotient;
 }
 
-bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, uint32_t unit_ns, uint16_t slot_count) {
+bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, const bushd_table* table, uint16_t slot_count) {
+  const uint32_t unit_ns = table->time_unit_ns;
   const uint32_t reciprocal = UINT32_MAX / tick_ns;
   const uint64_t unit_slots = (uint64_t)unit_ns * slot_count;
   bushd_run_tick tick;
@@ -72,16 +73,18 @@ bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, uint32_t unit_ns, uint16_t sl
   tick.units = tick_ns / unit_ns;
   tick.rest_ns = tick_ns % unit_ns;
   tick.slot_count = slot_count;
+  tick.cruise = table->cruise;
   tick.reciprocal = reciprocal < UINT16_MAX ? (uint16_t)reciprocal : UINT16_MAX;
   uint32_t q = tick_ns;
   for (uint16_t s = slot_count; ((q | s) & 1u) == 0; s = (uint16_t)(s >> 1)) q >>= 1;
   // The first step lies up to a unit beyond units - 1.
   tick.has_places = tick.units < UINT16_MAX && unit_ns < UINT32_MAX - UINT16_MAX &&
                     unit_slots >> 32 == 0 && tick.units + 1u + unit_ns < UINT32_MAX / q;
-  tick.per_unit = tick.per_ns = 0;
+  tick.per_unit = tick.per_ns = tick.per_cruise = 0;
   if (tick.has_places) {
     tick.per_unit = ((unit_slots << 32) + tick_ns - 1u) / tick_ns;
     tick.per_ns = ((uint64_t)slot_count << 32) / tick_ns;
+    tick.per_cruise = tick.per_unit * table->cruise;
   }
   return tick;
 }
@@ -152,9 +155,7 @@ static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_p
     run->accel_at = (uint16_t)(run->accel_at + made);
   } else if (run->cruise_left != 0) {
     const uint8_t left = part->left = at_most(run->cruise_left);
-    uint64_t rate = 0;
-    bushd_run_move_place(&rate, &tick->per_unit, part->delay);
-    part->rate = &rate;
+    part->rate = &tick->per_cruise;
     bushd_run_make_evenly(part);
     made = (uint8_t)(left - part->left);
     run->cruise_left -= made;
@@ -171,8 +172,10 @@ static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_p
 }
 
 // Preconditions: the first step is due, of `delay`; at the tick's end `since` units have passed.
-static int16_t make_by_places(bushd_run* run, const bushd_run_tick* tick, uint16_t since,
-                              uint16_t delay, uint16_t bit, uint16_t* masks) {
+// Not inlined, as the next one: in one function they would cost each other their registers.
+__attribute__((noinline)) static int16_t make_by_places(bushd_run* run, const bushd_run_tick* tick,
+                                                        uint16_t since, uint16_t delay,
+                                                        uint16_t bit, uint16_t* masks) {
   bushd_run_part part;
   part.place = 0;
   if (run->since_ns != 0) {
@@ -200,8 +203,9 @@ static int16_t make_by_places(bushd_run* run, const bushd_run_tick* tick, uint16
 }
 
 // The same, for all times: `since` may be beyond 16 bits.
-static int16_t make_by_rests(bushd_run* run, const bushd_run_tick* tick, uint32_t since,
-                             uint16_t delay, uint16_t bit, uint16_t* masks) {
+__attribute__((noinline)) static int16_t make_by_rests(bushd_run* run, const bushd_run_tick* tick,
+                                                       uint32_t since, uint16_t delay, uint16_t bit,
+                                                       uint16_t* masks) {
   const uint16_t slot_count = tick->slot_count;
   const scaled_ns unit_slots = (scaled_ns)tick->unit_ns * slot_count;
   scaled_ns rest = (scaled_ns)((delay - run->since) * tick->unit_ns - run->since_ns) * slot_count;
@@ -221,18 +225,20 @@ static int16_t make_by_rests(bushd_run* run, const bushd_run_tick* tick, uint32_
   return steps;
 }
 
+// A tick's rest that does not make whole units. Returns those that it makes with what has passed.
+static uint8_t carry_rest(bushd_run* run, const bushd_run_tick* tick, uint32_t* since_ns) {
+  *since_ns = run->since_ns + tick->rest_ns;
+  if (*since_ns >= tick->rest_ns && *since_ns < tick->unit_ns) return 0;
+  *since_ns -= tick->unit_ns;
+  return 1;
+}
+
 int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks) {
   const uint16_t delay = bushd_run_delay(run);
   if (delay == 0) return 0;
   uint32_t since = run->since + tick->units;
   uint32_t since_ns = run->since_ns;
-  if (tick->rest_ns != 0) {
-    since_ns += tick->rest_ns;
-    if (since_ns < tick->rest_ns || since_ns >= tick->unit_ns) {
-      since_ns -= tick->unit_ns;
-      ++since;
-    }
-  }
+  if (tick->rest_ns != 0) since += carry_rest(run, tick, &since_ns);
   int16_t steps = 0;
   if (since < delay) {
     run->since = since;
@@ -241,7 +247,7 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit
   } else {
     steps = make_by_rests(run, tick, since, delay, bit, masks);
   }
-  run->since_ns = since_ns;
+  if (tick->rest_ns != 0) run->since_ns = since_ns;
   return run->direction < 0 ? (int16_t)-steps : steps;
 }
 

@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-// A tick in the time units of a table. Made once for many ticks: it takes divisions.
+// A tick in the terms of a table. Made once for many ticks: it takes divisions.
 typedef struct bushd_run_tick {
   uint32_t tick_ns;
   uint32_t unit_ns;
@@ -23,11 +23,19 @@ typedef struct bushd_run_tick {
   // slot of every step exactly.
   uint64_t per_unit;
   uint64_t per_ns;
+  uint64_t per_cruise;  // in a delay of `cruise`
+  uint16_t cruise;
   bool has_places;
 } bushd_run_tick;
 //   slot_count  BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS
 // Precondition: tick_ns is at most BUSHD_MAX_TICK_NS.
-bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, uint32_t unit_ns, uint16_t slot_count);
+bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, const bushd_table* table, uint16_t slot_count);
+// Whether it is that of this table and length. O(1).
+static inline bool bushd_run_tick_fits(const bushd_run_tick* tick, uint32_t tick_ns,
+                                       const bushd_table* table) {
+  return tick->unit_ns == table->time_unit_ns && tick->cruise == table->cruise &&
+         tick->tick_ns == tick_ns;
+}
 
 // Makes the next tick of a run: sets `bit` in the masks of the slots floor(t x slot_count /
 // tick_ns) for the steps at the times t from the tick's start; one at exactly its end falls into
@@ -35,8 +43,8 @@ bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, uint32_t unit_ns, uint16_t sl
 // tick's end afterwards, as bushd_run_expand_coarse would leave it: ticks of both kinds may be
 // mixed.
 //   masks  slot_count entries
-// Precondition: as for bushd_run_expand_*; then no two steps share a slot. `tick` is of the unit of
-// the run's table. O(slots + steps), no division.
+// Precondition: as for bushd_run_expand_*; then no two steps share a slot. `tick` is of the
+// run's table. O(slots + steps), no division.
 int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks);
 
 // Steps of a tick that follow each other on one part of a run. A small MCU may link the four
