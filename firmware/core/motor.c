@@ -81,14 +81,18 @@ __attribute__((noinline)) static void emit_runs(bushd_mcu* mcu, bushd_slot_buffe
   const bool fine = mcu->format == BUSHD_FORMAT_FINE;
   bushd_mcu_motor* motor = mcu->motor;
   int16_t* steps = slot_buffer->steps;
+  const bushd_table* table = NULL;
+  const bushd_run_tick* tick = NULL;
   uint16_t forward = 0;
   uint16_t active = 0;
   uint16_t bit = 1;
   for (uint16_t left = exact; left != 0; left = (uint16_t)(left >> 1), ++motor, ++steps) {
     if ((left & 1u) != 0) {
       bushd_run* run = &motor->made.run;
-      const uint16_t mark = keep_slots ? bit : 0;
-      *steps = bushd_run_slots(run, run_tick_of(mcu, motor), mark, slot_buffer->step);
+      // Mostly motors share a table.
+      if (run->table != table) tick = run_tick_of(mcu, motor);
+      table = run->table;
+      *steps = bushd_run_slots(run, tick, keep_slots ? bit : 0, slot_buffer->step);
       if (run->direction > 0) forward |= bit;
       if (*steps != 0) active |= bit;
       if (fine) {
