@@ -95,8 +95,8 @@ typedef struct bushd_mcu {
   uint16_t direction;   // DIR levels of the slot_buffer prepared last
   uint16_t autonomous;  // motors that move by homing or local inputs
   uint16_t homed;
-  bushd_run_tick run_tick;  // for the runs' latest time unit
-  bushd_set_inputs inputs;  // settings
+  bushd_run_tick run_tick[BUSHD_TABLE_SLOTS];  // in the terms of each table
+  bushd_set_inputs inputs;                     // settings
   bushd_mcu_stream stream;
   bushd_mcu_reception reception;
   bushd_mcu_limits limits;

@@ -39,14 +39,6 @@ static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   return displacement;
 }
 
-static inline void set_direction(bushd_mcu* mcu, uint16_t bit, bool positive) {
-  if (positive) {
-    mcu->direction |= bit;
-  } else {
-    mcu->direction &= (uint16_t)~bit;
-  }
-}
-
 // By which stream_delay goes, in the fine format only.
 static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   if (displacement == 0) {
@@ -57,35 +49,70 @@ static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   motor->displacement = (uint16_t)(displacement < 0 ? -displacement : displacement);
 }
 
-// Sets `bit` in the masks of its steps, or none if the emission decides where they lie.
-static int16_t emit_exact(bushd_mcu* mcu, bushd_mcu_motor* motor, uint16_t bit, uint16_t* masks) {
+__attribute__((noinline)) static void make_run_tick(const bushd_mcu* mcu, const bushd_table* table,
+                                                    bushd_run_tick* tick) {
+  *tick = bushd_run_tick_of(mcu->tick_ns, table, mcu->config.slots);
+}
+
+// Divisions: in the first tick of a run at most, and where homing changes to its slow table.
+static inline const bushd_run_tick* run_tick_of(bushd_mcu* mcu, const bushd_mcu_motor* motor) {
+  const bushd_table* table = motor->made.run.table;
+  bushd_run_tick* tick = &mcu->run_tick[motor->table];
+  if (!bushd_run_tick_fits(tick, mcu->tick_ns, table)) make_run_tick(mcu, table, tick);
+  return tick;
+}
+
+// As ticks of the format would leave it, so that they can go on from here.
+static inline void note_fine(bushd_mcu_motor* motor, int16_t steps) {
   bushd_run* run = &motor->made.run;
-  set_direction(mcu, bit, run->direction > 0);
-  const uint32_t unit_ns = run->table->time_unit_ns;
-  if (mcu->run_tick.tick_ns != mcu->tick_ns || mcu->run_tick.unit_ns != unit_ns) {
-    mcu->run_tick = bushd_run_tick_of(mcu->tick_ns, unit_ns);
+  const int16_t before = motor->remainder;
+  bushd_run_note_fraction(run);
+  motor->remainder = (int16_t)(run->direction < 0 ? -run->fraction : run->fraction);
+  // Unsigned: an `int` of 16 bits does not hold every sum on the way.
+  const uint16_t whole = (uint16_t)((uint16_t)steps << 8);
+  note_speed(motor, (int16_t)(uint16_t)(whole + (uint16_t)motor->remainder - (uint16_t)before));
+}
+
+// Sets the motors' bits in the masks of their steps, or none if the emission decides where they
+// lie.
+__attribute__((noinline)) static void emit_runs(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer,
+                                                uint16_t exact) {
+  const bool keep_slots = bushd_mcu_steps_keep_slots(mcu);
+  const bool fine = mcu->format == BUSHD_FORMAT_FINE;
+  bushd_mcu_motor* motor = mcu->motor;
+  int16_t* steps = slot_buffer->steps;
+  const bushd_table* table = NULL;
+  const bushd_run_tick* tick = NULL;
+  uint16_t forward = 0;
+  uint16_t active = 0;
+  uint16_t bit = 1;
+  for (uint16_t left = exact; left != 0; left = (uint16_t)(left >> 1), ++motor, ++steps) {
+    if ((left & 1u) != 0) {
+      bushd_run* run = &motor->made.run;
+      // Mostly motors share a table.
+      if (run->table != table) tick = run_tick_of(mcu, motor);
+      table = run->table;
+      *steps = bushd_run_slots(run, tick, keep_slots ? bit : 0, slot_buffer->step);
+      if (run->direction > 0) forward |= bit;
+      if (*steps != 0) active |= bit;
+      if (fine) {
+        note_fine(motor, *steps);
+      } else {
+        motor->remainder = 0;
+      }
+      if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) end_run(mcu, motor);
+    }
+    bit = (uint16_t)(bit << 1);
   }
-  const uint16_t mark = bushd_mcu_steps_keep_slots(mcu) ? bit : 0;
-  const int16_t steps = bushd_run_slots(run, &mcu->run_tick, mcu->config.slots, mark, masks);
-  mcu->stream.begun |= bit;
-  // As ticks of the format would leave it, so that they can go on from here.
-  if (mcu->format == BUSHD_FORMAT_FINE) {
-    const int16_t before = motor->remainder;
-    bushd_run_note_fraction(run);
-    motor->remainder = (int16_t)(run->fraction * run->direction);
-    // Unsigned: an `int` of 16 bits does not hold every sum on the way.
-    const uint16_t whole = (uint16_t)((uint16_t)steps << 8);
-    note_speed(motor, (int16_t)(uint16_t)(whole + (uint16_t)motor->remainder - (uint16_t)before));
-  } else {
-    motor->remainder = 0;
-  }
-  if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) end_run(mcu, motor);
-  return steps;
+  mcu->direction = (mcu->direction & (uint16_t)~exact) | forward;
+  mcu->stream.begun |= exact;
+  slot_buffer->active |= active;
 }
 
 static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t tick) {
   if (motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)tick) {
     motor->mode = BUSHD_MCU_TABLE_RUN;
+    mcu->stream.queue_summary.stale = true;
   }
   if (motor->mode != BUSHD_MCU_TABLE_RUN) return false;
   if (ticks_after(tick, motor->made.until) < 0) return true;
@@ -99,12 +126,19 @@ void bushd_mcu_summarise_queue(bushd_mcu* mcu, uint32_t tick) {
   uint16_t plain = 0;
   uint16_t following = 0;
   uint16_t moves = 0;
+  uint16_t runs = 0;
   int32_t plain_ticks = INT32_MAX;
   int32_t moving_ticks = INT32_MAX;
+  int32_t run_ticks = INT32_MAX;
   uint16_t bit = 1;
   for (uint8_t m = 0; m < mcu->config.motors; ++m, bit = (uint16_t)(bit << 1)) {
     const bushd_mcu_motor* motor = &mcu->motor[m];
     const int32_t known_ticks = ticks_after(motor->known_until, tick);
+    if (motor->mode == BUSHD_MCU_TABLE_RUN) {
+      const int32_t ticks = ticks_after(motor->made.until, tick);
+      if (ticks > 0) runs |= bit;
+      if (ticks > 0 && ticks < run_ticks) run_ticks = ticks;
+    }
     if (known_ticks <= 0) {
       if (motor->mode == BUSHD_MCU_STREAM && motor->delay == 0) rests |= bit;
       continue;
@@ -127,6 +161,8 @@ void bushd_mcu_summarise_queue(bushd_mcu* mcu, uint32_t tick) {
   queue_summary->plain_until = tick + (uint32_t)plain_ticks;
   queue_summary->moves = moves;
   queue_summary->moving_until = tick + (uint32_t)moving_ticks;
+  queue_summary->runs = runs;
+  queue_summary->runs_until = tick + (uint32_t)run_ticks;
 }
 
 // Of motors that are to move on when their queued ticks end.
@@ -237,8 +273,10 @@ static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
   const uint32_t tick = mcu->tick + 1u;
   bushd_mcu_queue_summary* queue_summary = &mcu->stream.queue_summary;
   if (mcu->stream.starting != 0) forget_starts(mcu, tick);
-  if (queue_summary->stale || ticks_after(tick, queue_summary->plain_until) >= 0)
+  if (queue_summary->stale || ticks_after(tick, queue_summary->plain_until) >= 0 ||
+      (queue_summary->runs != 0 && ticks_after(tick, queue_summary->runs_until) >= 0)) {
     bushd_mcu_summarise_queue(mcu, tick);
+  }
   int16_t* const queued = bushd_mcu_queue_at(mcu, tick, 0);
   if (mcu->format == BUSHD_FORMAT_FINE) {
     bushd_mcu_take_fine_row(queued, values, mcu->config.motors, row);
@@ -247,9 +285,10 @@ static uint16_t find_row(bushd_mcu* mcu, int16_t* values, bushd_mcu_row* row) {
   }
   follow_begun(mcu, queue_summary->plain, row->moves, tick);
   if (queue_summary->rests != 0) stay_at_rest(mcu, queue_summary->rests, tick);
-  const uint16_t others =
-      bushd_mcu_own_motors(mcu) & (uint16_t) ~(queue_summary->plain | queue_summary->rests);
-  const uint16_t exact = others != 0 ? find_others(mcu, others, values, row) : (uint16_t)0;
+  uint16_t exact = queue_summary->runs & (uint16_t)~row->moves;
+  const uint16_t known = queue_summary->plain | queue_summary->rests | exact;
+  const uint16_t others = bushd_mcu_own_motors(mcu) & (uint16_t)~known;
+  if (others != 0) exact |= find_others(mcu, others, values, row);
   watch_low_water(mcu);
   return exact;
 }
@@ -271,6 +310,15 @@ __attribute__((noinline)) static void plan_fine(bushd_mcu* mcu, bushd_slot_buffe
   bushd_slots_fill(slot_buffer->step, mcu->config.slots, plans, mcu->config.motors);
 }
 
+// Where nothing moves but what is in a run.
+__attribute__((noinline)) static void rest_fine(bushd_mcu* mcu, int16_t* steps, uint16_t exact) {
+  bushd_mcu_motor* motor = mcu->motor;
+  for (uint8_t m = mcu->config.motors; m > 0; --m, ++motor, exact = (uint16_t)(exact >> 1)) {
+    if ((exact & 1u) == 0) note_speed(motor, 0);
+    *steps++ = 0;
+  }
+}
+
 // Returns the motors whose steps are those of a run, and still to be made.
 static uint16_t plan(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   const bool fine = mcu->format == BUSHD_FORMAT_FINE;
@@ -280,9 +328,15 @@ static uint16_t plan(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   mcu->direction = (mcu->direction & (uint16_t)~row.moves) | (row.moves & (uint16_t)~row.back);
   // The masks of a slot_buffer without steps are 0 already.
   const bool has_masks = slot_buffer->active != 0 || slot_buffer->outputs == BUSHD_OUTPUTS_LEVELS;
-  const bool fills = bushd_mcu_steps_keep_slots(mcu) && (has_masks || row.moves != 0);
+  const bool keep_slots = bushd_mcu_steps_keep_slots(mcu);
+  const bool fills = keep_slots && row.moves != 0;
+  if (keep_slots && has_masks && !fills) {
+    bushd_slots_clear(slot_buffer->step, mcu->config.slots);
+  }
   slot_buffer->active = row.moves;
-  if (fine) {
+  if (fine && row.moves == 0) {
+    rest_fine(mcu, slot_buffer->steps, exact);
+  } else if (fine) {
     plan_fine(mcu, slot_buffer, displacement, exact, fills);
   } else if (fills) {
     bushd_slots_fill_evenly(slot_buffer->step, mcu->config.slots, slot_buffer->steps,
@@ -292,12 +346,8 @@ static uint16_t plan(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
 }
 
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
-  uint16_t exact = plan(mcu, slot_buffer);
-  for (uint8_t m = 0; exact != 0; ++m, exact = (uint16_t)(exact >> 1)) {
-    if ((exact & 1u) == 0) continue;
-    slot_buffer->steps[m] = emit_exact(mcu, &mcu->motor[m], motor_bit(m), slot_buffer->step);
-    if (slot_buffer->steps[m] != 0) slot_buffer->active |= motor_bit(m);
-  }
+  const uint16_t exact = plan(mcu, slot_buffer);
+  if (exact != 0) emit_runs(mcu, slot_buffer, exact);
   slot_buffer->direction = mcu->direction;
   slot_buffer->outputs = BUSHD_OUTPUTS_PULSES;
   slot_buffer->compare_rise = slot_buffer->compare_fall = 0;

@@ -18,6 +18,8 @@ typedef struct bushd_mcu_queue_summary {
   uint32_t plain_until;   // that tick
   uint16_t moves;         // these are to move on when their ticks end, the first of them at:
   uint32_t moving_until;  // that tick
+  uint16_t runs;          // these are in a table run, until:
+  uint32_t runs_until;    // that tick
   uint16_t
       following;  // those that are plain and move on at plain_until, without an out-of-order range
 } bushd_mcu_queue_summary;

@@ -72,6 +72,7 @@ void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   // It was cut, or does so already.
   if (motor->mode == BUSHD_MCU_STREAM || motor->mode == BUSHD_MCU_RAMP_DOWN) return;
+  mcu->stream.queue_summary.stale = true;
   bushd_run_ramp_down(&motor->made.run);
   motor->mode = bushd_run_done(&motor->made.run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
 }

@@ -1,5 +1,14 @@
 // Times are counted in whole units and a rest of ns, as everywhere in a run; only what lies within
-// the tick is turned into slots. With t the time of a step in ns from the tick's start,
+// the tick is turned into slots. With T units and -since_ns ns from the tick's start to a step, its
+// place is
+//
+//     T x per_unit - since_ns x per_ns    in slots x 2^32
+//
+// per_unit is rounded up and per_ns down, so a place is never before the step, and after it by less
+// than T + since_ns. The slots to a step are a multiple of 1 / q, where q is tick_ns / S without
+// its common factors of two. So if 2^32 is more than q times that, no border of a slot lies
+// between step and place: it tells the slot exactly (has_places). Otherwise, with t the time of a
+// step in ns from the tick's start,
 //
 //     t x slot_count  =  slot x tick_ns + rest,   0 <= rest < tick_ns
 //
@@ -54,47 +63,198 @@ static uint8_t share(uint32_t numerator, uint8_t low, uint32_t divisor) {
   return quotient;
 }
 
-bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, uint32_t unit_ns) {
+bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, const bushd_table* table, uint16_t slot_count) {
+  const uint32_t unit_ns = table->time_unit_ns;
   const uint32_t reciprocal = UINT32_MAX / tick_ns;
-  const bushd_run_tick tick = {tick_ns, unit_ns, tick_ns / unit_ns, tick_ns % unit_ns,
-                               reciprocal < UINT16_MAX ? (uint16_t)reciprocal : UINT16_MAX};
+  const uint64_t unit_slots = (uint64_t)unit_ns * slot_count;
+  bushd_run_tick tick;
+  tick.tick_ns = tick_ns;
+  tick.unit_ns = unit_ns;
+  tick.units = tick_ns / unit_ns;
+  tick.rest_ns = tick_ns % unit_ns;
+  tick.slot_count = slot_count;
+  tick.cruise = table->cruise;
+  tick.reciprocal = reciprocal < UINT16_MAX ? (uint16_t)reciprocal : UINT16_MAX;
+  uint32_t q = tick_ns;
+  for (uint16_t s = slot_count; ((q | s) & 1u) == 0; s = (uint16_t)(s >> 1)) q >>= 1;
+  // The first step lies up to a unit beyond units - 1.
+  tick.has_places = tick.units < UINT16_MAX && unit_ns < UINT32_MAX - UINT16_MAX &&
+                    unit_slots >> 32 == 0 && tick.units + 1u + unit_ns < UINT32_MAX / q;
+  tick.per_unit = tick.per_ns = tick.per_cruise = 0;
+  if (tick.has_places) {
+    tick.per_unit = ((unit_slots << 32) + tick_ns - 1u) / tick_ns;
+    tick.per_ns = ((uint64_t)slot_count << 32) / tick_ns;
+    tick.per_cruise = tick.per_unit * table->cruise;
+  }
   return tick;
 }
 
-int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t slot_count,
-                        uint16_t bit, uint16_t* masks) {
-  uint16_t delay = bushd_run_delay(run);
-  if (delay == 0) return 0;
-  uint32_t since = run->since + tick->units;
-  uint32_t since_ns = run->since_ns + tick->rest_ns;
-  if (since_ns < tick->rest_ns || since_ns >= tick->unit_ns) {
-    since_ns -= tick->unit_ns;
-    ++since;
-  }
-  int16_t steps = 0;
-  if (since >= delay) {
-    const scaled_ns unit_slots = (scaled_ns)tick->unit_ns * slot_count;
-    scaled_ns rest = (scaled_ns)((delay - run->since) * tick->unit_ns - run->since_ns) * slot_count;
-    uint16_t slot = 0;
-    while (true) {
-      slot = (uint16_t)(slot + whole_slots(&rest, tick));
-      masks[slot < slot_count ? slot : slot_count - 1u] |= bit;
-      ++steps;
-      make_step(run);
-      since -= delay;
-      delay = bushd_run_delay(run);
-      if (delay == 0 || since < delay) break;
-      rest += (scaled_ns)delay * unit_slots;
+#ifndef BUSHD_OWN_RUN_PARTS
+void bushd_run_move_place(uint64_t* place, const uint64_t* rate, uint16_t times) {
+  *place += *rate * times;
+}
+
+uint8_t bushd_run_share(uint16_t numerator, uint8_t low, uint16_t divisor) {
+  uint8_t quotient = 0;
+  for (uint8_t bit = 0x80; bit != 0; bit = (uint8_t)(bit >> 1)) {
+    const bool carry = numerator >> 15 != 0;
+    numerator = (uint16_t)(numerator << 1 | ((low & bit) != 0));
+    if (carry || numerator >= divisor) {
+      numerator = (uint16_t)(numerator - divisor);
+      quotient |= bit;
     }
   }
+  return quotient;
+}
+
+static inline void make_due(bushd_run_part* part) {
+  const uint16_t slot = (uint16_t)(part->place >> 32);
+  part->masks[slot < part->last_slot ? slot : part->last_slot] |= part->bit;
+  part->since = (uint16_t)(part->since - part->delay);
+  --part->left;
+}
+
+void bushd_run_make_on_side(bushd_run_part* part, bool down) {
+  while (true) {
+    make_due(part);
+    if (part->left == 0) return;
+    part->delay = down ? *--part->code : *++part->code;
+    if (part->since < part->delay) return;
+    part->place += *part->rate * part->delay;
+  }
+}
+
+void bushd_run_make_evenly(bushd_run_part* part) {
+  while (true) {
+    make_due(part);
+    if (part->left == 0 || part->since < part->delay) return;
+    part->place += *part->rate;
+  }
+}
+#endif
+
+static inline uint8_t at_most(uint32_t steps) {
+  return steps < UINT8_MAX ? (uint8_t)steps : UINT8_MAX;
+}
+
+// Of the part that the step which is due belongs to. Returns how many were made; a tick has fewer
+// than a byte holds.
+static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_part* part) {
+  const bushd_table* table = run->table;
+  uint8_t made = 1;
+  if (run->lead_delay != 0) {
+    part->left = 1;
+    bushd_run_make_evenly(part);
+    run->lead_delay = 0;
+  } else if (run->accel_at < run->accel_end) {
+    const uint8_t left = part->left = at_most((uint32_t)(run->accel_end - run->accel_at));
+    part->code = &table->accel.code[run->accel_at];
+    part->rate = &tick->per_unit;
+    bushd_run_make_on_side(part, false);
+    made = (uint8_t)(left - part->left);
+    run->accel_at = (uint16_t)(run->accel_at + made);
+  } else if (run->cruise_left != 0) {
+    const uint8_t left = part->left = at_most(run->cruise_left);
+    part->rate = &tick->per_cruise;
+    bushd_run_make_evenly(part);
+    made = (uint8_t)(left - part->left);
+    run->cruise_left -= made;
+  } else {
+    const uint8_t left = part->left = at_most(run->decel_left);
+    part->code = &table->decel.code[run->decel_left - 1u];
+    part->rate = &tick->per_unit;
+    bushd_run_make_on_side(part, true);
+    made = (uint8_t)(left - part->left);
+    run->decel_left = (uint16_t)(run->decel_left - made);
+  }
+  bushd_run_count(run, made);
+  return made;
+}
+
+// Preconditions: the first step is due, of `delay`; at the tick's end `since` units have passed.
+// Not inlined, as the next one: in one function they would cost each other their registers.
+__attribute__((noinline)) static int16_t make_by_places(bushd_run* run, const bushd_run_tick* tick,
+                                                        uint16_t since, uint16_t delay,
+                                                        uint16_t bit, uint16_t* masks) {
+  bushd_run_part part;
+  part.place = 0;
+  if (run->since_ns != 0) {
+    uint64_t high = 0;
+    bushd_run_move_place(&part.place, &tick->per_ns, (uint16_t)run->since_ns);
+    bushd_run_move_place(&high, &tick->per_ns, (uint16_t)(run->since_ns >> 16));
+    part.place = 0 - (part.place + (high << 16));
+  }
+  bushd_run_move_place(&part.place, &tick->per_unit, (uint16_t)(delay - run->since));
+  part.masks = masks;
+  part.bit = bit;
+  part.last_slot = (uint16_t)(tick->slot_count - 1u);
+  part.since = since;
+  part.delay = delay;
+  int16_t steps = 0;
+  while (true) {
+    steps = (int16_t)(steps + make_part(run, tick, &part));
+    if (part.left != 0) break;
+    part.delay = bushd_run_delay(run);
+    if (part.delay == 0 || part.since < part.delay) break;
+    bushd_run_move_place(&part.place, &tick->per_unit, part.delay);
+  }
+  run->since = part.since;
+  return steps;
+}
+
+// The same, for all times: `since` may be beyond 16 bits.
+__attribute__((noinline)) static int16_t make_by_rests(bushd_run* run, const bushd_run_tick* tick,
+                                                       uint32_t since, uint16_t delay, uint16_t bit,
+                                                       uint16_t* masks) {
+  const uint16_t slot_count = tick->slot_count;
+  const scaled_ns unit_slots = (scaled_ns)tick->unit_ns * slot_count;
+  scaled_ns rest = (scaled_ns)((delay - run->since) * tick->unit_ns - run->since_ns) * slot_count;
+  int16_t steps = 0;
+  uint16_t slot = 0;
+  while (true) {
+    slot = (uint16_t)(slot + whole_slots(&rest, tick));
+    masks[slot < slot_count ? slot : slot_count - 1u] |= bit;
+    ++steps;
+    make_step(run);
+    since -= delay;
+    delay = bushd_run_delay(run);
+    if (delay == 0 || since < delay) break;
+    rest += (scaled_ns)delay * unit_slots;
+  }
   run->since = since;
-  run->since_ns = since_ns;
-  return (int16_t)(steps * run->direction);
+  return steps;
+}
+
+// A tick's rest that does not make whole units. Returns those that it makes with what has passed.
+static uint8_t carry_rest(bushd_run* run, const bushd_run_tick* tick, uint32_t* since_ns) {
+  *since_ns = run->since_ns + tick->rest_ns;
+  if (*since_ns >= tick->rest_ns && *since_ns < tick->unit_ns) return 0;
+  *since_ns -= tick->unit_ns;
+  return 1;
+}
+
+int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks) {
+  const uint16_t delay = bushd_run_delay(run);
+  if (delay == 0) return 0;
+  uint32_t since = run->since + tick->units;
+  uint32_t since_ns = run->since_ns;
+  if (tick->rest_ns != 0) since += carry_rest(run, tick, &since_ns);
+  int16_t steps = 0;
+  if (since < delay) {
+    run->since = since;
+  } else if (tick->has_places && since <= UINT16_MAX) {
+    steps = make_by_places(run, tick, (uint16_t)since, delay, bit, masks);
+  } else {
+    steps = make_by_rests(run, tick, since, delay, bit, masks);
+  }
+  if (tick->rest_ns != 0) run->since_ns = since_ns;
+  return run->direction < 0 ? (int16_t)-steps : steps;
 }
 
 void bushd_run_note_fraction(bushd_run* run) {
   const uint16_t delay = bushd_run_delay(run);
-  const uint32_t unit_ns = run->table->time_unit_ns;
-  run->fraction =
-      delay == 0 ? (uint8_t)0 : share(run->since, share(run->since_ns, 0, unit_ns), delay);
+  uint8_t low = 0;
+  if (run->since_ns != 0) low = share(run->since_ns, 0, run->table->time_unit_ns);
+  // Less than the delay, since the step that runs is not over.
+  run->fraction = delay == 0 ? (uint8_t)0 : bushd_run_share((uint16_t)run->since, low, delay);
 }

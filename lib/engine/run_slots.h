@@ -2,6 +2,7 @@
 #ifndef BUSHD_ENGINE_RUN_SLOTS_H
 #define BUSHD_ENGINE_RUN_SLOTS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "engine/run.h"
@@ -10,26 +11,65 @@
 extern "C" {
 #endif
 
-// A tick in the time units of a table. Made once for many ticks: it takes divisions.
+// A tick in the terms of a table. Made once for many ticks: it takes divisions.
 typedef struct bushd_run_tick {
   uint32_t tick_ns;
   uint32_t unit_ns;
   uint32_t units;
   uint32_t rest_ns;
+  uint16_t slot_count;
   uint16_t reciprocal;  // of tick_ns, x 2^32
+  // Slots in a unit, rounded up, and in a ns, rounded down, x 2^32. `has_places`: they tell the
+  // slot of every step exactly.
+  uint64_t per_unit;
+  uint64_t per_ns;
+  uint64_t per_cruise;  // in a delay of `cruise`
+  uint16_t cruise;
+  bool has_places;
 } bushd_run_tick;
-bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, uint32_t unit_ns);
+//   slot_count  BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS
+// Precondition: tick_ns is at most BUSHD_MAX_TICK_NS.
+bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, const bushd_table* table, uint16_t slot_count);
+// Whether it is that of this table and length. O(1).
+static inline bool bushd_run_tick_fits(const bushd_run_tick* tick, uint32_t tick_ns,
+                                       const bushd_table* table) {
+  return tick->unit_ns == table->time_unit_ns && tick->cruise == table->cruise &&
+         tick->tick_ns == tick_ns;
+}
 
 // Makes the next tick of a run: sets `bit` in the masks of the slots floor(t x slot_count /
 // tick_ns) for the steps at the times t from the tick's start; one at exactly its end falls into
 // its last slot. Returns the signed number of steps, 0 when the run is done. The run stands at the
 // tick's end afterwards, as bushd_run_expand_coarse would leave it: ticks of both kinds may be
 // mixed.
-//   masks  slot_count entries (BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS)
-// Precondition: as for bushd_run_expand_*; then no two steps share a slot. `tick` is of the unit of
-// the run's table and at most BUSHD_MAX_TICK_NS. O(slots + steps), no division.
-int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t slot_count,
-                        uint16_t bit, uint16_t* masks);
+//   masks  slot_count entries
+// Precondition: as for bushd_run_expand_*; then no two steps share a slot. `tick` is of the
+// run's table. O(slots + steps), no division.
+int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks);
+
+// Steps of a tick that follow each other on one part of a run. A small MCU may link the four
+// functions of its own (BUSHD_OWN_RUN_PARTS).
+typedef struct bushd_run_part {
+  uint64_t place;        // of the step that is due, in slots from the tick's start x 2^32
+  const uint64_t* rate;  // places in a unit
+  const uint16_t* code;  // its delay, on a side
+  uint16_t* masks;
+  uint16_t bit;
+  uint16_t last_slot;
+  uint16_t since;  // units from the step before it to the tick's end
+  uint16_t delay;  // <= since
+  uint8_t left;    // steps of the part, at least this one
+} bushd_run_part;
+// *place += times x *rate, modulo 2^40 at least.
+void bushd_run_move_place(uint64_t* place, const uint64_t* rate, uint16_t times);
+// Makes the step that is due and those that follow it within the tick and the part. Along a side of
+// the table, towards its fast end or `down` from there, or with the same delay, of which `rate`
+// then is the whole.
+void bushd_run_make_on_side(bushd_run_part* part, bool down);
+void bushd_run_make_evenly(bushd_run_part* part);
+// 256 numerator / divisor with the bits of `low` behind the numerator's, rounded down.
+// Precondition: numerator < divisor.
+uint8_t bushd_run_share(uint16_t numerator, uint8_t low, uint16_t divisor);
 
 // Makes the run's fraction what bushd_run_expand_fine would have left, so that ticks of that kind
 // may follow. Precondition: it stands at the end of a tick made by bushd_run_slots. No division.

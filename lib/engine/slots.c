@@ -47,6 +47,12 @@ static void fill(uint16_t* masks, uint16_t slot_count, uint16_t bit, const bushd
   }
 }
 
+#ifndef BUSHD_OWN_SLOTS_CLEAR
+void bushd_slots_clear(uint16_t* masks, uint16_t slot_count) {
+  memset(masks, 0, slot_count * sizeof masks[0]);
+}
+#endif
+
 #ifndef BUSHD_OWN_SLOTS_FILL
 void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* plans,
                       uint8_t motors) {

@@ -56,6 +56,9 @@ void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* p
 void bushd_slots_fill_evenly(uint16_t* masks, uint16_t slot_count, const int16_t* steps,
                              uint8_t motors);
 
+// No step in any slot. BUSHD_OWN_SLOTS_CLEAR.
+void bushd_slots_clear(uint16_t* masks, uint16_t slot_count);
+
 // The coarse byte as a fine displacement: steps x 256, signed by bit 7.
 static inline int16_t bushd_coarse_to_fine(uint8_t coarse) {
   const uint8_t steps = coarse & 0x7F;

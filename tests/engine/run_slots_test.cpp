@@ -15,8 +15,8 @@ struct Emitted {
 
 Emitted emit(bushd_run* run, uint32_t tick_ns, uint16_t slots, uint16_t bit) {
   Emitted tick{std::vector<uint16_t>(slots), 0};
-  const bushd_run_tick length = bushd_run_tick_of(tick_ns, run->table->time_unit_ns);
-  tick.steps = bushd_run_slots(run, &length, slots, bit, tick.masks.data());
+  const bushd_run_tick length = bushd_run_tick_of(tick_ns, run->table, slots);
+  tick.steps = bushd_run_slots(run, &length, bit, tick.masks.data());
   bushd_run_note_fraction(run);
   return tick;
 }
@@ -106,13 +106,13 @@ TEST(RunSlots, MotorsShareMasksAndADoneRunMakesNothing) {
   const TestTable table({{4}, {4}, 4, 1000}, false);
   bushd_run run;
   bushd_run_start(&run, table.view(), 2, 1);
-  const bushd_run_tick tick = bushd_run_tick_of(8000, 1000);
+  const bushd_run_tick tick = bushd_run_tick_of(8000, table.view(), 128);
   std::vector<uint16_t> masks(128, 0x8000);
-  EXPECT_EQ(bushd_run_slots(&run, &tick, 128, 1, masks.data()), 2);
+  EXPECT_EQ(bushd_run_slots(&run, &tick, 1, masks.data()), 2);
   for (size_t slot = 0; slot < 128; ++slot) {
     EXPECT_EQ(masks[slot], slot == 64 || slot == 127 ? 0x8001 : 0x8000) << slot;
   }
-  EXPECT_EQ(bushd_run_slots(&run, &tick, 128, 1, masks.data()), 0);
+  EXPECT_EQ(bushd_run_slots(&run, &tick, 1, masks.data()), 0);
 }
 
 }  // namespace

@@ -84,11 +84,21 @@ static inline bool has_reply(void) {
   return TIMSK3 != 0 || is_sending();
 }
 
+// Of the buffer. What others answer finds room before an answer that waits. A master that speaks
+// then waits for it no more: it gives way as soon as the frame needs its place.
+static uint16_t room_for(const bushd_receiver* receiver, uint8_t more) {
+  if (!has_reply()) return sizeof receiver->buffer;
+  const bool fits = receiver->size + more <= LINE_REPLY_AT || receiver->size > LINE_REPLY_AT;
+  if (fits || (receiver->buffer[2] & BUSHD_TYPE_REPLY) != 0) return LINE_REPLY_AT;
+  TIMSK3 = 0;
+  return is_sending() ? LINE_REPLY_AT : sizeof receiver->buffer;
+}
+
 static void collect(bushd_receiver* receiver) {
   uint8_t out = LINE_OUT;
   uint8_t left = (uint8_t)(LINE_IN - out);
   if (left > CHECK_BYTES) left = CHECK_BYTES;
-  const uint16_t room = has_reply() ? LINE_REPLY_AT : sizeof receiver->buffer;
+  const uint16_t room = room_for(receiver, left);
   if (left != 0 && receiver->size + left <= room) {
     uint8_t* to = receiver->buffer + receiver->size;
     out = line_decode(&to, &receiver->run, out, left);

@@ -11,7 +11,7 @@
 void line_init(void);
 
 // Where answers are made: at the end of the receiver's buffer, which has no need of it meanwhile.
-// What a master sends before an answer's time must be short, or counts as a bad frame.
+// If a master sends before an answer's time, the answer is given up for the frame.
 #define LINE_REPLY_AT (BUSHD_FRAME_MAX_RAW + 1u - BUSHD_MCU_MAX_REPLY)
 uint8_t* line_reply(bushd_receiver* receiver);
 

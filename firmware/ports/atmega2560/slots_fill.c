@@ -6,6 +6,7 @@
 // T is counted down by 2d a slot, modulo 2^16, and borrows are steps.
 #include "engine/slots.h"
 #include "firmware/ports/atmega2560/emission.h"
+#include "firmware/ports/atmega2560/run_parts.h"
 
 typedef struct slots_phase {
   uint16_t phase;
@@ -42,6 +43,14 @@ static void fill_fine(uint8_t* masks, const bushd_slots* plans) {
 
 static void clear(uint8_t* masks) {
   for (uint8_t slot = EMISSION_SLOTS; slot > 0; --slot, masks += 2) *masks = 0;
+}
+
+void bushd_slots_clear(uint16_t* masks, uint16_t slot_count) {
+  (void)slot_count;
+  for (uint8_t eights = EMISSION_SLOTS / 8; eights > 0; --eights, masks += 8) {
+    masks[0] = masks[1] = masks[2] = masks[3] = 0;
+    masks[4] = masks[5] = masks[6] = masks[7] = 0;
+  }
 }
 
 void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* plans,
