@@ -39,12 +39,12 @@ class DaemonRun {
   void carry_out_some();
   bool idle() const { return reception_.idle(); }
   void step();
+  // What the core has said.
+  void hear();
   // Messages that it could not use.
   std::uint64_t dropped() const { return front_.dropped(); }
 
  private:
-  void hear();
-
   Ears ears_;
   std::string prefix_;  // of channels
   std::unique_ptr<bushd::lcm::Transport> transport_;

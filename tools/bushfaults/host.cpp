@@ -116,6 +116,7 @@ void Host::run(TimeNs now_ns) {
   if (!due) return;
   deliver();
   for (const auto& told : std::exchange(disk_, {})) told();
+  daemon_->hear();
   while (!messages_.empty()) {
     const Message message = std::move(messages_.front());
     messages_.pop_front();

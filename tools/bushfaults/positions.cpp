@@ -103,9 +103,12 @@ void Positions::homed(std::size_t index, std::int64_t position_steps) {
 std::optional<std::string> Positions::was_homed(std::size_t index, std::int64_t position_steps) {
   Motor& motor = motors_[index];
   if (!motor.perhaps_homed) return std::nullopt;  // it has been set since
-  const bool seen = motor.offset && std::abs(*motor.offset - *motor.home_offset) <= kHomeSteps;
-  if (!seen) homed(index, position_steps);
-  if (seen || motor.offset == plant_steps(index) - position_steps) return std::nullopt;
+  // Not the offset of before: an MCU that says so may not have set its counter.
+  const auto is_home = [&motor] {
+    return motor.offset && std::abs(*motor.offset - *motor.home_offset) <= kHomeSteps;
+  };
+  if (!is_home()) homed(index, position_steps);
+  if (is_home()) return std::nullopt;
   return fmt::format("{} is said to be homed at {}, and would be at {} by its switch",
                      config_.motors[index].name, position_steps,
                      plant_steps(index) - *motor.home_offset);
