@@ -18,6 +18,7 @@
 #include "api/session.h"
 #include "base/result.h"
 #include "control/packet.h"
+#include "control/pid_lock.h"
 
 namespace bushd::control {
 
@@ -78,7 +79,7 @@ class Server {
     bool doomed = false;
   };
 
-  Server(std::string path, int lock, int listener, int epoll, Limits limits);
+  Server(std::string path, PidLock lock, int listener, int epoll, Limits limits);
   void accept_all();
   void accept_one(int fd);
   // Returns whether the connection may go on.
@@ -89,7 +90,7 @@ class Server {
   void watch(Connection connection, const Peer& peer, int operation) const;
 
   std::string path_;
-  int lock_;
+  PidLock lock_;
   int listener_;
   int epoll_;
   int spare_;  // given up for a moment to turn a connection away when there are no descriptors left
