@@ -30,4 +30,8 @@ function(bushd_program name)
   add_executable(${name} ${ARGN})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/lib ${PROJECT_SOURCE_DIR})
   bushd_target(${name})
+  # What the program answers to --version; of this file alone, for a new one is another version of
+  # nothing else.
+  set_property(SOURCE main.cpp APPEND PROPERTY
+    COMPILE_DEFINITIONS BUSHD_VERSION="${PROJECT_VERSION}")
 endfunction()

@@ -23,6 +23,7 @@ class Confirmation {
   using Check = std::function<Result<void>(const Mcu&)>;
   std::optional<Result<void>> follow(std::int64_t now_us, const Mcu* reported,
                                      const Installation& installation, const Check& check);
+  const api::Asker& asker() const { return asker_; }
   // Tells who asked.
   void answer(const Result<void>& ended) const;
 

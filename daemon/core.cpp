@@ -20,7 +20,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       emergency_stop_(installation_, interlocks_, homing_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
-      positions_(installation_, interlocks_, journal_),
+      positions_(installation_, interlocks_, journal_, outputs),
       trigger_(installation_, interlocks_, moves_, open_moves_),
       position_compare_(installation_),
       state_(installation_, outputs),

@@ -1,5 +1,6 @@
 #include "daemon/event_loop.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/epoll.h>
 #include <sys/resource.h>
@@ -154,7 +155,7 @@ Result<void> EventLoop::keep_watching(int fd, Handler handler) {
 }
 
 Result<void> EventLoop::set_up_signals() {
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2}) {
     sources_.push_back(std::make_unique<Source>(
         [this, signal](std::uint32_t) { handle_signal(now_us(), signal); }));
     if (const int error = sources_.back()->watch_signal(event_, signal); error < 0) {
@@ -219,6 +220,7 @@ Result<void> EventLoop::run() {
                                      (socket_front_ ? socket_front_->dropped() : 0));
     core_.keep_up(now);
     check_published();
+    for (const std::string& line : log_limit_.due(now)) spdlog::warn("{}", line);
     if (shut_down_by_us_ && (core_.at_rest() || now >= *shut_down_by_us_)) break;
     if (const auto handled = handle_sources(); !handled) return handled;
     carry_out_some();
@@ -272,16 +274,18 @@ void EventLoop::open_port(std::int64_t now, BusId bus) {
   if (!opened || !watched) {
     const std::string error = opened ? watched.error().text() : opened.error().text();
     if (error != port.last_error) {
-      spdlog::error("bus {}: {}; trying again twice a second", config.name, error);
+      log(LogLevel::kError,
+          fmt::format("bus {}: {}; trying again twice a second", config.name, error));
       port.last_error = error;
-      core_.port_lost(now, bus, "is out of reach: port " + error);
+      core_.port_lost(now, bus, "port " + error);
     }
     return;
   }
   port.serial = std::move(*opened);
   port.source = std::move(*watched);
   port.last_error.clear();
-  spdlog::info("bus {}: port {} opened at {} baud", config.name, port.serial->path(), config.baud);
+  log(LogLevel::kInfo, fmt::format("bus {}: port {} opened at {} baud", config.name,
+                                   port.serial->path(), config.baud));
   core_.port_opened(now, bus);
 }
 
@@ -294,8 +298,9 @@ void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause)
   port.serial.reset();
   port.open_due_us = now + kReopenUs;
   port.last_error = path + ": " + cause;
-  spdlog::error("bus {}: port {} lost: {}; trying again twice a second", config.name, path, cause);
-  core_.port_lost(now, bus, "is out of reach: port " + port.last_error);
+  log(LogLevel::kError, fmt::format("bus {}: port {} lost: {}; trying again twice a second",
+                                    config.name, path, cause));
+  core_.port_lost(now, bus, "port " + port.last_error);
 }
 
 // What is lost is given up in the loop: its source cannot go while it is being handled.
@@ -318,6 +323,10 @@ void EventLoop::handle_port(std::int64_t now, BusId bus, std::uint32_t events) {
 }
 
 void EventLoop::handle_signal(std::int64_t now, int signal) {
+  if (signal == SIGUSR1 || signal == SIGUSR2) {
+    log(LogLevel::kInfo, fmt::format("{}: ignored", signal == SIGUSR1 ? "SIGUSR1" : "SIGUSR2"));
+    return;
+  }
   if (shut_down_by_us_) return;
   if (signal == SIGHUP) {
     spdlog::info("SIGHUP: all tables are read again");
@@ -433,21 +442,35 @@ void EventLoop::check_published() {
 
 void EventLoop::move_log(const std::string& json_line) {
   if (move_log_ == nullptr) return;
-  if (const auto written = move_log_->append(json_line); !written) {
-    spdlog::error("log of moves: {}", written.error().text());
+  const auto appended = move_log_->append(json_line);
+  if (!appended) {
+    // Once, and how many when it is over: not a line of this log for each of that one.
+    if (++lost_move_lines_ == 1) {
+      log(LogLevel::kError, "log of moves: " + appended.error().text());
+    }
+    return;
+  }
+  if (*appended == MoveLog::Appended::kAnew) {
+    log(LogLevel::kWarning, "log of moves: its file was removed or renamed; a new one is begun");
+  }
+  if (const std::uint64_t lost = std::exchange(lost_move_lines_, 0); lost > 0) {
+    log(LogLevel::kWarning,
+        fmt::format("log of moves: is written again; {} lines were lost", lost));
   }
 }
 
 void EventLoop::log(LogLevel level, const std::string& text) {
+  const auto line = log_limit_.take(now_us(), text);
+  if (!line) return;
   switch (level) {
     case LogLevel::kInfo:
-      spdlog::info(text);
+      spdlog::info("{}", *line);
       break;
     case LogLevel::kWarning:
-      spdlog::warn(text);
+      spdlog::warn("{}", *line);
       break;
     case LogLevel::kError:
-      spdlog::error(text);
+      spdlog::error("{}", *line);
       break;
   }
 }

@@ -16,6 +16,7 @@
 #include "control/server.h"
 #include "daemon/core.h"
 #include "daemon/lcm_front.h"
+#include "daemon/log_limit.h"
 #include "daemon/move_log.h"
 #include "daemon/publishing.h"
 #include "daemon/reception.h"
@@ -41,8 +42,9 @@ class EventLoop : private Outputs {
   EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_log, TableLibrary library);
   ~EventLoop() override;
 
-  // Runs until SIGTERM or SIGINT, then ramps all motors down and returns. Precondition: both
-  // signals are blocked in every thread of the process (lcm::Transport starts some).
+  // Runs until SIGTERM or SIGINT, then ramps all motors down and returns. Precondition: these,
+  // SIGHUP, SIGUSR1 and SIGUSR2 are blocked in every thread of the process (lcm::Transport starts
+  // some).
   Result<void> run();
 
  private:
@@ -110,7 +112,9 @@ class EventLoop : private Outputs {
   std::unique_ptr<SocketFront> socket_front_;  // null: no control socket
   ById<BusId, Port> ports_;
   std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
-  bool mute_ = false;                                // LCM takes nothing
+  LogLimit log_limit_;
+  std::uint64_t lost_move_lines_ = 0;  // since the log of moves could be written last
+  bool mute_ = false;                  // LCM takes nothing
   sd_event* event_ = nullptr;
   std::vector<std::unique_ptr<Source>> sources_;  // those of ports aside
   std::int64_t started_us_ = 0;

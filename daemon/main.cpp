@@ -13,6 +13,7 @@
 
 #include "base/standard_output.h"
 #include "control/path.h"
+#include "daemon/channel_claim.h"
 #include "daemon/event_loop.h"
 
 namespace {
@@ -36,6 +37,8 @@ void block_signals() {
   sigaddset(&set, SIGTERM);
   sigaddset(&set, SIGINT);
   sigaddset(&set, SIGHUP);
+  sigaddset(&set, SIGUSR1);
+  sigaddset(&set, SIGUSR2);
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 }
@@ -71,6 +74,7 @@ bushd::Result<std::unique_ptr<bushd::control::Server>> open_control(
 struct Lcm {
   std::unique_ptr<bushd::lcm::Transport> all;
   std::unique_ptr<bushd::lcm::Transport> stops;  // null: `all` takes those too
+  std::optional<bushd::daemon::ChannelClaim> claim{};
 };
 
 // Without a network the control socket alone will do. Stops come by a transport of their own, so
@@ -85,13 +89,15 @@ bushd::Result<Lcm> open_lcm(const bushd::config::Lcm& config, bool has_control) 
     return Lcm{.all = std::move(*all), .stops = nullptr};
   }
   if (!all) return bushd::fail(all.error());
-  if (!config.commands || !config.url.starts_with("udpm://")) {
-    return Lcm{.all = std::move(*all), .stops = nullptr};
-  }
+  auto claim = bushd::daemon::ChannelClaim::make(config, bushd::daemon::lock_folders());
+  if (!claim) return bushd::fail(claim.error());
+  Lcm lcm{.all = std::move(*all), .stops = nullptr, .claim = std::move(*claim)};
+  if (!config.commands || !config.url.starts_with("udpm://")) return lcm;
   auto stops =
       Transport::open(config.url, {config.prefix + "_STOP", config.prefix + "_EMERGENCY_STOP"});
   if (!stops) return bushd::fail(stops.error());
-  return Lcm{.all = std::move(*all), .stops = std::move(*stops)};
+  lcm.stops = std::move(*stops);
+  return lcm;
 }
 
 int run(const bushd::config::Config& config, const std::string& move_log_path,

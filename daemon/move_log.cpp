@@ -2,18 +2,38 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 
 namespace bushd::daemon {
+namespace {
+
+bool is_null_device(const struct stat& status) {
+  constexpr dev_t kMemoryDevices = 1;  // of Linux; 3 is /dev/null
+  return S_ISCHR(status.st_mode) && major(status.st_rdev) == kMemoryDevices &&
+         minor(status.st_rdev) == 3;
+}
+
+}  // namespace
 
 Result<MoveLog> MoveLog::open(const std::string& path) {
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  // A FIFO that nobody reads would not even be opened without O_NONBLOCK.
+  const int fd =
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
+  const int error = errno;
+  struct stat status {};
+  const bool is_there = fd >= 0 ? ::fstat(fd, &status) == 0 : ::stat(path.c_str(), &status) == 0;
+  if (is_there && !S_ISREG(status.st_mode) && !is_null_device(status)) {
+    if (fd >= 0) ::close(fd);
+    return fail(Error{.message = "the log of moves must be a regular file, and this is none",
+                      .file = path});
+  }
   if (fd < 0) {
     return fail(
-        Error{.message = std::string("the log of moves cannot be opened: ") + std::strerror(errno),
+        Error{.message = std::string("the log of moves cannot be opened: ") + std::strerror(error),
               .file = path});
   }
   return MoveLog(fd, path);
@@ -25,17 +45,32 @@ MoveLog::~MoveLog() {
   ::close(fd_);
 }
 
-Result<void> MoveLog::append(const std::string& line) {
+bool MoveLog::is_at_its_path() const {
+  struct stat open {};
+  struct stat there {};
+  return ::fstat(fd_, &open) == 0 && ::stat(path_.c_str(), &there) == 0 &&
+         open.st_dev == there.st_dev && open.st_ino == there.st_ino;
+}
+
+Result<MoveLog::Appended> MoveLog::append(const std::string& line) {
+  Appended appended = Appended::kOn;
+  if (!is_at_its_path()) {
+    auto anew = open(path_);
+    if (!anew) return fail(anew.error());
+    std::swap(fd_, anew->fd_);
+    appended = Appended::kAnew;
+  }
   const std::string text = line + "\n";
   const ssize_t n = ::write(fd_, text.data(), text.size());
-  if (n == static_cast<ssize_t>(text.size())) return {};
+  if (n == static_cast<ssize_t>(text.size())) return appended;
+  const int error = errno;
   // Half a line would spoil the next one too.
   struct stat status {};
   if (n > 0 && ::fstat(fd_, &status) == 0) {
     static_cast<void>(::ftruncate(fd_, status.st_size - n));
   }
   return fail(Error{
-      .message = std::string("a line was lost: ") + (n < 0 ? std::strerror(errno) : "disk full"),
+      .message = std::string("a line was lost: ") + (n < 0 ? std::strerror(error) : "disk full"),
       .file = path_});
 }
 

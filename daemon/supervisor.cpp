@@ -33,7 +33,7 @@ Supervisor::Supervisor(Installation& installation, Journal& journal, Moves& move
       emergency_stop_(emergency_stop),
       services_(std::move(services)),
       outputs_(outputs) {
-  for ([[maybe_unused]] const McuId mcu : installation.mcus()) boot_number_.add();
+  for ([[maybe_unused]] const McuId mcu : installation.mcus()) heard_.add();
 }
 
 void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
@@ -41,8 +41,8 @@ void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
     return installation_[bus.mcus[event.mcu.value]];
   };
   const auto handle = Overloaded{
-      [&](const link::McuOnline& event) { goes_online(mcu_of(event)); },
-      [&](const link::McuOffline& event) { goes_offline(mcu_of(event)); },
+      [&](const link::McuOnline& event) { goes_online(now_us, mcu_of(event)); },
+      [&](const link::McuOffline& event) { goes_offline(now_us, mcu_of(event)); },
       [&](const link::McuReported& event) { reports(now_us, mcu_of(event)); },
       [&](const link::RequestRefused& event) {
         for (Service* service : services_) {
@@ -63,33 +63,60 @@ void Supervisor::replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outp
   moves_.replan(now_us, again);
 }
 
-void Supervisor::goes_online(Mcu& mcu) {
+void Supervisor::goes_online(std::int64_t now_us, Mcu& mcu) {
   const std::uint16_t boot_number = mcu.report().boot_number;
-  const auto before = std::exchange(boot_number_[mcu.id], boot_number);
+  Heard& heard = heard_[mcu.id];
+  const auto before = std::exchange(heard.boot_number, boot_number);
+  heard.report_us = now_us;
   const bool restarted = before && *before != boot_number;
+  std::string stood;
   for (const MotorId id : mcu.motors()) {
-    if (!is_reported(mcu, installation_[id])) continue;
-    installation_[id].goes_online(mcu.report(), !before, restarted);
-    if (restarted) journal_.position_lost(id);
+    motion::Motor& motor = installation_[id];
+    if (!is_reported(mcu, motor)) continue;
+    const std::int64_t before_steps = motor.position_steps();
+    motor.goes_online(mcu.report(), !before, restarted);
+    if (restarted) {
+      journal_.position_lost(id, before_steps);
+      stood += (stood.empty() ? "" : ", ") + motor.name() + " at " + std::to_string(before_steps);
+    } else if (before) {
+      follow_position(id, before_steps);
+    }
   }
   outputs_.log(restarted ? LogLevel::kWarning : LogLevel::kInfo,
                "MCU " + mcu.name() + " is ready, boot number " + std::to_string(boot_number) +
                    (restarted ? "; it restarted" + by_cause(mcu.report().reset_cause) +
-                                    ", so its motors' positions are uncertain: set or home them"
+                                    ", so its motors' positions are uncertain: set or home them. "
+                                    "Heard last before: " +
+                                    stood
                               : ""));
   for (Service* service : services_) service->goes_online(mcu);
   installation_.changed = true;
 }
 
-void Supervisor::goes_offline(Mcu& mcu) {
-  const std::string cause = "MCU " + mcu.name() + " " + mcu.view().detail;
+// What clients and logs were told when it was lost was where it was heard last.
+void Supervisor::follow_position(MotorId id, std::int64_t before_steps) {
+  const motion::Motor& motor = installation_[id];
+  if (motor.position_steps() == before_steps) return;
+  journal_.position_corrected(id, before_steps);
+  outputs_.log(LogLevel::kWarning,
+               motor.name() + ": stands at " + std::to_string(motor.position_steps()) +
+                   ", not at " + std::to_string(before_steps) + " where it was heard last: it " +
+                   "moved on while its MCU was out of reach");
+}
+
+void Supervisor::goes_offline(std::int64_t now_us, Mcu& mcu) {
+  const std::string cause = mcu.must_be_online().error().text();
   outputs_.log(LogLevel::kError, cause);
+  const std::int64_t heard_utime_us =
+      outputs_.wall_clock_us() - (now_us - heard_[mcu.id].report_us);
+  // Before the services end their motion.
+  for (const MotorId motor : mcu.motors()) installation_[motor].goes_offline(heard_utime_us);
   for (Service* service : services_) service->goes_offline(mcu, cause);
-  for (const MotorId motor : mcu.motors()) installation_[motor].goes_offline();
   installation_.changed = true;
 }
 
 void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
+  heard_[mcu.id].report_us = now_us;
   for (const MotorId id : mcu.motors()) {
     motion::Motor& motor = installation_[id];
     if (!is_reported(mcu, motor)) continue;

@@ -25,8 +25,9 @@ class Supervisor {
   void watch_for_other_masters(std::int64_t now_us);
 
  private:
-  void goes_online(Mcu& mcu);
-  void goes_offline(Mcu& mcu);
+  void goes_online(std::int64_t now_us, Mcu& mcu);
+  void goes_offline(std::int64_t now_us, Mcu& mcu);
+  void follow_position(MotorId motor, std::int64_t before_steps);
   void reports(std::int64_t now_us, Mcu& mcu);
   void starts_late(Mcu& mcu, Output output);
   void replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs);
@@ -38,8 +39,11 @@ class Supervisor {
   const EmergencyStop& emergency_stop_;
   std::vector<Service*> services_;
   Outputs& outputs_;
-  // Of the boot that positions belong to.
-  ById<McuId, std::optional<std::uint16_t>> boot_number_;
+  struct Heard {
+    std::optional<std::uint16_t> boot_number{};  // of the boot that positions belong to
+    std::int64_t report_us = 0;                  // the last report
+  };
+  ById<McuId, Heard> heard_;
 };
 
 }  // namespace bushd::daemon

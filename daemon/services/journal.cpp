@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "motion/report_words.h"
+
 namespace bushd::daemon {
 
 Journal::Journal(const Installation& installation, Outputs& outputs)
@@ -70,9 +72,22 @@ void Journal::ended(MotorId motor, std::string_view result) {
   outputs_.move_log(line.dump());
 }
 
-void Journal::position_set(MotorId motor) {
-  const nlohmann::json line = {{"event", "set"},
+void Journal::position_set(MotorId motor, std::int64_t from_steps, const api::Asker& by) {
+  nlohmann::json line = {{"event", "set"},
+                         {"motor", installation_[motor].name()},
+                         {"from_steps", from_steps},
+                         {"position_steps", installation_[motor].position_steps()},
+                         {"number", by.number}};
+  if (by.session) line["client"] = by.session->client_id();
+  // Clients choose their names; what is not UTF-8 must not end the daemon.
+  outputs_.move_log(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+void Journal::position_corrected(MotorId motor, std::int64_t from_steps) {
+  const nlohmann::json line = {{"event", "corrected"},
+                               {"utime_us", outputs_.wall_clock_us()},
                                {"motor", installation_[motor].name()},
+                               {"from_steps", from_steps},
                                {"position_steps", installation_[motor].position_steps()}};
   outputs_.move_log(line.dump());
 }
@@ -121,8 +136,20 @@ void Journal::end_autonomous(MotorId id, const Mcu& mcu) {
   outputs_.move_log(line.dump());
 }
 
-void Journal::position_lost(MotorId motor) {
+void Journal::position_lost(MotorId motor, std::int64_t from_steps) {
   if (autonomous_[motor]) autonomous_[motor]->set = true;
+  const bushd_report& report = installation_.mcu_of(motor).report();
+  nlohmann::json line = {{"event", "restarted"},
+                         {"utime_us", outputs_.wall_clock_us()},
+                         {"motor", installation_[motor].name()},
+                         {"mcu", installation_.mcu_of(motor).name()},
+                         {"boot", report.boot_number},
+                         {"from_steps", from_steps},
+                         {"position_steps", installation_[motor].position_steps()}};
+  if (const std::string cause = motion::reset_cause_word(report.reset_cause); !cause.empty()) {
+    line["reset_cause"] = cause;
+  }
+  outputs_.move_log(line.dump());
 }
 
 }  // namespace bushd::daemon

@@ -20,7 +20,9 @@ class Journal final : public Service {
                bool by_table);
   void changed(MotorId motor, const motion::Change& change);
   void ended(MotorId motor, std::string_view result);
-  void position_set(MotorId motor);
+  void position_set(MotorId motor, std::int64_t from_steps, const api::Asker& by);
+  // Its MCU, out of reach meanwhile, has moved it on.
+  void position_corrected(MotorId motor, std::int64_t from_steps);
 
   // Motion that MCUs make by themselves, homing and local inputs: no move has led to where these
   // motors stand. To be called before and after motors follow a report; `being_set`: positions that
@@ -29,7 +31,8 @@ class Journal final : public Service {
   void after_report(const Mcu& mcu);
 
   void goes_online(Mcu& mcu) override { told_[mcu.id].reset(); }
-  void position_lost(MotorId motor);
+  // Its MCU has restarted.
+  void position_lost(MotorId motor, std::int64_t from_steps);
 
  private:
   // Of a motor that moves by itself.

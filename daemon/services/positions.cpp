@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/services/open_moves.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -10,8 +12,9 @@ constexpr std::int64_t kMaxPosition = motion::Motor::kMaxPosition;
 
 }  // namespace
 
-Positions::Positions(Installation& installation, Interlocks& interlocks, Journal& journal)
-    : installation_(installation), journal_(journal) {
+Positions::Positions(Installation& installation, Interlocks& interlocks, Journal& journal,
+                     Outputs& outputs)
+    : installation_(installation), journal_(journal), outputs_(outputs) {
   // A move begins where the motor stands when it is accepted.
   interlocks.add([this](MotorId motor) -> Result<void> {
     if (!being_set(motor)) return {};
@@ -32,7 +35,7 @@ void Positions::request(std::int64_t now_us, const api::Asker& asker,
   std::vector<MotorId> motors;
   for (const Part& part : *parts) motors.push_back(part.motor);
   open_.push_back({Confirmation(asker, installation_.mcus_of(motors), now_us), {}});
-  for (const auto& [id, steps] : *parts) {
+  for (const auto& [id, steps, from_steps] : *parts) {
     installation_.mcu_of(id).set_position(installation_[id].output(), steps);
   }
   open_.back().parts = std::move(*parts);
@@ -55,7 +58,7 @@ Result<std::vector<Positions::Part>> Positions::parts_of(const api::SetPosition&
     if (steps > kMaxPosition || steps < -kMaxPosition) {
       return fail(motor.name() + ": positions lie within +-" + std::to_string(kMaxPosition));
     }
-    parts.push_back({id, static_cast<std::int32_t>(steps)});
+    parts.push_back({id, static_cast<std::int32_t>(steps), motor.position_steps()});
   }
   for (const MotorId id : *motors) {
     if (const auto online = installation_.mcu_of(id).must_be_online(); !online) {
@@ -68,7 +71,7 @@ Result<std::vector<Positions::Part>> Positions::parts_of(const api::SetPosition&
 void Positions::follow(std::int64_t now_us, const Mcu* reported) {
   for (auto it = open_.begin(); it != open_.end();) {
     const auto check = [&](const Mcu& mcu) -> Result<void> {
-      for (const auto& [id, steps] : it->parts) {
+      for (const auto& [id, steps, from_steps] : it->parts) {
         const motion::Motor& motor = installation_[id];
         if (installation_.config()[id].mcu == mcu.id && motor.position_steps() != steps) {
           return fail("did not take the position of " + motor.name());
@@ -90,8 +93,13 @@ void Positions::follow(std::int64_t now_us, const Mcu* reported) {
 void Positions::end(const Setting& setting, const Result<void>& ended) {
   for (const Part& part : setting.parts) {
     if (!ended) break;
-    installation_[part.motor].position_is_known();
-    journal_.position_set(part.motor);
+    motion::Motor& motor = installation_[part.motor];
+    motor.position_is_known();
+    const api::Asker& by = setting.confirmation.asker();
+    journal_.position_set(part.motor, part.from_steps, by);
+    outputs_.log(LogLevel::kInfo, motor.name() + ": position set to " + std::to_string(part.steps) +
+                                      ", was " + std::to_string(part.from_steps) + ", by " +
+                                      text_of(by));
   }
   installation_.changed = true;
   setting.confirmation.answer(ended);

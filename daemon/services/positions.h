@@ -14,7 +14,7 @@ namespace bushd::daemon {
 
 class Positions final : public Service {
  public:
-  Positions(Installation& installation, Interlocks& interlocks, Journal& journal);
+  Positions(Installation& installation, Interlocks& interlocks, Journal& journal, Outputs& outputs);
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::SetPosition& request);
 
@@ -28,6 +28,7 @@ class Positions final : public Service {
   struct Part {
     MotorId motor;
     std::int32_t steps;
+    std::int64_t from_steps;
   };
   struct Setting {
     Confirmation confirmation;
@@ -39,6 +40,7 @@ class Positions final : public Service {
 
   Installation& installation_;
   Journal& journal_;
+  Outputs& outputs_;
   std::list<Setting> open_;
 };
 

@@ -94,8 +94,13 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   state.input = reports(view.report.inputs);
   state.inhibited = {.positive = reports(view.report.forbidden_positive),
                      .negative = reports(view.report.forbidden_negative)};
-  state.trust = motor.uncertain_reason() ? api::Trust::kUncertain : api::Trust::kKnown;
-  state.uncertain_reason = motor.uncertain_reason().value_or("");
+  std::optional<std::uint16_t> boot_number;
+  if (view.identified) boot_number = view.identity.boot_number;
+  motion::PositionTrust trust = motor.trust(boot_number);
+  if (trust.trust == api::Trust::kUnknown) state.position_steps = state.target_steps = 0;
+  state.trust = trust.trust;
+  state.uncertain_reason = std::move(trust.reason);
+  state.heard_utime_us = trust.heard_utime_us;
   return state;
 }
 

@@ -16,7 +16,7 @@ namespace bushd::api {
 
 struct MotorState {
   std::string name{};
-  std::int64_t position_steps = 0;  // as its MCU reported last
+  std::int64_t position_steps = 0;  // as its MCU reported last; no number while Trust::kUnknown
   // Where it will stand in the end, also after a stop; without a move of the daemon's where it is.
   std::int64_t target_steps = 0;
   double velocity_steps_per_s = 0;  // signed, of the running step; 0 unless Activity::kMoving
@@ -26,7 +26,9 @@ struct MotorState {
   bool input = false;      // its switch is active
   Directions inhibited{};  // by its limit switches
   Trust trust = Trust::kKnown;
-  std::string uncertain_reason{};  // "" while known
+  std::string uncertain_reason{};  // why it is not known; "" while it is
+  // When the position was heard, microseconds since 1970, if Trust::kStale.
+  std::optional<std::int64_t> heard_utime_us{};
   friend bool operator==(const MotorState&, const MotorState&) = default;
 };
 

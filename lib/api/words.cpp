@@ -24,8 +24,10 @@ constexpr Words<Activity, 5> kActivities = {{
     {Activity::kHoming, "home"},
     {Activity::kLocal, "local"},
 }};
-constexpr Words<Trust, 2> kTrusts = {{
+constexpr Words<Trust, 4> kTrusts = {{
+    {Trust::kUnknown, "unknown"},
     {Trust::kKnown, "known"},
+    {Trust::kStale, "stale"},
     {Trust::kUncertain, "uncertain"},
 }};
 constexpr Words<McuState, 5> kMcuStates = {{

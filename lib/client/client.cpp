@@ -83,8 +83,41 @@ Client::Client(std::unique_ptr<Link> link, ClientOptions options)
       nonce_(random_number()) {}
 
 void Client::on_run(std::int64_t run) {
+  if (run != newest_run_) {
+    if (run == former_run_) heard_two_at_ = Clock::now();
+    former_run_ = std::exchange(newest_run_, run);
+  }
   if (run_ && *run_ != run) restarted_ = true;
   run_ = run;
+}
+
+void Client::on_welcome(const lcm::Welcome& welcome) {
+  if (session_ != 0 && welcome.run != welcome_run_) heard_two_at_ = Clock::now();
+  if (session_ != 0) return;
+  session_ = welcome.session;
+  welcome_run_ = welcome.run;
+}
+
+bool Client::hears_two() const {
+  return heard_two_at_ && Clock::now() < *heard_two_at_ + options_.silence_limit;
+}
+
+Error Client::two_daemons() const {
+  return {fmt::format(
+      "two daemons answer on channels {0}_..., so nothing was sent: end one of them, or give it "
+      "another prefix in [lcm]. 'bushctl stop' and 'bushctl estop' reach both",
+      options_.prefix)};
+}
+
+Error Client::no_answer(bool sent) const {
+  const std::string perhaps = sent ? "; it may still carry this out" : "";
+  if (hears_two()) return two_daemons();
+  const double seconds = std::chrono::duration<double>(options_.answer_within).count();
+  if (link_->loses() && state_heard_at_ >= asked_at_) {
+    return {fmt::format("bushd sends its state but has not answered for {:g} s{}", seconds,
+                        sent ? perhaps : "; nothing was asked of it")};
+  }
+  return {link_->remedy() + (link_->loses() ? "" : perhaps)};
 }
 
 void Client::on_message(const lcm::DaemonMessage& message) {
@@ -99,12 +132,16 @@ void Client::on_message(const lcm::DaemonMessage& message) {
     health_heard_ = true;
     collector_.add(*health);
   } else if (const auto* welcome = std::get_if<lcm::Welcome>(&message)) {
-    if (welcome->hello.client_id == id_ && welcome->hello.nonce == nonce_) {
-      session_ = welcome->session;
-    }
+    if (welcome->hello.client_id == id_ && welcome->hello.nonce == nonce_) on_welcome(*welcome);
   } else if (const auto* reply = std::get_if<lcm::ReplyMessage>(&message)) {
     if (reply->id.client_id != id_ || reply->id.number != waiting_.number) return;
     if (link_->loses() && reply->id.session != session_) return;
+    // Who has accepted it does not refuse it: then it is no longer known what became of it.
+    if (const auto* refused = std::get_if<api::Refused>(&reply->reply);
+        refused != nullptr && waiting_.accepted) {
+      waiting_.disowned = refused->reason;
+      return;
+    }
     if (!api::is_final(reply->reply)) {
       if (!waiting_.accepted) waiting_.accepted = reply->reply;
     } else if (!waiting_.final) {
@@ -130,7 +167,7 @@ Result<void> Client::wait(Clock::time_point deadline) {
 Result<void> Client::greet(Clock::time_point give_up) {
   Clock::time_point next_send = Clock::now();
   while (session_ == 0) {
-    if (Clock::now() >= give_up) return fail(link_->remedy());
+    if (Clock::now() >= give_up) return fail(no_answer(false));
     if (Clock::now() >= next_send) {
       const auto hello = lcm::encode(unix_time_us(), lcm::Hello{.client_id = id_, .nonce = nonce_});
       if (!hello) return fail(hello.error());
@@ -138,12 +175,18 @@ Result<void> Client::greet(Clock::time_point give_up) {
       next_send = Clock::now() + options_.resend_every;
     }
     if (auto waited = wait(std::min(next_send, give_up)); !waited) return waited;
+    if (session_ == 0) continue;
+    const Clock::time_point settled = Clock::now() + options_.others_answer_within;
+    while (Clock::now() < settled) {
+      if (auto waited = wait(settled); !waited) return waited;
+    }
   }
   return {};
 }
 
 Result<api::Reply> Client::run(const api::Request& request, Until until,
                                const std::function<void(const api::Reply&)>& on_reply) {
+  asked_at_ = Clock::now();
   // What happened to the daemon before this request is no concern of it.
   if (auto drained = wait(Clock::now()); !drained) return fail(drained.error());
   run_.reset();
@@ -152,6 +195,10 @@ Result<api::Reply> Client::run(const api::Request& request, Until until,
   if (link_->loses() && !api::is_repeatable(request)) {
     if (auto greeted = greet(Clock::now() + options_.answer_within); !greeted) {
       return fail(greeted.error());
+    }
+    if (hears_two()) {
+      forget_session();
+      return fail(two_daemons());
     }
   }
   waiting_ = {.number = ++number_};
@@ -162,11 +209,13 @@ Result<api::Reply> Client::run(const api::Request& request, Until until,
   // Of a daemon that has forgotten it, the next request needs another session.
   const auto* refused = reply ? std::get_if<api::Refused>(&*reply) : nullptr;
   const bool forgotten = refused != nullptr && refused->reason.starts_with(api::kUnknownSession);
-  if (!reply || forgotten) {
-    session_ = 0;
-    nonce_ = random_number();
-  }
+  if (!reply || forgotten) forget_session();
   return reply;
+}
+
+void Client::forget_session() {
+  session_ = 0;
+  nonce_ = random_number();
 }
 
 Result<void> Client::check_alive(Clock::time_point answered) const {
@@ -174,6 +223,10 @@ Result<void> Client::check_alive(Clock::time_point answered) const {
     return fail(
         "the daemon has restarted meanwhile (or two of them use this prefix), so the result is "
         "lost; 'bushctl status' shows where the motors are");
+  }
+  if (waiting_.disowned) {
+    return fail("the daemon accepted the command, and does not know its result any more: " +
+                *waiting_.disowned + "; 'bushctl status' shows where the motors are");
   }
   if (link_->loses() &&
       Clock::now() >= std::max(state_heard_at_, answered) + options_.silence_limit) {
@@ -216,7 +269,7 @@ Result<api::Reply> Client::await_reply(const lcm::Packet& packet, Until until,
     if (auto alive = check_alive(waiting_.accepted ? answered : Clock::now()); !alive) {
       return fail(alive.error());
     }
-    if (!waiting_.accepted && Clock::now() >= give_up) return fail(link_->remedy());
+    if (!waiting_.accepted && Clock::now() >= give_up) return fail(no_answer(sent_once));
   }
 }
 
@@ -241,6 +294,7 @@ Result<Status> Client::status(std::chrono::milliseconds timeout) {
       unix_time_us(), {.session = session_, .client_id = id_, .number = number_}, lcm::GetStatus{});
   if (!packet) return fail(packet.error());
   while (!collector_.has_everything()) {
+    if (Clock::now() >= deadline && hears_two()) return fail(two_daemons());
     if (Clock::now() >= deadline) return fail(link_->remedy());
     if (Clock::now() >= next_send) {
       if (auto sent = link_->send(*packet); !sent) return fail(sent.error());

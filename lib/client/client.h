@@ -39,6 +39,8 @@ struct ClientOptions {
   // long the daemon's state may stay away.
   std::chrono::milliseconds ask_again_every{1000};
   std::chrono::milliseconds silence_limit{5000};
+  // How long a second daemon may take to answer the HELLO that the first has answered.
+  std::chrono::milliseconds others_answer_within{100};
 };
 
 // One thread.
@@ -57,7 +59,8 @@ class Client {
   // Sends the request and waits. kAnswered: returns Accepted or Refused (or Completed, when that
   // came first). kResult: Refused or Completed. `on_reply` sees each different reply once. Fails
   // when no daemon answers, when it falls silent or restarts meanwhile (what the request did is
-  // then unknown), when interrupted, and for requests that cannot be sent.
+  // then unknown), when interrupted, and for requests that cannot be sent. Where two daemons are
+  // heard only what stops motors is sent.
   Result<api::Reply> run(const api::Request& request, Until until,
                          const std::function<void(const api::Reply&)>& on_reply = {});
 
@@ -81,11 +84,18 @@ class Client {
     std::optional<api::Reply> accepted{};
     std::optional<api::Reply> final{};  // Refused or Completed
     lcm::ReplyParts parts{};            // of the final one
+    std::optional<std::string> disowned{};  // refused after it was accepted, and why
   };
 
   void on_message(const lcm::DaemonMessage& message);
   void on_run(std::int64_t run);
+  void on_welcome(const lcm::Welcome& welcome);
+  void forget_session();
   Result<void> greet(Clock::time_point give_up);
+  bool hears_two() const;
+  Error two_daemons() const;
+  // Nobody has answered; `sent`: a request that may be carried out nevertheless.
+  Error no_answer(bool sent) const;
   Result<void> subscribe();
   Result<Status> wait_for(const bool& heard, bool (StatusCollector::*enough)() const,
                           std::chrono::milliseconds timeout);
@@ -109,8 +119,14 @@ class Client {
   bool state_heard_ = false;  // since it was set to false
   bool health_heard_ = false;
   Clock::time_point state_heard_at_{};
-  std::optional<std::int64_t> run_;  // of the daemon that is heard
+  Clock::time_point asked_at_{};
+  std::optional<std::int64_t> run_;  // of the daemon that is heard during a request
   bool restarted_ = false;
+  // A run that is heard again after another one has not been restarted: there are two.
+  std::int64_t newest_run_ = 0;
+  std::int64_t former_run_ = 0;
+  std::int64_t welcome_run_ = 0;  // of the first who has answered this nonce
+  std::optional<Clock::time_point> heard_two_at_;
 };
 
 }  // namespace bushd::client

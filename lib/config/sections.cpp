@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <map>
 #include <string_view>
 #include <system_error>
@@ -23,13 +24,15 @@ namespace {
 using tables::TomlReader;
 
 constexpr std::size_t kMaxName = 63;
-constexpr std::string_view kNameRule = "1..63 characters of A-Z a-z 0-9 _ . -";
+constexpr std::string_view kNameRule = "1..63 characters of A-Z a-z 0-9 _ . -, the first one no -";
 // A prefix becomes the beginning of LCM channel names, which have 63 characters at most.
 constexpr std::size_t kMaxPrefix = 48;
-constexpr std::string_view kPrefixRule = "1..48 characters of A-Z a-z 0-9 _ . -";
+constexpr std::string_view kPrefixRule =
+    "1..48 characters of A-Z a-z 0-9 _ . -, the first one no -";
 
+// On a command line what begins with - is an option, or a number of steps.
 bool is_name(std::string_view text, std::size_t longest) {
-  return !text.empty() && text.size() <= longest &&
+  return !text.empty() && text.size() <= longest && text.front() != '-' &&
          std::all_of(text.begin(), text.end(), [](char c) {
            return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') ||
                   c == '_' || c == '.' || c == '-';
@@ -81,6 +84,13 @@ class Taken {
  private:
   std::map<std::string, int> lines_;
 };
+
+// "Theta" and "theta" are two motors to a program, and one to people.
+std::string lower_case(std::string text) {
+  std::ranges::transform(text, text.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
 
 template <class T, class Key>
 std::string known(const std::vector<T>& elements, Key key) {
@@ -295,7 +305,7 @@ class TableShelf {
   Result<tables::TablePtr> get(const TomlReader& reader, const std::string& group,
                                const std::string& name) {
     const auto path = tables::find(name, directories_);
-    if (!path) return fail(reader.error("table", path.error().message));
+    if (!path) return fail(reader.error("table", path.error().text()));
     if (const auto shelved = tables_.find(*path); shelved != tables_.end()) return shelved->second;
     auto table = tables::load(*path);
     if (!table) {
@@ -358,6 +368,7 @@ Result<void> read_motion_of_its_own(const TomlReader& reader, Motor* motor) {
 Result<void> read_motors(Loading* loading) {
   Config& config = loading->config;
   Taken names;
+  Taken spoken_names;
   Taken outputs;
   for (const TomlReader& reader : loading->motors) {
     if (auto known = reader.only({"name", "mcu", "output", "group", "limit", "limit_action",
@@ -368,6 +379,11 @@ Result<void> read_motors(Loading* loading) {
     auto name = read_name(reader);
     if (!name) return fail(name.error());
     if (auto taken = names.take(reader, "name", *name, *name); !taken) return taken;
+    if (auto taken = spoken_names.take(reader, "name", lower_case(*name),
+                                       *name + ", but for upper and lower case,");
+        !taken) {
+      return taken;
+    }
     const auto mcu = resolve<McuId>(reader, "mcu", config.mcus, &Mcu::id);
     if (!mcu) return fail(mcu.error());
     const auto output = reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
@@ -406,7 +422,7 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
   auto groups = read_array(root, file, "group", false);
   if (!groups) return fail(groups.error());
   loading->groups = std::move(*groups);
-  auto motors = read_array(root, file, "motor", false);
+  auto motors = read_array(root, file, "motor", true);
   if (!motors) return fail(motors.error());
   loading->motors = std::move(*motors);
   if (auto read = read_buses(loading); !read) return read;

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <grp.h>
 #include <sys/epoll.h>
-#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -75,12 +74,15 @@ Result<std::unique_ptr<Server>> Server::open(const std::string& path, const std:
   if (std::filesystem::create_directory(folder, ignored)) ::chmod(folder.c_str(), 0755);
   // Who holds the lock may replace a socket that a daemon has left behind.
   const std::string lock_path = path + ".lock";
-  Descriptor lock(::open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
-  if (lock.get() < 0) return fail(system_error("the control socket cannot be made", lock_path));
-  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
-    return fail(Error{.message = "another daemon has this control socket; end it, or give this one "
-                                 "another [control] path",
+  auto taken = PidLock::take(lock_path);
+  if (!taken.holder.empty()) {
+    return fail(Error{.message = "another daemon has this control socket, " + taken.holder +
+                                 "; end it, or give this one another [control] path",
                       .file = path});
+  }
+  if (!taken.lock) {
+    return fail(
+        Error{.message = "the control socket cannot be made: " + taken.error, .file = lock_path});
   }
   Descriptor listener(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (listener.get() < 0) return fail(system_error("the control socket cannot be made", path));
@@ -105,12 +107,12 @@ Result<std::unique_ptr<Server>> Server::open(const std::string& path, const std:
     return fail(system_error("epoll", path));
   }
   return std::unique_ptr<Server>(
-      new Server(path, lock.release(), listener.release(), epoll.release(), limits));
+      new Server(path, std::move(*taken.lock), listener.release(), epoll.release(), limits));
 }
 
-Server::Server(std::string path, int lock, int listener, int epoll, Limits limits)
+Server::Server(std::string path, PidLock lock, int listener, int epoll, Limits limits)
     : path_(std::move(path)),
-      lock_(lock),
+      lock_(std::move(lock)),
       listener_(listener),
       epoll_(epoll),
       spare_(open_spare()),
@@ -123,7 +125,6 @@ Server::~Server() {
   ::close(listener_);
   ::close(epoll_);
   if (spare_ >= 0) ::close(spare_);
-  ::close(lock_);
 }
 
 void Server::watch(Connection connection, const Peer& peer, int operation) const {

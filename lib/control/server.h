@@ -19,6 +19,7 @@
 #include "api/session.h"
 #include "base/result.h"
 #include "control/packet.h"
+#include "control/pid_lock.h"
 
 namespace bushd::control {
 
@@ -82,7 +83,7 @@ class Server {
     bool doomed = false;
   };
 
-  Server(std::string path, int lock, int listener, int epoll, Limits limits);
+  Server(std::string path, PidLock lock, int listener, int epoll, Limits limits);
   void accept_all();
   void accept_one(int fd);
   void handle_peer(Connection connection, std::uint32_t events);
@@ -96,7 +97,7 @@ class Server {
   void watch(Connection connection, const Peer& peer, int operation) const;
 
   std::string path_;
-  int lock_;
+  PidLock lock_;
   int listener_;
   int epoll_;
   int spare_;  // given up for a moment to turn a connection away when there are no descriptors left

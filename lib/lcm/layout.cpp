@@ -14,7 +14,7 @@ constexpr Layout kRequest{"llsl"};
 constexpr Layout kBare{"t", {&kRequest}};
 constexpr Layout kMotors{"tnS", {&kRequest}};
 constexpr Layout kReplyHeader{"llslbssii"};
-constexpr Layout kMotor{"slldbsbbsss"};
+constexpr Layout kMotor{"slldbsbbsssl"};
 constexpr Layout kMotorDescription{"shst", {&kTableRef}};
 constexpr Layout kMcuHealth{"sisiisillllllliddb"};
 

@@ -57,6 +57,7 @@ motor_t message_of(const api::MotorState& motor) {
   message.inhibited = word(motor.inhibited);
   message.trust = word(motor.trust);
   message.uncertain_reason = motor.uncertain_reason;
+  message.heard_utime_us = motor.heard_utime_us.value_or(0);
   return message;
 }
 
@@ -65,6 +66,8 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
   const auto inhibited = api::directions_of(message.inhibited);
   const auto trust = api::trust_of(message.trust);
   if (!activity || !inhibited || !trust) return std::nullopt;
+  std::optional<std::int64_t> heard_utime_us;
+  if (message.heard_utime_us != 0) heard_utime_us = message.heard_utime_us;
   return api::MotorState{.name = message.name,
                          .position_steps = message.position_steps,
                          .target_steps = message.target_steps,
@@ -75,7 +78,8 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
                          .input = message.input != 0,
                          .inhibited = *inhibited,
                          .trust = *trust,
-                         .uncertain_reason = message.uncertain_reason};
+                         .uncertain_reason = message.uncertain_reason,
+                         .heard_utime_us = heard_utime_us};
 }
 
 mcu_health_t message_of(const api::McuHealth& health) {

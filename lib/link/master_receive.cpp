@@ -80,6 +80,7 @@ void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answ
   if (view.phase == McuPhase::kOffline) return;
   if (report.boot_number != view.identity.boot_number) {
     ++mcu.health.restarts;
+    view.identity.boot_number = report.boot_number;
     connector_.give_up(index, "restarted", now_us);
     return;
   }

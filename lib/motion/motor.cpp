@@ -91,8 +91,34 @@ void Motor::stop(std::optional<std::string> ended_by) {
 
 void Motor::end_homing(bool found) {
   if (!is<Homing>()) return;
-  if (found) uncertain_reason_.reset();
+  if (found) position_is_known();
   rest();
+}
+
+void Motor::position_is_known() {
+  confirmed_ = true;
+  uncertain_reason_.reset();
+}
+
+PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
+  using api::Trust;
+  const std::string mcu = "MCU " + setup_.mcu;
+  if (!boot_number_) return {Trust::kUnknown, mcu + " has not reported where it stands yet"};
+  if (boot_number && *boot_number != *boot_number_) {
+    return {Trust::kUnknown,
+            mcu + " restarted; before, it was heard at " + std::to_string(position_)};
+  }
+  if (lost_) {
+    std::string reason = lost_->in_motion ? mcu + " was lost while it moved, so it may have run on"
+                                          : mcu + " is out of reach; it rested when it was heard";
+    if (uncertain_reason_) reason += "; besides, " + *uncertain_reason_;
+    return {Trust::kStale, std::move(reason), lost_->heard_utime_us};
+  }
+  if (uncertain_reason_) return {Trust::kUncertain, *uncertain_reason_};
+  if (!confirmed_) {
+    return {Trust::kUncertain, "it has been neither set nor homed since this daemon started"};
+  }
+  return {Trust::kKnown, {}};
 }
 
 void Motor::rest() {
@@ -116,6 +142,8 @@ void Motor::take_limits(const bushd_report& report) {
 // Positions are counts since the MCU's boot: a boot whose positions nobody has seen has lost them.
 void Motor::goes_online(const bushd_report& report, bool first, bool restarted) {
   const std::int64_t before = std::exchange(position_, report.motor[output().value].position_steps);
+  boot_number_ = report.boot_number;
+  lost_.reset();
   if (restarted) uncertain_reason_ = "MCU " + setup_.mcu + " restarted";
   // Nobody here has seen whether it moved when it was stopped.
   const bool immediate = stops_immediately(report);
@@ -127,7 +155,10 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
   follow_autonomous(report);
 }
 
-void Motor::goes_offline() {
+void Motor::goes_offline(std::int64_t heard_utime_us) {
+  // What waits for a trigger may have had it, and people may use the inputs.
+  const bool in_motion = !is<Resting>() || setup_.local;
+  lost_ = Lost{.heard_utime_us = heard_utime_us, .in_motion = in_motion};
   if (is<Local>()) activity_ = Resting{};
 }
 

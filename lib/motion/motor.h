@@ -24,6 +24,7 @@ struct MotorSetup {
   std::string mcu;  // for texts, as the name
   Output output;
   bool has_home = false;
+  bool local = false;  // people may move it by the inputs at its MCU
   // Without a ramp, so that it may overrun.
   bool limit_immediate = false;
   bool emergency_stop_immediate = false;
@@ -53,6 +54,13 @@ struct Report {
   Tick tick;                 // of_mcu.tick, unwrapped
   bool requests_open;        // the MCU has not yet answered all that it was asked
   bool emergency_stop_open;  // commanded, and not yet known to be obeyed everywhere
+};
+
+// What its position is worth.
+struct PositionTrust {
+  api::Trust trust;
+  std::string reason;                            // why it is not known; "" while it is
+  std::optional<std::int64_t> heard_utime_us{};  // if stale
 };
 
 // What follows from a report, to be done in this order.
@@ -101,11 +109,15 @@ class Motor {
   bool has_plan() const { return is<Moving>() || is<Armed>(); }
   std::string busy_text() const;  // "theta moves"
 
-  std::int64_t position_steps() const { return position_; }  // as reported last
+  // As reported last; the MCU's boot that it belongs to, nothing before the first report.
+  std::int64_t position_steps() const { return position_; }
+  std::optional<std::uint16_t> boot_number() const { return boot_number_; }
+  // `boot_number`: of the MCU now.
+  PositionTrust trust(std::optional<std::uint16_t> boot_number) const;
   // Where it will stand when all is done.
   std::int64_t target_steps() const { return has_plan() ? axis_.end_steps() : position_; }
   double velocity_steps_per_s() const { return is<Moving>() ? axis_.velocity_steps_per_s() : 0.0; }
-  // Nothing: the position is known.
+  // Why steps may be lost, so that it may not move. Nothing: none are, as far as this daemon knows.
   const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
 
   // The plan; only while has_plan().
@@ -131,14 +143,15 @@ class Motor {
   bool change(Tick at) { return has_plan() && axis_.change(at); }
   void home() { activity_ = Homing{}; }
   void end_homing(bool found);
-  void position_is_known() { uncertain_reason_.reset(); }
+  void position_is_known();
   // Another table. Precondition: !has_plan().
   void set_axis(Axis axis) { axis_ = axis; }
 
   // Its MCU is configured and in step: for the first time, or again; `restarted` if positions do
   // not go on from before.
   void goes_online(const bushd_report& report, bool first, bool restarted);
-  void goes_offline();
+  // `heard_utime_us`: when its MCU reported last. To be told while its motion has not been ended.
+  void goes_offline(std::int64_t heard_utime_us);
   std::vector<Event> report(const Report& report);
   // The MCU did not get the first ticks in time.
   std::optional<event::Ended> starts_late(const bushd_report& report);
@@ -163,6 +176,15 @@ class Motor {
   Axis axis_;
   Activity activity_;
   std::int64_t position_ = 0;
+  std::optional<std::uint16_t> boot_number_;
+  // Somebody has said where it stands, or its switch has. What an earlier daemon was told, and
+  // whether steps were lost since, this one does not know.
+  bool confirmed_ = false;
+  struct Lost {
+    std::int64_t heard_utime_us;
+    bool in_motion;
+  };
+  std::optional<Lost> lost_;  // its MCU is offline
   std::optional<std::string> uncertain_reason_;
   bool autonomous_ = false;  // as reported last: its MCU moves it by itself
   bool forbidden_up_ = false;

@@ -15,6 +15,23 @@ bool is_table_name(std::string_view name) {
          });
 }
 
+namespace {
+
+namespace fs = std::filesystem;
+
+// Whether it is there. What cannot be looked at is an error, as is a link to nothing: a table of
+// the same name farther on would be taken for it.
+Result<bool> is_there(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(path, error)) return true;
+  if (error) return fail(Error{.message = "cannot be read: " + error.message(), .file = path});
+  if (!fs::is_symlink(fs::symlink_status(path, error))) return false;
+  return fail(
+      Error{.message = "is a link to nothing; make what it leads to, or remove it", .file = path});
+}
+
+}  // namespace
+
 Result<std::filesystem::path> find(std::string_view name,
                                    std::span<const std::filesystem::path> directories) {
   if (!is_table_name(name)) {
@@ -25,9 +42,16 @@ Result<std::filesystem::path> find(std::string_view name,
   }
   std::string looked_in;
   for (const std::filesystem::path& directory : directories) {
-    const std::filesystem::path path = directory / fmt::format("{}.toml", name);
-    std::error_code error;
-    if (std::filesystem::exists(path, error)) return path;
+    const auto searched = is_there(directory);
+    if (!searched) return fail(searched.error());
+    if (*searched && !fs::is_directory(directory)) {
+      return fail(
+          Error{.message = "is no folder, and tables are looked for in it", .file = directory});
+    }
+    const fs::path path = directory / fmt::format("{}.toml", name);
+    const auto found = is_there(path);
+    if (!found) return fail(found.error());
+    if (*found) return path;
     looked_in += (looked_in.empty() ? "" : ", ") + directory.string();
   }
   return fail(

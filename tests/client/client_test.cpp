@@ -29,13 +29,14 @@ class ClientTest : public testing::Test {
     auto link = std::make_unique<test::FakeLink>(loses);
     link_ = link.get();
     link_->on_send = [this](const lcm::ClientMessage& message) { on_send(message); };
-    client_ =
-        std::make_unique<Client>(std::move(link), ClientOptions{.program = "test",
-                                                                .interrupt_fd = interrupt_,
-                                                                .resend_every = milliseconds(3),
-                                                                .answer_within = patience,
-                                                                .ask_again_every = milliseconds(10),
-                                                                .silence_limit = patience});
+    client_ = std::make_unique<Client>(std::move(link),
+                                       ClientOptions{.program = "test",
+                                                     .interrupt_fd = interrupt_,
+                                                     .resend_every = milliseconds(3),
+                                                     .answer_within = patience,
+                                                     .ask_again_every = milliseconds(10),
+                                                     .silence_limit = patience,
+                                                     .others_answer_within = milliseconds(1)});
   }
 
   void on_send(const lcm::ClientMessage& message) {
@@ -231,6 +232,66 @@ TEST_F(ClientTest, NoticesADaemonThatFallsSilent) {
   const auto result = move();
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().text().find("silent"), std::string::npos);
+}
+
+TEST_F(ClientTest, SaysThatADaemonLivesAndDoesNotAnswer) {
+  open(true, milliseconds(50));
+  keep_publishing_states();
+  const auto result = move();
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().text(),
+            "bushd sends its state but has not answered for 0.05 s; it may still carry this out");
+}
+
+TEST_F(ClientTest, SaysThatNothingWasAskedOfADaemonThatGivesNoSession) {
+  open(true, milliseconds(50));
+  lost_hellos_ = 1'000'000;
+  keep_publishing_states();
+  const auto result = move();
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().text().find("nothing was asked of it"), std::string::npos);
+  EXPECT_TRUE(requests_.empty());
+}
+
+TEST_F(ClientTest, ARefusalOfWhatWasAcceptedIsNoResult) {
+  daemon_ = [this] {
+    reply(api::Accepted{});
+    reply(api::Refused{"who are you"});
+  };
+  const auto result = move();
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().text().find("who are you"), std::string::npos);
+  EXPECT_EQ(heard_, (std::vector<std::size_t>{0})) << "not accepted and refused both";
+}
+
+TEST_F(ClientTest, DoesNotCommandWhereTwoDaemonsWelcomeIt) {
+  daemon_ = [this] { reply(result(api::Outcome::kDone)); };
+  link_->on_send = [this](const lcm::ClientMessage& message) {
+    on_send(message);
+    if (!std::holds_alternative<lcm::Hello>(message.content)) return;
+    ++run_;
+    ++session_;
+    on_send(message);
+  };
+  const auto moved = move();
+  ASSERT_FALSE(moved);
+  EXPECT_NE(moved.error().text().find("two daemons"), std::string::npos);
+  EXPECT_TRUE(requests_.empty());
+  EXPECT_TRUE(run(api::Stop{}, Client::Until::kResult)) << "a stop is for both";
+  EXPECT_TRUE(run(api::EmergencyStop{}, Client::Until::kResult));
+  EXPECT_EQ(requests_.size(), 2u);
+}
+
+TEST_F(ClientTest, DoesNotCommandWhereTwoDaemonsSendTheirStates) {
+  daemon_ = [this] { reply(result(api::Outcome::kReached)); };
+  for (const std::int64_t run : {5, 6, 5}) {
+    run_ = run;
+    state(1);
+  }
+  const auto moved = move();
+  ASSERT_FALSE(moved);
+  EXPECT_NE(moved.error().text().find("two daemons"), std::string::npos);
+  EXPECT_TRUE(requests_.empty());
 }
 
 TEST_F(ClientTest, IsInterruptedThroughItsDescriptor) {

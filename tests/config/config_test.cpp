@@ -136,13 +136,19 @@ TEST(Config, LcmMayOnlyPublish) {
   EXPECT_FALSE(config->lcm.commands);
 }
 
-TEST(Config, BusWithAnMcuIsEnough) {
-  const ConfigFile file(
+TEST(Config, WithoutAMotorThereIsNothingToDo) {
+  const std::string bus =
       "[[bus]]\nname='b'\nport='p'\nbaud=500000\ntick_us=20000\nformat='coarse'\n"
-      "[[mcu]]\nbus='b'\naddress=1\n");
-  const auto config = file.load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  EXPECT_TRUE(config->motors.empty());
+      "[[mcu]]\nbus='b'\naddress=1\n";
+  const auto none = ConfigFile(bus).load();
+  ASSERT_FALSE(none.has_value());
+  EXPECT_NE(none.error().text().find("motor"), std::string::npos);
+  const auto one = ConfigFile(bus +
+                              "[[group]]\nname='g'\ntable='own'\n"
+                              "[[motor]]\nname='m'\nmcu='b:1'\noutput=0\ngroup='g'\n")
+                       .load();
+  ASSERT_TRUE(one.has_value()) << one.error().text();
+  EXPECT_EQ(one->motors.size(), 1u);
 }
 
 TEST(Config, GroupsWithTheSameTableShareIt) {
@@ -159,6 +165,28 @@ TEST(Config, TablesAreLookedUpBesideTheFileThenInItsTablesThenAmongTheShipped) {
   EXPECT_EQ(file.load()->groups[0].table->path(), below.string());
   const auto beside = file.directory().write("bushd2-constant.toml", kTable);
   EXPECT_EQ(file.load()->groups[0].table->path(), beside.string());
+}
+
+// A shipped table of that name would be taken for the one that somebody has put there.
+TEST(Config, ATableThatCannotBeLookedAtIsNotPassedOver) {
+  const ConfigFile file(kGood);
+  const auto& folder = file.directory().path();
+  std::filesystem::create_symlink("nowhere", folder / "tables");
+  ASSERT_FALSE(file.load());
+  EXPECT_NE(file.load().error().text().find("is a link to nothing"), std::string::npos);
+  std::filesystem::remove(folder / "tables");
+  file.directory().write("tables", "a file");
+  ASSERT_FALSE(file.load());
+  EXPECT_NE(file.load().error().text().find("is no folder"), std::string::npos);
+  std::filesystem::remove(folder / "tables");
+  std::filesystem::create_symlink("nowhere.toml", folder / "bushd2-constant.toml");
+  ASSERT_FALSE(file.load());
+  EXPECT_NE(file.load().error().text().find("is a link to nothing"), std::string::npos);
+  std::filesystem::remove(folder / "bushd2-constant.toml");
+  std::filesystem::create_symlink("loop", folder / "loop");
+  std::filesystem::create_symlink("loop", folder / "tables");
+  ASSERT_FALSE(file.load());
+  EXPECT_NE(file.load().error().text().find("cannot be read"), std::string::npos);
 }
 
 TEST(Config, ExampleOfTheDocumentationIsGood) {
@@ -351,6 +379,11 @@ INSTANTIATE_TEST_SUITE_P(
         change("UnknownKey", "output = 0", "pin = 0", 31, "motor[0].pin",
                "unknown key; allowed here: name, mcu, output, group"),
         change("NameMissing", "name = \"theta\"\n", "", 28, "motor[0].name", "is missing"),
+        change("NameLikeAnOption", "\"theta\"", "\"--to\"", 29, "motor[0].name",
+               "the first one no -"),
+        change("NameLikeSteps", "\"theta\"", "\"-5\"", 29, "motor[0].name", "the first one no -"),
+        change("NameTwiceToPeople", "\"slit\"", "\"Theta\"", 34, "motor[1].name",
+               "but for upper and lower case, is already taken in line 29"),
         change("NameBad", "\"theta\"", "\"θ\"", 29, "motor[0].name", "1..63 characters"),
         change("NameTwice", "\"slit\"", "\"theta\"", 34, "motor[1].name",
                "already taken in line 29"),

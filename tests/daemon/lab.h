@@ -92,7 +92,9 @@ class Lab : public daemon::Outputs {
   // Runs until the request has its result or was refused, and returns that.
   Answer wait(std::int64_t number, double limit_s = 60);
   bool all_ready() const;
-  void connect();  // asserts that all MCUs become READY
+  // Asserts that all MCUs become READY. The first time somebody says then that all motors stand
+  // where their MCUs count them.
+  void connect();
 
   bool has_state(const std::string& mcu) const { return states_.contains(mcu); }
   const api::StateSnapshot& state_of(const std::string& mcu) const { return states_.at(mcu); }
@@ -166,6 +168,7 @@ class Lab : public daemon::Outputs {
   std::map<std::string, api::HealthSnapshot> health_;
   std::vector<std::string> errors_;
   std::uint16_t master_ = 0;
+  bool positions_confirmed_ = false;
   std::vector<std::string> move_lines_;
   std::vector<std::string> kept_;
   std::vector<std::function<void()>> disk_;  // what it is to tell the core

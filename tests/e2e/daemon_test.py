@@ -10,6 +10,7 @@ from rig import MOTORS, OUTWARD, TABLE_RUNS, EndToEndTest
 class DaemonEnds(EndToEndTest):
     def start_moving(self, displacement_format="fine", bus_lines=()):
         self.bring_up(displacement_format, bus_lines)
+        self.survey()
         return self.start_outward()
 
     def check_sigterm(self, displacement_format):
@@ -46,7 +47,8 @@ class DaemonEnds(EndToEndTest):
         # At once, so that the motors still move when it comes.
         self.bushd = self.start_bushd("moves-after.jsonl")
         self.wait_until_ready()
-        self.assert_way_back_shows_no_step_lost("moves-after.jsonl")
+        # No step is lost, but the new daemon has not seen that.
+        self.assert_way_back_shows_no_step_lost("moves-after.jsonl", trust="uncertain")
 
     def test_killed_in_motion_mcus_run_down_and_the_next_daemon_goes_on_fine(self):
         self.check_kill("fine")

@@ -17,10 +17,11 @@ class Port(EndToEndTest):
         self.bushd = self.start_bushd()
         self.wait_until_offline()
         self.assertIn(f"{self.file('port')}: cannot be opened: No such file", self.bushd.said())
+        self.assertEqual({(motor["trust"], motor["position_steps"]) for motor in self.motors().values()},
+                         {("unknown", None)})
         refused = self.bushctl("move", "a0", "5")
         self.assertEqual(refused.returncode, 1)
-        self.assertIn("a0: MCU hall:1 is offline", refused.stderr)
-        self.assertIn(str(self.file("port")), refused.stderr)
+        self.assertIn(f"a0: MCU hall:1 is offline: port {self.file('port')}: cannot be opened", refused.stderr)
 
         self.start_bushsim()
         self.wait_until_ready()
@@ -67,6 +68,7 @@ class Port(EndToEndTest):
 
     def check_unplugged(self, bus_lines=(), port="port", links=("port",)):
         self.bring_up(bus_lines=bus_lines, port=port, links=links)
+        self.survey()
         before = [mcu["boot"] for mcu in self.status()["mcus"]]
         move = self.start_outward()
         self.bushsim.send(signal.SIGUSR1)
@@ -77,9 +79,20 @@ class Port(EndToEndTest):
         self.assertEqual(results, dict.fromkeys(OUTWARD, "link"))
         # The log tells it before clients are told.
         self.wait_until("clients to be told", lambda: self.mcu_states() == ["OFFLINE", "OFFLINE"])
+        stale = self.motors()
+        for name in OUTWARD:
+            self.assertEqual(stale[name]["trust"], "stale")
+            self.assertIn("may have run on", stale[name]["uncertain_reason"])
+            self.assertGreater(stale[name]["heard_utime_us"], 0)
 
         self.bushsim.send(signal.SIGUSR2)
         self.wait_until_ready()
+        found = self.positions()
+        corrected = {event["motor"]: event for event in self.moves() if event["event"] == "corrected"}
+        for name in OUTWARD:
+            self.assertEqual(corrected[name]["from_steps"], stale[name]["position_steps"])
+            self.assertEqual(corrected[name]["position_steps"], found[name])
+            self.assertIn(f"{name}: stands at {found[name]}, not at", self.bushd.said())
         self.assertIn(f"port {self.file(links[-1])} opened", self.bushd.said())
         self.assertEqual([mcu["boot"] for mcu in self.status()["mcus"]], before)
         self.assert_way_back_shows_no_step_lost()
@@ -128,7 +141,8 @@ class Port(EndToEndTest):
     def test_in_use_by_another_daemon(self):
         self.bring_up()
         config = self.file("bushd.toml").read_text()
-        self.file("second.toml").write_text(config.replace(str(self.file("control")), str(self.file("control-second"))))
+        config = config.replace(str(self.file("control")), str(self.file("control-second")))
+        self.file("second.toml").write_text(config.replace('"BUSHD"', '"SECOND"'))
         second = self.start_bushd("moves-second.jsonl", "second.toml")
         self.wait_until("the second daemon to complain", lambda: "trying again" in second.said())
         self.assertIn(str(self.file("port")), second.said())

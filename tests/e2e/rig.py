@@ -93,6 +93,7 @@ class EndToEndTest(unittest.TestCase):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="bushd-e2e-"))
         # For clients: the daemon of this test, and no other of this machine.
         os.environ["BUSHD_CONTROL"] = str(self.folder / "control")
+        os.environ["RUNTIME_DIRECTORY"] = str(self.folder)
         self.programs = []
         result = result if result is not None else self.defaultTestResult()
         bad_before = len(result.failures) + len(result.errors)
@@ -143,6 +144,11 @@ class EndToEndTest(unittest.TestCase):
         self.bushsim = self.start_bushsim(link=links[0], options=more)
         self.bushd = self.start_bushd()
         self.wait_until_ready()
+
+    def survey(self):
+        """Somebody says that all motors stand at 0."""
+        for name in MOTORS:
+            self.command("set", name, "0")
 
     def run_program(self, *command):
         return subprocess.run(command, capture_output=True, text=True, timeout=GIVE_UP_S, check=False)
@@ -231,11 +237,11 @@ class EndToEndTest(unittest.TestCase):
         edges = self.traced(trace)
         return {name: sum(1 if edge.direction else -1 for edge in edges[name]) for name in MOTORS}
 
-    def assert_way_back_shows_no_step_lost(self, moves="moves.jsonl"):
+    def assert_way_back_shows_no_step_lost(self, moves="moves.jsonl", trust="known"):
         """Motors that went OUTWARD and were ended by a fault: they stand where the trace leads to, and their tables
         brought them to rest there; so they get back to where they began. Ends all programs."""
         found = self.motors()
-        self.assertEqual({motor["trust"] for motor in found.values()}, {"known"})
+        self.assertEqual({motor["trust"] for motor in found.values()}, {trust})
         self.assertEqual({motor["moving"] for motor in found.values()}, {False})
         # Each against its former direction, so that in the trace the two can be told apart.
         self.command("move", "--wait", *[word for name in OUTWARD for word in (name, "--to", "0")])

@@ -272,8 +272,9 @@ TEST(Codec, SnapshotsArriveAsTheyAre) {
                                              .activity = api::Activity::kMoving,
                                              .moving = true,
                                              .inhibited = {.positive = true},
-                                             .trust = api::Trust::kUncertain,
-                                             .uncertain_reason = "restarted"}}};
+                                             .trust = api::Trust::kStale,
+                                             .uncertain_reason = "lost",
+                                             .heard_utime_us = 4711}}};
   const auto packet = encode(part, 11, state);
   const auto message = std::get<StateMessage>(*decode_daemon_message("STATE", packet->payload));
   EXPECT_EQ(message.snapshot, state);

@@ -29,6 +29,7 @@ class MotorTest : public testing::Test {
   MotorTest() {
     mcu.motor_count = 16;
     motor.goes_online(mcu, true, false);
+    motor.position_is_known();
   }
 
   // What the MCU says when its motors have done their plans up to `tick`.
@@ -235,8 +236,57 @@ TEST_F(MotorTest, LocalInputsThatCameFirstEndAMove) {
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
   EXPECT_TRUE(motor.is<Local>());
-  motor.goes_offline();
+  motor.goes_offline(0);
   EXPECT_TRUE(motor.is<Resting>()) << "nobody knows of it any more";
+}
+
+TEST_F(MotorTest, HasNoPositionBeforeItsMcuHasReported) {
+  const Motor unheard(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
+  EXPECT_EQ(unheard.trust({}).trust, api::Trust::kUnknown);
+  EXPECT_THAT(unheard.trust({}).reason, HasSubstr("MCU hall:1 has not reported"));
+  EXPECT_EQ(motor.trust(0).trust, api::Trust::kKnown);
+  EXPECT_EQ(motor.trust(0).reason, "");
+  report(kStart, 42);
+  EXPECT_EQ(motor.trust(1).trust, api::Trust::kUnknown) << "its MCU is in another boot";
+  EXPECT_THAT(motor.trust(1).reason, HasSubstr("heard at 42"));
+}
+
+TEST_F(MotorTest, IsUncertainUntilSomebodySaysWhereItStandsButMayMove) {
+  Motor found(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
+  found.goes_online(mcu, true, false);
+  EXPECT_EQ(found.trust(0).trust, api::Trust::kUncertain);
+  EXPECT_THAT(found.trust(0).reason, HasSubstr("neither set nor homed"));
+  EXPECT_TRUE(found.may_move_to(5));
+  found.home();
+  found.end_homing(true);
+  EXPECT_EQ(found.trust(0).trust, api::Trust::kKnown);
+}
+
+TEST_F(MotorTest, IsStaleWhileItsMcuIsOffline) {
+  motor.goes_offline(4711);
+  EXPECT_EQ(motor.trust(0).trust, api::Trust::kStale);
+  EXPECT_EQ(motor.trust(0).heard_utime_us, 4711);
+  EXPECT_THAT(motor.trust(0).reason, HasSubstr("it rested"));
+  motor.goes_online(mcu, false, false);
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  motor.goes_offline(4712);
+  motor.end(Outcome::kLink, "lost");
+  EXPECT_EQ(motor.trust(0).trust, api::Trust::kStale);
+  EXPECT_EQ(motor.trust(0).heard_utime_us, 4712);
+  EXPECT_THAT(motor.trust(0).reason, HasSubstr("may have run on"));
+  motor.goes_online(mcu, false, false);
+  EXPECT_EQ(motor.trust(0).trust, api::Trust::kKnown);
+}
+
+TEST_F(MotorTest, WhatPeopleMayMoveUnheardMayHaveRunOnFromRest) {
+  MotorSetup local = setup();
+  local.local = true;
+  Motor other(local, Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
+  other.goes_online(mcu, true, false);
+  other.position_is_known();
+  other.goes_offline(4711);
+  EXPECT_THAT(other.trust(0).reason, HasSubstr("may have run on"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <poll.h>
 #include <pty.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -65,6 +66,22 @@ class Pty : public testing::Test {
   int slave_ = -1;
   std::string path_;
 };
+
+// Before it is opened: a pattern such as /dev/tty* has the terminals of people among its matches.
+TEST(SerialPort, ConsolesAreRefused) {
+  unsigned there = 0;
+  for (const char* path : {"/dev/tty", "/dev/tty0", "/dev/tty1", "/dev/console", "/dev/ptmx"}) {
+    struct stat status {};
+    if (::stat(path, &status) != 0 || major(status.st_rdev) == 0) continue;
+    // In a container the console may be a pty.
+    if (major(status.st_rdev) != 4 && major(status.st_rdev) != 5) continue;
+    ++there;
+    const auto port = SerialPort::open(path, 9600);
+    ASSERT_FALSE(port) << path;
+    EXPECT_NE(port.error().text().find("is a console"), std::string::npos) << port.error().text();
+  }
+  EXPECT_GT(there, 0u) << "every Linux has /dev/tty";
+}
 
 TEST_F(Pty, IsSetToRaw8N1AtTheRateAsked) {
   const struct {

@@ -1,7 +1,15 @@
 #include "command_line.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <type_traits>
 #include <utility>
 
 #include "commands.h"
@@ -48,10 +56,22 @@ Command& Command::choice(const std::string& name, std::string* value,
   return *this;
 }
 
+namespace {
+
+// The check of a range lets NaN through: it is neither too small nor too large.
+std::string not_a_number(const std::string& text) {
+  double value = 0;
+  const bool is_nan = CLI::detail::lexical_cast(text, value) && std::isnan(value);
+  return is_nan ? text + " is not a number" : std::string();
+}
+
+}  // namespace
+
 template <class Number>
 Command& Command::number(const std::string& name, Number* value, Number least, Number most,
                          const std::string& text, Needed needed) {
   CLI::Option* option = app_->add_option(name, *value, text)->check(CLI::Range(least, most));
+  if constexpr (std::is_floating_point_v<Number>) option->check(CLI::Validator(not_a_number, ""));
   if (needed == Needed::kYes || !name.starts_with('-')) {
     option->required();
   } else if (*value != Number{}) {
@@ -87,13 +107,15 @@ void Command::run(std::function<int()> action) {
   });
 }
 
-CommandLine::CommandLine()
-    : app_(std::make_unique<CLI::App>("bushctl: move and watch the motors of a running bushd")) {
+CommandLine::CommandLine(const std::string& version)
+    : app_(std::make_unique<CLI::App>("bushctl: move and watch the motors of a running bushd",
+                                      "bushctl")) {
   const char* url = std::getenv("LCM_DEFAULT_URL");
   connection_.url = url != nullptr && *url != '\0' ? url : bushd::client::kDefaultUrl;
   app_->footer(
       "The daemon is reached by its control socket, or by LCM if there is none.\n"
       "Exit codes: 0 done, 1 refused or not done (reason on stderr), 2 wrong usage.");
+  app_->set_version_flag("--version", version);
   app_->require_subcommand(1);
   add_connection(app_.get());
 }
@@ -134,9 +156,72 @@ Command CommandLine::add_local(const std::string& name, const std::string& text)
   return Command(app_->add_subcommand(name, text));
 }
 
+namespace {
+
+// Insertions, deletions and exchanges of letters from one word to the other.
+std::size_t distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t corner = std::exchange(row[0], i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t exchanged = corner + (a[i] == b[j] ? 0 : 1);
+      corner = row[j + 1];
+      row[j + 1] = std::min({exchanged, row[j] + 1, corner + 1});
+    }
+  }
+  return row.back();
+}
+
+// What is wrong if the word that stands where a command of `app` should is none. `called`: the
+// words up to there.
+std::optional<std::string> no_command(const CLI::App& app, const std::string& called,
+                                      std::span<const std::string> arguments) {
+  constexpr std::size_t kAlike = 2;
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& word = arguments[i];
+    if (word.starts_with("-")) {
+      const CLI::Option* option = app.get_option_no_throw(word);
+      if (option != nullptr && option->get_items_expected_max() > 0) ++i;
+      continue;
+    }
+    const CLI::App* nearest = nullptr;
+    for (const CLI::App* command : app.get_subcommands({})) {
+      const std::size_t away = distance(word, command->get_name());
+      if (away == 0 && command->get_subcommands({}).empty()) return std::nullopt;
+      if (away == 0) return no_command(*command, called + " " + word, arguments.subspan(i + 1));
+      if (away > kAlike || away >= word.size()) continue;
+      if (nearest == nullptr || away < distance(word, nearest->get_name())) nearest = command;
+    }
+    const std::string hint =
+        nearest == nullptr ? "" : fmt::format("; is \"{}\" meant?", nearest->get_name());
+    return fmt::format("there is no command \"{}\"{} ('{} --help' lists them)", word, hint, called);
+  }
+  return std::nullopt;
+}
+
+// Steps may be negative, and no motor's name begins with a dash: behind "--" a command that sorts
+// its words by itself finds what it would find without.
+bool sorts_its_words(const CLI::App& app, std::span<const std::string> arguments) {
+  return std::ranges::any_of(app.get_subcommands({}), [&](const CLI::App* command) {
+    return command->get_allow_extras() &&
+           std::ranges::find(arguments, command->get_name()) != arguments.end();
+  });
+}
+
+}  // namespace
+
 int CommandLine::run(int argc, char** argv) {
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  if (const auto wrong = no_command(*app_, "bushctl", arguments))
+    return wrong_usage({.message = *wrong});
+  const auto ends = std::ranges::find(arguments, "--");
+  if (ends != arguments.end() && sorts_its_words(*app_, {arguments.begin(), ends})) {
+    arguments.erase(ends);
+  }
+  std::ranges::reverse(arguments);  // as CLI::App takes them
   try {
-    app_->parse(argc, argv);
+    app_->parse(std::move(arguments));
   } catch (const CLI::RuntimeError& ran) {
     return ran.get_exit_code();
   } catch (const CLI::ParseError& error) {

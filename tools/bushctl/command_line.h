@@ -61,7 +61,7 @@ class Command {
 
 class CommandLine {
  public:
-  CommandLine();
+  explicit CommandLine(const std::string& version);
   ~CommandLine();
 
   // `group`: of a command that has commands of its own; "": none.

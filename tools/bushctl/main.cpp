@@ -10,7 +10,7 @@
 int main(int argc, char** argv) {
   bushd::expect_closed_output();
   try {
-    bushctl::CommandLine line;
+    bushctl::CommandLine line(BUSHD_VERSION);
     bushctl::add_view_commands(line);
     bushctl::add_motion_commands(line);
     bushctl::add_driver_commands(line);

@@ -1,7 +1,9 @@
 #include "render.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "base/printable.h"
@@ -34,6 +36,31 @@ const char* moves_text(const api::MotorState& motor) {
   return motor.activity == api::Activity::kLocal ? "local" : "yes";
 }
 
+bool has_position(const api::MotorState& motor) {
+  return motor.trust != api::Trust::kUnknown;
+}
+
+std::string position_text(const api::MotorState& motor, std::int64_t steps) {
+  return has_position(motor) ? fmt::to_string(steps) : "-";
+}
+
+nlohmann::json position_json(const api::MotorState& motor, std::int64_t steps) {
+  return has_position(motor) ? nlohmann::json(steps) : nlohmann::json(nullptr);
+}
+
+// "heard 2026-01-31 14:03:22": old numbers are shown with their time.
+std::string heard_text(const api::MotorState& motor) {
+  if (!motor.heard_utime_us) return {};
+  const std::chrono::sys_seconds heard(std::chrono::seconds(*motor.heard_utime_us / 1'000'000));
+  return fmt::format("heard {:%F %T}", fmt::localtime(std::chrono::system_clock::to_time_t(heard)));
+}
+
+std::string notes_text(const api::MotorState& motor) {
+  const std::string heard = heard_text(motor);
+  const std::string limit = limit_text(motor);
+  return heard + (heard.empty() || limit.empty() ? "" : ", ") + limit;
+}
+
 // Of the motor at this place in the state; another one's never, whatever the network says.
 api::MotorDescription description_of(const api::Description& mcu, std::size_t index,
                                      const std::string& motor) {
@@ -46,6 +73,8 @@ api::MotorDescription description_of(const api::Description& mcu, std::size_t in
 
 nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
                           const api::MotorDescription& description) {
+  const auto heard_utime_us =
+      motor.heard_utime_us ? nlohmann::json(*motor.heard_utime_us) : nullptr;
   return {{"name", motor.name},
           {"mcu", mcu},
           {"output", description.output},
@@ -53,8 +82,8 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"table", description.table.name},
           {"table_revision", description.table.revision},
           {"table_hash", description.table.hash},
-          {"position_steps", motor.position_steps},
-          {"target_steps", motor.target_steps},
+          {"position_steps", position_json(motor, motor.position_steps)},
+          {"target_steps", position_json(motor, motor.target_steps)},
           {"velocity_steps_per_s", motor.velocity_steps_per_s},
           {"moving", motor.moving},
           {"activity", word(motor.activity)},
@@ -62,7 +91,8 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"input", motor.input},
           {"inhibited", word(motor.inhibited)},
           {"trust", word(motor.trust)},
-          {"uncertain_reason", motor.uncertain_reason}};
+          {"uncertain_reason", motor.uncertain_reason},
+          {"heard_utime_us", heard_utime_us}};
 }
 
 nlohmann::json mcu_json(const api::StateSnapshot& mcu, const api::Description& description) {
@@ -94,11 +124,11 @@ std::vector<std::string> table(const Status& status) {
       const auto description = description_of(status.descriptions.at(i).snapshot, m, motor.name);
       motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
                   fmt::to_string(description.output), bushd::printable(description.group),
-                  text_of(description.table), fmt::to_string(motor.position_steps),
-                  fmt::to_string(motor.target_steps),
+                  text_of(description.table), position_text(motor, motor.position_steps),
+                  position_text(motor, motor.target_steps),
                   fmt::format("{:.1f}", motor.velocity_steps_per_s),
                   moving_word(motor, moves_text(motor), "-"), std::string(word(motor.trust)),
-                  limit_text(motor)});
+                  notes_text(motor)});
     }
     mcus.row({bushd::printable(mcu.mcu), std::string(word(mcu.state)), fmt::to_string(mcu.boot),
               bushd::printable(mcu.detail)});
@@ -110,12 +140,12 @@ std::vector<std::string> table(const Status& status) {
 }
 
 std::string motor_line(const api::MotorState& motor) {
-  std::string line =
-      fmt::format("{} position {} target {} velocity {:.1f} {}", bushd::printable(motor.name),
-                  motor.position_steps, motor.target_steps, motor.velocity_steps_per_s,
-                  moving_word(motor, "moving", "at rest"));
+  std::string line = fmt::format(
+      "{} position {} target {} velocity {:.1f} {}", bushd::printable(motor.name),
+      position_text(motor, motor.position_steps), position_text(motor, motor.target_steps),
+      motor.velocity_steps_per_s, moving_word(motor, "moving", "at rest"));
   if (motor.trust != api::Trust::kKnown) line += fmt::format(" {}", word(motor.trust));
-  if (motor.inhibited.any()) line += " " + limit_text(motor);
+  if (const std::string notes = notes_text(motor); !notes.empty()) line += " " + notes;
   return line;
 }
 

@@ -54,6 +54,7 @@ int run(int argc, char** argv) {
       "Exit codes: 0 no violation, 1 a violation (seed, virtual time and what led to it on "
       "stderr),\n"
       "2 wrong usage. Rates are events per simulated hour, 0 for none.");
+  app.set_version_flag("--version", BUSHD_VERSION);
   bushfaults::Options options;
   bool json = false;
   std::string seed = "fresh";

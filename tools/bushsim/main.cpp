@@ -35,6 +35,7 @@ std::uint16_t fresh_boot_number() {
 
 int run(int argc, char** argv) {
   CLI::App app{"bushsim: virtual MCUs on a virtual RS-485 bus, reached through a pty"};
+  app.set_version_flag("--version", BUSHD_VERSION);
   app.footer(
       "SIGUSR1 pulls the serial adapter out: the port and its name are gone, the MCUs live on and\n"
       "hear nothing. SIGUSR2 plugs it in again, under the next --link.\n"

@@ -15,6 +15,7 @@ constexpr int kUsage = 2;
 int run(int argc, char** argv) {
   CLI::App app{"bushtab: make, show, edit and check acceleration tables"};
   app.footer("Exit codes: 0 done, 1 refused (reason on stderr), 2 wrong usage.");
+  app.set_version_flag("--version", BUSHD_VERSION);
   app.require_subcommand(1);
   app.fallthrough();
   bushtab::Places places;

@@ -69,6 +69,8 @@ class MoveLog:
             "retarget": self._change,
             "result": self._result,
             "set": self._set,
+            "corrected": self._corrected,
+            "restarted": self._set,  # the MCU counts from anew
             "autonomous": self._autonomous,
         }
         try:
@@ -145,6 +147,10 @@ class MoveLog:
         if name in self.motors:
             self.motors[name].set_by_steps += steps - self._at_steps.get(name, steps)
         self._at_steps[name] = steps
+
+    def _corrected(self, event):
+        """Steps that were made while nobody heard: the edges tell them."""
+        self._at_steps[event["motor"]] = event["position_steps"]
 
     def _check_each(self):
         """What the log must fulfil by itself, before edges are looked at."""

@@ -49,7 +49,8 @@ Result<Found> find(std::string_view table, std::span<const Place> places) {
     if (!content) return fail(content.error());
     return Found{*path, std::move(*content)};
   }
-  if (!is_table_name(name)) return fail(path.error());
+  // Not just missing: what is there cannot be looked at.
+  if (!is_table_name(name) || (!path && !path.error().file.empty())) return fail(path.error());
   for (const Place& place : places) {
     if (!knows(place, name)) continue;
     const Store store(place.directory, place.history);

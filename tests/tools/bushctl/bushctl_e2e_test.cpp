@@ -302,6 +302,39 @@ TEST(Bushctl, MixedMovesAndWrongWordsAreUsageErrors) {
   EXPECT_EQ(bushctl({"dance"}).code, 2);
 }
 
+TEST(Bushctl, ACommandThatIsNoneIsNamedWithTheNearest) {
+  const Ran ran = bushctl({"movee", "theta", "5"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("there is no command \"movee\"; is \"move\" meant?"));
+  const Ran nested = bushctl({"--lcm", "table", "uze"});
+  EXPECT_EQ(nested.code, 2);
+  EXPECT_THAT(nested.err, HasSubstr("there is no command \"uze\"; is \"use\" meant?"));
+  const Ran far = bushctl({"--prefix", "move", "dance"});
+  EXPECT_EQ(far.code, 2);
+  EXPECT_THAT(far.err, HasSubstr("there is no command \"dance\" ('bushctl --help'"));
+}
+
+TEST(Bushctl, NotANumberIsNoTime) {
+  const Ran ran = bushctl({"status", "--timeout-s", "nan"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("nan is not a number"));
+}
+
+TEST(Bushctl, SaysItsVersion) {
+  const Ran ran = bushctl({"--version"});
+  EXPECT_EQ(ran.code, 0);
+  EXPECT_THAT(ran.out, testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST(Bushctl, TwoDashesBeforeANegativeNumberChangeNothing) {
+  FakeDaemon daemon;
+  daemon.start(always(Outcome::kReached));
+  EXPECT_EQ(bushctl({"move", "theta", "--", "-400", "--wait"}).code, 0);
+  const auto requests = daemon.requests();
+  ASSERT_EQ(requests.size(), 1u);
+  EXPECT_EQ(std::get<api::Move>(requests[0]).motors, steps({{"theta", -400}}));
+}
+
 TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   FakeDaemon daemon;
   daemon.start(always(Outcome::kDone));

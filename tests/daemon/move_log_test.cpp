@@ -1,0 +1,78 @@
+// The file that moves are logged to: what is none is refused, what goes away is begun anew.
+#include "daemon/move_log.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "tables/temp_directory.h"
+
+namespace bushd::daemon {
+namespace {
+
+using testing::HasSubstr;
+using Appended = MoveLog::Appended;
+
+class MoveLogTest : public testing::Test {
+ protected:
+  std::string path() const { return directory_.path() / "moves.jsonl"; }
+  std::string text() const {
+    std::ostringstream text;
+    text << std::ifstream(path()).rdbuf();
+    return text.str();
+  }
+
+  test::TempDirectory directory_;
+};
+
+TEST_F(MoveLogTest, GoesOnWhereItEnded) {
+  ASSERT_EQ(MoveLog::open(path())->append("{1}"), Appended::kOn);
+  ASSERT_EQ(MoveLog::open(path())->append("{2}"), Appended::kOn);
+  EXPECT_EQ(text(), "{1}\n{2}\n");
+}
+
+TEST_F(MoveLogTest, AFifoIsRefusedAtOnceWithAndWithoutAReader) {
+  ASSERT_EQ(::mkfifo(path().c_str(), 0600), 0);
+  const auto refused = MoveLog::open(path());
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), HasSubstr("must be a regular file"));
+  const std::fstream reader(path());
+  EXPECT_FALSE(MoveLog::open(path()));
+}
+
+TEST_F(MoveLogTest, NoFileAtAllIsRefused) {
+  EXPECT_FALSE(MoveLog::open(directory_.path()));
+  EXPECT_FALSE(MoveLog::open(directory_.path() / "missing" / "moves.jsonl"));
+  EXPECT_TRUE(MoveLog::open("/dev/null"));
+}
+
+TEST_F(MoveLogTest, ARemovedFileIsBegunAnew) {
+  auto log = MoveLog::open(path());
+  ASSERT_EQ(log->append("{1}"), Appended::kOn);
+  std::filesystem::remove(path());
+  ASSERT_EQ(log->append("{2}"), Appended::kAnew);
+  ASSERT_EQ(log->append("{3}"), Appended::kOn);
+  EXPECT_EQ(text(), "{2}\n{3}\n");
+}
+
+TEST_F(MoveLogTest, ARotatedFileIsBegunAnew) {
+  auto log = MoveLog::open(path());
+  ASSERT_EQ(log->append("{1}"), Appended::kOn);
+  std::filesystem::rename(path(), path() + ".1");
+  ASSERT_EQ(log->append("{2}"), Appended::kAnew);
+  EXPECT_EQ(text(), "{2}\n");
+}
+
+TEST_F(MoveLogTest, ALineThatCannotBeWrittenIsAnErrorUntilTheFolderIsBack) {
+  auto log = MoveLog::open(path());
+  std::filesystem::remove_all(directory_.path());
+  EXPECT_FALSE(log->append("{1}"));
+  std::filesystem::create_directory(directory_.path());
+  EXPECT_EQ(log->append("{2}"), Appended::kAnew);
+}
+
+}  // namespace
+}  // namespace bushd::daemon
