@@ -68,7 +68,7 @@ TEST(Trust, NobodyHasSaidWhereItStandsAfterTheDaemonsStart) {
 // Cut off at speed, so that it may have overrun: the next daemon cannot know that.
 TEST(Trust, ARestartOfTheDaemonMakesNothingKnown) {
   std::string toml = hall(1, 1);
-  toml.insert(toml.find("[[group]]"), "emergency_stop = \"cut\"\n");
+  toml.insert(toml.find("[[group]]"), "emergency_stop = \"immediate\"\n");
   Lab lab(toml);
   lab.connect();
   const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
