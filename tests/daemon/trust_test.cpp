@@ -30,13 +30,13 @@ TEST(Trust, AnMcuThatWasNeverHeardHasUnknownPositions) {
   Lab lab(hall(1, 1));
   lab.unplug(0);
   lab.run_for(2);
-  EXPECT_EQ(lab.motor("m01").trust, "unknown");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUnknown);
 }
 
 TEST(Trust, UntilTheFirstReportOfARestartedDaemonThePositionIsUnknown) {
   Lab lab(hall(1, 1));
   lab.connect();
-  lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+  lab.send(Ask::kMoveBy, {"m01"}, {9000});
   lab.run_for(1);
   lab.restart_daemon();
   bool seen = false;
@@ -44,8 +44,8 @@ TEST(Trust, UntilTheFirstReportOfARestartedDaemonThePositionIsUnknown) {
       [&] {
         if (!lab.has_state("hall:1")) return false;
         const auto motor = lab.motor("m01");
-        seen |= motor.trust == "unknown";
-        EXPECT_NE(motor.trust, "known");
+        seen |= motor.trust == api::Trust::kUnknown;
+        EXPECT_NE(motor.trust, api::Trust::kKnown);
         return lab.all_ready();
       },
       30));
@@ -56,61 +56,61 @@ TEST(Trust, UntilTheFirstReportOfARestartedDaemonThePositionIsUnknown) {
 TEST(Trust, NobodyHasSaidWhereItStandsAfterTheDaemonsStart) {
   Lab lab(hall(1, 2));
   find(lab);
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
-  EXPECT_EQ(lab.wait(lab.send(command_t::SET_POSITION, {"m01"}, {7})).result, "done");
-  EXPECT_EQ(lab.motor("m01").trust, "known");
-  EXPECT_EQ(lab.motor("m02").trust, "uncertain");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {5})).result, "reached")
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {7})).result, "done");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.motor("m02").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "reached")
       << "as far as anybody knows no step is lost";
-  EXPECT_EQ(lab.motor("m02").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m02").trust, api::Trust::kUncertain);
 }
 
-// Cut off at speed, so that it may have overrun: the next daemon cannot know that.
+// Stopped immediately at speed, so that it may have overrun: the next daemon cannot know that.
 TEST(Trust, ARestartOfTheDaemonMakesNothingKnown) {
   std::string toml = hall(1, 1);
   toml.insert(toml.find("[[group]]"), "emergency_stop = \"immediate\"\n");
   Lab lab(toml);
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {9000});
   lab.run_for(1);
-  lab.send(command_t::EMERGENCY_STOP, {});
+  lab.send(Ask::kEmergencyStop, {});
   EXPECT_EQ(lab.wait(move).result, "stopped");
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
-  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
   lab.restart_daemon();
   find(lab);
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
 }
 
 TEST(Trust, ARestartOfDaemonAndMcuMakesNothingKnown) {
   Lab lab(hall(1, 1));
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {50})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {50})).result, "reached");
   lab.bus(0).reboot(0);
   lab.restart_daemon();
   find(lab);
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
 }
 
 TEST(Trust, WhatWasHeardLastIsStaleAndCorrectedInTheLogOfMoves) {
   for (const char* manner : {"fine", "fine_table"}) {
     Lab lab(hall(1, 2, manner));
     lab.connect();
-    lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+    lab.send(Ask::kMoveBy, {"m01"}, {9000});
     lab.run_for(1.3);
     lab.unplug(0);
     lab.run_for(0.01);
     const auto stale = lab.motor("m01");
-    EXPECT_EQ(stale.trust, "stale");
-    EXPECT_EQ(lab.motor("m02").trust, "stale") << "its MCU may have lost power";
+    EXPECT_EQ(stale.trust, api::Trust::kStale);
+    EXPECT_EQ(lab.motor("m02").trust, api::Trust::kStale) << "its MCU may have lost power";
     lab.run_for(3);
     EXPECT_EQ(lab.motor("m01").position_steps, stale.position_steps);
     lab.plug(0);
     find(lab);
     const std::int64_t stands = lab.shaft_steps("m01");
     EXPECT_GT(stands, stale.position_steps);
-    EXPECT_EQ(lab.motor("m01").trust, "known") << "its MCU has counted on";
+    EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown) << "its MCU has counted on";
     const auto corrected = last_event(lab, "corrected");
     ASSERT_FALSE(corrected.is_null());
     EXPECT_EQ(corrected["motor"], "m01");
@@ -123,11 +123,11 @@ TEST(Trust, WhatWasHeardLastIsStaleAndCorrectedInTheLogOfMoves) {
 TEST(Trust, WhereMotorsStoodBeforeTheirMcuRestartedIsInTheLog) {
   Lab lab(hall(1, 1));
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {50})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {50})).result, "reached");
   lab.bus(0).reboot(0, 50'000'000);
-  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == "unknown"; }, 5));
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == api::Trust::kUnknown; }, 5));
   find(lab);
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
   const auto restarted = last_event(lab, "restarted");
   ASSERT_FALSE(restarted.is_null());
   EXPECT_EQ(restarted["motor"], "m01");
@@ -138,8 +138,8 @@ TEST(Trust, WhereMotorsStoodBeforeTheirMcuRestartedIsInTheLog) {
 TEST(Trust, WhoSetAPositionIsInTheLog) {
   Lab lab(hall(1, 1));
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {50})).result, "reached");
-  const auto set = lab.send(command_t::SET_POSITION, {"m01"}, {7});
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {50})).result, "reached");
+  const auto set = lab.send(Ask::kSetPosition, {"m01"}, {7});
   EXPECT_EQ(lab.wait(set).result, "done");
   const auto event = last_event(lab, "set");
   EXPECT_EQ(event["from_steps"], 50);
