@@ -91,7 +91,7 @@ StreamScheduler::Choice StreamScheduler::choose(const Mcu& mcu, Tick first) {
   Choice choice{.first = first};
   for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     const Stream& stream = mcu.stream[m];
-    if (!mcu.sendable(m)) continue;
+    if (!mcu.sendable(m) || (mcu.replaced != 0 && stream.starts())) continue;
     if (stream.next != first) {
       choice.join = std::min(choice.join, stream.next);
       continue;
