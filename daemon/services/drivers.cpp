@@ -1,11 +1,15 @@
 #include "daemon/services/drivers.h"
 
 #include <algorithm>
+#include <string>
 
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
 namespace {
+
+// Each waits for its MCUs to confirm it, and a flood of them keeps these busy.
+constexpr std::size_t kMaxOpen = 256;
 
 // What the report of an MCU shows against an action being done there.
 Result<void> check(std::uint8_t action, const bushd_report& report) {
@@ -52,6 +56,11 @@ void Drivers::begin(std::int64_t now_us, const api::Asker& asker, const api::Mot
                     std::uint8_t action) {
   const auto mcus = mcus_of(names, action != BUSHD_CONTROL_ENABLE);
   if (!mcus) return asker.answer(api::Refused{mcus.error().text()});
+  if (open_.size() >= kMaxOpen) {
+    return asker.answer(api::Refused{std::to_string(open_.size()) +
+                                     " requests about drivers and faults wait for their MCUs "
+                                     "already; try again in a moment"});
+  }
   open_.push_back({Confirmation(asker, *mcus, now_us), action});
   for (const McuId mcu : *mcus) installation_[mcu].control(action);
 }

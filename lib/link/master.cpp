@@ -10,7 +10,7 @@ namespace {
 
 // A queue with less than this would be empty after some frames. However many stops are wanted, the
 // motors that they leave alone go on.
-constexpr std::int64_t kQueueCriticalUs = 30'000;
+constexpr std::int64_t kQueueCriticalUs = 40'000;
 
 PerMcu<McuRecord> records_of(const BusSetup& setup) {
   PerMcu<McuRecord> records;

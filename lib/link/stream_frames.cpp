@@ -76,10 +76,13 @@ bool StreamScheduler::behind(std::int64_t now_us, std::int64_t lead_us) const {
   const Tick lead = clock_.ticks_in(lead_us);
   for (const McuIndex i : mcus_.indices()) {
     if (records_[i].view.phase != McuPhase::kOnline) continue;
-    const auto next = mcus_[i].next_tick();
     // A small queue takes whole frames only, so it is never kept fuller than that.
     const Tick depth = (records_[i].view.identity.queue_ticks - kSpareTicks) / 2;
-    if (next && *next < now + std::min(lead, depth)) return true;
+    const Tick enough = now + std::min(lead, depth);
+    const Mcu& mcu = mcus_[i];
+    for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      if (mcu.sendable(m) && mcu.stream[m].next < enough) return true;  // starts that wait, too
+    }
   }
   return false;
 }
@@ -90,7 +93,7 @@ StreamScheduler::Choice StreamScheduler::choose(const Mcu& mcu, Tick first) {
   Choice choice{.first = first};
   for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     const Stream& stream = mcu.stream[m];
-    if (!mcu.sendable(m)) continue;
+    if (!mcu.sendable(m) || (mcu.replaced != 0 && stream.starts())) continue;
     if (stream.next != first) {
       choice.join = std::min(choice.join, stream.next);
       continue;

@@ -72,9 +72,12 @@ bool StreamScheduler::has_ticks_to_send(McuIndex mcu) const {
                      [](const Stream& s) { return s.active && !s.finished; });
 }
 
+// A start waits for the replacement before it to be confirmed: if that was not taken, neither would
+// the start be, and a replacement of the start would not be taken either.
 std::optional<Tick> StreamScheduler::Mcu::next_tick() const {
   std::optional<Tick> next;
   for (unsigned motor = 0; motor < BUSHD_MOTORS_PER_MCU; ++motor) {
+    if (replaced != 0 && stream[motor].starts()) continue;
     if (sendable(motor)) next = std::min(next.value_or(INT64_MAX), stream[motor].next);
   }
   return next;

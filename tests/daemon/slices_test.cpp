@@ -30,7 +30,7 @@ std::string large_hall() {
   std::string toml = "[[group]]\nname = \"axes\"\ntable = \"bushd2-constant\"\n";
   for (int b = 0; b < 8; ++b) {
     toml += "[[bus]]\nname = \"hall" + std::to_string(b) + "\"\nport = \"/dev/null" +
-            std::to_string(b) + "\"\nbaud = 4000000\ntick_us = 2560\nformat = \"coarse\"\n";
+            std::to_string(b) + "\"\nbaud = 4000000\ntick_us = 10240\nformat = \"coarse\"\n";
   }
   for (int m = 0; m < kMcus; ++m) {
     const std::string bus = "hall" + std::to_string(m / 16);
