@@ -80,6 +80,7 @@ bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, const bushd_table* table, uin
   // The first step lies up to a unit beyond units - 1.
   tick.has_places = tick.units < UINT16_MAX && unit_ns < UINT32_MAX - UINT16_MAX &&
                     unit_slots >> 32 == 0 && tick.units + 1u + unit_ns < UINT32_MAX / q;
+  tick.is_short = tick.has_places && tick.rest_ns == 0;
   tick.per_unit = tick.per_ns = tick.per_cruise = 0;
   if (tick.has_places) {
     tick.per_unit = ((unit_slots << 32) + tick_ns - 1u) / tick_ns;
@@ -233,9 +234,8 @@ static uint8_t carry_rest(bushd_run* run, const bushd_run_tick* tick, uint32_t* 
   return 1;
 }
 
-int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks) {
-  const uint16_t delay = bushd_run_delay(run);
-  if (delay == 0) return 0;
+__attribute__((noinline)) static int16_t make_any(bushd_run* run, const bushd_run_tick* tick,
+                                                  uint16_t delay, uint16_t bit, uint16_t* masks) {
   uint32_t since = run->since + tick->units;
   uint32_t since_ns = run->since_ns;
   if (tick->rest_ns != 0) since += carry_rest(run, tick, &since_ns);
@@ -247,7 +247,24 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit
   } else {
     steps = make_by_rests(run, tick, since, delay, bit, masks);
   }
-  if (tick->rest_ns != 0) run->since_ns = since_ns;
+  run->since_ns = since_ns;
+  return steps;
+}
+
+int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks) {
+  const uint16_t delay = bushd_run_delay(run);
+  if (delay == 0) return 0;
+  // Mostly 16 bits will do.
+  const uint16_t before = (uint16_t)run->since;
+  const uint16_t since = (uint16_t)(before + (uint16_t)tick->units);
+  int16_t steps = 0;
+  if (!tick->is_short || run->since >> 16 != 0 || since < before) {
+    steps = make_any(run, tick, delay, bit, masks);
+  } else if (since < delay) {
+    run->since = since;
+  } else {
+    steps = make_by_places(run, tick, since, delay, bit, masks);
+  }
   return run->direction < 0 ? (int16_t)-steps : steps;
 }
 

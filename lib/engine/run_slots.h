@@ -26,6 +26,7 @@ typedef struct bushd_run_tick {
   uint64_t per_cruise;  // in a delay of `cruise`
   uint16_t cruise;
   bool has_places;
+  bool is_short;  // that, and a whole number of units
 } bushd_run_tick;
 //   slot_count  BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS
 // Precondition: tick_ns is at most BUSHD_MAX_TICK_NS.

@@ -90,7 +90,7 @@ TEST_P(AvrTableRuns, SixteenKeepTheirSlots) {
   ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, load.unit_ns, codes(), load.cruise));
   ASSERT_NO_FATAL_FAILURE(master_.assign_all(kAddress, 0));
   begin_runs(master_.poll(kAddress).tick + 24);
-  // Sixteen runs are made for longer than a tick, well before they begin.
+  // Making sixteen runs takes some ticks, well before they begin; so those come late.
   pass(8 * TimeNs{load.tick_ns});
   const bushd_report before = master_.poll(kAddress);
   const TimeNs before_ns = bus_.now_ns();
@@ -120,23 +120,29 @@ TEST_P(AvrTableRuns, SixteenKeepTheirSlots) {
   }
 }
 
-// Up to 9 and 10 steps a tick of 2.56 ms, by ramps of 238 codes.
-constexpr std::array kLoads = {
-    Load{BUSHD_FORMAT_COARSE, 2'560'000, 1'000, 280, 0},
-    Load{BUSHD_FORMAT_COARSE, 2'560'000, 1'000, 280, 50},
-    Load{BUSHD_FORMAT_FINE, 2'560'000, 1'000, 280, 0},
-    Load{BUSHD_FORMAT_FINE, 2'560'000, 1'000, 280, 50},
-    Load{BUSHD_FORMAT_FINE, 2'560'000, 1'000, 280, 50, 1},
-    Load{BUSHD_FORMAT_FINE, 2'560'000, 1'000, 280, 50, 2},
-};
+// At least 9 steps a tick, by ramps of 238 codes; polled as by bushd. simavr enters interrupts in
+// no time, the chip takes five cycles: ticks are shorter by the 1500 cycles of a tick than those
+// that docs/performance.md tells.
+std::vector<Load> loads() {
+  std::vector<Load> loads;
+  for (int phase = 0; phase < 4; ++phase) {
+    loads.push_back({BUSHD_FORMAT_COARSE, 2'464'000, 1'000, 270, 50, phase});
+    loads.push_back({BUSHD_FORMAT_FINE, 2'704'000, 1'000, 297, 50, phase});
+  }
+  loads.push_back({BUSHD_FORMAT_FINE, 2'560'000, 1'000, 280, 0});
+  // A tick that is no whole number of time units.
+  loads.push_back({BUSHD_FORMAT_COARSE, 4'000'000, 7'000, 60, 50});
+  return loads;
+}
 
 std::string name_of(const testing::TestParamInfo<Load>& load) {
   return (load.param.format == BUSHD_FORMAT_FINE ? "Fine" : "Coarse") +
          std::to_string(load.param.tick_ns / 1000) + "us" +
-         (load.param.poll_ms != 0 ? "Answering" : "") + std::to_string(load.index);
+         (load.param.poll_ms != 0 ? "Answering" : "") +
+         (load.param.phase != 0 ? "Phase" + std::to_string(load.param.phase) : "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Loads, AvrTableRuns, testing::ValuesIn(kLoads), name_of);
+INSTANTIATE_TEST_SUITE_P(Loads, AvrTableRuns, testing::ValuesIn(loads()), name_of);
 
 }  // namespace
 }  // namespace bushd::sim
