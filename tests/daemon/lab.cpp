@@ -248,26 +248,16 @@ bool Lab::all_ready() const {
 void Lab::connect() {
   ASSERT_TRUE(run_until([this] { return all_ready(); }, 10)) << "not all MCUs became READY";
   if (std::exchange(positions_confirmed_, true)) return;
-  command_t set{};
-  set.client_id = "surveyor";
-  set.number = 1;
-  set.kind = command_t::SET_POSITION;
+  std::vector<std::string> motors;
+  std::vector<std::int64_t> steps;
   for (const auto& [mcu, state] : states_) {
-    for (const motor_state_t& motor : state.motors) {
-      if (motor.activity != "rest") continue;
-      set.motors.push_back(motor.name);
-      set.steps.push_back(motor.position_steps);
+    for (const api::MotorState& motor : state.motors) {
+      if (motor.activity != api::Activity::kResting) continue;
+      motors.push_back(motor.name);
+      steps.push_back(motor.position_steps);
     }
   }
-  set.motor_count = static_cast<std::int32_t>(set.motors.size());
-  command(set);
-  ASSERT_TRUE(run_until(
-      [&] {
-        return std::all_of(set.motors.begin(), set.motors.end(), [this](const std::string& name) {
-          return motor(name).trust == "known";
-        });
-      },
-      5));
+  ASSERT_EQ(wait(send(Ask::kSetPosition, motors, steps)).result, "done");
   move_lines_.clear();
 }
 

@@ -18,7 +18,12 @@ constexpr std::size_t kKept = 20'000;
 
 // The answer without its time.
 std::vector<std::uint8_t> essence(const lcm::ReplyMessage& message) {
-  return lcm::encode(0, message.id, message.reply).value().payload;
+  std::vector<std::uint8_t> all;
+  const auto parts = lcm::encode(0, message.id, message.reply).value();
+  for (const lcm::Packet& part : parts) {
+    all.insert(all.end(), part.payload.begin(), part.payload.end());
+  }
+  return all;
 }
 
 bool is_refusal(const api::Reply& reply, std::string_view part) {
