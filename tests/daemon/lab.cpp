@@ -248,22 +248,16 @@ bool Lab::all_ready() const {
 void Lab::connect() {
   ASSERT_TRUE(run_until([this] { return all_ready(); }, 10)) << "not all MCUs became READY";
   if (std::exchange(positions_confirmed_, true)) return;
-  std::vector<api::MotorSteps> resting;
+  std::vector<std::string> motors;
+  std::vector<std::int64_t> steps;
   for (const auto& [mcu, state] : states_) {
     for (const api::MotorState& motor : state.motors) {
       if (motor.activity != api::Activity::kResting) continue;
-      resting.push_back({motor.name, motor.position_steps});
+      motors.push_back(motor.name);
+      steps.push_back(motor.position_steps);
     }
   }
-  // Nobody is told.
-  core().request(now_us(), {}, api::SetPosition{resting});
-  ASSERT_TRUE(run_until(
-      [&] {
-        return std::ranges::all_of(resting, [this](const api::MotorSteps& set) {
-          return motor(set.motor).trust == api::Trust::kKnown;
-        });
-      },
-      5));
+  ASSERT_EQ(wait(send(Ask::kSetPosition, motors, steps)).result, "done");
   move_lines_.clear();
 }
 

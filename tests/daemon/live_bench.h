@@ -118,10 +118,11 @@ class LiveBench : public Bench {
   daemon::Interlocks interlocks{installation};
   daemon::OpenMoves open_moves{installation};
   daemon::Journal journal{installation, *this};
-  daemon::Moves moves{installation, interlocks, journal, open_moves, *this};
+  daemon::DryRuns dry_runs{installation};
+  daemon::Moves moves{installation, interlocks, journal, open_moves, dry_runs, *this};
   daemon::HomingQueue homing{installation, interlocks, open_moves, *this};
   daemon::EmergencyStop emergency_stop{installation, interlocks, homing, *this};
-  daemon::Positions positions{installation, interlocks, journal};
+  daemon::Positions positions{installation, interlocks, journal, *this};
 
  private:
   void advance() {

@@ -19,9 +19,9 @@ constexpr std::size_t kKept = 20'000;
 // The answer without its time.
 std::vector<std::uint8_t> essence(const lcm::ReplyMessage& message) {
   std::vector<std::uint8_t> all;
-  const auto packets = lcm::encode(0, message.id, message.reply);
-  for (const lcm::Packet& packet : *packets) {
-    all.insert(all.end(), packet.payload.begin(), packet.payload.end());
+  const auto parts = lcm::encode(0, message.id, message.reply).value();
+  for (const lcm::Packet& part : parts) {
+    all.insert(all.end(), part.payload.begin(), part.payload.end());
   }
   return all;
 }

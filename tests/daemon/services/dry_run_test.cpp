@@ -16,9 +16,11 @@ TEST(DryRunService, IsTheMoveOnCopies) {
   LiveBench bench;
   Stops stops(bench.installation, bench.moves, bench.homing, bench.open_moves);
   bench.connect(stops);
-  const DryRun dry_run(bench.installation);
-  const api::MovePlan plan =
-      dry_run.plan(bench.now_us(), {{bench.motor("m01"), 1000}, {bench.motor("m04"), 0}});
+  DryRun dry_run(bench.installation, bench.now_us(),
+                 {{bench.motor("m01"), 1000}, {bench.motor("m04"), 0}});
+  while (dry_run.step()) {
+  }
+  const api::MovePlan plan = dry_run.take_plan();
   ASSERT_EQ(plan.motors.size(), 2u);
   EXPECT_EQ(plan.motors[0].motor, "m01");
   EXPECT_GT(plan.motors[0].peak_steps_per_s, 0);

@@ -121,7 +121,10 @@ void FakeDaemon::on_request(const lcm::RequestId& id, const api::Request& reques
   }
   publish_state();  // as bushd does on any change
   if (!answer_) return;
-  for (const api::Reply& reply : answer_(request, times)) publish(lcm::encode(1, id, reply));
+  for (const api::Reply& reply : answer_(request, times)) {
+    const auto parts = lcm::encode(1, id, reply);
+    for (const lcm::Packet& part : parts.value()) publish(part);
+  }
 }
 
 api::Reply result(const api::Request& request, api::Outcome outcome) {
