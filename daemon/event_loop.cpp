@@ -12,6 +12,8 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <limits>
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "config/port_pattern.h"
@@ -83,7 +85,7 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
       publishing_(run_, config.mcus.size(), config.buses.size(),
                   {.now_us = now_us, .unix_us = unix_time_us}),
       reception_([this](const api::Asker& asker, const api::Request& request) {
-        core_.request(now_us(), logged(asker, request, *this), request);
+        core_.request(now_us(), with_log(asker, request), request);
       }),
       lcm_front_({.transport = fronts.lcm,
                   .stops = fronts.stops,
@@ -220,12 +222,13 @@ Result<void> EventLoop::run() {
                                      (socket_front_ ? socket_front_->dropped() : 0));
     core_.keep_up(now);
     check_published();
-    for (const std::string& line : log_limit_.due(now)) spdlog::warn("{}", line);
+    tell_left_out(now);
     if (shut_down_by_us_ && (core_.at_rest() || now >= *shut_down_by_us_)) break;
     if (const auto handled = handle_sources(); !handled) return handled;
     carry_out_some();
     core_.work();
   }
+  tell_left_out(std::numeric_limits<std::int64_t>::max());
   log_cpu_share();
   if (core_.at_rest()) return {};
   return fail("not all motors are known to be at rest; their MCUs run them down by themselves");
@@ -456,6 +459,26 @@ void EventLoop::move_log(const std::string& json_line) {
   if (const std::uint64_t lost = std::exchange(lost_move_lines_, 0); lost > 0) {
     log(LogLevel::kWarning,
         fmt::format("log of moves: is written again; {} lines were lost", lost));
+  }
+}
+
+// Anybody may stop, as often as he likes and by any name: no session is needed.
+api::Asker EventLoop::with_log(const api::Asker& asker, const api::Request& request) {
+  const bool too_many =
+      api::is_stop(request) && !stop_limit_.take(now_us(), std::string(api::name_of(request)));
+  return too_many ? asker : logged(asker, request, *this);
+}
+
+void EventLoop::tell_left_out(std::int64_t now) {
+  for (const LogLimit::LeftOut& left_out : log_limit_.due(now)) {
+    spdlog::warn("{}", left_out.text());
+  }
+  for (const LogLimit::LeftOut& left_out : stop_limit_.due(now)) {
+    const nlohmann::json line = {{"event", "requests"},
+                                 {"utime_us", wall_clock_us()},
+                                 {"request", left_out.newest},
+                                 {"left_out", left_out.lines}};
+    move_log(line.dump());
   }
 }
 

@@ -86,6 +86,8 @@ class EventLoop : private Outputs {
   void update_write_interest(BusId bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
+  api::Asker with_log(const api::Asker& asker, const api::Request& request);
+  void tell_left_out(std::int64_t now_us);
   void check_published();
 
   // Outputs
@@ -113,6 +115,7 @@ class EventLoop : private Outputs {
   ById<BusId, Port> ports_;
   std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
   LogLimit log_limit_;
+  LogLimit stop_limit_;                // of stops in the log of moves
   std::uint64_t lost_move_lines_ = 0;  // since the log of moves could be written last
   bool mute_ = false;                  // LCM takes nothing
   sd_event* event_ = nullptr;

@@ -1,7 +1,7 @@
 #include "daemon/log_limit.h"
 
-#include <algorithm>
 #include <string_view>
+#include <utility>
 
 namespace bushd::daemon {
 namespace {
@@ -39,34 +39,34 @@ std::optional<std::string> LogLimit::take(std::int64_t now_us, const std::string
     ++cause.lines;
     return text;
   }
-  ++cause.left_out;
-  cause.newest = text;
+  ++cause.left_out.lines;
+  cause.left_out.newest = text;
   return std::nullopt;
 }
 
-std::string LogLimit::summary(const Cause& cause) {
-  return std::to_string(cause.left_out) + " more lines in " +
-         std::to_string(kPeriodUs / 1'000'000) + " s like: " + cause.newest;
+std::string LogLimit::LeftOut::text() const {
+  return std::to_string(lines) + " more lines in " + std::to_string(kPeriodUs / 1'000'000) +
+         " s like: " + newest;
 }
 
-std::vector<std::string> LogLimit::due(std::int64_t now_us) {
-  std::vector<std::string> lines;
+std::vector<LogLimit::LeftOut> LogLimit::due(std::int64_t now_us) {
+  std::vector<LeftOut> all;
   for (auto it = causes_.begin(); it != causes_.end();) {
     Cause& cause = it->second;
     if (now_us - cause.since_us < kPeriodUs) {
       ++it;
       continue;
     }
-    if (cause.left_out == 0) {
+    if (cause.left_out.lines == 0) {
       it = causes_.erase(it);
       continue;
     }
-    lines.push_back(summary(cause));
-    // It goes on: of the next period the summary only, until one has passed without any.
+    all.push_back(std::move(cause.left_out));
+    // It may go on: of the next period this only, until one has passed without any.
     cause = {.since_us = now_us, .lines = kAtOnce};
     ++it;
   }
-  return lines;
+  return all;
 }
 
 }  // namespace bushd::daemon

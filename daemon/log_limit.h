@@ -21,7 +21,12 @@ class LogLimit {
   // The line to be written; nothing if it is one too many.
   std::optional<std::string> take(std::int64_t now_us, const std::string& text);
   // What is to be said of floods that are over, or go on. To be called now and then.
-  std::vector<std::string> due(std::int64_t now_us);
+  struct LeftOut {
+    std::uint64_t lines;
+    std::string newest;
+    std::string text() const;  // a line for people
+  };
+  std::vector<LeftOut> due(std::int64_t now_us);
 
   // What lines of one cause have in common: numbers and those who asked differ.
   static std::string cause_of(const std::string& text);
@@ -30,11 +35,8 @@ class LogLimit {
   struct Cause {
     std::int64_t since_us = 0;  // of the period that counts
     std::uint64_t lines = 0;    // in it
-    std::uint64_t left_out = 0;
-    std::string newest{};  // that was left out
+    LeftOut left_out{};
   };
-  static std::string summary(const Cause& cause);
-
   std::map<std::string, Cause> causes_;
 };
 

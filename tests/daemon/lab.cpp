@@ -257,7 +257,12 @@ void Lab::connect() {
       steps.push_back(motor.position_steps);
     }
   }
-  ASSERT_EQ(wait(send(Ask::kSetPosition, motors, steps)).result, "done");
+  const auto surveyor = std::make_shared<Client>();
+  core().request(now_us(), {.session = surveyor, .number = 1},
+                 request_of(Ask::kSetPosition, motors, steps));
+  ASSERT_TRUE(run_until([&] { return surveyor->answers[1].size() == 2; }, 5));
+  ASSERT_EQ(surveyor->answers[1].back().result, "done") << surveyor->answers[1].back().reason;
+  run_for(0.006);  // the state is published 5 ms after the last at the earliest
   move_lines_.clear();
 }
 

@@ -49,12 +49,12 @@ class Wire:
         self._sequence += 1
         self.send_datagram(struct.pack(">II", MAGIC, self._sequence) + channel + b"\0" + payload)
 
-    def next_move(self):
-        """The payload of the next move that anybody sends."""
+    def next(self, wanted=CHANNEL):
+        """The payload of the next request on this channel that anybody sends."""
         while True:
             datagram = self._socket.recv(65536)
             channel, _, payload = datagram[8:].partition(b"\0")
-            if channel == CHANNEL:
+            if channel == wanted:
                 return payload
 
 
@@ -63,7 +63,7 @@ class Hostile(EndToEndTest):
         self.bring_up()
         self.wire = self.enterContext(contextlib.closing(Wire()))
         self.command("move", "--dry-run", "--lcm", "a0", 5)
-        move = self.wire.next_move()
+        move = self.wire.next()
         self.fingerprint = move[:8]
         _, self.session, length = struct.unpack_from(">qqi", move, 8)
         self.client = move[28 : 28 + length - 1]

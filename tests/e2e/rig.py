@@ -220,7 +220,7 @@ class EndToEndTest(unittest.TestCase):
 
     def moves(self, log="moves.jsonl"):
         """What motors did, without who asked for it."""
-        return [event for event in self.logged(log) if event["event"] != "request"]
+        return [event for event in self.logged(log) if event["event"] not in ("request", "requests")]
 
     def assert_one_result_each(self, log="moves.jsonl"):
         events = self.moves(log)

@@ -64,6 +64,7 @@ class MoveLog:
     def read(self, path):
         take = {
             "request": lambda event: None,  # who has asked for it
+            "requests": lambda event: None,  # how many more
             "move": self._move,
             "stop": self._change,
             "retarget": self._change,

@@ -1,0 +1,65 @@
+"""What ends up in the logs when somebody floods them, takes them away, or sends signals that mean nothing."""
+
+import contextlib
+import os
+import signal
+import struct
+import unittest
+
+from hostile_test import Wire, text
+from rig import EndToEndTest
+
+STOP_CHANNEL = b"BUSHD_STOP"
+MANY = 1500
+BATCH = 50
+
+
+class Logs(EndToEndTest):
+    def stop_of(self, stop, client, number):
+        """The payload of another client's stop of all motors: fingerprint, utime_us, session, client_id, number, count."""
+        return stop[:8] + struct.pack(">qq", 0, 0) + text(client) + struct.pack(">qi", number, 0)
+
+    def test_stops_of_made_up_clients_do_not_fill_the_log_of_moves(self):
+        self.bring_up()
+        wire = self.enterContext(contextlib.closing(Wire()))
+        self.command("stop", "--lcm")
+        stop = wire.next(STOP_CHANNEL)
+        for i in range(MANY):
+            wire.send(self.stop_of(stop, b"evil-%d" % i, 1), STOP_CHANNEL)
+            if i % BATCH == 0:
+                self.assertIsNotNone(self.status())  # it has carried out those before
+        self.assertIsNotNone(self.status())
+        self.assertEqual(self.bushd.end(), 0)
+        lines = [event for event in self.logged() if event["event"] == "request"]
+        self.assertLess(len(lines), 110)
+        told = [event for event in self.logged() if event["event"] == "requests"]
+        self.assertGreater(sum(event["left_out"] for event in told), MANY // 2)
+        self.assertEqual(told[0]["request"], "stop")
+        self.assertLess(len(self.bushd.said().splitlines()), 150)
+
+    def test_a_log_of_moves_that_is_a_fifo_is_refused_at_once(self):
+        self.write_config()
+        os.mkfifo(self.file("moves.jsonl"))
+        bushd = self.start_bushd()
+        self.assertEqual(bushd.process.wait(20), 1)
+        self.assertIn("must be a regular file", bushd.said())
+
+    def test_a_log_of_moves_that_was_removed_is_begun_anew(self):
+        self.bring_up()
+        self.command("move", "--wait", "a0", "5")
+        self.file("moves.jsonl").unlink()
+        self.command("move", "--wait", "a0", "5")
+        self.assertEqual([event["event"] for event in self.logged()], ["request", "move", "result"])
+        self.assertIn("was removed or renamed", self.bushd.said())
+
+    def test_signals_without_a_meaning_are_ignored(self):
+        self.bring_up()
+        self.bushd.send(signal.SIGUSR1)
+        self.bushd.send(signal.SIGUSR2)
+        self.wait_until("both to be told", lambda: "SIGUSR1: ignored" in self.bushd.said()
+                        and "SIGUSR2: ignored" in self.bushd.said())
+        self.command("move", "--wait", "a0", "5")
+
+
+if __name__ == "__main__":
+    unittest.main()
