@@ -134,6 +134,7 @@ class LiveBench : public Bench {
                                      static_cast<daemon::Service*>(&positions), service_}) {
       service->step(now_us());
     }
+    if (!dry_runs.idle()) dry_runs.work();
     now_ns_ = std::max(now_ns_, std::min(std::max(master.next_wake_us() * 1000, now_ns_ + 1000),
                                          line.next_event_ns()));
     line.advance_to(now_ns_);
