@@ -121,7 +121,7 @@ class ControlSocket(EndToEndTest):
         self.bring_up(lcm_lines=["commands = false"])
         refused = self.bushctl("move", "--lcm", "a0", 5)
         self.assertEqual(refused.returncode, 1)
-        self.assertIn("no bushd answers", refused.stderr)
+        self.assertIn("bushd sends its state but has not answered for 3 s; nothing was asked of it", refused.stderr)
         self.command("status", "--lcm")
         self.command("move", "--wait", "a0", 5)
         self.assertEqual(self.positions()["a0"], 5)
