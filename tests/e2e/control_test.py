@@ -64,7 +64,9 @@ class ControlSocket(EndToEndTest):
 
     def test_a_second_daemon_does_not_take_it(self):
         self.bring_up()
-        second = self.start_bushd("other.jsonl")
+        config = self.file("bushd.toml").read_text()
+        self.file("second.toml").write_text(config.replace('"BUSHD"', '"SECOND"'))
+        second = self.start_bushd("moves-second.jsonl", "second.toml")
         self.assertEqual(second.process.wait(60), 1)
         self.assertIn("another daemon has this control socket", second.said())
         self.command("status", "--socket", self.file("control"))
