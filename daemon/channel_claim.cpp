@@ -55,7 +55,7 @@ Result<std::optional<control::PidLock>> lock(const config::Lcm& lcm,
 
 Result<void> listen(const config::Lcm& lcm) {
   auto transport = lcm::Transport::open(lcm.url, {lcm.prefix + "_STATE"});
-  if (!transport) return fail(transport.error());
+  if (!transport) return {};  // no network, nobody on it; who needs one will say so
   std::optional<std::string> bus;
   const auto heard = [&bus](lcm::Payload payload) {
     // Anybody may send anything.

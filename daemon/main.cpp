@@ -74,7 +74,6 @@ bushd::Result<std::unique_ptr<bushd::control::Server>> open_control(
 struct Lcm {
   std::unique_ptr<bushd::lcm::Transport> all;
   std::unique_ptr<bushd::lcm::Transport> stops;  // null: `all` takes those too
-  std::optional<bushd::daemon::ChannelClaim> claim{};
 };
 
 // Without a network the control socket alone will do. Stops come by a transport of their own, so
@@ -89,9 +88,7 @@ bushd::Result<Lcm> open_lcm(const bushd::config::Lcm& config, bool has_control) 
     return Lcm{.all = std::move(*all), .stops = nullptr};
   }
   if (!all) return bushd::fail(all.error());
-  auto claim = bushd::daemon::ChannelClaim::make(config, bushd::daemon::lock_folders());
-  if (!claim) return bushd::fail(claim.error());
-  Lcm lcm{.all = std::move(*all), .stops = nullptr, .claim = std::move(*claim)};
+  Lcm lcm{.all = std::move(*all), .stops = nullptr};
   if (!config.commands || !config.url.starts_with("udpm://")) return lcm;
   auto stops =
       Transport::open(config.url, {config.prefix + "_STOP", config.prefix + "_EMERGENCY_STOP"});
@@ -104,6 +101,12 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
         const std::string& in_service_path) {
   block_signals();
   raise_descriptor_limit();
+  // Before there is a control socket: who connects to it is to be answered at once.
+  const auto claim = bushd::daemon::ChannelClaim::make(config.lcm, bushd::daemon::lock_folders());
+  if (!claim) {
+    spdlog::error("{}", claim.error().text());
+    return 1;
+  }
   std::optional<bushd::daemon::MoveLog> move_log;
   if (!move_log_path.empty()) {
     auto opened = bushd::daemon::MoveLog::open(move_log_path);

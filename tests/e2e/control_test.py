@@ -64,7 +64,9 @@ class ControlSocket(EndToEndTest):
 
     def test_a_second_daemon_does_not_take_it(self):
         self.bring_up()
-        second = self.start_bushd("other.jsonl")
+        config = self.file("bushd.toml").read_text()
+        self.file("second.toml").write_text(config.replace('"BUSHD"', '"SECOND"'))
+        second = self.start_bushd("moves-second.jsonl", "second.toml")
         self.assertEqual(second.process.wait(60), 1)
         self.assertIn("another daemon has this control socket", second.said())
         self.command("status", "--socket", self.file("control"))
@@ -121,7 +123,7 @@ class ControlSocket(EndToEndTest):
         self.bring_up(lcm_lines=["commands = false"])
         refused = self.bushctl("move", "--lcm", "a0", 5)
         self.assertEqual(refused.returncode, 1)
-        self.assertIn("no bushd answers", refused.stderr)
+        self.assertIn("bushd sends its state but has not answered for 3 s; nothing was asked of it", refused.stderr)
         self.command("status", "--lcm")
         self.command("move", "--wait", "a0", 5)
         self.assertEqual(self.positions()["a0"], 5)

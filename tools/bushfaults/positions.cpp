@@ -138,6 +138,7 @@ std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
   for (const bushd::api::MotorState& claim : state.motors) {
     if (!wrong && claim.trust == bushd::api::Trust::kKnown)
       wrong = check_motor(mcu, claim, *report);
+    if (claim.trust == bushd::api::Trust::kUncertain) follow_set(claim, *report);
   }
   boot_seen_[mcu] = state.boot;
   return wrong;
@@ -179,6 +180,15 @@ bool Positions::agrees(Motor& motor, std::int64_t position_steps, std::int64_t p
   if (set == perhaps.end() && !motor.at_home(pulses, position_steps)) return false;
   motor.offset = pulses - position_steps;
   return true;
+}
+
+// A new daemon does not call known what the one before has set, and its client never heard of.
+void Positions::follow_set(const bushd::api::MotorState& claim, const Report& report) {
+  const auto found = std::ranges::find(config_.motors, claim.name, &bushd::config::Motor::name);
+  if (found == config_.motors.end()) return;
+  Motor& motor = motors_[static_cast<std::size_t>(found - config_.motors.begin())];
+  if (!motor.offset) return;
+  static_cast<void>(agrees(motor, claim.position_steps, report.pulses[found->output.value]));
 }
 
 std::optional<std::string> Positions::check_motor(std::size_t mcu,

@@ -109,6 +109,7 @@ class Positions {
   std::optional<std::string> check_age(TimeNs now_ns, std::size_t mcu, const Report& report);
   std::optional<std::string> check_motor(std::size_t mcu, const bushd::api::MotorState& claim,
                                          const Report& report);
+  void follow_set(const bushd::api::MotorState& claim, const Report& report);
   static bool agrees(Motor& motor, std::int64_t position_steps, std::int64_t pulses);
 
   const bushd::config::Config& config_;
