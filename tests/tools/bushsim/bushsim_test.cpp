@@ -121,9 +121,14 @@ class Bushsim : public testing::Test {
     std::filesystem::remove_all(folder);
   }
 
-  // Buses of one name each, with MCUs 1 and 2 on each.
+  // Buses of one name each, with MCUs 1 and 2 on each, and a motor at the first of all.
   void write_config(const std::vector<std::string>& buses, int baud = 500'000) const {
+    std::ofstream(folder + "/slow.toml")
+        << "name = \"slow\"\ntime_unit_ns = 40000\naccel = [250, 125]\n";
     std::ofstream file(config);
+    file << "[[group]]\nname = \"all\"\ntable = \"slow\"\n"
+         << "[[motor]]\nname = \"theta\"\nmcu = \"" << buses.front()
+         << ":1\"\noutput = 0\ngroup = \"all\"\n";
     for (const std::string& bus : buses) {
       file << "[[bus]]\nname = \"" << bus << "\"\nport = \"" << folder << "/" << bus
            << "\"\nbaud = " << baud << "\ntick_us = 2560\nformat = \"fine\"\n";
