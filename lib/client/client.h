@@ -82,8 +82,8 @@ class Client {
   struct Waiting {
     std::int64_t number = 0;
     std::optional<api::Reply> accepted{};
-    std::optional<api::Reply> final{};  // Refused or Completed
-    lcm::ReplyParts parts{};            // of the final one
+    std::optional<api::Reply> final{};      // Refused or Completed
+    lcm::ReplyParts parts{};                // of the final one
     std::optional<std::string> disowned{};  // refused after it was accepted, and why
   };
 

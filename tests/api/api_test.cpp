@@ -66,8 +66,7 @@ TEST(Words, EachIsReadBack) {
                            McuState::kRunning, McuState::kFault}) {
     EXPECT_EQ(mcu_state_of(word(state)), state);
   }
-  for (const auto trust :
-       {Trust::kUnknown, Trust::kKnown, Trust::kStale, Trust::kUncertain}) {
+  for (const auto trust : {Trust::kUnknown, Trust::kKnown, Trust::kStale, Trust::kUncertain}) {
     EXPECT_EQ(trust_of(word(trust)), trust);
   }
   for (const bool positive : {false, true}) {

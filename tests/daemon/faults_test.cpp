@@ -186,7 +186,8 @@ TEST_P(Faults, NewDaemonTakesPositionsOverInMotion) {
   for (const char* name : {"m01", "m08"}) {
     EXPECT_EQ(lab.motor(name).position_steps, lab.shaft_steps(name));
     EXPECT_NE(lab.shaft_steps(name), 0);
-    EXPECT_EQ(lab.motor(name).trust, api::Trust::kUncertain) << "this daemon has not seen all of it";
+    EXPECT_EQ(lab.motor(name).trust, api::Trust::kUncertain)
+        << "this daemon has not seen all of it";
   }
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01", "m08"}, {0, 0})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
