@@ -34,7 +34,7 @@ class Completion(unittest.TestCase):
 
     def test_options_of_the_command_and_those_of_all(self):
         self.assertEqual(self.complete("show", "--s"), {"--steps"})
-        self.assertEqual(self.complete("plot", "--"), {"--help", "--svg", "--png", "--dir", "--history"})
+        self.assertEqual(self.complete("plot", "--"), {"--help", "--version", "--svg", "--png", "--dir", "--history"})
         self.assertEqual(self.complete("scale", "t", "--ac"), {"--acceleration"})
 
     def test_values_that_an_option_allows(self):
