@@ -26,7 +26,7 @@ constexpr std::int64_t kMin = std::numeric_limits<std::int64_t>::min();
 std::int64_t first_number(bushd::sim::Random& random) {
   switch (random.below(8)) {
     case 0:
-      return kMin + random.between(0, 3);
+      return kMin + 1 + random.between(0, 3);  // the number before it is one too
     case 1:
       return kMax - random.between(0, 200);
     case 2:
