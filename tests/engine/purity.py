@@ -19,7 +19,7 @@ FREESTANDING = {"stdint.h", "stdbool.h", "stddef.h", "limits.h", "string.h"}
 ROOMS = {"lib/engine": ("engine/",), "firmware/core": ("engine/", "firmware/core/")}
 
 MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
-# A port may bring its own: BUSHD_OWN_CRC32, BUSHD_OWN_SLOTS_FILL.
+# A port may bring its own: BUSHD_OWN_CRC32, BUSHD_OWN_SLOTS_FILL, BUSHD_OWN_RUN_PARTS.
 OF_PORTS = {"bushd_crc32", "bushd_slots_fill",
             "bushd_run_make_evenly", "bushd_run_make_on_side", "bushd_run_move_place", "bushd_run_share"}
 # libgcc's arithmetic on small machines, and the names that AVR objects use to ask for start-up code that copies

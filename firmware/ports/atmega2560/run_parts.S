@@ -2,6 +2,7 @@
 ; cycles a step on a ramp and 35 in cruise.
 
 #include "firmware/ports/atmega2560/run_parts.h"
+#include "firmware/ports/atmega2560/saved_registers.inc"
 
 ; A place in r10 .. r14: r14 is the slot. A rate in r15 .. r19, a delay in r20 and r21. r22 is the motor's bit in the
 ; byte of the mask that has it, r23 counts what is left, r24 and r25 are `since`. Y points to that byte of the first slot's mask.
@@ -59,19 +60,6 @@
     sub r24, r20
     sbc r25, r21
     dec r23
-    .endm
-
-    .macro save
-    .irp register, 10, 11, 12, 13, 14, 15, 16, 17, 28, 29
-    push r\register
-    .endr
-    .endm
-
-    .macro restore
-    .irp register, 29, 28, 17, 16, 15, 14, 13, 12, 11, 10
-    pop r\register
-    .endr
-    clr r1
     .endm
 
     .text

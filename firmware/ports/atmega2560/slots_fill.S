@@ -2,21 +2,9 @@
 ; overflows is its step; the carry is shifted into the slot's mask. Eight motors, motor 0 in bit 0; masks lie
 ; two bytes apart. r28 is the mask.
 
+#include "firmware/ports/atmega2560/saved_registers.inc"
+
 #define SLOTS 128
-
-; r0, r1, r10 and on: the others are those of interrupts.
-    .macro save
-    .irp register, 10, 11, 12, 13, 14, 15, 16, 17, 28, 29
-    push r\register
-    .endr
-    .endm
-
-    .macro restore
-    .irp register, 29, 28, 17, 16, 15, 14, 13, 12, 11, 10
-    pop r\register
-    .endr
-    clr r1
-    .endm
 
     .macro fine low, high, step_low, step_high
     sub r\low, r\step_low
