@@ -17,6 +17,7 @@
 #include "engine/message.h"
 #include "fieldbus/emission_setup.h"
 #include "tables/table.h"
+#include "units/coordinates.h"
 
 namespace bushd::config {
 
@@ -80,6 +81,12 @@ struct Home {
   bool at_start = false;  // whenever its MCU comes and has not homed it
 };
 
+// On the dial, both inclusive.
+struct SoftLimits {
+  double low = 0;
+  double high = 0;
+};
+
 struct Motor {
   std::string name;
   McuId mcu;
@@ -92,6 +99,10 @@ struct Motor {
   bool input_active_open = false;
   std::optional<Home> home = {};
   bool local = false;  // its MCU's FORWARD and REVERSE inputs move it
+  std::string description{};
+  units::Coordinates coordinates{};
+  int precision = 0;  // decimals of its user and dial positions
+  std::optional<SoftLimits> soft_limits = {};
 };
 
 struct Config {
