@@ -77,6 +77,16 @@ void Journal::position_set(MotorId motor) {
   outputs_.move_log(line.dump());
 }
 
+void Journal::offset_set(MotorId id) {
+  const motion::Motor& motor = installation_[id];
+  const nlohmann::json line = {{"event", "offset"},
+                               {"motor", motor.name()},
+                               {"position_steps", motor.position_steps()},
+                               {"user", motor.coordinates().user_of(motor.position_steps())},
+                               {"offset", motor.coordinates().scale().offset}};
+  outputs_.move_log(line.dump());
+}
+
 void Journal::before_report(MotorId id, bool being_set) {
   if (autonomous_[id]) return;
   const motion::Motor& motor = installation_[id];

@@ -21,6 +21,7 @@ class Journal final : public Service {
   void changed(MotorId motor, const motion::Change& change);
   void ended(MotorId motor, std::string_view result);
   void position_set(MotorId motor);
+  void offset_set(MotorId motor);
 
   // Motion that MCUs make by themselves, homing and local inputs: no move has led to where these
   // motors stand. To be called before and after motors follow a report; `being_set`: positions that

@@ -26,6 +26,10 @@ struct MotorResult {
   std::string motor{};
   Outcome outcome = Outcome::kFault;
   std::int64_t position_steps = 0;  // where its MCU says that it stands
+  double user = 0;                  // the same for people (units/coordinates.h)
+  double dial = 0;
+  std::string unit{};
+  int precision = 0;  // decimals of both
   TableRef table{};                 // by which it has moved
 };
 

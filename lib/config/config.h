@@ -81,12 +81,6 @@ struct Home {
   bool at_start = false;  // whenever its MCU comes and has not homed it
 };
 
-// On the dial, both inclusive.
-struct SoftLimits {
-  double low = 0;
-  double high = 0;
-};
-
 struct Motor {
   std::string name;
   McuId mcu;
@@ -101,8 +95,7 @@ struct Motor {
   bool local = false;  // its MCU's FORWARD and REVERSE inputs move it
   std::string description{};
   units::Coordinates coordinates{};
-  int precision = 0;  // decimals of its user and dial positions
-  std::optional<SoftLimits> soft_limits = {};
+  std::optional<units::SoftLimits> soft_limits = {};
 };
 
 struct Config {

@@ -14,7 +14,6 @@ using tables::TomlReader;
 
 constexpr std::size_t kLongestUnit = 16;
 constexpr std::size_t kLongestDescription = 200;
-constexpr int kMostDecimals = 12;
 
 // Both end up on terminals and in logs.
 Result<std::string> read_line(const TomlReader& reader, std::string_view key, std::size_t longest) {
@@ -62,6 +61,10 @@ Result<void> read_scale(const TomlReader& reader, Motor* motor) {
   units::Scale scale;
   auto unit = read_line(reader, "unit", kLongestUnit);
   if (!unit) return fail(unit.error());
+  if (*unit == units::Coordinates::kSteps) {
+    return fail(reader.error("unit", "is \"steps\", which is said of motors without a unit; leave "
+                                     "the key out, or give it another name"));
+  }
   scale.unit = std::move(*unit);
   const auto ratio = read_steps_per_unit(reader);
   if (!ratio) return fail(ratio.error());
@@ -76,18 +79,18 @@ Result<void> read_scale(const TomlReader& reader, Motor* motor) {
     if (!offset) return fail(offset.error());
     scale.offset = *offset;
   }
+  if (reader.has("precision")) {
+    const auto decimals = reader.integer("precision", 0, units::Coordinates::kMostDecimals, "decimals");
+    if (!decimals) return fail(decimals.error());
+    scale.decimals = static_cast<int>(*decimals);
+  }
   auto coordinates = units::Coordinates::make(std::move(scale));
   if (!coordinates) return fail(reader.error("offset", coordinates.error().message));
   motor->coordinates = std::move(*coordinates);
-  motor->precision = motor->coordinates.precision();
-  if (!reader.has("precision")) return {};
-  const auto precision = reader.integer("precision", 0, kMostDecimals, "decimals");
-  if (!precision) return fail(precision.error());
-  motor->precision = static_cast<int>(*precision);
   return {};
 }
 
-Result<SoftLimits> read_soft_limits(const TomlReader& reader, const Motor& motor) {
+Result<units::SoftLimits> read_soft_limits(const TomlReader& reader, const Motor& motor) {
   constexpr std::string_view kKey = "soft_limits";
   constexpr std::string_view kAllowed = "[lowest, highest] dial position";
   const auto array = reader.array(kKey, kAllowed);
@@ -107,7 +110,7 @@ Result<SoftLimits> read_soft_limits(const TomlReader& reader, const Motor& motor
     return fail(reader.error(
         kKey, fmt::format("has no step from {} to {}; allowed: {}", ends[0], ends[1], kAllowed)));
   }
-  return SoftLimits{ends[0], ends[1]};
+  return units::SoftLimits{ends[0], ends[1]};
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 namespace bushd::lcm {
 namespace {
 
+constexpr int kMostDecimals = units::Coordinates::kMostDecimals;
+
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
@@ -83,6 +85,10 @@ void put(answer_t& answer, const std::vector<api::MotorResult>& motors) {
     answer.motors.push_back(motor.motor);
     answer.outcomes.push_back(text(word(motor.outcome)));
     answer.position_steps.push_back(motor.position_steps);
+    answer.user_positions.push_back(motor.user);
+    answer.dial_positions.push_back(motor.dial);
+    answer.units.push_back(motor.unit);
+    answer.precisions.push_back(static_cast<std::int8_t>(motor.precision));
     const auto table = std::find(told.begin(), told.end(), motor.table);
     answer.table_of_motor.push_back(static_cast<std::int16_t>(table - told.begin()));
     if (table != told.end()) continue;
@@ -168,6 +174,10 @@ std::optional<std::vector<api::MotorResult>> motors_of(const answer_t& message) 
     motors.push_back({.motor = message.motors[i],
                       .outcome = *outcome,
                       .position_steps = message.position_steps[i],
+                      .user = message.user_positions[i],
+                      .dial = message.dial_positions[i],
+                      .unit = message.units[i],
+                      .precision = std::clamp<int>(message.precisions[i], 0, kMostDecimals),
                       .table = ref_of(message.tables[table])});
   }
   return motors;

@@ -17,8 +17,6 @@ namespace {
 // offset and 2^31 of position leave this below a quarter of a step.
 constexpr std::int64_t kMostOffsetSteps = std::int64_t{1} << 50;
 
-constexpr int kMostDecimals = 12;
-
 mpq_class as_mpq(const Ratio& ratio) {
   return {mpz_class(static_cast<long>(ratio.numerator)),
           mpz_class(static_cast<long>(ratio.denominator))};
@@ -66,6 +64,11 @@ long double dial(const Ratio& steps_per_unit, std::int64_t steps) {
          static_cast<long double>(steps_per_unit.numerator);
 }
 
+double user_position(const Scale& scale, long double dial) {
+  const long double offset = scale.offset == 0 ? 0 : widened(scale.offset);
+  return static_cast<double>(scale.negative ? offset - dial : offset + dial);
+}
+
 }  // namespace
 
 Result<Coordinates> Coordinates::make(Scale scale) {
@@ -83,6 +86,7 @@ Result<Coordinates> Coordinates::make(Scale scale) {
 }
 
 int Coordinates::precision() const {
+  if (scale_.decimals) return *scale_.decimals;
   const Ratio& ratio = scale_.steps_per_unit;
   if (ratio.denominator == 1 && ratio.numerator == 1) return 0;
   const double per_unit =
@@ -90,14 +94,22 @@ int Coordinates::precision() const {
   return std::clamp(static_cast<int>(std::floor(std::log10(per_unit))) + 2, 0, kMostDecimals);
 }
 
+std::string Coordinates::text(std::int64_t steps) const {
+  return fmt::format("{:.{}f} {}", user_of(steps), precision(), scale_.unit);
+}
+
 double Coordinates::dial_of(std::int64_t steps) const {
   return static_cast<double>(dial(scale_.steps_per_unit, steps));
 }
 
 double Coordinates::user_of(std::int64_t steps) const {
-  const long double at = dial(scale_.steps_per_unit, steps);
-  const long double offset = scale_.offset == 0 ? 0 : widened(scale_.offset);
-  return static_cast<double>(scale_.negative ? offset - at : offset + at);
+  return user_position(scale_, dial(scale_.steps_per_unit, steps));
+}
+
+SoftLimits Coordinates::on_user_scale(const SoftLimits& dial) const {
+  const double low = user_position(scale_, widened(dial.low));
+  const double high = user_position(scale_, widened(dial.high));
+  return scale_.negative ? SoftLimits{high, low} : SoftLimits{low, high};
 }
 
 Result<std::int64_t> Coordinates::steps_of_dial(double dial) const {

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "base/result.h"
@@ -22,13 +23,23 @@ struct Scale {
   Ratio steps_per_unit = {};
   bool negative = false;  // user positions fall where steps rise
   double offset = 0;      // user units
+  std::optional<int> decimals = {};  // shown to people; none: as many as tell steps apart
   friend bool operator==(const Scale&, const Scale&) = default;
+};
+
+// On the dial, both inclusive.
+struct SoftLimits {
+  double low = 0;
+  double high = 0;
+  friend bool operator==(const SoftLimits&, const SoftLimits&) = default;
 };
 
 class Coordinates {
  public:
   // MCUs count positions in 32 bits.
   static constexpr std::int64_t kMaxSteps = INT32_MAX;
+  static constexpr int kMostDecimals = 12;
+  static constexpr const char* kSteps = "steps";  // is no unit of a configuration
 
   // Of a motor without a unit: all positions are steps.
   Coordinates() = default;
@@ -37,8 +48,12 @@ class Coordinates {
 
   const Scale& scale() const { return scale_; }
   const std::string& unit() const { return scale_.unit; }
-  // Decimals that tell steps apart, and one more; 0..12.
+  // A motor without a unit has none but steps.
+  bool has_unit() const { return scale_.unit != kSteps; }
+  // Decimals that people are shown; without a wish those that tell steps apart, and one more. 0..12
   int precision() const;
+  // "12.345 mm", "-7 steps": the user position.
+  std::string text(std::int64_t steps) const;
 
   double dial_of(std::int64_t steps) const;
   double user_of(std::int64_t steps) const;
@@ -53,6 +68,9 @@ class Coordinates {
   // rounded outwards. Clamped to +-kMaxSteps. Precondition: finite.
   std::int64_t first_step_from(double dial) const;
   std::int64_t last_step_to(double dial) const;
+
+  // On the user's scale, low below high.
+  SoftLimits on_user_scale(const SoftLimits& dial) const;
 
   // With the offset for which these steps are this user position.
   Result<Coordinates> with_user(double user, std::int64_t steps) const;

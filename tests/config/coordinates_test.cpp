@@ -26,7 +26,7 @@ TEST(ConfigCoordinates, WithoutAUnitPositionsAreSteps) {
   const Motor& motor = config->motors[1];
   EXPECT_EQ(motor.coordinates.unit(), "steps");
   EXPECT_EQ(motor.coordinates.user_of(-5), -5);
-  EXPECT_EQ(motor.precision, 0);
+  EXPECT_EQ(motor.coordinates.precision(), 0);
   EXPECT_EQ(motor.description, "");
   EXPECT_FALSE(motor.soft_limits.has_value());
 }
@@ -40,8 +40,7 @@ TEST(ConfigCoordinates, AllKeys) {
   ASSERT_TRUE(config.has_value()) << config.error().text();
   const Motor& motor = config->motors[1];
   EXPECT_EQ(motor.description, "lower blade");
-  EXPECT_EQ(motor.coordinates.scale(), (units::Scale{"mm", {320, 1}, true, 2.5}));
-  EXPECT_EQ(motor.precision, 3);
+  EXPECT_EQ(motor.coordinates.scale(), (units::Scale{"mm", {320, 1}, true, 2.5, 3}));
   ASSERT_TRUE(motor.soft_limits.has_value());
   EXPECT_EQ(motor.soft_limits->low, -5);
   EXPECT_EQ(motor.soft_limits->high, 5.5);
@@ -65,6 +64,7 @@ TEST(ConfigCoordinates, WhatCannotBeIsRefusedWithItsLineAndKey) {
            std::pair<std::string, const char*>{"unit = \"\"\nsteps_per_unit = 1\n",
                                                "37:8: motor[1].unit: is not allowed"},
            {"unit = \"m\\u001bm\"\nsteps_per_unit = 1\n", "motor[1].unit: is not allowed"},
+           {"unit = \"steps\"\nsteps_per_unit = 1\n", "37:8: motor[1].unit: is \"steps\", which"},
            {"unit = \"mm\"\n", "motor[1].steps_per_unit: is missing"},
            {"unit = \"mm\"\nsteps_per_unit = -400\n",
             "38:18: motor[1].steps_per_unit: is not above 0; allowed: a number above 0, such as "

@@ -16,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 
 Coordinates with(const std::string& steps_per_unit, bool negative = false, double offset = 0) {
-  return Coordinates::make({"mm", *parse_ratio(steps_per_unit), negative, offset}).value();
+  return Coordinates::make({"mm", *parse_ratio(steps_per_unit), negative, offset, {}}).value();
 }
 
 TEST(Ratio, IsWhatIsWritten) {
@@ -82,6 +82,8 @@ TEST(Coordinates, TiesAreThoseOfTheDecimalText) {
 TEST(Coordinates, ShownAsPeopleWriteThem) {
   EXPECT_EQ(with("400", false, 0.1).user_of(12345), 30.9625);
   EXPECT_EQ(with("10", false, 0.2).user_of(1), 0.3);  // 0.1 + 0.2 is another double
+  EXPECT_EQ(with("320", true, 1).text(160), "0.5000 mm");
+  EXPECT_EQ(Coordinates().text(-7), "-7 steps");
   EXPECT_EQ(with("320").precision(), 4);
   EXPECT_EQ(with("1000").precision(), 5);
   EXPECT_EQ(with("0.5").precision(), 1);
@@ -93,7 +95,7 @@ TEST(Coordinates, BeyondWhatCanBeCounted) {
   EXPECT_THAT(mm.steps_of_dial(5368709.12).error().message, HasSubstr("within +-2147483647 steps"));
   EXPECT_THAT(mm.steps_of_user(1e300).error().message, HasSubstr("within +-"));
   EXPECT_THAT(mm.steps_of_user(std::nan("")).error().message, HasSubstr("no finite number"));
-  EXPECT_THAT(Coordinates::make({"mm", {400, 1}, false, 1e14}).error().message,
+  EXPECT_THAT(Coordinates::make({"mm", {400, 1}, false, 1e14, {}}).error().message,
               HasSubstr("could not be told apart"));
 }
 
@@ -124,7 +126,7 @@ TEST(Coordinates, WhatIsShownMeansItsStep) {
         static_cast<double>(ratio.numerator) / static_cast<double>(ratio.denominator);
     const auto offset_steps = *rc::gen::inRange<std::int64_t>(-(1LL << 49), 1LL << 49);
     const Scale scale{"mm", ratio, *rc::gen::arbitrary<bool>(),
-                      static_cast<double>(offset_steps) / per_unit};
+                      static_cast<double>(offset_steps) / per_unit, {}};
     const auto coordinates = Coordinates::make(scale);
     RC_ASSERT(coordinates.has_value());
     const auto steps = *rc::gen::inRange(-Coordinates::kMaxSteps, Coordinates::kMaxSteps + 1);
@@ -144,7 +146,7 @@ TEST(Coordinates, NearestStepByIntegers) {
     const bool negative = *rc::gen::arbitrary<bool>();
     const auto ratio = parse_ratio(std::to_string(numerator) + "/" + std::to_string(denominator));
     const auto coordinates =
-        Coordinates::make({"mm", *ratio, negative, static_cast<double>(offset) / 1e6});
+        Coordinates::make({"mm", *ratio, negative, static_cast<double>(offset) / 1e6, {}});
     const std::int64_t above = (negative ? offset - user : user - offset) * numerator;
     const std::int64_t below = denominator * 1'000'000;
     const std::int64_t magnitude = (2 * std::abs(above) + below) / (2 * below);

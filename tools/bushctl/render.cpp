@@ -11,6 +11,7 @@ namespace bushctl {
 namespace {
 
 namespace api = bushd::api;
+namespace units = bushd::units;
 using bushd::client::Status;
 
 std::string text_of(const api::TableRef& table) {
@@ -44,6 +45,16 @@ api::MotorDescription description_of(const api::Description& mcu, std::size_t in
   return {};
 }
 
+bool has_unit(const units::Scale& scale) {
+  return scale.unit != units::Coordinates::kSteps;
+}
+
+// "12.345 mm", and bare steps of a motor without a unit.
+std::string position_text(std::int64_t steps, double user, const units::Scale& scale) {
+  if (!has_unit(scale)) return fmt::to_string(steps);
+  return fmt::format("{:.{}f} {}", user, scale.decimals.value_or(0), bushd::printable(scale.unit));
+}
+
 nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
                           const api::MotorDescription& description) {
   return {{"name", motor.name},
@@ -54,6 +65,10 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"table_revision", description.table.revision},
           {"table_hash", description.table.hash},
           {"position_steps", motor.position_steps},
+          {"unit", description.scale.unit},
+          {"user", motor.user},
+          {"dial", motor.dial},
+          {"user_target", motor.user_target},
           {"target_steps", motor.target_steps},
           {"velocity_steps_per_s", motor.velocity_steps_per_s},
           {"moving", motor.moving},
@@ -63,6 +78,14 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"inhibited", word(motor.inhibited)},
           {"trust", word(motor.trust)},
           {"uncertain_reason", motor.uncertain_reason}};
+}
+
+std::string position_text(const api::MotorResult& motor) {
+  const std::string user =
+      position_text(motor.position_steps, motor.user,
+                    {.unit = motor.unit, .steps_per_unit = {}, .decimals = motor.precision});
+  if (motor.unit == units::Coordinates::kSteps) return user;
+  return fmt::format("{} ({} steps)", user, motor.position_steps);
 }
 
 nlohmann::json mcu_json(const api::StateSnapshot& mcu, const api::Description& description) {
@@ -94,8 +117,9 @@ std::vector<std::string> table(const Status& status) {
       const auto description = description_of(status.descriptions.at(i).snapshot, m, motor.name);
       motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
                   fmt::to_string(description.output), bushd::printable(description.group),
-                  text_of(description.table), fmt::to_string(motor.position_steps),
-                  fmt::to_string(motor.target_steps),
+                  text_of(description.table),
+                  position_text(motor.position_steps, motor.user, description.scale),
+                  position_text(motor.target_steps, motor.user_target, description.scale),
                   fmt::format("{:.1f}", motor.velocity_steps_per_s),
                   moving_word(motor, moves_text(motor), "-"), std::string(word(motor.trust)),
                   limit_text(motor)});
@@ -181,7 +205,7 @@ std::vector<std::string> lines(const api::Reply& reply) {
   if (const auto* motors = std::get_if<std::vector<api::MotorResult>>(&completed->detail)) {
     for (const api::MotorResult& motor : *motors) {
       out.push_back(fmt::format("{}: {}, stands at {} by {} ({})", bushd::printable(motor.motor),
-                                word(motor.outcome), motor.position_steps, text_of(motor.table),
+                                word(motor.outcome), position_text(motor), text_of(motor.table),
                                 bushd::printable(motor.table.hash)));
     }
     return out;
