@@ -119,6 +119,27 @@ TEST(Sessions, ANewNumberIsCarriedOutAndASeenOneIsAnsweredAgain) {
   EXPECT_EQ(reason_of(late.reply), "stands");
 }
 
+TEST(Sessions, NumbersAndAnswersOfOneAreNothingToAnother) {
+  Sessions sessions(1);
+  const std::int64_t a = sessions.open("a", 7);
+  const std::int64_t b = sessions.open("b", 7);
+  EXPECT_TRUE(sessions.rule(a, "a", 2000, Move{}).carry_out);
+  sessions.record(a, 2000, result("for a"));
+  EXPECT_TRUE(sessions.rule(b, "b", 1, Move{}).carry_out);
+  EXPECT_TRUE(sessions.rule(b, "b", 2000, Move{}).carry_out);
+  EXPECT_FALSE(sessions.rule(b, "b", 2000, Move{}).reply);
+  EXPECT_EQ(reason_of(sessions.rule(a, "a", 2000, Move{}).reply), "for a");
+}
+
+TEST(Sessions, AnswersToWhatNobodyAskedAreIgnored) {
+  Sessions sessions(1);
+  sessions.record(5, 1, result("of no session"));
+  const std::int64_t session = sessions.open("scan", 7);
+  sessions.record(session, 1, result("of no request"));
+  EXPECT_EQ(sessions.bytes(), 0u);
+  EXPECT_TRUE(sessions.rule(session, "scan", 1, Move{}).carry_out);
+}
+
 TEST(Sessions, NumbersMayComeInAnyOrderWithinTheWindow) {
   Sessions sessions(1);
   const std::int64_t session = sessions.open("scan", 7);

@@ -33,13 +33,8 @@ struct Sent {
   }
 };
 
-command_t dry(std::vector<std::string> motors, std::vector<std::int64_t> steps) {
-  command_t command{};
-  command.kind = command_t::MOVE_RELATIVE;
-  command.dry_run = 1;
-  command.motors = std::move(motors);
-  command.steps = std::move(steps);
-  return command;
+api::Request dry(const std::vector<std::string>& motors, const std::vector<std::int64_t>& steps) {
+  return api::Move{.motors = motor_steps(motors, steps), .dry_run = true};
 }
 
 TEST(DryRun, TellsWhatTheMoveThenTakesAndSends) {
@@ -55,43 +50,44 @@ TEST(DryRun, TellsWhatTheMoveThenTakesAndSends) {
       sent.add(bytes);
       return true;
     };
-    const reply_t planned = lab.wait(lab.send(dry(motors, steps)));
+    const Answer planned = lab.wait(lab.send(dry(motors, steps)));
     lab.run_for(0.5);
     ASSERT_EQ(planned.result, "done") << planned.reason;
     EXPECT_EQ(sent.frames, 0) << "nothing moves";
-    ASSERT_EQ(planned.plan.size(), 1u);
-    const move_plan_t& plan = planned.plan[0];
+    ASSERT_TRUE(planned.plan);
+    const api::MovePlan& plan = *planned.plan;
+    ASSERT_TRUE(plan.traffic);
 
-    ASSERT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, motors, steps)).result, "reached");
+    ASSERT_EQ(lab.wait(lab.send(Ask::kMoveBy, motors, steps)).result, "reached");
     if (std::string(manner).find('_') == std::string::npos) {
       // States of runs hold for any time: a frame is due when less than 300 ms are queued, and
       // fills the queue up to 600 ms. So to each of two MCUs go T / 600 ms to T / 300 ms, and one
       // more for each motor that starts or ends.
-      EXPECT_GT(plan.frames, 0);
-      EXPECT_NEAR(static_cast<double>(plan.frames), static_cast<double>(sent.frames),
+      EXPECT_GT(plan.traffic->frames, 0);
+      EXPECT_NEAR(static_cast<double>(plan.traffic->frames), static_cast<double>(sent.frames),
                   2 + static_cast<double>(plan.duration_us) / 300'000);
     } else {
-      EXPECT_EQ(plan.frames, sent.frames);
+      EXPECT_EQ(plan.traffic->frames, sent.frames);
       // A delimiter goes before a frame after silence.
-      EXPECT_GE(plan.bytes, sent.bytes);
-      EXPECT_LE(plan.bytes, sent.bytes + plan.frames);
+      EXPECT_GE(plan.traffic->bytes, sent.bytes);
+      EXPECT_LE(plan.traffic->bytes, sent.bytes + plan.traffic->frames);
     }
     // From the first tick to the end of the last one, as the log of moves has it.
     EXPECT_EQ(plan.duration_us, plan.ticks * 2560);
-    EXPECT_LT(plan.duration_us - plan.motor_duration_us[0], 2560);
-    EXPECT_DOUBLE_EQ(plan.peak_steps_per_s[0], 2500);
-    EXPECT_LT(plan.peak_steps_per_s[1], 2500);
-    EXPECT_EQ(plan.peak_steps_per_s[2], 0);
-    EXPECT_EQ(plan.steps[3], -1700);
+    EXPECT_LT(plan.duration_us - plan.motors[0].duration_us, 2560);
+    EXPECT_DOUBLE_EQ(plan.motors[0].peak_steps_per_s, 2500);
+    EXPECT_LT(plan.motors[1].peak_steps_per_s, 2500);
+    EXPECT_EQ(plan.motors[2].peak_steps_per_s, 0);
+    EXPECT_EQ(plan.motors[3].steps, -1700);
   }
 }
 
 TEST(DryRun, TakesAsLongAsTheMove) {
   Lab lab(hall(1, 1));
   lab.connect();
-  const reply_t planned = lab.wait(lab.send(dry({"m01"}, {1234})));
-  const std::int64_t duration_us = planned.plan.at(0).duration_us;
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1234});
+  const Answer planned = lab.wait(lab.send(dry({"m01"}, {1234})));
+  const std::int64_t duration_us = planned.plan.value().duration_us;
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {1234});
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 0; }));
   const std::int64_t first_step_us = lab.now_us();
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") == 1234; }));
@@ -105,25 +101,22 @@ TEST(DryRun, IsRefusedWhereTheMoveWouldBeAndForMotorsThatMove) {
   Lab lab(hall(1, 2));
   lab.connect();
   EXPECT_THAT(lab.wait(lab.send(dry({"nobody"}, {5}))).reason, testing::HasSubstr("no motor"));
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {2000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {2000});
   lab.run_for(0.3);
-  const reply_t refused = lab.wait(lab.send(dry({"m01"}, {5})));
-  EXPECT_EQ(refused.phase, reply_t::REFUSED);
+  const Answer refused = lab.wait(lab.send(dry({"m01"}, {5})));
+  EXPECT_EQ(refused.phase, Answer::kRefused);
   EXPECT_THAT(refused.reason, testing::HasSubstr("m01 moves"));
   EXPECT_EQ(lab.wait(move).result, "reached") << "the move goes on";
-  command_t command = dry({}, {});
-  command.kind = command_t::STOP;
-  EXPECT_THAT(lab.wait(lab.send(command)).reason, testing::HasSubstr("only moves"));
 }
 
 // Days of frames are not made to be counted.
 TEST(DryRun, OfAVeryLongMoveTellsAllButTheFrames) {
   Lab lab(hall(1, 1, "fine_ticks"));
   lab.connect();
-  const reply_t planned = lab.wait(lab.send(dry({"m01"}, {1'000'000'000})));
+  const Answer planned = lab.wait(lab.send(dry({"m01"}, {1'000'000'000})));
   ASSERT_EQ(planned.result, "done");
-  EXPECT_EQ(planned.plan.at(0).frames, -1);
-  EXPECT_NEAR(static_cast<double>(planned.plan.at(0).duration_us), 4e11, 1e9);
+  EXPECT_FALSE(planned.plan.value().traffic);
+  EXPECT_NEAR(static_cast<double>(planned.plan.value().duration_us), 4e11, 1e9);
 }
 
 }  // namespace

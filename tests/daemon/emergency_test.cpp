@@ -34,14 +34,14 @@ INSTANTIATE_TEST_SUITE_P(Manners, Emergency,
 
 TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m03"}, {20000, -20000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01", "m03"}, {20000, -20000});
   lab.run_for(1.5);
   const std::int64_t at = lab.shaft_steps("m01");
-  const auto stop = lab.send(command_t::EMERGENCY_STOP, {});
-  EXPECT_EQ(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {5})).result, "refused");
-  const reply_t done = lab.wait(stop);
+  const auto stop = lab.send(Ask::kEmergencyStop, {});
+  EXPECT_EQ(lab.last_reply(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "refused");
+  const Answer done = lab.wait(stop);
   EXPECT_EQ(done.result, "done") << done.reason;
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "stopped");
   EXPECT_THAT(result.reason, HasSubstr("emergency stop"));
   EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
@@ -51,9 +51,9 @@ TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
   } else {
     EXPECT_GT(lab.shaft_steps("m01") - at, 100) << "the table's ramp";
   }
-  EXPECT_EQ(lab.motor("m01").trust, cut ? "uncertain" : "known");
-  EXPECT_EQ(lab.motor("m02").trust, "known") << "it did not move";
-  EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
+  EXPECT_EQ(lab.motor("m01").trust, cut ? api::Trust::kUncertain : api::Trust::kKnown);
+  EXPECT_EQ(lab.motor("m02").trust, api::Trust::kKnown) << "it did not move";
+  EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
   EXPECT_THAT(lab.state_of("hall:2").detail, HasSubstr("emergency stop"));
 
   // Neither time nor a lost link nor a new daemon lifts it.
@@ -62,15 +62,15 @@ TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
   lab.run_for(1);
   lab.plug(0);
   lab.run_for(2);
-  EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
-  const reply_t refused = lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {5}));
+  EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
+  const Answer refused = lab.last_reply(lab.send(Ask::kMoveBy, {"m02"}, {5}));
   EXPECT_THAT(refused.reason, HasSubstr("bushctl clear"));
-  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {5})).result, "reached");
-  const auto again = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5});
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "reached");
+  const auto again = lab.send(Ask::kMoveBy, {"m01"}, {5});
   if (cut) {
     EXPECT_THAT(lab.last_reply(again).reason, HasSubstr("may have overrun"));
-    EXPECT_EQ(lab.wait(lab.send(command_t::SET_POSITION, {"m01"}, {0})).result, "done");
+    EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
   } else {
     EXPECT_EQ(lab.wait(again).result, "reached");
   }
@@ -78,22 +78,22 @@ TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
 
 TEST_P(Emergency, BeforeTheStartNoStepIsMade) {
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {500});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {500});
   lab.run_for(0.02);
-  EXPECT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
   EXPECT_EQ(lab.wait(move).result, "stopped");
   lab.run_for(1);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
-  EXPECT_EQ(lab.motor("m01").trust, "known");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
 }
 
 TEST_P(Emergency, IsHeardThoughTheFirstWritesAreLost) {
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m03"}, {20000, 20000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01", "m03"}, {20000, 20000});
   lab.run_for(1.5);
   int writes = 0;
   lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return ++writes > 3; };
-  EXPECT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
   EXPECT_EQ(lab.wait(move).result, "stopped");
   EXPECT_LT(lab.shaft_steps("m01"), 6000);
 }
@@ -102,14 +102,14 @@ TEST_P(Emergency, IsNotLiftedByAClearThatWasUnderWay) {
   lab.connect();
   for (int ms = 0; ms < 60; ms += 7) {
     SCOPED_TRACE(ms);
-    ASSERT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
-    const auto clear = lab.send(command_t::CLEAR_FAULTS, {});
+    ASSERT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+    const auto clear = lab.send(Ask::kClearFaults, {});
     lab.run_for(ms * 1e-3);
-    ASSERT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+    ASSERT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
     lab.wait(clear);
     lab.run_for(0.5);
-    ASSERT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
-    ASSERT_EQ(lab.state_of("hall:2").mcu_state, "FAULT");
+    ASSERT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
+    ASSERT_EQ(lab.state_of("hall:2").state, api::McuState::kFault);
   }
 }
 
@@ -122,27 +122,27 @@ TEST_P(Emergency, HeardByAnMcuThatIsBeingConfiguredStaysLatched) {
     if (fresh.state_of("hall:1").detail != "being configured") continue;
     SCOPED_TRACE(ms);
     ++seen;
-    ASSERT_EQ(fresh.wait(fresh.send(command_t::EMERGENCY_STOP, {})).result, "done");
+    ASSERT_EQ(fresh.wait(fresh.send(Ask::kEmergencyStop, {})).result, "done");
     fresh.run_for(2);
-    ASSERT_EQ(fresh.state_of("hall:1").mcu_state, "FAULT");
+    ASSERT_EQ(fresh.state_of("hall:1").state, api::McuState::kFault);
   }
   EXPECT_GT(seen, 5);
 }
 
 TEST_P(Emergency, IsTakenWhateverElseIsWrong) {
   // Nobody is online yet, and a motor is named that is none.
-  const auto stop = lab.send(command_t::EMERGENCY_STOP, {"nobody"});
-  const reply_t result = lab.wait(stop);
+  const auto stop = lab.send(Ask::kEmergencyStop, {"nobody"});
+  const Answer result = lab.wait(stop);
   EXPECT_EQ(result.result, "done");
   EXPECT_THAT(result.reason, HasSubstr("hall:1 hall:2"));
 }
 
 TEST_P(Emergency, AnMcuThatIsLostEndsItsMovesWithLink) {
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(1.5);
   lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
-  const auto stop = lab.send(command_t::EMERGENCY_STOP, {});
+  const auto stop = lab.send(Ask::kEmergencyStop, {});
   EXPECT_EQ(lab.wait(move).result, "link");
   EXPECT_THAT(lab.wait(stop).reason, HasSubstr("hall:"));
 }

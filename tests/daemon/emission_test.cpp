@@ -68,14 +68,14 @@ TEST_P(EmissionModes, MovesReachTheirTargetsAndNoStepIsLost) {
       names.push_back(name);
       steps.push_back(distance);
     }
-    const reply_t there = lab.wait(lab.send(command_t::MOVE_RELATIVE, names, steps));
+    const Answer there = lab.wait(lab.send(Ask::kMoveBy, names, steps));
     EXPECT_EQ(there.result, "reached") << there.reason;
     int most = 0;
     for (const auto& [time, count] : drivers.together) most = std::max(most, count);
     EXPECT_LE(most, GetParam().most_together) << manner;
-    const auto number = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {-5000, 5000});
+    const auto number = lab.send(Ask::kMoveBy, {"m01", "m02"}, {-5000, 5000});
     lab.run_for(1.5);
-    lab.send(command_t::STOP, {"m01", "m02"});
+    lab.send(Ask::kStop, {"m01", "m02"});
     EXPECT_EQ(lab.wait(number).result, "stopped");
     for (int m = 0; m < 4; ++m) {
       const std::int64_t reported = lab.motor(names[static_cast<std::size_t>(m)]).position_steps;
@@ -94,7 +94,7 @@ TEST(EmissionStaggered, SupplyCurrentIsMeasuredBeforeTheMcuIsReady) {
   EXPECT_NEAR(lab.bus(0).mcu(0).core().emission.of.settle.of.step.back_ns, 518'000, 60'000);
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
   EXPECT_EQ(lab.bus(0).mcu(0).shaft(0).travel_steps, 2u) << "a step and its way back";
-  const reply_t result = lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {300, -300}));
+  const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {300, -300}));
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 300);
 }
@@ -130,8 +130,7 @@ TEST(EmissionPhases, MovesTurnTheWindings) {
     Lab lab(with_keys(manner, "emission = \"phases\"\nphase_sequence = \"half\"\n"), {}, &windings);
     lab.connect();
     for (const std::int64_t steps : {500, -37, -600}) {
-      const reply_t result =
-          lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01", "m04"}, {steps, -steps}));
+      const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m04"}, {steps, -steps}));
       EXPECT_EQ(result.result, "reached") << result.reason;
     }
     EXPECT_EQ(windings.position[0], -137);

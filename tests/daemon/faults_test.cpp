@@ -27,9 +27,8 @@ TEST_P(Faults, SomeLostWritesAreRepairedInTime) {
     if (!keep) ++lost;
     return keep;
   };
-  const auto move =
-      lab.send(command_t::MOVE_RELATIVE, {"m01", "m02", "m05"}, {15000, -9000, 12000});
-  const reply_t result = lab.wait(move);
+  const auto move = lab.send(Ask::kMoveBy, {"m01", "m02", "m05"}, {15000, -9000, 12000});
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 15000);
   EXPECT_EQ(lab.shaft_steps("m02"), -9000);
@@ -46,8 +45,7 @@ TEST_P(Faults, FlippedBitsAreDroppedCountedAndRepaired) {
       bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
     return true;
   };
-  const reply_t result =
-      lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {4000, -4000}));
+  const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {4000, -4000}));
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 4000);
   EXPECT_EQ(lab.shaft_steps("m02"), -4000);
@@ -59,12 +57,12 @@ TEST_P(Faults, LostReplacementIsPlannedAgain) {
   for (int lost = 1; lost <= 4; ++lost) {
     Lab lab(hall(1, 2, GetParam()));
     lab.connect();
-    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {9000, 3000});
+    const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {9000, 3000});
     lab.run_for(1.3);
     int count = 0;
     lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return ++count > lost; };
-    EXPECT_EQ(lab.wait(lab.send(command_t::STOP, {"m01"})).result, "done");
-    const reply_t result = lab.wait(move);
+    EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+    const Answer result = lab.wait(move);
     EXPECT_EQ(result.motor_results.at(0), "stopped") << lost << " lost: " << result.reason;
     EXPECT_EQ(result.motor_results.at(1), "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
@@ -79,13 +77,12 @@ TEST_P(Faults, DaemonPausedJustAfterAStop) {
   for (const double after_ms : {0.5, 5.0, 15.0, 40.0}) {
     Lab lab(hall(2, 3, GetParam()));
     lab.connect();
-    const auto move =
-        lab.send(command_t::MOVE_RELATIVE, {"m01", "m02", "m05"}, {9000, -9000, 9000});
+    const auto move = lab.send(Ask::kMoveBy, {"m01", "m02", "m05"}, {9000, -9000, 9000});
     lab.run_for(1.3);
-    lab.send(command_t::STOP, {});
+    lab.send(Ask::kStop, {});
     lab.run_for(after_ms / 1000);
     lab.pause_daemon(0.07);
-    const reply_t result = lab.wait(move);
+    const Answer result = lab.wait(move);
     EXPECT_EQ(result.result, "stopped") << "paused " << after_ms << " ms after: " << result.reason;
     EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
   }
@@ -94,10 +91,10 @@ TEST_P(Faults, DaemonPausedJustAfterAStop) {
 TEST_P(Faults, LinkLostInMotionRunsDownAndGoesOnFromThere) {
   Lab lab(hall(2, 4, GetParam()));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m06"}, {9000, -9000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01", "m06"}, {9000, -9000});
   lab.run_for(1.5);
   lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "link");
   lab.run_for(2);
   const std::int64_t first = lab.shaft_steps("m01");
@@ -107,8 +104,8 @@ TEST_P(Faults, LinkLostInMotionRunsDownAndGoesOnFromThere) {
   lab.on_send = nullptr;
   lab.connect();
   EXPECT_EQ(lab.motor("m01").position_steps, first);
-  EXPECT_EQ(lab.motor("m01").trust, "known");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01", "m06"}, {0, 0})).result, "reached");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01", "m06"}, {0, 0})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   EXPECT_EQ(lab.shaft_steps("m06"), 0);
 }
@@ -133,11 +130,11 @@ TEST_P(Faults, DaemonPausedForShortStillStopsAtOnce) {
   const auto steps_to_rest = [](double pause_s) {
     Lab lab(hall(1, 2, GetParam()));
     lab.connect();
-    lab.send(command_t::MOVE_RELATIVE, {"m01"}, {200000});
+    lab.send(Ask::kMoveBy, {"m01"}, {200000});
     lab.run_for(1.5);
     pause_when_asked(lab, pause_s);
     const std::int64_t at = lab.shaft_steps("m01");
-    EXPECT_EQ(lab.wait(lab.send(command_t::STOP, {})).result, "done");
+    EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
     return lab.shaft_steps("m01") - at;
   };
   EXPECT_LT(steps_to_rest(0.2), steps_to_rest(0) + 300) << "0.12 s at 2500 steps/s";
@@ -146,52 +143,52 @@ TEST_P(Faults, DaemonPausedForShortStillStopsAtOnce) {
 TEST_P(Faults, DaemonPausedLongerThanTheQueue) {
   Lab lab(hall(1, 2, GetParam()));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {200000});  // 80 s
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {200000});  // 80 s
   lab.run_for(1.5);
   pause_when_asked(lab, 1.7);
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "link") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << "read after the run-down";
   lab.connect();
   // At once, not where the broken-off move was to end, nor later by what the daemon was stopped.
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {3}), 1).result, "reached");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {3}), 1).result, "reached");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {0}), 20).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {3}), 1).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {3}), 1).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0}), 20).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
 TEST_P(Faults, PortLostAndBack) {
   Lab lab(hall(1, 2, GetParam()));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {-9000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {-9000});
   lab.run_for(1.1);
   lab.unplug(0);
   EXPECT_EQ(lab.last_reply(move).result, "link");
   lab.run_for(2);
-  EXPECT_EQ(lab.state_of("hall:1").mcu_state, "OFFLINE");
+  EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kOffline);
   EXPECT_THAT(lab.state_of("hall:1").detail, testing::HasSubstr("unplugged"));
-  EXPECT_THAT(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).reason,
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).reason,
               testing::HasSubstr("offline"));
   lab.plug(0);
   lab.connect();
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {10})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {10})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 10);
 }
 
 TEST_P(Faults, NewDaemonTakesPositionsOverInMotion) {
   Lab lab(hall(2, 4, GetParam()));
   lab.connect();
-  lab.send(command_t::MOVE_RELATIVE, {"m01", "m08"}, {9000, -9000});
+  lab.send(Ask::kMoveBy, {"m01", "m08"}, {9000, -9000});
   lab.run_for(1.5);
   lab.restart_daemon();
   lab.connect();
   for (const char* name : {"m01", "m08"}) {
     EXPECT_EQ(lab.motor(name).position_steps, lab.shaft_steps(name));
     EXPECT_NE(lab.shaft_steps(name), 0);
-    EXPECT_EQ(lab.motor(name).trust, "known");
+    EXPECT_EQ(lab.motor(name).trust, api::Trust::kKnown);
   }
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01", "m08"}, {0, 0})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01", "m08"}, {0, 0})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   EXPECT_EQ(lab.shaft_steps("m08"), 0);
 }
@@ -199,35 +196,35 @@ TEST_P(Faults, NewDaemonTakesPositionsOverInMotion) {
 TEST_P(Faults, McuResetMakesPositionsUncertainUntilSet) {
   Lab lab(hall(2, 2, GetParam()));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m03"}, {9000, 700});
+  const auto move = lab.send(Ask::kMoveBy, {"m01", "m03"}, {9000, 700});
   lab.run_for(1.5);
   lab.bus(0).reboot(0, 50'000'000);
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.motor_results.at(0), "link") << result.reason;
   EXPECT_EQ(result.motor_results.at(1), "reached") << "the other MCU goes on";
   lab.connect();
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
-  EXPECT_EQ(lab.motor("m03").trust, "known");
-  EXPECT_THAT(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).reason,
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.motor("m03").trust, api::Trust::kKnown);
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).reason,
               testing::HasSubstr("uncertain"));
-  EXPECT_EQ(lab.wait(lab.send(command_t::SET_POSITION, {"m01"}, {0})).result, "done");
-  EXPECT_EQ(lab.motor("m01").trust, "known");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   const std::int64_t before = lab.shaft_steps("m01");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {25})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {25})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), before + 25);
 }
 
 TEST_P(Faults, StopForADeadMcuDoesNotStarveTheOthers) {
   Lab lab(hall(2, 2, GetParam()));
   lab.connect();
-  const auto dying = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
-  const auto healthy = lab.send(command_t::MOVE_RELATIVE, {"m03"}, {5000});
+  const auto dying = lab.send(Ask::kMoveBy, {"m01"}, {9000});
+  const auto healthy = lab.send(Ask::kMoveBy, {"m03"}, {5000});
   lab.run_for(1.3);
   lab.bus(0).reboot(0, 3'600'000'000'000);
   lab.run_for(0.05);
-  lab.send(command_t::STOP, {"m01"});
+  lab.send(Ask::kStop, {"m01"});
   EXPECT_EQ(lab.wait(dying).result, "link");
-  const reply_t result = lab.wait(healthy);
+  const Answer result = lab.wait(healthy);
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m03"), 5000);
 }
@@ -235,7 +232,7 @@ TEST_P(Faults, StopForADeadMcuDoesNotStarveTheOthers) {
 TEST_P(Faults, DriversSwitchedOffStayOff) {
   Lab lab(hall(1, 2, GetParam()));
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(command_t::DISABLE, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kDisable, {})).result, "done");
   const auto online = [&] {
     return lab.has_state("hall:1") && lab.state_of("hall:1").detail == "drivers disabled";
   };
@@ -247,15 +244,15 @@ TEST_P(Faults, DriversSwitchedOffStayOff) {
   lab.restart_daemon();
   EXPECT_TRUE(lab.run_until(online, 10)) << "after a restart of the daemon";
   EXPECT_FALSE(lab.motor("m01").enabled);
-  EXPECT_EQ(lab.wait(lab.send(command_t::ENABLE, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {25})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {25})).result, "reached");
 }
 
 TEST_P(Faults, NoiseFromTheLineDoesNoHarm) {
   Lab lab(hall(1, 1, GetParam()));
   lab.connect();
   std::mt19937 random(1985);
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {3000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {3000});
   for (int i = 0; i < 400; ++i) {
     std::vector<std::uint8_t> noise(random() % 300);
     for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random());
@@ -270,9 +267,12 @@ TEST_P(Faults, SilentMcuCostsTheOthersNothing) {
   Lab lab(hall(2, 2, GetParam()));
   lab.bus(0).reboot(1, 3'600'000'000'000);
   EXPECT_TRUE(lab.run_until(
-      [&] { return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "READY"; }, 10));
-  EXPECT_EQ(lab.state_of("hall:2").mcu_state, "OFFLINE");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {3000})).result, "reached");
+      [&] {
+        return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kReady;
+      },
+      10));
+  EXPECT_EQ(lab.state_of("hall:2").state, api::McuState::kOffline);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {3000})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 3000);
 }
 

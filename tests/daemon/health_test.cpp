@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <numeric>
 
 #include "daemon/lab.h"
 #include "engine/frame.h"
@@ -17,20 +16,22 @@ using testing::HasSubstr;
 TEST(Health, OfAQuietBus) {
   Lab lab(hall(2, 2));
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {2000})).result, "reached");
-  const health_t health = lab.health_of("hall");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {2000})).result, "reached");
+  const api::HealthSnapshot health = lab.health_of("hall");
   EXPECT_EQ(health.port_state, "open");
-  EXPECT_EQ(health.two_masters, 0);
+  EXPECT_FALSE(health.two_masters);
   EXPECT_EQ(health.crc_errors, 0);
-  EXPECT_EQ(health.latency_below_us.back(), INT64_MAX);
-  EXPECT_GT(std::accumulate(health.latency_answers.begin(), health.latency_answers.end(), 0ll), 20);
-  ASSERT_EQ(health.mcu_count, 2);
-  const mcu_health_t& mcu = health.mcus[0];
+  EXPECT_EQ(health.latency.back().below_us, INT64_MAX);
+  std::uint64_t answers = 0;
+  for (const auto& latency : health.latency) answers += latency.answers;
+  EXPECT_GT(answers, 20u);
+  ASSERT_EQ(health.mcus.size(), 2u);
+  const api::McuHealth& mcu = health.mcus[0];
   EXPECT_EQ(mcu.mcu, "hall:1");
   EXPECT_EQ(mcu.unique_id.size(), 16u);
   EXPECT_NE(mcu.unique_id, health.mcus[1].unique_id);
-  EXPECT_EQ(mcu.boot_number, 1);
-  EXPECT_EQ(mcu.crc_errors + mcu.rejected_frames + mcu.run_downs + mcu.timeouts + mcu.repeats +
+  EXPECT_EQ(mcu.boot, 1);
+  EXPECT_EQ(mcu.crc_errors + mcu.rejected_frames + mcu.ramp_downs + mcu.timeouts + mcu.repeats +
                 mcu.missed_ticks + mcu.restarts,
             0);
 }
@@ -45,18 +46,18 @@ TEST(Health, LostAndBrokenFramesShow) {
     if (writes % 7 == 0) bytes[bytes.size() / 2] ^= 4;
     return writes % 11 != 0;
   };
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {12000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {12000});
   lab.run_for(2);
-  EXPECT_GE(lab.mcu_health("hall:1").low_water_ticks, 0);
+  EXPECT_GE(lab.mcu_health("hall:1").low_water_ticks.value(), 0);
   EXPECT_EQ(lab.wait(move).result, "reached");
   lab.on_send = nullptr;
-  const mcu_health_t mcu = lab.mcu_health("hall:1");
+  const api::McuHealth mcu = lab.mcu_health("hall:1");
   EXPECT_GT(mcu.crc_errors, 0);
   EXPECT_GT(mcu.repeats, 0);
   EXPECT_GT(mcu.missed_ticks, 0);
   EXPECT_GT(mcu.timeouts, 0);
   lab.run_for(2);
-  EXPECT_EQ(lab.mcu_health("hall:1").low_water_ticks, -1) << "none moved since the message before";
+  EXPECT_FALSE(lab.mcu_health("hall:1").low_water_ticks) << "none moved since the message before";
 }
 
 TEST(Health, ALostPortAndARestartShow) {
@@ -96,15 +97,15 @@ TEST(TwoMasters, AreToldAndMovesRefusedWhileItLasts) {
   EXPECT_EQ(lab.errors().size(), 1u) << "once";
   EXPECT_THAT(lab.errors().back(), HasSubstr("another master"));
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("another master"));
-  const reply_t refused = lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5}));
+  const Answer refused = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5}));
   EXPECT_EQ(refused.result, "refused");
   EXPECT_THAT(refused.reason, HasSubstr("another master talks on bus hall"));
-  EXPECT_EQ(lab.health_of("hall").two_masters, 1);
-  EXPECT_EQ(lab.mcu_health("hall:1").two_masters, 1);
+  EXPECT_TRUE(lab.health_of("hall").two_masters);
+  EXPECT_TRUE(lab.mcu_health("hall:1").two_masters);
   other = false;
   lab.run_for(5);
-  EXPECT_EQ(lab.health_of("hall").two_masters, 0);
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5})).result, "reached");
+  EXPECT_FALSE(lab.health_of("hall").two_masters);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {5})).result, "reached");
 }
 
 }  // namespace

@@ -38,19 +38,19 @@ TEST_F(Homing, SetsThePositionAndEndsReached) {
     Lab lab(with(homes(), 1, 2, manner));
     put_switch(lab, -700);
     lab.connect();
-    const auto home = lab.send(command_t::HOME, {"m01"});
+    const auto home = lab.send(Ask::kHome, {"m01"});
     lab.run_for(0.3);
-    EXPECT_EQ(lab.motor("m01").activity, "home");
+    EXPECT_EQ(lab.motor("m01").activity, api::Activity::kHoming);
     EXPECT_NE(lab.motor("m01").moving, 0);
-    EXPECT_EQ(lab.motor("m02").activity, "rest");
-    const reply_t result = lab.wait(home);
+    EXPECT_EQ(lab.motor("m02").activity, api::Activity::kResting);
+    const Answer result = lab.wait(home);
     EXPECT_EQ(result.result, "reached") << result.reason;
     ASSERT_EQ(result.position_steps.size(), 1u);
     EXPECT_EQ(result.position_steps[0], lab.shaft_steps("m01") + 650);
     EXPECT_LE(std::abs(result.position_steps[0] + 50), 1);
-    EXPECT_EQ(lab.motor("m01").trust, "known");
-    EXPECT_EQ(lab.motor("m01").activity, "rest");
-    EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {100})).result, "reached");
+    EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+    EXPECT_EQ(lab.motor("m01").activity, api::Activity::kResting);
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {100})).result, "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), -550);
   }
 }
@@ -60,62 +60,61 @@ TEST_F(Homing, MakesAPositionKnownAgain) {
   put_switch(lab, -300);
   lab.connect();
   lab.bus(0).reboot(0, 50'000'000);
-  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == "uncertain"; }));
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == api::Trust::kUncertain; }));
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
-  const reply_t refused = lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5}));
+  const Answer refused = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5}));
   EXPECT_THAT(refused.reason, HasSubstr("bushctl home"));
-  EXPECT_EQ(lab.wait(lab.send(command_t::HOME, {"m01"})).result, "reached");
-  EXPECT_EQ(lab.motor("m01").trust, "known");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01"})).result, "reached");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {5})).result, "reached");
 }
 
 TEST_F(Homing, MeanwhileNothingElseIsDoneWithTheMotor) {
   Lab lab(with(homes()));
   put_switch(lab, -2000);
   lab.connect();
-  const auto home = lab.send(command_t::HOME, {"m01"});
+  const auto home = lab.send(Ask::kHome, {"m01"});
   for (const double seconds : {0.0, 0.5}) {
     lab.run_for(seconds);
-    const auto refused = [&](std::int8_t kind) {
+    const auto refused = [&](Ask kind) {
       return lab.last_reply(lab.send(kind, {"m01"}, {5})).reason;
     };
-    EXPECT_THAT(refused(command_t::MOVE_RELATIVE), HasSubstr("m01: it is being homed"));
-    EXPECT_THAT(refused(command_t::HOME), HasSubstr("m01: it is being homed"));
-    EXPECT_THAT(refused(command_t::SET_POSITION), HasSubstr("m01 moves"));
-    EXPECT_THAT(refused(command_t::DISABLE), HasSubstr("m01 moves"));
+    EXPECT_THAT(refused(Ask::kMoveBy), HasSubstr("m01: it is being homed"));
+    EXPECT_THAT(refused(Ask::kHome), HasSubstr("m01: it is being homed"));
+    EXPECT_THAT(refused(Ask::kSetPosition), HasSubstr("m01 moves"));
+    EXPECT_THAT(refused(Ask::kDisable), HasSubstr("m01 moves"));
   }
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {50})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {50})).result, "reached");
   EXPECT_EQ(lab.wait(home).result, "reached");
-  EXPECT_THAT(lab.last_reply(lab.send(command_t::HOME, {"m02"})).reason,
-              HasSubstr("has no 'home'"));
-  EXPECT_EQ(lab.last_reply(lab.send(command_t::HOME, {})).result, "refused");
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kHome, {"m02"})).reason, HasSubstr("has no 'home'"));
+  EXPECT_EQ(lab.last_reply(lab.send(Ask::kHome, {})).result, "refused");
 }
 
 TEST_F(Homing, StopAndEmergencyStopEndIt) {
-  for (const std::int8_t kind : {command_t::STOP, command_t::EMERGENCY_STOP}) {
+  for (const Ask kind : {Ask::kStop, Ask::kEmergencyStop}) {
     Lab lab(with(homes()));
     lab.connect();
-    const auto home = lab.send(command_t::HOME, {"m01"});
+    const auto home = lab.send(Ask::kHome, {"m01"});
     lab.run_for(0.7);
     const auto stop = lab.send(kind, {});
-    const reply_t result = lab.wait(home);
+    const Answer result = lab.wait(home);
     EXPECT_EQ(result.result, "stopped") << result.reason;
     EXPECT_EQ(lab.wait(stop).result, "done");
     EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
     EXPECT_LT(result.position_steps.at(0), -100);
-    EXPECT_EQ(lab.motor("m01").trust, "known") << "its steps were counted all the time";
+    EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown) << "its steps were counted all the time";
   }
 }
 
 TEST_F(Homing, ASwitchThatIsNotThereIsAFault) {
   Lab lab(with(homes(", slow_most_steps = 60")));
   lab.connect();
-  const reply_t missing = lab.wait(lab.send(command_t::HOME, {"m01"}));
+  const Answer missing = lab.wait(lab.send(Ask::kHome, {"m01"}));
   EXPECT_EQ(missing.result, "fault");
   EXPECT_THAT(missing.reason, HasSubstr("m01: its switch was not found"));
   EXPECT_EQ(missing.position_steps.at(0), -6000);
   lab.bus(0).mcu(0).set_inputs({1, 0});
-  const reply_t stuck = lab.wait(lab.send(command_t::HOME, {"m01"}));
+  const Answer stuck = lab.wait(lab.send(Ask::kHome, {"m01"}));
   EXPECT_EQ(stuck.result, "fault");
   EXPECT_THAT(stuck.reason, HasSubstr("stuck"));
   EXPECT_EQ(stuck.position_steps.at(0), -6000 + 60);
@@ -130,21 +129,21 @@ TEST_F(Homing, MotorsOfOneMcuTakeTurns) {
   put_switch(lab, -300);
   lab.bus(0).mcu(0).attach_switch(1, {.at_steps = -500, .hysteresis_steps = 4});
   lab.connect();
-  const auto home = lab.send(command_t::HOME, {"m02", "m01"});
+  const auto home = lab.send(Ask::kHome, {"m02", "m01"});
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   EXPECT_LT(lab.shaft_steps("m02"), 0);
-  EXPECT_EQ(lab.motor("m01").activity, "home") << "it waits for its turn";
-  const reply_t result = lab.wait(home);
+  EXPECT_EQ(lab.motor("m01").activity, api::Activity::kHoming) << "it waits for its turn";
+  const Answer result = lab.wait(home);
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_LE(std::abs(lab.shaft_steps("m01") + 300), 1);
   EXPECT_LE(std::abs(lab.shaft_steps("m02") + 500), 1);
 
   // One that waits is stopped at once.
-  const auto again = lab.send(command_t::HOME, {"m01", "m02"});
+  const auto again = lab.send(Ask::kHome, {"m01", "m02"});
   lab.run_for(0.1);
-  lab.send(command_t::STOP, {"m02"});
-  const reply_t part = lab.wait(again);
+  lab.send(Ask::kStop, {"m02"});
+  const Answer part = lab.wait(again);
   EXPECT_EQ(part.motor_results.at(0), "reached");
   EXPECT_EQ(part.motor_results.at(1), "stopped");
 }
@@ -153,26 +152,26 @@ TEST_F(Homing, AtTheStartOfItsMcu) {
   Lab lab(with(homes(", at_start = true")));
   put_switch(lab, -300);
   lab.connect();
-  const auto homed = [&] { return lab.motor("m01").activity == "rest"; };
+  const auto homed = [&] { return lab.motor("m01").activity == api::Activity::kResting; };
   lab.run_for(0.1);
-  EXPECT_EQ(lab.motor("m01").activity, "home");
+  EXPECT_EQ(lab.motor("m01").activity, api::Activity::kHoming);
   ASSERT_TRUE(lab.run_until(homed, 60));
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01") + 250);
   // A new daemon finds it homed.
   lab.restart_daemon();
   lab.connect();
   lab.run_for(0.1);
-  EXPECT_EQ(lab.motor("m01").activity, "rest");
+  EXPECT_EQ(lab.motor("m01").activity, api::Activity::kResting);
   lab.bus(0).reboot(0, 50'000'000);
-  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == "uncertain"; }));
-  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == "known"; }, 60));
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == api::Trust::kUncertain; }));
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == api::Trust::kKnown; }, 60));
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01") + 250);
 }
 
 TEST_F(Homing, IsLostWithItsMcuAndCountedAllTheSame) {
   Lab lab(with(homes()));
   lab.connect();
-  const auto home = lab.send(command_t::HOME, {"m01"});
+  const auto home = lab.send(Ask::kHome, {"m01"});
   lab.run_for(0.7);
   lab.unplug(0);
   EXPECT_EQ(lab.wait(home).result, "link");
@@ -180,7 +179,7 @@ TEST_F(Homing, IsLostWithItsMcuAndCountedAllTheSame) {
   lab.plug(0);
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
-  EXPECT_EQ(lab.motor("m01").trust, "known");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_LT(lab.shaft_steps("m01"), -100);
   EXPECT_GT(lab.shaft_steps("m01"), -6000) << "it ran down when it heard nobody";
 }
@@ -201,13 +200,13 @@ TEST_F(Homing, WhereverItComesFromItIsTheSameToOneStep) {
   lab.connect();
   sim::Random random(21, 0);
   for (int i = 0; i < 100; ++i) {
-    const reply_t result = lab.wait(lab.send(command_t::HOME, {"m01"}));
+    const Answer result = lab.wait(lab.send(Ask::kHome, {"m01"}));
     ASSERT_EQ(result.result, "reached") << result.reason;
     const std::int64_t off = result.position_steps.at(0) + 50 - (lab.shaft_steps("m01") + 400);
     ASSERT_GE(off, 0);
     ASSERT_LE(off, 1);
     const auto away = random.between(-40, 900);
-    ASSERT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {away - 50})).result, "reached");
+    ASSERT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {away - 50})).result, "reached");
   }
 }
 
@@ -215,18 +214,19 @@ TEST_F(Homing, LocalInputsMoveAMotorAndTheDaemonFollows) {
   Lab lab(with("local = true"));
   lab.connect();
   hold(lab, BUSHD_INPUT_FORWARD);
-  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").activity == "local"; }, 1));
-  EXPECT_EQ(lab.motor("m02").activity, "rest");
-  EXPECT_THAT(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5})).reason,
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kLocal; }, 1));
+  EXPECT_EQ(lab.motor("m02").activity, api::Activity::kResting);
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5})).reason,
               HasSubstr("local inputs of MCU hall:1"));
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {50})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {50})).result, "reached");
   hold(lab, 0);
-  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").activity == "rest"; }, 5));
+  ASSERT_TRUE(
+      lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kResting; }, 5));
   EXPECT_GT(lab.shaft_steps("m01"), 50);
   EXPECT_EQ(lab.shaft_steps("m02"), 50);
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
-  EXPECT_EQ(lab.motor("m01").trust, "known");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
@@ -236,22 +236,23 @@ TEST_F(Homing, AMoveAndAPressAtTheSameTimeNeverMix) {
     SCOPED_TRACE(ms);
     Lab lab(with("local = true"));
     lab.connect();
-    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {100});
+    const auto move = lab.send(Ask::kMoveBy, {"m01"}, {100});
     lab.run_for(ms * 1e-3);
     hold(lab, BUSHD_INPUT_REVERSE);
     lab.run_for(0.5);
     hold(lab, 0);
-    const reply_t result = lab.wait(move);
+    const Answer result = lab.wait(move);
     EXPECT_THAT(result.result, testing::AnyOf("reached", "stopped")) << result.reason;
-    ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").activity == "rest"; }, 5));
+    ASSERT_TRUE(
+        lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kResting; }, 5));
     EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
-    EXPECT_EQ(lab.motor("m01").trust, "known");
+    EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
     if (result.result == "reached") {
       EXPECT_EQ(lab.shaft_steps("m01"), 100);
     } else {
       EXPECT_LT(lab.shaft_steps("m01"), 0);
     }
-    EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {0})).result, "reached");
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
   }
 }
 

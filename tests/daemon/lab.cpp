@@ -10,8 +10,77 @@
 #include "tables/store/open.h"
 
 namespace bushd::test {
+namespace {
 
-Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink) {
+Answer answer_of(const api::Reply& reply) {
+  if (const auto* refused = std::get_if<api::Refused>(&reply)) {
+    return {.phase = Answer::kRefused, .result = "refused", .reason = refused->reason};
+  }
+  const auto* completed = std::get_if<api::Completed>(&reply);
+  if (completed == nullptr) return {};
+  Answer answer{.phase = Answer::kResult,
+                .result = std::string(word(completed->outcome)),
+                .reason = completed->reason};
+  if (const auto* motors = std::get_if<std::vector<api::MotorResult>>(&completed->detail)) {
+    for (const api::MotorResult& motor : *motors) {
+      answer.motor_results.emplace_back(word(motor.outcome));
+      answer.position_steps.push_back(motor.position_steps);
+      answer.tables.push_back(motor.table);
+    }
+  }
+  if (const auto* plan = std::get_if<api::MovePlan>(&completed->detail)) answer.plan = *plan;
+  return answer;
+}
+
+}  // namespace
+
+std::vector<api::MotorSteps> motor_steps(const std::vector<std::string>& motors,
+                                         const std::vector<std::int64_t>& steps) {
+  std::vector<api::MotorSteps> all;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    all.push_back({motors[i], i < steps.size() ? steps[i] : 0});
+  }
+  return all;
+}
+
+api::Request request_of(Ask ask, const std::vector<std::string>& motors,
+                        const std::vector<std::int64_t>& steps) {
+  switch (ask) {
+    case Ask::kMoveBy:
+      return api::Move{.kind = api::Move::Kind::kRelative, .motors = motor_steps(motors, steps)};
+    case Ask::kMoveTo:
+      return api::Move{.kind = api::Move::Kind::kAbsolute, .motors = motor_steps(motors, steps)};
+    case Ask::kStop:
+      return api::Stop{motors};
+    case Ask::kEnable:
+      return api::Enable{motors};
+    case Ask::kDisable:
+      return api::Disable{motors};
+    case Ask::kSetPosition:
+      return api::SetPosition{motor_steps(motors, steps)};
+    case Ask::kClearFaults:
+      return api::ClearFaults{motors};
+    case Ask::kEmergencyStop:
+      return api::EmergencyStop{};
+    case Ask::kHome:
+      return api::Home{motors};
+    case Ask::kDisarm:
+      return api::Disarm{motors};
+  }
+  throw std::logic_error("an unknown Ask");
+}
+
+class Lab::Client final : public api::Session {
+ public:
+  Client() : Session(api::Transport::kLcm, "test", true) {}
+  void answer(std::int64_t number, const api::Reply& reply) override {
+    answers[number].push_back(answer_of(reply));
+  }
+  std::map<std::int64_t, std::vector<Answer>> answers;  // by number
+};
+
+Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink)
+    : client_(std::make_shared<Client>()) {
   directory_ = std::filesystem::temp_directory_path() / ("bushd-lab-" + std::to_string(::getpid()));
   std::filesystem::create_directories(directory_);
   const auto path = directory_ / "bushd.toml";
@@ -45,30 +114,23 @@ Lab::~Lab() {
 }
 
 void Lab::start_daemon() {
-  shim_ = std::make_unique<daemon::LcmShim>(config_, *this, ++master_);
+  core_ = std::make_unique<daemon::Core>(config_, *this, ++master_);
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     if (buses_[b].plugged) core().port_opened(now_us(), BusId{b});
   }
 }
 
 void Lab::restart_daemon() {
-  shim_.reset();
+  core_.reset();
   disk_.clear();
   for (SimulatedBus& bus : buses_) bus.received.clear();
   states_.clear();
+  descriptions_.clear();
   start_daemon();
 }
 
 void Lab::write_file(const std::string& name, const std::string& text) {
   std::ofstream(directory_ / name) << text;
-}
-
-std::int64_t Lab::use(const std::string& group, const std::string& table) {
-  command_t command{};
-  command.kind = command_t::USE_TABLE;
-  command.group = group;
-  command.table = table;
-  return send(command);
 }
 
 void Lab::read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
@@ -86,6 +148,10 @@ void Lab::read_tables(std::uint64_t ticket, const std::vector<std::string>& want
 void Lab::keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) {
   kept_ = wanted;
   disk_.push_back([this, ticket] { core().tables().kept(ticket, {}); });
+}
+
+void Lab::serve_tables(const api::Asker& asker, const api::Request&) {
+  asker.answer(api::Refused{"there are no table files here"});
 }
 
 void Lab::pause_daemon(double seconds) {
@@ -149,42 +215,25 @@ void Lab::run_for(double seconds) {
   run_until([] { return false; }, seconds);
 }
 
-std::int64_t Lab::send(std::int8_t kind, const std::vector<std::string>& motors,
-                       const std::vector<std::int64_t>& steps) {
-  command_t command{};
-  command.kind = kind;
-  command.motors = motors;
-  command.steps = steps;
-  command.steps.resize(motors.size());
-  return send(command);
-}
-
-std::int64_t Lab::send(command_t command) {
-  command.client_id = "test";
-  command.number = ++number_;
-  command.motor_count = static_cast<std::int32_t>(command.motors.size());
-  shim_->command(now_us(), command);
+std::int64_t Lab::send(const api::Request& request) {
+  core().request(now_us(), {.session = client_, .number = ++number_}, request);
   return number_;
 }
 
-std::vector<reply_t> Lab::replies(std::int64_t number) const {
-  std::vector<reply_t> found;
-  std::copy_if(
-      replies_.begin(), replies_.end(), std::back_inserter(found),
-      [&](const reply_t& reply) { return reply.client_id == "test" && reply.number == number; });
-  return found;
+std::vector<Answer> Lab::replies(std::int64_t number) const {
+  return client_->answers[number];
 }
 
-reply_t Lab::last_reply(std::int64_t number) const {
+Answer Lab::last_reply(std::int64_t number) const {
   return replies(number).back();
 }
 
 bool Lab::has_result(std::int64_t number) const {
-  const std::vector<reply_t> all = replies(number);
-  return !all.empty() && all.back().phase != reply_t::ACCEPTED;
+  const std::vector<Answer> all = replies(number);
+  return !all.empty() && all.back().phase != Answer::kAccepted;
 }
 
-reply_t Lab::wait(std::int64_t number, double limit_s) {
+Answer Lab::wait(std::int64_t number, double limit_s) {
   EXPECT_TRUE(run_until([&] { return has_result(number); }, limit_s)) << "no result in time";
   run_for(0.006);  // the state is published 5 ms after the last at the earliest
   return last_reply(number);
@@ -193,31 +242,40 @@ reply_t Lab::wait(std::int64_t number, double limit_s) {
 bool Lab::all_ready() const {
   if (states_.size() != config_.mcus.size()) return false;
   return std::all_of(states_.begin(), states_.end(),
-                     [](const auto& entry) { return entry.second.mcu_state == "READY"; });
+                     [](const auto& entry) { return entry.second.state == api::McuState::kReady; });
 }
 
 void Lab::connect() {
   ASSERT_TRUE(run_until([this] { return all_ready(); }, 10)) << "not all MCUs became READY";
 }
 
-motor_state_t Lab::motor(const std::string& name) const {
+api::MotorState Lab::motor(const std::string& name) const {
   for (const auto& [mcu, state] : states_) {
-    for (const motor_state_t& motor : state.motors) {
+    for (const api::MotorState& motor : state.motors) {
       if (motor.name == name) return motor;
     }
   }
   throw std::out_of_range(name);
 }
 
-health_t Lab::health_of(const std::string& bus) {
+api::MotorDescription Lab::description(const std::string& name) const {
+  for (const auto& [mcu, description] : descriptions_) {
+    for (const api::MotorDescription& motor : description.motors) {
+      if (motor.name == name) return motor;
+    }
+  }
+  throw std::out_of_range(name);
+}
+
+api::HealthSnapshot Lab::health_of(const std::string& bus) {
   health_.erase(bus);
   EXPECT_TRUE(run_until([&] { return health_.contains(bus); }, 2)) << "no health in time";
   return health_.at(bus);
 }
 
-mcu_health_t Lab::mcu_health(const std::string& mcu) {
-  const health_t health = health_of(mcu.substr(0, mcu.find(':')));
-  for (const mcu_health_t& candidate : health.mcus) {
+api::McuHealth Lab::mcu_health(const std::string& mcu) {
+  const api::HealthSnapshot health = health_of(mcu.substr(0, mcu.find(':')));
+  for (const api::McuHealth& candidate : health.mcus) {
     if (candidate.mcu == mcu) return candidate;
   }
   throw std::out_of_range(mcu);

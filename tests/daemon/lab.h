@@ -8,15 +8,64 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
-#include "daemon/lcm_shim.h"
+#include "daemon/core.h"
 #include "sim/bus.h"
+
+// Failures print words.
+namespace bushd::api {
+inline void PrintTo(Trust trust, std::ostream* out) {
+  *out << word(trust);
+}
+inline void PrintTo(Activity activity, std::ostream* out) {
+  *out << word(activity);
+}
+inline void PrintTo(McuState state, std::ostream* out) {
+  *out << word(state);
+}
+inline void PrintTo(Directions directions, std::ostream* out) {
+  *out << '"' << word(directions) << '"';
+}
+}  // namespace bushd::api
 
 namespace bushd::test {
 
-class Lab : public daemon::LcmOutputs {
+// Requests that motors, or motors and steps, are enough for.
+enum class Ask {
+  kMoveBy,
+  kMoveTo,
+  kStop,
+  kEnable,
+  kDisable,
+  kSetPosition,
+  kClearFaults,
+  kEmergencyStop,
+  kHome,
+  kDisarm
+};
+api::Request request_of(Ask ask, const std::vector<std::string>& motors,
+                        const std::vector<std::int64_t>& steps = {});
+std::vector<api::MotorSteps> motor_steps(const std::vector<std::string>& motors,
+                                         const std::vector<std::int64_t>& steps);
+
+// An api::Reply, laid flat.
+struct Answer {
+  enum Phase { kAccepted, kRefused, kResult };
+  Phase phase = kAccepted;
+  std::string result{};  // the word of its outcome, "refused", or ""
+  std::string reason{};
+  // By motor, in the request's order.
+  std::vector<std::string> motor_results{};
+  std::vector<std::int64_t> position_steps{};
+  std::vector<api::TableRef> tables{};
+  std::optional<api::MovePlan> plan{};
+};
+
+class Lab : public daemon::Outputs {
  public:
   // `toml` as in bushd.toml; its ports are only names here. Every MCU of it exists.
   // `glacier` is the text of a table file of that name beside it, if not empty.
@@ -29,26 +78,29 @@ class Lab : public daemon::LcmOutputs {
   bool run_until(const std::function<bool()>& done, double limit_s = 30);
   void run_for(double seconds);
 
-  // Sends a command as client "test" and returns its number.
-  std::int64_t send(std::int8_t kind, const std::vector<std::string>& motors,
-                    const std::vector<std::int64_t>& steps = {});
-  std::int64_t send(command_t command);
-  // The replies so far to a command of client "test".
-  std::vector<reply_t> replies(std::int64_t number) const;
+  // Sends a request as client "test" and returns its number.
+  std::int64_t send(Ask ask, const std::vector<std::string>& motors,
+                    const std::vector<std::int64_t>& steps = {}) {
+    return send(request_of(ask, motors, steps));
+  }
+  std::int64_t send(const api::Request& request);
+  // The replies so far to a request.
+  std::vector<Answer> replies(std::int64_t number) const;
   // The last reply, which must exist.
-  reply_t last_reply(std::int64_t number) const;
+  Answer last_reply(std::int64_t number) const;
   bool has_result(std::int64_t number) const;
-  // Runs until the command has its result or was refused, and returns that.
-  reply_t wait(std::int64_t number, double limit_s = 60);
+  // Runs until the request has its result or was refused, and returns that.
+  Answer wait(std::int64_t number, double limit_s = 60);
   bool all_ready() const;
   void connect();  // asserts that all MCUs become READY
 
   bool has_state(const std::string& mcu) const { return states_.contains(mcu); }
-  const state_t& state_of(const std::string& mcu) const { return states_.at(mcu); }
-  motor_state_t motor(const std::string& name) const;
+  const api::StateSnapshot& state_of(const std::string& mcu) const { return states_.at(mcu); }
+  api::MotorState motor(const std::string& name) const;
+  api::MotorDescription description(const std::string& motor) const;
   // As published next.
-  health_t health_of(const std::string& bus);
-  mcu_health_t mcu_health(const std::string& mcu);
+  api::HealthSnapshot health_of(const std::string& bus);
+  api::McuHealth mcu_health(const std::string& mcu);
   // What the daemon has logged as errors.
   const std::vector<std::string>& errors() const { return errors_; }
   // Steps that the motor has really made, seen from the outside.
@@ -67,12 +119,12 @@ class Lab : public daemon::LcmOutputs {
 
   // A file beside bushd.toml, where tables are looked for first.
   void write_file(const std::string& name, const std::string& text);
-  // Sends USE_TABLE, RELOAD_TABLES.
-  std::int64_t use(const std::string& group, const std::string& table);
-  std::int64_t reload() { return send(command_t::RELOAD_TABLES, {}); }
+  std::int64_t use(const std::string& group, const std::string& table) {
+    return send(api::UseTable{.group = group, .table = table});
+  }
+  std::int64_t reload() { return send(api::ReloadTables{}); }
 
-  daemon::Core& core() { return shim_->core(); }
-  void command(const command_t& command) { shim_->command(now_us(), command); }
+  daemon::Core& core() { return *core_; }
   sim::Bus& bus(std::size_t index) { return *buses_[index].bus; }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   const std::vector<std::string>& move_lines() const { return move_lines_; }
@@ -85,14 +137,18 @@ class Lab : public daemon::LcmOutputs {
     std::vector<std::uint8_t> received;
     bool plugged = true;
   };
+  class Client;
   void send(BusId bus, std::span<const std::uint8_t> bytes) override;
-  void reply(const reply_t& reply) override { replies_.push_back(reply); }
-  void state(const state_t& state) override { states_[state.mcu] = state; }
-  void health(const health_t& health) override { health_[health.bus] = health; }
+  void publish(McuId, const api::StateSnapshot& state) override { states_[state.mcu] = state; }
+  void publish(McuId, const api::Description& description) override {
+    descriptions_[description.mcu] = description;
+  }
+  void publish(BusId, const api::HealthSnapshot& health) override { health_[health.bus] = health; }
   void move_log(const std::string& line) override { move_lines_.push_back(line); }
   void log(daemon::LogLevel level, const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
+  void serve_tables(const api::Asker& asker, const api::Request& request) override;
   std::int64_t wall_clock_us() override { return now_us(); }
   void start_daemon();
   void advance();
@@ -100,13 +156,14 @@ class Lab : public daemon::LcmOutputs {
 
   std::filesystem::path directory_;
   config::Config config_;
-  std::unique_ptr<daemon::LcmShim> shim_;
+  std::unique_ptr<daemon::Core> core_;
+  std::shared_ptr<Client> client_;
   std::vector<SimulatedBus> buses_;
   std::int64_t now_ns_ = 0;
   std::int64_t number_ = 0;
-  std::vector<reply_t> replies_;
-  std::map<std::string, state_t> states_;
-  std::map<std::string, health_t> health_;
+  std::map<std::string, api::StateSnapshot> states_;
+  std::map<std::string, api::Description> descriptions_;
+  std::map<std::string, api::HealthSnapshot> health_;
   std::vector<std::string> errors_;
   std::uint16_t master_ = 0;
   std::vector<std::string> move_lines_;

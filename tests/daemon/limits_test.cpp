@@ -27,8 +27,8 @@ class Limits : public testing::TestWithParam<const char*> {
     lab.bus(0).mcu(0).set_inputs({motors, system});
   }
   // m01 and m02 move, and m01 meets its switch.
-  static reply_t meet_switch(Lab& lab, std::int64_t steps) {
-    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {steps, 3000});
+  static Answer meet_switch(Lab& lab, std::int64_t steps) {
+    const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {steps, 3000});
     EXPECT_TRUE(lab.run_until([&] { return std::abs(lab.shaft_steps("m01")) > 500; }));
     press(lab, 1);
     return lab.wait(move);
@@ -44,7 +44,7 @@ TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
     const std::string end = sign > 0 ? "positive" : "negative";
     Lab lab(lab_with(GetParam(), "", "limit = \"" + end + "\"\n"));
     lab.connect();
-    const reply_t result = meet_switch(lab, sign * 20000);
+    const Answer result = meet_switch(lab, sign * 20000);
     EXPECT_EQ(result.result, "limit") << result.reason;
     EXPECT_THAT(result.reason, HasSubstr("m01"));
     EXPECT_THAT(result.reason, HasSubstr(end + " end"));
@@ -56,23 +56,21 @@ TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
     EXPECT_LT(std::abs(stands), 1200) << "the table's ramp";
     EXPECT_EQ(lab.shaft_steps("m02"), 3000);
     lab.run_for(0.2);
-    EXPECT_EQ(lab.motor("m01").forbidden, end);
-    EXPECT_EQ(lab.motor("m01").trust, "known");
-    EXPECT_EQ(lab.state_of("hall:1").mcu_state, "READY") << "no fault";
+    EXPECT_EQ(word(lab.motor("m01").inhibited), end);
+    EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+    EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kReady) << "no fault";
 
-    const reply_t refused =
-        lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {sign * 10}));
+    const Answer refused = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {sign * 10}));
     EXPECT_EQ(refused.result, "refused");
     EXPECT_THAT(refused.reason, HasSubstr("m01: its limit switch at the " + end + " end"));
-    EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {sign * -10})).result,
-              "reached");
-    const auto back = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {sign * -200});
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {sign * -10})).result, "reached");
+    const auto back = lab.send(Ask::kMoveBy, {"m01"}, {sign * -200});
     lab.run_for(0.3);
     press(lab, 0);
     EXPECT_EQ(lab.wait(back).result, "reached");
     lab.run_for(0.1);
-    EXPECT_EQ(lab.motor("m01").forbidden, "");
-    EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {sign * 20})).result, "reached");
+    EXPECT_EQ(word(lab.motor("m01").inhibited), "");
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {sign * 20})).result, "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), stands - sign * 190);
     EXPECT_EQ(lab.motor("m01").position_steps, stands - sign * 190);
     EXPECT_TRUE(lab.errors().empty());
@@ -82,22 +80,22 @@ TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
 TEST_P(Limits, OneThatIsCutOffAtItsSwitchMayHaveOverrun) {
   Lab lab(lab_with(GetParam(), "", "limit = \"both\"\nlimit_action = \"cut\"\n"));
   lab.connect();
-  const reply_t result = meet_switch(lab, -20000);
+  const Answer result = meet_switch(lab, -20000);
   EXPECT_EQ(result.result, "limit");
   EXPECT_LE(std::abs(lab.shaft_steps("m01")), 560) << "a few ticks at 2500 steps/s";
   EXPECT_EQ(result.position_steps.at(0), lab.shaft_steps("m01"));
   lab.run_for(0.1);
-  EXPECT_EQ(lab.motor("m01").forbidden, "negative");
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(word(lab.motor("m01").inhibited), "negative");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
 }
 
 // The switch closes while the start is on its way.
 TEST_P(Limits, AMoveThatTheSwitchForestallsEndsAtTheLimitTheSame) {
   Lab lab(lab_with(GetParam(), "", "limit = \"positive\"\n"));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {300});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {300});
   press(lab, 1);
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "limit") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
@@ -105,14 +103,14 @@ TEST_P(Limits, AMoveThatTheSwitchForestallsEndsAtTheLimitTheSame) {
 TEST_P(Limits, ANewTargetBeyondTheSwitchEndsThereToo) {
   Lab lab(lab_with(GetParam(), "", "limit = \"positive\"\n"));
   lab.connect();
-  const auto away = lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {-3000});
+  const auto away = lab.send(Ask::kMoveTo, {"m01"}, {-3000});
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -600; }));
-  const auto back = lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {5000});
+  const auto back = lab.send(Ask::kMoveTo, {"m01"}, {5000});
   EXPECT_EQ(lab.wait(away).result, "stopped");
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 300; }));
   press(lab, 1);
   EXPECT_EQ(lab.wait(back).result, "limit");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
@@ -124,11 +122,11 @@ TEST_P(Limits, ASwitchThatOpensWhenItIsMetAndANewDaemon) {
   press(lab, 0);
   lab.run_for(0.2);
   EXPECT_TRUE(lab.motor("m01").input);
-  EXPECT_EQ(lab.motor("m01").forbidden, "negative");
+  EXPECT_EQ(word(lab.motor("m01").inhibited), "negative");
   lab.restart_daemon();
   lab.connect();
-  EXPECT_EQ(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {-1})).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).result, "reached");
+  EXPECT_EQ(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {-1})).result, "refused");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {1})).result, "reached");
 }
 
 TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndReleased) {
@@ -136,49 +134,49 @@ TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndRelease
     Lab lab(lab_with(GetParam(),
                      cut ? "emergency_input = \"cut\"\n" : "emergency_input = \"ramp\"\n", ""));
     lab.connect();
-    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {20000, -20000});
+    const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {20000, -20000});
     lab.run_for(1.5);
     const std::int64_t at = lab.shaft_steps("m01");
     press(lab, 0, BUSHD_INPUT_EMERGENCY);
-    const reply_t result = lab.wait(move);
+    const Answer result = lab.wait(move);
     EXPECT_EQ(result.result, "stopped");
     EXPECT_THAT(result.reason, HasSubstr("emergency input of MCU hall:1"));
     EXPECT_EQ(result.position_steps.at(1), lab.shaft_steps("m02"));
     EXPECT_EQ(lab.shaft_steps("m01") - at > 100, !cut);
     lab.run_for(0.1);
-    EXPECT_EQ(lab.motor("m01").trust, cut ? "uncertain" : "known");
-    EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
+    EXPECT_EQ(lab.motor("m01").trust, cut ? api::Trust::kUncertain : api::Trust::kKnown);
+    EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
     EXPECT_EQ(lab.state_of("hall:1").inputs, "emergency");
     EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("release it"));
-    const reply_t still = lab.wait(lab.send(command_t::CLEAR_FAULTS, {}));
+    const Answer still = lab.wait(lab.send(Ask::kClearFaults, {}));
     EXPECT_EQ(still.result, "fault");
     EXPECT_THAT(still.reason, HasSubstr("emergency input"));
     press(lab, 0);
     lab.restart_daemon();
     ASSERT_TRUE(lab.run_until([&] {
-      return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "FAULT";
+      return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
     })) << "not for a daemon to clear";
-    EXPECT_THAT(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).reason,
+    EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).reason,
                 HasSubstr("bushctl clear"));
-    EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+    EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
     if (cut) continue;
-    EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {10})).result, "reached");
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).result, "reached");
   }
 }
 
 TEST_P(Limits, OvercurrentTakesThePowerAndSaysSo) {
   Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(1);
   lab.bus(0).mcu(0).set_current(801);
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "fault");
   EXPECT_THAT(result.reason, HasSubstr("supply current"));
   lab.run_for(0.1);
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("overcurrent"));
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
-  EXPECT_EQ(lab.motor("m02").trust, "known") << "it did not move";
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.motor("m02").trust, api::Trust::kKnown) << "it did not move";
   EXPECT_FALSE(lab.motor("m01").enabled);
   EXPECT_EQ(lab.mcu_health("hall:1").current, 801);
   // Neither a lost link nor a new daemon puts it back.
@@ -188,26 +186,26 @@ TEST_P(Limits, OvercurrentTakesThePowerAndSaysSo) {
   lab.plug(0);
   lab.run_for(3);
   EXPECT_FALSE(lab.motor("m01").enabled);
-  EXPECT_EQ(lab.state_of("hall:1").mcu_state, "FAULT");
-  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+  EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
   lab.run_for(0.1);
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("drivers disabled"));
-  EXPECT_EQ(lab.wait(lab.send(command_t::ENABLE, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {10})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {10})).result, "reached");
 }
 
 TEST_P(Limits, OvercurrentBeforeTheFirstStepLeavesThePositionKnown) {
   Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.bus(0).mcu(0).set_current(801);
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "fault");
   EXPECT_THAT(result.reason, HasSubstr("supply current"));
   EXPECT_THAT(result.reason, HasSubstr("m01: it did not move"));
   lab.run_for(0.1);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
-  EXPECT_EQ(lab.motor("m01").trust, "known");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
 }
 
 // Whatever switches do: one result a move, and the daemon knows where the motors stand.
@@ -221,21 +219,21 @@ TEST_P(Limits, NoStepIsLostHoweverSwitchesBounce) {
                      "limit = \"" + std::string(ends[below(3)]) + "\"\n"));
     lab.connect();
     for (int i = 0; i < 8; ++i) {
-      const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"},
-                                 {below(3000) - 1500, below(3000) - 1500});
+      const auto move =
+          lab.send(Ask::kMoveBy, {"m01", "m02"}, {below(3000) - 1500, below(3000) - 1500});
       for (int k = below(40); k > 0 && !lab.has_result(move); --k) {
         lab.run_for(0.01 * below(20));
         press(lab, static_cast<std::uint16_t>(below(2)));
       }
-      if (below(4) == 0) lab.send(command_t::STOP, {});
-      const reply_t result = lab.wait(move);
+      if (below(4) == 0) lab.send(Ask::kStop, {});
+      const Answer result = lab.wait(move);
       EXPECT_THAT(result.result, testing::AnyOf("reached", "limit", "stopped", "refused"))
           << result.reason;
       lab.run_for(0.2);
       EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
       EXPECT_EQ(lab.motor("m02").position_steps, lab.shaft_steps("m02"));
-      EXPECT_EQ(lab.motor("m01").trust, "known");
-      EXPECT_EQ(lab.state_of("hall:1").mcu_state, "READY");
+      EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+      EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kReady);
     }
   }
 }
@@ -244,16 +242,16 @@ TEST_P(Limits, NoStepIsLostHoweverSwitchesBounce) {
 TEST_P(Limits, OvercurrentOnTheRampOfAnEmergencyStopLeavesThePositionUncertain) {
   Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(3);
-  lab.send(command_t::EMERGENCY_STOP, {});
+  lab.send(Ask::kEmergencyStop, {});
   sim::VirtualMcu& mcu = lab.bus(0).mcu(0);
   ASSERT_TRUE(lab.run_until([&] { return (mcu.core().faults & BUSHD_FAULT_EMERGENCY) != 0; }));
   mcu.set_current(801);
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "fault");
   EXPECT_THAT(result.reason, HasSubstr("supply current"));
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
 }
 
 class AfterReset : public testing::TestWithParam<const char*> {};
@@ -265,9 +263,9 @@ TEST_P(AfterReset, DriversAreAsConfiguredAfterTheWatchdog) {
   Lab lab(lab_with("fine", "enable_after_reset = \"" + setting + "\"\n", ""));
   lab.connect();
   EXPECT_EQ(lab.mcu_health("hall:1").reset_cause, "power-on");
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(1);
-  const std::int32_t boot_number = lab.state_of("hall:1").boot_number;
+  const std::int32_t boot_number = lab.state_of("hall:1").boot;
   sim::VirtualMcu& mcu = lab.bus(0).mcu(0);
   mcu.set_reset_cause(BUSHD_RESET_WATCHDOG);
   lab.bus(0).reboot(0, 100'000'000);
@@ -275,13 +273,14 @@ TEST_P(AfterReset, DriversAreAsConfiguredAfterTheWatchdog) {
   ASSERT_TRUE(lab.run_until([&] { return mcu.running(); }));
   EXPECT_EQ((mcu.core().flags & BUSHD_FLAG_ENABLED) != 0, setting == "at_once");
   lab.run_for(5);
-  EXPECT_NE(lab.state_of("hall:1").boot_number, boot_number);
+  EXPECT_NE(lab.state_of("hall:1").boot, boot_number);
   EXPECT_EQ(lab.mcu_health("hall:1").reset_cause, "watchdog");
-  EXPECT_EQ(lab.motor("m01").trust, "uncertain");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
   EXPECT_EQ(lab.motor("m01").enabled, setting != "no");
-  EXPECT_EQ(lab.state_of("hall:1").mcu_state, setting == "no" ? "BUSY" : "READY");
+  EXPECT_EQ(lab.state_of("hall:1").state,
+            setting == "no" ? api::McuState::kBusy : api::McuState::kReady);
   if (setting != "no") return;
-  EXPECT_EQ(lab.wait(lab.send(command_t::ENABLE, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
   lab.run_for(0.1);
   EXPECT_TRUE(lab.motor("m01").enabled);
 }
@@ -289,21 +288,23 @@ TEST_P(AfterReset, DriversAreAsConfiguredAfterTheWatchdog) {
 TEST(SelfTest, WhatHasFailedIsNamedAndKeepsMotorsOff) {
   Lab lab(hall(1, 1));
   lab.bus(0).mcu(0).fail_self_tests(BUSHD_TEST_RAM | BUSHD_TEST_FLASH);
-  ASSERT_TRUE(lab.run_until(
-      [&] { return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "FAULT"; }));
+  ASSERT_TRUE(lab.run_until([&] {
+    return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
+  }));
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("self-test failed (RAM, the program's"));
-  EXPECT_EQ(lab.last_reply(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {1})).result, "refused");
+  EXPECT_EQ(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).result, "refused");
   EXPECT_FALSE(lab.motor("m01").enabled);
 }
 
 TEST(SelfTest, AnMcuThatLostWhatItKeepsMovesOnceThatIsKnown) {
   Lab lab(hall(1, 1));
   lab.bus(0).mcu(0).fail_self_tests(BUSHD_TEST_EEPROM);
-  ASSERT_TRUE(lab.run_until(
-      [&] { return lab.has_state("hall:1") && lab.state_of("hall:1").mcu_state == "FAULT"; }));
+  ASSERT_TRUE(lab.run_until([&] {
+    return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
+  }));
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("if its unique id is 0"));
-  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {20})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {20})).result, "reached");
 }
 
 }  // namespace

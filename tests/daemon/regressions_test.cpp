@@ -54,10 +54,10 @@ TEST_P(Regressions, StopAtTheTickOfTheStart) {
   lab.connect();
   std::int64_t stands = 0;
   for (double after_s = 0.060; after_s < 0.080; after_s += 0.001) {
-    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {500});
+    const auto move = lab.send(Ask::kMoveBy, {"m01"}, {500});
     lab.run_for(after_s);
-    lab.wait(lab.send(command_t::STOP, {"m01"}));
-    const reply_t result = lab.wait(move);
+    lab.wait(lab.send(Ask::kStop, {"m01"}));
+    const Answer result = lab.wait(move);
     EXPECT_EQ(result.result, "stopped") << "after " << after_s << " s: " << result.reason;
     lab.run_for(1);
     EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << "after " << after_s << " s";
@@ -71,12 +71,12 @@ TEST_P(Regressions, StopAtTheTickOfTheStart) {
 TEST_P(Regressions, LostStopBeforeTheStart) {
   Lab lab(hall(1, 1, GetParam()));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {5000});
   lab.run_for(0.060);
   int lost = 0;
   lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return ++lost > 2; };
-  EXPECT_EQ(lab.wait(lab.send(command_t::STOP, {"m01"})).result, "done");
-  const reply_t result = lab.wait(move);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "stopped") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
   EXPECT_LT(lab.shaft_steps("m01"), 5000);
@@ -89,20 +89,20 @@ TEST_P(Regressions, ShortMoveOnASilentLineDidNotStart) {
     Lab lab(hall(1, 4, GetParam()));
     lab.connect();
     lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
-    const auto first = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {7});
+    const auto first = lab.send(Ask::kMoveBy, {"m01"}, {7});
     lab.run_for(0.03);
-    const auto second = lab.send(command_t::MOVE_RELATIVE, {"m02"}, {-1});
+    const auto second = lab.send(Ask::kMoveBy, {"m02"}, {-1});
     lab.run_for(silence_s);
     lab.on_send = nullptr;
     for (const auto move : {first, second}) {
-      const reply_t result = lab.wait(move);
+      const Answer result = lab.wait(move);
       EXPECT_EQ(result.result, "link") << result.reason;
     }
     EXPECT_EQ(lab.shaft_steps("m01"), 0);
     EXPECT_EQ(lab.shaft_steps("m02"), 0);
     lab.connect();
-    EXPECT_EQ(lab.motor("m01").trust, "known");
-    EXPECT_EQ(lab.motor("m02").trust, "known");
+    EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+    EXPECT_EQ(lab.motor("m02").trust, api::Trust::kKnown);
   }
 }
 
@@ -110,21 +110,21 @@ TEST_P(Regressions, ShortMoveOnASilentLineDidNotStart) {
 TEST_P(Regressions, MoveWhileThePositionIsBeingSet) {
   Lab lab(hall(1, 1, GetParam()));
   lab.connect();
-  const auto set = lab.send(command_t::SET_POSITION, {"m01"}, {1000});
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5});
+  const auto set = lab.send(Ask::kSetPosition, {"m01"}, {1000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {5});
   EXPECT_EQ(lab.last_reply(move).result, "refused");
   EXPECT_THAT(lab.last_reply(move).reason, testing::HasSubstr("being set"));
-  EXPECT_EQ(lab.last_reply(lab.send(command_t::SET_POSITION, {"m01"}, {3})).result, "refused");
+  EXPECT_EQ(lab.last_reply(lab.send(Ask::kSetPosition, {"m01"}, {3})).result, "refused");
   EXPECT_EQ(lab.wait(set).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {1005})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {1005})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 5);
 }
 
 TEST_P(Regressions, MoveWhileDriversAreBeingDisabled) {
   Lab lab(hall(1, 2, GetParam()));
   lab.connect();
-  const auto disable = lab.send(command_t::DISABLE, {"m02"});
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {5});
+  const auto disable = lab.send(Ask::kDisable, {"m02"});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {5});
   EXPECT_EQ(lab.last_reply(move).result, "refused");
   EXPECT_THAT(lab.last_reply(move).reason, testing::HasSubstr("being disabled"));
   EXPECT_EQ(lab.wait(disable).result, "done");
@@ -137,8 +137,8 @@ TEST_P(Regressions, StopWhileAnotherIsNotConfirmed) {
     for (int lost = 1; lost <= 3; ++lost) {
       Lab lab(hall(1, 2, every_tick(GetParam())));
       lab.connect();
-      const auto first = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
-      const auto second = lab.send(command_t::MOVE_RELATIVE, {"m02"}, {9000});
+      const auto first = lab.send(Ask::kMoveBy, {"m01"}, {9000});
+      const auto second = lab.send(Ask::kMoveBy, {"m02"}, {9000});
       lab.run_for(1.3);
       // The first polls after the stop are lost.
       int polls = 0;
@@ -152,11 +152,11 @@ TEST_P(Regressions, StopWhileAnotherIsNotConfirmed) {
         }
         return true;
       };
-      lab.send(command_t::STOP, {"m01"});
+      lab.send(Ask::kStop, {"m01"});
       lab.run_for(later_ms * 1e-3);
-      lab.send(command_t::STOP, {"m02"});
+      lab.send(Ask::kStop, {"m02"});
       EXPECT_EQ(lab.wait(first).result, "stopped") << later_ms << " ms, " << lost << " lost";
-      const reply_t result = lab.wait(second);
+      const Answer result = lab.wait(second);
       EXPECT_EQ(result.result, "stopped") << later_ms << " ms, " << lost << " lost";
       EXPECT_EQ(lab.shaft_steps("m02"), result.position_steps.at(0));
     }
@@ -168,7 +168,7 @@ TEST_P(Regressions, StopWhileAnotherIsNotConfirmed) {
 TEST_P(Regressions, FollowersOfALostStopComeAgainAfterTheNext) {
   Lab lab(hall(1, 1, every_tick(GetParam())));
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {9000});
   lab.run_for(1.3);
   std::vector<std::uint8_t> followers;
   int replacements = 0;
@@ -189,8 +189,8 @@ TEST_P(Regressions, FollowersOfALostStopComeAgainAfterTheNext) {
     }
     return true;
   };
-  lab.send(command_t::STOP, {"m01"});
-  const reply_t result = lab.wait(move);
+  lab.send(Ask::kStop, {"m01"});
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "stopped") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
   EXPECT_EQ(replacements, 2);
@@ -203,15 +203,15 @@ TEST_P(Regressions, EmergencyStopWhileALostStopIsNotKnownToBeLost) {
   for (int later_ms = 0; later_ms < 40; ++later_ms) {
     Lab lab(hall(1, 1, every_tick(GetParam())));
     lab.connect();
-    const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {9000});
+    const auto move = lab.send(Ask::kMoveBy, {"m01"}, {9000});
     lab.run_for(1.3);
     lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
-    lab.send(command_t::STOP, {"m01"});
+    lab.send(Ask::kStop, {"m01"});
     lab.run_for(0.045);
     lab.on_send = nullptr;
     lab.run_for(later_ms * 1e-3);
-    lab.send(command_t::EMERGENCY_STOP, {});
-    const reply_t result = lab.wait(move);
+    lab.send(Ask::kEmergencyStop, {});
+    const Answer result = lab.wait(move);
     ASSERT_EQ(result.result, "stopped") << later_ms << " ms: " << result.reason;
     ASSERT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << later_ms << " ms";
   }

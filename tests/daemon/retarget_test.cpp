@@ -46,7 +46,7 @@ class JudgedLab {
         [&] { return up ? lab_.shaft_steps(motor) >= steps : lab_.shaft_steps(motor) <= steps; }));
   }
   void expect_reached(std::int64_t move, const std::string& motor, std::int64_t steps) {
-    const reply_t result = lab_.wait(move);
+    const Answer result = lab_.wait(move);
     EXPECT_EQ(result.result, "reached") << result.reason;
     EXPECT_EQ(lab_.replies(move).size(), 2u) << "accepted and exactly one result";
     lab_.run_for(0.5);
@@ -87,10 +87,10 @@ INSTANTIATE_TEST_SUITE_P(Formats, Retarget, testing::Values("fine", "coarse"),
 
 TEST_P(Retarget, FartherGoesOnWithoutARest) {
   JudgedLab lab(1, GetParam());
-  const auto first = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {500});
+  const auto first = lab->send(Ask::kMoveTo, {"m01"}, {500});
   lab.pass("m01", 200);
-  const auto second = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {1500});
-  const reply_t old = lab->last_reply(first);
+  const auto second = lab->send(Ask::kMoveTo, {"m01"}, {1500});
+  const Answer old = lab->last_reply(first);
   EXPECT_EQ(old.result, "stopped") << "its move has ended, the motor goes on";
   EXPECT_THAT(old.reason, HasSubstr("m01: was given a new target by command 2 of test"));
   lab->run_for(0.1);
@@ -104,17 +104,17 @@ TEST_P(Retarget, FartherGoesOnWithoutARest) {
 
 TEST_P(Retarget, NearerWithinReachEndsThere) {
   JudgedLab lab(1, GetParam());
-  lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {-2000});
+  lab->send(Ask::kMoveTo, {"m01"}, {-2000});
   lab.pass("m01", -300);
-  lab.expect_reached(lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {-700}), "m01", -700);
+  lab.expect_reached(lab->send(Ask::kMoveTo, {"m01"}, {-700}), "m01", -700);
   EXPECT_EQ(lab.events("move").size(), 1u) << "in one go";
 }
 
 TEST_P(Retarget, TooNearOvershootsAndComesBack) {
   JudgedLab lab(1, GetParam());
-  lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {2000});
+  lab->send(Ask::kMoveTo, {"m01"}, {2000});
   lab.pass("m01", 300);
-  lab.expect_reached(lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {305}), "m01", 305);
+  lab.expect_reached(lab->send(Ask::kMoveTo, {"m01"}, {305}), "m01", 305);
   const auto legs = lab.events("move");
   ASSERT_EQ(legs.size(), 2u);
   EXPECT_LT(legs[1].at("steps"), 0);
@@ -123,9 +123,9 @@ TEST_P(Retarget, TooNearOvershootsAndComesBack) {
 
 TEST_P(Retarget, BehindReverses) {
   JudgedLab lab(1, GetParam());
-  lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {2000});
+  lab->send(Ask::kMoveTo, {"m01"}, {2000});
   lab.pass("m01", 300);
-  const auto back = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {-100});
+  const auto back = lab->send(Ask::kMoveTo, {"m01"}, {-100});
   lab->run_for(0.06);
   EXPECT_EQ(lab->motor("m01").target_steps, -100) << "while it still runs down";
   lab.expect_reached(back, "m01", -100);
@@ -136,11 +136,10 @@ TEST_P(Retarget, AtAnyTimeOfAMove) {
     JudgedLab lab(1, GetParam());
     std::int64_t from = 0;
     for (int ms = 0; ms <= 660; ms += 33) {
-      const auto first = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {from + 150});
+      const auto first = lab->send(Ask::kMoveTo, {"m01"}, {from + 150});
       lab->run_for(ms * 1e-3);
       const bool over = lab->has_result(first);
-      lab.expect_reached(lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {from + target}), "m01",
-                         from + target);
+      lab.expect_reached(lab->send(Ask::kMoveTo, {"m01"}, {from + target}), "m01", from + target);
       EXPECT_EQ(lab->last_reply(first).result, over ? "reached" : "stopped") << ms << " ms";
       from += target;
     }
@@ -149,19 +148,19 @@ TEST_P(Retarget, AtAnyTimeOfAMove) {
 
 TEST_P(Retarget, RelativeCountsFromThePresentTarget) {
   JudgedLab lab(1, GetParam());
-  lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {1000});
+  lab->send(Ask::kMoveTo, {"m01"}, {1000});
   lab.pass("m01", 100);
-  lab->send(command_t::MOVE_RELATIVE, {"m01"}, {500});
-  lab.expect_reached(lab->send(command_t::MOVE_RELATIVE, {"m01"}, {-200}), "m01", 1300);
+  lab->send(Ask::kMoveBy, {"m01"}, {500});
+  lab.expect_reached(lab->send(Ask::kMoveBy, {"m01"}, {-200}), "m01", 1300);
 }
 
 TEST_P(Retarget, ManyTimesInARow) {
   for (const int every_ms : {1, 7, 25, 60, 150}) {
     JudgedLab lab(1, GetParam());
-    std::int64_t last = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {800});
+    std::int64_t last = lab->send(Ask::kMoveTo, {"m01"}, {800});
     for (const std::int64_t target : {900, 300, -500, -480, 700, 0, 10, 650}) {
       lab->run_for(every_ms * 1e-3);
-      last = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {target});
+      last = lab->send(Ask::kMoveTo, {"m01"}, {target});
     }
     lab.expect_reached(last, "m01", 650);
     for (std::int64_t number = 1; number < last; ++number) {
@@ -175,13 +174,13 @@ TEST_P(Retarget, ThenStopEndsAtRestAndStartsNoSecondRun) {
   for (const std::int64_t target : {3000, 305, -500}) {
     for (const int later_ms : {0, 5, 40, 90, 300}) {
       JudgedLab lab(1, GetParam());
-      lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {2000});
+      lab->send(Ask::kMoveTo, {"m01"}, {2000});
       lab.pass("m01", 300);
-      const auto move = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {target});
+      const auto move = lab->send(Ask::kMoveTo, {"m01"}, {target});
       lab->run_for(later_ms * 1e-3);
-      const auto stop = lab->send(command_t::STOP, {"m01"});
+      const auto stop = lab->send(Ask::kStop, {"m01"});
       EXPECT_EQ(lab->wait(stop).result, "done");
-      const reply_t result = lab->last_reply(move);
+      const Answer result = lab->last_reply(move);
       const bool back_already = target == 305 && later_ms == 300;
       EXPECT_EQ(result.result, back_already ? "reached" : "stopped") << later_ms << " ms";
       lab->run_for(1);
@@ -195,11 +194,11 @@ TEST_P(Retarget, OfAStoppingMotorTakesTheStopsPlace) {
   for (const std::int64_t target : {1200, 340, -70}) {
     for (const int later_ms : {0, 5, 40, 90}) {
       JudgedLab lab(1, GetParam());
-      const auto first = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {2000});
+      const auto first = lab->send(Ask::kMoveTo, {"m01"}, {2000});
       lab.pass("m01", 300);
-      const auto stop = lab->send(command_t::STOP, {});
+      const auto stop = lab->send(Ask::kStop, {});
       lab->run_for(later_ms * 1e-3);
-      const auto second = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {target});
+      const auto second = lab->send(Ask::kMoveTo, {"m01"}, {target});
       lab.expect_reached(second, "m01", target);
       EXPECT_EQ(lab->last_reply(first).result, "stopped");
       EXPECT_EQ(lab->last_reply(stop).result, "done");
@@ -212,9 +211,9 @@ TEST_P(Retarget, IsPlannedAgainIfTheMcuDoesNotGetIt) {
   for (const std::int64_t target : {1200, 305, -70}) {
     for (const int lost : {1, 2, 3, 5}) {
       JudgedLab lab(1, GetParam());
-      lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {700});
+      lab->send(Ask::kMoveTo, {"m01"}, {700});
       lab.pass("m01", 300);
-      const auto move = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {target});
+      const auto move = lab->send(Ask::kMoveTo, {"m01"}, {target});
       int count = 0;
       lab->on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return ++count > lost; };
       lab.expect_reached(move, "m01", target);
@@ -226,9 +225,9 @@ TEST_P(Retarget, BeforeTheStartIsAnotherMove) {
   for (const std::int64_t target : {900, -400, 0}) {
     for (const int later_ms : {0, 5, 40, 60}) {
       JudgedLab lab(2, GetParam());
-      lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {500});
+      lab->send(Ask::kMoveTo, {"m01"}, {500});
       lab->run_for(later_ms * 1e-3);
-      lab.expect_reached(lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {target}), "m01", target);
+      lab.expect_reached(lab->send(Ask::kMoveTo, {"m01"}, {target}), "m01", target);
       EXPECT_EQ(lab.events("move").size(), 1u) << target << " after " << later_ms << " ms";
     }
   }
@@ -242,11 +241,11 @@ TEST_P(Retarget, GroupWithMotorsAtRestAndInMotion) {
     all.push_back((m < 10 ? "m0" : "m") + std::to_string(m));
     steps.push_back((m % 2 != 0 ? 1 : -1) * (100 + 61 * m));
   }
-  const auto first = lab->send(command_t::MOVE_ABSOLUTE, {"m01", "m02", "m03"}, {900, 900, 900});
+  const auto first = lab->send(Ask::kMoveTo, {"m01", "m02", "m03"}, {900, 900, 900});
   lab.pass("m01", 250);
-  const auto late = lab->send(command_t::MOVE_ABSOLUTE, {"m04"}, {900});
+  const auto late = lab->send(Ask::kMoveTo, {"m04"}, {900});
   lab->run_for(0.02);
-  const auto second = lab->send(command_t::MOVE_ABSOLUTE, all, steps);
+  const auto second = lab->send(Ask::kMoveTo, all, steps);
   EXPECT_TRUE(lab->has_result(first));
   EXPECT_TRUE(lab->has_result(late));
   EXPECT_EQ(lab->wait(second).result, "reached");
@@ -256,12 +255,12 @@ TEST_P(Retarget, GroupWithMotorsAtRestAndInMotion) {
 
 TEST_P(Retarget, OfOneMotorOfAGroupLeavesTheOthersAsTheyWere) {
   JudgedLab lab(2, GetParam());
-  const auto group = lab->send(command_t::MOVE_ABSOLUTE, {"m01", "m02"}, {900, 1000});
+  const auto group = lab->send(Ask::kMoveTo, {"m01", "m02"}, {900, 1000});
   lab.pass("m01", 250);
-  const auto single = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {-50});
+  const auto single = lab->send(Ask::kMoveTo, {"m01"}, {-50});
   EXPECT_FALSE(lab->has_result(group));
   lab.expect_reached(single, "m01", -50);
-  const reply_t result = lab->wait(group);
+  const Answer result = lab->wait(group);
   EXPECT_EQ(result.result, "stopped");
   EXPECT_THAT(result.motor_results, testing::ElementsAre("stopped", "reached"));
   EXPECT_EQ(lab->shaft_steps("m02"), 1000);
@@ -269,9 +268,9 @@ TEST_P(Retarget, OfOneMotorOfAGroupLeavesTheOthersAsTheyWere) {
 
 TEST_P(Retarget, ShutDownEndsTheSecondRunToo) {
   JudgedLab lab(1, GetParam());
-  lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {2000});
+  lab->send(Ask::kMoveTo, {"m01"}, {2000});
   lab.pass("m01", 300);
-  const auto back = lab->send(command_t::MOVE_ABSOLUTE, {"m01"}, {-500});
+  const auto back = lab->send(Ask::kMoveTo, {"m01"}, {-500});
   lab->run_for(0.1);
   lab->core().shut_down(lab->now_us());
   EXPECT_TRUE(lab->run_until([&] { return lab->core().at_rest(); }, 10));

@@ -27,13 +27,13 @@ accel = [250, 20]
 )";
 
 std::string table_of(Lab& lab, const std::string& motor) {
-  const table_ref_t table = lab.motor(motor).table;
+  const api::TableRef table = lab.description(motor).table;
   return table.name + "@" + std::to_string(table.revision);
 }
 
 std::int64_t milliseconds_of_move(Lab& lab, std::int64_t steps) {
   const std::int64_t start = lab.now_us();
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {steps})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {steps})).result, "reached");
   return (lab.now_us() - start) / 1000;
 }
 
@@ -45,19 +45,13 @@ std::string two_groups(int mcus, int motors) {
   return toml;
 }
 
-TEST(TableInService, IsToldByStateAndResultWithRevisionAndHash) {
+TEST(TableInService, IsToldByDescriptionAndResultWithRevisionAndHash) {
   Lab lab(hall(1, 2, "fine", "glacier"), kGlacier);
   lab.connect();
-  const motor_state_t motor = lab.motor("m01");
-  EXPECT_EQ(motor.table.name, "glacier");
-  EXPECT_EQ(motor.table.revision, 3);
-  EXPECT_EQ(motor.table.hash, kGlacierHash);
-  const reply_t result = lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01", "m02"}, {5, 0}));
-  EXPECT_THAT(result.table_of_motor, ElementsAre(0, 0));
-  ASSERT_EQ(result.tables.size(), 1u);
-  EXPECT_EQ(result.tables[0].name, "glacier");
-  EXPECT_EQ(result.tables[0].revision, 3);
-  EXPECT_EQ(result.tables[0].hash, kGlacierHash);
+  const api::TableRef glacier{.name = "glacier", .revision = 3, .hash = kGlacierHash};
+  EXPECT_EQ(lab.description("m01").table, glacier);
+  const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {5, 0}));
+  EXPECT_THAT(result.tables, ElementsAre(glacier, glacier));
 }
 
 TEST(UseTable, ServesTheNextMoveAndIsKept) {
@@ -66,7 +60,7 @@ TEST(UseTable, ServesTheNextMoveAndIsKept) {
   // Cruise is 10 units of 40 us a step, then 100: 1000 steps take well under 2 s, then at least 4
   // s.
   EXPECT_LT(milliseconds_of_move(lab, 1000), 2000);
-  const reply_t used = lab.wait(lab.use("axes", "glacier"));
+  const Answer used = lab.wait(lab.use("axes", "glacier"));
   EXPECT_EQ(used.result, "done");
   EXPECT_THAT(used.reason, HasSubstr("axes has glacier@3 (4259a0ec)"));
   EXPECT_EQ(table_of(lab, "m04"), "glacier@3");
@@ -75,33 +69,33 @@ TEST(UseTable, ServesTheNextMoveAndIsKept) {
   for (int mcu : {0, 1}) EXPECT_EQ(lab.bus(0).mcu(mcu).core().tables.slot[0].revision, 3u);
   EXPECT_GE(milliseconds_of_move(lab, 1000), 4000);
   EXPECT_EQ(lab.shaft_steps("m01"), 2000);
-  EXPECT_EQ(lab.motor("m01").trust, "known");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
 }
 
 TEST(UseTable, MoveUnderWayKeepsItsTableAndNoneBeginsByTheOldOne) {
   Lab lab(two_groups(1, 2), kGlacier);
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {2000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {2000});
   lab.run_for(0.5);
   const auto use = lab.use("axes", "glacier");
   lab.run_for(0.1);
-  EXPECT_EQ(lab.last_reply(use).phase, reply_t::ACCEPTED);
+  EXPECT_EQ(lab.last_reply(use).phase, Answer::kAccepted);
   EXPECT_EQ(table_of(lab, "m01"), "bushd2-constant@0");
   for (const char* motor : {"m02", "end"}) {
-    const reply_t refused = lab.wait(lab.send(command_t::MOVE_RELATIVE, {motor}, {5}));
-    EXPECT_EQ(refused.phase, reply_t::REFUSED);
+    const Answer refused = lab.wait(lab.send(Ask::kMoveBy, {motor}, {5}));
+    EXPECT_EQ(refused.phase, Answer::kRefused);
     EXPECT_THAT(refused.reason, HasSubstr("about to get another table, for group axes"));
   }
   // The one that moves may be given a new target, and still keeps its table.
-  const auto farther = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {500});
+  const auto farther = lab.send(Ask::kMoveBy, {"m01"}, {500});
   EXPECT_EQ(lab.wait(move).result, "stopped");
-  const reply_t reached = lab.wait(farther);
+  const Answer reached = lab.wait(farther);
   EXPECT_EQ(reached.result, "reached");
   EXPECT_EQ(reached.tables.at(0).name, "bushd2-constant");
   EXPECT_EQ(lab.wait(use).result, "done");
   EXPECT_EQ(table_of(lab, "m01"), "glacier@3");
   EXPECT_EQ(table_of(lab, "end"), "bushd2-scurve@0");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02", "end"}, {5, 5})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02", "end"}, {5, 5})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 2500);
 }
 
@@ -109,14 +103,13 @@ TEST(UseTable, MoveUnderWayKeepsItsTableAndNoneBeginsByTheOldOne) {
 TEST(UseTable, ResultTellsTheTableOfTheMoveAlsoIfItHasChangedSince) {
   Lab lab(two_groups(2, 2), kGlacier);
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m04", "end"}, {4000, 5});
+  const auto move = lab.send(Ask::kMoveBy, {"m04", "end"}, {4000, 5});
   lab.run_for(0.5);
   EXPECT_EQ(lab.wait(lab.use("ends", "glacier")).result, "done");
   EXPECT_EQ(table_of(lab, "end"), "glacier@3");
-  const reply_t result = lab.wait(move);
+  const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "reached");
-  EXPECT_EQ(result.tables.at(static_cast<std::size_t>(result.table_of_motor.at(1))).name,
-            "bushd2-scurve");
+  EXPECT_EQ(result.tables.at(1).name, "bushd2-scurve");
 }
 
 TEST(UseTable, WhatDoesNotFitIsRefusedAndTheOldOneStays) {
@@ -136,8 +129,8 @@ TEST(UseTable, WhatDoesNotFitIsRefusedAndTheOldOneStays) {
       {"../glacier", "is not a table's name"},
       {"", "no table is named"}};
   for (const auto& [table, reason] : cases) {
-    const reply_t refused = lab.wait(lab.use("axes", table));
-    EXPECT_EQ(refused.phase, reply_t::REFUSED) << table;
+    const Answer refused = lab.wait(lab.use("axes", table));
+    EXPECT_EQ(refused.phase, Answer::kRefused) << table;
     EXPECT_THAT(refused.reason, HasSubstr(reason));
   }
   EXPECT_THAT(lab.wait(lab.use("nobody", "glacier")).reason, HasSubstr("no group \"nobody\""));
@@ -148,11 +141,11 @@ TEST(UseTable, WhatDoesNotFitIsRefusedAndTheOldOneStays) {
 TEST(UseTable, LastOfThoseThatWaitCounts) {
   Lab lab(hall(1, 1), kGlacier);
   lab.connect();
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {2000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {2000});
   lab.run_for(0.5);
   const auto first = lab.use("axes", "glacier");
   const auto second = lab.use("axes", "bushd2-scurve");
-  const reply_t superseded = lab.wait(first);
+  const Answer superseded = lab.wait(first);
   EXPECT_EQ(superseded.result, "stopped");
   EXPECT_THAT(superseded.reason, HasSubstr("superseded by command"));
   // Even by the one that is in service already: it was not meant.
@@ -169,7 +162,7 @@ TEST(UseTable, McuThatIsOfflineGetsItWhenItComes) {
   Lab lab(hall(2, 1), kGlacier);
   lab.connect();
   lab.unplug(0);
-  const reply_t used = lab.wait(lab.use("axes", "glacier"));
+  const Answer used = lab.wait(lab.use("axes", "glacier"));
   EXPECT_EQ(used.result, "done");
   EXPECT_THAT(used.reason, HasSubstr("not online, they get it when they come: hall:1 hall:2"));
   lab.plug(0);
@@ -190,7 +183,7 @@ TEST(UseTable, McuThatIsLostWhileItGetsTheTableLeavesAllWithTheOldOne) {
     }
     return true;
   };
-  const reply_t used = lab.wait(lab.use("axes", "glacier"));
+  const Answer used = lab.wait(lab.use("axes", "glacier"));
   EXPECT_EQ(used.result, "fault");
   EXPECT_THAT(used.reason, HasSubstr("MCU hall:2 did not confirm it in time"));
   EXPECT_THAT(used.reason, HasSubstr("group axes keeps bushd2-constant"));
@@ -205,7 +198,8 @@ TEST(UseTable, McuThatComesDuringTheChangeWaitsForItsEnd) {
   Lab lab(hall(2, 1), kGlacier);
   lab.connect();
   lab.bus(0).deafen(1, (lab.now_us() + 2'000'000) * 1000);
-  ASSERT_TRUE(lab.run_until([&] { return lab.state_of("hall:2").mcu_state == "OFFLINE"; }, 3));
+  ASSERT_TRUE(
+      lab.run_until([&] { return lab.state_of("hall:2").state == api::McuState::kOffline; }, 3));
   // The first MCU hears nothing of the table.
   lab.on_send = [](std::size_t, std::vector<std::uint8_t>& bytes) {
     bushd_receiver receiver{};
@@ -217,15 +211,16 @@ TEST(UseTable, McuThatComesDuringTheChangeWaitsForItsEnd) {
     return true;
   };
   const auto use = lab.use("axes", "glacier");
-  ASSERT_TRUE(lab.run_until([&] { return lab.state_of("hall:2").mcu_state == "READY"; }, 8));
+  ASSERT_TRUE(
+      lab.run_until([&] { return lab.state_of("hall:2").state == api::McuState::kReady; }, 8));
   ASSERT_FALSE(lab.has_result(use));
-  const reply_t refused = lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {100}));
-  EXPECT_EQ(refused.phase, reply_t::REFUSED);
+  const Answer refused = lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {100}));
+  EXPECT_EQ(refused.phase, Answer::kRefused);
   EXPECT_THAT(refused.reason, HasSubstr("about to get another table"));
   EXPECT_EQ(lab.wait(use).result, "fault");
   lab.on_send = {};
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {100})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {100})).result, "reached");
   EXPECT_EQ(table_of(lab, "m02"), "bushd2-constant@0");
 }
 
@@ -245,9 +240,9 @@ TEST(ReloadTables, ChangedTableServesTheNextMove) {
   std::string changed = kGlacier;
   changed.replace(changed.find("revision = 3"), 12, "revision = 4");
   lab.write_file("glacier.toml", changed);
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {100});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {100});
   const auto reload = lab.reload();
-  EXPECT_EQ(lab.wait(move).tables.at(0).revision, 3);
+  EXPECT_EQ(lab.wait(move).tables.at(0).revision, 3u);
   // Another revision is another table, also with the same codes: the MCU is to tell which one it
   // has.
   EXPECT_THAT(lab.wait(reload).reason, HasSubstr("group axes has glacier@4"));
@@ -264,15 +259,15 @@ TEST(ReloadTables, BadTableKeepsItsGroupOnTheOldOneAndNoOther) {
   lab.write_file("glacier.toml", changed.replace(changed.find("revision = 3"), 12, "revision = 9"));
   lab.write_file("bushd2-constant.toml",
                  "name = \"bushd2-constant\"\ntime_unit_ns = 0\naccel = [9]\n");
-  const reply_t reloaded = lab.wait(lab.reload());
+  const Answer reloaded = lab.wait(lab.reload());
   EXPECT_EQ(reloaded.result, "fault");
   EXPECT_THAT(reloaded.reason, HasSubstr("group ends has glacier@9"));
   EXPECT_THAT(reloaded.reason, HasSubstr("group axes keeps bushd2-constant"));
   EXPECT_THAT(reloaded.reason, HasSubstr("bushd2-constant.toml:2:"));
   EXPECT_EQ(table_of(lab, "end"), "glacier@9");
   EXPECT_LT(milliseconds_of_move(lab, 1000), 2000);
-  const reply_t again = lab.wait(lab.reload());
-  EXPECT_EQ(again.phase, reply_t::REFUSED);
+  const Answer again = lab.wait(lab.reload());
+  EXPECT_EQ(again.phase, Answer::kRefused);
 }
 
 TEST(ReloadTables, GroupsWithTheSameTableShareItInTheMcus) {

@@ -50,7 +50,7 @@ class Trace : public testing::TestWithParam<Manner> {
   }
   void move(Lab& lab, const std::vector<std::string>& motors,
             const std::vector<std::int64_t>& steps) {
-    const reply_t result = lab.wait(lab.send(command_t::MOVE_RELATIVE, motors, steps));
+    const Answer result = lab.wait(lab.send(Ask::kMoveBy, motors, steps));
     EXPECT_EQ(result.result, "reached") << result.reason;
   }
   void write(Lab& lab) {
@@ -103,14 +103,14 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   Lab lab(toml(), {}, vcd_.get());
   lab.bus(0).mcu(0).attach_switch(0, {.at_steps = -700, .hysteresis_steps = 4});
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(command_t::HOME, {"m01"})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01"})).result, "reached");
   move(lab, {"m01", "m02", "m03", "m04", "m05"}, {500, -300, 200, -400, 1});
   lab.bus(0).mcu(0).set_inputs({0, BUSHD_INPUT_FORWARD});
   lab.run_for(0.7);
   move(lab, {"m03", "m05"}, {-90, 250});
   lab.bus(0).mcu(0).set_inputs({});
   lab.run_for(1);
-  const auto limited = lab.send(command_t::MOVE_RELATIVE, {"m04", "m06"}, {20000, -700});
+  const auto limited = lab.send(Ask::kMoveBy, {"m04", "m06"}, {20000, -700});
   lab.run_for(1.5);
   lab.bus(0).mcu(1).set_inputs({0b001, 0});
   EXPECT_EQ(lab.wait(limited).result, "limit");

@@ -40,15 +40,10 @@ class Triggered : public testing::TestWithParam<const char*> {
   Pins pins;
   Lab lab{hall(2, 3, GetParam()), {}, &pins};
 
-  static command_t armed(const std::vector<std::string>& motors,
-                         const std::vector<std::int64_t>& steps, std::int32_t delay_us = 1000) {
-    command_t command{};
-    command.kind = command_t::ARM;
-    command.motors = motors;
-    command.steps = steps;
-    command.edge = command_t::RISING;
-    command.delay_us = delay_us;
-    return command;
+  static api::Request armed(const std::vector<std::string>& motors,
+                            const std::vector<std::int64_t>& steps, std::int32_t delay_us = 1000) {
+    return api::Arm{
+        .edge = api::Edge::kRising, .delay_us = delay_us, .motors = motor_steps(motors, steps)};
   }
   std::int64_t arm(const std::vector<std::string>& motors, const std::vector<std::int64_t>& steps,
                    std::int32_t delay_us = 1000) {
@@ -94,19 +89,19 @@ TEST_P(Triggered, MovesBeginThreeTicksAndTheirDelayAfterTheEdge) {
     const auto before = pins.steps(0, 0).size();
     const auto from = lab.motor("m01").position_steps;
     const auto move = arm({"m01", "m03"}, {steps, steps}, 12'345);
-    EXPECT_TRUE(lab.motor("m01").armed);
+    EXPECT_EQ(lab.motor("m01").activity, api::Activity::kArmed);
     EXPECT_FALSE(lab.motor("m01").moving);
-    EXPECT_FALSE(lab.motor("m02").armed);
-    EXPECT_EQ(lab.state_of("hall:1").mcu_state, "READY");
+    EXPECT_NE(lab.motor("m02").activity, api::Activity::kArmed);
+    EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kReady);
     EXPECT_EQ(lab.motor("m01").position_steps, from);
     EXPECT_FALSE(lab.has_result(move));
     const std::int64_t edge_ns = fire();
-    const reply_t result = lab.wait(move);
+    const Answer result = lab.wait(move);
     EXPECT_EQ(result.result, "reached") << result.reason;
     EXPECT_EQ(lab.replies(move).size(), 2u);
     EXPECT_EQ(lab.shaft_steps("m01"), from + steps);
     EXPECT_EQ(lab.shaft_steps("m03"), from + steps);
-    EXPECT_FALSE(lab.motor("m01").armed);
+    EXPECT_NE(lab.motor("m01").activity, api::Activity::kArmed);
     const auto& all = pins.steps(0, 0);
     expect_table({all.begin() + static_cast<std::ptrdiff_t>(before), all.end()},
                  static_cast<std::size_t>(std::abs(steps)), edge_ns + 3 * kTickNs + 12'345'000);
@@ -120,7 +115,7 @@ TEST_P(Triggered, MovesBeginThreeTicksAndTheirDelayAfterTheEdge) {
         (line["start_tick"].get<std::int64_t>() * kTickNs + line.value("late_ns", 0)) % kTickNs,
         line.value("late_ns", 0));
   }
-  EXPECT_EQ(lab.motor("m01").trust, "known");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_TRUE(lab.errors().empty());
 }
 
@@ -132,7 +127,7 @@ TEST_P(Triggered, EachMcuHasItsOwnTriggerAndTheMoveEndsWithTheLast) {
   EXPECT_EQ(lab.shaft_steps("m01"), 50);
   EXPECT_EQ(lab.shaft_steps("m04"), 0);
   EXPECT_FALSE(lab.has_result(move));
-  EXPECT_TRUE(lab.motor("m04").armed);
+  EXPECT_EQ(lab.motor("m04").activity, api::Activity::kArmed);
   fire(1);
   EXPECT_EQ(lab.wait(move).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m04"), -60);
@@ -140,7 +135,7 @@ TEST_P(Triggered, EachMcuHasItsOwnTriggerAndTheMoveEndsWithTheLast) {
 
 TEST_P(Triggered, DisarmedTheyEndAsStopped) {
   lab.connect();
-  for (const std::int8_t kind : {command_t::DISARM, command_t::STOP}) {
+  for (const Ask kind : {Ask::kDisarm, Ask::kStop}) {
     const auto move = arm({"m01", "m02"}, {50, 60});
     const auto disarm = lab.send(kind, {"m02"});
     EXPECT_EQ(lab.wait(disarm).result, "done");
@@ -150,10 +145,10 @@ TEST_P(Triggered, DisarmedTheyEndAsStopped) {
     fire();
     lab.run_for(1);
     EXPECT_EQ(lab.shaft_steps("m01"), 0);
-    EXPECT_FALSE(lab.motor("m01").armed);
+    EXPECT_NE(lab.motor("m01").activity, api::Activity::kArmed);
   }
-  EXPECT_EQ(lab.wait(lab.send(command_t::DISARM, {})).result, "done") << "nothing is armed";
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m01"}, {30})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kDisarm, {})).result, "done") << "nothing is armed";
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {30})).result, "reached");
 }
 
 // All of them wait, or none.
@@ -165,7 +160,7 @@ TEST_P(Triggered, WhereOneMcuCannotBeArmedTheOthersDoNotWait) {
   limited.connect();
   const auto move = limited.send(armed({"m01", "m04", "m05"}, {50, 60, 70}));
   limited.bus(0).mcu(1).set_inputs({0b010, 0});  // at this very moment
-  const reply_t result = limited.wait(move, 2);
+  const Answer result = limited.wait(move, 2);
   EXPECT_EQ(result.result, "limit") << result.reason;
   EXPECT_EQ(result.motor_results, (std::vector<std::string>{"stopped", "limit", "limit"}));
   EXPECT_EQ(limited.bus(0).mcu(0).core().trigger.armed, 0);
@@ -179,11 +174,11 @@ TEST_P(Triggered, WhereOneMcuCannotBeArmedTheOthersDoNotWait) {
 TEST_P(Triggered, WhereOneMcuIsDisarmedOrLostTheOthersAreToo) {
   lab.connect();
   auto move = arm({"m01", "m04"}, {50, 60});
-  EXPECT_EQ(lab.wait(lab.send(command_t::DISARM, {"m04"})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kDisarm, {"m04"})).result, "done");
   EXPECT_EQ(lab.wait(move, 2).result, "stopped");
   move = arm({"m01", "m04"}, {50, 60});
   lab.bus(0).reboot(1, 100'000'000);
-  const reply_t result = lab.wait(move, 5);
+  const Answer result = lab.wait(move, 5);
   EXPECT_EQ(result.result, "link");
   EXPECT_EQ(result.motor_results, (std::vector<std::string>{"stopped", "link"}));
   fire(0);
@@ -195,7 +190,7 @@ TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
   lab.connect();
   auto move = arm({"m01"}, {3000});
   fire();
-  const auto disarm = lab.send(command_t::DISARM, {"m01"});
+  const auto disarm = lab.send(Ask::kDisarm, {"m01"});
   EXPECT_EQ(lab.wait(disarm).result, "done");
   EXPECT_THAT(lab.last_reply(disarm).reason, HasSubstr("the trigger came before"));
   EXPECT_TRUE(lab.motor("m01").moving);
@@ -203,7 +198,7 @@ TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
   // A long delay: stopped before it has begun.
   move = arm({"m01"}, {-3000}, 1'400'000);
   fire();
-  EXPECT_EQ(lab.wait(lab.send(command_t::STOP, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), 3000);
   lab.run_for(1.6);
@@ -212,8 +207,8 @@ TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
   move = arm({"m01"}, {-3000});
   fire();
   lab.run_for(0.8);
-  EXPECT_EQ(lab.wait(lab.send(command_t::STOP, {"m01"})).result, "done");
-  const reply_t result = lab.last_reply(move);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  const Answer result = lab.last_reply(move);
   EXPECT_EQ(result.result, "stopped");
   EXPECT_LT(result.position_steps.at(0), 3000);
   EXPECT_GT(result.position_steps.at(0), 0);
@@ -227,7 +222,7 @@ TEST_P(Triggered, AfterTheStartTheyTakeNewTargets) {
     const auto move = arm({"m01"}, {2000}, 100'000);
     fire();
     lab.run_for(later_s);
-    const auto next = lab.send(command_t::MOVE_ABSOLUTE, {"m01"}, {from + 3333});
+    const auto next = lab.send(Ask::kMoveTo, {"m01"}, {from + 3333});
     EXPECT_EQ(lab.wait(next).result, "reached") << lab.last_reply(next).reason;
     EXPECT_EQ(lab.last_reply(move).result, "stopped");
     EXPECT_EQ(lab.shaft_steps("m01"), from + 3333);
@@ -238,41 +233,35 @@ TEST_P(Triggered, AfterTheStartTheyTakeNewTargets) {
 TEST_P(Triggered, WhatWaitsIsRefusedOtherCommands) {
   lab.connect();
   const auto move = arm({"m01"}, {50});
-  for (const std::int8_t kind :
-       {command_t::MOVE_RELATIVE, command_t::MOVE_ABSOLUTE, command_t::SET_POSITION,
-        command_t::DISABLE, command_t::CLEAR_FAULTS, command_t::ARM}) {
-    command_t command = armed({"m01"}, {10});
-    command.kind = kind;
-    const reply_t reply = lab.last_reply(lab.send(command));
-    EXPECT_EQ(reply.result, "refused") << int{kind};
-    EXPECT_THAT(reply.reason, HasSubstr("waits for the trigger")) << int{kind};
+  std::vector<api::Request> requests = {armed({"m01"}, {10})};
+  for (const Ask ask :
+       {Ask::kMoveBy, Ask::kMoveTo, Ask::kSetPosition, Ask::kDisable, Ask::kClearFaults}) {
+    requests.push_back(request_of(ask, {"m01"}, {10}));
+  }
+  for (const api::Request& request : requests) {
+    const Answer reply = lab.last_reply(lab.send(request));
+    EXPECT_EQ(reply.result, "refused") << name_of(request);
+    EXPECT_THAT(reply.reason, HasSubstr("waits for the trigger")) << name_of(request);
   }
   EXPECT_THAT(lab.last_reply(lab.send(armed({"m02"}, {10}))).reason,
               HasSubstr("m01 waits for the trigger of MCU hall:1 already"));
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {30})).result, "reached")
-      << "others move";
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {30})).result, "reached") << "others move";
   fire();
   EXPECT_EQ(lab.wait(move).result, "reached");
 }
 
 TEST_P(Triggered, ArmingIsRefusedWithAReason) {
   lab.connect();
-  const auto refusal = [this](const command_t& command) {
-    const reply_t reply = lab.last_reply(lab.send(command));
-    EXPECT_EQ(reply.phase, reply_t::REFUSED);
+  const auto refusal = [this](const api::Request& request) {
+    const Answer reply = lab.last_reply(lab.send(request));
+    EXPECT_EQ(reply.phase, Answer::kRefused);
     return reply.reason;
   };
   EXPECT_THAT(refusal(armed({}, {})), HasSubstr("no motor"));
   EXPECT_THAT(refusal(armed({"m01"}, {0})), HasSubstr("no steps"));
   EXPECT_THAT(refusal(armed({"m01"}, {5}, 49)), HasSubstr("50 to 1500000"));
   EXPECT_THAT(refusal(armed({"m01"}, {5}, 1'500'001)), HasSubstr("50 to 1500000"));
-  command_t command = armed({"m01"}, {5});
-  command.edge = 3;
-  EXPECT_THAT(refusal(command), HasSubstr("RISING nor FALLING"));
-  command = armed({"m01"}, {5});
-  command.dry_run = 1;
-  EXPECT_THAT(refusal(command), HasSubstr("only moves can be run dry"));
-  const auto move = lab.send(command_t::MOVE_RELATIVE, {"m01"}, {500});
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {500});
   lab.run_for(0.3);
   EXPECT_THAT(refusal(armed({"m01"}, {5})), HasSubstr("m01 moves"));
   EXPECT_EQ(lab.wait(move).result, "reached");
@@ -281,12 +270,12 @@ TEST_P(Triggered, ArmingIsRefusedWithAReason) {
 TEST_P(Triggered, AnEmergencyStopEndsThem) {
   lab.connect();
   const auto move = arm({"m01"}, {50});
-  EXPECT_EQ(lab.wait(lab.send(command_t::EMERGENCY_STOP, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   fire();
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
-  EXPECT_EQ(lab.wait(lab.send(command_t::CLEAR_FAULTS, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
   const auto again = arm({"m01"}, {50});
   fire();
   EXPECT_EQ(lab.wait(again).result, "reached");
@@ -348,15 +337,13 @@ TEST_P(Triggered, ShutDownDisarms) {
 
 TEST_P(Triggered, ReferencePulsesWhenTheMotorArrives) {
   lab.connect();
-  command_t command{};
-  command.kind = command_t::REFERENCE;
-  command.motors = {"m02"};
-  command.steps = {300};
-  command.arrivals = command_t::POSITIVE;
-  command.delay_us = 20'000;
-  command.width_us = 500;
-  EXPECT_EQ(lab.wait(lab.send(command)).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {1000})).result, "reached");
+  api::PositionCompare compare{.motor = "m02",
+                               .position_steps = 300,
+                               .arrivals = {.positive = true},
+                               .delay_us = 20'000,
+                               .width_us = 500};
+  EXPECT_EQ(lab.wait(lab.send(compare)).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {1000})).result, "reached");
   lab.run_for(0.1);
   ASSERT_EQ(pins.reference.size(), 2u);
   const std::int64_t arrived_ns = pins.steps(0, 1).at(299);
@@ -365,38 +352,31 @@ TEST_P(Triggered, ReferencePulsesWhenTheMotorArrives) {
               10'000);
   EXPECT_TRUE(pins.reference[0].level);
   EXPECT_FALSE(pins.reference[1].level);
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {-1000})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {-1000})).result, "reached");
   EXPECT_EQ(pins.reference.size(), 2u) << "the other direction";
-  command.arrivals = 0;
-  EXPECT_EQ(lab.wait(lab.send(command)).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(command_t::MOVE_RELATIVE, {"m02"}, {1000})).result, "reached");
+  compare.arrivals = {};
+  EXPECT_EQ(lab.wait(lab.send(compare)).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {1000})).result, "reached");
   EXPECT_EQ(pins.reference.size(), 2u) << "switched off";
 }
 
 TEST_P(Triggered, ReferenceIsRefusedWithAReason) {
   lab.connect();
-  command_t good{};
-  good.kind = command_t::REFERENCE;
-  good.motors = {"m02"};
-  good.steps = {300};
-  good.arrivals = 3;
-  good.width_us = 10;
-  const auto refusal = [this](command_t command, const auto& bend) {
-    bend(command);
-    const reply_t reply = lab.last_reply(lab.send(command));
-    EXPECT_EQ(reply.phase, reply_t::REFUSED);
+  using Compare = api::PositionCompare;
+  const Compare good{.motor = "m02",
+                     .position_steps = 300,
+                     .arrivals = {.positive = true, .negative = true},
+                     .width_us = 10};
+  const auto refusal = [this](Compare compare, const auto& bend) {
+    bend(compare);
+    const Answer reply = lab.last_reply(lab.send(compare));
+    EXPECT_EQ(reply.phase, Answer::kRefused);
     return reply.reason;
   };
-  EXPECT_THAT(refusal(good, [](command_t& c) { c.width_us = 0; }), HasSubstr("1 to 1000000"));
-  EXPECT_THAT(refusal(good, [](command_t& c) { c.delay_us = -1; }), HasSubstr("0 to 1500000"));
-  EXPECT_THAT(refusal(good, [](command_t& c) { c.arrivals = 4; }), HasSubstr("arrivals"));
-  EXPECT_THAT(refusal(good, [](command_t& c) { c.steps = {1ll << 40}; }), HasSubstr("lie within"));
-  EXPECT_THAT(refusal(good,
-                      [](command_t& c) {
-                        c.motors = {"m01", "m02"};
-                        c.steps = {1, 2};
-                      }),
-              HasSubstr("one motor"));
+  EXPECT_THAT(refusal(good, [](Compare& c) { c.width_us = 0; }), HasSubstr("1 to 1000000"));
+  EXPECT_THAT(refusal(good, [](Compare& c) { c.delay_us = -1; }), HasSubstr("0 to 1500000"));
+  EXPECT_THAT(refusal(good, [](Compare& c) { c.position_steps = 1ll << 40; }),
+              HasSubstr("lie within"));
   EXPECT_EQ(lab.wait(lab.send(good)).result, "done");
 }
 
