@@ -10,8 +10,8 @@ std::int64_t number(std::uint64_t count) {
   return static_cast<std::int64_t>(count);
 }
 
-std::vector<api::MotorSteps> steps_of(const command_t& command) {
-  std::vector<api::MotorSteps> motors;
+std::vector<api::MotorAmount> steps_of(const command_t& command) {
+  std::vector<api::MotorAmount> motors;
   for (std::size_t i = 0; i < command.motors.size(); ++i) {
     motors.push_back({command.motors[i], command.steps[i]});
   }
@@ -35,7 +35,7 @@ Result<api::Request> compare_of(const command_t& command) {
   }
   return api::PositionCompare{
       .motor = command.motors.front(),
-      .position_steps = command.steps.front(),
+      .position = command.steps.front(),
       .arrivals = {.positive = (command.arrivals & command_t::POSITIVE) != 0,
                    .negative = (command.arrivals & command_t::NEGATIVE) != 0},
       .delay_us = command.delay_us,

@@ -48,8 +48,7 @@ Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount,
                                       api::Move::Kind kind) const {
   const motion::Motor& motor = installation_[id];
   const bool absolute = kind == api::Move::Kind::kAbsolute;
-  const auto counted =
-      absolute ? motor.steps_of_position(amount) : motor.steps_of_distance(amount);
+  const auto counted = absolute ? motor.steps_of_position(amount) : motor.steps_of_distance(amount);
   if (!counted) return fail(motor.name() + ": " + counted.error().message);
   const std::int64_t steps = *counted;
   // Compared before any arithmetic: the sum of two values from outside could overflow.

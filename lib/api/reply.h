@@ -30,7 +30,7 @@ struct MotorResult {
   double dial = 0;
   std::string unit{};
   int precision = 0;  // decimals of both
-  TableRef table{};                 // by which it has moved
+  TableRef table{};   // by which it has moved
 };
 
 // What a move would be.

@@ -51,8 +51,8 @@ struct MotorDescription {
   std::string name{};
   std::uint8_t output = 0;
   std::string group{};
-  TableRef table{};  // in service, for the next move
-  std::string text{};  // what people call it; may be empty
+  TableRef table{};      // in service, for the next move
+  std::string text{};    // what people call it; may be empty
   units::Scale scale{};  // with the number of decimals
   std::optional<units::SoftLimits> soft_limits{};
   friend bool operator==(const MotorDescription&, const MotorDescription&) = default;

@@ -62,8 +62,9 @@ Result<void> read_scale(const TomlReader& reader, Motor* motor) {
   auto unit = read_line(reader, "unit", kLongestUnit);
   if (!unit) return fail(unit.error());
   if (*unit == units::Coordinates::kSteps) {
-    return fail(reader.error("unit", "is \"steps\", which is said of motors without a unit; leave "
-                                     "the key out, or give it another name"));
+    return fail(reader.error("unit",
+                             "is \"steps\", which is said of motors without a unit; leave "
+                             "the key out, or give it another name"));
   }
   scale.unit = std::move(*unit);
   const auto ratio = read_steps_per_unit(reader);
@@ -80,7 +81,8 @@ Result<void> read_scale(const TomlReader& reader, Motor* motor) {
     scale.offset = *offset;
   }
   if (reader.has("precision")) {
-    const auto decimals = reader.integer("precision", 0, units::Coordinates::kMostDecimals, "decimals");
+    const auto decimals =
+        reader.integer("precision", 0, units::Coordinates::kMostDecimals, "decimals");
     if (!decimals) return fail(decimals.error());
     scale.decimals = static_cast<int>(*decimals);
   }

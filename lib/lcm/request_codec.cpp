@@ -17,7 +17,7 @@ std::int32_t count(const auto& elements) {
   return static_cast<std::int32_t>(elements.size());
 }
 
-motor_amount_t message_of(const api::MotorAmount& motor) {
+motor_amount_t amount_message(const api::MotorAmount& motor) {
   motor_amount_t message{};
   message.motor = motor.motor;
   if (const auto* steps = std::get_if<std::int64_t>(&motor.amount)) {
@@ -42,7 +42,7 @@ std::vector<api::MotorAmount> amounts_of(const std::vector<motor_amount_t>& moto
 }
 
 void put_motors(auto& message, const std::vector<api::MotorAmount>& motors) {
-  for (const api::MotorAmount& motor : motors) message.motors.push_back(message_of(motor));
+  for (const api::MotorAmount& motor : motors) message.motors.push_back(amount_message(motor));
   message.motor_count = count(motors);
 }
 
@@ -159,7 +159,7 @@ std::optional<api::Request> from_message(const arm_t& message) {
 
 position_compare_t to_message(const api::PositionCompare& compare) {
   position_compare_t message{};
-  message.position = message_of({compare.motor, compare.position});
+  message.position = amount_message({compare.motor, compare.position});
   message.arrivals =
       static_cast<std::int8_t>((compare.arrivals.positive ? position_compare_t::POSITIVE : 0) |
                                (compare.arrivals.negative ? position_compare_t::NEGATIVE : 0));

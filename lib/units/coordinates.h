@@ -21,8 +21,8 @@ namespace bushd::units {
 struct Scale {
   std::string unit = "steps";
   Ratio steps_per_unit = {};
-  bool negative = false;  // user positions fall where steps rise
-  double offset = 0;      // user units
+  bool negative = false;             // user positions fall where steps rise
+  double offset = 0;                 // user units
   std::optional<int> decimals = {};  // shown to people; none: as many as tell steps apart
   friend bool operator==(const Scale&, const Scale&) = default;
 };

@@ -58,7 +58,8 @@ void add_move(CommandLine& line) {
           "bushctl move [--wait] NAME --to POSITION [NAME --to POSITION...]  to these positions\n"
           "Both are in the motor's unit, or in steps of a motor without one, and may be negative; "
           "the nearest step counts. A motor that moves is given a new target; a distance then "
-          "counts from its present one. With --wait the exit code is 0 only if every motor reached its "
+          "counts from its present one. With --wait the exit code is 0 only if every motor reached "
+          "its "
           "target.")
       .flag("--wait", &options->wait, "Wait for the result")
       .flag("--steps", &options->steps, kSteps)
@@ -97,8 +98,8 @@ void add_arm(CommandLine& line) {
       .flag("--wait", &options->wait, "Wait for the result")
       .raw_words(&options->words)
       .run([&line, options] {
-        const auto arm = parse_arm(options->words, numbers(options->steps), options->edge,
-                                   options->delay_us);
+        const auto arm =
+            parse_arm(options->words, numbers(options->steps), options->edge, options->delay_us);
         if (!arm) return wrong_usage(arm.error());
         return send(line.connection(), *arm, until(options->wait), Hope::kReached);
       });
@@ -199,8 +200,8 @@ void add_set(CommandLine& line) {
       .flag("--dial", &options->dial, "POSITION is the dial's")
       .flag("--steps", &options->steps, kSteps)
       .run([&line, options] {
-        const auto request = parse_set(options->motor, options->position,
-                                       numbers(options->steps), options->dial);
+        const auto request =
+            parse_set(options->motor, options->position, numbers(options->steps), options->dial);
         if (!request) return wrong_usage(request.error());
         // Over in a moment, and only the result tells whether the MCU did it.
         return send(line.connection(), *request, Until::kResult, Hope::kDone);

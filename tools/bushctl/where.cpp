@@ -35,13 +35,13 @@ std::string limits_text(const api::MotorDescription& description) {
 }  // namespace
 
 Result<std::vector<Whereabouts>> where(const bushd::client::Status& status,
-                                       const std::vector<std::string>& names,
-                                       std::int64_t now_us) {
+                                       const std::vector<std::string>& names, std::int64_t now_us) {
   std::vector<Whereabouts> all;
   for (std::size_t i = 0; i < status.states.size(); ++i) {
     const auto age_us = std::max<std::int64_t>(now_us - status.states[i].part.utime_us, 0);
     for (const api::MotorState& state : status.states[i].snapshot.motors) {
-      Whereabouts motor{.state = state, .description = {}, .age_s = 1e-6 * static_cast<double>(age_us)};
+      Whereabouts motor{
+          .state = state, .description = {}, .age_s = 1e-6 * static_cast<double>(age_us)};
       for (const auto& description : status.descriptions.at(i).snapshot.motors) {
         if (description.name == state.name) motor.description = description;
       }
@@ -51,7 +51,8 @@ Result<std::vector<Whereabouts>> where(const bushd::client::Status& status,
   if (names.empty()) return all;
   std::vector<Whereabouts> chosen;
   for (const std::string& name : names) {
-    const auto found = std::ranges::find(all, name, [](const auto& motor) { return motor.state.name; });
+    const auto found =
+        std::ranges::find(all, name, [](const auto& motor) { return motor.state.name; });
     if (found == all.end()) {
       return fail(fmt::format("there is no motor \"{}\"; 'bushctl where' lists them", name));
     }
@@ -77,16 +78,11 @@ std::vector<std::string> table(const std::vector<Whereabouts>& motors) {
 std::string json(const std::vector<Whereabouts>& motors) {
   nlohmann::json out = {{"motors", nlohmann::json::array()}};
   for (const auto& [state, description, age_s] : motors) {
-    nlohmann::json motor = {{"name", state.name},
-                            {"unit", description.scale.unit},
-                            {"user", state.user},
-                            {"dial", state.dial},
-                            {"steps", state.position_steps},
-                            {"user_low", nullptr},
-                            {"user_high", nullptr},
-                            {"moving", state.moving},
-                            {"trust", word(state.trust)},
-                            {"reason", nullptr}};
+    nlohmann::json motor = {
+        {"name", state.name},   {"unit", description.scale.unit}, {"user", state.user},
+        {"dial", state.dial},   {"steps", state.position_steps},  {"user_low", nullptr},
+        {"user_high", nullptr}, {"moving", state.moving},         {"trust", word(state.trust)},
+        {"reason", nullptr}};
     if (const auto limits = user_limits(description)) {
       motor["user_low"] = limits->low;
       motor["user_high"] = limits->high;
