@@ -69,13 +69,15 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
 // By urgency: an emergency; replacements, what follows them, and the polls that confirm them;
 // queues about to run empty; reports; SYNCs; configuration; filling queues.
 bool Master::send_next(std::int64_t now_us) {
-  const std::int64_t urgent_us = horizon_.queue_urgent_us();
+  const std::int64_t target_us = horizon_.queue_target_us();
+  const StreamScheduler::Filling urgent{.lead_us = horizon_.queue_urgent_us(),
+                                        .target_us = target_us};
   return emergency_.send_due(now_us) || streams_.send_due_replacement(now_us) ||
-         streams_.send_stream(now_us, urgent_us, true) || poller_.send_wanted(now_us) ||
-         streams_.send_stream(now_us, urgent_us) || poller_.send_due(now_us) ||
+         streams_.send_stream(now_us, urgent, true) || poller_.send_wanted(now_us) ||
+         streams_.send_stream(now_us, urgent) || poller_.send_due(now_us) ||
          synchroniser_.send_due(now_us) || connector_.send_ramp_down(now_us) ||
          connector_.send_due_identify(now_us) || connector_.send_request(now_us) ||
-         streams_.send_stream(now_us, horizon_.queue_target_us());
+         streams_.send_stream(now_us, {.lead_us = target_us, .target_us = target_us});
 }
 
 std::int64_t Master::next_wake_us() const {

@@ -34,10 +34,11 @@ std::optional<Traffic> rehearse(std::int64_t now_us, const RehearsalStage& stage
     });
   };
   Traffic traffic;
+  const StreamScheduler::Filling filling{.lead_us = stage.queue_us, .target_us = stage.queue_us};
   for (; open(); now_us += kStreamWakeUs) {
     // Queues are filled ahead of the time: what has not gone out by its end never will.
     if (!stage.clock.valid() || stage.clock.tick_at(now_us) > end) return std::nullopt;
-    while (writer.has_room(now_us) && streams.send_stream(now_us, stage.queue_us)) {
+    while (writer.has_room(now_us) && streams.send_stream(now_us, filling)) {
       if (++traffic.frames > max_frames) return std::nullopt;
     }
     traffic.bytes += writer.bytes().size();

@@ -52,9 +52,8 @@ bool StreamScheduler::send_due_replacement(std::int64_t now_us) {
 // A replacement leaves an MCU with little more than one frame of ticks, far less than an answer may
 // take. So more goes out before anybody knows whether it was taken: if it was not, its followers
 // are of an epoch that the MCU does not have and change nothing.
-bool StreamScheduler::send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced) {
+bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling, bool only_replaced) {
   if (!clock_.valid()) return false;
-  const Tick now = clock_.tick_at(now_us);
   // The neediest first; one whose queue is full must not keep the others waiting.
   std::vector<std::pair<Tick, McuIndex>> needy;
   for (const McuIndex i : mcus_.indices()) {
@@ -65,7 +64,7 @@ bool StreamScheduler::send_stream(std::int64_t now_us, std::int64_t lead_us, boo
   }
   std::sort(needy.begin(), needy.end());
   return std::any_of(needy.begin(), needy.end(), [&](const auto& entry) {
-    return send_ticks_of(now_us, entry.second, now, clock_.ticks_in(lead_us));
+    return send_ticks_of(now_us, entry.second, filling);
   });
 }
 
@@ -88,7 +87,9 @@ StreamScheduler::Choice StreamScheduler::choose(const Mcu& mcu, Tick first) {
   return choice;
 }
 
-bool StreamScheduler::send_ticks_of(std::int64_t now_us, McuIndex index, Tick now, Tick lead) {
+bool StreamScheduler::send_ticks_of(std::int64_t now_us, McuIndex index, const Filling& filling) {
+  const Tick now = clock_.tick_at(now_us);
+  const Tick lead = clock_.ticks_in(filling.lead_us);
   const Choice choice = choose(mcus_[index], *mcus_[index].next_tick());
   const Tick first = choice.first;
   const Tick depth = records_[index].view.identity.queue_ticks - kSpareTicks;
@@ -102,7 +103,8 @@ bool StreamScheduler::send_ticks_of(std::int64_t now_us, McuIndex index, Tick no
   if (first > now + std::min(lead, depth * 3 / 4)) return false;
   const std::uint16_t mask = choice.starts != 0 ? choice.starts : choice.goes_on;
   const unsigned flags = choice.starts != 0 ? BUSHD_TICKS_START : 0;
-  const Tick deep = std::min(now + std::min(kTableDepth * lead, depth), choice.join);
+  const Tick target = kTableDepth * clock_.ticks_in(filling.target_us);
+  const Tick deep = std::min(now + std::min(target, depth), choice.join);
   if (deep > first && send_table_ticks(now_us, index, mask, first, deep - first, flags)) {
     return true;
   }

@@ -58,9 +58,14 @@ class StreamScheduler {
   // sent: so nothing should be, in the step in which this returns true.
   bool fail_late_replacements(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
-  // One frame for the MCU whose queue is emptiest, if it is not filled `lead_us` ahead.
-  // `only_replaced`: of those whose replacement is not confirmed.
-  bool send_stream(std::int64_t now_us, std::int64_t lead_us, bool only_replaced = false);
+  // One frame for the MCU whose queue is emptiest, if it is not filled `lead_us` ahead. States of
+  // runs cost the same however many ticks they hold: these fill it as far as `target_us` allows,
+  // whatever made the frame due. `only_replaced`: of those whose replacement is not confirmed.
+  struct Filling {
+    std::int64_t lead_us;
+    std::int64_t target_us;
+  };
+  bool send_stream(std::int64_t now_us, const Filling& filling, bool only_replaced = false);
 
   // The first tick of this motor that has not been sent.
   Tick next_tick(McuIndex mcu, std::uint8_t motor) const { return mcus_[mcu].stream[motor].next; }
@@ -120,7 +125,7 @@ class StreamScheduler {
 
   // stream_frames.cpp
   static Choice choose(const Mcu& mcu, Tick first);
-  bool send_ticks_of(std::int64_t now_us, McuIndex mcu, Tick now, Tick lead);
+  bool send_ticks_of(std::int64_t now_us, McuIndex mcu, const Filling& filling);
   void send_table_runs(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first);
   bool send_table_ticks(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first,
                         Tick max_ticks, unsigned flags);

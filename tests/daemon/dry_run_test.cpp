@@ -3,35 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "daemon/lab.h"
+#include "daemon/motion_frames.h"
 
 namespace bushd::test {
 namespace {
-
-bool carries_motion(const bushd_frame& frame) {
-  return frame.type == BUSHD_MSG_TICKS || frame.type == BUSHD_MSG_TABLE_TICKS ||
-         frame.type == BUSHD_MSG_TABLE_RUN;
-}
-
-// Frames with motion on their way to MCUs, and their bytes without the delimiters before them.
-struct Sent {
-  std::int64_t frames = 0;
-  std::int64_t bytes = 0;
-  bushd_receiver receiver{};
-  std::int64_t pending = 0;
-
-  void add(const std::vector<std::uint8_t>& wire) {
-    for (const std::uint8_t byte : wire) {
-      pending += byte == 0 && pending == 0 ? 0 : 1;
-      bushd_frame frame;
-      const auto status = bushd_receive_byte(&receiver, byte, &frame);
-      if (status == BUSHD_RECEIVE_FRAME && carries_motion(frame)) {
-        ++frames;
-        bytes += pending;
-      }
-      if (byte == 0) pending = 0;
-    }
-  }
-};
 
 api::Request dry(const std::vector<std::string>& motors, const std::vector<std::int64_t>& steps) {
   return api::Move{.motors = motor_steps(motors, steps), .dry_run = true};
@@ -45,7 +20,7 @@ TEST(DryRun, TellsWhatTheMoveThenTakesAndSends) {
     lab.connect();
     const std::vector<std::string> motors = {"m01", "m02", "m04", "m07"};
     const std::vector<std::int64_t> steps = {3000, -41, 0, -1700};
-    Sent sent;
+    MotionFrames sent;
     lab.on_send = [&sent](std::size_t, std::vector<std::uint8_t>& bytes) {
       sent.add(bytes);
       return true;

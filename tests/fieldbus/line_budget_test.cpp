@@ -5,7 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <string>
 #include <vector>
+
+#include "source_path.h"
 
 namespace bushd::fieldbus {
 namespace {
@@ -36,6 +42,24 @@ TEST(LineBudget, GrowsWithEverythingThatCosts) {
   EXPECT_LT(load, line_load(250'000, 2'560'000, BUSHD_FORMAT_FINE, few));
   EXPECT_LT(load, line_load(500'000, 2'000'000, BUSHD_FORMAT_FINE, few));
   EXPECT_GT(load, line_load(500'000, 2'560'000, BUSHD_FORMAT_COARSE, few));
+}
+
+// In ticks of 2560 us, with 16 motors on each MCU.
+TEST(LineBudget, ConfigurationDocumentHasTheSameLoads) {
+  std::ifstream file(test::source_path("docs/configuration.md"));
+  const std::string document{std::istreambuf_iterator<char>(file), {}};
+  for (const std::uint32_t baud : {115'200u, 230'400u, 500'000u, 1'000'000u}) {
+    std::string row = "| " + std::to_string(baud);
+    for (const bushd_format format : {BUSHD_FORMAT_COARSE, BUSHD_FORMAT_FINE}) {
+      for (const std::size_t mcus : {1u, 2u, 4u}) {
+        const double load =
+            line_load(baud, 2'560'000, format, std::vector<std::uint8_t>(mcus, std::uint8_t{16}));
+        row += " | " + (load > kMaxLineLoad ? std::string("refused")
+                                            : std::to_string(std::lround(load * 100)) + " %");
+      }
+    }
+    EXPECT_NE(document.find(row + " |\n"), std::string::npos) << row;
+  }
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ using link::Tick;
 
 constexpr std::int64_t kNowUs = 2'560'000;  // tick 1000
 constexpr std::int64_t kLeadUs = 300'000;
+constexpr link::StreamScheduler::Filling kFilling{.lead_us = kLeadUs, .target_us = kLeadUs};
 
 class Scheduling : public testing::Test {
  protected:
@@ -35,7 +36,7 @@ class Scheduling : public testing::Test {
   };
   // One frame, decoded; none if nothing is to be sent.
   std::optional<Ticks> next(bool only_replaced = false) {
-    if (!streams.send_stream(kNowUs, kLeadUs, only_replaced)) return std::nullopt;
+    if (!streams.send_stream(kNowUs, kFilling, only_replaced)) return std::nullopt;
     return frame();
   }
   std::optional<Ticks> frame() {
@@ -167,7 +168,7 @@ TEST_F(Replacing, TakenOnceTheReportShowsItsEpoch) {
   known_until(0, 1036);
   streams.follow_report(kFirst);
   EXPECT_TRUE(events.empty());
-  EXPECT_FALSE(streams.send_stream(kNowUs, kLeadUs, true)) << "nothing is unconfirmed";
+  EXPECT_FALSE(streams.send_stream(kNowUs, kFilling, true)) << "nothing is unconfirmed";
 }
 
 TEST_F(Replacing, NotTakenIsToldAndTheNextTryHasAnEpochOfItsOwn) {
@@ -220,7 +221,7 @@ TEST_F(Replacing, WhatWasNeverSentNeedsNone) {
 TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
   source.end = [](std::uint8_t) { return Tick{5000}; };
   streams.begin_table_run(kFirst, 0, 1040, -700);
-  ASSERT_TRUE(streams.send_stream(kNowUs, kLeadUs));
+  ASSERT_TRUE(streams.send_stream(kNowUs, kFilling));
   const auto sent = take_sent(writer);
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_EQ(sent[0].type, BUSHD_MSG_TABLE_RUN);
@@ -230,6 +231,24 @@ TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
   known_until(0, 1100);
   streams.drop(kFirst, 0);
   EXPECT_EQ(streams.next_tick(kFirst, 0), 1100);
+}
+
+// A start is urgent, since little is queued; its frame holds no less for that.
+TEST_F(Scheduling, StatesOfRunsFillTheQueueWhateverMadeThemDue) {
+  mcus[kFirst].view.identity.capabilities |= BUSHD_CAN_TABLE_TICKS;
+  source.segment = [](std::uint8_t, Tick, unsigned max_ticks) {
+    bushd_run run;
+    bushd_run_start(&run, &small_table(), 1'000'000, 1);
+    return link::TickSource::RunSegment{run, max_ticks};
+  };
+  streams.begin(kFirst, 0, 1040);
+  const link::StreamScheduler::Filling urgent{.lead_us = 120'000, .target_us = 300'000};
+  ASSERT_TRUE(streams.send_stream(kNowUs, urgent));
+  const auto sent = take_sent(writer);
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_EQ(sent[0].type, BUSHD_MSG_TABLE_TICKS);
+  EXPECT_EQ(streams.next_tick(kFirst, 0), 1000 + 2 * clock.ticks_in(300'000));
+  EXPECT_FALSE(streams.send_stream(kNowUs, urgent)) << "not due";
 }
 
 TEST_F(Scheduling, McuThatIsNotOnlineGetsNothing) {

@@ -1,6 +1,7 @@
 #include "clients.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <numeric>
 
@@ -19,29 +20,21 @@ Clients::Clients(const bushd::config::Config& config, const Witness& witness,
       witness_(witness),
       rates_(rates),
       per_hour_(std::accumulate(rates.begin(), rates.end(), 0.0)),
-      random_(seed, kStream),
-      number_(kClients, 0) {}
+      random_(seed, kStream) {}
 
 bushd::sim::TimeNs Clients::next_after(bushd::sim::TimeNs now_ns) {
   return per_hour_ > 0 ? now_ns + random_.wait(3.6e12 / per_hour_) : bushd::sim::kNever;
 }
 
-void Clients::begin_anew() {
-  ++generation_;
-  sent_.clear();
-  std::fill(number_.begin(), number_.end(), 0);
-}
-
 Request Clients::make(Ask ask) {
-  const auto client = static_cast<std::size_t>(random_.below(kClients));
-  return {.client = "c" + std::to_string(client) + "-" + std::to_string(generation_),
-          .number = ++number_[client],
-          .ask = ask};
+  return {.client = "c" + std::to_string(random_.below(kClients)), .ask = ask};
 }
 
 Request Clients::of_all_online(Ask ask) {
   Request request = make(ask);
-  const auto offline = [](const auto& state) { return !state || state->mcu_state == "OFFLINE"; };
+  const auto offline = [](const auto& state) {
+    return !state || state->state == bushd::api::McuState::kOffline;
+  };
   if (std::ranges::none_of(witness_.states(), offline)) return request;
   for (const auto& state : witness_.states()) {
     if (!offline(state) && !state->motors.empty()) request.add(state->motors.front().name, 0);
@@ -57,9 +50,9 @@ std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) c
   std::vector<Choice> found;
   for (const auto& state : witness_.states()) {
     if (!state) continue;
-    for (const bushd::motor_state_t& motor : state->motors) {
-      if (motor.armed == 0 && (motor.moving != 0) == moving &&
-          (motor.trust == "uncertain") == uncertain) {
+    for (const bushd::api::MotorState& motor : state->motors) {
+      if (motor.activity != bushd::api::Activity::kArmed && motor.moving == moving &&
+          (motor.trust == bushd::api::Trust::kUncertain) == uncertain) {
         found.push_back({motor.name, motor.position_steps, motor.target_steps});
       }
     }
@@ -137,17 +130,18 @@ Request Clients::set(const std::vector<Choice>& motors) {
 
 Request Clients::nonsense() {
   constexpr std::int64_t kHuge = std::numeric_limits<std::int64_t>::max();
-  Request request = make(static_cast<Ask>(random_.between(-128, 127)));
-  switch (random_.below(8)) {
+  constexpr Ask kNamesMotors[] = {Ask::kMoveBy, Ask::kMoveTo, Ask::kSetPosition, Ask::kHome,
+                                  Ask::kArm};
+  Request request = make(kNamesMotors[random_.below(std::size(kNamesMotors))]);
+  switch (random_.below(7)) {
     case 0:
       break;
     case 1:
-      request.ask = Ask::kMoveBy;
       request.add("no such motor", 1);
       break;
     case 2:
-      request.ask = static_cast<Ask>(random_.between(1, 7));
-      request.motors.push_back(any_motor());
+      request = move(1);
+      request.damage = static_cast<Damage>(random_.between(1, 4));
       break;
     case 3:
       request.ask = Ask::kMoveBy;
@@ -158,15 +152,12 @@ Request Clients::nonsense() {
       request.add(any_motor(), random_.one_in(2) ? kHuge : -kHuge - 1);
       break;
     case 5:
-      request.ask = Ask::kMoveBy;
       request.add(any_motor(), 5);
       request.add(request.motors.front(), 5);
       break;
-    case 6:
-      request.client = random_.one_in(2) ? "" : std::string(200, 'x');
-      break;
     default:
-      request.number = -random_.between(0, 1000);
+      request.add(any_motor(), 5);
+      request.client = random_.one_in(2) ? "" : std::string(200, 'x');
       break;
   }
   return request;
@@ -251,7 +242,6 @@ Request Clients::compose(CommandKind kind) {
     case CommandKind::kClear:
       return clear_all();
     case CommandKind::kAgain:
-      return sent_.empty() ? nonsense() : random_.pick(sent_);
     case CommandKind::kNonsense:
       return nonsense();
     case CommandKind::kHome:
@@ -271,21 +261,17 @@ CommandKind Clients::choose() {
   return static_cast<CommandKind>(kind);
 }
 
-Request Clients::next() {
+std::optional<Request> Clients::next() {
   if (auto request = remedy()) return *request;
   const CommandKind chosen = choose();
   ++sent_by_kind_[static_cast<std::size_t>(chosen)];
-  Request request = compose(chosen);
-  if (chosen == CommandKind::kAgain || chosen == CommandKind::kNonsense) return request;
-  if (sent_.size() == kRemembered) sent_.pop_front();
-  sent_.push_back(request);
-  return request;
+  if (chosen == CommandKind::kAgain) return std::nullopt;
+  return compose(chosen);
 }
 
 Request Clients::one_of_flood(std::size_t client) {
   Request request = compose(choose());
-  request.client = "f" + std::to_string(client) + "-" + std::to_string(generation_);
-  request.number = ++flood_number_;
+  request.client = "f" + std::to_string(client);
   return request;
 }
 

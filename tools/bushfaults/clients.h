@@ -1,9 +1,8 @@
 // Clients that nobody wants: they move, stop and set motors as chance has it, send groups, change
-// their minds, pull the emergency stop, send commands again, and talk nonsense.
+// their minds, pull the emergency stop, and talk nonsense. What they say goes by Mail.
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,8 +20,8 @@ class Clients {
   Clients(const bushd::config::Config& config, const Witness& witness, const CommandRates& rates,
           std::uint64_t seed);
 
-  // The next command, and when the one after it is due.
-  Request next();
+  // The next request, and when the one after it is due. Nothing: one that was sent before, again.
+  std::optional<Request> next();
   bushd::sim::TimeNs next_after(bushd::sim::TimeNs now_ns);
   // What only clients can mend: everything stops, drivers on, an emergency is over. Before quiet.
   Request stop_all() { return make(Ask::kStop); }
@@ -34,10 +33,6 @@ class Clients {
   const CommandCounts& sent() const { return sent_by_kind_; }
   // Of a flood of requests, by this client of the flood's own.
   Request one_of_flood(std::size_t client);
-  // Counts the daemons.
-  std::uint64_t generation() const { return generation_; }
-  // A new daemon does not know what was asked of the old one: clients begin anew.
-  void begin_anew();
 
  private:
   struct Choice {
@@ -67,17 +62,12 @@ class Clients {
   std::vector<Choice> motors_that(bool moving, bool uncertain) const;
 
   static constexpr std::size_t kClients = 4;
-  static constexpr std::size_t kRemembered = 30;
 
   const bushd::config::Config& config_;
   const Witness& witness_;
   const CommandRates rates_;
   const double per_hour_;  // of all kinds
   bushd::sim::Random random_;
-  std::uint64_t generation_ = 0;
-  std::vector<std::int64_t> number_;  // by client
-  std::int64_t flood_number_ = 0;
-  std::deque<Request> sent_;
   CommandCounts sent_by_kind_{};
 };
 

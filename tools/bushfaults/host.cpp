@@ -1,6 +1,10 @@
 #include "host.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <limits>
+#include <utility>
 
 namespace bushfaults {
 namespace {
@@ -13,11 +17,10 @@ constexpr bushd::sim::TimeNs kMaxLatencyNs = 16'000'000;
 }  // namespace
 
 Host::Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness,
-           Clients& clients, Recent& recent, std::uint64_t seed)
+           Recent& recent, std::uint64_t seed)
     : config_(config),
       bus_(bus),
       witness_(witness),
-      clients_(clients),
       recent_(recent),
       random_(seed, kStream),
       garbler_{bushd::sim::Garbler(seed, kStream + 1), bushd::sim::Garbler(seed, kStream + 2)} {
@@ -33,10 +36,17 @@ Host::~Host() {
 }
 
 void Host::start() {
-  daemon_ = std::make_unique<bushd::daemon::LcmShim>(
-      config_, *this, static_cast<std::uint16_t>(random_.between(1, 0xFFFF)));
   witness_.daemon_started(now_ns_);
-  clients_.begin_anew();
+  published_.assign(config_.mcus.size(), {});
+  run_number_ = random_.between(1, std::numeric_limits<std::int64_t>::max());
+  daemon_ = std::make_unique<DaemonRun>(
+      config_, *this,
+      DaemonRun::Ears{
+          .carry_out = [this](const auto& asker,
+                              const auto& request) { return carry_out(asker, request); },
+          .said = [this](const auto& message) { hear(message); },
+          .now_us = [this] { return now_us(); }},
+      run_number_);
   inbox_.clear();
   if (plugged_) core().port_opened(now_us(), {});
   step();
@@ -79,8 +89,12 @@ void Host::deliver() {
 }
 
 void Host::step() {
-  core().step(now_us());
+  daemon_->step();
+  if (!witness_.promise().heard_all()) {
+    witness_.violated(now_ns_, "an answer of the core's has not arrived");
+  }
   wake_ns_ = std::max(core().next_wake_us(), now_us() + 1) * 1000;
+  if (!daemon_->idle()) wake_ns_ = now_ns_;
 }
 
 void Host::run(TimeNs now_ns) {
@@ -97,16 +111,108 @@ void Host::run(TimeNs now_ns) {
     start();
   }
   if (now_ns_ < paused_until_ns_) return;
-  const bool due = now_ns_ >= wake_ns_ || !requests_.empty() || !disk_.empty() ||
+  const bool due = now_ns_ >= wake_ns_ || !messages_.empty() || !disk_.empty() ||
                    (!inbox_.empty() && inbox_.front().due_ns <= now_ns_);
   if (!due) return;
   deliver();
   for (const auto& told : std::exchange(disk_, {})) told();
-  for (; !requests_.empty(); requests_.pop_front()) {
-    witness_.request(now_ns_, requests_.front());
-    give(*daemon_, now_us(), requests_.front());
+  while (!messages_.empty()) {
+    const Message message = std::move(messages_.front());
+    messages_.pop_front();
+    std::visit([this](const auto& content) { give(content); }, message);
   }
+  daemon_->carry_out_some();
   step();
+}
+
+void Host::check(const std::optional<std::string>& wrong) {
+  if (wrong) witness_.violated(now_ns_, *wrong);
+}
+
+void Host::give(const bushd::lcm::Hello& hello) {
+  Promise& promise = witness_.promise();
+  promise.give(hello);
+  daemon_->give(bushd::lcm::encode(now_us(), hello).value());
+  check(promise.hello_given());
+}
+
+void Host::give(const Request& request) {
+  const bool usable = request.damage == Damage::kNone && bushd::api::is_client_id(request.client);
+  const std::uint64_t dropped = daemon_->dropped();
+  recent_.note(now_ns_, text_of(request));
+  if (usable) witness_.promise().give(request);
+  daemon_->give(packet_of(now_us(), request));
+  if (usable) check(witness_.promise().given());
+  if (usable != (daemon_->dropped() == dropped)) {
+    witness_.violated(now_ns_, (usable ? "dropped: " : "not dropped: ") + text_of(request));
+  }
+}
+
+// What the core answers, at the moment when it does: messages arrive later.
+class Host::Overhearing final : public bushd::api::Session {
+ public:
+  Overhearing(Host& host, bushd::api::Asker asker, Key key)
+      : Session(bushd::api::Transport::kLcm, asker.session->client_id(), true),
+        host_(host),
+        asker_(std::move(asker)),
+        key_(std::move(key)) {}
+  void answer(std::int64_t, const bushd::api::Reply& reply) override {
+    host_.witness_.reply(host_.now_ns_, key_, reply);
+    asker_.answer(reply);
+  }
+
+ private:
+  Host& host_;
+  bushd::api::Asker asker_;
+  Key key_;
+};
+
+bushd::api::Asker Host::carry_out(const bushd::api::Asker& asker,
+                                  const bushd::api::Request& request) {
+  const auto asked = witness_.promise().carried_out(asker.session->client_id(), asker.number);
+  if (!asked ||
+      packet_of(0, *asked).payload != bushd::lcm::encode(0, asked->id(), request).value().payload) {
+    witness_.violated(now_ns_,
+                      fmt::format("carried out, and was not to be: {} #{}: {}",
+                                  asker.session->client_id(), asker.number, name_of(request)));
+    return asker;
+  }
+  witness_.carried_out(now_ns_, *asked);
+  return {.session = std::make_shared<Overhearing>(*this, asker, key_of(asked->id())),
+          .number = asker.number};
+}
+
+void Host::hear(const std::optional<bushd::lcm::DaemonMessage>& message) {
+  if (!message) return witness_.violated(now_ns_, "a message of the daemon's means nothing");
+  if (const auto* welcome = std::get_if<bushd::lcm::Welcome>(&*message)) {
+    check(witness_.promise().hear(*welcome));
+  } else if (const auto* reply = std::get_if<bushd::lcm::ReplyMessage>(&*message)) {
+    check(witness_.promise().hear(*reply));
+  } else if (const auto* state = std::get_if<bushd::lcm::StateMessage>(&*message)) {
+    const auto mcu = static_cast<std::size_t>(state->part.part);
+    if (mcu >= published_.size() || published_[mcu] != state->snapshot) {
+      witness_.violated(now_ns_, "a state arrives otherwise than it was published");
+    }
+  }
+  if (on_message) on_message(*message);
+}
+
+void Host::publish(bushd::McuId mcu, const bushd::api::StateSnapshot& state) {
+  witness_.state(now_ns_, mcu.value, state);
+  published_[mcu.value] = state;
+  daemon_->publishing().publish(mcu, state);
+}
+
+void Host::publish(bushd::McuId mcu, const bushd::api::Description& description) {
+  daemon_->publishing().publish(mcu, description);
+}
+
+void Host::publish(bushd::BusId bus, const bushd::api::HealthSnapshot& health) {
+  daemon_->publishing().publish(bus, health);
+}
+
+void Host::serve_tables(const bushd::api::Asker& asker, const bushd::api::Request&) {
+  asker.answer(bushd::api::Refused{"there are no table files here"});
 }
 
 Host::TimeNs Host::next_ns() const {
@@ -118,8 +224,8 @@ Host::TimeNs Host::next_ns() const {
   return std::max(std::min(next, wake_ns_), now_ns_ + 1000);
 }
 
-void Host::request(TimeNs, const Request& request) {
-  if (daemon_) requests_.push_back(request);  // else nobody listens
+void Host::receive(const Message& message) {
+  if (daemon_) messages_.push_back(message);
 }
 
 void Host::garble(Direction direction, bushd::sim::Garbling what) {
@@ -154,7 +260,7 @@ void Host::kill(TimeNs now_ns, TimeNs until_ns) {
   now_ns_ = now_ns;
   starts_ns_ = daemon_ ? until_ns : std::max(starts_ns_, until_ns);
   daemon_.reset();
-  requests_.clear();
+  messages_.clear();
   disk_.clear();
   paused_until_ns_ = 0;
 }

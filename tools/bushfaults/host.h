@@ -7,26 +7,30 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <variant>
 #include <vector>
 
-#include "clients.h"
-#include "daemon/lcm_shim.h"
+#include "daemon_run.h"
 #include "recent.h"
+#include "request.h"
 #include "sim/bus.h"
 #include "sim/garbler.h"
 #include "witness.h"
 
 namespace bushfaults {
 
-class Host final : public bushd::daemon::LcmOutputs {
+// What clients send.
+using Message = std::variant<bushd::lcm::Hello, Request>;
+
+class Host final : public bushd::daemon::Outputs {
  public:
   using TimeNs = bushd::sim::TimeNs;
   // No adapter answers sooner, so that time can be moved in strides of this length.
   static constexpr TimeNs kStrideNs = 400'000;
 
   // All of them outlive the host. The daemon starts at once.
-  Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness,
-       Clients& clients, Recent& recent, std::uint64_t seed);
+  Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness, Recent& recent,
+       std::uint64_t seed);
   ~Host() override;
 
   // Time has come to now_ns, and the bus with it.
@@ -34,7 +38,12 @@ class Host final : public bushd::daemon::LcmOutputs {
   // When something is to be done next, if nothing comes from outside.
   TimeNs next_ns() const;
 
-  void request(TimeNs now_ns, const Request& request);
+  // Is lost if no daemon runs.
+  void receive(const Message& message);
+  // Of the daemon that runs, or of the last one.
+  std::int64_t run_number() const { return run_number_; }
+  // What it says to clients.
+  std::function<void(const bushd::lcm::DaemonMessage&)> on_message;
 
   // Faults. They may overlap: what is over last counts.
   enum class Direction { kOut, kIn };
@@ -53,19 +62,26 @@ class Host final : public bushd::daemon::LcmOutputs {
   };
 
   void send(bushd::BusId bus, std::span<const std::uint8_t> bytes) override;
-  void reply(const bushd::reply_t& reply) override { witness_.reply(now_ns_, reply); }
-  void state(const bushd::state_t& state) override { witness_.state(now_ns_, state); }
-  void health(const bushd::health_t&) override {}
+  void publish(bushd::McuId mcu, const bushd::api::StateSnapshot& state) override;
+  void publish(bushd::McuId mcu, const bushd::api::Description& description) override;
+  void publish(bushd::BusId bus, const bushd::api::HealthSnapshot& health) override;
   void move_log(const std::string& line) override { witness_.move_log(now_ns_, line); }
   void log(bushd::daemon::LogLevel level, const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>&) override;
+  void serve_tables(const bushd::api::Asker& asker, const bushd::api::Request&) override;
   std::int64_t wall_clock_us() override { return now_us(); }
 
   bushd::daemon::Core& core() { return daemon_->core(); }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   bool silent() const { return now_ns_ < silent_until_ns_; }
   void start();
+  class Overhearing;
+  bushd::api::Asker carry_out(const bushd::api::Asker& asker, const bushd::api::Request& request);
+  void hear(const std::optional<bushd::lcm::DaemonMessage>& message);
+  void check(const std::optional<std::string>& wrong);
+  void give(const bushd::lcm::Hello& hello);
+  void give(const Request& request);
   void plug_in();
   void take_in();
   void deliver();
@@ -74,18 +90,19 @@ class Host final : public bushd::daemon::LcmOutputs {
   const bushd::config::Config& config_;
   bushd::sim::Bus& bus_;
   Witness& witness_;
-  Clients& clients_;
   Recent& recent_;
   bushd::sim::Random random_;
   std::array<bushd::sim::Garbler, 2> garbler_;  // by Direction
   TimeNs now_ns_ = 0;
 
-  std::unique_ptr<bushd::daemon::LcmShim> daemon_;  // none: killed
-  TimeNs starts_ns_ = 0;                            // when the next daemon starts
+  std::unique_ptr<DaemonRun> daemon_;  // none: killed
+  std::int64_t run_number_ = 0;
+  TimeNs starts_ns_ = 0;  // when the next daemon starts
   TimeNs paused_until_ns_ = 0;
   TimeNs wake_ns_ = 0;
-  std::deque<Request> requests_;            // not yet read by the daemon
-  std::deque<std::function<void()>> disk_;  // what it is to tell the daemon
+  std::deque<Message> messages_;                      // not yet read by the daemon
+  std::vector<bushd::api::StateSnapshot> published_;  // by MCU
+  std::deque<std::function<void()>> disk_;            // what it is to tell the daemon
 
   bool plugged_ = false;
   TimeNs back_ns_ = 0;  // when the adapter is plugged in again

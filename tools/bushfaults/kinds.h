@@ -26,6 +26,11 @@ enum class FaultKind : std::uint8_t {
   kPause,
   kKill,
   kReset,
+  // On messages between clients and the daemon.
+  kLostRequest,
+  kLostAnswer,
+  kNumberLeap,
+  kNumberReuse,
   // None unless asked for.
   kLimitSwitch,
   kEmergencyInput,
@@ -36,7 +41,7 @@ enum class FaultKind : std::uint8_t {
   kFlood,
   kCrowd,
 };
-inline constexpr std::size_t kFaultKinds = 23;
+inline constexpr std::size_t kFaultKinds = 27;
 
 // What clients send.
 enum class CommandKind : std::uint8_t {

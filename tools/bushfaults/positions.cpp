@@ -15,12 +15,11 @@ constexpr bushd::sim::TimeNs kMaxAgeNs = 1'500'000'000;
 // pause and kMaxAgeNs together.
 constexpr std::size_t kReportsKept = 1024;
 
-bool is_online(const bushd::state_t& state) {
-  if (state.mcu_state == "READY" || state.mcu_state == "RUN" || state.mcu_state == "FAULT") {
-    return true;
-  }
+bool is_online(const bushd::api::StateSnapshot& state) {
+  using bushd::api::McuState;
+  if (state.state == McuState::kOffline) return false;
   // Not ready for moves, but no longer connecting.
-  return state.mcu_state == "BUSY" && state.detail == "drivers disabled";
+  return state.state != McuState::kBusy || state.detail == "drivers disabled";
 }
 
 }  // namespace
@@ -120,39 +119,40 @@ void Positions::cut_off(TimeNs now_ns, std::size_t mcu, std::size_t output) {
 }
 
 std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
-                                            const bushd::state_t& state) {
+                                            const bushd::api::StateSnapshot& state) {
   if (strict_ && !is_online(state)) return check_offline(state);
-  if (!is_online(state) || state.boot_number != bus_.mcu(mcu).boot_number()) return std::nullopt;
+  if (!is_online(state) || state.boot != bus_.mcu(mcu).boot_number()) return std::nullopt;
   const auto tick = static_cast<std::uint32_t>(state.tick);
   const auto& reports = reports_[mcu];
   const auto report = std::find_if(reports.rbegin(), reports.rend(), [&](const Report& r) {
-    return r.tick == tick && r.boot_number == state.boot_number;
+    return r.tick == tick && r.boot_number == state.boot;
   });
   if (report == reports.rend()) {
     return fmt::format("{} is said to have reported in tick {}, and has not", state.mcu,
                        state.tick);
   }
   auto wrong = check_age(now_ns, mcu, *report);
-  for (const bushd::motor_state_t& claim : state.motors) {
-    if (!wrong && claim.trust == "known") wrong = check_motor(mcu, claim, *report);
+  for (const bushd::api::MotorState& claim : state.motors) {
+    if (!wrong && claim.trust == bushd::api::Trust::kKnown)
+      wrong = check_motor(mcu, claim, *report);
   }
-  boot_seen_[mcu] = state.boot_number;
+  boot_seen_[mcu] = state.boot;
   return wrong;
 }
 
-std::optional<std::string> Positions::check_offline(const bushd::state_t& state) const {
-  for (const bushd::motor_state_t& claim : state.motors) {
-    if (claim.trust != "known") continue;
+std::optional<std::string> Positions::check_offline(const bushd::api::StateSnapshot& state) const {
+  for (const bushd::api::MotorState& claim : state.motors) {
+    if (claim.trust != bushd::api::Trust::kKnown) continue;
     const auto found = std::ranges::find(config_.motors, claim.name, &bushd::config::Motor::name);
     if (found == config_.motors.end()) return "a state of an unknown motor " + claim.name;
     const auto index = static_cast<std::size_t>(found - config_.motors.begin());
-    if (state.boot_number == 0) {
+    if (state.boot == 0) {
       return claim.name + " is said to be known, and its MCU has never been heard";
     }
     const auto& offset = motors_[index].offset;
     if (offset && plant_steps(index) - *offset == claim.position_steps) continue;
     return fmt::format("{} is said to be known to be at {} while {} is {}, and is not", claim.name,
-                       claim.position_steps, state.mcu, state.mcu_state);
+                       claim.position_steps, state.mcu, word(state.state));
   }
   return std::nullopt;
 }
@@ -179,7 +179,7 @@ bool Positions::agrees(Motor& motor, std::int64_t position_steps, std::int64_t p
 }
 
 std::optional<std::string> Positions::check_motor(std::size_t mcu,
-                                                  const bushd::motor_state_t& claim,
+                                                  const bushd::api::MotorState& claim,
                                                   const Report& report) {
   const auto found = std::ranges::find(config_.motors, claim.name, &bushd::config::Motor::name);
   if (found == config_.motors.end()) return "a state of an unknown motor " + claim.name;
@@ -201,7 +201,8 @@ std::optional<std::string> Positions::check_motor(std::size_t mcu,
                        claim.position_steps, report.tick, pulses - *motor.offset);
   }
   const std::int64_t stands = plant_steps(index);
-  if (claim.moving != 0 || claim.armed != 0 || stands - *motor.offset == claim.position_steps) {
+  if (claim.moving || claim.activity == bushd::api::Activity::kArmed ||
+      stands - *motor.offset == claim.position_steps) {
     return std::nullopt;
   }
   return fmt::format("{} is said to be at rest at {}, but stands at {}", claim.name,

@@ -29,7 +29,7 @@
 #include <string>
 #include <vector>
 
-#include "bushd/state_t.hpp"
+#include "api/snapshot.h"
 #include "config/config.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
@@ -68,7 +68,8 @@ class Positions {
   void pause(TimeNs now_ns, TimeNs until_ns);
 
   // What is wrong with what a state says, if something is.
-  std::optional<std::string> check(TimeNs now_ns, std::size_t mcu, const bushd::state_t& state);
+  std::optional<std::string> check(TimeNs now_ns, std::size_t mcu,
+                                   const bushd::api::StateSnapshot& state);
 
   // Where the motor stands, and what the daemon's positions are less than that; nothing while no
   // position of its is known.
@@ -103,9 +104,9 @@ class Positions {
   };
 
   TimeNs paused_by_ns(TimeNs now_ns) const;
-  std::optional<std::string> check_offline(const bushd::state_t& state) const;
+  std::optional<std::string> check_offline(const bushd::api::StateSnapshot& state) const;
   std::optional<std::string> check_age(TimeNs now_ns, std::size_t mcu, const Report& report);
-  std::optional<std::string> check_motor(std::size_t mcu, const bushd::motor_state_t& claim,
+  std::optional<std::string> check_motor(std::size_t mcu, const bushd::api::MotorState& claim,
                                          const Report& report);
   static bool agrees(Motor& motor, std::int64_t position_steps, std::int64_t pulses);
 

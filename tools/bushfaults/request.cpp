@@ -3,69 +3,117 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
-#include "bushd/command_t.hpp"
+#include <string_view>
 
 namespace bushfaults {
+namespace {
 
-using bushd::command_t;
+namespace api = bushd::api;
 
-static_assert(static_cast<int>(Ask::kMoveBy) == command_t::MOVE_RELATIVE);
-static_assert(static_cast<int>(Ask::kMoveTo) == command_t::MOVE_ABSOLUTE);
-static_assert(static_cast<int>(Ask::kStop) == command_t::STOP);
-static_assert(static_cast<int>(Ask::kEnable) == command_t::ENABLE);
-static_assert(static_cast<int>(Ask::kDisable) == command_t::DISABLE);
-static_assert(static_cast<int>(Ask::kSetPosition) == command_t::SET_POSITION);
-static_assert(static_cast<int>(Ask::kClearFaults) == command_t::CLEAR_FAULTS);
-static_assert(static_cast<int>(Ask::kEmergencyStop) == command_t::EMERGENCY_STOP);
-static_assert(static_cast<int>(Ask::kHome) == command_t::HOME);
-static_assert(static_cast<int>(Ask::kArm) == command_t::ARM);
-static_assert(static_cast<int>(Ask::kDisarm) == command_t::DISARM);
-
-void give(bushd::daemon::LcmShim& daemon, std::int64_t now_us, const Request& request) {
-  command_t command{};
-  command.client_id = request.client;
-  command.number = request.number;
-  command.kind = static_cast<std::int8_t>(request.ask);
-  command.motors = request.motors;
-  command.motor_count = static_cast<std::int32_t>(request.motors.size());
-  command.steps = request.steps;
-  if (request.ask == Ask::kArm) {
-    command.edge = request.rising ? command_t::RISING : command_t::FALLING;
-    command.delay_us = request.delay_us;
+std::vector<api::MotorSteps> motor_steps(const Request& request) {
+  std::vector<api::MotorSteps> all;
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    all.push_back({request.motors[i], request.steps[i]});
   }
-  daemon.command(now_us, command);
+  return all;
+}
+
+std::string_view word_of(const Request& request) {
+  switch (request.ask) {
+    case Ask::kMoveBy:
+      return "move by";
+    case Ask::kMoveTo:
+      return "move to";
+    case Ask::kArm:
+      return request.rising ? "arm (rising)" : "arm (falling)";
+    default:
+      return name_of(api_of(request));
+  }
+}
+
+std::string text_of(const bushd::lcm::RequestId& id) {
+  return fmt::format("{} {:04x} #{}", id.client_id.substr(0, 16), id.session & 0xFFFF, id.number);
+}
+
+}  // namespace
+
+api::Request api_of(const Request& request) {
+  switch (request.ask) {
+    case Ask::kMoveBy:
+      return api::Move{.kind = api::Move::Kind::kRelative, .motors = motor_steps(request)};
+    case Ask::kMoveTo:
+      return api::Move{.kind = api::Move::Kind::kAbsolute, .motors = motor_steps(request)};
+    case Ask::kStop:
+      return api::Stop{request.motors};
+    case Ask::kEnable:
+      return api::Enable{request.motors};
+    case Ask::kDisable:
+      return api::Disable{request.motors};
+    case Ask::kSetPosition:
+      return api::SetPosition{motor_steps(request)};
+    case Ask::kClearFaults:
+      return api::ClearFaults{request.motors};
+    case Ask::kEmergencyStop:
+      return api::EmergencyStop{};
+    case Ask::kHome:
+      return api::Home{request.motors};
+    case Ask::kArm:
+      return api::Arm{.edge = request.rising ? api::Edge::kRising : api::Edge::kFalling,
+                      .delay_us = request.delay_us,
+                      .motors = motor_steps(request)};
+    case Ask::kDisarm:
+      break;
+  }
+  return api::Disarm{request.motors};
+}
+
+bushd::lcm::Packet packet_of(std::int64_t utime_us, const Request& request) {
+  bushd::lcm::Packet packet = bushd::lcm::encode(utime_us, request.id(), api_of(request)).value();
+  switch (request.damage) {
+    case Damage::kNone:
+      break;
+    case Damage::kOtherType:
+      packet.payload.front() ^= 1;
+      break;
+    case Damage::kTruncated:
+      packet.payload.pop_back();
+      break;
+    case Damage::kTooLong:
+      packet.payload.push_back(0);
+      break;
+    case Damage::kOtherChannel:
+      packet.channel = "HELLO";
+      break;
+  }
+  return packet;
 }
 
 std::string text_of(const Request& request) {
-  const auto word = [&] {
-    switch (request.ask) {
-      case Ask::kMoveBy:
-        return "move by";
-      case Ask::kMoveTo:
-        return "move to";
-      case Ask::kStop:
-        return "stop";
-      case Ask::kEnable:
-        return "enable";
-      case Ask::kDisable:
-        return "disable";
-      case Ask::kSetPosition:
-        return "set position";
-      case Ask::kClearFaults:
-        return "clear faults";
-      case Ask::kEmergencyStop:
-        return "emergency stop";
-      case Ask::kHome:
-        return "home";
-      case Ask::kArm:
-        return request.rising ? "arm (rising)" : "arm (falling)";
-      case Ask::kDisarm:
-        return "disarm";
+  return fmt::format("{}: {} {} {}{}", text_of(request.id()), word_of(request),
+                     fmt::join(request.motors, ","), fmt::join(request.steps, ","),
+                     request.damage == Damage::kNone ? "" : " (broken)");
+}
+
+std::string text_of(const Key& key, const api::Reply& reply) {
+  const auto& [session, client, number] = key;
+  return text_of(bushd::lcm::ReplyMessage{
+      .id = {.session = session, .client_id = client, .number = number}, .reply = reply});
+}
+
+std::string text_of(const bushd::lcm::ReplyMessage& message) {
+  std::string text = "  " + text_of(message.id) + ": ";
+  if (const auto* refused = std::get_if<api::Refused>(&message.reply)) {
+    return text + "refused (" + refused->reason + ")";
+  }
+  const auto* completed = std::get_if<api::Completed>(&message.reply);
+  if (completed == nullptr) return text + "accepted";
+  text += fmt::format("{} ({})", word(completed->outcome), completed->reason);
+  if (const auto* motors = std::get_if<std::vector<api::MotorResult>>(&completed->detail)) {
+    for (const api::MotorResult& motor : *motors) {
+      text += fmt::format(" {} {} {}", motor.motor, word(motor.outcome), motor.position_steps);
     }
-    return "?";
-  };
-  return fmt::format("{} #{}: {} {} {}", request.client.substr(0, 16), request.number, word(),
-                     fmt::join(request.motors, ","), fmt::join(request.steps, ","));
+  }
+  return text;
 }
 
 }  // namespace bushfaults

@@ -50,7 +50,8 @@ void Skew::follow(TimeNs now_ns, std::size_t index) {
   }
   // While it is offline nobody keeps it in step, and nothing moves by its clock.
   if (const auto& state = witness_.states()[index]) {
-    mcu.online = state->mcu_state != "OFFLINE" && state->mcu_state != "BUSY";
+    using bushd::api::McuState;
+    mcu.online = state->state != McuState::kOffline && state->state != McuState::kBusy;
   }
   if (!of.running() || !mcu.online || (of.core().flags & BUSHD_FLAG_SYNCED) == 0) {
     mcu.in_step_since_ns.reset();

@@ -48,6 +48,9 @@ std::string summary_text(const World& world, double processor_s) {
   text += text_of<FaultKind>(world.faults());
   text += fmt::format("commands   {}\n", total(world.commands()));
   text += text_of<CommandKind>(world.commands());
+  const Promise& promise = world.witness().promise();
+  text += fmt::format("requests   {} carried out, {} answered again or refused by their session\n",
+                      promise.carried_out(), promise.not_carried_out());
   text += "moves      by result\n";
   for (const auto& [result, count] : world.witness().moves_by_result()) {
     text += fmt::format("           {:<17}{:>9}\n", result, count);
@@ -74,6 +77,8 @@ std::string summary_json(const World& world) {
       {"faults", json_of<FaultKind>(world.faults())},
       {"faults_total", total(world.faults())},
       {"commands", json_of<CommandKind>(world.commands())},
+      {"carried_out", world.witness().promise().carried_out()},
+      {"not_carried_out", world.witness().promise().not_carried_out()},
       {"moves", world.witness().moves_by_result()},
       {"homings", world.witness().homings_by_result()},
       {"steps_commanded", world.witness().steps_commanded()},

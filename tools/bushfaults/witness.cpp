@@ -10,9 +10,7 @@
 namespace bushfaults {
 namespace {
 
-using bushd::motor_state_t;
-using bushd::reply_t;
-using bushd::state_t;
+namespace api = bushd::api;
 
 // A move of the random clients lasts some seconds, the longest fault ten, and then a link is given
 // up within one.
@@ -20,21 +18,15 @@ constexpr bushd::sim::TimeNs kResultDueNs = 40'000'000'000;
 // A daemon may not have heard for as long that a switch bars the way, and a move may take as long
 // to its end.
 constexpr bushd::sim::TimeNs kBarredNs = kResultDueNs;
-// The daemon answers a command again while 64 newer ones of the client have come; here it is known
-// for longer, even if some of those have been overtaken.
-constexpr std::int64_t kNumbersAnswered = 64;
-constexpr std::int64_t kNumbersKept = 200;
+// Until no request waits to be carried out; daemons pause in between.
+constexpr bushd::sim::TimeNs kTurnDueNs = 15'000'000'000;
+// Of those that have ended; motors ask for no older ones.
+constexpr std::size_t kFinishedKept = 2000;
 
-bool same(const reply_t& a, const reply_t& b) {
-  return a.utime_us == b.utime_us && a.phase == b.phase && a.result == b.result &&
-         a.reason == b.reason && a.motors == b.motors && a.motor_results == b.motor_results &&
-         a.position_steps == b.position_steps;
-}
-
-std::string text_of(const reply_t& reply) {
-  return fmt::format("  {} #{}: {} ({}) {} {}", reply.client_id.substr(0, 16), reply.number,
-                     reply.phase == reply_t::ACCEPTED ? "accepted" : reply.result, reply.reason,
-                     fmt::join(reply.motor_results, ","), fmt::join(reply.position_steps, ","));
+std::vector<std::string> names_of(const std::vector<api::MotorResult>& motors) {
+  std::vector<std::string> names;
+  for (const api::MotorResult& motor : motors) names.push_back(motor.motor);
+  return names;
 }
 
 }  // namespace
@@ -68,11 +60,11 @@ Witness::Motor* Witness::find(const std::string& name) {
   return const_cast<Motor*>(std::as_const(*this).find(name));
 }
 
-void Witness::daemon_started(TimeNs) {
-  for (const auto& [key, asked] : asked_) forget(key, asked);
+void Witness::daemon_started(TimeNs now_ns) {
+  promise_.daemon_started();
+  none_waits_ns_ = now_ns;
   asked_.clear();
-  newest_.clear();
-  repeating_.reset();
+  finished_.clear();
   for (Motor& motor : motors_) motor.move.reset();
   std::fill(states_.begin(), states_.end(), std::nullopt);
   positions_.daemon_started();
@@ -82,63 +74,43 @@ void Witness::pressed(TimeNs now_ns, std::size_t motor) {
   motors_[motor].pressed_ns = now_ns;
 }
 
-void Witness::request(TimeNs now_ns, const Request& request) {
-  recent_.note(now_ns, text_of(request));
-  const Key key{request.client, request.number};
-  const auto [asked, fresh] = asked_.try_emplace(key);
-  repeating_.reset();
-  if (!fresh) {
-    repeating_ = key;
-    return;
-  }
-  asked->second.request = request;
-  std::int64_t& newest = newest_[request.client];
-  newest = std::max(newest, request.number);
-  const auto old = asked_.find({request.client, request.number - kNumbersKept});
-  if (old != asked_.end() && old->second.finished()) {
-    forget(old->first, old->second);
-    asked_.erase(old);
-  }
+void Witness::carried_out(TimeNs now_ns, const Request& request) {
+  asked_[key_of(request.id())] = Asked{.request = request, .since_ns = now_ns};
 }
 
-void Witness::forget(const Key& key, const Asked& asked) {
-  if (asked.accepted() && asked.request.counts_once()) carried_out_.insert(key);
-}
-
-void Witness::reply(TimeNs now_ns, const reply_t& reply) {
-  const auto found = asked_.find({reply.client_id, reply.number});
-  if (found == asked_.end())
-    return violated(now_ns, "a reply that nobody asked for:" + text_of(reply));
+void Witness::reply(TimeNs now_ns, const Key& key, const api::Reply& reply) {
+  if (const auto wrong = promise_.answered(key, reply)) return violated(now_ns, *wrong);
+  recent_.note(now_ns, text_of(key, reply));
+  const auto found = asked_.find(key);
+  if (found == asked_.end()) return;  // of a stop, long after another one with its number
   Asked& asked = found->second;
-  if (reply.reason.empty()) violated(now_ns, "a reply without a reason:" + text_of(reply));
-  const bool known = std::any_of(asked.replies.begin(), asked.replies.end(),
-                                 [&](const reply_t& before) { return same(before, reply); });
-  const bool repeating = repeating_ == found->first;
-  // A number from before the daemon's memory is refused whenever it comes.
-  const bool forgotten = newest_[reply.client_id] - reply.number >= kNumbersAnswered;
-  const bool too_old = !asked.replies.empty() && reply.phase == reply_t::REFUSED &&
-                       (asked.replies[0].phase == reply_t::REFUSED || forgotten);
-  if (repeating && (known || too_old)) return;
-  recent_.note(now_ns, text_of(reply));
-  const bool first = asked.replies.empty();
-  const bool in_order =
-      first ? reply.phase != reply_t::RESULT
-            : asked.replies.size() == 1 && asked.accepted() && reply.phase == reply_t::RESULT;
-  if (!in_order) return violated(now_ns, "one reply too many:" + text_of(reply));
-  asked.replies.push_back(reply);
-  if (reply.phase == reply_t::ACCEPTED) {
-    if (carried_out_.contains(found->first)) {
-      violated(now_ns, "carried out a second time: " + text_of(asked.request));
-    }
-    asked.accepted_ns = now_ns;
-    accepted(found->first, asked);
-  } else if (reply.phase == reply_t::RESULT) {
-    finished(now_ns, found->first, asked, reply);
-  } else if (asked.request.is_move()) {
-    ++moves_by_result_["refused"];
-  } else if (asked.request.ask == Ask::kHome) {
-    ++homings_by_result_["refused"];
+  if (std::holds_alternative<api::Accepted>(reply)) {
+    asked.accepted = true;
+    return accepted(key, asked);
   }
+  if (const auto* completed = std::get_if<api::Completed>(&reply)) {
+    if (completed->reason.empty()) violated(now_ns, "a result without a reason");
+    finished(now_ns, key, asked, *completed);
+  } else {
+    if (std::get<api::Refused>(reply).reason.empty()) {
+      violated(now_ns, "a refusal without a reason");
+    }
+    refused(asked);
+  }
+  asked.finished = true;
+  finished_.push_back(key);
+  forget_some();
+}
+
+void Witness::refused(const Asked& asked) {
+  if (asked.request.is_move()) ++moves_by_result_["refused"];
+  if (asked.request.ask == Ask::kHome) ++homings_by_result_["refused"];
+}
+
+void Witness::forget_some() {
+  if (finished_.size() <= kFinishedKept) return;
+  asked_.erase(finished_.front());
+  finished_.pop_front();
 }
 
 void Witness::accepted(const Key& key, Asked& asked) {
@@ -196,43 +168,47 @@ void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t>
   motor.target = target;
 }
 
-void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked, const reply_t& result) {
+void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
+                       const api::Completed& completed) {
   const Request& request = asked.request;
-  if (request.ask == Ask::kSetPosition && result.result == "done") {
+  if (request.ask == Ask::kSetPosition && completed.outcome == api::Outcome::kDone) {
     for (std::size_t i = 0; i < request.motors.size(); ++i) {
       positions_.was_set(index_of(*find(request.motors[i])), request.steps[i]);
     }
   }
-  if (request.ask == Ask::kHome) return homed(now_ns, asked, result);
-  if (!request.is_move()) return;
-  ++moves_by_result_[result.result];
-  if (result.motors != request.motors) {
-    return violated(now_ns, "a result of other motors:" + text_of(result));
+  const bool homes = request.ask == Ask::kHome;
+  if (!homes && !request.is_move()) return;
+  ++(homes ? homings_by_result_ : moves_by_result_)[std::string(word(completed.outcome))];
+  const auto* motors = std::get_if<Motors>(&completed.detail);
+  if (motors == nullptr || names_of(*motors) != request.motors) {
+    return violated(now_ns, "a result of other motors: " + text_of(request));
   }
-  for (std::size_t i = 0; i < result.motors.size(); ++i) {
+  if (homes) return homed(now_ns, *motors);
+  moved(now_ns, key, asked, *motors);
+}
+
+void Witness::moved(TimeNs now_ns, const Key& key, const Asked& asked, const Motors& motors) {
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const api::MotorResult& result = motors[i];
     const auto& end = asked.end[i];
-    if (request.ask == Ask::kArm && !asked.began[i]) {
+    if (asked.request.ask == Ask::kArm && !asked.began[i]) {
       // No line of the log tells how it ended, and it can have reached nothing.
-      Motor& motor = *find(result.motors[i]);
+      Motor& motor = *find(result.motor);
       if (motor.move == key) motor.move.reset();
-      if (result.motor_results[i] != "reached") continue;
+      if (result.outcome != api::Outcome::kReached) continue;
     }
-    if (end && end->agrees(result.motor_results[i], result.position_steps[i])) continue;
-    violated(now_ns, result.motors[i] + " ended otherwise than its result says:" + text_of(result));
+    if (end && end->agrees(result)) continue;
+    violated(now_ns, fmt::format("{} ended otherwise than its result says: {} at {}", result.motor,
+                                 word(result.outcome), result.position_steps));
   }
-  const auto wrong = starts_.check(request, asked.first_step_ns);
+  const auto wrong = starts_.check(asked.request, asked.first_step_ns);
   if (wrong) violated(now_ns, *wrong);
 }
 
-void Witness::homed(TimeNs now_ns, const Asked& asked, const reply_t& result) {
-  ++homings_by_result_[result.result];
-  if (result.motors != asked.request.motors) {
-    return violated(now_ns, "a result of other motors:" + text_of(result));
-  }
-  for (std::size_t i = 0; i < result.motors.size(); ++i) {
-    if (result.motor_results[i] != "reached") continue;
-    const auto wrong =
-        positions_.was_homed(index_of(*find(result.motors[i])), result.position_steps[i]);
+void Witness::homed(TimeNs now_ns, const Motors& motors) {
+  for (const api::MotorResult& result : motors) {
+    if (result.outcome != api::Outcome::kReached) continue;
+    const auto wrong = positions_.was_homed(index_of(*find(result.motor)), result.position_steps);
     if (wrong) violated(now_ns, *wrong);
   }
 }
@@ -289,12 +265,12 @@ void Witness::check_end(TimeNs now_ns, const Motor& motor, const End& end,
   }
 }
 
-void Witness::state(TimeNs now_ns, const state_t& state) {
-  std::size_t mcu = 0;
-  while (mcu < config_.mcus.size() && config_.mcus[mcu].id != state.mcu) ++mcu;
-  if (mcu == config_.mcus.size()) return violated(now_ns, "a state of an unknown MCU " + state.mcu);
-  if (!states_[mcu] || states_[mcu]->mcu_state != state.mcu_state) {
-    recent_.note(now_ns, fmt::format("{} {} {}", state.mcu, state.mcu_state, state.detail));
+void Witness::state(TimeNs now_ns, std::size_t mcu, const api::StateSnapshot& state) {
+  if (config_.mcus[mcu].id != state.mcu) {
+    return violated(now_ns, "a state of another MCU: " + state.mcu);
+  }
+  if (!states_[mcu] || states_[mcu]->state != state.state) {
+    recent_.note(now_ns, fmt::format("{} {} {}", state.mcu, word(state.state), state.detail));
   }
   states_[mcu] = state;
   if (const auto wrong = positions_.check(now_ns, mcu, state)) violated(now_ns, *wrong);
@@ -302,19 +278,18 @@ void Witness::state(TimeNs now_ns, const state_t& state) {
 
 void Witness::check_deadlines(TimeNs now_ns) {
   for (const auto& [key, asked] : asked_) {
-    if (asked.replies.empty() && key.first.size() <= 64 && !key.first.empty()) {
-      violated(now_ns, "no reply to " + text_of(asked.request));
-    } else if (asked.accepted() && !asked.finished() && !asked.request.may_wait() &&
-               now_ns - asked.accepted_ns > kResultDueNs) {
-      violated(now_ns,
-               fmt::format("no result {} s after it was accepted: {}",
-                           (now_ns - asked.accepted_ns) / 1'000'000'000, text_of(asked.request)));
+    if (asked.finished || asked.request.may_wait() || now_ns - asked.since_ns <= kResultDueNs) {
+      continue;
     }
+    violated(now_ns, fmt::format("no {} after {} s: {}", asked.accepted ? "result" : "reply",
+                                 kResultDueNs / 1'000'000'000, text_of(asked.request)));
   }
+  if (!promise_.waits()) none_waits_ns_ = now_ns;
+  if (now_ns - none_waits_ns_ > kTurnDueNs) violated(now_ns, "requests wait for their turn");
 }
 
 bool Witness::ready(std::size_t mcu) const {
-  return !present_[mcu] || (states_[mcu] && states_[mcu]->mcu_state == "READY");
+  return !present_[mcu] || (states_[mcu] && states_[mcu]->state == api::McuState::kReady);
 }
 
 bool Witness::all_ready() const {
@@ -330,24 +305,24 @@ std::string Witness::not_ready() const {
     if (ready(i)) continue;
     text += text.empty() ? "" : ", ";
     text += config_.mcus[i].id + " is ";
-    text += states_[i] ? states_[i]->mcu_state + " " + states_[i]->detail : "unknown";
+    text +=
+        states_[i] ? std::string(word(states_[i]->state)) + " " + states_[i]->detail : "unknown";
   }
   return text;
 }
 
 bool Witness::commands_open() const {
-  return std::any_of(asked_.begin(), asked_.end(), [](const auto& entry) {
-    return entry.second.accepted() && !entry.second.finished();
-  });
+  return promise_.waits() || std::any_of(asked_.begin(), asked_.end(),
+                                         [](const auto& entry) { return !entry.second.finished; });
 }
 
 std::uint64_t Witness::steps_unaccounted() const {
   std::uint64_t steps = 0;
   for (const auto& state : states_) {
     if (!state) continue;
-    for (const motor_state_t& claim : state->motors) {
+    for (const api::MotorState& claim : state->motors) {
       const Motor& motor = *find(claim.name);
-      if (!offset(motor) || claim.trust != "known" || claim.moving) continue;
+      if (!offset(motor) || claim.trust != api::Trust::kKnown || claim.moving) continue;
       steps += static_cast<std::uint64_t>(
           std::abs(plant_steps(motor) - *offset(motor) - claim.position_steps));
     }

@@ -4,17 +4,17 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "bushd/reply_t.hpp"
-#include "bushd/state_t.hpp"
+#include "api/snapshot.h"
 #include "config/config.h"
 #include "positions.h"
+#include "promise.h"
 #include "recent.h"
 #include "request.h"
 #include "sim/bus.h"
@@ -42,23 +42,25 @@ class Witness {
   void daemon_started(TimeNs now_ns);  // what clients had asked of the one before is void
   // Its limit switch is, or was until now, active.
   void pressed(TimeNs now_ns, std::size_t motor);
-  // Before the daemon gets it; after that come the replies that it makes at once.
-  void request(TimeNs now_ns, const Request& request);
-  void reply(TimeNs now_ns, const bushd::reply_t& reply);
-  void state(TimeNs now_ns, const bushd::state_t& state);
+  // Before the core gets it; after that come the replies that it makes at once.
+  void carried_out(TimeNs now_ns, const Request& request);
+  void reply(TimeNs now_ns, const Key& key, const bushd::api::Reply& reply);
+  void state(TimeNs now_ns, std::size_t mcu, const bushd::api::StateSnapshot& state);
   // A line of the log of moves: there each motor of a group ends by itself.
   void move_log(TimeNs now_ns, const std::string& json_line);
   // Accepted commands that should have had their result by now.
   void check_deadlines(TimeNs now_ns);
 
   // As the daemon said last, by MCU; empty before it has said anything in this life.
-  const std::vector<std::optional<bushd::state_t>>& states() const { return states_; }
+  const std::vector<std::optional<bushd::api::StateSnapshot>>& states() const { return states_; }
   // Whether it can be READY at all.
   void expect(std::size_t mcu, bool present) { present_[mcu] = present; }
   bool all_ready() const;
   std::string not_ready() const;  // which MCUs, and why
   bool commands_open() const;
 
+  Promise& promise() { return promise_; }
+  const Promise& promise() const { return promise_; }
   Starts& starts() { return starts_; }
   Positions& positions() { return positions_; }
   const Positions& positions() const { return positions_; }
@@ -71,13 +73,14 @@ class Witness {
   std::uint64_t steps_unaccounted() const;
 
  private:
-  using Key = std::pair<std::string, std::int64_t>;  // client and number of a command
+  using Motors = std::vector<bushd::api::MotorResult>;
   struct End {
     std::string word;  // of the result
     std::int64_t position_steps;
     bool moves_on = false;  // by another move; then nobody knows where exactly that began
-    bool agrees(const std::string& result, std::int64_t steps) const {
-      return word == result && (moves_on || position_steps == steps);
+    bool agrees(const bushd::api::MotorResult& result) const {
+      return word == bushd::api::word(result.outcome) &&
+             (moves_on || position_steps == result.position_steps);
     }
   };
   struct Motor {
@@ -90,23 +93,21 @@ class Witness {
     std::optional<std::int64_t> target;
   };
   struct Asked {
-    Request request;
-    std::vector<bushd::reply_t> replies;
-    TimeNs accepted_ns = 0;
+    Request request{};
+    TimeNs since_ns = 0;
+    bool accepted = false;
+    bool finished = false;  // refused, or its result has come
     // Of moves, by motor: where the plant stood (nothing if it moved) and must stand in the end,
     // how it ended, and when it made its first step, if it began at rest, did and ended as planned.
-    std::vector<std::optional<std::int64_t>> from;
-    std::vector<std::optional<std::int64_t>> target;
-    std::vector<std::optional<End>> end;
-    std::vector<std::optional<TimeNs>> first_step_ns;
-    std::vector<bool> began;  // one that waits for the trigger may not
+    std::vector<std::optional<std::int64_t>> from{};
+    std::vector<std::optional<std::int64_t>> target{};
+    std::vector<std::optional<End>> end{};
+    std::vector<std::optional<TimeNs>> first_step_ns{};
+    std::vector<bool> began{};  // one that waits for the trigger may not
     std::size_t index_of(const std::string& motor) const {
       const auto& all = request.motors;
       return static_cast<std::size_t>(std::find(all.begin(), all.end(), motor) - all.begin());
     }
-    bool accepted() const { return !replies.empty() && replies[0].phase == reply_accepted(); }
-    bool finished() const { return replies.size() == (accepted() ? 2u : 1u); }
-    static std::int8_t reply_accepted() { return bushd::reply_t::ACCEPTED; }
   };
 
   const Motor* find(const std::string& name) const;
@@ -122,9 +123,12 @@ class Witness {
     return positions_.offset(index_of(motor));
   }
   void accepted(const Key& key, Asked& asked);
-  void finished(TimeNs now_ns, const Key& key, const Asked& asked, const bushd::reply_t& result);
-  void homed(TimeNs now_ns, const Asked& asked, const bushd::reply_t& result);
-  void forget(const Key& key, const Asked& asked);
+  void refused(const Asked& asked);
+  void finished(TimeNs now_ns, const Key& key, const Asked& asked,
+                const bushd::api::Completed& result);
+  void moved(TimeNs now_ns, const Key& key, const Asked& asked, const Motors& motors);
+  void homed(TimeNs now_ns, const Motors& motors);
+  void forget_some();
   void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void check_end(TimeNs now_ns, const Motor& motor, const End& end,
@@ -138,12 +142,11 @@ class Witness {
   std::optional<Violation> violation_;
   std::vector<Motor> motors_;
   std::map<std::string, std::size_t> motor_by_name_;
+  Promise promise_;
+  TimeNs none_waits_ns_ = 0;  // when nothing waited for its turn
   std::map<Key, Asked> asked_;
-  std::map<std::string, std::int64_t> newest_;  // number by client
-  // Of those that are forgotten, which were accepted; by whichever daemon.
-  std::set<Key> carried_out_;
-  std::optional<Key> repeating_;  // the command being given was given before
-  std::vector<std::optional<bushd::state_t>> states_;
+  std::deque<Key> finished_;  // of asked_, oldest first
+  std::vector<std::optional<bushd::api::StateSnapshot>> states_;
   std::vector<bool> present_;  // by MCU
   bool ready(std::size_t mcu) const;
   std::map<std::string, std::uint64_t> moves_by_result_;

@@ -42,8 +42,8 @@ World::World(const Options& options, bushd::config::Config config)
       witness_(config_, bus_, plant_, recent_),
       skew_(config_, bus_, witness_),
       clients_(config_, witness_, options.command_rates, options.seed),
-      host_(config_, bus_, witness_, clients_, recent_, options.seed),
-      mail_(clients_, host_) {
+      host_(config_, bus_, witness_, recent_, options.seed),
+      mail_(clients_, host_, options.seed) {
   add_mcus();
   add_motors();
   witness_.positions().be_strict(options.strict_known);
@@ -112,7 +112,11 @@ void World::spell_of_trouble(TimeNs until_ns) {
       *next = now_ns_ + chance_[kind].wait(static_cast<double>(kHour) / options_.fault_rates[kind]);
     }
     if (now_ns_ >= next_command_ns_) {
-      mail_.send(now_ns_, clients_.next());
+      if (const auto request = clients_.next()) {
+        mail_.send(now_ns_, *request);
+      } else {
+        mail_.send_again();
+      }
       next_command_ns_ = clients_.next_after(now_ns_);
     }
     if (now_ns_ - deadlines_checked_ns_ >= kSecond) {
@@ -127,7 +131,7 @@ void World::calm() {
   run_until(std::max(
       {now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(), mail_.quiet_ns()}));
   const TimeNs began_ns = now_ns_;
-  host_.request(now_ns_, clients_.stop_all());
+  mail_.send(now_ns_, clients_.stop_all());
   be_well(began_ns);
   if (witness_.violation()) return;
   run_until(now_ns_ + kSecond);
@@ -148,7 +152,7 @@ void World::be_well(TimeNs began_ns) {
   while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
     run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
     // What a client has switched off or stopped only a client sets going again.
-    host_.request(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
+    mail_.send(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
   }
   if (ready() || witness_.violation()) return;
   witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready());
@@ -218,10 +222,18 @@ void World::strike(FaultKind kind) {
       return note_fault(kind, inputs_->trigger(now_ns_, random));
     case FaultKind::kSlowRequest:
       return note_fault(kind, mail_.delay_next(random));
+    case FaultKind::kLostRequest:
+      return note_fault(kind, mail_.lose_next(random));
+    case FaultKind::kLostAnswer:
+      return note_fault(kind, mail_.lose_answers(random));
+    case FaultKind::kNumberLeap:
+      return note_fault(kind, mail_.leap_next(random));
+    case FaultKind::kNumberReuse:
+      return note_fault(kind, mail_.reuse_next(random));
     case FaultKind::kLateRepeat:
-      return note_fault(kind, mail_.repeat(now_ns_, random));
+      return note_fault(kind, mail_.repeat(random));
     case FaultKind::kStaleRepeat:
-      return note_fault(kind, mail_.repeat_stale(now_ns_, random));
+      return note_fault(kind, mail_.repeat_stale(random));
     case FaultKind::kFlood:
       return note_fault(kind, mail_.flood(now_ns_, random, 200));
     case FaultKind::kCrowd:

@@ -1,0 +1,68 @@
+// Bytes on the line for each step of a move, by the way it is sent: what the daemon's core hands
+// over for it, the delimiters that take the line included, polls and SYNCs not. The shipped table
+// bushd2-constant, ticks of 2.56 ms, one motor on a line that loses nothing.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "daemon/lab.h"
+#include "daemon/motion_frames.h"
+
+namespace bushd::test {
+namespace {
+
+struct Way {
+  const char* name;
+  const char* manner;
+  std::int64_t steps;
+  double goal;                   // bytes a step; 0: none
+  std::int64_t most_frames = 0;  // 0: as many as it takes
+};
+
+constexpr Way kWays[] = {
+    {.name = "TABLE_RUN", .manner = "fine_table", .steps = 200, .goal = 0.2, .most_frames = 1},
+    {.name = "TABLE_TICKS", .manner = "fine", .steps = 200, .goal = 0.25, .most_frames = 1},
+    {.name = "TICKS coarse", .manner = "coarse_ticks", .steps = 200, .goal = 0},
+    {.name = "TICKS fine", .manner = "fine_ticks", .steps = 200, .goal = 0},
+    {.name = "TABLE_RUN", .manner = "fine_table", .steps = 20000, .goal = 0.01, .most_frames = 1},
+    {.name = "TABLE_TICKS", .manner = "fine", .steps = 20000, .goal = 0.03},
+    {.name = "TICKS coarse", .manner = "coarse_ticks", .steps = 20000, .goal = 0},
+    {.name = "TICKS fine", .manner = "fine_ticks", .steps = 20000, .goal = 0},
+};
+
+MotionFrames sent_for(const Way& way) {
+  Lab lab(hall(1, 1, way.manner));
+  lab.connect();
+  MotionFrames sent;
+  lab.on_send = [&sent](std::size_t, const std::vector<std::uint8_t>& bytes) {
+    sent.add(bytes);
+    return true;
+  };
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {way.steps})).result, "reached");
+  return sent;
+}
+
+TEST(Bytes, PerStepKeepTheirGoals) {
+  std::printf("%-12s %8s %8s %8s %12s %8s\n", "way", "steps", "frames", "bytes", "bytes/step",
+              "goal");
+  for (const Way& way : kWays) {
+    SCOPED_TRACE(way.name);
+    const MotionFrames sent = sent_for(way);
+    const std::int64_t bytes = sent.bytes + sent.delimiters;
+    const double cost = static_cast<double>(bytes) / static_cast<double>(way.steps);
+    std::printf("%-12s %8lld %8lld %8lld %12.4f", way.name, static_cast<long long>(way.steps),
+                static_cast<long long>(sent.frames), static_cast<long long>(bytes), cost);
+    if (way.goal == 0) {
+      std::printf("\n");
+      continue;
+    }
+    std::printf(" %8.2f\n", way.goal);
+    EXPECT_LE(cost, way.goal);
+    if (way.most_frames != 0) {
+      EXPECT_LE(sent.frames, way.most_frames);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bushd::test
