@@ -28,7 +28,7 @@ struct MotorResult {
   std::int64_t position_steps = 0;  // where its MCU says that it stands
   double user = 0;                  // the same for people (units/coordinates.h)
   double dial = 0;
-  std::string unit{};
+  std::string unit = "steps";
   int precision = 0;  // decimals of both
   TableRef table{};   // by which it has moved
 };

@@ -129,7 +129,7 @@ api::Reply result(const api::Request& request, api::Outcome outcome) {
       .outcome = outcome, .reason = std::string(word(outcome)) + " for a reason", .detail = {}};
   if (const auto* move = std::get_if<api::Move>(&request)) {
     std::vector<api::MotorResult> motors;
-    for (const api::MotorSteps& motor : move->motors) {
+    for (const api::MotorAmount& motor : move->motors) {
       motors.push_back({.motor = motor.motor,
                         .outcome = outcome,
                         .position_steps = 7,
