@@ -19,9 +19,6 @@ constexpr Layout kMotorAmount{"sbld"};
 constexpr Layout kMotorDescription{"shstsssbdbbdddd", {&kTableRef}};
 constexpr Layout kMcuHealth{"sisiisillllllliddb"};
 
-// Of the daemon's inside, until it does without.
-constexpr Layout kMotorState{"ssthlldbsbbbss", {&kTableRef}};
-
 }  // namespace
 
 #define BUSHD_LAYOUT(type, ...)                   \
@@ -59,12 +56,6 @@ BUSHD_LAYOUT(table_answer_t, "tnTnT", {&kReplyHeader, &kTableEntry, &kTable})
 BUSHD_LAYOUT(mcu_state_t, "llliisssssillnT", {&kMotor})
 BUSHD_LAYOUT(mcu_description_t, "llliissilsnT", {&kMotorDescription})
 BUSHD_LAYOUT(health_t, "lliissblllnLLnT", {&kMcuHealth})
-
-BUSHD_LAYOUT(command_t, "lslbssbbbiinSL")
-BUSHD_LAYOUT(reply_t, "lslbssnSSLHnTnT", {&kTableRef, &kMovePlan})
-BUSHD_LAYOUT(state_t, "lliississsillnT", {&kMotorState})
-BUSHD_LAYOUT(table_request_t, "lslbssnT", {&kTable})
-BUSHD_LAYOUT(table_reply_t, "lslbsnTnT", {&kTableEntry, &kTable})
 
 #undef BUSHD_LAYOUT
 

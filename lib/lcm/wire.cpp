@@ -137,7 +137,6 @@ bool counts_match(const T& message) {
   BUSHD_COUNTED(motor_count, dial_positions);
   BUSHD_COUNTED(motor_count, units);
   BUSHD_COUNTED(motor_count, precisions);
-  BUSHD_COUNTED(motor_count, motor_results);
   BUSHD_COUNTED(motor_count, table_of_motor);
   BUSHD_COUNTED(motor_count, motor_duration_us);
   BUSHD_COUNTED(motor_count, peak_steps_per_s);
@@ -203,7 +202,6 @@ std::optional<T> decode(std::span<const std::uint8_t> payload) {
 BUSHD_TRAVELS(answer_t)
 BUSHD_TRAVELS(arm_t)
 BUSHD_TRAVELS(clear_faults_t)
-BUSHD_TRAVELS(command_t)
 BUSHD_TRAVELS(disable_t)
 BUSHD_TRAVELS(disarm_t)
 BUSHD_TRAVELS(emergency_stop_t)
@@ -219,15 +217,11 @@ BUSHD_TRAVELS(mcu_state_t)
 BUSHD_TRAVELS(move_t)
 BUSHD_TRAVELS(position_compare_t)
 BUSHD_TRAVELS(reload_tables_t)
-BUSHD_TRAVELS(reply_t)
 BUSHD_TRAVELS(set_position_t)
 BUSHD_TRAVELS(set_table_t)
-BUSHD_TRAVELS(state_t)
 BUSHD_TRAVELS(stop_t)
 BUSHD_TRAVELS(subscribe_t)
 BUSHD_TRAVELS(table_answer_t)
-BUSHD_TRAVELS(table_reply_t)
-BUSHD_TRAVELS(table_request_t)
 BUSHD_TRAVELS(use_table_t)
 BUSHD_TRAVELS(welcome_t)
 

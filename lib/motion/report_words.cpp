@@ -96,11 +96,4 @@ bool forbids(const bushd_report& report, unsigned output, int direction) {
   return (mask >> output & 1) != 0;
 }
 
-std::string forbidden_word(const bushd_report& report, unsigned output) {
-  const bool positive = forbids(report, output, 1);
-  const bool negative = forbids(report, output, -1);
-  if (positive) return negative ? "both" : "positive";
-  return negative ? "negative" : "";
-}
-
 }  // namespace bushd::motion

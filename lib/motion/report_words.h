@@ -12,9 +12,8 @@ std::string fault_text(const bushd_report& report);
 // Why motors came to rest: an end to "because ".
 std::string stop_cause(const bushd_report& report);
 std::string reset_cause_word(std::uint8_t cause);      // as in mcu_health_t
-std::string system_inputs_words(std::uint8_t inputs);  // as in state_t
+std::string system_inputs_words(std::uint8_t inputs);  // as in mcu_state_t
 // Whether a limit switch bars the direction (+1, -1) of the motor at this output.
 bool forbids(const bushd_report& report, unsigned output, int direction);
-std::string forbidden_word(const bushd_report& report, unsigned output);  // as in motor_state_t
 
 }  // namespace bushd::motion

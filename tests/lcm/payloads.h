@@ -6,6 +6,8 @@
 
 #include "lcm/layout.h"
 #include "lcm/messages.h"
+#include "lcm/types.h"
+#include "lcm/wire.h"
 
 namespace bushd::test {
 
@@ -66,5 +68,10 @@ class PayloadMaker {
   Random& random_;
   std::vector<std::uint8_t> bytes_;
 };
+
+template <class T>
+T random_message(Random& random) {
+  return lcm::decode<T>(PayloadMaker(random).make<T>()).value();
+}
 
 }  // namespace bushd::test

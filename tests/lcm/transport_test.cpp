@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "lcm/messages.h"
+#include "lcm/payloads.h"
 
 namespace bushd::lcm {
 namespace {
@@ -21,18 +21,18 @@ bool readable(const Transport& transport) {
   return poll(&polled, 1, 0) == 1;
 }
 
-command_t numbered(std::int64_t number) {
-  command_t command{};
-  command.number = number;
-  return command;
+stop_t numbered(std::int64_t number) {
+  stop_t stop{};
+  stop.request.number = number;
+  return stop;
 }
 
 TEST(Transport, DeliversWhatWasPublishedInItsOrder) {
   const auto transport = in_process();
   std::vector<std::int64_t> heard;
-  ASSERT_TRUE(transport->subscribe<command_t>(
-      "BUSHD_COMMAND", [&](const command_t& command) { heard.push_back(command.number); }));
-  for (int i = 1; i <= 100; ++i) ASSERT_TRUE(transport->publish("BUSHD_COMMAND", numbered(i)));
+  ASSERT_TRUE(transport->subscribe<stop_t>(
+      "BUSHD_STOP", [&](const stop_t& stop) { heard.push_back(stop.request.number); }));
+  for (int i = 1; i <= 100; ++i) ASSERT_TRUE(transport->publish("BUSHD_STOP", numbered(i)));
   EXPECT_TRUE(readable(*transport));
   transport->handle();
   EXPECT_FALSE(readable(*transport));
@@ -48,9 +48,9 @@ TEST(Transport, AFloodDoesNotKeepTheCaller) {
   const auto transport = in_process();
   int heard = 0;
   // Every message makes another one.
-  ASSERT_TRUE(transport->subscribe<command_t>("C", [&](const command_t& command) {
+  ASSERT_TRUE(transport->subscribe<stop_t>("C", [&](const stop_t& stop) {
     ++heard;
-    EXPECT_TRUE(transport->publish("C", command));
+    EXPECT_TRUE(transport->publish("C", stop));
   }));
   ASSERT_TRUE(transport->publish("C", numbered(1)));
   transport->handle();
@@ -61,10 +61,9 @@ TEST(Transport, AFloodDoesNotKeepTheCaller) {
 TEST(Transport, ChannelsAreNamesAndNotPatterns) {
   const auto transport = in_process();
   int heard = 0;
-  ASSERT_TRUE(
-      transport->subscribe<command_t>("LAB.2+(x)_COMMAND", [&](const command_t&) { ++heard; }));
-  ASSERT_TRUE(transport->publish("LABx2+(x)_COMMAND", numbered(1)));
-  ASSERT_TRUE(transport->publish("LAB.2+(x)_COMMAND", numbered(1)));
+  ASSERT_TRUE(transport->subscribe<stop_t>("LAB.2+(x)_STOP", [&](const stop_t&) { ++heard; }));
+  ASSERT_TRUE(transport->publish("LABx2+(x)_STOP", numbered(1)));
+  ASSERT_TRUE(transport->publish("LAB.2+(x)_STOP", numbered(1)));
   transport->handle();
   EXPECT_EQ(heard, 1);
 }
@@ -74,15 +73,15 @@ TEST(Transport, RefusesChannelNamesThatLcmCannotSend) {
   const std::string longest(63, 'x');
   EXPECT_TRUE(transport->publish(longest, numbered(1)));
   EXPECT_FALSE(transport->publish(longest + "x", numbered(1)));
-  EXPECT_FALSE(transport->subscribe<command_t>("", [](const command_t&) {}));
+  EXPECT_FALSE(transport->subscribe<stop_t>("", [](const stop_t&) {}));
 }
 
 TEST(Transport, AnExceptionOfAHandlerComesOutAndTheNextMessagesStillArrive) {
   const auto transport = in_process();
   std::int64_t last = 0;
-  ASSERT_TRUE(transport->subscribe<command_t>("C", [&](const command_t& command) {
-    if (command.number == 1) throw std::runtime_error("handler");
-    last = command.number;
+  ASSERT_TRUE(transport->subscribe<stop_t>("C", [&](const stop_t& stop) {
+    if (stop.request.number == 1) throw std::runtime_error("handler");
+    last = stop.request.number;
   }));
   ASSERT_TRUE(transport->publish("C", numbered(1)));
   ASSERT_TRUE(transport->publish("C", numbered(2)));
@@ -133,14 +132,14 @@ void expect_survives_hostile_payloads() {
   EXPECT_GT(hostile, 1000u);
 }
 
-TEST(Transport, HostileCommandsAreCountedAndValidOnesArrive) {
-  expect_survives_hostile_payloads<command_t>();
+TEST(Transport, HostileMovesAreCountedAndValidOnesArrive) {
+  expect_survives_hostile_payloads<move_t>();
 }
-TEST(Transport, HostileRepliesAreCountedAndValidOnesArrive) {
-  expect_survives_hostile_payloads<reply_t>();
+TEST(Transport, HostileAnswersAreCountedAndValidOnesArrive) {
+  expect_survives_hostile_payloads<answer_t>();
 }
 TEST(Transport, HostileStatesAreCountedAndValidOnesArrive) {
-  expect_survives_hostile_payloads<state_t>();
+  expect_survives_hostile_payloads<mcu_state_t>();
 }
 
 TEST(Transport, AnUnusableUrlIsNamedTogetherWithTheRemedy) {

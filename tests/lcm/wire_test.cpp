@@ -64,10 +64,9 @@ class Wire : public testing::Test {
 
 // Of those of the same layout, one.
 using Types =
-    testing::Types<answer_t, arm_t, command_t, emergency_stop_t, get_table_t, health_t, hello_t,
-                   mcu_description_t, mcu_state_t, move_t, position_compare_t, reply_t,
-                   set_position_t, set_table_t, state_t, stop_t, subscribe_t, table_answer_t,
-                   table_reply_t, table_request_t, use_table_t, welcome_t>;
+    testing::Types<answer_t, arm_t, emergency_stop_t, get_table_t, health_t, hello_t,
+                   mcu_description_t, mcu_state_t, move_t, position_compare_t, set_position_t,
+                   set_table_t, stop_t, subscribe_t, table_answer_t, use_table_t, welcome_t>;
 
 class TypeNames {
  public:
@@ -156,39 +155,38 @@ TYPED_TEST(Wire, NoiseBehindTheFingerprintIsRejectedOrAnotherValidMessage) {
 
 TEST(Encode, RefusesCountsThatAreNotThoseOfTheArrays) {
   test::Random random(kSeed);
-  auto command = test::random_message<command_t>(random);
-  ++command.motor_count;
-  EXPECT_FALSE(encode(command));
-  command.motor_count = -1;
-  EXPECT_FALSE(encode(command));
-  auto reply = test::random_message<reply_t>(random);
-  reply.motor_results.emplace_back();
-  EXPECT_FALSE(encode(reply));
+  auto move = test::random_message<move_t>(random);
+  ++move.motor_count;
+  EXPECT_FALSE(encode(move));
+  move.motor_count = -1;
+  EXPECT_FALSE(encode(move));
+  auto answer = test::random_message<answer_t>(random);
+  answer.outcomes.emplace_back();
+  EXPECT_FALSE(encode(answer));
   auto health = test::random_message<health_t>(random);
   health.latency_below_us.emplace_back();
   EXPECT_FALSE(encode(health));
 }
 
 TEST(Encode, RefusesCountsWithin) {
-  table_request_t request{};
-  request.content.emplace_back();
-  request.content[0] = table_t{};
-  request.content_count = 1;
-  EXPECT_TRUE(encode(request));
-  request.content[0].accel_count = 1;
-  EXPECT_FALSE(encode(request));
-  reply_t reply{};
-  reply.plan.push_back(move_plan_t{});
-  reply.plan_count = 1;
-  EXPECT_TRUE(encode(reply));
-  reply.plan[0].motor_count = 1;
-  EXPECT_FALSE(encode(reply));
+  table_answer_t tables{};
+  tables.tables.push_back(table_t{});
+  tables.table_count = 1;
+  EXPECT_TRUE(encode(tables));
+  tables.tables[0].accel_count = 1;
+  EXPECT_FALSE(encode(tables));
+  answer_t answer{};
+  answer.plan.push_back(move_plan_t{});
+  answer.plan_count = 1;
+  EXPECT_TRUE(encode(answer));
+  answer.plan[0].motor_count = 1;
+  EXPECT_FALSE(encode(answer));
 }
 
 TEST(Encode, RefusesTextsWithANul) {
-  command_t command{};
-  command.client_id = std::string("a\0b", 3);
-  const auto bytes = encode(command);
+  move_t move{};
+  move.request.client_id = std::string("a\0b", 3);
+  const auto bytes = encode(move);
   ASSERT_FALSE(bytes);
   EXPECT_NE(bytes.error().text().find("NUL"), std::string::npos);
 }
@@ -207,28 +205,28 @@ TEST(Size, HealthOfABusWithEveryAddressFitsOneDatagram) {
   EXPECT_TRUE(encode(test::health_part(1, 0, 1, 255, std::string(63, 'x'))));
 }
 
-TEST(Size, CommandAndReplyFor512MotorsFitOneDatagram) {
-  command_t command{};
-  reply_t reply{};
+TEST(Size, MoveAndAnswerFor512MotorsFitOneDatagram) {
+  move_t move{};
+  answer_t answer{};
   for (int i = 0; i < 512; ++i) {
-    command.motors.emplace_back(63, 'x');
-    command.steps.push_back(i);
-    reply.motors.emplace_back(63, 'x');
-    reply.motor_results.emplace_back("reached");
-    reply.position_steps.push_back(i);
-    reply.table_of_motor.push_back(static_cast<std::int16_t>(i % 100));
+    move.motors.emplace_back(63, 'x');
+    move.steps.push_back(i);
+    answer.motors.emplace_back(63, 'x');
+    answer.outcomes.emplace_back("reached");
+    answer.position_steps.push_back(i);
+    answer.table_of_motor.push_back(static_cast<std::int16_t>(i % 100));
   }
   for (int i = 0; i < 100; ++i) {
     table_ref_t table{};
     table.name = std::string(63, 'x');
     table.hash = "01234567";
-    reply.tables.push_back(table);
+    answer.tables.push_back(table);
   }
-  command.motor_count = 512;
-  reply.motor_count = 512;
-  reply.table_count = 100;
-  EXPECT_TRUE(encode(command));
-  EXPECT_TRUE(encode(reply));
+  move.motor_count = 512;
+  answer.motor_count = 512;
+  answer.table_count = 100;
+  EXPECT_TRUE(encode(move));
+  EXPECT_TRUE(encode(answer));
 }
 
 }  // namespace

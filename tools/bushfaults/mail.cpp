@@ -215,6 +215,13 @@ void Mail::run(TimeNs now_ns) {
   repeat_open(now_ns);
 }
 
+void Mail::settle() {
+  lose_ = 0;
+  lose_answers_ = 0;
+  open_.clear();
+  for (auto& [name, client] : by_name_) client.waiting.clear();
+}
+
 TimeNs Mail::quiet_ns() const {
   TimeNs latest_ns = 0;
   for (const Letter& letter : letters_) latest_ns = std::max(latest_ns, letter.due_ns);

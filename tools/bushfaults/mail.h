@@ -43,6 +43,8 @@ class Mail {
   std::string flood(TimeNs now_ns, bushd::sim::Random& random, std::int64_t clients);
 
   void run(TimeNs now_ns);
+  // Clients give up what is not answered, and nothing is lost any more.
+  void settle();
   // When all that is under way has come.
   TimeNs quiet_ns() const;
 

@@ -130,6 +130,7 @@ void World::calm() {
   if (witness_.violation()) return;
   run_until(std::max(
       {now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(), mail_.quiet_ns()}));
+  mail_.settle();
   const TimeNs began_ns = now_ns_;
   mail_.send(now_ns_, clients_.stop_all());
   be_well(began_ns);
