@@ -125,8 +125,8 @@ TEST(Coordinates, WhatIsShownMeansItsStep) {
     const double per_unit =
         static_cast<double>(ratio.numerator) / static_cast<double>(ratio.denominator);
     const auto offset_steps = *rc::gen::inRange<std::int64_t>(-(1LL << 49), 1LL << 49);
-    const Scale scale{"mm", ratio, *rc::gen::arbitrary<bool>(),
-                      static_cast<double>(offset_steps) / per_unit, {}};
+    const Scale scale{
+        "mm", ratio, *rc::gen::arbitrary<bool>(), static_cast<double>(offset_steps) / per_unit, {}};
     const auto coordinates = Coordinates::make(scale);
     RC_ASSERT(coordinates.has_value());
     const auto steps = *rc::gen::inRange(-Coordinates::kMaxSteps, Coordinates::kMaxSteps + 1);
