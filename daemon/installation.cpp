@@ -106,7 +106,8 @@ void Installation::add_motors() {
             .emergency_stop_immediate = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
             .emergency_input_immediate = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE,
             .coordinates = config.coordinates,
-            .soft_limits = config.soft_limits},
+            .soft_limits = config.soft_limits,
+            .max_speed = config.max_speed},
         new_axis({motors_.size()}));
     motor_by_name_[config.name] = id;
     mcus_[config.mcu].motor_at_[config.output.value] = id;

@@ -72,7 +72,7 @@ void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
   open_.open(asker, *motors);
-  for (const MotorId motor : *motors) add(motor);
+  for (const MotorId motor : *motors) add({motor, *floor_of(motor, request.speed)});
 }
 
 Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) const {
@@ -83,6 +83,7 @@ Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) co
     if (const auto may = may_home(motor); !may) {
       return fail(installation_[motor].name() + ": " + may.error().text());
     }
+    if (const auto floor = floor_of(motor, request.speed); !floor) return fail(floor.error());
   }
   return motors;
 }
@@ -100,11 +101,19 @@ Result<void> HomingQueue::may_home(MotorId id) const {
               " cannot home; find out where it stands and run 'bushctl set NAME STEPS'");
 }
 
-bushd_home HomingQueue::message_for(MotorId id) const {
+Result<std::uint16_t> HomingQueue::floor_of(MotorId id,
+                                            const std::optional<api::Speed>& speed) const {
+  auto floor = installation_[id].floor_at(speed);
+  if (!floor) return fail(installation_[id].name() + ": " + floor.error().message);
+  return floor;
+}
+
+bushd_home HomingQueue::message_for(const Task& task) const {
+  const MotorId id = task.motor;
   const config::Motor& motor = installation_.config()[id];
   const config::Home& home = *motor.home;
   const bushd_table& table = installation_.table_of(id)->view();
-  const std::uint64_t first = std::max(table.accel.code[0], table.decel.code[0]);
+  const std::uint64_t first = std::max({table.accel.code[0], table.decel.code[0], task.floor});
   const std::uint64_t slow_ns = std::max<std::uint64_t>(
       {first * table.time_unit_ns, installation_.config().bus_of(motor).tick_ns(),
        1'000'000'000u / home.slow_steps_per_s});
@@ -112,6 +121,7 @@ bushd_home HomingQueue::message_for(MotorId id) const {
   return {.motor = motor.output.value,
           .direction = static_cast<std::int8_t>(home.positive ? 1 : -1),
           .most_steps = home.most_steps,
+          .floor = task.floor,
           .slow_steps = home.slow_most_steps.value_or(table.decel.count + kMoreSlowSteps),
           .slow_delay = static_cast<std::uint16_t>(std::min<std::uint64_t>(units, UINT16_MAX)),
           .position_steps = home.position_steps};
@@ -121,10 +131,10 @@ bool HomingQueue::empty() const {
   return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.empty(); });
 }
 
-void HomingQueue::add(MotorId motor) {
-  Mcu& mcu = installation_.mcu_of(motor);
-  installation_[motor].home();
-  queues_[mcu.id].push_back(motor);
+void HomingQueue::add(const Task& task) {
+  Mcu& mcu = installation_.mcu_of(task.motor);
+  installation_[task.motor].home();
+  queues_[mcu.id].push_back(task);
   if (queues_[mcu.id].size() == 1) begin(mcu);
   installation_.changed = true;
 }
@@ -135,7 +145,7 @@ void HomingQueue::begin(Mcu& mcu) {
 
 void HomingQueue::reports(std::int64_t, Mcu& mcu) {
   if (queues_[mcu.id].empty() || mcu.busy()) return;
-  const unsigned output = installation_[queues_[mcu.id].front()].output().value;
+  const unsigned output = installation_[queues_[mcu.id].front().motor].output().value;
   if (((mcu.report().autonomous | mcu.report().moving) >> output & 1) != 0) return;
   const Ending ending = ending_of(mcu.report(), mcu.name());
   end(mcu, ending.outcome, ending.reason);
@@ -143,7 +153,7 @@ void HomingQueue::reports(std::int64_t, Mcu& mcu) {
 
 void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   Queue& queue = queues_[mcu.id];
-  const MotorId id = queue.front();
+  const MotorId id = queue.front().motor;
   queue.pop_front();
   motion::Motor& motor = installation_[id];
   motor.end_homing(outcome == Outcome::kReached);
@@ -154,7 +164,7 @@ void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
 }
 
 void HomingQueue::goes_offline(Mcu& mcu, const std::string& cause) {
-  for (const MotorId motor : std::exchange(queues_[mcu.id], {})) {
+  for (const auto& [motor, floor] : std::exchange(queues_[mcu.id], {})) {
     installation_[motor].end_homing(false);
     open_.end(motor, Outcome::kLink, cause + "; it was being homed");
   }
@@ -169,7 +179,8 @@ void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
 
 bool HomingQueue::end_if_waiting(MotorId motor) {
   Queue& queue = queues_[installation_.config()[motor].mcu];
-  if (queue.empty() || queue.front() == motor || std::erase(queue, motor) == 0) return false;
+  const auto is_motor = [motor](const Task& task) { return task.motor == motor; };
+  if (queue.empty() || is_motor(queue.front()) || std::erase_if(queue, is_motor) == 0) return false;
   installation_[motor].end_homing(false);
   open_.end(motor, Outcome::kStopped, "stopped before it was its turn to be homed");
   return true;
@@ -181,7 +192,7 @@ void HomingQueue::end_waiting() {
 
 void HomingQueue::stop(MotorId motor) {
   if (!installation_[motor].is<motion::Homing>() || end_if_waiting(motor)) return;
-  bushd_home give_up = message_for(motor);
+  bushd_home give_up = message_for({motor, 0});
   give_up.most_steps = 0;
   installation_.mcu_of(motor).home(give_up);
 }
@@ -193,11 +204,12 @@ void HomingQueue::goes_online(Mcu& mcu) {
     const motion::Motor& motor = installation_[id];
     const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
     if (!home || !home->at_start || (homed && !motor.uncertain_reason())) continue;
-    if (const auto may = may_home(id); !may) {
+    const auto floor = motor.floor_at({});
+    if (const auto may = floor ? may_home(id) : fail(floor.error()); !may) {
       outputs_.log(LogLevel::kWarning, motor.name() + " is not homed: " + may.error().text());
       continue;
     }
-    add(id);
+    add({id, *floor});
   }
 }
 

@@ -23,7 +23,7 @@ void Moves::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
     if (motor.has_plan()) {
       return asker.answer(api::Refused{motor.name() + " moves; a dry run is of moves from rest"});
     }
-    planned.push_back({part.motor, part.target - motor.position_steps()});
+    planned.push_back({part.motor, part.target - motor.position_steps(), part.floor});
   }
   dry_runs_.request(now_us, asker, planned);
 }
@@ -34,15 +34,24 @@ Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   std::vector<Part> parts;
   for (std::size_t i = 0; i < motors->size(); ++i) {
-    const auto target = target_of((*motors)[i], move.motors[i].amount, move.kind);
+    const auto floor = floor_of((*motors)[i], move.speed);
+    if (!floor) return fail(floor.error());
+    const auto target = target_of((*motors)[i], move.motors[i].amount, move.kind, *floor);
     if (!target) return fail(target.error());
-    parts.push_back({(*motors)[i], *target});
+    parts.push_back({(*motors)[i], *target, *floor});
   }
   return parts;
 }
 
+Result<std::uint16_t> Moves::floor_of(MotorId id, const std::optional<api::Speed>& speed) const {
+  const motion::Motor& motor = installation_[id];
+  auto floor = motor.floor_at(speed);
+  if (!floor) return fail(motor.name() + ": " + floor.error().message);
+  return floor;
+}
+
 Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount,
-                                      api::Move::Kind kind) const {
+                                      api::Move::Kind kind, std::uint16_t floor) const {
   const motion::Motor& motor = installation_[id];
   const bool absolute = kind == api::Move::Kind::kAbsolute;
   const auto counted = absolute ? motor.steps_of_position(amount) : motor.steps_of_distance(amount);
@@ -55,7 +64,7 @@ Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount,
   }
   const std::int64_t from = absolute ? 0 : motor.target_steps();
   auto may = interlocks_.may_move(id);
-  if (may) may = motor.may_move_to(from + steps);
+  if (may) may = motor.may_move_to(from + steps, floor);
   if (!may) return fail(motor.name() + ": " + may.error().text());
   return from + steps;
 }
@@ -83,9 +92,10 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
     if (motor.has_plan()) {
-      motor.aim(part.target);
+      motor.aim(part.target, part.floor);
     } else {
-      start_run(part.motor, part.target, start[installation_.mcu_of(part.motor).config.bus]);
+      start_run(part.motor, part.target, start[installation_.mcu_of(part.motor).config.bus],
+                part.floor);
     }
   }
   retarget(now_us, moving);
@@ -97,17 +107,17 @@ void Moves::take_over(MotorId motor, const api::Asker& by) {
             "was given a new target by " + text_of(by) + "; it moves on");
 }
 
-void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start) {
+void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, std::uint16_t floor) {
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);
   const std::int64_t steps = target - motor.position_steps();
   const bool by_table = installation_.by_table(mcu, steps);
-  motor.start(target, start);
+  motor.start(target, start, floor);
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));
   } else if (by_table) {
-    mcu.begin_table_run(motor.output(), start, static_cast<std::int32_t>(steps));
+    mcu.begin_table_run(motor.output(), start, {static_cast<std::int32_t>(steps), floor});
   } else {
     mcu.begin(motor.output(), start);
   }
@@ -197,7 +207,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [&](const motion::event::Started& started) {
               journal_.started(id, started.steps, started.start, started.late_ns, true);
               mcu.follow_table_run(motor.output(), started.start,
-                                   static_cast<std::int32_t>(started.steps));
+                                   {static_cast<std::int32_t>(started.steps), motor.axis().floor()});
             },
             [&](const motion::event::Executed& executed) { journal_.changed(id, executed.change); },
             [&](const motion::event::Replan&) {
@@ -212,7 +222,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [&](const motion::event::Turn&) {
               journal_.ended(id, "turned");
               start_run(id, motor.axis().target_steps(),
-                        mcu.earliest_start(now_us, motor.output()));
+                        mcu.earliest_start(now_us, motor.output()), motor.axis().floor());
             },
             [&](const motion::event::Ended& ended) { end(id, ended); }},
         event);

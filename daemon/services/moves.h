@@ -31,8 +31,10 @@ class Moves final : public Service {
 
   // Checks where a motor of a request may go, "NAME: WHY" if not. `by` counts from where it stands,
   // or from its present target.
-  Result<std::int64_t> target_of(MotorId motor, const api::Amount& amount,
-                                 api::Move::Kind kind) const;
+  Result<std::int64_t> target_of(MotorId motor, const api::Amount& amount, api::Move::Kind kind,
+                                 std::uint16_t floor) const;
+  // motion::Motor::floor_at, "NAME: WHY" if there is none.
+  Result<std::uint16_t> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
 
   // Ramps down those that move; those that wait for the trigger wait no more.
   void stop(std::int64_t now_us, const std::vector<MotorId>& motors);
@@ -53,12 +55,13 @@ class Moves final : public Service {
   struct Part {
     MotorId motor;
     std::int64_t target;
+    std::uint16_t floor;
   };
   Result<std::vector<Part>> parts_of(const api::Move& move) const;
   void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);
   void take_over(MotorId motor, const api::Asker& by);
   // From rest; the motor is part of an open move.
-  void start_run(MotorId motor, std::int64_t target, motion::Tick start);
+  void start_run(MotorId motor, std::int64_t target, motion::Tick start, std::uint16_t floor);
   // Motors with another target: as soon as the line has time for it, and to the newest one only.
   void retarget(std::int64_t now_us, const std::vector<MotorId>& motors);
   void disarm(const std::vector<MotorId>& motors);

@@ -375,7 +375,7 @@ Result<void> read_motors(Loading* loading) {
     if (auto known =
             reader.only({"name", "mcu", "output", "group", "limit", "limit_action", "input_active",
                          "home", "local", "description", "unit", "steps_per_unit", "direction",
-                         "offset", "precision", "soft_limits"});
+                         "offset", "precision", "soft_limits", "max_speed"});
         !known) {
       return known;
     }

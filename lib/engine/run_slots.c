@@ -156,7 +156,12 @@ static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_p
     run->accel_at = (uint16_t)(run->accel_at + made);
   } else if (run->cruise_left != 0) {
     const uint8_t left = part->left = at_most(run->cruise_left);
+    uint64_t rate = 0;
     part->rate = &tick->per_cruise;
+    if (run->cruise != tick->cruise) {
+      bushd_run_move_place(&rate, &tick->per_unit, run->cruise);
+      part->rate = &rate;
+    }
     bushd_run_make_evenly(part);
     made = (uint8_t)(left - part->left);
     run->cruise_left -= made;

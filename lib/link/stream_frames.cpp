@@ -36,7 +36,7 @@ bool StreamScheduler::send_due_replacement(std::int64_t now_us) {
     mcu.epoch = ++mcu.newest_epoch;
     for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
       if (!has(mask, m)) continue;
-      mcu.stream[m].run_steps.reset();
+      mcu.stream[m].run.reset();
       mcu.stream[m].beyond_gap.reset();
       mcu.stream[m].sent = mcu.replace_at;
       mcu.stream[m].from_before = mcu.stream[m].from;
@@ -99,7 +99,7 @@ StreamScheduler::Choice StreamScheduler::choose(const Mcu& mcu, Tick first) {
       continue;
     }
     if (stream.beyond_gap) choice.join = std::min(choice.join, stream.beyond_gap->from);
-    (stream.starts() ? (stream.run_steps ? choice.runs : choice.starts) : choice.goes_on) |=
+    (stream.starts() ? (stream.run ? choice.runs : choice.starts) : choice.goes_on) |=
         static_cast<std::uint16_t>(1u << m);
   }
   return choice;
@@ -144,12 +144,8 @@ void StreamScheduler::send_table_runs(std::int64_t now_us, McuIndex index, std::
   std::uint8_t count = 0;
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if (!has(mask, m)) continue;
-    const std::int32_t steps = *mcus_[index].stream[m].run_steps;
-    entries[count++] = {
-        .motor = m,
-        .slot = setup.table_of_motor[m].value_or(0),
-        .direction = static_cast<std::int8_t>(steps < 0 ? -1 : 1),
-        .steps = static_cast<std::uint32_t>(std::abs(static_cast<std::int64_t>(steps)))};
+    entries[count++] =
+        entry_of(m, setup.table_of_motor[m].value_or(0), *mcus_[index].stream[m].run);
     note_sent(index, m, first, source_.end_tick(index, m));
   }
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;

@@ -42,7 +42,7 @@ Result<void> Motor::may_be_used() const {
   return {};
 }
 
-Result<void> Motor::may_move_to(std::int64_t target) const {
+Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const {
   if (uncertain_reason_) {
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
                 (setup_.has_home ? "run 'bushctl home NAME', or find out where it stands and run "
@@ -64,15 +64,30 @@ Result<void> Motor::may_move_to(std::int64_t target) const {
         switch_at(direction) +
         " is active: motion in this direction is inhibited; move it in the other direction");
   }
-  if (axis_.duration_ticks(steps) > Axis::kMaxDurationTicks) {
+  if (axis_.duration_ticks(steps, floor) > Axis::kMaxDurationTicks) {
     const double tick_days = axis_.tick_ns() * 1e-9 / 86400;
     const auto days = [tick_days](double ticks) { return std::llround(ticks * tick_days); };
     return fail(std::to_string(steps) + " steps would take " +
-                std::to_string(days(axis_.duration_ticks(steps))) +
-                " days with this table; the longest move is " +
+                std::to_string(days(axis_.duration_ticks(steps, floor))) +
+                " days at that speed; the longest move is " +
                 std::to_string(days(Axis::kMaxDurationTicks)) + " days");
   }
   return {};
+}
+
+Result<std::uint16_t> Motor::floor_at(const std::optional<api::Speed>& speed) const {
+  std::uint16_t floor = 0;
+  if (setup_.max_speed) {
+    const auto slowest = setup_.coordinates.delay_at(*setup_.max_speed, axis_.time_unit_ns());
+    if (!slowest) return fail("max_speed: " + slowest.error().message);
+    floor = *slowest;
+  }
+  if (!speed) return floor;
+  const units::Coordinates in_steps;
+  const auto delay = (speed->in_steps ? in_steps : setup_.coordinates)
+                         .delay_at(speed->per_s, axis_.time_unit_ns());
+  if (!delay) return delay;
+  return std::max(floor, *delay);
 }
 
 // One that stands beyond a limit may be moved towards it.
@@ -109,14 +124,14 @@ Result<std::int64_t> Motor::steps_of_distance(const api::Amount& distance) const
   return setup_.coordinates.steps_of_distance(std::get<api::UserUnits>(distance).value);
 }
 
-void Motor::start(std::int64_t target, Tick start) {
+void Motor::start(std::int64_t target, Tick start, std::uint16_t floor) {
   activity_ = Moving{};
-  axis_.start(position_, target - position_, start);
+  axis_.start(position_, target - position_, start, 0, floor);
 }
 
-void Motor::arm(std::uint8_t number, std::int64_t steps) {
+void Motor::arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor) {
   activity_ = Armed{.number = number, .steps = steps};
-  axis_.start(position_, steps, kNever);
+  axis_.start(position_, steps, kNever, 0, floor);
 }
 
 void Motor::stop(std::optional<std::string> ended_by) {
@@ -284,7 +299,7 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
   if (told && mcu.trigger_state == BUSHD_TRIGGER_STARTED) {
     const Tick start = report.tick + static_cast<std::int32_t>(mcu.start_tick - mcu.tick);
     activity_ = Moving{};
-    axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns);
+    axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns, axis_.floor());
     if (armed.stops) axis_.stop();
     events.emplace_back(
         event::Started{.start = start, .late_ns = mcu.start_ns, .steps = armed.steps});

@@ -33,6 +33,7 @@ struct MotorSetup {
   bool emergency_input_immediate = false;
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits{};
+  std::optional<double> max_speed{};  // user units/s
 };
 
 // What a motor does. Any other than Resting keeps other motions away from it.
@@ -133,16 +134,20 @@ class Motor {
   // What it may do now, as far as it depends on the motor alone. A motor that moves may be given
   // another target, and nothing else.
   Result<void> may_be_used() const;                     // for any motion
-  Result<void> may_move_to(std::int64_t target) const;  // beyond that
+  // Beyond that.
+  Result<void> may_move_to(std::int64_t target, std::uint16_t floor = 0) const;
+  // The floor of runs at max_speed and at this speed, whichever is slower. Error: no speed, or one
+  // slower than any delay.
+  Result<std::uint16_t> floor_at(const std::optional<api::Speed>& speed) const;
   // An amount in steps. Errors: not finite, beyond what is counted.
   Result<std::int64_t> steps_of_position(const api::Amount& position) const;
   Result<std::int64_t> steps_of_distance(const api::Amount& distance) const;
 
-  // Requests. Preconditions: it may.
+  // Requests. Preconditions: it may. Floors are those of Axis.
   // From rest, or from the turning point of a motion.
-  void start(std::int64_t target, Tick start);
-  void aim(std::int64_t target) { axis_.aim(target); }
-  void arm(std::uint8_t number, std::int64_t steps);
+  void start(std::int64_t target, Tick start, std::uint16_t floor = 0);
+  void aim(std::int64_t target, std::uint16_t floor = 0) { axis_.aim(target, floor); }
+  void arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor = 0);
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
   // `ended_by` is whose end ends it too.
   void stop(std::optional<std::string> ended_by = {});

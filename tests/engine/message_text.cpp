@@ -133,15 +133,15 @@ void put(const bushd_table_ticks& m, Fields& f) {
   for (bushd_table_ticks_entry entry; bushd_next_table_ticks_entry(&m, &at, &entry);) {
     const bushd_run_state& s = entry.state;
     append(&entries, parts({entry.motor, s.direction, s.cruises, s.since, s.since_ns, s.lead_delay,
-                            s.accel_at, s.accel_end, s.cruise_left, s.decel_left}));
+                            s.accel_at, s.accel_end, s.cruise_left, s.decel_left, s.cruise}));
   }
   f.add_text("entries", entries);
 }
 void put_entries(const uint8_t* entries, uint8_t count, Fields& f) {
   std::string text;
   for (uint8_t i = 0; i < count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(entries, i);
-    append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps}));
+    const bushd_table_run_entry entry = bushd_next_table_run_entry(&entries);
+    append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps, entry.floor}));
   }
   f.add_text("entries", text);
 }

@@ -39,7 +39,7 @@ class Trigger : public Streams {
     return rig.arm(number, BUSHD_EDGE_RISING, delay_us, {{0, 0, 1, steps}});
   }
   static Bytes run_frame(std::uint32_t first, std::uint8_t motor) {
-    const bushd_table_run_entry entry = {motor, 0, 1, 5};
+    const bushd_table_run_entry entry = {motor, 0, 1, 5, 0};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
     return payload;

@@ -335,7 +335,7 @@ TEST(Connect, AnotherMasterOnTheLineIsNoticedForSomeSeconds) {
 
 TEST(Connect, TableRunOfAnEarlierMasterIsRampedDownFirst) {
   FakeBus bus;
-  bus.slaves[0].run[1] = bushd_table_run_entry{1, 0, 1, 1000};
+  bus.slaves[0].run[1] = bushd_table_run_entry{1, 0, 1, 1000, 0};
   bus.slaves[0].known_until[1] = bus.tick(0) + 20'000;
   bus.connect();
   ASSERT_EQ(bus.heard_of(BUSHD_MSG_EMERGENCY).size(), 1u);

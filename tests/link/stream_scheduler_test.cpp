@@ -266,7 +266,7 @@ TEST_F(Replacing, TooLateToArriveFailsUnsent) {
 
 TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
   source.end = [](std::uint8_t) { return Tick{5000}; };
-  streams.begin_table_run(kFirst, 0, 1040, -700);
+  streams.begin_table_run(kFirst, 0, 1040, {-700});
   ASSERT_TRUE(streams.send_stream(kNowUs, kFilling));
   const auto sent = take_sent(writer);
   ASSERT_EQ(sent.size(), 1u);
@@ -284,7 +284,7 @@ TEST_F(Scheduling, StatesOfRunsFillTheQueueWhateverMadeThemDue) {
   mcus[kFirst].view.identity.capabilities |= BUSHD_CAN_TABLE_TICKS;
   source.segment = [](std::uint8_t, Tick, unsigned max_ticks) {
     bushd_run run;
-    bushd_run_start(&run, &small_table(), 1'000'000, 1);
+    bushd_run_start(&run, &small_table(), 1'000'000, 1, 0);
     return link::TickSource::RunSegment{run, max_ticks};
   };
   streams.begin(kFirst, 0, 1040);
