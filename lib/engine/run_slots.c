@@ -115,21 +115,24 @@ static inline void make_due(bushd_run_part* part) {
   --part->left;
 }
 
+// As those of a small MCU do, these read the rate before they know whether a step follows.
 void bushd_run_make_on_side(bushd_run_part* part, bool down) {
+  const uint64_t rate = *part->rate;
   while (true) {
     make_due(part);
     if (part->left == 0) return;
     part->delay = down ? *--part->code : *++part->code;
     if (part->since < part->delay) return;
-    part->place += *part->rate * part->delay;
+    part->place += rate * part->delay;
   }
 }
 
 void bushd_run_make_evenly(bushd_run_part* part) {
+  const uint64_t rate = *part->rate;
   while (true) {
     make_due(part);
     if (part->left == 0 || part->since < part->delay) return;
-    part->place += *part->rate;
+    part->place += rate;
   }
 }
 #endif
@@ -145,6 +148,7 @@ static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_p
   uint8_t made = 1;
   if (run->lead_delay != 0) {
     part->left = 1;
+    part->rate = &tick->per_unit;  // read, though no step follows
     bushd_run_make_evenly(part);
     run->lead_delay = 0;
   } else if (run->accel_at < run->accel_end) {

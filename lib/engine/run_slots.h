@@ -52,8 +52,8 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit
 // functions of its own (BUSHD_OWN_RUN_PARTS).
 typedef struct bushd_run_part {
   uint64_t place;        // of the step that is due, in slots from the tick's start x 2^32
-  const uint64_t* rate;  // places in a unit
-  const uint16_t* code;  // its delay, on a side
+  const uint64_t* rate;  // places in a unit; read even for a single step
+  const uint16_t* code;  // its delay; a side's only
   uint16_t* masks;
   uint16_t bit;
   uint16_t last_slot;

@@ -120,6 +120,28 @@ TEST_P(AvrTableRuns, SixteenKeepTheirSlots) {
   }
 }
 
+// The step that is running is a part of its own: before the ramp down, wherever the run is.
+class AvrStoppedRun : public AvrAlone, public testing::WithParamInterface<std::uint32_t> {};
+
+TEST_P(AvrStoppedRun, RampsDownFromTheStepThatRuns) {
+  constexpr std::uint32_t kLong = 20'000;
+  pass(kBootNs);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  run(0, kLong);
+  pass(GetParam() * TimeNs{kTickNs});
+  master_.send(kAddress, BUSHD_MSG_EMERGENCY, Bytes{BUSHD_STOP_RAMP});
+  pass(20 * TimeNs{kTickNs});
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.moving, 0);
+  EXPECT_GT(steps_made(0), 0u);
+  EXPECT_LT(steps_made(0), kLong);
+  EXPECT_EQ(report.motor[0].position_steps, static_cast<int>(steps_made(0)));
+}
+
+// In ticks. The run begins after 24, and takes four to its cruise.
+INSTANTIATE_TEST_SUITE_P(Ticks, AvrStoppedRun, testing::Values(26, 27, 100),
+                         testing::PrintToStringParamName());
+
 // At least 9 steps a tick, by ramps of 238 codes; polled as by bushd. simavr enters interrupts in
 // no time, the chip takes five cycles: ticks are shorter by the 1500 cycles of a tick than those
 // that docs/performance.md tells.
