@@ -145,10 +145,10 @@ Result<std::uint16_t> Coordinates::delay_at(double user_units_per_s, std::uint32
   if (delay <= kLongestDelay) return static_cast<std::uint16_t>(delay.get_ui());
   const mpq_class slowest = mpq_class(1'000'000'000) /
                             (as_mpq(scale_.steps_per_unit) * mpq_class(unit_ns) * kLongestDelay);
-  return fail(fmt::format("{} {}/s would take {:.0f} time units a step; allowed: up to {}, which is "
-                          "{:.6g} {}/s with this table",
-                          user_units_per_s, scale_.unit, delay.get_d(), kLongestDelay,
-                          slowest.get_d(), scale_.unit));
+  return fail(fmt::format(
+      "{} {}/s would take {:.0f} time units a step; allowed: up to {}, "
+      "which is {:.6g} {}/s with this table",
+      user_units_per_s, scale_.unit, delay.get_d(), kLongestDelay, slowest.get_d(), scale_.unit));
 }
 
 std::int64_t Coordinates::first_step_from(double dial) const {

@@ -169,28 +169,36 @@ Bytes any_trigger() {
   return payload;
 }
 
+// With this one behind a header of that size.
+std::function<void(Bytes*)> entry_alone(std::size_t header, Bytes entry) {
+  return [header, entry = std::move(entry)](Bytes* p) {
+    p->resize(header);
+    p->insert(p->end(), entry.begin(), entry.end());
+  };
+}
+
 }  // namespace
 
 Kinds motion_kinds() {
   return {
       {"home",
-       {bytes_with(16,
+       {bytes_with(18,
                    [](Bytes* p) {
                      (*p)[0] = between<uint8_t>(0, 15);
                      (*p)[1] = *rc::gen::element<uint8_t>(1, 0xFF);
                      (*p)[5] &= 0x7F;
-                     (*p)[9] &= 0x7F;
-                     (*p)[6] |= 1;
-                     (*p)[10] |= 1;
+                     (*p)[11] &= 0x7F;
+                     (*p)[8] |= 1;
+                     (*p)[12] |= 1;
                    }),
         codec(bushd_decode_home, bushd_encode_home),
         {{"motor 16", set8(0, 16)},
          {"no direction", set8(1, 0)},
          {"twice the direction", set8(1, 2)},
          {"too many steps", set32(2, 0x80000000)},
-         {"no slow steps", set32(6, 0)},
-         {"too many slow steps", set32(6, 0x80000000)},
-         {"no delay", set16(10, 0)}}}},
+         {"no slow steps", set32(8, 0)},
+         {"too many slow steps", set32(8, 0x80000000)},
+         {"no delay", set16(12, 0)}}}},
       {"local",
        {[] { return random_bytes(2); }, codec(bushd_decode_local, bushd_encode_local), {}}},
       {"poll", {any_poll, poll_again, {}}},
@@ -219,13 +227,10 @@ Kinds motion_kinds() {
       {"table_run",
        {any_table_run,
         table_run_again,
-        {{"no step", set32(BUSHD_TABLE_RUN_HEADER + 1, 0)},
-         {"no step, with a floor", set32(BUSHD_TABLE_RUN_HEADER + 1, 0x80000000u)},
-         {"a floor of no time",
-          [](Bytes* p) {
-            p->resize(BUSHD_TABLE_RUN_HEADER);
-            p->insert(p->end(), {0, 5, 0, 0, 0x80, 0, 0});
-          }},
+        {{"no step", entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0})},
+         {"no step, with a floor",
+          entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0x80, 9, 0})},
+         {"a floor of no time", entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 5, 0, 0, 0x80, 0, 0})},
          {"no entry", [](Bytes* p) { p->resize(BUSHD_TABLE_RUN_HEADER); }},
          {"a motor twice",
           [](Bytes* p) {
@@ -242,7 +247,7 @@ Kinds motion_kinds() {
          {"entries to disarm", set8(1, 0)},
          {"too short a delay", set32(2, 49)},
          {"too long a delay", set32(2, 1'500'001)},
-         {"no step", set32(7, 0)},
+         {"no step", entry_alone(6, {0, 0, 0, 0, 0})},
          {"no entry", [](Bytes* p) { p->resize(6); }}},
         true}},
       {"position_compare",

@@ -99,6 +99,7 @@ void put(const bushd_set_inputs& m, Fields& f) {
 }
 void put(const bushd_home& m, Fields& f) {
   f.add("motor", m.motor).add("direction", m.direction).add("most_steps", m.most_steps);
+  f.add("floor", m.floor);
   f.add("slow_steps", m.slow_steps).add("slow_delay", m.slow_delay);
   f.add("position_steps", m.position_steps);
 }

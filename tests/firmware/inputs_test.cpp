@@ -144,7 +144,7 @@ TEST_P(Inputs, AMotorWhoseWayIsBarredDoesNotHoldUpThoseThatStartWithIt) {
     on->pins(kSwitch);
     on->pass();
     if (whole) {
-      const bushd_table_run_entry both[] = {{0, 0, 1, 20}, {1, 0, 1, 20}, 0};
+      const bushd_table_run_entry both[] = {{0, 0, 1, 20, 0}, {1, 0, 1, 20, 0}};
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       payload.resize(bushd_encode_table_run(0, on->first_open(), both, 2, payload.data()));
       ASSERT_EQ(on->take(BUSHD_MSG_TABLE_RUN, payload), BUSHD_OK);

@@ -53,7 +53,7 @@ class AvrTableRuns : public AvrAlone, public testing::WithParamInterface<Load> {
   void begin_runs(std::uint32_t first) {
     std::vector<bushd_table_run_entry> entries;
     for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-      entries.push_back({m, 0, static_cast<std::int8_t>(m % 2 == 0 ? 1 : -1), kSteps});
+      entries.push_back({m, 0, static_cast<std::int8_t>(m % 2 == 0 ? 1 : -1), kSteps, 0});
     }
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(
