@@ -15,6 +15,10 @@ namespace {
 namespace api = bushd::api;
 using bushd::client::Status;
 
+// Where LCM's datagrams get lost on this PC.
+constexpr const char* kRoom =
+    "give datagrams more room ('sysctl net.core.rmem_max=4194304'), or use the control socket";
+
 std::string text_of(const api::TableRef& table) {
   const std::string revision = table.revision > 0 ? fmt::format("@{}", table.revision) : "";
   return bushd::printable(table.name) + revision;
@@ -137,6 +141,16 @@ std::vector<std::string> table(const Status& status) {
   out.emplace_back();
   for (std::string& line : mcus.lines()) out.push_back(std::move(line));
   return out;
+}
+
+std::string missing_text(const Status::Missing& missing, const char* things) {
+  return fmt::format("incomplete: messages were lost, nothing of {} of {} {} has arrived; {}",
+                     missing.count, missing.of, things, kRoom);
+}
+
+std::string lost_text(std::uint64_t messages) {
+  return fmt::format("{} messages of bushd were lost, so changes may be missing here; {}", messages,
+                     kRoom);
 }
 
 std::string motor_line(const api::MotorState& motor) {
