@@ -30,6 +30,7 @@ std::string limit_text(const api::MotorState& motor) {
 
 // What it does, in a word for tables.
 const char* moving_word(const api::MotorState& motor, const char* moves, const char* rests) {
+  if (motor.activity == api::Activity::kArming) return "arming";
   if (motor.activity == api::Activity::kArmed) return "armed";
   return motor.moving ? moves : rests;
 }
