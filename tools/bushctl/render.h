@@ -18,8 +18,9 @@ std::vector<std::string> table(const bushd::client::Status& status);
 std::string missing_text(const bushd::client::Status::Missing& missing, const char* things);
 std::string lost_text(std::uint64_t messages);
 
-// One line: name, position, target, velocity, moving or at rest, trust when it is not "known".
-std::string motor_line(const bushd::api::MotorState& motor);
+// One line of the motor at this place in the state of the MCU at that place: name, position,
+// target, velocity, moving or at rest, trust when it is not "known".
+std::string motor_line(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 
 // {"motors":[...],"mcus":[...],...}; docs/lcm.md lists the keys.
 std::string json(const bushd::client::Status& status);
