@@ -93,7 +93,9 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
                   .commands = config.lcm.commands,
                   .run = run_,
                   .seed = static_cast<std::uint64_t>(run_)},
-                 reception_, publishing_, unix_time_us) {
+                 reception_, publishing_, unix_time_us),
+      lcm_watch_(lcm_front_, publishing_, config.lcm.prefix,
+                 [this](LogLevel level, const std::string& text) { log(level, text); }) {
   for ([[maybe_unused]] const config::Bus& bus : config.buses) ports_.add();
   publishing_.set_refresh([this] { core_.publish_state(now_us()); });
   publishing_.add(lcm_front_);
@@ -221,7 +223,7 @@ Result<void> EventLoop::run() {
     publishing_.set_dropped_messages(lcm_front_.dropped() +
                                      (socket_front_ ? socket_front_->dropped() : 0));
     core_.keep_up(now);
-    check_published();
+    lcm_watch_.step(now);
     tell_left_out(now);
     if (shut_down_by_us_ && (core_.at_rest() || now >= *shut_down_by_us_)) break;
     if (const auto handled = handle_sources(); !handled) return handled;
@@ -429,18 +431,6 @@ void EventLoop::publish(McuId mcu, const api::Description& description) {
 
 void EventLoop::publish(BusId bus, const api::HealthSnapshot& health) {
   publishing_.publish(bus, health);
-}
-
-// Said once when it begins and once when it is over, not twenty times a second.
-void EventLoop::check_published() {
-  const std::string& trouble = lcm_front_.trouble();
-  if (mute_ == !trouble.empty()) return;
-  mute_ = !trouble.empty();
-  if (mute_) {
-    spdlog::error("LCM does not take messages: {}; clients there hear nothing", trouble);
-  } else {
-    spdlog::info("LCM takes messages again");
-  }
 }
 
 void EventLoop::move_log(const std::string& json_line) {

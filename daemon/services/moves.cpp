@@ -204,6 +204,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
     if (!std::holds_alternative<motion::event::Executed>(event)) installation_.changed = true;
     std::visit(
         Overloaded{
+            [](const motion::event::Waits&) {},
             [&](const motion::event::Started& started) {
               journal_.started(id, started.steps, started.start, started.late_ns, true);
               mcu.follow_table_run(motor.output(), started.start,

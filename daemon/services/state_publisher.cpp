@@ -34,7 +34,9 @@ std::string detail_of(const link::McuView& view, bool two_masters) {
 
 api::Activity activity_of(const motion::Motor& motor) {
   if (motor.is<motion::Moving>()) return api::Activity::kMoving;
-  if (motor.is<motion::Armed>()) return api::Activity::kArmed;
+  if (const auto* armed = motor.as<motion::Armed>()) {
+    return armed->confirmed ? api::Activity::kArmed : api::Activity::kArming;
+  }
   if (motor.is<motion::Homing>()) return api::Activity::kHoming;
   return motor.is<motion::Local>() ? api::Activity::kLocal : api::Activity::kResting;
 }
@@ -91,8 +93,7 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   if (view.phase == link::McuPhase::kConnecting && reports(view.report.autonomous)) {
     state.activity = api::Activity::kLocal;
   }
-  state.moving =
-      state.activity != api::Activity::kResting && state.activity != api::Activity::kArmed;
+  state.moving = state.activity != api::Activity::kResting && !motor.is<motion::Armed>();
   state.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;
   state.input = reports(view.report.inputs);
   state.inhibited = {.positive = reports(view.report.forbidden_positive),

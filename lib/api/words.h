@@ -22,6 +22,7 @@ enum class Outcome {
 enum class Activity {
   kResting,
   kMoving,
+  kArming,  // at rest, its MCU has not yet confirmed that it waits for the trigger
   kArmed,   // at rest, waits for the trigger of its MCU
   kHoming,  // or waits until the MCU has homed another one
   kLocal    // moved by the local inputs of its MCU

@@ -59,6 +59,7 @@ bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling, b
   // The neediest first; one whose queue is full must not keep the others waiting.
   std::vector<std::pair<Tick, McuIndex>> needy;
   for (const McuIndex i : mcus_.indices()) {
+    finish_ended(i);
     const Mcu& mcu = mcus_[i];
     const bool online = records_[i].view.phase == McuPhase::kOnline;
     if (!online || (only_replaced && mcu.replaced == 0)) continue;
@@ -68,6 +69,17 @@ bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling, b
   return std::any_of(needy.begin(), needy.end(), [&](const auto& entry) {
     return send_ticks_of(now_us, entry.second, filling);
   });
+}
+
+// A motor that was to have another plan, and did not get it, may have been told all of its own. An
+// MCU refuses more for it, and with it all that the frame has for others.
+void StreamScheduler::finish_ended(McuIndex index) {
+  Mcu& mcu = mcus_[index];
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    Stream& stream = mcu.stream[m];
+    if (!mcu.sendable(m) || !stream.begun()) continue;
+    stream.finished = stream.next >= source_.end_tick(index, m);
+  }
 }
 
 bool StreamScheduler::behind(std::int64_t now_us, std::int64_t lead_us) const {

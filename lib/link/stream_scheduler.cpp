@@ -95,8 +95,8 @@ void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, Ti
     } else {
       // A table run of which nothing has been sent is another one now; it goes out as a stream.
       stream.run.reset();
+      stream.finished = false;
     }
-    stream.finished = false;
   }
   if (sent == 0) return;
   // Two wishes before the first was sent: one replacement must serve both, so it takes the earlier

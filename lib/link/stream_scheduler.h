@@ -136,6 +136,7 @@ class StreamScheduler {
   void go_back(McuIndex mcu, std::uint8_t motor);
 
   // stream_frames.cpp
+  void finish_ended(McuIndex mcu);
   static Choice choose(const Mcu& mcu, Tick first);
   bool send_ticks_of(std::int64_t now_us, McuIndex mcu, const Filling& filling);
   void send_table_runs(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first);

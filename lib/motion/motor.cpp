@@ -306,6 +306,10 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
     return true;
   }
   if (mcu.faults != 0) return true;
+  if (told && mcu.trigger_state == BUSHD_TRIGGER_ARMED && !armed.confirmed) {
+    std::get<Armed>(activity_).confirmed = true;
+    events.emplace_back(event::Waits{});
+  }
   if (report.requests_open) return false;
   const std::string name = "MCU " + setup_.mcu;
   const bool refused_for_limit = !told && mcu.last_rejection == BUSHD_E_FORBIDDEN;

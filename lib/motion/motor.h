@@ -46,6 +46,7 @@ struct Moving {
 struct Armed {
   std::uint8_t number;  // of link::Master::arm
   std::int64_t steps;
+  bool confirmed = false;                 // the MCU has said that it waits
   bool stops = false;                     // as soon as it has started: that came before disarming
   std::optional<std::string> ended_by{};  // the motor armed with it whose end ends it too
 };
@@ -70,6 +71,7 @@ struct PositionTrust {
 
 // What follows from a report, to be done in this order.
 namespace event {
+struct Waits {};  // for the trigger: an edge from now on starts it
 struct Started {  // by the trigger: from now on it is a table run like any other
   Tick start;
   std::uint32_t late_ns;
@@ -88,8 +90,8 @@ struct Ended {
   bool was_armed = false;
 };
 }  // namespace event
-using Event = std::variant<event::Started, event::Executed, event::Replan, event::Drop,
-                           event::Mismatch, event::Turn, event::Ended>;
+using Event = std::variant<event::Waits, event::Started, event::Executed, event::Replan,
+                           event::Drop, event::Mismatch, event::Turn, event::Ended>;
 
 class Motor {
  public:

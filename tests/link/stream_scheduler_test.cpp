@@ -254,6 +254,46 @@ TEST_F(Replacing, OfARunCancelledBeforeItsStartHasNoFollowers) {
   while (const auto ticks = next()) EXPECT_EQ(ticks->mask & 2, 0);
 }
 
+// A motor whose last tick the MCU has, and whose other plan it then does not get.
+class ReplacingAnEnded : public Scheduling {
+ protected:
+  ReplacingAnEnded() {
+    plan_until(1026);
+    streams.begin(kFirst, 0, 1010);
+    fill();
+    writer.reset(kNowUs);
+    known_until(0, 1026);
+    plan_until(1200);
+    streams.replace(kFirst, 1, 1020, 1000);
+  }
+  void plan_until(Tick end) {
+    source.end = [end](std::uint8_t) { return end; };
+  }
+};
+
+TEST_F(ReplacingAnEnded, GoesOnIfItIsTaken) {
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  EXPECT_EQ(frame(), (Ticks{1, 1020, 16, BUSHD_TICKS_REPLACE, 1}));
+  EXPECT_EQ(next(), (Ticks{1, 1036, 16, 0, 1}));
+}
+
+TEST_F(ReplacingAnEnded, HasNoFollowersIfItWasTooLateAndThePlanStays) {
+  ASSERT_TRUE(streams.fail_late_replacements(kNowUs + 60'000));
+  plan_until(1026);
+  EXPECT_FALSE(next());
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+}
+
+TEST_F(ReplacingAnEnded, HasNoFollowersIfItWasNotTakenAndThePlanStays) {
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  take_sent(writer);
+  streams.follow_report(kFirst);  // in epoch 0
+  ASSERT_EQ(events.size(), 1u);
+  plan_until(1026);
+  EXPECT_FALSE(next());
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+}
+
 // Its frame may take longer than until its tick.
 TEST_F(Replacing, TooLateToArriveFailsUnsent) {
   streams.replace(kFirst, 1, 1010, 1000);

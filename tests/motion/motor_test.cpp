@@ -160,6 +160,20 @@ TEST_F(MotorTest, WaitsForTheTriggerAndStopsIfThatCameFirst) {
   EXPECT_TRUE(motor.is<Moving>());
 }
 
+TEST_F(MotorTest, IsArmedOnceItsMcuSaysSo) {
+  motor.arm(9, kSteps);
+  EXPECT_FALSE(motor.as<Armed>()->confirmed);
+  requests_open = true;
+  mcu.trigger_number = 8;
+  mcu.trigger_state = BUSHD_TRIGGER_ARMED;
+  EXPECT_TRUE(report(kStart).empty()) << "that was another one";
+  EXPECT_FALSE(motor.as<Armed>()->confirmed);
+  mcu.trigger_number = 9;
+  EXPECT_NE(find<event::Waits>(report(kStart + 1)), nullptr);
+  EXPECT_TRUE(motor.as<Armed>()->confirmed);
+  EXPECT_TRUE(report(kStart + 2).empty()) << "told once";
+}
+
 TEST_F(MotorTest, WhatDisarmsItEndsIt) {
   motor.arm(9, kSteps);
   motor.stop("phi");
