@@ -24,7 +24,7 @@ enum class Activity {
   kMoving,
   kArmed,   // at rest, waits for the trigger of its MCU
   kHoming,  // or waits until the MCU has homed another one
-  kLocal    // moved by the local inputs of its MCU
+  kLocal    // moved by the local inputs of its MCU, or by another master of its line
 };
 
 // How far a position can be relied on.
