@@ -45,7 +45,8 @@ motion::Axis* Bus::axis_of(link::McuIndex mcu, Output output) {
 }
 
 Result<void> Mcu::must_be_online() const {
-  if (online()) return {};
+  if (online() && view().outdated_us == 0) return {};
+  if (online()) return fail("MCU " + name() + " has not reported since this daemon stood still");
   return fail("MCU " + name() + " is offline: " + view().detail);
 }
 

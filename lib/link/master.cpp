@@ -54,11 +54,27 @@ void Master::port_lost(std::int64_t now_us, const std::string& cause) {
 }
 
 void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
+  notice_standing_still(now_us);
   transactions_.receive(now_us, bytes);
+}
+
+// While an MCU is not offline it is asked again and again, unless nobody calls step(). Another
+// master may have taken the place of one that was silent for so long; answers that have waited
+// meanwhile are of a time that is over.
+void Master::notice_standing_still(std::int64_t now_us) {
+  const std::int64_t still_us = now_us - stepped_us_;
+  if (!port_open_ || still_us < Synchroniser::kOtherMasterUs) return;
+  transactions_.abandon();
+  for (McuRecord& mcu : mcus_) {
+    if (mcu.view.phase != McuPhase::kOnline) continue;
+    mcu.view.outdated_us = still_us;
+    mcu.poll_wanted = true;
+  }
 }
 
 std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   writer_.clear();
+  notice_standing_still(now_us);
   stepped_us_ = now_us;
   if (!port_open_) return {};
   transactions_.expire(now_us);

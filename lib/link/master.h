@@ -141,6 +141,7 @@ class Master : private Transactions::Listener, private Connector::Listener {
   void went_offline(McuIndex mcu, bool was_online) override;
   void refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) override;
 
+  void notice_standing_still(std::int64_t now_us);
   void handle_report(std::int64_t now_us, const Transactions::Answer& answer,
                      const bushd_report& report);
   bool send_next(std::int64_t now_us);

@@ -36,6 +36,10 @@ std::string Motor::busy_text() const {
 Result<void> Motor::may_be_used() const {
   if (is<Armed>()) return fail("waits for the trigger; disarm it first");
   if (is<Homing>()) return fail("it is being homed; wait for that result");
+  if (is<Local>() && !autonomous_) {
+    return fail("MCU " + setup_.mcu +
+                " moves it for another master; end that, and wait until it rests");
+  }
   if (is<Local>()) {
     return fail("the local inputs of MCU " + setup_.mcu + " move it; release them first");
   }
@@ -175,7 +179,7 @@ PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
 }
 
 void Motor::rest() {
-  if (autonomous_) {
+  if (autonomous_ || moved_by_other_) {
     activity_ = Local{};
   } else {
     activity_ = Resting{};
@@ -205,7 +209,7 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
     uncertain_reason_ = immediate ? kStoppedImmediately : kUnpowered;
   }
   take_limits(report);
-  follow_autonomous(report);
+  follow_autonomous(report, false);
 }
 
 void Motor::goes_offline(std::int64_t heard_utime_us) {
@@ -217,21 +221,27 @@ void Motor::goes_offline(std::int64_t heard_utime_us) {
 
 std::vector<Event> Motor::report(const Report& report) {
   std::vector<Event> events;
-  position_ = report.of_mcu.motor[output().value].position_steps;
+  const bool free = is<Resting>() || is<Local>();
+  const std::int64_t before =
+      std::exchange(position_, report.of_mcu.motor[output().value].position_steps);
   take_limits(report.of_mcu);
   if (has_plan()) follow(report, events);
-  follow_autonomous(report.of_mcu);
+  follow_autonomous(report.of_mcu, free && position_ != before);
   return events;
 }
 
 // No move has led to where it stands.
-void Motor::follow_autonomous(const bushd_report& report) {
+void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
   const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output()));
   if (before && !autonomous_) {
     if (stops_immediately(report)) uncertain_reason_ = kStoppedImmediately;
     if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) uncertain_reason_ = kUnpowered;
   }
-  if (is<Resting>() || is<Local>()) rest();
+  const bool free = is<Resting>() || is<Local>();
+  // The bit alone may be that of a plan of this daemon's that has just ended.
+  moved_by_other_ =
+      free && has_bit(report.moving, output()) && (moved_by_other_ || moved_without_plan);
+  if (free) rest();
 }
 
 void Motor::follow(const Report& report, std::vector<Event>& events) {
@@ -247,12 +257,20 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
   }
   if (report.of_mcu.faults != 0) {
     // The MCU takes no more ticks; what it has, it runs, and then down its own table.
+    if (auto* now = std::get_if<Moving>(&activity_)) now->faults |= report.of_mcu.faults;
     if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
     return;
   }
   // It has not told of the emergency stop yet, with which its plan was given up.
   if (report.emergency_stop_open) return;
   auto& now = std::get<Moving>(activity_);
+  if (now.faults != 0) {
+    // Another master has cleared them as soon as the motor stood.
+    bushd_report before = report.of_mcu;
+    before.faults = now.faults;
+    if (!moving) events.emplace_back(end_by_fault(before));
+    return;
+  }
   if (now.limit == 0) {
     if (const auto change = axis_.executed(report.tick)) {
       events.emplace_back(event::Executed{*change});

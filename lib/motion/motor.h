@@ -41,6 +41,7 @@ struct Resting {};
 struct Moving {
   bool position_mismatch = false;  // counted otherwise than planned; it is being stopped
   int limit = 0;                   // +1, -1: its limit switch at this end stops it
+  std::uint8_t faults = 0;         // with which its MCU runs it down
 };
 // Waits for the trigger, or for the MCU to say that it does: the axis has no start yet.
 struct Armed {
@@ -51,7 +52,7 @@ struct Armed {
   std::optional<std::string> ended_by{};  // the motor armed with it whose end ends it too
 };
 struct Homing {};  // by its MCU, or it waits for its turn
-struct Local {};   // the inputs at its MCU move it
+struct Local {};   // the inputs at its MCU move it, or another master does
 using Activity = std::variant<Resting, Moving, Armed, Homing, Local>;
 
 // What an MCU reports, and what is known beside.
@@ -189,7 +190,7 @@ class Motor {
   event::Ended end_at_limit();
   event::Ended end_by_fault(const bushd_report& report);
   event::Ended ended(Outcome outcome, std::string reason);
-  void follow_autonomous(const bushd_report& report);
+  void follow_autonomous(const bushd_report& report, bool moved_without_plan);
   void rest();
   std::string did_not_start() const;
 
@@ -207,7 +208,8 @@ class Motor {
   };
   std::optional<Lost> lost_;  // its MCU is offline
   std::optional<std::string> uncertain_reason_;
-  bool autonomous_ = false;  // as reported last: its MCU moves it by itself
+  bool autonomous_ = false;      // as reported last: its MCU moves it by itself
+  bool moved_by_other_ = false;  // likewise: it has moved and still does, without a plan here
   bool forbidden_up_ = false;
   bool forbidden_down_ = false;
 };
