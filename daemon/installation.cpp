@@ -104,7 +104,9 @@ void Installation::add_motors() {
             .local = config.local,
             .limit_immediate = config.limit_action == BUSHD_STOP_IMMEDIATE,
             .emergency_stop_immediate = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
-            .emergency_input_immediate = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE},
+            .emergency_input_immediate = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE,
+            .coordinates = config.coordinates,
+            .soft_limits = config.soft_limits},
         new_axis({motors_.size()}));
     motor_by_name_[config.name] = id;
     mcus_[config.mcu].motor_at_[config.output.value] = id;
@@ -151,9 +153,9 @@ Result<std::vector<MotorId>> Installation::find(const api::MotorNames& names) co
   return motors;
 }
 
-Result<std::vector<MotorId>> Installation::find(const std::vector<api::MotorSteps>& motors) const {
+Result<std::vector<MotorId>> Installation::find(const std::vector<api::MotorAmount>& motors) const {
   api::MotorNames names;
-  for (const api::MotorSteps& motor : motors) names.push_back(motor.motor);
+  for (const api::MotorAmount& motor : motors) names.push_back(motor.motor);
   return find(names);
 }
 

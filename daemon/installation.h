@@ -158,7 +158,7 @@ class Installation {
   // By the names that clients use; none of them twice.
   Result<MotorId> find(const std::string& name) const;
   Result<std::vector<MotorId>> find(const api::MotorNames& names) const;
-  Result<std::vector<MotorId>> find(const std::vector<api::MotorSteps>& motors) const;
+  Result<std::vector<MotorId>> find(const std::vector<api::MotorAmount>& motors) const;
   Result<std::vector<MotorId>> find_or_all(const api::MotorNames& names) const;  // none named: all
 
   const Tables& tables() const { return tables_; }

@@ -8,8 +8,8 @@ namespace bushd::daemon {
 namespace {
 
 void put_motors(nlohmann::json& line, const auto& request) {
-  if constexpr (requires { request.motors.front().steps; }) {
-    for (const api::MotorSteps& motor : request.motors) line["motors"].push_back(motor.motor);
+  if constexpr (requires { request.motors.front().amount; }) {
+    for (const api::MotorAmount& motor : request.motors) line["motors"].push_back(motor.motor);
   } else if constexpr (requires { request.motors; }) {
     for (const std::string& motor : request.motors) line["motors"].push_back(motor);
   } else if constexpr (requires { request.motor; }) {

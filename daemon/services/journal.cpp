@@ -92,6 +92,18 @@ void Journal::position_corrected(MotorId motor, std::int64_t from_steps) {
   outputs_.move_log(line.dump());
 }
 
+void Journal::offset_set(MotorId id, const api::Asker& by) {
+  const motion::Motor& motor = installation_[id];
+  nlohmann::json line = {{"event", "offset"},
+                         {"motor", motor.name()},
+                         {"position_steps", motor.position_steps()},
+                         {"user", motor.coordinates().user_of(motor.position_steps())},
+                         {"offset", motor.coordinates().scale().offset},
+                         {"number", by.number}};
+  if (by.session) line["client"] = by.session->client_id();
+  outputs_.move_log(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
 void Journal::before_report(MotorId id, bool being_set) {
   if (autonomous_[id]) return;
   const motion::Motor& motor = installation_[id];

@@ -34,21 +34,26 @@ Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   std::vector<Part> parts;
   for (std::size_t i = 0; i < motors->size(); ++i) {
-    const auto target = target_of((*motors)[i], move.motors[i].steps, move.kind);
+    const auto target = target_of((*motors)[i], move.motors[i].amount, move.kind);
     if (!target) return fail(target.error());
     parts.push_back({(*motors)[i], *target});
   }
   return parts;
 }
 
-Result<std::int64_t> Moves::target_of(MotorId id, std::int64_t steps, api::Move::Kind kind) const {
+Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount,
+                                      api::Move::Kind kind) const {
   const motion::Motor& motor = installation_[id];
+  const bool absolute = kind == api::Move::Kind::kAbsolute;
+  const auto counted = absolute ? motor.steps_of_position(amount) : motor.steps_of_distance(amount);
+  if (!counted) return fail(motor.name() + ": " + counted.error().message);
+  const std::int64_t steps = *counted;
   // Compared before any arithmetic: the sum of two values from outside could overflow.
   if (steps > 2 * kMaxPosition || steps < -2 * kMaxPosition) {
     return fail(motor.name() + ": " + std::to_string(steps) +
                 " steps is out of range; allowed: +-" + std::to_string(kMaxPosition));
   }
-  const std::int64_t from = kind == api::Move::Kind::kAbsolute ? 0 : motor.target_steps();
+  const std::int64_t from = absolute ? 0 : motor.target_steps();
   auto may = interlocks_.may_move(id);
   if (may) may = motor.may_move_to(from + steps);
   if (!may) return fail(motor.name() + ": " + may.error().text());

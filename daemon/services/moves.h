@@ -31,7 +31,8 @@ class Moves final : public Service {
 
   // Checks where a motor of a request may go, "NAME: WHY" if not. `by` counts from where it stands,
   // or from its present target.
-  Result<std::int64_t> target_of(MotorId motor, std::int64_t steps, api::Move::Kind kind) const;
+  Result<std::int64_t> target_of(MotorId motor, const api::Amount& amount,
+                                 api::Move::Kind kind) const;
 
   // Ramps down those that move; those that wait for the trigger wait no more.
   void stop(std::int64_t now_us, const std::vector<MotorId>& motors);

@@ -29,9 +29,14 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason)
   std::vector<api::MotorResult> results;
   for (std::size_t i = 0; i < finished->motors.size(); ++i) {
     const motion::MotorOutcome& part = finished->motors[i];
+    const units::Coordinates& coordinates = installation_[part.motor].coordinates();
     results.push_back({.motor = installation_[part.motor].name(),
                        .outcome = part.outcome,
                        .position_steps = part.position_steps,
+                       .user = coordinates.user_of(part.position_steps),
+                       .dial = coordinates.dial_of(part.position_steps),
+                       .unit = coordinates.unit(),
+                       .precision = coordinates.precision(),
                        .table = open.mapped().tables[i]});
   }
   open.mapped().asker.answer(api::Completed{

@@ -9,14 +9,14 @@ bool within(std::int64_t value, std::int64_t least, std::int64_t most) {
   return value >= least && value <= most;
 }
 
-bushd_position_compare message_of(const api::PositionCompare& request, Output output) {
+bushd_position_compare message_of(const api::PositionCompare& request, const motion::Motor& motor) {
   bushd_position_compare message{};
-  message.motor = output.value;
+  message.motor = motor.output().value;
   message.width_us = 1;
   if (!request.arrivals.any()) return message;
   if (request.arrivals.positive) message.arrivals |= BUSHD_ARRIVES_POSITIVE;
   if (request.arrivals.negative) message.arrivals |= BUSHD_ARRIVES_NEGATIVE;
-  message.position_steps = static_cast<std::int32_t>(request.position_steps);
+  message.position_steps = static_cast<std::int32_t>(*motor.steps_of_position(request.position));
   message.delay_us = static_cast<std::uint32_t>(request.delay_us);
   message.width_us = static_cast<std::uint32_t>(request.width_us);
   return message;
@@ -30,7 +30,7 @@ void PositionCompare::request(std::int64_t now_us, const api::Asker& asker,
   if (!motor) return asker.answer(api::Refused{motor.error().text()});
   Mcu& mcu = installation_.mcu_of(*motor);
   open_.emplace_back(asker, std::vector{mcu.id}, now_us);
-  mcu.compare_positions(message_of(request, installation_[*motor].output()));
+  mcu.compare_positions(message_of(request, installation_[*motor]));
 }
 
 Result<MotorId> PositionCompare::check(const api::PositionCompare& request) const {
@@ -42,7 +42,9 @@ Result<MotorId> PositionCompare::check(const api::PositionCompare& request) cons
     return fail("MCU " + mcu.name() + " has no position compare output");
   }
   if (!request.arrivals.any()) return id;
-  if (!within(request.position_steps, -motion::Motor::kMaxPosition, motion::Motor::kMaxPosition)) {
+  const auto position = installation_[*id].steps_of_position(request.position);
+  if (!position) return fail(request.motor + ": " + position.error().message);
+  if (!within(*position, -motion::Motor::kMaxPosition, motion::Motor::kMaxPosition)) {
     return fail(request.motor + ": positions lie within +-" +
                 std::to_string(motion::Motor::kMaxPosition));
   }

@@ -30,42 +30,74 @@ bool Positions::being_set(MotorId motor) const {
 
 void Positions::request(std::int64_t now_us, const api::Asker& asker,
                         const api::SetPosition& request) {
-  auto parts = parts_of(request);
-  if (!parts) return asker.answer(api::Refused{parts.error().text()});
+  auto plan = plan_of(request);
+  if (!plan) return asker.answer(api::Refused{plan.error().text()});
+  for (Offset& offset : plan->offsets) {
+    installation_[offset.motor].set_coordinates(std::move(offset.coordinates));
+    journal_.offset_set(offset.motor, asker);
+    installation_.changed = true;
+  }
   std::vector<MotorId> motors;
-  for (const Part& part : *parts) motors.push_back(part.motor);
+  for (const Part& part : plan->parts) motors.push_back(part.motor);
   open_.push_back({Confirmation(asker, installation_.mcus_of(motors), now_us), {}});
-  for (const auto& [id, steps, from_steps] : *parts) {
+  for (const auto& [id, steps, from_steps] : plan->parts) {
     installation_.mcu_of(id).set_position(installation_[id].output(), steps);
   }
-  open_.back().parts = std::move(*parts);
+  open_.back().parts = std::move(plan->parts);
 }
 
-Result<std::vector<Positions::Part>> Positions::parts_of(const api::SetPosition& request) const {
+Result<Positions::Plan> Positions::plan_of(const api::SetPosition& request) const {
   const auto motors = installation_.find(request.motors);
   if (!motors) return fail(motors.error());
-  std::vector<Part> parts;
+  Plan plan;
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const MotorId id = (*motors)[i];
-    const motion::Motor& motor = installation_[id];
-    const std::int64_t steps = request.motors[i].steps;
-    if (!motor.is<motion::Resting>()) {
-      return fail(motor.busy_text() + "; its position can be set at rest only");
+    if (auto may = may_be_set(id); !may) return fail(may.error());
+    if (auto added = add(id, request.motors[i].amount, request.dial, plan); !added) {
+      return fail(installation_[id].name() + ": " + added.error().message);
     }
-    if (being_set(id)) {
-      return fail(motor.name() + ": its position is being set; wait for that result");
-    }
-    if (steps > kMaxPosition || steps < -kMaxPosition) {
-      return fail(motor.name() + ": positions lie within +-" + std::to_string(kMaxPosition));
-    }
-    parts.push_back({id, static_cast<std::int32_t>(steps), motor.position_steps()});
   }
   for (const MotorId id : *motors) {
     if (const auto online = installation_.mcu_of(id).must_be_online(); !online) {
       return fail(online.error());
     }
   }
-  return parts;
+  return plan;
+}
+
+Result<void> Positions::may_be_set(MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  if (!motor.is<motion::Resting>()) {
+    return fail(motor.busy_text() + "; its position can be set at rest only");
+  }
+  if (being_set(id)) {
+    return fail(motor.name() + ": its position is being set; wait for that result");
+  }
+  return {};
+}
+
+Result<void> Positions::add(MotorId id, const api::Amount& position, bool dial, Plan& plan) const {
+  const motion::Motor& motor = installation_[id];
+  const units::Coordinates& coordinates = motor.coordinates();
+  const auto* user = std::get_if<api::UserUnits>(&position);
+  if (user != nullptr && !dial && coordinates.has_unit()) {
+    if (motor.uncertain_reason()) {
+      return fail("its position is uncertain, because " + *motor.uncertain_reason() +
+                  "; home it, or say where it stands on the dial ('bushctl set NAME --dial')");
+    }
+    auto moved = coordinates.with_user(user->value, motor.position_steps());
+    if (!moved) return fail(moved.error());
+    plan.offsets.push_back({id, std::move(*moved)});
+    return {};
+  }
+  const auto steps = user != nullptr && dial ? coordinates.steps_of_dial(user->value)
+                                             : motor.steps_of_position(position);
+  if (!steps) return fail(steps.error());
+  if (*steps > kMaxPosition || *steps < -kMaxPosition) {
+    return fail("positions lie within +-" + std::to_string(kMaxPosition));
+  }
+  plan.parts.push_back({id, static_cast<std::int32_t>(*steps), motor.position_steps()});
+  return {};
 }
 
 void Positions::follow(std::int64_t now_us, const Mcu* reported) {

@@ -1,4 +1,5 @@
-// Sets where motors stand, and so makes their positions known.
+// Says where motors stand: sets their positions, which are known then, or the offsets of their user
+// positions.
 #pragma once
 
 #include <cstdint>
@@ -30,11 +31,22 @@ class Positions final : public Service {
     std::int32_t steps;
     std::int64_t from_steps;
   };
+  struct Offset {
+    MotorId motor;
+    units::Coordinates coordinates;
+  };
+  // What is asked of all motors, checked.
+  struct Plan {
+    std::vector<Part> parts{};
+    std::vector<Offset> offsets{};
+  };
   struct Setting {
     Confirmation confirmation;
     std::vector<Part> parts;
   };
-  Result<std::vector<Part>> parts_of(const api::SetPosition& request) const;
+  Result<Plan> plan_of(const api::SetPosition& request) const;
+  Result<void> may_be_set(MotorId motor) const;
+  Result<void> add(MotorId motor, const api::Amount& position, bool dial, Plan& plan) const;
   void follow(std::int64_t now_us, const Mcu* reported);
   void end(const Setting& setting, const Result<void>& ended);
 

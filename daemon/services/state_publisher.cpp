@@ -81,7 +81,10 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   api::MotorState state;
   state.name = motor.name();
   state.position_steps = motor.position_steps();
+  state.user = motor.coordinates().user_of(motor.position_steps());
+  state.dial = motor.coordinates().dial_of(motor.position_steps());
   state.target_steps = motor.target_steps();
+  state.user_target = motor.coordinates().user_of(motor.target_steps());
   state.velocity_steps_per_s = motor.velocity_steps_per_s();
   state.activity = activity_of(motor);
   // Motors follow reports only once their MCU is online.
@@ -133,10 +136,16 @@ api::Description StatePublisher::description_of(const Mcu& mcu) const {
                                .motors = {}};
   for (const MotorId motor : mcu.motors()) {
     const config::Motor& config = installation_.config()[motor];
+    const units::Coordinates& coordinates = installation_[motor].coordinates();
+    units::Scale scale = coordinates.scale();
+    scale.decimals = coordinates.precision();
     description.motors.push_back({.name = config.name,
                                   .output = config.output.value,
                                   .group = installation_.config().group_of(config).name,
-                                  .table = api::ref_to(*installation_.table_of(motor))});
+                                  .table = api::ref_to(*installation_.table_of(motor)),
+                                  .text = config.description,
+                                  .scale = std::move(scale),
+                                  .soft_limits = installation_[motor].soft_limits()});
   }
   return description;
 }

@@ -11,11 +11,12 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   asker.answer(api::Accepted{});
   open_moves_.open(asker, *motors);
   std::map<McuId, std::vector<link::Master::Armed>> moves;
+  const std::vector<std::int64_t> steps = steps_of(*motors, request);
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const MotorId motor = (*motors)[i];
     moves[installation_.config()[motor].mcu].push_back(
         {.motor = installation_[motor].output().value,
-         .steps = static_cast<std::int32_t>(request.motors[i].steps)});
+         .steps = static_cast<std::int32_t>(steps[i])});
   }
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
   std::map<McuId, std::uint8_t> numbers;
@@ -25,7 +26,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   }
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const MotorId motor = (*motors)[i];
-    installation_[motor].arm(numbers[installation_.config()[motor].mcu], request.motors[i].steps);
+    installation_[motor].arm(numbers[installation_.config()[motor].mcu], steps[i]);
   }
   installation_.changed = true;
 }
@@ -36,7 +37,7 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const auto target =
-        moves_.target_of((*motors)[i], request.motors[i].steps, api::Move::Kind::kRelative);
+        moves_.target_of((*motors)[i], request.motors[i].amount, api::Move::Kind::kRelative);
     if (!target) return fail(target.error());
   }
   if (request.delay_us < BUSHD_TRIGGER_MIN_DELAY_US ||
@@ -45,10 +46,21 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
                 " us after the trigger; allowed: " + std::to_string(BUSHD_TRIGGER_MIN_DELAY_US) +
                 " to " + std::to_string(BUSHD_TRIGGER_MAX_DELAY_US));
   }
+  const std::vector<std::int64_t> steps = steps_of(*motors, request);
   for (std::size_t i = 0; i < motors->size(); ++i) {
-    if (auto may = may_arm((*motors)[i], request.motors[i].steps); !may) return fail(may.error());
+    if (auto may = may_arm((*motors)[i], steps[i]); !may) return fail(may.error());
   }
   return motors;
+}
+
+// Precondition: Moves::target_of has no objection.
+std::vector<std::int64_t> Trigger::steps_of(const std::vector<MotorId>& motors,
+                                            const api::Arm& request) const {
+  std::vector<std::int64_t> steps;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    steps.push_back(*installation_[motors[i]].steps_of_distance(request.motors[i].amount));
+  }
+  return steps;
 }
 
 Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {

@@ -34,6 +34,8 @@ class Trigger final : public Service {
     std::string done = "done";
   };
   Result<std::vector<MotorId>> motors_of(const api::Arm& request) const;
+  std::vector<std::int64_t> steps_of(const std::vector<MotorId>& motors,
+                                     const api::Arm& request) const;
   Result<void> may_arm(MotorId motor, std::int64_t steps) const;
   void follow();
 

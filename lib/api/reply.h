@@ -26,7 +26,11 @@ struct MotorResult {
   std::string motor{};
   Outcome outcome = Outcome::kFault;
   std::int64_t position_steps = 0;  // where its MCU says that it stands
-  TableRef table{};                 // by which it has moved
+  double user = 0;                  // the same for people (units/coordinates.h)
+  double dial = 0;
+  std::string unit = "steps";
+  int precision = 0;  // decimals of both
+  TableRef table{};   // by which it has moved
 };
 
 // What a move would be.

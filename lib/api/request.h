@@ -17,11 +17,19 @@
 
 namespace bushd::api {
 
-// One motor and a number of steps: where to, or by how many. Within +-(2^31 - 1).
-struct MotorSteps {
+// In the motor's unit, on the user's scale (units/coordinates.h). Of a motor without a unit: steps.
+struct UserUnits {
+  double value = 0;
+  friend bool operator==(const UserUnits&, const UserUnits&) = default;
+};
+// A position or a distance, in steps or in the motor's unit: the nearest step counts. Within
+// +-(2^31 - 1) steps.
+using Amount = std::variant<std::int64_t, UserUnits>;
+
+struct MotorAmount {
   std::string motor{};
-  std::int64_t steps = 0;
-  friend bool operator==(const MotorSteps&, const MotorSteps&) = default;
+  Amount amount{};
+  friend bool operator==(const MotorAmount&, const MotorAmount&) = default;
 };
 
 using MotorNames = std::vector<std::string>;
@@ -32,11 +40,11 @@ using MotorNames = std::vector<std::string>;
 // motor cannot move.
 struct Move {
   enum class Kind {
-    kRelative,  // by so many steps, of a motor that moves from its present target
+    kRelative,  // by so much, of a motor that moves from its present target
     kAbsolute   // to this position
   };
   Kind kind = Kind::kRelative;
-  std::vector<MotorSteps> motors{};  // at least one, none twice
+  std::vector<MotorAmount> motors{};  // at least one, none twice
   bool dry_run = false;  // from rest only: result kDone with a MovePlan, and nothing moves
 };
 
@@ -59,9 +67,12 @@ struct Disable {
   MotorNames motors{};
 };
 
-// Sets where these motors, at rest, stand. Makes their positions known.
+// Says where these motors, at rest, stand. In user units, of a motor that has a unit: changes the
+// offset, so that where it stands is this user position. Otherwise, and with `dial`: sets the
+// position, which is known then.
 struct SetPosition {
-  std::vector<MotorSteps> motors{};  // at least one
+  std::vector<MotorAmount> motors{};  // at least one
+  bool dial = false;                  // user units are those of the dial
 };
 
 // Clears latched faults of the MCUs of these motors, none named: of all. Refused while one moves.
@@ -88,8 +99,8 @@ struct Home {
 // Motors, at rest, wait for an edge at the trigger input of their MCU and begin together after it.
 struct Arm {
   Edge edge = Edge::kRising;
-  std::int64_t delay_us = 0;         // 50..1500000, three ticks come on top
-  std::vector<MotorSteps> motors{};  // by so many steps, not 0
+  std::int64_t delay_us = 0;          // 50..1500000, three ticks come on top
+  std::vector<MotorAmount> motors{};  // by so much, not 0
 };
 
 // Motors that wait for the trigger do so no more, nor do those armed with them; none named: all.
@@ -100,8 +111,8 @@ struct Disarm {
 // The position compare output of the motor's MCU pulses when the motor arrives at the position.
 struct PositionCompare {
   std::string motor{};
-  std::int64_t position_steps = 0;
-  Directions arrivals{};      // by steps in these directions; none: no pulses any more
+  Amount position{};
+  Directions arrivals{};      // on the dial, by steps in these directions; none: no pulses any more
   std::int64_t delay_us = 0;  // from the step to the pulse, 0..1500000
   std::int64_t width_us = 0;  // of the pulse, 1..1000000; of no meaning without arrivals
 };

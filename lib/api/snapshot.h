@@ -11,14 +11,18 @@
 #include "api/reply.h"
 #include "api/words.h"
 #include "base/ids.h"
+#include "units/coordinates.h"
 
 namespace bushd::api {
 
 struct MotorState {
   std::string name{};
   std::int64_t position_steps = 0;  // as its MCU reported last; no number while Trust::kUnknown
+  double user = 0;                  // the same for people (units/coordinates.h)
+  double dial = 0;
   // Where it will stand in the end, also after a stop; without a move of the daemon's where it is.
   std::int64_t target_steps = 0;
+  double user_target = 0;
   double velocity_steps_per_s = 0;  // signed, of the running step; 0 unless Activity::kMoving
   Activity activity = Activity::kResting;
   bool moving = false;     // it makes steps, or is about to; not while armed
@@ -49,7 +53,10 @@ struct MotorDescription {
   std::string name{};
   std::uint8_t output = 0;
   std::string group{};
-  TableRef table{};  // in service, for the next move
+  TableRef table{};      // in service, for the next move
+  std::string text{};    // what people call it; may be empty
+  units::Scale scale{};  // with the number of decimals
+  std::optional<units::SoftLimits> soft_limits{};
   friend bool operator==(const MotorDescription&, const MotorDescription&) = default;
 };
 

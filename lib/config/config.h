@@ -17,6 +17,7 @@
 #include "engine/message.h"
 #include "fieldbus/emission_setup.h"
 #include "tables/table.h"
+#include "units/coordinates.h"
 
 namespace bushd::config {
 
@@ -92,6 +93,9 @@ struct Motor {
   bool input_active_open = false;
   std::optional<Home> home = {};
   bool local = false;  // its MCU's FORWARD and REVERSE inputs move it
+  std::string description{};
+  units::Coordinates coordinates{};
+  std::optional<units::SoftLimits> soft_limits = {};
 };
 
 struct Config {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "config/checks.h"
+#include "config/coordinates.h"
 #include "config/emission_section.h"
 #include "config/home.h"
 #include "config/inputs.h"
@@ -371,8 +372,10 @@ Result<void> read_motors(Loading* loading) {
   Taken spoken_names;
   Taken outputs;
   for (const TomlReader& reader : loading->motors) {
-    if (auto known = reader.only({"name", "mcu", "output", "group", "limit", "limit_action",
-                                  "input_active", "home", "local"});
+    if (auto known =
+            reader.only({"name", "mcu", "output", "group", "limit", "limit_action", "input_active",
+                         "home", "local", "description", "unit", "steps_per_unit", "direction",
+                         "offset", "precision", "soft_limits"});
         !known) {
       return known;
     }
@@ -401,6 +404,7 @@ Result<void> read_motors(Loading* loading) {
                 .group = *group};
     if (auto read = read_inputs(reader, &motor); !read) return read;
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
+    if (auto read = read_coordinates(reader, &motor); !read) return read;
     config.motors.push_back(std::move(motor));
   }
   return {};

@@ -14,8 +14,9 @@ constexpr Layout kRequest{"llsl"};
 constexpr Layout kBare{"t", {&kRequest}};
 constexpr Layout kMotors{"tnS", {&kRequest}};
 constexpr Layout kReplyHeader{"llslbssii"};
-constexpr Layout kMotor{"slldbsbbsssl"};
-constexpr Layout kMotorDescription{"shst", {&kTableRef}};
+constexpr Layout kMotor{"slddlddbsbbsssl"};
+constexpr Layout kMotorAmount{"sbld"};
+constexpr Layout kMotorDescription{"shstsssbdbbdddd", {&kTableRef}};
 constexpr Layout kMcuHealth{"sisiisillllllliddb"};
 
 }  // namespace
@@ -31,7 +32,7 @@ BUSHD_LAYOUT(hello_t, "lsl")
 BUSHD_LAYOUT(welcome_t, "llsll")
 BUSHD_LAYOUT(subscribe_t, "bbb")
 
-BUSHD_LAYOUT(arm_t, "tblnSL", {&kRequest})
+BUSHD_LAYOUT(arm_t, "tblnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(clear_faults_t, kMotors)
 BUSHD_LAYOUT(disable_t, kMotors)
 BUSHD_LAYOUT(disarm_t, kMotors)
@@ -41,15 +42,15 @@ BUSHD_LAYOUT(get_status_t, kBare)
 BUSHD_LAYOUT(get_table_t, "ts", {&kRequest})
 BUSHD_LAYOUT(home_t, kMotors)
 BUSHD_LAYOUT(list_tables_t, kBare)
-BUSHD_LAYOUT(move_t, "tbbnSL", {&kRequest})
-BUSHD_LAYOUT(position_compare_t, "tslbll", {&kRequest})
+BUSHD_LAYOUT(move_t, "tbbnT", {&kRequest, &kMotorAmount})
+BUSHD_LAYOUT(position_compare_t, "ttbll", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(reload_tables_t, kBare)
-BUSHD_LAYOUT(set_position_t, "tnSL", {&kRequest})
+BUSHD_LAYOUT(set_position_t, "tbnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(set_table_t, "tsst", {&kRequest, &kTable})
 BUSHD_LAYOUT(stop_t, kMotors)
 BUSHD_LAYOUT(use_table_t, "tss", {&kRequest})
 
-BUSHD_LAYOUT(answer_t, "tnSSLHnTnT", {&kReplyHeader, &kTableRef, &kMovePlan})
+BUSHD_LAYOUT(answer_t, "tnSSLDDSBHnTnT", {&kReplyHeader, &kTableRef, &kMovePlan})
 BUSHD_LAYOUT(table_answer_t, "tnTnT", {&kReplyHeader, &kTableEntry, &kTable})
 
 BUSHD_LAYOUT(mcu_state_t, "llliisssssillnT", {&kMotor})

@@ -12,6 +12,8 @@
 namespace bushd::lcm {
 namespace {
 
+constexpr int kMostDecimals = units::Coordinates::kMostDecimals;
+
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
@@ -90,6 +92,10 @@ void put(answer_t& answer, Piece<api::MotorResult> motors) {
     answer.motors.push_back(motor.motor);
     answer.outcomes.push_back(text(word(motor.outcome)));
     answer.position_steps.push_back(motor.position_steps);
+    answer.user_positions.push_back(motor.user);
+    answer.dial_positions.push_back(motor.dial);
+    answer.units.push_back(motor.unit);
+    answer.precisions.push_back(static_cast<std::int8_t>(motor.precision));
     const auto table = std::find(told.begin(), told.end(), motor.table);
     answer.table_of_motor.push_back(static_cast<std::int16_t>(table - told.begin()));
     if (table != told.end()) continue;
@@ -126,8 +132,9 @@ std::size_t size_of(std::string_view string) {
 // What an element takes in a message, or a little more: its table may have been told already.
 std::size_t size_of(const api::MotorResult& motor) {
   const auto table = static_cast<std::size_t>(message_of(motor.table)._getEncodedSizeNoHash());
-  return size_of(motor.motor) + size_of(word(motor.outcome)) + sizeof(std::int64_t) +
-         sizeof(std::int16_t) + table;
+  return size_of(motor.motor) + size_of(word(motor.outcome)) + size_of(motor.unit) +
+         sizeof(std::int64_t) + 2 * sizeof(double) + sizeof(std::int8_t) + sizeof(std::int16_t) +
+         table;
 }
 std::size_t size_of(const api::MovePlan::Motor& motor) {
   return size_of(motor.motor) + 2 * sizeof(std::int64_t) + sizeof(double);
@@ -212,6 +219,10 @@ std::optional<std::vector<api::MotorResult>> motors_of(const answer_t& message) 
     motors.push_back({.motor = message.motors[i],
                       .outcome = *outcome,
                       .position_steps = message.position_steps[i],
+                      .user = message.user_positions[i],
+                      .dial = message.dial_positions[i],
+                      .unit = message.units[i],
+                      .precision = std::clamp<int>(message.precisions[i], 0, kMostDecimals),
                       .table = ref_of(message.tables[table])});
   }
   return motors;

@@ -17,20 +17,32 @@ std::int32_t count(const auto& elements) {
   return static_cast<std::int32_t>(elements.size());
 }
 
-std::vector<api::MotorSteps> motor_steps(const std::vector<std::string>& motors,
-                                         const std::vector<std::int64_t>& steps) {
-  std::vector<api::MotorSteps> out;
+motor_amount_t amount_message(const api::MotorAmount& motor) {
+  motor_amount_t message{};
+  message.motor = motor.motor;
+  if (const auto* steps = std::get_if<std::int64_t>(&motor.amount)) {
+    message.in_steps = 1;
+    message.steps = *steps;
+  } else {
+    message.user = std::get<api::UserUnits>(motor.amount).value;
+  }
+  return message;
+}
+
+api::MotorAmount amount_of(const motor_amount_t& message) {
+  if (message.in_steps != 0) return {message.motor, message.steps};
+  return {message.motor, api::UserUnits{message.user}};
+}
+
+std::vector<api::MotorAmount> amounts_of(const std::vector<motor_amount_t>& motors) {
+  std::vector<api::MotorAmount> out;
   out.reserve(motors.size());
-  for (std::size_t i = 0; i < motors.size(); ++i) out.push_back({motors[i], steps[i]});
+  for (const motor_amount_t& motor : motors) out.push_back(amount_of(motor));
   return out;
 }
 
-void put_motors(auto& message, std::vector<std::int64_t>& steps,
-                const std::vector<api::MotorSteps>& motors) {
-  for (const api::MotorSteps& motor : motors) {
-    message.motors.push_back(motor.motor);
-    steps.push_back(motor.steps);
-  }
+void put_motors(auto& message, const std::vector<api::MotorAmount>& motors) {
+  for (const api::MotorAmount& motor : motors) message.motors.push_back(amount_message(motor));
   message.motor_count = count(motors);
 }
 
@@ -44,14 +56,14 @@ move_t to_message(const api::Move& move) {
   move_t message{};
   message.kind = move.kind == api::Move::Kind::kAbsolute ? move_t::ABSOLUTE : move_t::RELATIVE;
   message.dry_run = move.dry_run ? 1 : 0;
-  put_motors(message, message.steps, move.motors);
+  put_motors(message, move.motors);
   return message;
 }
 std::optional<api::Request> from_message(const move_t& message) {
   if (message.kind != move_t::RELATIVE && message.kind != move_t::ABSOLUTE) return std::nullopt;
   return api::Move{.kind = message.kind == move_t::ABSOLUTE ? api::Move::Kind::kAbsolute
                                                             : api::Move::Kind::kRelative,
-                   .motors = motor_steps(message.motors, message.steps),
+                   .motors = amounts_of(message.motors),
                    .dry_run = message.dry_run != 0};
 }
 
@@ -107,11 +119,12 @@ std::optional<api::Request> from_message(const emergency_stop_t&) {
 
 set_position_t to_message(const api::SetPosition& set) {
   set_position_t message{};
-  put_motors(message, message.position_steps, set.motors);
+  message.dial = set.dial ? 1 : 0;
+  put_motors(message, set.motors);
   return message;
 }
 std::optional<api::Request> from_message(const set_position_t& message) {
-  return api::SetPosition{motor_steps(message.motors, message.position_steps)};
+  return api::SetPosition{.motors = amounts_of(message.motors), .dial = message.dial != 0};
 }
 
 use_table_t to_message(const api::UseTable& use) {
@@ -134,20 +147,19 @@ arm_t to_message(const api::Arm& arm) {
   arm_t message{};
   message.edge = arm.edge == api::Edge::kRising ? arm_t::RISING : arm_t::FALLING;
   message.delay_us = arm.delay_us;
-  put_motors(message, message.steps, arm.motors);
+  put_motors(message, arm.motors);
   return message;
 }
 std::optional<api::Request> from_message(const arm_t& message) {
   if (message.edge != arm_t::RISING && message.edge != arm_t::FALLING) return std::nullopt;
   return api::Arm{.edge = message.edge == arm_t::RISING ? api::Edge::kRising : api::Edge::kFalling,
                   .delay_us = message.delay_us,
-                  .motors = motor_steps(message.motors, message.steps)};
+                  .motors = amounts_of(message.motors)};
 }
 
 position_compare_t to_message(const api::PositionCompare& compare) {
   position_compare_t message{};
-  message.motor = compare.motor;
-  message.position_steps = compare.position_steps;
+  message.position = amount_message({compare.motor, compare.position});
   message.arrivals =
       static_cast<std::int8_t>((compare.arrivals.positive ? position_compare_t::POSITIVE : 0) |
                                (compare.arrivals.negative ? position_compare_t::NEGATIVE : 0));
@@ -159,8 +171,8 @@ std::optional<api::Request> from_message(const position_compare_t& message) {
   constexpr int kBoth = position_compare_t::POSITIVE | position_compare_t::NEGATIVE;
   if ((message.arrivals & ~kBoth) != 0) return std::nullopt;
   return api::PositionCompare{
-      .motor = message.motor,
-      .position_steps = message.position_steps,
+      .motor = message.position.motor,
+      .position = amount_of(message.position).amount,
       .arrivals = {.positive = (message.arrivals & position_compare_t::POSITIVE) != 0,
                    .negative = (message.arrivals & position_compare_t::NEGATIVE) != 0},
       .delay_us = message.delay_us,

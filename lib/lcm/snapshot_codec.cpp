@@ -2,6 +2,7 @@
 #include "lcm/snapshot_codec.h"
 
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "lcm/wire.h"
@@ -48,6 +49,9 @@ motor_t message_of(const api::MotorState& motor) {
   motor_t message{};
   message.name = motor.name;
   message.position_steps = motor.position_steps;
+  message.user_position = motor.user;
+  message.dial_position = motor.dial;
+  message.user_target = motor.user_target;
   message.target_steps = motor.target_steps;
   message.velocity_steps_per_s = motor.velocity_steps_per_s;
   message.moving = motor.moving ? 1 : 0;
@@ -70,7 +74,10 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
   if (message.heard_utime_us != 0) heard_utime_us = message.heard_utime_us;
   return api::MotorState{.name = message.name,
                          .position_steps = message.position_steps,
+                         .user = message.user_position,
+                         .dial = message.dial_position,
                          .target_steps = message.target_steps,
+                         .user_target = message.user_target,
                          .velocity_steps_per_s = message.velocity_steps_per_s,
                          .activity = *activity,
                          .moving = message.moving != 0,
@@ -80,6 +87,51 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
                          .trust = *trust,
                          .uncertain_reason = message.uncertain_reason,
                          .heard_utime_us = heard_utime_us};
+}
+
+void put_scale(motor_description_t& message, const api::MotorDescription& motor) {
+  const auto coordinates = units::Coordinates::make(motor.scale);
+  message.description = motor.text;
+  message.unit = motor.scale.unit;
+  message.steps_per_unit = to_text(motor.scale.steps_per_unit);
+  message.negative = motor.scale.negative ? 1 : 0;
+  message.offset = motor.scale.offset;
+  message.precision = static_cast<std::int8_t>(motor.scale.decimals.value_or(0));
+  if (!motor.soft_limits || !coordinates) return;
+  message.soft_limits = 1;
+  message.dial_low = motor.soft_limits->low;
+  message.dial_high = motor.soft_limits->high;
+  const units::SoftLimits user = coordinates->on_user_scale(*motor.soft_limits);
+  message.user_low = user.low;
+  message.user_high = user.high;
+}
+
+std::optional<api::MotorDescription> description_of(const motor_description_t& message) {
+  const auto steps_per_unit = units::parse_ratio(message.steps_per_unit);
+  if (!steps_per_unit) return std::nullopt;
+  if (message.output < 0 || message.output > std::numeric_limits<std::uint8_t>::max()) {
+    return std::nullopt;
+  }
+  if (message.precision < 0 || message.precision > units::Coordinates::kMostDecimals) {
+    return std::nullopt;
+  }
+  auto coordinates = units::Coordinates::make({.unit = message.unit,
+                                               .steps_per_unit = *steps_per_unit,
+                                               .negative = message.negative != 0,
+                                               .offset = message.offset,
+                                               .decimals = message.precision});
+  if (!coordinates) return std::nullopt;
+  api::MotorDescription out{.name = message.name,
+                            .output = static_cast<std::uint8_t>(message.output),
+                            .group = message.group,
+                            .table = ref_of(message.table),
+                            .text = message.description,
+                            .scale = coordinates->scale(),
+                            .soft_limits = {}};
+  if (message.soft_limits == 0) return out;
+  if (!std::isfinite(message.dial_low) || !std::isfinite(message.dial_high)) return std::nullopt;
+  out.soft_limits = units::SoftLimits{message.dial_low, message.dial_high};
+  return out;
 }
 
 mcu_health_t message_of(const api::McuHealth& health) {
@@ -165,13 +217,9 @@ std::optional<DaemonMessage> decode_description(Payload payload) {
                    .emergency_stop = ramps ? api::StopMode::kRamp : api::StopMode::kImmediate,
                    .motors = {}}};
   for (const motor_description_t& motor : message->motors) {
-    if (motor.output < 0 || motor.output > std::numeric_limits<std::uint8_t>::max()) {
-      return std::nullopt;
-    }
-    out.snapshot.motors.push_back({.name = motor.name,
-                                   .output = static_cast<std::uint8_t>(motor.output),
-                                   .group = motor.group,
-                                   .table = ref_of(motor.table)});
+    auto one = description_of(motor);
+    if (!one) return std::nullopt;
+    out.snapshot.motors.push_back(std::move(*one));
   }
   return out;
 }
@@ -260,6 +308,7 @@ bushd::Result<Packet> encode(const Part& part, const api::Description& descripti
     one.output = motor.output;
     one.group = motor.group;
     one.table = message_of(motor.table);
+    put_scale(one, motor);
     message.motors.push_back(std::move(one));
   }
   message.motor_count = count(message.motors);

@@ -133,6 +133,10 @@ bool counts_match(const T& message) {
   BUSHD_COUNTED(motor_count, steps);
   BUSHD_COUNTED(motor_count, position_steps);
   BUSHD_COUNTED(motor_count, outcomes);
+  BUSHD_COUNTED(motor_count, user_positions);
+  BUSHD_COUNTED(motor_count, dial_positions);
+  BUSHD_COUNTED(motor_count, units);
+  BUSHD_COUNTED(motor_count, precisions);
   BUSHD_COUNTED(motor_count, table_of_motor);
   BUSHD_COUNTED(motor_count, motor_duration_us);
   BUSHD_COUNTED(motor_count, peak_steps_per_s);

@@ -1,5 +1,8 @@
 #include "motion/motor.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
@@ -51,6 +54,7 @@ Result<void> Motor::may_move_to(std::int64_t target) const {
     return fail("target " + std::to_string(target) + " is beyond +-" +
                 std::to_string(kMaxPosition) + " steps");
   }
+  if (auto within = within_soft_limits(target); !within) return within;
   if (const Moving* moving = as<Moving>(); moving != nullptr && moving->limit != 0) {
     return fail(switch_at(moving->limit) + " is stopping it; wait for that result");
   }
@@ -69,6 +73,40 @@ Result<void> Motor::may_move_to(std::int64_t target) const {
                 std::to_string(days(Axis::kMaxDurationTicks)) + " days");
   }
   return {};
+}
+
+// One that stands beyond a limit may be moved towards it.
+Result<void> Motor::within_soft_limits(std::int64_t target) const {
+  if (!setup_.soft_limits) return {};
+  const units::Coordinates& coordinates = setup_.coordinates;
+  const std::int64_t low = coordinates.first_step_from(setup_.soft_limits->low);
+  const std::int64_t high = coordinates.last_step_to(setup_.soft_limits->high);
+  if (target >= std::min(low, position_) && target <= std::max(high, position_)) return {};
+  const bool falls = coordinates.scale().negative;
+  return fail(fmt::format("target {} is beyond the soft limit at {}; allowed: {} to {}",
+                          coordinates.text(target), coordinates.text(target > high ? high : low),
+                          coordinates.text(falls ? high : low),
+                          coordinates.text(falls ? low : high)));
+}
+
+// Of a motor without a unit nothing is rounded.
+Result<void> Motor::is_amount(const api::Amount& amount) const {
+  const auto* user = std::get_if<api::UserUnits>(&amount);
+  if (user == nullptr || setup_.coordinates.has_unit()) return {};
+  if (std::trunc(user->value) == user->value) return {};
+  return fail(fmt::format("{} is no whole number of steps, and it has no unit", user->value));
+}
+
+Result<std::int64_t> Motor::steps_of_position(const api::Amount& position) const {
+  if (auto good = is_amount(position); !good) return fail(good.error());
+  if (const auto* steps = std::get_if<std::int64_t>(&position)) return *steps;
+  return setup_.coordinates.steps_of_user(std::get<api::UserUnits>(position).value);
+}
+
+Result<std::int64_t> Motor::steps_of_distance(const api::Amount& distance) const {
+  if (auto good = is_amount(distance); !good) return fail(good.error());
+  if (const auto* steps = std::get_if<std::int64_t>(&distance)) return *steps;
+  return setup_.coordinates.steps_of_distance(std::get<api::UserUnits>(distance).value);
 }
 
 void Motor::start(std::int64_t target, Tick start) {

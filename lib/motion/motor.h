@@ -9,11 +9,13 @@
 #include <variant>
 #include <vector>
 
+#include "api/request.h"
 #include "api/words.h"
 #include "base/ids.h"
 #include "base/result.h"
 #include "engine/message.h"
 #include "motion/axis.h"
+#include "units/coordinates.h"
 
 namespace bushd::motion {
 
@@ -29,6 +31,8 @@ struct MotorSetup {
   bool limit_immediate = false;
   bool emergency_stop_immediate = false;
   bool emergency_input_immediate = false;
+  units::Coordinates coordinates{};
+  std::optional<units::SoftLimits> soft_limits{};
 };
 
 // What a motor does. Any other than Resting keeps other motions away from it.
@@ -95,6 +99,8 @@ class Motor {
 
   const std::string& name() const { return setup_.name; }
   Output output() const { return setup_.output; }
+  const units::Coordinates& coordinates() const { return setup_.coordinates; }
+  const std::optional<units::SoftLimits>& soft_limits() const { return setup_.soft_limits; }
 
   const Activity& activity() const { return activity_; }
   template <class A>
@@ -128,6 +134,9 @@ class Motor {
   // another target, and nothing else.
   Result<void> may_be_used() const;                     // for any motion
   Result<void> may_move_to(std::int64_t target) const;  // beyond that
+  // An amount in steps. Errors: not finite, beyond what is counted.
+  Result<std::int64_t> steps_of_position(const api::Amount& position) const;
+  Result<std::int64_t> steps_of_distance(const api::Amount& distance) const;
 
   // Requests. Preconditions: it may.
   // From rest, or from the turning point of a motion.
@@ -143,6 +152,9 @@ class Motor {
   bool change(Tick at) { return has_plan() && axis_.change(at); }
   void home() { activity_ = Homing{}; }
   void end_homing(bool found);
+  void set_coordinates(units::Coordinates coordinates) {
+    setup_.coordinates = std::move(coordinates);
+  }
   void position_is_known();
   // Another table. Precondition: !has_plan().
   void set_axis(Axis axis) { axis_ = axis; }
@@ -161,6 +173,8 @@ class Motor {
  private:
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
   bool stops_immediately(const bushd_report& report) const;
+  Result<void> is_amount(const api::Amount& amount) const;
+  Result<void> within_soft_limits(std::int64_t target) const;
   void take_limits(const bushd_report& report);
   void follow(const Report& report, std::vector<Event>& events);
   bool follow_armed(const Report& report, std::vector<Event>& events);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -40,6 +41,17 @@ std::string describe(const toml::node& node) {
   if (node.is_table()) return "a table";
   return "a date or time";
 }
+
+namespace {
+
+std::optional<double> finite(const toml::node& node) {
+  if (const auto* whole = node.as_integer()) return static_cast<double>(whole->get());
+  const auto* number = node.as_floating_point();
+  if (number == nullptr || !std::isfinite(number->get())) return std::nullopt;
+  return number->get();
+}
+
+}  // namespace
 
 TomlReader::TomlReader(const toml::table& table, std::string file, std::string place)
     : table_(&table), file_(std::move(file)), place_(std::move(place)) {}
@@ -106,6 +118,19 @@ Result<std::int64_t> TomlReader::integer(std::string_view key, std::int64_t lowe
     return number->get();
   return fail(error(
       key, fmt::format("is {}; allowed: {}", describe(**node), range(lowest, highest, unit))));
+}
+
+Result<double> TomlReader::number(std::string_view key, std::string_view allowed) const {
+  const auto node = required(key, allowed);
+  if (!node) return fail(node.error());
+  if (const auto value = finite(**node)) return *value;
+  return fail(error(key, fmt::format("is {}; allowed: {}", describe(**node), allowed)));
+}
+
+Result<double> TomlReader::number(std::string_view key, std::size_t index, const toml::node& node,
+                                  std::string_view allowed) const {
+  if (const auto value = finite(node)) return *value;
+  return fail(error(key, index, fmt::format("is {}; allowed: {}", describe(node), allowed)));
 }
 
 Result<bool> TomlReader::boolean(std::string_view key) const {

@@ -21,6 +21,7 @@ class TomlReader {
   TomlReader(const toml::table& table, std::string file, std::string place = {});
 
   bool has(std::string_view key) const { return table_->contains(key); }
+  bool is_string(std::string_view key) const { return (*table_)[key].is_string(); }
   // The sub-table under `key`, or null.
   const toml::table* table(std::string_view key) const { return (*table_)[key].as_table(); }
 
@@ -31,6 +32,8 @@ class TomlReader {
   Result<std::string> string(std::string_view key, std::string_view allowed) const;
   Result<std::int64_t> integer(std::string_view key, std::int64_t lowest, std::int64_t highest,
                                std::string_view unit = {}) const;
+  // A finite number, whole or not.
+  Result<double> number(std::string_view key, std::string_view allowed) const;
   Result<bool> boolean(std::string_view key) const;
   Result<TomlReader> section(std::string_view key, std::string_view allowed) const;
   Result<const toml::array*> array(std::string_view key, std::string_view allowed) const;
@@ -39,6 +42,8 @@ class TomlReader {
   Result<std::int64_t> integer(std::string_view key, std::size_t index, const toml::node& node,
                                std::int64_t lowest, std::int64_t highest,
                                std::string_view unit = {}) const;
+  Result<double> number(std::string_view key, std::size_t index, const toml::node& node,
+                        std::string_view allowed) const;
 
   // An error at `key` (empty: at the table itself), or at one element of it.
   Error error(std::string_view key, std::string message) const;

@@ -34,9 +34,9 @@ Answer answer_of(const api::Reply& reply) {
 
 }  // namespace
 
-std::vector<api::MotorSteps> motor_steps(const std::vector<std::string>& motors,
-                                         const std::vector<std::int64_t>& steps) {
-  std::vector<api::MotorSteps> all;
+std::vector<api::MotorAmount> motor_steps(const std::vector<std::string>& motors,
+                                          const std::vector<std::int64_t>& steps) {
+  std::vector<api::MotorAmount> all;
   for (std::size_t i = 0; i < motors.size(); ++i) {
     all.push_back({motors[i], i < steps.size() ? steps[i] : 0});
   }
@@ -57,7 +57,7 @@ api::Request request_of(Ask ask, const std::vector<std::string>& motors,
     case Ask::kDisable:
       return api::Disable{motors};
     case Ask::kSetPosition:
-      return api::SetPosition{motor_steps(motors, steps)};
+      return api::SetPosition{.motors = motor_steps(motors, steps)};
     case Ask::kClearFaults:
       return api::ClearFaults{motors};
     case Ask::kEmergencyStop:

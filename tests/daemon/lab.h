@@ -49,8 +49,8 @@ enum class Ask {
 };
 api::Request request_of(Ask ask, const std::vector<std::string>& motors,
                         const std::vector<std::int64_t>& steps = {});
-std::vector<api::MotorSteps> motor_steps(const std::vector<std::string>& motors,
-                                         const std::vector<std::int64_t>& steps);
+std::vector<api::MotorAmount> motor_steps(const std::vector<std::string>& motors,
+                                          const std::vector<std::int64_t>& steps);
 
 // An api::Reply, laid flat.
 struct Answer {

@@ -338,7 +338,7 @@ TEST_P(Triggered, ShutDownDisarms) {
 TEST_P(Triggered, PulseWhenTheMotorArrives) {
   lab.connect();
   api::PositionCompare compare{.motor = "m02",
-                               .position_steps = 300,
+                               .position = 300,
                                .arrivals = {.positive = true},
                                .delay_us = 20'000,
                                .width_us = 500};
@@ -364,7 +364,7 @@ TEST_P(Triggered, PositionCompareIsRefusedWithAReason) {
   lab.connect();
   using Compare = api::PositionCompare;
   const Compare good{.motor = "m02",
-                     .position_steps = 300,
+                     .position = 300,
                      .arrivals = {.positive = true, .negative = true},
                      .width_us = 10};
   const auto refusal = [this](Compare compare, const auto& bend) {
@@ -375,7 +375,7 @@ TEST_P(Triggered, PositionCompareIsRefusedWithAReason) {
   };
   EXPECT_THAT(refusal(good, [](Compare& c) { c.width_us = 0; }), HasSubstr("1 to 1000000"));
   EXPECT_THAT(refusal(good, [](Compare& c) { c.delay_us = -1; }), HasSubstr("0 to 1500000"));
-  EXPECT_THAT(refusal(good, [](Compare& c) { c.position_steps = 1ll << 40; }),
+  EXPECT_THAT(refusal(good, [](Compare& c) { c.position = std::int64_t{1} << 40; }),
               HasSubstr("lie within"));
   EXPECT_EQ(lab.wait(lab.send(good)).result, "done");
 }

@@ -1,9 +1,9 @@
 """Broken and hostile payloads on a channel of requests, framed by hand: what LCM's own publish() would never send.
 
 A datagram of LCM (small message): "LC02", sequence number, channel with its NUL, payload. A payload of move_t:
-fingerprint of the type, utime_us, session, client_id, number, kind, dry_run, motor_count, motors, steps; numbers
-big-endian, a text as its length with NUL, characters, NUL. Fingerprint, session and client are those of a move that
-bushctl has sent.
+fingerprint of the type, utime_us, session, client_id, number, kind, dry_run, motor_count, motors, each of them a
+motor_amount_t: motor, in_steps, steps, user; numbers big-endian, a text as its length with NUL, characters, NUL.
+Fingerprint, session and client are those of a move that bushctl has sent.
 """
 
 import contextlib
@@ -69,13 +69,14 @@ class Hostile(EndToEndTest):
         self.client = move[28 : 28 + length - 1]
 
     def payload(self, client=None, number=100, motors=(b"a0",), steps=(5,), count=None, texts=None, session=None):
-        """A move; `count` and `texts` (all motors, encoded) replace what would be right."""
+        """A move; `count` and `texts` (the motors' names, encoded) replace what would be right."""
         session = self.session if session is None else session
         head = struct.pack(">qq", 0, session) + text(self.client if client is None else client)
         head += struct.pack(">qbb", number, MOVE_RELATIVE, 0)
         count = struct.pack(">i", len(motors) if count is None else count)
-        texts = b"".join(map(text, motors)) if texts is None else texts
-        return self.fingerprint + head + count + texts + struct.pack(f">{len(steps)}q", *steps)
+        texts = [text(motor) for motor in motors] if texts is None else texts
+        amounts = [struct.pack(">?qd", True, each, 0.0) for each in steps]
+        return self.fingerprint + head + count + b"".join(map(bytes.__add__, texts, amounts))
 
     def rejected(self):
         return self.status()["dropped_messages"]
@@ -117,8 +118,8 @@ class Hostile(EndToEndTest):
         truncated = [good[:length] for length in range(len(good))]
         lengths = [-(2**31), -1, 0, 2, 1000, 2**27, 2**31 - 1]
         wrong_counts = [self.payload(count=count) for count in lengths]
-        wrong_texts = [self.payload(texts=struct.pack(">i", length) + b"a0\0") for length in lengths]
-        wrong_ends = [self.payload(texts=struct.pack(">i", 3) + b"a0a"), self.payload(texts=text(b"a\0b"))]
+        wrong_texts = [self.payload(texts=[struct.pack(">i", length) + b"a0\0"]) for length in lengths]
+        wrong_ends = [self.payload(texts=[struct.pack(">i", 3) + b"a0a"]), self.payload(texts=[text(b"a\0b")])]
         longer = [good + b"\0", good + bytes(60000)]
         wrong_fingerprint = [bytes(8) + good[8:], good[:7] + bytes([good[7] ^ 1]) + good[8:]]
         self.assert_all_rejected(truncated + wrong_counts + wrong_texts + wrong_ends + longer + wrong_fingerprint)

@@ -59,11 +59,13 @@ TEST(Codec, EveryRequestHasAChannelOfItsOwn) {
 }
 
 TEST(Codec, MovesArriveAsTheyWereMeant) {
-  const auto move = request_over_the_wire(api::Move{.kind = api::Move::Kind::kAbsolute,
-                                                    .motors = {{"theta", -400}, {"chi", 20}},
-                                                    .dry_run = true});
+  const auto move =
+      request_over_the_wire(api::Move{.kind = api::Move::Kind::kAbsolute,
+                                      .motors = {{"theta", -400}, {"chi", api::UserUnits{2.5}}},
+                                      .dry_run = true});
   EXPECT_EQ(move.kind, api::Move::Kind::kAbsolute);
-  EXPECT_EQ(move.motors, (std::vector<api::MotorSteps>{{"theta", -400}, {"chi", 20}}));
+  EXPECT_EQ(move.motors,
+            (std::vector<api::MotorAmount>{{"theta", -400}, {"chi", api::UserUnits{2.5}}}));
   EXPECT_TRUE(move.dry_run);
 }
 
@@ -72,7 +74,8 @@ TEST(Codec, OtherRequestsDoToo) {
   request_over_the_wire(api::EmergencyStop{});
   EXPECT_EQ(request_over_the_wire(api::Enable{{"a"}}).motors, api::MotorNames{"a"});
   EXPECT_EQ(request_over_the_wire(api::Disable{}).motors, api::MotorNames{});
-  EXPECT_EQ(request_over_the_wire(api::SetPosition{{{"a", 5}}}).motors.front().steps, 5);
+  EXPECT_EQ(request_over_the_wire(api::SetPosition{.motors = {{"a", 5}}}).motors.front().amount,
+            api::Amount(std::int64_t{5}));
   EXPECT_EQ(request_over_the_wire(api::ClearFaults{{"a"}}).motors, api::MotorNames{"a"});
   EXPECT_EQ(request_over_the_wire(api::UseTable{"group", "own@2"}).table, "own@2");
   request_over_the_wire(api::ReloadTables{});
@@ -82,11 +85,8 @@ TEST(Codec, OtherRequestsDoToo) {
   EXPECT_EQ(arm.edge, api::Edge::kFalling);
   EXPECT_EQ(arm.delay_us, 100);
   EXPECT_EQ(request_over_the_wire(api::Disarm{{"a"}}).motors, api::MotorNames{"a"});
-  const auto compare = request_over_the_wire(api::PositionCompare{.motor = "a",
-                                                                  .position_steps = 9,
-                                                                  .arrivals = {.negative = true},
-                                                                  .delay_us = 5,
-                                                                  .width_us = 6});
+  const auto compare = request_over_the_wire(api::PositionCompare{
+      .motor = "a", .position = 9, .arrivals = {.negative = true}, .delay_us = 5, .width_us = 6});
   EXPECT_FALSE(compare.arrivals.positive);
   EXPECT_TRUE(compare.arrivals.negative);
   EXPECT_EQ(compare.width_us, 6);
@@ -143,20 +143,24 @@ TEST(Codec, RepliesArriveAsTheyWereMeant) {
   EXPECT_TRUE(std::holds_alternative<api::Accepted>(reply_over_the_wire(api::Accepted{}).reply));
   EXPECT_EQ(std::get<api::Refused>(reply_over_the_wire(api::Refused{"why"}).reply).reason, "why");
   const api::TableRef table{.name = "own", .revision = 2, .hash = "0123abcd"};
-  const auto moved =
-      std::get<api::Completed>(
-          reply_over_the_wire(api::Completed{.outcome = api::Outcome::kLimit,
-                                             .reason = "theta: stopped",
-                                             .detail =
-                                                 std::vector<api::MotorResult>{
-                                                     {"theta", api::Outcome::kLimit, 7, table},
-                                                     {"chi", api::Outcome::kReached, 9, table}}})
-              .reply);
+  const auto moved = std::get<api::Completed>(
+      reply_over_the_wire(
+          api::Completed{.outcome = api::Outcome::kLimit,
+                         .reason = "theta: stopped",
+                         .detail = std::vector<api::MotorResult>{{"theta", api::Outcome::kLimit, 7,
+                                                                  1.75, -0.25, "mm", 2, table},
+                                                                 {"chi", api::Outcome::kReached, 9,
+                                                                  9, 9, "steps", 0, table}}})
+          .reply);
   EXPECT_EQ(moved.outcome, api::Outcome::kLimit);
   const auto& motors = std::get<std::vector<api::MotorResult>>(moved.detail);
   EXPECT_EQ(motors.at(1).motor, "chi");
   EXPECT_EQ(motors.at(1).table, table);
   EXPECT_EQ(motors.at(0).position_steps, 7);
+  EXPECT_EQ(motors.at(0).user, 1.75);
+  EXPECT_EQ(motors.at(0).dial, -0.25);
+  EXPECT_EQ(motors.at(0).unit, "mm");
+  EXPECT_EQ(motors.at(0).precision, 2);
 }
 
 TEST(Codec, PlansAndTablesDoToo) {
@@ -206,10 +210,14 @@ TEST(Codec, ResultsOf2048MotorsComeInParts) {
         {.motor = name,
          .outcome = i % 3 == 0 ? api::Outcome::kLink : api::Outcome::kReached,
          .position_steps = 1000 - i,
+         .user = 0.5 * i,
+         .dial = -0.5 * i,
+         .unit = std::string(static_cast<std::size_t>(i) % 64, 'u'),
+         .precision = i % 7,
          .table = {.name = i % 2 == 0 ? "own" : "other", .revision = 7, .hash = "89abcdef"}});
   }
   const api::Completed reply{.outcome = api::Outcome::kLink, .reason = "r", .detail = motors};
-  const auto whole = put_together(reply, {2, 0, 0, 2, 1});
+  const auto whole = put_together(reply, {4, 2, 0, 0, 2, 1, 3});
   EXPECT_EQ(whole.outcome, api::Outcome::kLink);
   EXPECT_EQ(whole.reason, "r");
   const auto& arrived = std::get<std::vector<api::MotorResult>>(whole.detail);
@@ -218,6 +226,10 @@ TEST(Codec, ResultsOf2048MotorsComeInParts) {
     EXPECT_EQ(arrived[i].motor, motors[i].motor);
     EXPECT_EQ(arrived[i].outcome, motors[i].outcome);
     EXPECT_EQ(arrived[i].position_steps, motors[i].position_steps);
+    EXPECT_EQ(arrived[i].user, motors[i].user);
+    EXPECT_EQ(arrived[i].dial, motors[i].dial);
+    EXPECT_EQ(arrived[i].unit, motors[i].unit);
+    EXPECT_EQ(arrived[i].precision, motors[i].precision);
     EXPECT_EQ(arrived[i].table, motors[i].table);
   }
 }
@@ -267,7 +279,10 @@ TEST(Codec, SnapshotsArriveAsTheyAre) {
                                  .tick = 7,
                                  .motors = {{.name = "theta",
                                              .position_steps = -8,
+                                             .user = 1.5,
+                                             .dial = -1.5,
                                              .target_steps = 9,
+                                             .user_target = 2.5,
                                              .velocity_steps_per_s = 10.5,
                                              .activity = api::Activity::kMoving,
                                              .moving = true,
@@ -280,13 +295,19 @@ TEST(Codec, SnapshotsArriveAsTheyAre) {
   EXPECT_EQ(message.snapshot, state);
   EXPECT_EQ(message.dropped_messages, 11);
   EXPECT_EQ(message.part.sequence, 3);
-  const api::Description description{
-      .bus = "hall",
-      .mcu = "hall:1",
-      .address = 1,
-      .tick_ns = 2'560'000,
-      .emergency_stop = api::StopMode::kImmediate,
-      .motors = {{.name = "theta", .output = 15, .group = "g", .table = {"own", 2, "abc"}}}};
+  const api::Description description{.bus = "hall",
+                                     .mcu = "hall:1",
+                                     .address = 1,
+                                     .tick_ns = 2'560'000,
+                                     .emergency_stop = api::StopMode::kImmediate,
+                                     .motors = {{.name = "theta",
+                                                 .output = 15,
+                                                 .group = "g",
+                                                 .table = {"own", 2, "abc"},
+                                                 .text = "first circle",
+                                                 .scale = {"deg", {1000, 3}, true, -90.5, 4},
+                                                 .soft_limits = units::SoftLimits{-180, 180}},
+                                                {.name = "chi", .scale = {.decimals = 0}}}};
   const auto rare = encode(part, description);
   EXPECT_EQ(
       std::get<DescriptionMessage>(*decode_daemon_message("DESCRIPTION", rare->payload)).snapshot,

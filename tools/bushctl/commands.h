@@ -16,7 +16,7 @@ enum Exit : int {
   kInterrupted = 130
 };
 
-// status, watch, health
+// status, where, watch, health
 void add_view_commands(CommandLine& line);
 // move, arm, disarm, stop, estop, home, set, compare
 void add_motion_commands(CommandLine& line);

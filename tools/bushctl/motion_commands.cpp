@@ -14,6 +14,12 @@ namespace api = bushd::api;
 using bushd::client::Client;
 using Until = Client::Until;
 
+constexpr const char* kSteps = "Numbers are steps, not the motors' units";
+
+Numbers numbers(bool steps) {
+  return steps ? Numbers::kSteps : Numbers::kUser;
+}
+
 Until until(bool wait) {
   return wait ? Until::kResult : Until::kAnswered;
 }
@@ -40,6 +46,7 @@ int show_plan(const Connection& connection, api::Move move, bool as_json) {
 void add_move(CommandLine& line) {
   struct Options {
     bool wait = false;
+    bool steps = false;
     bool dry_run = false;
     bool json = false;
     std::vector<std::string> words;
@@ -47,18 +54,21 @@ void add_move(CommandLine& line) {
   const auto options = std::make_shared<Options>();
   line.add("move", "Move motors; those on one bus start in the same tick")
       .footer(
-          "bushctl move [--wait] NAME STEPS [NAME STEPS...]            by so many steps\n"
-          "bushctl move [--wait] NAME --to STEPS [NAME --to STEPS...]  to these positions\n"
-          "STEPS may be negative. A motor that moves is given a new target; by STEPS then counts "
-          "from its present one. With --wait the exit code is 0 only if every motor reached its "
+          "bushctl move [--wait] NAME DISTANCE [NAME DISTANCE...]            by these distances\n"
+          "bushctl move [--wait] NAME --to POSITION [NAME --to POSITION...]  to these positions\n"
+          "Both are in the motor's unit, or in steps of a motor without one, and may be negative; "
+          "the nearest step counts. A motor that moves is given a new target; a distance then "
+          "counts from its present one. With --wait the exit code is 0 only if every motor reached "
+          "its "
           "target.")
       .flag("--wait", &options->wait, "Wait for the result")
+      .flag("--steps", &options->steps, kSteps)
       .flag("--dry-run", &options->dry_run,
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
       .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
       .raw_words(&options->words)
       .run([&line, options] {
-        const auto move = parse_move(options->words);
+        const auto move = parse_move(options->words, numbers(options->steps));
         if (!move) return wrong_usage(move.error());
         if (options->dry_run) return show_plan(line.connection(), *move, options->json);
         return send(line.connection(), *move, until(options->wait), Hope::kReached);
@@ -69,13 +79,14 @@ void add_arm(CommandLine& line) {
   struct Options {
     std::string edge = "rising";
     std::int64_t delay_us = 0;
+    bool steps = false;
     bool wait = false;
     std::vector<std::string> words;
   };
   const auto options = std::make_shared<Options>();
   line.add("arm", "Let moves wait for the trigger of their MCU")
       .footer(
-          "bushctl arm --delay-us US NAME STEPS [NAME STEPS...]\n"
+          "bushctl arm --delay-us US NAME DISTANCE [NAME DISTANCE...]\n"
           "Motors at rest. Those of one MCU begin in the same slot, three ticks and the delay "
           "after "
           "the edge at its trigger input. With --wait the exit code is 0 only if every motor "
@@ -83,10 +94,12 @@ void add_arm(CommandLine& line) {
       .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'500'000,
                             "Delay from the edge, beyond the three ticks", Command::Needed::kYes)
       .choice("--edge", &options->edge, {"rising", "falling"}, "Edge that starts the moves")
+      .flag("--steps", &options->steps, kSteps)
       .flag("--wait", &options->wait, "Wait for the result")
       .raw_words(&options->words)
       .run([&line, options] {
-        const auto arm = parse_arm(options->words, options->edge, options->delay_us);
+        const auto arm =
+            parse_arm(options->words, numbers(options->steps), options->edge, options->delay_us);
         if (!arm) return wrong_usage(arm.error());
         return send(line.connection(), *arm, until(options->wait), Hope::kReached);
       });
@@ -106,12 +119,14 @@ void add_compare(CommandLine& line) {
   struct Options {
     std::string motor;
     std::string position;
+    bool steps = false;
     Pulse pulse;
   };
   const auto options = std::make_shared<Options>();
   line.add("compare", "Make a pulse when a motor arrives at a position")
       .option("NAME", &options->motor, "The motor; its MCU's position compare output pulses")
-      .option("POSITION", &options->position, "Position in steps, or off")
+      .option("POSITION", &options->position, "Position in the motor's unit, or off")
+      .flag("--steps", &options->steps, kSteps)
       .number<std::int64_t>("--delay-us", &options->pulse.delay_us, 0, 1'500'000,
                             "Delay from the step to the pulse")
       .number<std::int64_t>("--width-us", &options->pulse.width_us, 1, 1'000'000,
@@ -119,8 +134,8 @@ void add_compare(CommandLine& line) {
       .choice("--direction", &options->pulse.direction, {"both", "positive", "negative"},
               "Direction of arrival")
       .run([&line, options] {
-        const auto request =
-            parse_position_compare(options->motor, options->position, options->pulse);
+        const auto request = parse_position_compare(options->motor, options->position,
+                                                    numbers(options->steps), options->pulse);
         if (!request) return wrong_usage(request.error());
         return send(line.connection(), *request, Until::kResult, Hope::kDone);
       });
@@ -170,14 +185,23 @@ void add_home(CommandLine& line) {
 void add_set(CommandLine& line) {
   struct Options {
     std::string motor;
-    std::string steps;
+    std::string position;
+    bool steps = false;
+    bool dial = false;
   };
   const auto options = std::make_shared<Options>();
-  line.add("set", "Set the current position without moving")
+  line.add("set", "Say where a motor stands, without moving it")
+      .footer(
+          "Of a motor with a unit, POSITION is its user position from now on: the offset changes. "
+          "With --dial or --steps, and of a motor without a unit, the position itself is set, and "
+          "is known from then on.")
       .option("NAME", &options->motor, "The motor, at rest")
-      .option("STEPS", &options->steps, "New position")
+      .option("POSITION", &options->position, "New position")
+      .flag("--dial", &options->dial, "POSITION is the dial's")
+      .flag("--steps", &options->steps, kSteps)
       .run([&line, options] {
-        const auto request = parse_set(options->motor, options->steps);
+        const auto request =
+            parse_set(options->motor, options->position, numbers(options->steps), options->dial);
         if (!request) return wrong_usage(request.error());
         // Over in a moment, and only the result tells whether the MCU did it.
         return send(line.connection(), *request, Until::kResult, Hope::kDone);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -14,7 +15,7 @@ using bushd::fail;
 using bushd::Result;
 
 constexpr const char* kMoveUsage =
-    "write NAME STEPS [NAME STEPS...] or NAME --to STEPS [NAME --to STEPS...]";
+    "write NAME DISTANCE [NAME DISTANCE...] or NAME --to POSITION [NAME --to POSITION...]";
 
 std::optional<std::int64_t> whole_number(const std::string& word) {
   std::int64_t value = 0;
@@ -26,15 +27,27 @@ std::optional<std::int64_t> whole_number(const std::string& word) {
   return value;
 }
 
-Result<std::int64_t> steps_of(const std::string& motor, const std::string& word) {
-  if (const auto value = whole_number(word)) return *value;
-  return fail(
-      fmt::format("{}: \"{}\" is not a whole number of steps; {}", motor, word, kMoveUsage));
+std::optional<double> number(const std::string& word) {
+  double value = 0;
+  const char* begin = word.data() + (word.size() > 1 && word[0] == '+' && word[1] != '-' ? 1 : 0);
+  const char* end = word.data() + word.size();
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  if (error != std::errc{} || stop != end || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+Result<api::Amount> amount_of(const std::string& motor, const std::string& word, Numbers numbers) {
+  if (numbers == Numbers::kSteps) {
+    if (const auto steps = whole_number(word)) return *steps;
+    return fail(fmt::format("{}: \"{}\" is not a whole number of steps", motor, word));
+  }
+  if (const auto user = number(word)) return api::UserUnits{*user};
+  return fail(fmt::format("{}: \"{}\" is not a number", motor, word));
 }
 
 }  // namespace
 
-Result<api::Move> parse_move(const std::vector<std::string>& words) {
+Result<api::Move> parse_move(const std::vector<std::string>& words, Numbers numbers) {
   using Kind = api::Move::Kind;
   api::Move move;
   for (std::size_t i = 0; i < words.size();) {
@@ -43,38 +56,39 @@ Result<api::Move> parse_move(const std::vector<std::string>& words) {
       return fail(fmt::format("\"{}\" stands where a motor's name should; {}", motor, kMoveUsage));
     }
     if (i == words.size()) {
-      return fail(fmt::format("{}: the number of steps is missing; {}", motor, kMoveUsage));
+      return fail(fmt::format("{}: the distance is missing; {}", motor, kMoveUsage));
     }
     std::string number = words[i++];
     const bool absolute = number == "--to" || number.starts_with("--to=");
     if (number == "--to") {
-      if (i == words.size()) return fail(motor + ": --to wants the position in steps after it");
+      if (i == words.size()) return fail(motor + ": --to wants the position after it");
       number = words[i++];
     } else if (absolute) {
       number.erase(0, std::string("--to=").size());
     }
-    const auto steps = steps_of(motor, number);
-    if (!steps) return fail(steps.error());
+    const auto amount = amount_of(motor, number, numbers);
+    if (!amount) return fail(fmt::format("{}; {}", amount.error().message, kMoveUsage));
     const Kind kind = absolute ? Kind::kAbsolute : Kind::kRelative;
     if (!move.motors.empty() && move.kind != kind) {
       return fail(fmt::format(
           "{} is moved {}, the motors before it {}: one command is either. Give --to to "
           "all or to none, or send two commands",
-          motor, absolute ? "to a position" : "by steps", absolute ? "by steps" : "to positions"));
+          motor, absolute ? "to a position" : "by a distance",
+          absolute ? "by distances" : "to positions"));
     }
     move.kind = kind;
-    move.motors.push_back({motor, *steps});
+    move.motors.push_back({motor, *amount});
   }
   if (move.motors.empty()) return fail(fmt::format("no motor is named; {}", kMoveUsage));
   return move;
 }
 
-Result<api::Arm> parse_arm(const std::vector<std::string>& words, const std::string& edge,
-                           std::int64_t delay_us) {
-  const auto move = parse_move(words);
+Result<api::Arm> parse_arm(const std::vector<std::string>& words, Numbers numbers,
+                           const std::string& edge, std::int64_t delay_us) {
+  const auto move = parse_move(words, numbers);
   if (!move) return fail(move.error());
   if (move->kind != api::Move::Kind::kRelative) {
-    return fail("--to: what waits for the trigger is moved by steps; write NAME STEPS");
+    return fail("--to: what waits for the trigger is moved by a distance; write NAME DISTANCE");
   }
   return api::Arm{.edge = edge == "falling" ? api::Edge::kFalling : api::Edge::kRising,
                   .delay_us = delay_us,
@@ -82,14 +96,13 @@ Result<api::Arm> parse_arm(const std::vector<std::string>& words, const std::str
 }
 
 Result<api::PositionCompare> parse_position_compare(const std::string& motor,
-                                                    const std::string& where, const Pulse& pulse) {
+                                                    const std::string& where, Numbers numbers,
+                                                    const Pulse& pulse) {
   api::PositionCompare compare{.motor = motor};
   if (where == "off") return compare;
-  const auto position_steps = whole_number(where);
-  if (!position_steps) {
-    return fail(fmt::format("{}: \"{}\" is neither a whole number of steps nor off", motor, where));
-  }
-  compare.position_steps = *position_steps;
+  const auto position = amount_of(motor, where, numbers);
+  if (!position) return fail(position.error().message + ", nor off");
+  compare.position = *position;
   compare.arrivals = {.positive = pulse.direction != "negative",
                       .negative = pulse.direction != "positive"};
   compare.delay_us = pulse.delay_us;
@@ -97,12 +110,11 @@ Result<api::PositionCompare> parse_position_compare(const std::string& motor,
   return compare;
 }
 
-Result<api::SetPosition> parse_set(const std::string& motor, const std::string& steps) {
-  const auto position_steps = whole_number(steps);
-  if (!position_steps) {
-    return fail(fmt::format("{}: \"{}\" is not a whole number of steps", motor, steps));
-  }
-  return api::SetPosition{{{motor, *position_steps}}};
+Result<api::SetPosition> parse_set(const std::string& motor, const std::string& word,
+                                   Numbers numbers, bool dial) {
+  const auto position = amount_of(motor, word, numbers);
+  if (!position) return fail(position.error());
+  return api::SetPosition{.motors = {{motor, *position}}, .dial = dial};
 }
 
 }  // namespace bushctl

@@ -10,12 +10,15 @@
 
 namespace bushctl {
 
-// "theta 400 chi -20" moves by so many steps, "theta --to 400 chi --to -20" to these positions; in
-// any case all motors as one group. A mixture is refused: one command is relative or absolute.
-bushd::Result<bushd::api::Move> parse_move(const std::vector<std::string>& words);
+// What the numbers are: in the motors' units, of motors without one in steps; or all in steps.
+enum class Numbers { kUser, kSteps };
 
-// "theta 400 chi -20": the same by steps, when the trigger comes.
-bushd::Result<bushd::api::Arm> parse_arm(const std::vector<std::string>& words,
+// "theta 400 chi -20" moves by so much, "theta --to 400 chi --to -20" to these positions; in any
+// case all motors as one group. A mixture is refused: one command is relative or absolute.
+bushd::Result<bushd::api::Move> parse_move(const std::vector<std::string>& words, Numbers numbers);
+
+// "theta 400 chi -20": the same by so much, when the trigger comes.
+bushd::Result<bushd::api::Arm> parse_arm(const std::vector<std::string>& words, Numbers numbers,
                                          const std::string& edge, std::int64_t delay_us);
 
 struct Pulse {
@@ -26,10 +29,11 @@ struct Pulse {
 // "theta", "400": a pulse when theta arrives at 400; "theta", "off": none.
 bushd::Result<bushd::api::PositionCompare> parse_position_compare(const std::string& motor,
                                                                   const std::string& where,
+                                                                  Numbers numbers,
                                                                   const Pulse& pulse);
 
 // "theta", "400": theta stands at 400.
-bushd::Result<bushd::api::SetPosition> parse_set(const std::string& motor,
-                                                 const std::string& steps);
+bushd::Result<bushd::api::SetPosition> parse_set(const std::string& motor, const std::string& word,
+                                                 Numbers numbers, bool dial);
 
 }  // namespace bushctl

@@ -13,6 +13,7 @@ namespace bushctl {
 namespace {
 
 namespace api = bushd::api;
+namespace units = bushd::units;
 using bushd::client::Status;
 
 std::string text_of(const api::TableRef& table) {
@@ -40,12 +41,9 @@ bool has_position(const api::MotorState& motor) {
   return motor.trust != api::Trust::kUnknown;
 }
 
-std::string position_text(const api::MotorState& motor, std::int64_t steps) {
-  return has_position(motor) ? fmt::to_string(steps) : "-";
-}
-
-nlohmann::json position_json(const api::MotorState& motor, std::int64_t steps) {
-  return has_position(motor) ? nlohmann::json(steps) : nlohmann::json(nullptr);
+// In steps or units; null where nothing is known.
+nlohmann::json position_json(const api::MotorState& motor, auto position) {
+  return has_position(motor) ? nlohmann::json(position) : nlohmann::json(nullptr);
 }
 
 // "heard 2026-01-31 14:03:22": old numbers are shown with their time.
@@ -71,6 +69,21 @@ api::MotorDescription description_of(const api::Description& mcu, std::size_t in
   return {};
 }
 
+bool has_unit(const units::Scale& scale) {
+  return scale.unit != units::Coordinates::kSteps;
+}
+
+// "12.345 mm", and bare steps of a motor without a unit.
+std::string position_text(std::int64_t steps, double user, const units::Scale& scale) {
+  if (!has_unit(scale)) return fmt::to_string(steps);
+  return fmt::format("{:.{}f} {}", user, scale.decimals.value_or(0), bushd::printable(scale.unit));
+}
+
+std::string position_text(const api::MotorState& motor, std::int64_t steps, double user,
+                          const units::Scale& scale) {
+  return has_position(motor) ? position_text(steps, user, scale) : "-";
+}
+
 nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
                           const api::MotorDescription& description) {
   const auto heard_utime_us =
@@ -83,6 +96,10 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"table_revision", description.table.revision},
           {"table_hash", description.table.hash},
           {"position_steps", position_json(motor, motor.position_steps)},
+          {"unit", description.scale.unit},
+          {"user", position_json(motor, motor.user)},
+          {"dial", position_json(motor, motor.dial)},
+          {"user_target", position_json(motor, motor.user_target)},
           {"target_steps", position_json(motor, motor.target_steps)},
           {"velocity_steps_per_s", motor.velocity_steps_per_s},
           {"moving", motor.moving},
@@ -93,6 +110,14 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"trust", word(motor.trust)},
           {"uncertain_reason", motor.uncertain_reason},
           {"heard_utime_us", heard_utime_us}};
+}
+
+std::string position_text(const api::MotorResult& motor) {
+  const std::string user =
+      position_text(motor.position_steps, motor.user,
+                    {.unit = motor.unit, .steps_per_unit = {}, .decimals = motor.precision});
+  if (motor.unit == units::Coordinates::kSteps) return user;
+  return fmt::format("{} ({} steps)", user, motor.position_steps);
 }
 
 nlohmann::json mcu_json(const api::StateSnapshot& mcu, const api::Description& description) {
@@ -124,8 +149,9 @@ std::vector<std::string> table(const Status& status) {
       const auto description = description_of(status.descriptions.at(i).snapshot, m, motor.name);
       motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
                   fmt::to_string(description.output), bushd::printable(description.group),
-                  text_of(description.table), position_text(motor, motor.position_steps),
-                  position_text(motor, motor.target_steps),
+                  text_of(description.table),
+                  position_text(motor, motor.position_steps, motor.user, description.scale),
+                  position_text(motor, motor.target_steps, motor.user_target, description.scale),
                   fmt::format("{:.1f}", motor.velocity_steps_per_s),
                   moving_word(motor, moves_text(motor), "-"), std::string(word(motor.trust)),
                   notes_text(motor)});
@@ -139,11 +165,15 @@ std::vector<std::string> table(const Status& status) {
   return out;
 }
 
-std::string motor_line(const api::MotorState& motor) {
-  std::string line = fmt::format(
-      "{} position {} target {} velocity {:.1f} {}", bushd::printable(motor.name),
-      position_text(motor, motor.position_steps), position_text(motor, motor.target_steps),
-      motor.velocity_steps_per_s, moving_word(motor, "moving", "at rest"));
+std::string motor_line(const Status& status, std::size_t mcu, std::size_t index) {
+  const api::MotorState& motor = status.states[mcu].snapshot.motors[index];
+  const units::Scale scale =
+      description_of(status.descriptions.at(mcu).snapshot, index, motor.name).scale;
+  std::string line =
+      fmt::format("{} position {} target {} velocity {:.1f} {}", bushd::printable(motor.name),
+                  position_text(motor, motor.position_steps, motor.user, scale),
+                  position_text(motor, motor.target_steps, motor.user_target, scale),
+                  motor.velocity_steps_per_s, moving_word(motor, "moving", "at rest"));
   if (motor.trust != api::Trust::kKnown) line += fmt::format(" {}", word(motor.trust));
   if (const std::string notes = notes_text(motor); !notes.empty()) line += " " + notes;
   return line;
@@ -211,7 +241,7 @@ std::vector<std::string> lines(const api::Reply& reply) {
   if (const auto* motors = std::get_if<std::vector<api::MotorResult>>(&completed->detail)) {
     for (const api::MotorResult& motor : *motors) {
       out.push_back(fmt::format("{}: {}, stands at {} by {} ({})", bushd::printable(motor.motor),
-                                word(motor.outcome), motor.position_steps, text_of(motor.table),
+                                word(motor.outcome), position_text(motor), text_of(motor.table),
                                 bushd::printable(motor.table.hash)));
     }
     return out;

@@ -12,8 +12,9 @@ namespace bushctl {
 // Lines of a table of all motors, then of all MCUs.
 std::vector<std::string> table(const bushd::client::Status& status);
 
-// One line: name, position, target, velocity, moving or at rest, trust when it is not "known".
-std::string motor_line(const bushd::api::MotorState& motor);
+// One line of the motor at this place in the state of the MCU at that place: name, position,
+// target, velocity, moving or at rest, trust when it is not "known".
+std::string motor_line(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 
 // {"motors":[...],"mcus":[...],...}; docs/lcm.md lists the keys.
 std::string json(const bushd::client::Status& status);

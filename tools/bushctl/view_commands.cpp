@@ -11,6 +11,7 @@
 #include "render.h"
 #include "screen.h"
 #include "watch.h"
+#include "where.h"
 
 namespace bushctl {
 namespace {
@@ -116,10 +117,47 @@ void add_health(CommandLine& line) {
   });
 }
 
+std::int64_t unix_us() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
+int show_where(Client& client, const std::vector<std::string>& names,
+               std::chrono::milliseconds timeout, bool as_json) {
+  const auto status = client.status(timeout);
+  if (!status) return failure(client, status.error());
+  const auto motors = where(*status, names, unix_us());
+  if (!motors) return failure(client, motors.error());
+  if (as_json) {
+    fmt::print("{}\n", json(*motors));
+  } else {
+    for (const std::string& text : table(*motors)) fmt::print("{}\n", text);
+  }
+  return kDone;
+}
+
+void add_where(CommandLine& line) {
+  struct Options {
+    bushd::api::MotorNames motors;
+    bool json = false;
+    double timeout_s = 4;
+  };
+  const auto options = std::make_shared<Options>();
+  Command command = line.add("where", "Show where motors stand: user, dial and steps");
+  command.words("NAME", &options->motors, "Motors; none: all", Command::Needed::kNo)
+      .flag("--json", &options->json, "As JSON");
+  add_timeout(command, &options->timeout_s).run([&line, options] {
+    return with_client(line.connection(), [&](Client& client) {
+      return show_where(client, options->motors, milliseconds(options->timeout_s), options->json);
+    });
+  });
+}
+
 }  // namespace
 
 void add_view_commands(CommandLine& line) {
   add_status(line);
+  add_where(line);
   add_watch(line);
   add_health(line);
 }

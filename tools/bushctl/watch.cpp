@@ -30,12 +30,14 @@ class View {
 class ChangesView : public View {
  public:
   void show(const Status& status) override {
-    for (const bushd::lcm::StateMessage& state : status.states) {
-      const bushd::api::StateSnapshot& mcu = state.snapshot;
+    for (std::size_t i = 0; i < status.states.size(); ++i) {
+      const bushd::api::StateSnapshot& mcu = status.states[i].snapshot;
       line(mcu.mcu,
            fmt::format("{} {} boot {}{}{}", bushd::printable(mcu.mcu), word(mcu.state), mcu.boot,
                        mcu.detail.empty() ? "" : " ", bushd::printable(mcu.detail)));
-      for (const bushd::api::MotorState& motor : mcu.motors) line(motor.name, motor_line(motor));
+      for (std::size_t m = 0; m < mcu.motors.size(); ++m) {
+        line(mcu.motors[m].name, motor_line(status, i, m));
+      }
     }
     std::fflush(stdout);
   }

@@ -10,8 +10,8 @@ namespace {
 
 namespace api = bushd::api;
 
-std::vector<api::MotorSteps> motor_steps(const Request& request) {
-  std::vector<api::MotorSteps> all;
+std::vector<api::MotorAmount> motor_steps(const Request& request) {
+  std::vector<api::MotorAmount> all;
   for (std::size_t i = 0; i < request.motors.size(); ++i) {
     all.push_back({request.motors[i], request.steps[i]});
   }
@@ -50,7 +50,7 @@ api::Request api_of(const Request& request) {
     case Ask::kDisable:
       return api::Disable{request.motors};
     case Ask::kSetPosition:
-      return api::SetPosition{motor_steps(request)};
+      return api::SetPosition{.motors = motor_steps(request)};
     case Ask::kClearFaults:
       return api::ClearFaults{request.motors};
     case Ask::kEmergencyStop:

@@ -1,6 +1,6 @@
 // Example of a client in C++: moves motors as one group and waits until all stand.
 //
-//   move_and_wait [--socket PATH | --url URL] [--prefix PREFIX] NAME STEPS [NAME STEPS...]
+//   move_and_wait [--socket PATH | --url URL] [--prefix PREFIX] NAME DISTANCE [NAME DISTANCE...]
 //
 // Prints every reply of the daemon; exit code 0 only if all motors reached their targets.
 #include <cstdint>
@@ -29,21 +29,21 @@ void print(const api::Reply& reply) {
     if (motors == nullptr) return;
     for (const api::MotorResult& motor : *motors) {
       std::cout << "  " << motor.motor << ": " << word(motor.outcome) << ", stands at "
-                << motor.position_steps << std::endl;
+                << motor.user << " " << motor.unit << std::endl;
     }
   }
 }
 
 int usage() {
-  std::cerr << "usage: move_and_wait [--socket PATH | --url URL] [--prefix PREFIX] NAME STEPS "
-               "[NAME STEPS...]\n";
+  std::cerr << "usage: move_and_wait [--socket PATH | --url URL] [--prefix PREFIX] NAME "
+               "DISTANCE [NAME DISTANCE...]\n";
   return 2;
 }
 
 int run(const std::vector<std::string>& arguments) {
   // By the control socket if there is one, else by LCM.
   ClientOptions options{.program = "example-c++"};
-  api::Move move;  // by so many steps
+  api::Move move;  // by distances in the motors' units
   if (arguments.size() % 2 != 0) return usage();
   for (std::size_t i = 0; i < arguments.size(); i += 2) {
     const std::string& value = arguments[i + 1];
@@ -54,7 +54,7 @@ int run(const std::vector<std::string>& arguments) {
       options.way = ClientOptions::Way::kLcm;
       (arguments[i] == "--url" ? options.url : options.prefix) = value;
     } else {
-      move.motors.push_back({arguments[i], std::stoll(value)});
+      move.motors.push_back({arguments[i], api::UserUnits{std::stod(value)}});
     }
   }
   if (move.motors.empty()) return usage();
@@ -78,7 +78,7 @@ int run(const std::vector<std::string>& arguments) {
 int main(int argc, char** argv) {
   try {
     return run({argv + 1, argv + argc});
-  } catch (const std::exception&) {  // STEPS that is no number
+  } catch (const std::exception&) {  // DISTANCE that is no number
     return usage();
   }
 }

@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 struct MovesBench : LiveBench {
   explicit MovesBench() { connect(stops); }  // Moves itself is always served
-  void move_to(std::int64_t number, std::vector<api::MotorSteps> motors) {
+  void move_to(std::int64_t number, std::vector<api::MotorAmount> motors) {
     moves.request(now_us(), asker(number),
                   api::Move{.kind = api::Move::Kind::kAbsolute, .motors = std::move(motors)});
   }

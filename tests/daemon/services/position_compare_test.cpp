@@ -20,7 +20,7 @@ struct CompareBench : LiveBench {
 TEST(PositionCompareService, IsDoneWhenTheMcuHasConfirmedIt) {
   CompareBench bench;
   api::PositionCompare request{.motor = "m01",
-                               .position_steps = 40,
+                               .position = 40,
                                .arrivals = {.positive = true, .negative = false},
                                .delay_us = 10,
                                .width_us = 500};
@@ -35,7 +35,7 @@ TEST(PositionCompareService, IsDoneWhenTheMcuHasConfirmedIt) {
 TEST(PositionCompareService, WhatNoMcuCanDoIsRefusedWithItsFigure) {
   CompareBench bench;
   const api::PositionCompare good{.motor = "m01",
-                                  .position_steps = 40,
+                                  .position = 40,
                                   .arrivals = {.positive = true, .negative = true},
                                   .delay_us = 10,
                                   .width_us = 500};
@@ -45,7 +45,7 @@ TEST(PositionCompareService, WhatNoMcuCanDoIsRefusedWithItsFigure) {
     return bench.refusal(number);
   };
   api::PositionCompare bad = good;
-  bad.position_steps = motion::Motor::kMaxPosition + 1;
+  bad.position = motion::Motor::kMaxPosition + 1;
   EXPECT_THAT(refusal(bad), HasSubstr("positions lie within +-2147483647"));
   bad = good;
   bad.delay_us = 1'500'001;
@@ -61,7 +61,7 @@ TEST(PositionCompareService, WhatNoMcuCanDoIsRefusedWithItsFigure) {
 TEST(PositionCompareService, OfAnMcuThatIsOfflineIsRefused) {
   Bench bench;
   PositionCompare compare(bench.installation);
-  compare.request(0, bench.asker(), {.motor = "m01", .position_steps = 1});
+  compare.request(0, bench.asker(), {.motor = "m01", .position = 1});
   EXPECT_THAT(bench.refusal(), HasSubstr("MCU hall:1 is offline"));
 }
 

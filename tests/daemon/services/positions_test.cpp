@@ -14,7 +14,7 @@ using testing::HasSubstr;
 
 struct PositionsBench : LiveBench {
   PositionsBench() { connect(stops); }  // what connect() serves besides is all that is needed
-  void set(std::int64_t number, std::vector<api::MotorSteps> motors) {
+  void set(std::int64_t number, std::vector<api::MotorAmount> motors) {
     positions.request(now_us(), asker(number), api::SetPosition{std::move(motors)});
   }
   Stops stops{installation, moves, homing, open_moves};

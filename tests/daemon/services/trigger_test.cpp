@@ -13,7 +13,7 @@ using testing::HasSubstr;
 
 struct TriggerBench : LiveBench {
   TriggerBench() { connect(trigger); }
-  void arm(std::int64_t number, std::vector<api::MotorSteps> motors, std::int64_t delay_us = 700) {
+  void arm(std::int64_t number, std::vector<api::MotorAmount> motors, std::int64_t delay_us = 700) {
     trigger.request(
         asker(number),
         api::Arm{.edge = api::Edge::kRising, .delay_us = delay_us, .motors = std::move(motors)});

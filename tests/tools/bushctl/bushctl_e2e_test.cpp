@@ -59,8 +59,11 @@ Request only(const FakeDaemon& daemon) {
   return std::get<Request>(requests.at(0));
 }
 
-std::vector<api::MotorSteps> steps(const std::vector<api::MotorSteps>& motors) {
-  return motors;
+// Of motors without a unit.
+std::vector<api::MotorAmount> user(const std::vector<std::pair<std::string, double>>& motors) {
+  std::vector<api::MotorAmount> out;
+  for (const auto& [motor, value] : motors) out.push_back({motor, api::UserUnits{value}});
+  return out;
 }
 
 TEST(Bushctl, StatusAsJsonHasTheAgreedKeys) {
@@ -208,7 +211,7 @@ TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
             "chi: reached, stands at 7 by bushd2-constant@3 (0a1b2c3d)\n");
   const auto move = only<api::Move>(daemon);
   EXPECT_EQ(move.kind, api::Move::Kind::kRelative);
-  EXPECT_EQ(move.motors, steps({{"theta", -400}, {"chi", 20}}));
+  EXPECT_EQ(move.motors, user({{"theta", -400}, {"chi", 20}}));
   EXPECT_THAT(daemon.client_ids().at(0), HasSubstr("bushctl-"));
 }
 
@@ -219,7 +222,7 @@ TEST(Bushctl, ArmedMovesNameTheirEdgeAndDelay) {
       {"arm", "theta", "-400", "chi", "20", "--edge", "falling", "--delay-us", "75", "--wait"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   const auto arm = only<api::Arm>(daemon);
-  EXPECT_EQ(arm.motors, steps({{"theta", -400}, {"chi", 20}}));
+  EXPECT_EQ(arm.motors, user({{"theta", -400}, {"chi", 20}}));
   EXPECT_EQ(arm.edge, api::Edge::kFalling);
   EXPECT_EQ(arm.delay_us, 75);
   EXPECT_EQ(bushctl({"arm", "theta", "5"}).code, 2) << "no delay";
@@ -232,7 +235,7 @@ TEST(Bushctl, MoveToPositionsAndMotorsCalledLikeCommands) {
   EXPECT_EQ(bushctl({"move", "--wait", "stop", "--to", "-5", "phi", "--to=6"}).code, 0);
   const auto move = only<api::Move>(daemon);
   EXPECT_EQ(move.kind, api::Move::Kind::kAbsolute);
-  EXPECT_EQ(move.motors, steps({{"stop", -5}, {"phi", 6}}));
+  EXPECT_EQ(move.motors, user({{"stop", -5}, {"phi", 6}}));
 }
 
 TEST(Bushctl, WithoutWaitingAcceptedIsEnough) {
@@ -296,7 +299,8 @@ TEST(Bushctl, MixedMovesAndWrongWordsAreUsageErrors) {
   EXPECT_THAT(mixed.err, HasSubstr("one command is either"));
   EXPECT_EQ(bushctl({"move"}).code, 2);
   EXPECT_EQ(bushctl({"move", "theta"}).code, 2);
-  EXPECT_EQ(bushctl({"move", "theta", "1.5"}).code, 2);
+  EXPECT_EQ(bushctl({"move", "theta", "1.5", "--steps"}).code, 2);
+  EXPECT_EQ(bushctl({"move", "theta", "1,5"}).code, 2);
   EXPECT_EQ(bushctl({"move", "theta", "5", "--wiat"}).code, 2);
   EXPECT_EQ(bushctl({"set", "theta", "x"}).code, 2);
   EXPECT_EQ(bushctl({"dance"}).code, 2);
@@ -332,7 +336,7 @@ TEST(Bushctl, TwoDashesBeforeANegativeNumberChangeNothing) {
   EXPECT_EQ(bushctl({"move", "theta", "--", "-400", "--wait"}).code, 0);
   const auto requests = daemon.requests();
   ASSERT_EQ(requests.size(), 1u);
-  EXPECT_EQ(std::get<api::Move>(requests[0]).motors, steps({{"theta", -400}}));
+  EXPECT_EQ(std::get<api::Move>(requests[0]).motors, user({{"theta", -400}}));
 }
 
 TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
@@ -353,12 +357,12 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   EXPECT_THAT(std::get<api::Stop>(requests[1]).motors, ElementsAre("theta"));
   EXPECT_THAT(std::get<api::Enable>(requests[2]).motors, ElementsAre("theta", "phi"));
   EXPECT_TRUE(std::get<api::Disable>(requests[3]).motors.empty());
-  EXPECT_EQ(std::get<api::SetPosition>(requests[4]).motors, steps({{"theta", -100}}));
+  EXPECT_EQ(std::get<api::SetPosition>(requests[4]).motors, user({{"theta", -100}}));
   EXPECT_TRUE(std::holds_alternative<api::ClearFaults>(requests[5]));
   EXPECT_TRUE(std::holds_alternative<api::EmergencyStop>(requests[6]));
   EXPECT_THAT(std::get<api::Disarm>(requests[7]).motors, ElementsAre("theta"));
   const auto compare = std::get<api::PositionCompare>(requests[8]);
-  EXPECT_EQ(compare.position_steps, -5);
+  EXPECT_EQ(compare.position, api::Amount(api::UserUnits{-5}));
   EXPECT_EQ(compare.width_us, 7);
 }
 
@@ -418,7 +422,7 @@ TEST(Examples, MoveAndWaitInCpp) {
   Program example({EXAMPLE_MOVE_AND_WAIT, "theta", "-400", "chi", "5"});
   EXPECT_EQ(example.finish(), 0) << example.err();
   EXPECT_THAT(example.out(), HasSubstr("chi: reached, stands at 7"));
-  EXPECT_EQ(only<api::Move>(daemon).motors, steps({{"theta", -400}, {"chi", 5}}));
+  EXPECT_EQ(only<api::Move>(daemon).motors, user({{"theta", -400}, {"chi", 5}}));
 }
 
 TEST(Examples, MoveAndWaitInPython) {
@@ -432,7 +436,7 @@ TEST(Examples, MoveAndWaitInPython) {
   Program example({EXAMPLE_PYTHON, script, "theta", "-400", "chi", "5"});
   EXPECT_EQ(example.finish(), 0) << example.err();
   EXPECT_THAT(example.out(), HasSubstr("chi: reached, stands at 7"));
-  EXPECT_EQ(only<api::Move>(daemon).motors, steps({{"theta", -400}, {"chi", 5}}));
+  EXPECT_EQ(only<api::Move>(daemon).motors, user({{"theta", -400}, {"chi", 5}}));
 }
 
 }  // namespace

@@ -132,10 +132,12 @@ api::Reply result(const api::Request& request, api::Outcome outcome) {
       .outcome = outcome, .reason = std::string(word(outcome)) + " for a reason", .detail = {}};
   if (const auto* move = std::get_if<api::Move>(&request)) {
     std::vector<api::MotorResult> motors;
-    for (const api::MotorSteps& motor : move->motors) {
+    for (const api::MotorAmount& motor : move->motors) {
       motors.push_back({.motor = motor.motor,
                         .outcome = outcome,
                         .position_steps = 7,
+                        .user = 7,
+                        .dial = 7,
                         .table = {.name = "bushd2-constant", .revision = 3, .hash = "0a1b2c3d"}});
     }
     completed.detail = std::move(motors);

@@ -25,11 +25,13 @@ bushd::client::Status status_of(const api::MotorState& motor) {
 
 TEST(Render, AnUnknownPositionIsNoNumber) {
   const api::MotorState motor{.name = "theta", .trust = api::Trust::kUnknown};
-  EXPECT_THAT(motor_line(motor), HasSubstr("theta position - target -"));
-  EXPECT_THAT(motor_line(motor), HasSubstr("unknown"));
+  EXPECT_THAT(motor_line(status_of(motor), 0, 0), HasSubstr("theta position - target -"));
+  EXPECT_THAT(motor_line(status_of(motor), 0, 0), HasSubstr("unknown"));
   const auto shown = nlohmann::json::parse(json(status_of(motor)))["motors"][0];
   EXPECT_TRUE(shown["position_steps"].is_null());
   EXPECT_TRUE(shown["target_steps"].is_null());
+  EXPECT_TRUE(shown["user"].is_null());
+  EXPECT_TRUE(shown["dial"].is_null());
   EXPECT_TRUE(shown["heard_utime_us"].is_null());
   EXPECT_EQ(shown["trust"], "unknown");
 }
@@ -40,8 +42,8 @@ TEST(Render, AStalePositionHasItsTime) {
                               .trust = api::Trust::kStale,
                               .uncertain_reason = "lost",
                               .heard_utime_us = kHeard};
-  EXPECT_THAT(motor_line(motor), HasSubstr("position 42"));
-  EXPECT_THAT(motor_line(motor), HasSubstr("stale heard 2023-11-1"));
+  EXPECT_THAT(motor_line(status_of(motor), 0, 0), HasSubstr("position 42"));
+  EXPECT_THAT(motor_line(status_of(motor), 0, 0), HasSubstr("stale heard 2023-11-1"));
   EXPECT_THAT(table(status_of(motor)).at(1), HasSubstr("stale  heard 2023-11-1"));
   const auto shown = nlohmann::json::parse(json(status_of(motor)))["motors"][0];
   EXPECT_EQ(shown["position_steps"], 42);

@@ -16,7 +16,7 @@ import time
 import uuid
 
 import lcm
-from bushd import answer_t, hello_t, mcu_state_t, move_t, reply_header_t, request_t, welcome_t
+from bushd import answer_t, hello_t, mcu_state_t, motor_amount_t, move_t, reply_header_t, request_t, welcome_t
 
 RESEND_EVERY_S = 0.3  # until the daemon has answered
 ASK_AGAIN_EVERY_S = 1.0  # while the result is awaited: it may have been lost
@@ -168,8 +168,8 @@ def show(parts):
     phase = {reply_header_t.ACCEPTED: "accepted", reply_header_t.REFUSED: "refused"}.get(reply.phase, reply.outcome)
     print(f"{phase}: {reply.reason}" if reply.reason else phase, flush=True)
     for answer in parts:
-        for motor, outcome, position_steps in zip(answer.motors, answer.outcomes, answer.position_steps):
-            print(f"  {motor}: {outcome}, stands at {position_steps}", flush=True)
+        for motor, outcome, position, unit in zip(answer.motors, answer.outcomes, answer.user_positions, answer.units):
+            print(f"  {motor}: {outcome}, stands at {position:.12g} {unit}", flush=True)
 
 
 def main():
@@ -177,17 +177,20 @@ def main():
     parser.add_argument("--socket", metavar="PATH", help="the daemon's control socket; without it LCM is used")
     parser.add_argument("--url", default="udpm://239.255.76.67:7667?ttl=0")
     parser.add_argument("--prefix", default="BUSHD")
-    parser.add_argument("words", nargs="+", metavar="NAME STEPS", help="motors, and by how many steps")
+    parser.add_argument("words", nargs="+", metavar="NAME DISTANCE", help="motors, and how far, in their units")
     arguments = parser.parse_args()
     if len(arguments.words) % 2:
-        parser.error("every NAME wants its STEPS")
+        parser.error("every NAME wants its DISTANCE")
 
     move = move_t()
     move.kind = move_t.RELATIVE
-    move.motors = arguments.words[0::2]
-    move.motor_count = len(move.motors)
     try:
-        move.steps = [int(word) for word in arguments.words[1::2]]
+        for name, distance in zip(arguments.words[0::2], arguments.words[1::2]):
+            amount = motor_amount_t()
+            amount.motor = name
+            amount.user = float(distance)
+            move.motors.append(amount)
+        move.motor_count = len(move.motors)
     except ValueError as error:
         parser.error(str(error))
 

@@ -1,0 +1,94 @@
+// Keys about units and soft limits.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+
+#include "config/config.h"
+#include "config/config_file.h"
+
+namespace bushd::config {
+namespace {
+
+using test::ConfigFile;
+using test::kGood;
+using test::replaced;
+using testing::HasSubstr;
+
+std::string with_motor(const std::string& keys) {
+  return replaced(kGood, "output = 15\n", "output = 15\n" + keys);  // from line 37 on
+}
+
+TEST(ConfigCoordinates, WithoutAUnitPositionsAreSteps) {
+  const auto config = ConfigFile(kGood).load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  const Motor& motor = config->motors[1];
+  EXPECT_EQ(motor.coordinates.unit(), "steps");
+  EXPECT_EQ(motor.coordinates.user_of(-5), -5);
+  EXPECT_EQ(motor.coordinates.precision(), 0);
+  EXPECT_EQ(motor.description, "");
+  EXPECT_FALSE(motor.soft_limits.has_value());
+}
+
+TEST(ConfigCoordinates, AllKeys) {
+  const auto config =
+      ConfigFile(with_motor("description = \"lower blade\"\nunit = \"mm\"\n"
+                            "steps_per_unit = \"400/1.25\"\ndirection = \"negative\"\n"
+                            "offset = 2.5\nprecision = 3\nsoft_limits = [-5, 5.5]\n"))
+          .load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  const Motor& motor = config->motors[1];
+  EXPECT_EQ(motor.description, "lower blade");
+  EXPECT_EQ(motor.coordinates.scale(), (units::Scale{"mm", {320, 1}, true, 2.5, 3}));
+  ASSERT_TRUE(motor.soft_limits.has_value());
+  EXPECT_EQ(motor.soft_limits->low, -5);
+  EXPECT_EQ(motor.soft_limits->high, 5.5);
+}
+
+TEST(ConfigCoordinates, NumbersOfStepsPerUnit) {
+  for (const auto& [text, ratio] : {std::pair{"0.1", units::Ratio{1, 10}},
+                                    {"400", units::Ratio{400, 1}},
+                                    {"\"1/3\"", units::Ratio{1, 3}}}) {
+    const auto config =
+        ConfigFile(with_motor("unit = \"deg\"\nsteps_per_unit = " + std::string(text) + "\n"))
+            .load();
+    ASSERT_TRUE(config.has_value()) << config.error().text();
+    EXPECT_EQ(config->motors[1].coordinates.scale().steps_per_unit, ratio);
+  }
+}
+
+TEST(ConfigCoordinates, WhatCannotBeIsRefusedWithItsLineAndKey) {
+  const std::string unit = "unit = \"mm\"\nsteps_per_unit = 400\n";
+  for (const auto& [keys, error] : {
+           std::pair<std::string, const char*>{"unit = \"\"\nsteps_per_unit = 1\n",
+                                               "37:8: motor[1].unit: is not allowed"},
+           {"unit = \"m\\u001bm\"\nsteps_per_unit = 1\n", "motor[1].unit: is not allowed"},
+           {"unit = \"steps\"\nsteps_per_unit = 1\n", "37:8: motor[1].unit: is \"steps\", which"},
+           {"unit = \"mm\"\n", "motor[1].steps_per_unit: is missing"},
+           {"unit = \"mm\"\nsteps_per_unit = -400\n",
+            "38:18: motor[1].steps_per_unit: is not above 0; allowed: a number above 0, such as "
+            "400, or a ratio, such as \"400/1.25\". The direction has a key of its own"},
+           {"unit = \"mm\"\nsteps_per_unit = nan\n", "motor[1].steps_per_unit: is the floating"},
+           {"unit = \"mm\"\nsteps_per_unit = \"4OO\"\n", "motor[1].steps_per_unit: is no number"},
+           {"unit = \"mm\"\nsteps_per_unit = true\n", "motor[1].steps_per_unit: is true"},
+           {"steps_per_unit = 400\n", "motor[1].steps_per_unit: needs `unit`"},
+           {"offset = 1\n", "37:10: motor[1].offset: needs `unit`"},
+           {unit + "offset = 1e20\n", "motor[1].offset: an offset of 1e+20 mm is more than"},
+           {unit + "offset = inf\n", "motor[1].offset: is the floating-point number inf"},
+           {unit + "direction = \"up\"\n", "motor[1].direction: is \"up\"; allowed: \"negative\""},
+           {unit + "precision = 13\n", "motor[1].precision: is 13; allowed: a whole number 0..12"},
+           {"soft_limits = [0]\n", "motor[1].soft_limits: has 1 elements; allowed: [lowest"},
+           {"soft_limits = [0, \"x\"]\n", "motor[1].soft_limits[1]: is the string \"x\""},
+           {"soft_limits = [5, 4]\n", "37:15: motor[1].soft_limits: has no step from 5 to 4"},
+           {"soft_limits = 7\n", "motor[1].soft_limits: is 7; allowed: [lowest, highest]"},
+           {"description = 7\n", "motor[1].description: is 7"},
+       }) {
+    const auto config = ConfigFile(with_motor(keys)).load();
+    ASSERT_FALSE(config.has_value()) << keys;
+    EXPECT_THAT(config.error().text(), HasSubstr(error)) << keys;
+  }
+}
+
+}  // namespace
+}  // namespace bushd::config

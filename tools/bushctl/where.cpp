@@ -1,0 +1,96 @@
+#include "where.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "base/printable.h"
+#include "grid.h"
+
+namespace bushctl {
+namespace {
+
+namespace api = bushd::api;
+namespace units = bushd::units;
+using bushd::fail;
+using bushd::Result;
+
+std::string number(double value, const units::Scale& scale) {
+  return fmt::format("{:.{}f}", value, scale.decimals.value_or(0));
+}
+
+std::optional<units::SoftLimits> user_limits(const api::MotorDescription& description) {
+  const auto coordinates = units::Coordinates::make(description.scale);
+  if (!description.soft_limits || !coordinates) return std::nullopt;
+  return coordinates->on_user_scale(*description.soft_limits);
+}
+
+std::string limits_text(const api::MotorDescription& description) {
+  const auto limits = user_limits(description);
+  if (!limits) return "-";
+  return number(limits->low, description.scale) + " .. " + number(limits->high, description.scale);
+}
+
+}  // namespace
+
+Result<std::vector<Whereabouts>> where(const bushd::client::Status& status,
+                                       const std::vector<std::string>& names, std::int64_t now_us) {
+  std::vector<Whereabouts> all;
+  for (std::size_t i = 0; i < status.states.size(); ++i) {
+    const auto age_us = std::max<std::int64_t>(now_us - status.states[i].part.utime_us, 0);
+    for (const api::MotorState& state : status.states[i].snapshot.motors) {
+      Whereabouts motor{
+          .state = state, .description = {}, .age_s = 1e-6 * static_cast<double>(age_us)};
+      for (const auto& description : status.descriptions.at(i).snapshot.motors) {
+        if (description.name == state.name) motor.description = description;
+      }
+      all.push_back(std::move(motor));
+    }
+  }
+  if (names.empty()) return all;
+  std::vector<Whereabouts> chosen;
+  for (const std::string& name : names) {
+    const auto found =
+        std::ranges::find(all, name, [](const auto& motor) { return motor.state.name; });
+    if (found == all.end()) {
+      return fail(fmt::format("there is no motor \"{}\"; 'bushctl where' lists them", name));
+    }
+    chosen.push_back(*found);
+  }
+  return chosen;
+}
+
+std::vector<std::string> table(const std::vector<Whereabouts>& motors) {
+  using enum Align;
+  Grid grid({kLeft, kRight, kLeft, kRight, kRight, kLeft, kLeft, kRight, kLeft});
+  grid.row({"MOTOR", "USER", "UNIT", "DIAL", "STEPS", "LIMITS", "TRUST", "AGE", ""});
+  for (const auto& [state, description, age_s] : motors) {
+    grid.row({bushd::printable(state.name), number(state.user, description.scale),
+              bushd::printable(description.scale.unit), number(state.dial, description.scale),
+              fmt::to_string(state.position_steps), limits_text(description),
+              std::string(word(state.trust)), fmt::format("{:.1f} s", age_s),
+              bushd::printable(state.uncertain_reason)});
+  }
+  return grid.lines();
+}
+
+std::string json(const std::vector<Whereabouts>& motors) {
+  nlohmann::json out = {{"motors", nlohmann::json::array()}};
+  for (const auto& [state, description, age_s] : motors) {
+    nlohmann::json motor = {
+        {"name", state.name},   {"unit", description.scale.unit}, {"user", state.user},
+        {"dial", state.dial},   {"steps", state.position_steps},  {"user_low", nullptr},
+        {"user_high", nullptr}, {"moving", state.moving},         {"trust", word(state.trust)},
+        {"reason", nullptr}};
+    if (const auto limits = user_limits(description)) {
+      motor["user_low"] = limits->low;
+      motor["user_high"] = limits->high;
+    }
+    if (!state.uncertain_reason.empty()) motor["reason"] = state.uncertain_reason;
+    out["motors"].push_back(std::move(motor));
+  }
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace bushctl
