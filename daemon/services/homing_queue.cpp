@@ -62,8 +62,12 @@ const char* remedy_of(unsigned refusal) {
 }  // namespace
 
 HomingQueue::HomingQueue(Installation& installation, const Interlocks& interlocks,
-                         OpenMoves& open_moves, Outputs& outputs)
-    : installation_(installation), interlocks_(interlocks), open_(open_moves), outputs_(outputs) {
+                         OpenMoves& open_moves, KeptPositions& kept, Outputs& outputs)
+    : installation_(installation),
+      interlocks_(interlocks),
+      open_(open_moves),
+      kept_(kept),
+      outputs_(outputs) {
   for ([[maybe_unused]] const McuId mcu : installation.mcus()) queues_.add();
 }
 
@@ -118,24 +122,42 @@ bushd_home HomingQueue::message_for(MotorId id) const {
 }
 
 bool HomingQueue::empty() const {
-  return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.empty(); });
+  return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.motors.empty(); });
 }
 
 void HomingQueue::add(MotorId motor) {
   Mcu& mcu = installation_.mcu_of(motor);
   installation_[motor].home();
-  queues_[mcu.id].push_back(motor);
-  if (queues_[mcu.id].size() == 1) begin(mcu);
+  queues_[mcu.id].motors.push_back(motor);
+  if (queues_[mcu.id].motors.size() == 1) begin(mcu);
   installation_.changed = true;
 }
 
+// With a store as soon as that knows of the motion: step().
 void HomingQueue::begin(Mcu& mcu) {
-  mcu.home(message_for(queues_[mcu.id].front()));
+  Queue& queue = queues_[mcu.id];
+  queue.asked = !kept_.keeps();
+  if (queue.asked) mcu.home(message_for(queue.motors.front()));
+}
+
+void HomingQueue::step(std::int64_t now_us) {
+  for (const McuId id : installation_.mcus()) {
+    Queue& queue = queues_[id];
+    if (queue.asked || queue.motors.empty()) continue;
+    const auto ready = kept_.make_ready(now_us, queue.motors.front());
+    if (!ready) {
+      end(installation_[id], Outcome::kFault, ready.error().text());
+    } else if (*ready) {
+      queue.asked = true;
+      installation_[id].home(message_for(queue.motors.front()));
+    }
+  }
 }
 
 void HomingQueue::reports(std::int64_t, Mcu& mcu) {
-  if (queues_[mcu.id].empty() || mcu.busy()) return;
-  const unsigned output = installation_[queues_[mcu.id].front()].output().value;
+  const Queue& queue = queues_[mcu.id];
+  if (queue.motors.empty() || !queue.asked || mcu.busy()) return;
+  const unsigned output = installation_[queue.motors.front()].output().value;
   if (((mcu.report().autonomous | mcu.report().moving) >> output & 1) != 0) return;
   const Ending ending = ending_of(mcu.report(), mcu.name());
   end(mcu, ending.outcome, ending.reason);
@@ -143,25 +165,26 @@ void HomingQueue::reports(std::int64_t, Mcu& mcu) {
 
 void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   Queue& queue = queues_[mcu.id];
-  const MotorId id = queue.front();
-  queue.pop_front();
+  const MotorId id = queue.motors.front();
+  queue.motors.pop_front();
   motion::Motor& motor = installation_[id];
   motor.end_homing(outcome == Outcome::kReached);
   outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning,
                motor.name() + ": " + reason);
   open_.end(id, outcome, reason);
-  if (!queue.empty()) begin(mcu);
+  if (!queue.motors.empty()) begin(mcu);
 }
 
 void HomingQueue::goes_offline(Mcu& mcu, const std::string& cause) {
-  for (const MotorId motor : std::exchange(queues_[mcu.id], {})) {
+  for (const MotorId motor : std::exchange(queues_[mcu.id], {}).motors) {
+    kept_.not_wanted(motor);
     installation_[motor].end_homing(false);
     open_.end(motor, Outcome::kLink, cause + "; it was being homed");
   }
 }
 
 void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
-  if (type != BUSHD_MSG_HOME || queues_[mcu.id].empty()) return;
+  if (type != BUSHD_MSG_HOME || queues_[mcu.id].motors.empty()) return;
   end(mcu, Outcome::kFault,
       "MCU " + mcu.name() + " refused to home it: " + bushd_status_text(status) + "; " +
           remedy_of(status));
@@ -169,7 +192,10 @@ void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
 
 bool HomingQueue::end_if_waiting(MotorId motor) {
   Queue& queue = queues_[installation_.config()[motor].mcu];
-  if (queue.empty() || queue.front() == motor || std::erase(queue, motor) == 0) return false;
+  const bool first = !queue.motors.empty() && queue.motors.front() == motor;
+  if ((first && queue.asked) || std::erase(queue.motors, motor) == 0) return false;
+  kept_.not_wanted(motor);
+  if (first && !queue.motors.empty()) begin(installation_.mcu_of(motor));
   installation_[motor].end_homing(false);
   open_.end(motor, Outcome::kStopped, "stopped before it was its turn to be homed");
   return true;
