@@ -12,22 +12,28 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       interlocks_(installation_),
       open_moves_(installation_),
       journal_(installation_, outputs),
+      positions_(installation_, interlocks_, journal_, outputs),
+      kept_(installation_, positions_, journal_, outputs),
       dry_runs_(installation_),
       tables_(installation_, interlocks_, outputs),
       moves_(installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs),
-      homing_(installation_, interlocks_, open_moves_, outputs),
+      homing_(installation_, interlocks_, open_moves_, kept_, outputs),
       stops_(installation_, moves_, homing_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
-      positions_(installation_, interlocks_, journal_, outputs),
       trigger_(installation_, interlocks_, moves_, open_moves_),
       position_compare_(installation_),
       state_(installation_, outputs),
+      departures_(installation_, interlocks_, kept_,
+                  [this](std::int64_t now_us, const api::Asker& asker,
+                         const api::Request& request) { carry_out(now_us, asker, request); }),
       health_(installation_, outputs),
-      services_{&journal_, &moves_,     &homing_,  &link_faults_,      &stops_, &emergency_stop_,
-                &drivers_, &positions_, &trigger_, &position_compare_, &tables_},
-      supervisor_(installation_, journal_, moves_, positions_, emergency_stop_, services_,
+      // What an MCU's positions are worth comes before whoever goes by that.
+      services_{&kept_,           &journal_, &moves_,     &homing_,  &link_faults_,      &stops_,
+                &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_, &tables_,
+                &departures_},
+      supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {}
 
 void Core::port_opened(std::int64_t now_us, BusId bus) {
@@ -49,6 +55,25 @@ void Core::receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t>
 }
 
 void Core::request(std::int64_t now, const api::Asker& asker, const api::Request& request) {
+  cancel_departures(request);
+  if (!departures_.hold(now, asker, request)) carry_out(now, asker, request);
+}
+
+// Whoever stops motors stops those as well that are about to begin.
+void Core::cancel_departures(const api::Request& request) {
+  if (departures_.empty()) return;
+  Result<std::vector<MotorId>> motors;
+  if (const auto* stop = std::get_if<api::Stop>(&request)) {
+    motors = installation_.find_or_all(stop->motors);
+  } else if (const auto* disarm = std::get_if<api::Disarm>(&request)) {
+    motors = installation_.find_or_all(disarm->motors);
+  } else if (std::holds_alternative<api::EmergencyStop>(request)) {
+    motors = installation_.find_or_all({});
+  }
+  if (motors) departures_.cancel(*motors);
+}
+
+void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Request& request) {
   std::visit(Overloaded{
                  [&](const api::Move& r) { moves_.request(now, asker, r); },
                  [&](const api::Stop& r) { stops_.request(now, asker, r); },
@@ -84,7 +109,8 @@ void Core::keep_up(std::int64_t now_us) {
 
 std::int64_t Core::next_wake_us() const {
   if (!dry_runs_.idle()) return 0;
-  std::int64_t wake = std::min(state_.next_wake_us(), health_.next_wake_us());
+  std::int64_t wake =
+      std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us()});
   for (const BusId id : installation_.buses()) {
     wake = std::min(wake, installation_[id].master.next_wake_us());
   }
@@ -93,6 +119,7 @@ std::int64_t Core::next_wake_us() const {
 
 void Core::shut_down(std::int64_t now_us) {
   installation_.shutting_down = true;
+  departures_.cancel(*installation_.find_or_all({}));
   stops_.stop(now_us, *installation_.find_or_all({}));
 }
 

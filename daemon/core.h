@@ -13,12 +13,14 @@
 
 #include "api/session.h"
 #include "daemon/outputs.h"
+#include "daemon/services/departures.h"
 #include "daemon/services/drivers.h"
 #include "daemon/services/dry_run.h"
 #include "daemon/services/emergency_stop.h"
 #include "daemon/services/health_publisher.h"
 #include "daemon/services/homing_queue.h"
 #include "daemon/services/journal.h"
+#include "daemon/services/kept_positions.h"
 #include "daemon/services/link_faults.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
@@ -65,20 +67,29 @@ class Core {
 
   // Answers to what the outputs were asked, what the daemon has kept from before, and checks.
   TablesInService& tables() { return tables_; }
+  // The store of positions, likewise.
+  KeptPositions& kept() { return kept_; }
 
   // Ramps down all motors and takes no more moves.
   void shut_down(std::int64_t now_us);
   // No motor moves by this core's doing.
   bool at_rest() const { return open_moves_.empty() && homing_.empty(); }
+  // What there is to keep of positions is on the disk.
+  bool settled() const { return kept_.settled(); }
   // When all that moves now will have come to rest, as planned.
   std::int64_t rest_by_us(std::int64_t now_us) const { return moves_.rest_by_us(now_us); }
 
  private:
+  void carry_out(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
+  void cancel_departures(const api::Request& request);
+
   Outputs& outputs_;
   Installation installation_;
   Interlocks interlocks_;
   OpenMoves open_moves_;
   Journal journal_;
+  Positions positions_;
+  KeptPositions kept_;
   DryRuns dry_runs_;
   TablesInService tables_;
   Moves moves_;
@@ -87,10 +98,10 @@ class Core {
   EmergencyStop emergency_stop_;
   LinkFaults link_faults_;
   Drivers drivers_;
-  Positions positions_;
   Trigger trigger_;
   PositionCompare position_compare_;
   StatePublisher state_;
+  Departures departures_;
   HealthPublisher health_;
   std::vector<Service*> services_;  // in the order in which they follow what MCUs tell
   Supervisor supervisor_;

@@ -75,11 +75,12 @@ Result<serial::SerialPort> open_first(const config::Bus& bus) {
 }  // namespace
 
 EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_log,
-                     TableLibrary library)
+                     TableLibrary library, state::Store* store)
     : config_(config),
       fronts_(fronts),
       move_log_(move_log),
       library_(std::move(library)),
+      store_(store),
       run_(new_run()),
       core_(config, *this, master_number(run_)),
       publishing_(run_, config.mcus.size(), config.buses.size(),
@@ -97,6 +98,7 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
       lcm_watch_(lcm_front_, publishing_, config.lcm.prefix,
                  [this](LogLevel level, const std::string& text) { log(level, text); }) {
   for ([[maybe_unused]] const config::Bus& bus : config.buses) ports_.add();
+  if (store != nullptr) core_.kept().use(store->kept(), *this, config.state.required);
   publishing_.set_refresh([this] { core_.publish_state(now_us()); });
   publishing_.add(lcm_front_);
   if (fronts.control == nullptr) return;
@@ -184,6 +186,12 @@ Result<void> EventLoop::set_up() {
         keep_watching(fronts_.control->fd(), [this](std::uint32_t) { socket_front_->handle(); });
     if (!watched) return watched;
   }
+  for (Worker* worker : {&state_worker_, &mark_worker_}) {
+    if (store_ == nullptr) break;
+    if (const auto started = worker->start(); !started) return started;
+    const auto watched = keep_watching(worker->fd(), [worker](std::uint32_t) { worker->handle(); });
+    if (!watched) return watched;
+  }
   const auto watched = keep_watching(worker_.fd(), [this](std::uint32_t) { worker_.handle(); });
   if (!watched) return watched;
   return lcm_front_.subscribe();
@@ -225,12 +233,14 @@ Result<void> EventLoop::run() {
     core_.keep_up(now);
     lcm_watch_.step(now);
     tell_left_out(now);
-    if (shut_down_by_us_ && (core_.at_rest() || now >= *shut_down_by_us_)) break;
+    const bool done = core_.at_rest() && core_.settled();
+    if (shut_down_by_us_ && (done || now >= *shut_down_by_us_)) break;
     if (const auto handled = handle_sources(); !handled) return handled;
     carry_out_some();
     core_.work();
   }
   tell_left_out(std::numeric_limits<std::int64_t>::max());
+  close_store();
   log_cpu_share();
   if (core_.at_rest()) return {};
   return fail("not all motors are known to be at rest; their MCUs run them down by themselves");
@@ -485,6 +495,26 @@ void EventLoop::log(LogLevel level, const std::string& text) {
     case LogLevel::kError:
       spdlog::error("{}", *line);
       break;
+  }
+}
+
+void EventLoop::mark(std::vector<state::Mark> marks) {
+  mark_worker_.post([this, marks = std::move(marks)]() -> Worker::Completion {
+    return [this, done = store_->mark(marks)] { core_.kept().marked(now_us(), done); };
+  });
+}
+
+void EventLoop::write(state::Batch batch) {
+  state_worker_.post([this, batch = std::move(batch)]() -> Worker::Completion {
+    return [this, done = store_->write(batch)] { core_.kept().written(now_us(), done); };
+  });
+}
+
+void EventLoop::close_store() {
+  if (store_ == nullptr || state_worker_.waiting() > 0) return;
+  if (!core_.settled() || !core_.kept().guarded()) return;
+  if (const auto ended = store_->end(); !ended) {
+    spdlog::warn("state store: {}", ended.error().text());
   }
 }
 

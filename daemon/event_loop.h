@@ -26,12 +26,14 @@
 #include "daemon/worker.h"
 #include "lcm/transport.h"
 #include "serial/serial_port.h"
+#include "state/keeper.h"
+#include "state/store.h"
 
 struct sd_event;
 
 namespace bushd::daemon {
 
-class EventLoop : private Outputs {
+class EventLoop : private Outputs, private state::Backend {
  public:
   // What clients come by. Without `stops`, `lcm` takes those too; `control` may be null.
   struct Fronts {
@@ -39,8 +41,10 @@ class EventLoop : private Outputs {
     lcm::Transport* stops = nullptr;
     control::Server* control = nullptr;
   };
-  // Everything outlives the loop. `move_log` may be null.
-  EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_log, TableLibrary library);
+  // Everything outlives the loop. `move_log` may be null; so may `store`: nothing is kept of
+  // positions then.
+  EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_log, TableLibrary library,
+            state::Store* store);
   ~EventLoop() override;
 
   // Runs until SIGTERM or SIGINT, then ramps all motors down and returns. Precondition: these,
@@ -89,6 +93,8 @@ class EventLoop : private Outputs {
   void log_cpu_share() const;
   api::Asker with_log(const api::Asker& asker, const api::Request& request);
   void tell_left_out(std::int64_t now_us);
+  // Positions are on the disk, and it is told that the daemon has ended well.
+  void close_store();
 
   // Outputs
   void send(BusId bus, std::span<const std::uint8_t> bytes) override;
@@ -102,10 +108,15 @@ class EventLoop : private Outputs {
   void serve_tables(const api::Asker& asker, const api::Request& request) override;
   std::int64_t wall_clock_us() override;
 
+  // state::Backend
+  void mark(std::vector<state::Mark> marks) override;
+  void write(state::Batch batch) override;
+
   const config::Config& config_;
   Fronts fronts_;
   MoveLog* move_log_;
   TableLibrary library_;
+  state::Store* store_;
   std::int64_t run_;  // tells this run of the daemon from others
   Core core_;
   Publishing publishing_;
@@ -122,7 +133,10 @@ class EventLoop : private Outputs {
   std::vector<std::unique_ptr<Source>> sources_;  // those of ports aside
   std::int64_t started_us_ = 0;
   std::optional<std::int64_t> shut_down_by_us_;
-  Worker worker_;  // the last member: its thread uses others
+  // The last members: their threads use others.
+  Worker worker_;
+  Worker state_worker_;  // the database of positions
+  Worker mark_worker_;   // moving marks, which motions wait for
 };
 
 }  // namespace bushd::daemon

@@ -103,6 +103,7 @@ void Installation::add_motors() {
             .output = config.output,
             .has_home = config.home.has_value(),
             .local = config.local,
+            .restored_refused = config.restored_refused,
             .limit_immediate = config.limit_action == BUSHD_STOP_IMMEDIATE,
             .emergency_stop_immediate = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
             .emergency_input_immediate = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE,

@@ -15,6 +15,7 @@
 #include "control/path.h"
 #include "daemon/channel_claim.h"
 #include "daemon/event_loop.h"
+#include "daemon/state_folder.h"
 
 namespace {
 
@@ -98,6 +99,24 @@ bushd::Result<Lcm> open_lcm(const bushd::config::Lcm& config, bool has_control) 
   return lcm;
 }
 
+// Empty without a store: the default folder is not there or cannot be used, or none is wanted.
+bushd::Result<std::optional<bushd::state::Store>> open_store(const bushd::config::Config& config) {
+  const auto folder = bushd::daemon::state_folder(config.state);
+  if (!folder.wanted) {
+    spdlog::info("positions are not kept over power cuts: {}", folder.why_not);
+    return std::nullopt;
+  }
+  auto store = bushd::daemon::open_store(config, folder.path);
+  if (store) {
+    for (const std::string& note : store->notes()) spdlog::warn("{}", note);
+    spdlog::info("positions are kept in {}", folder.path.string());
+    return std::optional(std::move(*store));
+  }
+  if (folder.configured && config.state.required) return bushd::fail(store.error());
+  spdlog::warn("positions are not kept over power cuts: {}", store.error().text());
+  return std::nullopt;
+}
+
 int run(const bushd::config::Config& config, const std::string& move_log_path,
         const std::string& in_service_path) {
   block_signals();
@@ -127,11 +146,17 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
     spdlog::error("{}", lcm.error().text());
     return 1;
   }
+  auto store = open_store(config);
+  if (!store) {
+    spdlog::error("state store: {}. Another folder: [state] path", store.error().text());
+    return 1;
+  }
   spdlog::info("bushd: {}, LCM {}, control socket {}", extent(config), config.lcm.url,
                *control ? (*control)->path() : "none");
   bushd::daemon::EventLoop loop(
       config, {.lcm = *lcm->all, .stops = lcm->stops.get(), .control = control->get()},
-      move_log ? &*move_log : nullptr, bushd::daemon::TableLibrary(config, in_service_path));
+      move_log ? &*move_log : nullptr, bushd::daemon::TableLibrary(config, in_service_path),
+      *store ? &**store : nullptr);
   if (const auto ended = loop.run(); !ended) {
     spdlog::error("{}", ended.error().text());
     return 1;

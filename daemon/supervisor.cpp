@@ -24,12 +24,14 @@ bool is_reported(const Mcu& mcu, const motion::Motor& motor) {
 }  // namespace
 
 Supervisor::Supervisor(Installation& installation, Journal& journal, Moves& moves,
-                       const Positions& positions, const EmergencyStop& emergency_stop,
-                       std::vector<Service*> services, Outputs& outputs)
+                       const Positions& positions, const KeptPositions& kept,
+                       const EmergencyStop& emergency_stop, std::vector<Service*> services,
+                       Outputs& outputs)
     : installation_(installation),
       journal_(journal),
       moves_(moves),
       positions_(positions),
+      kept_(kept),
       emergency_stop_(emergency_stop),
       services_(std::move(services)),
       outputs_(outputs) {
@@ -85,9 +87,10 @@ void Supervisor::goes_online(std::int64_t now_us, Mcu& mcu) {
   outputs_.log(restarted ? LogLevel::kWarning : LogLevel::kInfo,
                "MCU " + mcu.name() + " is ready, boot number " + std::to_string(boot_number) +
                    (restarted ? "; it restarted" + by_cause(mcu.report().reset_cause) +
-                                    ", so its motors' positions are uncertain: set or home them. "
-                                    "Heard last before: " +
-                                    stood
+                                    (kept_.keeps() ? ". "
+                                                   : ", so its motors' positions are uncertain: "
+                                                     "set or home them. ") +
+                                    "Heard last before: " + stood
                               : ""));
   for (Service* service : services_) service->goes_online(mcu);
   installation_.changed = true;
@@ -120,7 +123,7 @@ void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
   for (const MotorId id : mcu.motors()) {
     motion::Motor& motor = installation_[id];
     if (!is_reported(mcu, motor)) continue;
-    journal_.before_report(id, positions_.being_set(id));
+    journal_.before_report(id, positions_.being_set(id) || kept_.being_restored(id));
     moves_.take(now_us, id,
                 motor.report({.of_mcu = mcu.report(),
                               .tick = mcu.view().tick,

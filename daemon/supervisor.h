@@ -18,7 +18,8 @@ class Supervisor {
  public:
   // `services` are told in their order.
   Supervisor(Installation& installation, Journal& journal, Moves& moves, const Positions& positions,
-             const EmergencyStop& emergency_stop, std::vector<Service*> services, Outputs& outputs);
+             const KeptPositions& kept, const EmergencyStop& emergency_stop,
+             std::vector<Service*> services, Outputs& outputs);
 
   void handle_events(std::int64_t now_us, Bus& bus);
   // Tells people at once that somebody else talks on a line, and when it is over.
@@ -36,6 +37,7 @@ class Supervisor {
   Journal& journal_;
   Moves& moves_;
   const Positions& positions_;
+  const KeptPositions& kept_;
   const EmergencyStop& emergency_stop_;
   std::vector<Service*> services_;
   Outputs& outputs_;

@@ -45,7 +45,7 @@ def group_of(motor):
 
 def configuration(options, port):
     # Not a control socket: that of a daemon of this machine stays as it is.
-    lines = ["[lcm]", f'url = "{options.url}"', "", "[control]", 'path = ""', "", "[[bus]]", 'name = "hall"', f'port = "{port}"']
+    lines = ["[lcm]", f'url = "{options.url}"', "", "[control]", 'path = ""', "", "[state]", 'path = ""', "", "[[bus]]", 'name = "hall"', f'port = "{port}"']
     # What an image has to deal with at once, when sixteen motors start, must fit into a tick.
     tick_us = 10240 if options.mcu in CHIPS else 2560
     lines += ["baud = 500000", f"tick_us = {tick_us}", f'format = "{options.format}"', ""]

@@ -62,8 +62,12 @@ const char* remedy_of(unsigned refusal) {
 }  // namespace
 
 HomingQueue::HomingQueue(Installation& installation, const Interlocks& interlocks,
-                         OpenMoves& open_moves, Outputs& outputs)
-    : installation_(installation), interlocks_(interlocks), open_(open_moves), outputs_(outputs) {
+                         OpenMoves& open_moves, KeptPositions& kept, Outputs& outputs)
+    : installation_(installation),
+      interlocks_(interlocks),
+      open_(open_moves),
+      kept_(kept),
+      outputs_(outputs) {
   for ([[maybe_unused]] const McuId mcu : installation.mcus()) queues_.add();
 }
 
@@ -128,24 +132,42 @@ bushd_home HomingQueue::message_for(const Task& task) const {
 }
 
 bool HomingQueue::empty() const {
-  return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.empty(); });
+  return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.tasks.empty(); });
 }
 
 void HomingQueue::add(const Task& task) {
   Mcu& mcu = installation_.mcu_of(task.motor);
   installation_[task.motor].home();
-  queues_[mcu.id].push_back(task);
-  if (queues_[mcu.id].size() == 1) begin(mcu);
+  queues_[mcu.id].tasks.push_back(task);
+  if (queues_[mcu.id].tasks.size() == 1) begin(mcu);
   installation_.changed = true;
 }
 
+// With a store as soon as that knows of the motion: step().
 void HomingQueue::begin(Mcu& mcu) {
-  mcu.home(message_for(queues_[mcu.id].front()));
+  Queue& queue = queues_[mcu.id];
+  queue.asked = !kept_.keeps();
+  if (queue.asked) mcu.home(message_for(queue.tasks.front()));
+}
+
+void HomingQueue::step(std::int64_t now_us) {
+  for (const McuId id : installation_.mcus()) {
+    Queue& queue = queues_[id];
+    if (queue.asked || queue.tasks.empty()) continue;
+    const auto ready = kept_.make_ready(now_us, queue.tasks.front().motor);
+    if (!ready) {
+      end(installation_[id], Outcome::kFault, ready.error().text());
+    } else if (*ready) {
+      queue.asked = true;
+      installation_[id].home(message_for(queue.tasks.front()));
+    }
+  }
 }
 
 void HomingQueue::reports(std::int64_t, Mcu& mcu) {
-  if (queues_[mcu.id].empty() || mcu.busy()) return;
-  const unsigned output = installation_[queues_[mcu.id].front().motor].output().value;
+  const Queue& queue = queues_[mcu.id];
+  if (queue.tasks.empty() || !queue.asked || mcu.busy()) return;
+  const unsigned output = installation_[queue.tasks.front().motor].output().value;
   if (((mcu.report().autonomous | mcu.report().moving) >> output & 1) != 0) return;
   const Ending ending = ending_of(mcu.report(), mcu.name());
   end(mcu, ending.outcome, ending.reason);
@@ -153,25 +175,26 @@ void HomingQueue::reports(std::int64_t, Mcu& mcu) {
 
 void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   Queue& queue = queues_[mcu.id];
-  const MotorId id = queue.front().motor;
-  queue.pop_front();
+  const MotorId id = queue.tasks.front().motor;
+  queue.tasks.pop_front();
   motion::Motor& motor = installation_[id];
   motor.end_homing(outcome == Outcome::kReached);
   outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning,
                motor.name() + ": " + reason);
   open_.end(id, outcome, reason);
-  if (!queue.empty()) begin(mcu);
+  if (!queue.tasks.empty()) begin(mcu);
 }
 
 void HomingQueue::goes_offline(Mcu& mcu, const std::string& cause) {
-  for (const auto& [motor, floor] : std::exchange(queues_[mcu.id], {})) {
+  for (const auto& [motor, floor] : std::exchange(queues_[mcu.id], {}).tasks) {
+    kept_.not_wanted(motor);
     installation_[motor].end_homing(false);
     open_.end(motor, Outcome::kLink, cause + "; it was being homed");
   }
 }
 
 void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
-  if (type != BUSHD_MSG_HOME || queues_[mcu.id].empty()) return;
+  if (type != BUSHD_MSG_HOME || queues_[mcu.id].tasks.empty()) return;
   end(mcu, Outcome::kFault,
       "MCU " + mcu.name() + " refused to home it: " + bushd_status_text(status) + "; " +
           remedy_of(status));
@@ -180,7 +203,10 @@ void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
 bool HomingQueue::end_if_waiting(MotorId motor) {
   Queue& queue = queues_[installation_.config()[motor].mcu];
   const auto is_motor = [motor](const Task& task) { return task.motor == motor; };
-  if (queue.empty() || is_motor(queue.front()) || std::erase_if(queue, is_motor) == 0) return false;
+  const bool first = !queue.tasks.empty() && is_motor(queue.tasks.front());
+  if ((first && queue.asked) || std::erase_if(queue.tasks, is_motor) == 0) return false;
+  kept_.not_wanted(motor);
+  if (first && !queue.tasks.empty()) begin(installation_.mcu_of(motor));
   installation_[motor].end_homing(false);
   open_.end(motor, Outcome::kStopped, "stopped before it was its turn to be homed");
   return true;

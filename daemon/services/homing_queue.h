@@ -10,6 +10,7 @@
 #include "daemon/interlocks.h"
 #include "daemon/outputs.h"
 #include "daemon/service.h"
+#include "daemon/services/kept_positions.h"
 #include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
@@ -17,7 +18,7 @@ namespace bushd::daemon {
 class HomingQueue final : public Service {
  public:
   HomingQueue(Installation& installation, const Interlocks& interlocks, OpenMoves& open_moves,
-              Outputs& outputs);
+              KeptPositions& kept, Outputs& outputs);
 
   void request(const api::Asker& asker, const api::Home& request);
 
@@ -32,13 +33,17 @@ class HomingQueue final : public Service {
   void goes_offline(Mcu& mcu, const std::string& cause) override;
   void reports(std::int64_t now_us, Mcu& mcu) override;
   void refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) override;
+  void step(std::int64_t now_us) override;
 
  private:
   struct Task {
     MotorId motor;
     std::uint16_t floor;  // of the fast approach
   };
-  using Queue = std::deque<Task>;  // the first is being homed, the others wait
+  struct Queue {
+    std::deque<Task> tasks;
+    bool asked = false;  // the MCU homes the first; the others wait
+  };
 
   Result<std::vector<MotorId>> motors_of(const api::Home& request) const;
   Result<void> may_home(MotorId motor) const;
@@ -52,6 +57,7 @@ class HomingQueue final : public Service {
   Installation& installation_;
   const Interlocks& interlocks_;
   OpenMoves& open_;
+  KeptPositions& kept_;
   Outputs& outputs_;
   ById<McuId, Queue> queues_;
 };

@@ -25,9 +25,10 @@ constexpr Words<Activity, 6> kActivities = {{
     {Activity::kHoming, "home"},
     {Activity::kLocal, "local"},
 }};
-constexpr Words<Trust, 4> kTrusts = {{
+constexpr Words<Trust, 5> kTrusts = {{
     {Trust::kUnknown, "unknown"},
     {Trust::kKnown, "known"},
+    {Trust::kRestored, "restored"},
     {Trust::kStale, "stale"},
     {Trust::kUncertain, "uncertain"},
 }};

@@ -32,6 +32,7 @@ enum class Activity {
 enum class Trust {
   kUnknown,   // its MCU has not reported since it booted: there is no number
   kKnown,     // the MCU has counted every step since somebody said where the motor stands
+  kRestored,  // as it was when the MCU lost power, at rest; nobody has looked since
   kStale,     // as heard last from an MCU that is offline: it may have run on, or lost power
   kUncertain  // steps may be lost, or nobody has said where it stands
 };
@@ -59,7 +60,7 @@ struct Directions {
 // The words are lower case and stable: scripts compare them.
 std::string_view word(Outcome outcome);        // done reached stopped limit link fault
 std::string_view word(Activity activity);      // rest move armed home local
-std::string_view word(Trust trust);            // unknown known stale uncertain
+std::string_view word(Trust trust);            // unknown known restored stale uncertain
 std::string_view word(McuState state);         // OFFLINE BUSY READY RUN FAULT
 std::string_view word(StopMode mode);          // ramp immediate
 std::string_view word(Edge edge);              // rising falling

@@ -34,6 +34,13 @@ struct Control {
   std::string group = {};  // that may use it; empty: that of the daemon
 };
 
+// What is kept over power cuts.
+struct State {
+  // A folder. Without a value: $STATE_DIRECTORY, or /var/lib/bushd where that is there.
+  std::optional<std::string> path = {};
+  bool required = true;  // nothing moves that could not be found uncertain afterwards
+};
+
 struct Bus {
   std::string name;
   std::string port;        // as written in the file; may be a pattern (config/port_pattern.h)
@@ -92,7 +99,8 @@ struct Motor {
   bushd_stop_mode limit_action = BUSHD_STOP_RAMP;
   bool input_active_open = false;
   std::optional<Home> home = {};
-  bool local = false;  // its MCU's FORWARD and REVERSE inputs move it
+  bool local = false;             // its MCU's FORWARD and REVERSE inputs move it
+  bool restored_refused = false;  // it may not move while its position is only restored
   std::string description{};
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits = {};
@@ -103,6 +111,7 @@ struct Config {
   std::string path;
   Lcm lcm;
   Control control;
+  State state;
   // In the order of the file.
   std::vector<Bus> buses;
   std::vector<Mcu> mcus;

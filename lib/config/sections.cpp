@@ -16,6 +16,7 @@
 #include "config/home.h"
 #include "config/inputs.h"
 #include "config/port_pattern.h"
+#include "config/state_section.h"
 #include "config/words.h"
 #include "tables/table_file.h"
 
@@ -374,8 +375,8 @@ Result<void> read_motors(Loading* loading) {
   for (const TomlReader& reader : loading->motors) {
     if (auto known =
             reader.only({"name", "mcu", "output", "group", "limit", "limit_action", "input_active",
-                         "home", "local", "description", "unit", "steps_per_unit", "direction",
-                         "offset", "precision", "soft_limits", "max_speed"});
+                         "home", "local", "restored", "description", "unit", "steps_per_unit",
+                         "direction", "offset", "precision", "soft_limits", "max_speed"});
         !known) {
       return known;
     }
@@ -404,6 +405,7 @@ Result<void> read_motors(Loading* loading) {
                 .group = *group};
     if (auto read = read_inputs(reader, &motor); !read) return read;
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
+    if (auto read = read_restored(reader, &motor); !read) return read;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
     config.motors.push_back(std::move(motor));
   }
@@ -414,10 +416,11 @@ Result<void> read_motors(Loading* loading) {
 
 Result<void> read_sections(const TomlReader& root, Loading* loading) {
   const std::string& file = loading->config.path;
-  if (auto known = root.only({"lcm", "control", "bus", "mcu", "group", "motor"}); !known)
+  if (auto known = root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor"}); !known)
     return known;
   if (auto read = read_lcm(root, &loading->config); !read) return read;
   if (auto read = read_control(root, &loading->config); !read) return read;
+  if (auto read = read_state(root, &loading->config); !read) return read;
   auto buses = read_array(root, file, "bus", true);
   if (!buses) return fail(buses.error());
   loading->buses = std::move(*buses);

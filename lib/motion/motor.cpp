@@ -53,6 +53,11 @@ Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const 
                                    "'bushctl set NAME STEPS'"
                                  : "find out where it stands and run 'bushctl set NAME STEPS'"));
   }
+  if (restored_reason_ && setup_.restored_refused) {
+    return fail("its position is only restored, because " + *restored_reason_ +
+                ", and restored = \"refuse\" keeps it there; home it, set its position, or run "
+                "'bushctl confirm NAME' if it is right");
+  }
   const std::int64_t steps = target - position_;
   if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
     return fail("target " + std::to_string(target) + " is beyond +-" +
@@ -155,6 +160,22 @@ void Motor::end_homing(bool found) {
 void Motor::position_is_known() {
   confirmed_ = true;
   uncertain_reason_.reset();
+  restored_reason_.reset();
+}
+
+void Motor::position_is_restored(std::string reason) {
+  position_is_known();
+  restored_reason_ = std::move(reason);
+}
+
+void Motor::position_is_uncertain(std::string reason) {
+  restored_reason_.reset();
+  uncertain_reason_ = std::move(reason);
+}
+
+void Motor::position_is_unconfirmed() {
+  position_is_known();
+  confirmed_ = false;
 }
 
 PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
@@ -165,6 +186,7 @@ PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
     return {Trust::kUnknown,
             mcu + " restarted; before, it was heard at " + std::to_string(position_)};
   }
+  if (restoring_) return {Trust::kUnknown, "its position is being restored"};
   if (lost_) {
     std::string reason = lost_->in_motion ? mcu + " was lost while it moved, so it may have run on"
                                           : mcu + " is out of reach; it rested when it was heard";
@@ -175,6 +197,7 @@ PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
   if (!confirmed_) {
     return {Trust::kUncertain, "it has been neither set nor homed since this daemon started"};
   }
+  if (restored_reason_) return {Trust::kRestored, *restored_reason_};
   return {Trust::kKnown, {}};
 }
 

@@ -26,7 +26,8 @@ struct MotorSetup {
   std::string mcu;  // for texts, as the name
   Output output;
   bool has_home = false;
-  bool local = false;  // people may move it by the inputs at its MCU
+  bool local = false;             // people may move it by the inputs at its MCU
+  bool restored_refused = false;  // it may not move while its position is only restored
   // Without a ramp, so that it may overrun.
   bool limit_immediate = false;
   bool emergency_stop_immediate = false;
@@ -129,6 +130,10 @@ class Motor {
   double velocity_steps_per_s() const { return is<Moving>() ? axis_.velocity_steps_per_s() : 0.0; }
   // Why steps may be lost, so that it may not move. Nothing: none are, as far as this daemon knows.
   const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
+  // Somebody has said where it stands, in this run of the daemon or as was kept.
+  bool confirmed() const { return confirmed_; }
+  // Since then its MCU has lost power, and it stood.
+  const std::optional<std::string>& restored_reason() const { return restored_reason_; }
 
   // The plan; only while has_plan().
   Axis& axis() { return axis_; }
@@ -164,6 +169,13 @@ class Motor {
     setup_.coordinates = std::move(coordinates);
   }
   void position_is_known();
+  // What was kept from before the MCU, or the daemon, was started.
+  void position_is_restored(std::string reason);
+  void position_is_uncertain(std::string reason);
+  void position_is_unconfirmed();  // nobody has said where it stands
+  // The MCU's counter is being set to what was kept: until then it is not its position.
+  void restoring(bool now) { restoring_ = now; }
+  bool is_restoring() const { return restoring_; }
   // Another table. Precondition: !has_plan().
   void set_axis(Axis axis) { axis_ = axis; }
 
@@ -208,6 +220,8 @@ class Motor {
   };
   std::optional<Lost> lost_;  // its MCU is offline
   std::optional<std::string> uncertain_reason_;
+  std::optional<std::string> restored_reason_;
+  bool restoring_ = false;
   bool autonomous_ = false;      // as reported last: its MCU moves it by itself
   bool moved_by_other_ = false;  // likewise: it has moved and still does, without a plan here
   bool forbidden_up_ = false;

@@ -130,6 +130,21 @@ TEST(Config, TheControlSocketIsWhereTheFileSays) {
   EXPECT_EQ(none->control.path, "");
 }
 
+TEST(Config, PositionsAreKeptWhereTheFileSays) {
+  const auto plain = ConfigFile(kGood).load();
+  ASSERT_TRUE(plain) << plain.error().text();
+  EXPECT_FALSE(plain->state.path);
+  EXPECT_TRUE(plain->state.required);
+  EXPECT_FALSE(plain->motors[1].restored_refused);
+  const auto named = ConfigFile("[state]\npath = \"/srv/positions\"\nrequired = false\n" + kGood +
+                                "restored = \"refuse\"\n")
+                         .load();
+  ASSERT_TRUE(named) << named.error().text();
+  EXPECT_EQ(named->state.path, "/srv/positions");
+  EXPECT_FALSE(named->state.required);
+  EXPECT_TRUE(named->motors[1].restored_refused);
+}
+
 TEST(Config, LcmMayOnlyPublish) {
   const auto config = ConfigFile(replaced(kGood, "url =", "commands = false\nurl =")).load();
   ASSERT_TRUE(config.has_value()) << config.error().text();
@@ -230,6 +245,21 @@ Refusal change(const char* what, const std::string& from, const std::string& to,
 
 const auto kNames = [](const auto& tested) { return std::string(tested.param.what); };
 
+Refusal state(const char* what, const std::string& lines, const char* key, const char* message) {
+  return {what, "[state]\n" + lines + "\n" + kGood, 2, key, message};
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    State, ConfigRefusal,
+    testing::Values(state("UnknownKey", "folder = 1", "state.folder",
+                          "allowed here: path, required"),
+                    state("RelativePath", "path = \"state\"", "state.path", "an absolute path"),
+                    state("RequiredIsWord", "required = \"yes\"", "state.required", "allowed"),
+                    Refusal{"Value", "state = 3\n", 1, "state", "one [state]"},
+                    Refusal{"Restored", kGood + "restored = \"yes\"\n", 38, "motor[1].restored",
+                            "\"allow\" or \"refuse\""}),
+    kNames);
+
 INSTANTIATE_TEST_SUITE_P(
     Lcm, ConfigRefusal,
     testing::Values(change("UnknownKey", "url =", "uri =", 2, "lcm.uri",
@@ -292,7 +322,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"Empty", "bus = []\n", 1, "bus", "is empty"},
         Refusal{"Numbers", "bus = [1]\n", 1, "bus[0]", "is 1; allowed: sections [[bus]]"},
         change("UnknownSection", "[[mcu]]", "[[motors]]", 16, "motors",
-               "unknown key; allowed here: lcm, control, bus, mcu, group, motor"),
+               "unknown key; allowed here: lcm, control, state, bus, mcu, group, motor"),
         change("UnknownKey", "tick_us", "tick_ms", 8, "bus[0].tick_ms",
                "unknown key; allowed here: name, port, baud, tick_us, format, moves, frames, "
                "emergency_stop"),

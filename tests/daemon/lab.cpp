@@ -115,6 +115,19 @@ Lab::~Lab() {
 
 void Lab::start_daemon() {
   core_ = std::make_unique<daemon::Core>(config_, *this, ++master_);
+  if (state_disk_) {
+    std::vector<std::string> motors;
+    for (const config::Motor& motor : config_.motors) motors.push_back(motor.name);
+    store_.reset();
+    auto store = state::Store::open(*state_disk_, {.folder = "/state",
+                                                   .motors = std::move(motors),
+                                                   .unguarded = !config_.state.required,
+                                                   .utime_us = now_us(),
+                                                   .random = 42});
+    if (!store) throw std::runtime_error(store.error().text());
+    store_.emplace(std::move(*store));
+    core().kept().use(store_->kept(), *this, config_.state.required);
+  }
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     if (buses_[b].plugged) core().port_opened(now_us(), BusId{b});
   }
@@ -123,10 +136,31 @@ void Lab::start_daemon() {
 void Lab::restart_daemon() {
   core_.reset();
   disk_.clear();
+  state_jobs_.clear();
   for (SimulatedBus& bus : buses_) bus.received.clear();
   states_.clear();
   descriptions_.clear();
   start_daemon();
+}
+
+void Lab::keep_positions() {
+  state_disk_ = std::make_unique<state::SimDisk>(1);
+  restart_daemon();
+}
+
+void Lab::cut_pc_power() {
+  core_.reset();
+  store_.reset();
+  state_disk_->boot();
+  restart_daemon();
+}
+
+void Lab::mark(std::vector<state::Mark> marks) {
+  post([this, marks = std::move(marks)] { core().kept().marked(now_us(), store_->mark(marks)); });
+}
+
+void Lab::write(state::Batch batch) {
+  post([this, batch = std::move(batch)] { core().kept().written(now_us(), store_->write(batch)); });
 }
 
 void Lab::write_file(const std::string& name, const std::string& text) {
@@ -186,9 +220,19 @@ void Lab::log(daemon::LogLevel level, const std::string& text) {
 // To the next thing that happens: on a bus, or in the daemon.
 void Lab::advance() {
   for (const auto& told : std::exchange(disk_, {})) told();
+  for (std::size_t i = 0; i < state_jobs_.size();) {
+    if (state_jobs_[i].first > now_us()) {
+      ++i;
+      continue;
+    }
+    const auto answer = std::move(state_jobs_[i].second);
+    state_jobs_.erase(state_jobs_.begin() + static_cast<std::ptrdiff_t>(i));
+    answer();
+  }
   core().step(now_us());
   std::int64_t next = std::max(core().next_wake_us() * 1000, now_ns_ + 1000);
   for (const SimulatedBus& bus : buses_) next = std::min(next, bus.bus->next_event_ns());
+  for (const auto& [due_us, answer] : state_jobs_) next = std::min(next, due_us * 1000);
   now_ns_ = std::max(next, now_ns_);
   run_buses();
 }

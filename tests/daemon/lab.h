@@ -15,6 +15,8 @@
 
 #include "daemon/core.h"
 #include "sim/bus.h"
+#include "state/sim_disk.h"
+#include "state/store.h"
 
 // Failures print words.
 namespace bushd::api {
@@ -65,7 +67,7 @@ struct Answer {
   std::optional<api::MovePlan> plan{};
 };
 
-class Lab : public daemon::Outputs {
+class Lab : public daemon::Outputs, private state::Backend {
  public:
   // `toml` as in bushd.toml; its ports are only names here. Every MCU of it exists.
   // `glacier` is the text of a table file of that name beside it, if not empty.
@@ -116,6 +118,13 @@ class Lab : public daemon::Outputs {
   void pause_daemon(double seconds);
   // The daemon is gone, and a new one starts on the same buses.
   void restart_daemon();
+  // From now on positions are kept, on a disk of the simulation: the daemon is started again.
+  void keep_positions();
+  state::SimDisk& disk() { return *state_disk_; }
+  // The disk takes that long for each thing.
+  std::int64_t disk_us = 500;
+  // The PC loses power: the daemon, and what the disk had not synced. A new one starts.
+  void cut_pc_power();
   // Bytes on the way to MCUs are handed to this before they are sent; returning false drops them.
   std::function<bool(std::size_t bus, std::vector<std::uint8_t>& bytes)> on_send;
 
@@ -152,6 +161,11 @@ class Lab : public daemon::Outputs {
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void serve_tables(const api::Asker& asker, const api::Request& request) override;
   std::int64_t wall_clock_us() override { return now_us(); }
+  void mark(std::vector<state::Mark> marks) override;
+  void write(state::Batch batch) override;
+  void post(std::function<void()> answer) {
+    state_jobs_.emplace_back(now_us() + disk_us, std::move(answer));
+  }
   void start_daemon();
   void advance();
   void run_buses();  // until now; the daemon reads what has arrived
@@ -172,6 +186,9 @@ class Lab : public daemon::Outputs {
   std::vector<std::string> move_lines_;
   std::vector<std::string> kept_;
   std::vector<std::function<void()>> disk_;  // what it is to tell the core
+  std::unique_ptr<state::SimDisk> state_disk_;
+  std::optional<state::Store> store_;
+  std::vector<std::pair<std::int64_t, std::function<void()>>> state_jobs_;  // when they are done
 };
 
 // One bus "hall" with `mcus` MCUs of `motors` motors each, named m01.., all in group "axes" of

@@ -45,7 +45,7 @@ class LiveBench : public Bench {
   // All MCUs go online; `service` is told of whatever happens from the beginning.
   void connect(daemon::Service& service) {
     service_ = &service;
-    supervisor_.emplace(installation, journal, moves, positions, emergency_stop,
+    supervisor_.emplace(installation, journal, moves, positions, kept, emergency_stop,
                         std::vector<daemon::Service*>{&journal, &moves, &homing, &emergency_stop,
                                                       &positions, &service},
                         *this);
@@ -118,11 +118,12 @@ class LiveBench : public Bench {
   daemon::Interlocks interlocks{installation};
   daemon::OpenMoves open_moves{installation};
   daemon::Journal journal{installation, *this};
+  daemon::Positions positions{installation, interlocks, journal, *this};
+  daemon::KeptPositions kept{installation, positions, journal, *this};
   daemon::DryRuns dry_runs{installation};
   daemon::Moves moves{installation, interlocks, journal, open_moves, dry_runs, *this};
-  daemon::HomingQueue homing{installation, interlocks, open_moves, *this};
+  daemon::HomingQueue homing{installation, interlocks, open_moves, kept, *this};
   daemon::EmergencyStop emergency_stop{installation, interlocks, homing, *this};
-  daemon::Positions positions{installation, interlocks, journal, *this};
 
  private:
   void advance() {

@@ -43,9 +43,9 @@ def program(name):
     return os.environ[name]
 
 
-def configuration(port, displacement_format="fine", bus_lines=(), control="", lcm_lines=()):
+def configuration(port, displacement_format="fine", bus_lines=(), control="", lcm_lines=(), state=""):
     lines = ['[lcm]\nurl = "udpm://239.255.76.67:7667?ttl=0"\nprefix = "BUSHD"', *lcm_lines]
-    lines += [f'[control]\npath = "{control}"']
+    lines += [f'[control]\npath = "{control}"', f'[state]\npath = "{state}"']
     lines += [f'[[bus]]\nname = "hall"\nport = "{port}"\nbaud = 500000\ntick_us = {TICK_US}']
     lines += [f'format = "{displacement_format}"', *bus_lines]
     lines += [f'[[mcu]]\nbus = "hall"\naddress = {address}' for address in (1, 2)]
@@ -123,8 +123,8 @@ class EndToEndTest(unittest.TestCase):
         self.programs.append(running)
         return running
 
-    def write_config(self, displacement_format="fine", bus_lines=(), port="port", lcm_lines=()):
-        text = configuration(self.file(port), displacement_format, bus_lines, self.file("control"), lcm_lines)
+    def write_config(self, displacement_format="fine", bus_lines=(), port="port", lcm_lines=(), state=""):
+        text = configuration(self.file(port), displacement_format, bus_lines, self.file("control"), lcm_lines, state)
         self.file("bushd.toml").write_text(text)
 
     def start_bushsim(self, trace="trace.vcd", link="port", options=()):

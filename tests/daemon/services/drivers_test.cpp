@@ -83,7 +83,10 @@ TEST(Drivers, OfAnMcuThatIsOfflineAreRefused) {
   Bench bench;
   Interlocks interlocks(bench.installation);
   OpenMoves open_moves(bench.installation);
-  HomingQueue homing(bench.installation, interlocks, open_moves, bench);
+  Journal journal(bench.installation, bench);
+  Positions positions(bench.installation, interlocks, journal, bench);
+  KeptPositions kept(bench.installation, positions, journal, bench);
+  HomingQueue homing(bench.installation, interlocks, open_moves, kept, bench);
   EmergencyStop emergency_stop(bench.installation, interlocks, homing, bench);
   Drivers drivers(bench.installation, interlocks, emergency_stop);
   drivers.request(0, bench.asker(), api::Enable{{"m03"}});

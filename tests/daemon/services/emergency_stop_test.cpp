@@ -17,7 +17,10 @@ TEST(EmergencyStop, AFloodIsCarriedOutAndItsMemoryIsBounded) {
   Bench bench;
   Interlocks interlocks(bench.installation);
   OpenMoves moves(bench.installation);
-  HomingQueue homing(bench.installation, interlocks, moves, bench);
+  Journal journal(bench.installation, bench);
+  Positions positions(bench.installation, interlocks, journal, bench);
+  KeptPositions kept(bench.installation, positions, journal, bench);
+  HomingQueue homing(bench.installation, interlocks, moves, kept, bench);
   EmergencyStop emergency_stop(bench.installation, interlocks, homing, bench);
   constexpr std::size_t kMore = 10;
   for (std::size_t i = 0; i < EmergencyStop::kMaxOpen + kMore; ++i) {

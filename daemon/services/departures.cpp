@@ -1,0 +1,113 @@
+#include "daemon/services/departures.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/overloaded.h"
+
+namespace bushd::daemon {
+namespace {
+
+bool has_common(const std::vector<MotorId>& a, const std::vector<MotorId>& b) {
+  return std::ranges::any_of(a,
+                             [&](MotorId motor) { return std::ranges::find(b, motor) != b.end(); });
+}
+
+}  // namespace
+
+std::optional<std::vector<MotorId>> Departures::motors_of(const api::Request& request) const {
+  const auto found =
+      std::visit(Overloaded{[&](const api::Move& r) -> Result<std::vector<MotorId>> {
+                              if (r.dry_run) return std::vector<MotorId>();
+                              return installation_.find(r.motors);
+                            },
+                            [&](const api::Arm& r) { return installation_.find(r.motors); },
+                            [&](const api::SetPosition& r) { return installation_.find(r.motors); },
+                            [](const auto&) -> Result<std::vector<MotorId>> { return {}; }},
+                 request);
+  if (!found || found->empty() || !interlocks_.may_move()) return std::nullopt;
+  const bool moves = !std::holds_alternative<api::SetPosition>(request);
+  for (const MotorId motor : *found) {
+    if (moves ? !interlocks_.may_move(motor) : !installation_.mcu_of(motor).online()) {
+      return std::nullopt;
+    }
+  }
+  return *found;
+}
+
+bool Departures::any_held(const std::vector<MotorId>& motors) const {
+  return std::ranges::any_of(held_,
+                             [&](const Held& held) { return has_common(held.motors, motors); });
+}
+
+Result<bool> Departures::make_ready(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  bool ready = true;
+  for (const MotorId motor : motors) {
+    const auto one = kept_.make_ready(now_us, motor);
+    if (!one) return fail(installation_[motor].name() + ": " + one.error().text());
+    ready = ready && *one;
+  }
+  return ready;
+}
+
+bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
+  if (!kept_.keeps()) return false;
+  auto motors = motors_of(request);
+  if (!motors) return false;
+  Held held{.asker = asker, .request = request, .motors = std::move(*motors)};
+  if (held_.size() >= kMostHeld) {
+    asker.answer(api::Refused{"too many requests wait for the disk; try again in a moment"});
+    return true;
+  }
+  // What comes later for a motor is carried out later.
+  if (!any_held(held.motors)) {
+    const auto ready = make_ready(now_us, held.motors);
+    if (!ready) {
+      refuse(held, ready.error().text());
+      return true;
+    }
+    if (*ready) return false;
+  }
+  held_.push_back(std::move(held));
+  return true;
+}
+
+void Departures::refuse(const Held& held, const std::string& reason) {
+  for (const MotorId motor : held.motors) kept_.not_wanted(motor);
+  held.asker.answer(api::Refused{reason});
+}
+
+void Departures::cancel(const std::vector<MotorId>& motors) {
+  std::erase_if(held_, [&](const Held& held) {
+    if (!has_common(held.motors, motors)) return false;
+    refuse(held, "stopped before it was carried out; nothing has moved");
+    return true;
+  });
+}
+
+void Departures::step(std::int64_t now_us) {
+  std::vector<MotorId> before;
+  for (auto it = held_.begin(); it != held_.end();) {
+    const bool in_turn = !has_common(it->motors, before);
+    // What became impossible meanwhile is refused by who carries it out.
+    const bool possible = motors_of(it->request).has_value();
+    const auto ready = !in_turn   ? Result<bool>(false)
+                       : possible ? make_ready(now_us, it->motors)
+                                  : Result<bool>(true);
+    if (ready && !*ready) {
+      before.insert(before.end(), it->motors.begin(), it->motors.end());
+      ++it;
+      continue;
+    }
+    const Held held = std::move(*it);
+    it = held_.erase(it);
+    if (!ready) {
+      refuse(held, ready.error().text());
+      continue;
+    }
+    for (const MotorId motor : held.motors) kept_.not_wanted(motor);
+    carry_out_(now_us, held.asker, held.request);
+  }
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,57 @@
+// Requests that change where motors stand, until the disk knows that these motors are no longer at
+// rest, and until their positions are restored. Mostly a millisecond or two, often none.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/interlocks.h"
+#include "daemon/service.h"
+#include "daemon/services/kept_positions.h"
+
+namespace bushd::daemon {
+
+class Departures final : public Service {
+ public:
+  using CarryOut = std::function<void(std::int64_t now_us, const api::Asker&, const api::Request&)>;
+  Departures(const Installation& installation, const Interlocks& interlocks, KeptPositions& kept,
+             CarryOut carry_out)
+      : installation_(installation),
+        interlocks_(interlocks),
+        kept_(kept),
+        carry_out_(std::move(carry_out)) {}
+
+  // Whether the request is kept here. It is carried out, or refused, in a later step.
+  bool hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
+  // Those of these motors are refused: they are being stopped.
+  void cancel(const std::vector<MotorId>& motors);
+  bool empty() const { return held_.empty(); }
+
+  void step(std::int64_t now_us) override;
+
+ private:
+  static constexpr std::size_t kMostHeld = 256;
+
+  struct Held {
+    api::Asker asker;
+    api::Request request;
+    std::vector<MotorId> motors;
+  };
+  // Nothing: the request changes no position, or is refused anyway by who carries it out.
+  std::optional<std::vector<MotorId>> motors_of(const api::Request& request) const;
+  bool any_held(const std::vector<MotorId>& motors) const;
+  Result<bool> make_ready(std::int64_t now_us, const std::vector<MotorId>& motors);
+  void refuse(const Held& held, const std::string& reason);
+
+  const Installation& installation_;
+  const Interlocks& interlocks_;
+  KeptPositions& kept_;
+  CarryOut carry_out_;
+  std::list<Held> held_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,232 @@
+#include "daemon/services/kept_positions.h"
+
+#include <utility>
+#include <vector>
+
+#include "link/unique_id.h"
+#include "units/ratio.h"
+
+namespace bushd::daemon {
+namespace {
+
+constexpr std::int64_t kSeenPeriodUs = 1'000'000;
+
+// "" of a motor without a unit: its positions are steps.
+std::string scale_text(const motion::Motor& motor) {
+  const units::Coordinates& coordinates = motor.coordinates();
+  return coordinates.has_unit() ? units::to_text(coordinates.scale().steps_per_unit)
+                                : std::string();
+}
+
+bool has(std::uint16_t mask, const motion::Motor& motor) {
+  return (mask >> motor.output().value & 1) != 0;
+}
+
+state::Trust trust_of(const motion::Motor& motor) {
+  if (motor.uncertain_reason()) return state::Trust::kUncertain;
+  if (motor.restored_reason()) return state::Trust::kRestored;
+  return motor.confirmed() ? state::Trust::kKnown : state::Trust::kUnconfirmed;
+}
+
+}  // namespace
+
+KeptPositions::KeptPositions(Installation& installation, const Positions& positions,
+                             Journal& journal, Outputs& outputs)
+    : installation_(installation), positions_(positions), journal_(journal), outputs_(outputs) {
+  for ([[maybe_unused]] const MotorId motor : installation.motors()) motors_.add();
+  for ([[maybe_unused]] const McuId mcu : installation.mcus()) mcus_.add();
+}
+
+void KeptPositions::use(const std::map<std::string, state::Kept>& kept, state::Backend& backend,
+                        bool required) {
+  std::vector<std::string> names;
+  for (const MotorId motor : installation_.motors()) names.push_back(installation_[motor].name());
+  keeper_.emplace(names, kept, backend);
+  required_ = required;
+}
+
+void KeptPositions::marked(std::int64_t now_us, const Result<void>& done) {
+  keeper_->mark(now_us, done);
+}
+
+void KeptPositions::written(std::int64_t now_us, const Result<void>& done) {
+  keeper_->write(now_us, done);
+}
+
+Result<bool> KeptPositions::make_ready(std::int64_t now_us, MotorId id) {
+  if (!keeper_) return true;
+  Motor& motor = motors_[id];
+  motor.wanted = true;
+  if (motor.restoring) return false;
+  const auto wanted = keeper_->want_mark(now_us, id);
+  if (wanted && !keeper_->marked(id)) return false;
+  motor.wanted = false;
+  if (wanted) return true;
+  if (required_) {
+    return fail("the disk cannot be told that it moves: " + wanted.error().text() +
+                ". Make room, or repair the disk; with [state] required = false it moves in spite "
+                "of that");
+  }
+  keeper_->give_up_mark(id);
+  return true;
+}
+
+void KeptPositions::past(state::PastMove move) {
+  if (!keeper_) return;
+  move.utime_us = outputs_.wall_clock_us();
+  keeper_->past(std::move(move));
+}
+
+bool KeptPositions::settled() const {
+  return !keeper_ || keeper_->trouble() || keeper_->kept_up_to() == keeper_->told();
+}
+
+void KeptPositions::goes_online(Mcu& mcu) {
+  if (!keeper_) return;
+  const Heard heard{.unique_id = link::unique_id_text(mcu.view().identity),
+                    .boot_number = mcu.report().boot_number};
+  const auto before = std::exchange(mcus_[mcu.id].heard, heard);
+  // What this daemon has followed itself it knows better.
+  if (before == heard) return;
+  for (const MotorId id : mcu.motors()) {
+    if (installation_[id].output().value < mcu.report().motor_count) {
+      connect(mcu, id, !before.has_value());
+    }
+  }
+}
+
+void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
+  motion::Motor& motor = installation_[id];
+  const config::Motor& config = installation_.config()[id];
+  const bool at_limit =
+      has(mcu.report().forbidden_positive, motor) || has(mcu.report().forbidden_negative, motor);
+  state::Verdict verdict = state::on_connecting(
+      keeper_->kept(id),
+      {.mcu = mcu.name(),
+       .unique_id = mcus_[mcu.id].heard->unique_id,
+       .boot_number = mcus_[mcu.id].heard->boot_number,
+       .output = motor.output().value,
+       .steps_per_unit = scale_text(motor),
+       .local = config.local,
+       .may_have_overrun = at_limit && config.limit_action == BUSHD_STOP_IMMEDIATE});
+  // What the MCU itself reports of before this daemon.
+  if (first && motor.uncertain_reason() && verdict.trust != state::Trust::kUncertain) {
+    verdict.trust = state::Trust::kUncertain;
+    verdict.reason = *motor.uncertain_reason();
+  }
+  take(id, verdict);
+  if (!verdict.set_steps) return;
+  motors_[id].restoring = Restoring{.steps = *verdict.set_steps, .reason = verdict.reason};
+  motor.restoring(true);
+  mcu.set_position(motor.output(), static_cast<std::int32_t>(*verdict.set_steps));
+}
+
+void KeptPositions::take(MotorId id, const state::Verdict& verdict) {
+  motion::Motor& motor = installation_[id];
+  switch (verdict.trust) {
+    case state::Trust::kUnconfirmed:
+      motor.position_is_unconfirmed();
+      break;
+    case state::Trust::kKnown:
+      motor.position_is_known();
+      break;
+    case state::Trust::kRestored:
+      motor.position_is_restored(verdict.reason);
+      break;
+    case state::Trust::kUncertain:
+      motor.position_is_uncertain(verdict.reason);
+      outputs_.log(LogLevel::kWarning, motor.name() + ": is uncertain: " + verdict.reason);
+      break;
+  }
+  installation_.changed = true;
+}
+
+void KeptPositions::goes_offline(Mcu& mcu, const std::string&) {
+  for (const MotorId id : mcu.motors()) {
+    // It begins again when the MCU is back.
+    if (!std::exchange(motors_[id].restoring, std::nullopt)) continue;
+    installation_[id].restoring(false);
+    mcus_[mcu.id].heard.reset();
+  }
+}
+
+void KeptPositions::reports(std::int64_t, Mcu& mcu) {
+  if (keeper_) mcus_[mcu.id].reported = true;
+}
+
+void KeptPositions::follow_restoring(const Mcu& mcu, MotorId id) {
+  if (mcu.busy()) return;
+  motion::Motor& motor = installation_[id];
+  const Restoring restoring = *std::exchange(motors_[id].restoring, std::nullopt);
+  motor.restoring(false);
+  installation_.changed = true;
+  if (motor.position_steps() != restoring.steps) {
+    motor.position_is_uncertain("MCU " + mcu.name() + " did not take its kept position of " +
+                                std::to_string(restoring.steps) + " steps");
+    outputs_.log(LogLevel::kError, motor.name() + ": " + *motor.uncertain_reason());
+    return;
+  }
+  journal_.position_set(id, 0, {});
+  if (motor.restored_reason()) {
+    outputs_.log(LogLevel::kInfo, motor.name() + ": position " + std::to_string(restoring.steps) +
+                                      " is restored: " + restoring.reason);
+  }
+}
+
+void KeptPositions::step(std::int64_t now_us) {
+  if (!keeper_) return;
+  // After the other services: what a report has ended is over.
+  for (const McuId id : installation_.mcus()) {
+    const Mcu& mcu = installation_[id];
+    if (!std::exchange(mcus_[id].reported, false) || !mcu.online()) continue;
+    for (const MotorId motor : mcu.motors()) {
+      if (installation_[motor].output().value >= mcu.report().motor_count) continue;
+      if (motors_[motor].restoring) {
+        follow_restoring(mcu, motor);
+      } else {
+        keep(now_us, mcu, motor);
+      }
+    }
+  }
+  keeper_->step(now_us);
+  tell_trouble();
+}
+
+void KeptPositions::keep(std::int64_t now_us, const Mcu& mcu, MotorId id) {
+  const motion::Motor& motor = installation_[id];
+  Motor& own = motors_[id];
+  if (own.wanted || positions_.being_set(id)) return;
+  const bushd_report& report = mcu.report();
+  const bool in_motion = has(report.moving, motor) || has(report.autonomous, motor) ||
+                         has(report.armed, motor) || !motor.is<motion::Resting>();
+  if (!in_motion) return keeper_->stands(id, record_of(mcu, id));
+  if (now_us - own.seen_us < kSeenPeriodUs) return;
+  own.seen_us = now_us;
+  keeper_->moves(id, record_of(mcu, id));
+}
+
+state::Record KeptPositions::record_of(const Mcu& mcu, MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  return {.steps = motor.position_steps(),
+          .steps_per_unit = scale_text(motor),
+          .trust = trust_of(motor),
+          .reason = motor.uncertain_reason() ? *motor.uncertain_reason()
+                                             : motor.restored_reason().value_or(""),
+          .utime_us = outputs_.wall_clock_us(),
+          .unique_id = mcus_[mcu.id].heard->unique_id,
+          .boot_number = mcus_[mcu.id].heard->boot_number,
+          .output = motor.output().value};
+}
+
+void KeptPositions::tell_trouble() {
+  if (told_trouble_ == keeper_->trouble()) return;
+  told_trouble_ = keeper_->trouble();
+  if (told_trouble_) {
+    outputs_.log(LogLevel::kError,
+                 "positions cannot be kept: " + *told_trouble_ + "; trying again once a second");
+  } else {
+    outputs_.log(LogLevel::kInfo, "positions are kept again");
+  }
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,92 @@
+// Positions that outlive the daemon and the power: what is kept of them, what they are worth when
+// an MCU is connected, and whether a motor may begin to move without looking at rest afterwards.
+//
+// Without a store nothing is kept, and nothing is held back.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "daemon/outputs.h"
+#include "daemon/service.h"
+#include "daemon/services/journal.h"
+#include "daemon/services/positions.h"
+#include "state/keeper.h"
+#include "state/rules.h"
+
+namespace bushd::daemon {
+
+class KeptPositions final : public Service {
+ public:
+  KeptPositions(Installation& installation, const Positions& positions, Journal& journal,
+                Outputs& outputs);
+
+  // Once, before anything else. `kept`: of the store as it was opened; the backend is where it is,
+  // and outlives this. Not required: motors move also if the disk does not take their marks.
+  void use(const std::map<std::string, state::Kept>& kept, state::Backend& backend, bool required);
+  bool keeps() const { return keeper_.has_value(); }
+  // Answers of the backend.
+  void marked(std::int64_t now_us, const Result<void>& done);
+  void written(std::int64_t now_us, const Result<void>& done);
+
+  // Whether the motor's position may change from now on. If not, it is made so; ask again after the
+  // next step, or say not_wanted(). Errors: it does not come to pass.
+  Result<bool> make_ready(std::int64_t now_us, MotorId motor);
+  void not_wanted(MotorId motor) { motors_[motor].wanted = false; }
+  bool being_restored(MotorId motor) const { return motors_[motor].restoring.has_value(); }
+
+  // For the history. Says who asked, and where from.
+  void past(state::PastMove move);
+
+  // All that there is to keep is on the disk, as far as the disk takes it.
+  bool settled() const;
+  // No motor has moved without being marked.
+  bool guarded() const { return keeper_ && !keeper_->any_unguarded(); }
+
+  void goes_online(Mcu& mcu) override;
+  void goes_offline(Mcu& mcu, const std::string& cause) override;
+  void reports(std::int64_t now_us, Mcu& mcu) override;
+  void step(std::int64_t now_us) override;
+  std::int64_t next_wake_us() const { return keeper_ ? keeper_->next_wake_us() : INT64_MAX; }
+
+ private:
+  struct Restoring {
+    std::int64_t steps;
+    std::string reason;  // of what is restored, for the log
+  };
+  struct Motor {
+    bool wanted = false;  // a motion is about to begin
+    std::optional<Restoring> restoring{};
+    std::int64_t seen_us = 0;  // when its motion was kept last
+  };
+  // Whose counters positions are.
+  struct Heard {
+    std::string unique_id{};
+    std::uint16_t boot_number = 0;
+    bool operator==(const Heard&) const = default;
+  };
+  void connect(Mcu& mcu, MotorId id, bool first);
+  void take(MotorId id, const state::Verdict& verdict);
+  void follow_restoring(const Mcu& mcu, MotorId id);
+  void keep(std::int64_t now_us, const Mcu& mcu, MotorId id);
+  state::Record record_of(const Mcu& mcu, MotorId id) const;
+  void tell_trouble();
+
+  Installation& installation_;
+  const Positions& positions_;
+  Journal& journal_;
+  Outputs& outputs_;
+  std::optional<state::Keeper> keeper_;
+  bool required_ = true;
+  ById<MotorId, Motor> motors_;
+  struct OfMcu {
+    std::optional<Heard> heard{};
+    bool reported = false;  // since the last step
+  };
+  ById<McuId, OfMcu> mcus_;
+  std::optional<std::string> told_trouble_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,13 @@
+// What is kept over power cuts; all of it may be left out.
+#pragma once
+
+#include "config/config.h"
+#include "tables/toml_reader.h"
+
+namespace bushd::config {
+
+Result<void> read_state(const tables::TomlReader& root, Config* config);
+// `restored` of a motor.
+Result<void> read_restored(const tables::TomlReader& reader, Motor* motor);
+
+}  // namespace bushd::config

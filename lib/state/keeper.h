@@ -1,0 +1,100 @@
+// What is to be on the disk, what is there, and what is on the way: the side of the store that has
+// no disk of its own. Marks and writes go to a backend in another thread, and its answers are
+// inputs like any other; so simulations run it in virtual time.
+//
+// At most one request of each kind is under way. What comes meanwhile goes together in the next, so
+// that many motors that start at once cost one sync. Marks and writes need no order between them:
+// a record carries the number of the motion whose end it knows.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/by_id.h"
+#include "base/ids.h"
+#include "base/result.h"
+#include "state/record.h"
+
+namespace bushd::state {
+
+// Where the disk is. Each call is answered by Keeper's function of that name, later.
+class Backend {
+ public:
+  virtual ~Backend() = default;
+  virtual void mark(std::vector<Mark> marks) = 0;
+  virtual void write(Batch batch) = 0;
+};
+
+class Keeper {
+ public:
+  static constexpr std::int64_t kPatienceUs = 1'000'000;
+  static constexpr std::int64_t kRetryUs = 1'000'000;
+
+  // `kept`: as the store was when it was opened. The backend outlives it.
+  Keeper(const std::vector<std::string>& motors, const std::map<std::string, Kept>& kept,
+         Backend& backend);
+
+  // As it is now, for the rules on connecting.
+  const Kept& kept(MotorId motor) const { return motors_[motor].kept; }
+
+  // Whatever happens now, this motor does not look at rest when the power goes.
+  bool marked(MotorId motor) const;
+  // Makes it so, which takes a moment, or says why that does not come to pass.
+  Result<void> want_mark(std::int64_t now_us, MotorId motor);
+  // It moves without. Until its rest is on the disk again, it does not look at rest.
+  void give_up_mark(MotorId motor);
+  bool any_unguarded() const;
+
+  // It stands, by a report after its motion. The record's `at_rest` and `motion` are filled in.
+  // Not to be told while somebody wants its mark.
+  void stands(MotorId motor, Record record);
+  // It was seen in motion.
+  void moves(MotorId motor, Record record);
+  void settings(MotorId motor, Settings settings);
+  void past(PastMove move) { pending_.moves.push_back(std::move(move)), ++told_; }
+
+  // How much has been told, and how much of that is on the disk.
+  std::uint64_t told() const { return told_; }
+  std::uint64_t kept_up_to() const { return kept_up_to_; }
+  // Why the last write failed; nothing while writes succeed.
+  const std::optional<std::string>& trouble() const { return trouble_; }
+
+  // Hands out what is due.
+  void step(std::int64_t now_us);
+  std::int64_t next_wake_us() const;
+
+  // Answers.
+  void mark(std::int64_t now_us, const Result<void>& done);
+  void write(std::int64_t now_us, const Result<void>& done);
+
+ private:
+  struct Motor {
+    std::string name;
+    Kept kept;
+    std::uint64_t on_disk = 0;  // number of the last motion whose mark is there
+    // Number of the last motion of whose end the disk may know.
+    std::uint64_t ended = 0;
+    bool unguarded = false;
+    std::optional<std::int64_t> wanted_us{};  // since when its mark is wanted and not there
+  };
+  void tell(Motor& motor, Record record);
+
+  Backend& backend_;
+  ById<MotorId, Motor> motors_;
+  std::vector<MotorId> to_mark_;
+  std::vector<std::pair<MotorId, std::uint64_t>> marking_;  // under way
+  std::optional<std::string> mark_error_;
+  std::int64_t mark_again_us_ = 0;
+  Batch pending_;
+  std::optional<Batch> writing_;  // under way
+  std::uint64_t told_ = 0;
+  std::uint64_t writing_up_to_ = 0;
+  std::uint64_t kept_up_to_ = 0;
+  std::optional<std::string> trouble_;
+  std::int64_t write_again_us_ = 0;
+};
+
+}  // namespace bushd::state

@@ -1,0 +1,89 @@
+#include "state/rules.h"
+
+#include <ctime>
+#include <utility>
+
+namespace bushd::state {
+namespace {
+
+// "; last known: 1200 steps on 2026-11-20 17:03:12 UTC"
+std::string last_known(const Record& record) {
+  if (record.utime_us == 0) return {};
+  return std::string("; last known: ") + std::to_string(record.steps) + " steps" +
+         (record.at_rest ? " at " : ", in motion, at ") + time_text(record.utime_us);
+}
+
+bool same_counter(const Record& record, const Seen& seen) {
+  return record.unique_id == seen.unique_id && record.output == seen.output;
+}
+
+// Why this is not the counter that the steps were counted by, or not the motor that it counted for.
+std::optional<std::string> changed(const Record& record, const Seen& seen) {
+  if (record.unique_id != seen.unique_id) {
+    return "MCU " + seen.mcu + " is another one now: its unique id is " + seen.unique_id +
+           ", not " + record.unique_id;
+  }
+  if (record.output != seen.output) {
+    return "it is at output " + std::to_string(seen.output) + " of MCU " + seen.mcu +
+           " now, not at " + std::to_string(record.output);
+  }
+  if (record.steps_per_unit != seen.steps_per_unit) {
+    const auto text = [](const std::string& scale) {
+      return scale.empty() ? std::string("none") : scale;
+    };
+    return "its steps_per_unit is " + text(seen.steps_per_unit) + " now, was " +
+           text(record.steps_per_unit);
+  }
+  return std::nullopt;
+}
+
+// Why it may have moved unseen before its MCU booted.
+std::optional<std::string> may_have_moved(const Kept& kept, const Seen& seen) {
+  if (kept.mark_lost) {
+    return "whether it moved when MCU " + seen.mcu + " lost power is not readable from the disk";
+  }
+  if (!stood(kept)) return "MCU " + seen.mcu + " restarted while it moved";
+  if (seen.local) {
+    return "MCU " + seen.mcu + " restarted, and people may have moved it by its local inputs";
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string time_text(std::int64_t utime_us) {
+  const std::time_t seconds = static_cast<std::time_t>(utime_us / 1'000'000);
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
+  return text;
+}
+
+Verdict on_connecting(const Kept& kept, const Seen& seen) {
+  if (!kept.record) return {};
+  const Record& record = *kept.record;
+  const bool same_boot = same_counter(record, seen) && record.boot_number == seen.boot_number;
+  Verdict verdict{.trust = record.trust, .reason = record.reason, .set_steps = {}};
+  // Also where it is uncertain: the number that people read, and may confirm, goes on.
+  if (same_counter(record, seen) && !same_boot) verdict.set_steps = record.steps;
+
+  auto doubt = changed(record, seen);
+  if (!doubt && !same_boot) doubt = may_have_moved(kept, seen);
+  if (!doubt && same_boot && !stood(kept) && seen.may_have_overrun) {
+    doubt = "its limit switch stopped it immediately, so it may have overrun";
+  }
+  if (record.trust == Trust::kUncertain) return verdict;
+  if (doubt) {
+    verdict.trust = Trust::kUncertain;
+    verdict.reason = *doubt + last_known(record);
+  } else if (!same_boot && record.trust != Trust::kUnconfirmed) {
+    verdict.trust = Trust::kRestored;
+    verdict.reason = "MCU " + seen.mcu + " has restarted; it stood at " +
+                     std::to_string(record.steps) + " steps, seen last at " +
+                     time_text(record.utime_us);
+  }
+  return verdict;
+}
+
+}  // namespace bushd::state

@@ -1,0 +1,240 @@
+// Positions over power cuts of PC and MCUs, in the whole core: what is restored, what is refused,
+// and that the disk knows of a motion before the line does.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::HasSubstr;
+
+struct KeptLab : Lab {
+  explicit KeptLab(const std::string& toml = hall(1, 2)) : Lab(toml) {
+    keep_positions();
+    connect();
+  }
+  void expect_refused(const std::string& motor, const std::string& why) {
+    const Answer answer = wait(send(Ask::kMoveBy, {motor}, {10}));
+    EXPECT_EQ(answer.result, "refused");
+    EXPECT_THAT(answer.reason, HasSubstr(why));
+  }
+  void reach(const std::string& motor, std::int64_t steps) {
+    EXPECT_EQ(wait(send(Ask::kMoveBy, {motor}, {steps})).result, "reached");
+  }
+  void reconnect() {
+    run_for(0.1);
+    ASSERT_TRUE(run_until([this] { return all_ready(); }, 20));
+    run_for(1);
+  }
+  void expect_at_shaft(const std::string& name, api::Trust trust) {
+    EXPECT_EQ(motor(name).trust, trust) << motor(name).uncertain_reason;
+    EXPECT_EQ(motor(name).position_steps, shaft_steps(name));
+  }
+};
+
+TEST(KeptPositions, AreKnownToTheNextDaemon) {
+  KeptLab lab;
+  lab.reach("m01", 300);
+  lab.run_for(0.2);
+  lab.restart_daemon();
+  lab.reconnect();
+  lab.expect_at_shaft("m01", api::Trust::kKnown);
+  lab.reach("m01", 50);
+}
+
+TEST(KeptPositions, AreKnownThoughTheDaemonWasKilledInMotion) {
+  KeptLab lab;
+  lab.send(Ask::kMoveBy, {"m01"}, {5000});
+  lab.run_for(0.7);
+  lab.restart_daemon();
+  lab.reconnect();
+  lab.run_for(3);
+  lab.expect_at_shaft("m01", api::Trust::kKnown);
+}
+
+TEST(KeptPositions, AreRestoredAfterAnMcuHasLostPowerAtRest) {
+  KeptLab lab;
+  lab.reach("m01", 300);
+  lab.reach("m02", -70);
+  lab.run_for(0.2);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
+  lab.expect_at_shaft("m02", api::Trust::kRestored);
+  EXPECT_THAT(lab.motor("m01").uncertain_reason, HasSubstr("300 steps"));
+  lab.reach("m01", 50);
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {350})).result, "done");
+  lab.expect_at_shaft("m01", api::Trust::kKnown);
+}
+
+TEST(KeptPositions, AreRestoredAfterEverythingHasLostPowerAtRest) {
+  KeptLab lab;
+  lab.reach("m01", 300);
+  lab.run_for(0.2);
+  lab.bus(0).reboot(0);
+  lab.cut_pc_power();
+  lab.reconnect();
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
+  lab.expect_at_shaft("m02", api::Trust::kRestored);
+  // And again: what is restored stays so.
+  lab.bus(0).reboot(0);
+  lab.cut_pc_power();
+  lab.reconnect();
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
+}
+
+TEST(KeptPositions, AreUncertainAfterAPowerCutInMotion) {
+  for (const bool of_pc : {false, true}) {
+    KeptLab lab;
+    lab.reach("m01", 300);
+    lab.send(Ask::kMoveBy, {"m01"}, {5000});
+    lab.run_for(0.7);
+    lab.bus(0).reboot(0);
+    if (of_pc) lab.cut_pc_power();
+    lab.reconnect();
+    EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+    lab.expect_refused("m01", "restarted while it moved; last known: ");
+    lab.expect_at_shaft("m02", api::Trust::kRestored);
+    // It stays so until somebody says where it stands.
+    lab.restart_daemon();
+    lab.reconnect();
+    lab.expect_refused("m01", "restarted while it moved; last known: ");
+    EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+    lab.reach("m01", 10);
+  }
+}
+
+TEST(KeptPositions, NobodyHasToldWhereTheyAreOnTheFirstDay) {
+  Lab lab(hall(1, 1));
+  lab.keep_positions();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  lab.run_for(0.2);
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+}
+
+TEST(KeptPositions, TheDiskKnowsOfAMotionBeforeTheLineDoes) {
+  KeptLab lab;
+  lab.run_for(0.5);
+  lab.disk_us = 50'000;
+  std::int64_t last_frame_us = 0;
+  lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) {
+    last_frame_us = lab.now_us();
+    return true;
+  };
+  const std::int64_t asked_us = lab.now_us();
+  const auto number = lab.send(Ask::kMoveBy, {"m01"}, {100});
+  EXPECT_TRUE(lab.replies(number).empty());
+  lab.run_for(0.049);
+  EXPECT_TRUE(lab.replies(number).empty());
+  lab.run_for(0.002);
+  EXPECT_EQ(lab.last_reply(number).phase, Answer::kAccepted);
+  EXPECT_GE(lab.now_us(), asked_us + 50'000);
+  EXPECT_EQ(lab.wait(number).result, "reached");
+}
+
+TEST(KeptPositions, WhatIsStoppedBeforeItBeginsIsRefused) {
+  KeptLab lab;
+  lab.run_for(0.5);
+  lab.disk_us = 50'000;
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {100});
+  const auto other = lab.send(Ask::kMoveBy, {"m02"}, {100});
+  const auto stop = lab.send(Ask::kStop, {"m01"});
+  EXPECT_THAT(lab.wait(move).reason, HasSubstr("stopped before it was carried out"));
+  EXPECT_EQ(lab.wait(stop).result, "done");
+  EXPECT_EQ(lab.wait(other).result, "reached");
+  EXPECT_EQ(lab.motor("m01").position_steps, 0);
+}
+
+TEST(KeptPositions, ADiskThatDoesNotAnswerKeepsMotorsAtRest) {
+  KeptLab lab;
+  lab.run_for(0.5);
+  lab.disk_us = 3'000'000;
+  const auto number = lab.send(Ask::kMoveBy, {"m01"}, {100});
+  lab.run_for(0.9);
+  EXPECT_TRUE(lab.replies(number).empty());
+  const Answer answer = lab.wait(number);
+  EXPECT_EQ(answer.result, "refused");
+  EXPECT_THAT(answer.reason, HasSubstr("m01: the disk cannot be told that it moves"));
+}
+
+TEST(KeptPositions, ABrokenDiskKeepsMotorsAtRestButNotThoseThatMove) {
+  KeptLab lab;
+  const auto moving = lab.send(Ask::kMoveBy, {"m02"}, {5000});
+  lab.run_for(0.5);
+  lab.disk().set_broken(true);
+  lab.expect_refused("m01", "input/output error");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m02"}, {900})).result, "reached");
+  EXPECT_EQ(lab.last_reply(moving).result, "stopped");
+  lab.disk().set_broken(false);
+  lab.run_for(2.5);
+  lab.reach("m01", 10);
+  lab.run_for(0.2);
+  lab.bus(0).reboot(0);
+  lab.cut_pc_power();
+  lab.reconnect();
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
+  lab.expect_at_shaft("m02", api::Trust::kRestored);
+}
+
+TEST(KeptPositions, NotRequiredTheyAreUncertainAfterwards) {
+  KeptLab lab("[state]\nrequired = false\n" + hall(1, 2));
+  lab.run_for(0.5);
+  lab.disk().set_broken(true);
+  lab.reach("m01", 10);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  lab.bus(0).reboot(0);
+  lab.cut_pc_power();
+  lab.reconnect();
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.motor("m02").trust, api::Trust::kUncertain);
+  lab.expect_refused("m02", "last known: 0 steps");
+}
+
+TEST(KeptPositions, RestoredMayBeTooLittle) {
+  std::string toml = hall(1, 2);
+  toml.insert(toml.find("name = \"m01\""), "restored = \"refuse\"\n");
+  KeptLab lab(toml);
+  lab.reach("m01", 300);
+  lab.run_for(0.2);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
+  lab.expect_refused("m01", "its position is only restored");
+  lab.reach("m02", 10);
+}
+
+TEST(KeptPositions, OfMotorsWithLocalInputsAreUncertainAfterAPowerCut) {
+  std::string toml = hall(1, 2);
+  toml.insert(toml.find("name = \"m01\""), "local = true\n");
+  KeptLab lab(toml);
+  lab.run_for(0.5);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  lab.expect_refused("m01", "people may have moved it");
+  lab.expect_at_shaft("m02", api::Trust::kRestored);
+}
+
+TEST(KeptPositions, AManyMotorsStartCostsOneSync) {
+  KeptLab lab(hall(2, 8));
+  lab.run_for(0.5);
+  const std::uint64_t before = lab.disk().syncs();
+  std::vector<std::string> motors;
+  for (int i = 1; i <= 16; ++i) motors.push_back((i < 10 ? "m0" : "m") + std::to_string(i));
+  const auto number = lab.send(Ask::kMoveBy, motors, std::vector<std::int64_t>(16, 100));
+  ASSERT_TRUE(lab.run_until([&] { return !lab.replies(number).empty(); }, 1));
+  EXPECT_EQ(lab.disk().syncs() - before, 1u);
+  EXPECT_EQ(lab.wait(number).result, "reached");
+}
+
+}  // namespace
+}  // namespace bushd::test
