@@ -141,7 +141,7 @@ class Motor {
 
   // What it may do now, as far as it depends on the motor alone. A motor that moves may be given
   // another target, and nothing else.
-  Result<void> may_be_used() const;                     // for any motion
+  Result<void> may_be_used() const;  // for any motion
   // Beyond that.
   Result<void> may_move_to(std::int64_t target, std::uint16_t floor = 0) const;
   // The floor of runs at max_speed and at this speed, whichever is slower. Error: no speed, or one
