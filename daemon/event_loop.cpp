@@ -520,6 +520,13 @@ void EventLoop::write(state::Batch batch) {
   });
 }
 
+void EventLoop::history(std::string motor, int most, Told told) {
+  state_worker_.post(
+      [this, motor = std::move(motor), most, told = std::move(told)]() -> Worker::Completion {
+        return [told, found = store_->history(motor, most)] { told(found); };
+      });
+}
+
 void EventLoop::close_store() {
   if (store_ == nullptr || state_worker_.waiting() > 0) return;
   if (!core_.settled() || !core_.kept().guarded()) return;
