@@ -34,7 +34,19 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_, &tables_,
                 &departures_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
-                  outputs) {}
+                  outputs) {
+  positions_.set_offset_listener([this](MotorId motor) { kept_.keep_offset(motor); });
+  open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
+    const motion::Motor& motor = installation_[ended.motor];
+    kept_.past({.motor = motor.name(),
+                .what = ended.what,
+                .who = text_of(ended.asker),
+                .from_steps = ended.from_steps,
+                .to_steps = motor.position_steps(),
+                .result = std::string(api::word(ended.outcome)),
+                .reason = ended.reason});
+  });
+}
 
 void Core::port_opened(std::int64_t now_us, BusId bus) {
   installation_[bus].master.port_opened(now_us);
@@ -91,6 +103,8 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::ListTables& r) { outputs_.serve_tables(asker, r); },
                  [&](const api::GetTable& r) { outputs_.serve_tables(asker, r); },
                  [&](const api::SetTable& r) { tables_.request(asker, r); },
+                 [&](const api::Confirm& r) { kept_.request(asker, r); },
+                 [&](const api::GetHistory& r) { kept_.request(asker, r); },
              },
              request);
 }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/epoll.h>
-#include <sys/resource.h>
 #include <systemd/sd-daemon.h>
 #include <systemd/sd-event.h>
 
@@ -14,9 +13,9 @@
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "config/port_pattern.h"
+#include "daemon/process.h"
 #include "daemon/request_log.h"
 #include "daemon/table_service.h"
 
@@ -25,36 +24,6 @@ namespace {
 
 constexpr std::size_t kMaxTableJobs = 64;  // anybody may ask for tables
 constexpr int kMaxTableJobsPerClient = 4;
-
-std::int64_t now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
-std::int64_t cpu_us() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return (usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) * 1'000'000 + usage.ru_utime.tv_usec +
-         usage.ru_stime.tv_usec;
-}
-
-std::int64_t unix_time_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
-// Another one in every run, and in every process on every machine as far as 63 bits go.
-std::int64_t new_run() {
-  std::random_device random;
-  const std::uint64_t number = std::uint64_t{random()} << 32 | random();
-  return static_cast<std::int64_t>(number >> 1 | 1u);
-}
-
-std::uint16_t master_number(std::int64_t run) {
-  return static_cast<std::uint16_t>(static_cast<std::uint64_t>(run) * 0x9E3779B97F4A7C15u >> 48);
-}
 
 std::string loop_text(int error) {
   return std::string("event loop: ") + std::strerror(-error);
@@ -508,6 +477,13 @@ void EventLoop::write(state::Batch batch) {
   state_worker_.post([this, batch = std::move(batch)]() -> Worker::Completion {
     return [this, done = store_->write(batch)] { core_.kept().written(now_us(), done); };
   });
+}
+
+void EventLoop::history(std::string motor, int most, Told told) {
+  state_worker_.post(
+      [this, motor = std::move(motor), most, told = std::move(told)]() -> Worker::Completion {
+        return [told, found = store_->history(motor, most)] { told(found); };
+      });
 }
 
 void EventLoop::close_store() {

@@ -111,6 +111,7 @@ class EventLoop : private Outputs, private state::Backend {
   // state::Backend
   void mark(std::vector<state::Mark> marks) override;
   void write(state::Batch batch) override;
+  void history(std::string motor, int most, Told told) override;
 
   const config::Config& config_;
   Fronts fronts_;

@@ -75,7 +75,7 @@ void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
   const auto motors = motors_of(request);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
-  open_.open(asker, *motors);
+  open_.open(asker, *motors, "home");
   for (const MotorId motor : *motors) add({motor, *floor_of(motor, request.speed)});
 }
 

@@ -1,8 +1,11 @@
 #include "daemon/services/kept_positions.h"
 
+#include <charconv>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "daemon/services/open_moves.h"
 #include "link/unique_id.h"
 #include "units/ratio.h"
 
@@ -10,6 +13,9 @@ namespace bushd::daemon {
 namespace {
 
 constexpr std::int64_t kSeenPeriodUs = 1'000'000;
+constexpr const char* kOffset = "offset";  // of state::Settings
+constexpr std::int32_t kMostPast = 1000;
+constexpr int kMostReading = 16;  // anybody may ask for a history
 
 // "" of a motor without a unit: its positions are steps.
 std::string scale_text(const motion::Motor& motor) {
@@ -20,6 +26,13 @@ std::string scale_text(const motion::Motor& motor) {
 
 bool has(std::uint16_t mask, const motion::Motor& motor) {
   return (mask >> motor.output().value & 1) != 0;
+}
+
+// The shortest that reads back as this number.
+std::string text_of_number(double number) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, number);
+  return {text, end.ptr};
 }
 
 state::Trust trust_of(const motion::Motor& motor) {
@@ -42,7 +55,36 @@ void KeptPositions::use(const std::map<std::string, state::Kept>& kept, state::B
   std::vector<std::string> names;
   for (const MotorId motor : installation_.motors()) names.push_back(installation_[motor].name());
   keeper_.emplace(names, kept, backend);
+  backend_ = &backend;
   required_ = required;
+  for (const MotorId motor : installation_.motors()) take_kept_offset(motor);
+}
+
+void KeptPositions::keep_offset(MotorId id) {
+  if (!keeper_) return;
+  state::Settings settings = keeper_->kept(id).settings;
+  settings[kOffset] = {
+      .value = text_of_number(installation_[id].coordinates().scale().offset),
+      .replaces = text_of_number(installation_.config()[id].coordinates.scale().offset)};
+  keeper_->settings(id, std::move(settings));
+}
+
+// It counts until that of bushd.toml is edited.
+void KeptPositions::take_kept_offset(MotorId id) {
+  const std::string in_file = text_of_number(installation_.config()[id].coordinates.scale().offset);
+  const state::Setting* kept = state::in_force(keeper_->kept(id).settings, kOffset, in_file);
+  motion::Motor& motor = installation_[id];
+  if (kept == nullptr || kept->value == in_file || !motor.coordinates().has_unit()) return;
+  units::Scale scale = motor.coordinates().scale();
+  const std::string& text = kept->value;
+  if (std::from_chars(text.data(), text.data() + text.size(), scale.offset).ec != std::errc()) {
+    return;
+  }
+  auto coordinates = units::Coordinates::make(std::move(scale));
+  if (!coordinates) return;
+  motor.set_coordinates(std::move(*coordinates));
+  outputs_.log(LogLevel::kInfo, motor.name() + ": its offset is " + text +
+                                    ", as it was set in operation; bushd.toml says " + in_file);
 }
 
 void KeptPositions::marked(std::int64_t now_us, const Result<void>& done) {
@@ -51,6 +93,81 @@ void KeptPositions::marked(std::int64_t now_us, const Result<void>& done) {
 
 void KeptPositions::written(std::int64_t now_us, const Result<void>& done) {
   keeper_->write(now_us, done);
+}
+
+Result<void> KeptPositions::may_be_confirmed(MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  if (auto online = installation_.mcu_of(id).must_be_online(); !online) return online;
+  if (!motor.is<motion::Resting>()) {
+    return fail(motor.busy_text() + "; its position can be confirmed at rest only");
+  }
+  if (!being_restored(id) && !positions_.being_set(id)) return {};
+  return fail(motor.name() + ": its position is being set; wait for that result");
+}
+
+void KeptPositions::request(const api::Asker& asker, const api::Confirm& request) {
+  const auto motors = installation_.find(request.motors);
+  if (!motors) return asker.answer(api::Refused{motors.error().text()});
+  for (const MotorId id : *motors) {
+    if (const auto may = may_be_confirmed(id); !may) {
+      return asker.answer(api::Refused{may.error().text()});
+    }
+  }
+  asker.answer(api::Accepted{});
+  for (const MotorId id : *motors) {
+    motion::Motor& motor = installation_[id];
+    const std::string who = text_of(asker);
+    motor.position_is_known();
+    outputs_.log(LogLevel::kInfo, motor.name() + ": position " +
+                                      std::to_string(motor.position_steps()) + " confirmed by " +
+                                      who);
+    past({.motor = motor.name(),
+          .what = "confirm",
+          .who = who,
+          .from_steps = motor.position_steps(),
+          .to_steps = motor.position_steps(),
+          .result = std::string(api::word(api::Outcome::kDone))});
+  }
+  installation_.changed = true;
+  asker.answer(api::Completed{.outcome = api::Outcome::kDone, .reason = "done", .detail = {}});
+}
+
+void KeptPositions::request(const api::Asker& asker, const api::GetHistory& request) {
+  const auto motor = installation_.find(request.motor);
+  if (!motor) return asker.answer(api::Refused{motor.error().text()});
+  if (request.most < 1 || request.most > kMostPast) {
+    return asker.answer(api::Refused{std::to_string(request.most) +
+                                     " lines of history; allowed: 1 to " +
+                                     std::to_string(kMostPast)});
+  }
+  if (!keeper_) {
+    return asker.answer(
+        api::Refused{"nothing is kept, so there is no history; see [state] in bushd.toml"});
+  }
+  if (reading_ >= kMostReading) {
+    return asker.answer(
+        api::Refused{"too many requests for histories wait; try again in a moment"});
+  }
+  ++reading_;
+  backend_->history(
+      request.motor, request.most,
+      [this, asker](const Result<std::vector<state::PastMove>>& found) {
+        --reading_;
+        if (!found) return asker.answer(api::Refused{found.error().text()});
+        api::MotionHistory history;
+        for (const state::PastMove& move : *found) {
+          history.motions.push_back({.utime_us = move.utime_us,
+                                     .what = move.what,
+                                     .who = move.who,
+                                     .from_steps = move.from_steps,
+                                     .to_steps = move.to_steps,
+                                     .outcome = move.result,
+                                     .reason = move.reason});
+        }
+        asker.answer(api::Accepted{});
+        asker.answer(api::Completed{
+            .outcome = api::Outcome::kDone, .reason = "done", .detail = std::move(history)});
+      });
 }
 
 Result<bool> KeptPositions::make_ready(std::int64_t now_us, MotorId id) {

@@ -31,12 +31,17 @@ class KeptPositions final : public Service {
   void marked(std::int64_t now_us, const Result<void>& done);
   void written(std::int64_t now_us, const Result<void>& done);
 
+  void request(const api::Asker& asker, const api::Confirm& request);
+  void request(const api::Asker& asker, const api::GetHistory& request);
+
   // Whether the motor's position may change from now on. If not, it is made so; ask again after the
   // next step, or say not_wanted(). Errors: it does not come to pass.
   Result<bool> make_ready(std::int64_t now_us, MotorId motor);
   void not_wanted(MotorId motor) { motors_[motor].wanted = false; }
   bool being_restored(MotorId motor) const { return motors_[motor].restoring.has_value(); }
 
+  // It has another offset than bushd.toml says.
+  void keep_offset(MotorId motor);
   // For the history. Says who asked, and where from.
   void past(state::PastMove move);
 
@@ -73,12 +78,16 @@ class KeptPositions final : public Service {
   void keep(std::int64_t now_us, const Mcu& mcu, MotorId id);
   state::Record record_of(const Mcu& mcu, MotorId id) const;
   void tell_trouble();
+  void take_kept_offset(MotorId motor);
+  Result<void> may_be_confirmed(MotorId id) const;
 
   Installation& installation_;
   const Positions& positions_;
   Journal& journal_;
   Outputs& outputs_;
   std::optional<state::Keeper> keeper_;
+  state::Backend* backend_ = nullptr;  // with keeper_
+  int reading_ = 0;                    // requests for histories
   bool required_ = true;
   ById<MotorId, Motor> motors_;
   struct OfMcu {

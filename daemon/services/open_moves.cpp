@@ -9,16 +9,30 @@ std::string text_of(const api::Asker& asker) {
   return "command " + std::to_string(asker.number) + " of " + asker.session->text();
 }
 
-void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors) {
-  Open open{.asker = std::move(asker), .tables = {}};
+void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors, std::string what) {
+  Open open{.asker = std::move(asker), .what = std::move(what), .tables = {}};
   for (const MotorId motor : motors) {
+    open.from_steps[motor] = installation_[motor].position_steps();
     open.tables.push_back(api::ref_to(*installation_.table_of(motor)));
   }
   open_.emplace(book_.open(motors), std::move(open));
 }
 
+void OpenMoves::tell(MotorId id, api::Outcome outcome, const std::string& reason) const {
+  const auto move = book_.move_of(id);
+  if (!listener_ || !move) return;
+  const Open& open = open_.at(*move);
+  listener_({.motor = id,
+             .what = open.what,
+             .asker = open.asker,
+             .from_steps = open.from_steps.at(id),
+             .outcome = outcome,
+             .reason = reason});
+}
+
 void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason) {
   installation_.changed = true;
+  tell(id, outcome, reason);
   const motion::Motor& motor = installation_[id];
   const auto finished = book_.end({.motor = id,
                                    .outcome = outcome,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -20,8 +21,20 @@ class OpenMoves {
  public:
   explicit OpenMoves(Installation& installation) : installation_(installation) {}
 
-  // Precondition: none of the motors is under way.
-  void open(api::Asker asker, const std::vector<MotorId>& motors);
+  // A motor's part that has ended.
+  struct Ended {
+    MotorId motor;
+    const std::string& what;
+    const api::Asker& asker;
+    std::int64_t from_steps;
+    api::Outcome outcome;
+    const std::string& reason;
+  };
+  using Listener = std::function<void(const Ended&)>;
+  void set_listener(Listener listener) { listener_ = std::move(listener); }
+
+  // Precondition: none of the motors is under way. `what`: move, home, arm.
+  void open(api::Asker asker, const std::vector<MotorId>& motors, std::string what = "move");
   // This motor's part has ended. One that is in no open move is ignored.
   void end(MotorId motor, api::Outcome outcome, const std::string& reason);
 
@@ -33,10 +46,15 @@ class OpenMoves {
  private:
   struct Open {
     api::Asker asker;
+    std::string what;
+    std::unordered_map<MotorId, std::int64_t> from_steps{};
     std::vector<api::TableRef> tables;  // by which its motors move, in the request's order
   };
 
+  void tell(MotorId motor, api::Outcome outcome, const std::string& reason) const;
+
   Installation& installation_;
+  Listener listener_;
   motion::MoveBook book_;
   std::unordered_map<std::uint64_t, Open> open_;  // by number in book_
 };

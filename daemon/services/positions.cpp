@@ -35,6 +35,7 @@ void Positions::request(std::int64_t now_us, const api::Asker& asker,
   for (Offset& offset : plan->offsets) {
     installation_[offset.motor].set_coordinates(std::move(offset.coordinates));
     journal_.offset_set(offset.motor, asker);
+    if (offset_listener_) offset_listener_(offset.motor);
     installation_.changed = true;
   }
   std::vector<MotorId> motors;

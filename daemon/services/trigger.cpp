@@ -9,7 +9,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   const auto motors = motors_of(request);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
-  open_moves_.open(asker, *motors);
+  open_moves_.open(asker, *motors, "arm");
   std::map<McuId, std::vector<link::Master::Armed>> moves;
   const std::vector<std::int64_t> steps = steps_of(*motors, request);
   for (std::size_t i = 0; i < motors->size(); ++i) {

@@ -37,6 +37,15 @@ std::size_t memory_of(const TableList& list) {
   return bytes;
 }
 
+std::size_t memory_of(const MotionHistory& history) {
+  std::size_t bytes = 0;
+  for (const PastMotion& motion : history.motions) {
+    bytes += sizeof motion + memory_of(motion.what) + memory_of(motion.who) +
+             memory_of(motion.outcome) + memory_of(motion.reason);
+  }
+  return bytes;
+}
+
 std::size_t memory_of(const tables::TableContent& content) {
   std::size_t codes = content.accel.capacity();
   if (content.decel) codes += content.decel->capacity();

@@ -65,6 +65,21 @@ struct TableList {
   std::vector<TableEntry> entries{};
 };
 
+// What has moved a motor, or made its position known.
+struct PastMotion {
+  std::int64_t utime_us = 0;  // when it ended
+  std::string what{};         // move, home, arm, confirm
+  std::string who{};
+  std::int64_t from_steps = 0;
+  std::int64_t to_steps = 0;
+  std::string outcome{};
+  std::string reason{};
+  friend bool operator==(const PastMotion&, const PastMotion&) = default;
+};
+struct MotionHistory {
+  std::vector<PastMotion> motions{};
+};
+
 struct Accepted {};
 
 struct Refused {
@@ -75,8 +90,9 @@ struct Completed {
   Outcome outcome = Outcome::kDone;
   std::string reason{};  // names motor and cause; never empty
   // Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
-  // table requests.
-  std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList, tables::TableContent>
+  // table requests; a history.
+  std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList, tables::TableContent,
+               MotionHistory>
       detail{};
 };
 

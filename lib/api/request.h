@@ -146,9 +146,20 @@ struct SetTable {
   std::string expected_hash{};
 };
 
-using Request =
-    std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
-                 ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables, GetTable, SetTable>;
+// The positions of these motors, at rest, are right as their MCUs count them: they are known.
+struct Confirm {
+  MotorNames motors{};  // at least one
+};
+
+// What has moved a motor, the newest first. Refused without a state store. Result: MotionHistory.
+struct GetHistory {
+  std::string motor{};
+  std::int32_t most = 20;  // 1..1000
+};
+
+using Request = std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
+                             UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables,
+                             GetTable, SetTable, Confirm, GetHistory>;
 
 // For logs and counts: "move", "stop", "emergency stop", ...
 std::string_view name_of(const Request& request);

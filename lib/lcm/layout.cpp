@@ -8,6 +8,7 @@ namespace {
 constexpr Layout kTableRef{"sis"};
 constexpr Layout kMovePlan{"llllnSLLD"};
 constexpr Layout kTable{"ssislinInI"};
+constexpr Layout kPastMotion{"lssllss"};
 constexpr Layout kTableEntry{"stsidd", {&kTableRef}};
 
 constexpr Layout kRequest{"llsl"};
@@ -34,10 +35,12 @@ BUSHD_LAYOUT(subscribe_t, "bbb")
 
 BUSHD_LAYOUT(arm_t, "tbldbnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(clear_faults_t, kMotors)
+BUSHD_LAYOUT(confirm_t, kMotors)
 BUSHD_LAYOUT(disable_t, kMotors)
 BUSHD_LAYOUT(disarm_t, kMotors)
 BUSHD_LAYOUT(emergency_stop_t, kBare)
 BUSHD_LAYOUT(enable_t, kMotors)
+BUSHD_LAYOUT(get_history_t, "tsi", {&kRequest})
 BUSHD_LAYOUT(get_status_t, kBare)
 BUSHD_LAYOUT(get_table_t, "ts", {&kRequest})
 BUSHD_LAYOUT(home_t, "tdbnS", {&kRequest})
@@ -51,6 +54,7 @@ BUSHD_LAYOUT(stop_t, kMotors)
 BUSHD_LAYOUT(use_table_t, "tss", {&kRequest})
 
 BUSHD_LAYOUT(answer_t, "tnSSLDDSBHnTnT", {&kReplyHeader, &kTableRef, &kMovePlan})
+BUSHD_LAYOUT(history_answer_t, "tnT", {&kReplyHeader, &kPastMotion})
 BUSHD_LAYOUT(table_answer_t, "tnTnT", {&kReplyHeader, &kTableEntry, &kTable})
 
 BUSHD_LAYOUT(mcu_state_t, "llliisssssillnT", {&kMotor})

@@ -124,6 +124,18 @@ table_entry_t entry_message(const api::TableEntry& entry) {
   return message;
 }
 
+past_motion_t motion_message(const api::PastMotion& motion) {
+  past_motion_t message{};
+  message.utime_us = motion.utime_us;
+  message.what = motion.what;
+  message.who = motion.who;
+  message.from_steps = motion.from_steps;
+  message.to_steps = motion.to_steps;
+  message.outcome = motion.outcome;
+  message.reason = motion.reason;
+  return message;
+}
+
 // Of an array of strings.
 std::size_t size_of(std::string_view string) {
   return sizeof(std::int32_t) + string.size() + 1;
@@ -141,6 +153,10 @@ std::size_t size_of(const api::MovePlan::Motor& motor) {
 }
 std::size_t size_of(const api::TableEntry& entry) {
   return static_cast<std::size_t>(entry_message(entry)._getEncodedSizeNoHash());
+}
+
+std::size_t size_of(const api::PastMotion& motion) {
+  return static_cast<std::size_t>(motion_message(motion)._getEncodedSizeNoHash());
 }
 
 // A list in pieces that fit a message each, beside `rest` bytes. At least one piece, maybe empty.
@@ -236,6 +252,8 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
   answer.reply = header(utime_us, id, reply);
   table_answer_t table_answer{};
   table_answer.reply = answer.reply;
+  history_answer_t history_answer{};
+  history_answer.reply = answer.reply;
   const auto alone = [&](const char* channel,
                          const auto& message) -> bushd::Result<std::vector<Packet>> {
     auto made = packet(channel, message);
@@ -264,6 +282,15 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
                                                      part.entries.push_back(entry_message(entry));
                                                    }
                                                    part.entry_count = count(piece);
+                                                 });
+                               },
+                               [&](const api::MotionHistory& history) {
+                                 return in_parts("HISTORY_REPLY", history_answer, history.motions,
+                                                 [](history_answer_t& part, auto piece) {
+                                                   for (const auto& motion : piece) {
+                                                     part.motions.push_back(motion_message(motion));
+                                                   }
+                                                   part.motion_count = count(piece);
                                                  });
                                },
                                [&](const tables::TableContent& content) {
@@ -318,6 +345,27 @@ std::optional<DaemonMessage> decode_table_answer(Payload payload) {
   return out;
 }
 
+std::optional<DaemonMessage> decode_history_answer(Payload payload) {
+  const auto message = decode<history_answer_t>(payload);
+  if (!message) return std::nullopt;
+  auto out = with_phase(message->reply);
+  if (!out) return std::nullopt;
+  auto* completed = std::get_if<api::Completed>(&out->reply);
+  if (completed == nullptr) return out;
+  api::MotionHistory history;
+  for (const past_motion_t& motion : message->motions) {
+    history.motions.push_back({.utime_us = motion.utime_us,
+                               .what = motion.what,
+                               .who = motion.who,
+                               .from_steps = motion.from_steps,
+                               .to_steps = motion.to_steps,
+                               .outcome = motion.outcome,
+                               .reason = motion.reason});
+  }
+  completed->detail = std::move(history);
+  return out;
+}
+
 std::optional<DaemonMessage> decode_welcome(Payload payload) {
   const auto message = decode<welcome_t>(payload);
   if (!message) return std::nullopt;
@@ -344,6 +392,9 @@ void append(api::Reply& reply, api::Reply&& part) {
                  },
                  [](api::MovePlan& to, api::MovePlan& from) { append(to.motors, from.motors); },
                  [](api::TableList& to, api::TableList& from) { append(to.entries, from.entries); },
+                 [](api::MotionHistory& to, api::MotionHistory& from) {
+                   append(to.motions, from.motions);
+                 },
                  [](auto&, auto&) {}},
       whole->detail, more->detail);
 }

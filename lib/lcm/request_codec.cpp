@@ -222,6 +222,22 @@ std::optional<api::Request> from_message(const set_table_t& message) {
                        .expected_hash = message.expected_hash};
 }
 
+confirm_t to_message(const api::Confirm& confirm) {
+  return motors_message<confirm_t>(confirm.motors);
+}
+std::optional<api::Request> from_message(const confirm_t& message) {
+  return api::Confirm{message.motors};
+}
+get_history_t to_message(const api::GetHistory& get) {
+  get_history_t message{};
+  message.motor = get.motor;
+  message.most = get.most;
+  return message;
+}
+std::optional<api::Request> from_message(const get_history_t& message) {
+  return api::GetHistory{.motor = message.motor, .most = message.most};
+}
+
 template <class Message>
 std::optional<ClientMessage> decode_request(Payload payload) {
   const auto message = decode<Message>(payload);
@@ -256,7 +272,7 @@ std::optional<ClientMessage> decode_get_status(Payload payload) {
 using Decoder = std::optional<ClientMessage> (*)(Payload);
 
 // A new request is a line here. Requests first, in the order of api::Request.
-constexpr std::array<std::pair<std::string_view, Decoder>, 19> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 21> kDecoders = {{
     {"MOVE", decode_request<move_t>},
     {"STOP", decode_request<stop_t>},
     {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
@@ -273,11 +289,13 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 19> kDecoders = {{
     {"LIST_TABLES", decode_request<list_tables_t>},
     {"GET_TABLE", decode_request<get_table_t>},
     {"SET_TABLE", decode_request<set_table_t>},
+    {"CONFIRM", decode_request<confirm_t>},
+    {"GET_HISTORY", decode_request<get_history_t>},
     {"HELLO", decode_hello},
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},
 }};
-static_assert(std::variant_size_v<api::Request> == 16);
+static_assert(std::variant_size_v<api::Request> == 18);
 
 constexpr auto kClientChannels = [] {
   std::array<std::string_view, kDecoders.size()> channels;

@@ -149,6 +149,7 @@ bool counts_match(const T& message) {
   BUSHD_COUNTED(latency_count, latency_below_us);
   BUSHD_COUNTED(latency_count, latency_answers);
   BUSHD_COUNTED(mcu_count, mcus);
+  BUSHD_COUNTED(motion_count, motions);
   // What is nested and has counts of its own.
   if constexpr (requires { message.plan.size(); }) return all_match(message.plan);
   if constexpr (requires { message.tables.front().accel; }) return all_match(message.tables);
@@ -202,14 +203,17 @@ std::optional<T> decode(std::span<const std::uint8_t> payload) {
 BUSHD_TRAVELS(answer_t)
 BUSHD_TRAVELS(arm_t)
 BUSHD_TRAVELS(clear_faults_t)
+BUSHD_TRAVELS(confirm_t)
 BUSHD_TRAVELS(disable_t)
 BUSHD_TRAVELS(disarm_t)
 BUSHD_TRAVELS(emergency_stop_t)
 BUSHD_TRAVELS(enable_t)
+BUSHD_TRAVELS(get_history_t)
 BUSHD_TRAVELS(get_status_t)
 BUSHD_TRAVELS(get_table_t)
 BUSHD_TRAVELS(health_t)
 BUSHD_TRAVELS(hello_t)
+BUSHD_TRAVELS(history_answer_t)
 BUSHD_TRAVELS(home_t)
 BUSHD_TRAVELS(list_tables_t)
 BUSHD_TRAVELS(mcu_description_t)

@@ -51,7 +51,8 @@ Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const 
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
                 (setup_.has_home ? "run 'bushctl home NAME', or find out where it stands and run "
                                    "'bushctl set NAME STEPS'"
-                                 : "find out where it stands and run 'bushctl set NAME STEPS'"));
+                                 : "find out where it stands and run 'bushctl set NAME STEPS'") +
+                ", or 'bushctl confirm NAME' if it stands where it is shown");
   }
   if (restored_reason_ && setup_.restored_refused) {
     return fail("its position is only restored, because " + *restored_reason_ +

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -20,12 +21,14 @@
 
 namespace bushd::state {
 
-// Where the disk is. Each call is answered by Keeper's function of that name, later.
+// Where the disk is. mark() and write() are answered by Keeper's functions of these names, later.
 class Backend {
  public:
   virtual ~Backend() = default;
   virtual void mark(std::vector<Mark> marks) = 0;
   virtual void write(Batch batch) = 0;
+  using Told = std::function<void(const Result<std::vector<PastMove>>&)>;
+  virtual void history(std::string motor, int most, Told told) = 0;
 };
 
 class Keeper {

@@ -224,6 +224,87 @@ TEST(KeptPositions, OfMotorsWithLocalInputsAreUncertainAfterAPowerCut) {
   lab.expect_at_shaft("m02", api::Trust::kRestored);
 }
 
+TEST(KeptPositions, AreKnownOnceTheyAreConfirmed) {
+  KeptLab lab;
+  lab.reach("m01", 300);
+  lab.send(Ask::kMoveBy, {"m01"}, {5000});
+  lab.run_for(0.7);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  lab.expect_refused("m01", "or 'bushctl confirm NAME' if it stands where it is shown");
+  const std::int64_t shown = lab.motor("m01").position_steps;
+  EXPECT_EQ(lab.wait(lab.send(api::Confirm{{"m01", "m02"}})).result, "done");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.motor("m01").position_steps, shown);
+  EXPECT_EQ(lab.motor("m02").trust, api::Trust::kKnown);
+  lab.run_for(0.2);
+  lab.restart_daemon();
+  lab.reconnect();
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  lab.send(Ask::kMoveBy, {"m01"}, {500});
+  lab.run_for(0.1);
+  EXPECT_THAT(lab.wait(lab.send(api::Confirm{{"m01"}})).reason, HasSubstr("moves"));
+  EXPECT_THAT(lab.wait(lab.send(api::Confirm{{"m09"}})).reason, HasSubstr("there is no motor"));
+}
+
+TEST(KeptPositions, AreOfAnotherScaleUntilSomebodyConfirmsThem) {
+  std::string toml = hall(1, 2);
+  toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n");
+  KeptLab lab(toml);
+  lab.reach("m01", 300);
+  lab.run_for(0.2);
+  toml.replace(toml.find("400"), 3, "800");
+  lab.use_configuration(toml);
+  lab.reconnect();
+  lab.expect_refused("m01", "its steps_per_unit is 800 now, was 400");
+  EXPECT_EQ(lab.wait(lab.send(api::Confirm{{"m01"}})).result, "done");
+  lab.expect_at_shaft("m01", api::Trust::kKnown);
+}
+
+TEST(KeptPositions, KeepTheirOffsetUntilTheFileIsEdited) {
+  std::string toml = hall(1, 1);
+  toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\noffset = 2\n");
+  KeptLab lab(toml);
+  lab.reach("m01", 400);
+  EXPECT_EQ(lab.motor("m01").user, 3);
+  EXPECT_EQ(lab.wait(lab.send(api::SetPosition{.motors = {{"m01", api::UserUnits{10}}}})).result,
+            "done");
+  EXPECT_EQ(lab.motor("m01").user, 10);
+  lab.run_for(0.2);
+  lab.cut_pc_power();
+  lab.reconnect();
+  EXPECT_EQ(lab.motor("m01").user, 10);
+  EXPECT_EQ(lab.motor("m01").dial, 1);
+  toml.replace(toml.find("offset = 2"), 10, "offset = 5");
+  lab.use_configuration(toml);
+  lab.reconnect();
+  EXPECT_EQ(lab.motor("m01").user, 6);
+}
+
+TEST(KeptPositions, HaveAHistory) {
+  KeptLab lab;
+  lab.reach("m01", 300);
+  lab.send(Ask::kMoveBy, {"m01"}, {5000});
+  lab.run_for(0.5);
+  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  lab.run_for(0.2);
+  const auto number = lab.send(api::GetHistory{.motor = "m01", .most = 10});
+  EXPECT_EQ(lab.wait(number).result, "done");
+  const auto history = lab.history(number);
+  ASSERT_EQ(history.size(), 2u);
+  EXPECT_EQ(history[0].outcome, "stopped");
+  EXPECT_EQ(history[0].from_steps, 300);
+  EXPECT_EQ(history[0].to_steps, lab.shaft_steps("m01"));
+  EXPECT_EQ(history[1].outcome, "reached");
+  EXPECT_EQ(history[1].what, "move");
+  EXPECT_THAT(history[1].who, HasSubstr("of test"));
+  EXPECT_THAT(lab.wait(lab.send(api::GetHistory{.motor = "m01", .most = 0})).reason,
+              HasSubstr("allowed: 1 to 1000"));
+  Lab without(hall(1, 1));
+  EXPECT_THAT(without.wait(without.send(api::GetHistory{.motor = "m01"})).reason,
+              HasSubstr("nothing is kept"));
+}
+
 TEST(KeptPositions, AManyMotorsStartCostsOneSync) {
   KeptLab lab(hall(2, 8));
   lab.run_for(0.5);

@@ -75,8 +75,13 @@ class Lab::Client final : public api::Session {
   Client() : Session(api::Transport::kLcm, "test", true) {}
   void answer(std::int64_t number, const api::Reply& reply) override {
     answers[number].push_back(answer_of(reply));
+    const auto* completed = std::get_if<api::Completed>(&reply);
+    const auto* history =
+        completed == nullptr ? nullptr : std::get_if<api::MotionHistory>(&completed->detail);
+    if (history != nullptr) histories[number] = history->motions;
   }
   std::map<std::int64_t, std::vector<Answer>> answers;  // by number
+  std::map<std::int64_t, std::vector<api::PastMotion>> histories;
 };
 
 Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink)
@@ -153,6 +158,19 @@ void Lab::cut_pc_power() {
   store_.reset();
   state_disk_->boot();
   restart_daemon();
+}
+
+void Lab::use_configuration(const std::string& toml) {
+  core_.reset();
+  write_file("bushd.toml", toml);
+  auto config = config::load(directory_ / "bushd.toml");
+  if (!config) throw std::runtime_error(config.error().text());
+  config_ = std::move(*config);
+  restart_daemon();
+}
+
+std::vector<api::PastMotion> Lab::history(std::int64_t number) const {
+  return client_->histories[number];
 }
 
 void Lab::mark(std::vector<state::Mark> marks) {

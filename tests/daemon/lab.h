@@ -123,6 +123,9 @@ class Lab : public daemon::Outputs, private state::Backend {
   state::SimDisk& disk() { return *state_disk_; }
   // The disk takes that long for each thing.
   std::int64_t disk_us = 500;
+  // Another bushd.toml with the same MCUs: the daemon is started again.
+  void use_configuration(const std::string& toml);
+  std::vector<api::PastMotion> history(std::int64_t number) const;
   // The PC loses power: the daemon, and what the disk had not synced. A new one starts.
   void cut_pc_power();
   // Bytes on the way to MCUs are handed to this before they are sent; returning false drops them.
@@ -163,6 +166,9 @@ class Lab : public daemon::Outputs, private state::Backend {
   std::int64_t wall_clock_us() override { return now_us(); }
   void mark(std::vector<state::Mark> marks) override;
   void write(state::Batch batch) override;
+  void history(std::string motor, int most, Told told) override {
+    post([this, motor, most, told] { told(store_->history(motor, most)); });
+  }
   void post(std::function<void()> answer) {
     state_jobs_.emplace_back(now_us() + disk_us, std::move(answer));
   }

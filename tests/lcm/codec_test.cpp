@@ -90,6 +90,10 @@ TEST(Codec, OtherRequestsDoToo) {
   EXPECT_FALSE(compare.arrivals.positive);
   EXPECT_TRUE(compare.arrivals.negative);
   EXPECT_EQ(compare.width_us, 6);
+  EXPECT_EQ(request_over_the_wire(api::Confirm{{"a"}}).motors, api::MotorNames{"a"});
+  const auto history = request_over_the_wire(api::GetHistory{.motor = "a", .most = 7});
+  EXPECT_EQ(history.motor, "a");
+  EXPECT_EQ(history.most, 7);
   request_over_the_wire(api::ListTables{});
   EXPECT_EQ(request_over_the_wire(api::GetTable{"own"}).table, "own");
   const auto set = request_over_the_wire(
@@ -176,6 +180,19 @@ TEST(Codec, PlansAndTablesDoToo) {
           api::Completed{.reason = "r", .detail = api::TableList{{{.name = "own", .fault = "f"}}}})
           .reply);
   EXPECT_EQ(std::get<api::TableList>(list.detail).entries.front().fault, "f");
+  const api::PastMotion motion{.utime_us = 1,
+                               .what = "move",
+                               .who = "w",
+                               .from_steps = -2,
+                               .to_steps = 3,
+                               .outcome = "reached",
+                               .reason = "r"};
+  const auto history = std::get<api::Completed>(
+      reply_over_the_wire(
+          api::Completed{.reason = "r", .detail = api::MotionHistory{{motion, motion}}})
+          .reply);
+  EXPECT_EQ(std::get<api::MotionHistory>(history.detail).motions,
+            std::vector<api::PastMotion>({motion, motion}));
   const tables::TableContent own{.name = "own", .time_unit_ns = 4000, .accel = {2500, 1200}};
   const auto content = std::get<api::Completed>(
       reply_over_the_wire(api::Completed{.reason = "r", .detail = own}).reply);

@@ -16,6 +16,7 @@ constexpr MotorId kTheta{1};
 struct Disk : Backend {
   void mark(std::vector<Mark> wanted) override { marks.push_back(std::move(wanted)); }
   void write(Batch batch) override { writes.push_back(std::move(batch)); }
+  void history(std::string, int, Told) override {}
   std::vector<std::vector<Mark>> marks;
   std::vector<Batch> writes;
 };

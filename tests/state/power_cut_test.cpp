@@ -31,6 +31,7 @@ struct Daemon : Backend {
   }
   void mark(std::vector<Mark> marks) override { to_mark = std::move(marks); }
   void write(Batch batch) override { to_write = std::move(batch); }
+  void history(std::string, int, Told) override {}
 
   struct Motor {
     Trust trust = Trust::kUnconfirmed;

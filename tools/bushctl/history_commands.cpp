@@ -1,0 +1,105 @@
+// Subcommands about positions that are kept: confirming them, and what has moved motors.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "base/printable.h"
+#include "commands.h"
+#include "grid.h"
+
+namespace bushctl {
+namespace {
+
+namespace api = bushd::api;
+using bushd::client::Client;
+using nlohmann::ordered_json;
+
+constexpr std::uint32_t kMostPast = 1000;
+
+void add_confirm(CommandLine& line) {
+  const auto motors = std::make_shared<api::MotorNames>();
+  line.add("confirm", "Confirm that motors stand where they are shown")
+      .footer(
+          "Positions that are restored or uncertain ('bushctl where') are known then, and nothing "
+          "moves. Where a motor stands elsewhere, use 'set' or 'home'.")
+      .words("NAME", motors.get(), "Motors", Command::Needed::kYes)
+      .run([&line, motors] {
+        return send(line.connection(), api::Confirm{*motors}, Client::Until::kResult, Hope::kDone);
+      });
+}
+
+void print_json(const std::string& motor, const api::MotionHistory& history) {
+  ordered_json json = {{"motor", motor}, {"motions", ordered_json::array()}};
+  for (const api::PastMotion& motion : history.motions) {
+    json["motions"].push_back({{"utime_us", motion.utime_us},
+                               {"what", motion.what},
+                               {"who", motion.who},
+                               {"from_steps", motion.from_steps},
+                               {"to_steps", motion.to_steps},
+                               {"outcome", motion.outcome},
+                               {"reason", motion.reason}});
+  }
+  fmt::print("{}\n", json.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
+}
+
+void print(const api::MotionHistory& history) {
+  using enum Align;
+  Grid grid({kLeft, kLeft, kRight, kRight, kLeft, kLeft, kLeft});
+  grid.row({"TIME", "WHAT", "FROM", "TO", "RESULT", "BY", ""});
+  for (const api::PastMotion& motion : history.motions) {
+    const auto seconds = static_cast<std::time_t>(motion.utime_us / 1'000'000);
+    grid.row({fmt::format("{:%Y-%m-%d %H:%M:%S}", fmt::localtime(seconds)),
+              bushd::printable(motion.what), fmt::to_string(motion.from_steps),
+              fmt::to_string(motion.to_steps), bushd::printable(motion.outcome),
+              bushd::printable(motion.who), bushd::printable(motion.reason)});
+  }
+  for (const std::string& line : grid.lines()) fmt::print("{}\n", line);
+}
+
+struct HistoryOptions {
+  std::string motor;
+  std::uint32_t most = 20;
+  bool json = false;
+};
+
+int show_history(Client& client, const HistoryOptions& options) {
+  const auto reply = client.run(
+      api::GetHistory{.motor = options.motor, .most = static_cast<std::int32_t>(options.most)},
+      Client::Until::kResult);
+  if (!reply) return failure(client, reply.error());
+  const auto* completed = std::get_if<api::Completed>(&*reply);
+  const auto* history =
+      completed == nullptr ? nullptr : std::get_if<api::MotionHistory>(&completed->detail);
+  if (history == nullptr) return refused(*reply);
+  if (options.json) {
+    print_json(options.motor, *history);
+  } else {
+    print(*history);
+  }
+  return kDone;
+}
+
+void add_history(CommandLine& line) {
+  const auto options = std::make_shared<HistoryOptions>();
+  line.add("history", "Show what has moved a motor, the newest first")
+      .footer("Positions are in steps. Needs a state store ([state] in bushd.toml).")
+      .option("NAME", &options->motor, "Motor")
+      .number("--most", &options->most, 1u, kMostPast, "How many lines")
+      .flag("--json", &options->json, "Print JSON")
+      .run([&line, options] {
+        return with_client(line.connection(),
+                           [&](Client& client) { return show_history(client, *options); });
+      });
+}
+
+}  // namespace
+
+void add_history_commands(CommandLine& line) {
+  add_confirm(line);
+  add_history(line);
+}
+
+}  // namespace bushctl
