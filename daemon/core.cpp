@@ -65,7 +65,7 @@ void Core::request(std::int64_t now, const api::Asker& asker, const api::Request
                  [&](const api::PositionCompare& r) { position_compare_.request(now, asker, r); },
                  [&](const api::ListTables& r) { outputs_.serve_tables(asker, r); },
                  [&](const api::GetTable& r) { outputs_.serve_tables(asker, r); },
-                 [&](const api::SetTable& r) { tables_.request(asker, r); },
+                 [&](const api::SetTable& r) { outputs_.serve_tables(asker, r); },
              },
              request);
 }
@@ -82,8 +82,13 @@ void Core::keep_up(std::int64_t now_us) {
   state_.step(now_us);
 }
 
+void Core::work() {
+  if (moves_.begins()) return moves_.work();
+  dry_runs_.work();
+}
+
 std::int64_t Core::next_wake_us() const {
-  if (!dry_runs_.idle()) return 0;
+  if (moves_.begins() || !dry_runs_.idle()) return 0;
   std::int64_t wake = std::min(state_.next_wake_us(), health_.next_wake_us());
   for (const BusId id : installation_.buses()) {
     wake = std::min(wake, installation_[id].master.next_wake_us());
