@@ -339,7 +339,7 @@ void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>
 
 void EventLoop::carry_out_some() {
   const std::int64_t until = now_us() + Reception::kSliceUs;
-  while (!reception_.idle()) {
+  while (!reception_.idle() && !core_.begins_moves()) {
     reception_.carry_out_next();
     if (now_us() >= until) return;
   }
@@ -355,10 +355,13 @@ void EventLoop::serve_tables(const api::Asker& asker, const api::Request& reques
   ++table_jobs_[client];
   const auto* set = std::get_if<api::SetTable>(&request);
   if (set == nullptr) return post_table_job(asker, request);
-  // A table's sums are made there too; whether it suits the motors the core knows.
+  // A table's sums are made there too, and its codes are looked at; the core knows whose it is.
   worker_.post([this, asker, request, set = *set]() -> Worker::Completion {
-    return [this, asker, request, name = set.table, table = tables::make(set.content)] {
-      const auto good = table ? core_.tables().check_content(name, *table) : fail(table.error());
+    const auto review = tables::make(set.content).map([this](const tables::TablePtr& table) {
+      return TableReview(config_, table);
+    });
+    return [this, asker, request, name = set.table, review] {
+      const auto good = review ? core_.tables().check_content(name, *review) : fail(review.error());
       if (good) return post_table_job(asker, request);
       answer_table_job(asker, api::Refused{good.error().text()});
     };
