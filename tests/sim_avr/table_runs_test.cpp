@@ -149,9 +149,9 @@ std::vector<Load> loads() {
   std::vector<Load> loads;
   for (int phase = 0; phase < 4; ++phase) {
     loads.push_back({BUSHD_FORMAT_COARSE, 2'464'000, 1'000, 270, 50, phase});
-    loads.push_back({BUSHD_FORMAT_FINE, 2'704'000, 1'000, 297, 50, phase});
+    loads.push_back({BUSHD_FORMAT_FINE, 2'464'000, 1'000, 270, 50, phase});
   }
-  loads.push_back({BUSHD_FORMAT_FINE, 2'560'000, 1'000, 280, 0});
+  loads.push_back({BUSHD_FORMAT_FINE, 2'464'000, 1'000, 270, 0});
   // A tick that is no whole number of time units.
   loads.push_back({BUSHD_FORMAT_COARSE, 4'000'000, 7'000, 60, 50});
   return loads;
