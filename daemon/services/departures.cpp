@@ -66,7 +66,10 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
       refuse(held, ready.error().text());
       return true;
     }
-    if (*ready) return false;
+    if (*ready) {
+      for (const MotorId motor : held.motors) kept_.not_wanted(motor);
+      return false;
+    }
   }
   held_.push_back(std::move(held));
   return true;

@@ -144,12 +144,15 @@ void HomingQueue::step(std::int64_t now_us) {
   for (const McuId id : installation_.mcus()) {
     Queue& queue = queues_[id];
     if (queue.asked || queue.motors.empty()) continue;
-    const auto ready = kept_.make_ready(now_us, queue.motors.front());
+    const MotorId motor = queue.motors.front();
+    const auto ready = kept_.make_ready(now_us, motor);
+    if (ready && !*ready) continue;
+    kept_.not_wanted(motor);
     if (!ready) {
       end(installation_[id], Outcome::kFault, ready.error().text());
-    } else if (*ready) {
+    } else {
       queue.asked = true;
-      installation_[id].home(message_for(queue.motors.front()));
+      installation_[id].home(message_for(motor));
     }
   }
 }
