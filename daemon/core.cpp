@@ -25,9 +25,12 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       trigger_(installation_, interlocks_, moves_, open_moves_),
       position_compare_(installation_),
       state_(installation_, outputs),
-      departures_(installation_, interlocks_, kept_,
-                  [this](std::int64_t now_us, const api::Asker& asker,
-                         const api::Request& request) { carry_out(now_us, asker, request); }),
+      departures_(
+          installation_, interlocks_, kept_,
+          [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
+            carry_out(now_us, asker, request);
+          },
+          [this] { return moves_.begins(); }),
       health_(installation_, outputs),
       // What an MCU's positions are worth comes before whoever goes by that.
       services_{&kept_,           &journal_, &moves_,     &homing_,  &link_faults_,      &stops_,

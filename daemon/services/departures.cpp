@@ -66,7 +66,10 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
       refuse(held, ready.error().text());
       return true;
     }
-    if (*ready) return false;
+    if (*ready) {
+      for (const MotorId motor : held.motors) kept_.not_wanted(motor);
+      return false;
+    }
   }
   held_.push_back(std::move(held));
   return true;
@@ -87,7 +90,7 @@ void Departures::cancel(const std::vector<MotorId>& motors) {
 
 void Departures::step(std::int64_t now_us) {
   std::vector<MotorId> before;
-  for (auto it = held_.begin(); it != held_.end();) {
+  for (auto it = held_.begin(); it != held_.end() && !busy_();) {
     const bool in_turn = !has_common(it->motors, before);
     // What became impossible meanwhile is refused by who carries it out.
     const bool possible = motors_of(it->request).has_value();

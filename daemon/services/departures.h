@@ -18,12 +18,14 @@ namespace bushd::daemon {
 class Departures final : public Service {
  public:
   using CarryOut = std::function<void(std::int64_t now_us, const api::Asker&, const api::Request&)>;
+  // `busy`: what was carried out before is still being begun; all that is held waits for it.
   Departures(const Installation& installation, const Interlocks& interlocks, KeptPositions& kept,
-             CarryOut carry_out)
+             CarryOut carry_out, std::function<bool()> busy)
       : installation_(installation),
         interlocks_(interlocks),
         kept_(kept),
-        carry_out_(std::move(carry_out)) {}
+        carry_out_(std::move(carry_out)),
+        busy_(std::move(busy)) {}
 
   // Whether the request is kept here. It is carried out, or refused, in a later step.
   bool hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
@@ -51,6 +53,7 @@ class Departures final : public Service {
   const Interlocks& interlocks_;
   KeptPositions& kept_;
   CarryOut carry_out_;
+  std::function<bool()> busy_;
   std::list<Held> held_;
 };
 

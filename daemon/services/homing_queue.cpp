@@ -154,12 +154,15 @@ void HomingQueue::step(std::int64_t now_us) {
   for (const McuId id : installation_.mcus()) {
     Queue& queue = queues_[id];
     if (queue.asked || queue.tasks.empty()) continue;
-    const auto ready = kept_.make_ready(now_us, queue.tasks.front().motor);
+    const Task task = queue.tasks.front();
+    const auto ready = kept_.make_ready(now_us, task.motor);
+    if (ready && !*ready) continue;
+    kept_.not_wanted(task.motor);
     if (!ready) {
       end(installation_[id], Outcome::kFault, ready.error().text());
-    } else if (*ready) {
+    } else {
       queue.asked = true;
-      installation_[id].home(message_for(queue.tasks.front()));
+      installation_[id].home(message_for(task));
     }
   }
 }

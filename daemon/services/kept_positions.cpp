@@ -176,9 +176,7 @@ Result<bool> KeptPositions::make_ready(std::int64_t now_us, MotorId id) {
   motor.wanted = true;
   if (motor.restoring) return false;
   const auto wanted = keeper_->want_mark(now_us, id);
-  if (wanted && !keeper_->marked(id)) return false;
-  motor.wanted = false;
-  if (wanted) return true;
+  if (wanted) return keeper_->marked(id);
   if (required_) {
     return fail("the disk cannot be told that it moves: " + wanted.error().text() +
                 ". Make room, or repair the disk; with [state] required = false it moves in spite "

@@ -35,7 +35,8 @@ class KeptPositions final : public Service {
   void request(const api::Asker& asker, const api::GetHistory& request);
 
   // Whether the motor's position may change from now on. If not, it is made so; ask again after the
-  // next step, or say not_wanted(). Errors: it does not come to pass.
+  // next step. Errors: it does not come to pass. In any case until not_wanted() it stays ready,
+  // once it is, and is not kept as a motor at rest.
   Result<bool> make_ready(std::int64_t now_us, MotorId motor);
   void not_wanted(MotorId motor) { motors_[motor].wanted = false; }
   bool being_restored(MotorId motor) const { return motors_[motor].restoring.has_value(); }

@@ -153,6 +153,18 @@ TEST(KeptPositions, WhatIsStoppedBeforeItBeginsIsRefused) {
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
 }
 
+TEST(KeptPositions, AMotorThatHasItsMarkWaitsForTheOthersWithIt) {
+  KeptLab lab;
+  lab.run_for(0.5);
+  lab.disk_us = 200'000;
+  const auto first = lab.send(Ask::kMoveBy, {"m01"}, {40});
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").moving; }, 1));
+  const auto both = lab.send(Ask::kMoveBy, {"m01", "m02"}, {10, 10});
+  ASSERT_TRUE(lab.run_until([&] { return !lab.replies(both).empty(); }, 0.25));
+  EXPECT_EQ(lab.wait(both).result, "reached");
+  EXPECT_THAT(lab.last_reply(first).result, testing::AnyOf("reached", "stopped"));
+}
+
 TEST(KeptPositions, ADiskThatDoesNotAnswerKeepsMotorsAtRest) {
   KeptLab lab;
   lab.run_for(0.5);
