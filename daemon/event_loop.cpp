@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "base/printable.h"
 #include "config/port_pattern.h"
 #include "daemon/request_log.h"
 #include "daemon/table_service.h"
@@ -473,7 +474,7 @@ void EventLoop::tell_left_out(std::int64_t now) {
 }
 
 void EventLoop::log(LogLevel level, const std::string& text) {
-  const auto line = log_limit_.take(now_us(), text);
+  const auto line = log_limit_.take(now_us(), printable(text));
   if (!line) return;
   switch (level) {
     case LogLevel::kInfo:
