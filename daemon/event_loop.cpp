@@ -14,6 +14,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/printable.h"
 #include "config/port_pattern.h"
 #include "daemon/process.h"
 #include "daemon/request_log.h"
@@ -455,7 +456,7 @@ void EventLoop::tell_left_out(std::int64_t now) {
 }
 
 void EventLoop::log(LogLevel level, const std::string& text) {
-  const auto line = log_limit_.take(now_us(), text);
+  const auto line = log_limit_.take(now_us(), printable(text));
   if (!line) return;
   switch (level) {
     case LogLevel::kInfo:

@@ -11,6 +11,8 @@
 #include <optional>
 #include <string>
 
+#include "base/parse_error.h"
+#include "base/printable.h"
 #include "base/standard_output.h"
 #include "control/path.h"
 #include "daemon/channel_claim.h"
@@ -124,26 +126,26 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
   // Before there is a control socket: who connects to it is to be answered at once.
   const auto claim = bushd::daemon::ChannelClaim::make(config.lcm, bushd::daemon::lock_folders());
   if (!claim) {
-    spdlog::error("{}", claim.error().text());
+    spdlog::error("{}", bushd::printable(claim.error().text()));
     return 1;
   }
   std::optional<bushd::daemon::MoveLog> move_log;
   if (!move_log_path.empty()) {
     auto opened = bushd::daemon::MoveLog::open(move_log_path);
     if (!opened) {
-      spdlog::error("{}", opened.error().text());
+      spdlog::error("{}", bushd::printable(opened.error().text()));
       return 1;
     }
     move_log.emplace(std::move(*opened));
   }
   const auto control = open_control(config.control);
   if (!control) {
-    spdlog::error("{}", control.error().text());
+    spdlog::error("{}", bushd::printable(control.error().text()));
     return 1;
   }
   const auto lcm = open_lcm(config.lcm, *control != nullptr);
   if (!lcm) {
-    spdlog::error("{}", lcm.error().text());
+    spdlog::error("{}", bushd::printable(lcm.error().text()));
     return 1;
   }
   auto store = open_store(config);
@@ -158,7 +160,7 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
       move_log ? &*move_log : nullptr, bushd::daemon::TableLibrary(config, in_service_path),
       *store ? &**store : nullptr);
   if (const auto ended = loop.run(); !ended) {
-    spdlog::error("{}", ended.error().text());
+    spdlog::error("{}", bushd::printable(ended.error().text()));
     return 1;
   }
   return 0;
@@ -193,7 +195,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return bushd::finished_output(app.exit(error) == 0 ? 0 : kUsage);
+    return bushd::finished_output(bushd::answered(app, error) ? 0 : kUsage);
   }
 
   spdlog::set_default_logger(spdlog::stderr_color_mt("bushd"));
@@ -205,11 +207,11 @@ int main(int argc, char** argv) {
   }
   const auto config = bushd::config::load(check ? check_path : config_path);
   if (!config) {
-    fmt::print(stderr, "{}\n", config.error().text());
+    fmt::print(stderr, "{}\n", bushd::printable(config.error().text()));
     return 1;
   }
   if (check) {
-    fmt::print("{}: good: {}\n", check_path, extent(*config));
+    fmt::print("{}: good: {}\n", bushd::printable(check_path), extent(*config));
     return bushd::finished_output(0);
   }
   return run(*config, move_log_path, in_service_path);

@@ -16,7 +16,8 @@ class StatePublisher {
   // "At once on change", but not more often than this: a client that sends many requests must not
   // make the daemon flood the network.
   static constexpr std::int64_t kMinPeriodUs = 5'000;
-  static constexpr std::int64_t kDescriptionPeriodUs = 2'000'000;
+  // Passed on to clients every few seconds only (Publishing).
+  static constexpr std::int64_t kDescriptionPeriodUs = 500'000;
 
   StatePublisher(Installation& installation, Outputs& outputs);
 

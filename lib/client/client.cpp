@@ -313,6 +313,7 @@ Result<Status> Client::status(std::chrono::milliseconds timeout) {
 Result<Status> Client::incomplete_status() {
   if (!link_->loses() || collector_.empty()) return fail(link_->remedy());
   Status partial = collector_.partial_status();
+  partial.answered = waiting_.final.has_value();
   collector_.expect_no_gaps();
   return partial;
 }

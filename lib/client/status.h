@@ -23,6 +23,7 @@ struct Status {
   };
   Missing missing_mcus{};
   Missing missing_buses{};
+  bool answered = true;  // else what is above came by itself
   // Messages that should have come and did not, since the client asked for the status.
   std::uint64_t lost = 0;
 

@@ -380,6 +380,7 @@ TEST_F(ClientTest, StatusOfWhatArrivedSaysThatMoreIsMissing) {
   EXPECT_EQ(status->states.size(), 1u);
   EXPECT_EQ(status->missing_mcus.count, 2u);
   EXPECT_EQ(status->missing_buses.count, 0u);
+  EXPECT_FALSE(status->answered) << "it came by itself";
 }
 
 TEST_F(ClientTest, NextStateKeepsWhatHasNotChanged) {

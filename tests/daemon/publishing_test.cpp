@@ -5,6 +5,8 @@
 
 #include <vector>
 
+#include "daemon/services/state_publisher.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -97,6 +99,16 @@ TEST_F(PublishingTest, DescriptionsComeOnChangeAndEveryThreeSeconds) {
   EXPECT_EQ(publish(kFirst, description), 1u);
   description.tick_ns = 5;
   EXPECT_EQ(publish(kFirst, description), 1u);
+}
+
+TEST_F(PublishingTest, DescriptionsAreNotPutOffByWhenTheCoreOffersThem) {
+  const api::Description description{.bus = "hall", .mcu = "hall:1"};
+  std::size_t count = 0;
+  for (std::int64_t us = 0; us < 30'000'000; us += StatePublisher::kDescriptionPeriodUs) {
+    count += publish(kFirst, description);
+    now_us_ += StatePublisher::kDescriptionPeriodUs;
+  }
+  EXPECT_EQ(count, 10u);
 }
 
 TEST_F(PublishingTest, PartsTellTheWholeAndTheRun) {

@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "base/parse_error.h"
 #include "commands.h"
 
 namespace bushctl {
@@ -225,7 +226,7 @@ int CommandLine::run(int argc, char** argv) {
   } catch (const CLI::RuntimeError& ran) {
     return ran.get_exit_code();
   } catch (const CLI::ParseError& error) {
-    return app_->exit(error) == 0 ? kDone : kUsage;
+    return bushd::answered(*app_, error) ? kDone : kUsage;
   }
   return kDone;
 }

@@ -40,7 +40,7 @@ int with_client(const Connection& connection, const std::function<int(Client&)>&
   options.interrupt_fd = block_signals();
   auto client = Client::open(std::move(options));
   if (!client) {
-    fmt::print(stderr, "bushctl: {}\n", client.error().text());
+    fmt::print(stderr, "bushctl: {}\n", bushd::printable(client.error().text()));
     return kFailed;
   }
   return action(**client);
@@ -48,18 +48,19 @@ int with_client(const Connection& connection, const std::function<int(Client&)>&
 
 int failure(const Client& client, const bushd::Error& error) {
   if (client.interrupted()) return kInterrupted;
-  fmt::print(stderr, "bushctl: {}\n", error.text());
+  fmt::print(stderr, "bushctl: {}\n", bushd::printable(error.text()));
   return kFailed;
 }
 
-int complete(const bushd::client::Status::Missing& missing, const char* things) {
+int complete(const bushd::client::Status& status, const bushd::client::Status::Missing& missing,
+             const char* things) {
   if (missing.count == 0) return kDone;
-  fmt::print(stderr, "bushctl: {}\n", missing_text(missing, things));
+  fmt::print(stderr, "bushctl: {}\n", missing_text(status.answered, missing, things));
   return kFailed;
 }
 
 int wrong_usage(const bushd::Error& error) {
-  fmt::print(stderr, "bushctl: {}\n", error.text());
+  fmt::print(stderr, "bushctl: {}\n", bushd::printable(error.text()));
   return kUsage;
 }
 

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <optional>
 
+#include "base/printable.h"
 #include "bus_line.h"
 #include "commands.h"
 #include "line_report.h"
@@ -33,7 +34,7 @@ constexpr unsigned kQuietRounds = 3;
 constexpr unsigned kTries = 3;
 
 int failed(const bushd::Error& error) {
-  fmt::print(stderr, "bushctl: {}\n", error.text());
+  fmt::print(stderr, "bushctl: {}\n", bushd::printable(error.text()));
   return kFailed;
 }
 

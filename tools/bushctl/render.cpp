@@ -170,7 +170,13 @@ std::vector<std::string> table(const Status& status) {
   return out;
 }
 
-std::string missing_text(const Status::Missing& missing, const char* things) {
+std::string missing_text(bool answered, const Status::Missing& missing, const char* things) {
+  if (!answered) {
+    return fmt::format(
+        "incomplete: bushd has not answered, and of {} of {} {} nothing has come by itself; wait "
+        "longer (--timeout-s)",
+        missing.count, missing.of, things);
+  }
   return fmt::format("incomplete: messages were lost, nothing of {} of {} {} has arrived; {}",
                      missing.count, missing.of, things, kRoom);
 }

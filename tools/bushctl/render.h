@@ -13,9 +13,10 @@ namespace bushctl {
 // Lines of a table of all motors, then of all MCUs.
 std::vector<std::string> table(const bushd::client::Status& status);
 
-// One line with a remedy: that so many MCUs or buses of a status did not arrive; that so many
-// messages were lost since the status before.
-std::string missing_text(const bushd::client::Status::Missing& missing, const char* things);
+// One line with a remedy: that so many MCUs or buses of a status did not arrive, whether bushd has
+// answered or not; that so many messages were lost since the status before.
+std::string missing_text(bool answered, const bushd::client::Status::Missing& missing,
+                         const char* things);
 std::string lost_text(std::uint64_t messages);
 
 // One line of the motor at this place in the state of the MCU at that place: name, position,

@@ -86,7 +86,9 @@ int watch(bushd::client::Client& client, const WatchOptions& options) {
   for (unsigned shown = 0;;) {
     if (status) {
       view->show(*status);
-      if (status->missing_mcus.count > 0) view->warn(missing_text(status->missing_mcus, "MCUs"));
+      if (status->missing_mcus.count > 0) {
+        view->warn(missing_text(status->answered, status->missing_mcus, "MCUs"));
+      }
       if (status->lost > lost) view->warn(lost_text(status->lost - lost));
       lost = status->lost;
       if (options.count > 0 && ++shown >= options.count) return kDone;

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "base/parse_error.h"
+#include "base/printable.h"
 #include "base/standard_output.h"
 #include "installation.h"
 #include "summary.h"
@@ -87,9 +89,10 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
     options.seed = seed == "fresh" ? std::random_device{}() : std::stoull(seed);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
+    return bushd::answered(app, error) ? kDone : kUsage;
   } catch (const std::logic_error&) {
-    fmt::print(stderr, "bushfaults: --seed {}: not a number from 0 to 2^64 - 1\n", seed);
+    fmt::print(stderr, "bushfaults: --seed {}: not a number from 0 to 2^64 - 1\n",
+               bushd::printable(seed));
     return kUsage;
   }
   auto config =

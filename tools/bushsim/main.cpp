@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "base/parse_error.h"
+#include "base/printable.h"
 #include "base/standard_output.h"
 #include "simulator.h"
 
@@ -21,7 +23,7 @@ constexpr int kFailed = 1;
 constexpr int kUsage = 2;
 
 int refuse(const bushd::Error& error) {
-  fmt::print(stderr, "bushsim: {}\n", error.text());
+  fmt::print(stderr, "bushsim: {}\n", bushd::printable(error.text()));
   return kFailed;
 }
 
@@ -76,7 +78,7 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
+    return bushd::answered(app, error) ? kDone : kUsage;
   }
 
   const auto setup = bushsim::load_setup(config, bus);
@@ -113,7 +115,7 @@ int main(int argc, char** argv) {
   try {
     return bushd::finished_output(run(argc, argv));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "bushsim: {}\n", error.what());
+    fmt::print(stderr, "bushsim: {}\n", bushd::printable(error.what()));
     return kFailed;
   }
 }

@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
-#include <sstream>
 
+#include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
 #include "options.h"
@@ -36,12 +36,7 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    std::ostringstream help;
-    std::ostringstream fault;
-    const bool asked = app.exit(error, help, fault) == 0;
-    std::fputs(help.str().c_str(), stdout);
-    std::fputs(bushd::printable_lines(fault.str()).c_str(), stderr);
-    return asked ? bushtab::kDone : kUsage;
+    return bushd::answered(app, error) ? bushtab::kDone : kUsage;
   }
   return chosen();
 }

@@ -189,6 +189,19 @@ TEST(Bushctl, NamesDoNotSteerTheTerminal) {
             "\x1b]0;owned\x07");
 }
 
+TEST(Bushctl, ItsOwnArgumentsDoNotSteerTheTerminal) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"mo\x1b[31mve"},
+                                             {"status", "--\x1b[31m"},
+                                             {"move", "theta", "3\x1b[31m"},
+                                             {"--socket", "/tmp/\x1b[31m", "status"}}) {
+    const Ran ran = bushctl(arguments);
+    EXPECT_NE(ran.code, 0);
+    EXPECT_THAT(ran.err, HasSubstr("\\x1b[31m"));
+    EXPECT_THAT(ran.out + ran.err, Not(HasSubstr("\x1b")));
+  }
+}
+
 TEST(Bushctl, WithoutDaemonSaysSoAndFails) {
   const Ran status = bushctl({"status", "--timeout-s", "0.1"});
   EXPECT_EQ(status.code, 1);

@@ -111,6 +111,11 @@ void FakeDaemon::on_message(std::string_view channel, lcm::Payload payload) {
   } else {
     publish_rest();
     publish_state();
+    const auto answer =
+        lcm::encode(1, message->id,
+                    api::Reply(api::Completed{
+                        .outcome = api::Outcome::kDone, .reason = "published", .detail = {}}));
+    publish(answer.value().front());
   }
 }
 

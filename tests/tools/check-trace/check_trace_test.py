@@ -508,5 +508,23 @@ class WrongLogs(CheckTraceTest):
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 
 
+class OutputTest(unittest.TestCase):
+    def run_to(self, output, *arguments):
+        command = [sys.executable, "-B", TOP / "tools" / "check-trace", *arguments]
+        return subprocess.run(command, stdout=output, stderr=subprocess.PIPE, text=True, check=False)
+
+    def test_a_full_disk_is_an_error_that_is_told(self):
+        for arguments in (["--help"], ["--version"]):
+            with open("/dev/full", "wb") as full:
+                ran = self.run_to(full, *arguments)
+            self.assertEqual(ran.returncode, 1)
+            self.assertIn("cannot write to standard output: No space left on device", ran.stderr)
+
+    def test_names_do_not_steer_the_terminal(self):
+        ran = self.run_to(subprocess.PIPE, "--moves", "a\x1b[31m\u202e", "--trace", "b")
+        self.assertEqual(ran.returncode, 2)
+        self.assertIn("a\\x1b[31m\\u202e: No such file", ran.stderr)
+
+
 if __name__ == "__main__":
     unittest.main()
