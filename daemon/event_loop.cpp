@@ -15,7 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/printable.h"
-#include "config/port_pattern.h"
+#include "daemon/bus_port.h"
 #include "daemon/process.h"
 #include "daemon/request_log.h"
 #include "daemon/table_service.h"
@@ -28,18 +28,6 @@ constexpr int kMaxTableJobsPerClient = 4;
 
 std::string loop_text(int error) {
   return std::string("event loop: ") + std::strerror(-error);
-}
-
-// Of the ports that the configuration may mean, the first that opens; else why the first does not.
-Result<serial::SerialPort> open_first(const config::Bus& bus) {
-  std::optional<Error> first_error;
-  for (const std::string& path : config::ports_matching(bus.port)) {
-    auto opened = serial::SerialPort::open(path, bus.baud);
-    if (opened) return opened;
-    if (!first_error) first_error = opened.error();
-  }
-  if (first_error) return fail(*first_error);
-  return fail(Error{.message = "no port matches", .file = bus.port});
 }
 
 }  // namespace
@@ -250,7 +238,7 @@ void EventLoop::open_port(std::int64_t now, BusId bus) {
   Port& port = ports_[bus];
   const config::Bus& config = config_[bus];
   port.open_due_us = now + kReopenUs;
-  auto opened = open_first(config);
+  auto opened = open_first_port(config);
   Result<std::unique_ptr<Source>> watched;
   if (opened) {
     watched = watch(opened->fd(),

@@ -35,8 +35,8 @@ static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
   bushd_mcu_homing* homing = &mcu->homing;
   homing->stage = (uint8_t)stage;
   homing->readings = 0;
-  bushd_run_start(&mcu->motor[homing->motor].made.run, &homing->slow, homing->slow_steps,
-                  direction, 0);
+  bushd_run_start(&mcu->motor[homing->motor].made.run, &homing->slow, homing->slow_steps, direction,
+                  0);
 }
 
 static void end(bushd_mcu* mcu, bushd_homing stage) {

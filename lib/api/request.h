@@ -53,7 +53,7 @@ struct Move {
   };
   Kind kind = Kind::kRelative;
   std::vector<MotorAmount> motors{};  // at least one, none twice
-  bool dry_run = false;  // from rest only: result kDone with a MovePlan, and nothing moves
+  bool dry_run = false;          // from rest only: result kDone with a MovePlan, and nothing moves
   std::optional<Speed> speed{};  // none: as fast as the motors' tables and max_speed allow
 };
 

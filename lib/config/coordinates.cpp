@@ -123,9 +123,10 @@ Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {
     return fail(reader.error(kKey, fmt::format("is {}; allowed: a number above 0", *speed)));
   }
   if (motor.local) {
-    return fail(reader.error(kKey, "does not hold for local motion, which the MCU makes by the "
-                                   "table alone; leave out `local`, or give the group a slower "
-                                   "table"));
+    return fail(reader.error(kKey,
+                             "does not hold for local motion, which the MCU makes by the "
+                             "table alone; leave out `local`, or give the group a slower "
+                             "table"));
   }
   return speed;
 }

@@ -126,10 +126,10 @@ bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks
 // First byte of an entry of TABLE_TICKS and TABLE_RUN: the motor, its direction, and what follows.
 #define HEAD_MOTOR 0x0Fu
 #define HEAD_POSITIVE 0x80u
-#define HEAD_PARTS 0x40u     // TABLE_TICKS: the parts follow; else it cruises
-#define HEAD_SINCE_NS 0x20u  // TABLE_TICKS
-#define HEAD_LEAD 0x10u      // TABLE_TICKS
-#define HEAD_SLOT_SHIFT 4u   // TABLE_RUN: three bits
+#define HEAD_PARTS 0x40u                  // TABLE_TICKS: the parts follow; else it cruises
+#define HEAD_SINCE_NS 0x20u               // TABLE_TICKS
+#define HEAD_LEAD 0x10u                   // TABLE_TICKS
+#define HEAD_SLOT_SHIFT 4u                // TABLE_RUN: three bits
 #define STEPS_FLOOR UINT32_C(0x80000000)  // TABLE_RUN, with the steps: a floor follows
 
 static void put_entry(writer* w, const bushd_table_ticks_entry* entry, uint8_t flags) {
@@ -238,9 +238,9 @@ static bushd_table_run_entry get_run_entry(reader* r, bool* in_range) {
   const bool has_floor = (steps & STEPS_FLOOR) != 0;
   const uint16_t floor = has_floor ? get16(r) : 0;
   if (has_floor && floor == 0) *in_range = false;
-  const bushd_table_run_entry entry = {
-      (uint8_t)(head & HEAD_MOTOR), (uint8_t)(head >> HEAD_SLOT_SHIFT & 7u),
-      head & HEAD_POSITIVE ? 1 : -1, steps & ~STEPS_FLOOR, floor};
+  const bushd_table_run_entry entry = {(uint8_t)(head & HEAD_MOTOR),
+                                       (uint8_t)(head >> HEAD_SLOT_SHIFT & 7u),
+                                       head & HEAD_POSITIVE ? 1 : -1, steps & ~STEPS_FLOOR, floor};
   return entry;
 }
 

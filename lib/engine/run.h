@@ -50,8 +50,8 @@ typedef struct bushd_run {
 #if BUSHD_RUN_BRAKES
   uint16_t brake_left;  // steps on the decelerating side before those at the cruise delay
 #endif
-  uint16_t decel_left;   // steps left on the decelerating side, at the end
-  uint8_t fraction;      // of the position at the end of the last fine tick, 1/256 step
+  uint16_t decel_left;  // steps left on the decelerating side, at the end
+  uint8_t fraction;     // of the position at the end of the last fine tick, 1/256 step
   int8_t direction;
 } bushd_run;
 
@@ -95,7 +95,8 @@ void bushd_run_ramp_down(bushd_run* run);
 // it: with a the first index of A(a) <= x, or the one after it if A(a) == x, and k the fewest steps
 // with D(k) <= x, the delay before step j of these n is
 //
-//     max( A(a+j-1), D(n-j), c, floor(j) ),   floor(j) = min( floor, D(k-j) ) while j <= k, else floor
+//     max( A(a+j-1), D(n-j), c, floor(j) ),   floor(j) = min( floor, D(k-j) ) while j <= k, else
+//     floor
 //
 // so that the run goes on speeding up, slows down to its floor, holds cruise, or ramps down,
 // whatever it did before. Returns false, and changes nothing, if a ramp-down takes more steps than

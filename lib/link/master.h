@@ -82,9 +82,10 @@ class Master : private Transactions::Listener, private Connector::Listener {
   bool can_run_tables(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TABLE_RUN); }
   // Everything that decides what would go out now (rehearsal.h).
   BusSnapshot snapshot(std::int64_t now_us) const;
-  // Runs of the MCU's motors that an edge at its trigger input starts. What becomes of them its reports tell, from when they have the number returned here.
-  // Preconditions: the MCU is online and can (can_trigger), the motors have tables and are at rest,
-  // no others wait (McuView::report.armed).
+  // Runs of the MCU's motors that an edge at its trigger input starts. What becomes of them its
+  // reports tell, from when they have the number returned here. Preconditions: the MCU is online
+  // and can (can_trigger), the motors have tables and are at rest, no others wait
+  // (McuView::report.armed).
   struct Armed {
     std::uint8_t motor;
     TableRun run;

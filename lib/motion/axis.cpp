@@ -15,8 +15,7 @@ constexpr std::size_t kBlock = 64;
 
 double Axis::duration_ticks(std::int64_t steps, std::uint16_t floor) const {
   bushd_run run;
-  bushd_run_start(&run, table_, static_cast<std::uint32_t>(steps < 0 ? -steps : steps), 1,
-                  floor);
+  bushd_run_start(&run, table_, static_cast<std::uint32_t>(steps < 0 ? -steps : steps), 1, floor);
   const double ns = static_cast<double>(bushd_run_units_left(&run)) * table_->time_unit_ns;
   return std::ceil(ns / tick_ns_);
 }
@@ -64,8 +63,7 @@ bool Axis::change(Tick at) {
   change_ = Change{.at = at, .target_steps = {}, .floor = floor_};
   if (!stopping_) change_->target_steps = target_;
   plan_end();
-  const bool same_speed =
-      stopping_ || base_.run.cruise == std::max(table_->cruise, change_->floor);
+  const bool same_speed = stopping_ || base_.run.cruise == std::max(table_->cruise, change_->floor);
   if (planned_end_ != planned_end || !same_speed) return true;
   change_.reset();
   plan_end();
@@ -102,8 +100,7 @@ void Axis::take_change(Place& place) const {
     // What is left of the way after the running step.
     const std::int64_t way = (*change_->target_steps - from_) * run.direction;
     const std::int64_t after = way - static_cast<std::int64_t>(run.steps_done) - 1;
-    if (after >= 0 &&
-        bushd_run_retarget(&run, static_cast<std::uint32_t>(after), change_->floor)) {
+    if (after >= 0 && bushd_run_retarget(&run, static_cast<std::uint32_t>(after), change_->floor)) {
       return;
     }
   }

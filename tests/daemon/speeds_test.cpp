@@ -116,8 +116,9 @@ TEST(Speeds, AMotorThatMovesTakesAnotherSpeedWithItsTarget) {
 }
 
 TEST(Speeds, HomingKeepsToThem) {
-  Lab lab(lab_with("home = { direction = \"negative\", position_steps = 0, most_steps = 6000 }\n"
-                   "max_speed = 500\n"));
+  Lab lab(
+      lab_with("home = { direction = \"negative\", position_steps = 0, most_steps = 6000 }\n"
+               "max_speed = 500\n"));
   lab.bus(0).mcu(0).attach_switch(0, {.at_steps = -700, .hysteresis_steps = 4});
   lab.connect();
   const double begin_s = seconds(lab);

@@ -3,7 +3,8 @@
 //
 //   delay before step j of N = max(A(j-1), D(N-j), c);  step j falls at the sum of the first j
 //   delays; position at time t = steps whose time is <= t, in the fine format plus the elapsed
-//   share of the running delay, rounded down to 1/256 step. A floor is one more term of the maximum.
+//   share of the running delay, rounded down to 1/256 step. A floor is one more term of the
+//   maximum.
 //
 // Shares no code with lib/engine: sides are plain vectors, times are 128-bit counts of 1/256 ns.
 #pragma once
@@ -87,8 +88,8 @@ class Reference {
     if (law_.accel_at(a) == delay) ++a;
     for (size_t j = 1; j <= after; ++j) {
       const Wide least = j <= k ? std::min(Wide{floor}, law_.decel_at(k - j)) : Wide{floor};
-      append(std::max(
-          {law_.accel_at(a + j - 1), law_.decel_at(after - j), Wide{law_.cruise}, least}));
+      append(
+          std::max({law_.accel_at(a + j - 1), law_.decel_at(after - j), Wide{law_.cruise}, least}));
     }
     return true;
   }

@@ -258,12 +258,15 @@ TEST(RunState, RefusesJumpsInSpeed) {
   EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 1, 7, 3, 0})) << "to cruise from half way up";
   EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 3, 7, 1, 0})) << "from cruise to rest in one step";
   EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 3, 0, 1, 0})) << "from the top to rest in one step";
-  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 1, 0, 3, 0})) << "to decelerating codes not yet reached";
+  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 1, 0, 3, 0}))
+      << "to decelerating codes not yet reached";
   EXPECT_TRUE(taken({1, false, 0, 0, 35, 2, 3, 7, 3, 0}));
-  EXPECT_FALSE(taken({1, false, 0, 0, 45, 2, 3, 7, 3, 0})) << "a lead slower than what comes before";
+  EXPECT_FALSE(taken({1, false, 0, 0, 45, 2, 3, 7, 3, 0}))
+      << "a lead slower than what comes before";
   EXPECT_FALSE(taken({1, false, 0, 0, 45, 3, 3, 7, 3, 0})) << "from a slow lead to cruise";
   EXPECT_FALSE(taken({1, false, 0, 0, 20, 0, 3, 7, 3, 0})) << "from a fast lead to the foot";
-  EXPECT_FALSE(taken({1, false, 0, 0, 20, 0, 0, 0, 1, 0})) << "from a fast lead to rest in one step";
+  EXPECT_FALSE(taken({1, false, 0, 0, 20, 0, 0, 0, 1, 0}))
+      << "from a fast lead to rest in one step";
   EXPECT_FALSE(taken({1, false, 0, 0, 19, 0, 0, 0, 3, 0})) << "a lead faster than cruise";
   EXPECT_TRUE(taken({1, true, 19, 999, 0, 0, 0, 0, 0, 0}));
   EXPECT_FALSE(taken({1, true, 20, 0, 0, 0, 0, 0, 0, 0})) << "the step is over";

@@ -98,8 +98,7 @@ static bool expands_to(bushd_run* run, uint32_t tick_ns, bool fine, int16_t ramp
 
 static bool check_move(const move_vector* vector) {
   bushd_run run;
-  bushd_run_start(&run, vector->table, vector->steps, vector->direction,
-                  vector->floor);
+  bushd_run_start(&run, vector->table, vector->steps, vector->direction, vector->floor);
   return expands_to(&run, vector->tick_ns, vector->fine, vector->ramp_down_at_tick,
                     vector->displacements, vector->size) &&
          bushd_run_done(&run);
@@ -124,8 +123,7 @@ static bool same_state(const bushd_run_state* a, const bushd_run_state* b) {
 
 static bool check_run_state(const run_state_vector* vector) {
   bushd_run run;
-  bushd_run_start(&run, vector->table, vector->steps, vector->direction,
-                  vector->floor);
+  bushd_run_start(&run, vector->table, vector->steps, vector->direction, vector->floor);
   for (uint16_t n = 0; n <= vector->tick; ++n) {
     if (vector->ramp_down_at_tick == (int16_t)n) bushd_run_ramp_down(&run);
     if (n == vector->tick) break;
