@@ -10,8 +10,9 @@ function(bushd_target target)
     endforeach()
   endif()
   if(BUSHD_SANITIZE)
+    # With the pattern, a pointer that was never set fails at its first use, whatever the stack held.
     target_compile_options(${target} PRIVATE -fsanitize=${BUSHD_SANITIZE} -fno-sanitize-recover=all
-      -fno-omit-frame-pointer)
+      -fno-omit-frame-pointer -ftrivial-auto-var-init=pattern)
     target_link_options(${target} PUBLIC -fsanitize=${BUSHD_SANITIZE})
   endif()
 endfunction()

@@ -32,11 +32,11 @@ std::optional<Result<void>> Confirmation::follow(std::int64_t now_us, const Mcu*
   return fail("MCU " + installation[awaited_.front()].name() + " did not confirm it in time");
 }
 
-void Confirmation::answer(const Result<void>& ended) const {
-  asker_.answer(
-      ended ? api::Completed{.outcome = api::Outcome::kDone, .reason = "done", .detail = {}}
-            : api::Completed{
-                  .outcome = api::Outcome::kFault, .reason = ended.error().text(), .detail = {}});
+void Confirmation::answer(const Result<void>& ended, const std::string& done) const {
+  asker_.answer(ended ? api::Completed{.outcome = api::Outcome::kDone, .reason = done, .detail = {}}
+                      : api::Completed{.outcome = api::Outcome::kFault,
+                                       .reason = ended.error().text(),
+                                       .detail = {}});
 }
 
 }  // namespace bushd::daemon

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "api/session.h"
@@ -24,8 +25,8 @@ class Confirmation {
   std::optional<Result<void>> follow(std::int64_t now_us, const Mcu* reported,
                                      const Installation& installation, const Check& check);
   const api::Asker& asker() const { return asker_; }
-  // Tells who asked.
-  void answer(const Result<void>& ended) const;
+  // Tells who asked; `done` is the reason when all is well.
+  void answer(const Result<void>& ended, const std::string& done = "done") const;
 
  private:
   api::Asker asker_;

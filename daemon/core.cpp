@@ -102,7 +102,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::PositionCompare& r) { position_compare_.request(now, asker, r); },
                  [&](const api::ListTables& r) { outputs_.serve_tables(asker, r); },
                  [&](const api::GetTable& r) { outputs_.serve_tables(asker, r); },
-                 [&](const api::SetTable& r) { tables_.request(asker, r); },
+                 [&](const api::SetTable& r) { outputs_.serve_tables(asker, r); },
                  [&](const api::Confirm& r) { kept_.request(asker, r); },
                  [&](const api::GetHistory& r) { kept_.request(asker, r); },
              },
@@ -121,8 +121,13 @@ void Core::keep_up(std::int64_t now_us) {
   state_.step(now_us);
 }
 
+void Core::work() {
+  if (moves_.begins()) return moves_.work();
+  dry_runs_.work();
+}
+
 std::int64_t Core::next_wake_us() const {
-  if (!dry_runs_.idle()) return 0;
+  if (moves_.begins() || !dry_runs_.idle()) return 0;
   std::int64_t wake =
       std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us()});
   for (const BusId id : installation_.buses()) {

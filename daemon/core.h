@@ -59,11 +59,13 @@ class Core {
   }
   std::int64_t next_wake_us() const;
   // The two by themselves, for who listens to others in between: what motors and clients wait for,
-  // and one slice of dry runs, far less than a millisecond.
+  // and one slice of large moves or dry runs, far less than a millisecond.
   void keep_up(std::int64_t now_us);
-  void work() { dry_runs_.work(); }
+  void work();
+  // A large move is being begun in slices: requests that are no stops should wait.
+  bool begins_moves() const { return moves_.begins(); }
   // Units of work done so far in slices.
-  std::uint64_t units_of_work() const { return dry_runs_.units(); }
+  std::uint64_t units_of_work() const { return dry_runs_.units() + moves_.units(); }
 
   // Answers to what the outputs were asked, what the daemon has kept from before, and checks.
   TablesInService& tables() { return tables_; }

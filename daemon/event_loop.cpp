@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/epoll.h>
-#include <sys/resource.h>
 #include <systemd/sd-daemon.h>
 #include <systemd/sd-event.h>
 
@@ -14,9 +13,9 @@
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "config/port_pattern.h"
+#include "daemon/process.h"
 #include "daemon/request_log.h"
 #include "daemon/table_service.h"
 
@@ -25,36 +24,6 @@ namespace {
 
 constexpr std::size_t kMaxTableJobs = 64;  // anybody may ask for tables
 constexpr int kMaxTableJobsPerClient = 4;
-
-std::int64_t now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
-std::int64_t cpu_us() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return (usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) * 1'000'000 + usage.ru_utime.tv_usec +
-         usage.ru_stime.tv_usec;
-}
-
-std::int64_t unix_time_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
-// Another one in every run, and in every process on every machine as far as 63 bits go.
-std::int64_t new_run() {
-  std::random_device random;
-  const std::uint64_t number = std::uint64_t{random()} << 32 | random();
-  return static_cast<std::int64_t>(number >> 1 | 1u);
-}
-
-std::uint16_t master_number(std::int64_t run) {
-  return static_cast<std::uint16_t>(static_cast<std::uint64_t>(run) * 0x9E3779B97F4A7C15u >> 48);
-}
 
 std::string loop_text(int error) {
   return std::string("event loop: ") + std::strerror(-error);
@@ -94,7 +63,9 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
                   .commands = config.lcm.commands,
                   .run = run_,
                   .seed = static_cast<std::uint64_t>(run_)},
-                 reception_, publishing_, unix_time_us) {
+                 reception_, publishing_, unix_time_us),
+      lcm_watch_(lcm_front_, publishing_, config.lcm.prefix,
+                 [this](LogLevel level, const std::string& text) { log(level, text); }) {
   for ([[maybe_unused]] const config::Bus& bus : config.buses) ports_.add();
   if (store != nullptr) core_.kept().use(store->kept(), *this, config.state.required);
   publishing_.set_refresh([this] { core_.publish_state(now_us()); });
@@ -229,7 +200,7 @@ Result<void> EventLoop::run() {
     publishing_.set_dropped_messages(lcm_front_.dropped() +
                                      (socket_front_ ? socket_front_->dropped() : 0));
     core_.keep_up(now);
-    check_published();
+    lcm_watch_.step(now);
     tell_left_out(now);
     const bool done = core_.at_rest() && core_.settled();
     if (shut_down_by_us_ && (done || now >= *shut_down_by_us_)) break;
@@ -368,7 +339,7 @@ void EventLoop::keep_tables(std::uint64_t ticket, const std::vector<std::string>
 
 void EventLoop::carry_out_some() {
   const std::int64_t until = now_us() + Reception::kSliceUs;
-  while (!reception_.idle()) {
+  while (!reception_.idle() && !core_.begins_moves()) {
     reception_.carry_out_next();
     if (now_us() >= until) return;
   }
@@ -384,10 +355,13 @@ void EventLoop::serve_tables(const api::Asker& asker, const api::Request& reques
   ++table_jobs_[client];
   const auto* set = std::get_if<api::SetTable>(&request);
   if (set == nullptr) return post_table_job(asker, request);
-  // A table's sums are made there too; whether it suits the motors the core knows.
+  // A table's sums are made there too, and its codes are looked at; the core knows whose it is.
   worker_.post([this, asker, request, set = *set]() -> Worker::Completion {
-    return [this, asker, request, name = set.table, table = tables::make(set.content)] {
-      const auto good = table ? core_.tables().check_content(name, *table) : fail(table.error());
+    const auto review = tables::make(set.content).map([this](const tables::TablePtr& table) {
+      return TableReview(config_, table);
+    });
+    return [this, asker, request, name = set.table, review] {
+      const auto good = review ? core_.tables().check_content(name, *review) : fail(review.error());
       if (good) return post_table_job(asker, request);
       answer_table_job(asker, api::Refused{good.error().text()});
     };
@@ -439,18 +413,6 @@ void EventLoop::publish(McuId mcu, const api::Description& description) {
 
 void EventLoop::publish(BusId bus, const api::HealthSnapshot& health) {
   publishing_.publish(bus, health);
-}
-
-// Said once when it begins and once when it is over, not twenty times a second.
-void EventLoop::check_published() {
-  const std::string& trouble = lcm_front_.trouble();
-  if (mute_ == !trouble.empty()) return;
-  mute_ = !trouble.empty();
-  if (mute_) {
-    spdlog::error("LCM does not take messages: {}; clients there hear nothing", trouble);
-  } else {
-    spdlog::info("LCM takes messages again");
-  }
 }
 
 void EventLoop::move_log(const std::string& json_line) {

@@ -16,6 +16,7 @@
 #include "control/server.h"
 #include "daemon/core.h"
 #include "daemon/lcm_front.h"
+#include "daemon/lcm_watch.h"
 #include "daemon/log_limit.h"
 #include "daemon/move_log.h"
 #include "daemon/publishing.h"
@@ -92,7 +93,6 @@ class EventLoop : private Outputs, private state::Backend {
   void log_cpu_share() const;
   api::Asker with_log(const api::Asker& asker, const api::Request& request);
   void tell_left_out(std::int64_t now_us);
-  void check_published();
   // Positions are on the disk, and it is told that the daemon has ended well.
   void close_store();
 
@@ -129,7 +129,7 @@ class EventLoop : private Outputs, private state::Backend {
   LogLimit log_limit_;
   LogLimit stop_limit_;                // of stops in the log of moves
   std::uint64_t lost_move_lines_ = 0;  // since the log of moves could be written last
-  bool mute_ = false;                  // LCM takes nothing
+  LcmWatch lcm_watch_;
   sd_event* event_ = nullptr;
   std::vector<std::unique_ptr<Source>> sources_;  // those of ports aside
   std::int64_t started_us_ = 0;

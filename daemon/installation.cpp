@@ -45,7 +45,8 @@ motion::Axis* Bus::axis_of(link::McuIndex mcu, Output output) {
 }
 
 Result<void> Mcu::must_be_online() const {
-  if (online()) return {};
+  if (online() && view().outdated_us == 0) return {};
+  if (online()) return fail("MCU " + name() + " has not reported since this daemon stood still");
   return fail("MCU " + name() + " is offline: " + view().detail);
 }
 
@@ -107,7 +108,8 @@ void Installation::add_motors() {
             .emergency_stop_immediate = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,
             .emergency_input_immediate = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE,
             .coordinates = config.coordinates,
-            .soft_limits = config.soft_limits},
+            .soft_limits = config.soft_limits,
+            .max_speed = config.max_speed},
         new_axis({motors_.size()}));
     motor_by_name_[config.name] = id;
     mcus_[config.mcu].motor_at_[config.output.value] = id;

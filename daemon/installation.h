@@ -94,11 +94,11 @@ class Mcu {
     return master_.has_time_to_retarget(now_us, on_bus_);
   }
   void begin(Output output, link::Tick start) { master_.begin(on_bus_, output.value, start); }
-  void begin_table_run(Output output, link::Tick start, std::int32_t steps) {
-    master_.begin_table_run(on_bus_, output.value, start, steps);
+  void begin_table_run(Output output, link::Tick start, link::TableRun run) {
+    master_.begin_table_run(on_bus_, output.value, start, run);
   }
-  void follow_table_run(Output output, link::Tick start, std::int32_t steps) {
-    master_.follow_table_run(on_bus_, output.value, start, steps);
+  void follow_table_run(Output output, link::Tick start, link::TableRun run) {
+    master_.follow_table_run(on_bus_, output.value, start, run);
   }
   void replace(std::uint16_t outputs, link::Tick first) {
     master_.replace(on_bus_, outputs, first);

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "base/printable.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -38,6 +40,9 @@ LcmFront::LcmFront(Setup setup, Reception& reception, Publishing& publishing,
       sessions_(setup_.seed) {}
 
 Result<void> LcmFront::subscribe() {
+  const auto listening = setup_.transport.subscribe_bytes(
+      setup_.prefix + "_DESCRIPTION", [this](lcm::Payload payload) { on_description(payload); });
+  if (!listening) return listening;
   if (!setup_.commands) return {};
   for (const std::string_view channel : lcm::client_channels()) {
     if (channel == "SUBSCRIBE") continue;  // all hear everything here
@@ -78,6 +83,15 @@ void LcmFront::on_message(std::string_view channel, lcm::Payload payload) {
     answer(message->id, false,
            api::Completed{.outcome = api::Outcome::kDone, .reason = "published", .detail = {}});
   }
+}
+
+// Its own come back to it, as to all.
+void LcmFront::on_description(lcm::Payload payload) {
+  const auto message = lcm::decode_daemon_message("DESCRIPTION", payload);
+  const auto* of = message ? std::get_if<lcm::DescriptionMessage>(&*message) : nullptr;
+  if (of == nullptr || of->part.run == setup_.run) return;
+  ++others_heard_;
+  other_bus_ = printable(of->snapshot.bus);
 }
 
 void LcmFront::on_request(const lcm::RequestId& id, const api::Request& request,

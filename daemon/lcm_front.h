@@ -35,11 +35,15 @@ class LcmFront : public Listener {
   std::uint64_t dropped() const;
   // Whether LCM took the last message; why not.
   const std::string& trouble() const { return trouble_; }
+  // Messages of daemons that are not this one, and a bus of the one heard last.
+  std::uint64_t others_heard() const { return others_heard_; }
+  const std::string& other_bus() const { return other_bus_; }
 
  private:
   class LcmSession;
 
   void on_message(std::string_view channel, lcm::Payload payload);
+  void on_description(lcm::Payload payload);
   void on_request(const lcm::RequestId& id, const api::Request& request, std::size_t bytes);
   void answer(const lcm::RequestId& id, bool record, const api::Reply& reply);
   void publish(const lcm::Packet& packet);
@@ -51,6 +55,8 @@ class LcmFront : public Listener {
   api::Sessions sessions_;
   std::uint64_t dropped_ = 0;
   std::string trouble_;
+  std::uint64_t others_heard_ = 0;
+  std::string other_bus_;
 };
 
 }  // namespace bushd::daemon

@@ -42,6 +42,7 @@ void block_signals() {
   sigaddset(&set, SIGUSR2);
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // write() tells it
 }
 
 // The default limit of 1024 is less than the connections that the control socket may have.

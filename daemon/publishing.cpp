@@ -41,7 +41,9 @@ void Publishing::send(Topic topic, Slot<Snapshot>& slot, Result<lcm::Packet> pac
   for (Listener* listener : listeners_) listener->hear(topic, *slot.packet);
 }
 
-void Publishing::publish(McuId mcu, const api::StateSnapshot& state) {
+void Publishing::publish(McuId mcu, const api::StateSnapshot& of_core) {
+  api::StateSnapshot state = of_core;
+  if (state.detail.empty()) state.detail = trouble_;
   auto& slot = states_[mcu.value];
   const bool changed = !slot.snapshot || !same(*slot.snapshot, state) || slot.dropped != dropped_;
   const bool due = clocks_.now_us() - slot.sent_us >= kRestingPeriodUs;

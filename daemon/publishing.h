@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -41,6 +42,8 @@ class Publishing : public api::Publisher {
   void add(Listener& listener) { listeners_.push_back(&listener); }
   void set_refresh(Refresh refresh) { refresh_ = std::move(refresh); }
   void set_dropped_messages(std::uint64_t count) { dropped_ = static_cast<std::int64_t>(count); }
+  // Stands in the `detail` of every MCU that has nothing of its own there; "": nothing does.
+  void set_trouble(std::string text) { trouble_ = std::move(text); }
 
   // The core may publish as often as it likes: a state that has not changed is passed on when its
   // period is over.
@@ -75,6 +78,7 @@ class Publishing : public api::Publisher {
   std::vector<Slot<api::HealthSnapshot>> healths_;  // by bus
   std::int64_t sequence_ = 0;
   std::int64_t dropped_ = 0;
+  std::string trouble_;
   std::int64_t newest_sent_us_ = INT64_MIN / 2;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "motion/report_words.h"
 
@@ -54,30 +55,47 @@ void Drivers::request(std::int64_t now_us, const api::Asker& asker,
 
 void Drivers::begin(std::int64_t now_us, const api::Asker& asker, const api::MotorNames& names,
                     std::uint8_t action) {
-  const auto mcus = mcus_of(names, action != BUSHD_CONTROL_ENABLE);
-  if (!mcus) return asker.answer(api::Refused{mcus.error().text()});
+  const auto targets = targets_of(names);
+  if (!targets) return asker.answer(api::Refused{targets.error().text()});
+  if (const auto may_do = may(action, targets->mcus); !may_do) {
+    return asker.answer(api::Refused{may_do.error().text()});
+  }
   if (open_.size() >= kMaxOpen) {
     return asker.answer(api::Refused{std::to_string(open_.size()) +
                                      " requests about drivers and faults wait for their MCUs "
                                      "already; try again in a moment"});
   }
-  open_.push_back({Confirmation(asker, *mcus, now_us), action});
-  for (const McuId mcu : *mcus) installation_[mcu].control(action);
+  std::string done = "done";
+  if (!targets->out_of_reach.empty()) done += "; not online, so not done there:";
+  for (const McuId mcu : targets->out_of_reach) done += " " + installation_[mcu].name();
+  open_.push_back({Confirmation(asker, targets->mcus, now_us), action, std::move(done)});
+  for (const McuId mcu : targets->mcus) installation_[mcu].control(action);
 }
 
-Result<std::vector<McuId>> Drivers::mcus_of(const api::MotorNames& names, bool at_rest_only) const {
+Result<Drivers::Targets> Drivers::targets_of(const api::MotorNames& names) const {
   const auto motors = installation_.find_or_all(names);
   if (!motors) return fail(motors.error());
-  const std::vector<McuId> mcus = installation_.mcus_of(*motors);
+  Targets targets;
+  for (const McuId id : installation_.mcus_of(*motors)) {
+    const auto online = installation_[id].must_be_online();
+    if (!online && !names.empty()) return fail(online.error());
+    (online ? targets.mcus : targets.out_of_reach).push_back(id);
+  }
+  if (targets.mcus.empty()) {
+    return fail(installation_[targets.out_of_reach.front()].must_be_online().error());
+  }
+  return targets;
+}
+
+Result<void> Drivers::may(std::uint8_t action, const std::vector<McuId>& mcus) const {
+  if (action == BUSHD_CONTROL_ENABLE) return {};
   for (const McuId id : mcus) {
-    const Mcu& mcu = installation_[id];
-    if (const auto online = mcu.must_be_online(); !online) return fail(online.error());
-    for (const MotorId motor : mcu.motors()) {
-      if (!at_rest_only || installation_[motor].is<motion::Resting>()) continue;
+    for (const MotorId motor : installation_[id].motors()) {
+      if (installation_[motor].is<motion::Resting>()) continue;
       return fail(installation_[motor].busy_text() + "; stop it first");
     }
   }
-  return mcus;
+  return {};
 }
 
 bool Drivers::being_disabled(McuId mcu) const {
@@ -93,7 +111,7 @@ void Drivers::follow(std::int64_t now_us, const Mcu* reported) {
         [&](const Mcu& mcu) { return check(operation.action, mcu.report()); });
     if (!ended) return false;
     installation_.changed = true;
-    operation.confirmation.answer(*ended);
+    operation.confirmation.answer(*ended, operation.done);
     return true;
   });
 }

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <string>
+#include <vector>
 
 #include "daemon/confirmation.h"
 #include "daemon/interlocks.h"
@@ -27,10 +29,16 @@ class Drivers final : public Service {
   struct Operation {
     Confirmation confirmation;
     std::uint8_t action;  // BUSHD_CONTROL_*
+    std::string done;     // what it is when all of these have confirmed it
+  };
+  struct Targets {
+    std::vector<McuId> mcus{};
+    std::vector<McuId> out_of_reach{};  // of all; those that are named have to be in reach
   };
   void begin(std::int64_t now_us, const api::Asker& asker, const api::MotorNames& names,
              std::uint8_t action);
-  Result<std::vector<McuId>> mcus_of(const api::MotorNames& names, bool at_rest_only) const;
+  Result<Targets> targets_of(const api::MotorNames& names) const;
+  Result<void> may(std::uint8_t action, const std::vector<McuId>& mcus) const;
   bool being_disabled(McuId mcu) const;
   void follow(std::int64_t now_us, const Mcu* reported);
 

@@ -11,8 +11,9 @@ namespace {
 
 constexpr std::uint64_t kMaxFrames = 3000;
 
-api::MovePlan::Motor plan_of(const std::string& name, const bushd_table& table,
-                             std::int64_t steps) {
+api::MovePlan::Motor plan_of(const std::string& name, bushd_table table, std::int64_t steps,
+                             std::uint16_t floor) {
+  table.cruise = std::max(table.cruise, floor);  // the same move (engine/run.h)
   const auto time = tables::move_time(table, static_cast<std::uint32_t>(std::abs(steps)));
   return {
       .motor = name,
@@ -32,7 +33,7 @@ motion::Axis* DryRun::Bus::axis_of(link::McuIndex mcu, Output output) {
 DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                const std::vector<Part>& parts) {
   motors_.reserve(parts.size());
-  for (const auto& [id, steps] : parts) {
+  for (const auto& [id, steps, floor] : parts) {
     const motion::Motor& motor = installation[id];
     const Mcu& mcu = installation.mcu_of(id);
     const config::Bus& bus = installation.bus_of(mcu).config;
@@ -42,6 +43,7 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                        .output = motor.output(),
                        .from_steps = motor.position_steps(),
                        .steps = steps,
+                       .floor = floor,
                        .start = mcu.earliest_start(now_us, motor.output()),
                        .by_table = installation.by_table(mcu, steps),
                        .tick_ns = bus.tick_ns(),
@@ -65,17 +67,19 @@ bool DryRun::step() {
 }
 
 void DryRun::plan_motor(const Motor& motor) {
-  plan_.motors.push_back(plan_of(motor.name, motor.table->view(), motor.steps));
+  plan_.motors.push_back(plan_of(motor.name, motor.table->view(), motor.steps, motor.floor));
   if (motor.steps == 0) return;
   motion::Axis axis(motor.table->view(), motor.tick_ns, motor.format);
-  axis.start(motor.from_steps, motor.steps, motor.start);
+  axis.start(motor.from_steps, motor.steps, motor.start, 0, motor.floor);
   const link::Tick ticks = axis.end_tick() - motor.start;
   plan_.ticks = std::max(plan_.ticks, ticks);
   plan_.duration_us = std::max(plan_.duration_us, ticks * motor.tick_ns / 1000);
   Bus& bus = buses_.at(motor.bus);
   bus.axes.emplace(std::pair{motor.mcu, motor.output}, axis);
   link::PlannedMove move{motor.mcu, motor.output.value, motor.start, {}};
-  if (motor.by_table) move.run_steps = static_cast<std::int32_t>(motor.steps);
+  if (motor.by_table) {
+    move.run = link::TableRun{static_cast<std::int32_t>(motor.steps), motor.floor};
+  }
   bus.moves.push_back(move);
 }
 

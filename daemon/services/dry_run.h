@@ -24,6 +24,7 @@ class DryRun {
   struct Part {
     MotorId motor;  // at rest
     std::int64_t steps;
+    std::uint16_t floor;
   };
   // `installation` outlives it, and may change meanwhile.
   DryRun(const Installation& installation, std::int64_t now_us, const std::vector<Part>& parts);
@@ -43,6 +44,7 @@ class DryRun {
     Output output;
     std::int64_t from_steps;
     std::int64_t steps;
+    std::uint16_t floor;
     link::Tick start;
     bool by_table;
     std::uint32_t tick_ns;

@@ -76,7 +76,7 @@ void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
   open_.open(asker, *motors, "home");
-  for (const MotorId motor : *motors) add(motor);
+  for (const MotorId motor : *motors) add({motor, *floor_of(motor, request.speed)});
 }
 
 Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) const {
@@ -87,6 +87,7 @@ Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) co
     if (const auto may = may_home(motor); !may) {
       return fail(installation_[motor].name() + ": " + may.error().text());
     }
+    if (const auto floor = floor_of(motor, request.speed); !floor) return fail(floor.error());
   }
   return motors;
 }
@@ -104,11 +105,19 @@ Result<void> HomingQueue::may_home(MotorId id) const {
               " cannot home; find out where it stands and run 'bushctl set NAME STEPS'");
 }
 
-bushd_home HomingQueue::message_for(MotorId id) const {
+Result<std::uint16_t> HomingQueue::floor_of(MotorId id,
+                                            const std::optional<api::Speed>& speed) const {
+  auto floor = installation_[id].floor_at(speed);
+  if (!floor) return fail(installation_[id].name() + ": " + floor.error().message);
+  return floor;
+}
+
+bushd_home HomingQueue::message_for(const Task& task) const {
+  const MotorId id = task.motor;
   const config::Motor& motor = installation_.config()[id];
   const config::Home& home = *motor.home;
   const bushd_table& table = installation_.table_of(id)->view();
-  const std::uint64_t first = std::max(table.accel.code[0], table.decel.code[0]);
+  const std::uint64_t first = std::max({table.accel.code[0], table.decel.code[0], task.floor});
   const std::uint64_t slow_ns = std::max<std::uint64_t>(
       {first * table.time_unit_ns, installation_.config().bus_of(motor).tick_ns(),
        1'000'000'000u / home.slow_steps_per_s});
@@ -116,20 +125,21 @@ bushd_home HomingQueue::message_for(MotorId id) const {
   return {.motor = motor.output.value,
           .direction = static_cast<std::int8_t>(home.positive ? 1 : -1),
           .most_steps = home.most_steps,
+          .floor = task.floor,
           .slow_steps = home.slow_most_steps.value_or(table.decel.count + kMoreSlowSteps),
           .slow_delay = static_cast<std::uint16_t>(std::min<std::uint64_t>(units, UINT16_MAX)),
           .position_steps = home.position_steps};
 }
 
 bool HomingQueue::empty() const {
-  return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.motors.empty(); });
+  return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.tasks.empty(); });
 }
 
-void HomingQueue::add(MotorId motor) {
-  Mcu& mcu = installation_.mcu_of(motor);
-  installation_[motor].home();
-  queues_[mcu.id].motors.push_back(motor);
-  if (queues_[mcu.id].motors.size() == 1) begin(mcu);
+void HomingQueue::add(const Task& task) {
+  Mcu& mcu = installation_.mcu_of(task.motor);
+  installation_[task.motor].home();
+  queues_[mcu.id].tasks.push_back(task);
+  if (queues_[mcu.id].tasks.size() == 1) begin(mcu);
   installation_.changed = true;
 }
 
@@ -137,14 +147,14 @@ void HomingQueue::add(MotorId motor) {
 void HomingQueue::begin(Mcu& mcu) {
   Queue& queue = queues_[mcu.id];
   queue.asked = !kept_.keeps();
-  if (queue.asked) mcu.home(message_for(queue.motors.front()));
+  if (queue.asked) mcu.home(message_for(queue.tasks.front()));
 }
 
 void HomingQueue::step(std::int64_t now_us) {
   for (const McuId id : installation_.mcus()) {
     Queue& queue = queues_[id];
-    if (queue.asked || queue.motors.empty()) continue;
-    const MotorId motor = queue.motors.front();
+    if (queue.asked || queue.tasks.empty()) continue;
+    const MotorId motor = queue.tasks.front().motor;
     const auto ready = kept_.make_ready(now_us, motor);
     if (ready && !*ready) continue;
     kept_.not_wanted(motor);
@@ -152,15 +162,15 @@ void HomingQueue::step(std::int64_t now_us) {
       end(installation_[id], Outcome::kFault, ready.error().text());
     } else {
       queue.asked = true;
-      installation_[id].home(message_for(motor));
+      installation_[id].home(message_for(queue.tasks.front()));
     }
   }
 }
 
 void HomingQueue::reports(std::int64_t, Mcu& mcu) {
   const Queue& queue = queues_[mcu.id];
-  if (queue.motors.empty() || !queue.asked || mcu.busy()) return;
-  const unsigned output = installation_[queue.motors.front()].output().value;
+  if (queue.tasks.empty() || !queue.asked || mcu.busy()) return;
+  const unsigned output = installation_[queue.tasks.front().motor].output().value;
   if (((mcu.report().autonomous | mcu.report().moving) >> output & 1) != 0) return;
   const Ending ending = ending_of(mcu.report(), mcu.name());
   end(mcu, ending.outcome, ending.reason);
@@ -168,18 +178,18 @@ void HomingQueue::reports(std::int64_t, Mcu& mcu) {
 
 void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   Queue& queue = queues_[mcu.id];
-  const MotorId id = queue.motors.front();
-  queue.motors.pop_front();
+  const MotorId id = queue.tasks.front().motor;
+  queue.tasks.pop_front();
   motion::Motor& motor = installation_[id];
   motor.end_homing(outcome == Outcome::kReached);
   outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning,
                motor.name() + ": " + reason);
   open_.end(id, outcome, reason);
-  if (!queue.motors.empty()) begin(mcu);
+  if (!queue.tasks.empty()) begin(mcu);
 }
 
 void HomingQueue::goes_offline(Mcu& mcu, const std::string& cause) {
-  for (const MotorId motor : std::exchange(queues_[mcu.id], {}).motors) {
+  for (const auto& [motor, floor] : std::exchange(queues_[mcu.id], {}).tasks) {
     kept_.not_wanted(motor);
     installation_[motor].end_homing(false);
     open_.end(motor, Outcome::kLink, cause + "; it was being homed");
@@ -187,7 +197,7 @@ void HomingQueue::goes_offline(Mcu& mcu, const std::string& cause) {
 }
 
 void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
-  if (type != BUSHD_MSG_HOME || queues_[mcu.id].motors.empty()) return;
+  if (type != BUSHD_MSG_HOME || queues_[mcu.id].tasks.empty()) return;
   end(mcu, Outcome::kFault,
       "MCU " + mcu.name() + " refused to home it: " + bushd_status_text(status) + "; " +
           remedy_of(status));
@@ -195,10 +205,11 @@ void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
 
 bool HomingQueue::end_if_waiting(MotorId motor) {
   Queue& queue = queues_[installation_.config()[motor].mcu];
-  const bool first = !queue.motors.empty() && queue.motors.front() == motor;
-  if ((first && queue.asked) || std::erase(queue.motors, motor) == 0) return false;
+  const auto is_motor = [motor](const Task& task) { return task.motor == motor; };
+  const bool first = !queue.tasks.empty() && is_motor(queue.tasks.front());
+  if ((first && queue.asked) || std::erase_if(queue.tasks, is_motor) == 0) return false;
   kept_.not_wanted(motor);
-  if (first && !queue.motors.empty()) begin(installation_.mcu_of(motor));
+  if (first && !queue.tasks.empty()) begin(installation_.mcu_of(motor));
   installation_[motor].end_homing(false);
   open_.end(motor, Outcome::kStopped, "stopped before it was its turn to be homed");
   return true;
@@ -210,7 +221,7 @@ void HomingQueue::end_waiting() {
 
 void HomingQueue::stop(MotorId motor) {
   if (!installation_[motor].is<motion::Homing>() || end_if_waiting(motor)) return;
-  bushd_home give_up = message_for(motor);
+  bushd_home give_up = message_for({motor, 0});
   give_up.most_steps = 0;
   installation_.mcu_of(motor).home(give_up);
 }
@@ -222,11 +233,12 @@ void HomingQueue::goes_online(Mcu& mcu) {
     const motion::Motor& motor = installation_[id];
     const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
     if (!home || !home->at_start || (homed && !motor.uncertain_reason())) continue;
-    if (const auto may = may_home(id); !may) {
+    const auto floor = motor.floor_at({});
+    if (const auto may = floor ? may_home(id) : fail(floor.error()); !may) {
       outputs_.log(LogLevel::kWarning, motor.name() + " is not homed: " + may.error().text());
       continue;
     }
-    add(id);
+    add({id, *floor});
   }
 }
 

@@ -36,15 +36,20 @@ class HomingQueue final : public Service {
   void step(std::int64_t now_us) override;
 
  private:
+  struct Task {
+    MotorId motor;
+    std::uint16_t floor;  // of the fast approach
+  };
   struct Queue {
-    std::deque<MotorId> motors;
+    std::deque<Task> tasks;
     bool asked = false;  // the MCU homes the first; the others wait
   };
 
   Result<std::vector<MotorId>> motors_of(const api::Home& request) const;
   Result<void> may_home(MotorId motor) const;
-  bushd_home message_for(MotorId motor) const;  // precondition: it has a home
-  void add(MotorId motor);
+  Result<std::uint16_t> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
+  bushd_home message_for(const Task& task) const;  // precondition: its motor has a home
+  void add(const Task& task);
   void begin(Mcu& mcu);
   bool end_if_waiting(MotorId motor);
   void end(Mcu& mcu, api::Outcome outcome, const std::string& reason);

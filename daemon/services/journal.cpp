@@ -41,6 +41,7 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
                          {"steps", steps},
                          {"from_steps", motor.axis().from_steps()}};
   if (late_ns != 0) line["late_ns"] = late_ns;
+  if (motor.axis().floor() != 0) line["floor"] = motor.axis().floor();
   if (const bushd_emission& emission = mcu.config.emission.settings;
       emission.mode != BUSHD_EMISSION_EVEN) {
     line["emission"] = fieldbus::kEmissionNames.at(emission.mode);
@@ -60,6 +61,7 @@ void Journal::changed(MotorId motor, const motion::Change& change) {
                          {"motor", installation_[motor].name()},
                          {"tick", change.at}};
   if (change.target_steps) line["target_steps"] = *change.target_steps;
+  if (change.target_steps && change.floor != 0) line["floor"] = change.floor;
   outputs_.move_log(line.dump());
 }
 

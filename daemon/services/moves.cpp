@@ -10,10 +10,13 @@ namespace bushd::daemon {
 namespace {
 
 constexpr std::int64_t kMaxPosition = motion::Motor::kMaxPosition;
+// From one slice to the next, with what is done in between; for the common start of all motors.
+constexpr std::int64_t kSliceUs = 2'000;
 
 }  // namespace
 
 void Moves::request(std::int64_t now_us, const api::Asker& asker, const api::Move& move) {
+  while (begins()) begin_next();  // of a caller that does not let it wait
   const auto parts = parts_of(move);
   if (!parts) return asker.answer(api::Refused{parts.error().text()});
   if (!move.dry_run) return start(now_us, asker, *parts);
@@ -23,7 +26,7 @@ void Moves::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
     if (motor.has_plan()) {
       return asker.answer(api::Refused{motor.name() + " moves; a dry run is of moves from rest"});
     }
-    planned.push_back({part.motor, part.target - motor.position_steps()});
+    planned.push_back({part.motor, part.target - motor.position_steps(), part.floor});
   }
   dry_runs_.request(now_us, asker, planned);
 }
@@ -34,15 +37,24 @@ Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   std::vector<Part> parts;
   for (std::size_t i = 0; i < motors->size(); ++i) {
-    const auto target = target_of((*motors)[i], move.motors[i].amount, move.kind);
+    const auto floor = floor_of((*motors)[i], move.speed);
+    if (!floor) return fail(floor.error());
+    const auto target = target_of((*motors)[i], move.motors[i].amount, move.kind, *floor);
     if (!target) return fail(target.error());
-    parts.push_back({(*motors)[i], *target});
+    parts.push_back({(*motors)[i], *target, *floor});
   }
   return parts;
 }
 
-Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount,
-                                      api::Move::Kind kind) const {
+Result<std::uint16_t> Moves::floor_of(MotorId id, const std::optional<api::Speed>& speed) const {
+  const motion::Motor& motor = installation_[id];
+  auto floor = motor.floor_at(speed);
+  if (!floor) return fail(motor.name() + ": " + floor.error().message);
+  return floor;
+}
+
+Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount, api::Move::Kind kind,
+                                      std::uint16_t floor) const {
   const motion::Motor& motor = installation_[id];
   const bool absolute = kind == api::Move::Kind::kAbsolute;
   const auto counted = absolute ? motor.steps_of_position(amount) : motor.steps_of_distance(amount);
@@ -55,7 +67,7 @@ Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount,
   }
   const std::int64_t from = absolute ? 0 : motor.target_steps();
   auto may = interlocks_.may_move(id);
-  if (may) may = motor.may_move_to(from + steps);
+  if (may) may = motor.may_move_to(from + steps, floor);
   if (!may) return fail(motor.name() + ": " + may.error().text());
   return from + steps;
 }
@@ -77,18 +89,46 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
     motion::Tick& common = start.try_emplace(mcu.config.bus, earliest).first->second;
     common = std::max(common, earliest);
   }
+  const std::size_t slices = (parts.size() - moving.size()) / kBeginsPerSlice;
+  for (auto& [bus, tick] : start) {
+    tick += static_cast<motion::Tick>(slices) * kSliceUs / installation_[bus].config.tick_us;
+  }
   asker.answer(api::Accepted{});
   for (const MotorId motor : moving) take_over(motor, asker);
   open_.open(asker, motors);
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
     if (motor.has_plan()) {
-      motor.aim(part.target);
+      motor.aim(part.target, part.floor);
     } else {
-      start_run(part.motor, part.target, start[installation_.mcu_of(part.motor).config.bus]);
+      motor.start(part.target, start[installation_.mcu_of(part.motor).config.bus], part.floor);
+      unbegun_.insert(part.motor);
+      to_begin_.push_back(part.motor);
     }
   }
+  if (unbegun_.size() <= kBeginsPerSlice) work();
   retarget(now_us, moving);
+}
+
+void Moves::work() {
+  for (unsigned i = 0; i < kBeginsPerSlice && begins(); ++i) begin_next();
+}
+
+void Moves::begin_next() {
+  const MotorId next = to_begin_.front();
+  to_begin_.pop_front();
+  ++units_;
+  if (!unbegun_.contains(next)) return;
+  if (const auto may = interlocks_.may_move(); !may) {
+    return cancel(next, "not begun, because " + may.error().text());
+  }
+  unbegun_.erase(next);
+  begin(next);
+}
+
+// Nobody has been told of it, nor does the log of moves know of it.
+void Moves::cancel(MotorId motor, const std::string& reason) {
+  end(motor, *installation_[motor].end(api::Outcome::kStopped, reason));
 }
 
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
@@ -97,17 +137,23 @@ void Moves::take_over(MotorId motor, const api::Asker& by) {
             "was given a new target by " + text_of(by) + "; it moves on");
 }
 
-void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start) {
+void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, std::uint16_t floor) {
+  installation_[id].start(target, start, floor);
+  begin(id);
+}
+
+void Moves::begin(MotorId id) {
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);
-  const std::int64_t steps = target - motor.position_steps();
+  const motion::Tick start = motor.axis().start_tick();
+  const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
   const bool by_table = installation_.by_table(mcu, steps);
-  motor.start(target, start);
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));
   } else if (by_table) {
-    mcu.begin_table_run(motor.output(), start, static_cast<std::int32_t>(steps));
+    mcu.begin_table_run(motor.output(), start,
+                        {static_cast<std::int32_t>(steps), motor.axis().floor()});
   } else {
     mcu.begin(motor.output(), start);
   }
@@ -118,6 +164,10 @@ void Moves::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
   std::vector<MotorId> changed;
   std::vector<MotorId> armed;
   for (const MotorId id : motors) {
+    if (unbegun_.contains(id)) {
+      cancel(id, "stopped before it began");
+      continue;
+    }
     motion::Motor& motor = installation_[id];
     motor.stop();
     if (motor.is<motion::Armed>()) armed.push_back(id);
@@ -194,10 +244,12 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
     if (!std::holds_alternative<motion::event::Executed>(event)) installation_.changed = true;
     std::visit(
         Overloaded{
+            [](const motion::event::Waits&) {},
             [&](const motion::event::Started& started) {
               journal_.started(id, started.steps, started.start, started.late_ns, true);
-              mcu.follow_table_run(motor.output(), started.start,
-                                   static_cast<std::int32_t>(started.steps));
+              mcu.follow_table_run(
+                  motor.output(), started.start,
+                  {static_cast<std::int32_t>(started.steps), motor.axis().floor()});
             },
             [&](const motion::event::Executed& executed) { journal_.changed(id, executed.change); },
             [&](const motion::event::Replan&) {
@@ -211,8 +263,8 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             },
             [&](const motion::event::Turn&) {
               journal_.ended(id, "turned");
-              start_run(id, motor.axis().target_steps(),
-                        mcu.earliest_start(now_us, motor.output()));
+              start_run(id, motor.axis().target_steps(), mcu.earliest_start(now_us, motor.output()),
+                        motor.axis().floor());
             },
             [&](const motion::event::Ended& ended) { end(id, ended); }},
         event);
@@ -221,10 +273,11 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
 
 void Moves::end(MotorId id, const motion::event::Ended& ended) {
   const motion::Motor& motor = installation_[id];
-  installation_.mcu_of(id).drop(motor.output());
+  const bool begun = unbegun_.erase(id) == 0;
+  if (begun) installation_.mcu_of(id).drop(motor.output());
   if (ended.was_armed) {
     cancel_armed_group(id);
-  } else {  // the log of moves knows nothing of one that has not started
+  } else if (begun) {  // the log of moves knows nothing of one that has not started
     journal_.ended(id, api::word(ended.outcome));
   }
   const bool planned =

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <set>
 #include <string>
 #include <vector>
@@ -18,6 +19,10 @@ namespace bushd::daemon {
 
 class Moves final : public Service {
  public:
+  // To begin a motor's move takes some microseconds, its line for the log of moves above all. So a
+  // move of more motors than this is begun in slices of as many.
+  static constexpr unsigned kBeginsPerSlice = 32;
+
   Moves(Installation& installation, const Interlocks& interlocks, Journal& journal,
         OpenMoves& open_moves, DryRuns& dry_runs, Outputs& outputs)
       : installation_(installation),
@@ -31,8 +36,10 @@ class Moves final : public Service {
 
   // Checks where a motor of a request may go, "NAME: WHY" if not. `by` counts from where it stands,
   // or from its present target.
-  Result<std::int64_t> target_of(MotorId motor, const api::Amount& amount,
-                                 api::Move::Kind kind) const;
+  Result<std::int64_t> target_of(MotorId motor, const api::Amount& amount, api::Move::Kind kind,
+                                 std::uint16_t floor) const;
+  // motion::Motor::floor_at, "NAME: WHY" if there is none.
+  Result<std::uint16_t> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
 
   // Ramps down those that move; those that wait for the trigger wait no more.
   void stop(std::int64_t now_us, const std::vector<MotorId>& motors);
@@ -42,6 +49,14 @@ class Moves final : public Service {
   // What follows from a report of a motor.
   void take(std::int64_t now_us, MotorId motor, const std::vector<motion::Event>& events);
   void end(MotorId motor, const motion::event::Ended& ended);
+
+  // A move that has been accepted is not yet begun by all of its motors. Until then requests that
+  // are no stops should wait.
+  bool begins() const { return !to_begin_.empty(); }
+  // One slice of that.
+  void work();
+  // Motors' moves begun so far.
+  std::uint64_t units() const { return units_; }
 
   // When all that moves now will have come to rest, as planned.
   std::int64_t rest_by_us(std::int64_t now_us) const;
@@ -53,12 +68,17 @@ class Moves final : public Service {
   struct Part {
     MotorId motor;
     std::int64_t target;
+    std::uint16_t floor;
   };
   Result<std::vector<Part>> parts_of(const api::Move& move) const;
   void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);
   void take_over(MotorId motor, const api::Asker& by);
   // From rest; the motor is part of an open move.
-  void start_run(MotorId motor, std::int64_t target, motion::Tick start);
+  void start_run(MotorId motor, std::int64_t target, motion::Tick start, std::uint16_t floor);
+  // Its plan is made: it is logged, and its MCU gets it.
+  void begin(MotorId motor);
+  void begin_next();
+  void cancel(MotorId motor, const std::string& reason);
   // Motors with another target: as soon as the line has time for it, and to the newest one only.
   void retarget(std::int64_t now_us, const std::vector<MotorId>& motors);
   void disarm(const std::vector<MotorId>& motors);
@@ -71,6 +91,9 @@ class Moves final : public Service {
   DryRuns& dry_runs_;
   Outputs& outputs_;
   std::set<MotorId> to_retarget_;  // waiting for the line
+  std::set<MotorId> unbegun_;      // planned, and nobody has been told yet
+  std::deque<MotorId> to_begin_;   // these, in their order, and some that were cancelled
+  std::uint64_t units_ = 0;
 };
 
 }  // namespace bushd::daemon

@@ -11,7 +11,8 @@ namespace {
 
 api::McuState state_word(const link::McuView& view) {
   if (view.phase == link::McuPhase::kOffline) return api::McuState::kOffline;
-  if (view.phase == link::McuPhase::kConnecting) return api::McuState::kBusy;
+  if (view.phase == link::McuPhase::kConnecting || view.outdated_us > 0)
+    return api::McuState::kBusy;
   switch (view.report.state) {
     case BUSHD_STATE_READY:
       return api::McuState::kReady;
@@ -26,6 +27,7 @@ api::McuState state_word(const link::McuView& view) {
 
 std::string detail_of(const link::McuView& view, bool two_masters) {
   if (view.phase != link::McuPhase::kOnline) return view.detail;
+  if (view.outdated_us > 0) return "has not reported since this daemon stood still";
   if (view.report.faults != 0) return motion::fault_text(view.report);
   if (two_masters) return "another master talks on the line";
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) return "drivers disabled";
@@ -34,7 +36,9 @@ std::string detail_of(const link::McuView& view, bool two_masters) {
 
 api::Activity activity_of(const motion::Motor& motor) {
   if (motor.is<motion::Moving>()) return api::Activity::kMoving;
-  if (motor.is<motion::Armed>()) return api::Activity::kArmed;
+  if (const auto* armed = motor.as<motion::Armed>()) {
+    return armed->confirmed ? api::Activity::kArmed : api::Activity::kArming;
+  }
   if (motor.is<motion::Homing>()) return api::Activity::kHoming;
   return motor.is<motion::Local>() ? api::Activity::kLocal : api::Activity::kResting;
 }
@@ -87,12 +91,14 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   state.user_target = motor.coordinates().user_of(motor.target_steps());
   state.velocity_steps_per_s = motor.velocity_steps_per_s();
   state.activity = activity_of(motor);
-  // Motors follow reports only once their MCU is online.
+  // Motors follow reports only once their MCU is online; and one that another master moves may not
+  // have made its first step.
+  const bool by_other = installation_.bus_of(mcu).two_masters && reports(view.report.moving);
+  if (state.activity == api::Activity::kResting && by_other) state.activity = api::Activity::kLocal;
   if (view.phase == link::McuPhase::kConnecting && reports(view.report.autonomous)) {
     state.activity = api::Activity::kLocal;
   }
-  state.moving =
-      state.activity != api::Activity::kResting && state.activity != api::Activity::kArmed;
+  state.moving = state.activity != api::Activity::kResting && !motor.is<motion::Armed>();
   state.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;
   state.input = reports(view.report.inputs);
   state.inhibited = {.positive = reports(view.report.forbidden_positive),
@@ -100,6 +106,11 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   std::optional<std::uint16_t> boot_number;
   if (view.identified) boot_number = view.identity.boot_number;
   motion::PositionTrust trust = motor.trust(boot_number);
+  if (trust.trust == api::Trust::kKnown && view.outdated_us > 0) {
+    trust = {api::Trust::kStale,
+             "MCU " + mcu.name() + " has not reported since this daemon stood still",
+             outputs_.wall_clock_us() - view.outdated_us};
+  }
   if (trust.trust == api::Trust::kUnknown) state.position_steps = state.target_steps = 0;
   state.trust = trust.trust;
   state.uncertain_reason = std::move(trust.reason);

@@ -31,6 +31,16 @@ void add_sentence(std::string& text, const std::string& sentence) {
   text += (text.empty() ? "" : "; ") + sentence;
 }
 
+Result<void> check_by_tick(const tables::Table& table, std::uint32_t tick_ns) {
+  const tables::profiles::Limits limits{.tick_ns = tick_ns};
+  for (const tables::profiles::Diagnostic& diagnostic :
+       tables::profiles::diagnostics(table, limits)) {
+    if (diagnostic.severity != tables::profiles::Severity::kError) continue;
+    return fail("table " + table.name() + ": " + diagnostic.rule + ": " + diagnostic.message);
+  }
+  return {};
+}
+
 std::optional<GroupId> find_group(const config::Config& config, const std::string& name) {
   const auto found = std::ranges::find(config.groups, name, &config::Group::name);
   if (found == config.groups.end()) return std::nullopt;
@@ -38,6 +48,13 @@ std::optional<GroupId> find_group(const config::Config& config, const std::strin
 }
 
 }  // namespace
+
+TableReview::TableReview(const config::Config& config, tables::TablePtr of) : table(std::move(of)) {
+  for (const config::Bus& bus : config.buses) {
+    if (by_tick_ns.contains(bus.tick_ns())) continue;
+    by_tick_ns.emplace(bus.tick_ns(), check_by_tick(*table, bus.tick_ns()));
+  }
+}
 
 TablesInService::TablesInService(Installation& installation, Interlocks& interlocks,
                                  Outputs& outputs)
@@ -87,13 +104,6 @@ void TablesInService::request(const api::Asker& asker, const api::ReloadTables&)
     for (const Part& part : other.parts) change.parts[part.group.value].wanted = part.wanted;
   }
   begin(std::move(change));
-}
-
-void TablesInService::request(const api::Asker& asker, const api::SetTable& request) {
-  const auto table = tables::make(request.content);
-  const auto good = table ? check_content(request.table, *table) : fail(table.error());
-  if (!good) return asker.answer(api::Refused{good.error().text()});
-  outputs_.serve_tables(asker, request);
 }
 
 void TablesInService::begin(Change change) {
@@ -160,7 +170,8 @@ void TablesInService::take_part(Change& change, Part part, const Result<tables::
 
 // Whether these groups' motors could all move by these tables, looking at one group.
 // Each tick and each MCU is looked at once, however many motors there are.
-Result<void> TablesInService::fits(const Tables& tables, GroupId group) const {
+Result<void> TablesInService::fits(const Tables& tables, GroupId group,
+                                   const TableReview* review) const {
   const tables::Table& table = *tables[group];
   std::set<std::uint32_t> ticks;
   std::set<McuId> mcus;
@@ -170,12 +181,9 @@ Result<void> TablesInService::fits(const Tables& tables, GroupId group) const {
     if (!mcus.insert(mcu.id).second) continue;
     const std::uint32_t tick_ns = installation_.bus_of(mcu).config.tick_ns();
     if (ticks.insert(tick_ns).second) {
-      const tables::profiles::Limits limits{.tick_ns = tick_ns};
-      for (const tables::profiles::Diagnostic& diagnostic :
-           tables::profiles::diagnostics(table, limits)) {
-        if (diagnostic.severity != tables::profiles::Severity::kError) continue;
-        return fail("table " + table.name() + ": " + diagnostic.rule + ": " + diagnostic.message);
-      }
+      auto good =
+          review != nullptr ? review->by_tick_ns.at(tick_ns) : check_by_tick(table, tick_ns);
+      if (!good) return good;
     }
     const link::McuSetup setup = setup_of(installation_.config(), mcu.id, tables);
     if (setup.tables.size() > BUSHD_TABLE_SLOTS) {
@@ -365,14 +373,14 @@ void TablesInService::complete(Changes::iterator change, api::Outcome outcome,
 }
 
 Result<void> TablesInService::check_content(const std::string& name,
-                                            const tables::TablePtr& table) const {
+                                            const TableReview& review) const {
   Tables tables = installation_.tables();
   for (const GroupId group : wanted_.ids()) {
-    if (wanted_[group] == name) tables[group] = table;
+    if (wanted_[group] == name) tables[group] = review.table;
   }
   for (const GroupId group : wanted_.ids()) {
     if (wanted_[group] != name) continue;
-    if (const auto good = fits(tables, group); !good) {
+    if (const auto good = fits(tables, group, &review); !good) {
       return fail("group " + name_of(group) + " has it, and " + good.error().text());
     }
   }

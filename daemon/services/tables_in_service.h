@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <list>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,13 +17,22 @@
 
 namespace bushd::daemon {
 
+// What takes long of a table's check, a millisecond for the largest ones: whether a motor could
+// move by it, by the tick of its bus. It depends on nothing else, and is made where nobody waits
+// for it.
+struct TableReview {
+  TableReview(const config::Config& config, tables::TablePtr of);
+
+  tables::TablePtr table;
+  std::map<std::uint32_t, Result<void>> by_tick_ns;
+};
+
 class TablesInService final : public Service {
  public:
   TablesInService(Installation& installation, Interlocks& interlocks, Outputs& outputs);
 
   void request(const api::Asker& asker, const api::UseTable& request);
   void request(const api::Asker& asker, const api::ReloadTables& request);
-  void request(const api::Asker& asker, const api::SetTable& request);
 
   // Answers to Outputs::read_tables and keep_tables.
   void read(std::int64_t now_us, std::uint64_t ticket,
@@ -30,7 +40,7 @@ class TablesInService final : public Service {
   void kept(std::uint64_t ticket, const Result<void>& kept);
 
   // Whether groups that have a table by this name, and follow its changes, could move by this one.
-  Result<void> check_content(const std::string& name, const tables::TablePtr& table) const;
+  Result<void> check_content(const std::string& name, const TableReview& review) const;
   // Before the first port is opened: the group has another table than the configuration says.
   Result<void> restore(GroupId group, const std::string& wanted, tables::TablePtr table);
 
@@ -65,7 +75,8 @@ class TablesInService final : public Service {
   bool unchanged(const Part& part) const;
   void take_part(Change& change, Part part, const Result<tables::TablePtr>& read);
   tables::TablePtr shared(const Tables& tables, tables::TablePtr table) const;
-  Result<void> fits(const Tables& tables, GroupId group) const;
+  // `review`: of the group's table, if there is one.
+  Result<void> fits(const Tables& tables, GroupId group, const TableReview* review = nullptr) const;
   Result<void> fits(const std::vector<Part>& parts) const;
   void supersede(const Change& by);
   const Change* changing(McuId mcu) const;

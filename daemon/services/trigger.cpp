@@ -16,7 +16,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
     const MotorId motor = (*motors)[i];
     moves[installation_.config()[motor].mcu].push_back(
         {.motor = installation_[motor].output().value,
-         .steps = static_cast<std::int32_t>(steps[i])});
+         .run = {static_cast<std::int32_t>(steps[i]), floor_of(motor, request)}});
   }
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
   std::map<McuId, std::uint8_t> numbers;
@@ -26,7 +26,8 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   }
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const MotorId motor = (*motors)[i];
-    installation_[motor].arm(numbers[installation_.config()[motor].mcu], steps[i]);
+    installation_[motor].arm(numbers[installation_.config()[motor].mcu], steps[i],
+                             floor_of(motor, request));
   }
   installation_.changed = true;
 }
@@ -36,8 +37,10 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
   if (!motors) return motors;
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   for (std::size_t i = 0; i < motors->size(); ++i) {
-    const auto target =
-        moves_.target_of((*motors)[i], request.motors[i].amount, api::Move::Kind::kRelative);
+    const auto floor = moves_.floor_of((*motors)[i], request.speed);
+    if (!floor) return fail(floor.error());
+    const auto target = moves_.target_of((*motors)[i], request.motors[i].amount,
+                                         api::Move::Kind::kRelative, *floor);
     if (!target) return fail(target.error());
   }
   if (request.delay_us < BUSHD_TRIGGER_MIN_DELAY_US ||
@@ -53,7 +56,11 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
   return motors;
 }
 
-// Precondition: Moves::target_of has no objection.
+// Precondition, as of steps_of: motors_of has no objection.
+std::uint16_t Trigger::floor_of(MotorId motor, const api::Arm& request) const {
+  return *moves_.floor_of(motor, request.speed);
+}
+
 std::vector<std::int64_t> Trigger::steps_of(const std::vector<MotorId>& motors,
                                             const api::Arm& request) const {
   std::vector<std::int64_t> steps;

@@ -36,6 +36,7 @@ class Trigger final : public Service {
   Result<std::vector<MotorId>> motors_of(const api::Arm& request) const;
   std::vector<std::int64_t> steps_of(const std::vector<MotorId>& motors,
                                      const api::Arm& request) const;
+  std::uint16_t floor_of(MotorId motor, const api::Arm& request) const;
   Result<void> may_arm(MotorId motor, std::int64_t steps) const;
   void follow();
 

@@ -36,7 +36,7 @@ static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
   homing->stage = (uint8_t)stage;
   homing->readings = 0;
   bushd_run_start(&mcu->motor[homing->motor].made.run, &homing->slow, homing->slow_steps,
-                  direction);
+                  direction, 0);
 }
 
 static void end(bushd_mcu* mcu, bushd_homing stage) {
@@ -88,7 +88,7 @@ static void go_on(bushd_mcu* mcu, bool active) {
         if (bushd_run_steps_left(run) != homing->most_steps) {
           bushd_run_ramp_down(run);
         } else {
-          bushd_run_start(run, run->table, 0, homing->direction);
+          bushd_run_start(run, run->table, 0, homing->direction, 0);
         }
         homing->stage = BUSHD_HOMING_RAMP_DOWN;
       } else if (done) {
@@ -186,6 +186,7 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   const uint16_t bit = motor_bit(message->motor);
   mcu->homed &= (uint16_t)~bit;
   mcu->local.held &= (uint16_t)~bit;
-  bushd_mcu_begin_by_itself(mcu, message->motor, message->most_steps, message->direction);
+  bushd_mcu_begin_by_itself(mcu, message->motor, message->most_steps, message->direction,
+                            message->floor);
   return BUSHD_OK;
 }

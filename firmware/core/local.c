@@ -42,7 +42,7 @@ static void begin_held(bushd_mcu* mcu) {
     if (mcu->motor[m].table < 0) {
       mcu->local.held &= (uint16_t)~motor_bit(m);
     } else {
-      bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish);
+      bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish, 0);
     }
   }
 }

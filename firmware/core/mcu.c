@@ -39,7 +39,7 @@ static bool engine_self_test(bushd_mcu* mcu) {
   // Delays 4 3 2 3 4: steps at 4, 7, 9, 12, 16; ticks of 6 end at 6, 12, 18.
   bushd_run run;
   uint8_t counts[3];
-  bushd_run_start(&run, &table, 5, 1);
+  bushd_run_start(&run, &table, 5, 1, 0);
   if (bushd_run_expand_coarse(&run, 6, 3, counts, 1) != 3) return false;
   if (counts[0] != 0x81 || counts[1] != 0x83 || counts[2] != 0x81) return false;
   // Two steps in a tick lie at a quarter and at three quarters of it.

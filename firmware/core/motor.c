@@ -62,23 +62,11 @@ static inline const bushd_run_tick* run_tick_of(bushd_mcu* mcu, const bushd_mcu_
   return tick;
 }
 
-// As ticks of the format would leave it, so that they can go on from here.
-static inline void note_fine(bushd_mcu_motor* motor, int16_t steps) {
-  bushd_run* run = &motor->made.run;
-  const int16_t before = motor->remainder;
-  bushd_run_note_fraction(run);
-  motor->remainder = (int16_t)(run->direction < 0 ? -run->fraction : run->fraction);
-  // Unsigned: an `int` of 16 bits does not hold every sum on the way.
-  const uint16_t whole = (uint16_t)((uint16_t)steps << 8);
-  note_speed(motor, (int16_t)(uint16_t)(whole + (uint16_t)motor->remainder - (uint16_t)before));
-}
-
 // Sets the motors' bits in the masks of their steps, or none if the emission decides where they
 // lie.
 __attribute__((noinline)) static void emit_runs(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer,
                                                 uint16_t exact) {
   const bool keep_slots = bushd_mcu_steps_keep_slots(mcu);
-  const bool fine = mcu->format == BUSHD_FORMAT_FINE;
   bushd_mcu_motor* motor = mcu->motor;
   int16_t* steps = slot_buffer->steps;
   const bushd_table* table = NULL;
@@ -95,11 +83,7 @@ __attribute__((noinline)) static void emit_runs(bushd_mcu* mcu, bushd_slot_buffe
       *steps = bushd_run_slots(run, tick, keep_slots ? bit : 0, slot_buffer->step);
       if (run->direction > 0) forward |= bit;
       if (*steps != 0) active |= bit;
-      if (fine) {
-        note_fine(motor, *steps);
-      } else {
-        motor->remainder = 0;
-      }
+      motor->remainder = 0;  // until ticks follow (leave_run)
       if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) end_run(mcu, motor);
     }
     bit = (uint16_t)(bit << 1);
@@ -109,13 +93,29 @@ __attribute__((noinline)) static void emit_runs(bushd_mcu* mcu, bushd_slot_buffe
   slot_buffer->active |= active;
 }
 
+// Ticks take the place of the rest of a run: they go on from the share of the running step that has
+// passed. Nobody asks for that before. Its speed is rounded down, so that a stop goes by a longer
+// delay rather than a shorter one; 31 bits hold it, since no table makes more than 127 steps a
+// tick.
+static void leave_run(bushd_mcu* mcu, bushd_mcu_motor* motor) {
+  bushd_run* run = &motor->made.run;
+  const uint16_t delay = bushd_run_delay(run);
+  if (delay == 0 || mcu->format != BUSHD_FORMAT_FINE) return;
+  bushd_run_note_fraction(run);
+  motor->remainder = (int16_t)(run->direction < 0 ? -run->fraction : run->fraction);
+  motor->displacement = (uint16_t)(run_tick_of(mcu, motor)->units * 256u / delay);
+  motor->still_ticks = 0;
+}
+
 static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t tick) {
-  if (motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)tick) {
+  const bool begins = motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)tick;
+  if (begins) {
     motor->mode = BUSHD_MCU_TABLE_RUN;
     mcu->stream.queue_summary.stale = true;
   }
   if (motor->mode != BUSHD_MCU_TABLE_RUN) return false;
   if (ticks_after(tick, motor->made.until) < 0) return true;
+  if (!begins) leave_run(mcu, motor);
   end_run(mcu, motor);
   return false;
 }

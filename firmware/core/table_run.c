@@ -27,7 +27,8 @@ void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_
 
 bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns) {
   bushd_mcu_made* made = &mcu->motor[entry->motor].made;
-  bushd_run_start(&made->run, &mcu->tables.slot[entry->slot].table, entry->steps, entry->direction);
+  bushd_run_start(&made->run, &mcu->tables.slot[entry->slot].table, entry->steps, entry->direction,
+                  entry->floor);
   return ticks_of_run(&made->run, mcu->tick_ns, &made->until, spare_ns);
 }
 
@@ -42,22 +43,25 @@ static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
 
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message) {
   bushd_mcu_tick_range range = {message->epoch, BUSHD_TICKS_START, message->first_tick, 1, 0};
+  const uint8_t* at = message->entries;
   for (uint8_t i = 0; i < message->count; ++i) {
-    range.mask |= motor_bit(bushd_get_table_run_entry(message->entries, i).motor);
+    range.mask |= motor_bit(bushd_next_table_run_entry(&at).motor);
   }
   const bushd_status status = bushd_mcu_check_tick_range(mcu, &range);
   if (status != BUSHD_OK) return status;
   bool barred = true;
+  at = message->entries;
   for (uint8_t i = 0; i < message->count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
+    const bushd_table_run_entry entry = bushd_next_table_run_entry(&at);
     const bushd_status entry_status = check_entry(mcu, message->first_tick, &entry);
     if (entry_status != BUSHD_OK) return entry_status;
     barred = barred && (bushd_mcu_forbidden(mcu, entry.direction) & motor_bit(entry.motor)) != 0;
   }
   if (barred) return BUSHD_E_FORBIDDEN;
   // All are made before one begins: the frame is taken whole or not at all.
+  at = message->entries;
   for (uint8_t i = 0; i < message->count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
+    const bushd_table_run_entry entry = bushd_next_table_run_entry(&at);
     uint32_t spare_ns;
     if (!bushd_mcu_make_run(mcu, &entry, &spare_ns)) return BUSHD_E_CAPACITY;
   }
@@ -77,9 +81,10 @@ void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
   motor->mode = bushd_run_done(&motor->made.run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
 }
 
-void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction) {
+void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
+                               uint16_t floor) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction);
+  bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction, floor);
   motor->mode = BUSHD_MCU_AUTONOMOUS;
   motor->exact = true;
   mcu->autonomous |= motor_bit(m);

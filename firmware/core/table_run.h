@@ -17,8 +17,9 @@ bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint
 // The motor's run, just started, begins in this tick and takes as many.
 void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks);
 // A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
-// ends: it is `autonomous` until it rests.
-void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction);
+// ends: it is `autonomous` until it rests. `floor`: as of bushd_run_start.
+void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
+                               uint16_t floor);
 // Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise
 // since stays so.
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);

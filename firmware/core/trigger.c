@@ -39,16 +39,18 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
   if (mcu->trigger.armed != 0) return BUSHD_E_STATE;
   uint16_t mask = 0;
+  const uint8_t* at = message->entries;
   for (uint8_t i = 0; i < message->count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
+    const bushd_table_run_entry entry = bushd_next_table_run_entry(&at);
     const bushd_status status = check_entry(mcu, &entry);
     if (status != BUSHD_OK) return status;
     mask |= motor_bit(entry.motor);
   }
   if (bushd_mcu_moving(mcu) & mask) return BUSHD_E_STATE;
   mcu->stream.starting &= (uint16_t)~mask;
+  at = message->entries;
   for (uint8_t i = 0; i < message->count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message->entries, i);
+    const bushd_table_run_entry entry = bushd_next_table_run_entry(&at);
     uint32_t* const spare_ns = &mcu->motor[entry.motor].spare_ns;
     if (!bushd_mcu_make_run(mcu, &entry, spare_ns)) return BUSHD_E_CAPACITY;
   }

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -32,6 +33,13 @@ struct MotorAmount {
   friend bool operator==(const MotorAmount&, const MotorAmount&) = default;
 };
 
+// A speed not to be exceeded, per second, above 0: in each motor's unit, or in steps.
+struct Speed {
+  double per_s = 0;
+  bool in_steps = false;
+  friend bool operator==(const Speed&, const Speed&) = default;
+};
+
 using MotorNames = std::vector<std::string>;
 
 // One group move: the motors of one bus start in the same tick. A motor that moves is given a new
@@ -46,6 +54,7 @@ struct Move {
   Kind kind = Kind::kRelative;
   std::vector<MotorAmount> motors{};  // at least one, none twice
   bool dry_run = false;  // from rest only: result kDone with a MovePlan, and nothing moves
+  std::optional<Speed> speed{};  // none: as fast as the motors' tables and max_speed allow
 };
 
 // Ramps these motors down; none named: all. Result kDone once they stand. Also disarms, and ends
@@ -93,7 +102,8 @@ struct ReloadTables {};
 
 // Motors, at rest, look for their switches, those of one MCU one after the other.
 struct Home {
-  MotorNames motors{};  // at least one, each with `home` in the configuration
+  MotorNames motors{};           // at least one, each with `home` in the configuration
+  std::optional<Speed> speed{};  // of the fast approach
 };
 
 // Motors, at rest, wait for an edge at the trigger input of their MCU and begin together after it.
@@ -101,6 +111,7 @@ struct Arm {
   Edge edge = Edge::kRising;
   std::int64_t delay_us = 0;          // 50..1500000, three ticks come on top
   std::vector<MotorAmount> motors{};  // by so much, not 0
+  std::optional<Speed> speed{};
 };
 
 // Motors that wait for the trigger do so no more, nor do those armed with them; none named: all.

@@ -17,9 +17,10 @@ constexpr Words<Outcome, 6> kOutcomes = {{
     {Outcome::kLink, "link"},
     {Outcome::kFault, "fault"},
 }};
-constexpr Words<Activity, 5> kActivities = {{
+constexpr Words<Activity, 6> kActivities = {{
     {Activity::kResting, "rest"},
     {Activity::kMoving, "move"},
+    {Activity::kArming, "arming"},
     {Activity::kArmed, "armed"},
     {Activity::kHoming, "home"},
     {Activity::kLocal, "local"},

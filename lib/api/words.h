@@ -22,9 +22,10 @@ enum class Outcome {
 enum class Activity {
   kResting,
   kMoving,
+  kArming,  // at rest, its MCU has not yet confirmed that it waits for the trigger
   kArmed,   // at rest, waits for the trigger of its MCU
   kHoming,  // or waits until the MCU has homed another one
-  kLocal    // moved by the local inputs of its MCU
+  kLocal    // moved by the local inputs of its MCU, or by another master of its line
 };
 
 // How far a position can be relied on.

@@ -295,7 +295,7 @@ Result<Status> Client::status(std::chrono::milliseconds timeout) {
   if (!packet) return fail(packet.error());
   while (!collector_.has_everything()) {
     if (Clock::now() >= deadline && hears_two()) return fail(two_daemons());
-    if (Clock::now() >= deadline) return fail(link_->remedy());
+    if (Clock::now() >= deadline) return incomplete_status();
     if (Clock::now() >= next_send) {
       if (auto sent = link_->send(*packet); !sent) return fail(sent.error());
       next_send = Clock::now() + options_.resend_every;
@@ -305,7 +305,16 @@ Result<Status> Client::status(std::chrono::milliseconds timeout) {
   // What is told here is not told again by next_state() and next_health().
   state_heard_ = false;
   health_heard_ = false;
+  collector_.expect_no_gaps();
   return collector_.status();
+}
+
+// What has come, when no more is waited for.
+Result<Status> Client::incomplete_status() {
+  if (!link_->loses() || collector_.empty()) return fail(link_->remedy());
+  Status partial = collector_.partial_status();
+  collector_.expect_no_gaps();
+  return partial;
 }
 
 Result<void> Client::subscribe() {

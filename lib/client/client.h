@@ -64,7 +64,8 @@ class Client {
   Result<api::Reply> run(const api::Request& request, Until until,
                          const std::function<void(const api::Reply&)>& on_reply = {});
 
-  // Description, state and health of everything as they are now: the daemon is asked.
+  // Description, state and health of everything as they are now: the daemon is asked. Where
+  // messages are lost again and again it is not complete, and says so.
   Result<Status> status(std::chrono::milliseconds timeout);
 
   // As soon as a state, or a health, has been published since the last call of ours. Descriptions
@@ -97,6 +98,7 @@ class Client {
   // Nobody has answered; `sent`: a request that may be carried out nevertheless.
   Error no_answer(bool sent) const;
   Result<void> subscribe();
+  Result<Status> incomplete_status();
   Result<Status> wait_for(const bool& heard, bool (StatusCollector::*enough)() const,
                           std::chrono::milliseconds timeout);
   Result<api::Reply> await_reply(const lcm::Packet& packet, Until until,

@@ -6,6 +6,9 @@
 namespace bushd::client {
 namespace {
 
+// Two snapshots of the largest installations, each an MCU a message.
+constexpr int kQueueCapacity = 1024;
+
 class LcmLink : public Link {
  public:
   LcmLink(std::unique_ptr<lcm::Transport> transport, std::string url, std::string prefix)
@@ -14,11 +17,13 @@ class LcmLink : public Link {
   Result<void> listen() {
     for (const std::string_view channel : lcm::daemon_channels()) {
       const auto listening = transport_->subscribe_bytes(
-          prefix_ + "_" + std::string(channel), [this, channel](lcm::Payload payload) {
+          prefix_ + "_" + std::string(channel),
+          [this, channel](lcm::Payload payload) {
             // Anybody may send anything.
             const auto message = lcm::decode_daemon_message(channel, payload);
             if (message && handler_ != nullptr) (*handler_)(*message);
-          });
+          },
+          kQueueCapacity);
       if (!listening) return listening;
     }
     return {};

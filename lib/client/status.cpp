@@ -14,6 +14,10 @@ std::int64_t Status::sequence() const {
 template <class Message>
 void StatusCollector::put(Parts<Message>& parts, const Message& message) {
   const lcm::Part& part = message.part;
+  if (newest_ > 0 && part.sequence > newest_) {
+    lost_ += static_cast<std::uint64_t>(part.sequence - newest_ - 1);
+    newest_ = part.sequence;
+  }
   if (part.parts < 1 || part.parts > kMaxParts || part.part < 0 || part.part >= part.parts) return;
   // Another daemon than before, maybe of another configuration.
   if (!parts.empty() && parts.begin()->second.part.parts != part.parts) parts.clear();
@@ -45,6 +49,18 @@ void StatusCollector::clear() {
   states_.clear();
   descriptions_.clear();
   healths_.clear();
+  newest_ = 0;
+  lost_ = 0;
+}
+
+void StatusCollector::expect_no_gaps() {
+  const auto follow = [this](const auto& parts) {
+    for (const auto& [index, message] : parts) newest_ = std::max(newest_, message.part.sequence);
+  };
+  follow(states_);
+  follow(descriptions_);
+  follow(healths_);
+  lost_ = 0;
 }
 
 Status StatusCollector::status() const {
@@ -56,6 +72,25 @@ Status StatusCollector::status() const {
   take(states_, out.states);
   take(descriptions_, out.descriptions);
   take(healths_, out.healths);
+  out.lost = lost_;
+  return out;
+}
+
+Status StatusCollector::partial_status() const {
+  Status out;
+  for (const auto& [index, state] : states_) {
+    const auto description = descriptions_.find(index);
+    if (description == descriptions_.end()) continue;
+    out.states.push_back(state);
+    out.descriptions.push_back(description->second);
+  }
+  for (const auto& [index, health] : healths_) out.healths.push_back(health);
+  // Where nothing tells how many there are: one at least.
+  const std::size_t mcus = std::max({expected(states_), expected(descriptions_), std::size_t{1}});
+  const std::size_t buses = std::max(expected(healths_), std::size_t{1});
+  out.missing_mcus = {.count = mcus - out.states.size(), .of = mcus};
+  out.missing_buses = {.count = buses - out.healths.size(), .of = buses};
+  out.lost = lost_;
   return out;
 }
 

@@ -104,6 +104,7 @@ struct Motor {
   std::string description{};
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits = {};
+  std::optional<double> max_speed = {};  // user units/s, above 0
 };
 
 struct Config {

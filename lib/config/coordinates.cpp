@@ -115,6 +115,21 @@ Result<units::SoftLimits> read_soft_limits(const TomlReader& reader, const Motor
   return units::SoftLimits{ends[0], ends[1]};
 }
 
+Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {
+  constexpr std::string_view kKey = "max_speed";
+  const auto speed = reader.number(kKey, "a number above 0");
+  if (!speed) return speed;
+  if (!(*speed > 0)) {
+    return fail(reader.error(kKey, fmt::format("is {}; allowed: a number above 0", *speed)));
+  }
+  if (motor.local) {
+    return fail(reader.error(kKey, "does not hold for local motion, which the MCU makes by the "
+                                   "table alone; leave out `local`, or give the group a slower "
+                                   "table"));
+  }
+  return speed;
+}
+
 }  // namespace
 
 Result<void> read_coordinates(const TomlReader& reader, Motor* motor) {
@@ -130,6 +145,11 @@ Result<void> read_coordinates(const TomlReader& reader, Motor* motor) {
       if (!reader.has(key)) continue;
       return fail(reader.error(key, "needs `unit`: positions of a motor without one are steps"));
     }
+  }
+  if (reader.has("max_speed")) {
+    const auto speed = read_max_speed(reader, *motor);
+    if (!speed) return fail(speed.error());
+    motor->max_speed = *speed;
   }
   if (!reader.has("soft_limits")) return {};
   const auto limits = read_soft_limits(reader, *motor);

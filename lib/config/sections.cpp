@@ -376,7 +376,7 @@ Result<void> read_motors(Loading* loading) {
     if (auto known =
             reader.only({"name", "mcu", "output", "group", "limit", "limit_action", "input_active",
                          "home", "local", "restored", "description", "unit", "steps_per_unit",
-                         "direction", "offset", "precision", "soft_limits"});
+                         "direction", "offset", "precision", "soft_limits", "max_speed"});
         !known) {
       return known;
     }

@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-#define BUSHD_PROTOCOL_VERSION 3u
+#define BUSHD_PROTOCOL_VERSION 4u
 #define BUSHD_MOTORS_PER_MCU 16u
 #define BUSHD_TABLE_SLOTS 8u
 #define BUSHD_MIN_TICK_NS 200000u

@@ -130,8 +130,9 @@ bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks
 #define HEAD_SINCE_NS 0x20u  // TABLE_TICKS
 #define HEAD_LEAD 0x10u      // TABLE_TICKS
 #define HEAD_SLOT_SHIFT 4u   // TABLE_RUN: three bits
+#define STEPS_FLOOR UINT32_C(0x80000000)  // TABLE_RUN, with the steps: a floor follows
 
-static void put_entry(writer* w, const bushd_table_ticks_entry* entry) {
+static void put_entry(writer* w, const bushd_table_ticks_entry* entry, uint8_t flags) {
   const bushd_run_state* const state = &entry->state;
   uint8_t head = entry->motor;
   if (state->direction > 0) head |= HEAD_POSITIVE;
@@ -140,6 +141,7 @@ static void put_entry(writer* w, const bushd_table_ticks_entry* entry) {
   if (state->lead_delay != 0) head |= HEAD_LEAD;
   put8(w, head);
   put16(w, state->since);
+  if ((flags & BUSHD_TICKS_CRUISE) != 0) put16(w, state->cruise);
   if (state->since_ns != 0) put32(w, state->since_ns);
   if (state->lead_delay != 0) put16(w, state->lead_delay);
   if (state->cruises) return;
@@ -150,13 +152,14 @@ static void put_entry(writer* w, const bushd_table_ticks_entry* entry) {
 }
 
 // Returns whether each field that the head announces is needed: so a state has one spelling.
-static bool get_entry(reader* r, bushd_table_ticks_entry* entry) {
+static bool get_entry(reader* r, bushd_table_ticks_entry* entry, uint8_t flags) {
   bushd_run_state* const state = &entry->state;
   const uint8_t head = get8(r);
   entry->motor = head & HEAD_MOTOR;
   state->direction = head & HEAD_POSITIVE ? 1 : -1;
   state->cruises = (head & HEAD_PARTS) == 0;
   state->since = get16(r);
+  state->cruise = flags & BUSHD_TICKS_CRUISE ? get16(r) : 0;
   state->since_ns = head & HEAD_SINCE_NS ? get32(r) : 0;
   state->lead_delay = head & HEAD_LEAD ? get16(r) : 0;
   state->accel_at = state->cruises ? 0 : get16(r);
@@ -171,11 +174,14 @@ size_t bushd_encode_table_ticks(uint8_t epoch, uint8_t flags, uint32_t first_tic
                                 const bushd_table_ticks_entry* entries, uint8_t motors,
                                 uint8_t* payload) {
   writer w = {payload};
+  for (uint8_t i = 0; i < motors; ++i) {
+    if (entries[i].state.cruise != 0) flags |= BUSHD_TICKS_CRUISE;
+  }
   put8(&w, epoch);
   put8(&w, flags);
   put32(&w, first_tick);
   put16(&w, count);
-  for (uint8_t i = 0; i < motors; ++i) put_entry(&w, &entries[i]);
+  for (uint8_t i = 0; i < motors; ++i) put_entry(&w, &entries[i], flags);
   return (size_t)(w.at - payload);
 }
 
@@ -191,14 +197,17 @@ bushd_status bushd_decode_table_ticks(const uint8_t* payload, size_t size,
   message->entries_size = (uint16_t)(r.end - r.at);
   message->mask = 0;
   bool in_range = true;
+  bool tells_cruise = false;
   while (r.at != r.end && !r.short_of_bytes) {
     bushd_table_ticks_entry entry;
-    if (!get_entry(&r, &entry)) in_range = false;
+    if (!get_entry(&r, &entry, message->flags)) in_range = false;
+    if (entry.state.cruise != 0) tells_cruise = true;
     const uint16_t bit = (uint16_t)(1u << entry.motor);
     if (message->mask >= bit) in_range = false;
     message->mask |= bit;
   }
-  const uint8_t known = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START;
+  if (tells_cruise != ((message->flags & BUSHD_TICKS_CRUISE) != 0)) in_range = false;
+  const uint8_t known = BUSHD_TICKS_REPLACE | BUSHD_TICKS_START | BUSHD_TICKS_CRUISE;
   return finish(&r, known_flags(message->flags, known) && message->count >= 1 &&
                         message->mask != 0 && in_range);
 }
@@ -207,7 +216,7 @@ bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at
                                   bushd_table_ticks_entry* entry) {
   if (*at >= message->entries_size) return false;
   reader r = read_from(message->entries + *at, (size_t)(message->entries_size - *at));
-  get_entry(&r, entry);
+  get_entry(&r, entry, message->flags);
   *at = (uint16_t)(r.at - message->entries);
   return true;
 }
@@ -217,30 +226,43 @@ static void put_run_entries(writer* w, const bushd_table_run_entry* entries, uin
     uint8_t head = (uint8_t)(entries[i].motor | entries[i].slot << HEAD_SLOT_SHIFT);
     if (entries[i].direction > 0) head |= HEAD_POSITIVE;
     put8(w, head);
-    put32(w, entries[i].steps);
+    put32(w, entries[i].steps | (entries[i].floor != 0 ? STEPS_FLOOR : 0));
+    if (entries[i].floor != 0) put16(w, entries[i].floor);
   }
+}
+
+// `in_range`: a floor that is announced is one.
+static bushd_table_run_entry get_run_entry(reader* r, bool* in_range) {
+  const uint8_t head = get8(r);
+  const uint32_t steps = get32(r);
+  const bool has_floor = (steps & STEPS_FLOOR) != 0;
+  const uint16_t floor = has_floor ? get16(r) : 0;
+  if (has_floor && floor == 0) *in_range = false;
+  const bushd_table_run_entry entry = {
+      (uint8_t)(head & HEAD_MOTOR), (uint8_t)(head >> HEAD_SLOT_SHIFT & 7u),
+      head & HEAD_POSITIVE ? 1 : -1, steps & ~STEPS_FLOOR, floor};
+  return entry;
 }
 
 // All that is left. `in_range`: motors rise, and each is to make steps.
 static const uint8_t* get_run_entries(reader* r, uint8_t* count, bool* in_range) {
-  const size_t rest = (size_t)(r->end - r->at);
-  *count = (uint8_t)(rest / BUSHD_TABLE_RUN_ENTRY);
-  const uint8_t* const entries = take(r, (size_t)*count * BUSHD_TABLE_RUN_ENTRY);
+  const uint8_t* const entries = r->at;
   uint16_t mask = 0;
-  for (uint8_t i = 0; i < *count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(entries, i);
+  for (*count = 0; r->at != r->end; ++*count) {
+    const bushd_table_run_entry entry = get_run_entry(r, in_range);
+    if (r->short_of_bytes) break;
     const uint16_t bit = (uint16_t)(1u << entry.motor);
-    if (mask >= bit || entry.steps == 0 || entry.steps > INT32_MAX) *in_range = false;
+    if (mask >= bit || entry.steps == 0) *in_range = false;
     mask |= bit;
   }
   return entries;
 }
 
-bushd_table_run_entry bushd_get_table_run_entry(const uint8_t* entries, uint8_t index) {
-  const uint8_t* const at = entries + (size_t)index * BUSHD_TABLE_RUN_ENTRY;
-  const bushd_table_run_entry entry = {(uint8_t)(at[0] & HEAD_MOTOR),
-                                       (uint8_t)(at[0] >> HEAD_SLOT_SHIFT & 7u),
-                                       at[0] & HEAD_POSITIVE ? 1 : -1, bushd_get_u32(at + 1)};
+bushd_table_run_entry bushd_next_table_run_entry(const uint8_t** at) {
+  reader r = read_from(*at, BUSHD_TABLE_RUN_MAX_ENTRY);
+  bool in_range = true;
+  const bushd_table_run_entry entry = get_run_entry(&r, &in_range);
+  *at = r.at;
   return entry;
 }
 
@@ -324,6 +346,7 @@ size_t bushd_encode_home(const bushd_home* message, uint8_t* payload) {
   put8(&w, message->motor);
   put8(&w, (uint8_t)message->direction);
   put32(&w, message->most_steps);
+  put16(&w, message->floor);
   put32(&w, message->slow_steps);
   put16(&w, message->slow_delay);
   put32(&w, (uint32_t)message->position_steps);
@@ -335,6 +358,7 @@ bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* 
   message->motor = get8(&r);
   message->direction = (int8_t)get8(&r);
   message->most_steps = get32(&r);
+  message->floor = get16(&r);
   message->slow_steps = get32(&r);
   message->slow_delay = get16(&r);
   message->position_steps = (int32_t)get32(&r);

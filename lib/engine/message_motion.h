@@ -23,6 +23,7 @@ typedef struct bushd_home {
   uint8_t motor;
   int8_t direction;     // towards the switch: +1, -1
   uint32_t most_steps;  // of the fast approach, below 2^31
+  uint16_t floor;       // no delay of it is shorter, time units of the motor's table; 0: none
   uint32_t slow_steps;  // at most as many in each of the slow stages; 1 .. 2^31 - 1
   uint16_t slow_delay;  // of a slow step, BUSHD_HOME_UNIT_NS; >= 1
   int32_t position_steps;
@@ -76,7 +77,8 @@ typedef struct bushd_sync {
 enum {
   BUSHD_TICKS_FINE = 1 << 0,     // int16 displacements, else coarse bytes
   BUSHD_TICKS_REPLACE = 1 << 1,  // instead of all that its motors have queued from first_tick on
-  BUSHD_TICKS_START = 1 << 2     // its motors start from rest here; without it they must be moving
+  BUSHD_TICKS_START = 1 << 2,    // its motors start from rest here; without it they must be moving
+  BUSHD_TICKS_CRUISE = 1 << 3    // TABLE_TICKS: entries tell cruise delays (set by its encoder)
 };
 
 // Displacements of `count` ticks for the motors in `mask`. Only these motors are touched.
@@ -101,7 +103,7 @@ uint8_t bushd_ticks_capacity(uint8_t motors, bool fine);
 // and has the displacements that the master's run gives.
 typedef struct bushd_table_ticks {
   uint8_t epoch;
-  uint8_t flags;  // as in bushd_ticks, without BUSHD_TICKS_FINE
+  uint8_t flags;  // BUSHD_TICKS_*, without BUSHD_TICKS_FINE
   uint32_t first_tick;
   uint16_t count;  // >= 1
   uint16_t mask;   // of the motors, in rising order; != 0
@@ -109,7 +111,7 @@ typedef struct bushd_table_ticks {
   uint16_t entries_size;
 } bushd_table_ticks;
 #define BUSHD_TABLE_TICKS_HEADER 8u
-#define BUSHD_TABLE_TICKS_MAX_ENTRY 19u
+#define BUSHD_TABLE_TICKS_MAX_ENTRY 21u
 
 // An entry of it. A motor that cruises throughout is told so in three bytes.
 typedef struct bushd_table_ticks_entry {
@@ -123,19 +125,20 @@ typedef struct bushd_table_run {
   uint8_t epoch;
   uint32_t first_tick;
   uint8_t count;           // of entries, >= 1
-  const uint8_t* entries;  // count x 5 bytes
+  const uint8_t* entries;  // 5 bytes each, or 7 with a floor
 } bushd_table_run;
 #define BUSHD_TABLE_RUN_HEADER 5u
-#define BUSHD_TABLE_RUN_ENTRY 5u
+#define BUSHD_TABLE_RUN_MAX_ENTRY 7u
 typedef struct bushd_table_run_entry {
   uint8_t motor;
   uint8_t slot;      // of the table; must be the one assigned to the motor
   int8_t direction;  // +1, -1
-  uint32_t steps;    // >= 1
+  uint32_t steps;    // 1 .. 2^31 - 1
+  uint16_t floor;    // no delay is shorter, time units of the table; 0: none
 } bushd_table_run_entry;
 
-// Entry `index` of a table run's or a trigger's.
-bushd_table_run_entry bushd_get_table_run_entry(const uint8_t* entries, uint8_t index);
+// The entry of a table run's or a trigger's at *at, which moves on to the next one.
+bushd_table_run_entry bushd_next_table_run_entry(const uint8_t** at);
 
 typedef enum bushd_edge {
   BUSHD_EDGE_NONE = 0,

@@ -2,7 +2,8 @@
 // max(A(j-1), D(N-j), c): a lead (a step taken over in its middle), steps on the accelerating side,
 // steps at cruise, steps on the decelerating side. Both sides are sorted, so A(j-1) - D(N-j) never
 // rises with j and one binary search finds where deceleration takes over; codes not above c count
-// as cruise.
+// as cruise. A floor is a longer c. To slow down to a floor a run brakes, on the decelerating side
+// as far as it lies below the floor, in place of speeding up.
 //
 // State in time is (which step runs, time units since the last step). Advancing by dt:
 // - on a side with an index, S[i] + since + dt is looked up in the prefix sums S: one bucket, one
@@ -29,6 +30,7 @@ static uint16_t codes_above(const bushd_ramp* ramp, uint16_t delay) {
 
 static void clear(bushd_run* run, const bushd_table* table, int direction) {
   run->table = table;
+  run->cruise = table->cruise;
 #if BUSHD_RUN_COUNTS
   run->steps_done = 0;
 #endif
@@ -36,6 +38,9 @@ static void clear(bushd_run* run, const bushd_table* table, int direction) {
   run->accel_end = 0;
   run->cruise_left = 0;
   run->decel_left = 0;
+#if BUSHD_RUN_BRAKES
+  run->brake_left = 0;
+#endif
   run->since = 0;
   run->since_ns = 0;
   run->lead_delay = 0;
@@ -46,8 +51,8 @@ static void clear(bushd_run* run, const bushd_table* table, int direction) {
 // `steps` to rest, the first of them with the delay A(first): max(A(first + j-1), D(steps-j), c).
 static void cut(bushd_run* run, uint16_t first, uint32_t steps) {
   const bushd_table* table = run->table;
-  const uint16_t accel_codes = codes_above(&table->accel, table->cruise);
-  const uint16_t decel_codes = codes_above(&table->decel, table->cruise);
+  const uint16_t accel_codes = codes_above(&table->accel, run->cruise);
+  const uint16_t decel_codes = codes_above(&table->decel, run->cruise);
   if (first > accel_codes) first = accel_codes;  // from there on all is cruise
   uint16_t up = (uint16_t)(accel_codes - first);
   uint16_t down = steps < decel_codes ? (uint16_t)steps : decel_codes;
@@ -73,8 +78,14 @@ static void cut(bushd_run* run, uint16_t first, uint32_t steps) {
   run->decel_left = down;
 }
 
-void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction) {
+static uint16_t cruise_above(const bushd_table* table, uint16_t floor) {
+  return floor > table->cruise ? floor : table->cruise;
+}
+
+void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction,
+                     uint16_t floor) {
   clear(run, table, direction);
+  run->cruise = cruise_above(table, floor);
   cut(run, 0, steps);
 }
 
@@ -88,6 +99,9 @@ void bushd_run_begin_late(bushd_run* run, uint32_t ns) {
 static void lead_then_ramp_down(bushd_run* run, uint16_t delay) {
   run->lead_delay = delay;
   run->accel_at = run->accel_end;
+#if BUSHD_RUN_BRAKES
+  run->brake_left = 0;
+#endif
   run->cruise_left = 0;
   run->decel_left = (uint16_t)bushd_table_steps_to_stop(run->table, delay);
 }
@@ -110,10 +124,30 @@ void bushd_run_ramp_down(bushd_run* run) {
   if (delay != 0) lead_then_ramp_down(run, delay);
 }
 
-bool bushd_run_retarget(bushd_run* run, uint32_t steps_after) {
+#if BUSHD_RUN_BRAKES
+
+// After a lead faster than the cruise delay: along the decelerating side down to that, and at the
+// end along the rest of it. Precondition: steps >= to_stop, the lead's.
+static void brake(bushd_run* run, uint32_t to_stop, uint32_t steps) {
+  const uint16_t decel_codes = codes_above(&run->table->decel, run->cruise);
+  run->accel_at = run->accel_end = codes_above(&run->table->accel, run->cruise);
+  run->brake_left = (uint16_t)(to_stop - decel_codes);
+  run->cruise_left = steps - to_stop;
+  run->decel_left = decel_codes;
+}
+
+bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, uint16_t floor) {
   const uint16_t delay = bushd_run_delay(run);
-  if (delay == 0 || bushd_table_steps_to_stop(run->table, delay) > steps_after) return false;
+  if (delay == 0) return false;
+  const uint32_t to_stop = bushd_table_steps_to_stop(run->table, delay);
+  if (to_stop > steps_after) return false;
   run->lead_delay = delay;
+  run->cruise = cruise_above(run->table, floor);
+  if (delay < run->cruise) {
+    brake(run, to_stop, steps_after);
+    return true;
+  }
+  run->brake_left = 0;
   const bushd_ramp* accel = &run->table->accel;
   const uint16_t at = codes_above(accel, delay);
   const bool there = at < accel->count && accel->code[at] == delay;
@@ -121,17 +155,30 @@ bool bushd_run_retarget(bushd_run* run, uint32_t steps_after) {
   return true;
 }
 
+#endif
+
+// Steps left on the decelerating side before those at the cruise delay.
+static inline uint16_t brake_left(const bushd_run* run) {
+#if BUSHD_RUN_BRAKES
+  return run->brake_left;
+#else
+  (void)run;
+  return 0;
+#endif
+}
+
 uint16_t bushd_run_delay(const bushd_run* run) {
   if (run->lead_delay != 0) return run->lead_delay;
   if (run->accel_at < run->accel_end) return run->table->accel.code[run->accel_at];
-  if (run->cruise_left != 0) return run->table->cruise;
+  if (brake_left(run) != 0) return run->table->decel.code[run->decel_left + brake_left(run) - 1];
+  if (run->cruise_left != 0) return run->cruise;
   if (run->decel_left != 0) return run->table->decel.code[run->decel_left - 1];
   return 0;
 }
 
 uint32_t bushd_run_steps_left(const bushd_run* run) {
-  return (run->lead_delay != 0) + (uint32_t)(run->accel_end - run->accel_at) + run->cruise_left +
-         run->decel_left;
+  return (run->lead_delay != 0) + (uint32_t)(run->accel_end - run->accel_at) + brake_left(run) +
+         run->cruise_left + run->decel_left;
 }
 
 bool bushd_run_done(const bushd_run* run) {
@@ -151,8 +198,9 @@ uint64_t bushd_run_units_left(const bushd_run* run) {
   if (bushd_run_done(run)) return 0;
   const bushd_table* table = run->table;
   return (uint64_t)run->lead_delay + units_between(&table->accel, run->accel_at, run->accel_end) +
-         (uint64_t)run->cruise_left * table->cruise +
-         units_between(&table->decel, 0, run->decel_left) - (uint64_t)(int32_t)run->since;
+         (uint64_t)run->cruise_left * run->cruise +
+         units_between(&table->decel, 0, (uint16_t)(run->decel_left + brake_left(run))) -
+         (uint64_t)(int32_t)run->since;
 }
 
 #if BUSHD_RAMP_INDEX
@@ -205,12 +253,23 @@ static uint32_t advance_accel(bushd_run* run) {
 }
 
 static uint32_t advance_cruise(bushd_run* run) {
-  uint32_t steps = run->since / run->table->cruise;
+  uint32_t steps = run->since / run->cruise;
   if (steps > run->cruise_left) steps = run->cruise_left;
-  run->since -= steps * run->table->cruise;
+  run->since -= steps * run->cruise;
   run->cruise_left -= steps;
   return steps;
 }
+
+#if BUSHD_RUN_BRAKES
+static uint32_t advance_brake(bushd_run* run) {
+  const uint16_t* code = run->table->decel.code + run->decel_left;
+  const uint16_t before = run->brake_left;
+  while (run->brake_left > 0 && run->since >= code[run->brake_left - 1]) {
+    run->since -= code[--run->brake_left];
+  }
+  return (uint32_t)(before - run->brake_left);
+}
+#endif
 
 static uint32_t advance_decel(bushd_run* run) {
   const bushd_ramp* ramp = &run->table->decel;
@@ -235,7 +294,10 @@ static uint32_t advance(bushd_run* run, uint32_t units) {
     ++steps;
   }
   if (run->accel_at < run->accel_end) steps += advance_accel(run);
-  if (run->accel_at == run->accel_end) {
+#if BUSHD_RUN_BRAKES
+  if (run->brake_left != 0) steps += advance_brake(run);
+#endif
+  if (run->accel_at == run->accel_end && brake_left(run) == 0) {
     if (run->cruise_left != 0) steps += advance_cruise(run);
     if (run->cruise_left == 0 && run->decel_left != 0) steps += advance_decel(run);
   }
@@ -355,7 +417,7 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
 
 static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t ticks,
                                   coarse_out out) {
-  const uint16_t cruise = run->table->cruise;
+  const uint16_t cruise = run->cruise;
   // In units if ticks are whole units, else in ns: one remainder to carry instead of two.
   const bool in_ns = tick->rest_ns != 0;
   const int64_t scale = in_ns ? tick->unit_ns : 1;
@@ -388,7 +450,7 @@ static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t
 }
 
 static size_t coarse_block(bushd_run* run, const tick_units* tick, size_t ticks, coarse_out out) {
-  if (run->lead_delay != 0 || bushd_run_begins_later(run)) return 0;
+  if (run->lead_delay != 0 || brake_left(run) != 0 || bushd_run_begins_later(run)) return 0;
   if (run->accel_at < run->accel_end) return coarse_accel_block(run, tick, ticks, out);
   if (run->cruise_left != 0) return coarse_cruise_block(run, tick, ticks, out);
   return coarse_decel_block(run, tick, ticks, out);

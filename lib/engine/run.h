@@ -27,6 +27,11 @@ extern "C" {
 #define BUSHD_RUN_COUNTS 1
 #endif
 
+// Runs may slow down to another speed in flight. Only who plans runs does that.
+#ifndef BUSHD_RUN_BRAKES
+#define BUSHD_RUN_BRAKES 1
+#endif
+
 // Plain state, copyable: a copy taken at some tick replays the same ticks. Private to run.c but for
 // the fields named here: `direction` (+1 / -1), `steps_done`.
 typedef struct bushd_run {
@@ -38,10 +43,14 @@ typedef struct bushd_run {
   uint32_t since;        // whole time units since the last step; before the run begins (begin_late)
                          // negative, modulo 2^32
   uint32_t since_ns;     // and the rest, < time_unit_ns
+  uint16_t cruise;       // the table's cruise delay, or the run's floor above it
   uint16_t lead_delay;   // of a step with a delay of its own, before all others; 0: none
   uint16_t accel_at;     // next index on the accelerating side
   uint16_t accel_end;    // and where that part ends
-  uint16_t decel_left;   // steps left on the decelerating side
+#if BUSHD_RUN_BRAKES
+  uint16_t brake_left;  // steps on the decelerating side before those at the cruise delay
+#endif
+  uint16_t decel_left;   // steps left on the decelerating side, at the end
   uint8_t fraction;      // of the position at the end of the last fine tick, 1/256 step
   int8_t direction;
 } bushd_run;
@@ -58,8 +67,10 @@ static inline void bushd_run_count(bushd_run* run, uint32_t steps) {
 
 // A move of `steps` (>= 0) from rest; direction is +1 or -1. The first tick expanded is the one in
 // which the move starts at its beginning. O(log steps).
+//   floor  no delay is shorter, time units; the table's own delays where they are longer. 0: none
 // Precondition: the table passed bushd_table_check.
-void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction);
+void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction,
+                     uint16_t floor);
 
 // Puts the beginning of a run that has just been started `ns` after the beginning of its first
 // tick. Precondition: ns < length of the ticks that it will be expanded in. O(1).
@@ -79,16 +90,17 @@ void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_
 // the fewest steps k with D(k) <= its delay. Does nothing to a run that is done. O(log count).
 void bushd_run_ramp_down(bushd_run* run);
 
-// Changes where the run ends, in its direction: the running step, of delay x, is completed, and
-// `steps_after` more follow. They take up the accelerating side where x stands in it: with a the
-// first index of A(a) <= x, or the one after it if A(a) == x, the delay before step j of these n is
+// Changes where the run ends, in its direction, and its floor: the running step, of delay x, is
+// completed, and `steps_after` more follow. They take up the accelerating side where x stands in
+// it: with a the first index of A(a) <= x, or the one after it if A(a) == x, and k the fewest steps
+// with D(k) <= x, the delay before step j of these n is
 //
-//     max( A(a+j-1), D(n-j), c )
+//     max( A(a+j-1), D(n-j), c, floor(j) ),   floor(j) = min( floor, D(k-j) ) while j <= k, else floor
 //
-// so that the run goes on speeding up, holds cruise, or ramps down, whatever it did before. Returns
-// false, and changes nothing, if a ramp-down takes more steps than that (the run would overshoot)
-// or the run is done. O(log steps).
-bool bushd_run_retarget(bushd_run* run, uint32_t steps_after);
+// so that the run goes on speeding up, slows down to its floor, holds cruise, or ramps down,
+// whatever it did before. Returns false, and changes nothing, if a ramp-down takes more steps than
+// that (the run would overshoot) or the run is done. O(log steps).
+bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, uint16_t floor);
 
 // The next `ticks` displacements of `tick_ns` each into out[0], out[stride], ... ; after the end of
 // the run they are 0. Returns the number of ticks in which the run was still active (<= ticks), so

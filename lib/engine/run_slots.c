@@ -115,21 +115,29 @@ static inline void make_due(bushd_run_part* part) {
   --part->left;
 }
 
+// As those of a small MCU do, these read the rate before they know whether a step follows.
+// Volatile, so that a sanitizer sees it.
+static inline uint64_t rate_of(const bushd_run_part* part) {
+  return *(const volatile uint64_t*)part->rate;
+}
+
 void bushd_run_make_on_side(bushd_run_part* part, bool down) {
+  const uint64_t rate = rate_of(part);
   while (true) {
     make_due(part);
     if (part->left == 0) return;
     part->delay = down ? *--part->code : *++part->code;
     if (part->since < part->delay) return;
-    part->place += *part->rate * part->delay;
+    part->place += rate * part->delay;
   }
 }
 
 void bushd_run_make_evenly(bushd_run_part* part) {
+  const uint64_t rate = rate_of(part);
   while (true) {
     make_due(part);
     if (part->left == 0 || part->since < part->delay) return;
-    part->place += *part->rate;
+    part->place += rate;
   }
 }
 #endif
@@ -145,6 +153,7 @@ static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_p
   uint8_t made = 1;
   if (run->lead_delay != 0) {
     part->left = 1;
+    part->rate = &tick->per_unit;  // read, though no step follows
     bushd_run_make_evenly(part);
     run->lead_delay = 0;
   } else if (run->accel_at < run->accel_end) {
@@ -156,7 +165,12 @@ static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_p
     run->accel_at = (uint16_t)(run->accel_at + made);
   } else if (run->cruise_left != 0) {
     const uint8_t left = part->left = at_most(run->cruise_left);
+    uint64_t rate = 0;
     part->rate = &tick->per_cruise;
+    if (run->cruise != tick->cruise) {
+      bushd_run_move_place(&rate, &tick->per_unit, run->cruise);
+      part->rate = &rate;
+    }
     bushd_run_make_evenly(part);
     made = (uint8_t)(left - part->left);
     run->cruise_left -= made;

@@ -45,15 +45,15 @@ static inline bool bushd_run_tick_fits(const bushd_run_tick* tick, uint32_t tick
 // mixed.
 //   masks  slot_count entries
 // Precondition: as for bushd_run_expand_*; then no two steps share a slot. `tick` is of the
-// run's table. O(slots + steps), no division.
+// run's table. It does not brake (bushd_run_retarget). O(slots + steps), no division.
 int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks);
 
 // Steps of a tick that follow each other on one part of a run. A small MCU may link the four
 // functions of its own (BUSHD_OWN_RUN_PARTS).
 typedef struct bushd_run_part {
   uint64_t place;        // of the step that is due, in slots from the tick's start x 2^32
-  const uint64_t* rate;  // places in a unit
-  const uint16_t* code;  // its delay, on a side
+  const uint64_t* rate;  // places in a unit; read even for a single step
+  const uint16_t* code;  // its delay; a side's only
   uint16_t* masks;
   uint16_t bit;
   uint16_t last_slot;

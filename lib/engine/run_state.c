@@ -5,17 +5,18 @@ static bool cruises(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
   if (run->lead_delay != 0 || run->accel_at != run->accel_end || run->cruise_left == 0) {
     return false;
   }
-  const uint64_t step_ns = (uint64_t)run->table->cruise * run->table->time_unit_ns;
+  const uint64_t step_ns = (uint64_t)run->cruise * run->table->time_unit_ns;
   const uint64_t since_ns = (uint64_t)run->since * run->table->time_unit_ns + run->since_ns;
   return since_ns + (uint64_t)tick_ns * ticks < step_ns * run->cruise_left;
 }
 
 bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
+  const uint16_t cruise = run->cruise == run->table->cruise ? (uint16_t)0 : run->cruise;
   const bushd_run_state state = {run->direction,       cruises(run, tick_ns, ticks),
                                  (uint16_t)run->since, run->since_ns,
                                  run->lead_delay,      run->accel_at,
                                  run->accel_end,       run->cruise_left,
-                                 run->decel_left};
+                                 run->decel_left,      cruise};
   return state;
 }
 
@@ -33,15 +34,16 @@ static bool may_follow(const bushd_table* table, uint16_t x, uint16_t at) {
   return at == 0 || bushd_table_accel(table, at - 1u) >= x;
 }
 
-static bool speeds_up_in_order(const bushd_table* table, const bushd_run_state* state) {
+static bool speeds_up_in_order(const bushd_table* table, uint16_t cruise,
+                               const bushd_run_state* state) {
   const uint16_t top = state->accel_end;
   const bool rises = state->accel_at < top;
-  const bool on_top = bushd_table_accel(table, top) <= table->cruise;
+  const bool on_top = bushd_table_accel(table, top) <= cruise;
   const uint16_t brake =
       state->decel_left != 0 ? table->decel.code[state->decel_left - 1] : UINT16_MAX;
   if (state->cruise_left != 0) {
     if (!on_top) return false;
-  } else if (rises && !on_top && brake < table->accel.code[top]) {
+  } else if (rises && brake < bushd_table_accel(table, top)) {
     return false;
   }
   if (state->lead_delay == 0) return true;
@@ -53,10 +55,20 @@ static bool speeds_up_in_order(const bushd_table* table, const bushd_run_state* 
          (may_follow(table, state->lead_delay, top) && brake >= bushd_table_accel(table, top));
 }
 
-static bool slows_down_in_order(const bushd_table* table, const bushd_run_state* state) {
+// A lead faster than the cruise delay goes over to it where no code of the decelerating side lies
+// between them.
+static bool lead_may_cruise(const bushd_table* table, uint16_t cruise,
+                            const bushd_run_state* state) {
+  return state->lead_delay >= cruise || state->cruise_left == 0 ||
+         bushd_table_steps_to_stop(table, cruise) ==
+             bushd_table_steps_to_stop(table, state->lead_delay);
+}
+
+static bool slows_down_in_order(const bushd_table* table, uint16_t cruise,
+                                const bushd_run_state* state) {
   const uint16_t brakes_from = bushd_table_decel(table, state->decel_left);
   if (state->cruise_left != 0) {
-    if (brakes_from > table->cruise) return false;
+    if (brakes_from > cruise) return false;
   } else if (state->accel_at < state->accel_end) {
     if (brakes_from > table->accel.code[state->accel_end - 1]) return false;
   }
@@ -65,22 +77,26 @@ static bool slows_down_in_order(const bushd_table* table, const bushd_run_state*
   return state->lead_delay == 0 || bushd_table_decel(table, after_lead) <= state->lead_delay;
 }
 
-static bool parts_fit(const bushd_table* table, const bushd_run_state* state) {
+static bool parts_fit(const bushd_table* table, uint16_t cruise, const bushd_run_state* state) {
   const uint32_t most = UINT32_MAX - 1u - state->accel_end - state->decel_left;
+  // A ramp-down begins anywhere.
+  const bool after_lead_only = state->accel_at == state->accel_end && state->cruise_left == 0;
   return state->accel_at <= state->accel_end && state->cruise_left <= most &&
-         part_fits(&table->accel, table->cruise, state->accel_end) &&
-         part_fits(&table->decel, table->cruise, state->decel_left) &&
-         (state->lead_delay == 0 || state->lead_delay >= table->cruise) &&
-         speeds_up_in_order(table, state) && slows_down_in_order(table, state);
+         part_fits(&table->accel, cruise, state->accel_end) &&
+         part_fits(&table->decel, after_lead_only ? table->cruise : cruise, state->decel_left) &&
+         (state->lead_delay == 0 ||
+          (state->lead_delay >= table->cruise && lead_may_cruise(table, cruise, state))) &&
+         speeds_up_in_order(table, cruise, state) && slows_down_in_order(table, cruise, state);
 }
 
 bool bushd_run_restore(bushd_run* run, const bushd_table* table, const bushd_run_state* state) {
-  bushd_run_start(run, table, 0, state->direction);
+  if (state->cruise != 0 && state->cruise <= table->cruise) return false;
+  bushd_run_start(run, table, 0, state->direction, state->cruise);
   if (state->cruises) {
     if (state->lead_delay != 0) return false;
     run->cruise_left = UINT32_MAX;
   } else {
-    if (!parts_fit(table, state)) return false;
+    if (!parts_fit(table, run->cruise, state)) return false;
     run->lead_delay = state->lead_delay;
     run->accel_at = state->accel_at;
     run->accel_end = state->accel_end;

@@ -22,15 +22,17 @@ typedef struct bushd_run_state {
   uint16_t accel_end;
   uint32_t cruise_left;
   uint16_t decel_left;
+  uint16_t cruise;  // the delay, time units, if above the table's; else 0
 } bushd_run_state;
 
 // The state of a run that is not done, for going on with it for `ticks` ticks. Precondition: the
-// run stands at a tick boundary and has begun (bushd_run_begin_late). O(1).
+// run stands at a tick boundary, has begun (bushd_run_begin_late), and does not brake
+// (bushd_run_retarget). O(1).
 bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks);
 
 // A run in that state; steps_done, where it is counted, begins at 0. Returns false, and leaves the
 // run undefined, if no run of this table can be in that state: nothing in `state` is believed.
-// O(1).
+// O(log count).
 bool bushd_run_restore(bushd_run* run, const bushd_table* table, const bushd_run_state* state);
 
 #ifdef __cplusplus

@@ -51,11 +51,22 @@ void put_motors(auto& message, const api::MotorNames& motors) {
   message.motor_count = count(motors);
 }
 
+void put_speed(auto& message, const std::optional<api::Speed>& speed) {
+  message.speed = speed ? speed->per_s : 0.0;
+  message.speed_in_steps = speed && speed->in_steps ? 1 : 0;
+}
+
+std::optional<api::Speed> speed_of(const auto& message) {
+  if (message.speed == 0) return std::nullopt;
+  return api::Speed{.per_s = message.speed, .in_steps = message.speed_in_steps != 0};
+}
+
 // One of these per request: to the message, and back.
 move_t to_message(const api::Move& move) {
   move_t message{};
   message.kind = move.kind == api::Move::Kind::kAbsolute ? move_t::ABSOLUTE : move_t::RELATIVE;
   message.dry_run = move.dry_run ? 1 : 0;
+  put_speed(message, move.speed);
   put_motors(message, move.motors);
   return message;
 }
@@ -64,7 +75,8 @@ std::optional<api::Request> from_message(const move_t& message) {
   return api::Move{.kind = message.kind == move_t::ABSOLUTE ? api::Move::Kind::kAbsolute
                                                             : api::Move::Kind::kRelative,
                    .motors = amounts_of(message.motors),
-                   .dry_run = message.dry_run != 0};
+                   .dry_run = message.dry_run != 0,
+                   .speed = speed_of(message)};
 }
 
 template <class Message>
@@ -98,10 +110,12 @@ std::optional<api::Request> from_message(const clear_faults_t& message) {
   return api::ClearFaults{message.motors};
 }
 home_t to_message(const api::Home& home) {
-  return motors_message<home_t>(home.motors);
+  auto message = motors_message<home_t>(home.motors);
+  put_speed(message, home.speed);
+  return message;
 }
 std::optional<api::Request> from_message(const home_t& message) {
-  return api::Home{message.motors};
+  return api::Home{.motors = message.motors, .speed = speed_of(message)};
 }
 disarm_t to_message(const api::Disarm& disarm) {
   return motors_message<disarm_t>(disarm.motors);
@@ -147,6 +161,7 @@ arm_t to_message(const api::Arm& arm) {
   arm_t message{};
   message.edge = arm.edge == api::Edge::kRising ? arm_t::RISING : arm_t::FALLING;
   message.delay_us = arm.delay_us;
+  put_speed(message, arm.speed);
   put_motors(message, arm.motors);
   return message;
 }
@@ -154,7 +169,8 @@ std::optional<api::Request> from_message(const arm_t& message) {
   if (message.edge != arm_t::RISING && message.edge != arm_t::FALLING) return std::nullopt;
   return api::Arm{.edge = message.edge == arm_t::RISING ? api::Edge::kRising : api::Edge::kFalling,
                   .delay_us = message.delay_us,
-                  .motors = amounts_of(message.motors)};
+                  .motors = amounts_of(message.motors),
+                  .speed = speed_of(message)};
 }
 
 position_compare_t to_message(const api::PositionCompare& compare) {

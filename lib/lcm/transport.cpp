@@ -7,6 +7,7 @@
 #include <set>
 
 #include "lcm/datagram_filter.h"
+#include "lcm/receive_buffer.h"
 
 namespace bushd::lcm {
 namespace {
@@ -77,6 +78,8 @@ Result<std::unique_ptr<Transport>> Transport::open(const std::string& url,
   std::unique_ptr<Transport> transport(new Transport(lcm, fd));
   for (const int udp_socket : udp_sockets()) {
     if (others.contains(udp_socket)) continue;
+    // Who gives a size gets that one.
+    if (url.find("recv_buf_size=") == std::string::npos) enlarge_receive_buffer(udp_socket);
     if (auto filtered = accept_whole_messages_only(udp_socket, channels); !filtered)
       return fail(filtered.error());
   }
@@ -108,14 +111,15 @@ void Transport::on_message(const lcm_recv_buf_t* buffer, const char*, void* subs
   }
 }
 
-Result<void> Transport::subscribe_bytes(const std::string& channel, BytesHandler handler) {
+Result<void> Transport::subscribe_bytes(const std::string& channel, BytesHandler handler,
+                                        int queue_capacity) {
   if (auto checked = check_channel(channel); !checked) return checked;
   auto subscription = std::make_unique<Subscription>(Subscription{this, std::move(handler)});
   lcm_subscription_t* added =
       lcm_subscribe(lcm_, literal(channel).c_str(), &Transport::on_message, subscription.get());
   if (added == nullptr)
     return fail(fmt::format("LCM refuses to subscribe to channel \"{}\"", channel));
-  lcm_subscription_set_queue_capacity(added, kQueueCapacity);
+  lcm_subscription_set_queue_capacity(added, queue_capacity);
   subscriptions_.push_back(std::move(subscription));
   return {};
 }

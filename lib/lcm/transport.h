@@ -23,9 +23,8 @@ namespace bushd::lcm {
 // handle() and subscribe() belong to one thread; publish() may be called from any.
 class Transport {
  public:
-  // Messages that wait for handle(), per subscription; LCM drops the newest beyond. LCM's default
-  // of 30 is less than one snapshot of 512 motors. For bursts the socket needs room too:
-  // `&recv_buf_size=4194304` in the URL, within the kernel's net.core.rmem_max.
+  // Messages that wait for handle(), per subscription unless it asks for more; LCM drops the newest
+  // beyond. LCM's default of 30 is less than one snapshot of 512 motors.
   static constexpr int kQueueCapacity = 256;
 
   // `url`: "udpm://239.255.76.67:7667?ttl=0", or "memq://" for messages that stay within this
@@ -33,6 +32,8 @@ class Transport {
   // is an error too. LCM starts a receiving thread here, which inherits the signal mask and the
   // scheduling policy: block signals that are to be taken from a descriptor before, become
   // real-time after.
+  // The socket's receive buffer is enlarged (lcm/receive_buffer.h), unless the URL has its size:
+  // `&recv_buf_size=4194304`.
   // With `channels` the kernel keeps everything else away, so that a flood on other channels is
   // none here. Up to 4.
   static Result<std::unique_ptr<Transport>> open(const std::string& url,
@@ -74,7 +75,8 @@ class Transport {
 
   // The same with payloads as they are. `handler` has to survive any of them.
   using BytesHandler = std::function<void(std::span<const std::uint8_t>)>;
-  Result<void> subscribe_bytes(const std::string& channel, BytesHandler handler);
+  Result<void> subscribe_bytes(const std::string& channel, BytesHandler handler,
+                               int queue_capacity = kQueueCapacity);
   Result<void> publish_bytes(const std::string& channel, std::span<const std::uint8_t> bytes);
 
   // Payloads on subscribed channels that were no message of the channel's type.

@@ -1,11 +1,13 @@
 // Frames on their way to the line, and when the line will have carried them.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "engine/frame.h"
 #include "engine/message.h"
 #include "fieldbus/address.h"
 
@@ -25,6 +27,9 @@ class FrameWriter {
   // Returns the frame's sequence number.
   std::uint8_t send(std::int64_t now_us, McuAddress address, std::uint8_t type,
                     std::span<const std::uint8_t> payload);
+
+  // It is one of the last 256: an adapter that echoes has returned it.
+  bool has_sent(const bushd_frame& frame) const;
 
   // What was sent since the last clear(); valid until the next send().
   std::span<const std::uint8_t> bytes() const { return bytes_; }
@@ -46,6 +51,7 @@ class FrameWriter {
   std::vector<std::uint8_t> bytes_;
   std::int64_t free_us_ = 0;
   std::uint8_t sequence_ = 0;
+  std::array<std::uint32_t, 256> sent_{};  // fingerprints, by sequence number
 };
 
 }  // namespace bushd::link

@@ -54,11 +54,27 @@ void Master::port_lost(std::int64_t now_us, const std::string& cause) {
 }
 
 void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
+  notice_standing_still(now_us);
   transactions_.receive(now_us, bytes);
+}
+
+// While an MCU is not offline it is asked again and again, unless nobody calls step(). Another
+// master may have taken the place of one that was silent for so long; answers that have waited
+// meanwhile are of a time that is over.
+void Master::notice_standing_still(std::int64_t now_us) {
+  const std::int64_t still_us = now_us - stepped_us_;
+  if (!port_open_ || still_us < Synchroniser::kOtherMasterUs) return;
+  transactions_.abandon();
+  for (McuRecord& mcu : mcus_) {
+    if (mcu.view.phase != McuPhase::kOnline) continue;
+    mcu.view.outdated_us = still_us;
+    mcu.poll_wanted = true;
+  }
 }
 
 std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   writer_.clear();
+  notice_standing_still(now_us);
   stepped_us_ = now_us;
   if (!port_open_) return {};
   transactions_.expire(now_us);
@@ -133,12 +149,12 @@ void Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   streams_.begin(mcu, motor, start);
 }
 
-void Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps) {
-  streams_.begin_table_run(mcu, motor, start, steps);
+void Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
+  streams_.begin_table_run(mcu, motor, start, run);
 }
 
-void Master::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps) {
-  streams_.follow_table_run(mcu, motor, start, steps);
+void Master::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
+  streams_.follow_table_run(mcu, motor, start, run);
 }
 
 void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
@@ -159,10 +175,7 @@ std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
   std::vector<bushd_table_run_entry> entries;
   for (const Armed& move : moves) {
     entries.push_back(
-        {.motor = move.motor,
-         .slot = record.setup.table_of_motor[move.motor].value_or(0),
-         .direction = static_cast<std::int8_t>(move.steps < 0 ? -1 : 1),
-         .steps = static_cast<std::uint32_t>(std::abs(static_cast<std::int64_t>(move.steps)))});
+        entry_of(move.motor, record.setup.table_of_motor[move.motor].value_or(0), move.run));
   }
   std::sort(entries.begin(), entries.end(),
             [](const auto& a, const auto& b) { return a.motor < b.motor; });

@@ -34,6 +34,7 @@
 #include "link/rehearsal.h"
 #include "link/stream_scheduler.h"
 #include "link/synchroniser.h"
+#include "link/table_run.h"
 #include "link/tick_source.h"
 #include "link/transactions.h"
 
@@ -75,20 +76,18 @@ class Master : private Transactions::Listener, private Connector::Listener {
   // From `start` on, until dropped, the source has ticks for this motor. Preconditions: the MCU is
   // online, the motor has a table, start >= earliest_start.
   void begin(McuIndex mcu, std::uint8_t motor, Tick start);
-  // The same, but the MCU gets the whole move at once and runs it by the motor's table. `steps`
-  // (either sign, not 0) are those of the source's run from `start` on. Precondition also: the MCU
-  // can (can_run_tables).
-  void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps);
+  // The same, but the MCU gets the whole move at once and runs it by the motor's table. `run` is
+  // the source's from `start` on. Precondition also: the MCU can (can_run_tables).
+  void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run);
   bool can_run_tables(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TABLE_RUN); }
   // Everything that decides what would go out now (rehearsal.h).
   BusSnapshot snapshot(std::int64_t now_us) const;
-  // Moves of the MCU's motors, `steps` (either sign, not 0) each, that an edge at its trigger input
-  // starts. What becomes of them its reports tell, from when they have the number returned here.
+  // Runs of the MCU's motors that an edge at its trigger input starts. What becomes of them its reports tell, from when they have the number returned here.
   // Preconditions: the MCU is online and can (can_trigger), the motors have tables and are at rest,
   // no others wait (McuView::report.armed).
   struct Armed {
     std::uint8_t motor;
-    std::int32_t steps;
+    TableRun run;
   };
   std::uint8_t arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                    std::span<const Armed> moves);
@@ -96,7 +95,7 @@ class Master : private Transactions::Listener, private Connector::Listener {
   void disarm(McuIndex mcu) { connector_.queue(mcu).disarm(); }
   bool can_trigger(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TRIGGER); }
   // The MCU has started one of them; from now on it is a table run like any other.
-  void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps);
+  void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run);
   // When the MCU's position compare output pulses from now on. Precondition: it has one.
   void position_compare(McuIndex mcu, const bushd_position_compare& message);
   bool can_compare_position(McuIndex mcu) const { return can(mcu, BUSHD_CAN_POSITION_COMPARE); }
@@ -142,6 +141,7 @@ class Master : private Transactions::Listener, private Connector::Listener {
   void went_offline(McuIndex mcu, bool was_online) override;
   void refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) override;
 
+  void notice_standing_still(std::int64_t now_us);
   void handle_report(std::int64_t now_us, const Transactions::Answer& answer,
                      const bushd_report& report);
   bool send_next(std::int64_t now_us);

@@ -86,6 +86,7 @@ void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answ
   }
   view.report = report;
   view.reported = true;
+  view.outdated_us = 0;
   poller_.follow_report(index);
   if (report.faults & BUSHD_FAULT_OVERCURRENT) connector_.drivers_off(index);
   const auto agreement = synchroniser_.follow_report(now_us, index, answer.line_us, answer.in_time);
@@ -98,7 +99,9 @@ void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answ
   unwrap_known_until(view);
   const bool in_step = agreement == Synchroniser::Agreement::kInStep;
   if (view.phase == McuPhase::kConnecting) {
-    connector_.follow_report(now_us, index, in_step);
+    const bool listens =
+        synchroniser_.perhaps_another(now_us) && !synchroniser_.two_masters(now_us);
+    connector_.follow_report(now_us, index, in_step && !listens);
     return;
   }
   if (!in_step && (report.flags & BUSHD_FLAG_CONFIGURED) == 0) {

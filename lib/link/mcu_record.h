@@ -22,6 +22,9 @@ struct McuView {
   bushd_identity identity{};
   bool reported = false;  // the fields below are valid
   bushd_report report{};
+  // How old the report was when this daemon, having stood still for very long, went on; 0: since
+  // then there has been another one.
+  std::int64_t outdated_us = 0;
   Tick tick = 0;                                         // report.tick, unwrapped
   std::array<Tick, BUSHD_MOTORS_PER_MCU> known_until{};  // likewise
 };

@@ -19,8 +19,8 @@ Rehearsal::Rehearsal(BusSnapshot bus, TickSource& source, std::span<const Planne
   writer_.reset(bus_.now_us);
   PerMcu<std::uint8_t> named(bus_.mcus.size());
   for (const PlannedMove& move : moves) {
-    if (move.run_steps) {
-      streams_.begin_table_run(move.mcu, move.motor, move.start, *move.run_steps);
+    if (move.run) {
+      streams_.begin_table_run(move.mcu, move.motor, move.start, *move.run);
     } else {
       streams_.begin(move.mcu, move.motor, move.start);
     }

@@ -12,6 +12,7 @@
 #include "link/frame_writer.h"
 #include "link/mcu_record.h"
 #include "link/stream_scheduler.h"
+#include "link/table_run.h"
 #include "link/tick_source.h"
 
 namespace bushd::link {
@@ -21,7 +22,7 @@ struct PlannedMove {
   McuIndex mcu;
   std::uint8_t motor;
   Tick start;
-  std::optional<std::int32_t> run_steps;  // of a table run
+  std::optional<TableRun> run;
 };
 
 struct Traffic {

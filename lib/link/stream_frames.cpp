@@ -36,7 +36,7 @@ bool StreamScheduler::send_due_replacement(std::int64_t now_us) {
     mcu.epoch = ++mcu.newest_epoch;
     for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
       if (!has(mask, m)) continue;
-      mcu.stream[m].run_steps.reset();
+      mcu.stream[m].run.reset();
       mcu.stream[m].beyond_gap.reset();
       mcu.stream[m].sent = mcu.replace_at;
       mcu.stream[m].from_before = mcu.stream[m].from;
@@ -59,6 +59,7 @@ bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling, b
   // The neediest first; one whose queue is full must not keep the others waiting.
   std::vector<std::pair<Tick, McuIndex>> needy;
   for (const McuIndex i : mcus_.indices()) {
+    finish_ended(i);
     const Mcu& mcu = mcus_[i];
     const bool online = records_[i].view.phase == McuPhase::kOnline;
     if (!online || (only_replaced && mcu.replaced == 0)) continue;
@@ -68,6 +69,17 @@ bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling, b
   return std::any_of(needy.begin(), needy.end(), [&](const auto& entry) {
     return send_ticks_of(now_us, entry.second, filling);
   });
+}
+
+// A motor that was to have another plan, and did not get it, may have been told all of its own. An
+// MCU refuses more for it, and with it all that the frame has for others.
+void StreamScheduler::finish_ended(McuIndex index) {
+  Mcu& mcu = mcus_[index];
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    Stream& stream = mcu.stream[m];
+    if (!mcu.sendable(m) || !stream.begun()) continue;
+    stream.finished = stream.next >= source_.end_tick(index, m);
+  }
 }
 
 bool StreamScheduler::behind(std::int64_t now_us, std::int64_t lead_us) const {
@@ -99,7 +111,7 @@ StreamScheduler::Choice StreamScheduler::choose(const Mcu& mcu, Tick first) {
       continue;
     }
     if (stream.beyond_gap) choice.join = std::min(choice.join, stream.beyond_gap->from);
-    (stream.starts() ? (stream.run_steps ? choice.runs : choice.starts) : choice.goes_on) |=
+    (stream.starts() ? (stream.run ? choice.runs : choice.starts) : choice.goes_on) |=
         static_cast<std::uint16_t>(1u << m);
   }
   return choice;
@@ -144,12 +156,8 @@ void StreamScheduler::send_table_runs(std::int64_t now_us, McuIndex index, std::
   std::uint8_t count = 0;
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if (!has(mask, m)) continue;
-    const std::int32_t steps = *mcus_[index].stream[m].run_steps;
-    entries[count++] = {
-        .motor = m,
-        .slot = setup.table_of_motor[m].value_or(0),
-        .direction = static_cast<std::int8_t>(steps < 0 ? -1 : 1),
-        .steps = static_cast<std::uint32_t>(std::abs(static_cast<std::int64_t>(steps)))};
+    entries[count++] =
+        entry_of(m, setup.table_of_motor[m].value_or(0), *mcus_[index].stream[m].run);
     note_sent(index, m, first, source_.end_tick(index, m));
   }
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;

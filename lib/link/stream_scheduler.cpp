@@ -32,15 +32,13 @@ void StreamScheduler::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   stream.start = stream.from = stream.from_before = stream.next = stream.sent = start;
 }
 
-void StreamScheduler::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start,
-                                      std::int32_t steps) {
+void StreamScheduler::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
   begin(mcu, motor, start);
-  mcus_[mcu].stream[motor].run_steps = steps;
+  mcus_[mcu].stream[motor].run = run;
 }
 
-void StreamScheduler::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start,
-                                       std::int32_t steps) {
-  begin_table_run(mcu, motor, start, steps);
+void StreamScheduler::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
+  begin_table_run(mcu, motor, start, run);
   Stream& stream = mcus_[mcu].stream[motor];
   stream.next = stream.sent = source_.end_tick(mcu, motor);
   stream.finished = true;
@@ -51,7 +49,7 @@ void StreamScheduler::drop(McuIndex mcu, std::uint8_t motor) {
   Stream& stream = m.stream[motor];
   stream.active = false;
   // A run that the MCU has broken off does not occupy the motor until where it was to end.
-  if (stream.run_steps) stream.next = records_[mcu].view.known_until[motor];
+  if (stream.run) stream.next = records_[mcu].view.known_until[motor];
   // Nor is a replacement that has been asked for and not yet sent.
   m.replacing &= static_cast<std::uint16_t>(~bit(motor));
 }
@@ -96,9 +94,9 @@ void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, Ti
       if (!too_late(stream.sent, now)) earliest = std::min(earliest, stream.sent);
     } else {
       // A table run of which nothing has been sent is another one now; it goes out as a stream.
-      stream.run_steps.reset();
+      stream.run.reset();
+      stream.finished = false;
     }
-    stream.finished = false;
   }
   if (sent == 0) return;
   // Two wishes before the first was sent: one replacement must serve both, so it takes the earlier
@@ -172,7 +170,7 @@ void StreamScheduler::follow_streams(McuIndex index) {
     Stream& stream = mcus_[index].stream[m];
     if (!stream.active) continue;
     // It has the whole move.
-    if (stream.run_steps && (report.running >> m & 1) != 0) continue;
+    if (stream.run && (report.running >> m & 1) != 0) continue;
     const Tick known = view.known_until[m];
     const bool moving = (report.moving >> m & 1) != 0;
     // A frame that it shares with others may have gone on past its end: that is rest, and no MCU
@@ -198,7 +196,7 @@ void StreamScheduler::go_back(McuIndex index, std::uint8_t motor) {
   stream.next = std::max(view.known_until[motor], stream.from);
   stream.beyond_gap.reset();
   stream.finished = false;
-  Tick missing = stream.run_steps ? 0 : stream.sent - stream.next;
+  Tick missing = stream.run ? 0 : stream.sent - stream.next;
   if ((report.out_of_order >> motor & 1) != 0) {
     const auto unwrap = [&](std::uint16_t tick) {
       return view.tick + static_cast<std::int16_t>(tick - static_cast<std::uint16_t>(report.tick));

@@ -20,6 +20,7 @@
 #include "link/frame_writer.h"
 #include "link/mcu_index.h"
 #include "link/mcu_record.h"
+#include "link/table_run.h"
 #include "link/tick_source.h"
 
 namespace bushd::link {
@@ -42,8 +43,8 @@ class StreamScheduler {
 
   // See Master for these. Preconditions: as there.
   void begin(McuIndex mcu, std::uint8_t motor, Tick start);
-  void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps);
-  void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, std::int32_t steps);
+  void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run);
+  void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run);
   void replace(McuIndex mcu, std::uint16_t motors, Tick first, Tick now);
   void drop(McuIndex mcu, std::uint8_t motor);
 
@@ -97,7 +98,7 @@ class StreamScheduler {
     // behind a gap. Reports need not show them, so the next replacement takes them away.
     bool unsure = false;
     // Of a table run, until it is replaced.
-    std::optional<std::int32_t> run_steps;
+    std::optional<TableRun> run;
 
     bool begun() const { return sent != from; }
     bool starts() const { return next == start && from == start; }
@@ -135,6 +136,7 @@ class StreamScheduler {
   void go_back(McuIndex mcu, std::uint8_t motor);
 
   // stream_frames.cpp
+  void finish_ended(McuIndex mcu);
   static Choice choose(const Mcu& mcu, Tick first);
   bool send_ticks_of(std::int64_t now_us, McuIndex mcu, const Filling& filling);
   void send_table_runs(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first);

@@ -4,8 +4,6 @@
 #include <array>
 #include <cstdlib>
 
-#include "fieldbus/line_times.h"
-
 namespace bushd::link {
 namespace {
 
@@ -16,8 +14,7 @@ constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be
 // ppm apart need a second without a SYNC for it, those whose rate is known much longer.
 constexpr std::int64_t kAgreementNs = 100'000;
 constexpr std::int64_t kClockJumpUs = 400'000;  // more than any latency: it is another time
-// A master says SYNC at least as often; two of them in a row may be lost.
-constexpr std::int64_t kOtherMasterUs = 3 * kSyncPeriodUs;
+constexpr std::size_t kOwnSyncsKept = 2 * Synchroniser::kOtherMasterUs / kFirstSyncPeriodUs;
 
 }  // namespace
 
@@ -29,12 +26,7 @@ Synchroniser::Synchroniser(const BusSetup& setup, PerMcu<McuRecord>& mcus, Frame
       since_sync_(mcus.size()) {}
 
 void Synchroniser::overheard(std::int64_t now_us, const bushd_frame& frame) {
-  bushd_sync sync;
-  if (frame.type == BUSHD_MSG_SYNC &&
-      bushd_decode_sync(frame.payload, frame.payload_size, &sync) == BUSHD_OK &&
-      sync.master != setup_.master) {
-    other_master_until_us_ = now_us + kOtherMasterUs;
-  }
+  if (!writer_.has_sent(frame)) other_master_until_us_ = now_us + kOtherMasterUs;
 }
 
 bool Synchroniser::two_masters(std::int64_t now_us) const {
@@ -43,6 +35,16 @@ bool Synchroniser::two_masters(std::int64_t now_us) const {
     return mcu.view.phase != McuPhase::kOffline && mcu.view.reported &&
            (mcu.view.report.flags & BUSHD_FLAG_TWO_MASTERS) != 0;
   });
+}
+
+// Also by a SYNC from before this master was there: the last one that the MCU has heard.
+void Synchroniser::note_other_master(std::int64_t now_us, const bushd_report& report) {
+  if ((report.flags & BUSHD_FLAG_SYNC_HEARD) == 0) return;
+  if (std::ranges::find(own_sync_ids_, report.sync_id) != own_sync_ids_.end()) return;
+  const auto age_ticks = static_cast<std::int32_t>(report.tick - report.sync_tick);
+  const std::int64_t age_us = age_ticks * setup_.tick_ns / 1000;
+  perhaps_another_until_us_ = std::max(perhaps_another_until_us_,
+                                       now_us - std::max<std::int64_t>(age_us, 0) + kOtherMasterUs);
 }
 
 bool Synchroniser::anybody_online() const {
@@ -55,6 +57,7 @@ Synchroniser::Agreement Synchroniser::follow_report(std::int64_t now_us, McuInde
   McuView& view = mcus_[mcu].view;
   const bushd_report& report = view.report;
   since_sync_[mcu].reported = true;
+  note_other_master(now_us, report);
   view.tick = clock_.unwrap(report.tick, now_us);
   constexpr std::uint8_t kKnowsTime = BUSHD_FLAG_SYNCED | BUSHD_FLAG_SYNC_HEARD;
   if (!in_time || (report.flags & kKnowsTime) != kKnowsTime) return Agreement::kUnsynced;
@@ -144,6 +147,8 @@ bool Synchroniser::send_due(std::int64_t now_us) {
   const std::size_t size = bushd_encode_sync(&sync, payload.data());
   writer_.send(now_us, kBroadcast, BUSHD_MSG_SYNC, {payload.data(), size});
   sync_id_ = sync.sync_id;
+  if (own_sync_ids_.size() == kOwnSyncsKept) own_sync_ids_.pop_front();
+  own_sync_ids_.push_back(sync.sync_id);
   for (const McuIndex i : mcus_.indices()) {
     since_sync_[i].reported = false;
     // MCUs that wait are asked at once, so that the next SYNC can follow this one.

@@ -11,9 +11,11 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <deque>
 #include <optional>
 
 #include "engine/message.h"
+#include "fieldbus/line_times.h"
 #include "link/bus_clock.h"
 #include "link/bus_setup.h"
 #include "link/frame_writer.h"
@@ -23,6 +25,10 @@ namespace bushd::link {
 
 class Synchroniser {
  public:
+  // A master says SYNC at least as often, two of them in a row may be lost: one that is silent for
+  // longer is not there any more, and another one may have taken its place.
+  static constexpr std::int64_t kOtherMasterUs = 3 * fieldbus::kSyncPeriodUs;
+
   // All of them outlive it.
   Synchroniser(const BusSetup& setup, PerMcu<McuRecord>& mcus, FrameWriter& writer);
 
@@ -37,6 +43,9 @@ class Synchroniser {
   void overheard(std::int64_t now_us, const bushd_frame& frame);
   // Another master was heard on this line within the last seconds, by this one or by an MCU.
   bool two_masters(std::int64_t now_us) const;
+  // An MCU has heard another one before this one, so lately that it may still be there: it has said
+  // SYNC when this one was not there to hear it.
+  bool perhaps_another(std::int64_t now_us) const { return now_us < perhaps_another_until_us_; }
 
   enum class Agreement {
     kInStep,    // the clock has been set by it
@@ -65,6 +74,7 @@ class Synchroniser {
   std::int64_t difference_ns(const bushd_report& a, const bushd_report& b) const;
   Survey survey() const;
   void survey_mcu(McuIndex mcu, Survey& survey) const;
+  void note_other_master(std::int64_t now_us, const bushd_report& report);
   void note_offsets(const bushd_report* reference);
   bool anybody_online() const;
 
@@ -80,6 +90,10 @@ class Synchroniser {
   };
   PerMcu<Mcu> since_sync_;
   std::optional<std::int64_t> other_master_until_us_;  // since it was heard
+  std::int64_t perhaps_another_until_us_ = INT64_MIN;
+  // The last SYNCs sent, oldest first: as many as there are while one of them may tell of another
+  // master.
+  std::deque<std::uint32_t> own_sync_ids_;
 };
 
 }  // namespace bushd::link

@@ -13,24 +13,27 @@ constexpr std::size_t kBlock = 64;
 
 }  // namespace
 
-double Axis::duration_ticks(std::int64_t steps) const {
+double Axis::duration_ticks(std::int64_t steps, std::uint16_t floor) const {
   bushd_run run;
-  bushd_run_start(&run, table_, static_cast<std::uint32_t>(steps < 0 ? -steps : steps), 1);
+  bushd_run_start(&run, table_, static_cast<std::uint32_t>(steps < 0 ? -steps : steps), 1,
+                  floor);
   const double ns = static_cast<double>(bushd_run_units_left(&run)) * table_->time_unit_ns;
   return std::ceil(ns / tick_ns_);
 }
 
-void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns) {
+void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns,
+                 std::uint16_t floor) {
   busy_ = true;
   start_ = start;
   late_ns_ = late_ns;
   from_ = from_steps;
   target_ = from_steps + steps;
+  floor_ = floor;
   stopping_ = false;
   stale_ = false;
   change_.reset();
   const auto count = static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
-  bushd_run_start(&base_.run, table_, count, steps < 0 ? -1 : 1);
+  bushd_run_start(&base_.run, table_, count, steps < 0 ? -1 : 1, floor);
   bushd_run_begin_late(&base_.run, late_ns_);
   base_.tick = start;
   head_ = base_;
@@ -43,9 +46,10 @@ void Axis::stop() {
   stale_ = true;
 }
 
-void Axis::aim(std::int64_t target_steps) {
+void Axis::aim(std::int64_t target_steps, std::uint16_t floor) {
   stopping_ = false;
   target_ = target_steps;
+  floor_ = floor;
   stale_ = true;
 }
 
@@ -57,10 +61,12 @@ bool Axis::change(Tick at) {
   plan_end();
   const std::int64_t planned_end = planned_end_;
   if (at >= std::max(end_, start_ + 1)) return false;
-  change_ = Change{.at = at, .target_steps = {}};
+  change_ = Change{.at = at, .target_steps = {}, .floor = floor_};
   if (!stopping_) change_->target_steps = target_;
   plan_end();
-  if (planned_end_ != planned_end) return true;
+  const bool same_speed =
+      stopping_ || base_.run.cruise == std::max(table_->cruise, change_->floor);
+  if (planned_end_ != planned_end || !same_speed) return true;
   change_.reset();
   plan_end();
   return false;
@@ -87,7 +93,8 @@ void Axis::take_change(Place& place) const {
   bushd_run& run = place.run;
   if (change_->at <= start_) {
     const std::int64_t steps = change_->target_steps.value_or(from_) - from_;
-    bushd_run_start(&run, table_, static_cast<std::uint32_t>(std::abs(steps)), steps < 0 ? -1 : 1);
+    bushd_run_start(&run, table_, static_cast<std::uint32_t>(std::abs(steps)), steps < 0 ? -1 : 1,
+                    change_->floor);
     bushd_run_begin_late(&run, late_ns_);
     return;
   }
@@ -95,7 +102,10 @@ void Axis::take_change(Place& place) const {
     // What is left of the way after the running step.
     const std::int64_t way = (*change_->target_steps - from_) * run.direction;
     const std::int64_t after = way - static_cast<std::int64_t>(run.steps_done) - 1;
-    if (after >= 0 && bushd_run_retarget(&run, static_cast<std::uint32_t>(after))) return;
+    if (after >= 0 &&
+        bushd_run_retarget(&run, static_cast<std::uint32_t>(after), change_->floor)) {
+      return;
+    }
   }
   bushd_run_ramp_down(&run);
 }
@@ -146,6 +156,7 @@ std::optional<Axis::RunSegment> Axis::run_at(Tick first, unsigned max_ticks) {
   Place place = head_;
   take_change(place);
   if (bushd_run_done(&place.run) || bushd_run_begins_later(&place.run)) return std::nullopt;
+  if (place.run.brake_left != 0) return std::nullopt;
   Tick until = std::min(first + max_ticks, end_of(place));
   if (change_ && effective() > first) until = std::min(until, effective());
   return RunSegment{.run = place.run, .ticks = static_cast<unsigned>(until - first)};

@@ -22,6 +22,7 @@ using Tick = std::int64_t;
 struct Change {
   Tick at;
   std::optional<std::int64_t> target_steps;
+  std::uint16_t floor = 0;  // of the run from then on (engine/run.h)
 };
 
 // Not copied while a run uses the table: the table outlives the axis.
@@ -31,9 +32,12 @@ class Axis {
       : table_(&table), tick_ns_(tick_ns), format_(format) {}
 
   std::uint32_t tick_ns() const { return tick_ns_; }
+  std::uint32_t time_unit_ns() const { return table_->time_unit_ns; }
+
+  // A floor is the shortest delay of a run, beside the table's own (engine/run.h); 0: none.
 
   // How long a move of `steps` takes, in ticks, rounded up; for any number of steps.
-  double duration_ticks(std::int64_t steps) const;
+  double duration_ticks(std::int64_t steps, std::uint16_t floor = 0) const;
 
   // Longer moves are beyond what tick numbers and times are made for: a month of the shortest
   // ticks, years of the longest.
@@ -42,12 +46,13 @@ class Axis {
   // From rest at `from_steps`, by `steps` (either sign), time 0 at the beginning of tick `start`,
   // or `late_ns` after it. Precondition: !busy(), |steps| < 2^31, duration_ticks(steps) <=
   // kMaxDurationTicks, late_ns less than a tick.
-  void start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns = 0);
+  void start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns = 0,
+             std::uint16_t floor = 0);
 
   // What is wanted of the motor from now on: rest, or another target. The plan follows with
   // change(). Precondition: busy().
   void stop();
-  void aim(std::int64_t target_steps);
+  void aim(std::int64_t target_steps, std::uint16_t floor = 0);
 
   // The plan does not yet do what is wanted, and can be changed: of two changes the first must have
   // been executed (or known to have failed) before the second is planned, for the MCU may have
@@ -67,7 +72,7 @@ class Axis {
 
   // The run as it is at the beginning of tick `first`, and for how many ticks (1 .. max_ticks) it
   // gives what render() would: up to the next change or the run's end. Nothing before the start, in
-  // a start tick in whose middle it begins, and after the end. Preconditions as of render().
+  // a start tick in whose middle it begins, while it slows down to a floor, and after the end. Preconditions as of render().
   struct RunSegment {
     bushd_run run;
     unsigned ticks;
@@ -96,6 +101,7 @@ class Axis {
   // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t planned_end_steps() const { return planned_end_; }
   std::int64_t target_steps() const { return target_; }
+  std::uint16_t floor() const { return floor_; }
   // Where the motor will stand when all is done: after a second run, if it takes one.
   std::int64_t end_steps() const { return stopping_ ? planned_end_ : target_; }
   // Of the step that runs at the last executed tick; 0 when not moving.
@@ -125,6 +131,7 @@ class Axis {
   std::int64_t from_ = 0;
   std::int64_t planned_end_ = 0;
   std::int64_t target_ = 0;
+  std::uint16_t floor_ = 0;
   bool stopping_ = false;
   bool stale_ = false;            // what is wanted has changed since the last change()
   std::optional<Change> change_;  // planned and not yet executed

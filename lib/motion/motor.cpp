@@ -36,13 +36,17 @@ std::string Motor::busy_text() const {
 Result<void> Motor::may_be_used() const {
   if (is<Armed>()) return fail("waits for the trigger; disarm it first");
   if (is<Homing>()) return fail("it is being homed; wait for that result");
+  if (is<Local>() && !autonomous_) {
+    return fail("MCU " + setup_.mcu +
+                " moves it for another master; end that, and wait until it rests");
+  }
   if (is<Local>()) {
     return fail("the local inputs of MCU " + setup_.mcu + " move it; release them first");
   }
   return {};
 }
 
-Result<void> Motor::may_move_to(std::int64_t target) const {
+Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const {
   if (uncertain_reason_) {
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
                 (setup_.has_home ? "run 'bushctl home NAME', or find out where it stands and run "
@@ -70,15 +74,30 @@ Result<void> Motor::may_move_to(std::int64_t target) const {
         switch_at(direction) +
         " is active: motion in this direction is inhibited; move it in the other direction");
   }
-  if (axis_.duration_ticks(steps) > Axis::kMaxDurationTicks) {
+  if (axis_.duration_ticks(steps, floor) > Axis::kMaxDurationTicks) {
     const double tick_days = axis_.tick_ns() * 1e-9 / 86400;
     const auto days = [tick_days](double ticks) { return std::llround(ticks * tick_days); };
     return fail(std::to_string(steps) + " steps would take " +
-                std::to_string(days(axis_.duration_ticks(steps))) +
-                " days with this table; the longest move is " +
+                std::to_string(days(axis_.duration_ticks(steps, floor))) +
+                " days at that speed; the longest move is " +
                 std::to_string(days(Axis::kMaxDurationTicks)) + " days");
   }
   return {};
+}
+
+Result<std::uint16_t> Motor::floor_at(const std::optional<api::Speed>& speed) const {
+  std::uint16_t floor = 0;
+  if (setup_.max_speed) {
+    const auto slowest = setup_.coordinates.delay_at(*setup_.max_speed, axis_.time_unit_ns());
+    if (!slowest) return fail("max_speed: " + slowest.error().message);
+    floor = *slowest;
+  }
+  if (!speed) return floor;
+  const units::Coordinates in_steps;
+  const auto delay = (speed->in_steps ? in_steps : setup_.coordinates)
+                         .delay_at(speed->per_s, axis_.time_unit_ns());
+  if (!delay) return delay;
+  return std::max(floor, *delay);
 }
 
 // One that stands beyond a limit may be moved towards it.
@@ -115,14 +134,14 @@ Result<std::int64_t> Motor::steps_of_distance(const api::Amount& distance) const
   return setup_.coordinates.steps_of_distance(std::get<api::UserUnits>(distance).value);
 }
 
-void Motor::start(std::int64_t target, Tick start) {
+void Motor::start(std::int64_t target, Tick start, std::uint16_t floor) {
   activity_ = Moving{};
-  axis_.start(position_, target - position_, start);
+  axis_.start(position_, target - position_, start, 0, floor);
 }
 
-void Motor::arm(std::uint8_t number, std::int64_t steps) {
+void Motor::arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor) {
   activity_ = Armed{.number = number, .steps = steps};
-  axis_.start(position_, steps, kNever);
+  axis_.start(position_, steps, kNever, 0, floor);
 }
 
 void Motor::stop(std::optional<std::string> ended_by) {
@@ -184,7 +203,7 @@ PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
 }
 
 void Motor::rest() {
-  if (autonomous_) {
+  if (autonomous_ || moved_by_other_) {
     activity_ = Local{};
   } else {
     activity_ = Resting{};
@@ -214,7 +233,7 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
     uncertain_reason_ = immediate ? kStoppedImmediately : kUnpowered;
   }
   take_limits(report);
-  follow_autonomous(report);
+  follow_autonomous(report, false);
 }
 
 void Motor::goes_offline(std::int64_t heard_utime_us) {
@@ -226,21 +245,27 @@ void Motor::goes_offline(std::int64_t heard_utime_us) {
 
 std::vector<Event> Motor::report(const Report& report) {
   std::vector<Event> events;
-  position_ = report.of_mcu.motor[output().value].position_steps;
+  const bool free = is<Resting>() || is<Local>();
+  const std::int64_t before =
+      std::exchange(position_, report.of_mcu.motor[output().value].position_steps);
   take_limits(report.of_mcu);
   if (has_plan()) follow(report, events);
-  follow_autonomous(report.of_mcu);
+  follow_autonomous(report.of_mcu, free && position_ != before);
   return events;
 }
 
 // No move has led to where it stands.
-void Motor::follow_autonomous(const bushd_report& report) {
+void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
   const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output()));
   if (before && !autonomous_) {
     if (stops_immediately(report)) uncertain_reason_ = kStoppedImmediately;
     if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) uncertain_reason_ = kUnpowered;
   }
-  if (is<Resting>() || is<Local>()) rest();
+  const bool free = is<Resting>() || is<Local>();
+  // The bit alone may be that of a plan of this daemon's that has just ended.
+  moved_by_other_ =
+      free && has_bit(report.moving, output()) && (moved_by_other_ || moved_without_plan);
+  if (free) rest();
 }
 
 void Motor::follow(const Report& report, std::vector<Event>& events) {
@@ -256,12 +281,20 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
   }
   if (report.of_mcu.faults != 0) {
     // The MCU takes no more ticks; what it has, it runs, and then down its own table.
+    if (auto* now = std::get_if<Moving>(&activity_)) now->faults |= report.of_mcu.faults;
     if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
     return;
   }
   // It has not told of the emergency stop yet, with which its plan was given up.
   if (report.emergency_stop_open) return;
   auto& now = std::get<Moving>(activity_);
+  if (now.faults != 0) {
+    // Another master has cleared them as soon as the motor stood.
+    bushd_report before = report.of_mcu;
+    before.faults = now.faults;
+    if (!moving) events.emplace_back(end_by_fault(before));
+    return;
+  }
   if (now.limit == 0) {
     if (const auto change = axis_.executed(report.tick)) {
       events.emplace_back(event::Executed{*change});
@@ -308,13 +341,17 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
   if (told && mcu.trigger_state == BUSHD_TRIGGER_STARTED) {
     const Tick start = report.tick + static_cast<std::int32_t>(mcu.start_tick - mcu.tick);
     activity_ = Moving{};
-    axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns);
+    axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns, axis_.floor());
     if (armed.stops) axis_.stop();
     events.emplace_back(
         event::Started{.start = start, .late_ns = mcu.start_ns, .steps = armed.steps});
     return true;
   }
   if (mcu.faults != 0) return true;
+  if (told && mcu.trigger_state == BUSHD_TRIGGER_ARMED && !armed.confirmed) {
+    std::get<Armed>(activity_).confirmed = true;
+    events.emplace_back(event::Waits{});
+  }
   if (report.requests_open) return false;
   const std::string name = "MCU " + setup_.mcu;
   const bool refused_for_limit = !told && mcu.last_rejection == BUSHD_E_FORBIDDEN;

@@ -34,6 +34,7 @@ struct MotorSetup {
   bool emergency_input_immediate = false;
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits{};
+  std::optional<double> max_speed{};  // user units/s
 };
 
 // What a motor does. Any other than Resting keeps other motions away from it.
@@ -41,16 +42,18 @@ struct Resting {};
 struct Moving {
   bool position_mismatch = false;  // counted otherwise than planned; it is being stopped
   int limit = 0;                   // +1, -1: its limit switch at this end stops it
+  std::uint8_t faults = 0;         // with which its MCU runs it down
 };
 // Waits for the trigger, or for the MCU to say that it does: the axis has no start yet.
 struct Armed {
   std::uint8_t number;  // of link::Master::arm
   std::int64_t steps;
+  bool confirmed = false;                 // the MCU has said that it waits
   bool stops = false;                     // as soon as it has started: that came before disarming
   std::optional<std::string> ended_by{};  // the motor armed with it whose end ends it too
 };
 struct Homing {};  // by its MCU, or it waits for its turn
-struct Local {};   // the inputs at its MCU move it
+struct Local {};   // the inputs at its MCU move it, or another master does
 using Activity = std::variant<Resting, Moving, Armed, Homing, Local>;
 
 // What an MCU reports, and what is known beside.
@@ -70,6 +73,7 @@ struct PositionTrust {
 
 // What follows from a report, to be done in this order.
 namespace event {
+struct Waits {};  // for the trigger: an edge from now on starts it
 struct Started {  // by the trigger: from now on it is a table run like any other
   Tick start;
   std::uint32_t late_ns;
@@ -88,8 +92,8 @@ struct Ended {
   bool was_armed = false;
 };
 }  // namespace event
-using Event = std::variant<event::Started, event::Executed, event::Replan, event::Drop,
-                           event::Mismatch, event::Turn, event::Ended>;
+using Event = std::variant<event::Waits, event::Started, event::Executed, event::Replan,
+                           event::Drop, event::Mismatch, event::Turn, event::Ended>;
 
 class Motor {
  public:
@@ -137,17 +141,21 @@ class Motor {
 
   // What it may do now, as far as it depends on the motor alone. A motor that moves may be given
   // another target, and nothing else.
-  Result<void> may_be_used() const;                     // for any motion
-  Result<void> may_move_to(std::int64_t target) const;  // beyond that
+  Result<void> may_be_used() const;  // for any motion
+  // Beyond that.
+  Result<void> may_move_to(std::int64_t target, std::uint16_t floor = 0) const;
+  // The floor of runs at max_speed and at this speed, whichever is slower. Error: no speed, or one
+  // slower than any delay.
+  Result<std::uint16_t> floor_at(const std::optional<api::Speed>& speed) const;
   // An amount in steps. Errors: not finite, beyond what is counted.
   Result<std::int64_t> steps_of_position(const api::Amount& position) const;
   Result<std::int64_t> steps_of_distance(const api::Amount& distance) const;
 
-  // Requests. Preconditions: it may.
+  // Requests. Preconditions: it may. Floors are those of Axis.
   // From rest, or from the turning point of a motion.
-  void start(std::int64_t target, Tick start);
-  void aim(std::int64_t target) { axis_.aim(target); }
-  void arm(std::uint8_t number, std::int64_t steps);
+  void start(std::int64_t target, Tick start, std::uint16_t floor = 0);
+  void aim(std::int64_t target, std::uint16_t floor = 0) { axis_.aim(target, floor); }
+  void arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor = 0);
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
   // `ended_by` is whose end ends it too.
   void stop(std::optional<std::string> ended_by = {});
@@ -194,7 +202,7 @@ class Motor {
   event::Ended end_at_limit();
   event::Ended end_by_fault(const bushd_report& report);
   event::Ended ended(Outcome outcome, std::string reason);
-  void follow_autonomous(const bushd_report& report);
+  void follow_autonomous(const bushd_report& report, bool moved_without_plan);
   void rest();
   std::string did_not_start() const;
 
@@ -214,7 +222,8 @@ class Motor {
   std::optional<std::string> uncertain_reason_;
   std::optional<std::string> restored_reason_;
   bool restoring_ = false;
-  bool autonomous_ = false;  // as reported last: its MCU moves it by itself
+  bool autonomous_ = false;      // as reported last: its MCU moves it by itself
+  bool moved_by_other_ = false;  // likewise: it has moved and still does, without a plan here
   bool forbidden_up_ = false;
   bool forbidden_down_ = false;
 };

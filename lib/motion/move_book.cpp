@@ -10,8 +10,8 @@ std::uint64_t MoveBook::open(const std::vector<MotorId>& motors) {
   move.result.move = id;
   move.left = motors.size();
   for (const MotorId motor : motors) {
+    of_motor_[motor] = {.move = id, .index = move.result.motors.size()};
     move.result.motors.push_back({.motor = motor, .reason = {}});
-    of_motor_[motor] = id;
   }
   open_.emplace(id, std::move(move));
   return id;
@@ -20,14 +20,10 @@ std::uint64_t MoveBook::open(const std::vector<MotorId>& motors) {
 std::optional<MoveResult> MoveBook::end(MotorOutcome outcome) {
   const auto of_motor = of_motor_.find(outcome.motor);
   if (of_motor == of_motor_.end()) return std::nullopt;
-  const auto found = open_.find(of_motor->second);
-  of_motor_.erase(of_motor);
+  const auto found = open_.find(of_motor->second.move);
   Open& move = found->second;
-  for (MotorOutcome& part : move.result.motors) {
-    if (part.motor != outcome.motor) continue;
-    part = std::move(outcome);
-    break;
-  }
+  move.result.motors[of_motor->second.index] = std::move(outcome);
+  of_motor_.erase(of_motor);
   if (--move.left != 0) return std::nullopt;
   MoveResult result = std::move(move.result);
   open_.erase(found);
@@ -42,7 +38,7 @@ std::optional<MoveResult> MoveBook::end(MotorOutcome outcome) {
 std::optional<std::uint64_t> MoveBook::move_of(MotorId motor) const {
   const auto found = of_motor_.find(motor);
   if (found == of_motor_.end()) return std::nullopt;
-  return found->second;
+  return found->second.move;
 }
 
 }  // namespace bushd::motion

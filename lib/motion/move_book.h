@@ -49,7 +49,11 @@ class MoveBook {
     std::size_t left = 0;
   };
   std::unordered_map<std::uint64_t, Open> open_;
-  std::unordered_map<MotorId, std::uint64_t> of_motor_;
+  struct Part {
+    std::uint64_t move;
+    std::size_t index;  // in its result
+  };
+  std::unordered_map<MotorId, Part> of_motor_;
   std::uint64_t last_ = 0;
 };
 

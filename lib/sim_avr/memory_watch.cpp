@@ -22,6 +22,8 @@ constexpr std::uint8_t kEepromAccess = 1 << 0 | 1 << 1;  // EERE, EEPE
 constexpr std::size_t kTimsk3 = 0x71;
 constexpr std::size_t kUcsr0b = 0xC1;
 constexpr std::uint8_t kSends = 1 << 5 | 1 << 6;  // UDRIE0, TXCIE0
+// What a frame holds that nobody has written: as an address, it is beyond RAM.
+constexpr std::uint8_t kNeverWritten = 0xA5;
 
 std::shared_ptr<const AvrMemoryMap> map_of(const std::string& image, const std::string& owners) {
   static std::map<std::pair<std::string, std::string>, std::shared_ptr<const AvrMemoryMap>> maps;
@@ -42,6 +44,16 @@ bool is_pointer_load(std::uint16_t opcode) {
   if ((opcode & 0xFE00) != 0x9000) return false;
   const int kind = opcode & 0xF;
   return kind != 0 && kind != 0xF;
+}
+
+// OUT, to a register of the address space of data.
+bool is_out(std::uint16_t opcode, std::uint16_t address) {
+  const unsigned a = address - kIoBegin;
+  return (opcode & 0xFE0F) == (0xB800 | (a & 0x30) << 5 | (a & 0xF));
+}
+
+void on_stack_pointer(avr_t*, avr_io_addr_t address, std::uint8_t value, void* param) {
+  static_cast<AvrMemoryWatch*>(param)->stack_pointer(address, value);
 }
 
 void on_eeprom_control(avr_t*, avr_io_addr_t, std::uint8_t value, void* param) {
@@ -79,6 +91,8 @@ AvrMemoryWatch::AvrMemoryWatch(avr_t* avr, const std::string& image, const std::
       inputs_(map_->unit_named("atmega2560/inputs.c")) {
   avr_->custom.data = this;
   avr_register_io_write(avr_, kEecr, on_eeprom_control, this);
+  avr_register_io_write(avr_, R_SPL, on_stack_pointer, this);
+  avr_register_io_write(avr_, R_SPH, on_stack_pointer, this);
 }
 
 AvrMemoryWatch::~AvrMemoryWatch() {
@@ -93,10 +107,18 @@ void AvrMemoryWatch::violate(const std::string& what) {
   avr_->state = cpu_Crashed;
 }
 
+std::uint16_t AvrMemoryWatch::opcode() const {
+  return static_cast<std::uint16_t>(avr_->flash[avr_->pc] | avr_->flash[avr_->pc + 1] << 8);
+}
+
+std::uint16_t AvrMemoryWatch::stack_pointer() const {
+  return static_cast<std::uint16_t>(avr_->data[R_SPL] | avr_->data[R_SPH] << 8);
+}
+
 // Library functions write for who has called them: those that do leave the stack alone.
 std::optional<std::uint32_t> AvrMemoryWatch::library_caller() const {
   if (map_->unit_at(avr_->pc) != AvrMemoryMap::kNoUnit) return std::nullopt;
-  const std::size_t sp = avr_->data[R_SPL] | std::size_t{avr_->data[R_SPH]} << 8;
+  const std::size_t sp = stack_pointer();
   if (sp + 3 > avr_->ramend) return std::nullopt;
   const std::uint8_t* const at = avr_->data + sp;
   const std::uint32_t back = std::uint32_t{at[1]} << 16 | std::uint32_t{at[2]} << 8 | at[3];
@@ -153,13 +175,22 @@ void AvrMemoryWatch::read(std::uint16_t address) {
   if (violation_ || !in_main_) return;
   if (address > avr_->ramend) return violate("reads " + hex(address) + ", beyond RAM");
   if (address < kIoBegin || address >= kRamBegin) return;
-  const auto opcode =
-      static_cast<std::uint16_t>(avr_->flash[avr_->pc] | avr_->flash[avr_->pc + 1] << 8);
-  if (!is_pointer_load(opcode)) return;
+  if (!is_pointer_load(opcode())) return;
   const AvrMemoryMap::Unit unit = writer();
   if (unit == inputs_) return;
   violate("of " + map_->name_of(unit) + " reads the I/O register " + hex(address) +
           " through a pointer");
+}
+
+// A function makes its frame by OUT, the high byte first. PUSH and CALL write what they take.
+void AvrMemoryWatch::stack_pointer(std::uint16_t address, std::uint8_t value) {
+  if (in_main_ && address == R_SPH && is_out(opcode(), R_SPH)) frame_top_ = stack_pointer();
+  avr_->data[address] = value;
+  if (!in_main_ || address != R_SPL || !is_out(opcode(), R_SPL)) return;
+  for (std::uint16_t at = frame_top_; at > stack_pointer() && !violation_; --at) {
+    check_stack(at);
+    avr_->data[at] = kNeverWritten;
+  }
 }
 
 void AvrMemoryWatch::eeprom_control(std::uint8_t value) {

@@ -7,6 +7,9 @@
 // - an address beyond RAM, and one of an I/O register through a pointer, but by inputs.c
 // - an address of the EEPROM beyond its end
 //
+// What a function finds in its frame that it has not written is no address: a pointer never set is
+// seen by the first use, whatever the stack held.
+//
 // From `main` on, until the next reset: what comes before has RAM to itself.
 #pragma once
 
@@ -38,10 +41,13 @@ class AvrMemoryWatch {
   // Of simavr's: by the instruction at the program counter.
   void write(std::uint16_t address, std::uint8_t value);
   void read(std::uint16_t address);
+  void stack_pointer(std::uint16_t address, std::uint8_t value);
   void eeprom_control(std::uint8_t value);
 
  private:
   struct Borrowed;  // where the image tells who has it
+  std::uint16_t opcode() const;
+  std::uint16_t stack_pointer() const;
   std::optional<std::uint32_t> library_caller() const;
   AvrMemoryMap::Unit writer() const;
   void check_stack(std::uint16_t address);
@@ -54,6 +60,7 @@ class AvrMemoryWatch {
   AvrMemoryMap::Unit main_;
   AvrMemoryMap::Unit inputs_;
   bool in_main_ = false;
+  std::uint16_t frame_top_ = 0;  // the stack pointer before the frame that is being made
   std::optional<std::string> violation_;
 };
 

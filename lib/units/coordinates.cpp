@@ -12,6 +12,8 @@
 namespace bushd::units {
 namespace {
 
+constexpr unsigned kLongestDelay = 65535;  // time units, a code of a table
+
 // What is shown is within two units in the last place of a double of the exact position: its own
 // rounding, and where long double is no wider than double those of quotient and sum. 2^50 steps of
 // offset and 2^31 of position leave this below a quarter of a step.
@@ -130,6 +132,23 @@ Result<std::int64_t> Coordinates::steps_of_distance(double user_units) const {
   const auto steps = steps_of_dial(user_units);
   if (!steps) return steps;
   return scale_.negative ? -*steps : *steps;
+}
+
+Result<std::uint16_t> Coordinates::delay_at(double user_units_per_s, std::uint32_t unit_ns) const {
+  const auto speed = number(user_units_per_s);
+  if (!speed || *speed <= 0) {
+    return fail(fmt::format("a speed of {}; allowed: any above 0", user_units_per_s));
+  }
+  const mpq_class units =
+      mpq_class(1'000'000'000) / (*speed * as_mpq(scale_.steps_per_unit) * mpq_class(unit_ns));
+  const mpz_class delay = -floor_of(-units);
+  if (delay <= kLongestDelay) return static_cast<std::uint16_t>(delay.get_ui());
+  const mpq_class slowest = mpq_class(1'000'000'000) /
+                            (as_mpq(scale_.steps_per_unit) * mpq_class(unit_ns) * kLongestDelay);
+  return fail(fmt::format(
+      "{} {}/s would take {:.0f} time units a step; allowed: up to {}, "
+      "which is {:.6g} {}/s with this table",
+      user_units_per_s, scale_.unit, delay.get_d(), kLongestDelay, slowest.get_d(), scale_.unit));
 }
 
 std::int64_t Coordinates::first_step_from(double dial) const {

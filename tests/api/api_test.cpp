@@ -58,8 +58,8 @@ TEST(Words, EachIsReadBack) {
                              Outcome::kLink, Outcome::kFault}) {
     EXPECT_EQ(outcome_of(word(outcome)), outcome);
   }
-  for (const auto activity : {Activity::kResting, Activity::kMoving, Activity::kArmed,
-                              Activity::kHoming, Activity::kLocal}) {
+  for (const auto activity : {Activity::kResting, Activity::kMoving, Activity::kArming,
+                              Activity::kArmed, Activity::kHoming, Activity::kLocal}) {
     EXPECT_EQ(activity_of(word(activity)), activity);
   }
   for (const auto state : {McuState::kOffline, McuState::kBusy, McuState::kReady,

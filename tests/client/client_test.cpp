@@ -368,6 +368,20 @@ TEST_F(ClientTest, StatusThatNeverCompletesIsAnError) {
   EXPECT_FALSE(client_->status(milliseconds(1)));
 }
 
+TEST_F(ClientTest, StatusOfWhatArrivedSaysThatMoreIsMissing) {
+  on_status_ = [this] {
+    state(1, 1, 3);
+    description(2, 1, 3);
+    description(3, 2, 3);
+    health(4);
+  };
+  const auto status = client_->status(milliseconds(20));
+  ASSERT_TRUE(status);
+  EXPECT_EQ(status->states.size(), 1u);
+  EXPECT_EQ(status->missing_mcus.count, 2u);
+  EXPECT_EQ(status->missing_buses.count, 0u);
+}
+
 TEST_F(ClientTest, NextStateKeepsWhatHasNotChanged) {
   on_status_ = [this] {
     for (std::int32_t part = 0; part < 2; ++part) {

@@ -92,7 +92,7 @@ class HomingScript : public Autonomous {
 
   // Both within one tick: from then on they go together.
   void home() {
-    const bushd_home message{kMotor, -1, 5000, 400, 1000, 0};
+    const bushd_home message{kMotor, -1, 5000, 0, 400, 1000, 0};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(bushd_encode_home(&message, payload.data()));
     bus_.advance_to(bus_.node(0).next_event_ns());
@@ -116,7 +116,7 @@ TEST_P(HomingScript, WhereverItComesFromItIsTheSameToOneStep) {
   for (int i = 0; i < 6; ++i) {
     SCOPED_TRACE("homing " + std::to_string(i));
     run_by_table(master_.poll(kReal).tick + 24,
-                 {{kMotor, 0, 1, 20 + static_cast<std::uint32_t>(random() % 400)}});
+                 {{kMotor, 0, 1, 20 + static_cast<std::uint32_t>(random() % 400), 0}});
     ASSERT_NO_FATAL_FAILURE(pass_until_rest());
     home();
     ASSERT_NO_FATAL_FAILURE(pass_until_rest());
@@ -158,7 +158,7 @@ TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
     bushd_set_inputs inputs{};
     inputs.enable_after_watchdog = keeps_enable;
     ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs));
-    run_by_table(master_.poll(kReal).tick + 24, {{kMotor, 0, 1, 10'000}});
+    run_by_table(master_.poll(kReal).tick + 24, {{kMotor, 0, 1, 10'000, 0}});
     pass_ticks(60);
     const bushd_report before = master_.poll(kReal);
     ASSERT_EQ(before.running, 1 << kMotor);
@@ -187,7 +187,7 @@ TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
     // And it goes on.
     const std::array<std::size_t, 2> made = {steps(0, kMotor).size(), steps(1, kMotor).size()};
     ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kMotor}));
-    run_by_table(master_.poll(kReal).tick + 24, {{kMotor, 0, -1, 50}});
+    run_by_table(master_.poll(kReal).tick + 24, {{kMotor, 0, -1, 50, 0}});
     pass_ticks(100);
     for (const std::size_t mcu : {0, 1}) EXPECT_EQ(steps(mcu, kMotor).size(), made[mcu] + 50);
     EXPECT_EQ(master_.poll(kReal).motor[kMotor].position_steps, -50);

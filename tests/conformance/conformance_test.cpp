@@ -61,7 +61,7 @@ TEST_P(Conformance, IsSilentAndAliveAfterNoise) {
 
 TEST_P(Conformance, RunsATableToTheSlot) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {9}));
-  run_by_table(master_.poll(kReal).tick + 24, {{9, 0, -1, 110}});
+  run_by_table(master_.poll(kReal).tick + 24, {{9, 0, -1, 110, 0}});
   pass_ticks(160);
   expect_the_same_steps(9, 110);
   expect_the_same_times(9);
@@ -71,10 +71,10 @@ TEST_P(Conformance, RunsATableToTheSlot) {
 TEST_P(Conformance, RunsFourTablesAtOnceToTheSlot) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {0, 5, 9, 15}));
   const std::uint32_t first = master_.poll(kReal).tick + 60;
-  run_by_table(first, {{0, 0, 1, 200}});
-  run_by_table(first, {{5, 0, 1, 150}});
-  run_by_table(first, {{9, 0, -1, 110}});
-  run_by_table(first, {{15, 0, -1, 180}});
+  run_by_table(first, {{0, 0, 1, 200, 0}});
+  run_by_table(first, {{5, 0, 1, 150, 0}});
+  run_by_table(first, {{9, 0, -1, 110, 0}});
+  run_by_table(first, {{15, 0, -1, 180, 0}});
   pass_ticks(300);
   for (const auto& [motor, count] : {std::pair{0, 200}, {5, 150}, {9, 110}, {15, 180}}) {
     expect_the_same_steps(static_cast<std::uint8_t>(motor), static_cast<std::size_t>(count));
@@ -96,12 +96,25 @@ TEST_P(Conformance, ComesIntoStepInTheLongestTicks) {
     tick += 1000;
     master_.sync({0, 0, true, sync_id, tick, ns});
     pass_ticks(10);
-    run_by_table(master_.poll(kReal).tick + 24, {{9, 0, 1, 20}});
+    run_by_table(master_.poll(kReal).tick + 24, {{9, 0, 1, 20, 0}});
     pass_ticks(40);
     made += 20;
     expect_the_same_steps(9, made);
   }
   expect_the_same_times(9);
+  expect_the_same_reports();
+}
+
+// A floor below the table's slowest delay, one above it, and none; also where the run is cut.
+TEST_P(Conformance, TableRunsKeepToTheirFloors) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {2, 5, 9}));
+  const std::uint32_t first = master_.poll(kReal).tick + 16;
+  run_by_table(first, {{2, 0, 1, 300, kCruise + 7}, {5, 0, -1, 40, 700}, {9, 0, 1, 300, 0}});
+  pass_ticks(800);
+  expect_the_same_steps(2, 300);
+  expect_the_same_steps(5, 40);
+  expect_the_same_steps(9, 300);
+  for (const std::uint8_t motor : Bytes{2, 5, 9}) expect_the_same_times(motor);
   expect_the_same_reports();
 }
 
@@ -111,7 +124,8 @@ TEST_P(Conformance, TurnsRoundWhilePollsCome) {
   for (int turn = 0; turn < 12; ++turn) {
     const auto direction = static_cast<std::int8_t>(turn % 2 == 0 ? 1 : -1);
     const std::uint32_t first = master_.poll(kReal).tick + 16;
-    run_by_table(first, {{2, 0, direction, 5}, {9, 0, static_cast<std::int8_t>(-direction), 5}});
+    const auto back = static_cast<std::int8_t>(-direction);
+    run_by_table(first, {{2, 0, direction, 5, 0}, {9, 0, back, 5, 0}});
     for (int poll = 0; poll < 12; ++poll) master_.poll(kReal);
   }
   for (const std::uint8_t motor : Bytes{2, 9}) expect_the_same_steps(motor, 60);

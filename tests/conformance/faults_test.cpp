@@ -78,7 +78,7 @@ class Faults : public testing::TestWithParam<Target> {
 
   // Of more steps than a test waits for.
   void start_run() {
-    const bushd_table_run_entry entry{kMotor, 0, 1, 5000};
+    const bushd_table_run_entry entry{kMotor, 0, 1, 5000, 0};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(
         bushd_encode_table_run(0, master_.poll(kReal).tick + 24, &entry, 1, payload.data()));

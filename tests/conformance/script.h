@@ -109,7 +109,7 @@ class Script : public testing::Test {
               bushd_format format) {
     const bushd_table view = table();
     bushd_run run;
-    bushd_run_start(&run, &view, steps, direction);
+    bushd_run_start(&run, &view, steps, direction, 0);
     std::uint8_t flags = BUSHD_TICKS_START;
     if (format == BUSHD_FORMAT_FINE) flags |= BUSHD_TICKS_FINE;
     constexpr std::uint8_t kCount = 12;

@@ -54,7 +54,7 @@ TEST_P(Triggers, EveryStepIsWithinASlotOfItsTime) {
     const bool rising = number % 2 != 0;
     const auto delay_us = static_cast<std::uint32_t>(50 + random() % 20'000);
     ASSERT_NO_FATAL_FAILURE(arm(number, rising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING, delay_us,
-                                {{3, 0, 1, kSteps}, {5, 0, -1, kSteps}}));
+                                {{3, 0, 1, kSteps, 0}, {5, 0, -1, kSteps, 0}}));
     EXPECT_EQ(master_.poll(kReal).armed, 1 << 3 | 1 << 5);
     pass(static_cast<TimeNs>(random() % (2 * kTickNs)));
     const TimeNs edge_ns = turn(rising);
@@ -85,7 +85,7 @@ TEST_P(Triggers, EveryStepIsWithinASlotOfItsTime) {
 
 TEST_P(Triggers, OnlyTheAwaitedEdgeCountsAndOnce) {
   turn(true);
-  ASSERT_NO_FATAL_FAILURE(arm(1, BUSHD_EDGE_RISING, 50, {{2, 0, 1, 6}}));
+  ASSERT_NO_FATAL_FAILURE(arm(1, BUSHD_EDGE_RISING, 50, {{2, 0, 1, 6, 0}}));
   pass(50'000'000);
   turn(false);
   pass(50'000'000);
@@ -98,7 +98,7 @@ TEST_P(Triggers, OnlyTheAwaitedEdgeCountsAndOnce) {
   }
   pass(200'000'000);
   expect_the_same_steps(2, 6);
-  ASSERT_NO_FATAL_FAILURE(arm(2, BUSHD_EDGE_RISING, 50, {{2, 0, 1, 6}}));
+  ASSERT_NO_FATAL_FAILURE(arm(2, BUSHD_EDGE_RISING, 50, {{2, 0, 1, 6, 0}}));
   ASSERT_NO_FATAL_FAILURE(arm(0, BUSHD_EDGE_NONE, 0, {}));
   turn(true);
   pass(200'000'000);
@@ -117,7 +117,7 @@ TEST_P(Triggers, TheComparePulseFollowsItsStep) {
           ask(BUSHD_MSG_POSITION_COMPARE, bushd_encode_position_compare,
               bushd_position_compare{2, BUSHD_ARRIVES_POSITIVE, position + 4, delay_us, width_us}));
       const TimeNs begin_ns = bus_.now_ns();
-      run_by_table(master_.poll(kReal).tick + 24, {{2, 0, 1, 6}});
+      run_by_table(master_.poll(kReal).tick + 24, {{2, 0, 1, 6, 0}});
       pass(400'000'000);
       position += 6;
       ++pulses;

@@ -157,6 +157,24 @@ TEST_P(Faults, DaemonPausedLongerThanTheQueue) {
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
+// Another daemon may have been there meanwhile.
+TEST_P(Faults, NothingIsKnownAfterALongPauseBeforeTheMcuHasReported) {
+  Lab lab(hall(1, 2, GetParam()));
+  lab.connect();
+  lab.run_for(1);
+  ASSERT_EQ(lab.state_of("hall:1").motors.at(0).trust, api::Trust::kKnown);
+  lab.pause_daemon(1.7);
+  const auto outdated = [&lab] { return lab.state_of("hall:1").state == api::McuState::kBusy; };
+  ASSERT_TRUE(lab.run_until(outdated, 0.01));
+  EXPECT_EQ(lab.state_of("hall:1").motors.at(0).trust, api::Trust::kStale);
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).reason,
+              testing::HasSubstr("since this daemon stood still"));
+  lab.run_for(0.1);
+  EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kReady);
+  EXPECT_EQ(lab.state_of("hall:1").motors.at(0).trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {3}), 1).result, "reached");
+}
+
 TEST_P(Faults, PortLostAndBack) {
   Lab lab(hall(1, 2, GetParam()));
   lab.connect();

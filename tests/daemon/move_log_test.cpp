@@ -3,8 +3,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
+#include <csignal>
 #include <fstream>
 #include <sstream>
 
@@ -64,6 +66,29 @@ TEST_F(MoveLogTest, ARotatedFileIsBegunAnew) {
   std::filesystem::rename(path(), path() + ".1");
   ASSERT_EQ(log->append("{2}"), Appended::kAnew);
   EXPECT_EQ(text(), "{2}\n");
+}
+
+// As a full disk does: the first line in part, the next ones not at all.
+TEST_F(MoveLogTest, WhatTheDiskHasNoRoomForIsLostAsAWhole) {
+  auto log = MoveLog::open(path());
+  ASSERT_EQ(log->append("{1}"), Appended::kOn);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit full = before;
+  full.rlim_cur = 6;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &full), 0);
+  const auto half = log->append("{2}");
+  full.rlim_cur = 4;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &full), 0);
+  const auto nothing = log->append("{3}");
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  ASSERT_FALSE(half);
+  EXPECT_THAT(half.error().text(), HasSubstr("a line was lost: disk full"));
+  ASSERT_FALSE(nothing);
+  EXPECT_THAT(nothing.error().text(), HasSubstr("a line was lost"));
+  EXPECT_EQ(log->append("{4}"), Appended::kOn);
+  EXPECT_EQ(text(), "{1}\n{4}\n");
 }
 
 TEST_F(MoveLogTest, ALineThatCannotBeWrittenIsAnErrorUntilTheFolderIsBack) {

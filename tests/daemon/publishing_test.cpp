@@ -55,6 +55,20 @@ TEST_F(PublishingTest, AChangeIsPublishedAtOnce) {
   EXPECT_EQ(publish(kFirst, state_), 1u);
 }
 
+TEST_F(PublishingTest, TroubleStandsWhereAnMcuHasNothingToTell) {
+  publish(kFirst, state_);
+  publishing_.set_trouble("another bushd");
+  EXPECT_EQ(publish(kFirst, state_), 1u);
+  EXPECT_EQ(std::get<lcm::StateMessage>(newest_).snapshot.detail, "another bushd");
+  state_.detail = "drivers disabled";
+  publish(kFirst, state_);
+  EXPECT_EQ(std::get<lcm::StateMessage>(newest_).snapshot.detail, "drivers disabled");
+  state_.detail.clear();
+  publishing_.set_trouble("");
+  publish(kFirst, state_);
+  EXPECT_EQ(std::get<lcm::StateMessage>(newest_).snapshot.detail, "");
+}
+
 TEST_F(PublishingTest, OnlyTheMcuThatMovesIsPublishedOften) {
   api::StateSnapshot moving = state_;
   moving.motors[0].moving = true;

@@ -17,22 +17,23 @@ namespace {
 using daemon::DryRuns;
 using testing::HasSubstr;
 
-constexpr int kMcus = 128;
-constexpr int kMotors = 2048;
+constexpr int kBuses = 8;
+constexpr int kMotorsOfBus = 256;
+constexpr int kMotors = kBuses * kMotorsOfBus;
 
 // As hall() names them.
 std::string name(int motor) {
   return (motor < 9 ? "m0" : "m") + std::to_string(motor + 1);
 }
 
-// 2048 motors on eight buses of 16 MCUs.
-std::string large_hall() {
+// Buses of 16 MCUs with 16 motors each.
+std::string large_hall(int buses) {
   std::string toml = "[[group]]\nname = \"axes\"\ntable = \"bushd2-constant\"\n";
-  for (int b = 0; b < 8; ++b) {
+  for (int b = 0; b < buses; ++b) {
     toml += "[[bus]]\nname = \"hall" + std::to_string(b) + "\"\nport = \"/dev/null" +
             std::to_string(b) + "\"\nbaud = 4000000\ntick_us = 10240\nformat = \"coarse\"\n";
   }
-  for (int m = 0; m < kMcus; ++m) {
+  for (int m = 0; m < 16 * buses; ++m) {
     const std::string bus = "hall" + std::to_string(m / 16);
     const std::string address = std::to_string(m % 16 + 1);
     toml += "[[mcu]]\nbus = \"" + bus + "\"\naddress = " + address + "\n";
@@ -86,7 +87,7 @@ class Slices : public testing::Test {
   // What the event loop does between two looks at what has arrived.
   void one_round() {
     lab_->core().keep_up(lab_->now_us());
-    if (!reception_.idle()) reception_.carry_out_next();
+    if (!reception_.idle() && !lab_->core().begins_moves()) reception_.carry_out_next();
     lab_->core().work();
   }
   bool answered(const std::string& text) const {
@@ -108,7 +109,7 @@ class Slices : public testing::Test {
 };
 
 TEST_F(Slices, AStopUnderAFloodOfDryRunsWaitsForOneSliceAtMost) {
-  open(large_hall(), kMotors);
+  open(large_hall(kBuses), kMotors);
   for (int i = 0; i < 100; ++i) {
     send(client("flood" + std::to_string(i)), dry_run_of_all(20'000));
   }
@@ -131,6 +132,60 @@ TEST_F(Slices, AStopUnderAFloodOfDryRunsWaitsForOneSliceAtMost) {
   }
   EXPECT_LE(most, DryRuns::kUnitsPerSlice);
   EXPECT_GT(answers_like("accepted"), answers_like("completed") + 10) << "the flood is there still";
+}
+
+TEST_F(Slices, AMoveOfAllMotorsIsBegunInSlicesThatAStopComesBetween) {
+  open(large_hall(1), kMotorsOfBus);
+  api::Move move = dry_run_of_all(2'000);
+  move.dry_run = false;
+  const auto mover = client("mover");
+  send(mover, move);
+  send(client("other"), api::Enable{});
+  std::uint64_t before = lab_->core().units_of_work();
+  for (int round = 0; round < 4; ++round) {
+    one_round();
+    const std::uint64_t now = lab_->core().units_of_work();
+    EXPECT_LE(now - before, daemon::Moves::kBeginsPerSlice);
+    EXPECT_GT(now, before);
+    before = now;
+  }
+  EXPECT_TRUE(answered("mover 1 accepted"));
+  EXPECT_EQ(answers_like("other"), 0) << "it waits until all have begun";
+  send(client("operator"), api::Stop{});
+  EXPECT_EQ(lab_->core().units_of_work(), before) << "no work comes before it";
+  EXPECT_THAT(log_.back(), HasSubstr("operator 3 accepted"));
+  ASSERT_TRUE(lab_->run_until([&] { return answered("mover 1 completed: "); }, 10));
+  EXPECT_THAT(log_, testing::Contains(HasSubstr("stopped")));
+  EXPECT_EQ(lab_->shaft_steps(name(kMotorsOfBus - 1)), 0) << "it has not begun";
+  while (!reception_.idle() || lab_->core().begins_moves()) one_round();
+  EXPECT_TRUE(answered("other 2 "));
+}
+
+TEST_F(Slices, AMoveBegunInSlicesStartsInOneTickAndArrives) {
+  open(large_hall(1), kMotorsOfBus);
+  api::Move move = dry_run_of_all(50);
+  move.dry_run = false;
+  send(client("mover"), move);
+  while (!reception_.idle() || lab_->core().begins_moves()) {
+    one_round();
+    lab_->run_for(0.002);
+  }
+  ASSERT_TRUE(lab_->run_until([&] { return answered("mover 1 completed: "); }, 10));
+  EXPECT_THAT(log_.back(), HasSubstr("stands at its target"));
+  EXPECT_EQ(lab_->shaft_steps(name(0)), 50);
+  EXPECT_EQ(lab_->shaft_steps(name(kMotorsOfBus - 1)), 50);
+}
+
+TEST_F(Slices, AnEmergencyStopLetsNoOtherMotorBegin) {
+  open(large_hall(1), kMotorsOfBus);
+  api::Move move = dry_run_of_all(2'000);
+  move.dry_run = false;
+  send(client("mover"), move);
+  for (int round = 0; round < 3; ++round) one_round();
+  send(client("operator"), api::EmergencyStop{});
+  while (!reception_.idle() || lab_->core().begins_moves()) one_round();
+  ASSERT_TRUE(lab_->run_until([&] { return answered("mover 1 completed: "); }, 10));
+  EXPECT_EQ(lab_->shaft_steps(name(kMotorsOfBus - 1)), 0);
 }
 
 TEST_F(Slices, ADryRunIsOfTheStateAtItsAcceptance) {

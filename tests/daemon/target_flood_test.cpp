@@ -95,7 +95,7 @@ class Flood : public testing::TestWithParam<std::tuple<const char*, int>> {
 INSTANTIATE_TEST_SUITE_P(Rates, Flood,
                          testing::Combine(testing::Values("fine", "coarse", "fine_ticks",
                                                           "coarse_ticks", "fine_table"),
-                                          testing::Values(60, 300, 1000)),
+                                          testing::Values(60, 300, 1000, 3000)),
                          [](const auto& test) {
                            return std::string(std::get<0>(test.param)) + "_" +
                                   std::to_string(std::get<1>(test.param));

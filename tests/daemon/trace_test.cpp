@@ -53,6 +53,21 @@ class Trace : public testing::TestWithParam<Manner> {
     const Answer result = lab.wait(lab.send(Ask::kMoveBy, motors, steps));
     EXPECT_EQ(result.result, "reached") << result.reason;
   }
+  // Slower than the table, slower yet in motion, faster, and back to where it was.
+  void move_at_speeds(Lab& lab) {
+    const auto to = [&lab](std::int64_t position, double speed) {
+      return lab.send(api::Move{.kind = api::Move::Kind::kAbsolute,
+                                .motors = {{"m02", position}, {"m05", -position}},
+                                .speed = api::Speed{.per_s = speed, .in_steps = true}});
+    };
+    to(1500, 700);
+    lab.run_for(0.6);
+    to(1500, 180);
+    lab.run_for(0.6);
+    to(1700, 1900);
+    lab.run_for(0.3);
+    EXPECT_EQ(lab.wait(to(30, 411)).result, "reached");
+  }
   void write(Lab& lab) {
     EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
     nlohmann::json positions;
@@ -116,6 +131,7 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   EXPECT_EQ(lab.wait(limited).result, "limit");
   move(lab, {"m04", "m05", "m06"}, {-300, 100, 300});
   move(lab, {"m01", "m02", "m03"}, {-100, -50, 30});
+  move_at_speeds(lab);
   lab.run_for(0.1);
   write(lab);
   EXPECT_EQ(check(lab, [](auto&) { return true; }), 0) << said();

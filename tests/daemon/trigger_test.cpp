@@ -133,6 +133,23 @@ TEST_P(Triggered, EachMcuHasItsOwnTriggerAndTheMoveEndsWithTheLast) {
   EXPECT_EQ(lab.shaft_steps("m04"), -60);
 }
 
+TEST_P(Triggered, AreSaidToBeArmedWhenAnEdgeStartsThem) {
+  lab.connect();
+  const auto move = lab.send(armed({"m01", "m04"}, {50, 60}));
+  EXPECT_TRUE(
+      lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kArming; }, 1));
+  EXPECT_FALSE(lab.motor("m01").moving);
+  const auto both_armed = [&] {
+    return lab.motor("m01").activity == api::Activity::kArmed &&
+           lab.motor("m04").activity == api::Activity::kArmed;
+  };
+  ASSERT_TRUE(lab.run_until(both_armed, 0.2)) << "told at once";
+  for (const std::size_t mcu : {0u, 1u}) EXPECT_NE(lab.bus(0).mcu(mcu).core().trigger.armed, 0);
+  fire(0);
+  fire(1);
+  EXPECT_EQ(lab.wait(move).result, "reached");
+}
+
 TEST_P(Triggered, DisarmedTheyEndAsStopped) {
   lab.connect();
   for (const Ask kind : {Ask::kDisarm, Ask::kStop}) {

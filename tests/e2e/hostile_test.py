@@ -1,7 +1,7 @@
 """Broken and hostile payloads on a channel of requests, framed by hand: what LCM's own publish() would never send.
 
 A datagram of LCM (small message): "LC02", sequence number, channel with its NUL, payload. A payload of move_t:
-fingerprint of the type, utime_us, session, client_id, number, kind, dry_run, motor_count, motors, each of them a
+fingerprint of the type, utime_us, session, client_id, number, kind, dry_run, speed, speed_in_steps, motor_count, motors, each of them a
 motor_amount_t: motor, in_steps, steps, user; numbers big-endian, a text as its length with NUL, characters, NUL.
 Fingerprint, session and client are those of a move that bushctl has sent.
 """
@@ -72,7 +72,7 @@ class Hostile(EndToEndTest):
         """A move; `count` and `texts` (the motors' names, encoded) replace what would be right."""
         session = self.session if session is None else session
         head = struct.pack(">qq", 0, session) + text(self.client if client is None else client)
-        head += struct.pack(">qbb", number, MOVE_RELATIVE, 0)
+        head += struct.pack(">qbbd?", number, MOVE_RELATIVE, 0, 0.0, False)
         count = struct.pack(">i", len(motors) if count is None else count)
         texts = [text(motor) for motor in motors] if texts is None else texts
         amounts = [struct.pack(">?qd", True, each, 0.0) for each in steps]

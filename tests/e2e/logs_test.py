@@ -1,7 +1,9 @@
 """What ends up in the logs when somebody floods them, takes them away, or sends signals that mean nothing."""
 
 import contextlib
+import json
 import os
+import resource
 import signal
 import struct
 import unittest
@@ -51,6 +53,27 @@ class Logs(EndToEndTest):
         self.command("move", "--wait", "a0", "5")
         self.assertEqual([event["event"] for event in self.logged()], ["request", "move", "result"])
         self.assertIn("was removed or renamed", self.bushd.said())
+
+    def test_a_full_disk_is_told_once_and_when_it_is_over(self):
+        """A limit of the size of files is like a full disk: what is to be written beyond it is not."""
+        full = 10_000
+        self.write_config()
+        self.file("moves.jsonl").write_text("\n" * full)
+        self.bushsim = self.start_bushsim()
+        self.bushd = self.start_bushd()
+        self.wait_until_ready()
+        resource.prlimit(self.bushd.process.pid, resource.RLIMIT_FSIZE, (full, resource.RLIM_INFINITY))
+        for _ in range(30):
+            self.command("move", "--wait", "a0", "5")
+        self.assertEqual(self.bushd.said().count("a line was lost"), 1, self.bushd.said())
+        unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+        resource.prlimit(self.bushd.process.pid, resource.RLIMIT_FSIZE, unlimited)
+        self.command("move", "--wait", "a0", "5")
+        self.assertRegex(self.bushd.said(), "is written again; 90 lines were lost")
+        text = self.file("moves.jsonl").read_text()
+        self.assertTrue(text.endswith("\n"))
+        lines = [json.loads(line) for line in text.splitlines() if line]
+        self.assertEqual([line["event"] for line in lines[-3:]], ["request", "move", "result"])
 
     def test_signals_without_a_meaning_are_ignored(self):
         self.bring_up()

@@ -8,6 +8,7 @@ bushd_run_state any_run_state() {
   state.since = between<uint16_t>(0, 65535);
   state.since_ns = *rc::gen::element<uint32_t>(0, 1, 39999, UINT32_MAX);
   state.lead_delay = *rc::gen::element<uint16_t>(0, 0, 1, 250, 65535);
+  state.cruise = *rc::gen::element<uint16_t>(0, 0, 1, 250, 65535);
   state.cruises = *rc::gen::arbitrary<bool>();
   if (state.cruises) return state;
   state.accel_at = between<uint16_t>(0, 65535);
@@ -122,7 +123,8 @@ bushd_status table_run_again(const Bytes& payload, Bytes* again) {
   const bushd_status status = bushd_decode_table_run(payload.data(), payload.size(), &m);
   if (status != BUSHD_OK) return status;
   std::vector<bushd_table_run_entry> entries;
-  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_get_table_run_entry(m.entries, i));
+  const uint8_t* at = m.entries;
+  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_next_table_run_entry(&at));
   again->resize(BUSHD_FRAME_MAX_PAYLOAD);
   again->resize(
       bushd_encode_table_run(m.epoch, m.first_tick, entries.data(), m.count, again->data()));
@@ -134,9 +136,11 @@ Bytes any_table_run() {
   Bytes payload = random_bytes(BUSHD_TABLE_RUN_HEADER);
   for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((mask >> m & 1) == 0) continue;
-    Bytes entry(BUSHD_TABLE_RUN_ENTRY);
+    const bool has_floor = between(0, 1) != 0;
+    Bytes entry(has_floor ? BUSHD_TABLE_RUN_MAX_ENTRY : BUSHD_TABLE_RUN_MAX_ENTRY - 2);
     entry[0] = static_cast<uint8_t>(m | between<uint8_t>(0, 15) << 4);
-    bushd_put_u32(&entry[1], between<uint32_t>(1, INT32_MAX));
+    bushd_put_u32(&entry[1], between<uint32_t>(1, INT32_MAX) | (has_floor ? 0x80000000u : 0u));
+    if (has_floor) bushd_put_u16(&entry[5], between<uint16_t>(1, 65535));
     payload.insert(payload.end(), entry.begin(), entry.end());
   }
   return payload;
@@ -147,7 +151,8 @@ bushd_status trigger_again(const Bytes& payload, Bytes* again) {
   const bushd_status status = bushd_decode_trigger(payload.data(), payload.size(), &m);
   if (status != BUSHD_OK) return status;
   std::vector<bushd_table_run_entry> entries;
-  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_get_table_run_entry(m.entries, i));
+  const uint8_t* at = m.entries;
+  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_next_table_run_entry(&at));
   again->resize(BUSHD_FRAME_MAX_PAYLOAD);
   again->resize(
       bushd_encode_trigger(m.number, m.edge, m.delay_us, entries.data(), m.count, again->data()));
@@ -164,28 +169,36 @@ Bytes any_trigger() {
   return payload;
 }
 
+// With this one behind a header of that size.
+std::function<void(Bytes*)> entry_alone(std::size_t header, Bytes entry) {
+  return [header, entry = std::move(entry)](Bytes* p) {
+    p->resize(header);
+    p->insert(p->end(), entry.begin(), entry.end());
+  };
+}
+
 }  // namespace
 
 Kinds motion_kinds() {
   return {
       {"home",
-       {bytes_with(16,
+       {bytes_with(18,
                    [](Bytes* p) {
                      (*p)[0] = between<uint8_t>(0, 15);
                      (*p)[1] = *rc::gen::element<uint8_t>(1, 0xFF);
                      (*p)[5] &= 0x7F;
-                     (*p)[9] &= 0x7F;
-                     (*p)[6] |= 1;
-                     (*p)[10] |= 1;
+                     (*p)[11] &= 0x7F;
+                     (*p)[8] |= 1;
+                     (*p)[12] |= 1;
                    }),
         codec(bushd_decode_home, bushd_encode_home),
         {{"motor 16", set8(0, 16)},
          {"no direction", set8(1, 0)},
          {"twice the direction", set8(1, 2)},
          {"too many steps", set32(2, 0x80000000)},
-         {"no slow steps", set32(6, 0)},
-         {"too many slow steps", set32(6, 0x80000000)},
-         {"no delay", set16(10, 0)}}}},
+         {"no slow steps", set32(8, 0)},
+         {"too many slow steps", set32(8, 0x80000000)},
+         {"no delay", set16(12, 0)}}}},
       {"local",
        {[] { return random_bytes(2); }, codec(bushd_decode_local, bushd_encode_local), {}}},
       {"poll", {any_poll, poll_again, {}}},
@@ -206,7 +219,7 @@ Kinds motion_kinds() {
        {any_table_ticks,
         table_ticks_again,
         {{"fine", [](Bytes* p) { (*p)[1] |= 1; }},
-         {"unknown flag", [](Bytes* p) { (*p)[1] |= 8; }},
+         {"unknown flag", [](Bytes* p) { (*p)[1] |= 16; }},
          {"start and replacement at once", [](Bytes* p) { (*p)[1] |= 6; }},
          {"no ticks", set16(6, 0)},
          {"no entry", [](Bytes* p) { p->resize(BUSHD_TABLE_TICKS_HEADER); }}},
@@ -214,12 +227,15 @@ Kinds motion_kinds() {
       {"table_run",
        {any_table_run,
         table_run_again,
-        {{"no step", set32(BUSHD_TABLE_RUN_HEADER + 1, 0)},
-         {"more steps than a position has", set32(BUSHD_TABLE_RUN_HEADER + 1, 0x80000000u)},
+        {{"no step", entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0})},
+         {"no step, with a floor",
+          entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0x80, 9, 0})},
+         {"a floor of no time", entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 5, 0, 0, 0x80, 0, 0})},
          {"no entry", [](Bytes* p) { p->resize(BUSHD_TABLE_RUN_HEADER); }},
          {"a motor twice",
           [](Bytes* p) {
-            const Bytes entry(p->end() - BUSHD_TABLE_RUN_ENTRY, p->end());
+            const Bytes entry{15, 5, 0, 0, 0};
+            p->insert(p->end(), entry.begin(), entry.end());
             p->insert(p->end(), entry.begin(), entry.end());
           }}},
         true}},
@@ -231,7 +247,7 @@ Kinds motion_kinds() {
          {"entries to disarm", set8(1, 0)},
          {"too short a delay", set32(2, 49)},
          {"too long a delay", set32(2, 1'500'001)},
-         {"no step", set32(7, 0)},
+         {"no step", entry_alone(6, {0, 0, 0, 0, 0})},
          {"no entry", [](Bytes* p) { p->resize(6); }}},
         true}},
       {"position_compare",

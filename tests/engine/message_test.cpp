@@ -129,6 +129,10 @@ TEST(MessageTableTicks, RefusesAFieldOf0ThatNeedNotBeThere) {
   Bytes no_ns = payload;
   bushd_put_u32(&no_ns[BUSHD_TABLE_TICKS_HEADER + 3], 0);
   EXPECT_EQ(bushd_decode_table_ticks(no_ns.data(), no_ns.size(), &message), BUSHD_E_FORMAT);
+  Bytes no_cruise = payload;
+  no_cruise[1] |= BUSHD_TICKS_CRUISE;
+  no_cruise.insert(no_cruise.begin() + BUSHD_TABLE_TICKS_HEADER + 3, {0, 0});
+  EXPECT_EQ(bushd_decode_table_ticks(no_cruise.data(), no_cruise.size(), &message), BUSHD_E_FORMAT);
   Bytes no_lead = payload;
   bushd_put_u16(&no_lead[BUSHD_TABLE_TICKS_HEADER + 7], 0);
   EXPECT_EQ(bushd_decode_table_ticks(no_lead.data(), no_lead.size(), &message), BUSHD_E_FORMAT);
@@ -145,14 +149,14 @@ TEST(MessageTableTicks, AMotorInCruiseTakesThreeBytes) {
 }
 
 TEST(MessageTableTicks, NoEntryIsLongerThanTheLongest) {
-  const bushd_table_ticks_entry entry{15, {1, false, 9, 9, 9, 9, 9, 9, 9}};
+  const bushd_table_ticks_entry entry{15, {1, false, 9, 9, 9, 9, 9, 9, 9, 9}};
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   EXPECT_EQ(bushd_encode_table_ticks(1, 0, 1000, 190, &entry, 1, payload.data()),
             BUSHD_TABLE_TICKS_HEADER + BUSHD_TABLE_TICKS_MAX_ENTRY);
 }
 
 TEST(MessageTableRun, OfAllMotorsFitsAFrame) {
-  EXPECT_LE(BUSHD_TABLE_RUN_HEADER + BUSHD_TABLE_RUN_ENTRY * BUSHD_MOTORS_PER_MCU,
+  EXPECT_LE(BUSHD_TABLE_RUN_HEADER + BUSHD_TABLE_RUN_MAX_ENTRY * BUSHD_MOTORS_PER_MCU,
             BUSHD_FRAME_MAX_PAYLOAD);
 }
 

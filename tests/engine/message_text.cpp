@@ -99,6 +99,7 @@ void put(const bushd_set_inputs& m, Fields& f) {
 }
 void put(const bushd_home& m, Fields& f) {
   f.add("motor", m.motor).add("direction", m.direction).add("most_steps", m.most_steps);
+  f.add("floor", m.floor);
   f.add("slow_steps", m.slow_steps).add("slow_delay", m.slow_delay);
   f.add("position_steps", m.position_steps);
 }
@@ -133,15 +134,15 @@ void put(const bushd_table_ticks& m, Fields& f) {
   for (bushd_table_ticks_entry entry; bushd_next_table_ticks_entry(&m, &at, &entry);) {
     const bushd_run_state& s = entry.state;
     append(&entries, parts({entry.motor, s.direction, s.cruises, s.since, s.since_ns, s.lead_delay,
-                            s.accel_at, s.accel_end, s.cruise_left, s.decel_left}));
+                            s.accel_at, s.accel_end, s.cruise_left, s.decel_left, s.cruise}));
   }
   f.add_text("entries", entries);
 }
 void put_entries(const uint8_t* entries, uint8_t count, Fields& f) {
   std::string text;
   for (uint8_t i = 0; i < count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(entries, i);
-    append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps}));
+    const bushd_table_run_entry entry = bushd_next_table_run_entry(&entries);
+    append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps, entry.floor}));
   }
   f.add_text("entries", text);
 }

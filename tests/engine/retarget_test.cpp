@@ -82,19 +82,21 @@ TEST(Retarget, ChangesAtAnyTickFollowTheDefinition) {
     const Law law = any_law();
     const TestTable table(law, *rc::gen::arbitrary<bool>());
     const auto steps = between<uint32_t>(1, 120);
+    const uint16_t first_floor = any_floor(law);
     Flight flight{.run = {},
-                  .reference = Reference::move(law, steps),
+                  .reference = Reference::move(law, steps, first_floor),
                   .tick_ns = any_tick_ns(law),
                   .fine = *rc::gen::arbitrary<bool>(),
                   .direction = *rc::gen::element(1, -1)};
-    bushd_run_start(&flight.run, table.view(), steps, flight.direction);
+    bushd_run_start(&flight.run, table.view(), steps, flight.direction, first_floor);
     for (int changes = between(1, 4); changes > 0; --changes) {
       const uint64_t left = flight.reference.units_left_at(flight.now_ns()) * law.unit_ns;
       flight.fly(std::min<uint64_t>(between<uint64_t>(0, left / flight.tick_ns + 1), kMostTicks));
       const auto after = between<uint32_t>(0, between(0, 1) != 0 ? 10 : 150);
       const bushd_run before = flight.run;
-      const bool taken = bushd_run_retarget(&flight.run, after);
-      RC_ASSERT(taken == flight.reference.retarget_at(flight.now_ns(), after));
+      const uint16_t floor = any_floor(law);
+      const bool taken = bushd_run_retarget(&flight.run, after, floor);
+      RC_ASSERT(taken == flight.reference.retarget_at(flight.now_ns(), after, floor));
       if (!taken) {
         RC_ASSERT(bushd_run_delay(&flight.run) == bushd_run_delay(&before));
         RC_ASSERT(bushd_run_steps_left(&flight.run) == bushd_run_steps_left(&before));
@@ -123,7 +125,7 @@ std::vector<uint32_t> delays_left(bushd_run run) {
 
 bushd_run after_units(const TestTable& table, uint32_t steps, uint32_t units) {
   bushd_run run;
-  bushd_run_start(&run, table.view(), steps, 1);
+  bushd_run_start(&run, table.view(), steps, 1, 0);
   std::vector<uint8_t> unused(units);
   bushd_run_expand_coarse(&run, 1000, units, unused.data(), 1);
   return run;
@@ -132,7 +134,7 @@ bushd_run after_units(const TestTable& table, uint32_t steps, uint32_t units) {
 TEST(Retarget, FartherWhileSpeedingUpIsTheLongerMove) {
   const TestTable table(kRamp, true);
   bushd_run run = after_units(table, 4, 50);  // 50 | 40 40 50
-  ASSERT_TRUE(bushd_run_retarget(&run, 9));
+  ASSERT_TRUE(bushd_run_retarget(&run, 9, 0));
   EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{40, 30, 20, 10, 10, 10, 20, 30, 40, 50}));
 }
 
@@ -140,7 +142,7 @@ TEST(Retarget, FartherAtCruiseStaysAtCruise) {
   const TestTable table(kRamp, true);
   bushd_run run = after_units(table, 12, 150);
   ASSERT_EQ(bushd_run_delay(&run), 10);
-  ASSERT_TRUE(bushd_run_retarget(&run, 7));
+  ASSERT_TRUE(bushd_run_retarget(&run, 7, 0));
   EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{10, 10, 10, 10, 20, 30, 40, 50}));
 }
 
@@ -148,7 +150,7 @@ TEST(Retarget, FartherWhileSlowingDownSpeedsUpFromThere) {
   const TestTable table(kRamp, true);
   bushd_run run = after_units(table, 10, 160);  // 50 40 30 20 10 10 | 20 30 40 50
   ASSERT_EQ(bushd_run_delay(&run), 20);
-  ASSERT_TRUE(bushd_run_retarget(&run, 8));
+  ASSERT_TRUE(bushd_run_retarget(&run, 8, 0));
   EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{20, 10, 10, 10, 10, 20, 30, 40, 50}));
 }
 
@@ -156,30 +158,49 @@ TEST(Retarget, ADelayThatTheAcceleratingSideDoesNotHaveGoesOnWithTheNextShorterO
   const TestTable table({{50, 40, 30, 20, 10}, {45, 35, 25, 15}, 10, 1000}, false);
   bushd_run run = after_units(table, 10, 175);
   ASSERT_EQ(bushd_run_delay(&run), 25);
-  ASSERT_TRUE(bushd_run_retarget(&run, 5));
+  ASSERT_TRUE(bushd_run_retarget(&run, 5, 0));
   EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{25, 20, 15, 25, 35, 45}));
 }
 
 TEST(Retarget, NearerEndsAsSoonAsTheTableAllowsAndNotBefore) {
   const TestTable table(kRamp, true);
   bushd_run run = after_units(table, 1000, 500);
-  EXPECT_FALSE(bushd_run_retarget(&run, 3));
+  EXPECT_FALSE(bushd_run_retarget(&run, 3, 0));
   EXPECT_EQ(bushd_run_steps_left(&run), 1000 - run.steps_done);
-  ASSERT_TRUE(bushd_run_retarget(&run, 4));
+  ASSERT_TRUE(bushd_run_retarget(&run, 4, 0));
   EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{10, 20, 30, 40, 50}));
+}
+
+TEST(Retarget, SlowsDownToAFloorAlongTheDeceleratingSideAndSpeedsUpFromItAgain) {
+  const TestTable table(kRamp, true);
+  bushd_run run = after_units(table, 1000, 500);
+  ASSERT_EQ(bushd_run_delay(&run), 10);
+  ASSERT_TRUE(bushd_run_retarget(&run, 9, 35));
+  EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{10, 20, 30, 35, 35, 35, 35, 35, 40, 50}));
+  std::vector<uint8_t> unused(10 + 20 + 30 + 35);
+  bushd_run_expand_coarse(&run, 1000, unused.size(), unused.data(), 1);
+  ASSERT_TRUE(bushd_run_retarget(&run, 6, 20));
+  EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{35, 30, 20, 20, 30, 40, 50}));
+}
+
+TEST(Retarget, AFloorSlowerThanTheTablesSlowestDelayIsReachedByItsWholeSide) {
+  const TestTable table(kRamp, true);
+  bushd_run run = after_units(table, 1000, 500);
+  ASSERT_TRUE(bushd_run_retarget(&run, 6, 60));
+  EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{10, 20, 30, 40, 50, 60, 60}));
 }
 
 TEST(Retarget, ARunThatIsDoneHasNoTarget) {
   const TestTable table(kRamp, true);
   bushd_run run = after_units(table, 1, 50);
-  EXPECT_FALSE(bushd_run_retarget(&run, 5));
+  EXPECT_FALSE(bushd_run_retarget(&run, 5, 0));
   EXPECT_TRUE(bushd_run_done(&run));
 }
 
 TEST(Retarget, TheMostStepsAreTakenInstantly) {
   const TestTable table(kRamp, true);
   bushd_run run = after_units(table, 30, 95);
-  ASSERT_TRUE(bushd_run_retarget(&run, UINT32_MAX - 10));
+  ASSERT_TRUE(bushd_run_retarget(&run, UINT32_MAX - 10, 0));
   EXPECT_EQ(bushd_run_steps_left(&run), UINT32_MAX - 9);
   EXPECT_EQ(bushd_run_delay(&run), 30);
 }

@@ -39,7 +39,7 @@ TEST(RunSlots, EveryStepFallsIntoItsSlotByTheSumOfTheDelays) {
     auto reference = Reference::move(table.law(), steps);
     reference.begin_late(late_ns);
     bushd_run run;
-    bushd_run_start(&run, table.view(), steps, direction);
+    bushd_run_start(&run, table.view(), steps, direction, 0);
     bushd_run_begin_late(&run, late_ns);
     size_t made = 0;
     for (uint64_t tick = 0; tick < 3000 && !bushd_run_done(&run); ++tick) {
@@ -69,7 +69,7 @@ TEST(RunSlots, TimeUnitOfSecondsIsCountedToItsEnd) {
   table.cruise = 1;
   table.time_unit_ns = kUnitNs;
   bushd_run run;
-  bushd_run_start(&run, &table, 2, 1);
+  bushd_run_start(&run, &table, 2, 1, 0);
   bushd_run_begin_late(&run, kLateNs);
   std::vector<int> ticks_of_steps;
   for (int tick = 0; !bushd_run_done(&run) && tick < 1000; ++tick) {
@@ -85,7 +85,7 @@ TEST(RunSlots, LeavesTheRunWhereAnExpandedTickLeavesIt) {
     const TestTable table(any_law(), between(0, 1) != 0);
     const uint32_t tick_ns = any_tick_ns(table.law());
     bushd_run by_ticks;
-    bushd_run_start(&by_ticks, table.view(), between<uint32_t>(1, 300), -1);
+    bushd_run_start(&by_ticks, table.view(), between<uint32_t>(1, 300), -1, 0);
     bushd_run mixed = by_ticks;
     for (int tick = 0; tick < 400; ++tick) {
       if (tick == 50) {
@@ -110,7 +110,7 @@ TEST(RunSlots, LeavesTheRunWhereAnExpandedTickLeavesIt) {
 TEST(RunSlots, MotorsShareMasksAndADoneRunMakesNothing) {
   const TestTable table({{4}, {4}, 4, 1000}, false);
   bushd_run run;
-  bushd_run_start(&run, table.view(), 2, 1);
+  bushd_run_start(&run, table.view(), 2, 1, 0);
   const bushd_run_tick tick = bushd_run_tick_of(8000, table.view(), 128);
   std::vector<uint16_t> masks(128, 0x8000);
   EXPECT_EQ(bushd_run_slots(&run, &tick, 1, masks.data()), 2);

@@ -33,14 +33,15 @@ bushd_run any_run(const TestTable& table, Format format, uint32_t tick_ns) {
   bushd_run run;
   const int direction = *rc::gen::element(1, -1);
   bushd_run_start(&run, table.view(),
-                  *rc::gen::element<uint32_t>(between<uint32_t>(1, 300), INT32_MAX), direction);
+                  *rc::gen::element<uint32_t>(between<uint32_t>(1, 300), INT32_MAX), direction,
+                  any_floor(table.law()));
   for (int again = between(0, 3); again >= 0; --again) {
     expand(&run, format, tick_ns, between<size_t>(0, 60));
     if (again == 0) break;
     if (between(0, 1) == 0) {
       bushd_run_ramp_down(&run);
     } else {
-      bushd_run_retarget(&run, between<uint32_t>(0, 300));
+      bushd_run_retarget(&run, between<uint32_t>(0, 300), any_floor(table.law()));
     }
   }
   return run;
@@ -70,7 +71,7 @@ void goes_on_as_the_original(Format format) {
   const Tables tables(any_law());
   const uint32_t tick_ns = any_tick_ns(tables.host.law());
   bushd_run run = any_run(tables.host, format, tick_ns);
-  RC_PRE(!bushd_run_done(&run));
+  RC_PRE(!bushd_run_done(&run) && run.brake_left == 0);
   const auto ticks = between<uint16_t>(1, 190);
   const bushd_run_state state = through_a_frame(bushd_run_save(&run, tick_ns, ticks));
   bushd_run taken_up;
@@ -100,7 +101,8 @@ TEST(RunState, FramesInARowMakeTheMove) {
     const uint32_t tick_ns = any_tick_ns(tables.host.law());
     const Format format = *rc::gen::element(Format::kCoarse, Format::kFine);
     bushd_run run;
-    bushd_run_start(&run, tables.host.view(), between<uint32_t>(1, 300), 1);
+    bushd_run_start(&run, tables.host.view(), between<uint32_t>(1, 300), 1,
+                    any_floor(tables.host.law()));
     uint64_t steps = 0;
     const uint32_t asked = bushd_run_steps_left(&run);
     for (int frames = 0; frames < 400 && !bushd_run_done(&run); ++frames) {
@@ -118,7 +120,7 @@ TEST(RunState, FramesInARowMakeTheMove) {
 TEST(RunState, CruisesOnlyIfItDoesThroughout) {
   const TestTable table({{5, 4}, {5, 4}, 3, 1000}, true);
   bushd_run run;
-  bushd_run_start(&run, table.view(), 104, 1);
+  bushd_run_start(&run, table.view(), 104, 1, 0);
   EXPECT_FALSE(bushd_run_save(&run, 3000, 1).cruises);  // speeds up
   expand(&run, Format::kCoarse, 3000, 3);               // 9 of cruise's 300 us are over
   EXPECT_TRUE(bushd_run_save(&run, 3000, 99).cruises);
@@ -153,6 +155,13 @@ uint32_t next_of(const Law& law, uint32_t delay) {
     if (code < delay) return std::max<uint32_t>(code, law.cruise);
   }
   return law.cruise;
+}
+
+// The longest delay that may follow a step of this one: the next on the way to rest.
+uint32_t slowest_after(const Law& law, uint32_t delay) {
+  size_t k = 0;
+  while (law.decel_at(k) > Wide{delay}) ++k;
+  return k == 0 ? 65535 : static_cast<uint32_t>(law.decel_at(k - 1));
 }
 
 // A hostile state is mostly made of numbers that the table knows: those nearly fit.
@@ -193,6 +202,7 @@ bushd_run_state hostile_state(const Law& law) {
   state.cruise_left =
       *rc::gen::element<uint32_t>(0, 0, 0, 1, 5, INT32_MAX, UINT32_MAX - 1, UINT32_MAX);
   state.decel_left = any_number_for(law.decel);
+  state.cruise = any_floor(law);
   return state;
 }
 
@@ -206,6 +216,7 @@ bool refused_or_legal(const TestTable& table, const bushd_run_state& state) {
   for (size_t i = 0; i < all.size(); ++i) {
     RC_ASSERT(all[i] >= law.cruise);
     if (i > 0) RC_ASSERT(all[i] >= next_of(law, all[i - 1]));
+    if (i > 0) RC_ASSERT(all[i] <= slowest_after(law, all[i - 1]));
   }
   // It comes to rest by its decelerating side: a step before which n more are left is not faster
   // than D(n).
@@ -242,24 +253,24 @@ TEST(RunState, RefusesJumpsInSpeed) {
     bushd_run run;
     return bushd_run_restore(&run, table.view(), &state);
   };
-  // direction, cruises, since, since_ns, lead, accel_at, accel_end, cruise_left, decel_left
-  EXPECT_TRUE(taken({1, false, 0, 0, 0, 0, 3, 7, 3}));
-  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 1, 7, 3})) << "to cruise from half way up";
-  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 3, 7, 1})) << "from cruise to rest in one step";
-  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 3, 0, 1})) << "from the top to rest in one step";
-  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 1, 0, 3})) << "to decelerating codes not yet reached";
-  EXPECT_TRUE(taken({1, false, 0, 0, 35, 2, 3, 7, 3}));
-  EXPECT_FALSE(taken({1, false, 0, 0, 45, 2, 3, 7, 3})) << "a lead slower than what comes before";
-  EXPECT_FALSE(taken({1, false, 0, 0, 45, 3, 3, 7, 3})) << "from a slow lead to cruise";
-  EXPECT_FALSE(taken({1, false, 0, 0, 20, 0, 3, 7, 3})) << "from a fast lead to the foot";
-  EXPECT_FALSE(taken({1, false, 0, 0, 20, 0, 0, 0, 1})) << "from a fast lead to rest in one step";
-  EXPECT_FALSE(taken({1, false, 0, 0, 19, 0, 0, 0, 3})) << "a lead faster than cruise";
-  EXPECT_TRUE(taken({1, true, 19, 999, 0, 0, 0, 0, 0}));
-  EXPECT_FALSE(taken({1, true, 20, 0, 0, 0, 0, 0, 0})) << "the step is over";
-  EXPECT_FALSE(taken({1, true, 0, 1000, 0, 0, 0, 0, 0})) << "more than a unit";
-  EXPECT_FALSE(taken({1, true, 0, 0, 30, 0, 0, 0, 0})) << "a lead is no cruise";
-  EXPECT_FALSE(taken({1, false, 0, 0, 0, 3, 3, 0, 0})) << "nothing to be done";
-  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 3, UINT32_MAX - 2, 3}))
+  // direction, cruises, since, since_ns, lead, accel_at, accel_end, cruise_left, decel_left, cruise
+  EXPECT_TRUE(taken({1, false, 0, 0, 0, 0, 3, 7, 3, 0}));
+  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 1, 7, 3, 0})) << "to cruise from half way up";
+  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 3, 7, 1, 0})) << "from cruise to rest in one step";
+  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 3, 0, 1, 0})) << "from the top to rest in one step";
+  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 1, 0, 3, 0})) << "to decelerating codes not yet reached";
+  EXPECT_TRUE(taken({1, false, 0, 0, 35, 2, 3, 7, 3, 0}));
+  EXPECT_FALSE(taken({1, false, 0, 0, 45, 2, 3, 7, 3, 0})) << "a lead slower than what comes before";
+  EXPECT_FALSE(taken({1, false, 0, 0, 45, 3, 3, 7, 3, 0})) << "from a slow lead to cruise";
+  EXPECT_FALSE(taken({1, false, 0, 0, 20, 0, 3, 7, 3, 0})) << "from a fast lead to the foot";
+  EXPECT_FALSE(taken({1, false, 0, 0, 20, 0, 0, 0, 1, 0})) << "from a fast lead to rest in one step";
+  EXPECT_FALSE(taken({1, false, 0, 0, 19, 0, 0, 0, 3, 0})) << "a lead faster than cruise";
+  EXPECT_TRUE(taken({1, true, 19, 999, 0, 0, 0, 0, 0, 0}));
+  EXPECT_FALSE(taken({1, true, 20, 0, 0, 0, 0, 0, 0, 0})) << "the step is over";
+  EXPECT_FALSE(taken({1, true, 0, 1000, 0, 0, 0, 0, 0, 0})) << "more than a unit";
+  EXPECT_FALSE(taken({1, true, 0, 0, 30, 0, 0, 0, 0, 0})) << "a lead is no cruise";
+  EXPECT_FALSE(taken({1, false, 0, 0, 0, 3, 3, 0, 0, 0})) << "nothing to be done";
+  EXPECT_FALSE(taken({1, false, 0, 0, 0, 0, 3, UINT32_MAX - 2, 3, 0}))
       << "more steps than a run counts";
 }
 

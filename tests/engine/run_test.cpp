@@ -115,7 +115,7 @@ const Law kSmall{{5, 4, 3}, {6, 3, 2}, 3, 1000};
 TEST(Run, FollowsTheRuleOnAMoveComputedByHand) {
   const TestTable table(kSmall, false);
   bushd_run run;
-  bushd_run_start(&run, table.view(), 5, 1);
+  bushd_run_start(&run, table.view(), 5, 1, 0);
   // Delays max(A(j-1), D(5-j), 3) = 5 4 3 3 6; steps at 5, 9, 12, 15, 21 us; ticks of 4 us.
   EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 7).displacements,
             (std::vector<int>{0, 256, 512, 256, 0, 256, 0}));
@@ -125,14 +125,14 @@ TEST(Run, ShortMoveNeverReachesCruise) {
   const Law law{{50, 40, 30, 20, 10}, {50, 40, 30, 20, 10}, 10, 1000};
   const TestTable table(law, true);
   bushd_run run;
-  bushd_run_start(&run, table.view(), 4, 1);
+  bushd_run_start(&run, table.view(), 4, 1, 0);
   EXPECT_EQ(bushd_run_units_left(&run), 50u + 40u + 40u + 50u);
 }
 
 TEST(Run, OfNoStepsIsDone) {
   const TestTable table(kSmall, true);
   bushd_run run;
-  bushd_run_start(&run, table.view(), 0, 1);
+  bushd_run_start(&run, table.view(), 0, 1, 0);
   EXPECT_TRUE(bushd_run_done(&run));
   EXPECT_EQ(bushd_run_delay(&run), 0);
   uint8_t out[3] = {1, 1, 1};
@@ -143,7 +143,7 @@ TEST(Run, OfNoStepsIsDone) {
 TEST(Run, OfTheMostStepsStartsInstantly) {
   const TestTable table(kSmall, true);
   bushd_run run;
-  bushd_run_start(&run, table.view(), UINT32_MAX, 1);
+  bushd_run_start(&run, table.view(), UINT32_MAX, 1, 0);
   EXPECT_EQ(bushd_run_steps_left(&run), UINT32_MAX);
   EXPECT_EQ(expand(&run, Format::kCoarse, 4000, 3).displacements, (std::vector<int>{0, 256, 512}));
 }
@@ -152,7 +152,7 @@ TEST(Run, IdleTicksAfterTheEndAreZeroBytesInBothDirections) {
   const TestTable table(kSmall, true);
   for (const int direction : {1, -1}) {
     bushd_run run;
-    bushd_run_start(&run, table.view(), 1, direction);
+    bushd_run_start(&run, table.view(), 1, direction, 0);
     uint8_t out[4];
     EXPECT_EQ(bushd_run_expand_coarse(&run, 4000, 4, out, 1), 2u);
     EXPECT_EQ(out[2], 0);
@@ -168,7 +168,7 @@ void check_move(const TestTable& table, Format format) {
   const size_t ticks = ticks_to_compare(reference, tick_ns);
   RC_LOG() << "steps " << steps << " tick " << tick_ns << " ticks " << ticks << '\n';
   bushd_run run;
-  bushd_run_start(&run, table.view(), steps, direction);
+  bushd_run_start(&run, table.view(), steps, direction, 0);
   const auto got = expand(&run, format, tick_ns, ticks, true);
   RC_ASSERT(got.displacements == expected(reference, format, tick_ns, 0, ticks, direction));
   RC_ASSERT(got.active == active_ticks(reference, tick_ns, ticks));
@@ -200,7 +200,7 @@ TEST(Run, MayBeginInTheMiddleOfItsFirstTick) {
     const size_t ticks = ticks_to_compare(reference, tick_ns);
     RC_LOG() << "steps " << steps << " tick " << tick_ns << " late " << late_ns << '\n';
     bushd_run run;
-    bushd_run_start(&run, table.view(), steps, -1);
+    bushd_run_start(&run, table.view(), steps, -1, 0);
     bushd_run_begin_late(&run, late_ns);
     RC_ASSERT(bushd_run_units_left(&run) == reference.units_left_at(0));
     const auto got = expand(&run, format, tick_ns, ticks, true);
@@ -224,7 +224,7 @@ TEST(Run, LongMovesAgreeWithTheDefinitionTickByTick) {
         const Reference reference = Reference::move(law, steps);
         const size_t ticks = ticks_to_compare(reference, 2'560'000);
         bushd_run run;
-        bushd_run_start(&run, table.view(), steps, -1);
+        bushd_run_start(&run, table.view(), steps, -1, 0);
         ASSERT_EQ(expand(&run, format, 2'560'000, ticks).displacements,
                   expected(reference, format, 2'560'000, 0, ticks, -1))
             << steps << " steps";
@@ -243,7 +243,7 @@ TEST(Run, TellsDelayAndTimeLeftAtEveryTick) {
     const Reference reference = Reference::move(table.law(), steps);
     const size_t ticks = std::min<size_t>(ticks_to_compare(reference, tick_ns), 200);
     bushd_run run;
-    bushd_run_start(&run, table.view(), steps, 1);
+    bushd_run_start(&run, table.view(), steps, 1, 0);
     for (size_t n = 0; n <= ticks; ++n) {
       const uint64_t now = uint64_t{n} * tick_ns;
       RC_ASSERT(bushd_run_delay(&run) == reference.delay_at(now));
@@ -265,7 +265,7 @@ TEST(Run, RampsDownFromAnyTick) {
     // Once or twice: a ramp-down may itself be asked to ramp down.
     size_t at = between<size_t>(0, all);
     bushd_run run;
-    bushd_run_start(&run, table.view(), steps, direction);
+    bushd_run_start(&run, table.view(), steps, direction, 0);
     auto got = expand(&run, format, tick_ns, at, true);
     auto want = expected(reference, format, tick_ns, 0, at, direction);
     for (int again = between(0, 1); again >= 0; --again) {
@@ -294,7 +294,7 @@ TEST(Run, RampDownBeforeTheFirstTickMakesTheFirstStepOnly) {
   const Law law{{50, 40, 30}, {50, 40, 30}, 30, 1000};
   const TestTable table(law, true);
   bushd_run run;
-  bushd_run_start(&run, table.view(), 100, 1);
+  bushd_run_start(&run, table.view(), 100, 1, 0);
   bushd_run_ramp_down(&run);
   EXPECT_EQ(bushd_run_steps_left(&run), 1u);  // D(0) = 50 <= 50: no step more is needed
 }
@@ -331,7 +331,7 @@ TEST(Run, TakeOverMakesAsManyStepsAsTheRunItselfRampingDown) {
     const TestTable table(any_law(), true);
     const uint32_t tick_ns = any_tick_ns(table.law());
     bushd_run run;
-    bushd_run_start(&run, table.view(), between<uint32_t>(1, 200), 1);
+    bushd_run_start(&run, table.view(), between<uint32_t>(1, 200), 1, 0);
     expand(&run, Format::kFine, tick_ns, between<size_t>(0, 60));
     RC_PRE(!bushd_run_done(&run));
     bushd_run taken;
@@ -355,7 +355,7 @@ TEST(Run, ACopyReplaysTheSameTicks) {
     const uint32_t tick_ns = any_tick_ns(table.law());
     const Format format = *rc::gen::element(Format::kCoarse, Format::kFine);
     bushd_run run;
-    bushd_run_start(&run, table.view(), between<uint32_t>(0, 200), 1);
+    bushd_run_start(&run, table.view(), between<uint32_t>(0, 200), 1, 0);
     expand(&run, format, tick_ns, between<size_t>(0, 60));
     bushd_run copy = run;
     const auto first = expand(&run, format, tick_ns, 60).displacements;

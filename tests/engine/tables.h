@@ -75,6 +75,22 @@ inline Law any_law() {
   return law;
 }
 
+// None, one of the table's delays, or another.
+inline uint16_t any_floor(const Law& law) {
+  switch (between(0, 4)) {
+    case 0:
+      return 0;
+    case 1:
+      return *rc::gen::elementOf(law.accel);
+    case 2:
+      return *rc::gen::elementOf(law.decel);
+    case 3:
+      return between<uint16_t>(1, 65535);
+    default:
+      return between<uint16_t>(law.decel.back(), law.decel.front());
+  }
+}
+
 // A tick of any length that lets no more than 127 steps fall into it, as the engine demands.
 inline uint32_t any_tick_ns(const Law& law) {
   const uint64_t most = uint64_t{law.cruise} * law.unit_ns * 127 - 1;

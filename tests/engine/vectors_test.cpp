@@ -114,7 +114,7 @@ TEST(Vectors, Moves) {
       const size_t ticks = expected.size() / (row.at("format") == "fine" ? 2 : 1);
       bushd_run run;
       bushd_run_start(&run, table.view(), static_cast<uint32_t>(std::abs(steps)),
-                      steps < 0 ? -1 : 1);
+                      steps < 0 ? -1 : 1, number<uint16_t>(row, "floor"));
       std::vector<uint8_t> got;
       const std::string stop = row.at("ramp_down_at_tick");
       const size_t before = stop.empty() ? 0 : std::stoul(stop);
@@ -153,7 +153,7 @@ TEST(Vectors, RunStates) {
       const auto tick = number<size_t>(row, "tick");
       bushd_run run;
       bushd_run_start(&run, table.view(), static_cast<uint32_t>(std::abs(steps)),
-                      steps < 0 ? -1 : 1);
+                      steps < 0 ? -1 : 1, number<uint16_t>(row, "floor"));
       std::vector<uint8_t> before;
       const std::string stop = row.at("ramp_down_at_tick");
       const size_t stopped = stop.empty() ? tick : std::stoul(stop);
@@ -164,6 +164,7 @@ TEST(Vectors, RunStates) {
       const std::vector<int64_t> parts{s.accel_at, s.accel_end, s.cruise_left, s.decel_left};
       std::vector<int64_t> state{s.direction, s.cruises, s.since, s.since_ns, s.lead_delay};
       for (const int64_t part : parts) state.push_back(s.cruises ? 0 : part);
+      state.push_back(s.cruise);
       EXPECT_EQ(state, numbers<int64_t>(row.at("state"), '/'));
       bushd_run taken_up;
       ASSERT_TRUE(bushd_run_restore(&taken_up, table.view(), &s));

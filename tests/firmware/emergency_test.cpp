@@ -28,7 +28,7 @@ class Emergency : public Streams {
   }
   static Bytes run_frame(std::uint32_t first, std::uint32_t steps, std::int8_t direction) {
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    const bushd_table_run_entry entry = {0, 0, direction, steps};
+    const bushd_table_run_entry entry = {0, 0, direction, steps, 0};
     payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
     return payload;
   }

@@ -40,7 +40,7 @@ constexpr std::uint16_t kSlow = 1000;  // 10 ms, the slowest step of ramp_law
 class Homing : public Streams {
  protected:
   static bushd_home command(int direction = -1, std::int32_t position = 0) {
-    return {kMotor, static_cast<std::int8_t>(direction), 5000, 400, kSlow, position};
+    return {kMotor, static_cast<std::int8_t>(direction), 5000, 0, 400, kSlow, position};
   }
   void put(Contact contact) {
     contact_ = contact;

@@ -14,7 +14,7 @@ constexpr bushd_inputs kSwitch{1, 0};  // of motor 0
 
 Bytes table_run(std::uint32_t first, std::uint32_t steps, std::int8_t direction) {
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  const bushd_table_run_entry entry = {0, 0, direction, steps};
+  const bushd_table_run_entry entry = {0, 0, direction, steps, 0};
   payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
   return payload;
 }
@@ -144,7 +144,7 @@ TEST_P(Inputs, AMotorWhoseWayIsBarredDoesNotHoldUpThoseThatStartWithIt) {
     on->pins(kSwitch);
     on->pass();
     if (whole) {
-      const bushd_table_run_entry both[] = {{0, 0, 1, 20}, {1, 0, 1, 20}};
+      const bushd_table_run_entry both[] = {{0, 0, 1, 20, 0}, {1, 0, 1, 20, 0}};
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       payload.resize(bushd_encode_table_run(0, on->first_open(), both, 2, payload.data()));
       ASSERT_EQ(on->take(BUSHD_MSG_TABLE_RUN, payload), BUSHD_OK);

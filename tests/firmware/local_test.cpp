@@ -258,7 +258,7 @@ TEST_P(Local, AMotorThatGetsItsTableWhileTheButtonIsHeldWaitsForThePress) {
 }
 
 TEST_P(Local, LeavesAMotorThatHomesAlone) {
-  ASSERT_EQ(rig.home({0, -1, 5000, 400, 1000, 0}), BUSHD_OK);
+  ASSERT_EQ(rig.home({0, -1, 5000, 0, 400, 1000, 0}), BUSHD_OK);
   rig.pass(20);
   hold(BUSHD_INPUT_FORWARD, 60);
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_FAST);

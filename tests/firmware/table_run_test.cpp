@@ -15,9 +15,10 @@ class TableRun : public Streams {
         epoch, first, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
     return payload;
   }
-  static bushd_status start(Rig& on, std::uint32_t first, std::uint32_t steps, int direction = 1) {
+  static bushd_status start(Rig& on, std::uint32_t first, std::uint32_t steps, int direction = 1,
+                            std::uint16_t floor = 0) {
     return on.take(BUSHD_MSG_TABLE_RUN,
-                   run_frame(first, {{0, 0, static_cast<std::int8_t>(direction), steps}}));
+                   run_frame(first, {{0, 0, static_cast<std::int8_t>(direction), steps, floor}}));
   }
   // The steps of each tick of what motor 0 has done since the history was forgotten, from the tick
   // that was open then on.
@@ -34,10 +35,12 @@ INSTANTIATE_TEST_SUITE_P(Formats, TableRun, testing::Values(BUSHD_FORMAT_FINE, B
                          format_name);
 
 TEST_P(TableRun, EveryStepFallsIntoTheSlotOfTheSumOfItsDelays) {
-  for (const std::uint32_t steps : {1u, 2u, 23u, 60u, 333u}) {
-    const auto reference = Reference::move(law, steps);
+  const auto cruise = law.cruise;
+  for (const auto& [steps, floor] : std::vector<std::pair<std::uint32_t, std::uint16_t>>{
+           {1, 0}, {2, 0}, {23, 0}, {60, 0}, {333, 0}, {333, cruise + 3}, {60, 2 * cruise}}) {
+    const auto reference = Reference::move(law, steps, floor);
     const std::uint32_t first = rig.first_open() + 3;
-    ASSERT_EQ(start(rig, first, steps), BUSHD_OK);
+    ASSERT_EQ(start(rig, first, steps, 1, floor), BUSHD_OK);
     while (rig.tick() != first) rig.pass();
     std::size_t made = 0;
     for (std::uint64_t tick = 0; rig.poll().moving != 0; ++tick, rig.pass()) {
@@ -55,7 +58,7 @@ TEST_P(TableRun, EveryStepFallsIntoTheSlotOfTheSumOfItsDelays) {
     EXPECT_EQ(made, steps);
     EXPECT_EQ(rig.poll().faults, 0);
   }
-  EXPECT_EQ(rig.poll().motor[0].position_steps, 1 + 2 + 23 + 60 + 333);
+  EXPECT_EQ(rig.poll().motor[0].position_steps, 1 + 2 + 23 + 60 + 333 + 333 + 60);
   EXPECT_EQ(rig.steps_with_dir(), 0);
 }
 
@@ -116,15 +119,15 @@ TEST_P(TableRun, RulesOfAStartHold) {
   const std::uint32_t first = rig.first_open();
   EXPECT_EQ(start(rig, first - 1, 5), BUSHD_E_LATE);
   EXPECT_EQ(start(rig, first + 1000, 5), BUSHD_E_CAPACITY);
-  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(first, {{0, 0, 1, 5}}, 1)), BUSHD_E_EPOCH);
-  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(first, {{0, 3, 1, 5}})), BUSHD_E_NO_TABLE)
+  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(first, {{0, 0, 1, 5, 0}}, 1)), BUSHD_E_EPOCH);
+  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(first, {{0, 3, 1, 5, 0}})), BUSHD_E_NO_TABLE)
       << "another table than the motor's";
-  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(first, {{0, 0, 1, 5}, {4, 0, 1, 5}})),
+  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(first, {{0, 0, 1, 5, 0}, {4, 0, 1, 5, 0}})),
             BUSHD_E_FORMAT)
       << "four motors";
   ASSERT_EQ(rig.take(ones(kStart, first, 5)), BUSHD_OK);
   EXPECT_EQ(start(rig, first + 5, 5), BUSHD_E_STATE) << "moves on";
-  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(first + 5, {{1, 0, 1, 5}, {0, 0, 1, 5}})),
+  EXPECT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(first + 5, {{1, 0, 1, 5, 0}, {0, 0, 1, 5, 0}})),
             BUSHD_E_FORMAT)
       << "motors in rising order";
   ASSERT_EQ(rig.take(ones(0, first + 5, 5, 0)), BUSHD_OK);

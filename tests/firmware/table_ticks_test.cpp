@@ -51,7 +51,7 @@ TEST_P(TableTicks, EqualTicksForAnyRunFromAnyTick) {
       bushd_run_start_ramp_down(&run, table.view(), between<std::uint16_t>(law.cruise, 400),
                                 between<std::uint8_t>(0, 255), direction);
     } else {
-      bushd_run_start(&run, table.view(), between<std::uint32_t>(1, 400), direction);
+      bushd_run_start(&run, table.view(), between<std::uint32_t>(1, 400), direction, 0);
     }
     Ticks head{.flags = kStart, .first = by_ticks.first_open()};
     const auto cut_tick = between<int>(5, 300);
@@ -95,7 +95,7 @@ TEST_P(TableTicks, SeveralMotorsShareAFrameAndDuplicatesChangeNothing) {
   std::vector<bushd_table_ticks_entry> entries;
   std::vector<bushd_run> runs(4);
   for (std::uint8_t m = 0; m < 4; ++m) {
-    bushd_run_start(&runs[m], table.view(), 10u + 20u * m, m % 2 ? -1 : 1);
+    bushd_run_start(&runs[m], table.view(), 10u + 20u * m, m % 2 ? -1 : 1, 0);
     entries.push_back({m, bushd_run_save(&runs[m], Rig::kTickNs, 120)});
   }
   const Ticks head{.flags = kStart, .first = rig.first_open()};
@@ -113,7 +113,7 @@ TEST_P(TableTicks, SeveralMotorsShareAFrameAndDuplicatesChangeNothing) {
 
 TEST_P(TableTicks, LostFrameLeavesAnOutOfOrderRangeToo) {
   bushd_run run;
-  bushd_run_start(&run, table.view(), 60, 1);
+  bushd_run_start(&run, table.view(), 60, 1, 0);
   Ticks head{.flags = kStart, .first = rig.first_open()};
   std::vector<std::pair<Ticks, bushd_run_state>> frames;
   while (!bushd_run_done(&run)) {
@@ -132,7 +132,7 @@ TEST_P(TableTicks, LostFrameLeavesAnOutOfOrderRangeToo) {
 // Nothing that a table cannot do is believed, and of a frame with one such state nothing is taken.
 TEST_P(TableTicks, StatesThatNoRunHasAreRefusedAndChangeNothing) {
   bushd_run run;
-  bushd_run_start(&run, table.view(), 300, 1);
+  bushd_run_start(&run, table.view(), 300, 1, 0);
   const bushd_run_state good = bushd_run_save(&run, Rig::kTickNs, 30);
   const auto with = [&](auto change) {
     bushd_run_state state = good;
@@ -150,8 +150,8 @@ TEST_P(TableTicks, StatesThatNoRunHasAreRefusedAndChangeNothing) {
                                       with([](State& s) { s.decel_left = 65535; }),
                                       with([](State& s) { s.lead_delay = 19; }),
                                       with([](State& s) { s.cruise_left = UINT32_MAX; }),
-                                      State{1, false, 0, 0, 0, 0, 0, 0, 0},
-                                      State{1, true, 20, 0, 0, 0, 0, 0, 0}};
+                                      State{1, false, 0, 0, 0, 0, 0, 0, 0, 0},
+                                      State{1, true, 20, 0, 0, 0, 0, 0, 0, 0}};
   const Ticks head{.flags = kStart, .first = rig.first_open() + 5};
   for (std::size_t i = 0; i < hostile.size(); ++i) {
     EXPECT_EQ(take_state(rig, head, 30, {{0, good}, {1, hostile[i]}}), BUSHD_E_FORMAT) << i;
@@ -172,7 +172,7 @@ TEST_P(TableTicks, AreRefusedByAnMcuThatIsTooSlowForThem) {
   EXPECT_EQ(slow.identify().capabilities & BUSHD_CAN_TABLE_TICKS, 0);
   slow.make_ready(law, format);
   bushd_run run;
-  bushd_run_start(&run, table.view(), 50, 1);
+  bushd_run_start(&run, table.view(), 50, 1, 0);
   const Ticks head{.flags = kStart, .first = slow.first_open()};
   EXPECT_EQ(take_state(slow, head, 30, {{0, bushd_run_save(&run, Rig::kTickNs, 30)}}),
             BUSHD_E_UNKNOWN_MESSAGE);

@@ -36,10 +36,10 @@ class Trigger : public Streams {
   }
   std::int64_t now_ns() const { return rig.tick() * kTick; }
   bushd_status arm(std::uint8_t number, std::uint32_t steps = 20, std::uint32_t delay_us = 50) {
-    return rig.arm(number, BUSHD_EDGE_RISING, delay_us, {{0, 0, 1, steps}});
+    return rig.arm(number, BUSHD_EDGE_RISING, delay_us, {{0, 0, 1, steps, 0}});
   }
   static Bytes run_frame(std::uint32_t first, std::uint8_t motor) {
-    const bushd_table_run_entry entry = {motor, 0, 1, 5};
+    const bushd_table_run_entry entry = {motor, 0, 1, 5, 0};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
     return payload;
@@ -60,7 +60,7 @@ TEST_P(Trigger, StepsFallIntoTheSlotsOfTheTableCountedFromTheEdge) {
     const std::uint32_t delay_us = i % 10 == 0 ? 1'500'000 - below(1000) : 50 + below(9000);
     const int direction = i % 3 == 0 ? -1 : 1;
     ASSERT_EQ(rig.arm(number, BUSHD_EDGE_FALLING, delay_us,
-                      {{0, 0, static_cast<std::int8_t>(direction), steps}}),
+                      {{0, 0, static_cast<std::int8_t>(direction), steps, 0}}),
               BUSHD_OK);
     rig.pass(static_cast<int>(below(5)));
     ASSERT_EQ(rig.awaited_edge(), BUSHD_EDGE_FALLING);
@@ -91,7 +91,7 @@ TEST_P(Trigger, StepsFallIntoTheSlotsOfTheTableCountedFromTheEdge) {
 
 TEST_P(Trigger, StartsSeveralMotorsInTheSameSlotWhileOthersStream) {
   ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 60, 0)), BUSHD_OK);
-  ASSERT_EQ(rig.arm(1, BUSHD_EDGE_RISING, 1234, {{1, 0, 1, 10}, {3, 0, -1, 10}}), BUSHD_OK);
+  ASSERT_EQ(rig.arm(1, BUSHD_EDGE_RISING, 1234, {{1, 0, 1, 10, 0}, {3, 0, -1, 10, 0}}), BUSHD_OK);
   rig.pass(5);
   EXPECT_EQ(rig.poll().armed, 0b1010);
   EXPECT_EQ(rig.poll().moving, 1) << "what waits is at rest";
@@ -186,20 +186,20 @@ TEST_P(Trigger, WhatWaitsForItTakesNothingElse) {
 
 TEST_P(Trigger, IsForMotorsAtRestWithTheirTablesInAnMcuThatIsReady) {
   const auto arm_one = [this](std::uint8_t motor, std::uint8_t slot, std::uint32_t steps) {
-    return rig.arm(5, BUSHD_EDGE_RISING, 50, {{motor, slot, 1, steps}});
+    return rig.arm(5, BUSHD_EDGE_RISING, 50, {{motor, slot, 1, steps, 0}});
   };
   EXPECT_EQ(arm_one(4, 0, 5), BUSHD_E_FORMAT) << "four motors";
   EXPECT_EQ(arm_one(1, 1, 5), BUSHD_E_NO_TABLE);
   EXPECT_EQ(arm_one(1, 0, 0), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.arm(5, BUSHD_EDGE_RISING, 49, {{1, 0, 1, 5}}), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.arm(5, BUSHD_EDGE_RISING, 1'500'001, {{1, 0, 1, 5}}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.arm(5, BUSHD_EDGE_RISING, 49, {{1, 0, 1, 5, 0}}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.arm(5, BUSHD_EDGE_RISING, 1'500'001, {{1, 0, 1, 5, 0}}), BUSHD_E_FORMAT);
   ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 5, 0)), BUSHD_OK);
   EXPECT_EQ(arm_one(0, 0, 5), BUSHD_E_STATE);
   EXPECT_EQ(arm_one(1, 0, 5), BUSHD_OK) << "nothing of what was refused has been taken";
   rig.pass_until_rest();
   ASSERT_EQ(rig.disarm(), BUSHD_OK);
   ASSERT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_OK);
-  EXPECT_EQ(rig.arm(6, BUSHD_EDGE_RISING, 50, {{1, 0, 1, 5}}), BUSHD_E_STATE);
+  EXPECT_EQ(rig.arm(6, BUSHD_EDGE_RISING, 50, {{1, 0, 1, 5, 0}}), BUSHD_E_STATE);
   EXPECT_EQ(rig.poll().trigger_number, 5);
 }
 
@@ -234,7 +234,7 @@ TEST_P(Trigger, NothingStartsWhereNoMasterIsHeard) {
 
 TEST_P(Trigger, NothingStartsTowardsAClosedLimit) {
   const auto arm_both = [this](std::uint8_t number) {
-    return rig.arm(number, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 20}, {1, 0, -1, 20}});
+    return rig.arm(number, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 20, 0}, {1, 0, -1, 20, 0}});
   };
   const InputSettings limits{.limit_positive = 0b11};
   ASSERT_EQ(rig.set_inputs(limits), BUSHD_OK);
@@ -262,7 +262,7 @@ TEST_P(Trigger, RisingIsWhereTheInputBecomesActive) {
   ASSERT_EQ(arm(1), BUSHD_OK);
   EXPECT_EQ(rig.awaited_edge(), BUSHD_EDGE_FALLING);
   ASSERT_EQ(rig.disarm(), BUSHD_OK);
-  ASSERT_EQ(rig.arm(2, BUSHD_EDGE_FALLING, 50, {{0, 0, 1, 5}}), BUSHD_OK);
+  ASSERT_EQ(rig.arm(2, BUSHD_EDGE_FALLING, 50, {{0, 0, 1, 5, 0}}), BUSHD_OK);
   EXPECT_EQ(rig.awaited_edge(), BUSHD_EDGE_RISING);
 }
 
@@ -295,7 +295,7 @@ TEST_P(Trigger, ItsRunIsReplacedByTicks) {
   for (std::uint32_t k = 1; k < 12; ++k) {
     Rig fresh({.queue_ticks = 256});
     fresh.make_ready(law, format);
-    ASSERT_EQ(fresh.arm(1, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 60}}), BUSHD_OK);
+    ASSERT_EQ(fresh.arm(1, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 60, 0}}), BUSHD_OK);
     fresh.trigger(kLateNs - 50'000);
     const std::uint32_t start = fresh.poll().start_tick;
     ASSERT_EQ(fresh.poll().start_ns, kLateNs);
@@ -326,7 +326,7 @@ TEST(TriggerInput, IsNotForAPortWithoutOne) {
   Rig rig({.trigger_input = false});
   rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_TRIGGER, 0);
-  EXPECT_EQ(rig.arm(1, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 5}}), BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(rig.arm(1, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 5, 0}}), BUSHD_E_UNKNOWN_MESSAGE);
   EXPECT_EQ(rig.disarm(), BUSHD_E_UNKNOWN_MESSAGE);
 }
 

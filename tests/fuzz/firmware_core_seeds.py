@@ -152,6 +152,8 @@ SEEDS = {
     "set-address": frame(SET_ADDRESS, b"fuzz\0\0\0\0" + b"\x09", True) + poll(9) + frame(TABLES),
     "table-run": ready(0) + table_run(3, (0, 1, 90), (0, -1, 5)) + passes(20) + frame(EMERGENCY, b"\0", True)
                  + passes(10) + frame(CONTROL, b"\4") + table_run(3, (0, -1, 9)) + passes(20),
+    "table-run-stopped": ready(1) + table_run(9, (0, 1, 250), (0, -1, 250)) + passes(18) + frame(EMERGENCY, b"\0", True)
+                         + passes(12) + poll(7),
     "table-ticks": ready(0) + bytes([7, 0, START, 2, 8, 13]) + struct.pack("<BHHHIH", 0xC0, 0, 0, 3, 40, 3) + passes(12),
     "limits": ready(0, inputs(positive=7)) + MOVE[0] + passes(3) + pins(1) + passes(15) + poll(7),
     "limits-cut": ready(1, inputs(positive=7, negative=7, cuts=7, debounce=0)) + MOVE[1] + passes(4) + pins(3)

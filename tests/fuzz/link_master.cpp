@@ -421,7 +421,7 @@ void begin(Bus& bus, Input& input, bool whole) {
   bus.source().start[mcu.value][motor] = start;
   bus.source().length[mcu.value][motor] = length;
   if (whole) {
-    bus.master().begin_table_run(mcu, motor, start, length - 128 == 0 ? 1 : length - 128);
+    bus.master().begin_table_run(mcu, motor, start, {length - 128 == 0 ? 1 : length - 128});
   } else {
     bus.master().begin(mcu, motor, start);
   }
@@ -445,7 +445,7 @@ void arm(Bus& bus, Input& input) {
   if (bus.master().view(mcu).report.armed != 0) return;
   std::vector<link::Master::Armed> moves;
   for (std::uint8_t m = 0; m < kMotors; ++m) {
-    if ((mask >> m & 1) != 0) moves.push_back({.motor = m, .steps = m % 2 == 0 ? 70 : -70});
+    if ((mask >> m & 1) != 0) moves.push_back({.motor = m, .run = {m % 2 == 0 ? 70 : -70, m}});
   }
   bus.master().arm(mcu, BUSHD_EDGE_RISING, delay_us, moves);
 }
@@ -458,7 +458,7 @@ void started(Bus& bus, Input& input) {
   const link::Tick start = bus.master().earliest_start(bus.now_us(), mcu, motor) + later;
   bus.source().start[mcu.value][motor] = start;
   bus.source().length[mcu.value][motor] = 90;
-  bus.master().follow_table_run(mcu, motor, start, 70);
+  bus.master().follow_table_run(mcu, motor, start, {70});
 }
 
 void position_compare(Bus& bus, Input& input) {
@@ -481,6 +481,7 @@ void home(Bus& bus, Input& input) {
   bus.master().home(mcu, {.motor = motor,
                           .direction = -1,
                           .most_steps = steps,
+                          .floor = 9,
                           .slow_steps = 100,
                           .slow_delay = 1000,
                           .position_steps = 7});

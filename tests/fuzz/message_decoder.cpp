@@ -217,8 +217,9 @@ void decode_table_run(Bytes payload) {
   std::array<bushd_table_run_entry, BUSHD_MOTORS_PER_MCU> entries;
   const auto encode = [&](const bushd_table_run* message, std::uint8_t* out) {
     BUSHD_REQUIRE(message->count >= 1 && message->count <= BUSHD_MOTORS_PER_MCU);
+    const std::uint8_t* at = message->entries;
     for (std::uint8_t i = 0; i < message->count; ++i) {
-      entries[i] = bushd_get_table_run_entry(message->entries, i);
+      entries[i] = bushd_next_table_run_entry(&at);
       BUSHD_REQUIRE(entries[i].steps >= 1 && entries[i].steps <= INT32_MAX);
       BUSHD_REQUIRE(entries[i].slot < BUSHD_TABLE_SLOTS);
       BUSHD_REQUIRE(i == 0 || entries[i].motor > entries[i - 1u].motor);
@@ -235,8 +236,9 @@ void decode_trigger(Bytes payload) {
   const auto encode = [&](const bushd_trigger* message, std::uint8_t* out) {
     BUSHD_REQUIRE(message->count <= BUSHD_MOTORS_PER_MCU);
     BUSHD_REQUIRE((message->count == 0) == (message->edge == BUSHD_EDGE_NONE));
+    const std::uint8_t* at = message->entries;
     for (std::uint8_t i = 0; i < message->count; ++i) {
-      entries[i] = bushd_get_table_run_entry(message->entries, i);
+      entries[i] = bushd_next_table_run_entry(&at);
       BUSHD_REQUIRE(entries[i].steps >= 1 && entries[i].steps <= INT32_MAX);
       BUSHD_REQUIRE(i == 0 || entries[i].motor > entries[i - 1u].motor);
     }

@@ -333,9 +333,27 @@ TEST(Connect, AnotherMasterOnTheLineIsNoticedForSomeSeconds) {
   EXPECT_TRUE(bus.master->two_masters(bus.now_us));
 }
 
+// Another master may have taken them over meanwhile: what this one knows of them may not be true.
+TEST(Connect, WhatAMasterKnowsIsOutdatedWhenItHasStoodStill) {
+  FakeBus bus;
+  bus.connect();
+  bus.run_for(2'000'000);
+  bus.now_us += 1'400'000;
+  const link::McuView& view = bus.master->view(McuIndex{0});
+  bus.run_for(1);
+  EXPECT_EQ(view.outdated_us, 0) << "three of its SYNCs have not been missed";
+  bus.run_for(500'000);
+  bus.now_us += 1'700'000;
+  bus.master->receive(bus.now_us, {});
+  EXPECT_NEAR(static_cast<double>(view.outdated_us), 1'700'000, 50'000);
+  bus.run_for(50'000);
+  EXPECT_EQ(view.outdated_us, 0) << "it is asked at once";
+  EXPECT_TRUE(bus.online());
+}
+
 TEST(Connect, TableRunOfAnEarlierMasterIsRampedDownFirst) {
   FakeBus bus;
-  bus.slaves[0].run[1] = bushd_table_run_entry{1, 0, 1, 1000};
+  bus.slaves[0].run[1] = bushd_table_run_entry{1, 0, 1, 1000, 0};
   bus.slaves[0].known_until[1] = bus.tick(0) + 20'000;
   bus.connect();
   ASSERT_EQ(bus.heard_of(BUSHD_MSG_EMERGENCY).size(), 1u);

@@ -20,7 +20,7 @@ class Unfit : public testing::TestWithParam<Misfit> {};
 INSTANTIATE_TEST_SUITE_P(Identities, Unfit,
                          testing::Values(Misfit{"Version",
                                                 [](bushd_identity& i) { i.protocol_version = 9; },
-                                                {"protocol version 9", "this program version 3",
+                                                {"protocol version 9", "this program version 4",
                                                  "update"}},
                                          Misfit{"Outputs",
                                                 [](bushd_identity& i) { i.motors = 3; },

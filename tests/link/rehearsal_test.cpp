@@ -47,7 +47,7 @@ TEST_F(RehearsalTest, CountsWhatIsThenSent) {
 }
 
 TEST_F(RehearsalTest, TableRunsAreOneFrameForTheMotorsOfAnMcu) {
-  for (PlannedMove& move : moves) move.run_steps = 500;
+  for (PlannedMove& move : moves) move.run = link::TableRun{500};
   const auto traffic = rehearse();
   ASSERT_TRUE(traffic);
   EXPECT_EQ(traffic->frames, 2u);

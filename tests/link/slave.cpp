@@ -324,16 +324,18 @@ void FakeBus::take_table_run(Slave& slave, const Heard& frame) {
   bushd_table_run message{};
   ASSERT_EQ(bushd_decode_table_run(frame.payload.data(), frame.payload.size(), &message), BUSHD_OK);
   bool good = message.epoch == slave.epoch && slave.faults == 0;
+  const std::uint8_t* at = message.entries;
   for (std::uint8_t i = 0; i < message.count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message.entries, i);
+    const bushd_table_run_entry entry = bushd_next_table_run_entry(&at);
     good &= slave.delay[entry.motor] == 0 && message.first_tick >= slave.known_until[entry.motor];
   }
   if (!good) {
     ++slave.rejected;
     return;
   }
+  at = message.entries;
   for (std::uint8_t i = 0; i < message.count; ++i) {
-    const bushd_table_run_entry entry = bushd_get_table_run_entry(message.entries, i);
+    const bushd_table_run_entry entry = bushd_next_table_run_entry(&at);
     slave.run[entry.motor] = entry;
     slave.known_until[entry.motor] =
         static_cast<std::uint32_t>(source.end(entry.motor));  // by its table

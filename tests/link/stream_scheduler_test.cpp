@@ -254,6 +254,46 @@ TEST_F(Replacing, OfARunCancelledBeforeItsStartHasNoFollowers) {
   while (const auto ticks = next()) EXPECT_EQ(ticks->mask & 2, 0);
 }
 
+// A motor whose last tick the MCU has, and whose other plan it then does not get.
+class ReplacingAnEnded : public Scheduling {
+ protected:
+  ReplacingAnEnded() {
+    plan_until(1026);
+    streams.begin(kFirst, 0, 1010);
+    fill();
+    writer.reset(kNowUs);
+    known_until(0, 1026);
+    plan_until(1200);
+    streams.replace(kFirst, 1, 1020, 1000);
+  }
+  void plan_until(Tick end) {
+    source.end = [end](std::uint8_t) { return end; };
+  }
+};
+
+TEST_F(ReplacingAnEnded, GoesOnIfItIsTaken) {
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  EXPECT_EQ(frame(), (Ticks{1, 1020, 16, BUSHD_TICKS_REPLACE, 1}));
+  EXPECT_EQ(next(), (Ticks{1, 1036, 16, 0, 1}));
+}
+
+TEST_F(ReplacingAnEnded, HasNoFollowersIfItWasTooLateAndThePlanStays) {
+  ASSERT_TRUE(streams.fail_late_replacements(kNowUs + 60'000));
+  plan_until(1026);
+  EXPECT_FALSE(next());
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+}
+
+TEST_F(ReplacingAnEnded, HasNoFollowersIfItWasNotTakenAndThePlanStays) {
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  take_sent(writer);
+  streams.follow_report(kFirst);  // in epoch 0
+  ASSERT_EQ(events.size(), 1u);
+  plan_until(1026);
+  EXPECT_FALSE(next());
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+}
+
 // Its frame may take longer than until its tick.
 TEST_F(Replacing, TooLateToArriveFailsUnsent) {
   streams.replace(kFirst, 1, 1010, 1000);
@@ -266,7 +306,7 @@ TEST_F(Replacing, TooLateToArriveFailsUnsent) {
 
 TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
   source.end = [](std::uint8_t) { return Tick{5000}; };
-  streams.begin_table_run(kFirst, 0, 1040, -700);
+  streams.begin_table_run(kFirst, 0, 1040, {-700});
   ASSERT_TRUE(streams.send_stream(kNowUs, kFilling));
   const auto sent = take_sent(writer);
   ASSERT_EQ(sent.size(), 1u);
@@ -284,7 +324,7 @@ TEST_F(Scheduling, StatesOfRunsFillTheQueueWhateverMadeThemDue) {
   mcus[kFirst].view.identity.capabilities |= BUSHD_CAN_TABLE_TICKS;
   source.segment = [](std::uint8_t, Tick, unsigned max_ticks) {
     bushd_run run;
-    bushd_run_start(&run, &small_table(), 1'000'000, 1);
+    bushd_run_start(&run, &small_table(), 1'000'000, 1, 0);
     return link::TickSource::RunSegment{run, max_ticks};
   };
   streams.begin(kFirst, 0, 1040);

@@ -134,23 +134,64 @@ TEST_F(Syncing, OtherTimeIsOnlyTakenWhileNobodyHasMoves) {
 }
 
 TEST_F(Syncing, AnotherMasterIsRememberedForThreeSyncs) {
+  const bushd_sync sync = sync_at(1'000'000);
   bushd_frame frame{};
   frame.type = BUSHD_MSG_SYNC;
+  frame.sequence = 1;
   std::array<std::uint8_t, 24> payload{};
-  bushd_sync sync{};
-  sync.master = 77;
   frame.payload = payload.data();
   frame.payload_size = static_cast<std::uint8_t>(bushd_encode_sync(&sync, payload.data()));
   synchroniser.overheard(1'000'000, frame);
   EXPECT_FALSE(synchroniser.two_masters(1'000'000)) << "an echo of its own";
-  sync.master = 78;
-  bushd_encode_sync(&sync, payload.data());
+  payload[0] ^= 1;  // of its number
   synchroniser.overheard(1'000'000, frame);
   EXPECT_TRUE(synchroniser.two_masters(2'499'999));
   EXPECT_FALSE(synchroniser.two_masters(2'500'000));
   mcus[kFirst].view.reported = true;
   mcus[kFirst].view.report.flags = BUSHD_FLAG_TWO_MASTERS;
   EXPECT_TRUE(synchroniser.two_masters(9'000'000)) << "an MCU has heard it";
+}
+
+// Two that do not listen before they talk destroy many of each other's frames. SYNCs come twice a
+// second, and three of them in a row may be lost; others come far more often.
+TEST_F(Syncing, AnyRequestThatItHasNotSentTellsOfAnotherMaster) {
+  const std::array<std::uint8_t, 1> payload = {BUSHD_CONTROL_ENABLE};
+  writer.send(1'000'000, link::McuAddress{3}, BUSHD_MSG_CONTROL, payload);
+  bushd_frame frame{.address = 3,
+                    .type = BUSHD_MSG_CONTROL,
+                    .sequence = 1,
+                    .payload_size = 1,
+                    .payload = payload.data()};
+  synchroniser.overheard(1'000'000, frame);
+  EXPECT_FALSE(synchroniser.two_masters(1'000'000)) << "an echo of its own";
+  frame.sequence = 2;
+  synchroniser.overheard(1'000'000, frame);
+  EXPECT_TRUE(synchroniser.two_masters(1'000'000));
+}
+
+// It may live, and say SYNC again within half a second: who moves motors until then moves motors
+// that another one believes at rest.
+TEST_F(Syncing, MasterThatAnMcuHasHeardLatelyMayStillBeThere) {
+  mcus[kFirst].view.phase = link::McuPhase::kConnecting;
+  synchroniser.port_opened(1'000'000);
+  EXPECT_FALSE(synchroniser.perhaps_another(1'000'000)) << "nobody has told of one";
+  report(kFirst, 1'010'000, 4711, 600'000);
+  EXPECT_TRUE(synchroniser.perhaps_another(1'010'000));
+  EXPECT_TRUE(synchroniser.perhaps_another(2'090'000));
+  EXPECT_FALSE(synchroniser.perhaps_another(2'110'000)) << "three of its SYNCs have not come";
+  EXPECT_FALSE(synchroniser.two_masters(1'010'000)) << "nor has one come beside those of this one";
+}
+
+TEST_F(Syncing, OwnSyncsAndThoseOfLongAgoTellOfNobody) {
+  for (int i = 0; i < 10; ++i) {
+    const std::int64_t us = synchroniser.due_us();
+    const bushd_sync sync = sync_at(us);
+    report(kFirst, us + 20'000, sync.sync_id, us);
+    EXPECT_FALSE(synchroniser.perhaps_another(us + 20'000));
+  }
+  const std::int64_t us = synchroniser.due_us();
+  report(kSecond, us, 4711, us - 1'600'000);
+  EXPECT_FALSE(synchroniser.perhaps_another(us));
 }
 
 TEST_F(Syncing, HurryBringsTheNextSyncForward) {

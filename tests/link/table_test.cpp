@@ -35,7 +35,7 @@ class Tables : public testing::TestWithParam<bushd_format> {
   };
   void plan_run(std::uint8_t m, Tick start, std::uint32_t steps) {
     bushd_run run;
-    bushd_run_start(&run, &bus.table, steps, 1);
+    bushd_run_start(&run, &bus.table, steps, 1, 0);
     plan[m] = {start, {}, {}};
     expand(plan[m], run);
   }
@@ -75,7 +75,8 @@ class Tables : public testing::TestWithParam<bushd_format> {
   void start(std::uint8_t m, std::uint32_t steps, bool whole) {
     plan_run(m, bus.master->earliest_start(bus.now_us, McuIndex{0}, m), steps);
     if (whole) {
-      bus.master->begin_table_run(McuIndex{0}, m, plan[m].start, static_cast<std::int32_t>(steps));
+      bus.master->begin_table_run(McuIndex{0}, m, plan[m].start,
+                                  {static_cast<std::int32_t>(steps)});
     } else {
       bus.master->begin(McuIndex{0}, m, plan[m].start);
     }

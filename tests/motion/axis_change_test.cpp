@@ -24,14 +24,17 @@ struct Plan {
   std::int64_t from;
   std::uint32_t tick_ns;
   int direction;
+  std::uint16_t floor;
   Reference steps;
 
-  Plan(Law the_law, std::int64_t from_steps, std::int64_t by, std::uint32_t tick)
+  Plan(Law the_law, std::int64_t from_steps, std::int64_t by, std::uint32_t tick,
+       std::uint16_t the_floor = 0)
       : law(std::move(the_law)),
         from(from_steps),
         tick_ns(tick),
         direction(by < 0 ? -1 : 1),
-        steps(Reference::move(law, static_cast<std::size_t>(std::abs(by)))) {}
+        floor(the_floor),
+        steps(Reference::move(law, static_cast<std::size_t>(std::abs(by)), floor)) {}
 
   std::uint64_t ns(Tick tick) const { return static_cast<std::uint64_t>(tick) * tick_ns; }
   std::int64_t end_steps() const {
@@ -54,16 +57,19 @@ struct Plan {
   // Both at ticks counted from the start.
   void stop(Tick at) {
     if (at > 0) return steps.ramp_down_at(ns(at));
-    *this = Plan(law, from, 0, tick_ns);
+    *this = Plan(law, from, 0, tick_ns, floor);
   }
-  void aim(Tick at, std::int64_t target) {
+  void aim(Tick at, std::int64_t target, std::uint16_t to_floor = 0) {
     if (at <= 0) {
-      *this = Plan(law, from, target - from, tick_ns);
+      *this = Plan(law, from, target - from, tick_ns, to_floor);
       return;
     }
     const auto next = from + direction * static_cast<std::int64_t>(steps.steps_at(ns(at)) + 1);
     const std::int64_t after = (target - next) * direction;
-    if (after < 0 || !steps.retarget_at(ns(at), static_cast<std::size_t>(after))) stop(at);
+    if (after < 0 || !steps.retarget_at(ns(at), static_cast<std::size_t>(after), to_floor)) {
+      return stop(at);
+    }
+    floor = to_floor;
   }
 };
 
@@ -170,10 +176,11 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
     const auto random_steps = [] { return between<std::int64_t>(-60, 60); };
     const std::int64_t by = random_steps();
     RC_PRE(by != 0);
-    Plan plan(any.law(), 5, by, tick_ns);
+    const std::uint16_t first_floor = between(0, 1) != 0 ? test::any_floor(any.law()) : 0;
+    Plan plan(any.law(), 5, by, tick_ns, first_floor);
     RC_PRE(plan.end_tick() < 3000);
     Axis random(*any.view(), tick_ns, format);
-    random.start(5, by, 0);
+    random.start(5, by, 0, 0, first_floor);
     Tick now = -10;              // executed up to here
     std::optional<Plan> before;  // without the change that is not yet executed
     Tick change_at = 0;
@@ -182,7 +189,7 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
         if (between(0, 2) == 0) {
           random.stop();
         } else {
-          random.aim(5 + random_steps());
+          random.aim(5 + random_steps(), between(0, 1) != 0 ? test::any_floor(any.law()) : 0);
         }
       }
       const bool failed = before && now <= std::max<Tick>(change_at, 0) && between(0, 3) == 0;
@@ -191,9 +198,13 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
         before.reset();
         const Tick at = now + between<Tick>(1, 12);
         Plan changed = plan;
-        random.stopping() ? changed.stop(at) : changed.aim(at, random.target_steps());
+        random.stopping() ? changed.stop(at)
+                          : changed.aim(at, random.target_steps(), random.floor());
         const bool over = at >= std::max<Tick>(plan.end_tick(), 1);
-        const bool differs = !over && changed.end_steps() != plan.end_steps();
+        const auto cruise = [&](std::uint16_t floor) { return std::max(any.law().cruise, floor); };
+        const bool faster_or_slower =
+            !random.stopping() && cruise(random.floor()) != cruise(plan.floor);
+        const bool differs = !over && (changed.end_steps() != plan.end_steps() || faster_or_slower);
         RC_ASSERT(random.change(at) == differs);
         if (differs) {
           before = plan;

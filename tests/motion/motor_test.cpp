@@ -99,6 +99,35 @@ TEST_F(MotorTest, AStopIsPlannedAtOnceAndToldWhenExecuted) {
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
 }
 
+// That is the MCU's own doing too, whoever has cleared the fault by then: the count is right.
+TEST_F(MotorTest, RunDownByAFaultThatAnotherMasterHasClearedIsNoMismatch) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  mcu.faults = BUSHD_FAULT_LINK;
+  EXPECT_TRUE(report(kStart + 30).empty()) << "it moves on, down its table";
+  mcu.faults = 0;
+  mcu.moving = 0;
+  mcu.tick = kStart + 60;
+  mcu.motor[3].position_steps -= 1;
+  const auto events = motor.report(
+      {.of_mcu = mcu, .tick = kStart + 60, .requests_open = false, .emergency_stop_open = false});
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLink);
+  EXPECT_EQ(motor.uncertain_reason(), std::nullopt);
+}
+
+TEST_F(MotorTest, WhatAnotherMasterMovesIsNotAtRest) {
+  set(mcu.moving, true);
+  report(kStart, 17);
+  EXPECT_TRUE(motor.is<Local>());
+  EXPECT_EQ(motor.position_steps(), 17);
+  EXPECT_THAT(refusal(20), HasSubstr("another master"));
+  set(mcu.moving, false);
+  report(kStart + 1, 18);
+  EXPECT_TRUE(motor.is<Resting>());
+  EXPECT_EQ(refusal(20), "");
+}
+
 TEST_F(MotorTest, ATargetBehindTakesASecondRun) {
   motor.start(kSteps, kStart);
   report(kStart + 40);
@@ -158,6 +187,20 @@ TEST_F(MotorTest, WaitsForTheTriggerAndStopsIfThatCameFirst) {
   EXPECT_EQ(started->late_ns, 1000u);
   EXPECT_NE(find<event::Replan>(events), nullptr);
   EXPECT_TRUE(motor.is<Moving>());
+}
+
+TEST_F(MotorTest, IsArmedOnceItsMcuSaysSo) {
+  motor.arm(9, kSteps);
+  EXPECT_FALSE(motor.as<Armed>()->confirmed);
+  requests_open = true;
+  mcu.trigger_number = 8;
+  mcu.trigger_state = BUSHD_TRIGGER_ARMED;
+  EXPECT_TRUE(report(kStart).empty()) << "that was another one";
+  EXPECT_FALSE(motor.as<Armed>()->confirmed);
+  mcu.trigger_number = 9;
+  EXPECT_NE(find<event::Waits>(report(kStart + 1)), nullptr);
+  EXPECT_TRUE(motor.as<Armed>()->confirmed);
+  EXPECT_TRUE(report(kStart + 2).empty()) << "told once";
 }
 
 TEST_F(MotorTest, WhatDisarmsItEndsIt) {

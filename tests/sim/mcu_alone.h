@@ -38,7 +38,7 @@ class McuAlone : public testing::Test {
 
   // By the table in slot 0.
   void run(std::uint8_t motor, std::uint32_t steps) {
-    const bushd_table_run_entry entry{motor, 0, 1, steps};
+    const bushd_table_run_entry entry{motor, 0, 1, steps, 0};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(
         bushd_encode_table_run(0, master_.poll(kAddress).tick + 24, &entry, 1, payload.data()));

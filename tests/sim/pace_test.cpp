@@ -52,7 +52,7 @@ class PaceTest : public testing::TestWithParam<bushd_format> {
   }
   std::vector<std::int16_t> move(std::uint32_t steps, int direction = 1) {
     bushd_run run;
-    bushd_run_start(&run, &law.table, steps, direction);
+    bushd_run_start(&run, &law.table, steps, direction, 0);
     std::vector<std::int16_t> all;
     while (!bushd_run_done(&run)) all.push_back(expand(run, 1)[0]);
     return all;
@@ -101,7 +101,7 @@ TEST_P(PaceTest, WholeMovesOfAnyLengthPass) {
 TEST_P(PaceTest, StopsAtAnyTickPass) {
   for (std::size_t at = 1; at < 200; ++at) {
     bushd_run run;
-    bushd_run_start(&run, &law.table, 3000, 1);
+    bushd_run_start(&run, &law.table, 3000, 1, 0);
     ASSERT_EQ(make(expand(run, at)), Jump::kNone) << at;
     bushd_run_ramp_down(&run);
     ASSERT_EQ(make(expand(run, 200)), Jump::kNone) << at;

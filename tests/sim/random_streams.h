@@ -99,7 +99,7 @@ class RandomStreams : public testing::Test {
   void start_move() {
     const bushd_table_run_entry entry{static_cast<std::uint8_t>(random_.below(kMotorsInUse)), 0,
                                       static_cast<std::int8_t>(random_.one_in(2) ? 1 : -1),
-                                      static_cast<std::uint32_t>(random_.between(1, 200))};
+                                      static_cast<std::uint32_t>(random_.between(1, 200)), 0};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(bushd_encode_table_run(epoch_, tick_ + 9, &entry, 1, payload.data()));
     master_.post(kAddress, BUSHD_MSG_TABLE_RUN, payload);
@@ -112,7 +112,7 @@ class RandomStreams : public testing::Test {
     switch (type) {
       case BUSHD_MSG_TABLE_RUN: {
         const bushd_table_run_entry entry{static_cast<std::uint8_t>(random_.below(16)), 0, 1,
-                                          static_cast<std::uint32_t>(random_.between(1, 90))};
+                                          static_cast<std::uint32_t>(random_.between(1, 90)), 0};
         size = bushd_encode_table_run(epoch_, tick_ + 10, &entry, 1, payload.data());
         break;
       }

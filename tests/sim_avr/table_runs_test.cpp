@@ -53,7 +53,7 @@ class AvrTableRuns : public AvrAlone, public testing::WithParamInterface<Load> {
   void begin_runs(std::uint32_t first) {
     std::vector<bushd_table_run_entry> entries;
     for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-      entries.push_back({m, 0, static_cast<std::int8_t>(m % 2 == 0 ? 1 : -1), kSteps});
+      entries.push_back({m, 0, static_cast<std::int8_t>(m % 2 == 0 ? 1 : -1), kSteps, 0});
     }
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(
@@ -120,6 +120,28 @@ TEST_P(AvrTableRuns, SixteenKeepTheirSlots) {
   }
 }
 
+// The step that is running is a part of its own: before the ramp down, wherever the run is.
+class AvrStoppedRun : public AvrAlone, public testing::WithParamInterface<std::uint32_t> {};
+
+TEST_P(AvrStoppedRun, RampsDownFromTheStepThatRuns) {
+  constexpr std::uint32_t kLong = 20'000;
+  pass(kBootNs);
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  run(0, kLong);
+  pass(GetParam() * TimeNs{kTickNs});
+  master_.send(kAddress, BUSHD_MSG_EMERGENCY, Bytes{BUSHD_STOP_RAMP});
+  pass(20 * TimeNs{kTickNs});
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.moving, 0);
+  EXPECT_GT(steps_made(0), 0u);
+  EXPECT_LT(steps_made(0), kLong);
+  EXPECT_EQ(report.motor[0].position_steps, static_cast<int>(steps_made(0)));
+}
+
+// In ticks. The run begins after 24, and takes four to its cruise.
+INSTANTIATE_TEST_SUITE_P(Ticks, AvrStoppedRun, testing::Values(26, 27, 100),
+                         testing::PrintToStringParamName());
+
 // At least 9 steps a tick, by ramps of 238 codes; polled as by bushd. simavr enters interrupts in
 // no time, the chip takes five cycles: ticks are shorter by the 1500 cycles of a tick than those
 // that docs/performance.md tells.
@@ -127,9 +149,9 @@ std::vector<Load> loads() {
   std::vector<Load> loads;
   for (int phase = 0; phase < 4; ++phase) {
     loads.push_back({BUSHD_FORMAT_COARSE, 2'464'000, 1'000, 270, 50, phase});
-    loads.push_back({BUSHD_FORMAT_FINE, 2'704'000, 1'000, 297, 50, phase});
+    loads.push_back({BUSHD_FORMAT_FINE, 2'464'000, 1'000, 270, 50, phase});
   }
-  loads.push_back({BUSHD_FORMAT_FINE, 2'560'000, 1'000, 280, 0});
+  loads.push_back({BUSHD_FORMAT_FINE, 2'464'000, 1'000, 270, 0});
   // A tick that is no whole number of time units.
   loads.push_back({BUSHD_FORMAT_COARSE, 4'000'000, 7'000, 60, 50});
   return loads;

@@ -24,7 +24,7 @@ std::vector<int> expand(const bushd_table& table, std::int64_t steps, std::uint3
   constexpr Displacement kUntouched = 77;
   bushd_run run;
   bushd_run_start(&run, &table, static_cast<std::uint32_t>(steps < 0 ? -steps : steps),
-                  steps < 0 ? -1 : 1);
+                  steps < 0 ? -1 : 1, 0);
   std::vector<int> out;
   while (!bushd_run_done(&run)) {
     const std::size_t ticks = block_ticks();

@@ -19,17 +19,18 @@ def steps_made(table, delays, time_ns):
     return position([d * table.unit_ns for d in delays], time_ns, 0, False) // 256
 
 
-def move_bytes(name, steps, tick_ns, form, stop):
-    table, fine = TABLES[name], form == "fine"
+def move_bytes(name, steps, tick_ns, form, stop, floor):
+    table, fine = TABLES[name].slower(floor), form == "fine"
     delays, _ = delays_of(table, abs(steps), tick_ns, stop)
     values = displacements(delays, table.unit_ns, tick_ns, fine)
     assert sum(values) == 256 * len(delays)
     return encode_displacements(values, -1 if steps < 0 else 1, fine)
 
 
-def run_state(name, steps, tick_ns, form, stop, tick, ticks):
+def run_state(name, steps, tick_ns, form, stop, floor, tick, ticks):
     """The fields of an entry of TABLE_TICKS behind the motor, at the beginning of `tick`, for `ticks` more."""
-    table = TABLES[name]
+    table = TABLES[name].slower(floor)
+    cruise_delay = table.cruise if table.cruise != TABLES[name].cruise else 0
     direction = -1 if steps < 0 else 1
     delays, stopped_at = delays_of(table, abs(steps), tick_ns, stop if stop is not None and stop <= tick else None)
     made = steps_made(table, delays, tick * tick_ns)
@@ -39,17 +40,19 @@ def run_state(name, steps, tick_ns, form, stop, tick, ticks):
         # The part of the accelerating side that the ramp-down gave up is empty, and stays named by its end.
         accel_end = table.parts(abs(steps))[0]
         lead = delays[stopped_at] if made == stopped_at else 0
-        return [direction, 0, since, since_ns, lead, accel_end, accel_end, 0, len(delays) - max(made, stopped_at + 1)]
+        return [direction, 0, since, since_ns, lead, accel_end, accel_end, 0, len(delays) - max(made, stopped_at + 1),
+                cruise_delay]
     accel, cruise, decel = table.parts(abs(steps))
     left_at_end = delays[steps_made(table, delays, (tick + ticks) * tick_ns):]
     cruises = made >= accel and len(left_at_end) > decel
     return [direction, int(cruises), since, since_ns, 0] + ([0] * 4 if cruises else [
-        min(made, accel), accel, min(cruise, max(0, accel + cruise - made)), min(decel, len(delays) - made)])
+        min(made, accel), accel, min(cruise, max(0, accel + cruise - made)), min(decel, len(delays) - made)
+    ]) + [cruise_delay]
 
 
-def rest_bytes(name, steps, tick_ns, form, stop, tick, ticks):
+def rest_bytes(name, steps, tick_ns, form, stop, floor, tick, ticks):
     width = 2 if form == "fine" else 1
-    return move_bytes(name, steps, tick_ns, form, stop)[tick * width:(tick + ticks) * width]
+    return move_bytes(name, steps, tick_ns, form, stop, floor)[tick * width:(tick + ticks) * width]
 
 
 def take_over_bytes(name, delay, fraction, direction, tick_ns, form):

@@ -42,14 +42,14 @@ def c_encoder(index, message, fields):
         lines.append(f"  return bushd_encode_table_ticks({fields['epoch']}, {fields['flags']}, "
                      f"UINT32_C({fields['first_tick']}), {fields['count']}, entries, {len(fields['entries'])}, payload);")
     elif message == "table_run":
-        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}}}"
-                            for motor, slot, direction, steps in fields["entries"])
+        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {floor}}}"
+                            for motor, slot, direction, steps, floor in fields["entries"])
         lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
         lines.append(f"  return bushd_encode_table_run({fields['epoch']}, UINT32_C({fields['first_tick']}), entries, "
                      f"{len(fields['entries'])}, payload);")
     elif message == "trigger":
-        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}}}"
-                            for motor, slot, direction, steps in fields["entries"])
+        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {floor}}}"
+                            for motor, slot, direction, steps, floor in fields["entries"])
         name = "entries" if entries else "NULL"
         if entries:
             lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
@@ -106,11 +106,13 @@ def c_header():
     numbers = {name: i for i, name in enumerate(TABLES)}
 
     rows = []
-    for i, (name, steps, tick_ns, form, stop) in enumerate(MOVES):
-        data = move_bytes(name, steps, tick_ns, form, stop)
+    for i, move in enumerate(MOVES):
+        name, steps, tick_ns, form, stop, floor = move
+        data = move_bytes(*move)
         out.append(c_array("uint8_t", f"kMove_{i}", data))
         rows.append(f"    {{&kTables[{numbers[name]}], {abs(steps)}, {-1 if steps < 0 else 1}, {tick_ns}, "
-                    f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, kMove_{i}, {len(data)}}},")
+                    f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, {floor}, kMove_{i}, "
+                    f"{len(data)}}},")
     out += ["static const move_vector kMoves[] = {", *rows, "};", ""]
 
     rows = []
@@ -124,11 +126,11 @@ def c_header():
 
     rows = []
     for i, saved in enumerate(RUN_STATES):
-        name, steps, tick_ns, form, stop, tick, ticks = saved
+        name, steps, tick_ns, form, stop, floor, tick, ticks = saved
         data = rest_bytes(*saved)
         out.append(c_array("uint8_t", f"kRest_{i}", data))
         rows.append(f"    {{&kTables[{numbers[name]}], {abs(steps)}, {-1 if steps < 0 else 1}, {tick_ns}, "
-                    f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, {tick}, {ticks}, "
+                    f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, {floor}, {tick}, {ticks}, "
                     f"{c_state(run_state(*saved))}, kRest_{i}, {len(data)}}},")
     out += ["static const run_state_vector kRunStates[] = {", *rows, "};", ""]
 

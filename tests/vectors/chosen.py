@@ -17,20 +17,23 @@ TABLES = {
     "slow": Table(1000000, [9, 7, 5]),
 }
 
-# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None)
+# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None, floor)
 MOVES = [
-    ("small", 5, 4000, "coarse", None), ("small", 5, 4000, "fine", None), ("small", -5, 4000, "fine", None),
-    ("small", 1, 4000, "coarse", None), ("small", -1, 4000, "coarse", None), ("small", 2, 1000, "fine", None),
-    ("small", 9, 4000, "fine", 2), ("small", 9, 4000, "coarse", 0),
-    ("flat", 1, 2560000, "fine", None), ("flat", 40, 2560000, "coarse", None), ("flat", -41, 2560000, "fine", 7),
-    ("bushd2", 1, 2560000, "coarse", None), ("bushd2", 30, 2560000, "fine", None),
-    ("bushd2", -31, 2560000, "coarse", None), ("bushd2", 520, 2560000, "coarse", None),
-    ("bushd2", 476, 2560000, "coarse", 300),
-    ("uneven", 30, 2560000, "fine", None), ("uneven", -30, 1000000, "coarse", None),
-    ("uneven", 12, 1000000, "fine", 9), ("uneven", 8, 777777, "fine", None),
-    ("micro", 500, 1000000, "coarse", None), ("micro", -499, 1000000, "fine", None),
-    ("micro", 500, 1000000, "fine", 9), ("micro", 60, 1000001, "coarse", None),
-    ("slow", 6, 2560000, "fine", None), ("slow", -3, 2560000, "coarse", None), ("slow", 6, 2560000, "fine", 5),
+    ("small", 5, 4000, "coarse", None, 0), ("small", 5, 4000, "fine", None, 0), ("small", -5, 4000, "fine", None, 0),
+    ("small", 1, 4000, "coarse", None, 0), ("small", -1, 4000, "coarse", None, 0), ("small", 2, 1000, "fine", None, 0),
+    ("small", 9, 4000, "fine", 2, 0), ("small", 9, 4000, "coarse", 0, 0),
+    ("flat", 1, 2560000, "fine", None, 0), ("flat", 40, 2560000, "coarse", None, 0), ("flat", -41, 2560000, "fine", 7, 0),
+    ("bushd2", 1, 2560000, "coarse", None, 0), ("bushd2", 30, 2560000, "fine", None, 0),
+    ("bushd2", -31, 2560000, "coarse", None, 0), ("bushd2", 520, 2560000, "coarse", None, 0),
+    ("bushd2", 476, 2560000, "coarse", 300, 0),
+    ("uneven", 30, 2560000, "fine", None, 0), ("uneven", -30, 1000000, "coarse", None, 0),
+    ("uneven", 12, 1000000, "fine", 9, 0), ("uneven", 8, 777777, "fine", None, 0),
+    ("micro", 500, 1000000, "coarse", None, 0), ("micro", -499, 1000000, "fine", None, 0),
+    ("micro", 500, 1000000, "fine", 9, 0), ("micro", 60, 1000001, "coarse", None, 0),
+    ("slow", 6, 2560000, "fine", None, 0), ("slow", -3, 2560000, "coarse", None, 0), ("slow", 6, 2560000, "fine", 5, 0),
+    ("small", 9, 4000, "fine", None, 4), ("small", -9, 4000, "coarse", None, 9), ("bushd2", 520, 2560000, "fine", None, 60),
+    ("bushd2", -520, 2560000, "coarse", 300, 251), ("uneven", 30, 2560000, "fine", None, 1900),
+    ("micro", 500, 1000000, "coarse", None, 150), ("slow", 6, 2560000, "fine", 5, 6),
 ]
 
 # (table, delay, fraction, direction, tick_ns, format)
@@ -48,16 +51,18 @@ SLOTS = [
     (256, 256, [1000, 1000, 1000, -3000]), (128, 256, [256 * 30 + 7, -256 * 30 - 7]),
 ]
 
-# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None, saved at the beginning of tick, ticks)
+# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None, floor, saved at the beginning of tick, ticks)
 RUN_STATES = [
-    ("small", 5, 4000, "fine", None, 0, 6), ("small", -5, 4000, "fine", None, 3, 3),
-    ("flat", 40, 2560000, "coarse", None, 1, 5), ("flat", -41, 2560000, "fine", 7, 7, 1),
-    ("bushd2", 520, 2560000, "fine", None, 0, 100), ("bushd2", 520, 2560000, "coarse", None, 488, 3),
-    ("bushd2", 520, 2560000, "fine", None, 170, 190), ("bushd2", 520, 2560000, "fine", None, 488, 190),
-    ("bushd2", -476, 2560000, "coarse", 100, 100, 2), ("bushd2", 476, 2560000, "coarse", 100, 104, 40),
-    ("uneven", 30, 2560000, "fine", None, 3, 9), ("uneven", -30, 1000000, "coarse", None, 12, 2),
-    ("uneven", 12, 1000000, "fine", 9, 9, 9), ("uneven", 8, 777777, "fine", None, 5, 1),
-    ("micro", 500, 1000000, "coarse", None, 4, 100), ("slow", 6, 2560000, "fine", 5, 6, 4),
+    ("small", 5, 4000, "fine", None, 0, 0, 6), ("small", -5, 4000, "fine", None, 0, 3, 3),
+    ("flat", 40, 2560000, "coarse", None, 0, 1, 5), ("flat", -41, 2560000, "fine", 7, 0, 7, 1),
+    ("bushd2", 520, 2560000, "fine", None, 0, 0, 100), ("bushd2", 520, 2560000, "coarse", None, 0, 488, 3),
+    ("bushd2", 520, 2560000, "fine", None, 0, 170, 190), ("bushd2", 520, 2560000, "fine", None, 0, 488, 190),
+    ("bushd2", -476, 2560000, "coarse", 100, 0, 100, 2), ("bushd2", 476, 2560000, "coarse", 100, 0, 104, 40),
+    ("uneven", 30, 2560000, "fine", None, 0, 3, 9), ("uneven", -30, 1000000, "coarse", None, 0, 12, 2),
+    ("uneven", 12, 1000000, "fine", 9, 0, 9, 9), ("uneven", 8, 777777, "fine", None, 0, 5, 1),
+    ("micro", 500, 1000000, "coarse", None, 0, 4, 100), ("slow", 6, 2560000, "fine", 5, 0, 6, 4),
+    ("bushd2", 520, 2560000, "fine", None, 60, 200, 190), ("bushd2", -520, 2560000, "coarse", 100, 60, 104, 40),
+    ("bushd2", 520, 2560000, "coarse", None, 60, 600, 1000), ("uneven", 30, 2560000, "fine", None, 1900, 3, 9),
 ]
 
 # (unique id, salt, slots)
@@ -92,18 +97,22 @@ FRAMES = [
     (1, 9, "ticks", {"epoch": 4, "flags": 3, "first_tick": 1002, "count": 1, "mask": 0x0005, "delays": [10, 0],
                      "displacements": [0x00, 0x01, 0x80, 0xFF]}),
     (1, 10, "table_ticks", {"epoch": 4, "flags": 4, "first_tick": 1100, "count": 190,
-                            "entries": [[3, 1, 0, 0, 0, 0, 0, 237, 46, 237]]}),
+                            "entries": [[3, 1, 0, 0, 0, 0, 0, 237, 46, 237, 0]]}),
     # Motors that cruise, ramp down in the middle of a step, speed up.
     (1, 11, "table_ticks", {"epoch": 4, "flags": 0, "first_tick": 1290, "count": 300,
-                            "entries": [[0, -1, 1, 9, 0, 0, 0, 0, 0, 0], [1, 1, 0, 7, 39999, 12, 200, 237, 0, 201],
-                                        [15, 1, 0, 65535, 0, 0, 5, 6, 2147483647, 65535]]}),
+                            "entries": [[0, -1, 1, 9, 0, 0, 0, 0, 0, 0, 0], [1, 1, 0, 7, 39999, 12, 200, 237, 0, 201, 0],
+                                        [15, 1, 0, 65535, 0, 0, 5, 6, 2147483647, 65535, 0]]}),
     (1, 12, "table_ticks", {"epoch": 5, "flags": 2, "first_tick": 0xFFFFFFFF, "count": 1,
-                            "entries": [[7, 1, 1, 0, 1, 0, 0, 0, 0, 0]]}),
-    (1, 13, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[0, 2, 1, 200]]}),
-    (1, 14, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[1, 0, -1, 1], [15, 7, 1, 2147483647]]}),
-    (1, 21, "trigger", {"number": 1, "edge": 2, "delay_us": 50, "entries": [[0, 2, 1, 200]]}),
+                            "entries": [[7, 1, 1, 0, 1, 0, 0, 0, 0, 0, 0]]}),
+    # With floors: one that cruises, one that speeds up; one without.
+    (1, 25, "table_ticks", {"epoch": 6, "flags": 8, "first_tick": 1290, "count": 300,
+                            "entries": [[0, -1, 1, 9, 0, 0, 0, 0, 0, 0, 60], [1, 1, 0, 7, 39999, 12, 20, 190, 9, 191, 258],
+                                        [2, 1, 1, 3, 0, 0, 0, 0, 0, 0, 0]]}),
+    (1, 13, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[0, 2, 1, 200, 0]]}),
+    (1, 14, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[1, 0, -1, 1, 513], [15, 7, 1, 2147483647, 0]]}),
+    (1, 21, "trigger", {"number": 1, "edge": 2, "delay_us": 50, "entries": [[0, 2, 1, 200, 0]]}),
     (1, 22, "trigger", {"number": 255, "edge": 1, "delay_us": 1500000,
-                        "entries": [[1, 0, -1, 1], [15, 7, 1, 2147483647]]}),
+                        "entries": [[1, 0, -1, 1, 513], [15, 7, 1, 2147483647, 0]]}),
     (1, 23, "trigger", {"number": 0, "edge": 0, "delay_us": 0, "entries": []}),
     (1, 24, "position_compare", {"motor": 15, "arrivals": 3, "position_steps": -310, "delay_us": 1500000,
                           "width_us": 1000000}),
@@ -124,12 +133,12 @@ FRAMES = [
     (2, 21, "set_inputs", {"limit_positive": 1, "limit_negative": 2, "limit_immediate": 3, "inverted": 4,
                            "debounce_ticks": 15, "system_inverted": 14, "emergency": 1, "overcurrent": 1023,
                            "enable_after_watchdog": 0}),
-    (1, 21, "home", {"motor": 3, "direction": -1, "most_steps": 20000, "slow_steps": 600, "slow_delay": 1000,
+    (1, 21, "home", {"motor": 3, "direction": -1, "most_steps": 20000, "floor": 77, "slow_steps": 600, "slow_delay": 1000,
                      "position_steps": -310}),
-    (2, 22, "home", {"motor": 15, "direction": 1, "most_steps": 0, "slow_steps": 1, "slow_delay": 65535,
+    (2, 22, "home", {"motor": 15, "direction": 1, "most_steps": 0, "floor": 0, "slow_steps": 1, "slow_delay": 65535,
                      "position_steps": 2147483647}),
     (1, 23, "local", {"motors": 0x8005}),
-    (1, 7, "identity", {"protocol_version": 3, "motors": 16, "firmware_version": 258, "boot_number": 4660,
+    (1, 7, "identity", {"protocol_version": 4, "motors": 16, "firmware_version": 258, "boot_number": 4660,
                         "slots": 128, "queue_ticks": 256, "table_codes": 2048, "capabilities": 15, "unique_id": ID}),
     (2, 255, "report", {"state": 2, "faults": 0, "flags": 7, "epoch": 3, "boot_number": 4660, "tick": 1001,
                         "tick_ns": 1999999, "sync_id": 66050, "sync_tick": 990, "sync_ns": 0, "rate_ppb": -48000,

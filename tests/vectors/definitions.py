@@ -39,6 +39,10 @@ class Table:
         assert kinds == "".join(sorted(kinds, key="acd".index))
         return kinds.count("a"), kinds.count("c"), kinds.count("d")
 
+    def slower(self, floor):
+        """The same with a floor under every delay."""
+        return Table(self.unit_ns, self.accel, self.decel, max(self.cruise, floor))
+
     def ramp_down(self, delay):
         """The delays after a step made at `delay`: the fewest steps k with D(k) <= delay."""
         k = 0

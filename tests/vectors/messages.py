@@ -27,7 +27,7 @@ LAYOUTS = {
     "set_inputs": (0x11, [("limit_positive", 2), ("limit_negative", 2), ("limit_immediate", 2), ("inverted", 2),
                           ("debounce_ticks", 1), ("system_inverted", 1), ("emergency", 1), ("overcurrent", 2),
                           ("enable_after_watchdog", 1)]),
-    "home": (0x13, [("motor", 1), ("direction", -1), ("most_steps", 4), ("slow_steps", 4), ("slow_delay", 2),
+    "home": (0x13, [("motor", 1), ("direction", -1), ("most_steps", 4), ("floor", 2), ("slow_steps", 4), ("slow_delay", 2),
                     ("position_steps", -4)]),
     "local": (0x14, [("motors", 2)]),
     "identity": (0x81, [("protocol_version", 1), ("motors", 1), ("firmware_version", 2), ("boot_number", 2),
@@ -47,9 +47,12 @@ LAYOUTS = {
 }
 
 
-def run_state_bytes(motor, direction, cruises, since, since_ns, lead, accel_at, accel_end, cruise_left, decel_left):
+def run_state_bytes(fields, motor, direction, cruises, since, since_ns, lead, accel_at, accel_end, cruise_left,
+                    decel_left, cruise):
     head = motor | (0x80 if direction > 0 else 0) | (0 if cruises else 0x40)
     out = since.to_bytes(2, "little")
+    if fields["flags"] & 8:
+        out += cruise.to_bytes(2, "little")
     if since_ns:
         head |= 0x20
         out += since_ns.to_bytes(4, "little")
@@ -62,8 +65,11 @@ def run_state_bytes(motor, direction, cruises, since, since_ns, lead, accel_at, 
     return bytes([head]) + out
 
 
-def table_run_bytes(motor, slot, direction, steps):
-    return bytes([motor | slot << 4 | (0x80 if direction > 0 else 0)]) + steps.to_bytes(4, "little")
+def table_run_bytes(_, motor, slot, direction, steps, floor):
+    head = bytes([motor | slot << 4 | (0x80 if direction > 0 else 0)])
+    if not floor:
+        return head + steps.to_bytes(4, "little")
+    return head + (steps | 1 << 31).to_bytes(4, "little") + floor.to_bytes(2, "little")
 
 
 ENTRIES = {"run_state": run_state_bytes, "table_run": table_run_bytes}
@@ -77,7 +83,7 @@ def payload_of(layout, fields):
             out += value.to_bytes(abs(width), "little", signed=width < 0)
             continue
         if isinstance(width, str):
-            out += b"".join(ENTRIES[width](*element) for element in value)
+            out += b"".join(ENTRIES[width](fields, *element) for element in value)
             continue
         for element in value:
             parts = element if isinstance(element, list) else [element]

@@ -74,7 +74,7 @@ class Measurement {
       time_ns += delays_ns_.back();
       times_ns_.push_back(time_ns);
     }
-    bushd_run_start(&run_, move.table, move.steps, 1);
+    bushd_run_start(&run_, move.table, move.steps, 1, 0);
   }
 
   void measure(Statistics* statistics) {

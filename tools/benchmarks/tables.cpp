@@ -117,7 +117,7 @@ void expand(benchmark::State& state,
   std::size_t ticks = 0;
   for (auto _ : state) {
     bushd_run run;
-    bushd_run_start(&run, &table->view(), kSteps, 1);
+    bushd_run_start(&run, &table->view(), kSteps, 1, 0);
     ticks = 0;
     while (!bushd_run_done(&run)) {
       ticks += expand_block(&run, kTickNs, block.size(), block.data(), 1);

@@ -67,7 +67,7 @@ class Moves {
 
   void start() {
     for (size_t m = 0; m < runs_.size(); ++m) {
-      bushd_run_start(&runs_[m], tables_[m]->view(), kSteps, m % 2 == 0 ? 1 : -1);
+      bushd_run_start(&runs_[m], tables_[m]->view(), kSteps, m % 2 == 0 ? 1 : -1, 0);
     }
   }
 

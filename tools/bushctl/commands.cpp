@@ -52,6 +52,12 @@ int failure(const Client& client, const bushd::Error& error) {
   return kFailed;
 }
 
+int complete(const bushd::client::Status::Missing& missing, const char* things) {
+  if (missing.count == 0) return kDone;
+  fmt::print(stderr, "bushctl: {}\n", missing_text(missing, things));
+  return kFailed;
+}
+
 int wrong_usage(const bushd::Error& error) {
   fmt::print(stderr, "bushctl: {}\n", error.text());
   return kUsage;

@@ -42,6 +42,8 @@ int send(const Connection& connection, const bushd::api::Request& request,
 
 // Says on stderr why, unless it was the user who broke off.
 int failure(const bushd::client::Client& client, const bushd::Error& error);
+// If something of what was shown did not arrive, stderr says so. kDone if nothing is missing.
+int complete(const bushd::client::Status::Missing& missing, const char* things);
 // Of words that make no request.
 int wrong_usage(const bushd::Error& error);
 int refused(const bushd::api::Reply& reply);

@@ -14,6 +14,7 @@ namespace api = bushd::api;
 using bushd::client::Client;
 using Until = Client::Until;
 
+constexpr const char* kSpeed = "Not faster than this, in the motor's unit per second";
 constexpr const char* kSteps = "Numbers are steps, not the motors' units";
 
 Numbers numbers(bool steps) {
@@ -49,6 +50,7 @@ void add_move(CommandLine& line) {
     bool steps = false;
     bool dry_run = false;
     bool json = false;
+    std::string speed;
     std::vector<std::string> words;
   };
   const auto options = std::make_shared<Options>();
@@ -62,14 +64,18 @@ void add_move(CommandLine& line) {
           "its "
           "target.")
       .flag("--wait", &options->wait, "Wait for the result")
+      .option("--speed", &options->speed, kSpeed)
       .flag("--steps", &options->steps, kSteps)
       .flag("--dry-run", &options->dry_run,
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
       .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
       .raw_words(&options->words)
       .run([&line, options] {
-        const auto move = parse_move(options->words, numbers(options->steps));
+        auto move = parse_move(options->words, numbers(options->steps));
         if (!move) return wrong_usage(move.error());
+        const auto speed = parse_speed(options->speed, numbers(options->steps));
+        if (!speed) return wrong_usage(speed.error());
+        move->speed = *speed;
         if (options->dry_run) return show_plan(line.connection(), *move, options->json);
         return send(line.connection(), *move, until(options->wait), Hope::kReached);
       });
@@ -81,6 +87,7 @@ void add_arm(CommandLine& line) {
     std::int64_t delay_us = 0;
     bool steps = false;
     bool wait = false;
+    std::string speed;
     std::vector<std::string> words;
   };
   const auto options = std::make_shared<Options>();
@@ -94,13 +101,17 @@ void add_arm(CommandLine& line) {
       .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'500'000,
                             "Delay from the edge, beyond the three ticks", Command::Needed::kYes)
       .choice("--edge", &options->edge, {"rising", "falling"}, "Edge that starts the moves")
+      .option("--speed", &options->speed, kSpeed)
       .flag("--steps", &options->steps, kSteps)
       .flag("--wait", &options->wait, "Wait for the result")
       .raw_words(&options->words)
       .run([&line, options] {
-        const auto arm =
+        auto arm =
             parse_arm(options->words, numbers(options->steps), options->edge, options->delay_us);
         if (!arm) return wrong_usage(arm.error());
+        const auto speed = parse_speed(options->speed, numbers(options->steps));
+        if (!speed) return wrong_usage(speed.error());
+        arm->speed = *speed;
         return send(line.connection(), *arm, until(options->wait), Hope::kReached);
       });
 }
@@ -165,6 +176,8 @@ void add_estop(CommandLine& line) {
 void add_home(CommandLine& line) {
   struct Options {
     api::MotorNames motors;
+    std::string speed;
+    bool steps = false;
     bool wait = false;
   };
   const auto options = std::make_shared<Options>();
@@ -175,9 +188,13 @@ void add_home(CommandLine& line) {
           "--wait the exit code is 0 only if every motor has found its switch; 'bushctl stop' ends "
           "it.")
       .words("NAME", &options->motors, "Motors", Command::Needed::kYes)
+      .option("--speed", &options->speed, kSpeed)
+      .flag("--steps", &options->steps, "--speed is in steps per second")
       .flag("--wait", &options->wait, "Wait for the result")
       .run([&line, options] {
-        return send(line.connection(), api::Home{options->motors}, until(options->wait),
+        const auto speed = parse_speed(options->speed, numbers(options->steps));
+        if (!speed) return wrong_usage(speed.error());
+        return send(line.connection(), api::Home{options->motors, *speed}, until(options->wait),
                     Hope::kReached);
       });
 }

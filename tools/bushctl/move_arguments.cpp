@@ -47,6 +47,15 @@ Result<api::Amount> amount_of(const std::string& motor, const std::string& word,
 
 }  // namespace
 
+Result<std::optional<api::Speed>> parse_speed(const std::string& word, Numbers numbers) {
+  if (word.empty()) return std::optional<api::Speed>();
+  const auto per_s = number(word);
+  if (!per_s || !(*per_s > 0)) {
+    return fail(fmt::format("--speed: \"{}\" is not a number above 0", word));
+  }
+  return std::optional(api::Speed{.per_s = *per_s, .in_steps = numbers == Numbers::kSteps});
+}
+
 Result<api::Move> parse_move(const std::vector<std::string>& words, Numbers numbers) {
   using Kind = api::Move::Kind;
   api::Move move;

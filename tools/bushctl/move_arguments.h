@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,10 @@ namespace bushctl {
 
 // What the numbers are: in the motors' units, of motors without one in steps; or all in steps.
 enum class Numbers { kUser, kSteps };
+
+// "2.5": not to be exceeded, per second. "" is none.
+bushd::Result<std::optional<bushd::api::Speed>> parse_speed(const std::string& word,
+                                                            Numbers numbers);
 
 // "theta 400 chi -20" moves by so much, "theta --to 400 chi --to -20" to these positions; in any
 // case all motors as one group. A mixture is refused: one command is relative or absolute.

@@ -16,6 +16,10 @@ namespace api = bushd::api;
 namespace units = bushd::units;
 using bushd::client::Status;
 
+// Where LCM's datagrams get lost on this PC.
+constexpr const char* kRoom =
+    "give datagrams more room ('sysctl net.core.rmem_max=4194304'), or use the control socket";
+
 std::string text_of(const api::TableRef& table) {
   const std::string revision = table.revision > 0 ? fmt::format("@{}", table.revision) : "";
   return bushd::printable(table.name) + revision;
@@ -27,6 +31,7 @@ std::string limit_text(const api::MotorState& motor) {
 
 // What it does, in a word for tables.
 const char* moving_word(const api::MotorState& motor, const char* moves, const char* rests) {
+  if (motor.activity == api::Activity::kArming) return "arming";
   if (motor.activity == api::Activity::kArmed) return "armed";
   return motor.moving ? moves : rests;
 }
@@ -163,6 +168,16 @@ std::vector<std::string> table(const Status& status) {
   out.emplace_back();
   for (std::string& line : mcus.lines()) out.push_back(std::move(line));
   return out;
+}
+
+std::string missing_text(const Status::Missing& missing, const char* things) {
+  return fmt::format("incomplete: messages were lost, nothing of {} of {} {} has arrived; {}",
+                     missing.count, missing.of, things, kRoom);
+}
+
+std::string lost_text(std::uint64_t messages) {
+  return fmt::format("{} messages of bushd were lost, so changes may be missing here; {}", messages,
+                     kRoom);
 }
 
 std::string motor_line(const Status& status, std::size_t mcu, std::size_t index) {

@@ -1,6 +1,7 @@
 // The state as people and programs read it.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,11 @@ namespace bushctl {
 
 // Lines of a table of all motors, then of all MCUs.
 std::vector<std::string> table(const bushd::client::Status& status);
+
+// One line with a remedy: that so many MCUs or buses of a status did not arrive; that so many
+// messages were lost since the status before.
+std::string missing_text(const bushd::client::Status::Missing& missing, const char* things);
+std::string lost_text(std::uint64_t messages);
 
 // One line of the motor at this place in the state of the MCU at that place: name, position,
 // target, velocity, moving or at rest, trust when it is not "known".

@@ -109,6 +109,7 @@ int list_tables(Client& client, bool as_json) {
   if (!list) return code;
   const auto status = client.status(kWithin);
   if (!status) return failure(client, status.error());
+  if (status->missing_mcus.count > 0) return complete(status->missing_mcus, "MCUs");
   (as_json ? print_json : print)(by_group(*status), list->entries);
   return kDone;
 }

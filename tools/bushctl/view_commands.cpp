@@ -29,12 +29,13 @@ Command& add_timeout(Command& command, double* timeout_s) {
 int show_status(Client& client, std::chrono::milliseconds timeout, bool as_json) {
   const auto status = client.status(timeout);
   if (!status) return failure(client, status.error());
+  if (status->states.empty()) return complete(status->missing_mcus, "MCUs");
   if (as_json) {
     fmt::print("{}\n", json(*status));
   } else {
     for (const std::string& line : table(*status)) fmt::print("{}\n", line);
   }
-  return kDone;
+  return complete(status->missing_mcus, "MCUs");
 }
 
 struct HealthOptions {
@@ -56,9 +57,10 @@ void print(const Status& status, bool as_json) {
 int show_health(Client& client, const HealthOptions& options) {
   auto health = client.status(milliseconds(options.timeout_s));
   if (!health) return failure(client, health.error());
+  if (health->healths.empty()) return complete(health->missing_buses, "buses");
   if (!options.watch) {
     print(*health, options.json);
-    return kDone;
+    return complete(health->missing_buses, "buses");
   }
   std::optional<Screen> screen;
   if (!options.json && isatty(STDOUT_FILENO) != 0) screen.emplace("'bushctl health' shows all");

@@ -25,6 +25,8 @@ class View {
   virtual void show(const Status& status) = 0;
   // No snapshot came in time. Whether to go on waiting.
   virtual bool silent() = 0;
+  // What has been shown is not all that there was to show.
+  virtual void warn(const std::string& text) = 0;
 };
 
 class ChangesView : public View {
@@ -42,6 +44,7 @@ class ChangesView : public View {
     std::fflush(stdout);
   }
   bool silent() override { return false; }
+  void warn(const std::string& text) override { fmt::print(stderr, "bushctl: {}\n", text); }
 
  private:
   void line(const std::string& about, const std::string& text) {
@@ -61,6 +64,7 @@ class TerminalView : public View {
     screen_.notice("no state from bushd; what is shown is old");
     return true;
   }
+  void warn(const std::string& text) override { screen_.notice(text); }
 
  private:
   Screen screen_{"'bushctl status' shows all"};
@@ -78,9 +82,13 @@ int watch(bushd::client::Client& client, const WatchOptions& options) {
   } else {
     view = std::make_unique<ChangesView>();
   }
+  std::uint64_t lost = 0;
   for (unsigned shown = 0;;) {
     if (status) {
       view->show(*status);
+      if (status->missing_mcus.count > 0) view->warn(missing_text(status->missing_mcus, "MCUs"));
+      if (status->lost > lost) view->warn(lost_text(status->lost - lost));
+      lost = status->lost;
       if (options.count > 0 && ++shown >= options.count) return kDone;
     } else if (client.interrupted()) {
       return kDone;

@@ -51,7 +51,9 @@ std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) c
   for (const auto& state : witness_.states()) {
     if (!state) continue;
     for (const bushd::api::MotorState& motor : state->motors) {
-      if (motor.activity != bushd::api::Activity::kArmed && motor.moving == moving &&
+      const bool waits = motor.activity == bushd::api::Activity::kArming ||
+                         motor.activity == bushd::api::Activity::kArmed;
+      if (!waits && motor.moving == moving &&
           (motor.trust == bushd::api::Trust::kUncertain) == uncertain) {
         found.push_back({motor.name, motor.position_steps, motor.target_steps});
       }

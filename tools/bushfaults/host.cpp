@@ -194,6 +194,7 @@ void Host::hear(const std::optional<bushd::lcm::DaemonMessage>& message) {
     if (mcu >= published_.size() || published_[mcu] != state->snapshot) {
       witness_.violated(now_ns_, "a state arrives otherwise than it was published");
     }
+    said_state_ns_ = now_ns_;
   }
   if (on_message) on_message(*message);
 }
@@ -223,6 +224,11 @@ Host::TimeNs Host::next_ns() const {
   if (now_ns_ < paused_until_ns_) return std::min(next, paused_until_ns_);
   if (!inbox_.empty()) next = std::min(next, inbox_.front().due_ns);
   return std::max(std::min(next, wake_ns_), now_ns_ + 1000);
+}
+
+std::optional<Host::TimeNs> Host::runs_since_ns() const {
+  if (!daemon_ || now_ns_ < paused_until_ns_) return std::nullopt;
+  return std::max(starts_ns_, paused_until_ns_);
 }
 
 void Host::receive(const Message& message) {

@@ -42,6 +42,10 @@ class Host final : public bushd::daemon::Outputs {
   void receive(const Message& message);
   // Of the daemon that runs, or of the last one.
   std::int64_t run_number() const { return run_number_; }
+  // Since when it has been running without a pause; nothing if it does not.
+  std::optional<TimeNs> runs_since_ns() const;
+  // When it has said a state on the network, the last time.
+  TimeNs said_state_ns() const { return said_state_ns_; }
   // What it says to clients.
   std::function<void(const bushd::lcm::DaemonMessage&)> on_message;
 
@@ -97,8 +101,9 @@ class Host final : public bushd::daemon::Outputs {
 
   std::unique_ptr<DaemonRun> daemon_;  // none: killed
   std::int64_t run_number_ = 0;
-  TimeNs starts_ns_ = 0;  // when the next daemon starts
+  TimeNs starts_ns_ = 0;  // when the next daemon starts, or this one has started
   TimeNs paused_until_ns_ = 0;
+  TimeNs said_state_ns_ = 0;
   TimeNs wake_ns_ = 0;
   std::deque<Message> messages_;                      // not yet read by the daemon
   std::vector<bushd::api::StateSnapshot> published_;  // by MCU

@@ -33,6 +33,7 @@ constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
     {"stale-repeats", 0, "a request that an earlier daemon has received is repeated"},
     {"floods", 0, "50 .. 2000 requests at once, of up to 200 clients"},
     {"crowds", 0, "likewise, of up to 2000 clients"},
+    {"second-daemons", 12, "another daemon for the same MCUs starts, for 0.1 .. 30 s"},
 }};
 
 constexpr std::array<KindInfo, kCommandKinds> kCommands = {{

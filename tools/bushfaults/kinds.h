@@ -40,8 +40,10 @@ enum class FaultKind : std::uint8_t {
   kStaleRepeat,
   kFlood,
   kCrowd,
+  // Last, so that the others' stories stay as they are without it.
+  kSecondDaemon,
 };
-inline constexpr std::size_t kFaultKinds = 27;
+inline constexpr std::size_t kFaultKinds = 28;
 
 // What clients send.
 enum class CommandKind : std::uint8_t {

@@ -214,7 +214,7 @@ std::optional<std::string> Positions::check_motor(std::size_t mcu,
                        claim.position_steps, report.tick, pulses - *motor.offset);
   }
   const std::int64_t stands = plant_steps(index);
-  if (claim.moving || claim.activity == bushd::api::Activity::kArmed ||
+  if (claim.moving || claim.activity != bushd::api::Activity::kResting ||
       stands - *motor.offset == claim.position_steps) {
     return std::nullopt;
   }

@@ -51,6 +51,12 @@ std::string summary_text(const World& world, double processor_s) {
   const Promise& promise = world.witness().promise();
   text += fmt::format("requests   {} carried out, {} answered again or refused by their session\n",
                       promise.carried_out(), promise.not_carried_out());
+  const SecondDaemon::Counts& second = world.second_daemons();
+  text += fmt::format(
+      "second     daemons: {} found the first on their network, {} ran; {} of their moves "
+      "accepted, "
+      "{} refused\n",
+      second.found_other, second.ran, second.moves_accepted, second.moves_refused);
   text += "moves      by result\n";
   for (const auto& [result, count] : world.witness().moves_by_result()) {
     text += fmt::format("           {:<17}{:>9}\n", result, count);
@@ -81,6 +87,9 @@ std::string summary_json(const World& world) {
       {"not_carried_out", world.witness().promise().not_carried_out()},
       {"moves", world.witness().moves_by_result()},
       {"homings", world.witness().homings_by_result()},
+      {"second_daemons_refused", world.second_daemons().found_other},
+      {"second_daemons_ran", world.second_daemons().ran},
+      {"second_daemons_moves", world.second_daemons().moves_accepted},
       {"steps_commanded", world.witness().steps_commanded()},
       {"steps_made", world.plant().steps_made()},
       {"steps_unaccounted", world.witness().steps_unaccounted()},

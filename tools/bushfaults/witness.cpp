@@ -231,11 +231,11 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   if (!motor.move) return violated(now_ns, motor.name + " ended without a move");
   Asked& asked = asked_.at(*motor.move);
   const End end{line.at("result"), line.at("position_steps")};
-  if (end.word == "turned") return check_end(now_ns, motor, end, std::nullopt);
+  if (end.word == "turned") return check_end(now_ns, motor, asked, end, std::nullopt);
   motor.move.reset();
   const std::size_t index = asked.index_of(motor.name);
   asked.end[index] = end;
-  check_end(now_ns, motor, end, asked.target[index]);
+  check_end(now_ns, motor, asked, end, asked.target[index]);
   // One that waited for the trigger and was stopped before its first step makes it in a streamed
   // tick, up to one late.
   const bool exact = asked.request.ask != Ask::kArm;
@@ -246,7 +246,7 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   }
 }
 
-void Witness::check_end(TimeNs now_ns, const Motor& motor, const End& end,
+void Witness::check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, const End& end,
                         std::optional<std::int64_t> target) {
   const std::int64_t stands = plant_steps(motor);
   const bool limited = end.word == "limit";
@@ -254,7 +254,7 @@ void Witness::check_end(TimeNs now_ns, const Motor& motor, const End& end,
       end.word == "reached" || end.word == "stopped" || end.word == "turned" || limited;
   if (limited && (!motor.pressed_ns || now_ns - *motor.pressed_ns > kBarredNs)) {
     violated(now_ns, motor.name + " ended at its limit, and nobody has pressed its switch");
-  } else if (end.word == "fault") {
+  } else if (end.word == "fault" && second_ns_ < asked.since_ns) {
     violated(now_ns, fmt::format("{} ended in fault at {}", motor.name, end.position_steps));
   } else if (end.word == "reached" && target && *target != stands) {
     violated(now_ns, fmt::format("{} is said to have reached its target, and stands {} steps off",

@@ -40,6 +40,8 @@ class Witness {
   const std::optional<Violation>& violation() const { return violation_; }  // the first
 
   void daemon_started(TimeNs now_ns);  // what clients had asked of the one before is void
+  // A second daemon talks on the line: it may take MCUs over, and with them what they move.
+  void second_daemon(TimeNs now_ns) { second_ns_ = now_ns; }
   // Its limit switch is, or was until now, active.
   void pressed(TimeNs now_ns, std::size_t motor);
   // Before the core gets it; after that come the replies that it makes at once.
@@ -131,7 +133,7 @@ class Witness {
   void forget_some();
   void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
-  void check_end(TimeNs now_ns, const Motor& motor, const End& end,
+  void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, const End& end,
                  std::optional<std::int64_t> target);
 
   const bushd::config::Config& config_;
@@ -143,6 +145,7 @@ class Witness {
   std::vector<Motor> motors_;
   std::map<std::string, std::size_t> motor_by_name_;
   Promise promise_;
+  TimeNs second_ns_ = -1;     // when a second daemon talked, the last time
   TimeNs none_waits_ns_ = 0;  // when nothing waited for its turn
   std::map<Key, Asked> asked_;
   std::deque<Key> finished_;  // of asked_, oldest first

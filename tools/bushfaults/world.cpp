@@ -49,6 +49,7 @@ World::World(const Options& options, bushd::config::Config config)
   witness_.positions().be_strict(options.strict_known);
   overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
   inputs_ = std::make_unique<Inputs>(config_, bus_, plant_, witness_, options.seed);
+  second_ = std::make_unique<SecondDaemon>(config_, bus_, recent_, options.seed);
   for (std::size_t i = 0; i < kFaultKinds; ++i) {
     chance_.emplace_back(options.seed, kFaultStream + static_cast<std::uint32_t>(i));
   }
@@ -128,8 +129,8 @@ void World::spell_of_trouble(TimeNs until_ns) {
 
 void World::calm() {
   if (witness_.violation()) return;
-  run_until(std::max(
-      {now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(), mail_.quiet_ns()}));
+  run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(),
+                      mail_.quiet_ns(), second_->over_ns()}));
   mail_.settle();
   const TimeNs began_ns = now_ns_;
   mail_.send(now_ns_, clients_.stop_all());
@@ -170,6 +171,10 @@ void World::advance(TimeNs until_ns) {
   host_.run(now_ns_);
   inputs_->run(now_ns_);
   mail_.run(now_ns_);
+  if (second_->talks()) witness_.second_daemon(now_ns_);
+  const auto wrong_of_second = second_->run(
+      now_ns_, {.runs_since_ns = host_.runs_since_ns(), .said_state_ns = host_.said_state_ns()});
+  if (wrong_of_second) witness_.violated(now_ns_, *wrong_of_second);
   if (now_ns_ - skew_checked_ns_ < kSkewPeriodNs) return;
   skew_checked_ns_ = now_ns_;
   if (const auto wrong = skew_.check(now_ns_)) witness_.violated(now_ns_, *wrong);
@@ -239,6 +244,8 @@ void World::strike(FaultKind kind) {
       return note_fault(kind, mail_.flood(now_ns_, random, 200));
     case FaultKind::kCrowd:
       return note_fault(kind, mail_.flood(now_ns_, random, 2'000));
+    case FaultKind::kSecondDaemon:
+      return note_fault(kind, second_->start(now_ns_, random));
     case FaultKind::kSilence:
       length_ns = random.magnitude(kMs, 10 * kSecond);
       host_.silence(now_ns_ + length_ns);

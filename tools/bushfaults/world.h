@@ -19,6 +19,7 @@
 #include "mail.h"
 #include "overheard.h"
 #include "recent.h"
+#include "second_daemon.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
 #include "skew.h"
@@ -56,6 +57,7 @@ class World {
   const Skew& skew() const { return skew_; }
   const Witness& witness() const { return witness_; }
   const bushd::sim::Plant& plant() const { return plant_; }
+  const SecondDaemon::Counts& second_daemons() const { return second_->counts(); }
   const Recent& recent() const { return recent_; }
 
  private:
@@ -87,6 +89,7 @@ class World {
   std::array<TimeNs, kFaultKinds> next_fault_ns_{};
   std::unique_ptr<Overheard> overheard_;  // once the MCUs are on the bus
   std::unique_ptr<Inputs> inputs_;        // likewise
+  std::unique_ptr<SecondDaemon> second_;  // likewise
   FaultCounts faults_{};
   TimeNs now_ns_ = 0;
   TimeNs next_command_ns_ = 0;

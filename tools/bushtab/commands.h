@@ -52,6 +52,7 @@ struct Expansion {
   std::int64_t steps = 0;  // -INT32_MAX .. INT32_MAX
   std::uint32_t tick_us = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
+  std::optional<double> speed;  // steps/s, not to be exceeded
   bool json = false;
 };
 int expand(const Places& places, const Expansion& expansion);

@@ -130,6 +130,7 @@ void add_expand(CLI::App& app, const Places& places, const Run& run) {
   expand->add_option("--format", options->format, "coarse (a byte) or fine (steps x 256)")
       ->required()
       ->check(CLI::IsMember({"coarse", "fine"}));
+  expand->add_option("--speed", expansion.speed, "Not faster than so many steps per second");
   expand->add_flag("--json", expansion.json, "Print JSON");
   run(expand, [&places, options] {
     options->expansion.format =

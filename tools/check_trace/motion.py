@@ -1,8 +1,9 @@
 """The motion, computed anew from the table: every step's time, and the slot that an MCU makes it in.
 
-What a move is.  Delay before step j of N:  max(A(j-1), D(N-j), c), times the table's unit; the sum of the
+What a move is.  Delay before step j of N:  max(A(j-1), D(N-j), c, floor), times the table's unit; the sum of the
 first j delays is the table's time of step j, counted from the beginning of the move's start tick, or from
-"late_ns" after it (a move that a trigger has started). A stop at tick k lets the step that runs then go on and adds the fewest steps m with D(m) <= its delay: D(m-1) .. D(0).
+"late_ns" after it (a move that a trigger has started). A stop at tick k lets the step that runs then go on and adds the fewest steps m with D(m) <= its delay: D(m-1) .. D(0). A new target there goes on along A, or down to a floor along
+D: of the j-th of the first m steps the floor is min(floor, D(m-j)).
 
 What an MCU makes of it.  A step belongs to tick i if its time lies in (begin of i, end of i]. Position is
 linear between steps; q is the position at a tick's end, rounded down to 1/256 step (fine) or to a whole step
@@ -61,10 +62,10 @@ class Table:
     def delay_before_end(self, i):
         return self.decel[i] if i < len(self.decel) else self.cruise
 
-    def delays(self, steps):
+    def delays(self, steps, floor):
         """Of a whole move, in time units."""
         return [
-            max(self.delay_from_start(j - 1), self.delay_before_end(steps - j), self.cruise)
+            max(self.delay_from_start(j - 1), self.delay_before_end(steps - j), self.cruise, floor)
             for j in range(1, steps + 1)
         ]
 
@@ -73,13 +74,15 @@ class Table:
         fewest = next(k for k in range(len(self.decel) + 1) if self.delay_before_end(k) <= delay)
         return [self.delay_before_end(k) for k in range(fewest - 1, -1, -1)]
 
-    def onward(self, delay, steps):
+    def onward(self, delay, steps, floor):
         """The delays of `steps` more after one made at `delay`, to rest."""
         a = next(i for i in range(len(self.accel) + 1) if self.delay_from_start(i) <= delay)
         if self.delay_from_start(a) == delay:
             a += 1
+        floors = [min(floor, down) for down in self.ramp_down(delay)]
+        floors += [floor] * (steps - len(floors))
         return [
-            max(self.delay_from_start(a + j - 1), self.delay_before_end(steps - j), self.cruise)
+            max(self.delay_from_start(a + j - 1), self.delay_before_end(steps - j), self.cruise, floors[j - 1])
             for j in range(1, steps + 1)
         ]
 
@@ -103,7 +106,7 @@ class Move:
         # From this tick on it is made of ticks.
         self.ticks_from = {"stream": self.start_tick, "table": math.inf}[event.get("moves", "stream")]
         self.goal_steps = self.from_steps + event["steps"]
-        self._go_to(self.goal_steps)
+        self._go_to(self.goal_steps, event.get("floor", 0))
         self.result = None
         self.result_steps = None
 
@@ -112,18 +115,18 @@ class Move:
         delays = (delay * self.table.unit_ns for delay in self.delays)
         return list(accumulate(delays, initial=self.late_ns))[1:]
 
-    def _go_to(self, goal_steps):
+    def _go_to(self, goal_steps, floor):
         steps = goal_steps - self.from_steps
         self.direction = 1 if steps >= 0 else -1
-        self.delays = self.table.delays(abs(steps))
+        self.delays = self.table.delays(abs(steps), floor)
 
-    def change(self, tick, target_steps=None):
+    def change(self, tick, target_steps=None, floor=0):
         """What a stop, or a new target, at `tick` makes of the rest; changes follow each other."""
         self.ticks_from = min(self.ticks_from, tick)
         if target_steps is not None:
             self.goal_steps = target_steps
         if tick <= self.start_tick:
-            self._go_to(self.from_steps if target_steps is None else target_steps)
+            self._go_to(self.from_steps if target_steps is None else target_steps, floor)
             return
         done = bisect.bisect_right(self.times_ns(), (tick - self.start_tick) * self.tick_ns)
         if done == len(self.delays):
@@ -133,7 +136,7 @@ class Move:
         if target_steps is not None:
             after = (target_steps - self.from_steps) * self.direction - (done + 1)
             if after >= len(rest):
-                rest = self.table.onward(running, after)
+                rest = self.table.onward(running, after, floor)
         self.delays[done + 1 :] = rest
 
     def end_steps(self):

@@ -130,7 +130,7 @@ class MoveLog:
     def _change(self, event):
         move = self._moves.get((event["motor"], event["id"]))
         if move is not None:
-            move.change(event["tick"], event["target_steps"] if event["event"] == "retarget" else None)
+            move.change(event["tick"], event.get("target_steps"), event.get("floor", 0))
 
     def _result(self, event):
         move = self._moves.get((event["motor"], event["id"]))

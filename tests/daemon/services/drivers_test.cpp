@@ -51,6 +51,34 @@ TEST(Drivers, NoMoveBeginsWhileTheyAreBeingDisabled) {
   bench.result(1);
 }
 
+TEST(Drivers, OfAllAreThoseOfTheMcusThatAreOnline) {
+  DriversBench bench;
+  bench.line.mcu(1).reset(bench.now_us() * 1000, INT64_MAX, 9);
+  ASSERT_TRUE(bench.run_until([&] { return bench.installation[McuId(1)].offline(); }));
+  bench.drivers.request(bench.now_us(), bench.asker(1), api::Disable{});
+  const api::Completed disabled = bench.result(1);
+  EXPECT_EQ(disabled.outcome, api::Outcome::kDone);
+  EXPECT_EQ(disabled.reason, "done; not online, so not done there: hall:2");
+  EXPECT_FALSE(bench.enabled("m01"));
+  bench.drivers.request(bench.now_us(), bench.asker(2), api::Enable{});
+  EXPECT_THAT(bench.result(2).reason, HasSubstr("not done there: hall:2"));
+  EXPECT_TRUE(bench.enabled("m01"));
+  bench.drivers.request(bench.now_us(), bench.asker(3), api::ClearFaults{});
+  EXPECT_THAT(bench.result(3).reason, HasSubstr("not done there: hall:2"));
+  bench.drivers.request(bench.now_us(), bench.asker(4), api::Enable{{"m01", "m03"}});
+  EXPECT_THAT(bench.refusal(4), HasSubstr("MCU hall:2 is offline")) << "it was meant";
+}
+
+TEST(Drivers, OfAllAreRefusedWhereNoMcuIsOnline) {
+  DriversBench bench;
+  bench.silent = true;
+  ASSERT_TRUE(bench.run_until([&] {
+    return bench.installation[McuId(0)].offline() && bench.installation[McuId(1)].offline();
+  }));
+  bench.drivers.request(bench.now_us(), bench.asker(1), api::ClearFaults{});
+  EXPECT_THAT(bench.refusal(1), HasSubstr("MCU hall:1 is offline"));
+}
+
 TEST(Drivers, OfAnMcuThatIsOfflineAreRefused) {
   Bench bench;
   Interlocks interlocks(bench.installation);

@@ -17,7 +17,7 @@ TEST(DryRunService, IsTheMoveOnCopies) {
   Stops stops(bench.installation, bench.moves, bench.homing, bench.open_moves);
   bench.connect(stops);
   DryRun dry_run(bench.installation, bench.now_us(),
-                 {{bench.motor("m01"), 1000}, {bench.motor("m04"), 0}});
+                 {{bench.motor("m01"), 1000, 0}, {bench.motor("m04"), 0, 0}});
   while (dry_run.step()) {
   }
   const api::MovePlan plan = dry_run.take_plan();

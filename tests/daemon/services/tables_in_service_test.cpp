@@ -74,5 +74,20 @@ TEST(TablesInService, ABadTableIsRefusedAndTheOldOneStays) {
   EXPECT_TRUE(bench.interlocks.may_move(bench.motor("m01")));
 }
 
+// Looking at the codes of a large table takes long, so it is done elsewhere and once: what was
+// found there counts, whatever the table is.
+TEST(TablesInService, ContentIsCheckedByItsReviewAlone) {
+  TablesBench bench;
+  const config::Config& config = bench.installation.config();
+  TableReview review(config, bench.changed_table());
+  ASSERT_EQ(review.by_tick_ns.size(), 1u) << "once for each tick, however many buses have it";
+  EXPECT_TRUE(bench.tables.check_content(config.groups[0].table_name, review));
+  review.by_tick_ns.begin()->second = fail("it is too fast");
+  const auto refused = bench.tables.check_content(config.groups[0].table_name, review);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), HasSubstr("too fast"));
+  EXPECT_TRUE(bench.tables.check_content("nobody's", review)) << "no motor would move by it";
+}
+
 }  // namespace
 }  // namespace bushd::daemon

@@ -104,6 +104,29 @@ TEST(Bushctl, StatusIsATableOfMotorsAndMcus) {
   EXPECT_THAT(ran.out, HasSubstr("hall:2  READY    42"));
 }
 
+TEST(Bushctl, StatusThatIsNotCompleteSaysSo) {
+  FakeDaemon daemon;
+  daemon.lose_second_mcu();
+  daemon.start();
+  const Ran ran = bushctl({"status", "--timeout-s", "1"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.out, HasSubstr("theta  hall:1"));
+  EXPECT_THAT(ran.out, Not(HasSubstr("hall:2")));
+  EXPECT_THAT(ran.err, HasSubstr("incomplete: messages were lost, nothing of 1 of 2 MCUs"));
+  EXPECT_THAT(ran.err, HasSubstr("rmem_max"));
+  EXPECT_EQ(bushctl({"status", "--json", "--timeout-s", "1"}).code, 1);
+}
+
+TEST(Bushctl, WatchTellsOfLosses) {
+  FakeDaemon daemon;
+  daemon.start();
+  Program watch(with_program({"watch", "--count", "20"}));
+  ASSERT_TRUE(watch.wait_for("theta"));
+  daemon.lose(3);
+  EXPECT_EQ(watch.finish(), 0);
+  EXPECT_THAT(watch.err(), HasSubstr("messages of bushd were lost"));
+}
+
 TEST(Bushctl, StatusSurvivesHostileStates) {
   FakeDaemon daemon;
   auto cut = bushd::lcm::encode(bushd::mcu_state_t{}).value();

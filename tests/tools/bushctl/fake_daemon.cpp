@@ -56,7 +56,8 @@ void FakeDaemon::run() {
 }
 
 lcm::Part FakeDaemon::part(std::int32_t index, std::int32_t parts) {
-  return {.utime_us = 1, .run = run_, .sequence = ++sequence_, .part = index, .parts = parts};
+  sequence_ += 1 + lost_;
+  return {.utime_us = 1, .run = run_, .sequence = sequence_, .part = index, .parts = parts};
 }
 
 void FakeDaemon::publish(const bushd::Result<lcm::Packet>& packet) {
@@ -78,6 +79,7 @@ void FakeDaemon::publish_state() {
                     .moving = true},
                    {.name = mcu == 0 ? "chi" : "stop", .trust = api::Trust::kUncertain}}};
     for (const auto& payload : hostile_) (void)transport_->publish_bytes("BUSHD_STATE", payload);
+    if (loses_ && mcu == 1) continue;
     publish(lcm::encode(part(mcu, 2), 0, state));
   }
 }

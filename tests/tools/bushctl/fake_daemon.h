@@ -41,6 +41,10 @@ class FakeDaemon {
   // From now on it is another run of the daemon.
   void restart() { ++run_; }
   void set_name(const std::string& name) { name_ = name; }  // of the first motor, before start()
+  // As if the second MCU's states were lost; before start().
+  void lose_second_mcu() { loses_ = true; }
+  // So many messages of each that is sent are lost, from now on.
+  void lose(std::int64_t messages) { lost_ = messages; }
   // Sent along with every state, before start().
   void set_hostile_states(std::vector<std::vector<std::uint8_t>> payloads) {
     hostile_ = std::move(payloads);
@@ -59,6 +63,8 @@ class FakeDaemon {
   Answer answer_;
   std::string name_ = "theta";
   std::vector<std::vector<std::uint8_t>> hostile_;
+  bool loses_ = false;
+  std::atomic<std::int64_t> lost_{0};
   std::atomic<std::int64_t> run_{7};
   std::int64_t sequence_ = 0;
   std::atomic<bool> ended_{false};
