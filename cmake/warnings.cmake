@@ -10,9 +10,10 @@ function(bushd_target target)
     endforeach()
   endif()
   if(BUSHD_SANITIZE)
-    # With the pattern, a pointer that was never set fails at its first use, whatever the stack held.
+    # With the pattern, a pointer that was never set fails at its first use, whatever the stack held. In C++, GCC 12 then
+    # warns of variables that libraries set.
     target_compile_options(${target} PRIVATE -fsanitize=${BUSHD_SANITIZE} -fno-sanitize-recover=all
-      -fno-omit-frame-pointer -ftrivial-auto-var-init=pattern)
+      -fno-omit-frame-pointer $<$<COMPILE_LANGUAGE:C>:-ftrivial-auto-var-init=pattern>)
     target_link_options(${target} PUBLIC -fsanitize=${BUSHD_SANITIZE})
   endif()
 endfunction()
