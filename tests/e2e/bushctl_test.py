@@ -62,6 +62,18 @@ class Bushctl(EndToEndTest):
         self.command("stop", "--wait")
         self.assertEqual(self.positions()["b0"], 0)
 
+    def test_completion_knows_motors_groups_and_tables(self):
+        self.bring_up()
+
+        def offered(*words):
+            return self.command("--complete", *words).stdout.split()
+
+        self.assertEqual(offered("move", ""), sorted(MOTORS))
+        self.assertEqual(offered("stop", "a0", "b"), sorted(name for name in MOTORS if name.startswith("b")))
+        groups = offered("table", "use", "")
+        self.assertTrue(groups)
+        self.assertIn("bushd2-constant", offered("table", "use", groups[0], "bushd2"))
+
     def test_disabled_drivers_refuse_moves(self):
         self.bring_up()
         self.command("disable", "a0")
