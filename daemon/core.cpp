@@ -19,6 +19,8 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       moves_(installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs),
       homing_(installation_, interlocks_, open_moves_, kept_, outputs),
       stops_(installation_, moves_, homing_, open_moves_),
+      jogs_(installation_, interlocks_, moves_, open_moves_),
+      pauses_(installation_, interlocks_, moves_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
@@ -35,7 +37,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       // What an MCU's positions are worth comes before whoever goes by that.
       services_{&kept_,           &journal_, &moves_,     &homing_,  &link_faults_,      &stops_,
                 &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_, &tables_,
-                &departures_},
+                &departures_,     &jogs_,    &pauses_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener([this](MotorId motor) { kept_.keep_offset(motor); });
@@ -82,6 +84,12 @@ void Core::cancel_departures(const api::Request& request) {
     motors = installation_.find_or_all(stop->motors);
   } else if (const auto* disarm = std::get_if<api::Disarm>(&request)) {
     motors = installation_.find_or_all(disarm->motors);
+  } else if (const auto* pause = std::get_if<api::Pause>(&request)) {
+    motors = installation_.find_with_groups(pause->motors);
+  } else if (const auto* jog = std::get_if<api::Jog>(&request); jog != nullptr && jog->per_s == 0) {
+    const auto motor = installation_.find(jog->motor);
+    if (motor && !jog->renew) departures_.cancel_jogs(*motor);
+    return;
   } else if (std::holds_alternative<api::EmergencyStop>(request)) {
     motors = installation_.find_or_all({});
   }
@@ -108,6 +116,11 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::SetTable& r) { outputs_.serve_tables(asker, r); },
                  [&](const api::Confirm& r) { kept_.request(asker, r); },
                  [&](const api::GetHistory& r) { kept_.request(asker, r); },
+                 [&](const api::Jog& r) { jogs_.request(now, asker, r); },
+                 [&](const api::Pause& r) { pauses_.request(now, asker, r); },
+                 [&](const api::Resume& r) { pauses_.request(now, asker, r); },
+                 [&](const api::Hold& r) { pauses_.request(now, asker, r); },
+                 [&](const api::Release& r) { pauses_.request(now, asker, r); },
              },
              request);
 }
@@ -131,8 +144,8 @@ void Core::work() {
 
 std::int64_t Core::next_wake_us() const {
   if (moves_.begins() || !dry_runs_.idle()) return 0;
-  std::int64_t wake =
-      std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us()});
+  std::int64_t wake = std::min(
+      {state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(), jogs_.next_wake_us()});
   for (const BusId id : installation_.buses()) {
     wake = std::min(wake, installation_[id].master.next_wake_us());
   }

@@ -19,11 +19,13 @@
 #include "daemon/services/emergency_stop.h"
 #include "daemon/services/health_publisher.h"
 #include "daemon/services/homing_queue.h"
+#include "daemon/services/jogs.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/link_faults.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
+#include "daemon/services/pauses.h"
 #include "daemon/services/position_compare.h"
 #include "daemon/services/positions.h"
 #include "daemon/services/state_publisher.h"
@@ -97,6 +99,8 @@ class Core {
   Moves moves_;
   HomingQueue homing_;
   Stops stops_;
+  Jogs jogs_;
+  Pauses pauses_;
   EmergencyStop emergency_stop_;
   LinkFaults link_faults_;
   Drivers drivers_;

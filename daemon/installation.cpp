@@ -109,7 +109,10 @@ void Installation::add_motors() {
             .emergency_input_immediate = mcu.emergency_input == BUSHD_EMERGENCY_INPUT_IMMEDIATE,
             .coordinates = config.coordinates,
             .soft_limits = config.soft_limits,
-            .max_speed = config.max_speed},
+            .max_speed = config.max_speed,
+            .backlash = config.backlash,
+            .backlash_speed = config.backlash_speed,
+            .settle_ticks = (config.settle_ms * 1000 + bus.tick_us - 1) / bus.tick_us},
         new_axis({motors_.size()}));
     motor_by_name_[config.name] = id;
     mcus_[config.mcu].motor_at_[config.output.value] = id;
@@ -167,6 +170,28 @@ Result<std::vector<MotorId>> Installation::find_or_all(const api::MotorNames& na
   std::vector<MotorId> all;
   for (const MotorId motor : motors()) all.push_back(motor);
   return all;
+}
+
+Result<std::vector<MotorId>> Installation::find_with_groups(const api::MotorNames& names) const {
+  if (names.empty()) return find_or_all({});
+  std::set<MotorId> found;
+  for (const std::string& name : names) {
+    const auto motor = find(name);
+    if (motor) {
+      found.insert(*motor);
+      continue;
+    }
+    const auto group = std::ranges::find(config_.groups, name, &config::Group::name);
+    if (group == config_.groups.end()) {
+      return fail("there is no motor or group \"" + shortened(name) +
+                  "\"; 'bushctl status' lists them");
+    }
+    const GroupId id{static_cast<std::size_t>(group - config_.groups.begin())};
+    for (const MotorId of_group : motors()) {
+      if (config_[of_group].group == id) found.insert(of_group);
+    }
+  }
+  return std::vector<MotorId>(found.begin(), found.end());
 }
 
 motion::Axis Installation::new_axis(MotorId id) const {

@@ -160,6 +160,8 @@ class Installation {
   Result<std::vector<MotorId>> find(const api::MotorNames& names) const;
   Result<std::vector<MotorId>> find(const std::vector<api::MotorAmount>& motors) const;
   Result<std::vector<MotorId>> find_or_all(const api::MotorNames& names) const;  // none named: all
+  // Motors, or those of groups, each once; none named: all.
+  Result<std::vector<MotorId>> find_with_groups(const api::MotorNames& names) const;
 
   const Tables& tables() const { return tables_; }
   const tables::TablePtr& table_of(MotorId id) const { return tables_[config_[id].group]; }

@@ -20,6 +20,8 @@ void put_motors(nlohmann::json& line, const auto& request) {
 bool is_logged(const api::Request& request) {
   const auto* move = std::get_if<api::Move>(&request);
   if (move != nullptr) return !move->dry_run;
+  const auto* jog = std::get_if<api::Jog>(&request);
+  if (jog != nullptr) return !jog->renew;
   return api::is_stop(request) || !api::is_repeatable(request);
 }
 
@@ -56,6 +58,7 @@ class Logged : public api::Session {
     }
     session_->answer(number, reply);
   }
+  bool gone() const override { return session_->gone(); }
 
  private:
   std::shared_ptr<api::Session> session_;

@@ -15,10 +15,13 @@ class SocketFront::SocketSession : public api::Session {
   void answer(std::int64_t number, const api::Reply& reply) override {
     front_.answer(connection_, client_id(), number, reply);
   }
+  bool gone() const override { return gone_; }
+  void is_gone() { gone_ = true; }
 
  private:
   SocketFront& front_;
   Connection connection_;  // never used again: after its end this is nobody's
+  bool gone_ = false;
 };
 
 SocketFront::SocketFront(control::Server& server, std::int64_t run, Reception& reception,
@@ -35,7 +38,7 @@ SocketFront::SocketFront(control::Server& server, std::int64_t run, Reception& r
                         .packet = [this](Connection connection,
                                          control::View packet) { on_packet(connection, packet); },
                         .is_urgent = lcm::is_stop_channel,
-                        .closed = [this](Connection connection) { clients_.erase(connection); }});
+                        .closed = [this](Connection connection) { on_closed(connection); }});
 }
 
 SocketFront::~SocketFront() {
@@ -62,6 +65,12 @@ void SocketFront::on_packet(Connection connection, control::View packet) {
     reception_.take({.session = client.session, .number = id.number},
                     std::get<api::Request>(message->content), packet.payload.size());
   }
+}
+
+void SocketFront::on_closed(Connection connection) {
+  const auto client = clients_.find(connection);
+  if (client->second.session) client->second.session->is_gone();
+  clients_.erase(client);
 }
 
 // A connection has one name for its life: answers and logs name it.

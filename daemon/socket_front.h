@@ -34,6 +34,7 @@ class SocketFront : public Listener {
   };
 
   void on_packet(Connection connection, control::View packet);
+  void on_closed(Connection connection);
   void on_hello(Connection connection, const lcm::Hello& hello);
   bool known(Connection connection, Client& client, const std::string& client_id);
   void send(Connection connection, const lcm::Packet& packet);

@@ -22,6 +22,10 @@ std::optional<std::vector<MotorId>> Departures::motors_of(const api::Request& re
                               return installation_.find(r.motors);
                             },
                             [&](const api::Arm& r) { return installation_.find(r.motors); },
+                            [&](const api::Jog& r) -> Result<std::vector<MotorId>> {
+                              if (r.per_s == 0 || r.renew) return std::vector<MotorId>();
+                              return installation_.find(api::MotorNames{r.motor});
+                            },
                             [&](const api::SetPosition& r) { return installation_.find(r.motors); },
                             [](const auto&) -> Result<std::vector<MotorId>> { return {}; }},
                  request);
@@ -80,11 +84,21 @@ void Departures::refuse(const Held& held, const std::string& reason) {
   held.asker.answer(api::Refused{reason});
 }
 
-void Departures::cancel(const std::vector<MotorId>& motors) {
+void Departures::cancel_if(const std::function<bool(const Held&)>& concerned) {
   std::erase_if(held_, [&](const Held& held) {
-    if (!has_common(held.motors, motors)) return false;
+    if (!concerned(held)) return false;
     refuse(held, "stopped before it was carried out; nothing has moved");
     return true;
+  });
+}
+
+void Departures::cancel(const std::vector<MotorId>& motors) {
+  cancel_if([&](const Held& held) { return has_common(held.motors, motors); });
+}
+
+void Departures::cancel_jogs(MotorId motor) {
+  cancel_if([motor](const Held& held) {
+    return std::holds_alternative<api::Jog>(held.request) && held.motors.front() == motor;
   });
 }
 

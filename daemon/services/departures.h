@@ -31,6 +31,8 @@ class Departures final : public Service {
   bool hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
   // Those of these motors are refused: they are being stopped.
   void cancel(const std::vector<MotorId>& motors);
+  // Jogs of this motor only.
+  void cancel_jogs(MotorId motor);
   bool empty() const { return held_.empty(); }
 
   void step(std::int64_t now_us) override;
@@ -48,6 +50,7 @@ class Departures final : public Service {
   bool any_held(const std::vector<MotorId>& motors) const;
   Result<bool> make_ready(std::int64_t now_us, const std::vector<MotorId>& motors);
   void refuse(const Held& held, const std::string& reason);
+  void cancel_if(const std::function<bool(const Held&)>& concerned);
 
   const Installation& installation_;
   const Interlocks& interlocks_;

@@ -33,7 +33,7 @@ motion::Axis* DryRun::Bus::axis_of(link::McuIndex mcu, Output output) {
 DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                const std::vector<Part>& parts) {
   motors_.reserve(parts.size());
-  for (const auto& [id, steps, floor] : parts) {
+  for (const auto& [id, steps, floor, from_steps] : parts) {
     const motion::Motor& motor = installation[id];
     const Mcu& mcu = installation.mcu_of(id);
     const config::Bus& bus = installation.bus_of(mcu).config;
@@ -41,7 +41,7 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                        .bus = mcu.config.bus,
                        .mcu = mcu.on_bus(),
                        .output = motor.output(),
-                       .from_steps = motor.position_steps(),
+                       .from_steps = from_steps.value_or(motor.position_steps()),
                        .steps = steps,
                        .floor = floor,
                        .start = mcu.earliest_start(now_us, motor.output()),
@@ -58,7 +58,8 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
 
 bool DryRun::step() {
   if (planned_ < motors_.size()) {
-    plan_motor(motors_[planned_++]);
+    plan_motor(motors_[planned_], is_further_leg(planned_));
+    if (++planned_ == motors_.size() && !plan_.traffic) rehearsed_ = buses_.end();
   } else if (rehearsed_ != buses_.end() && !rehearse(rehearsed_->second)) {
     // If one bus is too much to be counted, so are all.
     rehearsed_ = plan_.traffic ? std::next(rehearsed_) : buses_.end();
@@ -66,14 +67,28 @@ bool DryRun::step() {
   return planned_ < motors_.size() || rehearsed_ != buses_.end();
 }
 
-void DryRun::plan_motor(const Motor& motor) {
+bool DryRun::is_further_leg(std::size_t index) const {
+  if (index == 0) return false;
+  const Motor& before = motors_[index - 1];
+  const Motor& motor = motors_[index];
+  return before.bus == motor.bus && before.mcu == motor.mcu && before.output == motor.output;
+}
+
+void DryRun::plan_motor(const Motor& motor, bool further_leg) {
+  if (!further_leg) of_motor_ = {};
   plan_.motors.push_back(plan_of(motor.name, motor.table->view(), motor.steps, motor.floor));
   if (motor.steps == 0) return;
   motion::Axis axis(motor.table->view(), motor.tick_ns, motor.format);
   axis.start(motor.from_steps, motor.steps, motor.start, 0, motor.floor);
   const link::Tick ticks = axis.end_tick() - motor.start;
-  plan_.ticks = std::max(plan_.ticks, ticks);
-  plan_.duration_us = std::max(plan_.duration_us, ticks * motor.tick_ns / 1000);
+  of_motor_.ticks += ticks;
+  of_motor_.us += ticks * motor.tick_ns / 1000;
+  plan_.ticks = std::max(plan_.ticks, of_motor_.ticks);
+  plan_.duration_us = std::max(plan_.duration_us, of_motor_.us);
+  if (further_leg) {
+    plan_.traffic.reset();  // a rehearsal is of one run per motor
+    return;
+  }
   Bus& bus = buses_.at(motor.bus);
   bus.axes.emplace(std::pair{motor.mcu, motor.output}, axis);
   link::PlannedMove move{motor.mcu, motor.output.value, motor.start, {}};

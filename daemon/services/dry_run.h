@@ -8,6 +8,7 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,9 +23,10 @@ namespace bushd::daemon {
 class DryRun {
  public:
   struct Part {
-    MotorId motor;  // at rest
+    MotorId motor;  // at rest; the legs of one motor stand together, in their order
     std::int64_t steps;
     std::uint16_t floor;
+    std::optional<std::int64_t> from_steps{};  // none: where it stands
   };
   // `installation` outlives it, and may change meanwhile.
   DryRun(const Installation& installation, std::int64_t now_us, const std::vector<Part>& parts);
@@ -62,12 +64,18 @@ class DryRun {
     std::unique_ptr<link::Rehearsal> rehearsal;  // from when all its motors are planned
   };
 
-  void plan_motor(const Motor& motor);
+  bool is_further_leg(std::size_t index) const;
+  void plan_motor(const Motor& motor, bool further_leg);
   bool rehearse(Bus& bus);
 
   std::vector<Motor> motors_;
   std::map<BusId, Bus> buses_;
   std::size_t planned_ = 0;  // of `motors_`
+  struct Time {
+    link::Tick ticks = 0;
+    std::int64_t us = 0;
+  };
+  Time of_motor_;  // of the legs of the motor planned last
   std::map<BusId, Bus>::iterator rehearsed_;
   api::MovePlan plan_;
 };

@@ -26,7 +26,11 @@ void Moves::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
     if (motor.has_plan()) {
       return asker.answer(api::Refused{motor.name() + " moves; a dry run is of moves from rest"});
     }
-    planned.push_back({part.motor, part.target - motor.position_steps(), part.floor});
+    std::int64_t from = motor.position_steps();
+    for (const motion::Leg& leg : part.legs) {
+      planned.push_back({part.motor, leg.target - from, leg.floor, from});
+      from = leg.target;
+    }
   }
   dry_runs_.request(now_us, asker, planned);
 }
@@ -37,13 +41,22 @@ Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   std::vector<Part> parts;
   for (std::size_t i = 0; i < motors->size(); ++i) {
-    const auto floor = floor_of((*motors)[i], move.speed);
-    if (!floor) return fail(floor.error());
-    const auto target = target_of((*motors)[i], move.motors[i].amount, move.kind, *floor);
-    if (!target) return fail(target.error());
-    parts.push_back({(*motors)[i], *target, *floor});
+    auto part = part_of((*motors)[i], move.motors[i].amount, move);
+    if (!part) return fail(part.error());
+    parts.push_back(std::move(*part));
   }
   return parts;
+}
+
+Result<Moves::Part> Moves::part_of(MotorId motor, const api::Amount& amount,
+                                   const api::Move& move) const {
+  const auto floor = floor_of(motor, move.speed);
+  if (!floor) return fail(floor.error());
+  const auto target = target_of(motor, amount, move.kind, *floor);
+  if (!target) return fail(target.error());
+  auto legs = installation_[motor].legs_to(*target, *floor);
+  if (!legs) return fail(installation_[motor].name() + ": " + legs.error().message);
+  return Part{.motor = motor, .legs = std::move(*legs)};
 }
 
 Result<std::uint16_t> Moves::floor_of(MotorId id, const std::optional<api::Speed>& speed) const {
@@ -78,18 +91,18 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   // All motors of a bus that are at rest start in the same tick: the earliest that suits every one
   // of them.
   std::map<BusId, motion::Tick> start;
+  std::size_t starting = 0;
   for (const Part& part : parts) {
     motors.push_back(part.motor);
-    if (installation_[part.motor].has_plan()) {
-      moving.push_back(part.motor);
-      continue;
-    }
+    if (installation_[part.motor].has_plan()) moving.push_back(part.motor);
+    if (!installation_[part.motor].stands()) continue;
+    ++starting;
     const Mcu& mcu = installation_.mcu_of(part.motor);
     const motion::Tick earliest = mcu.earliest_start(now_us, installation_[part.motor].output());
     motion::Tick& common = start.try_emplace(mcu.config.bus, earliest).first->second;
     common = std::max(common, earliest);
   }
-  const std::size_t slices = (parts.size() - moving.size()) / kBeginsPerSlice;
+  const std::size_t slices = starting / kBeginsPerSlice;
   for (auto& [bus, tick] : start) {
     tick += static_cast<motion::Tick>(slices) * kSliceUs / installation_[bus].config.tick_us;
   }
@@ -98,13 +111,18 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   open_.open(asker, motors);
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
-    if (motor.has_plan()) {
-      motor.aim(part.target, part.floor);
+    const auto& [target, floor] = part.legs.front();
+    if (!motor.stands()) {
+      motor.aim(target, floor);
     } else {
-      motor.start(part.target, start[installation_.mcu_of(part.motor).config.bus], part.floor);
+      motor.start(target, start[installation_.mcu_of(part.motor).config.bus], floor);
       unbegun_.insert(part.motor);
       to_begin_.push_back(part.motor);
     }
+    motor.go_on({part.legs.begin() + 1, part.legs.end()});
+    const auto fastest = std::ranges::min_element(part.legs, {}, &motion::Leg::floor);
+    open_.planned(part.motor, static_cast<int>(part.legs.size()),
+                  motor.axis().most_steps_per_s(fastest->floor));
   }
   if (unbegun_.size() <= kBeginsPerSlice) work();
   retarget(now_us, moving);
@@ -137,6 +155,25 @@ void Moves::take_over(MotorId motor, const api::Asker& by) {
             "was given a new target by " + text_of(by) + "; it moves on");
 }
 
+void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::int64_t target,
+                std::uint16_t floor) {
+  while (begins()) begin_next();
+  motion::Motor& motor = installation_[id];
+  if (motor.has_plan()) take_over(id, asker);
+  open_.open(asker, {id}, "jog");
+  motor.go_on({});
+  if (!motor.stands()) return redirect(now_us, id, target, floor);
+  open_.planned(id, 1, motor.axis().most_steps_per_s(floor));
+  const Mcu& mcu = installation_.mcu_of(id);
+  start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), floor);
+}
+
+void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target, std::uint16_t floor) {
+  installation_[id].aim(target, floor);
+  open_.planned(id, 1, installation_[id].axis().most_steps_per_s(floor));
+  retarget(now_us, {id});
+}
+
 void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, std::uint16_t floor) {
   installation_[id].start(target, start, floor);
   begin(id);
@@ -147,7 +184,8 @@ void Moves::begin(MotorId id) {
   Mcu& mcu = installation_.mcu_of(id);
   const motion::Tick start = motor.axis().start_tick();
   const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
-  const bool by_table = installation_.by_table(mcu, steps);
+  // A jog will change, and only ticks that have not been run can be taken back.
+  const bool by_table = installation_.by_table(mcu, steps) && open_.what_of(id) != "jog";
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));
@@ -158,6 +196,38 @@ void Moves::begin(MotorId id) {
     mcu.begin(motor.output(), start);
   }
   installation_.changed = true;
+}
+
+void Moves::start_leg(std::int64_t now_us, MotorId id) {
+  const motion::Leg leg = installation_[id].take_leg();
+  const Mcu& mcu = installation_.mcu_of(id);
+  start_run(id, leg.target, mcu.earliest_start(now_us, installation_[id].output()), leg.floor);
+}
+
+void Moves::pause(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  while (begins()) begin_next();
+  std::vector<MotorId> changed;
+  for (const MotorId id : motors) {
+    installation_[id].pause();
+    if (installation_[id].needs_change()) changed.push_back(id);
+  }
+  replan(now_us, changed);
+}
+
+void Moves::resume(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  std::vector<MotorId> moving;
+  for (const MotorId id : motors) {
+    motion::Motor& motor = installation_[id];
+    if (!motor.is_paused()) continue;
+    const bool stands = motor.stands_paused();
+    motor.resume();
+    if (stands) {
+      start_leg(now_us, id);
+    } else {
+      moving.push_back(id);
+    }
+  }
+  retarget(now_us, moving);
 }
 
 void Moves::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
@@ -263,8 +333,14 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             },
             [&](const motion::event::Turn&) {
               journal_.ended(id, "turned");
-              start_run(id, motor.axis().target_steps(), mcu.earliest_start(now_us, motor.output()),
-                        motor.axis().floor());
+              start_leg(now_us, id);
+            },
+            [&](const motion::event::NextLeg&) {
+              journal_.ended(id, api::word(api::Outcome::kReached));
+              start_leg(now_us, id);
+            },
+            [&](const motion::event::Paused&) {
+              journal_.ended(id, api::word(api::Outcome::kStopped));
             },
             [&](const motion::event::Ended& ended) { end(id, ended); }},
         event);
@@ -277,7 +353,8 @@ void Moves::end(MotorId id, const motion::event::Ended& ended) {
   if (begun) installation_.mcu_of(id).drop(motor.output());
   if (ended.was_armed) {
     cancel_armed_group(id);
-  } else if (begun) {  // the log of moves knows nothing of one that has not started
+  } else if (begun && !ended.was_paused) {
+    // The log of moves knows nothing of one that has not started, and that a paused one stands.
     journal_.ended(id, api::word(ended.outcome));
   }
   const bool planned =

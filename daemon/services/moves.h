@@ -41,6 +41,16 @@ class Moves final : public Service {
   // motion::Motor::floor_at, "NAME: WHY" if there is none.
   Result<std::uint16_t> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
 
+  // Opens a motion of one motor, from rest or in place of what it does. Precondition: it may.
+  void jog(std::int64_t now_us, const api::Asker& asker, MotorId motor, std::int64_t target,
+           std::uint16_t floor);
+  // Gives an open motion that jog() has opened another target. Precondition: the motor moves.
+  void redirect(std::int64_t now_us, MotorId motor, std::int64_t target, std::uint16_t floor);
+
+  // Those that move ramp down and stay in their moves, until they are resumed or stopped.
+  void pause(std::int64_t now_us, const std::vector<MotorId>& motors);
+  void resume(std::int64_t now_us, const std::vector<MotorId>& motors);
+
   // Ramps down those that move; those that wait for the trigger wait no more.
   void stop(std::int64_t now_us, const std::vector<MotorId>& motors);
   // Lets the MCUs know what is wanted of these motors now, in place of changes that they have not
@@ -67,12 +77,13 @@ class Moves final : public Service {
  private:
   struct Part {
     MotorId motor;
-    std::int64_t target;
-    std::uint16_t floor;
+    std::vector<motion::Leg> legs;  // at least one
   };
   Result<std::vector<Part>> parts_of(const api::Move& move) const;
   void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);
+  Result<Part> part_of(MotorId motor, const api::Amount& amount, const api::Move& move) const;
   void take_over(MotorId motor, const api::Asker& by);
+  void start_leg(std::int64_t now_us, MotorId motor);
   // From rest; the motor is part of an open move.
   void start_run(MotorId motor, std::int64_t target, motion::Tick start, std::uint16_t floor);
   // Its plan is made: it is logged, and its MCU gets it.

@@ -19,9 +19,8 @@ void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors, std::
 }
 
 void OpenMoves::tell(MotorId id, api::Outcome outcome, const std::string& reason) const {
-  const auto move = book_.move_of(id);
-  if (!listener_ || !move) return;
-  const Open& open = open_.at(*move);
+  if (!listener_) return;
+  const Open& open = open_.at(*book_.move_of(id));
   listener_({.motor = id,
              .what = open.what,
              .asker = open.asker,
@@ -30,7 +29,24 @@ void OpenMoves::tell(MotorId id, api::Outcome outcome, const std::string& reason
              .reason = reason});
 }
 
+void OpenMoves::planned(MotorId motor, int legs, double most_steps_per_s) {
+  const auto move = book_.move_of(motor);
+  if (move) open_.at(*move).plans[motor] = {legs, most_steps_per_s};
+}
+
+void OpenMoves::say(MotorId motor, api::Outcome outcome, Saying saying) {
+  const auto move = book_.move_of(motor);
+  if (move) open_.at(*move).sayings.insert_or_assign({motor, outcome}, std::move(saying));
+}
+
 void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason) {
+  const auto move = book_.move_of(id);
+  if (!move) return;
+  if (reason == motion::kAtTarget || reason == motion::kOnRequest) {
+    if (const auto said = open_.at(*move).sayings.extract({id, outcome})) {
+      return end(id, said.mapped().outcome, said.mapped().reason);
+    }
+  }
   installation_.changed = true;
   tell(id, outcome, reason);
   const motion::Motor& motor = installation_[id];
@@ -39,7 +55,7 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason)
                                    .position_steps = motor.position_steps(),
                                    .reason = motor.name() + ": " + reason});
   if (!finished) return;
-  const auto open = open_.extract(finished->move);
+  auto open = open_.extract(finished->move);
   std::vector<api::MotorResult> results;
   for (std::size_t i = 0; i < finished->motors.size(); ++i) {
     const motion::MotorOutcome& part = finished->motors[i];
@@ -51,7 +67,9 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason)
                        .dial = coordinates.dial_of(part.position_steps),
                        .unit = coordinates.unit(),
                        .precision = coordinates.precision(),
-                       .table = open.mapped().tables[i]});
+                       .table = open.mapped().tables[i],
+                       .legs = open.mapped().plans[part.motor].legs,
+                       .most_steps_per_s = open.mapped().plans[part.motor].most_steps_per_s});
   }
   open.mapped().asker.answer(api::Completed{
       .outcome = finished->outcome, .reason = finished->reason, .detail = std::move(results)});
@@ -60,6 +78,11 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason)
 const api::Asker* OpenMoves::asker_of(MotorId motor) const {
   const auto move = book_.move_of(motor);
   return move ? &open_.at(*move).asker : nullptr;
+}
+
+std::string_view OpenMoves::what_of(MotorId motor) const {
+  const auto move = book_.move_of(motor);
+  return move ? std::string_view(open_.at(*move).what) : std::string_view();
 }
 
 }  // namespace bushd::daemon

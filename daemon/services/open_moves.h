@@ -4,8 +4,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
+#include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "api/session.h"
@@ -33,8 +36,18 @@ class OpenMoves {
   using Listener = std::function<void(const Ended&)>;
   void set_listener(Listener listener) { listener_ = std::move(listener); }
 
-  // Precondition: none of the motors is under way. `what`: move, home, arm.
+  // Precondition: none of the motors is under way. `what`: move, home, arm,
+  // jog.
   void open(api::Asker asker, const std::vector<MotorId>& motors, std::string what = "move");
+  // How a motor's part is made: its legs, and the speed that none of them exceeds.
+  void planned(MotorId motor, int legs, double most_steps_per_s);
+  // What is said of this motor's part, which is open, if its plan ends with `outcome`; not if
+  // something else ends it.
+  struct Saying {
+    api::Outcome outcome;
+    std::string reason;
+  };
+  void say(MotorId motor, api::Outcome outcome, Saying saying);
   // This motor's part has ended. One that is in no open move is ignored.
   void end(MotorId motor, api::Outcome outcome, const std::string& reason);
 
@@ -42,6 +55,8 @@ class OpenMoves {
   bool together(MotorId a, MotorId b) const { return book_.move_of(a) == book_.move_of(b); }
   // Whose request it is; null if none.
   const api::Asker* asker_of(MotorId motor) const;
+  // As open() was told; "" if none.
+  std::string_view what_of(MotorId motor) const;
 
  private:
   struct Open {
@@ -49,6 +64,12 @@ class OpenMoves {
     std::string what;
     std::unordered_map<MotorId, std::int64_t> from_steps{};
     std::vector<api::TableRef> tables;  // by which its motors move, in the request's order
+    std::map<std::pair<MotorId, api::Outcome>, Saying> sayings{};
+    struct Plan {
+      int legs = 1;
+      double most_steps_per_s = 0;
+    };
+    std::map<MotorId, Plan> plans{};
   };
 
   void tell(MotorId motor, api::Outcome outcome, const std::string& reason) const;

@@ -115,6 +115,8 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   state.trust = trust.trust;
   state.uncertain_reason = std::move(trust.reason);
   state.heard_utime_us = trust.heard_utime_us;
+  state.paused = motor.is_paused();
+  state.held = motor.is_held();
   return state;
 }
 

@@ -29,8 +29,10 @@ struct MotorResult {
   double user = 0;                  // the same for people (units/coordinates.h)
   double dial = 0;
   std::string unit = "steps";
-  int precision = 0;  // decimals of both
-  TableRef table{};   // by which it has moved
+  int precision = 0;            // decimals of both
+  TableRef table{};             // by which it has moved
+  int legs = 1;                 // how many its motion had, as planned
+  double most_steps_per_s = 0;  // not exceeded by any of them; 0 of what the MCU makes by itself
 };
 
 // What a move would be.
@@ -49,7 +51,7 @@ struct MovePlan {
   std::int64_t duration_us = 0;  // from the first tick to the end of the last one
   std::int64_t ticks = 0;
   std::optional<Traffic> traffic{};  // none: it is too much to be counted
-  std::vector<Motor> motors{};       // in the request's order
+  std::vector<Motor> motors{};       // in the request's order, each leg of a motor by itself
 };
 
 // One of the tables that the daemon finds.
@@ -68,7 +70,7 @@ struct TableList {
 // What has moved a motor, or made its position known.
 struct PastMotion {
   std::int64_t utime_us = 0;  // when it ended
-  std::string what{};         // move, home, arm, confirm
+  std::string what{};         // move, home, arm, jog, confirm
   std::string who{};
   std::int64_t from_steps = 0;
   std::int64_t to_steps = 0;

@@ -10,7 +10,8 @@ constexpr std::array<std::string_view, std::variant_size_v<Request>> kNames = {
     "move",         "stop",         "emergency stop",   "enable",        "disable",
     "set position", "clear faults", "use table",        "reload tables", "home",
     "arm",          "disarm",       "position compare", "list tables",   "get table",
-    "set table",    "confirm",      "get history"};
+    "set table",    "confirm",      "get history",      "jog",           "pause",
+    "resume",       "hold",         "release"};
 
 }  // namespace
 

@@ -157,9 +157,50 @@ struct GetHistory {
   std::int32_t most = 20;  // 1..1000
 };
 
-using Request = std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
-                             UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables,
-                             GetTable, SetTable, Confirm, GetHistory>;
+// A motor moves on at a speed, up to its soft limit, for as long as its client keeps it going. The
+// first request opens the motion and has its result, with one MotorResult, when that ends:
+// kDone ended by its client, kLimit at the soft limit, kStopped otherwise. Further ones of the
+// client change speed and direction, or just renew it, and are answered at once. Speed 0, of
+// whatever client, ends it: result kDone once the motor stands.
+struct Jog {
+  static constexpr std::int64_t kLeastKeepaliveMs = 50;
+  static constexpr std::int64_t kMostKeepaliveMs = 10'000;
+
+  std::string motor{};
+  double per_s = 0;       // signed
+  bool in_steps = false;  // else in the motor's unit, on the user's scale
+  // The motor is ramped down when no request of its client has come for so long.
+  std::int64_t keepalive_ms = 500;
+  // A sign of life: the client's jog of this motor goes on as it is. Speed and steps say nothing.
+  bool renew = false;
+  // With speed 0: not as soon as possible, but so many steps after where the motor is now.
+  // 0..2^31-1
+  std::optional<std::int64_t> steps_after{};
+};
+
+// These motors, or those of these groups, which move ramp down and keep their targets: their moves
+// stay open. None named: all. Jogs end. Result kDone once they stand. Moves of other motors, homing
+// and what waits for the trigger are left alone.
+struct Pause {
+  MotorNames motors{};  // and groups, as of the three below
+};
+// Those that are paused go on to their targets. Refused as a whole if one of them may not move.
+struct Resume {
+  MotorNames motors{};
+};
+// No motion of these motors begins, and none goes on that is paused, until they are released. What
+// is under way goes on.
+struct Hold {
+  MotorNames motors{};
+};
+struct Release {
+  MotorNames motors{};
+};
+
+using Request =
+    std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
+                 ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables, GetTable, SetTable,
+                 Confirm, GetHistory, Jog, Pause, Resume, Hold, Release>;
 
 // For logs and counts: "move", "stop", "emergency stop", ...
 std::string_view name_of(const Request& request);

@@ -20,4 +20,9 @@ std::string Session::text() const {
          std::to_string(credentials_->pid) + ")";
 }
 
+bool Asker::is_same_client(const Asker& other) const {
+  return session && other.session && session->transport() == other.session->transport() &&
+         session->text() == other.session->text();
+}
+
 }  // namespace bushd::api

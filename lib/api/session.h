@@ -50,6 +50,8 @@ class Session {
   // To who asked, about the request with this number. Called from within the core; must not call
   // back into it. Of a client that has gone it does nothing.
   virtual void answer(std::int64_t number, const Reply& reply) = 0;
+  // Its client is known to have gone; over a transport that does not tell that it never is.
+  virtual bool gone() const { return false; }
 
  private:
   Transport transport_;
@@ -66,6 +68,7 @@ struct Asker {
   void answer(const Reply& reply) const {
     if (session) session->answer(number, reply);
   }
+  bool is_same_client(const Asker& other) const;
 };
 
 }  // namespace bushd::api

@@ -33,6 +33,8 @@ struct MotorState {
   std::string uncertain_reason{};  // why it is not known; "" while it is
   // When the position was heard, microseconds since 1970, if Trust::kStale.
   std::optional<std::int64_t> heard_utime_us{};
+  bool paused = false;  // it ramps down, or stands, on the way to its target
+  bool held = false;    // no motion begins
   friend bool operator==(const MotorState&, const MotorState&) = default;
 };
 

@@ -13,7 +13,7 @@ enum class Outcome {
   kDone,     // of requests that are not moves
   kReached,  // the MCU has run the last tick and the motor stands at the target
   kStopped,  // ramped down on request, given a new target, or disarmed
-  kLimit,    // a limit switch stopped it
+  kLimit,    // a limit switch stopped it, or a jog has come to its soft limit
   kLink,     // the MCU was lost or ramped down by itself; the position is the last one known
   kFault     // the MCU counted otherwise than the table says, or did not do what was asked
 };

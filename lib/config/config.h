@@ -104,7 +104,10 @@ struct Motor {
   std::string description{};
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits = {};
-  std::optional<double> max_speed = {};  // user units/s, above 0
+  std::optional<double> max_speed = {};       // user units/s, above 0
+  double backlash = 0;                        // user units; its sign is that of the last approach
+  std::optional<double> backlash_speed = {};  // of that, user units/s, above 0
+  std::int64_t settle_ms = 0;                 // from the last step to the result
 };
 
 struct Config {

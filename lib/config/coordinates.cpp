@@ -14,6 +14,7 @@ using tables::TomlReader;
 
 constexpr std::size_t kLongestUnit = 16;
 constexpr std::size_t kLongestDescription = 200;
+constexpr std::int64_t kMostSettleMs = 60'000;
 
 // Both end up on terminals and in logs.
 Result<std::string> read_line(const TomlReader& reader, std::string_view key, std::size_t longest) {
@@ -131,6 +132,38 @@ Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {
   return speed;
 }
 
+Result<void> read_backlash(const TomlReader& reader, Motor* motor) {
+  if (reader.has("backlash")) {
+    const auto backlash = reader.number("backlash", "a number other than 0");
+    if (!backlash) return fail(backlash.error());
+    const auto steps = motor->coordinates.steps_of_distance(*backlash);
+    if (!steps) return fail(reader.error("backlash", steps.error().message));
+    if (*steps == 0) {
+      return fail(reader.error("backlash", fmt::format("is {}, which is no step; allowed: one "
+                                                       "step or more, or leave the key out",
+                                                       *backlash)));
+    }
+    motor->backlash = *backlash;
+  }
+  if (reader.has("backlash_speed")) {
+    constexpr std::string_view kKey = "backlash_speed";
+    if (motor->backlash == 0) {
+      return fail(reader.error(kKey, "needs `backlash`: it is the speed of its last approach"));
+    }
+    const auto speed = reader.number(kKey, "a number above 0");
+    if (!speed) return fail(speed.error());
+    if (!(*speed > 0)) {
+      return fail(reader.error(kKey, fmt::format("is {}; allowed: a number above 0", *speed)));
+    }
+    motor->backlash_speed = *speed;
+  }
+  if (!reader.has("settle_ms")) return {};
+  const auto settle_ms = reader.integer("settle_ms", 0, kMostSettleMs, "milliseconds");
+  if (!settle_ms) return fail(settle_ms.error());
+  motor->settle_ms = *settle_ms;
+  return {};
+}
+
 }  // namespace
 
 Result<void> read_coordinates(const TomlReader& reader, Motor* motor) {
@@ -152,6 +185,7 @@ Result<void> read_coordinates(const TomlReader& reader, Motor* motor) {
     if (!speed) return fail(speed.error());
     motor->max_speed = *speed;
   }
+  if (auto read = read_backlash(reader, motor); !read) return read;
   if (!reader.has("soft_limits")) return {};
   const auto limits = read_soft_limits(reader, *motor);
   if (!limits) return fail(limits.error());

@@ -15,7 +15,7 @@ constexpr Layout kRequest{"llsl"};
 constexpr Layout kBare{"t", {&kRequest}};
 constexpr Layout kMotors{"tnS", {&kRequest}};
 constexpr Layout kReplyHeader{"llslbssii"};
-constexpr Layout kMotor{"slddlddbsbbsssl"};
+constexpr Layout kMotor{"slddlddbsbbssslbb"};
 constexpr Layout kMotorAmount{"sbld"};
 constexpr Layout kMotorDescription{"shstsssbdbbdddd", {&kTableRef}};
 constexpr Layout kMcuHealth{"sisiisillllllliddb"};
@@ -43,17 +43,22 @@ BUSHD_LAYOUT(enable_t, kMotors)
 BUSHD_LAYOUT(get_history_t, "tsi", {&kRequest})
 BUSHD_LAYOUT(get_status_t, kBare)
 BUSHD_LAYOUT(get_table_t, "ts", {&kRequest})
+BUSHD_LAYOUT(hold_t, kMotors)
 BUSHD_LAYOUT(home_t, "tdbnS", {&kRequest})
+BUSHD_LAYOUT(jog_t, "tsdblbl", {&kRequest})
 BUSHD_LAYOUT(list_tables_t, kBare)
 BUSHD_LAYOUT(move_t, "tbbdbnT", {&kRequest, &kMotorAmount})
+BUSHD_LAYOUT(pause_t, kMotors)
 BUSHD_LAYOUT(position_compare_t, "ttbll", {&kRequest, &kMotorAmount})
+BUSHD_LAYOUT(release_t, kMotors)
 BUSHD_LAYOUT(reload_tables_t, kBare)
+BUSHD_LAYOUT(resume_t, kMotors)
 BUSHD_LAYOUT(set_position_t, "tbnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(set_table_t, "tsst", {&kRequest, &kTable})
 BUSHD_LAYOUT(stop_t, kMotors)
 BUSHD_LAYOUT(use_table_t, "tss", {&kRequest})
 
-BUSHD_LAYOUT(answer_t, "tnSSLDDSBHnTnT", {&kReplyHeader, &kTableRef, &kMovePlan})
+BUSHD_LAYOUT(answer_t, "tnSSLDDSBHBDnTnT", {&kReplyHeader, &kTableRef, &kMovePlan})
 BUSHD_LAYOUT(history_answer_t, "tnT", {&kReplyHeader, &kPastMotion})
 BUSHD_LAYOUT(table_answer_t, "tnTnT", {&kReplyHeader, &kTableEntry, &kTable})
 

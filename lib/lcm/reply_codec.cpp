@@ -96,6 +96,8 @@ void put(answer_t& answer, Piece<api::MotorResult> motors) {
     answer.dial_positions.push_back(motor.dial);
     answer.units.push_back(motor.unit);
     answer.precisions.push_back(static_cast<std::int8_t>(motor.precision));
+    answer.legs.push_back(static_cast<std::int8_t>(motor.legs));
+    answer.most_steps_per_s.push_back(motor.most_steps_per_s);
     const auto table = std::find(told.begin(), told.end(), motor.table);
     answer.table_of_motor.push_back(static_cast<std::int16_t>(table - told.begin()));
     if (table != told.end()) continue;
@@ -145,8 +147,8 @@ std::size_t size_of(std::string_view string) {
 std::size_t size_of(const api::MotorResult& motor) {
   const auto table = static_cast<std::size_t>(message_of(motor.table)._getEncodedSizeNoHash());
   return size_of(motor.motor) + size_of(word(motor.outcome)) + size_of(motor.unit) +
-         sizeof(std::int64_t) + 2 * sizeof(double) + sizeof(std::int8_t) + sizeof(std::int16_t) +
-         table;
+         sizeof(std::int64_t) + 3 * sizeof(double) + 2 * sizeof(std::int8_t) +
+         sizeof(std::int16_t) + table;
 }
 std::size_t size_of(const api::MovePlan::Motor& motor) {
   return size_of(motor.motor) + 2 * sizeof(std::int64_t) + sizeof(double);
@@ -239,7 +241,9 @@ std::optional<std::vector<api::MotorResult>> motors_of(const answer_t& message) 
                       .dial = message.dial_positions[i],
                       .unit = message.units[i],
                       .precision = std::clamp<int>(message.precisions[i], 0, kMostDecimals),
-                      .table = ref_of(message.tables[table])});
+                      .table = ref_of(message.tables[table]),
+                      .legs = message.legs[i],
+                      .most_steps_per_s = message.most_steps_per_s[i]});
   }
   return motors;
 }

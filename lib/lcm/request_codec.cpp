@@ -238,6 +238,51 @@ std::optional<api::Request> from_message(const get_history_t& message) {
   return api::GetHistory{.motor = message.motor, .most = message.most};
 }
 
+jog_t to_message(const api::Jog& jog) {
+  jog_t message{};
+  message.motor = jog.motor;
+  message.speed = jog.per_s;
+  message.speed_in_steps = jog.in_steps ? 1 : 0;
+  message.keepalive_ms = jog.keepalive_ms;
+  message.renew = jog.renew ? 1 : 0;
+  message.steps_after = jog.steps_after.value_or(-1);
+  return message;
+}
+std::optional<api::Request> from_message(const jog_t& message) {
+  api::Jog jog{.motor = message.motor,
+               .per_s = message.speed,
+               .in_steps = message.speed_in_steps != 0,
+               .keepalive_ms = message.keepalive_ms,
+               .renew = message.renew != 0};
+  if (message.steps_after != -1) jog.steps_after = message.steps_after;
+  return jog;
+}
+
+pause_t to_message(const api::Pause& pause) {
+  return motors_message<pause_t>(pause.motors);
+}
+std::optional<api::Request> from_message(const pause_t& message) {
+  return api::Pause{message.motors};
+}
+resume_t to_message(const api::Resume& resume) {
+  return motors_message<resume_t>(resume.motors);
+}
+std::optional<api::Request> from_message(const resume_t& message) {
+  return api::Resume{message.motors};
+}
+hold_t to_message(const api::Hold& hold) {
+  return motors_message<hold_t>(hold.motors);
+}
+std::optional<api::Request> from_message(const hold_t& message) {
+  return api::Hold{message.motors};
+}
+release_t to_message(const api::Release& release) {
+  return motors_message<release_t>(release.motors);
+}
+std::optional<api::Request> from_message(const release_t& message) {
+  return api::Release{message.motors};
+}
+
 template <class Message>
 std::optional<ClientMessage> decode_request(Payload payload) {
   const auto message = decode<Message>(payload);
@@ -272,7 +317,7 @@ std::optional<ClientMessage> decode_get_status(Payload payload) {
 using Decoder = std::optional<ClientMessage> (*)(Payload);
 
 // A new request is a line here. Requests first, in the order of api::Request.
-constexpr std::array<std::pair<std::string_view, Decoder>, 21> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 26> kDecoders = {{
     {"MOVE", decode_request<move_t>},
     {"STOP", decode_request<stop_t>},
     {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
@@ -291,11 +336,16 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 21> kDecoders = {{
     {"SET_TABLE", decode_request<set_table_t>},
     {"CONFIRM", decode_request<confirm_t>},
     {"GET_HISTORY", decode_request<get_history_t>},
+    {"JOG", decode_request<jog_t>},
+    {"PAUSE", decode_request<pause_t>},
+    {"RESUME", decode_request<resume_t>},
+    {"HOLD", decode_request<hold_t>},
+    {"RELEASE", decode_request<release_t>},
     {"HELLO", decode_hello},
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},
 }};
-static_assert(std::variant_size_v<api::Request> == 18);
+static_assert(std::variant_size_v<api::Request> == 23);
 
 constexpr auto kClientChannels = [] {
   std::array<std::string_view, kDecoders.size()> channels;

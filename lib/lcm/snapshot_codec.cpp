@@ -62,6 +62,8 @@ motor_t message_of(const api::MotorState& motor) {
   message.trust = word(motor.trust);
   message.uncertain_reason = motor.uncertain_reason;
   message.heard_utime_us = motor.heard_utime_us.value_or(0);
+  message.paused = motor.paused ? 1 : 0;
+  message.held = motor.held ? 1 : 0;
   return message;
 }
 
@@ -86,7 +88,9 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
                          .inhibited = *inhibited,
                          .trust = *trust,
                          .uncertain_reason = message.uncertain_reason,
-                         .heard_utime_us = heard_utime_us};
+                         .heard_utime_us = heard_utime_us,
+                         .paused = message.paused != 0,
+                         .held = message.held != 0};
 }
 
 void put_scale(motor_description_t& message, const api::MotorDescription& motor) {

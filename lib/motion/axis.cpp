@@ -20,6 +20,11 @@ double Axis::duration_ticks(std::int64_t steps, std::uint16_t floor) const {
   return std::ceil(ns / tick_ns_);
 }
 
+double Axis::most_steps_per_s(std::uint16_t floor) const {
+  const std::uint16_t delay = std::max(bushd_table_fastest(table_), floor);
+  return 1e9 / (static_cast<double>(delay) * table_->time_unit_ns);
+}
+
 void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns,
                  std::uint16_t floor) {
   busy_ = true;
@@ -192,6 +197,12 @@ std::optional<Change> Axis::executed(Tick until) {
   }
   if (head_.tick <= base_.tick) head_ = base_;
   return taken;
+}
+
+std::int64_t Axis::steps_at(Tick tick) const {
+  Place place = base_;
+  advance(place, tick);
+  return from_ + place.run.direction * static_cast<std::int64_t>(place.run.steps_done);
 }
 
 double Axis::velocity_steps_per_s() const {

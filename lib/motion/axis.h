@@ -39,6 +39,9 @@ class Axis {
   // How long a move of `steps` takes, in ticks, rounded up; for any number of steps.
   double duration_ticks(std::int64_t steps, std::uint16_t floor = 0) const;
 
+  // What no step of a run is faster than.
+  double most_steps_per_s(std::uint16_t floor) const;
+
   // Longer moves are beyond what tick numbers and times are made for: a month of the shortest
   // ticks, years of the longest.
   static constexpr double kMaxDurationTicks = 1 << 30;
@@ -58,6 +61,9 @@ class Axis {
   // been executed (or known to have failed) before the second is planned, for the MCU may have
   // taken it.
   bool needs_change() const { return stale_ && !change_; }
+
+  // The plan does what is wanted, as far as the table can.
+  bool is_planned() const { return !stale_; }
 
   // Plans what is wanted from tick `at` on, in place of a change that was planned before and that
   // the MCU has not taken. Returns false if the plan stays what it was without any change: over by
@@ -97,6 +103,8 @@ class Axis {
   std::int64_t executed_steps() const {
     return from_ + base_.run.direction * static_cast<std::int64_t>(base_.run.steps_done);
   }
+  // Where it stands, as planned, when the ticks before `tick` have been run. O(ticks ahead).
+  std::int64_t steps_at(Tick tick) const;
   // Of this run: +1, -1.
   int direction() const { return base_.run.direction; }
   // Where this run ends, as planned now, and where the motor was last told to go.

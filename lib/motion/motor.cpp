@@ -1,7 +1,5 @@
 #include "motion/motor.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -18,11 +16,6 @@ constexpr const char* kStoppedImmediately =
     "it was stopped immediately by an emergency stop and may have overrun";
 constexpr const char* kUnpowered = "its drivers were disabled by overcurrent while it moved";
 
-std::string switch_at(int direction) {
-  return std::string("its limit switch at the ") + (direction > 0 ? "positive" : "negative") +
-         " end";
-}
-
 bool has_bit(unsigned mask, Output output) {
   return (mask >> output.value & 1) != 0;
 }
@@ -33,109 +26,9 @@ std::string Motor::busy_text() const {
   return name() + (is<Armed>() ? " waits for the trigger" : " moves");
 }
 
-Result<void> Motor::may_be_used() const {
-  if (is<Armed>()) return fail("waits for the trigger; disarm it first");
-  if (is<Homing>()) return fail("it is being homed; wait for that result");
-  if (is<Local>() && !autonomous_) {
-    return fail("MCU " + setup_.mcu +
-                " moves it for another master; end that, and wait until it rests");
-  }
-  if (is<Local>()) {
-    return fail("the local inputs of MCU " + setup_.mcu + " move it; release them first");
-  }
-  return {};
-}
-
-Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const {
-  if (uncertain_reason_) {
-    return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
-                (setup_.has_home ? "run 'bushctl home NAME', or find out where it stands and run "
-                                   "'bushctl set NAME STEPS'"
-                                 : "find out where it stands and run 'bushctl set NAME STEPS'") +
-                ", or 'bushctl confirm NAME' if it stands where it is shown");
-  }
-  if (restored_reason_ && setup_.restored_refused) {
-    return fail("its position is only restored, because " + *restored_reason_ +
-                ", and restored = \"refuse\" keeps it there; home it, set its position, or run "
-                "'bushctl confirm NAME' if it is right");
-  }
-  const std::int64_t steps = target - position_;
-  if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
-    return fail("target " + std::to_string(target) + " is beyond +-" +
-                std::to_string(kMaxPosition) + " steps");
-  }
-  if (auto within = within_soft_limits(target); !within) return within;
-  if (const Moving* moving = as<Moving>(); moving != nullptr && moving->limit != 0) {
-    return fail(switch_at(moving->limit) + " is stopping it; wait for that result");
-  }
-  const int direction = steps < 0 ? -1 : 1;
-  if (steps != 0 && forbidden(direction)) {
-    return fail(
-        switch_at(direction) +
-        " is active: motion in this direction is inhibited; move it in the other direction");
-  }
-  if (axis_.duration_ticks(steps, floor) > Axis::kMaxDurationTicks) {
-    const double tick_days = axis_.tick_ns() * 1e-9 / 86400;
-    const auto days = [tick_days](double ticks) { return std::llround(ticks * tick_days); };
-    return fail(std::to_string(steps) + " steps would take " +
-                std::to_string(days(axis_.duration_ticks(steps, floor))) +
-                " days at that speed; the longest move is " +
-                std::to_string(days(Axis::kMaxDurationTicks)) + " days");
-  }
-  return {};
-}
-
-Result<std::uint16_t> Motor::floor_at(const std::optional<api::Speed>& speed) const {
-  std::uint16_t floor = 0;
-  if (setup_.max_speed) {
-    const auto slowest = setup_.coordinates.delay_at(*setup_.max_speed, axis_.time_unit_ns());
-    if (!slowest) return fail("max_speed: " + slowest.error().message);
-    floor = *slowest;
-  }
-  if (!speed) return floor;
-  const units::Coordinates in_steps;
-  const auto delay = (speed->in_steps ? in_steps : setup_.coordinates)
-                         .delay_at(speed->per_s, axis_.time_unit_ns());
-  if (!delay) return delay;
-  return std::max(floor, *delay);
-}
-
-// One that stands beyond a limit may be moved towards it.
-Result<void> Motor::within_soft_limits(std::int64_t target) const {
-  if (!setup_.soft_limits) return {};
-  const units::Coordinates& coordinates = setup_.coordinates;
-  const std::int64_t low = coordinates.first_step_from(setup_.soft_limits->low);
-  const std::int64_t high = coordinates.last_step_to(setup_.soft_limits->high);
-  if (target >= std::min(low, position_) && target <= std::max(high, position_)) return {};
-  const bool falls = coordinates.scale().negative;
-  return fail(fmt::format("target {} is beyond the soft limit at {}; allowed: {} to {}",
-                          coordinates.text(target), coordinates.text(target > high ? high : low),
-                          coordinates.text(falls ? high : low),
-                          coordinates.text(falls ? low : high)));
-}
-
-// Of a motor without a unit nothing is rounded.
-Result<void> Motor::is_amount(const api::Amount& amount) const {
-  const auto* user = std::get_if<api::UserUnits>(&amount);
-  if (user == nullptr || setup_.coordinates.has_unit()) return {};
-  if (std::trunc(user->value) == user->value) return {};
-  return fail(fmt::format("{} is no whole number of steps, and it has no unit", user->value));
-}
-
-Result<std::int64_t> Motor::steps_of_position(const api::Amount& position) const {
-  if (auto good = is_amount(position); !good) return fail(good.error());
-  if (const auto* steps = std::get_if<std::int64_t>(&position)) return *steps;
-  return setup_.coordinates.steps_of_user(std::get<api::UserUnits>(position).value);
-}
-
-Result<std::int64_t> Motor::steps_of_distance(const api::Amount& distance) const {
-  if (auto good = is_amount(distance); !good) return fail(good.error());
-  if (const auto* steps = std::get_if<std::int64_t>(&distance)) return *steps;
-  return setup_.coordinates.steps_of_distance(std::get<api::UserUnits>(distance).value);
-}
-
 void Motor::start(std::int64_t target, Tick start, std::uint16_t floor) {
   activity_ = Moving{};
+  pause_ = Pause::kNo;
   axis_.start(position_, target - position_, start, 0, floor);
 }
 
@@ -144,7 +37,39 @@ void Motor::arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor) {
   axis_.start(position_, steps, kNever, 0, floor);
 }
 
+void Motor::aim(std::int64_t target, std::uint16_t floor) {
+  pause_ = Pause::kNo;
+  axis_.aim(target, floor);
+}
+
+Leg Motor::take_leg() {
+  if (position_ != axis_.target_steps() || further_.empty()) {
+    return {.target = axis_.target_steps(), .floor = axis_.floor()};
+  }
+  const Leg next = further_.front();
+  further_.erase(further_.begin());
+  return next;
+}
+
+void Motor::pause() {
+  if (!is<Moving>() || axis_.stopping()) return;
+  pause_ = Pause::kRamps;
+  axis_.stop();
+}
+
+void Motor::resume() {
+  if (pause_ == Pause::kRamps) axis_.aim(axis_.target_steps(), axis_.floor());
+  pause_ = Pause::kNo;
+}
+
+std::int64_t Motor::target_steps() const {
+  if (!has_plan()) return position_;
+  if (axis_.stopping() && !is_paused()) return axis_.end_steps();
+  return further_.empty() ? axis_.target_steps() : further_.back().target;
+}
+
 void Motor::stop(std::optional<std::string> ended_by) {
+  pause_ = stands_paused() ? Pause::kOver : Pause::kNo;
   if (is<Moving>()) axis_.stop();
   if (auto* armed = std::get_if<Armed>(&activity_)) {
     armed->stops = true;
@@ -322,10 +247,26 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
     if (axis_.needs_change()) events.emplace_back(event::Replan{});
   } else if (now.position_mismatch) {
     if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
-  } else if (position_ == axis_.target_steps()) {
-    events.emplace_back(ended(Outcome::kReached, "stands at its target"));
+  } else {
+    follow_end_of_run(report, events);
+  }
+}
+
+// It stands where its plan has led.
+void Motor::follow_end_of_run(const Report& report, std::vector<Event>& events) {
+  const bool there = position_ == axis_.target_steps();
+  if (there && further_.empty()) {
+    const bool settles = !axis_.stopping() && report.tick < axis_.end_tick() + setup_.settle_ticks;
+    if (!settles) events.emplace_back(ended(Outcome::kReached, kAtTarget));
+  } else if (stands_paused()) {
+    // Until it is resumed.
+  } else if (is_paused()) {
+    pause_ = Pause::kStands;
+    events.emplace_back(event::Paused{});
   } else if (axis_.stopping()) {
-    events.emplace_back(ended(Outcome::kStopped, "stopped on request"));
+    events.emplace_back(ended(Outcome::kStopped, kOnRequest));
+  } else if (there) {
+    events.emplace_back(event::NextLeg{});
   } else {
     // It was given a target that its table could not lead to without a rest.
     events.emplace_back(event::Turn{});
@@ -398,11 +339,11 @@ void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
 
 // It stands.
 event::Ended Motor::end_at_limit() {
-  if (!axis_.stopping() && position_ == axis_.target_steps()) {
-    return ended(Outcome::kReached, "stands at its target");
+  if (!axis_.stopping() && further_.empty() && position_ == axis_.target_steps()) {
+    return ended(Outcome::kReached, kAtTarget);
   }
   if (axis_.stopping() && position_ == axis_.executed_steps()) {
-    return ended(Outcome::kStopped, "stopped on request");
+    return ended(Outcome::kStopped, kOnRequest);
   }
   std::string reason = "stopped by " + switch_at(std::get<Moving>(activity_).limit) +
                        ", stands at " + std::to_string(position_);
@@ -462,9 +403,15 @@ std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {
 
 event::Ended Motor::ended(Outcome outcome, std::string reason) {
   const bool was_armed = is<Armed>();
+  const bool was_paused = pause_ == Pause::kStands || pause_ == Pause::kOver;
+  further_.clear();
+  pause_ = Pause::kNo;
   axis_.finish();
   rest();
-  return {.outcome = outcome, .reason = std::move(reason), .was_armed = was_armed};
+  return {.outcome = outcome,
+          .reason = std::move(reason),
+          .was_armed = was_armed,
+          .was_paused = was_paused};
 }
 
 std::string Motor::did_not_start() const {

@@ -35,6 +35,19 @@ struct MotorSetup {
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits{};
   std::optional<double> max_speed{};  // user units/s
+  double backlash = 0;  // user units; its sign is that of the last approach; 0: from either side
+  std::optional<double> backlash_speed{};  // user units/s, of the last approach
+  Tick settle_ticks = 0;                   // it has ended when it has stood for so long
+};
+
+// What is said of a motion that ends as planned, or by a stop.
+inline constexpr const char* kAtTarget = "stands at its target";
+inline constexpr const char* kOnRequest = "stopped on request";
+
+// A motion is made of these, with a rest between any two.
+struct Leg {
+  std::int64_t target;
+  std::uint16_t floor;  // of Axis
 };
 
 // What a motor does. Any other than Resting keeps other motions away from it.
@@ -85,15 +98,19 @@ struct Executed {  // a change of plan
 struct Replan {};  // the plan is not what was requested any more
 struct Drop {};    // its MCU takes no more ticks for this motion
 struct Mismatch {};
-struct Turn {};  // it stands on the way to a target that takes a second run
+struct Turn {};     // it stands on the way to a target that takes a second run
+struct NextLeg {};  // it stands where a leg has led, and another one follows
+struct Paused {};   // it stands where it was to pause
 struct Ended {
   Outcome outcome;
   std::string reason;
   bool was_armed = false;
+  bool was_paused = false;  // and stood
 };
 }  // namespace event
-using Event = std::variant<event::Waits, event::Started, event::Executed, event::Replan,
-                           event::Drop, event::Mismatch, event::Turn, event::Ended>;
+using Event =
+    std::variant<event::Waits, event::Started, event::Executed, event::Replan, event::Drop,
+                 event::Mismatch, event::Turn, event::NextLeg, event::Paused, event::Ended>;
 
 class Motor {
  public:
@@ -125,8 +142,8 @@ class Motor {
   std::optional<std::uint16_t> boot_number() const { return boot_number_; }
   // `boot_number`: of the MCU now.
   PositionTrust trust(std::optional<std::uint16_t> boot_number) const;
-  // Where it will stand when all is done.
-  std::int64_t target_steps() const { return has_plan() ? axis_.end_steps() : position_; }
+  // Where it will stand when all is done, and it has been resumed if it is paused.
+  std::int64_t target_steps() const;
   double velocity_steps_per_s() const { return is<Moving>() ? axis_.velocity_steps_per_s() : 0.0; }
   // Why steps may be lost, so that it may not move. Nothing: none are, as far as this daemon knows.
   const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
@@ -144,6 +161,11 @@ class Motor {
   Result<void> may_be_used() const;  // for any motion
   // Beyond that.
   Result<void> may_move_to(std::int64_t target, std::uint16_t floor = 0) const;
+  // How far it may go from here in a direction: to its soft limit, as far as positions are counted,
+  // or for as long as a run may take. Where it stands, if that is not in this direction.
+  std::int64_t farthest(int direction, std::uint16_t floor) const;
+  // The legs of a move there, in place of what it does now. Errors: one of them may not be made.
+  Result<std::vector<Leg>> legs_to(std::int64_t target, std::uint16_t floor) const;
   // The floor of runs at max_speed and at this speed, whichever is slower. Error: no speed, or one
   // slower than any delay.
   Result<std::uint16_t> floor_at(const std::optional<api::Speed>& speed) const;
@@ -154,7 +176,22 @@ class Motor {
   // Requests. Preconditions: it may. Floors are those of Axis.
   // From rest, or from the turning point of a motion.
   void start(std::int64_t target, Tick start, std::uint16_t floor = 0);
-  void aim(std::int64_t target, std::uint16_t floor = 0) { axis_.aim(target, floor); }
+  void aim(std::int64_t target, std::uint16_t floor = 0);
+  // What comes after the run that it makes, in place of what was to come.
+  void go_on(std::vector<Leg> legs) { further_ = std::move(legs); }
+  // The leg that is to be made from where it stands: the rest of the one that it makes, or the next
+  // one, which is no more to come.
+  Leg take_leg();
+  // Moving: ramps down, and its motion stays open.
+  void pause();
+  // It goes on; if it stands already, by another run.
+  void resume();
+  bool is_paused() const { return pause_ == Pause::kRamps || stands_paused(); }
+  bool stands_paused() const { return pause_ == Pause::kStands; }
+  // start() is for it, not aim().
+  bool stands() const { return !has_plan() || stands_paused(); }
+  void hold(bool now) { held_ = now; }
+  bool is_held() const { return held_; }
   void arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor = 0);
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
   // `ended_by` is whose end ends it too.
@@ -192,6 +229,7 @@ class Motor {
 
  private:
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
+  void follow_end_of_run(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
   Result<void> is_amount(const api::Amount& amount) const;
   Result<void> within_soft_limits(std::int64_t target) const;
@@ -209,6 +247,10 @@ class Motor {
   MotorSetup setup_;
   Axis axis_;
   Activity activity_;
+  std::vector<Leg> further_;                         // after the run that it makes
+  enum class Pause { kNo, kRamps, kStands, kOver };  // kOver: stopped where it stood
+  Pause pause_ = Pause::kNo;
+  bool held_ = false;
   std::int64_t position_ = 0;
   std::optional<std::uint16_t> boot_number_;
   // Somebody has said where it stands, or its switch has. What an earlier daemon was told, and

@@ -92,6 +92,11 @@ std::string system_inputs_words(std::uint8_t inputs) {
   return list;
 }
 
+std::string switch_at(int direction) {
+  return std::string("its limit switch at the ") + (direction > 0 ? "positive" : "negative") +
+         " end";
+}
+
 bool forbids(const bushd_report& report, unsigned output, int direction) {
   const unsigned mask = direction > 0 ? report.forbidden_positive : report.forbidden_negative;
   return (mask >> output & 1) != 0;

@@ -13,6 +13,8 @@ std::string fault_text(const bushd_report& report);
 std::string stop_cause(const bushd_report& report);
 std::string reset_cause_word(std::uint8_t cause);      // as in mcu_health_t
 std::string system_inputs_words(std::uint8_t inputs);  // as in mcu_state_t
+// "its limit switch at the positive end"
+std::string switch_at(int direction);
 // Whether a limit switch inhibits the direction (+1, -1) of the motor at this output.
 bool forbids(const bushd_report& report, unsigned output, int direction);
 

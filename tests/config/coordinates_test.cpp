@@ -90,5 +90,37 @@ TEST(ConfigCoordinates, WhatCannotBeIsRefusedWithItsLineAndKey) {
   }
 }
 
+TEST(ConfigCoordinates, Backlash) {
+  const auto without = ConfigFile(kGood).load();
+  EXPECT_EQ(without->motors[1].backlash, 0);
+  EXPECT_EQ(without->motors[1].settle_ms, 0);
+  const auto config = ConfigFile(with_motor("unit = \"mm\"\nsteps_per_unit = 400\nbacklash = -0.1\n"
+                                            "backlash_speed = 0.5\nsettle_ms = 50\n"))
+                          .load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  const Motor& motor = config->motors[1];
+  EXPECT_EQ(motor.backlash, -0.1);
+  EXPECT_EQ(motor.backlash_speed, 0.5);
+  EXPECT_EQ(motor.settle_ms, 50);
+}
+
+TEST(ConfigCoordinates, ABadBacklashIsRefusedWithItsLine) {
+  const std::string mm = "unit = \"mm\"\nsteps_per_unit = 400\n";
+  for (const auto& [keys, reason] : std::initializer_list<std::pair<std::string, std::string>>{
+           {"backlash = 0\n", "37:12: motor[1].backlash: is 0, which is no step"},
+           {mm + "backlash = 0.001\n", "39:12: motor[1].backlash: is 0.001, which is no step"},
+           {"backlash = 0.5\n", "37:12: motor[1].backlash: "},
+           {"backlash = 3e9\n", "37:12: motor[1].backlash: "},
+           {"backlash = nan\n", "37:12: motor[1].backlash: "},
+           {"backlash_speed = 5\n", "motor[1].backlash_speed: needs `backlash`"},
+           {"backlash = 5\nbacklash_speed = 0\n", "motor[1].backlash_speed: is 0"},
+           {"settle_ms = -1\n", "37:13: motor[1].settle_ms: "},
+           {"settle_ms = 60001\n", "37:13: motor[1].settle_ms: "}}) {
+    const auto config = ConfigFile(with_motor(keys)).load();
+    ASSERT_FALSE(config.has_value()) << keys;
+    EXPECT_THAT(config.error().text(), HasSubstr(reason));
+  }
+}
+
 }  // namespace
 }  // namespace bushd::config

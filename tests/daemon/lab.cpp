@@ -26,6 +26,8 @@ Answer answer_of(const api::Reply& reply) {
       answer.motor_results.emplace_back(word(motor.outcome));
       answer.position_steps.push_back(motor.position_steps);
       answer.tables.push_back(motor.table);
+      answer.legs.push_back(motor.legs);
+      answer.most_steps_per_s.push_back(motor.most_steps_per_s);
     }
   }
   if (const auto* plan = std::get_if<api::MovePlan>(&completed->detail)) answer.plan = *plan;
@@ -72,7 +74,9 @@ api::Request request_of(Ask ask, const std::vector<std::string>& motors,
 
 class Lab::Client final : public api::Session {
  public:
-  Client() : Session(api::Transport::kLcm, "test", true) {}
+  explicit Client(std::string name = "test")
+      : Session(api::Transport::kLcm, std::move(name), true) {}
+  bool gone() const override { return has_left; }
   void answer(std::int64_t number, const api::Reply& reply) override {
     answers[number].push_back(answer_of(reply));
     const auto* completed = std::get_if<api::Completed>(&reply);
@@ -82,6 +86,7 @@ class Lab::Client final : public api::Session {
   }
   std::map<std::int64_t, std::vector<Answer>> answers;  // by number
   std::map<std::int64_t, std::vector<api::PastMotion>> histories;
+  bool has_left = false;
 };
 
 Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink)
@@ -282,8 +287,21 @@ std::int64_t Lab::send(const api::Request& request) {
   return number_;
 }
 
+std::int64_t Lab::send_as(const std::string& client, const api::Request& request) {
+  std::shared_ptr<Client>& session = others_[client];
+  if (!session) session = std::make_shared<Client>(client);
+  asked_by_[++number_] = session;
+  core().request(now_us(), {.session = session, .number = number_}, request);
+  return number_;
+}
+
+void Lab::leave(const std::string& client) {
+  others_.extract(client).mapped()->has_left = true;
+}
+
 std::vector<Answer> Lab::replies(std::int64_t number) const {
-  return client_->answers[number];
+  const auto other = asked_by_.find(number);
+  return (other == asked_by_.end() ? client_ : other->second)->answers[number];
 }
 
 Answer Lab::last_reply(std::int64_t number) const {

@@ -61,6 +61,8 @@ struct Answer {
   std::string result{};  // the word of its outcome, "refused", or ""
   std::string reason{};
   // By motor, in the request's order.
+  std::vector<int> legs{};
+  std::vector<double> most_steps_per_s{};
   std::vector<std::string> motor_results{};
   std::vector<std::int64_t> position_steps{};
   std::vector<api::TableRef> tables{};
@@ -86,6 +88,9 @@ class Lab : public daemon::Outputs, private state::Backend {
     return send(request_of(ask, motors, steps));
   }
   std::int64_t send(const api::Request& request);
+  // The same as another client, and that client's end.
+  std::int64_t send_as(const std::string& client, const api::Request& request);
+  void leave(const std::string& client);
   // The replies so far to a request.
   std::vector<Answer> replies(std::int64_t number) const;
   // The last reply, which must exist.
@@ -180,6 +185,8 @@ class Lab : public daemon::Outputs, private state::Backend {
   config::Config config_;
   std::unique_ptr<daemon::Core> core_;
   std::shared_ptr<Client> client_;
+  std::map<std::string, std::shared_ptr<Client>> others_;
+  std::map<std::int64_t, std::shared_ptr<Client>> asked_by_;  // those of `others_`, by number
   std::vector<SimulatedBus> buses_;
   std::int64_t now_ns_ = 0;
   std::int64_t number_ = 0;

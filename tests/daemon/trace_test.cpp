@@ -1,5 +1,5 @@
 // A day in a lab, judged by tools/check-trace from the log of moves and the pins alone: moves in
-// every way of emission, homing, local motion, a limit switch.
+// every way of emission, homing, local motion, a limit switch, jogs, pauses, moves of two legs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -44,6 +44,7 @@ class Trace : public testing::TestWithParam<Manner> {
         "home = { direction = \"negative\", position_steps = -50, most_steps = 6000 }\n");
     add("name = \"m02\"\n", "local = true\n");
     add("name = \"m04\"\n", "limit = \"positive\"\n");
+    add("name = \"m06\"\n", "backlash = 30\nbacklash_speed = 150\n");
     add("address = 1\n", GetParam().keys);
     add("address = 2\n", GetParam().keys);
     return text;
@@ -67,6 +68,26 @@ class Trace : public testing::TestWithParam<Manner> {
     to(1700, 1900);
     lab.run_for(0.3);
     EXPECT_EQ(lab.wait(to(30, 411)).result, "reached");
+  }
+  // Paused and resumed, jogged to and fro.
+  void change_on_the_way(Lab& lab) {
+    const auto paused = lab.send(Ask::kMoveBy, {"m03", "m06"}, {900, -900});
+    lab.run_for(0.35);
+    EXPECT_EQ(lab.wait(lab.send(api::Pause{})).reason, "paused: 2 motors");
+    lab.run_for(0.5);
+    lab.send(api::Resume{});
+    const auto jog = [&lab](double speed) {
+      return lab.send(api::Jog{.motor = "m05", .per_s = speed, .in_steps = true});
+    };
+    const auto jogged = jog(700);
+    lab.run_for(0.4);
+    jog(-450);
+    lab.run_for(0.4);
+    jog(-900);
+    lab.run_for(0.4);
+    jog(0);
+    EXPECT_EQ(lab.wait(jogged).result, "done");
+    EXPECT_EQ(lab.wait(paused).result, "reached");
   }
   void write(Lab& lab) {
     EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
@@ -132,6 +153,7 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   move(lab, {"m04", "m05", "m06"}, {-300, 100, 300});
   move(lab, {"m01", "m02", "m03"}, {-100, -50, 30});
   move_at_speeds(lab);
+  change_on_the_way(lab);
   lab.run_for(0.1);
   write(lab);
   EXPECT_EQ(check(lab, [](auto&) { return true; }), 0) << said();

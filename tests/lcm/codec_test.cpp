@@ -94,6 +94,13 @@ TEST(Codec, OtherRequestsDoToo) {
   const auto history = request_over_the_wire(api::GetHistory{.motor = "a", .most = 7});
   EXPECT_EQ(history.motor, "a");
   EXPECT_EQ(history.most, 7);
+  const auto jog = request_over_the_wire(
+      api::Jog{.motor = "a", .per_s = -2.5, .keepalive_ms = 300, .steps_after = 7});
+  EXPECT_EQ(jog.motor, "a");
+  EXPECT_EQ(jog.per_s, -2.5);
+  EXPECT_EQ(jog.keepalive_ms, 300);
+  EXPECT_EQ(jog.steps_after, 7);
+  EXPECT_FALSE(request_over_the_wire(api::Jog{.renew = true}).steps_after);
   request_over_the_wire(api::ListTables{});
   EXPECT_EQ(request_over_the_wire(api::GetTable{"own"}).table, "own");
   const auto set = request_over_the_wire(

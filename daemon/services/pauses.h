@@ -1,0 +1,47 @@
+// Motors that are paused on the way to their targets, and motors that are held back from moving at
+// all: what other systems call stop, pause, move, go.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <string>
+#include <vector>
+
+#include "daemon/interlocks.h"
+#include "daemon/service.h"
+#include "daemon/services/moves.h"
+#include "daemon/services/open_moves.h"
+
+namespace bushd::daemon {
+
+class Pauses final : public Service {
+ public:
+  // Whose standstill is waited for at a time; beyond, motors are paused all the same.
+  static constexpr std::size_t kMaxOpen = 256;
+
+  // It adds a check to the interlocks.
+  Pauses(Installation& installation, Interlocks& interlocks, Moves& moves, OpenMoves& open_moves);
+
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Pause& request);
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Resume& request);
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Hold& request);
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Release& request);
+
+  void step(std::int64_t now_us) override;
+
+ private:
+  struct Pausing {
+    api::Asker asker;
+    std::vector<MotorId> motors;  // that do not stand yet
+    std::size_t paused;           // how many it was
+  };
+  void hold(const api::Asker& asker, const api::MotorNames& names, bool held);
+
+  Installation& installation_;
+  Interlocks& interlocks_;
+  Moves& moves_;
+  OpenMoves& open_;
+  std::list<Pausing> open_pauses_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,160 @@
+// What a motor may do: where to, how fast, and by which legs.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "motion/motor.h"
+#include "motion/report_words.h"
+
+namespace bushd::motion {
+
+Result<void> Motor::may_be_used() const {
+  if (is<Armed>()) return fail("waits for the trigger; disarm it first");
+  if (is<Homing>()) return fail("it is being homed; wait for that result");
+  if (is<Local>() && !autonomous_) {
+    return fail("MCU " + setup_.mcu +
+                " moves it for another master; end that, and wait until it rests");
+  }
+  if (is<Local>()) {
+    return fail("the local inputs of MCU " + setup_.mcu + " move it; release them first");
+  }
+  return {};
+}
+
+Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const {
+  if (uncertain_reason_) {
+    return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
+                (setup_.has_home ? "run 'bushctl home NAME', or find out where it stands and run "
+                                   "'bushctl set NAME STEPS'"
+                                 : "find out where it stands and run 'bushctl set NAME STEPS'") +
+                ", or 'bushctl confirm NAME' if it stands where it is shown");
+  }
+  if (restored_reason_ && setup_.restored_refused) {
+    return fail("its position is only restored, because " + *restored_reason_ +
+                ", and restored = \"refuse\" keeps it there; home it, set its position, or run "
+                "'bushctl confirm NAME' if it is right");
+  }
+  const std::int64_t steps = target - position_;
+  if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
+    return fail("target " + std::to_string(target) + " is beyond +-" +
+                std::to_string(kMaxPosition) + " steps");
+  }
+  if (auto within = within_soft_limits(target); !within) return within;
+  if (const Moving* moving = as<Moving>(); moving != nullptr && moving->limit != 0) {
+    return fail(switch_at(moving->limit) + " is stopping it; wait for that result");
+  }
+  const int direction = steps < 0 ? -1 : 1;
+  if (steps != 0 && forbidden(direction)) {
+    return fail(
+        switch_at(direction) +
+        " is active: motion in this direction is inhibited; move it in the other direction");
+  }
+  if (axis_.duration_ticks(steps, floor) > Axis::kMaxDurationTicks) {
+    const double tick_days = axis_.tick_ns() * 1e-9 / 86400;
+    const auto days = [tick_days](double ticks) { return std::llround(ticks * tick_days); };
+    return fail(std::to_string(steps) + " steps would take " +
+                std::to_string(days(axis_.duration_ticks(steps, floor))) +
+                " days at that speed; the longest move is " +
+                std::to_string(days(Axis::kMaxDurationTicks)) + " days");
+  }
+  return {};
+}
+
+Result<std::uint16_t> Motor::floor_at(const std::optional<api::Speed>& speed) const {
+  std::uint16_t floor = 0;
+  if (setup_.max_speed) {
+    const auto slowest = setup_.coordinates.delay_at(*setup_.max_speed, axis_.time_unit_ns());
+    if (!slowest) return fail("max_speed: " + slowest.error().message);
+    floor = *slowest;
+  }
+  if (!speed) return floor;
+  const units::Coordinates in_steps;
+  const auto delay = (speed->in_steps ? in_steps : setup_.coordinates)
+                         .delay_at(speed->per_s, axis_.time_unit_ns());
+  if (!delay) return delay;
+  return std::max(floor, *delay);
+}
+
+std::int64_t Motor::farthest(int direction, std::uint16_t floor) const {
+  std::int64_t limit = direction > 0 ? kMaxPosition : -kMaxPosition;
+  if (setup_.soft_limits) {
+    limit = direction > 0 ? setup_.coordinates.last_step_to(setup_.soft_limits->high)
+                          : setup_.coordinates.first_step_from(setup_.soft_limits->low);
+  }
+  const std::int64_t steps = std::min((limit - position_) * direction, kMaxPosition);
+  if (steps <= 0) return position_;
+  if (axis_.duration_ticks(steps, floor) <= Axis::kMaxDurationTicks) {
+    return position_ + direction * steps;
+  }
+  std::int64_t low = 0;
+  std::int64_t high = steps;
+  while (high - low > 1) {
+    const std::int64_t middle = low + (high - low) / 2;
+    (axis_.duration_ticks(middle, floor) <= Axis::kMaxDurationTicks ? low : high) = middle;
+  }
+  return position_ + direction * low;
+}
+
+Result<std::vector<Leg>> Motor::legs_to(std::int64_t target, std::uint16_t floor) const {
+  if (auto may = may_move_to(target, floor); !may) return fail(may.error());
+  const auto backlash = setup_.coordinates.steps_of_distance(setup_.backlash);
+  const std::int64_t way = target - position_;
+  if (!backlash || *backlash == 0 || (way == 0 && stands())) {
+    return std::vector<Leg>{{target, floor}};
+  }
+  std::uint16_t slow = floor;
+  if (setup_.backlash_speed) {
+    const auto approach = floor_at(api::Speed{.per_s = *setup_.backlash_speed});
+    if (!approach) return fail("backlash_speed: " + approach.error().message);
+    slow = std::max(floor, *approach);
+  }
+  // As the EPICS motor record does it: straight, if it is in the direction of the last approach and
+  // as slow. One that moves may have to come back first, so that its direction says nothing.
+  const bool from_that_side = stands() && (way < 0) == (*backlash < 0);
+  if (from_that_side && (slow == floor || std::abs(way) <= std::abs(*backlash))) {
+    return std::vector<Leg>{{target, slow}};
+  }
+  const std::int64_t start = target - *backlash;
+  if (auto may = may_move_to(start, floor); !may) {
+    return fail("the start of its last approach, for backlash: " + may.error().message);
+  }
+  return std::vector<Leg>{{start, floor}, {target, slow}};
+}
+
+// One that stands beyond a limit may be moved towards it.
+Result<void> Motor::within_soft_limits(std::int64_t target) const {
+  if (!setup_.soft_limits) return {};
+  const units::Coordinates& coordinates = setup_.coordinates;
+  const std::int64_t low = coordinates.first_step_from(setup_.soft_limits->low);
+  const std::int64_t high = coordinates.last_step_to(setup_.soft_limits->high);
+  if (target >= std::min(low, position_) && target <= std::max(high, position_)) return {};
+  const bool falls = coordinates.scale().negative;
+  return fail(fmt::format("target {} is beyond the soft limit at {}; allowed: {} to {}",
+                          coordinates.text(target), coordinates.text(target > high ? high : low),
+                          coordinates.text(falls ? high : low),
+                          coordinates.text(falls ? low : high)));
+}
+
+// Of a motor without a unit nothing is rounded.
+Result<void> Motor::is_amount(const api::Amount& amount) const {
+  const auto* user = std::get_if<api::UserUnits>(&amount);
+  if (user == nullptr || setup_.coordinates.has_unit()) return {};
+  if (std::trunc(user->value) == user->value) return {};
+  return fail(fmt::format("{} is no whole number of steps, and it has no unit", user->value));
+}
+
+Result<std::int64_t> Motor::steps_of_position(const api::Amount& position) const {
+  if (auto good = is_amount(position); !good) return fail(good.error());
+  if (const auto* steps = std::get_if<std::int64_t>(&position)) return *steps;
+  return setup_.coordinates.steps_of_user(std::get<api::UserUnits>(position).value);
+}
+
+Result<std::int64_t> Motor::steps_of_distance(const api::Amount& distance) const {
+  if (auto good = is_amount(distance); !good) return fail(good.error());
+  if (const auto* steps = std::get_if<std::int64_t>(&distance)) return *steps;
+  return setup_.coordinates.steps_of_distance(std::get<api::UserUnits>(distance).value);
+}
+
+}  // namespace bushd::motion
