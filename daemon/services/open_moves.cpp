@@ -40,6 +40,7 @@ void OpenMoves::say(MotorId motor, api::Outcome outcome, Saying saying) {
 }
 
 void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason) {
+  installation_.changed = true;
   const auto move = book_.move_of(id);
   if (!move) return;
   if (reason == motion::kAtTarget || reason == motion::kOnRequest) {
@@ -47,7 +48,6 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason)
       return end(id, said.mapped().outcome, said.mapped().reason);
     }
   }
-  installation_.changed = true;
   tell(id, outcome, reason);
   const motion::Motor& motor = installation_[id];
   const auto finished = book_.end({.motor = id,
