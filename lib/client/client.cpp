@@ -253,6 +253,16 @@ Result<void> Client::send_when_due(Repeated& repeated, std::chrono::milliseconds
   return link_->send(repeated.packet);
 }
 
+// One that is lost is followed by another.
+Result<void> Client::send_beside(const Meanwhile& meanwhile, Clock::time_point& next) {
+  if (Clock::now() < next) return {};
+  next = Clock::now() + meanwhile.beside_every;
+  const auto request = meanwhile.beside();
+  if (!request) return {};
+  const auto packet = next_packet(*request);
+  return packet ? link_->send(*packet) : Result<void>(fail(packet.error()));
+}
+
 void Client::show_state(const Meanwhile& meanwhile, Clock::time_point& next) {
   constexpr std::chrono::milliseconds kEvery{100};
   if (!meanwhile.on_state || !state_heard_ || Clock::now() < next) return;
@@ -265,6 +275,7 @@ void Client::show_state(const Meanwhile& meanwhile, Clock::time_point& next) {
 Result<api::Reply> Client::await_reply(Repeated request, Until until, const Meanwhile& meanwhile) {
   const Clock::time_point give_up = Clock::now() + options_.answer_within;
   Clock::time_point next_shown{};
+  Clock::time_point next_beside{};
   Clock::time_point answered{};
   bool reported = false;
   std::optional<Repeated> ending;
@@ -277,7 +288,13 @@ Result<api::Reply> Client::await_reply(Repeated request, Until until, const Mean
       if (auto sent = send_when_due(*ending, options_.resend_every); !sent)
         return fail(sent.error());
     }
-    Clock::time_point wake = std::max(request.next_send, Clock::now());
+    const bool beside = meanwhile.beside && waiting_.accepted && !ending;
+    if (beside) {
+      if (auto sent = send_beside(meanwhile, next_beside); !sent) return fail(sent.error());
+    }
+    Clock::time_point wake = Clock::time_point::max();  // over a link that loses nothing
+    if (link_->loses() || !request.sent) wake = std::max(request.next_send, Clock::now());
+    if (beside) wake = std::min(wake, next_beside);
     if (ends && link_->loses()) wake = std::min(wake, ending->next_send);
     auto waited = wait(waiting_.accepted ? wake : std::min(wake, give_up));
     if (interrupted_ && meanwhile.on_interrupt && !ending) {

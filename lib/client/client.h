@@ -65,6 +65,10 @@ class Client {
     // Interrupted, after having made interrupt_fd unreadable: the request that is to end the first
     // one, whose result is awaited as before. Without, and at the second time, waiting ends.
     std::function<std::optional<api::Request>()> on_interrupt{};
+    // Once the request is accepted and is not being ended, this often: a request beside it, whose
+    // answer nobody waits for, such as a sign of life.
+    std::function<std::optional<api::Request>()> beside{};
+    std::chrono::milliseconds beside_every{100};
   };
 
   // Sends the request and waits. kAnswered: returns Accepted or Refused (or Completed, when that
@@ -122,6 +126,7 @@ class Client {
   Result<void> send_when_due(Repeated& repeated, std::chrono::milliseconds again_after);
   Result<lcm::Packet> next_packet(const api::Request& request);
   Result<api::Reply> await_reply(Repeated request, Until until, const Meanwhile& meanwhile);
+  Result<void> send_beside(const Meanwhile& meanwhile, Clock::time_point& next);
   void show_state(const Meanwhile& meanwhile, Clock::time_point& next);
   Result<void> check_alive(Clock::time_point answered) const;
   // Handles messages until `deadline`, or until there were some. Fails when interrupted.

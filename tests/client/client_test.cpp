@@ -343,6 +343,32 @@ TEST_F(ClientTest, InterruptedSendsWhatEndsTheRequestAndAwaitsItsResult) {
   }
 }
 
+TEST_F(ClientTest, SendsRequestsBesideTheOneThatIsAwaited) {
+  for (const bool loses : {true, false}) {
+    open(loses, std::chrono::minutes(5));
+    requests_.clear();
+    std::optional<lcm::RequestId> first;
+    int renewed = 0;
+    daemon_ = [&] {
+      const auto* jog = std::get_if<api::Jog>(&std::get<api::Request>(requests_.back().content));
+      ASSERT_TRUE(jog != nullptr);
+      reply(api::Accepted{});
+      if (!first) first = requests_.back().id;
+      if (!jog->renew) return;
+      reply(result(api::Outcome::kDone));  // of the renewal, which nobody waits for
+      if (++renewed < 3) return;
+      link_->say(lcm::ReplyMessage{.id = *first, .reply = result(api::Outcome::kLimit)});
+    };
+    const auto jogged =
+        client_->run(api::Jog{.motor = "theta", .per_s = 1}, Client::Until::kResult,
+                     {.beside = [] { return std::optional<api::Request>(api::Jog{.renew = true}); },
+                      .beside_every = std::chrono::milliseconds(1)});
+    ASSERT_TRUE(jogged) << jogged.error().text();
+    EXPECT_EQ(std::get<api::Completed>(*jogged).outcome, api::Outcome::kLimit);
+    EXPECT_EQ(renewed, 3);
+  }
+}
+
 TEST_F(ClientTest, InterruptedASecondTimeNoLongerWaits) {
   on_interrupt_ = [&]() -> std::optional<api::Request> { return api::Stop{}; };  // readable still
   daemon_ = [this] {

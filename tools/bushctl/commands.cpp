@@ -1,6 +1,7 @@
 #include "commands.h"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
 
@@ -65,6 +66,13 @@ bool as_hoped(const api::Reply& reply, Hope hope) {
 }
 
 }  // namespace
+
+bool take_interrupt() {
+  pollfd waits{.fd = signals(), .events = POLLIN, .revents = 0};
+  if (poll(&waits, 1, 0) <= 0) return false;
+  signalfd_siginfo signal{};
+  return read(signals(), &signal, sizeof signal) == sizeof signal;
+}
 
 int with_client(const Connection& connection, const std::function<int(Client&)>& action) {
   auto options = connection.options();

@@ -24,6 +24,10 @@ void add_motion_commands(CommandLine& line);
 void add_driver_commands(CommandLine& line);
 // confirm, history
 void add_history_commands(CommandLine& line);
+// jog
+void add_jog_commands(CommandLine& line);
+// pause, resume, hold, release
+void add_pause_commands(CommandLine& line);
 // table list, show, use, reload
 void add_table_commands(CommandLine& line);
 // latency-test, scan, address: on a line that no daemon has
@@ -35,6 +39,9 @@ int complete(CommandLine& line, const std::vector<std::string>& words);
 // Runs the action with a client that SIGINT and SIGTERM interrupt; without a daemon it says so.
 int with_client(const Connection& connection,
                 const std::function<int(bushd::client::Client&)>& action);
+
+// SIGINT or SIGTERM has come since; once, and then it is forgotten.
+bool take_interrupt();
 
 enum class Hope { kReached, kDone };  // what the result is when all is well
 

@@ -34,6 +34,8 @@ std::string limit_text(const api::MotorState& motor) {
 const char* moving_word(const api::MotorState& motor, const char* moves, const char* rests) {
   if (motor.activity == api::Activity::kArming) return "arming";
   if (motor.activity == api::Activity::kArmed) return "armed";
+  if (motor.paused) return "paused";
+  if (motor.held && !motor.moving) return "held";
   return motor.moving ? moves : rests;
 }
 
@@ -146,6 +148,8 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"input", motor.input},
           {"inhibited", word(motor.inhibited)},
           {"trust", word(motor.trust)},
+          {"paused", motor.paused},
+          {"held", motor.held},
           {"uncertain_reason", motor.uncertain_reason},
           {"heard_utime_us", heard_utime_us}};
 }
@@ -286,14 +290,17 @@ std::string json(const api::MovePlan& plan) {
 
 std::vector<std::string> lines(const api::MovePlan& plan) {
   std::vector<std::string> out;
-  for (const api::MovePlan::Motor& motor : plan.motors) {
-    out.push_back(fmt::format(
-        "{}: {:+} steps in {:.3f} s, up to {:.6g} steps/s", bushd::printable(motor.motor),
-        motor.steps, static_cast<double>(motor.duration_us) * 1e-6, motor.peak_steps_per_s));
+  for (std::size_t i = 0; i < plan.motors.size(); ++i) {
+    const api::MovePlan::Motor& motor = plan.motors[i];
+    const bool further_leg = i > 0 && plan.motors[i - 1].motor == motor.motor;
+    out.push_back(fmt::format("{}: {}{:+} steps in {:.3f} s, up to {:.6g} steps/s",
+                              bushd::printable(motor.motor), further_leg ? "then " : "",
+                              motor.steps, static_cast<double>(motor.duration_us) * 1e-6,
+                              motor.peak_steps_per_s));
   }
   const std::string traffic =
       plan.traffic ? fmt::format("{} frames of {} bytes", plan.traffic->frames, plan.traffic->bytes)
-                   : "more frames than are counted";
+                   : "frames are not counted";
   out.push_back(fmt::format("{} ticks, {:.3f} s; {}", plan.ticks,
                             static_cast<double>(plan.duration_us) * 1e-6, traffic));
   return out;
@@ -306,9 +313,10 @@ std::vector<std::string> lines(const api::Reply& reply) {
   std::vector<std::string> out;
   if (const auto* motors = std::get_if<std::vector<api::MotorResult>>(&completed->detail)) {
     for (const api::MotorResult& motor : *motors) {
-      out.push_back(fmt::format("{}: {}, stands at {} by {} ({})", bushd::printable(motor.motor),
+      out.push_back(fmt::format("{}: {}, stands at {} by {} ({}){}", bushd::printable(motor.motor),
                                 word(motor.outcome), position_text(motor), text_of(motor.table),
-                                bushd::printable(motor.table.hash)));
+                                bushd::printable(motor.table.hash),
+                                motor.legs > 1 ? fmt::format(", in {} legs", motor.legs) : ""));
     }
     return out;
   }

@@ -1,0 +1,37 @@
+// Subcommands that pause motors on their way, and that hold them back.
+#include <memory>
+
+#include "commands.h"
+
+namespace bushctl {
+namespace {
+
+namespace api = bushd::api;
+
+template <class Request>
+void add(CommandLine& line, const std::string& name, const std::string& text,
+         const std::string& footer) {
+  const auto names = std::make_shared<api::MotorNames>();
+  line.add(name, text)
+      .footer(footer)
+      .words("NAME", names.get(), "Motors or groups (default: all)", Command::Needed::kNo)
+      .run([&line, names] {
+        return send(line.connection(), Request{*names}, bushd::client::Client::Until::kResult,
+                    Hope::kDone);
+      });
+}
+
+}  // namespace
+
+void add_pause_commands(CommandLine& line) {
+  add<api::Pause>(line, "pause", "Ramp motors down, and keep their targets",
+                  "Their moves stay open until 'resume', 'stop' or a new target. Jogs end.");
+  add<api::Resume>(line, "resume", "Let paused motors go on to their targets",
+                   "Refused, as a whole, if one of them may not move.");
+  add<api::Hold>(line, "hold", "Let no motion of these motors begin",
+                 "Until 'release'. What is under way goes on; 'pause' or 'stop' it.");
+  add<api::Release>(line, "release", "Let motors that are held move again",
+                    "Motors that are paused stay so until 'resume'.");
+}
+
+}  // namespace bushctl
