@@ -138,6 +138,10 @@ Result<void> read_backlash(const TomlReader& reader, Motor* motor) {
     if (!backlash) return fail(backlash.error());
     const auto steps = motor->coordinates.steps_of_distance(*backlash);
     if (!steps) return fail(reader.error("backlash", steps.error().message));
+    if (!motor->coordinates.has_unit() && *backlash != static_cast<double>(*steps)) {
+      return fail(reader.error(
+          "backlash", fmt::format("is {}; allowed without `unit`: whole steps", *backlash)));
+    }
     if (*steps == 0) {
       return fail(reader.error("backlash", fmt::format("is {}, which is no step; allowed: one "
                                                        "step or more, or leave the key out",
