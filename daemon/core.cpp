@@ -32,13 +32,16 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
           },
           [this] { return moves_.begins(); }),
       health_(installation_, outputs),
+      settings_(installation_, positions_, kept_, journal_, outputs,
+                [this](MotorId motor) { return departures_.holds(motor); }),
       // What an MCU's positions are worth comes before whoever goes by that.
       services_{&kept_,           &journal_, &moves_,     &homing_,  &link_faults_,      &stops_,
                 &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_, &tables_,
-                &departures_},
+                &departures_,     &settings_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
-  positions_.set_offset_listener([this](MotorId motor) { kept_.keep_offset(motor); });
+  positions_.set_offset_listener([this](MotorId motor) { settings_.offset_set(motor); });
+  kept_.set_listener([this] { settings_.take_kept(); });
   open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
     const motion::Motor& motor = installation_[ended.motor];
     kept_.past({.motor = motor.name(),
@@ -108,6 +111,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::SetTable& r) { outputs_.serve_tables(asker, r); },
                  [&](const api::Confirm& r) { kept_.request(asker, r); },
                  [&](const api::GetHistory& r) { kept_.request(asker, r); },
+                 [&](const api::Configure& r) { settings_.request(asker, r); },
              },
              request);
 }

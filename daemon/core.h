@@ -22,6 +22,7 @@
 #include "daemon/services/journal.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/link_faults.h"
+#include "daemon/services/motor_settings.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
 #include "daemon/services/position_compare.h"
@@ -105,6 +106,7 @@ class Core {
   StatePublisher state_;
   Departures departures_;
   HealthPublisher health_;
+  MotorSettings settings_;
   std::vector<Service*> services_;  // in the order in which they follow what MCUs tell
   Supervisor supervisor_;
 };

@@ -32,6 +32,7 @@ class Departures final : public Service {
   // Those of these motors are refused: they are being stopped.
   void cancel(const std::vector<MotorId>& motors);
   bool empty() const { return held_.empty(); }
+  bool holds(MotorId motor) const { return any_held({motor}); }
 
   void step(std::int64_t now_us) override;
 

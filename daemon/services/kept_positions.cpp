@@ -1,7 +1,5 @@
 #include "daemon/services/kept_positions.h"
 
-#include <charconv>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -13,7 +11,6 @@ namespace bushd::daemon {
 namespace {
 
 constexpr std::int64_t kSeenPeriodUs = 1'000'000;
-constexpr const char* kOffset = "offset";  // of state::Settings
 constexpr std::int32_t kMostPast = 1000;
 constexpr int kMostReading = 16;  // anybody may ask for a history
 
@@ -26,13 +23,6 @@ std::string scale_text(const motion::Motor& motor) {
 
 bool has(std::uint16_t mask, const motion::Motor& motor) {
   return (mask >> motor.output().value & 1) != 0;
-}
-
-// The shortest that reads back as this number.
-std::string text_of_number(double number) {
-  char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, number);
-  return {text, end.ptr};
 }
 
 state::Trust trust_of(const motion::Motor& motor) {
@@ -57,34 +47,15 @@ void KeptPositions::use(const std::map<std::string, state::Kept>& kept, state::B
   keeper_.emplace(names, kept, backend);
   backend_ = &backend;
   required_ = required;
-  for (const MotorId motor : installation_.motors()) take_kept_offset(motor);
+  if (in_use_) in_use_();
 }
 
-void KeptPositions::keep_offset(MotorId id) {
-  if (!keeper_) return;
-  state::Settings settings = keeper_->kept(id).settings;
-  settings[kOffset] = {
-      .value = text_of_number(installation_[id].coordinates().scale().offset),
-      .replaces = text_of_number(installation_.config()[id].coordinates.scale().offset)};
-  keeper_->settings(id, std::move(settings));
+state::Settings KeptPositions::settings(MotorId id) const {
+  return keeper_ ? keeper_->kept(id).settings : state::Settings();
 }
 
-// It counts until that of bushd.toml is edited.
-void KeptPositions::take_kept_offset(MotorId id) {
-  const std::string in_file = text_of_number(installation_.config()[id].coordinates.scale().offset);
-  const state::Setting* kept = state::in_force(keeper_->kept(id).settings, kOffset, in_file);
-  motion::Motor& motor = installation_[id];
-  if (kept == nullptr || kept->value == in_file || !motor.coordinates().has_unit()) return;
-  units::Scale scale = motor.coordinates().scale();
-  const std::string& text = kept->value;
-  if (std::from_chars(text.data(), text.data() + text.size(), scale.offset).ec != std::errc()) {
-    return;
-  }
-  auto coordinates = units::Coordinates::make(std::move(scale));
-  if (!coordinates) return;
-  motor.set_coordinates(std::move(*coordinates));
-  outputs_.log(LogLevel::kInfo, motor.name() + ": its offset is " + text +
-                                    ", as it was set in operation; bushd.toml says " + in_file);
+void KeptPositions::keep(MotorId id, state::Settings settings) {
+  if (keeper_ && settings != keeper_->kept(id).settings) keeper_->settings(id, std::move(settings));
 }
 
 void KeptPositions::marked(std::int64_t now_us, const Result<void>& done) {

@@ -24,6 +24,8 @@ void add_motion_commands(CommandLine& line);
 void add_driver_commands(CommandLine& line);
 // confirm, history
 void add_history_commands(CommandLine& line);
+// config
+void add_config_commands(CommandLine& line);
 // table list, show, use, reload
 void add_table_commands(CommandLine& line);
 // latency-test, scan, address: on a line that no daemon has

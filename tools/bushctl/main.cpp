@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
     bushctl::add_motion_commands(line);
     bushctl::add_driver_commands(line);
     bushctl::add_history_commands(line);
+    bushctl::add_config_commands(line);
     bushctl::add_table_commands(line);
     bushctl::add_line_commands(line);
     return bushd::finished_output(line.run(argc, argv));
