@@ -17,7 +17,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       dry_runs_(installation_),
       tables_(installation_, interlocks_, outputs),
       moves_(installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs),
-      homing_(installation_, interlocks_, open_moves_, kept_, outputs),
+      homing_(installation_, interlocks_, open_moves_, moves_, kept_, outputs),
       stops_(installation_, moves_, homing_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),

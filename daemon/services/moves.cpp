@@ -142,6 +142,17 @@ void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, std::
   begin(id);
 }
 
+Result<std::int64_t> Moves::go_on(std::int64_t now_us, MotorId id, const api::Amount& position) {
+  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
+  const auto floor = installation_[id].floor_at({});
+  if (!floor) return fail(floor.error());
+  const auto target = target_of(id, position, api::Move::Kind::kAbsolute, *floor);
+  if (!target) return target;
+  const Mcu& mcu = installation_.mcu_of(id);
+  start_run(id, *target, mcu.earliest_start(now_us, installation_[id].output()), *floor);
+  return target;
+}
+
 void Moves::begin(MotorId id) {
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);

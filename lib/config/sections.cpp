@@ -407,6 +407,7 @@ Result<void> read_motors(Loading* loading) {
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
     if (auto read = read_restored(reader, &motor); !read) return read;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
+    if (auto checked = check_then(reader, motor); !checked) return checked;
     config.motors.push_back(std::move(motor));
   }
   return {};
