@@ -17,7 +17,9 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       dry_runs_(installation_),
       tables_(installation_, interlocks_, outputs),
       moves_(installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs),
-      homing_(installation_, interlocks_, open_moves_, moves_, kept_, outputs),
+      idle_drivers_(installation_, outputs,
+                    [this](MotorId motor) { return departures_.holds(motor); }),
+      homing_(installation_, interlocks_, open_moves_, moves_, kept_, idle_drivers_, outputs),
       stops_(installation_, moves_, homing_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
@@ -26,7 +28,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       position_compare_(installation_),
       state_(installation_, outputs),
       departures_(
-          installation_, interlocks_, kept_,
+          installation_, interlocks_, kept_, idle_drivers_,
           [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
             carry_out(now_us, asker, request);
           },
@@ -35,12 +37,13 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return departures_.holds(motor); }),
       // What an MCU's positions are worth comes before whoever goes by that.
-      services_{&kept_,           &journal_, &moves_,     &homing_,  &link_faults_,      &stops_,
-                &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_, &tables_,
-                &departures_,     &settings_},
+      services_{&kept_,   &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,
+                &stops_,  &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_,
+                &tables_, &departures_,     &settings_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener([this](MotorId motor) { settings_.offset_set(motor); });
+  drivers_.set_listener([this](McuId mcu) { idle_drivers_.switched(mcu); });
   kept_.set_listener([this] { settings_.take_kept(); });
   open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
     const motion::Motor& motor = installation_[ended.motor];
@@ -135,8 +138,8 @@ void Core::work() {
 
 std::int64_t Core::next_wake_us() const {
   if (moves_.begins() || !dry_runs_.idle()) return 0;
-  std::int64_t wake =
-      std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us()});
+  std::int64_t wake = std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(),
+                                idle_drivers_.next_wake_us()});
   for (const BusId id : installation_.buses()) {
     wake = std::min(wake, installation_[id].master.next_wake_us());
   }

@@ -19,6 +19,7 @@
 #include "daemon/services/emergency_stop.h"
 #include "daemon/services/health_publisher.h"
 #include "daemon/services/homing_queue.h"
+#include "daemon/services/idle_drivers.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/link_faults.h"
@@ -96,6 +97,7 @@ class Core {
   DryRuns dry_runs_;
   TablesInService tables_;
   Moves moves_;
+  IdleDrivers idle_drivers_;
   HomingQueue homing_;
   Stops stops_;
   EmergencyStop emergency_stop_;

@@ -62,12 +62,14 @@ const char* remedy_of(unsigned refusal) {
 }  // namespace
 
 HomingQueue::HomingQueue(Installation& installation, const Interlocks& interlocks,
-                         OpenMoves& open_moves, Moves& moves, KeptPositions& kept, Outputs& outputs)
+                         OpenMoves& open_moves, Moves& moves, KeptPositions& kept,
+                         IdleDrivers& idle_drivers, Outputs& outputs)
     : installation_(installation),
       interlocks_(interlocks),
       open_(open_moves),
       moves_(moves),
       kept_(kept),
+      idle_drivers_(idle_drivers),
       outputs_(outputs) {
   for ([[maybe_unused]] const McuId mcu : installation.mcus()) queues_.add();
 }
@@ -171,10 +173,10 @@ void HomingQueue::add(Task task) {
   installation_.changed = true;
 }
 
-// With a store as soon as that knows of the motion: step().
+// With a store as soon as that knows of the motion, and once its drivers are enabled: step().
 void HomingQueue::begin(Mcu& mcu) {
   Task& task = queues_[mcu.id].front();
-  if (kept_.keeps()) return;
+  if (kept_.keeps() || !idle_drivers_.none()) return;
   task.phase = Phase::kHoming;
   mcu.home(message_for(task));
 }
@@ -201,7 +203,8 @@ void HomingQueue::step(std::int64_t now_us, Mcu& mcu) {
 void HomingQueue::ask(std::int64_t now_us, Mcu& mcu) {
   Task& task = queues_[mcu.id].front();
   const auto ready = kept_.make_ready(now_us, task.motor);
-  if (ready && !*ready) return;
+  const bool powered = idle_drivers_.make_ready(now_us, mcu.id);
+  if (ready && !(*ready && powered)) return;
   kept_.not_wanted(task.motor);
   if (!ready) return end(mcu, Outcome::kFault, ready.error().text());
   task.phase = Phase::kHoming;

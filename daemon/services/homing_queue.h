@@ -12,6 +12,7 @@
 #include "daemon/interlocks.h"
 #include "daemon/outputs.h"
 #include "daemon/service.h"
+#include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
@@ -21,7 +22,7 @@ namespace bushd::daemon {
 class HomingQueue final : public Service {
  public:
   HomingQueue(Installation& installation, const Interlocks& interlocks, OpenMoves& open_moves,
-              Moves& moves, KeptPositions& kept, Outputs& outputs);
+              Moves& moves, KeptPositions& kept, IdleDrivers& idle_drivers, Outputs& outputs);
 
   void request(const api::Asker& asker, const api::Home& request);
 
@@ -86,6 +87,7 @@ class HomingQueue final : public Service {
   OpenMoves& open_;
   Moves& moves_;
   KeptPositions& kept_;
+  IdleDrivers& idle_drivers_;
   Outputs& outputs_;
   ById<McuId, Queue> queues_;
   std::optional<Sequence> sequence_;

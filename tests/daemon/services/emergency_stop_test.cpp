@@ -22,7 +22,8 @@ TEST(EmergencyStop, AFloodIsCarriedOutAndItsMemoryIsBounded) {
   KeptPositions kept(bench.installation, positions, journal, bench);
   DryRuns dry_runs(bench.installation);
   Moves moves(bench.installation, interlocks, journal, open_moves, dry_runs, bench);
-  HomingQueue homing(bench.installation, interlocks, open_moves, moves, kept, bench);
+  IdleDrivers idle_drivers(bench.installation, bench, [](MotorId) { return false; });
+  HomingQueue homing(bench.installation, interlocks, open_moves, moves, kept, idle_drivers, bench);
   EmergencyStop emergency_stop(bench.installation, interlocks, homing, bench);
   constexpr std::size_t kMore = 10;
   for (std::size_t i = 0; i < EmergencyStop::kMaxOpen + kMore; ++i) {
