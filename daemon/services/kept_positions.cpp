@@ -133,7 +133,9 @@ void KeptPositions::request(const api::Asker& asker, const api::GetHistory& requ
                                      .from_steps = move.from_steps,
                                      .to_steps = move.to_steps,
                                      .outcome = move.result,
-                                     .reason = move.reason});
+                                     .reason = move.reason,
+                                     .from_text = move.from_text,
+                                     .to_text = move.to_text});
         }
         asker.answer(api::Accepted{});
         asker.answer(api::Completed{
@@ -160,6 +162,12 @@ Result<bool> KeptPositions::make_ready(std::int64_t now_us, MotorId id) {
 void KeptPositions::past(state::PastMove move) {
   if (!keeper_) return;
   move.utime_us = outputs_.wall_clock_us();
+  const auto motor = installation_.find(move.motor);
+  if (motor && installation_[*motor].coordinates().has_unit()) {
+    const units::Coordinates& coordinates = installation_[*motor].coordinates();
+    if (move.from_text.empty()) move.from_text = coordinates.text(move.from_steps);
+    if (move.to_text.empty()) move.to_text = coordinates.text(move.to_steps);
+  }
   keeper_->past(std::move(move));
 }
 
@@ -186,15 +194,19 @@ void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
   const config::Motor& config = installation_.config()[id];
   const bool at_limit =
       has(mcu.report().forbidden_positive, motor) || has(mcu.report().forbidden_negative, motor);
+  const state::Kept& kept = keeper_->kept(id);
+  const bool same_scale = kept.record && kept.record->steps_per_unit == scale_text(motor);
   state::Verdict verdict = state::on_connecting(
-      keeper_->kept(id),
-      {.mcu = mcu.name(),
-       .unique_id = mcus_[mcu.id].heard->unique_id,
-       .boot_number = mcus_[mcu.id].heard->boot_number,
-       .output = motor.output().value,
-       .steps_per_unit = scale_text(motor),
-       .local = config.local,
-       .may_have_overrun = at_limit && config.limit_action == BUSHD_STOP_IMMEDIATE});
+      kept, {.mcu = mcu.name(),
+             .unique_id = mcus_[mcu.id].heard->unique_id,
+             .boot_number = mcus_[mcu.id].heard->boot_number,
+             .output = motor.output().value,
+             .steps_per_unit = scale_text(motor),
+             .position_text = same_scale && motor.coordinates().has_unit()
+                                  ? motor.coordinates().text(kept.record->steps)
+                                  : std::string(),
+             .local = config.local,
+             .may_have_overrun = at_limit && config.limit_action == BUSHD_STOP_IMMEDIATE});
   // What the MCU itself reports of before this daemon.
   if (first && motor.uncertain_reason() && verdict.trust != state::Trust::kUncertain) {
     verdict.trust = state::Trust::kUncertain;

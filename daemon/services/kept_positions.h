@@ -51,7 +51,8 @@ class KeptPositions final : public Service {
   std::uint64_t told() const { return keeper_ ? keeper_->told() : 0; }
   std::uint64_t kept_up_to() const { return keeper_ ? keeper_->kept_up_to() : 0; }
   std::optional<std::string> trouble() const { return keeper_ ? keeper_->trouble() : std::nullopt; }
-  // For the history. Says who asked, and where from.
+  // For the history. Says who asked, and where from; how people see both is added where it is not
+  // told.
   void past(state::PastMove move);
 
   // All that there is to keep is on the disk, as far as the disk takes it.

@@ -1,6 +1,7 @@
 #include "daemon/services/motor_settings.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "daemon/services/open_moves.h"
@@ -100,7 +101,13 @@ void MotorSettings::change(const api::Asker& asker, const api::Configure& reques
 }
 
 void MotorSettings::carry_out(const Plan& plan, const api::Asker& asker) {
+  // Where they stand for people, before.
+  std::map<MotorId, std::string> from;
   for (std::size_t i = 0; i < plan.motors.size(); ++i) {
+    const motion::Motor& motor = installation_[plan.motors[i]];
+    if (motor.coordinates().has_unit()) {
+      from[plan.motors[i]] = motor.coordinates().text(motor.position_steps());
+    }
     put(plan.motors[i], plan.settings[i]);
     keep(plan.motors[i]);
   }
@@ -117,8 +124,27 @@ void MotorSettings::carry_out(const Plan& plan, const api::Asker& asker) {
                 .from_steps = motor.position_steps(),
                 .to_steps = motor.position_steps(),
                 .result = std::string(api::word(api::Outcome::kDone)),
-                .reason = assignment(change.key, change.after) + ", was " + change.before});
+                .reason = assignment(change.key, change.after) + ", was " + change.before,
+                .from_text = from[change.motor]});
   }
+}
+
+void MotorSettings::offset_set(MotorId id, const units::Coordinates& before, const api::Asker& by) {
+  keep(id);
+  const motion::Motor& motor = installation_[id];
+  const auto offset = [](const units::Coordinates& coordinates) {
+    return config::text_of(config::Settings{.coordinates = coordinates}, SettingKey::kOffset);
+  };
+  kept_.past({.motor = motor.name(),
+              .what = "set",
+              .who = daemon::text_of(by),
+              .from_steps = motor.position_steps(),
+              .to_steps = motor.position_steps(),
+              .result = std::string(api::word(api::Outcome::kDone)),
+              .reason = assignment(SettingKey::kOffset, offset(motor.coordinates())) + ", was " +
+                        offset(before),
+              .from_text = before.text(motor.position_steps()),
+              .to_text = motor.coordinates().text(motor.position_steps())});
 }
 
 void MotorSettings::put(MotorId id, const config::Settings& settings) {

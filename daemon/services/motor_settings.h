@@ -31,7 +31,7 @@ class MotorSettings final : public Service {
   // The store is in use: what it has counts from now on.
   void take_kept();
   // Where it stands was given another user position.
-  void offset_set(MotorId motor) { keep(motor); }
+  void offset_set(MotorId motor, const units::Coordinates& before, const api::Asker& by);
 
   void step(std::int64_t now_us) override;
 

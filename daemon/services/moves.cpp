@@ -133,6 +133,7 @@ void Moves::cancel(MotorId motor, const std::string& reason) {
 
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
 void Moves::take_over(MotorId motor, const api::Asker& by) {
+  open_.not_stopped(motor);
   open_.end(motor, api::Outcome::kStopped,
             "was given a new target by " + text_of(by) + "; it moves on");
 }

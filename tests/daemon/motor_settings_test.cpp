@@ -212,6 +212,42 @@ TEST(MotorSettings, ChangesAreInTheHistory) {
   EXPECT_EQ(lab.history(number).front().what, "config");
   EXPECT_EQ(lab.history(number).front().reason, "offset = 2.5, was 10");
   EXPECT_THAT(lab.history(number).front().who, HasSubstr("test"));
+  EXPECT_EQ(lab.history(number).front().from_text, "10.0000 mm");
+  EXPECT_EQ(lab.history(number).front().to_text, "2.5000 mm");
+}
+
+TEST(MotorSettings, TheHistoryHasWhatWasSetAndMovedAsPeopleSawIt) {
+  SettingsLab lab;
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {400})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(api::SetPosition{.motors = {{"m01", api::UserUnits{3}}}})).result,
+            "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {800})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m02"}, {8})).result, "done");
+  const auto line = [](const api::PastMotion& motion) {
+    return motion.what + " " + motion.from_text + " to " + motion.to_text + " " + motion.reason;
+  };
+  const auto number = lab.send(api::GetHistory{.motor = "m01", .most = 3});
+  lab.wait(number);
+  std::vector<std::string> lines;
+  for (const api::PastMotion& motion : lab.history(number)) lines.push_back(line(motion));
+  EXPECT_THAT(lines, ElementsAre("set 3.0000 mm to 4.0000 mm ",
+                                 "set 11.0000 mm to 3.0000 mm offset = 2, was 10",
+                                 HasSubstr("move 10.0000 mm to 11.0000 mm")));
+  const auto plain = lab.send(api::GetHistory{.motor = "m02", .most = 1});
+  lab.wait(plain);
+  EXPECT_EQ(line(lab.history(plain).at(0)), "set  to  ");
+}
+
+TEST(MotorSettings, WhatWasKnownLastIsSaidInTheMotorsUnit) {
+  SettingsLab lab;
+  lab.send(Ask::kMoveBy, {"m01"}, {2000});
+  lab.run_for(0.7);
+  lab.bus(0).reboot(0);
+  lab.run_for(0.1);
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 20));
+  lab.run_for(0.2);
+  EXPECT_THAT(lab.motor("m01").uncertain_reason,
+              testing::ContainsRegex("last known: [0-9]+ steps .1[0-9].[0-9]* mm."));
 }
 
 }  // namespace
