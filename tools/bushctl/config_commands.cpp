@@ -95,7 +95,7 @@ void add_config_commands(CommandLine& line) {
           "bushctl config --save                writes that into bushd.toml, on the PC of bushd\n"
           "What is changed is kept in the state store, and counts until its key in bushd.toml is "
           "edited.")
-      .words("NAME KEY=VALUE", &options->words, "Motor (default: all), then changes",
+      .words("NAME", &options->words, "Motor (default: all), then changes KEY=VALUE",
              Command::Needed::kNo)
       .flag("--diff", &options->diff, "Show only what differs from bushd.toml")
       .flag("--save", &options->save, "Write what differs into bushd.toml")

@@ -188,7 +188,8 @@ void add_home(CommandLine& line) {
           "with "
           "--all those of one 'order' are homed together, the lowest first, and one that is not "
           "found ends the others. With --wait the exit code is 0 only if every motor has found its "
-          "switch; 'bushctl stop' ends it.")
+          "switch; 'bushctl stop' ends it, and with --wait Ctrl-C (with --all it stops all "
+          "motors).")
       .words("NAME", &options->motors, "Motors", Command::Needed::kNo)
       .flag("--all", &options->all, "All motors with a home switch, by their order")
       .option("--speed", &options->speed, kSpeed)
