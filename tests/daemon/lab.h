@@ -123,6 +123,9 @@ class Lab : public daemon::Outputs, private state::Backend {
   state::SimDisk& disk() { return *state_disk_; }
   // The disk takes that long for each thing.
   std::int64_t disk_us = 500;
+  // The daemon reads what has arrived once in that time, as from an adapter that collects bytes: of
+  // a large lab far cheaper than byte by byte, which is 0.
+  std::int64_t read_period_us = 0;
   // Another bushd.toml with the same MCUs: the daemon is started again.
   void use_configuration(const std::string& toml);
   std::vector<api::PastMotion> history(std::int64_t number) const;
