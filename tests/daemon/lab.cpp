@@ -149,7 +149,7 @@ void Lab::restart_daemon() {
 }
 
 void Lab::keep_positions() {
-  state_disk_ = std::make_unique<state::SimDisk>(1);
+  state_disk_ = std::make_unique<sim::SimDisk>(1);
   restart_daemon();
 }
 
