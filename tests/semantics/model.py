@@ -137,8 +137,12 @@ class Motor:
             found = self.steps_of_position(amount)
         else:
             found = {base + self.steps_of_distance(amount)}
+        if any(abs(target - (0 if absolute else base)) > 2 * MOST_STEPS for target in found):
+            raise Refused("out of range")
         if self.trust == "uncertain":
             raise Refused("its position is uncertain")
+        if any(abs(target) > MOST_STEPS for target in found):
+            raise Refused("beyond")
         return found
 
     def set_user(self, user: str):
