@@ -109,7 +109,8 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   std::optional<std::uint16_t> boot_number;
   if (view.identified) boot_number = view.identity.boot_number;
   motion::PositionTrust trust = motor.trust(boot_number);
-  if (trust.trust == api::Trust::kKnown && view.outdated_us > 0) {
+  const bool good = trust.trust == api::Trust::kKnown || trust.trust == api::Trust::kRestored;
+  if (good && view.outdated_us > 0) {
     trust = {api::Trust::kStale,
              "MCU " + mcu.name() + " has not reported since this daemon stood still",
              outputs_.wall_clock_us() - view.outdated_us};

@@ -70,6 +70,22 @@ TEST(KeptPositions, AreRestoredAfterAnMcuHasLostPowerAtRest) {
   lab.expect_at_shaft("m01", api::Trust::kKnown);
 }
 
+TEST(KeptPositions, AreStaleToADaemonThatHasStoodStillUntilTheMcuReports) {
+  KeptLab lab;
+  lab.reach("m01", 300);
+  lab.run_for(0.2);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
+  // Another one may have moved it meanwhile.
+  lab.pause_daemon(1.7);
+  const auto outdated = [&lab] { return lab.state_of("hall:1").state == api::McuState::kBusy; };
+  ASSERT_TRUE(lab.run_until(outdated, 0.01));
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kStale);
+  lab.run_for(0.5);
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
+}
+
 TEST(KeptPositions, AreRestoredAfterEverythingHasLostPowerAtRest) {
   KeptLab lab;
   lab.reach("m01", 300);

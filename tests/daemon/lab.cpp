@@ -153,7 +153,7 @@ void Lab::restart_daemon() {
 }
 
 void Lab::keep_positions() {
-  state_disk_ = std::make_unique<state::SimDisk>(1);
+  state_disk_ = std::make_unique<sim::SimDisk>(1);
   restart_daemon();
 }
 
@@ -261,7 +261,10 @@ void Lab::advance() {
   }
   core().step(now_us());
   std::int64_t next = std::max(core().next_wake_us() * 1000, now_ns_ + 1000);
-  for (const SimulatedBus& bus : buses_) next = std::min(next, bus.bus->next_event_ns());
+  if (read_period_us > 0) next = std::min(next, now_ns_ + read_period_us * 1000);
+  for (const SimulatedBus& bus : buses_) {
+    if (read_period_us == 0) next = std::min(next, bus.bus->next_event_ns());
+  }
   for (const auto& [due_us, answer] : state_jobs_) next = std::min(next, due_us * 1000);
   now_ns_ = std::max(next, now_ns_);
   run_buses();
