@@ -50,6 +50,9 @@ class Moves final : public Service {
   // Those that move ramp down and stay in their moves, until they are resumed or stopped.
   void pause(std::int64_t now_us, const std::vector<MotorId>& motors);
   void resume(std::int64_t now_us, const std::vector<MotorId>& motors);
+  // From rest, as the second part of what the motor does for a request that is open already: begins
+  // a move to this position, and says which step that is.
+  Result<std::int64_t> go_on(std::int64_t now_us, MotorId motor, const api::Amount& position);
 
   // Ramps down those that move; those that wait for the trigger wait no more.
   void stop(std::int64_t now_us, const std::vector<MotorId>& motors);

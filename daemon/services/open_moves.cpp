@@ -19,8 +19,9 @@ void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors, std::
 }
 
 void OpenMoves::tell(MotorId id, api::Outcome outcome, const std::string& reason) const {
-  if (!listener_) return;
-  const Open& open = open_.at(*book_.move_of(id));
+  const auto move = book_.move_of(id);
+  if (!listener_ || !move) return;
+  const Open& open = open_.at(*move);
   listener_({.motor = id,
              .what = open.what,
              .asker = open.asker,
@@ -39,14 +40,21 @@ void OpenMoves::say(MotorId motor, api::Outcome outcome, Saying saying) {
   if (move) open_.at(*move).sayings.insert_or_assign({motor, outcome}, std::move(saying));
 }
 
-void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason) {
+void OpenMoves::stopped_by(MotorId motor, const std::string& who) {
+  if (book_.move_of(motor)) stopped_by_[motor] = who;
+}
+
+void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& why) {
   installation_.changed = true;
   const auto move = book_.move_of(id);
-  if (!move) return;
-  if (reason == motion::kAtTarget || reason == motion::kOnRequest) {
+  if (move && (why == motion::kAtTarget || why == motion::kOnRequest)) {
     if (const auto said = open_.at(*move).sayings.extract({id, outcome})) {
       return end(id, said.mapped().outcome, said.mapped().reason);
     }
+  }
+  std::string reason = why;
+  if (const auto who = stopped_by_.extract(id); who && outcome == api::Outcome::kStopped) {
+    reason += ", asked for by " + who.mapped();
   }
   tell(id, outcome, reason);
   const motion::Motor& motor = installation_[id];
@@ -68,6 +76,7 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason)
                        .unit = coordinates.unit(),
                        .precision = coordinates.precision(),
                        .table = open.mapped().tables[i],
+                       .who = text_of(open.mapped().asker),
                        .legs = open.mapped().plans[part.motor].legs,
                        .most_steps_per_s = open.mapped().plans[part.motor].most_steps_per_s});
   }

@@ -9,10 +9,6 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
   std::erase_if(*motors, [this](MotorId motor) { return !can_be_stopped(motor); });
-  for (const MotorId motor : *motors) {
-    open_moves_.say(motor, api::Outcome::kStopped,
-                    {api::Outcome::kStopped, "stopped by " + text_of(asker)});
-  }
   stop(now_us, *motors);
   if (open_.size() >= kMaxOpen) {
     open_.front().asker.answer(api::Completed{

@@ -145,7 +145,7 @@ TEST(Jogs, WhoIsStoppedByOthersMustLetGoFirst) {
   EXPECT_THAT(lab.wait(lab.send_as("remote", jog(1000))).reason, HasSubstr("is being stopped"));
   EXPECT_EQ(lab.wait(stop).result, "done");
   EXPECT_EQ(lab.last_reply(first).result, "stopped");
-  EXPECT_THAT(lab.last_reply(first).reason, HasSubstr("stopped by command"));
+  EXPECT_THAT(lab.last_reply(first).reason, HasSubstr("stopped on request, asked for by command"));
   const std::int64_t stands = lab.shaft_steps("m01");
   for (int i = 0; i < 5; ++i) {
     EXPECT_THAT(lab.wait(lab.send_as("remote", jog(1000))).reason, HasSubstr("let go first"));

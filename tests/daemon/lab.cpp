@@ -83,10 +83,14 @@ class Lab::Client final : public api::Session {
     const auto* history =
         completed == nullptr ? nullptr : std::get_if<api::MotionHistory>(&completed->detail);
     if (history != nullptr) histories[number] = history->motions;
+    const auto* configuration =
+        completed == nullptr ? nullptr : std::get_if<api::Configuration>(&completed->detail);
+    if (configuration != nullptr) configurations[number] = *configuration;
   }
   std::map<std::int64_t, std::vector<Answer>> answers;  // by number
   std::map<std::int64_t, std::vector<api::PastMotion>> histories;
   bool has_left = false;
+  std::map<std::int64_t, api::Configuration> configurations;
 };
 
 Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink)
@@ -154,7 +158,7 @@ void Lab::restart_daemon() {
 }
 
 void Lab::keep_positions() {
-  state_disk_ = std::make_unique<state::SimDisk>(1);
+  state_disk_ = std::make_unique<sim::SimDisk>(1);
   restart_daemon();
 }
 
@@ -176,6 +180,14 @@ void Lab::use_configuration(const std::string& toml) {
 
 std::vector<api::PastMotion> Lab::history(std::int64_t number) const {
   return client_->histories[number];
+}
+
+std::vector<std::string> Lab::settings(std::int64_t number) const {
+  std::vector<std::string> lines;
+  for (const auto& [motor, key, value, in_file] : client_->configurations[number].settings) {
+    lines.push_back(motor + " " + key + " = " + value + ", in the file " + in_file);
+  }
+  return lines;
 }
 
 void Lab::mark(std::vector<state::Mark> marks) {
@@ -254,7 +266,10 @@ void Lab::advance() {
   }
   core().step(now_us());
   std::int64_t next = std::max(core().next_wake_us() * 1000, now_ns_ + 1000);
-  for (const SimulatedBus& bus : buses_) next = std::min(next, bus.bus->next_event_ns());
+  if (read_period_us > 0) next = std::min(next, now_ns_ + read_period_us * 1000);
+  for (const SimulatedBus& bus : buses_) {
+    if (read_period_us == 0) next = std::min(next, bus.bus->next_event_ns());
+  }
   for (const auto& [due_us, answer] : state_jobs_) next = std::min(next, due_us * 1000);
   now_ns_ = std::max(next, now_ns_);
   run_buses();

@@ -15,7 +15,7 @@
 
 #include "daemon/core.h"
 #include "sim/bus.h"
-#include "state/sim_disk.h"
+#include "sim_disk/sim_disk.h"
 #include "state/store.h"
 
 // Failures print words.
@@ -125,12 +125,17 @@ class Lab : public daemon::Outputs, private state::Backend {
   void restart_daemon();
   // From now on positions are kept, on a disk of the simulation: the daemon is started again.
   void keep_positions();
-  state::SimDisk& disk() { return *state_disk_; }
+  sim::SimDisk& disk() { return *state_disk_; }
   // The disk takes that long for each thing.
   std::int64_t disk_us = 500;
+  // The daemon reads what has arrived once in that time, as from an adapter that collects bytes: of
+  // a large lab far cheaper than byte by byte, which is 0.
+  std::int64_t read_period_us = 0;
   // Another bushd.toml with the same MCUs: the daemon is started again.
   void use_configuration(const std::string& toml);
   std::vector<api::PastMotion> history(std::int64_t number) const;
+  // "m01 offset = 12.5, in the file 0", each a line.
+  std::vector<std::string> settings(std::int64_t number) const;
   // The PC loses power: the daemon, and what the disk had not synced. A new one starts.
   void cut_pc_power();
   // Bytes on the way to MCUs are handed to this before they are sent; returning false drops them.
@@ -199,7 +204,7 @@ class Lab : public daemon::Outputs, private state::Backend {
   std::vector<std::string> move_lines_;
   std::vector<std::string> kept_;
   std::vector<std::function<void()>> disk_;  // what it is to tell the core
-  std::unique_ptr<state::SimDisk> state_disk_;
+  std::unique_ptr<sim::SimDisk> state_disk_;
   std::optional<state::Store> store_;
   std::vector<std::pair<std::int64_t, std::function<void()>>> state_jobs_;  // when they are done
 };

@@ -111,7 +111,8 @@ TEST(Legs, AStopEndsTheMoveInEveryLeg) {
   lab.send(Ask::kStop, {"m01"});
   const Answer in_first = lab.wait(first);
   EXPECT_EQ(in_first.result, "stopped");
-  EXPECT_THAT(in_first.reason, HasSubstr("m01: stopped by command 2 of test"));
+  EXPECT_THAT(in_first.reason,
+              HasSubstr("m01: stopped on request, asked for by command 2 of test"));
   lab.run_for(1);
   EXPECT_EQ(in_first.position_steps[0], lab.shaft_steps("m01")) << "no other leg follows";
   const auto second = lab.send(Ask::kMoveTo, {"m01"}, {-1000});

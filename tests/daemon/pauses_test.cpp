@@ -77,7 +77,7 @@ TEST(Pauses, AStopEndsThePausedMove) {
   const std::int64_t stands = lab.shaft_steps("m01");
   EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
   EXPECT_EQ(lab.wait(move).result, "stopped");
-  EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("stopped by command"));
+  EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("stopped on request, asked for by command"));
   EXPECT_EQ(lab.wait(lab.send(api::Resume{})).reason, "resumed: 0 motors");
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), stands);

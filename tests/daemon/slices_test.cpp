@@ -70,6 +70,7 @@ class Slices : public testing::Test {
  protected:
   void open(const std::string& toml, int motors) {
     lab_ = std::make_unique<Lab>(toml);
+    lab_->read_period_us = 400;  // until 128 MCUs have connected, two million bytes arrive
     motors_ = motors;
     lab_->connect();
   }

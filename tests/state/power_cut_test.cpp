@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <random>
 
+#include "sim_disk/sim_disk.h"
 #include "state/keeper.h"
 #include "state/rules.h"
-#include "state/sim_disk.h"
 #include "state/store.h"
 
 namespace bushd::state {
@@ -238,7 +238,7 @@ class Lab {
 
   std::uint64_t seed_;
   std::mt19937_64 random_;
-  SimDisk disk_;
+  sim::SimDisk disk_;
   ById<MotorId, Stage> stages_;
   std::uint16_t boot_ = 1;
   std::int64_t now_us_ = 1'000'000;

@@ -5,8 +5,8 @@
 
 #include <fstream>
 
+#include "sim_disk/sim_disk.h"
 #include "state/rules.h"
-#include "state/sim_disk.h"
 
 namespace bushd::state {
 namespace {
@@ -36,7 +36,7 @@ Opening an_opening(std::vector<std::string> motors = {"phi", "theta"}) {
   return {.folder = "/state", .motors = std::move(motors), .utime_us = 5'000'000, .random = 42};
 }
 
-Store open(SimDisk& disk, const Opening& opening = an_opening()) {
+Store open(sim::SimDisk& disk, const Opening& opening = an_opening()) {
   auto store = Store::open(disk, opening);
   if (!store) throw std::runtime_error(store.error().text());
   return std::move(*store);
@@ -54,7 +54,7 @@ PastMove past_move(const std::string& motor, std::int64_t utime_us) {
 }
 
 TEST(Store, KeepsWhatWasWritten) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   {
     Store store = open(disk);
     EXPECT_THAT(store.notes(), IsEmpty());
@@ -75,7 +75,7 @@ TEST(Store, KeepsWhatWasWritten) {
 }
 
 TEST(Store, AMarkBeyondTheRecordIsAMotorThatMoves) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   {
     Store store = open(disk);
     ASSERT_TRUE(store.write({.records = {{"theta", standing_at(1200, 0)}}}));
@@ -94,7 +94,7 @@ TEST(Store, ManyMotorsThatStartAtOnceCostOneSync) {
     motors.push_back("m" + std::to_string(i));
     marks.push_back({motors.back(), 1});
   }
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   Store store = open(disk, an_opening(motors));
   const std::uint64_t before = disk.syncs();
   ASSERT_TRUE(store.mark(marks));
@@ -102,7 +102,7 @@ TEST(Store, ManyMotorsThatStartAtOnceCostOneSync) {
 }
 
 TEST(Store, MotorsThatAreNewGetSlotsAndOthersKeepTheirs) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   for (int count = 1; count < 80; count += 13) {
     std::vector<std::string> motors;
     for (int i = 0; i < count; ++i) motors.push_back("m" + std::to_string(i));
@@ -115,7 +115,7 @@ TEST(Store, MotorsThatAreNewGetSlotsAndOthersKeepTheirs) {
 }
 
 TEST(Store, ATornSlotCountsAsMoving) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   {
     Store store = open(disk);
     ASSERT_TRUE(store.write({.records = {{"theta", standing_at(1200, 0)}}}));
@@ -129,7 +129,7 @@ TEST(Store, ATornSlotCountsAsMoving) {
 
 TEST(Store, MarksThatAreGoneOrOfAnotherTimeLeaveNoMotorAtRest) {
   for (const bool gone : {true, false}) {
-    SimDisk disk(1);
+    sim::SimDisk disk(1);
     std::vector<std::uint8_t> older;
     {
       Store store = open(disk);
@@ -149,7 +149,7 @@ TEST(Store, MarksThatAreGoneOrOfAnotherTimeLeaveNoMotorAtRest) {
 }
 
 TEST(Store, AnOlderCopyOfTheDatabaseLeavesNoMotorAtRest) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   { Store store = open(disk); }
   {
     Store store = open(disk);
@@ -181,7 +181,7 @@ void expect_lost(const Kept& kept) {
 }
 
 TEST(Store, ADatabaseThatIsGoneIsNoticed) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   {
     Store store = open(disk);
     ASSERT_TRUE(store.mark({{"theta", 1}}));
@@ -196,7 +196,7 @@ TEST(Store, WhatIsNoGoodDatabaseIsMovedAsideNotDeleted) {
       "hello, this is a text of somebody's that has nothing to do with positions",
       std::string("SQLite format 3\0 and then something else", 40), "damaged", "truncated"};
   for (const std::string& content : contents) {
-    SimDisk disk(1);
+    sim::SimDisk disk(1);
     {
       Store store = open(disk);
       ASSERT_TRUE(store.write({.records = {{"theta", standing_at(1200, 0)}}}));
@@ -220,7 +220,7 @@ TEST(Store, WhatIsNoGoodDatabaseIsMovedAsideNotDeleted) {
 }
 
 TEST(Store, AnEmptyFileIsADatabaseThatIsGone) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   { Store store = open(disk); }
   disk.content(kDatabase).clear();
   expect_lost(open(disk).kept().at("theta"));
@@ -228,7 +228,7 @@ TEST(Store, AnEmptyFileIsADatabaseThatIsGone) {
 
 TEST(Store, UnguardedMotionLeavesNoMotorAtRestUnlessItEndedWell) {
   for (const bool ended : {true, false}) {
-    SimDisk disk(1);
+    sim::SimDisk disk(1);
     {
       Opening opening = an_opening();
       opening.unguarded = true;
@@ -243,7 +243,7 @@ TEST(Store, UnguardedMotionLeavesNoMotorAtRestUnlessItEndedWell) {
 }
 
 TEST(Store, ABrokenDiskIsAnError) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   Store store = open(disk);
   disk.set_broken(true);
   EXPECT_FALSE(store.mark({{"theta", 1}}));
@@ -254,7 +254,7 @@ TEST(Store, ABrokenDiskIsAnError) {
 }
 
 TEST(Database, HistoryIsBoundedInTimeAndRows) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   Store store = open(disk);
   const std::int64_t start = 10 * Database::kHistoryUs;
   Batch batch;
@@ -273,18 +273,20 @@ TEST(Database, HistoryIsBoundedInTimeAndRows) {
 }
 
 TEST(Database, AnOlderVersionIsCopiedThenBroughtUpToDate) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   { Store store = open(disk); }
-  const std::vector<const char*> newer{all_versions()[0],
-                                       "ALTER TABLE setting ADD COLUMN who TEXT"};
+  const std::size_t now = all_versions().size();
+  std::vector<const char*> newer(all_versions().begin(), all_versions().end());
+  newer.push_back("ALTER TABLE setting ADD COLUMN who TEXT");
   std::vector<std::string> notes;
   {
     auto opened = Database::open(disk, kDatabase, 0, notes, newer);
     ASSERT_TRUE(opened) << opened.error().text();
   }
-  EXPECT_THAT(notes, ElementsAre(HasSubstr("from version 1 to 2")));
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("from version " + std::to_string(now) + " to " +
+                                           std::to_string(now + 1))));
   // The copy is a database of the version before.
-  EXPECT_TRUE(Database::open(disk, "/state/state.db.version-1", 0, notes));
+  EXPECT_TRUE(Database::open(disk, "/state/state.db.version-" + std::to_string(now), 0, notes));
   // This version does not know the newer one, and leaves it alone.
   const auto refused = Database::open(disk, kDatabase, 0, notes);
   ASSERT_FALSE(refused);
@@ -292,10 +294,26 @@ TEST(Database, AnOlderVersionIsCopiedThenBroughtUpToDate) {
   EXPECT_TRUE(Database::open(disk, kDatabase, 0, notes, newer));
 }
 
+TEST(Database, TheFirstVersionKeepsItsHistory) {
+  SimDisk disk(1);
+  std::vector<std::string> notes;
+  {
+    auto opened = Database::open(disk, kDatabase, 0, notes, all_versions().first(1));
+    ASSERT_TRUE(opened) << opened.error().text();
+  }
+  auto opened = Database::open(disk, kDatabase, 0, notes);
+  ASSERT_TRUE(opened) << opened.error().text();
+  PastMove move = past_move("theta", 5);
+  move.from_text = "1.0 mm";
+  move.to_text = "2.0 mm";
+  ASSERT_TRUE(opened->write({.moves = {move}}));
+  EXPECT_THAT(*opened->history("theta", 3), ElementsAre(move));
+}
+
 // Nothing that was acknowledged is lost, and nothing that was not marked looks like a move.
 TEST(Store, SurvivesPowerCutsAtEveryWrite) {
   for (std::uint64_t cut = 1; cut < 120; ++cut) {
-    SimDisk disk(cut);
+    sim::SimDisk disk(cut);
     std::uint64_t marked = 0;
     std::uint64_t asked = 0;
     std::optional<std::uint64_t> written;

@@ -116,6 +116,8 @@ int refused(const api::Reply& reply) {
 int send(const Connection& connection, const api::Request& request, Client::Until until,
          Hope hope) {
   const api::MotorNames motors = motors_of(request);
+  const auto* home = std::get_if<api::Home>(&request);
+  const bool moves = !motors.empty() || (home != nullptr && home->all);
   return with_client(connection, [&](Client& client) {
     bool accepted = false;
     bool stopped = false;
@@ -127,7 +129,7 @@ int send(const Connection& connection, const api::Request& request, Client::Unti
       for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
       std::fflush(stdout);
     };
-    if (until == Client::Until::kResult && !motors.empty()) {
+    if (until == Client::Until::kResult && moves) {
       meanwhile.on_state = [&](const bushd::client::Status& status) { progress.show(status); };
       meanwhile.on_interrupt = [&] {
         progress.clear();
@@ -141,10 +143,9 @@ int send(const Connection& connection, const api::Request& request, Client::Unti
     if (reply && as_hoped(*reply, hope)) return static_cast<int>(kDone);
     if (!reply && client.interrupted() && stopped) {
       fmt::print(stderr, "bushctl: the stop was sent; 'bushctl where' shows where motors stand\n");
-    } else if (!reply && client.interrupted() && accepted && !motors.empty()) {
-      const bool homes = std::holds_alternative<api::Home>(request);
+    } else if (!reply && client.interrupted() && accepted && moves) {
       fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
-                 homes ? "homing" : "move");
+                 home != nullptr ? "homing" : "move");
     }
     const int code = reply ? refused(*reply) : failure(client, reply.error());
     return stopped ? static_cast<int>(kInterrupted) : code;

@@ -28,6 +28,8 @@ void add_history_commands(CommandLine& line);
 void add_jog_commands(CommandLine& line);
 // pause, resume, hold, release
 void add_pause_commands(CommandLine& line);
+// config
+void add_config_commands(CommandLine& line);
 // table list, show, use, reload
 void add_table_commands(CommandLine& line);
 // latency-test, scan, address: on a line that no daemon has

@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
     bushctl::add_pause_commands(line);
     bushctl::add_driver_commands(line);
     bushctl::add_history_commands(line);
+    bushctl::add_config_commands(line);
     bushctl::add_table_commands(line);
     bushctl::add_line_commands(line);
     if (const auto words = bushd::completion_asked(argc, argv)) {

@@ -206,6 +206,19 @@ Request Clients::disarm() {
   return request;
 }
 
+// Those that are uncertain, or any: people are not always right.
+Request Clients::confirm() {
+  Request request = make(Ask::kConfirm);
+  std::vector<Choice> some = motors_that(false, !random_.one_in(4));
+  for (std::int64_t n = random_.between(1, 4); n > 0 && !some.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(some.size()));
+    request.add(some[index].name, 0);
+    some.erase(some.begin() + static_cast<std::ptrdiff_t>(index));
+  }
+  if (request.motors.empty()) request.add(any_motor(), 0);
+  return request;
+}
+
 bool Clients::says(const char* detail) const {
   return std::any_of(witness_.states().begin(), witness_.states().end(), [&](const auto& state) {
     return state && state->detail.find(detail) != std::string::npos;
@@ -252,6 +265,8 @@ Request Clients::compose(CommandKind kind) {
       return arm();
     case CommandKind::kDisarm:
       return disarm();
+    case CommandKind::kConfirm:
+      return confirm();
   }
   return nonsense();
 }

@@ -57,6 +57,7 @@ class Clients {
   Request home();
   Request arm();
   Request disarm();
+  Request confirm();
   std::string any_motor();
   // Motors that the daemon says are at rest (or moving), uncertain (or known).
   std::vector<Choice> motors_that(bool moving, bool uncertain) const;

@@ -14,10 +14,12 @@ constexpr std::uint32_t kStream = 200;  // of randomness; garblers have the next
 // latency timer is as long as its maker set it.
 constexpr bushd::sim::TimeNs kMaxLatencyNs = 16'000'000;
 
+constexpr bushd::sim::TimeNs kStartAgainNs = 100'000'000;
+
 }  // namespace
 
 Host::Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness,
-           Recent& recent, std::uint64_t seed)
+           Recent& recent, std::uint64_t seed, bool keeps)
     : config_(config),
       bus_(bus),
       witness_(witness),
@@ -27,6 +29,7 @@ Host::Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& w
   bus_.on_master_byte = [this](std::uint8_t byte, TimeNs end_ns) {
     if (plugged_ && end_ns >= silent_until_ns_) arriving_.push_back(byte);
   };
+  if (keeps) kept_ = std::make_unique<Kept>(config, seed);
   plug_in();
   start();
 }
@@ -48,6 +51,12 @@ void Host::start() {
           .now_us = [this] { return now_us(); }},
       run_number_);
   inbox_.clear();
+  if (kept_) {
+    if (const auto used = kept_->use(now_ns_, core()); !used) {
+      recent_.note(now_ns_, "it cannot start: " + used.error().text());
+      return kill(now_ns_, now_ns_ + kStartAgainNs);
+    }
+  }
   if (plugged_) core().port_opened(now_us(), {});
   step();
 }
@@ -97,8 +106,18 @@ void Host::step() {
   if (!daemon_->idle()) wake_ns_ = now_ns_;
 }
 
+bool Host::anything_due() const {
+  return now_ns_ >= wake_ns_ || !messages_.empty() || !disk_.empty() ||
+         (!inbox_.empty() && inbox_.front().due_ns <= now_ns_) ||
+         (kept_ && kept_->next_ns() <= now_ns_);
+}
+
 void Host::run(TimeNs now_ns) {
   now_ns_ = now_ns;
+  if (kept_ && !kept_->has_power()) {
+    recent_.note(now_ns_, "the PC has lost power while it wrote to its disk");
+    cut_power(now_ns_, now_ns_ + kStartAgainNs);
+  }
   take_in();
   if (!plugged_ && now_ns_ >= back_ns_) {
     recent_.note(now_ns_, "adapter is back");
@@ -109,12 +128,11 @@ void Host::run(TimeNs now_ns) {
     if (now_ns_ < starts_ns_) return;
     recent_.note(now_ns_, "a new daemon starts");
     start();
+    if (!daemon_) return;
   }
-  if (now_ns_ < paused_until_ns_) return;
-  const bool due = now_ns_ >= wake_ns_ || !messages_.empty() || !disk_.empty() ||
-                   (!inbox_.empty() && inbox_.front().due_ns <= now_ns_);
-  if (!due) return;
+  if (now_ns_ < paused_until_ns_ || !anything_due()) return;
   deliver();
+  if (kept_) kept_->run(now_ns_, core());
   for (const auto& told : std::exchange(disk_, {})) told();
   daemon_->hear();
   while (!messages_.empty()) {
@@ -223,6 +241,7 @@ Host::TimeNs Host::next_ns() const {
   if (!daemon_) return std::min(next, starts_ns_);
   if (now_ns_ < paused_until_ns_) return std::min(next, paused_until_ns_);
   if (!inbox_.empty()) next = std::min(next, inbox_.front().due_ns);
+  if (kept_) next = std::min(next, kept_->next_ns());
   return std::max(std::min(next, wake_ns_), now_ns_ + 1000);
 }
 
@@ -270,10 +289,20 @@ void Host::kill(TimeNs now_ns, TimeNs until_ns) {
   messages_.clear();
   disk_.clear();
   paused_until_ns_ = 0;
+  if (kept_) kept_->end_process();
+}
+
+void Host::cut_power(TimeNs now_ns, TimeNs until_ns) {
+  kill(now_ns, until_ns);
+  if (kept_) kept_->cut_power();
+  arriving_.clear();
+  free_ns_ = 0;
+  bus_.break_off_master();
 }
 
 Host::TimeNs Host::faults_over_ns() const {
   TimeNs over = std::max(silent_until_ns_, paused_until_ns_);
+  if (kept_) over = std::max(over, kept_->faults_over_ns());
   if (!plugged_) over = std::max(over, back_ns_);
   if (!daemon_) over = std::max(over, starts_ns_);
   return over;

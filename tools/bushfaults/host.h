@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon_run.h"
+#include "kept.h"
 #include "recent.h"
 #include "request.h"
 #include "sim/bus.h"
@@ -28,10 +29,13 @@ class Host final : public bushd::daemon::Outputs {
   // No adapter answers sooner, so that time can be moved in strides of this length.
   static constexpr TimeNs kStrideNs = 400'000;
 
-  // All of them outlive the host. The daemon starts at once.
+  // All of them outlive the host. The daemon starts at once. `keeps` positions on a disk.
   Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness, Recent& recent,
-       std::uint64_t seed);
+       std::uint64_t seed, bool keeps);
   ~Host() override;
+
+  // Null: they are not.
+  Kept* kept() { return kept_.get(); }
 
   // Time has come to now_ns, and the bus with it.
   void run(TimeNs now_ns);
@@ -56,6 +60,8 @@ class Host final : public bushd::daemon::Outputs {
   void unplug(TimeNs now_ns, TimeNs until_ns);
   void pause(TimeNs now_ns, TimeNs until_ns);
   void kill(TimeNs now_ns, TimeNs until_ns);
+  // The PC has no power until then.
+  void cut_power(TimeNs now_ns, TimeNs until_ns);
   // When the faults above are over, garblings that wait for bytes excepted.
   TimeNs faults_over_ns() const;
 
@@ -90,6 +96,7 @@ class Host final : public bushd::daemon::Outputs {
   void take_in();
   void deliver();
   void step();
+  bool anything_due() const;
 
   const bushd::config::Config& config_;
   bushd::sim::Bus& bus_;
@@ -99,6 +106,7 @@ class Host final : public bushd::daemon::Outputs {
   std::array<bushd::sim::Garbler, 2> garbler_;  // by Direction
   TimeNs now_ns_ = 0;
 
+  std::unique_ptr<Kept> kept_;
   std::unique_ptr<DaemonRun> daemon_;  // none: killed
   std::int64_t run_number_ = 0;
   TimeNs starts_ns_ = 0;  // when the next daemon starts, or this one has started

@@ -34,6 +34,8 @@ constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
     {"floods", 0, "50 .. 2000 requests at once, of up to 200 clients"},
     {"crowds", 0, "likewise, of up to 2000 clients"},
     {"second-daemons", 12, "another daemon for the same MCUs starts, for 0.1 .. 30 s"},
+    {"power-cuts", 0, "the PC loses power for 10 ms .. 3 s, mostly with some MCUs or all"},
+    {"disk-faults", 0, "the disk fails, or takes up to 2 s for a thing, for 10 ms .. 5 s"},
 }};
 
 constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
@@ -50,6 +52,7 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"homings", 0, "of 1 .. 4 motors; half of all have a switch then, which bounces"},
     {"armings", 0, "1 .. 8 motors wait for the trigger"},
     {"disarmings", 0, "of one motor or of all"},
+    {"confirmations", 0, "that motors stand where they are shown, right or wrong"},
 }};
 
 template <std::size_t kSize>

@@ -40,10 +40,12 @@ enum class FaultKind : std::uint8_t {
   kStaleRepeat,
   kFlood,
   kCrowd,
-  // Last, so that the others' stories stay as they are without it.
+  // Last, so that the others' stories stay as they are without them.
   kSecondDaemon,
+  kPowerCut,
+  kDiskFault,
 };
-inline constexpr std::size_t kFaultKinds = 28;
+inline constexpr std::size_t kFaultKinds = 30;
 
 // What clients send.
 enum class CommandKind : std::uint8_t {
@@ -61,8 +63,9 @@ enum class CommandKind : std::uint8_t {
   kHome,
   kArm,
   kDisarm,
+  kConfirm,
 };
-inline constexpr std::size_t kCommandKinds = 13;
+inline constexpr std::size_t kCommandKinds = 14;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

@@ -73,6 +73,10 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--strict-known", options.strict_known,
                "Require known positions to be right also while MCUs are offline");
+  app.add_flag(
+      "--keep-positions", options.keep_positions,
+      "Keep positions on a disk of the simulation (as do power-cuts and disk-faults); then "
+      "there is no second daemon");
   add_way<bool>(app, "--moves", ways.table_runs, {{"stream", false}, {"table", true}});
   add_way<bool>(app, "--frames", ways.table_ticks, {{"ticks", false}, {"auto", true}});
   add_way<bushd_format>(app, "--format", ways.format,
@@ -104,6 +108,12 @@ int run(int argc, char** argv) {
   if (options.absent_mcus + options.late_mcus >= options.mcus) {
     fmt::print(stderr, "bushfaults: of --mcus one must be there from the beginning\n");
     return kUsage;
+  }
+  options.keep_positions |= rate(options.fault_rates, bushfaults::FaultKind::kPowerCut) > 0 ||
+                            rate(options.fault_rates, bushfaults::FaultKind::kDiskFault) > 0;
+  // Where one has moved motors, the store of the other is void (docs/positions.md).
+  if (options.keep_positions) {
+    options.fault_rates[static_cast<std::size_t>(bushfaults::FaultKind::kSecondDaemon)] = 0;
   }
   bushfaults::furnish(*config, options.fault_rates, options.command_rates, options.seed);
   fmt::print(stderr, "seed {}\n", options.seed);

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace bushfaults {
 namespace {
@@ -14,6 +15,10 @@ constexpr bushd::sim::TimeNs kMaxAgeNs = 1'500'000'000;
 // Of reports, per MCU: polls come every 10 ms at most, and a state may be as old as the longest
 // pause and kMaxAgeNs together.
 constexpr std::size_t kReportsKept = 1024;
+
+bool is_good(bushd::api::Trust trust) {
+  return trust == bushd::api::Trust::kKnown || trust == bushd::api::Trust::kRestored;
+}
 
 bool is_online(const bushd::api::StateSnapshot& state) {
   using bushd::api::McuState;
@@ -63,7 +68,7 @@ void Positions::reported(TimeNs now_ns, std::size_t mcu) {
 
 void Positions::mcu_reset(std::size_t mcu) {
   for (std::size_t i = 0; i < motors_.size(); ++i) {
-    if (config_.motors[i].mcu.value != mcu) continue;
+    if (config_.motors[i].mcu.value != mcu || kept_) continue;
     const auto home_offset = motors_[i].home_offset;
     motors_[i] = {};
     motors_[i].offset.reset();
@@ -73,6 +78,7 @@ void Positions::mcu_reset(std::size_t mcu) {
 
 void Positions::daemon_started() {
   std::fill(boot_seen_.begin(), boot_seen_.end(), std::nullopt);
+  if (kept_) return;
   // It cannot know of what the one before has seen.
   for (Motor& motor : motors_) motor.cut_off_ns.reset();
 }
@@ -85,6 +91,7 @@ void Positions::may_be_set(std::size_t motor, std::int64_t position_steps) {
 void Positions::was_set(std::size_t motor, std::int64_t position_steps) {
   motors_[motor].offset = plant_steps(motor) - position_steps;
   motors_[motor].perhaps_set.clear();
+  motors_[motor].perhaps_confirmed = false;
   motors_[motor].cut_off_ns.reset();
 }
 
@@ -136,8 +143,7 @@ std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
   }
   auto wrong = check_age(now_ns, mcu, *report);
   for (const bushd::api::MotorState& claim : state.motors) {
-    if (!wrong && claim.trust == bushd::api::Trust::kKnown)
-      wrong = check_motor(mcu, claim, *report);
+    if (!wrong && is_good(claim.trust)) wrong = check_motor(mcu, claim, *report);
     if (claim.trust == bushd::api::Trust::kUncertain) follow_set(claim, *report);
   }
   boot_seen_[mcu] = state.boot;
@@ -146,7 +152,7 @@ std::optional<std::string> Positions::check(TimeNs now_ns, std::size_t mcu,
 
 std::optional<std::string> Positions::check_offline(const bushd::api::StateSnapshot& state) const {
   for (const bushd::api::MotorState& claim : state.motors) {
-    if (claim.trust != bushd::api::Trust::kKnown) continue;
+    if (!is_good(claim.trust)) continue;
     const auto found = std::ranges::find(config_.motors, claim.name, &bushd::config::Motor::name);
     if (found == config_.motors.end()) return "a state of an unknown motor " + claim.name;
     const auto index = static_cast<std::size_t>(found - config_.motors.begin());
@@ -155,8 +161,10 @@ std::optional<std::string> Positions::check_offline(const bushd::api::StateSnaps
     }
     const auto& offset = motors_[index].offset;
     if (offset && plant_steps(index) - *offset == claim.position_steps) continue;
-    return fmt::format("{} is said to be known to be at {} while {} is {}, and is not", claim.name,
-                       claim.position_steps, state.mcu, word(state.state));
+    return fmt::format("{} ({}) is said to be {} to be at {} while {} is {} ({}), and is at {}",
+                       claim.name, word(claim.activity), word(claim.trust), claim.position_steps,
+                       state.mcu, word(state.state), state.detail,
+                       offset ? plant_steps(index) - *offset : plant_steps(index));
   }
   return std::nullopt;
 }
@@ -209,9 +217,15 @@ std::optional<std::string> Positions::check_motor(std::size_t mcu,
   if (motor.cut_off_ns && report.made_ns > *motor.cut_off_ns) {
     return claim.name + " is said to be known although it was stopped immediately in motion";
   }
+  const bool confirmed = std::exchange(motor.perhaps_confirmed, false);
   if (!agrees(motor, claim.position_steps, pulses)) {
-    return fmt::format("{} is said to be at {} in its MCU's tick {}, but stood at {}", claim.name,
-                       claim.position_steps, report.tick, pulses - *motor.offset);
+    if (confirmed) {
+      motor.offset = pulses - claim.position_steps;
+      return std::nullopt;
+    }
+    return fmt::format("{} is said to be {}, at {} in its MCU's tick {}, but stood at {}",
+                       claim.name, word(claim.trust), claim.position_steps, report.tick,
+                       pulses - *motor.offset);
   }
   const std::int64_t stands = plant_steps(index);
   if (claim.moving || claim.activity != bushd::api::Activity::kResting ||

@@ -11,12 +11,14 @@
 // The offset is that between the motor and the MCU's counter. It changes only at rest and only by
 // what somebody asked for: by SET_POSITION, when the counter takes another value; by homing, when
 // it is counted from the switch, to one step; and by the end of a reset, from which the counter
-// begins at 0. So a state may lag behind the motor by the age of its report, and by nothing else;
-// and this age is bounded too: an MCU that has not answered for kMaxAgeNs of the daemon's time is
-// not online any more. A motor that is said to be at rest stands there now, not only at T. And a
-// motor that an emergency stop has stopped immediately in motion is not called known by the daemon
-// that was there, from the first report after that until somebody says where it stands, or homes
-// it.
+// begins at 0; where positions are kept, it is set then to where the motor stood, or the position
+// is neither known nor restored until somebody says where it stands, or confirms what is shown.
+// What is restored must be as right as what is known. So a state may lag behind the motor by the
+// age of its report, and by nothing else; and this age is bounded too: an MCU that has not answered
+// for kMaxAgeNs of the daemon's time is not online any more. A motor that is said to be at rest
+// stands there now, not only at T. And a motor that an emergency stop has stopped immediately in
+// motion is not called known by the daemon that was there, from the first report after that until
+// somebody says where it stands, or homes it.
 //
 // Where T's pulses are taken from: the poll as the MCU hears it (Overheard), for it makes its
 // report at once. Of the firmware only its tick's number and beginning are used.
@@ -45,8 +47,12 @@ class Positions {
   Positions(const bushd::config::Config& config, const bushd::sim::Bus& bus,
             const bushd::sim::Plant& plant);
 
-  // What is called known must be where the motor stands now, also while its MCU is not online.
+  // What is called known (or restored) must be where the motor stands now, also while its MCU is
+  // not online.
   void be_strict(bool strict) { strict_ = strict; }
+  // Positions are kept over restarts and power cuts: what people have said where motors stand
+  // counts until they say otherwise, whatever happens to daemons and MCUs.
+  void keep() { kept_ = true; }
   // The MCU makes a report now.
   void reported(TimeNs now_ns, std::size_t mcu);
   void mcu_reset(std::size_t mcu);
@@ -55,6 +61,11 @@ class Positions {
   // Somebody may set the motor's position to this one, now that it rests, and perhaps nobody is
   // ever told.
   void may_be_set(std::size_t motor, std::int64_t position_steps);
+  // Wherever it is shown now, that is where it stands.
+  void may_be_confirmed(std::size_t motor) {
+    motors_[motor].perhaps_confirmed = true;
+    motors_[motor].cut_off_ns.reset();
+  }
   void may_be_homed(std::size_t motor) { motors_[motor].perhaps_homed = true; }
   // It is, and has not been moved since.
   void homed(std::size_t motor, std::int64_t position_steps);
@@ -90,6 +101,7 @@ class Positions {
     std::vector<Set> perhaps_set;
     std::optional<std::int64_t> home_offset;  // that between switch and `home`
     bool perhaps_homed = false;
+    bool perhaps_confirmed = false;  // no claim since
     std::optional<TimeNs> cut_off_ns;
 
     bool at_home(std::int64_t pulses, std::int64_t position_steps) const {
@@ -122,6 +134,7 @@ class Positions {
   TimeNs paused_until_ns_ = 0;
   TimeNs worst_age_ns_ = 0;
   bool strict_ = false;
+  bool kept_ = false;
 };
 
 }  // namespace bushfaults

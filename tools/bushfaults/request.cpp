@@ -61,6 +61,8 @@ api::Request api_of(const Request& request) {
       return api::Arm{.edge = request.rising ? api::Edge::kRising : api::Edge::kFalling,
                       .delay_us = request.delay_us,
                       .motors = motor_steps(request)};
+    case Ask::kConfirm:
+      return api::Confirm{request.motors};
     case Ask::kDisarm:
       break;
   }

@@ -24,6 +24,7 @@ enum class Ask : std::uint8_t {
   kHome,
   kArm,
   kDisarm,
+  kConfirm,
 };
 
 // What the network makes of a message that is to be dropped.

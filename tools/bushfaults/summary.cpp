@@ -65,6 +65,10 @@ std::string summary_text(const World& world, double processor_s) {
   for (const auto& [result, count] : world.witness().homings_by_result()) {
     text += fmt::format("           {:<17}{:>9}\n", result, count);
   }
+  if (!world.mornings().empty()) text += "mornings   motors by trust\n";
+  for (const auto& [trust, count] : world.mornings()) {
+    text += fmt::format("           {:<17}{:>9}\n", trust, count);
+  }
   text += fmt::format("steps      {} commanded, {} made, {} unaccounted\n",
                       world.witness().steps_commanded(), world.plant().steps_made(),
                       world.witness().steps_unaccounted());
@@ -90,6 +94,7 @@ std::string summary_json(const World& world) {
       {"second_daemons_refused", world.second_daemons().found_other},
       {"second_daemons_ran", world.second_daemons().ran},
       {"second_daemons_moves", world.second_daemons().moves_accepted},
+      {"mornings", world.mornings()},
       {"steps_commanded", world.witness().steps_commanded()},
       {"steps_made", world.plant().steps_made()},
       {"steps_unaccounted", world.witness().steps_unaccounted()},

@@ -130,6 +130,7 @@ void Witness::accepted(const Key& key, Asked& asked) {
     if (request.ask == Ask::kSetPosition) {
       positions_.may_be_set(index_of(motor), request.steps[i]);
     }
+    if (request.ask == Ask::kConfirm) positions_.may_be_confirmed(index_of(motor));
     if (request.ask == Ask::kHome) positions_.may_be_homed(index_of(motor));
     if (request.ask == Ask::kMoveBy || request.ask == Ask::kArm) {
       const std::optional<std::int64_t> base = motor.move ? motor.target : stands;
@@ -322,7 +323,8 @@ std::uint64_t Witness::steps_unaccounted() const {
     if (!state) continue;
     for (const api::MotorState& claim : state->motors) {
       const Motor& motor = *find(claim.name);
-      if (!offset(motor) || claim.trust != api::Trust::kKnown || claim.moving) continue;
+      const bool good = claim.trust == api::Trust::kKnown || claim.trust == api::Trust::kRestored;
+      if (!offset(motor) || !good || claim.moving) continue;
       steps += static_cast<std::uint64_t>(
           std::abs(plant_steps(motor) - *offset(motor) - claim.position_steps));
     }

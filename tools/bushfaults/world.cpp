@@ -42,11 +42,12 @@ World::World(const Options& options, bushd::config::Config config)
       witness_(config_, bus_, plant_, recent_),
       skew_(config_, bus_, witness_),
       clients_(config_, witness_, options.command_rates, options.seed),
-      host_(config_, bus_, witness_, recent_, options.seed),
+      host_(config_, bus_, witness_, recent_, options.seed, options.keep_positions),
       mail_(clients_, host_, options.seed) {
   add_mcus();
   add_motors();
   witness_.positions().be_strict(options.strict_known);
+  if (options.keep_positions) witness_.positions().keep();
   overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
   inputs_ = std::make_unique<Inputs>(config_, bus_, plant_, witness_, options.seed);
   second_ = std::make_unique<SecondDaemon>(config_, bus_, recent_, options.seed);
@@ -129,6 +130,7 @@ void World::spell_of_trouble(TimeNs until_ns) {
 
 void World::calm() {
   if (witness_.violation()) return;
+  if (host_.kept() != nullptr) host_.kept()->lose_power_after(UINT64_MAX);
   run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(),
                       mail_.quiet_ns(), second_->over_ns()}));
   mail_.settle();
@@ -146,6 +148,7 @@ void World::calm() {
   if (const std::uint64_t steps = witness_.steps_unaccounted(); steps != 0) {
     witness_.violated(now_ns_, fmt::format("{} steps unaccounted", steps));
   }
+  if (options_.keep_positions) night();
 }
 
 void World::be_well(TimeNs began_ns) {
@@ -195,12 +198,16 @@ void World::reset_mcu() {
   const auto mcu = static_cast<std::size_t>(random.below(bus_.mcu_count()));
   const TimeNs down_ns = random.magnitude(kMs, 2 * kSecond);
   if (!is_up(mcu)) return;
-  bus_.reboot(mcu, down_ns);
+  take_power_of(mcu, down_ns);
+  note_fault(FaultKind::kReset, fmt::format("{} for {} ms", config_.mcus[mcu].id, down_ns / kMs));
+}
+
+void World::take_power_of(std::size_t mcu, TimeNs for_ns) {
+  bus_.reboot(mcu, for_ns);
   plant_.cut(mcu);
   witness_.positions().mcu_reset(mcu);
   overheard_->mcu_reset(mcu);
-  mcus_up_ns_ = std::max(mcus_up_ns_, now_ns_ + down_ns);
-  note_fault(FaultKind::kReset, fmt::format("{} for {} ms", config_.mcus[mcu].id, down_ns / kMs));
+  mcus_up_ns_ = std::max(mcus_up_ns_, now_ns_ + for_ns);
 }
 
 void World::deafen_mcu() {
@@ -220,6 +227,10 @@ void World::strike(FaultKind kind) {
       return deafen_mcu();
     case FaultKind::kReset:
       return reset_mcu();
+    case FaultKind::kPowerCut:
+      return cut_power();
+    case FaultKind::kDiskFault:
+      return disturb_disk();
     case FaultKind::kLimitSwitch:
       return note_fault(kind, inputs_->press_limit(now_ns_, random));
     case FaultKind::kEmergencyInput:

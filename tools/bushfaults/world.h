@@ -8,7 +8,11 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "clients.h"
 #include "config/config.h"
@@ -38,6 +42,7 @@ struct Options {
   Ways ways;
   FaultRates fault_rates = usual_fault_rates();
   CommandRates command_rates = usual_command_rates();
+  bool keep_positions = false;
   std::int64_t crystal_ppm = 50;
 };
 
@@ -59,6 +64,8 @@ class World {
   const bushd::sim::Plant& plant() const { return plant_; }
   const SecondDaemon::Counts& second_daemons() const { return second_->counts(); }
   const Recent& recent() const { return recent_; }
+  // Motors that were asked for what they know after a night without power, by their trust then.
+  const std::map<std::string, std::uint64_t>& mornings() const { return mornings_; }
 
  private:
   void add_mcus();
@@ -70,6 +77,13 @@ class World {
   void run_until(TimeNs until_ns);
   void strike(FaultKind kind);
   void reset_mcu();
+  void take_power_of(std::size_t mcu, TimeNs for_ns);
+  void cut_power();
+  void disturb_disk();
+  void night();
+  using Evening = std::vector<std::optional<bushd::api::StateSnapshot>>;
+  std::optional<std::string> wrong_morning(const Evening& evening,
+                                           const std::vector<bool>& dark) const;
   void deafen_mcu();
   bool is_up(std::size_t mcu) const;
   void note_fault(FaultKind kind, const std::string& detail);
@@ -91,6 +105,7 @@ class World {
   std::unique_ptr<Inputs> inputs_;        // likewise
   std::unique_ptr<SecondDaemon> second_;  // likewise
   FaultCounts faults_{};
+  std::map<std::string, std::uint64_t> mornings_;
   TimeNs now_ns_ = 0;
   TimeNs next_command_ns_ = 0;
   TimeNs mcus_up_ns_ = 0;  // when the last MCU that was reset boots

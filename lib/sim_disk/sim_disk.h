@@ -12,9 +12,9 @@
 
 #include "state/disk.h"
 
-namespace bushd::state {
+namespace bushd::sim {
 
-class SimDisk final : public Disk {
+class SimDisk final : public state::Disk {
  public:
   explicit SimDisk(std::uint64_t seed);
   ~SimDisk() override;
@@ -22,7 +22,7 @@ class SimDisk final : public Disk {
   SimDisk& operator=(const SimDisk&) = delete;
 
   Result<void> make_folder(const std::filesystem::path&) override { return {}; }
-  Result<std::unique_ptr<File>> open(const std::filesystem::path& path) override;
+  Result<std::unique_ptr<state::File>> open(const std::filesystem::path& path) override;
   bool exists(const std::filesystem::path& path) override { return nodes_.contains(path.string()); }
   Result<void> rename(const std::filesystem::path& from, const std::filesystem::path& to) override;
   Result<void> remove(const std::filesystem::path& path) override;
@@ -34,6 +34,8 @@ class SimDisk final : public Disk {
   bool has_power() const { return left_ > 0; }
   // Power is back. Files that are open stay without it.
   void boot();
+  // The process that had files open is gone: nothing more comes of them, what was written stays.
+  void end_process();
   // Every write and sync fails, or none does.
   void set_broken(bool broken) { broken_ = broken; }
   std::uint64_t operations() const { return operations_; }
@@ -53,6 +55,8 @@ class SimDisk final : public Disk {
     std::vector<std::uint8_t> cached;
     std::vector<Write> pending;
     bool name_synced = false;
+    bool edited = false;  // by content()
+    bool gone = false;    // who has it open can do nothing with it any more
   };
   std::shared_ptr<Node> node(const std::string& path);
   bool write(const std::shared_ptr<Node>& node, Write write);
@@ -61,17 +65,15 @@ class SimDisk final : public Disk {
 
  private:
   bool operate();
-  bool lives(const std::shared_ptr<Node>& node) const;
 
   std::string name_;
   sqlite3_vfs vfs_{};
   std::mt19937_64 random_;
   std::map<std::string, std::shared_ptr<Node>> nodes_;
-  std::vector<std::shared_ptr<Node>> dead_;
   std::uint64_t left_ = UINT64_MAX;
   std::uint64_t operations_ = 0;
   std::uint64_t syncs_ = 0;
   bool broken_ = false;
 };
 
-}  // namespace bushd::state
+}  // namespace bushd::sim

@@ -1,12 +1,12 @@
-#include "state/sim_disk.h"
+#include "sim_disk/sim_disk.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cstring>
 #include <new>
-#include <set>
+#include <utility>
 
-namespace bushd::state {
+namespace bushd::sim {
 namespace {
 
 constexpr std::size_t kSector = 512;
@@ -23,7 +23,7 @@ tl::unexpected<Error> failed() {
   return fail("input/output error");
 }
 
-class SimFile final : public File {
+class SimFile final : public state::File {
  public:
   SimFile(SimDisk& disk, std::shared_ptr<SimDisk::Node> node)
       : disk_(disk), node_(std::move(node)) {}
@@ -223,10 +223,6 @@ bool SimDisk::operate() {
   return left_ > 0 && !broken_;
 }
 
-bool SimDisk::lives(const std::shared_ptr<Node>& node) const {
-  return std::ranges::find(dead_, node) == dead_.end();
-}
-
 std::shared_ptr<SimDisk::Node> SimDisk::node(const std::string& path) {
   auto& found = nodes_[path];
   if (!found) found = std::make_shared<Node>();
@@ -234,7 +230,7 @@ std::shared_ptr<SimDisk::Node> SimDisk::node(const std::string& path) {
 }
 
 bool SimDisk::write(const std::shared_ptr<Node>& node, Write write) {
-  if (!operate() || !lives(node)) return false;
+  if (!operate() || node->gone) return false;
   put_into(node->cached, write);
   node->pending.push_back(std::move(write));
   return true;
@@ -242,14 +238,16 @@ bool SimDisk::write(const std::shared_ptr<Node>& node, Write write) {
 
 bool SimDisk::sync(const std::shared_ptr<Node>& node) {
   ++syncs_;
-  if (!operate() || !lives(node)) return false;
-  node->medium = node->cached;
+  if (!operate() || node->gone) return false;
+  // Not all of it each time: a database grows.
+  if (std::exchange(node->edited, false)) node->medium = node->cached;
+  for (const Write& write : node->pending) put_into(node->medium, write);
   node->pending.clear();
   node->name_synced = true;
   return true;
 }
 
-Result<std::unique_ptr<File>> SimDisk::open(const std::filesystem::path& path) {
+Result<std::unique_ptr<state::File>> SimDisk::open(const std::filesystem::path& path) {
   if (!has_power()) return failed();
   return std::make_unique<SimFile>(*this, node(path.string()));
 }
@@ -276,7 +274,7 @@ Result<void> SimDisk::sync_folder(const std::filesystem::path&) {
 void SimDisk::boot() {
   std::map<std::string, std::shared_ptr<Node>> after;
   for (const auto& [name, node] : nodes_) {
-    dead_.push_back(node);
+    node->gone = true;
     if (!node->name_synced && random_() % 2 == 0) continue;
     auto image = std::make_shared<Node>();
     image->name_synced = true;
@@ -307,6 +305,14 @@ void SimDisk::boot() {
   broken_ = false;
 }
 
+void SimDisk::end_process() {
+  for (auto& [name, node] : nodes_) {
+    auto same = std::make_shared<Node>(*node);
+    node->gone = true;
+    node = std::move(same);
+  }
+}
+
 std::vector<std::string> SimDisk::names() const {
   std::vector<std::string> names;
   for (const auto& [name, node] : nodes_) names.push_back(name);
@@ -314,7 +320,8 @@ std::vector<std::string> SimDisk::names() const {
 }
 
 std::vector<std::uint8_t>& SimDisk::content(const std::string& path) {
+  node(path)->edited = true;
   return node(path)->cached;
 }
 
-}  // namespace bushd::state
+}  // namespace bushd::sim

@@ -1,0 +1,181 @@
+"""What bushd promises of positions (docs/positions.md, docs/configuration.md): a model that shares no code with it.
+
+Steps count; user and dial positions are exact fractions of what people have written, rounded to the nearest step, ties
+away from zero. Here is what follows from a request and the state before it, and nothing of how it comes about. Jogs,
+backlash and pauses are to be added as further methods of Motor that return what is refused and what is aimed at.
+"""
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Optional
+
+MOST_STEPS = 2**31 - 1
+LONGEST_DELAY = 65535  # time units
+
+
+class Refused(Exception):
+    """Holds a part of the reason that people are told."""
+
+
+def as_written(number: float) -> Fraction:
+    """Of the shortest decimal text that means this double."""
+    return Fraction(repr(float(number)))
+
+
+def nearest(value: Fraction) -> int:
+    """Ties away from zero."""
+    steps = int(abs(value) + Fraction(1, 2))
+    return -steps if value < 0 else steps
+
+
+def above(value: Fraction) -> int:
+    return -(-value.numerator // value.denominator)
+
+
+def below(value: Fraction) -> int:
+    return value.numerator // value.denominator
+
+
+@dataclass
+class Amount:
+    """Of steps, or of user units as somebody has written them."""
+    steps: Optional[int] = None
+    user: Optional[str] = None
+
+    def as_json(self):
+        return {"steps": self.steps} if self.steps is not None else {"user": float(self.user)}
+
+
+@dataclass
+class Motor:
+    name: str
+    unit: bool = False
+    steps_per_unit: Fraction = Fraction(1)
+    negative: bool = False
+    offset: Fraction = Fraction(0)
+    limits: Optional[tuple] = None  # on the dial
+    max_speed: Optional[Fraction] = None
+    time_unit_ns: int = 1
+    # What is.
+    steps: int = 0
+    trust: str = "known"  # known, restored, unconfirmed (nobody has said where it stands), uncertain
+    # The offset is as exact as it is written: not so where a user position was set and the dial has no short text.
+    exact_offset: bool = True
+    file_offset: Fraction = field(default=Fraction(0))
+
+    # Coordinates.
+    def dial(self, steps: int) -> Fraction:
+        return steps / self.steps_per_unit
+
+    def user(self, steps: int) -> Fraction:
+        return self.offset - self.dial(steps) if self.negative else self.offset + self.dial(steps)
+
+    def _within(self, steps: int) -> int:
+        if abs(steps) > MOST_STEPS:
+            raise Refused("positions lie within")
+        return steps
+
+    def steps_of_dial(self, dial: Fraction) -> int:
+        return self._within(nearest(dial * self.steps_per_unit))
+
+    def steps_of_position(self, amount: Amount) -> set:
+        """All that the daemon may make of it: two where a tie depends on digits that an offset does not have."""
+        if amount.steps is not None:
+            return {amount.steps}
+        user = Fraction(amount.user)
+        if not self.unit:
+            return {self._whole(user)}
+        dial = self.offset - user if self.negative else user - self.offset
+        exact = dial * self.steps_per_unit
+        if not self.exact_offset and abs(abs(exact) % 1 - Fraction(1, 2)) < Fraction(1, 10**6):
+            return {self._within(below(exact)), self._within(above(exact))}
+        return {self._within(nearest(exact))}
+
+    def steps_of_distance(self, amount: Amount) -> int:
+        if amount.steps is not None:
+            return amount.steps
+        user = Fraction(amount.user)
+        if not self.unit:
+            return self._whole(user)
+        steps = self.steps_of_dial(user)
+        return -steps if self.negative else steps
+
+    def _whole(self, value: Fraction) -> int:
+        if value.denominator != 1:
+            raise Refused("no whole number of steps")
+        return self._within(int(value))
+
+    # Limits and speeds.
+    def step_limits(self) -> tuple:
+        low, high = (above(self.limits[0] * self.steps_per_unit), below(self.limits[1] * self.steps_per_unit))
+        return (max(low, -MOST_STEPS), min(high, MOST_STEPS))
+
+    def may_aim(self, target: int, nearest_steps: int, farthest_steps: int) -> Optional[bool]:
+        """Whether a target keeps to the soft limits, of a motor that is somewhere between these; None: that depends on
+        where exactly. A motor beyond a limit may be moved back."""
+        if self.limits is None:
+            return True
+        low, high = self.step_limits()
+        verdicts = {min(low, at) <= target <= max(high, at) for at in (nearest_steps, farthest_steps)}
+        return verdicts.pop() if len(verdicts) == 1 else None
+
+    def floor(self, speed: Optional[Fraction], in_steps: bool) -> int:
+        """Of all delays of a move, in time units."""
+        floors = [0]
+        for value, scale in ((self.max_speed, self.steps_per_unit), (speed, 1 if in_steps else self.steps_per_unit)):
+            if value is None:
+                continue
+            delay = above(Fraction(10**9) / (value * scale * self.time_unit_ns))
+            if delay > LONGEST_DELAY:
+                raise Refused("time units a step")
+            floors.append(delay)
+        return max(floors)
+
+    # What may be asked of it.
+    def targets(self, absolute: bool, amount: Amount, base: int) -> set:
+        """Of a move that somebody asks for; `base` is where it stands, or its present target."""
+        if absolute:
+            found = self.steps_of_position(amount)
+        else:
+            found = {base + self.steps_of_distance(amount)}
+        if any(abs(target - (0 if absolute else base)) > 2 * MOST_STEPS for target in found):
+            raise Refused("out of range")
+        if self.trust == "uncertain":
+            raise Refused("its position is uncertain")
+        if any(abs(target) > MOST_STEPS for target in found):
+            raise Refused("beyond")
+        return found
+
+    def set_user(self, user: str):
+        """Changes the offset."""
+        if self.trust == "uncertain":
+            raise Refused("its position is uncertain")
+        dial = self.dial(self.steps)
+        exact = Fraction(user) + dial if self.negative else Fraction(user) - dial
+        self.offset = as_written(float(exact))
+        self.exact_offset = self.offset == exact
+
+    def set_steps(self, steps: int):
+        self.steps = self._within(steps)
+        self.trust = "known"
+
+    def confirm(self):
+        self.trust = "known"
+
+    # What happens to it.
+    def mcu_restarted(self, in_motion: bool):
+        if in_motion and self.trust in ("known", "restored"):
+            self.trust = "uncertain"
+        elif in_motion and self.trust == "unconfirmed":
+            self.trust = "uncertain"
+        elif self.trust == "known":
+            self.trust = "restored"
+
+    def daemon_restarted(self, kept: bool):
+        if kept:
+            return  # the MCU has counted on
+        self.trust = "unconfirmed"
+        self.offset = self.file_offset
+        self.exact_offset = True
+
+    def trust_told(self) -> str:
+        return "uncertain" if self.trust == "unconfirmed" else self.trust

@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""The arithmetic of the model, by examples worked out by hand."""
+import unittest
+from fractions import Fraction
+
+from model import Amount, Motor, Refused, nearest
+
+
+class Arithmetic(unittest.TestCase):
+    def test_ties_go_away_from_zero(self):
+        self.assertEqual([nearest(Fraction(n, 2)) for n in (-3, -1, 0, 1, 3, 5)], [-2, -1, 0, 1, 2, 3])
+        self.assertEqual(nearest(Fraction("0.4999999999999999999")), 0)
+
+    def test_blade(self):
+        blade = Motor("m", unit=True, steps_per_unit=Fraction(400), negative=True, offset=Fraction(10),
+                      limits=(Fraction(-5), Fraction("5.5")))
+        self.assertEqual(blade.steps_of_position(Amount(user="8.0014")), {799})
+        self.assertEqual(blade.user(799), Fraction("8.0025"))
+        self.assertEqual(blade.steps_of_distance(Amount(user="1")), -400)
+        self.assertEqual(blade.step_limits(), (-2000, 2200))
+        self.assertTrue(blade.may_aim(2200, 0, 0))
+        self.assertFalse(blade.may_aim(2201, 0, 0))
+        self.assertTrue(blade.may_aim(2300, 2400, 2400))
+        self.assertIsNone(blade.may_aim(2300, 2400, 2200))
+
+    def test_limits_are_not_rounded_outwards(self):
+        motor = Motor("m", unit=True, steps_per_unit=Fraction(1000, 3), limits=(Fraction("-0.01"), Fraction("0.01")))
+        self.assertEqual(motor.step_limits(), (-3, 3))
+
+    def test_set_user_is_of_where_it_stands(self):
+        motor = Motor("m", unit=True, steps_per_unit=Fraction(1000, 3), steps=100)
+        motor.set_user("7")
+        self.assertEqual(motor.offset, Fraction("6.7"))
+        self.assertTrue(motor.exact_offset)
+        motor.steps = 101
+        motor.set_user("7")
+        self.assertEqual(motor.offset, Fraction("6.697"))
+        third = Motor("m", unit=True, steps_per_unit=Fraction(3), steps=1)
+        third.set_user("1")
+        self.assertFalse(third.exact_offset)
+
+    def test_speeds(self):
+        motor = Motor("m", unit=True, steps_per_unit=Fraction(400), time_unit_ns=40000)
+        self.assertEqual(motor.floor(Fraction(1), False), 63)  # 62.5, never faster
+        self.assertEqual(motor.floor(Fraction(400), True), 63)
+        with self.assertRaises(Refused):
+            motor.floor(Fraction("0.0009"), False)
+
+
+if __name__ == "__main__":
+    unittest.main()
