@@ -12,8 +12,11 @@ function(bushd_target target)
   if(BUSHD_SANITIZE)
     # With the pattern, a pointer that was never set fails at its first use, whatever the stack held. In C++, GCC 12 then
     # warns of variables that libraries set.
+    #
+    # In C++, checks of pointers are left to AddressSanitizer: those of UBSan are a quarter of what the build takes.
     target_compile_options(${target} PRIVATE -fsanitize=${BUSHD_SANITIZE} -fno-sanitize-recover=all
-      -fno-omit-frame-pointer $<$<COMPILE_LANGUAGE:C>:-ftrivial-auto-var-init=pattern>)
+      -fno-omit-frame-pointer $<$<COMPILE_LANGUAGE:C>:-ftrivial-auto-var-init=pattern>
+      $<$<COMPILE_LANGUAGE:CXX>:-fno-sanitize=null,alignment,object-size,vptr>)
     target_link_options(${target} PUBLIC -fsanitize=${BUSHD_SANITIZE})
   endif()
 endfunction()

@@ -17,7 +17,9 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       dry_runs_(installation_),
       tables_(installation_, interlocks_, outputs),
       moves_(installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs),
-      homing_(installation_, interlocks_, open_moves_, kept_, outputs),
+      idle_drivers_(installation_, outputs,
+                    [this](MotorId motor) { return departures_.holds(motor); }),
+      homing_(installation_, interlocks_, open_moves_, moves_, kept_, idle_drivers_, outputs),
       stops_(installation_, moves_, homing_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
@@ -26,19 +28,34 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       position_compare_(installation_),
       state_(installation_, outputs),
       departures_(
-          installation_, interlocks_, kept_,
+          installation_, interlocks_, kept_, idle_drivers_,
           [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
             carry_out(now_us, asker, request);
           },
           [this] { return moves_.begins(); }),
       health_(installation_, outputs),
+      settings_(installation_, positions_, kept_, journal_, outputs,
+                [this](MotorId motor) { return departures_.holds(motor); }),
       // What an MCU's positions are worth comes before whoever goes by that.
-      services_{&kept_,           &journal_, &moves_,     &homing_,  &link_faults_,      &stops_,
-                &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_, &tables_,
-                &departures_},
+      services_{&kept_,   &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,
+                &stops_,  &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_,
+                &tables_, &departures_,     &settings_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
-  positions_.set_offset_listener([this](MotorId motor) { kept_.keep_offset(motor); });
+  positions_.set_offset_listener(
+      [this](MotorId motor, const units::Coordinates& before, const api::Asker& by) {
+        settings_.offset_set(motor, before, by);
+      });
+  positions_.set_listener([this](MotorId motor, std::int64_t from_steps, const api::Asker& by) {
+    kept_.past({.motor = installation_[motor].name(),
+                .what = "set",
+                .who = text_of(by),
+                .from_steps = from_steps,
+                .to_steps = installation_[motor].position_steps(),
+                .result = std::string(api::word(api::Outcome::kDone))});
+  });
+  drivers_.set_listener([this](McuId mcu) { idle_drivers_.switched(mcu); });
+  kept_.set_listener([this] { settings_.take_kept(); });
   open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
     const motion::Motor& motor = installation_[ended.motor];
     kept_.past({.motor = motor.name(),
@@ -70,22 +87,29 @@ void Core::receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t>
 }
 
 void Core::request(std::int64_t now, const api::Asker& asker, const api::Request& request) {
-  cancel_departures(request);
+  note_stop(asker, request);
   if (!departures_.hold(now, asker, request)) carry_out(now, asker, request);
 }
 
-// Whoever stops motors stops those as well that are about to begin.
-void Core::cancel_departures(const api::Request& request) {
-  if (departures_.empty()) return;
+// Whoever stops motors stops those as well that are about to begin; and results say who it was.
+void Core::note_stop(const api::Asker& asker, const api::Request& request) {
   Result<std::vector<MotorId>> motors;
+  const bool disarms = std::holds_alternative<api::Disarm>(request);
   if (const auto* stop = std::get_if<api::Stop>(&request)) {
     motors = installation_.find_or_all(stop->motors);
-  } else if (const auto* disarm = std::get_if<api::Disarm>(&request)) {
-    motors = installation_.find_or_all(disarm->motors);
+  } else if (disarms) {
+    motors = installation_.find_or_all(std::get<api::Disarm>(request).motors);
   } else if (std::holds_alternative<api::EmergencyStop>(request)) {
     motors = installation_.find_or_all({});
   }
-  if (motors) departures_.cancel(*motors);
+  if (!motors) return;
+  departures_.cancel(*motors);
+  if (open_moves_.empty()) return;
+  const std::string who = text_of(asker);
+  for (const MotorId motor : *motors) {
+    if (disarms && !installation_[motor].is<motion::Armed>()) continue;
+    open_moves_.stopped_by(motor, who);
+  }
 }
 
 void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Request& request) {
@@ -108,6 +132,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::SetTable& r) { outputs_.serve_tables(asker, r); },
                  [&](const api::Confirm& r) { kept_.request(asker, r); },
                  [&](const api::GetHistory& r) { kept_.request(asker, r); },
+                 [&](const api::Configure& r) { settings_.request(asker, r); },
              },
              request);
 }
@@ -131,8 +156,8 @@ void Core::work() {
 
 std::int64_t Core::next_wake_us() const {
   if (moves_.begins() || !dry_runs_.idle()) return 0;
-  std::int64_t wake =
-      std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us()});
+  std::int64_t wake = std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(),
+                                idle_drivers_.next_wake_us()});
   for (const BusId id : installation_.buses()) {
     wake = std::min(wake, installation_[id].master.next_wake_us());
   }
@@ -142,6 +167,9 @@ std::int64_t Core::next_wake_us() const {
 void Core::shut_down(std::int64_t now_us) {
   installation_.shutting_down = true;
   departures_.cancel(*installation_.find_or_all({}));
+  for (const MotorId motor : installation_.motors()) {
+    open_moves_.stopped_by(motor, "the daemon, which ends");
+  }
   stops_.stop(now_us, *installation_.find_or_all({}));
 }
 

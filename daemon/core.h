@@ -19,9 +19,11 @@
 #include "daemon/services/emergency_stop.h"
 #include "daemon/services/health_publisher.h"
 #include "daemon/services/homing_queue.h"
+#include "daemon/services/idle_drivers.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/link_faults.h"
+#include "daemon/services/motor_settings.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
 #include "daemon/services/position_compare.h"
@@ -83,7 +85,7 @@ class Core {
 
  private:
   void carry_out(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
-  void cancel_departures(const api::Request& request);
+  void note_stop(const api::Asker& asker, const api::Request& request);
 
   Outputs& outputs_;
   Installation installation_;
@@ -95,6 +97,7 @@ class Core {
   DryRuns dry_runs_;
   TablesInService tables_;
   Moves moves_;
+  IdleDrivers idle_drivers_;
   HomingQueue homing_;
   Stops stops_;
   EmergencyStop emergency_stop_;
@@ -105,6 +108,7 @@ class Core {
   StatePublisher state_;
   Departures departures_;
   HealthPublisher health_;
+  MotorSettings settings_;
   std::vector<Service*> services_;  // in the order in which they follow what MCUs tell
   Supervisor supervisor_;
 };

@@ -76,6 +76,8 @@ class Mcu {
   // It has not yet answered all that it was asked, or not yet reported since.
   bool busy() const { return master_.busy(on_bus_); }
   const link::McuHealth& health() const { return master_.health(on_bus_); }
+  // Its drivers are disabled at rest (IdleDrivers), and enabled when one of its motors is to move.
+  bool asleep = false;
   bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
   bool can_trigger() const { return master_.can_trigger(on_bus_); }
   bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }

@@ -26,7 +26,7 @@ Result<void> Interlocks::may_move_by(const Mcu& mcu) const {
   if (mcu.report().faults != 0) {
     return fail("MCU " + mcu.name() + " has a fault: " + motion::fault_text(mcu.report()));
   }
-  if ((mcu.report().flags & BUSHD_FLAG_ENABLED) == 0) {
+  if ((mcu.report().flags & BUSHD_FLAG_ENABLED) == 0 && !mcu.asleep) {
     return fail("the drivers of MCU " + mcu.name() + " are disabled; enable them first");
   }
   const Bus& bus = installation_.bus_of(mcu);

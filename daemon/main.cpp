@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "base/completion.h"
 #include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
@@ -192,6 +193,10 @@ int main(int argc, char** argv) {
                  ".tables-in-service.json beside it)")
       ->type_name("FILE");
   config_option->excludes(check_option);
+  if (const auto words = bushd::completion_asked(argc, argv)) {
+    bushd::print_completion(bushd::complete(app, *words));
+    return bushd::finished_output(0);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

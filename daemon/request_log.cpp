@@ -10,6 +10,8 @@ namespace {
 void put_motors(nlohmann::json& line, const auto& request) {
   if constexpr (requires { request.motors.front().amount; }) {
     for (const api::MotorAmount& motor : request.motors) line["motors"].push_back(motor.motor);
+  } else if constexpr (requires { request.changes; }) {
+    for (const auto& change : request.changes) line["motors"].push_back(change.motor);
   } else if constexpr (requires { request.motors; }) {
     for (const std::string& motor : request.motors) line["motors"].push_back(motor);
   } else if constexpr (requires { request.motor; }) {

@@ -40,9 +40,12 @@ bool Departures::any_held(const std::vector<MotorId>& motors) const {
                              [&](const Held& held) { return has_common(held.motors, motors); });
 }
 
-Result<bool> Departures::make_ready(std::int64_t now_us, const std::vector<MotorId>& motors) {
+Result<bool> Departures::make_ready(std::int64_t now_us, const Held& held) {
   bool ready = true;
-  for (const MotorId motor : motors) {
+  const bool moves = !std::holds_alternative<api::SetPosition>(held.request);
+  for (const MotorId motor : held.motors) {
+    const McuId mcu = installation_.config()[motor].mcu;
+    if (moves && !idle_drivers_.make_ready(now_us, mcu)) ready = false;
     const auto one = kept_.make_ready(now_us, motor);
     if (!one) return fail(installation_[motor].name() + ": " + one.error().text());
     ready = ready && *one;
@@ -51,7 +54,7 @@ Result<bool> Departures::make_ready(std::int64_t now_us, const std::vector<Motor
 }
 
 bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
-  if (!kept_.keeps()) return false;
+  if (!kept_.keeps() && idle_drivers_.none()) return false;
   auto motors = motors_of(request);
   if (!motors) return false;
   Held held{.asker = asker, .request = request, .motors = std::move(*motors)};
@@ -61,7 +64,7 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
   }
   // What comes later for a motor is carried out later.
   if (!any_held(held.motors)) {
-    const auto ready = make_ready(now_us, held.motors);
+    const auto ready = make_ready(now_us, held);
     if (!ready) {
       refuse(held, ready.error().text());
       return true;
@@ -95,7 +98,7 @@ void Departures::step(std::int64_t now_us) {
     // What became impossible meanwhile is refused by who carries it out.
     const bool possible = motors_of(it->request).has_value();
     const auto ready = !in_turn   ? Result<bool>(false)
-                       : possible ? make_ready(now_us, it->motors)
+                       : possible ? make_ready(now_us, *it)
                                   : Result<bool>(true);
     if (ready && !*ready) {
       before.insert(before.end(), it->motors.begin(), it->motors.end());

@@ -1,5 +1,6 @@
 // Requests that change where motors stand, until the disk knows that these motors are no longer at
-// rest, and until their positions are restored. Mostly a millisecond or two, often none.
+// rest, until their positions are restored, and until their drivers are enabled. Mostly a
+// millisecond or two, often none.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "daemon/interlocks.h"
 #include "daemon/service.h"
+#include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
 
 namespace bushd::daemon {
@@ -20,10 +22,11 @@ class Departures final : public Service {
   using CarryOut = std::function<void(std::int64_t now_us, const api::Asker&, const api::Request&)>;
   // `busy`: what was carried out before is still being begun; all that is held waits for it.
   Departures(const Installation& installation, const Interlocks& interlocks, KeptPositions& kept,
-             CarryOut carry_out, std::function<bool()> busy)
+             IdleDrivers& idle_drivers, CarryOut carry_out, std::function<bool()> busy)
       : installation_(installation),
         interlocks_(interlocks),
         kept_(kept),
+        idle_drivers_(idle_drivers),
         carry_out_(std::move(carry_out)),
         busy_(std::move(busy)) {}
 
@@ -32,6 +35,7 @@ class Departures final : public Service {
   // Those of these motors are refused: they are being stopped.
   void cancel(const std::vector<MotorId>& motors);
   bool empty() const { return held_.empty(); }
+  bool holds(MotorId motor) const { return any_held({motor}); }
 
   void step(std::int64_t now_us) override;
 
@@ -46,12 +50,13 @@ class Departures final : public Service {
   // Nothing: the request changes no position, or is refused anyway by who carries it out.
   std::optional<std::vector<MotorId>> motors_of(const api::Request& request) const;
   bool any_held(const std::vector<MotorId>& motors) const;
-  Result<bool> make_ready(std::int64_t now_us, const std::vector<MotorId>& motors);
+  Result<bool> make_ready(std::int64_t now_us, const Held& held);
   void refuse(const Held& held, const std::string& reason);
 
   const Installation& installation_;
   const Interlocks& interlocks_;
   KeptPositions& kept_;
+  IdleDrivers& idle_drivers_;
   CarryOut carry_out_;
   std::function<bool()> busy_;
   std::list<Held> held_;

@@ -69,7 +69,10 @@ void Drivers::begin(std::int64_t now_us, const api::Asker& asker, const api::Mot
   if (!targets->out_of_reach.empty()) done += "; not online, so not done there:";
   for (const McuId mcu : targets->out_of_reach) done += " " + installation_[mcu].name();
   open_.push_back({Confirmation(asker, targets->mcus, now_us), action, std::move(done)});
-  for (const McuId mcu : targets->mcus) installation_[mcu].control(action);
+  for (const McuId mcu : targets->mcus) {
+    installation_[mcu].control(action);
+    if (action != BUSHD_CONTROL_CLEAR_FAULTS && listener_) listener_(mcu);
+  }
 }
 
 Result<Drivers::Targets> Drivers::targets_of(const api::MotorNames& names) const {

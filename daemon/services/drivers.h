@@ -5,6 +5,7 @@
 #include <functional>
 #include <list>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/confirmation.h"
@@ -21,6 +22,9 @@ class Drivers final : public Service {
   void request(std::int64_t now_us, const api::Asker& asker, const api::Enable& request);
   void request(std::int64_t now_us, const api::Asker& asker, const api::Disable& request);
   void request(std::int64_t now_us, const api::Asker& asker, const api::ClearFaults& request);
+
+  // Told of each MCU whose drivers somebody wants enabled or disabled.
+  void set_listener(std::function<void(McuId)> listener) { listener_ = std::move(listener); }
 
   void reports(std::int64_t now_us, Mcu& mcu) override { follow(now_us, &mcu); }
   void step(std::int64_t now_us) override { follow(now_us, nullptr); }
@@ -44,6 +48,7 @@ class Drivers final : public Service {
 
   Installation& installation_;
   const EmergencyStop& emergency_stop_;
+  std::function<void(McuId)> listener_;
   std::list<Operation> open_;
 };
 

@@ -62,11 +62,14 @@ const char* remedy_of(unsigned refusal) {
 }  // namespace
 
 HomingQueue::HomingQueue(Installation& installation, const Interlocks& interlocks,
-                         OpenMoves& open_moves, KeptPositions& kept, Outputs& outputs)
+                         OpenMoves& open_moves, Moves& moves, KeptPositions& kept,
+                         IdleDrivers& idle_drivers, Outputs& outputs)
     : installation_(installation),
       interlocks_(interlocks),
       open_(open_moves),
+      moves_(moves),
       kept_(kept),
+      idle_drivers_(idle_drivers),
       outputs_(outputs) {
   for ([[maybe_unused]] const McuId mcu : installation.mcus()) queues_.add();
 }
@@ -76,11 +79,24 @@ void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
   open_.open(asker, *motors, "home");
-  for (const MotorId motor : *motors) add({motor, *floor_of(motor, request.speed)});
+  if (request.all) sequence_.emplace();
+  for (const MotorId motor : *motors) {
+    Task task{.motor = motor, .floor = *floor_of(motor, request.speed)};
+    if (!request.all) {
+      add(std::move(task));
+    } else {
+      installation_[motor].home();
+      sequence_->later.push_back(std::move(task));
+    }
+  }
+  if (request.all) begin_next_of_sequence();
 }
 
 Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) const {
-  auto motors = installation_.find(request.motors);
+  if (request.all && !request.motors.empty()) {
+    return fail("all motors are to be homed, and some are named; name them, or home all");
+  }
+  auto motors = request.all ? all_by_order() : installation_.find(request.motors);
   if (!motors) return motors;
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   for (const MotorId motor : *motors) {
@@ -90,6 +106,17 @@ Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) co
     if (const auto floor = floor_of(motor, request.speed); !floor) return fail(floor.error());
   }
   return motors;
+}
+
+Result<std::vector<MotorId>> HomingQueue::all_by_order() const {
+  std::vector<MotorId> motors;
+  const config::Config& config = installation_.config();
+  for (const MotorId motor : installation_.motors()) {
+    if (config[motor].home) motors.push_back(motor);
+  }
+  std::ranges::stable_sort(motors, {}, [&](MotorId motor) { return config[motor].home->order; });
+  if (!motors.empty()) return motors;
+  return fail("no motor has a home switch; add 'home = {...}' to those that have one");
 }
 
 Result<void> HomingQueue::may_home(MotorId id) const {
@@ -107,7 +134,10 @@ Result<void> HomingQueue::may_home(MotorId id) const {
 
 Result<std::uint16_t> HomingQueue::floor_of(MotorId id,
                                             const std::optional<api::Speed>& speed) const {
-  auto floor = installation_[id].floor_at(speed);
+  const auto& home = installation_.config()[id].home;
+  std::optional<api::Speed> asked = speed;
+  if (!asked && home && home->speed) asked = api::Speed{.per_s = *home->speed};
+  auto floor = installation_[id].floor_at(asked);
   if (!floor) return fail(installation_[id].name() + ": " + floor.error().message);
   return floor;
 }
@@ -132,98 +162,227 @@ bushd_home HomingQueue::message_for(const Task& task) const {
 }
 
 bool HomingQueue::empty() const {
-  return std::ranges::all_of(queues_, [](const Queue& queue) { return queue.tasks.empty(); });
+  return !sequence_ && std::ranges::all_of(queues_, &Queue::empty);
 }
 
-void HomingQueue::add(const Task& task) {
+void HomingQueue::add(Task task) {
   Mcu& mcu = installation_.mcu_of(task.motor);
   installation_[task.motor].home();
-  queues_[mcu.id].tasks.push_back(task);
-  if (queues_[mcu.id].tasks.size() == 1) begin(mcu);
+  queues_[mcu.id].push_back(std::move(task));
+  if (queues_[mcu.id].size() == 1) begin(mcu);
   installation_.changed = true;
 }
 
-// With a store as soon as that knows of the motion: step().
+// With a store as soon as that knows of the motion, and once its drivers are enabled: step().
 void HomingQueue::begin(Mcu& mcu) {
-  Queue& queue = queues_[mcu.id];
-  queue.asked = !kept_.keeps();
-  if (queue.asked) mcu.home(message_for(queue.tasks.front()));
+  Task& task = queues_[mcu.id].front();
+  if (kept_.keeps() || !idle_drivers_.none()) return;
+  task.phase = Phase::kHoming;
+  mcu.home(message_for(task));
 }
 
 void HomingQueue::step(std::int64_t now_us) {
   for (const McuId id : installation_.mcus()) {
-    Queue& queue = queues_[id];
-    if (queue.asked || queue.tasks.empty()) continue;
-    const Task task = queue.tasks.front();
-    const auto ready = kept_.make_ready(now_us, task.motor);
-    if (ready && !*ready) continue;
-    kept_.not_wanted(task.motor);
-    if (!ready) {
-      end(installation_[id], Outcome::kFault, ready.error().text());
-    } else {
-      queue.asked = true;
-      installation_[id].home(message_for(task));
-    }
+    if (!queues_[id].empty()) step(now_us, installation_[id]);
   }
+}
+
+void HomingQueue::step(std::int64_t now_us, Mcu& mcu) {
+  switch (queues_[mcu.id].front().phase) {
+    case Phase::kWaiting:
+      return ask(now_us, mcu);
+    case Phase::kHoming:
+      return;
+    case Phase::kFound:
+      return move_on(now_us, mcu);
+    case Phase::kMovingOn:
+      return follow_moving_on(mcu);
+  }
+}
+
+void HomingQueue::ask(std::int64_t now_us, Mcu& mcu) {
+  Task& task = queues_[mcu.id].front();
+  const auto ready = kept_.make_ready(now_us, task.motor);
+  const bool powered = idle_drivers_.make_ready(now_us, mcu.id);
+  if (ready && !(*ready && powered)) return;
+  kept_.not_wanted(task.motor);
+  if (!ready) return end(mcu, Outcome::kFault, ready.error().text());
+  task.phase = Phase::kHoming;
+  mcu.home(message_for(task));
 }
 
 void HomingQueue::reports(std::int64_t, Mcu& mcu) {
   const Queue& queue = queues_[mcu.id];
-  if (queue.tasks.empty() || !queue.asked || mcu.busy()) return;
-  const unsigned output = installation_[queue.tasks.front().motor].output().value;
+  if (queue.empty() || queue.front().phase != Phase::kHoming || mcu.busy()) return;
+  const Task& task = queue.front();
+  const unsigned output = installation_[task.motor].output().value;
   if (((mcu.report().autonomous | mcu.report().moving) >> output & 1) != 0) return;
-  const Ending ending = ending_of(mcu.report(), mcu.name());
+  Ending ending = ending_of(mcu.report(), mcu.name());
+  if (ending.outcome == Outcome::kReached) return found(mcu);
+  if (ending.outcome == Outcome::kStopped && !task.ended_by.empty()) ending.reason = task.ended_by;
   end(mcu, ending.outcome, ending.reason);
 }
 
-void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
-  Queue& queue = queues_[mcu.id];
-  const MotorId id = queue.tasks.front().motor;
-  queue.tasks.pop_front();
-  motion::Motor& motor = installation_[id];
-  motor.end_homing(outcome == Outcome::kReached);
-  outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning,
-               motor.name() + ": " + reason);
-  open_.end(id, outcome, reason);
-  if (!queue.tasks.empty()) begin(mcu);
+void HomingQueue::found(Mcu& mcu) {
+  Task& task = queues_[mcu.id].front();
+  if (!installation_.config()[task.motor].home->then || !task.ended_by.empty()) {
+    return end(mcu, Outcome::kReached, "homed");
+  }
+  outputs_.log(LogLevel::kInfo, installation_[task.motor].name() + ": homed; moves on");
+  task.phase = Phase::kFound;
 }
 
-void HomingQueue::goes_offline(Mcu& mcu, const std::string& cause) {
-  for (const auto& [motor, floor] : std::exchange(queues_[mcu.id], {}).tasks) {
-    kept_.not_wanted(motor);
-    installation_[motor].end_homing(false);
-    open_.end(motor, Outcome::kLink, cause + "; it was being homed");
+// Nobody else has a motor that is being homed, up to the moment at which it moves.
+void HomingQueue::move_on(std::int64_t now_us, Mcu& mcu) {
+  Task& task = queues_[mcu.id].front();
+  motion::Motor& motor = installation_[task.motor];
+  const auto ready = kept_.make_ready(now_us, task.motor);
+  if (ready && !*ready) return;
+  kept_.not_wanted(task.motor);
+  constexpr const char* kStays = "homed, but it does not move on: ";
+  if (!ready) {
+    motor.end_homing(true);
+    return end(mcu, Outcome::kFault, kStays + ready.error().text());
+  }
+  motor.end_homing(true);
+  task.phase = Phase::kMovingOn;
+  const double then = *installation_.config()[task.motor].home->then;
+  const auto target = moves_.go_on(now_us, task.motor, api::UserUnits{then});
+  if (!target) return end(mcu, Outcome::kFault, kStays + target.error().text());
+  task.then_steps = *target;
+}
+
+// Its part of the request has ended with that move.
+void HomingQueue::follow_moving_on(Mcu& mcu) {
+  const Task& task = queues_[mcu.id].front();
+  const motion::Motor& motor = installation_[task.motor];
+  if (motor.has_plan() && (motor.axis().stopping() || motor.target_steps() == task.then_steps)) {
+    return;
+  }
+  const bool reached = !motor.has_plan() && motor.position_steps() == task.then_steps;
+  const MotorId id = task.motor;
+  queues_[mcu.id].pop_front();
+  follow_sequence(id, reached,
+                  "it was homed, and did not reach " + motor.coordinates().text(task.then_steps));
+  if (!queues_[mcu.id].empty()) begin(mcu);
+}
+
+void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
+  const MotorId id = queues_[mcu.id].front().motor;
+  queues_[mcu.id].pop_front();
+  outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning,
+               installation_[id].name() + ": " + reason);
+  ended(id, outcome, reason);
+  if (!queues_[mcu.id].empty() && queues_[mcu.id].front().phase == Phase::kWaiting) begin(mcu);
+}
+
+void HomingQueue::ended(MotorId id, Outcome outcome, const std::string& reason) {
+  kept_.not_wanted(id);
+  installation_[id].end_homing(outcome == Outcome::kReached);
+  open_.end(id, outcome, reason);
+  follow_sequence(id, outcome == Outcome::kReached, reason);
+}
+
+// One that is not found ends the others.
+void HomingQueue::follow_sequence(MotorId id, bool good, const std::string& reason) {
+  if (!sequence_) return;
+  const auto is_motor = [id](const Task& task) { return task.motor == id; };
+  if (std::erase(sequence_->now, id) == 0 && std::erase_if(sequence_->later, is_motor) == 0) return;
+  if (good) {
+    if (sequence_->now.empty()) begin_next_of_sequence();
+    return;
+  }
+  const std::string because = "ended, because " + installation_[id].name() + ": " + reason;
+  const Sequence rest = *std::exchange(sequence_, std::nullopt);
+  for (const Task& task : rest.later) ended(task.motor, Outcome::kStopped, because);
+  for (const MotorId other : rest.now) {
+    if (end_if_waiting(other, because)) continue;
+    for (Task& task : queues_[installation_.config()[other].mcu]) {
+      if (task.motor == other && task.phase == Phase::kHoming) give_up(task, because);
+    }
   }
 }
 
+void HomingQueue::begin_next_of_sequence() {
+  if (sequence_->later.empty()) return sequence_.reset();
+  const auto order_of = [this](const Task& task) {
+    return installation_.config()[task.motor].home->order;
+  };
+  const std::int32_t order = order_of(sequence_->later.front());
+  std::vector<Task> tasks;
+  while (!sequence_->later.empty() && order_of(sequence_->later.front()) == order) {
+    tasks.push_back(std::move(sequence_->later.front()));
+    sequence_->later.pop_front();
+    sequence_->now.push_back(tasks.back().motor);
+  }
+  for (Task& task : tasks) add(std::move(task));
+}
+
+void HomingQueue::goes_offline(Mcu& mcu, const std::string& cause) {
+  const std::string reason = cause + "; it was being homed";
+  for (const Task& task : std::exchange(queues_[mcu.id], {})) {
+    ended(task.motor, Outcome::kLink, reason);
+  }
+  if (!sequence_) return;
+  const auto later = std::ranges::find_if(sequence_->later, [&](const Task& task) {
+    return installation_.config()[task.motor].mcu == mcu.id;
+  });
+  if (later != sequence_->later.end()) ended(later->motor, Outcome::kLink, reason);
+}
+
 void HomingQueue::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
-  if (type != BUSHD_MSG_HOME || queues_[mcu.id].tasks.empty()) return;
+  if (type != BUSHD_MSG_HOME || queues_[mcu.id].empty()) return;
+  if (queues_[mcu.id].front().phase != Phase::kHoming) return;
   end(mcu, Outcome::kFault,
       "MCU " + mcu.name() + " refused to home it: " + bushd_status_text(status) + "; " +
           remedy_of(status));
 }
 
-bool HomingQueue::end_if_waiting(MotorId motor) {
-  Queue& queue = queues_[installation_.config()[motor].mcu];
-  const auto is_motor = [motor](const Task& task) { return task.motor == motor; };
-  const bool first = !queue.tasks.empty() && is_motor(queue.tasks.front());
-  if ((first && queue.asked) || std::erase_if(queue.tasks, is_motor) == 0) return false;
-  kept_.not_wanted(motor);
-  if (first && !queue.tasks.empty()) begin(installation_.mcu_of(motor));
-  installation_[motor].end_homing(false);
-  open_.end(motor, Outcome::kStopped, "stopped before it was its turn to be homed");
+bool HomingQueue::end_if_waiting(MotorId id, const std::string& because) {
+  Queue& queue = queues_[installation_.config()[id].mcu];
+  const auto task = std::ranges::find(queue, id, &Task::motor);
+  const bool later =
+      sequence_ && std::ranges::find(sequence_->later, id, &Task::motor) != sequence_->later.end();
+  if (later) {
+    ended(id, Outcome::kStopped, because);
+    return true;
+  }
+  if (task == queue.end()) return false;
+  if (task->phase == Phase::kFound) {
+    installation_[id].end_homing(true);
+    end(installation_.mcu_of(id), Outcome::kStopped, "homed; " + because);
+    return true;
+  }
+  if (task->phase != Phase::kWaiting) return false;
+  const bool first = task == queue.begin();
+  queue.erase(task);
+  ended(id, Outcome::kStopped, because);
+  if (first && !queue.empty() && queue.front().phase == Phase::kWaiting) {
+    begin(installation_.mcu_of(id));
+  }
   return true;
 }
 
 void HomingQueue::end_waiting() {
-  for (const MotorId motor : installation_.motors()) end_if_waiting(motor);
+  for (const MotorId motor : installation_.motors()) {
+    end_if_waiting(motor, "stopped before it was its turn to be homed");
+  }
 }
 
-void HomingQueue::stop(MotorId motor) {
-  if (!installation_[motor].is<motion::Homing>() || end_if_waiting(motor)) return;
-  bushd_home give_up = message_for({motor, 0});
-  give_up.most_steps = 0;
-  installation_.mcu_of(motor).home(give_up);
+void HomingQueue::give_up(Task& task, const std::string& because) {
+  if (!task.ended_by.empty()) return;
+  task.ended_by = because;
+  bushd_home message = message_for({.motor = task.motor, .floor = 0});
+  message.most_steps = 0;
+  installation_.mcu_of(task.motor).home(message);
+}
+
+void HomingQueue::stop(MotorId id) {
+  if (!installation_[id].is<motion::Homing>()) return;
+  if (end_if_waiting(id, "stopped before it was its turn to be homed")) return;
+  for (Task& task : queues_[installation_.config()[id].mcu]) {
+    if (task.motor == id) give_up(task, "homing was stopped on request");
+  }
 }
 
 // Those that shall be homed whenever their MCU comes and has not homed them.
@@ -233,12 +392,12 @@ void HomingQueue::goes_online(Mcu& mcu) {
     const motion::Motor& motor = installation_[id];
     const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
     if (!home || !home->at_start || (homed && !motor.uncertain_reason())) continue;
-    const auto floor = motor.floor_at({});
+    const auto floor = floor_of(id, {});
     if (const auto may = floor ? may_home(id) : fail(floor.error()); !may) {
       outputs_.log(LogLevel::kWarning, motor.name() + " is not homed: " + may.error().text());
       continue;
     }
-    add({id, *floor});
+    add({.motor = id, .floor = *floor});
   }
 }
 

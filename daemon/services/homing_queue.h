@@ -1,16 +1,20 @@
 // Homing: the MCUs do it by themselves (docs/protocol.md, HOME). Here is who may be homed, in which
 // order, and what came of it. An MCU homes one motor at a time, so those of one MCU wait in a row.
+// A motor whose `home` has a `then` moves there once its switch was found, as a part of the same.
 #pragma once
 
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/interlocks.h"
 #include "daemon/outputs.h"
 #include "daemon/service.h"
+#include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
+#include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
@@ -18,7 +22,7 @@ namespace bushd::daemon {
 class HomingQueue final : public Service {
  public:
   HomingQueue(Installation& installation, const Interlocks& interlocks, OpenMoves& open_moves,
-              KeptPositions& kept, Outputs& outputs);
+              Moves& moves, KeptPositions& kept, IdleDrivers& idle_drivers, Outputs& outputs);
 
   void request(const api::Asker& asker, const api::Home& request);
 
@@ -36,30 +40,57 @@ class HomingQueue final : public Service {
   void step(std::int64_t now_us) override;
 
  private:
+  enum class Phase {
+    kWaiting,  // for its turn, or for the disk
+    kHoming,   // the MCU has been asked
+    kFound,    // is to move on to `then`
+    kMovingOn
+  };
   struct Task {
     MotorId motor;
     std::uint16_t floor;  // of the fast approach
+    Phase phase = Phase::kWaiting;
+    std::string ended_by{};  // it was asked to end, because of that
+    std::int64_t then_steps = 0;
   };
-  struct Queue {
-    std::deque<Task> tasks;
-    bool asked = false;  // the MCU homes the first; the others wait
+  // Of one MCU: all but the first wait.
+  using Queue = std::deque<Task>;
+  // All motors with `home`: those of the lowest order are in their queues, the others not yet.
+  struct Sequence {
+    std::deque<Task> later{};  // by order
+    std::vector<MotorId> now{};
   };
 
   Result<std::vector<MotorId>> motors_of(const api::Home& request) const;
+  Result<std::vector<MotorId>> all_by_order() const;
   Result<void> may_home(MotorId motor) const;
   Result<std::uint16_t> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
   bushd_home message_for(const Task& task) const;  // precondition: its motor has a home
-  void add(const Task& task);
+  void add(Task task);
   void begin(Mcu& mcu);
-  bool end_if_waiting(MotorId motor);
+  void step(std::int64_t now_us, Mcu& mcu);
+  void ask(std::int64_t now_us, Mcu& mcu);
+  void found(Mcu& mcu);
+  void move_on(std::int64_t now_us, Mcu& mcu);
+  void follow_moving_on(Mcu& mcu);
+  bool end_if_waiting(MotorId motor, const std::string& because);
+  void give_up(Task& task, const std::string& because);
+  // The first of the queue.
   void end(Mcu& mcu, api::Outcome outcome, const std::string& reason);
+  // It is in no queue any more.
+  void ended(MotorId motor, api::Outcome outcome, const std::string& reason);
+  void follow_sequence(MotorId motor, bool good, const std::string& reason);
+  void begin_next_of_sequence();
 
   Installation& installation_;
   const Interlocks& interlocks_;
   OpenMoves& open_;
+  Moves& moves_;
   KeptPositions& kept_;
+  IdleDrivers& idle_drivers_;
   Outputs& outputs_;
   ById<McuId, Queue> queues_;
+  std::optional<Sequence> sequence_;
 };
 
 }  // namespace bushd::daemon

@@ -106,6 +106,17 @@ void Journal::offset_set(MotorId id, const api::Asker& by) {
   outputs_.move_log(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
+void Journal::configured(MotorId id, std::string_view key, std::string_view value,
+                         const api::Asker& by) {
+  nlohmann::json line = {{"event", "config"},
+                         {"motor", installation_[id].name()},
+                         {"key", key},
+                         {"value", value},
+                         {"number", by.number}};
+  if (by.session) line["client"] = by.session->client_id();
+  outputs_.move_log(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
 void Journal::before_report(MotorId id, bool being_set) {
   if (autonomous_[id]) return;
   const motion::Motor& motor = installation_[id];

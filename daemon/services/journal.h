@@ -24,6 +24,8 @@ class Journal final : public Service {
   // Its MCU, out of reach meanwhile, has moved it on.
   void position_corrected(MotorId motor, std::int64_t from_steps);
   void offset_set(MotorId motor, const api::Asker& by);
+  void configured(MotorId motor, std::string_view key, std::string_view value,
+                  const api::Asker& by);
 
   // Motion that MCUs make by themselves, homing and local inputs: no move has led to where these
   // motors stand. To be called before and after motors follow a report; `being_set`: positions that

@@ -1,7 +1,5 @@
 #include "daemon/services/kept_positions.h"
 
-#include <charconv>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -13,7 +11,6 @@ namespace bushd::daemon {
 namespace {
 
 constexpr std::int64_t kSeenPeriodUs = 1'000'000;
-constexpr const char* kOffset = "offset";  // of state::Settings
 constexpr std::int32_t kMostPast = 1000;
 constexpr int kMostReading = 16;  // anybody may ask for a history
 
@@ -26,13 +23,6 @@ std::string scale_text(const motion::Motor& motor) {
 
 bool has(std::uint16_t mask, const motion::Motor& motor) {
   return (mask >> motor.output().value & 1) != 0;
-}
-
-// The shortest that reads back as this number.
-std::string text_of_number(double number) {
-  char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, number);
-  return {text, end.ptr};
 }
 
 state::Trust trust_of(const motion::Motor& motor) {
@@ -57,34 +47,15 @@ void KeptPositions::use(const std::map<std::string, state::Kept>& kept, state::B
   keeper_.emplace(names, kept, backend);
   backend_ = &backend;
   required_ = required;
-  for (const MotorId motor : installation_.motors()) take_kept_offset(motor);
+  if (in_use_) in_use_();
 }
 
-void KeptPositions::keep_offset(MotorId id) {
-  if (!keeper_) return;
-  state::Settings settings = keeper_->kept(id).settings;
-  settings[kOffset] = {
-      .value = text_of_number(installation_[id].coordinates().scale().offset),
-      .replaces = text_of_number(installation_.config()[id].coordinates.scale().offset)};
-  keeper_->settings(id, std::move(settings));
+state::Settings KeptPositions::settings(MotorId id) const {
+  return keeper_ ? keeper_->kept(id).settings : state::Settings();
 }
 
-// It counts until that of bushd.toml is edited.
-void KeptPositions::take_kept_offset(MotorId id) {
-  const std::string in_file = text_of_number(installation_.config()[id].coordinates.scale().offset);
-  const state::Setting* kept = state::in_force(keeper_->kept(id).settings, kOffset, in_file);
-  motion::Motor& motor = installation_[id];
-  if (kept == nullptr || kept->value == in_file || !motor.coordinates().has_unit()) return;
-  units::Scale scale = motor.coordinates().scale();
-  const std::string& text = kept->value;
-  if (std::from_chars(text.data(), text.data() + text.size(), scale.offset).ec != std::errc()) {
-    return;
-  }
-  auto coordinates = units::Coordinates::make(std::move(scale));
-  if (!coordinates) return;
-  motor.set_coordinates(std::move(*coordinates));
-  outputs_.log(LogLevel::kInfo, motor.name() + ": its offset is " + text +
-                                    ", as it was set in operation; bushd.toml says " + in_file);
+void KeptPositions::keep(MotorId id, state::Settings settings) {
+  if (keeper_ && settings != keeper_->kept(id).settings) keeper_->settings(id, std::move(settings));
 }
 
 void KeptPositions::marked(std::int64_t now_us, const Result<void>& done) {
@@ -162,7 +133,9 @@ void KeptPositions::request(const api::Asker& asker, const api::GetHistory& requ
                                      .from_steps = move.from_steps,
                                      .to_steps = move.to_steps,
                                      .outcome = move.result,
-                                     .reason = move.reason});
+                                     .reason = move.reason,
+                                     .from_text = move.from_text,
+                                     .to_text = move.to_text});
         }
         asker.answer(api::Accepted{});
         asker.answer(api::Completed{
@@ -189,6 +162,12 @@ Result<bool> KeptPositions::make_ready(std::int64_t now_us, MotorId id) {
 void KeptPositions::past(state::PastMove move) {
   if (!keeper_) return;
   move.utime_us = outputs_.wall_clock_us();
+  const auto motor = installation_.find(move.motor);
+  if (motor && installation_[*motor].coordinates().has_unit()) {
+    const units::Coordinates& coordinates = installation_[*motor].coordinates();
+    if (move.from_text.empty()) move.from_text = coordinates.text(move.from_steps);
+    if (move.to_text.empty()) move.to_text = coordinates.text(move.to_steps);
+  }
   keeper_->past(std::move(move));
 }
 
@@ -215,15 +194,19 @@ void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
   const config::Motor& config = installation_.config()[id];
   const bool at_limit =
       has(mcu.report().forbidden_positive, motor) || has(mcu.report().forbidden_negative, motor);
+  const state::Kept& kept = keeper_->kept(id);
+  const bool same_scale = kept.record && kept.record->steps_per_unit == scale_text(motor);
   state::Verdict verdict = state::on_connecting(
-      keeper_->kept(id),
-      {.mcu = mcu.name(),
-       .unique_id = mcus_[mcu.id].heard->unique_id,
-       .boot_number = mcus_[mcu.id].heard->boot_number,
-       .output = motor.output().value,
-       .steps_per_unit = scale_text(motor),
-       .local = config.local,
-       .may_have_overrun = at_limit && config.limit_action == BUSHD_STOP_IMMEDIATE});
+      kept, {.mcu = mcu.name(),
+             .unique_id = mcus_[mcu.id].heard->unique_id,
+             .boot_number = mcus_[mcu.id].heard->boot_number,
+             .output = motor.output().value,
+             .steps_per_unit = scale_text(motor),
+             .position_text = same_scale && motor.coordinates().has_unit()
+                                  ? motor.coordinates().text(kept.record->steps)
+                                  : std::string(),
+             .local = config.local,
+             .may_have_overrun = at_limit && config.limit_action == BUSHD_STOP_IMMEDIATE});
   // What the MCU itself reports of before this daemon.
   if (first && motor.uncertain_reason() && verdict.trust != state::Trust::kUncertain) {
     verdict.trust = state::Trust::kUncertain;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -27,6 +28,8 @@ class KeptPositions final : public Service {
   // and outlives this. Not required: motors move also if the disk does not take their marks.
   void use(const std::map<std::string, state::Kept>& kept, state::Backend& backend, bool required);
   bool keeps() const { return keeper_.has_value(); }
+  // Told once the store is in use.
+  void set_listener(std::function<void()> in_use) { in_use_ = std::move(in_use); }
   // Answers of the backend.
   void marked(std::int64_t now_us, const Result<void>& done);
   void written(std::int64_t now_us, const Result<void>& done);
@@ -41,9 +44,15 @@ class KeptPositions final : public Service {
   void not_wanted(MotorId motor) { motors_[motor].wanted = false; }
   bool being_restored(MotorId motor) const { return motors_[motor].restoring.has_value(); }
 
-  // It has another offset than bushd.toml says.
-  void keep_offset(MotorId motor);
-  // For the history. Says who asked, and where from.
+  // What was set in operation in place of bushd.toml's keys; empty without a store.
+  state::Settings settings(MotorId motor) const;
+  void keep(MotorId motor, state::Settings settings);
+  // How much there was to keep so far, and how much of that is on the disk; why no more is.
+  std::uint64_t told() const { return keeper_ ? keeper_->told() : 0; }
+  std::uint64_t kept_up_to() const { return keeper_ ? keeper_->kept_up_to() : 0; }
+  std::optional<std::string> trouble() const { return keeper_ ? keeper_->trouble() : std::nullopt; }
+  // For the history. Says who asked, and where from; how people see both is added where it is not
+  // told.
   void past(state::PastMove move);
 
   // All that there is to keep is on the disk, as far as the disk takes it.
@@ -79,13 +88,13 @@ class KeptPositions final : public Service {
   void keep(std::int64_t now_us, const Mcu& mcu, MotorId id);
   state::Record record_of(const Mcu& mcu, MotorId id) const;
   void tell_trouble();
-  void take_kept_offset(MotorId motor);
   Result<void> may_be_confirmed(MotorId id) const;
 
   Installation& installation_;
   const Positions& positions_;
   Journal& journal_;
   Outputs& outputs_;
+  std::function<void()> in_use_;
   std::optional<state::Keeper> keeper_;
   state::Backend* backend_ = nullptr;  // with keeper_
   int reading_ = 0;                    // requests for histories

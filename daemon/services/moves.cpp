@@ -133,6 +133,7 @@ void Moves::cancel(MotorId motor, const std::string& reason) {
 
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
 void Moves::take_over(MotorId motor, const api::Asker& by) {
+  open_.not_stopped(motor);
   open_.end(motor, api::Outcome::kStopped,
             "was given a new target by " + text_of(by) + "; it moves on");
 }
@@ -140,6 +141,17 @@ void Moves::take_over(MotorId motor, const api::Asker& by) {
 void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, std::uint16_t floor) {
   installation_[id].start(target, start, floor);
   begin(id);
+}
+
+Result<std::int64_t> Moves::go_on(std::int64_t now_us, MotorId id, const api::Amount& position) {
+  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
+  const auto floor = installation_[id].floor_at({});
+  if (!floor) return fail(floor.error());
+  const auto target = target_of(id, position, api::Move::Kind::kAbsolute, *floor);
+  if (!target) return target;
+  const Mcu& mcu = installation_.mcu_of(id);
+  start_run(id, *target, mcu.earliest_start(now_us, installation_[id].output()), *floor);
+  return target;
 }
 
 void Moves::begin(MotorId id) {

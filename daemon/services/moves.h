@@ -41,6 +41,10 @@ class Moves final : public Service {
   // motion::Motor::floor_at, "NAME: WHY" if there is none.
   Result<std::uint16_t> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
 
+  // From rest, as the second part of what the motor does for a request that is open already: begins
+  // a move to this position, and says which step that is.
+  Result<std::int64_t> go_on(std::int64_t now_us, MotorId motor, const api::Amount& position);
+
   // Ramps down those that move; those that wait for the trigger wait no more.
   void stop(std::int64_t now_us, const std::vector<MotorId>& motors);
   // Lets the MCUs know what is wanted of these motors now, in place of changes that they have not

@@ -30,8 +30,16 @@ void OpenMoves::tell(MotorId id, api::Outcome outcome, const std::string& reason
              .reason = reason});
 }
 
-void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason) {
+void OpenMoves::stopped_by(MotorId motor, const std::string& who) {
+  if (book_.move_of(motor)) stopped_by_[motor] = who;
+}
+
+void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& why) {
   installation_.changed = true;
+  std::string reason = why;
+  if (const auto who = stopped_by_.extract(id); who && outcome == api::Outcome::kStopped) {
+    reason += ", asked for by " + who.mapped();
+  }
   tell(id, outcome, reason);
   const motion::Motor& motor = installation_[id];
   const auto finished = book_.end({.motor = id,
@@ -51,7 +59,8 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& reason)
                        .dial = coordinates.dial_of(part.position_steps),
                        .unit = coordinates.unit(),
                        .precision = coordinates.precision(),
-                       .table = open.mapped().tables[i]});
+                       .table = open.mapped().tables[i],
+                       .who = text_of(open.mapped().asker)});
   }
   open.mapped().asker.answer(api::Completed{
       .outcome = finished->outcome, .reason = finished->reason, .detail = std::move(results)});

@@ -38,6 +38,12 @@ class OpenMoves {
   // This motor's part has ended. One that is in no open move is ignored.
   void end(MotorId motor, api::Outcome outcome, const std::string& reason);
 
+  // Somebody has asked this motor to stop: if its part ends with that, the reason says who. One
+  // that is in no open move is ignored.
+  void stopped_by(MotorId motor, const std::string& who);
+  // It moves on, for somebody else.
+  void not_stopped(MotorId motor) { stopped_by_.erase(motor); }
+
   bool empty() const { return book_.empty(); }
   bool together(MotorId a, MotorId b) const { return book_.move_of(a) == book_.move_of(b); }
   // Whose request it is; null if none.
@@ -57,6 +63,7 @@ class OpenMoves {
   Listener listener_;
   motion::MoveBook book_;
   std::unordered_map<std::uint64_t, Open> open_;  // by number in book_
+  std::unordered_map<MotorId, std::string> stopped_by_;
 };
 
 }  // namespace bushd::daemon

@@ -33,9 +33,10 @@ void Positions::request(std::int64_t now_us, const api::Asker& asker,
   auto plan = plan_of(request);
   if (!plan) return asker.answer(api::Refused{plan.error().text()});
   for (Offset& offset : plan->offsets) {
+    const units::Coordinates before = installation_[offset.motor].coordinates();
     installation_[offset.motor].set_coordinates(std::move(offset.coordinates));
     journal_.offset_set(offset.motor, asker);
-    if (offset_listener_) offset_listener_(offset.motor);
+    if (offset_listener_) offset_listener_(offset.motor, before, asker);
     installation_.changed = true;
   }
   std::vector<MotorId> motors;
@@ -130,6 +131,7 @@ void Positions::end(const Setting& setting, const Result<void>& ended) {
     motor.position_is_known();
     const api::Asker& by = setting.confirmation.asker();
     journal_.position_set(part.motor, part.from_steps, by);
+    if (listener_) listener_(part.motor, part.from_steps, by);
     outputs_.log(LogLevel::kInfo, motor.name() + ": position set to " + std::to_string(part.steps) +
                                       ", was " + std::to_string(part.from_steps) + ", by " +
                                       text_of(by));

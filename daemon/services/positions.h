@@ -20,10 +20,13 @@ class Positions final : public Service {
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::SetPosition& request);
 
-  // Told of each motor whose offset has changed.
-  void set_offset_listener(std::function<void(MotorId)> listener) {
-    offset_listener_ = std::move(listener);
-  }
+  // Told of each motor whose offset has changed: what its coordinates were before.
+  using OffsetListener =
+      std::function<void(MotorId, const units::Coordinates& before, const api::Asker& by)>;
+  void set_offset_listener(OffsetListener listener) { offset_listener_ = std::move(listener); }
+  // Told of each motor whose position was set, once its MCU has confirmed it.
+  using Listener = std::function<void(MotorId, std::int64_t from_steps, const api::Asker& by)>;
+  void set_listener(Listener listener) { listener_ = std::move(listener); }
 
   // Its MCU has not yet confirmed a position.
   bool being_set(MotorId motor) const;
@@ -57,7 +60,8 @@ class Positions final : public Service {
   void end(const Setting& setting, const Result<void>& ended);
 
   Installation& installation_;
-  std::function<void(MotorId)> offset_listener_;
+  OffsetListener offset_listener_;
+  Listener listener_;
   Journal& journal_;
   Outputs& outputs_;
   std::list<Setting> open_;

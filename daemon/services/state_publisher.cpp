@@ -25,12 +25,15 @@ api::McuState state_word(const link::McuView& view) {
   }
 }
 
-std::string detail_of(const link::McuView& view, bool two_masters) {
+std::string detail_of(const Mcu& mcu, bool two_masters) {
+  const link::McuView& view = mcu.view();
   if (view.phase != link::McuPhase::kOnline) return view.detail;
   if (view.outdated_us > 0) return "has not reported since this daemon stood still";
   if (view.report.faults != 0) return motion::fault_text(view.report);
   if (two_masters) return "another master talks on the line";
-  if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) return "drivers disabled";
+  if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
+    return mcu.asleep ? "drivers disabled at rest" : "drivers disabled";
+  }
   return {};
 }
 
@@ -126,7 +129,7 @@ api::StateSnapshot StatePublisher::state_of(const Mcu& mcu) const {
   state.bus = bus.config.name;
   state.mcu = mcu.name();
   state.state = state_word(view);
-  state.detail = detail_of(view, bus.two_masters);
+  state.detail = detail_of(mcu, bus.two_masters);
   if (view.reported) state.inputs = motion::system_inputs_words(view.report.system_inputs);
   state.boot = view.identified ? view.identity.boot_number : 0;
   state.tick = view.tick;

@@ -18,7 +18,7 @@ std::size_t memory_of(std::monostate) {
 std::size_t memory_of(const std::vector<MotorResult>& motors) {
   std::size_t bytes = 0;
   for (const MotorResult& motor : motors) {
-    bytes += sizeof motor + memory_of(motor.motor) + memory_of(motor.table);
+    bytes += sizeof motor + memory_of(motor.motor) + memory_of(motor.table) + memory_of(motor.who);
   }
   return bytes;
 }
@@ -41,7 +41,17 @@ std::size_t memory_of(const MotionHistory& history) {
   std::size_t bytes = 0;
   for (const PastMotion& motion : history.motions) {
     bytes += sizeof motion + memory_of(motion.what) + memory_of(motion.who) +
-             memory_of(motion.outcome) + memory_of(motion.reason);
+             memory_of(motion.outcome) + memory_of(motion.reason) + memory_of(motion.from_text) +
+             memory_of(motion.to_text);
+  }
+  return bytes;
+}
+
+std::size_t memory_of(const Configuration& configuration) {
+  std::size_t bytes = memory_of(configuration.path) + memory_of(configuration.sha256);
+  for (const MotorSetting& setting : configuration.settings) {
+    bytes += memory_of(setting.motor) + memory_of(setting.key) + memory_of(setting.value) +
+             memory_of(setting.in_file);
   }
   return bytes;
 }

@@ -31,6 +31,7 @@ struct MotorResult {
   std::string unit = "steps";
   int precision = 0;  // decimals of both
   TableRef table{};   // by which it has moved
+  std::string who{};  // asked for it
 };
 
 // What a move would be.
@@ -74,10 +75,27 @@ struct PastMotion {
   std::int64_t to_steps = 0;
   std::string outcome{};
   std::string reason{};
+  // As they were shown to people then.
+  std::string from_text{};
+  std::string to_text{};
   friend bool operator==(const PastMotion&, const PastMotion&) = default;
 };
 struct MotionHistory {
   std::vector<PastMotion> motions{};
+};
+
+// What may be changed in operation, and what bushd.toml says of it.
+struct MotorSetting {
+  std::string motor{};
+  std::string key{};
+  std::string value{};
+  std::string in_file{};
+  friend bool operator==(const MotorSetting&, const MotorSetting&) = default;
+};
+struct Configuration {
+  std::string path{};    // of bushd.toml, absolute, on the daemon's PC
+  std::string sha256{};  // of its text as the daemon knows it
+  std::vector<MotorSetting> settings{};
 };
 
 struct Accepted {};
@@ -90,9 +108,9 @@ struct Completed {
   Outcome outcome = Outcome::kDone;
   std::string reason{};  // names motor and cause; never empty
   // Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
-  // table requests; a history.
+  // table requests; a history; settings.
   std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList, tables::TableContent,
-               MotionHistory>
+               MotionHistory, Configuration>
       detail{};
 };
 

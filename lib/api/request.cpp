@@ -10,7 +10,7 @@ constexpr std::array<std::string_view, std::variant_size_v<Request>> kNames = {
     "move",         "stop",         "emergency stop",   "enable",        "disable",
     "set position", "clear faults", "use table",        "reload tables", "home",
     "arm",          "disarm",       "position compare", "list tables",   "get table",
-    "set table",    "confirm",      "get history"};
+    "set table",    "confirm",      "get history",      "configure"};
 
 }  // namespace
 
@@ -23,6 +23,9 @@ bool is_stop(const Request& request) {
 }
 
 bool is_repeatable(const Request& request) {
+  if (const auto* configure = std::get_if<Configure>(&request)) {
+    return configure->kind == Configure::Kind::kShow;
+  }
   return is_stop(request) || std::holds_alternative<ListTables>(request) ||
          std::holds_alternative<GetTable>(request) || std::holds_alternative<GetHistory>(request);
 }

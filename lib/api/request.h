@@ -104,6 +104,7 @@ struct ReloadTables {};
 struct Home {
   MotorNames motors{};           // at least one, each with `home` in the configuration
   std::optional<Speed> speed{};  // of the fast approach
+  bool all = false;              // all motors with `home`, by its order; none is named then
 };
 
 // Motors, at rest, wait for an edge at the trigger input of their MCU and begin together after it.
@@ -157,9 +158,30 @@ struct GetHistory {
   std::int32_t most = 20;  // 1..1000
 };
 
+// Keys of motors that may be changed in operation: offset, direction, soft_limits. Their values are
+// texts as in bushd.toml: 12.5, negative, [-5, 30]; without soft limits none. Result: Configuration
+// of the motors that were named.
+struct Configure {
+  enum class Kind {
+    kShow,
+    kChange,  // of motors at rest; all of it or nothing
+    kSaved    // bushd.toml says this now, and has file_sha256: the client has written it
+  };
+  struct Change {
+    std::string motor{};
+    std::string key{};
+    std::string value{};
+    friend bool operator==(const Change&, const Change&) = default;
+  };
+  Kind kind = Kind::kShow;
+  MotorNames motors{};            // of kShow; none named: all
+  std::vector<Change> changes{};  // of the others
+  std::string file_sha256{};
+};
+
 using Request = std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
                              UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables,
-                             GetTable, SetTable, Confirm, GetHistory>;
+                             GetTable, SetTable, Confirm, GetHistory, Configure>;
 
 // For logs and counts: "move", "stop", "emergency stop", ...
 std::string_view name_of(const Request& request);

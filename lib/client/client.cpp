@@ -185,8 +185,9 @@ Result<void> Client::greet(Clock::time_point give_up) {
 }
 
 Result<api::Reply> Client::run(const api::Request& request, Until until,
-                               const std::function<void(const api::Reply&)>& on_reply) {
+                               const Meanwhile& meanwhile) {
   asked_at_ = Clock::now();
+  interrupted_ = false;
   // What happened to the daemon before this request is no concern of it.
   if (auto drained = wait(Clock::now()); !drained) return fail(drained.error());
   run_.reset();
@@ -201,11 +202,13 @@ Result<api::Reply> Client::run(const api::Request& request, Until until,
       return fail(two_daemons());
     }
   }
-  waiting_ = {.number = ++number_};
-  const auto packet = lcm::encode(
-      unix_time_us(), {.session = session_, .client_id = id_, .number = number_}, request);
+  if (meanwhile.on_state) {
+    if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error());
+  }
+  const auto packet = next_packet(request);
   if (!packet) return fail(packet.error());
-  auto reply = await_reply(*packet, until, on_reply);
+  waiting_ = {.number = number_};
+  auto reply = await_reply({.packet = *packet}, until, meanwhile);
   // Of a daemon that has forgotten it, the next request needs another session.
   const auto* refused = reply ? std::get_if<api::Refused>(&*reply) : nullptr;
   const bool forgotten = refused != nullptr && refused->reason.starts_with(api::kUnknownSession);
@@ -237,31 +240,63 @@ Result<void> Client::check_alive(Clock::time_point answered) const {
   return {};
 }
 
-Result<api::Reply> Client::await_reply(const lcm::Packet& packet, Until until,
-                                       const std::function<void(const api::Reply&)>& on_reply) {
+Result<lcm::Packet> Client::next_packet(const api::Request& request) {
+  return lcm::encode(unix_time_us(), {.session = session_, .client_id = id_, .number = ++number_},
+                     request);
+}
+
+// Over a link that loses nothing once is enough.
+Result<void> Client::send_when_due(Repeated& repeated, std::chrono::milliseconds again_after) {
+  if (Clock::now() < repeated.next_send || (repeated.sent && !link_->loses())) return {};
+  repeated.sent = true;
+  repeated.next_send = Clock::now() + again_after;
+  return link_->send(repeated.packet);
+}
+
+void Client::show_state(const Meanwhile& meanwhile, Clock::time_point& next) {
+  constexpr std::chrono::milliseconds kEvery{100};
+  if (!meanwhile.on_state || !state_heard_ || Clock::now() < next) return;
+  if (!collector_.has_motors()) return;
+  state_heard_ = false;
+  next = Clock::now() + kEvery;
+  meanwhile.on_state(collector_.status());
+}
+
+Result<api::Reply> Client::await_reply(Repeated request, Until until, const Meanwhile& meanwhile) {
   const Clock::time_point give_up = Clock::now() + options_.answer_within;
-  Clock::time_point next_send = Clock::now();
+  Clock::time_point next_shown{};
   Clock::time_point answered{};
-  bool sent_once = false;
   bool reported = false;
+  std::optional<Repeated> ending;
   for (;;) {
-    // Over a link that loses nothing once is enough.
-    if (Clock::now() >= next_send && (link_->loses() || !sent_once)) {
-      if (auto sent = link_->send(packet); !sent) return fail(sent.error());
-      sent_once = true;
-      next_send =
-          Clock::now() + (waiting_.accepted ? options_.ask_again_every : options_.resend_every);
+    const auto again_after = waiting_.accepted ? options_.ask_again_every : options_.resend_every;
+    if (auto sent = send_when_due(request, again_after); !sent) return fail(sent.error());
+    // Before it is accepted, the one that is to end it might be carried out first.
+    const bool ends = ending && waiting_.accepted;
+    if (ends) {
+      if (auto sent = send_when_due(*ending, options_.resend_every); !sent)
+        return fail(sent.error());
     }
-    const Clock::time_point wake = std::max(next_send, Clock::now());
+    Clock::time_point wake = std::max(request.next_send, Clock::now());
+    if (ends && link_->loses()) wake = std::min(wake, ending->next_send);
     auto waited = wait(waiting_.accepted ? wake : std::min(wake, give_up));
+    if (interrupted_ && meanwhile.on_interrupt && !ending) {
+      if (const auto end = meanwhile.on_interrupt()) {
+        const auto packet = next_packet(*end);
+        if (!packet) return fail(packet.error());
+        ending = Repeated{.packet = *packet};
+        interrupted_ = false;
+        waited = {};
+      }
+    }
     // What came before the end of the link counts.
     if (waiting_.accepted && !std::exchange(reported, true)) {
       answered = Clock::now();
-      next_send = answered + options_.ask_again_every;
-      if (on_reply) on_reply(*waiting_.accepted);
+      request.next_send = answered + options_.ask_again_every;
+      if (meanwhile.on_reply) meanwhile.on_reply(*waiting_.accepted);
     }
     if (waiting_.final) {
-      if (on_reply) on_reply(*waiting_.final);
+      if (meanwhile.on_reply) meanwhile.on_reply(*waiting_.final);
       return *waiting_.final;
     }
     if (waiting_.accepted && until == Until::kAnswered) return *waiting_.accepted;
@@ -269,7 +304,8 @@ Result<api::Reply> Client::await_reply(const lcm::Packet& packet, Until until,
     if (auto alive = check_alive(waiting_.accepted ? answered : Clock::now()); !alive) {
       return fail(alive.error());
     }
-    if (!waiting_.accepted && Clock::now() >= give_up) return fail(no_answer(sent_once));
+    if (!waiting_.accepted && Clock::now() >= give_up) return fail(no_answer(request.sent));
+    if (waiting_.accepted) show_state(meanwhile, next_shown);
   }
 }
 

@@ -56,13 +56,25 @@ class Client {
 
   enum class Until { kAnswered, kResult };
 
+  // What the caller does while a request runs.
+  struct Meanwhile {
+    // Each different reply, once.
+    std::function<void(const api::Reply&)> on_reply{};
+    // The state, at most ten times a second, as far as it is published.
+    std::function<void(const Status&)> on_state{};
+    // Interrupted, after having made interrupt_fd unreadable: the request that is to end the first
+    // one, whose result is awaited as before. Without, and at the second time, waiting ends.
+    std::function<std::optional<api::Request>()> on_interrupt{};
+  };
+
   // Sends the request and waits. kAnswered: returns Accepted or Refused (or Completed, when that
-  // came first). kResult: Refused or Completed. `on_reply` sees each different reply once. Fails
-  // when no daemon answers, when it falls silent or restarts meanwhile (what the request did is
-  // then unknown), when interrupted, and for requests that cannot be sent. Where two daemons are
-  // heard only what stops motors is sent.
-  Result<api::Reply> run(const api::Request& request, Until until,
-                         const std::function<void(const api::Reply&)>& on_reply = {});
+  // came first). kResult: Refused or Completed. Fails when no daemon answers, when it falls silent
+  // or restarts meanwhile (what the request did is then unknown), when interrupted, and for
+  // requests that cannot be sent. Where two daemons are heard only what stops motors is sent.
+  Result<api::Reply> run(const api::Request& request, Until until, const Meanwhile& meanwhile);
+  Result<api::Reply> run(const api::Request& request, Until until) {
+    return run(request, until, {});
+  }
 
   // Description, state and health of everything as they are now: the daemon is asked. Where
   // messages are lost again and again it is not complete, and says so.
@@ -73,7 +85,7 @@ class Client {
   Result<Status> next_state(std::chrono::milliseconds timeout);
   Result<Status> next_health(std::chrono::milliseconds timeout);
 
-  // interrupt_fd has become readable during one of the calls above.
+  // interrupt_fd has become readable during the last one of the calls above, and that ended it.
   bool interrupted() const { return interrupted_; }
 
   const std::string& id() const { return id_; }
@@ -101,8 +113,16 @@ class Client {
   Result<Status> incomplete_status();
   Result<Status> wait_for(const bool& heard, bool (StatusCollector::*enough)() const,
                           std::chrono::milliseconds timeout);
-  Result<api::Reply> await_reply(const lcm::Packet& packet, Until until,
-                                 const std::function<void(const api::Reply&)>& on_reply);
+  // A packet that is sent again until there is an answer.
+  struct Repeated {
+    lcm::Packet packet;
+    Clock::time_point next_send{};
+    bool sent = false;
+  };
+  Result<void> send_when_due(Repeated& repeated, std::chrono::milliseconds again_after);
+  Result<lcm::Packet> next_packet(const api::Request& request);
+  Result<api::Reply> await_reply(Repeated request, Until until, const Meanwhile& meanwhile);
+  void show_state(const Meanwhile& meanwhile, Clock::time_point& next);
   Result<void> check_alive(Clock::time_point answered) const;
   // Handles messages until `deadline`, or until there were some. Fails when interrupted.
   Result<void> wait(Clock::time_point deadline);

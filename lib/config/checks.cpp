@@ -54,6 +54,18 @@ Result<void> check_step_period(const Loading& loading, std::size_t index) {
   return fail(std::move(error));
 }
 
+// Its local inputs move nothing while the drivers are disabled, and cannot enable them.
+Result<void> check_idle(const Loading& loading, std::size_t index) {
+  const Motor& motor = loading.config.motors[index];
+  const Mcu& mcu = loading.config.mcu_of(motor);
+  if (!motor.local || !mcu.idle_disable_s) return {};
+  return fail(loading.motors[index].error(
+      "local",
+      fmt::format("is true, but MCU \"{}\" has idle_disable_s: its inputs would not move the "
+                  "motor once its drivers are disabled; leave out one of the two",
+                  mcu.id)));
+}
+
 Result<void> check_speed(const Loading& loading, std::size_t index) {
   const Config& config = loading.config;
   const Motor& motor = config.motors[index];
@@ -154,6 +166,7 @@ Result<void> check_together(const Loading& loading) {
   for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {
     if (auto checked = check_speed(loading, i); !checked) return checked;
     if (auto checked = check_step_period(loading, i); !checked) return checked;
+    if (auto checked = check_idle(loading, i); !checked) return checked;
   }
   if (auto checked = check_table_slots(loading); !checked) return checked;
   for (std::size_t i = 0; i < loading.config.buses.size(); ++i) {

@@ -1,5 +1,6 @@
 #include "config/config.h"
 
+#include <system_error>
 #include <utility>
 
 #include "config/checks.h"
@@ -21,6 +22,9 @@ Result<Config> parse(std::string_view text, const std::filesystem::path& path) {
   if (!document) return fail(document.error());
   Loading loading;
   loading.config.path = path.string();
+  std::error_code error;
+  loading.config.absolute_path = std::filesystem::absolute(path, error).string();
+  loading.config.text_sha256 = tables::text_sha256(text);
   const tables::TomlReader root(*document, loading.config.path);
   if (const auto read = read_sections(root, &loading); !read) return fail(read.error());
   if (const auto checked = check_together(loading); !checked) return fail(checked.error());

@@ -70,6 +70,8 @@ struct Mcu {
   std::uint8_t debounce_ticks = 1;
   std::uint16_t overcurrent = 0;  // reading of the current sensor; 0: no threshold
   EnableAfterReset enable_after_reset = EnableAfterReset::kReady;
+  std::optional<double> idle_disable_s = {};  // drivers are disabled after so long a rest
+  std::uint32_t enable_settle_ms = 0;         // from enabling them to the first step
 };
 
 struct Group {
@@ -85,7 +87,10 @@ struct Home {
   std::uint32_t most_steps = 0;     // to it
   std::uint32_t slow_steps_per_s = 100;
   std::optional<std::uint32_t> slow_most_steps = {};
-  bool at_start = false;  // whenever its MCU comes and has not homed it
+  bool at_start = false;             // whenever its MCU comes and has not homed it
+  std::int32_t order = 1;            // of all that are homed together: the lower ones first
+  std::optional<double> speed = {};  // of the fast approach unless asked otherwise, user units/s
+  std::optional<double> then = {};   // user position to move to once the switch was found
 };
 
 struct Motor {
@@ -105,10 +110,14 @@ struct Motor {
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits = {};
   std::optional<double> max_speed = {};  // user units/s, above 0
+  bool never_disable = false;            // its MCU's drivers stay enabled at rest
 };
 
 struct Config {
   std::string path;
+  // Where that is, and what its text was when it was read.
+  std::string absolute_path;
+  std::string text_sha256;
   Lcm lcm;
   Control control;
   State state;

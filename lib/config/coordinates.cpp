@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "config/setting.h"
+
 namespace bushd::config {
 namespace {
 
@@ -107,12 +109,11 @@ Result<units::SoftLimits> read_soft_limits(const TomlReader& reader, const Motor
     if (!end) return fail(end.error());
     ends[i] = *end;
   }
-  const units::Coordinates& coordinates = motor.coordinates;
-  if (coordinates.first_step_from(ends[0]) > coordinates.last_step_to(ends[1])) {
-    return fail(reader.error(
-        kKey, fmt::format("has no step from {} to {}; allowed: {}", ends[0], ends[1], kAllowed)));
+  const units::SoftLimits limits{ends[0], ends[1]};
+  if (const auto good = check_soft_limits(motor.coordinates, limits); !good) {
+    return fail(reader.error(kKey, good.error().message));
   }
-  return units::SoftLimits{ends[0], ends[1]};
+  return limits;
 }
 
 Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {

@@ -10,4 +10,7 @@ namespace bushd::config {
 // Precondition: the motor's section has the key.
 Result<Home> read_home(const tables::TomlReader& motor);
 
+// Where it is to move to once its switch was found. To be called when its units are known.
+Result<void> check_then(const tables::TomlReader& reader, const Motor& motor);
+
 }  // namespace bushd::config

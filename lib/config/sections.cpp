@@ -269,13 +269,34 @@ Result<void> read_buses(Loading* loading) {
   return {};
 }
 
+// When its drivers are disabled at rest, and how long they take to hold when enabled.
+Result<void> read_idle(const TomlReader& reader, Mcu* mcu) {
+  constexpr double kLongestS = 1'000'000;
+  if (reader.has("idle_disable_s")) {
+    const std::string allowed = fmt::format("a number above 0, up to {} s", kLongestS);
+    const auto seconds = reader.number("idle_disable_s", allowed);
+    if (!seconds) return fail(seconds.error());
+    if (!(*seconds > 0) || *seconds > kLongestS) {
+      return fail(
+          reader.error("idle_disable_s", fmt::format("is {}; allowed: {}", *seconds, allowed)));
+    }
+    mcu->idle_disable_s = *seconds;
+  }
+  if (!reader.has("enable_settle_ms")) return {};
+  const auto settle = reader.integer("enable_settle_ms", 0, 60'000, "ms");
+  if (!settle) return fail(settle.error());
+  mcu->enable_settle_ms = static_cast<std::uint32_t>(*settle);
+  return {};
+}
+
 Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
   Taken ids;
   for (const TomlReader& reader : readers) {
-    if (auto known = reader.only({"bus", "address", "emission", "step_us", "settle_us",
-                                  "dir_setup_us", "pulse_us", "phase_sequence", "hold_current",
-                                  "emergency_input", "emergency_active", "debounce_ticks",
-                                  "overcurrent", "enable_after_reset"});
+    if (auto known =
+            reader.only({"bus", "address", "emission", "step_us", "settle_us", "dir_setup_us",
+                         "pulse_us", "phase_sequence", "hold_current", "emergency_input",
+                         "emergency_active", "debounce_ticks", "overcurrent", "enable_after_reset",
+                         "idle_disable_s", "enable_settle_ms"});
         !known) {
       return known;
     }
@@ -293,6 +314,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
         fmt::format("address {} of bus \"{}\"", *address, config->buses[bus->value].name);
     if (auto taken = ids.take(reader, "address", mcu.id, what); !taken) return taken;
     if (auto read = read_inputs(reader, &mcu); !read) return read;
+    if (auto read = read_idle(reader, &mcu); !read) return read;
     config->mcus.push_back(std::move(mcu));
   }
   return {};
@@ -360,6 +382,11 @@ Result<void> read_motion_of_its_own(const TomlReader& reader, Motor* motor) {
     if (!home) return fail(home.error());
     motor->home = *home;
   }
+  if (reader.has("never_disable")) {
+    const auto never = reader.boolean("never_disable");
+    if (!never) return fail(never.error());
+    motor->never_disable = *never;
+  }
   if (!reader.has("local")) return {};
   const auto local = reader.boolean("local");
   if (!local) return fail(local.error());
@@ -373,10 +400,10 @@ Result<void> read_motors(Loading* loading) {
   Taken spoken_names;
   Taken outputs;
   for (const TomlReader& reader : loading->motors) {
-    if (auto known =
-            reader.only({"name", "mcu", "output", "group", "limit", "limit_action", "input_active",
-                         "home", "local", "restored", "description", "unit", "steps_per_unit",
-                         "direction", "offset", "precision", "soft_limits", "max_speed"});
+    if (auto known = reader.only({"name", "mcu", "output", "group", "limit", "limit_action",
+                                  "input_active", "home", "local", "restored", "description",
+                                  "unit", "steps_per_unit", "direction", "offset", "precision",
+                                  "soft_limits", "max_speed", "never_disable"});
         !known) {
       return known;
     }
@@ -407,6 +434,7 @@ Result<void> read_motors(Loading* loading) {
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
     if (auto read = read_restored(reader, &motor); !read) return read;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
+    if (auto checked = check_then(reader, motor); !checked) return checked;
     config.motors.push_back(std::move(motor));
   }
   return {};

@@ -8,7 +8,7 @@ namespace {
 constexpr Layout kTableRef{"sis"};
 constexpr Layout kMovePlan{"llllnSLLD"};
 constexpr Layout kTable{"ssislinInI"};
-constexpr Layout kPastMotion{"lssllss"};
+constexpr Layout kPastMotion{"lssllssss"};
 constexpr Layout kTableEntry{"stsidd", {&kTableRef}};
 
 constexpr Layout kRequest{"llsl"};
@@ -35,6 +35,7 @@ BUSHD_LAYOUT(subscribe_t, "bbb")
 
 BUSHD_LAYOUT(arm_t, "tbldbnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(clear_faults_t, kMotors)
+BUSHD_LAYOUT(configure_t, "tbnSnSSSs", {&kRequest})
 BUSHD_LAYOUT(confirm_t, kMotors)
 BUSHD_LAYOUT(disable_t, kMotors)
 BUSHD_LAYOUT(disarm_t, kMotors)
@@ -43,7 +44,7 @@ BUSHD_LAYOUT(enable_t, kMotors)
 BUSHD_LAYOUT(get_history_t, "tsi", {&kRequest})
 BUSHD_LAYOUT(get_status_t, kBare)
 BUSHD_LAYOUT(get_table_t, "ts", {&kRequest})
-BUSHD_LAYOUT(home_t, "tdbnS", {&kRequest})
+BUSHD_LAYOUT(home_t, "tdbnSb", {&kRequest})
 BUSHD_LAYOUT(list_tables_t, kBare)
 BUSHD_LAYOUT(move_t, "tbbdbnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(position_compare_t, "ttbll", {&kRequest, &kMotorAmount})
@@ -53,7 +54,8 @@ BUSHD_LAYOUT(set_table_t, "tsst", {&kRequest, &kTable})
 BUSHD_LAYOUT(stop_t, kMotors)
 BUSHD_LAYOUT(use_table_t, "tss", {&kRequest})
 
-BUSHD_LAYOUT(answer_t, "tnSSLDDSBHnTnT", {&kReplyHeader, &kTableRef, &kMovePlan})
+BUSHD_LAYOUT(answer_t, "tnSSLDDSBHSnTnT", {&kReplyHeader, &kTableRef, &kMovePlan})
+BUSHD_LAYOUT(configuration_answer_t, "tssnSSSS", {&kReplyHeader})
 BUSHD_LAYOUT(history_answer_t, "tnT", {&kReplyHeader, &kPastMotion})
 BUSHD_LAYOUT(table_answer_t, "tnTnT", {&kReplyHeader, &kTableEntry, &kTable})
 

@@ -96,6 +96,7 @@ void put(answer_t& answer, Piece<api::MotorResult> motors) {
     answer.dial_positions.push_back(motor.dial);
     answer.units.push_back(motor.unit);
     answer.precisions.push_back(static_cast<std::int8_t>(motor.precision));
+    answer.asked_by.push_back(motor.who);
     const auto table = std::find(told.begin(), told.end(), motor.table);
     answer.table_of_motor.push_back(static_cast<std::int16_t>(table - told.begin()));
     if (table != told.end()) continue;
@@ -133,6 +134,8 @@ past_motion_t motion_message(const api::PastMotion& motion) {
   message.to_steps = motion.to_steps;
   message.outcome = motion.outcome;
   message.reason = motion.reason;
+  message.from_text = motion.from_text;
+  message.to_text = motion.to_text;
   return message;
 }
 
@@ -145,8 +148,8 @@ std::size_t size_of(std::string_view string) {
 std::size_t size_of(const api::MotorResult& motor) {
   const auto table = static_cast<std::size_t>(message_of(motor.table)._getEncodedSizeNoHash());
   return size_of(motor.motor) + size_of(word(motor.outcome)) + size_of(motor.unit) +
-         sizeof(std::int64_t) + 2 * sizeof(double) + sizeof(std::int8_t) + sizeof(std::int16_t) +
-         table;
+         size_of(motor.who) + sizeof(std::int64_t) + 2 * sizeof(double) + sizeof(std::int8_t) +
+         sizeof(std::int16_t) + table;
 }
 std::size_t size_of(const api::MovePlan::Motor& motor) {
   return size_of(motor.motor) + 2 * sizeof(std::int64_t) + sizeof(double);
@@ -157,6 +160,11 @@ std::size_t size_of(const api::TableEntry& entry) {
 
 std::size_t size_of(const api::PastMotion& motion) {
   return static_cast<std::size_t>(motion_message(motion)._getEncodedSizeNoHash());
+}
+
+std::size_t size_of(const api::MotorSetting& setting) {
+  return size_of(setting.motor) + size_of(setting.key) + size_of(setting.value) +
+         size_of(setting.in_file);
 }
 
 // A list in pieces that fit a message each, beside `rest` bytes. At least one piece, maybe empty.
@@ -239,9 +247,20 @@ std::optional<std::vector<api::MotorResult>> motors_of(const answer_t& message) 
                       .dial = message.dial_positions[i],
                       .unit = message.units[i],
                       .precision = std::clamp<int>(message.precisions[i], 0, kMostDecimals),
-                      .table = ref_of(message.tables[table])});
+                      .table = ref_of(message.tables[table]),
+                      .who = message.asked_by[i]});
   }
   return motors;
+}
+
+void put(configuration_answer_t& answer, Piece<api::MotorSetting> settings) {
+  for (const auto& [motor, key, value, in_file] : settings) {
+    answer.setting_motors.push_back(motor);
+    answer.keys.push_back(key);
+    answer.values.push_back(value);
+    answer.values_in_file.push_back(in_file);
+  }
+  answer.setting_count = count(settings);
 }
 
 }  // namespace
@@ -254,6 +273,8 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
   table_answer.reply = answer.reply;
   history_answer_t history_answer{};
   history_answer.reply = answer.reply;
+  configuration_answer_t configuration_answer{};
+  configuration_answer.reply = answer.reply;
   const auto alone = [&](const char* channel,
                          const auto& message) -> bushd::Result<std::vector<Packet>> {
     auto made = packet(channel, message);
@@ -262,43 +283,49 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
   };
   const auto* completed = std::get_if<api::Completed>(&reply);
   if (completed == nullptr) return alone("REPLY", answer);
-  return std::visit(Overloaded{[&](std::monostate) { return alone("REPLY", answer); },
-                               [&](const std::vector<api::MotorResult>& motors) {
-                                 return in_parts(
-                                     "REPLY", answer, motors,
-                                     [](answer_t& part, auto piece) { put(part, piece); });
-                               },
-                               [&](const api::MovePlan& plan) {
-                                 return in_parts("REPLY", answer, plan.motors,
-                                                 [&plan](answer_t& part, auto piece) {
-                                                   part.plan.push_back(plan_message(plan, piece));
-                                                   part.plan_count = 1;
-                                                 });
-                               },
-                               [&](const api::TableList& list) {
-                                 return in_parts("TABLE_REPLY", table_answer, list.entries,
-                                                 [](table_answer_t& part, auto piece) {
-                                                   for (const auto& entry : piece) {
-                                                     part.entries.push_back(entry_message(entry));
-                                                   }
-                                                   part.entry_count = count(piece);
-                                                 });
-                               },
-                               [&](const api::MotionHistory& history) {
-                                 return in_parts("HISTORY_REPLY", history_answer, history.motions,
-                                                 [](history_answer_t& part, auto piece) {
-                                                   for (const auto& motion : piece) {
-                                                     part.motions.push_back(motion_message(motion));
-                                                   }
-                                                   part.motion_count = count(piece);
-                                                 });
-                               },
-                               [&](const tables::TableContent& content) {
-                                 table_answer.tables.push_back(message_of(content));
-                                 table_answer.table_count = 1;
-                                 return alone("TABLE_REPLY", table_answer);
-                               }},
-                    completed->detail);
+  return std::visit(
+      Overloaded{
+          [&](std::monostate) { return alone("REPLY", answer); },
+          [&](const std::vector<api::MotorResult>& motors) {
+            return in_parts("REPLY", answer, motors,
+                            [](answer_t& part, auto piece) { put(part, piece); });
+          },
+          [&](const api::MovePlan& plan) {
+            return in_parts("REPLY", answer, plan.motors, [&plan](answer_t& part, auto piece) {
+              part.plan.push_back(plan_message(plan, piece));
+              part.plan_count = 1;
+            });
+          },
+          [&](const api::TableList& list) {
+            return in_parts("TABLE_REPLY", table_answer, list.entries,
+                            [](table_answer_t& part, auto piece) {
+                              for (const auto& entry : piece) {
+                                part.entries.push_back(entry_message(entry));
+                              }
+                              part.entry_count = count(piece);
+                            });
+          },
+          [&](const api::MotionHistory& history) {
+            return in_parts("HISTORY_REPLY", history_answer, history.motions,
+                            [](history_answer_t& part, auto piece) {
+                              for (const auto& motion : piece) {
+                                part.motions.push_back(motion_message(motion));
+                              }
+                              part.motion_count = count(piece);
+                            });
+          },
+          [&](const api::Configuration& configuration) {
+            configuration_answer.path = configuration.path;
+            configuration_answer.sha256 = configuration.sha256;
+            return in_parts("CONFIGURATION_REPLY", configuration_answer, configuration.settings,
+                            [](auto& part, auto piece) { put(part, piece); });
+          },
+          [&](const tables::TableContent& content) {
+            table_answer.tables.push_back(message_of(content));
+            table_answer.table_count = 1;
+            return alone("TABLE_REPLY", table_answer);
+          }},
+      completed->detail);
 }
 
 bushd::Result<Packet> encode(std::int64_t utime_us, const Welcome& welcome) {
@@ -360,9 +387,29 @@ std::optional<DaemonMessage> decode_history_answer(Payload payload) {
                                .from_steps = motion.from_steps,
                                .to_steps = motion.to_steps,
                                .outcome = motion.outcome,
-                               .reason = motion.reason});
+                               .reason = motion.reason,
+                               .from_text = motion.from_text,
+                               .to_text = motion.to_text});
   }
   completed->detail = std::move(history);
+  return out;
+}
+
+std::optional<DaemonMessage> decode_configuration_answer(Payload payload) {
+  const auto message = decode<configuration_answer_t>(payload);
+  if (!message) return std::nullopt;
+  auto out = with_phase(message->reply);
+  if (!out) return std::nullopt;
+  auto* completed = std::get_if<api::Completed>(&out->reply);
+  if (completed == nullptr) return out;
+  api::Configuration configuration{.path = message->path, .sha256 = message->sha256};
+  for (std::size_t i = 0; i < message->setting_motors.size(); ++i) {
+    configuration.settings.push_back({.motor = message->setting_motors[i],
+                                      .key = message->keys[i],
+                                      .value = message->values[i],
+                                      .in_file = message->values_in_file[i]});
+  }
+  completed->detail = std::move(configuration);
   return out;
 }
 
@@ -394,6 +441,9 @@ void append(api::Reply& reply, api::Reply&& part) {
                  [](api::TableList& to, api::TableList& from) { append(to.entries, from.entries); },
                  [](api::MotionHistory& to, api::MotionHistory& from) {
                    append(to.motions, from.motions);
+                 },
+                 [](api::Configuration& to, api::Configuration& from) {
+                   append(to.settings, from.settings);
                  },
                  [](auto&, auto&) {}},
       whole->detail, more->detail);

@@ -112,10 +112,11 @@ std::optional<api::Request> from_message(const clear_faults_t& message) {
 home_t to_message(const api::Home& home) {
   auto message = motors_message<home_t>(home.motors);
   put_speed(message, home.speed);
+  message.all = home.all ? 1 : 0;
   return message;
 }
 std::optional<api::Request> from_message(const home_t& message) {
-  return api::Home{.motors = message.motors, .speed = speed_of(message)};
+  return api::Home{.motors = message.motors, .speed = speed_of(message), .all = message.all != 0};
 }
 disarm_t to_message(const api::Disarm& disarm) {
   return motors_message<disarm_t>(disarm.motors);
@@ -238,6 +239,36 @@ std::optional<api::Request> from_message(const get_history_t& message) {
   return api::GetHistory{.motor = message.motor, .most = message.most};
 }
 
+configure_t to_message(const api::Configure& configure) {
+  using Kind = api::Configure::Kind;
+  auto message = motors_message<configure_t>(configure.motors);
+  message.kind = configure.kind == Kind::kShow     ? configure_t::SHOW
+                 : configure.kind == Kind::kChange ? configure_t::CHANGE
+                                                   : configure_t::SAVED;
+  for (const auto& [motor, key, value] : configure.changes) {
+    message.change_motors.push_back(motor);
+    message.change_keys.push_back(key);
+    message.change_values.push_back(value);
+  }
+  message.change_count = count(configure.changes);
+  message.file_sha256 = configure.file_sha256;
+  return message;
+}
+std::optional<api::Request> from_message(const configure_t& message) {
+  using Kind = api::Configure::Kind;
+  if (message.kind < configure_t::SHOW || message.kind > configure_t::SAVED) return std::nullopt;
+  api::Configure configure{.kind = message.kind == configure_t::SHOW     ? Kind::kShow
+                                   : message.kind == configure_t::CHANGE ? Kind::kChange
+                                                                         : Kind::kSaved,
+                           .motors = message.motors,
+                           .file_sha256 = message.file_sha256};
+  for (std::size_t i = 0; i < message.change_motors.size(); ++i) {
+    configure.changes.push_back(
+        {message.change_motors[i], message.change_keys[i], message.change_values[i]});
+  }
+  return configure;
+}
+
 template <class Message>
 std::optional<ClientMessage> decode_request(Payload payload) {
   const auto message = decode<Message>(payload);
@@ -272,7 +303,7 @@ std::optional<ClientMessage> decode_get_status(Payload payload) {
 using Decoder = std::optional<ClientMessage> (*)(Payload);
 
 // A new request is a line here. Requests first, in the order of api::Request.
-constexpr std::array<std::pair<std::string_view, Decoder>, 21> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 22> kDecoders = {{
     {"MOVE", decode_request<move_t>},
     {"STOP", decode_request<stop_t>},
     {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
@@ -291,11 +322,12 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 21> kDecoders = {{
     {"SET_TABLE", decode_request<set_table_t>},
     {"CONFIRM", decode_request<confirm_t>},
     {"GET_HISTORY", decode_request<get_history_t>},
+    {"CONFIGURE", decode_request<configure_t>},
     {"HELLO", decode_hello},
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},
 }};
-static_assert(std::variant_size_v<api::Request> == 18);
+static_assert(std::variant_size_v<api::Request> == 19);
 
 constexpr auto kClientChannels = [] {
   std::array<std::string_view, kDecoders.size()> channels;

@@ -246,11 +246,12 @@ std::optional<DaemonMessage> decode_health(Payload payload) {
 
 using Decoder = std::optional<DaemonMessage> (*)(Payload);
 
-constexpr std::array<std::pair<std::string_view, Decoder>, 7> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 8> kDecoders = {{
     {"WELCOME", decode_welcome},
     {"REPLY", decode_answer},
     {"TABLE_REPLY", decode_table_answer},
     {"HISTORY_REPLY", decode_history_answer},
+    {"CONFIGURATION_REPLY", decode_configuration_answer},
     {"STATE", decode_state},
     {"DESCRIPTION", decode_description},
     {"HEALTH", decode_health},

@@ -12,6 +12,7 @@ api::TableRef ref_of(const table_ref_t& message);
 std::optional<DaemonMessage> decode_answer(Payload payload);
 std::optional<DaemonMessage> decode_table_answer(Payload payload);
 std::optional<DaemonMessage> decode_history_answer(Payload payload);
+std::optional<DaemonMessage> decode_configuration_answer(Payload payload);
 std::optional<DaemonMessage> decode_welcome(Payload payload);
 
 }  // namespace bushd::lcm

@@ -4,6 +4,8 @@
 #include "bushd/answer_t.hpp"
 #include "bushd/arm_t.hpp"
 #include "bushd/clear_faults_t.hpp"
+#include "bushd/configuration_answer_t.hpp"
+#include "bushd/configure_t.hpp"
 #include "bushd/confirm_t.hpp"
 #include "bushd/disable_t.hpp"
 #include "bushd/disarm_t.hpp"

@@ -150,6 +150,14 @@ bool counts_match(const T& message) {
   BUSHD_COUNTED(latency_count, latency_answers);
   BUSHD_COUNTED(mcu_count, mcus);
   BUSHD_COUNTED(motion_count, motions);
+  BUSHD_COUNTED(motor_count, asked_by);
+  BUSHD_COUNTED(change_count, change_motors);
+  BUSHD_COUNTED(change_count, change_keys);
+  BUSHD_COUNTED(change_count, change_values);
+  BUSHD_COUNTED(setting_count, setting_motors);
+  BUSHD_COUNTED(setting_count, keys);
+  BUSHD_COUNTED(setting_count, values);
+  BUSHD_COUNTED(setting_count, values_in_file);
   // What is nested and has counts of its own.
   if constexpr (requires { message.plan.size(); }) return all_match(message.plan);
   if constexpr (requires { message.tables.front().accel; }) return all_match(message.tables);
@@ -203,6 +211,8 @@ std::optional<T> decode(std::span<const std::uint8_t> payload) {
 BUSHD_TRAVELS(answer_t)
 BUSHD_TRAVELS(arm_t)
 BUSHD_TRAVELS(clear_faults_t)
+BUSHD_TRAVELS(configuration_answer_t)
+BUSHD_TRAVELS(configure_t)
 BUSHD_TRAVELS(confirm_t)
 BUSHD_TRAVELS(disable_t)
 BUSHD_TRAVELS(disarm_t)

@@ -114,6 +114,19 @@ Result<void> Motor::within_soft_limits(std::int64_t target) const {
                           coordinates.text(falls ? low : high)));
 }
 
+Result<void> Motor::stands_within_soft_limits() const {
+  if (!setup_.soft_limits) return {};
+  const units::Coordinates& coordinates = setup_.coordinates;
+  const std::int64_t low = coordinates.first_step_from(setup_.soft_limits->low);
+  const std::int64_t high = coordinates.last_step_to(setup_.soft_limits->high);
+  if (position_ >= low && position_ <= high) return {};
+  const bool falls = coordinates.scale().negative;
+  return fail(fmt::format(
+      "it stands at {}, beyond its soft limits of {} to {}; it may be moved towards them",
+      coordinates.text(position_), coordinates.text(falls ? high : low),
+      coordinates.text(falls ? low : high)));
+}
+
 // Of a motor without a unit nothing is rounded.
 Result<void> Motor::is_amount(const api::Amount& amount) const {
   const auto* user = std::get_if<api::UserUnits>(&amount);

@@ -168,6 +168,9 @@ class Motor {
   void set_coordinates(units::Coordinates coordinates) {
     setup_.coordinates = std::move(coordinates);
   }
+  void set_soft_limits(std::optional<units::SoftLimits> limits) { setup_.soft_limits = limits; }
+  // Error: how far it is from where it may be.
+  Result<void> stands_within_soft_limits() const;
   void position_is_known();
   // What was kept from before the MCU, or the daemon, was started.
   void position_is_restored(std::string reason);

@@ -51,7 +51,12 @@ CREATE INDEX move_of_motor ON move (motor, id);
 CREATE INDEX move_by_time ON move (utime_us);
 )";
 
-constexpr std::array kVersions = {kVersion1};
+constexpr const char* kVersion2 = R"(
+ALTER TABLE move ADD COLUMN from_text TEXT NOT NULL DEFAULT '';
+ALTER TABLE move ADD COLUMN to_text TEXT NOT NULL DEFAULT '';
+)";
+
+constexpr std::array kVersions = {kVersion1, kVersion2};
 constexpr std::array kTrust = {"unconfirmed", "known", "restored", "uncertain"};
 
 Trust trust_of(const std::string& word) {
@@ -297,8 +302,8 @@ Result<std::map<std::string, Settings>> Database::settings() {
 
 Result<std::vector<PastMove>> Database::history(const std::string& motor, int most) {
   Statement select(sqlite_,
-                   "SELECT motor, utime_us, what, who, from_steps, to_steps, result, reason"
-                   " FROM move WHERE motor = ? ORDER BY id DESC LIMIT ?");
+                   "SELECT motor, utime_us, what, who, from_steps, to_steps, result, reason,"
+                   " from_text, to_text FROM move WHERE motor = ? ORDER BY id DESC LIMIT ?");
   select.bind(motor).bind(std::int64_t{most});
   std::vector<PastMove> moves;
   while (true) {
@@ -312,7 +317,9 @@ Result<std::vector<PastMove>> Database::history(const std::string& motor, int mo
                      .from_steps = select.number(4),
                      .to_steps = select.number(5),
                      .result = select.text(6),
-                     .reason = select.text(7)});
+                     .reason = select.text(7),
+                     .from_text = select.text(8),
+                     .to_text = select.text(9)});
   }
 }
 
@@ -365,7 +372,7 @@ Result<void> Database::put(const std::string& motor, const Settings& settings) {
 Result<void> Database::add(const PastMove& move) {
   Statement insert(sqlite_,
                    "INSERT INTO move (motor, utime_us, what, who, from_steps, to_steps, result,"
-                   " reason) VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+                   " reason, from_text, to_text) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   auto added = insert.bind(move.motor)
                    .bind(move.utime_us)
                    .bind(move.what)
@@ -374,6 +381,8 @@ Result<void> Database::add(const PastMove& move) {
                    .bind(move.to_steps)
                    .bind(move.result)
                    .bind(move.reason)
+                   .bind(move.from_text)
+                   .bind(move.to_text)
                    .run();
   if (!added) return added;
   Statement old(sqlite_, "DELETE FROM move WHERE utime_us < ?");

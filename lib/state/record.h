@@ -65,12 +65,15 @@ inline bool stood(const Kept& kept) {
 struct PastMove {
   std::string motor{};
   std::int64_t utime_us = 0;  // when it ended
-  std::string what{};         // move, home, set, confirm
+  std::string what{};         // move, home, arm, set, config, confirm
   std::string who{};
   std::int64_t from_steps = 0;
   std::int64_t to_steps = 0;
   std::string result{};
   std::string reason{};
+  // Both as people saw them then, "3.0000 mm"; "" of a motor without a unit.
+  std::string from_text{};
+  std::string to_text{};
   friend bool operator==(const PastMove&, const PastMove&) = default;
 };
 

@@ -6,10 +6,16 @@
 namespace bushd::state {
 namespace {
 
-// "; last known: 1200 steps on 2026-11-20 17:03:12 UTC"
-std::string last_known(const Record& record) {
+// "1200 steps (3.0000 mm)"
+std::string position_of(const Record& record, const Seen& seen) {
+  const std::string steps = std::to_string(record.steps) + " steps";
+  return seen.position_text.empty() ? steps : steps + " (" + seen.position_text + ")";
+}
+
+// "; last known: 1200 steps (3.0000 mm) at 2026-11-20 17:03:12 UTC"
+std::string last_known(const Record& record, const Seen& seen) {
   if (record.utime_us == 0) return {};
-  return std::string("; last known: ") + std::to_string(record.steps) + " steps" +
+  return "; last known: " + position_of(record, seen) +
          (record.at_rest ? " at " : ", in motion, at ") + time_text(record.utime_us);
 }
 
@@ -76,12 +82,11 @@ Verdict on_connecting(const Kept& kept, const Seen& seen) {
   if (record.trust == Trust::kUncertain) return verdict;
   if (doubt) {
     verdict.trust = Trust::kUncertain;
-    verdict.reason = *doubt + last_known(record);
+    verdict.reason = *doubt + last_known(record, seen);
   } else if (!same_boot && record.trust != Trust::kUnconfirmed) {
     verdict.trust = Trust::kRestored;
     verdict.reason = "MCU " + seen.mcu + " has restarted; it stood at " +
-                     std::to_string(record.steps) + " steps, seen last at " +
-                     time_text(record.utime_us);
+                     position_of(record, seen) + ", seen last at " + time_text(record.utime_us);
   }
   return verdict;
 }

@@ -16,7 +16,8 @@ struct Seen {
   std::uint16_t boot_number = 0;
   std::uint8_t output = 0;
   std::string steps_per_unit{};
-  bool local = false;  // people may have moved it unseen
+  std::string position_text{};  // of the kept steps, in its unit; "" if there is none
+  bool local = false;           // people may have moved it unseen
   // It stands where a switch stops it immediately: nobody saw from which speed.
   bool may_have_overrun = false;
 };

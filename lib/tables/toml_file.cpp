@@ -118,6 +118,14 @@ Result<std::string> read_text(const std::filesystem::path& path) {
   return text;
 }
 
+std::string text_sha256(std::string_view text) {
+  gchar* const sum = g_compute_checksum_for_data(
+      G_CHECKSUM_SHA256, reinterpret_cast<const guchar*>(text.data()), text.size());
+  std::string out = sum;
+  g_free(sum);
+  return out;
+}
+
 Result<toml::table> parse_toml(std::string_view text, const std::string& path) {
   const char* end = text.data();
   if (!text.empty() &&

@@ -19,6 +19,9 @@ inline constexpr std::size_t kMaxFileBytes = 2 * 1024 * 1024;
 // A regular file of at most kMaxFileBytes.
 Result<std::string> read_text(const std::filesystem::path& path);
 
+// SHA-256 of a text, 64 hexadecimal digits.
+std::string text_sha256(std::string_view text);
+
 // `path` is only what errors say.
 Result<toml::table> parse_toml(std::string_view text, const std::string& path);
 

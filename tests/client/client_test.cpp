@@ -84,8 +84,11 @@ class ClientTest : public testing::Test {
     state(1);
   }
   Result<api::Reply> run(const api::Request& request, Client::Until until) {
-    return client_->run(request, until,
-                        [this](const api::Reply& heard) { heard_.push_back(heard.index()); });
+    return client_->run(
+        request, until,
+        {.on_reply = [this](const api::Reply& heard) { heard_.push_back(heard.index()); },
+         .on_state = on_state_,
+         .on_interrupt = on_interrupt_});
   }
   Result<api::Reply> move(Client::Until until = Client::Until::kResult) {
     return run(api::Move{.motors = {{"theta", -400}}}, until);
@@ -100,6 +103,8 @@ class ClientTest : public testing::Test {
   std::unique_ptr<Client> client_;
   std::function<void()> daemon_;
   std::function<void()> on_status_;
+  std::function<void(const Status&)> on_state_;
+  std::function<std::optional<api::Request>()> on_interrupt_;
   std::vector<lcm::ClientMessage> requests_;
   std::vector<std::size_t> heard_;
   std::int64_t run_ = 5;
@@ -298,6 +303,69 @@ TEST_F(ClientTest, IsInterruptedThroughItsDescriptor) {
   ASSERT_EQ(eventfd_write(interrupt_, 1), 0);
   EXPECT_FALSE(move());
   EXPECT_TRUE(client_->interrupted());
+}
+
+// A request that is to end the first one follows it, for it might overtake it; then the first one's
+// result counts.
+TEST_F(ClientTest, InterruptedSendsWhatEndsTheRequestAndAwaitsItsResult) {
+  for (const bool loses : {true, false}) {
+    open(loses, std::chrono::minutes(5));
+    requests_.clear();
+    int interrupted = 0;
+    on_interrupt_ = [&]() -> std::optional<api::Request> {
+      eventfd_t count = 0;
+      eventfd_read(interrupt_, &count);
+      ++interrupted;
+      reply(api::Accepted{});
+      return api::Stop{{"theta"}};
+    };
+    std::optional<lcm::RequestId> first;
+    bool stopped = false;
+    daemon_ = [&] {
+      const auto& request = std::get<api::Request>(requests_.back().content);
+      if (std::holds_alternative<api::Move>(request)) {
+        if (!first) eventfd_write(interrupt_, 1);
+        first = requests_.back().id;
+        return;
+      }
+      EXPECT_TRUE(first) << "the stop came first";
+      EXPECT_EQ(std::get<api::Stop>(request).motors, api::MotorNames{"theta"});
+      reply(result(api::Outcome::kDone));  // of the stop, which nobody waits for
+      if (std::exchange(stopped, true)) return;
+      link_->say(lcm::ReplyMessage{.id = *first, .reply = result(api::Outcome::kStopped)});
+    };
+    const auto moved = move();
+    ASSERT_TRUE(moved) << moved.error().text();
+    EXPECT_EQ(std::get<api::Completed>(*moved).outcome, api::Outcome::kStopped);
+    EXPECT_TRUE(stopped);
+    EXPECT_EQ(interrupted, 1);
+    EXPECT_FALSE(client_->interrupted());
+  }
+}
+
+TEST_F(ClientTest, InterruptedASecondTimeNoLongerWaits) {
+  on_interrupt_ = [&]() -> std::optional<api::Request> { return api::Stop{}; };  // readable still
+  daemon_ = [this] {
+    reply(api::Accepted{});
+    eventfd_write(interrupt_, 1);
+  };
+  EXPECT_FALSE(move());
+  EXPECT_TRUE(client_->interrupted());
+}
+
+TEST_F(ClientTest, ShowsTheStateWhileARequestRuns) {
+  std::vector<std::int64_t> shown;
+  on_state_ = [&](const Status& status) {
+    shown.push_back(status.sequence());
+    reply(result(api::Outcome::kReached));
+  };
+  daemon_ = [this] {
+    reply(api::Accepted{});
+    description(1);
+    state(2);
+  };
+  EXPECT_TRUE(reached(move()));
+  EXPECT_EQ(shown, std::vector<std::int64_t>{2});
 }
 
 TEST_F(ClientTest, OverALinkThatLosesNothingSaysEverythingOnce) {

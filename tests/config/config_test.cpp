@@ -96,6 +96,31 @@ TEST(Config, MotorsMayHaveASwitchAndButtons) {
   EXPECT_EQ(little->motors[0].home->slow_steps_per_s, 100u);
   EXPECT_FALSE(little->motors[0].home->slow_most_steps);
   EXPECT_FALSE(little->motors[0].home->at_start);
+  EXPECT_EQ(little->motors[0].home->order, 1);
+  EXPECT_FALSE(little->motors[0].home->speed);
+  EXPECT_FALSE(little->motors[0].home->then);
+}
+
+TEST(Config, HomedMotorsMayMoveOnWithinTheirSoftLimits) {
+  const auto load = [](const std::string& then) {
+    return ConfigFile(
+               replaced(kGood, "output = 0\n",
+                        "output = 0\nunit = \"mm\"\nsteps_per_unit = 400\ndirection = "
+                        "\"negative\"\nsoft_limits = [-5, 3]\nhome = { direction = \"negative\", "
+                        "most_steps = 9, order = 2, speed = 1.5, then = " +
+                            then + " }\n"))
+        .load();
+  };
+  const auto config = load("4.5");
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(config->motors[0].home->order, 2);
+  EXPECT_EQ(config->motors[0].home->speed, 1.5);
+  EXPECT_EQ(config->motors[0].home->then, 4.5);
+  const auto beyond = load("5.5");
+  ASSERT_FALSE(beyond);
+  EXPECT_EQ(beyond.error().key, "motor[0].home.then");
+  EXPECT_THAT(beyond.error().message,
+              testing::HasSubstr("beyond the soft limits; allowed: -3.0000 mm to 5.0000 mm"));
 }
 
 TEST(Config, PortsMayBePatterns) {
@@ -303,12 +328,20 @@ INSTANTIATE_TEST_SUITE_P(
              "is \"left\"; allowed: negative, positive"),
         home("StepsMissing", "{ direction = \"negative\" }", "motor[0].home.most_steps",
              "is missing; allowed: a whole number 1..2147483647 steps"),
-        home("UnknownKey", "{ direction = \"negative\", most_steps = 5, speed = 3 }",
-             "motor[0].home.speed", "unknown key"),
+        home("UnknownKey", "{ direction = \"negative\", most_steps = 5, pace = 3 }",
+             "motor[0].home.pace", "unknown key"),
         home("Speed", "{ direction = \"negative\", most_steps = 5, slow_steps_per_s = 1 }",
              "motor[0].home.slow_steps_per_s", "2..5000 steps/s"),
         home("AtStart", "{ direction = \"negative\", most_steps = 5, at_start = 1 }",
              "motor[0].home.at_start", "is 1; allowed: true or false"),
+        home("Order", "{ direction = \"negative\", most_steps = 5, order = 0 }",
+             "motor[0].home.order", "is 0; allowed: a whole number 1..1000"),
+        home("FastSpeed", "{ direction = \"negative\", most_steps = 5, speed = 0 }",
+             "motor[0].home.speed", "is 0; allowed: a number above 0"),
+        home("Then", "{ direction = \"negative\", most_steps = 5, then = true }",
+             "motor[0].home.then", "allowed: a position"),
+        home("ThenBetweenSteps", "{ direction = \"negative\", most_steps = 5, then = 1.5 }",
+             "motor[0].home.then", "is 1.5; allowed: a whole number of steps"),
         change("Local", "output = 0\n", "output = 0\nlocal = 1\n", 32, "motor[0].local",
                "is 1; allowed: true or false")),
     kNames);

@@ -31,6 +31,9 @@ TEST(ConfigInputs, NothingIsWatchedUnlessItIsAskedFor) {
   EXPECT_EQ(mcu.debounce_ticks, 1);
   EXPECT_EQ(mcu.overcurrent, 0);
   EXPECT_EQ(mcu.enable_after_reset, EnableAfterReset::kReady);
+  EXPECT_FALSE(mcu.idle_disable_s);
+  EXPECT_EQ(mcu.enable_settle_ms, 0u);
+  EXPECT_FALSE(config->motors[0].never_disable);
   const Motor& motor = config->motors[0];
   EXPECT_FALSE(motor.limit_positive || motor.limit_negative || motor.input_active_open);
   EXPECT_EQ(motor.limit_action, BUSHD_STOP_RAMP);
@@ -50,6 +53,17 @@ TEST(ConfigInputs, AnMcuHasItsOwn) {
   EXPECT_EQ(mcu.overcurrent, 1023);
   EXPECT_EQ(mcu.enable_after_reset, EnableAfterReset::kAtOnce);
   EXPECT_EQ(config->mcus[0].emergency_input, BUSHD_EMERGENCY_INPUT_IGNORED);
+}
+
+TEST(ConfigInputs, DriversAreDisabledAtRest) {
+  const auto config =
+      ConfigFile(replaced(with_mcu("idle_disable_s = 2.5\nenable_settle_ms = 300\n"),
+                          "output = 15\n", "output = 15\nnever_disable = true\n"))
+          .load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(config->mcus[1].idle_disable_s, 2.5);
+  EXPECT_EQ(config->mcus[1].enable_settle_ms, 300u);
+  EXPECT_TRUE(config->motors[1].never_disable);
 }
 
 TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
@@ -88,6 +102,13 @@ TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_mcu("overcurrent = 1024\n"), 22, "mcu[1].overcurrent: is 1024; allowed: a whole"},
       {with_mcu("enable_after_reset = true\n"), 22,
        "mcu[1].enable_after_reset: is true; allowed: \"ready\", \"at_once\" or \"no\""},
+      {with_mcu("idle_disable_s = 0\n"), 22,
+       "mcu[1].idle_disable_s: is 0; allowed: a number above"},
+      {with_mcu("enable_settle_ms = -1\n"), 22, "mcu[1].enable_settle_ms: is -1; allowed: a whole"},
+      {with_motor("never_disable = 1\n"), 37,
+       "motor[1].never_disable: is 1; allowed: true or false"},
+      {replaced(with_mcu("idle_disable_s = 1\n"), "output = 15\n", "output = 15\nlocal = true\n"),
+       38, "motor[1].local: is true, but MCU \"roof:255\" has idle_disable_s"},
       {with_motor("limit = \"left\"\n"), 37,
        "motor[1].limit: is \"left\"; allowed: \"positive\", \"negative\" or \"both\""},
       {with_motor("limit = \"both\"\nlimit_action = \"halt\"\n"), 38,

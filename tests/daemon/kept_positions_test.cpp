@@ -319,13 +319,15 @@ TEST(KeptPositions, HaveAHistory) {
   const auto number = lab.send(api::GetHistory{.motor = "m01", .most = 10});
   EXPECT_EQ(lab.wait(number).result, "done");
   const auto history = lab.history(number);
-  ASSERT_EQ(history.size(), 2u);
+  ASSERT_EQ(history.size(), 3u);
   EXPECT_EQ(history[0].outcome, "stopped");
+  EXPECT_THAT(history[0].reason, HasSubstr("asked for by command"));
   EXPECT_EQ(history[0].from_steps, 300);
   EXPECT_EQ(history[0].to_steps, lab.shaft_steps("m01"));
   EXPECT_EQ(history[1].outcome, "reached");
   EXPECT_EQ(history[1].what, "move");
   EXPECT_THAT(history[1].who, HasSubstr("of test"));
+  EXPECT_EQ(history[2].what, "set") << "when it was connected for the first time";
   EXPECT_THAT(lab.wait(lab.send(api::GetHistory{.motor = "m01", .most = 0})).reason,
               HasSubstr("allowed: 1 to 1000"));
   Lab without(hall(1, 1));

@@ -79,9 +79,13 @@ class Lab::Client final : public api::Session {
     const auto* history =
         completed == nullptr ? nullptr : std::get_if<api::MotionHistory>(&completed->detail);
     if (history != nullptr) histories[number] = history->motions;
+    const auto* configuration =
+        completed == nullptr ? nullptr : std::get_if<api::Configuration>(&completed->detail);
+    if (configuration != nullptr) configurations[number] = *configuration;
   }
   std::map<std::int64_t, std::vector<Answer>> answers;  // by number
   std::map<std::int64_t, std::vector<api::PastMotion>> histories;
+  std::map<std::int64_t, api::Configuration> configurations;
 };
 
 Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink)
@@ -171,6 +175,14 @@ void Lab::use_configuration(const std::string& toml) {
 
 std::vector<api::PastMotion> Lab::history(std::int64_t number) const {
   return client_->histories[number];
+}
+
+std::vector<std::string> Lab::settings(std::int64_t number) const {
+  std::vector<std::string> lines;
+  for (const auto& [motor, key, value, in_file] : client_->configurations[number].settings) {
+    lines.push_back(motor + " " + key + " = " + value + ", in the file " + in_file);
+  }
+  return lines;
 }
 
 void Lab::mark(std::vector<state::Mark> marks) {

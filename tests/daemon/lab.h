@@ -129,6 +129,8 @@ class Lab : public daemon::Outputs, private state::Backend {
   // Another bushd.toml with the same MCUs: the daemon is started again.
   void use_configuration(const std::string& toml);
   std::vector<api::PastMotion> history(std::int64_t number) const;
+  // "m01 offset = 12.5, in the file 0", each a line.
+  std::vector<std::string> settings(std::int64_t number) const;
   // The PC loses power: the daemon, and what the disk had not synced. A new one starts.
   void cut_pc_power();
   // Bytes on the way to MCUs are handed to this before they are sent; returning false drops them.

@@ -122,7 +122,9 @@ class LiveBench : public Bench {
   daemon::KeptPositions kept{installation, positions, journal, *this};
   daemon::DryRuns dry_runs{installation};
   daemon::Moves moves{installation, interlocks, journal, open_moves, dry_runs, *this};
-  daemon::HomingQueue homing{installation, interlocks, open_moves, kept, *this};
+  daemon::IdleDrivers idle_drivers{installation, *this, [](MotorId) { return false; }};
+  daemon::HomingQueue homing{installation, interlocks,   open_moves, moves,
+                             kept,         idle_drivers, *this};
   daemon::EmergencyStop emergency_stop{installation, interlocks, homing, *this};
 
  private:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import unittest
 
@@ -23,6 +24,24 @@ class Bushctl(EndToEndTest):
         # Nothing to be done is reached, too.
         self.command("move", "--wait", "b0", "--to", "93")
 
+    def test_ctrl_c_ramps_down_and_says_where_motors_stand(self):
+        self.bring_up()
+        for more in ((), ("--lcm",)):
+            move = self.start_move("a0", FAR, "b0", -FAR, *more)
+            self.wait_until_travelled(600, "a0", "b0")
+            self.assertEqual(move.end(signal.SIGINT), 130)
+            self.assertRegex(move.said(), r"a0: stopped, stands at \d+ by")
+            self.assertRegex(move.said(), r"b0: stopped, stands at -\d+ by")
+            self.assertIn("ramping down", move.said())
+            self.command("set", "a0", "0")
+            self.command("set", "b0", "0")
+        # Any other end of the program lets the motors go on.
+        move = self.start_move("a0", FAR)
+        self.wait_until_travelled(600, "a0")
+        self.assertEqual(move.end(signal.SIGTERM), 130)
+        self.assertIn("the move goes on", move.said())
+        self.assertTrue(self.motors()["a0"]["moving"])
+
     def test_what_cannot_be_is_refused_with_the_reason(self):
         self.bring_up()
         self.start_move("a0", FAR)
@@ -42,6 +61,18 @@ class Bushctl(EndToEndTest):
         # Of a refused group nothing has moved.
         self.command("stop", "--wait")
         self.assertEqual(self.positions()["b0"], 0)
+
+    def test_completion_knows_motors_groups_and_tables(self):
+        self.bring_up()
+
+        def offered(*words):
+            return self.command("--complete", *words).stdout.split()
+
+        self.assertEqual(offered("move", ""), sorted(MOTORS))
+        self.assertEqual(offered("stop", "a0", "b"), sorted(name for name in MOTORS if name.startswith("b")))
+        groups = offered("table", "use", "")
+        self.assertTrue(groups)
+        self.assertIn("bushd2-constant", offered("table", "use", groups[0], "bushd2"))
 
     def test_disabled_drivers_refuse_moves(self):
         self.bring_up()

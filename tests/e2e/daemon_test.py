@@ -43,7 +43,7 @@ class DaemonEnds(EndToEndTest):
     def check_kill(self, displacement_format="fine", bus_lines=()):
         move = self.start_moving(displacement_format, bus_lines)
         self.assertEqual(self.bushd.end(signal.SIGKILL), -signal.SIGKILL)
-        move.end(signal.SIGINT)
+        move.end(signal.SIGTERM)
         # At once, so that the motors still move when it comes.
         self.bushd = self.start_bushd("moves-after.jsonl")
         self.wait_until_ready()

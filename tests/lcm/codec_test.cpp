@@ -94,6 +94,16 @@ TEST(Codec, OtherRequestsDoToo) {
   const auto history = request_over_the_wire(api::GetHistory{.motor = "a", .most = 7});
   EXPECT_EQ(history.motor, "a");
   EXPECT_EQ(history.most, 7);
+  EXPECT_TRUE(request_over_the_wire(api::Home{.all = true}).all);
+  using Kind = api::Configure::Kind;
+  EXPECT_EQ(request_over_the_wire(api::Configure{.motors = {"a"}}).motors, api::MotorNames{"a"});
+  for (const Kind kind : {Kind::kShow, Kind::kChange, Kind::kSaved}) {
+    const auto configure = request_over_the_wire(
+        api::Configure{.kind = kind, .changes = {{"a", "offset", "2.5"}}, .file_sha256 = "abc"});
+    EXPECT_EQ(configure.kind, kind);
+    EXPECT_EQ(configure.changes, (std::vector<api::Configure::Change>{{"a", "offset", "2.5"}}));
+    EXPECT_EQ(configure.file_sha256, "abc");
+  }
   request_over_the_wire(api::ListTables{});
   EXPECT_EQ(request_over_the_wire(api::GetTable{"own"}).table, "own");
   const auto set = request_over_the_wire(
@@ -138,6 +148,9 @@ TEST(Codec, WhatNoMessageMeansIsRefused) {
   arm_t arm{};
   arm.edge = 0;
   EXPECT_FALSE(decode_client_message("ARM", *encode(arm)));
+  configure_t configure{};
+  configure.kind = 4;
+  EXPECT_FALSE(decode_client_message("CONFIGURE", *encode(configure)));
   position_compare_t compare{};
   compare.arrivals = 4;
   EXPECT_FALSE(decode_client_message("POSITION_COMPARE", *encode(compare)));
@@ -147,15 +160,17 @@ TEST(Codec, RepliesArriveAsTheyWereMeant) {
   EXPECT_TRUE(std::holds_alternative<api::Accepted>(reply_over_the_wire(api::Accepted{}).reply));
   EXPECT_EQ(std::get<api::Refused>(reply_over_the_wire(api::Refused{"why"}).reply).reason, "why");
   const api::TableRef table{.name = "own", .revision = 2, .hash = "0123abcd"};
-  const auto moved = std::get<api::Completed>(
-      reply_over_the_wire(
-          api::Completed{.outcome = api::Outcome::kLimit,
-                         .reason = "theta: stopped",
-                         .detail = std::vector<api::MotorResult>{{"theta", api::Outcome::kLimit, 7,
-                                                                  1.75, -0.25, "mm", 2, table},
-                                                                 {"chi", api::Outcome::kReached, 9,
-                                                                  9, 9, "steps", 0, table}}})
-          .reply);
+  const auto moved =
+      std::get<api::Completed>(
+          reply_over_the_wire(
+              api::Completed{
+                  .outcome = api::Outcome::kLimit,
+                  .reason = "theta: stopped",
+                  .detail =
+                      std::vector<api::MotorResult>{
+                          {"theta", api::Outcome::kLimit, 7, 1.75, -0.25, "mm", 2, table, "me"},
+                          {"chi", api::Outcome::kReached, 9, 9, 9, "steps", 0, table}}})
+              .reply);
   EXPECT_EQ(moved.outcome, api::Outcome::kLimit);
   const auto& motors = std::get<std::vector<api::MotorResult>>(moved.detail);
   EXPECT_EQ(motors.at(1).motor, "chi");
@@ -165,6 +180,7 @@ TEST(Codec, RepliesArriveAsTheyWereMeant) {
   EXPECT_EQ(motors.at(0).dial, -0.25);
   EXPECT_EQ(motors.at(0).unit, "mm");
   EXPECT_EQ(motors.at(0).precision, 2);
+  EXPECT_EQ(motors.at(0).who, "me");
 }
 
 TEST(Codec, PlansAndTablesDoToo) {
@@ -186,13 +202,26 @@ TEST(Codec, PlansAndTablesDoToo) {
                                .from_steps = -2,
                                .to_steps = 3,
                                .outcome = "reached",
-                               .reason = "r"};
+                               .reason = "r",
+                               .from_text = "-2.0 mm",
+                               .to_text = "3.0 mm"};
   const auto history = std::get<api::Completed>(
       reply_over_the_wire(
           api::Completed{.reason = "r", .detail = api::MotionHistory{{motion, motion}}})
           .reply);
   EXPECT_EQ(std::get<api::MotionHistory>(history.detail).motions,
             std::vector<api::PastMotion>({motion, motion}));
+  const api::Configuration configuration{
+      .path = "/etc/b.toml",
+      .sha256 = "abc",
+      .settings = {{.motor = "a", .key = "offset", .value = "2.5", .in_file = "0"}}};
+  const auto configured = std::get<api::Configuration>(
+      std::get<api::Completed>(
+          reply_over_the_wire(api::Completed{.reason = "r", .detail = configuration}).reply)
+          .detail);
+  EXPECT_EQ(configured.path, configuration.path);
+  EXPECT_EQ(configured.sha256, configuration.sha256);
+  EXPECT_EQ(configured.settings, configuration.settings);
   const tables::TableContent own{.name = "own", .time_unit_ns = 4000, .accel = {2500, 1200}};
   const auto content = std::get<api::Completed>(
       reply_over_the_wire(api::Completed{.reason = "r", .detail = own}).reply);

@@ -275,21 +275,39 @@ TEST(Database, HistoryIsBoundedInTimeAndRows) {
 TEST(Database, AnOlderVersionIsCopiedThenBroughtUpToDate) {
   sim::SimDisk disk(1);
   { Store store = open(disk); }
-  const std::vector<const char*> newer{all_versions()[0],
-                                       "ALTER TABLE setting ADD COLUMN who TEXT"};
+  const std::size_t now = all_versions().size();
+  std::vector<const char*> newer(all_versions().begin(), all_versions().end());
+  newer.push_back("ALTER TABLE setting ADD COLUMN who TEXT");
   std::vector<std::string> notes;
   {
     auto opened = Database::open(disk, kDatabase, 0, notes, newer);
     ASSERT_TRUE(opened) << opened.error().text();
   }
-  EXPECT_THAT(notes, ElementsAre(HasSubstr("from version 1 to 2")));
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("from version " + std::to_string(now) + " to " +
+                                           std::to_string(now + 1))));
   // The copy is a database of the version before.
-  EXPECT_TRUE(Database::open(disk, "/state/state.db.version-1", 0, notes));
+  EXPECT_TRUE(Database::open(disk, "/state/state.db.version-" + std::to_string(now), 0, notes));
   // This version does not know the newer one, and leaves it alone.
   const auto refused = Database::open(disk, kDatabase, 0, notes);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text(), HasSubstr("made by a newer bushd"));
   EXPECT_TRUE(Database::open(disk, kDatabase, 0, notes, newer));
+}
+
+TEST(Database, TheFirstVersionKeepsItsHistory) {
+  SimDisk disk(1);
+  std::vector<std::string> notes;
+  {
+    auto opened = Database::open(disk, kDatabase, 0, notes, all_versions().first(1));
+    ASSERT_TRUE(opened) << opened.error().text();
+  }
+  auto opened = Database::open(disk, kDatabase, 0, notes);
+  ASSERT_TRUE(opened) << opened.error().text();
+  PastMove move = past_move("theta", 5);
+  move.from_text = "1.0 mm";
+  move.to_text = "2.0 mm";
+  ASSERT_TRUE(opened->write({.moves = {move}}));
+  EXPECT_THAT(*opened->history("theta", 3), ElementsAre(move));
 }
 
 // Nothing that was acknowledged is lost, and nothing that was not marked looks like a move.

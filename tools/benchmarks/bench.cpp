@@ -13,14 +13,15 @@ namespace bushd::bench {
 namespace {
 
 constexpr size_t kMotors = 32;
+constexpr uint16_t kHalfSpeed = 1000;  // floor of 5000 steps/s
 
-void expand_coarse(benchmark::State& state) {
+void expand_coarse(benchmark::State& state, uint16_t floor = 0) {
   const auto block = static_cast<size_t>(state.range(0));
   Moves moves(kMotors);
   std::vector<uint8_t> out(block * kMotors);
   size_t motor_ticks = 0;
   for (auto _ : state) {
-    moves.start();
+    moves.start(floor);
     while (const size_t active = moves.expand_coarse(block, out.data())) {
       benchmark::DoNotOptimize(out.data());
       benchmark::ClobberMemory();
@@ -29,15 +30,21 @@ void expand_coarse(benchmark::State& state) {
   }
   state.SetItemsProcessed(static_cast<int64_t>(motor_ticks));
 }
-BENCHMARK(expand_coarse)->ArgName("block_ticks")->Arg(1)->Arg(15)->Arg(64)->Arg(256);
+BENCHMARK_CAPTURE(expand_coarse, table, 0)
+    ->ArgName("block_ticks")
+    ->Arg(1)
+    ->Arg(15)
+    ->Arg(64)
+    ->Arg(256);
+BENCHMARK_CAPTURE(expand_coarse, floor, kHalfSpeed)->ArgName("block_ticks")->Arg(15)->Arg(64);
 
-void expand_fine(benchmark::State& state) {
+void expand_fine(benchmark::State& state, uint16_t floor = 0) {
   const auto block = static_cast<size_t>(state.range(0));
   Moves moves(kMotors);
   std::vector<int16_t> out(block * kMotors);
   size_t motor_ticks = 0;
   for (auto _ : state) {
-    moves.start();
+    moves.start(floor);
     while (const size_t active = moves.expand_fine(block, out.data())) {
       benchmark::DoNotOptimize(out.data());
       benchmark::ClobberMemory();
@@ -46,7 +53,8 @@ void expand_fine(benchmark::State& state) {
   }
   state.SetItemsProcessed(static_cast<int64_t>(motor_ticks));
 }
-BENCHMARK(expand_fine)->ArgName("block_ticks")->Arg(1)->Arg(7)->Arg(64)->Arg(256);
+BENCHMARK_CAPTURE(expand_fine, table, 0)->ArgName("block_ticks")->Arg(1)->Arg(7)->Arg(64)->Arg(256);
+BENCHMARK_CAPTURE(expand_fine, floor, kHalfSpeed)->ArgName("block_ticks")->Arg(7)->Arg(64);
 
 constexpr uint8_t kFrameMotors = BUSHD_MOTORS_PER_MCU;
 

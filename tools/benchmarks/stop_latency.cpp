@@ -1,6 +1,8 @@
 // How long an emergency stop waits in the daemon while other clients of the control socket, or of
 // LCM, send as much as they can: from the client's send() to the core's door. Prints the median,
-// the 99th of a hundred and the longest. LCM is measured where its packets find a way
+// the 99th of a hundred and the longest, once by the clock and once by the processor time of the
+// daemon's loop: what it did before it dealt with the stop, however often other programs had the
+// processor meanwhile. LCM is measured where its packets find a way
 // (tests/tools/with-loopback-multicast).
 //
 // Front ends, reception and core are the daemon's, put together as its event loop does. The core
@@ -11,12 +13,14 @@
 // one look at what has arrived to the next.
 #include <fmt/format.h>
 #include <poll.h>
+#include <pthread.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -44,6 +48,20 @@ std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch())
       .count();
 }
+
+std::int64_t processor_ns(clockid_t of_thread) {
+  timespec time{};
+  clock_gettime(of_thread, &time);
+  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+
+// When each stop was sent, by number from 1: by the clock, and by what the loop had done until
+// then.
+struct Sent {
+  std::atomic<std::int64_t> ns;
+  std::atomic<std::int64_t> processor_ns;
+};
+using SentStops = std::vector<Sent>;
 
 // Opens a link of a client, or nothing.
 using Open = std::function<std::unique_ptr<bushd::client::Link>()>;
@@ -82,12 +100,14 @@ void flood(const Open& open, int number, const api::Request& dry_run,
   }
 }
 
-void send_stops(const Open& open, std::atomic<bool>& ended) {
+void send_stops(const Open& open, clockid_t loop, SentStops& sent, std::atomic<bool>& ended) {
   const auto link = open();
   for (int i = 0; i < kStops && link; ++i) {
     std::this_thread::sleep_for(kBetweenStops);
-    // The number is the time.
-    const bushd::lcm::RequestId id{.client_id = "stop", .number = now_ns()};
+    const bushd::lcm::RequestId id{.client_id = "stop", .number = i + 1};
+    Sent& now = sent[static_cast<std::size_t>(i)];
+    now.processor_ns = processor_ns(loop);
+    now.ns = now_ns();
     static_cast<void>(link->send(*bushd::lcm::encode(0, id, api::Request(api::EmergencyStop{}))));
     static_cast<void>(link->handle([](const auto&) {}));
   }
@@ -114,13 +134,18 @@ struct Daemon {
   bool idle() const { return reception.idle() && hall.core().next_wake_us() > 0; }
 
   bench::VirtualHall& hall;
+  SentStops sent = SentStops(kStops);
   std::vector<double> waited_us{};
+  std::vector<double> processor_us{};
   std::int64_t dry_runs = 0;  // asked for
   std::int64_t slices = 0;
   std::uint64_t most_units = 0;
   bushd::daemon::Reception reception{[this](const api::Asker& asker, const api::Request& request) {
     if (api::is_stop(request)) {
-      waited_us.push_back(static_cast<double>(now_ns() - asker.number) * 1e-3);
+      const Sent& stop = sent.at(static_cast<std::size_t>(asker.number - 1));
+      waited_us.push_back(static_cast<double>(now_ns() - stop.ns) * 1e-3);
+      processor_us.push_back(
+          static_cast<double>(processor_ns(CLOCK_THREAD_CPUTIME_ID) - stop.processor_ns) * 1e-3);
       return asker.answer(api::Accepted{});
     }
     ++dry_runs;
@@ -140,6 +165,13 @@ api::Request dry_run_of_all(const bushd::config::Config& config) {
   return move;
 }
 
+// In microseconds.
+std::string figures(std::vector<double> of) {
+  std::sort(of.begin(), of.end());
+  return fmt::format("{:6.0f} us (median), {:6.0f} us (99 %), {:6.0f} us (longest)",
+                     of[of.size() / 2], of[of.size() * 99 / 100], of.back());
+}
+
 void measure(const char* way, Daemon& daemon, const Open& open, std::vector<pollfd> fds,
              const std::function<void()>& handle, int floods) {
   std::atomic<bool> ended{false};
@@ -148,21 +180,21 @@ void measure(const char* way, Daemon& daemon, const Open& open, std::vector<poll
   for (int i = 0; i < floods; ++i) {
     clients.emplace_back(flood, std::cref(open), i, std::cref(dry_run), std::cref(ended));
   }
-  clients.emplace_back(send_stops, std::cref(open), std::ref(ended));
+  clockid_t loop{};
+  pthread_getcpuclockid(pthread_self(), &loop);
+  clients.emplace_back(send_stops, std::cref(open), loop, std::ref(daemon.sent), std::ref(ended));
   while (!ended) {
     if (poll(fds.data(), fds.size(), daemon.idle() ? 10 : 0) > 0) handle();
     daemon.work();
   }
   for (std::thread& client : clients) client.join();
   while (!daemon.idle()) daemon.work();  // its clients' sessions end with the front
-  std::vector<double>& waited_us = daemon.waited_us;
-  if (waited_us.empty()) return;
-  std::sort(waited_us.begin(), waited_us.end());
+  if (daemon.waited_us.empty()) return;
   fmt::print(
       "{}, {:2} flooding clients, {:6} dry runs asked for, {:6} slices of at most {} units: stop "
-      "after {:6.0f} us (median), {:6.0f} us (99 %), {:6.0f} us (longest)\n",
-      way, floods, daemon.dry_runs, daemon.slices, daemon.most_units,
-      waited_us[waited_us.size() / 2], waited_us[waited_us.size() * 99 / 100], waited_us.back());
+      "after {}; processor time {}\n",
+      way, floods, daemon.dry_runs, daemon.slices, daemon.most_units, figures(daemon.waited_us),
+      figures(daemon.processor_us));
 }
 
 void measure_socket(const std::string& path, bench::VirtualHall& hall, int floods) {

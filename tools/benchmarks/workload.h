@@ -65,9 +65,10 @@ class Moves {
     }
   }
 
-  void start() {
+  // No faster than the floor (engine/run.h), 0: as fast as the tables are.
+  void start(uint16_t floor = 0) {
     for (size_t m = 0; m < runs_.size(); ++m) {
-      bushd_run_start(&runs_[m], tables_[m]->view(), kSteps, m % 2 == 0 ? 1 : -1, 0);
+      bushd_run_start(&runs_[m], tables_[m]->view(), kSteps, m % 2 == 0 ? 1 : -1, floor);
     }
   }
 

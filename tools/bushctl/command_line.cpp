@@ -212,6 +212,18 @@ bool sorts_its_words(const CLI::App& app, std::span<const std::string> arguments
 
 }  // namespace
 
+bushd::Completion CommandLine::complete(const std::vector<std::string>& words) {
+  bushd::Completion completion = bushd::complete(*app_, words);
+  for (const auto& [option, value] : completion.given) {
+    if (option == "--socket") connection_.socket = value;
+    if (option == "--url") connection_.url = value;
+    if (option == "--prefix") connection_.prefix = value;
+    connection_.lcm_options = connection_.lcm_options || option == "--url" || option == "--prefix";
+  }
+  connection_.lcm = std::ranges::find(words, "--lcm") != words.end();
+  return completion;
+}
+
 int CommandLine::run(int argc, char** argv) {
   std::vector<std::string> arguments(argv + 1, argv + argc);
   if (const auto wrong = no_command(*app_, "bushctl", arguments))

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/completion.h"
 #include "client/client.h"
 
 namespace CLI {
@@ -71,6 +72,8 @@ class CommandLine {
   Command add_local(const std::string& name, const std::string& text);
 
   const Connection& connection() const { return connection_; }
+  // What may follow; also tells connection() what these words say of it.
+  bushd::Completion complete(const std::vector<std::string>& words);
   // The exit code of the subcommand that was chosen.
   int run(int argc, char** argv);
 

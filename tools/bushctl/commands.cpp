@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 #include <sys/signalfd.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 
 #include "base/printable.h"
+#include "progress.h"
 #include "render.h"
 
 namespace bushctl {
@@ -16,7 +19,6 @@ namespace {
 namespace api = bushd::api;
 using bushd::client::Client;
 
-// SIGINT and SIGTERM from a descriptor. Before LCM starts its thread, which inherits the mask.
 int block_signals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -24,6 +26,35 @@ int block_signals() {
   sigaddset(&signals, SIGTERM);
   sigprocmask(SIG_BLOCK, &signals, nullptr);
   return signalfd(-1, &signals, SFD_CLOEXEC);
+}
+
+// SIGINT and SIGTERM from a descriptor. First called before LCM starts its thread, which inherits
+// the mask.
+int signals() {
+  static const int fd = block_signals();
+  return fd;
+}
+
+// The motors that it moves, all of which a stop would end; none of other requests.
+api::MotorNames motors_of(const api::Request& request) {
+  api::MotorNames names;
+  const auto add = [&names](const std::vector<api::MotorAmount>& motors) {
+    for (const api::MotorAmount& motor : motors) names.push_back(motor.motor);
+  };
+  if (const auto* move = std::get_if<api::Move>(&request)) add(move->motors);
+  if (const auto* arm = std::get_if<api::Arm>(&request)) add(arm->motors);
+  if (const auto* home = std::get_if<api::Home>(&request)) names = home->motors;
+  return names;
+}
+
+// Ctrl-C stops them. Anything else lets them go on.
+std::optional<api::Request> stop_on_interrupt(const api::MotorNames& motors) {
+  signalfd_siginfo signal{};
+  if (read(signals(), &signal, sizeof signal) != sizeof signal || signal.ssi_signo != SIGINT) {
+    return std::nullopt;
+  }
+  fmt::print(stderr, "bushctl: ramping down; Ctrl-C again does not wait for that\n");
+  return api::Stop{motors};
 }
 
 bool as_hoped(const api::Reply& reply, Hope hope) {
@@ -37,7 +68,7 @@ bool as_hoped(const api::Reply& reply, Hope hope) {
 
 int with_client(const Connection& connection, const std::function<int(Client&)>& action) {
   auto options = connection.options();
-  options.interrupt_fd = block_signals();
+  options.interrupt_fd = signals();
   auto client = Client::open(std::move(options));
   if (!client) {
     fmt::print(stderr, "bushctl: {}\n", bushd::printable(client.error().text()));
@@ -76,22 +107,40 @@ int refused(const api::Reply& reply) {
 
 int send(const Connection& connection, const api::Request& request, Client::Until until,
          Hope hope) {
+  const api::MotorNames motors = motors_of(request);
+  const auto* home = std::get_if<api::Home>(&request);
+  const bool moves = !motors.empty() || (home != nullptr && home->all);
   return with_client(connection, [&](Client& client) {
     bool accepted = false;
-    const auto reply = client.run(request, until, [&](const api::Reply& heard) {
+    bool stopped = false;
+    Progress progress(motors);
+    Client::Meanwhile meanwhile;
+    meanwhile.on_reply = [&](const api::Reply& heard) {
       accepted = accepted || std::holds_alternative<api::Accepted>(heard);
+      progress.clear();
       for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
       std::fflush(stdout);
-    });
-    if (!reply) {
-      if (client.interrupted() && accepted && hope == Hope::kReached) {
-        const bool homes = std::holds_alternative<api::Home>(request);
-        fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
-                   homes ? "homing" : "move");
-      }
-      return failure(client, reply.error());
+    };
+    if (until == Client::Until::kResult && moves) {
+      meanwhile.on_state = [&](const bushd::client::Status& status) { progress.show(status); };
+      meanwhile.on_interrupt = [&] {
+        progress.clear();
+        auto stop = stop_on_interrupt(motors);
+        stopped = stop.has_value();
+        return stop;
+      };
     }
-    return as_hoped(*reply, hope) ? static_cast<int>(kDone) : refused(*reply);
+    const auto reply = client.run(request, until, meanwhile);
+    progress.clear();
+    if (reply && as_hoped(*reply, hope)) return static_cast<int>(kDone);
+    if (!reply && client.interrupted() && stopped) {
+      fmt::print(stderr, "bushctl: the stop was sent; 'bushctl where' shows where motors stand\n");
+    } else if (!reply && client.interrupted() && accepted && moves) {
+      fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
+                 home != nullptr ? "homing" : "move");
+    }
+    const int code = reply ? refused(*reply) : failure(client, reply.error());
+    return stopped ? static_cast<int>(kInterrupted) : code;
   });
 }
 

@@ -24,10 +24,15 @@ void add_motion_commands(CommandLine& line);
 void add_driver_commands(CommandLine& line);
 // confirm, history
 void add_history_commands(CommandLine& line);
+// config
+void add_config_commands(CommandLine& line);
 // table list, show, use, reload
 void add_table_commands(CommandLine& line);
 // latency-test, scan, address: on a line that no daemon has
 void add_line_commands(CommandLine& line);
+
+// What may follow these words (base/completion.h), with names that the daemon knows.
+int complete(CommandLine& line, const std::vector<std::string>& words);
 
 // Runs the action with a client that SIGINT and SIGTERM interrupt; without a daemon it says so.
 int with_client(const Connection& connection,

@@ -39,22 +39,30 @@ void print_json(const std::string& motor, const api::MotionHistory& history) {
                                {"who", motion.who},
                                {"from_steps", motion.from_steps},
                                {"to_steps", motion.to_steps},
+                               {"from", motion.from_text},
+                               {"to", motion.to_text},
                                {"outcome", motion.outcome},
                                {"reason", motion.reason}});
   }
   fmt::print("{}\n", json.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
 }
 
+// In its unit, as it was then; of a motor without one there are steps only.
+std::string position(const std::string& text, std::int64_t steps) {
+  return text.empty() ? fmt::format("{} steps", steps) : bushd::printable(text);
+}
+
 void print(const api::MotionHistory& history) {
   using enum Align;
-  Grid grid({kLeft, kLeft, kRight, kRight, kLeft, kLeft, kLeft});
-  grid.row({"TIME", "WHAT", "FROM", "TO", "RESULT", "BY", ""});
+  Grid grid({kLeft, kLeft, kRight, kRight, kRight, kLeft, kLeft, kLeft});
+  grid.row({"TIME", "WHAT", "FROM", "TO", "STEPS", "RESULT", "BY", ""});
   for (const api::PastMotion& motion : history.motions) {
     const auto seconds = static_cast<std::time_t>(motion.utime_us / 1'000'000);
     grid.row({fmt::format("{:%Y-%m-%d %H:%M:%S}", fmt::localtime(seconds)),
-              bushd::printable(motion.what), fmt::to_string(motion.from_steps),
-              fmt::to_string(motion.to_steps), bushd::printable(motion.outcome),
-              bushd::printable(motion.who), bushd::printable(motion.reason)});
+              bushd::printable(motion.what), position(motion.from_text, motion.from_steps),
+              position(motion.to_text, motion.to_steps), fmt::to_string(motion.to_steps),
+              bushd::printable(motion.outcome), bushd::printable(motion.who),
+              bushd::printable(motion.reason)});
   }
   for (const std::string& line : grid.lines()) fmt::print("{}\n", line);
 }
@@ -85,7 +93,9 @@ int show_history(Client& client, const HistoryOptions& options) {
 void add_history(CommandLine& line) {
   const auto options = std::make_shared<HistoryOptions>();
   line.add("history", "Show what has moved a motor, the newest first")
-      .footer("Positions are in steps. Needs a state store ([state] in bushd.toml).")
+      .footer(
+          "Positions are in the motor's unit, as it was then; STEPS is where it stood in the end. "
+          "Needs a state store ([state] in bushd.toml).")
       .option("NAME", &options->motor, "Motor")
       .number("--most", &options->most, 1u, kMostPast, "How many lines")
       .flag("--json", &options->json, "Print JSON")

@@ -15,8 +15,12 @@ int main(int argc, char** argv) {
     bushctl::add_motion_commands(line);
     bushctl::add_driver_commands(line);
     bushctl::add_history_commands(line);
+    bushctl::add_config_commands(line);
     bushctl::add_table_commands(line);
     bushctl::add_line_commands(line);
+    if (const auto words = bushd::completion_asked(argc, argv)) {
+      return bushd::finished_output(bushctl::complete(line, *words));
+    }
     return bushd::finished_output(line.run(argc, argv));
   } catch (const std::exception& error) {
     fmt::print(stderr, "bushctl: {}\n", error.what());

@@ -178,24 +178,31 @@ void add_home(CommandLine& line) {
     api::MotorNames motors;
     std::string speed;
     bool steps = false;
+    bool all = false;
     bool wait = false;
   };
   const auto options = std::make_shared<Options>();
   line.add("home", "Home motors at their switches")
       .footer(
-          "As the configuration's 'home' says. Those of one MCU are homed one after the other. "
-          "With "
-          "--wait the exit code is 0 only if every motor has found its switch; 'bushctl stop' ends "
-          "it.")
-      .words("NAME", &options->motors, "Motors", Command::Needed::kYes)
+          "As the configuration's 'home' says. Those of one MCU are homed one after the other; "
+          "with "
+          "--all those of one 'order' are homed together, the lowest first, and one that is not "
+          "found ends the others. With --wait the exit code is 0 only if every motor has found its "
+          "switch; 'bushctl stop' ends it, and with --wait Ctrl-C (with --all it stops all "
+          "motors).")
+      .words("NAME", &options->motors, "Motors", Command::Needed::kNo)
+      .flag("--all", &options->all, "All motors with a home switch, by their order")
       .option("--speed", &options->speed, kSpeed)
       .flag("--steps", &options->steps, "--speed is in steps per second")
       .flag("--wait", &options->wait, "Wait for the result")
       .run([&line, options] {
         const auto speed = parse_speed(options->speed, numbers(options->steps));
         if (!speed) return wrong_usage(speed.error());
-        return send(line.connection(), api::Home{options->motors, *speed}, until(options->wait),
-                    Hope::kReached);
+        if (options->all != options->motors.empty()) {
+          return wrong_usage(bushd::Error{.message = "home: name the motors, or use --all"});
+        }
+        return send(line.connection(), api::Home{options->motors, *speed, options->all},
+                    until(options->wait), Hope::kReached);
       });
 }
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/printable.h"
@@ -89,6 +90,38 @@ std::string position_text(const api::MotorState& motor, std::int64_t steps, doub
   return has_position(motor) ? position_text(steps, user, scale) : "-";
 }
 
+// In the motor's unit per second, with the sign of the user's scale.
+double user_speed(const api::MotorState& motor, const units::Coordinates& coordinates) {
+  const double per_s = motor.velocity_steps_per_s * coordinates.dial_of(1);
+  return coordinates.scale().negative ? -per_s : per_s;
+}
+
+// "1.250 mm/s", and bare steps per second of a motor without a unit.
+std::string speed_text(const api::MotorState& motor, const units::Scale& scale) {
+  const auto coordinates = units::Coordinates::make(scale);
+  if (!has_unit(scale) || !coordinates) return fmt::format("{:.1f}", motor.velocity_steps_per_s);
+  return fmt::format("{:.{}f} {}/s", user_speed(motor, *coordinates),
+                     scale.decimals.value_or(coordinates->precision()),
+                     bushd::printable(scale.unit));
+}
+
+// Where a motor stands between its soft limits: "-5 |----x---------| 25"; outside of them an arrow
+// points to where it is. "": it has none.
+std::string range_text(const api::MotorState& motor, const api::MotorDescription& description) {
+  constexpr std::size_t kColumns = 15;
+  const auto coordinates = units::Coordinates::make(description.scale);
+  if (!description.soft_limits || !coordinates) return {};
+  const units::SoftLimits limits = coordinates->on_user_scale(*description.soft_limits);
+  std::string bar(kColumns, '-');
+  const double place = (motor.user - limits.low) / (limits.high - limits.low);
+  if (has_position(motor) && place < 0) bar.front() = '<';
+  if (has_position(motor) && place > 1) bar.back() = '>';
+  if (has_position(motor) && place >= 0 && place <= 1) {
+    bar[static_cast<std::size_t>(std::lround(place * (kColumns - 1)))] = 'x';
+  }
+  return fmt::format("{:g} |{}| {:g}", limits.low, bar, limits.high);
+}
+
 nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
                           const api::MotorDescription& description) {
   const auto heard_utime_us =
@@ -142,9 +175,10 @@ nlohmann::json mcu_json(const api::StateSnapshot& mcu, const api::Description& d
 
 std::vector<std::string> table(const Status& status) {
   using enum Align;
-  Grid motors({kLeft, kLeft, kRight, kLeft, kLeft, kRight, kRight, kRight, kLeft, kLeft, kLeft});
-  motors.row({"MOTOR", "MCU", "OUTPUT", "GROUP", "TABLE", "POSITION", "TARGET", "STEPS/S", "MOVING",
-              "TRUST", ""});
+  Grid motors(
+      {kLeft, kLeft, kRight, kLeft, kLeft, kRight, kRight, kRight, kLeft, kRight, kLeft, kLeft});
+  motors.row({"MOTOR", "MCU", "OUTPUT", "GROUP", "TABLE", "POSITION", "TARGET", "SPEED", "MOVING",
+              "LIMITS", "TRUST", ""});
   Grid mcus({kLeft, kLeft, kRight, kLeft});
   mcus.row({"MCU", "STATE", "BOOT", "DETAIL"});
   for (std::size_t i = 0; i < status.states.size(); ++i) {
@@ -157,8 +191,8 @@ std::vector<std::string> table(const Status& status) {
                   text_of(description.table),
                   position_text(motor, motor.position_steps, motor.user, description.scale),
                   position_text(motor, motor.target_steps, motor.user_target, description.scale),
-                  fmt::format("{:.1f}", motor.velocity_steps_per_s),
-                  moving_word(motor, moves_text(motor), "-"), std::string(word(motor.trust)),
+                  speed_text(motor, description.scale), moving_word(motor, moves_text(motor), "-"),
+                  range_text(motor, description), std::string(word(motor.trust)),
                   notes_text(motor)});
     }
     mcus.row({bushd::printable(mcu.mcu), std::string(word(mcu.state)), fmt::to_string(mcu.boot),
@@ -191,13 +225,24 @@ std::string motor_line(const Status& status, std::size_t mcu, std::size_t index)
   const units::Scale scale =
       description_of(status.descriptions.at(mcu).snapshot, index, motor.name).scale;
   std::string line =
-      fmt::format("{} position {} target {} velocity {:.1f} {}", bushd::printable(motor.name),
+      fmt::format("{} position {} target {} velocity {} {}", bushd::printable(motor.name),
                   position_text(motor, motor.position_steps, motor.user, scale),
                   position_text(motor, motor.target_steps, motor.user_target, scale),
-                  motor.velocity_steps_per_s, moving_word(motor, "moving", "at rest"));
+                  speed_text(motor, scale), moving_word(motor, "moving", "at rest"));
   if (motor.trust != api::Trust::kKnown) line += fmt::format(" {}", word(motor.trust));
   if (const std::string notes = notes_text(motor); !notes.empty()) line += " " + notes;
   return line;
+}
+
+std::string way_text(const Status& status, std::size_t mcu, std::size_t index) {
+  const api::MotorState& motor = status.states[mcu].snapshot.motors[index];
+  const units::Scale scale =
+      description_of(status.descriptions.at(mcu).snapshot, index, motor.name).scale;
+  if (!has_unit(scale)) {
+    return fmt::format("at {} of {} steps", motor.position_steps, motor.target_steps);
+  }
+  return fmt::format("at {:.{}f} of {}", motor.user, scale.decimals.value_or(0),
+                     position_text(motor, motor.target_steps, motor.user_target, scale));
 }
 
 std::string json(const Status& status) {

@@ -23,6 +23,9 @@ std::string lost_text(std::uint64_t messages);
 // target, velocity, moving or at rest, trust when it is not "known".
 std::string motor_line(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 
+// Of the same motor: "at 5.3 of 12.5 mm".
+std::string way_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
+
 // {"motors":[...],"mcus":[...],...}; docs/lcm.md lists the keys.
 std::string json(const bushd::client::Status& status);
 

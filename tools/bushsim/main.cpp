@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "base/completion.h"
 #include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
@@ -75,6 +76,10 @@ int run(int argc, char** argv) {
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
+  if (const auto words = bushd::completion_asked(argc, argv)) {
+    bushd::print_completion(bushd::complete(app, *words));
+    return kDone;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

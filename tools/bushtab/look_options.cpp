@@ -118,7 +118,7 @@ void add_expand(CLI::App& app, const Places& places, const Run& run) {
       "forward, bits 6..0 count its steps in the tick: 130 is +2, 2 is -2. Those of format fine\n"
       "are signed, in 1/256 step: 512 is +2, -512 is -2.");
   constexpr std::int64_t kMaxSteps = std::numeric_limits<std::int32_t>::max();
-  expand->add_option("--table", expansion.table, kTable)->required();
+  expand->add_option("--table", expansion.table, kTable)->required()->type_name("TABLE");
   expand->add_option("--steps", expansion.steps, "Length and direction of the move")
       ->required()
       ->check(refuse_fraction)

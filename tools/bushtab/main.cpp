@@ -3,9 +3,11 @@
 #include <exception>
 #include <functional>
 
+#include "base/completion.h"
 #include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
+#include "open_table.h"
 #include "options.h"
 
 namespace {
@@ -33,6 +35,14 @@ int run(int argc, char** argv) {
   bushtab::add_new_options(app, places, on);
   bushtab::add_edit_options(app, places, on);
   bushtab::add_look_options(app, places, on);
+  if (const auto words = bushd::completion_asked(argc, argv)) {
+    auto completion = bushd::complete(app, *words);
+    places.directory = completion.given["--dir"];
+    const bool table = completion.value == "TABLE";
+    bushd::print_completion(completion, words->back(),
+                            table ? bushtab::table_names(places) : std::vector<std::string>());
+    return bushtab::kDone;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

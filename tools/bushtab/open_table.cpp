@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <set>
 #include <string_view>
 #include <system_error>
 
@@ -42,6 +43,18 @@ std::vector<fs::path> directories(const Places& places) {
   std::vector<fs::path> all{directory_of(places)};
   for (fs::path& shipped : tables::shipped_directories()) all.push_back(std::move(shipped));
   return all;
+}
+
+std::vector<std::string> table_names(const Places& places) {
+  std::set<std::string> names;
+  for (const fs::path& directory : directories(places)) {
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(directory, error)) {
+      const std::string name = entry.path().stem().string();
+      if (entry.path().extension() == ".toml" && !name.starts_with('.')) names.insert(name);
+    }
+  }
+  return {names.begin(), names.end()};
 }
 
 Result<Home> home_of(const Places& places, const std::string& table) {

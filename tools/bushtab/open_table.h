@@ -36,6 +36,8 @@ bushd::Result<std::uint32_t> create_in(Home& home, const std::string& text,
 
 // The directories in which names are looked for.
 std::vector<std::filesystem::path> directories(const Places& places);
+// All names there, sorted.
+std::vector<std::string> table_names(const Places& places);
 
 // Prints the error to stderr and returns kRefused.
 int refuse(const bushd::Error& error);

@@ -70,6 +70,8 @@ class MoveLog:
             "retarget": self._change,
             "result": self._result,
             "set": self._set,
+            "offset": lambda event: None,  # user positions only
+            "config": lambda event: None,
             "corrected": self._corrected,
             "restarted": self._set,  # the MCU counts from anew
             "autonomous": self._autonomous,

@@ -64,7 +64,7 @@ int run(const std::vector<std::string>& arguments) {
     std::cerr << "move_and_wait: " << client.error().text() << "\n";
     return 1;
   }
-  const auto reply = (*client)->run(move, Client::Until::kResult, print);
+  const auto reply = (*client)->run(move, Client::Until::kResult, {.on_reply = print});
   if (!reply) {
     std::cerr << "move_and_wait: " << reply.error().text() << "\n";
     return 1;

@@ -86,7 +86,10 @@ TEST(Drivers, OfAnMcuThatIsOfflineAreRefused) {
   Journal journal(bench.installation, bench);
   Positions positions(bench.installation, interlocks, journal, bench);
   KeptPositions kept(bench.installation, positions, journal, bench);
-  HomingQueue homing(bench.installation, interlocks, open_moves, kept, bench);
+  DryRuns dry_runs(bench.installation);
+  Moves moves(bench.installation, interlocks, journal, open_moves, dry_runs, bench);
+  IdleDrivers idle_drivers(bench.installation, bench, [](MotorId) { return false; });
+  HomingQueue homing(bench.installation, interlocks, open_moves, moves, kept, idle_drivers, bench);
   EmergencyStop emergency_stop(bench.installation, interlocks, homing, bench);
   Drivers drivers(bench.installation, interlocks, emergency_stop);
   drivers.request(0, bench.asker(), api::Enable{{"m03"}});

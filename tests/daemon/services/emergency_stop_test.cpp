@@ -16,11 +16,14 @@ using testing::HasSubstr;
 TEST(EmergencyStop, AFloodIsCarriedOutAndItsMemoryIsBounded) {
   Bench bench;
   Interlocks interlocks(bench.installation);
-  OpenMoves moves(bench.installation);
+  OpenMoves open_moves(bench.installation);
   Journal journal(bench.installation, bench);
   Positions positions(bench.installation, interlocks, journal, bench);
   KeptPositions kept(bench.installation, positions, journal, bench);
-  HomingQueue homing(bench.installation, interlocks, moves, kept, bench);
+  DryRuns dry_runs(bench.installation);
+  Moves moves(bench.installation, interlocks, journal, open_moves, dry_runs, bench);
+  IdleDrivers idle_drivers(bench.installation, bench, [](MotorId) { return false; });
+  HomingQueue homing(bench.installation, interlocks, open_moves, moves, kept, idle_drivers, bench);
   EmergencyStop emergency_stop(bench.installation, interlocks, homing, bench);
   constexpr std::size_t kMore = 10;
   for (std::size_t i = 0; i < EmergencyStop::kMaxOpen + kMore; ++i) {

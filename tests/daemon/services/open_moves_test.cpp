@@ -31,7 +31,35 @@ TEST(OpenMoves, AMoveIsAnsweredOnceWhenItsLastMotorHasEnded) {
   EXPECT_EQ(results[0].motor, "m01");
   EXPECT_EQ(results[1].outcome, api::Outcome::kLimit);
   EXPECT_EQ(results[1].table.name, "bushd2-constant");
+  EXPECT_EQ(results[1].who, "command 5 of test");
   EXPECT_TRUE(moves.empty());
+}
+
+TEST(OpenMoves, OfOneThatWasStoppedTheReasonSaysByWhom) {
+  Bench bench;
+  OpenMoves moves(bench.installation);
+  std::vector<std::string> told;
+  moves.set_listener([&](const OpenMoves::Ended& ended) { told.push_back(ended.reason); });
+  moves.stopped_by({0}, "nobody, as it was in no move then");
+  const auto reason_of = [&](api::Outcome outcome) {
+    moves.end({0}, outcome, "ended");
+    EXPECT_EQ(bench.completed().reason, "m01: " + told.back());
+    return told.back();
+  };
+  moves.open(bench.asker(1), {{0}});
+  EXPECT_EQ(reason_of(api::Outcome::kStopped), "ended");
+  moves.open(bench.asker(2), {{0}});
+  moves.stopped_by({0}, "command 7 of test");
+  EXPECT_EQ(reason_of(api::Outcome::kStopped), "ended, asked for by command 7 of test");
+  moves.open(bench.asker(3), {{0}});
+  moves.stopped_by({0}, "command 8 of test");
+  EXPECT_EQ(reason_of(api::Outcome::kReached), "ended") << "it came too late";
+  moves.open(bench.asker(4), {{0}});
+  EXPECT_EQ(reason_of(api::Outcome::kStopped), "ended") << "that was of the one before";
+  moves.open(bench.asker(5), {{0}});
+  moves.stopped_by({0}, "command 9 of test");
+  moves.not_stopped({0});
+  EXPECT_EQ(reason_of(api::Outcome::kStopped), "ended");
 }
 
 }  // namespace

@@ -8,7 +8,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cstdlib>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -408,14 +410,53 @@ TEST(Bushctl, SetFailsWhenTheMcuDidNotTakeIt) {
   EXPECT_EQ(bushctl({"set", "theta", "0"}).code, 1);
 }
 
-TEST(Bushctl, InterruptedMoveSaysThatItGoesOn) {
+TEST(Bushctl, CtrlCRampsDownAndSaysWhereTheMotorStands) {
   FakeDaemon daemon;
-  daemon.start([](const api::Request&, int) { return Replies{api::Accepted{}}; });
+  std::atomic<bool> stopped{false};
+  daemon.start([&stopped](const api::Request& request, int) -> Replies {
+    if (std::holds_alternative<api::Stop>(request)) {
+      stopped = true;
+      return {api::Accepted{}};
+    }
+    if (!stopped) return {api::Accepted{}};
+    return {result(request, Outcome::kStopped)};
+  });
   Program move(with_program({"move", "theta", "5", "--wait"}));
   ASSERT_TRUE(move.wait_for("accepted"));
   move.send_signal(SIGINT);
   EXPECT_EQ(move.finish(), 130);
+  EXPECT_THAT(move.err(), HasSubstr("ramping down"));
+  EXPECT_THAT(move.out(), HasSubstr("theta: stopped, stands at 7"));
+  const auto requests = daemon.requests();
+  ASSERT_EQ(requests.size(), 2u);
+  EXPECT_EQ(std::get<api::Stop>(requests[1]).motors, api::MotorNames{"theta"});
+}
+
+TEST(Bushctl, AfterASecondCtrlCNothingIsWaitedFor) {
+  FakeDaemon daemon;
+  std::promise<void> stopped;
+  daemon.start([&stopped](const api::Request& request, int times) {
+    if (std::holds_alternative<api::Stop>(request) && times == 1) stopped.set_value();
+    return Replies{api::Accepted{}};
+  });
+  Program move(with_program({"move", "theta", "5", "--wait"}));
+  ASSERT_TRUE(move.wait_for("accepted"));
+  move.send_signal(SIGINT);
+  stopped.get_future().wait();
+  move.send_signal(SIGINT);
+  EXPECT_EQ(move.finish(), 130);
+  EXPECT_THAT(move.err(), HasSubstr("the stop was sent"));
+}
+
+TEST(Bushctl, AMoveWhoseProgramIsEndedGoesOn) {
+  FakeDaemon daemon;
+  daemon.start([](const api::Request&, int) { return Replies{api::Accepted{}}; });
+  Program move(with_program({"move", "theta", "5", "--wait"}));
+  ASSERT_TRUE(move.wait_for("accepted"));
+  move.send_signal(SIGTERM);
+  EXPECT_EQ(move.finish(), 130);
   EXPECT_THAT(move.err(), HasSubstr("the move goes on"));
+  EXPECT_EQ(daemon.requests().size(), 1u);
 }
 
 TEST(Bushctl, WatchInAPipePrintsALineForWhatChanged) {

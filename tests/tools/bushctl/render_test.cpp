@@ -1,10 +1,12 @@
-// How positions are shown that nobody knows.
+// How positions are shown, those that nobody knows too, and how far a move has come.
 #include "tools/bushctl/render.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+
+#include "tools/bushctl/progress.h"
 
 namespace bushctl {
 namespace {
@@ -49,6 +51,72 @@ TEST(Render, AStalePositionHasItsTime) {
   EXPECT_EQ(shown["position_steps"], 42);
   EXPECT_EQ(shown["heard_utime_us"], kHeard);
   EXPECT_EQ(shown["uncertain_reason"], "lost");
+}
+
+// 400 steps are a mm, user positions fall where steps rise; -10 .. 30 mm for the user.
+bushd::client::Status stage_at(double user, std::int64_t steps) {
+  bushd::client::Status status = status_of({.name = "x",
+                                            .position_steps = steps,
+                                            .user = user,
+                                            .target_steps = -2000,
+                                            .user_target = 5,
+                                            .velocity_steps_per_s = -100,
+                                            .moving = true});
+  auto& stage = status.descriptions[0].snapshot.motors[0];
+  stage.scale = {.unit = "mm",
+                 .steps_per_unit = *bushd::units::parse_ratio("400"),
+                 .negative = true,
+                 .decimals = 2};
+  stage.soft_limits = bushd::units::SoftLimits{.low = -30, .high = 10};
+  return status;
+}
+
+TEST(Render, BarsShowWhereAMotorStandsBetweenItsLimits) {
+  EXPECT_THAT(table(stage_at(-10, 4000)).at(1), HasSubstr(" -10 |x--------------| 30 "));
+  EXPECT_THAT(table(stage_at(10, -4000)).at(1), HasSubstr(" -10 |-------x-------| 30 "));
+  EXPECT_THAT(table(stage_at(30, -12000)).at(1), HasSubstr(" -10 |--------------x| 30 "));
+  EXPECT_THAT(table(stage_at(31, -12400)).at(1), HasSubstr(" -10 |-------------->| 30 "));
+  EXPECT_THAT(table(stage_at(-11, 4400)).at(1), HasSubstr(" -10 |<--------------| 30 "));
+  auto unknown = stage_at(0, 0);
+  unknown.states[0].snapshot.motors[0].trust = api::Trust::kUnknown;
+  EXPECT_THAT(table(unknown).at(1), HasSubstr(" -10 |---------------| 30 "));
+}
+
+TEST(Render, SpeedsAreInTheMotorsUnit) {
+  EXPECT_THAT(table(stage_at(0, 0)).at(1), HasSubstr(" 0.25 mm/s "));
+  EXPECT_THAT(motor_line(stage_at(0, 0), 0, 0), HasSubstr("velocity 0.25 mm/s moving"));
+}
+
+TEST(Progress, ShowsTheWayFromWhereItWasSeenFirst) {
+  Progress progress({"x", "elsewhere"});
+  EXPECT_EQ(progress.text(stage_at(0, 0), 10), "x [>         ] 0 %, at 0.00 of 5.00 mm, 20 s left");
+  EXPECT_EQ(progress.text(stage_at(2, -800), 10),
+            "x [====>     ] 40 %, at 2.00 of 5.00 mm, 12 s left");
+  EXPECT_EQ(progress.text(stage_at(2, -800), 0), "x 40 %, at 2.00 of 5.00 mm, 12 s left");
+  EXPECT_EQ(progress.text(stage_at(5, -2000), 10), "");
+}
+
+TEST(Progress, KnowsNoTimeWhereTheSpeedTellsNone) {
+  Progress progress({"x"});
+  auto begins = stage_at(0, 0);
+  begins.states[0].snapshot.motors[0].velocity_steps_per_s = 0;
+  EXPECT_EQ(progress.text(begins, 0), "x 0 %, at 0.00 of 5.00 mm");
+  auto turns = stage_at(0, 0);
+  turns.states[0].snapshot.motors[0].velocity_steps_per_s = 100;  // away from the target
+  EXPECT_EQ(progress.text(turns, 0), "x 0 %, at 0.00 of 5.00 mm");
+}
+
+TEST(Progress, ShowsTheMotorThatTakesLongest) {
+  Progress progress({"x", "y"});
+  auto both = stage_at(0, 0);
+  api::MotorState y = both.states[0].snapshot.motors[0];
+  y.name = "y";
+  y.velocity_steps_per_s = -50;
+  both.states[0].snapshot.motors.push_back(y);
+  both.descriptions[0].snapshot.motors.push_back(both.descriptions[0].snapshot.motors[0]);
+  both.descriptions[0].snapshot.motors[1].name = "y";
+  EXPECT_THAT(progress.text(both, 0), testing::StartsWith("y 0 %"));
+  EXPECT_EQ(Progress({"z"}).text(both, 0), "");
 }
 
 }  // namespace

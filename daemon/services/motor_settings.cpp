@@ -1,0 +1,270 @@
+#include "daemon/services/motor_settings.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "daemon/services/open_moves.h"
+
+namespace bushd::daemon {
+namespace {
+
+using config::SettingKey;
+
+std::string assignment(SettingKey key, const std::string& value) {
+  return std::string(config::name_of(key)) + " = " + value;
+}
+
+}  // namespace
+
+MotorSettings::MotorSettings(Installation& installation, const Positions& positions,
+                             KeptPositions& kept, Journal& journal, Outputs& outputs,
+                             std::function<bool(MotorId)> about_to_move)
+    : installation_(installation),
+      positions_(positions),
+      kept_(kept),
+      journal_(journal),
+      outputs_(outputs),
+      about_to_move_(std::move(about_to_move)),
+      file_sha256_(installation.config().text_sha256) {
+  for (const MotorId id : installation.motors()) {
+    const config::Motor& motor = installation.config()[id];
+    in_file_.add(config::Settings{motor.coordinates, motor.soft_limits});
+  }
+}
+
+config::Settings MotorSettings::settings_of(const motion::Motor& motor) {
+  return {motor.coordinates(), motor.soft_limits()};
+}
+
+void MotorSettings::request(const api::Asker& asker, const api::Configure& request) {
+  using Kind = api::Configure::Kind;
+  if (request.kind == Kind::kChange) return change(asker, request);
+  if (request.kind == Kind::kSaved) return saved(asker, request);
+  const auto motors = installation_.find_or_all(request.motors);
+  if (!motors) return asker.answer(api::Refused{motors.error().text()});
+  asker.answer(api::Accepted{});
+  asker.answer(api::Completed{.reason = "done", .detail = configuration_of(*motors)});
+}
+
+Result<MotorSettings::Plan> MotorSettings::plan_of(
+    const api::Configure& request, const ById<MotorId, config::Settings>* from) const {
+  if (request.changes.empty()) return fail("no change is named; try 'offset=12.5'");
+  Plan plan;
+  for (const auto& [name, word, value] : request.changes) {
+    const auto id = installation_.find(name);
+    if (!id) return fail(id.error());
+    const auto key = config::setting_key_of(word);
+    if (!key) {
+      return fail(name + ": \"" + word +
+                  "\" cannot be changed in operation; allowed: offset, direction, soft_limits. "
+                  "Edit bushd.toml and restart bushd for other keys");
+    }
+    auto at = static_cast<std::size_t>(std::ranges::find(plan.motors, *id) - plan.motors.begin());
+    if (at == plan.motors.size()) {
+      plan.motors.push_back(*id);
+      plan.settings.push_back(from ? (*from)[*id] : settings_of(installation_[*id]));
+    }
+    auto changed = config::with(plan.settings[at], *key, value);
+    if (!changed) return fail(name + ": " + changed.error().message);
+    Change change{.motor = *id,
+                  .key = *key,
+                  .before = config::text_of(plan.settings[at], *key),
+                  .after = config::text_of(*changed, *key)};
+    plan.settings[at] = std::move(*changed);
+    plan.changes.push_back(std::move(change));
+  }
+  return plan;
+}
+
+Result<void> MotorSettings::may_be_changed(MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  constexpr const char* kAtRest = "; what bushd.toml says of it can be changed at rest only";
+  if (!motor.is<motion::Resting>()) return fail(motor.busy_text() + kAtRest);
+  if (about_to_move_(id)) return fail(motor.name() + " is about to move" + kAtRest);
+  if (!positions_.being_set(id)) return {};
+  return fail(motor.name() + ": its position is being set; wait for that result");
+}
+
+void MotorSettings::change(const api::Asker& asker, const api::Configure& request) {
+  const auto plan = plan_of(request, nullptr);
+  if (!plan) return asker.answer(api::Refused{plan.error().text()});
+  for (const MotorId motor : plan->motors) {
+    if (const auto may = may_be_changed(motor); !may) {
+      return asker.answer(api::Refused{may.error().text()});
+    }
+  }
+  asker.answer(api::Accepted{});
+  carry_out(*plan, asker);
+  api::Completed answer{.reason = text_of(*plan), .detail = configuration_of(plan->motors)};
+  open_.push_back({asker, kept_.told(), std::move(answer)});
+}
+
+void MotorSettings::carry_out(const Plan& plan, const api::Asker& asker) {
+  // Where they stand for people, before.
+  std::map<MotorId, std::string> from;
+  for (std::size_t i = 0; i < plan.motors.size(); ++i) {
+    const motion::Motor& motor = installation_[plan.motors[i]];
+    if (motor.coordinates().has_unit()) {
+      from[plan.motors[i]] = motor.coordinates().text(motor.position_steps());
+    }
+    put(plan.motors[i], plan.settings[i]);
+    keep(plan.motors[i]);
+  }
+  const std::string who = daemon::text_of(asker);
+  for (const Change& change : plan.changes) {
+    if (change.before == change.after) continue;
+    const motion::Motor& motor = installation_[change.motor];
+    journal_.configured(change.motor, config::name_of(change.key), change.after, asker);
+    outputs_.log(LogLevel::kInfo, motor.name() + ": " + assignment(change.key, change.after) +
+                                      ", was " + change.before + ", by " + who);
+    kept_.past({.motor = motor.name(),
+                .what = "config",
+                .who = who,
+                .from_steps = motor.position_steps(),
+                .to_steps = motor.position_steps(),
+                .result = std::string(api::word(api::Outcome::kDone)),
+                .reason = assignment(change.key, change.after) + ", was " + change.before,
+                .from_text = from[change.motor]});
+  }
+}
+
+void MotorSettings::offset_set(MotorId id, const units::Coordinates& before, const api::Asker& by) {
+  keep(id);
+  const motion::Motor& motor = installation_[id];
+  const auto offset = [](const units::Coordinates& coordinates) {
+    return config::text_of(config::Settings{.coordinates = coordinates}, SettingKey::kOffset);
+  };
+  kept_.past({.motor = motor.name(),
+              .what = "set",
+              .who = daemon::text_of(by),
+              .from_steps = motor.position_steps(),
+              .to_steps = motor.position_steps(),
+              .result = std::string(api::word(api::Outcome::kDone)),
+              .reason = assignment(SettingKey::kOffset, offset(motor.coordinates())) + ", was " +
+                        offset(before),
+              .from_text = before.text(motor.position_steps()),
+              .to_text = motor.coordinates().text(motor.position_steps())});
+}
+
+void MotorSettings::put(MotorId id, const config::Settings& settings) {
+  installation_[id].set_coordinates(settings.coordinates);
+  installation_[id].set_soft_limits(settings.soft_limits);
+  installation_.changed = true;
+}
+
+// What bushd.toml says by now is nothing to keep. Keys that this daemon does not know stay.
+void MotorSettings::keep(MotorId id) {
+  state::Settings all = kept_.settings(id);
+  const config::Settings now = settings_of(installation_[id]);
+  for (const SettingKey key : config::kSettingKeys) {
+    const std::string value = config::text_of(now, key);
+    const std::string in_file = config::text_of(in_file_[id], key);
+    all.erase(std::string(config::name_of(key)));
+    if (value == in_file) continue;
+    all[std::string(config::name_of(key))] = {.value = value, .replaces = in_file};
+  }
+  kept_.keep(id, std::move(all));
+}
+
+void MotorSettings::take_kept() {
+  for (const MotorId id : installation_.motors()) {
+    const state::Settings all = kept_.settings(id);
+    for (const SettingKey key : config::kSettingKeys) {
+      const auto found = all.find(std::string(config::name_of(key)));
+      if (found != all.end()) take_kept(id, key, found->second);
+    }
+    // An edit of the file ends a setting for good, also if it is taken back later.
+    keep(id);
+  }
+}
+
+void MotorSettings::take_kept(MotorId id, SettingKey key, const state::Setting& kept) {
+  const motion::Motor& motor = installation_[id];
+  const std::string in_file = config::text_of(in_file_[id], key);
+  const std::string name(config::name_of(key));
+  const auto replaced = config::with(in_file_[id], key, kept.replaces);
+  if (!replaced || config::text_of(*replaced, key) != in_file) {
+    outputs_.log(LogLevel::kInfo,
+                 motor.name() + ": bushd.toml was edited: " + assignment(key, in_file) +
+                     " counts, not " + kept.value + ", which was set in operation");
+    return;
+  }
+  if (kept.value == in_file) return;
+  const auto settings = config::with(settings_of(motor), key, kept.value);
+  if (!settings) {
+    outputs_.log(LogLevel::kWarning, motor.name() +
+                                         ": what was set in operation is not possible any more: " +
+                                         settings.error().message + "; " +
+                                         assignment(key, in_file) + " of bushd.toml counts");
+    return;
+  }
+  put(id, *settings);
+  outputs_.log(LogLevel::kInfo, motor.name() + ": its " + name + " is " + kept.value +
+                                    ", as it was set in operation; bushd.toml says " + in_file);
+}
+
+// "theta: offset = 12.5; it stands at 31.00 mm, beyond its soft limits of ..."
+std::string MotorSettings::text_of(const Plan& plan) const {
+  std::string text;
+  for (const MotorId id : plan.motors) {
+    const motion::Motor& motor = installation_[id];
+    text += (text.empty() ? "" : "; ") + motor.name() + ": ";
+    const char* separator = "";
+    for (const Change& change : plan.changes) {
+      if (change.motor != id) continue;
+      text += separator + assignment(change.key, change.after);
+      separator = ", ";
+    }
+    // Where nobody has heard of it there is nothing to be said.
+    if (!installation_.mcu_of(id).online()) continue;
+    const auto within = motor.stands_within_soft_limits();
+    if (!within) text += "; " + within.error().message;
+  }
+  if (!kept_.keeps()) text += "; counts until bushd ends, as there is no state store";
+  return text;
+}
+
+api::Configuration MotorSettings::configuration_of(const std::vector<MotorId>& motors) const {
+  api::Configuration out{
+      .path = installation_.config().absolute_path, .sha256 = file_sha256_, .settings = {}};
+  for (const MotorId id : motors) {
+    const config::Settings now = settings_of(installation_[id]);
+    for (const SettingKey key : config::kSettingKeys) {
+      if (!config::applies(now, key)) continue;
+      out.settings.push_back({.motor = installation_[id].name(),
+                              .key = std::string(config::name_of(key)),
+                              .value = config::text_of(now, key),
+                              .in_file = config::text_of(in_file_[id], key)});
+    }
+  }
+  return out;
+}
+
+void MotorSettings::saved(const api::Asker& asker, const api::Configure& request) {
+  const auto plan = plan_of(request, &in_file_);
+  if (!plan) return asker.answer(api::Refused{plan.error().text()});
+  asker.answer(api::Accepted{});
+  for (std::size_t i = 0; i < plan->motors.size(); ++i) {
+    in_file_[plan->motors[i]] = plan->settings[i];
+    keep(plan->motors[i]);
+  }
+  file_sha256_ = request.file_sha256;
+  outputs_.log(LogLevel::kInfo,
+               installation_.config().absolute_path + " was written by " + daemon::text_of(asker));
+  api::Completed answer{.reason = "done", .detail = configuration_of(plan->motors)};
+  open_.push_back({asker, kept_.told(), std::move(answer)});
+}
+
+// Whoever has been answered finds it after a power cut, unless the disk fails.
+void MotorSettings::step(std::int64_t) {
+  std::erase_if(open_, [this](Open& open) {
+    const auto trouble = kept_.trouble();
+    if (kept_.kept_up_to() < open.number && !trouble) return false;
+    if (trouble) open.answer.reason += "; not on the disk yet: " + *trouble;
+    open.asker.answer(open.answer);
+    return true;
+  });
+}
+
+}  // namespace bushd::daemon

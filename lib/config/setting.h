@@ -1,0 +1,42 @@
+// The keys of a motor that may be changed in operation, and their values as texts: as clients and
+// the state store have them, and as bushd.toml does but for quotes.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "units/coordinates.h"
+
+namespace bushd::config {
+
+enum class SettingKey { kOffset, kDirection, kSoftLimits };
+inline constexpr std::array kSettingKeys = {SettingKey::kOffset, SettingKey::kDirection,
+                                            SettingKey::kSoftLimits};
+
+std::string_view name_of(SettingKey key);  // as in bushd.toml
+std::optional<SettingKey> setting_key_of(std::string_view name);
+
+// Of one motor, what they stand for.
+struct Settings {
+  units::Coordinates coordinates{};
+  std::optional<units::SoftLimits> soft_limits = {};
+};
+
+// A motor without a unit has soft limits only.
+bool applies(const Settings& settings, SettingKey key);
+
+// "12.5"; "negative"; "[-5, 30]" or "none". The same value has one text.
+std::string text_of(const Settings& settings, SettingKey key);
+
+// With another value. Beside the texts above, soft limits may come without brackets and blanks:
+// "-5,30". Errors name key, value, cause and what is allowed, not the motor.
+Result<Settings> with(Settings settings, SettingKey key, std::string_view text);
+
+// Error: no step lies between them.
+Result<void> check_soft_limits(const units::Coordinates& coordinates,
+                               const units::SoftLimits& limits);
+
+}  // namespace bushd::config

@@ -1,0 +1,107 @@
+// Changes of bushd.toml that keep everything else in it to the letter.
+#include "config/edit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "config/config_file.h"
+
+namespace bushd::config {
+namespace {
+
+using test::kGood;
+using test::replaced;
+using testing::HasSubstr;
+
+constexpr SettingKey kOffset = SettingKey::kOffset;
+constexpr SettingKey kDirection = SettingKey::kDirection;
+constexpr SettingKey kSoftLimits = SettingKey::kSoftLimits;
+
+// `keys` behind those that motor "theta" has in any case; "slit" follows.
+std::string with_theta(const std::string& keys) {
+  const std::string group = "group = \"goniometer\"\n";
+  return replaced(replaced(kGood, "table = \"own\"", "table = \"bushd2-constant\""), group,
+                  group + "unit = \"mm\"\nsteps_per_unit = 400\n" + keys);
+}
+
+std::string after(const std::string& text, const std::vector<Edit>& edits) {
+  const auto out = edited(text, edits, "/nonexistent/bushd.toml");
+  return out ? *out : "error: " + out.error().text();
+}
+
+void expect(const std::string& before, const std::vector<Edit>& edits, const std::string& keys) {
+  EXPECT_EQ(after(with_theta(before), edits), with_theta(keys));
+}
+
+TEST(Edit, AValueIsReplacedWhereItStands) {
+  expect("  offset=10 # since µ-day\n# end\n", {{"theta", kOffset, "2.5"}},
+         "  offset=2.5 # since µ-day\n# end\n");
+  expect("direction = 'positive'\n\n", {{"theta", kDirection, "negative"}},
+         "direction = \"negative\"\n\n");
+  expect("soft_limits = [ # low\n  -5, # high\n  5 ]# all\n", {{"theta", kSoftLimits, "[1, 2]"}},
+         "soft_limits = [1, 2]# all\n");
+}
+
+TEST(Edit, AKeyThatIsMissingStandsBehindTheOthersOfItsMotor) {
+  expect("", {{"theta", kOffset, "-1"}, {"theta", kSoftLimits, "[1, 2]"}},
+         "offset = -1\nsoft_limits = [1, 2]\n");
+  expect("\n# of the other motor\n", {{"theta", kOffset, "-1"}},
+         "offset = -1\n\n# of the other motor\n");
+  expect("home = { direction = \"negative\", most_steps = 5 } # h\n",
+         {{"theta", kDirection, "negative"}},
+         "home = { direction = \"negative\", most_steps = 5 } # h\ndirection = \"negative\"\n");
+  expect(
+      "description = \"\"\"\\\n  µ = two lines\"\"\"\n[motor.home]\ndirection = "
+      "\"negative\"\nmost_steps = 5\n",
+      {{"theta", kOffset, "3"}},
+      "description = \"\"\"\\\n  µ = two lines\"\"\"\noffset = 3\n[motor.home]\ndirection = "
+      "\"negative\"\nmost_steps = 5\n");
+}
+
+TEST(Edit, SoftLimitsThatAreNoneGoAndTheirCommentsStay) {
+  expect("soft_limits = [-5, 5]\noffset = 1\n", {{"theta", kSoftLimits, "none"}}, "offset = 1\n");
+  expect("soft_limits = [-5, # low\n 5] # beware\noffset = 1\n", {{"theta", kSoftLimits, "none"}},
+         "# low\n# beware\noffset = 1\n");
+  expect("offset = 1\n", {{"theta", kSoftLimits, "none"}}, "offset = 1\n");
+}
+
+TEST(Edit, TheEndOfAFileAndItsNewlinesStay) {
+  const std::string text = with_theta("") + "unit = \"mm\"\nsteps_per_unit = 1\noffset = 4";
+  EXPECT_EQ(after(text, {{"slit", kOffset, "5"}}),
+            with_theta("") + "unit = \"mm\"\nsteps_per_unit = 1\noffset = 5");
+  EXPECT_EQ(after(text, {{"slit", kDirection, "negative"}}), text + "\ndirection = \"negative\"\n");
+  std::string crlf;
+  for (const char c : text) crlf += c == '\n' ? "\r\n" : std::string(1, c);
+  EXPECT_EQ(after(crlf, {{"slit", kDirection, "negative"}}),
+            crlf + "\r\ndirection = \"negative\"\r\n");
+}
+
+TEST(Edit, MotorsInOneLineAreChangedIfTheirKeyIsThere) {
+  const std::string text =
+      replaced(with_theta("") + "unit = \"mm\"\nsteps_per_unit = 1\n",
+               "[[motor]]\nname = \"theta\"", "[[motor]]\nlocal = false\nname = \"theta\"");
+  ASSERT_THAT(after(text, {{"theta", kOffset, "1"}}), HasSubstr("offset = 1"));
+  const std::string head = text.substr(0, text.find("[[motor]]"));
+  const std::string inline_motors =
+      "motor = [{ name = \"a\", mcu = \"hall:1\", output = 0, group = \"goniometer\", unit = "
+      "\"mm\", steps_per_unit = 4, offset = 3 }, { name = \"b\", mcu = \"roof:255\", output = 0, "
+      "group = \"slits\"}]\n";
+  EXPECT_EQ(after(inline_motors + head, {{"a", kOffset, "1"}}),
+            replaced(inline_motors, "offset = 3", "offset = 1") + head);
+  EXPECT_THAT(after(inline_motors + head, {{"a", kSoftLimits, "[1, 2]"}}),
+              HasSubstr("cannot be changed in place"));
+}
+
+TEST(Edit, WhatDoesNotFitIsRefused) {
+  EXPECT_THAT(after(with_theta(""), {{"phi", kOffset, "1"}}), HasSubstr("has no motor \"phi\""));
+  EXPECT_THAT(after(with_theta(""), {{"theta", kOffset, "1\nlocal = true"}}),
+              HasSubstr("theta: offset: is"));
+  EXPECT_THAT(after(with_theta(""), {{"slit", kOffset, "1"}}), HasSubstr("it has no unit"));
+  EXPECT_THAT(after("[[motor]\n", {{"slit", kOffset, "1"}}), HasSubstr("error"));
+}
+
+}  // namespace
+}  // namespace bushd::config

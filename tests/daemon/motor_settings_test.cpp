@@ -1,0 +1,254 @@
+// Offset, direction and soft limits that are changed in operation: what counts at once, what is
+// kept, and until when.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// m01 has a unit, m02 has none.
+std::string blade(const std::string& keys = "offset = 10\nsoft_limits = [-5, 5.5]\n") {
+  std::string toml = hall(1, 2);
+  return toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n" + keys);
+}
+
+struct SettingsLab : Lab {
+  explicit SettingsLab(const std::string& toml = blade(), bool kept = true) : Lab(toml) {
+    if (kept) keep_positions();
+    connect();
+  }
+  Answer change(const std::string& motor, const std::string& key, const std::string& value) {
+    return wait(send(
+        api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{motor, key, value}}}));
+  }
+  std::vector<std::string> show(const std::string& motor) {
+    const auto number = send(api::Configure{.motors = {motor}});
+    wait(number);
+    return settings(number);
+  }
+  void expect_done(const std::string& motor, const std::string& key, const std::string& value) {
+    const Answer answer = change(motor, key, value);
+    EXPECT_EQ(answer.result, "done") << answer.reason;
+  }
+  void expect_refused(const Answer& answer, const std::string& why) {
+    EXPECT_EQ(answer.result, "refused");
+    EXPECT_THAT(answer.reason, HasSubstr(why));
+  }
+  void restart(const std::string& toml) {
+    use_configuration(toml);
+    ASSERT_TRUE(run_until([this] { return all_ready(); }, 20));
+    run_for(0.1);
+  }
+};
+
+TEST(MotorSettings, AreShownAsTheyAreAndAsTheFileHasThem) {
+  SettingsLab lab;
+  EXPECT_THAT(lab.show("m01"), ElementsAre("m01 offset = 10, in the file 10",
+                                           "m01 direction = positive, in the file positive",
+                                           "m01 soft_limits = [-5, 5.5], in the file [-5, 5.5]"));
+  EXPECT_THAT(lab.show("m02"), ElementsAre("m02 soft_limits = none, in the file none"));
+  EXPECT_EQ(lab.wait(lab.send(api::Configure{.motors = {"m03"}})).result, "refused");
+}
+
+TEST(MotorSettings, CountAtOnceForRequestsAndForWhatClientsSee) {
+  SettingsLab lab;
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {400})).result, "reached");
+  lab.expect_done("m01", "offset", "2.5");
+  EXPECT_EQ(lab.motor("m01").user, 3.5);
+  EXPECT_EQ(lab.description("m01").scale.offset, 2.5);
+  lab.expect_done("m01", "direction", "negative");
+  EXPECT_EQ(lab.motor("m01").user, 1.5);
+  EXPECT_EQ(lab.motor("m01").dial, 1.0);
+  EXPECT_TRUE(lab.description("m01").scale.negative);
+  // The limits are where they were on the dial, so the user's have changed places.
+  EXPECT_EQ(lab.description("m01").soft_limits, (units::SoftLimits{-5, 5.5}));
+  lab.expect_refused(lab.wait(lab.send(api::Move{.kind = api::Move::Kind::kAbsolute,
+                                                 .motors = {{"m01", api::UserUnits{7.6}}}})),
+                     "allowed: -3.000");
+  EXPECT_EQ(lab.wait(lab.send(api::Move{.kind = api::Move::Kind::kAbsolute,
+                                        .motors = {{"m01", api::UserUnits{7.5}}}}))
+                .result,
+            "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), -2000);
+  lab.expect_done("m01", "soft_limits", "none");
+  EXPECT_FALSE(lab.description("m01").soft_limits);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {-10})).result, "reached");
+}
+
+TEST(MotorSettings, SayWhereAMotorStandsThatIsOutside) {
+  SettingsLab lab;
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {400})).result, "reached");
+  const Answer answer = lab.change("m01", "soft_limits", "[2, 3]");
+  EXPECT_EQ(answer.result, "done");
+  EXPECT_THAT(
+      answer.reason,
+      HasSubstr("m01: soft_limits = [2, 3]; it stands at 11.0000 mm, beyond its soft limits "
+                "of 12.0000 mm to 13.0000 mm; it may be moved towards them"));
+  lab.expect_refused(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {-1})), "soft limit");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  EXPECT_THAT(lab.change("m01", "soft_limits", "[1, 3]").reason, Not(HasSubstr("stands")));
+}
+
+TEST(MotorSettings, OfAMotorThatMovesStayAsTheyAre) {
+  SettingsLab lab;
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {1000});
+  // Whether the disk knows of the move yet or not.
+  lab.expect_refused(lab.change("m01", "offset", "1"), "m01 is about to move");
+  lab.run_for(0.2);
+  lab.expect_refused(lab.change("m01", "offset", "1"),
+                     "m01 moves; what bushd.toml says of it can be changed at rest only");
+  lab.expect_done("m02", "soft_limits", "-100,100");
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.motor("m01").user, 12.5);
+  const auto set = lab.send(Ask::kSetPosition, {"m01"}, {0});
+  lab.run_for(0.002);
+  lab.expect_refused(lab.change("m01", "offset", "1"), "m01: its position is being set");
+  EXPECT_EQ(lab.wait(set).result, "done");
+}
+
+TEST(MotorSettings, ThatMakeNoSenseAreRefusedWithMotorKeyCauseAndRemedy) {
+  SettingsLab lab;
+  lab.expect_refused(lab.change("m01", "offset", "1e300"), "m01: offset: an offset of 1e+300 mm");
+  lab.expect_refused(lab.change("m01", "offset", "2mm"),
+                     "m01: offset: is \"2mm\"; allowed: a number of user units");
+  lab.expect_refused(lab.change("m01", "direction", "left"),
+                     "m01: direction: is \"left\"; allowed: negative, positive");
+  lab.expect_refused(lab.change("m01", "soft_limits", "[3, 2]"),
+                     "m01: soft_limits: has no step from 3 to 2");
+  lab.expect_refused(lab.change("m01", "soft_limits", "nan,3"), "allowed: [LOWEST, HIGHEST]");
+  lab.expect_refused(lab.change("m01", "unit", "deg"),
+                     "m01: \"unit\" cannot be changed in operation");
+  lab.expect_refused(lab.change("m02", "offset", "1"), "m02: offset: it has no unit");
+  lab.expect_refused(lab.change("m03", "offset", "1"), "m03");
+  lab.expect_refused(lab.wait(lab.send(api::Configure{.kind = api::Configure::Kind::kChange})),
+                     "no change");
+  // All of it or nothing.
+  lab.expect_refused(lab.wait(lab.send(api::Configure{
+                         .kind = api::Configure::Kind::kChange,
+                         .changes = {{"m01", "offset", "1"}, {"m02", "soft_limits", "1"}}})),
+                     "m02");
+  EXPECT_EQ(lab.motor("m01").user, 10);
+  EXPECT_THAT(lab.errors(), IsEmpty());
+}
+
+TEST(MotorSettings, AreKeptOverPowerCutsUntilTheFileIsEdited) {
+  SettingsLab lab;
+  lab.expect_done("m01", "offset", "2.5");
+  lab.expect_done("m01", "direction", "negative");
+  lab.expect_done("m01", "soft_limits", "none");
+  lab.cut_pc_power();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 20));
+  EXPECT_THAT(lab.show("m01"), ElementsAre("m01 offset = 2.5, in the file 10",
+                                           "m01 direction = negative, in the file positive",
+                                           "m01 soft_limits = none, in the file [-5, 5.5]"));
+  // Each by itself, and what was edited stays so though the file goes back.
+  lab.restart(blade("offset = 11\nsoft_limits = [-5, 5.5]\n"));
+  EXPECT_THAT(lab.show("m01"), ElementsAre("m01 offset = 11, in the file 11",
+                                           "m01 direction = negative, in the file positive",
+                                           "m01 soft_limits = none, in the file [-5, 5.5]"));
+  lab.restart(blade());
+  EXPECT_THAT(lab.show("m01").front(), "m01 offset = 10, in the file 10");
+  // What the file makes impossible does not count.
+  lab.restart(hall(1, 2));
+  EXPECT_THAT(lab.show("m01"), ElementsAre("m01 soft_limits = none, in the file none"));
+}
+
+TEST(MotorSettings, OfSetAreTheSame) {
+  SettingsLab lab;
+  EXPECT_EQ(lab.wait(lab.send(api::SetPosition{.motors = {{"m01", api::UserUnits{3.25}}}})).result,
+            "done");
+  EXPECT_THAT(lab.show("m01").front(), "m01 offset = 3.25, in the file 10");
+  lab.expect_done("m01", "offset", "10");
+  lab.restart(blade());
+  EXPECT_THAT(lab.show("m01").front(), "m01 offset = 10, in the file 10");
+}
+
+TEST(MotorSettings, ThatWereSavedCountAsThoseOfTheFile) {
+  SettingsLab lab;
+  lab.expect_done("m01", "offset", "2.5");
+  EXPECT_EQ(lab.wait(lab.send(api::Configure{.kind = api::Configure::Kind::kSaved,
+                                             .changes = {{"m01", "offset", "2.5"}},
+                                             .file_sha256 = "abc"}))
+                .result,
+            "done");
+  EXPECT_THAT(lab.show("m01").front(), "m01 offset = 2.5, in the file 2.5");
+  // What is changed after that is newer than the file.
+  lab.expect_done("m01", "offset", "7");
+  lab.restart(blade("offset = 2.5\nsoft_limits = [-5, 5.5]\n"));
+  EXPECT_THAT(lab.show("m01").front(), "m01 offset = 7, in the file 2.5");
+}
+
+TEST(MotorSettings, WithoutAStoreCountUntilTheDaemonEnds) {
+  SettingsLab lab(blade(), false);
+  EXPECT_THAT(lab.change("m01", "offset", "2.5").reason, HasSubstr("there is no state store"));
+  EXPECT_EQ(lab.motor("m01").user, 2.5);
+  lab.restart(blade());
+  EXPECT_THAT(lab.show("m01").front(), "m01 offset = 10, in the file 10");
+}
+
+TEST(MotorSettings, AreToldAsDoneWhenTheDiskHasThem) {
+  SettingsLab lab;
+  lab.run_for(0.2);
+  lab.disk_us = 40'000;
+  const auto number = lab.send(
+      api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", "offset", "2.5"}}});
+  lab.run_for(0.03);
+  EXPECT_FALSE(lab.has_result(number));
+  EXPECT_EQ(lab.wait(number).result, "done");
+}
+
+TEST(MotorSettings, ChangesAreInTheHistory) {
+  SettingsLab lab;
+  lab.expect_done("m01", "offset", "2.5");
+  const auto number = lab.send(api::GetHistory{.motor = "m01", .most = 1});
+  lab.wait(number);
+  ASSERT_EQ(lab.history(number).size(), 1u);
+  EXPECT_EQ(lab.history(number).front().what, "config");
+  EXPECT_EQ(lab.history(number).front().reason, "offset = 2.5, was 10");
+  EXPECT_THAT(lab.history(number).front().who, HasSubstr("test"));
+  EXPECT_EQ(lab.history(number).front().from_text, "10.0000 mm");
+  EXPECT_EQ(lab.history(number).front().to_text, "2.5000 mm");
+}
+
+TEST(MotorSettings, TheHistoryHasWhatWasSetAndMovedAsPeopleSawIt) {
+  SettingsLab lab;
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {400})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(api::SetPosition{.motors = {{"m01", api::UserUnits{3}}}})).result,
+            "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {800})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m02"}, {8})).result, "done");
+  const auto line = [](const api::PastMotion& motion) {
+    return motion.what + " " + motion.from_text + " to " + motion.to_text + " " + motion.reason;
+  };
+  const auto number = lab.send(api::GetHistory{.motor = "m01", .most = 3});
+  lab.wait(number);
+  std::vector<std::string> lines;
+  for (const api::PastMotion& motion : lab.history(number)) lines.push_back(line(motion));
+  EXPECT_THAT(lines, ElementsAre("set 3.0000 mm to 4.0000 mm ",
+                                 "set 11.0000 mm to 3.0000 mm offset = 2, was 10",
+                                 HasSubstr("move 10.0000 mm to 11.0000 mm")));
+  const auto plain = lab.send(api::GetHistory{.motor = "m02", .most = 1});
+  lab.wait(plain);
+  EXPECT_EQ(line(lab.history(plain).at(0)), "set  to  ");
+}
+
+TEST(MotorSettings, WhatWasKnownLastIsSaidInTheMotorsUnit) {
+  SettingsLab lab;
+  lab.send(Ask::kMoveBy, {"m01"}, {2000});
+  lab.run_for(0.7);
+  lab.bus(0).reboot(0);
+  lab.run_for(0.1);
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 20));
+  lab.run_for(0.2);
+  EXPECT_THAT(lab.motor("m01").uncertain_reason,
+              testing::ContainsRegex("last known: [0-9]+ steps .1[0-9].[0-9]* mm."));
+}
+
+}  // namespace
+}  // namespace bushd::test

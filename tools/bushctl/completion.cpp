@@ -1,0 +1,55 @@
+// Names that may follow on a command line.
+#include <set>
+
+#include "commands.h"
+
+namespace bushctl {
+namespace {
+
+namespace api = bushd::api;
+using bushd::client::Client;
+
+// Somebody waits for it with a hand on the keyboard.
+constexpr std::chrono::milliseconds kPatience{500};
+
+std::set<std::string> tables(Client& client) {
+  std::set<std::string> names;
+  const auto reply = client.run(api::ListTables{}, Client::Until::kResult);
+  const auto* completed = reply ? std::get_if<api::Completed>(&*reply) : nullptr;
+  const auto* list =
+      completed == nullptr ? nullptr : std::get_if<api::TableList>(&completed->detail);
+  if (list == nullptr) return names;
+  for (const api::TableEntry& entry : list->entries) names.insert(entry.name);
+  return names;
+}
+
+// Nothing where no daemon answers.
+std::set<std::string> known_names(const Connection& connection, const std::string& value) {
+  std::set<std::string> names;
+  if (value != "NAME" && value != "GROUP" && value != "TABLE") return names;
+  auto options = connection.options();
+  options.answer_within = kPatience;
+  const auto client = Client::open(std::move(options));
+  if (!client) return names;
+  if (value == "TABLE") return tables(**client);
+  const auto status = (*client)->status(kPatience);
+  if (!status) return names;
+  for (const auto& mcu : status->descriptions) {
+    for (const api::MotorDescription& motor : mcu.snapshot.motors) {
+      names.insert(value == "NAME" ? motor.name : motor.group);
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+int complete(CommandLine& line, const std::vector<std::string>& words) {
+  bushd::Completion completion = line.complete(words);
+  const auto names = known_names(line.connection(), completion.value);
+  completion.value.clear();
+  bushd::print_completion(completion, words.back(), {names.begin(), names.end()});
+  return kDone;
+}
+
+}  // namespace bushctl

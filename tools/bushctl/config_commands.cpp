@@ -1,0 +1,111 @@
+// The subcommand about what may be changed of motors in operation.
+#include <fmt/format.h>
+
+#include <memory>
+#include <variant>
+
+#include "base/printable.h"
+#include "commands.h"
+#include "settings.h"
+
+namespace bushctl {
+namespace {
+
+namespace api = bushd::api;
+using bushd::client::Client;
+
+struct Options {
+  std::vector<std::string> words;
+  bool diff = false;
+  bool save = false;
+  bool json = false;
+};
+
+// The result, or the exit code where there is none.
+std::variant<api::Configuration, int> ask(Client& client, const api::Configure& request,
+                                          std::string* reason = nullptr) {
+  const auto reply = client.run(request, Client::Until::kResult);
+  if (!reply) return failure(client, reply.error());
+  const auto* completed = std::get_if<api::Completed>(&*reply);
+  const auto* configuration =
+      completed == nullptr ? nullptr : std::get_if<api::Configuration>(&completed->detail);
+  if (configuration == nullptr) return refused(*reply);
+  if (reason != nullptr) *reason = completed->reason;
+  return *configuration;
+}
+
+int show(const api::Configuration& configuration, const Options& options) {
+  if (options.json) {
+    fmt::print("{}\n", json(configuration));
+  } else if (configuration.settings.empty()) {
+    fmt::print("nothing differs from {}\n", bushd::printable(configuration.path));
+  } else {
+    for (const std::string& line : table(configuration)) fmt::print("{}\n", line);
+  }
+  return kDone;
+}
+
+int save_and_tell(Client& client, const api::Configuration& configuration) {
+  if (configuration.settings.empty()) {
+    fmt::print("nothing differs from {}\n", bushd::printable(configuration.path));
+    return kDone;
+  }
+  const auto saved = save(configuration);
+  if (!saved) {
+    fmt::print(stderr, "bushctl: not saved: {}\n", bushd::printable(saved.error().text()));
+    return kFailed;
+  }
+  for (const auto& [motor, key, value] : saved->changes) {
+    fmt::print("{}: {} = {}\n", bushd::printable(motor), bushd::printable(key),
+               bushd::printable(value));
+  }
+  fmt::print("written to {}\n", bushd::printable(configuration.path));
+  const auto told = ask(client, *saved);
+  if (std::holds_alternative<api::Configuration>(told)) return kDone;
+  fmt::print(stderr,
+             "bushctl: bushd does not know yet that it is written; restart bushd before "
+             "changing these again\n");
+  return std::get<int>(told);
+}
+
+int run(Client& client, const api::Configure& request, const Options& options) {
+  std::string reason;
+  auto answer = ask(client, request, &reason);
+  if (const int* code = std::get_if<int>(&answer)) return *code;
+  auto& configuration = std::get<api::Configuration>(answer);
+  if (options.save) return save_and_tell(client, differences(std::move(configuration)));
+  if (request.kind == api::Configure::Kind::kChange && !options.json) {
+    fmt::print("{}\n", bushd::printable(reason));
+    return kDone;
+  }
+  return show(options.diff ? differences(std::move(configuration)) : configuration, options);
+}
+
+}  // namespace
+
+void add_config_commands(CommandLine& line) {
+  const auto options = std::make_shared<Options>();
+  line.add("config", "Change offset, direction and soft_limits of motors in operation")
+      .footer(
+          "bushctl config [NAME]                what they are, and what bushd.toml says\n"
+          "bushctl config NAME KEY=VALUE...     changes them, at rest: offset=12.5, "
+          "direction=negative,\n"
+          "                                     soft_limits=-5,30 (on the dial), soft_limits=none\n"
+          "bushctl config --diff                what differs from bushd.toml\n"
+          "bushctl config --save                writes that into bushd.toml, on the PC of bushd\n"
+          "What is changed is kept in the state store, and counts until its key in bushd.toml is "
+          "edited.")
+      .words("NAME", &options->words, "Motor (default: all), then changes KEY=VALUE",
+             Command::Needed::kNo)
+      .flag("--diff", &options->diff, "Show only what differs from bushd.toml")
+      .flag("--save", &options->save, "Write what differs into bushd.toml")
+      .flag("--json", &options->json, "Print JSON")
+      .run([&line, options] {
+        const auto request = parse_settings(options->words);
+        if (!request) return wrong_usage(request.error());
+        return with_client(line.connection(),
+                           [&](Client& client) { return run(client, *request, *options); });
+      });
+}
+
+}  // namespace bushctl
