@@ -382,10 +382,12 @@ class Sequence:
                 if motor in motors:
                     motor.steps = aims[motor.name]
                 continue
-            may_have_moved = motor in motors and aims[motor.name] != motor.steps
-            # One that had arrived may have been at rest on the disk.
             before = motor.trust
-            if may_have_moved and motor is not moving and self.seen(motor)["trust"] != "uncertain":
+            may_have_moved = motor in motors
+            # One that was there, or had arrived, may have been at rest on the disk, or not yet.
+            seen = self.seen(motor)
+            doubt = seen["trust"] == "uncertain" and not seen["reason"].startswith("it has been neither")
+            if may_have_moved and motor is not moving and not doubt:
                 may_have_moved = False
                 motor.steps = aims[motor.name]
             motor.mcu_restarted(may_have_moved)

@@ -1,6 +1,7 @@
 #include "clients.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <iterator>
 #include <limits>
 #include <numeric>
@@ -219,6 +220,68 @@ Request Clients::confirm() {
   return request;
 }
 
+std::size_t Clients::index_of(const std::string& motor) const {
+  const auto found = std::ranges::find(config_.motors, motor, &bushd::config::Motor::name);
+  return static_cast<std::size_t>(found - config_.motors.begin());
+}
+
+Request Clients::move_or_retarget() {
+  if (random_.one_in(2)) return retarget();
+  return move(static_cast<std::size_t>(random_.between(1, 4)));
+}
+
+// The same in user units: exactly, a little beside, at the farthest a tie; or about at a limit.
+Request Clients::move_of_user() {
+  Request request = move_or_retarget();
+  const Units& units = witness_.units();
+  request.user = true;
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    const std::size_t motor = index_of(request.motors[i]);
+    const auto limits = units.limits(motor);
+    std::int64_t& amount = request.steps[i];
+    const bool absolute = request.ask == Ask::kMoveTo;
+    if (absolute && limits && random_.one_in(3)) {
+      amount = (random_.one_in(2) ? limits->low : limits->high) + random_.between(-2, 2);
+    }
+    const std::int64_t step = std::abs(units.micro_of_distance(motor, 1));
+    const auto position = units.user_of(motor, amount);
+    amount = absolute ? position.value_or(0) : units.micro_of_distance(motor, amount);
+    if (units.has_unit(motor)) amount += random_.between(-step / 2, step / 2);
+  }
+  return request;
+}
+
+Request Clients::set_of_user() {
+  Request request = make(Ask::kSetPosition);
+  request.user = true;
+  request.dial = random_.one_in(2);
+  std::vector<Choice> some = motors_that(false, false);
+  for (std::int64_t n = random_.between(1, 2); n > 0 && !some.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(some.size()));
+    const std::size_t motor = index_of(some[index].name);
+    const std::int64_t step = std::abs(witness_.units().micro_of_distance(motor, 1));
+    const std::int64_t beside =
+        witness_.units().has_unit(motor) ? random_.between(-step / 2, step / 2) : 0;
+    request.add(some[index].name, random_.between(-kFarthest / 4, kFarthest / 4) * step + beside);
+    some.erase(some.begin() + static_cast<std::ptrdiff_t>(index));
+  }
+  if (request.motors.empty()) request.add(any_motor(), 0);
+  return request;
+}
+
+// Of a motor at rest, or a change in flight.
+Request Clients::move_at_speed() {
+  Request request = random_.one_in(3) ? move_of_user() : move_or_retarget();
+  const std::int64_t steps_per_s = random_.magnitude(300, 4000);
+  request.speed_in_steps = random_.one_in(2) || request.motors.size() != 1;
+  const std::int64_t step =
+      request.speed_in_steps
+          ? 1'000'000
+          : std::abs(witness_.units().micro_of_distance(index_of(request.motors.front()), 1));
+  request.speed_micro = steps_per_s * step;
+  return request;
+}
+
 bool Clients::says(const char* detail) const {
   return std::any_of(witness_.states().begin(), witness_.states().end(), [&](const auto& state) {
     return state && state->detail.find(detail) != std::string::npos;
@@ -267,6 +330,12 @@ Request Clients::compose(CommandKind kind) {
       return disarm();
     case CommandKind::kConfirm:
       return confirm();
+    case CommandKind::kUserMove:
+      return move_of_user();
+    case CommandKind::kUserSet:
+      return set_of_user();
+    case CommandKind::kSpeed:
+      return move_at_speed();
   }
   return nonsense();
 }

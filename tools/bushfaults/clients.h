@@ -58,6 +58,11 @@ class Clients {
   Request arm();
   Request disarm();
   Request confirm();
+  Request move_of_user();
+  Request set_of_user();
+  Request move_at_speed();
+  Request move_or_retarget();
+  std::size_t index_of(const std::string& motor) const;
   std::string any_motor();
   // Motors that the daemon says are at rest (or moving), uncertain (or known).
   std::vector<Choice> motors_that(bool moving, bool uncertain) const;

@@ -7,6 +7,7 @@
 #include "fieldbus/line_budget.h"
 #include "sim/random.h"
 #include "tables/table_file.h"
+#include "units.h"
 
 namespace bushfaults {
 namespace {
@@ -83,6 +84,10 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
 
 void furnish(bushd::config::Config& config, const FaultRates& faults, const CommandRates& commands,
              std::uint64_t seed) {
+  const bool units = rate(commands, CommandKind::kUserMove) > 0 ||
+                     rate(commands, CommandKind::kUserSet) > 0 ||
+                     rate(commands, CommandKind::kSpeed) > 0;
+  if (units) add_units(config, seed);
   if (rate(commands, CommandKind::kHome) > 0) add_homes(config, seed);
   if (rate(faults, FaultKind::kLimitSwitch) > 0) add_limit_switches(config);
   if (rate(faults, FaultKind::kEmergencyInput) > 0) add_emergency_inputs(config, seed);

@@ -53,6 +53,10 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"armings", 0, "1 .. 8 motors wait for the trigger"},
     {"disarmings", 0, "of one motor or of all"},
     {"confirmations", 0, "that motors stand where they are shown, right or wrong"},
+    {"user-moves", 0,
+     "moves and new targets in user units; most motors have a unit then, half limits"},
+    {"user-sets", 0, "positions set in user units: of the offset, or of the dial"},
+    {"speeds", 0, "moves and new targets with a speed, in steps or user units"},
 }};
 
 template <std::size_t kSize>

@@ -64,8 +64,11 @@ enum class CommandKind : std::uint8_t {
   kArm,
   kDisarm,
   kConfirm,
+  kUserMove,
+  kUserSet,
+  kSpeed,
 };
-inline constexpr std::size_t kCommandKinds = 14;
+inline constexpr std::size_t kCommandKinds = 17;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <optional>
 #include <string_view>
 
 namespace bushfaults {
@@ -10,10 +11,23 @@ namespace {
 
 namespace api = bushd::api;
 
+constexpr double kMicro = 1e6;
+
+std::optional<api::Speed> speed_of(const Request& request) {
+  if (request.speed_micro == 0) return std::nullopt;
+  return api::Speed{.per_s = static_cast<double>(request.speed_micro) / kMicro,
+                    .in_steps = request.speed_in_steps};
+}
+
 std::vector<api::MotorAmount> motor_steps(const Request& request) {
   std::vector<api::MotorAmount> all;
   for (std::size_t i = 0; i < request.motors.size(); ++i) {
-    all.push_back({request.motors[i], request.steps[i]});
+    if (request.user) {
+      const double user = static_cast<double>(request.steps[i]) / kMicro;
+      all.push_back({request.motors[i], api::UserUnits{user}});
+    } else {
+      all.push_back({request.motors[i], request.steps[i]});
+    }
   }
   return all;
 }
@@ -40,9 +54,13 @@ std::string text_of(const bushd::lcm::RequestId& id) {
 api::Request api_of(const Request& request) {
   switch (request.ask) {
     case Ask::kMoveBy:
-      return api::Move{.kind = api::Move::Kind::kRelative, .motors = motor_steps(request)};
+      return api::Move{.kind = api::Move::Kind::kRelative,
+                       .motors = motor_steps(request),
+                       .speed = speed_of(request)};
     case Ask::kMoveTo:
-      return api::Move{.kind = api::Move::Kind::kAbsolute, .motors = motor_steps(request)};
+      return api::Move{.kind = api::Move::Kind::kAbsolute,
+                       .motors = motor_steps(request),
+                       .speed = speed_of(request)};
     case Ask::kStop:
       return api::Stop{request.motors};
     case Ask::kEnable:
@@ -50,7 +68,7 @@ api::Request api_of(const Request& request) {
     case Ask::kDisable:
       return api::Disable{request.motors};
     case Ask::kSetPosition:
-      return api::SetPosition{.motors = motor_steps(request)};
+      return api::SetPosition{.motors = motor_steps(request), .dial = request.dial};
     case Ask::kClearFaults:
       return api::ClearFaults{request.motors};
     case Ask::kEmergencyStop:
@@ -91,8 +109,13 @@ bushd::lcm::Packet packet_of(std::int64_t utime_us, const Request& request) {
 }
 
 std::string text_of(const Request& request) {
-  return fmt::format("{}: {} {} {}{}", text_of(request.id()), word_of(request),
-                     fmt::join(request.motors, ","), fmt::join(request.steps, ","),
+  std::string how = request.user ? request.dial ? " millionths on the dial" : " millionths" : "";
+  if (request.speed_micro != 0) {
+    how += fmt::format(" at {} millionths{}/s", request.speed_micro,
+                       request.speed_in_steps ? " of a step" : "");
+  }
+  return fmt::format("{}: {} {} {}{}{}", text_of(request.id()), word_of(request),
+                     fmt::join(request.motors, ","), fmt::join(request.steps, ","), how,
                      request.damage == Damage::kNone ? "" : " (broken)");
 }
 

@@ -37,8 +37,12 @@ struct Request {
   Ask ask{};
   std::vector<std::string> motors{};
   std::vector<std::int64_t> steps{};  // as many as motors
-  bool rising = false;                // kArm: the edge
-  std::int32_t delay_us = 0;          // kArm
+  bool user = false;                  // they are millionths of each motor's unit
+  bool dial = false;                  // kSetPosition: on the dial
+  std::int64_t speed_micro = 0;       // of moves, millionths a second; 0: none
+  bool speed_in_steps = false;
+  bool rising = false;        // kArm: the edge
+  std::int32_t delay_us = 0;  // kArm
   Damage damage = Damage::kNone;
 
   void add(const std::string& motor, std::int64_t steps_of_it) {

@@ -37,7 +37,8 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
       plant_(plant),
       recent_(recent),
       positions_(config, bus, plant),
-      starts_(config) {
+      starts_(config),
+      units_(config) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
     motors_.push_back({motor.name, motor.mcu.value, motor.output.value, {}, {}, {}});
@@ -68,6 +69,7 @@ void Witness::daemon_started(TimeNs now_ns) {
   for (Motor& motor : motors_) motor.move.reset();
   std::fill(states_.begin(), states_.end(), std::nullopt);
   positions_.daemon_started();
+  units_.daemon_started(offsets_kept_);
 }
 
 void Witness::pressed(TimeNs now_ns, std::size_t motor) {
@@ -86,7 +88,7 @@ void Witness::reply(TimeNs now_ns, const Key& key, const api::Reply& reply) {
   Asked& asked = found->second;
   if (std::holds_alternative<api::Accepted>(reply)) {
     asked.accepted = true;
-    return accepted(key, asked);
+    return accepted(now_ns, key, asked);
   }
   if (const auto* completed = std::get_if<api::Completed>(&reply)) {
     if (completed->reason.empty()) violated(now_ns, "a result without a reason");
@@ -95,6 +97,7 @@ void Witness::reply(TimeNs now_ns, const Key& key, const api::Reply& reply) {
     if (std::get<api::Refused>(reply).reason.empty()) {
       violated(now_ns, "a refusal without a reason");
     }
+    check_refusal(now_ns, asked, std::get<api::Refused>(reply).reason);
     refused(asked);
   }
   asked.finished = true;
@@ -113,8 +116,9 @@ void Witness::forget_some() {
   finished_.pop_front();
 }
 
-void Witness::accepted(const Key& key, Asked& asked) {
+void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   const Request& request = asked.request;
+  check_limits(now_ns, asked);
   if (request.ask == Ask::kStop || request.ask == Ask::kEmergencyStop) {
     for (Motor& motor : motors_) {
       const auto& named = request.motors;
@@ -127,16 +131,16 @@ void Witness::accepted(const Key& key, Asked& asked) {
     Motor& motor = *find(request.motors[i]);
     const std::int64_t stands = plant_steps(motor);
     if (request.is_move()) forget_unbegun(motor);
-    if (request.ask == Ask::kSetPosition) {
-      positions_.may_be_set(index_of(motor), request.steps[i]);
-    }
+    if (request.ask == Ask::kSetPosition) position_accepted(request, i);
     if (request.ask == Ask::kConfirm) positions_.may_be_confirmed(index_of(motor));
     if (request.ask == Ask::kHome) positions_.may_be_homed(index_of(motor));
     if (request.ask == Ask::kMoveBy || request.ask == Ask::kArm) {
       const std::optional<std::int64_t> base = motor.move ? motor.target : stands;
-      asked.target.push_back(base ? std::optional(*base + request.steps[i]) : std::nullopt);
-    } else if (request.ask == Ask::kMoveTo && offset(motor)) {
-      asked.target.emplace_back(*offset(motor) + request.steps[i]);
+      asked.target.push_back(base ? std::optional(*base + distance_asked(request, i))
+                                  : std::nullopt);
+    } else if (const auto position = position_asked(request, i);
+               request.ask == Ask::kMoveTo && offset(motor) && position) {
+      asked.target.emplace_back(*offset(motor) + *position);
     } else {
       asked.target.emplace_back();
     }
@@ -174,7 +178,9 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
   const Request& request = asked.request;
   if (request.ask == Ask::kSetPosition && completed.outcome == api::Outcome::kDone) {
     for (std::size_t i = 0; i < request.motors.size(); ++i) {
-      positions_.was_set(index_of(*find(request.motors[i])), request.steps[i]);
+      const std::size_t motor = index_of(*find(request.motors[i]));
+      if (sets_offset(units_, motor, request)) continue;
+      if (const auto set = position_asked(request, i)) positions_.was_set(motor, *set);
     }
   }
   const bool homes = request.ask == Ask::kHome;
@@ -244,6 +250,7 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const auto& from = asked.from[index];
   if (planned && from && plant_steps(motor) != *from) {
     asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
+    if (end.word == "reached") check_speed(now_ns, motor, asked, index);
   }
 }
 
@@ -275,6 +282,10 @@ void Witness::state(TimeNs now_ns, std::size_t mcu, const api::StateSnapshot& st
   }
   states_[mcu] = state;
   if (const auto wrong = positions_.check(now_ns, mcu, state)) violated(now_ns, *wrong);
+  for (const api::MotorState& motor : state.motors) {
+    const auto wrong = units_.check(index_of(*find(motor.name)), motor);
+    if (wrong) violated(now_ns, *wrong);
+  }
 }
 
 void Witness::check_deadlines(TimeNs now_ns) {

@@ -20,6 +20,7 @@
 #include "sim/bus.h"
 #include "sim/plant.h"
 #include "starts.h"
+#include "units.h"
 
 namespace bushfaults {
 
@@ -64,6 +65,9 @@ class Witness {
   Promise& promise() { return promise_; }
   const Promise& promise() const { return promise_; }
   Starts& starts() { return starts_; }
+  // Offsets are kept over restarts of the daemon.
+  void keep_offsets() { offsets_kept_ = true; }
+  const Units& units() const { return units_; }
   Positions& positions() { return positions_; }
   const Positions& positions() const { return positions_; }
   const std::map<std::string, std::uint64_t>& homings_by_result() const {
@@ -124,13 +128,24 @@ class Witness {
   std::optional<std::int64_t> offset(const Motor& motor) const {
     return positions_.offset(index_of(motor));
   }
-  void accepted(const Key& key, Asked& asked);
+  void accepted(TimeNs now_ns, const Key& key, Asked& asked);
   void refused(const Asked& asked);
   void finished(TimeNs now_ns, const Key& key, const Asked& asked,
                 const bushd::api::Completed& result);
   void moved(TimeNs now_ns, const Key& key, const Asked& asked, const Motors& motors);
   void homed(TimeNs now_ns, const Motors& motors);
   void forget_some();
+  // In steps of the daemon's count. Nothing: it is not known.
+  std::optional<std::int64_t> position_asked(const Request& request, std::size_t i) const;
+  std::int64_t distance_asked(const Request& request, std::size_t i) const;
+  static bool sets_offset(const Units& units, std::size_t motor, const Request& request);
+  void position_accepted(const Request& request, std::size_t i);
+  void check_limits(TimeNs now_ns, const Asked& asked);
+  void check_refusal(TimeNs now_ns, const Asked& asked, const std::string& reason);
+  std::optional<std::int64_t> target_asked(const Motor& motor, const Request& request,
+                                           std::size_t i) const;
+  bool trusted(const Motor& motor) const;
+  void check_speed(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index);
   void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, const End& end,
@@ -141,6 +156,8 @@ class Witness {
   Recent& recent_;
   Positions positions_;
   Starts starts_;
+  Units units_;
+  bool offsets_kept_ = false;
   std::optional<Violation> violation_;
   std::vector<Motor> motors_;
   std::map<std::string, std::size_t> motor_by_name_;

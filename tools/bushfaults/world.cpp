@@ -47,7 +47,10 @@ World::World(const Options& options, bushd::config::Config config)
   add_mcus();
   add_motors();
   witness_.positions().be_strict(options.strict_known);
-  if (options.keep_positions) witness_.positions().keep();
+  if (options.keep_positions) {
+    witness_.positions().keep();
+    witness_.keep_offsets();
+  }
   overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
   inputs_ = std::make_unique<Inputs>(config_, bus_, plant_, witness_, options.seed);
   second_ = std::make_unique<SecondDaemon>(config_, bus_, recent_, options.seed);
