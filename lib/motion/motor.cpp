@@ -109,8 +109,9 @@ PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
   const std::string mcu = "MCU " + setup_.mcu;
   if (!boot_number_) return {Trust::kUnknown, mcu + " has not reported where it stands yet"};
   if (boot_number && *boot_number != *boot_number_) {
-    return {Trust::kUnknown,
-            mcu + " restarted; before, it was heard at " + std::to_string(position_)};
+    std::string at = std::to_string(position_);
+    if (setup_.coordinates.has_unit()) at += " (" + setup_.coordinates.text(position_) + ")";
+    return {Trust::kUnknown, mcu + " restarted; before, it was heard at " + at};
   }
   if (restoring_) return {Trust::kUnknown, "its position is being restored"};
   if (lost_) {

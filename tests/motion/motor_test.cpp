@@ -292,6 +292,20 @@ TEST_F(MotorTest, HasNoPositionBeforeItsMcuHasReported) {
   report(kStart, 42);
   EXPECT_EQ(motor.trust(1).trust, api::Trust::kUnknown) << "its MCU is in another boot";
   EXPECT_THAT(motor.trust(1).reason, HasSubstr("heard at 42"));
+  motor.set_coordinates(units::Coordinates::make({"mm", {4, 1}, false, 0.5, 2}).value());
+  EXPECT_THAT(motor.trust(1).reason, HasSubstr("heard at 42 (11.00 mm)"));
+}
+
+TEST_F(MotorTest, SaysHowItStandsToItsSoftLimits) {
+  EXPECT_TRUE(motor.stands_within_soft_limits());
+  report(kStart, 42);
+  motor.set_soft_limits(units::SoftLimits{0, 42});
+  EXPECT_TRUE(motor.stands_within_soft_limits());
+  motor.set_soft_limits(units::SoftLimits{43, 50});
+  EXPECT_THAT(motor.stands_within_soft_limits().error().message,
+              HasSubstr("it stands at 42 steps, beyond its soft limits of 43 steps to 50 steps"));
+  EXPECT_FALSE(motor.may_move_to(41));
+  EXPECT_TRUE(motor.may_move_to(45));
 }
 
 TEST_F(MotorTest, IsUncertainUntilSomebodySaysWhereItStandsButMayMove) {
