@@ -295,7 +295,7 @@ TEST(Database, AnOlderVersionIsCopiedThenBroughtUpToDate) {
 }
 
 TEST(Database, TheFirstVersionKeepsItsHistory) {
-  SimDisk disk(1);
+  sim::SimDisk disk(1);
   std::vector<std::string> notes;
   {
     auto opened = Database::open(disk, kDatabase, 0, notes, all_versions().first(1));
