@@ -55,7 +55,7 @@ class Driver:
 
     def close(self):
         self.process.stdin.close()
-        self.process.stdout.close()
+        self.process.stdout.read()  # what it says at its end
         return self.process.wait()
 
 

@@ -31,7 +31,7 @@ import hashlib
 import math
 import tomllib
 from collections import namedtuple
-from itertools import accumulate
+from itertools import chain, repeat
 
 from check_trace.emission import PERIODIC
 from check_trace.problems import InputError
@@ -63,11 +63,11 @@ class Table:
         return self.decel[i] if i < len(self.decel) else self.cruise
 
     def delays(self, steps, floor):
-        """Of a whole move, in time units."""
-        return [
+        """Of a whole move, in time units, one after the other."""
+        return (
             max(self.delay_from_start(j - 1), self.delay_before_end(steps - j), self.cruise, floor)
             for j in range(1, steps + 1)
-        ]
+        )
 
     def ramp_down(self, delay):
         """The delays that bring a motor to rest after a step made at `delay`."""
@@ -75,16 +75,42 @@ class Table:
         return [self.delay_before_end(k) for k in range(fewest - 1, -1, -1)]
 
     def onward(self, delay, steps, floor):
-        """The delays of `steps` more after one made at `delay`, to rest."""
+        """The delays of `steps` more after one made at `delay`, to rest, one after the other."""
         a = next(i for i in range(len(self.accel) + 1) if self.delay_from_start(i) <= delay)
         if self.delay_from_start(a) == delay:
             a += 1
-        floors = [min(floor, down) for down in self.ramp_down(delay)]
-        floors += [floor] * (steps - len(floors))
-        return [
-            max(self.delay_from_start(a + j - 1), self.delay_before_end(steps - j), self.cruise, floors[j - 1])
-            for j in range(1, steps + 1)
-        ]
+        floors = chain((min(floor, down) for down in self.ramp_down(delay)), repeat(floor))
+        return (
+            max(self.delay_from_start(a + j - 1), self.delay_before_end(steps - j), self.cruise, least)
+            for j, least in zip(range(1, steps + 1), floors)
+        )
+
+
+class Plan:
+    """Delays of steps and when these are made, worked out as far as somebody asks: a jog is planned for 2^31 steps, and
+    few of them are made."""
+
+    def __init__(self, first_ns, unit_ns):
+        self._first_ns = first_ns
+        self._unit_ns = unit_ns
+        self.delays = []
+        self.times_ns = []
+        self.go_on(0, (), 0)
+
+    def go_on(self, done, rest, count):
+        """Behind the first `done` steps there are these `count` ones."""
+        del self.delays[done:]
+        del self.times_ns[done:]
+        self._rest = iter(rest)
+        self.count = done + count
+
+    def work_out(self, until_ns):
+        """So that all steps made by then are there, and the one that runs then."""
+        last_ns = self.times_ns[-1] if self.times_ns else self._first_ns
+        while last_ns <= until_ns and (delay := next(self._rest, None)) is not None:
+            last_ns += delay * self._unit_ns
+            self.delays.append(delay)
+            self.times_ns.append(last_ns)
 
 
 class Move:
@@ -106,19 +132,25 @@ class Move:
         # From this tick on it is made of ticks.
         self.ticks_from = {"stream": self.start_tick, "table": math.inf}[event.get("moves", "stream")]
         self.goal_steps = self.from_steps + event["steps"]
+        self._plan = Plan(self.late_ns, table.unit_ns)
         self._go_to(self.goal_steps, event.get("floor", 0))
         self.result = None
         self.result_steps = None
 
+    @property
+    def delays(self):
+        self._plan.work_out(math.inf)
+        return self._plan.delays
+
     def times_ns(self):
         """The table's times of the steps, from the beginning of the start tick."""
-        delays = (delay * self.table.unit_ns for delay in self.delays)
-        return list(accumulate(delays, initial=self.late_ns))[1:]
+        self._plan.work_out(math.inf)
+        return self._plan.times_ns
 
     def _go_to(self, goal_steps, floor):
         steps = goal_steps - self.from_steps
         self.direction = 1 if steps >= 0 else -1
-        self.delays = self.table.delays(abs(steps), floor)
+        self._plan.go_on(0, self.table.delays(abs(steps), floor), abs(steps))
 
     def change(self, tick, target_steps=None, floor=0):
         """What a stop, or a new target, at `tick` makes of the rest; changes follow each other."""
@@ -128,19 +160,24 @@ class Move:
         if tick <= self.start_tick:
             self._go_to(self.from_steps if target_steps is None else target_steps, floor)
             return
-        done = bisect.bisect_right(self.times_ns(), (tick - self.start_tick) * self.tick_ns)
-        if done == len(self.delays):
+        plan = self._plan
+        until_ns = (tick - self.start_tick) * self.tick_ns
+        plan.work_out(until_ns)
+        done = bisect.bisect_right(plan.times_ns, until_ns)
+        if done == plan.count:
             return
-        running = self.delays[done]
+        running = plan.delays[done]
         rest = self.table.ramp_down(running)
+        count = len(rest)
         if target_steps is not None:
             after = (target_steps - self.from_steps) * self.direction - (done + 1)
-            if after >= len(rest):
+            if after >= count:
                 rest = self.table.onward(running, after, floor)
-        self.delays[done + 1 :] = rest
+                count = after
+        plan.go_on(done + 1, rest, count)
 
     def end_steps(self):
-        return self.from_steps + self.direction * len(self.delays)
+        return self.from_steps + self.direction * self._plan.count
 
     def end_tick(self):
         """The first tick in which the motor is at rest again."""
@@ -150,6 +187,7 @@ class Move:
     def steps(self, slots):
         """Every step: when by the table, and when by way of ticks and slots."""
         times = self.times_ns()
+        delays = self._plan.delays
         crossing = 256 if self.fine else 128
         made = 0
         q0 = 0  # position at the beginning of the tick, 1/256 step
@@ -160,11 +198,11 @@ class Move:
             q1 = 256 * after
             if self.fine and after < len(times):
                 since_ns = end_ns - (times[after - 1] if after else self.late_ns)
-                q1 += since_ns * 256 // (self.delays[after] * self.table.unit_ns)
+                q1 += since_ns * 256 // (delays[after] * self.table.unit_ns)
             if after > made:
                 last = after == len(times)
                 place = LAST_TICK if last else FIRST_TICK if tick == 0 else INTERIOR
-                bound_ns = self.bound_ns(self.delays[made : after + 1], last, q1 - q0, slots)
+                bound_ns = self.bound_ns(delays[made : after + 1], last, q1 - q0, slots)
             by_table = self.start_tick + tick < self.ticks_from
             begin_ns = (self.start_tick + tick) * self.tick_ns
             for n in range(made, after):
