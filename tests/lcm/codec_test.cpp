@@ -270,7 +270,13 @@ TEST(Codec, ResultsOf2048MotorsComeInParts) {
          .table = {.name = i % 2 == 0 ? "own" : "other", .revision = 7, .hash = "89abcdef"}});
   }
   const api::Completed reply{.outcome = api::Outcome::kLink, .reason = "r", .detail = motors};
-  const auto whole = put_together(reply, {4, 2, 0, 0, 2, 1, 3});
+  // Out of order, and some of them twice; the first comes last, before anybody could be done.
+  const std::size_t parts = encode(1, kId, reply)->size();
+  ASSERT_GE(parts, 5u);
+  std::vector<std::size_t> order{4, 2, 2, 1, 3, 4};
+  for (std::size_t part = 5; part < parts; ++part) order.push_back(part);
+  order.push_back(0);
+  const auto whole = put_together(reply, order);
   EXPECT_EQ(whole.outcome, api::Outcome::kLink);
   EXPECT_EQ(whole.reason, "r");
   const auto& arrived = std::get<std::vector<api::MotorResult>>(whole.detail);
