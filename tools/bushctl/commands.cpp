@@ -127,6 +127,7 @@ int send(const Connection& connection, const api::Request& request, Client::Unti
       accepted = accepted || std::holds_alternative<api::Accepted>(heard);
       progress.clear();
       for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
+      for (const std::string& line : rounding_lines(request, heard)) fmt::print("{}\n", line);
       std::fflush(stdout);
     };
     if (until == Client::Until::kResult && moves) {

@@ -327,4 +327,24 @@ std::vector<std::string> lines(const api::Reply& reply) {
   return {bushd::printable(repeats ? completed->reason : outcome + ": " + completed->reason)};
 }
 
+std::vector<std::string> rounding_lines(const api::Request& request, const api::Reply& reply) {
+  const auto* move = std::get_if<api::Move>(&request);
+  const auto* completed = std::get_if<api::Completed>(&reply);
+  const auto* results = completed == nullptr
+                            ? nullptr
+                            : std::get_if<std::vector<api::MotorResult>>(&completed->detail);
+  std::vector<std::string> out;
+  if (move == nullptr || results == nullptr || move->kind != api::Move::Kind::kAbsolute) return out;
+  for (std::size_t i = 0; i < results->size() && i < move->motors.size(); ++i) {
+    const api::MotorResult& result = (*results)[i];
+    const auto* asked = std::get_if<api::UserUnits>(&move->motors[i].amount);
+    if (asked == nullptr || result.outcome != api::Outcome::kReached) continue;
+    const std::string at = fmt::format("{:.{}f}", result.user, result.precision);
+    if (std::stod(at) == asked->value) continue;
+    out.push_back(fmt::format("{}: at {} {}, asked {}", bushd::printable(result.motor), at,
+                              bushd::printable(result.unit), asked->value));
+  }
+  return out;
+}
+
 }  // namespace bushctl

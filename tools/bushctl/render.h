@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "api/reply.h"
+#include "api/request.h"
 #include "client/status.h"
 
 namespace bushctl {
@@ -36,5 +37,10 @@ std::vector<std::string> lines(const bushd::api::MovePlan& plan);
 // A reply in one line per motor, or in one line where no motors are named. Nothing of Refused,
 // which is for stderr.
 std::vector<std::string> lines(const bushd::api::Reply& reply);
+
+// Of motors that reached a position which is not quite the one that they were sent to, since there
+// is no step: "theta: at 12.3448 mm, asked 12.345".
+std::vector<std::string> rounding_lines(const bushd::api::Request& request,
+                                        const bushd::api::Reply& reply);
 
 }  // namespace bushctl

@@ -87,6 +87,28 @@ TEST(Render, SpeedsAreInTheMotorsUnit) {
   EXPECT_THAT(motor_line(stage_at(0, 0), 0, 0), HasSubstr("velocity 0.25 mm/s moving"));
 }
 
+TEST(Render, TellsOfPositionsThatWereRoundedToAStep) {
+  const api::Move move{
+      .kind = api::Move::Kind::kAbsolute,
+      .motors = {{"x", api::UserUnits{12.345}}, {"y", api::UserUnits{-2.5}}, {"z", 400}}};
+  const auto reached = [](const std::string& motor, double user) {
+    return api::MotorResult{.motor = motor,
+                            .outcome = api::Outcome::kReached,
+                            .user = user,
+                            .unit = "mm",
+                            .precision = 4};
+  };
+  std::vector<api::MotorResult> results{reached("x", 12.34481), reached("y", -2.5),
+                                        reached("z", 1)};
+  const auto lines_of = [&](const api::Request& request) {
+    return rounding_lines(request, api::Completed{.reason = "r", .detail = results});
+  };
+  EXPECT_THAT(lines_of(move), testing::ElementsAre("x: at 12.3448 mm, asked 12.345"));
+  results[0].outcome = api::Outcome::kStopped;
+  EXPECT_THAT(lines_of(move), testing::IsEmpty());
+  EXPECT_THAT(lines_of(api::Stop{}), testing::IsEmpty());
+}
+
 TEST(Progress, ShowsTheWayFromWhereItWasSeenFirst) {
   Progress progress({"x", "elsewhere"});
   EXPECT_EQ(progress.text(stage_at(0, 0), 10), "x [>         ] 0 %, at 0.00 of 5.00 mm, 20 s left");
