@@ -5,6 +5,7 @@ import asyncio
 import contextlib
 import dataclasses
 import pathlib
+import re
 import signal
 import sys
 import threading
@@ -15,7 +16,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 import bushd
 import bushd.aio
 from bushd import Activity, Outcome, Trust
-from rig import FAR, EndToEndTest
+from rig import FAR, TOP, EndToEndTest
 
 SOCKET, LCM = {}, {"lcm": True}
 UNITS = 'unit = "mm"\nsteps_per_unit = 100\nsoft_limits = [-50, 50]'
@@ -251,6 +252,31 @@ class Blocking(PythonTest):
         self.assertGreater(next(states)["a0"].position_steps, 0)
         states.close()
         client.stop()
+
+
+class Documentation(PythonTest):
+    """The examples of docs/python.md, as they are but for the names of motors."""
+
+    def run_block(self, first_words):
+        blocks = re.findall(r"^```python\n(.*?)^```$", (TOP / "docs" / "python.md").read_text(), re.DOTALL | re.MULTILINE)
+        (block,) = [block for block in blocks if block.startswith(first_words)]
+        script = self.file("script.py")
+        script.write_text(block.replace("theta", "a0").replace("phi", "b0"))
+        ran = self.run_program(sys.executable, "-B", script)
+        self.assertEqual((ran.returncode, ran.stderr), (0, ""))
+        return ran.stdout
+
+    def test_the_first_program(self):
+        self.bring_up()
+        lines = self.run_block("import bushd\n").splitlines()
+        self.assertEqual(lines[:2], ["a0: reached, stands at 400 steps", "a0: 400 steps (known), rest"])
+        self.assertIn("b0: 0 steps (uncertain), rest", lines)
+
+    def test_asyncio(self):
+        self.bring_up()
+        self.survey()
+        self.run_block("import asyncio\n")
+        self.assertEqual((self.positions()["a0"] > 1, self.positions()["b0"]), (True, 2))
 
 
 class Asyncio(PythonTest):

@@ -1,9 +1,10 @@
 """What the Python client's session stands on: the whole from its parts, LCM's datagrams, arguments of callers."""
 
+import inspect
 import struct
 import unittest
 
-from bushd import Trust, arguments, codec, messages, requests, udpm
+from bushd import Trust, aio, arguments, client, codec, messages, motion, requests, session, udpm
 from bushd.status import StatusCollector
 
 
@@ -131,6 +132,23 @@ class Arguments(unittest.TestCase):
         message = requests.change_configuration("m", changes).message
         self.assertEqual(message.change_values, ["12.5", "negative", "[-5.0, 30.0]"])
         self.assertEqual(requests.change_configuration("m", {"soft_limits": None}).message.change_values, ["none"])
+
+    def test_every_request_of_the_daemon_can_be_made(self):
+        made = inspect.getsource(requests) + inspect.getsource(session)
+        asked = [name for name in dir(messages) if "request" in getattr(getattr(messages, name), "__slots__", ())]
+        self.assertGreater(len(asked), 20)
+        for name in asked:
+            self.assertIn(f"messages.{name}", made)
+
+    def test_both_faces_have_the_same_functions(self):
+        for blocking, other in ((client.Client, aio.Client), (client.Tables, aio.Tables), (client.Jog, motion.Jog),
+                                (client.Motion, motion.Motion)):
+            for name, function in vars(blocking).items():
+                if name.startswith("_") or not callable(function):
+                    continue
+                parameters = dict(inspect.signature(function).parameters)
+                self.assertEqual(parameters, dict(inspect.signature(getattr(other, name)).parameters), name)
+                self.assertTrue(function.__doc__, name)
 
     def test_names_are_a_list(self):
         with self.assertRaises(TypeError):
