@@ -258,7 +258,8 @@ class Documentation(PythonTest):
     """The examples of docs/python.md, as they are but for the names of motors."""
 
     def run_block(self, first_words):
-        blocks = re.findall(r"^```python\n(.*?)^```$", (TOP / "docs" / "python.md").read_text(), re.DOTALL | re.MULTILINE)
+        page = (TOP / "docs" / "python.md").read_text()
+        blocks = re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
         (block,) = [block for block in blocks if block.startswith(first_words)]
         script = self.file("script.py")
         script.write_text(block.replace("theta", "a0").replace("phi", "b0"))

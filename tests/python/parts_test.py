@@ -62,6 +62,13 @@ class Whole(unittest.TestCase):
         motor = collector.status()["a"]
         self.assertEqual((motor.trust, motor.position, motor.target_steps), (Trust.UNKNOWN, None, None))
 
+    def test_states_and_descriptions_of_different_configurations_are_no_whole(self):
+        collector = StatusCollector()
+        collector.add(state(0, 2))
+        collector.add(state(1, 2))
+        collector.add(description(0, 1))
+        self.assertFalse(collector.has_motors())
+
     def test_parts_beyond_all_configurations_are_dropped(self):
         collector = StatusCollector()
         for part, parts in ((0, 0), (-1, 1), (1, 1), (0, 2**31 - 1)):
@@ -141,8 +148,9 @@ class Arguments(unittest.TestCase):
             self.assertIn(f"messages.{name}", made)
 
     def test_both_faces_have_the_same_functions(self):
-        for blocking, other in ((client.Client, aio.Client), (client.Tables, aio.Tables), (client.Jog, motion.Jog),
-                                (client.Motion, motion.Motion)):
+        pairs = ((client.Client, aio.Client), (client.Tables, aio.Tables), (client.Jog, motion.Jog),
+                 (client.Motion, motion.Motion))
+        for blocking, other in pairs:
             for name, function in vars(blocking).items():
                 if name.startswith("_") or not callable(function):
                     continue

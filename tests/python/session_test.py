@@ -165,8 +165,10 @@ class OverASocket(unittest.TestCase):
         for wrong in ({"m\0": 1.0}, {"m": float("nan")}, {}):
             with self.assertRaises(ValueError):
                 requests.move(wrong, absolute=True, in_steps=False)
-        with self.assertRaises(TypeError):
-            requests.move({"m": 1.5}, absolute=True, in_steps=True)
+        for wrong in (1.5, float("inf")):
+            with self.assertRaises(ValueError):
+                requests.move({"m": wrong}, absolute=True, in_steps=True)
+        self.assertEqual(requests.move({"m": 4.0}, absolute=True, in_steps=True).message.motors[0].steps, 4)
         self.assertEqual(self.daemon.sent, [])
 
 

@@ -59,11 +59,11 @@ class _Loop:
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="bushd", daemon=True)
         self._thread.start()
-        self._closed = False
+        self.closed = False
 
     def run(self, coroutine: Coroutine[Any, Any, T]) -> T:
         """Its result. A signal's exception (Ctrl-C) cancels it, waits until it has ended, and is raised then."""
-        if self._closed:
+        if self.closed:
             coroutine.close()
             raise RuntimeError("this client is closed")
         result: concurrent.futures.Future[T] = concurrent.futures.Future()
@@ -91,9 +91,9 @@ class _Loop:
         return self.run(calls())
 
     def close(self) -> None:
-        if self._closed:
+        if self.closed:
             return
-        self._closed = True
+        self.closed = True
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
@@ -125,7 +125,7 @@ class Client:
 
     def close(self) -> None:
         """Jogs of this client ramp down. Moves that were begun with wait=False go on."""
-        if not self._loop._closed:
+        if not self._loop.closed:
             self._loop.run(self._client.close())
             self._loop.close()
 
@@ -145,7 +145,9 @@ class Client:
     def where(self, name: str) -> model.Motor: ...
     def where(self, name: str | None = None) -> dict[str, model.Motor] | model.Motor:
         """The state of this motor, or of all by name: `client.where("theta").position`. Raises UnknownMotor."""
-        return self._loop.run(self._client.where() if name is None else self._client.where(name))
+        if name is None:
+            return self._loop.run(self._client.where())
+        return self._loop.run(self._client.where(name))
 
     def status(self, timeout_s: float = 3.0) -> model.Status:
         """All motors and MCUs, as they are now. Raises NoDaemon if it is not complete within this time."""
@@ -165,7 +167,7 @@ class Client:
             while True:
                 yield self._loop.run(anext(states))  # type: ignore[arg-type]  # it is a coroutine
         finally:
-            if not self._loop._closed:
+            if not self._loop.closed:
                 self._loop.run(states.aclose())  # type: ignore[attr-defined]
 
     # -- motion

@@ -11,6 +11,7 @@ import datetime
 import enum
 import math
 import struct
+from collections.abc import Callable
 from typing import Any
 
 from . import messages, model
@@ -114,7 +115,7 @@ def encode(message: Any) -> bytes:
     try:
         payload: bytes = message.encode()
     except struct.error as error:
-        raise ValueError(f"a number is too large for the request: {error}") from None
+        raise ValueError(f"a number does not fit the request: {error}") from None
     if len(payload) > MAX_MESSAGE_BYTES:
         raise ValueError(f"the request takes {len(payload)} bytes; at most {MAX_MESSAGE_BYTES} fit a message")
     return payload
@@ -140,10 +141,9 @@ def decode(channel: str, payload: bytes) -> Message | None:
         # lcm-gen's decoder takes negative counts, texts that are cut off and what is left over; no encoder makes them.
         if message.encode() != payload:
             return None
-        parsed: Message = parse(message)
-    except (ValueError, OverflowError, IndexError, AttributeError, struct.error):
+        return parse(message)
+    except (ValueError, OverflowError, IndexError, struct.error):
         return None
-    return parsed
 
 
 _STATE_FINGERPRINT: bytes = messages.mcu_state_t._get_packed_fingerprint()
@@ -339,7 +339,7 @@ def _mcu_health(message: Any) -> model.McuHealth:
     return model.McuHealth(**values)
 
 
-_DECODERS = {
+_DECODERS: dict[str, tuple[Any, Callable[[Any], Message]]] = {
     "WELCOME": (messages.welcome_t, _welcome),
     "REPLY": (messages.answer_t, _answer),
     "TABLE_REPLY": (messages.table_answer_t, _table_answer),

@@ -126,6 +126,8 @@ class Jog:
 
     async def change(self, speed: float) -> None:
         """Another speed, signed; the motor slows down, speeds up, or ramps down and comes back. Raises Refused."""
+        if self.done:
+            raise BushdError(f"{self._name}: the jog has ended: {self.result.reason}")
         exchange = self._driver.session.begin(self._request(speed), self._driver.now())
         await finish(self._driver, exchange)
         arguments.result_of(exchange, check=True)

@@ -174,10 +174,18 @@ def _amount(motor: str, value: float, in_steps: bool) -> Any:
     amount.motor = codec.text(motor)
     amount.in_steps = in_steps
     if in_steps:
-        amount.steps = operator.index(value)  # type: ignore[arg-type]  # a fraction of a step is an error
+        amount.steps = _whole(motor, value)
     else:
         amount.user = codec.finite(float(value))
     return amount
+
+
+def _whole(motor: str, steps: float) -> int:
+    """A number of steps may come as 400.0, from an array."""
+    whole = steps if isinstance(steps, int) else int(codec.finite(float(steps)))
+    if whole != steps:
+        raise ValueError(f"{motor}: {steps} is no whole number of steps")
+    return whole
 
 
 def _put_amounts(message: Any, amounts: Amounts, in_steps: bool) -> None:

@@ -52,7 +52,8 @@ class StatusCollector:
         return expected - len(parts)
 
     def has_motors(self) -> bool:
-        return self._missing(self._states) == 0 and self._missing(self._descriptions) == 0
+        complete = self._missing(self._states) == 0 and self._missing(self._descriptions) == 0
+        return complete and len(self._states) == len(self._descriptions)
 
     def has_health(self) -> bool:
         return self._missing(self._healths) == 0

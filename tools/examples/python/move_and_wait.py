@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Example of a client in Python: moves motors as one group and waits until all stand.
 
-Needs the package bushd: python3-bushd, or PYTHONPATH=build/release/lib/python in the source tree. Exit code 0 only if all
-motors have reached their targets. Ctrl-C ramps them down.
+Needs the package bushd: python3-bushd, or PYTHONPATH=build/release/lib/python in the source tree. Exit code 0 only if
+all motors have reached their targets. Ctrl-C ramps them down.
 """
 
 import argparse

@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Example in Python: prints how well each MCU does, once a second, until interrupted. Needs what move_and_wait.py needs."""
+"""Example in Python: prints how well each MCU does, once a second, until interrupted.
+
+Needs what move_and_wait.py needs.
+"""
 
 import argparse
 import itertools
