@@ -125,12 +125,14 @@ void Jogs::change(std::int64_t now_us, const api::Asker& asker, MotorId id, cons
                                   .detail = {}});
   }
   const bool again = std::exchange(jog.ends, false);
+  jog.let_go = false;
   jog.after.reset();
   const bool same = course.direction == jog.course.direction && course.floor == jog.course.floor;
   asker.answer(api::Accepted{});
   if (!same || again) {
     jog.course = course;
     say_limit(id);
+    open_.say(id, api::Outcome::kStopped, {api::Outcome::kStopped, motion::kOnRequest});
     moves_.redirect(now_us, id, course.target, course.floor);
   }
   asker.answer(done(installation_[id].name() + (same && !again ? ": renewed" : ": changed")));

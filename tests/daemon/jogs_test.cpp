@@ -161,6 +161,27 @@ TEST(Jogs, WhoIsStoppedByOthersMustLetGoFirst) {
   EXPECT_EQ(lab.wait(again).result, "stopped");
 }
 
+// What was said of an end that its client has taken back is no longer true.
+TEST(Jogs, TakenUpAgainAreStoppedByOthersAsEver) {
+  for (const bool silent : {false, true}) {
+    SCOPED_TRACE(silent);
+    Lab lab(lab_with(""));
+    lab.connect();
+    const auto first = lab.send_as("remote", jog(2000));
+    lab.run_for(silent ? 0.52 : 0.4);
+    if (!silent) lab.send_as("remote", jog(0));
+    lab.run_for(0.02);
+    EXPECT_EQ(lab.wait(lab.send_as("remote", jog(2000))).reason, "m01: changed");
+    lab.run_for(0.2);
+    const auto stop = lab.send(Ask::kStop, {"m01"});
+    EXPECT_EQ(lab.wait(stop).result, "done");
+    EXPECT_EQ(lab.last_reply(first).result, "stopped");
+    EXPECT_THAT(lab.last_reply(first).reason,
+                HasSubstr("m01: stopped on request, asked for by command"));
+    EXPECT_THAT(lab.wait(lab.send_as("remote", jog(2000))).reason, HasSubstr("let go first"));
+  }
+}
+
 TEST(Jogs, OfAnotherClientTakeOver) {
   Lab lab(lab_with(""));
   lab.connect();
