@@ -73,7 +73,9 @@ Result<Jogs::Course> Jogs::course_of(MotorId id, const api::Jog& request) const 
   const bool mirrored = !request.in_steps && motor.coordinates().scale().negative;
   const int direction = (request.per_s > 0) != mirrored ? 1 : -1;
   const std::int64_t target = motor.farthest(direction, *floor);
-  if (target == motor.position_steps() && !motor.has_plan()) {
+  // Beyond it, one that moves back would turn round.
+  const bool beyond = !motor.stands_within_soft_limits();
+  if (target == motor.position_steps() && (beyond || !motor.has_plan())) {
     return fail("stands at or beyond its soft limit, at " +
                 motor.coordinates().text(motor.position_steps()) + "; jog it the other way");
   }

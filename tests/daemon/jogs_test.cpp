@@ -182,6 +182,19 @@ TEST(Jogs, TakenUpAgainAreStoppedByOthersAsEver) {
   }
 }
 
+TEST(Jogs, AwayFromTheRangeAreRefusedInMotionToo) {
+  Lab lab(lab_with(kInMm));
+  lab.connect();
+  lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {6000}));
+  const auto first = lab.send(jog(-1000));
+  lab.run_for(0.4);
+  const Answer refused = lab.wait(lab.send(jog(1000)));
+  EXPECT_EQ(refused.result, "refused");
+  EXPECT_THAT(refused.reason, HasSubstr("beyond its soft limit"));
+  EXPECT_EQ(lab.wait(first).result, "stopped");
+  EXPECT_LT(lab.motor("m01").position_steps, 6000);
+}
+
 TEST(Jogs, OfAnotherClientTakeOver) {
   Lab lab(lab_with(""));
   lab.connect();
