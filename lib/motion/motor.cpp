@@ -404,7 +404,7 @@ std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {
 
 event::Ended Motor::ended(Outcome outcome, std::string reason) {
   const bool was_armed = is<Armed>();
-  const bool was_paused = pause_ == Pause::kStands || pause_ == Pause::kOver;
+  const bool was_paused = rests_in_pause();
   further_.clear();
   pause_ = Pause::kNo;
   axis_.finish();
