@@ -357,8 +357,8 @@ event::Ended Motor::end_at_limit() {
 
 // It stands, and not by its plan.
 event::Ended Motor::end_by_fault(const bushd_report& report) {
-  // One that has not made a step cannot overrun.
-  const bool stepped = position_ != axis_.from_steps();
+  // One that has not made a step, or stood, cannot overrun.
+  const bool stepped = position_ != axis_.from_steps() && !rests_in_pause();
   const std::string mcu = "MCU " + setup_.mcu;
   if (const Moving* moving = as<Moving>(); moving != nullptr && moving->position_mismatch) {
     return ended(Outcome::kFault, *uncertain_reason_ + "; check the position and set it");

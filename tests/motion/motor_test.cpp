@@ -250,6 +250,20 @@ TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
   EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("stopped immediately by an emergency stop"));
 }
 
+// It stood: no step can be lost.
+TEST_F(MotorTest, AnEmergencyStopLeavesAPausedMotorKnown) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  motor.pause();
+  motor.change(kStart + 30);
+  EXPECT_NE(find<event::Paused>(report(motor.axis().end_tick())), nullptr);
+  mcu.faults = BUSHD_FAULT_EMERGENCY;
+  const auto events = report(motor.axis().end_tick() + 10);
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
+  EXPECT_FALSE(motor.uncertain_reason());
+}
+
 TEST_F(MotorTest, HomingKeepsOthersAwayAndMakesThePositionKnown) {
   motor.goes_online(mcu, false, true);
   EXPECT_THAT(refusal(1), HasSubstr("MCU hall:1 restarted"));
