@@ -343,7 +343,7 @@ event::Ended Motor::end_at_limit() {
   if (!axis_.stopping() && further_.empty() && position_ == axis_.target_steps()) {
     return ended(Outcome::kReached, kAtTarget);
   }
-  if (axis_.stopping() && position_ == axis_.executed_steps()) {
+  if (axis_.stopping() && !is_paused() && position_ == axis_.executed_steps()) {
     return ended(Outcome::kStopped, kOnRequest);
   }
   std::string reason = "stopped by " + switch_at(std::get<Moving>(activity_).limit) +
