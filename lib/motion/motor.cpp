@@ -69,7 +69,7 @@ std::int64_t Motor::target_steps() const {
 }
 
 void Motor::stop(std::optional<std::string> ended_by) {
-  pause_ = stands_paused() ? Pause::kOver : Pause::kNo;
+  pause_ = rests_in_pause() ? Pause::kOver : Pause::kNo;
   if (is<Moving>()) axis_.stop();
   if (auto* armed = std::get_if<Armed>(&activity_)) {
     armed->stops = true;

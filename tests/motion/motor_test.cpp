@@ -250,6 +250,20 @@ TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
   EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("stopped immediately by an emergency stop"));
 }
 
+TEST_F(MotorTest, OneThatIsStoppedTwiceInAPauseStood) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  motor.pause();
+  motor.change(kStart + 30);
+  const Tick end = motor.axis().end_tick();
+  EXPECT_NE(find<event::Paused>(report(end)), nullptr);
+  motor.stop();
+  motor.stop();
+  const auto events = report(end + 10);
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_TRUE(find<event::Ended>(events)->was_paused) << "its end has been told";
+}
+
 // It stood: no step can be lost.
 TEST_F(MotorTest, AnEmergencyStopLeavesAPausedMotorKnown) {
   motor.start(kSteps, kStart);
