@@ -287,7 +287,8 @@ void Jogs::step(std::int64_t now_us) {
 std::int64_t Jogs::next_wake_us() const {
   std::int64_t wake = INT64_MAX;
   for (const auto& [motor, jog] : jogs_) {
-    if (!jog.ends) wake = std::min(wake, jog.until_us);
+    const bool runs_down = installation_[motor].axis().stopping();
+    if (!jog.ends && !runs_down) wake = std::min(wake, jog.until_us);
   }
   return wake;
 }

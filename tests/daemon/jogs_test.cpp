@@ -182,6 +182,20 @@ TEST(Jogs, TakenUpAgainAreStoppedByOthersAsEver) {
   }
 }
 
+// While it ramps down nothing is to be done for it, also when it is renewed no more.
+TEST(Jogs, ThatOthersStopLetTheDaemonSleep) {
+  Lab lab(lab_with(""));
+  lab.connect();
+  const auto first = lab.send(jog(2500));
+  lab.run_for(0.48);
+  lab.send_as("remote", {api::Stop{{"m01"}}});
+  lab.run_for(0.04);
+  ASSERT_FALSE(lab.has_result(first)) << "it ramps down";
+  lab.core().step(lab.now_us());
+  EXPECT_GT(lab.core().next_wake_us(), lab.now_us());
+  EXPECT_EQ(lab.wait(first).result, "stopped");
+}
+
 TEST(Jogs, AwayFromTheRangeAreRefusedInMotionToo) {
   Lab lab(lab_with(kInMm));
   lab.connect();
