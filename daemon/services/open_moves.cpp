@@ -54,6 +54,11 @@ void OpenMoves::say(MotorId motor, api::Outcome outcome, Saying saying) {
   if (move) open_.at(*move).sayings.insert_or_assign({motor, outcome}, std::move(saying));
 }
 
+void OpenMoves::unsay(MotorId motor, api::Outcome outcome) {
+  const auto move = book_.move_of(motor);
+  if (move) open_.at(*move).sayings.erase({motor, outcome});
+}
+
 void OpenMoves::stopped_by(const std::vector<MotorId>& motors, const std::string& who) {
   if (book_.empty()) return;
   for (const MotorId motor : motors) {

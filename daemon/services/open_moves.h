@@ -49,6 +49,7 @@ class OpenMoves {
     std::string reason;
   };
   void say(MotorId motor, api::Outcome outcome, Saying saying);
+  void unsay(MotorId motor, api::Outcome outcome);
   // This motor's part has ended; `by_plan`: as its plan does. One that is in no open move is
   // ignored.
   void end(MotorId motor, api::Outcome outcome, const std::string& reason, bool by_plan = false);

@@ -69,7 +69,7 @@ std::int64_t Motor::target_steps() const {
 }
 
 void Motor::stop(std::optional<std::string> ended_by) {
-  pause_ = stands_paused() ? Pause::kOver : Pause::kNo;
+  pause_ = rests_in_pause() ? Pause::kOver : Pause::kNo;
   if (is<Moving>()) axis_.stop();
   if (auto* armed = std::get_if<Armed>(&activity_)) {
     armed->stops = true;
@@ -343,7 +343,7 @@ event::Ended Motor::end_at_limit() {
   if (!axis_.stopping() && further_.empty() && position_ == axis_.target_steps()) {
     return reached();
   }
-  if (axis_.stopping() && position_ == axis_.executed_steps()) {
+  if (axis_.stopping() && !is_paused() && position_ == axis_.executed_steps()) {
     return stopped();
   }
   std::string reason = "stopped by " + switch_at(std::get<Moving>(activity_).limit) +
@@ -357,8 +357,8 @@ event::Ended Motor::end_at_limit() {
 
 // It stands, and not by its plan.
 event::Ended Motor::end_by_fault(const bushd_report& report) {
-  // One that has not made a step cannot overrun.
-  const bool stepped = position_ != axis_.from_steps();
+  // One that has not made a step, or stood, cannot overrun.
+  const bool stepped = position_ != axis_.from_steps() && !rests_in_pause();
   const std::string mcu = "MCU " + setup_.mcu;
   if (const Moving* moving = as<Moving>(); moving != nullptr && moving->position_mismatch) {
     return ended(Outcome::kFault, *uncertain_reason_ + "; check the position and set it");
@@ -404,7 +404,7 @@ std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {
 
 event::Ended Motor::ended(Outcome outcome, std::string reason) {
   const bool was_armed = is<Armed>();
-  const bool was_paused = pause_ == Pause::kStands || pause_ == Pause::kOver;
+  const bool was_paused = rests_in_pause();
   further_.clear();
   pause_ = Pause::kNo;
   axis_.finish();

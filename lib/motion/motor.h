@@ -186,7 +186,7 @@ class Motor {
   bool is_paused() const { return pause_ == Pause::kRamps || stands_paused(); }
   bool stands_paused() const { return pause_ == Pause::kStands; }
   // start() is for it, not aim().
-  bool stands() const { return !has_plan() || stands_paused(); }
+  bool stands() const { return !has_plan() || rests_in_pause(); }
   void hold(bool now) { held_ = now; }
   bool is_held() const { return held_; }
   void arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor = 0);
@@ -228,6 +228,7 @@ class Motor {
   std::optional<event::Ended> end(Outcome outcome, std::string reason);
 
  private:
+  bool rests_in_pause() const { return pause_ == Pause::kStands || pause_ == Pause::kOver; }
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
