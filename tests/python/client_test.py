@@ -5,17 +5,20 @@ import asyncio
 import contextlib
 import dataclasses
 import pathlib
+import random
 import re
 import signal
 import sys
 import threading
 import unittest
+import unittest.mock
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 
 import bushd
 import bushd.aio
 from bushd import Activity, Outcome, Trust
+from bushd.links import LcmLink
 from rig import FAR, TOP, EndToEndTest
 
 SOCKET, LCM = {}, {"lcm": True}
@@ -252,6 +255,33 @@ class Blocking(PythonTest):
         self.assertGreater(next(states)["a0"].position_steps, 0)
         states.close()
         client.stop()
+
+
+class LossyLink(LcmLink):
+    """Of the datagrams, both ways, a quarter is lost, and a quarter comes twice."""
+
+    chance = random.Random(1985)
+
+    def send(self, channel, payload):
+        for _ in range(self.chance.choice([0, 1, 1, 2])):
+            super().send(channel, payload)
+
+    def receive(self):
+        for message in super().receive():
+            yield from [message] * self.chance.choice([0, 1, 1, 2])
+
+
+class OverABadNetwork(PythonTest):
+    def test_every_move_is_made_once(self):
+        self.bring_up()
+        self.survey()
+        timing = bushd.Timing(resend_every_s=0.05, ask_again_every_s=0.1, answer_within_s=60, silence_limit_s=60)
+        with unittest.mock.patch("bushd.links.LcmLink", LossyLink):
+            client = self.connect(lcm=True, timing=timing)
+        for i in range(1, 16):
+            self.assertEqual(client.move(by={"a0": 10, "b0": -1})["a0"].position_steps, 10 * i)
+        self.assertEqual(self.positions()["b0"], -15)
+        self.assert_one_result_each()
 
 
 class Documentation(PythonTest):

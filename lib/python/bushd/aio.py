@@ -335,13 +335,13 @@ class Client:
         try:
             async with asyncio.timeout(self._timing.silence_limit_s):
                 await driver.until(
-                    lambda: driver.session.end is not None
+                    lambda: driver.session.ended is not None
                     or (collector.states_heard != seen and collector.has_motors())
                 )
         except TimeoutError:
             raise NoDaemon(driver.link.remedy) from None
-        if driver.session.end is not None:
-            raise driver.session.end
+        if driver.session.ended is not None:
+            raise NoDaemon(driver.session.ended)
 
     async def _amounts(
         self, motors: str | Mapping[str, float] | None, to: Amount | None, by: Amount | None, unit: str | None

@@ -101,7 +101,7 @@ class Driver:
 
     def _flush(self) -> None:
         try:
-            while self._outbox and self.session.end is None:
+            while self._outbox and self.session.ended is None:
                 self.link.send(*self._outbox[0])
                 self._outbox.popleft()
         except BlockingIOError:
@@ -122,7 +122,7 @@ class Driver:
             self.loop.remove_writer(self.link.fileno())
 
     def _end(self, why: str) -> None:
-        if self.session.end is not None:
+        if self.session.ended is not None:
             return
         self.session.link_ended(why)
         self._outbox.clear()

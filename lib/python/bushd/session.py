@@ -74,8 +74,7 @@ class Exchange:
         return self.error is not None or self.outcome is not None
 
     def take(self, reply: Reply, now: float) -> None:
-        if self.over:
-            return
+        """Of one that is not over."""
         if reply.phase is Phase.REFUSED:
             # Who has accepted it does not refuse it: then it is no longer known what became of it.
             self.error = Refused(reply.reason) if not self.accepted else ResultUnknown(
@@ -161,7 +160,7 @@ class Session:
         self._former_run = 0
         self._welcome_run = 0  # of the first who has answered this nonce
         self._heard_two_at = float("-inf")
-        self.end: BushdError | None = None  # of the link
+        self.ended: str | None = None  # why there is no link any more
 
     # -- what is asked for
 
@@ -171,8 +170,8 @@ class Session:
         exchange = Exchange(request, self._number, now)
         self._encode(request, 0, exchange.number)
         exchange.give_up = now + self._timing.answer_within_s
-        if self.end is not None:
-            exchange.error = self.end
+        if self.ended is not None:
+            exchange.error = NoDaemon(self.ended)
             return exchange
         if not self.loses or request.repeatable:
             self._address(exchange)
@@ -192,8 +191,9 @@ class Session:
     def begin_status(self, now: float, timeout_s: float) -> StatusQuery:
         request = Request("GET_STATUS", messages.get_status_t(), repeatable=True)
         query = StatusQuery(self.once(request, self._session), now, now + timeout_s)
-        query.error = self.end
-        if query.error is None:
+        if self.ended is not None:
+            query.error = NoDaemon(self.ended)
+        else:
             self._queries.append(query)
         return query
 
@@ -228,14 +228,14 @@ class Session:
 
     def link_ended(self, why: str) -> None:
         """No message comes any more. What has come before counts."""
-        self.end = NoDaemon(why)
+        self.ended = why
         for exchange in self._open():
             if exchange.accepted:
                 exchange.error = ResultUnknown(f"{why}; what became of the command is unknown")
             else:
                 exchange.error = NoDaemon(f"{why}; it may have carried the command out" if exchange.sent else why)
         for query in self._queries:
-            query.error = self.end
+            query.error = NoDaemon(why)
         self._exchanges.clear()
         self._queries.clear()
 
