@@ -232,6 +232,14 @@ class Blocking(PythonTest):
         with self.assertRaises(bushd.NoDaemon):
             client.where()
 
+    def test_a_program_may_end_without_closing_anything(self):
+        self.bring_up()
+        script = self.start_script("client = bushd.connect()", "states = client.watch()", "next(states)",
+                                   f"motion = client.move('a0', by={FAR}, wait=False)")
+        self.assertEqual((script.process.wait(60), script.said()), (0, ""))
+        self.moves_on("a0")
+        self.command("stop")
+
     def test_threads_share_a_client(self):
         self.bring_up()
         self.survey()
@@ -353,6 +361,19 @@ class Asyncio(PythonTest):
             self.run_async(cancel(**how))
         results = [event["result"] for event in self.moves() if event["event"] == "result"]
         self.assertEqual(results, ["stopped", "stopped"])
+
+    def test_ctrl_c_ramps_down(self):
+        self.bring_up()
+        script = self.start_script(
+            "async def main():",
+            "    async with bushd.aio.connect() as client:",
+            f"        await client.move('a0', by={FAR})",
+            "asyncio.run(main())")
+        self.moves_on("a0")
+        script.end(signal.SIGINT)
+        self.assertIn("KeyboardInterrupt", script.said())
+        self.assertFalse(self.motors()["a0"]["moving"])
+        self.assertEqual([event["result"] for event in self.moves() if event["event"] == "result"], ["stopped"])
 
     def test_jogs(self):
         self.bring_up()

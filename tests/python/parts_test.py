@@ -98,8 +98,9 @@ class Datagrams(unittest.TestCase):
         receiver = udpm.Receiver()
         for data in (b"", b"LC02", b"LC02\0\0\0\0", b"LC02\0\0\0\0name without end", b"LC02\0\0\0\0\0",
                      b"LC09" + bytes(40), b"LC02\0\0\0\0" + b"n" * 64 + b"\0", b"LC02\0\0\0\0\xff\0",
-                     self.fragment(0, 0, 0, 4, b"X\0ab"), self.fragment(2, 2, 0, 4, b"X\0ab"), self.fragment(0, 1, 3, 4, b"X\0abcd"),
-                     self.fragment(0, 1, 0, 2**32 - 1, b"X\0ab"), self.fragment(0, 1, 0, 4, b"no channel"),
+                     self.fragment(0, 0, 0, 4, b"X\0ab"), self.fragment(2, 2, 0, 4, b"X\0ab"),
+                     self.fragment(0, 1, 3, 4, b"X\0abcd"), self.fragment(0, 1, 0, 2**32 - 1, b"X\0ab"),
+                     self.fragment(0, 1, 0, 4, b"no channel"),
                      self.fragment(0, 1, 0, 5, b"X\0abcd")):
             self.assertIsNone(receiver.take(data, "host"), data)
 

@@ -315,6 +315,7 @@ class OverLcm(unittest.TestCase):
         exchange = self.daemon.begin_with_session()
         self.daemon.session.abandon(exchange)
         self.assertEqual(self.daemon.wait(10), [])
+        self.assertIsInstance(exchange.error, ResultUnknown)  # whoever waits for it nevertheless does not wait for ever
 
 
 class ExactlyOnce(unittest.TestCase):

@@ -4,6 +4,7 @@ while the caller does something else."""
 from __future__ import annotations
 
 import asyncio
+import atexit
 import concurrent.futures
 import os
 import threading
@@ -60,6 +61,8 @@ class _Loop:
         self._thread = threading.Thread(target=self._loop.run_forever, name="bushd", daemon=True)
         self._thread.start()
         self.closed = False
+        # At the end of the program, as long as the thread still runs: what is ended later would wait for it in vain.
+        atexit.register(self.close)
 
     def run(self, coroutine: Coroutine[Any, Any, T]) -> T:
         """Its result. A signal's exception (Ctrl-C) cancels it, waits until it has ended, and is raised then."""
@@ -94,6 +97,7 @@ class _Loop:
         if self.closed:
             return
         self.closed = True
+        atexit.unregister(self.close)
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()

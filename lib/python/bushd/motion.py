@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 
 from . import arguments, model, requests
 from .driver import Driver
-from .errors import BushdError, ResultUnknown
+from .errors import BushdError
 from .session import Exchange, Request
 
 
@@ -139,8 +139,6 @@ class Jog:
             raise BushdError(f"{self._name}: the jog has not begun")
         self._let_go()
         await end(self._driver, exchange, self._request(0.0, steps_after))
-        if not exchange.over:
-            exchange.error = ResultUnknown(f"{self._name}: the jog's result is unknown; the motor ramps down")
         self._driver.session.abandon(exchange)
         return self.result
 

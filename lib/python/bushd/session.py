@@ -182,6 +182,8 @@ class Session:
         """Nobody waits for it any more."""
         if exchange in self._exchanges:
             self._exchanges.remove(exchange)
+        if not exchange.over:
+            exchange.error = ResultUnknown("the result was not waited for; where() shows where the motors are")
 
     def once(self, request: Request, session: int) -> Packet:
         """To be sent once, beside an exchange of this session; whether it arrives nobody waits for."""
