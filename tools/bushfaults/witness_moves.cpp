@@ -143,9 +143,7 @@ void Witness::keep_within(TimeNs now_ns, Motor& motor) {
   const auto limits = units_.limits(index_of(motor));
   if (!limits || !offset(motor) || !trusted(motor)) return;
   const std::int64_t stands = plant_steps(motor) - *offset(motor);
-  const auto& motors = states_[motor.mcu]->motors;
-  const std::int64_t said =
-      std::ranges::find(motors, motor.name, &api::MotorState::name)->position_steps;
+  const std::int64_t said = said_steps(motor);
   motor.range = Range{.low = std::min({limits->low, stands, said}) + *offset(motor),
                       .high = std::max({limits->high, stands, said}) + *offset(motor),
                       .since_ns = now_ns};
