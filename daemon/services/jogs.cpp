@@ -134,7 +134,7 @@ void Jogs::change(std::int64_t now_us, const api::Asker& asker, MotorId id, cons
   if (!same || again) {
     jog.course = course;
     say_limit(id);
-    open_.say(id, api::Outcome::kStopped, {api::Outcome::kStopped, motion::kOnRequest});
+    open_.unsay(id, api::Outcome::kStopped);
     moves_.redirect(now_us, id, course.target, course.floor);
   }
   asker.answer(done(installation_[id].name() + (same && !again ? ": renewed" : ": changed")));
@@ -210,7 +210,7 @@ void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps) {
   jog.after = Jog::After{.steps = steps, .from = from};
   jog.course.target = target;
   open_.say(id, api::Outcome::kReached, {api::Outcome::kDone, "stands " + after});
-  open_.say(id, api::Outcome::kStopped, {api::Outcome::kStopped, "stopped on request"});
+  open_.unsay(id, api::Outcome::kStopped);
   moves_.redirect(now_us, id, target, jog.course.floor);
 }
 

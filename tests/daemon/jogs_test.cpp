@@ -1,5 +1,6 @@
 // Jogs: a motor that moves on for as long as its client keeps it going, from the request to the
 // shaft.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -232,11 +233,16 @@ TEST(Jogs, EndSoManyStepsAfterTheStopEvent) {
   lab.connect();
   const auto first = lab.send(jog(250));
   EXPECT_TRUE(keep_going(lab, [&] { return lab.shaft_steps("m01") >= 300; }));
+  const std::int64_t at_event = lab.shaft_steps("m01");
   lab.send(ended_after(200));
   const Answer ended = lab.wait(first);
   EXPECT_EQ(ended.result, "done") << ended.reason;
-  EXPECT_THAT(ended.reason, HasSubstr("200 steps after the stop event"));
-  EXPECT_NEAR(static_cast<double>(lab.shaft_steps("m01")), 500, 2);
+  const std::int64_t from = lab.shaft_steps("m01") - 200;
+  EXPECT_THAT(ended.reason, HasSubstr(fmt::format("200 steps after the stop event at {:.4f} mm",
+                                                  static_cast<double>(from) / 400)));
+  // The daemon reckons where the motor is by its estimate of the MCU's clock, which is right to far
+  // less than the 4 ms of a step: at most the step that is just being made may be counted or not.
+  EXPECT_LE(std::abs(from - at_event), 1);
 }
 
 TEST(Jogs, ThatCannotEndSoSoonSaySo) {
