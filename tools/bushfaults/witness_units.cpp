@@ -111,7 +111,7 @@ bool Witness::refused_for_good_reason(const Asked& asked, const Motor& motor, st
   if (request.ask == Ask::kJog) {
     if (!trusted(motor) || !offset(motor)) return true;
     // Where it is, or was heard last.
-    const auto [low, high] = std::minmax(plant_steps(motor) - *offset(motor), said_steps(motor));
+    const auto [low, high] = std::minmax({plant_steps(motor) - *offset(motor), said_steps(motor)});
     return request.speed_micro > 0 ? high >= limits->high : low <= limits->low;
   }
   const auto target = target_asked(motor, request, i);
