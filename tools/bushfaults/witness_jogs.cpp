@@ -161,7 +161,7 @@ void Witness::check_jog_end(TimeNs now_ns, const Motor& motor, const Asked& aske
   }
   const std::string_view after = " steps after the stop event at ";
   const auto at = reason.find(after);
-  if (completed.outcome == api::Outcome::kDone && at != std::string::npos) {
+  if (at != std::string::npos && reason.find(": stands ") != std::string::npos) {
     const double from_user = std::stod(reason.substr(at + after.size()));
     const auto from =
         units_.steps_of_position(index_of(motor), std::llround(from_user * 1'000'000));
