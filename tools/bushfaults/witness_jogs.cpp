@@ -96,7 +96,8 @@ void Witness::jog_accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   if (request.speed_micro == 0) {
     if (open == nullptr) return;
     motor.stops = true;
-    open->jog->let_go = own;
+    open->jog->let_go |= own;
+    if (open->jog->ends_after) return;  // that is not put off
     open->jog->ends_after = request.steps_after;
     open->jog->ends_from = plant_steps(motor);
     return;
