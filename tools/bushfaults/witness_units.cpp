@@ -181,7 +181,8 @@ void Witness::check_approach(TimeNs now_ns, const Motor& motor, const Asked& ask
 void Witness::check_settled(TimeNs now_ns, const Motor& motor, const Asked& asked) {
   const auto& run_from = motor.run_from;
   const std::int64_t stands = plant_steps(motor);
-  if (motor.stops || motor.pauses || !run_from || stands == *run_from) return;
+  // What a stop, or a client that falls silent, ends does not wait.
+  if (asked.jog || motor.stops || motor.pauses || !run_from || stands == *run_from) return;
   const std::int64_t settle_ns = config_.motors[index_of(motor)].settle_ms * 1'000'000;
   const TimeNs since_ns = now_ns - settle_ns + 2 * config_.buses[0].tick_ns();
   if (since_ns >= now_ns ||
