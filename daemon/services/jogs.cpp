@@ -182,14 +182,15 @@ void Jogs::end(std::int64_t now_us, const api::Asker& asker, MotorId id, const a
   const bool own = jog.opened_by.is_same_client(asker);
   jog.ends = true;
   jog.let_go = own;
-  if (request.steps_after && !jog.after) return end_after(now_us, id, *request.steps_after);
+  const OpenMoves::Saying ended{own ? api::Outcome::kDone : api::Outcome::kStopped,
+                                own ? "ended by its client" : "ended by " + text_of(asker)};
+  if (request.steps_after && !jog.after) return end_after(now_us, id, *request.steps_after, ended);
   jog.after.reset();
-  ramp_down(now_us, id,
-            own ? OpenMoves::Saying{api::Outcome::kDone, "ended by its client"}
-                : OpenMoves::Saying{api::Outcome::kStopped, "ended by " + text_of(asker)});
+  ramp_down(now_us, id, ended);
 }
 
-void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps) {
+void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps,
+                     const OpenMoves::Saying& ended) {
   Jog& jog = jogs_.at(id);
   const motion::Motor& motor = installation_[id];
   const motion::Axis& axis = motor.axis();
@@ -200,7 +201,7 @@ void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps) {
   const std::string after =
       std::to_string(steps) + " steps after the stop event at " + motor.coordinates().text(from);
   if (now < axis.start_tick()) {
-    return ramp_down(now_us, id, {api::Outcome::kDone, "ended by its client before it began"});
+    return ramp_down(now_us, id, {ended.outcome, ended.reason + " before it began"});
   }
   if ((motor.farthest(direction, jog.course.floor) - target) * direction < 0) {
     return ramp_down(
@@ -209,7 +210,9 @@ void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps) {
   }
   jog.after = Jog::After{.steps = steps, .from = from};
   jog.course.target = target;
-  open_.say(id, api::Outcome::kReached, {api::Outcome::kDone, "stands " + after});
+  const bool own = jog.let_go;
+  open_.say(id, api::Outcome::kReached,
+            {ended.outcome, "stands " + after + (own ? "" : ", " + ended.reason)});
   open_.unsay(id, api::Outcome::kStopped);
   moves_.redirect(now_us, id, target, jog.course.floor);
 }

@@ -64,7 +64,9 @@ class Jogs final : public Service {
   void change(std::int64_t now_us, const api::Asker& asker, MotorId motor, const Course& course);
   void renew(std::int64_t now_us, const api::Asker& asker, MotorId motor);
   void end(std::int64_t now_us, const api::Asker& asker, MotorId motor, const api::Jog& request);
-  void end_after(std::int64_t now_us, MotorId motor, std::int64_t steps);
+  // `ended`: with which outcome, and by whom.
+  void end_after(std::int64_t now_us, MotorId motor, std::int64_t steps,
+                 const OpenMoves::Saying& ended);
   void ramp_down(std::int64_t now_us, MotorId motor, OpenMoves::Saying saying);
   // Whoever has opened it still has the motor.
   bool is_open(MotorId motor, const Jog& jog) const;

@@ -183,6 +183,21 @@ TEST(Jogs, TakenUpAgainAreStoppedByOthersAsEver) {
   }
 }
 
+TEST(Jogs, ThatAnotherClientEndsSoManyStepsAfterAreStopped) {
+  Lab lab(lab_with(""));
+  lab.connect();
+  const auto first = lab.send_as("remote", jog(1000));
+  lab.run_for(0.3);
+  EXPECT_EQ(lab.wait(lab.send(ended_after(500))).result, "done");
+  EXPECT_EQ(lab.last_reply(first).result, "stopped");
+  EXPECT_THAT(lab.last_reply(first).reason, HasSubstr("stands 500 steps after the stop event at"));
+  EXPECT_THAT(lab.last_reply(first).reason, HasSubstr("ended by command"));
+  lab.run_for(1);
+  const auto unbegun = lab.send_as("other", jog(1000));
+  lab.send(ended_after(500));
+  EXPECT_EQ(lab.wait(unbegun).result, "stopped");
+}
+
 // While it ramps down nothing is to be done for it, also when it is renewed no more.
 TEST(Jogs, ThatOthersStopLetTheDaemonSleep) {
   Lab lab(lab_with(""));

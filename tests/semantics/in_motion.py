@@ -258,8 +258,9 @@ class InMotion:
 
     def jog_back(self, motor, request, direction, limit, number):
         hull = self.hull_of_jog(motor, direction, limit)
-        # Where it could stand, it may have ended: then this would be another jog.
-        if self.run_on(motor, limit) and self.seen(motor)["moving"]:
+        # Where it could stand, it may have ended: then this would be another jog. And one from beyond its limits
+        # would be refused until it is within.
+        if self.run_on(motor, limit) and self.seen(motor)["moving"] and not motor.is_outside():
             self.ask("jog", **{**request, "speed": -request["speed"]})
             low, high = motor.step_limits() if motor.limits else (-10**9, 10**9)
             hull = (min(low, motor.steps), max(high, motor.steps))

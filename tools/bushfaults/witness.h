@@ -119,6 +119,7 @@ class Witness {
     std::optional<std::int64_t> run_from{};
     std::optional<Range> range{};  // that it does not leave, as the plant counts
     bool held = false;
+    TimeNs set_ns = -1;   // when somebody said where it stands, the last time
     int idle_checks = 0;  // of the deadlines, while no motion of it was open
     std::optional<std::int64_t> held_at{};
     bool moves() const { return move && !over; }

@@ -96,7 +96,8 @@ void Witness::jog_accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   if (request.speed_micro == 0) {
     if (open == nullptr) return;
     motor.stops = true;
-    open->jog->let_go = own;
+    open->jog->let_go |= own;
+    if (open->jog->ends_after) return;  // that is not put off
     open->jog->ends_after = request.steps_after;
     open->jog->ends_from = plant_steps(motor);
     return;
@@ -161,7 +162,7 @@ void Witness::check_jog_end(TimeNs now_ns, const Motor& motor, const Asked& aske
   }
   const std::string_view after = " steps after the stop event at ";
   const auto at = reason.find(after);
-  if (completed.outcome == api::Outcome::kDone && at != std::string::npos) {
+  if (at != std::string::npos && reason.find(": stands ") != std::string::npos) {
     const double from_user = std::stod(reason.substr(at + after.size()));
     const auto from =
         units_.steps_of_position(index_of(motor), std::llround(from_user * 1'000'000));

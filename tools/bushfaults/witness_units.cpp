@@ -111,7 +111,7 @@ bool Witness::refused_for_good_reason(const Asked& asked, const Motor& motor, st
   if (request.ask == Ask::kJog) {
     if (!trusted(motor) || !offset(motor)) return true;
     // Where it is, or was heard last.
-    const auto [low, high] = std::minmax(plant_steps(motor) - *offset(motor), said_steps(motor));
+    const auto [low, high] = std::minmax({plant_steps(motor) - *offset(motor), said_steps(motor)});
     return request.speed_micro > 0 ? high >= limits->high : low <= limits->low;
   }
   const auto target = target_asked(motor, request, i);
@@ -181,7 +181,8 @@ void Witness::check_approach(TimeNs now_ns, const Motor& motor, const Asked& ask
 void Witness::check_settled(TimeNs now_ns, const Motor& motor, const Asked& asked) {
   const auto& run_from = motor.run_from;
   const std::int64_t stands = plant_steps(motor);
-  if (motor.stops || motor.pauses || !run_from || stands == *run_from) return;
+  // What a stop, or a client that falls silent, ends does not wait.
+  if (asked.jog || motor.stops || motor.pauses || !run_from || stands == *run_from) return;
   const std::int64_t settle_ns = config_.motors[index_of(motor)].settle_ms * 1'000'000;
   const TimeNs since_ns = now_ns - settle_ns + 2 * config_.buses[0].tick_ns();
   if (since_ns >= now_ns ||
