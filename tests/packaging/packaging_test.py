@@ -42,9 +42,9 @@ class Layout(unittest.TestCase):
         cls.files = {str(path.relative_to(cls.prefix)) for path in cls.prefix.rglob("*") if not path.is_dir()}
 
     def packaged(self):
-        """What the packages take, below a prefix; the images come from builds of their own, the Python client from none."""
+        """What the packages take, below a prefix; the images come from builds of their own."""
         for file in sorted((SOURCE / "debian").glob("*.install")):
-            if file.name in ("bushd-firmware.install", "python3-bushd.install"):
+            if file.name == "bushd-firmware.install":
                 continue
             for line in file.read_text().split():
                 yield line.removeprefix("usr/").replace("lib/*/", "lib/")

@@ -1,5 +1,6 @@
 """A Debian 12 in a container: made once, booted with systemd, its network a loopback device only."""
 
+import os
 import pathlib
 import re
 import shlex
@@ -129,7 +130,9 @@ class Container:
         with open(self.folder / "console.log", "ab") as console:
             command = ["systemd-nspawn", "--quiet", "--register=no", "--keep-unit", f"--machine={self.name}"]
             command += ["--private-network", f"--directory={self.root}", "--boot"]
-            self.nspawn = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=console, stderr=console)
+            # Debian 12 has one hierarchy of cgroups, whatever this PC has: the unit's filters need it.
+            environment = {**os.environ, "SYSTEMD_NSPAWN_UNIFIED_HIERARCHY": "1"}
+            self.nspawn = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=console, stderr=console)
         self.pid1 = wait_until("PID 1 of the container", self._leader)
         return wait_until("the container to boot", self._booted)
 
