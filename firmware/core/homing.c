@@ -5,8 +5,8 @@
 //     back-off    slowly away from it until it is released
 //     approach    slowly towards it until it is active again
 //
-// A limit that comes before the switch turns the fast stage round, once: the switch is looked for on
-// the limit's far side, and backed off in the same direction as ever, so that home is where the
+// A limit that comes before the switch turns the fast stage round, once: the switch is looked for
+// on the limit's far side, and backed off in the same direction as ever, so that home is where the
 // switch becomes active towards it, wherever the motor came from.
 //
 // A run of the slow stages is one of a table with a single code. It is not shorter than a tick, so
@@ -176,8 +176,8 @@ static bool on_switch(const bushd_mcu* mcu, uint8_t m) {
   return ((pins.motors ^ mcu->inputs.inverted) & motor_bit(mcu->switches[m].home)) != 0;
 }
 
-// In which direction the fast stage begins; 0: in none. On its switch a motor has to back off. It must
-// not look for a switch that it has overrun; at another limit it may begin.
+// In which direction the fast stage begins; 0: in none. On its switch a motor has to back off. It
+// must not look for a switch that it has overrun; at another limit it may begin.
 static int8_t first_direction(const bushd_mcu* mcu, uint8_t m, int8_t direction) {
   const uint16_t bit = motor_bit(m);
   const int8_t back = (int8_t)-direction;

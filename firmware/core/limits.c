@@ -62,8 +62,7 @@ void bushd_mcu_begin_limits(bushd_mcu* mcu, uint16_t active_inputs) {
 }
 
 uint16_t bushd_mcu_forbidden(const bushd_mcu* mcu, int8_t direction) {
-  const uint16_t hit =
-      direction > 0 ? mcu->limits.hit_positive : mcu->limits.hit_negative;
+  const uint16_t hit = direction > 0 ? mcu->limits.hit_positive : mcu->limits.hit_negative;
   return hit | (at_limit(mcu, direction) & (uint16_t)~mcu->limits.both_ends);
 }
 

@@ -152,8 +152,8 @@ Result<void> read_motor_inputs(const TomlReader& reader, std::optional<bool> own
     if (auto read = read_named(reader, &inputs); !read) return read;
   }
   const std::uint8_t own = motor->output.value;
-  inputs.own = Input{.number = own,
-                     .active_open = own_open.value_or(named_active_open(inputs, own))};
+  inputs.own =
+      Input{.number = own, .active_open = own_open.value_or(named_active_open(inputs, own))};
   if (auto read = read_limit(reader, motor); !read) return read;
   const bool homes_there = motor->home && !inputs.home;
   if (homes_there) inputs.home = inputs.own;
@@ -207,9 +207,10 @@ Result<void> check_level(const Loading& loading, std::size_t index, std::size_t 
     if (!its || its->number != own->number || its->active_open) continue;
     return fail(loading.motors[index].error(
         loading.motors[index].has("input_active") ? "input_active" : "inputs",
-        fmt::format("makes input {} of MCU \"{}\" active when open, but as {} of motor \"{}\" it is "
-                    "active when closed; allowed: one level an input",
-                    own->number, loading.config.mcu_of(motor).id, use.name, other.name)));
+        fmt::format(
+            "makes input {} of MCU \"{}\" active when open, but as {} of motor \"{}\" it is "
+            "active when closed; allowed: one level an input",
+            own->number, loading.config.mcu_of(motor).id, use.name, other.name)));
   }
   return {};
 }

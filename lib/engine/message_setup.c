@@ -314,10 +314,9 @@ bushd_status bushd_decode_motor_inputs(const uint8_t* payload, size_t size,
   message->positive = get8(&r);
   message->negative = get8(&r);
   message->home = get8(&r);
-  return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU &&
-                        message->positive < BUSHD_MOTORS_PER_MCU &&
-                        message->negative < BUSHD_MOTORS_PER_MCU &&
-                        message->home < BUSHD_MOTORS_PER_MCU);
+  return finish(
+      &r, message->motor < BUSHD_MOTORS_PER_MCU && message->positive < BUSHD_MOTORS_PER_MCU &&
+              message->negative < BUSHD_MOTORS_PER_MCU && message->home < BUSHD_MOTORS_PER_MCU);
 }
 
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload) {

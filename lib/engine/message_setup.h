@@ -174,8 +174,8 @@ typedef struct bushd_set_inputs {
   bool enable_after_watchdog;  // EN as it was before a watchdog reset; else low
 } bushd_set_inputs;
 
-// Which inputs of its MCU are a motor's switches; an MCU has as many inputs as motors. One input may
-// be several of them, and a limit of several motors.
+// Which inputs of its MCU are a motor's switches; an MCU has as many inputs as motors. One input
+// may be several of them, and a limit of several motors.
 typedef struct bushd_motor_inputs {
   uint8_t motor;
   uint8_t positive;  // the limit at this end, if bushd_set_inputs says that there is one

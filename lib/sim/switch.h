@@ -1,5 +1,6 @@
 // A switch that a motor's carriage runs into: it closes when the motor comes to a position, opens a
-// few steps before it, and bounces both times. A lever that the carriage passes opens beyond it too.
+// few steps before it, and bounces both times. A lever that the carriage passes opens beyond it
+// too.
 #pragma once
 
 #include <cstdint>

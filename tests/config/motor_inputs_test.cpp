@@ -80,8 +80,8 @@ TEST(MotorInputs, BothKindsOfKeysGoTogether) {
   inputs = inputs_of(std::string("inputs = { positive = 4, negative = 5 }\n") + kHome);
   EXPECT_EQ(inputs.home, Input{15}) << "what `home` has always meant";
   // One says at which level, the other does not.
-  inputs = inputs_of(
-      std::string("inputs = { positive = { input = 15, active = \"open\" } }\n") + kHome);
+  inputs =
+      inputs_of(std::string("inputs = { positive = { input = 15, active = \"open\" } }\n") + kHome);
   EXPECT_EQ(inputs.home, (Input{.number = 15, .active_open = true}));
 }
 
@@ -115,7 +115,8 @@ TEST(MotorInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_motor("inputs = 3\n"), 37,
        "motor[1].inputs: is 3; allowed: a table such as { positive = 3,"},
       {with_motor("inputs = {}\n"), 37, "motor[1].inputs: is empty; allowed: a table such as"},
-      {with_motor("inputs = { left = 3 }\n"), 37, "motor[1].inputs.left: unknown key; allowed here: positive, negative, home, step"},
+      {with_motor("inputs = { left = 3 }\n"), 37,
+       "motor[1].inputs.left: unknown key; allowed here: positive, negative, home, step"},
       {with_motor("inputs = { positive = 16 }\n"), 37,
        "motor[1].inputs.positive: is 16; allowed: a whole number 0..15; or { input = N"},
       {with_motor("inputs = { home = -1 }\n"), 37, "motor[1].inputs.home: is -1; allowed: a whole"},

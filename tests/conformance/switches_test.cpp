@@ -1,6 +1,6 @@
-// Motors with limit and home switches at inputs of their own, an image beside its virtual twin: each
-// limit, levels, homing between limits from anywhere, with contacts that bounce, and settings over a
-// reset.
+// Motors with limit and home switches at inputs of their own, an image beside its virtual twin:
+// each limit, levels, homing between limits from anywhere, with contacts that bounce, and settings
+// over a reset.
 #include <array>
 
 #include "conformance/script.h"
@@ -126,8 +126,7 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     const bushd_report report = master_.poll(kReal);
     EXPECT_EQ(report.homing, BUSHD_HOMING_DONE);
     EXPECT_EQ(report.homed, bit(kMotor));
-    const std::int64_t off =
-        stages_[1].position_steps() - at - report.motor[kMotor].position_steps;
+    const std::int64_t off = stages_[1].position_steps() - at - report.motor[kMotor].position_steps;
     EXPECT_LE(std::abs(off), 1) << "the counter is 0 where the switch closes";
     EXPECT_LE(std::abs(stages_[1].position_steps() - at), 2);
   }

@@ -119,9 +119,10 @@ TEST_P(MotorInputs, TheHomeSwitchIsFoundFromEitherSideAndFromEitherLimit) {
 }
 
 TEST_P(MotorInputs, ALimitMayBeTheHomeSwitch) {
-  Lab lab(lab_with(GetParam(), "inputs = { positive = 9, negative = { input = 14, active = \"open\" }, "
-                               "home = { input = 14, active = \"open\" } }\n" +
-                                   kHomes));
+  Lab lab(lab_with(GetParam(),
+                   "inputs = { positive = 9, negative = { input = 14, active = \"open\" }, "
+                   "home = { input = 14, active = \"open\" } }\n" +
+                       kHomes));
   furnish(lab.bus(0).mcu(0), 100'000);
   lab.connect();
   const Answer result = lab.wait(lab.send(Ask::kHome, {"m01"}));
@@ -138,7 +139,8 @@ TEST(MotorInputsTold, ASwitchThatIsNotBetweenTheLimits) {
   lab.connect();
   const Answer result = lab.wait(lab.send(Ask::kHome, {"m01"}), 60);
   EXPECT_EQ(result.result, "fault");
-  EXPECT_THAT(result.reason, HasSubstr("was not found within home.most_steps, or up to its limits"));
+  EXPECT_THAT(result.reason,
+              HasSubstr("was not found within home.most_steps, or up to its limits"));
   EXPECT_GE(lab.shaft_steps("m01"), kEnd) << "it has turned";
   EXPECT_EQ(result.position_steps.at(0), lab.shaft_steps("m01"));
 }

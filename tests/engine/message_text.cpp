@@ -277,11 +277,11 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {"identify",        "identity",  "configure",   "table_begin",     "table_data",
-          "table_end",       "assign",    "control",     "set_position",    "poll",
-          "report",          "sync",      "ticks",       "acknowledgement", "table_ticks",
-          "table_run",       "emergency", "set_address", "get_tables",      "tables",
-          "set_inputs",      "emission",  "home",        "local",           "trigger",
+  return {"identify",         "identity",    "configure",   "table_begin",     "table_data",
+          "table_end",        "assign",      "control",     "set_position",    "poll",
+          "report",           "sync",        "ticks",       "acknowledgement", "table_ticks",
+          "table_run",        "emergency",   "set_address", "get_tables",      "tables",
+          "set_inputs",       "emission",    "home",        "local",           "trigger",
           "position_compare", "motor_inputs"};
 }
 

@@ -125,7 +125,7 @@ void add_switches(bushd::config::Config& config, std::uint64_t seed) {
   for (const bushd::config::Motor& motor : config.motors) ++next_free[motor.mcu.value];
   for (bushd::config::Motor& motor : config.motors) {
     std::uint8_t& free = next_free[motor.mcu.value];
-    if (!motor.home || free + 2 > BUSHD_MOTORS_PER_MCU || random.one_in(4)) continue;
+    if (!motor.home || free + 2u > BUSHD_MOTORS_PER_MCU || random.one_in(4)) continue;
     motor.inputs.positive = {.number = free++, .active_open = random.one_in(2)};
     motor.inputs.negative = {.number = free++, .active_open = random.one_in(2)};
     const bool at_limit = random.one_in(3);

@@ -109,8 +109,7 @@ Result<std::vector<SwitchAt>> parse_switches(const std::vector<std::string>& cho
     const bool has_sign = has_output && read.ec == std::errc{} && end - read.ptr > 2 &&
                           *read.ptr == '@' && (*sign == '-' || *sign == '+');
     if (has_sign) read = std::from_chars(*sign == '+' ? sign + 1 : sign, end, one.options.at_steps);
-    if (!has_sign || read.ec != std::errc{} || read.ptr != end || one.output > 15 ||
-        input > 15) {
+    if (!has_sign || read.ec != std::errc{} || read.ptr != end || one.output > 15 || input > 15) {
       return fault(
           "must be ADDRESS.OUTPUT@-STEPS or ADDRESS.OUTPUT@+STEPS, with an output 0..15, or "
           "ADDRESS.OUTPUT:INPUT@.. with an input 0..15");
