@@ -1,7 +1,9 @@
 // Motors with limit and home switches at inputs of their own, an image beside its virtual twin:
 // each limit, levels, homing between limits from anywhere, with contacts that bounce, and settings
 // over a reset.
-#include <array>
+#include <cstdlib>
+#include <utility>
+#include <vector>
 
 #include "conformance/script.h"
 #include "sim/switch.h"
@@ -19,10 +21,11 @@ constexpr std::uint16_t bit(unsigned n) {
   return static_cast<std::uint16_t>(1u << n);
 }
 
-// What stands at the motor of one MCU, by the pins of that.
+// What stands at the motor, by the pins of the twin: a step of both is not at just the same time,
+// and the contacts are to say the same to both.
 class Stage {
  public:
-  Stage(std::size_t mcu, std::int64_t home_at_steps) : mcu_(mcu) {
+  explicit Stage(std::int64_t home_at_steps) {
     put(kPositive, {.at_steps = kEnd, .positive_end = true, .seed = 1});
     put(kNegative, {.at_steps = -kEnd, .seed = 2, .opens = true});
     put(kHome, {.at_steps = home_at_steps, .seed = 3, .width_steps = 80});
@@ -31,7 +34,7 @@ class Stage {
   bushd_inputs sense(TimeNs now_ns, const std::vector<Edge>& edges) {
     for (; seen_ < edges.size(); ++seen_) {
       const Edge& edge = edges[seen_];
-      if (edge.mcu != mcu_ || edge.index != kMotor) continue;
+      if (edge.mcu != 0 || edge.index != kMotor) continue;
       if (edge.signal == Signal::kDir) positive_ = edge.level;
       if (edge.signal == Signal::kStep && edge.level) position_steps_ += positive_ ? 1 : -1;
     }
@@ -51,7 +54,6 @@ class Stage {
     contacts_.emplace_back(input, Switch(options));
   }
 
-  std::size_t mcu_;
   std::vector<std::pair<std::uint8_t, Switch>> contacts_;
   std::size_t seen_ = 0;
   bool positive_ = false;
@@ -83,9 +85,7 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
   // Inputs are looked at once a tick: they change for both in the same one.
   void sense() {
     bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4);
-    for (std::size_t mcu = 0; mcu < 2; ++mcu) {
-      bus_.node(mcu).set_inputs(stages_[mcu].sense(bus_.now_ns(), recorder_.edges));
-    }
+    set_inputs(stage_.sense(bus_.now_ns(), recorder_.edges));
   }
 
   void pass_until_rest() {
@@ -104,7 +104,7 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     ASSERT_NO_FATAL_FAILURE(pass_until_rest());
   }
   void go_to(std::int64_t place) {
-    const std::int64_t way = place - stages_[1].position_steps();
+    const std::int64_t way = place - stage_.position_steps();
     if (way == 0) return;
     go(way > 0 ? 1 : -1, static_cast<std::uint32_t>(std::abs(way)));
   }
@@ -126,9 +126,9 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     const bushd_report report = master_.poll(kReal);
     EXPECT_EQ(report.homing, BUSHD_HOMING_DONE);
     EXPECT_EQ(report.homed, bit(kMotor));
-    const std::int64_t off = stages_[1].position_steps() - at - report.motor[kMotor].position_steps;
+    const std::int64_t off = stage_.position_steps() - at - report.motor[kMotor].position_steps;
     EXPECT_LE(std::abs(off), 1) << "the counter is 0 where the switch closes";
-    EXPECT_LE(std::abs(stages_[1].position_steps() - at), 2);
+    EXPECT_LE(std::abs(stage_.position_steps() - at), 2);
   }
 
   void expect_alike() {
@@ -142,7 +142,7 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     EXPECT_EQ(report.homing, expected.homing);
   }
 
-  std::array<Stage, 2> stages_{Stage(0, kHomeAt), Stage(1, kHomeAt)};
+  Stage stage_{kHomeAt};
 };
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Switches);
 INSTANTIATE_TEST_SUITE_P(Of, Switches, testing::ValuesIn(targets()),
@@ -156,8 +156,8 @@ TEST_P(Switches, EachLimitStopsItsDirection) {
     EXPECT_EQ(report.forbidden_positive, direction > 0 ? bit(kMotor) : 0);
     EXPECT_EQ(report.forbidden_negative, direction < 0 ? bit(kMotor) : 0);
     EXPECT_EQ(report.inputs, bit(direction > 0 ? kPositive : kNegative));
-    EXPECT_GE(stages_[1].position_steps() * direction, kEnd);
-    EXPECT_LE(stages_[1].position_steps() * direction, kEnd + 60) << "its ramp";
+    EXPECT_GE(stage_.position_steps() * direction, kEnd);
+    EXPECT_LE(stage_.position_steps() * direction, kEnd + 60) << "its ramp";
     expect_alike();
   }
 }
@@ -186,7 +186,7 @@ TEST_P(Switches, NoHomeBetweenTheLimits) {
   ASSERT_NO_FATAL_FAILURE(home(1));
   EXPECT_EQ(master_.poll(kReal).homing, BUSHD_HOMING_NOT_FOUND);
   EXPECT_EQ(master_.poll(kReal).forbidden_negative, bit(kMotor));
-  EXPECT_LE(stages_[1].position_steps(), -kEnd);
+  EXPECT_LE(stage_.position_steps(), -kEnd);
   expect_alike();
 }
 
