@@ -130,7 +130,6 @@ void add_switches(bushd::config::Config& config, std::uint64_t seed) {
     motor.inputs.negative = {.number = free++, .active_open = random.one_in(2)};
     const bool at_limit = random.one_in(3);
     if (at_limit) motor.inputs.home = limit_of(motor, motor.home->positive);
-    motor.limit_action = random.one_in(2) ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP;
   }
 }
 
