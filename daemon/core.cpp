@@ -23,7 +23,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       stops_(installation_, moves_, homing_, open_moves_),
       jogs_(installation_, interlocks_, moves_, open_moves_),
       pauses_(installation_, interlocks_, moves_, open_moves_),
-      emergency_stop_(installation_, interlocks_, homing_, outputs),
+      emergency_stop_(installation_, interlocks_, homing_, open_moves_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
       trigger_(installation_, interlocks_, moves_, open_moves_),
@@ -61,7 +61,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
   open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
     const motion::Motor& motor = installation_[ended.motor];
     kept_.past({.motor = motor.name(),
-                .what = ended.what,
+                .what = std::string(word(ended.purpose)),
                 .who = text_of(ended.asker),
                 .from_steps = ended.from_steps,
                 .to_steps = motor.position_steps(),
@@ -89,39 +89,9 @@ void Core::receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t>
 }
 
 void Core::request(std::int64_t now, const api::Asker& asker, const api::Request& request) {
-  note_stop(asker, request);
+  // Whoever stops motors stops those as well that are about to begin.
+  departures_.cancel_by(request);
   if (!departures_.hold(now, asker, request)) carry_out(now, asker, request);
-}
-
-// Whoever stops motors stops those as well that are about to begin; and results say who it was.
-void Core::note_stop(const api::Asker& asker, const api::Request& request) {
-  if (const auto* pause = std::get_if<api::Pause>(&request)) {
-    const auto paused = installation_.find_with_groups(pause->motors);
-    if (paused) departures_.cancel(*paused);
-    return;
-  }
-  if (const auto* jog = std::get_if<api::Jog>(&request)) {
-    const auto motor = installation_.find(jog->motor);
-    if (motor && jog->per_s == 0 && !jog->renew) departures_.cancel_jogs(*motor);
-    return;
-  }
-  Result<std::vector<MotorId>> motors;
-  const bool disarms = std::holds_alternative<api::Disarm>(request);
-  if (const auto* stop = std::get_if<api::Stop>(&request)) {
-    motors = installation_.find_or_all(stop->motors);
-  } else if (disarms) {
-    motors = installation_.find_or_all(std::get<api::Disarm>(request).motors);
-  } else if (std::holds_alternative<api::EmergencyStop>(request)) {
-    motors = installation_.find_or_all({});
-  }
-  if (!motors) return;
-  departures_.cancel(*motors);
-  if (open_moves_.empty()) return;
-  const std::string who = text_of(asker);
-  for (const MotorId motor : *motors) {
-    if (disarms && !installation_[motor].is<motion::Armed>()) continue;
-    open_moves_.stopped_by(motor, who);
-  }
 }
 
 void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Request& request) {
@@ -183,11 +153,10 @@ std::int64_t Core::next_wake_us() const {
 
 void Core::shut_down(std::int64_t now_us) {
   installation_.shutting_down = true;
-  departures_.cancel(*installation_.find_or_all({}));
-  for (const MotorId motor : installation_.motors()) {
-    open_moves_.stopped_by(motor, "the daemon, which ends");
-  }
-  stops_.stop(now_us, *installation_.find_or_all({}));
+  const std::vector<MotorId> all = *installation_.find_or_all({});
+  departures_.cancel(all);
+  open_moves_.stopped_by(all, "the daemon, which ends");
+  stops_.stop(now_us, all);
 }
 
 }  // namespace bushd::daemon

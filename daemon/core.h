@@ -87,7 +87,6 @@ class Core {
 
  private:
   void carry_out(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
-  void note_stop(const api::Asker& asker, const api::Request& request);
 
   Outputs& outputs_;
   Installation installation_;

@@ -99,6 +99,22 @@ void Departures::cancel(const std::vector<MotorId>& motors) {
   cancel_if([&](const Held& held) { return has_common(held.motors, motors); });
 }
 
+void Departures::cancel_by(const api::Request& request) {
+  if (const auto* jog = std::get_if<api::Jog>(&request)) {
+    const auto motor = installation_.find(jog->motor);
+    if (motor && jog->per_s == 0 && !jog->renew) cancel_jogs(*motor);
+    return;
+  }
+  const auto motors = std::visit(
+      Overloaded{[&](const api::Stop& r) { return installation_.find_or_all(r.motors); },
+                 [&](const api::Disarm& r) { return installation_.find_or_all(r.motors); },
+                 [&](const api::Pause& r) { return installation_.find_with_groups(r.motors); },
+                 [&](const api::EmergencyStop&) { return installation_.find_or_all({}); },
+                 [](const auto&) -> Result<std::vector<MotorId>> { return {}; }},
+      request);
+  if (motors) cancel(*motors);
+}
+
 void Departures::cancel_jogs(MotorId motor) {
   cancel_if([motor](const Held& held) {
     return std::holds_alternative<api::Jog>(held.request) && held.motors.front() == motor;

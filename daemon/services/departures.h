@@ -32,10 +32,10 @@ class Departures final : public Service {
 
   // Whether the request is kept here. It is carried out, or refused, in a later step.
   bool hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
-  // Those of these motors are refused: they are being stopped.
+  // Refuses those whose motors this request stops, if it is one that stops motors.
+  void cancel_by(const api::Request& request);
+  // Refuses those of these motors: they are being stopped.
   void cancel(const std::vector<MotorId>& motors);
-  // Jogs of this motor only.
-  void cancel_jogs(MotorId motor);
   bool empty() const { return held_.empty(); }
   bool holds(MotorId motor) const { return any_held({motor}); }
 
@@ -54,6 +54,7 @@ class Departures final : public Service {
   bool any_held(const std::vector<MotorId>& motors) const;
   Result<bool> make_ready(std::int64_t now_us, const Held& held);
   void refuse(const Held& held, const std::string& reason);
+  void cancel_jogs(MotorId motor);
   void cancel_if(const std::function<bool(const Held&)>& concerned);
 
   const Installation& installation_;

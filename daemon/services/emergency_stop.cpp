@@ -10,8 +10,8 @@ constexpr std::int64_t kConfirmUs = 5'000'000;
 }  // namespace
 
 EmergencyStop::EmergencyStop(Installation& installation, Interlocks& interlocks,
-                             HomingQueue& homing, Outputs& outputs)
-    : installation_(installation), homing_(homing), outputs_(outputs) {
+                             HomingQueue& homing, OpenMoves& open_moves, Outputs& outputs)
+    : installation_(installation), homing_(homing), open_moves_(open_moves), outputs_(outputs) {
   interlocks.add([this]() -> Result<void> {
     if (!under_way()) return {};
     return fail("an emergency stop is under way; wait for its result");
@@ -24,6 +24,7 @@ void EmergencyStop::request(std::int64_t now_us, const api::Asker& asker,
   outputs_.log(LogLevel::kWarning,
                "emergency stop, commanded by " +
                    (asker.session ? asker.session->text() : std::string("the daemon")));
+  open_moves_.stopped_by(*installation_.find_or_all({}), text_of(asker));
   for (const BusId id : installation_.buses()) {
     Bus& bus = installation_[id];
     bus.master.emergency_stop(bus.config.emergency_stop);

@@ -21,7 +21,7 @@ class EmergencyStop final : public Service {
   static constexpr std::size_t kMaxOpen = 256;
 
   EmergencyStop(Installation& installation, Interlocks& interlocks, HomingQueue& homing,
-                Outputs& outputs);
+                OpenMoves& open_moves, Outputs& outputs);
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::EmergencyStop& request);
 
@@ -43,6 +43,7 @@ class EmergencyStop final : public Service {
 
   Installation& installation_;
   HomingQueue& homing_;
+  OpenMoves& open_moves_;
   Outputs& outputs_;
   std::list<Stopping> open_;
 };

@@ -83,7 +83,7 @@ void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
   const auto motors = motors_of(request);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
-  open_.open(asker, *motors, "home");
+  open_.open(asker, *motors, OpenMoves::Purpose::kHome);
   if (request.all) sequence_.emplace();
   for (const MotorId motor : *motors) {
     Task task{.motor = motor, .floor = *floor_of(motor, request.speed)};

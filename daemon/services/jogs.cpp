@@ -73,7 +73,9 @@ Result<Jogs::Course> Jogs::course_of(MotorId id, const api::Jog& request) const 
   const bool mirrored = !request.in_steps && motor.coordinates().scale().negative;
   const int direction = (request.per_s > 0) != mirrored ? 1 : -1;
   const std::int64_t target = motor.farthest(direction, *floor);
-  if (target == motor.position_steps() && !motor.has_plan()) {
+  // Beyond it, one that moves back would turn round.
+  const bool beyond = !motor.stands_within_soft_limits();
+  if (target == motor.position_steps() && (beyond || !motor.has_plan())) {
     return fail("stands at or beyond its soft limit, at " +
                 motor.coordinates().text(motor.position_steps()) + "; jog it the other way");
   }
@@ -125,12 +127,14 @@ void Jogs::change(std::int64_t now_us, const api::Asker& asker, MotorId id, cons
                                   .detail = {}});
   }
   const bool again = std::exchange(jog.ends, false);
+  jog.let_go = false;
   jog.after.reset();
   const bool same = course.direction == jog.course.direction && course.floor == jog.course.floor;
   asker.answer(api::Accepted{});
   if (!same || again) {
     jog.course = course;
     say_limit(id);
+    open_.unsay(id, api::Outcome::kStopped);
     moves_.redirect(now_us, id, course.target, course.floor);
   }
   asker.answer(done(installation_[id].name() + (same && !again ? ": renewed" : ": changed")));
@@ -206,7 +210,7 @@ void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps) {
   jog.after = Jog::After{.steps = steps, .from = from};
   jog.course.target = target;
   open_.say(id, api::Outcome::kReached, {api::Outcome::kDone, "stands " + after});
-  open_.say(id, api::Outcome::kStopped, {api::Outcome::kStopped, "stopped on request"});
+  open_.unsay(id, api::Outcome::kStopped);
   moves_.redirect(now_us, id, target, jog.course.floor);
 }
 
@@ -283,7 +287,8 @@ void Jogs::step(std::int64_t now_us) {
 std::int64_t Jogs::next_wake_us() const {
   std::int64_t wake = INT64_MAX;
   for (const auto& [motor, jog] : jogs_) {
-    if (!jog.ends) wake = std::min(wake, jog.until_us);
+    const bool runs_down = installation_[motor].axis().stopping();
+    if (!jog.ends && !runs_down) wake = std::min(wake, jog.until_us);
   }
   return wake;
 }

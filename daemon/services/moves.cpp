@@ -108,7 +108,7 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   }
   asker.answer(api::Accepted{});
   for (const MotorId motor : moving) take_over(motor, asker);
-  open_.open(asker, motors);
+  open_.open(asker, motors, OpenMoves::Purpose::kMove);
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
     const auto& [target, floor] = part.legs.front();
@@ -161,7 +161,7 @@ void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::i
   while (begins()) begin_next();
   motion::Motor& motor = installation_[id];
   if (motor.has_plan()) take_over(id, asker);
-  open_.open(asker, {id}, "jog");
+  open_.open(asker, {id}, OpenMoves::Purpose::kJog);
   motor.go_on({});
   if (!motor.stands()) return redirect(now_us, id, target, floor);
   open_.planned(id, 1, motor.axis().most_steps_per_s(floor));
@@ -197,7 +197,7 @@ void Moves::begin(MotorId id) {
   const motion::Tick start = motor.axis().start_tick();
   const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
   // A jog will change, and only ticks that have not been run can be taken back.
-  const bool by_table = installation_.by_table(mcu, steps) && open_.what_of(id) != "jog";
+  const bool by_table = installation_.by_table(mcu, steps) && !open_.jogs(id);
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));
@@ -372,7 +372,7 @@ void Moves::end(MotorId id, const motion::event::Ended& ended) {
   const bool planned =
       ended.outcome == api::Outcome::kReached || ended.outcome == api::Outcome::kStopped;
   if (!planned) outputs_.log(LogLevel::kWarning, motor.name() + ": " + ended.reason);
-  open_.end(id, ended.outcome, ended.reason);
+  open_.end(id, ended.outcome, ended.reason, ended.by_plan);
 }
 
 void Moves::goes_offline(Mcu& mcu, const std::string& cause) {

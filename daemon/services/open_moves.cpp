@@ -9,8 +9,22 @@ std::string text_of(const api::Asker& asker) {
   return "command " + std::to_string(asker.number) + " of " + asker.session->text();
 }
 
-void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors, std::string what) {
-  Open open{.asker = std::move(asker), .what = std::move(what), .tables = {}};
+std::string_view word(OpenMoves::Purpose purpose) {
+  switch (purpose) {
+    case OpenMoves::Purpose::kMove:
+      return "move";
+    case OpenMoves::Purpose::kHome:
+      return "home";
+    case OpenMoves::Purpose::kArm:
+      return "arm";
+    case OpenMoves::Purpose::kJog:
+      return "jog";
+  }
+  return "";
+}
+
+void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors, Purpose purpose) {
+  Open open{.asker = std::move(asker), .purpose = purpose, .tables = {}};
   for (const MotorId motor : motors) {
     open.from_steps[motor] = installation_[motor].position_steps();
     open.tables.push_back(api::ref_to(*installation_.table_of(motor)));
@@ -23,7 +37,7 @@ void OpenMoves::tell(MotorId id, api::Outcome outcome, const std::string& reason
   if (!listener_ || !move) return;
   const Open& open = open_.at(*move);
   listener_({.motor = id,
-             .what = open.what,
+             .purpose = open.purpose,
              .asker = open.asker,
              .from_steps = open.from_steps.at(id),
              .outcome = outcome,
@@ -40,14 +54,22 @@ void OpenMoves::say(MotorId motor, api::Outcome outcome, Saying saying) {
   if (move) open_.at(*move).sayings.insert_or_assign({motor, outcome}, std::move(saying));
 }
 
-void OpenMoves::stopped_by(MotorId motor, const std::string& who) {
-  if (book_.move_of(motor)) stopped_by_[motor] = who;
+void OpenMoves::unsay(MotorId motor, api::Outcome outcome) {
+  const auto move = book_.move_of(motor);
+  if (move) open_.at(*move).sayings.erase({motor, outcome});
 }
 
-void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& why) {
+void OpenMoves::stopped_by(const std::vector<MotorId>& motors, const std::string& who) {
+  if (book_.empty()) return;
+  for (const MotorId motor : motors) {
+    if (book_.move_of(motor)) stopped_by_[motor] = who;
+  }
+}
+
+void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& why, bool by_plan) {
   installation_.changed = true;
   const auto move = book_.move_of(id);
-  if (move && (why == motion::kAtTarget || why == motion::kOnRequest)) {
+  if (move && by_plan) {
     if (const auto said = open_.at(*move).sayings.extract({id, outcome})) {
       return end(id, said.mapped().outcome, said.mapped().reason);
     }
@@ -89,9 +111,9 @@ const api::Asker* OpenMoves::asker_of(MotorId motor) const {
   return move ? &open_.at(*move).asker : nullptr;
 }
 
-std::string_view OpenMoves::what_of(MotorId motor) const {
+bool OpenMoves::jogs(MotorId motor) const {
   const auto move = book_.move_of(motor);
-  return move ? std::string_view(open_.at(*move).what) : std::string_view();
+  return move && open_.at(*move).purpose == Purpose::kJog;
 }
 
 }  // namespace bushd::daemon

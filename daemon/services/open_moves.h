@@ -24,10 +24,12 @@ class OpenMoves {
  public:
   explicit OpenMoves(Installation& installation) : installation_(installation) {}
 
+  enum class Purpose { kMove, kHome, kArm, kJog };
+
   // A motor's part that has ended.
   struct Ended {
     MotorId motor;
-    const std::string& what;
+    Purpose purpose;
     const api::Asker& asker;
     std::int64_t from_steps;
     api::Outcome outcome;
@@ -36,9 +38,8 @@ class OpenMoves {
   using Listener = std::function<void(const Ended&)>;
   void set_listener(Listener listener) { listener_ = std::move(listener); }
 
-  // Precondition: none of the motors is under way. `what`: move, home, arm,
-  // jog.
-  void open(api::Asker asker, const std::vector<MotorId>& motors, std::string what = "move");
+  // Precondition: none of the motors is under way.
+  void open(api::Asker asker, const std::vector<MotorId>& motors, Purpose purpose);
   // How a motor's part is made: its legs, and the speed that none of them exceeds.
   void planned(MotorId motor, int legs, double most_steps_per_s);
   // What is said of this motor's part, which is open, if its plan ends with `outcome`; not if
@@ -48,26 +49,28 @@ class OpenMoves {
     std::string reason;
   };
   void say(MotorId motor, api::Outcome outcome, Saying saying);
-  // This motor's part has ended. One that is in no open move is ignored.
-  void end(MotorId motor, api::Outcome outcome, const std::string& reason);
+  void unsay(MotorId motor, api::Outcome outcome);
+  // This motor's part has ended; `by_plan`: as its plan does. One that is in no open move is
+  // ignored.
+  void end(MotorId motor, api::Outcome outcome, const std::string& reason, bool by_plan = false);
 
-  // Somebody has asked this motor to stop: if its part ends with that, the reason says who. One
-  // that is in no open move is ignored.
-  void stopped_by(MotorId motor, const std::string& who);
-  // It moves on, for somebody else.
+  // Somebody has asked these motors to stop: if a part ends with that, the reason says who. Those
+  // that are in no open move are ignored.
+  void stopped_by(const std::vector<MotorId>& motors, const std::string& who);
+  // This motor moves on, for somebody else.
   void not_stopped(MotorId motor) { stopped_by_.erase(motor); }
 
   bool empty() const { return book_.empty(); }
   bool together(MotorId a, MotorId b) const { return book_.move_of(a) == book_.move_of(b); }
   // Whose request it is; null if none.
   const api::Asker* asker_of(MotorId motor) const;
-  // As open() was told; "" if none.
-  std::string_view what_of(MotorId motor) const;
+  // Whether that request is a jog.
+  bool jogs(MotorId motor) const;
 
  private:
   struct Open {
     api::Asker asker;
-    std::string what;
+    Purpose purpose;
     std::unordered_map<MotorId, std::int64_t> from_steps{};
     std::vector<api::TableRef> tables;  // by which its motors move, in the request's order
     std::map<std::pair<MotorId, api::Outcome>, Saying> sayings{};
@@ -86,5 +89,8 @@ class OpenMoves {
   std::unordered_map<std::uint64_t, Open> open_;  // by number in book_
   std::unordered_map<MotorId, std::string> stopped_by_;
 };
+
+// As the history of a motor has it.
+std::string_view word(OpenMoves::Purpose purpose);
 
 }  // namespace bushd::daemon

@@ -32,7 +32,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
   std::vector<MotorId> jogs;
   for (const MotorId motor : *motors) {
     if (!installation_[motor].is<motion::Moving>()) continue;
-    const bool jogs_on = open_.what_of(motor) == "jog";
+    const bool jogs_on = open_.jogs(motor);
     if (jogs_on) {
       open_.say(motor, api::Outcome::kStopped,
                 {api::Outcome::kStopped, "ended, because " + text_of(asker) + " paused it"});

@@ -8,6 +8,7 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
   auto motors = installation_.find_or_all(request.motors);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
+  open_moves_.stopped_by(*motors, text_of(asker));
   std::erase_if(*motors, [this](MotorId motor) { return !can_be_stopped(motor); });
   stop(now_us, *motors);
   if (open_.size() >= kMaxOpen) {

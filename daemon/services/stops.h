@@ -18,7 +18,7 @@ class Stops final : public Service {
   // carried out all the same.
   static constexpr std::size_t kMaxOpen = 256;
 
-  Stops(Installation& installation, Moves& moves, HomingQueue& homing, const OpenMoves& open_moves)
+  Stops(Installation& installation, Moves& moves, HomingQueue& homing, OpenMoves& open_moves)
       : installation_(installation), moves_(moves), homing_(homing), open_moves_(open_moves) {}
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Stop& request);
@@ -39,7 +39,7 @@ class Stops final : public Service {
   Installation& installation_;
   Moves& moves_;
   HomingQueue& homing_;
-  const OpenMoves& open_moves_;
+  OpenMoves& open_moves_;
   std::list<Stopping> open_;
 };
 

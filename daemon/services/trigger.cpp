@@ -9,7 +9,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   const auto motors = motors_of(request);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
-  open_moves_.open(asker, *motors, "arm");
+  open_moves_.open(asker, *motors, OpenMoves::Purpose::kArm);
   std::map<McuId, std::vector<link::Master::Armed>> moves;
   const std::vector<std::int64_t> steps = steps_of(*motors, request);
   for (std::size_t i = 0; i < motors->size(); ++i) {
@@ -93,6 +93,7 @@ void Trigger::request(const api::Asker& asker, const api::Disarm& request) {
   asker.answer(api::Accepted{});
   std::erase_if(*motors,
                 [this](MotorId motor) { return !installation_[motor].is<motion::Armed>(); });
+  open_moves_.stopped_by(*motors, text_of(asker));
   for (const McuId mcu : installation_.mcus_of(*motors)) installation_[mcu].disarm();
   open_.push_back({.asker = asker, .motors = std::move(*motors)});
 }

@@ -71,7 +71,7 @@ struct TableList {
 // What has moved a motor, or made its position known.
 struct PastMotion {
   std::int64_t utime_us = 0;  // when it ended
-  std::string what{};         // move, home, arm, jog, confirm
+  std::string what{};         // move, home, arm, jog, set, config, confirm
   std::string who{};
   std::int64_t from_steps = 0;
   std::int64_t to_steps = 0;

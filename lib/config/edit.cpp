@@ -10,41 +10,12 @@
 
 #include "config/config.h"
 #include "tables/toml_file.h"
+#include "tables/toml_text.h"
 
 namespace bushd::config {
 namespace {
 
-// Lines of a document, and the places in them that toml++ tells: it counts columns in code points.
-class Lines {
- public:
-  explicit Lines(std::string_view text) : text_(text) {
-    begins_.push_back(0);
-    for (std::size_t i = 0; i < text.size(); ++i) {
-      if (text[i] == '\n') begins_.push_back(i + 1);
-    }
-  }
-  std::size_t offset(const toml::source_position& position) const {
-    std::size_t at = begins_.at(position.line - 1);
-    for (std::size_t column = 1; column < position.column; ++column) {
-      do ++at;
-      while (at < text_.size() && (static_cast<unsigned char>(text_[at]) & 0xC0) == 0x80);
-    }
-    return std::min(at, text_.size());
-  }
-  std::size_t begin_of_line(std::size_t at) const {
-    return *std::prev(std::ranges::upper_bound(begins_, at));
-  }
-  // Behind its newline, if there is one.
-  std::size_t end_of_line(std::size_t at) const {
-    const std::size_t newline = text_.find('\n', at);
-    return newline == std::string_view::npos ? text_.size() : newline + 1;
-  }
-  std::string_view text() const { return text_; }
-
- private:
-  std::string_view text_;
-  std::vector<std::size_t> begins_;
-};
+using tables::TomlText;
 
 struct Span {
   std::size_t begin;
@@ -64,24 +35,8 @@ std::string toml_text(SettingKey key, const std::string& value) {
   return key == SettingKey::kDirection ? "\"" + value + "\"" : value;
 }
 
-// A scalar or an array, where its text stands. toml++ tells where a scalar begins and strings end;
-// numbers end with their token, arrays behind their bracket.
-std::optional<Span> value_span(const Lines& lines, const toml::node& node) {
-  const std::string_view text = lines.text();
-  const std::size_t begin = lines.offset(node.source().begin);
-  if (node.is_string()) return Span{begin, lines.offset(node.source().end)};
-  const auto token_end = [&](std::size_t at) {
-    return std::min(text.find_first_of(" \t\r\n,]#}", at), text.size());
-  };
-  const toml::array* array = node.as_array();
-  if (array == nullptr) return Span{begin, token_end(begin)};
-  if (array->empty()) return std::nullopt;
-  std::size_t at = token_end(lines.offset(array->back().source().begin));
-  while (at < text.size() && text[at] != ']') {
-    at = text[at] == '#' ? std::min(text.find('\n', at), text.size()) : at + 1;
-  }
-  if (at >= text.size()) return std::nullopt;
-  return Span{begin, at + 1};
+Span value_span(const TomlText& text, const toml::node& node) {
+  return {text.offset(node.source().begin), text.value_end(node)};
 }
 
 toml::table* motor_in(toml::table& document, const std::string& name) {
@@ -97,21 +52,19 @@ toml::table* motor_in(toml::table& document, const std::string& name) {
 // One edit of a text.
 class Editing {
  public:
-  Editing(std::string_view text, const toml::table& motor) : lines_(text), motor_(motor) {}
+  Editing(std::string_view text, const toml::table& motor) : toml_(text), motor_(motor) {}
 
   std::optional<std::string> set(SettingKey key, const std::string& value) const {
     const toml::node* node = motor_.get(name_of(key));
     const bool none = key == SettingKey::kSoftLimits && value == "none";
-    if (node == nullptr) return none ? std::string(lines_.text()) : add(key, value);
+    if (node == nullptr) return none ? std::string(toml_.text()) : add(key, value);
     if (none) return remove(key, *node);
-    const auto place = value_span(lines_, *node);
-    if (!place) return std::nullopt;
-    return replaced(*place, toml_text(key, value));
+    return replaced(value_span(toml_, *node), toml_text(key, value));
   }
 
  private:
   std::string replaced(Span place, std::string_view with) const {
-    std::string out(lines_.text());
+    std::string out(toml_.text());
     return out.replace(place.begin, place.end - place.begin, with);
   }
 
@@ -123,13 +76,11 @@ class Editing {
       if (const toml::table* table = node.as_table(); table != nullptr && !table->is_inline()) {
         continue;
       }
-      at = std::max(at, lines_.offset(node.source().begin));
-      if (const auto place = value_span(lines_, node); place && !node.is_table()) {
-        at = std::max(at, place->end);
-      }
+      const Span place = value_span(toml_, node);
+      at = std::max(at, node.is_table() ? place.begin : place.end);
     }
-    at = lines_.end_of_line(at);
-    const std::string_view text = lines_.text();
+    at = toml_.line_end(at);
+    const std::string_view text = toml_.text();
     const bool crlf = text.find("\r\n") != std::string_view::npos;
     const char* const newline = crlf ? "\r\n" : "\n";
     const bool unended = at > 0 && text[at - 1] != '\n';
@@ -139,23 +90,22 @@ class Editing {
 
   // Its lines, but for what people have written beside it.
   std::optional<std::string> remove(SettingKey key, const toml::node& node) const {
-    const auto place = value_span(lines_, node);
-    if (!place || motor_.is_inline()) return std::nullopt;
-    const std::string_view text = lines_.text();
+    if (motor_.is_inline()) return std::nullopt;
+    const std::string_view text = toml_.text();
     const Span whole{
-        lines_.begin_of_line(lines_.offset(motor_.find(name_of(key))->first.source().begin)),
-        lines_.end_of_line(place->end)};
+        toml_.line_begin(toml_.offset(motor_.find(name_of(key))->first.source().begin)),
+        toml_.line_end(value_span(toml_, node).end)};
     std::string comments;
     for (std::size_t at = whole.begin; at < whole.end; ++at) {
       if (text[at] != '#') continue;
-      const std::size_t end = lines_.end_of_line(at);
+      const std::size_t end = toml_.line_end(at);
       comments += text.substr(at, end - at);
       at = end - 1;
     }
     return replaced(whole, comments);
   }
 
-  Lines lines_;
+  TomlText toml_;
   const toml::table& motor_;
 };
 

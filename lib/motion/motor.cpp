@@ -69,7 +69,7 @@ std::int64_t Motor::target_steps() const {
 }
 
 void Motor::stop(std::optional<std::string> ended_by) {
-  pause_ = stands_paused() ? Pause::kOver : Pause::kNo;
+  pause_ = rests_in_pause() ? Pause::kOver : Pause::kNo;
   if (is<Moving>()) axis_.stop();
   if (auto* armed = std::get_if<Armed>(&activity_)) {
     armed->stops = true;
@@ -258,14 +258,14 @@ void Motor::follow_end_of_run(const Report& report, std::vector<Event>& events) 
   const bool there = position_ == axis_.target_steps();
   if (there && further_.empty()) {
     const bool settles = !axis_.stopping() && report.tick < axis_.end_tick() + setup_.settle_ticks;
-    if (!settles) events.emplace_back(ended(Outcome::kReached, kAtTarget));
+    if (!settles) events.emplace_back(reached());
   } else if (stands_paused()) {
     // Until it is resumed.
   } else if (is_paused()) {
     pause_ = Pause::kStands;
     events.emplace_back(event::Paused{});
   } else if (axis_.stopping()) {
-    events.emplace_back(ended(Outcome::kStopped, kOnRequest));
+    events.emplace_back(stopped());
   } else if (there) {
     events.emplace_back(event::NextLeg{});
   } else {
@@ -341,10 +341,10 @@ void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
 // It stands.
 event::Ended Motor::end_at_limit() {
   if (!axis_.stopping() && further_.empty() && position_ == axis_.target_steps()) {
-    return ended(Outcome::kReached, kAtTarget);
+    return reached();
   }
-  if (axis_.stopping() && position_ == axis_.executed_steps()) {
-    return ended(Outcome::kStopped, kOnRequest);
+  if (axis_.stopping() && !is_paused() && position_ == axis_.executed_steps()) {
+    return stopped();
   }
   std::string reason = "stopped by " + switch_at(std::get<Moving>(activity_).limit) +
                        ", stands at " + std::to_string(position_);
@@ -357,8 +357,8 @@ event::Ended Motor::end_at_limit() {
 
 // It stands, and not by its plan.
 event::Ended Motor::end_by_fault(const bushd_report& report) {
-  // One that has not made a step cannot overrun.
-  const bool stepped = position_ != axis_.from_steps();
+  // One that has not made a step, or stood, cannot overrun.
+  const bool stepped = position_ != axis_.from_steps() && !rests_in_pause();
   const std::string mcu = "MCU " + setup_.mcu;
   if (const Moving* moving = as<Moving>(); moving != nullptr && moving->position_mismatch) {
     return ended(Outcome::kFault, *uncertain_reason_ + "; check the position and set it");
@@ -404,7 +404,7 @@ std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {
 
 event::Ended Motor::ended(Outcome outcome, std::string reason) {
   const bool was_armed = is<Armed>();
-  const bool was_paused = pause_ == Pause::kStands || pause_ == Pause::kOver;
+  const bool was_paused = rests_in_pause();
   further_.clear();
   pause_ = Pause::kNo;
   axis_.finish();
@@ -413,6 +413,18 @@ event::Ended Motor::ended(Outcome outcome, std::string reason) {
           .reason = std::move(reason),
           .was_armed = was_armed,
           .was_paused = was_paused};
+}
+
+event::Ended Motor::reached() {
+  event::Ended event = ended(Outcome::kReached, "stands at its target");
+  event.by_plan = true;
+  return event;
+}
+
+event::Ended Motor::stopped() {
+  event::Ended event = ended(Outcome::kStopped, "stopped on request");
+  event.by_plan = true;
+  return event;
 }
 
 std::string Motor::did_not_start() const {

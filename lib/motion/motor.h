@@ -40,10 +40,6 @@ struct MotorSetup {
   Tick settle_ticks = 0;                   // it has ended when it has stood for so long
 };
 
-// What is said of a motion that ends as planned, or by a stop.
-inline constexpr const char* kAtTarget = "stands at its target";
-inline constexpr const char* kOnRequest = "stopped on request";
-
 // A motion is made of these, with a rest between any two.
 struct Leg {
   std::int64_t target;
@@ -106,6 +102,7 @@ struct Ended {
   std::string reason;
   bool was_armed = false;
   bool was_paused = false;  // and stood
+  bool by_plan = false;     // at the target, or where it was stopped on request
 };
 }  // namespace event
 using Event =
@@ -189,7 +186,7 @@ class Motor {
   bool is_paused() const { return pause_ == Pause::kRamps || stands_paused(); }
   bool stands_paused() const { return pause_ == Pause::kStands; }
   // start() is for it, not aim().
-  bool stands() const { return !has_plan() || stands_paused(); }
+  bool stands() const { return !has_plan() || rests_in_pause(); }
   void hold(bool now) { held_ = now; }
   bool is_held() const { return held_; }
   void arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor = 0);
@@ -231,10 +228,18 @@ class Motor {
   std::optional<event::Ended> end(Outcome outcome, std::string reason);
 
  private:
+  bool rests_in_pause() const { return pause_ == Pause::kStands || pause_ == Pause::kOver; }
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
   Result<void> is_amount(const api::Amount& amount) const;
+  // Steps within the soft limits; there are some.
+  struct Range {
+    std::int64_t low;
+    std::int64_t high;
+  };
+  Range allowed_steps() const;
+  std::string text_of(const Range& range) const;
   Result<void> within_soft_limits(std::int64_t target) const;
   void take_limits(const bushd_report& report);
   void follow(const Report& report, std::vector<Event>& events);
@@ -242,6 +247,8 @@ class Motor {
   void notice_limit(const Report& report, std::vector<Event>& events);
   event::Ended end_at_limit();
   event::Ended end_by_fault(const bushd_report& report);
+  event::Ended reached();
+  event::Ended stopped();
   event::Ended ended(Outcome outcome, std::string reason);
   void follow_autonomous(const bushd_report& report, bool moved_without_plan);
   void rest();

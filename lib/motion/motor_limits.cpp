@@ -78,11 +78,9 @@ Result<std::uint16_t> Motor::floor_at(const std::optional<api::Speed>& speed) co
 }
 
 std::int64_t Motor::farthest(int direction, std::uint16_t floor) const {
-  std::int64_t limit = direction > 0 ? kMaxPosition : -kMaxPosition;
-  if (setup_.soft_limits) {
-    limit = direction > 0 ? setup_.coordinates.last_step_to(setup_.soft_limits->high)
-                          : setup_.coordinates.first_step_from(setup_.soft_limits->low);
-  }
+  Range range{.low = -kMaxPosition, .high = kMaxPosition};
+  if (setup_.soft_limits) range = allowed_steps();
+  const std::int64_t limit = direction > 0 ? range.high : range.low;
   const std::int64_t steps = std::min((limit - position_) * direction, kMaxPosition);
   if (steps <= 0) return position_;
   if (axis_.duration_ticks(steps, floor) <= Axis::kMaxDurationTicks) {
@@ -123,31 +121,38 @@ Result<std::vector<Leg>> Motor::legs_to(std::int64_t target, std::uint16_t floor
   return std::vector<Leg>{{start, floor}, {target, slow}};
 }
 
+Motor::Range Motor::allowed_steps() const {
+  return {.low = setup_.coordinates.first_step_from(setup_.soft_limits->low),
+          .high = setup_.coordinates.last_step_to(setup_.soft_limits->high)};
+}
+
+std::string Motor::text_of(const Range& range) const {
+  const units::Coordinates& coordinates = setup_.coordinates;
+  const bool falls = coordinates.scale().negative;
+  return fmt::format("{} to {}", coordinates.text(falls ? range.high : range.low),
+                     coordinates.text(falls ? range.low : range.high));
+}
+
 // One that stands beyond a limit may be moved towards it.
 Result<void> Motor::within_soft_limits(std::int64_t target) const {
   if (!setup_.soft_limits) return {};
-  const units::Coordinates& coordinates = setup_.coordinates;
-  const std::int64_t low = coordinates.first_step_from(setup_.soft_limits->low);
-  const std::int64_t high = coordinates.last_step_to(setup_.soft_limits->high);
-  if (target >= std::min(low, position_) && target <= std::max(high, position_)) return {};
-  const bool falls = coordinates.scale().negative;
-  return fail(fmt::format("target {} is beyond the soft limit at {}; allowed: {} to {}",
-                          coordinates.text(target), coordinates.text(target > high ? high : low),
-                          coordinates.text(falls ? high : low),
-                          coordinates.text(falls ? low : high)));
+  const Range range = allowed_steps();
+  if (target >= std::min(range.low, position_) && target <= std::max(range.high, position_)) {
+    return {};
+  }
+  const std::int64_t limit = target > range.high ? range.high : range.low;
+  return fail(fmt::format("target {} is beyond the soft limit at {}; allowed: {}",
+                          setup_.coordinates.text(target), setup_.coordinates.text(limit),
+                          text_of(range)));
 }
 
 Result<void> Motor::stands_within_soft_limits() const {
   if (!setup_.soft_limits) return {};
-  const units::Coordinates& coordinates = setup_.coordinates;
-  const std::int64_t low = coordinates.first_step_from(setup_.soft_limits->low);
-  const std::int64_t high = coordinates.last_step_to(setup_.soft_limits->high);
-  if (position_ >= low && position_ <= high) return {};
-  const bool falls = coordinates.scale().negative;
-  return fail(fmt::format(
-      "it stands at {}, beyond its soft limits of {} to {}; it may be moved towards them",
-      coordinates.text(position_), coordinates.text(falls ? high : low),
-      coordinates.text(falls ? low : high)));
+  const Range range = allowed_steps();
+  if (position_ >= range.low && position_ <= range.high) return {};
+  return fail(
+      fmt::format("it stands at {}, beyond its soft limits of {}; it may be moved towards them",
+                  setup_.coordinates.text(position_), text_of(range)));
 }
 
 // Of a motor without a unit nothing is rounded.

@@ -43,10 +43,6 @@ struct Setting {
 };
 using Settings = std::map<std::string, Setting>;  // by key: offset, direction, soft_limits
 
-// Null if nothing was set, or if the file has been edited since.
-const Setting* in_force(const Settings& settings, const std::string& key,
-                        const std::string& in_file);
-
 // All that is kept of one motor.
 struct Kept {
   std::optional<Record> record{};
@@ -65,7 +61,7 @@ inline bool stood(const Kept& kept) {
 struct PastMove {
   std::string motor{};
   std::int64_t utime_us = 0;  // when it ended
-  std::string what{};         // move, home, arm, set, config, confirm
+  std::string what{};         // move, home, arm, jog, set, config, confirm
   std::string who{};
   std::int64_t from_steps = 0;
   std::int64_t to_steps = 0;

@@ -10,6 +10,7 @@
 
 #include "tables/table_file.h"
 #include "tables/toml_file.h"
+#include "tables/toml_text.h"
 
 namespace bushd::tables {
 namespace {
@@ -62,36 +63,12 @@ std::string wrapped(std::string_view text) {
   return out + "# " + line + "\n";
 }
 
-// Changes at byte offsets of a valid document, applied together at the end.
+// Changes of a valid document, applied together at the end.
 class Patch {
  public:
-  explicit Patch(std::string_view text) : text_(text) {
-    line_begins_.push_back(0);
-    for (std::size_t i = 0; i < text.size(); ++i) {
-      if (text[i] == '\n') line_begins_.push_back(i + 1);
-    }
-  }
+  explicit Patch(std::string_view text) : toml_(text), text_(text) {}
 
-  // toml++ counts columns in code points.
-  std::size_t offset(const toml::source_position& position) const {
-    std::size_t at = line_begins_.at(position.line - 1);
-    for (std::size_t column = 1; column < position.column; ++column) {
-      do ++at;
-      while (at < text_.size() && (static_cast<unsigned char>(text_[at]) & 0xC0) == 0x80);
-    }
-    return at;
-  }
-
-  std::size_t token_end(std::size_t at) const {
-    constexpr std::string_view kTokenEnds = " \t\r\n,]#}";
-    return std::min(text_.find_first_of(kTokenEnds, at), text_.size());
-  }
-
-  // Behind the ']' of an array whose last element, or '[', ends at `at`.
-  std::size_t array_end(std::size_t at) const {
-    while (text_[at] != ']') at = text_[at] == '#' ? text_.find('\n', at) : at + 1;
-    return at + 1;
-  }
+  const TomlText& toml() const { return toml_; }
 
   std::string comments_between(std::size_t begin, std::size_t end) const {
     std::string out;
@@ -104,14 +81,6 @@ class Patch {
     return out;
   }
 
-  std::size_t line_begin(std::size_t at) const {
-    const std::size_t newline = text_.rfind('\n', at);
-    return at == 0 || newline == std::string_view::npos ? 0 : newline + 1;
-  }
-  std::size_t line_end(std::size_t at) const {
-    const std::size_t newline = text_.find('\n', at);
-    return newline == std::string_view::npos ? text_.size() : newline + 1;
-  }
   bool ends_with_newline(std::size_t at) const { return at > 0 && text_[at - 1] == '\n'; }
 
   void replace(std::size_t begin, std::size_t end, std::string with) {
@@ -139,16 +108,17 @@ class Patch {
     std::string with;
   };
 
+  TomlText toml_;
   std::string_view text_;
-  std::vector<std::size_t> line_begins_;
   std::vector<Change> changes_;
 };
 
 // Replaces what differs: single codes if the number of codes stays, else all between the common
 // beginning and the common end.
 void patch_codes(Patch& patch, const toml::array& array, const Codes& before, const Codes& after) {
-  const auto begin_of = [&](std::size_t i) { return patch.offset(array.get(i)->source().begin); };
-  const auto end_of = [&](std::size_t i) { return patch.token_end(begin_of(i)); };
+  const TomlText& toml = patch.toml();
+  const auto begin_of = [&](std::size_t i) { return toml.offset(array.get(i)->source().begin); };
+  const auto end_of = [&](std::size_t i) { return toml.token_end(begin_of(i)); };
   if (before.size() == after.size()) {
     for (std::size_t i = 0; i < before.size(); ++i) {
       if (before[i] != after[i]) {
@@ -173,7 +143,7 @@ void patch_codes(Patch& patch, const toml::array& array, const Codes& before, co
     patch.replace(begin, end, patch.comments_between(begin, end) + middle);
     return;
   }
-  const std::size_t begin = head > 0 ? end_of(head - 1) : patch.offset(array.source().begin) + 1;
+  const std::size_t begin = head > 0 ? end_of(head - 1) : toml.offset(array.source().begin) + 1;
   const std::size_t end = end_of(before.size() - 1);
   const std::string comments = patch.comments_between(begin, end);
   std::string comma;
@@ -189,15 +159,15 @@ class Rewriter {
 
   // A key's whole lines, its value ending at `value_end`.
   void remove(std::string_view key, std::size_t value_end) {
-    const std::size_t begin = patch_.line_begin(key_offset(key));
-    const std::size_t end = patch_.line_end(value_end);
+    const std::size_t begin = patch_.toml().line_begin(key_offset(key));
+    const std::size_t end = patch_.toml().line_end(value_end);
     std::string comments = patch_.comments_between(begin, end);
     while (comments.ends_with(' ')) comments.pop_back();
     patch_.replace(begin, end, comments);
   }
 
   void add(std::string_view key, const std::string& value, std::string_view behind) {
-    const std::size_t at = patch_.line_end(value_end(behind));
+    const std::size_t at = patch_.toml().line_end(value_end(behind));
     patch_.replace(
         at, at, fmt::format("{}{} = {}\n", patch_.ends_with_newline(at) ? "" : "\n", key, value));
   }
@@ -222,28 +192,20 @@ class Rewriter {
   void set_text(std::string_view key, const std::string& before, const std::string& after) {
     if (before == after) return;
     if (!document_.contains(key)) return add(key, quoted(after), "name");
-    // Strings end where toml++ says; a description may have several lines.
-    patch_.replace(value_offset(key), patch_.offset(document_.get(key)->source().end),
-                   quoted(after));
+    patch_.replace(value_offset(key), value_end(key), quoted(after));
   }
 
   std::string text() { return patch_.applied(); }
 
  private:
   std::size_t key_offset(std::string_view key) const {
-    return patch_.offset(document_.find(key)->first.source().begin);
+    return patch_.toml().offset(document_.find(key)->first.source().begin);
   }
   std::size_t value_offset(std::string_view key) const {
-    return patch_.offset(document_.get(key)->source().begin);
+    return patch_.toml().offset(document_.get(key)->source().begin);
   }
   std::size_t value_end(std::string_view key) const {
-    const toml::node* node = document_.get(key);
-    const std::size_t begin = value_offset(key);
-    if (node->is_string()) return patch_.offset(node->source().end);
-    const toml::array* array = node->as_array();
-    if (array == nullptr) return patch_.token_end(begin);
-    return patch_.array_end(
-        patch_.token_end(patch_.offset(array->get(array->size() - 1)->source().begin)));
+    return patch_.toml().value_end(*document_.get(key));
   }
 
   Patch patch_;

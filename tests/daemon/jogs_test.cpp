@@ -1,5 +1,6 @@
 // Jogs: a motor that moves on for as long as its client keeps it going, from the request to the
 // shaft.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -161,6 +162,54 @@ TEST(Jogs, WhoIsStoppedByOthersMustLetGoFirst) {
   EXPECT_EQ(lab.wait(again).result, "stopped");
 }
 
+// What was said of an end that its client has taken back is no longer true.
+TEST(Jogs, TakenUpAgainAreStoppedByOthersAsEver) {
+  for (const bool silent : {false, true}) {
+    SCOPED_TRACE(silent);
+    Lab lab(lab_with(""));
+    lab.connect();
+    const auto first = lab.send_as("remote", jog(2000));
+    lab.run_for(silent ? 0.52 : 0.4);
+    if (!silent) lab.send_as("remote", jog(0));
+    lab.run_for(0.02);
+    EXPECT_EQ(lab.wait(lab.send_as("remote", jog(2000))).reason, "m01: changed");
+    lab.run_for(0.2);
+    const auto stop = lab.send(Ask::kStop, {"m01"});
+    EXPECT_EQ(lab.wait(stop).result, "done");
+    EXPECT_EQ(lab.last_reply(first).result, "stopped");
+    EXPECT_THAT(lab.last_reply(first).reason,
+                HasSubstr("m01: stopped on request, asked for by command"));
+    EXPECT_THAT(lab.wait(lab.send_as("remote", jog(2000))).reason, HasSubstr("let go first"));
+  }
+}
+
+// While it ramps down nothing is to be done for it, also when it is renewed no more.
+TEST(Jogs, ThatOthersStopLetTheDaemonSleep) {
+  Lab lab(lab_with(""));
+  lab.connect();
+  const auto first = lab.send(jog(2500));
+  lab.run_for(0.48);
+  lab.send_as("remote", {api::Stop{{"m01"}}});
+  lab.run_for(0.04);
+  ASSERT_FALSE(lab.has_result(first)) << "it ramps down";
+  lab.core().step(lab.now_us());
+  EXPECT_GT(lab.core().next_wake_us(), lab.now_us());
+  EXPECT_EQ(lab.wait(first).result, "stopped");
+}
+
+TEST(Jogs, AwayFromTheRangeAreRefusedInMotionToo) {
+  Lab lab(lab_with(kInMm));
+  lab.connect();
+  lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {6000}));
+  const auto first = lab.send(jog(-1000));
+  lab.run_for(0.4);
+  const Answer refused = lab.wait(lab.send(jog(1000)));
+  EXPECT_EQ(refused.result, "refused");
+  EXPECT_THAT(refused.reason, HasSubstr("beyond its soft limit"));
+  EXPECT_EQ(lab.wait(first).result, "stopped");
+  EXPECT_LT(lab.motor("m01").position_steps, 6000);
+}
+
 TEST(Jogs, OfAnotherClientTakeOver) {
   Lab lab(lab_with(""));
   lab.connect();
@@ -184,11 +233,16 @@ TEST(Jogs, EndSoManyStepsAfterTheStopEvent) {
   lab.connect();
   const auto first = lab.send(jog(250));
   EXPECT_TRUE(keep_going(lab, [&] { return lab.shaft_steps("m01") >= 300; }));
+  const std::int64_t at_event = lab.shaft_steps("m01");
   lab.send(ended_after(200));
   const Answer ended = lab.wait(first);
   EXPECT_EQ(ended.result, "done") << ended.reason;
-  EXPECT_THAT(ended.reason, HasSubstr("200 steps after the stop event"));
-  EXPECT_NEAR(static_cast<double>(lab.shaft_steps("m01")), 500, 2);
+  const std::int64_t from = lab.shaft_steps("m01") - 200;
+  EXPECT_THAT(ended.reason, HasSubstr(fmt::format("200 steps after the stop event at {:.4f} mm",
+                                                  static_cast<double>(from) / 400)));
+  // The daemon reckons where the motor is by its estimate of the MCU's clock, which is right to far
+  // less than the 4 ms of a step: at most the step that is just being made may be counted or not.
+  EXPECT_LE(std::abs(from - at_event), 1);
 }
 
 TEST(Jogs, ThatCannotEndSoSoonSaySo) {

@@ -125,7 +125,7 @@ class LiveBench : public Bench {
   daemon::IdleDrivers idle_drivers{installation, *this, [](MotorId) { return false; }};
   daemon::HomingQueue homing{installation, interlocks,   open_moves, moves,
                              kept,         idle_drivers, *this};
-  daemon::EmergencyStop emergency_stop{installation, interlocks, homing, *this};
+  daemon::EmergencyStop emergency_stop{installation, interlocks, homing, open_moves, *this};
 
  private:
   void advance() {

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 
 #include "daemon/lab.h"
@@ -94,6 +95,28 @@ TEST(Pauses, ANewTargetEndsThem) {
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {-100})).result, "reached");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), -100);
+}
+
+// Before any report has told that it was stopped where it stood.
+TEST(Pauses, ANewTargetRightAfterAStopBeginsFromRest) {
+  Lab lab(lab_with("backlash = 40\n"));
+  lab.connect();
+  const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
+  lab.wait(lab.send(api::Pause{}));
+  const std::int64_t stands = lab.shaft_steps("m01");
+  lab.send(Ask::kStop, {"m01"});
+  const Answer reached = lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {stands + 500}));
+  EXPECT_EQ(reached.result, "reached");
+  EXPECT_THAT(reached.legs, testing::ElementsAre(1)) << "straight, from that side";
+  EXPECT_EQ(lab.last_reply(move).result, "stopped");
+  const auto lines = [&](const std::string& event) {
+    return std::ranges::count_if(lab.move_lines(), [&](const std::string& line) {
+      return line.find("\"event\":\"" + event + "\"") != std::string::npos;
+    });
+  };
+  EXPECT_EQ(lines("move"), 2);
+  EXPECT_EQ(lines("result"), 2) << "each motion ends once in the log of moves";
 }
 
 TEST(Pauses, HoldInEveryLeg) {

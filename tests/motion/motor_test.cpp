@@ -250,6 +250,55 @@ TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
   EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("stopped immediately by an emergency stop"));
 }
 
+TEST_F(MotorTest, OneThatIsStoppedTwiceInAPauseStood) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  motor.pause();
+  motor.change(kStart + 30);
+  const Tick end = motor.axis().end_tick();
+  EXPECT_NE(find<event::Paused>(report(end)), nullptr);
+  motor.stop();
+  motor.stop();
+  const auto events = report(end + 10);
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_TRUE(find<event::Ended>(events)->was_paused) << "its end has been told";
+}
+
+// It stood: no step can be lost.
+TEST_F(MotorTest, AnEmergencyStopLeavesAPausedMotorKnown) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  motor.pause();
+  motor.change(kStart + 30);
+  EXPECT_NE(find<event::Paused>(report(motor.axis().end_tick())), nullptr);
+  mcu.faults = BUSHD_FAULT_EMERGENCY;
+  const auto events = report(motor.axis().end_tick() + 10);
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
+  EXPECT_FALSE(motor.uncertain_reason());
+}
+
+TEST_F(MotorTest, ALimitSwitchThatEndsAPauseIsNoStopOnRequest) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  motor.pause();
+  motor.change(kStart + 30);
+  set(mcu.forbidden_positive, true);
+  set(mcu.moving, true);
+  // By a ramp of its MCU's own, which is a step longer and ends in the same place.
+  const Tick end = motor.axis().end_tick();
+  mcu.motor[3].position_steps = static_cast<std::int32_t>(motor.axis().planned_end_steps());
+  const auto told = [&](Tick tick) {
+    return motor.report(
+        {.of_mcu = mcu, .tick = tick, .requests_open = false, .emergency_stop_open = false});
+  };
+  EXPECT_NE(find<event::Drop>(told(end)), nullptr);
+  set(mcu.moving, false);
+  const auto events = told(end + 1);
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLimit);
+}
+
 TEST_F(MotorTest, HomingKeepsOthersAwayAndMakesThePositionKnown) {
   motor.goes_online(mcu, false, true);
   EXPECT_THAT(refusal(1), HasSubstr("MCU hall:1 restarted"));

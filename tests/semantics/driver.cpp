@@ -23,15 +23,20 @@ class Pulses final : public sim::EdgeSink {
   void edge(const sim::Edge& edge) override {
     Pin& pin = pins_[{edge.mcu, edge.index}];
     if (edge.signal == sim::Signal::kDir) pin.forward = edge.level;
-    if (edge.signal == sim::Signal::kStep && edge.level) pin.steps += pin.forward ? 1 : -1;
+    if (edge.signal != sim::Signal::kStep || !edge.level) return;
+    pin.steps += pin.forward ? 1 : -1;
+    pin.last = pin.forward ? 1 : -1;
   }
   void settled(sim::TimeNs) override {}
   std::int64_t steps(std::size_t mcu, std::uint8_t output) { return pins_[{mcu, output}].steps; }
+  // Of its last step; 0: it has made none.
+  int direction(std::size_t mcu, std::uint8_t output) { return pins_[{mcu, output}].last; }
 
  private:
   struct Pin {
     bool forward = false;
     std::int64_t steps = 0;
+    int last = 0;
   };
   std::map<std::pair<std::size_t, std::uint8_t>, Pin> pins_;
 };
@@ -49,6 +54,27 @@ std::vector<api::MotorAmount> amounts_of(const json& request) {
   return all;
 }
 
+api::Jog jog_of(const json& request) {
+  api::Jog jog{.motor = request.at("motor").get<std::string>(),
+               .per_s = request.at("speed").get<double>(),
+               .in_steps = request.value("speed_in_steps", false),
+               .keepalive_ms = request.value("keepalive_ms", 500)};
+  if (request.contains("steps_after")) {
+    jog.steps_after = request.at("steps_after").get<std::int64_t>();
+  }
+  return jog;
+}
+
+api::Configure configure_of(const json& request) {
+  api::Configure configure{.kind = api::Configure::Kind::kChange};
+  for (const json& change : request.at("changes")) {
+    configure.changes.push_back({.motor = change.at("motor").get<std::string>(),
+                                 .key = change.at("key").get<std::string>(),
+                                 .value = change.at("value").get<std::string>()});
+  }
+  return configure;
+}
+
 api::Request request_of(const json& request) {
   const auto kind = request.at("request").get<std::string>();
   if (kind == "move") {
@@ -64,8 +90,14 @@ api::Request request_of(const json& request) {
   if (kind == "set") {
     return api::SetPosition{.motors = amounts_of(request), .dial = request.value("dial", false)};
   }
+  if (kind == "jog") return jog_of(request);
+  if (kind == "configure") return configure_of(request);
   const auto names = request.at("names").get<std::vector<std::string>>();
   if (kind == "confirm") return api::Confirm{names};
+  if (kind == "pause") return api::Pause{names};
+  if (kind == "resume") return api::Resume{names};
+  if (kind == "hold") return api::Hold{names};
+  if (kind == "release") return api::Release{names};
   return api::Stop{names};
 }
 
@@ -88,7 +120,8 @@ class Driver {
   json state() {
     json motors = json::object();
     for (const Motor& of : motors_) {
-      json motor = {{"pulses", pulses_->steps(of.mcu, of.output)}};
+      json motor = {{"pulses", pulses_->steps(of.mcu, of.output)},
+                    {"last_direction", pulses_->direction(of.mcu, of.output)}};
       if (lab_->has_state(of.mcu_name)) {
         const api::MotorState state = lab_->motor(of.name);
         motor.update({{"steps", state.position_steps},
@@ -97,6 +130,8 @@ class Driver {
                       {"target", state.target_steps},
                       {"user_target", state.user_target},
                       {"moving", state.moving},
+                      {"paused", state.paused},
+                      {"held", state.held},
                       {"trust", word(state.trust)},
                       {"reason", state.uncertain_reason}});
       }
@@ -160,6 +195,7 @@ class Driver {
             {"result", answer.result},
             {"reason", answer.reason},
             {"motor_results", answer.motor_results},
+            {"legs", answer.legs},
             {"position_steps", answer.position_steps}};
   }
 

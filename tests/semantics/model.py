@@ -1,8 +1,7 @@
 """What bushd promises of positions (docs/positions.md, docs/configuration.md): a model that shares no code with it.
 
 Steps count; user and dial positions are exact fractions of what people have written, rounded to the nearest step, ties
-away from zero. Here is what follows from a request and the state before it, and nothing of how it comes about. Jogs,
-backlash and pauses are to be added as further methods of Motor that return what is refused and what is aimed at.
+away from zero. Here is what follows from a request and the state before it, and nothing of how it comes about.
 """
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -55,12 +54,20 @@ class Motor:
     limits: Optional[tuple] = None  # on the dial
     max_speed: Optional[Fraction] = None
     time_unit_ns: int = 1
+    backlash: Fraction = Fraction(0)  # in units; its sign is that of the last approach
+    backlash_speed: Optional[Fraction] = None
+    settle_ms: int = 0
     # What is.
     steps: int = 0
     trust: str = "known"  # known, restored, unconfirmed (nobody has said where it stands), uncertain
     # The offset is as exact as it is written: not so where a user position was set and the dial has no short text.
     exact_offset: bool = True
-    file_offset: Fraction = field(default=Fraction(0))
+    held: bool = False
+    in_file: tuple = field(default=(Fraction(0), False, None))  # offset, negative, limits
+
+    def is_as_written(self):
+        """What is now is what bushd.toml says."""
+        self.in_file = (self.offset, self.negative, self.limits)
 
     # Coordinates.
     def dial(self, steps: int) -> Fraction:
@@ -130,7 +137,55 @@ class Motor:
             floors.append(delay)
         return max(floors)
 
+    def backlash_steps(self) -> int:
+        steps = nearest(self.backlash * self.steps_per_unit)
+        return -steps if self.negative else steps
+
+    def approach_floor(self, floor: int) -> int:
+        if self.backlash_speed is None:
+            return floor
+        return max(floor, above(Fraction(10**9) / (self.backlash_speed * self.steps_per_unit * self.time_unit_ns)))
+
+    def legs(self, at: Optional[int], target: int, floor: int) -> list:
+        """Where each leg of a move ends, and its floor; `at`: None if it moves, so that its direction says nothing."""
+        backlash = self.backlash_steps()
+        if backlash == 0 or at == target:
+            return [(target, floor)]
+        slow = self.approach_floor(floor)
+        from_that_side = at is not None and (target > at) == (backlash > 0)
+        if from_that_side and (slow == floor or abs(target - at) <= abs(backlash)):
+            return [(target, slow)]
+        return [(target - backlash, floor), (target, slow)]
+
+    def direction(self, speed: Fraction, in_steps: bool) -> int:
+        """In steps, of a jog."""
+        return -1 if (speed < 0) != (self.negative and not in_steps) else 1
+
+    def farthest(self, direction: int) -> int:
+        """Where a jog from rest leads; None: it goes on and on."""
+        if self.limits is None:
+            return None
+        low, high = self.step_limits()
+        limit = high if direction > 0 else low
+        if (limit - self.steps) * direction <= 0:
+            raise Refused("stands at or beyond its soft limit")
+        return limit
+
+    def jog(self, speed: Fraction, in_steps: bool) -> int:
+        """From rest: its direction."""
+        self.must_be_free()
+        self.floor(abs(speed), in_steps)
+        direction = self.direction(speed, in_steps)
+        self.farthest(direction)
+        if self.trust == "uncertain":
+            raise Refused("its position is uncertain")
+        return direction
+
     # What may be asked of it.
+    def must_be_free(self):
+        if self.held:
+            raise Refused("it is held")
+
     def targets(self, absolute: bool, amount: Amount, base: int) -> set:
         """Of a move that somebody asks for; `base` is where it stands, or its present target."""
         if absolute:
@@ -139,6 +194,7 @@ class Motor:
             found = {base + self.steps_of_distance(amount)}
         if any(abs(target - (0 if absolute else base)) > 2 * MOST_STEPS for target in found):
             raise Refused("out of range")
+        self.must_be_free()
         if self.trust == "uncertain":
             raise Refused("its position is uncertain")
         if any(abs(target) > MOST_STEPS for target in found):
@@ -161,6 +217,28 @@ class Motor:
     def confirm(self):
         self.trust = "known"
 
+    def configure(self, key: str, value):
+        """`value`: of the offset as people write it, of the direction whether it is negative, of the limits two such
+        texts or None."""
+        if key == "soft_limits":
+            limits = None if value is None else (Fraction(value[0]), Fraction(value[1]))
+            if limits and above(limits[0] * self.steps_per_unit) > below(limits[1] * self.steps_per_unit):
+                raise Refused("has no step from")
+            self.limits = limits
+        elif not self.unit:
+            raise Refused("it has no unit")
+        elif key == "direction":
+            self.negative = value
+        else:
+            self.offset = Fraction(value)
+            self.exact_offset = True
+
+    def is_outside(self) -> bool:
+        if self.limits is None:
+            return False
+        low, high = self.step_limits()
+        return not low <= self.steps <= high
+
     # What happens to it.
     def mcu_restarted(self, in_motion: bool):
         if in_motion and self.trust in ("known", "restored"):
@@ -171,10 +249,11 @@ class Motor:
             self.trust = "restored"
 
     def daemon_restarted(self, kept: bool):
+        self.held = False
         if kept:
             return  # the MCU has counted on
         self.trust = "unconfirmed"
-        self.offset = self.file_offset
+        self.offset, self.negative, self.limits = self.in_file
         self.exact_offset = True
 
     def trust_told(self) -> str:

@@ -46,6 +46,44 @@ class Arithmetic(unittest.TestCase):
         with self.assertRaises(Refused):
             motor.floor(Fraction("0.0009"), False)
 
+    def test_legs(self):
+        motor = Motor("m", unit=True, steps_per_unit=Fraction(400), time_unit_ns=40000, backlash=Fraction("0.1"))
+        self.assertEqual(motor.legs(0, -600, 0), [(-640, 0), (-600, 0)])
+        self.assertEqual(motor.legs(0, 600, 0), [(600, 0)])
+        self.assertEqual(motor.legs(None, 600, 0), [(560, 0), (600, 0)])
+        self.assertEqual(motor.legs(600, 600, 0), [(600, 0)])
+        motor.backlash_speed = Fraction("0.5")
+        self.assertEqual(motor.legs(0, 600, 0), [(560, 0), (600, 125)])
+        self.assertEqual(motor.legs(0, 40, 0), [(40, 125)])
+        self.assertEqual(motor.legs(0, 600, 125), [(600, 125)])
+        motor.negative = True
+        self.assertEqual(motor.legs(0, -600, 0), [(-560, 0), (-600, 125)])
+
+    def test_jogs(self):
+        motor = Motor("m", unit=True, steps_per_unit=Fraction(400), negative=True, limits=(Fraction(-1), Fraction(1)),
+                      time_unit_ns=40000)
+        self.assertEqual(motor.jog(Fraction(1), False), -1)
+        self.assertEqual(motor.jog(Fraction(1), True), 1)
+        self.assertEqual(motor.farthest(-1), -400)
+        motor.steps = 400
+        with self.assertRaises(Refused):
+            motor.jog(Fraction(1), True)
+        motor.held = True
+        with self.assertRaisesRegex(Refused, "held"):
+            motor.jog(Fraction(-1), True)
+
+    def test_settings(self):
+        motor = Motor("m", unit=True, steps_per_unit=Fraction(400), steps=800)
+        motor.is_as_written()
+        motor.configure("offset", "1.5")
+        motor.configure("direction", True)
+        motor.configure("soft_limits", ("-1", "1"))
+        self.assertEqual(motor.user(800), Fraction("-0.5"))
+        self.assertTrue(motor.is_outside())
+        motor.daemon_restarted(False)
+        self.assertEqual(motor.user(800), 2)
+        self.assertFalse(motor.is_outside())
+
 
 if __name__ == "__main__":
     unittest.main()

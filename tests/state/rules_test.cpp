@@ -105,13 +105,5 @@ TEST(Rules, EveryCombination) {
   EXPECT_EQ(combinations, 1024);
 }
 
-TEST(Settings, CountUntilTheFileIsEdited) {
-  const Settings settings{{"offset", {.value = "1.5", .replaces = "0"}}};
-  ASSERT_NE(in_force(settings, "offset", "0"), nullptr);
-  EXPECT_EQ(in_force(settings, "offset", "0")->value, "1.5");
-  EXPECT_EQ(in_force(settings, "offset", "2"), nullptr);
-  EXPECT_EQ(in_force(settings, "direction", "positive"), nullptr);
-}
-
 }  // namespace
 }  // namespace bushd::state

@@ -10,7 +10,6 @@ namespace bushfaults {
 namespace {
 
 constexpr std::int64_t kLongestMove = 6000;
-constexpr std::int64_t kFarthest = 20'000;
 constexpr std::uint32_t kStream = 100;  // of randomness
 
 }  // namespace
@@ -21,7 +20,8 @@ Clients::Clients(const bushd::config::Config& config, const Witness& witness,
       witness_(witness),
       rates_(rates),
       per_hour_(std::accumulate(rates.begin(), rates.end(), 0.0)),
-      random_(seed, kStream) {}
+      random_(seed, kStream),
+      joggers_(seed) {}
 
 bushd::sim::TimeNs Clients::next_after(bushd::sim::TimeNs now_ns) {
   return per_hour_ > 0 ? now_ns + random_.wait(3.6e12 / per_hour_) : bushd::sim::kNever;
@@ -77,8 +77,8 @@ Request Clients::move(std::size_t wanted) {
     const Choice motor = free[index];
     free.erase(free.begin() + static_cast<std::ptrdiff_t>(index));
     std::int64_t steps = random_.magnitude(1, kLongestMove) * (random_.one_in(2) ? 1 : -1);
-    if (motor.position_steps + steps > kFarthest) steps = -std::abs(steps);
-    if (motor.position_steps + steps < -kFarthest) steps = std::abs(steps);
+    if (motor.position_steps + steps > kFarthestSteps) steps = -std::abs(steps);
+    if (motor.position_steps + steps < -kFarthestSteps) steps = std::abs(steps);
     if (random_.one_in(50)) steps = 0;
     request.add(motor.name, absolute ? motor.position_steps + steps : steps);
   }
@@ -100,7 +100,7 @@ Request Clients::retarget() {
     some.erase(some.begin() + static_cast<std::ptrdiff_t>(index));
     const std::int64_t base = random_.one_in(2) ? motor.position_steps : motor.target_steps;
     const std::int64_t away = random_.magnitude(1, kLongestMove) * (random_.one_in(2) ? 1 : -1);
-    const std::int64_t target = std::clamp(base + away, -kFarthest, kFarthest);
+    const std::int64_t target = std::clamp(base + away, -kFarthestSteps, kFarthestSteps);
     request.add(motor.name, absolute ? target : target - motor.target_steps);
   }
   return request;
@@ -125,7 +125,7 @@ Request Clients::stop() {
 Request Clients::set(const std::vector<Choice>& motors) {
   Request request = make(Ask::kSetPosition);
   for (const Choice& motor : motors) {
-    request.add(motor.name, random_.between(-kFarthest / 2, kFarthest / 2));
+    request.add(motor.name, random_.between(-kFarthestSteps / 2, kFarthestSteps / 2));
     if (request.motors.size() == 16) break;
   }
   return request;
@@ -193,7 +193,7 @@ Request Clients::arm() {
   for (std::int64_t n = random_.between(1, 8); n > 0 && !free.empty(); --n) {
     const auto index = static_cast<std::size_t>(random_.below(free.size()));
     std::int64_t steps = random_.magnitude(1, kLongestMove) * (random_.one_in(2) ? 1 : -1);
-    if (std::abs(free[index].position_steps + steps) > kFarthest) steps = -steps;
+    if (std::abs(free[index].position_steps + steps) > kFarthestSteps) steps = -steps;
     request.add(free[index].name, steps);
     free.erase(free.begin() + static_cast<std::ptrdiff_t>(index));
   }
@@ -230,58 +230,6 @@ Request Clients::move_or_retarget() {
   return move(static_cast<std::size_t>(random_.between(1, 4)));
 }
 
-// The same in user units: exactly, a little beside, at the farthest a tie; or about at a limit.
-Request Clients::move_of_user() {
-  Request request = move_or_retarget();
-  const Units& units = witness_.units();
-  request.user = true;
-  for (std::size_t i = 0; i < request.motors.size(); ++i) {
-    const std::size_t motor = index_of(request.motors[i]);
-    const auto limits = units.limits(motor);
-    std::int64_t& amount = request.steps[i];
-    const bool absolute = request.ask == Ask::kMoveTo;
-    if (absolute && limits && random_.one_in(3)) {
-      amount = (random_.one_in(2) ? limits->low : limits->high) + random_.between(-2, 2);
-    }
-    const std::int64_t step = std::abs(units.micro_of_distance(motor, 1));
-    const auto position = units.user_of(motor, amount);
-    amount = absolute ? position.value_or(0) : units.micro_of_distance(motor, amount);
-    if (units.has_unit(motor)) amount += random_.between(-step / 2, step / 2);
-  }
-  return request;
-}
-
-Request Clients::set_of_user() {
-  Request request = make(Ask::kSetPosition);
-  request.user = true;
-  request.dial = random_.one_in(2);
-  std::vector<Choice> some = motors_that(false, false);
-  for (std::int64_t n = random_.between(1, 2); n > 0 && !some.empty(); --n) {
-    const auto index = static_cast<std::size_t>(random_.below(some.size()));
-    const std::size_t motor = index_of(some[index].name);
-    const std::int64_t step = std::abs(witness_.units().micro_of_distance(motor, 1));
-    const std::int64_t beside =
-        witness_.units().has_unit(motor) ? random_.between(-step / 2, step / 2) : 0;
-    request.add(some[index].name, random_.between(-kFarthest / 4, kFarthest / 4) * step + beside);
-    some.erase(some.begin() + static_cast<std::ptrdiff_t>(index));
-  }
-  if (request.motors.empty()) request.add(any_motor(), 0);
-  return request;
-}
-
-// Of a motor at rest, or a change in flight.
-Request Clients::move_at_speed() {
-  Request request = random_.one_in(3) ? move_of_user() : move_or_retarget();
-  const std::int64_t steps_per_s = random_.magnitude(300, 4000);
-  request.speed_in_steps = random_.one_in(2) || request.motors.size() != 1;
-  const std::int64_t step =
-      request.speed_in_steps
-          ? 1'000'000
-          : std::abs(witness_.units().micro_of_distance(index_of(request.motors.front()), 1));
-  request.speed_micro = steps_per_s * step;
-  return request;
-}
-
 bool Clients::says(const char* detail) const {
   return std::any_of(witness_.states().begin(), witness_.states().end(), [&](const auto& state) {
     return state && state->detail.find(detail) != std::string::npos;
@@ -294,7 +242,7 @@ std::optional<Request> Clients::remedy() {
   if (says("drivers disabled")) return enable_all();
   const std::vector<Choice> uncertain = motors_that(false, true);
   if (!uncertain.empty()) return set(uncertain);
-  return std::nullopt;
+  return remedy_of_pauses();
 }
 
 Request Clients::compose(CommandKind kind) {
@@ -336,6 +284,14 @@ Request Clients::compose(CommandKind kind) {
       return set_of_user();
     case CommandKind::kSpeed:
       return move_at_speed();
+    case CommandKind::kLegMove:
+      return move_with_legs();
+    case CommandKind::kJog:
+      return jog();
+    case CommandKind::kMotorPause:
+      return pause_or_hold();
+    case CommandKind::kSettings:
+      return change_settings();
   }
   return nonsense();
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "joggers.h"
 #include "kinds.h"
 #include "request.h"
 #include "sim/line.h"
@@ -27,6 +28,9 @@ class Clients {
   Request stop_all() { return make(Ask::kStop); }
   Request enable_all() { return of_all_online(Ask::kEnable); }
   Request clear_all() { return of_all_online(Ask::kClearFaults); }
+  // What those ask who have begun to jog; before quiet they die.
+  std::vector<Request> due(bushd::sim::TimeNs now_ns) { return joggers_.due(now_ns); }
+  void let_go() { joggers_.die(); }
   // Some MCU stands still after an emergency stop or input, as far as the daemon has said.
   bool emergency() const { return says("emergency"); }
 
@@ -62,18 +66,27 @@ class Clients {
   Request set_of_user();
   Request move_at_speed();
   Request move_or_retarget();
+  Request move_with_legs();
+  Request jog();
+  Request pause_or_hold();
+  Request change_settings();
+  Request of_some(Ask ask, std::vector<std::string> motors);
+  std::vector<std::string> motors_with(bool bushd::api::MotorState::*flag) const;
+  std::optional<Request> remedy_of_pauses();
   std::size_t index_of(const std::string& motor) const;
   std::string any_motor();
   // Motors that the daemon says are at rest (or moving), uncertain (or known).
   std::vector<Choice> motors_that(bool moving, bool uncertain) const;
 
   static constexpr std::size_t kClients = 4;
+  static constexpr std::int64_t kFarthestSteps = 20'000;
 
   const bushd::config::Config& config_;
   const Witness& witness_;
   const CommandRates rates_;
   const double per_hour_;  // of all kinds
   bushd::sim::Random random_;
+  Joggers joggers_;
   CommandCounts sent_by_kind_{};
 };
 

@@ -224,6 +224,7 @@ void Host::publish(bushd::McuId mcu, const bushd::api::StateSnapshot& state) {
 }
 
 void Host::publish(bushd::McuId mcu, const bushd::api::Description& description) {
+  witness_.description(now_ns_, description);
   daemon_->publishing().publish(mcu, description);
 }
 

@@ -20,7 +20,9 @@ constexpr std::array<std::uint32_t, 4> kBauds = {500'000, 1'000'000, 2'000'000, 
 constexpr std::uint32_t kStream = 400;  // of randomness
 constexpr std::uint32_t kHomeStream = 401;
 constexpr std::uint32_t kEmergencyStream = 402;
-constexpr std::uint32_t kInputStream = 403;
+constexpr std::uint32_t kInputStream = 413;
+constexpr std::uint32_t kHomeSpeedStream = 407;
+constexpr std::uint32_t kRequiredStream = 410;
 constexpr std::uint32_t kSwitchStream = 500;  // and the next ones, one for each motor
 constexpr std::uint32_t kLimitStream = 5000;  // likewise
 
@@ -45,6 +47,15 @@ const std::optional<bushd::config::Input>& limit_of(const bushd::config::Motor& 
   return positive ? motor.inputs.positive : motor.inputs.negative;
 }
 
+// Of every second one, in its own unit.
+void add_home_speed(bushd::config::Motor& motor, bushd::sim::Random& random) {
+  const std::int64_t steps_per_s = random.magnitude(600, 4'000);
+  if (random.one_in(2)) return;
+  const bushd::units::Ratio& scale = motor.coordinates.scale().steps_per_unit;
+  motor.home->speed =
+      static_cast<double>(steps_per_s * scale.denominator) / static_cast<double>(scale.numerator);
+}
+
 }  // namespace
 
 bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::size_t mcus,
@@ -56,6 +67,8 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
   }
   bushd::config::Config config;
   config.path = "bushfaults";
+  config.state.required =
+      ways.state_required.value_or(!bushd::sim::Random(seed, kRequiredStream).one_in(4));
   for (const char* name : kTables) {
     const auto path = bushd::tables::find(name, bushd::tables::shipped_directories());
     if (!path) return bushd::fail(path.error());
@@ -91,10 +104,12 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
 
 void furnish(bushd::config::Config& config, const FaultRates& faults, const CommandRates& commands,
              std::uint64_t seed) {
-  const bool units = rate(commands, CommandKind::kUserMove) > 0 ||
-                     rate(commands, CommandKind::kUserSet) > 0 ||
-                     rate(commands, CommandKind::kSpeed) > 0;
+  const bool units =
+      rate(commands, CommandKind::kUserMove) > 0 || rate(commands, CommandKind::kUserSet) > 0 ||
+      rate(commands, CommandKind::kSpeed) > 0 || rate(commands, CommandKind::kLegMove) > 0 ||
+      rate(commands, CommandKind::kJog) > 0 || rate(commands, CommandKind::kSettings) > 0;
   if (units) add_units(config, seed);
+  if (rate(commands, CommandKind::kLegMove) > 0) add_backlash(config, seed);
   if (rate(commands, CommandKind::kHome) > 0) add_homes(config, seed);
   if (rate(faults, FaultKind::kLimitSwitch) > 0) add_limit_switches(config);
   if (rate(faults, FaultKind::kEmergencyInput) > 0) add_emergency_inputs(config, seed);
@@ -102,6 +117,7 @@ void furnish(bushd::config::Config& config, const FaultRates& faults, const Comm
 
 void add_homes(bushd::config::Config& config, std::uint64_t seed) {
   bushd::sim::Random random(seed, kHomeStream);
+  bushd::sim::Random speeds(seed, kHomeSpeedStream);
   for (std::size_t i = 0; i < config.motors.size(); i += 2) {
     bushd::config::Motor& motor = config.motors[i];
     bushd::config::Home home;
@@ -114,6 +130,7 @@ void add_homes(bushd::config::Config& config, std::uint64_t seed) {
     if (limit) (home.positive ? motor.inputs.positive : motor.inputs.negative) = own;
     motor.inputs.home = motor.inputs.own = own;
     motor.home = home;
+    add_home_speed(motor, speeds);
   }
   add_switches(config, seed);
 }
@@ -195,10 +212,11 @@ void add_limit_switches(bushd::config::Config& config) {
 
 std::string ways_text(const bushd::config::Config& config) {
   const bushd::config::Bus& bus = config.buses[0];
-  return fmt::format("--moves {} --frames {} --format {} --emergency {}",
+  return fmt::format("--moves {} --frames {} --format {} --emergency {} --required {}",
                      bus.table_runs ? "table" : "stream", bus.table_ticks ? "auto" : "ticks",
                      bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse",
-                     bus.emergency_stop == BUSHD_STOP_IMMEDIATE ? "immediate" : "ramp");
+                     bus.emergency_stop == BUSHD_STOP_IMMEDIATE ? "immediate" : "ramp",
+                     config.state.required ? "yes" : "no");
 }
 
 }  // namespace bushfaults

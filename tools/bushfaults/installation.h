@@ -21,6 +21,7 @@ struct Ways {
   std::optional<bool> table_ticks;  // frames = "auto", or "ticks"
   std::optional<bushd_format> format;
   std::optional<bushd_stop_mode> emergency_stop;
+  std::optional<bool> state_required;  // [state] required
 };
 
 // Refuses what does not fit: more motors than outputs, or than any line can carry.
@@ -31,9 +32,9 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
 void furnish(bushd::config::Config& config, const FaultRates& faults, const CommandRates& commands,
              std::uint64_t seed);
 
-// Every second motor has a switch to run into and can be homed; most of these switches are limits
-// too. Where an MCU has inputs left, most of these motors have limit switches of their own at both
-// ends.
+// Every second motor has a switch to run into and can be homed, some at a speed; most of these
+// switches are limits too. Where an MCU has inputs left, most of these motors have limit switches
+// of their own at both ends.
 void add_homes(bushd::config::Config& config, std::uint64_t seed);
 void add_switches(bushd::config::Config& config, std::uint64_t seed);
 // Of such a motor, by its index: where the plant has its switch.

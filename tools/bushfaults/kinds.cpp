@@ -57,6 +57,11 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
      "moves and new targets in user units; most motors have a unit then, half limits"},
     {"user-sets", 0, "positions set in user units: of the offset, or of the dial"},
     {"speeds", 0, "moves and new targets with a speed, in steps or user units"},
+    {"leg-moves", 0,
+     "moves and new targets of motors with backlash; every second motor has it then"},
+    {"jogs", 0, "of one motor, renewed and changed until they are ended or their client dies"},
+    {"motor-pauses", 0, "motors are paused, resumed, held and released"},
+    {"settings", 0, "other offsets, directions and soft limits of motors at rest"},
 }};
 
 template <std::size_t kSize>

@@ -67,8 +67,12 @@ enum class CommandKind : std::uint8_t {
   kUserMove,
   kUserSet,
   kSpeed,
+  kLegMove,
+  kJog,
+  kMotorPause,
+  kSettings,
 };
-inline constexpr std::size_t kCommandKinds = 17;
+inline constexpr std::size_t kCommandKinds = 21;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

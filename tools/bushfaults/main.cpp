@@ -83,6 +83,7 @@ int run(int argc, char** argv) {
                         {{"coarse", BUSHD_FORMAT_COARSE}, {"fine", BUSHD_FORMAT_FINE}});
   add_way<bushd_stop_mode>(app, "--emergency", ways.emergency_stop,
                            {{"ramp", BUSHD_STOP_RAMP}, {"immediate", BUSHD_STOP_IMMEDIATE}});
+  add_way<bool>(app, "--required", ways.state_required, {{"no", false}, {"yes", true}});
   app.add_option("--crystal-ppm", options.crystal_ppm, "Largest error of the MCUs' clocks")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();

@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <cstdlib>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 namespace bushfaults {
 namespace {
@@ -17,6 +19,43 @@ std::optional<api::Speed> speed_of(const Request& request) {
   if (request.speed_micro == 0) return std::nullopt;
   return api::Speed{.per_s = static_cast<double>(request.speed_micro) / kMicro,
                     .in_steps = request.speed_in_steps};
+}
+
+api::Jog jog_of(const Request& request) {
+  return {.motor = request.motors.front(),
+          .per_s = static_cast<double>(request.speed_micro) / kMicro,
+          .in_steps = request.speed_in_steps,
+          .keepalive_ms = request.keepalive_ms,
+          .renew = request.renew,
+          .steps_after = request.steps_after};
+}
+
+// "12.345678"
+std::string decimal(std::int64_t micro) {
+  const std::int64_t size = std::abs(micro);
+  return fmt::format("{}{}.{:06}", micro < 0 ? "-" : "", size / 1'000'000, size % 1'000'000);
+}
+
+std::pair<std::string, std::string> key_and_value(const Setting& setting) {
+  switch (setting.key) {
+    case Setting::Key::kOffset:
+      return {"offset", decimal(setting.low)};
+    case Setting::Key::kDirection:
+      return {"direction", setting.low < 0 ? "negative" : "positive"};
+    case Setting::Key::kSoftLimits:
+      break;
+  }
+  if (setting.none) return {"soft_limits", "none"};
+  return {"soft_limits", fmt::format("[{}, {}]", decimal(setting.low), decimal(setting.high))};
+}
+
+api::Configure configure_of(const Request& request) {
+  api::Configure configure{.kind = api::Configure::Kind::kChange};
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    const auto [key, value] = key_and_value(request.settings[i]);
+    configure.changes.push_back({.motor = request.motors[i], .key = key, .value = value});
+  }
+  return configure;
 }
 
 std::vector<api::MotorAmount> motor_steps(const Request& request) {
@@ -81,6 +120,18 @@ api::Request api_of(const Request& request) {
                       .motors = motor_steps(request)};
     case Ask::kConfirm:
       return api::Confirm{request.motors};
+    case Ask::kJog:
+      return jog_of(request);
+    case Ask::kPause:
+      return api::Pause{request.motors};
+    case Ask::kResume:
+      return api::Resume{request.motors};
+    case Ask::kHold:
+      return api::Hold{request.motors};
+    case Ask::kRelease:
+      return api::Release{request.motors};
+    case Ask::kConfigure:
+      return configure_of(request);
     case Ask::kDisarm:
       break;
   }
@@ -113,6 +164,13 @@ std::string text_of(const Request& request) {
   if (request.speed_micro != 0) {
     how += fmt::format(" at {} millionths{}/s", request.speed_micro,
                        request.speed_in_steps ? " of a step" : "");
+  }
+  if (request.renew) how += " (renewed)";
+  if (request.ask == Ask::kJog) how += fmt::format(", {} ms", request.keepalive_ms);
+  if (request.steps_after) how += fmt::format(", {} steps after", *request.steps_after);
+  for (const Setting& setting : request.settings) {
+    const auto [key, value] = key_and_value(setting);
+    how += fmt::format(" {}={}", key, value);
   }
   return fmt::format("{}: {} {} {}{}{}", text_of(request.id()), word_of(request),
                      fmt::join(request.motors, ","), fmt::join(request.steps, ","), how,

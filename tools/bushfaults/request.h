@@ -2,7 +2,9 @@
 // it, and request.cpp alone knows the type of lib/api that it is.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -25,6 +27,21 @@ enum class Ask : std::uint8_t {
   kArm,
   kDisarm,
   kConfirm,
+  kJog,
+  kPause,
+  kResume,
+  kHold,
+  kRelease,
+  kConfigure,
+};
+
+// What a motor may be given in operation. Numbers are millionths of its unit.
+struct Setting {
+  enum class Key : std::uint8_t { kOffset, kDirection, kSoftLimits };
+  Key key{};
+  std::int64_t low = 0;  // the offset; the lower limit; below 0: the direction is negative
+  std::int64_t high = 0;
+  bool none = false;  // no soft limits
 };
 
 // What the network makes of a message that is to be dropped.
@@ -39,10 +56,14 @@ struct Request {
   std::vector<std::int64_t> steps{};  // as many as motors
   bool user = false;                  // they are millionths of each motor's unit
   bool dial = false;                  // kSetPosition: on the dial
-  std::int64_t speed_micro = 0;       // of moves, millionths a second; 0: none
+  std::int64_t speed_micro = 0;       // of moves and jogs, millionths a second; 0: none
   bool speed_in_steps = false;
-  bool rising = false;        // kArm: the edge
-  std::int32_t delay_us = 0;  // kArm
+  std::int64_t keepalive_ms = 0;              // kJog
+  bool renew = false;                         // kJog
+  std::optional<std::int64_t> steps_after{};  // kJog, with speed 0
+  std::vector<Setting> settings{};            // kConfigure: as many as motors
+  bool rising = false;                        // kArm: the edge
+  std::int32_t delay_us = 0;                  // kArm
   Damage damage = Damage::kNone;
 
   void add(const std::string& motor, std::int64_t steps_of_it) {
@@ -53,6 +74,10 @@ struct Request {
   bool is_stop() const { return ask == Ask::kStop || ask == Ask::kEmergencyStop; }
   // Of motors that then have a part in it, each with a result of its own.
   bool is_move() const { return ask == Ask::kMoveBy || ask == Ask::kMoveTo || ask == Ask::kArm; }
+  bool names(const std::string& motor) const {
+    return std::find(motors.begin(), motors.end(), motor) != motors.end();
+  }
+  bool names_or_all(const std::string& motor) const { return motors.empty() || names(motor); }
   // For other motors' homing, or the trigger: nobody knows for how long.
   bool may_wait() const { return ask == Ask::kHome || ask == Ask::kArm; }
 };

@@ -65,6 +65,12 @@ std::string summary_text(const World& world, double processor_s) {
   for (const auto& [result, count] : world.witness().homings_by_result()) {
     text += fmt::format("           {:<17}{:>9}\n", result, count);
   }
+  if (!world.witness().jogs_by_result().empty()) text += "jogs       by result\n";
+  for (const auto& [result, count] : world.witness().jogs_by_result()) {
+    text += fmt::format("           {:<17}{:>9}\n", result, count);
+  }
+  text += fmt::format("legs       {} last approaches, {} rests in pauses\n",
+                      world.witness().approaches(), world.witness().times_paused());
   if (!world.mornings().empty()) text += "mornings   motors by trust\n";
   for (const auto& [trust, count] : world.mornings()) {
     text += fmt::format("           {:<17}{:>9}\n", trust, count);
@@ -91,6 +97,9 @@ std::string summary_json(const World& world) {
       {"not_carried_out", world.witness().promise().not_carried_out()},
       {"moves", world.witness().moves_by_result()},
       {"homings", world.witness().homings_by_result()},
+      {"jogs", world.witness().jogs_by_result()},
+      {"approaches", world.witness().approaches()},
+      {"times_paused", world.witness().times_paused()},
       {"second_daemons_refused", world.second_daemons().found_other},
       {"second_daemons_ran", world.second_daemons().ran},
       {"second_daemons_moves", world.second_daemons().moves_accepted},

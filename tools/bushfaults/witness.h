@@ -49,6 +49,9 @@ class Witness {
   void carried_out(TimeNs now_ns, const Request& request);
   void reply(TimeNs now_ns, const Key& key, const bushd::api::Reply& reply);
   void state(TimeNs now_ns, std::size_t mcu, const bushd::api::StateSnapshot& state);
+  void description(TimeNs now_ns, const bushd::api::Description& said);
+  // From time to time; the plant has come to now_ns.
+  void watch(TimeNs now_ns);
   // A line of the log of moves: there each motor of a group ends by itself.
   void move_log(TimeNs now_ns, const std::string& json_line);
   // Accepted commands that should have had their result by now.
@@ -74,6 +77,10 @@ class Witness {
     return homings_by_result_;
   }
   const std::map<std::string, std::uint64_t>& moves_by_result() const { return moves_by_result_; }
+  const std::map<std::string, std::uint64_t>& jogs_by_result() const { return jogs_by_result_; }
+  // Last approaches that were made, of moves of two legs.
+  std::uint64_t approaches() const { return approaches_; }
+  std::uint64_t times_paused() const { return times_paused_; }
   std::uint64_t steps_commanded() const { return steps_commanded_; }
   // Between the last states and the motors, where the daemon claims to know.
   std::uint64_t steps_unaccounted() const;
@@ -83,24 +90,53 @@ class Witness {
   struct End {
     std::string word;  // of the result
     std::int64_t position_steps;
-    bool moves_on = false;  // by another move; then nobody knows where exactly that began
-    bool agrees(const bushd::api::MotorResult& result) const {
-      return word == bushd::api::word(result.outcome) &&
-             (moves_on || position_steps == result.position_steps);
-    }
+    std::int64_t stands = 0;  // as the plant counts
+    bool moves_on = false;    // by another move; then nobody knows where exactly that began
+    bool paused = false;      // it may be no end, and no other line be written when it comes
+    bool agrees(const bushd::api::MotorResult& result) const;
+  };
+  struct Range {
+    std::int64_t low;
+    std::int64_t high;
+    TimeNs since_ns;
   };
   struct Motor {
     std::string name;
     std::size_t mcu;
     std::size_t output;
-    std::optional<TimeNs> pressed_ns;  // when its limit switch was active last
-    std::optional<Key> move;           // accepted, and this motor's part of it not yet ended
+    std::optional<TimeNs> pressed_ns{};  // when its limit switch was active last
+    std::optional<Key> move{};           // accepted, and this motor's part of it perhaps not ended
     // Where it leads, as the plant counts; nothing after a stop.
-    std::optional<std::int64_t> target;
+    std::optional<std::int64_t> target{};
+    // How its last run ended is told. Unless it is paused, so has its part: another leg begins at
+    // once.
+    bool over = false;
+    bool goes_on = false;            // another run of its part may begin
+    bool stops = false;              // somebody has stopped it
+    bool pauses = false;             // somebody has paused it, and nobody resumed it
+    std::optional<Key> paused_by{};  // the last time
+    // Where its run began, if it began at rest.
+    std::optional<std::int64_t> run_from{};
+    std::optional<Range> range{};  // that it does not leave, as the plant counts
+    bool held = false;
+    int idle_checks = 0;  // of the deadlines, while no motion of it was open
+    std::optional<std::int64_t> held_at{};
+    bool moves() const { return move && !over; }
+    bool stands_paused() const { return move && over && pauses; }
+  };
+  // Of the request that has begun to jog.
+  struct JogOpen {
+    TimeNs renewed_ns;
+    std::int64_t keepalive_ms;
+    std::int64_t floor_ns;                     // of the fastest of its speeds
+    bool let_go = false;                       // by its client, which has not begun again
+    std::optional<std::int64_t> ends_after{};  // steps, from here:
+    std::int64_t ends_from = 0;
   };
   struct Asked {
     Request request{};
     TimeNs since_ns = 0;
+    TimeNs due_since_ns = 0;  // or since it was resumed
     bool accepted = false;
     bool finished = false;  // refused, or its result has come
     // Of moves, by motor: where the plant stood (nothing if it moved) and must stand in the end,
@@ -110,6 +146,14 @@ class Witness {
     std::vector<std::optional<End>> end{};
     std::vector<std::optional<TimeNs>> first_step_ns{};
     std::vector<bool> began{};  // one that waits for the trigger may not
+    // Where its legs must end, as the plant counts, and which one it makes; none: not known.
+    std::vector<std::vector<std::int64_t>> legs{};
+    std::vector<std::size_t> leg{};
+    std::vector<bool> told{};   // how a run of it ended
+    std::vector<bool> stops{};  // somebody has stopped it
+    std::optional<JogOpen> jog{};
+    std::vector<std::uint64_t> changes{};        // of settings
+    std::vector<std::optional<bool>> outside{};  // of its new limits; nothing: it is not known
     std::size_t index_of(const std::string& motor) const {
       const auto& all = request.motors;
       return static_cast<std::size_t>(std::find(all.begin(), all.end(), motor) - all.begin());
@@ -132,8 +176,10 @@ class Witness {
   void refused(const Asked& asked);
   void finished(TimeNs now_ns, const Key& key, const Asked& asked,
                 const bushd::api::Completed& result);
-  void moved(TimeNs now_ns, const Key& key, const Asked& asked, const Motors& motors);
-  void homed(TimeNs now_ns, const Motors& motors);
+  void position_set(const Request& request);
+  void moved(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result,
+             const Motors& motors);
+  void homed(TimeNs now_ns, const Asked& asked, const Motors& motors);
   void forget_some();
   // In steps of the daemon's count. Nothing: it is not known.
   std::optional<std::int64_t> position_asked(const Request& request, std::size_t i) const;
@@ -145,11 +191,37 @@ class Witness {
   std::optional<std::int64_t> target_asked(const Motor& motor, const Request& request,
                                            std::size_t i) const;
   bool trusted(const Motor& motor) const;
+  bool refused_for_good_reason(const Asked& asked, const Motor& motor, std::size_t i,
+                               const std::string& reason) const;
   void check_speed(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index);
+  void check_home_speed(TimeNs now_ns, const Asked& asked, std::size_t index);
+  std::optional<std::int64_t> base_of(const Motor& motor) const;
+  void check_approach(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index);
+  void check_settled(TimeNs now_ns, const Motor& motor, const Asked& asked);
+  // Where the legs of a move there must end, in the plant's count.
+  std::vector<std::int64_t> legs_to(const Motor& motor, const Request& request,
+                                    std::int64_t target) const;
+  void accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::size_t i);
   void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
+  void keep_within(TimeNs now_ns, Motor& motor);
+  void run_begins(TimeNs now_ns, Motor& motor);
+  void run_ended(TimeNs now_ns, Motor& motor, End end);
   void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, const End& end,
                  std::optional<std::int64_t> target);
+  // Jogs, pauses and settings.
+  void jog_accepted(TimeNs now_ns, const Key& key, Asked& asked);
+  Asked* open_jog(const Motor& motor);
+  void jogged(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
+  void check_jog_end(TimeNs now_ns, const Motor& motor, const Asked& asked,
+                     const bushd::api::Completed& result);
+  void stop_accepted(const Request& request);
+  void pause_accepted(TimeNs now_ns, const Request& request);
+  void hold_accepted(const Request& request);
+  void paused(TimeNs now_ns, const Key& key, const std::string& reason);
+  void configure_accepted(Asked& asked);
+  void configured(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
+  void check_deadline(TimeNs now_ns, const Key& key, Asked& asked);
 
   const bushd::config::Config& config_;
   const bushd::sim::Plant& plant_;
@@ -171,6 +243,9 @@ class Witness {
   bool ready(std::size_t mcu) const;
   std::map<std::string, std::uint64_t> moves_by_result_;
   std::map<std::string, std::uint64_t> homings_by_result_;
+  std::map<std::string, std::uint64_t> jogs_by_result_;
+  std::uint64_t approaches_ = 0;
+  std::uint64_t times_paused_ = 0;
   std::uint64_t steps_commanded_ = 0;
 };
 

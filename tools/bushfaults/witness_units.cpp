@@ -55,7 +55,7 @@ std::optional<std::int64_t> Witness::target_asked(const Motor& motor, const Requ
                                                   std::size_t i) const {
   if (!trusted(motor) || !offset(motor)) return std::nullopt;
   if (request.ask == Ask::kMoveTo) return position_asked(request, i);
-  const auto base = motor.move ? motor.target : plant_steps(motor);
+  const auto base = base_of(motor);
   if (!base || std::abs(request.steps[i]) > kMost) return std::nullopt;
   return *base - *offset(motor) + distance_asked(request, i);
 }
@@ -73,45 +73,118 @@ void Witness::check_limits(TimeNs now_ns, const Asked& asked) {
     const auto& motors = states_[motor.mcu]->motors;
     const std::int64_t said =
         std::ranges::find(motors, motor.name, &api::MotorState::name)->position_steps;
-    if (*target >= std::min({limits->low, stands, said}) &&
-        *target <= std::max({limits->high, stands, said})) {
-      continue;
+    const std::int64_t low = std::min({limits->low, stands, said});
+    const std::int64_t high = std::max({limits->high, stands, said});
+    for (const std::int64_t leg : legs_to(motor, request, *target + *offset(motor))) {
+      const std::int64_t end = leg - *offset(motor);
+      if (end >= low && end <= high) continue;
+      violated(now_ns, fmt::format("{} was accepted to go to {}, and its limits are {} and {}: {}",
+                                   motor.name, end, limits->low, limits->high, text_of(request)));
     }
-    violated(now_ns, fmt::format("{} was accepted to go to {}, and its limits are {} and {}: {}",
-                                 motor.name, *target, limits->low, limits->high, text_of(request)));
   }
 }
 
-// "m03: target 12.3 mm is beyond the soft limit at 12 mm; ..."
+// "m03: target 12.3 mm is beyond the soft limit at 12 mm; ...", "m03: the start of its last
+// approach, for backlash: target ...", "m03: stands at or beyond its soft limit, at ..."
 void Witness::check_refusal(TimeNs now_ns, const Asked& asked, const std::string& reason) {
   const Request& request = asked.request;
-  if (reason.find("is beyond the soft limit") == std::string::npos) return;
+  if (reason.find(" beyond the soft limit") == std::string::npos &&
+      reason.find(" beyond its soft limit, at") == std::string::npos) {
+    return;
+  }
   const auto named = std::ranges::find(request.motors, reason.substr(0, reason.find(':')));
   if (named == request.motors.end()) return violated(now_ns, "a limit of no motor: " + reason);
-  const Motor& motor = *find(*named);
-  const auto limits = units_.limits(index_of(motor));
-  if (!limits) return violated(now_ns, "there is no such limit: " + reason);
   const auto i = static_cast<std::size_t>(named - request.motors.begin());
-  const auto target = target_asked(motor, request, i);
-  if (!target || *target < limits->low || *target > limits->high) return;
-  violated(now_ns, fmt::format("refused, and {} is within {} and {}: {}", *target, limits->low,
-                               limits->high, reason));
+  if (refused_for_good_reason(asked, *find(*named), i, reason)) return;
+  violated(now_ns, "no reason to refuse: " + reason);
 }
 
-// From the first step to the last, which came before this is told.
+bool Witness::refused_for_good_reason(const Asked& asked, const Motor& motor, std::size_t i,
+                                      const std::string& reason) const {
+  const Request& request = asked.request;
+  const auto limits = units_.limits(index_of(motor));
+  if (!limits) return false;
+  if (request.ask == Ask::kJog) {
+    if (!trusted(motor) || !offset(motor)) return true;
+    const std::int64_t at = plant_steps(motor) - *offset(motor);
+    return request.speed_micro > 0 ? at >= limits->high : at <= limits->low;
+  }
+  const auto target = target_asked(motor, request, i);
+  if (!target) return true;
+  const auto legs = legs_to(motor, request, *target + *offset(motor));
+  const bool of_start = reason.find("for backlash") != std::string::npos;
+  if (of_start && legs.size() == 1) return motor.move && motor.over;
+  const std::int64_t end = (of_start ? legs.front() : legs.back()) - *offset(motor);
+  return end < limits->low || end > limits->high;
+}
+
+// Of a run: from the first step to the last, which came before this is told.
 void Witness::check_speed(TimeNs now_ns, const Motor& motor, const Asked& asked,
                           std::size_t index) {
-  const std::int64_t floor_ns = units_.floor_ns(index_of(motor), asked.request);
-  if (floor_ns == 0) return;
-  const std::int64_t steps = std::abs(plant_steps(motor) - *asked.from[index]);
+  const std::size_t of = index_of(motor);
+  const auto& legs = asked.legs[index];
+  const bool last = !legs.empty() && asked.leg[index] + 1 == legs.size();
+  const bool approach = last && asked.request.ask != Ask::kArm && units_.backlash_steps(of) != 0;
+  const std::int64_t floor_ns =
+      approach ? units_.approach_floor_ns(of, asked.request) : units_.floor_ns(of, asked.request);
+  if (floor_ns == 0 || asked.jog || !motor.run_from) return;
+  const std::int64_t steps = std::abs(plant_steps(motor) - *motor.run_from);
   // A tick, in which steps lie on a line; and crystals.
   const TimeNs least_ns =
       (steps - 1) * (floor_ns - floor_ns / 1000) - 2 * config_.buses[0].tick_ns();
-  const TimeNs took_ns = now_ns - *asked.first_step_ns[index];
+  const TimeNs took_ns = now_ns - plant_.first_step_ns(motor.mcu, motor.output);
   if (took_ns >= least_ns) return;
   violated(now_ns,
            fmt::format("{} made {} steps in {} us, and one takes {} us at least: {}", motor.name,
                        steps, took_ns / 1000, floor_ns / 1000, text_of(asked.request)));
+}
+
+void Witness::check_home_speed(TimeNs now_ns, const Asked& asked, std::size_t index) {
+  const Motor& motor = *find(asked.request.motors[index]);
+  const auto& home = config_.motors[index_of(motor)].home;
+  const auto& from = asked.from[index];
+  if (!home || !home->speed || !from) return;
+  const Request at_speed{.client = {},
+                         .ask = Ask::kHome,
+                         .speed_micro = static_cast<std::int64_t>(*home->speed * 1e6)};
+  const std::int64_t floor_ns = units_.floor_ns(index_of(motor), at_speed);
+  const std::int64_t steps = std::abs(plant_steps(motor) - *from);
+  if (now_ns - asked.since_ns >= steps * (floor_ns - floor_ns / 1000)) return;
+  violated(now_ns, fmt::format("{} made {} steps to its home, too fast", motor.name, steps));
+}
+
+// Its target is reached from the side that its backlash names, and from as far.
+void Witness::check_approach(TimeNs now_ns, const Motor& motor, const Asked& asked,
+                             std::size_t index) {
+  const std::int64_t backlash = units_.backlash_steps(index_of(motor));
+  if (backlash == 0 || asked.jog || asked.request.ask == Ask::kArm) return;
+  const std::int64_t stands = plant_steps(motor);
+  if (!motor.run_from) {
+    return violated(now_ns, motor.name + " has made no last approach: " + text_of(asked.request));
+  }
+  const std::int64_t way = stands - *motor.run_from;
+  const auto& legs = asked.legs[index];
+  approaches_ += legs.size() > 1 ? 1u : 0u;
+  const bool right_side = way == 0 || (way > 0) == (backlash > 0);
+  // Paused on its way, it may have begun again nearer.
+  if (right_side && (legs.size() < 2 || std::abs(way) <= std::abs(backlash))) return;
+  violated(now_ns, fmt::format("{} came {} steps to its target, and its backlash is {}: {}",
+                               motor.name, way, backlash, text_of(asked.request)));
+}
+
+// Two ticks: reports are of whole ones, and crystals differ.
+void Witness::check_settled(TimeNs now_ns, const Motor& motor, const Asked& asked) {
+  const auto& run_from = motor.run_from;
+  const std::int64_t stands = plant_steps(motor);
+  if (motor.stops || motor.pauses || !run_from || stands == *run_from) return;
+  const std::int64_t settle_ns = config_.motors[index_of(motor)].settle_ms * 1'000'000;
+  const TimeNs since_ns = now_ns - settle_ns + 2 * config_.buses[0].tick_ns();
+  if (since_ns >= now_ns ||
+      plant_.position_steps_before(motor.mcu, motor.output, since_ns) == stands) {
+    return;
+  }
+  violated(now_ns, fmt::format("{} has not stood for {} ms: {}", motor.name, settle_ns / 1'000'000,
+                               text_of(asked.request)));
 }
 
 }  // namespace bushfaults

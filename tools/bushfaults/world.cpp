@@ -124,6 +124,7 @@ void World::spell_of_trouble(TimeNs until_ns) {
       }
       next_command_ns_ = clients_.next_after(now_ns_);
     }
+    for (const Request& request : clients_.due(now_ns_)) mail_.send(now_ns_, request);
     if (now_ns_ - deadlines_checked_ns_ >= kSecond) {
       witness_.check_deadlines(now_ns_);
       deadlines_checked_ns_ = now_ns_;
@@ -137,6 +138,7 @@ void World::calm() {
   run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(),
                       mail_.quiet_ns(), second_->over_ns()}));
   mail_.settle();
+  clients_.let_go();
   const TimeNs began_ns = now_ns_;
   mail_.send(now_ns_, clients_.stop_all());
   be_well(began_ns);
@@ -183,6 +185,7 @@ void World::advance(TimeNs until_ns) {
   if (wrong_of_second) witness_.violated(now_ns_, *wrong_of_second);
   if (now_ns_ - skew_checked_ns_ < kSkewPeriodNs) return;
   skew_checked_ns_ = now_ns_;
+  witness_.watch(now_ns_);
   if (const auto wrong = skew_.check(now_ns_)) witness_.violated(now_ns_, *wrong);
 }
 

@@ -82,8 +82,8 @@ class World {
   void disturb_disk();
   void night();
   using Evening = std::vector<std::optional<bushd::api::StateSnapshot>>;
-  std::optional<std::string> wrong_morning(const Evening& evening,
-                                           const std::vector<bool>& dark) const;
+  std::optional<std::string> wrong_morning(const Evening& evening, const std::vector<bool>& dark,
+                                           bool of_pc) const;
   void deafen_mcu();
   bool is_up(std::size_t mcu) const;
   void note_fault(FaultKind kind, const std::string& detail);

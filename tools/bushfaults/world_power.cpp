@@ -77,7 +77,7 @@ void World::night() {
   if (of_pc) host_.cut_power(now_ns_, now_ns_ + random.magnitude(10 * kMs, kSecond));
   run_until(std::max(host_.faults_over_ns(), mcus_up_ns_));
   const TimeNs began_ns = now_ns_;
-  const auto wrong = [&] { return wrong_morning(evening, dark); };
+  const auto wrong = [&] { return wrong_morning(evening, dark, of_pc); };
   while (now_ns_ < began_ns + kMorningNs && wrong() && !witness_.violation()) {
     run_until(now_ns_ + 100 * kMs);
   }
@@ -89,7 +89,7 @@ void World::night() {
 }
 
 std::optional<std::string> World::wrong_morning(const Evening& evening,
-                                                const std::vector<bool>& dark) const {
+                                                const std::vector<bool>& dark, bool of_pc) const {
   for (std::size_t mcu = 0; mcu < evening.size(); ++mcu) {
     if (!evening[mcu] || evening[mcu]->state == bushd::api::McuState::kOffline) continue;
     const auto& morning = witness_.states()[mcu];
@@ -98,10 +98,12 @@ std::optional<std::string> World::wrong_morning(const Evening& evening,
       const bushd::api::MotorState& before = evening[mcu]->motors[i];
       const bushd::api::MotorState& now = morning->motors[i];
       if (before.moving || before.activity != bushd::api::Activity::kResting) continue;
-      // Nobody may have told where it stands, or steps were lost: that stays.
-      const Trust expected = !is_good(before.trust) ? Trust::kUncertain
-                             : !dark[mcu]           ? before.trust
-                                                    : Trust::kRestored;
+      // Nobody may have told where it stands, or steps were lost: that stays. And a daemon that may
+      // move motors without telling the disk leaves nothing behind that is trusted.
+      const bool lost = dark[mcu] && of_pc && !config_.state.required;
+      const Trust expected = !is_good(before.trust) || lost ? Trust::kUncertain
+                             : !dark[mcu]                   ? before.trust
+                                                            : Trust::kRestored;
       if (now.trust == expected) continue;
       return fmt::format("{} was {} in the evening, {} {}, and is {} in the morning ({})",
                          before.name, word(before.trust), config_.mcus[mcu].id,

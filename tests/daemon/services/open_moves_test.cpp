@@ -13,7 +13,7 @@ using test::Bench;
 TEST(OpenMoves, AMoveIsAnsweredOnceWhenItsLastMotorHasEnded) {
   Bench bench;
   OpenMoves moves(bench.installation);
-  moves.open(bench.asker(5), {{0}, {3}});
+  moves.open(bench.asker(5), {{0}, {3}}, OpenMoves::Purpose::kMove);
   EXPECT_TRUE(moves.together({0}, {3}));
   ASSERT_NE(moves.asker_of({3}), nullptr);
   EXPECT_EQ(text_of(*moves.asker_of({3})), "command 5 of test");
@@ -40,24 +40,24 @@ TEST(OpenMoves, OfOneThatWasStoppedTheReasonSaysByWhom) {
   OpenMoves moves(bench.installation);
   std::vector<std::string> told;
   moves.set_listener([&](const OpenMoves::Ended& ended) { told.push_back(ended.reason); });
-  moves.stopped_by({0}, "nobody, as it was in no move then");
+  moves.stopped_by({MotorId{0}}, "nobody, as it was in no move then");
   const auto reason_of = [&](api::Outcome outcome) {
     moves.end({0}, outcome, "ended");
     EXPECT_EQ(bench.completed().reason, "m01: " + told.back());
     return told.back();
   };
-  moves.open(bench.asker(1), {{0}});
+  moves.open(bench.asker(1), {{0}}, OpenMoves::Purpose::kMove);
   EXPECT_EQ(reason_of(api::Outcome::kStopped), "ended");
-  moves.open(bench.asker(2), {{0}});
-  moves.stopped_by({0}, "command 7 of test");
+  moves.open(bench.asker(2), {{0}}, OpenMoves::Purpose::kMove);
+  moves.stopped_by({MotorId{0}}, "command 7 of test");
   EXPECT_EQ(reason_of(api::Outcome::kStopped), "ended, asked for by command 7 of test");
-  moves.open(bench.asker(3), {{0}});
-  moves.stopped_by({0}, "command 8 of test");
+  moves.open(bench.asker(3), {{0}}, OpenMoves::Purpose::kMove);
+  moves.stopped_by({MotorId{0}}, "command 8 of test");
   EXPECT_EQ(reason_of(api::Outcome::kReached), "ended") << "it came too late";
-  moves.open(bench.asker(4), {{0}});
+  moves.open(bench.asker(4), {{0}}, OpenMoves::Purpose::kMove);
   EXPECT_EQ(reason_of(api::Outcome::kStopped), "ended") << "that was of the one before";
-  moves.open(bench.asker(5), {{0}});
-  moves.stopped_by({0}, "command 9 of test");
+  moves.open(bench.asker(5), {{0}}, OpenMoves::Purpose::kMove);
+  moves.stopped_by({MotorId{0}}, "command 9 of test");
   moves.not_stopped({0});
   EXPECT_EQ(reason_of(api::Outcome::kStopped), "ended");
 }

@@ -1,0 +1,154 @@
+// What clients ask of an instrument: moves in user units, with speeds and with legs, jogs, pauses,
+// and other settings.
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "clients.h"
+
+namespace bushfaults {
+
+// The same in user units: exactly, a little beside, at the farthest a tie; or about at a limit.
+Request Clients::move_of_user() {
+  Request request = move_or_retarget();
+  const Units& units = witness_.units();
+  request.user = true;
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    const std::size_t motor = index_of(request.motors[i]);
+    const auto limits = units.limits(motor);
+    std::int64_t& amount = request.steps[i];
+    const bool absolute = request.ask == Ask::kMoveTo;
+    if (absolute && limits && random_.one_in(3)) {
+      amount = (random_.one_in(2) ? limits->low : limits->high) + random_.between(-2, 2);
+    }
+    const std::int64_t step = std::abs(units.micro_of_distance(motor, 1));
+    const auto position = units.user_of(motor, amount);
+    amount = absolute ? position.value_or(0) : units.micro_of_distance(motor, amount);
+    if (units.has_unit(motor)) amount += random_.between(-step / 2, step / 2);
+  }
+  return request;
+}
+
+Request Clients::set_of_user() {
+  Request request = make(Ask::kSetPosition);
+  request.user = true;
+  request.dial = random_.one_in(2);
+  std::vector<Choice> some = motors_that(false, false);
+  for (std::int64_t n = random_.between(1, 2); n > 0 && !some.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(some.size()));
+    const std::size_t motor = index_of(some[index].name);
+    const std::int64_t step = std::abs(witness_.units().micro_of_distance(motor, 1));
+    const std::int64_t beside =
+        witness_.units().has_unit(motor) ? random_.between(-step / 2, step / 2) : 0;
+    request.add(some[index].name,
+                random_.between(-kFarthestSteps / 4, kFarthestSteps / 4) * step + beside);
+    some.erase(some.begin() + static_cast<std::ptrdiff_t>(index));
+  }
+  if (request.motors.empty()) request.add(any_motor(), 0);
+  return request;
+}
+
+// Of a motor at rest, or a change in flight.
+Request Clients::move_at_speed() {
+  Request request = random_.one_in(3) ? move_of_user() : move_or_retarget();
+  const std::int64_t steps_per_s = random_.magnitude(300, 4000);
+  request.speed_in_steps = random_.one_in(2) || request.motors.size() != 1;
+  const std::int64_t step =
+      request.speed_in_steps
+          ? 1'000'000
+          : std::abs(witness_.units().micro_of_distance(index_of(request.motors.front()), 1));
+  request.speed_micro = steps_per_s * step;
+  return request;
+}
+
+// In steps or in user units, with a speed or without; of those that have backlash.
+Request Clients::move_with_legs() {
+  Request request = random_.one_in(3) ? move_of_user() : move_or_retarget();
+  for (std::size_t i = request.motors.size(); i-- > 0 && request.motors.size() > 1;) {
+    if (config_.motors[index_of(request.motors[i])].backlash != 0) continue;
+    request.motors.erase(request.motors.begin() + static_cast<std::ptrdiff_t>(i));
+    request.steps.erase(request.steps.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  // Sometimes so near that it may be straight.
+  if (random_.one_in(2)) {
+    for (std::int64_t& amount : request.steps) {
+      if (request.ask == Ask::kMoveBy && !request.user) amount = random_.between(-500, 500);
+    }
+  }
+  return request;
+}
+
+Request Clients::jog() {
+  std::vector<Choice> some = motors_that(random_.one_in(4), false);
+  return joggers_.begin(some.empty() ? any_motor() : random_.pick(some).name);
+}
+
+std::vector<std::string> Clients::motors_with(bool bushd::api::MotorState::*flag) const {
+  std::vector<std::string> found;
+  for (const auto& state : witness_.states()) {
+    if (!state) continue;
+    for (const bushd::api::MotorState& motor : state->motors) {
+      if (motor.*flag) found.push_back(motor.name);
+    }
+  }
+  return found;
+}
+
+// Of one to eight of these; of all, now and then.
+Request Clients::of_some(Ask ask, std::vector<std::string> motors) {
+  Request request = make(ask);
+  if (random_.one_in(8)) return request;
+  for (std::int64_t n = random_.magnitude(1, 8); n > 0 && !motors.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(motors.size()));
+    request.add(motors[index], 0);
+    motors.erase(motors.begin() + static_cast<std::ptrdiff_t>(index));
+  }
+  if (request.motors.empty()) request.add(any_motor(), 0);
+  return request;
+}
+
+Request Clients::pause_or_hold() {
+  switch (random_.below(8)) {
+    case 0:
+      return of_some(Ask::kHold, {any_motor(), config_.motors.front().name});
+    case 1:
+      return of_some(Ask::kRelease, motors_with(&bushd::api::MotorState::held));
+    case 2:
+    case 3:
+      return of_some(Ask::kResume, motors_with(&bushd::api::MotorState::paused));
+    default:
+      return of_some(Ask::kPause, motors_with(&bushd::api::MotorState::moving));
+  }
+}
+
+// What is paused or held is not left so for long.
+std::optional<Request> Clients::remedy_of_pauses() {
+  const auto held = motors_with(&bushd::api::MotorState::held);
+  if (!held.empty() && random_.one_in(6)) return make(Ask::kRelease);
+  const auto paused = motors_with(&bushd::api::MotorState::paused);
+  if (!paused.empty() && random_.one_in(6)) return of_some(Ask::kResume, paused);
+  return std::nullopt;
+}
+
+Request Clients::change_settings() {
+  constexpr std::int64_t kMicro = 1'000'000;
+  Request request = make(Ask::kConfigure);
+  std::vector<Choice> some = motors_that(random_.one_in(20), false);
+  const std::string motor = some.empty() ? any_motor() : random_.pick(some).name;
+  const std::int64_t step = std::abs(witness_.units().micro_of_distance(index_of(motor), 1));
+  for (std::int64_t n = random_.between(1, 2); n > 0; --n) {
+    Setting setting{.key = static_cast<Setting::Key>(random_.below(3))};
+    if (setting.key == Setting::Key::kOffset) setting.low = random_.between(-50, 50) * kMicro + n;
+    if (setting.key == Setting::Key::kDirection) setting.low = random_.one_in(2) ? 1 : -1;
+    if (setting.key == Setting::Key::kSoftLimits) {
+      setting.none = random_.one_in(3);
+      setting.low = -random_.magnitude(10, 15'000) * step - random_.between(0, 999);
+      setting.high = random_.magnitude(10, 15'000) * step + random_.between(0, 999);
+    }
+    request.add(motor, 0);
+    request.settings.push_back(setting);
+  }
+  return request;
+}
+
+}  // namespace bushfaults

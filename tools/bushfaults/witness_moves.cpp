@@ -1,0 +1,308 @@
+// The part of the witness that is about motions: what is accepted, each run of it, and its end.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "witness.h"
+
+namespace bushfaults {
+namespace {
+
+namespace api = bushd::api;
+
+// A daemon may not have heard for as long that a switch is active, and a move may take as long
+// to its end.
+constexpr bushd::sim::TimeNs kBarredNs = 40'000'000'000;
+
+std::vector<std::string> names_of(const std::vector<api::MotorResult>& motors) {
+  std::vector<std::string> names;
+  for (const api::MotorResult& motor : motors) names.push_back(motor.motor);
+  return names;
+}
+
+}  // namespace
+
+bool Witness::End::agrees(const api::MotorResult& result) const {
+  // One that stands, paused, may end by what happens to its MCU.
+  const bool of_mcu =
+      paused && (result.outcome == api::Outcome::kLink || result.outcome == api::Outcome::kFault);
+  return (of_mcu || word == api::word(result.outcome)) &&
+         (moves_on || position_steps == result.position_steps);
+}
+
+void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
+  const Request& request = asked.request;
+  check_limits(now_ns, asked);
+  if (request.is_stop()) stop_accepted(request);
+  if (request.ask == Ask::kPause || request.ask == Ask::kResume) pause_accepted(now_ns, request);
+  if (request.ask == Ask::kHold || request.ask == Ask::kRelease) hold_accepted(request);
+  if (request.ask == Ask::kConfigure) configure_accepted(asked);
+  if (request.ask == Ask::kJog) return jog_accepted(now_ns, key, asked);
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    Motor& motor = *find(request.motors[i]);
+    if (request.is_move() || request.ask == Ask::kHome) {
+      accepted_motion(now_ns, key, asked, i);
+    } else if (request.ask == Ask::kSetPosition) {
+      position_accepted(request, i);
+      motor.range.reset();
+    } else if (request.ask == Ask::kConfirm) {
+      positions_.may_be_confirmed(index_of(motor));
+      motor.range.reset();
+    }
+  }
+}
+
+void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::size_t i) {
+  const Request& request = asked.request;
+  Motor& motor = *find(request.motors[i]);
+  const std::int64_t stands = plant_steps(motor);
+  if (motor.held) violated(now_ns, motor.name + " is held, and may move: " + text_of(request));
+  forget_unbegun(motor);
+  std::optional<std::int64_t> target;
+  if (request.ask == Ask::kMoveBy || request.ask == Ask::kArm) {
+    const auto base = base_of(motor);
+    if (base) target = *base + distance_asked(request, i);
+  } else if (const auto position = position_asked(request, i);
+             request.ask == Ask::kMoveTo && offset(motor) && position) {
+    target = *offset(motor) + *position;
+  }
+  // One that is stopped where it was paused may not have ended so far.
+  const bool known = target && !(motor.move && motor.over && motor.stops);
+  asked.legs.push_back(known ? legs_to(motor, request, *target) : std::vector<std::int64_t>());
+  asked.leg.push_back(0);
+  asked.target.push_back(target);
+  asked.from.push_back(motor.moves() ? std::nullopt : std::optional(stands));
+  asked.end.emplace_back();
+  asked.first_step_ns.emplace_back();
+  asked.began.push_back(request.ask != Ask::kArm);
+  asked.told.push_back(false);
+  asked.stops.push_back(false);
+  motor.range.reset();
+  if (request.ask == Ask::kHome) {
+    motor.move.reset();
+    return positions_.may_be_homed(index_of(motor));
+  }
+  take_over(motor, key, target);
+  keep_within(now_ns, motor);
+  if (target) steps_commanded_ += static_cast<std::uint64_t>(std::abs(*target - stands));
+}
+
+// What a relative move counts from, as the plant counts.
+std::optional<std::int64_t> Witness::base_of(const Motor& motor) const {
+  if (motor.moves()) return motor.target;
+  if (!motor.stands_paused()) return plant_steps(motor);
+  // Nobody has told whether it is paused, or has come to its end while others of it move.
+  if (asked_.at(*motor.move).request.motors.size() == 1) return motor.target;
+  return std::nullopt;
+}
+
+// As the EPICS motor record does it. One that moves always makes both.
+std::vector<std::int64_t> Witness::legs_to(const Motor& motor, const Request& request,
+                                           std::int64_t target) const {
+  const std::size_t index = index_of(motor);
+  const std::int64_t backlash = units_.backlash_steps(index);
+  const std::int64_t way = target - plant_steps(motor);
+  const bool rests = !motor.moves();
+  if (request.ask == Ask::kArm || backlash == 0 || (rests && way == 0)) return {target};
+  const bool near =
+      std::abs(way) <= std::abs(backlash) || !units_.approach_is_slower(index, request);
+  if (rests && (way > 0) == (backlash > 0) && near) return {target};
+  return {target - backlash, target};
+}
+
+// One that has waited for the trigger in vain is at rest again before the others that waited with
+// it have ended, and with them the move.
+void Witness::forget_unbegun(Motor& motor) {
+  if (!motor.move) return;
+  const Asked& asked = asked_.at(*motor.move);
+  if (!asked.began[asked.index_of(motor.name)]) motor.move.reset();
+}
+
+// A motor that moves belongs to the newest move; its part of the one before has ended.
+void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target) {
+  if (motor.moves() || motor.stands_paused()) {
+    Asked& before = asked_.at(*motor.move);
+    before.end[before.index_of(motor.name)] = End{
+        .word = "stopped", .position_steps = 0, .moves_on = true, .paused = motor.stands_paused()};
+  }
+  motor.run_from.reset();
+  motor.move = by;
+  motor.target = target;
+  motor.over = motor.goes_on = motor.stops = motor.pauses = false;
+  motor.idle_checks = 0;
+}
+
+// Soft limits hold for all that it does until something else is asked of it.
+void Witness::keep_within(TimeNs now_ns, Motor& motor) {
+  motor.range.reset();
+  const auto limits = units_.limits(index_of(motor));
+  if (!limits || !offset(motor) || !trusted(motor)) return;
+  const std::int64_t stands = plant_steps(motor) - *offset(motor);
+  const auto& motors = states_[motor.mcu]->motors;
+  const std::int64_t said =
+      std::ranges::find(motors, motor.name, &api::MotorState::name)->position_steps;
+  motor.range = Range{.low = std::min({limits->low, stands, said}) + *offset(motor),
+                      .high = std::max({limits->high, stands, said}) + *offset(motor),
+                      .since_ns = now_ns};
+}
+
+void Witness::position_set(const Request& request) {
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    const std::size_t motor = index_of(*find(request.motors[i]));
+    if (sets_offset(units_, motor, request)) continue;
+    if (const auto set = position_asked(request, i)) positions_.was_set(motor, *set);
+  }
+}
+
+void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
+                       const api::Completed& completed) {
+  const Request& request = asked.request;
+  const bool done = completed.outcome == api::Outcome::kDone;
+  if (request.ask == Ask::kSetPosition && done) position_set(request);
+  if (request.ask == Ask::kConfigure) configured(now_ns, asked, completed);
+  if (request.ask == Ask::kPause) paused(now_ns, key, completed.reason);
+  if (request.ask == Ask::kJog && asked.jog) jogged(now_ns, asked, completed);
+  const bool homes = request.ask == Ask::kHome;
+  if (homes || request.is_move()) {
+    ++(homes ? homings_by_result_ : moves_by_result_)[std::string(word(completed.outcome))];
+    const auto* motors = std::get_if<Motors>(&completed.detail);
+    if (motors == nullptr || names_of(*motors) != request.motors) {
+      return violated(now_ns, "a result of other motors: " + text_of(request));
+    }
+    if (homes) {
+      homed(now_ns, asked, *motors);
+    } else {
+      moved(now_ns, asked, completed, *motors);
+    }
+  }
+  for (const std::string& name : request.motors) {
+    if (Motor* motor = find(name); motor != nullptr && motor->move == key) motor->move.reset();
+  }
+}
+
+void Witness::moved(TimeNs now_ns, const Asked& asked, const api::Completed& completed,
+                    const Motors& motors) {
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const api::MotorResult& result = motors[i];
+    const auto& end = asked.end[i];
+    const auto& legs = asked.legs[i];
+    // No line of the log tells how one that never began ended, and it can have reached nothing.
+    const bool unbegun = asked.request.ask == Ask::kArm && !asked.began[i];
+    if (unbegun && result.outcome != api::Outcome::kReached) continue;
+    if (!end || !end->agrees(result)) {
+      violated(now_ns, fmt::format("{} ended otherwise than its result says: {} at {}",
+                                   result.motor, word(result.outcome), result.position_steps));
+    } else if (result.outcome == api::Outcome::kReached && !legs.empty() &&
+               (end->stands != legs.back() ||
+                static_cast<std::size_t>(result.legs) != legs.size())) {
+      violated(now_ns,
+               fmt::format("{} is said to have reached its target in {} legs of {}, and "
+                           "stands {} steps off",
+                           result.motor, result.legs, legs.size(), end->stands - legs.back()));
+    }
+    if (completed.reason.starts_with(result.motor + ": stopped on request") && !asked.stops[i]) {
+      violated(now_ns, "nobody has stopped it: " + completed.reason);
+    }
+  }
+  const auto wrong = starts_.check(asked.request, asked.first_step_ns);
+  if (wrong) violated(now_ns, *wrong);
+}
+
+void Witness::homed(TimeNs now_ns, const Asked& asked, const Motors& motors) {
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const api::MotorResult& result = motors[i];
+    if (result.outcome != api::Outcome::kReached) continue;
+    const std::size_t motor = index_of(*find(result.motor));
+    const auto wrong = positions_.was_homed(motor, result.position_steps);
+    if (wrong) violated(now_ns, *wrong);
+    check_home_speed(now_ns, asked, i);
+  }
+}
+
+void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
+  const nlohmann::json line = nlohmann::json::parse(json_line);
+  if (line.at("event") == "autonomous") {
+    const std::size_t index = index_of(*find(line.at("motor").get<std::string>()));
+    if (line.at("set")) positions_.homed(index, line.at("position_steps"));
+    return;
+  }
+  const bool begins = line.at("event") == "move";
+  if (!begins && line.at("event") != "result") return;
+  Motor& motor = *find(line.at("motor").get<std::string>());
+  if (begins && motor.move) return run_begins(now_ns, motor);
+  if (begins) return;
+  if (!motor.move) return violated(now_ns, motor.name + " ended without a move");
+  run_ended(now_ns, motor,
+            {.word = line.at("result"), .position_steps = line.at("position_steps")});
+}
+
+void Witness::run_begins(TimeNs now_ns, Motor& motor) {
+  Asked& asked = asked_.at(*motor.move);
+  const std::size_t index = asked.index_of(motor.name);
+  asked.began[index] = true;
+  if (motor.over && !motor.goes_on) violated(now_ns, motor.name + " moves on after its end");
+  motor.over = motor.goes_on = false;
+  // The trigger may have begun it a while ago.
+  motor.run_from = asked.request.ask == Ask::kArm ? asked.from[index] : plant_steps(motor);
+}
+
+void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
+  Asked& asked = asked_.at(*motor.move);
+  const std::size_t index = asked.index_of(motor.name);
+  const auto& legs = asked.legs[index];
+  std::size_t& leg = asked.leg[index];
+  if (motor.over) return violated(now_ns, motor.name + " ended twice");
+  motor.over = true;
+  end.stands = plant_steps(motor);
+  end.paused = end.word == "stopped" && motor.pauses;
+  std::optional<std::int64_t> target;
+  if (end.word == "reached" && !legs.empty()) target = legs[leg];
+  check_end(now_ns, motor, asked, end, target);
+  const bool exact = asked.request.ask != Ask::kArm;
+  const bool planned =
+      end.word == "reached" || end.word == "turned" || (end.word == "stopped" && exact);
+  const auto& from = asked.from[index];
+  // One that waited for the trigger and was stopped before its first step makes it in a streamed
+  // tick, up to one late.
+  if (planned && !asked.told[index] && from && end.stands != *from) {
+    asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
+  }
+  asked.told[index] = true;
+  if (end.word == "reached") check_speed(now_ns, motor, asked, index);
+  const bool last = leg + 1 >= legs.size();
+  const bool unknown = legs.empty() && units_.backlash_steps(index_of(motor)) != 0;
+  motor.goes_on = end.word == "turned" || (end.word == "reached" && (!last || unknown));
+  if (end.word == "reached" && last && !unknown) {
+    check_approach(now_ns, motor, asked, index);
+    check_settled(now_ns, motor, asked);
+  }
+  // A pause may come where a leg ends.
+  const bool there = end.word == "reached" || (end.paused && !last && end.stands == legs[leg]);
+  if (there && !last) ++leg;
+  if (end.word != "stopped") motor.pauses = false;
+  if (end.paused) ++times_paused_;
+  asked.end[index] = std::move(end);
+}
+
+void Witness::check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, const End& end,
+                        std::optional<std::int64_t> target) {
+  const std::int64_t stands = end.stands;
+  const bool limited = end.word == "limit";
+  const bool planned =
+      end.word == "reached" || end.word == "stopped" || end.word == "turned" || limited;
+  if (limited && (!motor.pressed_ns || now_ns - *motor.pressed_ns > kBarredNs)) {
+    violated(now_ns, motor.name + " ended at its limit, and nobody has pressed its switch");
+  } else if (end.word == "fault" && second_ns_ < asked.since_ns) {
+    violated(now_ns, fmt::format("{} ended in fault at {}", motor.name, end.position_steps));
+  } else if (end.word == "reached" && target && *target != stands) {
+    violated(now_ns, fmt::format("{} is said to have reached its target, and stands {} steps off",
+                                 motor.name, stands - *target));
+  } else if (planned && offset(motor) && stands - *offset(motor) != end.position_steps) {
+    violated(now_ns, fmt::format("{} {} at {}, but stands at {}", motor.name, end.word,
+                                 end.position_steps, stands - *offset(motor)));
+  }
+}
+
+}  // namespace bushfaults
