@@ -19,12 +19,29 @@ bushd_set_inputs inputs_of(const config::Mcu& mcu) {
   return inputs;
 }
 
-void add_inputs(bushd_set_inputs& inputs, const config::Motor& motor) {
+void add_inputs(link::McuSetup& setup, const config::Motor& motor) {
   const std::uint16_t bit = bit_of(motor.output);
-  if (motor.limit_positive) inputs.limit_positive |= bit;
-  if (motor.limit_negative) inputs.limit_negative |= bit;
-  if (motor.limit_action == BUSHD_STOP_IMMEDIATE) inputs.limit_immediate |= bit;
-  if (motor.input_active_open) inputs.inverted |= bit;
+  const config::MotorInputs& its = motor.inputs;
+  if (its.positive) setup.inputs.limit_positive |= bit;
+  if (its.negative) setup.inputs.limit_negative |= bit;
+  if (motor.limit_action == BUSHD_STOP_IMMEDIATE) setup.inputs.limit_immediate |= bit;
+  for (const auto& input : {its.positive, its.negative, its.home, its.step, its.own}) {
+    if (!input) continue;
+    setup.used_inputs |= static_cast<std::uint16_t>(1u << input->number);
+    if (input->active_open) {
+      setup.inputs.inverted |= static_cast<std::uint16_t>(1u << input->number);
+    }
+  }
+  const std::uint8_t own = motor.output.value;
+  const auto number = [own](const std::optional<config::Input>& input) {
+    return input ? input->number : own;
+  };
+  const bushd_motor_inputs numbers = {.motor = own,
+                                      .positive = number(its.positive),
+                                      .negative = number(its.negative),
+                                      .home = number(its.home)};
+  if (numbers.positive == own && numbers.negative == own && numbers.home == own) return;
+  setup.motor_inputs.push_back(numbers);
 }
 
 // Motors with the same table share it.
@@ -52,7 +69,7 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
   // Slots are given in the order of outputs.
   std::ranges::sort(motors, {}, [](const config::Motor* motor) { return motor->output; });
   for (const config::Motor* motor : motors) {
-    add_inputs(setup.inputs, *motor);
+    add_inputs(setup, *motor);
     if (motor->local) setup.local_motors |= bit_of(motor->output);
     add_table(setup, motor->output, *tables[motor->group]);
   }

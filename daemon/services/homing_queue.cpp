@@ -23,7 +23,12 @@ Ending ending_of(const bushd_report& report, const std::string& mcu) {
       return {Outcome::kReached, "homed"};
     case BUSHD_HOMING_NOT_FOUND:
       return {Outcome::kFault,
-              "its switch was not found within home.most_steps; check the switch and 'home'"};
+              "its switch was not found within home.most_steps, or up to its limits; check the "
+              "switch and 'home'"};
+    case BUSHD_HOMING_LIMIT:
+      return {Outcome::kFault,
+              "it came to a limit switch while it looked slowly for the edge of its home switch; "
+              "move one of the two switches"};
     case BUSHD_HOMING_STUCK:
       return {Outcome::kFault,
               "its switch stayed active all the way back; is it stuck, or are "

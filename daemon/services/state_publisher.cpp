@@ -46,6 +46,24 @@ api::Activity activity_of(const motion::Motor& motor) {
   return motor.is<motion::Local>() ? api::Activity::kLocal : api::Activity::kResting;
 }
 
+void show_inputs(const link::McuView& view, const config::MotorInputs& inputs,
+                 api::MotorState& state) {
+  const auto is_active = [&view](const std::optional<config::Input>& input) {
+    return input && view.reported && (view.report.inputs >> input->number & 1) != 0;
+  };
+  state.input = is_active(inputs.positive) || is_active(inputs.negative) ||
+                is_active(inputs.home) || is_active(inputs.own);
+  const auto tell = [&](const char* word, const std::optional<config::Input>& input) {
+    if (!is_active(input)) return;
+    if (!state.inputs.empty()) state.inputs += ' ';
+    state.inputs += word;
+  };
+  tell("positive", inputs.positive);
+  tell("negative", inputs.negative);
+  tell("home", inputs.home);
+  tell("step", inputs.step);
+}
+
 }  // namespace
 
 StatePublisher::StatePublisher(Installation& installation, Outputs& outputs)
@@ -103,7 +121,7 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   }
   state.moving = state.activity != api::Activity::kResting && !motor.is<motion::Armed>();
   state.enabled = view.reported && (view.report.flags & BUSHD_FLAG_ENABLED) != 0;
-  state.input = reports(view.report.inputs);
+  show_inputs(view, installation_.config()[*mcu.motor_at(motor.output())].inputs, state);
   state.inhibited = {.positive = reports(view.report.forbidden_positive),
                      .negative = reports(view.report.forbidden_negative)};
   std::optional<std::uint16_t> boot_number;

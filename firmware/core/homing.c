@@ -5,6 +5,10 @@
 //     back-off    slowly away from it until it is released
 //     approach    slowly towards it until it is active again
 //
+// A limit that comes before the switch turns the fast stage round, once: the switch is looked for
+// on the limit's far side, and backed off in the same direction as ever, so that home is where the
+// switch becomes active towards it, wherever the motor came from.
+//
 // A run of the slow stages is one of a table with a single code. It is not shorter than a tick, so
 // at most one step falls between two readings of the switch: the step at which it becomes active is
 // known to a step. A contact bounces; it counts as active, or as released, after READINGS readings
@@ -68,6 +72,44 @@ static bool is_sure(bushd_mcu* mcu, bool as_wanted) {
   return ++homing->readings >= READINGS;
 }
 
+// Of the fast stage.
+static void begin_to_stop(bushd_mcu* mcu, bool cuts) {
+  bushd_run* run = &mcu->motor[mcu->homing.motor].made.run;
+  // One that has not made a step need not begin in order to stop.
+  if (!cuts && bushd_run_steps_left(run) != mcu->homing.most_steps) {
+    bushd_run_ramp_down(run);
+  } else {
+    bushd_run_start(run, run->table, 0, run->direction, 0);
+  }
+}
+
+void bushd_mcu_homing_meets_limit(bushd_mcu* mcu, bool cuts) {
+  bushd_mcu_homing* homing = &mcu->homing;
+  switch (homing->stage) {
+    case BUSHD_HOMING_FAST:
+      if (cuts || !homing->meets_limit) begin_to_stop(mcu, cuts);
+      homing->meets_limit = true;
+      break;
+    case BUSHD_HOMING_RAMP_DOWN:
+      if (cuts) begin_to_stop(mcu, true);
+      break;
+    default:
+      end(mcu, BUSHD_HOMING_LIMIT);
+  }
+}
+
+static void end_fast(bushd_mcu* mcu) {
+  bushd_mcu_homing* homing = &mcu->homing;
+  if (!homing->meets_limit || homing->turned) {
+    end(mcu, BUSHD_HOMING_NOT_FOUND);
+    return;
+  }
+  homing->meets_limit = false;
+  homing->turned = true;
+  bushd_run* run = &mcu->motor[homing->motor].made.run;
+  bushd_run_start(run, run->table, homing->most_steps, -homing->direction, homing->floor);
+}
+
 static void watch_silence(bushd_mcu* mcu) {
   if (mcu->reception.silent_ticks < mcu->reception.comm_timeout_ticks) return;
   mcu->faults |= BUSHD_FAULT_LINK;
@@ -77,22 +119,16 @@ static void watch_silence(bushd_mcu* mcu) {
 
 static void go_on(bushd_mcu* mcu, bool active) {
   bushd_mcu_homing* homing = &mcu->homing;
-  bushd_run* run = &mcu->motor[homing->motor].made.run;
-  const bool done = bushd_run_done(run);
+  const bool done = bushd_run_done(&mcu->motor[homing->motor].made.run);
   switch (homing->stage) {
     case BUSHD_HOMING_FAST:
       if (active) {
         // Whatever ends the homing before it has backed off.
         bushd_mcu_stands_at_switch(mcu, homing->motor, homing->direction);
-        // One that has not made a step stands on its switch, and need not begin in order to stop.
-        if (bushd_run_steps_left(run) != homing->most_steps) {
-          bushd_run_ramp_down(run);
-        } else {
-          bushd_run_start(run, run->table, 0, homing->direction, 0);
-        }
+        if (!homing->meets_limit) begin_to_stop(mcu, false);
         homing->stage = BUSHD_HOMING_RAMP_DOWN;
       } else if (done) {
-        end(mcu, BUSHD_HOMING_NOT_FOUND);
+        end_fast(mcu);
       }
       break;
     case BUSHD_HOMING_RAMP_DOWN:
@@ -120,7 +156,7 @@ void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs) {
   watch_silence(mcu);
   const uint8_t m = mcu->homing.motor;
   if (mcu->motor[m].mode == BUSHD_MCU_AUTONOMOUS) {
-    go_on(mcu, (active_inputs & motor_bit(m)) != 0);
+    go_on(mcu, (active_inputs & motor_bit(mcu->switches[m].home)) != 0);
   } else {
     end(mcu, BUSHD_HOMING_STOPPED);
   }
@@ -135,8 +171,22 @@ static bool slow_enough(const bushd_mcu* mcu, const bushd_home* message) {
   return slow_ns >= mcu->tick_ns && slow_ns >= slowest_ns;
 }
 
-static uint16_t active_inputs(const bushd_mcu* mcu) {
-  return mcu->port.read_inputs(mcu->port.context).motors ^ mcu->inputs.inverted;
+static bool on_switch(const bushd_mcu* mcu, uint8_t m) {
+  const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
+  return ((pins.motors ^ mcu->inputs.inverted) & motor_bit(mcu->switches[m].home)) != 0;
+}
+
+// In which direction the fast stage begins; 0: in none. On its switch a motor has to back off. It
+// must not look for a switch that it has overrun; at another limit it may begin.
+static int8_t first_direction(const bushd_mcu* mcu, uint8_t m, int8_t direction) {
+  const uint16_t bit = motor_bit(m);
+  const int8_t back = (int8_t)-direction;
+  const bool ahead = (bushd_mcu_forbidden(mcu, direction) & bit) != 0;
+  const bool behind = (bushd_mcu_forbidden(mcu, back) & bit) != 0;
+  if (on_switch(mcu, m)) return behind ? 0 : direction;
+  if (behind && (ahead || bushd_mcu_homes_at_limit(mcu, m, back))) return 0;
+  if (!ahead) return direction;
+  return bushd_mcu_homes_at_limit(mcu, m, direction) ? 0 : back;
 }
 
 // The last one was ended in a slow stage, and its motor makes a step by the slow table yet.
@@ -153,12 +203,7 @@ static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
   if (under_way(&mcu->homing) || slow_table_in_use(mcu) || (bushd_mcu_engaged(mcu) & bit) != 0) {
     return BUSHD_E_STATE;
   }
-  if (!slow_enough(mcu, message)) return BUSHD_E_FORMAT;
-  // On its switch it will back off; but it must not look for it where it has overrun it.
-  const bool on_switch = (active_inputs(mcu) & bit) != 0;
-  const uint16_t barred = bushd_mcu_forbidden(mcu, (int8_t)-message->direction) |
-                          (on_switch ? 0u : bushd_mcu_forbidden(mcu, message->direction));
-  return (barred & bit) != 0 ? BUSHD_E_FORBIDDEN : BUSHD_OK;
+  return slow_enough(mcu, message) ? BUSHD_OK : BUSHD_E_FORMAT;
 }
 
 bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
@@ -172,10 +217,14 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   if (same) return BUSHD_OK;
   const bushd_status status = check(mcu, message);
   if (status != BUSHD_OK) return status;
+  const int8_t begins = first_direction(mcu, message->motor, message->direction);
+  if (begins == 0) return BUSHD_E_FORBIDDEN;
   memset(homing, 0, sizeof *homing);
   homing->stage = BUSHD_HOMING_FAST;
   homing->motor = message->motor;
   homing->direction = message->direction;
+  homing->turned = begins != message->direction;
+  homing->floor = message->floor;
   homing->most_steps = message->most_steps;
   homing->slow_steps = message->slow_steps;
   homing->home_steps = message->position_steps;
@@ -186,7 +235,6 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   const uint16_t bit = motor_bit(message->motor);
   mcu->homed &= (uint16_t)~bit;
   mcu->local.held &= (uint16_t)~bit;
-  bushd_mcu_begin_by_itself(mcu, message->motor, message->most_steps, message->direction,
-                            message->floor);
+  bushd_mcu_begin_by_itself(mcu, message->motor, message->most_steps, begins, message->floor);
   return BUSHD_OK;
 }

@@ -2,6 +2,7 @@
 #ifndef BUSHD_FIRMWARE_CORE_HOMING_H
 #define BUSHD_FIRMWARE_CORE_HOMING_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "engine/message.h"
@@ -14,6 +15,9 @@ typedef struct bushd_mcu_homing {
   uint8_t motor;
   int8_t direction;     // towards the switch
   uint8_t readings;     // of it in a row, as they are waited for
+  bool turned;          // the fast stage goes the other way: a limit came before the switch
+  bool meets_limit;     // it ramps down because of one
+  uint16_t floor;       // of the fast stage
   uint32_t most_steps;  // of the fast stage
   uint32_t slow_steps;  // of each slow one, at most
   int32_t home_steps;   // the position to be set
@@ -24,5 +28,8 @@ typedef struct bushd_mcu_homing {
 bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message);
 void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs);  // before every tick is prepared
 uint16_t bushd_mcu_homing_motor(const bushd_mcu* mcu);           // as a mask
+// The one that homes goes into a limit that is not the switch it looks for. `cuts`: it stops there
+// without another step; otherwise it ramps down.
+void bushd_mcu_homing_meets_limit(bushd_mcu* mcu, bool cuts);
 
 #endif

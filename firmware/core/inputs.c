@@ -10,14 +10,19 @@
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
 
-// `now_active`: the motor's switch has just become so.
+// `now_active`: a switch of the motor has just become so.
 static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
   const uint32_t next = mcu->tick + 1u;
   const int8_t heading = bushd_mcu_heading(mcu, m, next);
-  if (heading == 0 || !bushd_mcu_limit_stops(mcu, m, heading, now_active)) return;
+  const bool homes = (bushd_mcu_homing_motor(mcu) & motor_bit(m)) != 0;
+  if (heading == 0 || !bushd_mcu_limit_stops(mcu, m, heading, now_active, homes)) return;
+  const bool cuts = (mcu->inputs.limit_immediate & motor_bit(m)) != 0;
+  if (homes) {
+    bushd_mcu_homing_meets_limit(mcu, cuts);
+    return;
+  }
   // One that only turns towards the switch is at rest as far as this direction goes.
-  const bool turns = heading != bushd_mcu_last_direction(mcu, m);
-  const bool immediate = turns || (mcu->inputs.limit_immediate & motor_bit(m)) != 0;
+  const bool immediate = cuts || heading != bushd_mcu_last_direction(mcu, m);
   if (immediate || mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) {
     bushd_mcu_stop_motor(mcu, m, immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP, next);
   }
@@ -25,8 +30,8 @@ static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
 
 static void follow_limits(bushd_mcu* mcu, uint16_t pins) {
   const uint16_t now_active = bushd_mcu_debounce_limits(mcu, pins);
-  uint16_t concerned = mcu->limits.active | mcu->limits.hit_positive | mcu->limits.hit_negative;
-  concerned &= (uint16_t)~bushd_mcu_homing_motor(mcu);
+  uint16_t concerned = mcu->limits.at_positive | mcu->limits.at_negative |
+                       mcu->limits.hit_positive | mcu->limits.hit_negative;
   for (uint8_t m = 0; concerned != 0; ++m, concerned = (uint16_t)(concerned >> 1)) {
     if ((concerned & 1u) != 0) follow_limit(mcu, m, (now_active & motor_bit(m)) != 0);
   }
@@ -57,8 +62,7 @@ static void watch_current(bushd_mcu* mcu, uint32_t next) {
 void bushd_mcu_watch_inputs(bushd_mcu* mcu) {
   const uint32_t next = mcu->tick + 1u;
   const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
-  const uint16_t limits = mcu->inputs.limit_positive | mcu->inputs.limit_negative;
-  const uint16_t active = (pins.motors ^ mcu->inputs.inverted) & limits;
+  const uint16_t active = (pins.motors ^ mcu->inputs.inverted) & mcu->limits.watched;
   if ((active | mcu->limits.active | mcu->limits.unsettled | mcu->limits.hit_positive |
        mcu->limits.hit_negative) != 0) {
     follow_limits(mcu, active);
@@ -79,14 +83,33 @@ bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* messag
   const uint16_t limits = message->limit_positive | message->limit_negative;
   if ((limits & ~bushd_mcu_own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
   mcu->inputs = *message;
-  mcu->limits.hit_positive &= message->limit_positive;
-  mcu->limits.hit_negative &= message->limit_negative;
-  // What is active now counts at once: a start may follow.
+  bushd_mcu_default_switches(mcu);
+  bushd_mcu_begin_inputs(mcu);
+  return BUSHD_OK;
+}
+
+// What is active now counts at once: a start may follow.
+void bushd_mcu_begin_inputs(bushd_mcu* mcu) {
   const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
-  mcu->limits.active = (pins.motors ^ message->inverted) & limits;
+  bushd_mcu_begin_limits(mcu, pins.motors ^ mcu->inputs.inverted);
   bushd_mcu_forget_presses(mcu, system_inputs(mcu, pins));
-  mcu->limits.unsettled = 0;
   bushd_mcu_keep_enable(mcu);
+}
+
+bushd_status bushd_mcu_set_motor_inputs(bushd_mcu* mcu, const bushd_motor_inputs* message) {
+  const uint8_t count = mcu->config.motors;
+  if (message->motor >= count || message->positive >= count || message->negative >= count ||
+      message->home >= count) {
+    return BUSHD_E_FORMAT;
+  }
+  if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
+  bushd_mcu_switches* switches = &mcu->switches[message->motor];
+  switches->positive = message->positive & 0xFu;
+  switches->negative = message->negative & 0xFu;
+  switches->home = message->home & 0xFu;
+  // What a motor has hit it has hit: a master that connects tells INPUTS first, and this again.
+  const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
+  bushd_mcu_begin_limits(mcu, pins.motors ^ mcu->inputs.inverted);
   return BUSHD_OK;
 }
 

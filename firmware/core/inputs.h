@@ -8,6 +8,8 @@ typedef struct bushd_mcu bushd_mcu;
 
 void bushd_mcu_watch_inputs(bushd_mcu* mcu);  // before every tick is prepared
 bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message);
+bushd_status bushd_mcu_set_motor_inputs(bushd_mcu* mcu, const bushd_motor_inputs* message);
+void bushd_mcu_begin_inputs(bushd_mcu* mcu);  // after the settings were restored
 void bushd_mcu_report_inputs(const bushd_mcu* mcu, bushd_report* report);
 void bushd_mcu_clear_faults(bushd_mcu* mcu);  // whose cause is gone
 

@@ -8,12 +8,68 @@
 
 #define DEBOUNCE_BITS (sizeof((bushd_mcu_limits*)0)->bounces / sizeof(uint16_t))
 
+static uint16_t limits_towards(const bushd_mcu* mcu, int8_t direction) {
+  return direction > 0 ? mcu->inputs.limit_positive : mcu->inputs.limit_negative;
+}
+
+static uint16_t at_limit(const bushd_mcu* mcu, int8_t direction) {
+  return direction > 0 ? mcu->limits.at_positive : mcu->limits.at_negative;
+}
+
+static uint16_t* hit_towards(bushd_mcu* mcu, int8_t direction) {
+  return direction > 0 ? &mcu->limits.hit_positive : &mcu->limits.hit_negative;
+}
+
+// From the inputs as debounced.
+static void find_motors(bushd_mcu* mcu) {
+  bushd_mcu_limits* limits = &mcu->limits;
+  limits->at_positive = limits->at_negative = 0;
+  if (limits->active == 0) return;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    const bushd_mcu_switches* switches = &mcu->switches[m];
+    if (limits->active & motor_bit(switches->positive)) limits->at_positive |= motor_bit(m);
+    if (limits->active & motor_bit(switches->negative)) limits->at_negative |= motor_bit(m);
+  }
+  limits->at_positive &= mcu->inputs.limit_positive;
+  limits->at_negative &= mcu->inputs.limit_negative;
+}
+
+void bushd_mcu_default_switches(bushd_mcu* mcu) {
+  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    bushd_mcu_switches* switches = &mcu->switches[m];
+    switches->positive = switches->negative = switches->home = m & 0xFu;
+  }
+}
+
+void bushd_mcu_begin_limits(bushd_mcu* mcu, uint16_t active_inputs) {
+  bushd_mcu_limits* limits = &mcu->limits;
+  limits->watched = limits->both_ends = 0;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    const bushd_mcu_switches* switches = &mcu->switches[m];
+    const bool positive = (mcu->inputs.limit_positive & motor_bit(m)) != 0;
+    const bool negative = (mcu->inputs.limit_negative & motor_bit(m)) != 0;
+    if (positive) limits->watched |= motor_bit(switches->positive);
+    if (negative) limits->watched |= motor_bit(switches->negative);
+    if (positive && negative && switches->positive == switches->negative) {
+      limits->both_ends |= motor_bit(m);
+    }
+  }
+  limits->hit_positive &= mcu->inputs.limit_positive;
+  limits->hit_negative &= mcu->inputs.limit_negative;
+  limits->active = active_inputs & limits->watched;
+  limits->unsettled = 0;
+  find_motors(mcu);
+}
+
 uint16_t bushd_mcu_forbidden(const bushd_mcu* mcu, int8_t direction) {
-  const bushd_set_inputs* settings = &mcu->inputs;
-  return direction > 0 ? mcu->limits.hit_positive | (mcu->limits.active & settings->limit_positive &
-                                                     (uint16_t)~settings->limit_negative)
-                       : mcu->limits.hit_negative | (mcu->limits.active & settings->limit_negative &
-                                                     (uint16_t)~settings->limit_positive);
+  const uint16_t hit = direction > 0 ? mcu->limits.hit_positive : mcu->limits.hit_negative;
+  return hit | (at_limit(mcu, direction) & (uint16_t)~mcu->limits.both_ends);
+}
+
+bool bushd_mcu_homes_at_limit(const bushd_mcu* mcu, uint8_t m, int8_t direction) {
+  const bushd_mcu_switches* switches = &mcu->switches[m];
+  const uint8_t limit = direction > 0 ? switches->positive : switches->negative;
+  return switches->home == limit && (limits_towards(mcu, direction) & motor_bit(m)) != 0;
 }
 
 static int8_t first_direction(const bushd_ticks* ticks, uint8_t column) {
@@ -43,9 +99,9 @@ bool bushd_mcu_starts_into_limit(const bushd_mcu* mcu, const bushd_ticks* ticks)
 }
 
 // How long each input has differed from what it counts as is counted for all of them at once: bit k
-// of motor m's counter is bit m of bounces[k].
+// of input n's counter is bit n of bounces[k].
 uint16_t bushd_mcu_debounce_limits(bushd_mcu* mcu, uint16_t pins) {
-  const uint16_t before = mcu->limits.active;
+  const uint16_t before = mcu->limits.at_positive | mcu->limits.at_negative;
   const uint16_t differs = pins ^ mcu->limits.active;
   const uint16_t fresh = differs & (uint16_t)~mcu->limits.unsettled;
   uint16_t settled = differs;
@@ -56,34 +112,36 @@ uint16_t bushd_mcu_debounce_limits(bushd_mcu* mcu, uint16_t pins) {
     mcu->limits.bounces[k] = counter ^ carry;
     carry &= counter;
   }
-  mcu->limits.active ^= settled;
   mcu->limits.unsettled = differs & (uint16_t)~settled;
-  return mcu->limits.active & (uint16_t)~before;
+  if (settled == 0) return 0;
+  mcu->limits.active ^= settled;
+  find_motors(mcu);
+  return (mcu->limits.at_positive | mcu->limits.at_negative) & (uint16_t)~before;
 }
 
-static uint16_t* hit_towards(bushd_mcu* mcu, int8_t direction) {
-  return direction > 0 ? &mcu->limits.hit_positive : &mcu->limits.hit_negative;
-}
-
-bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active) {
+bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active, bool homes) {
   const uint16_t bit = motor_bit(m);
+  const int8_t back = (int8_t)-heading;
   uint16_t* const ahead = hit_towards(mcu, heading);
-  uint16_t* const behind = hit_towards(mcu, (int8_t)-heading);
-  const bool both_ends = (mcu->inputs.limit_positive & mcu->inputs.limit_negative & bit) != 0;
-  if (both_ends && now_active && (*behind & bit) == 0) *ahead |= bit;
-  if ((bushd_mcu_forbidden(mcu, heading) & bit) != 0) {
-    *ahead |= bit;
-    return true;
+  uint16_t* const behind = hit_towards(mcu, back);
+  if (!homes || !bushd_mcu_homes_at_limit(mcu, m, heading)) {
+    const bool both_ends = (mcu->limits.both_ends & bit) != 0;
+    if (both_ends && now_active && (*behind & bit) == 0) *ahead |= bit;
+    if ((bushd_mcu_forbidden(mcu, heading) & bit) != 0) {
+      *ahead |= bit;
+      return true;
+    }
   }
-  if ((mcu->limits.active & bit) == 0) *behind &= (uint16_t)~bit;
+  const bool its_own = homes && bushd_mcu_homes_at_limit(mcu, m, back);
+  if (!its_own && (at_limit(mcu, back) & bit) == 0) *behind &= (uint16_t)~bit;
   return false;
 }
 
 void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
-  const uint16_t limits = direction > 0 ? mcu->inputs.limit_positive : mcu->inputs.limit_negative;
-  *hit_towards(mcu, direction) |= limits & motor_bit(m);
+  if (bushd_mcu_homes_at_limit(mcu, m, direction)) *hit_towards(mcu, direction) |= motor_bit(m);
 }
 
 void bushd_mcu_has_left_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
+  if (!bushd_mcu_homes_at_limit(mcu, m, direction)) return;
   *hit_towards(mcu, direction) &= (uint16_t)~motor_bit(m);
 }

@@ -64,6 +64,7 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   for (uint8_t m = 0; m < config->motors; ++m) mcu->motor[m].table = -1;
   bushd_mcu_clear_streams(mcu);
   bushd_mcu_default_emission(mcu);
+  bushd_mcu_default_switches(mcu);
   mcu->failed_tests = port->self_test(port->context);
   if (!engine_self_test(mcu)) mcu->failed_tests |= BUSHD_TEST_ENGINE;
   if (mcu->failed_tests & BUSHD_TEST_EEPROM) mcu->faults |= BUSHD_FAULT_EEPROM;

@@ -95,8 +95,9 @@ typedef struct bushd_mcu {
   uint16_t direction;   // DIR levels of the slot_buffer prepared last
   uint16_t autonomous;  // motors that move by homing or local inputs
   uint16_t homed;
-  bushd_run_tick run_tick[BUSHD_TABLE_SLOTS];  // in the terms of each table
-  bushd_set_inputs inputs;                     // settings
+  bushd_run_tick run_tick[BUSHD_TABLE_SLOTS];         // in the terms of each table
+  bushd_set_inputs inputs;                            // settings
+  bushd_mcu_switches switches[BUSHD_MOTORS_PER_MCU];  // settings
   bushd_mcu_stream stream;
   bushd_mcu_reception reception;
   bushd_mcu_limits limits;
@@ -139,10 +140,11 @@ typedef struct bushd_mcu_nvm_region {
 } bushd_mcu_nvm_region;
 bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
 // Bytes of all pieces together, with this much table memory and all motors.
-#define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                      \
-  (sizeof(uint32_t) + sizeof(bushd_format) + sizeof(bushd_set_inputs) + sizeof(bushd_emission) + \
-   sizeof(uint16_t) + BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) +            \
-   sizeof(uint16_t) + (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t))
+#define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                        \
+  (sizeof(uint32_t) + sizeof(bushd_format) + sizeof(bushd_set_inputs) +                            \
+   BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) + sizeof(bushd_emission) + sizeof(uint16_t) + \
+   BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) + sizeof(uint16_t) +              \
+   (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t))
 void bushd_mcu_nvm_restored(bushd_mcu* mcu);
 
 // For a port that goes through all pieces a little at a time, again and again.

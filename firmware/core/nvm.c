@@ -12,7 +12,19 @@ static bushd_mcu_nvm_region piece_of(void* at, size_t size) {
 }
 
 bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
-  enum { TICK, FORMAT, INPUTS, EMISSION, LOCAL, TABLES, VALID_TABLES, CODES_USED, CODES, MOTORS };
+  enum {
+    TICK,
+    FORMAT,
+    INPUTS,
+    SWITCHES,
+    EMISSION,
+    LOCAL,
+    TABLES,
+    VALID_TABLES,
+    CODES_USED,
+    CODES,
+    MOTORS
+  };
   switch (index) {
     case TICK:
       return piece_of(&mcu->tick_ns, sizeof mcu->tick_ns);
@@ -20,6 +32,8 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
       return piece_of(&mcu->format, sizeof mcu->format);
     case INPUTS:
       return piece_of(&mcu->inputs, sizeof mcu->inputs);
+    case SWITCHES:
+      return piece_of(mcu->switches, sizeof mcu->switches);
     case EMISSION:
       return piece_of(&mcu->emission.settings, sizeof mcu->emission.settings);
     case LOCAL:
@@ -41,8 +55,7 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
 }
 
 void bushd_mcu_nvm_restored(bushd_mcu* mcu) {
-  const bushd_set_inputs inputs = mcu->inputs;
-  bushd_mcu_set_inputs(mcu, &inputs);
+  bushd_mcu_begin_inputs(mcu);
   bushd_mcu_restore_emission(mcu);
   mcu->port.set_tick(mcu->port.context, mcu->tick_ns);
 }

@@ -96,7 +96,8 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   identity.table_codes = mcu->config.code_count;
   uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
                  BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
-                 BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES;
+                 BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
+                 BUSHD_CAN_MOTOR_INPUTS;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
   identity.capabilities = (uint16_t)(all & ~mcu->config.disabled_capabilities);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
@@ -258,6 +259,8 @@ static bool is_disabled(const bushd_mcu* mcu, uint8_t type) {
       return (mcu->config.disabled_capabilities & BUSHD_CAN_LOCAL) != 0;
     case BUSHD_MSG_POSITION_COMPARE:
       return (mcu->config.disabled_capabilities & BUSHD_CAN_POSITION_COMPARE) != 0;
+    case BUSHD_MSG_MOTOR_INPUTS:
+      return (mcu->config.disabled_capabilities & BUSHD_CAN_MOTOR_INPUTS) != 0;
     default:
       return false;
   }
@@ -295,6 +298,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(set_position, set_position);
     case BUSHD_MSG_INPUTS:
       HANDLE(set_inputs, bushd_mcu_set_inputs);
+    case BUSHD_MSG_MOTOR_INPUTS:
+      HANDLE(motor_inputs, bushd_mcu_set_motor_inputs);
     case BUSHD_MSG_EMISSION:
       HANDLE(emission, bushd_mcu_take_emission);
     case BUSHD_MSG_HOME:

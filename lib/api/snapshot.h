@@ -27,7 +27,8 @@ struct MotorState {
   Activity activity = Activity::kResting;
   bool moving = false;     // it makes steps, or is about to; not while armed
   bool enabled = false;    // drivers powered
-  bool input = false;      // its switch is active
+  bool input = false;      // one of its switches is active
+  std::string inputs{};    // active ones: of positive, negative, home, step, blanks between
   Directions inhibited{};  // by its limit switches
   Trust trust = Trust::kKnown;
   std::string uncertain_reason{};  // why it is not known; "" while it is

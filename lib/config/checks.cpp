@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "config/motor_inputs.h"
 #include "engine/run.h"
 #include "fieldbus/line_budget.h"
 
@@ -168,6 +169,7 @@ Result<void> check_together(const Loading& loading) {
     if (auto checked = check_step_period(loading, i); !checked) return checked;
     if (auto checked = check_idle(loading, i); !checked) return checked;
   }
+  if (auto checked = check_motor_inputs(loading); !checked) return checked;
   if (auto checked = check_table_slots(loading); !checked) return checked;
   for (std::size_t i = 0; i < loading.config.buses.size(); ++i) {
     if (auto checked = check_line(loading, i); !checked) return checked;

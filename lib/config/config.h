@@ -93,16 +93,30 @@ struct Home {
   std::optional<double> then = {};   // user position to move to once the switch was found
 };
 
+// One of the numbered inputs of an MCU; all that is connected to it has one level.
+struct Input {
+  std::uint8_t number = 0;
+  bool active_open = false;
+  friend bool operator==(const Input&, const Input&) = default;
+};
+
+// Inputs of its MCU. One input may be several of these, but for the step sensor's.
+struct MotorInputs {
+  std::optional<Input> positive = {};  // limit switches; the same input: one for both ends
+  std::optional<Input> negative = {};
+  std::optional<Input> home = {};  // looked for as Motor::home says
+  std::optional<Input> step = {};  // a sensor that tells its steps
+  // That with the number of its output, the one that a motor without the key `inputs` has.
+  std::optional<Input> own = {};
+};
+
 struct Motor {
   std::string name;
   McuId mcu;
   Output output;
   GroupId group;
-  // Its input is a switch at these ends of its travel.
-  bool limit_positive = false;
-  bool limit_negative = false;
+  MotorInputs inputs = {};
   bushd_stop_mode limit_action = BUSHD_STOP_RAMP;
-  bool input_active_open = false;
   std::optional<Home> home = {};
   bool local = false;             // its MCU's FORWARD and REVERSE inputs move it
   bool restored_refused = false;  // it may not move while its position is only restored

@@ -1,5 +1,8 @@
 #include "config/inputs.h"
 
+#include <fmt/format.h>
+
+#include "config/motor_inputs.h"
 #include "config/words.h"
 
 namespace bushd::config {
@@ -53,24 +56,22 @@ Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
 }
 
 Result<void> read_inputs(const TomlReader& reader, Motor* motor) {
-  if (reader.has("limit")) {
-    const auto ends = read_word(reader, "limit", {"positive", "negative", "both"});
-    if (!ends) return fail(ends.error());
-    motor->limit_positive = *ends != 1;
-    motor->limit_negative = *ends != 0;
+  bool own_open = false;
+  if (auto read = read_active(reader, "input_active", &own_open); !read) return read;
+  std::optional<bool> own_level;
+  if (reader.has("input_active")) own_level = own_open;
+  if (auto read = read_motor_inputs(reader, own_level, motor); !read) return read;
+  if (!reader.has("limit_action")) return {};
+  const auto action = read_word(reader, "limit_action", {"ramp", "immediate"});
+  if (!action) return fail(action.error());
+  if (!motor->inputs.positive && !motor->inputs.negative) {
+    return fail(reader.error("limit_action",
+                             "applies only with a limit; allowed: "
+                             "beside limit = \"positive\", \"negative\" or "
+                             "\"both\", or inputs = { positive = N, negative = N }"));
   }
-  if (reader.has("limit_action")) {
-    const auto action = read_word(reader, "limit_action", {"ramp", "immediate"});
-    if (!action) return fail(action.error());
-    if (!reader.has("limit")) {
-      return fail(reader.error("limit_action",
-                               "applies only with a limit; allowed: "
-                               "beside limit = \"positive\", \"negative\" or "
-                               "\"both\""));
-    }
-    motor->limit_action = *action == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE;
-  }
-  return read_active(reader, "input_active", &motor->input_active_open);
+  motor->limit_action = *action == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE;
+  return {};
 }
 
 }  // namespace bushd::config

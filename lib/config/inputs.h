@@ -7,6 +7,7 @@
 namespace bushd::config {
 
 Result<void> read_inputs(const tables::TomlReader& reader, Mcu* mcu);
+// Precondition: its output and `home` have been read.
 Result<void> read_inputs(const tables::TomlReader& reader, Motor* motor);
 
 }  // namespace bushd::config

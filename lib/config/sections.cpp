@@ -400,12 +400,18 @@ Result<void> read_motors(Loading* loading) {
   Taken spoken_names;
   Taken outputs;
   for (const TomlReader& reader : loading->motors) {
-    if (auto known = reader.only({"name",           "mcu",          "output",        "group",
-                                  "limit",          "limit_action", "input_active",  "home",
-                                  "local",          "restored",     "description",   "unit",
-                                  "steps_per_unit", "direction",    "offset",        "precision",
-                                  "soft_limits",    "max_speed",    "never_disable", "backlash",
-                                  "backlash_speed", "settle_ms"});
+    if (auto known = reader.only({"name",         "mcu",
+                                  "output",       "group",
+                                  "limit",        "limit_action",
+                                  "input_active", "home",
+                                  "inputs",       "local",
+                                  "restored",     "description",
+                                  "unit",         "steps_per_unit",
+                                  "direction",    "offset",
+                                  "precision",    "soft_limits",
+                                  "max_speed",    "never_disable",
+                                  "backlash",     "backlash_speed",
+                                  "settle_ms"});
         !known) {
       return known;
     }
@@ -432,8 +438,8 @@ Result<void> read_motors(Loading* loading) {
                 .mcu = *mcu,
                 .output = {static_cast<std::uint8_t>(*output)},
                 .group = *group};
-    if (auto read = read_inputs(reader, &motor); !read) return read;
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
+    if (auto read = read_inputs(reader, &motor); !read) return read;
     if (auto read = read_restored(reader, &motor); !read) return read;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
     if (auto checked = check_then(reader, motor); !checked) return checked;

@@ -17,7 +17,8 @@ extern "C" {
 
 // The motor finds its switch by itself: fast by its table until the switch is active, slowly back
 // until it is released, slowly towards it until it is active again; there it stands at
-// `position_steps`. With `most_steps` 0: it gives that up, and ramps down.
+// `position_steps`. If it comes to a limit before, it looks for the switch on the other side, and
+// still approaches it in `direction`. With `most_steps` 0: it gives that up, and ramps down.
 #define BUSHD_HOME_UNIT_NS 10000u
 typedef struct bushd_home {
   uint8_t motor;
@@ -40,7 +41,8 @@ typedef enum bushd_homing {
   BUSHD_HOMING_NOT_FOUND = 6,  // by the fast approach
   BUSHD_HOMING_STUCK = 7,      // the switch was not released
   BUSHD_HOMING_LOST = 8,       // not found again by the slow approach
-  BUSHD_HOMING_STOPPED = 9     // by a fault, by silence, or because it was given up
+  BUSHD_HOMING_STOPPED = 9,    // by a fault, by silence, or because it was given up
+  BUSHD_HOMING_LIMIT = 10      // by a limit that is not the switch, in a slow stage
 } bushd_homing;
 
 // Motors that the MCU's FORWARD and REVERSE inputs move, by their tables, while one of them is

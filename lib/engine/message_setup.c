@@ -298,6 +298,27 @@ bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
                         message->overcurrent <= BUSHD_MAX_CURRENT && enable <= 1);
 }
 
+size_t bushd_encode_motor_inputs(const bushd_motor_inputs* message, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, message->motor);
+  put8(&w, message->positive);
+  put8(&w, message->negative);
+  put8(&w, message->home);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_motor_inputs(const uint8_t* payload, size_t size,
+                                       bushd_motor_inputs* message) {
+  reader r = read_from(payload, size);
+  message->motor = get8(&r);
+  message->positive = get8(&r);
+  message->negative = get8(&r);
+  message->home = get8(&r);
+  return finish(
+      &r, message->motor < BUSHD_MOTORS_PER_MCU && message->positive < BUSHD_MOTORS_PER_MCU &&
+              message->negative < BUSHD_MOTORS_PER_MCU && message->home < BUSHD_MOTORS_PER_MCU);
+}
+
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload) {
   payload[0] = message->status;
   return 1;

@@ -38,7 +38,8 @@ enum {
   BUSHD_CAN_BURST = 1 << 8,
   BUSHD_CAN_COMMON_DIR = 1 << 9,
   BUSHD_CAN_STAGGERED = 1 << 10,
-  BUSHD_CAN_PHASES = 1 << 11
+  BUSHD_CAN_PHASES = 1 << 11,
+  BUSHD_CAN_MOTOR_INPUTS = 1 << 12
 };
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
@@ -159,19 +160,28 @@ enum {
 #define BUSHD_MAX_DEBOUNCE_TICKS 15u
 #define BUSHD_MAX_CURRENT 1023u
 typedef struct bushd_set_inputs {
-  // Motors whose input is a limit switch at this end of their travel. In both masks: one input for
-  // both ends.
+  // Motors that have a limit switch at this end of their travel: the input with the motor's number,
+  // unless bushd_motor_inputs says otherwise afterwards.
   uint16_t limit_positive;
   uint16_t limit_negative;
   uint16_t
       limit_immediate;     // motors that stop at a limit without another step; the others ramp down
-  uint16_t inverted;       // motors whose input is active when the port calls it inactive
-  uint8_t debounce_ticks;  // a motor's input counts once it has stayed for as many more ticks
+  uint16_t inverted;       // inputs that are active when the port calls them inactive
+  uint8_t debounce_ticks;  // a limit switch counts once it has stayed for as many more ticks
   uint8_t system_inverted;     // as `inverted`, of BUSHD_INPUT_*
   uint8_t emergency;           // BUSHD_EMERGENCY_INPUT_*
   uint16_t overcurrent;        // EN falls above this reading; 0: never
   bool enable_after_watchdog;  // EN as it was before a watchdog reset; else low
 } bushd_set_inputs;
+
+// Which inputs of its MCU are a motor's switches; an MCU has as many inputs as motors. One input
+// may be several of them, and a limit of several motors.
+typedef struct bushd_motor_inputs {
+  uint8_t motor;
+  uint8_t positive;  // the limit at this end, if bushd_set_inputs says that there is one
+  uint8_t negative;  // the same input: one switch for both ends
+  uint8_t home;
+} bushd_motor_inputs;
 
 typedef struct bushd_acknowledgement {
   uint8_t status;  // bushd_status
@@ -194,6 +204,7 @@ size_t bushd_encode_control(const bushd_control* message, uint8_t* payload);
 size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* payload);
 size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* payload);
 size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload);
+size_t bushd_encode_motor_inputs(const bushd_motor_inputs* message, uint8_t* payload);
 size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload);
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload);
 
@@ -215,6 +226,8 @@ bushd_status bushd_decode_set_address(const uint8_t* payload, size_t size,
                                       bushd_set_address* message);
 bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
                                      bushd_set_inputs* message);
+bushd_status bushd_decode_motor_inputs(const uint8_t* payload, size_t size,
+                                       bushd_motor_inputs* message);
 bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message);
 bushd_status bushd_decode_acknowledgement(const uint8_t* payload, size_t size,
                                           bushd_acknowledgement* message);

@@ -15,7 +15,7 @@ constexpr Layout kRequest{"llsl"};
 constexpr Layout kBare{"t", {&kRequest}};
 constexpr Layout kMotors{"tnS", {&kRequest}};
 constexpr Layout kReplyHeader{"llslbssii"};
-constexpr Layout kMotor{"slddlddbsbbssslbb"};
+constexpr Layout kMotor{"slddlddbsbbsssslbb"};
 constexpr Layout kMotorAmount{"sbld"};
 constexpr Layout kMotorDescription{"shstsssbdbbdddd", {&kTableRef}};
 constexpr Layout kMcuHealth{"sisiisillllllliddb"};

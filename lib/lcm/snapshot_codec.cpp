@@ -58,6 +58,7 @@ motor_t message_of(const api::MotorState& motor) {
   message.activity = word(motor.activity);
   message.enabled = motor.enabled ? 1 : 0;
   message.input = motor.input ? 1 : 0;
+  message.inputs = motor.inputs;
   message.inhibited = word(motor.inhibited);
   message.trust = word(motor.trust);
   message.uncertain_reason = motor.uncertain_reason;
@@ -85,6 +86,7 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
                          .moving = message.moving != 0,
                          .enabled = message.enabled != 0,
                          .input = message.input != 0,
+                         .inputs = message.inputs,
                          .inhibited = *inhibited,
                          .trust = *trust,
                          .uncertain_reason = message.uncertain_reason,

@@ -27,6 +27,9 @@ struct McuSetup {
   std::array<std::optional<std::uint8_t>, BUSHD_MOTORS_PER_MCU> table_of_motor{};
   fieldbus::EmissionSetup emission{};
   bushd_set_inputs inputs{};
+  // Of motors whose switches are not all at the input with the number of their output.
+  std::vector<bushd_motor_inputs> motor_inputs{};
+  std::uint16_t used_inputs = 0;
   bool off_after_watchdog = false;  // then drivers stay off until control() enables them
   std::uint16_t local_motors = 0;   // that its FORWARD and REVERSE inputs move
 };

@@ -189,6 +189,7 @@ void Connector::write_setup(McuIndex mcu) {
                        std::min<std::int64_t>(comm_timeout_ticks, UINT16_MAX))});
   queue.emission(record.setup.emission.settings);
   queue.inputs(record.setup.inputs);
+  for (const bushd_motor_inputs& one : record.setup.motor_inputs) queue.motor_inputs(one);
   queue.ask_for_tables();
   links_[mcu].setup_written = true;
 }

@@ -32,6 +32,21 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
   return {};
 }
 
+// An MCU has as many inputs as motors.
+Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity) {
+  for (unsigned n = identity.motors; n < BUSHD_MOTORS_PER_MCU; ++n) {
+    if ((setup.used_inputs >> n & 1u) == 0) continue;
+    return fail("has only " + std::to_string(identity.motors) + " inputs, but input " +
+                std::to_string(n) + " is configured: use inputs 0 to " +
+                std::to_string(identity.motors - 1));
+  }
+  if (setup.motor_inputs.empty() || (identity.capabilities & BUSHD_CAN_MOTOR_INPUTS) != 0) {
+    return {};
+  }
+  return fail("knows one input a motor, but motor " + std::to_string(setup.motor_inputs[0].motor) +
+              " has others: leave out `inputs` of its motors, or update its firmware");
+}
+
 }  // namespace
 
 Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
@@ -64,6 +79,7 @@ Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_i
                   std::to_string(m) + " is configured");
     }
   }
+  if (auto inputs = check_inputs(setup, identity); !inputs) return inputs;
   if (auto room = check_room(setup, identity, bus.tick_ns); !room) return room;
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * bus.tick_ns / 1000;
@@ -87,13 +103,14 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
     const char* if_too_much;  // remedy
   };
   constexpr const char* kTables = "use shorter or slower tables, or fewer on this MCU";
-  static constexpr std::array<Request, 7> kRequests = {{
+  static constexpr std::array<Request, 8> kRequests = {{
       {BUSHD_MSG_CONFIGURE, "CONFIGURE", "use a longer tick_us on its bus"},
       {BUSHD_MSG_TABLE_BEGIN, "TABLE_BEGIN", kTables},
       {BUSHD_MSG_TABLE_DATA, "TABLE_DATA", kTables},
       {BUSHD_MSG_TABLE_END, "TABLE_END", kTables},
       {BUSHD_MSG_ASSIGN, "ASSIGN", kTables},
       {BUSHD_MSG_INPUTS, "INPUTS", nullptr},
+      {BUSHD_MSG_MOTOR_INPUTS, "MOTOR_INPUTS", nullptr},
       {BUSHD_MSG_LOCAL, "LOCAL", nullptr},
   }};
   const auto* const request =

@@ -30,6 +30,11 @@ void SetupQueue::inputs(const bushd_set_inputs& message) {
   add(BUSHD_MSG_INPUTS, [&](std::uint8_t* p) { return bushd_encode_set_inputs(&message, p); });
 }
 
+void SetupQueue::motor_inputs(const bushd_motor_inputs& message) {
+  add(BUSHD_MSG_MOTOR_INPUTS,
+      [&](std::uint8_t* p) { return bushd_encode_motor_inputs(&message, p); });
+}
+
 void SetupQueue::local(const bushd_local& message) {
   add(BUSHD_MSG_LOCAL, [&](std::uint8_t* p) { return bushd_encode_local(&message, p); });
 }

@@ -30,6 +30,7 @@ class SetupQueue {
   void configure(const bushd_configure& message);
   void emission(const bushd_emission& message);
   void inputs(const bushd_set_inputs& message);
+  void motor_inputs(const bushd_motor_inputs& message);
   void local(const bushd_local& message);
   // Which tables it has.
   void ask_for_tables();

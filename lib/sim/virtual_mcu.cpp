@@ -52,15 +52,16 @@ std::uint16_t VirtualMcu::on_current(void* context, std::int64_t time_ns) {
 }
 
 void VirtualMcu::attach_switch(std::size_t output, const SwitchOptions& options) {
-  switches_.insert_or_assign(output, Switch(options));
+  switches_.insert_or_assign(options.input.value_or(static_cast<std::uint8_t>(output)),
+                             Wired{output, Switch(options)});
 }
 
 bushd_inputs VirtualMcu::on_read_inputs(void* context, std::int64_t time_ns) {
   auto& self = *static_cast<VirtualMcu*>(context);
   bushd_inputs inputs = self.port_.inputs;
-  for (auto& [output, contact] : self.switches_) {
-    const auto bit = static_cast<std::uint16_t>(1u << output);
-    const bool active = contact.read(time_ns, self.port_.shaft[output].position_steps);
+  for (auto& [input, wired] : self.switches_) {
+    const auto bit = static_cast<std::uint16_t>(1u << input);
+    const bool active = wired.contact.read(time_ns, self.port_.shaft[wired.output].position_steps);
     inputs.motors = static_cast<std::uint16_t>(active ? inputs.motors | bit : inputs.motors & ~bit);
   }
   return inputs;

@@ -51,7 +51,7 @@ class VirtualMcu final : public Mcu {
   TimeNs tick_start_ns() const { return port_.tick_start_ns; }
 
   void set_inputs(bushd_inputs inputs) override { bushd_virtual_set_inputs(&port_, inputs); }
-  // From now on the input of this output's motor is what a switch at its shaft says.
+  // From now on that input is what a switch at the shaft of this output's motor says.
   void attach_switch(std::size_t output, const SwitchOptions& options);
   void set_current(std::uint16_t reading) override { port_.current = reading; }
   void fail_self_tests(std::uint8_t tests) { port_.failing_tests = tests; }     // of the next boots
@@ -83,7 +83,11 @@ class VirtualMcu final : public Mcu {
   std::optional<SupplyCurrent> supply_;
   std::vector<std::int16_t> queue_;
   std::vector<std::uint16_t> codes_;
-  std::map<std::size_t, Switch> switches_;  // by output
+  struct Wired {
+    std::size_t output;
+    Switch contact;
+  };
+  std::map<std::size_t, Wired> switches_;  // by input
   bushd_virtual port_;
 };
 

@@ -35,7 +35,9 @@ TEST(ConfigInputs, NothingIsWatchedUnlessItIsAskedFor) {
   EXPECT_EQ(mcu.enable_settle_ms, 0u);
   EXPECT_FALSE(config->motors[0].never_disable);
   const Motor& motor = config->motors[0];
-  EXPECT_FALSE(motor.limit_positive || motor.limit_negative || motor.input_active_open);
+  EXPECT_FALSE(motor.inputs.positive || motor.inputs.negative || motor.inputs.home ||
+               motor.inputs.step);
+  EXPECT_EQ(motor.inputs.own, (Input{.number = motor.output.value}));
   EXPECT_EQ(motor.limit_action, BUSHD_STOP_RAMP);
 }
 
@@ -75,11 +77,12 @@ TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
                             .load();
     ASSERT_TRUE(config.has_value()) << config.error().text();
     const Motor& motor = config->motors[1];
-    EXPECT_EQ(motor.limit_positive, positive) << word;
-    EXPECT_EQ(motor.limit_negative, negative) << word;
+    const Input own{.number = 15, .active_open = true};
+    EXPECT_EQ(motor.inputs.positive, positive ? std::optional(own) : std::nullopt) << word;
+    EXPECT_EQ(motor.inputs.negative, negative ? std::optional(own) : std::nullopt) << word;
     EXPECT_EQ(motor.limit_action, BUSHD_STOP_IMMEDIATE);
-    EXPECT_TRUE(motor.input_active_open);
-    EXPECT_FALSE(config->motors[0].limit_positive);
+    EXPECT_EQ(motor.inputs.own, own);
+    EXPECT_FALSE(config->motors[0].inputs.positive);
   }
 }
 

@@ -44,7 +44,10 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp, 1100));
   bushd_set_inputs inputs{};
   inputs.system_inverted = BUSHD_INPUT_FORWARD;
+  inputs.limit_negative = 1 << 4;
   ASSERT_EQ(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs), BUSHD_OK);
+  ASSERT_EQ(ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs, bushd_motor_inputs{4, 4, 12, 4}),
+            BUSHD_OK);
   const bushd_tables before = master_.tables(kAddress);
   pass(real_->keeps_within_ns(ramp.size()));
   reboot();
@@ -57,6 +60,11 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.faults, 0);
   EXPECT_EQ(report.system_inputs, BUSHD_INPUT_FORWARD);
+  EXPECT_EQ(report.forbidden_negative, 0);
+  bus_.node(0).set_inputs({1 << 12, 0});
+  pass(4 * TimeNs{kTickNs});
+  EXPECT_EQ(master_.poll(kAddress).forbidden_negative, 1 << 4);
+  bus_.node(0).set_inputs({});
 
   // And they move motors.
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));

@@ -112,6 +112,16 @@ Kinds setup_kinds() {
          {"unknown action", set8(10, 3)},
          {"more than can be read", set16(11, 1024)},
          {"neither on nor off", set8(13, 2)}}}},
+      {"motor_inputs",
+       {bytes_with(4,
+                   [](Bytes* p) {
+                     for (uint8_t& byte : *p) byte = between<uint8_t>(0, 15);
+                   }),
+        codec(bushd_decode_motor_inputs, bushd_encode_motor_inputs),
+        {{"motor 16", set8(0, 16)},
+         {"input 16 at the positive end", set8(1, 16)},
+         {"input 16 at the negative end", set8(2, 16)},
+         {"input 16 as home switch", set8(3, 16)}}}},
       {"emission",
        {bytes_with(11,
                    [](Bytes* p) {

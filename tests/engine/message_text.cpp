@@ -97,6 +97,10 @@ void put(const bushd_set_inputs& m, Fields& f) {
   f.add("emergency", m.emergency).add("overcurrent", m.overcurrent);
   f.add("enable_after_watchdog", m.enable_after_watchdog);
 }
+void put(const bushd_motor_inputs& m, Fields& f) {
+  f.add("motor", m.motor).add("positive", m.positive).add("negative", m.negative);
+  f.add("home", m.home);
+}
 void put(const bushd_home& m, Fields& f) {
   f.add("motor", m.motor).add("direction", m.direction).add("most_steps", m.most_steps);
   f.add("floor", m.floor);
@@ -252,6 +256,8 @@ std::string message_text(const bushd_frame& frame) {
       return empty_text("get_tables", frame);
     case BUSHD_MSG_INPUTS:
       return text("set_inputs", frame, bushd_decode_set_inputs);
+    case BUSHD_MSG_MOTOR_INPUTS:
+      return text("motor_inputs", frame, bushd_decode_motor_inputs);
     case BUSHD_MSG_HOME:
       return text("home", frame, bushd_decode_home);
     case BUSHD_MSG_LOCAL:
@@ -271,12 +277,12 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {"identify",        "identity",  "configure",   "table_begin",     "table_data",
-          "table_end",       "assign",    "control",     "set_position",    "poll",
-          "report",          "sync",      "ticks",       "acknowledgement", "table_ticks",
-          "table_run",       "emergency", "set_address", "get_tables",      "tables",
-          "set_inputs",      "emission",  "home",        "local",           "trigger",
-          "position_compare"};
+  return {"identify",         "identity",    "configure",   "table_begin",     "table_data",
+          "table_end",        "assign",      "control",     "set_position",    "poll",
+          "report",           "sync",        "ticks",       "acknowledgement", "table_ticks",
+          "table_run",        "emergency",   "set_address", "get_tables",      "tables",
+          "set_inputs",       "emission",    "home",        "local",           "trigger",
+          "position_compare", "motor_inputs"};
 }
 
 }  // namespace bushd::test

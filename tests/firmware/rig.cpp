@@ -243,6 +243,12 @@ bushd_status Rig::set_inputs(const InputSettings& settings) {
                  payload_of([&](std::uint8_t* p) { return bushd_encode_set_inputs(&message, p); }));
 }
 
+bushd_status Rig::motor_inputs(const bushd_motor_inputs& message) {
+  return request(BUSHD_MSG_MOTOR_INPUTS, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_motor_inputs(&message, p);
+                 }));
+}
+
 bushd_status Rig::home(const bushd_home& message) {
   return request(BUSHD_MSG_HOME,
                  payload_of([&](std::uint8_t* p) { return bushd_encode_home(&message, p); }));

@@ -128,6 +128,7 @@ class Rig {
   bushd_status emission(const bushd_emission& message);
   bushd_tables tables();
   bushd_status set_inputs(const InputSettings& settings);
+  bushd_status motor_inputs(const bushd_motor_inputs& message);
   bushd_status home(const bushd_home& message);
   bushd_status local(std::uint16_t motors);
   // The pins, from the next tick that is prepared on.

@@ -13,7 +13,7 @@ CORPORA = pathlib.Path(__file__).parent / "corpus"
 TICK_NS = 2_560_000
 (IDENTIFY, CONFIGURE, TABLE_BEGIN, TABLE_DATA, TABLE_END, ASSIGN, CONTROL, SET_POSITION, POLL, SYNC, TICKS,
  TABLE_TICKS, TABLE_RUN, EMERGENCY, SET_ADDRESS, TABLES, INPUTS, EMISSION, HOME, LOCAL, TRIGGER,
- POSITION_COMPARE) = range(1, 0x17)
+ POSITION_COMPARE, MOTOR_INPUTS) = range(1, 0x18)
 FINE, REPLACE, START = 1, 2, 4
 EMERGENCY_PIN, FORWARD, REVERSE = 1, 2, 4
 
@@ -114,7 +114,7 @@ def emission(mode, sequence=0, hold=0, step_us=250, settle_us=0, setup_us=0, pul
 
 
 def home(motor, direction, most=200, slow_steps=40, slow_delay=300, position=-5):
-    return frame(HOME, struct.pack("<BbIIHi", motor, direction, most, slow_steps, slow_delay, position))
+    return frame(HOME, struct.pack("<BbIHIHi", motor, direction, most, 0, slow_steps, slow_delay, position))
 
 
 def entries(*motors):
@@ -168,6 +168,9 @@ SEEDS = {
                   + pins(0, FORWARD) + passes(12) + pins(0) + passes(9),
     "home": ready(0, inputs(negative=1)) + home(0, -1) + passes(12) + pins(1) + passes(15) + pins(0) + passes(9)
             + pins(1) + passes(15) + poll(7),
+    "home-behind-a-limit": ready(0, inputs(positive=1, negative=1) + frame(MOTOR_INPUTS, bytes([0, 1, 2, 3]))) + home(0, -1)
+                           + passes(12) + pins(4) + passes(12) + pins(0) + passes(9) + pins(8) + passes(15) + pins(0) + passes(9)
+                           + pins(8) + passes(15) + poll(7),
     "home-given-up": ready(0, inputs(negative=1)) + home(0, -1) + passes(9) + home(0, -1, 0) + passes(15),
     "trigger": ready(0) + trigger(1, 1, 5000, entries(0, 2)) + passes(3) + trigger_edge() + passes(20)
                + trigger(1, 1, 5000, entries(0, 2)) + trigger(2, 2, 50, entries(1)) + trigger_edge(-30000)

@@ -92,6 +92,13 @@ void decode_for_mcu(Bytes payload) {
     BUSHD_REQUIRE(inputs.emergency <= BUSHD_EMERGENCY_INPUT_IMMEDIATE);
     BUSHD_REQUIRE(inputs.debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS);
   }
+  bushd_motor_inputs motor_inputs;
+  if (decoded(payload, &motor_inputs, bushd_decode_motor_inputs, bushd_encode_motor_inputs)) {
+    BUSHD_REQUIRE(motor_inputs.motor < BUSHD_MOTORS_PER_MCU);
+    BUSHD_REQUIRE(motor_inputs.positive < BUSHD_MOTORS_PER_MCU);
+    BUSHD_REQUIRE(motor_inputs.negative < BUSHD_MOTORS_PER_MCU);
+    BUSHD_REQUIRE(motor_inputs.home < BUSHD_MOTORS_PER_MCU);
+  }
   bushd_home home;
   if (decoded(payload, &home, bushd_decode_home, bushd_encode_home)) {
     BUSHD_REQUIRE(home.motor < BUSHD_MOTORS_PER_MCU && home.direction * home.direction == 1);

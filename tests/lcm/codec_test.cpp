@@ -345,6 +345,8 @@ TEST(Codec, SnapshotsArriveAsTheyAre) {
                                              .velocity_steps_per_s = 10.5,
                                              .activity = api::Activity::kMoving,
                                              .moving = true,
+                                             .input = true,
+                                             .inputs = "positive home",
                                              .inhibited = {.positive = true},
                                              .trust = api::Trust::kStale,
                                              .uncertain_reason = "lost",

@@ -60,6 +60,23 @@ TEST(Connect, SettingsOfInputsAreToldEveryTime) {
   EXPECT_EQ(inputs.overcurrent, 900);
 }
 
+TEST(Connect, SwitchesAtOtherInputsAreToldAfterTheSettings) {
+  FakeBus bus(1, 2);
+  bus.slaves[0].identity.capabilities |= BUSHD_CAN_MOTOR_INPUTS;
+  bus.slaves[0].identity.motors = 16;
+  bus.connect();
+  EXPECT_TRUE(bus.heard_of(BUSHD_MSG_MOTOR_INPUTS).empty()) << "those of INPUTS will do";
+  link::McuSetup setup = bus.setup.mcus[0];
+  setup.motor_inputs = {{0, 9, 14, 3}, {1, 1, 1, 15}};
+  bus.master->reconfigure(McuIndex{0}, setup);
+  bus.heard.clear();
+  bus.connect();
+  const auto told = bus.heard_of(BUSHD_MSG_MOTOR_INPUTS);
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told[0].payload, (std::vector<std::uint8_t>{0, 9, 14, 3}));
+  EXPECT_EQ(told[1].payload, (std::vector<std::uint8_t>{1, 1, 1, 15}));
+}
+
 TEST(Connect, AllMcusAgreeOnTheTime) {
   FakeBus bus(5, 2);
   bus.connect();

@@ -51,6 +51,25 @@ TEST_P(Unfit, IsSaidAndAskedAgainWithoutHurry) {
   bus.connect();
 }
 
+// What an MCU cannot have: inputs by number, and more than one a motor.
+TEST(Connect, AnMcuWithoutTheInputsIsNamed) {
+  for (const bool knows : {false, true}) {
+    FakeBus bus(1, 2);
+    link::McuSetup setup = bus.setup.mcus[0];
+    setup.motor_inputs = {{1, 9, 14, 3}};
+    setup.used_inputs = 1u << 3 | 1u << 9 | 1u << 14;
+    bus.slaves[0].identity.motors = knows ? 9 : 16;
+    if (knows) bus.slaves[0].identity.capabilities |= BUSHD_CAN_MOTOR_INPUTS;
+    bus.master->reconfigure(McuIndex{0}, setup);
+    bus.run_for(3'000'000);
+    EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
+    EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
+                HasSubstr(knows ? "has only 9 inputs, but input 9 is configured: use inputs 0 to 8"
+                                : "knows one input a motor, but motor 1 has others"));
+    EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONFIGURE).size(), 0u);
+  }
+}
+
 TEST(Connect, ExactlyEnoughMemoryIsEnough) {
   FakeBus bus(1, 4);
   bus.slaves[0].identity.table_codes = 350;

@@ -133,6 +133,8 @@ FRAMES = [
     (2, 21, "set_inputs", {"limit_positive": 1, "limit_negative": 2, "limit_immediate": 3, "inverted": 4,
                            "debounce_ticks": 15, "system_inverted": 14, "emergency": 1, "overcurrent": 1023,
                            "enable_after_watchdog": 0}),
+    (1, 26, "motor_inputs", {"motor": 15, "positive": 0, "negative": 3, "home": 8}),
+    (2, 27, "motor_inputs", {"motor": 0, "positive": 15, "negative": 15, "home": 15}),
     (1, 21, "home", {"motor": 3, "direction": -1, "most_steps": 20000, "floor": 77, "slow_steps": 600, "slow_delay": 1000,
                      "position_steps": -310}),
     (2, 22, "home", {"motor": 15, "direction": 1, "most_steps": 0, "floor": 0, "slow_steps": 1, "slow_delay": 65535,

@@ -27,6 +27,7 @@ LAYOUTS = {
     "set_inputs": (0x11, [("limit_positive", 2), ("limit_negative", 2), ("limit_immediate", 2), ("inverted", 2),
                           ("debounce_ticks", 1), ("system_inverted", 1), ("emergency", 1), ("overcurrent", 2),
                           ("enable_after_watchdog", 1)]),
+    "motor_inputs": (0x17, [("motor", 1), ("positive", 1), ("negative", 1), ("home", 1)]),
     "home": (0x13, [("motor", 1), ("direction", -1), ("most_steps", 4), ("floor", 2), ("slow_steps", 4), ("slow_delay", 2),
                     ("position_steps", -4)]),
     "local": (0x14, [("motors", 2)]),

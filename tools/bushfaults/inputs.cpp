@@ -26,10 +26,14 @@ Inputs::Inputs(const bushd::config::Config& config, bushd::sim::Bus& bus, bushd:
       trigger_(config.mcus.size(), false) {
   for (std::size_t i = 0; i < config.motors.size(); ++i) {
     const bushd::config::Motor& motor = config.motors[i];
-    switch_.push_back(home_switch(config, i, seed));
-    if (!switch_.back()) continue;
-    bus_.mcu(motor.mcu.value).attach_switch(motor.output.value, *switch_.back());
-    witness_.positions().has_switch(i, switch_.back()->at_steps);
+    switches_.push_back(limit_switches(config, i, seed));
+    const auto home = home_switch(config, i, seed);
+    if (!home) continue;
+    switches_.back().push_back(*home);
+    witness_.positions().has_switch(i, home->at_steps);
+    for (const bushd::sim::SwitchOptions& one : switches_.back()) {
+      bus_.mcu(motor.mcu.value).attach_switch(motor.output.value, one);
+    }
   }
 }
 
@@ -98,12 +102,12 @@ void Inputs::run(TimeNs now_ns) {
 
 // A motor that is beyond its switch, or so near that the contact may still be closed, presses it.
 void Inputs::watch_switches(TimeNs now_ns) {
-  for (std::size_t i = 0; i < switch_.size(); ++i) {
-    if (!switch_[i]) continue;
-    const std::int64_t towards = switch_[i]->positive_end ? 1 : -1;
-    const std::int64_t beyond =
-        (witness_.positions().plant_steps(i) - switch_[i]->at_steps) * towards;
-    if (beyond >= -switch_[i]->hysteresis_steps) witness_.pressed(now_ns, i);
+  for (std::size_t i = 0; i < switches_.size(); ++i) {
+    for (const bushd::sim::SwitchOptions& one : switches_[i]) {
+      const std::int64_t towards = one.positive_end ? 1 : -1;
+      const std::int64_t beyond = (witness_.positions().plant_steps(i) - one.at_steps) * towards;
+      if (beyond >= -one.hysteresis_steps) witness_.pressed(now_ns, i);
+    }
   }
 }
 

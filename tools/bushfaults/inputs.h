@@ -46,7 +46,7 @@ class Inputs {
   std::vector<TimeNs> emergency_until_ns_;  // by MCU; likewise
   std::vector<bool> trigger_;               // by MCU: its level
   // By motor: what it runs into.
-  std::vector<std::optional<bushd::sim::SwitchOptions>> switch_;
+  std::vector<std::vector<bushd::sim::SwitchOptions>> switches_;
 };
 
 }  // namespace bushfaults

@@ -20,9 +20,11 @@ constexpr std::array<std::uint32_t, 4> kBauds = {500'000, 1'000'000, 2'000'000, 
 constexpr std::uint32_t kStream = 400;  // of randomness
 constexpr std::uint32_t kHomeStream = 401;
 constexpr std::uint32_t kEmergencyStream = 402;
+constexpr std::uint32_t kInputStream = 413;
 constexpr std::uint32_t kHomeSpeedStream = 407;
 constexpr std::uint32_t kRequiredStream = 410;
 constexpr std::uint32_t kSwitchStream = 500;  // and the next ones, one for each motor
+constexpr std::uint32_t kLimitStream = 5000;  // likewise
 
 // Every choice is drawn, also where the way is given: so a run told all its ways is the same run.
 bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
@@ -38,6 +40,11 @@ bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
   bus.emergency_stop =
       ways.emergency_stop.value_or(immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP);
   return bus;
+}
+
+const std::optional<bushd::config::Input>& limit_of(const bushd::config::Motor& motor,
+                                                    bool positive) {
+  return positive ? motor.inputs.positive : motor.inputs.negative;
 }
 
 // Of every second one, in its own unit.
@@ -119,10 +126,27 @@ void add_homes(bushd::config::Config& config, std::uint64_t seed) {
         static_cast<std::int32_t>(random.between(8'000, 15'000)) * (home.positive ? 1 : -1);
     home.most_steps = static_cast<std::uint32_t>(random.between(5'000, 40'000));
     const bool limit = !random.one_in(4);
-    motor.limit_positive = limit && home.positive;
-    motor.limit_negative = limit && !home.positive;
+    const bushd::config::Input own{.number = motor.output.value};
+    if (limit) (home.positive ? motor.inputs.positive : motor.inputs.negative) = own;
+    motor.inputs.home = motor.inputs.own = own;
     motor.home = home;
     add_home_speed(motor, speeds);
+  }
+  add_switches(config, seed);
+}
+
+// At inputs that no motor of its MCU has by its output. Where all are taken nothing is drawn.
+void add_switches(bushd::config::Config& config, std::uint64_t seed) {
+  bushd::sim::Random random(seed, kInputStream);
+  std::vector<std::uint8_t> next_free(config.mcus.size(), 0);
+  for (const bushd::config::Motor& motor : config.motors) ++next_free[motor.mcu.value];
+  for (bushd::config::Motor& motor : config.motors) {
+    std::uint8_t& free = next_free[motor.mcu.value];
+    if (!motor.home || free + 2u > BUSHD_MOTORS_PER_MCU || random.one_in(4)) continue;
+    motor.inputs.positive = {.number = free++, .active_open = random.one_in(2)};
+    motor.inputs.negative = {.number = free++, .active_open = random.one_in(2)};
+    const bool at_limit = random.one_in(3);
+    if (at_limit) motor.inputs.home = limit_of(motor, motor.home->positive);
   }
 }
 
@@ -131,7 +155,8 @@ void add_homes(bushd::config::Config& config, std::uint64_t seed) {
 std::optional<bushd::sim::SwitchOptions> home_switch(const bushd::config::Config& config,
                                                      std::size_t motor, std::uint64_t seed) {
   const auto& home = config.motors[motor].home;
-  if (!home) return std::nullopt;
+  const auto& input = config.motors[motor].inputs.home;
+  if (!home || !input) return std::nullopt;
   bushd::sim::Random random(seed, kSwitchStream + static_cast<std::uint32_t>(motor));
   bushd::sim::SwitchOptions options;
   options.at_steps = random.between(1'000, 6'000) * (home->positive ? 1 : -1);
@@ -139,7 +164,33 @@ std::optional<bushd::sim::SwitchOptions> home_switch(const bushd::config::Config
   options.hysteresis_steps = random.between(0, 20);
   options.bounce_ns = random.between(0, 6'000'000);
   options.seed = seed + motor;
+  options.input = input->number;
+  options.opens = input->active_open;
   return options;
+}
+
+std::vector<bushd::sim::SwitchOptions> limit_switches(const bushd::config::Config& config,
+                                                      std::size_t index, std::uint64_t seed) {
+  const bushd::config::Motor& motor = config.motors[index];
+  const auto home = home_switch(config, index, seed);
+  std::vector<bushd::sim::SwitchOptions> switches;
+  if (!home) return switches;
+  bushd::sim::Random random(seed, kLimitStream + static_cast<std::uint32_t>(index));
+  for (const bool positive : {true, false}) {
+    const auto& input = limit_of(motor, positive);
+    if (!input || input->number == motor.inputs.home->number) continue;
+    // A ramp beyond the home switch, and far away from it on the other side.
+    const bool beyond_home = positive == motor.home->positive;
+    const std::int64_t away = random.between(beyond_home ? 6'300 : 2'000, 9'000);
+    switches.push_back({.at_steps = positive ? away : -away,
+                        .positive_end = positive,
+                        .hysteresis_steps = random.between(0, 20),
+                        .bounce_ns = random.between(0, 6'000'000),
+                        .seed = seed + 1000 * (index + 1) + (positive ? 1 : 0),
+                        .opens = input->active_open,
+                        .input = input->number});
+  }
+  return switches;
 }
 
 void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed) {
@@ -153,8 +204,9 @@ void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed) {
 void add_limit_switches(bushd::config::Config& config) {
   for (std::size_t i = 0; i < config.motors.size(); ++i) {
     if (config.motors[i].home) continue;
-    config.motors[i].limit_positive = i % 3 != 1;
-    config.motors[i].limit_negative = i % 3 != 0;
+    const bushd::config::Input own{.number = config.motors[i].output.value};
+    if (i % 3 != 1) config.motors[i].inputs.positive = own;
+    if (i % 3 != 0) config.motors[i].inputs.negative = own;
   }
 }
 

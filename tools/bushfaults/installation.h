@@ -33,11 +33,17 @@ void furnish(bushd::config::Config& config, const FaultRates& faults, const Comm
              std::uint64_t seed);
 
 // Every second motor has a switch to run into and can be homed, some at a speed; most of these
-// switches are limits too.
+// switches are limits too. Where an MCU has inputs left, most of these motors have limit switches
+// of their own at both ends.
 void add_homes(bushd::config::Config& config, std::uint64_t seed);
+void add_switches(bushd::config::Config& config, std::uint64_t seed);
 // Of such a motor, by its index: where the plant has its switch.
 std::optional<bushd::sim::SwitchOptions> home_switch(const bushd::config::Config& config,
                                                      std::size_t motor, std::uint64_t seed);
+
+// Likewise those limits of it that are not its home switch.
+std::vector<bushd::sim::SwitchOptions> limit_switches(const bushd::config::Config& config,
+                                                      std::size_t motor, std::uint64_t seed);
 
 // Of all MCUs; they ramp or stop immediately.
 void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed);

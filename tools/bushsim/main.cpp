@@ -71,7 +71,7 @@ int run(int argc, char** argv) {
   app.add_option("--switch", switches,
                  "A switch at a motor of a virtual MCU, ADDRESS.OUTPUT@STEPS: 1.0@-200 closes 200 "
                  "steps from where it stands now in the negative direction, 1.0@+200 in the "
-                 "positive one. Several times for several")
+                 "positive one; 1.0:9@-200 is connected to input 9. Several times for several")
       ->allow_extra_args(false);
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")

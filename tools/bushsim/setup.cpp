@@ -101,17 +101,24 @@ Result<std::vector<SwitchAt>> parse_switches(const std::vector<std::string>& cho
     auto read = std::from_chars(choice.data(), end, one.address);
     const bool has_output = read.ec == std::errc{} && read.ptr != end && *read.ptr == '.';
     if (has_output) read = std::from_chars(read.ptr + 1, end, one.output);
+    std::uint8_t input = one.output;
+    if (has_output && read.ec == std::errc{} && read.ptr != end && *read.ptr == ':') {
+      read = std::from_chars(read.ptr + 1, end, input);
+    }
     const char* const sign = read.ptr + 1;
     const bool has_sign = has_output && read.ec == std::errc{} && end - read.ptr > 2 &&
                           *read.ptr == '@' && (*sign == '-' || *sign == '+');
     if (has_sign) read = std::from_chars(*sign == '+' ? sign + 1 : sign, end, one.options.at_steps);
-    if (!has_sign || read.ec != std::errc{} || read.ptr != end || one.output > 15) {
-      return fault("must be ADDRESS.OUTPUT@-STEPS or ADDRESS.OUTPUT@+STEPS, with an output 0..15");
+    if (!has_sign || read.ec != std::errc{} || read.ptr != end || one.output > 15 || input > 15) {
+      return fault(
+          "must be ADDRESS.OUTPUT@-STEPS or ADDRESS.OUTPUT@+STEPS, with an output 0..15, or "
+          "ADDRESS.OUTPUT:INPUT@.. with an input 0..15");
     }
     if (std::ranges::find(setup.addresses, one.address) == setup.addresses.end()) {
       return fault(fmt::format("bus \"{}\" has no MCU of this address", setup.bus));
     }
     if (images.contains(one.address)) return fault("only virtual MCUs can have one");
+    one.options.input = input;
     one.options.positive_end = *sign == '+';
     one.options.hysteresis_steps = kHysteresisSteps;
     one.options.bounce_ns = kBounceNs;

@@ -40,8 +40,9 @@ struct SwitchAt {
   bushd::sim::SwitchOptions options;
 };
 
-// From `1.0@-200`: address, output, and where it closes; the sign is the end of the travel that it
-// is at.
+// From `1.0@-200` or `1.0:9@-200`: address, output, the input that it is connected to (without:
+// that with the number of the output), and where it closes; the sign is the end of the travel that
+// it is at.
 bushd::Result<std::vector<SwitchAt>> parse_switches(const std::vector<std::string>& choices,
                                                     const Setup& setup, const Images& images);
 

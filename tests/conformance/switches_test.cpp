@@ -1,0 +1,194 @@
+// Motors with limit and home switches at inputs of their own, an image beside its virtual twin:
+// each limit, levels, homing between limits from anywhere, with contacts that bounce, and settings
+// over a reset.
+#include <cstdlib>
+#include <utility>
+#include <vector>
+
+#include "conformance/script.h"
+#include "sim/switch.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint8_t kMotor = 6;
+constexpr std::uint8_t kPositive = 15;
+constexpr std::uint8_t kNegative = 2;
+constexpr std::uint8_t kHome = 9;
+constexpr std::int64_t kEnd = 500;
+
+constexpr std::uint16_t bit(unsigned n) {
+  return static_cast<std::uint16_t>(1u << n);
+}
+
+// What stands at the motor, by the pins of the twin: a step of both is not at just the same time,
+// and the contacts are to say the same to both.
+class Stage {
+ public:
+  explicit Stage(std::int64_t home_at_steps) {
+    put(kPositive, {.at_steps = kEnd, .positive_end = true, .seed = 1});
+    put(kNegative, {.at_steps = -kEnd, .seed = 2, .opens = true});
+    put(kHome, {.at_steps = home_at_steps, .seed = 3, .width_steps = 80});
+  }
+
+  bushd_inputs sense(TimeNs now_ns, const std::vector<Edge>& edges) {
+    for (; seen_ < edges.size(); ++seen_) {
+      const Edge& edge = edges[seen_];
+      if (edge.mcu != 0 || edge.index != kMotor) continue;
+      if (edge.signal == Signal::kDir) positive_ = edge.level;
+      if (edge.signal == Signal::kStep && edge.level) position_steps_ += positive_ ? 1 : -1;
+    }
+    unsigned active = 0;
+    for (auto& [input, contact] : contacts_) {
+      if (contact.read(now_ns, position_steps_)) active |= 1u << input;
+    }
+    return {static_cast<std::uint16_t>(active), 0};
+  }
+  std::int64_t position_steps() const { return position_steps_; }
+
+ private:
+  // Three ticks of bounce are within a slow step.
+  void put(std::uint8_t input, SwitchOptions options) {
+    options.hysteresis_steps = 5;
+    options.bounce_ns = 3 * TimeNs{kTickNs};
+    contacts_.emplace_back(input, Switch(options));
+  }
+
+  std::vector<std::pair<std::uint8_t, Switch>> contacts_;
+  std::size_t seen_ = 0;
+  bool positive_ = false;
+  std::int64_t position_steps_ = 0;
+};
+
+class Switches : public Script, public testing::WithParamInterface<Target> {
+ protected:
+  static constexpr std::int64_t kHomeAt = -120;
+
+  Switches() : Script(GetParam()) {}
+
+  void SetUp() override {
+    ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kMotor}));
+    ASSERT_NO_FATAL_FAILURE(wire(kHome));
+  }
+
+  void wire(std::uint8_t home) {
+    sense();
+    bushd_set_inputs inputs{};
+    inputs.limit_positive = inputs.limit_negative = bit(kMotor);
+    inputs.inverted = bit(kNegative);
+    inputs.debounce_ticks = 1;
+    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs));
+    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs,
+                                bushd_motor_inputs{kMotor, kPositive, kNegative, home}));
+  }
+
+  // Inputs are looked at once a tick: they change for both in the same one.
+  void sense() {
+    bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4);
+    set_inputs(stage_.sense(bus_.now_ns(), recorder_.edges));
+  }
+
+  void pass_until_rest() {
+    for (int ticks = 0; ticks < 6000; ++ticks) {
+      sense();
+      if (ticks % 60 == 59 && master_.poll(kReal).moving == 0 &&
+          master_.poll(kVirtual).moving == 0) {
+        return;
+      }
+    }
+    FAIL() << "it does not come to rest";
+  }
+
+  void go(std::int8_t direction, std::uint32_t steps) {
+    run_by_table(master_.poll(kReal).tick + 24, {{kMotor, 0, direction, steps, 0}});
+    ASSERT_NO_FATAL_FAILURE(pass_until_rest());
+  }
+  void go_to(std::int64_t place) {
+    const std::int64_t way = place - stage_.position_steps();
+    if (way == 0) return;
+    go(way > 0 ? 1 : -1, static_cast<std::uint32_t>(std::abs(way)));
+  }
+
+  // Both within one tick: from then on they go together.
+  void home(std::int8_t direction) {
+    const bushd_home message{kMotor, direction, 3000, 0, 400, 1000, 0};
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_home(&message, payload.data()));
+    bus_.advance_to(bus_.node(0).next_event_ns());
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      master_.post(address, BUSHD_MSG_HOME, payload);
+      bus_.advance_to(bus_.now_ns() + 1'000'000);
+    }
+    ASSERT_NO_FATAL_FAILURE(pass_until_rest());
+  }
+
+  void expect_home_at(std::int64_t at) {
+    const bushd_report report = master_.poll(kReal);
+    EXPECT_EQ(report.homing, BUSHD_HOMING_DONE);
+    EXPECT_EQ(report.homed, bit(kMotor));
+    const std::int64_t off = stage_.position_steps() - at - report.motor[kMotor].position_steps;
+    EXPECT_LE(std::abs(off), 1) << "the counter is 0 where the switch closes";
+    EXPECT_LE(std::abs(stage_.position_steps() - at), 2);
+  }
+
+  void expect_alike() {
+    expect_the_same_steps(kMotor, steps(0, kMotor).size());
+    expect_the_same_times(kMotor);
+    expect_the_same_reports();
+    const bushd_report expected = master_.poll(kVirtual);
+    const bushd_report report = master_.poll(kReal);
+    EXPECT_EQ(report.forbidden_positive, expected.forbidden_positive);
+    EXPECT_EQ(report.forbidden_negative, expected.forbidden_negative);
+    EXPECT_EQ(report.homing, expected.homing);
+  }
+
+  Stage stage_{kHomeAt};
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Switches);
+INSTANTIATE_TEST_SUITE_P(Of, Switches, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(Switches, EachLimitStopsItsDirection) {
+  for (const std::int8_t direction : {std::int8_t{1}, std::int8_t{-1}}) {
+    SCOPED_TRACE(int{direction});
+    ASSERT_NO_FATAL_FAILURE(go(direction, 1500));
+    const bushd_report report = master_.poll(kReal);
+    EXPECT_EQ(report.forbidden_positive, direction > 0 ? bit(kMotor) : 0);
+    EXPECT_EQ(report.forbidden_negative, direction < 0 ? bit(kMotor) : 0);
+    EXPECT_EQ(report.inputs, bit(direction > 0 ? kPositive : kNegative));
+    EXPECT_GE(stage_.position_steps() * direction, kEnd);
+    EXPECT_LE(stage_.position_steps() * direction, kEnd + 60) << "its ramp";
+    expect_alike();
+  }
+}
+
+TEST_P(Switches, HomeIsFoundFromAnywhereBetweenTheLimits) {
+  for (const std::int64_t from : {300, -400, 900, -900, -150, -200}) {
+    SCOPED_TRACE("from " + std::to_string(from));
+    ASSERT_NO_FATAL_FAILURE(go_to(from));
+    ASSERT_NO_FATAL_FAILURE(home(-1));
+    expect_home_at(kHomeAt);
+    expect_alike();
+  }
+}
+
+TEST_P(Switches, ALimitMayBeTheHomeSwitch) {
+  ASSERT_NO_FATAL_FAILURE(wire(kNegative));
+  ASSERT_NO_FATAL_FAILURE(home(-1));
+  expect_home_at(-kEnd);
+  EXPECT_EQ(master_.poll(kReal).forbidden_negative, bit(kMotor));
+  expect_alike();
+}
+
+// Nothing is connected to that input.
+TEST_P(Switches, NoHomeBetweenTheLimits) {
+  ASSERT_NO_FATAL_FAILURE(wire(kMotor));
+  ASSERT_NO_FATAL_FAILURE(home(1));
+  EXPECT_EQ(master_.poll(kReal).homing, BUSHD_HOMING_NOT_FOUND);
+  EXPECT_EQ(master_.poll(kReal).forbidden_negative, bit(kMotor));
+  EXPECT_LE(stage_.position_steps(), -kEnd);
+  expect_alike();
+}
+
+}  // namespace
+}  // namespace bushd::sim
