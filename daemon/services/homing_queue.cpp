@@ -178,10 +178,11 @@ void HomingQueue::add(Task task) {
   installation_.changed = true;
 }
 
-// With a store as soon as that knows of the motion, and once its drivers are enabled: step().
+// With a store as soon as that knows of the motion, and once its drivers are enabled: step(). There
+// one ends as well that was held while it waited for its turn.
 void HomingQueue::begin(Mcu& mcu) {
   Task& task = queues_[mcu.id].front();
-  if (kept_.keeps() || !idle_drivers_.none()) return;
+  if (kept_.keeps() || !idle_drivers_.none() || installation_[task.motor].is_held()) return;
   task.phase = Phase::kHoming;
   mcu.home(message_for(task));
 }
@@ -207,6 +208,9 @@ void HomingQueue::step(std::int64_t now_us, Mcu& mcu) {
 
 void HomingQueue::ask(std::int64_t now_us, Mcu& mcu) {
   Task& task = queues_[mcu.id].front();
+  if (installation_[task.motor].is_held()) {
+    return end(mcu, Outcome::kStopped, "it was held before it was its turn to be homed");
+  }
   const auto ready = kept_.make_ready(now_us, task.motor);
   const bool powered = idle_drivers_.make_ready(now_us, mcu.id);
   if (ready && !(*ready && powered)) return;

@@ -182,13 +182,13 @@ void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, std::
 
 Result<std::int64_t> Moves::go_on(std::int64_t now_us, MotorId id, const api::Amount& position) {
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
-  const auto floor = installation_[id].floor_at({});
-  if (!floor) return fail(floor.error());
-  const auto target = target_of(id, position, api::Move::Kind::kAbsolute, *floor);
-  if (!target) return target;
+  const auto part = part_of(id, position, {.kind = api::Move::Kind::kAbsolute});
+  if (!part) return fail(part.error());
+  const auto& [target, floor] = part->legs.front();
+  installation_[id].go_on({part->legs.begin() + 1, part->legs.end()});
   const Mcu& mcu = installation_.mcu_of(id);
-  start_run(id, *target, mcu.earliest_start(now_us, installation_[id].output()), *floor);
-  return target;
+  start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), floor);
+  return part->legs.back().target;
 }
 
 void Moves::begin(MotorId id) {

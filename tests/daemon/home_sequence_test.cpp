@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "daemon/lab.h"
+#include "daemon/motor_keys.h"
 
 namespace bushd::test {
 namespace {
@@ -26,7 +27,10 @@ std::string homes(const std::vector<std::string>& keys) {
 }
 
 struct SequenceLab : Lab {
-  explicit SequenceLab(const std::vector<std::string>& keys, bool kept = false) : Lab(homes(keys)) {
+  // `of_m01`: more keys of that motor.
+  explicit SequenceLab(const std::vector<std::string>& keys, bool kept = false,
+                       const std::string& of_m01 = "")
+      : Lab(with_m01(homes(keys), of_m01)) {
     if (kept) keep_positions();
     for (std::size_t i = 0; i < keys.size(); ++i) {
       if (!keys[i].empty()) bus(0).mcu(i / 2).attach_switch(i % 2, {.at_steps = kSwitch});
@@ -98,6 +102,41 @@ TEST(HomeSequence, AMotorMovesOnToThenAndThatIsPartOfTheResult) {
     EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01", "m02"})).result, "reached");
     EXPECT_EQ(lab.motor("m01").position_steps, 120);
     EXPECT_THAT(lab.errors(), IsEmpty());
+  }
+}
+
+TEST(HomeSequence, AMotorMovesOnToThenAsAnyMoveDoesByItsLegs) {
+  for (const bool kept : {false, true}) {
+    SequenceLab lab({"then = 120", "order = 2", "", ""}, kept, "backlash = -20\n");
+    const auto all = lab.home_all();
+    std::int64_t farthest = -1000;
+    ASSERT_TRUE(lab.run_until(
+        [&] {
+          if (lab.motor("m01").activity == api::Activity::kMoving) {
+            farthest = std::max(farthest, lab.shaft_steps("m01"));
+          }
+          return lab.has_moved("m02");
+        },
+        60));
+    EXPECT_EQ(farthest, kSwitch + 140) << "from there it approaches in the negative direction";
+    EXPECT_EQ(lab.motor("m01").position_steps, 120);
+    EXPECT_EQ(lab.shaft_steps("m01"), kSwitch + 120);
+    EXPECT_EQ(lab.wait(all).result, "reached");
+  }
+}
+
+TEST(HomeSequence, AMotorThatIsHeldBeforeItsTurnIsNotMoved) {
+  for (const bool kept : {false, true}) {
+    SequenceLab lab({"order = 1", "order = 2", "", ""}, kept);
+    const auto all = lab.home_all();
+    ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -50; }));
+    EXPECT_EQ(lab.wait(lab.send(api::Hold{{"m02"}})).result, "done");
+    const Answer answer = lab.wait(all);
+    EXPECT_THAT(answer.motor_results, ElementsAre("reached", "stopped"));
+    EXPECT_THAT(answer.reason, HasSubstr("m02: it was held before it was its turn"));
+    EXPECT_FALSE(lab.has_moved("m02"));
+    EXPECT_EQ(lab.wait(lab.send(api::Release{{"m02"}})).result, "done");
+    EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m02"})).result, "reached");
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "daemon/lab.h"
+#include "daemon/motor_keys.h"
 #include "fieldbus/line_times.h"
 
 namespace bushd::test {
@@ -41,11 +42,6 @@ class Pins final : public sim::EdgeSink {
 std::string with_mcu(std::string toml, const std::string& keys) {
   const std::string mcu = "address = 1\n";
   return toml.replace(toml.find(mcu), mcu.size(), mcu + keys);
-}
-
-std::string with_m01(std::string toml, const std::string& keys) {
-  const std::string motor = "name = \"m01\"\n";
-  return toml.replace(toml.find(motor), motor.size(), motor + keys);
 }
 
 const std::string kIdle = "idle_disable_s = 0.5\nenable_settle_ms = 250\n";

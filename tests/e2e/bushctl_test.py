@@ -1,9 +1,8 @@
 """bushctl and the example clients against the real daemon."""
 
 import json
-import os
 import signal
-import subprocess
+import sys
 import unittest
 
 from rig import FAR, MOTORS, TOP, EndToEndTest, program
@@ -143,23 +142,26 @@ class Examples(EndToEndTest):
         self.check_example(program("MOVE_AND_WAIT"))
 
     def python_with(self, example):
-        python = os.environ["EXAMPLE_PYTHON"]
-        try:
-            subprocess.run([python, "-c", "import lcm, bushd"], check=True, capture_output=True)
-        except (OSError, subprocess.CalledProcessError):
-            self.skipTest(f"{python} has no lcm: tools/examples/python/setup-venv needs a package index")
-        return python, TOP / "tools" / "examples" / "python" / example
+        return sys.executable, "-B", TOP / "tools" / "examples" / "python" / example
 
     def test_in_python(self):
-        self.check_example(*self.python_with("move_and_wait.py"))
+        lcm = "udpm://239.255.76.67:7667?ttl=0"
+        self.check_example(*self.python_with("move_and_wait.py"), "--lcm", lcm)
 
     def test_in_python_over_the_socket(self):
         self.check_example(*self.python_with("move_and_wait.py"), "--socket", self.file("control"))
 
-    def test_health_in_python(self):
-        example = self.python_with("show_health.py")
+    def test_scan_in_python(self):
         self.bring_up()
-        ran = self.run_program(*example, "--count", "1")
+        self.survey()
+        ran = self.run_program(*self.python_with("scan.py"), "a0", "-10", "10", "3")
+        self.assertEqual((ran.returncode, ran.stderr), (0, ""))
+        self.assertEqual(ran.stdout, "# a0 [steps], reached, value\n-10 -10 0\n0 0 0\n10 10 0\n")
+        self.assertEqual(self.positions()["a0"], 0)
+
+    def test_health_in_python(self):
+        self.bring_up()
+        ran = self.run_program(*self.python_with("show_health.py"), "--count", "1")
         self.assertEqual(ran.returncode, 0, ran.stderr)
         self.assertRegex(ran.stdout, r"hall:1: \d+ CRC errors, .*\nhall:2: \d+ CRC errors, ")
 

@@ -71,7 +71,9 @@ TimeNs Skew::drift_ns(TimeNs now_ns, std::size_t index) const {
   const Mcu& mcu = mcus_[index];
   const bool made_up = now_ns - mcu.corrected_ns > kCorrectionTicks * tick_ns_;
   const TimeNs alone_ns = now_ns - (made_up ? mcu.corrected_ns : mcu.corrected_before_ns);
-  if (mcu.corrections < kRateKnownAfter) return alone_ns / 1'000'000 * kRateUnknownPpm;
+  // A correction counts when it is made up.
+  const unsigned corrections = mcu.corrections - (made_up || mcu.corrections == 0 ? 0u : 1u);
+  if (corrections < kRateKnownAfter) return alone_ns / 1'000'000 * kRateUnknownPpm;
   return std::max(TimeNs{0}, alone_ns - kSilenceNs) / 1'000'000 * kRateKnownPpm;
 }
 

@@ -191,6 +191,7 @@ class Witness {
   std::optional<std::int64_t> target_asked(const Motor& motor, const Request& request,
                                            std::size_t i) const;
   bool trusted(const Motor& motor) const;
+  std::int64_t said_steps(const Motor& motor) const;
   bool refused_for_good_reason(const Asked& asked, const Motor& motor, std::size_t i,
                                const std::string& reason) const;
   void check_speed(TimeNs now_ns, const Motor& motor, const Asked& asked, std::size_t index);

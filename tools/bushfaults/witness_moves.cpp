@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "witness.h"
 
@@ -79,11 +80,12 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   asked.began.push_back(request.ask != Ask::kArm);
   asked.told.push_back(false);
   asked.stops.push_back(false);
-  motor.range.reset();
   if (request.ask == Ask::kHome) {
     motor.move.reset();
+    motor.range.reset();
     return positions_.may_be_homed(index_of(motor));
   }
+  if (!motor.moves()) motor.range.reset();
   take_over(motor, key, target);
   keep_within(now_ns, motor);
   if (target) steps_commanded_ += static_cast<std::uint64_t>(std::abs(*target - stands));
@@ -134,18 +136,21 @@ void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t>
   motor.idle_checks = 0;
 }
 
-// Soft limits hold for all that it does until something else is asked of it.
+// Soft limits hold for all that it does until something else is asked of it. One that moves beyond
+// them may turn round, and first rest where it might have gone before.
 void Witness::keep_within(TimeNs now_ns, Motor& motor) {
-  motor.range.reset();
+  const auto before = std::exchange(motor.range, std::nullopt);
   const auto limits = units_.limits(index_of(motor));
   if (!limits || !offset(motor) || !trusted(motor)) return;
   const std::int64_t stands = plant_steps(motor) - *offset(motor);
-  const auto& motors = states_[motor.mcu]->motors;
-  const std::int64_t said =
-      std::ranges::find(motors, motor.name, &api::MotorState::name)->position_steps;
+  const std::int64_t said = said_steps(motor);
   motor.range = Range{.low = std::min({limits->low, stands, said}) + *offset(motor),
                       .high = std::max({limits->high, stands, said}) + *offset(motor),
                       .since_ns = now_ns};
+  if (before && stands < limits->low) motor.range->low = std::min(motor.range->low, before->low);
+  if (before && stands > limits->high) {
+    motor.range->high = std::max(motor.range->high, before->high);
+  }
 }
 
 void Witness::position_set(const Request& request) {

@@ -50,6 +50,12 @@ bool Witness::trusted(const Motor& motor) const {
   return found->trust == api::Trust::kKnown || found->trust == api::Trust::kRestored;
 }
 
+// As the daemon has said last.
+std::int64_t Witness::said_steps(const Motor& motor) const {
+  const auto& motors = states_[motor.mcu]->motors;
+  return std::ranges::find(motors, motor.name, &api::MotorState::name)->position_steps;
+}
+
 // In the daemon's count.
 std::optional<std::int64_t> Witness::target_asked(const Motor& motor, const Request& request,
                                                   std::size_t i) const {
@@ -70,9 +76,7 @@ void Witness::check_limits(TimeNs now_ns, const Asked& asked) {
     const auto target = limits ? target_asked(motor, request, i) : std::nullopt;
     if (!target) continue;
     const std::int64_t stands = plant_steps(motor) - *offset(motor);
-    const auto& motors = states_[motor.mcu]->motors;
-    const std::int64_t said =
-        std::ranges::find(motors, motor.name, &api::MotorState::name)->position_steps;
+    const std::int64_t said = said_steps(motor);
     const std::int64_t low = std::min({limits->low, stands, said});
     const std::int64_t high = std::max({limits->high, stands, said});
     for (const std::int64_t leg : legs_to(motor, request, *target + *offset(motor))) {
@@ -106,8 +110,9 @@ bool Witness::refused_for_good_reason(const Asked& asked, const Motor& motor, st
   if (!limits) return false;
   if (request.ask == Ask::kJog) {
     if (!trusted(motor) || !offset(motor)) return true;
-    const std::int64_t at = plant_steps(motor) - *offset(motor);
-    return request.speed_micro > 0 ? at >= limits->high : at <= limits->low;
+    // Where it is, or was heard last.
+    const auto [low, high] = std::minmax(plant_steps(motor) - *offset(motor), said_steps(motor));
+    return request.speed_micro > 0 ? high >= limits->high : low <= limits->low;
   }
   const auto target = target_asked(motor, request, i);
   if (!target) return true;

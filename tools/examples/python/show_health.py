@@ -1,42 +1,43 @@
 #!/usr/bin/env python3
-"""Example in Python: prints how well each MCU does, once a second, until interrupted.
-
-Needs what move_and_wait.py needs.
-"""
+"""Example in Python: prints how well each MCU does, once a second, until interrupted. Needs what move_and_wait.py needs."""
 
 import argparse
+import itertools
+import sys
+import time
 
-import lcm
-from bushd import health_t
+import bushd
 
 
-def show(_channel, data):
-    try:
-        health = health_t.decode(data)
-    except Exception:  # anybody may send anything
-        return
-    for mcu in health.mcus:
-        low_water = f"{mcu.low_water_ticks} ticks" if mcu.low_water_ticks >= 0 else "none moved"
-        print(
-            f"{mcu.mcu}: {mcu.crc_errors} CRC errors, {mcu.repeats} repeats, {mcu.ramp_downs} ramp-downs, "
-            f"low water {low_water}, crystal {-mcu.rate_ppm:+.1f} ppm",
-            flush=True,
-        )
+def show(health):
+    for bus in health.values():
+        for mcu in bus.mcus:
+            low_water = "none moved" if mcu.low_water_ticks is None else f"{mcu.low_water_ticks} ticks"
+            print(
+                f"{mcu.mcu}: {mcu.crc_errors} CRC errors, {mcu.repeats} repeats, {mcu.ramp_downs} ramp-downs, "
+                f"low water {low_water}, crystal {-mcu.rate_ppm:+.1f} ppm",
+                flush=True,
+            )
 
 
 def main():
     parser = argparse.ArgumentParser(description="Prints the health of all MCUs.")
-    parser.add_argument("--url", default="udpm://239.255.76.67:7667?ttl=0")
-    parser.add_argument("--prefix", default="BUSHD")
-    parser.add_argument("--count", type=int, default=0, help="end after so many messages")
+    parser.add_argument("--lcm", metavar="URL", help="LCM in place of the control socket")
+    parser.add_argument("--prefix", default="BUSHD", help="of the LCM channels")
+    parser.add_argument("--count", type=int, default=0, help="end after so many times")
     arguments = parser.parse_args()
-    network = lcm.LCM(arguments.url)
-    network.subscribe(arguments.prefix + "_HEALTH", show)
-    shown = 0
-    while arguments.count == 0 or shown < arguments.count:
-        network.handle()
-        shown += 1
+    with bushd.connect(lcm=arguments.lcm or False, prefix=arguments.prefix) as client:
+        for count in itertools.count(1):
+            show(client.health())
+            if count == arguments.count:
+                return
+            time.sleep(1)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:
+        pass
+    except bushd.BushdError as error:
+        sys.exit(f"show_health.py: {error}")

@@ -1,0 +1,88 @@
+"""A client of bushd, the daemon that moves stepper motors:
+
+    import bushd
+
+    with bushd.connect() as client:
+        client.move("theta", to=12.5)
+        print(client.where("theta").position)
+
+`bushd.aio` is the same for asyncio. Everything is Python; nothing but the standard library is needed.
+"""
+
+from . import aio
+from .client import Client, Jog, Motion, Tables, connect
+from .errors import (
+    BushdError,
+    MoveFailed,
+    NoDaemon,
+    Refused,
+    RequestFailed,
+    ResultUnknown,
+    TwoDaemons,
+    UnknownMotor,
+)
+from .model import (
+    Activity,
+    BusHealth,
+    Configuration,
+    Inhibited,
+    Mcu,
+    McuHealth,
+    McuState,
+    Motor,
+    MotorResult,
+    MovePlan,
+    MoveResult,
+    Outcome,
+    PastMotion,
+    PlannedLeg,
+    Result,
+    Setting,
+    Status,
+    Table,
+    TableEntry,
+    TableRef,
+    Trust,
+)
+from .session import Timing
+from .version import __version__
+
+__all__ = [
+    "Activity",
+    "BusHealth",
+    "BushdError",
+    "Client",
+    "Configuration",
+    "Inhibited",
+    "Jog",
+    "Mcu",
+    "McuHealth",
+    "McuState",
+    "Motion",
+    "Motor",
+    "MotorResult",
+    "MoveFailed",
+    "MovePlan",
+    "MoveResult",
+    "NoDaemon",
+    "Outcome",
+    "PastMotion",
+    "PlannedLeg",
+    "Refused",
+    "RequestFailed",
+    "Result",
+    "ResultUnknown",
+    "Setting",
+    "Status",
+    "Table",
+    "TableEntry",
+    "TableRef",
+    "Tables",
+    "Timing",
+    "Trust",
+    "TwoDaemons",
+    "UnknownMotor",
+    "__version__",
+    "aio",
+    "connect",
+]

@@ -1,0 +1,182 @@
+"""Ways to the daemon: the control socket of this PC, or LCM. None of them blocks."""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import struct
+from collections.abc import Iterator
+from typing import Protocol
+
+from . import udpm
+from .errors import NoDaemon
+
+SYSTEM_PATH = "/run/bushd/control"
+DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
+DEFAULT_PREFIX = "BUSHD"
+MAX_CHANNEL = 63  # on the control socket
+PACKETS_AT_ONCE = 256
+
+
+class LinkEnded(Exception):
+    """The daemon has closed the connection."""
+
+
+class Link(Protocol):
+    loses: bool
+    remedy: str  # what has to be there for a daemon to answer
+
+    def fileno(self) -> int:
+        """Readable while messages wait."""
+
+    def send(self, channel: str, payload: bytes) -> None:
+        """Raises BlockingIOError while there is no room, LinkEnded when there will be none."""
+
+    def receive(self) -> Iterator[tuple[str, bytes]]:
+        """What waits, at most PACKETS_AT_ONCE messages. Raises LinkEnded behind the last message."""
+
+    def close(self) -> None: ...
+
+
+class SocketLink:
+    loses = False
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self.remedy = f"bushd does not answer at {path}; its log may tell why"
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            self._socket.connect(path)
+        except OSError as error:
+            self._socket.close()
+            why = error.strerror or str(error)
+            raise NoDaemon(f"{path}: no bushd at this control socket: {why}. Start `bushd --config FILE`") from error
+        self._socket.setblocking(False)
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def send(self, channel: str, payload: bytes) -> None:
+        try:
+            self._socket.send(channel.encode("ascii") + b"\0" + payload)
+        except (BlockingIOError, InterruptedError):
+            raise BlockingIOError from None
+        except OSError as error:
+            raise LinkEnded(f"the daemon does not take messages at {self._path}: {error.strerror}") from error
+
+    def receive(self) -> Iterator[tuple[str, bytes]]:
+        for _ in range(PACKETS_AT_ONCE):
+            try:
+                packet, _, flags, _ = self._socket.recvmsg(65536)
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError:
+                packet, flags = b"", 0
+            if not packet:
+                raise LinkEnded(f"the daemon has ended, or closed {self._path}")
+            name, nul, payload = packet.partition(b"\0")
+            if nul and 0 < len(name) <= MAX_CHANNEL and name.isascii() and not flags & socket.MSG_TRUNC:
+                yield name.decode("ascii"), payload
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class LcmLink:
+    loses = True
+
+    def __init__(self, url: str, prefix: str) -> None:
+        self._url = udpm.Url.parse(url)
+        self._prefix = prefix + "_"
+        self.remedy = (
+            f"no bushd answers on channels {prefix}_... of {url}. Start `bushd --config FILE`, with "
+            f'url = "{url}" and prefix = "{prefix}" in [lcm] of that file'
+        )
+        self._sequence = 0
+        self._receiver = udpm.Receiver()
+        self._in = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._open(url)
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(self, url: str) -> None:
+        address = self._url.address
+        self._in.setblocking(False)
+        self._out.setblocking(False)
+        self._in.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        # As much as the machine allows: one answer of a large installation is hundreds of datagrams.
+        self._in.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, self._url.receive_buffer_bytes)
+        self._out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self._url.ttl)
+        self._out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        try:
+            group = struct.pack("4sI", socket.inet_aton(address), socket.INADDR_ANY)
+            self._in.bind((address, self._url.port))
+            self._in.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
+            self._out.connect((address, self._url.port))
+        except OSError as error:
+            raise NoDaemon(
+                f'LCM cannot use the URL "{url}" ({error.strerror or error}): the address is wrong or there is no '
+                f"route to it. For this machine only: ip route replace {address}/32 dev lo (as root)"
+            ) from error
+
+    def fileno(self) -> int:
+        return self._in.fileno()
+
+    def send(self, channel: str, payload: bytes) -> None:
+        self._sequence += 1
+        try:
+            self._out.send(udpm.datagram(self._sequence, self._prefix + channel, payload))
+        except OSError as error:
+            # A lost datagram is sent again. What else it is does not pass by itself.
+            if error.errno not in (errno.EAGAIN, errno.EINTR, errno.ENOBUFS, errno.ECONNREFUSED):
+                raise LinkEnded(f"LCM cannot send: {error.strerror}; is the network up?") from error
+
+    def receive(self) -> Iterator[tuple[str, bytes]]:
+        for _ in range(PACKETS_AT_ONCE):
+            try:
+                data, sender = self._in.recvfrom(65536)
+            except OSError:
+                return
+            message = self._receiver.take(data, sender)
+            if message is not None and message[0].startswith(self._prefix):
+                yield message[0][len(self._prefix) :], message[1]
+
+    def close(self) -> None:
+        self._in.close()
+        self._out.close()
+
+
+def default_paths() -> list[str]:
+    """Where a daemon's control socket may be, the likeliest first."""
+    named = os.environ.get("BUSHD_CONTROL")
+    if named:
+        return [named]
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    return [SYSTEM_PATH] + ([f"{runtime}/bushd/control"] if runtime.startswith("/") else [])
+
+
+def open_link(path: str | os.PathLike[str] | None, lcm: bool | str, prefix: str) -> Link:
+    """As `connect()` of the two faces says. Raises NoDaemon."""
+    if path is not None and lcm:
+        raise ValueError("give a socket or LCM, not both")
+    if path is not None:
+        return SocketLink(os.fspath(path))
+    if lcm:
+        return LcmLink(lcm if isinstance(lcm, str) else DEFAULT_URL, prefix)
+    barred = ""  # there is a socket, and this user has no right to it: that is why LCM was tried
+    for candidate in default_paths():
+        try:
+            return SocketLink(candidate)
+        except NoDaemon as error:
+            if isinstance(error.__cause__, PermissionError):
+                barred = barred or f" ({error})"
+    try:
+        link = LcmLink(DEFAULT_URL, prefix)
+    except NoDaemon as error:
+        raise NoDaemon(f"{error}{barred}") from error
+    link.remedy += barred
+    return link

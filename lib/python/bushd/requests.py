@@ -1,0 +1,215 @@
+"""All that can be asked of the daemon, as requests of `session`: one function each.
+
+Names of motors and numbers go as they come; the daemon resolves them, checks every range, and refuses with a reason.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from . import codec, messages, model
+from .session import Request
+
+STEPS = "steps"
+
+Amounts = Mapping[str, float]
+Names = Iterable[str]
+
+
+def move(
+    amounts: Amounts, *, absolute: bool, in_steps: bool, speed: float | None = None, dry_run: bool = False
+) -> Request:
+    message = messages.move_t()
+    message.kind = messages.move_t.ABSOLUTE if absolute else messages.move_t.RELATIVE
+    message.dry_run = bool(dry_run)
+    _put_speed(message, speed, in_steps)
+    _put_amounts(message, amounts, in_steps)
+    return Request("MOVE", message)
+
+
+def arm(
+    amounts: Amounts, *, in_steps: bool, falling: bool = False, delay_us: int = 50, speed: float | None = None
+) -> Request:
+    message = messages.arm_t()
+    message.edge = messages.arm_t.FALLING if falling else messages.arm_t.RISING
+    message.delay_us = operator.index(delay_us)
+    _put_speed(message, speed, in_steps)
+    _put_amounts(message, amounts, in_steps)
+    return Request("ARM", message)
+
+
+def home(names: Names, *, every: bool = False, speed: float | None = None, in_steps: bool = False) -> Request:
+    message = messages.home_t()
+    message.all = bool(every)
+    _put_speed(message, speed, in_steps)
+    return Request("HOME", _named(message, names))
+
+
+def jog(motor: str, speed: float, *, in_steps: bool, keepalive_ms: int, steps_after: int | None = None) -> Request:
+    message = messages.jog_t()
+    message.motor = codec.text(motor)
+    message.speed = codec.finite(float(speed))
+    message.speed_in_steps = in_steps
+    message.keepalive_ms = operator.index(keepalive_ms)
+    message.steps_after = -1 if steps_after is None else operator.index(steps_after)
+    return Request("JOG", message)
+
+
+def renew_jog(motor: str, *, keepalive_ms: int) -> Request:
+    request = jog(motor, 0.0, in_steps=False, keepalive_ms=keepalive_ms)
+    request.message.renew = True
+    return request
+
+
+def stop(names: Names) -> Request:
+    return Request("STOP", _named(messages.stop_t(), names), repeatable=True)
+
+
+def emergency_stop() -> Request:
+    return Request("EMERGENCY_STOP", messages.emergency_stop_t(), repeatable=True)
+
+
+def set_position(amounts: Amounts, *, in_steps: bool, dial: bool) -> Request:
+    message = messages.set_position_t()
+    message.dial = bool(dial)
+    _put_amounts(message, amounts, in_steps)
+    return Request("SET_POSITION", message)
+
+
+def position_compare(
+    motor: str, position: float, *, in_steps: bool, positive: bool, negative: bool, delay_us: int, width_us: int
+) -> Request:
+    message = messages.position_compare_t()
+    message.position = _amount(motor, position, in_steps)
+    message.arrivals = (message.POSITIVE if positive else 0) | (message.NEGATIVE if negative else 0)
+    message.delay_us = operator.index(delay_us)
+    message.width_us = operator.index(width_us)
+    return Request("POSITION_COMPARE", message)
+
+
+_OF_MOTORS = {
+    "CONFIRM": messages.confirm_t,
+    "ENABLE": messages.enable_t,
+    "DISABLE": messages.disable_t,
+    "CLEAR_FAULTS": messages.clear_faults_t,
+    "DISARM": messages.disarm_t,
+    "PAUSE": messages.pause_t,
+    "RESUME": messages.resume_t,
+    "HOLD": messages.hold_t,
+    "RELEASE": messages.release_t,
+}
+
+
+def of_motors(channel: str, names: Names) -> Request:
+    """Those that name motors and nothing else."""
+    return Request(channel, _named(_OF_MOTORS[channel](), names))
+
+
+def history(motor: str, most: int) -> Request:
+    message = messages.get_history_t()
+    message.motor = codec.text(motor)
+    message.most = operator.index(most)
+    return Request("GET_HISTORY", message, repeatable=True)
+
+
+def show_configuration(names: Names) -> Request:
+    message = messages.configure_t()
+    message.kind = messages.configure_t.SHOW
+    return Request("CONFIGURE", _named(message, names), repeatable=True)
+
+
+def change_configuration(motor: str, changes: Mapping[str, object]) -> Request:
+    """Values: a number, a word, (low, high), or None for no soft limits."""
+    message = messages.configure_t()
+    message.kind = messages.configure_t.CHANGE
+    message.change_motors = [codec.text(motor)] * len(changes)
+    message.change_keys = [codec.text(key) for key in changes]
+    message.change_values = [_setting(value) for value in changes.values()]
+    message.change_count = len(changes)
+    return Request("CONFIGURE", message)
+
+
+def list_tables() -> Request:
+    return Request("LIST_TABLES", messages.list_tables_t(), repeatable=True)
+
+
+def get_table(name: str) -> Request:
+    message = messages.get_table_t()
+    message.table = codec.text(name)
+    return Request("GET_TABLE", message, repeatable=True)
+
+
+def set_table(name: str, table: model.Table) -> Request:
+    message = messages.set_table_t()
+    message.table = codec.text(name)
+    message.expected_hash = codec.text(table.hash)
+    content = message.content
+    content.name = codec.text(table.name)
+    content.description = codec.text(table.description)
+    content.revision = table.revision
+    content.time_unit_ns = table.time_unit_ns
+    content.cruise = table.cruise
+    content.accel = [operator.index(code) for code in table.accel]
+    content.accel_count = len(content.accel)
+    content.decel = [operator.index(code) for code in table.decel]
+    content.decel_count = len(content.decel)
+    return Request("SET_TABLE", message)
+
+
+def use_table(group: str, table: str) -> Request:
+    message = messages.use_table_t()
+    message.group = codec.text(group)
+    message.table = codec.text(table)
+    return Request("USE_TABLE", message)
+
+
+def reload_tables() -> Request:
+    return Request("RELOAD_TABLES", messages.reload_tables_t())
+
+
+def _amount(motor: str, value: float, in_steps: bool) -> Any:
+    amount = messages.motor_amount_t()
+    amount.motor = codec.text(motor)
+    amount.in_steps = in_steps
+    if in_steps:
+        amount.steps = operator.index(value)  # type: ignore[arg-type]  # a fraction of a step is an error
+    else:
+        amount.user = codec.finite(float(value))
+    return amount
+
+
+def _put_amounts(message: Any, amounts: Amounts, in_steps: bool) -> None:
+    message.motors = [_amount(motor, value, in_steps) for motor, value in amounts.items()]
+    message.motor_count = len(message.motors)
+    if not message.motors:
+        raise ValueError("no motor is named")
+
+
+def _put_speed(message: Any, speed: float | None, in_steps: bool) -> None:
+    if speed is None:
+        return
+    message.speed = codec.finite(float(speed))
+    message.speed_in_steps = in_steps
+    if message.speed <= 0:
+        raise ValueError(f"a speed of {speed:g}: it is to be above 0")
+
+
+def _named(message: Any, names: Names) -> Any:
+    if isinstance(names, str):
+        raise TypeError(f'a list of names is needed, not the text "{names}"')
+    message.motors = [codec.text(name) for name in names]
+    message.motor_count = len(message.motors)
+    return message
+
+
+def _setting(value: object) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, str):
+        return codec.text(value)
+    if isinstance(value, (tuple, list)):
+        low, high = value
+        return f"[{_setting(low)}, {_setting(high)}]"
+    return repr(codec.finite(float(value)))  # type: ignore[arg-type]  # TypeError tells what it is

@@ -1,0 +1,140 @@
+"""The whole, put together from its parts: state and description per MCU, health per bus; the newest of each counts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import codec, model
+from .codec import MAX_PARTS, Description, Health, Part
+
+
+class StatusCollector:
+    """Takes snapshots in any order; tells what they are once all parts of the whole are there."""
+
+    def __init__(self) -> None:
+        self.states_heard = 0  # so many were used
+        self._run: int | None = None
+        self._states: dict[int, Part] = {}
+        self._descriptions: dict[int, Part] = {}
+        self._healths: dict[int, Part] = {}
+
+    def add(self, part: Part) -> bool:
+        """Whether it is used: a part beyond all configurations, and one older than what is there, is not."""
+        if not 0 <= part.part < part.parts <= MAX_PARTS:
+            return False
+        if isinstance(part, Health):
+            return self._put(self._healths, part, renew=True)
+        if part.run != self._run:  # of another daemon
+            self._run = part.run
+            self._states.clear()
+            self._descriptions.clear()
+            self._healths.clear()
+        if isinstance(part, Description):
+            return self._put(self._descriptions, part)
+        self.states_heard += 1
+        return self._put(self._states, part)
+
+    def _put(self, parts: dict[int, Part], part: Part, renew: bool = False) -> bool:
+        # Maybe of another configuration.
+        if parts and next(iter(parts.values())).parts != part.parts:
+            parts.clear()
+        known = parts.get(part.part)
+        if known is not None and part.sequence < known.sequence:
+            if not renew:
+                return False
+            parts.clear()  # health tells no run: a sequence that begins anew is another daemon's
+        parts[part.part] = part
+        return True
+
+    @staticmethod
+    def _missing(parts: dict[int, Part]) -> int:
+        expected = next(iter(parts.values())).parts if parts else 1
+        return expected - len(parts)
+
+    def has_motors(self) -> bool:
+        return self._missing(self._states) == 0 and self._missing(self._descriptions) == 0
+
+    def has_health(self) -> bool:
+        return self._missing(self._healths) == 0
+
+    def is_empty(self) -> bool:
+        return not (self._states or self._descriptions or self._healths)
+
+    def missing(self) -> str:
+        """What has not come, for people."""
+        mcus = max(self._missing(self._states), self._missing(self._descriptions))
+        return f"{mcus} MCUs and {self._missing(self._healths)} buses or more are missing"
+
+    def status(self) -> model.Status:
+        """Only when it has_motors()."""
+        motors: dict[str, model.Motor] = {}
+        mcus: dict[str, model.Mcu] = {}
+        for index, state in sorted(self._states.items()):
+            description = self._descriptions[index]
+            mcus[state.content.mcu] = _mcu(state.content, description.content)
+            described = {motor.name: motor for motor in description.content.motors}
+            for motor in state.content.motors:
+                if motor.name in described:
+                    motors[motor.name] = _motor(motor, described[motor.name], state.content.mcu)
+        newest = max(self._states.values(), key=lambda part: part.sequence)
+        return model.Status(
+            motors=motors,
+            mcus=mcus,
+            at=codec.at(newest.utime_us),
+            run=newest.run,
+            sequence=newest.sequence,
+            dropped_messages=newest.content.dropped_messages,
+        )
+
+    def health(self) -> dict[str, model.BusHealth]:
+        """Only when it has_health()."""
+        return {part.content.bus: part.content for _, part in sorted(self._healths.items())}
+
+
+def _mcu(state: Any, description: Any) -> model.Mcu:
+    return model.Mcu(
+        name=state.mcu,
+        bus=state.bus,
+        address=description.address,
+        state=model.McuState(state.state),
+        detail=state.detail,
+        inputs=frozenset(state.inputs.split()),
+        boot_number=state.boot_number,
+        tick=state.tick,
+        tick_ns=description.tick_ns,
+        emergency_stop=description.emergency_stop,
+    )
+
+
+def _motor(state: Any, description: Any, mcu: str) -> model.Motor:
+    trust = model.Trust(state.trust)
+    known = trust is not model.Trust.UNKNOWN
+    return model.Motor(
+        name=state.name,
+        position=state.user_position if known else None,
+        dial=state.dial_position if known else None,
+        position_steps=state.position_steps if known else None,
+        target=state.user_target if known else None,
+        target_steps=state.target_steps if known else None,
+        unit=description.unit,
+        velocity_steps_per_s=state.velocity_steps_per_s,
+        moving=state.moving,
+        activity=model.Activity(state.activity),
+        enabled=state.enabled,
+        switch=state.input,
+        inputs=frozenset(state.inputs.split()),
+        inhibited=model.Inhibited(state.inhibited),
+        trust=trust,
+        uncertain_reason=state.uncertain_reason,
+        heard_at=codec.at(state.heard_utime_us) if trust is model.Trust.STALE else None,
+        paused=state.paused,
+        held=state.held,
+        mcu=mcu,
+        output=description.output,
+        group=description.group,
+        table=codec.table_ref(description.table),
+        description=description.description,
+        steps_per_unit=description.steps_per_unit,
+        precision=description.precision,
+        soft_limits=(description.user_low, description.user_high) if description.soft_limits else None,
+    )

@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""One version everywhere, one layout of `cmake --install` and packages, headers that are complete, and bushd-flash.
+
+$BUSHD_SOURCE_DIR is the source tree, $BUSHD_BUILD_DIR the build, $BUSHD and $CMAKE are programs."""
+
+import fnmatch
+import os
+import pathlib
+import re
+import stat
+import subprocess
+import tempfile
+import unittest
+import zlib
+
+SOURCE = pathlib.Path(os.environ["BUSHD_SOURCE_DIR"])
+BUILD = pathlib.Path(os.environ["BUSHD_BUILD_DIR"])
+
+
+def project_version():
+    return re.search(r"^project\(bushd VERSION ([0-9.]+)", (SOURCE / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
+
+
+class Version(unittest.TestCase):
+    def test_is_that_of_the_newest_entry_of_the_changelog_of_packages(self):
+        entry = re.match(r"bushd \((.*?)\) ", (SOURCE / "debian/changelog").read_text())
+        self.assertEqual(entry[1], project_version(), "debian/changelog and project(VERSION) of CMakeLists.txt differ")
+
+    def test_is_what_the_program_says(self):
+        said = subprocess.run([os.environ["BUSHD"], "--version"], capture_output=True, text=True, check=True).stdout
+        self.assertIn(project_version(), said)
+
+
+class Layout(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.prefix = pathlib.Path(cls.folder.name)
+        command = [os.environ["CMAKE"], "--install", BUILD, "--prefix", cls.prefix]
+        subprocess.run(command, capture_output=True, check=True)
+        cls.files = {str(path.relative_to(cls.prefix)) for path in cls.prefix.rglob("*") if not path.is_dir()}
+
+    def packaged(self):
+        """What the packages take, below a prefix; the images come from builds of their own, the Python client from none."""
+        for file in sorted((SOURCE / "debian").glob("*.install")):
+            if file.name in ("bushd-firmware.install", "python3-bushd.install"):
+                continue
+            for line in file.read_text().split():
+                yield line.removeprefix("usr/").replace("lib/*/", "lib/")
+
+    def test_packages_take_what_is_there_and_leave_nothing(self):
+        taken = set()
+        for pattern in self.packaged():
+            found = {file for file in self.files if fnmatch.fnmatch(file, pattern) or file.startswith(pattern + "/")}
+            self.assertTrue(found, f"debian/*.install take {pattern}, and it is not installed")
+            taken |= found
+        self.assertEqual(self.files - taken, set(), "installed, and in no package")
+
+    def test_a_client_finds_all_headers(self):
+        includes = self.prefix / "include"
+        for header in [*(includes / "bushd").rglob("*.h")]:
+            for named in re.findall(r'^#include "(.*)"', header.read_text(), re.MULTILINE):
+                with self.subTest(f"{header.relative_to(includes)} includes {named}"):
+                    self.assertTrue((includes / "bushd" / named).exists() or (includes / named).exists())
+
+    def test_the_demonstration_is_a_good_configuration(self):
+        ran = subprocess.run([os.environ["BUSHD"], "--check-config", SOURCE / "system/demo.toml"], capture_output=True, text=True, check=False)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+
+    def test_manual_pages_are_complete(self):
+        for page in (self.prefix / "share/man").rglob("*"):
+            if page.is_file():
+                with self.subTest(page.name):
+                    text = page.read_text()
+                    self.assertRegex(text, r"\A('\\\" t\n)?\.TH ")
+                    self.assertNotRegex(text, r"@[A-Z]+@")
+
+
+class Flash(unittest.TestCase):
+    """bushd-flash beside images, with an avrdude that writes down how it is called."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.prefix = pathlib.Path(folder.name)
+        (self.prefix / "bin").mkdir()
+        self.program = self.prefix / "bin/bushd-flash"
+        self.program.write_text((SOURCE / "tools/flash/bushd-flash").read_text())
+        avrdude = self.prefix / "bin/avrdude"
+        avrdude.write_text(f'#!/bin/sh\necho "$@" >> {self.prefix}/called\n'
+                           f'for word; do case $word in eeprom:*) file=${{word#eeprom:w:}}; cp "${{file%:r}}" {self.prefix}/eeprom ;; esac; done\n')
+        for program in (self.program, avrdude):
+            program.chmod(program.stat().st_mode | stat.S_IXUSR)
+        self.firmware = self.prefix / "share/bushd/firmware"
+        self.firmware.mkdir(parents=True)
+        (self.firmware / "bushd-atmega2560-500000.hex").write_text("")
+        self.versions(4, 4)
+
+    def versions(self, image, daemon):
+        (self.firmware / "protocol-version").write_text(f"{image}\n")
+        (self.prefix / "share/bushd/protocol-version").write_text(f"{daemon}\n")
+
+    def flash(self, *arguments):
+        path = f"{self.prefix}/bin:{os.environ['PATH']}"
+        return subprocess.run([self.program, *arguments], capture_output=True, text=True, env={**os.environ, "PATH": path}, check=False)
+
+    def test_gives_a_new_chip_fuses_program_and_address(self):
+        ran = self.flash("atmega2560", "500000", "--fuses", "--address", "3")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        fuses, program, memory = (self.prefix / "called").read_text().splitlines()
+        self.assertEqual(fuses, "-p m2560 -c usbasp -U lfuse:w:0xFF:m -U hfuse:w:0xD1:m -U efuse:w:0xFC:m")
+        self.assertRegex(program, r"^-p m2560 -c usbasp -U flash:w:\S+/bushd-atmega2560-500000\.hex:i$")
+        self.assertRegex(memory, r"-U eeprom:w:\S+:r$")
+        kept = (self.prefix / "eeprom").read_bytes()
+        self.assertEqual((kept[8], int.from_bytes(kept[9:], "little")), (3, zlib.crc32(kept[:9])))
+
+    def test_the_fuses_are_those_of_the_documentation(self):
+        documented = re.findall(r"[lhe]fuse:w:0x..:m", (SOURCE / "docs/firmware.md").read_text())
+        self.flash("atmega2560", "500000", "--fuses")
+        self.assertEqual(re.findall(r"[lhe]fuse:w:0x..:m", (self.prefix / "called").read_text()), documented)
+
+    def test_refuses_another_protocol_unless_forced(self):
+        self.versions(3, 4)
+        ran = self.flash("atmega2560", "500000")
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn("images speak protocol 3, the bushd of this PC protocol 4", ran.stderr)
+        self.assertFalse((self.prefix / "called").exists())
+        self.assertEqual(self.flash("--check").returncode, 1)
+        self.assertEqual(self.flash("atmega2560", "500000", "--force").returncode, 0)
+
+    def test_names_the_baud_rates_that_there_are(self):
+        ran = self.flash("atmega2560", "115200")
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn("there are 500000", ran.stderr)
+
+    def test_runs_nothing_when_asked_for_the_commands_only(self):
+        ran = self.flash("atmega2560", "500000", "--dry-run")
+        self.assertIn("avrdude -p m2560", ran.stdout)
+        self.assertFalse((self.prefix / "called").exists())
+
+    def test_page_and_help_tell_of_the_same_options(self):
+        page = (SOURCE / "docs/man/bushd-flash.1").read_text().replace(r"\-", "-")
+        options = set(re.findall(r"^\.TP\n\\fB(--[a-z-]+)", page, re.MULTILINE))
+        said = set(re.findall(r"^  (--[a-z-]+)", self.flash("--help").stdout, re.MULTILINE))
+        self.assertEqual(options, said)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,159 @@
+"""What the Python client's session stands on: the whole from its parts, LCM's datagrams, arguments of callers."""
+
+import inspect
+import struct
+import unittest
+
+from bushd import Trust, aio, arguments, client, codec, messages, motion, requests, session, udpm
+from bushd.status import StatusCollector
+
+
+def state(part, parts=2, sequence=1, run=1, motors=(), trust="known"):
+    message = messages.mcu_state_t()
+    message.mcu, message.state = f"hall:{part + 1}", "READY"
+    message.part, message.parts, message.sequence, message.run = part, parts, sequence, run
+    for name in motors:
+        motor = messages.motor_t()
+        motor.name, motor.trust, motor.activity, motor.user_position = name, trust, "rest", 12.5
+        message.motors.append(motor)
+    message.motor_count = len(motors)
+    return codec.decode("STATE", message.encode())
+
+
+def description(part, parts=2, sequence=1, run=1, motors=()):
+    message = messages.mcu_description_t()
+    message.mcu, message.part, message.parts = f"hall:{part + 1}", part, parts
+    message.sequence, message.run = sequence, run
+    for name in motors:
+        motor = messages.motor_description_t()
+        motor.name, motor.unit, motor.precision, motor.soft_limits = name, "mm", 3, True
+        motor.user_low, motor.user_high = -5.0, 30.0
+        message.motors.append(motor)
+    message.motor_count = len(motors)
+    return codec.decode("DESCRIPTION", message.encode())
+
+
+class Whole(unittest.TestCase):
+    def test_is_there_once_all_parts_are(self):
+        collector = StatusCollector()
+        for part in (description(1, motors=["b"]), state(0, motors=["a"]), description(0, motors=["a"])):
+            collector.add(part)
+            self.assertFalse(collector.has_motors())
+        collector.add(state(1, motors=["b"]))
+        status = collector.status()
+        self.assertEqual(list(status.motors), ["a", "b"])
+        self.assertEqual((status["b"].mcu, status["b"].position), ("hall:2", 12.5))
+        self.assertEqual(status["b"].soft_limits, (-5.0, 30.0))
+        self.assertEqual(str(status["a"]), "a: 12.500 mm (known), rest")
+
+    def test_the_newest_counts_and_another_run_begins_anew(self):
+        collector = StatusCollector()
+        for part in (state(0, 1, sequence=9, motors=["new"]), state(0, 1, sequence=3, motors=["old"]),
+                     description(0, 1, motors=["new", "old"])):
+            collector.add(part)
+        self.assertEqual(list(collector.status().motors), ["new"])
+        collector.add(state(0, 1, run=2, motors=["new"]))
+        self.assertFalse(collector.has_motors())
+
+    def test_an_unknown_position_is_none(self):
+        collector = StatusCollector()
+        collector.add(state(0, 1, motors=["a"], trust="unknown"))
+        collector.add(description(0, 1, motors=["a"]))
+        motor = collector.status()["a"]
+        self.assertEqual((motor.trust, motor.position, motor.target_steps), (Trust.UNKNOWN, None, None))
+
+    def test_parts_beyond_all_configurations_are_dropped(self):
+        collector = StatusCollector()
+        for part, parts in ((0, 0), (-1, 1), (1, 1), (0, 2**31 - 1)):
+            self.assertFalse(collector.add(state(part, parts)))
+        self.assertTrue(collector.is_empty())
+
+
+class Datagrams(unittest.TestCase):
+    def fragment(self, number, count, offset, size, piece, sequence=1):
+        return struct.pack(">IIIIHH", udpm.FRAGMENT, sequence, size, offset, number, count) + piece
+
+    def test_a_message_is_as_lcm_has_it(self):
+        data = udpm.datagram(5, "BUSHD_STOP", b"abc")
+        self.assertEqual(data, b"LC02\0\0\0\x05BUSHD_STOP\0abc")
+        self.assertEqual(udpm.Receiver().take(data, "host"), ("BUSHD_STOP", b"abc"))
+
+    def test_fragments_come_in_any_order(self):
+        receiver = udpm.Receiver()
+        self.assertIsNone(receiver.take(self.fragment(1, 3, 2, 6, b"cd"), "host"))
+        self.assertIsNone(receiver.take(self.fragment(2, 3, 4, 6, b"ef"), "host"))
+        self.assertIsNone(receiver.take(self.fragment(2, 3, 4, 6, b"ef"), "host"))
+        self.assertIsNone(receiver.take(self.fragment(0, 3, 0, 6, b"X\0zz"), "another host"))
+        self.assertEqual(receiver.take(self.fragment(0, 3, 0, 6, b"X\0ab"), "host"), ("X", b"abcdef"))
+        self.assertIsNone(receiver.take(self.fragment(0, 3, 0, 6, b"X\0ab"), "host"))
+
+    def test_what_is_no_message_is_dropped(self):
+        receiver = udpm.Receiver()
+        for data in (b"", b"LC02", b"LC02\0\0\0\0", b"LC02\0\0\0\0name without end", b"LC02\0\0\0\0\0",
+                     b"LC09" + bytes(40), b"LC02\0\0\0\0" + b"n" * 64 + b"\0", b"LC02\0\0\0\0\xff\0", self.fragment(0, 0, 0, 4, b"X\0ab"),
+                     self.fragment(2, 2, 0, 4, b"X\0ab"), self.fragment(0, 1, 3, 4, b"X\0abcd"),
+                     self.fragment(0, 1, 0, 2**32 - 1, b"X\0ab"), self.fragment(0, 1, 0, 4, b"no channel"),
+                     self.fragment(0, 1, 0, 5, b"X\0abcd")):
+            self.assertIsNone(receiver.take(data, "host"), data)
+
+    def test_unfinished_messages_are_bounded(self):
+        receiver = udpm.Receiver()
+        for sequence in range(1000):
+            receiver.take(self.fragment(0, 2, 0, 4, b"X\0ab", sequence), "host")
+        self.assertLessEqual(len(receiver._unfinished), receiver.MAX_MESSAGES)
+
+    def test_urls(self):
+        self.assertEqual(udpm.Url.parse("udpm://"), udpm.Url())
+        self.assertEqual(udpm.Url.parse("udpm://239.1.2.3:4000?ttl=1&recv_buf_size=5"),
+                         udpm.Url("239.1.2.3", 4000, 1, 5))
+        for url in ("file:///x", "udpm://a:b"):
+            with self.assertRaises(ValueError):
+                udpm.Url.parse(url)
+
+
+class Arguments(unittest.TestCase):
+    def test_ways_to_write_a_move(self):
+        self.assertEqual(arguments.amounts("m", 1, None, None), arguments.Amounts({"m": 1}, True, None))
+        self.assertEqual(arguments.amounts("m", None, 1, None), arguments.Amounts({"m": 1}, False, None))
+        self.assertEqual(arguments.amounts({"m": 1}, None, None, None), arguments.Amounts({"m": 1}, True, None))
+        self.assertEqual(arguments.amounts(None, None, {"m": 1}, "steps"), arguments.Amounts({"m": 1}, False, "steps"))
+        for wrong in (("m", None, None), ("m", 1, 1), ({"m": 1}, 1, None), ("m", {"m": 1}, None), (None, 1, None),
+                      (None, None, None)):
+            with self.assertRaises(TypeError):
+                arguments.amounts(*wrong, None)
+
+    def test_a_client_id_is_one(self):
+        name = arguments.client_id("a program\n" + "x" * 100)
+        self.assertRegex(name, r"^[!-~]{1,64}$")
+        self.assertNotEqual(name, arguments.client_id("a program\n" + "x" * 100))
+
+    def test_settings_are_as_in_the_file(self):
+        changes = {"offset": 12.5, "direction": "negative", "soft_limits": (-5, 30.0)}
+        message = requests.change_configuration("m", changes).message
+        self.assertEqual(message.change_values, ["12.5", "negative", "[-5.0, 30.0]"])
+        self.assertEqual(requests.change_configuration("m", {"soft_limits": None}).message.change_values, ["none"])
+
+    def test_every_request_of_the_daemon_can_be_made(self):
+        made = inspect.getsource(requests) + inspect.getsource(session)
+        asked = [name for name in dir(messages) if "request" in getattr(getattr(messages, name), "__slots__", ())]
+        self.assertGreater(len(asked), 20)
+        for name in asked:
+            self.assertIn(f"messages.{name}", made)
+
+    def test_both_faces_have_the_same_functions(self):
+        for blocking, other in ((client.Client, aio.Client), (client.Tables, aio.Tables), (client.Jog, motion.Jog),
+                                (client.Motion, motion.Motion)):
+            for name, function in vars(blocking).items():
+                if name.startswith("_") or not callable(function):
+                    continue
+                parameters = dict(inspect.signature(function).parameters)
+                self.assertEqual(parameters, dict(inspect.signature(getattr(other, name)).parameters), name)
+                self.assertTrue(function.__doc__, name)
+
+    def test_names_are_a_list(self):
+        with self.assertRaises(TypeError):
+            requests.stop("theta")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,421 @@
+"""The rules of the Python client's session, without I/O and without a clock: lost, repeated and hostile messages."""
+
+import random
+import unittest
+
+from bushd import Outcome, messages
+from bushd.errors import NoDaemon, Refused, ResultUnknown, TwoDaemons
+from bushd import codec, requests
+from bushd.session import Session, Timing
+
+ACCEPTED, REFUSED, RESULT = (messages.reply_header_t.ACCEPTED, messages.reply_header_t.REFUSED,
+                             messages.reply_header_t.RESULT)
+TIMING = Timing()
+
+
+def reply(request, phase, outcome="", reason="", part=0, parts=1, session=None):
+    header = messages.reply_header_t()
+    header.session = request.session if session is None else session
+    header.client_id = request.client_id
+    header.number = request.number
+    header.phase = phase
+    header.outcome = outcome
+    header.reason = reason
+    header.part, header.parts = part, parts
+    return header
+
+
+def answer(*arguments, motors=(), **named):
+    message = messages.answer_t()
+    message.reply = reply(*arguments, **named)
+    message.tables = [messages.table_ref_t()]
+    message.table_count = 1
+    message.motors = list(motors)
+    message.motor_count = len(motors)
+    for name in motors:
+        message.outcomes.append("reached")
+        message.position_steps.append(int(name[1:]))
+        message.user_positions.append(float(name[1:]))
+        message.dial_positions.append(0.0)
+        message.units.append("mm")
+        message.precisions.append(3)
+        message.table_of_motor.append(0)
+        message.asked_by.append("me")
+        message.legs.append(1)
+        message.most_steps_per_s.append(100.0)
+    return message.encode()
+
+
+def state(run=1, sequence=1, part=0, parts=1):
+    message = messages.mcu_state_t()
+    message.run, message.sequence = run, sequence
+    message.part, message.parts = part, parts
+    message.state = "READY"
+    return message.encode()
+
+
+class Daemon:
+    """The other end: answers when it is told to."""
+
+    def __init__(self, loses, timing=TIMING):
+        self.now = 100.0
+        numbers = iter(range(7, 1000))
+        self.session = Session("me", loses=loses, remedy="start it", timing=timing,
+                               random_number=lambda: next(numbers), utime_us=lambda: 5)
+        self.sent = []  # (channel, message)
+
+    def poll(self):
+        kinds = {"MOVE": messages.move_t, "STOP": messages.stop_t, "HELLO": messages.hello_t}
+        packets = self.session.poll(self.now)
+        self.sent += [(channel, kinds[channel].decode(payload)) for channel, payload in packets]
+        return [channel for channel, _ in packets]
+
+    def wait(self, seconds):
+        """Time goes by; what is sent meanwhile."""
+        until = self.now + seconds
+        channels = []
+        for _ in range(10_000):
+            wake_at = self.session.wake_at()
+            if wake_at is None or wake_at > until:
+                break
+            self.now = max(self.now, wake_at)
+            channels += self.poll()
+        else:
+            raise AssertionError("it does not sleep")
+        self.now = until
+        return channels + self.poll()
+
+    def tell(self, channel, payload):
+        self.session.receive(channel, payload, self.now)
+
+    def welcome(self, session=11, run=1, nonce=None):
+        hello = [message for channel, message in self.sent if channel == "HELLO"][-1]
+        message = messages.welcome_t()
+        message.client_id = hello.client_id
+        message.nonce = hello.nonce if nonce is None else nonce
+        message.session, message.run = session, run
+        self.tell("WELCOME", message.encode())
+
+    def request(self):
+        return self.sent[-1][1].request
+
+    def begin(self, request=None):
+        request = request or requests.move({"m1": 1.0}, absolute=True, in_steps=False)
+        exchange = self.session.begin(request, self.now)
+        self.poll()
+        return exchange
+
+    def begin_with_session(self):
+        exchange = self.begin()
+        self.welcome()
+        self.wait(0.1)
+        return exchange
+
+
+class OverASocket(unittest.TestCase):
+    def setUp(self):
+        self.daemon = Daemon(loses=False)
+
+    def test_a_request_is_sent_once_and_needs_no_session(self):
+        exchange = self.daemon.begin()
+        self.assertEqual((self.daemon.request().session, self.daemon.request().number), (0, 1))
+        self.daemon.tell("REPLY", answer(self.daemon.request(), ACCEPTED))
+        self.assertEqual(self.daemon.wait(3600), [])
+        self.daemon.tell("REPLY", answer(self.daemon.request(), RESULT, "reached", "there", motors=["m1"]))
+        self.assertEqual((exchange.outcome, exchange.reason), (Outcome.REACHED, "there"))
+        self.assertEqual(exchange.detail.motors[0].position, 1.0)
+        self.assertIsNone(self.daemon.session.wake_at())
+
+    def test_a_daemon_that_does_not_answer_is_given_up(self):
+        exchange = self.daemon.begin()
+        self.daemon.wait(2.9)
+        self.assertFalse(exchange.over)
+        self.daemon.wait(0.2)
+        self.assertIsInstance(exchange.error, NoDaemon)
+        self.assertEqual(str(exchange.error), "start it; it may still carry this out")
+
+    def test_a_refusal_has_its_reason(self):
+        exchange = self.daemon.begin()
+        self.daemon.tell("REPLY", answer(self.daemon.request(), REFUSED, reason="m1: it is held"))
+        self.assertIsInstance(exchange.error, Refused)
+        self.assertEqual(exchange.error.reason, "m1: it is held")
+
+    def test_the_end_of_the_link_ends_all_exchanges(self):
+        accepted, other = self.daemon.begin(), None
+        self.daemon.tell("REPLY", answer(self.daemon.request(), ACCEPTED))
+        other = self.daemon.begin()
+        self.daemon.session.link_ended("closed")
+        self.assertIsInstance(accepted.error, ResultUnknown)
+        self.assertEqual(str(other.error), "closed; it may have carried the command out")
+        self.assertIsInstance(self.daemon.begin().error, NoDaemon)
+
+    def test_several_requests_are_told_apart(self):
+        exchanges = [self.daemon.begin() for _ in range(5)]
+        asked = [message.request for _, message in self.daemon.sent]
+        self.assertEqual([request.number for request in asked], [1, 2, 3, 4, 5])
+        for request in reversed(asked):
+            self.daemon.tell("REPLY", answer(request, RESULT, "done", str(request.number)))
+        self.assertEqual([exchange.reason for exchange in exchanges], ["1", "2", "3", "4", "5"])
+
+    def test_what_does_not_fit_a_message_is_an_error_of_the_caller(self):
+        with self.assertRaises(ValueError):
+            self.daemon.begin(requests.move({"m1": 2**63}, absolute=True, in_steps=True))
+        with self.assertRaises(ValueError):
+            self.daemon.begin(requests.move({"m": 1.0, "n" * 70_000: 1.0}, absolute=True, in_steps=False))
+        for wrong in ({"m\0": 1.0}, {"m": float("nan")}, {}):
+            with self.assertRaises(ValueError):
+                requests.move(wrong, absolute=True, in_steps=False)
+        with self.assertRaises(TypeError):
+            requests.move({"m": 1.5}, absolute=True, in_steps=True)
+        self.assertEqual(self.daemon.sent, [])
+
+
+class OverLcm(unittest.TestCase):
+    def setUp(self):
+        self.daemon = Daemon(loses=True)
+
+    def test_a_session_is_asked_for_until_there_is_one(self):
+        exchange = self.daemon.begin()
+        self.assertEqual(self.daemon.wait(0.7), ["HELLO", "HELLO"])
+        self.daemon.welcome()
+        # A second daemon would answer now.
+        self.assertEqual(self.daemon.wait(0.09), [])
+        self.assertEqual(self.daemon.wait(0.02), ["MOVE"])
+        self.assertEqual((self.daemon.request().session, self.daemon.request().number), (11, 1))
+        self.assertFalse(exchange.over)
+        # The next request has it already.
+        self.daemon.begin()
+        self.assertEqual((self.daemon.request().session, self.daemon.request().number), (11, 2))
+
+    def test_a_welcome_to_others_is_none(self):
+        self.daemon.begin()
+        self.daemon.welcome(nonce=123456)
+        self.assertEqual(set(self.daemon.wait(1)), {"HELLO"})
+
+    def test_without_a_daemon_nothing_was_sent(self):
+        exchange = self.daemon.begin()
+        self.assertEqual(set(self.daemon.wait(4)), {"HELLO"})
+        self.assertEqual(str(exchange.error), "start it")
+        self.assertIsNone(self.daemon.session.wake_at())
+
+    def test_a_request_is_repeated_with_its_number_until_it_is_answered(self):
+        exchange = self.daemon.begin_with_session()
+        first = self.daemon.sent[-1][1].encode()
+        self.assertEqual(self.daemon.wait(1.0), ["MOVE"] * 3)
+        self.assertEqual({message.encode() for channel, message in self.daemon.sent if channel == "MOVE"}, {first})
+        self.daemon.tell("REPLY", answer(self.daemon.request(), ACCEPTED))
+        # The result may have been lost: it is asked for once a second, as long as the state comes.
+        sent = []
+        for _ in range(8):
+            self.daemon.tell("STATE", state())
+            sent += self.daemon.wait(1.0)
+        self.assertEqual(sent, ["MOVE"] * 8)
+        self.assertFalse(exchange.over)
+        self.daemon.tell("REPLY", answer(self.daemon.request(), RESULT, "reached", "there"))
+        self.assertEqual(exchange.outcome, Outcome.REACHED)
+        self.assertEqual(self.daemon.wait(10), [])
+
+    def test_a_daemon_that_does_not_answer_may_still_carry_it_out(self):
+        exchange = self.daemon.begin_with_session()
+        self.daemon.tell("STATE", state())
+        self.daemon.wait(4)
+        self.assertEqual(str(exchange.error),
+                         "bushd sends its state but has not answered for 3 s; it may still carry this out")
+        # The next one begins anew.
+        self.daemon.begin()
+        self.assertEqual(self.daemon.sent[-1][0], "HELLO")
+
+    def test_repeated_answers_change_nothing(self):
+        exchange = self.daemon.begin_with_session()
+        request = self.daemon.request()
+        for _ in range(3):
+            self.daemon.tell("REPLY", answer(request, RESULT, "reached", "there"))
+            self.daemon.tell("REPLY", answer(request, RESULT, "fault", "another"))
+            self.daemon.tell("REPLY", answer(request, ACCEPTED))
+        self.assertEqual((exchange.outcome, exchange.reason), (Outcome.REACHED, "there"))
+
+    def test_answers_of_another_session_are_none(self):
+        exchange = self.daemon.begin_with_session()
+        self.daemon.tell("REPLY", answer(self.daemon.request(), RESULT, "reached", session=12))
+        self.assertFalse(exchange.over)
+
+    def test_a_result_in_parts_is_put_together(self):
+        exchange = self.daemon.begin_with_session()
+        request = self.daemon.request()
+        for part in (2, 0, 2):
+            self.daemon.tell("REPLY", answer(request, RESULT, "reached", part=part, parts=3, motors=[f"m{part}"]))
+        self.assertFalse(exchange.over)
+        self.daemon.tell("REPLY", answer(request, RESULT, "reached", part=1, parts=3, motors=["m1"]))
+        self.assertEqual([motor.motor for motor in exchange.detail.motors], ["m0", "m1", "m2"])
+
+    def test_a_session_that_was_forgotten(self):
+        exchange = self.daemon.begin_with_session()
+        self.daemon.tell("REPLY", answer(self.daemon.request(), REFUSED, reason="the session is unknown: look"))
+        self.assertIsInstance(exchange.error, Refused)
+        self.daemon.begin()
+        hello = self.daemon.sent[-1]
+        self.assertEqual((hello[0], hello[1].nonce), ("HELLO", 8))
+
+    def test_who_has_accepted_does_not_refuse(self):
+        exchange = self.daemon.begin_with_session()
+        self.daemon.tell("REPLY", answer(self.daemon.request(), ACCEPTED))
+        self.daemon.tell("REPLY", answer(self.daemon.request(), REFUSED, reason="answer not kept"))
+        self.assertIsInstance(exchange.error, ResultUnknown)
+
+    def test_a_restart_loses_the_result(self):
+        exchange = self.daemon.begin_with_session()
+        self.daemon.tell("REPLY", answer(self.daemon.request(), ACCEPTED))
+        self.daemon.tell("STATE", state(run=1))
+        self.daemon.tell("STATE", state(run=2))
+        self.assertIsInstance(exchange.error, ResultUnknown)
+        self.assertIn("restarted", str(exchange.error))
+
+    def test_a_daemon_that_falls_silent(self):
+        exchange = self.daemon.begin_with_session()
+        self.daemon.tell("REPLY", answer(self.daemon.request(), ACCEPTED))
+        self.daemon.wait(4.0)
+        self.daemon.tell("STATE", state())
+        self.daemon.wait(4.9)
+        self.assertFalse(exchange.over)
+        self.daemon.wait(0.2)
+        self.assertIsInstance(exchange.error, ResultUnknown)
+
+    def test_two_daemons_get_stops_only(self):
+        exchange = self.daemon.begin()
+        self.daemon.welcome(session=11, run=1)
+        self.daemon.welcome(session=12, run=2)
+        self.assertEqual(self.daemon.wait(1), [])
+        self.assertIsInstance(exchange.error, TwoDaemons)
+        self.daemon.begin(requests.stop([]))
+        self.assertEqual((self.daemon.sent[-1][0], self.daemon.request().session), ("STOP", 0))
+
+    def test_two_daemons_are_known_by_their_states(self):
+        for run in (1, 2, 1):
+            self.daemon.tell("STATE", state(run=run))
+        exchange = self.daemon.begin_with_session()
+        self.daemon.wait(0.1)
+        self.assertIsInstance(exchange.error, TwoDaemons)
+        self.assertNotIn("MOVE", [channel for channel, _ in self.daemon.sent])
+
+    def test_a_stop_waits_for_no_session(self):
+        move = self.daemon.begin()
+        stop = self.daemon.begin(requests.stop(["m1"]))
+        self.assertEqual(self.daemon.sent[-1][0], "STOP")
+        self.daemon.welcome()
+        self.daemon.wait(0.1)
+        self.assertEqual(self.daemon.sent[-1][0], "MOVE")
+        stopping = [message for channel, message in self.daemon.sent if channel == "STOP"][0].request
+        self.daemon.tell("REPLY", answer(stopping, RESULT, "done"))
+        self.assertTrue(stop.over)
+        self.assertFalse(move.over)
+
+    def test_what_nobody_waits_for_is_not_sent_again(self):
+        exchange = self.daemon.begin_with_session()
+        self.daemon.session.abandon(exchange)
+        self.assertEqual(self.daemon.wait(10), [])
+
+
+class ExactlyOnce(unittest.TestCase):
+    """Against a daemon that keeps to the rules, over a line that loses, repeats and reorders."""
+
+    def carry_out(self, seed):
+        chance = random.Random(seed)
+        daemon = Daemon(loses=True, timing=Timing(answer_within_s=60.0, silence_limit_s=1000.0))
+        carried_out, answers, on_the_way = [], {}, []
+        exchanges = [daemon.session.begin(requests.move({f"m{i}": 1.0}, absolute=False, in_steps=False), daemon.now)
+                     for i in range(5)]
+        kinds = {"MOVE": messages.move_t, "HELLO": messages.hello_t}
+        for _ in range(3000):
+            if all(exchange.over for exchange in exchanges):
+                break
+            for channel, payload in daemon.session.poll(daemon.now):
+                message = kinds[channel].decode(payload)
+                daemon.sent.append((channel, message))
+                for _ in range(chance.choice([0, 0, 1, 1, 2])):
+                    on_the_way.append(("to", channel, message))
+            chance.shuffle(on_the_way)
+            for _ in range(len(on_the_way) // 2):
+                way, channel, message = on_the_way.pop()
+                if way == "from":
+                    daemon.tell(channel, message)
+                elif channel == "HELLO":
+                    daemon.welcome()
+                else:
+                    number = message.request.number
+                    if number not in answers:
+                        carried_out.append(message.motors[0].motor)
+                    answers[number] = chance.choice([ACCEPTED, RESULT]) if answers.get(number) != RESULT else RESULT
+                    outcome = "reached" if answers[number] == RESULT else ""
+                    if chance.random() < 0.5:
+                        on_the_way.append(("from", "REPLY", answer(message.request, answers[number], outcome)))
+            wake_at = daemon.session.wake_at()
+            daemon.now = max(daemon.now + 0.01, min(wake_at or 0, daemon.now + 0.1))
+        self.assertEqual([exchange.outcome for exchange in exchanges], [Outcome.REACHED] * 5, f"seed {seed}")
+        self.assertEqual(sorted(carried_out), [f"m{i}" for i in range(5)], f"seed {seed}")
+
+    def test_over_a_bad_line(self):
+        for seed in range(100):
+            self.carry_out(seed)
+
+
+class HostileBytes(unittest.TestCase):
+    def valid(self):
+        request = messages.request_t()
+        request.client_id, request.number = "me", 1
+        welcome = messages.welcome_t()
+        welcome.client_id, welcome.nonce, welcome.session = "me", 7, 1
+        table = messages.table_answer_t()
+        table.reply = reply(request, RESULT, "done")
+        table.tables, table.table_count = [messages.table_t()], 1
+        table.tables[0].accel, table.tables[0].accel_count = [5, 4, 3], 3
+        history = messages.history_answer_t()
+        history.reply = reply(request, RESULT, "done")
+        history.motions, history.motion_count = [messages.past_motion_t()], 1
+        health = messages.health_t()
+        health.mcus, health.mcu_count, health.parts = [messages.mcu_health_t()], 1, 1
+        described = messages.mcu_description_t()
+        described.motors, described.motor_count, described.parts = [messages.motor_description_t()], 1, 1
+        return {"REPLY": answer(request, RESULT, "reached", "there", motors=["m1", "m2"]), "STATE": state(),
+                "WELCOME": welcome.encode(), "TABLE_REPLY": table.encode(), "HISTORY_REPLY": history.encode(),
+                "HEALTH": health.encode(), "DESCRIPTION": described.encode()}
+
+    def test_valid_ones_are_taken(self):
+        for channel, payload in self.valid().items():
+            self.assertIsNotNone(codec.decode(channel, payload), channel)
+
+    def test_what_is_cut_off_or_too_long_is_dropped(self):
+        for channel, payload in self.valid().items():
+            for end in range(len(payload)):
+                self.assertIsNone(codec.decode(channel, payload[:end]), (channel, end))
+            self.assertIsNone(codec.decode(channel, payload + b"\0"), channel)
+
+    def test_any_bytes_raise_nothing(self):
+        chance = random.Random(1985)
+        session = Session("me", loses=True, remedy="", random_number=lambda: 7)
+        query = session.begin_status(0.0, 1.0)
+        session.begin(requests.move({"m1": 1.0}, absolute=True, in_steps=False), 0.0)
+        extremes = [b"\xff\xff\xff\xff", b"\x80\0\0\0", b"\x7f\xff\xff\xff", b"\0\0\0\0"]
+        for channel, payload in self.valid().items():
+            for _ in range(1500):
+                hostile = bytearray(payload)
+                for _ in range(chance.randint(1, 3)):
+                    place = chance.randrange(8, len(hostile))
+                    hostile[place : place + 4] = chance.choice([*extremes, chance.randbytes(4)])
+                session.receive(channel, bytes(hostile), 1.0)
+                session.poll(1.0)
+            session.receive(channel, chance.randbytes(100), 1.0)
+        for channel in ("", "NOTHING", "MOVE"):
+            session.receive(channel, b"", 1.0)
+        if query.collector.has_motors():
+            query.collector.status()
+
+    def test_words_that_no_daemon_says_are_dropped(self):
+        request = messages.request_t()
+        for payload in (answer(request, RESULT, "splendid"), answer(request, 9),
+                        answer(request, RESULT, "done", part=1, parts=1),
+                        answer(request, RESULT, "done", parts=1_000_000)):
+            self.assertIsNone(codec.decode("REPLY", payload))
+
+
+if __name__ == "__main__":
+    unittest.main()
