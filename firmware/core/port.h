@@ -16,7 +16,7 @@ extern "C" {
 // What the pins say: 1 is active as the port wires it (docs/firmware.md). The core turns those
 // round whose switches rest at the other level (bushd_set_inputs).
 typedef struct bushd_inputs {
-  uint16_t motors;  // bit per motor: its limit or home switch
+  uint16_t motors;  // bit per input: switches of motors
   uint8_t system;   // BUSHD_INPUT_*
 } bushd_inputs;
 

@@ -156,7 +156,8 @@ class Motor:
     moving: bool
     activity: Activity
     enabled: bool  # drivers powered
-    switch: bool  # its switch is active
+    switch: bool  # one of its switches is active
+    inputs: frozenset[str]  # active ones of "positive", "negative", "home", "step"
     inhibited: Inhibited
     trust: Trust
     uncertain_reason: str  # why the position is not known; "" while it is

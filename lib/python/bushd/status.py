@@ -123,6 +123,7 @@ def _motor(state: Any, description: Any, mcu: str) -> model.Motor:
         activity=model.Activity(state.activity),
         enabled=state.enabled,
         switch=state.input,
+        inputs=frozenset(state.inputs.split()),
         inhibited=model.Inhibited(state.inhibited),
         trust=trust,
         uncertain_reason=state.uncertain_reason,
