@@ -26,8 +26,10 @@ constexpr TimeNs kResultDueNs = 40 * kSecond;
 constexpr TimeNs kTurnDueNs = 15 * kSecond;
 // Checks, a second apart. An MCU that has heard nothing for long has come to rest by then.
 constexpr int kIdleChecks = 4;
-// In what the daemon plans, and what the plant has done by now: two ticks at the tables' fastest.
-constexpr std::int64_t kEventSteps = 20;
+// Between the tick in which the daemon takes the event to be and what the plant has done by then:
+// at 2500 steps/s, in the latency of the worst adapter, by which a daemon may misjudge the bus's
+// time, and two ticks.
+constexpr std::int64_t kEventSteps = 60;
 
 }  // namespace
 
