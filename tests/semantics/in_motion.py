@@ -28,7 +28,8 @@ class InMotion:
     @staticmethod
     def hull(motor, aim):
         """Where it is on its way there."""
-        return (min(motor.steps, aim, aim - motor.backlash_steps()), max(motor.steps, aim, aim - motor.backlash_steps()))
+        places = (motor.steps, aim, aim - motor.backlash_steps())
+        return (min(places), max(places))
 
     def finish(self, motors, targets, number):
         end = self.driver.do("end", number=number)

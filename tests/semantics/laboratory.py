@@ -1,4 +1,5 @@
-"""The lab at the other end of a pipe (driver.cpp), and what is in it: made up at random, for bushd.toml and the model."""
+"""The lab at the other end of a pipe (driver.cpp), and what is in it: made up at random, for bushd.toml and the model.
+"""
 import json
 import subprocess
 from decimal import Decimal

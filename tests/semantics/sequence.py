@@ -1,4 +1,5 @@
-"""A sequence of random requests to a lab, each foretold by the model (model.py), and what is asked of motors at rest."""
+"""A sequence of random requests to a lab, each foretold by the model (model.py), and what is asked of motors at rest.
+"""
 import copy
 from fractions import Fraction
 

@@ -217,6 +217,8 @@ class Witness {
   void jogged(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
   void check_jog_end(TimeNs now_ns, const Motor& motor, const Asked& asked,
                      const bushd::api::Completed& result);
+  void check_steps_after(TimeNs now_ns, const Motor& motor, const Asked& asked,
+                         const std::string& reason);
   void stop_accepted(const Request& request);
   void pause_accepted(TimeNs now_ns, const Request& request);
   void hold_accepted(const Request& request);

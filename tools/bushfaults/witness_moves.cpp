@@ -137,8 +137,8 @@ void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t>
   motor.idle_checks = 0;
 }
 
-// Soft limits hold for all that it does until something else is asked of it. One that moves beyond
-// them may turn round, and first rest where it might have gone before.
+// Soft limits hold for all that it does until something else is asked of it. One that moves
+// may turn round, and first rest where it might have gone before.
 void Witness::keep_within(TimeNs now_ns, Motor& motor) {
   const auto before = std::exchange(motor.range, std::nullopt);
   const auto limits = units_.limits(index_of(motor));
@@ -148,10 +148,9 @@ void Witness::keep_within(TimeNs now_ns, Motor& motor) {
   motor.range = Range{.low = std::min({limits->low, stands, said}) + *offset(motor),
                       .high = std::max({limits->high, stands, said}) + *offset(motor),
                       .since_ns = now_ns};
-  if (before && stands < limits->low) motor.range->low = std::min(motor.range->low, before->low);
-  if (before && stands > limits->high) {
-    motor.range->high = std::max(motor.range->high, before->high);
-  }
+  if (!before) return;
+  motor.range->low = std::min(motor.range->low, before->low);
+  motor.range->high = std::max(motor.range->high, before->high);
 }
 
 void Witness::position_set(const Request& request) {
