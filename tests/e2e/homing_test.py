@@ -9,12 +9,12 @@ AT = -50  # the position that the switch shall have
 
 
 class Homing(EndToEndTest):
-    def bring_up_with_switch(self, more=""):
+    def bring_up_with_switch(self, more="", keys="", switches=(f"1.0@{SWITCH}",)):
         self.write_config()
         config = self.file("bushd.toml")
         home = f'home = {{ direction = "negative", position_steps = {AT}, most_steps = 5000{more} }}'
-        config.write_text(config.read_text().replace('name = "a0"\n', f'name = "a0"\n{home}\n'))
-        self.bushsim = self.start_bushsim(options=["--switch", f"1.0@{SWITCH}"])
+        config.write_text(config.read_text().replace('name = "a0"\n', f'name = "a0"\n{home}\n{keys}\n'))
+        self.bushsim = self.start_bushsim(options=[word for one in switches for word in ("--switch", one)])
         self.bushd = self.start_bushd()
         self.wait_until_ready()
 
@@ -31,6 +31,16 @@ class Homing(EndToEndTest):
         self.command("move", "--wait", "a0", "--to", 400)
         self.command("home", "--wait", "a0")
         self.command("move", "--wait", "a0", 7)
+        self.assert_stands_where_it_says()
+
+    def test_between_limits_of_its_own(self):
+        self.bring_up_with_switch(keys="inputs = { positive = 9, negative = 10, home = 11 }",
+                                  switches=("1.0:9@+900", "1.0:10@-2000", f"1.0:11@{SWITCH}"))
+        self.assertIn("limit", self.bushctl("move", "--wait", "a0", 3000).stdout)
+        self.wait_until("its limit to be shown", lambda: self.motors()["a0"]["inputs"] == "positive")
+        self.assertEqual(self.motors()["a0"]["inhibited"], "positive")
+        self.command("home", "--wait", "a0")
+        self.wait_until("its switch to be shown", lambda: self.motors()["a0"]["inputs"] == "home")
         self.assert_stands_where_it_says()
 
     def test_is_stopped_and_refused(self):
