@@ -267,6 +267,12 @@ void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
   std::optional<std::int64_t> target;
   if (end.word == "reached" && !legs.empty()) target = legs[leg];
   check_end(now_ns, motor, asked, end, target);
+  const auto& range = motor.range;
+  const bool by_plan = end.word == "reached" || end.word == "turned";
+  if (by_plan && range && second_ns_ < range->since_ns &&
+      (end.stands < range->low || end.stands > range->high)) {
+    violated(now_ns, motor.name + " has come to rest beyond its limits");
+  }
   const bool exact = asked.request.ask != Ask::kArm;
   const bool planned =
       end.word == "reached" || end.word == "turned" || (end.word == "stopped" && exact);
