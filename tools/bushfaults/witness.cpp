@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "own_ramp.h"
+
 namespace bushfaults {
 namespace {
 
@@ -25,7 +27,16 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
       units_(config) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
-    motors_.push_back({.name = motor.name, .mcu = motor.mcu.value, .output = motor.output.value});
+    const bushd::config::Bus& bus_of = config.bus_of(motor);
+    std::int64_t excess = 0;
+    for (const bushd::config::Group& group : config.groups) {
+      if (bus_of.format == BUSHD_FORMAT_FINE) break;
+      excess = std::max(excess, own_ramp_excess(group.table->view(), bus_of.tick_us * 1000));
+    }
+    motors_.push_back({.name = motor.name,
+                       .mcu = motor.mcu.value,
+                       .output = motor.output.value,
+                       .own_ramp_excess = excess});
   }
   states_.resize(config.mcus.size());
   present_.resize(config.mcus.size(), true);

@@ -104,6 +104,7 @@ class Witness {
     std::string name;
     std::size_t mcu;
     std::size_t output;
+    std::int64_t own_ramp_excess;        // steps beyond its plan, if its MCU ramps it down
     std::optional<TimeNs> pressed_ns{};  // when its limit switch was active last
     std::optional<Key> move{};           // accepted, and this motor's part of it perhaps not ended
     // Where it leads, as the plant counts; nothing after a stop.

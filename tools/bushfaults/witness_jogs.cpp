@@ -30,8 +30,6 @@ constexpr int kIdleChecks = 4;
 // at 2500 steps/s, in the latency of the worst adapter, by which a daemon may misjudge the bus's
 // time, and two ticks.
 constexpr std::int64_t kEventSteps = 60;
-// In the coarse format a ramp of an MCU's own, in an emergency, may be a step longer than the plan.
-constexpr std::int64_t kOwnRampSteps = 1;
 
 }  // namespace
 
@@ -230,7 +228,8 @@ void Witness::watch(TimeNs now_ns) {
     if (second) motor.held_at.reset();
     const std::int64_t stands = plant_steps(motor);
     if (motor.range && second_ns_ < motor.range->since_ns &&
-        (stands < motor.range->low - kOwnRampSteps || stands > motor.range->high + kOwnRampSteps)) {
+        (stands < motor.range->low - motor.own_ramp_excess ||
+         stands > motor.range->high + motor.own_ramp_excess)) {
       violated(now_ns, fmt::format("{} is at {}, and its limits are {} and {}, in steps since the "
                                    "beginning",
                                    motor.name, stands, motor.range->low, motor.range->high));
