@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/epoll.h>
-#include <systemd/sd-daemon.h>
 #include <systemd/sd-event.h>
 
 #include <algorithm>
@@ -18,6 +17,7 @@
 #include "daemon/bus_port.h"
 #include "daemon/process.h"
 #include "daemon/request_log.h"
+#include "daemon/service_manager.h"
 #include "daemon/table_service.h"
 
 namespace bushd::daemon {
@@ -54,8 +54,11 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
                   .seed = static_cast<std::uint64_t>(run_)},
                  reception_, publishing_, unix_time_us),
       lcm_watch_(lcm_front_, publishing_, config.lcm.prefix,
-                 [this](LogLevel level, const std::string& text) { log(level, text); }) {
+                 [this](LogLevel level, const std::string& text) { log(level, {}, text); }) {
   for ([[maybe_unused]] const config::Bus& bus : config.buses) ports_.add();
+  for ([[maybe_unused]] const config::Mcu& mcu : config.mcus) {
+    mcu_states_.add(api::McuState::kOffline);
+  }
   if (store != nullptr) core_.kept().use(store->kept(), *this, config.state.required);
   publishing_.set_refresh([this] { core_.publish_state(now_us()); });
   publishing_.add(lcm_front_);
@@ -179,7 +182,9 @@ Result<void> EventLoop::run() {
   if (const auto restored = restore_tables(); !restored) return restored;
   if (const auto ready = set_up(); !ready) return ready;
   started_us_ = now_us();
-  static_cast<void>(sd_notify(0, "READY=1"));
+  open_due_ports(started_us_);
+  tell_status(status_text(config_, mcu_states_));
+  tell_ready();
   while (true) {
     const std::int64_t now = now_us();
     for (const BusId bus : ports_.ids()) {
@@ -247,7 +252,7 @@ void EventLoop::open_port(std::int64_t now, BusId bus) {
   if (!opened || !watched) {
     const std::string error = opened ? watched.error().text() : opened.error().text();
     if (error != port.last_error) {
-      log(LogLevel::kError,
+      log(LogLevel::kError, {},
           fmt::format("bus {}: {}; trying again twice a second", config.name, error));
       port.last_error = error;
       core_.port_lost(now, bus, "port " + error);
@@ -257,8 +262,9 @@ void EventLoop::open_port(std::int64_t now, BusId bus) {
   port.serial = std::move(*opened);
   port.source = std::move(*watched);
   port.last_error.clear();
-  log(LogLevel::kInfo, fmt::format("bus {}: port {} opened at {} baud", config.name,
-                                   port.serial->path(), config.baud));
+  log(LogLevel::kInfo, {},
+      fmt::format("bus {}: port {} opened at {} baud", config.name, port.serial->path(),
+                  config.baud));
   core_.port_opened(now, bus);
 }
 
@@ -271,8 +277,9 @@ void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause)
   port.serial.reset();
   port.open_due_us = now + kReopenUs;
   port.last_error = path + ": " + cause;
-  log(LogLevel::kError, fmt::format("bus {}: port {} lost: {}; trying again twice a second",
-                                    config.name, path, cause));
+  log(LogLevel::kError, {},
+      fmt::format("bus {}: port {} lost: {}; trying again twice a second", config.name, path,
+                  cause));
   core_.port_lost(now, bus, "port " + port.last_error);
 }
 
@@ -297,7 +304,7 @@ void EventLoop::handle_port(std::int64_t now, BusId bus, std::uint32_t events) {
 
 void EventLoop::handle_signal(std::int64_t now, int signal) {
   if (signal == SIGUSR1 || signal == SIGUSR2) {
-    log(LogLevel::kInfo, fmt::format("{}: ignored", signal == SIGUSR1 ? "SIGUSR1" : "SIGUSR2"));
+    log(LogLevel::kInfo, {}, fmt::format("{}: ignored", signal == SIGUSR1 ? "SIGUSR1" : "SIGUSR2"));
     return;
   }
   if (shut_down_by_us_) return;
@@ -306,7 +313,7 @@ void EventLoop::handle_signal(std::int64_t now, int signal) {
     return core_.tables().request({}, api::ReloadTables{});
   }
   spdlog::info("{}: ramping all motors down", signal == SIGTERM ? "SIGTERM" : "SIGINT");
-  static_cast<void>(sd_notify(0, "STOPPING=1"));
+  tell_stopping();
   core_.shut_down(now);
   shut_down_by_us_ = core_.rest_by_us(now) + kShutDownSlackUs;
 }
@@ -393,6 +400,9 @@ void EventLoop::send(BusId bus, std::span<const std::uint8_t> bytes) {
 }
 
 void EventLoop::publish(McuId mcu, const api::StateSnapshot& state) {
+  if (std::exchange(mcu_states_[mcu], state.state) != state.state) {
+    tell_status(status_text(config_, mcu_states_));
+  }
   publishing_.publish(mcu, state);
 }
 
@@ -410,15 +420,16 @@ void EventLoop::move_log(const std::string& json_line) {
   if (!appended) {
     // Once, and how many when it is over: not a line of this log for each of that one.
     if (++lost_move_lines_ == 1) {
-      log(LogLevel::kError, "log of moves: " + appended.error().text());
+      log(LogLevel::kError, {}, "log of moves: " + appended.error().text());
     }
     return;
   }
   if (*appended == MoveLog::Appended::kAnew) {
-    log(LogLevel::kWarning, "log of moves: its file was removed or renamed; a new one is begun");
+    log(LogLevel::kWarning, {},
+        "log of moves: its file was removed or renamed; a new one is begun");
   }
   if (const std::uint64_t lost = std::exchange(lost_move_lines_, 0); lost > 0) {
-    log(LogLevel::kWarning,
+    log(LogLevel::kWarning, {},
         fmt::format("log of moves: is written again; {} lines were lost", lost));
   }
 }
@@ -443,20 +454,16 @@ void EventLoop::tell_left_out(std::int64_t now) {
   }
 }
 
-void EventLoop::log(LogLevel level, const std::string& text) {
+void EventLoop::log(LogLevel level, LogSubject subject, const std::string& text) {
   const auto line = log_limit_.take(now_us(), printable(text));
   if (!line) return;
-  switch (level) {
-    case LogLevel::kInfo:
-      spdlog::info("{}", *line);
-      break;
-    case LogLevel::kWarning:
-      spdlog::warn("{}", *line);
-      break;
-    case LogLevel::kError:
-      spdlog::error("{}", *line);
-      break;
+  JournalFields fields;
+  if (const auto* motor = std::get_if<MotorId>(&subject)) {
+    fields.motor = config_[*motor].name;
+    subject = config_[*motor].mcu;
   }
+  if (const auto* mcu = std::get_if<McuId>(&subject)) fields.mcu = config_[*mcu].id;
+  write_log(level, *line, fields);
 }
 
 void EventLoop::mark(std::vector<state::Mark> marks) {

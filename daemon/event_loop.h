@@ -102,7 +102,7 @@ class EventLoop : private Outputs, private state::Backend {
   void publish(McuId mcu, const api::Description& description) override;
   void publish(BusId bus, const api::HealthSnapshot& health) override;
   void move_log(const std::string& json_line) override;
-  void log(LogLevel level, const std::string& text) override;
+  void log(LogLevel level, LogSubject subject, const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void serve_tables(const api::Asker& asker, const api::Request& request) override;
@@ -125,6 +125,7 @@ class EventLoop : private Outputs, private state::Backend {
   LcmFront lcm_front_;
   std::unique_ptr<SocketFront> socket_front_;  // null: no control socket
   ById<BusId, Port> ports_;
+  ById<McuId, api::McuState> mcu_states_;            // as published last
   std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
   LogLimit log_limit_;
   LogLimit stop_limit_;                // of stops in the log of moves

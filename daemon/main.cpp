@@ -18,6 +18,8 @@
 #include "control/path.h"
 #include "daemon/channel_claim.h"
 #include "daemon/event_loop.h"
+#include "daemon/example_config.h"
+#include "daemon/service_manager.h"
 #include "daemon/state_folder.h"
 
 namespace {
@@ -184,6 +186,10 @@ int main(int argc, char** argv) {
   auto* check_option =
       app.add_option("--check-config", check_path, "Check a configuration and exit")
           ->type_name("FILE");
+  bool example = false;
+  app.add_flag(
+      "--example-config", example,
+      "Print a configuration to begin with, and exit: bushd --example-config > bushd.toml");
   app.add_option("--move-log", move_log_path,
                  "Append moves and their results to this file as JSON lines")
       ->type_name("FILE");
@@ -203,8 +209,14 @@ int main(int argc, char** argv) {
     return bushd::finished_output(bushd::answered(app, error) ? 0 : kUsage);
   }
 
+  if (example) {
+    fmt::print("{}", bushd::daemon::kExampleConfig);
+    return bushd::finished_output(0);
+  }
+
   spdlog::set_default_logger(spdlog::stderr_color_mt("bushd"));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
+  bushd::daemon::use_journal();
   const bool check = !check_path.empty();
   if (!check && config_path.empty()) {
     fmt::print(stderr, "bushd: --config FILE or --check-config FILE is needed; see --help\n");

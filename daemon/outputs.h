@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "api/session.h"
@@ -15,11 +16,14 @@ namespace bushd::daemon {
 
 enum class LogLevel { kInfo, kWarning, kError };
 
+// Whom a line of the log is about, for who looks for all about a motor.
+using LogSubject = std::variant<std::monostate, MotorId, McuId>;
+
 class Outputs : public api::Publisher {
  public:
   virtual void send(BusId bus, std::span<const std::uint8_t> bytes) = 0;
   virtual void move_log(const std::string& json_line) = 0;
-  virtual void log(LogLevel level, const std::string& text) = 0;
+  virtual void log(LogLevel level, LogSubject subject, const std::string& text) = 0;
   // Answered by Core::tables_read and Core::tables_kept, later.
   virtual void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) = 0;
   // For the next daemon: which table each group has, TABLE[@REV] in the order of the configuration.

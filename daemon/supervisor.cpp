@@ -84,7 +84,7 @@ void Supervisor::goes_online(std::int64_t now_us, Mcu& mcu) {
       follow_position(id, before_steps);
     }
   }
-  outputs_.log(restarted ? LogLevel::kWarning : LogLevel::kInfo,
+  outputs_.log(restarted ? LogLevel::kWarning : LogLevel::kInfo, mcu.id,
                "MCU " + mcu.name() + " is ready, boot number " + std::to_string(boot_number) +
                    (restarted ? "; it restarted" + by_cause(mcu.report().reset_cause) +
                                     (kept_.keeps() ? ". "
@@ -101,7 +101,7 @@ void Supervisor::follow_position(MotorId id, std::int64_t before_steps) {
   const motion::Motor& motor = installation_[id];
   if (motor.position_steps() == before_steps) return;
   journal_.position_corrected(id, before_steps);
-  outputs_.log(LogLevel::kWarning,
+  outputs_.log(LogLevel::kWarning, id,
                motor.name() + ": stands at " + std::to_string(motor.position_steps()) +
                    ", not at " + std::to_string(before_steps) + " where it was heard last: it " +
                    "moved on while its MCU was out of reach");
@@ -109,7 +109,7 @@ void Supervisor::follow_position(MotorId id, std::int64_t before_steps) {
 
 void Supervisor::goes_offline(std::int64_t now_us, Mcu& mcu) {
   const std::string cause = mcu.must_be_online().error().text();
-  outputs_.log(LogLevel::kError, cause);
+  outputs_.log(LogLevel::kError, mcu.id, cause);
   const std::int64_t heard_utime_us =
       outputs_.wall_clock_us() - (now_us - heard_[mcu.id].report_us);
   // Before the services end their motion.
@@ -148,11 +148,12 @@ void Supervisor::watch_for_other_masters(std::int64_t now_us) {
     if (std::exchange(bus.two_masters, now) == now) continue;
     installation_.changed = true;
     if (now) {
-      outputs_.log(LogLevel::kError, "bus " + bus.config.name +
-                                         ": another master talks on the line; no moves are taken "
-                                         "until it is silent");
+      outputs_.log(LogLevel::kError, {},
+                   "bus " + bus.config.name +
+                       ": another master talks on the line; no moves are taken "
+                       "until it is silent");
     } else {
-      outputs_.log(LogLevel::kInfo, "bus " + bus.config.name + ": the other master is silent");
+      outputs_.log(LogLevel::kInfo, {}, "bus " + bus.config.name + ": the other master is silent");
     }
   }
 }

@@ -21,7 +21,7 @@ EmergencyStop::EmergencyStop(Installation& installation, Interlocks& interlocks,
 void EmergencyStop::request(std::int64_t now_us, const api::Asker& asker,
                             const api::EmergencyStop&) {
   asker.answer(api::Accepted{});
-  outputs_.log(LogLevel::kWarning,
+  outputs_.log(LogLevel::kWarning, {},
                "emergency stop, commanded by " +
                    (asker.session ? asker.session->text() : std::string("the daemon")));
   open_moves_.stopped_by(*installation_.find_or_all({}), text_of(asker));

@@ -237,7 +237,7 @@ void HomingQueue::found(Mcu& mcu) {
   if (!installation_.config()[task.motor].home->then || !task.ended_by.empty()) {
     return end(mcu, Outcome::kReached, "homed");
   }
-  outputs_.log(LogLevel::kInfo, installation_[task.motor].name() + ": homed; moves on");
+  outputs_.log(LogLevel::kInfo, task.motor, installation_[task.motor].name() + ": homed; moves on");
   task.phase = Phase::kFound;
 }
 
@@ -279,7 +279,7 @@ void HomingQueue::follow_moving_on(Mcu& mcu) {
 void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   const MotorId id = queues_[mcu.id].front().motor;
   queues_[mcu.id].pop_front();
-  outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning,
+  outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning, id,
                installation_[id].name() + ": " + reason);
   ended(id, outcome, reason);
   if (!queues_[mcu.id].empty() && queues_[mcu.id].front().phase == Phase::kWaiting) begin(mcu);
@@ -403,7 +403,7 @@ void HomingQueue::goes_online(Mcu& mcu) {
     if (!home || !home->at_start || (homed && !motor.uncertain_reason())) continue;
     const auto floor = floor_of(id, {});
     if (const auto may = floor ? may_home(id) : fail(floor.error()); !may) {
-      outputs_.log(LogLevel::kWarning, motor.name() + " is not homed: " + may.error().text());
+      outputs_.log(LogLevel::kWarning, id, motor.name() + " is not homed: " + may.error().text());
       continue;
     }
     add({.motor = id, .floor = *floor});

@@ -77,9 +77,10 @@ void IdleDrivers::fall_asleep(Mcu& mcu) {
   mcu.asleep = true;
   mcus_[mcu.id].rests = false;
   installation_.changed = true;
-  outputs_.log(LogLevel::kInfo, "MCU " + mcu.name() +
-                                    ": its motors have rested for idle_disable_s, so their drivers "
-                                    "are disabled until one moves");
+  outputs_.log(LogLevel::kInfo, mcu.id,
+               "MCU " + mcu.name() +
+                   ": its motors have rested for idle_disable_s, so their drivers "
+                   "are disabled until one moves");
 }
 
 void IdleDrivers::step(std::int64_t now_us) {

@@ -89,9 +89,9 @@ void KeptPositions::request(const api::Asker& asker, const api::Confirm& request
     motion::Motor& motor = installation_[id];
     const std::string who = text_of(asker);
     motor.position_is_known();
-    outputs_.log(LogLevel::kInfo, motor.name() + ": position " +
-                                      std::to_string(motor.position_steps()) + " confirmed by " +
-                                      who);
+    outputs_.log(LogLevel::kInfo, id,
+                 motor.name() + ": position " + std::to_string(motor.position_steps()) +
+                     " confirmed by " + who);
     past({.motor = motor.name(),
           .what = "confirm",
           .who = who,
@@ -233,7 +233,7 @@ void KeptPositions::take(MotorId id, const state::Verdict& verdict) {
       break;
     case state::Trust::kUncertain:
       motor.position_is_uncertain(verdict.reason);
-      outputs_.log(LogLevel::kWarning, motor.name() + ": is uncertain: " + verdict.reason);
+      outputs_.log(LogLevel::kWarning, id, motor.name() + ": is uncertain: " + verdict.reason);
       break;
   }
   installation_.changed = true;
@@ -261,13 +261,14 @@ void KeptPositions::follow_restoring(const Mcu& mcu, MotorId id) {
   if (motor.position_steps() != restoring.steps) {
     motor.position_is_uncertain("MCU " + mcu.name() + " did not take its kept position of " +
                                 std::to_string(restoring.steps) + " steps");
-    outputs_.log(LogLevel::kError, motor.name() + ": " + *motor.uncertain_reason());
+    outputs_.log(LogLevel::kError, id, motor.name() + ": " + *motor.uncertain_reason());
     return;
   }
   journal_.position_set(id, 0, {});
   if (motor.restored_reason()) {
-    outputs_.log(LogLevel::kInfo, motor.name() + ": position " + std::to_string(restoring.steps) +
-                                      " is restored: " + restoring.reason);
+    outputs_.log(LogLevel::kInfo, id,
+                 motor.name() + ": position " + std::to_string(restoring.steps) +
+                     " is restored: " + restoring.reason);
   }
 }
 
@@ -320,10 +321,10 @@ void KeptPositions::tell_trouble() {
   if (told_trouble_ == keeper_->trouble()) return;
   told_trouble_ = keeper_->trouble();
   if (told_trouble_) {
-    outputs_.log(LogLevel::kError,
+    outputs_.log(LogLevel::kError, {},
                  "positions cannot be kept: " + *told_trouble_ + "; trying again once a second");
   } else {
-    outputs_.log(LogLevel::kInfo, "positions are kept again");
+    outputs_.log(LogLevel::kInfo, {}, "positions are kept again");
   }
 }
 

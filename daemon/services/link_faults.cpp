@@ -18,8 +18,9 @@ void LinkFaults::reports(std::int64_t, Mcu& mcu) {
   const bool faulty = (report.faults & (BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC)) != 0 &&
                       (report.faults & link::kPeoplesFaults) == 0 && !emergency_stop_.under_way();
   if (faulty && !asked && report.moving == 0) {
-    outputs_.log(LogLevel::kWarning, "MCU " + mcu.name() + ": " + motion::stop_cause(report) +
-                                         "; positions are read, clearing the fault");
+    outputs_.log(LogLevel::kWarning, mcu.id,
+                 "MCU " + mcu.name() + ": " + motion::stop_cause(report) +
+                     "; positions are read, clearing the fault");
     mcu.control(BUSHD_CONTROL_CLEAR_FAULTS);
   }
   if (asked != faulty) installation_.changed = true;

@@ -116,8 +116,9 @@ void MotorSettings::carry_out(const Plan& plan, const api::Asker& asker) {
     if (change.before == change.after) continue;
     const motion::Motor& motor = installation_[change.motor];
     journal_.configured(change.motor, config::name_of(change.key), change.after, asker);
-    outputs_.log(LogLevel::kInfo, motor.name() + ": " + assignment(change.key, change.after) +
-                                      ", was " + change.before + ", by " + who);
+    outputs_.log(LogLevel::kInfo, change.motor,
+                 motor.name() + ": " + assignment(change.key, change.after) + ", was " +
+                     change.before + ", by " + who);
     kept_.past({.motor = motor.name(),
                 .what = "config",
                 .who = who,
@@ -185,7 +186,7 @@ void MotorSettings::take_kept(MotorId id, SettingKey key, const state::Setting& 
   const std::string name(config::name_of(key));
   const auto replaced = config::with(in_file_[id], key, kept.replaces);
   if (!replaced || config::text_of(*replaced, key) != in_file) {
-    outputs_.log(LogLevel::kInfo,
+    outputs_.log(LogLevel::kInfo, id,
                  motor.name() + ": bushd.toml was edited: " + assignment(key, in_file) +
                      " counts, not " + kept.value + ", which was set in operation");
     return;
@@ -193,15 +194,16 @@ void MotorSettings::take_kept(MotorId id, SettingKey key, const state::Setting& 
   if (kept.value == in_file) return;
   const auto settings = config::with(settings_of(motor), key, kept.value);
   if (!settings) {
-    outputs_.log(LogLevel::kWarning, motor.name() +
-                                         ": what was set in operation is not possible any more: " +
-                                         settings.error().message + "; " +
-                                         assignment(key, in_file) + " of bushd.toml counts");
+    outputs_.log(LogLevel::kWarning, id,
+                 motor.name() + ": what was set in operation is not possible any more: " +
+                     settings.error().message + "; " + assignment(key, in_file) +
+                     " of bushd.toml counts");
     return;
   }
   put(id, *settings);
-  outputs_.log(LogLevel::kInfo, motor.name() + ": its " + name + " is " + kept.value +
-                                    ", as it was set in operation; bushd.toml says " + in_file);
+  outputs_.log(LogLevel::kInfo, id,
+               motor.name() + ": its " + name + " is " + kept.value +
+                   ", as it was set in operation; bushd.toml says " + in_file);
 }
 
 // "theta: offset = 12.5; it stands at 31.00 mm, beyond its soft limits of ..."
@@ -250,7 +252,7 @@ void MotorSettings::saved(const api::Asker& asker, const api::Configure& request
     keep(plan->motors[i]);
   }
   file_sha256_ = request.file_sha256;
-  outputs_.log(LogLevel::kInfo,
+  outputs_.log(LogLevel::kInfo, {},
                installation_.config().absolute_path + " was written by " + daemon::text_of(asker));
   api::Completed answer{.reason = "done", .detail = configuration_of(plan->motors)};
   open_.push_back({asker, kept_.told(), std::move(answer)});

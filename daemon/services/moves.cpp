@@ -340,7 +340,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             },
             [&](const motion::event::Drop&) { mcu.drop(motor.output()); },
             [&](const motion::event::Mismatch&) {
-              outputs_.log(LogLevel::kError,
+              outputs_.log(LogLevel::kError, id,
                            motor.name() + ": " + *motor.uncertain_reason() + "; it is stopped");
             },
             [&](const motion::event::Turn&) {
@@ -371,7 +371,7 @@ void Moves::end(MotorId id, const motion::event::Ended& ended) {
   }
   const bool planned =
       ended.outcome == api::Outcome::kReached || ended.outcome == api::Outcome::kStopped;
-  if (!planned) outputs_.log(LogLevel::kWarning, motor.name() + ": " + ended.reason);
+  if (!planned) outputs_.log(LogLevel::kWarning, id, motor.name() + ": " + ended.reason);
   open_.end(id, ended.outcome, ended.reason, ended.by_plan);
 }
 

@@ -132,9 +132,9 @@ void Positions::end(const Setting& setting, const Result<void>& ended) {
     const api::Asker& by = setting.confirmation.asker();
     journal_.position_set(part.motor, part.from_steps, by);
     if (listener_) listener_(part.motor, part.from_steps, by);
-    outputs_.log(LogLevel::kInfo, motor.name() + ": position set to " + std::to_string(part.steps) +
-                                      ", was " + std::to_string(part.from_steps) + ", by " +
-                                      text_of(by));
+    outputs_.log(LogLevel::kInfo, part.motor,
+                 motor.name() + ": position set to " + std::to_string(part.steps) + ", was " +
+                     std::to_string(part.from_steps) + ", by " + text_of(by));
   }
   installation_.changed = true;
   setting.confirmation.answer(ended);

@@ -357,7 +357,7 @@ void TablesInService::kept(std::uint64_t ticket, const Result<void>& kept) {
 void TablesInService::refuse(Changes::iterator change) {
   const Change finished = std::move(*change);
   changes_.erase(change);
-  if (!finished.asker.session) outputs_.log(LogLevel::kError, "tables: " + finished.refused);
+  if (!finished.asker.session) outputs_.log(LogLevel::kError, {}, "tables: " + finished.refused);
   finished.asker.answer(api::Refused{finished.refused});
 }
 
@@ -367,7 +367,7 @@ void TablesInService::complete(Changes::iterator change, api::Outcome outcome,
   const Change finished = std::move(*change);
   changes_.erase(change);
   installation_.changed = true;
-  outputs_.log(outcome == api::Outcome::kDone ? LogLevel::kInfo : LogLevel::kError,
+  outputs_.log(outcome == api::Outcome::kDone ? LogLevel::kInfo : LogLevel::kError, {},
                "tables: " + text);
   finished.asker.answer(api::Completed{.outcome = outcome, .reason = text, .detail = {}});
 }
@@ -398,9 +398,9 @@ Result<void> TablesInService::restore(GroupId group, const std::string& wanted,
   for (const McuId id : installation_.mcus()) {
     installation_[id].reconfigure(setup_of(installation_.config(), id, installation_.tables()));
   }
-  outputs_.log(LogLevel::kInfo, "group " + name_of(group) + " has table " + wanted + ", " +
-                                    text_of(*table) + ", as it was given; configured is " +
-                                    installation_.config()[group].table_name);
+  outputs_.log(LogLevel::kInfo, {},
+               "group " + name_of(group) + " has table " + wanted + ", " + text_of(*table) +
+                   ", as it was given; configured is " + installation_.config()[group].table_name);
   return {};
 }
 

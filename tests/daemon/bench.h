@@ -43,7 +43,7 @@ class Bench : public daemon::Outputs {
   }
   void publish(BusId, const api::HealthSnapshot& snapshot) override { health.push_back(snapshot); }
   void move_log(const std::string& line) override { lines.push_back(line); }
-  void log(daemon::LogLevel level, const std::string& text) override {
+  void log(daemon::LogLevel level, daemon::LogSubject, const std::string& text) override {
     if (level != daemon::LogLevel::kInfo) warnings.push_back(text);
   }
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& names) override {

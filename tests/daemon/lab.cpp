@@ -245,7 +245,7 @@ void Lab::send(BusId bus, std::span<const std::uint8_t> bytes) {
   if (buses_[bus.value].plugged) buses_[bus.value].bus->master_send(copy, now_ns_);
 }
 
-void Lab::log(daemon::LogLevel level, const std::string& text) {
+void Lab::log(daemon::LogLevel level, daemon::LogSubject, const std::string& text) {
   if (level == daemon::LogLevel::kError) errors_.push_back(text);
   if (level != daemon::LogLevel::kInfo) {
     std::printf("[%.3f s] %s\n", static_cast<double>(now_ns_) * 1e-9, text.c_str());

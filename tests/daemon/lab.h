@@ -169,7 +169,7 @@ class Lab : public daemon::Outputs, private state::Backend {
   }
   void publish(BusId, const api::HealthSnapshot& health) override { health_[health.bus] = health; }
   void move_log(const std::string& line) override { move_lines_.push_back(line); }
-  void log(daemon::LogLevel level, const std::string& text) override;
+  void log(daemon::LogLevel level, daemon::LogSubject, const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void serve_tables(const api::Asker& asker, const api::Request& request) override;

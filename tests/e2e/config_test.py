@@ -32,6 +32,16 @@ class Configuration(EndToEndTest):
         self.assertEqual((ran.returncode, ran.stderr), (0, ""))
         self.assertIn("good: 8 motors on 2 MCUs and 1 bus\n", ran.stdout)
 
+    def test_the_example_is_good_and_so_is_all_that_it_suggests(self):
+        example = self.run_program(program("BUSHD"), "--example-config")
+        self.assertEqual(example.returncode, 0, example.stderr)
+        suggested = re.sub(r"^#(?=\w)", "", example.stdout, flags=re.MULTILINE)
+        self.assertNotEqual(suggested, example.stdout)
+        for text in (example.stdout, suggested):
+            ran = self.check(text)
+            self.assertEqual((ran.returncode, ran.stderr), (0, ""))
+            self.assertIn("good: 1 motor on 1 MCU and 1 bus\n", ran.stdout)
+
     def test_bad_files_name_line_and_key_and_are_refused_at_the_start(self):
         good = configuration(self.file("port"))
         for name, (old, new, message) in BAD.items():

@@ -24,7 +24,7 @@ class Service(EndToEndTest):
         """What comes before it."""
         before = []
         while True:
-            said = self.manager.recv(4096).decode().split()
+            said = self.manager.recv(4096).decode().splitlines()
             if word in said:
                 return before
             before += said
@@ -36,6 +36,12 @@ class Service(EndToEndTest):
             self.wait_for("WATCHDOG=1")
         self.assertEqual(self.bushd.end(), 0)
         self.wait_for("STOPPING=1")
+
+    def test_says_how_many_mcus_are_offline(self):
+        self.bring_up()
+        before = self.wait_for("STATUS=1 bus, 8 motors, all MCUs online")
+        self.assertIn("STATUS=1 bus, 8 motors, 2 MCUs offline", before)
+        self.assertIn("READY=1", before)
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ class Layout(unittest.TestCase):
                     self.assertTrue((includes / "bushd" / named).exists() or (includes / named).exists())
 
     def test_the_demonstration_is_a_good_configuration(self):
-        ran = subprocess.run([os.environ["BUSHD"], "--check-config", SOURCE / "system/demo.toml"], capture_output=True, text=True, check=False)
+        ran = subprocess.run([os.environ["BUSHD"], "--check-config", SOURCE / "daemon/system/demo.toml"], capture_output=True, text=True, check=False)
         self.assertEqual(ran.returncode, 0, ran.stderr)
 
     def test_manual_pages_are_complete(self):

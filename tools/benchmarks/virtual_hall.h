@@ -31,7 +31,7 @@ class VirtualHall final : public bushd::daemon::Outputs {
   void publish(bushd::McuId, const bushd::api::Description&) override {}
   void publish(bushd::BusId, const bushd::api::HealthSnapshot&) override {}
   void move_log(const std::string&) override {}
-  void log(bushd::daemon::LogLevel, const std::string&) override {}
+  void log(bushd::daemon::LogLevel, bushd::daemon::LogSubject, const std::string&) override {}
   void read_tables(std::uint64_t, const std::vector<std::string>&) override {}
   void keep_tables(std::uint64_t, const std::vector<std::string>&) override {}
   void serve_tables(const bushd::api::Asker&, const bushd::api::Request&) override {}

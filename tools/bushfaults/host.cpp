@@ -328,7 +328,7 @@ void Host::keep_tables(std::uint64_t ticket, const std::vector<std::string>&) {
   disk_.push_back([this, ticket] { core().tables().kept(ticket, {}); });
 }
 
-void Host::log(bushd::daemon::LogLevel level, const std::string& text) {
+void Host::log(bushd::daemon::LogLevel level, bushd::daemon::LogSubject, const std::string& text) {
   if (level != bushd::daemon::LogLevel::kInfo) recent_.note(now_ns_, "log: " + text);
 }
 

@@ -76,7 +76,8 @@ class Host final : public bushd::daemon::Outputs {
   void publish(bushd::McuId mcu, const bushd::api::Description& description) override;
   void publish(bushd::BusId bus, const bushd::api::HealthSnapshot& health) override;
   void move_log(const std::string& line) override { witness_.move_log(now_ns_, line); }
-  void log(bushd::daemon::LogLevel level, const std::string& text) override;
+  void log(bushd::daemon::LogLevel level, bushd::daemon::LogSubject,
+           const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
   void keep_tables(std::uint64_t ticket, const std::vector<std::string>&) override;
   void serve_tables(const bushd::api::Asker& asker, const bushd::api::Request&) override;

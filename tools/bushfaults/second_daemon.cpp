@@ -116,7 +116,8 @@ void SecondDaemon::send(bushd::BusId, std::span<const std::uint8_t> bytes) {
   bus_.second_master_send(bytes, free_ns_);
 }
 
-void SecondDaemon::log(bushd::daemon::LogLevel level, const std::string& text) {
+void SecondDaemon::log(bushd::daemon::LogLevel level, bushd::daemon::LogSubject,
+                       const std::string& text) {
   if (level != bushd::daemon::LogLevel::kInfo) recent_.note(now_ns_, "log of the second: " + text);
 }
 

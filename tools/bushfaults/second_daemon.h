@@ -65,7 +65,8 @@ class SecondDaemon final : public bushd::daemon::Outputs {
   void publish(bushd::McuId, const bushd::api::Description&) override {}
   void publish(bushd::BusId, const bushd::api::HealthSnapshot&) override {}
   void move_log(const std::string&) override {}
-  void log(bushd::daemon::LogLevel level, const std::string& text) override;
+  void log(bushd::daemon::LogLevel level, bushd::daemon::LogSubject,
+           const std::string& text) override;
   void read_tables(std::uint64_t, const std::vector<std::string>&) override {}
   void keep_tables(std::uint64_t, const std::vector<std::string>&) override {}
   void serve_tables(const bushd::api::Asker& asker, const bushd::api::Request&) override;
