@@ -147,15 +147,21 @@ TEST_F(KeeperTest, WhatFailedIsTriedAgainOnceASecond) {
   EXPECT_TRUE(keeper.marked(kTheta));
 }
 
-TEST_F(KeeperTest, AMotorThatMovedWithoutAMarkDoesNotLookAtRestUntilTheDiskWorksAgain) {
+TEST_F(KeeperTest, AMotorThatMovesWithoutAMarkDoesNotLookAtRest) {
   stand(kTheta, 5);
   EXPECT_TRUE(stood(keeper.kept(kTheta)));
+  EXPECT_FALSE(keeper.kept(kTheta).mark_lost);
   keeper.give_up_mark(kTheta);
-  stand(kTheta, 6);
   EXPECT_TRUE(keeper.kept(kTheta).mark_lost);
+  // Here its rest is known at once, after a failure of the PC only from the disk.
+  stand(kTheta, 6);
+  EXPECT_FALSE(keeper.kept(kTheta).mark_lost);
   EXPECT_TRUE(keeper.any_unguarded());
   keeper.step(0);
-  keeper.write(0, {});
+  keeper.write(0, fail("no space left"));
+  EXPECT_TRUE(keeper.any_unguarded());
+  keeper.step(1'000'000);
+  keeper.write(1'000'010, {});
   EXPECT_FALSE(keeper.any_unguarded());
 }
 
