@@ -2,6 +2,7 @@
 find_package(PkgConfig REQUIRED)
 
 find_package(fmt REQUIRED)
+find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(nlohmann_json REQUIRED)
 pkg_check_modules(LCM REQUIRED IMPORTED_TARGET lcm)
 pkg_check_modules(GMPXX REQUIRED IMPORTED_TARGET gmpxx)
