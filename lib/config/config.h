@@ -10,12 +10,15 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "base/ids.h"
 #include "base/result.h"
 #include "engine/message.h"
 #include "fieldbus/emission_setup.h"
+#include "pseudo/curved_axis.h"
+#include "pseudo/linear_axes.h"
 #include "tables/table.h"
 #include "units/coordinates.h"
 
@@ -130,6 +133,22 @@ struct Motor {
   bool never_disable = false;                 // its MCU's drivers stay enabled at rest
 };
 
+struct PseudoAxis {
+  std::string name{};
+  std::string unit{};
+  std::optional<units::SoftLimits> soft_limits = {};  // of its own, beside those of its motors
+  int decimals = 4;                                   // that people are shown
+};
+
+using PseudoLaw = std::variant<pseudo::LinearAxes, pseudo::CurvedAxis>;
+
+// Axes that are computed from motors, all of one bus.
+struct Pseudo {
+  std::vector<PseudoAxis> axes{};
+  std::vector<MotorId> motors{};  // in the order of the law's
+  PseudoLaw law{};
+};
+
 struct Config {
   std::string path;
   // Where that is, and what its text was when it was read.
@@ -143,6 +162,7 @@ struct Config {
   std::vector<Mcu> mcus;
   std::vector<Group> groups;
   std::vector<Motor> motors;
+  std::vector<Pseudo> pseudos{};
 
   const Bus& operator[](BusId id) const { return buses[id.value]; }
   const Mcu& operator[](McuId id) const { return mcus[id.value]; }

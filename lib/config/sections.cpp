@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <map>
 #include <string_view>
 #include <system_error>
@@ -16,6 +15,7 @@
 #include "config/home.h"
 #include "config/inputs.h"
 #include "config/port_pattern.h"
+#include "config/pseudo_section.h"
 #include "config/state_section.h"
 #include "config/words.h"
 #include "tables/table_file.h"
@@ -25,24 +25,14 @@ namespace {
 
 using tables::TomlReader;
 
-constexpr std::size_t kMaxName = 63;
-constexpr std::string_view kNameRule = "1..63 characters of A-Z a-z 0-9 _ . -, the first one no -";
 // A prefix becomes the beginning of LCM channel names, which have 63 characters at most.
 constexpr std::size_t kMaxPrefix = 48;
 constexpr std::string_view kPrefixRule =
     "1..48 characters of A-Z a-z 0-9 _ . -, the first one no -";
 
-// On a command line what begins with - is an option, or a number of steps.
-bool is_name(std::string_view text, std::size_t longest) {
-  return !text.empty() && text.size() <= longest && text.front() != '-' &&
-         std::all_of(text.begin(), text.end(), [](char c) {
-           return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') ||
-                  c == '_' || c == '.' || c == '-';
-         });
-}
-
 Result<std::string> read_name(const TomlReader& reader, std::string_view key = "name",
-                              std::size_t longest = kMaxName, std::string_view rule = kNameRule) {
+                              std::size_t longest = kLongestName,
+                              std::string_view rule = kNameRule) {
   auto name = reader.string(key, rule);
   if (!name || is_name(*name, longest)) return name;
   return refuse(reader, key, *name, rule);
@@ -86,13 +76,6 @@ class Taken {
  private:
   std::map<std::string, int> lines_;
 };
-
-// "Theta" and "theta" are two motors to a program, and one to people.
-std::string lower_case(std::string text) {
-  std::ranges::transform(text, text.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 template <class T, class Key>
 std::string known(const std::vector<T>& elements, Key key) {
@@ -448,11 +431,34 @@ Result<void> read_motors(Loading* loading) {
   return {};
 }
 
+Result<void> read_pseudos(const std::vector<TomlReader>& readers, Loading* loading) {
+  Taken names;  // beside those of motors, for they are told apart by nothing else
+  Config& config = loading->config;
+  for (std::size_t i = 0; i < config.motors.size(); ++i) {
+    const std::string& name = config.motors[i].name;
+    if (auto taken = names.take(loading->motors[i], "name", lower_case(name), name); !taken) {
+      return taken;
+    }
+  }
+  for (const TomlReader& reader : readers) {
+    auto pseudo = read_pseudo(reader, config);
+    if (!pseudo) return fail(pseudo.error());
+    for (const PseudoAxis& axis : pseudo->axes) {
+      if (auto taken = names.take(reader, "name", lower_case(axis.name), axis.name); !taken) {
+        return taken;
+      }
+    }
+    config.pseudos.push_back(std::move(*pseudo));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> read_sections(const TomlReader& root, Loading* loading) {
   const std::string& file = loading->config.path;
-  if (auto known = root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor"}); !known)
+  if (auto known = root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor", "pseudo"});
+      !known)
     return known;
   if (auto read = read_lcm(root, &loading->config); !read) return read;
   if (auto read = read_control(root, &loading->config); !read) return read;
@@ -471,7 +477,10 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
   if (auto read = read_buses(loading); !read) return read;
   if (auto read = read_mcus(*mcus, &loading->config); !read) return read;
   if (auto read = read_groups(loading); !read) return read;
-  return read_motors(loading);
+  const auto pseudos = read_array(root, file, "pseudo", false);
+  if (!pseudos) return fail(pseudos.error());
+  if (auto read = read_motors(loading); !read) return read;
+  return read_pseudos(*pseudos, loading);
 }
 
 }  // namespace bushd::config

@@ -22,6 +22,7 @@ class TomlReader {
 
   bool has(std::string_view key) const { return table_->contains(key); }
   bool is_string(std::string_view key) const { return (*table_)[key].is_string(); }
+  bool is_array(std::string_view key) const { return (*table_)[key].is_array(); }
   // The sub-table under `key`, or null.
   const toml::table* table(std::string_view key) const { return (*table_)[key].as_table(); }
 
