@@ -28,7 +28,8 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       drivers_(installation_, interlocks_, emergency_stop_),
       trigger_(installation_, interlocks_, moves_, open_moves_),
       position_compare_(installation_),
-      state_(installation_, outputs),
+      pseudo_axes_(installation_),
+      state_(installation_, pseudo_axes_, outputs),
       departures_(
           installation_, interlocks_, kept_, idle_drivers_,
           [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
@@ -88,7 +89,10 @@ void Core::receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t>
   supervisor_.handle_events(now_us, installation_[bus]);
 }
 
-void Core::request(std::int64_t now, const api::Asker& asker, const api::Request& request) {
+void Core::request(std::int64_t now, const api::Asker& asker, const api::Request& as_asked) {
+  const auto of_motors = pseudo_axes_.of_motors(as_asked);
+  if (!of_motors) return asker.answer(api::Refused{of_motors.error().text()});
+  const api::Request& request = *of_motors ? **of_motors : as_asked;
   // Whoever stops motors stops those as well that are about to begin.
   departures_.cancel_by(request);
   if (!departures_.hold(now, asker, request)) carry_out(now, asker, request);

@@ -30,6 +30,7 @@
 #include "daemon/services/pauses.h"
 #include "daemon/services/position_compare.h"
 #include "daemon/services/positions.h"
+#include "daemon/services/pseudo_axes.h"
 #include "daemon/services/state_publisher.h"
 #include "daemon/services/stops.h"
 #include "daemon/services/tables_in_service.h"
@@ -108,6 +109,7 @@ class Core {
   Drivers drivers_;
   Trigger trigger_;
   PositionCompare position_compare_;
+  PseudoAxes pseudo_axes_;
   StatePublisher state_;
   Departures departures_;
   HealthPublisher health_;

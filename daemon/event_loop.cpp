@@ -41,7 +41,7 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
       store_(store),
       run_(new_run()),
       core_(config, *this, master_number(run_)),
-      publishing_(run_, config.mcus.size(), config.buses.size(),
+      publishing_(run_, config.state_parts(), config.buses.size(),
                   {.now_us = now_us, .unix_us = unix_time_us}),
       reception_([this](const api::Asker& asker, const api::Request& request) {
         core_.request(now_us(), with_log(asker, request), request);
@@ -400,7 +400,8 @@ void EventLoop::send(BusId bus, std::span<const std::uint8_t> bytes) {
 }
 
 void EventLoop::publish(McuId mcu, const api::StateSnapshot& state) {
-  if (std::exchange(mcu_states_[mcu], state.state) != state.state) {
+  const bool computed = mcu.value >= config_.mcus.size();
+  if (!computed && std::exchange(mcu_states_[mcu], state.state) != state.state) {
     tell_status(status_text(config_, mcu_states_));
   }
   publishing_.publish(mcu, state);

@@ -21,8 +21,12 @@ bool moves(const api::StateSnapshot& state) {
 
 }  // namespace
 
-Publishing::Publishing(std::int64_t run, std::size_t mcus, std::size_t buses, Clocks clocks)
-    : run_(run), clocks_(std::move(clocks)), states_(mcus), descriptions_(mcus), healths_(buses) {}
+Publishing::Publishing(std::int64_t run, std::size_t state_parts, std::size_t buses, Clocks clocks)
+    : run_(run),
+      clocks_(std::move(clocks)),
+      states_(state_parts),
+      descriptions_(state_parts),
+      healths_(buses) {}
 
 lcm::Part Publishing::part(std::size_t index, std::size_t parts) {
   return {.utime_us = clocks_.unix_us(),

@@ -36,7 +36,7 @@ class Publishing : public api::Publisher {
   // Lets the core publish the state as it is now.
   using Refresh = std::function<void()>;
   // `run` tells this run of the daemon from others.
-  Publishing(std::int64_t run, std::size_t mcus, std::size_t buses, Clocks clocks);
+  Publishing(std::int64_t run, std::size_t state_parts, std::size_t buses, Clocks clocks);
 
   // Outlives this.
   void add(Listener& listener) { listeners_.push_back(&listener); }

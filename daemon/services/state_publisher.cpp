@@ -66,9 +66,10 @@ void show_inputs(const link::McuView& view, const config::MotorInputs& inputs,
 
 }  // namespace
 
-StatePublisher::StatePublisher(Installation& installation, Outputs& outputs)
-    : installation_(installation), outputs_(outputs) {
-  for ([[maybe_unused]] const McuId mcu : installation.mcus()) described_.add();
+StatePublisher::StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes,
+                               Outputs& outputs)
+    : installation_(installation), pseudo_axes_(pseudo_axes), outputs_(outputs) {
+  for (std::size_t i = 0; i < installation.config().state_parts(); ++i) described_.add();
 }
 
 void StatePublisher::step(std::int64_t now_us) {
@@ -77,7 +78,17 @@ void StatePublisher::step(std::int64_t now_us) {
 }
 
 void StatePublisher::publish_all(std::int64_t now_us) {
-  for (const McuId mcu : installation_.mcus()) publish(now_us, installation_[mcu]);
+  for (const McuId id : installation_.mcus()) {
+    const Mcu& mcu = installation_[id];
+    publish(now_us, id, description_of(mcu), state_of(mcu));
+  }
+  const auto of_motor = [this](MotorId motor) {
+    return state_of(installation_.mcu_of(motor), installation_[motor]);
+  };
+  for (std::size_t i = 0; i < pseudo_axes_.size(); ++i) {
+    publish(now_us, McuId{installation_.config().mcus.size() + i}, pseudo_axes_.description(i),
+            pseudo_axes_.state(i, of_motor));
+  }
   installation_.changed = false;
   sent_us_ = now_us;
   due_us_ = now_us + kPeriodUs;
@@ -87,14 +98,14 @@ std::int64_t StatePublisher::next_wake_us() const {
   return installation_.changed ? std::min(due_us_, sent_us_ + kMinPeriodUs) : due_us_;
 }
 
-void StatePublisher::publish(std::int64_t now_us, const Mcu& mcu) {
-  Described& described = described_[mcu.id];
-  api::Description description = description_of(mcu);
+void StatePublisher::publish(std::int64_t now_us, McuId part, api::Description description,
+                             const api::StateSnapshot& state) {
+  Described& described = described_[part];
   if (now_us >= described.due_us || description != described.last) {
-    outputs_.publish(mcu.id, description);
+    outputs_.publish(part, description);
     described = {.last = std::move(description), .due_us = now_us + kDescriptionPeriodUs};
   }
-  outputs_.publish(mcu.id, state_of(mcu));
+  outputs_.publish(part, state);
 }
 
 api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& motor) const {

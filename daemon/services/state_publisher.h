@@ -7,6 +7,7 @@
 
 #include "daemon/installation.h"
 #include "daemon/outputs.h"
+#include "daemon/services/pseudo_axes.h"
 
 namespace bushd::daemon {
 
@@ -19,7 +20,7 @@ class StatePublisher {
   // Passed on to clients every few seconds only (Publishing).
   static constexpr std::int64_t kDescriptionPeriodUs = 500'000;
 
-  StatePublisher(Installation& installation, Outputs& outputs);
+  StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes, Outputs& outputs);
 
   void step(std::int64_t now_us);
   // As it is now, whether due or not.
@@ -30,15 +31,17 @@ class StatePublisher {
   api::StateSnapshot state_of(const Mcu& mcu) const;
   api::MotorState state_of(const Mcu& mcu, const motion::Motor& motor) const;
   api::Description description_of(const Mcu& mcu) const;
-  void publish(std::int64_t now_us, const Mcu& mcu);
+  void publish(std::int64_t now_us, McuId part, api::Description description,
+               const api::StateSnapshot& state);
 
   struct Described {
     std::optional<api::Description> last;
     std::int64_t due_us = 0;
   };
   Installation& installation_;
+  const PseudoAxes& pseudo_axes_;
   Outputs& outputs_;
-  ById<McuId, Described> described_;
+  ById<McuId, Described> described_;  // then computed axes
   std::int64_t due_us_ = 0;
   std::int64_t sent_us_ = INT64_MIN / 2;
 };

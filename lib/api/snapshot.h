@@ -39,10 +39,11 @@ struct MotorState {
   friend bool operator==(const MotorState&, const MotorState&) = default;
 };
 
-// One MCU and its motors.
+// One MCU and its motors. Or axes that are computed from motors: their positions are those of `user`,
+// and their steps count the last decimal that people are shown.
 struct StateSnapshot {
   std::string bus{};
-  std::string mcu{};  // "<bus>:<address>"
+  std::string mcu{};  // "<bus>:<address>", or "<bus>:<name of the first axis>"
   McuState state = McuState::kOffline;
   std::string detail{};   // cause of kOffline or kFault, else ""
   std::string inputs{};   // active ones: of emergency, forward, reverse, trigger, blanks between
@@ -66,7 +67,7 @@ struct MotorDescription {
 struct Description {
   std::string bus{};
   std::string mcu{};
-  std::int32_t address = 0;
+  std::int32_t address = 0;  // 0: axes that are computed from motors
   std::int64_t tick_ns = 0;
   StopMode emergency_stop = StopMode::kRamp;
   std::vector<MotorDescription> motors{};  // by output
@@ -116,7 +117,7 @@ class Publisher {
  public:
   virtual ~Publisher() = default;
   // `mcu` numbers the snapshots of one kind from 0, `bus` likewise: each one replaces the one
-  // before of its number.
+  // before of its number. Numbers beyond those of MCUs are of computed axes.
   virtual void publish(McuId mcu, const StateSnapshot& state) = 0;
   virtual void publish(McuId mcu, const Description& description) = 0;
   virtual void publish(BusId bus, const HealthSnapshot& health) = 0;

@@ -164,6 +164,9 @@ struct Config {
   std::vector<Motor> motors;
   std::vector<Pseudo> pseudos{};
 
+  // States are published by MCU, and then by section of computed axes.
+  std::size_t state_parts() const { return mcus.size() + pseudos.size(); }
+
   const Bus& operator[](BusId id) const { return buses[id.value]; }
   const Mcu& operator[](McuId id) const { return mcus[id.value]; }
   const Group& operator[](GroupId id) const { return groups[id.value]; }

@@ -27,7 +27,7 @@ DaemonRun::DaemonRun(const bushd::config::Config& config, daemon::Outputs& outpu
       prefix_(config.lcm.prefix + "_"),
       transport_(std::move(*lcm::Transport::open("memq://"))),
       core_(config, outputs, static_cast<std::uint16_t>(run)),
-      publishing_(run, config.mcus.size(), config.buses.size(),
+      publishing_(run, config.state_parts(), config.buses.size(),
                   {.now_us = ears_.now_us, .unix_us = ears_.now_us}),
       reception_([this](const bushd::api::Asker& asker, const bushd::api::Request& request) {
         core_.request(ears_.now_us(), ears_.carry_out(asker, request), request);

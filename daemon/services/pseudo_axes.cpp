@@ -1,0 +1,318 @@
+#include "daemon/services/pseudo_axes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/overloaded.h"
+
+namespace bushd::daemon {
+namespace {
+
+std::vector<double> positions_of(const config::PseudoLaw& law, const std::vector<double>& motors) {
+  return std::visit(
+      Overloaded{[&](const pseudo::LinearAxes& axes) { return axes.positions(motors); },
+                 [&](const pseudo::CurvedAxis& axis) { return std::vector{axis.position(motors)}; }},
+      law);
+}
+
+Result<std::vector<double>> motors_for(const config::PseudoLaw& law,
+                                       const std::vector<double>& positions,
+                                       const std::vector<double>& motors_now) {
+  return std::visit(Overloaded{[&](const pseudo::LinearAxes& axes) -> Result<std::vector<double>> {
+                                 return axes.motors_for(positions, motors_now);
+                               },
+                               [&](const pseudo::CurvedAxis& axis) {
+                                 return axis.motors_for(positions.front());
+                               }},
+                    law);
+}
+
+std::int64_t counts_per_unit(const config::PseudoAxis& axis) {
+  std::int64_t counts = 1;
+  for (int i = 0; i < axis.decimals; ++i) counts *= 10;
+  return counts;
+}
+
+std::int64_t counts_of(const config::PseudoAxis& axis, double position) {
+  const double counts = position * static_cast<double>(counts_per_unit(axis));
+  constexpr double kMost = 9e18;
+  return std::llround(std::clamp(counts, -kMost, kMost));
+}
+
+// What all motors know well enough, the worst last.
+int rank(api::Trust trust) {
+  switch (trust) {
+    case api::Trust::kKnown:
+      return 0;
+    case api::Trust::kRestored:
+      return 1;
+    case api::Trust::kStale:
+      return 2;
+    case api::Trust::kUncertain:
+      return 3;
+    case api::Trust::kUnknown:
+      break;
+  }
+  return 4;
+}
+
+std::string text_of(const config::PseudoAxis& axis, double position) {
+  return fmt::format("{:.{}f} {}", position, axis.decimals, axis.unit);
+}
+
+// Of all motors together, but for the position.
+void take_worst(api::MotorState& all, const api::MotorState& motor) {
+  if (motor.activity != api::Activity::kResting) all.activity = api::Activity::kMoving;
+  all.moving = all.moving || motor.moving;
+  all.enabled = all.enabled && motor.enabled;
+  all.input = all.input || motor.input;
+  all.paused = all.paused || motor.paused;
+  all.held = all.held || motor.held;
+  if (rank(motor.trust) <= rank(all.trust)) return;
+  all.trust = motor.trust;
+  all.uncertain_reason = motor.name + ": " + motor.uncertain_reason;
+  all.heard_utime_us = motor.heard_utime_us;
+}
+
+}  // namespace
+
+std::optional<PseudoAxes::Place> PseudoAxes::find(const std::string& name) const {
+  const std::vector<config::Pseudo>& pseudos = installation_.config().pseudos;
+  for (std::size_t i = 0; i < pseudos.size(); ++i) {
+    const auto axis = std::ranges::find(pseudos[i].axes, name, &config::PseudoAxis::name);
+    if (axis == pseudos[i].axes.end()) continue;
+    return Place{.pseudo = i, .axis = static_cast<std::size_t>(axis - pseudos[i].axes.begin())};
+  }
+  return std::nullopt;
+}
+
+std::string PseudoAxes::motors_text(const config::Pseudo& pseudo) const {
+  std::string text;
+  for (const MotorId motor : pseudo.motors) {
+    text += (text.empty() ? "" : ", ") + installation_[motor].name();
+  }
+  return text;
+}
+
+Result<std::optional<api::Request>> PseudoAxes::of_motors(const api::Request& request) const {
+  using Answer = Result<std::optional<api::Request>>;
+  if (size() == 0) return std::nullopt;
+  // Stops and holds are those of its motors.
+  const auto named = [this](auto copy) -> Answer {
+    api::MotorNames names;
+    bool any = false;
+    for (std::string& name : copy.motors) {
+      const auto place = find(name);
+      if (!place) {
+        names.push_back(std::move(name));
+        continue;
+      }
+      any = true;
+      for (const MotorId motor : installation_.config().pseudos[place->pseudo].motors) {
+        names.push_back(installation_[motor].name());
+      }
+    }
+    if (!any) return std::nullopt;
+    std::ranges::sort(names);
+    names.erase(std::unique(names.begin(), names.end()), names.end());
+    copy.motors = std::move(names);
+    return api::Request(std::move(copy));
+  };
+  const auto refuse = [this](const std::string& name) -> Answer {
+    const auto place = find(name);
+    if (!place) return std::nullopt;
+    return fail(fmt::format("{} is computed from motors {}; name these", name,
+                            motors_text(installation_.config().pseudos[place->pseudo])));
+  };
+  return std::visit(
+      Overloaded{[&](const api::Move& move) -> Answer {
+                   const auto is_computed = [this](const api::MotorAmount& amount) {
+                     return find(amount.motor).has_value();
+                   };
+                   if (!std::ranges::any_of(move.motors, is_computed)) return std::nullopt;
+                   auto asked = of_motors(move);
+                   if (!asked) return fail(asked.error());
+                   return std::move(*asked);
+                 },
+                 [&](const api::Stop& r) { return named(r); },
+                 [&](const api::Pause& r) { return named(r); },
+                 [&](const api::Resume& r) { return named(r); },
+                 [&](const api::Hold& r) { return named(r); },
+                 [&](const api::Release& r) { return named(r); },
+                 [&](const api::Jog& r) { return refuse(r.motor); },
+                 [&](const auto& r) -> Answer {
+                   if constexpr (requires { r.motors.front().motor; }) {
+                     for (const auto& one : r.motors) {
+                       if (auto refused = refuse(one.motor); !refused) return refused;
+                     }
+                   } else if constexpr (requires { api::MotorNames(r.motors); }) {
+                     for (const auto& name : r.motors) {
+                       if (auto refused = refuse(name); !refused) return refused;
+                     }
+                   }
+                   return std::nullopt;
+                 }},
+      request);
+}
+
+Result<std::vector<double>> PseudoAxes::positions_asked(const api::Move& move,
+                                                        const config::Pseudo& pseudo,
+                                                        const std::vector<double>& motors) const {
+  std::vector<double> positions = positions_of(pseudo.law, motors);
+  for (const api::MotorAmount& amount : move.motors) {
+    const auto place = find(amount.motor);
+    const config::Pseudo* its =
+        place ? &installation_.config().pseudos[place->pseudo] : nullptr;
+    if (its != &pseudo) {
+      return fail(fmt::format("{} does not go with the axes that are computed from {}; move it by a "
+                              "request of its own",
+                              amount.motor, motors_text(pseudo)));
+    }
+    const config::PseudoAxis& axis = pseudo.axes[place->axis];
+    const auto* steps = std::get_if<std::int64_t>(&amount.amount);
+    const double asked = steps != nullptr ? static_cast<double>(*steps) /
+                                                static_cast<double>(counts_per_unit(axis))
+                                          : std::get<api::UserUnits>(amount.amount).value;
+    double& position = positions[place->axis];
+    position = move.kind == api::Move::Kind::kAbsolute ? asked : position + asked;
+    if (!std::isfinite(position)) return fail(axis.name + ": a target that is not finite");
+    const auto& limits = axis.soft_limits;
+    if (!limits || (position >= limits->low && position <= limits->high)) continue;
+    return fail(fmt::format("{}: target {} is beyond the soft limit at {}; allowed: {} to {}",
+                            axis.name, text_of(axis, position),
+                            text_of(axis, position < limits->low ? limits->low : limits->high),
+                            text_of(axis, limits->low), text_of(axis, limits->high)));
+  }
+  return positions;
+}
+
+Result<api::Request> PseudoAxes::of_motors(const api::Move& move) const {
+  const auto is_computed = [this](const api::MotorAmount& amount) {
+    return find(amount.motor).has_value();
+  };
+  const auto first = std::ranges::find_if(move.motors, is_computed);
+  const config::Pseudo& pseudo = installation_.config().pseudos[find(first->motor)->pseudo];
+  std::vector<double> now;
+  for (const MotorId motor : pseudo.motors) {
+    now.push_back(installation_[motor].coordinates().user_of(installation_[motor].target_steps()));
+  }
+  const auto positions = positions_asked(move, pseudo, now);
+  if (!positions) return fail(positions.error());
+  const auto motors = motors_for(pseudo.law, *positions, now);
+  if (!motors) return fail(first->motor + ": " + motors.error().message);
+
+  api::MoveLine line{.kind = api::Move::Kind::kAbsolute, .motors = {}, .dry_run = move.dry_run};
+  double longest = 0;  // way of a motor, in its unit
+  for (std::size_t j = 0; j < motors->size(); ++j) {
+    const motion::Motor& motor = installation_[pseudo.motors[j]];
+    const auto steps = motor.coordinates().steps_of_user((*motors)[j]);
+    if (!steps) return fail(motor.name() + ": " + steps.error().message);
+    longest = std::max(longest, std::abs((*motors)[j] - now[j]));
+    if (*steps != motor.target_steps()) line.motors.push_back({motor.name(), *steps});
+  }
+  // Where it stands already; its first motor says so.
+  if (line.motors.empty()) {
+    const motion::Motor& motor = installation_[pseudo.motors.front()];
+    line.motors.push_back({motor.name(), motor.target_steps()});
+  }
+  if (move.speed) {
+    if (move.speed->in_steps) {
+      return fail(first->motor + ": a computed axis has no steps; give its speed in its unit");
+    }
+    // The share of the way that each axis may make in a second.
+    const std::vector<double> before = positions_of(pseudo.law, now);
+    double farthest = 0;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      farthest = std::max(farthest, std::abs((*positions)[i] - before[i]));
+    }
+    line.speed = move.speed;
+    if (farthest > 0 && longest > 0) line.speed->per_s *= longest / farthest;
+  }
+  if (line.motors.size() > 1) return api::Request(std::move(line));
+  return api::Request(api::Move{.kind = line.kind,
+                                .motors = std::move(line.motors),
+                                .dry_run = line.dry_run,
+                                .speed = line.speed});
+}
+
+api::StateSnapshot PseudoAxes::state(std::size_t index, const StateOf& state_of) const {
+  const config::Pseudo& pseudo = installation_.config().pseudos[index];
+  const Mcu& mcu = installation_.mcu_of(pseudo.motors.front());
+  api::StateSnapshot snapshot;
+  snapshot.bus = installation_.bus_of(mcu).config.name;
+  snapshot.mcu = snapshot.bus + ":" + pseudo.axes.front().name;
+  snapshot.state = api::McuState::kReady;
+  api::MotorState all;
+  all.enabled = true;
+  std::vector<double> positions;
+  std::vector<double> targets;
+  std::vector<double> later;  // by the speeds of now
+  constexpr double kLaterS = 1e-3;
+  for (const MotorId id : pseudo.motors) {
+    const api::MotorState motor = state_of(id);
+    const motion::Motor& of = installation_[id];
+    positions.push_back(motor.user);
+    targets.push_back(motor.user_target);
+    const double way = of.coordinates().user_of(1) - of.coordinates().user_of(0);
+    later.push_back(motor.user + way * motor.velocity_steps_per_s * kLaterS);
+    take_worst(all, motor);
+    if (!installation_.mcu_of(id).online()) snapshot.state = api::McuState::kOffline;
+    if (motor.moving && snapshot.state == api::McuState::kReady) {
+      snapshot.state = api::McuState::kRunning;
+    }
+  }
+  const auto* curved = std::get_if<pseudo::CurvedAxis>(&pseudo.law);
+  if (curved != nullptr && !curved->is_within(positions) &&
+      rank(all.trust) < rank(api::Trust::kUncertain)) {
+    all.trust = api::Trust::kUncertain;
+    all.uncertain_reason =
+        installation_[pseudo.motors.front()].name() + " stands beyond the calibration";
+  }
+  positions = positions_of(pseudo.law, positions);
+  targets = positions_of(pseudo.law, targets);
+  later = positions_of(pseudo.law, later);
+  for (std::size_t i = 0; i < pseudo.axes.size(); ++i) {
+    const config::PseudoAxis& axis = pseudo.axes[i];
+    api::MotorState state = all;
+    state.name = axis.name;
+    state.user = state.dial = positions[i];
+    state.user_target = targets[i];
+    const bool known = state.trust != api::Trust::kUnknown;
+    state.position_steps = known ? counts_of(axis, positions[i]) : 0;
+    state.target_steps = known ? counts_of(axis, targets[i]) : 0;
+    state.velocity_steps_per_s = (later[i] - positions[i]) / kLaterS *
+                                 static_cast<double>(counts_per_unit(axis));
+    snapshot.motors.push_back(std::move(state));
+  }
+  return snapshot;
+}
+
+api::Description PseudoAxes::description(std::size_t index) const {
+  const config::Pseudo& pseudo = installation_.config().pseudos[index];
+  const config::Bus& bus = installation_.bus_of(installation_.mcu_of(pseudo.motors.front())).config;
+  api::Description description{.bus = bus.name,
+                               .mcu = bus.name + ":" + pseudo.axes.front().name,
+                               .address = 0,
+                               .tick_ns = bus.tick_ns(),
+                               .emergency_stop = api::StopMode::kRamp,
+                               .motors = {}};
+  for (std::size_t i = 0; i < pseudo.axes.size(); ++i) {
+    const config::PseudoAxis& axis = pseudo.axes[i];
+    description.motors.push_back(
+        {.name = axis.name,
+         .output = static_cast<std::uint8_t>(i),
+         .group = {},
+         .table = {},
+         .text = "computed from " + motors_text(pseudo),
+         .scale = {.unit = axis.unit,
+                   .steps_per_unit = {.numerator = counts_per_unit(axis), .denominator = 1},
+                   .decimals = axis.decimals},
+         .soft_limits = axis.soft_limits});
+  }
+  return description;
+}
+
+}  // namespace bushd::daemon
