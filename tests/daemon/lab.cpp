@@ -335,7 +335,7 @@ Answer Lab::wait(std::int64_t number, double limit_s) {
 }
 
 bool Lab::all_ready() const {
-  if (states_.size() != config_.mcus.size()) return false;
+  if (states_.size() != config_.state_parts()) return false;
   return std::all_of(states_.begin(), states_.end(),
                      [](const auto& entry) { return entry.second.state == api::McuState::kReady; });
 }
@@ -348,6 +348,10 @@ void Lab::connect() {
   for (const auto& [mcu, state] : states_) {
     for (const api::MotorState& motor : state.motors) {
       if (motor.activity != api::Activity::kResting) continue;
+      if (std::ranges::find(config_.motors, motor.name, &config::Motor::name) ==
+          config_.motors.end()) {
+        continue;  // computed
+      }
       motors.push_back(motor.name);
       steps.push_back(motor.position_steps);
     }

@@ -188,11 +188,13 @@ std::vector<std::string> table(const Status& status) {
   mcus.row({"MCU", "STATE", "BOOT", "DETAIL"});
   for (std::size_t i = 0; i < status.states.size(); ++i) {
     const api::StateSnapshot& mcu = status.states[i].snapshot;
+    const bool is_mcu = status.descriptions.at(i).snapshot.address != 0;
     for (std::size_t m = 0; m < mcu.motors.size(); ++m) {
       const api::MotorState& motor = mcu.motors[m];
       const auto description = description_of(status.descriptions.at(i).snapshot, m, motor.name);
       motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
-                  fmt::to_string(description.output), bushd::printable(description.group),
+                  is_mcu ? fmt::to_string(description.output) : std::string("-"),
+                  bushd::printable(description.group),
                   text_of(description.table),
                   position_text(motor, motor.position_steps, motor.user, description.scale),
                   position_text(motor, motor.target_steps, motor.user_target, description.scale),
@@ -200,6 +202,7 @@ std::vector<std::string> table(const Status& status) {
                   range_text(motor, description), std::string(word(motor.trust)),
                   notes_text(motor)});
     }
+    if (!is_mcu) continue;
     mcus.row({bushd::printable(mcu.mcu), std::string(word(mcu.state)), fmt::to_string(mcu.boot),
               bushd::printable(mcu.detail)});
   }
@@ -264,7 +267,7 @@ std::string json(const Status& status) {
       out["motors"].push_back(
           motor_json(mcu.motors[m], mcu.mcu, description_of(description, m, mcu.motors[m].name)));
     }
-    out["mcus"].push_back(mcu_json(mcu, description));
+    if (description.address != 0) out["mcus"].push_back(mcu_json(mcu, description));
   }
   // Texts from the network need not be UTF-8; by default dump() throws then.
   return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
