@@ -78,7 +78,8 @@ TEST(RunPlan, RampsDownOnceOnly) {
     const std::vector<uint16_t> delays = delays_left(run);
     bushd_run_ramp_down_once(&run);
     RC_ASSERT(delays_left(run) == delays);
-    for (size_t i = 1; i < delays.size(); ++i) RC_ASSERT(delays[i] >= delays[i - 1]);
+    // The running step may be slower than the decelerating side begins.
+    for (size_t i = 2; i < delays.size(); ++i) RC_ASSERT(delays[i] >= delays[i - 1]);
   });
 }
 
