@@ -66,12 +66,13 @@ def dependencies(files):
 
 
 def mirror():
+    """From where this PC has its packages; none named: debootstrap knows one."""
     for file in [pathlib.Path("/etc/apt/sources.list"), *pathlib.Path("/etc/apt/sources.list.d").glob("*")]:
         text = file.read_text() if file.is_file() else ""
         found = re.search(r"^deb (?:\[.*?\] )?(\S*debian\S*)", text, re.MULTILINE) or re.search(r"^URIs: (\S*debian\S*)", text, re.MULTILINE)
         if found:
-            return found[1]
-    return "http://deb.debian.org/debian"
+            return [found[1]]
+    return []
 
 
 def in_root(root, *command):
@@ -87,7 +88,7 @@ def make_debian():
         WORK.mkdir(parents=True, exist_ok=True)
         making = WORK / "debian.making"
         shutil.rmtree(making, ignore_errors=True)
-        sh("debootstrap", "--variant=minbase", f"--include={BASE_PACKAGES}", "bookworm", making, mirror())
+        sh("debootstrap", "--variant=minbase", f"--include={BASE_PACKAGES}", "bookworm", making, *mirror())
         making.rename(debian)
     return debian
 
