@@ -23,6 +23,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       stops_(installation_, moves_, homing_, open_moves_),
       jogs_(installation_, interlocks_, moves_, open_moves_),
       pauses_(installation_, interlocks_, moves_, open_moves_),
+      lines_(installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_),
       emergency_stop_(installation_, interlocks_, homing_, open_moves_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
@@ -42,7 +43,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       // What an MCU's positions are worth comes before whoever goes by that.
       services_{&kept_,   &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,
                 &stops_,  &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_,
-                &tables_, &departures_,     &jogs_,    &pauses_,    &settings_},
+                &tables_, &departures_,     &jogs_,    &pauses_,    &lines_,   &settings_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener(
@@ -124,6 +125,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::Hold& r) { pauses_.request(now, asker, r); },
                  [&](const api::Release& r) { pauses_.request(now, asker, r); },
                  [&](const api::Configure& r) { settings_.request(asker, r); },
+                 [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
              },
              request);
 }

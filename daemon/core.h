@@ -23,6 +23,7 @@
 #include "daemon/services/jogs.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/kept_positions.h"
+#include "daemon/services/lines.h"
 #include "daemon/services/link_faults.h"
 #include "daemon/services/motor_settings.h"
 #include "daemon/services/moves.h"
@@ -104,6 +105,7 @@ class Core {
   Stops stops_;
   Jogs jogs_;
   Pauses pauses_;
+  Lines lines_;
   EmergencyStop emergency_stop_;
   LinkFaults link_faults_;
   Drivers drivers_;

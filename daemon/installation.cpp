@@ -130,6 +130,22 @@ std::vector<McuId> Installation::mcus_of(const std::vector<MotorId>& motors) con
   return {mcus.begin(), mcus.end()};
 }
 
+std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const {
+  std::set<std::uint64_t> lines;
+  for (const MotorId id : motors) {
+    const auto* on_line = motors_[id].as<motion::OnLine>();
+    if (on_line != nullptr) lines.insert(on_line->line);
+  }
+  if (lines.empty()) return motors;
+  std::set<MotorId> named(motors.begin(), motors.end());
+  for (const MotorId id : motors_.ids()) {
+    const auto* on_line = motors_[id].as<motion::OnLine>();
+    if (on_line == nullptr || !lines.contains(on_line->line)) continue;
+    if (named.insert(id).second) motors.push_back(id);
+  }
+  return motors;
+}
+
 bool Installation::any_moves(const Mcu& mcu) const {
   return std::ranges::any_of(
       mcu.motors(), [this](MotorId motor) { return !motors_[motor].is<motion::Resting>(); });

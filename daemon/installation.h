@@ -153,7 +153,9 @@ class Installation {
   const Mcu& mcu_of(MotorId id) const { return mcus_[config_[id].mcu]; }
   const Bus& bus_of(const Mcu& mcu) const { return *buses_[mcu.config.bus]; }
   std::vector<McuId> mcus_of(const std::vector<MotorId>& motors) const;  // each once, in order
-  bool any_moves(const Mcu& mcu) const;                                  // or is not at rest
+  // With those that move on a line with one of them.
+  std::vector<MotorId> with_lines(std::vector<MotorId> motors) const;
+  bool any_moves(const Mcu& mcu) const;  // or is not at rest
   // The MCU gets such a move as a whole and runs it by the motor's table.
   bool by_table(const Mcu& mcu, std::int64_t steps) const;
 

@@ -22,6 +22,8 @@ void put_motors(nlohmann::json& line, const auto& request) {
 bool is_logged(const api::Request& request) {
   const auto* move = std::get_if<api::Move>(&request);
   if (move != nullptr) return !move->dry_run;
+  const auto* line = std::get_if<api::MoveLine>(&request);
+  if (line != nullptr) return !line->dry_run;
   const auto* jog = std::get_if<api::Jog>(&request);
   if (jog != nullptr) return !jog->renew;
   return api::is_stop(request) || !api::is_repeatable(request);

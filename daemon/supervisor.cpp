@@ -62,7 +62,7 @@ void Supervisor::replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outp
   for (const MotorId motor : mcu.motors()) {
     if ((outputs >> installation_[motor].output().value & 1) != 0) again.push_back(motor);
   }
-  moves_.replan(now_us, again);
+  moves_.plan_again(now_us, again);
 }
 
 void Supervisor::goes_online(std::int64_t now_us, Mcu& mcu) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iterator>
+#include <utility>
 
 #include "tables/move_time.h"
 
@@ -23,6 +24,15 @@ api::MovePlan::Motor plan_of(const std::string& name, bushd_table table, std::in
           steps == 0 ? 0.0 : 1e9 / (static_cast<double>(time.fastest_code) * table.time_unit_ns)};
 }
 
+// As long as the run, which is as fast as its share of it.
+api::MovePlan::Motor plan_of_line(const std::string& name, const motion::LineShare& share,
+                                  std::int64_t steps, std::uint16_t floor) {
+  api::MovePlan::Motor plan = plan_of(name, share.table->view(), share.longest, floor);
+  plan.steps = steps;
+  plan.peak_steps_per_s *= static_cast<double>(share.increment) / share.longest;
+  return plan;
+}
+
 }  // namespace
 
 motion::Axis* DryRun::Bus::axis_of(link::McuIndex mcu, Output output) {
@@ -31,9 +41,11 @@ motion::Axis* DryRun::Bus::axis_of(link::McuIndex mcu, Output output) {
 }
 
 DryRun::DryRun(const Installation& installation, std::int64_t now_us,
-               const std::vector<Part>& parts) {
+               const std::vector<Part>& parts, std::string limited_by) {
+  plan_.limited_by = std::move(limited_by);
   motors_.reserve(parts.size());
-  for (const auto& [id, steps, floor, from_steps] : parts) {
+  link::Tick of_lines = INT64_MIN;
+  for (const auto& [id, steps, floor, from_steps, line] : parts) {
     const motion::Motor& motor = installation[id];
     const Mcu& mcu = installation.mcu_of(id);
     const config::Bus& bus = installation.bus_of(mcu).config;
@@ -45,13 +57,16 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                        .steps = steps,
                        .floor = floor,
                        .start = mcu.earliest_start(now_us, motor.output()),
-                       .by_table = installation.by_table(mcu, steps),
+                       .by_table = !line && installation.by_table(mcu, steps),
                        .tick_ns = bus.tick_ns(),
                        .format = bus.format,
-                       .table = installation.table_of(id)});
+                       .table = installation.table_of(id),
+                       .line = line});
+    if (line) of_lines = std::max(of_lines, motors_.back().start);
     if (steps == 0 || buses_.contains(mcu.config.bus)) continue;
     buses_.try_emplace(mcu.config.bus, installation[mcu.config.bus].master.snapshot(now_us));
   }
+  for (Motor& motor : motors_) motor.start = std::max(motor.start, of_lines);
   rehearsed_ = buses_.begin();
   plan_.traffic.emplace();
 }
@@ -76,10 +91,16 @@ bool DryRun::is_further_leg(std::size_t index) const {
 
 void DryRun::plan_motor(const Motor& motor, bool further_leg) {
   if (!further_leg) of_motor_ = {};
-  plan_.motors.push_back(plan_of(motor.name, motor.table->view(), motor.steps, motor.floor));
+  plan_.motors.push_back(motor.line
+                             ? plan_of_line(motor.name, *motor.line, motor.steps, motor.floor)
+                             : plan_of(motor.name, motor.table->view(), motor.steps, motor.floor));
   if (motor.steps == 0) return;
   motion::Axis axis(motor.table->view(), motor.tick_ns, motor.format);
-  axis.start(motor.from_steps, motor.steps, motor.start, 0, motor.floor);
+  if (motor.line) {
+    axis.start_line(motor.from_steps, *motor.line, motor.start, motor.floor);
+  } else {
+    axis.start(motor.from_steps, motor.steps, motor.start, 0, motor.floor);
+  }
   const link::Tick ticks = axis.end_tick() - motor.start;
   of_motor_.ticks += ticks;
   of_motor_.us += ticks * motor.tick_ns / 1000;
@@ -121,7 +142,7 @@ std::size_t DryRuns::waiting_of(const std::string& client) const {
 }
 
 void DryRuns::request(std::int64_t now_us, const api::Asker& asker,
-                      const std::vector<DryRun::Part>& parts) {
+                      const std::vector<DryRun::Part>& parts, const std::string& limited_by) {
   if (const std::size_t count = waiting_of(asker.session->text()); count >= kMaxPerClient) {
     return asker.answer(api::Refused{std::to_string(count) +
                                      " dry runs of this client wait already; wait for answers"});
@@ -131,7 +152,7 @@ void DryRuns::request(std::int64_t now_us, const api::Asker& asker,
                                      " dry runs wait already; try again in a moment"});
   }
   asker.answer(api::Accepted{});
-  waiting_.emplace_back(asker, installation_, now_us, parts);
+  waiting_.emplace_back(asker, installation_, now_us, parts, limited_by);
 }
 
 void DryRuns::work() {

@@ -27,9 +27,12 @@ class DryRun {
     std::int64_t steps;
     std::uint16_t floor;
     std::optional<std::int64_t> from_steps{};  // none: where it stands
+    std::optional<motion::LineShare> line{};   // of its run, whose floor it is; all start together
   };
   // `installation` outlives it, and may change meanwhile.
-  DryRun(const Installation& installation, std::int64_t now_us, const std::vector<Part>& parts);
+  // `limited_by` as of MovePlan.
+  DryRun(const Installation& installation, std::int64_t now_us, const std::vector<Part>& parts,
+         std::string limited_by = {});
   DryRun(const DryRun&) = delete;
   DryRun& operator=(const DryRun&) = delete;
 
@@ -52,6 +55,7 @@ class DryRun {
     std::uint32_t tick_ns;
     bushd_format format;
     tables::TablePtr table;
+    std::optional<motion::LineShare> line;
   };
   // The motors of one bus.
   struct Bus : AxisSource {
@@ -92,8 +96,8 @@ class DryRuns {
   explicit DryRuns(const Installation& installation) : installation_(installation) {}
 
   // Refuses one too many. Precondition: the motors may make these moves.
-  void request(std::int64_t now_us, const api::Asker& asker,
-               const std::vector<DryRun::Part>& parts);
+  void request(std::int64_t now_us, const api::Asker& asker, const std::vector<DryRun::Part>& parts,
+               const std::string& limited_by = {});
 
   bool idle() const { return waiting_.empty(); }
   // One slice of the oldest.
@@ -104,8 +108,8 @@ class DryRuns {
  private:
   struct Waiting {
     Waiting(api::Asker by, const Installation& installation, std::int64_t now_us,
-            const std::vector<DryRun::Part>& parts)
-        : asker(std::move(by)), dry_run(installation, now_us, parts) {}
+            const std::vector<DryRun::Part>& parts, const std::string& limited_by)
+        : asker(std::move(by)), dry_run(installation, now_us, parts, limited_by) {}
     api::Asker asker;
     DryRun dry_run;
   };

@@ -40,6 +40,16 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
                          {"start_tick", start},
                          {"steps", steps},
                          {"from_steps", motor.axis().from_steps()}};
+  if (const auto& share = motor.axis().line()) {
+    // Of all motors of a line the same, but for the increment.
+    line["line"] = {{"line", motor.as<motion::OnLine>()->line},
+                    {"way", share->way},
+                    {"increment", share->increment},
+                    {"longest", share->longest},
+                    {"direction", share->direction},
+                    {"from", share->from},
+                    {"to", share->to}};
+  }
   if (late_ns != 0) line["late_ns"] = late_ns;
   if (motor.axis().floor() != 0) line["floor"] = motor.axis().floor();
   if (const bushd_emission& emission = mcu.config.emission.settings;
@@ -55,6 +65,20 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
   outputs_.move_log(line.dump());
 }
 
+std::uint64_t Journal::line_laid(std::uint32_t longest, const std::vector<OnWay>& motors) {
+  nlohmann::json line = {{"event", "line"}, {"way", ++last_id_}, {"longest", longest}};
+  for (const auto& [id, increment, floor] : motors) {
+    const tables::Table& table = *installation_.table_of(id);
+    line["motors"].push_back({{"motor", installation_[id].name()},
+                              {"increment", increment},
+                              {"floor", floor},
+                              {"table_file", table.path()},
+                              {"table_sha256", table.content_hash()}});
+  }
+  outputs_.move_log(line.dump());
+  return last_id_;
+}
+
 void Journal::changed(MotorId motor, const motion::Change& change) {
   nlohmann::json line = {{"event", change.target_steps ? "retarget" : "stop"},
                          {"id", id_[motor]},
@@ -62,6 +86,9 @@ void Journal::changed(MotorId motor, const motion::Change& change) {
                          {"tick", change.at}};
   if (change.target_steps) line["target_steps"] = *change.target_steps;
   if (change.target_steps && change.floor != 0) line["floor"] = change.floor;
+  if (change.target_steps && installation_[motor].axis().line()) {
+    line["run_steps"] = change.run_steps;
+  }
   outputs_.move_log(line.dump());
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "base/by_id.h"
 #include "daemon/outputs.h"
@@ -18,6 +19,13 @@ class Journal final : public Service {
 
   void started(MotorId motor, std::int64_t steps, motion::Tick start, std::uint32_t late_ns,
                bool by_table);
+  // Before the runs of its motors. Returns its number.
+  struct OnWay {
+    MotorId motor;
+    std::uint32_t increment;
+    std::uint16_t floor;
+  };
+  std::uint64_t line_laid(std::uint32_t longest, const std::vector<OnWay>& motors);
   void changed(MotorId motor, const motion::Change& change);
   void ended(MotorId motor, std::string_view result);
   void position_set(MotorId motor, std::int64_t from_steps, const api::Asker& by);

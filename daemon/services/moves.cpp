@@ -107,7 +107,7 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
     tick += static_cast<motion::Tick>(slices) * kSliceUs / installation_[bus].config.tick_us;
   }
   asker.answer(api::Accepted{});
-  for (const MotorId motor : moving) take_over(motor, asker);
+  take_over(moving, asker);
   open_.open(asker, motors, OpenMoves::Purpose::kMove);
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
@@ -150,17 +150,19 @@ void Moves::cancel(MotorId motor, const std::string& reason) {
 }
 
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
-void Moves::take_over(MotorId motor, const api::Asker& by) {
-  open_.not_stopped(motor);
-  open_.end(motor, api::Outcome::kStopped,
-            "was given a new target by " + text_of(by) + "; it moves on");
+void Moves::take_over(const std::vector<MotorId>& motors, const api::Asker& by) {
+  for (const MotorId motor : motors) {
+    open_.not_stopped(motor);
+    open_.end(motor, api::Outcome::kStopped,
+              "was given a new target by " + text_of(by) + "; it moves on");
+  }
 }
 
 void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::int64_t target,
                 std::uint16_t floor) {
   while (begins()) begin_next();
   motion::Motor& motor = installation_[id];
-  if (motor.has_plan()) take_over(id, asker);
+  if (motor.has_plan()) take_over({id}, asker);
   open_.open(asker, {id}, OpenMoves::Purpose::kJog);
   motor.go_on({});
   if (!motor.stands()) return redirect(now_us, id, target, floor);
@@ -216,6 +218,22 @@ void Moves::start_leg(std::int64_t now_us, MotorId id) {
   start_run(id, leg.target, mcu.earliest_start(now_us, installation_[id].output()), leg.floor);
 }
 
+void Moves::begin_on_line(const std::vector<MotorId>& motors) {
+  for (const MotorId id : motors) {
+    const motion::Axis& axis = installation_[id].axis();
+    journal_.started(id, axis.target_steps() - axis.from_steps(), axis.start_tick(), 0, false);
+    // One that makes no step of it only waits.
+    if (axis.end_tick() > axis.start_tick()) {
+      installation_.mcu_of(id).begin(installation_[id].output(), axis.start_tick());
+    }
+  }
+  installation_.changed = true;
+}
+
+void Moves::redirect_on_line(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  retarget(now_us, motors);
+}
+
 void Moves::pause(std::int64_t now_us, const std::vector<MotorId>& motors) {
   while (begins()) begin_next();
   std::vector<MotorId> changed;
@@ -233,6 +251,7 @@ void Moves::resume(std::int64_t now_us, const std::vector<MotorId>& motors) {
     if (!motor.is_paused()) continue;
     const bool stands = motor.stands_paused();
     motor.resume();
+    if (motor.is<motion::OnLine>()) continue;  // who leads the line begins its next run
     if (stands) {
       start_leg(now_us, id);
     } else {
@@ -245,7 +264,7 @@ void Moves::resume(std::int64_t now_us, const std::vector<MotorId>& motors) {
 void Moves::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
   std::vector<MotorId> changed;
   std::vector<MotorId> armed;
-  for (const MotorId id : motors) {
+  for (const MotorId id : installation_.with_lines(motors)) {
     if (unbegun_.contains(id)) {
       cancel(id, "stopped before it began");
       continue;
@@ -281,6 +300,38 @@ void Moves::cancel_armed_group(MotorId ended) {
 }
 
 void Moves::replan(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  plan(now_us, with_whole_lines(motors));
+}
+
+void Moves::plan_again(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  plan(now_us, motors);
+}
+
+// The motors of a line change at the same tick, or not yet: one of them may have taken a change
+// that another one is not known to have taken.
+std::vector<MotorId> Moves::with_whole_lines(const std::vector<MotorId>& motors) {
+  std::set<std::uint64_t> stop;
+  std::set<std::uint64_t> wait;
+  std::vector<MotorId> all = installation_.with_lines(motors);
+  for (const MotorId id : all) {
+    const motion::Motor& motor = installation_[id];
+    const auto* on_line = motor.as<motion::OnLine>();
+    if (on_line == nullptr) continue;
+    if (motor.axis().open_change()) wait.insert(on_line->line);
+    if (motor.axis().stopping() && !motor.is_paused()) stop.insert(on_line->line);
+  }
+  std::erase_if(all, [&](MotorId id) {
+    const auto* on_line = installation_[id].as<motion::OnLine>();
+    return on_line != nullptr && wait.contains(on_line->line);
+  });
+  for (const MotorId id : all) {
+    const auto* on_line = installation_[id].as<motion::OnLine>();
+    if (on_line != nullptr && stop.contains(on_line->line)) installation_[id].stop();
+  }
+  return all;
+}
+
+void Moves::plan(std::int64_t now_us, const std::vector<MotorId>& motors) {
   // One replacement serves all motors of an MCU. It can bring a motor that has not begun to rest at
   // any tick, but another beginning only at the tick where it was to begin.
   std::map<McuId, motion::Tick> at;
@@ -291,6 +342,19 @@ void Moves::replan(std::int64_t now_us, const std::vector<MotorId>& motors) {
                                                : mcu.earliest_retarget(now_us, axis.start_tick());
     motion::Tick& common = at.try_emplace(mcu.id, first).first->second;
     common = std::max(common, first);
+  }
+  std::map<BusId, motion::Tick> of_lines;
+  for (const MotorId id : motors) {
+    if (!installation_[id].is<motion::OnLine>()) continue;
+    const Mcu& mcu = installation_.mcu_of(id);
+    // What an MCU has not taken, it should take where the others have.
+    const motion::Tick others = installation_[id].axis().open_change().value_or(INT64_MIN);
+    motion::Tick& common = of_lines.try_emplace(mcu.config.bus, INT64_MIN).first->second;
+    common = std::max({common, at[mcu.id], others});
+  }
+  for (auto& [mcu, tick] : at) {
+    const auto common = of_lines.find(installation_[mcu].config.bus);
+    if (common != of_lines.end()) tick = std::max(tick, common->second);
   }
   std::map<McuId, std::uint16_t> masks;
   for (const MotorId id : motors) {
@@ -312,11 +376,18 @@ void Moves::step(std::int64_t now_us) {
   std::vector<MotorId> now;
   std::erase_if(to_retarget_, [&](MotorId id) {
     const bool needed = installation_[id].needs_change();
-    if (needed && !installation_.mcu_of(id).has_time_to_retarget(now_us)) return false;
+    if (needed && !has_time_to_retarget(now_us, id)) return false;
     if (needed) now.push_back(id);
     return true;
   });
   if (!now.empty()) replan(now_us, now);
+}
+
+// Of a line all MCUs have.
+bool Moves::has_time_to_retarget(std::int64_t now_us, MotorId motor) const {
+  return std::ranges::all_of(installation_.with_lines({motor}), [&](MotorId id) {
+    return installation_.mcu_of(id).has_time_to_retarget(now_us);
+  });
 }
 
 void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Event>& events) {
@@ -354,6 +425,9 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [&](const motion::event::Paused&) {
               journal_.ended(id, api::word(api::Outcome::kStopped));
             },
+            [&](const motion::event::StandsOnLine& stands) {
+              journal_.ended(id, stands.at_target ? api::word(api::Outcome::kReached) : "turned");
+            },
             [&](const motion::event::Ended& ended) { end(id, ended); }},
         event);
   }
@@ -388,8 +462,8 @@ std::int64_t Moves::rest_by_us(std::int64_t now_us) const {
   for (const MotorId id : installation_.motors()) {
     const motion::Motor& motor = installation_[id];
     const Bus& bus = installation_.bus_of(installation_.mcu_of(id));
-    if (!motor.is<motion::Moving>() || !bus.master.time_known()) continue;
-    const motion::Tick ticks = motor.axis().end_tick() - bus.master.tick_at(now_us);
+    if (!motor.moves() || !bus.master.time_known()) continue;
+    const motion::Tick ticks = motor.axis().over_tick() - bus.master.tick_at(now_us);
     latest_us = std::max(latest_us, now_us + ticks * bus.config.tick_us);
   }
   return latest_us;

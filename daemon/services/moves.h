@@ -50,6 +50,14 @@ class Moves final : public Service {
   // Those that move ramp down and stay in their moves, until they are resumed or stopped.
   void pause(std::int64_t now_us, const std::vector<MotorId>& motors);
   void resume(std::int64_t now_us, const std::vector<MotorId>& motors);
+  // Motors of one line, all planned by who leads it. Precondition: their part of an open move.
+  // Runs that have just been started, at one tick:
+  void begin_on_line(const std::vector<MotorId>& motors);
+  // Runs with another end or speed:
+  void redirect_on_line(std::int64_t now_us, const std::vector<MotorId>& motors);
+  // They are given to another move.
+  void take_over(const std::vector<MotorId>& motors, const api::Asker& by);
+
   // From rest, as the second part of what the motor does for a request that is open already: begins
   // a move to this position, and says which step that is.
   Result<std::int64_t> go_on(std::int64_t now_us, MotorId motor, const api::Amount& position);
@@ -59,6 +67,8 @@ class Moves final : public Service {
   // Lets the MCUs know what is wanted of these motors now, in place of changes that they have not
   // taken.
   void replan(std::int64_t now_us, const std::vector<MotorId>& motors);
+  // The same for motors whose MCU has not taken the change.
+  void plan_again(std::int64_t now_us, const std::vector<MotorId>& motors);
   // What follows from a report of a motor.
   void take(std::int64_t now_us, MotorId motor, const std::vector<motion::Event>& events);
   void end(MotorId motor, const motion::event::Ended& ended);
@@ -83,9 +93,11 @@ class Moves final : public Service {
     std::vector<motion::Leg> legs;  // at least one
   };
   Result<std::vector<Part>> parts_of(const api::Move& move) const;
+  void plan(std::int64_t now_us, const std::vector<MotorId>& motors);
+  std::vector<MotorId> with_whole_lines(const std::vector<MotorId>& motors);
+  bool has_time_to_retarget(std::int64_t now_us, MotorId motor) const;
   void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);
   Result<Part> part_of(MotorId motor, const api::Amount& amount, const api::Move& move) const;
-  void take_over(MotorId motor, const api::Asker& by);
   void start_leg(std::int64_t now_us, MotorId motor);
   // From rest; the motor is part of an open move.
   void start_run(MotorId motor, std::int64_t target, motion::Tick start, std::uint16_t floor);

@@ -19,6 +19,8 @@ std::string_view word(OpenMoves::Purpose purpose) {
       return "arm";
     case OpenMoves::Purpose::kJog:
       return "jog";
+    case OpenMoves::Purpose::kLine:
+      return "line";
   }
   return "";
 }
@@ -57,6 +59,11 @@ void OpenMoves::say(MotorId motor, api::Outcome outcome, Saying saying) {
 void OpenMoves::unsay(MotorId motor, api::Outcome outcome) {
   const auto move = book_.move_of(motor);
   if (move) open_.at(*move).sayings.erase({motor, outcome});
+}
+
+void OpenMoves::conclude(MotorId motor, std::function<std::string()> conclusion) {
+  const auto move = book_.move_of(motor);
+  if (move) open_.at(*move).conclusion = std::move(conclusion);
 }
 
 void OpenMoves::stopped_by(const std::vector<MotorId>& motors, const std::string& who) {
@@ -102,8 +109,11 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& why, bo
                        .legs = open.mapped().plans[part.motor].legs,
                        .most_steps_per_s = open.mapped().plans[part.motor].most_steps_per_s});
   }
-  open.mapped().asker.answer(api::Completed{
-      .outcome = finished->outcome, .reason = finished->reason, .detail = std::move(results)});
+  const auto& conclusion = open.mapped().conclusion;
+  open.mapped().asker.answer(
+      api::Completed{.outcome = finished->outcome,
+                     .reason = finished->reason + (conclusion ? conclusion() : std::string()),
+                     .detail = std::move(results)});
 }
 
 const api::Asker* OpenMoves::asker_of(MotorId motor) const {

@@ -24,7 +24,7 @@ class OpenMoves {
  public:
   explicit OpenMoves(Installation& installation) : installation_(installation) {}
 
-  enum class Purpose { kMove, kHome, kArm, kJog };
+  enum class Purpose { kMove, kHome, kArm, kJog, kLine };
 
   // A motor's part that has ended.
   struct Ended {
@@ -50,6 +50,8 @@ class OpenMoves {
   };
   void say(MotorId motor, api::Outcome outcome, Saying saying);
   void unsay(MotorId motor, api::Outcome outcome);
+  // What is added to the reason of the result of this motor's move, asked for when all has ended.
+  void conclude(MotorId motor, std::function<std::string()> conclusion);
   // This motor's part has ended; `by_plan`: as its plan does. One that is in no open move is
   // ignored.
   void end(MotorId motor, api::Outcome outcome, const std::string& reason, bool by_plan = false);
@@ -74,6 +76,7 @@ class OpenMoves {
     std::unordered_map<MotorId, std::int64_t> from_steps{};
     std::vector<api::TableRef> tables;  // by which its motors move, in the request's order
     std::map<std::pair<MotorId, api::Outcome>, Saying> sayings{};
+    std::function<std::string()> conclusion{};
     struct Plan {
       int legs = 1;
       double most_steps_per_s = 0;

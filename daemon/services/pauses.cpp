@@ -30,8 +30,8 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
   asker.answer(api::Accepted{});
   std::vector<MotorId> moving;
   std::vector<MotorId> jogs;
-  for (const MotorId motor : *motors) {
-    if (!installation_[motor].is<motion::Moving>()) continue;
+  for (const MotorId motor : installation_.with_lines(*motors)) {
+    if (!installation_[motor].moves()) continue;
     const bool jogs_on = open_.jogs(motor);
     if (jogs_on) {
       open_.say(motor, api::Outcome::kStopped,
@@ -55,7 +55,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Re
     return asker.answer(api::Refused{may.error().text()});
   }
   std::vector<MotorId> paused;
-  for (const MotorId motor : *motors) {
+  for (const MotorId motor : installation_.with_lines(*motors)) {
     if (!installation_[motor].is_paused()) continue;
     if (const auto may = interlocks_.may_move(motor); !may) {
       return asker.answer(api::Refused{installation_[motor].name() + ": " + may.error().text()});

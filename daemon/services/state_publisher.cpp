@@ -38,12 +38,19 @@ std::string detail_of(const Mcu& mcu, bool two_masters) {
 }
 
 api::Activity activity_of(const motion::Motor& motor) {
-  if (motor.is<motion::Moving>()) return api::Activity::kMoving;
+  if (motor.moves()) return api::Activity::kMoving;
   if (const auto* armed = motor.as<motion::Armed>()) {
     return armed->confirmed ? api::Activity::kArmed : api::Activity::kArming;
   }
   if (motor.is<motion::Homing>()) return api::Activity::kHoming;
   return motor.is<motion::Local>() ? api::Activity::kLocal : api::Activity::kResting;
+}
+
+api::MotorState::Line line_of(const Mcu& mcu, const motion::Axis& axis) {
+  const double made = axis.line_step();
+  const motion::Tick left = std::max<motion::Tick>(axis.over_tick() - mcu.view().tick, 0);
+  return {.fraction = made / std::max(axis.line()->longest, 1u),
+          .left_us = left * axis.tick_ns() / 1000};
 }
 
 void show_inputs(const link::McuView& view, const config::MotorInputs& inputs,
@@ -123,6 +130,7 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   state.user_target = motor.coordinates().user_of(motor.target_steps());
   state.velocity_steps_per_s = motor.velocity_steps_per_s();
   state.activity = activity_of(motor);
+  if (motor.is<motion::OnLine>()) state.line = line_of(mcu, motor.axis());
   // Motors follow reports only once their MCU is online; and one that another master moves may not
   // have made its first step.
   const bool by_other = installation_.bus_of(mcu).two_masters && reports(view.report.moving);

@@ -8,6 +8,7 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
   auto motors = installation_.find_or_all(request.motors);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
+  *motors = installation_.with_lines(std::move(*motors));
   open_moves_.stopped_by(*motors, text_of(asker));
   std::erase_if(*motors, [this](MotorId motor) { return !can_be_stopped(motor); });
   stop(now_us, *motors);
@@ -36,7 +37,7 @@ void Stops::follow() {
     std::erase_if(stopping.motors, [&](MotorId id) {
       const motion::Motor& motor = installation_[id];
       if (!can_be_stopped(id)) return true;
-      if (!motor.is<motion::Moving>() || motor.axis().stopping()) return false;
+      if (!motor.moves() || motor.axis().stopping()) return false;
       const api::Asker* by = open_moves_.asker_of(id);
       stopping.done = motor.name() + " was given a new target" +
                       (by != nullptr ? " by " + text_of(*by) : "") + " while it ran down";

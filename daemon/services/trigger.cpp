@@ -103,7 +103,7 @@ void Trigger::follow() {
     std::erase_if(disarming.motors, [&](MotorId id) {
       const motion::Motor& motor = installation_[id];
       if (motor.is<motion::Armed>()) return false;
-      if (motor.is<motion::Moving>()) {
+      if (motor.moves()) {
         disarming.done = motor.name() + " moves: the trigger came before it was disarmed";
       }
       return true;

@@ -52,6 +52,7 @@ struct MovePlan {
   std::int64_t duration_us = 0;  // from the first tick to the end of the last one
   std::int64_t ticks = 0;
   std::optional<Traffic> traffic{};  // none: it is too much to be counted
+  std::string limited_by{};          // of a line: the motor that makes it take so long
   std::vector<Motor> motors{};       // in the request's order, each leg of a motor by itself
 };
 

@@ -6,6 +6,7 @@
 // ranges below are those that are accepted, not preconditions.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -55,6 +56,23 @@ struct Move {
   std::vector<MotorAmount> motors{};  // at least one, none twice
   bool dry_run = false;          // from rest only: result kDone with a MovePlan, and nothing moves
   std::optional<Speed> speed{};  // none: as fast as the motors' tables and max_speed allow
+};
+
+// Motors of one bus move along a straight line: at any moment each has made the same share of its
+// way, as nearly as steps allow, and no motor steps faster than its table allows. A motor with
+// backlash that comes from the wrong side makes its last approach, on a line too, when all have
+// arrived. The same motors, while they move, may be given an end of the same line that is nearer,
+// or another speed. Stops, pauses and limits of one of them ramp all down along the line.
+// Result: as of Move; the reason names the motor that limits the line, and how far motors are off
+// it.
+struct MoveLine {
+  Move::Kind kind = Move::Kind::kRelative;
+  std::vector<MotorAmount> motors{};   // at least one, at most kMostMotors, none twice
+  bool dry_run = false;                // from rest only: result kDone with a MovePlan
+  std::optional<Speed> speed{};        // no motor exceeds it; none: as fast as tables allow
+  std::optional<double> duration_s{};  // not shorter than this; refused if it cannot be so slow
+
+  static constexpr std::size_t kMostMotors = 127;
 };
 
 // Ramps these motors down; none named: all. Result kDone once they stand. Also disarms, and ends
@@ -222,7 +240,7 @@ struct Release {
 using Request =
     std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
                  ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables, GetTable, SetTable,
-                 Confirm, GetHistory, Configure, Jog, Pause, Resume, Hold, Release>;
+                 Confirm, GetHistory, Configure, Jog, Pause, Resume, Hold, Release, MoveLine>;
 
 // For logs and counts: "move", "stop", "emergency stop", ...
 std::string_view name_of(const Request& request);

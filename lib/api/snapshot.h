@@ -36,6 +36,14 @@ struct MotorState {
   std::optional<std::int64_t> heard_utime_us{};
   bool paused = false;  // it ramps down, or stands, on the way to its target
   bool held = false;    // no motion begins
+  // While it moves on a line: the share of the line's run that has been made, as reported last, and
+  // the time that the rest of it takes.
+  struct Line {
+    double fraction = 0;
+    std::int64_t left_us = 0;
+    friend bool operator==(const Line&, const Line&) = default;
+  };
+  std::optional<Line> line{};
   friend bool operator==(const MotorState&, const MotorState&) = default;
 };
 

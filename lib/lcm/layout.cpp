@@ -6,7 +6,7 @@ namespace bushd::lcm {
 namespace {
 
 constexpr Layout kTableRef{"sis"};
-constexpr Layout kMovePlan{"llllnSLLD"};
+constexpr Layout kMovePlan{"llllsnSLLD"};
 constexpr Layout kTable{"ssislinInI"};
 constexpr Layout kPastMotion{"lssllssss"};
 constexpr Layout kTableEntry{"stsidd", {&kTableRef}};
@@ -15,7 +15,7 @@ constexpr Layout kRequest{"llsl"};
 constexpr Layout kBare{"t", {&kRequest}};
 constexpr Layout kMotors{"tnS", {&kRequest}};
 constexpr Layout kReplyHeader{"llslbssii"};
-constexpr Layout kMotor{"slddlddbsbbsssslbb"};
+constexpr Layout kMotor{"slddlddbsbbsssslbbbdd"};
 constexpr Layout kMotorAmount{"sbld"};
 constexpr Layout kMotorDescription{"shstsssbdbbdddd", {&kTableRef}};
 constexpr Layout kMcuHealth{"sisiisillllllliddb"};
@@ -48,6 +48,7 @@ BUSHD_LAYOUT(hold_t, kMotors)
 BUSHD_LAYOUT(home_t, "tdbnSb", {&kRequest})
 BUSHD_LAYOUT(jog_t, "tsdblbl", {&kRequest})
 BUSHD_LAYOUT(list_tables_t, kBare)
+BUSHD_LAYOUT(move_line_t, "tbbdbdnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(move_t, "tbbdbnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(pause_t, kMotors)
 BUSHD_LAYOUT(position_compare_t, "ttbll", {&kRequest, &kMotorAmount})

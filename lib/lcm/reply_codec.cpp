@@ -59,6 +59,7 @@ move_plan_t plan_message(const api::MovePlan& plan, Piece<api::MovePlan::Motor> 
   message.ticks = plan.ticks;
   message.frames = plan.traffic ? plan.traffic->frames : -1;
   message.bytes = plan.traffic ? plan.traffic->bytes : -1;
+  message.limited_by = plan.limited_by;
   for (const api::MovePlan::Motor& motor : motors) {
     message.motors.push_back(motor.motor);
     message.steps.push_back(motor.steps);
@@ -76,6 +77,7 @@ api::MovePlan plan_of(const move_plan_t& message) {
   if (message.frames >= 0) {
     plan.traffic = api::MovePlan::Traffic{.frames = message.frames, .bytes = message.bytes};
   }
+  plan.limited_by = message.limited_by;
   for (std::size_t i = 0; i < message.motors.size(); ++i) {
     plan.motors.push_back({.motor = message.motors[i],
                            .steps = message.steps[i],

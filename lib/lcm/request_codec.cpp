@@ -79,6 +79,29 @@ std::optional<api::Request> from_message(const move_t& message) {
                    .speed = speed_of(message)};
 }
 
+move_line_t to_message(const api::MoveLine& move) {
+  move_line_t message{};
+  message.kind =
+      move.kind == api::Move::Kind::kAbsolute ? move_line_t::ABSOLUTE : move_line_t::RELATIVE;
+  message.dry_run = move.dry_run ? 1 : 0;
+  put_speed(message, move.speed);
+  message.duration_s = move.duration_s.value_or(0.0);
+  put_motors(message, move.motors);
+  return message;
+}
+std::optional<api::Request> from_message(const move_line_t& message) {
+  if (message.kind != move_line_t::RELATIVE && message.kind != move_line_t::ABSOLUTE) {
+    return std::nullopt;
+  }
+  api::MoveLine move{.kind = message.kind == move_line_t::ABSOLUTE ? api::Move::Kind::kAbsolute
+                                                                   : api::Move::Kind::kRelative,
+                     .motors = amounts_of(message.motors),
+                     .dry_run = message.dry_run != 0,
+                     .speed = speed_of(message)};
+  if (message.duration_s != 0) move.duration_s = message.duration_s;
+  return move;
+}
+
 template <class Message>
 Message motors_message(const api::MotorNames& motors) {
   Message message{};
@@ -348,7 +371,7 @@ std::optional<ClientMessage> decode_get_status(Payload payload) {
 using Decoder = std::optional<ClientMessage> (*)(Payload);
 
 // A new request is a line here. Requests first, in the order of api::Request.
-constexpr std::array<std::pair<std::string_view, Decoder>, 27> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 28> kDecoders = {{
     {"MOVE", decode_request<move_t>},
     {"STOP", decode_request<stop_t>},
     {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
@@ -373,11 +396,12 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 27> kDecoders = {{
     {"RESUME", decode_request<resume_t>},
     {"HOLD", decode_request<hold_t>},
     {"RELEASE", decode_request<release_t>},
+    {"MOVE_LINE", decode_request<move_line_t>},
     {"HELLO", decode_hello},
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},
 }};
-static_assert(std::variant_size_v<api::Request> == 24);
+static_assert(std::variant_size_v<api::Request> == 25);
 
 constexpr auto kClientChannels = [] {
   std::array<std::string_view, kDecoders.size()> channels;

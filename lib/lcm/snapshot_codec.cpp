@@ -1,6 +1,7 @@
 // What the daemon publishes.
 #include "lcm/snapshot_codec.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -65,6 +66,11 @@ motor_t message_of(const api::MotorState& motor) {
   message.heard_utime_us = motor.heard_utime_us.value_or(0);
   message.paused = motor.paused ? 1 : 0;
   message.held = motor.held ? 1 : 0;
+  message.on_line = motor.line ? 1 : 0;
+  if (motor.line) {
+    message.line_fraction = motor.line->fraction;
+    message.line_left_s = static_cast<double>(motor.line->left_us) * 1e-6;
+  }
   return message;
 }
 
@@ -75,6 +81,13 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
   if (!activity || !inhibited || !trust) return std::nullopt;
   std::optional<std::int64_t> heard_utime_us;
   if (message.heard_utime_us != 0) heard_utime_us = message.heard_utime_us;
+  std::optional<api::MotorState::Line> line;
+  if (message.on_line != 0) {
+    // What hostile numbers make of it need only be some number.
+    const double left_us = std::clamp(message.line_left_s, 0.0, 1e9) * 1e6;
+    line = {.fraction = message.line_fraction,
+            .left_us = std::isnan(left_us) ? 0 : std::llround(left_us)};
+  }
   return api::MotorState{.name = message.name,
                          .position_steps = message.position_steps,
                          .user = message.user_position,
@@ -92,7 +105,8 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
                          .uncertain_reason = message.uncertain_reason,
                          .heard_utime_us = heard_utime_us,
                          .paused = message.paused != 0,
-                         .held = message.held != 0};
+                         .held = message.held != 0,
+                         .line = line};
 }
 
 void put_scale(motor_description_t& message, const api::MotorDescription& motor) {

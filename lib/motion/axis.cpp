@@ -6,10 +6,24 @@
 #include <cstdlib>
 #include <utility>
 
+#include "engine/run_plan.h"
+#include "engine/slots.h"
+
 namespace bushd::motion {
 namespace {
 
 constexpr std::size_t kBlock = 64;
+
+__extension__ using Wide = unsigned __int128;
+
+std::uint16_t at_most_16_bits(Wide units) {
+  return units < UINT16_MAX ? static_cast<std::uint16_t>(units) : UINT16_MAX;
+}
+
+// It makes nothing but the end of its decelerating side.
+bool ramps_down(const bushd_run& run) {
+  return run.accel_at == run.accel_end && run.brake_left == 0 && run.cruise_left == 0;
+}
 
 }  // namespace
 
@@ -36,12 +50,52 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::u
   stopping_ = false;
   stale_ = false;
   change_.reset();
+  share_.reset();
   const auto count = static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
-  bushd_run_start(&base_.run, table_, count, steps < 0 ? -1 : 1, floor);
-  bushd_run_begin_late(&base_.run, late_ns_);
+  restart(base_.run, count, steps < 0 ? -1 : 1, floor);
   base_.tick = start;
   head_ = base_;
   plan_end();
+}
+
+void Axis::restart(bushd_run& run, std::uint32_t steps, int direction, std::uint16_t floor) const {
+  bushd_run_start(&run, &run_table(), steps, direction, floor);
+  bushd_run_begin_late(&run, late_ns_);
+}
+
+void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor) {
+  busy_ = true;
+  start_ = start;
+  late_ns_ = 0;
+  from_ = from_steps;
+  floor_ = floor;
+  stopping_ = false;
+  stale_ = false;
+  change_.reset();
+  share_ = std::move(share);
+  run_target_ = share_->to - share_->from;
+  share_from_steps_ = line_steps(0);
+  target_ = from_ + share_->direction * (line_steps(run_target_) - share_from_steps_);
+  restart(base_.run, run_target_, 1, floor);
+  base_.tick = start;
+  bushd_line_start(&base_.line, share_->increment, share_->longest);
+  bushd_line_go_to(&base_.line, share_->from);
+  base_.told_256 = share_from_steps_ * 256;
+  head_ = base_;
+  plan_end();
+}
+
+// Of the motor, from the line's beginning, when the run has made so many.
+std::int64_t Axis::line_steps(std::uint32_t run_steps) const {
+  bushd_line line;
+  bushd_line_start(&line, share_->increment, share_->longest);
+  bushd_line_go_to(&line, share_->from + run_steps);
+  return line.made;
+}
+
+std::int64_t Axis::steps_of(const Place& place) const {
+  if (share_) return from_ + share_->direction * (place.told_256 / 256 - share_from_steps_);
+  return from_ + place.run.direction * static_cast<std::int64_t>(place.run.steps_done);
 }
 
 void Axis::stop() {
@@ -57,6 +111,11 @@ void Axis::aim(std::int64_t target_steps, std::uint16_t floor) {
   stale_ = true;
 }
 
+void Axis::aim_on_line(std::uint32_t line_step, std::uint16_t floor) {
+  run_target_ = line_step - share_->from;
+  aim(from_ + share_->direction * (line_steps(run_target_) - share_from_steps_), floor);
+}
+
 bool Axis::change(Tick at) {
   stale_ = false;
   change_.reset();
@@ -64,51 +123,113 @@ bool Axis::change(Tick at) {
   if (bushd_run_done(&base_.run)) return false;  // over, but for the report that says so
   plan_end();
   const std::int64_t planned_end = planned_end_;
-  if (at >= std::max(end_, start_ + 1)) return false;
-  change_ = Change{.at = at, .target_steps = {}, .floor = floor_};
+  const std::uint32_t planned_run_steps = planned_run_steps_;
+  unchanged_end_ = end_;
+  if (at >= std::max(over_tick(), start_ + 1)) return false;
+  change_ = Change{.at = at, .target_steps = {}, .floor = floor_, .run_steps = run_target_};
   if (!stopping_) change_->target_steps = target_;
   plan_end();
-  const bool same_speed = stopping_ || base_.run.cruise == std::max(table_->cruise, change_->floor);
-  if (planned_end_ != planned_end || !same_speed) return true;
+  const bool same_end = planned_end_ == planned_end && planned_run_steps_ == planned_run_steps;
+  const bool same_speed =
+      stopping_ || base_.run.cruise == std::max(run_table().cruise, change_->floor);
+  if (share_ && at >= unchanged_end_) end_ = unchanged_end_;  // it has made all of its steps
+  if (!same_end || !same_speed) {
+    return !(share_ && share_->increment == 0) && at < std::max(unchanged_end_, start_ + 1);
+  }
   change_.reset();
   plan_end();
   return false;
 }
 
-std::size_t Axis::expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
-                         std::size_t stride) const {
+void Axis::expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out,
+                      std::size_t stride) const {
   if (format_ == BUSHD_FORMAT_FINE) {
-    return bushd_run_expand_fine(&run, tick_ns_, ticks, out, stride);
+    bushd_run_expand_fine(&run, tick_ns_, ticks, out, stride);
+    return;
   }
-  std::size_t active = 0;
   std::array<std::uint8_t, kBlock> bytes;
   for (std::size_t done = 0; done < ticks; done += kBlock) {
     const std::size_t n = std::min(kBlock, ticks - done);
-    active += bushd_run_expand_coarse(&run, tick_ns_, n, bytes.data(), 1);
+    bushd_run_expand_coarse(&run, tick_ns_, n, bytes.data(), 1);
     for (std::size_t i = 0; i < n; ++i) out[(done + i) * stride] = bytes[i];
   }
-  return active;
+}
+
+void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const {
+  if (!share_) return expand_run(place.run, ticks, out, stride);
+  std::array<std::int16_t, kBlock> run_ticks;
+  const std::uint32_t run_end = place.run.steps_done + bushd_run_steps_left(&place.run);
+  const std::int64_t rest_256 = line_steps(run_end) * 256;
+  for (std::size_t done = 0; done < ticks; done += kBlock) {
+    const std::size_t n = std::min(kBlock, ticks - done);
+    const std::uint8_t before_256 = place.run.fraction;
+    expand_run(place.run, n, run_ticks.data(), 1);
+    follow_run(place, n, run_ticks.data(), before_256, rest_256, out + done * stride, stride);
+  }
+}
+
+// The motor comes to rest on a whole step, so it goes no farther than that. If a change has made
+// that the step it has begun, it goes back by the part of it that it has been told.
+void Axis::follow_run(Place& place, std::size_t ticks, const std::int16_t* run_ticks,
+                      std::uint32_t before_256, std::int64_t rest_256, std::int16_t* out,
+                      std::size_t stride) const {
+  const bool fine = format_ == BUSHD_FORMAT_FINE;
+  std::uint32_t part_256 = before_256;  // of the run's running step
+  for (std::size_t i = 0; i < ticks; ++i) {
+    part_256 += static_cast<std::uint32_t>(
+        fine ? run_ticks[i] : bushd_coarse_to_fine(static_cast<std::uint8_t>(run_ticks[i])));
+    bushd_line_follow(&place.line, part_256 / 256);
+    part_256 %= 256;
+    const auto at_256 = static_cast<std::int64_t>(
+        fine ? bushd_line_position(&place.line, static_cast<std::uint8_t>(part_256))
+             : std::uint64_t{place.line.made} * 256);
+    const std::int64_t moved_256 = std::min(at_256, rest_256) - place.told_256;
+    place.told_256 += moved_256;
+    const bool forward = share_->direction > 0;
+    out[i * stride] = static_cast<std::int16_t>(
+        fine             ? moved_256 * share_->direction
+        : moved_256 == 0 ? 0
+                         : (moved_256 / 256) | (forward ? BUSHD_COARSE_DIRECTION : 0));
+  }
+}
+
+// The delay of the motor's running step, in units of its own table. Of a share: as the run goes
+// now, rounded up; its table lets no motor be faster than its own table at that place.
+std::uint16_t Axis::delay_of(const Place& place) const {
+  const std::uint16_t delay = bushd_run_delay(&place.run);
+  if (!share_ || delay == 0) return delay;
+  const bool changes_later = change_ && change_->at > start_ && place.tick <= change_->at;
+  if (place.tick >= (changes_later ? unchanged_end_ : end_)) return 0;
+  const Wide time = Wide{delay} * run_table().time_unit_ns * share_->longest;
+  const Wide units = Wide{table_->time_unit_ns} * share_->increment;
+  return at_most_16_bits((time + units - 1) / units);
 }
 
 // At the beginning of a place's tick: what the change, if it is due there, makes of the run.
 void Axis::take_change(Place& place) const {
   if (!change_ || place.tick != effective()) return;
   bushd_run& run = place.run;
+  if (change_->at <= start_ && share_) {
+    return restart(run, change_->target_steps ? change_->run_steps : 0, 1, change_->floor);
+  }
   if (change_->at <= start_) {
     const std::int64_t steps = change_->target_steps.value_or(from_) - from_;
-    bushd_run_start(&run, table_, static_cast<std::uint32_t>(std::abs(steps)), steps < 0 ? -1 : 1,
-                    change_->floor);
-    bushd_run_begin_late(&run, late_ns_);
-    return;
+    return restart(run, static_cast<std::uint32_t>(std::abs(steps)), steps < 0 ? -1 : 1,
+                   change_->floor);
   }
   if (change_->target_steps) {
     // What is left of the way after the running step.
-    const std::int64_t way = (*change_->target_steps - from_) * run.direction;
+    const std::int64_t way = share_ ? std::int64_t{change_->run_steps}
+                                    : (*change_->target_steps - from_) * run.direction;
     const std::int64_t after = way - static_cast<std::int64_t>(run.steps_done) - 1;
-    if (after >= 0 && bushd_run_retarget(&run, static_cast<std::uint32_t>(after), change_->floor)) {
+    // The ramp-down of a line is not shortened (bushd_run_ramp_down_once).
+    const bool possible = !share_ || !ramps_down(run) || after + 1 >= bushd_run_steps_left(&run);
+    if (possible && after >= 0 &&
+        bushd_run_retarget(&run, static_cast<std::uint32_t>(after), change_->floor)) {
       return;
     }
   }
+  if (share_) return bushd_run_ramp_down_once(&run);
   bushd_run_ramp_down(&run);
 }
 
@@ -124,7 +245,7 @@ void Axis::advance(Place& place, Tick to) const {
       continue;
     }
     const auto n = std::min<Tick>(next - place.tick, kBlock);
-    expand(place.run, static_cast<std::size_t>(n), unused.data(), 1);
+    expand(place, static_cast<std::size_t>(n), unused.data(), 1);
     place.tick += n;
   }
 }
@@ -136,15 +257,45 @@ Tick Axis::end_of(const Place& place) const {
   return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
 }
 
+// Of a share: first tick after the motor's last step, before the run's own end if the motor makes
+// none of its last ones. The position that follow_run tells reaches the last step in the tick in
+// which the run reaches `crossing`/256 of the step `last` of the line.
+Tick Axis::own_end_of(const Place& place) const {
+  const std::uint32_t left = bushd_run_steps_left(&place.run);
+  const std::uint32_t run_end = share_->from + place.run.steps_done + left;
+  bushd_line line = place.line;
+  bushd_line_go_to(&line, run_end);
+  const std::int64_t rest_256 = std::int64_t{line.made} * 256;
+  if (place.told_256 >= rest_256) return place.tick + (place.told_256 > rest_256 ? 1 : 0);
+  const std::uint32_t last = bushd_line_run_step(&line, line.made);
+  bushd_line_go_to(&line, last - 1);
+  const bool fine = format_ == BUSHD_FORMAT_FINE;
+  const std::int64_t crossing = fine ? bushd_line_crossing(&line) : 256;
+  const std::uint64_t before = bushd_run_units_of_last(&place.run, run_end - last + 1);
+  const std::uint64_t after = bushd_run_units_of_last(&place.run, run_end - last);
+  const std::int64_t unit_ns = run_table().time_unit_ns;
+  const auto delay_ns = static_cast<std::int64_t>(before - after) * unit_ns;
+  const auto whole = static_cast<std::int64_t>(bushd_run_units_of_last(&place.run, left) - before) -
+                     static_cast<std::int32_t>(place.run.since);
+  const std::int64_t ns = whole * unit_ns - place.run.since_ns + (crossing * delay_ns + 255) / 256;
+  return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
+}
+
 void Axis::plan_end() {
   Place place = base_;
   if (change_) {
     advance(place, effective());
     take_change(place);
   }
-  planned_end_ = from_ + place.run.direction * (static_cast<std::int64_t>(place.run.steps_done) +
-                                                bushd_run_steps_left(&place.run));
-  end_ = end_of(place);
+  planned_run_steps_ = place.run.steps_done + bushd_run_steps_left(&place.run);
+  run_end_ = end_of(place);
+  if (share_) {
+    planned_end_ = from_ + share_->direction * (line_steps(planned_run_steps_) - share_from_steps_);
+    end_ = own_end_of(place);
+  } else {
+    planned_end_ = from_ + place.run.direction * static_cast<std::int64_t>(planned_run_steps_);
+    end_ = run_end_;
+  }
 }
 
 void Axis::go_to(Tick first) {
@@ -153,7 +304,7 @@ void Axis::go_to(Tick first) {
 }
 
 std::optional<Axis::RunSegment> Axis::run_at(Tick first, unsigned max_ticks) {
-  if (!busy_ || first < start_) return std::nullopt;
+  if (!busy_ || first < start_ || share_) return std::nullopt;
   go_to(first);
   Place place = head_;
   take_change(place);
@@ -177,13 +328,13 @@ std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::s
     Tick until = first + count;
     if (change_ && effective() > head_.tick) until = std::min(until, effective());
     const auto n = static_cast<std::size_t>(until - head_.tick);
-    expand(head_.run, n, out + done * stride, stride);
+    expand(head_, n, out + done * stride, stride);
     done += static_cast<unsigned>(n);
   }
   head_.tick = std::max(head_.tick, first + count);
   // A change that begins where this ends is already due: the MCU must know the delay it starts
   // from, which the change leaves as it is.
-  return bushd_run_delay(&head_.run);
+  return delay_of(head_);
 }
 
 std::optional<Change> Axis::executed(Tick until) {
@@ -191,7 +342,7 @@ std::optional<Change> Axis::executed(Tick until) {
   advance(base_, until);
   std::optional<Change> taken;
   // Of a run that makes no step nothing comes after the change.
-  if (change_ && (until > effective() || until >= end_)) {
+  if (change_ && (until > effective() || until >= over_tick())) {
     take_change(base_);
     taken = std::exchange(change_, std::nullopt);
   }
@@ -202,7 +353,7 @@ std::optional<Change> Axis::executed(Tick until) {
 std::int64_t Axis::steps_at(Tick tick) const {
   Place place = base_;
   advance(place, tick);
-  return from_ + place.run.direction * static_cast<std::int64_t>(place.run.steps_done);
+  return steps_of(place);
 }
 
 double Axis::velocity_steps_per_s() const {
@@ -211,7 +362,10 @@ double Axis::velocity_steps_per_s() const {
   take_change(place);
   const std::uint16_t delay = bushd_run_delay(&place.run);
   if (delay == 0) return 0.0;
-  return place.run.direction * 1e9 / (static_cast<double>(delay) * table_->time_unit_ns);
+  const double run_steps_per_s = 1e9 / (static_cast<double>(delay) * run_table().time_unit_ns);
+  if (!share_) return place.run.direction * run_steps_per_s;
+  if (place.tick >= end_) return 0.0;
+  return share_->direction * run_steps_per_s * share_->increment / share_->longest;
 }
 
 }  // namespace bushd::motion

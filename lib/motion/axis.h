@@ -2,15 +2,23 @@
 // that the MCU has not yet executed, and to be changed from a tick on: ramped down, or given
 // another target. A target that the table cannot lead to in one go (too near, or behind) takes a
 // second run, from where the first has come to rest; whoever follows the axis starts it.
+//
+// The run may be that of a line (engine/line.h), by the table of the line. Then every motor of the
+// line has a copy of it, and makes of it what its share says: as long as all copies are started,
+// changed and stopped at the same ticks, the motors stay on the line, and none need know of
+// another.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 
+#include "engine/line.h"
 #include "engine/message.h"
 #include "engine/run.h"
+#include "tables/envelope.h"
 
 namespace bushd::motion {
 
@@ -23,6 +31,20 @@ struct Change {
   Tick at;
   std::optional<std::int64_t> target_steps;
   std::uint16_t floor = 0;  // of the run from then on (engine/run.h)
+  // Of a line's run, with a target: where that ends. The line's floor is in the line's time units.
+  std::uint32_t run_steps = 0;
+};
+
+// What a motor makes of the run of its line.
+struct LineShare {
+  std::uint64_t way = 0;                          // its number, for logs
+  std::shared_ptr<const tables::Envelope> table;  // of the run
+  std::uint32_t increment = 0;                    // |N|; of 0 the motor only waits for the others
+  std::uint32_t longest = 0;                      // L
+  int direction = 1;
+  // This run's part of the line, by its steps.
+  std::uint32_t from = 0;
+  std::uint32_t to = 0;
 };
 
 // Not copied while a run uses the table: the table outlives the axis.
@@ -52,10 +74,16 @@ class Axis {
   void start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns = 0,
              std::uint16_t floor = 0);
 
+  // The same for a part of a line; `floor` in the line's time units.
+  // Precondition: !busy(), the run of all of it takes at most kMaxDurationTicks.
+  void start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor);
+
   // What is wanted of the motor from now on: rest, or another target. The plan follows with
   // change(). Precondition: busy().
   void stop();
   void aim(std::int64_t target_steps, std::uint16_t floor = 0);
+  // Of a line: an end of it, by its steps.
+  void aim_on_line(std::uint32_t line_step, std::uint16_t floor);
 
   // The plan does not yet do what is wanted, and can be changed: of two changes the first must have
   // been executed (or known to have failed) before the second is planned, for the MCU may have
@@ -64,10 +92,15 @@ class Axis {
 
   // The plan does what is wanted, as far as the table can.
   bool is_planned() const { return !stale_; }
+  // There is one that is not known to have been executed: from this tick on.
+  std::optional<Tick> open_change() const {
+    return change_ ? std::optional<Tick>(change_->at) : std::nullopt;
+  }
 
   // Plans what is wanted from tick `at` on, in place of a change that was planned before and that
   // the MCU has not taken. Returns false if the plan stays what it was without any change: over by
-  // then, or it leads there already. Precondition: busy(), `at` not yet executed.
+  // then, or it leads there already. Of a line: if that is so of this motor, which may have made
+  // all of its steps before the others have. Precondition: busy(), `at` not yet executed.
   bool change(Tick at);
 
   // Displacements of ticks first .. first+count-1 (before the start and after the end: 0) into
@@ -100,13 +133,11 @@ class Axis {
   Tick end_tick() const { return end_; }
   std::int64_t from_steps() const { return from_; }
   // Where it stands when the ticks that are over have been run.
-  std::int64_t executed_steps() const {
-    return from_ + base_.run.direction * static_cast<std::int64_t>(base_.run.steps_done);
-  }
+  std::int64_t executed_steps() const { return steps_of(base_); }
   // Where it stands, as planned, when the ticks before `tick` have been run. O(ticks ahead).
   std::int64_t steps_at(Tick tick) const;
   // Of this run: +1, -1.
-  int direction() const { return base_.run.direction; }
+  int direction() const { return share_ ? share_->direction : base_.run.direction; }
   // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t planned_end_steps() const { return planned_end_; }
   std::int64_t target_steps() const { return target_; }
@@ -116,19 +147,39 @@ class Axis {
   // Of the step that runs at the last executed tick; 0 when not moving.
   double velocity_steps_per_s() const;
 
+  // Of a line, by its steps: where it is, as executed, where its run ends, as planned now, and
+  // where it is to end. Its run is over for all motors at over_tick(); this one's last step is made
+  // by end_tick(). Without a line that is the same.
+  const std::optional<LineShare>& line() const { return share_; }
+  std::uint32_t line_step() const { return share_->from + base_.run.steps_done; }
+  std::uint32_t line_planned_end() const { return share_->from + planned_run_steps_; }
+  std::uint32_t line_target() const { return share_->from + run_target_; }
+  Tick over_tick() const { return std::max(end_, run_end_); }
+
  private:
   struct Place {
     bushd_run run;
-    Tick tick;  // the run's state is that at the beginning of this tick
+    Tick tick;              // the run's state is that at the beginning of this tick
+    bushd_line line;        // that of the share, by the steps that the run has made
+    std::int64_t told_256;  // where the share has led by then, 1/256 step from the line's beginning
   };
+  std::int64_t steps_of(const Place& place) const;
+  std::int64_t line_steps(std::uint32_t run_steps) const;
   Tick effective() const { return std::max(change_->at, start_); }
   void go_to(Tick first);
   void take_change(Place& place) const;
   void advance(Place& place, Tick to) const;
-  std::size_t expand(bushd_run& run, std::size_t ticks, std::int16_t* out,
-                     std::size_t stride) const;
+  void expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  void expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  void follow_run(Place& place, std::size_t ticks, const std::int16_t* run_ticks,
+                  std::uint32_t before_256, std::int64_t rest_256, std::int16_t* out,
+                  std::size_t stride) const;
+  std::uint16_t delay_of(const Place& place) const;
   Tick end_of(const Place& place) const;
+  Tick own_end_of(const Place& place) const;
   void plan_end();
+  void restart(bushd_run& run, std::uint32_t steps, int direction, std::uint16_t floor) const;
+  const bushd_table& run_table() const { return share_ ? share_->table->view() : *table_; }
 
   const bushd_table* table_;
   std::uint32_t tick_ns_;
@@ -144,6 +195,12 @@ class Axis {
   bool stopping_ = false;
   bool stale_ = false;            // what is wanted has changed since the last change()
   std::optional<Change> change_;  // planned and not yet executed
+  std::optional<LineShare> share_;
+  std::int64_t share_from_steps_ = 0;  // steps of the line that the motor has made before this run
+  std::uint32_t run_target_ = 0;       // of the share: steps of the run that are wanted,
+  std::uint32_t planned_run_steps_ = 0;  // and planned
+  Tick run_end_ = 0;
+  Tick unchanged_end_ = 0;  // what end_ is without `change_`, of a share
   Place base_{};  // executed up to here; without `change_`, which may be planned again, later
   Place head_{};  // where the last render ended, so that the next one need not start from base_
 };

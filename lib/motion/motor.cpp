@@ -42,6 +42,18 @@ void Motor::aim(std::int64_t target, std::uint16_t floor) {
   axis_.aim(target, floor);
 }
 
+void Motor::start_line(const OnLine& on_line, LineShare share, Tick start, std::uint16_t floor) {
+  activity_ = on_line;
+  pause_ = Pause::kNo;
+  further_.clear();
+  axis_.start_line(position_, std::move(share), start, floor);
+}
+
+void Motor::aim_on_line(const OnLine& on_line, std::uint32_t line_step, std::uint16_t floor) {
+  activity_ = on_line;
+  axis_.aim_on_line(line_step, floor);
+}
+
 Leg Motor::take_leg() {
   if (position_ != axis_.target_steps() || further_.empty()) {
     return {.target = axis_.target_steps(), .floor = axis_.floor()};
@@ -52,12 +64,17 @@ Leg Motor::take_leg() {
 }
 
 void Motor::pause() {
-  if (!is<Moving>() || axis_.stopping()) return;
+  if (auto* on_line = std::get_if<OnLine>(&activity_)) on_line->resumes = false;
+  if (!moves() || axis_.stopping()) return;
   pause_ = Pause::kRamps;
   axis_.stop();
 }
 
 void Motor::resume() {
+  if (auto* on_line = std::get_if<OnLine>(&activity_)) {
+    on_line->resumes = is_paused();
+    return;
+  }
   if (pause_ == Pause::kRamps) axis_.aim(axis_.target_steps(), axis_.floor());
   pause_ = Pause::kNo;
 }
@@ -65,12 +82,13 @@ void Motor::resume() {
 std::int64_t Motor::target_steps() const {
   if (!has_plan()) return position_;
   if (axis_.stopping() && !is_paused()) return axis_.end_steps();
+  if (const OnLine* on_line = as<OnLine>()) return on_line->target_steps;
   return further_.empty() ? axis_.target_steps() : further_.back().target;
 }
 
 void Motor::stop(std::optional<std::string> ended_by) {
   pause_ = rests_in_pause() ? Pause::kOver : Pause::kNo;
-  if (is<Moving>()) axis_.stop();
+  if (moves()) axis_.stop();
   if (auto* armed = std::get_if<Armed>(&activity_)) {
     armed->stops = true;
     if (ended_by) armed->ended_by = std::move(ended_by);
@@ -207,13 +225,13 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
   }
   if (report.of_mcu.faults != 0) {
     // The MCU takes no more ticks; what it has, it runs, and then down its own table.
-    if (auto* now = std::get_if<Moving>(&activity_)) now->faults |= report.of_mcu.faults;
+    if (moves()) moving_now().faults |= report.of_mcu.faults;
     if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
     return;
   }
   // It has not told of the emergency stop yet, with which its plan was given up.
   if (report.emergency_stop_open) return;
-  auto& now = std::get<Moving>(activity_);
+  Moving& now = moving_now();
   if (now.faults != 0) {
     // Another master has cleared them as soon as the motor stood.
     bushd_report before = report.of_mcu;
@@ -244,12 +262,32 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
     events.emplace_back(event::Mismatch{});
     axis_.stop();
   }
-  if (report.tick < axis_.end_tick()) {
+  if (report.tick < axis_.over_tick()) {
     if (axis_.needs_change()) events.emplace_back(event::Replan{});
   } else if (now.position_mismatch) {
     if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
+  } else if (is<OnLine>()) {
+    follow_end_of_line(report, events);
   } else {
     follow_end_of_run(report, events);
+  }
+}
+
+// All motors of the line stand by now, for all that is planned.
+void Motor::follow_end_of_line(const Report& report, std::vector<Event>& events) {
+  OnLine& now = std::get<OnLine>(activity_);
+  const bool there = axis_.line_planned_end() == axis_.line_target();
+  if (there && now.last_run && !now.stands) {
+    const bool settles = !axis_.stopping() && report.tick < axis_.over_tick() + setup_.settle_ticks;
+    if (!settles) events.emplace_back(reached());
+  } else if (is_paused()) {
+    const bool stood = std::exchange(now.stands, true);
+    pause_ = Pause::kStands;
+    if (!stood) events.emplace_back(event::Paused{});
+  } else if (axis_.stopping()) {
+    events.emplace_back(stopped());
+  } else if (!std::exchange(now.stands, true)) {
+    events.emplace_back(event::StandsOnLine{there});
   }
 }
 
@@ -334,7 +372,7 @@ void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
   // Its own ramp may be a step longer than what was planned.
   const bool outlasts = moving && report.tick >= axis_.end_tick();
   if (!given_up && !outlasts && axis_.executed_steps() == position_) return;
-  std::get<Moving>(activity_).limit = direction;
+  moving_now().limit = direction;
   events.emplace_back(event::Drop{});
 }
 
@@ -346,8 +384,8 @@ event::Ended Motor::end_at_limit() {
   if (axis_.stopping() && !is_paused() && position_ == axis_.executed_steps()) {
     return stopped();
   }
-  std::string reason = "stopped by " + switch_at(std::get<Moving>(activity_).limit) +
-                       ", stands at " + std::to_string(position_);
+  std::string reason =
+      "stopped by " + switch_at(moving()->limit) + ", stands at " + std::to_string(position_);
   if (setup_.limit_immediate && position_ != axis_.from_steps()) {
     uncertain_reason_ = "it was stopped immediately at its limit switch and may have overrun";
     reason += "; stopped immediately, it may have overrun, so check the position and set it";
@@ -360,7 +398,7 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   // One that has not made a step, or stood, cannot overrun.
   const bool stepped = position_ != axis_.from_steps() && !rests_in_pause();
   const std::string mcu = "MCU " + setup_.mcu;
-  if (const Moving* moving = as<Moving>(); moving != nullptr && moving->position_mismatch) {
+  if (moves() && moving()->position_mismatch) {
     return ended(Outcome::kFault, *uncertain_reason_ + "; check the position and set it");
   }
   if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
@@ -404,7 +442,8 @@ std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {
 
 event::Ended Motor::ended(Outcome outcome, std::string reason) {
   const bool was_armed = is<Armed>();
-  const bool was_paused = rests_in_pause();
+  const OnLine* on_line = as<OnLine>();
+  const bool was_paused = rests_in_pause() || (on_line != nullptr && on_line->stands);
   further_.clear();
   pause_ = Pause::kNo;
   axis_.finish();

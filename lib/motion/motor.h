@@ -62,8 +62,16 @@ struct Armed {
   std::optional<std::string> ended_by{};  // the motor armed with it whose end ends it too
 };
 struct Homing {};  // by its MCU, or it waits for its turn
-struct Local {};   // the inputs at its MCU move it, or another master does
-using Activity = std::variant<Resting, Moving, Armed, Homing, Local>;
+// Moves on a line with others. Whoever leads the line begins its runs, all at the same ticks.
+struct OnLine : Moving {
+  std::uint64_t line = 0;         // its number
+  std::int64_t target_steps = 0;  // where its last run leads
+  bool last_run = true;
+  bool stands = false;   // where a run has led that was not the last one
+  bool resumes = false;  // paused, and to go on as soon as all motors of the line stand
+};
+struct Local {};  // the inputs at its MCU move it, or another master does
+using Activity = std::variant<Resting, Moving, Armed, Homing, Local, OnLine>;
 
 // What an MCU reports, and what is known beside.
 struct Report {
@@ -94,9 +102,12 @@ struct Executed {  // a change of plan
 struct Replan {};  // the plan is not what was requested any more
 struct Drop {};    // its MCU takes no more ticks for this motion
 struct Mismatch {};
-struct Turn {};     // it stands on the way to a target that takes a second run
-struct NextLeg {};  // it stands where a leg has led, and another one follows
-struct Paused {};   // it stands where it was to pause
+struct Turn {};        // it stands on the way to a target that takes a second run
+struct NextLeg {};     // it stands where a leg has led, and another one follows
+struct Paused {};      // it stands where it was to pause
+struct StandsOnLine {  // and its motion goes on when all motors of the line stand
+  bool at_target;
+};
 struct Ended {
   Outcome outcome;
   std::string reason;
@@ -105,9 +116,9 @@ struct Ended {
   bool by_plan = false;     // at the target, or where it was stopped on request
 };
 }  // namespace event
-using Event =
-    std::variant<event::Waits, event::Started, event::Executed, event::Replan, event::Drop,
-                 event::Mismatch, event::Turn, event::NextLeg, event::Paused, event::Ended>;
+using Event = std::variant<event::Waits, event::Started, event::Executed, event::Replan,
+                           event::Drop, event::Mismatch, event::Turn, event::NextLeg, event::Paused,
+                           event::StandsOnLine, event::Ended>;
 
 class Motor {
  public:
@@ -130,8 +141,14 @@ class Motor {
   bool is() const {
     return std::holds_alternative<A>(activity_);
   }
+  // It moves, alone or on a line.
+  const Moving* moving() const {
+    const OnLine* on_line = as<OnLine>();
+    return on_line != nullptr ? on_line : as<Moving>();
+  }
+  bool moves() const { return moving() != nullptr; }
   // Its axis has a plan: it moves, or will when the trigger comes.
-  bool has_plan() const { return is<Moving>() || is<Armed>(); }
+  bool has_plan() const { return moves() || is<Armed>(); }
   std::string busy_text() const;  // "theta moves"
 
   // As reported last; the MCU's boot that it belongs to, nothing before the first report.
@@ -141,7 +158,7 @@ class Motor {
   PositionTrust trust(std::optional<std::uint16_t> boot_number) const;
   // Where it will stand when all is done, and it has been resumed if it is paused.
   std::int64_t target_steps() const;
-  double velocity_steps_per_s() const { return is<Moving>() ? axis_.velocity_steps_per_s() : 0.0; }
+  double velocity_steps_per_s() const { return moves() ? axis_.velocity_steps_per_s() : 0.0; }
   // Why steps may be lost, so that it may not move. Nothing: none are, as far as this daemon knows.
   const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
   // Somebody has said where it stands, in this run of the daemon or as was kept.
@@ -174,6 +191,9 @@ class Motor {
   // From rest, or from the turning point of a motion.
   void start(std::int64_t target, Tick start, std::uint16_t floor = 0);
   void aim(std::int64_t target, std::uint16_t floor = 0);
+  // The same for a run of a line.
+  void start_line(const OnLine& on_line, LineShare share, Tick start, std::uint16_t floor);
+  void aim_on_line(const OnLine& on_line, std::uint32_t line_step, std::uint16_t floor);
   // What comes after the run that it makes, in place of what was to come.
   void go_on(std::vector<Leg> legs) { further_ = std::move(legs); }
   // The leg that is to be made from where it stands: the rest of the one that it makes, or the next
@@ -181,7 +201,7 @@ class Motor {
   Leg take_leg();
   // Moving: ramps down, and its motion stays open.
   void pause();
-  // It goes on; if it stands already, by another run.
+  // It goes on; if it stands already, by another run. On a line it stands first.
   void resume();
   bool is_paused() const { return pause_ == Pause::kRamps || stands_paused(); }
   bool stands_paused() const { return pause_ == Pause::kStands; }
@@ -194,7 +214,7 @@ class Motor {
   // `ended_by` is whose end ends it too.
   void stop(std::optional<std::string> ended_by = {});
   // The plan is not yet what was requested, and can be changed.
-  bool needs_change() const { return is<Moving>() && axis_.needs_change(); }
+  bool needs_change() const { return moves() && axis_.needs_change(); }
   // Whether the plan is another one now from this tick on.
   bool change(Tick at) { return has_plan() && axis_.change(at); }
   void home() { activity_ = Homing{}; }
@@ -230,7 +250,9 @@ class Motor {
  private:
   bool rests_in_pause() const { return pause_ == Pause::kStands || pause_ == Pause::kOver; }
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
+  Moving& moving_now() { return const_cast<Moving&>(*moving()); }
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
+  void follow_end_of_line(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
   Result<void> is_amount(const api::Amount& amount) const;
   // Steps within the soft limits; there are some.

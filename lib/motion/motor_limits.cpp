@@ -31,6 +31,9 @@ Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const 
                                  : "find out where it stands and run 'bushctl set NAME STEPS'") +
                 ", or 'bushctl confirm NAME' if it stands where it is shown");
   }
+  if (is<OnLine>()) {
+    return fail("it moves on a line with other motors; stop it first, then move it by itself");
+  }
   if (restored_reason_ && setup_.restored_refused) {
     return fail("its position is only restored, because " + *restored_reason_ +
                 ", and restored = \"refuse\" keeps it there; home it, set its position, or run "
@@ -42,8 +45,8 @@ Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const 
                 std::to_string(kMaxPosition) + " steps");
   }
   if (auto within = within_soft_limits(target); !within) return within;
-  if (const Moving* moving = as<Moving>(); moving != nullptr && moving->limit != 0) {
-    return fail(switch_at(moving->limit) + " is stopping it; wait for that result");
+  if (moves() && moving()->limit != 0) {
+    return fail(switch_at(moving()->limit) + " is stopping it; wait for that result");
   }
   const int direction = steps < 0 ? -1 : 1;
   if (steps != 0 && forbidden(direction)) {

@@ -1,5 +1,6 @@
 // A day in a lab, judged by tools/check-trace from the log of moves and the pins alone: moves in
-// every way of emission, homing, local motion, a limit switch, jogs, pauses, moves of two legs.
+// every way of emission, homing, local motion, a limit switch, jogs, pauses, moves of two legs,
+// lines.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -89,6 +90,32 @@ class Trace : public testing::TestWithParam<Manner> {
     EXPECT_EQ(lab.wait(jogged).result, "done");
     EXPECT_EQ(lab.wait(paused).result, "reached");
   }
+  // On one line: to its end, stopped, paused and resumed, and with another speed and a nearer end.
+  void move_along_lines(Lab& lab) {
+    const std::vector<std::string> motors{"m02", "m03", "m05"};
+    const auto by = [&](const std::vector<std::int64_t>& steps, double speed = 0) {
+      api::MoveLine line{.motors = motor_steps(motors, steps)};
+      if (speed != 0) line.speed = api::Speed{.per_s = speed, .in_steps = true};
+      return lab.send(line);
+    };
+    EXPECT_EQ(lab.wait(by({-31, 700, 299})).result, "reached");
+    const auto stopped = by({900, -411, 17});
+    lab.run_for(0.45);
+    lab.send(Ask::kStop, {"m05"});
+    EXPECT_EQ(lab.wait(stopped).result, "stopped");
+    const auto paused = by({-1000, -3, 998});
+    lab.run_for(0.35);
+    EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m03"}})).reason, "paused: 3 motors");
+    lab.send(api::Resume{});
+    EXPECT_EQ(lab.wait(paused).result, "reached");
+    by({2000, 1000, -500});
+    lab.run_for(0.4);
+    by({0, 0, 0}, 250);
+    lab.run_for(0.5);
+    by({0, 0, 0}, 900);
+    lab.run_for(0.3);
+    EXPECT_EQ(lab.wait(by({-1200, -600, 300})).result, "reached");
+  }
   void write(Lab& lab) {
     EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
     nlohmann::json positions;
@@ -154,6 +181,7 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   move(lab, {"m01", "m02", "m03"}, {-100, -50, 30});
   move_at_speeds(lab);
   change_on_the_way(lab);
+  move_along_lines(lab);
   lab.run_for(0.1);
   write(lab);
   EXPECT_EQ(check(lab, [](auto&) { return true; }), 0) << said();
@@ -163,6 +191,15 @@ TEST_P(Trace, EveryEdgeIsExplained) {
                   [](auto& event) {
                     if (event["result"] == "limit") {
                       event["position_steps"] = event["position_steps"].template get<int>() - 1;
+                    }
+                    return true;
+                  }),
+            1);
+  EXPECT_EQ(check(lab,
+                  [](auto& event) {
+                    if (event.contains("line") && event["motor"] == "m03") {
+                      event["line"]["increment"] =
+                          event["line"]["increment"].template get<int>() - 1;
                     }
                     return true;
                   }),

@@ -23,6 +23,26 @@ class Bushctl(EndToEndTest):
         # Nothing to be done is reached, too.
         self.command("move", "--wait", "b0", "--to", "93")
 
+    def test_lines(self):
+        self.bring_up()
+        ran = self.command("move", "--line", "--wait", "a0", "900", "b0", "-300")
+        self.assertRegex(ran.stdout, r"a0: reached, stands at 900 by .*\nb0: reached, stands at -300 by ")
+        self.assertRegex(ran.stdout, r"a0: stands at its target; the line was limited by [ab]0\n")
+        plan = json.loads(self.command("move", "--line", "--duration", "3", "--dry-run", "--json", "a0", "--to=0", "b0", "--to=0").stdout)
+        self.assertGreaterEqual(plan["duration_us"], 3_000_000)
+        self.assertIn(plan["limited_by"], ("a0", "b0"))
+        self.assertEqual([motor["steps"] for motor in plan["motors"]], [-900, 300])
+        self.assertEqual(self.bushctl("move", "--duration", "3", "a0", "1").returncode, 2)
+        ran = self.bushctl("move", "--line", "--duration", "0.01", "a0", "1000", "b0", "1")
+        self.assertEqual(ran.returncode, 1)
+        self.assertRegex(ran.stderr, "the line takes at least .* limited by a0")
+        # Ctrl-C ramps all down along the line.
+        move = self.start_move("--line", "a0", FAR, "b0", -FAR)
+        self.wait_until_travelled(600, "a0", "b0")
+        self.assertEqual(move.end(signal.SIGINT), 130)
+        self.assertIn("which was left at", move.said())
+        self.assertEqual(self.motors()["a0"]["position_steps"] - 900, -300 - self.motors()["b0"]["position_steps"])
+
     def test_ctrl_c_ramps_down_and_says_where_motors_stand(self):
         self.bring_up()
         for more in ((), ("--lcm",)):

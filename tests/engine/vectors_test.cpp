@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/frame.h"
+#include "engine/line.h"
 #include "engine/message.h"
 #include "engine/message_text.h"
 #include "engine/run.h"
@@ -172,6 +173,26 @@ TEST(Vectors, RunStates) {
       std::vector<uint8_t> got;
       expand(&taken_up, row, expected.size() / (row.at("format") == "fine" ? 2 : 1), &got);
       EXPECT_EQ(got, expected);
+    }
+  }
+}
+
+TEST(Vectors, Lines) {
+  for (const Row& row : read_csv("lines.csv")) {
+    SCOPED_TRACE(row.at("increment") + " of " + row.at("longest"));
+    const auto first = number<uint32_t>(row, "first");
+    const auto made = numbers<uint32_t>(row.at("made"));
+    const auto fractions = numbers<uint8_t>(row.at("fractions"));
+    const auto positions = numbers<uint64_t>(row.at("positions"));
+    ASSERT_EQ(made.size(), number<uint32_t>(row, "last") - first + 1);
+    bushd_line line;
+    bushd_line_start(&line, number<uint32_t>(row, "increment"), number<uint32_t>(row, "longest"));
+    bushd_line_go_to(&line, first);
+    for (size_t i = 0; i < made.size(); ++i) {
+      EXPECT_EQ(line.made, made[i]) << first + i;
+      if (i == positions.size()) break;
+      EXPECT_EQ(bushd_line_position(&line, fractions[i]), positions[i]) << first + i;
+      EXPECT_EQ(bushd_line_follow(&line, 1), made[i + 1] - made[i]) << first + i + 1;
     }
   }
 }

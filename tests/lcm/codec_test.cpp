@@ -104,6 +104,19 @@ TEST(Codec, OtherRequestsDoToo) {
     EXPECT_EQ(configure.changes, (std::vector<api::Configure::Change>{{"a", "offset", "2.5"}}));
     EXPECT_EQ(configure.file_sha256, "abc");
   }
+  const auto line = request_over_the_wire(
+      api::MoveLine{.kind = api::Move::Kind::kAbsolute,
+                    .motors = {{"a", std::int64_t{4}}, {"b", api::UserUnits{-0.5}}},
+                    .dry_run = true,
+                    .speed = api::Speed{.per_s = 2.5},
+                    .duration_s = 12.5});
+  EXPECT_EQ(line.kind, api::Move::Kind::kAbsolute);
+  EXPECT_EQ(line.motors,
+            (std::vector<api::MotorAmount>{{"a", std::int64_t{4}}, {"b", api::UserUnits{-0.5}}}));
+  EXPECT_TRUE(line.dry_run);
+  EXPECT_EQ(line.speed, (api::Speed{.per_s = 2.5}));
+  EXPECT_EQ(line.duration_s, 12.5);
+  EXPECT_FALSE(request_over_the_wire(api::MoveLine{}).duration_s);
   const auto jog = request_over_the_wire(
       api::Jog{.motor = "a", .per_s = -2.5, .keepalive_ms = 300, .steps_after = 7});
   EXPECT_EQ(jog.motor, "a");

@@ -118,6 +118,27 @@ class Blocking(PythonTest):
         results = [event["result"] for event in self.moves() if event["event"] == "result"]
         self.assertEqual(results, ["stopped", "stopped"])
 
+    def test_lines(self):
+        self.bring_up_with_unit()
+        for how in (SOCKET, LCM):
+            with self.connect(**how) as client:
+                client.set_position("a0", 0, unit="steps")
+                before = client.where("b1").position_steps
+                plan = client.plan_line(by={"a0": 5, "b1": -200}, duration_s=2)
+                self.assertGreaterEqual(plan.duration_s, 2)
+                self.assertIn(plan.limited_by, ("a0", "b1"))
+                motion = client.move_line(by={"a0": 5, "b1": -200}, duration_s=2, wait=False)
+                self.wait_until("a line", lambda: client.where("b1").line is not None)
+                self.assertLessEqual(client.where("b1").line.fraction, 1)
+                result = motion.wait()
+                self.assertIn("the line was limited by", result.reason)
+                self.assertEqual(result["b1"].position_steps, before - 200)
+                self.assertIsNone(client.where("b1").line)
+                client.move_line({"a0": 0, "b1": before})
+                with self.assertRaisesRegex(bushd.Refused, "takes at least"):
+                    client.move_line(by={"a0": 5, "b1": -200}, duration_s=0.001)
+        self.assert_one_result_each()
+
     def test_jogs(self):
         self.bring_up_with_unit()
         for how in (SOCKET, LCM):

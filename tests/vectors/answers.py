@@ -1,7 +1,9 @@
 """What the chosen ones lead to."""
 
+from fractions import Fraction
+
 from chosen import TABLES
-from definitions import displacements, encode_displacements, position, slots_of
+from definitions import displacements, encode_displacements, line_position, line_steps, position, slots_of
 
 
 def delays_of(table, steps, tick_ns, stop):
@@ -69,3 +71,11 @@ def slot_lists(slot_count, crossing, values):
         slots, remainder = slots_of(value, remainder, slot_count, crossing)
         lists.append(slots)
     return lists, remainder
+
+
+def line_answers(increment, longest, first, last):
+    """After each step of the run the steps made, and the position at a fraction of the next one in 1/256."""
+    made = [line_steps(increment, longest, s) for s in range(first, last + 1)]
+    fractions = [s * 89 % 256 for s in range(first, last)]
+    positions = [line_position(increment, longest, s + Fraction(f, 256)) for s, f in zip(range(first, last), fractions)]
+    return made, fractions, positions

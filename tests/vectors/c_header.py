@@ -1,7 +1,7 @@
 """The vectors as C arrays, for firmware builds."""
 
-from answers import move_bytes, rest_bytes, run_state, slot_lists, take_over_bytes
-from chosen import FRAMES, IDENTIFY_SLOTS, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS
+from answers import line_answers, move_bytes, rest_bytes, run_state, slot_lists, take_over_bytes
+from chosen import FRAMES, IDENTIFY_SLOTS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS
 from definitions import frame, identify_slot
 from messages import LAYOUTS, payload_of
 
@@ -133,6 +133,15 @@ def c_header():
                     f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, {floor}, {tick}, {ticks}, "
                     f"{c_state(run_state(*saved))}, kRest_{i}, {len(data)}}},")
     out += ["static const run_state_vector kRunStates[] = {", *rows, "};", ""]
+
+    rows = []
+    for i, line in enumerate(LINES):
+        made, fractions, positions = line_answers(*line)
+        out.append(c_array("uint32_t", f"kLineMade_{i}", [f"{n}u" for n in made]))
+        out.append(c_array("uint8_t", f"kLineFractions_{i}", fractions))
+        out.append(c_array("uint64_t", f"kLinePositions_{i}", [f"UINT64_C({n})" for n in positions]))
+        rows.append(f"    {{{', '.join(f'{n}u' for n in line)}, kLineMade_{i}, kLineFractions_{i}, kLinePositions_{i}}},")
+    out += ["static const line_vector kLines[] = {", *rows, "};", ""]
 
     rows = [f"    {{{{{', '.join(map(str, bytes.fromhex(unique_id)))}}}, {salt}, {slots}, "
             f"{identify_slot(bytes.fromhex(unique_id), salt, slots)}}}," for unique_id, salt, slots in IDENTIFY_SLOTS]

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "engine/frame.h"
+#include "engine/line.h"
 #include "engine/message.h"
 #include "engine/run.h"
 #include "engine/run_state.h"
@@ -49,6 +50,16 @@ typedef struct run_state_vector {
   const uint8_t* displacements;  // from there on; fewer than `ticks` if it ends before
   uint16_t size;
 } run_state_vector;
+
+typedef struct line_vector {
+  uint32_t increment;
+  uint32_t longest;
+  uint32_t first;
+  uint32_t last;
+  const uint32_t* made;       // after the steps first .. last of the run
+  const uint8_t* fractions;   // of the step after it, but for the last
+  const uint64_t* positions;  // at that fraction, 1/256 step
+} line_vector;
 
 typedef struct identify_slot_vector {
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
@@ -140,6 +151,20 @@ static bool check_crc(const uint32_t* crc) {
   return bushd_table_crc32(&kTables[crc - kTableCrcs]) == *crc;
 }
 
+static bool check_line(const line_vector* vector) {
+  bushd_line line;
+  bushd_line_start(&line, vector->increment, vector->longest);
+  if (line.made != 0) return false;
+  bushd_line_go_to(&line, vector->first);
+  for (uint32_t s = vector->first; line.made == vector->made[s - vector->first]; ++s) {
+    if (s == vector->last) return true;
+    const uint32_t at = s - vector->first;
+    if (bushd_line_position(&line, vector->fractions[at]) != vector->positions[at]) return false;
+    bushd_line_follow(&line, 1);
+  }
+  return false;
+}
+
 static bool check_identify_slot(const identify_slot_vector* vector) {
   return bushd_identify_slot(vector->unique_id, vector->salt, vector->slots) == vector->slot;
 }
@@ -196,6 +221,7 @@ unsigned bushd_check_vectors(unsigned* checked, void (*report)(const char* kind,
   CHECK_ALL("take-over", kTakeOvers, check_take_over)
   CHECK_ALL("run state", kRunStates, check_run_state)
   CHECK_ALL("table", kTableCrcs, check_crc)
+  CHECK_ALL("line", kLines, check_line)
   CHECK_ALL("identify slot", kIdentifySlots, check_identify_slot)
   CHECK_ALL("slots", kSlots, check_slots)
   CHECK_ALL("frame", kFrames, check_frame)

@@ -95,6 +95,19 @@ def slots_of(displacement, remainder, slot_count, crossing):
     return slots, remainder + displacement - 256 * len(slots) * direction
 
 
+def line_steps(increment, longest, run_steps):
+    """How many steps a motor of a line has made after so many of the run, which may be a broken number."""
+    share = Fraction(increment, longest)
+    return max(0, (share * (run_steps - Fraction(1, 2)) + Fraction(1, 2)).__floor__())
+
+
+def line_position(increment, longest, run_steps):
+    """In 1/256 step: up to its first step it rises twice as fast from 0, until it is where the rule says."""
+    share = Fraction(increment, longest)
+    ruled = share * (run_steps - Fraction(1, 2)) + Fraction(1, 2)
+    return (256 * min(2 * share * run_steps, ruled)).__floor__()
+
+
 def identify_slot(unique_id, salt, slots):
     mask = 0xFFFFFFFF
     value = 2166136261

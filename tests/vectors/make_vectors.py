@@ -16,9 +16,9 @@ import sys
 
 sys.dont_write_bytecode = True  # no caches in the source tree
 
-from answers import move_bytes, rest_bytes, run_state, slot_lists, take_over_bytes  # noqa: E402
+from answers import line_answers, move_bytes, rest_bytes, run_state, slot_lists, take_over_bytes  # noqa: E402
 from c_header import c_header  # noqa: E402
-from chosen import FRAMES, IDENTIFY_SLOTS, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS  # noqa: E402
+from chosen import FRAMES, IDENTIFY_SLOTS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS  # noqa: E402
 from definitions import frame, identify_slot  # noqa: E402
 from messages import LAYOUTS, payload_of  # noqa: E402
 
@@ -54,6 +54,8 @@ def csv_files():
                              "displacements"],
           [[*r[:4], "" if r[4] is None else r[4], *r[5:], field_text([run_state(*r)]), rest_bytes(*r).hex()]
            for r in RUN_STATES])
+    write("lines.csv", ["increment", "longest", "first", "last", "made", "fractions", "positions"],
+          [[*line, *map(join, line_answers(*line))] for line in LINES])
     write("identify_slots.csv", ["unique_id", "salt", "slots", "slot"],
           [[*one, identify_slot(bytes.fromhex(one[0]), *one[1:])] for one in IDENTIFY_SLOTS])
     slots = []

@@ -45,6 +45,12 @@ Command& Command::flag_with(const std::string& with, const std::string& name, bo
   return *this;
 }
 
+Command& Command::option_with(const std::string& with, const std::string& name, std::string* value,
+                              const std::string& text) {
+  app_->add_option(name, *value, text)->needs(app_->get_option(with));
+  return *this;
+}
+
 Command& Command::option(const std::string& name, std::string* value, const std::string& text) {
   CLI::Option* option = app_->add_option(name, *value, text);
   if (!name.starts_with('-')) option->required();

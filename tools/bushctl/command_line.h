@@ -39,6 +39,8 @@ class Command {
   // Only together with the option `with`.
   Command& flag_with(const std::string& with, const std::string& name, bool* value,
                      const std::string& text);
+  Command& option_with(const std::string& with, const std::string& name, std::string* value,
+                       const std::string& text);
   // `name` without dashes: in its place among the words, and needed.
   Command& option(const std::string& name, std::string* value, const std::string& text);
   Command& choice(const std::string& name, std::string* value,

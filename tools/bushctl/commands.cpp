@@ -43,6 +43,7 @@ api::MotorNames motors_of(const api::Request& request) {
     for (const api::MotorAmount& motor : motors) names.push_back(motor.motor);
   };
   if (const auto* move = std::get_if<api::Move>(&request)) add(move->motors);
+  if (const auto* move = std::get_if<api::MoveLine>(&request)) add(move->motors);
   if (const auto* arm = std::get_if<api::Arm>(&request)) add(arm->motors);
   if (const auto* home = std::get_if<api::Home>(&request)) names = home->motors;
   return names;
@@ -128,6 +129,12 @@ int send(const Connection& connection, const api::Request& request, Client::Unti
       progress.clear();
       for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
       for (const std::string& line : rounding_lines(request, heard)) fmt::print("{}\n", line);
+      // What limits a line, and how near to it the motors are.
+      const auto* completed = std::get_if<api::Completed>(&heard);
+      if (completed != nullptr && std::holds_alternative<api::MoveLine>(request) &&
+          as_hoped(heard, hope)) {
+        fmt::print("{}\n", bushd::printable(completed->reason));
+      }
       std::fflush(stdout);
     };
     if (until == Client::Until::kResult && moves) {

@@ -26,7 +26,8 @@ Until until(bool wait) {
 }
 
 // What the move would be.
-int show_plan(const Connection& connection, api::Move move, bool as_json) {
+template <class Move>
+int show_plan(const Connection& connection, Move move, bool as_json) {
   return with_client(connection, [&](Client& client) {
     move.dry_run = true;
     const auto reply = client.run(move, Until::kResult);
@@ -50,10 +51,19 @@ void add_move(CommandLine& line) {
     bool steps = false;
     bool dry_run = false;
     bool json = false;
+    bool line = false;
     std::string speed;
+    std::string duration;
     std::vector<std::string> words;
   };
   const auto options = std::make_shared<Options>();
+  const auto carry_out = [&line, options](auto move) {
+    const auto speed = parse_speed(options->speed, numbers(options->steps));
+    if (!speed) return wrong_usage(speed.error());
+    move.speed = *speed;
+    if (options->dry_run) return show_plan(line.connection(), move, options->json);
+    return send(line.connection(), move, until(options->wait), Hope::kReached);
+  };
   line.add("move", "Move motors; those on one bus start in the same tick")
       .footer(
           "bushctl move [--wait] NAME DISTANCE [NAME DISTANCE...]            by these distances\n"
@@ -62,22 +72,28 @@ void add_move(CommandLine& line) {
           "the nearest step counts. A motor that moves is given a new target; a distance then "
           "counts from its present one. With --wait the exit code is 0 only if every motor reached "
           "its "
-          "target.")
+          "target.\n"
+          "With --line motors of one bus move along a straight line: at any moment each of them "
+          "has "
+          "made the same share of its way. Stops, pauses and limits of one act on all.")
+      .flag("--line", &options->line, "Along a straight line; all motors on one bus")
       .flag("--wait", &options->wait, "Wait for the result")
       .option("--speed", &options->speed, kSpeed)
+      .option_with("--line", "--duration", &options->duration,
+                   "With --line: take at least so many seconds")
       .flag("--steps", &options->steps, kSteps)
       .flag("--dry-run", &options->dry_run,
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
       .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
       .raw_words(&options->words)
-      .run([&line, options] {
-        auto move = parse_move(options->words, numbers(options->steps));
-        if (!move) return wrong_usage(move.error());
-        const auto speed = parse_speed(options->speed, numbers(options->steps));
-        if (!speed) return wrong_usage(speed.error());
-        move->speed = *speed;
-        if (options->dry_run) return show_plan(line.connection(), *move, options->json);
-        return send(line.connection(), *move, until(options->wait), Hope::kReached);
+      .run([carry_out, options] {
+        const Numbers as = numbers(options->steps);
+        if (options->line) {
+          auto move = parse_move_line(options->words, as, options->duration);
+          return move ? carry_out(std::move(*move)) : wrong_usage(move.error());
+        }
+        auto move = parse_move(options->words, as);
+        return move ? carry_out(std::move(*move)) : wrong_usage(move.error());
       });
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 namespace bushctl {
 namespace {
@@ -90,6 +91,17 @@ Result<api::Move> parse_move(const std::vector<std::string>& words, Numbers numb
   }
   if (move.motors.empty()) return fail(fmt::format("no motor is named; {}", kMoveUsage));
   return move;
+}
+
+Result<api::MoveLine> parse_move_line(const std::vector<std::string>& words, Numbers numbers,
+                                      const std::string& duration) {
+  auto move = parse_move(words, numbers);
+  if (!move) return fail(move.error());
+  api::MoveLine line{.kind = move->kind, .motors = std::move(move->motors)};
+  if (duration.empty()) return line;
+  line.duration_s = number(duration);
+  if (line.duration_s && *line.duration_s > 0) return line;
+  return fail(fmt::format("--duration: \"{}\" is not a number of seconds above 0", duration));
 }
 
 Result<api::Arm> parse_arm(const std::vector<std::string>& words, Numbers numbers,

@@ -22,6 +22,10 @@ bushd::Result<std::optional<bushd::api::Speed>> parse_speed(const std::string& w
 // case all motors as one group. A mixture is refused: one command is relative or absolute.
 bushd::Result<bushd::api::Move> parse_move(const std::vector<std::string>& words, Numbers numbers);
 
+// The same along a straight line; `duration` in seconds, "" is none.
+bushd::Result<bushd::api::MoveLine> parse_move_line(const std::vector<std::string>& words,
+                                                    Numbers numbers, const std::string& duration);
+
 // "theta 400 chi -20": the same by so much, when the trigger comes.
 bushd::Result<bushd::api::Arm> parse_arm(const std::vector<std::string>& words, Numbers numbers,
                                          const std::string& edge, std::int64_t delay_us);

@@ -128,6 +128,10 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
                           const api::MotorDescription& description) {
   const auto heard_utime_us =
       motor.heard_utime_us ? nlohmann::json(*motor.heard_utime_us) : nullptr;
+  nlohmann::json on_line = nullptr;
+  if (motor.line) {
+    on_line = {{"fraction", motor.line->fraction}, {"left_us", motor.line->left_us}};
+  }
   return {{"name", motor.name},
           {"mcu", mcu},
           {"output", description.output},
@@ -151,6 +155,7 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"trust", word(motor.trust)},
           {"paused", motor.paused},
           {"held", motor.held},
+          {"line", on_line},
           {"uncertain_reason", motor.uncertain_reason},
           {"heard_utime_us", heard_utime_us}};
 }
@@ -278,11 +283,13 @@ std::string json(const api::MovePlan& plan) {
                         {"ticks", plan.ticks},
                         {"frames", nullptr},
                         {"bytes", nullptr},
+                        {"limited_by", nullptr},
                         {"motors", nlohmann::json::array()}};
   if (plan.traffic) {
     out["frames"] = plan.traffic->frames;
     out["bytes"] = plan.traffic->bytes;
   }
+  if (!plan.limited_by.empty()) out["limited_by"] = plan.limited_by;
   for (const api::MovePlan::Motor& motor : plan.motors) {
     out["motors"].push_back({{"name", motor.motor},
                              {"steps", motor.steps},
@@ -307,6 +314,7 @@ std::vector<std::string> lines(const api::MovePlan& plan) {
                    : "frames are not counted";
   out.push_back(fmt::format("{} ticks, {:.3f} s; {}", plan.ticks,
                             static_cast<double>(plan.duration_us) * 1e-6, traffic));
+  if (!plan.limited_by.empty()) out.push_back("limited by " + bushd::printable(plan.limited_by));
   return out;
 }
 
@@ -333,15 +341,18 @@ std::vector<std::string> lines(const api::Reply& reply) {
 
 std::vector<std::string> rounding_lines(const api::Request& request, const api::Reply& reply) {
   const auto* move = std::get_if<api::Move>(&request);
+  const auto* line = std::get_if<api::MoveLine>(&request);
   const auto* completed = std::get_if<api::Completed>(&reply);
   const auto* results = completed == nullptr
                             ? nullptr
                             : std::get_if<std::vector<api::MotorResult>>(&completed->detail);
   std::vector<std::string> out;
-  if (move == nullptr || results == nullptr || move->kind != api::Move::Kind::kAbsolute) return out;
-  for (std::size_t i = 0; i < results->size() && i < move->motors.size(); ++i) {
+  if ((move == nullptr && line == nullptr) || results == nullptr) return out;
+  if ((move != nullptr ? move->kind : line->kind) != api::Move::Kind::kAbsolute) return out;
+  const std::vector<api::MotorAmount>& motors = move != nullptr ? move->motors : line->motors;
+  for (std::size_t i = 0; i < results->size() && i < motors.size(); ++i) {
     const api::MotorResult& result = (*results)[i];
-    const auto* asked = std::get_if<api::UserUnits>(&move->motors[i].amount);
+    const auto* asked = std::get_if<api::UserUnits>(&motors[i].amount);
     if (asked == nullptr || result.outcome != api::Outcome::kReached) continue;
     const std::string at = fmt::format("{:.{}f}", result.user, result.precision);
     if (std::stod(at) == asked->value) continue;

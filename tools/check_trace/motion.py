@@ -176,6 +176,10 @@ class Move:
                 count = after
         plan.go_on(done + 1, rest, count)
 
+    def too_close(self):
+        """A step that comes sooner than its table allows: none, where the table alone makes the delays."""
+        return None
+
     def end_steps(self):
         return self.from_steps + self.direction * self._plan.count
 

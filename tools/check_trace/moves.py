@@ -3,6 +3,7 @@
 import json
 import math
 
+from check_trace.lines import Envelope, LineMove, Part
 from check_trace.motion import Move
 from check_trace.problems import InputError
 from check_trace.tables import find_table
@@ -59,12 +60,14 @@ class MoveLog:
         self._moves = {}  # by motor and id: a group move has one id
         self._at_steps = {}  # by motor name: where the last result or "set" leaves it
         self._tables = {}
+        self._ways = {}  # by number: the tables of lines
         self._ticks = set()  # (bus, tick_ns)
 
     def read(self, path):
         take = {
             "request": lambda event: None,  # who has asked for it
             "requests": lambda event: None,  # how many more
+            "line": self._line,
             "move": self._move,
             "stop": self._change,
             "retarget": self._change,
@@ -122,17 +125,32 @@ class MoveLog:
         motor = self._motor_of(event, f"move {event['id']}")
         if motor is None:
             return
-        which = event["table_file"], event["table_sha256"]
-        if which not in self._tables:
-            self._tables[which] = find_table(*which)
-        move = Move(event, self._tables[which])
+        table = self._table(event)
+        if "line" in event:
+            move = LineMove(event, table, self._ways[event["line"]["way"]])
+        else:
+            move = Move(event, table)
         motor.moves.append(move)
         self._moves[motor.name, move.id] = move
 
+    def _table(self, event):
+        which = event["table_file"], event["table_sha256"]
+        if which not in self._tables:
+            self._tables[which] = find_table(*which)
+        return self._tables[which]
+
+    def _line(self, event):
+        """A way of a line: the table of its runs."""
+        longest = event["longest"]
+        parts = [Part(self._table(motor), motor["increment"], longest, motor["floor"]) for motor in event["motors"]]
+        self._ways[event["way"]] = Envelope(parts)
+
     def _change(self, event):
         move = self._moves.get((event["motor"], event["id"]))
-        if move is not None:
-            move.change(event["tick"], event.get("target_steps"), event.get("floor", 0))
+        if move is None:
+            return
+        run_steps = {"run_steps": event["run_steps"]} if "run_steps" in event else {}
+        move.change(event["tick"], event.get("target_steps"), event.get("floor", 0), **run_steps)
 
     def _result(self, event):
         move = self._moves.get((event["motor"], event["id"]))
@@ -174,6 +192,9 @@ class MoveLog:
 
     def _check_result(self, motor, move):
         text = None
+        if (too_close := move.too_close()) is not None:
+            name = f"step {too_close} of move {move.id}"
+            self._problems.add(motor, "table", f"{name} comes sooner after the one before than its table allows")
         if move.result is None:
             text = f"move {move.id} has no result"
         elif move.result == "limit":

@@ -142,6 +142,55 @@ class Client:
         motion = self._motion(request, list(wanted.values))
         return await motion.wait(check=check) if wait else await motion.accepted()
 
+    @overload
+    async def move_line(self, motors: Mapping[str, float] | None = None, *, to: Mapping[str, float] | None = None,
+                        by: Mapping[str, float] | None = None, unit: str | None = None, speed: float | None = None,
+                        duration_s: float | None = None, wait: Literal[True] = True,
+                        check: bool = True) -> model.MoveResult: ...
+    @overload
+    async def move_line(self, motors: Mapping[str, float] | None = None, *, to: Mapping[str, float] | None = None,
+                        by: Mapping[str, float] | None = None, unit: str | None = None, speed: float | None = None,
+                        duration_s: float | None = None, wait: Literal[False], check: bool = True) -> Motion: ...
+    async def move_line(
+        self,
+        motors: Mapping[str, float] | None = None,
+        *,
+        to: Mapping[str, float] | None = None,
+        by: Mapping[str, float] | None = None,
+        unit: str | None = None,
+        speed: float | None = None,
+        duration_s: float | None = None,
+        wait: bool = True,
+        check: bool = True,
+    ) -> model.MoveResult | Motion:
+        wanted = await self._amounts(motors, to, by, unit)
+        request = requests.move_line(
+            wanted.values, absolute=wanted.absolute, in_steps=wanted.in_steps, speed=speed, duration_s=duration_s
+        )
+        motion = self._motion(request, list(wanted.values))
+        return await motion.wait(check=check) if wait else await motion.accepted()
+
+    async def plan_line(
+        self,
+        motors: Mapping[str, float] | None = None,
+        *,
+        to: Mapping[str, float] | None = None,
+        by: Mapping[str, float] | None = None,
+        unit: str | None = None,
+        speed: float | None = None,
+        duration_s: float | None = None,
+    ) -> model.MovePlan:
+        wanted = await self._amounts(motors, to, by, unit)
+        request = requests.move_line(
+            wanted.values,
+            absolute=wanted.absolute,
+            in_steps=wanted.in_steps,
+            speed=speed,
+            duration_s=duration_s,
+            dry_run=True,
+        )
+        return _there((await self._ask(request)).detail.plan)
+
     async def plan(
         self,
         motors: str | Mapping[str, float] | None = None,

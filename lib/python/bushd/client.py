@@ -3,22 +3,17 @@ while the caller does something else."""
 
 from __future__ import annotations
 
-import asyncio
-import atexit
-import concurrent.futures
 import os
-import threading
 import types
-from collections.abc import Coroutine, Iterator, Mapping
-from typing import Any, Literal, TypeVar, overload
+from collections.abc import Iterator, Mapping
+from typing import Literal, overload
 
 from . import aio, model, motion
 from .aio import KEEP
 from .arguments import Amount
 from .links import DEFAULT_PREFIX
+from .loop import Loop as _Loop
 from .session import Timing
-
-T = TypeVar("T")
 
 
 def connect(
@@ -51,56 +46,6 @@ def connect(
     except BaseException:
         loop.close()
         raise
-
-
-class _Loop:
-    """An asyncio loop in a thread."""
-
-    def __init__(self) -> None:
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name="bushd", daemon=True)
-        self._thread.start()
-        self.closed = False
-        # At the end of the program, as long as the thread still runs: what is ended later would wait for it in vain.
-        atexit.register(self.close)
-
-    def run(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Its result. A signal's exception (Ctrl-C) cancels it, waits until it has ended, and is raised then."""
-        if self.closed:
-            coroutine.close()
-            raise RuntimeError("this client is closed")
-        result: concurrent.futures.Future[T] = concurrent.futures.Future()
-        tasks: list[asyncio.Task[None]] = []
-
-        async def carry_out() -> None:
-            try:
-                result.set_result(await coroutine)
-            except BaseException as error:
-                result.set_exception(error)
-
-        self._loop.call_soon_threadsafe(lambda: tasks.append(self._loop.create_task(carry_out())))
-        try:
-            return result.result()
-        except BaseException:
-            if not result.done():
-                self._loop.call_soon_threadsafe(lambda: tasks[0].cancel())
-                concurrent.futures.wait([result])
-            raise
-
-    def call(self, function: Any, *arguments: Any) -> Any:
-        async def calls() -> Any:
-            return function(*arguments)
-
-        return self.run(calls())
-
-    def close(self) -> None:
-        if self.closed:
-            return
-        self.closed = True
-        atexit.unregister(self.close)
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
 
 
 class Client:
@@ -213,6 +158,60 @@ class Client:
             begun = self._client.move(motors, to=to, by=by, unit=unit, speed=speed, wait=False)
             return Motion(self._loop, self._loop.run(begun))
         return self._loop.run(self._client.move(motors, to=to, by=by, unit=unit, speed=speed, check=check))
+
+    @overload
+    def move_line(self, motors: Mapping[str, float] | None = None, *, to: Mapping[str, float] | None = None,
+                  by: Mapping[str, float] | None = None, unit: str | None = None, speed: float | None = None,
+                  duration_s: float | None = None, wait: Literal[True] = True,
+                  check: bool = True) -> model.MoveResult: ...
+    @overload
+    def move_line(self, motors: Mapping[str, float] | None = None, *, to: Mapping[str, float] | None = None,
+                  by: Mapping[str, float] | None = None, unit: str | None = None, speed: float | None = None,
+                  duration_s: float | None = None, wait: Literal[False], check: bool = True) -> Motion: ...
+    def move_line(
+        self,
+        motors: Mapping[str, float] | None = None,
+        *,
+        to: Mapping[str, float] | None = None,
+        by: Mapping[str, float] | None = None,
+        unit: str | None = None,
+        speed: float | None = None,
+        duration_s: float | None = None,
+        wait: bool = True,
+        check: bool = True,
+    ) -> model.MoveResult | Motion:
+        """Moves motors of one bus along a straight line: at any moment each has made the same share of its way.
+
+            client.move_line({"gap": 2.0, "centre": -0.5})      # to positions
+            client.move_line(by={"x": 10.0, "y": 4.0}, duration_s=30)
+
+        speed: no motor exceeds it, each in its own unit.
+        duration_s: not shorter than this; refused where the motors cannot be so slow, or so quick.
+        All else as of `move()`.
+        """
+        if not wait:
+            begun = self._client.move_line(
+                motors, to=to, by=by, unit=unit, speed=speed, duration_s=duration_s, wait=False
+            )
+            return Motion(self._loop, self._loop.run(begun))
+        return self._loop.run(
+            self._client.move_line(motors, to=to, by=by, unit=unit, speed=speed, duration_s=duration_s, check=check)
+        )
+
+    def plan_line(
+        self,
+        motors: Mapping[str, float] | None = None,
+        *,
+        to: Mapping[str, float] | None = None,
+        by: Mapping[str, float] | None = None,
+        unit: str | None = None,
+        speed: float | None = None,
+        duration_s: float | None = None,
+    ) -> model.MovePlan:
+        """What such a `move_line()` would be. Nothing moves; of motors at rest."""
+        return self._loop.run(
+            self._client.plan_line(motors, to=to, by=by, unit=unit, speed=speed, duration_s=duration_s)
+        )
 
     def plan(
         self,

@@ -226,6 +226,7 @@ def _plan(message: Any) -> model.MovePlan:
         ticks=message.ticks,
         frames=message.frames if counted else None,
         bytes=message.bytes if counted else None,
+        limited_by=message.limited_by or None,
         legs=tuple(
             model.PlannedLeg(name, steps, duration_us / 1e6, peak)
             for name, steps, duration_us, peak in zip(

@@ -138,7 +138,16 @@ class MovePlan:
     ticks: int
     frames: int | None  # to the MCUs, for the motion alone; None: too many to be counted
     bytes: int | None  # of these frames on the line
+    limited_by: str | None  # of a line: the motor that makes it take so long
     legs: tuple[PlannedLeg, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class LineState:
+    """A line under way."""
+
+    fraction: float  # 0..1: the share of it that has been made
+    left_s: float  # time that the rest of it takes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,6 +173,7 @@ class Motor:
     heard_at: datetime.datetime | None  # while `trust` is STALE: when the position was heard
     paused: bool  # it ramps down, or stands, on the way to its target
     held: bool  # no motion begins
+    line: LineState | None  # while it moves on a line with others
     mcu: str  # "<bus>:<address>"
     output: int
     group: str

@@ -29,6 +29,28 @@ def move(
     return Request("MOVE", message)
 
 
+def move_line(
+    amounts: Amounts,
+    *,
+    absolute: bool,
+    in_steps: bool,
+    speed: float | None = None,
+    duration_s: float | None = None,
+    dry_run: bool = False,
+) -> Request:
+    message = messages.move_line_t()
+    message.kind = messages.move_line_t.ABSOLUTE if absolute else messages.move_line_t.RELATIVE
+    message.dry_run = bool(dry_run)
+    _put_speed(message, speed, in_steps)
+    if duration_s is not None:
+        # 0 on the bus of messages is "none".
+        if not codec.finite(float(duration_s)) > 0:
+            raise ValueError(f"duration_s={duration_s}; allowed: above 0")
+        message.duration_s = float(duration_s)
+    _put_amounts(message, amounts, in_steps)
+    return Request("MOVE_LINE", message)
+
+
 def arm(
     amounts: Amounts, *, in_steps: bool, falling: bool = False, delay_us: int = 50, speed: float | None = None
 ) -> Request:

@@ -1,0 +1,457 @@
+#include "daemon/services/lines.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <iterator>
+#include <utility>
+
+namespace bushd::daemon {
+namespace {
+
+constexpr std::int64_t kMostSteps = motion::Motor::kMaxPosition;
+
+}  // namespace
+
+void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request) {
+  const auto motors = installation_.find(request.motors);
+  if (!motors) return asker.answer(api::Refused{motors.error().text()});
+  const bool moves = std::ranges::any_of(
+      *motors, [this](MotorId motor) { return installation_[motor].has_plan(); });
+  if (moves) return redirect(now_us, asker, *motors, request);
+  auto line = line_of(request);
+  if (!line) return asker.answer(api::Refused{line.error().text()});
+  if (request.dry_run) return plan_only(now_us, asker, *line);
+  start(now_us, asker, std::move(*line));
+}
+
+Result<Lines::Line> Lines::line_of(const api::MoveLine& request) const {
+  Line line{.motors = *installation_.find(request.motors), .points = {}, .way = {}};
+  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
+  if (const auto one = on_one_bus(line.motors); !one) return fail(one.error());
+  auto points = points_of(line.motors, request);
+  if (!points) return fail(points.error());
+  line.points = std::move(*points);
+  std::vector<std::int64_t> from;
+  for (const MotorId motor : line.motors) from.push_back(installation_[motor].position_steps());
+  line.way = lay(line.motors, from, line.points.front());
+  line.target = line.way.longest();
+  if (auto fits = fits_duration(line, request.duration_s); !fits) return fail(fits.error());
+  return line;
+}
+
+Result<void> Lines::on_one_bus(const std::vector<MotorId>& motors) const {
+  if (motors.size() > api::MoveLine::kMostMotors) {
+    return fail(fmt::format("{} motors are named; a line has at most {}", motors.size(),
+                            api::MoveLine::kMostMotors));
+  }
+  const auto bus_name = [this](MotorId motor) {
+    return installation_.bus_of(installation_.mcu_of(motor)).config.name;
+  };
+  for (const MotorId motor : motors) {
+    if (bus_name(motor) == bus_name(motors.front())) continue;
+    return fail(fmt::format(
+        "{} is on bus {} and {} on bus {}: ticks of two buses are not in step, so motors of a line "
+        "must be on one. Move them without --line, or connect their MCUs to one bus",
+        installation_[motors.front()].name(), bus_name(motors.front()), installation_[motor].name(),
+        bus_name(motor)));
+  }
+  return {};
+}
+
+// The line itself is straight. A motor that should make a last approach for its backlash makes it
+// when all have arrived, and the others wait.
+Result<std::vector<Lines::Point>> Lines::points_of(const std::vector<MotorId>& motors,
+                                                   const api::MoveLine& request) const {
+  Point to;
+  Point back;
+  Point again;
+  bool approach = false;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const motion::Motor& motor = installation_[motors[i]];
+    const auto floor = moves_.floor_of(motors[i], request.speed);
+    if (!floor) return fail(floor.error());
+    const auto target = moves_.target_of(motors[i], request.motors[i].amount, request.kind, *floor);
+    if (!target) return fail(target.error());
+    const auto legs = motor.legs_to(*target, *floor);
+    if (!legs) return fail(motor.name() + ": " + legs.error().message);
+    const motion::Leg& last = legs->back();
+    const bool straight = legs->size() == 1;
+    approach = approach || !straight;
+    to.steps.push_back(*target);
+    to.floors.push_back(straight ? last.floor : *floor);
+    back.steps.push_back(straight ? *target : legs->front().target);
+    back.floors.push_back(*floor);
+    again.steps.push_back(*target);
+    again.floors.push_back(last.floor);
+  }
+  std::vector<Point> points{std::move(to)};
+  if (approach) {
+    points.push_back(std::move(back));
+    points.push_back(std::move(again));
+  }
+  return points;
+}
+
+motion::Way Lines::lay(const std::vector<MotorId>& motors, const std::vector<std::int64_t>& from,
+                       const Point& to) const {
+  std::vector<motion::Way::Motor> all;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    all.push_back({.table = &installation_.table_of(motors[i])->view(),
+                   .from = from[i],
+                   .to = to.steps[i],
+                   .floor = to.floors[i]});
+  }
+  return motion::Way(std::move(all));
+}
+
+Result<void> Lines::fits_duration(Line& line, std::optional<double> duration_s) const {
+  if (line.way.longest() == 0) return {};
+  const double tick_ns = installation_[line.motors.front()].axis().tick_ns();
+  const double longest_ns = tick_ns * motion::Axis::kMaxDurationTicks;
+  if (line.way.duration_ns() > longest_ns) {
+    return fail(fmt::format(
+        "the line would take {:.0f} days, limited by {}; the longest move is {:.0f} days",
+        line.way.duration_ns() / 86400e9, limiting(line), longest_ns / 86400e9));
+  }
+  if (!duration_s) return {};
+  if (auto taken = line.way.take(*duration_s, longest_ns); !taken) {
+    return fail(taken.error().message + "; it is limited by " + limiting(line));
+  }
+  return {};
+}
+
+const std::string& Lines::limiting(const Line& line) const {
+  return installation_[line.motors[line.way.limiting()]].name();
+}
+
+void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, const Line& line) {
+  std::vector<DryRun::Part> parts;
+  std::vector<motion::Way> ways{line.way};
+  for (std::size_t p = 1; p < line.points.size(); ++p) {
+    ways.push_back(lay(line.motors, line.points[p - 1].steps, line.points[p]));
+  }
+  // The ways of one motor stand together.
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    for (const motion::Way& way : ways) {
+      const auto& [table, from, to, floor] = way.motors()[i];
+      DryRun::Part part{line.motors[i], to - from, way.floor(), from};
+      if (way.longest() != 0) part.line = way.share(i, 0, way.longest());
+      parts.push_back(std::move(part));
+    }
+  }
+  dry_runs_.request(now_us, asker, parts, line.way.longest() != 0 ? limiting(line) : "");
+}
+
+void Lines::start(std::int64_t now_us, const api::Asker& asker, Line line) {
+  asker.answer(api::Accepted{});
+  const std::uint64_t number = ++last_number_;
+  open(asker, number, line);
+  if (line.way.longest() == 0) {
+    for (const MotorId motor : line.motors) {
+      open_.end(motor, api::Outcome::kReached, "stands at its target already");
+    }
+    return;
+  }
+  Line& kept = lines_.emplace(number, std::move(line)).first->second;
+  log(kept);
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < kept.motors.size(); ++i) all.push_back(i);
+  begin_run(now_us, number, kept, all, kept.target);
+}
+
+void Lines::log(Line& line) {
+  std::vector<Journal::OnWay> motors;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    motors.push_back({.motor = line.motors[i],
+                      .increment = line.way.increment(i),
+                      .floor = line.way.motors()[i].floor});
+  }
+  line.way.set_number(journal_.line_laid(line.way.longest(), motors));
+}
+
+void Lines::open(const api::Asker& asker, std::uint64_t number, const Line& line) {
+  open_.open(asker, line.motors, OpenMoves::Purpose::kLine);
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    open_.planned(line.motors[i], static_cast<int>(line.points.size()),
+                  line.way.most_steps_per_s(i));
+  }
+  if (line.way.longest() == 0) return;
+  open_.conclude(line.motors.front(), [this, number] { return conclusion(number); });
+}
+
+void Lines::begin_run(std::int64_t now_us, std::uint64_t number, const Line& line,
+                      const std::vector<std::size_t>& indices, std::uint32_t to) {
+  motion::Tick start = INT64_MIN;
+  std::vector<MotorId> motors;
+  for (const std::size_t i : indices) {
+    const MotorId id = line.motors[i];
+    motors.push_back(id);
+    start = std::max(start,
+                     installation_.mcu_of(id).earliest_start(now_us, installation_[id].output()));
+  }
+  for (const std::size_t i : indices) {
+    motion::Motor& motor = installation_[line.motors[i]];
+    const bool same_way =
+        motor.is<motion::OnLine>() && motor.axis().line()->table == line.way.table();
+    motion::OnLine on_line;
+    on_line.line = number;
+    on_line.target_steps = line.points.back().steps[i];
+    on_line.last_run = line.points.size() == 1 && to == line.target;
+    const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
+    motor.start_line(on_line, line.way.share(i, from, to), start, line.way.floor());
+  }
+  moves_.begin_on_line(motors);
+}
+
+const motion::OnLine* Lines::on_line(MotorId motor, std::uint64_t number) const {
+  const auto* on_line = installation_[motor].as<motion::OnLine>();
+  return on_line != nullptr && on_line->line == number ? on_line : nullptr;
+}
+
+Result<std::uint64_t> Lines::number_of(const std::vector<MotorId>& motors) const {
+  const motion::OnLine* first = installation_[motors.front()].as<motion::OnLine>();
+  const auto whole = first == nullptr ? lines_.end() : lines_.find(first->line);
+  for (const MotorId motor : motors) {
+    if (whole != lines_.end() && on_line(motor, whole->first) != nullptr) continue;
+    return fail(fmt::format(
+        "{} is not on one line with the others: motors of a line begin it at rest; stop "
+        "those that move first",
+        installation_[motor].name()));
+  }
+  if (motors.size() != whole->second.motors.size()) {
+    return fail(
+        fmt::format("{} motors move on this line and {} are named; name all of them, or "
+                    "stop it first",
+                    whole->second.motors.size(), motors.size()));
+  }
+  return whole->first;
+}
+
+// The step of the line at which all motors are where they are asked to be.
+Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId>& motors,
+                                     const api::MoveLine& request) const {
+  const std::vector<motion::Way::Motor>& ways = line.way.motors();
+  std::vector<std::int64_t> targets(motors.size());
+  std::optional<std::int64_t> step;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const motion::Motor& motor = installation_[motors[i]];
+    const bool absolute = request.kind == api::Move::Kind::kAbsolute;
+    const api::Amount& amount = request.motors[i].amount;
+    const auto steps = absolute ? motor.steps_of_position(amount) : motor.steps_of_distance(amount);
+    if (!steps) return fail(motor.name() + ": " + steps.error().message);
+    const auto at =
+        static_cast<std::size_t>(std::ranges::find(line.motors, motors[i]) - line.motors.begin());
+    // Compared before any arithmetic: the sum of two values from outside could overflow.
+    if (std::abs(*steps / 2) > kMostSteps) {
+      return fail(fmt::format("{}: {} steps is out of range; allowed: +-{}", motor.name(), *steps,
+                              kMostSteps));
+    }
+    targets[at] = *steps + (absolute ? 0 : motor.target_steps());
+    if (line.way.increment(at) != line.way.longest()) continue;
+    step = (targets[at] - ways[at].from) * (ways[at].to < ways[at].from ? -1 : 1);
+  }
+  const std::uint32_t end = line.target;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    const motion::Motor& motor = installation_[line.motors[i]];
+    if (*step < 0 || *step > end) {
+      return fail(
+          fmt::format("{} is beyond the ends of the line that is under way; stop it first, "
+                      "or wait for its result",
+                      motor.coordinates().text(targets[i])));
+    }
+    const auto s = static_cast<std::uint32_t>(*step);
+    const std::int64_t on_way = line.way.position_at(i, s);
+    if (targets[i] == on_way) continue;
+    return fail(fmt::format(
+        "{}: {} is not on the line that is under way, which leads through {} "
+        "there; stop it first, or wait for its result",
+        motor.name(), motor.coordinates().text(targets[i]), motor.coordinates().text(on_way)));
+  }
+  return static_cast<std::uint32_t>(*step);
+}
+
+void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
+                     const std::vector<MotorId>& motors, const api::MoveLine& request) {
+  const auto refuse = [&asker](const std::string& why) { asker.answer(api::Refused{why}); };
+  const std::string& name = installation_[motors.front()].name();
+  if (request.dry_run) return refuse(name + " moves; a dry run is of lines from rest");
+  if (request.duration_s) {
+    return refuse("the line is under way: a duration is of a line from rest; give a speed");
+  }
+  const auto number = number_of(motors);
+  if (!number) return refuse(number.error().text());
+  Line& line = lines_.at(*number);
+  if (line.points.size() > 1) {
+    return refuse("the line ends in a last approach for backlash; stop it first");
+  }
+  std::vector<std::uint16_t> floors;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    const motion::Motor& motor = installation_[line.motors[i]];
+    if (motor.axis().stopping() || motor.is_paused() || motor.as<motion::OnLine>()->stands) {
+      return refuse(motor.name() + " is being stopped or paused; wait for that, or resume it");
+    }
+    const auto floor = moves_.floor_of(line.motors[i], request.speed);
+    if (!floor) return refuse(floor.error().text());
+    floors.push_back(*floor);
+  }
+  const auto step = step_of(line, motors, request);
+  if (!step) return refuse(step.error().text());
+  if (!line.way.set_floors(floors)) {
+    return refuse("that is slower than this line can be told; stop it first");
+  }
+  asker.answer(api::Accepted{});
+  moves_.take_over(line.motors, asker);
+  line.target = *step;
+  Point& to = line.points.front();
+  to.floors = floors;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    to.steps[i] = line.way.position_at(i, *step);
+    motion::OnLine now = *installation_[line.motors[i]].as<motion::OnLine>();
+    now.target_steps = to.steps[i];
+    now.last_run = true;
+    installation_[line.motors[i]].aim_on_line(now, *step, line.way.floor());
+  }
+  open(asker, *number, line);
+  moves_.redirect_on_line(now_us, line.motors);
+}
+
+void Lines::step(std::int64_t now_us) {
+  for (auto it = lines_.begin(); it != lines_.end();) {
+    it = follow(now_us, it->first, it->second) ? std::next(it) : lines_.erase(it);
+  }
+}
+
+bool Lines::follow(std::int64_t now_us, std::uint64_t number, Line& line) {
+  const auto cause = cause_to_end(now_us, number, line);
+  if (cause) end(now_us, number, line, *cause);
+  bool any = false;
+  bool all_stand = !cause;
+  for (const MotorId id : line.motors) {
+    const motion::OnLine* motor = on_line(id, number);
+    if (motor == nullptr) continue;
+    any = true;
+    const bool paused = installation_[id].is_paused();
+    const bool stops = installation_[id].axis().stopping() && !paused;
+    all_stand = all_stand && motor->stands && !stops && (!paused || motor->resumes);
+  }
+  if (any && all_stand) go_on(now_us, number, line);
+  return any;
+}
+
+// Of a motor that does not go on along the line as the others do. At the end of a run their reports
+// come one after the other.
+std::optional<std::string> Lines::cause_to_end(std::int64_t now_us, std::uint64_t number,
+                                               const Line& line) const {
+  std::optional<std::string> cause;
+  bool any_goes_on = false;
+  for (const MotorId id : line.motors) {
+    const motion::Motor& motor = installation_[id];
+    const motion::OnLine* now = on_line(id, number);
+    if (now == nullptr) {
+      if (!cause) cause = motor.name() + " does not move on";
+      continue;
+    }
+    const bool emergency = (now->faults & BUSHD_FAULT_EMERGENCY) != 0;  // that of all
+    if (now->limit != 0) cause = motor.name() + " has come to its limit switch";
+    if (now->position_mismatch) cause = motor.name() + " is not where it should be";
+    if (now->faults != 0 && !emergency) {
+      cause = "MCU " + installation_.mcu_of(id).name() + " has a fault";
+    }
+    const link::Master& master = installation_.bus_of(installation_.mcu_of(id)).master;
+    const bool runs = !emergency && motor.axis().over_tick() > master.tick_at(now_us);
+    const bool stops = motor.axis().stopping() && !motor.is_paused();
+    const bool gone_on_without = now->limit == 0 && now->faults == 0 && !now->position_mismatch;
+    any_goes_on = any_goes_on || (gone_on_without && !stops && (runs || now->stands));
+  }
+  if (!any_goes_on) return std::nullopt;
+  return cause;
+}
+
+void Lines::end(std::int64_t now_us, std::uint64_t number, const Line& line,
+                const std::string& cause) {
+  std::vector<MotorId> motors;
+  for (const MotorId id : line.motors) {
+    if (on_line(id, number) == nullptr) continue;
+    motors.push_back(id);
+    open_.say(id, api::Outcome::kStopped,
+              {api::Outcome::kStopped, "ramped down along the line, because " + cause});
+  }
+  moves_.stop(now_us, motors);
+}
+
+// All stand where their runs have led. Those that have been stopped earlier than others, since
+// their MCU was the only one to hear of it at once, catch up first.
+void Lines::go_on(std::int64_t now_us, std::uint64_t number, Line& line) {
+  std::uint32_t farthest = 0;
+  for (const MotorId id : line.motors) {
+    farthest = std::max(farthest, installation_[id].axis().line_planned_end());
+  }
+  std::vector<std::size_t> behind;
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    all.push_back(i);
+    if (installation_[line.motors[i]].axis().line_planned_end() < farthest) behind.push_back(i);
+  }
+  if (!behind.empty()) return begin_run(now_us, number, line, behind, farthest);
+  if (farthest < line.target) return begin_run(now_us, number, line, all, line.target);
+  // At a point that is not the last, or beyond one that came too late.
+  if (farthest == line.target) line.points.erase(line.points.begin());
+  std::vector<std::int64_t> from;
+  for (const MotorId id : line.motors) from.push_back(installation_[id].position_steps());
+  line.way = lay(line.motors, from, line.points.front());
+  line.target = line.way.longest();
+  log(line);
+  begin_run(now_us, number, line, all, line.target);
+}
+
+std::string Lines::conclusion(std::uint64_t number) const {
+  const auto found = lines_.find(number);
+  if (found == lines_.end()) return {};
+  const Line& line = found->second;
+  const bool moves_on = std::ranges::any_of(
+      line.motors, [&](MotorId motor) { return on_line(motor, number) != nullptr; });
+  if (moves_on) return {};
+  return fmt::format("; the line was limited by {}{}", limiting(line), deviation(line));
+}
+
+// At the point of the line that is nearest to where the motors stand.
+std::string Lines::deviation(const Line& line) const {
+  std::uint32_t at = 0;
+  std::size_t farthest_off = 0;
+  std::int64_t least = INT64_MAX;
+  // One that has ended earlier may have begun to move again.
+  const auto followed = [&](std::size_t i) {
+    const auto& share = installation_[line.motors[i]].axis().line();
+    return share && share->table == line.way.table();
+  };
+  for (std::size_t candidate = 0; candidate < line.motors.size(); ++candidate) {
+    if (!followed(candidate)) continue;
+    const std::uint32_t step = installation_[line.motors[candidate]].axis().line_planned_end();
+    std::int64_t most = 0;
+    std::size_t motor = 0;
+    for (std::size_t i = 0; i < line.motors.size(); ++i) {
+      if (!followed(i)) continue;
+      const std::int64_t off =
+          std::abs(installation_[line.motors[i]].position_steps() - line.way.position_at(i, step));
+      if (off <= most) continue;
+      most = off;
+      motor = i;
+    }
+    if (most >= least) continue;
+    least = most;
+    at = step;
+    farthest_off = motor;
+  }
+  if (least == INT64_MAX) return {};
+  const double percent = 100.0 * at / line.way.longest();
+  std::string text =
+      at == line.way.longest() ? "" : fmt::format(", which was left at {:.1f} %", percent);
+  if (least == 0) return text;
+  return text + fmt::format("; {} stands {} steps off it",
+                            installation_[line.motors[farthest_off]].name(), least);
+}
+
+}  // namespace bushd::daemon

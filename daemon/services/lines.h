@@ -1,0 +1,94 @@
+// Motors of one bus as one, along a straight line. Each of them has a copy of the line's run
+// (motion/axis.h), begun at the same tick and changed at the same ticks; who does that is Moves.
+// Here is what is about all of them: the line's table, its runs one after the other, and what
+// happens to the others when one does not go on.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/interlocks.h"
+#include "daemon/service.h"
+#include "daemon/services/dry_run.h"
+#include "daemon/services/moves.h"
+#include "daemon/services/open_moves.h"
+#include "motion/way.h"
+
+namespace bushd::daemon {
+
+class Lines final : public Service {
+ public:
+  Lines(Installation& installation, const Interlocks& interlocks, Journal& journal, Moves& moves,
+        OpenMoves& open_moves, DryRuns& dry_runs)
+      : installation_(installation),
+        interlocks_(interlocks),
+        journal_(journal),
+        moves_(moves),
+        open_(open_moves),
+        dry_runs_(dry_runs) {}
+
+  void request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request);
+
+  void step(std::int64_t now_us) override;
+
+ private:
+  // Where a way leads, and the floor of each motor's steps on it.
+  struct Point {
+    std::vector<std::int64_t> steps;
+    std::vector<std::uint16_t> floors;
+  };
+  struct Line {
+    std::vector<MotorId> motors;  // in the request's order, as all that is by motor
+    std::vector<Point> points;    // the one that the way leads to, and those to come
+    motion::Way way;
+    std::uint32_t target = 0;  // step of the way at which its point is
+  };
+
+  Result<Line> line_of(const api::MoveLine& request) const;
+  Result<void> on_one_bus(const std::vector<MotorId>& motors) const;
+  Result<std::vector<Point>> points_of(const std::vector<MotorId>& motors,
+                                       const api::MoveLine& request) const;
+  motion::Way lay(const std::vector<MotorId>& motors, const std::vector<std::int64_t>& from,
+                  const Point& to) const;
+  Result<void> fits_duration(Line& line, std::optional<double> duration_s) const;
+
+  void plan_only(std::int64_t now_us, const api::Asker& asker, const Line& line);
+  void start(std::int64_t now_us, const api::Asker& asker, Line line);
+  void log(Line& line);
+  void open(const api::Asker& asker, std::uint64_t number, const Line& line);
+  // Of these of its motors, by place: the part of the way between these steps of it.
+  void begin_run(std::int64_t now_us, std::uint64_t number, const Line& line,
+                 const std::vector<std::size_t>& indices, std::uint32_t to);
+
+  // A request for motors that move.
+  Result<std::uint64_t> number_of(const std::vector<MotorId>& motors) const;
+  void redirect(std::int64_t now_us, const api::Asker& asker, const std::vector<MotorId>& motors,
+                const api::MoveLine& request);
+  Result<std::uint32_t> step_of(const Line& line, const std::vector<MotorId>& motors,
+                                const api::MoveLine& request) const;
+
+  const motion::OnLine* on_line(MotorId motor, std::uint64_t number) const;
+  // Returns false when none of its motors is on it any more.
+  bool follow(std::int64_t now_us, std::uint64_t number, Line& line);
+  std::optional<std::string> cause_to_end(std::int64_t now_us, std::uint64_t number,
+                                          const Line& line) const;
+  void end(std::int64_t now_us, std::uint64_t number, const Line& line, const std::string& cause);
+  void go_on(std::int64_t now_us, std::uint64_t number, Line& line);
+  std::string conclusion(std::uint64_t number) const;
+  std::string deviation(const Line& line) const;
+  const std::string& limiting(const Line& line) const;
+
+  Installation& installation_;
+  const Interlocks& interlocks_;
+  Journal& journal_;
+  Moves& moves_;
+  OpenMoves& open_;
+  DryRuns& dry_runs_;
+  std::map<std::uint64_t, Line> lines_;
+  std::uint64_t last_number_ = 0;
+};
+
+}  // namespace bushd::daemon

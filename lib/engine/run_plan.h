@@ -1,0 +1,26 @@
+// What those ask of a run who plan motors that follow it (engine/line.h). An MCU does not.
+#ifndef BUSHD_ENGINE_RUN_PLAN_H
+#define BUSHD_ENGINE_RUN_PLAN_H
+
+#include <stdint.h>
+
+#include "engine/run.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Time that the last `steps` steps of the run take, in time units: their delays, without what has
+// passed of the running one. Precondition: steps <= bushd_run_steps_left. O(steps left on the
+// ramps) without an index, else O(1).
+uint64_t bushd_run_units_of_last(const bushd_run* run, uint32_t steps);
+
+// As bushd_run_ramp_down, but a run that ramps down already, to its end or to a floor, only goes on
+// with that: equal codes that it has still to make are not left out. The interval between two steps
+// of a slow motor that follows may hold all of them.
+void bushd_run_ramp_down_once(bushd_run* run);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,110 @@
+#include "motion/way.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+namespace bushd::motion {
+
+Way::Way(std::vector<Motor> motors) : motors_(std::move(motors)) {
+  for (std::size_t i = 0; i < motors_.size(); ++i) longest_ = std::max(longest_, increment(i));
+  if (longest_ == 0) return;
+  table_ = std::make_shared<const tables::Envelope>(parts(), longest_);
+  floor_ = table_->floor();
+  limiting_ = tables::limiting_part(parts(), longest_);
+}
+
+std::uint32_t Way::increment(std::size_t motor) const {
+  return static_cast<std::uint32_t>(std::abs(motors_[motor].to - motors_[motor].from));
+}
+
+std::vector<tables::LinePart> Way::parts() const {
+  std::vector<tables::LinePart> parts;
+  for (std::size_t i = 0; i < motors_.size(); ++i) {
+    parts.push_back({motors_[i].table, increment(i), motors_[i].floor});
+  }
+  return parts;
+}
+
+double Way::duration_ns(std::uint16_t floor) const {
+  if (longest_ == 0) return 0;
+  bushd_run run;
+  bushd_run_start(&run, &table_->view(), longest_, 1, floor);
+  return static_cast<double>(bushd_run_units_left(&run)) * table_->view().time_unit_ns;
+}
+
+double Way::most_steps_per_s(std::size_t motor) const {
+  if (longest_ == 0) return 0;
+  const std::uint16_t delay = std::max(bushd_table_fastest(&table_->view()), floor_);
+  const double run = 1e9 / (static_cast<double>(delay) * table_->view().time_unit_ns);
+  return run * increment(motor) / longest_;
+}
+
+std::int64_t Way::position_at(std::size_t motor, std::uint32_t step) const {
+  const auto& [table, from, to, floor] = motors_[motor];
+  if (longest_ == 0) return from;
+  bushd_line line;
+  bushd_line_start(&line, increment(motor), longest_);
+  bushd_line_go_to(&line, step);
+  return to < from ? from - line.made : from + line.made;
+}
+
+LineShare Way::share(std::size_t motor, std::uint32_t from, std::uint32_t to) const {
+  return {.way = number_,
+          .table = table_,
+          .increment = increment(motor),
+          .longest = longest_,
+          .direction = motors_[motor].to < motors_[motor].from ? -1 : 1,
+          .from = from,
+          .to = to};
+}
+
+bool Way::set_floors(std::span<const std::uint16_t> floors) {
+  std::vector<tables::LinePart> changed = parts();
+  for (std::size_t i = 0; i < changed.size(); ++i) changed[i].floor = floors[i];
+  const auto floor = table_->floor_of(changed, longest_);
+  if (!floor) return false;
+  for (std::size_t i = 0; i < motors_.size(); ++i) motors_[i].floor = floors[i];
+  floor_ = *floor;
+  return true;
+}
+
+Result<void> Way::take(double duration_s, double longest_ns) {
+  if (!std::isfinite(duration_s) || duration_s <= 0) {
+    return fail(fmt::format("duration of {} s; allowed: above 0", duration_s));
+  }
+  const double wanted_ns = duration_s * 1e9;
+  const double least_ns = duration_ns();
+  // What a client was told before must not be refused for its last digit.
+  if (wanted_ns < least_ns * (1 - 1e-6)) {
+    return fail(
+        fmt::format("duration of {:.6g} s: the line takes at least {:.6g} s; ask for that "
+                    "or more",
+                    duration_s, least_ns * 1e-9));
+  }
+  const double most_ns = std::min(duration_ns(UINT16_MAX), longest_ns);
+  if (wanted_ns > most_ns) {
+    return fail(
+        fmt::format("duration of {:.6g} s: the line takes at most {:.6g} s; ask for that or "
+                    "less",
+                    duration_s, most_ns * 1e-9));
+  }
+  // The least floor by which it is so long: the longer the floor, the longer the line.
+  std::uint32_t low = floor_;
+  std::uint32_t high = UINT16_MAX;
+  while (low < high) {
+    const std::uint32_t middle = low + (high - low) / 2;
+    if (duration_ns(static_cast<std::uint16_t>(middle)) >= wanted_ns) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  floor_ = static_cast<std::uint16_t>(low);
+  return {};
+}
+
+}  // namespace bushd::motion

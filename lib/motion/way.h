@@ -1,0 +1,66 @@
+// A straight way of several motors: from where to where, by which table, how fast, and where each
+// of them is on it. The runs on it are those of their axes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/result.h"
+#include "motion/axis.h"
+#include "tables/envelope.h"
+
+namespace bushd::motion {
+
+class Way {
+ public:
+  struct Motor {
+    const bushd_table* table;  // outlives the way
+    std::int64_t from;
+    std::int64_t to;  // |to - from| < 2^31
+    std::uint16_t floor;
+  };
+  Way() = default;
+  // At least one motor.
+  explicit Way(std::vector<Motor> motors);
+
+  // A number for logs, which its shares have too.
+  void set_number(std::uint64_t number) { number_ = number; }
+
+  const std::vector<Motor>& motors() const { return motors_; }
+  std::uint32_t increment(std::size_t motor) const;
+  // In steps of the motor with most of them; 0: none moves, and all else says nothing.
+  std::uint32_t longest() const { return longest_; }
+  std::uint16_t floor() const { return floor_; }  // of its runs
+  const std::shared_ptr<const tables::Envelope>& table() const { return table_; }
+  // By whose table it takes so long.
+  std::size_t limiting() const { return limiting_; }
+  double duration_ns() const { return duration_ns(floor_); }
+  double most_steps_per_s(std::size_t motor) const;
+  // Where a motor is when the way's run has made so many steps of it.
+  std::int64_t position_at(std::size_t motor, std::uint32_t step) const;
+  // A motor's share of a run between these steps of the way.
+  LineShare share(std::size_t motor, std::uint32_t from, std::uint32_t to) const;
+
+  // Other floors of the motors. Returns false, and changes nothing, if they are too slow to be
+  // told.
+  bool set_floors(std::span<const std::uint16_t> floors);
+  // Takes at least this long, and not much longer. Errors: more or less than what is possible.
+  Result<void> take(double duration_s, double longest_ns);
+
+ private:
+  std::vector<tables::LinePart> parts() const;
+  double duration_ns(std::uint16_t floor) const;
+
+  std::vector<Motor> motors_;
+  std::uint64_t number_ = 0;
+  std::uint32_t longest_ = 0;
+  std::shared_ptr<const tables::Envelope> table_;
+  std::uint16_t floor_ = 0;
+  std::size_t limiting_ = 0;
+};
+
+}  // namespace bushd::motion

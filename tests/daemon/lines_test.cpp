@@ -1,0 +1,416 @@
+// Motors on a straight line, over the real firmware core: where they are relative to each other at
+// any time, what stops, pauses and limits do to all of them, and what is told.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+api::MoveLine line_to(const std::vector<std::string>& motors,
+                      const std::vector<std::int64_t>& steps) {
+  return {.kind = api::Move::Kind::kAbsolute, .motors = motor_steps(motors, steps)};
+}
+
+// Keys of the motor of this name.
+std::string with_keys(std::string toml, const std::string& motor, const std::string& keys) {
+  const std::string name = "name = \"" + motor + "\"\n";
+  return toml.insert(toml.find(name) + name.size(), keys);
+}
+
+// How far the shafts are from the nearest point of the line from 0 to these steps.
+double off_line(const Lab& lab, const std::vector<std::string>& motors,
+                const std::vector<std::int64_t>& steps) {
+  double along = 0;
+  double length = 0;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const auto n = static_cast<double>(steps[i]);
+    along += n * static_cast<double>(lab.shaft_steps(motors[i]));
+    length += n * n;
+  }
+  double most = 0;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const double there = static_cast<double>(steps[i]) * along / length;
+    most = std::max(most, std::abs(static_cast<double>(lab.shaft_steps(motors[i])) - there));
+  }
+  return most;
+}
+
+const std::vector<std::string> kMotors{"m01", "m02", "m03", "m04"};
+const std::vector<std::int64_t> kSteps{3000, -1201, 17, 0};
+
+TEST(Lines, AllMotorsAreOnTheLineAtAnyTime) {
+  for (const char* manner : {"fine", "coarse", "fine_table", "coarse_ticks"}) {
+    SCOPED_TRACE(manner);
+    Lab lab(hall(2, 2, manner));
+    lab.connect();
+    const auto move = lab.send(line_to(kMotors, kSteps));
+    double most = 0;
+    lab.run_until([&] {
+      most = std::max(most, off_line(lab, kMotors, kSteps));
+      return lab.has_result(move);
+    });
+    // Half a step each, and what a tick of the stream may be off its run.
+    EXPECT_LT(most, 2.5);
+    const Answer result = lab.last_reply(move);
+    EXPECT_EQ(result.result, "reached");
+    EXPECT_EQ(result.reason, "m01: stands at its target; the line was limited by m01");
+    EXPECT_THAT(result.position_steps, ElementsAre(3000, -1201, 17, 0));
+    for (std::size_t i = 0; i < kMotors.size(); ++i) {
+      EXPECT_EQ(lab.shaft_steps(kMotors[i]), kSteps[i]);
+    }
+    for (const char* mcu : {"hall:1", "hall:2"}) {
+      EXPECT_EQ(lab.mcu_health(mcu).rejected_frames, 0u);
+      EXPECT_EQ(lab.mcu_health(mcu).ramp_downs, 0u);
+    }
+    EXPECT_THAT(lab.errors(), testing::IsEmpty());
+  }
+}
+
+TEST(Lines, EqualMotorsTakeTheTimeOfOne) {
+  Lab lab(hall(1, 3));
+  lab.connect();
+  auto alone = api::Move{.motors = motor_steps({"m01"}, {2000}), .dry_run = true};
+  auto line = line_to({"m01", "m02", "m03"}, {2000, 0, -2000});
+  line.dry_run = true;
+  const auto of_one = lab.wait(lab.send(alone)).plan;
+  const auto of_line = lab.wait(lab.send(line)).plan;
+  ASSERT_TRUE(of_one && of_line);
+  EXPECT_EQ(of_line->duration_us, of_one->duration_us);
+  EXPECT_EQ(of_line->motors[0].duration_us, of_one->motors[0].duration_us);
+  EXPECT_EQ(of_line->limited_by, "m01");
+  EXPECT_EQ(of_line->motors[2].steps, -2000);
+  EXPECT_TRUE(of_line->traffic);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
+TEST(Lines, StateTellsTheShareAndTheTimeLeft) {
+  Lab lab(hall(2, 1));
+  lab.connect();
+  const auto move = lab.send(line_to({"m01", "m02"}, {1000, 4000}));
+  lab.run_until([&] { return lab.shaft_steps("m02") >= 2000; });
+  lab.run_for(0.2);
+  const api::MotorState state = lab.motor("m01");
+  ASSERT_TRUE(state.line);
+  EXPECT_NEAR(state.line->fraction, static_cast<double>(lab.motor("m02").position_steps) / 4000,
+              0.01);
+  EXPECT_EQ(state.target_steps, 1000);
+  const auto now_us = lab.now_us();
+  lab.wait(move);
+  EXPECT_NEAR(static_cast<double>(state.line->left_us), static_cast<double>(lab.now_us() - now_us),
+              3e5);
+  lab.run_for(1.5);
+  EXPECT_FALSE(lab.motor("m01").line);
+}
+
+TEST(Lines, AStopOfOneLeavesAllOnTheLine) {
+  for (const char* manner : {"fine", "coarse"}) {
+    for (const double after_s : {0.105, 0.12, 0.15, 0.3, 0.6, 0.9, 1.0}) {
+      SCOPED_TRACE(std::string(manner) + " " + std::to_string(after_s));
+      Lab lab(hall(2, 2, manner));
+      lab.connect();
+      const auto move = lab.send(line_to(kMotors, {-2500, 1201, -40, 2499}));
+      lab.run_for(after_s);
+      EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m03"})).result, "done");
+      const Answer result = lab.wait(move);
+      EXPECT_EQ(result.result, "stopped");
+      EXPECT_THAT(result.reason, HasSubstr("stopped on request, asked for by command"));
+      EXPECT_THAT(result.reason, Not(HasSubstr("off it")));
+      EXPECT_LT(off_line(lab, kMotors, {-2500, 1201, -40, 2499}), 0.8);
+      lab.run_for(0.5);
+      EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0u);
+      EXPECT_EQ(lab.mcu_health("hall:2").rejected_frames, 0u);
+      // The motors' counters and remainders are whole: they move on from there.
+      EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, {0, 0, 0, 0}))).result, "reached");
+      for (const std::string& motor : kMotors) EXPECT_EQ(lab.shaft_steps(motor), 0);
+    }
+  }
+}
+
+TEST(Lines, PausesAndGoesOn) {
+  for (const char* manner : {"fine", "coarse"}) {
+    SCOPED_TRACE(manner);
+    Lab lab(hall(2, 2, manner));
+    lab.connect();
+    const auto move = lab.send(line_to(kMotors, kSteps));
+    lab.run_until([&] { return lab.shaft_steps("m01") >= 700; });
+    EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m02"}})).reason, "paused: 4 motors");
+    EXPECT_LT(off_line(lab, kMotors, kSteps), 0.8);
+    EXPECT_TRUE(lab.motor("m01").paused);
+    EXPECT_FALSE(lab.has_result(move));
+    const std::int64_t stands = lab.shaft_steps("m01");
+    lab.run_for(2);
+    EXPECT_EQ(lab.shaft_steps("m01"), stands);
+    EXPECT_EQ(lab.wait(lab.send(api::Resume{{"m01"}})).reason, "resumed: 4 motors");
+    double most = 0;
+    lab.run_until([&] {
+      most = std::max(most, off_line(lab, kMotors, kSteps));
+      return lab.has_result(move);
+    });
+    EXPECT_LT(most, 2.5);
+    EXPECT_EQ(lab.last_reply(move).result, "reached");
+    for (std::size_t i = 0; i < kMotors.size(); ++i) {
+      EXPECT_EQ(lab.shaft_steps(kMotors[i]), kSteps[i]);
+    }
+    EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0u);
+    EXPECT_EQ(lab.mcu_health("hall:2").rejected_frames, 0u);
+  }
+}
+
+TEST(Lines, ResumedWhileTheyRampDownTheyStandFirst) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(line_to(kMotors, kSteps));
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 1500; });
+  lab.send(api::Pause{});
+  lab.run_for(0.05);
+  lab.send(api::Resume{});
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m02"), -1201);
+}
+
+TEST(Lines, ASpeedIsThatOfEachMotor) {
+  Lab lab(hall(1, 2));
+  lab.connect();
+  auto line = line_to({"m01", "m02"}, {1000, 500});
+  line.speed = api::Speed{.per_s = 100, .in_steps = true};
+  const Answer result = lab.wait(lab.send(line));
+  EXPECT_EQ(result.result, "reached");
+  EXPECT_LE(result.most_steps_per_s[0], 100.0);
+  EXPECT_GT(result.most_steps_per_s[0], 99.0);
+  EXPECT_NEAR(result.most_steps_per_s[1], 50.0, 0.5);
+}
+
+TEST(Lines, ADurationIsAsked) {
+  Lab lab(hall(1, 2));
+  lab.connect();
+  auto line = line_to({"m01", "m02"}, {1000, 300});
+  line.duration_s = 12;
+  line.dry_run = true;
+  const auto plan = lab.wait(lab.send(line)).plan;
+  ASSERT_TRUE(plan);
+  EXPECT_NEAR(static_cast<double>(plan->duration_us), 12e6, 0.1e6);
+  EXPECT_GE(plan->motors[0].duration_us, 12'000'000);
+  line.duration_s = 0.1;
+  EXPECT_THAT(lab.wait(lab.send(line)).reason, HasSubstr("the line takes at least"));
+  EXPECT_THAT(lab.last_reply(lab.send(line)).reason, HasSubstr("limited by m01"));
+  line.duration_s = 1e7;
+  EXPECT_THAT(lab.wait(lab.send(line)).reason, HasSubstr("the line takes at most"));
+}
+
+TEST(Lines, ANearerEndAndAnotherSpeed) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(line_to(kMotors, {4000, -2000, 1000, 0}));
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 800; });
+  auto slower = line_to(kMotors, {4000, -2000, 1000, 0});
+  slower.speed = api::Speed{.per_s = 300, .in_steps = true};
+  const auto second = lab.send(slower);
+  EXPECT_EQ(lab.wait(move).result, "stopped");
+  EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("was given a new target by command"));
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 1200; });
+  EXPECT_LT(off_line(lab, kMotors, {4000, -2000, 1000, 0}), 2.0);
+  // Named in another order, as a distance from the target.
+  const auto third = lab.send(
+      api::MoveLine{.motors = motor_steps({"m03", "m04", "m01", "m02"}, {-500, 0, -2000, 1000})});
+  EXPECT_EQ(lab.wait(third).result, "reached");
+  EXPECT_EQ(lab.last_reply(second).result, "stopped");
+  EXPECT_EQ(lab.shaft_steps("m01"), 2000);
+  EXPECT_EQ(lab.shaft_steps("m02"), -1000);
+  EXPECT_EQ(lab.shaft_steps("m03"), 500);
+}
+
+TEST(Lines, AnEndThatComesTooLateIsReachedFromBeyond) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(line_to(kMotors, {4000, -2000, 1000, 0}));
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
+  const auto back = lab.send(line_to(kMotors, {400, -200, 100, 0}));
+  EXPECT_EQ(lab.wait(back).result, "reached");
+  EXPECT_EQ(lab.last_reply(move).result, "stopped");
+  EXPECT_EQ(lab.shaft_steps("m01"), 400);
+  EXPECT_EQ(lab.shaft_steps("m02"), -200);
+  EXPECT_EQ(lab.shaft_steps("m03"), 100);
+}
+
+TEST(Lines, WhatIsNotOnTheLineIsRefused) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(line_to(kMotors, {4000, -2000, 1000, 0}));
+  lab.run_for(0.5);
+  const auto refusal = [&](const api::Request& request) {
+    return lab.wait(lab.send(request)).reason;
+  };
+  EXPECT_THAT(
+      refusal(line_to(kMotors, {2000, -1002, 500, 0})),
+      HasSubstr(
+          "m02: -1002 steps is not on the line that is under way, which leads through -1000"));
+  EXPECT_THAT(refusal(line_to(kMotors, {5000, -2500, 1250, 0})), HasSubstr("beyond the ends"));
+  EXPECT_THAT(refusal(line_to({"m01", "m02"}, {2000, -1000})), HasSubstr("name all of them"));
+  EXPECT_THAT(refusal(request_of(Ask::kMoveTo, {"m01"}, {10})), HasSubstr("moves on a line"));
+  EXPECT_THAT(refusal(api::Jog{.motor = "m01", .per_s = 10, .in_steps = true}),
+              HasSubstr("moves on a line"));
+  EXPECT_EQ(lab.wait(move).result, "reached");
+}
+
+TEST(Lines, BeginAtRestAndOnOneBus) {
+  Lab lab(hall(1, 2) +
+          "\n[[bus]]\nname = \"lab\"\nport = \"/dev/null1\"\nbaud = 500000\ntick_us = 2560\n"
+          "format = \"fine\"\n[[mcu]]\nbus = \"lab\"\naddress = 1\n"
+          "[[motor]]\nname = \"far\"\nmcu = \"lab:1\"\noutput = 0\ngroup = \"axes\"\n");
+  lab.connect();
+  EXPECT_THAT(lab.wait(lab.send(line_to({"m01", "far"}, {10, 10}))).reason,
+              HasSubstr("m01 is on bus hall and far on bus lab"));
+  const auto move = lab.send(Ask::kMoveTo, {"m02"}, {500});
+  lab.run_for(0.2);
+  EXPECT_THAT(lab.wait(lab.send(line_to({"m01", "m02"}, {10, 10}))).reason,
+              HasSubstr("begin it at rest"));
+  lab.wait(move);
+  EXPECT_EQ(lab.wait(lab.send(line_to({"m01", "m02"}, {0, 500}))).reason,
+            "m01: stands at its target already");
+}
+
+TEST(Lines, SoftLimitsAreThoseOfEachMotor) {
+  Lab lab(with_keys(hall(1, 2), "m02", "soft_limits = [-100, 100]\n"));
+  lab.connect();
+  const std::string why = lab.wait(lab.send(line_to({"m01", "m02"}, {1000, 101}))).reason;
+  EXPECT_THAT(why, HasSubstr("m02: target 101 steps is beyond the soft limit at 100"));
+  EXPECT_EQ(lab.wait(lab.send(line_to({"m01", "m02"}, {1000, 100}))).result, "reached");
+}
+
+TEST(Lines, BacklashIsTakenUpWhenAllHaveArrived) {
+  Lab lab(with_keys(hall(1, 2), "m02", "backlash = 30\n"));
+  lab.connect();
+  const auto move = lab.send(line_to({"m01", "m02"}, {-600, -300}));
+  lab.run_until([&] { return lab.shaft_steps("m01") == -600; });
+  EXPECT_NEAR(static_cast<double>(lab.shaft_steps("m02")), -300, 1);
+  std::int64_t lowest = 0;
+  lab.run_until([&] {
+    lowest = std::min(lowest, lab.shaft_steps("m02"));
+    return lab.has_result(move);
+  });
+  EXPECT_EQ(lowest, -330);
+  const Answer result = lab.last_reply(move);
+  EXPECT_EQ(result.result, "reached");
+  EXPECT_THAT(result.legs, ElementsAre(3, 3));
+  EXPECT_EQ(lab.shaft_steps("m02"), -300);
+  EXPECT_EQ(lab.shaft_steps("m01"), -600);
+  // From its side it goes straight.
+  EXPECT_THAT(lab.wait(lab.send(line_to({"m01", "m02"}, {0, 0}))).legs, ElementsAre(1, 1));
+}
+
+TEST(Lines, OneThatIsLostEndsTheOthersAlongTheLine) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(line_to(kMotors, {6000, -3001, 1500, 5999}));
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
+  lab.bus(0).reboot(1, 100'000'000);
+  const Answer result = lab.wait(move);
+  EXPECT_EQ(result.result, "link");
+  EXPECT_EQ(result.motor_results[0], "stopped");
+  EXPECT_EQ(result.motor_results[2], "link");
+  EXPECT_LT(off_line(lab, {"m01", "m02"}, {6000, -3001}), 0.8) << "those that went on are on it";
+  EXPECT_LT(lab.shaft_steps("m01"), 6000);
+}
+
+TEST(Lines, ALimitSwitchOfOneEndsTheOthersAlongTheLine) {
+  Lab lab(with_keys(hall(2, 2), "m03", "limit = \"positive\"\n"));
+  lab.connect();
+  const std::vector<std::int64_t> steps{6000, -3001, 1500, 5999};
+  const auto move = lab.send(line_to(kMotors, steps));
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
+  lab.bus(0).mcu(1).set_inputs({0b001, 0});
+  const Answer result = lab.wait(move);
+  EXPECT_EQ(result.result, "limit");
+  EXPECT_THAT(result.motor_results, ElementsAre("stopped", "stopped", "limit", "stopped"));
+  EXPECT_THAT(result.reason, HasSubstr("m03: stopped by its limit switch at the positive end"));
+  EXPECT_THAT(result.reason, HasSubstr("; the line was limited by m04, which was left at "));
+  EXPECT_THAT(result.reason, HasSubstr("; m03 stands "));
+  EXPECT_LT(off_line(lab, {"m01", "m02", "m04"}, {6000, -3001, 5999}), 0.8);
+  const std::string why = lab.wait(lab.send(line_to(kMotors, steps))).reason;
+  EXPECT_THAT(why, HasSubstr("m03: its limit switch at the positive end is active"));
+}
+
+// Frames are lost: what is told of the line is where its motors stand.
+TEST(Lines, WhatIsToldIsTrueOnABadLine) {
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE(seed);
+    Lab lab(hall(3, 2));
+    lab.connect();
+    std::mt19937 random(seed);
+    lab.on_send = [&random](std::size_t, std::vector<std::uint8_t>&) { return random() % 12 != 0; };
+    const std::vector<std::string> motors{"m01", "m02", "m03", "m04", "m05", "m06"};
+    const std::vector<std::int64_t> steps{9000, -4001, 1700, 12, -8999, 0};
+    const auto move = lab.send(line_to(motors, steps));
+    lab.run_for(0.3 + 0.1 * static_cast<double>(seed));
+    if (seed % 3 != 0) lab.wait(lab.send(api::Pause{{"m02"}}));
+    if (seed % 3 == 1) lab.wait(lab.send(api::Resume{}));
+    if (seed % 3 == 1) lab.run_for(0.4);
+    lab.send(Ask::kStop, {"m05"});
+    const Answer result = lab.wait(move);
+    lab.run_for(1);
+    const bool off = result.reason.find("steps off it") != std::string::npos;
+    EXPECT_TRUE(result.result == "stopped" || result.result == "link") << result.reason;
+    if (result.result == "stopped") {
+      EXPECT_EQ(off_line(lab, motors, steps) > 0.8, off) << result.reason;
+    }
+    for (std::size_t i = 0; i < motors.size(); ++i) {
+      EXPECT_EQ(lab.shaft_steps(motors[i]), lab.motor(motors[i]).position_steps);
+    }
+    EXPECT_EQ(lab.wait(lab.send(line_to(motors, {0, 0, 0, 0, 0, 0}))).result, "reached");
+  }
+}
+
+TEST(Lines, AnEmergencyStopEndsThem) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(line_to(kMotors, kSteps));
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 1000; });
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  const Answer result = lab.wait(move);
+  EXPECT_EQ(result.result, "stopped");
+  EXPECT_THAT(result.reason, HasSubstr("stopped by an emergency stop"));
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, {0, 0, 0, 0}))).result, "reached");
+}
+
+TEST(Lines, AStopBeforeTheStartMovesNothing) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(line_to(kMotors, kSteps));
+  lab.run_for(0.005);
+  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  EXPECT_EQ(lab.wait(move).result, "stopped");
+  for (const std::string& motor : kMotors) EXPECT_EQ(lab.shaft_steps(motor), 0);
+  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, kSteps))).result, "reached");
+}
+
+TEST(Lines, AreKeptLikeOtherMoves) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  lab.keep_positions();
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, kSteps))).result, "reached");
+  const auto history = lab.send(api::GetHistory{.motor = "m02"});
+  lab.wait(history);
+  const auto past = lab.history(history);
+  ASSERT_FALSE(past.empty());
+  EXPECT_EQ(past.front().what, "line");
+  EXPECT_EQ(past.front().to_steps, -1201);
+}
+
+}  // namespace
+}  // namespace bushd::test

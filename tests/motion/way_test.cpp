@@ -1,0 +1,85 @@
+#include "motion/way.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "engine/tables.h"
+
+namespace bushd::motion {
+namespace {
+
+using test::Law;
+using test::TestTable;
+using testing::HasSubstr;
+
+Law law(std::uint16_t cruise) {
+  return {.accel = {1000, 500, cruise}, .decel = {1000, cruise}, .cruise = cruise, .unit_ns = 1000};
+}
+
+class WayTest : public testing::Test {
+ protected:
+  TestTable quick_{law(100), true};
+  TestTable slow_{law(400), true};
+};
+
+TEST_F(WayTest, LeadsAllMotorsToTheirEnds) {
+  const Way way(
+      {{quick_.view(), 100, 1100, 0}, {slow_.view(), 5, -95, 0}, {quick_.view(), 7, 7, 0}});
+  EXPECT_EQ(way.longest(), 1000u);
+  EXPECT_EQ(way.increment(1), 100u);
+  EXPECT_EQ(way.position_at(0, 0), 100);
+  EXPECT_EQ(way.position_at(1, 500), 5 - 50);
+  EXPECT_EQ(way.position_at(0, 1000), 1100);
+  EXPECT_EQ(way.position_at(1, 1000), -95);
+  EXPECT_EQ(way.position_at(2, 1000), 7);
+  const LineShare share = way.share(1, 10, 900);
+  EXPECT_EQ(share.direction, -1);
+  EXPECT_EQ(share.increment, 100u);
+  EXPECT_EQ(share.from, 10u);
+  EXPECT_EQ(share.to, 900u);
+  EXPECT_EQ(way.share(0, 0, 1).direction, 1);
+}
+
+TEST_F(WayTest, IsAsFastAsTheMotorThatLimitsIt) {
+  const Way even({{quick_.view(), 0, 1000, 0}, {slow_.view(), 0, 1000, 0}});
+  EXPECT_EQ(even.limiting(), 1u);
+  EXPECT_EQ(even.most_steps_per_s(0), 2500.0);
+  const Way uneven({{quick_.view(), 0, 1000, 0}, {slow_.view(), 0, -100, 0}});
+  EXPECT_EQ(uneven.limiting(), 0u);
+  EXPECT_EQ(uneven.most_steps_per_s(1), 1000.0);
+  const Way limited({{quick_.view(), 0, 1000, 0}, {slow_.view(), 0, -100, 2000}});
+  EXPECT_EQ(limited.limiting(), 1u);
+  EXPECT_EQ(limited.most_steps_per_s(1), 500.0);
+}
+
+TEST_F(WayTest, OfNoStepsTakesNoTime) {
+  const Way way({{quick_.view(), 3, 3, 0}, {slow_.view(), -4, -4, 0}});
+  EXPECT_EQ(way.longest(), 0u);
+  EXPECT_EQ(way.duration_ns(), 0.0);
+  EXPECT_EQ(way.position_at(1, 0), -4);
+}
+
+TEST_F(WayTest, TakesAsLongAsIsAsked) {
+  Way way({{quick_.view(), 0, 1000, 0}, {slow_.view(), 0, 100, 0}});
+  const double least_s = way.duration_ns() * 1e-9;
+  ASSERT_TRUE(way.take(1.0, 1e12));
+  EXPECT_GE(way.duration_ns(), 1e9);
+  EXPECT_LT(way.duration_ns(), 1.001e9);
+  EXPECT_THAT(Way({{quick_.view(), 0, 1000, 0}}).take(least_s / 2, 1e12).error().message,
+              HasSubstr("the line takes at least"));
+  EXPECT_THAT(way.take(1000.0, 1e12).error().message, HasSubstr("the line takes at most 65.535 s"));
+  EXPECT_THAT(way.take(50.0, 3e10).error().message, HasSubstr("the line takes at most 30 s"));
+  EXPECT_FALSE(way.take(-1, 1e12));
+  EXPECT_FALSE(way.take(0.0 / 0.0, 1e12));
+}
+
+TEST_F(WayTest, TakesOtherFloors) {
+  Way way({{quick_.view(), 0, 1000, 0}, {quick_.view(), 0, 100, 0}});
+  EXPECT_TRUE(way.set_floors(std::vector<std::uint16_t>{0, 4000}));
+  EXPECT_EQ(way.floor(), 400);
+  EXPECT_EQ(way.motors()[1].floor, 4000);
+  EXPECT_EQ(way.most_steps_per_s(1), 250.0);
+}
+
+}  // namespace
+}  // namespace bushd::motion
