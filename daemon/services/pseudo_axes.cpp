@@ -13,8 +13,9 @@ namespace {
 
 std::vector<double> positions_of(const config::PseudoLaw& law, const std::vector<double>& motors) {
   return std::visit(
-      Overloaded{[&](const pseudo::LinearAxes& axes) { return axes.positions(motors); },
-                 [&](const pseudo::CurvedAxis& axis) { return std::vector{axis.position(motors)}; }},
+      Overloaded{
+          [&](const pseudo::LinearAxes& axes) { return axes.positions(motors); },
+          [&](const pseudo::CurvedAxis& axis) { return std::vector{axis.position(motors)}; }},
       law);
 }
 
@@ -127,35 +128,35 @@ Result<std::optional<api::Request>> PseudoAxes::of_motors(const api::Request& re
     return fail(fmt::format("{} is computed from motors {}; name these", name,
                             motors_text(installation_.config().pseudos[place->pseudo])));
   };
-  return std::visit(
-      Overloaded{[&](const api::Move& move) -> Answer {
-                   const auto is_computed = [this](const api::MotorAmount& amount) {
-                     return find(amount.motor).has_value();
-                   };
-                   if (!std::ranges::any_of(move.motors, is_computed)) return std::nullopt;
-                   auto asked = of_motors(move);
-                   if (!asked) return fail(asked.error());
-                   return std::move(*asked);
-                 },
-                 [&](const api::Stop& r) { return named(r); },
-                 [&](const api::Pause& r) { return named(r); },
-                 [&](const api::Resume& r) { return named(r); },
-                 [&](const api::Hold& r) { return named(r); },
-                 [&](const api::Release& r) { return named(r); },
-                 [&](const api::Jog& r) { return refuse(r.motor); },
-                 [&](const auto& r) -> Answer {
-                   if constexpr (requires { r.motors.front().motor; }) {
-                     for (const auto& one : r.motors) {
-                       if (auto refused = refuse(one.motor); !refused) return refused;
-                     }
-                   } else if constexpr (requires { api::MotorNames(r.motors); }) {
-                     for (const auto& name : r.motors) {
-                       if (auto refused = refuse(name); !refused) return refused;
-                     }
-                   }
-                   return std::nullopt;
-                 }},
-      request);
+  return std::visit(Overloaded{[&](const api::Move& move) -> Answer {
+                                 const auto is_computed = [this](const api::MotorAmount& amount) {
+                                   return find(amount.motor).has_value();
+                                 };
+                                 if (!std::ranges::any_of(move.motors, is_computed))
+                                   return std::nullopt;
+                                 auto asked = of_motors(move);
+                                 if (!asked) return fail(asked.error());
+                                 return std::move(*asked);
+                               },
+                               [&](const api::Stop& r) { return named(r); },
+                               [&](const api::Pause& r) { return named(r); },
+                               [&](const api::Resume& r) { return named(r); },
+                               [&](const api::Hold& r) { return named(r); },
+                               [&](const api::Release& r) { return named(r); },
+                               [&](const api::Jog& r) { return refuse(r.motor); },
+                               [&](const auto& r) -> Answer {
+                                 if constexpr (requires { r.motors.front().motor; }) {
+                                   for (const auto& one : r.motors) {
+                                     if (auto refused = refuse(one.motor); !refused) return refused;
+                                   }
+                                 } else if constexpr (requires { api::MotorNames(r.motors); }) {
+                                   for (const auto& name : r.motors) {
+                                     if (auto refused = refuse(name); !refused) return refused;
+                                   }
+                                 }
+                                 return std::nullopt;
+                               }},
+                    request);
 }
 
 Result<std::vector<double>> PseudoAxes::positions_asked(const api::Move& move,
@@ -164,18 +165,18 @@ Result<std::vector<double>> PseudoAxes::positions_asked(const api::Move& move,
   std::vector<double> positions = positions_of(pseudo.law, motors);
   for (const api::MotorAmount& amount : move.motors) {
     const auto place = find(amount.motor);
-    const config::Pseudo* its =
-        place ? &installation_.config().pseudos[place->pseudo] : nullptr;
+    const config::Pseudo* its = place ? &installation_.config().pseudos[place->pseudo] : nullptr;
     if (its != &pseudo) {
-      return fail(fmt::format("{} does not go with the axes that are computed from {}; move it by a "
-                              "request of its own",
-                              amount.motor, motors_text(pseudo)));
+      return fail(
+          fmt::format("{} does not go with the axes that are computed from {}; move it by a "
+                      "request of its own",
+                      amount.motor, motors_text(pseudo)));
     }
     const config::PseudoAxis& axis = pseudo.axes[place->axis];
     const auto* steps = std::get_if<std::int64_t>(&amount.amount);
-    const double asked = steps != nullptr ? static_cast<double>(*steps) /
-                                                static_cast<double>(counts_per_unit(axis))
-                                          : std::get<api::UserUnits>(amount.amount).value;
+    const double asked =
+        steps != nullptr ? static_cast<double>(*steps) / static_cast<double>(counts_per_unit(axis))
+                         : std::get<api::UserUnits>(amount.amount).value;
     double& position = positions[place->axis];
     position = move.kind == api::Move::Kind::kAbsolute ? asked : position + asked;
     if (!std::isfinite(position)) return fail(axis.name + ": a target that is not finite");
@@ -265,7 +266,10 @@ api::StateSnapshot PseudoAxes::state(std::size_t index, const StateOf& state_of)
     }
   }
   const auto* curved = std::get_if<pseudo::CurvedAxis>(&pseudo.law);
-  if (curved != nullptr && !curved->is_within(positions) &&
+  const units::Coordinates& first = installation_[pseudo.motors.front()].coordinates();
+  const double step = std::abs(first.user_of(1) - first.user_of(0));
+  // The step that is nearest to an end may be beyond it.
+  if (curved != nullptr && curved->beyond(positions) > step / 2 &&
       rank(all.trust) < rank(api::Trust::kUncertain)) {
     all.trust = api::Trust::kUncertain;
     all.uncertain_reason =
@@ -283,8 +287,8 @@ api::StateSnapshot PseudoAxes::state(std::size_t index, const StateOf& state_of)
     const bool known = state.trust != api::Trust::kUnknown;
     state.position_steps = known ? counts_of(axis, positions[i]) : 0;
     state.target_steps = known ? counts_of(axis, targets[i]) : 0;
-    state.velocity_steps_per_s = (later[i] - positions[i]) / kLaterS *
-                                 static_cast<double>(counts_per_unit(axis));
+    state.velocity_steps_per_s =
+        (later[i] - positions[i]) / kLaterS * static_cast<double>(counts_per_unit(axis));
     snapshot.motors.push_back(std::move(state));
   }
   return snapshot;

@@ -22,9 +22,9 @@ class PseudoAxes {
 
   std::size_t size() const { return installation_.config().pseudos.size(); }
 
-  // The same, asked of motors; nothing if the request names no computed axis. Moves are to where the
-  // motors stand when they have made what they were told before. Errors: axes of two sections, or
-  // axes and motors, in one move; a target beyond a limit of the axis or its calibration; what
+  // The same, asked of motors; nothing if the request names no computed axis. Moves are to where
+  // the motors stand when they have made what they were told before. Errors: axes of two sections,
+  // or axes and motors, in one move; a target beyond a limit of the axis or its calibration; what
   // cannot be asked of a computed axis.
   Result<std::optional<api::Request>> of_motors(const api::Request& request) const;
 
@@ -41,8 +41,7 @@ class PseudoAxes {
   std::optional<Place> find(const std::string& name) const;
   std::string motors_text(const config::Pseudo& pseudo) const;
   Result<api::Request> of_motors(const api::Move& move) const;
-  Result<std::vector<double>> positions_asked(const api::Move& move,
-                                              const config::Pseudo& pseudo,
+  Result<std::vector<double>> positions_asked(const api::Move& move, const config::Pseudo& pseudo,
                                               const std::vector<double>& motors) const;
 
   const Installation& installation_;

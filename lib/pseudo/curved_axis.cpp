@@ -46,10 +46,10 @@ double CurvedAxis::position(std::span<const double> motors) const {
   return curves_.front().where(motors.front());
 }
 
-bool CurvedAxis::is_within(std::span<const double> motors) const {
+double CurvedAxis::beyond(std::span<const double> motors) const {
   const MonotoneCubic& first = curves_.front();
   const auto [low, high] = std::minmax({first.first_y(), first.last_y()});
-  return motors.front() >= low && motors.front() <= high;
+  return std::max({low - motors.front(), motors.front() - high, 0.0});
 }
 
 std::vector<double> CurvedAxis::deviations(std::span<const double> motors) const {

@@ -31,8 +31,8 @@ class CurvedAxis {
 
   // That of the first motor; beyond the calibration: its end.
   double position(std::span<const double> motors) const;
-  // Whether the first motor stands within the calibration.
-  bool is_within(std::span<const double> motors) const;
+  // How far the first motor stands beyond the calibration; 0 within.
+  double beyond(std::span<const double> motors) const;
   // How far the others stand from where the first one says that they should; 0 for the first.
   std::vector<double> deviations(std::span<const double> motors) const;
   // Error: beyond the calibration, with its ends.

@@ -107,10 +107,11 @@ TEST(PseudoAxes, TheExamplesOfTheDocument) {
     // To where the calibrated ones begin.
     if (!example.files.empty()) {
       const auto first = targets_of(example.moves.substr(example.moves.find(':')));
-      ASSERT_EQ(lab.wait(lab.send(to({first.begin(), first.begin() + static_cast<std::ptrdiff_t>(
-                                                        example.motors().size())})))
-                    .result,
-                "reached");
+      ASSERT_EQ(
+          lab.wait(lab.send(to({first.begin(), first.begin() + static_cast<std::ptrdiff_t>(
+                                                                   example.motors().size())})))
+              .result,
+          "reached");
     }
     std::istringstream lines(example.moves);
     std::string line;
@@ -186,6 +187,24 @@ TEST(PseudoAxes, AreAsTrustedAsTheLeastTrustedMotor) {
   EXPECT_EQ(lab.motor("gap").trust, lab.motor("right").trust);
   EXPECT_THAT(lab.motor("gap").uncertain_reason, HasSubstr("right: "));
   lab.connect();
+}
+
+TEST(PseudoAxes, BeyondItsCalibrationAnAxisIsUncertain) {
+  const std::string toml = motors({"lift"});
+  Lab lab(toml);
+  lab.write_file("bar.csv", "angle,lift\n0,1\n10,17.36\n");
+  lab.use_configuration(toml +
+                        "[[pseudo]]\nname = \"angle\"\nunit = \"deg\"\nmotors = [\"lift\"]\n"
+                        "calibration = \"bar.csv\"\n");
+  lab.connect();
+  EXPECT_EQ(lab.motor("lift").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.motor("angle").trust, api::Trust::kUncertain);
+  EXPECT_EQ(lab.motor("angle").uncertain_reason, "lift stands beyond the calibration");
+  EXPECT_THAT(lab.last_reply(lab.send(to({{"angle", 10.1}}))).reason,
+              HasSubstr("angle: 10.1 is beyond the calibration; allowed: 0 to 10"));
+  EXPECT_EQ(lab.wait(lab.send(to({{"angle", 10}}))).result, "reached");
+  lab.run_for(0.2);
+  EXPECT_EQ(lab.motor("angle").trust, api::Trust::kKnown);
 }
 
 TEST(PseudoAxes, StopAndPauseAreThoseOfTheMotors) {

@@ -28,12 +28,12 @@ TEST(CurvedAxis, ItsMotorsFollowACurveEach) {
   EXPECT_THAT(axis->motors_for(6000).value(), ElementsAre(DoubleEq(19.2376), DoubleEq(14.9)));
   const std::vector<double> motors{19.2376, 14.95};
   EXPECT_NEAR(axis->position(motors), 6000, 1e-9);
-  EXPECT_TRUE(axis->is_within(motors));
+  EXPECT_EQ(axis->beyond(motors), 0);
   EXPECT_EQ(axis->deviations(motors)[0], 0);
   EXPECT_NEAR(axis->deviations(motors)[1], 0.05, 1e-12);
   const std::vector<double> beyond{24, 14.95};
   EXPECT_EQ(axis->position(beyond), 5000);
-  EXPECT_FALSE(axis->is_within(beyond));
+  EXPECT_NEAR(axis->beyond(beyond), 24 - 23.2956, 1e-12);
 }
 
 TEST(CurvedAxis, BeyondTheCalibrationThereIsNothing) {

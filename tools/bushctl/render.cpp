@@ -199,8 +199,7 @@ std::vector<std::string> table(const Status& status) {
       const auto description = description_of(status.descriptions.at(i).snapshot, m, motor.name);
       motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
                   is_mcu ? fmt::to_string(description.output) : std::string("-"),
-                  bushd::printable(description.group),
-                  text_of(description.table),
+                  bushd::printable(description.group), text_of(description.table),
                   position_text(motor, motor.position_steps, motor.user, description.scale),
                   position_text(motor, motor.target_steps, motor.user_target, description.scale),
                   speed_text(motor, description.scale), moving_word(motor, moves_text(motor), "-"),
