@@ -47,8 +47,8 @@ struct MotorState {
   friend bool operator==(const MotorState&, const MotorState&) = default;
 };
 
-// One MCU and its motors. Or axes that are computed from motors: their positions are those of `user`,
-// and their steps count the last decimal that people are shown.
+// One MCU and its motors. Or axes that are computed from motors: their positions are those of
+// `user`, and their steps count the last decimal that people are shown.
 struct StateSnapshot {
   std::string bus{};
   std::string mcu{};  // "<bus>:<address>", or "<bus>:<name of the first axis>"

@@ -90,7 +90,8 @@ Result<std::vector<PseudoAxis>> read_axes(const TomlReader& reader) {
     const bool steers =
         std::ranges::any_of(unit, [](char c) { return (c >= 0 && c < ' ') || c == 0x7F; });
     if (unit == units::Coordinates::kSteps) {
-      return fail(reader.error("unit", "is \"steps\", which only motors make; allowed: " + allowed));
+      return fail(
+          reader.error("unit", "is \"steps\", which only motors make; allowed: " + allowed));
     }
     if (unit.empty() || unit.size() > kLongestUnit || steers) {
       return fail(reader.error("unit", "is not allowed; allowed: " + allowed));
