@@ -6,7 +6,7 @@ import socket
 import time
 import unittest
 
-from rig import FAR, EndToEndTest
+from rig import FAR, EndToEndTest, program
 
 
 class ControlSocket(EndToEndTest):
@@ -61,6 +61,22 @@ class ControlSocket(EndToEndTest):
         self.assertEqual((local["by"], local["uid"], local["motors"]), ("socket", os.getuid(), ["a0"]))
         self.assertEqual(network["by"], "lcm")
         self.assertNotIn("uid", network)
+        for event in (local, network):
+            self.assertEqual((event["program"], event["host"]), ("bushctl", socket.gethostname()))
+
+    def test_who_has_no_right_is_told_before_lcm_is_used(self):
+        self.bring_up()
+        os.chmod(self.folder, 0o755)
+        command = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", program("BUSHCTL")]
+        if self.run_program(*command, "--version").returncode != 0:
+            self.skipTest("only root can be another user too")
+        seen = self.run_program(*command, "status")
+        self.assertEqual(seen.returncode, 0, seen.stderr)
+        self.assertRegex(seen.stderr, r"^bushctl: \S+/control: this user has no right to the control socket: it is for the "
+                                      r"group \S+. Run 'sudo usermod -aG \S+ USER', then log in again; LCM is used meanwhile\n$")
+        refused = self.run_program(*command, "--socket", self.file("control"), "status")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("no right to the control socket", refused.stderr)
 
     def test_a_second_daemon_does_not_take_it(self):
         self.bring_up()
