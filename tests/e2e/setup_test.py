@@ -3,6 +3,7 @@ wrong, with and without a daemon."""
 
 import json
 import os
+import subprocess
 import unittest
 
 from rig import EndToEndTest, program
@@ -94,6 +95,14 @@ class Doctor(EndToEndTest):
         lines = self.bushctl("doctor", "--config", self.file("bushd.toml"), "--watch-s", 1.5).stdout
         self.assertRegex(lines, r"ok +configuration +\S+bushd.toml: 8 motors")
         self.assertRegex(lines, r"\n\d+ errors?, \d+ warnings?\n$")
+
+    def test_asks_at_the_socket_of_the_configuration(self):
+        self.bring_up()
+        elsewhere = {name: value for name, value in os.environ.items() if name != "BUSHD_CONTROL"}
+        ran = subprocess.run([program("BUSHCTL"), "doctor", "--config", self.file("bushd.toml"), "--watch-s", "0"],
+                             env=elsewhere, capture_output=True, text=True, check=False)
+        self.assertIn(f"ok       socket         {self.file('control')}", ran.stdout)
+        self.assertIn("answers by the control socket", ran.stdout)
 
     def test_motors_that_nobody_has_surveyed(self):
         self.bring_up()

@@ -179,10 +179,22 @@ DaemonSeen daemon_seen(const Scope& scope) {
   return seen;
 }
 
+// The daemon of this configuration, unless somebody has named another one.
+Scope as_configured(Scope scope, const bushd::Result<bushd::config::Config>& config) {
+  bushd::client::ClientOptions& client = scope.client;
+  if (!config || client.way != bushd::client::ClientOptions::Way::kAny) return scope;
+  client.url = config->lcm.url;
+  client.prefix = config->lcm.prefix;
+  const auto paths = socket_paths(client, config);
+  if (paths.size() == 1) client.socket = paths.front();
+  return scope;
+}
+
 }  // namespace
 
-Observations observe(const Scope& scope) {
-  const auto config = bushd::config::load(scope.config_path);
+Observations observe(const Scope& asked) {
+  const auto config = bushd::config::load(asked.config_path);
+  const Scope scope = as_configured(asked, config);
   Observations seen;
   seen.asking = asking_user();
   seen.serving = serving_user(scope.config_path, seen.asking);
