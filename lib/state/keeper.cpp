@@ -79,7 +79,8 @@ void Keeper::stands(MotorId id, Record record) {
   record.at_rest = true;
   record.motion = motor.kept.motion;
   motor.kept.mark_lost = motor.unguarded;
-  if (motor.kept.record && same_but_time(*motor.kept.record, record)) return;
+  const bool same = motor.kept.record && same_but_time(*motor.kept.record, record);
+  if (same && !motor.unguarded) return;
   tell(motor, std::move(record));
 }
 

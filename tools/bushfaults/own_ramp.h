@@ -3,14 +3,15 @@
 
 #include <cstdint>
 
+#include "engine/message_base.h"
 #include "engine/table.h"
 
 namespace bushfaults {
 
-// In steps, in the coarse format. There an MCU knows of a streamed motion only how many steps each
-// tick has: it takes the delay of the running step to be 4 tick / (s + 1), with s the steps of the
-// two ticks before and of the two after (docs/protocol.md, EMERGENCY_STOP). On a ramp-down the
-// steps behind come faster than those ahead, so that it may take the motor to be faster than it is.
-std::int64_t own_ramp_excess(const bushd_table& table, std::int64_t tick_ns);
+// In steps. Of a streamed motion an MCU knows its displacement in each tick; from that it takes the
+// delay of the running step (docs/protocol.md, EMERGENCY): in the fine format from the last tick,
+// in the coarse one from the steps of the two ticks before and of the two after. On a ramp-down
+// steps become slower, so that it may take the motor to be faster than it is.
+std::int64_t own_ramp_excess(const bushd_table& table, std::int64_t tick_ns, bushd_format format);
 
 }  // namespace bushfaults

@@ -30,8 +30,8 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
     const bushd::config::Bus& bus_of = config.bus_of(motor);
     std::int64_t excess = 0;
     for (const bushd::config::Group& group : config.groups) {
-      if (bus_of.format == BUSHD_FORMAT_FINE) break;
-      excess = std::max(excess, own_ramp_excess(group.table->view(), bus_of.tick_us * 1000));
+      excess = std::max(excess,
+                        own_ramp_excess(group.table->view(), bus_of.tick_us * 1000, bus_of.format));
     }
     motors_.push_back({.name = motor.name,
                        .mcu = motor.mcu.value,

@@ -18,8 +18,6 @@ using tables::SideKey;
 using tables::TableContent;
 using tables::profiles::Quantity;
 
-constexpr const char* kTable = "A table's file or name";
-
 // A table that is changed, and how what it is then is told.
 void add_changed(CLI::App* command, std::string& table, bool& json) {
   command->add_option("TABLE", table, kTable)->required();

@@ -13,8 +13,6 @@ namespace {
 
 using bushd::tables::profiles::Quantity;
 
-constexpr const char* kTable = "A table's file or name";
-
 void add_show(CLI::App& app, const Places& places, const Run& run) {
   struct Options {
     std::string table;

@@ -15,6 +15,8 @@ namespace bushtab {
 // Gives the command its action; the result is the program's exit code.
 using Run = std::function<void(CLI::App* command, std::function<int()> action)>;
 
+inline constexpr const char* kTable = "A table's file or name";
+
 void add_look_options(CLI::App& app, const Places& places, const Run& run);
 void add_edit_options(CLI::App& app, const Places& places, const Run& run);
 void add_new_options(CLI::App& app, const Places& places, const Run& run);
