@@ -39,6 +39,7 @@ Observations good() {
   seen.serving = {.name = "bushd", .uid = 120, .groups = {kBushd, kDialout}};
   seen.configuration = {.path = "/etc/bushd/bushd.toml",
                         .exists = true,
+                        .rights = {.uid = 0, .gid = 0, .mode = 0644, .group = "root"},
                         .extent = "2 motors on 2 MCUs and 1 bus",
                         .sha256 = "abc"};
   seen.ports = {{.bus = "hall",
@@ -117,6 +118,12 @@ TEST(Doctor, ErrorsOfConfigurationAndTablesAreThoseOfTheDaemon) {
                 seen.configuration.sha256.clear();
               }),
               ElementsAre(AllOf(HasSubstr("there is no table"), HasSubstr("--check-config"))));
+}
+
+TEST(Doctor, TheUserOfTheDaemonHasToReadTheConfiguration) {
+  EXPECT_THAT(with([](Observations& seen) { seen.configuration.rights.mode = 0600; }),
+              ElementsAre(AllOf(HasSubstr("user bushd may not read it (0600, group root)"),
+                                HasSubstr("chmod 0644 /etc/bushd/bushd.toml"))));
 }
 
 TEST(Doctor, APortThatIsNotThereNamesThoseThatAre) {

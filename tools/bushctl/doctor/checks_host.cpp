@@ -96,6 +96,13 @@ Findings check_configuration(const Observations& seen) {
              "mend it, check it with 'bushd --check-config " + configuration.path +
                  "', and restart bushd"}};
   }
+  if (!may_read(configuration.rights, seen.serving)) {
+    return {{Level::kError, "configuration",
+             fmt::format("{}: user {} may not read it ({:04o}, group {})", configuration.path,
+                         seen.serving.name, configuration.rights.mode & 07777,
+                         configuration.rights.group),
+             "sudo chmod 0644 " + configuration.path}};
+  }
   return {{Level::kOk, "configuration",
            fmt::format("{}: {}", configuration.path, configuration.extent), ""}};
 }

@@ -36,6 +36,7 @@ struct Holder {
 struct ConfigurationSeen {
   std::string path{};
   bool exists = false;
+  Rights rights{};
   std::string error{};   // of reading and checking it and its tables; "": it is good
   std::string extent{};  // "2 buses, 3 MCUs, 32 motors"
   std::string sha256{};  // of its text

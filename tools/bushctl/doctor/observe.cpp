@@ -66,6 +66,7 @@ ConfigurationSeen configuration_of(const std::string& path,
   ConfigurationSeen seen{.path = path};
   std::error_code error;
   seen.exists = fs::exists(path, error) || error;
+  if (const auto file = file_at(path)) seen.rights = file->rights;
   if (!config) {
     seen.error = config.error().text();
     return seen;

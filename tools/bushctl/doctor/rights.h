@@ -14,6 +14,9 @@ inline bool has_bits(const Rights& rights, const User& user, std::uint32_t bits)
   return (rights.mode >> shift & bits) == bits;
 }
 
+inline bool may_read(const Rights& rights, const User& user) {
+  return has_bits(rights, user, 04);
+}
 // To read and to write.
 inline bool may_use(const Rights& rights, const User& user) {
   return has_bits(rights, user, 06);
