@@ -23,6 +23,11 @@ constexpr int kPacketsAtOnce = 256;
 std::string no_right(const std::string& path) {
   struct stat status {};
   const group* entry = ::stat(path.c_str(), &status) == 0 ? ::getgrgid(status.st_gid) : nullptr;
+  if (entry != nullptr && entry->gr_gid == 0) {
+    return "this user has no right to the control socket: it is for root only. Set [control] group "
+           "in "
+           "bushd.toml, and restart bushd";
+  }
   if (entry == nullptr) return "this user has no right to the control socket";
   return fmt::format(
       "this user has no right to the control socket: it is for the group {0}. Run 'sudo usermod "

@@ -211,6 +211,11 @@ TEST(Doctor, AUserWithoutTheGroupIsToldAndThatLcmIsUsed) {
                 seen.sockets[0].is_member_elsewhere = true;
               })[0],
               HasSubstr("log in again"));
+  EXPECT_THAT(with([&](Observations& seen) {
+                barred(seen);
+                seen.sockets[0].group = "root";
+              })[0],
+              HasSubstr("set [control] group"));
 }
 
 TEST(Doctor, WithoutADaemonTheRestIsExamined) {

@@ -30,6 +30,9 @@ bool answers(const Observations& seen) {
 Finding no_right(const SocketSeen& socket, const User& asking) {
   const std::string seen = fmt::format("{} is for group {}, and {} is not in it", socket.path,
                                        socket.group, asking.name);
+  if (socket.group == "root") {
+    return {Level::kError, "socket", seen, "set [control] group in bushd.toml, and restart bushd"};
+  }
   if (socket.is_member_elsewhere) {
     return {Level::kError, "socket", seen + " since this login",
             "log in again, or run 'newgrp " + socket.group + "'"};
