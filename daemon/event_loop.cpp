@@ -11,12 +11,10 @@
 #include <csignal>
 #include <cstring>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "base/printable.h"
 #include "daemon/bus_port.h"
 #include "daemon/process.h"
-#include "daemon/request_log.h"
 #include "daemon/service_manager.h"
 #include "daemon/table_service.h"
 
@@ -61,6 +59,7 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
   }
   if (store != nullptr) core_.kept().use(store->kept(), *this, config.state.required);
   publishing_.set_refresh([this] { core_.publish_state(now_us()); });
+  publishing_.set_log([this](const std::string& text) { log(LogLevel::kError, {}, text); });
   publishing_.add(lcm_front_);
   if (fronts.control == nullptr) return;
   socket_front_ =
@@ -413,58 +412,6 @@ void EventLoop::publish(McuId mcu, const api::Description& description) {
 
 void EventLoop::publish(BusId bus, const api::HealthSnapshot& health) {
   publishing_.publish(bus, health);
-}
-
-void EventLoop::move_log(const std::string& json_line) {
-  if (move_log_ == nullptr) return;
-  const auto appended = move_log_->append(json_line);
-  if (!appended) {
-    // Once, and how many when it is over: not a line of this log for each of that one.
-    if (++lost_move_lines_ == 1) {
-      log(LogLevel::kError, {}, "log of moves: " + appended.error().text());
-    }
-    return;
-  }
-  if (*appended == MoveLog::Appended::kAnew) {
-    log(LogLevel::kWarning, {},
-        "log of moves: its file was removed or renamed; a new one is begun");
-  }
-  if (const std::uint64_t lost = std::exchange(lost_move_lines_, 0); lost > 0) {
-    log(LogLevel::kWarning, {},
-        fmt::format("log of moves: is written again; {} lines were lost", lost));
-  }
-}
-
-// Anybody may stop, as often as he likes and by any name: no session is needed.
-api::Asker EventLoop::with_log(const api::Asker& asker, const api::Request& request) {
-  const bool too_many =
-      api::is_stop(request) && !stop_limit_.take(now_us(), std::string(api::name_of(request)));
-  return too_many ? asker : logged(asker, request, *this);
-}
-
-void EventLoop::tell_left_out(std::int64_t now) {
-  for (const LogLimit::LeftOut& left_out : log_limit_.due(now)) {
-    spdlog::warn("{}", left_out.text());
-  }
-  for (const LogLimit::LeftOut& left_out : stop_limit_.due(now)) {
-    const nlohmann::json line = {{"event", "requests"},
-                                 {"utime_us", wall_clock_us()},
-                                 {"request", left_out.newest},
-                                 {"left_out", left_out.lines}};
-    move_log(line.dump());
-  }
-}
-
-void EventLoop::log(LogLevel level, LogSubject subject, const std::string& text) {
-  const auto line = log_limit_.take(now_us(), printable(text));
-  if (!line) return;
-  JournalFields fields;
-  if (const auto* motor = std::get_if<MotorId>(&subject)) {
-    fields.motor = config_[*motor].name;
-    subject = config_[*motor].mcu;
-  }
-  if (const auto* mcu = std::get_if<McuId>(&subject)) fields.mcu = config_[*mcu].id;
-  write_log(level, *line, fields);
 }
 
 void EventLoop::mark(std::vector<state::Mark> marks) {

@@ -59,7 +59,7 @@ void raise_descriptor_limit() {
 }
 
 // Null without one. The one that the configuration names has to be there; of the default ones the
-// first that can be made is taken.
+// first that can be made is taken; with a group, one has to be made.
 bushd::Result<std::unique_ptr<bushd::control::Server>> open_control(
     const bushd::config::Control& config) {
   using bushd::control::Server;
@@ -74,6 +74,8 @@ bushd::Result<std::unique_ptr<bushd::control::Server>> open_control(
     if (!why.empty()) why += "; ";
     why += opened.error().text();
   }
+  // Somebody counts on it; without it perhaps nobody could command.
+  if (!config.group.empty()) return bushd::fail(why);
   spdlog::warn("no control socket, clients need LCM: {}", why);
   return nullptr;
 }

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 
 namespace bushd::daemon {
@@ -19,7 +20,7 @@ bool is_null_device(const struct stat& status) {
 
 }  // namespace
 
-Result<MoveLog> MoveLog::open(const std::string& path) {
+Result<MoveLog> MoveLog::open(const std::string& path, std::uint64_t max_bytes) {
   // A FIFO that nobody reads would not even be opened without O_NONBLOCK.
   const int fd =
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
@@ -36,7 +37,7 @@ Result<MoveLog> MoveLog::open(const std::string& path) {
         Error{.message = std::string("the log of moves cannot be opened: ") + std::strerror(error),
               .file = path});
   }
-  return MoveLog(fd, path);
+  return MoveLog(fd, path, max_bytes);
 }
 
 MoveLog::~MoveLog() {
@@ -52,15 +53,37 @@ bool MoveLog::is_at_its_path() const {
          open.st_dev == there.st_dev && open.st_ino == there.st_ino;
 }
 
+// What is no regular file never fills.
+bool MoveLog::has_room(std::size_t bytes) const {
+  struct stat status {};
+  if (::fstat(fd_, &status) != 0 || !S_ISREG(status.st_mode) || status.st_size == 0) return true;
+  return static_cast<std::uint64_t>(status.st_size) + bytes <= max_bytes_;
+}
+
+Result<void> MoveLog::begin_anew() {
+  auto anew = open(path_, max_bytes_);
+  if (!anew) return fail(anew.error());
+  std::swap(fd_, anew->fd_);
+  return {};
+}
+
 Result<MoveLog::Appended> MoveLog::append(const std::string& line) {
   Appended appended = Appended::kOn;
+  const std::string text = line + "\n";
   if (!is_at_its_path()) {
-    auto anew = open(path_);
-    if (!anew) return fail(anew.error());
-    std::swap(fd_, anew->fd_);
+    if (auto begun = begin_anew(); !begun) return fail(begun.error());
     appended = Appended::kAnew;
   }
-  const std::string text = line + "\n";
+  if (!has_room(text.size())) {
+    if (std::rename(path_.c_str(), full_path().c_str()) != 0) {
+      return fail(Error{.message = std::string("a line was lost: the file is full and cannot be "
+                                               "renamed: ") +
+                                   std::strerror(errno),
+                        .file = path_});
+    }
+    if (auto begun = begin_anew(); !begun) return fail(begun.error());
+    appended = Appended::kFull;
+  }
   const ssize_t n = ::write(fd_, text.data(), text.size());
   if (n == static_cast<ssize_t>(text.size())) return appended;
   const int error = errno;

@@ -14,6 +14,10 @@ bool same(const api::StateSnapshot& a, const api::StateSnapshot& b) {
          a.inputs == b.inputs && a.boot == b.boot && a.motors == b.motors;
 }
 
+const char* word(Topic topic) {
+  return topic == Topic::kState ? "state" : topic == Topic::kDescription ? "description" : "health";
+}
+
 bool moves(const api::StateSnapshot& state) {
   return std::any_of(state.motors.begin(), state.motors.end(),
                      [](const api::MotorState& motor) { return motor.moving; });
@@ -39,8 +43,12 @@ lcm::Part Publishing::part(std::size_t index, std::size_t parts) {
 template <class Snapshot>
 void Publishing::send(Topic topic, Slot<Snapshot>& slot, Result<lcm::Packet> packet) {
   slot.sent_us = clocks_.now_us();
-  // A configuration is checked to have names that fit.
-  if (!packet) return;
+  // A configuration is checked to have names that fit: this is a defect, which clients see as
+  // silence.
+  if (!packet) {
+    if (log_) log_(std::string("not published, ") + word(topic) + ": " + packet.error().text());
+    return;
+  }
   slot.packet = std::move(*packet);
   for (Listener* listener : listeners_) listener->hear(topic, *slot.packet);
 }

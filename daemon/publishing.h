@@ -41,6 +41,9 @@ class Publishing : public api::Publisher {
   // Outlives this.
   void add(Listener& listener) { listeners_.push_back(&listener); }
   void set_refresh(Refresh refresh) { refresh_ = std::move(refresh); }
+  // Told of what cannot be published, each time; its limit is its own.
+  using Log = std::function<void(const std::string&)>;
+  void set_log(Log log) { log_ = std::move(log); }
   void set_dropped_messages(std::uint64_t count) { dropped_ = static_cast<std::int64_t>(count); }
   // Stands in the `detail` of every MCU that has nothing of its own there; "": nothing does.
   void set_trouble(std::string text) { trouble_ = std::move(text); }
@@ -72,6 +75,7 @@ class Publishing : public api::Publisher {
   std::int64_t run_;
   Clocks clocks_;
   Refresh refresh_;
+  Log log_;
   std::vector<Listener*> listeners_;
   std::vector<Slot<api::StateSnapshot>> states_;  // by MCU
   std::vector<Slot<api::Description>> descriptions_;

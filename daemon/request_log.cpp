@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "api/introduction.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -40,6 +42,10 @@ std::string line_of(std::int64_t unix_us, const api::Session& session, std::int6
   if (const auto& credentials = session.credentials()) {
     line["uid"] = credentials->uid;
     line["pid"] = credentials->pid;
+  }
+  if (const auto introduction = api::introduction_of(session.client_id())) {
+    line["program"] = introduction->program;
+    line["host"] = introduction->host;
   }
   std::visit([&line](const auto& content) { put_motors(line, content); }, request);
   // Names are as clients wrote them; what is not UTF-8 must not end the daemon.

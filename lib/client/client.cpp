@@ -30,11 +30,14 @@ std::int64_t random_number() {
   return static_cast<std::int64_t>(std::uint64_t{random()} << 32 | random());
 }
 
-// Unique among running clients: process numbers repeat, and containers may share a host's name.
+// PROGRAM@HOST-PID-RANDOM (api/introduction.h). Unique among running clients: process numbers
+// repeat, and containers may share a host's name.
 std::string make_id(const std::string& program) {
   const std::string tail =
       fmt::format("-{}-{:08x}", getpid(), static_cast<std::uint32_t>(random_number()));
-  std::string head = program + "-" + host_name();
+  std::string name = program;
+  std::ranges::replace(name, '@', '_');  // what is behind the first one is the host
+  std::string head = name + "@" + host_name();
   head.resize(std::min(head.size(), kMaxClientId - tail.size()));
   std::replace_if(
       head.begin(), head.end(), [](unsigned char c) { return c >= 0x80 || std::isgraph(c) == 0; },
@@ -54,31 +57,44 @@ std::vector<std::string> socket_paths(const ClientOptions& options) {
   return control::default_paths();
 }
 
-Result<std::unique_ptr<Link>> open_link(const ClientOptions& options) {
+struct Opened {
+  std::unique_ptr<Link> link;
+  std::string barred{};
+};
+
+Result<Opened> open_link(const ClientOptions& options) {
   using Way = ClientOptions::Way;
+  std::string barred;
   if (options.way != Way::kLcm) {
     std::optional<Error> first;
     for (const std::string& path : socket_paths(options)) {
       auto link = open_socket(path);
-      if (link) return link;
+      if (link) return Opened{.link = std::move(*link)};
       if (!first) first = link.error();
+      if (barred.empty() && is_barred(path)) barred = link.error().text();
     }
     if (options.way == Way::kSocket) return fail(*first);
   }
-  return open_lcm(options.url, options.prefix);
+  auto link = open_lcm(options.url, options.prefix);
+  if (link) return Opened{.link = std::move(*link), .barred = std::move(barred)};
+  Error error = link.error();
+  if (!barred.empty()) error.message += " (LCM was tried because " + barred + ")";
+  return fail(std::move(error));
 }
 
 }  // namespace
 
 Result<std::unique_ptr<Client>> Client::open(ClientOptions options) {
-  auto link = open_link(options);
-  if (!link) return fail(link.error());
-  return std::make_unique<Client>(std::move(*link), std::move(options));
+  auto opened = open_link(options);
+  if (!opened) return fail(opened.error());
+  return std::make_unique<Client>(std::move(opened->link), std::move(options),
+                                  std::move(opened->barred));
 }
 
-Client::Client(std::unique_ptr<Link> link, ClientOptions options)
+Client::Client(std::unique_ptr<Link> link, ClientOptions options, std::string barred)
     : link_(std::move(link)),
       options_(std::move(options)),
+      barred_(std::move(barred)),
       id_(make_id(options_.program)),
       nonce_(random_number()) {}
 

@@ -49,8 +49,8 @@ class Client {
   using Clock = std::chrono::steady_clock;
 
   static Result<std::unique_ptr<Client>> open(ClientOptions options);
-  // Over a link that is there already.
-  Client(std::unique_ptr<Link> link, ClientOptions options);
+  // Over a link that is there already; `barred` as below.
+  Client(std::unique_ptr<Link> link, ClientOptions options, std::string barred = {});
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
@@ -91,6 +91,10 @@ class Client {
 
   // interrupt_fd has become readable during the last one of the calls above, and that ended it.
   bool interrupted() const { return interrupted_; }
+
+  // Why LCM is used although there is a control socket: this user has no right to it, and how he
+  // gets it. "": that is not so.
+  const std::string& barred() const { return barred_; }
 
   const std::string& id() const { return id_; }
   Link& link() { return *link_; }
@@ -134,6 +138,7 @@ class Client {
 
   std::unique_ptr<Link> link_;
   ClientOptions options_;
+  std::string barred_;
   std::string id_;
   std::int64_t nonce_;
   std::int64_t session_ = 0;  // 0: none yet

@@ -31,4 +31,7 @@ class Link {
 Result<std::unique_ptr<Link>> open_lcm(const std::string& url, const std::string& prefix);
 Result<std::unique_ptr<Link>> open_socket(const std::string& path);
 
+// There is a socket at this path, or a folder that hides it, to which this user has no right.
+bool is_barred(const std::string& path);
+
 }  // namespace bushd::client

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
+#include <grp.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -16,6 +18,23 @@ namespace {
 
 constexpr int kSendWithinMs = 3000;
 constexpr int kPacketsAtOnce = 256;
+
+// Who has a right to this socket, and how one becomes one of them.
+std::string no_right(const std::string& path) {
+  struct stat status {};
+  const group* entry = ::stat(path.c_str(), &status) == 0 ? ::getgrgid(status.st_gid) : nullptr;
+  if (entry != nullptr && entry->gr_gid == 0) {
+    return "this user has no right to the control socket: it is for root only. Set [control] group "
+           "in "
+           "bushd.toml, and restart bushd";
+  }
+  if (entry == nullptr) return "this user has no right to the control socket";
+  return fmt::format(
+      "this user has no right to the control socket: it is for the group {0}. Run 'sudo usermod "
+      "-aG "
+      "{0} USER', then log in again",
+      entry->gr_name);
+}
 
 class SocketLink : public Link {
  public:
@@ -80,12 +99,18 @@ Result<std::unique_ptr<Link>> open_socket(const std::string& path) {
   address.sun_family = AF_UNIX;
   std::memcpy(address.sun_path, path.c_str(), path.size());
   if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    const std::string why = std::strerror(errno);
+    const int error = errno;
+    if (error == EACCES) return fail(Error{.message = no_right(path), .file = path});
+    const std::string why = std::strerror(error);
     return fail(Error{.message = "no bushd at this control socket: " + why +
                                  ". Start `bushd --config FILE`, or use LCM with --lcm",
                       .file = path});
   }
   return link;
+}
+
+bool is_barred(const std::string& path) {
+  return ::access(path.c_str(), R_OK | W_OK) != 0 && errno == EACCES;
 }
 
 }  // namespace bushd::client

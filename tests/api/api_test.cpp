@@ -3,6 +3,7 @@
 #include <set>
 #include <string>
 
+#include "api/introduction.h"
 #include "api/reply.h"
 #include "api/request.h"
 #include "api/session.h"
@@ -80,12 +81,28 @@ TEST(Words, EachIsReadBack) {
 }
 
 TEST(Session, ClientIdsAreShortAndPrintable) {
-  EXPECT_TRUE(is_client_id("bushctl-hall-4711-0badcafe"));
+  EXPECT_TRUE(is_client_id("bushctl@hall-4711-0badcafe"));
   EXPECT_TRUE(is_client_id(std::string(64, 'x')));
   EXPECT_FALSE(is_client_id(std::string(65, 'x')));
   EXPECT_FALSE(is_client_id(""));
   EXPECT_FALSE(is_client_id("a b"));
   EXPECT_FALSE(is_client_id("a\x1b[2J"));
+}
+
+TEST(Session, ClientIdsTellProgramAndHostIfTheyHaveThem) {
+  const auto of = [](std::string_view id) {
+    const auto introduction = introduction_of(id);
+    return introduction
+               ? std::string(introduction->program) + " on " + std::string(introduction->host)
+               : "nobody";
+  };
+  EXPECT_EQ(of("bushctl@hall-4711-0badcafe"), "bushctl on hall");
+  EXPECT_EQ(of("my-scan@lab-pc-3.local-4711-0badcafe"), "my-scan on lab-pc-3.local");
+  EXPECT_EQ(of("scan@a@b-1-2"), "scan on a@b");
+  for (const char* other : {"scan", "", "@", "@-", "--", "@a-1-2", "scan@-1-2", "scan@a-1",
+                            "a-1-2@b", "a-1@b-2", "scan@", "-@-"}) {
+    EXPECT_EQ(of(other), "nobody") << other;
+  }
 }
 
 TEST(Session, TextNamesTheProcessIfTheKernelKnowsIt) {

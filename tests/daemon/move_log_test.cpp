@@ -68,6 +68,37 @@ TEST_F(MoveLogTest, ARotatedFileIsBegunAnew) {
   EXPECT_EQ(text(), "{2}\n");
 }
 
+TEST_F(MoveLogTest, AFullFileIsRenamedAndNoMoreThanTwoAreKept) {
+  auto log = MoveLog::open(path(), 9);
+  ASSERT_EQ(log->append("{1}"), Appended::kOn);
+  ASSERT_EQ(log->append("{2}"), Appended::kOn);
+  EXPECT_EQ(log->append("{3}"), Appended::kFull);
+  EXPECT_EQ(text(), "{3}\n");
+  std::ostringstream full;
+  full << std::ifstream(log->full_path()).rdbuf();
+  EXPECT_EQ(full.str(), "{1}\n{2}\n");
+  ASSERT_EQ(log->append("{4}"), Appended::kOn);
+  EXPECT_EQ(log->append("{5}"), Appended::kFull);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory_.path()), {}), 2);
+}
+
+TEST_F(MoveLogTest, ALineThatIsLongerThanAFileIsWrittenNevertheless) {
+  auto log = MoveLog::open(path(), 2);
+  EXPECT_EQ(log->append("{1}"), Appended::kOn);
+  EXPECT_EQ(log->append("{2}"), Appended::kFull);
+}
+
+TEST_F(MoveLogTest, AFullFileThatCannotBeRenamedGrowsNoFurther) {
+  auto log = MoveLog::open(path(), 9);
+  std::filesystem::create_directories(log->full_path() + "/x");
+  ASSERT_EQ(log->append("{1}"), Appended::kOn);
+  ASSERT_EQ(log->append("{2}"), Appended::kOn);
+  const auto lost = log->append("{3}");
+  ASSERT_FALSE(lost);
+  EXPECT_THAT(lost.error().text(), HasSubstr("a line was lost: the file is full"));
+  EXPECT_EQ(text(), "{1}\n{2}\n");
+}
+
 // As a full disk does: the first line in part, the next ones not at all.
 TEST_F(MoveLogTest, WhatTheDiskHasNoRoomForIsLostAsAWhole) {
   auto log = MoveLog::open(path());

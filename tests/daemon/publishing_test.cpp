@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <vector>
 
 #include "daemon/services/state_publisher.h"
@@ -55,6 +56,15 @@ TEST_F(PublishingTest, AChangeIsPublishedAtOnce) {
   EXPECT_EQ(publish(kFirst, state_), 0u);
   state_.detail = "drivers disabled";
   EXPECT_EQ(publish(kFirst, state_), 1u);
+}
+
+TEST_F(PublishingTest, WhatCannotBeSentIsTold) {
+  std::vector<std::string> told;
+  publishing_.set_log([&told](const std::string& text) { told.push_back(text); });
+  state_.motors[0].name = std::string("a\0b", 3);
+  EXPECT_EQ(publish(kFirst, state_), 0u);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0].rfind("not published, state: ", 0), 0u) << told[0];
 }
 
 TEST_F(PublishingTest, TroubleStandsWhereAnMcuHasNothingToTell) {

@@ -1,12 +1,13 @@
 """The control socket: clients of all kinds at it, while motors move."""
 
+import grp
 import os
 import resource
 import socket
 import time
 import unittest
 
-from rig import FAR, EndToEndTest
+from rig import FAR, EndToEndTest, program
 
 
 class ControlSocket(EndToEndTest):
@@ -61,6 +62,26 @@ class ControlSocket(EndToEndTest):
         self.assertEqual((local["by"], local["uid"], local["motors"]), ("socket", os.getuid(), ["a0"]))
         self.assertEqual(network["by"], "lcm")
         self.assertNotIn("uid", network)
+        for event in (local, network):
+            self.assertEqual((event["program"], event["host"]), ("bushctl", socket.gethostname()))
+
+    def test_who_has_no_right_is_told_before_lcm_is_used(self):
+        self.bring_up()
+        os.chmod(self.folder, 0o755)
+        command = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", program("BUSHCTL")]
+        if self.run_program(*command, "--version").returncode != 0:
+            self.skipTest("only root can be another user too")
+        seen = self.run_program(*command, "status")
+        self.assertEqual(seen.returncode, 0, seen.stderr)
+        # As root started this daemon, the socket is for the group root.
+        self.assertRegex(seen.stderr, r"^bushctl: \S+/control: this user has no right to the control socket: it is for root only. "
+                                      r"Set \[control\] group in bushd.toml, and restart bushd; LCM is used meanwhile\n$")
+        os.chown(self.file("control"), -1, grp.getgrnam("dialout").gr_gid)
+        seen = self.run_program(*command, "status")
+        self.assertIn("it is for the group dialout. Run 'sudo usermod -aG dialout USER', then log in again; LCM", seen.stderr)
+        refused = self.run_program(*command, "--socket", self.file("control"), "status")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("no right to the control socket", refused.stderr)
 
     def test_a_second_daemon_does_not_take_it(self):
         self.bring_up()

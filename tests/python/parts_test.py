@@ -1,6 +1,7 @@
 """What the Python client's session stands on: the whole from its parts, LCM's datagrams, arguments of callers."""
 
 import inspect
+import os
 import struct
 import unittest
 
@@ -134,6 +135,7 @@ class Arguments(unittest.TestCase):
         name = arguments.client_id("a program\n" + "x" * 100)
         self.assertRegex(name, r"^[!-~]{1,64}$")
         self.assertNotEqual(name, arguments.client_id("a program\n" + "x" * 100))
+        self.assertRegex(arguments.client_id("a@b"), rf"^a_b@.+-{os.getpid()}-[0-9a-f]{{8}}$")
 
     def test_settings_are_as_in_the_file(self):
         changes = {"offset": 12.5, "direction": "negative", "soft_limits": (-5, 30.0)}

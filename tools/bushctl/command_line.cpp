@@ -57,6 +57,11 @@ Command& Command::option(const std::string& name, std::string* value, const std:
   return *this;
 }
 
+Command& Command::file(const std::string& name, std::string* value, const std::string& text) {
+  app_->add_option(name, *value, text)->type_name("FILE")->capture_default_str();
+  return *this;
+}
+
 Command& Command::choice(const std::string& name, std::string* value,
                          const std::vector<std::string>& allowed, const std::string& text) {
   app_->add_option(name, *value, text)->check(CLI::IsMember(allowed))->capture_default_str();

@@ -29,13 +29,6 @@ int block_signals() {
   return signalfd(-1, &signals, SFD_CLOEXEC);
 }
 
-// SIGINT and SIGTERM from a descriptor. First called before LCM starts its thread, which inherits
-// the mask.
-int signals() {
-  static const int fd = block_signals();
-  return fd;
-}
-
 // The motors that it moves, all of which a stop would end; none of other requests.
 api::MotorNames motors_of(const api::Request& request) {
   api::MotorNames names;
@@ -52,7 +45,8 @@ api::MotorNames motors_of(const api::Request& request) {
 // Ctrl-C stops them. Anything else lets them go on.
 std::optional<api::Request> stop_on_interrupt(const api::MotorNames& motors) {
   signalfd_siginfo signal{};
-  if (read(signals(), &signal, sizeof signal) != sizeof signal || signal.ssi_signo != SIGINT) {
+  if (read(signal_descriptor(), &signal, sizeof signal) != sizeof signal ||
+      signal.ssi_signo != SIGINT) {
     return std::nullopt;
   }
   fmt::print(stderr, "bushctl: ramping down; Ctrl-C again does not wait for that\n");
@@ -68,20 +62,28 @@ bool as_hoped(const api::Reply& reply, Hope hope) {
 
 }  // namespace
 
+int signal_descriptor() {
+  static const int fd = block_signals();
+  return fd;
+}
+
 bool take_interrupt() {
-  pollfd waits{.fd = signals(), .events = POLLIN, .revents = 0};
+  pollfd waits{.fd = signal_descriptor(), .events = POLLIN, .revents = 0};
   if (poll(&waits, 1, 0) <= 0) return false;
   signalfd_siginfo signal{};
-  return read(signals(), &signal, sizeof signal) == sizeof signal;
+  return read(signal_descriptor(), &signal, sizeof signal) == sizeof signal;
 }
 
 int with_client(const Connection& connection, const std::function<int(Client&)>& action) {
   auto options = connection.options();
-  options.interrupt_fd = signals();
+  options.interrupt_fd = signal_descriptor();
   auto client = Client::open(std::move(options));
   if (!client) {
     fmt::print(stderr, "bushctl: {}\n", bushd::printable(client.error().text()));
     return kFailed;
+  }
+  if (const std::string& why = (*client)->barred(); !why.empty()) {
+    fmt::print(stderr, "bushctl: {}; LCM is used meanwhile\n", bushd::printable(why));
   }
   return action(**client);
 }

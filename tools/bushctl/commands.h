@@ -34,6 +34,13 @@ void add_config_commands(CommandLine& line);
 void add_table_commands(CommandLine& line);
 // latency-test, scan, address: on a line that no daemon has
 void add_line_commands(CommandLine& line);
+// setup
+void add_setup_command(CommandLine& line);
+// doctor
+void add_doctor_command(CommandLine& line);
+
+// Where the service has its configuration.
+inline constexpr const char* kSystemConfig = "/etc/bushd/bushd.toml";
 
 // What may follow these words (base/completion.h), with names that the daemon knows.
 int complete(CommandLine& line, const std::vector<std::string>& words);
@@ -42,6 +49,9 @@ int complete(CommandLine& line, const std::vector<std::string>& words);
 int with_client(const Connection& connection,
                 const std::function<int(bushd::client::Client&)>& action);
 
+// Readable once SIGINT or SIGTERM has come. First called before there are threads: they inherit
+// that these are blocked.
+int signal_descriptor();
 // SIGINT or SIGTERM has come since; once, and then it is forgotten.
 bool take_interrupt();
 

@@ -20,6 +20,8 @@ int main(int argc, char** argv) {
     bushctl::add_config_commands(line);
     bushctl::add_table_commands(line);
     bushctl::add_line_commands(line);
+    bushctl::add_setup_command(line);
+    bushctl::add_doctor_command(line);
     if (const auto words = bushd::completion_asked(argc, argv)) {
       return bushd::finished_output(bushctl::complete(line, *words));
     }

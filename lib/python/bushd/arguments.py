@@ -21,11 +21,11 @@ Amount = float | Mapping[str, float]
 
 
 def client_id(program: str | None) -> str:
-    """Unique among running clients: process numbers repeat, and containers may share a host's name."""
+    """PROGRAM@HOST-PID-RANDOM, as the log of moves reads it. Unique among running clients: process numbers repeat, and containers may share a host's name."""
     name = program or os.path.basename(sys.argv[0] if sys.argv else "") or "python"
     name = name.lstrip("-") or "python"  # of python -c
     tail = f"-{os.getpid()}-{secrets.token_hex(4)}"
-    head = re.sub(r"[^!-~]", "_", f"{name}-{socket.gethostname()}")
+    head = re.sub(r"[^!-~]", "_", f"{name.replace('@', '_')}@{socket.gethostname()}")
     return head[: MAX_CLIENT_ID - len(tail)] + tail
 
 

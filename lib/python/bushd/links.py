@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import grp
 import os
 import socket
 import struct
@@ -50,6 +51,8 @@ class SocketLink:
             self._socket.connect(path)
         except OSError as error:
             self._socket.close()
+            if isinstance(error, PermissionError):
+                raise NoDaemon(no_right(path)) from error
             why = error.strerror or str(error)
             raise NoDaemon(f"{path}: no bushd at this control socket: {why}. Start `bushd --config FILE`") from error
         self._socket.setblocking(False)
@@ -148,6 +151,18 @@ class LcmLink:
     def close(self) -> None:
         self._in.close()
         self._out.close()
+
+
+def no_right(path: str) -> str:
+    """Who has a right to this socket, and how one becomes one of them."""
+    text = f"{path}: this user has no right to the control socket"
+    try:
+        group = grp.getgrgid(os.stat(path).st_gid).gr_name
+    except (OSError, KeyError):
+        return text
+    if group == "root":
+        return f"{text}: it is for root only. Set [control] group in bushd.toml, and restart bushd"
+    return f"{text}: it is for the group {group}. Run 'sudo usermod -aG {group} USER', then log in again"
 
 
 def default_paths() -> list[str]:

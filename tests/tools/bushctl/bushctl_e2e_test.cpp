@@ -250,7 +250,7 @@ TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
   const auto move = only<api::Move>(daemon);
   EXPECT_EQ(move.kind, api::Move::Kind::kRelative);
   EXPECT_EQ(move.motors, user({{"theta", -400}, {"chi", 20}}));
-  EXPECT_THAT(daemon.client_ids().at(0), HasSubstr("bushctl-"));
+  EXPECT_THAT(daemon.client_ids().at(0), HasSubstr("bushctl@"));
 }
 
 TEST(Bushctl, ArmedMovesNameTheirEdgeAndDelay) {

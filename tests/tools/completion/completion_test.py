@@ -69,6 +69,8 @@ class Bushtab(unittest.TestCase):
 class Others(unittest.TestCase):
     def test_bushctl(self):
         self.assertEqual(complete_in_bash("bushctl", "mov"), {"move"})
+        self.assertEqual(complete_in_bash("bushctl", "doc"), {"doctor"})
+        self.assertEqual(complete_in_bash("bushctl", "setup", "--dry"), {"--dry-run"})
         self.assertEqual(complete_in_bash("bushctl", "table", ""), {"list", "show", "use", "reload"})
         self.assertEqual(complete_in_bash("bushctl", "arm", "--edge", ""), {"rising", "falling"})
         self.assertEqual(complete_in_bash("bushctl", "move", "--dry"), {"--dry-run"})
