@@ -12,7 +12,8 @@ using test::Bench;
 
 TEST(StatePublisher, PublishesOnChangeButNotMoreOftenThanItMay) {
   Bench bench;
-  StatePublisher publisher(bench.installation, bench);
+  const PseudoAxes none(bench.installation);
+  StatePublisher publisher(bench.installation, none, bench);
   publisher.step(0);
   EXPECT_EQ(bench.states.size(), 2u) << "one for each MCU";
   EXPECT_EQ(bench.descriptions.size(), 2u);
