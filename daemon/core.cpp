@@ -38,10 +38,14 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return departures_.holds(motor); }),
+      camac_(installation_, interlocks_, tables_, outputs,
+             [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
+               this->request(now_us, asker, request);
+             }),
       // What an MCU's positions are worth comes before whoever goes by that.
-      services_{&kept_,   &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,
-                &stops_,  &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_,
-                &tables_, &departures_,     &jogs_,    &pauses_,    &settings_},
+      services_{&kept_,   &idle_drivers_,   &journal_, &moves_,     &homing_,   &link_faults_,
+                &stops_,  &emergency_stop_, &drivers_, &positions_, &trigger_,  &position_compare_,
+                &tables_, &departures_,     &jogs_,    &pauses_,    &settings_, &camac_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener(
@@ -120,6 +124,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::Hold& r) { pauses_.request(now, asker, r); },
                  [&](const api::Release& r) { pauses_.request(now, asker, r); },
                  [&](const api::Configure& r) { settings_.request(asker, r); },
+                 [&](const api::Camac& r) { camac_.request(now, asker, r); },
              },
              request);
 }

@@ -29,7 +29,8 @@ constexpr std::array<std::string_view, std::variant_size_v<Request>> kNames = {"
                                                                                "pause",
                                                                                "resume",
                                                                                "hold",
-                                                                               "release"};
+                                                                               "release",
+                                                                               "camac"};
 
 }  // namespace
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "api/words.h"
+#include "camac/naf.h"
 #include "tables/table.h"
 
 namespace bushd::api {
@@ -219,10 +220,18 @@ struct Release {
   MotorNames motors{};
 };
 
+// Cycles of a CAMAC crate of the configuration, at once. Result: CamacResult.
+struct Camac {
+  static constexpr std::uint32_t kMostCycles = 4096;  // also of words
+
+  std::int32_t crate = 1;
+  camac::Block block{};  // stations 1..31, subaddresses 0..15, functions 0..31, 24 bits of data
+};
+
 using Request =
     std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
                  ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables, GetTable, SetTable,
-                 Confirm, GetHistory, Configure, Jog, Pause, Resume, Hold, Release>;
+                 Confirm, GetHistory, Configure, Jog, Pause, Resume, Hold, Release, Camac>;
 
 // For logs and counts: "move", "stop", "emergency stop", ...
 std::string_view name_of(const Request& request);

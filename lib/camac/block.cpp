@@ -1,13 +1,9 @@
 #include "camac/block.h"
 
-#include <array>
-#include <cstddef>
 #include <tuple>
 
 namespace bushd::camac {
 namespace {
-
-constexpr int kLastSubaddress = 15;
 
 Response make(std::int64_t now_us, Crate& crate, const Naf& naf) {
   return crate.cycle(now_us, naf.station,
@@ -52,7 +48,7 @@ BlockResult scan(std::int64_t now_us, Crate& crate, const Block& block) {
   BlockResult result;
   Naf naf = block.cycles.front();
   const std::tuple last{block.last_station, block.last_subaddress};
-  while (result.tally < block.count && naf.station <= Crate::kStations &&
+  while (result.tally < block.count && naf.station <= kStations &&
          std::tuple{naf.station, naf.subaddress} <= last) {
     naf.data = word_of(block, result.tally);
     const Response response = make(now_us, crate, naf);
@@ -71,11 +67,6 @@ BlockResult scan(std::int64_t now_us, Crate& crate, const Block& block) {
 }
 
 }  // namespace
-
-std::string_view word(BlockMode mode) {
-  static constexpr std::array<std::string_view, 4> kWords{"single", "repeat", "q-stop", "scan"};
-  return kWords[static_cast<std::size_t>(mode)];
-}
 
 BlockResult transfer(std::int64_t now_us, Crate& crate, const Block& block) {
   switch (block.mode) {

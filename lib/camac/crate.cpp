@@ -29,7 +29,7 @@ Response switch_bit(int function, bool& bit) {
 }
 
 bool is_station(int station) {
-  return station >= 1 && station <= Crate::kStations;
+  return station >= 1 && station <= kStations;
 }
 
 }  // namespace

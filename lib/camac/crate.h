@@ -19,8 +19,6 @@ namespace bushd::camac {
 
 class Crate {
  public:
-  static constexpr int kStations = 23;
-
   // The module outlives the crate. Precondition: 1 <= station <= kStations, nothing stands there.
   void insert(int station, Module& module);
   // Null: nothing stands there.

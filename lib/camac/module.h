@@ -7,9 +7,9 @@
 
 #include <cstdint>
 
-namespace bushd::camac {
+#include "camac/naf.h"
 
-inline constexpr std::uint32_t kDataMask = 0xFFFFFF;
+namespace bushd::camac {
 
 constexpr bool reads(int function) {
   return function >= 0 && function < 8;
@@ -23,13 +23,6 @@ struct Command {
   int subaddress = 0;      // A, 0..15
   int function = 0;        // F, 0..31
   std::uint32_t data = 0;  // W; of functions that write
-};
-
-struct Response {
-  bool x = false;
-  bool q = false;
-  std::uint32_t data = 0;  // R; 0 of functions that do not read
-  friend bool operator==(const Response&, const Response&) = default;
 };
 
 class Module {

@@ -130,6 +130,19 @@ struct Motor {
   bool never_disable = false;                 // its MCU's drivers stay enabled at rest
 };
 
+// A module of a CAMAC crate (docs/camac.md).
+struct CamacModule {
+  enum class Type { kBushd1, kBushd2 };
+  int station = 0;
+  Type type = Type::kBushd2;
+  int f_start_hz = 40;           // of kBushd2: code 250
+  std::vector<MotorId> motors{};  // by their numbers in the module; kBushd1 has one
+};
+struct Crate {
+  int number = 1;
+  std::vector<CamacModule> modules{};
+};
+
 struct Config {
   std::string path;
   // Where that is, and what its text was when it was read.
@@ -143,6 +156,7 @@ struct Config {
   std::vector<Mcu> mcus;
   std::vector<Group> groups;
   std::vector<Motor> motors;
+  std::vector<Crate> crates;
 
   const Bus& operator[](BusId id) const { return buses[id.value]; }
   const Mcu& operator[](McuId id) const { return mcus[id.value]; }

@@ -12,6 +12,7 @@
 
 #include "config/checks.h"
 #include "config/coordinates.h"
+#include "config/crates.h"
 #include "config/emission_section.h"
 #include "config/home.h"
 #include "config/inputs.h"
@@ -452,8 +453,10 @@ Result<void> read_motors(Loading* loading) {
 
 Result<void> read_sections(const TomlReader& root, Loading* loading) {
   const std::string& file = loading->config.path;
-  if (auto known = root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor"}); !known)
+  if (auto known = root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor", "crate"});
+      !known) {
     return known;
+  }
   if (auto read = read_lcm(root, &loading->config); !read) return read;
   if (auto read = read_control(root, &loading->config); !read) return read;
   if (auto read = read_state(root, &loading->config); !read) return read;
@@ -471,7 +474,8 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
   if (auto read = read_buses(loading); !read) return read;
   if (auto read = read_mcus(*mcus, &loading->config); !read) return read;
   if (auto read = read_groups(loading); !read) return read;
-  return read_motors(loading);
+  if (auto read = read_motors(loading); !read) return read;
+  return read_crates(root, &loading->config);
 }
 
 }  // namespace bushd::config

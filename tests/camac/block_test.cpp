@@ -113,6 +113,8 @@ TEST(Block, WordsOfModes) {
   EXPECT_EQ(word(BlockMode::kRepeat), "repeat");
   EXPECT_EQ(word(BlockMode::kQStop), "q-stop");
   EXPECT_EQ(word(BlockMode::kScan), "scan");
+  EXPECT_EQ(block_mode_of("q-stop"), BlockMode::kQStop);
+  EXPECT_FALSE(block_mode_of("q"));
 }
 
 }  // namespace

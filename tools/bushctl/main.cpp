@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
     bushctl::add_history_commands(line);
     bushctl::add_config_commands(line);
     bushctl::add_table_commands(line);
+    bushctl::add_camac_commands(line);
     bushctl::add_line_commands(line);
     if (const auto words = bushd::completion_asked(argc, argv)) {
       return bushd::finished_output(bushctl::complete(line, *words));
