@@ -135,7 +135,7 @@ struct CamacModule {
   enum class Type { kBushd1, kBushd2 };
   int station = 0;
   Type type = Type::kBushd2;
-  int f_start_hz = 40;           // of kBushd2: code 250
+  int f_start_hz = 40;            // of kBushd2: code 250
   std::vector<MotorId> motors{};  // by their numbers in the module; kBushd1 has one
 };
 struct Crate {

@@ -41,8 +41,8 @@ constexpr int kAddress = 1;
 struct Options {
   std::vector<std::string> words;
   std::uint32_t crate = 1;
-  std::uint32_t page = kLastPage + 1;  // none
-  std::uint32_t steps = 0;             // as they are
+  std::string page;         // to dump as a table; "": all memory
+  std::uint32_t steps = 0;  // as they are
   std::uint32_t f_start_hz = 40;
   bool json = false;
 };
@@ -141,20 +141,22 @@ std::optional<std::vector<std::uint32_t>> read_memory(Crate& crate, int station)
 }
 
 int print_table(const Options& options, int station, const std::vector<std::uint32_t>& bytes) {
-  const std::size_t first = options.page * kPageBytes + kFirstCode;
+  const auto page = number_of(options.page, kLastPage);
+  if (!page) return wrong_usage(page.error());
+  const std::size_t first = *page * kPageBytes + kFirstCode;
   if (first + kCodes > bytes.size()) {
-    fmt::print(stderr, "bushctl: station {} has no page {}\n", station, options.page);
+    fmt::print(stderr, "bushctl: station {} has no page {}\n", station, *page);
     return kFailed;
   }
   bushd::tables::TableContent table{
-      .name = fmt::format("camac-{}-{}-{}", options.crate, station, options.page),
+      .name = fmt::format("camac-{}-{}-{}", options.crate, station, *page),
       .time_unit_ns = kUnitNsAt1Hz / options.f_start_hz};
   for (std::size_t i = first; i < first + kCodes; ++i) {
     table.accel.push_back(static_cast<std::uint16_t>(std::max(bytes[i], 1U)));
   }
   if (const auto fault = bushd::tables::check(table)) {
-    fmt::print(stderr, "bushctl: the codes of page {} are no table: {}: {}\n", options.page,
-               fault->key, fault->message);
+    fmt::print(stderr, "bushctl: the codes of page {} are no table: {}: {}\n", *page, fault->key,
+               fault->message);
     return kFailed;
   }
   fmt::print("{}", bushd::tables::to_text(table));
@@ -165,7 +167,7 @@ int dump(Client& client, const Options& options, int station) {
   Crate crate(client, options.crate);
   const auto bytes = read_memory(crate, station);
   if (!bytes) return crate.exit_code();
-  if (options.page <= kLastPage) return print_table(options, station, *bytes);
+  if (!options.page.empty()) return print_table(options, station, *bytes);
   if (options.json) {
     const ordered_json json = {{"station", station}, {"memory", *bytes}};
     fmt::print("{}\n", json.dump());
@@ -275,7 +277,7 @@ void add_camac_commands(CommandLine& line) {
       .words("N", &options->words, "N A F [DATA], dump STATION, or load STATION PAGE TABLE",
              Command::Needed::kYes)
       .number("--crate", &options->crate, 1u, 62u, "Number of the crate")
-      .number("--page", &options->page, 0u, kLastPage + 1, "Program to dump, 0..3; 4: none")
+      .option("--page", &options->page, "Program to dump, 0..3")
       .number("--f-start", &options->f_start_hz, 1u, 100u, "f_start_hz of the module, for --page")
       .number("--steps", &options->steps, 0u, 65535u, "Number of steps to load; 0: as it is")
       .flag("--json", &options->json, "Print JSON")
