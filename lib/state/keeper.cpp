@@ -78,8 +78,9 @@ void Keeper::stands(MotorId id, Record record) {
   Motor& motor = motors_[id];
   record.at_rest = true;
   record.motion = motor.kept.motion;
-  motor.kept.mark_lost = false;  // whoever asks this keeper; the disk may still say so
-  if (motor.kept.record && same_but_time(*motor.kept.record, record)) return;
+  motor.kept.mark_lost = motor.unguarded;
+  const bool same = motor.kept.record && same_but_time(*motor.kept.record, record);
+  if (same && !motor.unguarded) return;
   tell(motor, std::move(record));
 }
 

@@ -47,8 +47,7 @@ class Keeper {
   bool marked(MotorId motor) const;
   // Makes it so, which takes a moment, or says why that does not come to pass.
   Result<void> want_mark(std::int64_t now_us, MotorId motor);
-  // It moves without: it does not look at rest until it is told to stand, nor to the keeper of a
-  // later process before that is on the disk.
+  // It moves without. Until its rest is on the disk again, it does not look at rest.
   void give_up_mark(MotorId motor);
   bool any_unguarded() const;
 

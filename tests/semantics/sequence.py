@@ -52,7 +52,8 @@ class Sequence(InMotion):
             expect(seen["steps"] == motor.steps, f"{name} is at {seen['steps']} steps, not at {motor.steps}")
             expect(seen["held"] == motor.held and not seen["paused"], f"{name}: held, or paused")
             expect(seen["target"] == motor.steps, f"{name} aims at {seen['target']} at rest at {motor.steps}")
-            expect(seen["trust"] == motor.trust_told(), f"{name} is {seen['trust']}, not {motor.trust}: {seen['reason']}")
+            trust = motor.trust_told()
+            expect(seen["trust"] == trust, f"{name} is {seen['trust']}, not {trust}: {seen['reason']}")
             self._same(name, "dial", seen["dial"], motor.dial(motor.steps))
             self._same(name, "user", seen["user"], motor.user(motor.steps))
             if self.base[name] is not None:

@@ -147,22 +147,36 @@ TEST_F(KeeperTest, WhatFailedIsTriedAgainOnceASecond) {
   EXPECT_TRUE(keeper.marked(kTheta));
 }
 
-TEST_F(KeeperTest, AMotorThatMovesWithoutAMarkDoesNotLookAtRest) {
+TEST_F(KeeperTest, AMotorThatMovedWithoutAMarkDoesNotLookAtRestUntilTheDiskWorksAgain) {
   stand(kTheta, 5);
   EXPECT_TRUE(stood(keeper.kept(kTheta)));
-  EXPECT_FALSE(keeper.kept(kTheta).mark_lost);
   keeper.give_up_mark(kTheta);
-  EXPECT_TRUE(keeper.kept(kTheta).mark_lost);
-  // Here its rest is known at once, after a failure of the PC only from the disk.
   stand(kTheta, 6);
-  EXPECT_FALSE(keeper.kept(kTheta).mark_lost);
+  EXPECT_TRUE(keeper.kept(kTheta).mark_lost);
   EXPECT_TRUE(keeper.any_unguarded());
   keeper.step(0);
-  keeper.write(0, fail("no space left"));
-  EXPECT_TRUE(keeper.any_unguarded());
-  keeper.step(1'000'000);
-  keeper.write(1'000'010, {});
+  keeper.write(0, {});
   EXPECT_FALSE(keeper.any_unguarded());
+}
+
+TEST_F(KeeperTest, NorIsItForgottenThatItStandsWhereItStood) {
+  stand(kTheta, 5);
+  keeper.step(0);
+  keeper.write(0, {});
+  // The disk has just failed, so it is not even asked; the motor comes back to where it was.
+  ASSERT_TRUE(keeper.want_mark(0, kPhi));
+  keeper.step(0);
+  keeper.mark(10, fail("no space left"));
+  ASSERT_FALSE(keeper.want_mark(20, kTheta));
+  keeper.give_up_mark(kTheta);
+  stand(kTheta, 5);
+  EXPECT_TRUE(keeper.kept(kTheta).mark_lost);
+  keeper.step(1'000'010);
+  ASSERT_THAT(disk.writes, SizeIs(2));
+  keeper.write(1'000'020, {});
+  EXPECT_FALSE(keeper.any_unguarded());
+  stand(kTheta, 5);
+  EXPECT_FALSE(keeper.kept(kTheta).mark_lost);
 }
 
 }  // namespace
