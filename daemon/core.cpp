@@ -38,7 +38,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return departures_.holds(motor); }),
-      camac_(installation_, interlocks_, tables_, outputs,
+      camac_(installation_, interlocks_, tables_, kept_, outputs,
              [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
                this->request(now_us, asker, request);
              }),
@@ -61,7 +61,10 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 .result = std::string(api::word(api::Outcome::kDone))});
   });
   drivers_.set_listener([this](McuId mcu) { idle_drivers_.switched(mcu); });
-  kept_.set_listener([this] { settings_.take_kept(); });
+  kept_.set_listener([this] {
+    settings_.take_kept();
+    camac_.take_kept();
+  });
   open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
     const motion::Motor& motor = installation_[ended.motor];
     kept_.past({.motor = motor.name(),

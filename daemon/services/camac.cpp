@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "camac/block.h"
+#include "camac/memory_text.h"
 #include "daemon/services/camac_motors.h"
 #include "daemon/services/camac_shutter.h"
 
@@ -12,6 +13,7 @@ namespace bushd::daemon {
 namespace {
 
 constexpr int kLastN = 31;
+constexpr const char* kMemory = "memory";  // in the store
 
 std::string name_of(const config::Crate& crate, const config::CamacModule& module) {
   return "camac-" + std::to_string(crate.number) + "-" + std::to_string(module.station);
@@ -54,15 +56,20 @@ Result<void> check(const camac::Block& block) {
 class Camac::Station {
  public:
   virtual ~Station() = default;
-  virtual camac::Module& module() = 0;
+  // Its name in the store.
+  explicit Station(std::string name) : kept_as(std::move(name)) {}
+  virtual camac::MotionModule& module() = 0;
   virtual void step(std::int64_t now_us) = 0;
+
+  const std::string kept_as;
 };
 
 class Camac::Bushd1Station final : public Station {
  public:
   template <class... Args>
-  explicit Bushd1Station(Args&&... args) : shutter_(std::forward<Args>(args)...) {}
-  camac::Module& module() override { return module_; }
+  explicit Bushd1Station(std::string place, Args&&... args)
+      : Station(std::move(place)), shutter_(std::forward<Args>(args)...) {}
+  camac::MotionModule& module() override { return module_; }
   void step(std::int64_t now_us) override { shutter_.follow(now_us, module_); }
 
  private:
@@ -73,9 +80,11 @@ class Camac::Bushd1Station final : public Station {
 class Camac::Bushd2Station final : public Station {
  public:
   template <class... Args>
-  explicit Bushd2Station(int f_start_hz, Args&&... args)
-      : motors_(std::forward<Args>(args)...), module_({.f_start_hz = f_start_hz}, motors_) {}
-  camac::Module& module() override { return module_; }
+  Bushd2Station(std::string place, int f_start_hz, Args&&... args)
+      : Station(std::move(place)),
+        motors_(std::forward<Args>(args)...),
+        module_({.f_start_hz = f_start_hz}, motors_) {}
+  camac::MotionModule& module() override { return module_; }
   // Who does not answer is told by the core: his move ends.
   void step(std::int64_t now_us) override { motors_.step(now_us, module_); }
 
@@ -85,19 +94,21 @@ class Camac::Bushd2Station final : public Station {
 };
 
 Camac::Camac(Installation& installation, const Interlocks& interlocks, TablesInService& tables,
-             Outputs& outputs, const AskCore& ask)
-    : outputs_(outputs) {
+             KeptPositions& kept, Outputs& outputs, const AskCore& ask)
+    : kept_(kept), outputs_(outputs) {
   for (const config::Crate& configured : installation.config().crates) {
     Crate crate{.number = configured.number};
     for (const config::CamacModule& module : configured.modules) {
       const std::string name = name_of(configured, module);
+      const std::string kept_as =
+          "camac/" + std::to_string(configured.number) + "/" + std::to_string(module.station);
       std::unique_ptr<Station> station;
       if (module.type == config::CamacModule::Type::kBushd1) {
-        station = std::make_unique<Bushd1Station>(name, module.motors.front(), installation,
-                                                  interlocks, outputs, ask);
+        station = std::make_unique<Bushd1Station>(kept_as, name, module.motors.front(),
+                                                  installation, interlocks, outputs, ask);
       } else {
-        station = std::make_unique<Bushd2Station>(module.f_start_hz, name, module, installation,
-                                                  interlocks, tables, outputs, ask);
+        station = std::make_unique<Bushd2Station>(kept_as, module.f_start_hz, name, module,
+                                                  installation, interlocks, tables, outputs, ask);
       }
       crate.crate.insert(module.station, station->module());
       crate.stations.push_back(std::move(station));
@@ -120,9 +131,31 @@ void Camac::request(std::int64_t now_us, const api::Asker& asker, const api::Cam
   asker.answer(api::Accepted{});
   api::CamacResult result{.block = camac::transfer(now_us, crate->crate, request.block)};
   result.requests = crate->crate.requests();
+  keep_memories(*crate);
   asker.answer(api::Completed{.outcome = api::Outcome::kDone,
                               .reason = std::to_string(result.block.tally) + " words",
                               .detail = std::move(result)});
+}
+
+void Camac::keep_memories(const Crate& crate) {
+  if (!kept_.keeps()) return;
+  for (const auto& station : crate.stations) {
+    const std::string text = camac::to_text(station->module().memory());
+    kept_.keep(station->kept_as, {{kMemory, {.value = text}}});
+  }
+}
+
+void Camac::take_kept() {
+  for (const Crate& crate : crates_) {
+    for (const auto& station : crate.stations) {
+      const state::Settings kept = kept_.settings(station->kept_as);
+      const auto memory = kept.find(kMemory);
+      if (memory == kept.end()) continue;
+      if (const auto bytes = camac::bytes_of(memory->second.value)) {
+        station->module().load_memory(*bytes);
+      }
+    }
+  }
 }
 
 void Camac::step(std::int64_t now_us) {

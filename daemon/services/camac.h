@@ -12,6 +12,7 @@
 #include "daemon/outputs.h"
 #include "daemon/service.h"
 #include "daemon/services/camac_asker.h"
+#include "daemon/services/kept_positions.h"
 #include "daemon/services/tables_in_service.h"
 
 namespace bushd::daemon {
@@ -20,10 +21,12 @@ class Camac final : public Service {
  public:
   // `ask` is called from step() only.
   Camac(Installation& installation, const Interlocks& interlocks, TablesInService& tables,
-        Outputs& outputs, const AskCore& ask);
+        KeptPositions& kept, Outputs& outputs, const AskCore& ask);
   ~Camac() override;
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request);
+  // The store is in use: memories are as they were kept.
+  void take_kept();
 
   void step(std::int64_t now_us) override;
 
@@ -40,7 +43,9 @@ class Camac final : public Service {
   };
 
   void tell_lam(Crate& crate);
+  void keep_memories(const Crate& crate);
 
+  KeptPositions& kept_;
   Outputs& outputs_;
   std::vector<Crate> crates_;
 };

@@ -319,6 +319,50 @@ TEST(CamacMotion, ModesOfTheShutterThatNoMcuHasAreRefused) {
   EXPECT_THAT(lab.warnings().back(), HasSubstr("automatic modes are not available"));
 }
 
+// Another daemon finds the memory, and no motor moves because of it.
+TEST(CamacMotion, MemorySurvivesRestartsAndPowerCuts) {
+  CamacLab lab;
+  lab.keep_positions();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  lab.load(1, 40, falling_codes());
+  lab.load(0, 30, falling_codes());
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.wait_for_lam());
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  EXPECT_FALSE(lab.lam()) << "registers begin anew";
+  lab.naf(kStation, 1, 16, 256);
+  EXPECT_EQ(lab.naf(kStation, 0, 0).data, 40U);
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.shaft_steps("m01"), 60);
+  lab.run_for(2);
+  lab.cut_pc_power();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  lab.naf(kStation, 1, 16, 0);
+  EXPECT_EQ(lab.naf(kStation, 0, 0).data, 30U);
+  EXPECT_EQ(lab.shaft_steps("m01"), 60);
+  EXPECT_TRUE(lab.errors().empty());
+}
+
+// The motion ends without its module; the next daemon has neither LAM nor a second motion.
+TEST(CamacMotion, ARestartInMotionLeavesTheMotorAccountedFor) {
+  CamacLab lab;
+  lab.keep_positions();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  lab.load(0, 20'000, falling_codes());
+  lab.permit(kEnabled);
+  lab.run_until([&] { return lab.shaft_steps("m01") > 500; });
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready() && !lab.motor("m01").moving; }));
+  lab.run_for(2);
+  const std::int64_t stands = lab.shaft_steps("m01");
+  EXPECT_EQ(lab.motor("m01").position_steps, stands);
+  EXPECT_EQ(lab.requests(), 0U);
+  lab.run_for(5);
+  EXPECT_EQ(lab.shaft_steps("m01"), stands);
+}
+
 TEST(CamacRequests, BadOnesAreRefused) {
   CamacLab lab;
   EXPECT_THAT(lab.block({.cycles = {{5, 0, 0}}}, 2).reason, HasSubstr("there is no crate 2"));
