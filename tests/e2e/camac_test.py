@@ -3,7 +3,7 @@
 import json
 import unittest
 
-from rig import EndToEndTest
+from rig import EndToEndTest, program
 
 CRATE = """
 [[crate]]
@@ -45,6 +45,12 @@ class Camac(EndToEndTest):
             self.cycle(5, 0, 10, *more)
         self.assertEqual(self.bushd.end(), 0)
         self.assert_one_result_each()
+
+    def test_a_program_in_c_does_too(self):
+        self.bring_up_crate()
+        ran = self.run_program(program("ESONE_PROGRAM"), "205")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(self.motors()["a0"]["position_steps"], 205)
 
     def test_programs_are_dumped_and_loaded(self):
         self.bring_up_crate()
