@@ -40,10 +40,15 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return departures_.holds(motor); }),
+      camac_(installation_, interlocks_, tables_, kept_, outputs,
+             [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
+               this->request(now_us, asker, request);
+             }),
       // What an MCU's positions are worth comes before whoever goes by that.
       services_{&kept_,   &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,
                 &stops_,  &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_,
-                &tables_, &departures_,     &jogs_,    &pauses_,    &lines_,   &settings_},
+                &tables_, &departures_,     &jogs_,    &pauses_,    &lines_,   &settings_,
+                &camac_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener(
@@ -59,7 +64,10 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 .result = std::string(api::word(api::Outcome::kDone))});
   });
   drivers_.set_listener([this](McuId mcu) { idle_drivers_.switched(mcu); });
-  kept_.set_listener([this] { settings_.take_kept(); });
+  kept_.set_listener([this] {
+    settings_.take_kept();
+    camac_.take_kept();
+  });
   open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
     const motion::Motor& motor = installation_[ended.motor];
     kept_.past({.motor = motor.name(),
@@ -126,6 +134,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::Release& r) { pauses_.request(now, asker, r); },
                  [&](const api::Configure& r) { settings_.request(asker, r); },
                  [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
+                 [&](const api::Camac& r) { camac_.request(now, asker, r); },
              },
              request);
 }

@@ -13,6 +13,7 @@
 
 #include "api/session.h"
 #include "daemon/outputs.h"
+#include "daemon/services/camac.h"
 #include "daemon/services/departures.h"
 #include "daemon/services/drivers.h"
 #include "daemon/services/dry_run.h"
@@ -116,6 +117,7 @@ class Core {
   Departures departures_;
   HealthPublisher health_;
   MotorSettings settings_;
+  Camac camac_;
   std::vector<Service*> services_;  // in the order in which they follow what MCUs tell
   Supervisor supervisor_;
 };

@@ -101,6 +101,7 @@ class EventLoop : private Outputs, private state::Backend {
   void publish(McuId mcu, const api::StateSnapshot& state) override;
   void publish(McuId mcu, const api::Description& description) override;
   void publish(BusId bus, const api::HealthSnapshot& health) override;
+  void publish_lam(const api::CamacLam& lam) override { publishing_.publish_lam(lam); }
   void move_log(const std::string& json_line) override;
   void log(LogLevel level, LogSubject subject, const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;

@@ -78,6 +78,12 @@ void Publishing::publish(BusId bus, const api::HealthSnapshot& health) {
   send(Topic::kHealth, slot, lcm::encode(part(bus.value, healths_.size()), health));
 }
 
+void Publishing::publish_lam(const api::CamacLam& lam) {
+  const auto packet = lcm::encode(clocks_.unix_us(), lam);
+  if (!packet) return;
+  for (Listener* listener : listeners_) listener->hear(Topic::kState, *packet);
+}
+
 std::vector<const lcm::Packet*> Publishing::newest() {
   if (refresh_) refresh_();
   std::vector<const lcm::Packet*> all;

@@ -53,6 +53,7 @@ class Publishing : public api::Publisher {
   void publish(McuId mcu, const api::StateSnapshot& state) override;
   void publish(McuId mcu, const api::Description& description) override;
   void publish(BusId bus, const api::HealthSnapshot& health) override;
+  void publish_lam(const api::CamacLam& lam) override;
 
   // Description, state and health of everything, the state as it is now.
   std::vector<const lcm::Packet*> newest();

@@ -47,6 +47,9 @@ void KeptPositions::use(const std::map<std::string, state::Kept>& kept, state::B
   keeper_.emplace(names, kept, backend);
   backend_ = &backend;
   required_ = required;
+  for (const auto& [name, of_name] : kept) {
+    if (state::is_no_motor(name)) others_[name] = of_name.settings;
+  }
   if (in_use_) in_use_();
 }
 
@@ -56,6 +59,17 @@ state::Settings KeptPositions::settings(MotorId id) const {
 
 void KeptPositions::keep(MotorId id, state::Settings settings) {
   if (keeper_ && settings != keeper_->kept(id).settings) keeper_->settings(id, std::move(settings));
+}
+
+state::Settings KeptPositions::settings(const std::string& name) const {
+  const auto found = others_.find(name);
+  return found != others_.end() ? found->second : state::Settings();
+}
+
+void KeptPositions::keep(const std::string& name, const state::Settings& settings) {
+  if (!keeper_ || others_[name] == settings) return;
+  others_[name] = settings;
+  keeper_->settings(name, settings);
 }
 
 void KeptPositions::marked(std::int64_t now_us, const Result<void>& done) {

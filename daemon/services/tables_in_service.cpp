@@ -101,6 +101,7 @@ void TablesInService::request(const api::Asker& asker, const api::ReloadTables&)
   }
   // Of a group that is about to get another table, that one is read again.
   for (const Change& other : changes_) {
+    if (!other.kept) continue;
     for (const Part& part : other.parts) change.parts[part.group.value].wanted = part.wanted;
   }
   begin(std::move(change));
@@ -123,13 +124,26 @@ void TablesInService::read(std::int64_t now_us, std::uint64_t ticket,
   if (change == changes_.end()) return;
   const auto parts = std::exchange(change->parts, {});
   for (std::size_t i = 0; i < parts.size(); ++i) take_part(*change, parts[i], tables[i]);
+  put_in_service(now_us, change);
+}
+
+void TablesInService::use(std::int64_t now_us, const api::Asker& asker, GroupId group,
+                          tables::TablePtr table) {
+  const auto change =
+      changes_.insert(changes_.end(), {.asker = asker, .ticket = ++last_ticket_, .kept = false});
+  take_part(*change, {.group = group, .wanted = table->name()}, table);
+  put_in_service(now_us, change);
+}
+
+// Its tables are read.
+void TablesInService::put_in_service(std::int64_t now_us, Changes::iterator change) {
   if (change->parts.empty() && !change->refused.empty()) return refuse(change);
   supersede(*change);
   change->asker.answer(api::Accepted{});
   if (change->parts.empty()) {
     return complete(change, api::Outcome::kDone, "no table has changed");
   }
-  if (unchanged(change->parts.front())) return keep(*change);
+  if (unchanged(change->parts.front())) return keep(change);
   change->mcus = mcus_of(change->parts);
   change->stage = Change::Stage::kResting;
   step(now_us);
@@ -313,10 +327,11 @@ void TablesInService::roll_back(Change& change) {
   change.notes = who;
 }
 
-void TablesInService::keep(Change& change) {
-  change.stage = Change::Stage::kKeeping;
-  for (const Part& part : change.parts) wanted_[part.group] = part.wanted;
-  outputs_.keep_tables(change.ticket, {wanted_.begin(), wanted_.end()});
+void TablesInService::keep(Changes::iterator change) {
+  if (!change->kept) return finish(change, {});
+  change->stage = Change::Stage::kKeeping;
+  for (const Part& part : change->parts) wanted_[part.group] = part.wanted;
+  outputs_.keep_tables(change->ticket, {wanted_.begin(), wanted_.end()});
 }
 
 void TablesInService::step(std::int64_t now_us) {
@@ -332,7 +347,7 @@ void TablesInService::step(std::int64_t now_us) {
     }
     if (change->stage != Change::Stage::kUploading) continue;
     if (uploaded(*change)) {
-      keep(*change);
+      keep(change);
     } else if (now_us > change->deadline_us) {
       roll_back(*change);
       complete(change, api::Outcome::kFault, change->notes);
@@ -342,7 +357,10 @@ void TablesInService::step(std::int64_t now_us) {
 
 void TablesInService::kept(std::uint64_t ticket, const Result<void>& kept) {
   const auto change = find(ticket);
-  if (change == changes_.end()) return;
+  if (change != changes_.end()) finish(change, kept);
+}
+
+void TablesInService::finish(Changes::iterator change, const Result<void>& kept) {
   std::string text;
   for (const Part& part : change->parts) {
     const tables::Table& table = *installation_.tables()[part.group];

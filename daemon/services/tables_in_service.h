@@ -34,6 +34,10 @@ class TablesInService final : public Service {
   void request(const api::Asker& asker, const api::UseTable& request);
   void request(const api::Asker& asker, const api::ReloadTables& request);
 
+  // A table that is no file, as the request for one; the next daemon is not told of it. One that
+  // the group has already is not given to it again.
+  void use(std::int64_t now_us, const api::Asker& asker, GroupId group, tables::TablePtr table);
+
   // Answers to Outputs::read_tables and keep_tables.
   void read(std::int64_t now_us, std::uint64_t ticket,
             const std::vector<Result<tables::TablePtr>>& tables);
@@ -59,6 +63,7 @@ class TablesInService final : public Service {
     api::Asker asker;  // without a session: not from a client
     std::uint64_t ticket;
     bool reload = false;  // groups whose table is what it was are left out
+    bool kept = true;     // for the next daemon
     Stage stage = Stage::kReading;
     std::vector<Part> parts{};
     std::vector<McuId> mcus{};     // that need other tables
@@ -71,6 +76,7 @@ class TablesInService final : public Service {
 
   const std::string& name_of(GroupId group) const;
   void begin(Change change);
+  void put_in_service(std::int64_t now_us, Changes::iterator change);
   Changes::iterator find(std::uint64_t ticket);
   bool unchanged(const Part& part) const;
   void take_part(Change& change, Part part, const Result<tables::TablePtr>& read);
@@ -86,7 +92,8 @@ class TablesInService final : public Service {
   std::int64_t upload_us(const Mcu& mcu) const;
   bool uploaded(const Change& change) const;
   void roll_back(Change& change);
-  void keep(Change& change);
+  void keep(Changes::iterator change);
+  void finish(Changes::iterator change, const Result<void>& kept);
   void refuse(Changes::iterator change);
   void complete(Changes::iterator change, api::Outcome outcome, const std::string& reason);
 

@@ -56,6 +56,10 @@ std::size_t memory_of(const Configuration& configuration) {
   return bytes;
 }
 
+std::size_t memory_of(const CamacResult& result) {
+  return sizeof result + result.block.responses.capacity() * sizeof(camac::Response);
+}
+
 std::size_t memory_of(const tables::TableContent& content) {
   std::size_t codes = content.accel.capacity();
   if (content.decel) codes += content.decel->capacity();

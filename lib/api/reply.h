@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "api/words.h"
+#include "camac/naf.h"
 #include "tables/table.h"
 
 namespace bushd::api {
@@ -101,6 +102,13 @@ struct Configuration {
   std::vector<MotorSetting> settings{};
 };
 
+// What a crate has answered.
+struct CamacResult {
+  camac::BlockResult block{};
+  std::uint32_t requests = 0;  // L lines of its stations afterwards; bit n - 1 is station n
+  friend bool operator==(const CamacResult&, const CamacResult&) = default;
+};
+
 struct Accepted {};
 
 struct Refused {
@@ -111,9 +119,9 @@ struct Completed {
   Outcome outcome = Outcome::kDone;
   std::string reason{};  // names motor and cause; never empty
   // Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
-  // table requests; a history; settings.
+  // table requests; a history; settings; of a crate.
   std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList, tables::TableContent,
-               MotionHistory, Configuration>
+               MotionHistory, Configuration, CamacResult>
       detail{};
 };
 

@@ -30,7 +30,8 @@ constexpr std::array<std::string_view, std::variant_size_v<Request>> kNames = {"
                                                                                "resume",
                                                                                "hold",
                                                                                "release",
-                                                                               "move line"};
+                                                                               "move line",
+                                                                               "camac"};
 
 }  // namespace
 

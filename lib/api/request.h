@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "api/words.h"
+#include "camac/naf.h"
 #include "tables/table.h"
 
 namespace bushd::api {
@@ -237,10 +238,18 @@ struct Release {
   MotorNames motors{};
 };
 
-using Request =
-    std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
-                 ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables, GetTable, SetTable,
-                 Confirm, GetHistory, Configure, Jog, Pause, Resume, Hold, Release, MoveLine>;
+// Cycles of a CAMAC crate of the configuration, at once. Result: CamacResult.
+struct Camac {
+  static constexpr std::uint32_t kMostCycles = 4096;  // also of words
+
+  std::int32_t crate = 1;
+  camac::Block block{};  // stations 1..31, subaddresses 0..15, functions 0..31, 24 bits of data
+};
+
+using Request = std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
+                             UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables,
+                             GetTable, SetTable, Confirm, GetHistory, Configure, Jog, Pause, Resume,
+                             Hold, Release, MoveLine, Camac>;
 
 // For logs and counts: "move", "stop", "emergency stop", ...
 std::string_view name_of(const Request& request);

@@ -120,6 +120,15 @@ struct HealthSnapshot {
   std::vector<McuHealth> mcus{};
 };
 
+// Stations of a CAMAC crate have raised L.
+struct CamacLam {
+  std::int32_t crate = 0;
+  std::uint32_t raised = 0;    // bit n - 1: station n, just now
+  std::uint32_t requests = 0;  // all that raise it
+  bool demand = false;         // somebody has enabled the crate's demand
+  friend bool operator==(const CamacLam&, const CamacLam&) = default;
+};
+
 // Where the core publishes to. Called from within the core; must not call back into it.
 class Publisher {
  public:
@@ -129,6 +138,8 @@ class Publisher {
   virtual void publish(McuId mcu, const StateSnapshot& state) = 0;
   virtual void publish(McuId mcu, const Description& description) = 0;
   virtual void publish(BusId bus, const HealthSnapshot& health) = 0;
+  // An event, not kept for later.
+  virtual void publish_lam(const CamacLam& /*lam*/) {}
 };
 
 }  // namespace bushd::api

@@ -149,6 +149,19 @@ struct Pseudo {
   PseudoLaw law{};
 };
 
+// A module of a CAMAC crate (docs/camac.md).
+struct CamacModule {
+  enum class Type { kBushd1, kBushd2 };
+  int station = 0;
+  Type type = Type::kBushd2;
+  int f_start_hz = 40;            // of kBushd2: code 250
+  std::vector<MotorId> motors{};  // by their numbers in the module; kBushd1 has one
+};
+struct Crate {
+  int number = 1;
+  std::vector<CamacModule> modules{};
+};
+
 struct Config {
   std::string path;
   // Where that is, and what its text was when it was read.
@@ -162,6 +175,7 @@ struct Config {
   std::vector<Mcu> mcus;
   std::vector<Group> groups;
   std::vector<Motor> motors;
+  std::vector<Crate> crates;
   std::vector<Pseudo> pseudos{};
 
   // States are published by MCU, and then by section of computed axes.

@@ -11,6 +11,7 @@
 
 #include "config/checks.h"
 #include "config/coordinates.h"
+#include "config/crates.h"
 #include "config/emission_section.h"
 #include "config/home.h"
 #include "config/inputs.h"
@@ -457,9 +458,11 @@ Result<void> read_pseudos(const std::vector<TomlReader>& readers, Loading* loadi
 
 Result<void> read_sections(const TomlReader& root, Loading* loading) {
   const std::string& file = loading->config.path;
-  if (auto known = root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor", "pseudo"});
-      !known)
+  if (auto known =
+          root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor", "pseudo", "crate"});
+      !known) {
     return known;
+  }
   if (auto read = read_lcm(root, &loading->config); !read) return read;
   if (auto read = read_control(root, &loading->config); !read) return read;
   if (auto read = read_state(root, &loading->config); !read) return read;
@@ -480,7 +483,8 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
   const auto pseudos = read_array(root, file, "pseudo", false);
   if (!pseudos) return fail(pseudos.error());
   if (auto read = read_motors(loading); !read) return read;
-  return read_pseudos(*pseudos, loading);
+  if (auto read = read_pseudos(*pseudos, loading); !read) return read;
+  return read_crates(root, &loading->config);
 }
 
 }  // namespace bushd::config

@@ -91,6 +91,8 @@ bushd::Result<Packet> encode(const Part& part, std::int64_t dropped_messages,
 bushd::Result<Packet> encode(const Part& part, const api::Description& description);
 bushd::Result<Packet> encode(const Part& part, const api::HealthSnapshot& health);
 
+bushd::Result<Packet> encode(std::int64_t utime_us, const api::CamacLam& lam);
+
 struct ReplyMessage {
   RequestId id;
   api::Reply reply;  // with its piece of the list
@@ -118,9 +120,14 @@ struct StateMessage : SnapshotMessage<api::StateSnapshot> {
 using DescriptionMessage = SnapshotMessage<api::Description>;
 using HealthMessage = SnapshotMessage<api::HealthSnapshot>;
 
+struct CamacLamMessage {
+  std::int64_t utime_us = 0;
+  api::CamacLam lam;
+};
+
 // All that the daemon may say.
-using DaemonMessage =
-    std::variant<Welcome, ReplyMessage, StateMessage, DescriptionMessage, HealthMessage>;
+using DaemonMessage = std::variant<Welcome, ReplyMessage, StateMessage, DescriptionMessage,
+                                   HealthMessage, CamacLamMessage>;
 
 std::span<const std::string_view> daemon_channels();
 

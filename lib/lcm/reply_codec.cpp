@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "lcm/camac_codec.h"
 #include "lcm/codec.h"
 #include "lcm/snapshot_codec.h"
 #include "lcm/table_codec.h"
@@ -171,6 +172,10 @@ std::size_t size_of(const api::MotorSetting& setting) {
          size_of(setting.in_file);
 }
 
+std::size_t size_of(const camac::Response&) {
+  return 2 * sizeof(std::int8_t) + sizeof(std::int32_t);
+}
+
 // A list in pieces that fit a message each, beside `rest` bytes. At least one piece, maybe empty.
 template <class T>
 std::vector<Piece<T>> pieces(const std::vector<T>& list, std::size_t rest) {
@@ -281,6 +286,8 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
   history_answer.reply = answer.reply;
   configuration_answer_t configuration_answer{};
   configuration_answer.reply = answer.reply;
+  camac_reply_t camac_answer{};
+  camac_answer.reply = answer.reply;
   const auto alone = [&](const char* channel,
                          const auto& message) -> bushd::Result<std::vector<Packet>> {
     auto made = packet(channel, message);
@@ -324,6 +331,11 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
             configuration_answer.path = configuration.path;
             configuration_answer.sha256 = configuration.sha256;
             return in_parts("CONFIGURATION_REPLY", configuration_answer, configuration.settings,
+                            [](auto& part, auto piece) { put(part, piece); });
+          },
+          [&](const api::CamacResult& result) {
+            put(camac_answer, result);
+            return in_parts("CAMAC_REPLY", camac_answer, result.block.responses,
                             [](auto& part, auto piece) { put(part, piece); });
           },
           [&](const tables::TableContent& content) {
@@ -419,6 +431,17 @@ std::optional<DaemonMessage> decode_configuration_answer(Payload payload) {
   return out;
 }
 
+std::optional<DaemonMessage> decode_camac_answer(Payload payload) {
+  const auto message = decode<camac_reply_t>(payload);
+  if (!message) return std::nullopt;
+  auto out = with_phase(message->reply);
+  if (!out) return std::nullopt;
+  auto* completed = std::get_if<api::Completed>(&out->reply);
+  if (completed == nullptr) return out;
+  completed->detail = result_of(*message);
+  return out;
+}
+
 std::optional<DaemonMessage> decode_welcome(Payload payload) {
   const auto message = decode<welcome_t>(payload);
   if (!message) return std::nullopt;
@@ -450,6 +473,9 @@ void append(api::Reply& reply, api::Reply&& part) {
                  },
                  [](api::Configuration& to, api::Configuration& from) {
                    append(to.settings, from.settings);
+                 },
+                 [](api::CamacResult& to, api::CamacResult& from) {
+                   append(to.block.responses, from.block.responses);
                  },
                  [](auto&, auto&) {}},
       whole->detail, more->detail);

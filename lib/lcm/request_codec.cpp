@@ -2,6 +2,7 @@
 #include <array>
 #include <type_traits>
 
+#include "lcm/camac_codec.h"
 #include "lcm/codec.h"
 #include "lcm/table_codec.h"
 #include "lcm/wire.h"
@@ -337,6 +338,12 @@ std::optional<api::Request> from_message(const release_t& message) {
   return api::Release{message.motors};
 }
 
+std::optional<api::Request> from_message(const camac_request_t& message) {
+  auto camac = camac_of(message);
+  if (!camac) return std::nullopt;
+  return *std::move(camac);
+}
+
 template <class Message>
 std::optional<ClientMessage> decode_request(Payload payload) {
   const auto message = decode<Message>(payload);
@@ -371,7 +378,7 @@ std::optional<ClientMessage> decode_get_status(Payload payload) {
 using Decoder = std::optional<ClientMessage> (*)(Payload);
 
 // A new request is a line here. Requests first, in the order of api::Request.
-constexpr std::array<std::pair<std::string_view, Decoder>, 28> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 29> kDecoders = {{
     {"MOVE", decode_request<move_t>},
     {"STOP", decode_request<stop_t>},
     {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
@@ -397,6 +404,7 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 28> kDecoders = {{
     {"HOLD", decode_request<hold_t>},
     {"RELEASE", decode_request<release_t>},
     {"MOVE_LINE", decode_request<move_line_t>},
+    {"CAMAC", decode_request<camac_request_t>},
     {"HELLO", decode_hello},
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},

@@ -264,17 +264,29 @@ std::optional<DaemonMessage> decode_health(Payload payload) {
   return out;
 }
 
+std::optional<DaemonMessage> decode_camac_lam(Payload payload) {
+  const auto message = decode<camac_lam_t>(payload);
+  if (!message) return std::nullopt;
+  return CamacLamMessage{.utime_us = message->utime_us,
+                         .lam = {.crate = message->crate,
+                                 .raised = static_cast<std::uint32_t>(message->raised),
+                                 .requests = static_cast<std::uint32_t>(message->requests),
+                                 .demand = message->demand != 0}};
+}
+
 using Decoder = std::optional<DaemonMessage> (*)(Payload);
 
-constexpr std::array<std::pair<std::string_view, Decoder>, 8> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 10> kDecoders = {{
     {"WELCOME", decode_welcome},
     {"REPLY", decode_answer},
     {"TABLE_REPLY", decode_table_answer},
     {"HISTORY_REPLY", decode_history_answer},
     {"CONFIGURATION_REPLY", decode_configuration_answer},
+    {"CAMAC_REPLY", decode_camac_answer},
     {"STATE", decode_state},
     {"DESCRIPTION", decode_description},
     {"HEALTH", decode_health},
+    {"CAMAC_LAM", decode_camac_lam},
 }};
 
 constexpr auto kDaemonChannels = [] {
@@ -354,6 +366,16 @@ bushd::Result<Packet> encode(const Part& part, const api::HealthSnapshot& health
   for (const api::McuHealth& mcu : health.mcus) message.mcus.push_back(message_of(mcu));
   message.mcu_count = count(message.mcus);
   return packet("HEALTH", message);
+}
+
+bushd::Result<Packet> encode(std::int64_t utime_us, const api::CamacLam& lam) {
+  camac_lam_t message{};
+  message.utime_us = utime_us;
+  message.crate = lam.crate;
+  message.raised = static_cast<std::int32_t>(lam.raised);
+  message.requests = static_cast<std::int32_t>(lam.requests);
+  message.demand = lam.demand ? 1 : 0;
+  return packet("CAMAC_LAM", message);
 }
 
 std::span<const std::string_view> daemon_channels() {

@@ -13,6 +13,7 @@ std::optional<DaemonMessage> decode_answer(Payload payload);
 std::optional<DaemonMessage> decode_table_answer(Payload payload);
 std::optional<DaemonMessage> decode_history_answer(Payload payload);
 std::optional<DaemonMessage> decode_configuration_answer(Payload payload);
+std::optional<DaemonMessage> decode_camac_answer(Payload payload);
 std::optional<DaemonMessage> decode_welcome(Payload payload);
 
 }  // namespace bushd::lcm

@@ -3,6 +3,9 @@
 
 #include "bushd/answer_t.hpp"
 #include "bushd/arm_t.hpp"
+#include "bushd/camac_lam_t.hpp"
+#include "bushd/camac_reply_t.hpp"
+#include "bushd/camac_request_t.hpp"
 #include "bushd/clear_faults_t.hpp"
 #include "bushd/configuration_answer_t.hpp"
 #include "bushd/configure_t.hpp"

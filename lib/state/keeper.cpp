@@ -98,6 +98,11 @@ void Keeper::settings(MotorId id, Settings settings) {
   motors_[id].kept.settings = std::move(settings);
 }
 
+void Keeper::settings(const std::string& name, Settings settings) {
+  ++told_;
+  pending_.settings[name] = std::move(settings);
+}
+
 void Keeper::step(std::int64_t now_us) {
   if (marking_.empty() && !to_mark_.empty() && now_us >= mark_again_us_) {
     std::vector<Mark> marks;

@@ -57,6 +57,8 @@ class Keeper {
   // It was seen in motion.
   void moves(MotorId motor, Record record);
   void settings(MotorId motor, Settings settings);
+  // Of what is no motor.
+  void settings(const std::string& name, Settings settings);
   void past(PastMove move) { pending_.moves.push_back(std::move(move)), ++told_; }
 
   // How much has been told, and how much of that is on the disk.

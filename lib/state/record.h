@@ -43,6 +43,11 @@ struct Setting {
 };
 using Settings = std::map<std::string, Setting>;  // by key: offset, direction, soft_limits
 
+// Names with a slash are of something else that has settings: no motor has one.
+inline bool is_no_motor(const std::string& name) {
+  return name.find('/') != std::string::npos;
+}
+
 // All that is kept of one motor.
 struct Kept {
   std::optional<Record> record{};

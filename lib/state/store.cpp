@@ -104,6 +104,9 @@ Result<void> Store::read_marks(Disk& disk, const Opening& opening) {
     }
     marks.push_back({.motor = motor, .motion = kept.motion});
   }
+  for (auto& [name, of_name] : *settings) {
+    if (is_no_motor(name)) kept_[name].settings = std::move(of_name);
+  }
   auto made = Marks::make(std::move(*file), id, marks);
   if (!made) return fail(made.error());
   marks_ = std::move(*made);

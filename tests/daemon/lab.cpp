@@ -31,6 +31,7 @@ Answer answer_of(const api::Reply& reply) {
     }
   }
   if (const auto* plan = std::get_if<api::MovePlan>(&completed->detail)) answer.plan = *plan;
+  if (const auto* crate = std::get_if<api::CamacResult>(&completed->detail)) answer.camac = *crate;
   return answer;
 }
 
@@ -247,6 +248,7 @@ void Lab::send(BusId bus, std::span<const std::uint8_t> bytes) {
 
 void Lab::log(daemon::LogLevel level, daemon::LogSubject, const std::string& text) {
   if (level == daemon::LogLevel::kError) errors_.push_back(text);
+  if (level == daemon::LogLevel::kWarning) warnings_.push_back(text);
   if (level != daemon::LogLevel::kInfo) {
     std::printf("[%.3f s] %s\n", static_cast<double>(now_ns_) * 1e-9, text.c_str());
   }

@@ -67,6 +67,7 @@ struct Answer {
   std::vector<std::int64_t> position_steps{};
   std::vector<api::TableRef> tables{};
   std::optional<api::MovePlan> plan{};
+  std::optional<api::CamacResult> camac{};
 };
 
 class Lab : public daemon::Outputs, private state::Backend {
@@ -110,8 +111,10 @@ class Lab : public daemon::Outputs, private state::Backend {
   // As published next.
   api::HealthSnapshot health_of(const std::string& bus);
   api::McuHealth mcu_health(const std::string& mcu);
-  // What the daemon has logged as errors.
+  // What the daemon has logged as errors, and as warnings.
   const std::vector<std::string>& errors() const { return errors_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::vector<api::CamacLam>& lams() const { return lams_; }
   // Steps that the motor has really made, seen from the outside.
   std::int64_t shaft_steps(const std::string& motor) const;
 
@@ -168,6 +171,7 @@ class Lab : public daemon::Outputs, private state::Backend {
     descriptions_[description.mcu] = description;
   }
   void publish(BusId, const api::HealthSnapshot& health) override { health_[health.bus] = health; }
+  void publish_lam(const api::CamacLam& lam) override { lams_.push_back(lam); }
   void move_log(const std::string& line) override { move_lines_.push_back(line); }
   void log(daemon::LogLevel level, daemon::LogSubject, const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
@@ -199,6 +203,8 @@ class Lab : public daemon::Outputs, private state::Backend {
   std::map<std::string, api::Description> descriptions_;
   std::map<std::string, api::HealthSnapshot> health_;
   std::vector<std::string> errors_;
+  std::vector<std::string> warnings_;
+  std::vector<api::CamacLam> lams_;
   std::uint16_t master_ = 0;
   bool positions_confirmed_ = false;
   std::vector<std::string> move_lines_;

@@ -95,6 +95,14 @@ TEST(Codec, OtherRequestsDoToo) {
   EXPECT_EQ(history.motor, "a");
   EXPECT_EQ(history.most, 7);
   EXPECT_TRUE(request_over_the_wire(api::Home{.all = true}).all);
+  const camac::Block block{.mode = camac::BlockMode::kScan,
+                           .cycles = {{5, 15, 31, 0xFFFFFF}, {31, 0, 0, 7}},
+                           .count = 9,
+                           .last_station = 23,
+                           .last_subaddress = 3};
+  const auto cycles = request_over_the_wire(api::Camac{.crate = 62, .block = block});
+  EXPECT_EQ(cycles.crate, 62);
+  EXPECT_EQ(cycles.block, block);
   using Kind = api::Configure::Kind;
   EXPECT_EQ(request_over_the_wire(api::Configure{.motors = {"a"}}).motors, api::MotorNames{"a"});
   for (const Kind kind : {Kind::kShow, Kind::kChange, Kind::kSaved}) {
@@ -171,6 +179,9 @@ TEST(Codec, WhatNoMessageMeansIsRefused) {
   configure_t configure{};
   configure.kind = 4;
   EXPECT_FALSE(decode_client_message("CONFIGURE", *encode(configure)));
+  camac_request_t cycles{};
+  cycles.mode = 5;
+  EXPECT_FALSE(decode_client_message("CAMAC", *encode(cycles)));
   position_compare_t compare{};
   compare.arrivals = 4;
   EXPECT_FALSE(decode_client_message("POSITION_COMPARE", *encode(compare)));
@@ -231,6 +242,12 @@ TEST(Codec, PlansAndTablesDoToo) {
           .reply);
   EXPECT_EQ(std::get<api::MotionHistory>(history.detail).motions,
             std::vector<api::PastMotion>({motion, motion}));
+  const api::CamacResult crate{
+      .block = {.responses = {{true, false, 0xFFFFFF}, {false, true, 0}}, .tally = 2},
+      .requests = 1U << 22};
+  const auto answered = std::get<api::Completed>(
+      reply_over_the_wire(api::Completed{.reason = "r", .detail = crate}).reply);
+  EXPECT_EQ(std::get<api::CamacResult>(answered.detail), crate);
   const api::Configuration configuration{
       .path = "/etc/b.toml",
       .sha256 = "abc",
@@ -329,6 +346,25 @@ TEST(Codec, AListOfManyTablesComesInParts) {
   const auto whole = put_together(reply, order);
   EXPECT_EQ(std::get<api::TableList>(whole.detail).entries.size(), 5000u);
   EXPECT_EQ(whole.reason, "all tables");
+}
+
+TEST(Codec, LongBlocksOfACrateComeInParts) {
+  api::CamacResult crate{.block = {.tally = 20'000}, .requests = 5};
+  for (std::uint32_t i = 0; i < 20'000; ++i) {
+    crate.block.responses.push_back({.x = i % 2 == 0, .q = i % 3 == 0, .data = i});
+  }
+  const auto whole = put_together(api::Completed{.reason = "r", .detail = crate}, {1, 0});
+  EXPECT_EQ(std::get<api::CamacResult>(whole.detail), crate);
+}
+
+TEST(Codec, LamArrives) {
+  const api::CamacLam lam{.crate = 3, .raised = 16, .requests = 1U << 22 | 16, .demand = true};
+  const auto packet = encode(77, lam);
+  ASSERT_TRUE(packet);
+  EXPECT_EQ(packet->channel, "CAMAC_LAM");
+  const auto heard = decode_daemon_message(packet->channel, packet->payload);
+  EXPECT_EQ(std::get<CamacLamMessage>(*heard).lam, lam);
+  EXPECT_EQ(std::get<CamacLamMessage>(*heard).utime_us, 77);
 }
 
 // Nobody can make a client keep more than a reply.

@@ -74,6 +74,16 @@ TEST(Store, KeepsWhatWasWritten) {
   EXPECT_THAT(*store.history("phi", 10), IsEmpty());
 }
 
+TEST(Store, KeepsSettingsOfWhatIsNoMotor) {
+  sim::SimDisk disk(1);
+  {
+    Store store = open(disk);
+    ASSERT_TRUE(store.write({.settings = {{"camac/1/5", {{"memory", {"00ff", ""}}}}}}));
+  }
+  disk.boot();
+  EXPECT_EQ(open(disk).kept().at("camac/1/5").settings.at("memory").value, "00ff");
+}
+
 TEST(Store, AMarkBeyondTheRecordIsAMotorThatMoves) {
   sim::SimDisk disk(1);
   {

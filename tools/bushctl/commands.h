@@ -32,6 +32,8 @@ void add_pause_commands(CommandLine& line);
 void add_config_commands(CommandLine& line);
 // table list, show, use, reload
 void add_table_commands(CommandLine& line);
+// camac
+void add_camac_commands(CommandLine& line);
 // latency-test, scan, address: on a line that no daemon has
 void add_line_commands(CommandLine& line);
 // setup

@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
     bushctl::add_history_commands(line);
     bushctl::add_config_commands(line);
     bushctl::add_table_commands(line);
+    bushctl::add_camac_commands(line);
     bushctl::add_line_commands(line);
     bushctl::add_setup_command(line);
     bushctl::add_doctor_command(line);

@@ -1,0 +1,179 @@
+#include "daemon/services/camac.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "camac/block.h"
+#include "camac/memory_text.h"
+#include "daemon/services/camac_motors.h"
+#include "daemon/services/camac_shutter.h"
+
+namespace bushd::daemon {
+namespace {
+
+constexpr int kLastN = 31;
+constexpr const char* kMemory = "memory";  // in the store
+
+std::string name_of(const config::Crate& crate, const config::CamacModule& module) {
+  return "camac-" + std::to_string(crate.number) + "-" + std::to_string(module.station);
+}
+
+Result<void> in_range(const char* what, std::int64_t value, std::int64_t least, std::int64_t most) {
+  if (value >= least && value <= most) return {};
+  return fail(std::string(what) + " " + std::to_string(value) +
+              " is out of range; allowed: " + std::to_string(least) + ".." + std::to_string(most));
+}
+
+Result<void> check(const camac::Naf& naf) {
+  auto good = in_range("station", naf.station, 1, kLastN);
+  if (good) good = in_range("subaddress", naf.subaddress, 0, camac::kLastSubaddress);
+  if (good) good = in_range("function", naf.function, 0, camac::kLastFunction);
+  if (good) good = in_range("data", naf.data, 0, camac::kDataMask);
+  return good;
+}
+
+Result<void> check(const camac::Block& block) {
+  constexpr std::int64_t kMost = api::Camac::kMostCycles;
+  const auto cycles = static_cast<std::int64_t>(block.cycles.size());
+  auto good = in_range("number of cycles", cycles, 1, kMost);
+  if (good) good = in_range("count", block.count, 1, kMost);
+  if (good) good = in_range("last station", block.last_station, 1, camac::kStations);
+  if (good) good = in_range("last subaddress", block.last_subaddress, 0, camac::kLastSubaddress);
+  for (std::size_t i = 0; good && i < block.cycles.size(); ++i) good = check(block.cycles[i]);
+  if (!good) return good;
+  const bool words =
+      block.mode == camac::BlockMode::kSingle || camac::writes(block.cycles.front().function);
+  if (words && block.count != cycles) {
+    return fail("the count is " + std::to_string(block.count) + " and " + std::to_string(cycles) +
+                " words are given; give as many");
+  }
+  return {};
+}
+
+}  // namespace
+
+class Camac::Station {
+ public:
+  virtual ~Station() = default;
+  // Its name in the store.
+  explicit Station(std::string name) : kept_as(std::move(name)) {}
+  virtual camac::MotionModule& module() = 0;
+  virtual void step(std::int64_t now_us) = 0;
+
+  const std::string kept_as;
+};
+
+class Camac::Bushd1Station final : public Station {
+ public:
+  template <class... Args>
+  explicit Bushd1Station(std::string place, Args&&... args)
+      : Station(std::move(place)), shutter_(std::forward<Args>(args)...) {}
+  camac::MotionModule& module() override { return module_; }
+  void step(std::int64_t now_us) override { shutter_.follow(now_us, module_); }
+
+ private:
+  CamacShutter shutter_;
+  camac::Bushd1 module_{shutter_};
+};
+
+class Camac::Bushd2Station final : public Station {
+ public:
+  template <class... Args>
+  Bushd2Station(std::string place, int f_start_hz, Args&&... args)
+      : Station(std::move(place)),
+        motors_(std::forward<Args>(args)...),
+        module_({.f_start_hz = f_start_hz}, motors_) {}
+  camac::MotionModule& module() override { return module_; }
+  // Who does not answer is told by the core: his move ends.
+  void step(std::int64_t now_us) override { motors_.step(now_us, module_); }
+
+ private:
+  CamacMotors motors_;
+  camac::Bushd2 module_;
+};
+
+Camac::Camac(Installation& installation, const Interlocks& interlocks, TablesInService& tables,
+             KeptPositions& kept, Outputs& outputs, const AskCore& ask)
+    : kept_(kept), outputs_(outputs) {
+  for (const config::Crate& configured : installation.config().crates) {
+    Crate crate{.number = configured.number};
+    for (const config::CamacModule& module : configured.modules) {
+      const std::string name = name_of(configured, module);
+      const std::string kept_as =
+          "camac/" + std::to_string(configured.number) + "/" + std::to_string(module.station);
+      std::unique_ptr<Station> station;
+      if (module.type == config::CamacModule::Type::kBushd1) {
+        station = std::make_unique<Bushd1Station>(kept_as, name, module.motors.front(),
+                                                  installation, interlocks, outputs, ask);
+      } else {
+        station = std::make_unique<Bushd2Station>(kept_as, module.f_start_hz, name, module,
+                                                  installation, interlocks, tables, outputs, ask);
+      }
+      crate.crate.insert(module.station, station->module());
+      crate.stations.push_back(std::move(station));
+    }
+    crates_.push_back(std::move(crate));
+  }
+}
+
+Camac::~Camac() = default;
+
+void Camac::request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request) {
+  const auto crate = std::ranges::find(crates_, request.crate, &Crate::number);
+  if (crate == crates_.end()) {
+    return asker.answer(api::Refused{"there is no crate " + std::to_string(request.crate) +
+                                     "; add a [[crate]] with this number to bushd.toml"});
+  }
+  if (const auto good = check(request.block); !good) {
+    return asker.answer(api::Refused{good.error().text()});
+  }
+  asker.answer(api::Accepted{});
+  api::CamacResult result{.block = camac::transfer(now_us, crate->crate, request.block)};
+  result.requests = crate->crate.requests();
+  keep_memories(*crate);
+  asker.answer(api::Completed{.outcome = api::Outcome::kDone,
+                              .reason = std::to_string(result.block.tally) + " words",
+                              .detail = std::move(result)});
+}
+
+void Camac::keep_memories(const Crate& crate) {
+  if (!kept_.keeps()) return;
+  for (const auto& station : crate.stations) {
+    const std::string text = camac::to_text(station->module().memory());
+    kept_.keep(station->kept_as, {{kMemory, {.value = text}}});
+  }
+}
+
+void Camac::take_kept() {
+  for (const Crate& crate : crates_) {
+    for (const auto& station : crate.stations) {
+      const state::Settings kept = kept_.settings(station->kept_as);
+      const auto memory = kept.find(kMemory);
+      if (memory == kept.end()) continue;
+      if (const auto bytes = camac::bytes_of(memory->second.value)) {
+        station->module().load_memory(*bytes);
+      }
+    }
+  }
+}
+
+void Camac::step(std::int64_t now_us) {
+  for (Crate& crate : crates_) {
+    for (const auto& station : crate.stations) station->step(now_us);
+    tell_lam(crate);
+  }
+}
+
+void Camac::tell_lam(Crate& crate) {
+  const std::uint32_t requests = crate.crate.requests();
+  const std::uint32_t raised = requests & ~crate.told;
+  crate.told = requests;
+  if (raised == 0) return;
+  outputs_.publish_lam({.crate = crate.number,
+                        .raised = raised,
+                        .requests = requests,
+                        .demand = crate.crate.demand_enabled()});
+}
+
+}  // namespace bushd::daemon

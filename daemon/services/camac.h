@@ -1,0 +1,53 @@
+// CAMAC crates of the configuration: cycles of clients go to the modules, and what the modules want
+// of motors goes through the requests of everybody (camac_motors.h, camac_shutter.h).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "camac/crate.h"
+#include "daemon/installation.h"
+#include "daemon/interlocks.h"
+#include "daemon/outputs.h"
+#include "daemon/service.h"
+#include "daemon/services/camac_asker.h"
+#include "daemon/services/kept_positions.h"
+#include "daemon/services/tables_in_service.h"
+
+namespace bushd::daemon {
+
+class Camac final : public Service {
+ public:
+  // `ask` is called from step() only.
+  Camac(Installation& installation, const Interlocks& interlocks, TablesInService& tables,
+        KeptPositions& kept, Outputs& outputs, const AskCore& ask);
+  ~Camac() override;
+
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request);
+  // The store is in use: memories are as they were kept.
+  void take_kept();
+
+  void step(std::int64_t now_us) override;
+
+ private:
+  // A module with the motors behind it.
+  class Station;
+  class Bushd1Station;
+  class Bushd2Station;
+  struct Crate {
+    int number;
+    camac::Crate crate{};
+    std::vector<std::unique_ptr<Station>> stations{};
+    std::uint32_t told = 0;  // of its requests
+  };
+
+  void tell_lam(Crate& crate);
+  void keep_memories(const Crate& crate);
+
+  KeptPositions& kept_;
+  Outputs& outputs_;
+  std::vector<Crate> crates_;
+};
+
+}  // namespace bushd::daemon

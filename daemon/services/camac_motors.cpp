@@ -1,0 +1,198 @@
+#include "daemon/services/camac_motors.h"
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+namespace bushd::daemon {
+namespace {
+
+using camac::Bushd2;
+using camac::MotorStatus;
+using camac::Program;
+
+constexpr std::int64_t kNsPerS = 1'000'000'000;
+
+// Before the step in the middle stands the last code that is used.
+std::size_t codes_used(const Program& program) {
+  return std::min<std::size_t>((program.steps + 1) / 2, program.codes.size());
+}
+
+std::string reason_of(const api::Reply& reply) {
+  if (const auto* refused = std::get_if<api::Refused>(&reply)) return refused->reason;
+  const auto* completed = std::get_if<api::Completed>(&reply);
+  return completed == nullptr ? "" : completed->reason;
+}
+
+std::optional<api::Outcome> outcome_of(const api::Reply& reply) {
+  const auto* completed = std::get_if<api::Completed>(&reply);
+  if (completed == nullptr) return std::nullopt;
+  return completed->outcome;
+}
+
+}  // namespace
+
+Result<tables::TablePtr> table_of_program(const Program& program, int f_start_hz,
+                                          const std::string& module) {
+  const auto rise = std::ranges::is_sorted_until(program.codes, std::greater<>());
+  const auto falling = static_cast<std::size_t>(rise - program.codes.begin());
+  if (falling < codes_used(program)) {
+    return fail("code " + std::to_string(falling) + " of program " + std::to_string(program.page) +
+                " rises from " + std::to_string(*(rise - 1)) + " to " + std::to_string(*rise) +
+                "; codes must fall, or stay, from the start to the middle of a motion");
+  }
+  tables::TableContent content{.name = module,
+                               .time_unit_ns = static_cast<std::uint32_t>(
+                                   kNsPerS / (Bushd2::kCodesPerStartPeriod * f_start_hz))};
+  content.accel.assign(program.codes.begin(), rise);
+  content.name += "-" + std::to_string(program.page) + "-" +
+                  tables::content_hash(content).substr(0, tables::kShortHashLength);
+  return tables::make(std::move(content));
+}
+
+MotorStatus limits_of(const Installation& installation, MotorId motor) {
+  const Mcu& mcu = installation.mcu_of(motor);
+  if (!mcu.online()) return {};
+  const unsigned output = 1U << installation[motor].output().value;
+  return {.right_limit = (mcu.report().forbidden_positive & output) != 0,
+          .left_limit = (mcu.report().forbidden_negative & output) != 0};
+}
+
+void CamacMotors::warn(MotorId motor, const std::string& why) {
+  outputs_.log(LogLevel::kWarning, motor, name_ + ": " + why);
+}
+
+MotorStatus CamacMotors::status(int number) {
+  const auto index = static_cast<std::size_t>(number);
+  if (index >= config_.motors.size()) {
+    outputs_.log(LogLevel::kWarning, {},
+                 name_ + ": there is no motor " + std::to_string(number) + "; it has " +
+                     std::to_string(config_.motors.size()));
+    return {.not_connected = true};
+  }
+  const MotorId id = config_.motors[index];
+  const Mcu& mcu = installation_.mcu_of(id);
+  MotorStatus status = limits_of(installation_, id);
+  const bool supplied =
+      !mcu.online() || mcu.asleep || (mcu.report().flags & BUSHD_FLAG_ENABLED) != 0;
+  status.supply_missing = !supplied;
+  auto may = interlocks_.may_move();
+  if (may) may = interlocks_.may_move(id);
+  if (!may) {
+    status.not_connected = supplied;
+    warn(id, installation_[id].name() + ": " + may.error().text());
+  }
+  return status;
+}
+
+bool CamacMotors::move(const Program& program) {
+  const MotorId id = config_.motors[static_cast<std::size_t>(program.motor)];
+  const motion::Motor& motor = installation_[id];
+  Result<void> may;
+  if (motor.has_plan()) may = fail("moves, by another's request");
+  const auto table = table_of_program(program, config_.f_start_hz, name_);
+  if (may && !table) may = fail(table.error());
+  const std::int64_t steps = program.left ? -std::int64_t{program.steps} : program.steps;
+  if (may) may = motor.may_move_to(motor.position_steps() + steps);
+  if (!may) {
+    warn(id, motor.name() + ": " + may.error().text());
+    return false;
+  }
+  motion_ = Motion{.motor = id, .program = program, .table = *table};
+  return true;
+}
+
+void CamacMotors::stop(int) {
+  if (motion_) motion_->to_stop = true;
+}
+
+void CamacMotors::step(std::int64_t now_us, Bushd2& module) {
+  if (!motion_) return;
+  if (motion_->stage == Motion::Stage::kBegins && motion_->to_stop) {
+    motion_.reset();
+    return module.ends({});
+  }
+  if (motion_->stage == Motion::Stage::kBegins) begin(now_us);
+  if (motion_->stage == Motion::Stage::kGetsTable) {
+    follow_table(now_us, module);
+  } else {
+    follow_move(now_us, module);
+  }
+}
+
+void CamacMotors::begin(std::int64_t now_us) {
+  const GroupId group = installation_.config()[motion_->motor].group;
+  motion_->stage = Motion::Stage::kGetsTable;
+  const api::Asker by = asker();
+  if (installation_.tables()[group]->content_hash() == motion_->table->content_hash()) {
+    return by.answer(api::Completed{.outcome = api::Outcome::kDone, .reason = "", .detail = {}});
+  }
+  tables_.use(now_us, by, group, motion_->table);
+}
+
+void CamacMotors::follow_table(std::int64_t now_us, Bushd2& module) {
+  const auto& reply = session_->last_answer();
+  if (!reply) return;
+  const MotorId id = motion_->motor;
+  const motion::Motor& motor = installation_[id];
+  if (outcome_of(*reply) != api::Outcome::kDone) {
+    warn(id, motor.name() + ": its program was not put in service: " + reason_of(*reply));
+  } else if (motion_->to_stop) {
+    warn(id, motor.name() + ": stopped before it began");
+  } else if (motor.has_plan()) {
+    warn(id, motor.busy_text() + ", by another's request");
+  } else {
+    motion_->stage = Motion::Stage::kMoves;
+    motion_->from_steps = motor.position_steps();
+    const std::int64_t steps = motion_->program.steps;
+    ask_(now_us, asker(),
+         api::Move{.kind = api::Move::Kind::kRelative,
+                   .motors = {{motor.name(), motion_->program.left ? -steps : steps}}});
+    return;
+  }
+  motion_.reset();
+  module.ends({});
+}
+
+// All but the last one, which comes with the result.
+void CamacMotors::tell_steps(std::int64_t now_us, Bushd2& module) {
+  const std::int64_t moved = installation_[motion_->motor].position_steps() - motion_->from_steps;
+  const std::int64_t last = motion_->program.steps - 1;
+  const auto made = static_cast<std::uint32_t>(
+      std::clamp<std::int64_t>(motion_->program.left ? -moved : moved, motion_->told,
+                               std::max<std::int64_t>(last, motion_->told)));
+  const std::uint32_t more = made - motion_->told;
+  motion_->told = made;
+  if (more > 0) module.answer(now_us, more, {});
+}
+
+void CamacMotors::follow_move(std::int64_t now_us, Bushd2& module) {
+  if (motion_->to_stop && !motion_->stopping) {
+    motion_->stopping = true;
+    ask_(now_us, {.session = stops_, .number = stops_->next_number()},
+         api::Stop{{installation_[motion_->motor].name()}});
+  }
+  tell_steps(now_us, module);
+  if (const auto reply = session_->last_answer()) end(now_us, module, *reply);
+}
+
+void CamacMotors::end(std::int64_t now_us, Bushd2& module, const api::Reply& reply) {
+  const Motion ended = std::move(*motion_);
+  motion_.reset();
+  const auto outcome = outcome_of(reply);
+  MotorStatus status = limits_of(installation_, ended.motor);
+  if (outcome == api::Outcome::kReached) {
+    return module.answer(now_us, ended.program.steps - ended.told, status);
+  }
+  if (outcome != api::Outcome::kStopped || !ended.stopping) {
+    warn(ended.motor, reason_of(reply));
+  }
+  if (outcome == api::Outcome::kLimit) {
+    (ended.program.left ? status.left_limit : status.right_limit) = true;
+  } else if (outcome != api::Outcome::kStopped) {
+    status.not_connected = outcome.has_value();
+  }
+  module.ends(status);
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,81 @@
+// The motors behind a BUSHD-2. A program becomes the table of its motor's group, as soon as the
+// MCUs of the group rest; then the motor is moved by the steps of the program. The module is told
+// as much of it as MCUs report.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "camac/bushd2.h"
+#include "daemon/interlocks.h"
+#include "daemon/outputs.h"
+#include "daemon/services/camac_asker.h"
+#include "daemon/services/tables_in_service.h"
+
+namespace bushd::daemon {
+
+// The table of a program: as many of its codes, from the first one on, as never rise. Error: the
+// program needs more of them.
+Result<tables::TablePtr> table_of_program(const camac::Program& program, int f_start_hz,
+                                          const std::string& module);
+
+// What the limit switches of a motor say: right is in positive direction.
+camac::MotorStatus limits_of(const Installation& installation, MotorId motor);
+
+class CamacMotors final : public camac::Motors {
+ public:
+  // `name` is that of the module: "camac-1-5".
+  CamacMotors(std::string name, const config::CamacModule& module, Installation& installation,
+              const Interlocks& interlocks, TablesInService& tables, Outputs& outputs, AskCore ask)
+      : name_(std::move(name)),
+        config_(module),
+        installation_(installation),
+        interlocks_(interlocks),
+        tables_(tables),
+        outputs_(outputs),
+        ask_(std::move(ask)),
+        session_(std::make_shared<CamacSession>(name_)) {}
+
+  camac::MotorStatus status(int motor) override;
+  bool move(const camac::Program& program) override;
+  void stop(int motor) override;
+
+  // Does what is due, and tells the module what has become of its motion.
+  void step(std::int64_t now_us, camac::Bushd2& module);
+
+ private:
+  struct Motion {
+    enum class Stage { kBegins, kGetsTable, kMoves };
+    MotorId motor;
+    camac::Program program;
+    tables::TablePtr table;
+    Stage stage = Stage::kBegins;
+    std::int64_t from_steps = 0;
+    std::uint32_t told = 0;  // of its steps
+    bool to_stop = false;
+    bool stopping = false;  // it was asked to
+  };
+
+  api::Asker asker() { return {.session = session_, .number = session_->next_number()}; }
+  void begin(std::int64_t now_us);
+  void follow_table(std::int64_t now_us, camac::Bushd2& module);
+  void follow_move(std::int64_t now_us, camac::Bushd2& module);
+  void tell_steps(std::int64_t now_us, camac::Bushd2& module);
+  void end(std::int64_t now_us, camac::Bushd2& module, const api::Reply& reply);
+  void warn(MotorId motor, const std::string& why);
+
+  const std::string name_;
+  const config::CamacModule& config_;
+  Installation& installation_;
+  const Interlocks& interlocks_;
+  TablesInService& tables_;
+  Outputs& outputs_;
+  AskCore ask_;
+  std::shared_ptr<CamacSession> session_;
+  std::shared_ptr<CamacSession> stops_ = std::make_shared<CamacSession>(name_);
+  std::optional<Motion> motion_;
+};
+
+}  // namespace bushd::daemon

@@ -1,0 +1,63 @@
+// Cycles of a CAMAC crate and blocks of them, as values: what is asked, and what is answered.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace bushd::camac {
+
+inline constexpr int kStations = 23;  // for modules, 1 .. 23
+inline constexpr int kLastSubaddress = 15;
+inline constexpr int kLastFunction = 31;
+inline constexpr std::uint32_t kDataMask = 0xFFFFFF;
+
+struct Naf {
+  int station = 0;
+  int subaddress = 0;
+  int function = 0;
+  std::uint32_t data = 0;  // W; of functions that write
+  friend bool operator==(const Naf&, const Naf&) = default;
+};
+
+struct Response {
+  bool x = false;
+  bool q = false;
+  std::uint32_t data = 0;  // R; 0 of functions that do not read
+  friend bool operator==(const Response&, const Response&) = default;
+};
+
+enum class BlockMode {
+  kSingle,  // each cycle of a list, whatever X and Q
+  kRepeat,  // one address; the same word again until Q, or kMostTries times
+  kQStop,   // one address, until a word without Q, which is none
+  kScan     // one subaddress after the other, after one without Q the next station
+};
+
+// single, repeat, q-stop, scan
+std::string_view word(BlockMode mode);
+std::optional<BlockMode> block_mode_of(std::string_view word);
+
+struct Block {
+  static constexpr int kMostTries = 100;
+
+  BlockMode mode = BlockMode::kSingle;
+  // Of a block other than kSingle the first one has the address, and each one a word, if it writes.
+  std::vector<Naf> cycles{};  // at least one
+  // Words; of kSingle and of blocks that write as many as there are cycles.
+  std::uint32_t count = 1;
+  // Of kScan: the last address, inclusive.
+  int last_station = kStations;
+  int last_subaddress = kLastSubaddress;
+  friend bool operator==(const Block&, const Block&) = default;
+};
+
+struct BlockResult {
+  // Of the cycles that moved a word, of kSingle of all; of one address that by which it ended, too.
+  std::vector<Response> responses{};
+  std::uint32_t tally = 0;  // words moved; of kSingle cycles made
+  friend bool operator==(const BlockResult&, const BlockResult&) = default;
+};
+
+}  // namespace bushd::camac

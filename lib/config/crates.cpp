@@ -1,0 +1,193 @@
+#include "config/crates.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "config/words.h"
+
+namespace bushd::config {
+namespace {
+
+using tables::TomlReader;
+
+constexpr std::int64_t kLastCrate = 62;  // of a serial highway
+constexpr std::int64_t kLastStation = 23;
+constexpr std::int64_t kLeastStartHz = 1;
+constexpr std::int64_t kMostStartHz = 100;
+constexpr std::size_t kMostMotors = 32;
+constexpr std::size_t kMotorsPerPage = 8;
+
+// Where each motor has its place, for what follows.
+struct Place {
+  std::string module;  // "station 5 of crate 1"
+  std::size_t page;    // of kBushd2: which of its four programs moves it
+  bool programmed;     // by codes from the memory
+};
+using Places = std::map<std::size_t, Place>;  // by MotorId
+
+Result<std::vector<TomlReader>> sections(const TomlReader& parent, const std::string& file,
+                                         std::string_view key, const std::string& place) {
+  const std::string allowed = fmt::format("sections [[{}]]", place);
+  const auto elements = parent.array(key, allowed);
+  if (!elements) return fail(elements.error());
+  std::vector<TomlReader> readers;
+  for (const toml::node& node : **elements) {
+    const toml::table* table = node.as_table();
+    if (table == nullptr) {
+      return fail(parent.error(key, readers.size(),
+                               fmt::format("is {}; allowed: {}", tables::describe(node), allowed)));
+    }
+    readers.emplace_back(*table, file, fmt::format("{}[{}]", place, readers.size()));
+  }
+  return readers;
+}
+
+// Which motor has this name, for a key or an element of it.
+Result<MotorId> find_motor(const TomlReader& reader, std::string_view key,
+                           std::optional<std::size_t> index, const std::string& name,
+                           const Config& config) {
+  const auto found = std::ranges::find(config.motors, name, &Motor::name);
+  if (found != config.motors.end()) {
+    return MotorId{static_cast<std::size_t>(found - config.motors.begin())};
+  }
+  return fail(
+      reader.error(key, index, fmt::format("is \"{}\"; allowed: names of [[motor]]", name)));
+}
+
+// A motor obeys one module.
+Result<void> take(const TomlReader& reader, std::string_view key, std::optional<std::size_t> index,
+                  MotorId motor, Place place, const Config& config, Places* places) {
+  const auto [first, is_new] = places->emplace(motor.value, std::move(place));
+  if (is_new) return {};
+  return fail(reader.error(key, index,
+                           fmt::format("motor \"{}\" is already one of {}; allowed: each once",
+                                       config[motor].name, first->second.module)));
+}
+
+Result<void> read_motors(const TomlReader& reader, const std::string& where, const Config& config,
+                         CamacModule* module, Places* places) {
+  constexpr std::string_view kRule = "1..32 names of motors";
+  const auto names = reader.array("motors", kRule);
+  if (!names) return fail(names.error());
+  if ((*names)->empty() || (*names)->size() > kMostMotors) {
+    return fail(
+        reader.error("motors", fmt::format("has {}; allowed: {}", (*names)->size(), kRule)));
+  }
+  for (std::size_t i = 0; i < (*names)->size(); ++i) {
+    const toml::node& node = *(*names)->get(i);
+    if (!node.is_string()) {
+      return fail(reader.error(
+          "motors", i, fmt::format("is {}; allowed: the name of a motor", tables::describe(node))));
+    }
+    const auto motor = find_motor(reader, "motors", i, node.as_string()->get(), config);
+    if (!motor) return fail(motor.error());
+    const Place place{.module = where, .page = i / kMotorsPerPage, .programmed = true};
+    if (auto taken = take(reader, "motors", i, *motor, place, config, places); !taken) return taken;
+    module->motors.push_back(*motor);
+  }
+  return {};
+}
+
+Result<void> read_bushd2(const TomlReader& reader, const std::string& where, const Config& config,
+                         CamacModule* module, Places* places) {
+  if (auto known = reader.only({"station", "type", "f_start_hz", "motors"}); !known) return known;
+  if (reader.has("f_start_hz")) {
+    const auto f_start = reader.integer("f_start_hz", kLeastStartHz, kMostStartHz, "Hz");
+    if (!f_start) return fail(f_start.error());
+    module->f_start_hz = static_cast<int>(*f_start);
+  }
+  return read_motors(reader, where, config, module, places);
+}
+
+Result<void> read_bushd1(const TomlReader& reader, const std::string& where, const Config& config,
+                         CamacModule* module, Places* places) {
+  if (auto known = reader.only({"station", "type", "motor"}); !known) return known;
+  const auto name = reader.string("motor", "the name of a motor");
+  if (!name) return fail(name.error());
+  const auto motor = find_motor(reader, "motor", std::nullopt, *name, config);
+  if (!motor) return fail(motor.error());
+  module->motors.push_back(*motor);
+  const Place place{.module = where, .page = 0, .programmed = false};
+  return take(reader, "motor", std::nullopt, *motor, place, config, places);
+}
+
+Result<void> read_module(const TomlReader& reader, const Config& config, Crate* crate,
+                         Places* places) {
+  const auto station = reader.integer("station", 1, kLastStation);
+  if (!station) return fail(station.error());
+  const int number = static_cast<int>(*station);
+  if (std::ranges::find(crate->modules, number, &CamacModule::station) != crate->modules.end()) {
+    return fail(reader.error("station", fmt::format("station {} of crate {} is already taken; "
+                                                    "allowed: each once",
+                                                    number, crate->number)));
+  }
+  const auto type = read_word(reader, "type", {"bushd-1", "bushd-2"});
+  if (!type) return fail(type.error());
+  CamacModule module{.station = number,
+                     .type = *type == 0 ? CamacModule::Type::kBushd1 : CamacModule::Type::kBushd2};
+  const std::string where = fmt::format("station {} of crate {}", number, crate->number);
+  const auto read = module.type == CamacModule::Type::kBushd1 ? read_bushd1 : read_bushd2;
+  if (auto good = read(reader, where, config, &module, places); !good) return good;
+  crate->modules.push_back(std::move(module));
+  return {};
+}
+
+// The codes of a program become the table of the motor's group: nobody else may be in it.
+Result<void> check_groups(const TomlReader& root, const Config& config, const Places& places) {
+  for (const auto& [number, place] : places) {
+    if (!place.programmed) continue;
+    const Motor& motor = config.motors[number];
+    for (std::size_t i = 0; i < config.motors.size(); ++i) {
+      const Motor& other = config.motors[i];
+      if (other.group != motor.group) continue;
+      const auto at = places.find(i);
+      if (at != places.end() && at->second.module == place.module &&
+          at->second.page == place.page) {
+        continue;
+      }
+      return fail(root.error(
+          "crate",
+          fmt::format("motor \"{}\" of {} moves by programs, which become the table of group "
+                      "\"{}\", and motor \"{}\" has the same group but not program {} of that "
+                      "module; allowed: groups whose motors all have one program. Give them "
+                      "groups of their own",
+                      motor.name, place.module, config.group_of(motor).name, other.name,
+                      place.page)));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> read_crates(const TomlReader& root, Config* config) {
+  if (!root.has("crate")) return {};
+  const auto crates = sections(root, config->path, "crate", "crate");
+  if (!crates) return fail(crates.error());
+  Places places;
+  for (std::size_t i = 0; i < crates->size(); ++i) {
+    const TomlReader& reader = (*crates)[i];
+    if (auto known = reader.only({"number", "module"}); !known) return known;
+    const auto number = reader.integer("number", 1, kLastCrate);
+    if (!number) return fail(number.error());
+    Crate crate{.number = static_cast<int>(*number)};
+    if (std::ranges::find(config->crates, crate.number, &Crate::number) != config->crates.end()) {
+      return fail(reader.error(
+          "number", fmt::format("crate {} is already there; allowed: each once", crate.number)));
+    }
+    const auto modules =
+        sections(reader, config->path, "module", fmt::format("crate[{}].module", i));
+    if (!modules) return fail(modules.error());
+    for (const TomlReader& module : *modules) {
+      if (auto read = read_module(module, *config, &crate, &places); !read) return read;
+    }
+    config->crates.push_back(std::move(crate));
+  }
+  return check_groups(root, *config, places);
+}
+
+}  // namespace bushd::config

@@ -1,0 +1,84 @@
+"""CAMAC cycles by bushctl, over both transports, down to the steps of a motor."""
+
+import json
+import unittest
+
+from rig import EndToEndTest, program
+
+CRATE = """
+[[crate]]
+number = 1
+[[crate.module]]
+station = 5
+type = "bushd-2"
+f_start_hz = 100
+motors = ["a0", "b0"]
+"""
+
+
+class Camac(EndToEndTest):
+    def bring_up_crate(self):
+        self.write_config()
+        with self.file("bushd.toml").open("a") as config:
+            config.write(CRATE)
+        self.bushsim = self.start_bushsim()
+        self.bushd = self.start_bushd()
+        self.wait_until_ready()
+        self.survey()
+
+    def cycle(self, *words):
+        return json.loads(self.command("camac", *words, "--json").stdout)
+
+    def test_a_program_moves_a_motor(self):
+        self.bring_up_crate()
+        self.assertEqual(self.cycle(5, 1, 16, 0), {"x": True, "q": True, "data": 0, "lam": False})
+        self.assertEqual(self.cycle(9, 0, 0), {"x": False, "q": False, "data": 0, "lam": False})
+        self.command("camac", "load", 5, 0, "bushd2-constant", "--steps", 300)
+        for more, motor, steps in ((), "a0", 300), (("--lcm",), "b0", -300):
+            number = 0 if motor == "a0" else 0x81
+            self.cycle(5, 2, 16, hex(0x60 | number), *more)
+            self.cycle(5, 0, 26, *more)
+            self.wait_until("LAM", lambda: self.cycle(5, 0, 8, *more)["q"])
+            self.assertEqual(self.motors()[motor]["position_steps"], steps)
+            self.assertEqual(self.cycle(5, 3, 0, *more)["data"], 0x10)
+            self.assertTrue(self.cycle(5, 0, 8, *more)["lam"])
+            self.cycle(5, 0, 10, *more)
+        self.assertEqual(self.bushd.end(), 0)
+        self.assert_one_result_each()
+
+    def test_a_program_in_c_does_too(self):
+        self.bring_up_crate()
+        ran = self.run_program(program("ESONE_PROGRAM"), "205")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(self.motors()["a0"]["position_steps"], 205)
+
+    def test_programs_are_dumped_and_loaded(self):
+        self.bring_up_crate()
+        self.command("camac", "load", 5, 2, "bushd2-constant", "--steps", 513)
+        memory = json.loads(self.command("camac", "dump", 5, "--json").stdout)["memory"]
+        self.assertEqual(len(memory), 1024)
+        self.assertEqual(memory[512:514], [1, 2])
+        self.assertEqual(memory[514], 250)
+        table = self.command("camac", "dump", 5, "--page", 2, "--f-start", 100).stdout
+        self.assertIn("time_unit_ns = 40000", table)
+        self.assertEqual(len(self.command("camac", "dump", 5).stdout.splitlines()), 64)
+        for words, why in (
+            (("5", "0"), "allowed: camac N A F"),
+            (("5", "0", "x"), "x is no number 0..31"),
+            (("5", "0", "40"), "40 is no number 0..31"),
+        ):
+            ran = self.bushctl("camac", *words)
+            self.assertEqual(ran.returncode, 2, ran.stderr)
+            self.assertIn(why, ran.stderr)
+        ran = self.bushctl("camac", "--crate", "2", "5", "0", "0")
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn("there is no crate 2", ran.stderr)
+        ran = self.bushctl("camac", "load", "5", "0", "nobody")
+        self.assertEqual(ran.returncode, 1)
+        ran = self.bushctl("camac", "dump", "6")
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn("X = 0", ran.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
