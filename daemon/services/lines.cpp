@@ -150,8 +150,10 @@ void Lines::start(std::int64_t now_us, const api::Asker& asker, Line line) {
   const std::uint64_t number = ++last_number_;
   open(asker, number, line);
   if (line.way.longest() == 0) {
+    // Each by a run of no steps, as it would alone.
     for (const MotorId motor : line.motors) {
-      open_.end(motor, api::Outcome::kReached, "stands at its target already");
+      const auto stands = moves_.go_on(now_us, motor, installation_[motor].position_steps());
+      if (!stands) open_.end(motor, api::Outcome::kStopped, stands.error().text());
     }
     return;
   }
@@ -199,6 +201,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, const Line& lin
     motion::OnLine on_line;
     on_line.line = number;
     on_line.target_steps = line.points.back().steps[i];
+    on_line.to_point = to == line.target;
     on_line.last_run = line.points.size() == 1 && to == line.target;
     const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
     motor.start_line(on_line, line.way.share(i, from, to), start, line.way.floor());

@@ -283,11 +283,16 @@ void Motor::follow_end_of_line(const Report& report, std::vector<Event>& events)
   } else if (is_paused()) {
     const bool stood = std::exchange(now.stands, true);
     pause_ = Pause::kStands;
-    if (!stood) events.emplace_back(event::Paused{});
+    if (stood) return;
+    if (now.resumes) {
+      events.emplace_back(event::StandsOnLine{false});
+    } else {
+      events.emplace_back(event::Paused{});
+    }
   } else if (axis_.stopping()) {
     events.emplace_back(stopped());
   } else if (!std::exchange(now.stands, true)) {
-    events.emplace_back(event::StandsOnLine{there});
+    events.emplace_back(event::StandsOnLine{there && now.to_point});
   }
 }
 

@@ -67,6 +67,7 @@ struct OnLine : Moving {
   std::uint64_t line = 0;         // its number
   std::int64_t target_steps = 0;  // where its last run leads
   bool last_run = true;
+  bool to_point = true;  // this run leads where the line, or its leg, is to end
   bool stands = false;   // where a run has led that was not the last one
   bool resumes = false;  // paused, and to go on as soon as all motors of the line stand
 };

@@ -68,7 +68,7 @@ std::vector<TimeNs> ramp_downs(const std::vector<TimeNs>& delay_ns,
 
 PaceRules::PaceRules(const bushd_table& table, std::uint32_t tick_ns, std::uint16_t slots,
                      bushd_format format)
-    : tick_ns_(tick_ns) {
+    : tick_ns_(tick_ns), longest_told_ns_(TimeNs{UINT16_MAX} * table.time_unit_ns) {
   const bool fine = format == BUSHD_FORMAT_FINE;
   const auto tolerances = fine ? fine_tolerances : coarse_tolerances;
   delay_ns_ = delays(table, table.accel);
@@ -106,6 +106,7 @@ void Pace::start(TimeNs t_ns, bool positive) {
   count_ = 0;
   remember(t_ns);
   positive_ = positive;
+  excused_ = false;
   first_ns_ = t_ns;
   k_ = 0;
   cursor_ = 0;
@@ -118,7 +119,7 @@ Jump Pace::step(TimeNs t_ns, bool positive) {
     return Jump::kNone;
   }
   const TimeNs apart_ns = t_ns - last_ns();
-  if (apart_ns >= rules_->rest_ns()) {
+  if (!on_line_ && apart_ns >= rules_->rest_ns()) {
     const Jump jump = come_to_rest();
     start(t_ns, positive);
     return jump;
@@ -136,7 +137,7 @@ Jump Pace::step(TimeNs t_ns, bool positive) {
   k_ = std::min(k_ + 1, rules_->last());
   const TimeNs earliest_ns = exact_ns_ + rules_->delay_ns(k_);
   exact_ns_ = std::max(earliest_ns, t_ns - tolerance_ns);
-  while (k_ > 0 && rules_->delay_ns(k_) < apart_ns - 2 * tolerance_ns) --k_;
+  while (!on_line_ && k_ > 0 && rules_->delay_ns(k_) < apart_ns - 2 * tolerance_ns) --k_;
   remember(t_ns);
   too_early_ns_ = earliest_ns - tolerance_ns - t_ns;
   if (too_early_ns_ <= 0) return Jump::kNone;
@@ -150,6 +151,7 @@ Jump Pace::come_to_rest() {
   const TimeNs slack_ns = 2 * rules_->tolerance_ns(0);
   const TimeNs last = last_ns();
   count_ = 0;
+  if (excused_) return Jump::kNone;
   for (std::size_t n = 1; n <= known; ++n) {
     const TimeNs took_ns = last - time_ns_[(newest_ + kHistory - n) % kHistory];
     if (took_ns + slack_ns < rules_->stop_ns(n)) return Jump::kStoppedDead;

@@ -17,6 +17,10 @@
 // goes on after a gap, breaks the first rule: after a long delay only the beginning of the table is
 // allowed.
 //
+// On a line a motor follows the run of another one: it may be slower than its table for a while,
+// and go on as its table does from rest in as many steps. There k only rises: no delay is shorter
+// than the table's after as many steps from rest.
+//
 // Tolerances. T is the tick, S its slots; ticks are emitted up to 1/64 (sync) and 50 ppm (crystal)
 // faster than real time, so every delay counts 1/63 less. Fine format (docs/performance.md):
 //
@@ -59,6 +63,8 @@ class PaceRules {
   // The longest ramp-down, tolerances included, of a motor whose exact delay is at least A(k): it
   // completes the running step, of delay x, and makes the fewest steps n with D(n) <= x.
   TimeNs ramp_down_ns(std::size_t k) const { return ramp_down_ns_[k]; }
+  // The longest delay that an MCU can be told. On a line the running step may take as long.
+  TimeNs longest_told_ns() const { return longest_told_ns_; }
   // Silent for longer, the motor is surely at rest.
   TimeNs rest_ns() const { return rest_ns_; }
 
@@ -69,6 +75,7 @@ class PaceRules {
   std::vector<TimeNs> stop_ns_;
   std::vector<TimeNs> ramp_down_ns_;
   TimeNs rest_ns_;
+  TimeNs longest_told_ns_;
 };
 
 enum class Jump {
@@ -84,9 +91,19 @@ class Pace {
 
   // A step at t_ns, not before the last one. O(1) amortised.
   Jump step(TimeNs t_ns, bool positive);
+  // Its next motion, from rest, is one of a line, until it is said to rest. Without `ramped_down`
+  // it may still move, as its MCU makes it.
+  void begin_on_line() { on_line_ = true; }
+  Jump rest_on_line(bool ramped_down) {
+    if (!on_line_) return Jump::kNone;
+    on_line_ = false;
+    excused_ = !ramped_down;
+    return ramped_down && count_ != 0 ? come_to_rest() : Jump::kNone;
+  }
+
   // No step since the last one until now.
   Jump silent(TimeNs now_ns) {
-    if (count_ == 0 || now_ns - last_ns() < rules_->rest_ns()) return Jump::kNone;
+    if (on_line_ || count_ == 0 || now_ns - last_ns() < rules_->rest_ns()) return Jump::kNone;
     return come_to_rest();
   }
   // The motor was cut off (a reset): what came before says nothing about what follows.
@@ -98,7 +115,8 @@ class Pace {
   // If it ramps down from now on, it rests after this time. At rest: it may have begun, and then
   // completes its first step.
   TimeNs ramp_down_ns() const {
-    return rules_->ramp_down_ns(count_ == 0 ? 0 : std::min(k_ + 1, rules_->last()));
+    const std::size_t k = count_ == 0 ? 0 : std::min(k_ + 1, rules_->last());
+    return rules_->ramp_down_ns(k) + (on_line_ ? rules_->longest_told_ns() : 0);
   }
   TimeNs last_ns() const { return time_ns_[newest_]; }
   // The first step since the last rest.
@@ -118,6 +136,8 @@ class Pace {
   std::size_t newest_ = 0;
   std::size_t count_ = 0;  // steps since rest, at most kHistory
   bool positive_ = false;
+  bool on_line_ = false;
+  bool excused_ = false;    // from ramping down by its table, until it starts again
   std::size_t k_ = 0;       // the last exact delay was at least A(k)
   std::size_t cursor_ = 0;  // where the tolerance was found last
   TimeNs first_ns_ = 0;

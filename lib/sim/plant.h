@@ -23,6 +23,12 @@ class Plant final : public EdgeSink {
   // The motor at an output; `rules` outlive the plant. Steps at outputs without one are violations.
   void attach(std::size_t mcu, std::size_t output, const PaceRules& rules);
 
+  // The motor's next motion, from rest, is one of a line; and it rests after that (sim/pace.h).
+  void begin_on_line(std::size_t mcu, std::size_t output) {
+    motor_of_[mcu].at(output)->pace.begin_on_line();
+  }
+  void rest_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output, bool ramped_down);
+
   // Puts a rotor on that motor; `rules` outlive the plant. It slips where the torque does not hold
   // it, which is a violation. Its driver is taken to be on all the time.
   void couple(std::size_t mcu, std::size_t output, const RotorRules& rules);

@@ -292,6 +292,8 @@ Request Clients::compose(CommandKind kind) {
       return pause_or_hold();
     case CommandKind::kSettings:
       return change_settings();
+    case CommandKind::kLine:
+      return move_along_line();
   }
   return nonsense();
 }

@@ -67,6 +67,7 @@ class Clients {
   Request move_at_speed();
   Request move_or_retarget();
   Request move_with_legs();
+  Request move_along_line();
   Request jog();
   Request pause_or_hold();
   Request change_settings();

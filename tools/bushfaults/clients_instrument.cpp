@@ -78,6 +78,23 @@ Request Clients::move_with_legs() {
   return request;
 }
 
+// Of motors without backlash, as far as there are any: what the legs of a line are the witness does
+// not know. At rest, but for a few: those are refused, or a line of one motor gets another end.
+Request Clients::move_along_line() {
+  Request request = move(static_cast<std::size_t>(random_.between(2, 6)));
+  for (std::size_t i = request.motors.size(); i-- > 0 && request.motors.size() > 1;) {
+    if (config_.motors[index_of(request.motors[i])].backlash == 0) continue;
+    request.motors.erase(request.motors.begin() + static_cast<std::ptrdiff_t>(i));
+    request.steps.erase(request.steps.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  request.line = config_.motors[index_of(request.motors.front())].backlash == 0;
+  if (random_.one_in(4)) {
+    request.speed_micro = random_.magnitude(100, 3'000) * 1'000'000;
+    request.speed_in_steps = true;
+  }
+  return request;
+}
+
 Request Clients::jog() {
   std::vector<Choice> some = motors_that(random_.one_in(4), false);
   return joggers_.begin(some.empty() ? any_motor() : random_.pick(some).name);

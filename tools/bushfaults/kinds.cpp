@@ -62,6 +62,7 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"jogs", 0, "of one motor, renewed and changed until they are ended or their client dies"},
     {"motor-pauses", 0, "motors are paused, resumed, held and released"},
     {"settings", 0, "other offsets, directions and soft limits of motors at rest"},
+    {"lines", 0, "motors at rest move along a straight line"},
 }};
 
 template <std::size_t kSize>

@@ -71,8 +71,9 @@ enum class CommandKind : std::uint8_t {
   kJog,
   kMotorPause,
   kSettings,
+  kLine,
 };
-inline constexpr std::size_t kCommandKinds = 21;
+inline constexpr std::size_t kCommandKinds = 22;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

@@ -71,12 +71,19 @@ std::vector<api::MotorAmount> motor_steps(const Request& request) {
   return all;
 }
 
+api::MoveLine line_of(const Request& request) {
+  return {
+      .kind = request.ask == Ask::kMoveTo ? api::Move::Kind::kAbsolute : api::Move::Kind::kRelative,
+      .motors = motor_steps(request),
+      .speed = speed_of(request)};
+}
+
 std::string_view word_of(const Request& request) {
   switch (request.ask) {
     case Ask::kMoveBy:
-      return "move by";
+      return request.line ? "line by" : "move by";
     case Ask::kMoveTo:
-      return "move to";
+      return request.line ? "line to" : "move to";
     case Ask::kArm:
       return request.rising ? "arm (rising)" : "arm (falling)";
     default:
@@ -93,10 +100,12 @@ std::string text_of(const bushd::lcm::RequestId& id) {
 api::Request api_of(const Request& request) {
   switch (request.ask) {
     case Ask::kMoveBy:
+      if (request.line) return line_of(request);
       return api::Move{.kind = api::Move::Kind::kRelative,
                        .motors = motor_steps(request),
                        .speed = speed_of(request)};
     case Ask::kMoveTo:
+      if (request.line) return line_of(request);
       return api::Move{.kind = api::Move::Kind::kAbsolute,
                        .motors = motor_steps(request),
                        .speed = speed_of(request)};

@@ -55,6 +55,7 @@ struct Request {
   std::vector<std::string> motors{};
   std::vector<std::int64_t> steps{};  // as many as motors
   bool user = false;                  // they are millionths of each motor's unit
+  bool line = false;                  // kMoveBy, kMoveTo: along a straight line
   bool dial = false;                  // kSetPosition: on the dial
   std::int64_t speed_micro = 0;       // of moves and jogs, millionths a second; 0: none
   bool speed_in_steps = false;

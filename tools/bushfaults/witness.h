@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -50,6 +51,10 @@ class Witness {
   void reply(TimeNs now_ns, const Key& key, const bushd::api::Reply& reply);
   void state(TimeNs now_ns, std::size_t mcu, const bushd::api::StateSnapshot& state);
   void description(TimeNs now_ns, const bushd::api::Description& said);
+  // A run of this motor begins, one of a line or of its own, or has ended as this word says.
+  std::function<void(std::size_t mcu, std::size_t output, bool on_line)> on_run;
+  std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, const std::string& word)>
+      on_run_end;
   // From time to time; the plant has come to now_ns.
   void watch(TimeNs now_ns);
   // A line of the log of moves: there each motor of a group ends by itself.
@@ -220,6 +225,8 @@ class Witness {
                      const bushd::api::Completed& result);
   void check_steps_after(TimeNs now_ns, const Motor& motor, const Asked& asked,
                          const std::string& reason);
+  // What is asked of one motor of a line is asked of all.
+  bool concerns(const Request& request, const Motor& motor) const;
   void stop_accepted(const Request& request);
   void pause_accepted(TimeNs now_ns, const Request& request);
   void hold_accepted(const Request& request);

@@ -33,9 +33,17 @@ constexpr std::int64_t kEventSteps = 60;
 
 }  // namespace
 
+bool Witness::concerns(const Request& request, const Motor& motor) const {
+  if (request.names_or_all(motor.name)) return true;
+  if (!motor.move || !asked_.at(*motor.move).request.line) return false;
+  return std::ranges::any_of(motors_, [&](const Motor& other) {
+    return other.move == motor.move && request.names(other.name);
+  });
+}
+
 void Witness::stop_accepted(const Request& request) {
   for (Motor& motor : motors_) {
-    if (request.ask == Ask::kStop && !request.names_or_all(motor.name)) continue;
+    if (request.ask == Ask::kStop && !concerns(request, motor)) continue;
     motor.target.reset();
     motor.stops = true;
     motor.pauses = false;
@@ -48,7 +56,7 @@ void Witness::stop_accepted(const Request& request) {
 // What is being stopped, and what waits for the trigger, is left alone. Jogs end.
 void Witness::pause_accepted(TimeNs now_ns, const Request& request) {
   for (Motor& motor : motors_) {
-    if (!request.names_or_all(motor.name) || !motor.move) continue;
+    if (!concerns(request, motor) || !motor.move) continue;
     Asked& asked = asked_.at(*motor.move);
     if (request.ask == Ask::kResume) {
       if (std::exchange(motor.pauses, false)) motor.goes_on |= motor.over;
@@ -66,6 +74,8 @@ void Witness::paused(TimeNs now_ns, const Key& key, const std::string& reason) {
   if (reason.find("not waited for") != std::string::npos) return;
   for (const Motor& motor : motors_) {
     if (motor.paused_by != key || !motor.pauses || !motor.moves()) continue;
+    // If another one of its line does not go on, all ramp down for good.
+    if (asked_.at(*motor.move).request.line) continue;
     violated(now_ns, motor.name + " is said to be paused, and moves");
   }
 }

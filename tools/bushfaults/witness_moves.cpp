@@ -29,7 +29,9 @@ bool Witness::End::agrees(const api::MotorResult& result) const {
   // One that stands, paused, may end by what happens to its MCU.
   const bool of_mcu =
       paused && (result.outcome == api::Outcome::kLink || result.outcome == api::Outcome::kFault);
-  return (of_mcu || word == api::word(result.outcome)) &&
+  // Of a line it may be stopped where it stands on its way.
+  const bool on_way = word == "turned" && result.outcome == api::Outcome::kStopped;
+  return (of_mcu || on_way || word == api::word(result.outcome)) &&
          (moves_on || position_steps == result.position_steps);
 }
 
@@ -238,8 +240,10 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const bool begins = line.at("event") == "move";
   if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
+  if (begins && on_run) on_run(motor.mcu, motor.output, line.contains("line"));
   if (begins && motor.move) return run_begins(now_ns, motor);
   if (begins) return;
+  if (on_run_end) on_run_end(now_ns, motor.mcu, motor.output, line.at("result"));
   if (!motor.move) return violated(now_ns, motor.name + " ended without a move");
   run_ended(now_ns, motor,
             {.word = line.at("result"), .position_steps = line.at("position_steps")});
@@ -263,7 +267,8 @@ void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
   if (motor.over) return violated(now_ns, motor.name + " ended twice");
   motor.over = true;
   end.stands = plant_steps(motor);
-  end.paused = end.word == "stopped" && motor.pauses;
+  const bool on_way = end.word == "turned" && asked.request.line;
+  end.paused = on_way || (end.word == "stopped" && motor.pauses);
   std::optional<std::int64_t> target;
   if (end.word == "reached" && !legs.empty()) target = legs[leg];
   check_end(now_ns, motor, asked, end, target);

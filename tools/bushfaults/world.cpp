@@ -82,6 +82,15 @@ void World::add_motors() {
   for (const bushd::config::Motor& motor : config_.motors) {
     plant_.attach(motor.mcu.value, motor.output.value, *rules_[motor.group.value]);
   }
+  witness_.on_run = [this](std::size_t mcu, std::size_t output, bool on_line) {
+    plant_.rest_on_line(now_ns_, mcu, output, false);  // a daemon that was killed has not told
+    if (on_line) plant_.begin_on_line(mcu, output);
+  };
+  witness_.on_run_end = [this](TimeNs at_ns, std::size_t mcu, std::size_t output,
+                               const std::string& word) {
+    const bool planned = word == "reached" || word == "stopped" || word == "turned";
+    plant_.rest_on_line(at_ns, mcu, output, planned);
+  };
   plant_.on_violation = [this](TimeNs time_ns, std::size_t mcu, std::size_t output,
                                const std::string& what) {
     witness_.violated(time_ns, fmt::format("{} output {}: {}", config_.mcus[mcu].id, output, what));
