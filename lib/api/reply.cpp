@@ -69,6 +69,20 @@ std::size_t memory_of(const tables::TableContent& content) {
 
 }  // namespace
 
+Detail::Detail() = default;
+Detail::Detail(const Detail&) = default;
+Detail::Detail(Detail&&) noexcept = default;
+Detail& Detail::operator=(const Detail&) = default;
+Detail& Detail::operator=(Detail&&) noexcept = default;
+Detail::~Detail() = default;
+
+Reply::Reply() = default;
+Reply::Reply(const Reply&) = default;
+Reply::Reply(Reply&&) noexcept = default;
+Reply& Reply::operator=(const Reply&) = default;
+Reply& Reply::operator=(Reply&&) noexcept = default;
+Reply::~Reply() = default;
+
 TableRef ref_to(const tables::Table& table) {
   return {.name = table.name(), .revision = table.revision(), .hash = table.short_hash()};
 }

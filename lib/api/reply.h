@@ -115,17 +115,35 @@ struct Refused {
   std::string reason{};  // what, why with the figure, what to do
 };
 
+// Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
+// table requests; a history; settings; of a crate. (Its copies are compiled once, not in every file
+// that has one. So are those of Reply and Request.)
+struct Detail : std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList,
+                             tables::TableContent, MotionHistory, Configuration, CamacResult> {
+  using variant::variant;
+  Detail();
+  Detail(const Detail&);
+  Detail(Detail&&) noexcept;
+  Detail& operator=(const Detail&);
+  Detail& operator=(Detail&&) noexcept;
+  ~Detail();
+};
+
 struct Completed {
   Outcome outcome = Outcome::kDone;
   std::string reason{};  // names motor and cause; never empty
-  // Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
-  // table requests; a history; settings; of a crate.
-  std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList, tables::TableContent,
-               MotionHistory, Configuration, CamacResult>
-      detail{};
+  Detail detail{};
 };
 
-using Reply = std::variant<Accepted, Refused, Completed>;
+struct Reply : std::variant<Accepted, Refused, Completed> {
+  using variant::variant;
+  Reply();
+  Reply(const Reply&);
+  Reply(Reply&&) noexcept;
+  Reply& operator=(const Reply&);
+  Reply& operator=(Reply&&) noexcept;
+  ~Reply();
+};
 
 // Nothing follows it.
 inline bool is_final(const Reply& reply) {

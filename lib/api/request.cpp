@@ -6,34 +6,42 @@ namespace bushd::api {
 namespace {
 
 // In the order of the variant.
-constexpr std::array<std::string_view, std::variant_size_v<Request>> kNames = {"move",
-                                                                               "stop",
-                                                                               "emergency stop",
-                                                                               "enable",
-                                                                               "disable",
-                                                                               "set position",
-                                                                               "clear faults",
-                                                                               "use table",
-                                                                               "reload tables",
-                                                                               "home",
-                                                                               "arm",
-                                                                               "disarm",
-                                                                               "position compare",
-                                                                               "list tables",
-                                                                               "get table",
-                                                                               "set table",
-                                                                               "confirm",
-                                                                               "get history",
-                                                                               "configure",
-                                                                               "jog",
-                                                                               "pause",
-                                                                               "resume",
-                                                                               "hold",
-                                                                               "release",
-                                                                               "move line",
-                                                                               "camac"};
+constexpr std::array<std::string_view, std::variant_size_v<Request::variant>> kNames = {
+    "move",
+    "stop",
+    "emergency stop",
+    "enable",
+    "disable",
+    "set position",
+    "clear faults",
+    "use table",
+    "reload tables",
+    "home",
+    "arm",
+    "disarm",
+    "position compare",
+    "list tables",
+    "get table",
+    "set table",
+    "confirm",
+    "get history",
+    "configure",
+    "jog",
+    "pause",
+    "resume",
+    "hold",
+    "release",
+    "move line",
+    "camac"};
 
 }  // namespace
+
+Request::Request() = default;
+Request::Request(const Request&) = default;
+Request::Request(Request&&) noexcept = default;
+Request& Request::operator=(const Request&) = default;
+Request& Request::operator=(Request&&) noexcept = default;
+Request::~Request() = default;
 
 std::string_view name_of(const Request& request) {
   return kNames[request.index()];

@@ -246,10 +246,18 @@ struct Camac {
   camac::Block block{};  // stations 1..31, subaddresses 0..15, functions 0..31, 24 bits of data
 };
 
-using Request = std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
-                             UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables,
-                             GetTable, SetTable, Confirm, GetHistory, Configure, Jog, Pause, Resume,
-                             Hold, Release, MoveLine, Camac>;
+struct Request : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
+                              UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare,
+                              ListTables, GetTable, SetTable, Confirm, GetHistory, Configure, Jog,
+                              Pause, Resume, Hold, Release, MoveLine, Camac> {
+  using variant::variant;
+  Request();
+  Request(const Request&);
+  Request(Request&&) noexcept;
+  Request& operator=(const Request&);
+  Request& operator=(Request&&) noexcept;
+  ~Request();
+};
 
 // For logs and counts: "move", "stop", "emergency stop", ...
 std::string_view name_of(const Request& request);

@@ -2,11 +2,46 @@
 #pragma once
 
 #include <cstddef>
-#include <ranges>
+#include <iterator>
 #include <utility>
 #include <vector>
 
 namespace bushd {
+
+// The first `size` identifiers. (The views of <ranges> are nothing that clang 14 can read.)
+template <class Id>
+class Ids {
+ public:
+  class Iterator {
+   public:
+    using iterator_category = std::input_iterator_tag;
+    using value_type = Id;
+    using difference_type = std::ptrdiff_t;
+    using pointer = const Id*;
+    using reference = Id;
+
+    Iterator() = default;
+    explicit Iterator(std::size_t value) : value_(value) {}
+    Id operator*() const { return Id{value_}; }
+    Iterator& operator++() {
+      ++value_;
+      return *this;
+    }
+    Iterator operator++(int) { return Iterator(value_++); }
+    friend bool operator==(const Iterator&, const Iterator&) = default;
+
+   private:
+    std::size_t value_ = 0;
+  };
+
+  explicit Ids(std::size_t size) : size_(size) {}
+  Iterator begin() const { return Iterator(0); }
+  Iterator end() const { return Iterator(size_); }
+  std::size_t size() const { return size_; }
+
+ private:
+  std::size_t size_;
+};
 
 template <class Id, class T>
 class ById {
@@ -21,11 +56,8 @@ class ById {
     return Id{all_.size() - 1};
   }
   std::size_t size() const { return all_.size(); }
-  // In order.
-  auto ids() const {
-    return std::views::iota(std::size_t{0}, all_.size()) |
-           std::views::transform([](std::size_t value) { return Id{value}; });
-  }
+  // In order; of the elements that there are now.
+  Ids<Id> ids() const { return Ids<Id>(all_.size()); }
 
   auto begin() { return all_.begin(); }
   auto end() { return all_.end(); }

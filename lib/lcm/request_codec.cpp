@@ -409,7 +409,7 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 29> kDecoders = {{
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},
 }};
-static_assert(std::variant_size_v<api::Request> == 26);
+static_assert(std::variant_size_v<api::Request::variant> == 26);
 
 constexpr auto kClientChannels = [] {
   std::array<std::string_view, kDecoders.size()> channels;

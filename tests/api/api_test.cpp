@@ -22,7 +22,7 @@ class Silent : public Session {
 
 template <std::size_t I = 0>
 void collect_names(std::multiset<std::string>& names) {
-  if constexpr (I < std::variant_size_v<Request>) {
+  if constexpr (I < std::variant_size_v<Request::variant>) {
     names.insert(std::string(name_of(Request(std::in_place_index<I>))));
     collect_names<I + 1>(names);
   }
@@ -31,7 +31,7 @@ void collect_names(std::multiset<std::string>& names) {
 TEST(Request, EachTypeHasANameOfItsOwn) {
   std::multiset<std::string> names;
   collect_names(names);
-  EXPECT_EQ(names.size(), std::variant_size_v<Request>);
+  EXPECT_EQ(names.size(), std::variant_size_v<Request::variant>);
   EXPECT_EQ(std::set(names.begin(), names.end()).size(), names.size());
   EXPECT_EQ(name_of(Move{}), "move");
   EXPECT_EQ(name_of(PositionCompare{}), "position compare");
