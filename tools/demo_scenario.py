@@ -27,6 +27,7 @@ GROUPS = {
 MOTORS = [f"m{number:02}" for number in range(1, 33)]
 MOTORS_PER_MCU = 16
 STOPPED = "m07"
+ON_LINE = {"m01": 9000, "m06": -4321, "m25": 6500, "m31": -777}  # of both MCUs, and each with another table
 START_TIMEOUT_S = 20
 STAGE_TIMEOUT_S = 60
 END_TIMEOUT_S = 10
@@ -258,6 +259,9 @@ class Demo:
         text = f"long moves: a group start for each of the four tables; {STOPPED} is stopped in flight"
         self.stage(text, commands)
 
+        text = f"a straight line: {len(ON_LINE)} motors of both MCUs make the same shares of their ways at any time"
+        self.stage(text, [(0, 0, ["move", "--line", "--wait", *pairs(ON_LINE, ON_LINE)])])
+
         home = [word for motor in MOTORS for word in (motor, "--to", "0")]
         self.stage("all 32 motors back to 0, in one group start", [(0, 0, ["move", "--wait", *home])])
 
@@ -296,6 +300,9 @@ class Demo:
         stopped = {event["motor"] for event in moves if event.get("result") == "stopped"}
         if stopped != {STOPPED}:
             raise Failure(f"stopped were {sorted(stopped)}, to be stopped was {STOPPED}")
+        on_line = {event["motor"] for event in moves if "line" in event and event["event"] == "move"}
+        if on_line != set(ON_LINE):
+            raise Failure(f"on a line were {sorted(on_line)}, to be on one were {sorted(ON_LINE)}")
         return lines[-1]
 
     def print_logs(self):

@@ -81,6 +81,7 @@ void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, std:
   bushd_line_start(&base_.line, share_->increment, share_->longest);
   bushd_line_go_to(&base_.line, share_->from);
   base_.told_256 = share_from_steps_ * 256;
+  share_by_ = Divisor(share_->longest);
   head_ = base_;
   plan_end();
 }
@@ -157,40 +158,67 @@ void Axis::expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out,
 
 void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const {
   if (!share_) return expand_run(place.run, ticks, out, stride);
-  std::array<std::int16_t, kBlock> run_ticks;
-  const std::uint32_t run_end = place.run.steps_done + bushd_run_steps_left(&place.run);
-  const std::int64_t rest_256 = line_steps(run_end) * 256;
   for (std::size_t done = 0; done < ticks; done += kBlock) {
     const std::size_t n = std::min(kBlock, ticks - done);
-    const std::uint8_t before_256 = place.run.fraction;
-    expand_run(place.run, n, run_ticks.data(), 1);
-    follow_run(place, n, run_ticks.data(), before_256, rest_256, out + done * stride, stride);
+    std::int16_t* to = out + done * stride;
+    if (format_ == BUSHD_FORMAT_FINE) {
+      follow_run_fine(place, n, to, stride);
+    } else {
+      follow_run_coarse(place, n, to, stride);
+    }
   }
 }
 
-// The motor comes to rest on a whole step, so it goes no farther than that. If a change has made
-// that the step it has begun, it goes back by the part of it that it has been told.
-void Axis::follow_run(Place& place, std::size_t ticks, const std::int16_t* run_ticks,
-                      std::uint32_t before_256, std::int64_t rest_256, std::int16_t* out,
-                      std::size_t stride) const {
-  const bool fine = format_ == BUSHD_FORMAT_FINE;
-  std::uint32_t part_256 = before_256;  // of the run's running step
+// What bushd_line_position says, tick by tick: the motor's way in 1/256 step is that of the run
+// times N / L, each tick from the beginning of the block. The motor comes to rest on a
+// whole step, so it goes no farther than that. If a change has made that the step it has begun, it
+// goes back by the part of it that it has been told.
+void Axis::follow_run_fine(Place& place, std::size_t ticks, std::int16_t* out,
+                           std::size_t stride) const {
+  std::array<std::int16_t, kBlock> run_ticks;
+  const std::uint32_t run_end = place.run.steps_done + bushd_run_steps_left(&place.run);
+  const std::int64_t rest_256 = line_steps(run_end) * 256;
+  const std::uint64_t increment = place.line.increment;
+  const std::uint64_t longest = place.line.longest;
+  const bool odd = ((longest - increment) & 1u) != 0;
+  std::uint64_t way =
+      std::uint64_t{place.line.value} * 256 + (odd ? 128 : 0) + increment * place.run.fraction;
+  const std::uint64_t before_256 = std::uint64_t{place.line.made} * 256;
+  expand_run(place.run, ticks, run_ticks.data(), 1);
+  bushd_line_go_to(&place.line, share_->from + place.run.steps_done);
   for (std::size_t i = 0; i < ticks; ++i) {
-    part_256 += static_cast<std::uint32_t>(
-        fine ? run_ticks[i] : bushd_coarse_to_fine(static_cast<std::uint8_t>(run_ticks[i])));
-    bushd_line_follow(&place.line, part_256 / 256);
-    part_256 %= 256;
-    const auto at_256 = static_cast<std::int64_t>(
-        fine ? bushd_line_position(&place.line, static_cast<std::uint8_t>(part_256))
-             : std::uint64_t{place.line.made} * 256);
-    const std::int64_t moved_256 = std::min(at_256, rest_256) - place.told_256;
+    way += increment * static_cast<std::uint16_t>(run_ticks[i]);
+    std::uint64_t at_256 = before_256 + share_by_.quotient(way);
+    if (at_256 < 256) {
+      // Before the motor's first step: twice its way from 0, until the rule has more to say.
+      const std::uint64_t risen = (way - (longest - increment) * 128) * 2;
+      if (risen < way) at_256 = share_by_.quotient(risen);
+    }
+    const std::int64_t moved_256 =
+        std::min(static_cast<std::int64_t>(at_256), rest_256) - place.told_256;
     place.told_256 += moved_256;
-    const bool forward = share_->direction > 0;
-    out[i * stride] = static_cast<std::int16_t>(
-        fine             ? moved_256 * share_->direction
-        : moved_256 == 0 ? 0
-                         : (moved_256 / 256) | (forward ? BUSHD_COARSE_DIRECTION : 0));
+    out[i * stride] = static_cast<std::int16_t>(moved_256 * share_->direction);
   }
+}
+
+void Axis::follow_run_coarse(Place& place, std::size_t ticks, std::int16_t* out,
+                             std::size_t stride) const {
+  std::array<std::uint8_t, kBlock> run_ticks;
+  bushd_run_expand_coarse(&place.run, tick_ns_, ticks, run_ticks.data(), 1);
+  const unsigned direction = share_->direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
+  const std::uint64_t increment = place.line.increment;
+  std::uint64_t way = place.line.value;
+  std::uint64_t made = 0;
+  for (std::size_t i = 0; i < ticks; ++i) {
+    way += increment * (run_ticks[i] & 0x7Fu);
+    const std::uint64_t made_by_now = share_by_.quotient(way);
+    const std::uint64_t steps = made_by_now - made;
+    made = made_by_now;
+    out[i * stride] = static_cast<std::int16_t>(steps == 0 ? 0 : steps | direction);
+  }
+  place.line.value = static_cast<std::uint32_t>(way - made * place.line.longest);
+  place.line.made += static_cast<std::uint32_t>(made);
+  place.told_256 += static_cast<std::int64_t>(made) * 256;
 }
 
 // The delay of the motor's running step, in units of its own table. Of a share: as the run goes

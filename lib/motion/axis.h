@@ -14,10 +14,12 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "engine/line.h"
 #include "engine/message.h"
 #include "engine/run.h"
+#include "motion/divisor.h"
 #include "tables/envelope.h"
 
 namespace bushd::motion {
@@ -171,9 +173,10 @@ class Axis {
   void advance(Place& place, Tick to) const;
   void expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
   void expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
-  void follow_run(Place& place, std::size_t ticks, const std::int16_t* run_ticks,
-                  std::uint32_t before_256, std::int64_t rest_256, std::int16_t* out,
-                  std::size_t stride) const;
+  void follow_run_fine(Place& place, std::size_t ticks, std::int16_t* out,
+                       std::size_t stride) const;
+  void follow_run_coarse(Place& place, std::size_t ticks, std::int16_t* out,
+                         std::size_t stride) const;
   std::uint16_t delay_of(const Place& place) const;
   Tick end_of(const Place& place) const;
   Tick own_end_of(const Place& place) const;
@@ -196,6 +199,7 @@ class Axis {
   bool stale_ = false;            // what is wanted has changed since the last change()
   std::optional<Change> change_;  // planned and not yet executed
   std::optional<LineShare> share_;
+  Divisor share_by_;                   // its `longest`
   std::int64_t share_from_steps_ = 0;  // steps of the line that the motor has made before this run
   std::uint32_t run_target_ = 0;       // of the share: steps of the run that are wanted,
   std::uint32_t planned_run_steps_ = 0;  // and planned
