@@ -189,10 +189,10 @@ static int8_t first_direction(const bushd_mcu* mcu, uint8_t m, int8_t direction)
   return bushd_mcu_homes_at_limit(mcu, m, direction) ? 0 : back;
 }
 
-// The last one was ended in a slow stage, and its motor makes a step by the slow table yet.
-static bool slow_table_in_use(const bushd_mcu* mcu) {
+bool bushd_mcu_homing_in_use(const bushd_mcu* mcu) {
   const bushd_mcu_motor* motor = &mcu->motor[mcu->homing.motor];
-  return motor->mode == BUSHD_MCU_RAMP_DOWN && motor->made.run.table == &mcu->homing.slow;
+  return under_way(&mcu->homing) ||
+         (motor->mode == BUSHD_MCU_RAMP_DOWN && motor->made.run.table == &mcu->homing.slow);
 }
 
 static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
@@ -200,7 +200,8 @@ static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
   bushd_mcu_update_state(mcu);
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
   if (mcu->motor[message->motor].table < 0) return BUSHD_E_NO_TABLE;
-  if (under_way(&mcu->homing) || slow_table_in_use(mcu) || (bushd_mcu_engaged(mcu) & bit) != 0) {
+  if (bushd_mcu_homing_in_use(mcu) || bushd_mcu_travels(&mcu->travel) ||
+      (bushd_mcu_engaged(mcu) & bit) != 0) {
     return BUSHD_E_STATE;
   }
   return slow_enough(mcu, message) ? BUSHD_OK : BUSHD_E_FORMAT;

@@ -9,6 +9,7 @@
 #include "firmware/core/local.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
+#include "firmware/core/travel.h"
 
 // `now_active`: a switch of the motor has just become so.
 static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
@@ -21,6 +22,8 @@ static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
     bushd_mcu_homing_meets_limit(mcu, cuts);
     return;
   }
+  const bool travels = (bushd_mcu_travel_motor(mcu) & motor_bit(m)) != 0;
+  if (travels && !bushd_mcu_travel_meets_limit(mcu)) return;
   // One that only turns towards the switch is at rest as far as this direction goes.
   const bool immediate = cuts || heading != bushd_mcu_last_direction(mcu, m);
   if (immediate || mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) {

@@ -10,6 +10,7 @@
 #include "firmware/core/limits.h"
 #include "firmware/core/state.h"
 #include "firmware/core/table_run.h"
+#include "firmware/core/travel.h"
 
 enum { READINGS = 3 };
 
@@ -66,7 +67,8 @@ void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs) {
   }
   if (wish == 0 || !allowed) return;
   if (local->readings < READINGS && ++local->readings == READINGS) {
-    local->held = (uint16_t)(local->motors & ~bushd_mcu_homing_motor(mcu));
+    local->held =
+        (uint16_t)(local->motors & ~(bushd_mcu_homing_motor(mcu) | bushd_mcu_travel_motor(mcu)));
     if ((mcu->flags & BUSHD_FLAG_ENABLED) == 0) bushd_mcu_set_enable(mcu, true);
   }
   begin_held(mcu);

@@ -14,6 +14,7 @@
 #include "firmware/core/stop.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/sync.h"
+#include "firmware/core/travel.h"
 #include "firmware/core/trigger.h"
 
 #define STALE_SEQUENCES 128u
@@ -101,9 +102,18 @@ const bushd_slot_buffer* bushd_mcu_swap(bushd_mcu* mcu) {
   return &mcu->slot_buffer[mcu->front];
 }
 
+void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns) {
+  if (mcu->trigger.armed != 0) {
+    bushd_mcu_begin_armed(mcu, time_in_tick_ns);
+  } else if (mcu->travel.stage == BUSHD_TRAVEL_ARMED) {
+    bushd_mcu_travel_at_edge(mcu, time_in_tick_ns);
+  }
+}
+
 static void move_by_itself(bushd_mcu* mcu) {
   const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
   bushd_mcu_go_home(mcu, pins.motors ^ mcu->inputs.inverted);
+  bushd_mcu_go_travel(mcu, pins.motors ^ mcu->inputs.inverted);
   if (mcu->local.motors != 0) {
     bushd_mcu_move_locally(mcu, pins.system ^ mcu->inputs.system_inverted);
   }

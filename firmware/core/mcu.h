@@ -38,6 +38,7 @@ extern "C" {
 #include "firmware/core/stream.h"
 #include "firmware/core/sync.h"
 #include "firmware/core/tables.h"
+#include "firmware/core/travel.h"
 #include "firmware/core/trigger.h"
 #ifdef __cplusplus
 }
@@ -93,7 +94,7 @@ typedef struct bushd_mcu {
   uint16_t ramp_downs;
   uint16_t low_water_ticks;
   uint16_t direction;   // DIR levels of the slot_buffer prepared last
-  uint16_t autonomous;  // motors that move by homing or local inputs
+  uint16_t autonomous;  // motors that move by homing, travel or local inputs
   uint16_t homed;
   bushd_run_tick run_tick[BUSHD_TABLE_SLOTS];         // in the terms of each table
   bushd_set_inputs inputs;                            // settings
@@ -101,7 +102,10 @@ typedef struct bushd_mcu {
   bushd_mcu_stream stream;
   bushd_mcu_reception reception;
   bushd_mcu_limits limits;
-  bushd_mcu_homing homing;
+  union {  // one of both at a time; the stage tells which
+    bushd_mcu_homing homing;
+    bushd_mcu_travel travel;
+  };
   bushd_mcu_local local;
   bushd_mcu_clock clock;
   bushd_mcu_emission emission;

@@ -17,6 +17,7 @@
 #include "firmware/core/sync.h"
 #include "firmware/core/table_run.h"
 #include "firmware/core/tables.h"
+#include "firmware/core/travel.h"
 #include "firmware/core/trigger.h"
 
 // What it says of each motor. One out-of-order range has room in a report: that of the lowest
@@ -43,7 +44,8 @@ static inline void report_motors(const bushd_mcu* mcu, bushd_report* report) {
   }
   report->motor_count = mcu->config.motors;
   // What people move by local inputs is not for a master to end.
-  report->running = (uint16_t)(running & ~(mcu->autonomous & ~bushd_mcu_homing_motor(mcu)));
+  const uint16_t its = bushd_mcu_homing_motor(mcu) | bushd_mcu_travel_motor(mcu);
+  report->running = (uint16_t)(running & ~(mcu->autonomous & ~its));
   report->out_of_order_from = told != NULL ? (uint16_t)told->from : (uint16_t)0;
   report->out_of_order_until = told != NULL ? (uint16_t)told->until : (uint16_t)0;
 }
@@ -97,7 +99,7 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
                  BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
                  BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
-                 BUSHD_CAN_MOTOR_INPUTS;
+                 BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_TRAVEL;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
   identity.capabilities = (uint16_t)(all & ~mcu->config.disabled_capabilities);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
@@ -259,6 +261,8 @@ static bool is_disabled(const bushd_mcu* mcu, uint8_t type) {
       return (mcu->config.disabled_capabilities & BUSHD_CAN_LOCAL) != 0;
     case BUSHD_MSG_POSITION_COMPARE:
       return (mcu->config.disabled_capabilities & BUSHD_CAN_POSITION_COMPARE) != 0;
+    case BUSHD_MSG_TRAVEL:
+      return (mcu->config.disabled_capabilities & BUSHD_CAN_TRAVEL) != 0;
     case BUSHD_MSG_MOTOR_INPUTS:
       return (mcu->config.disabled_capabilities & BUSHD_CAN_MOTOR_INPUTS) != 0;
     default:
@@ -306,6 +310,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(home, bushd_mcu_home);
     case BUSHD_MSG_LOCAL:
       HANDLE(local, bushd_mcu_set_local);
+    case BUSHD_MSG_TRAVEL:
+      HANDLE(travel, bushd_mcu_take_travel);
     case BUSHD_MSG_TRIGGER:
       HANDLE(trigger, bushd_mcu_arm);
     case BUSHD_MSG_POSITION_COMPARE:

@@ -21,8 +21,7 @@ static bushd_status check_entry(const bushd_mcu* mcu, const bushd_table_run_entr
   return forbidden ? BUSHD_E_FORBIDDEN : BUSHD_OK;
 }
 
-// The port knows nothing of inputs that are inverted.
-static bushd_edge edge_of_pin(const bushd_mcu* mcu, bushd_edge edge) {
+bushd_edge bushd_mcu_edge_of_pin(const bushd_mcu* mcu, bushd_edge edge) {
   if ((mcu->inputs.system_inverted & BUSHD_INPUT_TRIGGER) == 0) return edge;
   return edge == BUSHD_EDGE_RISING ? BUSHD_EDGE_FALLING : BUSHD_EDGE_RISING;
 }
@@ -37,7 +36,7 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
   if (message->number == mcu->trigger.number) return BUSHD_OK;
   bushd_mcu_update_state(mcu);
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
-  if (mcu->trigger.armed != 0) return BUSHD_E_STATE;
+  if (mcu->trigger.armed != 0 || bushd_mcu_travels(&mcu->travel)) return BUSHD_E_STATE;
   uint16_t mask = 0;
   const uint8_t* at = message->entries;
   for (uint8_t i = 0; i < message->count; ++i) {
@@ -58,7 +57,7 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
   mcu->trigger.number = message->number;
   mcu->trigger.state = BUSHD_TRIGGER_ARMED;
   mcu->trigger.delay_us = message->delay_us;
-  mcu->port.set_trigger(mcu->port.context, edge_of_pin(mcu, message->edge));
+  mcu->port.set_trigger(mcu->port.context, bushd_mcu_edge_of_pin(mcu, message->edge));
   return BUSHD_OK;
 }
 
@@ -70,7 +69,7 @@ void bushd_mcu_disarm(bushd_mcu* mcu, bushd_trigger_state why) {
 
 // A tick that is lengthened or shortened to follow the bus is as long as any other by the bus's
 // time.
-static int32_t bus_ns(const bushd_mcu* mcu, int32_t time_in_tick_ns) {
+int32_t bushd_mcu_bus_ns(const bushd_mcu* mcu, int32_t time_in_tick_ns) {
   const int32_t longer_ns = mcu->clock.slew_now_ns + mcu->clock.rate_now_ns;
   return time_in_tick_ns - (int32_t)((int64_t)time_in_tick_ns * longer_ns / (int32_t)mcu->tick_ns);
 }
@@ -93,14 +92,13 @@ static void begin_late(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t 
   bushd_mcu_begin_run(mcu, m, first_tick, ticks);
 }
 
-void bushd_mcu_trigger(bushd_mcu* mcu, int32_t time_in_tick_ns) {
+void bushd_mcu_begin_armed(bushd_mcu* mcu, int32_t time_in_tick_ns) {
   uint16_t armed = mcu->trigger.armed;
-  if (armed == 0) return;
   if (mcu->faults != 0 || is_forbidden(mcu, armed)) {
     bushd_mcu_disarm(mcu, mcu->faults != 0 ? BUSHD_TRIGGER_FAULT : BUSHD_TRIGGER_FORBIDDEN);
     return;
   }
-  const int32_t ns = bus_ns(mcu, time_in_tick_ns) +
+  const int32_t ns = bushd_mcu_bus_ns(mcu, time_in_tick_ns) +
                      (int32_t)(BUSHD_TRIGGER_FIXED_TICKS * mcu->tick_ns) +
                      (int32_t)(mcu->trigger.delay_us * 1000u);
   const uint32_t after_ns = ns > 0 ? (uint32_t)ns : 0;

@@ -20,6 +20,12 @@ typedef struct bushd_mcu_trigger_input {
 } bushd_mcu_trigger_input;
 
 bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message);
+// The edge that armed motors wait for (bushd_mcu_trigger).
+void bushd_mcu_begin_armed(bushd_mcu* mcu, int32_t time_in_tick_ns);
+// The port knows nothing of inputs that are inverted.
+bushd_edge bushd_mcu_edge_of_pin(const bushd_mcu* mcu, bushd_edge edge);
+// A time in the present tick as the bus has it.
+int32_t bushd_mcu_bus_ns(const bushd_mcu* mcu, int32_t time_in_tick_ns);
 void bushd_mcu_disarm(bushd_mcu* mcu, bushd_trigger_state why);
 
 #endif

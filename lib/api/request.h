@@ -129,7 +129,7 @@ struct Home {
 // Motors, at rest, wait for an edge at the trigger input of their MCU and begin together after it.
 struct Arm {
   Edge edge = Edge::kRising;
-  std::int64_t delay_us = 0;          // 50..1500000, three ticks come on top
+  std::int64_t delay_us = 0;          // 50..1650000, three ticks come on top
   std::vector<MotorAmount> motors{};  // by so much, not 0
   std::optional<Speed> speed{};
 };

@@ -153,7 +153,7 @@ typedef enum bushd_edge {
 // any more.
 #define BUSHD_TRIGGER_FIXED_TICKS 3u
 #define BUSHD_TRIGGER_MIN_DELAY_US 50u
-#define BUSHD_TRIGGER_MAX_DELAY_US 1500000u
+#define BUSHD_TRIGGER_MAX_DELAY_US 1650000u
 typedef struct bushd_trigger {
   uint8_t number;  // chosen by the master, 1..255: the same one again is the same frame again; 0:
                    // of BUSHD_EDGE_NONE
@@ -173,6 +173,47 @@ typedef enum bushd_trigger_state {
   BUSHD_TRIGGER_FAULT = 5,     // a fault was latched before the edge came
   BUSHD_TRIGGER_FORBIDDEN = 6  // the edge came, but a limit forbids the direction of one of them
 } bushd_trigger_state;
+
+// The motor goes from one of its limits to the other and back, by its table: at once, or whenever
+// an edge at the trigger input has come, until it is given up. Or it makes one step, and its sensor
+// has to become active.
+typedef enum bushd_travel_kind {
+  BUSHD_TRAVEL_NONE = 0,  // the motor is to give up; nothing else is told
+  BUSHD_TRAVEL_STEP = 1,
+  BUSHD_TRAVEL_LIMITS = 2
+} bushd_travel_kind;
+typedef struct bushd_travel {
+  uint8_t number;  // as of bushd_trigger; 0: of BUSHD_TRAVEL_NONE
+  bushd_travel_kind kind;
+  uint8_t motor;
+  int8_t direction;  // of the first run or the step: +1, -1
+  bushd_edge edge;   // of BUSHD_TRAVEL_LIMITS; none: at once
+  uint8_t sensor;    // input of BUSHD_TRAVEL_STEP, 0..15
+  uint32_t steps;    // of either run, 1 .. 2^31 - 1; of BUSHD_TRAVEL_STEP 1
+  // From the edge to the beginning of the first run; at least BUSHD_TRIGGER_FIXED_TICKS + 1 ticks.
+  uint32_t delay_us;  // without an edge 0
+  // From the edge, or without one from the last step of the first run, to the beginning of the
+  // return, if the limit has been reached by then. Of a step: its sensor has so long.
+  uint32_t wait_us;
+} bushd_travel;
+#define BUSHD_TRAVEL_MIN_WAIT_US 50u
+#define BUSHD_TRAVEL_MAX_WAIT_US 1650000u
+
+// What the MCU does for its last TRAVEL, or what came of it: in a report in place of bushd_homing.
+typedef enum bushd_travel_stage {
+  BUSHD_TRAVEL_STEPS = 16,         // makes its one step, or waits for the sensor
+  BUSHD_TRAVEL_ARMED = 17,         // waits for the edge
+  BUSHD_TRAVEL_DELAY = 18,         // the first run is to begin
+  BUSHD_TRAVEL_RUN = 19,           // until its limit is active
+  BUSHD_TRAVEL_RETURN_DELAY = 20,  // stands there
+  BUSHD_TRAVEL_RETURN = 21,        // likewise, back
+  BUSHD_TRAVEL_DONE = 22,
+  BUSHD_TRAVEL_NOT_SEEN = 23,     // by the sensor in time
+  BUSHD_TRAVEL_EARLY = 24,        // its limit was active before the last step
+  BUSHD_TRAVEL_NOT_REACHED = 25,  // its limit was not active after the last step
+  BUSHD_TRAVEL_NOT_LEFT = 26,     // the other limit still was
+  BUSHD_TRAVEL_STOPPED = 27       // by a fault, by silence, by a limit, or because it was given up
+} bushd_travel_stage;
 
 enum { BUSHD_ARRIVES_POSITIVE = 1 << 0, BUSHD_ARRIVES_NEGATIVE = 1 << 1 };
 
@@ -232,9 +273,9 @@ typedef struct bushd_report {
   uint16_t current;        // of the supply, 0..1023
   uint8_t reset_cause;     // BUSHD_RESET_*
   uint8_t failed_tests;    // at boot, BUSHD_TEST_*
-  uint16_t autonomous;     // motors that move by homing or by local inputs
+  uint16_t autonomous;     // motors that move by homing, travel or local inputs
   uint16_t homed;          // motors whose last homing since boot was done
-  uint8_t homing;          // bushd_homing
+  uint8_t homing;          // bushd_homing or bushd_travel_stage, of the last of both
   uint16_t armed;          // motors that wait for the trigger
   uint8_t trigger_number;  // of the last one taken; 0: none since boot
   uint8_t trigger_state;   // bushd_trigger_state
@@ -249,6 +290,7 @@ typedef struct bushd_report {
 // Encoders return the payload's size. Preconditions are the ranges given above.
 size_t bushd_encode_home(const bushd_home* message, uint8_t* payload);
 size_t bushd_encode_local(const bushd_local* message, uint8_t* payload);
+size_t bushd_encode_travel(const bushd_travel* message, uint8_t* payload);
 size_t bushd_encode_poll(const bushd_poll_entry* entries, uint8_t count, uint8_t* payload);
 size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload);
 size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload);
@@ -274,6 +316,7 @@ size_t bushd_encode_position_compare(const bushd_position_compare* message, uint
 // Decoders return BUSHD_OK, BUSHD_E_LENGTH or BUSHD_E_FORMAT.
 bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* message);
 bushd_status bushd_decode_local(const uint8_t* payload, size_t size, bushd_local* message);
+bushd_status bushd_decode_travel(const uint8_t* payload, size_t size, bushd_travel* message);
 bushd_status bushd_decode_poll(const uint8_t* payload, size_t size, bushd_poll* message);
 bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message);
 bushd_status bushd_decode_sync(const uint8_t* payload, size_t size, bushd_sync* message);

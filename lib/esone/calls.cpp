@@ -16,7 +16,6 @@ using camac::Response;
 constexpr std::int32_t kValidExt = 0x40000000;
 constexpr std::int32_t kExtBits = 0x073F1F0F;
 constexpr std::int32_t kLamBase = 0x20000000;
-constexpr int kLastBranch = 7;
 constexpr int kLastCrate = 62;
 constexpr int kLastN = 31;
 constexpr std::uint32_t kMostWords = 4096;  // of one request
@@ -162,7 +161,8 @@ Status Calls::test(std::int32_t handle, bool* raised) {
   return status;
 }
 
-Status Calls::wait(std::int32_t handle, std::int64_t timeout_ms) {
+Status Calls::wait(std::int32_t handle, std::int32_t timeout_ms) {
+  if (timeout_ms < 0) return failed(kBadTimeout, "a timeout is 0, for ever, or some ms");
   const std::int64_t end_ms = port_->now_ms() + timeout_ms;
   while (true) {
     bool raised = false;
@@ -175,15 +175,15 @@ Status Calls::wait(std::int32_t handle, std::int64_t timeout_ms) {
   }
 }
 
-Status Calls::begin(std::int32_t* cb) {
+Status Calls::begin(std::int32_t* cb, std::int32_t timeout_ms) {
   cb[1] = 0;
   if (cb[0] < 1) return failed(kBadCount, "the repeat count is below 1");
-  return cb[2] == 0 ? Status{} : wait(cb[2], cb[3]);
+  return cb[2] == 0 ? Status{} : wait(cb[2], timeout_ms);
 }
 
 Status Calls::actions(const std::int32_t* fa, const std::int32_t* exta, Words words,
                       std::int32_t* qa, std::int32_t* cb) {
-  Status worst = begin(cb);
+  Status worst = begin(cb, cb[3]);
   if (worst.k != 0) return worst;
   for (std::size_t i = 0; i < static_cast<std::size_t>(cb[0]); ++i) {
     std::uint32_t data = camac::writes(fa[i]) ? words.get(i) : 0;
@@ -199,7 +199,8 @@ Status Calls::actions(const std::int32_t* fa, const std::int32_t* exta, Words wo
 }
 
 Status Calls::block(BlockMode mode, int f, std::int32_t ext, Words words, std::int32_t* cb) {
-  if (Status begun = begin(cb); begun.k != 0) return begun;
+  const bool stop_on_word = mode == BlockMode::kQStop && cb[3] == kStopOnWord;
+  if (Status begun = begin(cb, stop_on_word ? 0 : cb[3]); begun.k != 0) return begun;
   const auto address = address_of(ext);
   if (!is_function(f)) return failed(kBadFunction, "functions are 0..31");
   if (!address) return failed(kBadExt, "EXT is none of cdreg");
@@ -222,6 +223,10 @@ Status Calls::block(BlockMode mode, int f, std::int32_t ext, Words words, std::i
     cb[1] = static_cast<std::int32_t>(tally);
     if (moved == block.count) continue;
     const Response& last = responses.back();
+    if (stop_on_word && last.x) {
+      if (camac::reads(f)) words.set(tally, last.data);
+      ++cb[1];
+    }
     if (mode != BlockMode::kRepeat || !last.x) return of(last);
     if (moved > 0) give_up_ms = port_->now_ms() + kRepeatMs;
     if (port_->now_ms() >= give_up_ms) return failed(kNoQ, "no Q in 1 s", 1);
@@ -230,8 +235,24 @@ Status Calls::block(BlockMode mode, int f, std::int32_t ext, Words words, std::i
   return {};
 }
 
+Status Calls::at_each_lam(int f, std::int32_t ext, Words words, std::int32_t* cb) {
+  cb[1] = 0;
+  if (cb[0] < 1) return failed(kBadCount, "the repeat count is below 1");
+  while (cb[1] < cb[0]) {
+    if (Status waited = wait(cb[2], cb[3]); waited.k != 0) return waited;
+    const auto i = static_cast<std::size_t>(cb[1]);
+    std::uint32_t data = camac::writes(f) ? words.get(i) : 0;
+    bool q = false;
+    if (Status status = cycle(f, ext, &data, &q); status.k != 0) return status;
+    if (camac::reads(f)) words.set(i, data);
+    ++cb[1];
+    if (Status cleared = clear(cb[2]); cleared.k != 0) return cleared;
+  }
+  return {};
+}
+
 Status Calls::scan(int f, const std::int32_t* extb, Words words, std::int32_t* cb) {
-  if (Status begun = begin(cb); begun.k != 0) return begun;
+  if (Status begun = begin(cb, cb[3]); begun.k != 0) return begun;
   const auto first = address_of(extb[0]);
   const auto last = address_of(extb[1]);
   if (!is_function(f)) return failed(kBadFunction, "functions are 0..31");

@@ -17,6 +17,7 @@ struct Address {
   int station = 0;
   int subaddress = 0;
 };
+constexpr int kLastBranch = 7;
 // EXT orders as a scan goes; 0 is none.
 std::int32_t ext_of(const Address& address);
 std::optional<Address> address_of(std::int32_t ext);
@@ -52,9 +53,10 @@ class Calls {
  public:
   static constexpr std::int64_t kRepeatMs = 1000;  // without any Q
   static constexpr std::int64_t kPollMs = 20;      // of a LAM
+  // In cb[3]: a block ends with the word without Q, which is one; no timeout.
+  static constexpr std::int32_t kStopOnWord = -1;
 
   explicit Calls(Port& port) : port_(&port) {}
-  void use(Port& port) { port_ = &port; }
 
   // One cycle. `data` may be null for a function that moves none.
   Status cycle(int f, std::int32_t ext, std::uint32_t* data, bool* q);
@@ -67,15 +69,18 @@ class Calls {
   Status clear(std::int32_t handle);
   Status test(std::int32_t handle, bool* raised);
   // 0: for ever.
-  Status wait(std::int32_t handle, std::int64_t timeout_ms);
+  Status wait(std::int32_t handle, std::int32_t timeout_ms);
 
   Status actions(const std::int32_t* fa, const std::int32_t* exta, Words words, std::int32_t* qa,
                  std::int32_t* cb);
+  // `mode`: kQStop or kRepeat. Of kQStop cb[3] may be kStopOnWord.
   Status block(camac::BlockMode mode, int f, std::int32_t ext, Words words, std::int32_t* cb);
+  // One register, a word for each LAM, which is cleared with it.
+  Status at_each_lam(int f, std::int32_t ext, Words words, std::int32_t* cb);
   Status scan(int f, const std::int32_t* extb, Words words, std::int32_t* cb);
 
  private:
-  Status begin(std::int32_t* cb);
+  Status begin(std::int32_t* cb, std::int32_t timeout_ms);
   Status at(const Lam& lam, int a, int f, std::uint32_t data, camac::Response* response);
 
   Port* port_;

@@ -1,18 +1,43 @@
-// bushd_esone.h: one lock around all calls, and a status for each thread.
+// bushd_esone.h: one lock around all calls but while they wait, and a status for each thread.
 #include <mutex>
 #include <utility>
 
 #include "esone/bushd_esone.h"
 #include "esone/calls.h"
+#include "esone/links.h"
 
 namespace bushd::esone {
 namespace {
 
 std::mutex mutex;
 
+// Who waits lets others call.
+class SharedPort final : public Port {
+ public:
+  void use(Port& port) { port_ = &port; }
+  tl::expected<api::CamacResult, Failure> run(int crate, const camac::Block& block) override {
+    return port_->run(crate, block);
+  }
+  std::int64_t now_ms() override { return port_->now_ms(); }
+  void pause_ms(std::int64_t length_ms) override {
+    Port* const port = port_;
+    mutex.unlock();
+    port->pause_ms(length_ms);
+    mutex.lock();
+  }
+
+ private:
+  Port* port_ = &client_port();
+};
+
+SharedPort& shared_port() {
+  static SharedPort port;
+  return port;
+}
+
 // Made by the first call.
 Calls& calls() {
-  static Calls all(client_port());
+  static Calls all(shared_port());
   return all;
 }
 
@@ -43,6 +68,25 @@ int call(std::int32_t* logical, const Work& work) {
   bool value = false;
   const int k = call([&](Calls& all) { return work(all, &value); });
   *logical = value ? 1 : 0;
+  return k;
+}
+
+Links& links() {
+  calls();  // is there as long as the links
+  static Links all([](std::int32_t lam) {
+    std::int32_t raised = 0;
+    return ctlm(lam, &raised) == 0 && raised != 0;
+  });
+  return all;
+}
+
+// `work` is told whether the LAM is linked, and returns the same.
+template <class Work>
+int of_link(std::int32_t lam, const Work& work) {
+  int k = call([&](Calls& all) {
+    return all.lam(lam) == nullptr ? failed(kBadLam, "LAM is none of cdlam") : Status{};
+  });
+  if (k == 0 && !work(links())) k = told(failed(kBadLam, "the LAM has no procedure: cclnk"));
   return k;
 }
 
@@ -81,7 +125,8 @@ int common_control(std::int32_t ext, int a) {
 }  // namespace
 
 void use(Port& port) {
-  calls().use(port);
+  const std::lock_guard lock(mutex);
+  shared_port().use(port);
 }
 
 }  // namespace bushd::esone
@@ -129,6 +174,10 @@ int cssa(int32_t f, int32_t ext, int16_t* data, int32_t* q) {
 int ctstat(int32_t* k) {
   *k = last_status().k;
   return *k;
+}
+
+int ccinit(int32_t b) {
+  return told(b >= 0 && b <= kLastBranch ? Status{} : failed(kBadBranch, "branches are 0..7"));
 }
 
 int cccz(int32_t ext) {
@@ -182,6 +231,18 @@ int cglam(int32_t lam, int32_t* b, int32_t* c, int32_t* n, int32_t* m, int32_t* 
   });
 }
 
+int cclnk(int32_t lam, void (*procedure)(void)) {
+  return of_link(lam, [&](Links& all) {
+    all.link(lam, procedure);
+    return true;
+  });
+}
+int cculk(int32_t lam) {
+  return of_link(lam, [&](Links& all) { return all.unlink(lam); });
+}
+int ccrgl(int32_t lam) {
+  return of_link(lam, [&](Links& all) { return all.arm(lam); });
+}
 int cclm(int32_t lam, int32_t l) {
   return call([&](Calls& all) { return all.enable(lam, l != 0); });
 }
@@ -210,6 +271,9 @@ int cfubc(int32_t f, int32_t ext, int32_t* intc, int32_t* cb) {
 int cfubr(int32_t f, int32_t ext, int32_t* intc, int32_t* cb) {
   return call([&](Calls& all) { return all.block(BlockMode::kRepeat, f, ext, Words(intc), cb); });
 }
+int cfubl(int32_t f, int32_t ext, int32_t* intc, int32_t* cb) {
+  return call([&](Calls& all) { return all.at_each_lam(f, ext, Words(intc), cb); });
+}
 int csga(const int32_t* fa, const int32_t* exta, int16_t* intc, int32_t* qa, int32_t* cb) {
   return call([&](Calls& all) { return all.actions(fa, exta, Words(intc), qa, cb); });
 }
@@ -221,6 +285,9 @@ int csubc(int32_t f, int32_t ext, int16_t* intc, int32_t* cb) {
 }
 int csubr(int32_t f, int32_t ext, int16_t* intc, int32_t* cb) {
   return call([&](Calls& all) { return all.block(BlockMode::kRepeat, f, ext, Words(intc), cb); });
+}
+int csubl(int32_t f, int32_t ext, int16_t* intc, int32_t* cb) {
+  return call([&](Calls& all) { return all.at_each_lam(f, ext, Words(intc), cb); });
 }
 
 const char* bushd_esone_text(void) {

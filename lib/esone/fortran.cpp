@@ -1,4 +1,5 @@
-// The subroutines as Fortran calls them: a trailing underscore, every argument by reference.
+// The subroutines as Fortran calls them: a trailing underscore, every argument by
+// reference; a procedure is passed as what it is.
 #include "esone/bushd_esone.h"
 
 extern "C" {
@@ -108,6 +109,30 @@ void csubc_(const int32_t* f, const int32_t* ext, int16_t* intc, int32_t* cb) {
 void csubr_(const int32_t* f, const int32_t* ext, int16_t* intc, int32_t* cb);
 void csubr_(const int32_t* f, const int32_t* ext, int16_t* intc, int32_t* cb) {
   csubr(*f, *ext, intc, cb);
+}
+void ccinit_(const int32_t* b);
+void ccinit_(const int32_t* b) {
+  ccinit(*b);
+}
+void cclnk_(const int32_t* lam, void (*procedure)(void));
+void cclnk_(const int32_t* lam, void (*procedure)(void)) {
+  cclnk(*lam, procedure);
+}
+void cculk_(const int32_t* lam);
+void cculk_(const int32_t* lam) {
+  cculk(*lam);
+}
+void ccrgl_(const int32_t* lam);
+void ccrgl_(const int32_t* lam) {
+  ccrgl(*lam);
+}
+void cfubl_(const int32_t* f, const int32_t* ext, int32_t* intc, int32_t* cb);
+void cfubl_(const int32_t* f, const int32_t* ext, int32_t* intc, int32_t* cb) {
+  cfubl(*f, *ext, intc, cb);
+}
+void csubl_(const int32_t* f, const int32_t* ext, int16_t* intc, int32_t* cb);
+void csubl_(const int32_t* f, const int32_t* ext, int16_t* intc, int32_t* cb) {
+  csubl(*f, *ext, intc, cb);
 }
 
 }  // extern "C"

@@ -20,6 +20,7 @@ enum Code {
   kBadFunction = 5,
   kBadExt = 6,
   kBadLam = 7,
+  kBadTimeout = 8,
   kNoDaemon = 9,
   kTransport = 11,
   kLamTimeout = 12,

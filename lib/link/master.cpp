@@ -19,6 +19,11 @@ PerMcu<McuRecord> records_of(const BusSetup& setup) {
   return records;
 }
 
+// The MCU takes the number that it has for the same frame again.
+std::uint8_t next_trigger_number(const bushd_report& report) {
+  return static_cast<std::uint8_t>(report.trigger_number % 255 + 1);
+}
+
 }  // namespace
 
 Master::Master(BusSetup setup, TickSource& source)
@@ -179,10 +184,22 @@ std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
   }
   std::sort(entries.begin(), entries.end(),
             [](const auto& a, const auto& b) { return a.motor < b.motor; });
-  // The MCU takes the number that it has for the same frame again.
-  const auto number = static_cast<std::uint8_t>(record.view.report.trigger_number % 255 + 1);
+  const std::uint8_t number = next_trigger_number(record.view.report);
   connector_.queue(mcu).arm(number, edge, delay_us, entries);
   return number;
+}
+
+std::uint8_t Master::travel(McuIndex mcu, bushd_travel message) {
+  message.number = next_trigger_number(mcus_[mcu].view.report);
+  connector_.queue(mcu).travel(message);
+  return message.number;
+}
+
+void Master::end_travel(McuIndex mcu, std::uint8_t motor) {
+  bushd_travel message{};
+  message.kind = BUSHD_TRAVEL_NONE;
+  message.motor = motor;
+  connector_.queue(mcu).travel(message);
 }
 
 void Master::position_compare(McuIndex mcu, const bushd_position_compare& message) {

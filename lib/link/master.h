@@ -92,6 +92,13 @@ class Master : private Transactions::Listener, private Connector::Listener {
   };
   std::uint8_t arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                    std::span<const Armed> moves);
+  // A motor travels, or makes a step that its sensor has to see, by itself; how that goes is told
+  // by reports, from when they have the number returned here. `message`: without number.
+  // Preconditions as of arm; the MCU can (can_travel), and has answered all that it was asked.
+  std::uint8_t travel(McuIndex mcu, bushd_travel message);
+  // It travels no more.
+  void end_travel(McuIndex mcu, std::uint8_t motor);
+  bool can_travel(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TRAVEL); }
   // None of them waits any more; those that have been started go on.
   void disarm(McuIndex mcu) { connector_.queue(mcu).disarm(); }
   bool can_trigger(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TRIGGER); }

@@ -96,6 +96,10 @@ void SetupQueue::home(const bushd_home& message) {
   add(BUSHD_MSG_HOME, [&](std::uint8_t* p) { return bushd_encode_home(&message, p); });
 }
 
+void SetupQueue::travel(const bushd_travel& message) {
+  add(BUSHD_MSG_TRAVEL, [&](std::uint8_t* p) { return bushd_encode_travel(&message, p); });
+}
+
 void SetupQueue::position_compare(const bushd_position_compare& message) {
   add(BUSHD_MSG_POSITION_COMPARE,
       [&](std::uint8_t* p) { return bushd_encode_position_compare(&message, p); });

@@ -42,6 +42,7 @@ class SetupQueue {
   void discard_clearing();
   void set_position(std::uint8_t motor, std::int32_t position_steps);
   void home(const bushd_home& message);
+  void travel(const bushd_travel& message);
   void position_compare(const bushd_position_compare& message);
   // `entries` by rising motor.
   void arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,

@@ -276,8 +276,8 @@ TEST_P(Triggered, ArmingIsRefusedWithAReason) {
   };
   EXPECT_THAT(refusal(armed({}, {})), HasSubstr("no motor"));
   EXPECT_THAT(refusal(armed({"m01"}, {0})), HasSubstr("no steps"));
-  EXPECT_THAT(refusal(armed({"m01"}, {5}, 49)), HasSubstr("50 to 1500000"));
-  EXPECT_THAT(refusal(armed({"m01"}, {5}, 1'500'001)), HasSubstr("50 to 1500000"));
+  EXPECT_THAT(refusal(armed({"m01"}, {5}, 49)), HasSubstr("50 to 1650000"));
+  EXPECT_THAT(refusal(armed({"m01"}, {5}, 1'650'001)), HasSubstr("50 to 1650000"));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {500});
   lab.run_for(0.3);
   EXPECT_THAT(refusal(armed({"m01"}, {5})), HasSubstr("m01 moves"));

@@ -47,10 +47,18 @@ class Camac(EndToEndTest):
         self.assert_one_result_each()
 
     def test_a_program_in_c_does_too(self):
+        self.run_on_crate("ESONE_PROGRAM", "205")
+
+    def test_a_program_in_fortran_does_too(self):
+        self.run_on_crate("ESONE_PROGRAM_FORTRAN")
+
+    def run_on_crate(self, name, *arguments):
         self.bring_up_crate()
-        ran = self.run_program(program("ESONE_PROGRAM"), "205")
+        ran = self.run_program(program(name), *arguments)
         self.assertEqual(ran.returncode, 0, ran.stderr)
         self.assertEqual(self.motors()["a0"]["position_steps"], 205)
+        self.assertEqual(self.bushd.end(), 0)
+        self.assert_one_result_each()
 
     def test_programs_are_dumped_and_loaded(self):
         self.bring_up_crate()

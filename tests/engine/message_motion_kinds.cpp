@@ -164,8 +164,26 @@ Bytes any_trigger() {
   Bytes payload(6);
   payload[0] = between<uint8_t>(1, 255);
   payload[1] = between<uint8_t>(1, 2);
-  bushd_put_u32(&payload[2], between<uint32_t>(50, 1'500'000));
+  bushd_put_u32(&payload[2], between<uint32_t>(50, 1'650'000));
   payload.insert(payload.end(), run.begin() + BUSHD_TABLE_RUN_HEADER, run.end());
+  return payload;
+}
+
+Bytes any_travel() {
+  const uint8_t edge = between<uint8_t>(0, 2);
+  const bool steps = edge == 0 && *rc::gen::arbitrary<bool>();
+  bushd_travel m{};
+  m.number = between<uint8_t>(1, 255);
+  m.kind = steps ? BUSHD_TRAVEL_STEP : BUSHD_TRAVEL_LIMITS;
+  m.motor = between<uint8_t>(0, 15);
+  m.direction = *rc::gen::element<int8_t>(1, -1);
+  m.edge = static_cast<bushd_edge>(edge);
+  m.sensor = steps ? between<uint8_t>(0, 15) : uint8_t{0};
+  m.steps = steps ? 1 : between<uint32_t>(1, INT32_MAX);
+  m.delay_us = edge != 0 ? between<uint32_t>(50, 1'650'000) : 0;
+  m.wait_us = between<uint32_t>(50, 1'650'000);
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(bushd_encode_travel(&m, payload.data()));
   return payload;
 }
 
@@ -199,6 +217,21 @@ Kinds motion_kinds() {
          {"no slow steps", set32(8, 0)},
          {"too many slow steps", set32(8, 0x80000000)},
          {"no delay", set16(12, 0)}}}},
+      {"travel",
+       {any_travel,
+        codec(bushd_decode_travel, bushd_encode_travel),
+        {{"no number", set8(0, 0)},
+         {"kind 3", set8(1, 3)},
+         {"something to give up", set8(1, 0)},
+         {"motor 16", set8(2, 16)},
+         {"no direction", set8(3, 0)},
+         {"no such edge", set8(4, 3)},
+         {"sensor 16", set8(5, 16)},
+         {"no step", set32(6, 0)},
+         {"too many steps", set32(6, 0x80000000)},
+         {"too long a delay", set32(10, 1'650'001)},
+         {"too short a wait", set32(14, 49)},
+         {"too long a wait", set32(14, 1'650'001)}}}},
       {"local",
        {[] { return random_bytes(2); }, codec(bushd_decode_local, bushd_encode_local), {}}},
       {"poll", {any_poll, poll_again, {}}},
@@ -245,7 +278,7 @@ Kinds motion_kinds() {
          {"no such edge", set8(1, 3)},
          {"entries to disarm", set8(1, 0)},
          {"too short a delay", set32(2, 49)},
-         {"too long a delay", set32(2, 1'500'001)},
+         {"too long a delay", set32(2, 1'650'001)},
          {"no step", entry_alone(6, {0, 0, 0, 0, 0})},
          {"no entry", [](Bytes* p) { p->resize(6); }}},
         true}},

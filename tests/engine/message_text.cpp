@@ -107,6 +107,11 @@ void put(const bushd_home& m, Fields& f) {
   f.add("slow_steps", m.slow_steps).add("slow_delay", m.slow_delay);
   f.add("position_steps", m.position_steps);
 }
+void put(const bushd_travel& m, Fields& f) {
+  f.add("number", m.number).add("kind", m.kind).add("motor", m.motor);
+  f.add("direction", m.direction).add("edge", m.edge).add("sensor", m.sensor);
+  f.add("steps", m.steps).add("delay_us", m.delay_us).add("wait_us", m.wait_us);
+}
 void put(const bushd_local& m, Fields& f) {
   f.add("motors", m.motors);
 }
@@ -260,6 +265,8 @@ std::string message_text(const bushd_frame& frame) {
       return text("motor_inputs", frame, bushd_decode_motor_inputs);
     case BUSHD_MSG_HOME:
       return text("home", frame, bushd_decode_home);
+    case BUSHD_MSG_TRAVEL:
+      return text("travel", frame, bushd_decode_travel);
     case BUSHD_MSG_LOCAL:
       return text("local", frame, bushd_decode_local);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
@@ -277,12 +284,12 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {"identify",         "identity",    "configure",   "table_begin",     "table_data",
-          "table_end",        "assign",      "control",     "set_position",    "poll",
-          "report",           "sync",        "ticks",       "acknowledgement", "table_ticks",
-          "table_run",        "emergency",   "set_address", "get_tables",      "tables",
-          "set_inputs",       "emission",    "home",        "local",           "trigger",
-          "position_compare", "motor_inputs"};
+  return {"identify",         "identity",     "configure",   "table_begin",     "table_data",
+          "table_end",        "assign",       "control",     "set_position",    "poll",
+          "report",           "sync",         "ticks",       "acknowledgement", "table_ticks",
+          "table_run",        "emergency",    "set_address", "get_tables",      "tables",
+          "set_inputs",       "emission",     "home",        "local",           "trigger",
+          "position_compare", "motor_inputs", "travel"};
 }
 
 }  // namespace bushd::test

@@ -1,9 +1,12 @@
 // The subroutines of IEEE 758, against a crate of the test.
 #include <gtest/gtest.h>
 
+#include <condition_variable>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "camac/bench.h"
@@ -25,13 +28,18 @@ class EsoneTest : public ::testing::Test, public Port {
   ~EsoneTest() override { use(client_port()); }
 
   tl::expected<api::CamacResult, Failure> run(int crate, const camac::Block& block) override {
+    const std::lock_guard lock(mutex_);
     ++runs_;
     if (crate != 1) return tl::unexpected<Failure>(Failure{kNoCrate, "there is no crate"});
     const auto result = camac::transfer(now_ms_ * 1000, crate_, block);
     return api::CamacResult{.block = result, .requests = crate_.requests()};
   }
-  std::int64_t now_ms() override { return now_ms_; }
+  std::int64_t now_ms() override {
+    const std::lock_guard lock(mutex_);
+    return now_ms_;
+  }
   void pause_ms(std::int64_t length_ms) override {
+    const std::lock_guard lock(mutex_);
     now_ms_ += length_ms;
     module_.answer(now_ms_ * 1000, 1, {});
   }
@@ -42,6 +50,22 @@ class EsoneTest : public ::testing::Test, public Port {
     return made;
   }
 
+  static std::int32_t lam_of_5() {
+    std::int32_t lam = 0;
+    EXPECT_EQ(cdlam(&lam, 1, 1, 5, 0, nullptr), 0);
+    return lam;
+  }
+  // An address overflow, which is enabled.
+  static void raise_lam() {
+    std::int32_t data = 0x10;
+    std::int32_t q = 0;
+    cfsa(16, ext(5, 2), &data, &q);
+    data = 1023;
+    cfsa(16, ext(5, 1), &data, &q);
+    cfsa(0, ext(5, 0), &data, &q);
+  }
+
+  std::mutex mutex_;
   std::int64_t now_ms_ = 0;
   int runs_ = 0;
   camac::MotorsBench motors_;
@@ -147,6 +171,127 @@ TEST_F(EsoneTest, LamHandles) {
   EXPECT_EQ(ctlm(grouped, &l), 3) << "BUSHD-2 has no group 2";
 }
 
+TEST_F(EsoneTest, TimeoutsAreNotNegative) {
+  EXPECT_EQ(e(cclwt_timeout(lam_of_5(), -1)), kBadTimeout);
+  std::int32_t word = 0;
+  std::int32_t cb[4] = {1, 0, lam_of_5(), -1};
+  EXPECT_EQ(e(cfubr(0, ext(5, 2), &word, cb)), kBadTimeout);
+  cb[2] = 0;
+  EXPECT_EQ(cfubr(0, ext(5, 2), &word, cb), 0) << "nothing is waited for";
+}
+
+TEST_F(EsoneTest, OthersMayCallWhileOneWaits) {
+  const std::int32_t lam = lam_of_5();
+  std::thread waits([lam] { EXPECT_EQ(cclwt(lam), 0); });
+  raise_lam();
+  waits.join();
+}
+
+// What is called when the LAM is raised.
+struct Served {
+  std::mutex mutex;
+  std::condition_variable changed;
+  int times = 0;
+  std::int32_t lam = 0;
+
+  void wait_for(int wanted) {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [&] { return times == wanted; });
+  }
+} served;
+
+void count() {
+  const std::lock_guard lock(served.mutex);
+  ++served.times;
+  served.changed.notify_all();
+}
+void serve() {
+  EXPECT_EQ(cclc(served.lam), 0);
+  count();
+}
+void serve_again() {
+  EXPECT_EQ(cclc(served.lam), 0);
+  EXPECT_EQ(ccrgl(served.lam), 0);
+  count();
+}
+void serve_for_the_last_time() {
+  EXPECT_EQ(cclc(served.lam), 0);
+  EXPECT_EQ(cculk(served.lam), 0);
+  count();
+}
+
+TEST_F(EsoneTest, ALinkedProcedureIsCalledOncePerLam) {
+  served.times = 0;
+  const std::int32_t lam = served.lam = lam_of_5();
+  EXPECT_EQ(e(cclnk(lam + 1000, serve)), kBadLam);
+  EXPECT_EQ(e(ccrgl(lam)), kBadLam) << "not linked";
+  EXPECT_EQ(e(cculk(lam)), kBadLam);
+  EXPECT_EQ(cclnk(lam, serve), 0);
+  raise_lam();
+  served.wait_for(1);
+  raise_lam();
+  EXPECT_EQ(served.times, 1);
+  EXPECT_EQ(ccrgl(lam), 0);
+  served.wait_for(2);
+  EXPECT_EQ(cclnk(lam, serve_again), 0) << "takes the place of the other";
+  for (int times = 3; times < 6; ++times) {
+    raise_lam();
+    served.wait_for(times);
+  }
+  EXPECT_EQ(cculk(lam), 0);
+  raise_lam();
+  EXPECT_EQ(cclnk(lam, serve_for_the_last_time), 0) << "it is raised already";
+  served.wait_for(6);
+  EXPECT_EQ(e(cculk(lam)), kBadLam);
+  EXPECT_EQ(served.times, 6);
+}
+
+TEST_F(EsoneTest, AWordForEachLam) {
+  const std::int32_t lam = lam_of_5();
+  raise_lam();
+  std::int32_t words[3] = {-1, -1, -1};
+  std::int32_t cb[4] = {3, -1, lam, 100};
+  EXPECT_EQ(e(cfubl(0, ext(5, 1), words, cb)), kLamTimeout) << "for the second";
+  EXPECT_EQ(cb[1], 1);
+  EXPECT_EQ((std::vector<std::int32_t>(words, words + 3)), (std::vector<std::int32_t>{0, -1, -1}));
+  raise_lam();
+  EXPECT_EQ(cfubl(0, ext(5, 0), words, cb), 1) << "the memory has no Q while a LAM is raised";
+  EXPECT_EQ(cb[1], 0);
+  std::int32_t l = 0;
+  EXPECT_EQ(ctlm(lam, &l), 0);
+  EXPECT_EQ(l, 1) << "and then it stays";
+  std::int16_t word = 5;
+  cb[0] = 1;
+  EXPECT_EQ(csubl(16, ext(5, 1), &word, cb), 0);
+  EXPECT_EQ(cb[1], 1);
+  cb[2] = 0;
+  EXPECT_EQ(e(cfubl(0, ext(5, 1), words, cb)), kBadLam);
+  cb[0] = 0;
+  EXPECT_EQ(e(cfubl(0, ext(5, 1), words, cb)), kBadCount);
+}
+
+TEST_F(EsoneTest, StopOnWordTakesTheWordWithoutQ) {
+  std::int32_t data = 0x10;
+  std::int32_t q = 0;
+  cfsa(16, ext(5, 2), &data, &q);  // address overflow ends a block
+  data = 1022;
+  cfsa(16, ext(5, 1), &data, &q);
+  std::int32_t words[5] = {7, 8, 9, 10, 11};
+  std::int32_t cb[4] = {5, -1, 0, Calls::kStopOnWord};
+  EXPECT_EQ(cfubc(16, ext(5, 0), words, cb), 1);
+  EXPECT_EQ(cb[1], 3) << "after the overflow one more is written";
+  cfsa(10, ext(5, 0), &data, &q);
+  data = 1022;
+  cfsa(16, ext(5, 1), &data, &q);
+  std::int32_t back[5] = {-1, -1, -1, -1, -1};
+  EXPECT_EQ(cfubc(0, ext(5, 0), back, cb), 1);
+  EXPECT_EQ(cb[1], 3);
+  EXPECT_EQ((std::vector<std::int32_t>(back, back + 5)),
+            (std::vector<std::int32_t>{7, 8, 9, -1, -1}));
+  EXPECT_EQ(cfubc(0, ext(9, 0), back, cb), 3);
+  EXPECT_EQ(cb[1], 0) << "without X there is no word";
+}
+
 TEST_F(EsoneTest, BlocksOfOneRegister) {
   std::vector<std::int32_t> words(1500, 7);
   std::int32_t data = 0x10;
@@ -201,6 +346,11 @@ TEST_F(EsoneTest, ListOfActions) {
   EXPECT_EQ((std::vector<std::int32_t>(words, words + 4)),
             (std::vector<std::int32_t>{300, 300, -1, 0}));
   EXPECT_EQ((std::vector<std::int32_t>(q, q + 4)), (std::vector<std::int32_t>{1, 1, 0, 0}));
+}
+
+TEST_F(EsoneTest, BranchesAreInitialised) {
+  EXPECT_EQ(ccinit(7), 0);
+  EXPECT_EQ(e(ccinit(8)), kBadBranch);
 }
 
 }  // namespace

@@ -57,7 +57,7 @@ TEST_P(Trigger, StepsFallIntoTheSlotsOfTheTableCountedFromTheEdge) {
   for (int i = 0; i < 150; ++i) {
     const auto number = static_cast<std::uint8_t>(i + 1);
     const std::uint32_t steps = 1 + below(70);
-    const std::uint32_t delay_us = i % 10 == 0 ? 1'500'000 - below(1000) : 50 + below(9000);
+    const std::uint32_t delay_us = i % 10 == 0 ? 1'650'000 - below(1000) : 50 + below(9000);
     const int direction = i % 3 == 0 ? -1 : 1;
     ASSERT_EQ(rig.arm(number, BUSHD_EDGE_FALLING, delay_us,
                       {{0, 0, static_cast<std::int8_t>(direction), steps, 0}}),
@@ -192,7 +192,7 @@ TEST_P(Trigger, IsForMotorsAtRestWithTheirTablesInAnMcuThatIsReady) {
   EXPECT_EQ(arm_one(1, 1, 5), BUSHD_E_NO_TABLE);
   EXPECT_EQ(arm_one(1, 0, 0), BUSHD_E_FORMAT);
   EXPECT_EQ(rig.arm(5, BUSHD_EDGE_RISING, 49, {{1, 0, 1, 5, 0}}), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.arm(5, BUSHD_EDGE_RISING, 1'500'001, {{1, 0, 1, 5, 0}}), BUSHD_E_FORMAT);
+  EXPECT_EQ(rig.arm(5, BUSHD_EDGE_RISING, 1'650'001, {{1, 0, 1, 5, 0}}), BUSHD_E_FORMAT);
   ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 5, 0)), BUSHD_OK);
   EXPECT_EQ(arm_one(0, 0, 5), BUSHD_E_STATE);
   EXPECT_EQ(arm_one(1, 0, 5), BUSHD_OK) << "nothing of what was refused has been taken";

@@ -14,6 +14,7 @@ TICK_NS = 2_560_000
 (IDENTIFY, CONFIGURE, TABLE_BEGIN, TABLE_DATA, TABLE_END, ASSIGN, CONTROL, SET_POSITION, POLL, SYNC, TICKS,
  TABLE_TICKS, TABLE_RUN, EMERGENCY, SET_ADDRESS, TABLES, INPUTS, EMISSION, HOME, LOCAL, TRIGGER,
  POSITION_COMPARE, MOTOR_INPUTS) = range(1, 0x18)
+TRAVEL = 0x19
 FINE, REPLACE, START = 1, 2, 4
 EMERGENCY_PIN, FORWARD, REVERSE = 1, 2, 4
 
@@ -125,6 +126,10 @@ def trigger(number, edge, delay_us, runs):
     return frame(TRIGGER, struct.pack("<BBI", number, edge, delay_us) + runs)
 
 
+def travel(number, kind, edge=0, sensor=0, steps=0, delay_us=0, wait_us=0):
+    return frame(TRAVEL, struct.pack("<BBBbBBIII", number, kind, 0, 1 if kind else 0, edge, sensor, steps, delay_us, wait_us))
+
+
 def ready(fine=0, before=b""):
     return (pins(0) + configure(fine) + before + in_step() + table() + assign(0, 1, 2, 3)
             + frame(CONTROL, b"\1") + passes(2))
@@ -135,6 +140,8 @@ MOVE = {0: ticks(START, 2, 3, (150, 150), (0x81, 0x82, 0x81, 0x83, 2, 2, 2, 2, 0
 MORE = {0: ticks(0, 7, 3, (0, 0), (0x81, 1)), 1: ticks(FINE, 3, 3, (0, 0), (256, -128))}
 REPLACEMENT = ticks(REPLACE | FINE, 4, 1, (0,), (128, 64), epoch=1)
 
+# Of motor 0 the limits are the inputs 0 and 1.
+SHUTTER = inputs(positive=1, negative=1) + frame(MOTOR_INPUTS, bytes([0, 0, 1, 0]))
 SEEDS = {
     "noise": noise(bytes(range(256))[:200]),
     "identify": frame(IDENTIFY, struct.pack("<HBH", 7, 4, 100), True),
@@ -174,7 +181,13 @@ SEEDS = {
     "home-given-up": ready(0, inputs(negative=1)) + home(0, -1) + passes(9) + home(0, -1, 0) + passes(15),
     "trigger": ready(0) + trigger(1, 1, 5000, entries(0, 2)) + passes(3) + trigger_edge() + passes(20)
                + trigger(1, 1, 5000, entries(0, 2)) + trigger(2, 2, 50, entries(1)) + trigger_edge(-30000)
-               + passes(15) + trigger(3, 1, 1_500_000, entries(0)) + frame(TRIGGER, bytes(6)),
+               + passes(15) + trigger(3, 1, 1_650_000, entries(0)) + frame(TRIGGER, bytes(6)),
+    "travel": ready(0, SHUTTER) + pins(2) + passes(2) + travel(1, 2, 0, 0, 9, 0, 3000) + passes(9) + pins(0) + passes(9) + pins(1)
+              + passes(12) + pins(0) + passes(12) + pins(2) + passes(9) + poll(7),
+    "travel-at-edges": ready(0, SHUTTER) + travel(1, 2, 1, 0, 5, 30000, 60000) + passes(2) + trigger_edge() + passes(15) + pins(1)
+                       + passes(15) + pins(2) + passes(15) + trigger_edge() + passes(9) + travel(0, 0) + passes(9),
+    "step-with-sensor": ready(0) + travel(1, 1, 0, 3, 1, 0, 30000) + passes(6) + pins(8) + passes(9) + travel(1, 1, 0, 3, 1, 0, 30000)
+                        + travel(2, 1, 0, 3, 1, 0, 30000) + passes(15),
     "position-compare": ready(0) + frame(POSITION_COMPARE, struct.pack("<BBiII", 0, 3, 3, 700, 4000)) + MOVE[0] + passes(20),
     "burst": ready(0, emission(1)) + MOVE[0] + passes(12),
     "common-dir": ready(0, emission(2)) + MOVE[0] + passes(12),

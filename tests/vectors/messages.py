@@ -30,6 +30,8 @@ LAYOUTS = {
     "motor_inputs": (0x17, [("motor", 1), ("positive", 1), ("negative", 1), ("home", 1)]),
     "home": (0x13, [("motor", 1), ("direction", -1), ("most_steps", 4), ("floor", 2), ("slow_steps", 4), ("slow_delay", 2),
                     ("position_steps", -4)]),
+    "travel": (0x19, [("number", 1), ("kind", 1), ("motor", 1), ("direction", -1), ("edge", 1), ("sensor", 1), ("steps", 4),
+                      ("delay_us", 4), ("wait_us", 4)]),
     "local": (0x14, [("motors", 2)]),
     "identity": (0x81, [("protocol_version", 1), ("motors", 1), ("firmware_version", 2), ("boot_number", 2),
                         ("slots", 2), ("queue_ticks", 2), ("table_codes", 2), ("capabilities", 2),

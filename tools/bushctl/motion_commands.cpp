@@ -114,7 +114,7 @@ void add_arm(CommandLine& line) {
           "after "
           "the edge at its trigger input. With --wait the exit code is 0 only if every motor "
           "reached its target.")
-      .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'500'000,
+      .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'650'000,
                             "Delay from the edge, beyond the three ticks", Command::Needed::kYes)
       .choice("--edge", &options->edge, {"rising", "falling"}, "Edge that starts the moves")
       .option("--speed", &options->speed, kSpeed)

@@ -261,7 +261,7 @@ class Client:
     ) -> Motion:
         """Lets these motors, at rest, wait for an edge at the trigger input of their MCU, to move by these distances.
 
-        They begin together, three ticks and `delay_us` (50 to 1500000) after the edge. Returns once it is accepted;
+        They begin together, three ticks and `delay_us` (50 to 1650000) after the edge. Returns once it is accepted;
         their activity is ARMED as soon as an edge starts them.
         """
         begun = self._client.arm(motors, unit=unit, edge=edge, delay_us=delay_us, speed=speed)

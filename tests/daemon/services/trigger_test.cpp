@@ -54,7 +54,7 @@ TEST(Trigger, DisarmedMotorsMoveNoMore) {
 TEST(Trigger, RefusalsSayWhy) {
   TriggerBench bench;
   bench.arm(1, {{"m01", 300}}, 49);
-  EXPECT_THAT(bench.refusal(1), HasSubstr("allowed: 50 to 1500000"));
+  EXPECT_THAT(bench.refusal(1), HasSubstr("allowed: 50 to 1650000"));
   bench.arm(2, {{"m01", 0}});
   EXPECT_THAT(bench.refusal(2), HasSubstr("m01: a move of no steps"));
   bench.arm(3, {{"m02", 5}});
