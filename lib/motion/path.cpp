@@ -334,19 +334,17 @@ bool Path::plan(std::size_t count) {
 void Path::shape(std::size_t i, const Shares& before, const Shares& now, const Shares& behind,
                  std::uint32_t delay_before, Profile& profile) const {
   const std::size_t width = now.size();
-  auto& [places, ramps, front, back] = scratch_;
-  const std::uint32_t least = flat(i, now);
-  const auto ramp = [&](bool decel, Profile& side) {
+  auto& [places, up, down, merger] = scratch_;
+  const auto take = [&](const std::vector<std::int32_t>& from, std::vector<PathRamp>& ramps) {
     ramps.clear();
     for (std::size_t m = 0; m < width; ++m) {
-      places[m] = (decel ? decel_ : accel_)[i * width + m];
-      if (now[m].moves()) ramps.push_back({&now[m], places[m]});
+      if (now[m].moves()) ramps.push_back({&now[m], from[i * width + m]});
     }
-    ramp_profile(ramps, decel, least, length_of(i), side);
   };
-  ramp(true, back);
-  ramp(false, front);
-  join_profiles(length_of(i), least, front, back, profile);
+  take(accel_, up);
+  take(decel_, down);
+  merger.merge(up, down, flat(i, now), length_of(i), profile);
+  for (std::size_t m = 0; m < width; ++m) places[m] = accel_[i * width + m];
   if (i > 0) raise_heads(i, before, now, false, places, delay_before, profile);
   if (delay_before != kRest) {
     for (std::size_t m = 0; m < width; ++m) places[m] = decel_[i * width + m];

@@ -159,9 +159,9 @@ class Path {
   Profile joined_;
   struct Scratch {
     Places places;
-    std::vector<PathRamp> ramps;
-    Profile front;
-    Profile back;
+    std::vector<PathRamp> up;
+    std::vector<PathRamp> down;
+    RampMerger merger;
   };
   mutable Scratch scratch_;
 };

@@ -22,13 +22,6 @@ std::uint64_t run_step(const PathShare& share, std::uint64_t made) {
   return (made * share.longest + share.steps - 1) / share.steps;
 }
 
-struct Climb {
-  PathRamp ramp;
-  std::uint64_t made;
-  std::uint64_t next;
-  std::uint32_t delay;
-};
-
 }  // namespace
 
 std::uint32_t PathShare::scaled(std::uint16_t own) const {
@@ -69,71 +62,73 @@ std::int64_t PathShare::place(bool decel, std::uint32_t delay, std::int64_t reac
   return std::clamp(reached, first, first_at_most(decel, delay - 1));
 }
 
-void ramp_profile(std::span<const PathRamp> ramps, bool decel, std::uint32_t flat,
-                  std::uint32_t steps, Profile& profile) {
-  profile.clear();
-  // No side rises, so that one which asks for less than `flat` never asks for more.
-  thread_local std::vector<Climb> climbs;
-  climbs.clear();
+void RampMerger::Slowest::start(std::span<const PathRamp> ramps, bool decel, std::uint32_t flat) {
+  decel_ = decel;
+  flat_ = flat;
+  climbs_.clear();
   for (const PathRamp& ramp : ramps) {
     const std::uint32_t delay = ramp.share->at(decel, ramp.place);
-    if (delay > flat) climbs.push_back({ramp, 0, run_step(*ramp.share, 1), delay});
+    if (delay > flat) climbs_.push_back({ramp, run_step(*ramp.share, 1), delay});
   }
-  std::uint64_t done = 0;
-  while (done < steps && !climbs.empty()) {
-    std::uint32_t delay = 0;
-    std::uint64_t next = steps;
-    for (const Climb& climb : climbs) {
-      delay = std::max(delay, climb.delay);
-      next = std::min(next, climb.next);
-    }
-    append(profile, static_cast<std::uint32_t>(next - done), delay);
-    done = next;
-    for (Climb& climb : climbs) {
-      if (climb.next != next) continue;
-      ++climb.made;
-      climb.next = run_step(*climb.ramp.share, climb.made + 1);
-      climb.delay =
-          climb.ramp.share->at(decel, climb.ramp.place + static_cast<std::int64_t>(climb.made));
-    }
-    std::erase_if(climbs, [flat](const Climb& climb) { return climb.delay <= flat; });
+  find_leader();
+}
+
+void RampMerger::Slowest::find_leader() {
+  leader_ = 0;
+  second_ = 0;
+  for (std::size_t i = 1; i < climbs_.size(); ++i) {
+    const bool leads = climbs_[i].delay > climbs_[leader_].delay;
+    second_ = std::max(second_, climbs_[leads ? leader_ : i].delay);
+    if (leads) leader_ = i;
   }
 }
 
-void join_profiles(std::uint32_t steps, std::uint32_t flat, const Profile& front,
-                   const Profile& back, Profile& joined) {
-  joined.clear();
-  std::uint32_t back_steps = 0;
-  for (const Delays& delays : back) back_steps += delays.steps;
-  // Both walk on together; before and behind their profiles they ask for `flat`.
-  auto at = front.begin();
-  auto from = back.rbegin();
-  std::uint32_t front_left = at != front.end() ? at->steps : steps;
-  std::uint32_t back_left = back_steps < steps    ? steps - back_steps
-                            : from != back.rend() ? from->steps
-                                                  : steps;
-  bool before_back = back_steps < steps;
-  std::uint32_t left = steps;
+void RampMerger::Slowest::go_to(std::uint64_t step) {
+  while (!climbs_.empty()) {
+    Climb& leader = climbs_[leader_];
+    if (leader.next > step) return;
+    const PathShare& share = *leader.ramp.share;
+    const std::uint64_t made =
+        share.steps == share.longest ? step : step * share.steps / share.longest;
+    leader.next = run_step(share, made + 1);
+    leader.delay = share.at(decel_, leader.ramp.place + static_cast<std::int64_t>(made));
+    if (leader.delay <= flat_) {
+      leader = climbs_.back();
+      climbs_.pop_back();
+      find_leader();
+    } else if (leader.delay < second_) {
+      find_leader();
+    }
+  }
+}
+
+// Whichever end is slower now is the slower side of the step there, as neither side rises towards
+// the other end.
+void RampMerger::merge(std::span<const PathRamp> up, std::span<const PathRamp> down,
+                       std::uint32_t flat, std::uint32_t steps, Profile& merged) {
+  merged.clear();
+  back_.clear();
+  up_.start(up, false, flat);
+  down_.start(down, true, flat);
+  std::uint64_t from_first = 0;
+  std::uint64_t from_last = 0;
+  std::uint64_t left = steps;
   while (left > 0) {
-    const std::uint32_t in_front = at != front.end() ? at->delay : flat;
-    const std::uint32_t behind = before_back || from == back.rend() ? flat : from->delay;
-    const std::uint32_t now = std::min({left, front_left, back_left});
-    append(joined, now, std::max({flat, in_front, behind}));
+    const std::uint32_t in_front = up_.delay();
+    const std::uint32_t behind = down_.delay();
+    if (in_front == 0 && behind == 0) break;
+    const bool forward = in_front >= behind;
+    Slowest& side = forward ? up_ : down_;
+    std::uint64_t& done = forward ? from_first : from_last;
+    const std::uint64_t now = std::min(left, side.until() - done);
+    append(forward ? merged : back_, static_cast<std::uint32_t>(now), forward ? in_front : behind);
     left -= now;
-    front_left -= now;
-    back_left -= now;
-    if (front_left == 0) {
-      if (at != front.end()) ++at;
-      front_left = at != front.end() ? at->steps : left;
-    }
-    if (back_left == 0) {
-      if (before_back) {
-        before_back = false;
-      } else {
-        ++from;
-      }
-      back_left = from != back.rend() ? from->steps : left;
-    }
+    done += now;
+    side.go_to(done);
+  }
+  append(merged, static_cast<std::uint32_t>(left), flat);
+  for (auto part = back_.rbegin(); part != back_.rend(); ++part) {
+    append(merged, part->steps, part->delay);
   }
 }
 

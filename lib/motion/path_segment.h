@@ -53,15 +53,43 @@ struct PathRamp {
   std::int64_t place;
 };
 
-// What ramps ask of `steps` steps counted from where they begin, as long as that is above `flat`.
-// O(codes).
-void ramp_profile(std::span<const PathRamp> ramps, bool decel, std::uint32_t flat,
-                  std::uint32_t steps, Profile& profile);
+// The delays of `steps` steps: the greatest of `flat`, of ramps up from the first step on, and of
+// ramps down to the last one, counted from there. O(codes of the greater side).
+class RampMerger {
+ public:
+  void merge(std::span<const PathRamp> up, std::span<const PathRamp> down, std::uint32_t flat,
+             std::uint32_t steps, Profile& merged);
 
-// For `steps` steps the greater one: of `flat`, of a profile from the first step on, and of one
-// from the last step back.
-void join_profiles(std::uint32_t steps, std::uint32_t flat, const Profile& front,
-                   const Profile& back, Profile& joined);
+ private:
+  // Motors' ramps in one direction, of which the slowest one counts.
+  class Slowest {
+   public:
+    void start(std::span<const PathRamp> ramps, bool decel, std::uint32_t flat);
+    std::uint32_t delay() const { return climbs_.empty() ? 0 : climbs_[leader_].delay; }
+    std::uint64_t until() const { return climbs_[leader_].next; }
+    void go_to(std::uint64_t step);
+
+   private:
+    struct Climb {
+      PathRamp ramp;
+      std::uint64_t next;  // step of the run from which on the delay is another one
+      std::uint32_t delay;
+    };
+    void find_leader();
+
+    bool decel_ = false;
+    std::uint32_t flat_ = 0;
+    // Delays of all but the leader may be those of an earlier step. As no side rises they are not
+    // too short.
+    std::vector<Climb> climbs_;
+    std::size_t leader_ = 0;
+    std::uint32_t second_ = 0;
+  };
+
+  Slowest up_;
+  Slowest down_;
+  Profile back_;
+};
 
 // Makes the first, or the last, of a profile's steps at least so long.
 void raise_first(Profile& profile, std::uint32_t steps, std::uint32_t least);
