@@ -29,8 +29,8 @@ bool turns(const PathShare& before, const PathShare& behind) {
 }  // namespace
 
 Path::Path(std::vector<Motor> motors, std::vector<std::int64_t> points, Corners corners,
-           std::vector<std::uint16_t> floors)
-    : motors_(std::move(motors)), corners_(corners), start_{0} {
+           std::vector<std::uint16_t> floors, std::uint32_t first_step)
+    : motors_(std::move(motors)), corners_(corners), start_{0}, first_step_(first_step) {
   const std::size_t width = motors_.size();
   const std::size_t rows = points.size() / width;
   points_.assign(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(width));
@@ -184,6 +184,11 @@ std::uint32_t Path::least_before(const Shares& before, const Shares& behind,
   return least;
 }
 
+// Steps of a motor's own in a segment, but for parts of steps.
+std::uint32_t Path::own_made(std::size_t segment, const PathShare& share) const {
+  return static_cast<std::uint32_t>(std::uint64_t{share.steps} * made_of(segment) / share.longest);
+}
+
 std::int64_t Path::accel_place(const PathShare& now, const PathShare& before, std::uint32_t delay,
                                std::int64_t place, std::uint32_t travel) const {
   if (delay == kRest || !now.moves()) return 0;
@@ -233,8 +238,8 @@ void Path::raise_heads(std::size_t segment, const Shares& before, const Shares& 
 
 // Of segments that end with rest or with the step of `side` behind them: `side` becomes that of
 // its own first step.
-std::uint32_t Path::first_of(std::size_t segment, const Shares& before, const Shares& now,
-                             const Places& places) const {
+std::uint32_t Path::first_delay(std::size_t segment, const Shares& before, const Shares& now,
+                                const Places& places) const {
   std::uint32_t least = flat(segment, now);
   for (std::size_t m = 0; m < now.size(); ++m) {
     if (!now[m].moves()) continue;
@@ -251,7 +256,7 @@ void Path::corners_step(std::size_t i) {
   if (!rests_at(i)) corner_[i] = corner(before_, now_);
   for (std::size_t m = 0; m < now_.size(); ++m) {
     const bool on = !rests_at(i) && goes_on(before_[m], now_[m]);
-    travel_[m] = on ? travel_[m] + before_[m].steps : 0;
+    travel_[m] = on ? travel_[m] + own_made(i - 1, before_[m]) : 0;
     if (rests_at(i) || !now_[m].moves()) continue;
     corner_[i] = std::max(corner_[i], now_[m].at(false, travel_[m]));
   }
@@ -280,8 +285,8 @@ void Path::back_step(std::size_t i) {
     places[m] = decel_place(now_[m], rest ? now_[m] : behind_[m], delay, behind, travel_[m]);
     decel_[i * now_.size() + m] = static_cast<std::int32_t>(places[m]);
   }
-  std::uint32_t first = std::max(corner_[i], first_of(i, before_, now_, places));
-  if (!rest && length_of(i) == 1) first = std::max(first, least_before(now_, behind_, delay));
+  std::uint32_t first = std::max(corner_[i], first_delay(i, before_, now_, places));
+  if (!rest && made_of(i) == 1) first = std::max(first, least_before(now_, behind_, delay));
   first_[i] = delay = first;
   std::swap(behind_, now_);
   std::swap(now_, before_);
@@ -294,8 +299,11 @@ void Path::forth_step(std::size_t i) {
   const std::uint32_t delay = rests_at(i) ? kRest : last_[i - 1];
   for (std::size_t m = 0; m < width; ++m) {
     const bool on = delay != kRest && goes_on(before_[m], now_[m]);
-    travel_[m] = on ? travel_[m] + before_[m].steps : 0;
-    const std::int64_t before = delay == kRest ? 0 : accel_[(i - 1) * width + m];
+    const std::uint32_t made = i == 0 ? 0 : own_made(i - 1, before_[m]);
+    travel_[m] = on ? travel_[m] + made : 0;
+    // As if it had come from the beginning of the segment.
+    const std::int64_t before =
+        delay == kRest ? 0 : accel_[(i - 1) * width + m] + std::int64_t{made} - before_[m].steps;
     accel_[i * width + m] = static_cast<std::int32_t>(
         accel_place(now_[m], delay == kRest ? now_[m] : before_[m], delay, before, travel_[m]));
   }
@@ -343,7 +351,7 @@ void Path::shape(std::size_t i, const Shares& before, const Shares& now, const S
   };
   take(accel_, up);
   take(decel_, down);
-  merger.merge(up, down, flat(i, now), length_of(i), profile);
+  merger.merge(up, down, flat(i, now), made_of(i), profile);
   for (std::size_t m = 0; m < width; ++m) places[m] = accel_[i * width + m];
   if (i > 0) raise_heads(i, before, now, false, places, delay_before, profile);
   if (delay_before != kRest) {

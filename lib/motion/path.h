@@ -21,6 +21,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -39,10 +41,10 @@ class Path {
     std::uint16_t floor = 0;   // none of its steps has a shorter delay
   };
   // Points of all motors, one after the other, each |to - from| < 2^31; the first one is where they
-  // stand. `floors`: as that of a motor, of each segment and motor, or none at all. Precondition:
-  // steps() < 2^31.
+  // stand. `floors`: as that of a motor, of each segment and motor, or none at all. The run begins
+  // at rest at `first_step`, within the first segment. Precondition: steps() < 2^31.
   Path(std::vector<Motor> motors, std::vector<std::int64_t> points, Corners corners,
-       std::vector<std::uint16_t> floors = {});
+       std::vector<std::uint16_t> floors = {}, std::uint32_t first_step = 0);
   Path(const Path&) = delete;
   Path& operator=(const Path&) = delete;
 
@@ -67,6 +69,14 @@ class Path {
   std::uint32_t length_of(std::size_t segment) const {
     return static_cast<std::uint32_t>(start_[segment + 1] - start_[segment]);
   }
+  std::uint32_t first_step() const { return first_step_; }
+  // The first one of a segment that the run makes, and how many it makes of it.
+  std::uint32_t first_of(std::size_t segment) const {
+    return segment == 0 ? first_step_ : start_of(segment);
+  }
+  std::uint32_t made_of(std::size_t segment) const {
+    return start_of(segment + 1) - first_of(segment);
+  }
   std::size_t segment_at(std::uint32_t step) const;  // the one that the step after it is of
   std::int64_t point(std::size_t segment, std::size_t motor) const {
     return points_[segment * motors_.size() + motor];
@@ -82,17 +92,15 @@ class Path {
   // Delays of a segment. O(its codes).
   Profile profile(std::size_t segment) const;
 
-  // The same with rest at two steps of the run, by the ramps from and to there, as far as they
-  // reach: of each of these segments, the part of it that lies between. Precondition: from < to.
-  struct Part {
-    std::size_t segment;
-    Profile profile;
-  };
-  std::vector<Part> profiles_from(std::uint32_t step) const;
-  std::vector<Part> profiles_to(std::uint32_t step, std::uint32_t since) const;
-  // A run that makes its step `running` now (counted from 0), which has the delay `delay`, can come
-  // to rest here at the earliest.
-  std::uint32_t nearest_rest(std::uint32_t running, std::uint32_t delay) const;
+  // Of a run that ends at rest within the path: its delays by segment up to there, back to where
+  // they are the path's own.
+  using Parts = std::map<std::size_t, Profile>;
+  Parts parts_to(std::uint32_t step) const;
+  // Where a run that makes its step `running` now, counted from 0, can come to rest at the
+  // earliest, so that neither that step nor one before it is faster than the ramps that lead there
+  // allow. `made` says what it makes of a segment, up to that step.
+  using MadeOf = std::function<const Profile&(std::size_t)>;
+  std::uint32_t nearest_rest(std::uint32_t running, const MadeOf& made) const;
 
  private:
   enum class Phase { kCorners, kBack, kForth, kDone };
@@ -111,6 +119,7 @@ class Path {
   std::uint32_t corner(const Shares& before, const Shares& behind) const;
   std::uint32_t least_behind(const Shares& before, const Shares& behind, std::uint32_t delay) const;
   std::uint32_t least_before(const Shares& before, const Shares& behind, std::uint32_t delay) const;
+  std::uint32_t own_made(std::size_t segment, const PathShare& share) const;
   std::int64_t accel_place(const PathShare& now, const PathShare& before, std::uint32_t delay,
                            std::int64_t place, std::uint32_t travel) const;
   std::int64_t decel_place(const PathShare& now, const PathShare& behind, std::uint32_t delay,
@@ -119,10 +128,22 @@ class Path {
             std::uint16_t own) const;
   void raise_heads(std::size_t segment, const Shares& before, const Shares& now, bool decel,
                    const Places& places, std::uint32_t most, Profile& profile) const;
-  std::uint32_t first_of(std::size_t segment, const Shares& before, const Shares& now,
-                         const Places& places) const;
+  std::uint32_t first_delay(std::size_t segment, const Shares& before, const Shares& now,
+                            const Places& places) const;
   void shape(std::size_t segment, const Shares& before, const Shares& now, const Shares& behind,
              std::uint32_t delay_before, Profile& profile) const;
+  // What is carried over a corner, in either direction.
+  struct Border {
+    std::uint32_t delay = kRest;
+    Places places;
+    std::vector<std::uint32_t> travel;
+  };
+  void enter(const Shares& now, const Shares& behind, Border& border) const;
+  std::vector<PathRamp> ramps_of(const Shares& now, const Places& places) const;
+  std::uint32_t down_at(const Shares& now, const Places& places, std::uint32_t steps) const;
+  bool allows(const Profile& made, std::uint32_t steps, const Shares& now, const Places& places,
+              std::uint32_t at_last, const std::vector<Head>& heads) const;
+  bool can_rest(std::uint32_t end, std::size_t running, const MadeOf& made) const;
   void corners_step(std::size_t segment);
   void back_step(std::size_t segment);
   void forth_step(std::size_t segment);
@@ -133,6 +154,7 @@ class Path {
   std::vector<std::uint16_t> floors_;
   std::vector<std::uint32_t> row_segments_;  // of each given point: segments before it
   std::vector<std::uint64_t> start_;
+  std::uint32_t first_step_ = 0;
   std::uint32_t unit_ns_ = 1;
   std::vector<std::pair<std::uint64_t, std::uint64_t>> unit_ratio_;  // a motor's by the path's
   std::uint64_t number_ = 0;

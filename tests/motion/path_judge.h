@@ -25,7 +25,8 @@ struct Ran {
 
 inline std::vector<Ran> whole(const motion::Path& path) {
   std::vector<Ran> run;
-  for (std::size_t i = 0; i < path.segments(); ++i) run.push_back({i, 0, path.profile(i)});
+  for (std::size_t i = 0; i < path.segments(); ++i)
+    run.push_back({i, path.first_of(i) - path.start_of(i), path.profile(i)});
   return run;
 }
 
