@@ -1,0 +1,205 @@
+#include "motion/path_segment.h"
+
+#include <algorithm>
+
+namespace bushd::motion {
+namespace {
+
+__extension__ using Wide = unsigned __int128;
+
+void append(Profile& profile, std::uint32_t steps, std::uint32_t delay) {
+  if (steps == 0) return;
+  if (!profile.empty() && profile.back().delay == delay) {
+    profile.back().steps += steps;
+  } else {
+    profile.push_back({steps, delay});
+  }
+}
+
+// The step of the run, counted from 0, before which a motor has made this many more.
+std::uint64_t run_step(const PathShare& share, std::uint64_t made) {
+  if (share.steps == share.longest) return made;
+  return (made * share.longest + share.steps - 1) / share.steps;
+}
+
+}  // namespace
+
+std::uint32_t PathShare::scaled(std::uint16_t own) const {
+  if (numerator == denominator) return own;
+  if (numerator >> 47 == 0) {
+    return static_cast<std::uint32_t>((own * numerator + denominator - 1) / denominator);
+  }
+  return static_cast<std::uint32_t>((Wide{own} * numerator + denominator - 1) / denominator);
+}
+
+std::uint16_t PathShare::code(bool decel, std::int64_t index) const {
+  const bushd_ramp& ramp = decel ? table->decel : table->accel;
+  if (index >= ramp.count) return table->cruise;
+  return std::max(ramp.code[std::max<std::int64_t>(index, 0)], table->cruise);
+}
+
+std::int64_t PathShare::first_at_most(bool decel, std::uint32_t delay) const {
+  const bushd_ramp& ramp = decel ? table->decel : table->accel;
+  std::uint64_t own = 0;  // the greatest code that asks for no more
+  if (__builtin_mul_overflow(std::uint64_t{delay}, denominator, &own)) {
+    own = static_cast<std::uint64_t>(
+        std::min(Wide{UINT16_MAX}, Wide{delay} * denominator / numerator));
+  } else {
+    own = numerator == denominator ? delay : own / numerator;
+  }
+  if (own < table->cruise) return ramp.count;
+  const std::uint16_t* const end = ramp.code + ramp.count;
+  return std::partition_point(ramp.code, end, [own](std::uint16_t code) { return code > own; }) -
+         ramp.code;
+}
+
+std::int64_t PathShare::place(bool decel, std::uint32_t delay, std::int64_t reached) const {
+  const std::int64_t first = first_at_most(decel, delay);
+  const bushd_ramp& ramp = decel ? table->decel : table->accel;
+  const bool equal = first < ramp.count && at(decel, first) == delay;
+  if (!equal) return first;
+  if (reached < 0) return first + 1;
+  return std::clamp(reached, first, first_at_most(decel, delay - 1));
+}
+
+void RampMerger::Slowest::start(std::span<const PathRamp> ramps, bool decel, std::uint32_t flat) {
+  decel_ = decel;
+  flat_ = flat;
+  climbs_.clear();
+  for (const PathRamp& ramp : ramps) {
+    const std::uint32_t delay = ramp.share->at(decel, ramp.place);
+    if (delay > flat) climbs_.push_back({ramp, run_step(*ramp.share, 1), delay});
+  }
+  find_leader();
+}
+
+void RampMerger::Slowest::find_leader() {
+  leader_ = 0;
+  second_ = 0;
+  for (std::size_t i = 1; i < climbs_.size(); ++i) {
+    const bool leads = climbs_[i].delay > climbs_[leader_].delay;
+    second_ = std::max(second_, climbs_[leads ? leader_ : i].delay);
+    if (leads) leader_ = i;
+  }
+}
+
+void RampMerger::Slowest::go_to(std::uint64_t step) {
+  while (!climbs_.empty()) {
+    Climb& leader = climbs_[leader_];
+    if (leader.next > step) return;
+    const PathShare& share = *leader.ramp.share;
+    const std::uint64_t made =
+        share.steps == share.longest ? step : step * share.steps / share.longest;
+    leader.next = run_step(share, made + 1);
+    leader.delay = share.at(decel_, leader.ramp.place + static_cast<std::int64_t>(made));
+    if (leader.delay <= flat_) {
+      leader = climbs_.back();
+      climbs_.pop_back();
+      find_leader();
+    } else if (leader.delay < second_) {
+      find_leader();
+    }
+  }
+}
+
+// Whichever end is slower now is the slower side of the step there, as neither side rises towards
+// the other end.
+void RampMerger::merge(std::span<const PathRamp> up, std::span<const PathRamp> down,
+                       std::uint32_t flat, std::uint32_t steps, Profile& merged) {
+  merged.clear();
+  back_.clear();
+  up_.start(up, false, flat);
+  down_.start(down, true, flat);
+  std::uint64_t from_first = 0;
+  std::uint64_t from_last = 0;
+  std::uint64_t left = steps;
+  while (left > 0) {
+    const std::uint32_t in_front = up_.delay();
+    const std::uint32_t behind = down_.delay();
+    if (in_front == 0 && behind == 0) break;
+    const bool forward = in_front >= behind;
+    Slowest& side = forward ? up_ : down_;
+    std::uint64_t& done = forward ? from_first : from_last;
+    const std::uint64_t now = std::min(left, side.until() - done);
+    append(forward ? merged : back_, static_cast<std::uint32_t>(now), forward ? in_front : behind);
+    left -= now;
+    done += now;
+    side.go_to(done);
+  }
+  append(merged, static_cast<std::uint32_t>(left), flat);
+  for (auto part = back_.rbegin(); part != back_.rend(); ++part) {
+    append(merged, part->steps, part->delay);
+  }
+}
+
+void raise_first(Profile& profile, std::uint32_t steps, std::uint32_t least) {
+  Profile::size_type i = 0;
+  while (steps > 0 && i < profile.size()) {
+    if (profile[i].delay >= least) {
+      steps -= std::min(steps, profile[i].steps);
+    } else if (profile[i].steps <= steps) {
+      profile[i].delay = least;
+      steps -= profile[i].steps;
+    } else {
+      const Delays rest{profile[i].steps - steps, profile[i].delay};
+      profile[i] = {steps, least};
+      profile.insert(profile.begin() + static_cast<std::ptrdiff_t>(i) + 1, rest);
+      return;
+    }
+    ++i;
+  }
+}
+
+void raise_last(Profile& profile, std::uint32_t least) {
+  Delays& last = profile.back();
+  if (last.delay >= least) return;
+  if (last.steps == 1) {
+    last.delay = least;
+    return;
+  }
+  --last.steps;
+  profile.push_back({1, least});
+}
+
+Profile greater_of(const Profile& one, const Profile& other) {
+  Profile greater;
+  auto a = one.begin();
+  auto b = other.begin();
+  std::uint32_t a_done = 0;
+  std::uint32_t b_done = 0;
+  while (a != one.end() && b != other.end()) {
+    const std::uint32_t now = std::min(a->steps - a_done, b->steps - b_done);
+    append(greater, now, std::max(a->delay, b->delay));
+    a_done += now;
+    b_done += now;
+    if (a_done == a->steps) {
+      ++a;
+      a_done = 0;
+    }
+    if (b_done == b->steps) {
+      ++b;
+      b_done = 0;
+    }
+  }
+  return greater;
+}
+
+Profile part_of(const Profile& profile, std::uint32_t first, std::uint32_t steps) {
+  Profile part;
+  for (const Delays& delays : profile) {
+    const std::uint32_t skipped = std::min(first, delays.steps);
+    first -= skipped;
+    const std::uint32_t taken = std::min(steps, delays.steps - skipped);
+    append(part, taken, delays.delay);
+    steps -= taken;
+  }
+  return part;
+}
+
+std::uint64_t units_of(const Profile& profile) {
+  std::uint64_t units = 0;
+  for (const Delays& delays : profile) units += std::uint64_t{delays.steps} * delays.delay;
+  return units;
+}
+
+}  // namespace bushd::motion

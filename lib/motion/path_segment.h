@@ -1,0 +1,103 @@
+// One segment of a path, by the steps of its longest motor: what the motors' tables ask of the
+// delays between them. A motor with N of its L steps, r = N / L, that is at place i of a side of
+// its table where the ramp begins, asks for r A(i + floor(r k)) after k steps of the run, rounded
+// up. All delays here are in one time unit, that of the path, and have 32 bits.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/table.h"
+
+namespace bushd::motion {
+
+// So many steps of a run, one like the other.
+struct Delays {
+  std::uint32_t steps;
+  std::uint32_t delay;
+  friend bool operator==(const Delays&, const Delays&) = default;
+};
+using Profile = std::vector<Delays>;
+
+inline constexpr std::uint32_t kRest = UINT32_MAX;  // in place of a delay
+
+// A motor's part of a segment. Without steps it asks for nothing.
+struct PathShare {
+  const bushd_table* table = nullptr;
+  std::uint32_t steps = 0;    // N
+  std::uint32_t longest = 0;  // L
+  int direction = 0;          // +1, -1; 0: it stands
+  // A delay of its own is `numerator` / `denominator` of it to the run, rounded up.
+  std::uint64_t numerator = 0;
+  std::uint64_t denominator = 1;
+
+  bool moves() const { return steps != 0; }
+  double ratio() const { return static_cast<double>(steps) / longest; }
+  std::uint32_t scaled(std::uint16_t own) const;
+  std::uint16_t code(bool decel, std::int64_t index) const;
+  // What it asks for at an index of its table; one below 0 counts as 0.
+  std::uint32_t at(bool decel, std::int64_t index) const { return scaled(code(decel, index)); }
+  // First index of a side that asks for at most this delay.
+  std::int64_t first_at_most(bool decel, std::uint32_t delay) const;
+  // Its place on a side next to a step of this delay: the first that asks for at most as much, or
+  // the next one if it asks for just that. `reached`: where its own ramp would go on, if it is that
+  // which gives the delay, else -1; of equal codes those behind are not made again.
+  std::int64_t place(bool decel, std::uint32_t delay, std::int64_t reached) const;
+};
+
+// One motor's ramp: where it is on its side next to the border of the segment.
+struct PathRamp {
+  const PathShare* share;
+  std::int64_t place;
+};
+
+// The delays of `steps` steps: the greatest of `flat`, of ramps up from the first step on, and of
+// ramps down to the last one, counted from there. O(codes of the greater side).
+class RampMerger {
+ public:
+  void merge(std::span<const PathRamp> up, std::span<const PathRamp> down, std::uint32_t flat,
+             std::uint32_t steps, Profile& merged);
+
+ private:
+  // Motors' ramps in one direction, of which the slowest one counts.
+  class Slowest {
+   public:
+    void start(std::span<const PathRamp> ramps, bool decel, std::uint32_t flat);
+    std::uint32_t delay() const { return climbs_.empty() ? 0 : climbs_[leader_].delay; }
+    std::uint64_t until() const { return climbs_[leader_].next; }
+    void go_to(std::uint64_t step);
+
+   private:
+    struct Climb {
+      PathRamp ramp;
+      std::uint64_t next;  // step of the run from which on the delay is another one
+      std::uint32_t delay;
+    };
+    void find_leader();
+
+    bool decel_ = false;
+    std::uint32_t flat_ = 0;
+    // Delays of all but the leader may be those of an earlier step. As no side rises they are not
+    // too short.
+    std::vector<Climb> climbs_;
+    std::size_t leader_ = 0;
+    std::uint32_t second_ = 0;
+  };
+
+  Slowest up_;
+  Slowest down_;
+  Profile back_;
+};
+
+// Makes the first, or the last, of a profile's steps at least so long.
+void raise_first(Profile& profile, std::uint32_t steps, std::uint32_t least);
+void raise_last(Profile& profile, std::uint32_t least);
+// The greater one at each step. Of equal length.
+Profile greater_of(const Profile& one, const Profile& other);
+// Without its first steps, and no longer than `steps` then.
+Profile part_of(const Profile& profile, std::uint32_t first, std::uint32_t steps);
+std::uint64_t units_of(const Profile& profile);
+
+}  // namespace bushd::motion
