@@ -192,6 +192,7 @@ static int8_t first_direction(const bushd_mcu* mcu, uint8_t m, int8_t direction)
 // The last one was ended in a slow stage, and its motor makes a step by the slow table yet.
 static bool slow_table_in_use(const bushd_mcu* mcu) {
   const bushd_mcu_motor* motor = &mcu->motor[mcu->homing.motor];
+  if ((mcu->line.motors & motor_bit(mcu->homing.motor)) != 0) return false;
   return motor->mode == BUSHD_MCU_RAMP_DOWN && motor->made.run.table == &mcu->homing.slow;
 }
 

@@ -39,7 +39,8 @@ enum {
   BUSHD_CAN_COMMON_DIR = 1 << 9,
   BUSHD_CAN_STAGGERED = 1 << 10,
   BUSHD_CAN_PHASES = 1 << 11,
-  BUSHD_CAN_MOTOR_INPUTS = 1 << 12
+  BUSHD_CAN_MOTOR_INPUTS = 1 << 12,
+  BUSHD_CAN_LINE_RUN = 1 << 13
 };
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say

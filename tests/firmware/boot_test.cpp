@@ -56,9 +56,9 @@ TEST(Boot, IdentitySaysWhatThePortGave) {
   EXPECT_EQ(identity.boot_number, 77);
   EXPECT_EQ(identity.capabilities,
             BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
-                BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_TRIGGER | BUSHD_CAN_POSITION_COMPARE |
-                BUSHD_CAN_BURST | BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
-                BUSHD_CAN_MOTOR_INPUTS);
+                BUSHD_CAN_LINE_RUN | BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_TRIGGER |
+                BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST | BUSHD_CAN_COMMON_DIR |
+                BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES | BUSHD_CAN_MOTOR_INPUTS);
   EXPECT_TRUE(std::ranges::equal(identity.unique_id, Rig::unique_id()));
 }
 
