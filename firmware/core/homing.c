@@ -192,7 +192,8 @@ static int8_t first_direction(const bushd_mcu* mcu, uint8_t m, int8_t direction)
 bool bushd_mcu_homing_in_use(const bushd_mcu* mcu) {
   const bushd_mcu_motor* motor = &mcu->motor[mcu->homing.motor];
   return under_way(&mcu->homing) ||
-         (motor->mode == BUSHD_MCU_RAMP_DOWN && motor->made.run.table == &mcu->homing.slow);
+         ((mcu->line.motors & motor_bit(mcu->homing.motor)) == 0 &&
+          motor->mode == BUSHD_MCU_RAMP_DOWN && motor->made.run.table == &mcu->homing.slow);
 }
 
 static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {

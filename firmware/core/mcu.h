@@ -29,6 +29,7 @@ extern "C" {
 #include "firmware/core/emission.h"
 #include "firmware/core/homing.h"
 #include "firmware/core/limits.h"
+#include "firmware/core/line_run.h"
 #include "firmware/core/local.h"
 #include "firmware/core/motor.h"
 #include "firmware/core/port.h"
@@ -100,6 +101,7 @@ typedef struct bushd_mcu {
   bushd_set_inputs inputs;                            // settings
   bushd_mcu_switches switches[BUSHD_MOTORS_PER_MCU];  // settings
   bushd_mcu_stream stream;
+  bushd_mcu_line line;
   bushd_mcu_reception reception;
   bushd_mcu_limits limits;
   union {  // one of both at a time; the stage tells which

@@ -4,9 +4,11 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/emission.h"
+#include "firmware/core/line_run.h"
 #include "firmware/core/position_compare.h"
 #include "firmware/core/stop.h"
 #include "firmware/core/stream.h"
+#include "firmware/core/table_run.h"
 
 static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
@@ -49,17 +51,8 @@ static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   motor->displacement = (uint16_t)(displacement < 0 ? -displacement : displacement);
 }
 
-__attribute__((noinline)) static void make_run_tick(const bushd_mcu* mcu, const bushd_table* table,
-                                                    bushd_run_tick* tick) {
-  *tick = bushd_run_tick_of(mcu->tick_ns, table, mcu->config.slots);
-}
-
-// Divisions: in the first tick of a run at most, and where homing changes to its slow table.
 static inline const bushd_run_tick* run_tick_of(bushd_mcu* mcu, const bushd_mcu_motor* motor) {
-  const bushd_table* table = motor->made.run.table;
-  bushd_run_tick* tick = &mcu->run_tick[motor->table];
-  if (!bushd_run_tick_fits(tick, mcu->tick_ns, table)) make_run_tick(mcu, table, tick);
-  return tick;
+  return bushd_mcu_run_tick_of(mcu, (uint8_t)motor->table, motor->made.run.table);
 }
 
 // Sets the motors' bits in the masks of their steps, or none if the emission decides where they
@@ -115,7 +108,12 @@ static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t ti
   }
   if (motor->mode != BUSHD_MCU_TABLE_RUN) return false;
   if (ticks_after(tick, motor->made.until) < 0) return true;
-  if (!begins) leave_run(mcu, motor);
+  const uint8_t m = (uint8_t)(motor - mcu->motor);
+  if ((mcu->line.motors & motor_bit(m)) != 0) {
+    bushd_mcu_leave_line(mcu, m);
+  } else if (!begins) {
+    leave_run(mcu, motor);
+  }
   end_run(mcu, motor);
   return false;
 }
@@ -347,7 +345,9 @@ static uint16_t plan(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
 
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   const uint16_t exact = plan(mcu, slot_buffer);
-  if (exact != 0) emit_runs(mcu, slot_buffer, exact);
+  const uint16_t on_line = exact & mcu->line.motors;
+  if (exact != on_line) emit_runs(mcu, slot_buffer, exact & (uint16_t)~on_line);
+  if (on_line != 0) bushd_mcu_emit_line(mcu, slot_buffer, on_line);
   slot_buffer->direction = mcu->direction;
   slot_buffer->outputs = BUSHD_OUTPUTS_PULSES;
   slot_buffer->compare_rise = slot_buffer->compare_fall = 0;

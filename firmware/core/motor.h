@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "engine/line_follower.h"
 #include "engine/run.h"
 #include "firmware/core/slot_buffer.h"
 
@@ -32,6 +33,14 @@ typedef struct bushd_mcu_made {
   bushd_run run;   // stands at the first tick that is not prepared
 } bushd_mcu_made;
 
+// The motor's part of the line's run (bushd_mcu.line).
+typedef struct bushd_mcu_on_line {
+  uint32_t until;  // as of bushd_mcu_made
+  bushd_line_follower follower;
+  uint16_t share;  // N / L x 2^16, rounded down
+  int8_t direction;
+} bushd_mcu_on_line;
+
 // The last start taken, while it is still to come. A small MCU has no room for whole tick numbers;
 // such as are not far (near_tick) are told by their low bits.
 typedef struct bushd_mcu_start {
@@ -58,6 +67,7 @@ typedef struct bushd_mcu_motor {
   union {
     bushd_mcu_out_of_order out_of_order;
     bushd_mcu_made made;
+    bushd_mcu_on_line on_line;  // of those in bushd_mcu.line.motors, in place of `made.run`
   };
 } bushd_mcu_motor;
 

@@ -9,6 +9,7 @@
 #include "firmware/core/emission.h"
 #include "firmware/core/homing.h"
 #include "firmware/core/inputs.h"
+#include "firmware/core/line_run.h"
 #include "firmware/core/local.h"
 #include "firmware/core/position_compare.h"
 #include "firmware/core/state.h"
@@ -99,7 +100,7 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
                  BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
                  BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
-                 BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_TRAVEL;
+                 BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
   identity.capabilities = (uint16_t)(all & ~mcu->config.disabled_capabilities);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
@@ -242,6 +243,8 @@ static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_
       HANDLE(table_ticks, bushd_mcu_take_table_ticks);
     case BUSHD_MSG_TABLE_RUN:
       HANDLE(table_run, bushd_mcu_take_table_run);
+    case BUSHD_MSG_LINE_RUN:
+      HANDLE(line_run, bushd_mcu_take_line_run);
     default:
       HANDLE(emergency, bushd_mcu_emergency);
   }
@@ -265,6 +268,8 @@ static bool is_disabled(const bushd_mcu* mcu, uint8_t type) {
       return (mcu->config.disabled_capabilities & BUSHD_CAN_TRAVEL) != 0;
     case BUSHD_MSG_MOTOR_INPUTS:
       return (mcu->config.disabled_capabilities & BUSHD_CAN_MOTOR_INPUTS) != 0;
+    case BUSHD_MSG_LINE_RUN:
+      return (mcu->config.disabled_capabilities & BUSHD_CAN_LINE_RUN) != 0;
     default:
       return false;
   }
@@ -272,7 +277,7 @@ static bool is_disabled(const bushd_mcu* mcu, uint8_t type) {
 
 static bool is_answered(uint8_t type) {
   return type != BUSHD_MSG_SYNC && type != BUSHD_MSG_TICKS && type != BUSHD_MSG_TABLE_TICKS &&
-         type != BUSHD_MSG_TABLE_RUN && type != BUSHD_MSG_EMERGENCY;
+         type != BUSHD_MSG_TABLE_RUN && type != BUSHD_MSG_LINE_RUN && type != BUSHD_MSG_EMERGENCY;
 }
 
 static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns,
@@ -320,6 +325,7 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:
     case BUSHD_MSG_TABLE_RUN:
+    case BUSHD_MSG_LINE_RUN:
     case BUSHD_MSG_EMERGENCY:
       return hear(mcu, frame, time_in_tick_ns);
     default:

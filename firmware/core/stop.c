@@ -1,11 +1,12 @@
 // How motors stop, each by its own table. They do when
 // - their queue ends while they move
-// - no master is heard for too long while they are in a table run
+// - no master is heard for too long while they are in a table run, or no SYNC while on a line
 // - an emergency stop is commanded, or an input asks for one
 // - they come to a limit switch
 #include "firmware/core/stop.h"
 
 #include "firmware/core/access.h"
+#include "firmware/core/line_run.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/table_run.h"
 
@@ -37,25 +38,40 @@ static bool start_waits(const bushd_mcu* mcu, uint8_t m, uint32_t next, uint32_t
   return ticks_after(next, near_tick(start->tick, next)) <= 0;
 }
 
+// Of a motor in a run, which goes on without `next`, or of one whose run waits.
+static void end_in_silence(bushd_mcu* mcu, uint8_t m, bool runs, uint32_t next) {
+  uint32_t from = next;
+  uint32_t rest_from;
+  if (runs) {
+    mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
+  } else if (start_waits(mcu, m, next, &rest_from) && ticks_after(rest_from, next) > 0) {
+    from = rest_from;  // ticks before it are still made
+  }
+  bushd_mcu_cut_queue(mcu, m, from);
+  mcu->faults |= BUSHD_FAULT_LINK;
+}
+
+static void watch_line(bushd_mcu* mcu, uint32_t next) {
+  if (mcu->line.motors == 0 || ticks_after(next, bushd_mcu_line_deadline(mcu)) < 0) return;
+  uint16_t concerned = bushd_mcu_ramp_down_line(mcu);
+  for (uint8_t m = 0; concerned != 0; ++m, concerned = (uint16_t)(concerned >> 1)) {
+    if ((concerned & 1u) == 0) continue;
+    end_in_silence(mcu, m, mcu->motor[m].mode != BUSHD_MCU_RUN_WAITS, next);
+  }
+}
+
 void bushd_mcu_watch_comm_timeout(bushd_mcu* mcu) {
+  const uint32_t next = mcu->tick + 1u;
+  watch_line(mcu, next);
   if (mcu->reception.silent_ticks < mcu->reception.comm_timeout_ticks) return;
   if (mcu->trigger.armed != 0) mcu->faults |= BUSHD_FAULT_LINK;
-  const uint32_t next = mcu->tick + 1u;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];
     const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN;
     if (!runs && motor->mode != BUSHD_MCU_RUN_WAITS) continue;
-    if (bushd_run_done(&motor->made.run)) continue;
-    uint32_t from = next;
-    uint32_t rest_from;
-    if (runs) {
-      mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
-      bushd_mcu_ramp_down_run(mcu, m);
-    } else if (start_waits(mcu, m, next, &rest_from) && ticks_after(rest_from, next) > 0) {
-      from = rest_from;  // ticks before it are still made
-    }
-    bushd_mcu_cut_queue(mcu, m, from);
-    mcu->faults |= BUSHD_FAULT_LINK;
+    if ((mcu->line.motors & motor_bit(m)) != 0 || bushd_run_done(&motor->made.run)) continue;
+    if (runs) bushd_mcu_ramp_down_run(mcu, m);
+    end_in_silence(mcu, m, runs, next);
   }
 }
 
@@ -116,6 +132,18 @@ static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stre
   return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * (2u * TICKS_AHEAD) / most, 256);
 }
 
+// One leaves the line, and the others do not wait for it.
+static void stop_on_line(bushd_mcu* mcu, uint8_t m, bushd_stop_mode mode) {
+  const uint16_t delay = bushd_mcu_line_delay(mcu, m);
+  bushd_mcu_leave_line(mcu, m);
+  mcu->motor[m].mode = BUSHD_MCU_STREAM;
+  if (mode == BUSHD_STOP_IMMEDIATE) {
+    mcu->motor[m].remainder = 0;
+  } else if (delay != 0) {
+    bushd_mcu_ramp_down_stream(mcu, m, delay);
+  }
+}
+
 void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode mode, uint32_t next) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_mcu_finish_rows(mcu);
@@ -126,6 +154,11 @@ void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode mode, uint3
                        (start_waits(mcu, m, next, &rest_from) && ticks_after(next, rest_from) >= 0);
   const uint16_t delay = at_rest || runs ? 0 : stream_delay(mcu, m, &rest, next);
   bushd_mcu_cut_queue(mcu, m, next);
+  if (runs && (mcu->line.motors & motor_bit(m)) != 0) {
+    stop_on_line(mcu, m, mode);
+    return;
+  }
+  if (mode == BUSHD_STOP_IMMEDIATE) mcu->line.motors &= (uint16_t)~motor_bit(m);
   if (mode == BUSHD_STOP_IMMEDIATE) {
     if (motor->mode != BUSHD_MCU_STREAM || !at_rest) motor->remainder = 0;
     motor->mode = BUSHD_MCU_STREAM;
@@ -137,6 +170,7 @@ void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode mode, uint3
 }
 
 void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_stop_mode mode, uint32_t next) {
+  if (mode == BUSHD_STOP_RAMP) bushd_mcu_ramp_down_line(mcu);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) bushd_mcu_stop_motor(mcu, m, mode, next);
 }
 
@@ -149,7 +183,7 @@ int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const bool begins = motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)next;
   const bool runs =
       (begins || motor->mode == BUSHD_MCU_TABLE_RUN) && ticks_after(motor->made.until, next) > 0;
-  if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return motor->made.run.direction;
+  if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return bushd_mcu_run_direction(mcu, m);
   const int16_t queued = ticks_after(motor->known_until, next) > 0
                              ? *bushd_mcu_queue_at((bushd_mcu*)mcu, next, m)
                              : (int16_t)0;

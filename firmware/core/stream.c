@@ -21,6 +21,7 @@ void bushd_mcu_clear_streams(bushd_mcu* mcu) {
   mcu->stream.rows.next = mcu->stream.rows.ticks.count;
   mcu->stream.queue_summary.stale = true;
   mcu->stream.begun = mcu->stream.starting = 0;
+  mcu->line.motors = 0;
   memset(mcu->config.queue, 0,
          (size_t)mcu->config.queue_ticks * mcu->config.motors * sizeof mcu->config.queue[0]);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -63,7 +64,10 @@ static void cut_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   if ((mcu->stream.starting & motor_bit(m)) == 0) return;
   if (ticks_after(near_tick(motor->start.tick, tick), tick) < 0) return;
-  if (motor->mode == BUSHD_MCU_RUN_WAITS) motor->mode = BUSHD_MCU_STREAM;
+  if (motor->mode == BUSHD_MCU_RUN_WAITS) {
+    motor->mode = BUSHD_MCU_STREAM;
+    mcu->line.motors &= (uint16_t)~motor_bit(m);
+  }
   motor->start.tick = (uint16_t)tick;
   if (ticks_after(near_tick(motor->start.rest_from, tick), tick) >= 0) {
     mcu->stream.starting &= (uint16_t)~motor_bit(m);

@@ -166,6 +166,9 @@ void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick
   } else if (known && bushd_mcu_moving(mcu) == 0) {
     adopt(mcu, sync);
   }
+  // A late copy of another one does not take it back.
+  const bool later = ticks_after(sync->sync_tick, clock->told_tick) > 0;
+  if (sync->follows && (later || mcu->line.motors == 0)) clock->told_tick = sync->sync_tick;
   clock->heard = true;
   clock->master = sync->master;
   clock->sync_id = sync->sync_id;

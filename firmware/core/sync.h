@@ -24,6 +24,7 @@ typedef struct bushd_mcu_clock {
   int32_t slew_next_ns;  // of the next one, given
   int32_t rate_now_ns;   // the rate's share in the same
   int32_t rate_next_ns;
+  uint32_t told_tick;     // of the bus, that the last SYNC with a follow-up has told
   bool rate_known;        // estimated since the clock was adopted
   int32_t rate_ppb;       // faster than the crystal
   int32_t rate_step;      // ns a tick, x 4096

@@ -5,8 +5,8 @@
 #include "firmware/core/limits.h"
 #include "firmware/core/stream.h"
 
-static bool ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
-                         uint32_t* spare_ns) {
+bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
+                            uint32_t* spare_ns) {
   const uint32_t unit_ns = run->table->time_unit_ns;
   const uint64_t units = bushd_run_units_left(run);
   if (units > (uint64_t)(INT32_MAX / 2) * tick_ns / unit_ns) return false;
@@ -14,6 +14,19 @@ static bool ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks
   *ticks = (uint32_t)((ns + tick_ns - 1u) / tick_ns);
   *spare_ns = (uint32_t)((uint64_t)*ticks * tick_ns - ns);
   return true;
+}
+
+__attribute__((noinline)) static void make_run_tick(const bushd_mcu* mcu, const bushd_table* table,
+                                                    bushd_run_tick* tick) {
+  *tick = bushd_run_tick_of(mcu->tick_ns, table, mcu->config.slots);
+}
+
+// Divisions: in the first tick of a run at most, and where homing changes to its slow table.
+const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t slot,
+                                            const bushd_table* table) {
+  bushd_run_tick* tick = &mcu->run_tick[slot];
+  if (!bushd_run_tick_fits(tick, mcu->tick_ns, table)) make_run_tick(mcu, table, tick);
+  return tick;
 }
 
 void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks) {
@@ -29,7 +42,7 @@ bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint
   bushd_mcu_made* made = &mcu->motor[entry->motor].made;
   bushd_run_start(&made->run, &mcu->tables.slot[entry->slot].table, entry->steps, entry->direction,
                   entry->floor);
-  return ticks_of_run(&made->run, mcu->tick_ns, &made->until, spare_ns);
+  return bushd_mcu_ticks_of_run(&made->run, mcu->tick_ns, &made->until, spare_ns);
 }
 
 static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,

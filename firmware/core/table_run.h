@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "engine/message.h"
+#include "engine/run_slots.h"
 
 typedef struct bushd_mcu bushd_mcu;
 
@@ -14,6 +15,11 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
 // end: it holds how many ticks the run takes. `spare_ns`: by how much it may begin late and still
 // be over then; less than a tick. False if its end is farther than tick numbers reach.
 bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns);
+// How many ticks a run takes from its beginning.
+bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
+                            uint32_t* spare_ns);
+// The tick in the terms of the table in this slot, or of that which its motor has for now.
+const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t slot, const bushd_table* table);
 // The motor's run, just started, begins in this tick and takes as many.
 void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks);
 // A motor at rest begins a run of its table that nothing but its own end, a stop or the caller

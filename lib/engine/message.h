@@ -7,6 +7,7 @@
 
 #include "engine/frame.h"
 #include "engine/message_base.h"
+#include "engine/message_line.h"
 #include "engine/message_motion.h"
 #include "engine/message_setup.h"
 

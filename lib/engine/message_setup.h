@@ -40,6 +40,7 @@ enum {
   BUSHD_CAN_STAGGERED = 1 << 10,
   BUSHD_CAN_PHASES = 1 << 11,
   BUSHD_CAN_MOTOR_INPUTS = 1 << 12,
+  BUSHD_CAN_LINE_RUN = 1 << 13,
   BUSHD_CAN_TRAVEL = 1 << 14  // where it has a trigger input also at its edges
 };
 

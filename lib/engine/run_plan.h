@@ -1,4 +1,4 @@
-// What those ask of a run who plan motors that follow it (engine/line.h). An MCU does not.
+// What those ask of a run who have motors that follow it (engine/line.h).
 #ifndef BUSHD_ENGINE_RUN_PLAN_H
 #define BUSHD_ENGINE_RUN_PLAN_H
 

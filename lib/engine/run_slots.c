@@ -241,7 +241,7 @@ __attribute__((noinline)) static int16_t make_by_rests(bushd_run* run, const bus
 }
 
 // A tick's rest that does not make whole units. Returns those that it makes with what has passed.
-static uint8_t carry_rest(bushd_run* run, const bushd_run_tick* tick, uint32_t* since_ns) {
+static uint8_t carry_rest(const bushd_run* run, const bushd_run_tick* tick, uint32_t* since_ns) {
   *since_ns = run->since_ns + tick->rest_ns;
   if (*since_ns >= tick->rest_ns && *since_ns < tick->unit_ns) return 0;
   *since_ns -= tick->unit_ns;
@@ -280,6 +280,85 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit
     steps = make_by_places(run, tick, since, delay, bit, masks);
   }
   return run->direction < 0 ? (int16_t)-steps : steps;
+}
+
+void bushd_run_walk_begin(bushd_run_walk* walk, const bushd_run* run, const bushd_run_tick* tick) {
+  walk->tick = tick;
+  walk->begin_units = -(int32_t)run->since;
+  walk->begin_ns = run->since_ns;
+  walk->since = run->since + tick->units;
+  walk->since_ns = run->since_ns;
+  if (tick->rest_ns != 0) walk->since += carry_rest(run, tick, &walk->since_ns);
+  walk->delay = 0;
+  walk->begin = walk->end = 0;
+  if (!tick->has_places) return;
+  const uint64_t unit = tick->per_unit >> (24 - BUSHD_WALK_SHIFT);
+  walk->unit_high = (uint32_t)(unit >> 16);
+  walk->unit_low = (uint16_t)unit + (uint32_t)(unit << (24 - BUSHD_WALK_SHIFT) != tick->per_unit);
+  const bool later = bushd_run_begins_later(run);
+  const uint16_t units = (uint16_t)(later ? 0u - run->since : run->since);
+  bushd_run_move_place(&walk->end, &tick->per_unit, units);
+  if (!later) walk->end = 0 - walk->end;
+  if (run->since_ns == 0) return;
+  uint64_t low = 0;
+  uint64_t high = 0;
+  bushd_run_move_place(&low, &tick->per_ns, (uint16_t)run->since_ns);
+  bushd_run_move_place(&high, &tick->per_ns, (uint16_t)(run->since_ns >> 16));
+  walk->end -= low + (high << 16);
+}
+
+// What is rounded is rounded up: no place lies before the tick.
+static uint32_t walk_place(uint64_t place) {
+  const uint64_t rest = (UINT64_C(1) << (32 - BUSHD_WALK_SHIFT)) - 1u;
+  return (uint32_t)(place >> (32 - BUSHD_WALK_SHIFT)) + ((place & rest) != 0);
+}
+
+static uint32_t place_of(uint64_t ns, const bushd_run_tick* tick, uint32_t parts) {
+  const uint64_t length = (uint64_t)tick->tick_ns * parts;
+  const uint64_t slots = ns * tick->slot_count;
+  const uint64_t rest = (slots % length << BUSHD_WALK_SHIFT) + length - 1u;
+  return (uint32_t)(slots / length << BUSHD_WALK_SHIFT) + (uint32_t)(rest / length);
+}
+
+// Of the step that runs: with places, or by divisions.
+static void walk_parts(bushd_run_walk* walk) {
+  const bushd_run_tick* tick = walk->tick;
+  if (tick->has_places) {
+    walk->part = walk->delay * walk->unit_high + (walk->delay * walk->unit_low >> 16) + 1u;
+    walk->first = walk_place(walk->begin) + walk->part;
+    return;
+  }
+  const int64_t ns = (int64_t)walk->begin_units * tick->unit_ns - walk->begin_ns;
+  const uint32_t begin =
+      ns < 0 ? 0u - place_of((uint64_t)-ns, tick, 1) + 1u : place_of((uint64_t)ns, tick, 1);
+  walk->part = place_of((uint64_t)walk->delay * tick->unit_ns, tick, 256);
+  walk->first = begin + walk->part;
+}
+
+bool bushd_run_walk_next(bushd_run_walk* walk, bushd_run* run) {
+  if (walk->delay != 0) {
+    // The tick's end lies in the step before.
+    if (walk->parts < 256u) return false;
+    walk->begin_units += walk->delay;
+    walk->since -= walk->delay;
+  }
+  walk->begin = walk->end;
+  walk->delay = bushd_run_delay(run);
+  run->since_ns = walk->since_ns;
+  if (walk->delay != 0 && walk->since >= walk->delay) {
+    walk->parts = 256;
+    if (walk->tick->has_places) {
+      bushd_run_move_place(&walk->end, &walk->tick->per_unit, walk->delay);
+    }
+    make_step(run);
+    run->since = walk->since - walk->delay;
+  } else {
+    run->since = walk->since;
+    bushd_run_note_fraction(run);
+    walk->parts = run->fraction;
+  }
+  if (walk->delay != 0) walk_parts(walk);
+  return walk->delay != 0;
 }
 
 void bushd_run_note_fraction(bushd_run* run) {

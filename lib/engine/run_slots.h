@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "engine/run.h"
+#include "engine/slots.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -71,6 +72,44 @@ void bushd_run_make_evenly(bushd_run_part* part);
 // 256 numerator / divisor with the bits of `low` behind the numerator's, rounded down.
 // Precondition: numerator < divisor.
 uint8_t bushd_run_share(uint16_t numerator, uint8_t low, uint16_t divisor);
+
+// A tick of a run step by step, for what follows it (engine/line_follower.h). Places are slots from
+// the tick's start: x 2^32, as in bushd_run_part, or x 2^BUSHD_WALK_SHIFT in 32 bits; modulo 2^40
+// at least, and modulo 2^32.
+#if BUSHD_MAX_SLOTS <= 128
+#define BUSHD_WALK_SHIFT 24
+#else
+#define BUSHD_WALK_SHIFT 23
+#endif
+typedef struct bushd_run_walk {
+  const bushd_run_tick* tick;
+  uint64_t begin;      // of the step that runs
+  uint64_t end;        // and where it ends, if that is in this tick
+  uint32_t first;      // when the first of its 256 parts is over
+  uint32_t part;       // and for each one more
+  uint32_t unit_high;  // places of the parts in a unit, whole and
+  uint32_t unit_low;   // x 2^16, rounded up
+  uint32_t since;      // units from where it begins to the tick's end
+  uint32_t since_ns;
+  int32_t begin_units;  // from the tick's start to where it begins; begin_ns before that
+  uint32_t begin_ns;
+  uint16_t delay;  // of it
+  uint16_t parts;  // of it, 1/256, that are over at the tick's end; 256: it ends in this tick
+} bushd_run_walk;
+// At the beginning of the next tick, before any step. As bushd_run_slots; the run is not done.
+void bushd_run_walk_begin(bushd_run_walk* walk, const bushd_run* run, const bushd_run_tick* tick);
+// The step that runs, and the next ones that begin within the tick: true as long as there is one.
+// Then the run stands where that step ends, or at the tick's end.
+bool bushd_run_walk_next(bushd_run_walk* walk, bushd_run* run);
+// The slot of what falls at the end of part `part` (0 .. walk->parts - 1) of this step: that in
+// which this time lies, to within a thousandth of a slot; the last one at the tick's end. As
+// bushd_run_slots has it for the run's own steps.
+static inline uint16_t bushd_run_walk_slot(const bushd_run_walk* walk, uint8_t part) {
+  const uint16_t last = (uint16_t)(walk->tick->slot_count - 1u);
+  const uint32_t place = walk->first + walk->part * part;
+  const uint16_t slot = (uint16_t)(place >> BUSHD_WALK_SHIFT);
+  return slot < last ? slot : last;
+}
 
 // Makes the run's fraction what bushd_run_expand_fine would have left, so that ticks of that kind
 // may follow. Precondition: it stands at the end of a tick made by bushd_run_slots. No division.

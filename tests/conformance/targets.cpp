@@ -21,7 +21,9 @@ class Atmega2560 final : public McuUnderTest {
             .code_count = 952,
             .disabled_capabilities = disabled_capabilities()};
   }
-  std::uint16_t disabled_capabilities() const override { return BUSHD_CAN_TABLE_TICKS; }
+  std::uint16_t disabled_capabilities() const override {
+    return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN;
+  }
   std::uint32_t full_tick_ns(bushd_format format) const override {
     return format == BUSHD_FORMAT_FINE ? 4'000'000 : 2'560'000;
   }

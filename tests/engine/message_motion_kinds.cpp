@@ -146,6 +146,37 @@ Bytes any_table_run() {
   return payload;
 }
 
+bushd_status line_run_again(const Bytes& payload, Bytes* again) {
+  bushd_line_run m{};
+  const bushd_status status = bushd_decode_line_run(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  std::vector<bushd_line_entry> entries;
+  const uint8_t* at = m.line.entries;
+  for (uint8_t i = 0; i < m.line.count; ++i) entries.push_back(bushd_next_line_entry(&at));
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(bushd_encode_line_run(&m, entries.data(), m.line.count, again->data()));
+  return status;
+}
+
+Bytes any_line_run() {
+  const auto mask = between<uint16_t>(1, 0xFFFF);
+  const auto longest = between<uint32_t>(1, INT32_MAX);
+  const auto from = between<uint32_t>(0, longest - 1);
+  Bytes payload = random_bytes(BUSHD_LINE_RUN_HEADER);
+  payload[5] = between<uint8_t>(0, 7);
+  bushd_put_u32(&payload[8], longest);
+  bushd_put_u32(&payload[12], from);
+  bushd_put_u32(&payload[16], between<uint32_t>(1, longest - from));
+  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((mask >> m & 1) == 0) continue;
+    Bytes entry(BUSHD_LINE_RUN_ENTRY);
+    entry[0] = static_cast<uint8_t>(m | between<uint8_t>(0, 1) << 7);
+    bushd_put_u32(&entry[1], between<uint32_t>(1, longest));
+    payload.insert(payload.end(), entry.begin(), entry.end());
+  }
+  return payload;
+}
+
 bushd_status trigger_again(const Bytes& payload, Bytes* again) {
   bushd_trigger m{};
   const bushd_status status = bushd_decode_trigger(payload.data(), payload.size(), &m);
@@ -267,6 +298,30 @@ Kinds motion_kinds() {
          {"a motor twice",
           [](Bytes* p) {
             const Bytes entry{15, 5, 0, 0, 0};
+            p->insert(p->end(), entry.begin(), entry.end());
+            p->insert(p->end(), entry.begin(), entry.end());
+          }}},
+        true}},
+      {"line_run",
+       {any_line_run,
+        line_run_again,
+        {{"no such slot", set8(5, 8)},
+         {"no way", set32(8, 0)},
+         {"too long a way", set32(8, 0x80000000)},
+         {"a beginning at the end",
+          [](Bytes* p) { bushd_put_u32(&(*p)[12], bushd_get_u32(&(*p)[8])); }},
+         {"no step of the run", set32(16, 0)},
+         {"beyond the end",
+          [](Bytes* p) {
+            bushd_put_u32(&(*p)[16], bushd_get_u32(&(*p)[8]) - bushd_get_u32(&(*p)[12]) + 1);
+          }},
+         {"no step", entry_alone(BUSHD_LINE_RUN_HEADER, {0, 0, 0, 0, 0})},
+         {"longer than the longest", entry_alone(BUSHD_LINE_RUN_HEADER, {0, 0, 0, 0, 0x80})},
+         {"unknown bits", [](Bytes* p) { (*p)[BUSHD_LINE_RUN_HEADER] |= 0x10; }},
+         {"no entry", [](Bytes* p) { p->resize(BUSHD_LINE_RUN_HEADER); }},
+         {"a motor twice",
+          [](Bytes* p) {
+            const Bytes entry{15, 1, 0, 0, 0};
             p->insert(p->end(), entry.begin(), entry.end());
             p->insert(p->end(), entry.begin(), entry.end());
           }}},

@@ -160,6 +160,11 @@ TEST(MessageTableRun, OfAllMotorsFitsAFrame) {
             BUSHD_FRAME_MAX_PAYLOAD);
 }
 
+TEST(MessageLineRun, OfAllMotorsFitsAFrame) {
+  EXPECT_LE(BUSHD_LINE_RUN_HEADER + BUSHD_LINE_RUN_ENTRY * BUSHD_MOTORS_PER_MCU,
+            BUSHD_FRAME_MAX_PAYLOAD);
+}
+
 TEST(MessagePoll, RefusesToAskNobody) {
   bushd_poll message;
   const uint8_t nobody = 0;

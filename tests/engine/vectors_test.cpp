@@ -11,6 +11,7 @@
 
 #include "engine/frame.h"
 #include "engine/line.h"
+#include "engine/line_follower.h"
 #include "engine/message.h"
 #include "engine/message_text.h"
 #include "engine/run.h"
@@ -194,6 +195,35 @@ TEST(Vectors, Lines) {
       EXPECT_EQ(bushd_line_position(&line, fractions[i]), positions[i]) << first + i;
       EXPECT_EQ(bushd_line_follow(&line, 1), made[i + 1] - made[i]) << first + i + 1;
     }
+  }
+}
+
+TEST(Vectors, LineFollowers) {
+  for (const Row& row : read_csv("lines.csv")) {
+    SCOPED_TRACE(row.at("increment") + " of " + row.at("longest"));
+    const auto first = number<uint32_t>(row, "first");
+    const auto longest = number<uint32_t>(row, "longest");
+    if (number<uint32_t>(row, "increment") == 0) continue;
+    const auto made = numbers<uint32_t>(row.at("made"));
+    const auto fractions = numbers<uint8_t>(row.at("fractions"));
+    const auto positions = numbers<uint64_t>(row.at("positions"));
+    bushd_line_follower follower;
+    bushd_line_follower_start(&follower, number<uint32_t>(row, "increment"), longest, first);
+    uint64_t so_far = made[0];
+    const auto go_to = [&](uint32_t step, uint16_t parts) {
+      if (!bushd_line_follower_due(&follower, step, parts)) return;
+      bushd_line_follower_step(&follower);
+      ++so_far;
+    };
+    for (size_t i = 0; i < positions.size(); ++i) {
+      const auto step = static_cast<uint32_t>(first + i + 1);
+      EXPECT_EQ(so_far, made[i]) << step;
+      go_to(step, fractions[i]);
+      const auto fraction = bushd_line_follower_fraction(&follower, longest, step, fractions[i]);
+      EXPECT_EQ(so_far * 256 + fraction, positions[i]) << step;
+      go_to(step, 256);
+    }
+    EXPECT_EQ(so_far, made.back());
   }
 }
 

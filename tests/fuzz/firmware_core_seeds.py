@@ -13,8 +13,7 @@ CORPORA = pathlib.Path(__file__).parent / "corpus"
 TICK_NS = 2_560_000
 (IDENTIFY, CONFIGURE, TABLE_BEGIN, TABLE_DATA, TABLE_END, ASSIGN, CONTROL, SET_POSITION, POLL, SYNC, TICKS,
  TABLE_TICKS, TABLE_RUN, EMERGENCY, SET_ADDRESS, TABLES, INPUTS, EMISSION, HOME, LOCAL, TRIGGER,
- POSITION_COMPARE, MOTOR_INPUTS) = range(1, 0x18)
-TRAVEL = 0x19
+ POSITION_COMPARE, MOTOR_INPUTS, LINE_RUN, TRAVEL) = range(1, 0x1A)
 FINE, REPLACE, START = 1, 2, 4
 EMERGENCY_PIN, FORWARD, REVERSE = 1, 2, 4
 
@@ -122,6 +121,12 @@ def entries(*motors):
     return b"".join(struct.pack("<BI", m | 0x80, 30 + m) for m in motors)
 
 
+def line_run(*increments, first=16, longest=90, begun=0):
+    """Of the motors from 0 on; negative: back. `first` counts from boot."""
+    return frame(LINE_RUN, struct.pack("<BIBHIII", 0, first, 0, 0, longest, begun, longest - begun) + b"".join(
+        struct.pack("<BI", m | (0x80 if n > 0 else 0), abs(n)) for m, n in enumerate(increments)))
+
+
 def trigger(number, edge, delay_us, runs):
     return frame(TRIGGER, struct.pack("<BBI", number, edge, delay_us) + runs)
 
@@ -188,6 +193,11 @@ SEEDS = {
                        + passes(15) + pins(2) + passes(15) + trigger_edge() + passes(9) + travel(0, 0) + passes(9),
     "step-with-sensor": ready(0) + travel(1, 1, 0, 3, 1, 0, 30000) + passes(6) + pins(8) + passes(9) + travel(1, 1, 0, 3, 1, 0, 30000)
                         + travel(2, 1, 0, 3, 1, 0, 30000) + passes(15),
+    "line-run": ready(0) + line_run(90, -31, 1) + passes(60) + frame(EMERGENCY, b"\0", True) + passes(30)
+                + frame(CONTROL, b"\4") + line_run(90, first=110) + passes(60),
+    "line-run-replaced": ready(1) + line_run(90, -89) + passes(15) + REPLACEMENT + passes(40),
+    "line-run-into-limit": ready(1, inputs(positive=3)) + line_run(70, 90, 90, first=20, begun=9) + passes(25) + pins(2)
+                           + passes(60),
     "position-compare": ready(0) + frame(POSITION_COMPARE, struct.pack("<BBiII", 0, 3, 3, 700, 4000)) + MOVE[0] + passes(20),
     "burst": ready(0, emission(1)) + MOVE[0] + passes(12),
     "common-dir": ready(0, emission(2)) + MOVE[0] + passes(12),

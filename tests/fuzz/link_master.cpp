@@ -250,6 +250,7 @@ class Bus {
       case BUSHD_MSG_TICKS:
       case BUSHD_MSG_TABLE_TICKS:
       case BUSHD_MSG_TABLE_RUN:
+      case BUSHD_MSG_LINE_RUN:
       case BUSHD_MSG_EMERGENCY:
         return;
       case BUSHD_MSG_POLL:
@@ -314,6 +315,8 @@ class Bus {
         return decodes(bushd_table_ticks{}, bushd_decode_table_ticks);
       case BUSHD_MSG_TABLE_RUN:
         return decodes(bushd_table_run{}, bushd_decode_table_run);
+      case BUSHD_MSG_LINE_RUN:
+        return decodes(bushd_line_run{}, bushd_decode_line_run);
       case BUSHD_MSG_HOME:
         return decodes(bushd_home{}, bushd_decode_home);
       case BUSHD_MSG_LOCAL:

@@ -7,6 +7,7 @@
 
 #include "engine/frame.h"
 #include "engine/line.h"
+#include "engine/line_follower.h"
 #include "engine/message.h"
 #include "engine/run.h"
 #include "engine/run_state.h"
@@ -165,6 +166,31 @@ static bool check_line(const line_vector* vector) {
   return false;
 }
 
+// The same by one that is asked where its next step is due.
+static bool check_line_follower(const line_vector* vector) {
+  if (vector->increment == 0) return true;
+  bushd_line_follower follower;
+  bushd_line_follower_start(&follower, vector->increment, vector->longest, vector->first);
+  uint64_t made = vector->made[0];
+  for (uint32_t s = vector->first; s != vector->last; ++s) {
+    const uint32_t at = s - vector->first;
+    const uint8_t parts = vector->fractions[at];
+    if (made != vector->made[at]) return false;
+    if (bushd_line_follower_due(&follower, s + 1u, parts)) {
+      bushd_line_follower_step(&follower);
+      ++made;
+    }
+    const uint8_t fraction =
+        bushd_line_follower_fraction(&follower, vector->longest, s + 1u, parts);
+    if (made * 256u + fraction != vector->positions[at]) return false;
+    if (bushd_line_follower_due(&follower, s + 1u, 256)) {
+      bushd_line_follower_step(&follower);
+      ++made;
+    }
+  }
+  return made == vector->made[vector->last - vector->first];
+}
+
 static bool check_identify_slot(const identify_slot_vector* vector) {
   return bushd_identify_slot(vector->unique_id, vector->salt, vector->slots) == vector->slot;
 }
@@ -222,6 +248,7 @@ unsigned bushd_check_vectors(unsigned* checked, void (*report)(const char* kind,
   CHECK_ALL("run state", kRunStates, check_run_state)
   CHECK_ALL("table", kTableCrcs, check_crc)
   CHECK_ALL("line", kLines, check_line)
+  CHECK_ALL("line_follower", kLines, check_line_follower)
   CHECK_ALL("identify slot", kIdentifySlots, check_identify_slot)
   CHECK_ALL("slots", kSlots, check_slots)
   CHECK_ALL("frame", kFrames, check_frame)

@@ -117,6 +117,11 @@ FRAMES = [
                                         [2, 1, 1, 3, 0, 0, 0, 0, 0, 0, 0]]}),
     (1, 13, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[0, 2, 1, 200, 0]]}),
     (1, 14, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[1, 0, -1, 1, 513], [15, 7, 1, 2147483647, 0]]}),
+    (1, 26, "line_run", {"epoch": 5, "first_tick": 2000, "slot": 3, "floor": 0, "longest": 700, "from": 0, "steps": 700,
+                         "entries": [[0, 1, 700], [2, -1, 211]]}),
+    # The rest of one after a pause, with a floor.
+    (1, 27, "line_run", {"epoch": 255, "first_tick": 4294967295, "slot": 7, "floor": 513, "longest": 2147483647,
+                         "from": 2147483640, "steps": 7, "entries": [[15, -1, 1]]}),
     (1, 21, "trigger", {"number": 1, "edge": 2, "delay_us": 50, "entries": [[0, 2, 1, 200, 0]]}),
     (1, 22, "trigger", {"number": 255, "edge": 1, "delay_us": 1650000,
                         "entries": [[1, 0, -1, 1, 513], [15, 7, 1, 2147483647, 0]]}),

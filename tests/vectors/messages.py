@@ -17,6 +17,8 @@ LAYOUTS = {
                      ("displacements", [1])]),
     "table_ticks": (0x0C, [("epoch", 1), ("flags", 1), ("first_tick", 4), ("count", 2), ("entries", "run_state")]),
     "table_run": (0x0D, [("epoch", 1), ("first_tick", 4), ("entries", "table_run")]),
+    "line_run": (0x18, [("epoch", 1), ("first_tick", 4), ("slot", 1), ("floor", 2), ("longest", 4), ("from", 4),
+                        ("steps", 4), ("entries", "line")]),
     "trigger": (0x15, [("number", 1), ("edge", 1), ("delay_us", 4), ("entries", "table_run")]),
     "position_compare": (0x16, [("motor", 1), ("arrivals", 1), ("position_steps", -4), ("delay_us", 4), ("width_us", 4)]),
     "emergency": (0x0E, [("mode", 1)]),
@@ -75,7 +77,11 @@ def table_run_bytes(_, motor, slot, direction, steps, floor):
     return head + (steps | 1 << 31).to_bytes(4, "little") + floor.to_bytes(2, "little")
 
 
-ENTRIES = {"run_state": run_state_bytes, "table_run": table_run_bytes}
+def line_bytes(_, motor, direction, increment):
+    return bytes([motor | (0x80 if direction > 0 else 0)]) + increment.to_bytes(4, "little")
+
+
+ENTRIES = {"run_state": run_state_bytes, "table_run": table_run_bytes, "line": line_bytes}
 
 
 def payload_of(layout, fields):

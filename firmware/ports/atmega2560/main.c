@@ -131,8 +131,9 @@ __attribute__((noinline)) static void boot(void) {
   bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = EMISSION_MIN_TICK_NS,
-                             // A frame of them stands for more ticks than it could make in one.
-                             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS,
+                             // A frame of them stands for more ticks than it could make in one;
+                             // a line of more than a few motors would take it longer than a tick.
+                             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN,
                              .pulse_ns = EMISSION_PULSE_NS,
                              .in_pieces = true,
                              .queue = queue,

@@ -1,0 +1,215 @@
+// LINE_RUN. One run for all motors of the line, made step by step; in each of its steps every motor
+// is asked whether it makes one of its own there (engine/line_follower.h). All MCUs of the line
+// have the same run, begun at the same tick, and changed at the same ticks by the same rules: so
+// the motors of all of them are on the line without a word between them.
+//
+// The silence after which the run is ramped down is counted from a time that all MCUs know alike:
+// that which the last SYNC frame has told, in ticks of the bus.
+#include "firmware/core/line_run.h"
+
+#include "engine/run_plan.h"
+#include "firmware/core/access.h"
+#include "firmware/core/limits.h"
+#include "firmware/core/stream.h"
+#include "firmware/core/table_run.h"
+
+static inline bool is_on_line(const bushd_mcu* mcu, uint8_t m) {
+  return (mcu->line.motors & motor_bit(m)) != 0;
+}
+
+static bushd_status check_table(const bushd_mcu* mcu, uint8_t slot) {
+  if ((mcu->tables.valid & (uint8_t)(1u << slot)) == 0) return BUSHD_E_NO_TABLE;
+  const bushd_table* table = &mcu->tables.slot[slot].table;
+  const uint32_t most = bushd_table_max_steps_per_tick(table, mcu->tick_ns);
+  return most > mcu->emission.grid.max_steps ? BUSHD_E_CAPACITY : BUSHD_OK;
+}
+
+// `barred`: a limit forbids the direction of each.
+static bushd_status check_entries(const bushd_mcu* mcu, const bushd_line_run* message,
+                                  bool* barred) {
+  const uint8_t* at = message->line.entries;
+  *barred = true;
+  for (uint8_t i = 0; i < message->line.count; ++i) {
+    const bushd_line_entry entry = bushd_next_line_entry(&at);
+    const bushd_mcu_motor* motor = &mcu->motor[entry.motor];
+    if (ticks_after(message->first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
+    if (motor->mode != BUSHD_MCU_STREAM) return BUSHD_E_STATE;
+    if ((bushd_mcu_forbidden(mcu, entry.direction) & motor_bit(entry.motor)) == 0) *barred = false;
+  }
+  return BUSHD_OK;
+}
+
+static uint16_t motors_of(const bushd_line_part* part) {
+  uint16_t mask = 0;
+  const uint8_t* at = part->entries;
+  for (uint8_t i = 0; i < part->count; ++i) mask |= motor_bit(bushd_next_line_entry(&at).motor);
+  return mask;
+}
+
+static void begin(bushd_mcu* mcu, const bushd_line_run* message, uint32_t ticks) {
+  const bushd_line_part* part = &message->line;
+  mcu->line.slot = part->slot;
+  mcu->line.longest = part->longest;
+  mcu->line.step = part->from + 1u;
+  mcu->line.last = part->from + part->steps;
+  const uint8_t* at = part->entries;
+  for (uint8_t i = 0; i < part->count; ++i) {
+    const bushd_line_entry entry = bushd_next_line_entry(&at);
+    bushd_mcu_on_line* on_line = &mcu->motor[entry.motor].on_line;
+    const uint64_t share = ((uint64_t)entry.increment << 16) / part->longest;
+    on_line->direction = entry.direction;
+    on_line->share = share < UINT16_MAX ? (uint16_t)share : UINT16_MAX;
+    bushd_line_follower_start(&on_line->follower, entry.increment, part->longest, part->from);
+    mcu->line.motors |= motor_bit(entry.motor);
+    bushd_mcu_begin_run(mcu, entry.motor, message->first_tick, ticks);
+  }
+}
+
+bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message) {
+  const bushd_line_part* part = &message->line;
+  const bushd_mcu_tick_range range = {message->epoch, BUSHD_TICKS_START, message->first_tick, 1,
+                                      motors_of(part)};
+  bushd_status status = bushd_mcu_check_tick_range(mcu, &range);
+  if (status != BUSHD_OK) return status;
+  bool barred;
+  status = check_entries(mcu, message, &barred);
+  if (status == BUSHD_OK) status = check_table(mcu, part->slot);
+  if (status != BUSHD_OK) return status;
+  if (barred) return BUSHD_E_FORBIDDEN;
+  if (mcu->line.motors != 0) return BUSHD_E_STATE;
+  uint32_t ticks;
+  uint32_t spare_ns;
+  bushd_run_start(&mcu->line.run, &mcu->tables.slot[part->slot].table, part->steps, 1, part->floor);
+  if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, &ticks, &spare_ns)) {
+    return BUSHD_E_CAPACITY;
+  }
+  begin(mcu, message, ticks);
+  return BUSHD_OK;
+}
+
+// What the motors make of the part of a step of the run that lies in this tick.
+static void follow(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors,
+                   const bushd_run_walk* walk, bool keep_slots) {
+  const uint32_t step = mcu->line.step;
+  const uint16_t parts = walk->parts;
+  bushd_mcu_motor* motor = mcu->motor;
+  int16_t* steps = slot_buffer->steps;
+  uint16_t active = 0;
+  uint16_t bit = 1;
+  for (; motors != 0; motors = (uint16_t)(motors >> 1), ++motor, ++steps) {
+    bushd_line_follower* follower = &motor->on_line.follower;
+    if ((motors & 1u) != 0 && bushd_line_follower_due(follower, step, parts)) {
+      if (keep_slots) slot_buffer->step[bushd_run_walk_slot(walk, follower->due_part)] |= bit;
+      *steps = (int16_t)(*steps + motor->on_line.direction);
+      active |= bit;
+      bushd_line_follower_step(follower);
+    }
+    bit = (uint16_t)(bit << 1);
+  }
+  slot_buffer->active |= active;
+}
+
+static uint16_t forward(const bushd_mcu* mcu, uint16_t motors) {
+  uint16_t positive = 0;
+  for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
+    if ((motors & 1u) != 0 && mcu->motor[m].on_line.direction > 0) positive |= motor_bit(m);
+  }
+  return positive;
+}
+
+// Of a ramp-down: otherwise the end is known beforehand.
+static void end_ramp_down(bushd_mcu* mcu, uint16_t motors) {
+  for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
+    if ((motors & 1u) == 0 || mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) continue;
+    mcu->motor[m].mode = BUSHD_MCU_STREAM;
+    mcu->line.motors &= (uint16_t)~motor_bit(m);
+    mcu->stream.queue_summary.stale = true;
+  }
+}
+
+void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors) {
+  bushd_run* run = &mcu->line.run;
+  const bool keep_slots = bushd_mcu_steps_keep_slots(mcu);
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if ((motors & motor_bit(m)) == 0) continue;
+    slot_buffer->steps[m] = 0;
+    mcu->motor[m].remainder = 0;  // until ticks follow (bushd_mcu_leave_line)
+  }
+  bushd_run_walk walk;
+  bushd_run_walk_begin(&walk, run, bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table));
+  while (bushd_run_walk_next(&walk, run)) {
+    follow(mcu, slot_buffer, motors, &walk, keep_slots);
+    if (walk.parts == 256u) ++mcu->line.step;
+  }
+  mcu->direction = (mcu->direction & (uint16_t)~motors) | forward(mcu, motors);
+  mcu->stream.begun |= motors;
+  if (bushd_run_done(run)) end_ramp_down(mcu, motors);
+}
+
+uint16_t bushd_mcu_ramp_down_line(bushd_mcu* mcu) {
+  uint16_t concerned = 0;
+  if (mcu->line.motors == 0 || bushd_run_done(&mcu->line.run)) return 0;
+  bool under_way = false;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    bushd_mcu_motor* motor = &mcu->motor[m];
+    if (!is_on_line(mcu, m) || motor->mode == BUSHD_MCU_RAMP_DOWN) continue;
+    concerned |= motor_bit(m);
+    if (motor->mode != BUSHD_MCU_TABLE_RUN) continue;  // its start is cut with its queue
+    motor->mode = BUSHD_MCU_RAMP_DOWN;
+    under_way = true;
+  }
+  if (!under_way) return concerned;
+  mcu->stream.queue_summary.stale = true;
+  bushd_run_ramp_down_once(&mcu->line.run);
+  mcu->line.last = mcu->line.step - 1u + bushd_run_steps_left(&mcu->line.run);
+  return concerned;
+}
+
+static bool has_steps_left(const bushd_mcu* mcu, uint8_t m) {
+  return !bushd_run_done(&mcu->line.run) &&
+         mcu->motor[m].on_line.follower.due_step <= mcu->line.last;
+}
+
+uint16_t bushd_mcu_line_delay(const bushd_mcu* mcu, uint8_t m) {
+  if (!has_steps_left(mcu, m)) return 0;
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  const uint32_t own_unit_ns = bushd_mcu_table_of(mcu, motor)->time_unit_ns;
+  const uint64_t ns = (uint64_t)bushd_run_delay(&mcu->line.run) * mcu->line.run.table->time_unit_ns;
+  // In units first: the product with L may need more than 64 bits.
+  const uint64_t units = (ns + own_unit_ns - 1u) / own_unit_ns;
+  if (units > UINT16_MAX) return UINT16_MAX;
+  const uint32_t increment = motor->on_line.follower.increment;
+  const uint64_t own = (units * mcu->line.longest + increment - 1u) / increment;
+  return own < UINT16_MAX ? (uint16_t)own : UINT16_MAX;
+}
+
+// Its displacement tells its speed to a stop (stream_delay): rounded down, so that this goes by a
+// longer delay rather than a shorter one.
+static void note_speed(bushd_mcu* mcu, bushd_mcu_motor* motor) {
+  const bushd_run* run = &mcu->line.run;
+  const uint32_t units = bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table)->units;
+  const uint32_t of_run = units * 256u / bushd_run_delay(run);  // 15 bits
+  motor->displacement = (uint16_t)(of_run * motor->on_line.share >> 16);
+  motor->still_ticks = 0;
+}
+
+void bushd_mcu_leave_line(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  mcu->line.motors &= (uint16_t)~motor_bit(m);
+  motor->remainder = 0;
+  // It comes to rest on a whole step.
+  if (mcu->format != BUSHD_FORMAT_FINE || !has_steps_left(mcu, m)) return;
+  const uint8_t fraction = bushd_line_follower_fraction(&motor->on_line.follower, mcu->line.longest,
+                                                        mcu->line.step, mcu->line.run.fraction);
+  motor->remainder = motor->on_line.direction < 0 ? (int16_t)-fraction : (int16_t)fraction;
+  note_speed(mcu, motor);
+}
+
+uint32_t bushd_mcu_line_deadline(const bushd_mcu* mcu) {
+  return mcu->clock.told_tick + mcu->reception.comm_timeout_ticks;
+}
+
+int8_t bushd_mcu_run_direction(const bushd_mcu* mcu, uint8_t m) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  return is_on_line(mcu, m) ? motor->on_line.direction : motor->made.run.direction;
+}

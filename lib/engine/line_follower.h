@@ -1,0 +1,62 @@
+// A motor that follows the run of a line (engine/line.h) where the run's own steps are made exact
+// to a slot (engine/run_slots.h): between which of them, and where, the motor makes its own.
+//
+// In 1/256 of the run's steps, its step j falls at
+//
+//     C(j) = ceil( 128 (2j - 1) L / N ) + 128 ,
+//
+// which is where the position of engine/line.h reaches j. From one to the next that is an addition
+// and a comparison: no division per step.
+#ifndef BUSHD_ENGINE_LINE_FOLLOWER_H
+#define BUSHD_ENGINE_LINE_FOLLOWER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Plain state. Parts are 1/256 of a step of the run.
+typedef struct bushd_line_follower {
+  uint32_t increment;    // |N|
+  uint32_t due_step;     // of the run, counted from the line's beginning from 1: in it the next one
+  uint32_t late;         // falls, later than it would in exact fractions by late / N parts; < N
+  uint32_t apart_steps;  // from one to the next, in steps and
+  uint32_t apart_late;   // rounded up by apart_late / N parts
+  uint8_t due_part;      // and at the end of this part of due_step, counted from 0
+  uint8_t apart_parts;   // parts
+} bushd_line_follower;
+
+// The motor's place on its line when `from` steps of the run are over. Precondition: 1 <= increment
+// <= longest < 2^31, from <= longest. Three divisions.
+void bushd_line_follower_start(bushd_line_follower* follower, uint32_t increment, uint32_t longest,
+                               uint32_t from);
+
+// The step that is due has been made: the next one is. O(1), no division.
+static inline void bushd_line_follower_step(bushd_line_follower* follower) {
+  const uint16_t part = (uint16_t)(follower->due_part + follower->apart_parts);
+  follower->due_step += follower->apart_steps + (part >> 8);
+  follower->due_part = (uint8_t)part;
+  follower->late += follower->apart_late;
+  if (follower->late < follower->increment) return;
+  follower->late -= follower->increment;
+  if (follower->due_part-- == 0) --follower->due_step;
+}
+
+// Whether the step that is due lies in the first `parts` (0 .. 256) of this step of the run.
+static inline bool bushd_line_follower_due(const bushd_line_follower* follower, uint32_t step,
+                                           uint16_t parts) {
+  return follower->due_step == step && follower->due_part < parts;
+}
+
+// The motor's position beyond its last step, 1/256 step rounded down, when `parts` (0 .. 255) of
+// the step `step` are over: that of bushd_line_position. Precondition: what was due is made; L is
+// that of the start. No division.
+uint8_t bushd_line_follower_fraction(const bushd_line_follower* follower, uint32_t longest,
+                                     uint32_t step, uint8_t parts);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,109 @@
+// Motors of two MCUs on one line: an image beside its virtual twin, told the same run. So the twins
+// are also what a line of two MCUs is: their motors make the same steps in the same slots.
+#include <vector>
+
+#include "conformance/script.h"
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kLongest = 400;
+const std::vector<bushd_line_entry> kEntries = {
+    {1, 1, 400}, {6, -1, 399}, {9, 1, 137}, {15, -1, 3}};
+
+class LineScript : public Script, public testing::WithParamInterface<Target> {
+ protected:
+  LineScript() : Script(GetParam()) {}
+  void SetUp() override {
+    for (const bushd_line_entry& entry : kEntries) motors_.push_back(entry.motor);
+  }
+
+  // The last SYNC tells the time of one that was a few ticks ago.
+  void tell_time() {
+    for (int i = 0; i < 2; ++i) {
+      master_.discipline(kVirtual);
+      pass_ticks(3);
+    }
+  }
+
+  bool is_denied() const { return (real_->disabled_capabilities() & BUSHD_CAN_LINE_RUN) != 0; }
+
+  void begin_line(std::uint32_t from = 0, std::uint16_t floor = 0) {
+    tell_time();
+    bushd_line_run message{};
+    message.first_tick = master_.poll(kReal).tick + 40;
+    message.line = {0, floor, kLongest, from, kLongest - from, 0, nullptr};
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_line_run(
+        &message, kEntries.data(), static_cast<std::uint8_t>(kEntries.size()), payload.data()));
+    tell(BUSHD_MSG_LINE_RUN, payload);
+  }
+
+  // The same number of steps at the same times, and alike for all motors to half a slot.
+  void expect_alike() {
+    for (const std::uint8_t motor : motors_) {
+      expect_the_same_steps(motor, steps(0, motor).size());
+      expect_the_same_times(motor);
+    }
+    expect_the_same_reports();
+  }
+
+  std::vector<std::uint8_t> motors_;
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(LineScript);
+INSTANTIATE_TEST_SUITE_P(Of, LineScript, testing::ValuesIn(targets()),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(LineScript, EveryStepIsInTheSlotOfTheTwins) {
+  for (const bushd_format format : {BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE}) {
+    ASSERT_NO_FATAL_FAILURE(make_ready(format, motors_));
+    const std::size_t before = steps(0, 1).size();
+    begin_line();
+    pass_ticks(60);
+    if (is_denied()) {
+      EXPECT_EQ(master_.poll(kReal).last_rejection, BUSHD_E_UNKNOWN_MESSAGE);
+      EXPECT_EQ(steps(1, 1).size(), 0u);
+      continue;
+    }
+    EXPECT_EQ(master_.poll(kReal).running, 1u << 1 | 1u << 6 | 1u << 9 | 1u << 15);
+    pass_ticks(300);
+    EXPECT_EQ(steps(0, 1).size(), before + kLongest);
+    expect_alike();
+    // The rest of one, slowly.
+    begin_line(150, kCruise + 37);
+    pass_ticks(400);
+    EXPECT_EQ(steps(0, 1).size(), before + 2 * kLongest - 150);
+    expect_alike();
+  }
+}
+
+TEST_P(LineScript, ItsEndIsTheSame) {
+  if (is_denied()) GTEST_SKIP() << "denied; the test above shows it";
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
+  begin_line();
+  pass_ticks(120);
+  // Within one tick for both.
+  bus_.advance_to(bus_.node(0).next_event_ns());
+  master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_EMERGENCY, Bytes{BUSHD_STOP_RAMP});
+  pass_ticks(100);
+  EXPECT_LT(steps(0, 1).size(), kLongest);
+  EXPECT_EQ(master_.poll(kReal).moving, 0);
+  expect_alike();
+}
+
+// All MCUs go by the same time: that which the last SYNC has told.
+TEST_P(LineScript, SilenceEndsItInTheSameTick) {
+  if (is_denied()) GTEST_SKIP() << "denied; the first test shows it";
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
+  const bushd_configure short_timeout = {tick_ns_, BUSHD_FORMAT_FINE, 150};
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_CONFIGURE, bushd_encode_configure, short_timeout));
+  begin_line();
+  pass_ticks(400);
+  EXPECT_LT(steps(0, 1).size(), kLongest);
+  EXPECT_GT(steps(0, 1).size(), 0u);
+  EXPECT_EQ(master_.poll(kReal).faults, BUSHD_FAULT_LINK);
+  expect_alike();
+}
+
+}  // namespace
+}  // namespace bushd::sim

@@ -1,0 +1,386 @@
+// LINE_RUN: motors that follow one run along a line, exact to a slot.
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "engine/line.h"
+#include "firmware/streams.h"
+
+namespace bushd::test {
+namespace {
+
+struct Motor {
+  std::uint8_t number;
+  std::int32_t steps;  // of the whole line
+};
+
+std::uint32_t length(std::int32_t steps) {
+  return static_cast<std::uint32_t>(std::abs(steps));
+}
+
+// When, in 1/256 ns from the run's beginning: by rational numbers, rounded up to 1/256 of a step of
+// the run.
+std::vector<Wide> times_of(const Reference& run, std::uint32_t increment, std::uint32_t longest,
+                           std::uint32_t from = 0) {
+  std::vector<Wide> times;
+  for (Wide j = 1; j <= increment; ++j) {
+    const Wide parts = (128 * (2 * j - 1) * longest + increment - 1) / increment + 128;
+    const Wide step = (parts + 255) / 256 - 1 - from;
+    if (step < 0) continue;
+    if (step >= static_cast<Wide>(run.steps())) break;
+    const Step& running = run.step(static_cast<std::size_t>(step));
+    const Wide begin = running.end - running.delay;
+    times.push_back(begin + running.delay * (parts - 256 * (step + from)) / 256);
+  }
+  return times;
+}
+
+// Of an MCU with four motors; the run is of `law`, in slot 0, as are their tables.
+class LineRun : public Streams {
+ protected:
+  LineRun() : Streams({.queue_ticks = 256}) {}
+
+  struct Frame {
+    std::uint32_t first;
+    std::vector<Motor> motors;
+    std::uint32_t longest;
+    std::uint32_t from = 0;
+    std::uint32_t steps = 0;  // 0: all
+    std::uint16_t floor = 0;
+    std::uint8_t slot = 0;
+    std::uint8_t epoch = 0;
+  };
+  static Bytes frame(const Frame& of) {
+    std::vector<bushd_line_entry> entries;
+    for (const Motor& motor : of.motors) {
+      entries.push_back(
+          {motor.number, static_cast<std::int8_t>(motor.steps < 0 ? -1 : 1), length(motor.steps)});
+    }
+    bushd_line_run message{};
+    message.epoch = of.epoch;
+    message.first_tick = of.first;
+    message.line = {.slot = of.slot,
+                    .floor = of.floor,
+                    .longest = of.longest,
+                    .from = of.from,
+                    .steps = of.steps == 0 ? of.longest - of.from : of.steps,
+                    .count = 0,
+                    .entries = nullptr};
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_line_run(
+        &message, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
+    return payload;
+  }
+  static bushd_status start(Rig& on, const Frame& of) {
+    return on.take(BUSHD_MSG_LINE_RUN, frame(of));
+  }
+
+  // From tick `first` on, each slot of each tick until the run is over.
+  static void expect_slots(Rig& of, const Reference& run, const Frame& frame) {
+    const std::uint16_t slots = of.options().slots;
+    std::vector<std::vector<Wide>> times;
+    for (const Motor& motor : frame.motors) {
+      times.push_back(times_of(run, length(motor.steps), frame.longest, frame.from));
+    }
+    std::vector<std::size_t> made(frame.motors.size());
+    while (of.tick() != frame.first) of.pass();
+    for (std::uint64_t tick = 0; of.poll().moving != 0; ++tick, of.pass()) {
+      std::vector<std::uint16_t> expected(slots);
+      const Wide begin = Wide{tick * Rig::kTickNs} * 256;
+      const Wide length = Wide{Rig::kTickNs} * 256;
+      for (std::size_t i = 0; i < times.size(); ++i) {
+        for (; made[i] < times[i].size() && times[i][made[i]] <= begin + length; ++made[i]) {
+          const auto slot = static_cast<std::size_t>((times[i][made[i]] - begin) * slots / length);
+          expected[std::min<std::size_t>(slot, slots - 1u)] |=
+              static_cast<std::uint16_t>(1u << frame.motors[i].number);
+        }
+      }
+      ASSERT_TRUE(std::ranges::equal(std::span(of.slot_buffer().step).first(slots), expected))
+          << tick;
+    }
+    for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(made[i], times[i].size());
+    EXPECT_EQ(of.poll().faults, 0);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Formats, LineRun, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
+                         format_name);
+
+const std::vector<Motor> kMotors = {{0, 333}, {1, -118}, {2, 1}, {3, 332}};
+
+TEST_P(LineRun, EveryStepFallsIntoItsSlot) {
+  std::array<std::int64_t, 4> at{};
+  for (const std::uint16_t floor : {std::uint16_t{0}, static_cast<std::uint16_t>(law.cruise + 3)}) {
+    const Frame line{
+        .first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .floor = floor};
+    ASSERT_EQ(start(rig, line), BUSHD_OK);
+    expect_slots(rig, Reference::move(law, 333, floor), line);
+    for (const Motor& motor : kMotors) at[motor.number] += motor.steps;
+  }
+  for (std::size_t m = 0; m < 4; ++m) EXPECT_EQ(rig.poll().motor[m].position_steps, at[m]);
+  EXPECT_EQ(rig.steps_with_dir(), 0);
+  EXPECT_EQ(rig.mcu().line.motors, 0);
+}
+
+TEST_P(LineRun, MayBeAPartOfALineWhoseLongestMotorIsElsewhere) {
+  const Frame line{.first = rig.first_open() + 3,
+                   .motors = {{1, -640}, {3, 71}},
+                   .longest = 1000,
+                   .from = 444,
+                   .steps = 301};
+  ASSERT_EQ(start(rig, line), BUSHD_OK);
+  expect_slots(rig, Reference::move(law, 301), line);
+}
+
+TEST_P(LineRun, IsExactInTicksThatAreNoWholeUnits) {
+  Law odd = law;
+  odd.unit_ns = 3701;
+  for (std::uint16_t* code : {&odd.cruise}) *code = static_cast<std::uint16_t>(*code * 11);
+  for (std::uint16_t& code : odd.accel) code = static_cast<std::uint16_t>(code * 11);
+  for (std::uint16_t& code : odd.decel) code = static_cast<std::uint16_t>(code * 11);
+  Rig other({.queue_ticks = 256});
+  other.make_ready(odd, format);
+  const Frame line{.first = other.first_open() + 3, .motors = kMotors, .longest = 333};
+  ASSERT_EQ(start(other, line), BUSHD_OK);
+  expect_slots(other, Reference::move(odd, 333), line);
+}
+
+TEST_P(LineRun, ReportTellsItsEndAndThatItRuns) {
+  const Frame line{.first = rig.first_open() + 10, .motors = {{0, 5}, {2, -100}}, .longest = 100};
+  const auto ticks =
+      static_cast<std::uint32_t>(steps_by_tick(Reference::move(law, 100), Rig::kTickNs).size());
+  ASSERT_EQ(start(rig, line), BUSHD_OK);
+  for (; rig.tick() + 2 <= line.first + ticks; rig.pass()) {
+    const bushd_report report = rig.poll();
+    ASSERT_EQ(report.moving, 5) << "also the one that has made its last step";
+    ASSERT_EQ(report.running, 5);
+    const std::uint32_t known = line.first + ticks;
+    ASSERT_EQ(report.motor[0].known_until, static_cast<std::uint16_t>(known));
+    ASSERT_EQ(report.motor[2].known_until, static_cast<std::uint16_t>(known));
+  }
+  rig.pass_until_rest();
+  EXPECT_EQ(rig.poll().moving, 0);
+  EXPECT_EQ(rig.pulses(2), -100);
+}
+
+TEST_P(LineRun, RulesOfAStartHold) {
+  const std::uint32_t first = rig.first_open();
+  const Frame good{.first = first, .motors = {{0, 5}, {1, 7}}, .longest = 7};
+  const auto with = [&good](auto change) {
+    Frame changed = good;
+    change(changed);
+    return changed;
+  };
+  EXPECT_EQ(start(rig, with([](Frame& f) { --f.first; })), BUSHD_E_LATE);
+  EXPECT_EQ(start(rig, with([](Frame& f) { f.first += 1000; })), BUSHD_E_CAPACITY);
+  EXPECT_EQ(start(rig, with([](Frame& f) { f.epoch = 1; })), BUSHD_E_EPOCH);
+  EXPECT_EQ(start(rig, with([](Frame& f) { f.slot = 3; })), BUSHD_E_NO_TABLE) << "no such table";
+  EXPECT_EQ(start(rig, with([](Frame& f) { f.motors.push_back({4, 1}); })), BUSHD_E_FORMAT);
+  EXPECT_EQ(start(rig, with([](Frame& f) {
+                    f.longest = INT32_MAX;
+                    f.floor = UINT16_MAX;
+                  })),
+            BUSHD_E_CAPACITY)
+      << "for ever";
+  ASSERT_EQ(start(rig, good), BUSHD_OK);
+  EXPECT_EQ(start(rig, good), BUSHD_E_LATE) << "the same frame";
+  EXPECT_EQ(start(rig, {.first = first, .motors = {{2, 5}}, .longest = 7}), BUSHD_E_STATE)
+      << "room for one line";
+  rig.pass_until_rest();
+  EXPECT_EQ(start(rig, {.first = rig.first_open(), .motors = {{2, 5}}, .longest = 7}), BUSHD_OK);
+  rig.pass_until_rest();
+  EXPECT_EQ(rig.pulses(0), 5);
+  EXPECT_EQ(rig.pulses(1), 7);
+  EXPECT_EQ(rig.pulses(2), 5);
+}
+
+TEST_P(LineRun, IsUnknownWhereItIsDenied) {
+  Rig denied({.disabled_capabilities = BUSHD_CAN_LINE_RUN});
+  denied.make_ready(law, format);
+  EXPECT_EQ(denied.identify().capabilities & BUSHD_CAN_LINE_RUN, 0);
+  EXPECT_EQ(start(denied, {.first = denied.first_open(), .motors = {{0, 5}}, .longest = 5}),
+            BUSHD_E_UNKNOWN_MESSAGE);
+}
+
+// The rest of the same line as displacements, from every tick on: in the end all have made their
+// ways, and in the fine format nothing shows where they took over.
+TEST_P(LineRun, IsReplacedByTicksAtEveryTick) {
+  constexpr std::uint32_t kLongest = 120;
+  const std::vector<Motor> motors = {{0, -120}, {1, 43}, {2, -3}};
+  const Plan run = plan_move(law, kLongest, Rig::kTickNs, BUSHD_FORMAT_FINE);
+  const auto position_at = [&](const Motor& motor, std::size_t tick) {
+    bushd_line line;
+    bushd_line_start(&line, length(motor.steps), kLongest);
+    const std::int64_t at = tick == 0 ? 0 : run.made[tick - 1];
+    bushd_line_go_to(&line, static_cast<std::uint32_t>(at));
+    const auto part = static_cast<std::uint8_t>(tick == 0 ? 0 : run.fraction[tick - 1]);
+    const auto end = std::int64_t{length(motor.steps)} * 256;
+    const auto position =
+        std::min(static_cast<std::int64_t>(bushd_line_position(&line, part)), end);
+    return format == BUSHD_FORMAT_FINE ? position : position / 256 * 256;
+  };
+  for (std::size_t k = 0; k + 1 < run.ticks(); k += format == BUSHD_FORMAT_FINE ? 1 : 5) {
+    Rig fresh({.queue_ticks = 256});
+    fresh.make_ready(law, format);
+    const std::uint32_t first = fresh.first_open();
+    ASSERT_EQ(start(fresh, {.first = first, .motors = motors, .longest = kLongest}), BUSHD_OK);
+    fresh.pass(static_cast<int>(k) / 2);
+    for (std::size_t from = k; from < run.ticks(); from += 20) {
+      const std::size_t count = std::min<std::size_t>(20, run.ticks() - from);
+      Ticks rest{.flags = from == k ? kReplace : std::uint8_t{0},
+                 .first = first + static_cast<std::uint32_t>(from),
+                 .count = static_cast<std::uint8_t>(count),
+                 .mask = 7,
+                 .displacements = {},
+                 .delays = {},
+                 .epoch = 1};
+      for (std::size_t tick = from; tick < from + count; ++tick) {
+        for (const Motor& motor : motors) {
+          const std::int64_t moved = position_at(motor, tick + 1) - position_at(motor, tick);
+          const bool back = motor.steps < 0;
+          rest.displacements.push_back(static_cast<std::int16_t>(
+              format == BUSHD_FORMAT_FINE ? (back ? -moved : moved)
+                                          : (moved / 256) | (back ? 0 : BUSHD_COARSE_DIRECTION)));
+        }
+      }
+      const bool over = from + count == run.ticks();
+      for (std::size_t i = 0; i < motors.size(); ++i) {
+        rest.delays.push_back(static_cast<std::uint16_t>(over ? 0 : 1000));
+      }
+      ASSERT_EQ(fresh.take(rest), BUSHD_OK) << k << " " << from;
+      while (static_cast<std::int32_t>(rest.first - fresh.tick()) > 50) fresh.pass();
+    }
+    fresh.pass_until_rest();
+    for (const Motor& motor : motors) {
+      ASSERT_EQ(fresh.pulses(motor.number), motor.steps) << k;
+      ASSERT_EQ(fresh.mcu().motor[motor.number].remainder, 0) << k;
+    }
+    ASSERT_EQ(fresh.poll().faults, 0);
+    ASSERT_EQ(fresh.mcu().line.motors, 0);
+  }
+}
+
+// Where motors of the line are when `steps` of its run are over.
+void expect_on_line(const Rig& of, const std::vector<Motor>& motors, std::uint32_t longest,
+                    std::uint32_t steps) {
+  for (const Motor& motor : motors) {
+    bushd_line line;
+    bushd_line_start(&line, length(motor.steps), longest);
+    bushd_line_go_to(&line, steps);
+    EXPECT_EQ(of.pulses(motor.number), motor.steps < 0 ? -std::int64_t{line.made} : line.made)
+        << "motor " << +motor.number;
+  }
+}
+
+bushd_sync sync_telling(const Rig& rig, std::uint32_t id, std::uint32_t tick) {
+  bushd_sync message{};
+  message.master = rig.mcu().clock.master;
+  message.sync_id = id;
+  message.follows = true;
+  message.follow_up_id = id - 1000;  // one that nobody knows: the clock stays as it is
+  message.sync_tick = tick;
+  return message;
+}
+
+TEST_P(LineRun, IsRampedDownAlongTheLineWhenNoSyncTellsTheTime) {
+  constexpr std::uint16_t kSilence = 60;
+  ASSERT_EQ(rig.configure(format, Rig::kTickNs, kSilence), BUSHD_OK);
+  const std::uint32_t first = rig.first_open();
+  ASSERT_EQ(start(rig, {.first = first, .motors = kMotors, .longest = 333}), BUSHD_OK);
+  rig.pass(20);
+  const std::uint32_t told = rig.tick() - 7;
+  rig.sync(sync_telling(rig, 7000, told));
+  rig.sync(sync_telling(rig, 7001, told - 30));  // a late copy
+  // Other frames do not count.
+  for (int i = 0; i < 15; ++i) {
+    rig.pass(10);
+    rig.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, {});
+  }
+  rig.pass_until_rest();
+  auto run = Reference::move(law, 333);
+  run.ramp_down_at(std::uint64_t{told + kSilence - first} * Rig::kTickNs);
+  ASSERT_LT(run.steps(), 333u);
+  expect_on_line(rig, kMotors, 333, static_cast<std::uint32_t>(run.steps()));
+  const bushd_report report = rig.poll();
+  EXPECT_EQ(report.faults, BUSHD_FAULT_LINK);
+  EXPECT_EQ(report.ramp_downs, 4);
+  EXPECT_EQ(rig.mcu().line.motors, 0);
+}
+
+TEST_P(LineRun, ThatWaitsIsCancelledByThatSilence) {
+  ASSERT_EQ(rig.configure(format, Rig::kTickNs, 30), BUSHD_OK);
+  rig.sync(sync_telling(rig, 7000, rig.tick()));
+  ASSERT_EQ(start(rig, {.first = rig.first_open() + 100, .motors = kMotors, .longest = 333}),
+            BUSHD_OK);
+  rig.pass(28);
+  EXPECT_EQ(rig.poll().faults, 0);
+  rig.pass(150);
+  EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_LINK);
+  EXPECT_EQ(rig.poll().ramp_downs, 0);
+  EXPECT_EQ(rig.poll().moving, 0);
+  EXPECT_EQ(rig.mcu().line.motors, 0);
+  for (const Motor& motor : kMotors) EXPECT_EQ(rig.pulses(motor.number), 0);
+}
+
+TEST_P(LineRun, EmergencyRampLeadsAlongTheLine) {
+  for (const int wait : {0, 3, 12, 40, 90}) {
+    Rig fresh({.queue_ticks = 256});
+    fresh.make_ready(law, format);
+    const std::uint32_t first = fresh.first_open();
+    ASSERT_EQ(start(fresh, {.first = first, .motors = kMotors, .longest = 333}), BUSHD_OK);
+    fresh.pass(wait);
+    const std::uint32_t from = fresh.first_open();
+    fresh.emergency(BUSHD_STOP_RAMP);
+    fresh.pass_until_rest();
+    auto run = Reference::move(law, 333);
+    run.ramp_down_at(std::uint64_t{from - first} * Rig::kTickNs);
+    SCOPED_TRACE(wait);
+    // One that has not begun does not begin.
+    expect_on_line(fresh, kMotors, 333, wait == 0 ? 0 : static_cast<std::uint32_t>(run.steps()));
+    EXPECT_EQ(fresh.poll().faults, BUSHD_FAULT_EMERGENCY);
+    EXPECT_EQ(fresh.mcu().line.motors, 0);
+  }
+}
+
+TEST_P(LineRun, ImmediateStopEndsItBetweenTwoSteps) {
+  ASSERT_EQ(start(rig, {.first = rig.first_open(), .motors = kMotors, .longest = 333}), BUSHD_OK);
+  rig.pass(40);
+  rig.emergency(BUSHD_STOP_IMMEDIATE);
+  rig.pass(3);
+  const std::int64_t stands = rig.pulses(0);
+  EXPECT_EQ(rig.poll().moving, 0);
+  rig.pass(20);
+  EXPECT_EQ(rig.pulses(0), stands);
+  EXPECT_EQ(rig.mcu().line.motors, 0);
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  ASSERT_EQ(start(rig, {.first = rig.first_open(), .motors = {{3, 9}}, .longest = 9}), BUSHD_OK);
+  rig.pass_until_rest();
+}
+
+// By its own table, from the speed that it has; the others go on.
+TEST_P(LineRun, MotorThatMeetsALimitLeavesIt) {
+  ASSERT_EQ(rig.set_inputs({.limit_positive = 1 << 3}), BUSHD_OK);
+  ASSERT_EQ(start(rig, {.first = rig.first_open(), .motors = kMotors, .longest = 333}), BUSHD_OK);
+  rig.pass(60);
+  rig.pins({.motors = 1 << 3, .system = 0});
+  const std::int64_t before = rig.pulses(3);
+  rig.pass_until_rest();
+  EXPECT_GT(rig.pulses(3), before);
+  EXPECT_LT(rig.pulses(3), before + 60) << "ramps down";
+  EXPECT_EQ(rig.pulses(0), 333);
+  EXPECT_EQ(rig.pulses(1), -118);
+  EXPECT_EQ(rig.pulses(2), 1);
+  EXPECT_EQ(rig.poll().faults, 0);
+  EXPECT_EQ(rig.mcu().line.motors, 0);
+  // One that must not begin stays where it is.
+  ASSERT_EQ(start(rig, {.first = rig.first_open(), .motors = {{2, 9}, {3, 7}}, .longest = 9}),
+            BUSHD_OK);
+  const std::int64_t stands = rig.pulses(3);
+  rig.pass_until_rest();
+  EXPECT_EQ(rig.pulses(3), stands);
+  EXPECT_EQ(rig.pulses(2), 10);
+  EXPECT_EQ(start(rig, {.first = rig.first_open(), .motors = {{3, 7}}, .longest = 9}),
+            BUSHD_E_FORBIDDEN);
+}
+
+}  // namespace
+}  // namespace bushd::test
