@@ -61,10 +61,26 @@ def event(random_):
     return " ".join(str(word) for word in [what, *arguments.get(what, [])])
 
 
+def travel(random_):
+    """A shutter that goes there and back as it should, broken off somewhere now and then."""
+    steps, left, synchronous = random_.randrange(1, 6), random_.random() < 0.5, random_.random() < 0.3
+    control = random_.randrange(64) & ~8 | 64 | (8 if left else 0) | (128 if synchronous else 0)
+    lines = ["naf 7 0 24 0", "stands", f"limits {int(left)} {int(not left)}", f"naf 7 2 16 {control}", "naf 7 1 16 0"]
+    for byte in [steps, 0, 100, 0] + [value for code in range(steps, 0, -1) for value in (code, 0)]:
+        lines.append(f"naf 7 0 16 {byte}")
+    lines.append("naf 7 0 26 0")
+    for to_left in (left, not left):
+        lines += ["run_step_done", "limits 0 0", *["run_step_done"] * (steps - 1), f"limits {int(not to_left)} {int(to_left)}", "run_ends",
+                  "naf 7 3 0 0"]
+    return lines if random_.random() < 0.6 else lines[:random_.randrange(len(lines))]
+
+
 def inputs(seed, cycles):
     random_ = random.Random(seed)
     made = 0
     while made < cycles:
+        if random_.random() < 0.01:
+            yield from travel(random_)
         if random_.random() < 0.4:
             yield event(random_)
             continue
