@@ -125,6 +125,7 @@ bool Axis::change(Tick at) {
   const std::int64_t planned_end = planned_end_;
   const std::uint32_t planned_run_steps = planned_run_steps_;
   unchanged_end_ = end_;
+  const Tick unchanged_over = over_tick();
   if (at >= std::max(over_tick(), start_ + 1)) return false;
   change_ = Change{.at = at, .target_steps = {}, .floor = floor_, .run_steps = run_target_};
   if (!stopping_) change_->target_steps = target_;
@@ -134,6 +135,8 @@ bool Axis::change(Tick at) {
       stopping_ || base_.run.cruise == std::max(run_table().cruise, change_->floor);
   if (share_ && at >= unchanged_end_) end_ = unchanged_end_;  // it has made all of its steps
   if (!same_end || !same_speed) {
+    // Its MCU makes the run to its end, also when the motor has made its last step.
+    if (share_ && share_->in_mcus) return unchanged_end_ > start_ && at < unchanged_over;
     return !(share_ && share_->increment == 0) && at < std::max(unchanged_end_, start_ + 1);
   }
   change_.reset();
@@ -141,9 +144,9 @@ bool Axis::change(Tick at) {
   return false;
 }
 
-void Axis::expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out,
+void Axis::expand_run(bushd_run& run, bool fine, std::size_t ticks, std::int16_t* out,
                       std::size_t stride) const {
-  if (format_ == BUSHD_FORMAT_FINE) {
+  if (fine) {
     bushd_run_expand_fine(&run, tick_ns_, ticks, out, stride);
     return;
   }
@@ -156,14 +159,14 @@ void Axis::expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out,
 }
 
 void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const {
-  if (!share_) return expand_run(place.run, ticks, out, stride);
+  if (!share_) return expand_run(place.run, fine(), ticks, out, stride);
   std::array<std::int16_t, kBlock> run_ticks;
   const std::uint32_t run_end = place.run.steps_done + bushd_run_steps_left(&place.run);
   const std::int64_t rest_256 = line_steps(run_end) * 256;
   for (std::size_t done = 0; done < ticks; done += kBlock) {
     const std::size_t n = std::min(kBlock, ticks - done);
     const std::uint8_t before_256 = place.run.fraction;
-    expand_run(place.run, n, run_ticks.data(), 1);
+    expand_run(place.run, follows_between_steps(), n, run_ticks.data(), 1);
     follow_run(place, n, run_ticks.data(), before_256, rest_256, out + done * stride, stride);
   }
 }
@@ -173,21 +176,22 @@ void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_
 void Axis::follow_run(Place& place, std::size_t ticks, const std::int16_t* run_ticks,
                       std::uint32_t before_256, std::int64_t rest_256, std::int16_t* out,
                       std::size_t stride) const {
-  const bool fine = format_ == BUSHD_FORMAT_FINE;
+  const bool between = follows_between_steps();
+  const bool forward = share_->direction > 0;
   std::uint32_t part_256 = before_256;  // of the run's running step
   for (std::size_t i = 0; i < ticks; ++i) {
     part_256 += static_cast<std::uint32_t>(
-        fine ? run_ticks[i] : bushd_coarse_to_fine(static_cast<std::uint8_t>(run_ticks[i])));
+        between ? run_ticks[i] : bushd_coarse_to_fine(static_cast<std::uint8_t>(run_ticks[i])));
     bushd_line_follow(&place.line, part_256 / 256);
     part_256 %= 256;
-    const auto at_256 = static_cast<std::int64_t>(
-        fine ? bushd_line_position(&place.line, static_cast<std::uint8_t>(part_256))
-             : std::uint64_t{place.line.made} * 256);
+    auto at_256 = static_cast<std::int64_t>(
+        between ? bushd_line_position(&place.line, static_cast<std::uint8_t>(part_256))
+                : std::uint64_t{place.line.made} * 256);
+    if (!fine()) at_256 -= at_256 % 256;
     const std::int64_t moved_256 = std::min(at_256, rest_256) - place.told_256;
     place.told_256 += moved_256;
-    const bool forward = share_->direction > 0;
     out[i * stride] = static_cast<std::int16_t>(
-        fine             ? moved_256 * share_->direction
+        fine()           ? moved_256 * share_->direction
         : moved_256 == 0 ? 0
                          : (moved_256 / 256) | (forward ? BUSHD_COARSE_DIRECTION : 0));
   }
@@ -269,8 +273,7 @@ Tick Axis::own_end_of(const Place& place) const {
   if (place.told_256 >= rest_256) return place.tick + (place.told_256 > rest_256 ? 1 : 0);
   const std::uint32_t last = bushd_line_run_step(&line, line.made);
   bushd_line_go_to(&line, last - 1);
-  const bool fine = format_ == BUSHD_FORMAT_FINE;
-  const std::int64_t crossing = fine ? bushd_line_crossing(&line) : 256;
+  const std::int64_t crossing = follows_between_steps() ? bushd_line_crossing(&line) : 256;
   const std::uint64_t before = bushd_run_units_of_last(&place.run, run_end - last + 1);
   const std::uint64_t after = bushd_run_units_of_last(&place.run, run_end - last);
   const std::int64_t unit_ns = run_table().time_unit_ns;

@@ -45,6 +45,9 @@ struct LineShare {
   // This run's part of the line, by its steps.
   std::uint32_t from = 0;
   std::uint32_t to = 0;
+  // The MCUs make the run themselves (LINE_RUN). Then coarse ticks, too, have the steps that fall
+  // between those of the run.
+  bool in_mcus = false;
 };
 
 // Not copied while a run uses the table: the table outlives the axis.
@@ -170,7 +173,10 @@ class Axis {
   void take_change(Place& place) const;
   void advance(Place& place, Tick to) const;
   void expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
-  void expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  void expand_run(bushd_run& run, bool fine, std::size_t ticks, std::int16_t* out,
+                  std::size_t stride) const;
+  bool fine() const { return format_ == BUSHD_FORMAT_FINE; }
+  bool follows_between_steps() const { return fine() || share_->in_mcus; }
   void follow_run(Place& place, std::size_t ticks, const std::int16_t* run_ticks,
                   std::uint32_t before_256, std::int64_t rest_256, std::int16_t* out,
                   std::size_t stride) const;
