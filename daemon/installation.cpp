@@ -146,6 +146,18 @@ std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const
   return motors;
 }
 
+link::LineRun Mcu::line_run(const motion::Axis& axis) const {
+  const motion::LineShare& share = *axis.line();
+  return {.slot = *master_.slot_of(on_bus_, share.table->view()),
+          .floor = axis.floor(),
+          .longest = share.longest,
+          .from = share.from,
+          .steps = share.to - share.from,
+          .ticks = axis.over_tick() - axis.start_tick(),
+          .increment = share.increment,
+          .direction = share.direction};
+}
+
 bool Installation::any_moves(const Mcu& mcu) const {
   return std::ranges::any_of(
       mcu.motors(), [this](MotorId motor) { return !motors_[motor].is<motion::Resting>(); });

@@ -61,7 +61,13 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                        .tick_ns = bus.tick_ns(),
                        .format = bus.format,
                        .table = installation.table_of(id),
-                       .line = line});
+                       .line = line,
+                       .line_run = {}});
+    if (line && line->in_mcus) {
+      motion::Axis axis = installation.new_axis(id);
+      axis.start_line(motors_.back().from_steps, *line, motors_.back().start, floor);
+      motors_.back().line_run = mcu.line_run(axis);
+    }
     if (line) of_lines = std::max(of_lines, motors_.back().start);
     if (steps == 0 || buses_.contains(mcu.config.bus)) continue;
     buses_.try_emplace(mcu.config.bus, installation[mcu.config.bus].master.snapshot(now_us));
@@ -116,6 +122,7 @@ void DryRun::plan_motor(const Motor& motor, bool further_leg) {
   if (motor.by_table) {
     move.run = link::TableRun{static_cast<std::int32_t>(motor.steps), motor.floor};
   }
+  if (motor.line_run) move.run = *motor.line_run;
   bus.moves.push_back(move);
 }
 

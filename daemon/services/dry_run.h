@@ -56,6 +56,7 @@ class DryRun {
     bushd_format format;
     tables::TablePtr table;
     std::optional<motion::LineShare> line;
+    std::optional<link::LineRun> line_run;  // that its MCU is to make itself
   };
   // The motors of one bus.
   struct Bus : AxisSource {

@@ -133,12 +133,14 @@ void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, const Line& 
   for (std::size_t p = 1; p < line.points.size(); ++p) {
     ways.push_back(lay(line.motors, line.points[p - 1].steps, line.points[p]));
   }
+  const bool by_mcus = line.way.longest() != 0 && in_mcus(0, line);
   // The ways of one motor stand together.
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     for (const motion::Way& way : ways) {
       const auto& [table, from, to, floor] = way.motors()[i];
       DryRun::Part part{line.motors[i], to - from, way.floor(), from};
       if (way.longest() != 0) part.line = way.share(i, 0, way.longest());
+      if (part.line) part.line->in_mcus = by_mcus;
       parts.push_back(std::move(part));
     }
   }
@@ -184,6 +186,20 @@ void Lines::open(const api::Asker& asker, std::uint64_t number, const Line& line
   open_.conclude(line.motors.front(), [this, number] { return conclusion(number); });
 }
 
+// The MCUs make the run themselves if all of them can: they have its table, and no other line.
+bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
+  const bushd_table& table = line.way.table()->view();
+  return std::ranges::all_of(installation_.mcus_of(line.motors), [&](McuId id) {
+    const Mcu& mcu = installation_[id];
+    const bool has_other = std::ranges::any_of(mcu.motors(), [&](MotorId motor) {
+      const auto* other = installation_[motor].as<motion::OnLine>();
+      return other != nullptr && other->line != number &&
+             installation_[motor].axis().line()->in_mcus;
+    });
+    return mcu.can_run_lines() && !has_other && mcu.has_table(table);
+  });
+}
+
 void Lines::begin_run(std::int64_t now_us, std::uint64_t number, const Line& line,
                       const std::vector<std::size_t>& indices, std::uint32_t to) {
   motion::Tick start = INT64_MIN;
@@ -194,6 +210,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, const Line& lin
     start = std::max(start,
                      installation_.mcu_of(id).earliest_start(now_us, installation_[id].output()));
   }
+  const bool by_mcus = in_mcus(number, line);
   for (const std::size_t i : indices) {
     motion::Motor& motor = installation_[line.motors[i]];
     const bool same_way =
@@ -204,7 +221,9 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, const Line& lin
     on_line.to_point = to == line.target;
     on_line.last_run = line.points.size() == 1 && to == line.target;
     const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
-    motor.start_line(on_line, line.way.share(i, from, to), start, line.way.floor());
+    motion::LineShare share = line.way.share(i, from, to);
+    share.in_mcus = by_mcus;
+    motor.start_line(on_line, std::move(share), start, line.way.floor());
   }
   moves_.begin_on_line(motors);
 }
@@ -430,9 +449,18 @@ std::string Lines::deviation(const Line& line) const {
     const auto& share = installation_[line.motors[i]].axis().line();
     return share && share->table == line.way.table();
   };
-  for (std::size_t candidate = 0; candidate < line.motors.size(); ++candidate) {
-    if (!followed(candidate)) continue;
-    const std::uint32_t step = installation_[line.motors[candidate]].axis().line_planned_end();
+  std::vector<std::uint32_t> candidates;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    if (!followed(i)) continue;
+    candidates.push_back(installation_[line.motors[i]].axis().line_planned_end());
+    // Where MCUs have ramped the run down by themselves nobody has planned it.
+    if (line.way.increment(i) != line.way.longest()) continue;
+    const std::int64_t made =
+        std::abs(installation_[line.motors[i]].position_steps() - line.way.position_at(i, 0));
+    candidates.push_back(
+        static_cast<std::uint32_t>(std::min<std::int64_t>(made, line.way.longest())));
+  }
+  for (const std::uint32_t step : candidates) {
     std::int64_t most = 0;
     std::size_t motor = 0;
     for (std::size_t i = 0; i < line.motors.size(); ++i) {

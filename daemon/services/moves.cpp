@@ -221,10 +221,16 @@ void Moves::start_leg(std::int64_t now_us, MotorId id) {
 void Moves::begin_on_line(const std::vector<MotorId>& motors) {
   for (const MotorId id : motors) {
     const motion::Axis& axis = installation_[id].axis();
-    journal_.started(id, axis.target_steps() - axis.from_steps(), axis.start_tick(), 0, false);
+    const motion::LineShare& share = *axis.line();
+    journal_.started(id, axis.target_steps() - axis.from_steps(), axis.start_tick(), 0,
+                     share.in_mcus);
     // One that makes no step of it only waits.
-    if (axis.end_tick() > axis.start_tick()) {
-      installation_.mcu_of(id).begin(installation_[id].output(), axis.start_tick());
+    if (axis.end_tick() <= axis.start_tick()) continue;
+    Mcu& mcu = installation_.mcu_of(id);
+    if (share.in_mcus) {
+      mcu.begin_line_run(installation_[id].output(), axis);
+    } else {
+      mcu.begin(installation_[id].output(), axis.start_tick());
     }
   }
   installation_.changed = true;

@@ -4,7 +4,7 @@
 // the motors of all of them are on the line without a word between them.
 //
 // The silence after which the run is ramped down is counted from a time that all MCUs know alike:
-// that which the last SYNC frame has told, in ticks of the bus.
+// that which the last SYNC frame has told, in ticks of the bus, or the run's first tick.
 #include "firmware/core/line_run.h"
 
 #include "engine/run_plan.h"
@@ -149,16 +149,13 @@ void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_
 uint16_t bushd_mcu_ramp_down_line(bushd_mcu* mcu) {
   uint16_t concerned = 0;
   if (mcu->line.motors == 0 || bushd_run_done(&mcu->line.run)) return 0;
-  bool under_way = false;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];
-    if (!is_on_line(mcu, m) || motor->mode == BUSHD_MCU_RAMP_DOWN) continue;
-    concerned |= motor_bit(m);
-    if (motor->mode != BUSHD_MCU_TABLE_RUN) continue;  // its start is cut with its queue
+    if (!is_on_line(mcu, m) || motor->mode != BUSHD_MCU_TABLE_RUN) continue;
     motor->mode = BUSHD_MCU_RAMP_DOWN;
-    under_way = true;
+    concerned |= motor_bit(m);
   }
-  if (!under_way) return concerned;
+  if (concerned == 0) return 0;
   mcu->stream.queue_summary.stale = true;
   bushd_run_ramp_down_once(&mcu->line.run);
   mcu->line.last = mcu->line.step - 1u + bushd_run_steps_left(&mcu->line.run);
@@ -203,6 +200,11 @@ void bushd_mcu_leave_line(bushd_mcu* mcu, uint8_t m) {
                                                         mcu->line.step, mcu->line.run.fraction);
   motor->remainder = motor->on_line.direction < 0 ? (int16_t)-fraction : (int16_t)fraction;
   note_speed(mcu, motor);
+}
+
+void bushd_mcu_line_begins(bushd_mcu* mcu, uint32_t tick) {
+  uint32_t* told_tick = &mcu->clock.told_tick;
+  if (ticks_after(tick, *told_tick) > 0) *told_tick = tick;
 }
 
 uint32_t bushd_mcu_line_deadline(const bushd_mcu* mcu) {

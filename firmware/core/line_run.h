@@ -25,15 +25,17 @@ typedef struct bushd_mcu_line {
 bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message);
 // The next tick of the run, and what these motors make of it.
 void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors);
-// All that are on the line ramp down along it: without its beginning, if that is still to come.
-// Returns those that were to go on. Their queues are still to be cut.
+// All that are on the line and have begun it ramp down along it. Returns those that were to go on.
+// Their queues are still to be cut.
 uint16_t bushd_mcu_ramp_down_line(bushd_mcu* mcu);
 // A motor leaves the line where it is, as a stream would have left it there. No division of more
 // than 32 bits.
 void bushd_mcu_leave_line(bushd_mcu* mcu, uint8_t m);
 // Of its running step, in time units of its own table, rounded up; 0: it has made its last step.
 uint16_t bushd_mcu_line_delay(const bushd_mcu* mcu, uint8_t m);
-// If no SYNC tells the time, lines are ramped down from this tick on.
+// In the first tick of its run.
+void bushd_mcu_line_begins(bushd_mcu* mcu, uint32_t tick);
+// If no SYNC tells the time, the line is ramped down from this tick on.
 uint32_t bushd_mcu_line_deadline(const bushd_mcu* mcu);
 // Of a motor in a run, by itself or on a line.
 int8_t bushd_mcu_run_direction(const bushd_mcu* mcu, uint8_t m);

@@ -102,13 +102,14 @@ static void leave_run(bushd_mcu* mcu, bushd_mcu_motor* motor) {
 
 static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t tick) {
   const bool begins = motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)tick;
+  const uint8_t m = (uint8_t)(motor - mcu->motor);
   if (begins) {
     motor->mode = BUSHD_MCU_TABLE_RUN;
     mcu->stream.queue_summary.stale = true;
+    if ((mcu->line.motors & motor_bit(m)) != 0) bushd_mcu_line_begins(mcu, tick);
   }
   if (motor->mode != BUSHD_MCU_TABLE_RUN) return false;
   if (ticks_after(tick, motor->made.until) < 0) return true;
-  const uint8_t m = (uint8_t)(motor - mcu->motor);
   if ((mcu->line.motors & motor_bit(m)) != 0) {
     bushd_mcu_leave_line(mcu, m);
   } else if (!begins) {

@@ -55,8 +55,7 @@ static void watch_line(bushd_mcu* mcu, uint32_t next) {
   if (mcu->line.motors == 0 || ticks_after(next, bushd_mcu_line_deadline(mcu)) < 0) return;
   uint16_t concerned = bushd_mcu_ramp_down_line(mcu);
   for (uint8_t m = 0; concerned != 0; ++m, concerned = (uint16_t)(concerned >> 1)) {
-    if ((concerned & 1u) == 0) continue;
-    end_in_silence(mcu, m, mcu->motor[m].mode != BUSHD_MCU_RUN_WAITS, next);
+    if (concerned & 1u) end_in_silence(mcu, m, true, next);
   }
 }
 
@@ -69,7 +68,8 @@ void bushd_mcu_watch_comm_timeout(bushd_mcu* mcu) {
     bushd_mcu_motor* motor = &mcu->motor[m];
     const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN;
     if (!runs && motor->mode != BUSHD_MCU_RUN_WAITS) continue;
-    if ((mcu->line.motors & motor_bit(m)) != 0 || bushd_run_done(&motor->made.run)) continue;
+    const bool on_line = (mcu->line.motors & motor_bit(m)) != 0;
+    if (on_line ? runs : bushd_run_done(&motor->made.run)) continue;
     if (runs) bushd_mcu_ramp_down_run(mcu, m);
     end_in_silence(mcu, m, runs, next);
   }

@@ -12,6 +12,18 @@ namespace {
 // motors that they leave alone go on.
 constexpr std::int64_t kQueueCriticalUs = 40'000;
 
+// Codes behind the end of a side are the cruise delay.
+bool makes_the_same_runs(const bushd_table& a, const bushd_table& b) {
+  if (a.cruise != b.cruise || a.time_unit_ns != b.time_unit_ns) return false;
+  for (std::uint32_t i = 0; i < std::max(a.accel.count, b.accel.count); ++i) {
+    if (bushd_table_accel(&a, i) != bushd_table_accel(&b, i)) return false;
+  }
+  for (std::uint32_t i = 0; i < std::max(a.decel.count, b.decel.count); ++i) {
+    if (bushd_table_decel(&a, i) != bushd_table_decel(&b, i)) return false;
+  }
+  return true;
+}
+
 PerMcu<McuRecord> records_of(const BusSetup& setup) {
   PerMcu<McuRecord> records;
   for (const McuSetup& mcu : setup.mcus)
@@ -82,6 +94,7 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   notice_standing_still(now_us);
   stepped_us_ = now_us;
   if (!port_open_) return {};
+  synchroniser_.lines_run(streams_.runs_line());
   transactions_.expire(now_us);
   if (streams_.fail_late_replacements(now_us)) return {};
   // Nobody should be talking any more, and an answer that is late all the same may be lost.
@@ -155,7 +168,20 @@ void Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
 }
 
 void Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
-  streams_.begin_table_run(mcu, motor, start, run);
+  streams_.begin_run(mcu, motor, start, run);
+}
+
+void Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) {
+  streams_.begin_run(mcu, motor, start, run);
+  synchroniser_.lines_run(true);
+}
+
+std::optional<std::uint8_t> Master::slot_of(McuIndex mcu, const bushd_table& table) const {
+  const std::vector<TableRef>& tables = mcus_[mcu].setup.tables;
+  for (std::size_t slot = 0; slot < tables.size(); ++slot) {
+    if (makes_the_same_runs(*tables[slot].table, table)) return static_cast<std::uint8_t>(slot);
+  }
+  return std::nullopt;
 }
 
 void Master::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {

@@ -80,6 +80,15 @@ class Master : private Transactions::Listener, private Connector::Listener {
   // the source's from `start` on. Precondition also: the MCU can (can_run_tables).
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run);
   bool can_run_tables(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TABLE_RUN); }
+  // The same for a motor's part of a run of a line. Precondition: the MCU can (can_run_lines), and
+  // has no other line.
+  void begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run);
+  // Not where every tick is to be told.
+  bool can_run_lines(McuIndex mcu) const {
+    return setup_.table_ticks && can(mcu, BUSHD_CAN_LINE_RUN);
+  }
+  // Of a table of the MCU that makes the same runs as this one.
+  std::optional<std::uint8_t> slot_of(McuIndex mcu, const bushd_table& table) const;
   // Everything that decides what would go out now (rehearsal.h).
   BusSnapshot snapshot(std::int64_t now_us) const;
   // Runs of the MCU's motors that an edge at its trigger input starts. What becomes of them its

@@ -20,7 +20,7 @@ Rehearsal::Rehearsal(BusSnapshot bus, TickSource& source, std::span<const Planne
   PerMcu<std::uint8_t> named(bus_.mcus.size());
   for (const PlannedMove& move : moves) {
     if (move.run) {
-      streams_.begin_table_run(move.mcu, move.motor, move.start, *move.run);
+      streams_.begin_run(move.mcu, move.motor, move.start, *move.run);
     } else {
       streams_.begin(move.mcu, move.motor, move.start);
     }

@@ -22,7 +22,7 @@ struct PlannedMove {
   McuIndex mcu;
   std::uint8_t motor;
   Tick start;
-  std::optional<TableRun> run;
+  std::optional<McuRun> run;
 };
 
 struct Traffic {

@@ -111,8 +111,11 @@ StreamScheduler::Choice StreamScheduler::choose(const Mcu& mcu, Tick first) {
       continue;
     }
     if (stream.beyond_gap) choice.join = std::min(choice.join, stream.beyond_gap->from);
-    (stream.starts() ? (stream.run ? choice.runs : choice.starts) : choice.goes_on) |=
-        static_cast<std::uint16_t>(1u << m);
+    std::uint16_t& kind = !stream.starts()                                ? choice.goes_on
+                          : !stream.run                                   ? choice.starts
+                          : std::holds_alternative<TableRun>(*stream.run) ? choice.runs
+                                                                          : choice.lines;
+    kind |= static_cast<std::uint16_t>(1u << m);
   }
   return choice;
 }
@@ -123,10 +126,14 @@ bool StreamScheduler::send_ticks_of(std::int64_t now_us, McuIndex index, const F
   const Choice choice = choose(mcus_[index], *mcus_[index].next_tick());
   const Tick first = choice.first;
   const Tick depth = records_[index].view.identity.queue_ticks - kSpareTicks;
-  // Table runs need no queue: they are given as soon as the MCU takes them.
-  if (choice.runs != 0) {
+  // Runs need no queue: they are given as soon as the MCU takes them.
+  if (choice.runs != 0 || choice.lines != 0) {
     if (first > now + depth) return false;
-    send_table_runs(now_us, index, choice.runs, first);
+    if (choice.runs != 0) {
+      send_table_runs(now_us, index, choice.runs, first);
+    } else {
+      send_line_run(now_us, index, choice.lines, first);
+    }
     return true;
   }
   // A quarter of a small queue is empty before it is worth a frame.
@@ -156,14 +163,40 @@ void StreamScheduler::send_table_runs(std::int64_t now_us, McuIndex index, std::
   std::uint8_t count = 0;
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if (!has(mask, m)) continue;
-    entries[count++] =
-        entry_of(m, setup.table_of_motor[m].value_or(0), *mcus_[index].stream[m].run);
+    entries[count++] = entry_of(m, setup.table_of_motor[m].value_or(0),
+                                std::get<TableRun>(*mcus_[index].stream[m].run));
     note_sent(index, m, first, source_.end_tick(index, m));
   }
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
   const std::size_t size = bushd_encode_table_run(
       mcus_[index].epoch, static_cast<std::uint32_t>(first), entries.data(), count, payload.data());
   writer_.send(now_us, setup.address, BUSHD_MSG_TABLE_RUN, {payload.data(), size});
+}
+
+void StreamScheduler::send_line_run(std::int64_t now_us, McuIndex index, std::uint16_t mask,
+                                    Tick first) {
+  std::array<bushd_line_entry, BUSHD_MOTORS_PER_MCU> entries;
+  std::uint8_t count = 0;
+  bushd_line_run message{};
+  message.epoch = mcus_[index].epoch;
+  message.first_tick = static_cast<std::uint32_t>(first);
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if (!has(mask, m)) continue;
+    const auto& run = std::get<LineRun>(*mcus_[index].stream[m].run);
+    message.line = {.slot = run.slot,
+                    .floor = run.floor,
+                    .longest = run.longest,
+                    .from = run.from,
+                    .steps = run.steps,
+                    .count = 0,
+                    .entries = nullptr};
+    entries[count++] = {m, static_cast<std::int8_t>(run.direction), run.increment};
+    // Also when it has made its last step: a replacement must take it off the line.
+    note_sent(index, m, first, first + run.ticks);
+  }
+  std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+  const std::size_t size = bushd_encode_line_run(&message, entries.data(), count, payload.data());
+  writer_.send(now_us, records_[index].setup.address, BUSHD_MSG_LINE_RUN, {payload.data(), size});
 }
 
 // As many of these ticks as all motors run by their tables, if that is worth it.

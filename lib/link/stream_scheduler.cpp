@@ -32,13 +32,13 @@ void StreamScheduler::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   stream.start = stream.from = stream.from_before = stream.next = stream.sent = start;
 }
 
-void StreamScheduler::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
+void StreamScheduler::begin_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) {
   begin(mcu, motor, start);
   mcus_[mcu].stream[motor].run = run;
 }
 
 void StreamScheduler::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
-  begin_table_run(mcu, motor, start, run);
+  begin_run(mcu, motor, start, run);
   Stream& stream = mcus_[mcu].stream[motor];
   stream.next = stream.sent = source_.end_tick(mcu, motor);
   stream.finished = true;
@@ -62,6 +62,14 @@ void StreamScheduler::drop_all(McuIndex mcu) {
 
 void StreamScheduler::came_online(McuIndex mcu) {
   mcus_[mcu].epoch = mcus_[mcu].newest_epoch = records_[mcu].view.report.epoch;
+}
+
+bool StreamScheduler::runs_line() const {
+  return std::ranges::any_of(mcus_, [](const Mcu& mcu) {
+    return std::ranges::any_of(mcu.stream, [](const Stream& stream) {
+      return stream.active && stream.run && std::holds_alternative<LineRun>(*stream.run);
+    });
+  });
 }
 
 bool StreamScheduler::has_ticks_to_send(McuIndex mcu) const {

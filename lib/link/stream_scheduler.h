@@ -43,7 +43,7 @@ class StreamScheduler {
 
   // See Master for these. Preconditions: as there.
   void begin(McuIndex mcu, std::uint8_t motor, Tick start);
-  void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run);
+  void begin_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run);
   void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run);
   void replace(McuIndex mcu, std::uint16_t motors, Tick first, Tick now);
   void drop(McuIndex mcu, std::uint8_t motor);
@@ -71,6 +71,8 @@ class StreamScheduler {
   // The first tick of this motor that has not been sent.
   Tick next_tick(McuIndex mcu, std::uint8_t motor) const { return mcus_[mcu].stream[motor].next; }
   bool has_ticks_to_send(McuIndex mcu) const;
+  // An MCU makes the run of a line, or is to.
+  bool runs_line() const;
   bool has_replacement_to_send(McuIndex mcu) const { return mcus_[mcu].replacing != 0; }
   // A replacement has been sent to this MCU and is not yet confirmed.
   bool replacement_open(McuIndex mcu) const { return mcus_[mcu].replaced != 0; }
@@ -97,8 +99,8 @@ class StreamScheduler {
     // Since a replacement failed: beyond `sent` the MCU may have ticks of the plan before it,
     // behind a gap. Reports need not show them, so the next replacement takes them away.
     bool unsure = false;
-    // Of a table run, until it is replaced.
-    std::optional<TableRun> run;
+    // Made by the MCU itself, until it is replaced.
+    std::optional<McuRun> run;
 
     bool begun() const { return sent != from; }
     bool starts() const { return next == start && from == start; }
@@ -123,6 +125,7 @@ class StreamScheduler {
   struct Choice {
     Tick first;
     std::uint16_t runs = 0;     // table runs to begin
+    std::uint16_t lines = 0;    // runs of lines to begin
     std::uint16_t starts = 0;   // streams to begin
     std::uint16_t goes_on = 0;  // streams to continue
     Tick join = INT64_MAX;      // where another motor, or ticks beyond a gap, join in
@@ -140,6 +143,7 @@ class StreamScheduler {
   static Choice choose(const Mcu& mcu, Tick first);
   bool send_ticks_of(std::int64_t now_us, McuIndex mcu, const Filling& filling);
   void send_table_runs(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first);
+  void send_line_run(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first);
   bool send_table_ticks(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first,
                         Tick max_ticks, unsigned flags);
   void send_ticks(std::int64_t now_us, McuIndex mcu, std::uint16_t mask, Tick first, unsigned count,

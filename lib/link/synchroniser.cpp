@@ -10,6 +10,8 @@ namespace {
 using fieldbus::kSyncPeriodUs;
 
 constexpr std::int64_t kFirstSyncPeriodUs = 60'000;  // while an MCU waits to be told the time
+// A SYNC tells the time of the one before. Of the second that MCUs run on for, some may be lost.
+constexpr std::int64_t kLineSyncPeriodUs = 200'000;
 // A SYNC frame lasts longer on most lines, so its repetition is told apart. Crystals that are 100
 // ppm apart need a second without a SYNC for it, those whose rate is known much longer.
 constexpr std::int64_t kAgreementNs = 100'000;
@@ -24,6 +26,11 @@ Synchroniser::Synchroniser(const BusSetup& setup, PerMcu<McuRecord>& mcus, Frame
       writer_(writer),
       clock_(setup.tick_ns),
       since_sync_(mcus.size()) {}
+
+void Synchroniser::lines_run(bool any) {
+  lines_run_ = any;
+  if (any) due_us_ = std::min(due_us_, sent_us_ + kLineSyncPeriodUs);
+}
 
 void Synchroniser::overheard(std::int64_t now_us, const bushd_frame& frame) {
   if (!writer_.has_sent(frame)) other_master_until_us_ = now_us + kOtherMasterUs;
@@ -125,7 +132,9 @@ bool Synchroniser::send_due(std::int64_t now_us) {
   note_offsets(found.reference);
   const bool doubtful = !found.agreed && !disagreed_;
   const bool soon = found.waiting || doubtful;
-  due_us_ = now_us + (soon ? kFirstSyncPeriodUs : kSyncPeriodUs);
+  const std::int64_t period_us = lines_run_ ? kLineSyncPeriodUs : kSyncPeriodUs;
+  due_us_ = now_us + (soon ? kFirstSyncPeriodUs : period_us);
+  sent_us_ = now_us;
   if (!found.listening) return false;
   // By the clock, so that no two SYNCs of a master have the same id.
   const auto id = static_cast<std::uint32_t>(now_us / 1000);

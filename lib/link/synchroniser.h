@@ -39,6 +39,9 @@ class Synchroniser {
   // An MCU has been found that may have to be told the time.
   void hurry(std::int64_t now_us) { due_us_ = std::min(due_us_, now_us); }
 
+  // MCUs that make the run of a line go by the time that SYNCs tell: they get more of them.
+  void lines_run(bool any);
+
   // A frame that is not an answer.
   void overheard(std::int64_t now_us, const bushd_frame& frame);
   // Another master was heard on this line within the last seconds, by this one or by an MCU.
@@ -83,6 +86,8 @@ class Synchroniser {
   FrameWriter& writer_;
   BusClock clock_;
   std::int64_t due_us_ = 0;
+  std::int64_t sent_us_ = 0;  // the last one
+  bool lines_run_ = false;
   std::optional<std::uint32_t> sync_id_;  // of the last SYNC sent
   bool disagreed_ = false;                // MCUs, about the SYNC before
   struct Mcu {

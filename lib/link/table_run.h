@@ -1,8 +1,9 @@
-// A run of a motor's table that its MCU makes by itself.
+// Runs that an MCU makes by itself: of a motor's table, or of a line.
 #pragma once
 
 #include <cstdint>
 #include <cstdlib>
+#include <variant>
 
 #include "engine/message.h"
 
@@ -12,6 +13,22 @@ struct TableRun {
   std::int32_t steps;       // either sign, not 0
   std::uint16_t floor = 0;  // of bushd_run_start
 };
+
+// A motor's part of a run that all motors of its line follow, on whatever MCU. All but the last two
+// are the same for all that begin at one tick on an MCU, the numbers of slots aside for all of the
+// line (engine/message_line.h).
+struct LineRun {
+  std::uint8_t slot;  // of the run's table
+  std::uint16_t floor;
+  std::uint32_t longest;
+  std::uint32_t from;
+  std::uint32_t steps;
+  std::int64_t ticks;  // until the run's last step
+  std::uint32_t increment;
+  int direction;  // +1, -1
+};
+
+using McuRun = std::variant<TableRun, LineRun>;
 
 // `slot`: of the table that the motor has.
 inline bushd_table_run_entry entry_of(std::uint8_t motor, std::uint8_t slot, TableRun run) {

@@ -126,6 +126,7 @@ bool Axis::change(Tick at) {
   const std::int64_t planned_end = planned_end_;
   const std::uint32_t planned_run_steps = planned_run_steps_;
   unchanged_end_ = end_;
+  const Tick unchanged_over = over_tick();
   if (at >= std::max(over_tick(), start_ + 1)) return false;
   change_ = Change{.at = at, .target_steps = {}, .floor = floor_, .run_steps = run_target_};
   if (!stopping_) change_->target_steps = target_;
@@ -135,6 +136,8 @@ bool Axis::change(Tick at) {
       stopping_ || base_.run.cruise == std::max(run_table().cruise, change_->floor);
   if (share_ && at >= unchanged_end_) end_ = unchanged_end_;  // it has made all of its steps
   if (!same_end || !same_speed) {
+    // Its MCU makes the run to its end, also when the motor has made its last step.
+    if (share_ && share_->in_mcus) return unchanged_end_ > start_ && at < unchanged_over;
     return !(share_ && share_->increment == 0) && at < std::max(unchanged_end_, start_ + 1);
   }
   change_.reset();
@@ -142,9 +145,9 @@ bool Axis::change(Tick at) {
   return false;
 }
 
-void Axis::expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out,
+void Axis::expand_run(bushd_run& run, bool fine, std::size_t ticks, std::int16_t* out,
                       std::size_t stride) const {
-  if (format_ == BUSHD_FORMAT_FINE) {
+  if (fine) {
     bushd_run_expand_fine(&run, tick_ns_, ticks, out, stride);
     return;
   }
@@ -157,14 +160,14 @@ void Axis::expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out,
 }
 
 void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const {
-  if (!share_) return expand_run(place.run, ticks, out, stride);
+  if (!share_) return expand_run(place.run, fine(), ticks, out, stride);
   for (std::size_t done = 0; done < ticks; done += kBlock) {
     const std::size_t n = std::min(kBlock, ticks - done);
     std::int16_t* to = out + done * stride;
-    if (format_ == BUSHD_FORMAT_FINE) {
-      follow_run_fine(place, n, to, stride);
+    if (follows_between_steps()) {
+      follow_between_steps(place, n, to, stride);
     } else {
-      follow_run_coarse(place, n, to, stride);
+      follow_steps(place, n, to, stride);
     }
   }
 }
@@ -173,8 +176,8 @@ void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_
 // times N / L, each tick from the beginning of the block. The motor comes to rest on a
 // whole step, so it goes no farther than that. If a change has made that the step it has begun, it
 // goes back by the part of it that it has been told.
-void Axis::follow_run_fine(Place& place, std::size_t ticks, std::int16_t* out,
-                           std::size_t stride) const {
+void Axis::follow_between_steps(Place& place, std::size_t ticks, std::int16_t* out,
+                                std::size_t stride) const {
   std::array<std::int16_t, kBlock> run_ticks;
   const std::uint32_t run_end = place.run.steps_done + bushd_run_steps_left(&place.run);
   const std::int64_t rest_256 = line_steps(run_end) * 256;
@@ -184,7 +187,7 @@ void Axis::follow_run_fine(Place& place, std::size_t ticks, std::int16_t* out,
   std::uint64_t way =
       std::uint64_t{place.line.value} * 256 + (odd ? 128 : 0) + increment * place.run.fraction;
   const std::uint64_t before_256 = std::uint64_t{place.line.made} * 256;
-  expand_run(place.run, ticks, run_ticks.data(), 1);
+  expand_run(place.run, true, ticks, run_ticks.data(), 1);
   bushd_line_go_to(&place.line, share_->from + place.run.steps_done);
   for (std::size_t i = 0; i < ticks; ++i) {
     way += increment * static_cast<std::uint16_t>(run_ticks[i]);
@@ -194,18 +197,19 @@ void Axis::follow_run_fine(Place& place, std::size_t ticks, std::int16_t* out,
       const std::uint64_t risen = (way - (longest - increment) * 128) * 2;
       if (risen < way) at_256 = share_by_.quotient(risen);
     }
+    if (!fine()) at_256 -= at_256 % 256;
     const std::int64_t moved_256 =
         std::min(static_cast<std::int64_t>(at_256), rest_256) - place.told_256;
     place.told_256 += moved_256;
-    out[i * stride] = static_cast<std::int16_t>(moved_256 * share_->direction);
+    out[i * stride] = fine() ? static_cast<std::int16_t>(moved_256 * share_->direction)
+                             : coarse_of(static_cast<unsigned>(moved_256 / 256));
   }
 }
 
-void Axis::follow_run_coarse(Place& place, std::size_t ticks, std::int16_t* out,
-                             std::size_t stride) const {
+void Axis::follow_steps(Place& place, std::size_t ticks, std::int16_t* out,
+                        std::size_t stride) const {
   std::array<std::uint8_t, kBlock> run_ticks;
   bushd_run_expand_coarse(&place.run, tick_ns_, ticks, run_ticks.data(), 1);
-  const unsigned direction = share_->direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
   const std::uint64_t increment = place.line.increment;
   std::uint64_t way = place.line.value;
   std::uint64_t made = 0;
@@ -214,7 +218,7 @@ void Axis::follow_run_coarse(Place& place, std::size_t ticks, std::int16_t* out,
     const std::uint64_t made_by_now = share_by_.quotient(way);
     const std::uint64_t steps = made_by_now - made;
     made = made_by_now;
-    out[i * stride] = static_cast<std::int16_t>(steps == 0 ? 0 : steps | direction);
+    out[i * stride] = coarse_of(static_cast<unsigned>(steps));
   }
   place.line.value = static_cast<std::uint32_t>(way - made * place.line.longest);
   place.line.made += static_cast<std::uint32_t>(made);
@@ -286,7 +290,7 @@ Tick Axis::end_of(const Place& place) const {
 }
 
 // Of a share: first tick after the motor's last step, before the run's own end if the motor makes
-// none of its last ones. The position that follow_run tells reaches the last step in the tick in
+// none of its last ones. The position that follow_between_steps tells reaches the last step in the tick in
 // which the run reaches `crossing`/256 of the step `last` of the line.
 Tick Axis::own_end_of(const Place& place) const {
   const std::uint32_t left = bushd_run_steps_left(&place.run);
@@ -297,8 +301,7 @@ Tick Axis::own_end_of(const Place& place) const {
   if (place.told_256 >= rest_256) return place.tick + (place.told_256 > rest_256 ? 1 : 0);
   const std::uint32_t last = bushd_line_run_step(&line, line.made);
   bushd_line_go_to(&line, last - 1);
-  const bool fine = format_ == BUSHD_FORMAT_FINE;
-  const std::int64_t crossing = fine ? bushd_line_crossing(&line) : 256;
+  const std::int64_t crossing = follows_between_steps() ? bushd_line_crossing(&line) : 256;
   const std::uint64_t before = bushd_run_units_of_last(&place.run, run_end - last + 1);
   const std::uint64_t after = bushd_run_units_of_last(&place.run, run_end - last);
   const std::int64_t unit_ns = run_table().time_unit_ns;

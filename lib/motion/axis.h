@@ -47,6 +47,9 @@ struct LineShare {
   // This run's part of the line, by its steps.
   std::uint32_t from = 0;
   std::uint32_t to = 0;
+  // The MCUs make the run themselves (LINE_RUN). Then coarse ticks, too, have the steps that fall
+  // between those of the run.
+  bool in_mcus = false;
 };
 
 // Not copied while a run uses the table: the table outlives the axis.
@@ -172,11 +175,18 @@ class Axis {
   void take_change(Place& place) const;
   void advance(Place& place, Tick to) const;
   void expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
-  void expand_run(bushd_run& run, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
-  void follow_run_fine(Place& place, std::size_t ticks, std::int16_t* out,
-                       std::size_t stride) const;
-  void follow_run_coarse(Place& place, std::size_t ticks, std::int16_t* out,
-                         std::size_t stride) const;
+  void expand_run(bushd_run& run, bool fine, std::size_t ticks, std::int16_t* out,
+                  std::size_t stride) const;
+  bool fine() const { return format_ == BUSHD_FORMAT_FINE; }
+  bool follows_between_steps() const { return fine() || share_->in_mcus; }
+  void follow_between_steps(Place& place, std::size_t ticks, std::int16_t* out,
+                            std::size_t stride) const;
+  void follow_steps(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  // As a byte of coarse displacements, of a line's motor.
+  std::int16_t coarse_of(unsigned steps) const {
+    return static_cast<std::int16_t>(
+        steps == 0 ? 0u : steps | (share_->direction > 0 ? BUSHD_COARSE_DIRECTION : 0u));
+  }
   std::uint16_t delay_of(const Place& place) const;
   Tick end_of(const Place& place) const;
   Tick own_end_of(const Place& place) const;

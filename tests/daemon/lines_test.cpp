@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lab.h"
+#include "daemon/on_line.h"
 
 namespace bushd::test {
 namespace {
@@ -19,64 +19,12 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-api::MoveLine line_to(const std::vector<std::string>& motors,
-                      const std::vector<std::int64_t>& steps) {
-  return {.kind = api::Move::Kind::kAbsolute, .motors = motor_steps(motors, steps)};
-}
-
-// Keys of the motor of this name.
-std::string with_keys(std::string toml, const std::string& motor, const std::string& keys) {
-  const std::string name = "name = \"" + motor + "\"\n";
-  return toml.insert(toml.find(name) + name.size(), keys);
-}
-
-// How far the shafts are from the nearest point of the line from 0 to these steps.
-double off_line(const Lab& lab, const std::vector<std::string>& motors,
-                const std::vector<std::int64_t>& steps) {
-  double along = 0;
-  double length = 0;
-  for (std::size_t i = 0; i < motors.size(); ++i) {
-    const auto n = static_cast<double>(steps[i]);
-    along += n * static_cast<double>(lab.shaft_steps(motors[i]));
-    length += n * n;
-  }
-  double most = 0;
-  for (std::size_t i = 0; i < motors.size(); ++i) {
-    const double there = static_cast<double>(steps[i]) * along / length;
-    most = std::max(most, std::abs(static_cast<double>(lab.shaft_steps(motors[i])) - there));
-  }
-  return most;
-}
-
-const std::vector<std::string> kMotors{"m01", "m02", "m03", "m04"};
-const std::vector<std::int64_t> kSteps{3000, -1201, 17, 0};
-
 TEST(Lines, AllMotorsAreOnTheLineAtAnyTime) {
+  // Half a step each, and what a tick of the stream may be off its run.
   for (const char* manner : {"fine", "coarse", "fine_table", "coarse_ticks"}) {
-    SCOPED_TRACE(manner);
-    Lab lab(hall(2, 2, manner));
-    lab.connect();
-    const auto move = lab.send(line_to(kMotors, kSteps));
-    double most = 0;
-    lab.run_until([&] {
-      most = std::max(most, off_line(lab, kMotors, kSteps));
-      return lab.has_result(move);
-    });
-    // Half a step each, and what a tick of the stream may be off its run.
-    EXPECT_LT(most, 2.5);
-    const Answer result = lab.last_reply(move);
-    EXPECT_EQ(result.result, "reached");
-    EXPECT_EQ(result.reason, "m01: stands at its target; the line was limited by m01");
-    EXPECT_THAT(result.position_steps, ElementsAre(3000, -1201, 17, 0));
-    for (std::size_t i = 0; i < kMotors.size(); ++i) {
-      EXPECT_EQ(lab.shaft_steps(kMotors[i]), kSteps[i]);
-    }
-    for (const char* mcu : {"hall:1", "hall:2"}) {
-      EXPECT_EQ(lab.mcu_health(mcu).rejected_frames, 0u);
-      EXPECT_EQ(lab.mcu_health(mcu).ramp_downs, 0u);
-    }
-    EXPECT_THAT(lab.errors(), testing::IsEmpty());
+    expect_on_line_all_the_way(manner, kSteps, 2.5);
   }
+  expect_on_line_all_the_way("fine_ticks", kInMcus, 2.5);
 }
 
 TEST(Lines, EqualMotorsTakeTheTimeOfOne) {
@@ -115,20 +63,20 @@ TEST(Lines, StateTellsTheShareAndTheTimeLeft) {
   EXPECT_FALSE(lab.motor("m01").line);
 }
 
-TEST(Lines, AStopOfOneLeavesAllOnTheLine) {
+void expect_on_line_after_a_stop(const std::vector<std::int64_t>& steps) {
   for (const char* manner : {"fine", "coarse"}) {
     for (const double after_s : {0.105, 0.12, 0.15, 0.3, 0.6, 0.9, 1.0}) {
       SCOPED_TRACE(std::string(manner) + " " + std::to_string(after_s));
       Lab lab(hall(2, 2, manner));
       lab.connect();
-      const auto move = lab.send(line_to(kMotors, {-2500, 1201, -40, 2499}));
+      const auto move = lab.send(line_to(kMotors, steps));
       lab.run_for(after_s);
       EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m03"})).result, "done");
       const Answer result = lab.wait(move);
       EXPECT_EQ(result.result, "stopped");
       EXPECT_THAT(result.reason, HasSubstr("stopped on request, asked for by command"));
       EXPECT_THAT(result.reason, Not(HasSubstr("off it")));
-      EXPECT_LT(off_line(lab, kMotors, {-2500, 1201, -40, 2499}), 0.8);
+      EXPECT_LT(off_line(lab, kMotors, steps), 0.8);
       lab.run_for(0.5);
       EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0u);
       EXPECT_EQ(lab.mcu_health("hall:2").rejected_frames, 0u);
@@ -139,15 +87,20 @@ TEST(Lines, AStopOfOneLeavesAllOnTheLine) {
   }
 }
 
-TEST(Lines, PausesAndGoesOn) {
+TEST(Lines, AStopOfOneLeavesAllOnTheLine) {
+  expect_on_line_after_a_stop({-2500, 1201, -40, 2499});
+  expect_on_line_after_a_stop({-2500, 2500, -40, 2500});  // by the MCUs
+}
+
+void expect_pause(const std::vector<std::int64_t>& steps) {
   for (const char* manner : {"fine", "coarse"}) {
     SCOPED_TRACE(manner);
     Lab lab(hall(2, 2, manner));
     lab.connect();
-    const auto move = lab.send(line_to(kMotors, kSteps));
+    const auto move = lab.send(line_to(kMotors, steps));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 700; });
     EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m02"}})).reason, "paused: 4 motors");
-    EXPECT_LT(off_line(lab, kMotors, kSteps), 0.8);
+    EXPECT_LT(off_line(lab, kMotors, steps), 0.8);
     EXPECT_TRUE(lab.motor("m01").paused);
     EXPECT_FALSE(lab.has_result(move));
     const std::int64_t stands = lab.shaft_steps("m01");
@@ -156,17 +109,22 @@ TEST(Lines, PausesAndGoesOn) {
     EXPECT_EQ(lab.wait(lab.send(api::Resume{{"m01"}})).reason, "resumed: 4 motors");
     double most = 0;
     lab.run_until([&] {
-      most = std::max(most, off_line(lab, kMotors, kSteps));
+      most = std::max(most, off_line(lab, kMotors, steps));
       return lab.has_result(move);
     });
     EXPECT_LT(most, 2.5);
     EXPECT_EQ(lab.last_reply(move).result, "reached");
     for (std::size_t i = 0; i < kMotors.size(); ++i) {
-      EXPECT_EQ(lab.shaft_steps(kMotors[i]), kSteps[i]);
+      EXPECT_EQ(lab.shaft_steps(kMotors[i]), steps[i]);
     }
     EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0u);
     EXPECT_EQ(lab.mcu_health("hall:2").rejected_frames, 0u);
   }
+}
+
+TEST(Lines, PausesAndGoesOn) {
+  expect_pause(kSteps);
+  expect_pause(kInMcus);
 }
 
 TEST(Lines, ResumedWhileTheyRampDownTheyStandFirst) {
@@ -233,16 +191,19 @@ TEST(Lines, ANearerEndAndAnotherSpeed) {
 }
 
 TEST(Lines, AnEndThatComesTooLateIsReachedFromBeyond) {
-  Lab lab(hall(2, 2));
-  lab.connect();
-  const auto move = lab.send(line_to(kMotors, {4000, -2000, 1000, 0}));
-  lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
-  const auto back = lab.send(line_to(kMotors, {400, -200, 100, 0}));
-  EXPECT_EQ(lab.wait(back).result, "reached");
-  EXPECT_EQ(lab.last_reply(move).result, "stopped");
-  EXPECT_EQ(lab.shaft_steps("m01"), 400);
-  EXPECT_EQ(lab.shaft_steps("m02"), -200);
-  EXPECT_EQ(lab.shaft_steps("m03"), 100);
+  for (const std::int64_t steps : {-200, -400}) {  // the latter by the MCUs
+    SCOPED_TRACE(steps);
+    Lab lab(hall(2, 2));
+    lab.connect();
+    const auto move = lab.send(line_to(kMotors, {4000, 10 * steps, 0, 4000}));
+    lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
+    const auto back = lab.send(line_to(kMotors, {400, steps, 0, 400}));
+    EXPECT_EQ(lab.wait(back).result, "reached");
+    EXPECT_EQ(lab.last_reply(move).result, "stopped");
+    EXPECT_EQ(lab.shaft_steps("m01"), 400);
+    EXPECT_EQ(lab.shaft_steps("m02"), steps);
+    EXPECT_EQ(lab.shaft_steps("m04"), 400);
+  }
 }
 
 TEST(Lines, WhatIsNotOnTheLineIsRefused) {
@@ -312,23 +273,25 @@ TEST(Lines, BacklashIsTakenUpWhenAllHaveArrived) {
 }
 
 TEST(Lines, OneThatIsLostEndsTheOthersAlongTheLine) {
-  Lab lab(hall(2, 2));
-  lab.connect();
-  const auto move = lab.send(line_to(kMotors, {6000, -3001, 1500, 5999}));
-  lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
-  lab.bus(0).reboot(1, 100'000'000);
-  const Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "link");
-  EXPECT_EQ(result.motor_results[0], "stopped");
-  EXPECT_EQ(result.motor_results[2], "link");
-  EXPECT_LT(off_line(lab, {"m01", "m02"}, {6000, -3001}), 0.8) << "those that went on are on it";
-  EXPECT_LT(lab.shaft_steps("m01"), 6000);
+  for (const std::int64_t steps : {-3001, -6000}) {  // the latter by the MCUs
+    SCOPED_TRACE(steps);
+    Lab lab(hall(2, 2));
+    lab.connect();
+    const auto move = lab.send(line_to(kMotors, {6000, steps, 500, 6000}));
+    lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
+    lab.bus(0).reboot(1, 100'000'000);
+    const Answer result = lab.wait(move);
+    EXPECT_EQ(result.result, "link");
+    EXPECT_EQ(result.motor_results[0], "stopped");
+    EXPECT_EQ(result.motor_results[2], "link");
+    EXPECT_LT(off_line(lab, {"m01", "m02"}, {6000, steps}), 0.8) << "those that went on are on it";
+    EXPECT_LT(lab.shaft_steps("m01"), 6000);
+  }
 }
 
-TEST(Lines, ALimitSwitchOfOneEndsTheOthersAlongTheLine) {
+void expect_end_at_a_limit(const std::vector<std::int64_t>& steps, const std::string& limited_by) {
   Lab lab(with_keys(hall(2, 2), "m03", "limit = \"positive\"\n"));
   lab.connect();
-  const std::vector<std::int64_t> steps{6000, -3001, 1500, 5999};
   const auto move = lab.send(line_to(kMotors, steps));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
   lab.bus(0).mcu(1).set_inputs({0b001, 0});
@@ -336,11 +299,17 @@ TEST(Lines, ALimitSwitchOfOneEndsTheOthersAlongTheLine) {
   EXPECT_EQ(result.result, "limit");
   EXPECT_THAT(result.motor_results, ElementsAre("stopped", "stopped", "limit", "stopped"));
   EXPECT_THAT(result.reason, HasSubstr("m03: stopped by its limit switch at the positive end"));
-  EXPECT_THAT(result.reason, HasSubstr("; the line was limited by m04, which was left at "));
+  EXPECT_THAT(result.reason,
+              HasSubstr("; the line was limited by " + limited_by + ", which was left at "));
   EXPECT_THAT(result.reason, HasSubstr("; m03 stands "));
-  EXPECT_LT(off_line(lab, {"m01", "m02", "m04"}, {6000, -3001, 5999}), 0.8);
+  EXPECT_LT(off_line(lab, {"m01", "m02", "m04"}, {steps[0], steps[1], steps[3]}), 0.8);
   const std::string why = lab.wait(lab.send(line_to(kMotors, steps))).reason;
   EXPECT_THAT(why, HasSubstr("m03: its limit switch at the positive end is active"));
+}
+
+TEST(Lines, ALimitSwitchOfOneEndsTheOthersAlongTheLine) {
+  expect_end_at_a_limit({6000, -3001, 1500, 5999}, "m04");
+  expect_end_at_a_limit({6000, -6000, 6000, 301}, "m01");  // by the MCUs
 }
 
 // Frames are lost: what is told of the line is where its motors stand.
@@ -352,7 +321,10 @@ TEST(Lines, WhatIsToldIsTrueOnABadLine) {
     std::mt19937 random(seed);
     lab.on_send = [&random](std::size_t, std::vector<std::uint8_t>&) { return random() % 12 != 0; };
     const std::vector<std::string> motors{"m01", "m02", "m03", "m04", "m05", "m06"};
-    const std::vector<std::int64_t> steps{9000, -4001, 1700, 12, -8999, 0};
+    // Some are made by the MCUs.
+    const std::vector<std::int64_t> steps =
+        seed % 4 < 2 ? std::vector<std::int64_t>{9000, -4001, 1700, 12, -8999, 0}
+                     : std::vector<std::int64_t>{9000, -9000, 170, 12, -9000, 0};
     const auto move = lab.send(line_to(motors, steps));
     lab.run_for(0.3 + 0.1 * static_cast<double>(seed));
     if (seed % 3 != 0) lab.wait(lab.send(api::Pause{{"m02"}}));

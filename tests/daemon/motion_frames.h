@@ -33,7 +33,7 @@ struct MotionFrames {
  private:
   static bool carries_motion(const bushd_frame& frame) {
     return frame.type == BUSHD_MSG_TICKS || frame.type == BUSHD_MSG_TABLE_TICKS ||
-           frame.type == BUSHD_MSG_TABLE_RUN;
+           frame.type == BUSHD_MSG_TABLE_RUN || frame.type == BUSHD_MSG_LINE_RUN;
   }
 
   bushd_receiver receiver_{};

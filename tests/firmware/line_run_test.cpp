@@ -306,9 +306,21 @@ TEST_P(LineRun, IsRampedDownAlongTheLineWhenNoSyncTellsTheTime) {
   EXPECT_EQ(rig.mcu().line.motors, 0);
 }
 
-TEST_P(LineRun, ThatWaitsIsCancelledByThatSilence) {
-  ASSERT_EQ(rig.configure(format, Rig::kTickNs, 30), BUSHD_OK);
+TEST_P(LineRun, GoesOnForThatLongFromItsBeginning) {
+  constexpr std::uint16_t kSilence = 60;
+  ASSERT_EQ(rig.configure(format, Rig::kTickNs, kSilence), BUSHD_OK);
   rig.sync(sync_telling(rig, 7000, rig.tick()));
+  const std::uint32_t first = rig.first_open() + 40;
+  ASSERT_EQ(start(rig, {.first = first, .motors = kMotors, .longest = 333}), BUSHD_OK);
+  rig.pass_until_rest();
+  auto run = Reference::move(law, 333);
+  run.ramp_down_at(std::uint64_t{kSilence} * Rig::kTickNs);
+  expect_on_line(rig, kMotors, 333, static_cast<std::uint32_t>(run.steps()));
+  EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_LINK);
+}
+
+TEST_P(LineRun, ThatWaitsIsCancelledBySilence) {
+  ASSERT_EQ(rig.configure(format, Rig::kTickNs, 30), BUSHD_OK);
   ASSERT_EQ(start(rig, {.first = rig.first_open() + 100, .motors = kMotors, .longest = 333}),
             BUSHD_OK);
   rig.pass(28);

@@ -306,7 +306,7 @@ TEST_F(Replacing, TooLateToArriveFailsUnsent) {
 
 TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
   source.end = [](std::uint8_t) { return Tick{5000}; };
-  streams.begin_table_run(kFirst, 0, 1040, {-700});
+  streams.begin_run(kFirst, 0, 1040, link::TableRun{-700});
   ASSERT_TRUE(streams.send_stream(kNowUs, kFilling));
   const auto sent = take_sent(writer);
   ASSERT_EQ(sent.size(), 1u);
@@ -317,6 +317,85 @@ TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
   known_until(0, 1100);
   streams.drop(kFirst, 0);
   EXPECT_EQ(streams.next_tick(kFirst, 0), 1100);
+}
+
+class LineRuns : public Scheduling {
+ protected:
+  static link::LineRun part(std::uint32_t increment, int direction) {
+    return {.slot = 3,
+            .floor = 9,
+            .longest = 700,
+            .from = 100,
+            .steps = 500,
+            .ticks = 800,
+            .increment = increment,
+            .direction = direction};
+  }
+  void SetUp() override {
+    // The motors' own last steps.
+    source.end = [](std::uint8_t motor) { return motor == 0 ? Tick{1840} : Tick{1200}; };
+    streams.begin_run(kFirst, 0, 1040, part(700, 1));
+    streams.begin_run(kFirst, 2, 1040, part(5, -1));
+  }
+};
+
+TEST_F(LineRuns, AreOneFrameForAllMotors) {
+  EXPECT_TRUE(streams.runs_line());
+  ASSERT_TRUE(streams.send_stream(kNowUs, kFilling));
+  const auto sent = take_sent(writer);
+  ASSERT_EQ(sent.size(), 1u);
+  ASSERT_EQ(sent[0].type, BUSHD_MSG_LINE_RUN);
+  bushd_line_run message{};
+  ASSERT_EQ(bushd_decode_line_run(sent[0].payload.data(), sent[0].payload.size(), &message),
+            BUSHD_OK);
+  EXPECT_EQ(message.first_tick, 1040u);
+  EXPECT_EQ(message.line.slot, 3);
+  EXPECT_EQ(message.line.floor, 9);
+  EXPECT_EQ(message.line.longest, 700u);
+  EXPECT_EQ(message.line.from, 100u);
+  EXPECT_EQ(message.line.steps, 500u);
+  ASSERT_EQ(message.line.count, 2);
+  const std::uint8_t* at = message.line.entries;
+  const bushd_line_entry first = bushd_next_line_entry(&at);
+  const bushd_line_entry second = bushd_next_line_entry(&at);
+  EXPECT_EQ(first.motor, 0);
+  EXPECT_EQ(first.increment, 700u);
+  EXPECT_EQ(second.motor, 2);
+  EXPECT_EQ(second.direction, -1);
+  EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
+}
+
+TEST_F(LineRuns, LostFrameIsSentAgain) {
+  ASSERT_TRUE(streams.send_stream(kNowUs, kFilling));
+  take_sent(writer);
+  streams.follow_report(kFirst);
+  ASSERT_TRUE(streams.send_stream(kNowUs, kFilling));
+  EXPECT_EQ(take_sent(writer)[0].type, BUSHD_MSG_LINE_RUN);
+  // Then the report shows it.
+  report().running = report().moving = 0b101;
+  known_until(0, 1840);
+  known_until(2, 1840);
+  streams.follow_report(kFirst);
+  EXPECT_FALSE(streams.send_stream(kNowUs, kFilling));
+}
+
+// The MCU makes the run to its end for every motor of it.
+TEST_F(LineRuns, ReplacementTakesAllOffTheLine) {
+  ASSERT_TRUE(streams.send_stream(kNowUs, kFilling));
+  take_sent(writer);
+  report().running = report().moving = 0b101;
+  known_until(0, 1840);
+  known_until(2, 1840);
+  streams.follow_report(kFirst);
+  source.end = [](std::uint8_t motor) { return motor == 0 ? Tick{1330} : Tick{1200}; };
+  streams.replace(kFirst, 0b101, 1300, 1000);
+  ASSERT_TRUE(streams.send_due_replacement(kNowUs));
+  const auto replacement = frame();
+  ASSERT_TRUE(replacement);
+  EXPECT_EQ(replacement->mask, 0b101);
+  EXPECT_EQ(replacement->first, 1300);
+  EXPECT_EQ(replacement->flags, BUSHD_TICKS_REPLACE);
+  EXPECT_FALSE(streams.runs_line());
 }
 
 // A start is urgent, since little is queued; its frame holds no less for that.

@@ -3,7 +3,8 @@ motor makes of it.
 
 A motor with N of the line's L steps makes its step j when the run is at s = (j - 1/2) L / N + 1/2, of which the steps of
 the run are s = 1, 2, ... L, and between two of them the run goes evenly. In the coarse format it makes it with the
-next step of the run. The table of the line has, with r = N / L, all rounded up,
+next step of the run; but an MCU that makes the run itself ("moves": "table") makes it between them, in the slot in which
+s lies, rounded up to 1/256, until the first change. The table of the line has, with r = N / L, all rounded up,
 
     A(k) = max r A_i(floor(r k)),  D(k) = max r D_i(k) for r = 1, else r D_i(max(0, floor(r k) - 1)),  c = max r c_i.
 
@@ -12,9 +13,11 @@ its first step it rises twice as fast, from 0. So the tick of the first step of 
 """
 
 import bisect
+import math
+from fractions import Fraction
 from itertools import accumulate
 
-from check_trace.motion import FIRST_TICK, INTERIOR, LAST_TICK, Move, Step, Table
+from check_trace.motion import FIRST_TICK, INTERIOR, LAST_TICK, PERIODIC, Move, Step, Table
 
 MOST_CODES = 32767
 MOST_UNITS = 2**31 - 1
@@ -148,6 +151,8 @@ class LineMove(Move):
         self._run = Run(envelope, line["to"] - self._from, event.get("floor", 0))
         self._envelope = envelope
         super().__init__({**event, "floor": 0}, table)
+        # Its steps fall between those of the run, too.
+        self._between = self.fine or self.ticks_from == math.inf
         self.direction = self._line_direction
         self._rests = [(-1, self._rest())]  # from which tick of the move on, where it will rest, in steps of the line
         self._known = None
@@ -164,6 +169,7 @@ class LineMove(Move):
 
     def change(self, tick, target_steps=None, floor=0, run_steps=None):
         self._known = None
+        self.ticks_from = min(self.ticks_from, tick)
         if target_steps is not None:
             self.goal_steps = target_steps
         if tick <= self.start_tick:
@@ -192,7 +198,7 @@ class LineMove(Move):
         whole = 2 * self._increment
         for j in range(self._made(self._from) + 1, self._rest() + 1):
             s = (2 * j - 1) * self._longest + self._increment - whole * self._from
-            if not self.fine:
+            if not self._between:
                 s = up(s, whole) * whole
             before, rest = divmod(s, whole)
             units = ends[before] * whole
@@ -232,7 +238,7 @@ class LineMove(Move):
         rest = next(rest for since, rest in reversed(self._rests) if tick >= since)
         run = bisect.bisect_right(self._run.ends, at_ns // self._envelope.unit_ns)
         s = self._from + run
-        if not self.fine:
+        if not self._between:
             return 256 * min(self._made(s), rest)
         part = 0
         if run < len(self._run.delays):
@@ -240,7 +246,17 @@ class LineMove(Move):
             part = since_ns * 256 // (self._run.delays[run] * self._envelope.unit_ns)
         twice = 2 * self._increment * (256 * s + part)
         ruled = (twice + 256 * (self._longest - self._increment)) // (2 * self._longest)
-        return min(ruled, twice // self._longest, 256 * rest)
+        place = min(ruled, twice // self._longest, 256 * rest)
+        return place if self.fine else place // 256 * 256
+
+    def _time_in_mcu(self, j):
+        """When an MCU that makes the run itself makes step j of the motor's line, and how long a 256th of the run's step is
+        there: in ns."""
+        parts = up(128 * (2 * j - 1) * self._longest, self._increment) + 128 - 256 * self._from
+        before = up(parts, 256) - 1
+        ends = self._run.ends[before - 1] if before else 0
+        part_ns = Fraction(self._run.delays[before] * self._envelope.unit_ns, 256)
+        return ends * self._envelope.unit_ns + (parts - 256 * before) * part_ns, part_ns
 
     def steps(self, slots):
         times = self.times_ns()
@@ -256,7 +272,13 @@ class LineMove(Move):
                 place = LAST_TICK if after == len(times) else FIRST_TICK if made == 0 else INTERIOR
                 bound_ns = self._bound_ns(tick, place, q1 - q0, slots)
             for n in range(made, after):
-                slot = min((256 * (first + n) + crossing - q0) * slots // (q1 - q0), slots - 1)
+                if self.start_tick + tick < self.ticks_from:
+                    at_ns, part_ns = self._time_in_mcu(first + n + 1)
+                    slot = min(math.floor((at_ns - tick * self.tick_ns) * slots / self.tick_ns), slots - 1)
+                    if self.emission not in PERIODIC:
+                        bound_ns = self.tick_ns / slots + float(part_ns)
+                else:
+                    slot = min((256 * (first + n) + crossing - q0) * slots // (q1 - q0), slots - 1)
                 begin_ns = (self.start_tick + tick) * self.tick_ns
                 yield Step(
                     move=self,

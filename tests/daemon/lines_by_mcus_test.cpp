@@ -1,0 +1,110 @@
+// Lines whose run the MCUs make themselves: what goes over the bus, where the motors are, and where
+// a lost link leaves them.
+#include <tuple>
+
+#include "daemon/motion_frames.h"
+#include "daemon/on_line.h"
+
+namespace bushd::test {
+namespace {
+
+TEST(LinesByMcus, AllMotorsAreOnThemToAStep) {
+  for (const char* manner : {"fine", "coarse", "coarse_table"}) {
+    expect_on_line_all_the_way(manner, kInMcus, 1.5);
+  }
+}
+
+// Of motors with one table the line's is that one, unless their ways are nearly as long.
+TEST(LinesByMcus, OneFrameTellsAnMcuAllOfIt) {
+  for (const auto& [manner, steps, most] :
+       std::vector<std::tuple<const char*, std::int64_t, int>>{{"fine", 2000, 2},
+                                                               {"coarse", -1, 2},
+                                                               {"fine", 1999, 1000},
+                                                               {"fine_ticks", 2000, 1000}}) {
+    SCOPED_TRACE(std::string(manner) + " " + std::to_string(steps));
+    Lab lab(hall(2, 2, manner));
+    lab.connect();
+    auto line = line_to({"m01", "m02", "m03"}, {2000, -2000, steps});
+    line.dry_run = true;
+    const auto plan = lab.wait(lab.send(line)).plan;
+    line.dry_run = false;
+    MotionFrames sent;
+    lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
+      sent.add(bytes);
+      return true;
+    };
+    EXPECT_EQ(lab.wait(lab.send(line)).result, "reached");
+    lab.run_for(0.3);
+    if (most == 2) {
+      EXPECT_EQ(sent.frames, 2);
+    } else {
+      EXPECT_GT(sent.frames, 8);
+    }
+    ASSERT_TRUE(plan && plan->traffic);
+    EXPECT_EQ(plan->traffic->frames, sent.frames);
+    EXPECT_EQ(lab.shaft_steps("m03"), steps);
+  }
+}
+
+// All MCUs go by the time that the last SYNC has told, so they ramp down from the same tick.
+TEST(LinesByMcus, ALostLinkLeavesAllOnTheLine) {
+  const std::vector<std::int64_t> steps{20000, -20000, 3, 1201};
+  for (const char* manner : {"fine", "coarse"}) {
+    for (const double after_s : {0.3, 1.0, 1.61}) {
+      SCOPED_TRACE(std::string(manner) + " " + std::to_string(after_s));
+      Lab lab(hall(2, 2, manner));
+      lab.connect();
+      const auto move = lab.send(line_to(kMotors, steps));
+      lab.run_for(after_s);
+      const std::int64_t before = lab.shaft_steps("m01");
+      lab.unplug(0);
+      double most = 0;
+      for (int i = 0; i < 300; ++i) {
+        lab.run_for(0.01);
+        most = std::max(most, off_line(lab, kMotors, steps));
+      }
+      EXPECT_LT(most, 1.0) << "ticks of two MCUs meet within some microseconds";
+      EXPECT_LT(off_line(lab, kMotors, steps), 0.8);
+      const std::int64_t stands = lab.shaft_steps("m01");
+      EXPECT_GT(stands, before + 500) << "for a second they go on";
+      EXPECT_LT(stands, 20000);
+      lab.run_for(1);
+      EXPECT_EQ(lab.shaft_steps("m01"), stands);
+      EXPECT_EQ(lab.last_reply(move).result, "link");
+      lab.plug(0);
+      lab.run_for(3);
+      for (const std::string& motor : kMotors) {
+        EXPECT_EQ(lab.motor(motor).position_steps, lab.shaft_steps(motor));
+      }
+      lab.wait(lab.send(Ask::kClearFaults, {}));
+      EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, {0, 0, 0, 0}))).result, "reached");
+    }
+  }
+}
+
+TEST(LinesByMcus, TakeANearerEndAndAnotherSpeed) {
+  for (const char* manner : {"fine", "coarse"}) {
+    SCOPED_TRACE(manner);
+    Lab lab(hall(2, 2, manner));
+    lab.connect();
+    const std::vector<std::int64_t> steps{6000, -6000, 401, 6000};
+    const auto move = lab.send(line_to(kMotors, steps));
+    lab.run_until([&] { return lab.shaft_steps("m01") >= 1000; });
+    auto slower = line_to(kMotors, steps);
+    slower.speed = api::Speed{.per_s = 300, .in_steps = true};
+    const auto second = lab.send(slower);
+    lab.run_for(0.4);
+    EXPECT_LT(off_line(lab, kMotors, steps), 2.0);
+    const auto third = lab.send(line_to(kMotors, {3000, -3000, 200, 3000}));
+    EXPECT_EQ(lab.wait(third).result, "reached") << lab.last_reply(third).reason;
+    EXPECT_EQ(lab.last_reply(move).result, "stopped");
+    EXPECT_EQ(lab.last_reply(second).result, "stopped");
+    EXPECT_EQ(lab.shaft_steps("m01"), 3000);
+    EXPECT_EQ(lab.shaft_steps("m02"), -3000);
+    EXPECT_EQ(lab.shaft_steps("m03"), 200);
+    EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0u);
+  }
+}
+
+}  // namespace
+}  // namespace bushd::test
