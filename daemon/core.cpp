@@ -134,6 +134,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::Release& r) { pauses_.request(now, asker, r); },
                  [&](const api::Configure& r) { settings_.request(asker, r); },
                  [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
+                 [&](const api::MovePath& r) { lines_.request(now, asker, r); },
                  [&](const api::Camac& r) { camac_.request(now, asker, r); },
              },
              request);
@@ -153,11 +154,12 @@ void Core::keep_up(std::int64_t now_us) {
 
 void Core::work() {
   if (moves_.begins()) return moves_.work();
+  if (lines_.plans()) return lines_.work();
   dry_runs_.work();
 }
 
 std::int64_t Core::next_wake_us() const {
-  if (moves_.begins() || !dry_runs_.idle()) return 0;
+  if (moves_.begins() || lines_.plans() || !dry_runs_.idle()) return 0;
   std::int64_t wake = std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(),
                                 idle_drivers_.next_wake_us(), jogs_.next_wake_us()});
   for (const BusId id : installation_.buses()) {

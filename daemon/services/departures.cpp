@@ -25,6 +25,16 @@ std::optional<std::vector<MotorId>> Departures::motors_of(const api::Request& re
                               if (r.dry_run) return std::vector<MotorId>();
                               return installation_.find(r.motors);
                             },
+                            [&](const api::MovePath& r) -> Result<std::vector<MotorId>> {
+                              // When all of its points are here.
+                              const std::size_t rows =
+                                  r.positions.size() / std::max<std::size_t>(r.motors.size(), 1);
+                              const bool last = r.first_row >= 0 && r.rows >= 0 &&
+                                                static_cast<std::size_t>(r.first_row) + rows >=
+                                                    static_cast<std::size_t>(r.rows);
+                              if (r.dry_run || !last) return std::vector<MotorId>();
+                              return installation_.find(r.motors);
+                            },
                             [&](const api::Arm& r) { return installation_.find(r.motors); },
                             [&](const api::Jog& r) -> Result<std::vector<MotorId>> {
                               if (r.per_s == 0 || r.renew) return std::vector<MotorId>();

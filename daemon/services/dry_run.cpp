@@ -27,6 +27,14 @@ api::MovePlan::Motor plan_of(const std::string& name, bushd_table table, std::in
 // As long as the run, which is as fast as its share of it.
 api::MovePlan::Motor plan_of_line(const std::string& name, const motion::LineShare& share,
                                   std::int64_t steps, std::uint16_t floor) {
+  if (share.track) {
+    const motion::Path& path = share.track->path();
+    const double ns = static_cast<double>(share.track->units()) * path.unit_ns();
+    return {.motor = name,
+            .steps = steps,
+            .duration_us = static_cast<std::int64_t>(ns / 1000),
+            .peak_steps_per_s = path.most_steps_per_s(share.motor)};
+  }
   api::MovePlan::Motor plan = plan_of(name, share.table->view(), share.longest, floor);
   plan.steps = steps;
   plan.peak_steps_per_s *= static_cast<double>(share.increment) / share.longest;
@@ -71,6 +79,14 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
     if (line) of_lines = std::max(of_lines, motors_.back().start);
     if (steps == 0 || buses_.contains(mcu.config.bus)) continue;
     buses_.try_emplace(mcu.config.bus, installation[mcu.config.bus].master.snapshot(now_us));
+  }
+  if (!parts.empty() && parts.front().line && parts.front().line->track) {
+    const motion::Path& path = parts.front().line->track->path();
+    const std::vector<std::uint64_t> units = path.units_at_points();
+    for (std::size_t i = 0; i < units.size() && units.size() <= api::MovePlan::kMostPoints; ++i) {
+      const double ns = static_cast<double>(units[i]) * path.unit_ns();
+      plan_.points_us.push_back(static_cast<std::int64_t>(ns / 1000));
+    }
   }
   for (Motor& motor : motors_) motor.start = std::max(motor.start, of_lines);
   rehearsed_ = buses_.begin();

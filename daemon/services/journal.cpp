@@ -40,7 +40,13 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
                          {"start_tick", start},
                          {"steps", steps},
                          {"from_steps", motor.axis().from_steps()}};
-  if (const auto& share = motor.axis().line()) {
+  const auto& share = motor.axis().line();
+  if (share && share->track) {
+    line["path"] = {{"line", motor.as<motion::OnLine>()->line},
+                    {"way", share->way},
+                    {"from", share->from},
+                    {"to", share->to}};
+  } else if (share) {
     // Of all motors of a line the same, but for the increment.
     line["line"] = {{"line", motor.as<motion::OnLine>()->line},
                     {"way", share->way},
@@ -72,6 +78,24 @@ std::uint64_t Journal::line_laid(std::uint32_t longest, const std::vector<OnWay>
     line["motors"].push_back({{"motor", installation_[id].name()},
                               {"increment", increment},
                               {"floor", floor},
+                              {"table_file", table.path()},
+                              {"table_sha256", table.content_hash()}});
+  }
+  outputs_.move_log(line.dump());
+  return last_id_;
+}
+
+// Its points are the client's; here is by which tables, and how long it is.
+std::uint64_t Journal::path_laid(const std::vector<MotorId>& motors, const motion::Path& path) {
+  nlohmann::json line = {
+      {"event", "path"},         {"way", ++last_id_},         {"segments", path.segments()},
+      {"longest", path.steps()}, {"unit_ns", path.unit_ns()}, {"units", path.units()}};
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const tables::Table& table = *installation_.table_of(motors[i]);
+    line["motors"].push_back({{"motor", installation_[motors[i]].name()},
+                              {"from_steps", path.point(0, i)},
+                              {"to_steps", path.point(path.segments(), i)},
+                              {"floor", path.motors()[i].floor},
                               {"table_file", table.path()},
                               {"table_sha256", table.content_hash()}});
   }

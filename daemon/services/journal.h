@@ -26,6 +26,7 @@ class Journal final : public Service {
     std::uint16_t floor;
   };
   std::uint64_t line_laid(std::uint32_t longest, const std::vector<OnWay>& motors);
+  std::uint64_t path_laid(const std::vector<MotorId>& motors, const motion::Path& path);
   void changed(MotorId motor, const motion::Change& change);
   void ended(MotorId motor, std::string_view result);
   void position_set(MotorId motor, std::int64_t from_steps, const api::Asker& by);

@@ -151,7 +151,7 @@ void Lines::start(std::int64_t now_us, const api::Asker& asker, Line line) {
   asker.answer(api::Accepted{});
   const std::uint64_t number = ++last_number_;
   open(asker, number, line);
-  if (line.way.longest() == 0) {
+  if (line.longest() == 0) {
     // Each by a run of no steps, as it would alone.
     for (const MotorId motor : line.motors) {
       const auto stands = moves_.go_on(now_us, motor, installation_[motor].position_steps());
@@ -167,6 +167,10 @@ void Lines::start(std::int64_t now_us, const api::Asker& asker, Line line) {
 }
 
 void Lines::log(Line& line) {
+  if (line.path) {
+    line.path->set_number(journal_.path_laid(line.motors, *line.path));
+    return;
+  }
   std::vector<Journal::OnWay> motors;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     motors.push_back({.motor = line.motors[i],
@@ -179,15 +183,15 @@ void Lines::log(Line& line) {
 void Lines::open(const api::Asker& asker, std::uint64_t number, const Line& line) {
   open_.open(asker, line.motors, OpenMoves::Purpose::kLine);
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    open_.planned(line.motors[i], static_cast<int>(line.points.size()),
-                  line.way.most_steps_per_s(i));
+    open_.planned(line.motors[i], static_cast<int>(line.points.size()), line.most_steps_per_s(i));
   }
-  if (line.way.longest() == 0) return;
+  if (line.longest() == 0) return;
   open_.conclude(line.motors.front(), [this, number] { return conclusion(number); });
 }
 
 // The MCUs make the run themselves if all of them can: they have its table, and no other line.
 bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
+  if (line.path) return false;
   const bushd_table& table = line.way.table()->view();
   return std::ranges::all_of(installation_.mcus_of(line.motors), [&](McuId id) {
     const Mcu& mcu = installation_[id];
@@ -200,7 +204,7 @@ bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
   });
 }
 
-void Lines::begin_run(std::int64_t now_us, std::uint64_t number, const Line& line,
+void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                       const std::vector<std::size_t>& indices, std::uint32_t to) {
   motion::Tick start = INT64_MIN;
   std::vector<MotorId> motors;
@@ -213,17 +217,18 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, const Line& lin
   const bool by_mcus = in_mcus(number, line);
   for (const std::size_t i : indices) {
     motion::Motor& motor = installation_[line.motors[i]];
-    const bool same_way =
-        motor.is<motion::OnLine>() && motor.axis().line()->table == line.way.table();
+    const auto* before = motor.as<motion::OnLine>();
+    const bool same_way = before != nullptr && before->line == number &&
+                          (line.path || motor.axis().line()->table == line.way.table());
     motion::OnLine on_line;
     on_line.line = number;
     on_line.target_steps = line.points.back().steps[i];
     on_line.to_point = to == line.target;
     on_line.last_run = line.points.size() == 1 && to == line.target;
     const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
-    motion::LineShare share = line.way.share(i, from, to);
+    motion::LineShare share = line.share(i, from, to);
     share.in_mcus = by_mcus;
-    motor.start_line(on_line, std::move(share), start, line.way.floor());
+    motor.start_line(on_line, std::move(share), start, line.path ? 0 : line.way.floor());
   }
   moves_.begin_on_line(motors);
 }
@@ -306,6 +311,7 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   const auto number = number_of(motors);
   if (!number) return refuse(number.error().text());
   Line& line = lines_.at(*number);
+  if (line.path) return refuse(name + " moves on a path; stop it first, or wait for its result");
   if (line.points.size() > 1) {
     return refuse("the line ends in a last approach for backlash; stop it first");
   }
@@ -341,6 +347,11 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
 }
 
 void Lines::step(std::int64_t now_us) {
+  if (!coming_.empty() && coming_.front().line.path->is_planned()) {
+    Coming planned = std::move(coming_.front());
+    coming_.pop_front();
+    begin_path(now_us, std::move(planned));
+  }
   for (auto it = lines_.begin(); it != lines_.end();) {
     it = follow(now_us, it->first, it->second) ? std::next(it) : lines_.erase(it);
   }
@@ -418,6 +429,11 @@ void Lines::go_on(std::int64_t now_us, std::uint64_t number, Line& line) {
     if (installation_[line.motors[i]].axis().line_planned_end() < farthest) behind.push_back(i);
   }
   if (!behind.empty()) return begin_run(now_us, number, line, behind, farthest);
+  if (farthest < line.target && line.path && line.rest->first_step() != farthest) {
+    line.rest = line.path->rest(farthest);
+    line.track.reset();
+  }
+  if (line.path && !line.rest->is_planned()) return;  // as soon as it is
   if (farthest < line.target) return begin_run(now_us, number, line, all, line.target);
   // At a point that is not the last, or beyond one that came too late.
   if (farthest == line.target) line.points.erase(line.points.begin());
@@ -436,6 +452,7 @@ std::string Lines::conclusion(std::uint64_t number) const {
   const bool moves_on = std::ranges::any_of(
       line.motors, [&](MotorId motor) { return on_line(motor, number) != nullptr; });
   if (moves_on) return {};
+  if (line.path) return deviation(line).insert(0, "; the path has ended");
   return fmt::format("; the line was limited by {}{}", limiting(line), deviation(line));
 }
 
@@ -447,14 +464,15 @@ std::string Lines::deviation(const Line& line) const {
   // One that has ended earlier may have begun to move again.
   const auto followed = [&](std::size_t i) {
     const auto& share = installation_[line.motors[i]].axis().line();
-    return share && share->table == line.way.table();
+    return share && (line.path ? share->way == line.path->number() && share->track
+                               : share->table == line.way.table());
   };
   std::vector<std::uint32_t> candidates;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     if (!followed(i)) continue;
     candidates.push_back(installation_[line.motors[i]].axis().line_planned_end());
     // Where MCUs have ramped the run down by themselves nobody has planned it.
-    if (line.way.increment(i) != line.way.longest()) continue;
+    if (line.path || line.way.increment(i) != line.way.longest()) continue;
     const std::int64_t made =
         std::abs(installation_[line.motors[i]].position_steps() - line.way.position_at(i, 0));
     candidates.push_back(
@@ -466,7 +484,7 @@ std::string Lines::deviation(const Line& line) const {
     for (std::size_t i = 0; i < line.motors.size(); ++i) {
       if (!followed(i)) continue;
       const std::int64_t off =
-          std::abs(installation_[line.motors[i]].position_steps() - line.way.position_at(i, step));
+          std::abs(installation_[line.motors[i]].position_steps() - line.position_at(i, step));
       if (off <= most) continue;
       most = off;
       motor = i;
@@ -477,9 +495,9 @@ std::string Lines::deviation(const Line& line) const {
     farthest_off = motor;
   }
   if (least == INT64_MAX) return {};
-  const double percent = 100.0 * at / line.way.longest();
+  const double percent = 100.0 * at / line.longest();
   std::string text =
-      at == line.way.longest() ? "" : fmt::format(", which was left at {:.1f} %", percent);
+      at == line.longest() ? "" : fmt::format(", which was left at {:.1f} %", percent);
   if (least == 0) return text;
   return text + fmt::format("; {} stands {} steps off it",
                             installation_[line.motors[farthest_off]].name(), least);

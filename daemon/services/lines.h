@@ -1,11 +1,13 @@
-// Motors of one bus as one, along a straight line. Each of them has a copy of the line's run
-// (motion/axis.h), begun at the same tick and changed at the same ticks; who does that is Moves.
-// Here is what is about all of them: the line's table, its runs one after the other, and what
-// happens to the others when one does not go on.
+// Motors of one bus as one, along a straight line or a path of several. Each of them has a copy of
+// the line's run (motion/axis.h), begun at the same tick and changed at the same ticks; who does
+// that is Moves. Here is what is about all of them: the line's table, its runs one after the other,
+// and what happens to the others when one does not go on.
 #pragma once
 
 #include <cstdint>
+#include <list>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +17,8 @@
 #include "daemon/services/dry_run.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
+#include "daemon/services/path_points.h"
+#include "motion/path.h"
 #include "motion/way.h"
 
 namespace bushd::daemon {
@@ -31,6 +35,11 @@ class Lines final : public Service {
         dry_runs_(dry_runs) {}
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request);
+  void request(std::int64_t now_us, const api::Asker& asker, const api::MovePath& request);
+
+  // A path is being planned; one slice of that.
+  bool plans() const;
+  void work();
 
   void step(std::int64_t now_us) override;
 
@@ -45,6 +54,23 @@ class Lines final : public Service {
     std::vector<Point> points;    // the one that the way leads to, and those to come
     motion::Way way;
     std::uint32_t target = 0;  // step of the way at which its point is
+    // Of a path, in place of the way: all of it, and what the run that is made, or comes, is of it.
+    std::shared_ptr<motion::Path> path{};
+    std::shared_ptr<motion::Path> rest{};
+    std::shared_ptr<const motion::PathTrack> track{};  // of the whole rest
+    std::vector<tables::TablePtr> tables{};            // that it points to
+
+    std::uint32_t longest() const;
+    std::int64_t position_at(std::size_t motor, std::uint32_t step) const;
+    double most_steps_per_s(std::size_t motor) const;
+    // A motor's share of a run between these steps.
+    motion::LineShare share(std::size_t motor, std::uint32_t from, std::uint32_t to);
+  };
+  // A path that is not planned yet.
+  struct Coming {
+    api::Asker asker;
+    bool dry_run;
+    Line line;
   };
 
   Result<Line> line_of(const api::MoveLine& request) const;
@@ -61,8 +87,18 @@ class Lines final : public Service {
   void open(const api::Asker& asker, std::uint64_t number, const Line& line);
   bool in_mcus(std::uint64_t number, const Line& line) const;
   // Of these of its motors, by place: the part of the way between these steps of it.
-  void begin_run(std::int64_t now_us, std::uint64_t number, const Line& line,
+  void begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                  const std::vector<std::size_t>& indices, std::uint32_t to);
+
+  Result<Line> path_of(const api::MovePath& request) const;
+  Result<std::vector<std::int64_t>> points_of(const std::vector<MotorId>& motors,
+                                              const api::MovePath& request,
+                                              const std::vector<std::uint16_t>& floors) const;
+  Result<std::vector<std::uint16_t>> floors_of(MotorId motor, const api::MovePath& request,
+                                               const std::vector<std::int64_t>& points,
+                                               std::uint16_t floor) const;
+  Result<void> may_begin(const Line& line) const;
+  void begin_path(std::int64_t now_us, Coming coming);
 
   // A request for motors that move.
   Result<std::uint64_t> number_of(const std::vector<MotorId>& motors) const;
@@ -89,6 +125,8 @@ class Lines final : public Service {
   OpenMoves& open_;
   DryRuns& dry_runs_;
   std::map<std::uint64_t, Line> lines_;
+  PathPoints path_points_;
+  std::list<Coming> coming_;
   std::uint64_t last_number_ = 0;
 };
 

@@ -55,6 +55,9 @@ struct MovePlan {
   std::optional<Traffic> traffic{};  // none: it is too much to be counted
   std::string limited_by{};          // of a line: the motor that makes it take so long
   std::vector<Motor> motors{};       // in the request's order, each leg of a motor by itself
+  // Of a path of at most kMostPoints: when each of its points is reached, from the first tick on.
+  std::vector<std::int64_t> points_us{};
+  static constexpr std::size_t kMostPoints = 2048;
 };
 
 // One of the tables that the daemon finds.

@@ -32,7 +32,8 @@ constexpr std::array<std::string_view, std::variant_size_v<Request::variant>> kN
     "hold",
     "release",
     "move line",
-    "camac"};
+    "camac",
+    "move path"};
 
 }  // namespace
 

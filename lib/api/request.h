@@ -76,6 +76,33 @@ struct MoveLine {
   static constexpr std::size_t kMostMotors = 127;
 };
 
+// Motors of one bus move from where they stand to the first of these points and on from point to
+// point, along straight lines and by one run. Points may come in several requests of a client, one
+// after the other: each but the last has kDone as its result as soon as it is taken, and the last
+// one begins the motion. The first one drops what the client has not finished. Motors make no last
+// approach for backlash. Stops, pauses and limits of one of them ramp all down along the path.
+// Result: as of MoveLine.
+struct MovePath {
+  enum class Corners {
+    kContinuous,  // passed at speeds at which no motor jumps by more than it starts with from rest
+    kExact        // rest at each point
+  };
+  MotorNames motors{};         // at least one, at most MoveLine::kMostMotors, none twice
+  std::int32_t rows = 0;       // points of the whole path, 1..kMostRows
+  std::int32_t first_row = 0;  // of this request; as many as have been taken before
+  std::vector<double>
+      positions{};  // of all motors, row by row, in their units; not above kMostValues
+  // Of a single motor only: its speed is not exceeded on the way to that row; 0: as below. None, or
+  // as many as rows.
+  std::vector<double> speeds{};
+  Corners corners = Corners::kContinuous;
+  bool dry_run = false;          // result kDone with a MovePlan
+  std::optional<Speed> speed{};  // no motor exceeds it; none: as fast as tables allow
+
+  static constexpr std::int32_t kMostRows = 100'000;
+  static constexpr std::size_t kMostValues = 4096;
+};
+
 // Ramps these motors down; none named: all. Result kDone once they stand. Also disarms, and ends
 // homing. Never refused, but for an unknown motor.
 struct Stop {
@@ -249,7 +276,7 @@ struct Camac {
 struct Request : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
                               UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare,
                               ListTables, GetTable, SetTable, Confirm, GetHistory, Configure, Jog,
-                              Pause, Resume, Hold, Release, MoveLine, Camac> {
+                              Pause, Resume, Hold, Release, MoveLine, Camac, MovePath> {
   using variant::variant;
   Request();
   Request(const Request&);

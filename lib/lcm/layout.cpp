@@ -6,7 +6,7 @@ namespace bushd::lcm {
 namespace {
 
 constexpr Layout kTableRef{"sis"};
-constexpr Layout kMovePlan{"llllsnSLLD"};
+constexpr Layout kMovePlan{"llllsnSLLDnL"};
 constexpr Layout kTable{"ssislinInI"};
 constexpr Layout kPastMotion{"lssllssss"};
 constexpr Layout kTableEntry{"stsidd", {&kTableRef}};
@@ -50,6 +50,7 @@ BUSHD_LAYOUT(home_t, "tdbnSb", {&kRequest})
 BUSHD_LAYOUT(jog_t, "tsdblbl", {&kRequest})
 BUSHD_LAYOUT(list_tables_t, kBare)
 BUSHD_LAYOUT(move_line_t, "tbbdbdnT", {&kRequest, &kMotorAmount})
+BUSHD_LAYOUT(move_path_t, "tiibbdbnSnDnD", {&kRequest})
 BUSHD_LAYOUT(move_t, "tbbdbnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(pause_t, kMotors)
 BUSHD_LAYOUT(position_compare_t, "ttbll", {&kRequest, &kMotorAmount})

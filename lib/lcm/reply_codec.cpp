@@ -68,6 +68,8 @@ move_plan_t plan_message(const api::MovePlan& plan, Piece<api::MovePlan::Motor> 
     message.peak_steps_per_s.push_back(motor.peak_steps_per_s);
   }
   message.motor_count = count(motors);
+  message.points_us = plan.points_us;
+  message.point_count = count(plan.points_us);
   return message;
 }
 
@@ -85,6 +87,7 @@ api::MovePlan plan_of(const move_plan_t& message) {
                            .duration_us = message.motor_duration_us[i],
                            .peak_steps_per_s = message.peak_steps_per_s[i]});
   }
+  plan.points_us = message.points_us;
   return plan;
 }
 

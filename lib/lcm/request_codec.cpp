@@ -103,6 +103,37 @@ std::optional<api::Request> from_message(const move_line_t& message) {
   return move;
 }
 
+move_path_t to_message(const api::MovePath& path) {
+  move_path_t message{};
+  message.rows = path.rows;
+  message.first_row = path.first_row;
+  message.corners =
+      path.corners == api::MovePath::Corners::kExact ? move_path_t::EXACT : move_path_t::CONTINUOUS;
+  message.dry_run = path.dry_run ? 1 : 0;
+  put_speed(message, path.speed);
+  put_motors(message, path.motors);
+  message.positions = path.positions;
+  message.value_count = count(path.positions);
+  message.speeds = path.speeds;
+  message.speed_count = count(path.speeds);
+  return message;
+}
+std::optional<api::Request> from_message(const move_path_t& message) {
+  if (message.corners != move_path_t::CONTINUOUS && message.corners != move_path_t::EXACT) {
+    return std::nullopt;
+  }
+  return api::MovePath{.motors = message.motors,
+                       .rows = message.rows,
+                       .first_row = message.first_row,
+                       .positions = message.positions,
+                       .speeds = message.speeds,
+                       .corners = message.corners == move_path_t::EXACT
+                                      ? api::MovePath::Corners::kExact
+                                      : api::MovePath::Corners::kContinuous,
+                       .dry_run = message.dry_run != 0,
+                       .speed = speed_of(message)};
+}
+
 template <class Message>
 Message motors_message(const api::MotorNames& motors) {
   Message message{};
@@ -378,7 +409,7 @@ std::optional<ClientMessage> decode_get_status(Payload payload) {
 using Decoder = std::optional<ClientMessage> (*)(Payload);
 
 // A new request is a line here. Requests first, in the order of api::Request.
-constexpr std::array<std::pair<std::string_view, Decoder>, 29> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 30> kDecoders = {{
     {"MOVE", decode_request<move_t>},
     {"STOP", decode_request<stop_t>},
     {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
@@ -405,11 +436,12 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 29> kDecoders = {{
     {"RELEASE", decode_request<release_t>},
     {"MOVE_LINE", decode_request<move_line_t>},
     {"CAMAC", decode_request<camac_request_t>},
+    {"MOVE_PATH", decode_request<move_path_t>},
     {"HELLO", decode_hello},
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},
 }};
-static_assert(std::variant_size_v<api::Request::variant> == 26);
+static_assert(std::variant_size_v<api::Request::variant> == 27);
 
 constexpr auto kClientChannels = [] {
   std::array<std::string_view, kDecoders.size()> channels;

@@ -27,6 +27,7 @@
 #include "bushd/mcu_description_t.hpp"
 #include "bushd/mcu_state_t.hpp"
 #include "bushd/move_line_t.hpp"
+#include "bushd/move_path_t.hpp"
 #include "bushd/move_t.hpp"
 #include "bushd/pause_t.hpp"
 #include "bushd/position_compare_t.hpp"

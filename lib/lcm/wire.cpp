@@ -140,6 +140,9 @@ bool counts_match(const T& message) {
   BUSHD_COUNTED(motor_count, table_of_motor);
   BUSHD_COUNTED(motor_count, motor_duration_us);
   BUSHD_COUNTED(motor_count, peak_steps_per_s);
+  BUSHD_COUNTED(point_count, points_us);
+  BUSHD_COUNTED(value_count, positions);
+  BUSHD_COUNTED(speed_count, speeds);
   BUSHD_COUNTED(entry_count, entries);
   BUSHD_COUNTED(table_count, tables);
   BUSHD_COUNTED(content_count, content);
@@ -234,6 +237,7 @@ BUSHD_TRAVELS(list_tables_t)
 BUSHD_TRAVELS(mcu_description_t)
 BUSHD_TRAVELS(mcu_state_t)
 BUSHD_TRAVELS(move_line_t)
+BUSHD_TRAVELS(move_path_t)
 BUSHD_TRAVELS(move_t)
 BUSHD_TRAVELS(pause_t)
 BUSHD_TRAVELS(position_compare_t)

@@ -76,18 +76,25 @@ void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, std:
   run_target_ = share_->to - share_->from;
   share_from_steps_ = line_steps(0);
   target_ = from_ + share_->direction * (line_steps(run_target_) - share_from_steps_);
-  restart(base_.run, run_target_, 1, floor);
+  base_.run = {};
+  if (!on_path()) restart(base_.run, run_target_, 1, floor);
   base_.tick = start;
   bushd_line_start(&base_.line, share_->increment, share_->longest);
   bushd_line_go_to(&base_.line, share_->from);
   base_.told_256 = share_from_steps_ * 256;
-  share_by_ = Divisor(share_->longest);
+  if (!on_path()) share_by_ = Divisor(share_->longest);
+  base_.path = on_path() ? PathRun(share_->track) : PathRun();
+  base_.made = share_from_steps_;
   head_ = base_;
   plan_end();
 }
 
 // Of the motor, from the line's beginning, when the run has made so many.
 std::int64_t Axis::line_steps(std::uint32_t run_steps) const {
+  if (on_path()) {
+    const Path& path = share_->track->path();
+    return path.position_at(share_->motor, share_->from + run_steps);
+  }
   bushd_line line;
   bushd_line_start(&line, share_->increment, share_->longest);
   bushd_line_go_to(&line, share_->from + run_steps);
@@ -95,6 +102,7 @@ std::int64_t Axis::line_steps(std::uint32_t run_steps) const {
 }
 
 std::int64_t Axis::steps_of(const Place& place) const {
+  if (on_path()) return from_ + place.made - share_from_steps_;
   if (share_) return from_ + share_->direction * (place.told_256 / 256 - share_from_steps_);
   return from_ + place.run.direction * static_cast<std::int64_t>(place.run.steps_done);
 }
@@ -121,7 +129,7 @@ bool Axis::change(Tick at) {
   stale_ = false;
   change_.reset();
   head_ = base_;
-  if (bushd_run_done(&base_.run)) return false;  // over, but for the report that says so
+  if (run_over(base_)) return false;  // over, but for the report that says so
   plan_end();
   const std::int64_t planned_end = planned_end_;
   const std::uint32_t planned_run_steps = planned_run_steps_;
@@ -133,7 +141,7 @@ bool Axis::change(Tick at) {
   plan_end();
   const bool same_end = planned_end_ == planned_end && planned_run_steps_ == planned_run_steps;
   const bool same_speed =
-      stopping_ || base_.run.cruise == std::max(run_table().cruise, change_->floor);
+      stopping_ || on_path() || base_.run.cruise == std::max(run_table().cruise, change_->floor);
   if (share_ && at >= unchanged_end_) end_ = unchanged_end_;  // it has made all of its steps
   if (!same_end || !same_speed) {
     // Its MCU makes the run to its end, also when the motor has made its last step.
@@ -161,6 +169,7 @@ void Axis::expand_run(bushd_run& run, bool fine, std::size_t ticks, std::int16_t
 
 void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const {
   if (!share_) return expand_run(place.run, fine(), ticks, out, stride);
+  if (on_path()) return follow_path(place, ticks, out, stride);
   for (std::size_t done = 0; done < ticks; done += kBlock) {
     const std::size_t n = std::min(kBlock, ticks - done);
     std::int16_t* to = out + done * stride;
@@ -228,10 +237,17 @@ void Axis::follow_steps(Place& place, std::size_t ticks, std::int16_t* out,
 // The delay of the motor's running step, in units of its own table. Of a share: as the run goes
 // now, rounded up; its table lets no motor be faster than its own table at that place.
 std::uint16_t Axis::delay_of(const Place& place) const {
-  const std::uint16_t delay = bushd_run_delay(&place.run);
-  if (!share_ || delay == 0) return delay;
+  const std::uint32_t delay = run_delay(place);
+  if (!share_ || delay == 0) return static_cast<std::uint16_t>(delay);
   const bool changes_later = change_ && change_->at > start_ && place.tick <= change_->at;
   if (place.tick >= (changes_later ? unchanged_end_ : end_)) return 0;
+  if (on_path()) {
+    const double share = share_of_run(place);
+    if (share == 0) return UINT16_MAX;  // it only stands on the way
+    const double own_ns = static_cast<double>(delay) * run_unit_ns() / share;
+    const double own = std::ceil(own_ns / table_->time_unit_ns);
+    return static_cast<std::uint16_t>(std::min<double>(own, UINT16_MAX));
+  }
   const Wide time = Wide{delay} * run_table().time_unit_ns * share_->longest;
   const Wide units = Wide{table_->time_unit_ns} * share_->increment;
   return at_most_16_bits((time + units - 1) / units);
@@ -240,6 +256,7 @@ std::uint16_t Axis::delay_of(const Place& place) const {
 // At the beginning of a place's tick: what the change, if it is due there, makes of the run.
 void Axis::take_change(Place& place) const {
   if (!change_ || place.tick != effective()) return;
+  if (on_path()) return take_change_on_path(place);
   bushd_run& run = place.run;
   if (change_->at <= start_ && share_) {
     return restart(run, change_->target_steps ? change_->run_steps : 0, 1, change_->floor);
@@ -272,7 +289,7 @@ void Axis::advance(Place& place, Tick to) const {
     take_change(place);
     Tick next = to;
     if (change_ && effective() > place.tick) next = std::min(next, effective());
-    if (bushd_run_done(&place.run)) {
+    if (run_over(place)) {
       place.tick = next;
       continue;
     }
@@ -284,14 +301,18 @@ void Axis::advance(Place& place, Tick to) const {
 
 // A step exactly at the end of a tick belongs to that tick.
 Tick Axis::end_of(const Place& place) const {
+  if (on_path()) {
+    const std::int64_t left_ns = place.path.ns_to(place.path.track()->to());
+    return place.tick + (left_ns + tick_ns_ - 1) / tick_ns_;
+  }
   const auto units = static_cast<std::int64_t>(bushd_run_units_left(&place.run));
   const std::int64_t ns = units * table_->time_unit_ns - (units == 0 ? 0 : place.run.since_ns);
   return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
 }
 
 // Of a share: first tick after the motor's last step, before the run's own end if the motor makes
-// none of its last ones. The position that follow_between_steps tells reaches the last step in the tick in
-// which the run reaches `crossing`/256 of the step `last` of the line.
+// none of its last ones. The position that follow_between_steps tells reaches the last step in the
+// tick in which the run reaches `crossing`/256 of the step `last` of the line.
 Tick Axis::own_end_of(const Place& place) const {
   const std::uint32_t left = bushd_run_steps_left(&place.run);
   const std::uint32_t run_end = share_->from + place.run.steps_done + left;
@@ -318,11 +339,11 @@ void Axis::plan_end() {
     advance(place, effective());
     take_change(place);
   }
-  planned_run_steps_ = place.run.steps_done + bushd_run_steps_left(&place.run);
+  planned_run_steps_ = run_steps(place) + run_steps_left(place);
   run_end_ = end_of(place);
   if (share_) {
     planned_end_ = from_ + share_->direction * (line_steps(planned_run_steps_) - share_from_steps_);
-    end_ = own_end_of(place);
+    end_ = on_path() ? own_end_on_path(place) : own_end_of(place);
   } else {
     planned_end_ = from_ + place.run.direction * static_cast<std::int64_t>(planned_run_steps_);
     end_ = run_end_;
@@ -391,12 +412,12 @@ double Axis::velocity_steps_per_s() const {
   if (!busy_) return 0.0;
   Place place = base_;
   take_change(place);
-  const std::uint16_t delay = bushd_run_delay(&place.run);
+  const std::uint32_t delay = run_delay(place);
   if (delay == 0) return 0.0;
-  const double run_steps_per_s = 1e9 / (static_cast<double>(delay) * run_table().time_unit_ns);
+  const double run_steps_per_s = 1e9 / (static_cast<double>(delay) * run_unit_ns());
   if (!share_) return place.run.direction * run_steps_per_s;
   if (place.tick >= end_) return 0.0;
-  return share_->direction * run_steps_per_s * share_->increment / share_->longest;
+  return direction() * run_steps_per_s * share_of_run(place);
 }
 
 }  // namespace bushd::motion

@@ -6,7 +6,7 @@
 // The run may be that of a line (engine/line.h), by the table of the line. Then every motor of the
 // line has a copy of it, and makes of it what its share says: as long as all copies are started,
 // changed and stopped at the same ticks, the motors stay on the line, and none need know of
-// another.
+// another. The same is so of a path (motion/path_run.h), whose run they all follow.
 #pragma once
 
 #include <algorithm>
@@ -20,6 +20,7 @@
 #include "engine/message.h"
 #include "engine/run.h"
 #include "motion/divisor.h"
+#include "motion/path_run.h"
 #include "tables/envelope.h"
 
 namespace bushd::motion {
@@ -37,12 +38,15 @@ struct Change {
   std::uint32_t run_steps = 0;
 };
 
-// What a motor makes of the run of its line.
+// What a motor makes of the run of its line, or of its path.
 struct LineShare {
-  std::uint64_t way = 0;                          // its number, for logs
-  std::shared_ptr<const tables::Envelope> table;  // of the run
-  std::uint32_t increment = 0;                    // |N|; of 0 the motor only waits for the others
-  std::uint32_t longest = 0;                      // L
+  std::uint64_t way = 0;                               // its number, for logs
+  std::shared_ptr<const tables::Envelope> table = {};  // of the run; none: of a path
+  std::shared_ptr<const PathTrack> track = {};         // of a path, with the motor's place in it
+  std::size_t motor = 0;
+  // |N|; of 0 the motor only waits for the others. Of a path as far as that.
+  std::uint32_t increment = 0;
+  std::uint32_t longest = 0;  // L; of a path all its steps
   int direction = 1;
   // This run's part of the line, by its steps.
   std::uint32_t from = 0;
@@ -141,8 +145,8 @@ class Axis {
   std::int64_t executed_steps() const { return steps_of(base_); }
   // Where it stands, as planned, when the ticks before `tick` have been run. O(ticks ahead).
   std::int64_t steps_at(Tick tick) const;
-  // Of this run: +1, -1.
-  int direction() const { return share_ ? share_->direction : base_.run.direction; }
+  // Of this run: +1, -1. Of a path where it is, as executed.
+  int direction() const;
   // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t planned_end_steps() const { return planned_end_; }
   std::int64_t target_steps() const { return target_; }
@@ -156,7 +160,7 @@ class Axis {
   // where it is to end. Its run is over for all motors at over_tick(); this one's last step is made
   // by end_tick(). Without a line that is the same.
   const std::optional<LineShare>& line() const { return share_; }
-  std::uint32_t line_step() const { return share_->from + base_.run.steps_done; }
+  std::uint32_t line_step() const { return share_->from + run_steps(base_); }
   std::uint32_t line_planned_end() const { return share_->from + planned_run_steps_; }
   std::uint32_t line_target() const { return share_->from + run_target_; }
   Tick over_tick() const { return std::max(end_, run_end_); }
@@ -167,7 +171,19 @@ class Axis {
     Tick tick;              // the run's state is that at the beginning of this tick
     bushd_line line;        // that of the share, by the steps that the run has made
     std::int64_t told_256;  // where the share has led by then, 1/256 step from the line's beginning
+    PathRun path;           // in place of `run`, `line`
+    std::int64_t made;      // steps that this has taken, as its MCU counts them (engine/slots.h)
   };
+  bool on_path() const { return share_ && share_->track != nullptr; }
+  bool run_over(const Place& place) const;
+  std::uint32_t run_steps(const Place& place) const;  // made
+  std::uint32_t run_steps_left(const Place& place) const;
+  std::uint32_t run_delay(const Place& place) const;  // 0: over
+  std::uint32_t run_unit_ns() const;
+  double share_of_run(const Place& place) const;
+  void take_change_on_path(Place& place) const;
+  void follow_path(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  Tick own_end_on_path(const Place& place) const;
   std::int64_t steps_of(const Place& place) const;
   std::int64_t line_steps(std::uint32_t run_steps) const;
   Tick effective() const { return std::max(change_->at, start_); }

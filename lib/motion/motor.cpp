@@ -369,7 +369,10 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
 
 // The way it goes is barred, and the MCU has not begun, or goes by a ramp of its own.
 void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
-  const int direction = axis_.direction();
+  int direction = axis_.direction();
+  // On a path it may have turned round since it came to its switch.
+  const bool on_path = axis_.line() && axis_.line()->track;
+  if (on_path && !forbidden(direction)) direction = -direction;
   if (!forbidden(direction)) return;
   const bool moving = has_bit(report.of_mcu.moving, output());
   const bool given_up =

@@ -29,8 +29,8 @@ bool turns(const PathShare& before, const PathShare& behind) {
 }  // namespace
 
 Path::Path(std::vector<Motor> motors, std::vector<std::int64_t> points, Corners corners,
-           std::vector<std::uint16_t> floors, std::uint32_t first_step)
-    : motors_(std::move(motors)), corners_(corners), start_{0}, first_step_(first_step) {
+           std::vector<std::uint16_t> floors)
+    : motors_(std::move(motors)), corners_(corners), start_{0} {
   const std::size_t width = motors_.size();
   const std::size_t rows = points.size() / width;
   points_.assign(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(width));
@@ -51,6 +51,31 @@ Path::Path(std::vector<Motor> motors, std::vector<std::int64_t> points, Corners 
     }
     row_segments_.push_back(static_cast<std::uint32_t>(start_.size() - 1));
   }
+  prepare();
+}
+
+Path::Path(const Path& whole, std::uint32_t begin, std::size_t last)
+    : motors_(whole.motors_), corners_(whole.corners_), first_step_(begin) {
+  const auto part = [](const auto& all, std::size_t first, std::size_t end) {
+    return std::vector(all.begin() + static_cast<std::ptrdiff_t>(first),
+                       all.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+  const std::size_t width = motors_.size();
+  const std::size_t first = whole.segment_at(begin);
+  points_ = part(whole.points_, first * width, (last + 2) * width);
+  start_ = part(whole.start_, first, last + 2);
+  if (!whole.floors_.empty()) {
+    floors_ = part(whole.floors_, first * width, (last + 1) * width);
+  }
+  prepare();
+}
+
+std::unique_ptr<Path> Path::rest(std::uint32_t begin, std::size_t last) const {
+  return std::unique_ptr<Path>(new Path(*this, begin, last));
+}
+
+void Path::prepare() {
+  const std::size_t width = motors_.size();
   unit_ns_ = UINT32_MAX;
   for (const Motor& motor : motors_) unit_ns_ = std::min(unit_ns_, motor.table->time_unit_ns);
   for (const Motor& motor : motors_) {

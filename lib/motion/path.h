@@ -23,6 +23,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -41,12 +42,17 @@ class Path {
     std::uint16_t floor = 0;   // none of its steps has a shorter delay
   };
   // Points of all motors, one after the other, each |to - from| < 2^31; the first one is where they
-  // stand. `floors`: as that of a motor, of each segment and motor, or none at all. The run begins
-  // at rest at `first_step`, within the first segment. Precondition: steps() < 2^31.
+  // stand. `floors`: as that of a motor, of each segment and motor, or none at all.
+  // Precondition: steps() < 2^31.
   Path(std::vector<Motor> motors, std::vector<std::int64_t> points, Corners corners,
-       std::vector<std::uint16_t> floors = {}, std::uint32_t first_step = 0);
+       std::vector<std::uint16_t> floors = {});
   Path(const Path&) = delete;
   Path& operator=(const Path&) = delete;
+
+  // The rest of it, for a run from rest at this step, to the end of the segment `last`. Steps keep
+  // their numbers. Precondition: begin < steps(), and not behind that segment.
+  std::unique_ptr<Path> rest(std::uint32_t begin, std::size_t last) const;
+  std::unique_ptr<Path> rest(std::uint32_t begin) const { return rest(begin, segments() - 1); }
 
   // Goes on with planning by this many segments at each of three passes; returns whether it is
   // done. All below but steps() and what is of points needs that.
@@ -62,7 +68,7 @@ class Path {
   std::size_t segments() const { return start_.size() - 1; }
   std::uint32_t unit_ns() const { return unit_ns_; }
   std::uint64_t steps() const { return start_.back(); }
-  // Of the run, at the beginning of a segment; that of segments() is steps().
+  // Of the run, at the beginning of a segment; that of segments() is steps(), where it ends.
   std::uint32_t start_of(std::size_t segment) const {
     return static_cast<std::uint32_t>(start_[segment]);
   }
@@ -104,6 +110,9 @@ class Path {
 
  private:
   enum class Phase { kCorners, kBack, kForth, kDone };
+  Path(const Path& whole, std::uint32_t begin, std::size_t last);
+  void prepare();
+
   using Shares = std::vector<PathShare>;     // by motor, as those below
   using Places = std::vector<std::int64_t>;  // on the sides of their tables
   struct Head {

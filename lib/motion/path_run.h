@@ -22,6 +22,7 @@ class PathTrack {
   PathTrack& operator=(const PathTrack&) = delete;
 
   const Path& path() const { return *path_; }
+  const std::shared_ptr<const Path>& shared_path() const { return path_; }
   std::uint32_t from() const { return path_->first_step(); }
   std::uint32_t to() const { return to_; }
   // Of the part of a segment that it makes. Precondition: that is some of it.

@@ -125,6 +125,22 @@ TEST(Codec, OtherRequestsDoToo) {
   EXPECT_EQ(line.speed, (api::Speed{.per_s = 2.5}));
   EXPECT_EQ(line.duration_s, 12.5);
   EXPECT_FALSE(request_over_the_wire(api::MoveLine{}).duration_s);
+  const auto path = request_over_the_wire(api::MovePath{.motors = {"a"},
+                                                        .rows = 3,
+                                                        .first_row = 1,
+                                                        .positions = {0.5, -2},
+                                                        .speeds = {0, 2},
+                                                        .corners = api::MovePath::Corners::kExact,
+                                                        .dry_run = true,
+                                                        .speed = api::Speed{.per_s = 2.5}});
+  EXPECT_EQ(path.motors, api::MotorNames{"a"});
+  EXPECT_EQ(path.rows, 3);
+  EXPECT_EQ(path.first_row, 1);
+  EXPECT_EQ(path.positions, (std::vector<double>{0.5, -2}));
+  EXPECT_EQ(path.speeds, (std::vector<double>{0, 2}));
+  EXPECT_EQ(path.corners, api::MovePath::Corners::kExact);
+  EXPECT_TRUE(path.dry_run);
+  EXPECT_EQ(path.speed, (api::Speed{.per_s = 2.5}));
   const auto jog = request_over_the_wire(
       api::Jog{.motor = "a", .per_s = -2.5, .keepalive_ms = 300, .steps_after = 7});
   EXPECT_EQ(jog.motor, "a");

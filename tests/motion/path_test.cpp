@@ -28,8 +28,7 @@ struct Planned {
 };
 
 Planned planned(const std::vector<Law>& laws, std::vector<std::int64_t> points,
-                Path::Corners corners, std::vector<std::uint16_t> floors = {},
-                std::uint32_t first_step = 0) {
+                Path::Corners corners, std::vector<std::uint16_t> floors = {}) {
   Planned made;
   std::vector<Path::Motor> motors;
   for (const Law& law : laws) {
@@ -37,8 +36,7 @@ Planned planned(const std::vector<Law>& laws, std::vector<std::int64_t> points,
     motors.push_back({made.tables.back()->view()});
   }
   made.points = points;
-  made.path =
-      std::make_unique<Path>(motors, std::move(points), corners, std::move(floors), first_step);
+  made.path = std::make_unique<Path>(motors, std::move(points), corners, std::move(floors));
   while (!made.path->plan(7)) {
   }
   return made;
@@ -98,14 +96,14 @@ Planned any_path(Path::Corners corners, bool from_anywhere = false) {
       points.push_back(points[points.size() - width] + way[m]);
     }
   }
-  std::uint32_t first_step = 0;
-  if (from_anywhere) {
-    const std::uint32_t steps = planned(laws, points, corners).path->segments() == 0
-                                    ? 1
-                                    : planned(laws, points, corners).path->length_of(0);
-    first_step = between<std::uint32_t>(0, steps - 1);
+  Planned made = planned(laws, std::move(points), corners);
+  if (from_anywhere && made.path->segments() > 0) {
+    const auto begin =
+        between<std::uint32_t>(0, static_cast<std::uint32_t>(made.path->steps()) - 1);
+    made.path = made.path->rest(begin);
+    made.path->plan(SIZE_MAX);
   }
-  return planned(laws, std::move(points), corners, {}, first_step);
+  return made;
 }
 
 TEST(Path, OfOneSegmentAndOneMotorIsTheMotorsOwnMove) {

@@ -37,6 +37,7 @@ api::MotorNames motors_of(const api::Request& request) {
   };
   if (const auto* move = std::get_if<api::Move>(&request)) add(move->motors);
   if (const auto* move = std::get_if<api::MoveLine>(&request)) add(move->motors);
+  if (const auto* path = std::get_if<api::MovePath>(&request)) names = path->motors;
   if (const auto* arm = std::get_if<api::Arm>(&request)) add(arm->motors);
   if (const auto* home = std::get_if<api::Home>(&request)) names = home->motors;
   return names;
@@ -116,12 +117,32 @@ int refused(const api::Reply& reply) {
   return kFailed;
 }
 
-int send(const Connection& connection, const api::Request& request, Client::Until until,
-         Hope hope) {
+namespace {
+
+api::Reply worded(api::Reply reply, const Wording& wording) {
+  if (auto* refused = std::get_if<api::Refused>(&reply); refused != nullptr && wording) {
+    refused->reason = wording(refused->reason);
+  }
+  return reply;
+}
+
+// Of a path; kDone if all of its points but those of the last request are taken.
+int bring(Client& client, const std::vector<api::MovePath>& parts, const Wording& wording) {
+  for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
+    const auto reply = client.run(parts[i], Client::Until::kResult);
+    if (!reply) return failure(client, reply.error());
+    if (!as_hoped(*reply, Hope::kDone)) return refused(worded(*reply, wording));
+  }
+  return kDone;
+}
+
+int send_last(const Connection& connection, const std::vector<api::MovePath>& before,
+              const api::Request& request, Client::Until until, Hope hope, const Wording& wording) {
   const api::MotorNames motors = motors_of(request);
   const auto* home = std::get_if<api::Home>(&request);
   const bool moves = !motors.empty() || (home != nullptr && home->all);
   return with_client(connection, [&](Client& client) {
+    if (const int code = bring(client, before, wording); code != kDone) return code;
     bool accepted = false;
     bool stopped = false;
     Progress progress(motors);
@@ -157,8 +178,40 @@ int send(const Connection& connection, const api::Request& request, Client::Unti
       fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
                  home != nullptr ? "homing" : "move");
     }
-    const int code = reply ? refused(*reply) : failure(client, reply.error());
+    const int code = reply ? refused(worded(*reply, wording)) : failure(client, reply.error());
     return stopped ? static_cast<int>(kInterrupted) : code;
+  });
+}
+
+}  // namespace
+
+int send(const Connection& connection, const api::Request& request, Client::Until until,
+         Hope hope) {
+  return send_last(connection, {}, request, until, hope, {});
+}
+
+int send_parts(const Connection& connection, const std::vector<api::MovePath>& parts,
+               Client::Until until, const Wording& wording) {
+  return send_last(connection, parts, parts.back(), until, Hope::kReached, wording);
+}
+
+int show_plan(const Connection& connection, std::vector<api::MovePath> parts, bool as_json,
+              const Wording& wording) {
+  for (api::MovePath& part : parts) part.dry_run = true;
+  return with_client(connection, [&](Client& client) {
+    if (const int code = bring(client, parts, wording); code != kDone) return code;
+    const auto reply = client.run(parts.back(), Client::Until::kResult);
+    if (!reply) return failure(client, reply.error());
+    const auto* completed = std::get_if<api::Completed>(&*reply);
+    const auto* plan =
+        completed == nullptr ? nullptr : std::get_if<api::MovePlan>(&completed->detail);
+    if (plan == nullptr) return refused(worded(*reply, wording));
+    if (as_json) {
+      fmt::print("{}\n", json(*plan));
+    } else {
+      for (const std::string& line : lines(*plan)) fmt::print("{}\n", line);
+    }
+    return static_cast<int>(kDone);
   });
 }
 

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "client/client.h"
 #include "command_line.h"
@@ -24,6 +26,8 @@ void add_motion_commands(CommandLine& line);
 void add_driver_commands(CommandLine& line);
 // confirm, history
 void add_history_commands(CommandLine& line);
+// path
+void add_path_commands(CommandLine& line);
 // jog
 void add_jog_commands(CommandLine& line);
 // pause, resume, hold, release
@@ -63,6 +67,15 @@ enum class Hope { kReached, kDone };  // what the result is when all is well
 // exit codes.
 int send(const Connection& connection, const bushd::api::Request& request,
          bushd::client::Client::Until until, Hope hope);
+
+// How a reason reads here.
+using Wording = std::function<std::string(const std::string&)>;
+// A path whose points come in several requests: all but the last are taken, then that is sent.
+int send_parts(const Connection& connection, const std::vector<bushd::api::MovePath>& parts,
+               bushd::client::Client::Until until, const Wording& wording);
+// What it would be.
+int show_plan(const Connection& connection, std::vector<bushd::api::MovePath> parts, bool as_json,
+              const Wording& wording);
 
 // Says on stderr why, unless it was the user who broke off.
 int failure(const bushd::client::Client& client, const bushd::Error& error);

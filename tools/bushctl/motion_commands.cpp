@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "move_arguments.h"
+#include "path_file.h"
 #include "render.h"
 
 namespace bushctl {
@@ -75,7 +76,10 @@ void add_move(CommandLine& line) {
           "target.\n"
           "With --line motors of one bus move along a straight line: at any moment each of them "
           "has "
-          "made the same share of its way. Stops, pauses and limits of one act on all.")
+          "made the same share of its way. Stops, pauses and limits of one act on all.\n"
+          "NAME --to POSITION --speed-at AT:SPEED [--speed-at AT:SPEED...] moves one motor, from "
+          "each of these positions on not faster than that, until the next one; it makes no last "
+          "approach for backlash.")
       .flag("--line", &options->line, "Along a straight line; all motors on one bus")
       .flag("--wait", &options->wait, "Wait for the result")
       .option("--speed", &options->speed, kSpeed)
@@ -86,8 +90,19 @@ void add_move(CommandLine& line) {
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
       .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
       .raw_words(&options->words)
-      .run([carry_out, options] {
+      .run([&line, carry_out, options] {
         const Numbers as = numbers(options->steps);
+        const auto profile = parse_speed_profile(options->words, as, options->speed);
+        if (!profile) return wrong_usage(profile.error());
+        if (!profile->empty() && options->line) {
+          return wrong_usage(bushd::Error{"--speed-at is for one motor, --line for several"});
+        }
+        if (!profile->empty() && options->dry_run) {
+          return show_plan(line.connection(), *profile, options->json, {});
+        }
+        if (!profile->empty()) {
+          return send_parts(line.connection(), *profile, until(options->wait), {});
+        }
         if (options->line) {
           auto move = parse_move_line(options->words, as, options->duration);
           return move ? carry_out(std::move(*move)) : wrong_usage(move.error());

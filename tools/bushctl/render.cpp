@@ -289,6 +289,7 @@ std::string json(const api::MovePlan& plan) {
     out["bytes"] = plan.traffic->bytes;
   }
   if (!plan.limited_by.empty()) out["limited_by"] = plan.limited_by;
+  if (!plan.points_us.empty()) out["points_us"] = plan.points_us;
   for (const api::MovePlan::Motor& motor : plan.motors) {
     out["motors"].push_back({{"name", motor.motor},
                              {"steps", motor.steps},

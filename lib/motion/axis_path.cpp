@@ -1,0 +1,123 @@
+// An axis on a path: what differs from one run by one table.
+#include <algorithm>
+#include <cstdlib>
+
+#include "motion/axis.h"
+
+namespace bushd::motion {
+
+bool Axis::run_over(const Place& place) const {
+  return on_path() ? place.path.done() : bushd_run_done(&place.run);
+}
+
+std::uint32_t Axis::run_steps(const Place& place) const {
+  return on_path() ? place.path.step() - share_->from : place.run.steps_done;
+}
+
+std::uint32_t Axis::run_steps_left(const Place& place) const {
+  if (!on_path()) return bushd_run_steps_left(&place.run);
+  return place.path.track()->to() - place.path.step();
+}
+
+std::uint32_t Axis::run_delay(const Place& place) const {
+  return on_path() ? place.path.delay() : bushd_run_delay(&place.run);
+}
+
+std::uint32_t Axis::run_unit_ns() const {
+  return on_path() ? share_->track->path().unit_ns() : run_table().time_unit_ns;
+}
+
+// Steps of the motor by step of the run, where it is.
+double Axis::share_of_run(const Place& place) const {
+  if (!on_path()) return static_cast<double>(share_->increment) / share_->longest;
+  const Path& path = share_->track->path();
+  if (path.segments() == 0) return 0;
+  const std::size_t i = place.path.segment();
+  const std::int64_t way = path.point(i + 1, share_->motor) - path.point(i, share_->motor);
+  return static_cast<double>(std::abs(way)) / path.length_of(i);
+}
+
+int Axis::direction() const {
+  if (!on_path()) return share_ ? share_->direction : base_.run.direction;
+  const Path& path = share_->track->path();
+  // Of one that stands, where it came from.
+  for (std::size_t i = base_.path.segment() + 1; i-- > 0 && path.segments() > 0;) {
+    const std::int64_t way = path.point(i + 1, share_->motor) - path.point(i, share_->motor);
+    if (way != 0) return way < 0 ? -1 : 1;
+  }
+  return 1;
+}
+
+void Axis::take_change_on_path(Place& place) const {
+  const std::uint32_t end =
+      change_->target_steps ? share_->from + change_->run_steps : std::uint32_t{0};
+  if (change_->at <= start_) {
+    // It has not begun, so that any end will do.
+    const std::uint32_t to = std::max(end, share_->from);
+    if (to == share_->track->to()) {
+      place.path = PathRun(share_->track);
+    } else {
+      place.path = PathRun(std::make_shared<const PathTrack>(share_->track->shared_path(), to));
+    }
+    return;
+  }
+  if (!place.path.done()) place.path.end_at(end);
+}
+
+// The motor's MCU takes a step when it has been told a whole one more than it has made.
+void Axis::follow_path(Place& place, std::size_t ticks, std::int16_t* out,
+                       std::size_t stride) const {
+  const bool fine = format_ == BUSHD_FORMAT_FINE;
+  const PathTrack& track = *place.path.track();
+  for (std::size_t i = 0; i < ticks; ++i) {
+    place.path.tick(tick_ns_, fine);
+    const std::int64_t at_256 =
+        path_position_256(track.path(), share_->motor, place.path.step(), place.path.fraction(),
+                          track.to(), place.path.segment());
+    const std::int64_t told_256 = fine ? at_256 : at_256 / 256 * 256;
+    const std::int64_t moved_256 = told_256 - place.told_256;
+    place.told_256 = told_256;
+    const std::int64_t off_256 = told_256 - place.made * 256;
+    place.made += off_256 / 256;
+    const std::int64_t coarse = std::abs(moved_256) / 256;
+    out[i * stride] = static_cast<std::int16_t>(
+        fine             ? moved_256
+        : moved_256 == 0 ? 0
+                         : coarse | (moved_256 > 0 ? BUSHD_COARSE_DIRECTION : 0));
+  }
+}
+
+// First tick after the motor's last step. Its position is told until it reaches that in the segment
+// where it moves last, and stays then.
+Tick Axis::own_end_on_path(const Place& place) const {
+  const PathTrack& track = *place.path.track();
+  const Path& path = track.path();
+  const std::size_t motor = share_->motor;
+  if (place.path.done() || track.to() == share_->from) return place.tick;
+  const std::int64_t rest = path.position_at(motor, track.to());
+  for (std::size_t i = path.segment_at(track.to() - 1) + 1; i-- > 0;) {
+    const std::int64_t from = path.point(i, motor);
+    const std::int64_t way = path.point(i + 1, motor) - from;
+    const std::uint32_t begin = path.start_of(i);
+    if (way != 0 && rest != from) {
+      bushd_line line;
+      bushd_line_start(&line, static_cast<std::uint32_t>(std::abs(way)), path.length_of(i));
+      const auto made = static_cast<std::uint32_t>(std::abs(rest - from));
+      const std::uint32_t last = bushd_line_run_step(&line, made);
+      bushd_line_go_to(&line, last - 1);
+      const std::int64_t crossing =
+          format_ == BUSHD_FORMAT_FINE ? std::int64_t{bushd_line_crossing(&line)} : 256;
+      const std::uint32_t step = begin + last;  // the run's, with or before which that is
+      if (step <= place.path.step()) break;
+      const std::int64_t after_ns = place.path.ns_to(step);
+      const std::int64_t before_ns = place.path.ns_to(step - 1);
+      const std::int64_t ns = before_ns + (crossing * (after_ns - before_ns) + 255) / 256;
+      if (ns <= 0) break;
+      return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
+    }
+    if (begin <= place.path.step()) break;
+  }
+  return place.told_256 == rest * 256 ? place.tick : place.tick + 1;
+}
+
+}  // namespace bushd::motion

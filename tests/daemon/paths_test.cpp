@@ -1,0 +1,219 @@
+// Motors on a path, over the real firmware core: where they are, what stops, pauses and limits do
+// to all of them, and what is refused.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+const std::vector<std::string> kMotors{"m01", "m02", "m03"};
+// Round corners, a sharp one, one where a motor turns round, one that rests.
+const std::vector<double> kPoints{400,  0,   0,  //
+                                  800,  50,  7,  //
+                                  1100, 200, 7,  //
+                                  1100, 600, 7,  //
+                                  700,  900, -20};
+
+api::MovePath path_of(const std::vector<std::string>& motors, std::vector<double> points) {
+  const auto rows = static_cast<std::int32_t>(points.size() / motors.size());
+  return {.motors = motors, .rows = rows, .positions = std::move(points)};
+}
+
+// How far the shafts are from the nearest point of the polyline from 0.
+double off_path(const Lab& lab, const std::vector<std::string>& motors,
+                const std::vector<double>& points) {
+  const std::size_t width = motors.size();
+  std::vector<double> from(width, 0);
+  double least = 1e9;
+  for (std::size_t row = 0; row * width < points.size(); ++row) {
+    double along = 0;
+    double length = 0;
+    for (std::size_t i = 0; i < width; ++i) {
+      const double way = points[row * width + i] - from[i];
+      along += way * (static_cast<double>(lab.shaft_steps(motors[i])) - from[i]);
+      length += way * way;
+    }
+    const double share = length == 0 ? 0 : std::clamp(along / length, 0.0, 1.0);
+    double most = 0;
+    for (std::size_t i = 0; i < width; ++i) {
+      const double at = from[i] + share * (points[row * width + i] - from[i]);
+      most = std::max(most, std::abs(static_cast<double>(lab.shaft_steps(motors[i])) - at));
+      from[i] = points[row * width + i];
+    }
+    least = std::min(least, most);
+  }
+  return least;
+}
+
+TEST(Paths, AllMotorsAreOnThePathAtAnyTime) {
+  for (const char* manner : {"fine", "coarse", "fine_table"}) {
+    for (const auto corners :
+         {api::MovePath::Corners::kContinuous, api::MovePath::Corners::kExact}) {
+      SCOPED_TRACE(manner);
+      Lab lab(hall(2, 2, manner));
+      lab.connect();
+      api::MovePath path = path_of(kMotors, kPoints);
+      path.corners = corners;
+      const auto move = lab.send(path);
+      double most = 0;
+      lab.run_until([&] {
+        most = std::max(most, off_path(lab, kMotors, kPoints));
+        return lab.has_result(move);
+      });
+      // Half a step each, and what a tick of the stream may be off its run.
+      EXPECT_LT(most, 2.5);
+      const Answer result = lab.last_reply(move);
+      EXPECT_EQ(result.result, "reached") << result.reason;
+      EXPECT_THAT(result.position_steps, ElementsAre(700, 900, -20));
+      for (const char* mcu : {"hall:1", "hall:2"}) {
+        EXPECT_EQ(lab.mcu_health(mcu).rejected_frames, 0u);
+        EXPECT_EQ(lab.mcu_health(mcu).ramp_downs, 0u);
+      }
+      EXPECT_THAT(lab.errors(), IsEmpty());
+    }
+  }
+}
+
+TEST(Paths, PauseAndResumeKeepThePath) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(path_of(kMotors, kPoints));
+  double most = 0;
+  for (const std::int64_t at : {300, 790, 1099}) {
+    lab.run_until([&] {
+      most = std::max(most, off_path(lab, kMotors, kPoints));
+      return lab.shaft_steps("m01") >= at;
+    });
+    EXPECT_EQ(lab.wait(lab.send(api::Pause{})).result, "done");
+    lab.run_for(0.1);
+    EXPECT_LT(off_path(lab, kMotors, kPoints), 0.75);
+    lab.send(api::Resume{});
+  }
+  lab.run_until([&] {
+    most = std::max(most, off_path(lab, kMotors, kPoints));
+    return lab.has_result(move);
+  });
+  EXPECT_LT(most, 2.5);
+  EXPECT_EQ(lab.last_reply(move).result, "reached") << lab.last_reply(move).reason;
+  EXPECT_THAT(lab.last_reply(move).position_steps, ElementsAre(700, 900, -20));
+  EXPECT_THAT(lab.errors(), IsEmpty());
+}
+
+TEST(Paths, AStopRampsAllDownAlongIt) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(path_of(kMotors, kPoints));
+  lab.run_until([&] { return lab.shaft_steps("m02") >= 100; });
+  lab.wait(lab.send(api::Stop{{"m03"}}));
+  lab.run_until([&] { return lab.has_result(move); });
+  const Answer result = lab.last_reply(move);
+  EXPECT_EQ(result.result, "stopped");
+  EXPECT_THAT(result.reason, HasSubstr("the path has ended, which was left at"));
+  EXPECT_LT(off_path(lab, kMotors, kPoints), 0.75);
+  EXPECT_THAT(lab.errors(), IsEmpty());
+}
+
+TEST(Paths, ALimitOfOneRampsTheOthersDownAlongIt) {
+  std::string toml = hall(2, 1);
+  const std::string name = "name = \"m01\"\n";
+  Lab lab(toml.insert(toml.find(name) + name.size(), "limit = \"positive\"\n"));
+  lab.connect();
+  const std::vector<double> points{500, 100, 2000, 900, 2500, 2000};
+  const auto move = lab.send(path_of({"m01", "m02"}, points));
+  lab.run_until([&] { return lab.shaft_steps("m01") >= 800; });
+  lab.bus(0).mcu(0).set_inputs({0b001, 0});
+  const Answer result = lab.wait(move);
+  EXPECT_EQ(result.result, "limit") << result.reason;
+  EXPECT_THAT(result.motor_results, ElementsAre("limit", "stopped"));
+  EXPECT_THAT(result.reason, HasSubstr("m01: stopped by its limit switch at the positive end"));
+  EXPECT_LT(off_path(lab, {"m02"}, {2000}), 0.75);
+  EXPECT_LT(lab.shaft_steps("m02"), 1500);
+}
+
+TEST(Paths, PointsComeInSeveralRequests) {
+  Lab lab(hall(1, 2));
+  lab.connect();
+  std::vector<double> points;
+  for (int i = 1; i <= 50; ++i) points.insert(points.end(), {i * 20.0, (i % 5) * 3.0});
+  const std::vector<std::string> motors{"m01", "m02"};
+  const auto part = [&](std::size_t first, std::size_t end) {
+    api::MovePath path = path_of(motors, {points.begin() + static_cast<std::ptrdiff_t>(first * 2),
+                                          points.begin() + static_cast<std::ptrdiff_t>(end * 2)});
+    path.rows = 50;
+    path.first_row = static_cast<std::int32_t>(first);
+    return path;
+  };
+  EXPECT_EQ(lab.wait(lab.send(part(0, 20))).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(part(20, 40))).result, "done");
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  const auto move = lab.send(part(40, 50));
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 1000);
+  // Not in their order.
+  EXPECT_EQ(lab.wait(lab.send(part(0, 20))).result, "done");
+  EXPECT_THAT(lab.wait(lab.send(part(30, 50))).reason,
+              HasSubstr("points from 31 on where those from 21 on were to come"));
+  EXPECT_THAT(lab.wait(lab.send(part(20, 50))).reason, HasSubstr("send it again"));
+}
+
+TEST(Paths, ADryRunTellsWhenEachPointIsReached) {
+  Lab lab(hall(1, 2));
+  lab.connect();
+  api::MovePath path = path_of({"m01", "m02"}, {500, 0, 500, 0, 500, 500});
+  path.corners = api::MovePath::Corners::kExact;
+  path.dry_run = true;
+  const auto plan = lab.wait(lab.send(path)).plan;
+  ASSERT_TRUE(plan);
+  const auto alone =
+      lab.wait(lab.send(api::Move{.motors = motor_steps({"m01"}, {500}), .dry_run = true})).plan;
+  ASSERT_TRUE(alone);
+  ASSERT_EQ(plan->points_us.size(), 3u);
+  EXPECT_EQ(plan->points_us[0], alone->motors[0].duration_us);
+  EXPECT_EQ(plan->points_us[1], plan->points_us[0]);
+  EXPECT_EQ(plan->points_us[2], 2 * alone->motors[0].duration_us);
+  EXPECT_EQ(plan->motors[1].steps, 500);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
+TEST(Paths, SpeedsOfPointsSlowASingleMotorDown) {
+  Lab lab(hall(1, 1));
+  lab.connect();
+  api::MovePath path = path_of({"m01"}, {1000, 1500, 3000});
+  path.dry_run = true;
+  const auto fast = lab.wait(lab.send(path)).plan;
+  path.speeds = {0, 100, 0};
+  const auto slow = lab.wait(lab.send(path)).plan;
+  ASSERT_TRUE(fast && slow);
+  EXPECT_GE(slow->points_us[1] - slow->points_us[0], 5'000'000);
+  EXPECT_LT(slow->points_us[1] - slow->points_us[0], 5'100'000);
+  EXPECT_LT(fast->points_us[1] - fast->points_us[0], 2'500'000);
+  path.positions = {1000, 500, 3000};
+  EXPECT_THAT(lab.wait(lab.send(path)).reason, HasSubstr("point 2, m01"));
+}
+
+TEST(Paths, RefusesWhatCannotBe) {
+  Lab lab(hall(1, 2));
+  lab.connect();
+  const auto why = [&](const api::MovePath& path) { return lab.wait(lab.send(path)).reason; };
+  EXPECT_THAT(why(path_of({"m01", "m02"}, {100, 0, 3e9, 0})), HasSubstr("point 2, m01"));
+  EXPECT_THAT(why(path_of({"m01", "m02"}, {100, 0.5})), HasSubstr("point 1, m02"));
+  EXPECT_THAT(why(path_of({"m01", "nobody"}, {100, 0})), HasSubstr("nobody"));
+  EXPECT_THAT(why(path_of({"m01"}, {})), HasSubstr("1 to 100000"));
+  lab.send(api::Move{.motors = motor_steps({"m01"}, {5000})});
+  EXPECT_THAT(why(path_of({"m01", "m02"}, {100, 10})), HasSubstr("stop it or wait"));
+}
+
+}  // namespace
+}  // namespace bushd::test
