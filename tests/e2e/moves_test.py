@@ -40,6 +40,28 @@ class Moves(EndToEndTest):
         self.assertEqual(results.count("stopped"), 1)
         self.assertEqual(set(results), {"reached", "stopped"})
 
+    def check_line_made_by_the_mcus(self, displacement_format):
+        """Of two MCUs, the motors' ways equal: every edge in the slot of its time, until a stop makes ticks of it."""
+        self.bring_up(displacement_format)
+        self.command("move", "--line", "--wait", "a0", "900", "b0", "-900")
+        move = self.start_move("--line", "a0", "20000", "b0", "-20000")
+        self.wait_until("a0 to be under way", lambda: self.positions()["a0"] > 2500)
+        self.command("stop", "b0")
+        self.assertEqual(move.process.wait(), 1)
+        status = self.status()
+        self.assertEqual(self.positions()["a0"], -self.positions()["b0"])
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        self.assertEqual([event["moves"] for event in self.logged() if event["event"] == "move"], ["table"] * 4)
+        self.assert_one_result_each()
+        self.assert_trace_is_right(status)
+
+    def test_lines_made_by_the_mcus_fine(self):
+        self.check_line_made_by_the_mcus("fine")
+
+    def test_lines_made_by_the_mcus_coarse(self):
+        self.check_line_made_by_the_mcus("coarse")
+
     def check_new_targets(self, displacement_format, bus_lines=()):
         self.bring_up(displacement_format, bus_lines)
         first = self.start_move("a0", FAR, "b1", -FAR)

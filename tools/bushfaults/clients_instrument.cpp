@@ -80,14 +80,27 @@ Request Clients::move_with_legs() {
 
 // Of motors without backlash, as far as there are any: what the legs of a line are the witness does
 // not know. At rest, but for a few: those are refused, or a line of one motor gets another end.
+// Every second one is of motors with one table and equal ways: MCUs that can make it themselves.
 Request Clients::move_along_line() {
   Request request = move(static_cast<std::size_t>(random_.between(2, 6)));
+  const bool equal = random_.one_in(2);
+  const auto group_of = [this](const std::string& motor) {
+    return config_.motors[index_of(motor)].group;
+  };
   for (std::size_t i = request.motors.size(); i-- > 0 && request.motors.size() > 1;) {
-    if (config_.motors[index_of(request.motors[i])].backlash == 0) continue;
+    const bool other =
+        equal && i != 0 && group_of(request.motors[i]) != group_of(request.motors[0]);
+    if (config_.motors[index_of(request.motors[i])].backlash == 0 && !other) continue;
     request.motors.erase(request.motors.begin() + static_cast<std::ptrdiff_t>(i));
     request.steps.erase(request.steps.begin() + static_cast<std::ptrdiff_t>(i));
   }
   request.line = config_.motors[index_of(request.motors.front())].backlash == 0;
+  if (equal && request.line) {
+    request.ask = Ask::kMoveBy;
+    request.user = false;
+    const std::int64_t way = random_.between(1, 6000);
+    for (std::int64_t& steps : request.steps) steps = steps < 0 ? -way : way;
+  }
   if (random_.one_in(4)) {
     request.speed_micro = random_.magnitude(100, 3'000) * 1'000'000;
     request.speed_in_steps = true;
