@@ -71,10 +71,9 @@ void Axis::follow_path(Place& place, std::size_t ticks, std::int16_t* out,
   const PathTrack& track = *place.path.track();
   for (std::size_t i = 0; i < ticks; ++i) {
     place.path.tick(tick_ns_, fine);
-    const std::int64_t at_256 =
+    const std::int64_t told_256 =
         path_position_256(track.path(), share_->motor, place.path.step(), place.path.fraction(),
-                          track.to(), place.path.segment());
-    const std::int64_t told_256 = fine ? at_256 : at_256 / 256 * 256;
+                          track.to(), place.path.segment(), !fine);
     const std::int64_t moved_256 = told_256 - place.told_256;
     place.told_256 = told_256;
     const std::int64_t off_256 = told_256 - place.made * 256;

@@ -14,8 +14,8 @@ namespace {
 // Of a delay that is not known better than to the last digit of a double.
 std::uint32_t rounded_up(double delay) {
   if (delay >= kRest - 1.0) return kRest - 1;
-  const double whole = std::round(delay);
-  return static_cast<std::uint32_t>(delay == whole ? whole : std::ceil(delay * (1 + 1e-12)));
+  const auto whole = static_cast<std::uint32_t>(delay);
+  return delay == whole ? whole : static_cast<std::uint32_t>(delay * (1 + 1e-12)) + 1;
 }
 
 bool goes_on(const PathShare& before, const PathShare& behind) {
@@ -82,6 +82,8 @@ void Path::prepare() {
     const std::uint64_t own_ns = motor.table->time_unit_ns;
     const std::uint64_t common = std::gcd(own_ns, std::uint64_t{unit_ns_});
     unit_ratio_.emplace_back(own_ns / common, unit_ns_ / common);
+    const std::uint16_t slowest = std::max(motor.table->accel.code[0], motor.table->cruise);
+    start_units_.push_back(static_cast<double>(slowest) * static_cast<double>(own_ns) / unit_ns_);
   }
   const std::size_t n = segments();
   travel_.assign(width, 0);
@@ -135,7 +137,8 @@ void Path::load(std::size_t segment, std::vector<PathShare>& shares) const {
                               : way < 0 ? -1
                                         : 0,
                  .numerator = steps * unit_ratio_[m].first,
-                 .denominator = longest * unit_ratio_[m].second};
+                 .denominator = longest * unit_ratio_[m].second,
+                 .ratio = static_cast<double>(steps) / longest};
   }
 }
 
@@ -156,57 +159,50 @@ bool Path::rests_at(std::size_t segment) const {
   return segment == 0 || segment == segments() || corners_ == Corners::kExact;
 }
 
-double Path::start_units(std::size_t motor) const {
-  const bushd_table& table = *motors_[motor].table;
-  return static_cast<double>(std::max(table.accel.code[0], table.cruise)) *
-         static_cast<double>(unit_ratio_[motor].first) /
-         static_cast<double>(unit_ratio_[motor].second);
-}
-
 // The least delay on both sides of the corner.
 std::uint32_t Path::corner(const Shares& before, const Shares& behind) const {
-  std::uint32_t least = 1;
+  double least = 1;
   for (std::size_t m = 0; m < behind.size(); ++m) {
-    const double r1 = before[m].ratio();
-    const double r2 = behind[m].ratio();
+    const double r1 = before[m].ratio;
+    const double r2 = behind[m].ratio;
     const double squares =
         turns(before[m], behind[m]) ? r1 * r1 + r2 * r2 : std::abs(r2 - r1) * (r1 + r2);
-    if (squares != 0) least = std::max(least, rounded_up(start_units(m) * std::sqrt(squares)));
+    least = std::max(least, start_units_[m] * start_units_[m] * squares);
   }
-  return least;
+  return rounded_up(std::sqrt(least));
 }
 
 // Of the first step behind it, after one of this delay.
 std::uint32_t Path::least_behind(const Shares& before, const Shares& behind,
                                  std::uint32_t delay) const {
-  std::uint32_t least = 1;
+  double least = 1;
   for (std::size_t m = 0; m < behind.size(); ++m) {
-    const double r1 = before[m].ratio();
-    const double r2 = behind[m].ratio();
+    const double r1 = before[m].ratio;
+    const double r2 = behind[m].ratio;
     if (r2 == 0 || r2 == r1 || turns(before[m], behind[m])) continue;
-    const double slow = start_units(m);
-    const double v1 = r1 * slow / delay;
-    least = std::max(least, rounded_up(r2 * slow / std::sqrt(1 + v1 * v1)));
+    const double v1 = r1 * start_units_[m] / delay;
+    const double alone = r2 * start_units_[m];
+    least = std::max(least, alone * alone / (1 + v1 * v1));
   }
-  return least;
+  return rounded_up(std::sqrt(least));
 }
 
 // Of the last step before it, with one of this delay behind it.
 std::uint32_t Path::least_before(const Shares& before, const Shares& behind,
                                  std::uint32_t delay) const {
-  std::uint32_t least = 1;
+  double least = 1;
   for (std::size_t m = 0; m < behind.size(); ++m) {
-    const double r1 = before[m].ratio();
-    const double r2 = behind[m].ratio();
+    const double r1 = before[m].ratio;
+    const double r2 = behind[m].ratio;
     const bool turn = turns(before[m], behind[m]);
     if (r1 == 0 || (r1 == r2 && !turn)) continue;
-    const double slow = start_units(m);
-    const double v2 = r2 * slow / delay;
+    const double v2 = r2 * start_units_[m] / delay;
     const double left = turn ? 1 - v2 * v2 : 1 + v2 * v2;
-    // Of a turn the corner's own delay leaves more than nothing.
-    least = std::max(least, rounded_up(left > 0 ? r1 * slow / std::sqrt(left) : kRest));
+    if (left <= 0) return kRest - 1;  // the corner's own delay leaves more than nothing
+    const double alone = r1 * start_units_[m];
+    least = std::max(least, alone * alone / left);
   }
-  return least;
+  return rounded_up(std::sqrt(least));
 }
 
 // Steps of a motor's own in a segment, but for parts of steps.
@@ -241,8 +237,8 @@ Path::Head Path::head(std::size_t segment, std::size_t motor, const PathShare& b
                       const PathShare& now, std::uint16_t own) const {
   // Behind a rest on the way the first step comes after a whole delay, whatever was before.
   const bool rest = rests_at(segment);
-  const double r1 = rest ? 1 : before.ratio();
-  const double r2 = now.ratio();
+  const double r1 = rest ? 1 : before.ratio;
+  const double r2 = now.ratio;
   if (!now.moves() || (!rest && !goes_on(before, now)) || r2 >= r1) return {0, 0};
   const std::uint16_t code = std::max(own, own_least(segment, motor));
   const double delay = code * static_cast<double>(now.numerator) /
@@ -255,6 +251,7 @@ Path::Head Path::head(std::size_t segment, std::size_t motor, const PathShare& b
 void Path::raise_heads(std::size_t segment, const Shares& before, const Shares& now, bool decel,
                        const Places& places, std::uint32_t most, Profile& profile) const {
   for (std::size_t m = 0; m < now.size(); ++m) {
+    if (now[m].ratio == 1) continue;  // none is held back
     const std::int64_t index = decel ? places[m] + now[m].steps - 1 : places[m];
     const Head held = head(segment, m, before[m], now[m], now[m].code(decel, index));
     if (held.steps != 0) raise_first(profile, held.steps, std::min(held.delay, most));
@@ -338,7 +335,7 @@ void Path::forth_step(std::size_t i) {
   std::uint32_t least = kRest;
   for (const Delays& delays : joined_) least = std::min(least, delays.delay);
   for (std::size_t m = 0; m < width; ++m) {
-    if (now_[m].moves()) fastest_[m] = std::max(fastest_[m], now_[m].ratio() / least);
+    if (now_[m].moves()) fastest_[m] = std::max(fastest_[m], now_[m].ratio / least);
   }
   std::swap(before_, now_);
   std::swap(now_, behind_);

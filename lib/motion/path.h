@@ -124,7 +124,6 @@ class Path {
   std::uint16_t own_least(std::size_t segment, std::size_t motor) const;
   std::uint32_t flat(std::size_t segment, const Shares& shares) const;
   bool rests_at(std::size_t segment) const;
-  double start_units(std::size_t motor) const;
   std::uint32_t corner(const Shares& before, const Shares& behind) const;
   std::uint32_t least_behind(const Shares& before, const Shares& behind, std::uint32_t delay) const;
   std::uint32_t least_before(const Shares& before, const Shares& behind, std::uint32_t delay) const;
@@ -166,6 +165,7 @@ class Path {
   std::uint32_t first_step_ = 0;
   std::uint32_t unit_ns_ = 1;
   std::vector<std::pair<std::uint64_t, std::uint64_t>> unit_ratio_;  // a motor's by the path's
+  std::vector<double> start_units_;                                  // 1 / F
   std::uint64_t number_ = 0;
 
   // By segment: the least delay of its first step, by the corner; the same and by what comes

@@ -125,7 +125,8 @@ void PathRun::end_at(std::uint32_t end) {
 }
 
 std::int64_t path_position_256(const Path& path, std::size_t motor, std::uint32_t step,
-                               std::uint8_t fraction, std::uint32_t end, std::size_t segment) {
+                               std::uint8_t fraction, std::uint32_t end, std::size_t segment,
+                               bool whole_steps) {
   const std::int64_t from = path.point(segment, motor);
   const std::int64_t way = path.point(segment + 1, motor) - from;
   if (way == 0) return from * 256;
@@ -135,9 +136,10 @@ std::int64_t path_position_256(const Path& path, std::size_t motor, std::uint32_
   bushd_line_go_to(&line, std::min(end, path.start_of(segment + 1)) - path.start_of(segment));
   const std::int64_t rest_256 = std::int64_t{line.made} * 256;
   bushd_line_go_to(&line, step - path.start_of(segment));
-  const auto at_256 =
-      std::min(static_cast<std::int64_t>(bushd_line_position(&line, fraction)), rest_256);
-  return from * 256 + (way < 0 ? -at_256 : at_256);
+  const std::uint64_t at_256 =
+      whole_steps ? std::uint64_t{line.made} * 256 : bushd_line_position(&line, fraction);
+  const std::int64_t made_256 = std::min(static_cast<std::int64_t>(at_256), rest_256);
+  return from * 256 + (way < 0 ? -made_256 : made_256);
 }
 
 }  // namespace bushd::motion

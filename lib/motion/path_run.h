@@ -91,7 +91,9 @@ class PathRun {
 // Where a motor is on the path when the run has made `step` of its steps and `fraction`/256 of the
 // next one, 1/256 step, as bushd_line_position tells it for each segment: on a whole step at every
 // point. Not beyond the whole step where it is to come to rest when the run ends at `end`.
+// `whole_steps`: what it has made of them.
 std::int64_t path_position_256(const Path& path, std::size_t motor, std::uint32_t step,
-                               std::uint8_t fraction, std::uint32_t end, std::size_t segment);
+                               std::uint8_t fraction, std::uint32_t end, std::size_t segment,
+                               bool whole_steps);
 
 }  // namespace bushd::motion

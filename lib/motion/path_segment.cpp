@@ -7,6 +7,12 @@ namespace {
 
 __extension__ using Wide = unsigned __int128;
 
+// Most numbers are small, and their division takes half the time.
+std::uint64_t quotient(std::uint64_t dividend, std::uint64_t divisor) {
+  if ((dividend | divisor) >> 32 != 0) return dividend / divisor;
+  return static_cast<std::uint32_t>(dividend) / static_cast<std::uint32_t>(divisor);
+}
+
 void append(Profile& profile, std::uint32_t steps, std::uint32_t delay) {
   if (steps == 0) return;
   if (!profile.empty() && profile.back().delay == delay) {
@@ -19,7 +25,7 @@ void append(Profile& profile, std::uint32_t steps, std::uint32_t delay) {
 // The step of the run, counted from 0, before which a motor has made this many more.
 std::uint64_t run_step(const PathShare& share, std::uint64_t made) {
   if (share.steps == share.longest) return made;
-  return (made * share.longest + share.steps - 1) / share.steps;
+  return quotient(made * share.longest + share.steps - 1, share.steps);
 }
 
 }  // namespace
@@ -27,7 +33,7 @@ std::uint64_t run_step(const PathShare& share, std::uint64_t made) {
 std::uint32_t PathShare::scaled(std::uint16_t own) const {
   if (numerator == denominator) return own;
   if (numerator >> 47 == 0) {
-    return static_cast<std::uint32_t>((own * numerator + denominator - 1) / denominator);
+    return static_cast<std::uint32_t>(quotient(own * numerator + denominator - 1, denominator));
   }
   return static_cast<std::uint32_t>((Wide{own} * numerator + denominator - 1) / denominator);
 }
@@ -45,7 +51,7 @@ std::int64_t PathShare::first_at_most(bool decel, std::uint32_t delay) const {
     own = static_cast<std::uint64_t>(
         std::min(Wide{UINT16_MAX}, Wide{delay} * denominator / numerator));
   } else {
-    own = numerator == denominator ? delay : own / numerator;
+    own = numerator == denominator ? delay : quotient(own, numerator);
   }
   if (own < table->cruise) return ramp.count;
   const std::uint16_t* const end = ramp.code + ramp.count;
@@ -89,7 +95,7 @@ void RampMerger::Slowest::go_to(std::uint64_t step) {
     if (leader.next > step) return;
     const PathShare& share = *leader.ramp.share;
     const std::uint64_t made =
-        share.steps == share.longest ? step : step * share.steps / share.longest;
+        share.steps == share.longest ? step : quotient(step * share.steps, share.longest);
     leader.next = run_step(share, made + 1);
     leader.delay = share.at(decel_, leader.ramp.place + static_cast<std::int64_t>(made));
     if (leader.delay <= flat_) {
@@ -102,6 +108,54 @@ void RampMerger::Slowest::go_to(std::uint64_t step) {
   }
 }
 
+bool RampMerger::Slowest::has_codes() const {
+  if (climbs_.empty()) return true;
+  const PathShare& share = *climbs_[leader_].ramp.share;
+  return share.steps == share.longest && share.numerator == share.denominator;
+}
+
+RampMerger::Slowest::Codes RampMerger::Slowest::codes(std::uint64_t step) const {
+  if (climbs_.empty()) return {};
+  const PathRamp& leader = climbs_[leader_].ramp;
+  const bushd_ramp& side = decel_ ? leader.share->table->decel : leader.share->table->accel;
+  return {side.code + leader.place + step, side.code + side.count};
+}
+
+void RampMerger::Slowest::leave_codes(std::uint64_t step) {
+  if (climbs_.empty()) return;
+  climbs_[leader_].next = step;
+  go_to(step);
+}
+
+// As merge(), step by step, as long as only two motors count, which make all steps.
+void RampMerger::merge_codes(Profile& merged) {
+  const std::uint32_t least = std::max({flat_, up_.others(), down_.others()});
+  auto up = up_.codes(from_first_);
+  auto down = down_.codes(from_last_);
+  std::uint64_t left = left_;
+  const std::uint64_t before = left + from_first_;
+  std::uint64_t back = 0;
+  while (left > 0) {
+    const std::uint32_t in_front = up.now();
+    const std::uint32_t behind = down.now();
+    if (std::max(in_front, behind) <= least) break;
+    --left;
+    if (in_front >= behind) {
+      append(merged, 1, in_front);
+      ++up.at;
+    } else {
+      append(back_, 1, behind);
+      ++down.at;
+      ++back;
+    }
+  }
+  left_ = left;
+  from_first_ = before - left - back;
+  from_last_ += back;
+  up_.leave_codes(from_first_);
+  down_.leave_codes(from_last_);
+}
+
 // Whichever end is slower now is the slower side of the step there, as neither side rises towards
 // the other end.
 void RampMerger::merge(std::span<const PathRamp> up, std::span<const PathRamp> down,
@@ -110,23 +164,25 @@ void RampMerger::merge(std::span<const PathRamp> up, std::span<const PathRamp> d
   back_.clear();
   up_.start(up, false, flat);
   down_.start(down, true, flat);
-  std::uint64_t from_first = 0;
-  std::uint64_t from_last = 0;
-  std::uint64_t left = steps;
-  while (left > 0) {
+  flat_ = flat;
+  from_first_ = 0;
+  from_last_ = 0;
+  left_ = steps;
+  while (left_ > 0) {
+    if (up_.has_codes() && down_.has_codes()) merge_codes(merged);
     const std::uint32_t in_front = up_.delay();
     const std::uint32_t behind = down_.delay();
-    if (in_front == 0 && behind == 0) break;
+    if ((in_front == 0 && behind == 0) || left_ == 0) break;
     const bool forward = in_front >= behind;
     Slowest& side = forward ? up_ : down_;
-    std::uint64_t& done = forward ? from_first : from_last;
-    const std::uint64_t now = std::min(left, side.until() - done);
+    std::uint64_t& done = forward ? from_first_ : from_last_;
+    const std::uint64_t now = std::min(left_, side.until() - done);
     append(forward ? merged : back_, static_cast<std::uint32_t>(now), forward ? in_front : behind);
-    left -= now;
+    left_ -= now;
     done += now;
     side.go_to(done);
   }
-  append(merged, static_cast<std::uint32_t>(left), flat);
+  append(merged, static_cast<std::uint32_t>(left_), flat);
   for (auto part = back_.rbegin(); part != back_.rend(); ++part) {
     append(merged, part->steps, part->delay);
   }

@@ -33,8 +33,9 @@ struct PathShare {
   std::uint64_t numerator = 0;
   std::uint64_t denominator = 1;
 
+  double ratio = 0;  // r
+
   bool moves() const { return steps != 0; }
-  double ratio() const { return static_cast<double>(steps) / longest; }
   std::uint32_t scaled(std::uint16_t own) const;
   std::uint16_t code(bool decel, std::int64_t index) const;
   // What it asks for at an index of its table; one below 0 counts as 0.
@@ -69,6 +70,18 @@ class RampMerger {
     std::uint64_t until() const { return climbs_[leader_].next; }
     void go_to(std::uint64_t step);
 
+    // The codes that come one by one as long as they are above `others`, if the slowest motor makes
+    // every step of the run in the run's units; it is to be told how far that was.
+    struct Codes {
+      const std::uint16_t* at = nullptr;
+      const std::uint16_t* end = nullptr;
+      std::uint32_t now() const { return at == end ? 0 : *at; }
+    };
+    bool has_codes() const;
+    Codes codes(std::uint64_t step) const;
+    std::uint32_t others() const { return second_; }
+    void leave_codes(std::uint64_t step);
+
    private:
     struct Climb {
       PathRamp ramp;
@@ -86,8 +99,14 @@ class RampMerger {
     std::uint32_t second_ = 0;
   };
 
+  void merge_codes(Profile& merged);
+
   Slowest up_;
   Slowest down_;
+  std::uint64_t from_first_ = 0;
+  std::uint64_t from_last_ = 0;
+  std::uint64_t left_ = 0;
+  std::uint32_t flat_ = 0;
   Profile back_;
 };
 

@@ -43,6 +43,44 @@ class Bushctl(EndToEndTest):
         self.assertIn("which was left at", move.said())
         self.assertEqual(self.motors()["a0"]["position_steps"] - 900, -300 - self.motors()["b0"]["position_steps"])
 
+    def test_paths(self):
+        self.bring_up()
+        scan = self.file("scan.csv")
+        # More rows than one request holds.
+        rows = [f"{i % 40},{-i // 4}" for i in range(2500)]
+        scan.write_text("\n".join(["# there and back", "a0, b0", "", *rows, "300,-700"]))
+        plan = json.loads(self.command("path", "run", "--dry-run", "--json", scan).stdout)
+        self.assertEqual([motor["steps"] for motor in plan["motors"]], [300, -700])
+        short = self.file("short.csv")
+        short.write_text("a0,b0\n400,0\n400,-250\n0,0\n")
+        plan = json.loads(self.command("path", "check", "--json", "--corners", "exact", short).stdout)
+        self.assertEqual(plan["points_us"], sorted(plan["points_us"]))
+        self.assertEqual(len(plan["points_us"]), 3)
+        passed = json.loads(self.command("path", "check", "--json", short).stdout)
+        self.assertLess(passed["points_us"][-1], plan["points_us"][-1])
+        ran = self.command("path", "run", "--wait", short)
+        self.assertRegex(ran.stdout, r"a0: reached, stands at 0 by .*\nb0: reached, stands at 0 by ")
+        # Errors name the line of the file.
+        scan.write_text("a0,b0\n1,2\n\n3,4e9\n")
+        ran = self.bushctl("path", "run", scan)
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn(f"{scan}, line 4, b0: ", ran.stderr)
+        scan.write_text("a0,b0\n1,2\n3,four\n")
+        ran = self.bushctl("path", "run", scan)
+        self.assertEqual(ran.returncode, 2)
+        self.assertRegex(ran.stderr, r"scan\.csv.*3.*b0")
+        # One motor at several speeds.
+        ran = self.command("move", "a0", "--to", "300", "--speed-at", "100:50", "--speed-at", "120:1000", "--dry-run", "--json")
+        times = json.loads(ran.stdout)["points_us"]
+        self.assertGreater(times[1] - times[0], 400_000)
+        # Ctrl-C ramps all down along the path.
+        short.write_text(f"a0,b0\n{FAR},-{FAR}\n0,0\n")
+        move = self.start_bushctl("path", "run", "--wait", short)
+        self.wait_until_travelled(600, "a0", "b0")
+        self.assertEqual(move.end(signal.SIGINT), 130)
+        self.assertIn("the path has ended, which was left at", move.said())
+        self.assertEqual(self.motors()["a0"]["position_steps"], -self.motors()["b0"]["position_steps"])
+
     def test_ctrl_c_ramps_down_and_says_where_motors_stand(self):
         self.bring_up()
         for more in ((), ("--lcm",)):

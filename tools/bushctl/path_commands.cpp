@@ -59,7 +59,7 @@ Command& describe(Command& command, const std::shared_ptr<Options>& options) {
           "point, along straight lines and by one run. Stops, pauses and limits of one of them "
           "ramp "
           "all down along the path. No last approach for backlash is made.")
-      .file("FILE", &options->file, "Points, CSV")
+      .option("FILE", &options->file, "Points, CSV")
       .choice(
           "--corners", &options->corners, {"continuous", "exact"},
           "Pass the points at speeds at which no motor jumps by more than it starts with, or rest "

@@ -52,6 +52,22 @@ class Motor:
         return sum(1 if edge.direction else -1 for edge in self.edges)
 
 
+class PathMove(Move):
+    """A motor's part of a run along a path, whose steps are judged by the path (paths.py)."""
+
+    def __init__(self, event, table):
+        super().__init__({**event, "steps": 0}, table)
+        self.way = event["path"]["way"]
+        self.goal_steps = self.from_steps + event["steps"]
+
+    def end_steps(self):
+        """Where its path has led is judged by that."""
+        return self.result_steps
+
+    def change(self, tick, target_steps=None, floor=0, run_steps=None):
+        pass
+
+
 class MoveLog:
     def __init__(self, bus, problems):
         self.motors = {}  # by name
@@ -62,12 +78,14 @@ class MoveLog:
         self._tables = {}
         self._ways = {}  # by number: the tables of lines
         self._ticks = set()  # (bus, tick_ns)
+        self.paths = {}  # by number of the way: floors by motor's name
 
     def read(self, path):
         take = {
             "request": lambda event: None,  # who has asked for it
             "requests": lambda event: None,  # how many more
             "line": self._line,
+            "path": self._path,
             "move": self._move,
             "stop": self._change,
             "retarget": self._change,
@@ -126,7 +144,9 @@ class MoveLog:
         if motor is None:
             return
         table = self._table(event)
-        if "line" in event:
+        if "path" in event:
+            move = PathMove(event, table)
+        elif "line" in event:
             move = LineMove(event, table, self._ways[event["line"]["way"]])
         else:
             move = Move(event, table)
@@ -144,6 +164,9 @@ class MoveLog:
         longest = event["longest"]
         parts = [Part(self._table(motor), motor["increment"], longest, motor["floor"]) for motor in event["motors"]]
         self._ways[event["way"]] = Envelope(parts)
+
+    def _path(self, event):
+        self.paths[event["way"]] = {motor["motor"]: motor["floor"] for motor in event["motors"]}
 
     def _change(self, event):
         move = self._moves.get((event["motor"], event["id"]))
