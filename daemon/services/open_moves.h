@@ -1,5 +1,5 @@
-// Which requests have motors under way (moves, homing, armed moves, travel), and the one answer that each
-// gets when the last of its motors has ended.
+// Which requests have motors under way (moves, homing, armed moves, travel), and the one answer
+// that each gets when the last of its motors has ended.
 #pragma once
 
 #include <cstdint>
