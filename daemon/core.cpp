@@ -20,7 +20,8 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       idle_drivers_(installation_, outputs,
                     [this](MotorId motor) { return departures_.holds(motor); }),
       homing_(installation_, interlocks_, open_moves_, moves_, kept_, idle_drivers_, outputs),
-      stops_(installation_, moves_, homing_, open_moves_),
+      travels_(installation_, interlocks_, open_moves_, kept_, idle_drivers_, outputs),
+      stops_(installation_, moves_, homing_, travels_, open_moves_),
       jogs_(installation_, interlocks_, moves_, open_moves_),
       pauses_(installation_, interlocks_, moves_, open_moves_),
       lines_(installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_),
@@ -40,15 +41,15 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return departures_.holds(motor); }),
-      camac_(installation_, interlocks_, tables_, kept_, outputs,
+      camac_(installation_, interlocks_, tables_, travels_, kept_, outputs,
              [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
                this->request(now_us, asker, request);
              }),
       // What an MCU's positions are worth comes before whoever goes by that.
-      services_{&kept_,   &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,
-                &stops_,  &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_,
-                &tables_, &departures_,     &jogs_,    &pauses_,    &lines_,   &settings_,
-                &camac_},
+      services_{&kept_,    &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,
+                &stops_,   &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_,
+                &tables_,  &departures_,     &jogs_,    &pauses_,    &lines_,   &settings_,
+                &travels_, &camac_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener(

@@ -36,6 +36,7 @@
 #include "daemon/services/state_publisher.h"
 #include "daemon/services/stops.h"
 #include "daemon/services/tables_in_service.h"
+#include "daemon/services/travels.h"
 #include "daemon/services/trigger.h"
 #include "daemon/supervisor.h"
 
@@ -103,6 +104,7 @@ class Core {
   Moves moves_;
   IdleDrivers idle_drivers_;
   HomingQueue homing_;
+  Travels travels_;
   Stops stops_;
   Jogs jogs_;
   Pauses pauses_;

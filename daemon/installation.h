@@ -85,6 +85,7 @@ class Mcu {
   }
   bool can_trigger() const { return master_.can_trigger(on_bus_); }
   bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }
+  bool can_travel() const { return master_.can_travel(on_bus_); }
   bool can_home() const { return (view().identity.capabilities & BUSHD_CAN_HOME) != 0; }
 
   link::Tick earliest_start(std::int64_t now_us, Output output) const {
@@ -124,6 +125,8 @@ class Mcu {
     master_.position_compare(on_bus_, message);
   }
   void home(const bushd_home& message) { master_.home(on_bus_, message); }
+  std::uint8_t travel(const bushd_travel& message) { return master_.travel(on_bus_, message); }
+  void end_travel(Output output) { master_.end_travel(on_bus_, output.value); }
   void control(std::uint8_t actions) { master_.control(on_bus_, actions); }
   void set_position(Output output, std::int32_t position_steps) {
     master_.set_position(on_bus_, output.value, position_steps);

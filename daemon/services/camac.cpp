@@ -94,7 +94,7 @@ class Camac::Bushd2Station final : public Station {
 };
 
 Camac::Camac(Installation& installation, const Interlocks& interlocks, TablesInService& tables,
-             KeptPositions& kept, Outputs& outputs, const AskCore& ask)
+             Travels& travels, KeptPositions& kept, Outputs& outputs, const AskCore& ask)
     : kept_(kept), outputs_(outputs) {
   for (const config::Crate& configured : installation.config().crates) {
     Crate crate{.number = configured.number};
@@ -104,8 +104,9 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, TablesInS
           "camac/" + std::to_string(configured.number) + "/" + std::to_string(module.station);
       std::unique_ptr<Station> station;
       if (module.type == config::CamacModule::Type::kBushd1) {
-        station = std::make_unique<Bushd1Station>(kept_as, name, module.motors.front(),
-                                                  installation, interlocks, outputs, ask);
+        station =
+            std::make_unique<Bushd1Station>(kept_as, name, module.motors.front(), installation,
+                                            interlocks, tables, travels, outputs, ask);
       } else {
         station = std::make_unique<Bushd2Station>(kept_as, module.f_start_hz, name, module,
                                                   installation, interlocks, tables, outputs, ask);

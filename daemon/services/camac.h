@@ -14,6 +14,7 @@
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/tables_in_service.h"
+#include "daemon/services/travels.h"
 
 namespace bushd::daemon {
 
@@ -21,7 +22,7 @@ class Camac final : public Service {
  public:
   // `ask` is called from step() only.
   Camac(Installation& installation, const Interlocks& interlocks, TablesInService& tables,
-        KeptPositions& kept, Outputs& outputs, const AskCore& ask);
+        Travels& travels, KeptPositions& kept, Outputs& outputs, const AskCore& ask);
   ~Camac() override;
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request);

@@ -1,54 +1,242 @@
 #include "daemon/services/camac_shutter.h"
 
+#include <algorithm>
+#include <functional>
+
 #include "daemon/services/camac_motors.h"
 
 namespace bushd::daemon {
+namespace {
+
+constexpr std::uint32_t kTravelUnitNs = camac::Travel::kUnitUs * 1000;
+
+bool is_done(const api::Reply& reply, api::Outcome wanted) {
+  const auto* completed = std::get_if<api::Completed>(&reply);
+  return completed != nullptr && completed->outcome == wanted;
+}
+
+std::string reason_of(const api::Reply& reply) {
+  if (const auto* refused = std::get_if<api::Refused>(&reply)) return refused->reason;
+  const auto* completed = std::get_if<api::Completed>(&reply);
+  return completed == nullptr ? "" : completed->reason;
+}
+
+// Whether a switch is active, as debounced: what a motor has met it may not meet any more.
+bool is_active(const bushd_report& report, const std::optional<config::Input>& input) {
+  return input && (report.inputs >> input->number & 1) != 0;
+}
+
+// The stages in which the MCU makes the return, or is about to.
+bool is_return(const bushd_report& report) {
+  return report.homing == BUSHD_TRAVEL_RETURN_DELAY || report.homing == BUSHD_TRAVEL_RETURN;
+}
+
+}  // namespace
+
+Result<tables::TablePtr> table_of_travel(const camac::Travel& travel, const std::string& module) {
+  const auto& codes = travel.codes;
+  auto slower = std::ranges::is_sorted_until(codes, std::greater<>());
+  // Neither side of a table is empty.
+  if (slower == codes.end() && codes.size() > 1) --slower;
+  tables::TableContent content{.name = module, .time_unit_ns = kTravelUnitNs};
+  content.accel.assign(codes.begin(), slower);
+  content.decel.emplace(slower, codes.end());
+  if (content.decel->empty()) content.decel = content.accel;
+  content.cruise = std::ranges::min(codes);
+  content.name += "-" + tables::content_hash(content).substr(0, tables::kShortHashLength);
+  return tables::make(std::move(content));
+}
+
+void CamacShutter::warn(const std::string& what) {
+  outputs_.log(LogLevel::kWarning, motor_, name_ + ": " + what);
+}
 
 bool CamacShutter::refuse(const std::string& why) {
-  outputs_.log(LogLevel::kWarning, motor_,
-               name_ + ": " + installation_[motor_].name() + ": " + why);
+  warn(installation_[motor_].name() + ": " + why);
   return false;
 }
 
-bool CamacShutter::step(const camac::SingleStep& step) {
+Result<void> CamacShutter::may_begin(std::int64_t steps) const {
   const motion::Motor& motor = installation_[motor_];
-  if (step.with_sensor)
-    return refuse("no MCU watches a step sensor for a single step; use mode 00");
-  if (motor.has_plan()) return refuse("moves, by another's request");
-  auto may = interlocks_.may_move();
-  if (may) may = interlocks_.may_move(motor_);
-  if (may) may = motor.may_move_to(motor.position_steps() + (step.left ? -1 : 1));
+  if (motor.has_plan()) return fail("moves, by another's request");
+  if (auto may = interlocks_.may_move(); !may) return may;
+  if (auto may = interlocks_.may_move(motor_); !may) return may;
+  return motor.may_move_to(motor.position_steps() + steps);
+}
+
+bool CamacShutter::takes(Motion motion, const Result<void>& may) {
   if (!may) return refuse(may.error().text());
-  wanted_ = step;
+  motion_ = std::move(motion);
   return true;
 }
 
-bool CamacShutter::travel(const camac::Travel&) {
-  return refuse("no MCU travels between limits by itself; automatic modes are not available");
+bool CamacShutter::step(const camac::SingleStep& step) {
+  const bool sensed = step.with_sensor;
+  if (sensed && !installation_.config()[motor_].inputs.step) {
+    return refuse("it has no step sensor; add 'step' to its 'inputs', or use mode 00");
+  }
+  if (sensed && !installation_.mcu_of(motor_).can_travel()) {
+    return refuse("the firmware of its MCU does not watch a step sensor; use mode 00");
+  }
+  return takes({.kind = sensed ? Motion::Kind::kSensedStep : Motion::Kind::kStep, .step = step},
+               may_begin(step.left ? -1 : 1));
+}
+
+bool CamacShutter::travel(const camac::Travel& travel) {
+  const Mcu& mcu = installation_.mcu_of(motor_);
+  if (!mcu.can_travel() || (travel.synchronous && !mcu.can_trigger())) {
+    return refuse(
+        "the firmware of its MCU does not travel between limits by itself; modes 00 and "
+        "01 are available");
+  }
+  const auto table = table_of_travel(travel, name_);
+  if (!table) return refuse(table.error().text());
+  const auto steps = static_cast<std::int64_t>(travel.codes.size());
+  return takes({.kind = Motion::Kind::kTravel, .travel = travel, .table = *table},
+               may_begin(travel.left ? -steps : steps));
+}
+
+void CamacShutter::stop() {
+  if (motion_) motion_->to_stop = true;
 }
 
 void CamacShutter::follow(std::int64_t now_us, camac::Bushd1& module) {
-  const camac::MotorStatus limits = limits_of(installation_, motor_);
-  module.limits(limits.right_limit, limits.left_limit);
-  if (wanted_) {
-    const std::int64_t steps = wanted_->left ? -1 : 1;
-    wanted_.reset();
-    moves_ = true;
-    const api::Asker by{.session = session_, .number = session_->next_number()};
-    ask_(now_us, by,
-         api::Move{.kind = api::Move::Kind::kRelative,
-                   .motors = {{installation_[motor_].name(), steps}}});
+  tell_limits(module);
+  if (!motion_) return;
+  if (motion_->stage == Motion::Stage::kBegins) begin(now_us);
+  if (motion_->stage == Motion::Stage::kGetsTable) {
+    follow_table(module);
+  } else {
+    follow_going(now_us, module);
   }
-  if (!moves_ || !session_->last_answer()) return;
-  moves_ = false;
-  const auto* completed = std::get_if<api::Completed>(&*session_->last_answer());
-  if (completed != nullptr && completed->outcome == api::Outcome::kReached) {
-    return module.step_done();
+}
+
+void CamacShutter::begin(std::int64_t now_us) {
+  if (motion_->kind != Motion::Kind::kTravel) {
+    motion_->stage = Motion::Stage::kGoes;
+    if (motion_->kind == Motion::Kind::kSensedStep) return ask_mcu();
+    return ask_(now_us, asker(),
+                api::Move{.kind = api::Move::Kind::kRelative,
+                          .motors = {{installation_[motor_].name(), motion_->left() ? -1 : 1}}});
   }
-  const auto* refused = std::get_if<api::Refused>(&*session_->last_answer());
-  outputs_.log(LogLevel::kWarning, motor_,
-               name_ + ": " + (refused != nullptr ? refused->reason : completed->reason));
-  module.step_not_done();
+  motion_->stage = Motion::Stage::kGetsTable;
+  const GroupId group = installation_.config()[motor_].group;
+  const api::Asker by = asker();
+  if (installation_.tables()[group]->content_hash() == motion_->table->content_hash()) {
+    return by.answer(api::Completed{.outcome = api::Outcome::kDone, .reason = "", .detail = {}});
+  }
+  tables_.use(now_us, by, group, motion_->table);
+}
+
+void CamacShutter::follow_table(camac::Bushd1& module) {
+  const auto& reply = session_->last_answer();
+  if (!reply) return;
+  if (is_done(*reply, api::Outcome::kDone) && !motion_->to_stop) {
+    motion_->stage = Motion::Stage::kGoes;
+    return ask_mcu();
+  }
+  refuse(motion_->to_stop ? "stopped before it began"
+                          : "its codes were not put in service: " + reason_of(*reply));
+  motion_.reset();
+  module.stands();
+}
+
+void CamacShutter::ask_mcu() {
+  bushd_travel message{};
+  message.direction = motion_->left() ? -1 : 1;
+  if (motion_->kind == Motion::Kind::kSensedStep) {
+    message.kind = BUSHD_TRAVEL_STEP;
+    message.sensor = installation_.config()[motor_].inputs.step->number;
+    message.steps = 1;
+    message.wait_us = camac::SingleStep::kSensorUs;
+  } else {
+    const camac::Travel& travel = motion_->travel;
+    message.kind = BUSHD_TRAVEL_LIMITS;
+    message.edge = travel.synchronous ? BUSHD_EDGE_RISING : BUSHD_EDGE_NONE;
+    message.steps = static_cast<std::uint32_t>(travel.codes.size());
+    message.delay_us = travel.synchronous ? camac::Travel::kFixedDelayUs : 0;
+    message.wait_us = static_cast<std::uint32_t>(travel.return_delay_us());
+  }
+  motion_->from_steps = installation_[motor_].position_steps();
+  travels_.request(asker(), motor_, message);
+}
+
+void CamacShutter::follow_going(std::int64_t now_us, camac::Bushd1& module) {
+  if (motion_->to_stop && !motion_->stopping && motion_->kind != Motion::Kind::kStep) {
+    motion_->stopping = true;
+    ask_(now_us, {.session = stops_, .number = stops_->next_number()},
+         api::Stop{{installation_[motor_].name()}});
+  }
+  if (const auto reply = session_->last_answer()) return end(module, *reply);
+  const bushd_report* report = travels_.progress(motor_);
+  if (motion_->kind == Motion::Kind::kTravel && report != nullptr) follow_travel(*report, module);
+}
+
+// What happens between two reports is told in its order, whichever of it they show.
+void CamacShutter::follow_travel(const bushd_report& report, camac::Bushd1& module) {
+  if (motion_->stopping) return;
+  const Motion::Start start{report.start_tick, report.start_ns};
+  const bool unseen = report.homing == BUSHD_TRAVEL_ARMED && !motion_->returns && motion_->start &&
+                      *motion_->start != start;
+  if (is_return(report) ? !motion_->returns : unseen) end_run(module, *motion_);
+  if (!is_return(report) && motion_->returns) end_run(module, *motion_);
+  motion_->start = start;
+  tell_steps(module, *motion_, false);
+}
+
+// All but the last one, which comes with the end of the run.
+void CamacShutter::tell_steps(camac::Bushd1& module, Motion& motion, bool all) const {
+  const auto steps = static_cast<std::int64_t>(motion.travel.codes.size());
+  const std::int64_t moved = installation_[motor_].position_steps() - motion.from_steps;
+  const std::int64_t made = all ? steps : std::min(motion.left() ? -moved : moved, steps - 1);
+  for (; motion.told < made; ++motion.told) module.run_step_done();
+}
+
+// The MCU has seen its limit.
+void CamacShutter::end_run(camac::Bushd1& module, Motion& motion) {
+  const bool left = motion.left();
+  const auto steps = static_cast<std::int64_t>(motion.travel.codes.size());
+  tell_steps(module, motion, true);
+  module.limits(!left, left);
+  module.run_ends();
+  motion.from_steps += left ? -steps : steps;
+  motion.told = 0;
+  motion.returns = !motion.returns;
+}
+
+// Whether a run has reached its limit in time is the MCU's to say, which sees more than reports
+// show.
+void CamacShutter::tell_limits(camac::Bushd1& module) {
+  camac::MotorStatus limits = limits_of(installation_, motor_);
+  const config::MotorInputs& inputs = installation_.config()[motor_].inputs;
+  const bushd_report& report = installation_.mcu_of(motor_).report();
+  limits.right_limit = limits.right_limit && is_active(report, inputs.positive);
+  limits.left_limit = limits.left_limit && is_active(report, inputs.negative);
+  const bool runs =
+      motion_ && motion_->kind == Motion::Kind::kTravel && motion_->stage == Motion::Stage::kGoes;
+  module.limits(limits.right_limit && !(runs && !motion_->left()),
+                limits.left_limit && !(runs && motion_->left()));
+}
+
+void CamacShutter::end(camac::Bushd1& module, const api::Reply& reply) {
+  Motion motion = std::move(*motion_);
+  motion_.reset();
+  const bool done = is_done(reply, api::Outcome::kReached);
+  const bool told = motion.kind != Motion::Kind::kStep && !std::get_if<api::Refused>(&reply);
+  if (!done && !told) warn(reason_of(reply));
+  if (motion.kind == Motion::Kind::kTravel) return end_travel(module, motion, done);
+  done ? module.step_done() : module.step_not_done();
+}
+
+void CamacShutter::end_travel(camac::Bushd1& module, Motion& motion, bool done) {
+  if (done && !motion.returns) end_run(module, motion);
+  if (done) return end_run(module, motion);
+  const std::uint8_t stage = installation_.mcu_of(motor_).report().homing;
+  const bool all = stage == BUSHD_TRAVEL_NOT_REACHED || stage == BUSHD_TRAVEL_NOT_LEFT;
+  if (!motion.stopping) tell_steps(module, motion, all);
+  tell_limits(module);
+  if (all) module.run_ends();
+  module.stands();
 }
 
 }  // namespace bushd::daemon

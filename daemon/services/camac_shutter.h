@@ -1,5 +1,6 @@
-// The motor behind a BUSHD-1. It makes single steps without a sensor. Automatic travel, and steps
-// that a sensor has to see in time, need an MCU that does them by itself: they are refused.
+// The motor behind a BUSHD-1. A step without a sensor is a move like any other. With one, and in
+// automatic travel, the MCU goes by itself (travels.h), by the codes as the table of the motor's
+// group; the module is told of it as far as reports show it.
 #pragma once
 
 #include <cstdint>
@@ -12,40 +13,90 @@
 #include "daemon/interlocks.h"
 #include "daemon/outputs.h"
 #include "daemon/services/camac_asker.h"
+#include "daemon/services/tables_in_service.h"
+#include "daemon/services/travels.h"
 
 namespace bushd::daemon {
+
+// The table by which a run makes these codes. Precondition: they fall and rise once.
+Result<tables::TablePtr> table_of_travel(const camac::Travel& travel, const std::string& module);
 
 class CamacShutter final : public camac::Shutter {
  public:
   CamacShutter(const std::string& name, MotorId motor, Installation& installation,
-               const Interlocks& interlocks, Outputs& outputs, AskCore ask)
+               const Interlocks& interlocks, TablesInService& tables, Travels& travels,
+               Outputs& outputs, AskCore ask)
       : name_(name),
         motor_(motor),
         installation_(installation),
         interlocks_(interlocks),
+        tables_(tables),
+        travels_(travels),
         outputs_(outputs),
         ask_(std::move(ask)),
         session_(std::make_shared<CamacSession>(name)) {}
 
+  void refuses(std::string_view why) override { refuse(std::string(why)); }
   bool step(const camac::SingleStep& step) override;
   bool travel(const camac::Travel& travel) override;
-  void stop() override {}  // a single step ends by itself
+  void stop() override;
 
   // Does what is due, and tells the module what has become of it.
   void follow(std::int64_t now_us, camac::Bushd1& module);
 
  private:
+  struct Motion {
+    enum class Kind { kStep, kSensedStep, kTravel };
+    enum class Stage { kBegins, kGetsTable, kGoes };
+    Kind kind;
+    camac::SingleStep step{};
+    camac::Travel travel{};
+    tables::TablePtr table{};
+    Stage stage = Stage::kBegins;
+    bool to_stop = false;
+    bool stopping = false;  // it was asked to
+    // Of a travel, as the module knows it.
+    bool returns = false;
+    std::int64_t from_steps = 0;  // of the run
+    std::int64_t told = 0;        // steps of it
+    struct Start {
+      std::uint32_t tick;
+      std::uint32_t ns;
+      bool operator==(const Start&) const = default;
+    };
+    std::optional<Start> start{};  // of the run that was reported last
+
+    // Of the run, or the step, that is made.
+    bool left() const { return kind == Kind::kTravel ? travel.left != returns : step.left; }
+  };
+
+  void warn(const std::string& what);
   bool refuse(const std::string& why);
+  Result<void> may_begin(std::int64_t steps) const;
+  bool takes(Motion motion, const Result<void>& may);
+  api::Asker asker() { return {.session = session_, .number = session_->next_number()}; }
+  void begin(std::int64_t now_us);
+  void follow_table(camac::Bushd1& module);
+  void ask_mcu();
+  void follow_going(std::int64_t now_us, camac::Bushd1& module);
+  void follow_travel(const bushd_report& report, camac::Bushd1& module);
+  void tell_steps(camac::Bushd1& module, Motion& motion, bool all) const;
+  void end_run(camac::Bushd1& module, Motion& motion);
+  void tell_limits(camac::Bushd1& module);
+  void end(camac::Bushd1& module, const api::Reply& reply);
+  void end_travel(camac::Bushd1& module, Motion& motion, bool done);
 
   const std::string name_;
   const MotorId motor_;
   Installation& installation_;
   const Interlocks& interlocks_;
+  TablesInService& tables_;
+  Travels& travels_;
   Outputs& outputs_;
   AskCore ask_;
   std::shared_ptr<CamacSession> session_;
-  std::optional<camac::SingleStep> wanted_;
-  bool moves_ = false;
+  std::shared_ptr<CamacSession> stops_ = std::make_shared<CamacSession>(name_);
+  std::optional<Motion> motion_;
 };
 
 }  // namespace bushd::daemon

@@ -1,11 +1,22 @@
 #include "daemon/services/journal.h"
 
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <utility>
 
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
+namespace {
+
+// What moves a motor by itself, as the log of moves has it.
+constexpr std::string_view kHoming = "homing";
+std::string_view what_moves(const motion::Motor& motor) {
+  if (motor.is<motion::Homing>()) return kHoming;
+  return motor.is<motion::Travelling>() ? "travel" : "local";
+}
+
+}  // namespace
 
 Journal::Journal(const Installation& installation, Outputs& outputs)
     : installation_(installation),
@@ -178,9 +189,8 @@ void Journal::before_report(MotorId id, bool being_set) {
   const bool tapped = installation_.config()[id].local && !motor.has_plan() && !being_set &&
                       mcu.report().motor[output].position_steps != motor.position_steps();
   if (!autonomous && !tapped) return;
-  autonomous_[id] = Autonomous{.since = told_[mcu.id],
-                               .from_steps = motor.position_steps(),
-                               .homes = motor.is<motion::Homing>()};
+  autonomous_[id] = Autonomous{
+      .since = told_[mcu.id], .from_steps = motor.position_steps(), .what = what_moves(motor)};
 }
 
 void Journal::after_report(const Mcu& mcu) {
@@ -196,14 +206,14 @@ void Journal::end_autonomous(MotorId id, const Mcu& mcu) {
   const Autonomous autonomous = *std::exchange(autonomous_[id], std::nullopt);
   const motion::Motor& motor = installation_[id];
   const config::Bus& bus = installation_.bus_of(mcu).config;
-  const bool homed = autonomous.homes && mcu.report().homing == BUSHD_HOMING_DONE;
+  const bool homed = autonomous.what == kHoming && mcu.report().homing == BUSHD_HOMING_DONE;
   nlohmann::json line = {{"event", "autonomous"},
                          {"motor", motor.name()},
                          {"bus", bus.name},
                          {"address", mcu.config.address.value},
                          {"output", motor.output().value},
                          {"tick_ns", bus.tick_ns()},
-                         {"what", autonomous.homes ? "homing" : "local"},
+                         {"what", autonomous.what},
                          {"until_tick", mcu.view().tick},
                          {"from_steps", autonomous.from_steps},
                          {"set", homed || autonomous.set},

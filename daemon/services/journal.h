@@ -51,8 +51,8 @@ class Journal final : public Service {
   struct Autonomous {
     std::optional<motion::Tick> since;  // of the last report before, if there is one
     std::int64_t from_steps;
-    bool homes;
-    bool set = false;  // the MCU's counter does not go on from there
+    std::string_view what;  // word of the log
+    bool set = false;       // the MCU's counter does not go on from there
   };
   void end_autonomous(MotorId motor, const Mcu& mcu);
 

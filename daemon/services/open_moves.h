@@ -1,5 +1,5 @@
-// Which requests have motors under way (moves, homing, armed moves), and the one answer that each
-// gets when the last of its motors has ended.
+// Which requests have motors under way (moves, homing, armed moves, travel), and the one answer
+// that each gets when the last of its motors has ended.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class OpenMoves {
  public:
   explicit OpenMoves(Installation& installation) : installation_(installation) {}
 
-  enum class Purpose { kMove, kHome, kArm, kJog, kLine };
+  enum class Purpose { kMove, kHome, kArm, kJog, kLine, kTravel };
 
   // A motor's part that has ended.
   struct Ended {

@@ -23,12 +23,16 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
 }
 
 void Stops::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
-  for (const MotorId motor : motors) homing_.stop(motor);
+  for (const MotorId motor : motors) {
+    homing_.stop(motor);
+    travels_.stop(motor);
+  }
   moves_.stop(now_us, motors);
 }
 
 bool Stops::can_be_stopped(MotorId motor) const {
-  return installation_[motor].has_plan() || installation_[motor].is<motion::Homing>();
+  const motion::Motor& its = installation_[motor];
+  return its.has_plan() || its.is<motion::Homing>() || its.is<motion::Travelling>();
 }
 
 // However long a motor's ramp is, it ends: there is no deadline.

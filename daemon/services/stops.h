@@ -9,6 +9,7 @@
 #include "daemon/service.h"
 #include "daemon/services/homing_queue.h"
 #include "daemon/services/moves.h"
+#include "daemon/services/travels.h"
 
 namespace bushd::daemon {
 
@@ -18,8 +19,13 @@ class Stops final : public Service {
   // carried out all the same.
   static constexpr std::size_t kMaxOpen = 256;
 
-  Stops(Installation& installation, Moves& moves, HomingQueue& homing, OpenMoves& open_moves)
-      : installation_(installation), moves_(moves), homing_(homing), open_moves_(open_moves) {}
+  Stops(Installation& installation, Moves& moves, HomingQueue& homing, Travels& travels,
+        OpenMoves& open_moves)
+      : installation_(installation),
+        moves_(moves),
+        homing_(homing),
+        travels_(travels),
+        open_moves_(open_moves) {}
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Stop& request);
   void stop(std::int64_t now_us, const std::vector<MotorId>& motors);
@@ -39,6 +45,7 @@ class Stops final : public Service {
   Installation& installation_;
   Moves& moves_;
   HomingQueue& homing_;
+  Travels& travels_;
   OpenMoves& open_moves_;
   std::list<Stopping> open_;
 };

@@ -70,10 +70,16 @@ void Bushd1::start_travel(bool left) {
   for (int i = 0; i < std::min(steps, kMostSteps); ++i) {
     travel.codes.push_back(delay_at(kFirstCode + 2 * static_cast<std::size_t>(i)));
   }
-  if (steps == 0 || steps > kMostSteps || at_limit(left) || !rise_and_fall_once(travel.codes) ||
-      !shutter_.travel(travel)) {
-    return raise(kTravelFailed);
+  const char* why = nullptr;
+  if (steps == 0 || steps > kMostSteps) {
+    why = "the number of steps at address 0 is not 1..126";
+  } else if (at_limit(left)) {
+    why = "the limit switch that it is to travel to is active";
+  } else if (!rise_and_fall_once(travel.codes)) {
+    why = "its delays do not fall and then rise, once";
   }
+  if (why != nullptr) shutter_.refuses(why);
+  if (why != nullptr || !shutter_.travel(travel)) return raise(kTravelFailed);
   motion_ =
       Motion{.automatic = true, .left = left, .synchronous = travel.synchronous, .steps = steps};
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 namespace bushd::camac {
@@ -53,6 +54,8 @@ class Shutter {
  public:
   virtual ~Shutter() = default;
 
+  // The memory or the limits do not allow a travel: what people are told.
+  virtual void refuses(std::string_view /*why*/) {}
   // False: it cannot be made, and nothing moves.
   virtual bool step(const SingleStep& step) = 0;
   virtual bool travel(const Travel& travel) = 0;

@@ -24,8 +24,7 @@ constexpr std::size_t kMotorsPerPage = 8;
 // Where each motor has its place, for what follows.
 struct Place {
   std::string module;  // "station 5 of crate 1"
-  std::size_t page;    // of kBushd2: which of its four programs moves it
-  bool programmed;     // by codes from the memory
+  std::size_t page;    // which of the module's programs moves it: kBushd2 has four
 };
 using Places = std::map<std::size_t, Place>;  // by MotorId
 
@@ -85,7 +84,7 @@ Result<void> read_motors(const TomlReader& reader, const std::string& where, con
     }
     const auto motor = find_motor(reader, "motors", i, node.as_string()->get(), config);
     if (!motor) return fail(motor.error());
-    const Place place{.module = where, .page = i / kMotorsPerPage, .programmed = true};
+    const Place place{.module = where, .page = i / kMotorsPerPage};
     if (auto taken = take(reader, "motors", i, *motor, place, config, places); !taken) return taken;
     module->motors.push_back(*motor);
   }
@@ -111,7 +110,7 @@ Result<void> read_bushd1(const TomlReader& reader, const std::string& where, con
   const auto motor = find_motor(reader, "motor", std::nullopt, *name, config);
   if (!motor) return fail(motor.error());
   module->motors.push_back(*motor);
-  const Place place{.module = where, .page = 0, .programmed = false};
+  const Place place{.module = where, .page = 0};
   return take(reader, "motor", std::nullopt, *motor, place, config, places);
 }
 
@@ -139,7 +138,6 @@ Result<void> read_module(const TomlReader& reader, const Config& config, Crate* 
 // The codes of a program become the table of the motor's group: nobody else may be in it.
 Result<void> check_groups(const TomlReader& root, const Config& config, const Places& places) {
   for (const auto& [number, place] : places) {
-    if (!place.programmed) continue;
     const Motor& motor = config.motors[number];
     for (std::size_t i = 0; i < config.motors.size(); ++i) {
       const Motor& other = config.motors[i];

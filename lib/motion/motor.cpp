@@ -101,6 +101,10 @@ void Motor::end_homing(bool found) {
   rest();
 }
 
+void Motor::end_travel() {
+  if (is<Travelling>()) rest();
+}
+
 void Motor::position_is_known() {
   confirmed_ = true;
   uncertain_reason_.reset();

@@ -71,8 +71,9 @@ struct OnLine : Moving {
   bool stands = false;   // where a run has led that was not the last one
   bool resumes = false;  // paused, and to go on as soon as all motors of the line stand
 };
-struct Local {};  // the inputs at its MCU move it, or another master does
-using Activity = std::variant<Resting, Moving, Armed, Homing, Local, OnLine>;
+struct Local {};       // the inputs at its MCU move it, or another master does
+struct Travelling {};  // by its MCU, between its limits or for one step, or it is about to
+using Activity = std::variant<Resting, Moving, Armed, Homing, Local, OnLine, Travelling>;
 
 // What an MCU reports, and what is known beside.
 struct Report {
@@ -220,6 +221,8 @@ class Motor {
   bool change(Tick at) { return has_plan() && axis_.change(at); }
   void home() { activity_ = Homing{}; }
   void end_homing(bool found);
+  void travel() { activity_ = Travelling{}; }
+  void end_travel();
   void set_coordinates(units::Coordinates coordinates) {
     setup_.coordinates = std::move(coordinates);
   }

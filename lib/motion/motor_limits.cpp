@@ -13,6 +13,7 @@ namespace bushd::motion {
 Result<void> Motor::may_be_used() const {
   if (is<Armed>()) return fail("waits for the trigger; disarm it first");
   if (is<Homing>()) return fail("it is being homed; wait for that result");
+  if (is<Travelling>()) return fail("it travels by itself, for a CAMAC module; stop it first");
   if (is<Local>() && !autonomous_) {
     return fail("MCU " + setup_.mcu +
                 " moves it for another master; end that, and wait until it rests");

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "camac/bushd2.h"
-#include "daemon/lab.h"
+#include "daemon/camac_lab.h"
 
 namespace bushd::test {
 namespace {
@@ -15,25 +15,8 @@ namespace {
 using camac::Bushd2;
 using testing::HasSubstr;
 
-constexpr int kStation = 5;
-constexpr int kShutterStation = 7;
 constexpr int kStartHz = 100;
 constexpr std::int64_t kUnitNs = 1'000'000'000 / (250 * kStartHz);
-
-// BUSHD-2 with m01 and m02, and BUSHD-1 with m03, each kind with a group of its own.
-std::string lab_with(const std::string& manner = "fine", const std::string& motor_keys = "") {
-  std::string toml = hall(1, 3, manner);
-  const std::string last = "output = 2\ngroup = \"axes\"\n";
-  toml.replace(toml.find(last), last.size(), "output = 2\ngroup = \"shutters\"\n");
-  const std::string first = "output = 0\n";
-  toml.insert(toml.find(first) + first.size(), motor_keys);
-  return toml +
-         "[[group]]\nname = \"shutters\"\ntable = \"bushd2-constant\"\n"
-         "[[crate]]\nnumber = 1\n"
-         "[[crate.module]]\nstation = 5\ntype = \"bushd-2\"\nf_start_hz = 100\n"
-         "motors = [\"m01\", \"m02\"]\n"
-         "[[crate.module]]\nstation = 7\ntype = \"bushd-1\"\nmotor = \"m03\"\n";
-}
 
 // When the STEP outputs of an MCU have risen.
 class StepTimes final : public sim::EdgeSink {
@@ -45,46 +28,6 @@ class StepTimes final : public sim::EdgeSink {
   }
   void settled(sim::TimeNs) override {}
   std::vector<sim::TimeNs> times_ns;
-};
-
-class CamacLab : public Lab {
- public:
-  explicit CamacLab(const std::string& toml = lab_with(), sim::EdgeSink* sink = nullptr)
-      : Lab(toml, "", sink) {
-    connect();
-  }
-  Answer block(camac::Block block, int crate = 1) {
-    return wait(send(api::Camac{.crate = crate, .block = std::move(block)}));
-  }
-  camac::Response naf(int n, int a, int f, std::uint32_t data = 0) {
-    const Answer answer = block({.cycles = {{n, a, f, data}}});
-    if (!answer.camac) {
-      ADD_FAILURE() << answer.reason;
-      return {};
-    }
-    return answer.camac->block.responses.at(0);
-  }
-  void load(int page, int steps, const std::vector<int>& codes) {
-    naf(kStation, 1, 16, static_cast<std::uint32_t>(page) * 256);
-    camac::Block words{.mode = camac::BlockMode::kQStop};
-    std::vector<int> bytes{steps % 256, steps / 256};
-    bytes.insert(bytes.end(), codes.begin(), codes.end());
-    for (const int byte : bytes) {
-      words.cycles.push_back({kStation, 0, 16, static_cast<std::uint32_t>(byte)});
-    }
-    words.count = static_cast<std::uint32_t>(words.cycles.size());
-    EXPECT_EQ(block(words).camac->block.tally, words.count);
-  }
-  void permit(std::uint32_t control) {
-    naf(kStation, 2, 16, control);
-    naf(kStation, 0, 26);
-  }
-  std::uint32_t requests() { return naf(kStation, 3, 0).data; }
-  bool lam() { return naf(kStation, 0, 8).q; }
-  bool wait_for_lam(double limit_s = 60) {
-    const std::size_t before = lams().size();
-    return run_until([&] { return lams().size() > before; }, limit_s);
-  }
 };
 
 constexpr std::uint32_t kEnabled = 0x60;  // fault and end of motion
@@ -305,18 +248,6 @@ TEST(CamacMotion, SingleStepsOfTheShutter) {
   lab.naf(kShutterStation, 0, 26);
   ASSERT_TRUE(lab.wait_for_lam());
   EXPECT_EQ(lab.shaft_steps("m03"), 0);
-}
-
-TEST(CamacMotion, ModesOfTheShutterThatNoMcuHasAreRefused) {
-  CamacLab lab;
-  lab.naf(kShutterStation, 1, 16, 0);
-  for (const std::uint32_t byte : {1U, 0U, 1U, 0U, 100U, 0U}) {
-    lab.naf(kShutterStation, 0, 16, byte);
-  }
-  lab.naf(kShutterStation, 2, 16, 0x77);
-  lab.naf(kShutterStation, 0, 26);
-  EXPECT_EQ(lab.naf(kShutterStation, 3, 0).data, 0x10U);
-  EXPECT_THAT(lab.warnings().back(), HasSubstr("automatic modes are not available"));
 }
 
 // Another daemon finds the memory, and no motor moves because of it.

@@ -22,6 +22,7 @@
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
 #include "daemon/services/positions.h"
+#include "daemon/services/travels.h"
 #include "daemon/supervisor.h"
 #include "sim/bus.h"
 
@@ -66,6 +67,7 @@ class LiveBench : public Bench {
   daemon::IdleDrivers idle_drivers{installation, *this, [](MotorId) { return false; }};
   daemon::HomingQueue homing{installation, interlocks,   open_moves, moves,
                              kept,         idle_drivers, *this};
+  daemon::Travels travels{installation, interlocks, open_moves, kept, idle_drivers, *this};
   daemon::EmergencyStop emergency_stop{installation, interlocks, homing, open_moves, *this};
 
  private:

@@ -3,6 +3,7 @@
 import json
 import unittest
 
+import bushd
 from rig import EndToEndTest, program
 
 CRATE = """
@@ -70,6 +71,7 @@ class Camac(EndToEndTest):
         table = self.command("camac", "dump", 5, "--page", 2, "--f-start", 100).stdout
         self.assertIn("time_unit_ns = 40000", table)
         self.assertEqual(len(self.command("camac", "dump", 5).stdout.splitlines()), 64)
+        self.python_reads(memory)
         for words, why in (
             (("5", "0"), "allowed: camac N A F"),
             (("5", "0", "x"), "x is no number 0..31"),
@@ -86,6 +88,17 @@ class Camac(EndToEndTest):
         ran = self.bushctl("camac", "dump", "6")
         self.assertEqual(ran.returncode, 1)
         self.assertIn("X = 0", ran.stderr)
+
+    def python_reads(self, memory):
+        for how in ({}, {"lcm": True}):
+            with bushd.connect(**how) as client:
+                begun = client.camac([(5, 1, 16, 0), (9, 0, 0)])
+                self.assertEqual(begun, bushd.CamacResult((bushd.CamacResponse(True, True, 0), bushd.CamacResponse(False, False, 0)), 2, 0))
+                read = client.camac([(5, 0, 0)], mode="q-stop", count=1024)
+                self.assertEqual([response.data for response in read.responses], memory)
+                self.assertEqual(client.camac([(4, 0, 0)], mode="scan", count=20, last=(6, 15)).tally, 4)
+                with self.assertRaisesRegex(bushd.Refused, "there is no crate 2"):
+                    client.camac([(5, 0, 0)], crate=2)
 
 
 if __name__ == "__main__":

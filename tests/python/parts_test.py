@@ -143,11 +143,20 @@ class Arguments(unittest.TestCase):
         self.assertEqual(message.change_values, ["12.5", "negative", "[-5.0, 30.0]"])
         self.assertEqual(requests.change_configuration("m", {"soft_limits": None}).message.change_values, ["none"])
 
+    def test_cycles_have_addresses_and_data(self):
+        message = requests.camac([(5, 1, 16, 7), (5, 0, 0)], crate=2).message
+        self.assertEqual((message.crate, message.count, message.cycle_count), (2, 2, 2))
+        self.assertEqual((message.stations, message.subaddresses, message.functions, message.data), ([5, 5], [1, 0], [16, 0], [7, 0]))
+        self.assertEqual((message.last_station, message.last_subaddress), (23, 15))
+        self.assertEqual(requests.camac([(5, 0, 0)], mode="q-stop", count=4096).message.count, 4096)
+        for wrong in ({"mode": "stop"}, {"cycles": [(5, 0)]}):
+            with self.assertRaises(ValueError):
+                requests.camac(**{"cycles": [(5, 0, 0)], **wrong})
+
     def test_every_request_of_the_daemon_can_be_made(self):
         made = inspect.getsource(requests) + inspect.getsource(session)
         asked = [name for name in dir(messages) if "request" in getattr(getattr(messages, name), "__slots__", ())]
         self.assertGreater(len(asked), 20)
-        asked.remove("camac_request_t")  # for old programs, which have libbushd-esone (docs/python.md)
         for name in asked:
             self.assertIn(f"messages.{name}", made)
 

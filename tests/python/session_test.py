@@ -374,12 +374,16 @@ class HostileBytes(unittest.TestCase):
         history = messages.history_answer_t()
         history.reply = reply(request, RESULT, "done")
         history.motions, history.motion_count = [messages.past_motion_t()], 1
+        camac = messages.camac_reply_t()
+        camac.reply = reply(request, RESULT, "done")
+        camac.x, camac.q, camac.data, camac.response_count = [True], [False], [7], 1
         health = messages.health_t()
         health.mcus, health.mcu_count, health.parts = [messages.mcu_health_t()], 1, 1
         described = messages.mcu_description_t()
         described.motors, described.motor_count, described.parts = [messages.motor_description_t()], 1, 1
         return {"REPLY": answer(request, RESULT, "reached", "there", motors=["m1", "m2"]), "STATE": state(),
                 "WELCOME": welcome.encode(), "TABLE_REPLY": table.encode(), "HISTORY_REPLY": history.encode(),
+                "CAMAC_REPLY": camac.encode(),
                 "HEALTH": health.encode(), "DESCRIPTION": described.encode()}
 
     def test_valid_ones_are_taken(self):

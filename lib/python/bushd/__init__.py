@@ -24,6 +24,8 @@ from .errors import (
 from .model import (
     Activity,
     BusHealth,
+    CamacResponse,
+    CamacResult,
     Configuration,
     Inhibited,
     Mcu,
@@ -52,6 +54,8 @@ __all__ = [
     "Activity",
     "BusHealth",
     "BushdError",
+    "CamacResponse",
+    "CamacResult",
     "Client",
     "Configuration",
     "Inhibited",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import os
 import types
-from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Iterable, Mapping
 from typing import Literal, TypeVar, overload
 
 from . import arguments, model, requests
@@ -351,6 +351,18 @@ class Client:
 
     async def history(self, name: str, most: int = 20) -> list[model.PastMotion]:
         return list((await self._ask(requests.history(name, most))).detail.motions)
+
+    async def camac(
+        self,
+        cycles: Iterable[requests.Cycle],
+        *,
+        crate: int = 1,
+        mode: str = "single",
+        count: int | None = None,
+        last: tuple[int, int] | None = None,
+    ) -> model.CamacResult:
+        request = requests.camac(cycles, crate=crate, mode=mode, count=count, last=last)
+        return _there((await self._ask(request)).detail.camac)
 
     # -- how
 

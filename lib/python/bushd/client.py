@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import os
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal, overload
 
-from . import aio, model, motion
+from . import aio, model, motion, requests
 from .aio import KEEP
 from .arguments import Amount
 from .links import DEFAULT_PREFIX
@@ -401,6 +401,22 @@ class Client:
     def history(self, name: str, most: int = 20) -> list[model.PastMotion]:
         """What has moved this motor, the newest first; `most` 1 to 1000. Refused without a state store."""
         return self._loop.run(self._client.history(name, most))
+
+    def camac(
+        self,
+        cycles: Iterable[requests.Cycle],
+        *,
+        crate: int = 1,
+        mode: str = "single",
+        count: int | None = None,
+        last: tuple[int, int] | None = None,
+    ) -> model.CamacResult:
+        """Cycles of a CAMAC crate, each (N, A, F) or, of functions that write, (N, A, F, data).
+
+        mode: "single", each cycle of the list; "repeat", "q-stop" and "scan" begin at the address of the first one, and each
+        cycle has a word to write. count: words to read, 1 to 4096. last: station and subaddress with which a scan ends.
+        """
+        return self._loop.run(self._client.camac(cycles, crate=crate, mode=mode, count=count, last=last))
 
 
 class Motion:

@@ -41,15 +41,18 @@ class Detail:
     tables: tuple[model.Table, ...] = ()
     motions: tuple[model.PastMotion, ...] = ()
     configuration: model.Configuration | None = None
+    camac: model.CamacResult | None = None
 
     def __add__(self, more: Detail) -> Detail:
         """With the piece of the list that the next part has."""
-        plan, configuration = self.plan, self.configuration
+        plan, configuration, camac = self.plan, self.configuration, self.camac
         if plan is not None and more.plan is not None:
             plan = dataclasses.replace(plan, legs=plan.legs + more.plan.legs)
         if configuration is not None and more.configuration is not None:
             settings = configuration.settings + more.configuration.settings
             configuration = dataclasses.replace(configuration, settings=settings)
+        if camac is not None and more.camac is not None:
+            camac = dataclasses.replace(camac, responses=camac.responses + more.camac.responses)
         return Detail(
             motors=self.motors + more.motors,
             plan=plan,
@@ -57,6 +60,7 @@ class Detail:
             tables=self.tables + more.tables,
             motions=self.motions + more.motions,
             configuration=configuration,
+            camac=camac,
         )
 
 
@@ -138,6 +142,8 @@ def decode(channel: str, payload: bytes) -> Message | None:
     kind, parse = known
     try:
         message = kind.decode(payload)
+        for name in _BOOLEAN_ARRAYS.get(channel, ()):
+            setattr(message, name, list(getattr(message, name)))
         # lcm-gen's decoder takes negative counts, texts that are cut off and what is left over; no encoder makes them.
         if message.encode() != payload:
             return None
@@ -146,6 +152,8 @@ def decode(channel: str, payload: bytes) -> Message | None:
         return None
 
 
+# lcm-gen's decoder makes iterators of them, which its encoder cannot take.
+_BOOLEAN_ARRAYS = {"CAMAC_REPLY": ("x", "q")}
 _STATE_FINGERPRINT: bytes = messages.mcu_state_t._get_packed_fingerprint()
 
 
@@ -285,6 +293,13 @@ def _configuration_answer(message: Any) -> Reply:
     return _reply(message, Detail(configuration=model.Configuration(message.path, message.sha256, settings)))
 
 
+def _camac_answer(message: Any) -> Reply:
+    responses = tuple(
+        model.CamacResponse(bool(x), bool(q), data) for x, q, data in zip(message.x, message.q, message.data)
+    )
+    return _reply(message, Detail(camac=model.CamacResult(responses, message.tally, message.requests)))
+
+
 def _welcome(message: Any) -> Welcome:
     if message.session == 0:
         raise ValueError("no session")
@@ -345,6 +360,7 @@ _DECODERS: dict[str, tuple[Any, Callable[[Any], Message]]] = {
     "REPLY": (messages.answer_t, _answer),
     "TABLE_REPLY": (messages.table_answer_t, _table_answer),
     "HISTORY_REPLY": (messages.history_answer_t, _history_answer),
+    "CAMAC_REPLY": (messages.camac_reply_t, _camac_answer),
     "CONFIGURATION_REPLY": (messages.configuration_answer_t, _configuration_answer),
     "STATE": (messages.mcu_state_t, _state),
     "DESCRIPTION": (messages.mcu_description_t, _description),

@@ -262,7 +262,7 @@ class PastMotion:
     """What has moved a motor, or made its position known."""
 
     at: datetime.datetime  # when it ended
-    what: str  # "move", "home", "arm", "set", "config" or "confirm"
+    what: str  # "move", "home", "arm", "jog", "line", "travel", "set", "config" or "confirm"
     who: str  # asked for it
     from_steps: int
     to_steps: int
@@ -289,6 +289,24 @@ class Configuration:
     path: str  # of bushd.toml, on the daemon's PC
     sha256: str  # of its text as the daemon knows it
     settings: tuple[Setting, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class CamacResponse:
+    """What a station of a CAMAC crate has answered to a cycle."""
+
+    x: bool  # it has this command
+    q: bool
+    data: int  # 24 bits; 0 of functions that do not read
+
+
+@dataclasses.dataclass(frozen=True)
+class CamacResult:
+    """What has become of CAMAC cycles."""
+
+    responses: tuple[CamacResponse, ...]  # of the cycles that moved a word, and of the one that ended a block at one address
+    tally: int  # words that were moved; of "single" cycles that were made
+    requests: int  # stations that raise L afterwards: bit n - 1 is station n
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,6 +16,8 @@ STEPS = "steps"
 
 Amounts = Mapping[str, float]
 Names = Iterable[str]
+# (N, A, F), and of functions that write (N, A, F, data).
+Cycle = tuple[int, int, int] | tuple[int, int, int, int]
 
 
 def move(
@@ -151,6 +153,36 @@ def change_configuration(motor: str, changes: Mapping[str, object]) -> Request:
     message.change_values = [_setting(value) for value in changes.values()]
     message.change_count = len(changes)
     return Request("CONFIGURE", message)
+
+
+_CAMAC_MODES = {
+    "single": messages.camac_request_t.SINGLE,
+    "repeat": messages.camac_request_t.REPEAT,
+    "q-stop": messages.camac_request_t.Q_STOP,
+    "scan": messages.camac_request_t.SCAN,
+}
+_LAST_STATION, _LAST_SUBADDRESS = 23, 15
+
+
+def camac(
+    cycles: Iterable[Cycle], *, crate: int = 1, mode: str = "single", count: int | None = None, last: tuple[int, int] | None = None
+) -> Request:
+    if mode not in _CAMAC_MODES:
+        raise ValueError(f"mode={mode!r}; allowed: {', '.join(_CAMAC_MODES)}")
+    listed = [tuple(map(operator.index, cycle)) for cycle in cycles]
+    if any(len(cycle) not in (3, 4) for cycle in listed):
+        raise ValueError("a cycle is (N, A, F) or (N, A, F, data)")
+    message = messages.camac_request_t()
+    message.crate = operator.index(crate)
+    message.mode = _CAMAC_MODES[mode]
+    message.count = len(listed) if count is None else operator.index(count)
+    message.last_station, message.last_subaddress = last or (_LAST_STATION, _LAST_SUBADDRESS)
+    message.cycle_count = len(listed)
+    message.stations = [cycle[0] for cycle in listed]
+    message.subaddresses = [cycle[1] for cycle in listed]
+    message.functions = [cycle[2] for cycle in listed]
+    message.data = [cycle[3] if len(cycle) == 4 else 0 for cycle in listed]
+    return Request("CAMAC", message)
 
 
 def list_tables() -> Request:

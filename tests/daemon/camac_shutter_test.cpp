@@ -1,0 +1,198 @@
+// BUSHD-1 through the daemon: a shutter between two limit switches, with reactor starts, down to
+// the edges of its STEP output.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/camac_lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::uint32_t kAllEnabled = 0x37;
+constexpr std::uint32_t kLeft = 0x08;
+constexpr std::uint32_t kAutomatic = 0x40;
+constexpr std::uint32_t kSecondMode = 0x80;
+enum Request : std::uint32_t {
+  kRightLimit = 0x01,
+  kLeftLimit = 0x02,
+  kStepDone = 0x04,
+  kStepNotDone = 0x08,
+  kTravelFailed = 0x10,
+  kRightLevel = 0x40,
+  kLeftLevel = 0x80
+};
+
+// They fall and rise once, from 20 ms to 2.5 ms.
+const std::vector<int> kCodes{400, 250, 120, 60, 50, 50, 70, 150, 300};
+
+TEST(CamacShutter, TravelsToTheLimitAndBack) {
+  ShutterLab lab;
+  EXPECT_EQ(lab.requests(), kLeftLevel);
+  lab.load_codes(kCodes, 6000);
+  lab.permit(kAutomatic | kAllEnabled);
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.cleared_requests(), kRightLimit | kRightLevel);
+  EXPECT_EQ(lab.shutter().position, 9);
+  EXPECT_TRUE(lab.motor("m03").moving) << "it is to return";
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.cleared_requests(), kLeftLimit | kLeftLevel);
+  ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }));
+  EXPECT_EQ(lab.shutter().position, 0);
+  EXPECT_EQ(lab.motor("m03").position_steps, 0);
+  ASSERT_EQ(lab.shutter().steps.size(), 18U);
+  const sim::TimeNs begin_ns = lab.shutter().steps[0].time_ns - kCodes[0] * ShutterLab::kUnitNs;
+  lab.expect_run(0, begin_ns, kCodes, false);
+  sim::TimeNs there_ns = begin_ns;
+  for (const int code : kCodes) there_ns += code * ShutterLab::kUnitNs;
+  lab.expect_run(9, there_ns + 6000 * ShutterLab::kUnitNs, kCodes, true);
+  EXPECT_THAT(lab.description("m03").table.name, HasSubstr("camac-1-7-"));
+  EXPECT_TRUE(lab.warnings().empty());
+  EXPECT_TRUE(lab.errors().empty());
+  const Answer moved = lab.wait(lab.send(Ask::kMoveBy, {"m03"}, {3}));
+  EXPECT_EQ(moved.result, "reached") << "it is anybody's again";
+}
+
+TEST(CamacShutter, FollowsReactorStarts) {
+  ShutterLab lab;
+  lab.load_codes(kCodes, 12'000);
+  lab.permit(kAutomatic | kSecondMode | kAllEnabled);
+  lab.run_for(1);
+  EXPECT_TRUE(lab.shutter().steps.empty()) << "it waits for the reactor";
+  for (std::size_t start = 0; start < 3; ++start) {
+    SCOPED_TRACE(start);
+    lab.run_for(0.0013);
+    const sim::TimeNs start_ns = lab.reactor_starts();
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.cleared_requests() & 0x3F, kRightLimit);
+    lab.reactor_starts();  // during a travel: ignored
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.cleared_requests() & 0x3F, kLeftLimit);
+    ASSERT_EQ(lab.shutter().steps.size(), (start + 1) * 18);
+    lab.expect_run(start * 18, start_ns + 150'000'000, kCodes, false);
+    lab.expect_run(start * 18 + 9, start_ns + 600'000'000, kCodes, true);
+  }
+  lab.naf(kShutterStation, 0, 24);
+  ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }));
+  lab.reactor_starts();
+  lab.run_for(1);
+  EXPECT_EQ(lab.shutter().steps.size(), 54U);
+  EXPECT_FALSE(lab.lam()) << "F24 raises no request";
+  EXPECT_EQ(lab.motor("m03").position_steps, 0);
+}
+
+TEST(CamacShutter, ErrorsOfATravelStopIt) {
+  struct Case {
+    int right_limit;
+    int left_limit;
+    std::uint32_t levels;
+    const char* log;
+  };
+  for (const Case& bad : {Case{5, 0, kRightLevel, "was active before its last step"},
+                          Case{10, 0, 0, "was not active after its last step"},
+                          Case{9, 9, kRightLevel | kLeftLevel, "came from is still active"}}) {
+    SCOPED_TRACE(bad.log);
+    ShutterLab lab;
+    lab.load_codes(kCodes, 6000);
+    lab.shutter().right_limit = bad.right_limit;
+    lab.shutter().left_limit = bad.left_limit;
+    lab.shutter().tell();
+    lab.permit(kAutomatic | kAllEnabled);
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_TRUE((lab.requests() & kTravelFailed) != 0);
+    EXPECT_EQ(lab.requests() & (kRightLevel | kLeftLevel), bad.levels);
+    EXPECT_THAT(lab.warnings().back(), HasSubstr(bad.log));
+    const int stands = lab.shutter().position;
+    lab.run_for(2);
+    EXPECT_EQ(lab.shutter().position, stands) << "no return";
+    EXPECT_FALSE(lab.motor("m03").moving);
+    EXPECT_EQ(lab.motor("m03").position_steps, stands);
+  }
+}
+
+TEST(CamacShutter, StepsAreSeenByTheSensorInTime) {
+  ShutterLab lab;
+  lab.permit(kSecondMode | kAllEnabled);
+  lab.run_until([&] { return lab.shutter().position == 1; });
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.requests(), 0U) << "it has 1.5 s";
+  lab.shutter().sensor = true;
+  lab.shutter().tell();
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.cleared_requests(), kStepDone);
+  const std::int64_t began_us = lab.now_us();
+  lab.permit(kSecondMode | kAllEnabled);
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.cleared_requests(), kStepNotDone);
+  EXPECT_GE(lab.now_us() - began_us, 1'500'000);
+  EXPECT_LE(lab.now_us() - began_us, 1'800'000);
+  EXPECT_EQ(lab.shutter().position, 2);
+  EXPECT_EQ(lab.motor("m03").position_steps, 2);
+  EXPECT_THAT(lab.warnings().back(), HasSubstr("its sensor has not seen the step in time"));
+}
+
+TEST(CamacShutter, WhatCannotWorkIsAFaultThatTheLogExplains) {
+  ShutterLab without("inputs = { positive = 3 }\n");
+  without.load_codes(kCodes, 6000);
+  without.permit(kAutomatic | kAllEnabled);
+  ASSERT_TRUE(without.wait_for_lam());
+  EXPECT_EQ(without.cleared_requests() & 0x3F, kTravelFailed);
+  EXPECT_THAT(without.warnings().back(), HasSubstr("needs a limit switch of its own at each end"));
+  without.permit(kSecondMode | kAllEnabled);
+  EXPECT_EQ(without.cleared_requests() & 0x3F, kStepNotDone);
+  EXPECT_THAT(without.warnings().back(), HasSubstr("it has no step sensor"));
+  ShutterLab lab;
+  lab.load_codes({400, 100, 300, 200, 400}, 6000);
+  lab.permit(kAutomatic | kAllEnabled);
+  EXPECT_EQ(lab.cleared_requests() & 0x3F, kTravelFailed) << "they rise twice";
+  EXPECT_THAT(lab.warnings().back(), HasSubstr("m03: its delays do not fall and then rise, once"));
+  lab.load_codes(kCodes, 6000);
+  const auto move = lab.send(Ask::kMoveBy, {"m03"}, {1});
+  lab.permit(kAutomatic | kAllEnabled);
+  EXPECT_EQ(lab.cleared_requests() & 0x3F, kTravelFailed);
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.shutter().position, 1);
+}
+
+TEST(CamacShutter, AStopOfSomebodyElseIsAFault) {
+  ShutterLab lab;
+  lab.load_codes(kCodes, 6000);
+  lab.permit(kAutomatic | kAllEnabled);
+  lab.run_until([&] { return lab.shutter().position == 2; });
+  lab.wait(lab.send(Ask::kStop, {}));
+  EXPECT_EQ(lab.cleared_requests() & 0x3F, kTravelFailed);
+  const int stands = lab.shutter().position;
+  lab.run_for(1);
+  EXPECT_EQ(lab.shutter().position, stands);
+  EXPECT_EQ(lab.motor("m03").position_steps, stands);
+}
+
+// Nobody makes it move on, nor twice.
+TEST(CamacShutter, FaultsInBetweenEndIt) {
+  ShutterLab lab;
+  lab.load_codes(kCodes, 6000);
+  lab.permit(kAutomatic | kSecondMode | kAllEnabled);
+  lab.run_for(0.5);
+  lab.unplug(0);
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.cleared_requests() & 0x3F, kTravelFailed);
+  lab.run_for(2);
+  lab.reactor_starts();
+  lab.plug(0);
+  ASSERT_TRUE(lab.run_until([&] { return lab.has_state("hall:1") && !lab.motor("m03").moving; }));
+  lab.run_for(1);
+  EXPECT_EQ(lab.shutter().position, 0) << "a shutter without its daemon stays closed";
+  lab.wait(lab.send(Ask::kClearFaults, {}));
+  lab.permit(kAutomatic | kSecondMode | kAllEnabled);
+  lab.run_for(0.5);
+  lab.restart_daemon();
+  lab.run_for(2);
+  lab.reactor_starts();
+  lab.run_for(1);
+  EXPECT_EQ(lab.shutter().position, 0) << "nor does one whose daemon is another one";
+  EXPECT_FALSE(lab.motor("m03").moving);
+}
+
+}  // namespace
+}  // namespace bushd::test
