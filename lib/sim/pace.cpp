@@ -114,6 +114,7 @@ void Pace::start(TimeNs t_ns, bool positive) {
 }
 
 Jump Pace::step(TimeNs t_ns, bool positive) {
+  if (t_ns > line_until_ns_) forget_line();
   if (count_ == 0) {
     start(t_ns, positive);
     return Jump::kNone;

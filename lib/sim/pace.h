@@ -92,17 +92,31 @@ class Pace {
   // A step at t_ns, not before the last one. O(1) amortised.
   Jump step(TimeNs t_ns, bool positive);
   // Its next motion, from rest, is one of a line, until it is said to rest. Without `ramped_down`
-  // it may still move, as its MCU makes it.
-  void begin_on_line() { on_line_ = true; }
-  Jump rest_on_line(bool ramped_down) {
+  // it may still move, as its MCU makes it: if that makes the line's run itself (`by_mcu`), along
+  // the line, for as long as it goes on without a master.
+  void begin_on_line(bool by_mcu) {
+    on_line_ = true;
+    by_mcu_ = by_mcu;
+    line_until_ns_ = kNever;
+  }
+  Jump rest_on_line(TimeNs now_ns, bool ramped_down) {
     if (!on_line_) return Jump::kNone;
-    on_line_ = false;
-    excused_ = !ramped_down;
+    if (by_mcu_ && !ramped_down) {
+      line_until_ns_ = now_ns + kMostSilenceNs + rules_->ramp_down_ns(rules_->last()) +
+                       rules_->longest_told_ns();
+      return Jump::kNone;
+    }
+    leave_line(!ramped_down);
     return ramped_down && count_ != 0 ? come_to_rest() : Jump::kNone;
+  }
+  // Another motion begins: whatever the line was, it is over.
+  void forget_line() {
+    if (on_line_) leave_line(true);
   }
 
   // No step since the last one until now.
   Jump silent(TimeNs now_ns) {
+    if (now_ns > line_until_ns_) forget_line();
     if (on_line_ || count_ == 0 || now_ns - last_ns() < rules_->rest_ns()) return Jump::kNone;
     return come_to_rest();
   }
@@ -126,6 +140,15 @@ class Pace {
 
  private:
   static constexpr std::size_t kHistory = 64;  // a power of two
+  // A second from the time that the last SYNC has told, which may be that of the one before.
+  static constexpr TimeNs kMostSilenceNs = 2'000'000'000;
+  static constexpr TimeNs kNever = INT64_MAX;
+
+  void leave_line(bool excused) {
+    on_line_ = false;
+    excused_ = excused;
+    line_until_ns_ = kNever;
+  }
 
   void start(TimeNs t_ns, bool positive);
   void remember(TimeNs t_ns);
@@ -137,6 +160,8 @@ class Pace {
   std::size_t count_ = 0;  // steps since rest, at most kHistory
   bool positive_ = false;
   bool on_line_ = false;
+  bool by_mcu_ = false;
+  TimeNs line_until_ns_ = kNever;
   bool excused_ = false;    // from ramping down by its table, until it starts again
   std::size_t k_ = 0;       // the last exact delay was at least A(k)
   std::size_t cursor_ = 0;  // where the tolerance was found last

@@ -240,7 +240,9 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   const bool begins = line.at("event") == "move";
   if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
-  if (begins && on_run) on_run(motor.mcu, motor.output, line.contains("line"));
+  if (begins && on_run) {
+    on_run(motor.mcu, motor.output, line.contains("line"), line.at("moves") == "table");
+  }
   if (begins && motor.move) return run_begins(now_ns, motor);
   if (begins) return;
   if (on_run_end) on_run_end(now_ns, motor.mcu, motor.output, line.at("result"));
