@@ -1,8 +1,10 @@
 // Programs of BUSHD-2 and BUSHD-1 with faults in between, as chance has it: whatever happens, the
 // memory is there, each start ends in one request or the daemon has ended, motors make no step that
-// nobody has asked for, and their positions are those of their shafts.
+// nobody has asked for, and their positions are those of their shafts. With BUSHD_CAMAC_SEEDS as
+// many seeds that nobody has tried before; BUSHD_CAMAC_SEED is one that has shown something.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <random>
 
 #include "daemon/camac_lab.h"
@@ -12,7 +14,20 @@ namespace {
 
 constexpr std::uint32_t kEnabled = 0x60;  // of BUSHD-2: fault and end of motion
 constexpr std::uint32_t kLeft = 0x80;
+constexpr int kLongerRamp = 12;
 constexpr std::uint32_t kReactor = 0xC0 | 0x17;  // of BUSHD-1: automatic, synchronous, enabled
+
+std::vector<std::uint32_t> seeds() {
+  if (const char* one = std::getenv("BUSHD_CAMAC_SEED")) {
+    return {static_cast<std::uint32_t>(std::stoul(one))};
+  }
+  const char* fresh = std::getenv("BUSHD_CAMAC_SEEDS");
+  if (fresh == nullptr) return {1, 2, 3};
+  std::vector<std::uint32_t> made(std::stoul(fresh));
+  std::random_device device;
+  for (std::uint32_t& seed : made) seed = device();
+  return made;
+}
 
 enum class Fault { kNone, kUnplugged, kReset, kRestart, kLimit, kStop, kKinds };
 
@@ -36,7 +51,7 @@ class Chaos {
     lab_.naf(kStation, 2, 16, kEnabled | (left ? kLeft : 0U));
     lab_.naf(kStation, 0, 26);
     const auto fault = static_cast<Fault>(below(static_cast<int>(Fault::kKinds)));
-    limited_ = fault == Fault::kLimit && !left;
+    limited_ = limited_ || (fault == Fault::kLimit && !left);
     SCOPED_TRACE("fault " + std::to_string(static_cast<int>(fault)));
     lab_.run_for(below(800) * 1e-3);
     strike(fault);
@@ -48,8 +63,11 @@ class Chaos {
     lab_.run_for(1);
     EXPECT_LE(lab_.lams().size(), lams + 1) << "told once";
     const std::int64_t moved = (lab_.shaft_steps("m01") - from) * (left ? -1 : 1);
+    if (left && moved > 5) limited_ = false;
     EXPECT_GE(moved, 0);
-    EXPECT_LE(moved, steps) << "no motion is made twice";
+    // An MCU that ramps down a stream takes its speed from the last displacement
+    // (docs/protocol.md).
+    EXPECT_LE(moved, steps + (fault == Fault::kLimit ? kLongerRamp : 0)) << "none is made twice";
     if (fault == Fault::kNone) {
       EXPECT_EQ(moved, steps);
     }
@@ -147,8 +165,8 @@ class Chaos {
 };
 
 TEST(CamacFaults, ProgramsOfBushd2AreAccountedFor) {
-  for (const std::uint32_t seed : {1U, 2U, 3U}) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
+  for (const std::uint32_t seed : seeds()) {
+    SCOPED_TRACE("BUSHD_CAMAC_SEED=" + std::to_string(seed));
     Chaos chaos(seed);
     for (int round = 0; round < 25; ++round) {
       SCOPED_TRACE("round " + std::to_string(round));
@@ -160,8 +178,9 @@ TEST(CamacFaults, ProgramsOfBushd2AreAccountedFor) {
 
 // A shutter that follows reactor starts opens once for each of them, or a request says that it
 // does not any more.
-TEST(CamacFaults, TheShutterIsAccountedFor) {
-  std::mt19937 random(7);
+void follow_reactor(std::uint32_t seed) {
+  SCOPED_TRACE("BUSHD_CAMAC_SEED=" + std::to_string(seed));
+  std::mt19937 random(seed);
   const std::vector<int> codes{400, 250, 120, 60, 60, 120, 250, 400};
   ShutterLab lab;
   lab.keep_positions();
@@ -203,9 +222,17 @@ TEST(CamacFaults, TheShutterIsAccountedFor) {
     lab.wait(lab.send(Ask::kEnable, {}));
     ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
     lab.wait(lab.send(Ask::kSetPosition, {"m03"}, {lab.shutter().position}));
+    lab.wait(lab.send(Ask::kMoveTo, {"m03"}, {3}));  // off the limit that it has met
     lab.wait(lab.send(Ask::kMoveTo, {"m03"}, {0}));
     ASSERT_EQ(lab.shutter().position, 0);
     if (testing::Test::HasFailure()) return;
+  }
+}
+
+TEST(CamacFaults, TheShutterIsAccountedFor) {
+  for (const std::uint32_t seed : seeds()) {
+    follow_reactor(seed);
+    if (HasFailure()) return;
   }
 }
 
