@@ -35,11 +35,13 @@ motion::LineShare Lines::Line::share(std::size_t motor, std::uint32_t from, std:
   motion::LineShare share{.way = path->number(),
                           .track = {},
                           .motor = motor,
-                          .increment = 1,
                           .longest = longest(),
                           .from = from,
                           .to = to};
+  // One that makes no step of it only waits.
+  const auto moves = [motor](const motion::Path& of) { return of.most_steps_per_s(motor) > 0; };
   if (rest->first_step() == from && to == rest->steps()) {
+    share.increment = moves(*rest) ? 1 : 0;
     if (!track) track = std::make_shared<const motion::PathTrack>(rest, to);
     share.track = track;
     return share;
@@ -47,6 +49,7 @@ motion::LineShare Lines::Line::share(std::size_t motor, std::uint32_t from, std:
   // One that has stopped earlier than others goes after them: some segments.
   std::shared_ptr<motion::Path> part = path->rest(from, path->segment_at(to - 1));
   part->plan(SIZE_MAX);
+  share.increment = moves(*part) ? 1 : 0;
   share.track = std::make_shared<const motion::PathTrack>(part, to);
   return share;
 }
