@@ -66,6 +66,19 @@ class Lines final : public Service {
     // A motor's share of a run between these steps.
     motion::LineShare share(std::size_t motor, std::uint32_t from, std::uint32_t to);
   };
+  // A path whose points are coming.
+  struct Incoming {
+    Line line;
+    // Of each motor's way: the points farthest up and down, 0 where it stands.
+    struct End {
+      std::int32_t point;
+      std::int64_t steps;
+    };
+    std::vector<End> low;
+    std::vector<End> high;
+    std::int32_t rows = 0;
+    int direction = 0;  // of a motor with speeds
+  };
   // A path that is not planned yet.
   struct Coming {
     api::Asker asker;
@@ -90,13 +103,10 @@ class Lines final : public Service {
   void begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                  const std::vector<std::size_t>& indices, std::uint32_t to);
 
-  Result<Line> path_of(const api::MovePath& request) const;
-  Result<std::vector<std::int64_t>> points_of(const std::vector<MotorId>& motors,
-                                              const api::MovePath& request,
-                                              const std::vector<std::uint16_t>& floors) const;
-  Result<std::vector<std::uint16_t>> floors_of(MotorId motor, const api::MovePath& request,
-                                               const std::vector<std::int64_t>& points,
-                                               std::uint16_t floor) const;
+  Result<Incoming> begin_points(const api::MovePath& request) const;
+  Result<void> add_points(Incoming& incoming, const api::MovePath& request) const;
+  Result<std::uint16_t> floor_to(Incoming& incoming, std::int64_t point, double speed) const;
+  Result<void> check_ends(const Incoming& incoming) const;
   Result<void> may_begin(const Line& line) const;
   void begin_path(std::int64_t now_us, Coming coming);
 
@@ -126,6 +136,7 @@ class Lines final : public Service {
   DryRuns& dry_runs_;
   std::map<std::uint64_t, Line> lines_;
   PathPoints path_points_;
+  std::map<std::string, Incoming> incoming_;  // by client
   std::list<Coming> coming_;
   std::uint64_t last_number_ = 0;
 };

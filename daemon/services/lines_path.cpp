@@ -14,15 +14,7 @@ namespace {
 // Segments that are planned in one slice; each takes some microseconds at each of three passes.
 constexpr std::size_t kSegmentsPerSlice = 100;
 constexpr std::size_t kMostComing = 4;
-
-// Of a single motor's way: the first point that is not on the way to the last one; 0: all are.
-std::size_t first_turn(const std::vector<std::int64_t>& points) {
-  const bool falls = points.back() < points.front();
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    if (falls ? points[i] > points[i - 1] : points[i] < points[i - 1]) return i;
-  }
-  return 0;
-}
+constexpr std::int64_t kMostSteps = motion::Motor::kMaxPosition;
 
 }  // namespace
 
@@ -43,11 +35,13 @@ motion::LineShare Lines::Line::share(std::size_t motor, std::uint32_t from, std:
   motion::LineShare share{.way = path->number(),
                           .track = {},
                           .motor = motor,
-                          .increment = 1,
                           .longest = longest(),
                           .from = from,
                           .to = to};
+  // One that makes no step of it only waits.
+  const auto moves = [motor](const motion::Path& of) { return of.most_steps_per_s(motor) > 0; };
   if (rest->first_step() == from && to == rest->steps()) {
+    share.increment = moves(*rest) ? 1 : 0;
     if (!track) track = std::make_shared<const motion::PathTrack>(rest, to);
     share.track = track;
     return share;
@@ -55,119 +49,149 @@ motion::LineShare Lines::Line::share(std::size_t motor, std::uint32_t from, std:
   // One that has stopped earlier than others goes after them: some segments.
   std::shared_ptr<motion::Path> part = path->rest(from, path->segment_at(to - 1));
   part->plan(SIZE_MAX);
+  share.increment = moves(*part) ? 1 : 0;
   share.track = std::make_shared<const motion::PathTrack>(part, to);
   return share;
 }
 
+// Points are looked at as they come: a million of them at once would keep others waiting.
 void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& request) {
+  const auto refuse = [&](const Error& why) { asker.answer(api::Refused{why.text()}); };
+  const std::string client = asker.session ? asker.session->client_id() : std::string();
   const auto motors = installation_.find(request.motors);
-  if (!motors) return asker.answer(api::Refused{motors.error().text()});
-  auto whole = path_points_.take(asker, request);
-  if (!whole) return asker.answer(api::Refused{whole.error().text()});
-  if (!*whole) {
+  if (!motors) return refuse(motors.error());
+  const auto last = path_points_.take(client, request);
+  if (request.first_row == 0) incoming_.erase(client);
+  if (!last) return refuse(last.error());
+  std::erase_if(incoming_, [&](const auto& one) {
+    return one.first != client && !path_points_.has(one.first);
+  });
+  auto incoming = incoming_.find(client);
+  Result<void> good;
+  if (incoming == incoming_.end()) {
+    auto begun = begin_points(request);
+    if (begun) {
+      incoming = incoming_.emplace(client, std::move(*begun)).first;
+    } else {
+      good = fail(begun.error());
+    }
+  }
+  if (good) good = add_points(incoming->second, request);
+  if (good && *last) good = check_ends(incoming->second);
+  if (good && *last && coming_.size() >= kMostComing) {
+    good = fail(fmt::format("{} paths are being planned; try again in a moment", coming_.size()));
+  }
+  if (!good) {
+    path_points_.drop(client);
+    incoming_.erase(client);
+    return refuse(good.error());
+  }
+  if (!*last) {
     return asker.answer(api::Completed{.outcome = api::Outcome::kDone,
                                        .reason = "these points are taken; more are to come",
                                        .detail = {}});
   }
-  if (coming_.size() >= kMostComing) {
-    return asker.answer(api::Refused{
-        fmt::format("{} paths are being planned; try again in a moment", coming_.size())});
+  Line line = std::move(incoming->second.line);
+  incoming_.erase(incoming);
+  line.rest = line.path;
+  line.target = line.longest();
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    line.points.front().steps.push_back(line.path->point(line.path->segments(), i));
   }
-  auto line = path_of(**whole);
-  if (!line) return asker.answer(api::Refused{line.error().text()});
-  if (auto may = may_begin(*line); !may) return asker.answer(api::Refused{may.error().text()});
-  coming_.push_back({asker, (*whole)->dry_run, std::move(*line)});
+  coming_.push_back({asker, request.dry_run, std::move(line)});
 }
 
-Result<Lines::Line> Lines::path_of(const api::MovePath& request) const {
-  Line line{.motors = *installation_.find(request.motors), .points = {}, .way = {}};
+Result<Lines::Incoming> Lines::begin_points(const api::MovePath& request) const {
+  Incoming incoming;
+  Line& line = incoming.line;
+  line.motors = *installation_.find(request.motors);
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   if (const auto one = on_one_bus(line.motors); !one) return fail(one.error());
   std::vector<motion::Path::Motor> motors;
-  Point to;
+  std::vector<std::int64_t> begin;
+  Point& to = line.points.emplace_back();
   for (const MotorId id : line.motors) {
     const auto floor = moves_.floor_of(id, request.speed);
     if (!floor) return fail(floor.error());
     line.tables.push_back(installation_.table_of(id));
     motors.push_back({&line.tables.back()->view(), *floor});
     to.floors.push_back(*floor);
+    begin.push_back(installation_[id].position_steps());
+    incoming.low.push_back({0, begin.back()});
+    incoming.high.push_back({0, begin.back()});
   }
-  auto points = points_of(line.motors, request, to.floors);
-  if (!points) return fail(points.error());
-  auto floors = floors_of(line.motors.front(), request, *points, to.floors.front());
-  if (!floors) return fail(floors.error());
-  to.steps.assign(points->end() - static_cast<std::ptrdiff_t>(motors.size()), points->end());
   const auto corners = request.corners == api::MovePath::Corners::kExact
                            ? motion::Path::Corners::kExact
                            : motion::Path::Corners::kContinuous;
-  line.path = std::make_shared<motion::Path>(std::move(motors), std::move(*points), corners,
-                                             std::move(*floors));
-  if (line.path->steps() > std::uint64_t{motion::Motor::kMaxPosition}) {
-    return fail(fmt::format("the path has {} steps; at most {}: make several paths of it",
-                            line.path->steps(), motion::Motor::kMaxPosition));
-  }
-  line.rest = line.path;
-  line.target = static_cast<std::uint32_t>(line.path->steps());
-  line.points.push_back(std::move(to));
-  return line;
+  line.path = std::make_shared<motion::Path>(std::move(motors), begin, corners,
+                                             static_cast<std::size_t>(request.rows));
+  if (auto may = may_begin(line); !may) return fail(may.error());
+  return incoming;
 }
 
-// In steps, behind where the motors stand. What is asked of a motor are the ends of its way.
-Result<std::vector<std::int64_t>> Lines::points_of(const std::vector<MotorId>& motors,
-                                                   const api::MovePath& request,
-                                                   const std::vector<std::uint16_t>& floors) const {
-  const std::size_t width = motors.size();
-  std::vector<std::int64_t> points;
-  points.reserve(request.positions.size() + width);
-  for (const MotorId id : motors) points.push_back(installation_[id].position_steps());
-  std::vector<std::size_t> low(width, 0);
-  std::vector<std::size_t> high(width, 0);
-  const auto wrong = [&](std::size_t at, const std::string& why) {
-    return fail(
-        fmt::format("point {}, {}: {}", at / width, installation_[motors[at % width]].name(), why));
-  };
-  for (const double position : request.positions) {
-    const std::size_t at = points.size();
-    const std::size_t m = at % width;
-    const auto steps = installation_[motors[m]].steps_of_position(api::UserUnits{position});
-    if (!steps) return wrong(at, steps.error().message);
-    points.push_back(*steps);
-    if (*steps < points[low[m] * width + m]) low[m] = at / width;
-    if (*steps > points[high[m] * width + m]) high[m] = at / width;
-  }
-  for (std::size_t m = 0; m < width; ++m) {
-    const motion::Motor& motor = installation_[motors[m]];
-    if (auto may = interlocks_.may_move(motors[m]); !may) {
-      return fail(motor.name() + ": " + may.error().text());
-    }
-    for (const std::size_t row : {std::min(low[m], high[m]), std::max(low[m], high[m])}) {
-      const auto may = motor.may_move_to(points[row * width + m], floors[m]);
-      if (!may) return wrong(row * width + m, may.error().text());
-    }
-  }
-  return points;
-}
-
-// Of each segment of a single motor, if it has speeds.
-Result<std::vector<std::uint16_t>> Lines::floors_of(MotorId motor, const api::MovePath& request,
-                                                    const std::vector<std::int64_t>& points,
-                                                    std::uint16_t floor) const {
+Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request) const {
+  const Line& line = incoming.line;
+  const std::size_t width = line.motors.size();
+  std::vector<std::int64_t> point(width);
   std::vector<std::uint16_t> floors;
-  // It would go to the zone's beginning first.
-  if (const std::size_t turn = first_turn(points); !request.speeds.empty() && turn != 0) {
-    return fail(
-        fmt::format("point {}, {}: it does not lie on the way from the point before it to "
-                    "the last one; give points of speeds in their order",
-                    turn, installation_[motor].name()));
+  for (std::size_t at = 0; at < request.positions.size(); at += width) {
+    const std::int32_t row = ++incoming.rows;
+    for (std::size_t m = 0; m < width; ++m) {
+      const motion::Motor& motor = installation_[line.motors[m]];
+      const auto wrong = [&](const std::string& why) {
+        return fail(fmt::format("point {}, {}: {}", row, motor.name(), why));
+      };
+      const auto steps = motor.steps_of_position(api::UserUnits{request.positions[at + m]});
+      if (!steps) return wrong(steps.error().message);
+      if (std::abs(*steps) > kMostSteps)
+        return wrong(fmt::format("it is beyond +-{} steps", kMostSteps));
+      point[m] = *steps;
+      if (*steps < incoming.low[m].steps) incoming.low[m] = {row, *steps};
+      if (*steps > incoming.high[m].steps) incoming.high[m] = {row, *steps};
+    }
+    if (!request.speeds.empty()) {
+      auto floor = floor_to(incoming, point.front(), request.speeds[at]);
+      if (!floor) return fail(fmt::format("point {}, {}", row, floor.error().text()));
+      floors.assign(1, *floor);
+    }
+    line.path->add(point, floors);
   }
-  for (std::size_t i = 0; i < request.speeds.size(); ++i) {
-    floors.push_back(floor);
-    if (request.speeds[i] == 0) continue;
-    const auto slower = moves_.floor_of(motor, api::Speed{.per_s = request.speeds[i]});
-    if (!slower) return fail(fmt::format("point {}, {}", i + 1, slower.error().text()));
-    floors.back() = std::max(floor, *slower);
+  if (line.path->steps() <= static_cast<std::uint64_t>(kMostSteps)) return {};
+  return fail(fmt::format("the path has more than {} steps; make several paths of it", kMostSteps));
+}
+
+// Of the way to a point of a motor with speeds.
+Result<std::uint16_t> Lines::floor_to(Incoming& incoming, std::int64_t point, double speed) const {
+  const Line& line = incoming.line;
+  const MotorId id = line.motors.front();
+  const std::int64_t way = point - line.path->point(line.path->segments(), 0);
+  const int direction = way > 0 ? 1 : way < 0 ? -1 : 0;
+  // It would go to the beginning of a speed first, and back.
+  if (direction * incoming.direction < 0) {
+    return fail(installation_[id].name() +
+                ": it lies behind the point before it, or the motor; "
+                "give speeds in the order of their positions");
   }
-  return floors;
+  if (direction != 0) incoming.direction = direction;
+  if (speed == 0) return line.points.front().floors.front();
+  const auto floor = moves_.floor_of(id, api::Speed{.per_s = speed});
+  if (!floor) return fail(floor.error());
+  return std::max(*floor, line.points.front().floors.front());
+}
+
+// A motor may go where it may go to the ends of its way.
+Result<void> Lines::check_ends(const Incoming& incoming) const {
+  const Line& line = incoming.line;
+  for (std::size_t m = 0; m < line.motors.size(); ++m) {
+    const motion::Motor& motor = installation_[line.motors[m]];
+    for (const auto& [row, steps] : {incoming.low[m], incoming.high[m]}) {
+      const auto may = motor.may_move_to(steps, line.points.front().floors[m]);
+      if (may) continue;
+      const std::string where = row == 0 ? "" : fmt::format("point {}, ", row);
+      return fail(fmt::format("{}{}: {}", where, motor.name(), may.error().text()));
+    }
+  }
+  return may_begin(line);
 }
 
 // All stand where the path begins, and nothing keeps them there.

@@ -51,46 +51,47 @@ Result<void> check(const MovePath& part) {
 
 }  // namespace
 
-Result<std::optional<MovePath>> PathPoints::take(const api::Asker& asker, const MovePath& part) {
+Result<bool> PathPoints::take(const std::string& client, const MovePath& part) {
   if (auto good = check(part); !good) return fail(good.error());
-  const std::string client = asker.session ? asker.session->client_id() : std::string();
-  auto begun = std::ranges::find(begun_, client, &Begun::client);
   if (part.first_row == 0) {
-    if (begun != begun_.end()) begun_.erase(begun);
+    drop(client);
     if (begun_.size() == kMost) begun_.pop_front();
-    MovePath path = part;
-    path.positions.clear();
-    path.speeds.clear();
-    begun = begun_.insert(begun_.end(), {client, std::move(path)});
+    MovePath first = part;
+    first.positions.clear();
+    first.speeds.clear();
+    begun_.push_back({client, std::move(first), !part.speeds.empty()});
   }
+  const auto begun = std::ranges::find(begun_, client, &Begun::client);
   if (begun == begun_.end()) {
     return fail("the path's first points are not here any more; send it again from its beginning");
   }
-  MovePath& path = begun->path;
-  const std::size_t width = path.motors.size();
-  const std::size_t taken = path.positions.size() / width;
-  const bool same =
-      part.motors == path.motors && part.rows == path.rows &&
-      part.speeds.empty() == (path.speeds.empty() && (taken > 0 || part.speeds.empty()));
-  if (!same || part.first_row < 0 || static_cast<std::size_t>(part.first_row) != taken) {
-    const std::string why =
-        same ? fmt::format("points from {} on where those from {} on were to come",
-                           part.first_row + 1, taken + 1)
-             : std::string("it is of other motors, or of another number of points, than before");
+  const auto& [name, first, has_speeds, taken] = *begun;
+  std::string why;
+  const auto rows = static_cast<std::int32_t>(part.positions.size() / part.motors.size());
+  if (part.motors != first.motors || part.rows != first.rows || part.speeds.empty() == has_speeds) {
+    why = "it is of other motors, or of another number of points, than before";
+  } else if (part.first_row != taken) {
+    why = fmt::format("points from {} on where those from {} on were to come", part.first_row + 1,
+                      taken + 1);
+  } else if (rows > first.rows - taken) {
+    why = fmt::format("{} points of a path of {}", std::int64_t{taken} + rows, first.rows);
+  }
+  if (!why.empty()) {
     begun_.erase(begun);
     return fail(why + "; send the path again from its beginning");
   }
-  path.positions.insert(path.positions.end(), part.positions.begin(), part.positions.end());
-  path.speeds.insert(path.speeds.end(), part.speeds.begin(), part.speeds.end());
-  const std::size_t whole = static_cast<std::size_t>(path.rows) * width;
-  if (path.positions.size() < whole) return std::nullopt;
-  MovePath complete = std::move(path);
-  begun_.erase(begun);
-  if (complete.positions.size() > whole) {
-    return fail(
-        fmt::format("{} points of a path of {}", complete.positions.size() / width, complete.rows));
-  }
-  return complete;
+  begun->rows += rows;
+  const bool last = begun->rows == part.rows;
+  if (last) begun_.erase(begun);
+  return last;
+}
+
+void PathPoints::drop(const std::string& client) {
+  std::erase_if(begun_, [&](const Begun& one) { return one.client == client; });
+}
+
+bool PathPoints::has(const std::string& client) const {
+  return std::ranges::find(begun_, client, &Begun::client) != begun_.end();
 }
 
 }  // namespace bushd::daemon

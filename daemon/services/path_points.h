@@ -4,28 +4,32 @@
 #include <cstddef>
 #include <cstdint>
 #include <list>
-#include <optional>
 #include <string>
-#include <vector>
 
-#include "api/session.h"
+#include "api/request.h"
 #include "base/result.h"
 
 namespace bushd::daemon {
 
 class PathPoints {
  public:
-  // Of so many clients at once; the one that has waited longest is dropped for another one.
+  // Of so many clients at once; the one that has begun first is dropped for another one.
   static constexpr std::size_t kMost = 4;
   static constexpr std::size_t kMostValues = 1'000'000;  // of one path
 
-  // Takes a request's points. Returns the whole path if it is complete, with all its points.
-  Result<std::optional<api::MovePath>> take(const api::Asker& asker, const api::MovePath& part);
+  // Whether a request may come now; its points are then those behind the ones before. Returns
+  // whether they are the last ones. Error: the path is dropped.
+  Result<bool> take(const std::string& client, const api::MovePath& part);
+  void drop(const std::string& client);
+  // Its points, but not all of them, are here.
+  bool has(const std::string& client) const;
 
  private:
   struct Begun {
     std::string client;
-    api::MovePath path;
+    api::MovePath first;  // without its points
+    bool has_speeds;
+    std::int32_t rows = 0;  // taken
   };
   std::list<Begun> begun_;
 };

@@ -28,30 +28,33 @@ bool turns(const PathShare& before, const PathShare& behind) {
 
 }  // namespace
 
-Path::Path(std::vector<Motor> motors, std::vector<std::int64_t> points, Corners corners,
-           std::vector<std::uint16_t> floors)
-    : motors_(std::move(motors)), corners_(corners), start_{0} {
+Path::Path(std::vector<Motor> motors, std::span<const std::int64_t> begin, Corners corners,
+           std::size_t points)
+    : motors_(std::move(motors)),
+      points_(begin.begin(), begin.end()),
+      corners_(corners),
+      start_{0} {
+  points_.reserve((points + 1) * motors_.size());
+  start_.reserve(points + 1);
+  row_segments_.reserve(points);
+  prepare(points);
+}
+
+void Path::add(std::span<const std::int64_t> point, std::span<const std::uint16_t> floors) {
   const std::size_t width = motors_.size();
-  const std::size_t rows = points.size() / width;
-  points_.assign(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(width));
-  for (std::size_t row = 1; row < rows; ++row) {
-    const std::int64_t* to = &points[row * width];
-    const std::int64_t* from = &points_[points_.size() - width];
-    std::uint64_t longest = 0;
-    for (std::size_t m = 0; m < width; ++m) {
-      longest = std::max(longest, static_cast<std::uint64_t>(std::abs(to[m] - from[m])));
-    }
-    if (longest != 0) {
-      points_.insert(points_.end(), to, to + width);
-      start_.push_back(start_.back() + longest);
-      if (!floors.empty()) {
-        floors_.insert(floors_.end(), &floors[(row - 1) * width],
-                       &floors[(row - 1) * width] + width);
-      }
-    }
-    row_segments_.push_back(static_cast<std::uint32_t>(start_.size() - 1));
+  const std::int64_t* from = &points_[points_.size() - width];
+  std::uint64_t longest = 0;
+  for (std::size_t m = 0; m < width; ++m) {
+    longest = std::max(longest, static_cast<std::uint64_t>(std::abs(point[m] - from[m])));
   }
-  prepare();
+  if (longest != 0) {
+    points_.insert(points_.end(), point.begin(), point.end());
+    start_.push_back(start_.back() + longest);
+    floors_.insert(floors_.end(), floors.begin(), floors.end());
+    if (floors.empty() && !floors_.empty()) floors_.resize(floors_.size() + width, 0);
+    phase_ = Phase::kCorners;
+  }
+  row_segments_.push_back(static_cast<std::uint32_t>(start_.size() - 1));
 }
 
 Path::Path(const Path& whole, std::uint32_t begin, std::size_t last)
@@ -67,15 +70,16 @@ Path::Path(const Path& whole, std::uint32_t begin, std::size_t last)
   if (!whole.floors_.empty()) {
     floors_ = part(whole.floors_, first * width, (last + 1) * width);
   }
-  prepare();
+  prepare(segments());
+  phase_ = Phase::kCorners;
 }
 
 std::unique_ptr<Path> Path::rest(std::uint32_t begin, std::size_t last) const {
   return std::unique_ptr<Path>(new Path(*this, begin, last));
 }
 
-void Path::prepare() {
-  const std::size_t width = motors_.size();
+// What grows with the points grows while they are looked at.
+void Path::prepare(std::size_t points) {
   unit_ns_ = UINT32_MAX;
   for (const Motor& motor : motors_) unit_ns_ = std::min(unit_ns_, motor.table->time_unit_ns);
   for (const Motor& motor : motors_) {
@@ -85,17 +89,16 @@ void Path::prepare() {
     const std::uint16_t slowest = std::max(motor.table->accel.code[0], motor.table->cruise);
     start_units_.push_back(static_cast<double>(slowest) * static_cast<double>(own_ns) / unit_ns_);
   }
-  const std::size_t n = segments();
+  const std::size_t width = motors_.size();
   travel_.assign(width, 0);
-  corner_.assign(n, 0);
-  first_.assign(n, 0);
-  last_.assign(n, 0);
-  end_units_.assign(n, 0);
-  accel_.assign(n * width, 0);
-  decel_.assign(n * width, 0);
+  corner_.reserve(points);
+  first_.reserve(points);
+  last_.reserve(points);
+  end_units_.reserve(points);
+  accel_.reserve(points * width);
+  decel_.reserve(points * width);
   fastest_.assign(width, 0);
   scratch_.places.assign(width, 0);
-  if (n == 0) phase_ = Phase::kDone;
 }
 
 std::size_t Path::segment_at(std::uint32_t step) const {
@@ -275,7 +278,12 @@ std::uint32_t Path::first_delay(std::size_t segment, const Shares& before, const
 
 void Path::corners_step(std::size_t i) {
   load(i, now_);
-  if (!rests_at(i)) corner_[i] = corner(before_, now_);
+  corner_.push_back(rests_at(i) ? 0 : corner(before_, now_));
+  first_.push_back(0);
+  last_.push_back(0);
+  end_units_.push_back(0);
+  accel_.resize(accel_.size() + now_.size(), 0);
+  decel_.resize(decel_.size() + now_.size(), 0);
   for (std::size_t m = 0; m < now_.size(); ++m) {
     const bool on = !rests_at(i) && goes_on(before_[m], now_[m]);
     travel_[m] = on ? travel_[m] + own_made(i - 1, before_[m]) : 0;

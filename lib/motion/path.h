@@ -24,6 +24,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -41,11 +42,12 @@ class Path {
     const bushd_table* table;  // outlives the path
     std::uint16_t floor = 0;   // none of its steps has a shorter delay
   };
-  // Points of all motors, one after the other, each |to - from| < 2^31; the first one is where they
-  // stand. `floors`: as that of a motor, of each segment and motor, or none at all.
-  // Precondition: steps() < 2^31.
-  Path(std::vector<Motor> motors, std::vector<std::int64_t> points, Corners corners,
-       std::vector<std::uint16_t> floors = {});
+  // `begin`: where they stand. `points`: as many as are to come, if that is known.
+  Path(std::vector<Motor> motors, std::span<const std::int64_t> begin, Corners corners,
+       std::size_t points = 0);
+  // The next point. `floors`: as that of a motor, of the way there; none: of none. Preconditions:
+  // |to - from| < 2^32, steps() < 2^31 before plan() is called, which has not been.
+  void add(std::span<const std::int64_t> point, std::span<const std::uint16_t> floors = {});
   Path(const Path&) = delete;
   Path& operator=(const Path&) = delete;
 
@@ -111,7 +113,7 @@ class Path {
  private:
   enum class Phase { kCorners, kBack, kForth, kDone };
   Path(const Path& whole, std::uint32_t begin, std::size_t last);
-  void prepare();
+  void prepare(std::size_t points);
 
   using Shares = std::vector<PathShare>;     // by motor, as those below
   using Places = std::vector<std::int64_t>;  // on the sides of their tables
@@ -180,7 +182,7 @@ class Path {
   std::vector<double> fastest_;
 
   // Of the pass that is under way.
-  Phase phase_ = Phase::kCorners;
+  Phase phase_ = Phase::kDone;  // nothing to do without points
   std::size_t at_ = 0;
   std::uint32_t delay_ = 0;
   std::vector<std::uint32_t> travel_;  // own steps since it stood or turned

@@ -57,7 +57,7 @@ Path::Parts Path::parts_to(std::uint32_t step) const {
     if (!ends) raise_first(parts.at(i + 1), 1, border.delay);
     Profile ramp;
     RampMerger merger;
-    merger.merge({}, ramps_of(now, border.places), 1, steps, ramp);
+    merger.merge({}, ramps_of(now, border.places), flat(i, now), steps, ramp);
     Profile part = greater_of(part_of(profile(i), 0, steps), ramp);
     if (!ends) raise_last(part, least_before(now, behind, border.delay));
     if (rests_at(i)) {

@@ -118,7 +118,9 @@ RampMerger::Slowest::Codes RampMerger::Slowest::codes(std::uint64_t step) const 
   if (climbs_.empty()) return {};
   const PathRamp& leader = climbs_[leader_].ramp;
   const bushd_ramp& side = decel_ ? leader.share->table->decel : leader.share->table->accel;
-  return {side.code + leader.place + step, side.code + side.count};
+  // Behind the codes is the cruise delay, which is not above `flat`.
+  const std::uint64_t at = static_cast<std::uint64_t>(leader.place) + step;
+  return {side.code + std::min<std::uint64_t>(at, side.count), side.code + side.count};
 }
 
 void RampMerger::Slowest::leave_codes(std::uint64_t step) {

@@ -44,7 +44,7 @@ OnPath any_axes() {
   for (std::size_t i = width; i < rows * width; ++i) {
     points.push_back(points[i - width] + between<std::int64_t>(-far, far));
   }
-  made.path = std::make_shared<Path>(
+  made.path = test::path_through(
       motors, points, between(0, 1) == 0 ? Path::Corners::kContinuous : Path::Corners::kExact);
   made.path->plan(SIZE_MAX);
   made.format = between(0, 1) == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
+#include <span>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -15,6 +17,21 @@
 #include "motion/path.h"
 
 namespace bushd::test {
+
+// Rows of points of all motors, the first one where they stand; floors of the ways to the others.
+inline std::unique_ptr<motion::Path> path_through(const std::vector<motion::Path::Motor>& motors,
+                                                  const std::vector<std::int64_t>& points,
+                                                  motion::Path::Corners corners,
+                                                  const std::vector<std::uint16_t>& floors = {}) {
+  const std::size_t width = motors.size();
+  const std::span all(points);
+  auto path = std::make_unique<motion::Path>(motors, all.first(width), corners);
+  for (std::size_t at = width; at < all.size(); at += width) {
+    const std::span slower(floors);
+    path->add(all.subspan(at, width), slower.empty() ? slower : slower.subspan(at - width, width));
+  }
+  return path;
+}
 
 // Of a run, in segments: step `first` .. of each, by their delays.
 struct Ran {

@@ -36,7 +36,7 @@ Planned planned(const std::vector<Law>& laws, std::vector<std::int64_t> points,
     motors.push_back({made.tables.back()->view()});
   }
   made.points = points;
-  made.path = std::make_unique<Path>(motors, std::move(points), corners, std::move(floors));
+  made.path = test::path_through(motors, points, corners, floors);
   while (!made.path->plan(7)) {
   }
   return made;

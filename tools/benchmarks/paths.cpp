@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <span>
 #include <vector>
 
 #include "motion/path.h"
@@ -52,8 +53,12 @@ void measure(const char* name, const bushd_table& table, double amplitude) {
   std::uint64_t steps = 0;
   for (int repeat = 0; repeat < 5; ++repeat) {
     const double begin_ms = cpu_ms();
-    motion::Path path(std::vector<motion::Path::Motor>(kMotors, {&table}), points,
-                      motion::Path::Corners::kContinuous);
+    const std::span all(points);
+    motion::Path path(std::vector<motion::Path::Motor>(kMotors, {&table}), all.first(kMotors),
+                      motion::Path::Corners::kContinuous, kPoints);
+    for (std::size_t at = kMotors; at < all.size(); at += kMotors) {
+      path.add(all.subspan(at, kMotors));
+    }
     double longest_ms = 0;
     for (bool done = false; !done;) {
       const double slice_begin_ms = cpu_ms();
