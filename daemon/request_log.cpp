@@ -26,6 +26,8 @@ bool is_logged(const api::Request& request) {
   if (move != nullptr) return !move->dry_run;
   const auto* line = std::get_if<api::MoveLine>(&request);
   if (line != nullptr) return !line->dry_run;
+  const auto* follow = std::get_if<api::Follow>(&request);
+  if (follow != nullptr) return follow->part == api::Follow::Part::kRun;
   const auto* jog = std::get_if<api::Jog>(&request);
   if (jog != nullptr) return !jog->renew;
   return api::is_stop(request) || !api::is_repeatable(request);

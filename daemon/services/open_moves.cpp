@@ -21,6 +21,8 @@ std::string_view word(OpenMoves::Purpose purpose) {
       return "jog";
     case OpenMoves::Purpose::kLine:
       return "line";
+    case OpenMoves::Purpose::kFollow:
+      return "follow";
   }
   return "";
 }

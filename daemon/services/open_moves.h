@@ -24,7 +24,7 @@ class OpenMoves {
  public:
   explicit OpenMoves(Installation& installation) : installation_(installation) {}
 
-  enum class Purpose { kMove, kHome, kArm, kJog, kLine };
+  enum class Purpose { kMove, kHome, kArm, kJog, kLine, kFollow };
 
   // A motor's part that has ended.
   struct Ended {

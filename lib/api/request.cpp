@@ -31,7 +31,8 @@ constexpr std::array<std::string_view, std::variant_size_v<Request>> kNames = {"
                                                                                "hold",
                                                                                "release",
                                                                                "move line",
-                                                                               "camac"};
+                                                                               "camac",
+                                                                               "follow"};
 
 }  // namespace
 

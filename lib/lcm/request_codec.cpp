@@ -338,6 +338,34 @@ std::optional<api::Request> from_message(const release_t& message) {
   return api::Release{message.motors};
 }
 
+follow_t to_message(const api::Follow& follow) {
+  auto message = motors_message<follow_t>(follow.motors);
+  message.part = follow.part == api::Follow::Part::kRows       ? follow_t::ROWS
+                 : follow.part == api::Follow::Part::kLastRows ? follow_t::LAST_ROWS
+                                                               : follow_t::RUN;
+  message.array = follow.array;
+  message.cubic = follow.cubic ? 1 : 0;
+  message.stretch = follow.stretch;
+  message.time_s = follow.time_s;
+  message.row_count = count(follow.time_s);
+  message.positions = follow.positions;
+  message.position_count = count(follow.positions);
+  return message;
+}
+std::optional<api::Request> from_message(const follow_t& message) {
+  using Part = api::Follow::Part;
+  if (message.part < follow_t::ROWS || message.part > follow_t::RUN) return std::nullopt;
+  return api::Follow{.part = message.part == follow_t::ROWS        ? Part::kRows
+                             : message.part == follow_t::LAST_ROWS ? Part::kLastRows
+                                                                   : Part::kRun,
+                     .array = message.array,
+                     .motors = message.motors,
+                     .cubic = message.cubic != 0,
+                     .stretch = message.stretch,
+                     .time_s = message.time_s,
+                     .positions = message.positions};
+}
+
 std::optional<api::Request> from_message(const camac_request_t& message) {
   auto camac = camac_of(message);
   if (!camac) return std::nullopt;
@@ -378,7 +406,7 @@ std::optional<ClientMessage> decode_get_status(Payload payload) {
 using Decoder = std::optional<ClientMessage> (*)(Payload);
 
 // A new request is a line here. Requests first, in the order of api::Request.
-constexpr std::array<std::pair<std::string_view, Decoder>, 29> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, Decoder>, 30> kDecoders = {{
     {"MOVE", decode_request<move_t>},
     {"STOP", decode_request<stop_t>},
     {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
@@ -405,11 +433,12 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 29> kDecoders = {{
     {"RELEASE", decode_request<release_t>},
     {"MOVE_LINE", decode_request<move_line_t>},
     {"CAMAC", decode_request<camac_request_t>},
+    {"FOLLOW", decode_request<follow_t>},
     {"HELLO", decode_hello},
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},
 }};
-static_assert(std::variant_size_v<api::Request> == 26);
+static_assert(std::variant_size_v<api::Request> == 27);
 
 constexpr auto kClientChannels = [] {
   std::array<std::string_view, kDecoders.size()> channels;

@@ -7,6 +7,10 @@
 // line has a copy of it, and makes of it what its share says: as long as all copies are started,
 // changed and stopped at the same ticks, the motors stay on the line, and none need know of
 // another.
+//
+// In place of a run it may follow a trajectory (motion/trajectory.h), which may become longer
+// meanwhile. It ramps down from that by its table when it is stopped, and where the trajectory ends
+// in motion.
 #pragma once
 
 #include <algorithm>
@@ -20,6 +24,7 @@
 #include "engine/message.h"
 #include "engine/run.h"
 #include "motion/divisor.h"
+#include "motion/trajectory.h"
 #include "tables/envelope.h"
 
 namespace bushd::motion {
@@ -47,6 +52,13 @@ struct LineShare {
   // This run's part of the line, by its steps.
   std::uint32_t from = 0;
   std::uint32_t to = 0;
+};
+
+// The motor's part of a trajectory.
+struct TrajectoryShare {
+  std::uint64_t number = 0;  // of the trajectory, for logs
+  std::shared_ptr<const Trajectory> trajectory;
+  std::size_t motor = 0;
 };
 
 // Not copied while a run uses the table: the table outlives the axis.
@@ -79,6 +91,22 @@ class Axis {
   // The same for a part of a line; `floor` in the line's time units.
   // Precondition: !busy(), the run of all of it takes at most kMaxDurationTicks.
   void start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor);
+
+  // Follows a trajectory, whose first row is where it stands.
+  // Precondition: !busy(), TrajectoryCheck has nothing against it as far as it is known.
+  void start_trajectory(TrajectoryShare share, Tick start);
+  // It knows more rows, or has been closed. Precondition: !runs_out_before(the first tick that the
+  // MCU may have).
+  void trajectory_grew();
+  // The trajectory, as far as it is known, ends in motion, or might, and this tick comes after it.
+  bool runs_out_before(Tick tick) const;
+  // It is on the trajectory, and will be for some ticks more.
+  bool trajectory_goes_on_after(Tick tick) const;
+  const std::optional<TrajectoryShare>& trajectory() const { return followed_; }
+  // It has ramped down because the trajectory ended in motion.
+  bool ran_out() const { return followed_ && !base_.follows && !stopping_; }
+  // It goes, or has gone since the last executed(), in this direction.
+  bool goes(int direction) const;
 
   // What is wanted of the motor from now on: rest, or another target. The plan follows with
   // change(). Precondition: busy().
@@ -139,7 +167,7 @@ class Axis {
   // Where it stands, as planned, when the ticks before `tick` have been run. O(ticks ahead).
   std::int64_t steps_at(Tick tick) const;
   // Of this run: +1, -1.
-  int direction() const { return share_ ? share_->direction : base_.run.direction; }
+  int direction() const;
   // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t planned_end_steps() const { return planned_end_; }
   std::int64_t target_steps() const { return target_; }
@@ -164,6 +192,13 @@ class Axis {
     Tick tick;              // the run's state is that at the beginning of this tick
     bushd_line line;        // that of the share, by the steps that the run has made
     std::int64_t told_256;  // where the share has led by then, 1/256 step from the line's beginning
+    // Of a trajectory: on it, or by the run to rest from the step `left_at` on, whose direction is
+    // that of the run. told_256 counts from step 0.
+    bool follows;
+    std::int64_t left_at;
+    Follower follower;
+    bool went_up;  // since the last executed()
+    bool went_down;
   };
   std::int64_t steps_of(const Place& place) const;
   std::int64_t line_steps(std::uint32_t run_steps) const;
@@ -177,6 +212,20 @@ class Axis {
                        std::size_t stride) const;
   void follow_run_coarse(Place& place, std::size_t ticks, std::int16_t* out,
                          std::size_t stride) const;
+  bool over(const Place& place) const {
+    return followed_ ? trajectory_over(place) : bushd_run_done(&place.run);
+  }
+  // axis_trajectory.cpp
+  bool trajectory_over(const Place& place) const;
+  std::int64_t steps_followed(const Place& place) const;
+  double trajectory_velocity(const Place& place) const;
+  void follow_trajectory(Place& place, std::size_t ticks, std::int16_t* out,
+                         std::size_t stride) const;
+  std::uint16_t delay_on_trajectory(const Place& place) const;
+  std::uint16_t follower_delay(const Place& place) const;
+  void leave_trajectory(Place& place) const;
+  void plan_trajectory_end(Place place);
+  std::int16_t as_told(std::int64_t moved_256) const;
   std::uint16_t delay_of(const Place& place) const;
   Tick end_of(const Place& place) const;
   Tick own_end_of(const Place& place) const;
@@ -198,6 +247,9 @@ class Axis {
   bool stopping_ = false;
   bool stale_ = false;            // what is wanted has changed since the last change()
   std::optional<Change> change_;  // planned and not yet executed
+  std::optional<TrajectoryShare> followed_;
+  bool rests_at_end_ = false;  // of the trajectory
+  bool end_is_near_ = true;    // and end_ exact, else the earliest that it may be
   std::optional<LineShare> share_;
   Divisor share_by_;                   // its `longest`
   std::int64_t share_from_steps_ = 0;  // steps of the line that the motor has made before this run

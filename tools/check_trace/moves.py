@@ -3,6 +3,7 @@
 import json
 import math
 
+from check_trace.arrays import Array, ArrayMove
 from check_trace.lines import Envelope, LineMove, Part
 from check_trace.motion import Move
 from check_trace.problems import InputError
@@ -61,6 +62,7 @@ class MoveLog:
         self._at_steps = {}  # by motor name: where the last result or "set" leaves it
         self._tables = {}
         self._ways = {}  # by number: the tables of lines
+        self._arrays = {}  # by number
         self._ticks = set()  # (bus, tick_ns)
 
     def read(self, path):
@@ -68,6 +70,7 @@ class MoveLog:
             "request": lambda event: None,  # who has asked for it
             "requests": lambda event: None,  # how many more
             "line": self._line,
+            "array": self._array,
             "move": self._move,
             "stop": self._change,
             "retarget": self._change,
@@ -128,6 +131,8 @@ class MoveLog:
         table = self._table(event)
         if "line" in event:
             move = LineMove(event, table, self._ways[event["line"]["way"]])
+        elif "array" in event:
+            move = ArrayMove(event, table, self._arrays[event["array"]["array"]])
         else:
             move = Move(event, table)
         motor.moves.append(move)
@@ -144,6 +149,14 @@ class MoveLog:
         longest = event["longest"]
         parts = [Part(self._table(motor), motor["increment"], longest, motor["floor"]) for motor in event["motors"]]
         self._ways[event["way"]] = Envelope(parts)
+
+    def _array(self, event):
+        """The first rows of an array, or further ones."""
+        number = event["array"]
+        if number in self._arrays:
+            self._arrays[number].add(event)
+        else:
+            self._arrays[number] = Array(event)
 
     def _change(self, event):
         move = self._moves.get((event["motor"], event["id"]))
