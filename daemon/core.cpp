@@ -25,6 +25,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       jogs_(installation_, interlocks_, moves_, open_moves_),
       pauses_(installation_, interlocks_, moves_, open_moves_),
       lines_(installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_),
+      arrays_(installation_, interlocks_, journal_, moves_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, open_moves_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
@@ -49,7 +50,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       services_{&kept_,    &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,
                 &stops_,   &emergency_stop_, &drivers_, &positions_, &trigger_, &position_compare_,
                 &tables_,  &departures_,     &jogs_,    &pauses_,    &lines_,   &settings_,
-                &travels_, &camac_},
+                &travels_, &camac_,          &arrays_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener(
@@ -137,6 +138,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
                  [&](const api::MovePath& r) { lines_.request(now, asker, r); },
                  [&](const api::Camac& r) { camac_.request(now, asker, r); },
+                 [&](const api::Follow& r) { arrays_.request(now, asker, r); },
              },
              request);
 }
@@ -156,11 +158,13 @@ void Core::keep_up(std::int64_t now_us) {
 void Core::work() {
   if (moves_.begins()) return moves_.work();
   if (lines_.plans()) return lines_.work();
+  arrays_in_turn_ = !arrays_in_turn_ || dry_runs_.idle();
+  if (arrays_in_turn_ && !arrays_.idle()) return arrays_.work();
   dry_runs_.work();
 }
 
 std::int64_t Core::next_wake_us() const {
-  if (moves_.begins() || lines_.plans() || !dry_runs_.idle()) return 0;
+  if (moves_.begins() || lines_.plans() || !dry_runs_.idle() || !arrays_.idle()) return 0;
   std::int64_t wake = std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(),
                                 idle_drivers_.next_wake_us(), jogs_.next_wake_us()});
   for (const BusId id : installation_.buses()) {

@@ -13,6 +13,7 @@
 
 #include "api/session.h"
 #include "daemon/outputs.h"
+#include "daemon/services/arrays.h"
 #include "daemon/services/camac.h"
 #include "daemon/services/departures.h"
 #include "daemon/services/drivers.h"
@@ -73,7 +74,9 @@ class Core {
   // A large move is being begun in slices: requests that are no stops should wait.
   bool begins_moves() const { return moves_.begins(); }
   // Units of work done so far in slices.
-  std::uint64_t units_of_work() const { return dry_runs_.units() + moves_.units(); }
+  std::uint64_t units_of_work() const {
+    return dry_runs_.units() + moves_.units() + arrays_.units();
+  }
 
   // Answers to what the outputs were asked, what the daemon has kept from before, and checks.
   TablesInService& tables() { return tables_; }
@@ -109,6 +112,7 @@ class Core {
   Jogs jogs_;
   Pauses pauses_;
   Lines lines_;
+  Arrays arrays_;
   EmergencyStop emergency_stop_;
   LinkFaults link_faults_;
   Drivers drivers_;
@@ -122,6 +126,7 @@ class Core {
   Camac camac_;
   std::vector<Service*> services_;  // in the order in which they follow what MCUs tell
   Supervisor supervisor_;
+  bool arrays_in_turn_ = false;
 };
 
 }  // namespace bushd::daemon

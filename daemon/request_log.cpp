@@ -28,6 +28,8 @@ bool is_logged(const api::Request& request) {
   if (line != nullptr) return !line->dry_run;
   const auto* path = std::get_if<api::MovePath>(&request);
   if (path != nullptr) return !path->dry_run && path->first_row == 0;
+  const auto* follow = std::get_if<api::Follow>(&request);
+  if (follow != nullptr) return follow->part == api::Follow::Part::kRun;
   const auto* jog = std::get_if<api::Jog>(&request);
   if (jog != nullptr) return !jog->renew;
   return api::is_stop(request) || !api::is_repeatable(request);

@@ -35,6 +35,10 @@ std::optional<std::vector<MotorId>> Departures::motors_of(const api::Request& re
                               if (r.dry_run || !last) return std::vector<MotorId>();
                               return installation_.find(r.motors);
                             },
+                            [&](const api::Follow& r) -> Result<std::vector<MotorId>> {
+                              if (r.part != api::Follow::Part::kRun) return std::vector<MotorId>();
+                              return installation_.find(r.motors);
+                            },
                             [&](const api::Arm& r) { return installation_.find(r.motors); },
                             [&](const api::Jog& r) -> Result<std::vector<MotorId>> {
                               if (r.per_s == 0 || r.renew) return std::vector<MotorId>();

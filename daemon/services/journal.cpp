@@ -1,5 +1,6 @@
 #include "daemon/services/journal.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
@@ -15,6 +16,8 @@ std::string_view what_moves(const motion::Motor& motor) {
   if (motor.is<motion::Homing>()) return kHoming;
   return motor.is<motion::Travelling>() ? "travel" : "local";
 }
+
+constexpr std::size_t kRowsPerLine = 500;  // of an array
 
 }  // namespace
 
@@ -67,6 +70,9 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
                     {"from", share->from},
                     {"to", share->to}};
   }
+  if (const auto& followed = motor.axis().trajectory()) {
+    line["array"] = {{"array", followed->number}, {"column", followed->motor}};
+  }
   if (late_ns != 0) line["late_ns"] = late_ns;
   if (motor.axis().floor() != 0) line["floor"] = motor.axis().floor();
   if (const bushd_emission& emission = mcu.config.emission.settings;
@@ -112,6 +118,37 @@ std::uint64_t Journal::path_laid(const std::vector<MotorId>& motors, const motio
   }
   outputs_.move_log(line.dump());
   return last_id_;
+}
+
+std::uint64_t Journal::array_begun(const motion::Trajectory& trajectory,
+                                   const std::vector<MotorId>& motors) {
+  array_rows(++last_id_, trajectory, motors);
+  return last_id_;
+}
+
+void Journal::array_rows(std::uint64_t number, const motion::Trajectory& trajectory,
+                         const std::vector<MotorId>& motors) {
+  std::size_t& logged = rows_logged_[number];
+  const bool cubic = trajectory.interpolation() == motion::Trajectory::Interpolation::kCubic;
+  do {
+    const std::size_t until = std::min(trajectory.rows(), logged + kRowsPerLine);
+    const bool last = until == trajectory.rows() && trajectory.closed();
+    nlohmann::json line = {{"event", "array"},
+                           {"array", number},
+                           {"interpolation", cubic ? "cubic" : "linear"},
+                           {"closed", last}};
+    for (const MotorId id : motors) line["motors"].push_back(installation_[id].name());
+    line["rows"] = nlohmann::json::array();
+    for (; logged < until; ++logged) {
+      nlohmann::json row = {trajectory.time_ns(logged)};
+      for (std::size_t m = 0; m < motors.size(); ++m) {
+        row.push_back(trajectory.position(logged, m));
+      }
+      line["rows"].push_back(std::move(row));
+    }
+    outputs_.move_log(line.dump());
+  } while (logged < trajectory.rows());
+  if (trajectory.closed()) rows_logged_.erase(number);
 }
 
 void Journal::changed(MotorId motor, const motion::Change& change) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -27,6 +28,12 @@ class Journal final : public Service {
   };
   std::uint64_t line_laid(std::uint32_t longest, const std::vector<OnWay>& motors);
   std::uint64_t path_laid(const std::vector<MotorId>& motors, const motion::Path& path);
+  // Before its motors follow it: its rows so far. Returns its number.
+  std::uint64_t array_begun(const motion::Trajectory& trajectory,
+                            const std::vector<MotorId>& motors);
+  // Rows that it has now and that have not been logged, and whether one follows.
+  void array_rows(std::uint64_t number, const motion::Trajectory& trajectory,
+                  const std::vector<MotorId>& motors);
   void changed(MotorId motor, const motion::Change& change);
   void ended(MotorId motor, std::string_view result);
   void position_set(MotorId motor, std::int64_t from_steps, const api::Asker& by);
@@ -59,7 +66,8 @@ class Journal final : public Service {
   const Installation& installation_;
   Outputs& outputs_;
   std::uint64_t last_id_;
-  ById<MotorId, std::uint64_t> id_;  // of its present move in the log
+  std::map<std::uint64_t, std::size_t> rows_logged_;  // by array
+  ById<MotorId, std::uint64_t> id_;                   // of its present move in the log
   ById<MotorId, std::optional<Autonomous>> autonomous_;
   ById<McuId, std::optional<motion::Tick>> told_;  // the tick of the last report
 };

@@ -23,6 +23,8 @@ std::string_view word(OpenMoves::Purpose purpose) {
       return "line";
     case OpenMoves::Purpose::kTravel:
       return "travel";
+    case OpenMoves::Purpose::kFollow:
+      return "follow";
   }
   return "";
 }

@@ -24,7 +24,7 @@ class OpenMoves {
  public:
   explicit OpenMoves(Installation& installation) : installation_(installation) {}
 
-  enum class Purpose { kMove, kHome, kArm, kJog, kLine, kTravel };
+  enum class Purpose { kMove, kHome, kArm, kJog, kLine, kTravel, kFollow };
 
   // A motor's part that has ended.
   struct Ended {

@@ -27,6 +27,13 @@ Pauses::Pauses(Installation& installation, Interlocks& interlocks, Moves& moves,
 void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pause& request) {
   const auto motors = installation_.find_with_groups(request.motors);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
+  for (const MotorId motor : *motors) {
+    if (!installation_[motor].follows()) continue;
+    return asker.answer(api::Refused{
+        installation_[motor].name() +
+        " follows an array, whose times go on: stop it, and follow the rest of the rows from "
+        "where its motors stand"});
+  }
   asker.answer(api::Accepted{});
   std::vector<MotorId> moving;
   std::vector<MotorId> jogs;

@@ -33,7 +33,8 @@ constexpr std::array<std::string_view, std::variant_size_v<Request::variant>> kN
     "release",
     "move line",
     "camac",
-    "move path"};
+    "move path",
+    "follow"};
 
 }  // namespace
 

@@ -103,6 +103,30 @@ struct MovePath {
   static constexpr std::size_t kMostValues = 4096;
 };
 
+// Motors of one bus, at rest, follow positions in time. The rows of an array come in parts, each
+// a request of its own, which is answered when the array has been checked as far as it is known:
+// kDone if all of its motors can follow it, with a MovePlan after the last row, otherwise kFault,
+// and the array is dropped. The first row is where the motors stand. kRun begins the motion.
+// Further rows may be told while it runs; an array that comes to its end in motion, or without its
+// last row, ramps its motors down by their tables.
+// Result of kRun: as of Move.
+struct Follow {
+  enum class Part { kRows, kLastRows, kRun };
+  static constexpr std::size_t kMostMotors = 127;
+  static constexpr std::size_t kMostRows = 100'000;       // of an array
+  static constexpr std::size_t kMostNumbers = 1'000'000;  // positions of an array
+
+  Part part = Part::kRows;
+  std::int64_t array = 0;  // its number, the client's own
+  // Of all parts alike:
+  MotorNames motors{};  // at least one, none twice
+  bool cubic = false;   // between rows; else linear
+  double stretch = 1;   // all times are so many times as long, 0.001..1000
+  // Of kRows and kLastRows:
+  std::vector<double> time_s{};     // each later than the one before, below 10^8
+  std::vector<double> positions{};  // user units, row by row: one for each motor
+};
+
 // Ramps these motors down; none named: all. Result kDone once they stand. Also disarms, and ends
 // homing. Never refused, but for an unknown motor.
 struct Stop {
@@ -276,7 +300,7 @@ struct Camac {
 struct Request : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
                               UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare,
                               ListTables, GetTable, SetTable, Confirm, GetHistory, Configure, Jog,
-                              Pause, Resume, Hold, Release, MoveLine, Camac, MovePath> {
+                              Pause, Resume, Hold, Release, MoveLine, Camac, MovePath, Follow> {
   using variant::variant;
   Request();
   Request(const Request&);

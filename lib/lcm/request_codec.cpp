@@ -369,6 +369,34 @@ std::optional<api::Request> from_message(const release_t& message) {
   return api::Release{message.motors};
 }
 
+follow_t to_message(const api::Follow& follow) {
+  auto message = motors_message<follow_t>(follow.motors);
+  message.part = follow.part == api::Follow::Part::kRows       ? follow_t::ROWS
+                 : follow.part == api::Follow::Part::kLastRows ? follow_t::LAST_ROWS
+                                                               : follow_t::RUN;
+  message.array = follow.array;
+  message.cubic = follow.cubic ? 1 : 0;
+  message.stretch = follow.stretch;
+  message.time_s = follow.time_s;
+  message.row_count = count(follow.time_s);
+  message.positions = follow.positions;
+  message.position_count = count(follow.positions);
+  return message;
+}
+std::optional<api::Request> from_message(const follow_t& message) {
+  using Part = api::Follow::Part;
+  if (message.part < follow_t::ROWS || message.part > follow_t::RUN) return std::nullopt;
+  return api::Follow{.part = message.part == follow_t::ROWS        ? Part::kRows
+                             : message.part == follow_t::LAST_ROWS ? Part::kLastRows
+                                                                   : Part::kRun,
+                     .array = message.array,
+                     .motors = message.motors,
+                     .cubic = message.cubic != 0,
+                     .stretch = message.stretch,
+                     .time_s = message.time_s,
+                     .positions = message.positions};
+}
+
 std::optional<api::Request> from_message(const camac_request_t& message) {
   auto camac = camac_of(message);
   if (!camac) return std::nullopt;
@@ -437,11 +465,12 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 30> kDecoders = {{
     {"MOVE_LINE", decode_request<move_line_t>},
     {"CAMAC", decode_request<camac_request_t>},
     {"MOVE_PATH", decode_request<move_path_t>},
+    {"FOLLOW", decode_request<follow_t>},
     {"HELLO", decode_hello},
     {"SUBSCRIBE", decode_subscription},
     {"GET_STATUS", decode_get_status},
 }};
-static_assert(std::variant_size_v<api::Request::variant> == 27);
+static_assert(std::variant_size_v<api::Request::variant> == 28);
 
 constexpr auto kClientChannels = [] {
   std::array<std::string_view, kDecoders.size()> channels;

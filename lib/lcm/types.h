@@ -14,6 +14,7 @@
 #include "bushd/disarm_t.hpp"
 #include "bushd/emergency_stop_t.hpp"
 #include "bushd/enable_t.hpp"
+#include "bushd/follow_t.hpp"
 #include "bushd/get_history_t.hpp"
 #include "bushd/get_status_t.hpp"
 #include "bushd/get_table_t.hpp"

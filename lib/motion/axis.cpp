@@ -51,6 +51,7 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::u
   stale_ = false;
   change_.reset();
   share_.reset();
+  followed_.reset();
   const auto count = static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
   restart(base_.run, count, steps < 0 ? -1 : 1, floor);
   base_.tick = start;
@@ -72,6 +73,7 @@ void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, std:
   stopping_ = false;
   stale_ = false;
   change_.reset();
+  followed_.reset();
   share_ = std::move(share);
   run_target_ = share_->to - share_->from;
   share_from_steps_ = line_steps(0);
@@ -104,6 +106,7 @@ std::int64_t Axis::line_steps(std::uint32_t run_steps) const {
 std::int64_t Axis::steps_of(const Place& place) const {
   if (on_path()) return from_ + place.made - share_from_steps_;
   if (share_) return from_ + share_->direction * (place.told_256 / 256 - share_from_steps_);
+  if (followed_) return steps_followed(place);
   return from_ + place.run.direction * static_cast<std::int64_t>(place.run.steps_done);
 }
 
@@ -139,6 +142,7 @@ bool Axis::change(Tick at) {
   change_ = Change{.at = at, .target_steps = {}, .floor = floor_, .run_steps = run_target_};
   if (!stopping_) change_->target_steps = target_;
   plan_end();
+  if (followed_) return true;
   const bool same_end = planned_end_ == planned_end && planned_run_steps_ == planned_run_steps;
   const bool same_speed =
       stopping_ || on_path() || base_.run.cruise == std::max(run_table().cruise, change_->floor);
@@ -168,6 +172,7 @@ void Axis::expand_run(bushd_run& run, bool fine, std::size_t ticks, std::int16_t
 }
 
 void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const {
+  if (followed_) return follow_trajectory(place, ticks, out, stride);
   if (!share_) return expand_run(place.run, fine(), ticks, out, stride);
   if (on_path()) return follow_path(place, ticks, out, stride);
   for (std::size_t done = 0; done < ticks; done += kBlock) {
@@ -237,6 +242,7 @@ void Axis::follow_steps(Place& place, std::size_t ticks, std::int16_t* out,
 // The delay of the motor's running step, in units of its own table. Of a share: as the run goes
 // now, rounded up; its table lets no motor be faster than its own table at that place.
 std::uint16_t Axis::delay_of(const Place& place) const {
+  if (followed_ && place.follows) return follower_delay(place);
   const std::uint32_t delay = run_delay(place);
   if (!share_ || delay == 0) return static_cast<std::uint16_t>(delay);
   const bool changes_later = change_ && change_->at > start_ && place.tick <= change_->at;
@@ -258,6 +264,11 @@ void Axis::take_change(Place& place) const {
   if (!change_ || place.tick != effective()) return;
   if (on_path()) return take_change_on_path(place);
   bushd_run& run = place.run;
+  if (followed_ && change_->at > start_) return leave_trajectory(place);
+  if (followed_) {
+    place.follows = false;  // it never begins
+    return;
+  }
   if (change_->at <= start_ && share_) {
     return restart(run, change_->target_steps ? change_->run_steps : 0, 1, change_->floor);
   }
@@ -339,6 +350,7 @@ void Axis::plan_end() {
     advance(place, effective());
     take_change(place);
   }
+  if (followed_) return plan_trajectory_end(place);
   planned_run_steps_ = run_steps(place) + run_steps_left(place);
   run_end_ = end_of(place);
   if (share_) {
@@ -356,7 +368,7 @@ void Axis::go_to(Tick first) {
 }
 
 std::optional<Axis::RunSegment> Axis::run_at(Tick first, unsigned max_ticks) {
-  if (!busy_ || first < start_ || share_) return std::nullopt;
+  if (!busy_ || first < start_ || share_ || followed_) return std::nullopt;
   go_to(first);
   Place place = head_;
   take_change(place);
@@ -391,7 +403,9 @@ std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::s
 
 std::optional<Change> Axis::executed(Tick until) {
   if (!busy_ || until < base_.tick) return std::nullopt;
+  base_.went_up = base_.went_down = false;
   advance(base_, until);
+  if (followed_ && !end_is_near_) plan_end();
   std::optional<Change> taken;
   // Of a run that makes no step nothing comes after the change.
   if (change_ && (until > effective() || until >= over_tick())) {
@@ -412,6 +426,7 @@ double Axis::velocity_steps_per_s() const {
   if (!busy_) return 0.0;
   Place place = base_;
   take_change(place);
+  if (followed_ && place.follows) return trajectory_velocity(place);
   const std::uint32_t delay = run_delay(place);
   if (delay == 0) return 0.0;
   const double run_steps_per_s = 1e9 / (static_cast<double>(delay) * run_unit_ns());

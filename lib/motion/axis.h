@@ -7,6 +7,10 @@
 // line has a copy of it, and makes of it what its share says: as long as all copies are started,
 // changed and stopped at the same ticks, the motors stay on the line, and none need know of
 // another. The same is so of a path (motion/path_run.h), whose run they all follow.
+//
+// In place of a run it may follow a trajectory (motion/trajectory.h), which may become longer
+// meanwhile. It ramps down from that by its table when it is stopped, and where the trajectory ends
+// in motion.
 #pragma once
 
 #include <algorithm>
@@ -21,6 +25,7 @@
 #include "engine/run.h"
 #include "motion/divisor.h"
 #include "motion/path_run.h"
+#include "motion/trajectory.h"
 #include "tables/envelope.h"
 
 namespace bushd::motion {
@@ -56,6 +61,13 @@ struct LineShare {
   bool in_mcus = false;
 };
 
+// The motor's part of a trajectory.
+struct TrajectoryShare {
+  std::uint64_t number = 0;  // of the trajectory, for logs
+  std::shared_ptr<const Trajectory> trajectory;
+  std::size_t motor = 0;
+};
+
 // Not copied while a run uses the table: the table outlives the axis.
 class Axis {
  public:
@@ -86,6 +98,22 @@ class Axis {
   // The same for a part of a line; `floor` in the line's time units.
   // Precondition: !busy(), the run of all of it takes at most kMaxDurationTicks.
   void start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor);
+
+  // Follows a trajectory, whose first row is where it stands.
+  // Precondition: !busy(), TrajectoryCheck has nothing against it as far as it is known.
+  void start_trajectory(TrajectoryShare share, Tick start);
+  // It knows more rows, or has been closed. Precondition: !runs_out_before(the first tick that the
+  // MCU may have).
+  void trajectory_grew();
+  // The trajectory, as far as it is known, ends in motion, or might, and this tick comes after it.
+  bool runs_out_before(Tick tick) const;
+  // It is on the trajectory, and will be for some ticks more.
+  bool trajectory_goes_on_after(Tick tick) const;
+  const std::optional<TrajectoryShare>& trajectory() const { return followed_; }
+  // It has ramped down because the trajectory ended in motion.
+  bool ran_out() const { return followed_ && !base_.follows && !stopping_; }
+  // It goes, or has gone since the last executed(), in this direction.
+  bool goes(int direction) const;
 
   // What is wanted of the motor from now on: rest, or another target. The plan follows with
   // change(). Precondition: busy().
@@ -173,6 +201,13 @@ class Axis {
     std::int64_t told_256;  // where the share has led by then, 1/256 step from the line's beginning
     PathRun path;           // in place of `run`, `line`
     std::int64_t made;      // steps that this has taken, as its MCU counts them (engine/slots.h)
+    // Of a trajectory: on it, or by the run to rest from the step `left_at` on, whose direction is
+    // that of the run. told_256 counts from step 0.
+    bool follows;
+    std::int64_t left_at;
+    Follower follower;
+    bool went_up;  // since the last executed()
+    bool went_down;
   };
   bool on_path() const { return share_ && share_->track != nullptr; }
   bool run_over(const Place& place) const;
@@ -203,6 +238,17 @@ class Axis {
     return static_cast<std::int16_t>(
         steps == 0 ? 0u : steps | (share_->direction > 0 ? BUSHD_COARSE_DIRECTION : 0u));
   }
+  // axis_trajectory.cpp
+  bool trajectory_over(const Place& place) const;
+  std::int64_t steps_followed(const Place& place) const;
+  double trajectory_velocity(const Place& place) const;
+  void follow_trajectory(Place& place, std::size_t ticks, std::int16_t* out,
+                         std::size_t stride) const;
+  std::uint16_t delay_on_trajectory(const Place& place) const;
+  std::uint16_t follower_delay(const Place& place) const;
+  void leave_trajectory(Place& place) const;
+  void plan_trajectory_end(Place place);
+  std::int16_t as_told(std::int64_t moved_256) const;
   std::uint16_t delay_of(const Place& place) const;
   Tick end_of(const Place& place) const;
   Tick own_end_of(const Place& place) const;
@@ -224,6 +270,9 @@ class Axis {
   bool stopping_ = false;
   bool stale_ = false;            // what is wanted has changed since the last change()
   std::optional<Change> change_;  // planned and not yet executed
+  std::optional<TrajectoryShare> followed_;
+  bool rests_at_end_ = false;  // of the trajectory
+  bool end_is_near_ = true;    // and end_ exact, else the earliest that it may be
   std::optional<LineShare> share_;
   Divisor share_by_;                   // its `longest`
   std::int64_t share_from_steps_ = 0;  // steps of the line that the motor has made before this run

@@ -7,6 +7,7 @@
 namespace bushd::motion {
 
 bool Axis::run_over(const Place& place) const {
+  if (followed_) return trajectory_over(place);
   return on_path() ? place.path.done() : bushd_run_done(&place.run);
 }
 
@@ -38,6 +39,7 @@ double Axis::share_of_run(const Place& place) const {
 }
 
 int Axis::direction() const {
+  if (followed_ && base_.follows) return base_.follower.direction() < 0 ? -1 : 1;
   if (!on_path()) return share_ ? share_->direction : base_.run.direction;
   const Path& path = share_->track->path();
   // Of one that stands, where it came from.

@@ -54,6 +54,13 @@ void Motor::aim_on_line(const OnLine& on_line, std::uint32_t line_step, std::uin
   axis_.aim_on_line(line_step, floor);
 }
 
+void Motor::follow(TrajectoryShare share, Tick start) {
+  activity_ = Moving{};
+  pause_ = Pause::kNo;
+  further_.clear();
+  axis_.start_trajectory(std::move(share), start);
+}
+
 Leg Motor::take_leg() {
   if (position_ != axis_.target_steps() || further_.empty()) {
     return {.target = axis_.target_steps(), .floor = axis_.floor()};
@@ -303,7 +310,9 @@ void Motor::follow_end_of_line(const Report& report, std::vector<Event>& events)
 // It stands where its plan has led.
 void Motor::follow_end_of_run(const Report& report, std::vector<Event>& events) {
   const bool there = position_ == axis_.target_steps();
-  if (there && further_.empty()) {
+  if (axis_.ran_out()) {
+    events.emplace_back(ran_out());
+  } else if (there && further_.empty()) {
     const bool settles = !axis_.stopping() && report.tick < axis_.end_tick() + setup_.settle_ticks;
     if (!settles) events.emplace_back(reached());
   } else if (stands_paused()) {
@@ -373,11 +382,15 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
 
 // The way it goes is barred, and the MCU has not begun, or goes by a ramp of its own.
 void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
+  // On a path or a trajectory it may have turned round since it came to its switch.
   int direction = axis_.direction();
-  // On a path it may have turned round since it came to its switch.
-  const bool on_path = axis_.line() && axis_.line()->track;
-  if (on_path && !forbidden(direction)) direction = -direction;
-  if (!forbidden(direction)) return;
+  if (axis_.line() && axis_.line()->track) {
+    if (!forbidden(direction)) direction = -direction;
+    if (!forbidden(direction)) return;
+  } else {
+    if (axis_.goes(-direction) && forbidden(-direction)) direction = -direction;
+    if (!forbidden(direction) || !axis_.goes(direction)) return;
+  }
   const bool moving = has_bit(report.of_mcu.moving, output());
   const bool given_up =
       !moving && report.tick >= axis_.start_tick() && axis_.velocity_steps_per_s() != 0;
@@ -468,6 +481,15 @@ event::Ended Motor::ended(Outcome outcome, std::string reason) {
 
 event::Ended Motor::reached() {
   event::Ended event = ended(Outcome::kReached, "stands at its target");
+  event.by_plan = true;
+  return event;
+}
+
+event::Ended Motor::ran_out() {
+  event::Ended event =
+      ended(Outcome::kStopped, axis_.trajectory()->trajectory->closed()
+                                   ? "its array ended in motion; ramped down by its table"
+                                   : "no further rows of its array came; ramped down by its table");
   event.by_plan = true;
   return event;
 }

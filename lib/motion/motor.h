@@ -188,6 +188,9 @@ class Motor {
   // An amount in steps. Errors: not finite, beyond what is counted.
   Result<std::int64_t> steps_of_position(const api::Amount& position) const;
   Result<std::int64_t> steps_of_distance(const api::Amount& distance) const;
+  // Where it may be, by its soft limits, or as far as positions are counted.
+  std::int64_t lowest() const;
+  std::int64_t highest() const;
 
   // Requests. Preconditions: it may. Floors are those of Axis.
   // From rest, or from the turning point of a motion.
@@ -196,6 +199,10 @@ class Motor {
   // The same for a run of a line.
   void start_line(const OnLine& on_line, LineShare share, Tick start, std::uint16_t floor);
   void aim_on_line(const OnLine& on_line, std::uint32_t line_step, std::uint16_t floor);
+  // From rest, along a trajectory whose first row is where it stands.
+  void follow(TrajectoryShare share, Tick start);
+  // It moves so.
+  bool follows() const { return moves() && axis_.trajectory().has_value(); }
   // What comes after the run that it makes, in place of what was to come.
   void go_on(std::vector<Leg> legs) { further_ = std::move(legs); }
   // The leg that is to be made from where it stands: the rest of the one that it makes, or the next
@@ -275,6 +282,7 @@ class Motor {
   event::Ended end_by_fault(const bushd_report& report);
   event::Ended reached();
   event::Ended stopped();
+  event::Ended ran_out();
   event::Ended ended(Outcome outcome, std::string reason);
   void follow_autonomous(const bushd_report& report, bool moved_without_plan);
   void rest();

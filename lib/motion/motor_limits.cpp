@@ -35,6 +35,7 @@ Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const 
   if (is<OnLine>()) {
     return fail("it moves on a line with other motors; stop it first, then move it by itself");
   }
+  if (follows()) return fail("it follows an array; stop it first, then move it by itself");
   if (restored_reason_ && setup_.restored_refused) {
     return fail("its position is only restored, because " + *restored_reason_ +
                 ", and restored = \"refuse\" keeps it there; home it, set its position, or run "
@@ -128,6 +129,14 @@ Result<std::vector<Leg>> Motor::legs_to(std::int64_t target, std::uint16_t floor
 Motor::Range Motor::allowed_steps() const {
   return {.low = setup_.coordinates.first_step_from(setup_.soft_limits->low),
           .high = setup_.coordinates.last_step_to(setup_.soft_limits->high)};
+}
+
+std::int64_t Motor::lowest() const {
+  return setup_.soft_limits ? allowed_steps().low : -kMaxPosition;
+}
+
+std::int64_t Motor::highest() const {
+  return setup_.soft_limits ? allowed_steps().high : kMaxPosition;
 }
 
 std::string Motor::text_of(const Range& range) const {

@@ -128,6 +128,16 @@ Result<std::int64_t> Coordinates::steps_of_user(double user) const {
   return steps_from(dial * as_mpq(scale_.steps_per_unit));
 }
 
+Result<std::int64_t> Coordinates::parts_of_user(double user) const {
+  const auto value = number(user);
+  if (!value) return fail(value.error());
+  mpq_class dial = *value - *exact(scale_.offset);
+  if (scale_.negative) dial = -dial;
+  const mpq_class steps = dial * as_mpq(scale_.steps_per_unit);
+  if (const auto whole = steps_from(steps); !whole) return whole;
+  return nearest(steps * mpq_class(std::int64_t{1} << 32)).get_si();
+}
+
 Result<std::int64_t> Coordinates::steps_of_distance(double user_units) const {
   const auto steps = steps_of_dial(user_units);
   if (!steps) return steps;

@@ -61,6 +61,8 @@ class Coordinates {
   // The nearest step, ties away from 0. Errors: not finite, beyond +-kMaxSteps.
   Result<std::int64_t> steps_of_dial(double dial) const;
   Result<std::int64_t> steps_of_user(double user) const;
+  // In 2^-32 of a step, the nearest.
+  Result<std::int64_t> parts_of_user(double user) const;
   // Of a distance on the user's scale, with its sign.
   Result<std::int64_t> steps_of_distance(double user_units) const;
 

@@ -1,6 +1,6 @@
 // A day in a lab, judged by tools/check-trace from the log of moves and the pins alone: moves in
 // every way of emission, homing, local motion, a limit switch, jogs, pauses, moves of two legs,
-// lines.
+// lines, arrays.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -116,6 +116,53 @@ class Trace : public testing::TestWithParam<Manner> {
     lab.run_for(0.3);
     EXPECT_EQ(lab.wait(by({-1200, -600, 300})).result, "reached");
   }
+  // Straight and cubic, to its end, in motion beyond it, stopped, and with rows that come later.
+  void follow_arrays(Lab& lab) {
+    const std::vector<std::string> motors{"m02", "m03", "m05"};
+    std::int64_t array = 0;
+    using Part = api::Follow::Part;
+    const auto rows = [&](Part part, bool cubic, const std::vector<std::vector<double>>& all) {
+      api::Follow follow{.part = part, .array = array, .motors = motors, .cubic = cubic};
+      for (const auto& row : all) {
+        follow.time_s.push_back(row.front());
+        for (std::size_t m = 0; m < motors.size(); ++m) {
+          const auto at = static_cast<double>(begins_[m]);
+          follow.positions.push_back(at + row[m + 1]);
+        }
+      }
+      return lab.send(follow);
+    };
+    const auto begin = [&] {
+      ++array;
+      begins_.clear();
+      for (const auto& motor : motors) begins_.push_back(lab.motor(motor).position_steps);
+    };
+    const auto expect_loaded = [&](std::int64_t number) {
+      const Answer loaded = lab.wait(number);
+      EXPECT_EQ(loaded.result, "done") << loaded.reason;
+    };
+    begin();
+    expect_loaded(
+        rows(Part::kLastRows, false,
+             {{0, 0, 0, 0}, {1, 60, -99.25, 0}, {1.4, 90.3, -99.25, 7.7}, {2.5, 31, -0.5, 9}}));
+    EXPECT_EQ(lab.wait(rows(Part::kRun, false, {})).result, "reached");
+    begin();
+    expect_loaded(rows(Part::kRows, true,
+                       {{0, 0, 0, 0}, {0.5, 20, -8, 2}, {1, 90, -40, 3}, {1.5, 170, -90, 3}}));
+    const auto cubic = rows(Part::kRun, true, {});
+    expect_loaded(rows(Part::kRows, true, {{2, 230, -130, 4}, {2.5, 250, -140, 5}}));
+    expect_loaded(rows(Part::kLastRows, true, {{3.1, 235, -130, 6}, {3.9, 220, -110, 12.2}}));
+    EXPECT_EQ(lab.wait(cubic).result, "reached");
+    begin();
+    expect_loaded(rows(Part::kLastRows, true, {{0, 0, 0, 0}, {3, 220, 100, -200}}));
+    const auto stopped = rows(Part::kRun, true, {});
+    lab.run_for(1.6);
+    lab.send(Ask::kStop, {"m03"});
+    EXPECT_EQ(lab.wait(stopped).result, "stopped");
+    begin();
+    expect_loaded(rows(Part::kRows, true, {{0, 0, 0, 0}, {1.5, 110, 20, -80}, {3, 330, 0, -300}}));
+    EXPECT_EQ(lab.wait(rows(Part::kRun, true, {})).result, "stopped");
+  }
   void write(Lab& lab) {
     EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
     nlohmann::json positions;
@@ -145,6 +192,7 @@ class Trace : public testing::TestWithParam<Manner> {
     return {std::istreambuf_iterator<char>(file), {}};
   }
 
+  std::vector<std::int64_t> begins_;
   std::filesystem::path directory_;
   std::unique_ptr<sim::VcdWriter> vcd_;
 };
@@ -182,6 +230,7 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   move_at_speeds(lab);
   change_on_the_way(lab);
   move_along_lines(lab);
+  follow_arrays(lab);
   lab.run_for(0.1);
   write(lab);
   EXPECT_EQ(check(lab, [](auto&) { return true; }), 0) << said();
@@ -201,6 +250,13 @@ TEST_P(Trace, EveryEdgeIsExplained) {
                       event["line"]["increment"] =
                           event["line"]["increment"].template get<int>() - 1;
                     }
+                    return true;
+                  }),
+            1);
+  EXPECT_EQ(check(lab,
+                  [](auto& event) {
+                    if (event["event"] == "array")
+                      event["rows"][1][0] = event["rows"][1][0].template get<int>() + 9'000'000;
                     return true;
                   }),
             1);

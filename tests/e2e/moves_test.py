@@ -2,7 +2,9 @@
 
 import csv
 import io
+import json
 import unittest
+from fractions import Fraction
 
 from rig import FAR, MOTORS, TABLE_RUNS, TICK_US, TOP, EndToEndTest, program
 
@@ -92,6 +94,33 @@ class Moves(EndToEndTest):
         self.assertEqual(sorted(targets), [300, 1500, 2990, 5000])
         results = [event["result"] for event in self.moves() if event["event"] == "result"]
         self.assertEqual(results.count("turned"), 2)
+
+    def test_motors_follow_a_file_of_times_and_positions(self):
+        self.bring_up()
+        scan = self.file("scan.csv")
+        rows = [(0, 0, 0), (1, 80, -20.25), (1.5, 80, -20.25), (2.5, 0, 30)]
+        scan.write_text("# a scan\ntime_s, a0, b1\n" + "".join(f"{t}, {a}, {b}\n" for t, a, b in rows), encoding="utf-8")
+        fast = self.bushctl("follow", scan, "--stretch", "0.5")
+        self.assertEqual(fast.returncode, 1)
+        self.assertRegex(fast.stderr, r"fault: row 1 \(0 s\): a0 is to change at once to 160 steps/s; allowed: 100 steps/s; with times stretched")
+        self.assertIn(f"that row is line 3 of {scan}", fast.stderr)
+        plan = json.loads(self.command("follow", scan, "--dry-run", "--json").stdout)
+        self.assertEqual(plan["duration_us"], 2_500_000)
+        self.command("follow", scan, "--wait")
+        self.assertEqual(self.positions()["b1"], 30)
+        self.command("move", "--wait", "b1", "--to", "0")
+        self.command("follow", scan, "--wait", "--interpolation", "cubic", "--stretch", "1.25")
+        status = self.status()
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        self.assert_one_result_each()
+        self.assert_trace_is_right(status)
+        # The log has what the file says, computed otherwise: in 2^-32 step, and ns.
+        arrays = [event for event in self.moves() if event["event"] == "array"]
+        self.assertEqual([event["interpolation"] for event in arrays], ["linear", "cubic"])
+        for event, stretch in zip(arrays, (1, Fraction(5, 4))):
+            told = [[int(Fraction(str(t)) * 10**9 * stretch), *(int(Fraction(str(p)) * 2**32) for p in at)] for t, *at in rows]
+            self.assertEqual(event["rows"], told)
 
     def test_new_targets_for_moving_motors_fine(self):
         self.check_new_targets("fine")

@@ -141,6 +141,23 @@ TEST(Codec, OtherRequestsDoToo) {
   EXPECT_EQ(path.corners, api::MovePath::Corners::kExact);
   EXPECT_TRUE(path.dry_run);
   EXPECT_EQ(path.speed, (api::Speed{.per_s = 2.5}));
+  const api::Follow rows{.part = api::Follow::Part::kLastRows,
+                         .array = 7,
+                         .motors = {"a", "b"},
+                         .cubic = true,
+                         .stretch = 1.5,
+                         .time_s = {0, 0.5},
+                         .positions = {1, 2, 3, 4.25}};
+  const auto follow = request_over_the_wire(rows);
+  EXPECT_EQ(follow.part, rows.part);
+  EXPECT_EQ(follow.array, 7);
+  EXPECT_EQ(follow.motors, rows.motors);
+  EXPECT_TRUE(follow.cubic);
+  EXPECT_EQ(follow.stretch, 1.5);
+  EXPECT_EQ(follow.time_s, rows.time_s);
+  EXPECT_EQ(follow.positions, rows.positions);
+  EXPECT_EQ(request_over_the_wire(api::Follow{.part = api::Follow::Part::kRun}).part,
+            api::Follow::Part::kRun);
   const auto jog = request_over_the_wire(
       api::Jog{.motor = "a", .per_s = -2.5, .keepalive_ms = 300, .steps_after = 7});
   EXPECT_EQ(jog.motor, "a");

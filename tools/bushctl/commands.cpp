@@ -40,6 +40,8 @@ api::MotorNames motors_of(const api::Request& request) {
   if (const auto* path = std::get_if<api::MovePath>(&request)) names = path->motors;
   if (const auto* arm = std::get_if<api::Arm>(&request)) add(arm->motors);
   if (const auto* home = std::get_if<api::Home>(&request)) names = home->motors;
+  const auto* follow = std::get_if<api::Follow>(&request);
+  if (follow != nullptr && follow->part == api::Follow::Part::kRun) names = follow->motors;
   return names;
 }
 
@@ -136,63 +138,68 @@ int bring(Client& client, const std::vector<api::MovePath>& parts, const Wording
   return kDone;
 }
 
-int send_last(const Connection& connection, const std::vector<api::MovePath>& before,
-              const api::Request& request, Client::Until until, Hope hope, const Wording& wording) {
+int send(Client& client, const api::Request& request, Client::Until until, Hope hope,
+         const Wording& wording) {
   const api::MotorNames motors = motors_of(request);
   const auto* home = std::get_if<api::Home>(&request);
   const bool moves = !motors.empty() || (home != nullptr && home->all);
-  return with_client(connection, [&](Client& client) {
-    if (const int code = bring(client, before, wording); code != kDone) return code;
-    bool accepted = false;
-    bool stopped = false;
-    Progress progress(motors);
-    Client::Meanwhile meanwhile;
-    meanwhile.on_reply = [&](const api::Reply& heard) {
-      accepted = accepted || std::holds_alternative<api::Accepted>(heard);
-      progress.clear();
-      for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
-      for (const std::string& line : rounding_lines(request, heard)) fmt::print("{}\n", line);
-      // What limits a line, and how near to it the motors are.
-      const auto* completed = std::get_if<api::Completed>(&heard);
-      if (completed != nullptr && std::holds_alternative<api::MoveLine>(request) &&
-          as_hoped(heard, hope)) {
-        fmt::print("{}\n", bushd::printable(completed->reason));
-      }
-      std::fflush(stdout);
-    };
-    if (until == Client::Until::kResult && moves) {
-      meanwhile.on_state = [&](const bushd::client::Status& status) { progress.show(status); };
-      meanwhile.on_interrupt = [&] {
-        progress.clear();
-        auto stop = stop_on_interrupt(motors);
-        stopped = stop.has_value();
-        return stop;
-      };
-    }
-    const auto reply = client.run(request, until, meanwhile);
+  bool accepted = false;
+  bool stopped = false;
+  Progress progress(motors);
+  Client::Meanwhile meanwhile;
+  meanwhile.on_reply = [&](const api::Reply& heard) {
+    accepted = accepted || std::holds_alternative<api::Accepted>(heard);
     progress.clear();
-    if (reply && as_hoped(*reply, hope)) return static_cast<int>(kDone);
-    if (!reply && client.interrupted() && stopped) {
-      fmt::print(stderr, "bushctl: the stop was sent; 'bushctl where' shows where motors stand\n");
-    } else if (!reply && client.interrupted() && accepted && moves) {
-      fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
-                 home != nullptr ? "homing" : "move");
+    for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
+    for (const std::string& line : rounding_lines(request, heard)) fmt::print("{}\n", line);
+    // What limits a line, and how near to it the motors are.
+    const auto* completed = std::get_if<api::Completed>(&heard);
+    if (completed != nullptr && std::holds_alternative<api::MoveLine>(request) &&
+        as_hoped(heard, hope)) {
+      fmt::print("{}\n", bushd::printable(completed->reason));
     }
-    const int code = reply ? refused(worded(*reply, wording)) : failure(client, reply.error());
-    return stopped ? static_cast<int>(kInterrupted) : code;
-  });
+    std::fflush(stdout);
+  };
+  if (until == Client::Until::kResult && moves) {
+    meanwhile.on_state = [&](const bushd::client::Status& status) { progress.show(status); };
+    meanwhile.on_interrupt = [&] {
+      progress.clear();
+      auto stop = stop_on_interrupt(motors);
+      stopped = stop.has_value();
+      return stop;
+    };
+  }
+  const auto reply = client.run(request, until, meanwhile);
+  progress.clear();
+  if (reply && as_hoped(*reply, hope)) return static_cast<int>(kDone);
+  if (!reply && client.interrupted() && stopped) {
+    fmt::print(stderr, "bushctl: the stop was sent; 'bushctl where' shows where motors stand\n");
+  } else if (!reply && client.interrupted() && accepted && moves) {
+    fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
+               home != nullptr ? "homing" : "move");
+  }
+  const int code = reply ? refused(worded(*reply, wording)) : failure(client, reply.error());
+  return stopped ? static_cast<int>(kInterrupted) : code;
 }
 
 }  // namespace
 
+int send(Client& client, const api::Request& request, Client::Until until, Hope hope) {
+  return send(client, request, until, hope, {});
+}
+
 int send(const Connection& connection, const api::Request& request, Client::Until until,
          Hope hope) {
-  return send_last(connection, {}, request, until, hope, {});
+  return with_client(connection,
+                     [&](Client& client) { return send(client, request, until, hope); });
 }
 
 int send_parts(const Connection& connection, const std::vector<api::MovePath>& parts,
                Client::Until until, const Wording& wording) {
-  return send_last(connection, parts, parts.back(), until, Hope::kReached, wording);
+  return with_client(connection, [&](Client& client) {
+    if (const int code = bring(client, parts, wording); code != kDone) return code;
+    return send(client, parts.back(), until, Hope::kReached, wording);
+  });
 }
 
 int show_plan(const Connection& connection, std::vector<api::MovePath> parts, bool as_json,

@@ -22,6 +22,8 @@ enum Exit : int {
 void add_view_commands(CommandLine& line);
 // move, arm, disarm, stop, estop, home, set, compare
 void add_motion_commands(CommandLine& line);
+// follow
+void add_follow_command(CommandLine& line);
 // enable, disable, clear
 void add_driver_commands(CommandLine& line);
 // confirm, history
@@ -66,6 +68,9 @@ enum class Hope { kReached, kDone };  // what the result is when all is well
 // kAnswered: done when accepted. kResult: done when the result is as hoped for. All returns are
 // exit codes.
 int send(const Connection& connection, const bushd::api::Request& request,
+         bushd::client::Client::Until until, Hope hope);
+// The same with a client that is there.
+int send(bushd::client::Client& client, const bushd::api::Request& request,
          bushd::client::Client::Until until, Hope hope);
 
 // How a reason reads here.

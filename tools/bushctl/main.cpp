@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
     bushctl::add_view_commands(line);
     bushctl::add_motion_commands(line);
     bushctl::add_path_commands(line);
+    bushctl::add_follow_command(line);
     bushctl::add_jog_commands(line);
     bushctl::add_pause_commands(line);
     bushctl::add_driver_commands(line);

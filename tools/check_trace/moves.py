@@ -3,6 +3,7 @@
 import json
 import math
 
+from check_trace.arrays import Array, ArrayMove
 from check_trace.lines import Envelope, LineMove, Part
 from check_trace.motion import Move
 from check_trace.problems import InputError
@@ -77,6 +78,7 @@ class MoveLog:
         self._at_steps = {}  # by motor name: where the last result or "set" leaves it
         self._tables = {}
         self._ways = {}  # by number: the tables of lines
+        self._arrays = {}  # by number
         self._ticks = set()  # (bus, tick_ns)
         self.paths = {}  # by number of the way: floors by motor's name
 
@@ -86,6 +88,7 @@ class MoveLog:
             "requests": lambda event: None,  # how many more
             "line": self._line,
             "path": self._path,
+            "array": self._array,
             "move": self._move,
             "stop": self._change,
             "retarget": self._change,
@@ -148,6 +151,8 @@ class MoveLog:
             move = PathMove(event, table)
         elif "line" in event:
             move = LineMove(event, table, self._ways[event["line"]["way"]])
+        elif "array" in event:
+            move = ArrayMove(event, table, self._arrays[event["array"]["array"]])
         else:
             move = Move(event, table)
         motor.moves.append(move)
@@ -167,6 +172,14 @@ class MoveLog:
 
     def _path(self, event):
         self.paths[event["way"]] = {motor["motor"]: motor["floor"] for motor in event["motors"]}
+
+    def _array(self, event):
+        """The first rows of an array, or further ones."""
+        number = event["array"]
+        if number in self._arrays:
+            self._arrays[number].add(event)
+        else:
+            self._arrays[number] = Array(event)
 
     def _change(self, event):
         move = self._moves.get((event["motor"], event["id"]))

@@ -1,0 +1,437 @@
+#include "daemon/services/arrays.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace bushd::daemon {
+namespace {
+
+using motion::Trajectory;
+using motion::TrajectoryCheck;
+
+// Of all motors together; each takes some 100 ns.
+constexpr unsigned kTicksPerSlice = 2000;
+// Times that were found to be long enough for each step by itself are mostly so for all of them.
+constexpr int kMostTries = 6;
+constexpr double kLongestS = 1e8;
+
+api::Completed done(std::string reason) {
+  return {.outcome = api::Outcome::kDone, .reason = std::move(reason), .detail = {}};
+}
+
+std::string client_of(const api::Asker& asker) {
+  return asker.session ? asker.session->text() : "";
+}
+
+}  // namespace
+
+std::vector<MotorId> Arrays::Array::motors() const {
+  std::vector<MotorId> motors;
+  for (const Part& part : parts) motors.push_back(part.motor);
+  return motors;
+}
+
+void Arrays::request(std::int64_t now_us, const api::Asker& asker, const api::Follow& request) {
+  if (request.part == api::Follow::Part::kRun) return run(now_us, asker, request);
+  take_rows(now_us, asker, request);
+}
+
+std::list<Arrays::Array>::iterator Arrays::find(const api::Asker& asker, std::int64_t number) {
+  return std::ranges::find_if(arrays_, [&](const Array& array) {
+    return array.number == number && array.client == client_of(asker);
+  });
+}
+
+Result<std::list<Arrays::Array>::iterator> Arrays::begin(const api::Asker& asker,
+                                                         const api::Follow& request) {
+  const auto motors = installation_.find(request.motors);
+  if (!motors) return fail(motors.error());
+  if (motors->size() > api::Follow::kMostMotors) {
+    return fail(fmt::format("{} motors are named; an array has at most {}", motors->size(),
+                            api::Follow::kMostMotors));
+  }
+  if (!(request.stretch >= 0.001 && request.stretch <= 1000)) {
+    return fail(fmt::format("times stretched by {}; allowed: 0.001 to 1000", request.stretch));
+  }
+  Array array{
+      .client = client_of(asker),
+      .number = request.array,
+      .parts = {},
+      .stretch_thousandths = std::llround(request.stretch * 1000),
+      .rows = Trajectory(motors->size(), request.cubic ? Trajectory::Interpolation::kCubic
+                                                       : Trajectory::Interpolation::kLinear),
+      .check = {},
+      .followed = {}};
+  const McuId first = installation_.config()[motors->front()].mcu;
+  for (const MotorId id : *motors) {
+    const motion::Motor& motor = installation_[id];
+    const Mcu& mcu = installation_.mcu_of(id);
+    if (mcu.config.bus != installation_[first].config.bus) {
+      return fail(fmt::format(
+          "{} and {} are on two buses, whose ticks are not in step; motors of an array must be on "
+          "one. Follow two arrays, or connect their MCUs to one bus",
+          installation_[motors->front()].name(), motor.name()));
+    }
+    const auto floor = moves_.floor_of(id, std::nullopt);
+    if (!floor) return fail(floor.error());
+    const tables::TablePtr table = installation_.table_of(id);
+    array.parts.push_back({.motor = id,
+                           .table = table,
+                           .coordinates = motor.coordinates(),
+                           .bounds = {.table = &table->view(),
+                                      .floor = *floor,
+                                      .lowest = motor.lowest(),
+                                      .highest = motor.highest()}});
+  }
+  const auto loaded = [](const Array& one) { return !one.followed && !one.waits; };
+  if (std::ranges::count_if(arrays_, loaded) >= static_cast<std::ptrdiff_t>(kMostLoaded)) {
+    arrays_.erase(std::ranges::find_if(arrays_, loaded));
+  }
+  if (arrays_.size() >= 4 * kMostLoaded) {
+    return fail(
+        fmt::format("{} arrays run or are being checked; wait for one of them", arrays_.size()));
+  }
+  return arrays_.insert(arrays_.end(), std::move(array));
+}
+
+Result<void> Arrays::may_go_on(const Array& array, const api::Follow& request) const {
+  if (array.waits) return fail("rows that came before are still being checked");
+  if (array.spoilt) return fail("rows that came before cannot be followed; no more are taken");
+  if (array.rows.closed()) return fail("the array has its last row already");
+  const bool cubic = array.rows.interpolation() == Trajectory::Interpolation::kCubic;
+  const auto motors = installation_.find(request.motors);
+  if (!motors || *motors != array.motors() || cubic != request.cubic ||
+      array.stretch_thousandths != std::llround(request.stretch * 1000)) {
+    return fail("its motors, its interpolation and its stretch are those of its first rows");
+  }
+  return {};
+}
+
+// What has been sent to an MCU cannot be changed any more.
+Result<void> Arrays::has_time(std::int64_t now_us, const Array& array) const {
+  if (!array.followed) return {};
+  for (const MotorId id : array.motors()) {
+    const Mcu& mcu = installation_.mcu_of(id);
+    if (!follows(array, id) || installation_[id].axis().stopping()) {
+      return fail(installation_[id].name() + " does not follow the array any more");
+    }
+    const motion::Tick queued = mcu.earliest_start(now_us, installation_[id].output());
+    if (installation_[id].axis().runs_out_before(queued)) {
+      return fail(fmt::format(
+          "the rows come too late: those before end in less than half a second, and have been "
+          "sent; {} ramps down after them",
+          installation_[id].name()));
+    }
+  }
+  return {};
+}
+
+Result<void> Arrays::take(Array& array, const api::Follow& request) const {
+  const std::size_t motors = array.parts.size();
+  const std::size_t rows = request.time_s.size();
+  if (request.positions.size() != rows * motors) {
+    return fail(fmt::format("{} positions are told for {} rows of {} motors",
+                            request.positions.size(), rows, motors));
+  }
+  const std::size_t all = array.rows.rows() + rows;
+  if (all > api::Follow::kMostRows || all * motors > api::Follow::kMostNumbers) {
+    return fail(fmt::format("{} rows of {} motors; an array has at most {} rows and {} positions",
+                            all, motors, api::Follow::kMostRows, api::Follow::kMostNumbers));
+  }
+  std::vector<Trajectory::Position> positions(motors);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const std::size_t number = array.rows.rows() + 1;
+    const double time_s = request.time_s[row];
+    if (!(std::abs(time_s) <= kLongestS)) {
+      return fail(
+          fmt::format("row {}: a time of {} s; allowed: +-{:.0f} s", number, time_s, kLongestS));
+    }
+    if (array.rows.rows() == 0) array.first_s = time_s;
+    const auto ns = std::llround((time_s - array.first_s) * 1e9);
+    const auto time_ns = static_cast<std::int64_t>(
+        std::llround(static_cast<long double>(ns) * array.stretch_thousandths / 1000));
+    if (time_ns / 1000 > static_cast<std::int64_t>(kLongestS * 1e6)) {
+      return fail(fmt::format("row {}: after {} s; an array takes at most {:.0f} s", number,
+                              time_ns / 1000000000, kLongestS));
+    }
+    if (array.rows.rows() > 0 && time_ns <= array.rows.time_ns(array.rows.rows() - 1)) {
+      return fail(
+          fmt::format("row {}: at {} s, and not later than the row before", number, time_s));
+    }
+    for (std::size_t m = 0; m < motors; ++m) {
+      const auto position =
+          array.parts[m].coordinates.parts_of_user(request.positions[row * motors + m]);
+      const std::string& name = installation_[array.parts[m].motor].name();
+      if (!position) {
+        return fail(fmt::format("row {}: {}: {}", number, name, position.error().message));
+      }
+      positions[m] = *position;
+    }
+    array.rows.append(time_ns, positions);
+  }
+  if (request.part == api::Follow::Part::kLastRows) {
+    if (array.rows.rows() < 2) return fail("an array has two rows at least");
+    array.rows.close();
+  }
+  return {};
+}
+
+void Arrays::take_rows(std::int64_t now_us, const api::Asker& asker, const api::Follow& request) {
+  auto array = find(asker, request.array);
+  const bool is_new = array == arrays_.end();
+  if (is_new) {
+    auto begun = begin(asker, request);
+    if (!begun) return asker.answer(api::Refused{begun.error().text()});
+    array = *begun;
+  }
+  auto taken = may_go_on(*array, request);
+  if (taken) taken = has_time(now_us, *array);
+  if (taken) {
+    taken = take(*array, request);
+    // A part of its rows is there, and another one is not.
+    array->spoilt = !taken;
+  }
+  if (!taken) {
+    if ((is_new || array->spoilt) && !array->followed) arrays_.erase(array);
+    return asker.answer(api::Refused{taken.error().text()});
+  }
+  asker.answer(api::Accepted{});
+  if (!array->check && array->rows.rows() > 0) {
+    array->check =
+        std::make_unique<TrajectoryCheck>(array->rows, bounds_of(*array), tick_ns_of(*array));
+  }
+  array->waits = true;
+  jobs_.push_back({.asker = asker, .array = array, .longer = {}, .check_of_longer = {}});
+}
+
+std::vector<TrajectoryCheck::Motor> Arrays::bounds_of(const Array& array) const {
+  std::vector<TrajectoryCheck::Motor> bounds;
+  for (const Part& part : array.parts) bounds.push_back(part.bounds);
+  return bounds;
+}
+
+std::uint32_t Arrays::tick_ns_of(const Array& array) const {
+  const Mcu& mcu = installation_.mcu_of(array.parts.front().motor);
+  return installation_.bus_of(mcu).config.tick_ns();
+}
+
+void Arrays::work() {
+  if (jobs_.empty()) return;
+  ++units_;
+  Job& job = jobs_.front();
+  TrajectoryCheck* check = job.check_of_longer ? job.check_of_longer.get() : job.array->check.get();
+  const auto motors = static_cast<unsigned>(job.array->parts.size());
+  if (check != nullptr && check->work(std::max(kTicksPerSlice / motors, 1u))) return;
+  if (check != nullptr && check->first() && try_longer(job)) return;
+  end_job(now_us_);
+}
+
+// Whether there is still something to be found out of how much longer its times must be.
+bool Arrays::try_longer(Job& job) const {
+  const Array& array = *job.array;
+  const TrajectoryCheck& last = job.check_of_longer ? *job.check_of_longer : *array.check;
+  const std::int64_t factor = last.stretch_thousandths();
+  if (!array.rows.closed() || array.followed || factor == 0 || ++job.tries > kMostTries) {
+    job.thousandths = 0;
+    return false;
+  }
+  job.thousandths = (job.thousandths * factor + 999) / 1000;
+  job.check_of_longer.reset();
+  job.longer = std::make_unique<Trajectory>(array.rows.stretched(job.thousandths));
+  if (job.longer->time_ns(job.longer->rows() - 1) / 1000 >
+      static_cast<std::int64_t>(kLongestS * 1e6)) {
+    job.thousandths = 0;
+    return false;
+  }
+  job.check_of_longer =
+      std::make_unique<TrajectoryCheck>(*job.longer, bounds_of(array), tick_ns_of(array));
+  return true;
+}
+
+void Arrays::end_job(std::int64_t now_us) {
+  Job job = std::move(jobs_.front());
+  jobs_.pop_front();
+  Array& array = *job.array;
+  array.waits = false;
+  if (array.check && array.check->first()) {
+    job.asker.answer(
+        api::Completed{.outcome = api::Outcome::kFault, .reason = text_of(job), .detail = {}});
+    array.spoilt = true;
+    if (!array.followed) arrays_.erase(job.array);
+    return;
+  }
+  if (array.followed) {
+    if (const auto time = has_time(now_us, array); !time) {
+      array.spoilt = true;
+      return job.asker.answer(api::Completed{
+          .outcome = api::Outcome::kFault, .reason = time.error().text(), .detail = {}});
+    }
+    accept_rows(array);
+  }
+  const std::string rows = fmt::format("{} rows", array.rows.rows());
+  if (!array.rows.closed()) return job.asker.answer(done(rows + " can be followed so far"));
+  job.asker.answer(api::Completed{.outcome = api::Outcome::kDone,
+                                  .reason = rows + " can be followed",
+                                  .detail = plan_of(array)});
+}
+
+// They have been checked: motors that follow the array may go on with them.
+void Arrays::accept_rows(Array& array) {
+  Trajectory& followed = *array.followed;
+  std::vector<Trajectory::Position> positions(array.parts.size());
+  for (std::size_t row = followed.rows(); row < array.rows.rows(); ++row) {
+    for (std::size_t m = 0; m < positions.size(); ++m) positions[m] = array.rows.position(row, m);
+    followed.append(array.rows.time_ns(row), positions);
+  }
+  if (array.rows.closed()) followed.close();
+  journal_.array_rows(array.logged, followed, array.motors());
+  for (const MotorId id : array.motors()) installation_[id].axis().trajectory_grew();
+  installation_.changed = true;
+}
+
+std::string Arrays::text_of(const Job& job) const {
+  const Array& array = *job.array;
+  const TrajectoryCheck::Finding& finding = *array.check->first();
+  const Part& part = array.parts[finding.motor];
+  const std::string& name = installation_[part.motor].name();
+  const double time_s = static_cast<double>(array.rows.time_ns(finding.row)) * 1e-9;
+  const std::string where = fmt::format("row {} ({:.6g} s): {}", finding.row + 1, time_s, name);
+  if (finding.fault == TrajectoryCheck::Fault::kPosition) {
+    return fmt::format(
+        "{} would go to {}; allowed: {} to {}", where, part.coordinates.text(finding.steps),
+        part.coordinates.text(part.bounds.lowest), part.coordinates.text(part.bounds.highest));
+  }
+  const double unit = std::abs(part.coordinates.user_of(1) - part.coordinates.user_of(0));
+  const char* what = finding.fault == TrajectoryCheck::Fault::kSpeed     ? "is to move"
+                     : finding.fault == TrajectoryCheck::Fault::kCorner  ? "is to change at once"
+                     : finding.fault == TrajectoryCheck::Fault::kSpeedUp ? "is to speed up"
+                                                                         : "is to slow down from";
+  std::string text = fmt::format("{} {} {} {:.6g} {}/s; allowed: {:.6g} {}/s", where, what,
+                                 finding.fault == TrajectoryCheck::Fault::kSlowDown ? "a speed of"
+                                 : finding.fault == TrajectoryCheck::Fault::kSpeed  ? "at"
+                                                                                    : "to",
+                                 finding.asked_steps_per_s * unit, part.coordinates.unit(),
+                                 finding.allowed_steps_per_s * unit, part.coordinates.unit());
+  if (!array.rows.closed() || array.followed) return text;
+  if (job.thousandths == 0) return text;
+  return text +
+         fmt::format("; with times stretched by {:.3f} all motors can follow it",
+                     static_cast<double>(array.stretch_thousandths * job.thousandths) * 1e-6);
+}
+
+api::MovePlan Arrays::plan_of(const Array& array) const {
+  const Trajectory& rows = array.rows;
+  const std::size_t last = rows.rows() - 1;
+  api::MovePlan plan;
+  plan.duration_us = rows.time_ns(last) / 1000;
+  plan.ticks = rows.time_ns(last) / tick_ns_of(array);
+  for (std::size_t m = 0; m < array.parts.size(); ++m) {
+    plan.motors.push_back({.motor = installation_[array.parts[m].motor].name(),
+                           .steps = motion::nearest_step(rows.position(last, m)) -
+                                    motion::nearest_step(rows.position(0, m)),
+                           .duration_us = plan.duration_us,
+                           .peak_steps_per_s = array.check->peak_steps_per_s(m)});
+  }
+  return plan;
+}
+
+Result<void> Arrays::may_run(const Array& array) const {
+  if (array.waits) return fail("its rows are still being checked");
+  if (array.followed) return fail("it runs already");
+  if (array.rows.known_rows() == 0) return fail("it has too few rows");
+  if (const auto may = interlocks_.may_move(); !may) return may;
+  for (std::size_t m = 0; m < array.parts.size(); ++m) {
+    const auto& [id, table, coordinates, bounds] = array.parts[m];
+    const motion::Motor& motor = installation_[id];
+    auto may = interlocks_.may_move(id);
+    if (may) may = motor.may_move_to(motor.position_steps());
+    if (may && motor.has_plan()) may = fail("it moves; stop it, or wait for its result");
+    if (!may) return fail(motor.name() + ": " + may.error().text());
+    if (table != installation_.table_of(id) || coordinates.scale() != motor.coordinates().scale() ||
+        bounds.lowest != motor.lowest() || bounds.highest != motor.highest()) {
+      return fail(motor.name() +
+                  ": its table, offset, direction or limits have changed since the array was "
+                  "checked; load it again");
+    }
+    const std::int64_t first = motion::nearest_step(array.rows.position(0, m));
+    if (motor.position_steps() == first) continue;
+    return fail(fmt::format("{} stands at {}, and the array begins at {}; move it there first",
+                            motor.name(), coordinates.text(motor.position_steps()),
+                            coordinates.text(first)));
+  }
+  return {};
+}
+
+void Arrays::run(std::int64_t now_us, const api::Asker& asker, const api::Follow& request) {
+  const auto found = find(asker, request.array);
+  if (found == arrays_.end()) {
+    return asker.answer(api::Refused{"no such array is loaded; tell its rows first"});
+  }
+  Array& array = *found;
+  if (const auto may = may_run(array); !may) return asker.answer(api::Refused{may.error().text()});
+  asker.answer(api::Accepted{});
+  array.followed = std::make_shared<Trajectory>(array.rows);
+  array.logged = journal_.array_begun(*array.followed, array.motors());
+  const std::vector<MotorId> motors = array.motors();
+  motion::Tick start = INT64_MIN;
+  for (const MotorId id : motors) {
+    start = std::max(start,
+                     installation_.mcu_of(id).earliest_start(now_us, installation_[id].output()));
+  }
+  open_.open(asker, motors, OpenMoves::Purpose::kFollow);
+  for (std::size_t m = 0; m < motors.size(); ++m) {
+    open_.planned(motors[m], 1, array.check->peak_steps_per_s(m));
+    installation_[motors[m]].follow(
+        {.number = array.logged, .trajectory = array.followed, .motor = m}, start);
+  }
+  moves_.begin_on_line(motors);
+}
+
+bool Arrays::follows(const Array& array, MotorId motor) const {
+  const motion::Motor& of = installation_[motor];
+  return of.follows() && of.axis().trajectory()->trajectory == array.followed;
+}
+
+void Arrays::step(std::int64_t now_us) {
+  now_us_ = now_us;
+  for (auto it = arrays_.begin(); it != arrays_.end();) {
+    const bool over = it->followed && !it->waits && !follow(now_us, *it);
+    it = over ? arrays_.erase(it) : std::next(it);
+  }
+}
+
+// Whatever ends one motor's part before the array ends acts on all. Returns false when none follows
+// it any more.
+bool Arrays::follow(std::int64_t now_us, Array& array) {
+  std::vector<MotorId> on;
+  std::optional<std::string> off;
+  for (const MotorId id : array.motors()) {
+    const motion::Motor& motor = installation_[id];
+    const Mcu& mcu = installation_.mcu_of(id);
+    if (!follows(array, id)) {
+      off = motor.name();
+      continue;
+    }
+    const motion::Moving& moving = *motor.moving();
+    const bool ends = motor.axis().stopping() || moving.limit != 0 || moving.faults != 0 ||
+                      moving.position_mismatch;
+    if (ends) off = motor.name();
+    const motion::Tick now = installation_.bus_of(mcu).master.tick_at(now_us);
+    if (!ends && motor.axis().trajectory_goes_on_after(now)) on.push_back(id);
+  }
+  const bool any =
+      std::ranges::any_of(array.motors(), [&](MotorId id) { return follows(array, id); });
+  if (!off || on.empty()) return any;
+  for (const MotorId id : on) {
+    open_.say(id, api::Outcome::kStopped,
+              {api::Outcome::kStopped, "ramped down by its table, because " + *off +
+                                           " does not follow the array any more"});
+  }
+  moves_.stop(now_us, on);
+  return any;
+}
+
+}  // namespace bushd::daemon

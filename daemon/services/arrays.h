@@ -1,0 +1,109 @@
+// Motors of one bus follow arrays of times and positions (motion/trajectory.h). Rows are checked
+// as they come, in slices: what motors can follow takes longer to find out than a request may.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/interlocks.h"
+#include "daemon/service.h"
+#include "daemon/services/journal.h"
+#include "daemon/services/moves.h"
+#include "daemon/services/open_moves.h"
+#include "motion/trajectory_check.h"
+
+namespace bushd::daemon {
+
+class Arrays final : public Service {
+ public:
+  // Of those that are loaded and do not run, the oldest one gives way to one more.
+  static constexpr std::size_t kMostLoaded = 8;
+
+  Arrays(Installation& installation, const Interlocks& interlocks, Journal& journal, Moves& moves,
+         OpenMoves& open_moves)
+      : installation_(installation),
+        interlocks_(interlocks),
+        journal_(journal),
+        moves_(moves),
+        open_(open_moves) {}
+
+  void request(std::int64_t now_us, const api::Asker& asker, const api::Follow& request);
+
+  bool idle() const { return jobs_.empty(); }
+  // One slice of the oldest check.
+  void work();
+  std::uint64_t units() const { return units_; }
+
+  void step(std::int64_t now_us) override;
+
+ private:
+  // Of a motor, when its array was begun: what the check goes by.
+  struct Part {
+    MotorId motor;
+    tables::TablePtr table;
+    units::Coordinates coordinates;
+    motion::TrajectoryCheck::Motor bounds;
+  };
+  struct Array {
+    std::string client;
+    std::int64_t number;
+    std::vector<Part> parts;
+    std::int64_t stretch_thousandths;
+    double first_s = 0;  // time of its first row
+    motion::Trajectory rows;
+    std::unique_ptr<motion::TrajectoryCheck> check;
+    bool waits = false;  // for a check
+    bool spoilt = false;
+    // From when it runs: the rows that have been checked.
+    std::shared_ptr<motion::Trajectory> followed;
+    std::uint64_t logged = 0;
+
+    std::vector<MotorId> motors() const;
+  };
+  // Rows of an array, to be checked, and then to be tried with longer times.
+  struct Job {
+    api::Asker asker;
+    std::list<Array>::iterator array;
+    std::unique_ptr<motion::Trajectory> longer;
+    std::unique_ptr<motion::TrajectoryCheck> check_of_longer;
+    std::int64_t thousandths = 1000;
+    int tries = 0;
+  };
+
+  std::list<Array>::iterator find(const api::Asker& asker, std::int64_t number);
+  Result<std::list<Array>::iterator> begin(const api::Asker& asker, const api::Follow& request);
+  Result<void> may_go_on(const Array& array, const api::Follow& request) const;
+  Result<void> has_time(std::int64_t now_us, const Array& array) const;
+  Result<void> take(Array& array, const api::Follow& request) const;
+  void take_rows(std::int64_t now_us, const api::Asker& asker, const api::Follow& request);
+  std::vector<motion::TrajectoryCheck::Motor> bounds_of(const Array& array) const;
+  std::uint32_t tick_ns_of(const Array& array) const;
+
+  void end_job(std::int64_t now_us);
+  bool try_longer(Job& job) const;
+  void accept_rows(Array& array);
+  std::string text_of(const Job& job) const;
+  api::MovePlan plan_of(const Array& array) const;
+
+  void run(std::int64_t now_us, const api::Asker& asker, const api::Follow& request);
+  Result<void> may_run(const Array& array) const;
+  bool follow(std::int64_t now_us, Array& array);
+  bool follows(const Array& array, MotorId motor) const;
+
+  Installation& installation_;
+  const Interlocks& interlocks_;
+  Journal& journal_;
+  Moves& moves_;
+  OpenMoves& open_;
+  std::list<Array> arrays_;  // the newest last
+  std::deque<Job> jobs_;
+  std::uint64_t units_ = 0;
+  std::int64_t now_us_ = 0;
+};
+
+}  // namespace bushd::daemon

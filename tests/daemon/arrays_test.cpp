@@ -1,0 +1,186 @@
+// Motors that follow arrays of times and positions, over the real firmware core: what is checked
+// and said beforehand, where they are at any time, and what ends one motor's part does to the
+// others.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Part = api::Follow::Part;
+
+const std::vector<std::string> kMotors{"m01", "m03"};  // of two MCUs
+
+api::Follow part_of(Part part, std::vector<double> time_s = {},
+                    std::vector<double> positions = {}) {
+  return {.part = part,
+          .array = 7,
+          .motors = kMotors,
+          .time_s = std::move(time_s),
+          .positions = std::move(positions)};
+}
+
+// To 120 and -60 steps and back, at up to 100 steps/s.
+api::Follow there_and_back(Part part = Part::kLastRows) {
+  return part_of(part, {0, 1.2, 1.7, 3.1}, {0, 0, 120, -60, 120, -60, 0, 0});
+}
+
+// Where m01 is to be.
+double expected(double s) {
+  if (s < 1.2) return 100 * s;
+  return s < 1.7 ? 120 : std::max(0.0, 120 - 120 / 1.4 * (s - 1.7));
+}
+
+class Arrays : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Format, Arrays, testing::Values("fine", "coarse"));
+
+TEST_P(Arrays, AllMotorsAreWhereTheRowsSayAtAnyTime) {
+  Lab lab(hall(2, 2, GetParam()));
+  lab.connect();
+  const Answer loaded = lab.wait(lab.send(there_and_back()));
+  EXPECT_EQ(loaded.result, "done") << loaded.reason;
+  EXPECT_EQ(loaded.reason, "4 rows can be followed");
+  ASSERT_TRUE(loaded.plan);
+  EXPECT_EQ(loaded.plan->duration_us, 3'100'000);
+  const auto run = lab.send(part_of(Part::kRun));
+  lab.run_until([&] { return lab.shaft_steps("m01") != 0; });
+  // Its first step is half a step's way after the beginning.
+  const double begun_s = static_cast<double>(lab.now_us()) * 1e-6 - 0.005;
+  double most = 0;
+  lab.run_until([&] {
+    const double s = static_cast<double>(lab.now_us()) * 1e-6 - begun_s;
+    most = std::max(most, std::abs(static_cast<double>(lab.shaft_steps("m01")) - expected(s)));
+    return lab.has_result(run);
+  });
+  // Half a step, and two ticks of 2.56 ms between MCU and bus.
+  EXPECT_LT(most, 1.3);
+  const Answer result = lab.last_reply(run);
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_THAT(result.position_steps, ElementsAre(0, 0));
+  EXPECT_EQ(lab.shaft_steps("m03"), 0);
+  for (const char* mcu : {"hall:1", "hall:2"}) {
+    EXPECT_EQ(lab.mcu_health(mcu).rejected_frames, 0u);
+    EXPECT_EQ(lab.mcu_health(mcu).ramp_downs, 0u);
+  }
+  EXPECT_THAT(lab.errors(), IsEmpty());
+}
+
+TEST(Array, WhatCannotBeFollowedIsNamedAndNothingMoves) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const Answer fast = lab.wait(lab.send(part_of(Part::kLastRows, {0, 1}, {0, 0, 20, 150})));
+  EXPECT_EQ(fast.result, "fault");
+  EXPECT_EQ(
+      fast.reason,
+      "row 1 (0 s): m03 is to change at once to 150 steps/s; allowed: 100 steps/s; with times "
+      "stretched by 1.500 all motors can follow it");
+  EXPECT_THAT(lab.wait(lab.send(part_of(Part::kRun))).reason, HasSubstr("no such array"));
+  auto stretched = part_of(Part::kLastRows, {0, 1}, {0, 0, 20, 150});
+  stretched.stretch = 1.5;
+  EXPECT_EQ(lab.wait(lab.send(stretched)).result, "done");
+  EXPECT_EQ(lab.shaft_steps("m03"), 0);
+}
+
+TEST(Array, RowsAreCheckedForWhatTheyAre) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto refusal = [&](const api::Follow& follow) {
+    const Answer answer = lab.wait(lab.send(follow));
+    EXPECT_EQ(answer.result, "refused");
+    return answer.reason;
+  };
+  EXPECT_EQ(refusal(part_of(Part::kRows, {0, 1}, {0, 0, 1})),
+            "3 positions are told for 2 rows of 2 motors");
+  EXPECT_EQ(refusal(part_of(Part::kRows, {0, 0}, {0, 0, 1, 1})),
+            "row 2: at 0 s, and not later than the row before");
+  EXPECT_THAT(refusal(part_of(Part::kRows, {0, std::nan("")}, {0, 0, 1, 1})),
+              HasSubstr("row 2: a"));
+  EXPECT_THAT(refusal(part_of(Part::kRows, {0, 1}, {0, 0, 1, HUGE_VAL})), HasSubstr("row 2: m03:"));
+  EXPECT_THAT(refusal(part_of(Part::kLastRows, {0}, {0, 0})), HasSubstr("two rows"));
+  auto stretch = there_and_back();
+  stretch.stretch = 0;
+  EXPECT_THAT(refusal(stretch), HasSubstr("stretched by 0"));
+}
+
+TEST(Array, MotorsStandAtTheFirstRow) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  lab.wait(lab.send(part_of(Part::kLastRows, {0, 1}, {3, 0, 10, 10})));
+  EXPECT_EQ(lab.wait(lab.send(part_of(Part::kRun))).reason,
+            "m01 stands at 0 steps, and the array begins at 3 steps; move it there first");
+}
+
+TEST(Array, RowsMayComeWhileItRunsAndAnOpenEndRampsDown) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(part_of(Part::kRows, {0, 1.5}, {0, 0, 120, 60}))).reason,
+            "2 rows can be followed so far");
+  const auto run = lab.send(part_of(Part::kRun));
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.wait(lab.send(part_of(Part::kRows, {3}, {240, 100}))).result, "done");
+  lab.run_for(2.35);
+  // Its queue is filled beyond the last row.
+  const Answer late = lab.wait(lab.send(part_of(Part::kRows, {4}, {300, 100})));
+  EXPECT_THAT(late.reason, HasSubstr("come too late"));
+  const Answer end = lab.wait(run);
+  EXPECT_EQ(end.result, "stopped");
+  EXPECT_THAT(end.reason, HasSubstr("no further rows of its array came; ramped down by its table"));
+  EXPECT_NEAR(static_cast<double>(end.position_steps[0]), 241, 1);
+  EXPECT_EQ(lab.shaft_steps("m01"), end.position_steps[0]);
+  EXPECT_THAT(lab.errors(), IsEmpty());
+}
+
+TEST(Array, AStopOfOneStopsAll) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  lab.wait(lab.send(there_and_back()));
+  const auto run = lab.send(part_of(Part::kRun));
+  lab.run_for(0.7);
+  EXPECT_THAT(lab.wait(lab.send(api::Pause{})).reason, HasSubstr("follows an array"));
+  EXPECT_THAT(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).reason,
+              HasSubstr("follows an array"));
+  lab.send(Ask::kStop, {"m03"});
+  const Answer end = lab.wait(run);
+  EXPECT_EQ(end.result, "stopped");
+  EXPECT_LT(lab.shaft_steps("m01"), 119);
+  EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
+  EXPECT_EQ(lab.shaft_steps("m03"), lab.motor("m03").position_steps);
+  EXPECT_THAT(lab.errors(), IsEmpty());
+}
+
+TEST(Array, ALostMcuRampsDownTheOthers) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  lab.wait(lab.send(there_and_back()));
+  const auto run = lab.send(part_of(Part::kRun));
+  lab.run_for(0.7);
+  lab.bus(0).reboot(1, 2'000'000'000);
+  const Answer end = lab.wait(run);
+  EXPECT_THAT(end.motor_results, ElementsAre("stopped", "link"));
+  EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
+  EXPECT_LT(lab.shaft_steps("m01"), 119);
+}
+
+TEST(Array, AnEmergencyStopEndsIt) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  lab.wait(lab.send(there_and_back()));
+  const auto run = lab.send(part_of(Part::kRun));
+  lab.run_for(0.7);
+  lab.wait(lab.send(Ask::kEmergencyStop, {}));
+  EXPECT_EQ(lab.wait(run).result, "stopped");
+  EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
+  EXPECT_EQ(lab.shaft_steps("m03"), lab.motor("m03").position_steps);
+}
+
+}  // namespace
+}  // namespace bushd::test
