@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -140,6 +141,57 @@ TEST(Paths, ALimitOfOneRampsTheOthersDownAlongIt) {
   EXPECT_THAT(result.reason, HasSubstr("m01: stopped by its limit switch at the positive end"));
   EXPECT_LT(off_path(lab, {"m02"}, {2000}), 0.75);
   EXPECT_LT(lab.shaft_steps("m02"), 1500);
+}
+
+// Frames are lost: those that have stopped earlier than others catch up when they are resumed, and
+// what is told is where motors stand.
+TEST(Paths, WhatIsToldIsTrueOnABadLine) {
+  const std::vector<std::string> motors{"m01", "m02", "m03", "m04", "m05"};
+  std::vector<double> points;
+  for (int i = 1; i <= 40; ++i) {
+    points.insert(points.end(), {i * 200.0, std::round(1500 * std::sin(i * 0.4)), i * -120.0,
+                                 std::round(600 * std::cos(i * 0.2)) - 600, 7});
+  }
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE(seed);
+    Lab lab(hall(3, 2));
+    lab.connect();
+    std::mt19937 random(seed);
+    lab.on_send = [&random](std::size_t, std::vector<std::uint8_t>&) { return random() % 12 != 0; };
+    const auto move = lab.send(path_of(motors, points));
+    for (unsigned pause = 0; pause < seed % 3; ++pause) {
+      lab.run_for(0.5 + 0.1 * static_cast<double>(seed));
+      lab.wait(lab.send(api::Pause{{"m02"}}));
+      lab.wait(lab.send(api::Resume{}));
+    }
+    lab.run_for(0.6);
+    if (seed % 2 == 0) lab.send(Ask::kStop, {"m05"});
+    const Answer result = lab.wait(move);
+    lab.run_for(1);
+    const bool off = result.reason.find("steps off it") != std::string::npos;
+    EXPECT_TRUE(result.result == "stopped" || result.result == "link" || result.result == "reached")
+        << result.reason;
+    if (result.result != "link") {
+      EXPECT_EQ(off_path(lab, motors, points) > 0.8, off) << result.reason;
+    }
+    if (result.result == "reached") {
+      EXPECT_THAT(result.position_steps, ElementsAre(8000, -432, -4800, -687, 7));
+    }
+    for (const std::string& motor : motors) {
+      EXPECT_EQ(lab.shaft_steps(motor), lab.motor(motor).position_steps);
+    }
+  }
+}
+
+TEST(Paths, AStopBeforeTheStartMovesNothing) {
+  Lab lab(hall(2, 2));
+  lab.connect();
+  const auto move = lab.send(path_of(kMotors, kPoints));
+  lab.run_for(0.005);
+  lab.wait(lab.send(api::Stop{{"m01"}}));
+  EXPECT_EQ(lab.wait(move).result, "stopped");
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
 TEST(Paths, PointsComeInSeveralRequests) {

@@ -73,7 +73,9 @@ void add_path_commands(CommandLine& line) {
   line.add_group("path", "Move motors along a path of points");
   const auto checked = std::make_shared<Options>();
   Command check_command = line.add(
-      "check", "Say how long a path takes and when each point is reached; moves nothing", "path");
+      "check",
+      "Say how long a path takes, with --json also when each point is reached; moves nothing",
+      "path");
   describe(check_command, checked)
       .flag("--json", &checked->json, "Print JSON")
       .run([&line, checked] { return check(line.connection(), *checked); });
