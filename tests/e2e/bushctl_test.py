@@ -1,6 +1,8 @@
 """bushctl and the example clients against the real daemon."""
 
 import json
+import math
+import re
 import signal
 import sys
 import unittest
@@ -84,6 +86,27 @@ class Bushctl(EndToEndTest):
         self.assertEqual(move.end(signal.SIGINT), 130)
         self.assertIn("the path has ended, which was left at", move.said())
         self.assertEqual(self.motors()["a0"]["position_steps"], -self.motors()["b0"]["position_steps"])
+
+    def test_a_path_is_what_comes_out_of_the_pins(self):
+        self.bring_up()
+        path = self.file("path.csv")
+        rows = [f"{round(300 * math.sin(i / 8))},{round(150 - 150 * math.cos(i / 8))},{2 * i}" for i in range(1, 60)]
+        path.write_text("\n".join(["a0,b0,b1", *rows, "0,0,0"]))
+        move = self.start_bushctl("path", "run", "--wait", path)
+        self.wait_until_travelled(200, "a0")
+        self.command("pause")
+        self.command("resume")
+        self.assertEqual(move.process.wait(), 0, move.said())
+        status = self.status()
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        self.file("status.json").write_text(json.dumps(status))
+        command = [sys.executable, "-B", TOP / "tools" / "check-trace", "--moves", self.file("moves.jsonl"), "--path", path]
+        ran = self.run_program(*command, "--trace", self.file("trace.vcd"), "--positions", self.file("status.json"))
+        self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
+        judged = re.search(r"(\d+) of (\d+) edges of 3 motors", ran.stdout)
+        self.assertEqual(judged[1], judged[2])
+        self.assertGreater(int(judged[1]), 2000)
 
     def test_ctrl_c_ramps_down_and_says_where_motors_stand(self):
         self.bring_up()

@@ -1,14 +1,15 @@
-"""Paths, judged by what comes out of the pins: the file of points, the tables and the edges, and nothing of how the run was planned.
+"""Paths, judged by what comes out of the pins: the file of points, the tables and the edges, and nothing of how the run was
+planned.
 
-On a segment of L steps of the longest motor, a motor with N steps makes its step j when the run is at s = (j - 1/2) L / N + 1/2 of it.
-So every edge says where the run is. It is asked
+On a segment of L steps of the longest motor, a motor with N steps makes its step j when the run is at s = (j - 1/2) L / N + 1/2
+of it. So every edge says where the run is. It is asked
 
-- that each motor makes the steps of its points, in their order; where it turns round a step and the same step back may be left out, for a tick says
-  only where it ends;
-- that the edges of all motors, put in the order of their s, are in the order of time, to two ticks: one for each of two edges. Positions are then
-  within half a step of one point of the path, and what a tick is off its run;
-- that a motor takes no less time for 1, 4, 16 and 64 steps than its table has for them, to two ticks: of the interval before a step that follows i
-  others since the motor stood or turned round, and that k follow until it does, max(A(i), D(k), c, floor).
+- that each motor makes the steps of its points, in their order; where it turns round a step and the same step back may be left
+  out, for a tick says only where it ends;
+- that the edges of all motors, put in the order of their s, are in the order of time, to two ticks: one for each of two edges.
+  Positions are then within half a step of one point of the path, and what a tick is off its run;
+- that a motor takes no less time for 1, 4, 16 and 64 steps than its table has for them, to two ticks: of the interval before a
+  step that follows i others since the motor stood or turned round, and that k follow until it does, max(A(i), D(k), c, floor).
 
 In the coarse format a step is made with the next one of the run, so that s is a whole number, and intervals are not judged.
 A run may be paused and go on anywhere, and end anywhere.
