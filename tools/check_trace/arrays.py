@@ -74,6 +74,8 @@ class Array:
 class ArrayMove(Move):
     """One motor's way along an array, and by its table to rest where that ends in motion, or is stopped."""
 
+    turns = True
+
     def __init__(self, event, table, array):
         self._array = array
         self._column = event["array"]["column"]
