@@ -74,6 +74,8 @@ class Array:
 class ArrayMove(Move):
     """One motor's way along an array, and by its table to rest where that ends in motion, or is stopped."""
 
+    turns = True
+
     def __init__(self, event, table, array):
         self._array = array
         self._column = event["array"]["column"]
@@ -149,7 +151,9 @@ class ArrayMove(Move):
             steps = int((parts - 256 * made) / 256)
             made += steps
             fastest = abs(way) if steps or turns else max(fastest, abs(way))
-            yield Tick(parts if self.fine else 256 * made, direction, row, over, turns or lags)
+            # The way to its last step is cut off there: as of any move, it comes with the end of its tick.
+            last = over or (rests and row + 1 == known and told == rest)
+            yield Tick(parts if self.fine else 256 * made, direction, row, last, turns or lags)
             tick += 1
         else:
             return

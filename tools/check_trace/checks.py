@@ -112,8 +112,10 @@ class MotorCheck:
 
     def _check_limited(self, move, steps, edges):
         made = move.direction * (move.result_steps - move.from_steps)
-        if made != len(edges):
-            text = f"move {move.id} is said to have made {made} steps until its limit, its edges are {len(edges)}"
+        # Along an array it may have turned round.
+        seen = move.direction * sum(1 if edge.direction else -1 for edge in edges) if move.turns else len(edges)
+        if made != seen:
+            text = f"move {move.id} is said to have made {made} steps until its limit, its edges are {seen}"
             self._problems.add(self._motor, "position", text)
         planned = 0
         for step, edge in zip(steps, edges):
@@ -125,9 +127,9 @@ class MotorCheck:
             planned += 1
         ramp = edges[planned:]
         for edge in ramp:
-            self._check_other(edge, f"an edge of the ramp of move {move.id}", move.direction)
+            self._check_other(edge, f"an edge of the ramp of move {move.id}", None if move.turns else move.direction)
         # In the coarse format an MCU takes its speed from the steps of a few ticks.
-        running = move.delays[max(planned - 1, 0)] if move.delays else move.table.cruise
+        running = move.delays[max(planned - 1, 0)] if move.delays and not move.turns else move.table.cruise
         unsure = 3 * move.tick_ns // (running * move.table.unit_ns) + 2
         most = len(move.table.ramp_down(running)) + unsure
         if len(ramp) > most:

@@ -114,6 +114,8 @@ class Plan:
 
 
 class Move:
+    turns = False  # its steps are all in one direction
+
     def __init__(self, event, table):
         self.id = event["id"]
         self.tick_ns = event["tick_ns"]
