@@ -113,7 +113,7 @@ move_path_t to_message(const api::MovePath& path) {
   put_speed(message, path.speed);
   put_motors(message, path.motors);
   message.positions = path.positions;
-  message.value_count = count(path.positions);
+  message.position_count = count(path.positions);
   message.speeds = path.speeds;
   message.speed_count = count(path.speeds);
   return message;

@@ -141,7 +141,8 @@ bool counts_match(const T& message) {
   BUSHD_COUNTED(motor_count, motor_duration_us);
   BUSHD_COUNTED(motor_count, peak_steps_per_s);
   BUSHD_COUNTED(point_count, points_us);
-  BUSHD_COUNTED(value_count, positions);
+  BUSHD_COUNTED(row_count, time_s);
+  BUSHD_COUNTED(position_count, positions);
   BUSHD_COUNTED(speed_count, speeds);
   BUSHD_COUNTED(entry_count, entries);
   BUSHD_COUNTED(table_count, tables);
