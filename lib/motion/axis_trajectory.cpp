@@ -113,7 +113,8 @@ void Axis::follow_trajectory(Place& place, std::size_t ticks, std::int16_t* out,
 // after this moment: a ramp-down from it is not too short. 0: it stands, or all but.
 std::uint16_t Axis::delay_on_trajectory(const Place& place) const {
   const Follower& now = place.follower;
-  Position way = now.fastest_way();
+  // One that has all but come to rest since goes no faster than twice as it does.
+  Position way = std::min(now.fastest_way(), 2 * now.last_way());
   Follower later = now;
   const bool goes_on = !now.rests() && later.next(rests_at_end_);
   if (goes_on && (now.direction() == 0 || later.direction() == now.direction())) {

@@ -38,15 +38,19 @@ std::uint32_t codes_from(const bushd_ramp& ramp, double delay_ns, double unit_ns
 }
 
 // The delay that a side has one index beyond the place of this one, which may lie between two
-// codes: there the squares of speeds are, as of steady acceleration. Slower ones are as the first
-// code.
-double next_delay(const bushd_ramp& ramp, std::uint16_t cruise, double delay_ns, double unit_ns) {
+// codes: there the squares of speeds are, as of steady acceleration. Slower ones are rest, beyond
+// which is the index `first`.
+double next_delay(const bushd_ramp& ramp, std::uint16_t cruise, double delay_ns, double unit_ns,
+                  std::uint32_t first) {
   const auto code_ns = [&](std::uint32_t i) {
     return (i < ramp.count ? std::max(ramp.code[i], cruise) : cruise) * unit_ns;
   };
   const std::uint32_t passed = codes_from(ramp, delay_ns, unit_ns);
-  if (passed == 0) return code_ns(1);
   const auto square = [](double ns) { return 1 / (ns * ns); };
+  if (passed == 0) {
+    const double share = first == 1 ? 1 : square(delay_ns) / square(code_ns(0));
+    return 1 / std::sqrt(square(code_ns(0)) + share * (square(code_ns(1)) - square(code_ns(0))));
+  }
   const double before = square(code_ns(passed - 1));
   const double after = square(code_ns(passed));
   if (after <= before) return code_ns(passed);
@@ -185,7 +189,7 @@ void TrajectoryCheck::judge_speed(std::size_t m) {
   const double before = rested || watched.delays.empty() ? 1e18 : watched.delays.back();
   const auto allowed = [&](double factor) {
     return std::max({bushd_table_accel(&table, steps) * unit, least_delay_ns(watched.motor),
-                     next_delay(table.accel, table.cruise, before * factor, unit)});
+                     next_delay(table.accel, table.cruise, before * factor, unit, 1)});
   };
   if (!is_short(delay_ns, allowed(1))) return;
   find(follower.row() + 1, m, Fault::kSpeedUp, 1e9 / delay_ns, 1e9 / allowed(1),
@@ -280,7 +284,7 @@ void TrajectoryCheck::judge(std::size_t m, double delay_ns) {
   const auto steps = static_cast<std::uint32_t>(watched.delays.size()) + 1;
   const auto up = [&](double factor) {
     return std::max(bushd_table_accel(&table, steps) * unit,
-                    next_delay(table.accel, table.cruise, before * factor, unit));
+                    next_delay(table.accel, table.cruise, before * factor, unit, 1));
   };
   const double at_least = static_cast<double>(stretch_) / 1000;
   if (is_short(delay_ns, up(1))) {
@@ -288,13 +292,13 @@ void TrajectoryCheck::judge(std::size_t m, double delay_ns) {
          stretch_for(delay_ns, at_least, slowest, up));
   }
   const auto down = [&](double factor) {
-    return next_delay(table.decel, table.cruise, delay_ns * factor, unit);
+    return next_delay(table.decel, table.cruise, delay_ns * factor, unit, 0);
   };
   if (!watched.delays.empty() && is_short(before, down(1))) {
     find(row, m, Fault::kSlowDown, 1e9 / before, 1e9 / down(1),
          stretch_for(before, at_least, slowest, down));
   }
-  if (delay_ns >= slowest) return rest(m, 1);
+  if (delay_ns >= slowest) return rest(m, delay_ns < 2 * slowest ? 1 : 0);
   watched.delays.push_back(delay_ns);
 }
 

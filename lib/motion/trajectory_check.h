@@ -5,7 +5,8 @@
 //
 //     every delay >= c, and >= the floor of the motor's max_speed
 //     delay j after rest >= A(j), j = 1, 2 ...; delay i before rest >= D(i), i = 0, 1 ..., where a
-//     delay as long as A(0) and D(0) is one that begins and ends a motion
+//     delay as long as A(0) and D(0) begins and ends a motion: as one of them while it is less
+//     than twice as long, beyond that as rest
 //     after a delay x, no shorter than what A has one index beyond the place of x
 //     before a delay y, no shorter than what D has one index beyond the place of y
 //

@@ -122,7 +122,11 @@ class Trace : public testing::TestWithParam<Manner> {
     std::int64_t array = 0;
     using Part = api::Follow::Part;
     const auto rows = [&](Part part, bool cubic, const std::vector<std::vector<double>>& all) {
-      api::Follow follow{.part = part, .array = array, .motors = motors, .cubic = cubic};
+      api::Follow follow{.part = part,
+                         .array = array,
+                         .motors = motors,
+                         .cubic = cubic,
+                         .stretch = cubic ? 1.1 : 1};
       for (const auto& row : all) {
         follow.time_s.push_back(row.front());
         for (std::size_t m = 0; m < motors.size(); ++m) {

@@ -121,7 +121,7 @@ class ArrayMove(Move):
         told = (at + STEP // 2) // STEP * STEP
         made = told // STEP
         least = min(self.tick_ns * STEP // (2 * self.table.accel[0] * self.table.unit_ns), STEP)
-        direction = row = fastest = tick = 0
+        direction = row = fastest = tick = way = 0
         over = False
         while not (over and told == rest):
             time_ns = (tick + 1) * self.tick_ns
@@ -159,7 +159,7 @@ class ArrayMove(Move):
             return
         if self._stop is not None and self._stop <= self.start_tick:
             return
-        yield from self._ramp(tick, row, at, told, made, direction, fastest)
+        yield from self._ramp(tick, row, at, told, made, direction, min(fastest, 2 * abs(way)))
 
     def _ramp(self, tick, row, at, told, made, direction, fastest):
         """As if its MCU heard no more: the running step, as fast as it was anywhere, and the fewest that follow."""
@@ -298,7 +298,7 @@ class ArrayMove(Move):
                 continue
             rests = run and (direction != run[-1][2] or due - run[-1][1] >= slowest_ns)
             if rests:
-                found = judge(True, 0 if direction != run[-1][2] else 1)
+                found = judge(True, 1 if direction == run[-1][2] and due - run[-1][1] < 2 * slowest_ns else 0)
                 if found is not None:
                     return found
                 run.clear()
