@@ -197,7 +197,7 @@ bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
     const Mcu& mcu = installation_[id];
     const bool has_other = std::ranges::any_of(mcu.motors(), [&](MotorId motor) {
       const auto* other = installation_[motor].as<motion::OnLine>();
-      return other != nullptr && other->line != number &&
+      return other != nullptr && other->line != number && installation_[motor].axis().line() &&
              installation_[motor].axis().line()->in_mcus;
     });
     return mcu.can_run_lines() && !has_other && mcu.has_table(table);

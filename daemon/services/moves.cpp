@@ -221,13 +221,12 @@ void Moves::start_leg(std::int64_t now_us, MotorId id) {
 void Moves::begin_on_line(const std::vector<MotorId>& motors) {
   for (const MotorId id : motors) {
     const motion::Axis& axis = installation_[id].axis();
-    const motion::LineShare& share = *axis.line();
-    journal_.started(id, axis.target_steps() - axis.from_steps(), axis.start_tick(), 0,
-                     share.in_mcus);
+    const bool in_mcus = axis.line() && axis.line()->in_mcus;
+    journal_.started(id, axis.target_steps() - axis.from_steps(), axis.start_tick(), 0, in_mcus);
     // One that makes no step of it only waits.
     if (axis.end_tick() <= axis.start_tick()) continue;
     Mcu& mcu = installation_.mcu_of(id);
-    if (share.in_mcus) {
+    if (in_mcus) {
       mcu.begin_line_run(installation_[id].output(), axis);
     } else {
       mcu.begin(installation_[id].output(), axis.start_tick());
