@@ -182,11 +182,14 @@ void AvrMemoryWatch::read(std::uint16_t address) {
           " through a pointer");
 }
 
-// A function makes its frame by OUT, the high byte first. PUSH and CALL write what they take.
+// A function makes its frame by OUT, the high byte first. PUSH and CALL write what they take. A
+// reset sets the stack pointer, too, after all registers were cleared, whatever the instruction
+// was.
 void AvrMemoryWatch::stack_pointer(std::uint16_t address, std::uint8_t value) {
   if (in_main_ && address == R_SPH && is_out(opcode(), R_SPH)) frame_top_ = stack_pointer();
   avr_->data[address] = value;
   if (!in_main_ || address != R_SPL || !is_out(opcode(), R_SPL)) return;
+  if (avr_->data[opcode() >> 4 & 0x1Fu] != value) return;
   for (std::uint16_t at = frame_top_; at > stack_pointer() && !violation_; --at) {
     check_stack(at);
     avr_->data[at] = kNeverWritten;
