@@ -177,12 +177,7 @@ void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_
   if (on_path()) return follow_path(place, ticks, out, stride);
   for (std::size_t done = 0; done < ticks; done += kBlock) {
     const std::size_t n = std::min(kBlock, ticks - done);
-    std::int16_t* to = out + done * stride;
-    if (follows_between_steps()) {
-      follow_between_steps(place, n, to, stride);
-    } else {
-      follow_steps(place, n, to, stride);
-    }
+    follow_line(place, n, out + done * stride, stride);
   }
 }
 
@@ -190,8 +185,8 @@ void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_
 // times N / L, each tick from the beginning of the block. The motor comes to rest on a
 // whole step, so it goes no farther than that. If a change has made that the step it has begun, it
 // goes back by the part of it that it has been told.
-void Axis::follow_between_steps(Place& place, std::size_t ticks, std::int16_t* out,
-                                std::size_t stride) const {
+void Axis::follow_line(Place& place, std::size_t ticks, std::int16_t* out,
+                       std::size_t stride) const {
   std::array<std::int16_t, kBlock> run_ticks;
   const std::uint32_t run_end = place.run.steps_done + bushd_run_steps_left(&place.run);
   const std::int64_t rest_256 = line_steps(run_end) * 256;
@@ -218,25 +213,6 @@ void Axis::follow_between_steps(Place& place, std::size_t ticks, std::int16_t* o
     out[i * stride] = fine() ? static_cast<std::int16_t>(moved_256 * share_->direction)
                              : coarse_of(static_cast<unsigned>(moved_256 / 256));
   }
-}
-
-void Axis::follow_steps(Place& place, std::size_t ticks, std::int16_t* out,
-                        std::size_t stride) const {
-  std::array<std::uint8_t, kBlock> run_ticks;
-  bushd_run_expand_coarse(&place.run, tick_ns_, ticks, run_ticks.data(), 1);
-  const std::uint64_t increment = place.line.increment;
-  std::uint64_t way = place.line.value;
-  std::uint64_t made = 0;
-  for (std::size_t i = 0; i < ticks; ++i) {
-    way += increment * (run_ticks[i] & 0x7Fu);
-    const std::uint64_t made_by_now = share_by_.quotient(way);
-    const std::uint64_t steps = made_by_now - made;
-    made = made_by_now;
-    out[i * stride] = coarse_of(static_cast<unsigned>(steps));
-  }
-  place.line.value = static_cast<std::uint32_t>(way - made * place.line.longest);
-  place.line.made += static_cast<std::uint32_t>(made);
-  place.told_256 += static_cast<std::int64_t>(made) * 256;
 }
 
 // The delay of the motor's running step, in units of its own table. Of a share: as the run goes
@@ -322,7 +298,7 @@ Tick Axis::end_of(const Place& place) const {
 }
 
 // Of a share: first tick after the motor's last step, before the run's own end if the motor makes
-// none of its last ones. The position that follow_between_steps tells reaches the last step in the
+// none of its last ones. The position that follow_line tells reaches the last step in the
 // tick in which the run reaches `crossing`/256 of the step `last` of the line.
 Tick Axis::own_end_of(const Place& place) const {
   const std::uint32_t left = bushd_run_steps_left(&place.run);
@@ -333,7 +309,7 @@ Tick Axis::own_end_of(const Place& place) const {
   if (place.told_256 >= rest_256) return place.tick + (place.told_256 > rest_256 ? 1 : 0);
   const std::uint32_t last = bushd_line_run_step(&line, line.made);
   bushd_line_go_to(&line, last - 1);
-  const std::int64_t crossing = follows_between_steps() ? bushd_line_crossing(&line) : 256;
+  const std::int64_t crossing = bushd_line_crossing(&line);
   const std::uint64_t before = bushd_run_units_of_last(&place.run, run_end - last + 1);
   const std::uint64_t after = bushd_run_units_of_last(&place.run, run_end - last);
   const std::int64_t unit_ns = run_table().time_unit_ns;

@@ -56,8 +56,7 @@ struct LineShare {
   // This run's part of the line, by its steps.
   std::uint32_t from = 0;
   std::uint32_t to = 0;
-  // The MCUs make the run themselves (LINE_RUN). Then coarse ticks, too, have the steps that fall
-  // between those of the run.
+  // The MCUs make the run themselves (LINE_RUN).
   bool in_mcus = false;
 };
 
@@ -229,10 +228,7 @@ class Axis {
   void expand_run(bushd_run& run, bool fine, std::size_t ticks, std::int16_t* out,
                   std::size_t stride) const;
   bool fine() const { return format_ == BUSHD_FORMAT_FINE; }
-  bool follows_between_steps() const { return fine() || share_->in_mcus; }
-  void follow_between_steps(Place& place, std::size_t ticks, std::int16_t* out,
-                            std::size_t stride) const;
-  void follow_steps(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  void follow_line(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
   // As a byte of coarse displacements, of a line's motor.
   std::int16_t coarse_of(unsigned steps) const {
     return static_cast<std::int16_t>(

@@ -31,7 +31,6 @@ struct Line {
   bushd_format format = BUSHD_FORMAT_FINE;
 
   // Of the run's position the part of a step counts too.
-  bool between_steps() const { return format == BUSHD_FORMAT_FINE || share.in_mcus; }
   const bushd_table& own() const { return *tables.back()->view(); }
   // The envelope as the reference has tables.
   Law law() const {
@@ -90,9 +89,6 @@ std::int64_t made_at(const LineShare& share, std::uint32_t step) {
 std::int64_t place_at(const Line& line, std::int64_t run_256, std::int64_t rest_256) {
   const Wide n = line.share.increment;
   const Wide l = line.share.longest;
-  if (!line.between_steps()) {
-    return made_at(line.share, line.share.from + static_cast<std::uint32_t>(run_256 / 256)) * 256;
-  }
   const Wide x = Wide{line.share.from} * 256 + run_256;
   const Wide ruled = (2 * n * x + 256 * (l - n)) / (2 * l);
   const Wide rising = 2 * n * x / l;
@@ -161,9 +157,7 @@ TEST(LineOfAnAxis, EveryTickIsWhereTheLineIs) {
         const Reference plain = Reference::move(law, run_steps, line.floor);
         const Reference& now = changed ? run : plain;
         const std::int64_t whole_rest = made_at(line.share, line.share.to);
-        const std::int64_t position = line.between_steps()
-                                          ? now.position_at(ns)
-                                          : static_cast<std::int64_t>(now.steps_at(ns)) * 256;
+        const std::int64_t position = now.position_at(ns);
         const std::int64_t ruled =
             tick <= start ? from * 256
                           : place_at(line, position, (changed ? rest : whole_rest) * 256);

@@ -2,9 +2,9 @@
 motor makes of it.
 
 A motor with N of the line's L steps makes its step j when the run is at s = (j - 1/2) L / N + 1/2, of which the steps of
-the run are s = 1, 2, ... L, and between two of them the run goes evenly. In the coarse format it makes it with the
-next step of the run; but an MCU that makes the run itself ("moves": "table") makes it between them, in the slot in which
-s lies, rounded up to 1/256, until the first change. The table of the line has, with r = N / L, all rounded up,
+the run are s = 1, 2, ... L, and between two of them the run goes evenly. An MCU that makes the run itself ("moves":
+"table") makes it in the slot in which s lies, rounded up to 1/256, until the first change. The table of the line has, with
+r = N / L, all rounded up,
 
     A(k) = max r A_i(floor(r k)),  D(k) = max r D_i(k) for r = 1, else r D_i(max(0, floor(r k) - 1)),  c = max r c_i.
 
@@ -151,8 +151,6 @@ class LineMove(Move):
         self._run = Run(envelope, line["to"] - self._from, event.get("floor", 0))
         self._envelope = envelope
         super().__init__({**event, "floor": 0}, table)
-        # Its steps fall between those of the run, too.
-        self._between = self.fine or self.ticks_from == math.inf
         self.direction = self._line_direction
         self._rests = [(-1, self._rest())]  # from which tick of the move on, where it will rest, in steps of the line
         self._known = None
@@ -198,8 +196,6 @@ class LineMove(Move):
         whole = 2 * self._increment
         for j in range(self._made(self._from) + 1, self._rest() + 1):
             s = (2 * j - 1) * self._longest + self._increment - whole * self._from
-            if not self._between:
-                s = up(s, whole) * whole
             before, rest = divmod(s, whole)
             units = ends[before] * whole
             if rest > 0:
@@ -238,8 +234,6 @@ class LineMove(Move):
         rest = next(rest for since, rest in reversed(self._rests) if tick >= since)
         run = bisect.bisect_right(self._run.ends, at_ns // self._envelope.unit_ns)
         s = self._from + run
-        if not self._between:
-            return 256 * min(self._made(s), rest)
         part = 0
         if run < len(self._run.delays):
             since_ns = at_ns - (self._run.ends[run - 1] if run else 0) * self._envelope.unit_ns
@@ -297,8 +291,8 @@ class LineMove(Move):
             tick += 1
 
     def _bound_ns(self, tick, place, displacement, slots):
-        """As of any move (motion.py), with the share of the run's speed. Two numbers are rounded down, the run's position and
-        the motor's; in the coarse format the run's is a whole step of it."""
+        """As of any move (motion.py), with the share of the run's speed. Two numbers are rounded down to 1/256 step, the run's
+        position and the motor's; in the coarse format the motor's to a whole step, which is half a step from the middle."""
         if self.emission in ("burst", "common-dir", "staggered") or place == FIRST_TICK:
             return self.tick_ns
         unit_ns = self._envelope.unit_ns
@@ -308,5 +302,5 @@ class LineMove(Move):
         share = self._increment / self._longest
         vmax = share / (min(delays) * unit_ns)
         vmin = 0 if place == LAST_TICK else share / (max(delays) * unit_ns)
-        off_steps = (vmax - vmin) * self.tick_ns / 4 + (2 / 256 if self.fine else 1 / 2 + share)
+        off_steps = (vmax - vmin) * self.tick_ns / 4 + (2 / 256 if self.fine else 1 / 2 + 2 / 256)
         return min(self.tick_ns, 256 * self.tick_ns / displacement * off_steps + self.tick_ns / slots)
