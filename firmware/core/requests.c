@@ -252,26 +252,27 @@ static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_
 
 // What a frame of this type asks for is beyond the port. Modes of emission have statuses of their
 // own.
-static bool is_disabled(const bushd_mcu* mcu, uint8_t type) {
+// Without which an MCU does not know such a message; 0: every MCU does.
+static uint16_t capability_of(uint8_t type) {
   switch (type) {
     case BUSHD_MSG_TABLE_TICKS:
-      return (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
+      return BUSHD_CAN_TABLE_TICKS;
     case BUSHD_MSG_TABLE_RUN:
-      return (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_RUN) != 0;
+      return BUSHD_CAN_TABLE_RUN;
     case BUSHD_MSG_HOME:
-      return (mcu->config.disabled_capabilities & BUSHD_CAN_HOME) != 0;
+      return BUSHD_CAN_HOME;
     case BUSHD_MSG_LOCAL:
-      return (mcu->config.disabled_capabilities & BUSHD_CAN_LOCAL) != 0;
+      return BUSHD_CAN_LOCAL;
     case BUSHD_MSG_POSITION_COMPARE:
-      return (mcu->config.disabled_capabilities & BUSHD_CAN_POSITION_COMPARE) != 0;
+      return BUSHD_CAN_POSITION_COMPARE;
     case BUSHD_MSG_TRAVEL:
-      return (mcu->config.disabled_capabilities & BUSHD_CAN_TRAVEL) != 0;
+      return BUSHD_CAN_TRAVEL;
     case BUSHD_MSG_MOTOR_INPUTS:
-      return (mcu->config.disabled_capabilities & BUSHD_CAN_MOTOR_INPUTS) != 0;
+      return BUSHD_CAN_MOTOR_INPUTS;
     case BUSHD_MSG_LINE_RUN:
-      return (mcu->config.disabled_capabilities & BUSHD_CAN_LINE_RUN) != 0;
+      return BUSHD_CAN_LINE_RUN;
     default:
-      return false;
+      return 0;
   }
 }
 
@@ -341,9 +342,9 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   a.size = 0;
   // The frame may lie in the same buffer (bushd_mcu_config.reply): it is read by then.
   a.payload = mcu->config.reply + 2 + BUSHD_FRAME_HEADER;
-  const bushd_status status = is_disabled(mcu, frame->type)
-                                  ? BUSHD_E_UNKNOWN_MESSAGE
-                                  : handle(mcu, frame, time_in_tick_ns, &a);
+  const bool denied = (capability_of(frame->type) & mcu->config.disabled_capabilities) != 0;
+  const bushd_status status =
+      denied ? BUSHD_E_UNKNOWN_MESSAGE : handle(mcu, frame, time_in_tick_ns, &a);
   // Ticks look to it themselves; these two change nothing that it tells.
   if (frame->type != BUSHD_MSG_TICKS && frame->type != BUSHD_MSG_POLL &&
       frame->type != BUSHD_MSG_SYNC) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #ifdef AVR_IMAGES
 #include "sim_avr/avr_mcu.h"
 #endif
@@ -98,6 +100,14 @@ Target target(const char* name) {
   return {name, [] { return std::make_unique<Kind>(); }};
 }
 
+std::vector<Target> those_that_deny(std::uint16_t capability, bool deny) {
+  std::vector<Target> those = targets();
+  std::erase_if(those, [=](const Target& target) {
+    return ((target.make()->disabled_capabilities() & capability) != 0) != deny;
+  });
+  return those;
+}
+
 }  // namespace
 
 std::vector<Target> targets() {
@@ -109,6 +119,14 @@ std::vector<Target> targets() {
       target<Lm3s6965>("Lm3s6965"),
 #endif
   };
+}
+
+std::vector<Target> targets_with(std::uint16_t capability) {
+  return those_that_deny(capability, false);
+}
+
+std::vector<Target> targets_without(std::uint16_t capability) {
+  return those_that_deny(capability, true);
 }
 
 }  // namespace bushd::sim

@@ -4,35 +4,15 @@
 #include <cstdint>
 
 #include "engine/line.h"
+#include "engine/line_motor.h"
 #include "engine/properties.h"
 
 namespace bushd::test {
 namespace {
 
-constexpr uint32_t kLongest = 2147483647;
-
-// Few steps, where all borders are near, and as many as there may be.
-struct Motor {
-  uint32_t increment;
-  uint32_t longest;
-};
-Motor any_motor() {
-  const auto longest =
-      between<uint32_t>(1, *rc::gen::element<uint32_t>(1, 2, 5, 40, 1000, 1'000'000, kLongest));
-  switch (between(0, 3)) {
-    case 0:
-      return {*rc::gen::element<uint32_t>(1, longest, std::max(1u, longest - 1)), longest};
-    case 1:
-      return {between<uint32_t>(1, std::min<uint32_t>(longest, 7)), longest};
-    default:
-      return {between<uint32_t>(1, longest), longest};
-  }
-}
-
-// As an MCU asks it, tick by tick: at any places that do not go back.
 TEST(LineFollower, IsWhereTheLineIs) {
   holds("steps made and position are those of bushd_line_position", [] {
-    const Motor motor = any_motor();
+    const LineMotor motor = any_line_motor(1);
     const auto from = between<uint32_t>(0, motor.longest - 1);
     bushd_line_follower follower;
     bushd_line_follower_start(&follower, motor.increment, motor.longest, from);
@@ -64,7 +44,7 @@ TEST(LineFollower, IsWhereTheLineIs) {
 
 TEST(LineFollower, NeverHasTwoStepsInOneOfTheRun) {
   holds("a step of the run apart at least", [] {
-    const Motor motor = any_motor();
+    const LineMotor motor = any_line_motor(1);
     bushd_line_follower follower;
     bushd_line_follower_start(&follower, motor.increment, motor.longest,
                               between<uint32_t>(0, motor.longest));

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdlib>
 
+#include "engine/line_motor.h"
 #include "engine/properties.h"
 
 namespace bushd::test {
@@ -11,8 +12,6 @@ namespace {
 
 // Exact, from the definition: numbers over a common denominator in 128 bits.
 __extension__ typedef __int128 Wide;
-
-constexpr uint32_t kLongest = 2147483647;
 
 Wide floor_of(Wide numerator, Wide denominator) {
   const Wide quotient = numerator / denominator;
@@ -30,28 +29,9 @@ Wide position_at(Wide increment, Wide longest, Wide x) {
   return std::min(ruled, floor_of(2 * increment * x, longest));
 }
 
-struct Motor {
-  uint32_t increment;
-  uint32_t longest;
-};
-
-// Few steps, where all borders are near, and as many as there may be.
-Motor any_motor() {
-  const auto longest =
-      between<uint32_t>(1, *rc::gen::element<uint32_t>(1, 2, 5, 40, 1000, 1'000'000, kLongest));
-  switch (between(0, 3)) {
-    case 0:
-      return {*rc::gen::element<uint32_t>(0, 1, longest, longest - 1), longest};
-    case 1:
-      return {between<uint32_t>(0, std::min<uint32_t>(longest, 7)), longest};
-    default:
-      return {between<uint32_t>(0, longest), longest};
-  }
-}
-
 TEST(Line, EveryStepIsWhereTheRulePutsIt) {
   holds("made = floor(r (s - 1/2) + 1/2)", [] {
-    const Motor motor = any_motor();
+    const LineMotor motor = any_line_motor(0);
     bushd_line line;
     bushd_line_start(&line, motor.increment, motor.longest);
     RC_ASSERT(line.made == 0u);
@@ -72,7 +52,7 @@ TEST(Line, EveryStepIsWhereTheRulePutsIt) {
 
 TEST(Line, EndsAtItsIncrements) {
   holds("all steps are made at s = L", [] {
-    const Motor motor = any_motor();
+    const LineMotor motor = any_line_motor(0);
     bushd_line line;
     bushd_line_start(&line, motor.increment, motor.longest);
     bushd_line_go_to(&line, motor.longest);
@@ -82,7 +62,7 @@ TEST(Line, EndsAtItsIncrements) {
 
 TEST(Line, IsWithinHalfAStepOfItsPoint) {
   holds("|made - r (s - 1/2)| <= 1/2", [] {
-    const Motor motor = any_motor();
+    const LineMotor motor = any_line_motor(0);
     bushd_line line;
     bushd_line_start(&line, motor.increment, motor.longest);
     const auto s = between<uint32_t>(1, motor.longest);
@@ -95,7 +75,7 @@ TEST(Line, IsWithinHalfAStepOfItsPoint) {
 
 TEST(Line, TellsInWhichStepOfTheRunAStepFalls) {
   holds("the least s with so many made", [] {
-    const Motor motor = any_motor();
+    const LineMotor motor = any_line_motor(0);
     RC_PRE(motor.increment > 0);
     bushd_line line;
     bushd_line_start(&line, motor.increment, motor.longest);
@@ -127,7 +107,7 @@ TEST(Line, ReversedMakesTheSamePattern) {
 
 TEST(Line, PositionsBetweenStepsFollowTheSameRule) {
   holds("positions at a fraction of a step of the run", [] {
-    const Motor motor = any_motor();
+    const LineMotor motor = any_line_motor(0);
     bushd_line line;
     bushd_line_start(&line, motor.increment, motor.longest);
     // Near the beginning, where the position rises from 0, or anywhere.
@@ -146,7 +126,7 @@ TEST(Line, PositionsBetweenStepsFollowTheSameRule) {
 
 TEST(Line, CrossesAtTheLeastFractionThatItTells) {
   holds("the fraction at which a step is made", [] {
-    const Motor motor = any_motor();
+    const LineMotor motor = any_line_motor(0);
     RC_PRE(motor.increment > 0);
     bushd_line line;
     bushd_line_start(&line, motor.increment, motor.longest);
