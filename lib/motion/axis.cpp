@@ -12,7 +12,7 @@
 namespace bushd::motion {
 namespace {
 
-constexpr std::size_t kBlock = 64;
+constexpr std::size_t kBlock = RunBlocks::kMostTicks;
 
 __extension__ using Wide = unsigned __int128;
 
@@ -187,16 +187,14 @@ void Axis::expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_
 // goes back by the part of it that it has been told.
 void Axis::follow_line(Place& place, std::size_t ticks, std::int16_t* out,
                        std::size_t stride) const {
-  std::array<std::int16_t, kBlock> run_ticks;
-  const std::uint32_t run_end = place.run.steps_done + bushd_run_steps_left(&place.run);
-  const std::int64_t rest_256 = line_steps(run_end) * 256;
+  const std::int64_t rest_256 = line_rest_256(place);
   const std::uint64_t increment = place.line.increment;
   const std::uint64_t longest = place.line.longest;
   const bool odd = ((longest - increment) & 1u) != 0;
   std::uint64_t way =
       std::uint64_t{place.line.value} * 256 + (odd ? 128 : 0) + increment * place.run.fraction;
   const std::uint64_t before_256 = std::uint64_t{place.line.made} * 256;
-  expand_run(place.run, true, ticks, run_ticks.data(), 1);
+  const auto run_ticks = share_->blocks->expand(place.run, tick_ns_, ticks);
   bushd_line_go_to(&place.line, share_->from + place.run.steps_done);
   for (std::size_t i = 0; i < ticks; ++i) {
     way += increment * static_cast<std::uint16_t>(run_ticks[i]);
@@ -213,6 +211,27 @@ void Axis::follow_line(Place& place, std::size_t ticks, std::int16_t* out,
     out[i * stride] = fine() ? static_cast<std::int16_t>(moved_256 * share_->direction)
                              : coarse_of(static_cast<unsigned>(moved_256 / 256));
   }
+}
+
+std::int64_t Axis::line_rest_256(const Place& place) const {
+  return line_steps(place.run.steps_done + bushd_run_steps_left(&place.run)) * 256;
+}
+
+// As follow_line, where nobody asks for each tick.
+void Axis::pass_line(Place& place, std::size_t ticks) const {
+  const std::int64_t rest_256 = line_rest_256(place);
+  share_->blocks->expand(place.run, tick_ns_, ticks);
+  bushd_line_go_to(&place.line, share_->from + place.run.steps_done);
+  auto at_256 = static_cast<std::int64_t>(bushd_line_position(&place.line, place.run.fraction));
+  if (!fine()) at_256 -= at_256 % 256;
+  place.told_256 = std::min(at_256, rest_256);
+}
+
+// Up to kBlock ticks whose displacements nobody asks for.
+void Axis::pass(Place& place, std::size_t ticks) const {
+  if (share_ && !on_path()) return pass_line(place, ticks);
+  std::array<std::int16_t, kBlock> unused;
+  expand(place, ticks, unused.data(), 1);
 }
 
 // The delay of the motor's running step, in units of its own table. Of a share: as the run goes
@@ -271,7 +290,6 @@ void Axis::take_change(Place& place) const {
 
 // Advances a place, taking the change on the way if it lies at or after the place.
 void Axis::advance(Place& place, Tick to) const {
-  std::array<std::int16_t, kBlock> unused;
   while (place.tick < to) {
     take_change(place);
     Tick next = to;
@@ -281,7 +299,7 @@ void Axis::advance(Place& place, Tick to) const {
       continue;
     }
     const auto n = std::min<Tick>(next - place.tick, kBlock);
-    expand(place, static_cast<std::size_t>(n), unused.data(), 1);
+    pass(place, static_cast<std::size_t>(n));
     place.tick += n;
   }
 }

@@ -25,6 +25,7 @@
 #include "engine/run.h"
 #include "motion/divisor.h"
 #include "motion/path_run.h"
+#include "motion/run_blocks.h"
 #include "motion/trajectory.h"
 #include "tables/envelope.h"
 
@@ -47,6 +48,7 @@ struct Change {
 struct LineShare {
   std::uint64_t way = 0;                               // its number, for logs
   std::shared_ptr<const tables::Envelope> table = {};  // of the run; none: of a path
+  std::shared_ptr<RunBlocks> blocks = {};              // of the run of a line, for all its motors
   std::shared_ptr<const PathTrack> track = {};         // of a path, with the motor's place in it
   std::size_t motor = 0;
   // |N|; of 0 the motor only waits for the others. Of a path as far as that.
@@ -229,6 +231,9 @@ class Axis {
                   std::size_t stride) const;
   bool fine() const { return format_ == BUSHD_FORMAT_FINE; }
   void follow_line(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  void pass(Place& place, std::size_t ticks) const;
+  void pass_line(Place& place, std::size_t ticks) const;
+  std::int64_t line_rest_256(const Place& place) const;
   // As a byte of coarse displacements, of a line's motor.
   std::int16_t coarse_of(unsigned steps) const {
     return static_cast<std::int16_t>(

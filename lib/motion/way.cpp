@@ -55,6 +55,7 @@ std::int64_t Way::position_at(std::size_t motor, std::uint32_t step) const {
 LineShare Way::share(std::size_t motor, std::uint32_t from, std::uint32_t to) const {
   return {.way = number_,
           .table = table_,
+          .blocks = blocks_,
           .increment = increment(motor),
           .longest = longest_,
           .direction = motors_[motor].to < motors_[motor].from ? -1 : 1,

@@ -59,6 +59,7 @@ class Way {
   std::uint64_t number_ = 0;
   std::uint32_t longest_ = 0;
   std::shared_ptr<const tables::Envelope> table_;
+  std::shared_ptr<RunBlocks> blocks_ = std::make_shared<RunBlocks>();
   std::uint16_t floor_ = 0;
   std::size_t limiting_ = 0;
 };

@@ -69,6 +69,7 @@ Line any_line() {
     line.floor = between<std::uint16_t>(1, line.envelope->view().accel.code[0]);
   }
   line.share = {.table = line.envelope,
+                .blocks = std::make_shared<RunBlocks>(),
                 .increment = increment,
                 .longest = longest,
                 .direction = between(0, 1) == 0 ? 1 : -1,
