@@ -139,6 +139,26 @@ class Blocking(PythonTest):
                     client.move_line(by={"a0": 5, "b1": -200}, duration_s=0.001)
         self.assert_one_result_each()
 
+    def test_paths_and_arrays(self):
+        self.bring_up_with_unit()
+        for how in (SOCKET, LCM):
+            with self.connect(**how) as client:
+                client.set_position("a0", 0, unit="steps")
+                client.set_position("b1", 0, unit="steps")
+                points = [(0.5, 40), (1, 90), (1, 0), (0, 0)]
+                plan = client.plan_path(["a0", "b1"], points, exact=True)
+                self.assertEqual(len(plan.points_s), 4)
+                self.assertEqual(client.where("b1").position_steps, 0)
+                result = client.move_path(["a0", "b1"], points)
+                self.assertIn("the path was limited by", result.reason)
+                self.assertEqual(client.where("b1").position_steps, 0)
+                follow = client.follow(["b1"], [0, 1, 2], [[0], [50], [0]], wait=False)
+                self.wait_until("b1 to follow", lambda: client.where("b1").position_steps > 10)
+                self.assertEqual(follow.wait()["b1"].position_steps, 0)
+                with self.assertRaisesRegex(bushd.RequestFailed, "stretched by"):
+                    client.follow(["b1"], [0, 0.001], [[0], [500]])
+        self.assert_one_result_each()
+
     def test_jogs(self):
         self.bring_up_with_unit()
         for how in (SOCKET, LCM):

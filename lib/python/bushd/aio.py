@@ -19,6 +19,7 @@ from .driver import Driver
 from .errors import NoDaemon
 from .links import DEFAULT_PREFIX, Link, open_link
 from .motion import Jog, Motion, finish
+from .requests import Names, Rows
 from .session import Exchange, Request, Session, StatusQuery, Timing
 from .status import StatusCollector
 
@@ -70,6 +71,7 @@ class Client:
         self._timing = timing
         self._driver = Driver(link, session)
         self.tables = Tables(self)
+        self._arrays = 0  # numbers of those that it has told
 
     @property
     def id(self) -> str:
@@ -190,6 +192,77 @@ class Client:
             dry_run=True,
         )
         return _there((await self._ask(request)).detail.plan)
+
+    @overload
+    async def move_path(self, motors: Names, points: Rows, *, exact: bool = False, speed: float | None = None,
+                  speeds: Iterable[float] = (), in_steps: bool = False, wait: Literal[True] = True,
+                  check: bool = True) -> model.MoveResult: ...
+    @overload
+    async def move_path(self, motors: Names, points: Rows, *, exact: bool = False, speed: float | None = None,
+                  speeds: Iterable[float] = (), in_steps: bool = False, wait: Literal[False],
+                  check: bool = True) -> Motion: ...
+    async def move_path(
+        self,
+        motors: Names,
+        points: Rows,
+        *,
+        exact: bool = False,
+        speed: float | None = None,
+        speeds: Iterable[float] = (),
+        in_steps: bool = False,
+        wait: bool = True,
+        check: bool = True,
+    ) -> model.MoveResult | Motion:
+        names = list(motors)
+        *before, last = requests.move_path(
+            names, points, exact=exact, speed=speed, speeds=speeds, in_steps=in_steps
+        )
+        for part in before:
+            await self._ask(part)
+        motion = self._motion(last, names)
+        return await motion.wait(check=check) if wait else await motion.accepted()
+
+    async def plan_path(
+        self,
+        motors: Names,
+        points: Rows,
+        *,
+        exact: bool = False,
+        speed: float | None = None,
+        speeds: Iterable[float] = (),
+        in_steps: bool = False,
+    ) -> model.MovePlan:
+        parts = requests.move_path(
+            motors, points, exact=exact, speed=speed, speeds=speeds, in_steps=in_steps, dry_run=True
+        )
+        for part in parts:
+            exchange = await self._ask(part)
+        return _there(exchange.detail.plan)
+
+    @overload
+    async def follow(self, motors: Names, time_s: Iterable[float], positions: Rows, *, cubic: bool = False,
+               stretch: float = 1.0, wait: Literal[True] = True, check: bool = True) -> model.MoveResult: ...
+    @overload
+    async def follow(self, motors: Names, time_s: Iterable[float], positions: Rows, *, cubic: bool = False,
+               stretch: float = 1.0, wait: Literal[False], check: bool = True) -> Motion: ...
+    async def follow(
+        self,
+        motors: Names,
+        time_s: Iterable[float],
+        positions: Rows,
+        *,
+        cubic: bool = False,
+        stretch: float = 1.0,
+        wait: bool = True,
+        check: bool = True,
+    ) -> model.MoveResult | Motion:
+        names = list(motors)
+        self._arrays += 1
+        *rows, run = requests.follow(names, time_s, positions, array=self._arrays, cubic=cubic, stretch=stretch)
+        for part in rows:
+            await self._ask(part)
+        motion = self._motion(run, names)
+        return await motion.wait(check=check) if wait else await motion.accepted()
 
     async def plan(
         self,

@@ -13,6 +13,7 @@ from .aio import KEEP
 from .arguments import Amount
 from .links import DEFAULT_PREFIX
 from .loop import Loop as _Loop
+from .requests import Names, Rows
 from .session import Timing
 
 
@@ -211,6 +212,100 @@ class Client:
         """What such a `move_line()` would be. Nothing moves; of motors at rest."""
         return self._loop.run(
             self._client.plan_line(motors, to=to, by=by, unit=unit, speed=speed, duration_s=duration_s)
+        )
+
+    @overload
+    def move_path(self, motors: Names, points: Rows, *, exact: bool = False, speed: float | None = None,
+                  speeds: Iterable[float] = (), in_steps: bool = False, wait: Literal[True] = True,
+                  check: bool = True) -> model.MoveResult: ...
+    @overload
+    def move_path(self, motors: Names, points: Rows, *, exact: bool = False, speed: float | None = None,
+                  speeds: Iterable[float] = (), in_steps: bool = False, wait: Literal[False],
+                  check: bool = True) -> Motion: ...
+    def move_path(
+        self,
+        motors: Names,
+        points: Rows,
+        *,
+        exact: bool = False,
+        speed: float | None = None,
+        speeds: Iterable[float] = (),
+        in_steps: bool = False,
+        wait: bool = True,
+        check: bool = True,
+    ) -> model.MoveResult | Motion:
+        """Moves motors of one bus, at rest, from point to point by one run.
+
+            client.move_path(["x", "y"], [(0.5, 0.0), (1.0, 0.3), (1.0, 2.0)])
+
+        points: 1 to 100000, each with a position of every motor in its unit, on the user's scale.
+        exact: rest at each point; otherwise points are passed at speeds at which no motor jumps by more than it
+            starts with from rest.
+        speed: no motor exceeds it, per second, each in its own unit, with `in_steps` in steps.
+        speeds: of a single motor: not exceeded on the way to that point; 0: none. As many as points, or none.
+        All else as of `move()`. A part that the daemon refuses raises Refused, and nothing has moved.
+        """
+        if not wait:
+            begun = self._client.move_path(
+                motors, points, exact=exact, speed=speed, speeds=speeds, in_steps=in_steps, wait=False
+            )
+            return Motion(self._loop, self._loop.run(begun))
+        return self._loop.run(
+            self._client.move_path(
+                motors, points, exact=exact, speed=speed, speeds=speeds, in_steps=in_steps, check=check
+            )
+        )
+
+    def plan_path(
+        self,
+        motors: Names,
+        points: Rows,
+        *,
+        exact: bool = False,
+        speed: float | None = None,
+        speeds: Iterable[float] = (),
+        in_steps: bool = False,
+    ) -> model.MovePlan:
+        """What such a `move_path()` would be, with the time at which each point is reached. Nothing moves."""
+        return self._loop.run(
+            self._client.plan_path(motors, points, exact=exact, speed=speed, speeds=speeds, in_steps=in_steps)
+        )
+
+    @overload
+    def follow(self, motors: Names, time_s: Iterable[float], positions: Rows, *, cubic: bool = False,
+               stretch: float = 1.0, wait: Literal[True] = True, check: bool = True) -> model.MoveResult: ...
+    @overload
+    def follow(self, motors: Names, time_s: Iterable[float], positions: Rows, *, cubic: bool = False,
+               stretch: float = 1.0, wait: Literal[False], check: bool = True) -> Motion: ...
+    def follow(
+        self,
+        motors: Names,
+        time_s: Iterable[float],
+        positions: Rows,
+        *,
+        cubic: bool = False,
+        stretch: float = 1.0,
+        wait: bool = True,
+        check: bool = True,
+    ) -> model.MoveResult | Motion:
+        """Motors of one bus, at rest, follow positions in time (a fly scan).
+
+            client.follow(["theta"], [0.0, 1.0, 2.5], [(0.0,), (4.0,), (10.0,)])
+
+        time_s: each later than the one before, below 10^8.
+        positions: a row for each time, with a position of every motor in its unit, on the user's scale; the first
+            row is where the motors stand.
+        cubic: between rows (Hermite); else linear.
+        stretch: all times are so many times as long, 0.001..1000.
+
+        All rows are checked before anything moves: RequestFailed names the first row and motor that cannot be
+        followed, and the least stretch that would do. Waiting and results as of `move()`.
+        """
+        if not wait:
+            begun = self._client.follow(motors, time_s, positions, cubic=cubic, stretch=stretch, wait=False)
+            return Motion(self._loop, self._loop.run(begun))
+        return self._loop.run(
+            self._client.follow(motors, time_s, positions, cubic=cubic, stretch=stretch, check=check)
         )
 
     def plan(

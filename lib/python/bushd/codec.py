@@ -235,6 +235,7 @@ def _plan(message: Any) -> model.MovePlan:
         frames=message.frames if counted else None,
         bytes=message.bytes if counted else None,
         limited_by=message.limited_by or None,
+        points_s=tuple(us * 1e-6 for us in message.points_us),
         legs=tuple(
             model.PlannedLeg(name, steps, duration_us / 1e6, peak)
             for name, steps, duration_us, peak in zip(

@@ -6,7 +6,7 @@ Names of motors and numbers go as they come; the daemon resolves them, checks ev
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from . import codec, messages, model
@@ -16,6 +16,7 @@ STEPS = "steps"
 
 Amounts = Mapping[str, float]
 Names = Iterable[str]
+Rows = Iterable[Iterable[float]]
 # (N, A, F), and of functions that write (N, A, F, data).
 Cycle = tuple[int, int, int] | tuple[int, int, int, int]
 
@@ -51,6 +52,82 @@ def move_line(
         message.duration_s = float(duration_s)
     _put_amounts(message, amounts, in_steps)
     return Request("MOVE_LINE", message)
+
+
+# What one message holds (move_path_t, follow_t); more come in several.
+MOST_VALUES = 4096
+
+
+def move_path(
+    motors: Names,
+    points: Rows,
+    *,
+    exact: bool = False,
+    in_steps: bool = False,
+    speed: float | None = None,
+    speeds: Iterable[float] = (),
+    dry_run: bool = False,
+) -> list[Request]:
+    """The last of them begins the motion; those before it carry points only."""
+    names, rows = list(motors), [list(point) for point in points]
+    limits = [codec.finite(float(limit)) for limit in speeds]
+    made = []
+    for first, some in _pieces(names, rows):
+        message = messages.move_path_t()
+        message.rows, message.first_row = len(rows), first
+        message.corners = messages.move_path_t.EXACT if exact else messages.move_path_t.CONTINUOUS
+        message.dry_run = bool(dry_run)
+        _put_speed(message, speed, in_steps)
+        _named(message, names)
+        message.positions = _positions(some)
+        message.position_count = len(message.positions)
+        message.speeds = limits[first : first + len(some)]
+        message.speed_count = len(message.speeds)
+        made.append(Request("MOVE_PATH", message))
+    if limits and len(limits) != len(rows):
+        raise ValueError(f"{len(limits)} speeds for {len(rows)} points")
+    return made
+
+
+def follow(
+    motors: Names, time_s: Iterable[float], positions: Rows, *, array: int, cubic: bool = False, stretch: float = 1.0
+) -> list[Request]:
+    """The last of them begins the motion; those before it carry rows only."""
+    names, rows, times = list(motors), [list(row) for row in positions], [codec.finite(float(t)) for t in time_s]
+    if len(times) != len(rows):
+        raise ValueError(f"{len(times)} times for {len(rows)} rows")
+
+    def part(kind: int, first: int, some: list[list[float]]) -> Request:
+        message = messages.follow_t()
+        message.part, message.array = kind, array
+        message.cubic, message.stretch = bool(cubic), codec.finite(float(stretch))
+        _named(message, names)
+        message.time_s = times[first : first + len(some)]
+        message.row_count = len(message.time_s)
+        message.positions = _positions(some)
+        message.position_count = len(message.positions)
+        return Request("FOLLOW", message)
+
+    kind = messages.follow_t
+    pieces = list(_pieces(names, rows))
+    made = [part(kind.ROWS, first, some) for first, some in pieces[:-1]]
+    return [*made, part(kind.LAST_ROWS, *pieces[-1]), part(kind.RUN, 0, [])]
+
+
+def _pieces(names: list[str], rows: list[list[float]]) -> Iterator[tuple[int, list[list[float]]]]:
+    """As many rows as a message holds, with the number of the first."""
+    if not names or not rows:
+        raise ValueError("no motor is named" if not names else "there is no row")
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(names):
+            raise ValueError(f"row {number} has {len(row)} positions for {len(names)} motors")
+    most = max(1, MOST_VALUES // len(names))
+    for first in range(0, len(rows), most):
+        yield first, rows[first : first + most]
+
+
+def _positions(rows: list[list[float]]) -> list[float]:
+    return [codec.finite(float(position)) for row in rows for position in row]
 
 
 def arm(
