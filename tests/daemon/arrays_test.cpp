@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lab.h"
+#include "daemon/on_line.h"
 
 namespace bushd::test {
 namespace {
@@ -18,13 +18,13 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Part = api::Follow::Part;
 
-const std::vector<std::string> kMotors{"m01", "m03"};  // of two MCUs
+const std::vector<std::string> kFollowing{"m01", "m03"};  // of two MCUs
 
 api::Follow part_of(Part part, std::vector<double> time_s = {},
                     std::vector<double> positions = {}) {
   return {.part = part,
           .array = 7,
-          .motors = kMotors,
+          .motors = kFollowing,
           .time_s = std::move(time_s),
           .positions = std::move(positions)};
 }
@@ -39,6 +39,18 @@ double expected(double s) {
   if (s < 1.2) return 100 * s;
   return s < 1.7 ? 120 : std::max(0.0, 120 - 120 / 1.4 * (s - 1.7));
 }
+
+// Loads and runs it in a hall of two MCUs, for 0.7 s.
+struct UnderWay {
+  UnderWay() : lab(hall(2, 2)) {
+    lab.connect();
+    lab.wait(lab.send(there_and_back()));
+    run = lab.send(part_of(Part::kRun));
+    lab.run_for(0.7);
+  }
+  Lab lab;
+  std::int64_t run = 0;
+};
 
 class Arrays : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Format, Arrays, testing::Values("fine", "coarse"));
@@ -61,17 +73,14 @@ TEST_P(Arrays, AllMotorsAreWhereTheRowsSayAtAnyTime) {
     most = std::max(most, std::abs(static_cast<double>(lab.shaft_steps("m01")) - expected(s)));
     return lab.has_result(run);
   });
-  // Half a step, and two ticks of 2.56 ms between MCU and bus.
-  EXPECT_LT(most, 1.3);
+  // Half a step. A tick has 0.256 of one at 100 steps/s: by that the step that told the beginning
+  // may have been off, as may any other, and so much is made where a row ends amid a tick.
+  EXPECT_LE(most, 0.5 + 3 * 100 * 2.56e-3);
   const Answer result = lab.last_reply(run);
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_THAT(result.position_steps, ElementsAre(0, 0));
   EXPECT_EQ(lab.shaft_steps("m03"), 0);
-  for (const char* mcu : {"hall:1", "hall:2"}) {
-    EXPECT_EQ(lab.mcu_health(mcu).rejected_frames, 0u);
-    EXPECT_EQ(lab.mcu_health(mcu).ramp_downs, 0u);
-  }
-  EXPECT_THAT(lab.errors(), IsEmpty());
+  expect_clean(lab);
 }
 
 TEST(Array, WhatCannotBeFollowedIsNamedAndNothingMoves) {
@@ -140,16 +149,13 @@ TEST(Array, RowsMayComeWhileItRunsAndAnOpenEndRampsDown) {
 }
 
 TEST(Array, AStopOfOneStopsAll) {
-  Lab lab(hall(2, 2));
-  lab.connect();
-  lab.wait(lab.send(there_and_back()));
-  const auto run = lab.send(part_of(Part::kRun));
-  lab.run_for(0.7);
+  UnderWay array;
+  Lab& lab = array.lab;
   EXPECT_THAT(lab.wait(lab.send(api::Pause{})).reason, HasSubstr("follows an array"));
   EXPECT_THAT(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).reason,
               HasSubstr("follows an array"));
   lab.send(Ask::kStop, {"m03"});
-  const Answer end = lab.wait(run);
+  const Answer end = lab.wait(array.run);
   EXPECT_EQ(end.result, "stopped");
   EXPECT_LT(lab.shaft_steps("m01"), 119);
   EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
@@ -158,26 +164,20 @@ TEST(Array, AStopOfOneStopsAll) {
 }
 
 TEST(Array, ALostMcuRampsDownTheOthers) {
-  Lab lab(hall(2, 2));
-  lab.connect();
-  lab.wait(lab.send(there_and_back()));
-  const auto run = lab.send(part_of(Part::kRun));
-  lab.run_for(0.7);
+  UnderWay array;
+  Lab& lab = array.lab;
   lab.bus(0).reboot(1, 2'000'000'000);
-  const Answer end = lab.wait(run);
+  const Answer end = lab.wait(array.run);
   EXPECT_THAT(end.motor_results, ElementsAre("stopped", "link"));
   EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
   EXPECT_LT(lab.shaft_steps("m01"), 119);
 }
 
 TEST(Array, AnEmergencyStopEndsIt) {
-  Lab lab(hall(2, 2));
-  lab.connect();
-  lab.wait(lab.send(there_and_back()));
-  const auto run = lab.send(part_of(Part::kRun));
-  lab.run_for(0.7);
+  UnderWay array;
+  Lab& lab = array.lab;
   lab.wait(lab.send(Ask::kEmergencyStop, {}));
-  EXPECT_EQ(lab.wait(run).result, "stopped");
+  EXPECT_EQ(lab.wait(array.run).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
   EXPECT_EQ(lab.shaft_steps("m03"), lab.motor("m03").position_steps);
 }

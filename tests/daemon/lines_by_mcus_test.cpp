@@ -10,7 +10,7 @@ namespace {
 
 TEST(LinesByMcus, AllMotorsAreOnThemToAStep) {
   for (const char* manner : {"fine", "coarse", "coarse_table"}) {
-    expect_on_line_all_the_way(manner, kInMcus, 1.5);
+    expect_on_line_all_the_way(manner, kInMcus, kOffByMcus);
   }
 }
 
@@ -63,8 +63,8 @@ TEST(LinesByMcus, ALostLinkLeavesAllOnTheLine) {
         lab.run_for(0.01);
         most = std::max(most, off_line(lab, kMotors, steps));
       }
-      EXPECT_LT(most, 1.0) << "ticks of two MCUs meet within some microseconds";
-      EXPECT_LT(off_line(lab, kMotors, steps), 0.8);
+      EXPECT_LE(most, kOffByMcus);
+      EXPECT_LE(off_line(lab, kMotors, steps), kOffAtRest);
       const std::int64_t stands = lab.shaft_steps("m01");
       EXPECT_GT(stands, before + 500) << "for a second they go on";
       EXPECT_LT(stands, 20000);
@@ -94,7 +94,7 @@ TEST(LinesByMcus, TakeANearerEndAndAnotherSpeed) {
     slower.speed = api::Speed{.per_s = 300, .in_steps = true};
     const auto second = lab.send(slower);
     lab.run_for(0.4);
-    EXPECT_LT(off_line(lab, kMotors, steps), 2.0);
+    EXPECT_LE(off_line(lab, kMotors, steps), kOffByMcus);
     const auto third = lab.send(line_to(kMotors, {3000, -3000, 200, 3000}));
     EXPECT_EQ(lab.wait(third).result, "reached") << lab.last_reply(third).reason;
     EXPECT_EQ(lab.last_reply(move).result, "stopped");

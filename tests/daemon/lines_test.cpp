@@ -20,11 +20,10 @@ using testing::HasSubstr;
 using testing::Not;
 
 TEST(Lines, AllMotorsAreOnTheLineAtAnyTime) {
-  // Half a step each, and what a tick of the stream may be off its run.
   for (const char* manner : {"fine", "coarse", "fine_table", "coarse_ticks"}) {
-    expect_on_line_all_the_way(manner, kSteps, 2.5);
+    expect_on_line_all_the_way(manner, kSteps, off_in_motion(manner));
   }
-  expect_on_line_all_the_way("fine_ticks", kInMcus, 2.5);
+  expect_on_line_all_the_way("fine_ticks", kInMcus, kOffFine);
 }
 
 TEST(Lines, EqualMotorsTakeTheTimeOfOne) {
@@ -76,7 +75,7 @@ void expect_on_line_after_a_stop(const std::vector<std::int64_t>& steps) {
       EXPECT_EQ(result.result, "stopped");
       EXPECT_THAT(result.reason, HasSubstr("stopped on request, asked for by command"));
       EXPECT_THAT(result.reason, Not(HasSubstr("off it")));
-      EXPECT_LT(off_line(lab, kMotors, steps), 0.8);
+      EXPECT_LE(off_line(lab, kMotors, steps), kOffAtRest);
       lab.run_for(0.5);
       EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0u);
       EXPECT_EQ(lab.mcu_health("hall:2").rejected_frames, 0u);
@@ -100,7 +99,7 @@ void expect_pause(const std::vector<std::int64_t>& steps) {
     const auto move = lab.send(line_to(kMotors, steps));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 700; });
     EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m02"}})).reason, "paused: 4 motors");
-    EXPECT_LT(off_line(lab, kMotors, steps), 0.8);
+    EXPECT_LE(off_line(lab, kMotors, steps), kOffAtRest);
     EXPECT_TRUE(lab.motor("m01").paused);
     EXPECT_FALSE(lab.has_result(move));
     const std::int64_t stands = lab.shaft_steps("m01");
@@ -112,7 +111,7 @@ void expect_pause(const std::vector<std::int64_t>& steps) {
       most = std::max(most, off_line(lab, kMotors, steps));
       return lab.has_result(move);
     });
-    EXPECT_LT(most, 2.5);
+    EXPECT_LE(most, off_in_motion(manner));
     EXPECT_EQ(lab.last_reply(move).result, "reached");
     for (std::size_t i = 0; i < kMotors.size(); ++i) {
       EXPECT_EQ(lab.shaft_steps(kMotors[i]), steps[i]);
@@ -179,7 +178,7 @@ TEST(Lines, ANearerEndAndAnotherSpeed) {
   EXPECT_EQ(lab.wait(move).result, "stopped");
   EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("was given a new target by command"));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1200; });
-  EXPECT_LT(off_line(lab, kMotors, {4000, -2000, 1000, 0}), 2.0);
+  EXPECT_LE(off_line(lab, kMotors, {4000, -2000, 1000, 0}), kOffFine);
   // Named in another order, as a distance from the target.
   const auto third = lab.send(
       api::MoveLine{.motors = motor_steps({"m03", "m04", "m01", "m02"}, {-500, 0, -2000, 1000})});
@@ -284,7 +283,8 @@ TEST(Lines, OneThatIsLostEndsTheOthersAlongTheLine) {
     EXPECT_EQ(result.result, "link");
     EXPECT_EQ(result.motor_results[0], "stopped");
     EXPECT_EQ(result.motor_results[2], "link");
-    EXPECT_LT(off_line(lab, {"m01", "m02"}, {6000, steps}), 0.8) << "those that went on are on it";
+    EXPECT_LE(off_line(lab, {"m01", "m02"}, {6000, steps}), kOffAtRest)
+        << "those that went on are on it";
     EXPECT_LT(lab.shaft_steps("m01"), 6000);
   }
 }
@@ -302,7 +302,7 @@ void expect_end_at_a_limit(const std::vector<std::int64_t>& steps, const std::st
   EXPECT_THAT(result.reason,
               HasSubstr("; the line was limited by " + limited_by + ", which was left at "));
   EXPECT_THAT(result.reason, HasSubstr("; m03 stands "));
-  EXPECT_LT(off_line(lab, {"m01", "m02", "m04"}, {steps[0], steps[1], steps[3]}), 0.8);
+  EXPECT_LE(off_line(lab, {"m01", "m02", "m04"}, {steps[0], steps[1], steps[3]}), kOffAtRest);
   const std::string why = lab.wait(lab.send(line_to(kMotors, steps))).reason;
   EXPECT_THAT(why, HasSubstr("m03: its limit switch at the positive end is active"));
 }
@@ -336,7 +336,7 @@ TEST(Lines, WhatIsToldIsTrueOnABadLine) {
     const bool off = result.reason.find("steps off it") != std::string::npos;
     EXPECT_TRUE(result.result == "stopped" || result.result == "link") << result.reason;
     if (result.result == "stopped") {
-      EXPECT_EQ(off_line(lab, motors, steps) > 0.8, off) << result.reason;
+      EXPECT_EQ(off_line(lab, motors, steps) > kOffAtRest, off) << result.reason;
     }
     for (std::size_t i = 0; i < motors.size(); ++i) {
       EXPECT_EQ(lab.shaft_steps(motors[i]), lab.motor(motors[i]).position_steps);

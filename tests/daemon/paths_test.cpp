@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lab.h"
+#include "daemon/on_line.h"
 
 namespace bushd::test {
 namespace {
@@ -19,7 +19,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const std::vector<std::string> kMotors{"m01", "m02", "m03"};
+const std::vector<std::string> kOnPath{"m01", "m02", "m03"};
 // Round corners, a sharp one, one where a motor turns round, one that rests.
 const std::vector<double> kPoints{400,  0,   0,  //
                                   800,  50,  7,  //
@@ -32,32 +32,6 @@ api::MovePath path_of(const std::vector<std::string>& motors, std::vector<double
   return {.motors = motors, .rows = rows, .positions = std::move(points)};
 }
 
-// How far the shafts are from the nearest point of the polyline from 0.
-double off_path(const Lab& lab, const std::vector<std::string>& motors,
-                const std::vector<double>& points) {
-  const std::size_t width = motors.size();
-  std::vector<double> from(width, 0);
-  double least = 1e9;
-  for (std::size_t row = 0; row * width < points.size(); ++row) {
-    double along = 0;
-    double length = 0;
-    for (std::size_t i = 0; i < width; ++i) {
-      const double way = points[row * width + i] - from[i];
-      along += way * (static_cast<double>(lab.shaft_steps(motors[i])) - from[i]);
-      length += way * way;
-    }
-    const double share = length == 0 ? 0 : std::clamp(along / length, 0.0, 1.0);
-    double most = 0;
-    for (std::size_t i = 0; i < width; ++i) {
-      const double at = from[i] + share * (points[row * width + i] - from[i]);
-      most = std::max(most, std::abs(static_cast<double>(lab.shaft_steps(motors[i])) - at));
-      from[i] = points[row * width + i];
-    }
-    least = std::min(least, most);
-  }
-  return least;
-}
-
 TEST(Paths, AllMotorsAreOnThePathAtAnyTime) {
   for (const char* manner : {"fine", "coarse", "fine_table"}) {
     for (const auto corners :
@@ -65,24 +39,19 @@ TEST(Paths, AllMotorsAreOnThePathAtAnyTime) {
       SCOPED_TRACE(manner);
       Lab lab(hall(2, 2, manner));
       lab.connect();
-      api::MovePath path = path_of(kMotors, kPoints);
+      api::MovePath path = path_of(kOnPath, kPoints);
       path.corners = corners;
       const auto move = lab.send(path);
       double most = 0;
       lab.run_until([&] {
-        most = std::max(most, off_path(lab, kMotors, kPoints));
+        most = std::max(most, off_polyline(lab, kOnPath, kPoints));
         return lab.has_result(move);
       });
-      // Half a step each, and what a tick of the stream may be off its run.
-      EXPECT_LT(most, 2.5);
+      EXPECT_LE(most, off_in_motion(manner));
       const Answer result = lab.last_reply(move);
       EXPECT_EQ(result.result, "reached") << result.reason;
       EXPECT_THAT(result.position_steps, ElementsAre(700, 900, -20));
-      for (const char* mcu : {"hall:1", "hall:2"}) {
-        EXPECT_EQ(lab.mcu_health(mcu).rejected_frames, 0u);
-        EXPECT_EQ(lab.mcu_health(mcu).ramp_downs, 0u);
-      }
-      EXPECT_THAT(lab.errors(), IsEmpty());
+      expect_clean(lab);
     }
   }
 }
@@ -90,23 +59,23 @@ TEST(Paths, AllMotorsAreOnThePathAtAnyTime) {
 TEST(Paths, PauseAndResumeKeepThePath) {
   Lab lab(hall(2, 2));
   lab.connect();
-  const auto move = lab.send(path_of(kMotors, kPoints));
+  const auto move = lab.send(path_of(kOnPath, kPoints));
   double most = 0;
   for (const std::int64_t at : {300, 790, 1099}) {
     lab.run_until([&] {
-      most = std::max(most, off_path(lab, kMotors, kPoints));
+      most = std::max(most, off_polyline(lab, kOnPath, kPoints));
       return lab.shaft_steps("m01") >= at;
     });
     EXPECT_EQ(lab.wait(lab.send(api::Pause{})).result, "done");
     lab.run_for(0.1);
-    EXPECT_LT(off_path(lab, kMotors, kPoints), 0.75);
+    EXPECT_LE(off_polyline(lab, kOnPath, kPoints), kOffAtRest);
     lab.send(api::Resume{});
   }
   lab.run_until([&] {
-    most = std::max(most, off_path(lab, kMotors, kPoints));
+    most = std::max(most, off_polyline(lab, kOnPath, kPoints));
     return lab.has_result(move);
   });
-  EXPECT_LT(most, 2.5);
+  EXPECT_LE(most, kOffFine);
   EXPECT_EQ(lab.last_reply(move).result, "reached") << lab.last_reply(move).reason;
   EXPECT_THAT(lab.last_reply(move).position_steps, ElementsAre(700, 900, -20));
   EXPECT_THAT(lab.errors(), IsEmpty());
@@ -115,31 +84,30 @@ TEST(Paths, PauseAndResumeKeepThePath) {
 TEST(Paths, AStopRampsAllDownAlongIt) {
   Lab lab(hall(2, 2));
   lab.connect();
-  const auto move = lab.send(path_of(kMotors, kPoints));
+  const auto move = lab.send(path_of(kOnPath, kPoints));
   lab.run_until([&] { return lab.shaft_steps("m02") >= 100; });
   lab.wait(lab.send(api::Stop{{"m03"}}));
   lab.run_until([&] { return lab.has_result(move); });
   const Answer result = lab.last_reply(move);
   EXPECT_EQ(result.result, "stopped");
   EXPECT_THAT(result.reason, HasSubstr("the path has ended, which was left at"));
-  EXPECT_LT(off_path(lab, kMotors, kPoints), 0.75);
+  EXPECT_LE(off_polyline(lab, kOnPath, kPoints), kOffAtRest);
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
 TEST(Paths, ALimitOfOneRampsTheOthersDownAlongIt) {
-  std::string toml = hall(2, 1);
-  const std::string name = "name = \"m01\"\n";
-  Lab lab(toml.insert(toml.find(name) + name.size(), "limit = \"positive\"\n"));
+  Lab lab(with_keys(hall(2, 2), "m01", "limit = \"positive\"\n"));
   lab.connect();
-  const std::vector<double> points{500, 100, 2000, 900, 2500, 2000};
-  const auto move = lab.send(path_of({"m01", "m02"}, points));
+  const std::vector<double> points{500, 100, -40, 2000, 900, -300, 2500, 2000, 600};
+  const auto move = lab.send(path_of(kOnPath, points));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 800; });
   lab.bus(0).mcu(0).set_inputs({0b001, 0});
   const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "limit") << result.reason;
-  EXPECT_THAT(result.motor_results, ElementsAre("limit", "stopped"));
+  EXPECT_THAT(result.motor_results, ElementsAre("limit", "stopped", "stopped"));
   EXPECT_THAT(result.reason, HasSubstr("m01: stopped by its limit switch at the positive end"));
-  EXPECT_LT(off_path(lab, {"m02"}, {2000}), 0.75);
+  // The columns of the others.
+  EXPECT_LE(off_polyline(lab, {"m02", "m03"}, {100, -40, 900, -300, 2000, 600}), kOffAtRest);
   EXPECT_LT(lab.shaft_steps("m02"), 1500);
 }
 
@@ -172,7 +140,7 @@ TEST(Paths, WhatIsToldIsTrueOnABadLine) {
     EXPECT_TRUE(result.result == "stopped" || result.result == "link" || result.result == "reached")
         << result.reason;
     if (result.result != "link") {
-      EXPECT_EQ(off_path(lab, motors, points) > 0.8, off) << result.reason;
+      EXPECT_EQ(off_polyline(lab, motors, points) > kOffAtRest, off) << result.reason;
     }
     if (result.result == "reached") {
       EXPECT_THAT(result.position_steps, ElementsAre(8000, -432, -4800, -687, 7));
@@ -186,7 +154,7 @@ TEST(Paths, WhatIsToldIsTrueOnABadLine) {
 TEST(Paths, AStopBeforeTheStartMovesNothing) {
   Lab lab(hall(2, 2));
   lab.connect();
-  const auto move = lab.send(path_of(kMotors, kPoints));
+  const auto move = lab.send(path_of(kOnPath, kPoints));
   lab.run_for(0.005);
   lab.wait(lab.send(api::Stop{{"m01"}}));
   EXPECT_EQ(lab.wait(move).result, "stopped");

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "engine/properties.h"
 
@@ -21,7 +22,8 @@ inline LineMotor any_line_motor(uint32_t least) {
       between<uint32_t>(1, *rc::gen::element<uint32_t>(1, 2, 5, 40, 1000, 1'000'000, kLongest));
   switch (between(0, 3)) {
     case 0:
-      return {*rc::gen::element<uint32_t>(least, 1, longest, std::max(least, longest - 1)),
+      return {*rc::gen::elementOf(
+                  std::vector<uint32_t>{least, 1, longest, std::max(least, longest - 1)}),
               longest};
     case 1:
       return {between<uint32_t>(least, std::min<uint32_t>(longest, 7)), longest};
