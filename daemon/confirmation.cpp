@@ -4,14 +4,9 @@
 #include <utility>
 
 namespace bushd::daemon {
-namespace {
-
-constexpr std::int64_t kPatienceUs = 5'000'000;
-
-}  // namespace
 
 Confirmation::Confirmation(api::Asker asker, std::vector<McuId> mcus, std::int64_t now_us)
-    : asker_(std::move(asker)), awaited_(std::move(mcus)), deadline_us_(now_us + kPatienceUs) {
+    : asker_(std::move(asker)), awaited_(std::move(mcus)), deadline_us_(now_us + kConfirmUs) {
   asker_.answer(api::Accepted{});
 }
 

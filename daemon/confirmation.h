@@ -13,6 +13,9 @@
 
 namespace bushd::daemon {
 
+// For an answer, beyond what the line needs.
+inline constexpr std::int64_t kConfirmUs = 5'000'000;
+
 class Confirmation {
  public:
   // The request is accepted, and told so.

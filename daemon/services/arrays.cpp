@@ -18,10 +18,6 @@ constexpr unsigned kTicksPerSlice = 2000;
 constexpr int kMostTries = 6;
 constexpr double kLongestS = 1e8;
 
-api::Completed done(std::string reason) {
-  return {.outcome = api::Outcome::kDone, .reason = std::move(reason), .detail = {}};
-}
-
 std::string client_of(const api::Asker& asker) {
   return asker.session ? asker.session->text() : "";
 }
@@ -272,7 +268,7 @@ void Arrays::end_job(std::int64_t now_us) {
     accept_rows(array);
   }
   const std::string rows = fmt::format("{} rows", array.rows.rows());
-  if (!array.rows.closed()) return job.asker.answer(done(rows + " can be followed so far"));
+  if (!array.rows.closed()) return job.asker.answer(api::done(rows + " can be followed so far"));
   job.asker.answer(api::Completed{.outcome = api::Outcome::kDone,
                                   .reason = rows + " can be followed",
                                   .detail = plan_of(array)});

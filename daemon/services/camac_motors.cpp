@@ -18,12 +18,6 @@ std::size_t codes_used(const Program& program) {
   return std::min<std::size_t>((program.steps + 1) / 2, program.codes.size());
 }
 
-std::string reason_of(const api::Reply& reply) {
-  if (const auto* refused = std::get_if<api::Refused>(&reply)) return refused->reason;
-  const auto* completed = std::get_if<api::Completed>(&reply);
-  return completed == nullptr ? "" : completed->reason;
-}
-
 std::optional<api::Outcome> outcome_of(const api::Reply& reply) {
   const auto* completed = std::get_if<api::Completed>(&reply);
   if (completed == nullptr) return std::nullopt;
@@ -185,7 +179,7 @@ void CamacMotors::end(std::int64_t now_us, Bushd2& module, const api::Reply& rep
     return module.answer(now_us, ended.program.steps - ended.told, status);
   }
   if (outcome != api::Outcome::kStopped || !ended.stopping) {
-    warn(ended.motor, reason_of(reply));
+    warn(ended.motor, api::reason_of(reply));
   }
   if (outcome == api::Outcome::kLimit) {
     (ended.program.left ? status.left_limit : status.right_limit) = true;

@@ -15,12 +15,6 @@ bool is_done(const api::Reply& reply, api::Outcome wanted) {
   return completed != nullptr && completed->outcome == wanted;
 }
 
-std::string reason_of(const api::Reply& reply) {
-  if (const auto* refused = std::get_if<api::Refused>(&reply)) return refused->reason;
-  const auto* completed = std::get_if<api::Completed>(&reply);
-  return completed == nullptr ? "" : completed->reason;
-}
-
 // Whether a switch is active, as debounced: what a motor has met it may not meet any more.
 bool is_active(const bushd_report& report, const std::optional<config::Input>& input) {
   return input && (report.inputs >> input->number & 1) != 0;
@@ -223,7 +217,7 @@ void CamacShutter::end(camac::Bushd1& module, const api::Reply& reply) {
   motion_.reset();
   const bool done = is_done(reply, api::Outcome::kReached);
   const bool told = motion.kind != Motion::Kind::kStep && !std::get_if<api::Refused>(&reply);
-  if (!done && !told) warn(reason_of(reply));
+  if (!done && !told) warn(api::reason_of(reply));
   if (motion.kind == Motion::Kind::kTravel) return end_travel(module, motion, done);
   done ? module.step_done() : module.step_not_done();
 }

@@ -2,13 +2,9 @@
 
 #include <utility>
 
+#include "daemon/confirmation.h"
+
 namespace bushd::daemon {
-namespace {
-
-constexpr std::int64_t kConfirmUs = 5'000'000;
-
-}  // namespace
-
 EmergencyStop::EmergencyStop(Installation& installation, Interlocks& interlocks,
                              HomingQueue& homing, OpenMoves& open_moves, Outputs& outputs)
     : installation_(installation), homing_(homing), open_moves_(open_moves), outputs_(outputs) {

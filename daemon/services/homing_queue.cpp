@@ -12,12 +12,12 @@ using api::Outcome;
 
 constexpr std::uint32_t kMoreSlowSteps = 1000;  // than a ramp has
 
-struct Ending {
+struct HomingEnd {
   Outcome outcome;
   std::string reason;
 };
 
-Ending ending_of(const bushd_report& report, const std::string& mcu) {
+HomingEnd end_of_homing(const bushd_report& report, const std::string& mcu) {
   switch (report.homing) {
     case BUSHD_HOMING_DONE:
       return {Outcome::kReached, "homed"};
@@ -226,7 +226,7 @@ void HomingQueue::reports(std::int64_t, Mcu& mcu) {
   const Task& task = queue.front();
   const unsigned output = installation_[task.motor].output().value;
   if (((mcu.report().autonomous | mcu.report().moving) >> output & 1) != 0) return;
-  Ending ending = ending_of(mcu.report(), mcu.name());
+  HomingEnd ending = end_of_homing(mcu.report(), mcu.name());
   if (ending.outcome == Outcome::kReached) return found(mcu);
   if (ending.outcome == Outcome::kStopped && !task.ended_by.empty()) ending.reason = task.ended_by;
   end(mcu, ending.outcome, ending.reason);

@@ -14,10 +14,6 @@ std::string ms_text(std::int64_t us) {
   return std::to_string(us / 1000) + " ms";
 }
 
-api::Completed done(std::string reason) {
-  return {.outcome = api::Outcome::kDone, .reason = std::move(reason), .detail = {}};
-}
-
 Result<void> in_range(const api::Jog& request) {
   using Jog = api::Jog;
   if (request.keepalive_ms < Jog::kLeastKeepaliveMs ||
@@ -137,7 +133,7 @@ void Jogs::change(std::int64_t now_us, const api::Asker& asker, MotorId id, cons
     open_.unsay(id, api::Outcome::kStopped);
     moves_.redirect(now_us, id, course.target, course.floor);
   }
-  asker.answer(done(installation_[id].name() + (same && !again ? ": renewed" : ": changed")));
+  asker.answer(api::done(installation_[id].name() + (same && !again ? ": renewed" : ": changed")));
 }
 
 void Jogs::renew(std::int64_t now_us, const api::Asker& asker, MotorId id) {
@@ -161,7 +157,7 @@ void Jogs::renew(std::int64_t now_us, const api::Asker& asker, MotorId id) {
     say_limit(id);
     moves_.redirect(now_us, id, farthest, jog.course.floor);
   }
-  asker.answer(done(motor.name() + ": renewed"));
+  asker.answer(api::done(motor.name() + ": renewed"));
 }
 
 void Jogs::end(std::int64_t now_us, const api::Asker& asker, MotorId id, const api::Jog& request) {
@@ -170,10 +166,11 @@ void Jogs::end(std::int64_t now_us, const api::Asker& asker, MotorId id, const a
   });
   asker.answer(api::Accepted{});
   const auto found = jogs_.find(id);
-  if (found == jogs_.end()) return asker.answer(done(installation_[id].name() + " does not jog"));
+  if (found == jogs_.end())
+    return asker.answer(api::done(installation_[id].name() + " does not jog"));
   Jog& jog = found->second;
   if (jog.waiting.size() >= kMostWaiting) {
-    jog.waiting.front().answer(done("carried out; its end is not waited for"));
+    jog.waiting.front().answer(api::done("carried out; its end is not waited for"));
     jog.waiting.erase(jog.waiting.begin());
   }
   jog.waiting.push_back(asker);
@@ -263,7 +260,7 @@ void Jogs::has_ended(std::int64_t now_us, MotorId id, const Jog& jog) {
       motor.name() + " stands at " + motor.coordinates().text(motor.position_steps());
   const api::Asker* by = open_.asker_of(id);
   for (const api::Asker& waiting : jog.waiting) {
-    waiting.answer(done(by == nullptr ? where : motor.name() + " was given a new target"));
+    waiting.answer(api::done(by == nullptr ? where : motor.name() + " was given a new target"));
   }
   const bool at_limit = by == nullptr && motor.position_steps() == jog.course.target;
   const bool taken_by_itself = by != nullptr && by->is_same_client(jog.opened_by);

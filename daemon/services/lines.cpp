@@ -9,11 +9,7 @@
 #include <utility>
 
 namespace bushd::daemon {
-namespace {
-
-constexpr std::int64_t kMostSteps = motion::Motor::kMaxPosition;
-
-}  // namespace
+namespace {}  // namespace
 
 void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request) {
   const auto motors = installation_.find(request.motors);
@@ -272,9 +268,9 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
     const auto at =
         static_cast<std::size_t>(std::ranges::find(line.motors, motors[i]) - line.motors.begin());
     // Compared before any arithmetic: the sum of two values from outside could overflow.
-    if (std::abs(*steps / 2) > kMostSteps) {
+    if (std::abs(*steps / 2) > motion::Motor::kMaxPosition) {
       return fail(fmt::format("{}: {} steps is out of range; allowed: +-{}", motor.name(), *steps,
-                              kMostSteps));
+                              motion::Motor::kMaxPosition));
     }
     targets[at] = *steps + (absolute ? 0 : motor.target_steps());
     if (line.way.increment(at) != line.way.longest()) continue;

@@ -14,7 +14,6 @@ namespace {
 // Segments that are planned in one slice; each takes some microseconds at each of three passes.
 constexpr std::size_t kSegmentsPerSlice = 100;
 constexpr std::size_t kMostComing = 4;
-constexpr std::int64_t kMostSteps = motion::Motor::kMaxPosition;
 
 }  // namespace
 
@@ -143,8 +142,8 @@ Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request)
       };
       const auto steps = motor.steps_of_position(api::UserUnits{request.positions[at + m]});
       if (!steps) return wrong(steps.error().message);
-      if (std::abs(*steps) > kMostSteps)
-        return wrong(fmt::format("it is beyond +-{} steps", kMostSteps));
+      if (std::abs(*steps) > motion::Motor::kMaxPosition)
+        return wrong(fmt::format("it is beyond +-{} steps", motion::Motor::kMaxPosition));
       point[m] = *steps;
       if (*steps < incoming.low[m].steps) incoming.low[m] = {row, *steps};
       if (*steps > incoming.high[m].steps) incoming.high[m] = {row, *steps};
@@ -156,8 +155,9 @@ Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request)
     }
     line.path->add(point, floors);
   }
-  if (line.path->steps() <= static_cast<std::uint64_t>(kMostSteps)) return {};
-  return fail(fmt::format("the path has more than {} steps; make several paths of it", kMostSteps));
+  if (line.path->steps() <= static_cast<std::uint64_t>(motion::Motor::kMaxPosition)) return {};
+  return fail(fmt::format("the path has more than {} steps; make several paths of it",
+                          motion::Motor::kMaxPosition));
 }
 
 // Of the way to a point of a motor with speeds.

@@ -9,7 +9,6 @@
 namespace bushd::daemon {
 namespace {
 
-constexpr std::int64_t kMaxPosition = motion::Motor::kMaxPosition;
 // From one slice to the next, with what is done in between; for the common start of all motors.
 constexpr std::int64_t kSliceUs = 2'000;
 
@@ -74,9 +73,10 @@ Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount, api
   if (!counted) return fail(motor.name() + ": " + counted.error().message);
   const std::int64_t steps = *counted;
   // Compared before any arithmetic: the sum of two values from outside could overflow.
-  if (steps > 2 * kMaxPosition || steps < -2 * kMaxPosition) {
+  if (steps > 2 * motion::Motor::kMaxPosition || steps < -2 * motion::Motor::kMaxPosition) {
     return fail(motor.name() + ": " + std::to_string(steps) +
-                " steps is out of range; allowed: +-" + std::to_string(kMaxPosition));
+                " steps is out of range; allowed: +-" +
+                std::to_string(motion::Motor::kMaxPosition));
   }
   const std::int64_t from = absolute ? 0 : motor.target_steps();
   auto may = interlocks_.may_move(id);

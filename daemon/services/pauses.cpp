@@ -5,10 +5,6 @@
 namespace bushd::daemon {
 namespace {
 
-api::Completed done(std::string reason) {
-  return {.outcome = api::Outcome::kDone, .reason = std::move(reason), .detail = {}};
-}
-
 std::string count_text(std::size_t motors) {
   return std::to_string(motors) + (motors == 1 ? " motor" : " motors");
 }
@@ -49,7 +45,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
   moves_.pause(now_us, moving);
   moves_.stop(now_us, jogs);
   if (open_pauses_.size() >= kMaxOpen) {
-    open_pauses_.front().asker.answer(done("carried out; its end is not waited for"));
+    open_pauses_.front().asker.answer(api::done("carried out; its end is not waited for"));
     open_pauses_.pop_front();
   }
   open_pauses_.push_back({.asker = asker, .motors = moving, .paused = moving.size()});
@@ -72,7 +68,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Re
   asker.answer(api::Accepted{});
   moves_.resume(now_us, paused);
   installation_.changed = true;
-  asker.answer(done("resumed: " + count_text(paused.size())));
+  asker.answer(api::done("resumed: " + count_text(paused.size())));
 }
 
 void Pauses::request(std::int64_t, const api::Asker& asker, const api::Hold& request) {
@@ -89,7 +85,7 @@ void Pauses::hold(const api::Asker& asker, const api::MotorNames& names, bool he
   asker.answer(api::Accepted{});
   for (const MotorId motor : *motors) installation_[motor].hold(held);
   installation_.changed = true;
-  asker.answer(done((held ? "held: " : "released: ") + count_text(motors->size())));
+  asker.answer(api::done((held ? "held: " : "released: ") + count_text(motors->size())));
 }
 
 void Pauses::step(std::int64_t) {
@@ -99,7 +95,7 @@ void Pauses::step(std::int64_t) {
       return !motor.is_paused() || motor.stands_paused();
     });
     if (!pausing.motors.empty()) return false;
-    pausing.asker.answer(done("paused: " + count_text(pausing.paused)));
+    pausing.asker.answer(api::done("paused: " + count_text(pausing.paused)));
     return true;
   });
 }

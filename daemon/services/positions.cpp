@@ -6,11 +6,7 @@
 #include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
-namespace {
-
-constexpr std::int64_t kMaxPosition = motion::Motor::kMaxPosition;
-
-}  // namespace
+namespace {}  // namespace
 
 Positions::Positions(Installation& installation, Interlocks& interlocks, Journal& journal,
                      Outputs& outputs)
@@ -95,8 +91,8 @@ Result<void> Positions::add(MotorId id, const api::Amount& position, bool dial, 
   const auto steps = user != nullptr && dial ? coordinates.steps_of_dial(user->value)
                                              : motor.steps_of_position(position);
   if (!steps) return fail(steps.error());
-  if (*steps > kMaxPosition || *steps < -kMaxPosition) {
-    return fail("positions lie within +-" + std::to_string(kMaxPosition));
+  if (*steps > motion::Motor::kMaxPosition || *steps < -motion::Motor::kMaxPosition) {
+    return fail("positions lie within +-" + std::to_string(motion::Motor::kMaxPosition));
   }
   plan.parts.push_back({id, static_cast<std::int32_t>(*steps), motor.position_steps()});
   return {};

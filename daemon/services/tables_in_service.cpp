@@ -5,16 +5,16 @@
 #include <set>
 #include <utility>
 
+#include "daemon/confirmation.h"
 #include "daemon/services/open_moves.h"
 #include "tables/profiles/diagnostics.h"
 
 namespace bushd::daemon {
 namespace {
 
-constexpr std::int64_t kConfirmUs = 5'000'000;  // beyond what the line needs
-constexpr std::int64_t kRequestUs = 100'000;    // lost once, with a slow adapter
-constexpr std::size_t kRequestBytes = 350;      // with its answer
-constexpr std::size_t kRequestsPerTable = 20;   // beside its codes: begin, end, assignments
+constexpr std::int64_t kRequestUs = 100'000;   // lost once, with a slow adapter
+constexpr std::size_t kRequestBytes = 350;     // with its answer
+constexpr std::size_t kRequestsPerTable = 20;  // beside its codes: begin, end, assignments
 
 std::string text_of(const tables::Table& table) {
   const std::string revision =

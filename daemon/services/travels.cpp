@@ -9,12 +9,12 @@ namespace {
 
 using api::Outcome;
 
-struct Ending {
+struct TravelEnd {
   Outcome outcome;
   std::string reason;
 };
 
-Ending ending_of(const bushd_report& report, const std::string& mcu) {
+TravelEnd end_of_travel(const bushd_report& report, const std::string& mcu) {
   switch (report.homing) {
     case BUSHD_TRAVEL_DONE:
       return {Outcome::kReached, "done"};
@@ -142,7 +142,7 @@ void Travels::reports(std::int64_t, Mcu& mcu) {
   const bushd_report& report = mcu.report();
   const Output output = installation_[task->motor].output();
   if (has_bit(report.autonomous, output) || has_bit(report.moving, output)) return;
-  const Ending ending = ending_of(report, mcu.name());
+  const TravelEnd ending = end_of_travel(report, mcu.name());
   end(mcu, ending.outcome, ending.reason);
 }
 

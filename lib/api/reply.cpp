@@ -97,4 +97,14 @@ std::size_t memory_of(const Reply& reply) {
   return bytes;
 }
 
+Completed done(std::string reason) {
+  return {.outcome = Outcome::kDone, .reason = std::move(reason), .detail = {}};
+}
+
+std::string reason_of(const Reply& reply) {
+  if (const auto* refused = std::get_if<Refused>(&reply)) return refused->reason;
+  const auto* completed = std::get_if<Completed>(&reply);
+  return completed == nullptr ? "" : completed->reason;
+}
+
 }  // namespace bushd::api

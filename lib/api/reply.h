@@ -148,6 +148,11 @@ struct Reply : std::variant<Accepted, Refused, Completed> {
   ~Reply();
 };
 
+Completed done(std::string reason);
+
+// "" of one that was accepted.
+std::string reason_of(const Reply& reply);
+
 // Nothing follows it.
 inline bool is_final(const Reply& reply) {
   return !std::holds_alternative<Accepted>(reply);

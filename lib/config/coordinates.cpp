@@ -14,7 +14,6 @@ namespace {
 
 using tables::TomlReader;
 
-constexpr std::size_t kLongestUnit = 16;
 constexpr std::size_t kLongestDescription = 200;
 constexpr std::int64_t kMostSettleMs = 60'000;
 

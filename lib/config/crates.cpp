@@ -18,7 +18,7 @@ constexpr std::int64_t kLastCrate = 62;  // of a serial highway
 constexpr std::int64_t kLastStation = 23;
 constexpr std::int64_t kLeastStartHz = 1;
 constexpr std::int64_t kMostStartHz = 100;
-constexpr std::size_t kMostMotors = 32;
+constexpr std::size_t kMostOfModule = 32;
 constexpr std::size_t kMotorsPerPage = 8;
 
 // Where each motor has its place, for what follows.
@@ -72,7 +72,7 @@ Result<void> read_motors(const TomlReader& reader, const std::string& where, con
   constexpr std::string_view kRule = "1..32 names of motors";
   const auto names = reader.array("motors", kRule);
   if (!names) return fail(names.error());
-  if ((*names)->empty() || (*names)->size() > kMostMotors) {
+  if ((*names)->empty() || (*names)->size() > kMostOfModule) {
     return fail(
         reader.error("motors", fmt::format("has {}; allowed: {}", (*names)->size(), kRule)));
   }

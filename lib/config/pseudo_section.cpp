@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "config/coordinates.h"
 #include "config/words.h"
 #include "csv/number_csv.h"
 #include "tables/toml_file.h"
@@ -17,9 +18,8 @@ namespace {
 
 using tables::TomlReader;
 
-constexpr std::size_t kMostMotors = 32;
+constexpr std::size_t kMostOfPseudo = 32;
 constexpr std::size_t kMostPoints = 10'000;
-constexpr std::size_t kLongestUnit = 16;
 constexpr std::string_view kNames = "a name, or a list of names, one for each axis";
 
 // A key that has one value for one axis, and a list of them for several.
@@ -105,9 +105,9 @@ Result<std::vector<MotorId>> read_motors(const TomlReader& reader, const Config&
   constexpr std::string_view kAllowed = "a list of motors";
   const auto names = read_texts(reader, "motors", kAllowed);
   if (!names) return fail(names.error());
-  if (names->size() > kMostMotors) {
+  if (names->size() > kMostOfPseudo) {
     return fail(reader.error(
-        "motors", fmt::format("has {} elements; allowed: up to {}", names->size(), kMostMotors)));
+        "motors", fmt::format("has {} elements; allowed: up to {}", names->size(), kMostOfPseudo)));
   }
   std::vector<MotorId> motors;
   for (const std::string& name : *names) {

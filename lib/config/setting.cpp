@@ -14,8 +14,8 @@ namespace {
 constexpr std::string_view kNone = "none";
 
 // In the order of the enumeration.
-constexpr std::array<std::string_view, kSettingKeys.size()> kNames = {"offset", "direction",
-                                                                      "soft_limits"};
+constexpr std::array<std::string_view, kSettingKeys.size()> kKeyNames = {"offset", "direction",
+                                                                         "soft_limits"};
 constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
     "a number of user units", "negative, positive", "[LOWEST, HIGHEST] dial position, or none"};
 
@@ -70,7 +70,7 @@ Result<Settings> with_soft_limits(Settings settings, std::string_view text) {
 }  // namespace
 
 std::string_view name_of(SettingKey key) {
-  return kNames.at(static_cast<std::size_t>(key));
+  return kKeyNames.at(static_cast<std::size_t>(key));
 }
 
 std::optional<SettingKey> setting_key_of(std::string_view name) {

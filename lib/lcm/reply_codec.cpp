@@ -4,8 +4,10 @@
 #include <span>
 #include <utility>
 
+#include "base/overloaded.h"
 #include "lcm/camac_codec.h"
 #include "lcm/codec.h"
+#include "lcm/packet.h"
 #include "lcm/snapshot_codec.h"
 #include "lcm/table_codec.h"
 #include "lcm/wire.h"
@@ -14,17 +16,6 @@ namespace bushd::lcm {
 namespace {
 
 constexpr int kMostDecimals = units::Coordinates::kMostDecimals;
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-template <class... F>
-Overloaded(F...) -> Overloaded<F...>;
-
-std::int32_t count(const auto& elements) {
-  return static_cast<std::int32_t>(elements.size());
-}
 
 std::string text(std::string_view word) {
   return std::string(word);
@@ -113,13 +104,6 @@ void put(answer_t& answer, Piece<api::MotorResult> motors) {
   }
   answer.motor_count = count(answer.motors);
   answer.table_count = count(answer.tables);
-}
-
-template <class Message>
-bushd::Result<Packet> packet(const char* channel, const Message& message) {
-  auto payload = encode(message);
-  if (!payload) return fail(payload.error());
-  return Packet{.channel = channel, .payload = std::move(*payload)};
 }
 
 table_entry_t entry_message(const api::TableEntry& entry) {

@@ -4,6 +4,7 @@
 
 #include "lcm/camac_codec.h"
 #include "lcm/codec.h"
+#include "lcm/packet.h"
 #include "lcm/table_codec.h"
 #include "lcm/wire.h"
 
@@ -12,10 +13,6 @@ namespace {
 
 RequestId id_of(const request_t& request) {
   return {.session = request.session, .client_id = request.client_id, .number = request.number};
-}
-
-std::int32_t count(const auto& elements) {
-  return static_cast<std::int32_t>(elements.size());
 }
 
 motor_amount_t amount_message(const api::MotorAmount& motor) {
@@ -434,57 +431,51 @@ std::optional<ClientMessage> decode_get_status(Payload payload) {
   return ClientMessage{.id = id_of(message->request), .content = GetStatus{}};
 }
 
-using Decoder = std::optional<ClientMessage> (*)(Payload);
+using RequestDecoder = std::optional<ClientMessage> (*)(Payload);
 
 // A new request is a line here. Requests first, in the order of api::Request.
 constexpr std::size_t kRequests = std::variant_size_v<api::Request::variant>;
-constexpr std::array<std::pair<std::string_view, Decoder>, kRequests + 3> kDecoders = {{
-    {"MOVE", decode_request<move_t>},
-    {"STOP", decode_request<stop_t>},
-    {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
-    {"ENABLE", decode_request<enable_t>},
-    {"DISABLE", decode_request<disable_t>},
-    {"SET_POSITION", decode_request<set_position_t>},
-    {"CLEAR_FAULTS", decode_request<clear_faults_t>},
-    {"USE_TABLE", decode_request<use_table_t>},
-    {"RELOAD_TABLES", decode_request<reload_tables_t>},
-    {"HOME", decode_request<home_t>},
-    {"ARM", decode_request<arm_t>},
-    {"DISARM", decode_request<disarm_t>},
-    {"POSITION_COMPARE", decode_request<position_compare_t>},
-    {"LIST_TABLES", decode_request<list_tables_t>},
-    {"GET_TABLE", decode_request<get_table_t>},
-    {"SET_TABLE", decode_request<set_table_t>},
-    {"CONFIRM", decode_request<confirm_t>},
-    {"GET_HISTORY", decode_request<get_history_t>},
-    {"CONFIGURE", decode_request<configure_t>},
-    {"JOG", decode_request<jog_t>},
-    {"PAUSE", decode_request<pause_t>},
-    {"RESUME", decode_request<resume_t>},
-    {"HOLD", decode_request<hold_t>},
-    {"RELEASE", decode_request<release_t>},
-    {"MOVE_LINE", decode_request<move_line_t>},
-    {"CAMAC", decode_request<camac_request_t>},
-    {"MOVE_PATH", decode_request<move_path_t>},
-    {"FOLLOW", decode_request<follow_t>},
-    {"HELLO", decode_hello},
-    {"SUBSCRIBE", decode_subscription},
-    {"GET_STATUS", decode_get_status},
-}};
-static_assert(kDecoders.back().second != nullptr);
+constexpr std::array<std::pair<std::string_view, RequestDecoder>, kRequests + 3> kRequestDecoders =
+    {{
+        {"MOVE", decode_request<move_t>},
+        {"STOP", decode_request<stop_t>},
+        {"EMERGENCY_STOP", decode_request<emergency_stop_t>},
+        {"ENABLE", decode_request<enable_t>},
+        {"DISABLE", decode_request<disable_t>},
+        {"SET_POSITION", decode_request<set_position_t>},
+        {"CLEAR_FAULTS", decode_request<clear_faults_t>},
+        {"USE_TABLE", decode_request<use_table_t>},
+        {"RELOAD_TABLES", decode_request<reload_tables_t>},
+        {"HOME", decode_request<home_t>},
+        {"ARM", decode_request<arm_t>},
+        {"DISARM", decode_request<disarm_t>},
+        {"POSITION_COMPARE", decode_request<position_compare_t>},
+        {"LIST_TABLES", decode_request<list_tables_t>},
+        {"GET_TABLE", decode_request<get_table_t>},
+        {"SET_TABLE", decode_request<set_table_t>},
+        {"CONFIRM", decode_request<confirm_t>},
+        {"GET_HISTORY", decode_request<get_history_t>},
+        {"CONFIGURE", decode_request<configure_t>},
+        {"JOG", decode_request<jog_t>},
+        {"PAUSE", decode_request<pause_t>},
+        {"RESUME", decode_request<resume_t>},
+        {"HOLD", decode_request<hold_t>},
+        {"RELEASE", decode_request<release_t>},
+        {"MOVE_LINE", decode_request<move_line_t>},
+        {"CAMAC", decode_request<camac_request_t>},
+        {"MOVE_PATH", decode_request<move_path_t>},
+        {"FOLLOW", decode_request<follow_t>},
+        {"HELLO", decode_hello},
+        {"SUBSCRIBE", decode_subscription},
+        {"GET_STATUS", decode_get_status},
+    }};
+static_assert(kRequestDecoders.back().second != nullptr);
 
 constexpr auto kClientChannels = [] {
-  std::array<std::string_view, kDecoders.size()> channels;
-  for (std::size_t i = 0; i < channels.size(); ++i) channels[i] = kDecoders[i].first;
+  std::array<std::string_view, kRequestDecoders.size()> channels;
+  for (std::size_t i = 0; i < channels.size(); ++i) channels[i] = kRequestDecoders[i].first;
   return channels;
 }();
-
-template <class Message>
-bushd::Result<Packet> packet(std::string_view channel, const Message& message) {
-  auto payload = encode(message);
-  if (!payload) return fail(payload.error());
-  return Packet{.channel = std::string(channel), .payload = std::move(*payload)};
-}
 
 void put_id(request_t& request, std::int64_t utime_us, const RequestId& id) {
   request.utime_us = utime_us;
@@ -504,7 +495,7 @@ bool is_stop_channel(std::string_view channel) {
 }
 
 std::optional<ClientMessage> decode_client_message(std::string_view channel, Payload payload) {
-  for (const auto& [name, decoder] : kDecoders) {
+  for (const auto& [name, decoder] : kRequestDecoders) {
     if (name == channel) return decoder(payload);
   }
   return std::nullopt;
@@ -516,7 +507,7 @@ bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id,
       [&](const auto& content) {
         auto message = to_message(content);
         put_id(message.request, utime_us, id);
-        return packet(kDecoders[request.index()].first, message);
+        return packet(kRequestDecoders[request.index()].first, message);
       },
       request);
 }

@@ -6,14 +6,11 @@
 #include <cmath>
 #include <limits>
 
+#include "lcm/packet.h"
 #include "lcm/wire.h"
 
 namespace bushd::lcm {
 namespace {
-
-std::int32_t count(const auto& elements) {
-  return static_cast<std::int32_t>(elements.size());
-}
 
 std::int64_t number(std::uint64_t counted) {
   return static_cast<std::int64_t>(counted);
@@ -37,13 +34,6 @@ Part part_of(const auto& message) {
             .parts = message.parts};
   if constexpr (requires { message.run; }) part.run = message.run;
   return part;
-}
-
-template <class Message>
-bushd::Result<Packet> packet(const char* channel, const Message& message) {
-  auto payload = encode(message);
-  if (!payload) return fail(payload.error());
-  return Packet{.channel = channel, .payload = std::move(*payload)};
 }
 
 motor_t message_of(const api::MotorState& motor) {
@@ -274,9 +264,9 @@ std::optional<DaemonMessage> decode_camac_lam(Payload payload) {
                                  .demand = message->demand != 0}};
 }
 
-using Decoder = std::optional<DaemonMessage> (*)(Payload);
+using SnapshotDecoder = std::optional<DaemonMessage> (*)(Payload);
 
-constexpr std::array<std::pair<std::string_view, Decoder>, 10> kDecoders = {{
+constexpr std::array<std::pair<std::string_view, SnapshotDecoder>, 10> kSnapshotDecoders = {{
     {"WELCOME", decode_welcome},
     {"REPLY", decode_answer},
     {"TABLE_REPLY", decode_table_answer},
@@ -290,8 +280,8 @@ constexpr std::array<std::pair<std::string_view, Decoder>, 10> kDecoders = {{
 }};
 
 constexpr auto kDaemonChannels = [] {
-  std::array<std::string_view, kDecoders.size()> channels;
-  for (std::size_t i = 0; i < channels.size(); ++i) channels[i] = kDecoders[i].first;
+  std::array<std::string_view, kSnapshotDecoders.size()> channels;
+  for (std::size_t i = 0; i < channels.size(); ++i) channels[i] = kSnapshotDecoders[i].first;
   return channels;
 }();
 
@@ -383,7 +373,7 @@ std::span<const std::string_view> daemon_channels() {
 }
 
 std::optional<DaemonMessage> decode_daemon_message(std::string_view channel, Payload payload) {
-  for (const auto& [name, decoder] : kDecoders) {
+  for (const auto& [name, decoder] : kSnapshotDecoders) {
     if (name == channel) return decoder(payload);
   }
   return std::nullopt;

@@ -2,12 +2,10 @@
 
 #include <limits>
 
+#include "lcm/packet.h"
+
 namespace bushd::lcm {
 namespace {
-
-std::int32_t count(const auto& elements) {
-  return static_cast<std::int32_t>(elements.size());
-}
 
 // What a file cannot say becomes what it cannot say either: 0, which the check of a table names.
 std::uint16_t code(std::int32_t value) {

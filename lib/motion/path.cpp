@@ -18,10 +18,6 @@ std::uint32_t rounded_up(double delay) {
   return delay == whole ? whole : static_cast<std::uint32_t>(delay * (1 + 1e-12)) + 1;
 }
 
-bool goes_on(const PathShare& before, const PathShare& behind) {
-  return before.moves() && behind.moves() && before.direction == behind.direction;
-}
-
 bool turns(const PathShare& before, const PathShare& behind) {
   return before.moves() && behind.moves() && before.direction != behind.direction;
 }

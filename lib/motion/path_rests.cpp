@@ -8,10 +8,6 @@
 namespace bushd::motion {
 namespace {
 
-bool goes_on(const PathShare& before, const PathShare& behind) {
-  return before.moves() && behind.moves() && before.direction == behind.direction;
-}
-
 // Of a motor in so many steps of the run, but for parts of steps.
 std::int64_t own_steps(const PathShare& share, std::uint32_t steps) {
   return static_cast<std::int64_t>(std::uint64_t{share.steps} * steps / share.longest);

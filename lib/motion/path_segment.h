@@ -48,6 +48,11 @@ struct PathShare {
   std::int64_t place(bool decel, std::uint32_t delay, std::int64_t reached) const;
 };
 
+// Over the end of a segment, in its direction.
+inline bool goes_on(const PathShare& before, const PathShare& behind) {
+  return before.moves() && behind.moves() && before.direction == behind.direction;
+}
+
 // One motor's ramp: where it is on its side next to the border of the segment.
 struct PathRamp {
   const PathShare* share;

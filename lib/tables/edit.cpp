@@ -18,7 +18,7 @@ using Codes = std::vector<std::uint16_t>;
 constexpr double kNoise = 1e-6;
 constexpr double kPathNoise = 1e-9;  // of a step; a side's path is up to 131070 steps
 constexpr int kHalvings = 60;        // of a path that a double holds
-constexpr double kMaxCode = std::numeric_limits<std::uint16_t>::max();
+constexpr double kLongestCode = std::numeric_limits<std::uint16_t>::max();
 
 Result<TableContent> checked(TableContent content) {
   // A mirror image need not be written out.
@@ -59,7 +59,7 @@ Result<std::uint16_t> rounded_up(double units) {
                     "be said. Use a shorter time unit (\"bushtab resample --time-unit\")",
                     units));
   }
-  if (code <= kMaxCode) return static_cast<std::uint16_t>(code);
+  if (code <= kLongestCode) return static_cast<std::uint16_t>(code);
   return fail(
       fmt::format("a delay becomes {:.0f} time units; allowed: up to 65535. Use a longer time "
                   "unit (\"bushtab resample --time-unit\")",

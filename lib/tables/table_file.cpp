@@ -12,7 +12,7 @@
 namespace bushd::tables {
 namespace {
 
-constexpr std::int64_t kMaxCode = std::numeric_limits<std::uint16_t>::max();
+constexpr std::int64_t kLongestDelay = std::numeric_limits<std::uint16_t>::max();
 constexpr std::string_view kUnits = "(time units)";
 
 Result<std::vector<std::uint16_t>> read_codes(const TomlReader& reader, std::string_view key) {
@@ -21,7 +21,7 @@ Result<std::vector<std::uint16_t>> read_codes(const TomlReader& reader, std::str
   std::vector<std::uint16_t> codes;
   codes.reserve((*elements)->size());
   for (const toml::node& node : **elements) {
-    const auto code = reader.integer(key, codes.size(), node, 1, kMaxCode, kUnits);
+    const auto code = reader.integer(key, codes.size(), node, 1, kLongestDelay, kUnits);
     if (!code) return fail(code.error());
     codes.push_back(static_cast<std::uint16_t>(*code));
   }
@@ -48,7 +48,7 @@ Result<TableContent> read_content(const TomlReader& reader) {
     content.decel = std::move(*decel);
   }
   if (reader.has("cruise")) {
-    const auto cruise = reader.integer("cruise", 1, kMaxCode, kUnits);
+    const auto cruise = reader.integer("cruise", 1, kLongestDelay, kUnits);
     if (!cruise) return fail(cruise.error());
     content.cruise = static_cast<std::uint16_t>(*cruise);
   }

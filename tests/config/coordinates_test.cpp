@@ -16,7 +16,7 @@ using test::kGood;
 using test::replaced;
 using testing::HasSubstr;
 
-std::string with_motor(const std::string& keys) {
+std::string with_coordinates(const std::string& keys) {
   return replaced(kGood, "output = 15\n", "output = 15\n" + keys);  // from line 37 on
 }
 
@@ -33,9 +33,9 @@ TEST(ConfigCoordinates, WithoutAUnitPositionsAreSteps) {
 
 TEST(ConfigCoordinates, AllKeys) {
   const auto config =
-      ConfigFile(with_motor("description = \"lower blade\"\nunit = \"mm\"\n"
-                            "steps_per_unit = \"400/1.25\"\ndirection = \"negative\"\n"
-                            "offset = 2.5\nprecision = 3\nsoft_limits = [-5, 5.5]\n"))
+      ConfigFile(with_coordinates("description = \"lower blade\"\nunit = \"mm\"\n"
+                                  "steps_per_unit = \"400/1.25\"\ndirection = \"negative\"\n"
+                                  "offset = 2.5\nprecision = 3\nsoft_limits = [-5, 5.5]\n"))
           .load();
   ASSERT_TRUE(config.has_value()) << config.error().text();
   const Motor& motor = config->motors[1];
@@ -51,7 +51,7 @@ TEST(ConfigCoordinates, NumbersOfStepsPerUnit) {
                                     {"400", units::Ratio{400, 1}},
                                     {"\"1/3\"", units::Ratio{1, 3}}}) {
     const auto config =
-        ConfigFile(with_motor("unit = \"deg\"\nsteps_per_unit = " + std::string(text) + "\n"))
+        ConfigFile(with_coordinates("unit = \"deg\"\nsteps_per_unit = " + std::string(text) + "\n"))
             .load();
     ASSERT_TRUE(config.has_value()) << config.error().text();
     EXPECT_EQ(config->motors[1].coordinates.scale().steps_per_unit, ratio);
@@ -84,7 +84,7 @@ TEST(ConfigCoordinates, WhatCannotBeIsRefusedWithItsLineAndKey) {
            {"soft_limits = 7\n", "motor[1].soft_limits: is 7; allowed: [lowest, highest]"},
            {"description = 7\n", "motor[1].description: is 7"},
        }) {
-    const auto config = ConfigFile(with_motor(keys)).load();
+    const auto config = ConfigFile(with_coordinates(keys)).load();
     ASSERT_FALSE(config.has_value()) << keys;
     EXPECT_THAT(config.error().text(), HasSubstr(error)) << keys;
   }
@@ -94,9 +94,10 @@ TEST(ConfigCoordinates, Backlash) {
   const auto without = ConfigFile(kGood).load();
   EXPECT_EQ(without->motors[1].backlash, 0);
   EXPECT_EQ(without->motors[1].settle_ms, 0);
-  const auto config = ConfigFile(with_motor("unit = \"mm\"\nsteps_per_unit = 400\nbacklash = -0.1\n"
-                                            "backlash_speed = 0.5\nsettle_ms = 50\n"))
-                          .load();
+  const auto config =
+      ConfigFile(with_coordinates("unit = \"mm\"\nsteps_per_unit = 400\nbacklash = -0.1\n"
+                                  "backlash_speed = 0.5\nsettle_ms = 50\n"))
+          .load();
   ASSERT_TRUE(config.has_value()) << config.error().text();
   const Motor& motor = config->motors[1];
   EXPECT_EQ(motor.backlash, -0.1);
@@ -116,7 +117,7 @@ TEST(ConfigCoordinates, ABadBacklashIsRefusedWithItsLine) {
            {"backlash = 5\nbacklash_speed = 0\n", "motor[1].backlash_speed: is 0"},
            {"settle_ms = -1\n", "37:13: motor[1].settle_ms: "},
            {"settle_ms = 60001\n", "37:13: motor[1].settle_ms: "}}) {
-    const auto config = ConfigFile(with_motor(keys)).load();
+    const auto config = ConfigFile(with_coordinates(keys)).load();
     ASSERT_FALSE(config.has_value()) << keys;
     EXPECT_THAT(config.error().text(), HasSubstr(reason));
   }

@@ -86,14 +86,14 @@ TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
   }
 }
 
-struct BadKey {
+struct BadInputKey {
   std::string text;
   int line;
   const char* error;
 };
 
 TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
-  const BadKey bad[] = {
+  const BadInputKey bad[] = {
       {with_mcu("emergency_input = \"stop\"\n"), 22,
        "mcu[1].emergency_input: is \"stop\"; allowed: \"ignore\", \"ramp\" or \"immediate\""},
       {with_mcu("emergency_active = \"open\"\n"), 22,
@@ -121,7 +121,7 @@ TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_motor("input_active = \"low\"\n"), 37,
        "motor[1].input_active: is \"low\"; allowed: \"closed\" or \"open\""},
   };
-  for (const BadKey& one : bad) {
+  for (const BadInputKey& one : bad) {
     const auto config = ConfigFile(one.text).load();
     ASSERT_FALSE(config.has_value()) << one.error;
     EXPECT_EQ(config.error().line, one.line) << config.error().text();

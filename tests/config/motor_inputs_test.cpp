@@ -16,18 +16,18 @@ using test::replaced;
 using testing::HasSubstr;
 
 // Of "slit", output 15 of "roof:255"; from line 37 on.
-std::string with_motor(const std::string& keys) {
+std::string with_motor_inputs(const std::string& keys) {
   return replaced(kGood, "output = 15\n", "output = 15\n" + keys);
 }
 
 // Beside another one of that MCU, from line 38 on (after its output in 41).
 std::string with_two(const std::string& keys, const std::string& others) {
-  return with_motor(keys) + "[[motor]]\nname = \"blade\"\nmcu = \"roof:255\"\noutput = 2\n" +
+  return with_motor_inputs(keys) + "[[motor]]\nname = \"blade\"\nmcu = \"roof:255\"\noutput = 2\n" +
          others + "group = \"slits\"\n";
 }
 
 MotorInputs inputs_of(const std::string& keys) {
-  const auto config = ConfigFile(with_motor(keys)).load();
+  const auto config = ConfigFile(with_motor_inputs(keys)).load();
   EXPECT_TRUE(config.has_value()) << config.error().text();
   return config ? config->motors[1].inputs : MotorInputs{};
 }
@@ -87,7 +87,8 @@ TEST(MotorInputs, BothKindsOfKeysGoTogether) {
 
 TEST(MotorInputs, ALimitActionNeedsALimitOfEitherKind) {
   const auto config =
-      ConfigFile(with_motor("inputs = { negative = 4 }\nlimit_action = \"immediate\"\n")).load();
+      ConfigFile(with_motor_inputs("inputs = { negative = 4 }\nlimit_action = \"immediate\"\n"))
+          .load();
   ASSERT_TRUE(config.has_value()) << config.error().text();
   EXPECT_EQ(config->motors[1].limit_action, BUSHD_STOP_IMMEDIATE);
 }
@@ -104,47 +105,50 @@ TEST(MotorInputs, OneThatNobodyNeedsMayBeAnothersWithoutAWord) {
   ASSERT_TRUE(config.has_value()) << config.error().text();
 }
 
-struct BadKey {
+struct BadMotorInputKey {
   std::string text;
   int line;
   const char* error;
 };
 
 TEST(MotorInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
-  const BadKey bad[] = {
-      {with_motor("inputs = 3\n"), 37,
+  const BadMotorInputKey bad[] = {
+      {with_motor_inputs("inputs = 3\n"), 37,
        "motor[1].inputs: is 3; allowed: a table such as { positive = 3,"},
-      {with_motor("inputs = {}\n"), 37, "motor[1].inputs: is empty; allowed: a table such as"},
-      {with_motor("inputs = { left = 3 }\n"), 37,
+      {with_motor_inputs("inputs = {}\n"), 37,
+       "motor[1].inputs: is empty; allowed: a table such as"},
+      {with_motor_inputs("inputs = { left = 3 }\n"), 37,
        "motor[1].inputs.left: unknown key; allowed here: positive, negative, home, step"},
-      {with_motor("inputs = { positive = 16 }\n"), 37,
+      {with_motor_inputs("inputs = { positive = 16 }\n"), 37,
        "motor[1].inputs.positive: is 16; allowed: a whole number 0..15; or { input = N"},
-      {with_motor("inputs = { home = -1 }\n"), 37, "motor[1].inputs.home: is -1; allowed: a whole"},
-      {with_motor("inputs = { step = \"3\" }\n"), 37,
+      {with_motor_inputs("inputs = { home = -1 }\n"), 37,
+       "motor[1].inputs.home: is -1; allowed: a whole"},
+      {with_motor_inputs("inputs = { step = \"3\" }\n"), 37,
        "motor[1].inputs.step: is the string \"3\"; allowed: a whole"},
-      {with_motor("inputs = { home = { active = \"open\" } }\n"), 37,
+      {with_motor_inputs("inputs = { home = { active = \"open\" } }\n"), 37,
        "motor[1].inputs.home.input: is missing; allowed: a whole"},
-      {with_motor("inputs = { home = { input = 16 } }\n"), 37,
+      {with_motor_inputs("inputs = { home = { input = 16 } }\n"), 37,
        "motor[1].inputs.home.input: is 16; allowed: a whole"},
-      {with_motor("inputs = { home = { input = 1, level = 0 } }\n"), 37,
+      {with_motor_inputs("inputs = { home = { input = 1, level = 0 } }\n"), 37,
        "motor[1].inputs.home.level: unknown key"},
-      {with_motor("inputs = { home = { input = 1, active = \"low\" } }\n"), 37,
+      {with_motor_inputs("inputs = { home = { input = 1, active = \"low\" } }\n"), 37,
        "motor[1].inputs.home.active: is \"low\"; allowed: \"closed\" or \"open\""},
-      {with_motor("inputs = { positive = 3, home = { input = 3, active = \"open\" } }\n"), 37,
+      {with_motor_inputs("inputs = { positive = 3, home = { input = 3, active = \"open\" } }\n"),
+       37,
        "motor[1].inputs.positive: is input 3, active when closed, but as home switch of motor "
        "\"slit\" it is active when open; allowed: one level an input"},
-      {with_motor("inputs = { positive = 3, step = 3 }\n"), 37,
+      {with_motor_inputs("inputs = { positive = 3, step = 3 }\n"), 37,
        "motor[1].inputs.step: is input 3, the positive limit of motor \"slit\"; allowed: an input "
        "of its own. Connect the sensor to another input"},
-      {with_motor("limit = \"positive\"\ninputs = { positive = 3 }\n"), 38,
+      {with_motor_inputs("limit = \"positive\"\ninputs = { positive = 3 }\n"), 38,
        "motor[1].inputs.positive: is input 3, but `limit` says that the positive limit of motor "
        "\"slit\" is input 15, the number of its output; allowed: one of the two keys"},
-      {with_motor("input_active = \"closed\"\nlimit = \"negative\"\n"
-                  "inputs = { home = { input = 15, active = \"open\" } }\n"),
+      {with_motor_inputs("input_active = \"closed\"\nlimit = \"negative\"\n"
+                         "inputs = { home = { input = 15, active = \"open\" } }\n"),
        38,
        "motor[1].limit: is input 15, active when closed, but as home switch of motor \"slit\" it "
        "is active when open"},
-      {with_motor("inputs = { home = 3 }\nlimit_action = \"ramp\"\n"), 38,
+      {with_motor_inputs("inputs = { home = 3 }\nlimit_action = \"ramp\"\n"), 38,
        "motor[1].limit_action: applies only with a limit"},
       {with_two("inputs = { home = 3 }\n", "inputs = { negative = 3 }\n"), 43,
        "motor[2].inputs.negative: is input 3 of MCU \"roof:255\", the home switch of motor "
@@ -166,7 +170,7 @@ TEST(MotorInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_two("input_active = \"open\"\n", "inputs = { positive = 15 }\n"), 37,
        "motor[1].input_active: makes input 15 of MCU \"roof:255\" active when open"},
   };
-  for (const BadKey& one : bad) {
+  for (const BadMotorInputKey& one : bad) {
     const auto config = ConfigFile(one.text).load();
     ASSERT_FALSE(config.has_value()) << one.error;
     EXPECT_EQ(config.error().line, one.line) << config.error().text();

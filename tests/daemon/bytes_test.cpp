@@ -11,7 +11,7 @@
 namespace bushd::test {
 namespace {
 
-struct Way {
+struct ByteWay {
   const char* name;
   const char* manner;
   std::int64_t steps;
@@ -19,7 +19,7 @@ struct Way {
   std::int64_t most_frames = 0;  // 0: as many as it takes
 };
 
-constexpr Way kWays[] = {
+constexpr ByteWay kWays[] = {
     {.name = "TABLE_RUN", .manner = "fine_table", .steps = 200, .goal = 0.2, .most_frames = 1},
     {.name = "TABLE_TICKS", .manner = "fine", .steps = 200, .goal = 0.25, .most_frames = 1},
     {.name = "TICKS coarse", .manner = "coarse_ticks", .steps = 200, .goal = 0},
@@ -30,7 +30,7 @@ constexpr Way kWays[] = {
     {.name = "TICKS fine", .manner = "fine_ticks", .steps = 20000, .goal = 0},
 };
 
-MotionFrames sent_for(const Way& way) {
+MotionFrames sent_for(const ByteWay& way) {
   Lab lab(hall(1, 1, way.manner));
   lab.connect();
   MotionFrames sent;
@@ -45,7 +45,7 @@ MotionFrames sent_for(const Way& way) {
 TEST(Bytes, PerStepKeepTheirGoals) {
   std::printf("%-12s %8s %8s %8s %12s %8s\n", "way", "steps", "frames", "bytes", "bytes/step",
               "goal");
-  for (const Way& way : kWays) {
+  for (const ByteWay& way : kWays) {
     SCOPED_TRACE(way.name);
     const MotionFrames sent = sent_for(way);
     const std::int64_t bytes = sent.bytes + sent.delimiters;

@@ -20,7 +20,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr std::int64_t kRun = 99;
+constexpr std::int64_t kRunOfFronts = 99;
 
 bool readable(int fd) {
   pollfd polled{.fd = fd, .events = POLLIN, .revents = 0};
@@ -50,7 +50,7 @@ class FrontsTest : public testing::Test {
   Reception reception_{
       [this](const api::Asker& asker, const api::Request& request) { carry_out(asker, request); }};
   Publishing publishing_{
-      kRun,
+      kRunOfFronts,
       1,
       1,
       {.now_us = [this] { return now_us_; }, .unix_us = [] { return std::int64_t{1}; }}};
@@ -72,7 +72,7 @@ class LcmFrontTest : public FrontsTest {
     front_ = std::make_unique<LcmFront>(LcmFront::Setup{.transport = *transport_,
                                                         .prefix = "LAB",
                                                         .commands = commands,
-                                                        .run = kRun,
+                                                        .run = kRunOfFronts,
                                                         .seed = 5},
                                         reception_, publishing_, [] { return std::int64_t{1}; });
     EXPECT_TRUE(front_->subscribe());
@@ -92,7 +92,7 @@ class LcmFrontTest : public FrontsTest {
     say(lcm::encode(0, lcm::Hello{.client_id = client_id, .nonce = nonce}));
     const auto welcome = std::get<lcm::Welcome>(heard_.at(0));
     EXPECT_EQ(welcome.hello.nonce, nonce);
-    EXPECT_EQ(welcome.run, kRun);
+    EXPECT_EQ(welcome.run, kRunOfFronts);
     return welcome.session;
   }
   // The last reply to it.
@@ -160,7 +160,7 @@ class SocketFrontTest : public FrontsTest {
  protected:
   SocketFrontTest() {
     server_ = std::move(*control::Server::open(path_, ""));
-    front_ = std::make_unique<SocketFront>(*server_, kRun, reception_, publishing_,
+    front_ = std::make_unique<SocketFront>(*server_, kRunOfFronts, reception_, publishing_,
                                            [] { return std::int64_t{1}; });
     publishing_.add(*front_);
   }
@@ -240,7 +240,7 @@ TEST_F(SocketFrontTest, WhatComesAfterItsClientHasGoneIsNobodys) {
   api::Asker asker;
   Reception keep([&asker](const api::Asker& who, const api::Request&) { asker = who; });
   front_ = nullptr;
-  SocketFront front(*server_, kRun, keep, publishing_, [] { return std::int64_t{1}; });
+  SocketFront front(*server_, kRunOfFronts, keep, publishing_, [] { return std::int64_t{1}; });
   EXPECT_TRUE(scan.link->send(
       *lcm::encode(0, {.client_id = "scan", .number = 1}, api::Request(api::Stop{}))));
   while (readable(server_->fd())) front.handle();

@@ -14,7 +14,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 // 100 to 2500 steps/s; the last approach of m01 is upwards, over 40 steps.
-std::string lab_with(const std::string& keys = "", const char* manner = "fine") {
+std::string lab_with_backlash(const std::string& keys = "", const char* manner = "fine") {
   std::string toml = hall(1, 2, manner);
   const std::string motor = "output = 0\n";
   return toml.insert(toml.find(motor) + motor.size(),
@@ -43,7 +43,7 @@ Way way_of(Lab& lab, std::int64_t request) {
 TEST(Legs, AgainstTheBacklashAMoveComesBackFromBeyond) {
   for (const char* manner : {"fine", "coarse", "fine_table"}) {
     SCOPED_TRACE(manner);
-    Lab lab(lab_with("", manner));
+    Lab lab(lab_with_backlash("", manner));
     lab.connect();
     const auto down = lab.send(Ask::kMoveTo, {"m01"}, {-600});
     const Way way = way_of(lab, down);
@@ -61,7 +61,7 @@ TEST(Legs, AgainstTheBacklashAMoveComesBackFromBeyond) {
 }
 
 TEST(Legs, TheLastApproachHasItsOwnSpeed) {
-  Lab lab(lab_with("backlash_speed = 0.5\n"));
+  Lab lab(lab_with_backlash("backlash_speed = 0.5\n"));
   lab.connect();
   // Farther than the backlash, so not as slow all the way.
   const auto up = lab.send(Ask::kMoveTo, {"m01"}, {1000});
@@ -79,21 +79,21 @@ TEST(Legs, TheLastApproachHasItsOwnSpeed) {
 }
 
 TEST(Legs, ANegativeOneIsUsedFromAbove) {
-  std::string toml = lab_with();
+  std::string toml = lab_with_backlash();
   toml.replace(toml.find("0.1"), 3, "-0.1");
   Lab lab(toml);
   lab.connect();
   const auto up = lab.send(Ask::kMoveTo, {"m01"}, {600});
   EXPECT_EQ(way_of(lab, up).highest, 640);
   EXPECT_EQ(lab.shaft_steps("m01"), 600);
-  Lab turned(lab_with("direction = \"negative\"\n"));
+  Lab turned(lab_with_backlash("direction = \"negative\"\n"));
   turned.connect();
   const auto there = turned.send(Ask::kMoveTo, {"m01"}, {600});
   EXPECT_EQ(way_of(turned, there).highest, 640) << "upwards on the user's scale is down here";
 }
 
 TEST(Legs, LimitsHoldForEveryLegBeforeTheFirst) {
-  Lab lab(lab_with("soft_limits = [-1.0, 5.0]\n"));
+  Lab lab(lab_with_backlash("soft_limits = [-1.0, 5.0]\n"));
   lab.connect();
   const Answer refused = lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {-390}));
   EXPECT_EQ(refused.result, "refused");
@@ -104,7 +104,7 @@ TEST(Legs, LimitsHoldForEveryLegBeforeTheFirst) {
 }
 
 TEST(Legs, AStopEndsTheMoveInEveryLeg) {
-  Lab lab(lab_with("backlash_speed = 0.25\n"));
+  Lab lab(lab_with_backlash("backlash_speed = 0.25\n"));
   lab.connect();
   const auto first = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") <= -300; });
@@ -126,7 +126,7 @@ TEST(Legs, AStopEndsTheMoveInEveryLeg) {
 }
 
 TEST(Legs, AStopWhereALegEndsIsNoArrival) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_backlash());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") == -640; });
@@ -136,7 +136,7 @@ TEST(Legs, AStopWhereALegEndsIsNoArrival) {
 }
 
 TEST(Legs, ANewTargetInAnyLegIsReachedFromTheRightSide) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_backlash());
   lab.connect();
   for (const int at : {-200, -630}) {
     SCOPED_TRACE(at);
@@ -155,7 +155,7 @@ TEST(Legs, ANewTargetInAnyLegIsReachedFromTheRightSide) {
 }
 
 TEST(Legs, ALostLinkEndsTheMoveInTheFirstLeg) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_backlash());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") <= -300; });
@@ -169,7 +169,7 @@ TEST(Legs, ALostLinkEndsTheMoveInTheFirstLeg) {
 }
 
 TEST(Legs, TheResultComesWhenItHasSettled) {
-  Lab lab(lab_with("settle_ms = 800\n"));
+  Lab lab(lab_with_backlash("settle_ms = 800\n"));
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-200});
   lab.run_until([&] { return lab.shaft_steps("m01") == -240; });
@@ -189,7 +189,7 @@ TEST(Legs, TheResultComesWhenItHasSettled) {
 }
 
 TEST(Legs, ANewTargetWhileItSettlesIsGoneTo) {
-  Lab lab(lab_with("settle_ms = 800\n"));
+  Lab lab(lab_with_backlash("settle_ms = 800\n"));
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {100});
   lab.run_until([&] { return lab.shaft_steps("m01") == 100; });
@@ -200,7 +200,7 @@ TEST(Legs, ANewTargetWhileItSettlesIsGoneTo) {
 }
 
 TEST(Legs, ADryRunShowsThem) {
-  Lab lab(lab_with("backlash_speed = 0.25\n"));
+  Lab lab(lab_with_backlash("backlash_speed = 0.25\n"));
   lab.connect();
   const Answer planned = lab.wait(lab.send(api::Move{.kind = api::Move::Kind::kAbsolute,
                                                      .motors = {{"m01", -600}, {"m02", 50}},
@@ -218,7 +218,7 @@ TEST(Legs, ADryRunShowsThem) {
 }
 
 TEST(Legs, TheMotorIsMarkedAsMovingFromTheFirstToTheLast) {
-  Lab lab(lab_with("settle_ms = 500\n"));
+  Lab lab(lab_with_backlash("settle_ms = 500\n"));
   lab.keep_positions();
   lab.connect();
   lab.run_for(1);

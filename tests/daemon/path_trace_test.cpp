@@ -19,7 +19,7 @@
 namespace bushd::test {
 namespace {
 
-const std::vector<std::string> kMotors{"m01", "m03", "m04"};
+const std::vector<std::string> kTraced{"m01", "m03", "m04"};
 
 class PathTrace : public testing::TestWithParam<const char*> {
  protected:
@@ -76,7 +76,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, PathTrace, testing::Values("fine", "coarse"),
 TEST_P(PathTrace, EveryEdgeIsOnThePath) {
   Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   lab.connect();
-  const auto move = lab.send(api::MovePath{.motors = kMotors, .rows = 63, .positions = points()});
+  const auto move = lab.send(api::MovePath{.motors = kTraced, .rows = 63, .positions = points()});
   for (int pause = 0; pause < 3; ++pause) {
     lab.run_for(0.8);
     lab.wait(lab.send(api::Pause{}));

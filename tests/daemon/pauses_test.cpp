@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string lab_with(const std::string& keys = "", const char* manner = "fine") {
+std::string lab_with_keys(const std::string& keys = "", const char* manner = "fine") {
   std::string toml = hall(1, 3, manner);
   const std::string motor = "output = 0\n";
   return toml.insert(toml.find(motor) + motor.size(), keys);
@@ -21,7 +21,7 @@ std::string lab_with(const std::string& keys = "", const char* manner = "fine") 
 TEST(Pauses, KeepTheTargetAndTheMove) {
   for (const char* manner : {"fine", "coarse", "fine_table", "coarse_ticks"}) {
     SCOPED_TRACE(manner);
-    Lab lab(lab_with("", manner));
+    Lab lab(lab_with_keys("", manner));
     lab.connect();
     const auto move = lab.send(Ask::kMoveTo, {"m01", "m02"}, {2000, 800});
     lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
@@ -45,7 +45,7 @@ TEST(Pauses, KeepTheTargetAndTheMove) {
 }
 
 TEST(Pauses, AreTakenBackWhileItRampsDown) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {3000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1000; });
@@ -57,7 +57,7 @@ TEST(Pauses, AreTakenBackWhileItRampsDown) {
 }
 
 TEST(Pauses, OfAGroupAreOfItsMotors) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01", "m03"}, {2000, -2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
@@ -70,7 +70,7 @@ TEST(Pauses, OfAGroupAreOfItsMotors) {
 }
 
 TEST(Pauses, AStopEndsThePausedMove) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
@@ -87,7 +87,7 @@ TEST(Pauses, AStopEndsThePausedMove) {
 }
 
 TEST(Pauses, ANewTargetEndsThem) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
@@ -99,7 +99,7 @@ TEST(Pauses, ANewTargetEndsThem) {
 
 // Before any report has told that it was stopped where it stood.
 TEST(Pauses, ANewTargetRightAfterAStopBeginsFromRest) {
-  Lab lab(lab_with("backlash = 40\n"));
+  Lab lab(lab_with_keys("backlash = 40\n"));
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
@@ -120,7 +120,7 @@ TEST(Pauses, ANewTargetRightAfterAStopBeginsFromRest) {
 }
 
 TEST(Pauses, HoldInEveryLeg) {
-  Lab lab(lab_with("backlash = 40\nbacklash_speed = 200.0\n"));
+  Lab lab(lab_with_keys("backlash = 40\nbacklash_speed = 200.0\n"));
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") <= -300; });
@@ -139,7 +139,7 @@ TEST(Pauses, HoldInEveryLeg) {
 }
 
 TEST(Pauses, BetweenTwoLegsTheNextOneWaits) {
-  Lab lab(lab_with("backlash = 40\n"));
+  Lab lab(lab_with_keys("backlash = 40\n"));
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") == -640; });
@@ -153,7 +153,7 @@ TEST(Pauses, BetweenTwoLegsTheNextOneWaits) {
 }
 
 TEST(Pauses, ALostLinkEndsThePausedMove) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
@@ -167,7 +167,7 @@ TEST(Pauses, ALostLinkEndsThePausedMove) {
 }
 
 TEST(Pauses, APausedMotorIsNotTakenForOneAtRest) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.keep_positions();
   lab.connect();
   lab.send(Ask::kMoveTo, {"m01"}, {2000});
@@ -184,7 +184,7 @@ TEST(Pauses, APausedMotorIsNotTakenForOneAtRest) {
 }
 
 TEST(Pauses, EndJogs) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.connect();
   const auto jog = lab.send(api::Jog{.motor = "m01", .per_s = 500, .in_steps = true});
   lab.run_for(0.3);
@@ -194,7 +194,7 @@ TEST(Pauses, EndJogs) {
 }
 
 TEST(Holds, RefuseWhatWouldBegin) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {1000});
   lab.run_for(0.1);
@@ -215,7 +215,7 @@ TEST(Holds, RefuseWhatWouldBegin) {
 }
 
 TEST(Holds, KeepAPausedMotorWhereItIs) {
-  Lab lab(lab_with());
+  Lab lab(lab_with_keys());
   lab.connect();
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });

@@ -13,7 +13,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr std::int64_t kTickNs = 2'560'000;
+constexpr std::int64_t kBusTickNs = 2'560'000;
 
 // Rising edges of STEP and of the position compare output.
 class Pins : public sim::EdgeSink {
@@ -72,7 +72,7 @@ class Triggered : public testing::TestWithParam<const char*> {
       at_ns += delay * table.time_unit_ns;
       // Its MCU keeps in step with the bus by a few us.
       ASSERT_LE(steps[j], at_ns + 5'000) << j;
-      ASSERT_GE(steps[j], at_ns - kTickNs / 256 - 5'000) << j;
+      ASSERT_GE(steps[j], at_ns - kBusTickNs / 256 - 5'000) << j;
     }
   }
   static const tables::Table& lab_table() {
@@ -104,16 +104,16 @@ TEST_P(Triggered, MovesBeginThreeTicksAndTheirDelayAfterTheEdge) {
     EXPECT_NE(lab.motor("m01").activity, api::Activity::kArmed);
     const auto& all = pins.steps(0, 0);
     expect_table({all.begin() + static_cast<std::ptrdiff_t>(before), all.end()},
-                 static_cast<std::size_t>(std::abs(steps)), edge_ns + 3 * kTickNs + 12'345'000);
+                 static_cast<std::size_t>(std::abs(steps)), edge_ns + 3 * kBusTickNs + 12'345'000);
     EXPECT_EQ(pins.steps(0, 0), pins.steps(0, 2)) << "in the same slots";
     const auto line = nlohmann::json::parse(*std::find_if(
         lab.move_lines().rbegin(), lab.move_lines().rend(),
         [](const std::string& text) { return text.find("\"event\":\"move\"") != text.npos; }));
     EXPECT_EQ(line["moves"], "table");
     EXPECT_EQ(line["from_steps"], from);
-    EXPECT_EQ(
-        (line["start_tick"].get<std::int64_t>() * kTickNs + line.value("late_ns", 0)) % kTickNs,
-        line.value("late_ns", 0));
+    EXPECT_EQ((line["start_tick"].get<std::int64_t>() * kBusTickNs + line.value("late_ns", 0)) %
+                  kBusTickNs,
+              line.value("late_ns", 0));
   }
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_TRUE(lab.errors().empty());

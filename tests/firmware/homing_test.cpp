@@ -34,19 +34,18 @@ class Contact {
   std::mt19937 noise_{7};
 };
 
-constexpr std::uint8_t kMotor = 1;
-constexpr std::uint16_t kSlow = 1000;  // 10 ms, the slowest step of ramp_law
+constexpr std::uint8_t kHomed = 1;
 
 class Homing : public Streams {
  protected:
   static bushd_home command(int direction = -1, std::int32_t position = 0) {
-    return {kMotor, static_cast<std::int8_t>(direction), 5000, 0, 400, kSlow, position};
+    return {kHomed, static_cast<std::int8_t>(direction), 5000, 0, 400, kSlow, position};
   }
   void put(Contact contact) {
     contact_ = contact;
     rig.sense = [this] {
-      const bool active = contact_.read(rig.pulses(kMotor) + plus_);
-      return bushd_inputs{static_cast<std::uint16_t>(active ? 1u << kMotor : 0u), system};
+      const bool active = contact_.read(rig.pulses(kHomed) + plus_);
+      return bushd_inputs{static_cast<std::uint16_t>(active ? 1u << kHomed : 0u), system};
     };
   }
   bushd_report homed() {
@@ -55,7 +54,7 @@ class Homing : public Streams {
   }
   // Where the steps say it stands, from where the counter was set.
   void expect_counted(std::int64_t offset) {
-    EXPECT_EQ(rig.poll().motor[kMotor].position_steps, rig.pulses(kMotor) + offset);
+    EXPECT_EQ(rig.poll().motor[kHomed].position_steps, rig.pulses(kHomed) + offset);
     EXPECT_EQ(rig.steps_with_dir(), 0);
     EXPECT_EQ(rig.steps_while_disabled(), 0);
   }
@@ -70,23 +69,23 @@ INSTANTIATE_TEST_SUITE_P(Formats, Homing, testing::Values(BUSHD_FORMAT_FINE, BUS
 TEST_P(Homing, SetsThePositionAtTheSwitch) {
   for (const int direction : {-1, 1}) {
     Homing::rig.forget_history();
-    const std::int64_t before = rig.pulses(kMotor);
+    const std::int64_t before = rig.pulses(kHomed);
     const std::int64_t at = before + direction * 700;
     put(Contact(at, direction, 5));
     ASSERT_EQ(rig.home(command(direction, 1000)), BUSHD_OK);
-    EXPECT_EQ(rig.poll().autonomous, 1 << kMotor);
-    EXPECT_EQ(rig.poll().moving, 1 << kMotor);
-    EXPECT_EQ(rig.poll().running, 1 << kMotor);
+    EXPECT_EQ(rig.poll().autonomous, 1 << kHomed);
+    EXPECT_EQ(rig.poll().moving, 1 << kHomed);
+    EXPECT_EQ(rig.poll().running, 1 << kHomed);
     EXPECT_EQ(rig.poll().homed, 0);
     const bushd_report report = homed();
     EXPECT_EQ(report.homing, BUSHD_HOMING_DONE);
-    EXPECT_EQ(report.homed, 1 << kMotor);
+    EXPECT_EQ(report.homed, 1 << kHomed);
     EXPECT_EQ(report.autonomous, 0);
     EXPECT_EQ(report.faults, 0);
     EXPECT_EQ(report.state, BUSHD_STATE_READY);
     expect_counted(1000 - at);
-    EXPECT_LE(std::abs(rig.pulses(kMotor) - at), 1) << "it stands where it found it";
-    ASSERT_EQ(rig.set_position(kMotor, 0), BUSHD_OK);
+    EXPECT_LE(std::abs(rig.pulses(kHomed) - at), 1) << "it stands where it found it";
+    ASSERT_EQ(rig.set_position(kHomed, 0), BUSHD_OK);
   }
 }
 
@@ -96,7 +95,7 @@ TEST_P(Homing, GoesFastByTheTableUntilTheSwitchAndRampsDown) {
   rig.forget_history();
   rig.pass(3);
   while (rig.poll().homing == BUSHD_HOMING_FAST) rig.pass();
-  const std::size_t ticks = rig.history(kMotor).size();
+  const std::size_t ticks = rig.history(kHomed).size();
   while (rig.poll().homing == BUSHD_HOMING_RAMP_DOWN) rig.pass();
   // The reading came in the tick that was being emitted then; the one after it is the first
   // changed.
@@ -104,7 +103,7 @@ TEST_P(Homing, GoesFastByTheTableUntilTheSwitchAndRampsDown) {
   reference.ramp_down_at((ticks - 1) * std::uint64_t{Rig::kTickNs});
   std::vector<int> expected = steps_by_tick(reference, Rig::kTickNs);
   for (int& n : expected) n = -n;
-  std::vector<int> seen(rig.history(kMotor).begin() + 2, rig.history(kMotor).end());
+  std::vector<int> seen(rig.history(kHomed).begin() + 2, rig.history(kHomed).end());
   expected.resize(seen.size());
   EXPECT_EQ(seen, expected);
   EXPECT_EQ(homed().homing, BUSHD_HOMING_DONE);
@@ -118,7 +117,7 @@ TEST_P(Homing, OnTheSwitchItBacksOffFirst) {
   std::int64_t least = 0;
   while (rig.poll().moving != 0) {
     rig.pass();
-    least = std::min(least, rig.pulses(kMotor));
+    least = std::min(least, rig.pulses(kHomed));
   }
   EXPECT_EQ(least, 0) << "not a step farther in";
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_DONE);
@@ -130,12 +129,12 @@ TEST_P(Homing, FromRandomPlacesWithBounceItIsTheSameToOneStep) {
   for (int i = 0; i < 50; ++i) {
     SCOPED_TRACE(i);
     // Three readings of bounce are within one slow step.
-    const std::int64_t at = rig.pulses(kMotor) - static_cast<std::int64_t>(random() % 2000) + 20;
+    const std::int64_t at = rig.pulses(kHomed) - static_cast<std::int64_t>(random() % 2000) + 20;
     put(Contact(at, -1, 6, 3));
     for (int n = 0; n < 5; ++n) rig.pass();
     ASSERT_EQ(rig.home(command()), BUSHD_OK);
     ASSERT_EQ(homed().homing, BUSHD_HOMING_DONE);
-    const std::int64_t off = rig.poll().motor[kMotor].position_steps - (rig.pulses(kMotor) - at);
+    const std::int64_t off = rig.poll().motor[kHomed].position_steps - (rig.pulses(kHomed) - at);
     ASSERT_GE(off, 0);
     ASSERT_LE(off, 1);
   }
@@ -149,15 +148,15 @@ TEST_P(Homing, SwitchNeverFound) {
   EXPECT_EQ(report.homed, 0);
   EXPECT_EQ(report.autonomous, 0);
   EXPECT_EQ(report.faults, 0);
-  EXPECT_EQ(rig.pulses(kMotor), -5000);
+  EXPECT_EQ(rig.pulses(kHomed), -5000);
   expect_counted(0);
 }
 
 TEST_P(Homing, SwitchThatStaysActiveAndOneThatIsLost) {
-  rig.pins({1 << kMotor, 0});
+  rig.pins({1 << kHomed, 0});
   ASSERT_EQ(rig.home(command()), BUSHD_OK);
   EXPECT_EQ(homed().homing, BUSHD_HOMING_STUCK);
-  EXPECT_EQ(rig.pulses(kMotor), 400);
+  EXPECT_EQ(rig.pulses(kHomed), 400);
   expect_counted(0);
 
   ASSERT_EQ(rig.home(command()), BUSHD_OK);
@@ -178,8 +177,8 @@ TEST_P(Homing, CanBeGivenUpInEveryStage) {
     fresh.make_ready(law, format, 1000);
     Contact contact(-300, -1, 5);
     fresh.sense = [&] {
-      const bool active = contact.read(fresh.pulses(kMotor));
-      return bushd_inputs{static_cast<std::uint16_t>(active ? 1u << kMotor : 0u), 0};
+      const bool active = contact.read(fresh.pulses(kHomed));
+      return bushd_inputs{static_cast<std::uint16_t>(active ? 1u << kHomed : 0u), 0};
     };
     ASSERT_EQ(fresh.home(command()), BUSHD_OK);
     fresh.pass(n);
@@ -190,7 +189,7 @@ TEST_P(Homing, CanBeGivenUpInEveryStage) {
     fresh.pass_until_rest();
     ASSERT_EQ(fresh.poll().homing, BUSHD_HOMING_STOPPED) << n;
     ASSERT_EQ(fresh.poll().autonomous, 0);
-    ASSERT_EQ(fresh.poll().motor[kMotor].position_steps, fresh.pulses(kMotor));
+    ASSERT_EQ(fresh.poll().motor[kHomed].position_steps, fresh.pulses(kHomed));
     ASSERT_EQ(fresh.poll().faults, 0);
     ASSERT_EQ(fresh.steps_with_dir(), 0);
   }
@@ -208,7 +207,7 @@ TEST_P(Homing, AnotherMotorWaitsUntilTheLastSlowStepIsOver) {
   ASSERT_EQ(rig.home(give_up), BUSHD_OK);
   rig.pass();
   ASSERT_EQ(rig.poll().homing, BUSHD_HOMING_STOPPED);
-  ASSERT_EQ(rig.poll().moving, 1 << kMotor);
+  ASSERT_EQ(rig.poll().moving, 1 << kHomed);
   EXPECT_EQ(rig.home(other), BUSHD_E_STATE);
   rig.pass_until_rest();
   expect_counted(0);
@@ -221,14 +220,14 @@ TEST_P(Homing, EmergencyEndsIt) {
     fresh.make_ready(law, format, 1000);
     ASSERT_EQ(fresh.home(command()), BUSHD_OK);
     fresh.pass(100);
-    const std::int64_t at = fresh.pulses(kMotor);
+    const std::int64_t at = fresh.pulses(kHomed);
     fresh.emergency(mode);
     fresh.pass_until_rest();
     EXPECT_EQ(fresh.poll().homing, BUSHD_HOMING_STOPPED);
     EXPECT_EQ(fresh.poll().faults, BUSHD_FAULT_EMERGENCY);
-    EXPECT_EQ(fresh.poll().motor[kMotor].position_steps, fresh.pulses(kMotor));
+    EXPECT_EQ(fresh.poll().motor[kHomed].position_steps, fresh.pulses(kHomed));
     if (mode == BUSHD_STOP_IMMEDIATE) {
-      EXPECT_LE(at - fresh.pulses(kMotor), 7) << "two ticks at cruise";
+      EXPECT_LE(at - fresh.pulses(kHomed), 7) << "two ticks at cruise";
     }
     EXPECT_EQ(fresh.home(command()), BUSHD_E_STATE) << "latched";
   }
@@ -236,15 +235,15 @@ TEST_P(Homing, EmergencyEndsIt) {
 
 // Short lever: the ramp overruns it, and the switch no longer tells that the motor is beyond.
 TEST_P(Homing, EndedBetweenOverrunAndBackOffTheSwitchBarsTheWayOn) {
-  constexpr std::uint16_t kBit = 1u << kMotor;
+  constexpr std::uint16_t kBit = 1u << kHomed;
   ASSERT_EQ(rig.set_inputs({.limit_negative = kBit}), BUSHD_OK);
   rig.sense = [this] {
-    const std::int64_t at = rig.pulses(kMotor);
+    const std::int64_t at = rig.pulses(kHomed);
     return bushd_inputs{at <= -700 && at > -708 ? kBit : std::uint16_t{0}, 0};
   };
   ASSERT_EQ(rig.home(command()), BUSHD_OK);
   while (rig.poll().homing == BUSHD_HOMING_FAST) rig.pass();
-  while (rig.pulses(kMotor) > -708) rig.pass();
+  while (rig.pulses(kHomed) > -708) rig.pass();
   ASSERT_EQ(rig.poll().homing, BUSHD_HOMING_RAMP_DOWN);
   rig.emergency(BUSHD_STOP_IMMEDIATE);
   rig.pass_until_rest();
@@ -254,12 +253,12 @@ TEST_P(Homing, EndedBetweenOverrunAndBackOffTheSwitchBarsTheWayOn) {
   EXPECT_EQ(rig.poll().forbidden_positive, 0);
   ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
   EXPECT_EQ(rig.home(command()), BUSHD_E_FORBIDDEN);
-  rig.run_plan(plan(100), kMotor);
+  rig.run_plan(plan(100), kHomed);
   EXPECT_EQ(rig.poll().forbidden_negative, 0) << "it has left it";
 }
 
 TEST_P(Homing, EndedWhereTheSwitchIsReleasedNothingIsBarred) {
-  constexpr std::uint16_t kBit = 1u << kMotor;
+  constexpr std::uint16_t kBit = 1u << kHomed;
   ASSERT_EQ(rig.set_inputs({.limit_negative = kBit}), BUSHD_OK);
   put(Contact(-700, -1, 5));
   ASSERT_EQ(rig.home(command()), BUSHD_OK);
@@ -279,8 +278,8 @@ TEST_P(Homing, RunsDownWhenTheHostFallsSilent) {
   EXPECT_EQ(report.homing, BUSHD_HOMING_STOPPED);
   EXPECT_EQ(report.faults, BUSHD_FAULT_LINK);
   EXPECT_EQ(report.ramp_downs, 1);
-  EXPECT_LT(report.motor[kMotor].position_steps, -20);
-  EXPECT_GT(report.motor[kMotor].position_steps, -200);
+  EXPECT_LT(report.motor[kHomed].position_steps, -20);
+  EXPECT_GT(report.motor[kHomed].position_steps, -200);
   expect_counted(0);
 }
 
@@ -296,27 +295,27 @@ TEST_P(Homing, MeanwhileTheMotorIsItsOwnAndOthersMove) {
   EXPECT_EQ(rig.home(other), BUSHD_OK) << "there is nothing to give up";
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_FAST);
   Ticks start = ones(kStart, rig.first_open(), 5, 0);
-  start.mask = 1 << kMotor;
+  start.mask = 1 << kHomed;
   EXPECT_EQ(rig.take(start), BUSHD_E_STATE);
-  EXPECT_EQ(rig.set_position(kMotor, 5), BUSHD_E_STATE);
-  EXPECT_EQ(rig.assign(kMotor, 0), BUSHD_E_STATE);
+  EXPECT_EQ(rig.set_position(kHomed, 5), BUSHD_E_STATE);
+  EXPECT_EQ(rig.assign(kHomed, 0), BUSHD_E_STATE);
   EXPECT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_E_STATE);
   rig.run_plan(plan(40), 0);
   EXPECT_EQ(rig.pulses(0), 40);
   EXPECT_EQ(homed().homing, BUSHD_HOMING_DONE);
   expect_counted(900);
-  rig.run_plan(plan(60), kMotor);
+  rig.run_plan(plan(60), kHomed);
   expect_counted(900);
 }
 
 TEST_P(Homing, TheSwitchMayBeALimitAndBarsTheWayAfterwards) {
-  constexpr std::uint16_t kBit = 1u << kMotor;
+  constexpr std::uint16_t kBit = 1u << kHomed;
   for (const bool both_ends : {false, true}) {
     ASSERT_EQ(rig.set_inputs({.limit_positive = both_ends ? kBit : std::uint16_t{0},
                               .limit_negative = kBit,
                               .limit_immediate = kBit}),
               BUSHD_OK);
-    put(Contact(rig.pulses(kMotor) - 500, -1, 5));
+    put(Contact(rig.pulses(kHomed) - 500, -1, 5));
     ASSERT_EQ(rig.home(command()), BUSHD_OK);
     ASSERT_EQ(homed().homing, BUSHD_HOMING_DONE);
     EXPECT_EQ(rig.poll().forbidden_negative, kBit);
@@ -325,14 +324,14 @@ TEST_P(Homing, TheSwitchMayBeALimitAndBarsTheWayAfterwards) {
     back.mask = kBit;
     back.displacements = {two_back()};
     EXPECT_EQ(rig.take(back), BUSHD_E_FORBIDDEN);
-    rig.run_plan(plan(60), kMotor);
+    rig.run_plan(plan(60), kHomed);
     EXPECT_EQ(rig.poll().forbidden_negative, 0) << "it has left it";
-    ASSERT_EQ(rig.set_position(kMotor, static_cast<std::int32_t>(rig.pulses(kMotor))), BUSHD_OK);
+    ASSERT_EQ(rig.set_position(kHomed, static_cast<std::int32_t>(rig.pulses(kHomed))), BUSHD_OK);
   }
 }
 
 TEST_P(Homing, BehindASwitchThatItHasOverrunItIsNotLookedFor) {
-  constexpr std::uint16_t kBit = 1u << kMotor;
+  constexpr std::uint16_t kBit = 1u << kHomed;
   ASSERT_EQ(rig.set_inputs({.limit_positive = kBit, .limit_negative = kBit}), BUSHD_OK);
   ASSERT_EQ(rig.home(command()), BUSHD_OK);
   rig.pass(100);
@@ -358,7 +357,7 @@ TEST_P(Homing, BadCommandsAreRefused) {
   Law slow = law;
   slow.accel = slow.decel = {50};
   ASSERT_EQ(rig.upload(1, slow), BUSHD_OK);
-  ASSERT_EQ(rig.assign(kMotor, 1), BUSHD_OK);
+  ASSERT_EQ(rig.assign(kHomed, 1), BUSHD_OK);
   bad.slow_delay = 255;
   EXPECT_EQ(rig.home(bad), BUSHD_E_FORMAT) << "2 ms, faster than a step a tick";
   EXPECT_EQ(rig.request(BUSHD_MSG_HOME, {1, 2, 3}), BUSHD_E_LENGTH);

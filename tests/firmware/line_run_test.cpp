@@ -105,16 +105,16 @@ class LineRun : public Streams {
 INSTANTIATE_TEST_SUITE_P(Formats, LineRun, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
                          format_name);
 
-const std::vector<Motor> kMotors = {{0, 333}, {1, -118}, {2, 1}, {3, 332}};
+const std::vector<Motor> kOnLine = {{0, 333}, {1, -118}, {2, 1}, {3, 332}};
 
 TEST_P(LineRun, EveryStepFallsIntoItsSlot) {
   std::array<std::int64_t, 4> at{};
   for (const std::uint16_t floor : {std::uint16_t{0}, static_cast<std::uint16_t>(law.cruise + 3)}) {
     const Frame line{
-        .first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .floor = floor};
+        .first = rig.first_open() + 3, .motors = kOnLine, .longest = 333, .floor = floor};
     ASSERT_EQ(start(rig, line), BUSHD_OK);
     expect_slots(rig, Reference::move(law, 333, floor), line);
-    for (const Motor& motor : kMotors) at[motor.number] += motor.steps;
+    for (const Motor& motor : kOnLine) at[motor.number] += motor.steps;
   }
   for (std::size_t m = 0; m < 4; ++m) EXPECT_EQ(rig.poll().motor[m].position_steps, at[m]);
   EXPECT_EQ(rig.steps_with_dir(), 0);
@@ -139,7 +139,7 @@ TEST_P(LineRun, IsExactInTicksThatAreNoWholeUnits) {
   for (std::uint16_t& code : odd.decel) code = static_cast<std::uint16_t>(code * 11);
   Rig other({.queue_ticks = 256});
   other.make_ready(odd, format);
-  const Frame line{.first = other.first_open() + 3, .motors = kMotors, .longest = 333};
+  const Frame line{.first = other.first_open() + 3, .motors = kOnLine, .longest = 333};
   ASSERT_EQ(start(other, line), BUSHD_OK);
   expect_slots(other, Reference::move(odd, 333), line);
 }
@@ -285,7 +285,7 @@ TEST_P(LineRun, IsRampedDownAlongTheLineWhenNoSyncTellsTheTime) {
   constexpr std::uint16_t kSilence = 60;
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, kSilence), BUSHD_OK);
   const std::uint32_t first = rig.first_open();
-  ASSERT_EQ(start(rig, {.first = first, .motors = kMotors, .longest = 333}), BUSHD_OK);
+  ASSERT_EQ(start(rig, {.first = first, .motors = kOnLine, .longest = 333}), BUSHD_OK);
   rig.pass(20);
   const std::uint32_t told = rig.tick() - 7;
   rig.sync(sync_telling(rig, 7000, told));
@@ -299,7 +299,7 @@ TEST_P(LineRun, IsRampedDownAlongTheLineWhenNoSyncTellsTheTime) {
   auto run = Reference::move(law, 333);
   run.ramp_down_at(std::uint64_t{told + kSilence - first} * Rig::kTickNs);
   ASSERT_LT(run.steps(), 333u);
-  expect_on_line(rig, kMotors, 333, static_cast<std::uint32_t>(run.steps()));
+  expect_on_line(rig, kOnLine, 333, static_cast<std::uint32_t>(run.steps()));
   const bushd_report report = rig.poll();
   EXPECT_EQ(report.faults, BUSHD_FAULT_LINK);
   EXPECT_EQ(report.ramp_downs, 4);
@@ -311,17 +311,17 @@ TEST_P(LineRun, GoesOnForThatLongFromItsBeginning) {
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, kSilence), BUSHD_OK);
   rig.sync(sync_telling(rig, 7000, rig.tick()));
   const std::uint32_t first = rig.first_open() + 40;
-  ASSERT_EQ(start(rig, {.first = first, .motors = kMotors, .longest = 333}), BUSHD_OK);
+  ASSERT_EQ(start(rig, {.first = first, .motors = kOnLine, .longest = 333}), BUSHD_OK);
   rig.pass_until_rest();
   auto run = Reference::move(law, 333);
   run.ramp_down_at(std::uint64_t{kSilence} * Rig::kTickNs);
-  expect_on_line(rig, kMotors, 333, static_cast<std::uint32_t>(run.steps()));
+  expect_on_line(rig, kOnLine, 333, static_cast<std::uint32_t>(run.steps()));
   EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_LINK);
 }
 
 TEST_P(LineRun, ThatWaitsIsCancelledBySilence) {
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, 30), BUSHD_OK);
-  ASSERT_EQ(start(rig, {.first = rig.first_open() + 100, .motors = kMotors, .longest = 333}),
+  ASSERT_EQ(start(rig, {.first = rig.first_open() + 100, .motors = kOnLine, .longest = 333}),
             BUSHD_OK);
   rig.pass(28);
   EXPECT_EQ(rig.poll().faults, 0);
@@ -330,7 +330,7 @@ TEST_P(LineRun, ThatWaitsIsCancelledBySilence) {
   EXPECT_EQ(rig.poll().ramp_downs, 0);
   EXPECT_EQ(rig.poll().moving, 0);
   EXPECT_EQ(rig.mcu().line.motors, 0);
-  for (const Motor& motor : kMotors) EXPECT_EQ(rig.pulses(motor.number), 0);
+  for (const Motor& motor : kOnLine) EXPECT_EQ(rig.pulses(motor.number), 0);
 }
 
 TEST_P(LineRun, EmergencyRampLeadsAlongTheLine) {
@@ -338,7 +338,7 @@ TEST_P(LineRun, EmergencyRampLeadsAlongTheLine) {
     Rig fresh({.queue_ticks = 256});
     fresh.make_ready(law, format);
     const std::uint32_t first = fresh.first_open();
-    ASSERT_EQ(start(fresh, {.first = first, .motors = kMotors, .longest = 333}), BUSHD_OK);
+    ASSERT_EQ(start(fresh, {.first = first, .motors = kOnLine, .longest = 333}), BUSHD_OK);
     fresh.pass(wait);
     const std::uint32_t from = fresh.first_open();
     fresh.emergency(BUSHD_STOP_RAMP);
@@ -347,14 +347,14 @@ TEST_P(LineRun, EmergencyRampLeadsAlongTheLine) {
     run.ramp_down_at(std::uint64_t{from - first} * Rig::kTickNs);
     SCOPED_TRACE(wait);
     // One that has not begun does not begin.
-    expect_on_line(fresh, kMotors, 333, wait == 0 ? 0 : static_cast<std::uint32_t>(run.steps()));
+    expect_on_line(fresh, kOnLine, 333, wait == 0 ? 0 : static_cast<std::uint32_t>(run.steps()));
     EXPECT_EQ(fresh.poll().faults, BUSHD_FAULT_EMERGENCY);
     EXPECT_EQ(fresh.mcu().line.motors, 0);
   }
 }
 
 TEST_P(LineRun, ImmediateStopEndsItBetweenTwoSteps) {
-  ASSERT_EQ(start(rig, {.first = rig.first_open(), .motors = kMotors, .longest = 333}), BUSHD_OK);
+  ASSERT_EQ(start(rig, {.first = rig.first_open(), .motors = kOnLine, .longest = 333}), BUSHD_OK);
   rig.pass(40);
   rig.emergency(BUSHD_STOP_IMMEDIATE);
   rig.pass(3);
@@ -371,7 +371,7 @@ TEST_P(LineRun, ImmediateStopEndsItBetweenTwoSteps) {
 // By its own table, from the speed that it has; the others go on.
 TEST_P(LineRun, MotorThatMeetsALimitLeavesIt) {
   ASSERT_EQ(rig.set_inputs({.limit_positive = 1 << 3}), BUSHD_OK);
-  ASSERT_EQ(start(rig, {.first = rig.first_open(), .motors = kMotors, .longest = 333}), BUSHD_OK);
+  ASSERT_EQ(start(rig, {.first = rig.first_open(), .motors = kOnLine, .longest = 333}), BUSHD_OK);
   rig.pass(60);
   rig.pins({.motors = 1 << 3, .system = 0});
   const std::int64_t before = rig.pulses(3);

@@ -7,11 +7,11 @@
 namespace bushd::test {
 namespace {
 
-constexpr std::uint16_t kMotors = 0b0101;
+constexpr std::uint16_t kLocal = 0b0101;
 
 class Local : public Streams {
  protected:
-  void SetUp() override { ASSERT_EQ(rig.local(kMotors), BUSHD_OK); }
+  void SetUp() override { ASSERT_EQ(rig.local(kLocal), BUSHD_OK); }
   void hold(std::uint8_t buttons, int ticks) {
     rig.pins({0, buttons});
     rig.pass(ticks);
@@ -36,8 +36,8 @@ TEST_P(Local, WhileHeldMotorsFollowTheirTableAndThenRampDown) {
        {std::pair{BUSHD_INPUT_FORWARD, 1}, std::pair{BUSHD_INPUT_REVERSE, -1}}) {
     rig.forget_history();
     hold(static_cast<std::uint8_t>(button), 130);
-    EXPECT_EQ(rig.poll().autonomous, kMotors);
-    EXPECT_EQ(rig.poll().moving, kMotors);
+    EXPECT_EQ(rig.poll().autonomous, kLocal);
+    EXPECT_EQ(rig.poll().moving, kLocal);
     EXPECT_EQ(rig.poll().running, 0) << "not for a master to end";
     EXPECT_EQ(rig.poll().state, BUSHD_STATE_RUN);
     release();
@@ -149,7 +149,7 @@ TEST_P(Local, ACutIsNoRampWhoeverAsksForIt) {
   };
   for (const auto& cut : cuts) {
     hold(BUSHD_INPUT_FORWARD, 60);
-    ASSERT_EQ(rig.poll().autonomous, kMotors);
+    ASSERT_EQ(rig.poll().autonomous, kLocal);
     cut();
     rig.pass(2);
     const std::int64_t at = rig.pulses(0);
@@ -208,7 +208,7 @@ TEST_P(Local, StopsAtALimitAndComesBackFromIt) {
 TEST_P(Local, MotorsThatTheMcuDoesNotHaveAreRefused) {
   EXPECT_EQ(rig.local(0b1'0001), BUSHD_E_FORMAT);
   hold(BUSHD_INPUT_FORWARD, 60);
-  EXPECT_EQ(rig.poll().autonomous, kMotors) << "as it was told before";
+  EXPECT_EQ(rig.poll().autonomous, kLocal) << "as it was told before";
   release();
   expect_counted();
 }
@@ -217,7 +217,7 @@ TEST_P(Local, MotorsThatTheMcuDoesNotHaveAreRefused) {
 TEST_P(Local, AButtonMustHaveBeenSeenReleasedSinceItWasTold) {
   ASSERT_EQ(rig.local(0), BUSHD_OK);
   hold(BUSHD_INPUT_FORWARD, 5);
-  ASSERT_EQ(rig.local(kMotors), BUSHD_OK);
+  ASSERT_EQ(rig.local(kLocal), BUSHD_OK);
   rig.pass(60);
   EXPECT_EQ(rig.pulses(0), 0) << "held when it was given motors";
   release();
@@ -230,7 +230,7 @@ TEST_P(Local, AButtonMustHaveBeenSeenReleasedSinceItWasTold) {
   rig.pass(1);
   rig.pins({});
   rig.pass(3);
-  EXPECT_EQ(rig.poll().autonomous, kMotors);
+  EXPECT_EQ(rig.poll().autonomous, kLocal);
 }
 
 TEST_P(Local, AButtonHeldAtPowerUpMovesNothingUntilItIsPressedAnew) {
@@ -241,7 +241,7 @@ TEST_P(Local, AButtonHeldAtPowerUpMovesNothingUntilItIsPressedAnew) {
   EXPECT_FALSE(rig.enabled());
   release();
   hold(BUSHD_INPUT_FORWARD, 60);
-  EXPECT_EQ(rig.poll().autonomous, kMotors);
+  EXPECT_EQ(rig.poll().autonomous, kLocal);
 }
 
 // Nor of one that is held when its motor gets a table.

@@ -7,8 +7,6 @@
 namespace bushd::test {
 namespace {
 
-constexpr std::int64_t kTick = Rig::kTickNs;
-constexpr std::int64_t kSlots = 256;
 constexpr std::int64_t kSlotNs = kTick / kSlots;
 constexpr std::uint8_t kBoth = BUSHD_ARRIVES_POSITIVE | BUSHD_ARRIVES_NEGATIVE;
 

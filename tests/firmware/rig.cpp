@@ -17,13 +17,13 @@ Bytes payload_of(Encode&& encode) {
   return payload;
 }
 
+}  // namespace
+
 std::vector<std::uint16_t> codes_of(const Law& law) {
   std::vector<std::uint16_t> codes = law.accel;
   codes.insert(codes.end(), law.decel.begin(), law.decel.end());
   return codes;
 }
-
-}  // namespace
 
 std::uint32_t crc32(const Bytes& bytes) {
   std::uint32_t crc = 0xFFFFFFFF;

@@ -221,6 +221,11 @@ class Rig {
 };
 
 // A ramp of 24 codes with unequal sides: 40 us units, 10 ms down to 0.8 ms.
+inline constexpr std::uint16_t kSlow = 1000;  // 10 ms, the slowest step of ramp_law
 Law ramp_law();
+std::vector<std::uint16_t> codes_of(const Law& law);
+
+inline constexpr std::int64_t kTick = Rig::kTickNs;
+inline constexpr std::int64_t kSlots = 256;
 
 }  // namespace bushd::test

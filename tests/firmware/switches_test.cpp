@@ -10,9 +10,8 @@
 namespace bushd::test {
 namespace {
 
-constexpr std::uint8_t kMotor = 1;
-constexpr std::uint16_t kBit = 1u << kMotor;
-constexpr std::uint16_t kSlow = 1000;  // 10 ms, the slowest step of ramp_law
+constexpr std::uint8_t kSwitched = 1;
+constexpr std::uint16_t kSwitchedBit = 1u << kSwitched;
 
 constexpr std::uint16_t bit(unsigned input) {
   return static_cast<std::uint16_t>(1u << input);
@@ -26,7 +25,9 @@ class Switches : public Streams {
     ASSERT_EQ(rig.set_inputs(settings), BUSHD_OK);
     ASSERT_EQ(rig.motor_inputs(inputs), BUSHD_OK);
   }
-  static InputSettings both() { return {.limit_positive = kBit, .limit_negative = kBit}; }
+  static InputSettings both() {
+    return {.limit_positive = kSwitchedBit, .limit_negative = kSwitchedBit};
+  }
   bushd_status start(std::uint8_t motor, int steps) {
     return rig.take(rig.part(plan(steps), rig.first_open(), 0, 100, motor));
   }
@@ -41,51 +42,51 @@ INSTANTIATE_TEST_SUITE_P(Formats, Switches, testing::Values(BUSHD_FORMAT_FINE, B
                          format_name);
 
 TEST_P(Switches, EachEndHasItsOwn) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 9, 14, 3}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
   for (const unsigned other : {1u, 3u, 0u, 15u}) {
     rig.pins({bit(other), 0});
     expect_forbidden(0, 0);
   }
   rig.pins({bit(9), 0});
-  expect_forbidden(kBit, 0);
-  EXPECT_EQ(start(kMotor, 5), BUSHD_E_FORBIDDEN);
-  EXPECT_EQ(start(kMotor, -5), BUSHD_OK);
+  expect_forbidden(kSwitchedBit, 0);
+  EXPECT_EQ(start(kSwitched, 5), BUSHD_E_FORBIDDEN);
+  EXPECT_EQ(start(kSwitched, -5), BUSHD_OK);
   rig.pass_until_rest();
   rig.pins({bit(14), 0});
-  expect_forbidden(0, kBit);
-  EXPECT_EQ(start(kMotor, -5), BUSHD_E_FORBIDDEN);
-  EXPECT_EQ(start(kMotor, 5), BUSHD_OK);
+  expect_forbidden(0, kSwitchedBit);
+  EXPECT_EQ(start(kSwitched, -5), BUSHD_E_FORBIDDEN);
+  EXPECT_EQ(start(kSwitched, 5), BUSHD_OK);
   rig.pass_until_rest();
   rig.pins({static_cast<std::uint16_t>(bit(9) | bit(14)), 0});
-  expect_forbidden(kBit, kBit);
-  expect_position(kMotor, 0);
+  expect_forbidden(kSwitchedBit, kSwitchedBit);
+  expect_position(kSwitched, 0);
 }
 
 TEST_P(Switches, AnInputOfAHighNumberStopsItsMotorAlone) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 15, 14, kMotor}));
-  for (const std::uint8_t motor : {kMotor, std::uint8_t{15}}) {
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 15, 14, kSwitched}));
+  for (const std::uint8_t motor : {kSwitched, std::uint8_t{15}}) {
     ASSERT_EQ(start(motor, 50), BUSHD_OK);
   }
   rig.pass(20);
   rig.pins({bit(15), 0});
   rig.pass_until_rest();
-  EXPECT_LT(rig.pulses(kMotor), 50);
-  EXPECT_GT(rig.pulses(kMotor), 0);
+  EXPECT_LT(rig.pulses(kSwitched), 50);
+  EXPECT_GT(rig.pulses(kSwitched), 0);
   EXPECT_EQ(rig.pulses(15), 50);
   EXPECT_EQ(rig.poll().inputs, bit(15));
-  EXPECT_EQ(rig.poll().forbidden_positive, kBit);
+  EXPECT_EQ(rig.poll().forbidden_positive, kSwitchedBit);
 }
 
 TEST_P(Switches, AHitSwitchInhibitsUntilItIsLeft) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 9, 14, 3}));
-  ASSERT_EQ(start(kMotor, 60), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
+  ASSERT_EQ(start(kSwitched, 60), BUSHD_OK);
   rig.pass(30);
   rig.pins({bit(9), 0});
   rig.pass(2);
   rig.pins({0, 0});  // overrun
   rig.pass_until_rest();
-  expect_forbidden(kBit, 0);
-  rig.run_plan(plan(-3), kMotor);
+  expect_forbidden(kSwitchedBit, 0);
+  rig.run_plan(plan(-3), kSwitched);
   expect_forbidden(0, 0);
 }
 
@@ -93,23 +94,23 @@ TEST_P(Switches, LevelsAreThoseOfInputs) {
   InputSettings settings = both();
   settings.inverted = bit(9);  // a contact that opens
   rig.pins({bit(9), 0});
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 9, 14, 3}, settings));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}, settings));
   expect_forbidden(0, 0);
   EXPECT_EQ(rig.poll().inputs, 0);
   rig.pins({0, 0});
-  expect_forbidden(kBit, 0);
+  expect_forbidden(kSwitchedBit, 0);
   EXPECT_EQ(rig.poll().inputs, bit(9));
   rig.pins({static_cast<std::uint16_t>(bit(9) | bit(14)), 0});
-  expect_forbidden(0, kBit);
+  expect_forbidden(0, kSwitchedBit);
 }
 
 TEST_P(Switches, OneSwitchForBothEndsMayBeAnyInput) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 12, 12, 12}));
-  ASSERT_EQ(start(kMotor, -50), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 12, 12, 12}));
+  ASSERT_EQ(start(kSwitched, -50), BUSHD_OK);
   rig.pass(20);
   rig.pins({bit(12), 0});
   rig.pass_until_rest();
-  expect_forbidden(0, kBit);
+  expect_forbidden(0, kSwitchedBit);
 }
 
 TEST_P(Switches, AnInputMayStopTwoMotors) {
@@ -124,44 +125,44 @@ TEST_P(Switches, AnInputMayStopTwoMotors) {
 TEST_P(Switches, EachInputIsDebouncedByItself) {
   InputSettings settings = both();
   settings.debounce_ticks = 3;
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 9, 14, 3}, settings));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}, settings));
   rig.pins({bit(9), 0});
   rig.pass(2);
   rig.pins({static_cast<std::uint16_t>(bit(9) | bit(14)), 0});
   rig.pass(2);
-  EXPECT_EQ(rig.poll().forbidden_positive, kBit);
+  EXPECT_EQ(rig.poll().forbidden_positive, kSwitchedBit);
   EXPECT_EQ(rig.poll().forbidden_negative, 0);
   rig.pass(2);
-  EXPECT_EQ(rig.poll().forbidden_negative, kBit);
+  EXPECT_EQ(rig.poll().forbidden_negative, kSwitchedBit);
 }
 
 TEST_P(Switches, InputsBringsTheDefaultBack) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 9, 14, 3}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
   rig.pins({bit(9), 0});
-  expect_forbidden(kBit, 0);
-  ASSERT_EQ(rig.set_inputs({.limit_positive = kBit}), BUSHD_OK);
+  expect_forbidden(kSwitchedBit, 0);
+  ASSERT_EQ(rig.set_inputs({.limit_positive = kSwitchedBit}), BUSHD_OK);
   expect_forbidden(0, 0);
-  rig.pins({kBit, 0});
-  expect_forbidden(kBit, 0);
+  rig.pins({kSwitchedBit, 0});
+  expect_forbidden(kSwitchedBit, 0);
 }
 
 // As a daemon does that begins anew.
 TEST_P(Switches, AHitSwitchInhibitsWhileSettingsAreToldAgain) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 9, 14, 3}));
-  ASSERT_EQ(start(kMotor, 60), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
+  ASSERT_EQ(start(kSwitched, 60), BUSHD_OK);
   rig.pass(30);
   rig.pins({bit(9), 0});
   rig.pass_until_rest();
   rig.pins({0, 0});
-  expect_forbidden(kBit, 0);
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 9, 14, 3}));
-  expect_forbidden(kBit, 0);
-  ASSERT_EQ(rig.set_inputs({.limit_negative = kBit}), BUSHD_OK);
+  expect_forbidden(kSwitchedBit, 0);
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
+  expect_forbidden(kSwitchedBit, 0);
+  ASSERT_EQ(rig.set_inputs({.limit_negative = kSwitchedBit}), BUSHD_OK);
   expect_forbidden(0, 0);
 }
 
 TEST_P(Switches, SettingsOutlastAReset) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, 9, 14, 3}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
   std::vector<std::vector<std::uint8_t>> kept;
   for (std::uint8_t i = 0;; ++i) {
     const bushd_mcu_nvm_region region = bushd_mcu_nvm_region_at(rig.mutable_mcu(), i);
@@ -178,7 +179,7 @@ TEST_P(Switches, SettingsOutlastAReset) {
   bushd_mcu_nvm_restored(anew.mutable_mcu());
   anew.pins({bit(14), 0});
   anew.pass();
-  EXPECT_EQ(anew.poll().forbidden_negative, kBit);
+  EXPECT_EQ(anew.poll().forbidden_negative, kSwitchedBit);
   EXPECT_EQ(anew.poll().forbidden_positive, 0);
 }
 
@@ -189,7 +190,7 @@ TEST_P(Switches, WhatCannotBeIsRefused) {
   }
   EXPECT_EQ(rig.request(BUSHD_MSG_MOTOR_INPUTS, {1, 2, 3}), BUSHD_E_LENGTH);
   ASSERT_EQ(start(0, 40), BUSHD_OK);
-  EXPECT_EQ(rig.motor_inputs({kMotor, 9, 14, 3}), BUSHD_E_STATE) << "a motor moves";
+  EXPECT_EQ(rig.motor_inputs({kSwitched, 9, 14, 3}), BUSHD_E_STATE) << "a motor moves";
   Rig small({.disabled_capabilities = BUSHD_CAN_MOTOR_INPUTS});
   EXPECT_EQ(small.identify().capabilities & BUSHD_CAN_MOTOR_INPUTS, 0);
   EXPECT_EQ(small.motor_inputs({0, 0, 0, 0}), BUSHD_E_UNKNOWN_MESSAGE);
@@ -212,7 +213,7 @@ class Stage : public Switches {
   };
 
   void put(std::int64_t stands_at, HomeFlag flag, int bounce_readings = 0) {
-    plus_ = stands_at - rig.pulses(kMotor);
+    plus_ = stands_at - rig.pulses(kSwitched);
     rig.sense = [this, flag, bounce_readings] {
       const std::int64_t at = place();
       const std::int64_t beyond = (at - flag.at) * flag.direction;
@@ -223,9 +224,9 @@ class Stage : public Switches {
       return bushd_inputs{static_cast<std::uint16_t>(inputs), 0};
     };
   }
-  std::int64_t place() const { return rig.pulses(kMotor) + plus_; }
+  std::int64_t place() const { return rig.pulses(kSwitched) + plus_; }
   static bushd_home command(int direction, std::uint32_t most_steps = 8000) {
-    return {kMotor, static_cast<std::int8_t>(direction), most_steps, 0, 400, kSlow, 100};
+    return {kSwitched, static_cast<std::int8_t>(direction), most_steps, 0, 400, kSlow, 100};
   }
   // How far it went to either side.
   std::pair<std::int64_t, std::int64_t> home(const bushd_home& message) {
@@ -242,8 +243,8 @@ class Stage : public Switches {
   }
   void expect_home_at(std::int64_t at) {
     EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_DONE);
-    EXPECT_EQ(rig.poll().homed, kBit);
-    const std::int64_t counted = rig.poll().motor[kMotor].position_steps;
+    EXPECT_EQ(rig.poll().homed, kSwitchedBit);
+    const std::int64_t counted = rig.poll().motor[kSwitched].position_steps;
     // A reading comes within a tick of the edge, or of the end of three readings that bounce, and a
     // slow step takes almost four.
     EXPECT_LE(std::abs(counted - 100 - (place() - at)), 1);
@@ -274,7 +275,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, Stage, testing::Values(BUSHD_FORMAT_FINE, BUSH
                          format_name);
 
 TEST_P(Stage, TheHomeSwitchIsNoLimit) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
   put(0, {.at = 700, .direction = 1, .width = 50});
   const auto way = home(command(1));
   expect_home_at(700);
@@ -283,7 +284,7 @@ TEST_P(Stage, TheHomeSwitchIsNoLimit) {
   EXPECT_EQ(rig.poll().forbidden_negative, 0);
   // It stands where the switch closes, or a step further: three readings and the tick that is
   // prepared by then last five ticks, 12.8 ms, and a slow step 10 ms.
-  rig.run_plan(plan(300), kMotor);
+  rig.run_plan(plan(300), kSwitched);
   EXPECT_GE(place(), 1000);
   EXPECT_LE(place(), 1001);
 }
@@ -294,8 +295,8 @@ TEST_P(Stage, ALimitBeforeTheSwitchTurnsTheMotor) {
     for (const bool cuts : {false, true}) {
       SCOPED_TRACE(std::to_string(direction) + (cuts ? " immediate" : " ramp"));
       InputSettings settings = both();
-      if (cuts) settings.limit_immediate = kBit;
-      ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}, settings));
+      if (cuts) settings.limit_immediate = kSwitchedBit;
+      ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}, settings));
       put(1500 * direction, {.at = -900 * direction, .direction = direction, .width = 400});
       rig.pass(3);
       const auto way = home(command(direction));
@@ -310,7 +311,7 @@ TEST_P(Stage, ALimitBeforeTheSwitchTurnsTheMotor) {
 }
 
 TEST_P(Stage, AtTheLimitItBeginsTheOtherWay) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
   put(kEnd + 5, {.at = 100, .direction = 1, .width = 300});
   rig.pass(3);
   const auto way = home(command(1));
@@ -324,7 +325,7 @@ TEST_P(Stage, AtTheLimitItBeginsTheOtherWay) {
 
 TEST_P(Stage, FromAnywhereItIsTheSameToOneStep) {
   std::mt19937 random(17);
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
   for (int n = 0; n < 40; ++n) {
     const int direction = random() % 2 == 0 ? 1 : -1;
     const auto stands = static_cast<std::int64_t>(random() % 4000) - 2000;
@@ -341,19 +342,19 @@ TEST_P(Stage, FromAnywhereItIsTheSameToOneStep) {
 }
 
 TEST_P(Stage, NoSwitchBetweenTheLimits) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
   put(500, {.at = 50'000, .direction = 1});
   const auto way = home(command(1));
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_NOT_FOUND);
   EXPECT_EQ(rig.poll().homed, 0);
   EXPECT_GE(way.second, kEnd);
   EXPECT_LE(way.first, -kEnd);
-  EXPECT_EQ(rig.poll().forbidden_negative, kBit) << "it stands there";
-  EXPECT_EQ(rig.poll().motor[kMotor].position_steps, rig.pulses(kMotor));
+  EXPECT_EQ(rig.poll().forbidden_negative, kSwitchedBit) << "it stands there";
+  EXPECT_EQ(rig.poll().motor[kSwitched].position_steps, rig.pulses(kSwitched));
 }
 
 TEST_P(Stage, NoSwitchWithinTheStepsOfEitherWay) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
   put(1900, {.at = -1500, .direction = 1, .width = 100});
   const auto way = home(command(1, 600));
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_NOT_FOUND);
@@ -364,57 +365,57 @@ TEST_P(Stage, NoSwitchWithinTheStepsOfEitherWay) {
 TEST_P(Stage, TheHomeSwitchMayBeTheLimit) {
   for (const int direction : {1, -1}) {
     const std::uint8_t its = direction > 0 ? kPositive : kNegative;
-    ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, its}));
+    ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, its}));
     put(100, {.at = 50'000, .direction = 1});
     const auto way = home(command(direction));
     expect_home_at(kEnd * direction);
     EXPECT_LE(std::max(way.second, -way.first), kEnd + kTwoTicks + kRamp);
-    EXPECT_EQ(rig.poll().forbidden_positive, direction > 0 ? kBit : 0) << "it stands there";
-    EXPECT_EQ(rig.poll().forbidden_negative, direction < 0 ? kBit : 0);
-    rig.run_plan(plan(-60 * direction), kMotor);
+    EXPECT_EQ(rig.poll().forbidden_positive, direction > 0 ? kSwitchedBit : 0) << "it stands there";
+    EXPECT_EQ(rig.poll().forbidden_negative, direction < 0 ? kSwitchedBit : 0);
+    rig.run_plan(plan(-60 * direction), kSwitched);
     EXPECT_EQ(rig.poll().forbidden_positive | rig.poll().forbidden_negative, 0);
   }
 }
 
 // A lever so short that the ramp overruns it: what it bars stays barred until it backs off.
 TEST_P(Stage, AShortLeverBarsTheWayWhereverTheOtherLimitIs) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kNegative}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kNegative}));
   rig.sense = [this] {
-    const std::int64_t at = rig.pulses(kMotor);
+    const std::int64_t at = rig.pulses(kSwitched);
     return bushd_inputs{at <= -700 && at > -708 ? bit(kNegative) : std::uint16_t{0}, 0};
   };
   ASSERT_EQ(rig.home(command(-1)), BUSHD_OK);
   while (rig.poll().homing < BUSHD_HOMING_BACK_OFF) rig.pass();
   rig.pass(2);
-  ASSERT_LT(rig.pulses(kMotor), -708);
+  ASSERT_LT(rig.pulses(kSwitched), -708);
   rig.emergency(BUSHD_STOP_IMMEDIATE);
   rig.pass_until_rest();
-  EXPECT_EQ(rig.poll().forbidden_negative, kBit);
+  EXPECT_EQ(rig.poll().forbidden_negative, kSwitchedBit);
 }
 
 // Home is marked behind the limit: the slow approach would go into it.
 TEST_P(Stage, ALimitEndsTheSlowStages) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
   put(1500, {.at = kEnd + 4, .direction = 1});
   const auto way = home(command(1));
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_LIMIT);
   EXPECT_EQ(rig.poll().homed, 0);
   EXPECT_LE(way.second, kEnd + kThreeTicks + kRamp);
-  EXPECT_EQ(rig.poll().motor[kMotor].position_steps, rig.pulses(kMotor));
-  EXPECT_EQ(rig.poll().forbidden_positive, kBit);
-  EXPECT_EQ(start(kMotor, -50), BUSHD_OK) << "back is free";
+  EXPECT_EQ(rig.poll().motor[kSwitched].position_steps, rig.pulses(kSwitched));
+  EXPECT_EQ(rig.poll().forbidden_positive, kSwitchedBit);
+  EXPECT_EQ(start(kSwitched, -50), BUSHD_OK) << "back is free";
   rig.pass_until_rest();
 }
 
 TEST_P(Stage, OnItsSwitchAtTheOtherLimitItCannotBackOff) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
   put(-kEnd, {.at = -kEnd - 50, .direction = 1});
   rig.pass(3);
   EXPECT_EQ(rig.home(command(1)), BUSHD_E_FORBIDDEN);
 }
 
 TEST_P(Stage, CanBeGivenUpOnTheWayBack) {
-  ASSERT_NO_FATAL_FAILURE(wire({kMotor, kPositive, kNegative, kHome}));
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
   put(1900, {.at = -1500, .direction = 1, .width = 100});
   ASSERT_EQ(rig.home(command(1)), BUSHD_OK);
   while (place() < kEnd) rig.pass();
@@ -424,7 +425,7 @@ TEST_P(Stage, CanBeGivenUpOnTheWayBack) {
   rig.pass_until_rest();
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_STOPPED);
   EXPECT_GT(place(), 1000 - kThreeTicks - kRamp) << "seen within a tick, then as above";
-  EXPECT_EQ(rig.poll().motor[kMotor].position_steps, rig.pulses(kMotor));
+  EXPECT_EQ(rig.poll().motor[kSwitched].position_steps, rig.pulses(kSwitched));
 }
 
 }  // namespace

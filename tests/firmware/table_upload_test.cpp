@@ -22,12 +22,6 @@ Law flat_law(std::uint16_t first, std::size_t accel, std::size_t decel) {
   return law;
 }
 
-std::vector<std::uint16_t> codes_of(const Law& law) {
-  std::vector<std::uint16_t> codes = law.accel;
-  codes.insert(codes.end(), law.decel.begin(), law.decel.end());
-  return codes;
-}
-
 // Lets the motor run into the end of its queue at cruise and compares every tick of the ramp-down
 // with what the law says: the MCU's own table decides it.
 void expect_runs_down_by(Rig& rig, std::uint8_t motor, const Law& law) {

@@ -7,10 +7,8 @@
 namespace bushd::test {
 namespace {
 
-constexpr std::int64_t kTick = Rig::kTickNs;
-constexpr std::int64_t kSlots = 256;
-constexpr std::uint8_t kMotor = 1;
-constexpr std::uint16_t kBit = 1 << kMotor;
+constexpr std::uint8_t kTraveller = 1;
+constexpr std::uint16_t kTravellerBit = 1 << kTraveller;
 constexpr std::uint16_t kLeft = 1 << 2;    // the input of its negative limit
 constexpr std::uint16_t kSensor = 1 << 3;  // of no motor's
 constexpr std::uint32_t kWay = 60;         // steps between the limits
@@ -26,18 +24,18 @@ class Travel : public Streams {
   Travel() {
     watch({});
     rig.sense = [this] {
-      const std::int64_t at = rig.pulses(kMotor) + stands_;
+      const std::int64_t at = rig.pulses(kTraveller) + stands_;
       unsigned active = others_;
-      if (at >= right_) active |= kBit;
+      if (at >= right_) active |= kTravellerBit;
       if (at <= left_) active |= kLeft;
       return bushd_inputs{static_cast<std::uint16_t>(active), 0};
     };
     rig.pass(2);
   }
   void watch(InputSettings settings) {
-    settings.limit_positive = settings.limit_negative = kBit;
+    settings.limit_positive = settings.limit_negative = kTravellerBit;
     ASSERT_EQ(rig.set_inputs(settings), BUSHD_OK);
-    ASSERT_EQ(rig.motor_inputs({kMotor, 1, 2, 1}), BUSHD_OK);
+    ASSERT_EQ(rig.motor_inputs({kTraveller, 1, 2, 1}), BUSHD_OK);
   }
   bushd_status request(const bushd_travel& message) {
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
@@ -46,26 +44,27 @@ class Travel : public Streams {
   }
   // From the left limit, with a delay of 20 ms before the return.
   bushd_travel once(std::uint32_t steps = kWay) {
-    return {++number_, BUSHD_TRAVEL_LIMITS, kMotor, 1, BUSHD_EDGE_NONE, 0, steps, 0, 20'000};
+    return {++number_, BUSHD_TRAVEL_LIMITS, kTraveller, 1, BUSHD_EDGE_NONE, 0, steps, 0, 20'000};
   }
   bushd_travel at_edges(std::uint32_t delay_us, std::uint32_t wait_us) {
-    return {++number_, BUSHD_TRAVEL_LIMITS, kMotor, 1, BUSHD_EDGE_RISING, 0, kWay, delay_us,
+    return {++number_, BUSHD_TRAVEL_LIMITS, kTraveller, 1, BUSHD_EDGE_RISING, 0, kWay, delay_us,
             wait_us};
   }
   bushd_travel step(std::uint32_t wait_us = 50'000) {
-    return {++number_, BUSHD_TRAVEL_STEP, kMotor, 1, BUSHD_EDGE_NONE, 3, 1, 0, wait_us};
+    return {++number_, BUSHD_TRAVEL_STEP, kTraveller, 1, BUSHD_EDGE_NONE, 3, 1, 0, wait_us};
   }
   static bushd_travel give_up() {
-    return {0, BUSHD_TRAVEL_NONE, kMotor, 0, BUSHD_EDGE_NONE, 0, 0, 0, 0};
+    return {0, BUSHD_TRAVEL_NONE, kTraveller, 0, BUSHD_EDGE_NONE, 0, 0, 0, 0};
   }
   int stage() { return rig.poll().homing; }
   std::int64_t now_ns() const { return rig.tick() * kTick; }
 
   // The tick that is being emitted, and on to the next one.
   void pass() {
-    const int sign = rig.slot_buffer().steps[kMotor] < 0 ? -1 : 1;
+    const int sign = rig.slot_buffer().steps[kTraveller] < 0 ? -1 : 1;
     for (std::int64_t slot = 0; slot < kSlots; ++slot) {
-      if (rig.slot_buffer().step[slot] & kBit) made.push_back({rig.tick() * kSlots + slot, sign});
+      if (rig.slot_buffer().step[slot] & kTravellerBit)
+        made.push_back({rig.tick() * kSlots + slot, sign});
     }
     rig.pass();
   }
@@ -89,14 +88,14 @@ class Travel : public Streams {
     end_ns = begin_ns + static_cast<std::int64_t>(reference.step(kWay - 1).end / 256);
   }
   void expect_counted() {
-    EXPECT_EQ(rig.poll().motor[kMotor].position_steps, rig.pulses(kMotor));
+    EXPECT_EQ(rig.poll().motor[kTraveller].position_steps, rig.pulses(kTraveller));
     EXPECT_EQ(rig.steps_with_dir(), 0);
     EXPECT_EQ(rig.steps_while_disabled(), 0);
   }
   void expect_ends(bushd_travel_stage stage, std::int64_t at) {
     pass_until_rest();
     EXPECT_EQ(rig.poll().homing, stage);
-    EXPECT_EQ(rig.pulses(kMotor), at);
+    EXPECT_EQ(rig.pulses(kTraveller), at);
     EXPECT_EQ(rig.poll().autonomous, 0);
     expect_counted();
   }
@@ -117,15 +116,15 @@ TEST_P(Travel, GoesThereAndBack) {
   const std::uint32_t first = rig.first_open();
   ASSERT_EQ(request(once()), BUSHD_OK);
   const bushd_report report = rig.poll();
-  EXPECT_EQ(report.autonomous, kBit);
-  EXPECT_EQ(report.moving, kBit);
-  EXPECT_EQ(report.running, kBit);
+  EXPECT_EQ(report.autonomous, kTravellerBit);
+  EXPECT_EQ(report.moving, kTravellerBit);
+  EXPECT_EQ(report.running, kTravellerBit);
   EXPECT_EQ(report.homing, BUSHD_TRAVEL_DELAY);
   EXPECT_EQ(report.trigger_number, number_);
   pass_while({BUSHD_TRAVEL_DELAY, BUSHD_TRAVEL_RUN});
   EXPECT_EQ(stage(), BUSHD_TRAVEL_RETURN_DELAY);
-  EXPECT_EQ(rig.pulses(kMotor), kWay);
-  EXPECT_EQ(rig.poll().forbidden_positive, kBit);
+  EXPECT_EQ(rig.pulses(kTraveller), kWay);
+  EXPECT_EQ(rig.poll().forbidden_positive, kTravellerBit);
   pass_while({BUSHD_TRAVEL_RETURN_DELAY});
   EXPECT_EQ(stage(), BUSHD_TRAVEL_RETURN);
   expect_ends(BUSHD_TRAVEL_DONE, 0);
@@ -179,7 +178,7 @@ TEST_P(Travel, TheFarLimitIsReachedWithTheLastStep) {
   ASSERT_EQ(request(once()), BUSHD_OK);
   pass_until_rest();
   EXPECT_EQ(stage(), BUSHD_TRAVEL_EARLY);
-  EXPECT_LT(rig.pulses(kMotor), static_cast<std::int64_t>(kWay));
+  EXPECT_LT(rig.pulses(kTraveller), static_cast<std::int64_t>(kWay));
   expect_counted();
 }
 
@@ -207,7 +206,7 @@ TEST_P(Travel, ErrorsOfTheReturn) {
   left_ = kWay;
   pass_until_rest();
   EXPECT_EQ(stage(), BUSHD_TRAVEL_EARLY) << "active where the return was to begin";
-  EXPECT_EQ(rig.pulses(kMotor), static_cast<std::int64_t>(kWay));
+  EXPECT_EQ(rig.pulses(kTraveller), static_cast<std::int64_t>(kWay));
 }
 
 TEST_P(Travel, LimitsAreDebounced) {
@@ -231,7 +230,7 @@ TEST_P(Travel, EndsByFaultsAndByStops) {
   EXPECT_EQ(stage(), BUSHD_TRAVEL_STOPPED);
   EXPECT_EQ(rig.poll().faults, 0);
   expect_counted();
-  stands_ = -rig.pulses(kMotor);
+  stands_ = -rig.pulses(kTraveller);
   rig.pass(2);
   in_flight();
   rig.emergency(BUSHD_STOP_RAMP);
@@ -239,7 +238,7 @@ TEST_P(Travel, EndsByFaultsAndByStops) {
   EXPECT_EQ(stage(), BUSHD_TRAVEL_STOPPED);
   expect_counted();
   ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
-  stands_ = -rig.pulses(kMotor);
+  stands_ = -rig.pulses(kTraveller);
   rig.pass(2);
   ASSERT_EQ(rig.configure(format, Rig::kTickNs, 12), BUSHD_OK);
   ASSERT_EQ(request(at_edges(200'000, 900'000)), BUSHD_OK);
@@ -252,7 +251,7 @@ TEST_P(Travel, EndsByFaultsAndByStops) {
 TEST_P(Travel, ASensorSeesTheStep) {
   ASSERT_EQ(request(step()), BUSHD_OK);
   EXPECT_EQ(stage(), BUSHD_TRAVEL_STEPS);
-  for (int i = 0; i < 100 && rig.pulses(kMotor) == 0; ++i) rig.pass();
+  for (int i = 0; i < 100 && rig.pulses(kTraveller) == 0; ++i) rig.pass();
   rig.pass(5);
   EXPECT_EQ(stage(), BUSHD_TRAVEL_STEPS);
   others_ = kSensor;
@@ -276,7 +275,7 @@ TEST_P(Travel, TheSameNumberAgainIsTheSameFrame) {
   expect_ends(BUSHD_TRAVEL_NOT_SEEN, 1);
   ASSERT_EQ(request(message), BUSHD_OK) << "its acknowledgement was lost";
   rig.pass(20);
-  EXPECT_EQ(rig.pulses(kMotor), 1) << "no second step";
+  EXPECT_EQ(rig.pulses(kTraveller), 1) << "no second step";
 }
 
 TEST_P(Travel, Refusals) {
@@ -292,14 +291,14 @@ TEST_P(Travel, Refusals) {
   bad = step();
   bad.sensor = 4;
   EXPECT_EQ(request(bad), BUSHD_E_FORMAT);
-  ASSERT_EQ(rig.motor_inputs({kMotor, 1, 1, 1}), BUSHD_OK);
+  ASSERT_EQ(rig.motor_inputs({kTraveller, 1, 1, 1}), BUSHD_OK);
   EXPECT_EQ(request(once()), BUSHD_E_FORMAT) << "one switch for both ends";
-  ASSERT_EQ(rig.motor_inputs({kMotor, 1, 2, 1}), BUSHD_OK);
+  ASSERT_EQ(rig.motor_inputs({kTraveller, 1, 2, 1}), BUSHD_OK);
   ASSERT_EQ(request(at_edges(150'000, 900'000)), BUSHD_OK);
   EXPECT_EQ(request(once()), BUSHD_E_STATE);
   EXPECT_EQ(rig.home({0, 1, 100, 0, 10, 1000, 0}), BUSHD_E_STATE);
   EXPECT_EQ(rig.arm(99, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 5, 0}}), BUSHD_E_STATE);
-  EXPECT_EQ(rig.set_position(kMotor, 5), BUSHD_E_STATE);
+  EXPECT_EQ(rig.set_position(kTraveller, 5), BUSHD_E_STATE);
   EXPECT_EQ(rig.poll().trigger_state, BUSHD_TRIGGER_ARMED);
   ASSERT_EQ(request(give_up()), BUSHD_OK);
   rig.pass(3);

@@ -6,9 +6,6 @@
 namespace bushd::test {
 namespace {
 
-constexpr std::int64_t kTick = Rig::kTickNs;
-constexpr std::int64_t kSlots = 256;
-
 class Trigger : public Streams {
  protected:
   // Slots since tick 0 in which the motor steps, until it has come to rest.

@@ -26,12 +26,13 @@ class BusLine {
     std::vector<std::uint8_t> payload;
     std::int64_t latency_us;  // after the line can have carried it, if it came at once
   };
+  using Answers = std::vector<Answer>;
   // Sends the request, then takes answers to it until `within` has passed since the line can have
   // carried it, or until `enough` says so. `reply_payload`: an answer's size.
-  bushd::Result<std::vector<Answer>> ask(
-      std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload,
-      std::size_t reply_payload, std::chrono::microseconds within,
-      const std::function<bool(const std::vector<Answer>&)>& enough);
+  bushd::Result<Answers> ask(std::uint8_t address, std::uint8_t type,
+                             std::span<const std::uint8_t> payload, std::size_t reply_payload,
+                             std::chrono::microseconds within,
+                             const std::function<bool(const Answers&)>& enough);
 
   std::chrono::microseconds line_time(std::size_t bytes) const;
 

@@ -10,7 +10,6 @@ namespace {
 using bushd::fail;
 using bushd::Result;
 using std::chrono::microseconds;
-using Answers = std::vector<BusLine::Answer>;
 
 // An answer may begin so late after its slot's beginning, and the line must be let go.
 constexpr microseconds kSlotGuard{600};
@@ -20,7 +19,7 @@ constexpr std::uint8_t kScanSlots = 64;
 constexpr unsigned kMaxRounds = 16;
 constexpr unsigned kQuietRounds = 3;
 
-bool never(const Answers&) {
+bool never(const BusLine::Answers&) {
   return false;
 }
 

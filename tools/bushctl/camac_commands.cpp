@@ -38,7 +38,7 @@ constexpr int kWrite = 16;
 constexpr int kMemory = 0;
 constexpr int kAddress = 1;
 
-struct Options {
+struct CamacOptions {
   std::vector<std::string> words;
   std::uint32_t crate = 1;
   std::string page;         // to dump as a table; "": all memory
@@ -107,7 +107,7 @@ class Crate {
   int exit_code_ = kFailed;
 };
 
-int run_cycle(Client& client, const Options& options, const camac::Naf& naf) {
+int run_cycle(Client& client, const CamacOptions& options, const camac::Naf& naf) {
   Crate crate(client, options.crate);
   const auto result = crate.run({.cycles = {naf}});
   if (!result || result->block.responses.empty()) return crate.exit_code();
@@ -140,7 +140,7 @@ std::optional<std::vector<std::uint32_t>> read_memory(Crate& crate, int station)
   return bytes;
 }
 
-int print_table(const Options& options, int station, const std::vector<std::uint32_t>& bytes) {
+int print_table(const CamacOptions& options, int station, const std::vector<std::uint32_t>& bytes) {
   const auto page = number_of(options.page, kLastPage);
   if (!page) return wrong_usage(page.error());
   const std::size_t first = *page * kPageBytes + kFirstCode;
@@ -163,7 +163,7 @@ int print_table(const Options& options, int station, const std::vector<std::uint
   return kDone;
 }
 
-int dump(Client& client, const Options& options, int station) {
+int dump(Client& client, const CamacOptions& options, int station) {
   Crate crate(client, options.crate);
   const auto bytes = read_memory(crate, station);
   if (!bytes) return crate.exit_code();
@@ -211,7 +211,8 @@ Result<std::vector<std::uint32_t>> codes_of(Client& client, const std::string& n
   return codes;
 }
 
-int load(Client& client, const Options& options, int station, int page, const std::string& name) {
+int load(Client& client, const CamacOptions& options, int station, int page,
+         const std::string& name) {
   const auto codes = codes_of(client, name);
   if (!codes) {
     fmt::print(stderr, "bushctl: {}\n", bushd::printable(codes.error().message));
@@ -238,7 +239,7 @@ int load(Client& client, const Options& options, int station, int page, const st
   return kFailed;
 }
 
-int run_camac(const CommandLine& line, const Options& options) {
+int run_camac(const CommandLine& line, const CamacOptions& options) {
   const auto& words = options.words;
   const bool loads = words.front() == "load" && words.size() == 4;
   const bool dumps = words.front() == "dump" && words.size() == 2;
@@ -266,7 +267,7 @@ int run_camac(const CommandLine& line, const Options& options) {
 }  // namespace
 
 void add_camac_commands(CommandLine& line) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CamacOptions>();
   line.add("camac", "Make a cycle of a CAMAC crate, or read and write a module's memory")
       .footer(
           "camac N A F [DATA]: one cycle; numbers are decimal, or hexadecimal with 0x.\n"

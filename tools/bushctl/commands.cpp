@@ -226,4 +226,14 @@ std::chrono::milliseconds milliseconds(double seconds) {
   return std::chrono::milliseconds(std::lround(seconds * 1000));
 }
 
+int failed(const bushd::Error& error) {
+  fmt::print(stderr, "bushctl: {}\n", bushd::printable(error.text()));
+  return kFailed;
+}
+
+std::int64_t unix_us() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
 }  // namespace bushctl

@@ -87,10 +87,14 @@ int failure(const bushd::client::Client& client, const bushd::Error& error);
 // If something of what was shown did not arrive, stderr says so. kDone if nothing is missing.
 int complete(const bushd::client::Status& status, const bushd::client::Status::Missing& missing,
              const char* things);
+// Says on stderr why.
+int failed(const bushd::Error& error);
 // Of words that make no request.
 int wrong_usage(const bushd::Error& error);
 int refused(const bushd::api::Reply& reply);
 
 std::chrono::milliseconds milliseconds(double seconds);
+// Of the clock on the wall, since 1970.
+std::int64_t unix_us();
 
 }  // namespace bushctl

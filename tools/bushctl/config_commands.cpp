@@ -14,7 +14,7 @@ namespace {
 namespace api = bushd::api;
 using bushd::client::Client;
 
-struct Options {
+struct ConfigOptions {
   std::vector<std::string> words;
   bool diff = false;
   bool save = false;
@@ -34,7 +34,7 @@ std::variant<api::Configuration, int> ask(Client& client, const api::Configure& 
   return *configuration;
 }
 
-int show(const api::Configuration& configuration, const Options& options) {
+int show(const api::Configuration& configuration, const ConfigOptions& options) {
   if (options.json) {
     fmt::print("{}\n", json(configuration));
   } else if (configuration.settings.empty()) {
@@ -68,7 +68,7 @@ int save_and_tell(Client& client, const api::Configuration& configuration) {
   return std::get<int>(told);
 }
 
-int run(Client& client, const api::Configure& request, const Options& options) {
+int run(Client& client, const api::Configure& request, const ConfigOptions& options) {
   std::string reason;
   auto answer = ask(client, request, &reason);
   if (const int* code = std::get_if<int>(&answer)) return *code;
@@ -84,7 +84,7 @@ int run(Client& client, const api::Configure& request, const Options& options) {
 }  // namespace
 
 void add_config_commands(CommandLine& line) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ConfigOptions>();
   line.add("config", "Change offset, direction and soft_limits of motors in operation")
       .footer(
           "bushctl config [NAME]                what they are, and what bushd.toml says\n"

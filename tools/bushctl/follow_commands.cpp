@@ -69,7 +69,7 @@ void say_line(const bushd::csv::NumberTable& rows, const std::string& reason) {
              bushd::printable(rows.file));
 }
 
-struct Options {
+struct FollowOptions {
   std::string file;
   std::string interpolation = "linear";
   std::string stretch;
@@ -78,7 +78,7 @@ struct Options {
   bool json = false;
 };
 
-int follow(Client& client, const Options& options, const bushd::csv::NumberTable& rows,
+int follow(Client& client, const FollowOptions& options, const bushd::csv::NumberTable& rows,
            api::Follow common) {
   const auto send_part = [&](api::Follow part) {
     part.array = common.array;
@@ -118,7 +118,7 @@ int follow(Client& client, const Options& options, const bushd::csv::NumberTable
 }  // namespace
 
 void add_follow_command(CommandLine& line) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<FollowOptions>();
   line.add("follow", "Let motors follow a file of times and positions")
       .footer(
           "FILE has a line 'time_s, NAME, ...' and rows of numbers: seconds, and positions in the "

@@ -19,9 +19,8 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
-using Until = Client::Until;
 
-struct Options {
+struct JogOptions {
   std::vector<std::string> words;
   bool steps = false;
   std::uint32_t keepalive_ms = 500;
@@ -39,7 +38,7 @@ std::optional<double> number(const std::string& word) {
   return value;
 }
 
-api::Jog jog_at(const Options& options, double speed) {
+api::Jog jog_at(const JogOptions& options, double speed) {
   api::Jog jog{.motor = options.words[0],
                .per_s = speed,
                .in_steps = options.steps,
@@ -48,19 +47,19 @@ api::Jog jog_at(const Options& options, double speed) {
   return jog;
 }
 
-std::chrono::milliseconds renewal(const Options& options) {
+std::chrono::milliseconds renewal(const JogOptions& options) {
   return std::chrono::milliseconds(options.keepalive_ms / 3);
 }
 
-void print(const api::Reply& reply) {
+void print_reply(const api::Reply& reply) {
   for (const std::string& line : lines(reply)) fmt::print("{}\n", line);
   std::fflush(stdout);
 }
 
 // Until Ctrl-C, or somebody else, ends it.
-int jog(Client& client, const Options& options, double speed) {
+int jog(Client& client, const JogOptions& options, double speed) {
   Client::Meanwhile meanwhile;
-  meanwhile.on_reply = print;
+  meanwhile.on_reply = print_reply;
   meanwhile.beside_every = renewal(options);
   meanwhile.beside = [&]() -> std::optional<api::Request> {
     return api::Jog{.motor = options.words[0], .renew = true};
@@ -69,7 +68,7 @@ int jog(Client& client, const Options& options, double speed) {
     take_interrupt();
     return jog_at(options, 0);
   };
-  const auto reply = client.run(jog_at(options, speed), Until::kResult, meanwhile);
+  const auto reply = client.run(jog_at(options, speed), Client::Until::kResult, meanwhile);
   if (!reply) return failure(client, reply.error());
   const auto* completed = std::get_if<api::Completed>(&*reply);
   const bool done = completed != nullptr && completed->outcome == api::Outcome::kDone;
@@ -79,7 +78,7 @@ int jog(Client& client, const Options& options, double speed) {
 // Arrow keys left and right jog, up and down move by a step.
 class Panel {
  public:
-  Panel(Client& client, const Options& options) : client_(client), options_(options) {}
+  Panel(Client& client, const JogOptions& options) : client_(client), options_(options) {}
 
   int run() {
     fmt::print(
@@ -129,7 +128,7 @@ class Panel {
   void jog(double speed) {
     bool ends = false;
     Client::Meanwhile meanwhile;
-    meanwhile.on_reply = print;
+    meanwhile.on_reply = print_reply;
     meanwhile.beside_every = std::min(renewal(options_), std::chrono::milliseconds(kKeyMs));
     meanwhile.beside = [&]() -> std::optional<api::Request> {
       if (ends) return std::nullopt;
@@ -156,7 +155,7 @@ class Panel {
                                    : api::Amount(api::UserUnits{distance});
     const api::Stop stop{{options_.words[0]}};
     Client::Meanwhile meanwhile;
-    meanwhile.on_reply = print;
+    meanwhile.on_reply = print_reply;
     meanwhile.beside = [&]() -> std::optional<api::Request> {
       const auto key = keys_.next(0);
       if (!key) return std::nullopt;
@@ -176,7 +175,7 @@ class Panel {
       over_ = true;
       return ending;
     };
-    const auto reply = client_.run(request, Until::kResult, meanwhile);
+    const auto reply = client_.run(request, Client::Until::kResult, meanwhile);
     if (!reply) {
       over_ = true;
       result_ = failure(client_, reply.error());
@@ -186,14 +185,14 @@ class Panel {
   }
 
   Client& client_;
-  Options options_;
+  JogOptions options_;
   Keys keys_;
   std::optional<Key> next_;
   bool over_ = false;
   int result_ = kDone;
 };
 
-int run(const Connection& connection, Options options) {
+int run(const Connection& connection, JogOptions options) {
   if (options.words.size() > 2) {
     return wrong_usage({.message = "jog: write NAME SPEED, or NAME alone in a terminal"});
   }
@@ -204,7 +203,8 @@ int run(const Connection& connection, Options options) {
                                                  options.words[1])});
     }
     // What ends the jog of others is answered when the motor stands.
-    if (*speed == 0) return send(connection, jog_at(options, 0), Until::kResult, Hope::kDone);
+    if (*speed == 0)
+      return send(connection, jog_at(options, 0), Client::Until::kResult, Hope::kDone);
     return with_client(connection, [&](Client& client) { return jog(client, options, *speed); });
   }
   if (isatty(STDIN_FILENO) == 0) {
@@ -218,7 +218,7 @@ int run(const Connection& connection, Options options) {
 }  // namespace
 
 void add_jog_commands(CommandLine& line) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<JogOptions>();
   line.add("jog", "Let a motor move on at a speed, until Ctrl-C")
       .footer(
           "bushctl jog NAME SPEED    at this speed in the motor's unit per second, negative: the "

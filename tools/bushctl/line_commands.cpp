@@ -20,16 +20,10 @@ namespace {
 
 using bushd::fail;
 using bushd::Result;
-using Answers = std::vector<BusLine::Answer>;
 
 constexpr unsigned kTries = 3;
 
-int failed(const bushd::Error& error) {
-  fmt::print(stderr, "bushctl: {}\n", bushd::printable(error.text()));
-  return kFailed;
-}
-
-bool one(const Answers& answers) {
+bool one(const BusLine::Answers& answers) {
   return !answers.empty();
 }
 

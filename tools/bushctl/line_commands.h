@@ -6,6 +6,8 @@
 
 namespace bushctl {
 
+inline constexpr std::uint32_t kMaxBaud = 100'000'000;
+
 struct LineOptions {
   std::string port;
   std::uint32_t baud = 0;

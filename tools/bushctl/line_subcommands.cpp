@@ -7,8 +7,6 @@
 namespace bushctl {
 namespace {
 
-constexpr std::uint32_t kMaxBaud = 100'000'000;
-
 Command add_line_command(CommandLine& line, LineOptions& options, const char* name,
                          const char* text) {
   Command command = line.add_local(name, text);

@@ -13,7 +13,6 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
-using Until = Client::Until;
 
 constexpr const char* kSpeed = "Not faster than this, in the motor's unit per second";
 constexpr const char* kSteps = "Numbers are steps, not the motors' units";
@@ -22,8 +21,8 @@ Numbers numbers(bool steps) {
   return steps ? Numbers::kSteps : Numbers::kUser;
 }
 
-Until until(bool wait) {
-  return wait ? Until::kResult : Until::kAnswered;
+Client::Until until(bool wait) {
+  return wait ? Client::Until::kResult : Client::Until::kAnswered;
 }
 
 // What the move would be.
@@ -31,7 +30,7 @@ template <class Move>
 int show_plan(const Connection& connection, Move move, bool as_json) {
   return with_client(connection, [&](Client& client) {
     move.dry_run = true;
-    const auto reply = client.run(move, Until::kResult);
+    const auto reply = client.run(move, Client::Until::kResult);
     if (!reply) return failure(client, reply.error());
     const auto* completed = std::get_if<api::Completed>(&*reply);
     const auto* plan =
@@ -153,7 +152,7 @@ void add_disarm(CommandLine& line) {
       .footer("What waits for the same trigger, or was armed together, is disarmed together.")
       .words("NAME", motors.get(), "Motors (default: all)", Command::Needed::kNo)
       .run([&line, motors] {
-        return send(line.connection(), api::Disarm{*motors}, Until::kResult, Hope::kDone);
+        return send(line.connection(), api::Disarm{*motors}, Client::Until::kResult, Hope::kDone);
       });
 }
 
@@ -179,7 +178,7 @@ void add_compare(CommandLine& line) {
         const auto request = parse_position_compare(options->motor, options->position,
                                                     numbers(options->steps), options->pulse);
         if (!request) return wrong_usage(request.error());
-        return send(line.connection(), *request, Until::kResult, Hope::kDone);
+        return send(line.connection(), *request, Client::Until::kResult, Hope::kDone);
       });
 }
 
@@ -200,7 +199,7 @@ void add_stop(CommandLine& line) {
 
 void add_estop(CommandLine& line) {
   line.add("estop", "Stop all motors of all buses at once, until 'clear'").run([&line] {
-    return send(line.connection(), api::EmergencyStop{}, Until::kResult, Hope::kDone);
+    return send(line.connection(), api::EmergencyStop{}, Client::Until::kResult, Hope::kDone);
   });
 }
 
@@ -259,7 +258,7 @@ void add_set(CommandLine& line) {
             parse_set(options->motor, options->position, numbers(options->steps), options->dial);
         if (!request) return wrong_usage(request.error());
         // Over in a moment, and only the result tells whether the MCU did it.
-        return send(line.connection(), *request, Until::kResult, Hope::kDone);
+        return send(line.connection(), *request, Client::Until::kResult, Hope::kDone);
       });
 }
 

@@ -14,9 +14,8 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
-using Until = Client::Until;
 
-struct Options {
+struct PathOptions {
   std::string file;
   std::string corners = "continuous";
   std::string speed;
@@ -25,28 +24,29 @@ struct Options {
   bool json = false;
 };
 
-bushd::Result<PathFile> read_path(const Options& options) {
+bushd::Result<PathFile> read_path(const PathOptions& options) {
   const auto text = bushd::tables::read_text(options.file);
   if (!text) return bushd::fail(text.error());
   return parse_path(*text, options.file, options.corners, options.speed);
 }
 
-int check(const Connection& connection, const Options& options) {
+int check(const Connection& connection, const PathOptions& options) {
   auto path = read_path(options);
   if (!path) return wrong_usage(path.error());
   return show_plan(connection, path->parts, options.json,
                    [&](const std::string& why) { return path->located(why); });
 }
 
-int run(const Connection& connection, const Options& options) {
+int run(const Connection& connection, const PathOptions& options) {
   if (options.dry_run) return check(connection, options);
   auto path = read_path(options);
   if (!path) return wrong_usage(path.error());
-  return send_parts(connection, path->parts, options.wait ? Until::kResult : Until::kAnswered,
+  return send_parts(connection, path->parts,
+                    options.wait ? Client::Until::kResult : Client::Until::kAnswered,
                     [&](const std::string& why) { return path->located(why); });
 }
 
-Command& describe(Command& command, const std::shared_ptr<Options>& options) {
+Command& describe(Command& command, const std::shared_ptr<PathOptions>& options) {
   return command
       .footer(
           "The first line of FILE names motors of one bus, each further one has a position of "
@@ -71,7 +71,7 @@ Command& describe(Command& command, const std::shared_ptr<Options>& options) {
 
 void add_path_commands(CommandLine& line) {
   line.add_group("path", "Move motors along a path of points");
-  const auto checked = std::make_shared<Options>();
+  const auto checked = std::make_shared<PathOptions>();
   Command check_command = line.add(
       "check",
       "Say how long a path takes, with --json also when each point is reached; moves nothing",
@@ -79,7 +79,7 @@ void add_path_commands(CommandLine& line) {
   describe(check_command, checked)
       .flag("--json", &checked->json, "Print JSON")
       .run([&line, checked] { return check(line.connection(), *checked); });
-  const auto made = std::make_shared<Options>();
+  const auto made = std::make_shared<PathOptions>();
   Command run_command = line.add("run", "Move along a path", "path");
   describe(run_command, made)
       .flag("--wait", &made->wait, "Wait for the result")

@@ -14,6 +14,7 @@
 #include "bus_scan.h"
 #include "commands.h"
 #include "config/config.h"
+#include "line_commands.h"
 #include "setup_text.h"
 #include "tables/store/atomic_file.h"
 
@@ -23,13 +24,12 @@ namespace {
 using bushd::fail;
 using bushd::Result;
 
-constexpr std::uint32_t kMaxBaud = 100'000'000;
 // Those of the images, and what small chips are given.
 constexpr std::array<std::uint32_t, 3> kBauds = {500'000, 1'000'000, 115'200};
 // The first that the line can carry for all MCUs.
 constexpr std::array<std::uint32_t, 4> kTicksUs = {2560, 5120, 10'240, 20'000};
 
-struct Options {
+struct SetupOptions {
   std::vector<std::string> ports;
   std::uint32_t baud = 0;  // 0: each of kBauds
   std::string output = kSystemConfig;
@@ -39,11 +39,6 @@ struct Options {
 
 void say(const std::string& text) {
   fmt::print(stderr, "bushctl: {}\n", bushd::printable(text));
-}
-
-int failed(const bushd::Error& error) {
-  say(error.text());
-  return kFailed;
 }
 
 // On this port, at the first of these rates at which somebody answers.
@@ -59,7 +54,8 @@ Result<FoundBus> find_on(const std::string& port, std::span<const std::uint32_t>
 }
 
 // Only buses with an MCU that can be used. Says on stderr what it asks and finds.
-std::vector<FoundBus> find_buses(const std::vector<std::string>& ports, const Options& options) {
+std::vector<FoundBus> find_buses(const std::vector<std::string>& ports,
+                                 const SetupOptions& options) {
   const std::span<const std::uint32_t> bauds =
       options.baud == 0 ? std::span<const std::uint32_t>(kBauds) : std::span(&options.baud, 1);
   std::vector<FoundBus> buses;
@@ -94,7 +90,7 @@ bool is_there(const std::string& path) {
   return std::filesystem::exists(std::filesystem::symlink_status(path, error));
 }
 
-int set_up(const Options& options) {
+int set_up(const SetupOptions& options) {
   const std::string& path = options.output;
   if (!options.dry_run && !options.force && is_there(path)) {
     return failed({.message = "is there already, and is left alone; --force replaces it, --output "
@@ -126,7 +122,7 @@ int set_up(const Options& options) {
 }  // namespace
 
 void add_setup_command(CommandLine& line) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SetupOptions>();
   line.add_local("setup", "Find MCUs on serial ports, and write a configuration to begin with")
       .footer(
           "Without PORT all serial adapters are asked: a few bytes go out on each. The daemon must "

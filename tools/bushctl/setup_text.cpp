@@ -51,7 +51,7 @@ std::string trouble(const Found& mcu) {
                      mcu.address, unique_id_text(mcu.identity));
 }
 
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
@@ -87,7 +87,7 @@ tick_us = {}
 format = "fine"      # 2 bytes a motor and tick; "coarse": 1 byte, for full steps
 #moves = "table"     # MCUs run whole moves by their own copies of tables; "stream": tick by tick
 )",
-                     name, quoted(bus.port), bus.baud, tick_us);
+                     name, in_quotes(bus.port), bus.baud, tick_us);
 }
 
 std::string mcu_text(const std::string& bus, const Found& mcu) {

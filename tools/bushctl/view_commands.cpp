@@ -119,11 +119,6 @@ void add_health(CommandLine& line) {
   });
 }
 
-std::int64_t unix_us() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
-}
-
 int show_where(Client& client, const std::vector<std::string>& names,
                std::chrono::milliseconds timeout, bool as_json) {
   const auto status = client.status(timeout);

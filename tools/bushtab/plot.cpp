@@ -21,13 +21,13 @@ namespace {
 
 constexpr int kDefaultColumns = 80;
 constexpr int kMinColumns = 40;
-constexpr int kMaxColumns = 400;
+constexpr int kWidestPlot = 400;
 constexpr int kRows = 16;
 constexpr int kLabelColumns = 11;  // "123456.7 |" and a space
-constexpr std::array<const char*, 6> kColours{"36", "33", "35", "32", "31", "34"};
+constexpr std::array<const char*, 6> kAnsiColours{"36", "33", "35", "32", "31", "34"};
 
 const char* colour_of(int table) {
-  return kColours[static_cast<std::size_t>(table) % kColours.size()];
+  return kAnsiColours[static_cast<std::size_t>(table) % kAnsiColours.size()];
 }
 
 int columns() {
@@ -38,7 +38,7 @@ int columns() {
   } else if (const char* text = std::getenv("COLUMNS"); text != nullptr && std::atoi(text) > 0) {
     wanted = std::atoi(text);
   }
-  return std::clamp(wanted, kMinColumns, kMaxColumns);
+  return std::clamp(wanted, kMinColumns, kWidestPlot);
 }
 
 std::string row_text(const Canvas& canvas, int width, int row, bool coloured) {

@@ -9,14 +9,13 @@
 
 #include "engine/run.h"
 #include "tables/edit.h"
+#include "tables/profiles/make.h"
 
 namespace bushd::tables::profiles {
 namespace {
 
 constexpr double kNoise = 1e-6;
 constexpr double kSpeedRatio = 2.0;
-constexpr double kBushdSlowest = 250;
-constexpr double kBushdFastest = 10;
 constexpr int kMostRounds = 30;  // of looking for a factor
 // Of the factor from one round to the next. What coarse codes make of it falls in jumps.
 constexpr double kShrink = 0.9;

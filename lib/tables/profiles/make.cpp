@@ -18,8 +18,6 @@ namespace {
 // Binary fractions cannot hold most delays: this much of a unit beside a whole number is noise.
 constexpr double kNoiseUnits = 1e-6;
 constexpr double kLongestSideUnits = 2147483647.0;
-constexpr double kBushdSlowest = 250;  // the code of F_start
-constexpr double kBushdFastest = 10;   // one code more is 10 % slower: the resolution of BUSHD-2
 
 constexpr std::array<std::string_view, 8> kNames{
     "constant", "recurrence", "v64", "scurve", "exponential", "pto", "torque", "piecewise"};

@@ -16,6 +16,10 @@
 
 namespace bushd::tables::profiles {
 
+// Codes of BUSHD-2: that of F_start, and the least; there one code more is 10 % slower.
+inline constexpr double kBushdSlowest = 250;
+inline constexpr double kBushdFastest = 10;
+
 enum class Profile {
   kConstant,     // constant acceleration, exact
   kRecurrence,   // f_n = f_(n-1) + k / f_(n-1)          (Ivanov 2023, eq. 7-9)

@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "../adapters.h"
+#include "../commands.h"
 #include "config/config.h"
 #include "control/path.h"
 #include "observe_files.h"
@@ -31,12 +32,7 @@ constexpr const char* kServiceUser = "bushd";
 constexpr const char* kSystemFolder = "/etc/bushd/";
 constexpr const char* kStateFolder = "/var/lib/bushd";
 constexpr const char* kLogFolder = "/var/log/bushd";
-constexpr std::chrono::milliseconds kPatience{4000};
-
-std::int64_t unix_us() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
-}
+constexpr std::chrono::milliseconds kDoctorPatience{4000};
 
 User asking_user() {
   User user{.uid = geteuid()};
@@ -159,7 +155,7 @@ DaemonSeen daemon_seen(const Scope& scope) {
     return seen;
   }
   seen.by_socket = !(*client)->link().loses();
-  auto status = (*client)->status(kPatience);
+  auto status = (*client)->status(kDoctorPatience);
   if (!status) {
     seen.unreachable = status.error().text();
     return seen;
