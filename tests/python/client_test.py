@@ -150,7 +150,7 @@ class Blocking(PythonTest):
                 self.assertEqual(len(plan.points_s), 4)
                 self.assertEqual(client.where("b1").position_steps, 0)
                 result = client.move_path(["a0", "b1"], points)
-                self.assertIn("the path was limited by", result.reason)
+                self.assertIn("the path has ended", result.reason)
                 self.assertEqual(client.where("b1").position_steps, 0)
                 follow = client.follow(["b1"], [0, 1, 2], [[0], [50], [0]], wait=False)
                 self.wait_until("b1 to follow", lambda: client.where("b1").position_steps > 10)
