@@ -1,38 +1,18 @@
 // What comes out of the pins on a path, judged by tools/check-trace from the file of its points.
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-
-#include <array>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "daemon/lab.h"
-#include "sim/shipped_motors.h"
-#include "sim/vcd.h"
+#include "daemon/traced.h"
 
 namespace bushd::test {
 namespace {
 
 const std::vector<std::string> kTraced{"m01", "m03", "m04"};
 
-class PathTrace : public testing::TestWithParam<const char*> {
+class PathTrace : public Traced<const char*> {
  protected:
-  PathTrace() {
-    std::string name = (std::filesystem::temp_directory_path() / "bushd-path-XXXXXX").string();
-    directory_ = ::mkdtemp(name.data());
-    const std::array<std::uint8_t, 2> addresses = {1, 2};
-    vcd_ = std::move(sim::VcdWriter::create(path("trace.vcd"), addresses).value());
-  }
-  ~PathTrace() override { std::filesystem::remove_all(directory_); }
-
-  std::string path(const char* file) const { return (directory_ / file).string(); }
-
   // A contour of short segments, then some long ones with sharp corners.
   static std::vector<double> points() {
     std::vector<double> all;
@@ -51,24 +31,7 @@ class PathTrace : public testing::TestWithParam<const char*> {
       file << points[i] << ',' << points[i + 1] << ',' << points[i + 2] << '\n';
     }
   }
-  int check(const Lab& lab) {
-    std::ofstream moves(path("moves.jsonl"));
-    for (const std::string& line : lab.move_lines()) moves << line << "\n";
-    moves.close();
-    const std::string tool = (kShippedTables.parent_path() / "tools" / "check-trace").string();
-    const std::string command = BUSHD_PYTHON " -B " + tool + " --moves " + path("moves.jsonl") +
-                                " --trace " + path("trace.vcd") + " --path " + path("path.csv") +
-                                " > " + path("said") + " 2>&1";
-    const int status = std::system(command.c_str());  // NOLINT: a program of ours
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-  std::string said() const {
-    std::ifstream file(path("said"));
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-
-  std::filesystem::path directory_;
-  std::unique_ptr<sim::VcdWriter> vcd_;
+  int check(const Lab& lab) { return Traced::check(lab, "--path " + path("path.csv")); }
 };
 INSTANTIATE_TEST_SUITE_P(Formats, PathTrace, testing::Values("fine", "coarse"),
                          [](const auto& format) { return std::string(format.param); });

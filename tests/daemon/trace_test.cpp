@@ -4,15 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
-#include <functional>
 #include <nlohmann/json.hpp>
 
-#include "daemon/lab.h"
-#include "sim/shipped_motors.h"
-#include "sim/vcd.h"
+#include "daemon/traced.h"
 
 namespace bushd::test {
 namespace {
@@ -24,18 +19,8 @@ struct Manner {
   const char* manner = "fine";
 };
 
-class Trace : public testing::TestWithParam<Manner> {
+class Trace : public Traced<Manner> {
  protected:
-  Trace() {
-    std::string name = (std::filesystem::temp_directory_path() / "bushd-trace-XXXXXX").string();
-    directory_ = ::mkdtemp(name.data());
-    const std::array<std::uint8_t, 2> addresses = {1, 2};
-    vcd_ = std::move(sim::VcdWriter::create(path("trace.vcd"), addresses).value());
-  }
-  ~Trace() override { std::filesystem::remove_all(directory_); }
-
-  std::string path(const char* file) const { return (directory_ / file).string(); }
-
   static std::string toml() {
     std::string text = hall(2, 3, GetParam().manner);
     const auto add = [&text](const std::string& after, const std::string& keys) {
@@ -176,29 +161,11 @@ class Trace : public testing::TestWithParam<Manner> {
     }
     std::ofstream(path("positions.json")) << positions;
   }
-  // The exit code, with what `bend` leaves of the log's events.
-  int check(const Lab& lab, const std::function<bool(nlohmann::json&)>& bend) {
-    std::ofstream moves(path("moves.jsonl"));
-    for (const std::string& line : lab.move_lines()) {
-      auto event = nlohmann::json::parse(line);
-      if (bend(event)) moves << event << "\n";
-    }
-    moves.close();
-    const std::string tool = (kShippedTables.parent_path() / "tools" / "check-trace").string();
-    const std::string command = BUSHD_PYTHON " -B " + tool + " --moves " + path("moves.jsonl") +
-                                " --trace " + path("trace.vcd") + " --positions " +
-                                path("positions.json") + " > " + path("said");
-    const int status = std::system(command.c_str());  // NOLINT: a program of ours
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-  std::string said() const {
-    std::ifstream file(path("said"));
-    return {std::istreambuf_iterator<char>(file), {}};
+  int check(const Lab& lab, const Bend& bend) {
+    return Traced::check(lab, "--positions " + path("positions.json"), bend);
   }
 
   std::vector<std::int64_t> begins_;
-  std::filesystem::path directory_;
-  std::unique_ptr<sim::VcdWriter> vcd_;
 };
 INSTANTIATE_TEST_SUITE_P(
     Emission, Trace,
