@@ -36,6 +36,7 @@ class AxisSource : public link::TickSource {
                        std::int16_t* out, std::size_t stride) final;
   std::optional<RunSegment> run_at(link::McuIndex mcu, std::uint8_t motor, link::Tick first,
                                    unsigned max_ticks) final;
+  std::optional<bushd_run> plan_at(link::McuIndex mcu, std::uint8_t motor, link::Tick at) final;
   link::Tick end_tick(link::McuIndex mcu, std::uint8_t motor) final;
 };
 
