@@ -27,6 +27,7 @@
 #include "link/health.h"
 #include "link/mcu_index.h"
 #include "link/mcu_record.h"
+#include "link/pulse_port.h"
 #include "link/rehearsal.h"
 #include "link/table_run.h"
 #include "link/tick.h"
@@ -47,6 +48,10 @@ class BusMaster {
   virtual void receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) = 0;
   // Does what is due. The returned bytes are to be sent now; they stay valid until the next call.
   virtual std::span<const std::uint8_t> step(std::int64_t now_us) = 0;
+  // What the last step() orders of a port that is more than bytes; answered by pulse_status. Null:
+  // nothing.
+  virtual const PulseOrder* pulse_order() const { return nullptr; }
+  virtual void pulse_status(std::int64_t, const PulseStatus&) {}
   // step() has nothing to do before this time, unless bytes arrive or a call below is made.
   virtual std::int64_t next_wake_us() const = 0;
   // Events since the last call.
