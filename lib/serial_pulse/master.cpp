@@ -1,5 +1,6 @@
 #include "serial_pulse/master.h"
 
+#include <cstdio>
 #include <functional>
 #include <utility>
 
@@ -61,6 +62,7 @@ void Master::port_lost(std::int64_t now_us, const std::string& cause) {
   if (homing_) end_homing(now_us, BUSHD_HOMING_STOPPED);
   sent_.clear();
   recent_.clear();
+  burst_us_.reset();
   open_ = false;
   waits_ = fresh_ = false;
   order_.reset();
@@ -128,8 +130,34 @@ void Master::pulse_status(std::int64_t now_us, const link::PulseStatus& status) 
   const bool first = !status_;
   status_ = status;
   status_us_ = now_us;
+  for (const int direction : {-1, 1}) {
+    if (at_limit(direction)) limit_us_[direction > 0] = now_us;
+  }
   wake_us_ = now_us;
   if (first) identify();
+  measure_pauses();
+}
+
+// Where the driver tells that all has left, it is known how much later that is than it should be.
+void Master::measure_pauses() {
+  count_gone(now_us_);
+  if (!burst_us_ || !drained(now_us_)) return;
+  burst_us_.reset();
+  if (status_->empty) add_pause(now_us_ - us_of(line_free_ns_) - kDrainAskUs);
+}
+
+void Master::add_pause(std::int64_t us) {
+  constexpr std::int64_t kWorthTellingUs = 1'000;
+  if (us <= 0) return;
+  pauses_.pauses_us += us;
+  pauses_.longest_us = std::max(pauses_.longest_us, us);
+  if (pauses_.longest_us < kWorthTellingUs || pauses_.bytes_us == 0) return;
+  const double share =
+      static_cast<double>(pauses_.pauses_us) / static_cast<double>(pauses_.bytes_us);
+  char text[96];
+  std::snprintf(text, sizeof text, "pauses amid bytes: %.2f %% of their time, the longest %.1f ms",
+                100 * share, 1e-3 * static_cast<double>(pauses_.longest_us));
+  view_.note = text;
 }
 
 void Master::identify() {
@@ -247,16 +275,23 @@ bushd_motor_inputs Master::numbers() const {
   return named.empty() ? bushd_motor_inputs{} : named.front();
 }
 
-bool Master::forbidden(int direction) const {
+bool Master::at_limit(int direction) const {
   const bushd_set_inputs& inputs = setup_.mcus[0].inputs;
   const bool has = ((direction > 0 ? inputs.limit_positive : inputs.limit_negative) & 1) != 0;
   return has && reads(direction > 0 ? numbers().positive : numbers().negative);
+}
+
+// For a report that tells where a run was ended, too, however its switch is by then.
+bool Master::forbidden(int direction) const {
+  return (run_ && run_->limited && run_->direction == direction) ||
+         now_us_ < limit_us_[direction > 0] + kReleaseUs;
 }
 
 void Master::watch_limits(std::int64_t now_us) {
   if (!run_ || homing_ || !forbidden(run_->direction)) return;
   const bool immediately = (setup_.mcus[0].inputs.limit_immediate & 1) != 0;
   if (!run_->planned && !immediately) return;  // it ramps down already
+  run_->limited = true;
   leave_plan(now_us, immediately);
 }
 
@@ -365,6 +400,7 @@ void Master::end_run(std::int64_t now_us) {
     base_us_ = now_us;
   }
   position_ = run_->from_steps + run_->direction * std::int64_t{run_->gone};
+  if (run_->limited) limit_us_[run_->direction > 0] = now_us;
   run_.reset();
   report_due_us_ = now_us;
 }
@@ -399,8 +435,11 @@ bool Master::may_write(std::int64_t now_us, link::PulseOrder& order) {
       wait_until_drained(now_us);
     } else if (now_us < us_of(line_free_ns_) + kDirectionUs) {
       wake_at(us_of(line_free_ns_) + kDirectionUs);
+    } else if (now_us < direction_due_us_) {
+      ask_at(now_us + kDrainAskUs);
     } else {
       order.positive = positive;
+      direction_due_us_ = now_us + kDirectionUs;
     }
     return false;
   }
@@ -442,11 +481,9 @@ bool Master::write_byte(std::int64_t now_us, link::PulseOrder& order) {
     wake_at(us_of(line_free_ns_ - room_ns + std::min(room_ns / 2, kSpareUs * 1000)));
     return false;
   }
-  if (run.written > 0 && under_way_ns < 0 && !run.slow && order.bytes.empty()) {
-    ++gaps_.gaps;
-    gaps_.longest_us = std::max(gaps_.longest_us, -under_way_ns / 1000);
-  }
-  ++gaps_.bytes;
+  if (burst_us_ && under_way_ns < 0 && run.hold_us == 0) add_pause(-under_way_ns / 1000);
+  if (!burst_us_) burst_us_ = now_us;
+  pauses_.bytes_us += one_ns / 1000;
   for (unsigned i = 0; i < choice.pattern.steps; ++i) run.ahead.take();
   run.written += choice.pattern.steps;
   order.bytes.push_back(choice.pattern.byte);

@@ -17,6 +17,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -41,6 +42,8 @@ class Master final : public link::BusMaster {
   static constexpr std::int64_t kUnseenUs = 20'000;
   // The direction is set as long before a step, and kept as long behind it.
   static constexpr std::int64_t kDirectionUs = 1'000;
+  // A limit is active until its contact has been open for as long: it bounces.
+  static constexpr std::int64_t kReleaseUs = 100'000;
 
   // One MCU with one motor, at output 0. `source` outlives it. `unique_id`: of the port, so that a
   // kept position is known again.
@@ -80,13 +83,13 @@ class Master final : public link::BusMaster {
   void set_position(link::McuIndex, std::uint8_t, std::int32_t position_steps) override;
   void home(link::McuIndex, const bushd_home& message) override;
 
-  // Pauses in the middle of runs, changes of rate aside: the daemon, or the adapter, was late.
-  struct Gaps {
-    std::uint64_t bytes = 0;  // written in runs
-    std::uint64_t gaps = 0;
+  // Pauses of the line amid bytes: the adapter made them, or the daemon was late.
+  struct Pauses {
+    std::int64_t bytes_us = 0;   // what the bytes take by their rates
+    std::int64_t pauses_us = 0;  // and what they took beyond that
     std::int64_t longest_us = 0;
   };
-  const Gaps& gaps() const { return gaps_; }
+  const Pauses& pauses() const { return pauses_; }
 
  private:
   struct Sent {
@@ -111,6 +114,7 @@ class Master final : public link::BusMaster {
     std::int64_t hold_us = 0;        // from when the last byte has left for sure to the next one
     std::uint32_t written = 0;
     std::uint32_t gone = 0;
+    bool limited = false;  // a limit ends it
     bool slow = false;  // of homing: a byte is written when the one before it has left, and looked
   };
   struct Homing {
@@ -128,6 +132,7 @@ class Master final : public link::BusMaster {
   link::Tick clock(std::int64_t now_us) const;
   bool reads(std::uint8_t number) const;
   bushd_motor_inputs numbers() const;
+  bool at_limit(int direction) const;
   bool forbidden(int direction) const;
   bool at_home() const { return reads(numbers().home); }
 
@@ -160,6 +165,8 @@ class Master final : public link::BusMaster {
   bool is_sure(std::int64_t now_us, bool as_wanted);
 
   void identify();
+  void measure_pauses();
+  void add_pause(std::int64_t us);
   void report(std::int64_t now_us);
   void wake_at(std::int64_t us) { wake_us_ = std::min(wake_us_, us); }
   void ask_at(std::int64_t us) { ask_us_ = std::min(ask_us_, us); }
@@ -170,7 +177,8 @@ class Master final : public link::BusMaster {
   link::McuHealth health_;
   link::BusHealth bus_health_;
   std::vector<link::Event> events_;
-  Gaps gaps_;
+  Pauses pauses_;
+  std::optional<std::int64_t> burst_us_;  // bytes have been written since then, without a rest
 
   bool open_ = false;
   std::optional<link::PulseOrder> order_;  // not answered yet
@@ -178,11 +186,13 @@ class Master final : public link::BusMaster {
   bool fresh_ = false;                     // it is of the last step
   std::optional<link::PulseStatus> status_;
   std::int64_t status_us_ = 0;
-  std::int64_t quiet_since_us_ = 0;  // the driver has had no byte
-  std::int64_t direction_us_ = 0;    // when the direction was seen as it is
+  std::int64_t quiet_since_us_ = 0;    // the driver has had no byte
+  std::int64_t direction_due_us_ = 0;  // when it may be ordered again
+  std::int64_t direction_us_ = 0;      // when the direction was seen as it is
   std::int64_t wake_us_ = 0;
   std::int64_t ask_us_ = 0;  // when the port is to be asked, whether there is an order or not
   std::int64_t report_due_us_ = 0;
+  std::array<std::int64_t, 2> limit_us_{INT64_MIN / 2, INT64_MIN / 2};  // seen last; [1]: positive
   std::int64_t now_us_ = 0;  // of the last call that had it
 
   Planner planner_;

@@ -291,6 +291,41 @@ TEST(SerialPulse, RefusesWhatNeedsTicks) {
   EXPECT_NE(lab.wait(line).reason.find("runs of tables only"), std::string::npos);
 }
 
+TEST(SerialPulse, TellsPausesAmidBytes) {
+  Desk lab;
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {1000})).result, "reached");
+  EXPECT_EQ(lab.state_of("com1").detail, "");
+  const auto move = lab.send(Ask::kMoveBy, {"m"}, {4000});
+  lab.run_for(1.0);
+  lab.pause_daemon(0.1);
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  lab.expect_settled(5000);
+  lab.expect_run(1000, 4000);
+  lab.run_for(0.2);
+  EXPECT_NE(lab.state_of("com1").detail.find("the longest 8"), std::string::npos)
+      << lab.state_of("com1").detail;
+}
+
+TEST(SerialPulse, HomingStopsOnRequest) {
+  Desk lab;
+  lab.connect();
+  const auto home = lab.send(Ask::kHome, {"m"});
+  lab.run_for(0.8);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m"})).result, "done");
+  EXPECT_EQ(lab.last_reply(home).result, "stopped");
+  lab.run_for(0.1);
+  lab.expect_settled(lab.it().position_steps());
+  lab.expect_run(0, lab.it().steps());
+}
+
+TEST(SerialPulse, HasNoDriverToDisable) {
+  Desk lab;
+  lab.connect();
+  EXPECT_NE(lab.wait(lab.send(Ask::kDisable, {"m"})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {5})).result, "reached");
+}
+
 // Whatever is asked of it, and whenever: what it says is what the line did.
 TEST(SerialPulse, CountsEveryStepOfADayOfOrders) {
   const unsigned seed = std::random_device{}();
