@@ -6,7 +6,6 @@
 #include <array>
 #include <map>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "config/checks.h"
@@ -15,12 +14,12 @@
 #include "config/emission_section.h"
 #include "config/home.h"
 #include "config/inputs.h"
-#include "config/port_pattern.h"
+#include "config/port_check.h"
 #include "config/pseudo_section.h"
 #include "config/serial_pulse_section.h"
 #include "config/state_section.h"
+#include "config/table_shelf.h"
 #include "config/words.h"
-#include "tables/table_file.h"
 
 namespace bushd::config {
 namespace {
@@ -188,36 +187,6 @@ Result<std::uint32_t> read_baud(const TomlReader& reader) {
                                                fmt::join(rates.begin(), rates.end(), ", "))));
 }
 
-// One path for all spellings; a port that is not plugged in has one too.
-std::filesystem::path plain(const std::string& port) {
-  std::error_code error;
-  const auto absolute = std::filesystem::absolute(port, error);
-  if (error) return port;
-  const auto path = std::filesystem::weakly_canonical(absolute, error);
-  return error ? absolute : path;
-}
-
-// The same port under two names would give its bytes to whoever reads first.
-Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vector<Bus>& others) {
-  for (const Bus& other : others) {
-    std::error_code missing;
-    const bool same = plain(bus.port) == plain(other.port) ||
-                      std::filesystem::equivalent(bus.port, other.port, missing);
-    if (!same && patterns_may_meet(bus.port, other.port)) {
-      return fail(reader.error(
-          "port", fmt::format("\"{}\" and \"{}\", the port of bus \"{}\", may be the same port; "
-                              "allowed: one bus a port. Write more of the names",
-                              bus.port, other.port, other.name)));
-    }
-    if (!same) continue;
-    return fail(reader.error(
-        "port", fmt::format("\"{}\" is the port \"{}\" of bus \"{}\"; allowed: one bus "
-                            "a port. Put the MCUs of both on one [[bus]]",
-                            bus.port, other.port, other.name)));
-  }
-  return {};
-}
-
 // Of a bus of kind "rs485".
 Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
   if (auto known = reader.only({"name", "kind", "port", "baud", "tick_us", "format", "moves",
@@ -344,32 +313,6 @@ Result<void> add_stand_ins(const std::vector<TomlReader>& readers, Config* confi
   }
   return {};
 }
-
-// Tables by path, so that groups that name the same one share it.
-class TableShelf {
- public:
-  explicit TableShelf(const std::filesystem::path& config_path)
-      : directories_(table_directories(config_path)) {}
-
-  Result<tables::TablePtr> get(const TomlReader& reader, const std::string& group,
-                               const std::string& name) {
-    const auto path = tables::find(name, directories_);
-    if (!path) return fail(reader.error("table", path.error().text()));
-    if (const auto shelved = tables_.find(*path); shelved != tables_.end()) return shelved->second;
-    auto table = tables::load(*path);
-    if (!table) {
-      const Error user = reader.error("table", "");
-      table.error().message +=
-          fmt::format(" (the table of group \"{}\", {}:{})", group, user.file, user.line);
-      return table;
-    }
-    return tables_.emplace(*path, std::move(*table)).first->second;
-  }
-
- private:
-  std::vector<std::filesystem::path> directories_;
-  std::map<std::filesystem::path, tables::TablePtr> tables_;
-};
 
 Result<void> read_groups(Loading* loading) {
   Taken names;

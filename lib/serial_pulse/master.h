@@ -33,6 +33,11 @@
 
 namespace bushd::serial_pulse {
 
+// Not before it.
+constexpr std::int64_t us_of(std::int64_t ns) {
+  return (ns + 999) / 1000;
+}
+
 class Master final : public link::BusMaster {
  public:
   // Bytes under way, at most: where one takes nearly as long or longer, it and as much before it.
