@@ -77,7 +77,8 @@ bool Master::may_write(std::int64_t now_us, link::PulseOrder& order) {
     run.not_before_us = std::max(run.not_before_us, now_us + run.hold_us);
     run.hold_us = 0;
   }
-  if (run.slow && homing_ && homing_->readings > 0) return false;  // it looks once more
+  // It looks before each step, and once more if that is not sure.
+  if (run.slow && homing_ && (!looked(now_us) || homing_->readings > 0)) return false;
   const std::int64_t from_us = std::max(run.not_before_us, direction_us_ + kDirectionUs);
   if (now_us >= from_us) return true;
   wake_at(from_us);

@@ -6,8 +6,8 @@
 //
 // The slow stages are those of the source (docs/heritage.md): one step a byte, 0xF0, and after each
 // a look at the switch. The next byte goes out when that one has left for sure, so home is exact to
-// the step. A contact bounces: it counts after three readings in a row, and no step is made
-// before.
+// the step. A contact bounces: nothing is read for 5 ms behind a step, then it counts after three
+// readings in a row, and no step is made before.
 #include "serial_pulse/master.h"
 
 namespace bushd::serial_pulse {
@@ -15,6 +15,7 @@ namespace {
 
 constexpr unsigned kReadings = 3;
 constexpr std::int64_t kReadingUs = 1'000;
+constexpr std::int64_t kBounceUs = 5'000;  // behind a step nothing is read for so long
 
 }  // namespace
 
@@ -115,10 +116,21 @@ bool Master::is_sure(std::int64_t now_us, bool as_wanted) {
   return false;
 }
 
-// Looks when the last step has been made for sure, and not before.
+// The last step has been made for sure, and the lines have been read since, when they were quiet.
+bool Master::looked(std::int64_t now_us) {
+  if (!drained(now_us)) {
+    wait_until_drained(now_us);
+    return false;
+  }
+  const std::int64_t quiet_us = us_of(line_free_ns_) + kBounceUs;
+  if (status_us_ >= quiet_us) return true;
+  ask_at(std::max(quiet_us, now_us));
+  return false;
+}
+
 void Master::follow_slow(std::int64_t now_us) {
   if (!run_) return end_homing(now_us, BUSHD_HOMING_STOPPED);
-  if (!drained(now_us)) return;
+  if (!looked(now_us)) return;
   const bool approaches = homing_->stage == BUSHD_HOMING_APPROACH;
   const int direction = homing_->message.direction;
   if (is_sure(now_us, at_home() == approaches)) {

@@ -167,6 +167,7 @@ class Master final : public link::BusMaster {
   void begin_fast(std::int64_t now_us, int direction);
   void begin_slow(std::int64_t now_us, bushd_homing stage, int direction);
   void end_homing(std::int64_t now_us, bushd_homing how);
+  bool looked(std::int64_t now_us);
   bool is_sure(std::int64_t now_us, bool as_wanted);
 
   void identify();

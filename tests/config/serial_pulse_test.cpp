@@ -46,8 +46,8 @@ TEST(SerialPulse, IsABusWithOneMotor) {
 }
 
 TEST(SerialPulse, IsRefusedWithCauseAndRemedy) {
-  EXPECT_THAT(refusal("\"rts\"", "\"txd\""), HasSubstr("is \"txd\"; allowed: \"dtr\", \"rts\""));
-  EXPECT_THAT(refusal("direction_line = \"rts\"\n", ""), HasSubstr("direction_line is missing"));
+  EXPECT_THAT(refusal("\"rts\"", "\"txd\""), HasSubstr("is \"txd\"; allowed: \"dtr\" or \"rts\""));
+  EXPECT_THAT(refusal("direction_line = \"rts\"\n", ""), HasSubstr("direction_line: is missing"));
   EXPECT_THAT(refusal("direction_line", "baud = 9600\ndirection_line"), HasSubstr("unknown key"));
   EXPECT_THAT(refusal("home = \"cd\"", "home = \"rxd\""), HasSubstr("is \"rxd\"; allowed: \"cd\""));
   EXPECT_THAT(refusal("home = \"cd\"", "home = 3"), HasSubstr("\"cd\", \"dsr\", \"cts\", \"ri\""));
@@ -60,7 +60,7 @@ TEST(SerialPulse, IsRefusedWithCauseAndRemedy) {
               HasSubstr("which has no MCU; remove this section"));
   EXPECT_THAT(refusal("[[motor]]\n",
                       "[[motor]]\nname = \"y\"\nmcu = \"com1\"\ngroup = \"slits\"\n[[motor]]\n"),
-              HasSubstr("the one motor of bus \"com1\" is already taken in line 10"));
+              HasSubstr("the one motor of bus \"com1\" is already taken in line 12"));
   EXPECT_THAT(refusal("home = \"cd\", ", "") + refusal("mcu = \"com1\"\n", "mcu = \"com1\"\n"),
               HasSubstr("accepted"));
   EXPECT_THAT(

@@ -177,7 +177,7 @@ TEST(SerialPulse, HomesToTheStep) {
     Desk lab;
     if (!tells_empty) lab.pulse_driver.empty.reset();
     lab.connect();
-    lab.it().attach_switch(0, {.at_steps = -700, .hysteresis_steps = 3, .bounce_ns = 900'000});
+    lab.it().attach_switch(0, {.at_steps = -700, .hysteresis_steps = 3, .bounce_ns = 4'000'000});
     const Answer answer = lab.wait(lab.send(Ask::kHome, {"m"}), 200);
     ASSERT_EQ(answer.result, "reached") << answer.reason;
     EXPECT_EQ(lab.it().position_steps(), -700);
