@@ -100,6 +100,11 @@ void Core::receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t>
   supervisor_.handle_events(now_us, installation_[bus]);
 }
 
+void Core::pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus& status) {
+  installation_[bus].master.pulse_status(now_us, status);
+  supervisor_.handle_events(now_us, installation_[bus]);
+}
+
 void Core::request(std::int64_t now, const api::Asker& asker, const api::Request& as_asked) {
   const auto of_motors = pseudo_axes_.of_motors(as_asked);
   if (!of_motors) return asker.answer(api::Refused{of_motors.error().text()});
@@ -147,6 +152,9 @@ void Core::keep_up(std::int64_t now_us) {
   for (const BusId id : installation_.buses()) {
     const std::span<const std::uint8_t> bytes = installation_[id].master.step(now_us);
     if (!bytes.empty()) outputs_.send(id, bytes);
+    if (const link::PulseOrder* order = installation_[id].master.pulse_order()) {
+      outputs_.pulse(id, *order);
+    }
     supervisor_.handle_events(now_us, installation_[id]);
   }
   for (Service* service : services_) service->step(now_us);

@@ -54,6 +54,8 @@ class Core {
   void port_opened(std::int64_t now_us, BusId bus);
   void port_lost(std::int64_t now_us, BusId bus, const std::string& cause);
   void receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t> bytes);
+  // To be called soon after the output that ordered it.
+  void pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus& status);
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
 

@@ -13,7 +13,6 @@
 #include <limits>
 
 #include "base/printable.h"
-#include "daemon/bus_port.h"
 #include "daemon/process.h"
 #include "daemon/service_manager.h"
 #include "daemon/table_service.h"
@@ -192,7 +191,7 @@ Result<void> EventLoop::run() {
     open_due_ports(now);
     publishing_.set_dropped_messages(lcm_front_.dropped() +
                                      (socket_front_ ? socket_front_->dropped() : 0));
-    core_.keep_up(now);
+    keep_up(now);
     lcm_watch_.step(now);
     tell_left_out(now);
     const bool done = core_.at_rest() && core_.settled();
@@ -208,6 +207,15 @@ Result<void> EventLoop::run() {
   return fail("not all motors are known to be at rest; their MCUs run them down by themselves");
 }
 
+void EventLoop::keep_up(std::int64_t now) {
+  core_.keep_up(now);
+  for (const BusId bus : ports_.ids()) {
+    if (const auto status = std::exchange(ports_[bus].status, std::nullopt)) {
+      core_.pulse_status(now_us(), bus, *status);
+    }
+  }
+}
+
 Result<void> EventLoop::handle_sources() {
   std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
   // One call dispatches one source, the one that has waited longest.
@@ -215,7 +223,7 @@ Result<void> EventLoop::handle_sources() {
     const int dispatched = sd_event_run(event_, static_cast<std::uint64_t>(wait_us));
     if (dispatched < 0 && dispatched != -EINTR) return fail(loop_text(dispatched));
     if (dispatched <= 0) return {};
-    core_.keep_up(now_us());
+    keep_up(now_us());
     wait_us = 0;
   }
   return {};
@@ -245,7 +253,7 @@ void EventLoop::open_port(std::int64_t now, BusId bus) {
   auto opened = open_first_port(config);
   Result<std::unique_ptr<Source>> watched;
   if (opened) {
-    watched = watch(opened->fd(),
+    watched = watch((*opened)->fd(),
                     [this, bus](std::uint32_t events) { handle_port(now_us(), bus, events); });
   }
   if (!opened || !watched) {
@@ -262,8 +270,8 @@ void EventLoop::open_port(std::int64_t now, BusId bus) {
   port.source = std::move(*watched);
   port.last_error.clear();
   log(LogLevel::kInfo, {},
-      fmt::format("bus {}: port {} opened at {} baud", config.name, port.serial->path(),
-                  config.baud));
+      fmt::format("bus {}: port {} opened {}", config.name, port.serial->path(),
+                  port.serial->text()));
   core_.port_opened(now, bus);
 }
 
@@ -274,6 +282,7 @@ void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause)
   const std::string path = port.serial->path();
   port.source.reset();
   port.serial.reset();
+  port.status.reset();
   port.open_due_us = now + kReopenUs;
   port.last_error = path + ": " + cause;
   log(LogLevel::kError, {},
@@ -285,7 +294,7 @@ void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause)
 // What is lost is given up in the loop: its source cannot go while it is being handled.
 void EventLoop::handle_port(std::int64_t now, BusId bus, std::uint32_t events) {
   if (!ports_[bus].serial) return;
-  serial::SerialPort& serial = *ports_[bus].serial;
+  BusPort& serial = *ports_[bus].serial;
   if (events & EPOLLIN) {
     std::vector<std::uint8_t> bytes;
     const auto read = serial.read(bytes);
@@ -396,6 +405,13 @@ void EventLoop::send(BusId bus, std::span<const std::uint8_t> bytes) {
   } else if (waited != ports_[bus].serial->wants_to_write()) {
     update_write_interest(bus);
   }
+}
+
+void EventLoop::pulse(BusId bus, const link::PulseOrder& order) {
+  if (!ports_[bus].serial) return;
+  const auto status = ports_[bus].serial->carry_out(order);
+  if (!status) ports_[bus].lost = status.error().text();
+  if (status) ports_[bus].status = *status;
 }
 
 void EventLoop::publish(McuId mcu, const api::StateSnapshot& state) {

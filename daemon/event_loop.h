@@ -14,6 +14,7 @@
 #include "base/by_id.h"
 #include "config/config.h"
 #include "control/server.h"
+#include "daemon/bus_port.h"
 #include "daemon/core.h"
 #include "daemon/lcm_front.h"
 #include "daemon/lcm_watch.h"
@@ -25,7 +26,6 @@
 #include "daemon/table_library.h"
 #include "daemon/worker.h"
 #include "lcm/transport.h"
-#include "serial/serial_port.h"
 #include "state/keeper.h"
 #include "state/store.h"
 
@@ -63,8 +63,9 @@ class EventLoop : private Outputs, private state::Backend {
   using Handler = std::function<void(std::uint32_t events)>;
 
   struct Port {
-    std::optional<serial::SerialPort> serial;
-    std::unique_ptr<Source> source;  // of its descriptor
+    std::unique_ptr<BusPort> serial;
+    std::optional<link::PulseStatus> status;  // to be told to the core
+    std::unique_ptr<Source> source;           // of its descriptor
     std::int64_t open_due_us = 0;
     std::string last_error;  // so that a missing port is logged once, not twice a second
     // Why it is to be given up, as soon as neither the core nor its source is at work.
@@ -81,6 +82,8 @@ class EventLoop : private Outputs, private state::Backend {
   void handle_port(std::int64_t now_us, BusId bus, std::uint32_t events);
   void handle_signal(std::int64_t now_us, int signal);
   Result<void> restore_tables();
+  // The core has what is due done, and hears at once what became of it.
+  void keep_up(std::int64_t now_us);
   // Waits until something comes, then handles each source that has something, once: a stop among
   // them comes before any more of the requests that wait.
   Result<void> handle_sources();
@@ -98,6 +101,7 @@ class EventLoop : private Outputs, private state::Backend {
 
   // Outputs
   void send(BusId bus, std::span<const std::uint8_t> bytes) override;
+  void pulse(BusId bus, const link::PulseOrder& order) override;
   void publish(McuId mcu, const api::StateSnapshot& state) override;
   void publish(McuId mcu, const api::Description& description) override;
   void publish(BusId bus, const api::HealthSnapshot& health) override;

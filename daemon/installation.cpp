@@ -32,6 +32,12 @@ std::optional<link::TickSource::RunSegment> AxisSource::run_at(link::McuIndex mc
   return RunSegment{.run = segment->run, .ticks = segment->ticks};
 }
 
+std::optional<bushd_run> AxisSource::plan_at(link::McuIndex mcu, std::uint8_t motor,
+                                             link::Tick at) {
+  motion::Axis* axis = axis_of(mcu, Output{motor});
+  return axis == nullptr ? std::nullopt : axis->plan_at(at);
+}
+
 link::Tick AxisSource::end_tick(link::McuIndex mcu, std::uint8_t motor) {
   const motion::Axis* axis = axis_of(mcu, Output{motor});
   return axis == nullptr ? 0 : axis->end_tick();
@@ -164,7 +170,7 @@ bool Installation::any_moves(const Mcu& mcu) const {
 }
 
 bool Installation::by_table(const Mcu& mcu, std::int64_t steps) const {
-  return bus_of(mcu).config.table_runs && mcu.can_run_tables() &&
+  return (bus_of(mcu).config.table_runs || !mcu.streams()) && mcu.can_run_tables() &&
          std::abs(steps) <= motion::Motor::kMaxPosition;
 }
 

@@ -11,6 +11,7 @@
 #include "api/session.h"
 #include "api/snapshot.h"
 #include "base/ids.h"
+#include "link/pulse_port.h"
 
 namespace bushd::daemon {
 
@@ -22,6 +23,8 @@ using LogSubject = std::variant<std::monostate, MotorId, McuId>;
 class Outputs : public api::Publisher {
  public:
   virtual void send(BusId bus, std::span<const std::uint8_t> bytes) = 0;
+  // Of a port that is more than bytes; answered by Core::pulse_status, at once.
+  virtual void pulse(BusId, const link::PulseOrder&) {}
   virtual void move_log(const std::string& json_line) = 0;
   virtual void log(LogLevel level, LogSubject subject, const std::string& text) = 0;
   // Answered by Core::tables_read and Core::tables_kept, later.

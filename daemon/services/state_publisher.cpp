@@ -34,7 +34,7 @@ std::string detail_of(const Mcu& mcu, bool two_masters) {
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
     return mcu.asleep ? "drivers disabled at rest" : "drivers disabled";
   }
-  return {};
+  return view.note;
 }
 
 api::Activity activity_of(const motion::Motor& motor) {

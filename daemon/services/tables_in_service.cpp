@@ -293,6 +293,7 @@ void TablesInService::begin_upload(std::int64_t now_us, Change& change) {
 }
 
 std::int64_t TablesInService::upload_us(const Mcu& mcu) const {
+  if (!mcu.streams()) return 0;  // nothing is sent
   std::size_t requests = 0;
   const link::McuSetup setup = setup_of(installation_.config(), mcu.id, installation_.tables());
   for (const link::TableRef& ref : setup.tables) {

@@ -137,6 +137,7 @@ std::string line_remedy(const Bus& bus, std::span<const std::uint8_t> motors) {
 Result<void> check_line(const Loading& loading, std::size_t index) {
   const Config& config = loading.config;
   const Bus& bus = config.buses[index];
+  if (bus.kind != BusKind::kRs485) return {};
   std::vector<std::uint8_t> motors;
   for (std::size_t i = 0; i < config.mcus.size(); ++i) {
     if (config.mcus[i].bus != BusId{index}) continue;

@@ -44,15 +44,42 @@ struct State {
   bool required = true;  // nothing moves that could not be found uncertain afterwards
 };
 
+// One of the numbered inputs of an MCU; all that is connected to it has one level.
+struct Input {
+  std::uint8_t number = 0;
+  bool active_open = false;
+  friend bool operator==(const Input&, const Input&) = default;
+};
+
+// Inputs of its MCU. One input may be several of these, but for the step sensor's.
+struct MotorInputs {
+  std::optional<Input> positive = {};  // limit switches; the same input: one for both ends
+  std::optional<Input> negative = {};
+  std::optional<Input> home = {};  // looked for as Motor::home says
+  std::optional<Input> step = {};  // a sensor that tells its steps
+  // That with the number of its output, the one that a motor without the key `inputs` has.
+  std::optional<Input> own = {};
+};
+
+enum class BusKind { kRs485, kSerialPulse };  // docs/decisions/0043-bus-kinds.md
+
+// Of a bus of that kind.
+struct SerialPulse {
+  bool rts = false;         // the direction is on RTS, else on DTR
+  MotorInputs inputs = {};  // inputs 0..3 are the modem lines CD, DSR, CTS, RI
+};
+
 struct Bus {
   std::string name;
+  BusKind kind = BusKind::kRs485;
   std::string port;        // as written in the file; may be a pattern (config/port_pattern.h)
-  std::uint32_t baud = 0;  // one of libserial's fixed rates
+  std::uint32_t baud = 0;  // one of libserial's fixed rates; 0: of a kind without
   std::uint32_t tick_us = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
   bool table_runs = false;  // a move from rest is given to the MCU as a whole, if the MCU can
   bool table_ticks = true;  // streamed ticks may be told as states of the run
   bushd_stop_mode emergency_stop = BUSHD_STOP_RAMP;
+  SerialPulse serial_pulse = {};
 
   std::uint32_t tick_ns() const { return tick_us * 1000u; }
 };
@@ -94,23 +121,6 @@ struct Home {
   std::int32_t order = 1;            // of all that are homed together: the lower ones first
   std::optional<double> speed = {};  // of the fast approach unless asked otherwise, user units/s
   std::optional<double> then = {};   // user position to move to once the switch was found
-};
-
-// One of the numbered inputs of an MCU; all that is connected to it has one level.
-struct Input {
-  std::uint8_t number = 0;
-  bool active_open = false;
-  friend bool operator==(const Input&, const Input&) = default;
-};
-
-// Inputs of its MCU. One input may be several of these, but for the step sensor's.
-struct MotorInputs {
-  std::optional<Input> positive = {};  // limit switches; the same input: one for both ends
-  std::optional<Input> negative = {};
-  std::optional<Input> home = {};  // looked for as Motor::home says
-  std::optional<Input> step = {};  // a sensor that tells its steps
-  // That with the number of its output, the one that a motor without the key `inputs` has.
-  std::optional<Input> own = {};
 };
 
 struct Motor {

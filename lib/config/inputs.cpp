@@ -61,6 +61,10 @@ Result<void> read_inputs(const TomlReader& reader, Motor* motor) {
   std::optional<bool> own_level;
   if (reader.has("input_active")) own_level = own_open;
   if (auto read = read_motor_inputs(reader, own_level, motor); !read) return read;
+  return read_limit_action(reader, motor);
+}
+
+Result<void> read_limit_action(const TomlReader& reader, Motor* motor) {
   if (!reader.has("limit_action")) return {};
   const auto action = read_word(reader, "limit_action", {"ramp", "immediate"});
   if (!action) return fail(action.error());

@@ -10,4 +10,7 @@ Result<void> read_inputs(const tables::TomlReader& reader, Mcu* mcu);
 // Precondition: its output and `home` have been read.
 Result<void> read_inputs(const tables::TomlReader& reader, Motor* motor);
 
+// The key `limit_action`. Precondition: its limits are known.
+Result<void> read_limit_action(const tables::TomlReader& reader, Motor* motor);
+
 }  // namespace bushd::config

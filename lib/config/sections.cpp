@@ -6,7 +6,6 @@
 #include <array>
 #include <map>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "config/checks.h"
@@ -15,11 +14,12 @@
 #include "config/emission_section.h"
 #include "config/home.h"
 #include "config/inputs.h"
-#include "config/port_pattern.h"
+#include "config/port_check.h"
 #include "config/pseudo_section.h"
+#include "config/serial_pulse_section.h"
 #include "config/state_section.h"
+#include "config/table_shelf.h"
 #include "config/words.h"
-#include "tables/table_file.h"
 
 namespace bushd::config {
 namespace {
@@ -28,6 +28,8 @@ using tables::TomlReader;
 
 // A prefix becomes the beginning of LCM channel names, which have 63 characters at most.
 constexpr std::size_t kMaxPrefix = 48;
+constexpr std::array<std::string_view, 2> kBusKinds = {"rs485",
+                                                       "serial-pulse"};  // in the order of BusKind
 constexpr std::string_view kPrefixRule =
     "1..48 characters of A-Z a-z 0-9 _ . -, the first one no -";
 
@@ -185,45 +187,46 @@ Result<std::uint32_t> read_baud(const TomlReader& reader) {
                                                fmt::join(rates.begin(), rates.end(), ", "))));
 }
 
-// One path for all spellings; a port that is not plugged in has one too.
-std::filesystem::path plain(const std::string& port) {
-  std::error_code error;
-  const auto absolute = std::filesystem::absolute(port, error);
-  if (error) return port;
-  const auto path = std::filesystem::weakly_canonical(absolute, error);
-  return error ? absolute : path;
+// Of a bus of kind "rs485".
+Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
+  if (auto known = reader.only({"name", "kind", "port", "baud", "tick_us", "format", "moves",
+                                "frames", "emergency_stop"});
+      !known) {
+    return known;
+  }
+  const auto baud = read_baud(reader);
+  if (!baud) return fail(baud.error());
+  bus->baud = *baud;
+  const auto tick_us =
+      reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
+  if (!tick_us) return fail(tick_us.error());
+  bus->tick_us = static_cast<std::uint32_t>(*tick_us);
+  const auto format = read_word(reader, "format", {"fine", "coarse"});
+  if (!format) return fail(format.error());
+  bus->format = *format == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
+  return {};
 }
 
-// The same port under two names would give its bytes to whoever reads first.
-Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vector<Bus>& others) {
-  for (const Bus& other : others) {
-    std::error_code missing;
-    const bool same = plain(bus.port) == plain(other.port) ||
-                      std::filesystem::equivalent(bus.port, other.port, missing);
-    if (!same && patterns_may_meet(bus.port, other.port)) {
-      return fail(reader.error(
-          "port", fmt::format("\"{}\" and \"{}\", the port of bus \"{}\", may be the same port; "
-                              "allowed: one bus a port. Write more of the names",
-                              bus.port, other.port, other.name)));
-    }
-    if (!same) continue;
-    return fail(reader.error(
-        "port", fmt::format("\"{}\" is the port \"{}\" of bus \"{}\"; allowed: one bus "
-                            "a port. Put the MCUs of both on one [[bus]]",
-                            bus.port, other.port, other.name)));
+Result<void> read_kind(const TomlReader& reader, Bus* bus) {
+  if (reader.has("kind")) {
+    const auto kind = read_word(reader, "kind", kBusKinds);
+    if (!kind) return fail(kind.error());
+    bus->kind = static_cast<BusKind>(*kind);
   }
-  return {};
+  switch (bus->kind) {
+    case BusKind::kSerialPulse:
+      return read_serial_pulse(reader, bus);
+    case BusKind::kRs485:
+      break;
+  }
+  return read_rs485(reader, bus);
 }
 
 Result<void> read_buses(Loading* loading) {
   Taken names;
   for (const TomlReader& reader : loading->buses) {
-    if (auto known = reader.only(
-            {"name", "port", "baud", "tick_us", "format", "moves", "frames", "emergency_stop"});
-        !known) {
-      return known;
-    }
     Bus bus;
+    if (auto read = read_kind(reader, &bus); !read) return read;
     auto name = read_name(reader);
     if (!name) return fail(name.error());
     bus.name = std::move(*name);
@@ -237,16 +240,6 @@ Result<void> read_buses(Loading* loading) {
     }
     bus.port = std::move(*port);
     if (auto once = check_port(reader, bus, loading->config.buses); !once) return once;
-    const auto baud = read_baud(reader);
-    if (!baud) return fail(baud.error());
-    bus.baud = *baud;
-    const auto tick_us =
-        reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
-    if (!tick_us) return fail(tick_us.error());
-    bus.tick_us = static_cast<std::uint32_t>(*tick_us);
-    const auto format = read_word(reader, "format", {"fine", "coarse"});
-    if (!format) return fail(format.error());
-    bus.format = *format == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
     if (auto read = read_manners(reader, &bus); !read) return read;
     loading->config.buses.push_back(std::move(bus));
   }
@@ -304,31 +297,22 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
   return {};
 }
 
-// Tables by path, so that groups that name the same one share it.
-class TableShelf {
- public:
-  explicit TableShelf(const std::filesystem::path& config_path)
-      : directories_(table_directories(config_path)) {}
-
-  Result<tables::TablePtr> get(const TomlReader& reader, const std::string& group,
-                               const std::string& name) {
-    const auto path = tables::find(name, directories_);
-    if (!path) return fail(reader.error("table", path.error().text()));
-    if (const auto shelved = tables_.find(*path); shelved != tables_.end()) return shelved->second;
-    auto table = tables::load(*path);
-    if (!table) {
-      const Error user = reader.error("table", "");
-      table.error().message +=
-          fmt::format(" (the table of group \"{}\", {}:{})", group, user.file, user.line);
-      return table;
-    }
-    return tables_.emplace(*path, std::move(*table)).first->second;
+// A bus that needs no [[mcu]] stands in for its one.
+Result<void> add_stand_ins(const std::vector<TomlReader>& readers, Config* config) {
+  for (std::size_t i = 0; i < config->mcus.size(); ++i) {
+    const Bus& bus = config->bus_of(config->mcus[i]);
+    if (bus.kind != BusKind::kSerialPulse) continue;
+    return fail(readers[i].error(
+        "bus", fmt::format("is \"{}\", a serial port with one motor, which has no MCU; remove this "
+                           "section, and give the motor mcu = \"{}\"",
+                           bus.name, bus.name)));
   }
-
- private:
-  std::vector<std::filesystem::path> directories_;
-  std::map<std::filesystem::path, tables::TablePtr> tables_;
-};
+  for (std::size_t i = 0; i < config->buses.size(); ++i) {
+    if (config->buses[i].kind != BusKind::kSerialPulse) continue;
+    config->mcus.push_back({.bus = {i}, .address = {1}, .id = config->buses[i].name});
+  }
+  return {};
+}
 
 Result<void> read_groups(Loading* loading) {
   Taken names;
@@ -409,13 +393,19 @@ Result<void> read_motors(Loading* loading) {
     }
     const auto mcu = resolve<McuId>(reader, "mcu", config.mcus, &Mcu::id);
     if (!mcu) return fail(mcu.error());
-    const auto output = reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
+    const Bus& bus = config.bus_of(config.mcus[mcu->value]);
+    const bool one_motor = bus.kind == BusKind::kSerialPulse;
+    const auto output =
+        one_motor ? Result<std::int64_t>(0) : reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
     if (!output) return fail(output.error());
     if (auto room = check_phase_output(reader, config.mcus[mcu->value], *output); !room)
       return room;
     const std::string& id = config.mcus[mcu->value].id;
-    const std::string what = fmt::format("output {} of MCU \"{}\"", *output, id);
-    if (auto taken = outputs.take(reader, "output", what, what); !taken) return taken;
+    const std::string what = one_motor ? fmt::format("the one motor of bus \"{}\"", id)
+                                       : fmt::format("output {} of MCU \"{}\"", *output, id);
+    if (auto taken = outputs.take(reader, one_motor ? "mcu" : "output", what, what); !taken) {
+      return taken;
+    }
     const auto group = resolve<GroupId>(reader, "group", config.groups, &Group::name);
     if (!group) return fail(group.error());
     Motor motor{.name = std::move(*name),
@@ -423,7 +413,11 @@ Result<void> read_motors(Loading* loading) {
                 .output = {static_cast<std::uint8_t>(*output)},
                 .group = *group};
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
-    if (auto read = read_inputs(reader, &motor); !read) return read;
+    if (auto read =
+            one_motor ? take_serial_pulse(reader, bus, &motor) : read_inputs(reader, &motor);
+        !read) {
+      return read;
+    }
     if (auto read = read_restored(reader, &motor); !read) return read;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
     if (auto checked = check_then(reader, motor); !checked) return checked;
@@ -479,6 +473,7 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
   loading->motors = std::move(*motors);
   if (auto read = read_buses(loading); !read) return read;
   if (auto read = read_mcus(*mcus, &loading->config); !read) return read;
+  if (auto added = add_stand_ins(*mcus, &loading->config); !added) return added;
   if (auto read = read_groups(loading); !read) return read;
   const auto pseudos = read_array(root, file, "pseudo", false);
   if (!pseudos) return fail(pseudos.error());

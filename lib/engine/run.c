@@ -176,6 +176,29 @@ uint16_t bushd_run_delay(const bushd_run* run) {
   return 0;
 }
 
+#if BUSHD_RUN_BRAKES
+uint16_t bushd_run_take_step(bushd_run* run) {
+  const uint16_t delay = bushd_run_delay(run);
+  if (delay == 0) return 0;
+  if (run->lead_delay != 0) {
+    run->lead_delay = 0;
+  } else if (run->accel_at < run->accel_end) {
+    ++run->accel_at;
+  } else if (run->brake_left != 0) {
+    --run->brake_left;
+  } else if (run->cruise_left != 0) {
+    --run->cruise_left;
+  } else {
+    --run->decel_left;
+  }
+  run->since = 0;
+  run->since_ns = 0;
+  run->fraction = 0;
+  bushd_run_count(run, 1);
+  return delay;
+}
+#endif
+
 uint32_t bushd_run_steps_left(const bushd_run* run) {
   return (run->lead_delay != 0) + (uint32_t)(run->accel_end - run->accel_at) + brake_left(run) +
          run->cruise_left + run->decel_left;

@@ -116,6 +116,11 @@ size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int
 // The delay of the step that is running, time units; 0 when the run is done. O(1).
 uint16_t bushd_run_delay(const bushd_run* run);
 bool bushd_run_done(const bushd_run* run);
+#if BUSHD_RUN_BRAKES
+// Makes the next step, whenever that is: returns the delay before it, time units; 0 when the run is
+// done. What is over of the running step is forgotten. O(1).
+uint16_t bushd_run_take_step(bushd_run* run);
+#endif
 // Steps still to be made. O(1).
 uint32_t bushd_run_steps_left(const bushd_run* run);
 // Time from now to the last step, in time units and rounded up. O(steps left on the ramps) without

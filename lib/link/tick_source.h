@@ -28,6 +28,10 @@ class TickSource {
   };
   virtual std::optional<RunSegment> run_at(McuIndex mcu, std::uint8_t motor, Tick first,
                                            unsigned max_ticks) = 0;
+  // The run as it is planned from the beginning of tick `at` on, or from its start, if that is
+  // later; whatever it does then. Nothing: the motor has no plan, or one that is no run of its
+  // table.
+  virtual std::optional<bushd_run> plan_at(McuIndex, std::uint8_t, Tick) { return std::nullopt; }
   // First tick after the motor's last step, as planned now.
   virtual Tick end_tick(McuIndex mcu, std::uint8_t motor) = 0;
 };

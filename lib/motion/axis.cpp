@@ -373,6 +373,14 @@ std::optional<Axis::RunSegment> Axis::run_at(Tick first, unsigned max_ticks) {
   return RunSegment{.run = place.run, .ticks = static_cast<unsigned>(until - first)};
 }
 
+std::optional<bushd_run> Axis::plan_at(Tick first) {
+  if (!busy_ || share_ || followed_) return std::nullopt;
+  go_to(std::max(first, start_));
+  Place place = head_;
+  take_change(place);
+  return place.run;
+}
+
 std::uint16_t Axis::render(Tick first, unsigned count, std::int16_t* out, std::size_t stride) {
   go_to(first);
   // The delay to be told at the end of ticks before the start is that of the changed run.

@@ -157,6 +157,10 @@ class Axis {
   };
   std::optional<RunSegment> run_at(Tick first, unsigned max_ticks);
 
+  // The same, whatever it does then: `first` or its start, if that is later. Nothing: no run of the
+  // motor's own table.
+  std::optional<bushd_run> plan_at(Tick first);
+
   // The ticks before `until` are over and will not be asked for again. Returns the change that was
   // among them.
   std::optional<Change> executed(Tick until);

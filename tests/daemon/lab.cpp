@@ -105,11 +105,15 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
   if (!config) throw std::runtime_error(config.error().text());
   config_ = std::move(*config);
   for (std::size_t b = 0; b < config_.buses.size(); ++b) {
-    buses_.push_back({std::make_unique<sim::Bus>(config_.buses[b].baud, sink), {}, true});
+    const bool pulses = config_.buses[b].kind == config::BusKind::kSerialPulse;
+    const std::uint32_t baud = pulses ? 115'200 : config_.buses[b].baud;
+    SimulatedBus bus{.bus = std::make_unique<sim::Bus>(baud, sink), .drive = {}, .received = {}};
+    if (pulses) bus.drive = std::make_unique<sim::PulseDrive>(sink);
+    buses_.push_back(std::move(bus));
   }
   for (std::size_t b = 0; b < config_.buses.size(); ++b) {
     for (std::size_t m = 0; m < config_.mcus.size(); ++m) {
-      if (config_.mcus[m].bus.value != b) continue;
+      if (config_.mcus[m].bus.value != b || buses_[b].drive) continue;
       // Each boots at another time, so that their ticks have nothing in common by themselves.
       sim::McuOptions options{.address = config_.mcus[m].address.value,
                               .boot_number = static_cast<std::uint16_t>(100 * b + m + 1),
@@ -230,6 +234,7 @@ void Lab::pause_daemon(double seconds) {
 }
 
 void Lab::unplug(std::size_t bus) {
+  if (buses_[bus].drive) buses_[bus].drive->break_off(now_ns_);
   buses_[bus].plugged = false;
   core().port_lost(now_us(), BusId{bus}, "unplugged");
 }
@@ -244,6 +249,30 @@ void Lab::send(BusId bus, std::span<const std::uint8_t> bytes) {
   std::vector<std::uint8_t> copy(bytes.begin(), bytes.end());
   if (on_send && !on_send(bus.value, copy)) return;
   if (buses_[bus.value].plugged) buses_[bus.value].bus->master_send(copy, now_ns_);
+}
+
+void Lab::pulse(BusId id, const link::PulseOrder& order) {
+  SimulatedBus& bus = buses_[id.value];
+  if (!bus.plugged) return;
+  if (order.positive) bus.drive->set_direction(now_ns_, *order.positive);
+  if (order.baud) bus.drive->set_baud(now_ns_, *order.baud);
+  bus.drive->send(now_ns_, order.bytes);
+  bus.ordered = true;
+}
+
+void Lab::tell_pulse_status() {
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    if (!std::exchange(buses_[b].ordered, false)) continue;
+    sim::PulseDrive& drive = *buses_[b].drive;
+    link::PulseStatus status = pulse_driver;
+    status.baud = drive.baud();
+    // What the driver has not sent: not what is in the UART.
+    status.queued = std::max<std::size_t>(drive.queued(), 1) - 1;
+    if (status.empty) status.empty = drive.queued() == 0;
+    status.lines = drive.lines();
+    status.positive = drive.positive();
+    core().pulse_status(now_us(), BusId{b}, status);
+  }
 }
 
 void Lab::log(daemon::LogLevel level, daemon::LogSubject, const std::string& text) {
@@ -267,6 +296,7 @@ void Lab::advance() {
     answer();
   }
   core().step(now_us());
+  tell_pulse_status();
   std::int64_t next = std::max(core().next_wake_us() * 1000, now_ns_ + 1000);
   if (read_period_us > 0) next = std::min(next, now_ns_ + read_period_us * 1000);
   for (const SimulatedBus& bus : buses_) {
@@ -280,6 +310,7 @@ void Lab::advance() {
 void Lab::run_buses() {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     buses_[b].bus->advance_to(now_ns_);
+    if (buses_[b].drive) buses_[b].drive->advance_to(now_ns_);
     if (buses_[b].received.empty()) continue;
     const std::vector<std::uint8_t> bytes = std::exchange(buses_[b].received, {});
     core().receive(now_us(), BusId{b}, bytes);
@@ -403,6 +434,7 @@ std::int64_t Lab::shaft_steps(const std::string& name) const {
   for (const config::Motor& motor : config_.motors) {
     if (motor.name != name) continue;
     const config::Mcu& mcu = config_.mcu_of(motor);
+    if (buses_[mcu.bus.value].drive) return buses_[mcu.bus.value].drive->position_steps();
     std::size_t in_bus = 0;
     for (std::size_t m = 0; m < motor.mcu.value; ++m) {
       if (config_.mcus[m].bus == mcu.bus) ++in_bus;

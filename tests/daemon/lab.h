@@ -15,6 +15,7 @@
 
 #include "daemon/core.h"
 #include "sim/bus.h"
+#include "sim/pulse_drive.h"
 #include "sim_disk/sim_disk.h"
 #include "state/store.h"
 
@@ -153,6 +154,10 @@ class Lab : public daemon::Outputs, private state::Backend {
 
   daemon::Core& core() { return *core_; }
   sim::Bus& bus(std::size_t index) { return *buses_[index].bus; }
+  // Of kind "serial-pulse".
+  sim::PulseDrive& drive(std::size_t index) { return *buses_[index].drive; }
+  // What the drivers of such ports can do, from the next time that one is opened.
+  link::PulseStatus pulse_driver = {.any_rate = true, .empty = true};
   std::int64_t now_us() const { return now_ns_ / 1000; }
   const std::vector<std::string>& move_lines() const { return move_lines_; }
   // Which tables a restarted daemon is to have, as asked to keep last.
@@ -161,6 +166,8 @@ class Lab : public daemon::Outputs, private state::Backend {
  private:
   struct SimulatedBus {
     std::unique_ptr<sim::Bus> bus;
+    std::unique_ptr<sim::PulseDrive> drive;  // in its place, of a bus of that kind
+    bool ordered = false;                    // and its status is to be told
     std::vector<std::uint8_t> received;
     bool plugged = true;
   };
@@ -188,6 +195,8 @@ class Lab : public daemon::Outputs, private state::Backend {
   }
   void start_daemon();
   void advance();
+  void pulse(BusId bus, const link::PulseOrder& order) override;
+  void tell_pulse_status();
   void run_buses();  // until now; the daemon reads what has arrived
 
   std::filesystem::path directory_;

@@ -15,6 +15,7 @@
 #include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
+#include "pulse_simulator.h"
 #include "simulator.h"
 
 namespace {
@@ -71,7 +72,8 @@ int run(int argc, char** argv) {
   app.add_option("--switch", switches,
                  "A switch at a motor of a virtual MCU, ADDRESS.OUTPUT@STEPS: 1.0@-200 closes 200 "
                  "steps from where it stands now in the negative direction, 1.0@+200 in the "
-                 "positive one; 1.0:9@-200 is connected to input 9. Several times for several")
+                 "positive one; 1.0:9@-200 is connected to input 9. At a serial port that makes "
+                 "pulses, inputs 0 to 3 are CD, DSR, CTS and RI. Several times for several")
       ->allow_extra_args(false);
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
@@ -98,13 +100,20 @@ int run(int argc, char** argv) {
   options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
   bushd::Result<void> ended;
   std::string summary;
-  {
-    const auto simulator = bushsim::Simulator::create(options);
-    if (!simulator) return refuse(simulator.error());
+  const auto simulate = [&](const auto& simulator) {
     fmt::print("bushsim: ready {}\n", options.links.front());
     std::fflush(stdout);
-    ended = (*simulator)->run();
-    summary = (*simulator)->summary();
+    ended = simulator->run();
+    summary = simulator->summary();
+  };
+  if (options.setup.pulses) {
+    const auto simulator = bushsim::PulseSimulator::create(options);
+    if (!simulator) return refuse(simulator.error());
+    simulate(*simulator);
+  } else {
+    const auto simulator = bushsim::Simulator::create(options);
+    if (!simulator) return refuse(simulator.error());
+    simulate(*simulator);
   }
   // Only now, with trace and link put in order: whoever started this may have closed its end of
   // stdout.

@@ -23,6 +23,7 @@ class Pty {
   ~Pty();
 
   int fd() const { return master_.get(); }
+  const std::string& link() const { return link_; }
 
   // What the other side has written, at most `space`; never blocks. Returns the number of bytes.
   bushd::Result<std::size_t> read(std::span<std::uint8_t> space);

@@ -15,6 +15,7 @@ namespace bushsim {
 struct Setup {
   std::string bus;
   std::uint32_t baud = 0;
+  bool pulses = false;                  // a bus of kind "serial-pulse"
   std::vector<std::uint8_t> addresses;  // at least one
   std::set<std::uint8_t> measuring;     // of these, the MCUs that measure their supply current
 };

@@ -34,8 +34,9 @@ void add_side_options(CLI::App* command, const std::string& prefix,
                       const std::function<profiles::SideSpec&()>& side) {
   const std::string of = prefix.empty() ? "" : " of the decelerating side";
   const std::string dashes = "--" + prefix;
-  const std::vector<std::string> names{"constant",    "recurrence", "v64",    "scurve",
-                                       "exponential", "pto",        "torque", "piecewise"};
+  const std::vector<std::string> names{"constant", "recurrence",  "v64",
+                                       "scurve",   "exponential", "pto",
+                                       "torque",   "piecewise",   "serial"};
   auto* profile = command->add_option_function<std::string>(
       dashes + "law",
       [side](const std::string& name) { side().profile = *profiles::profile_of(name); },

@@ -96,4 +96,31 @@ Result<std::vector<double>> v64(const SideSpec& side, double start_hz, double ma
   }
 }
 
+Result<std::vector<double>> serial(const SideSpec& side, Side which, double start_hz,
+                                   double max_hz) {
+  constexpr std::uint32_t kStepsOfAByte = 5;
+  const bool up = which == Side::kAccel;
+  if (!side.codes) return fail("profile serial takes --codes, the steps of its bytes");
+  const std::uint32_t bytes = *side.codes / kStepsOfAByte;
+  const std::uint32_t last = *side.codes % kStepsOfAByte;
+  if (up && last != 0) {
+    return fail(fmt::format(
+        "--codes {}: profile serial speeds up by bytes of five steps; allowed: multiples of 5",
+        *side.codes));
+  }
+  if (!up && last == 0) {
+    return fail(fmt::format(
+        "--decel-codes {}: profile serial slows down by bytes of five steps and a last one of 1 to "
+        "4; allowed: all but multiples of 5",
+        *side.codes));
+  }
+  std::vector<double> delays(last, 1.0 / start_hz);
+  const double change_hz = (max_hz - start_hz) / (up ? bytes : bytes + 1);
+  for (std::uint32_t i = up ? 0 : 1; i < (up ? bytes : bytes + 1); ++i) {
+    delays.insert(delays.end(), kStepsOfAByte, 1.0 / (start_hz + i * change_hz));
+  }
+  delays.push_back(1.0 / max_hz);
+  return delays;
+}
+
 }  // namespace bushd::tables::profiles

@@ -1,4 +1,4 @@
-// The two profiles that are programs, not motions: they are run as their sources run them.
+// The profiles that are programs, not motions: they are run as their sources run them.
 #pragma once
 
 #include "tables/profiles/make.h"
@@ -15,5 +15,12 @@ Result<std::vector<double>> recurrence(const SideSpec& side, double start_hz, do
 inline constexpr std::uint32_t kV64UnitNs = 25'000;
 Result<std::vector<double>> v64(const SideSpec& side, double start_hz, double max_hz,
                                 bool published);
+
+// The serial port as controller (docs/heritage.md): a byte makes five steps of one speed. Speeding
+// up takes n1 bytes, each df1 = (f_h - f_l) / n1 faster than the one before, the first one at f_l.
+// Slowing down takes n3 bytes and a last one of dp = 1..4 steps, each df2 = (f_h - f_l) / (n3 + 1)
+// slower, the last one at f_l. `side.codes` is 5 n1, or 5 n3 + dp; the cruise delay is one more.
+Result<std::vector<double>> serial(const SideSpec& side, Side which, double start_hz,
+                                   double max_hz);
 
 }  // namespace bushd::tables::profiles

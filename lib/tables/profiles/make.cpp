@@ -19,15 +19,16 @@ namespace {
 constexpr double kNoiseUnits = 1e-6;
 constexpr double kLongestSideUnits = 2147483647.0;
 
-constexpr std::array<std::string_view, 8> kNames{
-    "constant", "recurrence", "v64", "scurve", "exponential", "pto", "torque", "piecewise"};
+constexpr std::array<std::string_view, 9> kNames{"constant", "recurrence",  "v64",
+                                                 "scurve",   "exponential", "pto",
+                                                 "torque",   "piecewise",   "serial"};
 
 bool is_positive(double value) {
   return std::isfinite(value) && value > 0;
 }
 
 bool is_discrete(Profile profile) {
-  return profile == Profile::kRecurrence || profile == Profile::kV64;
+  return profile == Profile::kRecurrence || profile == Profile::kV64 || profile == Profile::kSerial;
 }
 
 bool uses_v64(const Spec& spec) {
@@ -66,7 +67,7 @@ Result<void> check_skip(const Spec& spec) {
                     what, hz, skip.low_hz, skip.high_hz));
   }
   if (is_discrete(spec.accel.profile) || (spec.decel && is_discrete(spec.decel->profile))) {
-    return fail("profiles recurrence and v64 know no --skip; use constant");
+    return fail("profiles recurrence, v64 and serial know no --skip; use constant");
   }
   if (skip.acceleration && skip.factor) {
     return fail("--skip-acceleration is an acceleration or xFACTOR, not both");
@@ -142,7 +143,8 @@ Result<void> check(const Spec& spec) {
   if (uses_v64(spec) && spec.time_unit_ns.value_or(kV64UnitNs) != kV64UnitNs) {
     return fail("profile v64 counts in 25 us; allowed: --time-unit 25us, or leave it out");
   }
-  if (spec.published && !is_discrete(spec.accel.profile)) {
+  if (spec.published &&
+      (!is_discrete(spec.accel.profile) || spec.accel.profile == Profile::kSerial)) {
     return fail("--published is for profiles recurrence and v64, whose sources round down");
   }
   return check_skip(spec);
@@ -248,6 +250,7 @@ Result<std::vector<double>> side_delays_s(const Spec& spec, Side side) {
   if (from_hz == spec.max_hz && side_spec.profile != Profile::kPiecewise)
     return Delays{1.0 / from_hz};
   if (side_spec.profile == Profile::kRecurrence) return recurrence(side_spec, from_hz, spec.max_hz);
+  if (side_spec.profile == Profile::kSerial) return serial(side_spec, side, from_hz, spec.max_hz);
   if (side_spec.profile == Profile::kV64)
     return v64(side_spec, from_hz, spec.max_hz, spec.published);
   const auto motion = continuous(spec, side_spec, side, from_hz);

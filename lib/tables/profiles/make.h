@@ -29,6 +29,7 @@ enum class Profile {
   kPto,          // constant, from times, as PLC wizards ask
   kTorque,       // the fastest that a motor can follow
   kPiecewise,    // constant acceleration over each of several stretches of steps
+  kSerial,       // another speed after each five steps   (a serial port, docs/heritage.md)
 };
 std::string_view name_of(Profile profile);
 std::optional<Profile> profile_of(std::string_view name);

@@ -1,4 +1,4 @@
-// The two profiles that are programs, against their sources' loops written down anew.
+// The profiles that are programs, against their sources' loops written down anew.
 #include <gtest/gtest.h>
 
 #include "tables/profiles/random_spec.h"
@@ -65,6 +65,37 @@ std::vector<int> avr_loop(long start, long maximum, long change, std::size_t cou
     reload = static_cast<int>(2'560'000 / speed);
   }
   return delays;
+}
+
+// n1 = 3, n3 = 2, dp = 3: bytes of the document, in the order of the motion.
+TEST(Serial, SpeedChangesByTheDocumentsDifferencesAfterEachByte) {
+  Spec spec{.name = "s", .start_hz = 100, .max_hz = 400};
+  spec.time_unit_ns = 1000;
+  spec.accel = {.profile = Profile::kSerial, .codes = 15};
+  spec.decel = tables::profiles::SideSpec{.profile = Profile::kSerial, .codes = 13};
+  const auto content = make_content(spec);
+  ASSERT_TRUE(content) << content.error().message;
+  const auto codes = [](std::initializer_list<std::pair<int, double>> bytes) {
+    std::vector<std::uint16_t> all;
+    for (const auto& [steps, hz] : bytes) {
+      all.insert(all.end(), static_cast<std::size_t>(steps),
+                 static_cast<std::uint16_t>(std::ceil(1e6 / hz)));
+    }
+    return all;
+  };
+  EXPECT_EQ(content->accel, codes({{5, 100}, {5, 200}, {5, 300}, {1, 400}}));
+  EXPECT_EQ(content->decel, codes({{1, 400}, {5, 300}, {5, 200}, {3, 100}}));
+}
+
+TEST(Serial, RefusesStepsThatAreNoBytes) {
+  Spec spec{.name = "s", .start_hz = 100, .max_hz = 400};
+  spec.accel = {.profile = Profile::kSerial, .codes = 16};
+  EXPECT_NE(make_content(spec).error().message.find("multiples of 5"), std::string::npos);
+  spec.accel.codes = 15;
+  spec.decel = tables::profiles::SideSpec{.profile = Profile::kSerial, .codes = 15};
+  EXPECT_NE(make_content(spec).error().message.find("all but multiples of 5"), std::string::npos);
+  spec.accel = {.profile = Profile::kSerial, .time_s = 1};
+  EXPECT_NE(make_content(spec).error().message.find("takes --codes"), std::string::npos);
 }
 
 TEST(V64, DelaysAreThoseOfTheControllersLoop) {

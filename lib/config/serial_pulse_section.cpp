@@ -1,0 +1,111 @@
+#include "config/serial_pulse_section.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <string_view>
+
+#include "config/inputs.h"
+#include "config/words.h"
+
+namespace bushd::config {
+namespace {
+
+using tables::TomlReader;
+
+constexpr std::uint32_t kTickUs = 2560;  // of reports, and of the plan between them
+constexpr std::array<std::string_view, 4> kLines = {"cd", "dsr", "cts", "ri"};
+constexpr std::string_view kLineRule =
+    "\"cd\", \"dsr\", \"cts\", \"ri\", or { line = \"cd\", active = \"on\" or \"off\" }";
+
+Result<Input> read_line(const TomlReader& inputs, std::string_view key) {
+  if (inputs.table(key) == nullptr) {
+    if (!inputs.is_string(key))
+      return fail(inputs.error(key, fmt::format("allowed: {}", kLineRule)));
+    const auto line = read_word(inputs, key, kLines);
+    if (!line) return fail(line.error());
+    return Input{.number = static_cast<std::uint8_t>(*line)};
+  }
+  const auto reader = inputs.section(key, kLineRule);
+  if (!reader) return fail(reader.error());
+  if (auto known = reader->only({"line", "active"}); !known) return fail(known.error());
+  const auto line = read_word(*reader, "line", kLines);
+  if (!line) return fail(line.error());
+  Input input{.number = static_cast<std::uint8_t>(*line)};
+  if (!reader->has("active")) return input;
+  const auto active = read_word(*reader, "active", {"on", "off"});
+  if (!active) return fail(active.error());
+  input.active_open = *active == 1;
+  return input;
+}
+
+Result<void> read_lines(const TomlReader& bus, MotorInputs* lines) {
+  const auto reader =
+      bus.section("inputs", "a table such as { home = \"cd\", positive = \"dsr\" }");
+  if (!reader) return fail(reader.error());
+  if (auto known = reader->only({"positive", "negative", "home"}); !known) return known;
+  struct Use {
+    std::string_view key;
+    std::optional<Input> MotorInputs::*input;
+  };
+  for (const Use& use :
+       {Use{"positive", &MotorInputs::positive}, Use{"negative", &MotorInputs::negative},
+        Use{"home", &MotorInputs::home}}) {
+    if (!reader->has(use.key)) continue;
+    const auto input = read_line(*reader, use.key);
+    if (!input) return fail(input.error());
+    for (const auto& other : {lines->positive, lines->negative, lines->home}) {
+      if (!other || other->number != input->number || other->active_open == input->active_open) {
+        continue;
+      }
+      return fail(reader->error(
+          use.key, fmt::format("is {}, which another input has with the other level; allowed: one "
+                               "level a line",
+                               kLines[input->number])));
+    }
+    lines->*use.input = *input;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> read_serial_pulse(const TomlReader& reader, Bus* bus) {
+  if (auto known = reader.only(
+          {"name", "kind", "port", "direction_line", "inputs", "tick_us", "emergency_stop"});
+      !known) {
+    return known;
+  }
+  const auto line = read_word(reader, "direction_line", {"dtr", "rts"});
+  if (!line) return fail(line.error());
+  bus->serial_pulse.rts = *line == 1;
+  if (reader.has("inputs")) {
+    if (auto read = read_lines(reader, &bus->serial_pulse.inputs); !read) return read;
+  }
+  bus->tick_us = kTickUs;
+  if (!reader.has("tick_us")) return {};
+  const auto tick_us =
+      reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
+  if (!tick_us) return fail(tick_us.error());
+  bus->tick_us = static_cast<std::uint32_t>(*tick_us);
+  return {};
+}
+
+Result<void> take_serial_pulse(const TomlReader& reader, const Bus& bus, Motor* motor) {
+  for (const std::string_view key : {"output", "inputs", "limit", "input_active", "local"}) {
+    if (!reader.has(key)) continue;
+    return fail(reader.error(
+        key, fmt::format("does not apply to the motor of bus \"{}\", a serial port with one motor; "
+                         "remove it, switches are named by `inputs` of the bus",
+                         bus.name)));
+  }
+  motor->inputs = bus.serial_pulse.inputs;
+  if (motor->home && !motor->inputs.home) {
+    return fail(reader.error(
+        "home", fmt::format("needs a home switch; add inputs = {{ home = \"cd\" }} to bus \"{}\"",
+                            bus.name)));
+  }
+  return read_limit_action(reader, motor);
+}
+
+}  // namespace bushd::config

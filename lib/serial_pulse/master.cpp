@@ -1,0 +1,411 @@
+#include "serial_pulse/master.h"
+
+#include <functional>
+#include <utility>
+
+namespace bushd::serial_pulse {
+namespace {
+
+using link::McuIndex;
+using link::Tick;
+
+constexpr McuIndex kMcu{0};
+constexpr std::int64_t kMovingAskUs = 2'000;
+constexpr std::int64_t kRestingAskUs = 20'000;
+constexpr std::int64_t kReportUs = 20'000;
+constexpr std::int64_t kRestingReportUs = 100'000;
+// What a change of rate takes beside the time in which the line is drained for sure.
+constexpr std::int64_t kChangeUs = 2'000;
+
+}  // namespace
+
+Master::Master(link::BusSetup setup, link::TickSource& source, std::uint64_t unique_id)
+    : setup_(std::move(setup)), source_(source) {
+  bushd_identity& identity = view_.identity;
+  identity.protocol_version = BUSHD_PROTOCOL_VERSION;
+  identity.motors = 1;
+  identity.boot_number = setup_.master;  // the counter is the daemon's
+  identity.capabilities = BUSHD_CAN_FINE | BUSHD_CAN_COARSE | BUSHD_CAN_TABLE_RUN | BUSHD_CAN_HOME;
+  for (std::size_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {
+    identity.unique_id[i] = static_cast<std::uint8_t>(unique_id >> (56 - 8 * i));
+  }
+}
+
+void Master::port_opened(std::int64_t now_us) {
+  open_ = true;
+  waits_ = fresh_ = false;
+  order_.reset();
+  status_.reset();
+  asked_baud_ = 0;
+  made_.clear();
+  line_free_ns_ = now_us * 1000;
+  ask_us_ = now_us;
+  wake_us_ = now_us;
+}
+
+void Master::port_lost(std::int64_t now_us, const std::string& cause) {
+  const std::uint32_t unsure = unsure_steps(now_us);
+  const bool was_online = view_.phase == link::McuPhase::kOnline;
+  if (run_) {
+    count_gone(now_us);
+    if (run_->planned) base_tick_ = run_->tick;
+    position_ = run_->from_steps + run_->direction * std::int64_t{run_->gone};
+    base_us_ = now_us;
+    run_.reset();
+  }
+  if (homing_) end_homing(now_us, BUSHD_HOMING_STOPPED);
+  sent_.clear();
+  recent_.clear();
+  burst_us_.reset();
+  open_ = false;
+  waits_ = fresh_ = false;
+  order_.reset();
+  view_.phase = link::McuPhase::kOffline;
+  view_.detail = cause;
+  if (was_online) events_.push_back(link::McuOffline{kMcu});
+  if (unsure == 0) return;
+  view_.uncertain_reason =
+      cause + " while " + std::to_string(unsure) + " steps were under way: as many may be missing";
+  events_.push_back(link::PositionUncertain{kMcu, 0});
+}
+
+std::vector<link::Event> Master::take_events() {
+  return std::exchange(events_, {});
+}
+
+std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
+  fresh_ = false;
+  now_us_ = now_us;
+  if (!open_ || waits_) return {};
+  wake_us_ = INT64_MAX;
+  link::PulseOrder order;
+  if (status_) {
+    count_gone(now_us);
+    watch_limits(now_us);
+    follow_homing(now_us);
+    if (run_) {
+      if (run_->planned) advance_ticks(now_us, false);
+      if (run_->ahead.left() == 0 && drained(now_us)) {
+        end_run(now_us);
+        follow_homing(now_us);
+      }
+    }
+    if (run_) write(now_us, order);
+  }
+  if (order.positive || order.baud || !order.bytes.empty() || now_us >= ask_us_) {
+    order_ = std::move(order);
+    waits_ = fresh_ = true;
+    ask_us_ = now_us + (run_ || homing_ ? kMovingAskUs : kRestingAskUs);
+  }
+  if (status_ && now_us >= report_due_us_) report(now_us);
+  wake_at(std::min(ask_us_, report_due_us_));
+  return {};
+}
+
+std::int64_t Master::next_wake_us() const {
+  return open_ && !waits_ ? wake_us_ : INT64_MAX;
+}
+
+void Master::pulse_status(std::int64_t now_us, const link::PulseStatus& status) {
+  if (!open_) return;
+  waits_ = false;
+  now_us_ = now_us;
+  if (!status_ || status.positive != status_->positive) direction_us_ = now_us;
+  if (!status_ || status.lines != status_->lines) report_due_us_ = now_us;
+  const bool quiet = status.queued == 0 && (!order_ || order_->bytes.empty());
+  if (!quiet || !status_ || status_->queued > 0 || (order_ && !order_->bytes.empty())) {
+    quiet_since_us_ = now_us;
+  }
+  if (order_ && order_->baud) {
+    made_[*order_->baud] = status.baud;
+    planner_.learn(*order_->baud, status.baud);
+  }
+  order_.reset();
+  const bool first = !status_;
+  status_ = status;
+  status_us_ = now_us;
+  for (const int direction : {-1, 1}) {
+    if (at_limit(direction)) limit_us_[direction > 0] = now_us;
+  }
+  wake_us_ = now_us;
+  if (first) identify();
+  measure_pauses();
+}
+
+void Master::identify() {
+  view_.phase = link::McuPhase::kOnline;
+  view_.detail.clear();
+  view_.identified = true;
+  report(status_us_);
+  events_.insert(events_.begin(), link::McuOnline{kMcu});
+}
+
+// --- Time
+
+std::int64_t Master::us_per_ticks(Tick ticks) const {
+  return ticks * setup_.tick_ns / 1000;
+}
+
+Tick Master::clock(std::int64_t now_us) const {
+  return base_tick_ + (now_us - base_us_) * 1000 / setup_.tick_ns;
+}
+
+Tick Master::tick_at(std::int64_t now_us) const {
+  return run_ && run_->planned ? run_->tick : clock(now_us);
+}
+
+Tick Master::earliest_start(std::int64_t now_us, McuIndex, std::uint8_t) const {
+  return std::max(clock(now_us), view_.tick) + 2;
+}
+
+// The first tick at whose beginning the plan has made all that has been written.
+Tick Master::earliest_replace(std::int64_t now_us) const {
+  if (!run_ || !run_->planned) return clock(now_us) + 2;
+  const Run& run = *run_;
+  if (run.written == 0) return run.tick;
+  bushd_run by_ticks = run.by_ticks;
+  Tick tick = run.tick;
+  for (;; ++tick) {
+    if (run.change && tick == run.change->at) by_ticks = run.change->run;
+    if (by_ticks.steps_done >= run.written || bushd_run_done(&by_ticks)) return tick;
+    std::int16_t moved = 0;
+    bushd_run_expand_fine(&by_ticks, setup_.tick_ns, 1, &moved, 1);
+  }
+}
+
+Tick Master::earliest_retarget(std::int64_t now_us, Tick start) const {
+  return std::max(earliest_replace(now_us), start);
+}
+
+// The report is of the last tick at whose beginning the plan had made no more steps than have left.
+// The last tick of a run is told when all has left for sure.
+void Master::advance_ticks(std::int64_t now_us, bool to_the_end) {
+  Run& run = *run_;
+  const Tick now = clock(now_us);
+  if (run.tick < run.start) run.tick = to_the_end ? run.start : std::min(run.start, now);
+  if (run.tick < run.start) return;
+  for (;;) {
+    if (run.change && run.tick == run.change->at) {
+      run.by_ticks = std::exchange(run.change, std::nullopt)->run;
+    }
+    if (bushd_run_done(&run.by_ticks)) return;
+    bushd_run next = run.by_ticks;
+    std::int16_t moved = 0;
+    bushd_run_expand_fine(&next, setup_.tick_ns, 1, &moved, 1);
+    const bool early = next.steps_done > run.gone || run.tick >= now || bushd_run_done(&next);
+    if (early && !to_the_end) return;
+    run.by_ticks = next;
+    ++run.tick;
+  }
+}
+
+// --- Inputs
+
+bool Master::reads(std::uint8_t number) const {
+  const unsigned active = status_->lines ^ setup_.mcus[0].inputs.inverted;
+  return (active >> number & 1) != 0;
+}
+
+bushd_motor_inputs Master::numbers() const {
+  const auto& named = setup_.mcus[0].motor_inputs;
+  return named.empty() ? bushd_motor_inputs{} : named.front();
+}
+
+bool Master::at_limit(int direction) const {
+  const bushd_set_inputs& inputs = setup_.mcus[0].inputs;
+  const bool has = ((direction > 0 ? inputs.limit_positive : inputs.limit_negative) & 1) != 0;
+  return has && reads(direction > 0 ? numbers().positive : numbers().negative);
+}
+
+// For a report that tells where a run was ended, too, however its switch is by then.
+bool Master::forbidden(int direction) const {
+  return (run_ && run_->limited && run_->direction == direction) ||
+         now_us_ < limit_us_[direction > 0] + kReleaseUs;
+}
+
+void Master::watch_limits(std::int64_t now_us) {
+  if (!run_ || homing_ || !forbidden(run_->direction)) return;
+  const bool immediately = (setup_.mcus[0].inputs.limit_immediate & 1) != 0;
+  if (!run_->planned && !immediately) return;  // it ramps down already
+  run_->limited = true;
+  leave_plan(now_us, immediately);
+}
+
+// --- Runs
+
+const bushd_table& Master::table() const {
+  const link::McuSetup& mcu = setup_.mcus[0];
+  return *mcu.tables[mcu.table_of_motor[0].value_or(0)].table;
+}
+
+bushd_run Master::no_steps() const {
+  bushd_run run;
+  bushd_run_start(&run, &table(), 0, 1, 0);
+  return run;
+}
+
+void Master::begin(McuIndex, std::uint8_t, Tick start) {
+  const auto plan = source_.plan_at(kMcu, 0, start);
+  if (!plan || run_ || !status_) {
+    events_.push_back(link::StartMissed{kMcu, 0});
+    return;
+  }
+  begin_run(base_us_, *plan, start, true);
+}
+
+void Master::begin_run(std::int64_t now_us, const bushd_run& run, Tick start, bool planned) {
+  const std::int64_t first_us =
+      us_of(std::int64_t{bushd_run_delay(&run)} * run.table->time_unit_ns);
+  const std::int64_t start_us = planned ? base_us_ + us_per_ticks(start - base_tick_) + 1 : now_us;
+  run_ = Run{.ahead = {run},
+             .by_ticks = run,
+             .start = start,
+             .tick = view_.tick,
+             .planned = planned,
+             .direction = run.direction,
+             .from_steps = position_,
+             .not_before_us = start_us + first_us};
+  plan_rates(run);
+  wake_us_ = 0;
+}
+
+void Master::plan_rates(const bushd_run& run) {
+  const std::uint64_t unit = run.table->time_unit_ns;
+  const std::uint64_t longest =
+      unit * std::max({run.table->accel.code[0], run.table->decel.code[0], run.cruise});
+  const Rates driver{.any = status_->any_rate, .base = status_->base};
+  std::vector<Rate> rates = rates_for(driver, unit * run.table->cruise, longest);
+  // The floor of the run may be another speed than one of the table.
+  const std::vector<Rate> of_floor = rates_for(driver, unit * run.cruise, longest);
+  rates.insert(rates.end(), of_floor.begin(), of_floor.end());
+  std::ranges::sort(rates, std::greater<>(), &Rate::ask);
+  const auto same = std::ranges::unique(rates, {}, &Rate::ask);
+  rates.erase(same.begin(), same.end());
+  const std::int64_t change_us = kChangeUs + (status_->empty ? 0 : kUnseenUs);
+  planner_ = Planner(std::move(rates), static_cast<std::uint64_t>(change_us) * 1000);
+  for (const auto& [ask, made] : made_) planner_.learn(ask, made);
+}
+
+void Master::replace(McuIndex, std::uint16_t, Tick first) {
+  if (!run_ || !run_->planned) return;
+  Run& run = *run_;
+  const auto plan = source_.plan_at(kMcu, 0, first);
+  if (!plan) return;
+  if (plan->steps_done < run.written) {
+    events_.push_back(link::ReplacementFailed{kMcu, 1});
+    return;
+  }
+  plan_rates(*plan);
+  wake_us_ = 0;
+  if (first > run.start) {
+    run.change = Run::Change{.at = first, .run = *plan};
+    run.ahead.then = *plan;
+    return;
+  }
+  run.ahead = {*plan};
+  run.by_ticks = *plan;
+  run.direction = plan->direction;
+}
+
+// From now on ticks go by the clock, for the plan does not tell any more where the motor is.
+void Master::leave_plan(std::int64_t now_us, bool immediately) {
+  if (run_->planned) {
+    base_tick_ = run_->tick;
+    base_us_ = now_us;
+    run_->planned = false;
+  }
+  ramp_down(immediately);
+  report_due_us_ = now_us;
+}
+
+void Master::ramp_down(bool immediately) {
+  Steps& ahead = run_->ahead;
+  ahead.then.reset();
+  // One that has not made a step need not begin in order to stop.
+  if (immediately || run_->written == 0) {
+    ahead.run = no_steps();
+  } else {
+    bushd_run_ramp_down(&ahead.run);
+  }
+}
+
+void Master::end_run(std::int64_t now_us) {
+  if (run_->planned) {
+    advance_ticks(now_us, true);
+    base_tick_ = run_->tick;
+    base_us_ = now_us;
+  }
+  position_ = run_->from_steps + run_->direction * std::int64_t{run_->gone};
+  if (run_->limited) limit_us_[run_->direction > 0] = now_us;
+  run_.reset();
+  report_due_us_ = now_us;
+}
+
+void Master::drop(McuIndex, std::uint8_t) {
+  if (run_ && run_->planned && run_->ahead.left() > 0) leave_plan(now_us_, false);
+}
+
+void Master::emergency_stop(bushd_stop_mode mode) {
+  faults_ |= BUSHD_FAULT_EMERGENCY;
+  if (run_) leave_plan(now_us_, mode == BUSHD_STOP_IMMEDIATE);
+  report_due_us_ = 0;
+  wake_us_ = 0;
+}
+
+// --- Requests
+
+void Master::reconfigure(McuIndex, link::McuSetup setup) {
+  setup_.mcus[0] = std::move(setup);
+  if (view_.phase == link::McuPhase::kOnline) events_.push_back(link::McuOnline{kMcu});
+}
+
+void Master::control(McuIndex, std::uint8_t actions) {
+  if ((actions & BUSHD_CONTROL_CLEAR_FAULTS) != 0 && !run_) faults_ = 0;
+  // There is nothing that could disable the driver.
+  if ((actions & BUSHD_CONTROL_DISABLE) != 0) {
+    events_.push_back(link::RequestRefused{kMcu, BUSHD_MSG_CONTROL, BUSHD_E_STATE});
+  }
+  requests_open_ = true;
+  report_due_us_ = wake_us_ = 0;
+}
+
+void Master::set_position(McuIndex, std::uint8_t, std::int32_t position_steps) {
+  if (!run_) position_ = position_steps;
+  requests_open_ = true;
+  report_due_us_ = wake_us_ = 0;
+}
+
+void Master::report(std::int64_t now_us) {
+  const bool begun = run_ && (!run_->planned || run_->tick >= run_->start);
+  const bushd_set_inputs& inputs = setup_.mcus[0].inputs;
+  std::int64_t position = position_;
+  view_.tick = std::max(view_.tick, tick_at(now_us));
+  if (run_) {
+    const std::uint32_t made = run_->planned ? run_->by_ticks.steps_done : run_->gone;
+    position = run_->from_steps + run_->direction * std::int64_t{made};
+  }
+  bushd_report report{};
+  report.state = faults_ != 0 ? BUSHD_STATE_FAULT : begun ? BUSHD_STATE_RUN : BUSHD_STATE_READY;
+  report.faults = faults_;
+  report.flags = BUSHD_FLAG_ENABLED | BUSHD_FLAG_SYNCED | BUSHD_FLAG_CONFIGURED;
+  report.boot_number = view_.identity.boot_number;
+  report.tick = static_cast<std::uint32_t>(view_.tick);
+  report.moving = begun ? 1 : 0;
+  report.running = report.moving;
+  report.inputs = static_cast<std::uint16_t>((status_->lines ^ inputs.inverted) & 0x0F);
+  report.low_water_ticks = UINT16_MAX;
+  report.forbidden_positive = forbidden(1) ? 1 : 0;
+  report.forbidden_negative = forbidden(-1) ? 1 : 0;
+  report.autonomous = homing_ ? 1 : 0;
+  report.homed = homed_ ? 1 : 0;
+  report.homing = static_cast<std::uint8_t>(homing_ ? homing_->stage : last_homing_);
+  report.motor_count = 1;
+  report.motor[0].position_steps = static_cast<std::int32_t>(position);
+  view_.report = report;
+  view_.reported = true;
+  requests_open_ = false;
+  report_due_us_ = now_us + (run_ || homing_ ? kReportUs : kRestingReportUs);
+  events_.push_back(link::McuReported{kMcu});
+}
+
+}  // namespace bushd::serial_pulse

@@ -1,0 +1,75 @@
+#include <gmock/gmock.h>
+
+#include "config/config_file.h"
+
+namespace bushd::config {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kPort =
+    "[[bus]]\n"
+    "name = \"com1\"\n"
+    "kind = \"serial-pulse\"\n"
+    "port = \"/dev/no-such-port\"\n"
+    "direction_line = \"rts\"\n"
+    "inputs = { home = \"cd\", positive = { line = \"dsr\", active = \"off\" } }\n"
+    "[[group]]\n"
+    "name = \"slits\"\n"
+    "table = \"own\"\n"
+    "[[motor]]\n"
+    "name = \"x\"\n"
+    "mcu = \"com1\"\n"
+    "group = \"slits\"\n";
+
+std::string refusal(const std::string& from, const std::string& to) {
+  std::string text = kPort;
+  text.replace(text.find(from), from.size(), to);
+  const auto config = load(test::ConfigFile(text).path());
+  return config ? "accepted" : config.error().text();
+}
+
+TEST(SerialPulse, IsABusWithOneMotor) {
+  const test::ConfigFile file(kPort);
+  const auto config = load(file.path());
+  ASSERT_TRUE(config) << config.error().text();
+  EXPECT_EQ(config->buses[0].kind, BusKind::kSerialPulse);
+  EXPECT_TRUE(config->buses[0].serial_pulse.rts);
+  EXPECT_EQ(config->buses[0].tick_us, 2560u);
+  ASSERT_EQ(config->mcus.size(), 1u);
+  EXPECT_EQ(config->mcus[0].id, "com1");
+  const Motor& motor = config->motors[0];
+  EXPECT_EQ(motor.output.value, 0);
+  EXPECT_EQ(motor.inputs.home, Input{.number = 0});
+  EXPECT_EQ(motor.inputs.positive, (Input{.number = 1, .active_open = true}));
+  EXPECT_FALSE(motor.inputs.negative);
+}
+
+TEST(SerialPulse, IsRefusedWithCauseAndRemedy) {
+  EXPECT_THAT(refusal("\"rts\"", "\"txd\""), HasSubstr("is \"txd\"; allowed: \"dtr\" or \"rts\""));
+  EXPECT_THAT(refusal("direction_line = \"rts\"\n", ""), HasSubstr("direction_line: is missing"));
+  EXPECT_THAT(refusal("direction_line", "baud = 9600\ndirection_line"), HasSubstr("unknown key"));
+  EXPECT_THAT(refusal("home = \"cd\"", "home = \"rxd\""), HasSubstr("is \"rxd\"; allowed: \"cd\""));
+  EXPECT_THAT(refusal("home = \"cd\"", "home = 3"), HasSubstr("\"cd\", \"dsr\", \"cts\", \"ri\""));
+  EXPECT_THAT(refusal("home = \"cd\"", "home = \"dsr\""), HasSubstr("the other level"));
+  EXPECT_THAT(refusal("mcu = \"com1\"\n", "mcu = \"com1\"\noutput = 0\n"),
+              HasSubstr("does not apply to the motor of bus \"com1\""));
+  EXPECT_THAT(refusal("mcu = \"com1\"\n", "mcu = \"com1\"\nlimit = \"both\"\n"),
+              HasSubstr("switches are named by `inputs` of the bus"));
+  EXPECT_THAT(refusal("[[group]]", "[[mcu]]\nbus = \"com1\"\naddress = 1\n[[group]]"),
+              HasSubstr("which has no MCU; remove this section"));
+  EXPECT_THAT(refusal("[[motor]]\n",
+                      "[[motor]]\nname = \"y\"\nmcu = \"com1\"\ngroup = \"slits\"\n[[motor]]\n"),
+              HasSubstr("the one motor of bus \"com1\" is already taken in line 12"));
+  EXPECT_THAT(refusal("home = \"cd\", ", "") + refusal("mcu = \"com1\"\n", "mcu = \"com1\"\n"),
+              HasSubstr("accepted"));
+  EXPECT_THAT(
+      refusal("home = \"cd\", positive = { line = \"dsr\", active = \"off\" } }\n[[group]]\n"
+              "name = \"slits\"\ntable = \"own\"\n[[motor]]\n",
+              "positive = \"dsr\" }\n[[group]]\nname = \"slits\"\ntable = \"own\"\n"
+              "[[motor]]\nhome = { direction = \"negative\", most_steps = 10 }\n"),
+      HasSubstr("needs a home switch; add inputs = { home = \"cd\" } to bus \"com1\""));
+}
+
+}  // namespace
+}  // namespace bushd::config

@@ -1,0 +1,364 @@
+// A serial port as the controller of one motor, from a request to the levels on the line: the core
+// with a virtual drive, whose steps are judged by the codes of the table and a rule of their own.
+#include <numeric>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+// 100 Hz to 2500 Hz in 60 codes of 40 us, both sides the same.
+constexpr std::int64_t kUnitNs = 40'000;
+std::vector<std::int64_t> codes() {
+  std::vector<std::int64_t> all;
+  for (int i = 0; i < 60; ++i) all.push_back(std::llround(25'000.0 / (100 + 40.0 * i)));
+  return all;
+}
+
+std::string table() {
+  std::string text = "name = \"glacier\"\ntime_unit_ns = 40000\naccel = [";
+  for (const std::int64_t code : codes()) text += std::to_string(code) + ", ";
+  return text + "10]\n";
+}
+
+std::string port(const std::string& more_of_motor = {}, const std::string& more_of_bus = {}) {
+  return "[[bus]]\nname = \"com1\"\nkind = \"serial-pulse\"\nport = \"/dev/ttyS0\"\n"
+         "direction_line = \"dtr\"\n"
+         "inputs = { home = \"cd\", positive = \"dsr\", negative = \"cts\" }\n" +
+         more_of_bus +
+         "[[group]]\nname = \"axes\"\ntable = \"glacier\"\n"
+         "[[motor]]\nname = \"m\"\nmcu = \"com1\"\ngroup = \"axes\"\n"
+         "home = { direction = \"negative\", most_steps = 5000 }\n" +
+         more_of_motor;
+}
+
+struct Desk : Lab {
+  explicit Desk(const std::string& toml = port()) : Lab(toml, table()) {}
+
+  sim::PulseDrive& it() { return drive(0); }
+  std::vector<std::int64_t> intervals(std::size_t from = 0) {
+    const auto& times = it().step_times_ns();
+    std::vector<std::int64_t> all;
+    for (std::size_t i = from + 1; i < times.size(); ++i) all.push_back(times[i] - times[i - 1]);
+    return all;
+  }
+  // Steps from `from` on are one run from rest to rest: the interval before its step j is at least
+  // A(j-1), D(N-j) and the cruise delay. Times are whole ns: an interval is exact to one.
+  void expect_run(std::size_t from, std::size_t steps) {
+    const auto all = codes();
+    const auto side = [&](std::size_t i) { return (i < all.size() ? all[i] : 10) * kUnitNs; };
+    const auto made = intervals(from);
+    ASSERT_EQ(made.size() + 1, steps);
+    for (std::size_t j = 2; j <= steps; ++j) {
+      const std::int64_t least = std::max({side(j - 1), side(steps - j), 10 * kUnitNs});
+      ASSERT_GE(made[j - 2] + 1, least) << "before step " << j << " of " << steps;
+    }
+  }
+  void expect_settled(std::int64_t position) {
+    EXPECT_EQ(it().position_steps(), position);
+    EXPECT_EQ(motor("m").position_steps, position);
+    EXPECT_EQ(it().faults(), 0u);
+  }
+};
+
+TEST(SerialPulse, MovesByItsTable) {
+  Desk lab;
+  lab.connect();
+  const Answer answer = lab.wait(lab.send(Ask::kMoveBy, {"m"}, {1003}));
+  EXPECT_EQ(answer.result, "reached") << answer.reason;
+  lab.expect_settled(1003);
+  lab.expect_run(0, 1003);
+  EXPECT_EQ(lab.motor("m").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {-7})).result, "reached");
+  lab.expect_settled(-7);
+  lab.expect_run(1003, 1010);
+}
+
+// Not longer than what a change of rate and the bytes between cost: the bound is that of the
+// planner's own test for such a table.
+TEST(SerialPulse, TakesHardlyLongerThanItsTable) {
+  Desk lab;
+  lab.connect();
+  lab.wait(lab.send(Ask::kMoveBy, {"m"}, {4000}));
+  const auto all = codes();
+  const std::int64_t ramps = 2 * std::accumulate(all.begin(), all.end(), std::int64_t{0});
+  const std::int64_t by_table = (ramps + (4000 - 120) * 10) * kUnitNs;
+  const auto made = lab.intervals();
+  const std::int64_t took = std::accumulate(made.begin(), made.end(), std::int64_t{0});
+  std::printf("  4000 steps: %.3f s by the table, %.3f s made\n",
+              1e-9 * static_cast<double>(by_table), 1e-9 * static_cast<double>(took));
+  EXPECT_LT(took, by_table * 3 / 2);
+  EXPECT_EQ(lab.it().faults(), 0u);
+}
+
+TEST(SerialPulse, EveryNumberOfStepsIsExact) {
+  Desk lab;
+  lab.connect();
+  std::int64_t position = 0;
+  std::size_t made = 0;
+  for (int steps = 1; steps <= 24; ++steps) {
+    const int way = steps % 2 == 0 ? -steps : steps;
+    ASSERT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {way})).result, "reached") << steps;
+    position += way;
+    lab.expect_settled(position);
+    lab.expect_run(made, static_cast<std::size_t>(steps));
+    made += static_cast<std::size_t>(steps);
+  }
+}
+
+TEST(SerialPulse, StopsAlongItsRamp) {
+  Desk lab;
+  lab.connect();
+  const auto move = lab.send(Ask::kMoveBy, {"m"}, {5000});
+  lab.run_for(1.0);
+  const std::uint64_t before = lab.it().steps();
+  const auto stop = lab.send(Ask::kStop, {"m"});
+  EXPECT_EQ(lab.wait(stop).result, "done");
+  EXPECT_EQ(lab.last_reply(move).result, "stopped");
+  const std::int64_t position = lab.it().position_steps();
+  lab.expect_settled(position);
+  lab.expect_run(0, lab.it().steps());
+  // What was under way, at 2500 Hz; up to the tick after that; the ramp.
+  EXPECT_LE(lab.it().steps() - before, 50u + 8u + 61u);
+  EXPECT_GT(lab.it().steps(), before);
+}
+
+TEST(SerialPulse, TakesAnotherTarget) {
+  Desk lab;
+  lab.connect();
+  const auto first = lab.send(Ask::kMoveTo, {"m"}, {3000});
+  lab.run_for(0.8);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {3500})).result, "reached");
+  EXPECT_EQ(lab.last_reply(first).result, "stopped");
+  lab.expect_settled(3500);
+  lab.expect_run(0, 3500);
+  lab.send(Ask::kMoveTo, {"m"}, {6000});
+  lab.run_for(0.8);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {3600})).result, "reached");
+  lab.expect_settled(3600);
+}
+
+TEST(SerialPulse, JogsUntilItsClientLetsGo) {
+  Desk lab;
+  lab.connect();
+  const auto jog = lab.send(api::Jog{.motor = "m", .per_s = -1000, .in_steps = true});
+  lab.run_for(0.5);
+  EXPECT_LT(lab.it().position_steps(), -50);
+  lab.wait(lab.send(api::Jog{.motor = "m", .per_s = 0, .in_steps = true}));
+  EXPECT_TRUE(lab.run_until([&] { return lab.has_result(jog); }, 5));
+  lab.run_for(0.1);
+  lab.expect_settled(lab.it().position_steps());
+  lab.expect_run(0, lab.it().steps());
+}
+
+TEST(SerialPulse, LimitStopsIt) {
+  for (const bool immediate : {false, true}) {
+    Desk lab(port(immediate ? "limit_action = \"immediate\"\n" : ""));
+    lab.connect();
+    lab.it().attach_switch(1, {.at_steps = 1200, .positive_end = true});
+    const Answer answer = lab.wait(lab.send(Ask::kMoveBy, {"m"}, {4000}));
+    EXPECT_EQ(answer.result, "limit") << answer.reason;
+    const std::int64_t position = lab.it().position_steps();
+    lab.expect_settled(position);
+    EXPECT_GE(position, 1200);
+    // A look every 2 ms, 20 ms under way, and the ramp.
+    EXPECT_LE(position, 1200 + 5 + 50 + (immediate ? 5 : 66));
+    EXPECT_TRUE(lab.motor("m").inhibited.positive);
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {10})).result, "refused");
+    if (immediate) continue;
+    lab.expect_run(0, lab.it().steps());
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {-500})).result, "reached");
+    lab.expect_settled(position - 500);
+  }
+}
+
+TEST(SerialPulse, HomesToTheStep) {
+  for (const bool tells_empty : {true, false}) {
+    Desk lab;
+    if (!tells_empty) lab.pulse_driver.empty.reset();
+    lab.connect();
+    lab.it().attach_switch(0, {.at_steps = -700, .hysteresis_steps = 3, .bounce_ns = 4'000'000});
+    const Answer answer = lab.wait(lab.send(Ask::kHome, {"m"}), 200);
+    ASSERT_EQ(answer.result, "reached") << answer.reason;
+    EXPECT_EQ(lab.it().position_steps(), -700);
+    EXPECT_EQ(lab.motor("m").position_steps, 0);
+    EXPECT_EQ(lab.it().faults(), 0u);
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {700})).result, "reached");
+    EXPECT_EQ(lab.it().position_steps(), 0);
+  }
+}
+
+TEST(SerialPulse, HomingLooksBehindALimitAndGivesUp) {
+  Desk lab;
+  lab.connect();
+  lab.it().attach_switch(2, {.at_steps = -300});
+  lab.it().attach_switch(0, {.at_steps = 400, .positive_end = true, .width_steps = 200});
+  EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m"}), 200).result, "reached");
+  // It becomes active towards the negative end at its far edge.
+  EXPECT_EQ(lab.it().position_steps(), 599);
+  EXPECT_EQ(lab.it().faults(), 0u);
+}
+
+TEST(SerialPulse, PortLostInMotionIsTold) {
+  Desk lab;
+  lab.connect();
+  const auto move = lab.send(Ask::kMoveBy, {"m"}, {5000});
+  lab.run_for(1.0);
+  lab.unplug(0);
+  EXPECT_EQ(lab.wait(move).result, "link");
+  lab.plug(0);
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 2));
+  lab.run_for(0.2);
+  EXPECT_EQ(lab.motor("m").trust, api::Trust::kUncertain);
+  const std::string reason = lab.motor("m").uncertain_reason;
+  EXPECT_NE(reason.find(" steps were under way: as many may be missing"), std::string::npos)
+      << reason;
+  const std::int64_t most = std::stoll(reason.substr(reason.find("while ") + 6));
+  const std::int64_t counted = lab.motor("m").position_steps;
+  EXPECT_LE(std::abs(lab.it().position_steps() - counted), most);
+  EXPECT_LE(most, 2 * 50 + 5);
+  lab.wait(lab.send(Ask::kSetPosition, {"m"}, {0}));
+  const std::int64_t from = lab.it().position_steps();
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {50})).result, "reached");
+  EXPECT_EQ(lab.it().position_steps(), from + 50);
+}
+
+TEST(SerialPulse, PortLostAtRestLosesNothing) {
+  Desk lab;
+  lab.connect();
+  lab.wait(lab.send(Ask::kMoveBy, {"m"}, {321}));
+  lab.unplug(0);
+  lab.run_for(0.5);
+  lab.plug(0);
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 2));
+  lab.run_for(0.2);
+  EXPECT_EQ(lab.motor("m").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {0})).result, "reached");
+  lab.expect_settled(0);
+}
+
+TEST(SerialPulse, EmergencyStopLatchesUntilCleared) {
+  Desk lab;
+  lab.connect();
+  const auto move = lab.send(Ask::kMoveBy, {"m"}, {5000});
+  lab.run_for(0.7);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  EXPECT_EQ(lab.last_reply(move).result, "stopped");
+  lab.expect_settled(lab.it().position_steps());
+  lab.expect_run(0, lab.it().steps());
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {10})).result, "refused");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {"m"})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {10})).result, "reached");
+}
+
+TEST(SerialPulse, ServesDriversThatCanLess) {
+  for (const bool any : {true, false}) {
+    for (const bool empty : {true, false}) {
+      for (const std::uint32_t base : {0u, 115'200u}) {
+        Desk lab;
+        lab.pulse_driver.any_rate = any;
+        lab.pulse_driver.base = base;
+        lab.pulse_driver.empty.reset();
+        if (empty) lab.pulse_driver.empty = true;
+        lab.connect();
+        EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {777})).result, "reached");
+        lab.expect_settled(777);
+        lab.expect_run(0, 777);
+      }
+    }
+  }
+}
+
+TEST(SerialPulse, SlowSpeedsWaitBetweenBytes) {
+  Desk lab;
+  lab.connect();
+  const auto move = lab.send(api::Move{.kind = api::Move::Kind::kRelative,
+                                       .motors = motor_steps({"m"}, {4}),
+                                       .speed = api::Speed{.per_s = 2, .in_steps = true}});
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  lab.expect_settled(4);
+  for (const std::int64_t ns : lab.intervals()) {
+    EXPECT_GE(ns, 500'000'000);
+    EXPECT_LE(ns, 740'000'000);
+  }
+}
+
+TEST(SerialPulse, RefusesWhatNeedsTicks) {
+  Desk lab;
+  lab.connect();
+  const auto line = lab.send(
+      api::MoveLine{.kind = api::Move::Kind::kRelative, .motors = motor_steps({"m"}, {10})});
+  EXPECT_NE(lab.wait(line).reason.find("runs of tables only"), std::string::npos);
+}
+
+TEST(SerialPulse, TellsPausesAmidBytes) {
+  Desk lab;
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {1000})).result, "reached");
+  EXPECT_EQ(lab.state_of("com1").detail, "");
+  const auto move = lab.send(Ask::kMoveBy, {"m"}, {4000});
+  lab.run_for(1.0);
+  lab.pause_daemon(0.1);
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  lab.expect_settled(5000);
+  lab.expect_run(1000, 4000);
+  lab.run_for(0.2);
+  EXPECT_NE(lab.state_of("com1").detail.find("the longest 8"), std::string::npos)
+      << lab.state_of("com1").detail;
+}
+
+TEST(SerialPulse, HomingStopsOnRequest) {
+  Desk lab;
+  lab.connect();
+  const auto home = lab.send(Ask::kHome, {"m"});
+  lab.run_for(0.8);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m"})).result, "done");
+  EXPECT_EQ(lab.last_reply(home).result, "stopped");
+  lab.run_for(0.1);
+  lab.expect_settled(lab.it().position_steps());
+  lab.expect_run(0, lab.it().steps());
+}
+
+TEST(SerialPulse, HasNoDriverToDisable) {
+  Desk lab;
+  lab.connect();
+  EXPECT_NE(lab.wait(lab.send(Ask::kDisable, {"m"})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {5})).result, "reached");
+}
+
+// Whatever is asked of it, and whenever: what it says is what the line did.
+TEST(SerialPulse, CountsEveryStepOfADayOfOrders) {
+  const unsigned seed = std::random_device{}();
+  std::printf("  seed %u\n", seed);
+  std::mt19937 random(seed);
+  const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
+  Desk lab;
+  lab.it().attach_switch(1, {.at_steps = 2000, .positive_end = true, .bounce_ns = 2'000'000});
+  lab.it().attach_switch(2, {.at_steps = -2000, .bounce_ns = 2'000'000});
+  lab.connect();
+  for (int i = 0; i < 120; ++i) {
+    switch (below(6)) {
+      case 0:
+        lab.send(Ask::kStop, {"m"});
+        break;
+      case 1:
+        lab.send(api::Pause{{"m"}});
+        lab.run_for(0.01 * below(40));
+        lab.send(api::Resume{{"m"}});
+        break;
+      default:
+        lab.send(Ask::kMoveTo, {"m"}, {below(5000) - 2500});
+    }
+    lab.run_for(0.001 * below(900));
+    if (below(12) == 0) lab.pause_daemon(0.001 * below(200));
+  }
+  lab.wait(lab.send(Ask::kStop, {"m"}));
+  lab.run_for(1);
+  lab.expect_settled(lab.it().position_steps());
+  EXPECT_EQ(lab.motor("m").trust, api::Trust::kKnown) << lab.motor("m").uncertain_reason;
+  // No interval of any kind is shorter than the cruise delay.
+  for (const std::int64_t ns : lab.intervals()) ASSERT_GE(ns + 1, 10 * kUnitNs);
+}
+
+}  // namespace
+}  // namespace bushd::test
