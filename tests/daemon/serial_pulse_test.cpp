@@ -326,6 +326,28 @@ TEST(SerialPulse, HasNoDriverToDisable) {
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {5})).result, "reached");
 }
 
+TEST(SerialPulse, ItsPositionOutlivesTheDaemon) {
+  Desk lab;
+  lab.keep_positions();
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m"}, {345})).result, "reached");
+  lab.run_for(0.5);
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 5));
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.motor("m").position_steps, 345);
+  EXPECT_EQ(lab.motor("m").trust, api::Trust::kRestored) << lab.motor("m").uncertain_reason;
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {0})).result, "reached");
+  EXPECT_EQ(lab.it().position_steps(), 0);
+
+  lab.send(Ask::kMoveTo, {"m"}, {4000});
+  lab.run_for(1);
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 5));
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.motor("m").trust, api::Trust::kUncertain);
+}
+
 // Whatever is asked of it, and whenever: what it says is what the line did.
 TEST(SerialPulse, CountsEveryStepOfADayOfOrders) {
   const unsigned seed = std::random_device{}();
