@@ -80,8 +80,8 @@ class Questions {
     int byte = std::getchar();
     for (; byte != EOF && byte != '\n'; byte = std::getchar()) {
       if (line.size() == kMaxAnswer) {
-        return bushd::fail(fmt::format("an answer has {} bytes at most; nothing is written",
-                                       kMaxAnswer));
+        return bushd::fail(
+            fmt::format("an answer has {} bytes at most; nothing is written", kMaxAnswer));
       }
       line.push_back(static_cast<char>(byte));
     }
@@ -167,8 +167,7 @@ Result<void> ask_profile(Questions& questions, Answers& answers, profiles::Spec&
        quantity(Quantity::kSpeed, spec.max_hz, positive)},
       {"Start/stop speed, SS_SPEED" + speed, &answers.start,
        quantity(Quantity::kSpeed, spec.start_hz, below_max)},
-      {"Acceleration time, from start to maximum speed" + time, &answers.accel_time,
-       accel_time},
+      {"Acceleration time, from start to maximum speed" + time, &answers.accel_time, accel_time},
       {"Deceleration time, from maximum to stop speed" + time, &answers.decel_time,
        quantity(Quantity::kTime, decel_s, positive)},
   });
@@ -254,9 +253,8 @@ int wizard(const Places& places, const Wizard& wanted) {
       return bushd::fail("allowed: yes, no, or again: all questions with these answers ready");
     };
     std::string usual = told ? "yes" : "again";
-    if (const auto asked = questions.ask("Write " + bushd::printable(made.spec.name) +
-                                             ": yes, no, again",
-                                         usual, take);
+    if (const auto asked = questions.ask(
+            "Write " + bushd::printable(made.spec.name) + ": yes, no, again", usual, take);
         !asked) {
       return refuse(asked.error());
     }

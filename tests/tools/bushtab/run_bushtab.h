@@ -30,7 +30,8 @@ inline Outcome bushtab(const std::string& arguments, const std::string& environm
   const std::string out = directory.path() / "out";
   const std::string err = directory.path() / "err";
   const int status = std::system(
-      (environment + " " BUSHTAB " " + arguments + " <" + input + " >" + out + " 2>" + err).c_str());
+      (environment + " " BUSHTAB " " + arguments + " <" + input + " >" + out + " 2>" + err)
+          .c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
 }
 
