@@ -164,7 +164,7 @@ bool Installation::any_moves(const Mcu& mcu) const {
 }
 
 bool Installation::by_table(const Mcu& mcu, std::int64_t steps) const {
-  return bus_of(mcu).config.table_runs && mcu.can_run_tables() &&
+  return (bus_of(mcu).config.table_runs || !mcu.streams()) && mcu.can_run_tables() &&
          std::abs(steps) <= motion::Motor::kMaxPosition;
 }
 

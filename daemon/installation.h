@@ -17,8 +17,9 @@
 #include "base/ids.h"
 #include "base/result.h"
 #include "config/config.h"
+#include "daemon/bus_kinds.h"
 #include "daemon/mcu_setup.h"
-#include "link/master.h"
+#include "link/bus_master.h"
 #include "motion/motor.h"
 
 namespace bushd::daemon {
@@ -41,24 +42,31 @@ class AxisSource : public link::TickSource {
 class Bus final : public AxisSource {
  public:
   Bus(const config::Bus& as_configured, link::BusSetup setup, Installation& of)
-      : config(as_configured), master(std::move(setup), *this), installation_(of) {}
+      : config(as_configured),
+        installation_(of),
+        master_(new_master(as_configured, std::move(setup), *this)),
+        master(*master_) {}
 
   motion::Axis* axis_of(link::McuIndex mcu, Output output) override;
 
   const config::Bus& config;
-  link::Master master;
-  std::vector<McuId> mcus;  // by link::McuIndex
-  std::string port_state = "not yet opened";
-  bool two_masters = false;  // as told in the log last
 
  private:
   Installation& installation_;
+  const std::unique_ptr<link::BusMaster> master_;
+
+ public:
+  link::BusMaster& master;
+  std::vector<McuId> mcus;  // by link::McuIndex
+  std::string port_state = "not yet opened";
+  bool two_masters = false;  // as told in the log last
 };
 
-// One MCU, and what can be asked of it; link::Master says what each function does.
+// One MCU, and what can be asked of it; link::BusMaster says what each function does.
 class Mcu {
  public:
-  Mcu(McuId its_id, const config::Mcu& as_configured, link::Master& master, link::McuIndex on_bus)
+  Mcu(McuId its_id, const config::Mcu& as_configured, link::BusMaster& master,
+      link::McuIndex on_bus)
       : id(its_id), config(as_configured), master_(master), on_bus_(on_bus) {}
 
   const McuId id;
@@ -76,6 +84,7 @@ class Mcu {
   // It has not yet answered all that it was asked, or not yet reported since.
   bool busy() const { return master_.busy(on_bus_); }
   const link::McuHealth& health() const { return master_.health(on_bus_); }
+  bool streams() const { return master_.streams(); }
   // Its drivers are disabled at rest (IdleDrivers), and enabled when one of its motors is to move.
   bool asleep = false;
   bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
@@ -86,7 +95,7 @@ class Mcu {
   bool can_trigger() const { return master_.can_trigger(on_bus_); }
   bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }
   bool can_travel() const { return master_.can_travel(on_bus_); }
-  bool can_home() const { return (view().identity.capabilities & BUSHD_CAN_HOME) != 0; }
+  bool can_home() const { return master_.can_home(on_bus_); }
 
   link::Tick earliest_start(std::int64_t now_us, Output output) const {
     return master_.earliest_start(now_us, on_bus_, output.value);
@@ -117,7 +126,7 @@ class Mcu {
   }
   void drop(Output output) { master_.drop(on_bus_, output.value); }
   std::uint8_t arm(bushd_edge edge, std::uint32_t delay_us,
-                   std::span<const link::Master::Armed> moves) {
+                   std::span<const link::BusMaster::Armed> moves) {
     return master_.arm(on_bus_, edge, delay_us, moves);
   }
   void disarm() { master_.disarm(on_bus_); }
@@ -136,7 +145,7 @@ class Mcu {
 
  private:
   friend class Installation;
-  link::Master& master_;
+  link::BusMaster& master_;
   link::McuIndex on_bus_;
   std::vector<MotorId> motors_;
   std::array<std::optional<MotorId>, BUSHD_MOTORS_PER_MCU> motor_at_{};

@@ -3,7 +3,7 @@
 
 #include "base/by_id.h"
 #include "config/config.h"
-#include "link/master.h"
+#include "link/bus_setup.h"
 
 namespace bushd::daemon {
 

@@ -52,6 +52,9 @@ void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
         }
       },
       [&](const link::StartMissed& event) { starts_late(mcu_of(event), Output{event.motor}); },
+      [&](const link::PositionUncertain& event) {
+        is_uncertain(mcu_of(event), Output{event.motor});
+      },
       [&](const link::ReplacementFailed& event) { replans(now_us, mcu_of(event), event.motors); }};
   for (const link::Event& event : bus.master.take_events()) std::visit(handle, event);
 }
@@ -139,6 +142,16 @@ void Supervisor::starts_late(Mcu& mcu, Output output) {
   if (!id) return;
   const auto ended = installation_[*id].starts_late(mcu.report());
   if (ended) moves_.end(*id, *ended);
+}
+
+void Supervisor::is_uncertain(const Mcu& mcu, Output output) {
+  const auto id = mcu.motor_at(output);
+  if (!id) return;
+  const std::string& reason = mcu.view().uncertain_reason;
+  motion::Motor& motor = installation_[*id];
+  motor.position_is_uncertain(reason);
+  outputs_.log(LogLevel::kError, *id, motor.name() + ": its position is uncertain: " + reason);
+  installation_.changed = true;
 }
 
 void Supervisor::watch_for_other_masters(std::int64_t now_us) {

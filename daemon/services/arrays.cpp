@@ -75,6 +75,12 @@ Result<std::list<Arrays::Array>::iterator> Arrays::begin(const api::Asker& asker
           "one. Follow two arrays, or connect their MCUs to one bus",
           installation_[motors->front()].name(), motor.name()));
     }
+    if (!mcu.streams()) {
+      return fail(fmt::format(
+          "{} is on bus {}, which makes runs of tables only and cannot follow an array; move it "
+          "from point to point",
+          motor.name(), installation_.bus_of(mcu).config.name));
+    }
     const auto floor = moves_.floor_of(id, std::nullopt);
     if (!floor) return fail(floor.error());
     const tables::TablePtr table = installation_.table_of(id);

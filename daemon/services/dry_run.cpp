@@ -142,11 +142,15 @@ void DryRun::plan_motor(const Motor& motor, bool further_leg) {
   bus.moves.push_back(move);
 }
 
-// Returns false when all frames of the bus are counted, or too many.
+// Returns false when all frames of the bus are counted, or too many, or cannot be.
 bool DryRun::rehearse(Bus& bus) {
+  if (!bus.snapshot) {
+    plan_.traffic.reset();
+    return false;
+  }
   if (!bus.rehearsal) {
     bus.rehearsal =
-        std::make_unique<link::Rehearsal>(std::move(bus.snapshot), bus, bus.moves, kMaxFrames);
+        std::make_unique<link::Rehearsal>(std::move(*bus.snapshot), bus, bus.moves, kMaxFrames);
     return true;
   }
   if (bus.rehearsal->step()) return true;

@@ -60,10 +60,10 @@ class DryRun {
   };
   // The motors of one bus.
   struct Bus : AxisSource {
-    explicit Bus(link::BusSnapshot of) : snapshot(std::move(of)) {}
+    explicit Bus(std::optional<link::BusSnapshot> of) : snapshot(std::move(of)) {}
     motion::Axis* axis_of(link::McuIndex mcu, Output output) override;
 
-    link::BusSnapshot snapshot;
+    std::optional<link::BusSnapshot> snapshot;  // none: of a kind whose traffic is not counted
     std::map<std::pair<link::McuIndex, Output>, motion::Axis> axes;
     std::vector<link::PlannedMove> moves;
     std::unique_ptr<link::Rehearsal> rehearsal;  // from when all its motors are planned

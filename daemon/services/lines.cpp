@@ -51,6 +51,13 @@ Result<void> Lines::on_one_bus(const std::vector<MotorId>& motors) const {
     return installation_.bus_of(installation_.mcu_of(motor)).config.name;
   };
   for (const MotorId motor : motors) {
+    if (installation_.mcu_of(motor).streams()) continue;
+    return fail(fmt::format(
+        "{} is on bus {}, which makes runs of tables only, no lines or paths; move it without "
+        "--line",
+        installation_[motor].name(), bus_name(motor)));
+  }
+  for (const MotorId motor : motors) {
     if (bus_name(motor) == bus_name(motors.front())) continue;
     return fail(fmt::format(
         "{} is on bus {} and {} on bus {}: ticks of two buses are not in step, so motors of a line "
@@ -393,7 +400,7 @@ std::optional<std::string> Lines::cause_to_end(std::int64_t now_us, std::uint64_
     if (now->faults != 0 && !emergency) {
       cause = "MCU " + installation_.mcu_of(id).name() + " has a fault";
     }
-    const link::Master& master = installation_.bus_of(installation_.mcu_of(id)).master;
+    const link::BusMaster& master = installation_.bus_of(installation_.mcu_of(id)).master;
     const bool runs = !emergency && motor.axis().over_tick() > master.tick_at(now_us);
     const bool stops = motor.axis().stopping() && !motor.is_paused();
     const bool gone_on_without = now->limit == 0 && now->faults == 0 && !now->position_mismatch;

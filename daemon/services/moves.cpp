@@ -198,8 +198,8 @@ void Moves::begin(MotorId id) {
   Mcu& mcu = installation_.mcu_of(id);
   const motion::Tick start = motor.axis().start_tick();
   const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
-  // A jog will change, and only ticks that have not been run can be taken back.
-  const bool by_table = installation_.by_table(mcu, steps) && !open_.jogs(id);
+  // A jog will change, and of what is streamed only ticks that have not been run can be taken back.
+  const bool by_table = installation_.by_table(mcu, steps) && !(mcu.streams() && open_.jogs(id));
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));

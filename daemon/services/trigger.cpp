@@ -10,7 +10,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
   open_moves_.open(asker, *motors, OpenMoves::Purpose::kArm);
-  std::map<McuId, std::vector<link::Master::Armed>> moves;
+  std::map<McuId, std::vector<link::BusMaster::Armed>> moves;
   const std::vector<std::int64_t> steps = steps_of(*motors, request);
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const MotorId motor = (*motors)[i];

@@ -44,8 +44,11 @@ struct State {
   bool required = true;  // nothing moves that could not be found uncertain afterwards
 };
 
+enum class BusKind { kRs485 };  // docs/decisions/0043-bus-kinds.md
+
 struct Bus {
   std::string name;
+  BusKind kind = BusKind::kRs485;
   std::string port;        // as written in the file; may be a pattern (config/port_pattern.h)
   std::uint32_t baud = 0;  // one of libserial's fixed rates
   std::uint32_t tick_us = 0;

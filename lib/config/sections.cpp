@@ -28,6 +28,7 @@ using tables::TomlReader;
 
 // A prefix becomes the beginning of LCM channel names, which have 63 characters at most.
 constexpr std::size_t kMaxPrefix = 48;
+constexpr std::array<std::string_view, 1> kBusKinds = {"rs485"};  // in the order of BusKind
 constexpr std::string_view kPrefixRule =
     "1..48 characters of A-Z a-z 0-9 _ . -, the first one no -";
 
@@ -218,8 +219,8 @@ Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vec
 Result<void> read_buses(Loading* loading) {
   Taken names;
   for (const TomlReader& reader : loading->buses) {
-    if (auto known = reader.only(
-            {"name", "port", "baud", "tick_us", "format", "moves", "frames", "emergency_stop"});
+    if (auto known = reader.only({"name", "kind", "port", "baud", "tick_us", "format", "moves",
+                                  "frames", "emergency_stop"});
         !known) {
       return known;
     }
@@ -228,6 +229,11 @@ Result<void> read_buses(Loading* loading) {
     if (!name) return fail(name.error());
     bus.name = std::move(*name);
     if (auto taken = names.take(reader, "name", bus.name, bus.name); !taken) return taken;
+    if (reader.has("kind")) {
+      const auto kind = read_word(reader, "kind", kBusKinds);
+      if (!kind) return fail(kind.error());
+      bus.kind = static_cast<BusKind>(*kind);
+    }
     constexpr std::string_view kPortRule =
         "the path of a serial port, such as \"/dev/ttyUSB0\" or \"/dev/ttyUSB*\"";
     auto port = reader.string("port", kPortRule);

@@ -38,7 +38,13 @@ struct StartMissed {
   std::uint8_t motor;
 };
 
+// Steps of `motor` may be lost: McuView::uncertain_reason says how many, and why.
+struct PositionUncertain {
+  McuIndex mcu;
+  std::uint8_t motor;
+};
+
 using Event = std::variant<McuOnline, McuOffline, McuReported, ReplacementFailed, RequestRefused,
-                           StartMissed>;
+                           StartMissed, PositionUncertain>;
 
 }  // namespace bushd::link

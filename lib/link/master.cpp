@@ -192,12 +192,12 @@ void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
   streams_.replace(mcu, motors, first, clock().tick_at(stepped_us_));
 }
 
-BusSnapshot Master::snapshot(std::int64_t now_us) const {
-  return {.setup = &setup_,
-          .mcus = mcus_,
-          .clock = clock(),
-          .queue_us = horizon_.queue_target_us(),
-          .now_us = now_us};
+std::optional<BusSnapshot> Master::snapshot(std::int64_t now_us) const {
+  return BusSnapshot{.setup = &setup_,
+                     .mcus = mcus_,
+                     .clock = clock(),
+                     .queue_us = horizon_.queue_target_us(),
+                     .now_us = now_us};
 }
 
 std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,

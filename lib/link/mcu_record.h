@@ -27,6 +27,7 @@ struct McuView {
   std::int64_t outdated_us = 0;
   Tick tick = 0;                                         // report.tick, unwrapped
   std::array<Tick, BUSHD_MOTORS_PER_MCU> known_until{};  // likewise
+  std::string uncertain_reason{};                        // of the last PositionUncertain
 };
 
 // Common to the machines of a master. Each keeps for itself what only it needs to know.

@@ -357,8 +357,10 @@ INSTANTIATE_TEST_SUITE_P(
         change("UnknownSection", "[[mcu]]", "[[motors]]", 16, "motors",
                "unknown key; allowed here: lcm, control, state, bus, mcu, group, motor"),
         change("UnknownKey", "tick_us", "tick_ms", 8, "bus[0].tick_ms",
-               "unknown key; allowed here: name, port, baud, tick_us, format, moves, frames, "
+               "unknown key; allowed here: name, kind, port, baud, tick_us, format, moves, frames, "
                "emergency_stop"),
+        change("KindUnknown", "tick_us", "kind = \"can\"\ntick_us", 8, "bus[0].kind",
+               "is \"can\"; allowed: rs485"),
         change("NameMissing", "name = \"hall\"\n", "", 4, "bus[0].name", "is missing"),
         change("NameBad", "\"hall\"", "\"ha:ll\"", 5, "bus[0].name",
                "is \"ha:ll\"; allowed: 1..63 characters of A-Z a-z 0-9 _ . -"),

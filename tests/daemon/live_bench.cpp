@@ -84,7 +84,7 @@ void LiveBench::send(BusId, std::span<const std::uint8_t> bytes) {
 }
 
 void LiveBench::advance() {
-  link::Master& master = installation[kBus].master;
+  link::BusMaster& master = installation[kBus].master;
   const std::span<const std::uint8_t> bytes = master.step(now_us());
   if (!bytes.empty()) send(kBus, bytes);
   supervisor_->handle_events(now_us(), installation[kBus]);
