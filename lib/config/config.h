@@ -44,18 +44,21 @@ struct State {
   bool required = true;  // nothing moves that could not be found uncertain afterwards
 };
 
-enum class BusKind { kRs485 };  // docs/decisions/0043-bus-kinds.md
+enum class BusKind { kRs485, kCommutator };  // docs/decisions/0043-bus-kinds.md
 
 struct Bus {
   std::string name;
   BusKind kind = BusKind::kRs485;
   std::string port;        // as written in the file; may be a pattern (config/port_pattern.h)
   std::uint32_t baud = 0;  // one of libserial's fixed rates
-  std::uint32_t tick_us = 0;
+  std::uint32_t tick_us = 2560;
   bushd_format format = BUSHD_FORMAT_FINE;
   bool table_runs = false;  // a move from rest is given to the MCU as a whole, if the MCU can
   bool table_ticks = true;  // streamed ticks may be told as states of the run
   bushd_stop_mode emergency_stop = BUSHD_STOP_RAMP;
+  // Of a commutator board.
+  std::uint32_t start_hz = 0;   // F_start
+  std::uint32_t answer_ms = 0;  // for an answer, beyond twice its delay
 
   std::uint32_t tick_ns() const { return tick_us * 1000u; }
 };

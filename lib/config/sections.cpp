@@ -28,7 +28,8 @@ using tables::TomlReader;
 
 // A prefix becomes the beginning of LCM channel names, which have 63 characters at most.
 constexpr std::size_t kMaxPrefix = 48;
-constexpr std::array<std::string_view, 1> kBusKinds = {"rs485"};  // in the order of BusKind
+// In the order of BusKind.
+constexpr std::array<std::string_view, 2> kBusKinds = {"rs485", "commutator"};
 constexpr std::string_view kPrefixRule =
     "1..48 characters of A-Z a-z 0-9 _ . -, the first one no -";
 
@@ -216,24 +217,58 @@ Result<void> check_port(const TomlReader& reader, const Bus& bus, const std::vec
   return {};
 }
 
+// Which keys a bus has depends on what it is.
+Result<BusKind> read_kind(const TomlReader& reader) {
+  BusKind kind = BusKind::kRs485;
+  if (reader.has("kind")) {
+    const auto word = read_word(reader, "kind", kBusKinds);
+    if (!word) return fail(word.error());
+    kind = static_cast<BusKind>(*word);
+  }
+  const auto known =
+      kind == BusKind::kCommutator
+          ? reader.only({"name", "kind", "port", "baud", "start_hz", "answer_ms", "emergency_stop"})
+          : reader.only({"name", "kind", "port", "baud", "tick_us", "format", "moves", "frames",
+                         "emergency_stop"});
+  if (!known) return fail(known.error());
+  return kind;
+}
+
+// Ticks of an RS-485 line are those of its MCUs.
+Result<void> read_ticks(const TomlReader& reader, Bus* bus) {
+  const auto tick_us =
+      reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
+  if (!tick_us) return fail(tick_us.error());
+  bus->tick_us = static_cast<std::uint32_t>(*tick_us);
+  const auto format = read_word(reader, "format", {"fine", "coarse"});
+  if (!format) return fail(format.error());
+  bus->format = *format == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
+  return {};
+}
+
+Result<void> read_board(const TomlReader& reader, Bus* bus) {
+  const auto start_hz = reader.integer("start_hz", 1, 100, "Hz");
+  if (!start_hz) return fail(start_hz.error());
+  bus->start_hz = static_cast<std::uint32_t>(*start_hz);
+  bus->answer_ms = 100;
+  if (!reader.has("answer_ms")) return {};
+  const auto answer_ms = reader.integer("answer_ms", 10, 10'000, "ms");
+  if (!answer_ms) return fail(answer_ms.error());
+  bus->answer_ms = static_cast<std::uint32_t>(*answer_ms);
+  return {};
+}
+
 Result<void> read_buses(Loading* loading) {
   Taken names;
   for (const TomlReader& reader : loading->buses) {
-    if (auto known = reader.only({"name", "kind", "port", "baud", "tick_us", "format", "moves",
-                                  "frames", "emergency_stop"});
-        !known) {
-      return known;
-    }
+    const auto kind = read_kind(reader);
+    if (!kind) return fail(kind.error());
     Bus bus;
+    bus.kind = *kind;
     auto name = read_name(reader);
     if (!name) return fail(name.error());
     bus.name = std::move(*name);
     if (auto taken = names.take(reader, "name", bus.name, bus.name); !taken) return taken;
-    if (reader.has("kind")) {
-      const auto kind = read_word(reader, "kind", kBusKinds);
-      if (!kind) return fail(kind.error());
-      bus.kind = static_cast<BusKind>(*kind);
-    }
     constexpr std::string_view kPortRule =
         "the path of a serial port, such as \"/dev/ttyUSB0\" or \"/dev/ttyUSB*\"";
     auto port = reader.string("port", kPortRule);
@@ -246,13 +281,8 @@ Result<void> read_buses(Loading* loading) {
     const auto baud = read_baud(reader);
     if (!baud) return fail(baud.error());
     bus.baud = *baud;
-    const auto tick_us =
-        reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
-    if (!tick_us) return fail(tick_us.error());
-    bus.tick_us = static_cast<std::uint32_t>(*tick_us);
-    const auto format = read_word(reader, "format", {"fine", "coarse"});
-    if (!format) return fail(format.error());
-    bus.format = *format == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
+    const bool board = bus.kind == BusKind::kCommutator;
+    if (auto read = board ? read_board(reader, &bus) : read_ticks(reader, &bus); !read) return read;
     if (auto read = read_manners(reader, &bus); !read) return read;
     loading->config.buses.push_back(std::move(bus));
   }
@@ -292,6 +322,13 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     }
     const auto bus = resolve<BusId>(reader, "bus", config->buses, &Bus::name);
     if (!bus) return fail(bus.error());
+    if (config->buses[bus->value].kind == BusKind::kCommutator) {
+      const std::string& name = config->buses[bus->value].name;
+      return fail(reader.error(
+          "bus", fmt::format("\"{0}\" is a commutator board, which has no MCUs; allowed: buses of "
+                             "kind \"rs485\". Remove this section; its motors have mcu = \"{0}\"",
+                             name)));
+    }
     const auto address = reader.integer("address", 1, 255);
     if (!address) return fail(address.error());
     Mcu mcu{.bus = *bus,
@@ -306,6 +343,32 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     if (auto read = read_inputs(reader, &mcu); !read) return read;
     if (auto read = read_idle(reader, &mcu); !read) return read;
     config->mcus.push_back(std::move(mcu));
+  }
+  return {};
+}
+
+// A commutator board stands for an MCU of its own name.
+void add_boards(Config* config) {
+  for (std::size_t i = 0; i < config->buses.size(); ++i) {
+    if (config->buses[i].kind != BusKind::kCommutator) continue;
+    config->mcus.push_back({.bus = BusId{i}, .address = {1}, .id = config->buses[i].name});
+  }
+}
+
+// Its motors' numbers, and what it has no inputs for: it watches limit switches of its own.
+Result<void> check_board_motor(const TomlReader& reader, const std::string& board,
+                               std::int64_t output) {
+  if (output > 7) {
+    return fail(reader.error("output", fmt::format("is {}; allowed: 0..7 on commutator board "
+                                                   "\"{}\"",
+                                                   output, board)));
+  }
+  for (const char* const key : {"inputs", "limit", "input_active", "home", "local"}) {
+    if (!reader.has(key)) continue;
+    return fail(reader.error(
+        key, fmt::format("is for motors of MCUs; the board \"{}\" has limit switches of its own "
+                         "and no other inputs. Remove this line",
+                         board)));
   }
   return {};
 }
@@ -417,6 +480,10 @@ Result<void> read_motors(Loading* loading) {
     if (!mcu) return fail(mcu.error());
     const auto output = reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
     if (!output) return fail(output.error());
+    const Bus& bus = config.buses[config.mcus[mcu->value].bus.value];
+    if (bus.kind == BusKind::kCommutator) {
+      if (auto good = check_board_motor(reader, bus.name, *output); !good) return good;
+    }
     if (auto room = check_phase_output(reader, config.mcus[mcu->value], *output); !room)
       return room;
     const std::string& id = config.mcus[mcu->value].id;
@@ -429,7 +496,8 @@ Result<void> read_motors(Loading* loading) {
                 .output = {static_cast<std::uint8_t>(*output)},
                 .group = *group};
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
-    if (auto read = read_inputs(reader, &motor); !read) return read;
+    const bool has_limits = bus.kind == BusKind::kCommutator;
+    if (auto read = read_inputs(reader, has_limits, &motor); !read) return read;
     if (auto read = read_restored(reader, &motor); !read) return read;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
     if (auto checked = check_then(reader, motor); !checked) return checked;
@@ -485,6 +553,7 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
   loading->motors = std::move(*motors);
   if (auto read = read_buses(loading); !read) return read;
   if (auto read = read_mcus(*mcus, &loading->config); !read) return read;
+  add_boards(&loading->config);
   if (auto read = read_groups(loading); !read) return read;
   const auto pseudos = read_array(root, file, "pseudo", false);
   if (!pseudos) return fail(pseudos.error());

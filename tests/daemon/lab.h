@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "daemon/core.h"
+#include "sim/board_line.h"
 #include "sim/bus.h"
 #include "sim_disk/sim_disk.h"
 #include "state/store.h"
@@ -153,6 +154,7 @@ class Lab : public daemon::Outputs, private state::Backend {
 
   daemon::Core& core() { return *core_; }
   sim::Bus& bus(std::size_t index) { return *buses_[index].bus; }
+  sim::CommutatorBoard& board(std::size_t index) { return buses_[index].board->board; }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   const std::vector<std::string>& move_lines() const { return move_lines_; }
   // Which tables a restarted daemon is to have, as asked to keep last.
@@ -160,9 +162,10 @@ class Lab : public daemon::Outputs, private state::Backend {
 
  private:
   struct SimulatedBus {
-    std::unique_ptr<sim::Bus> bus;
+    std::unique_ptr<sim::Bus> bus;  // without MCUs where a board is in their place
     std::vector<std::uint8_t> received;
     bool plugged = true;
+    std::unique_ptr<sim::BoardLine> board = {};
   };
   class Client;
   void send(BusId bus, std::span<const std::uint8_t> bytes) override;
