@@ -139,6 +139,18 @@ struct Motor {
   bool never_disable = false;                 // its MCU's drivers stay enabled at rest
 };
 
+// A box with keys on a serial line of its own, which jogs a motor.
+struct Keypad {
+  std::string port{};
+  std::uint32_t baud = 625;
+  MotorId motor{};
+  bool latched = false;  // a key counts until the next one; else as long as its byte is repeated
+  std::uint32_t delay_us = 3'000;     // of a step, at first
+  std::uint32_t slower_us = 300;      // more with each key "slower"
+  std::uint32_t slowest_us = 30'000;  // beyond it, the first one again
+  std::uint32_t keepalive_ms = 500;   // 50..10000
+};
+
 struct PseudoAxis {
   std::string name{};
   std::string unit{};
@@ -183,6 +195,7 @@ struct Config {
   std::vector<Motor> motors;
   std::vector<Crate> crates;
   std::vector<Pseudo> pseudos{};
+  std::vector<Keypad> keypads{};
 
   // States are published by MCU, and then by section of computed axes.
   std::size_t state_parts() const { return mcus.size() + pseudos.size(); }

@@ -15,6 +15,7 @@
 #include "config/emission_section.h"
 #include "config/home.h"
 #include "config/inputs.h"
+#include "config/keypad_section.h"
 #include "config/port_pattern.h"
 #include "config/pseudo_section.h"
 #include "config/state_section.h"
@@ -532,8 +533,8 @@ Result<void> read_pseudos(const std::vector<TomlReader>& readers, Loading* loadi
 
 Result<void> read_sections(const TomlReader& root, Loading* loading) {
   const std::string& file = loading->config.path;
-  if (auto known =
-          root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor", "pseudo", "crate"});
+  if (auto known = root.only(
+          {"lcm", "control", "state", "bus", "mcu", "group", "motor", "pseudo", "crate", "keypad"});
       !known) {
     return known;
   }
@@ -559,6 +560,13 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
   if (!pseudos) return fail(pseudos.error());
   if (auto read = read_motors(loading); !read) return read;
   if (auto read = read_pseudos(*pseudos, loading); !read) return read;
+  const auto keypads = read_array(root, file, "keypad", false);
+  if (!keypads) return fail(keypads.error());
+  for (const TomlReader& reader : *keypads) {
+    auto keypad = read_keypad(reader, loading->config);
+    if (!keypad) return fail(keypad.error());
+    loading->config.keypads.push_back(std::move(*keypad));
+  }
   return read_crates(root, &loading->config);
 }
 

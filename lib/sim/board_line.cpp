@@ -22,6 +22,7 @@ std::vector<std::uint8_t> BoardLine::advance(TimeNs now_ns) {
     to_board_.pop_front();
     board.receive(next_ns, byte);
   }
+  now_ns_ = now_ns;
   std::vector<std::uint8_t> arrived;
   while (!from_board_.empty() && from_board_.front().at_ns <= now_ns) {
     arrived.push_back(from_board_.front().value);

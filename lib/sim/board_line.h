@@ -24,6 +24,7 @@ class BoardLine {
   // What has arrived from the board by then.
   std::vector<std::uint8_t> advance(TimeNs now_ns);
   TimeNs next_event_ns() const;
+  TimeNs advanced_to_ns() const { return now_ns_; }
 
  private:
   struct Byte {
@@ -33,6 +34,7 @@ class BoardLine {
   void run_board(TimeNs now_ns);
 
   const TimeNs byte_ns_;
+  TimeNs now_ns_ = 0;
   std::deque<Byte> to_board_;
   std::deque<Byte> from_board_;
 };

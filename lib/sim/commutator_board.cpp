@@ -55,7 +55,8 @@ void CommutatorBoard::make_step(TimeNs now_ns) {
       place_of(std::exchange(windings_.at(number_), kTwoPhase.at(phase_.at(number_))));
   const unsigned turned = (place_of(windings_.at(number_)) + 4 - before) % 4;
   position_.at(number_) += turned == 1 ? 1 : -1;
-  steps_.push_back({now_ns, number_, left_});
+  ++travel_.at(number_);
+  if (keeps_steps) steps_.push_back({now_ns, number_, left_});
   tell(now_ns, Signal::kStep, true);
   tell(now_ns + kPulseNs, Signal::kStep, false);
 }
@@ -76,6 +77,7 @@ std::vector<std::uint8_t> CommutatorBoard::take_answers() {
 
 void CommutatorBoard::tell(TimeNs now_ns, Signal signal, bool level) {
   if (edges_ == nullptr) return;
+  last_edge_ns_ = now_ns;
   edges_->edge({.time_ns = now_ns,
                 .mcu = mcu_,
                 .signal = signal,

@@ -35,6 +35,7 @@ class CommutatorBoard {
   bool supply = true;
   bool cut = false;            // the line: nothing passes in either direction
   bool loses_answers = false;  // what it sends
+  bool keeps_steps = true;     // for steps()
 
   // A byte's stop bit ended. Times never fall.
   void receive(TimeNs now_ns, std::uint8_t byte);
@@ -44,7 +45,9 @@ class CommutatorBoard {
 
   // Steps to the right since the beginning, counted from what the windings did.
   std::int64_t position(unsigned number) const { return position_.at(number); }
-  // When it has last stepped, and for how long it then had not.
+  std::uint64_t travel(unsigned number) const { return travel_.at(number); }
+  TimeNs last_edge_ns() const { return last_edge_ns_; }
+  // All of them.
   struct Step {
     TimeNs time_ns;
     unsigned motor;
@@ -64,6 +67,8 @@ class CommutatorBoard {
   std::array<unsigned, kMotors> phase_{};       // the board's own pointer, 0..3
   std::array<std::uint8_t, kMotors> windings_;  // as they are
   std::array<std::int64_t, kMotors> position_{};
+  std::array<std::uint64_t, kMotors> travel_{};
+  TimeNs last_edge_ns_ = 0;
   bool selected_ = false;
   unsigned number_ = 0;
   bool left_ = false;

@@ -299,6 +299,7 @@ TEST(Boards, ProgramOfABushd2MovesAMotorBehindABoard) {
   EXPECT_EQ(sent, expected);
 
   // The board misses the supply, and the module tells its program.
+  lab.naf(5, 0, 10);
   lab.board(0).supply = false;
   lab.permit(1 | 1 << 5 | 1 << 6);
   ASSERT_TRUE(lab.wait_for_lam());

@@ -15,6 +15,7 @@
 #include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
+#include "board_simulator.h"
 #include "simulator.h"
 
 namespace {
@@ -34,6 +35,26 @@ std::uint16_t fresh_boot_number() {
   const auto seconds = static_cast<std::uint64_t>(std::time(nullptr));
   const auto process = static_cast<std::uint64_t>(::getpid());
   return static_cast<std::uint16_t>(1 + (seconds * 31 + process) % UINT16_MAX);
+}
+
+// Makes it, says that it is there, and lets it run until a signal ends it.
+template <class Kind, class Options>
+int simulate(const Options& options) {
+  bushd::Result<void> ended;
+  std::string summary;
+  {
+    const auto simulator = Kind::create(options);
+    if (!simulator) return refuse(simulator.error());
+    fmt::print("bushsim: ready {}\n", options.links.front());
+    std::fflush(stdout);
+    ended = (*simulator)->run();
+    summary = (*simulator)->summary();
+  }
+  // Only now, with trace and link put in order: whoever started this may have closed its end of
+  // stdout.
+  fmt::print("{}", summary);
+  if (!ended) return refuse(ended.error());
+  return kDone;
 }
 
 int run(int argc, char** argv) {
@@ -95,22 +116,15 @@ int run(int argc, char** argv) {
   const auto wired = bushsim::parse_switches(switches, *setup, *images);
   if (!wired) return refuse(wired.error());
   options.switches = *wired;
-  options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
-  bushd::Result<void> ended;
-  std::string summary;
-  {
-    const auto simulator = bushsim::Simulator::create(options);
-    if (!simulator) return refuse(simulator.error());
-    fmt::print("bushsim: ready {}\n", options.links.front());
-    std::fflush(stdout);
-    ended = (*simulator)->run();
-    summary = (*simulator)->summary();
+  if (setup->board_start_hz != 0) {
+    if (!mcus.empty() || !doubled.empty()) {
+      return refuse({"a commutator board has no MCUs: leave out --mcu and --doubled"});
+    }
+    return simulate<bushsim::BoardSimulator>(bushsim::BoardSimulator::Options{
+        options.setup, options.switches, options.links, options.trace});
   }
-  // Only now, with trace and link put in order: whoever started this may have closed its end of
-  // stdout.
-  fmt::print("{}", summary);
-  if (!ended) return refuse(ended.error());
-  return kDone;
+  options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
+  return simulate<bushsim::Simulator>(options);
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
   for (std::size_t i = 0; i < config->buses.size(); ++i) {
     const auto& candidate = config->buses[i];
     if (!bus.empty() && candidate.name != bus) continue;
-    Setup setup{candidate.name, candidate.baud, {}, {}};
+    Setup setup{candidate.name, candidate.baud, {}, {}, candidate.start_hz};
     for (const auto& mcu : config->mcus) {
       if (mcu.bus.value != i) continue;
       setup.addresses.push_back(mcu.address.value);
