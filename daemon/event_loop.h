@@ -73,8 +73,8 @@ class EventLoop : private Outputs, private state::Backend {
   };
 
   struct KeypadPort {
-    KeypadPort(const config::Keypad& its_config, std::string motor, Keypad::Ask ask)
-        : config(its_config), keypad(its_config, std::move(motor), std::move(ask)) {}
+    KeypadPort(const config::Keypad& its_config, std::string motor, Keypad::Ask ask);
+    ~KeypadPort();
     const config::Keypad& config;
     Keypad keypad;
     std::optional<serial::SerialPort> serial{};

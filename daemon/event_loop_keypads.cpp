@@ -12,6 +12,12 @@
 
 namespace bushd::daemon {
 
+EventLoop::KeypadPort::KeypadPort(const config::Keypad& its_config, std::string motor,
+                                  Keypad::Ask ask)
+    : config(its_config), keypad(its_config, std::move(motor), std::move(ask)) {}
+
+EventLoop::KeypadPort::~KeypadPort() = default;
+
 void EventLoop::add_keypads() {
   for (const config::Keypad& keypad : config_.keypads) {
     keypads_.push_back(std::make_unique<KeypadPort>(

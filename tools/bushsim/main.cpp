@@ -16,6 +16,7 @@
 #include "base/printable.h"
 #include "base/standard_output.h"
 #include "board_simulator.h"
+#include "keypad.h"
 #include "simulator.h"
 
 namespace {
@@ -70,8 +71,7 @@ int run(int argc, char** argv) {
   options.boot_number = fresh_boot_number();
   std::string config;
   std::string bus;
-  app.add_option("--config", config, "Configuration of bushd: baud rate and MCUs of the bus")
-      ->required();
+  app.add_option("--config", config, "Configuration of bushd: baud rate and MCUs of the bus");
   app.add_option("--link", options.links,
                  "Symlink to make, the bus's serial port. Given several times: its names in turn, "
                  "each time that it is plugged in")
@@ -97,6 +97,10 @@ int run(int argc, char** argv) {
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
+  bool keypad = false;
+  app.add_flag("--keypad", keypad,
+               "A keypad instead of a bus: what is typed are its keys (f, r, s, x), and what it "
+               "would show is printed");
   if (const auto words = bushd::completion_asked(argc, argv)) {
     bushd::print_completion(bushd::complete(app, *words));
     return kDone;
@@ -107,6 +111,14 @@ int run(int argc, char** argv) {
     return bushd::answered(app, error) ? kDone : kUsage;
   }
 
+  if (keypad) {
+    const auto ended = bushsim::run_keypad(options.links.front());
+    return ended ? kDone : refuse(ended.error());
+  }
+  if (config.empty()) {
+    fmt::print(stderr, "--config is required, but with --keypad\nRun with --help for more.\n");
+    return kUsage;
+  }
   const auto setup = bushsim::load_setup(config, bus);
   if (!setup) return refuse(setup.error());
   options.setup = *setup;
