@@ -360,7 +360,7 @@ INSTANTIATE_TEST_SUITE_P(
                "unknown key; allowed here: name, kind, port, baud, tick_us, format, moves, frames, "
                "emergency_stop"),
         change("KindUnknown", "tick_us", "kind = \"can\"\ntick_us", 8, "bus[0].kind",
-               "is \"can\"; allowed: rs485"),
+               "is \"can\"; allowed: \"rs485\""),
         change("NameMissing", "name = \"hall\"\n", "", 4, "bus[0].name", "is missing"),
         change("NameBad", "\"hall\"", "\"ha:ll\"", 5, "bus[0].name",
                "is \"ha:ll\"; allowed: 1..63 characters of A-Z a-z 0-9 _ . -"),

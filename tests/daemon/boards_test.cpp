@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -270,6 +271,65 @@ TEST(Boards, PositionsAreKeptOverRestarts) {
   lab.run_for(0.5);
   EXPECT_EQ(lab.motor("m0").position_steps, 321);
   EXPECT_EQ(lab.motor("m0").trust, api::Trust::kRestored);
+}
+
+TEST(Boards, JogChangesSpeedAndDirectionAndEnds) {
+  BoardLab lab;
+  const auto jog = [&](double per_s) {
+    return lab.send(
+        api::Jog{.motor = "m0", .per_s = per_s, .in_steps = true, .keepalive_ms = 5000});
+  };
+  const auto first = jog(200);
+  lab.run_for(1);
+  const std::int64_t slow = lab.shaft_steps("m0");
+  EXPECT_NEAR(static_cast<double>(slow), 200, 20);
+  jog(1000);
+  lab.run_for(1.5);
+  EXPECT_GT(lab.shaft_steps("m0"), slow + 700);
+  jog(-300);
+  lab.run_for(3);
+  const std::int64_t at = lab.shaft_steps("m0");
+  lab.run_for(1);
+  // 84 codes of 40 us, and 20 bits of the line.
+  EXPECT_NEAR(static_cast<double>(lab.shaft_steps("m0") - at), -1e6 / (84 * 40 + 174), 2);
+  EXPECT_EQ(lab.wait(jog(0)).result, "done");
+  EXPECT_EQ(lab.wait(first).position_steps, std::vector<std::int64_t>{lab.shaft_steps("m0")});
+  EXPECT_TRUE(lab.trusted("m0"));
+}
+
+// Each trouble leaves one step unknown at the most, and only where the motor is uncertain then.
+TEST(Boards, WhateverHappensCountsAreRightOrSaidToBeUncertain) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto upto = [&random](unsigned n) { return static_cast<std::int64_t>(random() % n); };
+    BoardLab lab;
+    lab.board(0).motor(0).right_limit_at = 3000;
+    for (int trouble = 0; trouble < 30; ++trouble) {
+      const auto move = lab.send(Ask::kMoveBy, {"m0"}, {upto(4000) - 2000});
+      lab.run_for(static_cast<double>(upto(900)) * 1e-3);
+      const std::int64_t kind = upto(8);
+      if (kind == 0) lab.board(0).cut = true;
+      if (kind == 1) lab.board(0).loses_answers = true;
+      if (kind == 2) lab.unplug(0);
+      if (kind == 3) lab.board(0).supply = false;
+      if (kind == 4) lab.send(Ask::kStop, {"m0"});
+      if (kind == 5) lab.send(Ask::kMoveBy, {"m0"}, {upto(4000) - 2000});
+      if (kind == 6) lab.send(Ask::kEmergencyStop, {});
+      lab.run_for(static_cast<double>(upto(300)) * 1e-3);
+      lab.board(0).cut = lab.board(0).loses_answers = false;
+      lab.board(0).supply = true;
+      if (kind == 2) lab.plug(0);
+      ASSERT_TRUE(lab.run_until([&] { return lab.has_result(move); }, 60));
+      lab.run_for(5);
+      lab.wait(lab.send(Ask::kClearFaults, {}));
+      ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10)) << "trouble " << kind;
+      const std::int64_t off = lab.shaft_steps("m0") - lab.motor("m0").position_steps;
+      ASSERT_LE(std::abs(off), lab.trusted("m0") ? 0 : 1) << "trouble " << kind;
+      ASSERT_FALSE(kind >= 4 && !lab.trusted("m0")) << "trouble " << kind;
+      lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {lab.shaft_steps("m0")}));
+    }
+  }
 }
 
 // Program, BUSHD-2, commutator, windings: what the report of 1985 describes.

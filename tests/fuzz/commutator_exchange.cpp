@@ -1,5 +1,6 @@
 // The exchange with a commutator board: whatever bytes come at whatever times, each step that is
-// asked for ends once, in an answer, a loss or a cancel; and what is sent is what boards understand.
+// asked for ends once, in an answer, a loss or a cancel; and what is sent is what boards
+// understand.
 //
 // Input: operations of four bytes, what, which and a number of 16 bits.
 #include "commutator/exchange.h"
