@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "config/board_section.h"
 #include "config/checks.h"
 #include "config/coordinates.h"
 #include "config/crates.h"
@@ -247,18 +248,6 @@ Result<void> read_ticks(const TomlReader& reader, Bus* bus) {
   return {};
 }
 
-Result<void> read_board(const TomlReader& reader, Bus* bus) {
-  const auto start_hz = reader.integer("start_hz", 1, 100, "Hz");
-  if (!start_hz) return fail(start_hz.error());
-  bus->start_hz = static_cast<std::uint32_t>(*start_hz);
-  bus->answer_ms = 100;
-  if (!reader.has("answer_ms")) return {};
-  const auto answer_ms = reader.integer("answer_ms", 10, 10'000, "ms");
-  if (!answer_ms) return fail(answer_ms.error());
-  bus->answer_ms = static_cast<std::uint32_t>(*answer_ms);
-  return {};
-}
-
 Result<void> read_buses(Loading* loading) {
   Taken names;
   for (const TomlReader& reader : loading->buses) {
@@ -344,32 +333,6 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     if (auto read = read_inputs(reader, &mcu); !read) return read;
     if (auto read = read_idle(reader, &mcu); !read) return read;
     config->mcus.push_back(std::move(mcu));
-  }
-  return {};
-}
-
-// A commutator board stands for an MCU of its own name.
-void add_boards(Config* config) {
-  for (std::size_t i = 0; i < config->buses.size(); ++i) {
-    if (config->buses[i].kind != BusKind::kCommutator) continue;
-    config->mcus.push_back({.bus = BusId{i}, .address = {1}, .id = config->buses[i].name});
-  }
-}
-
-// Its motors' numbers, and what it has no inputs for: it watches limit switches of its own.
-Result<void> check_board_motor(const TomlReader& reader, const std::string& board,
-                               std::int64_t output) {
-  if (output > 7) {
-    return fail(reader.error("output", fmt::format("is {}; allowed: 0..7 on commutator board "
-                                                   "\"{}\"",
-                                                   output, board)));
-  }
-  for (const char* const key : {"inputs", "limit", "input_active", "home", "local"}) {
-    if (!reader.has(key)) continue;
-    return fail(reader.error(
-        key, fmt::format("is for motors of MCUs; the board \"{}\" has limit switches of its own "
-                         "and no other inputs. Remove this line",
-                         board)));
   }
   return {};
 }
