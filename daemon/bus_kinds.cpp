@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "commutator/master.h"
 #include "link/master.h"
 #include "serial_pulse/master.h"
 
@@ -24,6 +25,13 @@ std::unique_ptr<link::BusMaster> new_master(const config::Bus& bus, link::BusSet
       return std::make_unique<serial_pulse::Master>(std::move(setup), source, hash_of(bus.name));
     case config::BusKind::kRs485:
       break;
+    case config::BusKind::kCommutator:
+      return std::make_unique<commutator::Master>(
+          commutator::Master::Setup{.name = bus.name,
+                                    .board = {.start_hz = bus.start_hz,
+                                              .baud = bus.baud,
+                                              .answer_us = bus.answer_ms * std::int64_t{1000}}},
+          std::move(setup), source);
   }
   return std::make_unique<link::Master>(std::move(setup), source);
 }

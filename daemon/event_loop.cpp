@@ -13,6 +13,8 @@
 #include <limits>
 
 #include "base/printable.h"
+#include "daemon/bus_port.h"
+#include "daemon/event_loop_source.h"
 #include "daemon/process.h"
 #include "daemon/service_manager.h"
 #include "daemon/table_service.h"
@@ -60,48 +62,16 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
   publishing_.set_refresh([this] { core_.publish_state(now_us()); });
   publishing_.set_log([this](const std::string& text) { log(LogLevel::kError, {}, text); });
   publishing_.add(lcm_front_);
+  add_keypads();
   if (fronts.control == nullptr) return;
   socket_front_ =
       std::make_unique<SocketFront>(*fronts.control, run_, reception_, publishing_, unix_time_us);
   publishing_.add(*socket_front_);
 }
 
-class EventLoop::Source {
- public:
-  explicit Source(Handler handler) : handler_(std::move(handler)) {}
-  ~Source() { sd_event_source_disable_unref(source_); }
-  Source(const Source&) = delete;
-  Source& operator=(const Source&) = delete;
-
-  int watch(sd_event* event, int fd) {
-    return sd_event_add_io(
-        event, &source_, fd, EPOLLIN,
-        [](sd_event_source*, int, std::uint32_t events, void* self) {
-          static_cast<Source*>(self)->handler_(events);
-          return 0;
-        },
-        this);
-  }
-  int watch_signal(sd_event* event, int signal) {
-    return sd_event_add_signal(
-        event, &source_, signal,
-        [](sd_event_source*, const signalfd_siginfo*, void* self) {
-          static_cast<Source*>(self)->handler_(0);
-          return 0;
-        },
-        this);
-  }
-  void await(std::uint32_t events) {
-    static_cast<void>(sd_event_source_set_io_events(source_, events));
-  }
-
- private:
-  Handler handler_;
-  sd_event_source* source_ = nullptr;
-};
-
 EventLoop::~EventLoop() {
   sources_.clear();
+  keypads_.clear();
   for (Port& port : ports_) port.source.reset();
   sd_event_unref(event_);
 }
@@ -189,6 +159,7 @@ Result<void> EventLoop::run() {
       if (ports_[bus].lost) lose_port(now, bus, *std::exchange(ports_[bus].lost, std::nullopt));
     }
     open_due_ports(now);
+    step_keypads(now);
     publishing_.set_dropped_messages(lcm_front_.dropped() +
                                      (socket_front_ ? socket_front_->dropped() : 0));
     keep_up(now);
@@ -219,7 +190,7 @@ void EventLoop::keep_up(std::int64_t now) {
 Result<void> EventLoop::handle_sources() {
   std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
   // One call dispatches one source, the one that has waited longest.
-  for (std::size_t i = 0; i < sources_.size() + ports_.size(); ++i) {
+  for (std::size_t i = 0; i < sources_.size() + ports_.size() + keypads_.size(); ++i) {
     const int dispatched = sd_event_run(event_, static_cast<std::uint64_t>(wait_us));
     if (dispatched < 0 && dispatched != -EINTR) return fail(loop_text(dispatched));
     if (dispatched <= 0) return {};
@@ -231,7 +202,7 @@ Result<void> EventLoop::handle_sources() {
 
 std::int64_t EventLoop::next_wake_us() const {
   if (!reception_.idle()) return 0;
-  std::int64_t wake = core_.next_wake_us();
+  std::int64_t wake = std::min(core_.next_wake_us(), next_keypad_wake_us());
   for (const Port& port : ports_) {
     if (port.lost) return 0;
     if (!port.serial) wake = std::min(wake, port.open_due_us);

@@ -16,6 +16,7 @@
 #include "control/server.h"
 #include "daemon/bus_port.h"
 #include "daemon/core.h"
+#include "daemon/keypad.h"
 #include "daemon/lcm_front.h"
 #include "daemon/lcm_watch.h"
 #include "daemon/log_limit.h"
@@ -72,6 +73,18 @@ class EventLoop : private Outputs, private state::Backend {
     std::optional<std::string> lost;
   };
 
+  struct KeypadPort {
+    KeypadPort(const config::Keypad& its_config, std::string motor, Keypad::Ask ask);
+    ~KeypadPort();
+    const config::Keypad& config;
+    Keypad keypad;
+    std::optional<serial::SerialPort> serial{};
+    std::unique_ptr<Source> source{};
+    std::int64_t open_due_us = 0;
+    std::string last_error{};
+    std::optional<std::string> lost{};  // as of Port
+  };
+
   Result<void> set_up();
   Result<void> set_up_signals();
   Result<std::unique_ptr<Source>> watch(int fd, Handler handler);
@@ -80,6 +93,12 @@ class EventLoop : private Outputs, private state::Backend {
   void open_port(std::int64_t now_us, BusId bus);
   void lose_port(std::int64_t now_us, BusId bus, const std::string& cause);
   void handle_port(std::int64_t now_us, BusId bus, std::uint32_t events);
+  void add_keypads();
+  void open_keypad(std::int64_t now_us, KeypadPort& port);
+  void lose_keypad(std::int64_t now_us, KeypadPort& port);
+  void handle_keypad(std::int64_t now_us, KeypadPort& port);
+  void step_keypads(std::int64_t now_us);
+  std::int64_t next_keypad_wake_us() const;
   void handle_signal(std::int64_t now_us, int signal);
   Result<void> restore_tables();
   // The core has what is due done, and hears at once what became of it.
@@ -130,6 +149,7 @@ class EventLoop : private Outputs, private state::Backend {
   LcmFront lcm_front_;
   std::unique_ptr<SocketFront> socket_front_;  // null: no control socket
   ById<BusId, Port> ports_;
+  std::vector<std::unique_ptr<KeypadPort>> keypads_;
   ById<McuId, api::McuState> mcu_states_;            // as published last
   std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
   LogLimit log_limit_;

@@ -85,6 +85,7 @@ class Mcu {
   // It has not yet answered all that it was asked, or not yet reported since.
   bool busy() const { return master_.busy(on_bus_); }
   const link::McuHealth& health() const { return master_.health(on_bus_); }
+  bool one_at_a_time() const { return master_.one_at_a_time(); }
   bool streams() const { return master_.streams(); }
   // Its drivers are disabled at rest (IdleDrivers), and enabled when one of its motors is to move.
   bool asleep = false;

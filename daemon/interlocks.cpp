@@ -14,7 +14,13 @@ Result<void> Interlocks::may_move() const {
 
 Result<void> Interlocks::may_move(MotorId motor) const {
   if (auto may = installation_[motor].may_be_used(); !may) return may;
-  if (auto may = may_move_by(installation_.mcu_of(motor)); !may) return may;
+  const Mcu& mcu = installation_.mcu_of(motor);
+  if (auto may = may_move_by(mcu); !may) return may;
+  for (const MotorId other : mcu.motors()) {
+    if (!mcu.one_at_a_time() || other == motor || !installation_[other].has_plan()) continue;
+    return fail(installation_[other].busy_text() + ", and the board " + mcu.name() +
+                " moves one motor at a time; wait for its end, or stop it");
+  }
   for (const ForMotor& check : for_motor_) {
     if (auto may = check(motor); !may) return may;
   }

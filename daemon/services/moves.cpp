@@ -42,6 +42,13 @@ Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
   for (std::size_t i = 0; i < motors->size(); ++i) {
     auto part = part_of((*motors)[i], move.motors[i].amount, move);
     if (!part) return fail(part.error());
+    for (const Part& other : parts) {
+      const Mcu& mcu = installation_.mcu_of(other.motor);
+      if (!mcu.one_at_a_time() || mcu.id != installation_.mcu_of(part->motor).id) continue;
+      return fail("the board " + mcu.name() + " moves one motor at a time; move " +
+                  installation_[part->motor].name() + " after " +
+                  installation_[other.motor].name());
+    }
     parts.push_back(std::move(*part));
   }
   return parts;

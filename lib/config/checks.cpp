@@ -89,6 +89,24 @@ Result<void> check_speed(const Loading& loading, std::size_t index) {
                   BUSHD_MAX_STEPS_PER_TICK, remedy)));
 }
 
+// A board makes no step sooner than after one code.
+Result<void> check_board_speed(const Loading& loading, std::size_t index) {
+  const Config& config = loading.config;
+  const Motor& motor = config.motors[index];
+  const Bus& bus = config.bus_of(motor);
+  if (bus.kind != BusKind::kCommutator) return {};
+  const bushd_table& view = config.table_of(motor).view();
+  const std::uint64_t fastest_ns = std::uint64_t{view.time_unit_ns} * bushd_table_fastest(&view);
+  const std::uint64_t code_ns = 1'000'000'000 / (250 * std::uint64_t{bus.start_hz});
+  if (fastest_ns >= code_ns) return {};
+  return fail(loading.motors[index].error(
+      "group",
+      fmt::format("the table \"{}\" has steps {} ns apart; allowed: {} ns and more, one "
+                  "delay code of board \"{}\" with start_hz = {}. Use a slower table, or "
+                  "a board with a higher F_start",
+                  config.table_of(motor).name(), fastest_ns, code_ns, bus.name, bus.start_hz)));
+}
+
 Result<void> check_table_slots(const Loading& loading) {
   const Config& config = loading.config;
   std::vector<std::set<const tables::Table*>> used(config.mcus.size());
@@ -168,6 +186,7 @@ Result<void> check_together(const Loading& loading) {
   for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {
     if (auto checked = check_speed(loading, i); !checked) return checked;
     if (auto checked = check_step_period(loading, i); !checked) return checked;
+    if (auto checked = check_board_speed(loading, i); !checked) return checked;
     if (auto checked = check_idle(loading, i); !checked) return checked;
   }
   if (auto checked = check_motor_inputs(loading); !checked) return checked;

@@ -61,7 +61,7 @@ struct MotorInputs {
   std::optional<Input> own = {};
 };
 
-enum class BusKind { kRs485, kSerialPulse };  // docs/decisions/0043-bus-kinds.md
+enum class BusKind { kRs485, kSerialPulse, kCommutator };  // docs/decisions/0043-bus-kinds.md
 
 // Of a bus of that kind.
 struct SerialPulse {
@@ -74,12 +74,15 @@ struct Bus {
   BusKind kind = BusKind::kRs485;
   std::string port;        // as written in the file; may be a pattern (config/port_pattern.h)
   std::uint32_t baud = 0;  // one of libserial's fixed rates; 0: of a kind without
-  std::uint32_t tick_us = 0;
+  std::uint32_t tick_us = 2560;
   bushd_format format = BUSHD_FORMAT_FINE;
   bool table_runs = false;  // a move from rest is given to the MCU as a whole, if the MCU can
   bool table_ticks = true;  // streamed ticks may be told as states of the run
   bushd_stop_mode emergency_stop = BUSHD_STOP_RAMP;
   SerialPulse serial_pulse = {};
+  // Of a commutator board.
+  std::uint32_t start_hz = 0;   // F_start
+  std::uint32_t answer_ms = 0;  // for an answer, beyond twice its delay
 
   std::uint32_t tick_ns() const { return tick_us * 1000u; }
 };
@@ -143,6 +146,18 @@ struct Motor {
   bool never_disable = false;                 // its MCU's drivers stay enabled at rest
 };
 
+// A box with keys on a serial line of its own, which jogs a motor.
+struct Keypad {
+  std::string port{};
+  std::uint32_t baud = 625;
+  MotorId motor{};
+  bool latched = false;  // a key counts until the next one; else as long as its byte is repeated
+  std::uint32_t delay_us = 3'000;     // of a step, at first
+  std::uint32_t slower_us = 300;      // more with each key "slower"
+  std::uint32_t slowest_us = 30'000;  // beyond it, the first one again
+  std::uint32_t keepalive_ms = 500;   // 50..10000
+};
+
 struct PseudoAxis {
   std::string name{};
   std::string unit{};
@@ -187,6 +202,7 @@ struct Config {
   std::vector<Motor> motors;
   std::vector<Crate> crates;
   std::vector<Pseudo> pseudos{};
+  std::vector<Keypad> keypads{};
 
   // States are published by MCU, and then by section of computed axes.
   std::size_t state_parts() const { return mcus.size() + pseudos.size(); }

@@ -55,7 +55,7 @@ Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
   return {};
 }
 
-Result<void> read_inputs(const TomlReader& reader, Motor* motor) {
+Result<void> read_inputs(const TomlReader& reader, bool has_limits, Motor* motor) {
   bool own_open = false;
   if (auto read = read_active(reader, "input_active", &own_open); !read) return read;
   std::optional<bool> own_level;
@@ -68,7 +68,7 @@ Result<void> read_limit_action(const TomlReader& reader, Motor* motor) {
   if (!reader.has("limit_action")) return {};
   const auto action = read_word(reader, "limit_action", {"ramp", "immediate"});
   if (!action) return fail(action.error());
-  if (!motor->inputs.positive && !motor->inputs.negative) {
+  if (!has_limits && !motor->inputs.positive && !motor->inputs.negative) {
     return fail(reader.error("limit_action",
                              "applies only with a limit; allowed: "
                              "beside limit = \"positive\", \"negative\" or "

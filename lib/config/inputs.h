@@ -7,8 +7,8 @@
 namespace bushd::config {
 
 Result<void> read_inputs(const tables::TomlReader& reader, Mcu* mcu);
-// Precondition: its output and `home` have been read.
-Result<void> read_inputs(const tables::TomlReader& reader, Motor* motor);
+// `has_limits`: beside those of these keys. Precondition: its output and `home` have been read.
+Result<void> read_inputs(const tables::TomlReader& reader, bool has_limits, Motor* motor);
 
 // The key `limit_action`. Precondition: its limits are known.
 Result<void> read_limit_action(const tables::TomlReader& reader, Motor* motor);

@@ -8,13 +8,16 @@
 #include <string_view>
 #include <utility>
 
+#include "config/board_section.h"
 #include "config/checks.h"
 #include "config/coordinates.h"
 #include "config/crates.h"
 #include "config/emission_section.h"
 #include "config/home.h"
 #include "config/inputs.h"
+#include "config/keypad_section.h"
 #include "config/port_check.h"
+#include "config/port_pattern.h"
 #include "config/pseudo_section.h"
 #include "config/serial_pulse_section.h"
 #include "config/state_section.h"
@@ -28,8 +31,8 @@ using tables::TomlReader;
 
 // A prefix becomes the beginning of LCM channel names, which have 63 characters at most.
 constexpr std::size_t kMaxPrefix = 48;
-constexpr std::array<std::string_view, 2> kBusKinds = {"rs485",
-                                                       "serial-pulse"};  // in the order of BusKind
+// In the order of BusKind.
+constexpr std::array<std::string_view, 3> kBusKinds = {"rs485", "serial-pulse", "commutator"};
 constexpr std::string_view kPrefixRule =
     "1..48 characters of A-Z a-z 0-9 _ . -, the first one no -";
 
@@ -207,6 +210,20 @@ Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
   return {};
 }
 
+// Of a bus of kind "commutator".
+Result<void> read_commutator(const TomlReader& reader, Bus* bus) {
+  if (auto known = reader.only(
+          {"name", "kind", "port", "baud", "start_hz", "answer_ms", "emergency_stop"});
+      !known) {
+    return known;
+  }
+  const auto baud = read_baud(reader);
+  if (!baud) return fail(baud.error());
+  bus->baud = *baud;
+  return read_board(reader, bus);
+}
+
+// Which keys a bus has depends on what it is.
 Result<void> read_kind(const TomlReader& reader, Bus* bus) {
   if (reader.has("kind")) {
     const auto kind = read_word(reader, "kind", kBusKinds);
@@ -216,6 +233,8 @@ Result<void> read_kind(const TomlReader& reader, Bus* bus) {
   switch (bus->kind) {
     case BusKind::kSerialPulse:
       return read_serial_pulse(reader, bus);
+    case BusKind::kCommutator:
+      return read_commutator(reader, bus);
     case BusKind::kRs485:
       break;
   }
@@ -279,6 +298,13 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     }
     const auto bus = resolve<BusId>(reader, "bus", config->buses, &Bus::name);
     if (!bus) return fail(bus.error());
+    if (config->buses[bus->value].kind == BusKind::kCommutator) {
+      const std::string& name = config->buses[bus->value].name;
+      return fail(reader.error(
+          "bus", fmt::format("\"{0}\" is a commutator board, which has no MCUs; allowed: buses of "
+                             "kind \"rs485\". Remove this section; its motors have mcu = \"{0}\"",
+                             name)));
+    }
     const auto address = reader.integer("address", 1, 255);
     if (!address) return fail(address.error());
     Mcu mcu{.bus = *bus,
@@ -308,7 +334,7 @@ Result<void> add_stand_ins(const std::vector<TomlReader>& readers, Config* confi
                            bus.name, bus.name)));
   }
   for (std::size_t i = 0; i < config->buses.size(); ++i) {
-    if (config->buses[i].kind != BusKind::kSerialPulse) continue;
+    if (config->buses[i].kind == BusKind::kRs485) continue;
     config->mcus.push_back({.bus = {i}, .address = {1}, .id = config->buses[i].name});
   }
   return {};
@@ -398,6 +424,10 @@ Result<void> read_motors(Loading* loading) {
     const auto output =
         one_motor ? Result<std::int64_t>(0) : reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
     if (!output) return fail(output.error());
+    const Bus& bus = config.buses[config.mcus[mcu->value].bus.value];
+    if (bus.kind == BusKind::kCommutator) {
+      if (auto good = check_board_motor(reader, bus.name, *output); !good) return good;
+    }
     if (auto room = check_phase_output(reader, config.mcus[mcu->value], *output); !room)
       return room;
     const std::string& id = config.mcus[mcu->value].id;
@@ -413,8 +443,9 @@ Result<void> read_motors(Loading* loading) {
                 .output = {static_cast<std::uint8_t>(*output)},
                 .group = *group};
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
-    if (auto read =
-            one_motor ? take_serial_pulse(reader, bus, &motor) : read_inputs(reader, &motor);
+    const bool has_limits = bus.kind == BusKind::kCommutator;
+    if (auto read = one_motor ? take_serial_pulse(reader, bus, &motor)
+                              : read_inputs(reader, has_limits, &motor);
         !read) {
       return read;
     }
@@ -452,8 +483,8 @@ Result<void> read_pseudos(const std::vector<TomlReader>& readers, Loading* loadi
 
 Result<void> read_sections(const TomlReader& root, Loading* loading) {
   const std::string& file = loading->config.path;
-  if (auto known =
-          root.only({"lcm", "control", "state", "bus", "mcu", "group", "motor", "pseudo", "crate"});
+  if (auto known = root.only(
+          {"lcm", "control", "state", "bus", "mcu", "group", "motor", "pseudo", "crate", "keypad"});
       !known) {
     return known;
   }
@@ -479,6 +510,13 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
   if (!pseudos) return fail(pseudos.error());
   if (auto read = read_motors(loading); !read) return read;
   if (auto read = read_pseudos(*pseudos, loading); !read) return read;
+  const auto keypads = read_array(root, file, "keypad", false);
+  if (!keypads) return fail(keypads.error());
+  for (const TomlReader& reader : *keypads) {
+    auto keypad = read_keypad(reader, loading->config);
+    if (!keypad) return fail(keypad.error());
+    loading->config.keypads.push_back(std::move(*keypad));
+  }
   return read_crates(root, &loading->config);
 }
 

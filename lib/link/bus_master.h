@@ -76,6 +76,8 @@ class BusMaster {
   // that. Where it is no, a motor makes runs of its table, at least as slow as the table says, and
   // its ticks wait for it.
   virtual bool streams() const { return false; }
+  // A motor of an MCU begins only when no other one of it moves: precondition of begin().
+  virtual bool one_at_a_time() const { return false; }
 
   // Earliest tick at which a move of this motor can start.
   virtual Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const = 0;

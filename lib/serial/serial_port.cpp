@@ -15,6 +15,8 @@
 #include <memory>
 #include <utility>
 
+#include "serial/any_rate.h"
+
 namespace bushd::serial {
 namespace {
 
@@ -135,6 +137,20 @@ Result<SerialPort> SerialPort::open(const std::string& path, std::uint32_t baud)
   }
   ask_for_low_latency(*fd);
   return port;
+}
+
+Result<SerialPort> SerialPort::open_any_rate(const std::string& path, std::uint32_t baud) {
+  constexpr std::uint32_t kOpened = 9600;  // every driver has it
+  auto port = open(path, kOpened);
+  if (!port) return port;
+  const std::uint32_t made = set_any_rate(port->fd(), baud);
+  const std::uint64_t off = made > baud ? made - baud : baud - made;
+  if (made != 0 && off * 50 <= baud) return port;
+  return fail(
+      Error{.message = "cannot be set to " + std::to_string(baud) + " baud; its driver makes " +
+                       (made == 0 ? std::string("fixed rates only") : std::to_string(made)) +
+                       ". Use another adapter, or another rate at both ends",
+            .file = path});
 }
 
 SerialPort::SerialPort(SerialPort&& other) noexcept

@@ -18,6 +18,8 @@ class SerialPort {
   // 8 data bits, no parity, 1 stop bit, raw, no flow control; locked against other programs. `baud`
   // is one of libserial's fixed rates. Never blocks.
   static Result<SerialPort> open(const std::string& path, std::uint32_t baud);
+  // The same at any rate that the driver can make, to 2 %: more than that bytes of 8N1 do not bear.
+  static Result<SerialPort> open_any_rate(const std::string& path, std::uint32_t baud);
 
   SerialPort(SerialPort&& other) noexcept;
   SerialPort& operator=(SerialPort&& other) noexcept;

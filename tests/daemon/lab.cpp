@@ -105,15 +105,18 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
   if (!config) throw std::runtime_error(config.error().text());
   config_ = std::move(*config);
   for (std::size_t b = 0; b < config_.buses.size(); ++b) {
-    const bool pulses = config_.buses[b].kind == config::BusKind::kSerialPulse;
-    const std::uint32_t baud = pulses ? 115'200 : config_.buses[b].baud;
-    SimulatedBus bus{.bus = std::make_unique<sim::Bus>(baud, sink), .drive = {}, .received = {}};
-    if (pulses) bus.drive = std::make_unique<sim::PulseDrive>(sink);
-    buses_.push_back(std::move(bus));
+    const config::Bus& bus = config_.buses[b];
+    const bool pulses = bus.kind == config::BusKind::kSerialPulse;
+    buses_.push_back(
+        {.bus = std::make_unique<sim::Bus>(pulses ? 115'200 : bus.baud, sink), .received = {}});
+    if (pulses) buses_.back().drive = std::make_unique<sim::PulseDrive>(sink);
+    if (bus.kind == config::BusKind::kCommutator) {
+      buses_.back().board = std::make_unique<sim::BoardLine>(bus.baud, bus.start_hz, sink);
+    }
   }
   for (std::size_t b = 0; b < config_.buses.size(); ++b) {
     for (std::size_t m = 0; m < config_.mcus.size(); ++m) {
-      if (config_.mcus[m].bus.value != b || buses_[b].drive) continue;
+      if (config_.mcus[m].bus.value != b || buses_[b].drive || buses_[b].board) continue;
       // Each boots at another time, so that their ticks have nothing in common by themselves.
       sim::McuOptions options{.address = config_.mcus[m].address.value,
                               .boot_number = static_cast<std::uint16_t>(100 * b + m + 1),
@@ -248,7 +251,10 @@ void Lab::plug(std::size_t bus) {
 void Lab::send(BusId bus, std::span<const std::uint8_t> bytes) {
   std::vector<std::uint8_t> copy(bytes.begin(), bytes.end());
   if (on_send && !on_send(bus.value, copy)) return;
-  if (buses_[bus.value].plugged) buses_[bus.value].bus->master_send(copy, now_ns_);
+  SimulatedBus& line = buses_[bus.value];
+  if (!line.plugged) return;
+  if (line.board) return line.board->send(now_ns_, copy);
+  line.bus->master_send(copy, now_ns_);
 }
 
 void Lab::pulse(BusId id, const link::PulseOrder& order) {
@@ -300,7 +306,8 @@ void Lab::advance() {
   std::int64_t next = std::max(core().next_wake_us() * 1000, now_ns_ + 1000);
   if (read_period_us > 0) next = std::min(next, now_ns_ + read_period_us * 1000);
   for (const SimulatedBus& bus : buses_) {
-    if (read_period_us == 0) next = std::min(next, bus.bus->next_event_ns());
+    if (read_period_us != 0) continue;
+    next = std::min(next, bus.board ? bus.board->next_event_ns() : bus.bus->next_event_ns());
   }
   for (const auto& [due_us, answer] : state_jobs_) next = std::min(next, due_us * 1000);
   now_ns_ = std::max(next, now_ns_);
@@ -309,7 +316,14 @@ void Lab::advance() {
 
 void Lab::run_buses() {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
-    buses_[b].bus->advance_to(now_ns_);
+    if (buses_[b].board) {
+      const auto arrived = buses_[b].board->advance(now_ns_);
+      if (buses_[b].plugged) {
+        buses_[b].received.insert(buses_[b].received.end(), arrived.begin(), arrived.end());
+      }
+    } else {
+      buses_[b].bus->advance_to(now_ns_);
+    }
     if (buses_[b].drive) buses_[b].drive->advance_to(now_ns_);
     if (buses_[b].received.empty()) continue;
     const std::vector<std::uint8_t> bytes = std::exchange(buses_[b].received, {});
@@ -439,7 +453,9 @@ std::int64_t Lab::shaft_steps(const std::string& name) const {
     for (std::size_t m = 0; m < motor.mcu.value; ++m) {
       if (config_.mcus[m].bus == mcu.bus) ++in_bus;
     }
-    return buses_[mcu.bus.value].bus->mcu(in_bus).shaft(motor.output.value).position_steps;
+    const SimulatedBus& bus = buses_[mcu.bus.value];
+    if (bus.board) return bus.board->board.position(motor.output.value);
+    return bus.bus->mcu(in_bus).shaft(motor.output.value).position_steps;
   }
   throw std::out_of_range(name);
 }

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "daemon/core.h"
+#include "sim/board_line.h"
 #include "sim/bus.h"
 #include "sim/pulse_drive.h"
 #include "sim_disk/sim_disk.h"
@@ -158,6 +159,7 @@ class Lab : public daemon::Outputs, private state::Backend {
   sim::PulseDrive& drive(std::size_t index) { return *buses_[index].drive; }
   // What the drivers of such ports can do, from the next time that one is opened.
   link::PulseStatus pulse_driver = {.any_rate = true, .empty = true};
+  sim::CommutatorBoard& board(std::size_t index) { return buses_[index].board->board; }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   const std::vector<std::string>& move_lines() const { return move_lines_; }
   // Which tables a restarted daemon is to have, as asked to keep last.
@@ -165,11 +167,12 @@ class Lab : public daemon::Outputs, private state::Backend {
 
  private:
   struct SimulatedBus {
-    std::unique_ptr<sim::Bus> bus;
-    std::unique_ptr<sim::PulseDrive> drive;  // in its place, of a bus of that kind
-    bool ordered = false;                    // and its status is to be told
+    std::unique_ptr<sim::Bus> bus;  // without MCUs where one of these is in their place
+    std::unique_ptr<sim::PulseDrive> drive = {};
+    bool ordered = false;  // the drive's status is to be told
     std::vector<std::uint8_t> received;
     bool plugged = true;
+    std::unique_ptr<sim::BoardLine> board = {};
   };
   class Client;
   void send(BusId bus, std::span<const std::uint8_t> bytes) override;

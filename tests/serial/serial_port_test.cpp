@@ -16,6 +16,8 @@
 #include <numeric>
 #include <string>
 
+#include "serial/any_rate.h"
+
 namespace bushd::serial {
 namespace {
 
@@ -249,6 +251,15 @@ TEST_F(Pty, UnknownRateIsRefused) {
   const auto port = SerialPort::open(path_, 123'456);
   ASSERT_FALSE(port);
   EXPECT_THAT(port.error().text(), HasSubstr("123456 baud"));
+}
+
+// Keypads of the source documents talk at 625 baud, which POSIX does not have.
+TEST_F(Pty, OpensAtAnyRate) {
+  for (const std::uint32_t baud : {625u, 9600u, 123'456u}) {
+    const auto port = SerialPort::open_any_rate(path_, baud);
+    ASSERT_TRUE(port) << port.error().text();
+    EXPECT_EQ(rate_of(master_), baud);
+  }
 }
 
 }  // namespace

@@ -15,6 +15,8 @@
 #include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
+#include "board_simulator.h"
+#include "keypad.h"
 #include "pulse_simulator.h"
 #include "simulator.h"
 
@@ -37,6 +39,26 @@ std::uint16_t fresh_boot_number() {
   return static_cast<std::uint16_t>(1 + (seconds * 31 + process) % UINT16_MAX);
 }
 
+// Makes it, says that it is there, and lets it run until a signal ends it.
+template <class Kind, class Options>
+int simulate(const Options& options) {
+  bushd::Result<void> ended;
+  std::string summary;
+  {
+    const auto simulator = Kind::create(options);
+    if (!simulator) return refuse(simulator.error());
+    fmt::print("bushsim: ready {}\n", options.links.front());
+    std::fflush(stdout);
+    ended = (*simulator)->run();
+    summary = (*simulator)->summary();
+  }
+  // Only now, with trace and link put in order: whoever started this may have closed its end of
+  // stdout.
+  fmt::print("{}", summary);
+  if (!ended) return refuse(ended.error());
+  return kDone;
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"bushsim: virtual MCUs on a virtual RS-485 bus, reached through a pty"};
   app.set_version_flag("--version", BUSHD_VERSION);
@@ -50,8 +72,7 @@ int run(int argc, char** argv) {
   options.boot_number = fresh_boot_number();
   std::string config;
   std::string bus;
-  app.add_option("--config", config, "Configuration of bushd: baud rate and MCUs of the bus")
-      ->required();
+  app.add_option("--config", config, "Configuration of bushd: baud rate and MCUs of the bus");
   app.add_option("--link", options.links,
                  "Symlink to make, the bus's serial port. Given several times: its names in turn, "
                  "each time that it is plugged in")
@@ -78,6 +99,10 @@ int run(int argc, char** argv) {
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
+  bool keypad = false;
+  app.add_flag("--keypad", keypad,
+               "A keypad instead of a bus: what is typed are its keys (f, r, s, x), and what it "
+               "would show is printed");
   if (const auto words = bushd::completion_asked(argc, argv)) {
     bushd::print_completion(bushd::complete(app, *words));
     return kDone;
@@ -88,6 +113,14 @@ int run(int argc, char** argv) {
     return bushd::answered(app, error) ? kDone : kUsage;
   }
 
+  if (keypad) {
+    const auto ended = bushsim::run_keypad(options.links.front());
+    return ended ? kDone : refuse(ended.error());
+  }
+  if (config.empty()) {
+    fmt::print(stderr, "--config is required, but with --keypad\nRun with --help for more.\n");
+    return kUsage;
+  }
   const auto setup = bushsim::load_setup(config, bus);
   if (!setup) return refuse(setup.error());
   options.setup = *setup;
@@ -97,29 +130,16 @@ int run(int argc, char** argv) {
   const auto wired = bushsim::parse_switches(switches, *setup, *images);
   if (!wired) return refuse(wired.error());
   options.switches = *wired;
-  options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
-  bushd::Result<void> ended;
-  std::string summary;
-  const auto simulate = [&](const auto& simulator) {
-    fmt::print("bushsim: ready {}\n", options.links.front());
-    std::fflush(stdout);
-    ended = simulator->run();
-    summary = simulator->summary();
-  };
-  if (options.setup.pulses) {
-    const auto simulator = bushsim::PulseSimulator::create(options);
-    if (!simulator) return refuse(simulator.error());
-    simulate(*simulator);
-  } else {
-    const auto simulator = bushsim::Simulator::create(options);
-    if (!simulator) return refuse(simulator.error());
-    simulate(*simulator);
+  if (setup->board_start_hz != 0) {
+    if (!mcus.empty() || !doubled.empty()) {
+      return refuse({"a commutator board has no MCUs: leave out --mcu and --doubled"});
+    }
+    return simulate<bushsim::BoardSimulator>(bushsim::BoardSimulator::Options{
+        options.setup, options.switches, options.links, options.trace});
   }
-  // Only now, with trace and link put in order: whoever started this may have closed its end of
-  // stdout.
-  fmt::print("{}", summary);
-  if (!ended) return refuse(ended.error());
-  return kDone;
+  options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
+  if (setup->pulses) return simulate<bushsim::PulseSimulator>(options);
+  return simulate<bushsim::Simulator>(options);
 }
 
 }  // namespace

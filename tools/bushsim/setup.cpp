@@ -25,8 +25,12 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
   for (std::size_t i = 0; i < config->buses.size(); ++i) {
     const auto& candidate = config->buses[i];
     if (!bus.empty() && candidate.name != bus) continue;
-    Setup setup{.bus = candidate.name, .baud = candidate.baud, .addresses = {}, .measuring = {}};
-    setup.pulses = candidate.kind == bushd::config::BusKind::kSerialPulse;
+    Setup setup{.bus = candidate.name,
+                .baud = candidate.baud,
+                .pulses = candidate.kind == bushd::config::BusKind::kSerialPulse,
+                .addresses = {},
+                .measuring = {},
+                .board_start_hz = candidate.start_hz};
     for (const auto& mcu : config->mcus) {
       if (mcu.bus.value != i) continue;
       setup.addresses.push_back(mcu.address.value);

@@ -18,6 +18,7 @@ struct Setup {
   bool pulses = false;                  // a bus of kind "serial-pulse"
   std::vector<std::uint8_t> addresses;  // at least one
   std::set<std::uint8_t> measuring;     // of these, the MCUs that measure their supply current
+  std::uint32_t board_start_hz = 0;     // F_start of a commutator board; 0: it is none
 };
 
 // `bus` may be empty if the configuration has one bus only.

@@ -69,6 +69,14 @@ struct New {
 };
 int make_new(const Places& places, const New& wanted);
 
+// Asks on standard output for what PLC wizards ask, draws the profile, writes the table. Answers
+// come from standard input, a line each: typed, or ready in a file.
+struct Wizard {
+  std::string table;
+  bool replace = false;
+};
+int wizard(const Places& places, const Wizard& wanted);
+
 // A change of a table that is there: a new revision, comments kept.
 using Change =
     std::function<bushd::Result<bushd::tables::TableContent>(bushd::tables::TableContent content)>;
@@ -119,6 +127,9 @@ int import_bushd(const Places& places, const BushdImport& wanted);
 int list(const Places& places, bool json);
 // In the terminal: as wide as that is, coloured if it is one.
 int plot(const Places& places, const std::vector<std::string>& tables);
+// Precondition: as many names as tables.
+void draw_in_terminal(const std::vector<bushd::tables::TablePtr>& tables,
+                      const std::vector<std::string>& names);
 struct Plot {
   std::vector<std::string> tables;
   std::string svg;  // files; empty: none

@@ -233,4 +233,14 @@ void add_new_options(CLI::App& app, const Places& places, const Run& run) {
   });
 }
 
+void add_wizard_options(CLI::App& app, const Places& places, const Run& run) {
+  const auto options = std::make_shared<Wizard>();
+  CLI::App* command = app.add_subcommand(
+      "wizard", "Ask for a profile as PLC wizards do, draw it, and make a table of it");
+  command->add_option("TABLE", options->table, "The new table's name, or a file NAME.toml")
+      ->required();
+  command->add_flag("--replace", options->replace, "Make a new revision if the table exists");
+  run(command, [&places, options] { return wizard(places, *options); });
+}
+
 }  // namespace bushtab

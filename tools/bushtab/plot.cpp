@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdlib>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/printable.h"
@@ -56,13 +57,23 @@ std::string row_text(const Canvas& canvas, int width, int row, bool coloured) {
 }  // namespace
 
 int plot(const Places& places, const std::vector<std::string>& names) {
+  std::vector<bushd::tables::TablePtr> all;
+  for (const std::string& name : names) {
+    auto table = open_table(places, name);
+    if (!table) return refuse(table.error());
+    all.push_back(std::move(*table));
+  }
+  draw_in_terminal(all, names);
+  return kDone;
+}
+
+void draw_in_terminal(const std::vector<bushd::tables::TablePtr>& all,
+                      const std::vector<std::string>& names) {
   std::vector<std::vector<CurveStep>> curves;
   double end_s = 0;
   double top_hz = 0;
-  for (const std::string& name : names) {
-    const auto table = open_table(places, name);
-    if (!table) return refuse(table.error());
-    curves.push_back(curve_of(**table));
+  for (const bushd::tables::TablePtr& table : all) {
+    curves.push_back(curve_of(*table));
     for (const CurveStep& step : curves.back()) top_hz = std::max(top_hz, step.speed_hz());
     end_s = std::max(end_s, static_cast<double>(curves.back().back().time_ns) * 1e-9);
   }
@@ -98,7 +109,6 @@ int plot(const Places& places, const std::vector<std::string>& names) {
       fmt::print("{}\n", bushd::printable(names[i]));
     }
   }
-  return kDone;
 }
 
 }  // namespace bushtab

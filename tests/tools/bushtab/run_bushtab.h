@@ -24,12 +24,14 @@ inline std::string read_file(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-inline Outcome bushtab(const std::string& arguments, const std::string& environment = "") {
+inline Outcome bushtab(const std::string& arguments, const std::string& environment = "",
+                       const std::string& input = "/dev/null") {
   const TempDirectory directory;
   const std::string out = directory.path() / "out";
   const std::string err = directory.path() / "err";
   const int status = std::system(
-      (environment + " " BUSHTAB " " + arguments + " </dev/null >" + out + " 2>" + err).c_str());
+      (environment + " " BUSHTAB " " + arguments + " <" + input + " >" + out + " 2>" + err)
+          .c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
 }
 

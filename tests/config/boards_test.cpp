@@ -1,0 +1,89 @@
+// [[bus]] of kind "commutator", and [[keypad]].
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "config/config_file.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kBoard =
+    "[[bus]]\nname = \"board\"\nkind = \"commutator\"\nport = \"/dev/a\"\nbaud = 9600\n"
+    "start_hz = 100\n"
+    "[[group]]\nname = \"axes\"\ntable = \"own\"\n"
+    "[[motor]]\nname = \"m0\"\nmcu = \"board\"\noutput = 7\ngroup = \"axes\"\n";
+const std::string kKeypad = kBoard + "[[keypad]]\nport = \"/dev/b\"\nmotor = \"m0\"\n";
+
+std::string changed(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::runtime_error(from);
+  return text.replace(at, from.size(), to);
+}
+
+std::string error_of(const std::string& text) {
+  const auto config = ConfigFile(text).load();
+  return config ? "none" : config.error().text();
+}
+
+TEST(ConfigBoards, BoardStandsForAnMcuOfItsName) {
+  const auto config = ConfigFile(kBoard).load();
+  ASSERT_TRUE(config) << config.error().text();
+  EXPECT_EQ(config->buses[0].kind, config::BusKind::kCommutator);
+  EXPECT_EQ(config->buses[0].start_hz, 100u);
+  EXPECT_EQ(config->buses[0].answer_ms, 100u);
+  ASSERT_EQ(config->mcus.size(), 1u);
+  EXPECT_EQ(config->mcus[0].id, "board");
+  EXPECT_TRUE(ConfigFile(kBoard + "limit_action = \"immediate\"\n").load());
+}
+
+TEST(ConfigBoards, WhatABoardDoesNotHaveIsRefused) {
+  EXPECT_THAT(error_of(changed(kBoard, "start_hz = 100\n", "")), HasSubstr("start_hz"));
+  EXPECT_THAT(error_of(changed(kBoard, "= 100\n", "= 101\n")), HasSubstr("1..100 Hz"));
+  EXPECT_THAT(error_of(changed(kBoard, "baud", "tick_us = 2560\nbaud")),
+              HasSubstr("unknown key; allowed here: name, kind, port, baud, start_hz, answer_ms"));
+  EXPECT_THAT(error_of(changed(kBoard, "output = 7", "output = 8")),
+              HasSubstr("is 8; allowed: 0..7 on commutator board \"board\""));
+  EXPECT_THAT(error_of(kBoard + "limit = \"both\"\n"), HasSubstr("limit switches of its own"));
+  EXPECT_THAT(error_of(kBoard + "home = { direction = \"negative\", most_steps = 5 }\n"),
+              HasSubstr("motor[0].home"));
+  EXPECT_THAT(error_of("[[mcu]]\nbus = \"board\"\naddress = 1\n" + kBoard),
+              HasSubstr("Remove this section; its motors have mcu = \"board\""));
+  // The table's fastest code is 10 of 40 us.
+  EXPECT_EQ(error_of(changed(kBoard, "= 100\n", "= 10\n")), "none");
+  EXPECT_THAT(error_of(changed(kBoard, "= 100\n", "= 9\n")),
+              HasSubstr("has steps 400000 ns apart; allowed: 444444 ns and more"));
+  EXPECT_THAT(error_of(changed(kBoard, "\"commutator\"", "\"can\"")),
+              HasSubstr("allowed: \"rs485\" or \"commutator\""));
+}
+
+TEST(ConfigKeypads, KeysHaveDefaults) {
+  const auto config = ConfigFile(kKeypad).load();
+  ASSERT_TRUE(config) << config.error().text();
+  ASSERT_EQ(config->keypads.size(), 1u);
+  const config::Keypad& keypad = config->keypads[0];
+  EXPECT_EQ(keypad.baud, 625u);
+  EXPECT_FALSE(keypad.latched);
+  EXPECT_EQ(keypad.delay_us, 3'000u);
+  EXPECT_EQ(keypad.keepalive_ms, 500u);
+  EXPECT_TRUE(ConfigFile(kKeypad + "mode = \"latch\"\n").load()->keypads[0].latched);
+}
+
+TEST(ConfigKeypads, WhatCannotBeIsRefused) {
+  EXPECT_THAT(error_of(changed(kKeypad, "motor = \"m0\"", "motor = \"m1\"")),
+              HasSubstr("keypad[0].motor: is \"m1\"; allowed: the name of a motor"));
+  EXPECT_THAT(error_of(changed(kKeypad, "/dev/b", "/dev/a")), HasSubstr("is already taken"));
+  EXPECT_THAT(error_of(kKeypad + "mode = \"toggle\"\n"),
+              HasSubstr("allowed: \"hold\" or \"latch\""));
+  EXPECT_THAT(error_of(kKeypad + "baud = 1\n"), HasSubstr("50..4000000"));
+  EXPECT_THAT(error_of(kKeypad + "keepalive_ms = 49\n"), HasSubstr("50..10000"));
+  EXPECT_THAT(error_of(kKeypad + "slowest_us = 2000\n"),
+              HasSubstr("slowest_us = 2000 is below delay_us = 3000"));
+  EXPECT_THAT(error_of(kKeypad + "speed = 3\n"), HasSubstr("unknown key"));
+}
+
+}  // namespace
+}  // namespace bushd::test

@@ -1,0 +1,122 @@
+"""The commands of docs/heritage.md, section by section, and what comes of them."""
+
+import json
+import os
+import pathlib
+import re
+import subprocess
+
+from rig import TOP, EndToEndTest, Running, program
+
+PAGE = TOP / "docs/heritage.md"
+
+
+def sections():
+    """By heading: its files by name, and its commands."""
+    found = {}
+    for section in PAGE.read_text().split("\n## ")[1:]:
+        heading, body = section.split("\n", 1)
+        files = {}
+        for before, text in re.findall(r"([^\n]*)\n\n```toml\n(.*?)```\n", body, re.DOTALL):
+            files[re.search(r"`([^`]+)`:$", before)[1]] = text
+        consoles = re.findall(r"```console\n(.*?)```\n", body, re.DOTALL)
+        found[heading] = files, [line for text in consoles for line in re.findall(r"^\$ (.*)$", text, re.MULTILINE)]
+    return found
+
+
+class Heritage(EndToEndTest):
+    def shell(self, command, log):
+        self.environment = dict(os.environ, LC_ALL="C.UTF-8")
+        folders = [str(pathlib.Path(program(name)).parent) for name in ("BUSHD", "BUSHSIM", "BUSHCTL", "BUSHTAB")]
+        path = ":".join([*folders, self.environment["PATH"]])
+        return ["env", f"PATH={path}", "bash", "-c", f"cd {self.folder}; exec 2>&1; {command}"], self.file(log)
+
+    def write_files(self, files):
+        """As on the page, but for a socket that no other daemon has."""
+        for name, text in files.items():
+            self.file(name).write_text(f'{text}\n[control]\npath = "{self.file("control")}"\n')
+
+    def run_section(self, heading):
+        """All its commands; those with & behind them live on."""
+        files, commands = sections()[heading]
+        self.write_files(files)
+        for number, command in enumerate(commands):
+            if command.endswith(" &"):
+                # exec: a signal reaches the program, not its shell.
+                self.before = self.bushctl("status", "--json").returncode == 0 and self.positions()
+                running = Running(*self.shell(f"exec {command[:-2]}", f"{number}.log"))
+                self.programs.append(running)
+                self.wait_for_start(command, running)
+                continue
+            line, log = self.shell(command, f"{number}.log")
+            done = subprocess.run(line, capture_output=True, text=True, timeout=120, stdin=subprocess.DEVNULL)
+            log.write_text(done.stdout)
+            self.assertEqual(done.returncode, 0, f"{command}\n{done.stdout}")
+
+    def wait_for_start(self, command, running):
+        name = command.split()[0]
+        if name == "bushsim":
+            self.wait_until("bushsim", lambda: "bushsim: ready" in running.said())
+        elif name == "bushd":
+            self.wait_until("the MCU to be READY", lambda: self.mcu_states() == ["READY"])
+        else:
+            self.wait_until(command, lambda: self.positions() != self.before or not running.lives())
+
+    def position(self, motor):
+        return self.motors()[motor]["position_steps"]
+
+    def test_plc_profiles(self):
+        self.run_section("PLC profiles")
+        self.wait_until("feed to rest", lambda: self.motors()["feed"]["activity"] == "rest")
+        # The jog began at 3000, and was stopped at once: 500 steps and what it had made by then.
+        self.assertGreaterEqual(self.position("feed"), 3500)
+        self.assertLess(self.position("feed"), 30000)
+        jog = self.programs[-1]
+        self.assertRegex(jog.said(), "500 steps after the stop event")
+
+    def test_commutator_boards(self):
+        self.run_section("Commutator boards")
+        self.wait_until("m5 to come", lambda: self.position("m5") == 300)
+        self.assertEqual(self.position("m0"), 400)
+        self.assertEqual(self.programs[1].end(), 0)
+        self.assertEqual(self.programs[0].end(), 0)
+        self.assertIn("step0 400 (at +400), step5 300 (at +300)", self.programs[0].said())
+        steps = self.file("board.vcd").read_text()
+        self.assertIn("$scope module mcu1 $end", steps)
+
+    def test_keypads(self):
+        files, commands = sections()["Keypads"]
+        self.write_files(files)
+        for number, command in enumerate(commands[:2]):
+            self.programs.append(Running(*self.shell(f"exec {command[:-2]}", f"{number}.log")))
+            self.wait_for_start(command, self.programs[-1])
+        line, log = self.shell(f"exec {commands[2]}", "keypad.log")
+        with log.open("wb") as shown:
+            keypad = subprocess.Popen(line, stdin=subprocess.PIPE, stdout=shown, stderr=shown)
+        self.addCleanup(keypad.kill)
+
+        def press(key):
+            keypad.stdin.write(key.encode())
+            keypad.stdin.flush()
+
+        self.wait_until("the keypad's port", lambda: "0300" in log.read_text())
+        press("s")
+        self.wait_until("the display", lambda: "0330" in log.read_text())
+        press("f")
+        self.wait_until("theta to move", lambda: self.position("theta") > 300)
+        press("r")
+        self.wait_until("theta to come back", lambda: self.position("theta") < 0)
+        press("x")
+        self.wait_until("theta to rest", lambda: self.motors()["theta"]["activity"] == "rest")
+        self.assertEqual(self.motors()["theta"]["trust"], "uncertain")  # neither set nor homed
+        press("f")
+        self.wait_until("theta to move", lambda: self.motors()["theta"]["moving"])
+        # Its port is gone.
+        keypad.stdin.close()
+        self.assertEqual(keypad.wait(60), 0)
+        self.wait_until("theta to rest", lambda: self.motors()["theta"]["activity"] == "rest")
+        self.assertTrue(self.programs[1].lives())
+
+
+if __name__ == "__main__":
+    print(json.dumps(sections(), indent=1))

@@ -1,0 +1,151 @@
+#include "board_simulator.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <ctime>
+#include <iterator>
+
+namespace bushsim {
+namespace {
+
+using bushd::fail;
+using bushd::Result;
+using bushd::sim::CommutatorBoard;
+using bushd::sim::TimeNs;
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr TimeNs kIdleSleepNs = 20'000'000;  // edges are written meanwhile
+constexpr std::size_t kReadBytes = 4096;
+
+std::int64_t monotonic_ns() {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kNsPerSecond + now.tv_nsec;
+}
+
+}  // namespace
+
+BoardSimulator::BoardSimulator(const Options& options, Pty pty,
+                               std::unique_ptr<bushd::sim::VcdWriter> trace)
+    : links_(options.links),
+      pty_(std::move(pty)),
+      trace_(std::move(trace)),
+      line_(options.setup.baud, options.setup.board_start_hz, trace_.get()),
+      start_ns_(monotonic_ns()) {
+  line_.board.keeps_steps = false;
+  for (const SwitchAt& one : options.switches) {
+    CommutatorBoard::Motor& motor = line_.board.motor(one.output);
+    (one.options.positive_end ? motor.right_limit_at : motor.left_limit_at) = one.options.at_steps;
+  }
+}
+
+Result<std::unique_ptr<BoardSimulator>> BoardSimulator::create(const Options& options) {
+  for (const SwitchAt& one : options.switches) {
+    if (one.output < CommutatorBoard::kMotors && one.options.input == one.output) continue;
+    return fail(fmt::format("--switch: a board has motors 0..{}, each with switches of its own",
+                            CommutatorBoard::kMotors - 1));
+  }
+  auto pty = Pty::open(options.links.front());
+  if (!pty) return fail(pty.error());
+  std::unique_ptr<bushd::sim::VcdWriter> trace;
+  if (!options.trace.empty()) {
+    auto created = bushd::sim::VcdWriter::create(options.trace, options.setup.addresses);
+    if (!created) return fail(created.error());
+    trace = std::move(*created);
+  }
+  std::unique_ptr<BoardSimulator> simulator(
+      new BoardSimulator(options, std::move(*pty), std::move(trace)));
+  sigset_t mask;
+  sigemptyset(&mask);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2}) sigaddset(&mask, signal);
+  if (::sigprocmask(SIG_BLOCK, &mask, nullptr) != 0) {
+    return fail(system_error("signals cannot be blocked"));
+  }
+  simulator->signals_ = Descriptor(::signalfd(-1, &mask, SFD_NONBLOCK | SFD_CLOEXEC));
+  if (!simulator->signals_.valid()) return fail(system_error("signals cannot be read"));
+  return simulator;
+}
+
+TimeNs BoardSimulator::now_ns() const {
+  return monotonic_ns() - start_ns_;
+}
+
+Result<void> BoardSimulator::run() {
+  Result<void> done;
+  while (done && !ended_) {
+    done = wait();
+    if (done) done = take_signals();
+    if (done) done = take_bytes();
+    if (done) done = hand_out_answers();
+    if (!trace_) continue;
+    // A pulse ends after its step has been told.
+    trace_->settled(line_.advanced_to_ns());
+    if (trace_->error()) done = fail(*trace_->error());
+  }
+  if (!trace_) return done;
+  const auto closed = trace_->close(std::max(now_ns(), line_.board.last_edge_ns()));
+  return done ? closed : done;
+}
+
+Result<void> BoardSimulator::wait() const {
+  std::array<pollfd, 2> watched{{{signals_.get(), POLLIN, 0}, {pty_ ? pty_->fd() : -1, POLLIN, 0}}};
+  const TimeNs sleep_ns = std::clamp<TimeNs>(line_.next_event_ns() - now_ns(), 0, kIdleSleepNs);
+  const timespec timeout{.tv_sec = 0, .tv_nsec = sleep_ns};
+  if (::ppoll(watched.data(), watched.size(), &timeout, nullptr) >= 0 || errno == EINTR) return {};
+  return fail(system_error("waiting failed"));
+}
+
+Result<void> BoardSimulator::take_signals() {
+  signalfd_siginfo info{};
+  while (::read(signals_.get(), &info, sizeof info) == sizeof info) {
+    if (info.ssi_signo == SIGUSR1) {
+      pty_.reset();
+    } else if (info.ssi_signo == SIGUSR2 && !pty_) {
+      auto opened = Pty::open(links_[links_used_++ % links_.size()]);
+      if (!opened) return fail(opened.error());
+      pty_.emplace(std::move(*opened));
+    } else if (info.ssi_signo != SIGUSR2) {
+      ended_ = true;
+    }
+  }
+  return {};
+}
+
+Result<void> BoardSimulator::take_bytes() {
+  if (!pty_) return {};
+  std::array<std::uint8_t, kReadBytes> space;
+  const auto size = pty_->read(space);
+  if (!size) return fail(size.error());
+  line_.send(now_ns(), {space.data(), *size});
+  if (*size == 0) pty_->lift_exclusive_use();
+  return {};
+}
+
+Result<void> BoardSimulator::hand_out_answers() {
+  const auto answers = line_.advance(now_ns());
+  if (!pty_ || answers.empty()) return {};
+  const auto taken = pty_->write(answers);
+  if (!taken) return fail(taken.error());
+  return {};
+}
+
+std::string BoardSimulator::summary() const {
+  std::string motors;
+  const CommutatorBoard& board = line_.board;
+  for (unsigned i = 0; i < CommutatorBoard::kMotors; ++i) {
+    const std::uint64_t made = board.travel(i);
+    if (made == 0) continue;
+    fmt::format_to(std::back_inserter(motors), "{}step{} {} (at {:+})",
+                   motors.empty() ? ": " : ", ", i, made, board.position(i));
+  }
+  return fmt::format("bushsim: board: steps made{}\n", motors.empty() ? ": none" : motors);
+}
+
+}  // namespace bushsim

@@ -1,0 +1,53 @@
+// A commutator board behind a pty, paced to the clock on the wall.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "descriptor.h"
+#include "pty.h"
+#include "setup.h"
+#include "sim/board_line.h"
+#include "sim/vcd.h"
+
+namespace bushsim {
+
+class BoardSimulator {
+ public:
+  struct Options {
+    Setup setup;                     // of a board
+    std::vector<SwitchAt> switches;  // of its motors' numbers
+    std::vector<std::string> links;  // as of Simulator
+    std::string trace;
+  };
+  // Makes all that can fail. Blocks SIGINT, SIGTERM, SIGHUP, SIGUSR1 and SIGUSR2: run() takes them.
+  static bushd::Result<std::unique_ptr<BoardSimulator>> create(const Options& options);
+
+  // Until a signal ends it. SIGUSR1 takes the serial adapter away, SIGUSR2 plugs it in again.
+  bushd::Result<void> run();
+  // What was done, for people.
+  std::string summary() const;
+
+ private:
+  BoardSimulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace);
+  bushd::sim::TimeNs now_ns() const;
+  bushd::Result<void> wait() const;
+  bushd::Result<void> take_signals();
+  bushd::Result<void> take_bytes();
+  bushd::Result<void> hand_out_answers();
+
+  const std::vector<std::string> links_;
+  std::size_t links_used_ = 1;
+  std::optional<Pty> pty_;  // none: unplugged
+  std::unique_ptr<bushd::sim::VcdWriter> trace_;
+  bushd::sim::BoardLine line_;
+  Descriptor signals_;
+  const std::int64_t start_ns_;  // CLOCK_MONOTONIC at simulated time 0
+  bool ended_ = false;
+};
+
+}  // namespace bushsim
