@@ -1,4 +1,4 @@
-// An MCU on the virtual bus that is an ATmega2560: its image runs in simavr, instruction by
+// An MCU on the virtual bus that is an ATmega2560 or ATmega1284P: its image runs in simavr, instruction by
 // instruction, and its pins and bytes are taken with the time of the CPU cycle.
 //
 // What simavr does otherwise than the chip, and what is made up for here:
@@ -15,6 +15,7 @@
 #include <string>
 
 #include "sim/mcu.h"
+#include "sim_avr/avr_chip.h"
 #include "sim_avr/memory_watch.h"
 
 struct avr_t;
@@ -32,6 +33,7 @@ struct AvrOptions {
   // Path of who may write where (memory_watch.h): then the image stops at the first wrong access.
   // "": unwatched, and faster.
   std::string memory_owners = {};
+  std::string chip = "atmega2560";  // avr_chip.h
 };
 
 class AvrMcu final : public Mcu {
@@ -91,13 +93,17 @@ class AvrMcu final : public Mcu {
   };
 
   void watch_port(char port, Signal signal, std::uint8_t first_index);
-  void watch_pin(char port, int pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param);
+  void watch_signal(AvrPin pin, Signal signal);
+  void watch_pin(AvrPin pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param);
+  void set_pin(Pin& pin, bool level);
   void feed();
   void drop_outputs();
-  void drive(char port, int pin, bool level);
+  void drive(AvrPin pin, bool level);
   std::array<std::uint8_t, 18> eeprom() const;
   TimeNs time_ns() const;
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
+  static void on_spi(avr_t* avr, std::uint16_t address, std::uint8_t value, void* param);
+  static void on_dir_latch(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_driver_enable(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_byte(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_adc(avr_irq_t* irq, std::uint32_t value, void* param);
@@ -105,6 +111,7 @@ class AvrMcu final : public Mcu {
   static void on_reset(avr_io_t* io);
   static std::uint8_t read_shorted(avr_t* avr, std::uint16_t address, void* param);
 
+  const AvrChip& chip_;
   std::size_t index_;
   Driver& driver_;
   EdgeSink* sink_;
@@ -133,6 +140,13 @@ class AvrMcu final : public Mcu {
   std::uint64_t bytes_cut_ = 0;
   std::array<Pin, 35> pins_{};
   std::size_t pin_count_ = 0;
+  struct Driven {  // of a port, by what is outside
+    std::uint8_t mask = 0;
+    std::uint8_t levels = 0;
+  };
+  std::array<Driven, 12> driven_{};
+  std::size_t first_dir_ = 0;  // of pins_, behind the shift register
+  std::uint8_t shifted_ = 0;
 };
 
 }  // namespace bushd::sim

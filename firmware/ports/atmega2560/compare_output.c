@@ -3,7 +3,7 @@
 #include <avr/io.h>
 #include <util/atomic.h>
 
-#include "firmware/ports/atmega2560/board.h"
+#include <board.h>
 #include "firmware/ports/atmega2560/clock.h"
 
 #define COUNT_CYCLES 64u
