@@ -5,6 +5,7 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
+#include "firmware/core/currents.h"
 #include "firmware/core/drivers.h"
 #include "firmware/core/emission.h"
 #include "firmware/core/homing.h"
@@ -102,6 +103,7 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
                  BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
                  BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
+  if (mcu->port.set_current != NULL) all |= BUSHD_CAN_CURRENTS;
   identity.capabilities = (uint16_t)(all & ~mcu->config.disabled_capabilities);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
   return bushd_encode_identity(&identity, payload);
@@ -270,6 +272,9 @@ static bool is_disabled(const bushd_mcu* mcu, uint8_t type) {
       return (mcu->config.disabled_capabilities & BUSHD_CAN_MOTOR_INPUTS) != 0;
     case BUSHD_MSG_LINE_RUN:
       return (mcu->config.disabled_capabilities & BUSHD_CAN_LINE_RUN) != 0;
+    case BUSHD_MSG_CURRENTS:
+      return mcu->port.set_current == NULL ||
+             (mcu->config.disabled_capabilities & BUSHD_CAN_CURRENTS) != 0;
     default:
       return false;
   }
@@ -321,6 +326,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(trigger, bushd_mcu_arm);
     case BUSHD_MSG_POSITION_COMPARE:
       HANDLE(position_compare, bushd_mcu_take_position_compare);
+    case BUSHD_MSG_CURRENTS:
+      HANDLE(currents, bushd_mcu_set_currents);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:

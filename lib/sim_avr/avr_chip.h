@@ -31,7 +31,8 @@ struct AvrChip {
   AvrPin emergency;
   AvrPin forward;
   AvrPin reverse;
-  // Data register of the SPI, in the address space of data, and who latches DIR; 0: DIR is at ports.
+  // Data register of the SPI, in the address space of data, and who latches DIR; 0: DIR is at
+  // ports.
   std::uint16_t spi_data;
   AvrPin dir_latch;
 };

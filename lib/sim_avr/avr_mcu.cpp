@@ -157,6 +157,7 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
     watch_ = std::make_unique<AvrMemoryWatch>(avr_, chip_, options.image, options.memory_owners);
   }
   set_inputs({});
+  if (options.power_stage) begin_stage(*options.power_stage);
 }
 
 AvrMcu::~AvrMcu() {
@@ -240,6 +241,9 @@ void AvrMcu::on_pin(avr_irq_t*, std::uint32_t value, void* param) {
 void AvrMcu::set_pin(Pin& pin, bool level) {
   if (level == pin.level) return;
   pin.level = level;
+  if (stage_ && pin.signal == Signal::kStep && pin.index < PowerStage::kWindings) {
+    stage_output(pin.index, level);
+  }
   if (sink_ != nullptr) sink_->edge({time_ns(), index_, pin.signal, pin.index, level});
 }
 
@@ -285,6 +289,7 @@ void AvrMcu::on_reset(avr_io_t* io) {
   AvrMcu& self = *reinterpret_cast<ResetHook*>(io)->mcu;
   if (self.watch_) self.watch_->reset();
   self.drop_outputs();
+  if (self.stage_) avr_cycle_timer_register(self.avr_, 1, on_stage_time, &self);
 }
 
 void AvrMcu::drop_outputs() {
@@ -292,10 +297,7 @@ void AvrMcu::drop_outputs() {
   received_.clear();
   for (std::size_t i = 0; i < pin_count_; ++i) {
     Pin& pin = pins_[i];
-    if (pin.level && sink_ != nullptr) {
-      sink_->edge({time_ns(), index_, pin.signal, pin.index, false});
-    }
-    pin.level = false;
+    set_pin(pin, false);
   }
 }
 

@@ -251,7 +251,8 @@ INSTANTIATE_TEST_SUITE_P(Of, ConformanceOfEmission,
                                   std::get<Mode>(test.param).name;
                          });
 
-// Four motors, or all that have phases, to and fro, in streams, where every output changes at the same slots.
+// Four motors, or all that have phases, to and fro, in streams, where every output changes at the
+// same slots.
 TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
   const Mode& mode = std::get<Mode>(GetParam());
   const bool phases = mode.settings.mode == BUSHD_EMISSION_PHASES;

@@ -47,8 +47,9 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   inputs.limit_negative = 1 << 4;
   ASSERT_EQ(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs), BUSHD_OK);
   const auto limit = static_cast<std::uint8_t>(13 % real_->twin().motors);
-  ASSERT_EQ(ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs, bushd_motor_inputs{4, 4, limit, 4}),
-            BUSHD_OK);
+  ASSERT_EQ(
+      ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs, bushd_motor_inputs{4, 4, limit, 4}),
+      BUSHD_OK);
   const bushd_tables before = master_.tables(kAddress);
   pass(real_->keeps_within_ns(ramp.size()));
   reboot();

@@ -7,8 +7,8 @@
 
 #define CYCLES_PER_US 16u
 
-// A whole port in the low I/O space, so that the pulses of a slot begin together and each bit may be
-// cleared by itself. With phases: motor 0 has bits 0..3, motor 1 bits 4..7.
+// A whole port in the low I/O space, so that the pulses of a slot begin together and each bit may
+// be cleared by itself. With phases: motor 0 has bits 0..3, motor 1 bits 4..7.
 #define STEP_PORT PORTC
 // DIR of motors 0..7 goes through a 74HC595 at the SPI: only drivers with STEP and DIR need it.
 #define DIR_LATCH_PORT PORTB
@@ -32,7 +32,10 @@
 #define DECAY_BIT 7
 // Outputs of the comparators of both pairs of windings of motor 0, low while the current is above
 // the reference. The reference is the mean of the PWM at PD7.
-#define COMPARATOR_BITS (1 << 2 | 1 << 3)
+#define COMPARATORS PIND
+#define COMPARATOR_0_BIT 2
+#define COMPARATOR_1_BIT 3
+#define COMPARATOR_BITS (1 << COMPARATOR_0_BIT | 1 << COMPARATOR_1_BIT)
 #define REFERENCE_BIT 7
 // Output of the position compare pulse.
 #define COMPARE_PORT PORTD
@@ -43,12 +46,17 @@
 #define DE_PORT PORTD
 #define DE_BIT 4
 
-// What main.c makes of it. What the bigger chip cannot with sixteen motors, this one cannot with eight
-// beside its chopper; there is no common DIR.
+// What main.c makes of it. What the bigger chip cannot with sixteen motors, this one cannot with
+// eight beside its chopper; there is no common DIR.
 #define BOARD_MOTORS 8u
 #define BOARD_DISABLED (BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_COMMON_DIR)
-#define BOARD_QUEUE_TICKS 256u
+// To clear the queue takes its time: with 256 ticks of it a ramp-down would come a tick late.
+#define BOARD_QUEUE_TICKS 64u
 #define BOARD_TABLE_CODES 1536u
+// Motor 0 has the chopper.
+#define BOARD_CURRENT_MOTORS 1u
+#define BOARD_CURRENTS chopper_currents
+#define BOARD_SET_CURRENT chopper_set
 // Shorter, slots would not hold their interrupts: a slot then has 250 cycles.
 #define BOARD_MIN_TICK_NS 2000000u
 
@@ -73,19 +81,7 @@
 #define LINE_COUNT_CYCLES 8u
 #define LINE_OTHER_INTERRUPTS (1 << OCIE3B)
 
-#ifdef __ASSEMBLER__
-
-; What the line sends next, in r30 and r31.
-    .macro load_sending
-    lds r30, line_sending
-    lds r31, line_sending+1
-    .endm
-    .macro store_sending
-    sts line_sending, r30
-    sts line_sending+1, r31
-    .endm
-
-#else
+#ifndef __ASSEMBLER__
 
 #include <stdint.h>
 #include <util/atomic.h>

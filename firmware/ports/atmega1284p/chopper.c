@@ -1,11 +1,12 @@
 #include "firmware/ports/atmega1284p/chopper.h"
 
 #include <avr/io.h>
-
 #include <board.h>
 
 #define COUNT_CYCLES 8u
 #define COMPARATOR_INTERRUPTS (1 << INT0 | 1 << INT1)
+
+bushd_mcu_currents chopper_currents[1];
 
 void chopper_init(void) {
   EICRA = BOARD_EDGES;
@@ -18,8 +19,18 @@ void chopper_init(void) {
   TCCR0B = 1 << CS01;
 }
 
-void chopper_set(uint8_t reference, bool fast_decay) {
-  if (OCR2A != reference) OCR2A = reference;
+static uint8_t reference_of(uint16_t ma) {
+  if (ma == 0) return 0;
+  const uint16_t reference =
+      (uint16_t)((UINT8_MAX * (uint32_t)ma + BUSHD_MAX_CURRENT_MA / 2u) / BUSHD_MAX_CURRENT_MA);
+  return (uint8_t)(reference == 0 ? 1u : reference);
+}
+
+void chopper_set(void* context, uint8_t motor, uint16_t ma, bool fast_decay) {
+  (void)context;
+  (void)motor;
+  const uint8_t reference = reference_of(ma);
+  OCR2A = reference;
   if (fast_decay) {
     DECAY_PORT |= 1 << DECAY_BIT;
   } else {

@@ -1,11 +1,11 @@
-// By compare B of timer 3, which is the clock: it goes round every 32 ms, less than the longest tick
-// that is lengthened.
+// By compare B of timer 3, which is the clock: it goes round every 32 ms, less than the longest
+// tick that is lengthened.
 #include "firmware/ports/atmega2560/compare_output.h"
 
 #include <avr/interrupt.h>
+#include <board.h>
 #include <stdbool.h>
 
-#include <board.h>
 #include "firmware/ports/atmega2560/clock.h"
 
 volatile uint16_t line_sending;  // of the line; it has no register to spare

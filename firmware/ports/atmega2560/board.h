@@ -36,12 +36,16 @@
 #define DE_PORT PORTE
 #define DE_BIT 4
 
-// What main.c makes of it. A frame of TABLE_TICKS stands for more ticks than it could make in one; a
-// line of more than a few motors would take it longer than a tick.
+// What main.c makes of it. A frame of TABLE_TICKS stands for more ticks than it could make in one;
+// a line of more than a few motors would take it longer than a tick.
 #define BOARD_MOTORS 16u
 #define BOARD_DISABLED (BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN)
 #define BOARD_QUEUE_TICKS 64u
 #define BOARD_TABLE_CODES 952u  // four tables of 238 codes
+// No current of windings is controlled.
+#define BOARD_CURRENT_MOTORS 0u
+#define BOARD_CURRENTS NULL
+#define BOARD_SET_CURRENT NULL
 // Shorter, slots would not hold their interrupts.
 #define BOARD_MIN_TICK_NS 900000u
 
@@ -70,19 +74,7 @@
 #define LINE_COUNT_CYCLES 1u
 #define LINE_OTHER_INTERRUPTS 0u
 
-#ifdef __ASSEMBLER__
-
-; What the line sends next, in r30 and r31.
-    .macro load_sending
-    in r30, _SFR_IO_ADDR(LINE_SENDING_LOW)
-    in r31, _SFR_IO_ADDR(LINE_SENDING_HIGH)
-    .endm
-    .macro store_sending
-    out _SFR_IO_ADDR(LINE_SENDING_LOW), r30
-    out _SFR_IO_ADDR(LINE_SENDING_HIGH), r31
-    .endm
-
-#else
+#ifndef __ASSEMBLER__
 
 #include <stdint.h>
 

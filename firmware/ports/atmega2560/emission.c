@@ -1,10 +1,10 @@
 #include "firmware/ports/atmega2560/emission.h"
 
 #include <avr/interrupt.h>
+#include <board.h>
 #include <stddef.h>
 #include <util/atomic.h>
 
-#include <board.h>
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/emission_slots.h"
 

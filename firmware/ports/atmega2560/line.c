@@ -1,8 +1,8 @@
 #include "firmware/ports/atmega2560/line.h"
 
 #include <avr/interrupt.h>
-
 #include <board.h>
+
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/line_interrupts.h"
 

@@ -6,6 +6,7 @@
 #include <avr/io.h>
 
 #include <board.h>
+#include <board.inc>
 #include "firmware/ports/atmega2560/emission_slots.h"
 #include "firmware/ports/atmega2560/line_interrupts.h"
 

@@ -2,8 +2,8 @@
 // collect bytes with the times of delimiters, and send; the core runs in the main loop only.
 #include <avr/interrupt.h>
 #include <avr/wdt.h>
-
 #include <board.h>
+
 #include "firmware/ports/atmega2560/boot_tests.h"
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/compare_output.h"
@@ -126,12 +126,15 @@ __attribute__((noinline)) static void boot(void) {
   port.self_test = port_self_test;
   port.keep_enable = port_keep_enable;
   port.set_trigger = port_set_trigger;
+  port.set_current = BOARD_SET_CURRENT;
   bushd_mcu_config config = {.motors = BOARD_MOTORS,
                              .slots = EMISSION_SLOTS,
                              .min_tick_ns = BOARD_MIN_TICK_NS,
                              .disabled_capabilities = BOARD_DISABLED,
                              .pulse_ns = EMISSION_PULSE_NS,
                              .in_pieces = true,
+                             .currents = BOARD_CURRENTS,
+                             .current_motors = BOARD_CURRENT_MOTORS,
                              .queue = queue,
                              .queue_ticks = BOARD_QUEUE_TICKS,
                              .codes = codes,

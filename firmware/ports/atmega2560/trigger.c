@@ -1,8 +1,8 @@
 #include "firmware/ports/atmega2560/trigger.h"
 
 #include <avr/io.h>
-
 #include <board.h>
+
 #include "firmware/ports/atmega2560/clock.h"
 
 volatile uint16_t trigger_count;  // of the clock's timer; edge_interrupts.S
