@@ -71,6 +71,11 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
   for (const config::Motor* motor : motors) {
     add_inputs(setup, *motor);
     if (motor->local) setup.local_motors |= bit_of(motor->output);
+    if (setup.emission.settings.mode == BUSHD_EMISSION_PHASES) {
+      const config::Currents its = motor->currents.value_or(config::Currents{});
+      setup.currents.push_back(
+          {motor->output.value, its.fast_decay, its.ramp_ma, its.cruise_ma, its.hold_ma});
+    }
     add_table(setup, motor->output, *tables[motor->group]);
   }
   return setup;

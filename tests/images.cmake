@@ -24,10 +24,15 @@ endfunction()
 
 if(TARGET bushd_sim_avr AND AVR_GCC)
   bushd_images(avr_image AVR avr atmega2560)
+  bushd_images(atmega1284p_image ATMEGA1284P atmega1284p atmega1284p)
   set(AVR_DEFINITIONS AVR_IMAGES="${AVR_IMAGES}"
-    AVR_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega2560/memory_owners")
+    AVR_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega2560/memory_owners"
+    ATMEGA1284P_IMAGES="${ATMEGA1284P_IMAGES}"
+    ATMEGA1284P_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega1284p/memory_owners")
   bushd_check(avr_stack_is_bounded LABEL slow NEEDS avr_image COMMAND ${Python3_EXECUTABLE}
-    ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py avr-objdump ${AVR_IMAGES}-500000.elf)
+    ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega2560 avr-objdump ${AVR_IMAGES}-500000.elf)
+  bushd_check(atmega1284p_stack_is_bounded LABEL slow NEEDS atmega1284p_image COMMAND ${Python3_EXECUTABLE}
+    ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega1284p avr-objdump ${ATMEGA1284P_IMAGES}-500000.elf)
 else()
   message(STATUS "The image for ATmega2560 is not tested: it needs gcc-avr and libsimavr-dev (tools/setup)")
 endif()

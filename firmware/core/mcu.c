@@ -4,6 +4,7 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
+#include "firmware/core/currents.h"
 #include "firmware/core/emission.h"
 #include "firmware/core/homing.h"
 #include "firmware/core/inputs.h"
@@ -125,6 +126,7 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
   if ((mcu->autonomous | mcu->local.motors) != 0) move_by_itself(mcu);
   bushd_mcu_watch_comm_timeout(mcu);
   bushd_mcu_emit(mcu, &mcu->slot_buffer[mcu->front ^ 1u]);
+  bushd_mcu_choose_currents(mcu);
   if (mcu->autonomous != 0) mcu->autonomous &= bushd_mcu_moving(mcu);
   if (mcu->trigger.armed != 0 && mcu->faults != 0) bushd_mcu_disarm(mcu, BUSHD_TRIGGER_FAULT);
   bushd_mcu_update_state(mcu);

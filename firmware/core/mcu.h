@@ -26,6 +26,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#include "firmware/core/currents.h"
 #include "firmware/core/emission.h"
 #include "firmware/core/homing.h"
 #include "firmware/core/limits.h"
@@ -71,7 +72,10 @@ typedef struct bushd_mcu_config {
   int32_t pulse_ns;  // how long STEP pulses last; 0: half a slot; less: so much shorter than that
   uint16_t disabled_capabilities;  // BUSHD_CAN_* that it is too slow for: not in the identity, and
                                    // refused
-  uint16_t* codes;                 // table memory
+  // Of motors 0 .. current_motors-1, whose windings' currents the port controls; all zero.
+  bushd_mcu_currents* currents;
+  uint8_t current_motors;  // at most BUSHD_MAX_CURRENT_MOTORS
+  uint16_t* codes;         // table memory
   uint16_t code_count;
   // BUSHD_MCU_MAX_REPLY bytes for answers. May be the end of the receiver's buffer, if the port
   // keeps the receiver out of it from the making of an answer until it is sent.
@@ -150,7 +154,8 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
   (sizeof(uint32_t) + sizeof(bushd_format) + sizeof(bushd_set_inputs) +                            \
    BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) + sizeof(bushd_emission) + sizeof(uint16_t) + \
    BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) + sizeof(uint16_t) +              \
-   (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t))
+   (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t) +                       \
+   BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents))
 void bushd_mcu_nvm_restored(bushd_mcu* mcu);
 
 // For a port that goes through all pieces a little at a time, again and again.

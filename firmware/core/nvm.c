@@ -47,8 +47,13 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
     case CODES:
       return piece_of(mcu->config.codes, mcu->tables.codes_used * sizeof mcu->config.codes[0]);
     default: {
-      const uint8_t motor = (uint8_t)(index - MOTORS);
-      if (motor >= mcu->config.motors) return piece_of(NULL, 0);
+      uint8_t motor = (uint8_t)(index - MOTORS);
+      if (motor >= mcu->config.motors) {
+        motor = (uint8_t)(motor - mcu->config.motors);
+        if (motor >= mcu->config.current_motors) return piece_of(NULL, 0);
+        bushd_currents* const its = &mcu->config.currents[motor].settings;
+        return piece_of(its, sizeof *its);
+      }
       return piece_of(&mcu->motor[motor].table, sizeof mcu->motor[motor].table);
     }
   }

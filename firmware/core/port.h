@@ -63,6 +63,10 @@ typedef struct bushd_port {
   // bushd_mcu_trigger; BUSHD_EDGE_NONE: none is. Edges of before do not count. NULL: there is no
   // such input.
   void (*set_trigger)(void* context, bushd_edge edge);
+
+  // Peak current of the windings of this motor, driven by phases, from the next tick on; 0: it is
+  // not controlled. NULL: no current is.
+  void (*set_current)(void* context, uint8_t motor, uint16_t ma, bool fast_decay);
 } bushd_port;
 
 #ifdef __cplusplus

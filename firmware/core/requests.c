@@ -5,6 +5,7 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
+#include "firmware/core/currents.h"
 #include "firmware/core/drivers.h"
 #include "firmware/core/emission.h"
 #include "firmware/core/homing.h"
@@ -88,6 +89,16 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   return bushd_encode_report(&report, payload);
 }
 
+static uint16_t capabilities_of(const bushd_mcu* mcu) {
+  uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
+                 BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
+                 BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
+                 BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL;
+  if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
+  if (mcu->port.set_current != NULL) all |= BUSHD_CAN_CURRENTS;
+  return (uint16_t)(all & ~mcu->config.disabled_capabilities);
+}
+
 static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   bushd_identity identity;
   identity.protocol_version = BUSHD_PROTOCOL_VERSION;
@@ -97,12 +108,7 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   identity.slots = mcu->config.slots;
   identity.queue_ticks = mcu->config.queue_ticks;
   identity.table_codes = mcu->config.code_count;
-  uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
-                 BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
-                 BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
-                 BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL;
-  if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
-  identity.capabilities = (uint16_t)(all & ~mcu->config.disabled_capabilities);
+  identity.capabilities = capabilities_of(mcu);
   memcpy(identity.unique_id, mcu->config.unique_id, sizeof identity.unique_id);
   return bushd_encode_identity(&identity, payload);
 }
@@ -271,6 +277,8 @@ static uint16_t capability_of(uint8_t type) {
       return BUSHD_CAN_MOTOR_INPUTS;
     case BUSHD_MSG_LINE_RUN:
       return BUSHD_CAN_LINE_RUN;
+    case BUSHD_MSG_CURRENTS:
+      return BUSHD_CAN_CURRENTS;
     default:
       return 0;
   }
@@ -322,6 +330,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(trigger, bushd_mcu_arm);
     case BUSHD_MSG_POSITION_COMPARE:
       HANDLE(position_compare, bushd_mcu_take_position_compare);
+    case BUSHD_MSG_CURRENTS:
+      HANDLE(currents, bushd_mcu_set_currents);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:
@@ -342,7 +352,8 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   a.size = 0;
   // The frame may lie in the same buffer (bushd_mcu_config.reply): it is read by then.
   a.payload = mcu->config.reply + 2 + BUSHD_FRAME_HEADER;
-  const bool denied = (capability_of(frame->type) & mcu->config.disabled_capabilities) != 0;
+  const uint16_t needed = capability_of(frame->type);
+  const bool denied = (needed & ~capabilities_of(mcu)) != 0;
   const bushd_status status =
       denied ? BUSHD_E_UNKNOWN_MESSAGE : handle(mcu, frame, time_in_tick_ns, &a);
   // Ticks look to it themselves; these two change nothing that it tells.

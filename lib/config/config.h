@@ -126,6 +126,14 @@ struct Home {
   std::optional<double> then = {};   // user position to move to once the switch was found
 };
 
+// Peak currents of the windings of a motor that its MCU drives by phases.
+struct Currents {
+  std::uint16_t ramp_ma = 0;
+  std::uint16_t cruise_ma = 0;
+  std::uint16_t hold_ma = 0;
+  bool fast_decay = false;
+};
+
 struct Motor {
   std::string name;
   McuId mcu;
@@ -143,7 +151,8 @@ struct Motor {
   double backlash = 0;                        // user units; its sign is that of the last approach
   std::optional<double> backlash_speed = {};  // of that, user units/s, above 0
   std::int64_t settle_ms = 0;                 // from the last step to the result
-  bool never_disable = false;                 // its MCU's drivers stay enabled at rest
+  std::optional<Currents> currents = {};
+  bool never_disable = false;  // its MCU's drivers stay enabled at rest
 };
 
 // A box with keys on a serial line of its own, which jogs a motor.

@@ -12,6 +12,7 @@
 #include "config/checks.h"
 #include "config/coordinates.h"
 #include "config/crates.h"
+#include "config/currents.h"
 #include "config/emission_section.h"
 #include "config/home.h"
 #include "config/inputs.h"
@@ -405,7 +406,7 @@ Result<void> read_motors(Loading* loading) {
                                   "precision",    "soft_limits",
                                   "max_speed",    "never_disable",
                                   "backlash",     "backlash_speed",
-                                  "settle_ms"});
+                                  "settle_ms",    "currents"});
         !known) {
       return known;
     }
@@ -450,6 +451,9 @@ Result<void> read_motors(Loading* loading) {
       return read;
     }
     if (auto read = read_restored(reader, &motor); !read) return read;
+    auto currents = read_currents(reader, config.mcus[mcu->value]);
+    if (!currents) return fail(currents.error());
+    motor.currents = *currents;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
     if (auto checked = check_then(reader, motor); !checked) return checked;
     config.motors.push_back(std::move(motor));

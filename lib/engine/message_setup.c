@@ -319,6 +319,31 @@ bushd_status bushd_decode_motor_inputs(const uint8_t* payload, size_t size,
               message->negative < BUSHD_MOTORS_PER_MCU && message->home < BUSHD_MOTORS_PER_MCU);
 }
 
+size_t bushd_encode_currents(const bushd_currents* message, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, message->motor);
+  put8(&w, message->decay);
+  put16(&w, message->ramp_ma);
+  put16(&w, message->cruise_ma);
+  put16(&w, message->hold_ma);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_currents(const uint8_t* payload, size_t size, bushd_currents* message) {
+  reader r = read_from(payload, size);
+  message->motor = get8(&r);
+  message->decay = get8(&r);
+  message->ramp_ma = get16(&r);
+  message->cruise_ma = get16(&r);
+  message->hold_ma = get16(&r);
+  const bool none = (message->ramp_ma | message->cruise_ma | message->hold_ma) == 0;
+  const bool all = message->ramp_ma != 0 && message->cruise_ma != 0 && message->hold_ma != 0;
+  return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU && message->decay <= BUSHD_DECAY_FAST &&
+                        (none || all) && message->ramp_ma <= BUSHD_MAX_CURRENT_MA &&
+                        message->cruise_ma <= BUSHD_MAX_CURRENT_MA &&
+                        message->hold_ma <= BUSHD_MAX_CURRENT_MA);
+}
+
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload) {
   payload[0] = message->status;
   return 1;

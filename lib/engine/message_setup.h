@@ -41,8 +41,9 @@ enum {
   BUSHD_CAN_PHASES = 1 << 11,
   BUSHD_CAN_MOTOR_INPUTS = 1 << 12,
   BUSHD_CAN_LINE_RUN = 1 << 13,
-  BUSHD_CAN_TRAVEL = 1 << 14  // where it has a trigger input also at its edges
+  BUSHD_CAN_TRAVEL = 1 << 14,  // where it has a trigger input also at its edges
 };
+#define BUSHD_CAN_CURRENTS 0x8000u  // beyond an int of 16 bits
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
 // which one it is.
@@ -185,6 +186,18 @@ typedef struct bushd_motor_inputs {
   uint8_t home;
 } bushd_motor_inputs;
 
+// Peak currents of a motor's windings, controlled by the MCU. All three are 0, or none is: then,
+// and after boot, no current is controlled.
+typedef enum bushd_decay { BUSHD_DECAY_SLOW = 0, BUSHD_DECAY_FAST = 1 } bushd_decay;
+#define BUSHD_MAX_CURRENT_MA 5110u
+typedef struct bushd_currents {
+  uint8_t motor;
+  uint8_t decay;  // bushd_decay: how a current falls while its winding is switched off
+  uint16_t ramp_ma;
+  uint16_t cruise_ma;  // at constant speed
+  uint16_t hold_ma;    // at rest, if windings stay on there (bushd_emission.hold_current)
+} bushd_currents;
+
 typedef struct bushd_acknowledgement {
   uint8_t status;  // bushd_status
 } bushd_acknowledgement;
@@ -207,6 +220,7 @@ size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* pay
 size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* payload);
 size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload);
 size_t bushd_encode_motor_inputs(const bushd_motor_inputs* message, uint8_t* payload);
+size_t bushd_encode_currents(const bushd_currents* message, uint8_t* payload);
 size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload);
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload);
 
@@ -230,6 +244,7 @@ bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
                                      bushd_set_inputs* message);
 bushd_status bushd_decode_motor_inputs(const uint8_t* payload, size_t size,
                                        bushd_motor_inputs* message);
+bushd_status bushd_decode_currents(const uint8_t* payload, size_t size, bushd_currents* message);
 bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message);
 bushd_status bushd_decode_acknowledgement(const uint8_t* payload, size_t size,
                                           bushd_acknowledgement* message);

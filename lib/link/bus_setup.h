@@ -29,6 +29,8 @@ struct McuSetup {
   bushd_set_inputs inputs{};
   // Of motors whose switches are not all at the input with the number of their output.
   std::vector<bushd_motor_inputs> motor_inputs{};
+  // Of all motors that are driven by phases: those without current control have zeros.
+  std::vector<bushd_currents> currents{};
   std::uint16_t used_inputs = 0;
   bool off_after_watchdog = false;  // then drivers stay off until control() enables them
   std::uint16_t local_motors = 0;   // that its FORWARD and REVERSE inputs move

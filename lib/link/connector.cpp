@@ -190,6 +190,10 @@ void Connector::write_setup(McuIndex mcu) {
   queue.emission(record.setup.emission.settings);
   queue.inputs(record.setup.inputs);
   for (const bushd_motor_inputs& one : record.setup.motor_inputs) queue.motor_inputs(one);
+  // An MCU may have kept others.
+  if ((record.view.identity.capabilities & BUSHD_CAN_CURRENTS) != 0) {
+    for (const bushd_currents& one : record.setup.currents) queue.currents(one);
+  }
   queue.ask_for_tables();
   links_[mcu].setup_written = true;
 }

@@ -32,6 +32,16 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
   return {};
 }
 
+Result<void> check_currents(const McuSetup& setup, const bushd_identity& identity) {
+  if ((identity.capabilities & BUSHD_CAN_CURRENTS) != 0) return {};
+  for (const bushd_currents& one : setup.currents) {
+    if (one.ramp_ma == 0) continue;
+    return fail("controls no currents of windings, but motor " + std::to_string(one.motor) +
+                " has `currents`: leave them out, or connect it to an MCU with a chopper");
+  }
+  return {};
+}
+
 // An MCU has as many inputs as motors.
 Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity) {
   for (unsigned n = identity.motors; n < BUSHD_MOTORS_PER_MCU; ++n) {
@@ -80,6 +90,7 @@ Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_i
     }
   }
   if (auto inputs = check_inputs(setup, identity); !inputs) return inputs;
+  if (auto currents = check_currents(setup, identity); !currents) return currents;
   if (auto room = check_room(setup, identity, bus.tick_ns); !room) return room;
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * bus.tick_ns / 1000;
@@ -103,7 +114,7 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
     const char* if_too_much;  // remedy
   };
   constexpr const char* kTables = "use shorter or slower tables, or fewer on this MCU";
-  static constexpr std::array<Request, 8> kRequests = {{
+  static constexpr std::array<Request, 9> kRequests = {{
       {BUSHD_MSG_CONFIGURE, "CONFIGURE", "use a longer tick_us on its bus"},
       {BUSHD_MSG_TABLE_BEGIN, "TABLE_BEGIN", kTables},
       {BUSHD_MSG_TABLE_DATA, "TABLE_DATA", kTables},
@@ -112,6 +123,7 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
       {BUSHD_MSG_INPUTS, "INPUTS", nullptr},
       {BUSHD_MSG_MOTOR_INPUTS, "MOTOR_INPUTS", nullptr},
       {BUSHD_MSG_LOCAL, "LOCAL", nullptr},
+      {BUSHD_MSG_CURRENTS, "CURRENTS", nullptr},
   }};
   const auto* const request =
       std::find_if(kRequests.begin(), kRequests.end(),

@@ -35,6 +35,10 @@ void SetupQueue::motor_inputs(const bushd_motor_inputs& message) {
       [&](std::uint8_t* p) { return bushd_encode_motor_inputs(&message, p); });
 }
 
+void SetupQueue::currents(const bushd_currents& message) {
+  add(BUSHD_MSG_CURRENTS, [&](std::uint8_t* p) { return bushd_encode_currents(&message, p); });
+}
+
 void SetupQueue::local(const bushd_local& message) {
   add(BUSHD_MSG_LOCAL, [&](std::uint8_t* p) { return bushd_encode_local(&message, p); });
 }

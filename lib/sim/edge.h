@@ -22,6 +22,14 @@ struct Edge {
   bool level;
 };
 
+// What can be measured at an MCU: the current of a winding, in A.
+struct Sample {
+  TimeNs time_ns;
+  std::size_t mcu;
+  std::uint8_t winding;
+  double current_a;
+};
+
 // All pins are low when the simulation begins.
 class EdgeSink {
  public:
@@ -32,6 +40,9 @@ class EdgeSink {
 
   // In order of time for each MCU, but not from one MCU to another.
   virtual void edge(const Edge& edge) = 0;
+
+  // In order of time for each MCU, as edges are; 0 when the simulation begins.
+  virtual void sample(const Sample& /*sample*/) {}
 
   // Every edge of every MCU before `until_ns` has been given; later ones lie at or after it.
   virtual void settled(TimeNs until_ns) = 0;

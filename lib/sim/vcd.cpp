@@ -10,6 +10,7 @@ namespace bushd::sim {
 namespace {
 
 constexpr std::size_t kWiresPerMcu = 2 * kOutputsPerMcu + 3;
+constexpr std::size_t kWindings = 4;
 constexpr std::size_t kTextBytes = std::size_t{1} << 18;
 
 std::size_t wire_of(const Edge& edge) {
@@ -57,13 +58,14 @@ Error write_error(const std::string& path, const char* what, int error_number) {
 }  // namespace
 
 Result<std::unique_ptr<VcdWriter>> VcdWriter::create(const std::string& path,
-                                                     std::span<const std::uint8_t> addresses) {
+                                                     std::span<const std::uint8_t> addresses,
+                                                     const std::set<std::uint8_t>& measured) {
   File file(std::fopen(path.c_str(), "we"));
   if (!file) return fail(write_error(path, "the trace cannot be created", errno));
   // Text is gathered here already; a second buffer would only delay the news of a full disk.
   std::setvbuf(file.get(), nullptr, _IONBF, 0);
   std::unique_ptr<VcdWriter> writer(new VcdWriter(path, std::move(file), addresses.size()));
-  writer->write_head(addresses);
+  writer->write_head(addresses, measured);
   writer->flush_text();
   if (writer->error_) return fail(*writer->error_);
   return writer;
@@ -74,10 +76,13 @@ VcdWriter::VcdWriter(std::string path, File file, std::size_t mcus)
   for (std::size_t wire = 0; wire < mcus * kWiresPerMcu; ++wire) {
     identifiers_.push_back(identifier(wire));
   }
+  currents_.resize(mcus * kWindings);
   text_.reserve(kTextBytes + 64);
 }
 
-void VcdWriter::write_head(std::span<const std::uint8_t> addresses) {
+void VcdWriter::write_head(std::span<const std::uint8_t> addresses,
+                           const std::set<std::uint8_t>& measured) {
+  std::size_t next = identifiers_.size();
   text_ += "$version bushd virtual bus $end\n$timescale 1 ns $end\n";
   for (std::size_t mcu = 0; mcu < addresses.size(); ++mcu) {
     text_ += "$scope module mcu" + std::to_string(addresses[mcu]) + " $end\n";
@@ -85,12 +90,19 @@ void VcdWriter::write_head(std::span<const std::uint8_t> addresses) {
       text_ += "$var wire 1 " + identifiers_[mcu * kWiresPerMcu + wire] + " " + wire_name(wire) +
                " $end\n";
     }
+    for (std::size_t w = 0; w < kWindings && measured.contains(addresses[mcu]); ++w) {
+      std::string& code = currents_[mcu * kWindings + w] = identifier(next++);
+      text_ += "$var real 64 " + code + " current" + std::to_string(w) + "_a $end\n";
+    }
     text_ += "$upscope $end\n";
   }
   text_ += "$enddefinitions $end\n";
   write_time(0);
   text_ += "$dumpvars\n";
   for (std::size_t wire = 0; wire < identifiers_.size(); ++wire) write_value(wire, false);
+  for (const std::string& code : currents_) {
+    if (!code.empty()) text_ += "r0 " + code + "\n";
+  }
   text_ += "$end\n";
 }
 
@@ -111,17 +123,40 @@ void VcdWriter::write_value(std::size_t wire, bool level) {
   text_ += '\n';
 }
 
+void VcdWriter::sample(const Sample& sample) {
+  if (currents_[sample.mcu * kWindings + sample.winding].empty()) return;
+  pending_.push_back({{sample.time_ns, sample.mcu, {}, sample.winding, false}, sample.current_a});
+}
+
+// To 0.1 mA.
+void VcdWriter::write_current(const Change& change) {
+  char digits[32];
+  const auto end = std::to_chars(std::begin(digits), std::end(digits), *change.current_a,
+                                 std::chars_format::fixed, 4)
+                       .ptr;
+  text_ += 'r';
+  text_.append(digits, end);
+  text_ += ' ';
+  text_ += currents_[change.edge.mcu * kWindings + change.edge.index];
+  text_ += '\n';
+}
+
 void VcdWriter::write_pending(TimeNs until_ns) {
-  const auto rest = std::stable_partition(pending_.begin(), pending_.end(),
-                                          [&](const Edge& e) { return e.time_ns < until_ns; });
+  const auto rest = std::stable_partition(
+      pending_.begin(), pending_.end(), [&](const Change& c) { return c.edge.time_ns < until_ns; });
   // The order given is the order of each MCU; a stable sort by time and MCU keeps it.
-  std::stable_sort(pending_.begin(), rest, [](const Edge& a, const Edge& b) {
-    return a.time_ns != b.time_ns ? a.time_ns < b.time_ns : a.mcu < b.mcu;
+  std::stable_sort(pending_.begin(), rest, [](const Change& a, const Change& b) {
+    return a.edge.time_ns != b.edge.time_ns ? a.edge.time_ns < b.edge.time_ns
+                                            : a.edge.mcu < b.edge.mcu;
   });
-  for (auto edge = pending_.begin(); edge != rest; ++edge) {
-    write_time(edge->time_ns);
-    write_value(wire_of(*edge), edge->level);
-    ++edges_written_;
+  for (auto change = pending_.begin(); change != rest; ++change) {
+    write_time(change->edge.time_ns);
+    if (change->current_a) {
+      write_current(*change);
+    } else {
+      write_value(wire_of(change->edge), change->edge.level);
+      ++edges_written_;
+    }
     if (text_.size() >= kTextBytes) flush_text();
   }
   pending_.erase(pending_.begin(), rest);

@@ -2,7 +2,8 @@
 // tools/check-trace.
 //
 //     $timescale 1 ns $end
-//     scopes `mcu<address>`, in each the wires `step0`..`step15`, `dir0`..`dir15`, `en`
+//     scopes `mcu<address>`, in each the wires `step0`..`step15`, `dir0`..`dir15`, `en`; where
+//     windings are measured the real variables `current0_a`..`current3_a` too
 //
 // Time stamps rise strictly: edges of all MCUs are merged. Those of one ns stand in the order of
 // the MCUs on the bus, those of one MCU in the order in which they were made.
@@ -12,6 +13,7 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,14 +27,17 @@ class VcdWriter final : public EdgeSink {
  public:
   // Creates (or empties) the file and writes its head. `addresses` in the order of the MCUs on the
   // bus.
+  // Those of `measured` have windings.
   static Result<std::unique_ptr<VcdWriter>> create(const std::string& path,
-                                                   std::span<const std::uint8_t> addresses);
+                                                   std::span<const std::uint8_t> addresses,
+                                                   const std::set<std::uint8_t>& measured = {});
 
   // A writer that was not closed leaves a file without its end; call close() to know that all is
   // written.
   ~VcdWriter() override = default;
 
-  void edge(const Edge& edge) override { pending_.push_back(edge); }
+  void edge(const Edge& edge) override { pending_.push_back({edge, {}}); }
+  void sample(const Sample& sample) override;
   void settled(TimeNs until_ns) override;
 
   // The first write that failed, if any; from then on nothing more is written. Known late, because
@@ -52,9 +57,15 @@ class VcdWriter final : public EdgeSink {
   using File = std::unique_ptr<std::FILE, FileCloser>;
 
   VcdWriter(std::string path, File file, std::size_t mcus);
-  void write_head(std::span<const std::uint8_t> addresses);
+  // An edge, or if it has a current that of the winding `edge.index`.
+  struct Change {
+    Edge edge;
+    std::optional<double> current_a;
+  };
+  void write_head(std::span<const std::uint8_t> addresses, const std::set<std::uint8_t>& measured);
   void write_time(TimeNs time_ns);
   void write_value(std::size_t wire, bool level);
+  void write_current(const Change& change);
   void write_pending(TimeNs until_ns);
   void flush_text();
   void fail_with(int error_number);
@@ -62,7 +73,8 @@ class VcdWriter final : public EdgeSink {
   std::string path_;
   File file_;
   std::vector<std::string> identifiers_;  // one per wire, kWiresPerMcu for each MCU
-  std::vector<Edge> pending_;
+  std::vector<std::string> currents_;     // one per winding, kWindings for each MCU; "": none
+  std::vector<Change> pending_;
   std::string text_;
   TimeNs last_time_ns_ = -1;
   std::uint64_t edges_written_ = 0;

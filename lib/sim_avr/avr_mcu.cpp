@@ -26,8 +26,6 @@ namespace bushd::sim {
 namespace {
 
 constexpr std::uint32_t kFrequency = 16'000'000;
-constexpr std::uint8_t kExternalInterrupts = 8;
-constexpr std::size_t kRamBegin = 0x200;
 constexpr std::uint8_t kPaint = 0xC5;  // firmware/ports/atmega2560/boot_tests.h
 // Behind the one that simavr holds: the chip's buffer has two, its shift register one more.
 constexpr std::size_t kHardwareFifo = 2;
@@ -44,7 +42,6 @@ constexpr std::uint8_t kEerie = 1 << 3;
 constexpr std::uint8_t kPowerOn = 1;
 constexpr std::uint8_t kExternalReset = 2;
 constexpr std::uint16_t kJumpToItself = 0xCFFF;
-constexpr std::uint32_t kEepromReady = 30;  // vector
 constexpr std::size_t kAddressAt = 8;
 constexpr std::size_t kBootNumberAt = 16;
 
@@ -65,6 +62,22 @@ avr_uart_t* find_uart(avr_t* avr) {
   throw std::runtime_error("simavr: no UART 0");
 }
 
+// INT2 of the ATmega1284P is at PB2, and its ADC may run freely; simavr has it at PB3, and knows
+// nothing else that would start a conversion.
+void mend_atmega1284p(avr_t* avr) {
+  for (avr_io_t* io = avr->io_port; io != nullptr; io = io->next) {
+    if (std::strcmp(io->kind, "adc") == 0) {
+      reinterpret_cast<avr_adc_t*>(io)->adts_op[0] = avr_adts_free_running;
+    }
+    if (std::strcmp(io->kind, "extint") != 0) continue;
+    auto& int2 = reinterpret_cast<avr_extint_t*>(io)->eint[EXTINT_IRQ_OUT_INT2];
+    avr_irq_t* const interrupt = io->irq + EXTINT_IRQ_OUT_INT2;
+    avr_unconnect_irq(avr_io_getirq(avr, int2.port_ioctl, int2.port_pin), interrupt);
+    int2.port_pin = 2;
+    avr_connect_irq(avr_io_getirq(avr, int2.port_ioctl, int2.port_pin), interrupt);
+  }
+}
+
 }  // namespace
 
 struct AvrMcu::ResetHook {
@@ -73,15 +86,16 @@ struct AvrMcu::ResetHook {
 };
 
 AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
-    : index_(index), driver_(driver), sink_(sink) {
+    : chip_(avr_chip(options.chip)), index_(index), driver_(driver), sink_(sink) {
   avr_global_logger_set(print_errors);
   elf_firmware_t firmware{};
   if (elf_read_firmware(options.image.c_str(), &firmware) != 0) {
     throw std::runtime_error(options.image + ": not an image for an AVR");
   }
-  avr_ = avr_make_mcu_by_name("atmega2560");
-  if (avr_ == nullptr) throw std::runtime_error("simavr: no ATmega2560");
+  avr_ = avr_make_mcu_by_name(chip_.name);
+  if (avr_ == nullptr) throw std::runtime_error("simavr: no " + options.chip);
   avr_init(avr_);
+  if (chip_.external_interrupts == 3) mend_atmega1284p(avr_);
   avr_->frequency = firmware.frequency = kFrequency;
   avr_load_firmware(avr_, &firmware);
   avr_->sleep = no_sleep;
@@ -89,8 +103,10 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   avr_->vcc = avr_->avcc = avr_->aref = kSupplyMv;
   // Pins that are low would be looked at in every cycle, for interrupts that the image does not
   // use.
-  for (std::uint8_t i = 0; i < kExternalInterrupts; ++i) avr_extint_set_strict_lvl_trig(avr_, i, 0);
-  stack_begin_ = kRamBegin + firmware.datasize + firmware.bsssize;
+  for (std::uint8_t i = 0; i < chip_.external_interrupts; ++i) {
+    avr_extint_set_strict_lvl_trig(avr_, i, 0);
+  }
+  stack_begin_ = chip_.ram_begin + firmware.datasize + firmware.bsssize;
   avr_->data[kMcusr] = kPowerOn;
 
   std::array<std::uint8_t, 18> memory{};
@@ -114,17 +130,21 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
                           this);
   avr_irq_register_notify(avr_get_interrupt_irq(avr_, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING,
                           on_interrupt, this);
-  watch_port('A', Signal::kStep, 0);
-  watch_port('C', Signal::kStep, 8);
-  watch_port('L', Signal::kDir, 0);
-  watch_port('B', Signal::kDir, 8);
-  pins_[pin_count_] = {this, Signal::kEnable, 0, false};
-  watch_pin('H', 3, on_pin, &pins_[pin_count_++]);
-  pins_[pin_count_] = {this, Signal::kPositionCompare, 0, false};
-  watch_pin('G', 5, on_pin, &pins_[pin_count_++]);
-  pins_[pin_count_] = {this, Signal::kCommonDir, 0, false};
-  watch_pin('F', 2, on_pin, &pins_[pin_count_++]);
-  watch_pin('E', 4, on_driver_enable, this);
+  for (std::size_t half = 0; half < chip_.step.size(); ++half) {
+    const auto first = static_cast<std::uint8_t>(8 * half);
+    watch_port(chip_.step[half], Signal::kStep, first);
+    watch_port(chip_.dir[half], Signal::kDir, first);
+  }
+  watch_signal(chip_.enable, Signal::kEnable);
+  watch_signal(chip_.compare, Signal::kPositionCompare);
+  watch_signal(chip_.common_dir, Signal::kCommonDir);
+  watch_pin(chip_.driver_enable, on_driver_enable, this);
+  if (chip_.spi_data != 0) {
+    first_dir_ = pin_count_;
+    for (std::uint8_t i = 0; i < 8; ++i) pins_[pin_count_++] = {this, Signal::kDir, i, false};
+    avr_register_io_write(avr_, chip_.spi_data, on_spi, this);
+    watch_pin(chip_.dir_latch, on_dir_latch, this);
+  }
   avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER), on_adc,
                           this);
 
@@ -134,9 +154,10 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   reset_hook_->mcu = this;
   avr_register_io(avr_, &reset_hook_->io);
   if (!options.memory_owners.empty()) {
-    watch_ = std::make_unique<AvrMemoryWatch>(avr_, options.image, options.memory_owners);
+    watch_ = std::make_unique<AvrMemoryWatch>(avr_, chip_, options.image, options.memory_owners);
   }
   set_inputs({});
+  if (options.power_stage) begin_stage(*options.power_stage);
 }
 
 AvrMcu::~AvrMcu() {
@@ -146,35 +167,54 @@ AvrMcu::~AvrMcu() {
 }
 
 void AvrMcu::watch_port(char port, Signal signal, std::uint8_t first_index) {
+  if (port == 0) return;
   for (int pin = 0; pin < 8; ++pin) {
     Pin& watched = pins_[pin_count_++];
     watched = {this, signal, static_cast<std::uint8_t>(first_index + pin), false};
-    watch_pin(port, pin, on_pin, &watched);
+    watch_pin({port, pin}, on_pin, &watched);
   }
 }
 
-void AvrMcu::watch_pin(char port, int pin, void (*notify)(avr_irq_t*, std::uint32_t, void*),
-                       void* param) {
-  avr_irq_t* irq = avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), pin);
+void AvrMcu::watch_signal(AvrPin pin, Signal signal) {
+  if (pin.port == 0) return;
+  pins_[pin_count_] = {this, signal, 0, false};
+  watch_pin(pin, on_pin, &pins_[pin_count_++]);
+}
+
+void AvrMcu::watch_pin(AvrPin pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param) {
+  avr_irq_t* irq =
+      avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(pin.port)), pin.bit);
   if (irq == nullptr) throw std::runtime_error("simavr: a pin is missing");
   avr_irq_register_notify(irq, notify, param);
 }
 
-void AvrMcu::drive(char port, int pin, bool level) {
-  avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), pin),
-                level);
+// Whenever a port is written to, simavr gives its inputs the level of their pull-ups, but where it
+// knows what drives them.
+void AvrMcu::drive(AvrPin pin, bool level) {
+  if (pin.port == 0) return;
+  Driven& port = driven_[static_cast<std::size_t>(pin.port - 'A')];
+  const auto bit = static_cast<std::uint8_t>(1 << pin.bit);
+  port.mask |= bit;
+  port.levels = static_cast<std::uint8_t>(level ? port.levels | bit : port.levels & ~bit);
+  avr_ioport_external_t external{};
+  external.name = static_cast<unsigned>(pin.port) & 0x7Fu;
+  external.mask = port.mask;
+  external.value = port.levels;
+  avr_ioctl(avr_, AVR_IOCTL_IOPORT_SET_EXTERNAL(static_cast<unsigned>(pin.port)), &external);
+  avr_raise_irq(
+      avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(pin.port)), pin.bit),
+      level);
 }
 
 // Switches to ground.
 void AvrMcu::set_inputs(bushd_inputs inputs) {
-  for (int i = 0; i < 8; ++i) {
-    drive('K', i, (inputs.motors >> i & 1) == 0);
-    drive('J', i, (inputs.motors >> (8 + i) & 1) == 0);
+  for (std::size_t i = 0; i < chip_.inputs.size(); ++i) {
+    drive(chip_.inputs[i], (inputs.motors >> i & 1) == 0);
   }
-  drive('D', 0, (inputs.system & BUSHD_INPUT_TRIGGER) == 0);
-  drive('D', 1, (inputs.system & BUSHD_INPUT_EMERGENCY) == 0);
-  drive('D', 2, (inputs.system & BUSHD_INPUT_FORWARD) == 0);
-  drive('D', 3, (inputs.system & BUSHD_INPUT_REVERSE) == 0);
+  drive(chip_.trigger, (inputs.system & BUSHD_INPUT_TRIGGER) == 0);
+  drive(chip_.emergency, (inputs.system & BUSHD_INPUT_EMERGENCY) == 0);
+  drive(chip_.forward, (inputs.system & BUSHD_INPUT_FORWARD) == 0);
+  drive(chip_.reverse, (inputs.system & BUSHD_INPUT_REVERSE) == 0);
 }
 
 void AvrMcu::set_current(std::uint16_t reading) {
@@ -195,12 +235,31 @@ TimeNs AvrMcu::time_ns() const {
 // An edge calls twice, with other bits above the level.
 void AvrMcu::on_pin(avr_irq_t*, std::uint32_t value, void* param) {
   auto& pin = *static_cast<Pin*>(param);
-  const bool level = (value & 1) != 0;
+  pin.mcu->set_pin(pin, (value & 1) != 0);
+}
+
+void AvrMcu::set_pin(Pin& pin, bool level) {
   if (level == pin.level) return;
   pin.level = level;
-  AvrMcu& self = *pin.mcu;
-  if (self.sink_ == nullptr) return;
-  self.sink_->edge({self.time_ns(), self.index_, pin.signal, pin.index, level});
+  if (stage_ && pin.signal == Signal::kStep && pin.index < PowerStage::kWindings) {
+    stage_output(pin.index, level);
+  }
+  if (sink_ != nullptr) sink_->edge({time_ns(), index_, pin.signal, pin.index, level});
+}
+
+// simavr takes 100 us for a byte whatever its rate: it is taken when it is written, and latched
+// later.
+void AvrMcu::on_spi(avr_t* avr, std::uint16_t address, std::uint8_t value, void* param) {
+  avr->data[address] = value;
+  static_cast<AvrMcu*>(param)->shifted_ = value;
+}
+
+void AvrMcu::on_dir_latch(avr_irq_t*, std::uint32_t value, void* param) {
+  auto& self = *static_cast<AvrMcu*>(param);
+  if ((value & 1) == 0) return;
+  for (std::size_t i = 0; i < 8; ++i) {
+    self.set_pin(self.pins_[self.first_dir_ + i], (self.shifted_ >> i & 1) != 0);
+  }
 }
 
 void AvrMcu::on_driver_enable(avr_irq_t*, std::uint32_t value, void* param) {
@@ -230,6 +289,7 @@ void AvrMcu::on_reset(avr_io_t* io) {
   AvrMcu& self = *reinterpret_cast<ResetHook*>(io)->mcu;
   if (self.watch_) self.watch_->reset();
   self.drop_outputs();
+  if (self.stage_) avr_cycle_timer_register(self.avr_, 1, on_stage_time, &self);
 }
 
 void AvrMcu::drop_outputs() {
@@ -237,10 +297,7 @@ void AvrMcu::drop_outputs() {
   received_.clear();
   for (std::size_t i = 0; i < pin_count_; ++i) {
     Pin& pin = pins_[i];
-    if (pin.level && sink_ != nullptr) {
-      sink_->edge({time_ns(), index_, pin.signal, pin.index, false});
-    }
-    pin.level = false;
+    set_pin(pin, false);
   }
 }
 
@@ -248,7 +305,7 @@ void AvrMcu::drop_outputs() {
 void AvrMcu::on_interrupt(avr_irq_t*, std::uint32_t value, void* param) {
   auto& self = *static_cast<AvrMcu*>(param);
   if (value != 0) ++self.interrupts_;
-  if (value == kEepromReady) ++self.eeprom_writes_;
+  if (value == self.chip_.eeprom_ready) ++self.eeprom_writes_;
 }
 
 std::array<std::uint8_t, 18> AvrMcu::eeprom() const {

@@ -1,5 +1,5 @@
-// An MCU on the virtual bus that is an ATmega2560: its image runs in simavr, instruction by
-// instruction, and its pins and bytes are taken with the time of the CPU cycle.
+// An MCU on the virtual bus that is an ATmega2560 or ATmega1284P: its image runs in simavr,
+// instruction by instruction, and its pins and bytes are taken with the time of the CPU cycle.
 //
 // What simavr does otherwise than the chip, and what is made up for here:
 // - bytes take 11 bit times: set to 10
@@ -15,6 +15,8 @@
 #include <string>
 
 #include "sim/mcu.h"
+#include "sim/power_stage.h"
+#include "sim_avr/avr_chip.h"
 #include "sim_avr/memory_watch.h"
 
 struct avr_t;
@@ -32,6 +34,9 @@ struct AvrOptions {
   // Path of who may write where (memory_watch.h): then the image stops at the first wrong access.
   // "": unwatched, and faster.
   std::string memory_owners = {};
+  std::string chip = "atmega2560";  // avr_chip.h
+  // Behind the outputs of motor 0; its currents go to the sink. Only of a chip with comparators.
+  std::optional<PowerStageRules> power_stage = {};
 };
 
 class AvrMcu final : public Mcu {
@@ -58,6 +63,9 @@ class AvrMcu final : public Mcu {
 
   // What the current sensor reads when a conversion begins; not set: what set_current said.
   std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
+
+  // Precondition: it has one.
+  const PowerStage& power_stage() const { return stage_->stage; }
 
   // Faults of the chip.
   void hang();        // jumps into an endless loop, interrupts stay as they are
@@ -91,13 +99,23 @@ class AvrMcu final : public Mcu {
   };
 
   void watch_port(char port, Signal signal, std::uint8_t first_index);
-  void watch_pin(char port, int pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param);
+  void watch_signal(AvrPin pin, Signal signal);
+  void watch_pin(AvrPin pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param);
+  void set_pin(Pin& pin, bool level);
   void feed();
   void drop_outputs();
-  void drive(char port, int pin, bool level);
+  void drive(AvrPin pin, bool level);
   std::array<std::uint8_t, 18> eeprom() const;
   TimeNs time_ns() const;
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
+  void begin_stage(const PowerStageRules& rules);
+  void stage_output(std::uint8_t winding, bool level);
+  void follow_stage();
+  static void on_decay(avr_irq_t* irq, std::uint32_t value, void* param);
+  static void on_reference(avr_irq_t* irq, std::uint32_t value, void* param);
+  static std::uint64_t on_stage_time(avr_t* avr, std::uint64_t when, void* param);
+  static void on_spi(avr_t* avr, std::uint16_t address, std::uint8_t value, void* param);
+  static void on_dir_latch(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_driver_enable(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_byte(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_adc(avr_irq_t* irq, std::uint32_t value, void* param);
@@ -105,6 +123,7 @@ class AvrMcu final : public Mcu {
   static void on_reset(avr_io_t* io);
   static std::uint8_t read_shorted(avr_t* avr, std::uint16_t address, void* param);
 
+  const AvrChip& chip_;
   std::size_t index_;
   Driver& driver_;
   EdgeSink* sink_;
@@ -133,6 +152,21 @@ class AvrMcu final : public Mcu {
   std::uint64_t bytes_cut_ = 0;
   std::array<Pin, 35> pins_{};
   std::size_t pin_count_ = 0;
+  struct Driven {  // of a port, by what is outside
+    std::uint8_t mask = 0;
+    std::uint8_t levels = 0;
+  };
+  std::array<Driven, 12> driven_{};
+  // Power stage and comparators, with the filter behind the PWM that makes their reference.
+  struct Stage {
+    PowerStage stage;
+    std::uint8_t duty = 0;
+    TimeNs followed_ns = 0;
+    std::array<bool, PowerStage::kPairs> trips{};
+  };
+  std::optional<Stage> stage_;
+  std::size_t first_dir_ = 0;  // of pins_, behind the shift register
+  std::uint8_t shifted_ = 0;
 };
 
 }  // namespace bushd::sim

@@ -46,7 +46,7 @@ class AvrMemoryMap : public MemoryMap {
   void take_symbol(const std::string& name, const GElf_Sym& symbol, const std::string& source);
   void assign_writers(const std::string& owners);
 
-  static constexpr std::size_t kData = 0x2200;
+  static constexpr std::size_t kData = 0x4100;  // the largest of all chips
 
   std::vector<Unit> unit_at_;
   std::map<std::string, std::string> defined_in_;  // names of local objects

@@ -13,13 +13,13 @@ namespace bushd::sim {
 namespace {
 
 constexpr std::uint16_t kIoBegin = 0x20;
-constexpr std::uint16_t kRamBegin = 0x200;
 // In the address space of data.
 constexpr std::size_t kEecr = 0x3F;
 constexpr std::size_t kEear = 0x41;
 constexpr std::uint16_t kEepromEnd = 4096;
 constexpr std::uint8_t kEepromAccess = 1 << 0 | 1 << 1;  // EERE, EEPE
 constexpr std::size_t kTimsk3 = 0x71;
+constexpr std::uint8_t kWaits = 1 << 1;  // OCIE3A
 constexpr std::size_t kUcsr0b = 0xC1;
 constexpr std::uint8_t kSends = 1 << 5 | 1 << 6;  // UDRIE0, TXCIE0
 // What a frame holds that nobody has written: as an address, it is beyond RAM.
@@ -83,12 +83,14 @@ struct AvrMemoryWatch::Borrowed {
   AvrMemoryMap::Unit frames;
 };
 
-AvrMemoryWatch::AvrMemoryWatch(avr_t* avr, const std::string& image, const std::string& owners)
+AvrMemoryWatch::AvrMemoryWatch(avr_t* avr, const AvrChip& chip, const std::string& image,
+                               const std::string& owners)
     : avr_(avr),
+      chip_(chip),
       map_(map_of(image, owners)),
       borrowed_(std::make_unique<Borrowed>(*map_)),
       main_(map_->unit_named("atmega2560/main.c")),
-      inputs_(map_->unit_named("atmega2560/inputs.c")) {
+      inputs_(map_->unit_named(std::string(chip.name) + "/inputs.c")) {
   avr_->custom.data = this;
   avr_register_io_write(avr_, kEecr, on_eeprom_control, this);
   avr_register_io_write(avr_, R_SPL, on_stack_pointer, this);
@@ -119,9 +121,9 @@ std::uint16_t AvrMemoryWatch::stack_pointer() const {
 std::optional<std::uint32_t> AvrMemoryWatch::library_caller() const {
   if (map_->unit_at(avr_->pc) != AvrMemoryMap::kNoUnit) return std::nullopt;
   const std::size_t sp = stack_pointer();
-  if (sp + 3 > avr_->ramend) return std::nullopt;
-  const std::uint8_t* const at = avr_->data + sp;
-  const std::uint32_t back = std::uint32_t{at[1]} << 16 | std::uint32_t{at[2]} << 8 | at[3];
+  if (sp + chip_.return_bytes > avr_->ramend) return std::nullopt;
+  std::uint32_t back = 0;
+  for (std::size_t i = 1; i <= chip_.return_bytes; ++i) back = back << 8 | avr_->data[sp + i];
   return 2 * back - 2;
 }
 
@@ -143,7 +145,7 @@ void AvrMemoryWatch::check_borrowed(AvrMemoryMap::Unit unit, std::uint16_t addre
   const Borrowed& b = *borrowed_;
   if (address < b.buffer.address || address >= b.buffer.address + b.buffer.size) return;
   const std::uint8_t* const data = avr_->data;
-  const bool sends = data[kTimsk3] != 0 || (data[kUcsr0b] & kSends) != 0;
+  const bool sends = (data[kTimsk3] & kWaits) != 0 || (data[kUcsr0b] & kSends) != 0;
   if (sends && address >= b.reply.address && address < b.reply.address + b.reply.size) {
     violate("writes to " + hex(address) + " in the reply, which the line is sending");
   }
@@ -155,7 +157,7 @@ void AvrMemoryWatch::check_borrowed(AvrMemoryMap::Unit unit, std::uint16_t addre
 
 void AvrMemoryWatch::write(std::uint16_t address, std::uint8_t) {
   if (violation_) return;
-  if (address < kRamBegin) return;
+  if (address < chip_.ram_begin) return;
   if (!in_main_) in_main_ = writer() == main_;
   if (!in_main_) return;
   if (address > avr_->ramend) return violate("writes to " + hex(address) + ", beyond RAM");
@@ -174,7 +176,7 @@ void AvrMemoryWatch::write(std::uint16_t address, std::uint8_t) {
 void AvrMemoryWatch::read(std::uint16_t address) {
   if (violation_ || !in_main_) return;
   if (address > avr_->ramend) return violate("reads " + hex(address) + ", beyond RAM");
-  if (address < kIoBegin || address >= kRamBegin) return;
+  if (address < kIoBegin || address >= chip_.ram_begin) return;
   if (!is_pointer_load(opcode())) return;
   const AvrMemoryMap::Unit unit = writer();
   if (unit == inputs_) return;

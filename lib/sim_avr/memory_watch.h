@@ -18,6 +18,7 @@
 #include <optional>
 #include <string>
 
+#include "sim_avr/avr_chip.h"
 #include "sim_avr/memory_map.h"
 
 struct avr_t;
@@ -29,7 +30,8 @@ class AvrMemoryWatch {
   static constexpr std::uint16_t kReserve = 512;
 
   // Of an image's ELF. The map is read once for each image.
-  AvrMemoryWatch(avr_t* avr, const std::string& image, const std::string& owners);
+  AvrMemoryWatch(avr_t* avr, const AvrChip& chip, const std::string& image,
+                 const std::string& owners);
   ~AvrMemoryWatch();
   AvrMemoryWatch(const AvrMemoryWatch&) = delete;
   AvrMemoryWatch& operator=(const AvrMemoryWatch&) = delete;
@@ -55,6 +57,7 @@ class AvrMemoryWatch {
   void violate(const std::string& what);
 
   avr_t* avr_;
+  const AvrChip& chip_;
   std::shared_ptr<const AvrMemoryMap> map_;
   std::unique_ptr<const Borrowed> borrowed_;
   AvrMemoryMap::Unit main_;

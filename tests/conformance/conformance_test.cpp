@@ -26,7 +26,7 @@ TEST_P(Conformance, TellsWhoItIs) {
   const bushd_identity expected = identity_of(kVirtual);
   const bushd_identity identity = identity_of(kReal);
   EXPECT_EQ(identity.protocol_version, BUSHD_PROTOCOL_VERSION);
-  EXPECT_EQ(identity.motors, 16);
+  EXPECT_EQ(identity.motors, expected.motors);
   EXPECT_EQ(identity.boot_number, 7);
   EXPECT_EQ(identity.slots, expected.slots);
   EXPECT_EQ(identity.queue_ticks, expected.queue_ticks);
@@ -60,25 +60,26 @@ TEST_P(Conformance, IsSilentAndAliveAfterNoise) {
 }
 
 TEST_P(Conformance, RunsATableToTheSlot) {
-  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {9}));
-  run_by_table(master_.poll(kReal).tick + 24, {{9, 0, -1, 110, 0}});
+  const std::uint8_t motor = own(9);
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {motor}));
+  run_by_table(master_.poll(kReal).tick + 24, {{motor, 0, -1, 110, 0}});
   pass_ticks(160);
-  expect_the_same_steps(9, 110);
-  expect_the_same_times(9);
+  expect_the_same_steps(motor, 110);
+  expect_the_same_times(motor);
   expect_the_same_reports();
 }
 
 TEST_P(Conformance, RunsFourTablesAtOnceToTheSlot) {
-  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {0, 5, 9, 15}));
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {0, 5, own(9), own(15)}));
   const std::uint32_t first = master_.poll(kReal).tick + 60;
   run_by_table(first, {{0, 0, 1, 200, 0}});
   run_by_table(first, {{5, 0, 1, 150, 0}});
-  run_by_table(first, {{9, 0, -1, 110, 0}});
-  run_by_table(first, {{15, 0, -1, 180, 0}});
+  run_by_table(first, {{own(9), 0, -1, 110, 0}});
+  run_by_table(first, {{own(15), 0, -1, 180, 0}});
   pass_ticks(300);
   for (const auto& [motor, count] : {std::pair{0, 200}, {5, 150}, {9, 110}, {15, 180}}) {
-    expect_the_same_steps(static_cast<std::uint8_t>(motor), static_cast<std::size_t>(count));
-    expect_the_same_times(static_cast<std::uint8_t>(motor));
+    expect_the_same_steps(own(motor), static_cast<std::size_t>(count));
+    expect_the_same_times(own(motor));
   }
   expect_the_same_reports();
 }
@@ -86,7 +87,8 @@ TEST_P(Conformance, RunsFourTablesAtOnceToTheSlot) {
 // The clock jumps by part of a tick: one tick is longer by up to a whole one.
 TEST_P(Conformance, ComesIntoStepInTheLongestTicks) {
   tick_ns_ = BUSHD_MAX_TICK_NS;
-  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {9}));
+  const std::uint8_t motor = own(9);
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {motor}));
   std::uint32_t tick = 0;
   std::size_t made = 0;
   for (const std::uint32_t ns : {0, 19'900'000, 1'000, 15'000'000, 7'000'000}) {
@@ -96,39 +98,41 @@ TEST_P(Conformance, ComesIntoStepInTheLongestTicks) {
     tick += 1000;
     master_.sync({0, 0, true, sync_id, tick, ns});
     pass_ticks(10);
-    run_by_table(master_.poll(kReal).tick + 24, {{9, 0, 1, 20, 0}});
+    run_by_table(master_.poll(kReal).tick + 24, {{motor, 0, 1, 20, 0}});
     pass_ticks(40);
     made += 20;
-    expect_the_same_steps(9, made);
+    expect_the_same_steps(motor, made);
   }
-  expect_the_same_times(9);
+  expect_the_same_times(motor);
   expect_the_same_reports();
 }
 
 // A floor below the table's slowest delay, one above it, and none; also where the run is cut.
 TEST_P(Conformance, TableRunsKeepToTheirFloors) {
-  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {2, 5, 9}));
+  const Bytes motors = {2, 5, own(14)};
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors));
   const std::uint32_t first = master_.poll(kReal).tick + 16;
-  run_by_table(first, {{2, 0, 1, 300, kCruise + 7}, {5, 0, -1, 40, 700}, {9, 0, 1, 300, 0}});
+  run_by_table(first, {{2, 0, 1, 300, kCruise + 7}, {5, 0, -1, 40, 700}, {own(14), 0, 1, 300, 0}});
   pass_ticks(800);
   expect_the_same_steps(2, 300);
   expect_the_same_steps(5, 40);
-  expect_the_same_steps(9, 300);
-  for (const std::uint8_t motor : Bytes{2, 5, 9}) expect_the_same_times(motor);
+  expect_the_same_steps(own(14), 300);
+  for (const std::uint8_t motor : motors) expect_the_same_times(motor);
   expect_the_same_reports();
 }
 
 // Inputs are told with every report, at any time of a tick.
 TEST_P(Conformance, TurnsRoundWhilePollsCome) {
-  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {2, 9}));
+  const Bytes motors = {2, own(14)};
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors));
   for (int turn = 0; turn < 12; ++turn) {
     const auto direction = static_cast<std::int8_t>(turn % 2 == 0 ? 1 : -1);
     const std::uint32_t first = master_.poll(kReal).tick + 16;
     const auto back = static_cast<std::int8_t>(-direction);
-    run_by_table(first, {{2, 0, direction, 5, 0}, {9, 0, back, 5, 0}});
+    run_by_table(first, {{2, 0, direction, 5, 0}, {own(14), 0, back, 5, 0}});
     for (int poll = 0; poll < 12; ++poll) master_.poll(kReal);
   }
-  for (const std::uint8_t motor : Bytes{2, 9}) expect_the_same_steps(motor, 60);
+  for (const std::uint8_t motor : motors) expect_the_same_steps(motor, 60);
   expect_the_same_reports();
 }
 
@@ -158,12 +162,13 @@ TEST_P(ConformanceOfStreams, MakesTheStepsOfTheVirtualOne) {
   expect_the_same_reports();
 }
 
-// Sixteen motors at any speeds, to and fro, up to the fastest: in the very slots.
+// All motors at any speeds, to and fro, up to the fastest: in the very slots.
 TEST_P(ConformanceOfStreams, StepsOfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
   const bool fine = format() == BUSHD_FORMAT_FINE;
   tick_ns_ = real_->full_tick_ns(format());
   std::vector<std::uint8_t> motors;
-  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) motors.push_back(m);
+  for (std::uint8_t m = 0; m < real_->twin().motors; ++m) motors.push_back(m);
+  const auto mask = static_cast<std::uint16_t>((1u << motors.size()) - 1);
   ASSERT_NO_FATAL_FAILURE(make_ready(format(), motors));
   Random random(7, 0);
   const std::uint32_t start = master_.poll(kReal).tick + 24;
@@ -176,7 +181,7 @@ TEST_P(ConformanceOfStreams, StepsOfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     const auto flags = static_cast<std::uint8_t>((frame == 0 ? BUSHD_TICKS_START : 0) |
                                                  (fine ? BUSHD_TICKS_FINE : 0));
-    std::size_t size = bushd_encode_ticks_head(0, flags, start + frame * kCount, kCount, 0xFFFF,
+    std::size_t size = bushd_encode_ticks_head(0, flags, start + frame * kCount, kCount, mask,
                                                delays.data(), payload.data());
     for (std::size_t i = 0; i < kCount * motors.size(); ++i) {
       const auto steps = static_cast<std::uint8_t>(random.below(128));
@@ -246,19 +251,23 @@ INSTANTIATE_TEST_SUITE_P(Of, ConformanceOfEmission,
                                   std::get<Mode>(test.param).name;
                          });
 
-// Four motors to and fro, in streams, where every output changes at the same slots.
+// Four motors, or all that have phases, to and fro, in streams, where every output changes at the
+// same slots.
 TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
   const Mode& mode = std::get<Mode>(GetParam());
   const bool phases = mode.settings.mode == BUSHD_EMISSION_PHASES;
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, BUSHD_FORMAT_COARSE));
+  const bool refuses = (real_->disabled_capabilities() & mode.needs) != 0;
   for (const std::uint8_t address : {kVirtual, kReal}) {
-    const bool refuses = address == kReal && (real_->disabled_capabilities() & mode.needs) != 0;
     EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_EMISSION, bushd_encode_emission,
                                    mode.settings) == BUSHD_OK,
               !refuses);
-    if (refuses) return;
   }
-  ASSERT_NO_FATAL_FAILURE(give_tables({0, 1, 2, 3}));
+  if (refuses) return;
+  const auto outputs = real_->twin().motors;
+  std::vector<std::uint8_t> motors = {0, 1, 2, 3};
+  if (phases) motors.resize(outputs / BUSHD_PHASE_OUTPUTS);
+  ASSERT_NO_FATAL_FAILURE(give_tables(motors));
   // Windings are on by now.
   const TimeNs begin_ns = bus_.now_ns();
   const std::uint32_t first = master_.poll(kReal).tick + 40;
@@ -266,10 +275,11 @@ TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
   const std::array<std::uint16_t, 4> at_rest{};
   for (std::uint32_t frame = 0; frame < 4; ++frame) {
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_ticks_head(0, BUSHD_TICKS_START, first + 12 * frame, kCount, 0xF,
+    payload.resize(bushd_encode_ticks_head(0, BUSHD_TICKS_START, first + 12 * frame, kCount,
+                                           static_cast<std::uint16_t>((1u << motors.size()) - 1),
                                            at_rest.data(), payload.data()));
-    for (std::uint32_t i = 0; i < kCount * 4u; ++i) {
-      const std::uint32_t motor = i % 4;
+    for (std::uint32_t i = 0; i < kCount * motors.size(); ++i) {
+      const auto motor = static_cast<std::uint32_t>(i % motors.size());
       const bool forward = (motor + frame) % 2 == 0;
       payload.push_back(static_cast<std::uint8_t>((1 + (i + frame) % 2) |
                                                   (forward ? BUSHD_COARSE_DIRECTION : 0)));
@@ -277,7 +287,7 @@ TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
     tell(BUSHD_MSG_TICKS, payload);
   }
   pass_ticks(120);
-  for (std::uint8_t output = 0; output < (phases ? 16 : 4); ++output) {
+  for (std::uint8_t output = 0; output < (phases ? outputs : 4); ++output) {
     expect_the_same_changes(output, !phases, begin_ns);
   }
   expect_the_same_reports();

@@ -86,7 +86,7 @@ class ImageReplay final : public fuzz::Programmed {
     }
     // A report takes a few ticks to come, and what is asked for then has to come too.
     const auto passed = static_cast<std::uint32_t>((bus_.now_ns() - asked_ns_) / tick_ns_);
-    return {address(),    BUSHD_MOTORS_PER_MCU, last_.epoch,   last_.tick + passed + 1,
+    return {address(),    real_->twin().motors, last_.epoch,   last_.tick + passed + 1,
             tick_ns_,     sync_master_,         last_.sync_id, last_.sync_tick,
             last_.sync_ns};
   }
@@ -286,7 +286,7 @@ class ImageReplay final : public fuzz::Programmed {
 
   void check_counts(const bushd_report& report) {
     if (!emission_ || *emission_ == BUSHD_EMISSION_PHASES) return;
-    for (std::size_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    for (std::size_t m = 0; m < report.motor_count; ++m) {
       const auto told = static_cast<std::uint32_t>(report.motor[m].position_steps);
       if (adopt_) offset_[m] = told - counter_.count[m];
       // Where homing ends the position gets another name.

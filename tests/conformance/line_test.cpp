@@ -15,7 +15,7 @@ class LineScript : public Script, public testing::WithParamInterface<Target> {
  protected:
   LineScript() : Script(GetParam()) {}
   void SetUp() override {
-    for (const bushd_line_entry& entry : kEntries) motors_.push_back(entry.motor);
+    for (const bushd_line_entry& entry : kEntries) motors_.push_back(own(entry.motor));
   }
 
   // The last SYNC tells the time of one that was a few ticks ago.

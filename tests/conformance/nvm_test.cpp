@@ -46,8 +46,10 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   inputs.system_inverted = BUSHD_INPUT_FORWARD;
   inputs.limit_negative = 1 << 4;
   ASSERT_EQ(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs), BUSHD_OK);
-  ASSERT_EQ(ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs, bushd_motor_inputs{4, 4, 12, 4}),
-            BUSHD_OK);
+  const auto limit = static_cast<std::uint8_t>(13 % real_->twin().motors);
+  ASSERT_EQ(
+      ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs, bushd_motor_inputs{4, 4, limit, 4}),
+      BUSHD_OK);
   const bushd_tables before = master_.tables(kAddress);
   pass(real_->keeps_within_ns(ramp.size()));
   reboot();
@@ -61,7 +63,7 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   EXPECT_EQ(report.faults, 0);
   EXPECT_EQ(report.system_inputs, BUSHD_INPUT_FORWARD);
   EXPECT_EQ(report.forbidden_negative, 0);
-  bus_.node(0).set_inputs({1 << 12, 0});
+  bus_.node(0).set_inputs({static_cast<std::uint16_t>(1u << limit), 0});
   pass(4 * TimeNs{kTickNs});
   EXPECT_EQ(master_.poll(kAddress).forbidden_negative, 1 << 4);
   bus_.node(0).set_inputs({});

@@ -61,6 +61,11 @@ class Script : public testing::Test {
     }
   }
 
+  // One that the MCU has, of sixteen: also of inputs.
+  std::uint8_t own(int number) const {
+    return static_cast<std::uint8_t>(number % real_->twin().motors);
+  }
+
   void pass_ticks(int ticks) { bus_.advance_to(bus_.now_ns() + TimeNs{tick_ns_} * ticks); }
 
   // The same request to both, which take it.

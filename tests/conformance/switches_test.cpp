@@ -12,7 +12,8 @@ namespace bushd::sim {
 namespace {
 
 constexpr std::uint8_t kMotor = 6;
-constexpr std::uint8_t kPositive = 15;
+// Inputs, of sixteen (Script::own).
+constexpr std::uint8_t kPositive = 13;
 constexpr std::uint8_t kNegative = 2;
 constexpr std::uint8_t kHome = 9;
 constexpr std::int64_t kEnd = 500;
@@ -25,10 +26,10 @@ constexpr std::uint16_t bit(unsigned n) {
 // and the contacts are to say the same to both.
 class Stage {
  public:
-  explicit Stage(std::int64_t home_at_steps) {
-    put(kPositive, {.at_steps = kEnd, .positive_end = true, .seed = 1});
+  Stage(std::int64_t home_at_steps, std::uint8_t positive, std::uint8_t home) {
+    put(positive, {.at_steps = kEnd, .positive_end = true, .seed = 1});
     put(kNegative, {.at_steps = -kEnd, .seed = 2, .opens = true});
-    put(kHome, {.at_steps = home_at_steps, .seed = 3, .width_steps = 80});
+    put(home, {.at_steps = home_at_steps, .seed = 3, .width_steps = 80});
   }
 
   bushd_inputs sense(TimeNs now_ns, const std::vector<Edge>& edges) {
@@ -68,7 +69,7 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
 
   void SetUp() override {
     ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kMotor}));
-    ASSERT_NO_FATAL_FAILURE(wire(kHome));
+    ASSERT_NO_FATAL_FAILURE(wire(own(kHome)));
   }
 
   void wire(std::uint8_t home) {
@@ -79,7 +80,7 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     inputs.debounce_ticks = 1;
     ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs));
     ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs,
-                                bushd_motor_inputs{kMotor, kPositive, kNegative, home}));
+                                bushd_motor_inputs{kMotor, own(kPositive), kNegative, home}));
   }
 
   // Inputs are looked at once a tick: they change for both in the same one.
@@ -147,7 +148,7 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     EXPECT_EQ(report.homing, expected.homing);
   }
 
-  Stage stage_{kHomeAt};
+  Stage stage_{kHomeAt, own(kPositive), own(kHome)};
 };
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Switches);
 INSTANTIATE_TEST_SUITE_P(Of, Switches, testing::ValuesIn(targets()),
@@ -160,7 +161,7 @@ TEST_P(Switches, EachLimitStopsItsDirection) {
     const bushd_report report = master_.poll(kReal);
     EXPECT_EQ(report.forbidden_positive, direction > 0 ? bit(kMotor) : 0);
     EXPECT_EQ(report.forbidden_negative, direction < 0 ? bit(kMotor) : 0);
-    EXPECT_EQ(report.inputs, bit(direction > 0 ? kPositive : kNegative));
+    EXPECT_EQ(report.inputs, bit(direction > 0 ? own(kPositive) : kNegative));
     EXPECT_GE(stage_.position_steps() * direction, kEnd);
     // At cruise, 0.9 ms, a tick has 2.9 steps: three ticks of bounce, one for debouncing, two until
     // the MCU acts, and then its ramp.

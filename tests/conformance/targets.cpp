@@ -15,28 +15,18 @@ namespace bushd::sim {
 namespace {
 
 #ifdef AVR_IMAGES
-class Atmega2560 final : public McuUnderTest {
+class Avr : public McuUnderTest {
  public:
-  McuOptions twin() const override {
-    return {.slots = 128,
-            .queue_ticks = 64,
-            .code_count = 952,
-            .disabled_capabilities = disabled_capabilities()};
-  }
-  std::uint16_t disabled_capabilities() const override {
-    return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN;
-  }
+  explicit Avr(AvrOptions options) : options_(std::move(options)) {}
   std::uint32_t full_tick_ns(bushd_format format) const override {
     return format == BUSHD_FORMAT_FINE ? 4'000'000 : 2'560'000;
   }
   std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
                             EdgeSink* sink) override {
-    AvrOptions options;
-    options.image = AVR_IMAGES "-500000.elf";
+    AvrOptions options = options_;
     options.address = birth.address;
     options.unique_id = birth.unique_id;
     options.boots = birth.boots;
-    options.memory_owners = AVR_MEMORY_OWNERS;
     auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
     mcu->on_conversion = on_conversion;
     avr_ = mcu.get();
@@ -56,7 +46,42 @@ class Atmega2560 final : public McuUnderTest {
   }
 
  private:
+  AvrOptions options_;
   AvrMcu* avr_ = nullptr;
+};
+
+class Atmega2560 final : public Avr {
+ public:
+  Atmega2560() : Avr({.image = AVR_IMAGES "-500000.elf", .memory_owners = AVR_MEMORY_OWNERS}) {}
+  McuOptions twin() const override {
+    return {.slots = 128,
+            .queue_ticks = 64,
+            .code_count = 952,
+            .disabled_capabilities = disabled_capabilities(),
+            .current_motors = 0};
+  }
+  std::uint16_t disabled_capabilities() const override {
+    return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN;
+  }
+};
+
+class Atmega1284p final : public Avr {
+ public:
+  Atmega1284p()
+      : Avr({.image = ATMEGA1284P_IMAGES "-500000.elf",
+             .memory_owners = ATMEGA1284P_MEMORY_OWNERS,
+             .chip = "atmega1284p"}) {}
+  McuOptions twin() const override {
+    return {.motors = 8,
+            .slots = 128,
+            .queue_ticks = 64,
+            .code_count = 1536,
+            .disabled_capabilities = disabled_capabilities(),
+            .current_motors = 1};
+  }
+  std::uint16_t disabled_capabilities() const override {
+    return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_COMMON_DIR;
+  }
 };
 #endif
 
@@ -64,7 +89,7 @@ class Atmega2560 final : public McuUnderTest {
 class Lm3s6965 final : public McuUnderTest {
  public:
   McuOptions twin() const override {
-    return {.slots = 128, .queue_ticks = 512, .code_count = 12288};
+    return {.slots = 128, .queue_ticks = 512, .code_count = 12288, .current_motors = 0};
   }
   std::uint16_t disabled_capabilities() const override { return 0; }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }
@@ -114,6 +139,7 @@ std::vector<Target> targets() {
   return {
 #ifdef AVR_IMAGES
       target<Atmega2560>("Atmega2560"),
+      target<Atmega1284p>("Atmega1284p"),
 #endif
 #ifdef LM3S_IMAGES
       target<Lm3s6965>("Lm3s6965"),

@@ -139,6 +139,26 @@ Kinds setup_kinds() {
             (*p)[0] = BUSHD_EMISSION_BURST;
             bushd_put_u16(p->data() + 3, 0);
           }}}}},
+      {"currents",
+       {bytes_with(8,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 15);
+                     (*p)[1] = between<uint8_t>(0, 1);
+                     const uint16_t least = between<uint8_t>(0, 3) == 0 ? 0 : 1;
+                     const uint16_t most = least == 0 ? 0 : BUSHD_MAX_CURRENT_MA;
+                     for (size_t at : {2, 4, 6}) {
+                       bushd_put_u16(p->data() + at, between<uint16_t>(least, most));
+                     }
+                   }),
+        codec(bushd_decode_currents, bushd_encode_currents),
+        {{"motor 16", set8(0, 16)},
+         {"decay 2", set8(1, 2)},
+         {"more than 5.11 A", set16(4, 5111)},
+         {"one of them without current",
+          [](Bytes* p) {
+            bushd_put_u16(p->data() + 2, 100);
+            bushd_put_u16(p->data() + 6, 0);
+          }}}}},
       {"acknowledgement",
        {[] { return random_bytes(1); },
         codec(bushd_decode_acknowledgement, bushd_encode_acknowledgement),

@@ -112,6 +112,10 @@ void put(const bushd_travel& m, Fields& f) {
   f.add("direction", m.direction).add("edge", m.edge).add("sensor", m.sensor);
   f.add("steps", m.steps).add("delay_us", m.delay_us).add("wait_us", m.wait_us);
 }
+void put(const bushd_currents& m, Fields& f) {
+  f.add("motor", m.motor).add("decay", m.decay).add("ramp_ma", m.ramp_ma);
+  f.add("cruise_ma", m.cruise_ma).add("hold_ma", m.hold_ma);
+}
 void put(const bushd_local& m, Fields& f) {
   f.add("motors", m.motors);
 }
@@ -283,6 +287,8 @@ std::string message_text(const bushd_frame& frame) {
       return text("travel", frame, bushd_decode_travel);
     case BUSHD_MSG_LOCAL:
       return text("local", frame, bushd_decode_local);
+    case BUSHD_MSG_CURRENTS:
+      return text("currents", frame, bushd_decode_currents);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
       return text("tables", frame, bushd_decode_tables);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY:
@@ -303,7 +309,7 @@ std::set<std::string> message_names() {
           "report",           "sync",         "ticks",       "acknowledgement", "table_ticks",
           "table_run",        "emergency",    "set_address", "get_tables",      "tables",
           "set_inputs",       "emission",     "home",        "local",           "trigger",
-          "position_compare", "motor_inputs", "line_run",    "travel"};
+          "position_compare", "motor_inputs", "line_run",    "travel",          "currents"};
 }
 
 }  // namespace bushd::test

@@ -57,7 +57,9 @@ class Nvm : public testing::Test {
     };
     for (const auto& part : found.parts) {
       EXPECT_TRUE(within(part, &rig.mcu(), sizeof(bushd_mcu)) ||
-                  within(part, rig.mcu().config.codes, kCodes * sizeof(std::uint16_t)));
+                  within(part, rig.mcu().config.codes, kCodes * sizeof(std::uint16_t)) ||
+                  within(part, rig.mcu().config.currents,
+                         rig.options().current_motors * sizeof(bushd_mcu_currents)));
     }
   }
 
@@ -71,7 +73,8 @@ TEST_F(Nvm, AWalkGoesOverAllOfIt) {
   const std::size_t used = rig.mcu().tables.codes_used;
   ASSERT_GT(used, 0u);
   EXPECT_EQ(found.bytes,
-            most() - 2 * (kCodes - used) - (BUSHD_MOTORS_PER_MCU - rig.options().motors));
+            most() - 2 * (kCodes - used) - (BUSHD_MOTORS_PER_MCU - rig.options().motors) -
+                (BUSHD_MAX_CURRENT_MOTORS - rig.options().current_motors) * sizeof(bushd_currents));
 }
 
 // A walk that stood behind the last code went on through all memory, and the ports wrote it down.

@@ -111,7 +111,14 @@ Rig::Rig(RigOptions options)
       static_cast<Rig*>(context)->awaited_edge_ = edge;
     };
   }
+  if (options.current_motors > 0) {
+    port.set_current = [](void* context, std::uint8_t motor, std::uint16_t ma, bool fast_decay) {
+      static_cast<Rig*>(context)->windings_.push_back({motor, ma, fast_decay});
+    };
+  }
   bushd_mcu_config config{};
+  config.currents = currents_.data();
+  config.current_motors = options.current_motors;
   config.address = options.address;
   config.motors = options.motors;
   config.slots = options.slots;
@@ -247,6 +254,12 @@ bushd_status Rig::motor_inputs(const bushd_motor_inputs& message) {
   return request(BUSHD_MSG_MOTOR_INPUTS, payload_of([&](std::uint8_t* p) {
                    return bushd_encode_motor_inputs(&message, p);
                  }));
+}
+
+bushd_status Rig::currents(const bushd_currents& message) {
+  Bytes payload(8);
+  bushd_encode_currents(&message, payload.data());
+  return request(BUSHD_MSG_CURRENTS, payload);
 }
 
 bushd_status Rig::home(const bushd_home& message) {

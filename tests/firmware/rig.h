@@ -34,6 +34,7 @@ struct RigOptions {
   std::int32_t pulse_ns = 0;
   bool stores_address = true;
   bool trigger_input = true;
+  std::uint8_t current_motors = 1;  // whose windings' currents the port controls
 };
 
 struct Answer {
@@ -129,6 +130,14 @@ class Rig {
   bushd_tables tables();
   bushd_status set_inputs(const InputSettings& settings);
   bushd_status motor_inputs(const bushd_motor_inputs& message);
+  bushd_status currents(const bushd_currents& message);
+  // What the port was told, in order of time.
+  struct Winding {
+    std::uint8_t motor;
+    std::uint16_t ma;
+    bool fast_decay;
+  };
+  const std::vector<Winding>& windings() const { return windings_; }
   bushd_status home(const bushd_home& message);
   bushd_status local(std::uint16_t motors);
   // The pins, from the next tick that is prepared on.
@@ -211,6 +220,8 @@ class Rig {
   int stored_address_ = -1;
   bushd_inputs pins_{};
   std::uint16_t current_ = 0;
+  std::array<bushd_mcu_currents, BUSHD_MAX_CURRENT_MOTORS> currents_{};
+  std::vector<Winding> windings_;
   std::uint32_t sync_id_ = 0;
   std::uint32_t port_tick_ns_ = 0;
   std::uint16_t direction_ = 0;

@@ -44,7 +44,12 @@ void CoreRig::boot() {
       .read_current = [](void* context) { return self(context)->current(); },
       .self_test = [](void*) -> std::uint8_t { return 0; },
       .keep_enable = [](void* context, bool on) { self(context)->enable_at_boot_ = on; },
-      .set_trigger = [](void* context, bushd_edge edge) { self(context)->awaited_ = edge; }};
+      .set_trigger = [](void* context, bushd_edge edge) { self(context)->awaited_ = edge; },
+      .set_current =
+          [](void*, std::uint8_t motor, std::uint16_t ma, bool) {
+            BUSHD_REQUIRE(motor < BUSHD_MAX_CURRENT_MOTORS && ma <= BUSHD_MAX_CURRENT_MA);
+          }};
+  currents_ = {};
   bushd_mcu_config config = {.address = address_,
                              .motors = configuration_.motors,
                              .slots = kSlots,
@@ -57,6 +62,8 @@ void CoreRig::boot() {
                              .min_tick_ns = configuration_.min_tick_ns,
                              .pulse_ns = configuration_.pulse_ns,
                              .disabled_capabilities = configuration_.disabled_capabilities,
+                             .currents = currents_.data(),
+                             .current_motors = static_cast<std::uint8_t>(currents_.size()),
                              .codes = codes_.data(),
                              .code_count = configuration_.codes,
                              .reply = reply(),

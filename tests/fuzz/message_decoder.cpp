@@ -99,6 +99,12 @@ void decode_for_mcu(Bytes payload) {
     BUSHD_REQUIRE(motor_inputs.negative < BUSHD_MOTORS_PER_MCU);
     BUSHD_REQUIRE(motor_inputs.home < BUSHD_MOTORS_PER_MCU);
   }
+  bushd_currents currents;
+  if (decoded(payload, &currents, bushd_decode_currents, bushd_encode_currents)) {
+    BUSHD_REQUIRE(currents.motor < BUSHD_MOTORS_PER_MCU);
+    BUSHD_REQUIRE(currents.ramp_ma <= BUSHD_MAX_CURRENT_MA);
+    BUSHD_REQUIRE((currents.cruise_ma == 0) == (currents.hold_ma == 0));
+  }
   bushd_home home;
   if (decoded(payload, &home, bushd_decode_home, bushd_encode_home)) {
     BUSHD_REQUIRE(home.motor < BUSHD_MOTORS_PER_MCU && home.direction * home.direction == 1);

@@ -77,6 +77,27 @@ TEST(Connect, SwitchesAtOtherInputsAreToldAfterTheSettings) {
   EXPECT_EQ(told[1].payload, (std::vector<std::uint8_t>{1, 1, 1, 15}));
 }
 
+TEST(Connect, CurrentsAreToldToAnMcuThatControlsThem) {
+  for (const bool controls : {false, true}) {
+    FakeBus bus(1, 2);
+    if (controls) bus.slaves[0].identity.capabilities |= BUSHD_CAN_CURRENTS;
+    bus.connect();
+    link::McuSetup setup = bus.setup.mcus[0];
+    setup.currents = {{0, BUSHD_DECAY_FAST, static_cast<std::uint16_t>(controls ? 1500 : 0),
+                       static_cast<std::uint16_t>(controls ? 1000 : 0),
+                       static_cast<std::uint16_t>(controls ? 300 : 0)},
+                      {1, BUSHD_DECAY_SLOW, 0, 0, 0}};
+    bus.master->reconfigure(McuIndex{0}, setup);
+    bus.heard.clear();
+    bus.connect();
+    const auto told = bus.heard_of(BUSHD_MSG_CURRENTS);
+    ASSERT_EQ(told.size(), controls ? 2u : 0u);
+    if (!controls) continue;
+    EXPECT_EQ(told[0].payload, (std::vector<std::uint8_t>{0, 1, 0xDC, 5, 0xE8, 3, 0x2C, 1}));
+    EXPECT_EQ(told[1].payload, (std::vector<std::uint8_t>{1, 0, 0, 0, 0, 0, 0, 0}));
+  }
+}
+
 TEST(Connect, AllMcusAgreeOnTheTime) {
   FakeBus bus(5, 2);
   bus.connect();

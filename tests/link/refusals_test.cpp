@@ -70,6 +70,17 @@ TEST(Connect, AnMcuWithoutTheInputsIsNamed) {
   }
 }
 
+TEST(Connect, AnMcuWithoutAChopperIsNamedWhereCurrentsAreSet) {
+  FakeBus bus(1, 2);
+  link::McuSetup setup = bus.setup.mcus[0];
+  setup.currents = {{0, BUSHD_DECAY_SLOW, 0, 0, 0}, {1, BUSHD_DECAY_SLOW, 900, 600, 200}};
+  bus.master->reconfigure(McuIndex{0}, setup);
+  bus.run_for(3'000'000);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
+              HasSubstr("controls no currents of windings, but motor 1 has `currents`"));
+}
+
 TEST(Connect, ExactlyEnoughMemoryIsEnough) {
   FakeBus bus(1, 4);
   bus.slaves[0].identity.table_codes = 350;

@@ -1,6 +1,6 @@
 """How deep the stack of an image for AVR can get, by its machine code, and that this much RAM is left for it.
 
-    stack_bound_test.py OBJDUMP IMAGE.elf...
+    stack_bound_test.py CHIP OBJDUMP IMAGE.elf...
 
 The depth is followed through every instruction from main and from each interrupt: pushes, frames, calls. What is called
 through a pointer is one of the port's functions. On top of the deepest path of main lie all interrupts that let others
@@ -13,9 +13,8 @@ import subprocess
 import sys
 from collections import namedtuple
 
-RAM_BEGIN, RAM_SIZE = 0x200, 8192
-RETURN_ADDRESS = 3
-RECEIVER = "__vector_25"
+Chip = namedtuple("Chip", "ram_size return_address receiver")
+CHIPS = {"atmega2560": Chip(8192, 3, "__vector_25"), "atmega1284p": Chip(16384, 2, "__vector_20")}
 BRANCH = re.compile(r"br\w\w$")
 SKIP = {"cpse", "sbrc", "sbrs", "sbic", "sbis"}
 RETURN = {"ret", "reti"}
@@ -26,7 +25,8 @@ State = namedtuple("State", "depth frame low")  # `frame`: the depth that Y stan
 
 
 class Image:
-    def __init__(self, objdump, path):
+    def __init__(self, chip, objdump, path):
+        self.chip = chip
         text = subprocess.run([objdump, "-d", "-j", ".text", path], check=True, capture_output=True, text=True).stdout
         self.code = {}
         self.symbols = {}
@@ -63,7 +63,7 @@ class Image:
         return self.known[entry]
 
     def called(self, address):
-        return RETURN_ADDRESS + self.depth(address)
+        return self.chip.return_address + self.depth(address)
 
     def through_pointer(self):
         return max(self.called(at) for at in self.port)
@@ -85,7 +85,7 @@ class Path:
             address, state = unvisited.pop()
             if address in self.seen and self.seen[address].depth >= state.depth:
                 continue
-            assert state.depth < RAM_SIZE, f"the stack grows without end at {address:#x}"
+            assert state.depth < self.image.chip.ram_size, f"the stack grows without end at {address:#x}"
             self.seen[address] = state
             unvisited += self.step(address, state)
             self.most = max(self.most, state.depth)
@@ -115,7 +115,7 @@ class Path:
             return state._replace(depth=state.depth - 1)
         if name in ("rcall", "call"):
             if code.target == code.next:
-                return state._replace(depth=state.depth + RETURN_ADDRESS)  # makes room
+                return state._replace(depth=state.depth + self.image.chip.return_address)  # makes room
             self.most = max(self.most, state.depth + self.image.called(code.target))
         if name in ("icall", "eicall"):
             self.most = max(self.most, state.depth + self.image.through_pointer())
@@ -173,21 +173,22 @@ def bound(image):
         lets_in = any(image.code[seen].name == "sei" for seen in path.seen)
         print(f"  {name} {depth}{'' if lets_in else ', alone'}")
         if lets_in:
-            open_interrupts += depth * (2 if name == RECEIVER else 1)
+            open_interrupts += depth * (2 if name == image.chip.receiver else 1)
         else:
             closed_interrupts = max(closed_interrupts, depth)
     return main + open_interrupts + closed_interrupts
 
 
-def main(objdump, *paths):
+def main(chip, objdump, *paths):
+    chip = CHIPS[chip]
     for path in paths:
-        image = Image(objdump, path)
+        image = Image(chip, objdump, path)
         headers = subprocess.run([objdump, "-h", path], check=True, capture_output=True, text=True).stdout
         used = sum(int(size, 16) for size in re.findall(r" \.(?:data|bss|noinit|line_bytes) +([0-9a-f]+)", headers))
         print(path)
         deepest = bound(image)
-        print(f"  stack up to {deepest}, variables {used}: {RAM_SIZE - used - deepest} bytes of RAM are left")
-        assert used + deepest <= RAM_SIZE, "the stack may reach the variables"
+        print(f"  stack up to {deepest}, variables {used}: {chip.ram_size - used - deepest} bytes of RAM are left")
+        assert used + deepest <= chip.ram_size, "the stack may reach the variables"
 
 
 if __name__ == "__main__":

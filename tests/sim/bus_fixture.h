@@ -28,6 +28,7 @@ class Recorder final : public EdgeSink {
     last_ns_[edge.mcu] = edge.time_ns;
     edges.push_back(edge);
   }
+  void sample(const Sample& sample) override { samples.push_back(sample); }
   void settled(TimeNs until_ns) override {
     EXPECT_GE(until_ns, settled_ns_);
     settled_ns_ = until_ns;
@@ -44,6 +45,7 @@ class Recorder final : public EdgeSink {
   }
 
   std::vector<Edge> edges;
+  std::vector<Sample> samples;
 
  private:
   TimeNs settled_ns_ = 0;

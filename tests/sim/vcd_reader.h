@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace bushd::sim {
@@ -19,6 +20,7 @@ struct VcdChange {
 struct VcdFile {
   std::string timescale;
   std::map<std::string, std::vector<VcdChange>> wires;  // by "scope.name", with the initial values
+  std::map<std::string, std::vector<std::pair<std::int64_t, double>>> reals;
   std::vector<std::int64_t> stamps;
 };
 
@@ -47,10 +49,15 @@ inline VcdFile read_vcd(const std::string& path) {
       scope.pop_back();
     } else if (word == "$var") {
       const auto words = section();
-      if (words.at(0) != "wire" || words.at(1) != "1") throw std::runtime_error("not a wire");
+      const bool real = words.at(0) == "real" && words.at(1) == "64";
+      if (!real && (words.at(0) != "wire" || words.at(1) != "1")) {
+        throw std::runtime_error("not a wire");
+      }
       const std::string name = scope.at(0) + "." + words.at(3);
       if (!name_of.emplace(words.at(2), name).second) throw std::runtime_error("code used twice");
-      if (!file.wires.emplace(name, std::vector<VcdChange>()).second) {
+      if (real) {
+        file.reals[name];
+      } else if (!file.wires.emplace(name, std::vector<VcdChange>()).second) {
         throw std::runtime_error("name used twice: " + name);
       }
     } else if (word == "$enddefinitions") {
@@ -69,6 +76,10 @@ inline VcdFile read_vcd(const std::string& path) {
       file.stamps.push_back(stamp);
     } else if (word.front() == '0' || word.front() == '1') {
       file.wires.at(name_of.at(word.substr(1))).push_back({now, word.front() == '1'});
+    } else if (word.front() == 'r') {
+      const double value = std::stod(word.substr(1));
+      if (!(in >> word)) throw std::runtime_error("a real without its code");
+      file.reals.at(name_of.at(word)).emplace_back(now, value);
     } else {
       throw std::runtime_error("what is " + word);
     }

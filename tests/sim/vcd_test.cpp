@@ -56,6 +56,22 @@ TEST_F(Vcd, EdgesOfSeveralMcusAreMergedByTime) {
   EXPECT_EQ(file.wires.at("mcu2.en").at(1).time, 200);
 }
 
+TEST_F(Vcd, CurrentsAreRealVariablesOfTheMcuThatHasThem) {
+  auto writer = *VcdWriter::create(path, std::array<std::uint8_t, 2>{1, 2}, {2});
+  writer->edge({100, 1, Signal::kStep, 3, true});
+  writer->sample({100, 1, 3, 0.25});
+  writer->sample({250, 0, 3, 1.0});  // nobody measures there
+  writer->sample({200, 1, 0, 1.50004});
+  writer->settled(1000);
+  ASSERT_TRUE(writer->close(1000));
+  const VcdFile file = read_vcd(path);
+  using Values = std::vector<std::pair<std::int64_t, double>>;
+  EXPECT_EQ(file.reals.size(), 4u);
+  EXPECT_EQ(file.reals.at("mcu2.current3_a"), (Values{{0, 0.0}, {100, 0.25}}));
+  EXPECT_EQ(file.reals.at("mcu2.current0_a"), (Values{{0, 0.0}, {200, 1.5}}));
+  EXPECT_EQ(file.stamps, (std::vector<std::int64_t>{0, 100, 200, 1000}));
+}
+
 TEST_F(Vcd, FileHoldsWhatTheBusDid) {
   auto writer = *VcdWriter::create(path, std::array<std::uint8_t, 2>{1, 2});
   Bus bus(500'000, writer.get());

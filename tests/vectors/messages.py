@@ -35,6 +35,7 @@ LAYOUTS = {
     "travel": (0x19, [("number", 1), ("kind", 1), ("motor", 1), ("direction", -1), ("edge", 1), ("sensor", 1), ("steps", 4),
                       ("delay_us", 4), ("wait_us", 4)]),
     "local": (0x14, [("motors", 2)]),
+    "currents": (0x1A, [("motor", 1), ("decay", 1), ("ramp_ma", 2), ("cruise_ma", 2), ("hold_ma", 2)]),
     "identity": (0x81, [("protocol_version", 1), ("motors", 1), ("firmware_version", 2), ("boot_number", 2),
                         ("slots", 2), ("queue_ticks", 2), ("table_codes", 2), ("capabilities", 2),
                         ("unique_id", [1])]),

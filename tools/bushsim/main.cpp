@@ -86,8 +86,9 @@ int run(int argc, char** argv) {
       ->excludes("--trace");
   std::vector<std::string> mcus;
   app.add_option("--mcu", mcus,
-                 "What an MCU is, ADDRESS=KIND: virtual (the default), atmega2560:IMAGE.elf, which "
-                 "runs in simavr, or lm3s6965:IMAGE.elf, in QEMU. Several times for several")
+                 "What an MCU is, ADDRESS=KIND: virtual (the default), atmega2560:IMAGE.elf or "
+                 "atmega1284p:IMAGE.elf, which run in simavr, or lm3s6965:IMAGE.elf, in QEMU. "
+                 "Several times for several")
       ->allow_extra_args(false);
   std::vector<std::string> switches;
   app.add_option("--switch", switches,

@@ -45,7 +45,7 @@ namespace {
 
 // The package that this bushsim would have needed; empty if it can run the chip's images.
 Result<std::string> missing_for(const std::string& chip) {
-  if (chip == "atmega2560") {
+  if (chip == "atmega2560" || chip == "atmega1284p") {
 #ifndef BUSHSIM_AVR
     return "simavr (libsimavr-dev, libelf-dev)";
 #endif
@@ -57,7 +57,8 @@ Result<std::string> missing_for(const std::string& chip) {
 #endif
     return "";
   }
-  return fail("is neither virtual nor atmega2560:IMAGE.elf nor lm3s6965:IMAGE.elf");
+  return fail(
+      "is neither virtual nor atmega2560:IMAGE.elf, atmega1284p:IMAGE.elf or lm3s6965:IMAGE.elf");
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <csignal>
 #include <ctime>
 #include <iterator>
+#include <set>
 
 #ifdef BUSHSIM_AVR
 #include "sim_avr/avr_mcu.h"
@@ -62,8 +63,11 @@ std::unique_ptr<Mcu> make_mcu([[maybe_unused]] const Image& image,
                               [[maybe_unused]] Mcu::Driver& driver,
                               [[maybe_unused]] EdgeSink* sink) {
 #ifdef BUSHSIM_AVR
-  if (image.chip == "atmega2560") {
-    const bushd::sim::AvrOptions options{image.path, address, index + 1, boots};
+  if (image.chip == "atmega2560" || image.chip == "atmega1284p") {
+    bushd::sim::AvrOptions options{image.path, address, index + 1, boots};
+    options.chip = image.chip;
+    // Its windings are there, whether its comparators are used or not.
+    if (image.chip == "atmega1284p") options.power_stage = bushd::sim::PowerStageRules{};
     return std::make_unique<bushd::sim::AvrMcu>(options, index, driver, sink);
   }
 #endif
@@ -134,7 +138,11 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
   if (!pty) return fail(pty.error());
   std::unique_ptr<bushd::sim::VcdWriter> trace;
   if (!options.trace.empty()) {
-    auto created = bushd::sim::VcdWriter::create(options.trace, options.setup.addresses);
+    std::set<std::uint8_t> measured;  // their windings
+    for (const auto& [address, image] : options.images) {
+      if (image.chip == "atmega1284p") measured.insert(address);
+    }
+    auto created = bushd::sim::VcdWriter::create(options.trace, options.setup.addresses, measured);
     if (!created) return fail(created.error());
     trace = std::move(*created);
   }

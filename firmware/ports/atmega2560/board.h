@@ -36,7 +36,70 @@
 #define DE_PORT PORTE
 #define DE_BIT 4
 
+// What main.c makes of it. A frame of TABLE_TICKS stands for more ticks than it could make in one;
+// a line of more than a few motors would take it longer than a tick.
+#define BOARD_MOTORS 16u
+#define BOARD_DISABLED (BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN)
+#define BOARD_QUEUE_TICKS 64u
+#define BOARD_TABLE_CODES 952u  // four tables of 238 codes
+// No current of windings is controlled.
+#define BOARD_CURRENT_MOTORS 0u
+#define BOARD_CURRENTS NULL
+#define BOARD_SET_CURRENT NULL
+// Shorter, slots would not hold their interrupts.
+#define BOARD_MIN_TICK_NS 900000u
+
+// Timer 1, of the slots.
+#define BOARD_SLOT_FLAGS (1 << OCF1A | 1 << OCF1B | 1 << OCF1C)
+#define BOARD_SLOT_INTERRUPTS (1 << OCIE1A | 1 << OCIE1B | 1 << OCIE1C)
+
+// Interrupt of the trigger input.
+#define TRIGGER_VECTOR INT0_vect
+#define TRIGGER_INT INT0
+#define TRIGGER_FLAG INTF0
+#define TRIGGER_FALLING (1 << ISC01)
+#define TRIGGER_RISING (1 << ISC01 | 1 << ISC00)
+#define BOARD_EDGES 0u  // of other interrupts
+
+// Timer of clock.h, and of its bytes.
+#define CLOCK_COUNT TCNT5
+#define CLOCK_COUNT_LOW TCNT5L
+#define CLOCK_COUNT_HIGH TCNT5H
+
+// Where the next byte to be sent lies: in registers of timer 0, which is at rest.
+#define LINE_SENDING_LOW OCR0A
+#define LINE_SENDING_HIGH OCR0B
+
+// What the line waits by, timer 3: cycles of a count, and its interrupts without compare A.
+#define LINE_COUNT_CYCLES 1u
+#define LINE_OTHER_INTERRUPTS 0u
+
 #ifndef __ASSEMBLER__
+
+#include <stdint.h>
+
+static inline void line_set_sending(const uint8_t* wire) {
+  LINE_SENDING_LOW = (uint8_t)(uintptr_t)wire;
+  LINE_SENDING_HIGH = (uint8_t)((uintptr_t)wire >> 8);
+}
+static inline void line_timer_start(void) {
+  TCCR3B = 1 << CS30;
+}
+static inline uint16_t line_timer_now(void) {
+  return TCNT3;
+}
+static inline void line_timer_wait(uint16_t count) {
+  OCR3A = count;
+}
+
+static inline void clock_start(void) {
+  // Timer 4, of the position compare output, begins in the same cycle, from the same prescaler.
+  GTCCR = 1 << TSM | 1 << PSRSYNC;
+  TCCR5B = 1 << CS51;
+  TCCR4B = 1 << CS41 | 1 << CS40;
+  GTCCR = 0;
+}
+
 static inline void board_init(void) {
   // Outputs are low since reset.
   DDRA = DDRC = DDRL = DDRB = 0xFF;

@@ -1,15 +1,11 @@
 #include "firmware/ports/atmega2560/clock.h"
 
-#include <avr/io.h>
+#include <board.h>
 
 static uint32_t latest;  // in counts
 
 void clock_init(void) {
-  // Timer 4, of the position compare output, begins in the same cycle, from the same prescaler.
-  GTCCR = 1 << TSM | 1 << PSRSYNC;
-  TCCR5B = 1 << CS51;
-  TCCR4B = 1 << CS41 | 1 << CS40;
-  GTCCR = 0;
+  clock_start();
 }
 
 // The UART's interrupt reads the timer through the same register for its high byte. With interrupts
@@ -19,8 +15,8 @@ static uint16_t count_now(void) {
   uint16_t before = 0;
   uint16_t count = 0;
   do {
-    before = TCNT5;
-    count = TCNT5;
+    before = CLOCK_COUNT;
+    count = CLOCK_COUNT;
   } while ((uint16_t)(count - before) > UINT8_MAX / 2u);
   return count;
 }

@@ -1,4 +1,4 @@
-// Time in CPU cycles since boot, modulo 2^32: timer 5 counts every eighth.
+// Time in CPU cycles since boot, modulo 2^32: a timer counts every eighth.
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_CLOCK_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_CLOCK_H
 
@@ -11,7 +11,7 @@ void clock_init(void);
 
 // Both for the main loop only, and one of them at least every 30 ms.
 uint32_t clock_now(void);
-// When timer 5 showed `count`, in the last 30 ms.
+// When the timer showed `count`, in the last 30 ms.
 uint32_t clock_at(uint16_t count);
 
 static inline bool clock_before(uint32_t time, uint32_t reference) {

@@ -1,9 +1,9 @@
 #include "firmware/ports/atmega2560/compare_output.h"
 
 #include <avr/io.h>
+#include <board.h>
 #include <util/atomic.h>
 
-#include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/clock.h"
 
 #define COUNT_CYCLES 64u

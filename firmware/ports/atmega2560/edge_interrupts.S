@@ -3,21 +3,22 @@
 
 #include <avr/io.h>
 
-#include "firmware/ports/atmega2560/board.h"
+#include <board.h>
 #include "firmware/ports/atmega2560/emission_slots.h"
 
     .section .vectors, "ax", @progbits
 
 ; Each edge once, with its time.
-    .global INT0_vect
-INT0_vect:
-    lds DATA_LOW, TCNT5L
-    lds DATA_HIGH, TCNT5H
+    .global TRIGGER_VECTOR
+TRIGGER_VECTOR:
+    lds DATA_LOW, CLOCK_COUNT_LOW
     sts trigger_count, DATA_LOW
-    sts trigger_count+1, DATA_HIGH
-    cbi _SFR_IO_ADDR(EIMSK), INT0
+    lds DATA_LOW, CLOCK_COUNT_HIGH
+    sts trigger_count+1, DATA_LOW
+    cbi _SFR_IO_ADDR(EIMSK), TRIGGER_INT
     reti
 
+#ifdef TCNT4
 ; Compare A of timer 4 begins the pulse, compare B ends it. Each goes off by itself, and leaves the other as it is
 ; wanted: a compare comes again whenever the timer has gone round.
     .global TIMER4_COMPA_vect
@@ -35,3 +36,4 @@ TIMER4_COMPB_vect:
     lds DATA_LOW, compare_rises
     sts TIMSK4, DATA_LOW
     reti
+#endif

@@ -1,10 +1,10 @@
 #include "firmware/ports/atmega2560/emission.h"
 
 #include <avr/interrupt.h>
+#include <board.h>
 #include <stddef.h>
 #include <util/atomic.h>
 
-#include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/emission_slots.h"
 
@@ -12,7 +12,7 @@
 // cycles after its compare, and up to 35 later if another interrupt is being served; B's 4 after
 // its own.
 #define PULSE_END_CYCLES 82u
-// To compare C: B has been served.
+// To compare C, where timer 1 has one: B has been served.
 #define CHANGE_CYCLES 92u
 // Until the first slot.
 #define START_CYCLES 400u
@@ -168,15 +168,17 @@ void emission_start(void) {
   GPIOR0 = 1 << TICK_IS_NEXT | 1 << TICK_CHANGES;
   OCR1A = START_CYCLES - 1u;
   OCR1B = PULSE_END_CYCLES;
+#ifdef OCR1C
   OCR1C = CHANGE_CYCLES;
+#endif
   TCNT1 = 0;
   TCCR1A = 0;
   core_start = emission_next_start = clock_now() + START_CYCLES;
   TCCR1B = 1 << WGM12 | 1 << CS10;
   while (TCNT1 <= CHANGE_CYCLES) {
   }
-  TIFR1 = 1 << OCF1A | 1 << OCF1B | 1 << OCF1C;
-  TIMSK1 = 1 << OCIE1A | 1 << OCIE1B | 1 << OCIE1C;
+  TIFR1 = BOARD_SLOT_FLAGS;
+  TIMSK1 = BOARD_SLOT_INTERRUPTS;
 }
 
 void emission_ready(const bushd_slot_buffer* slot_buffer) {

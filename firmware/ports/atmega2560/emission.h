@@ -19,8 +19,6 @@
 // Most that a frame asks for takes no longer than twice that: then the next tick is not begun too
 // late.
 #define EMISSION_FRAME_CYCLES 2000u
-// Shorter, slots would not hold their interrupts.
-#define EMISSION_MIN_TICK_NS 900000u
 
 // All of these are for the main loop only.
 

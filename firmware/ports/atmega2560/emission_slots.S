@@ -7,7 +7,7 @@
 
 #include <avr/io.h>
 
-#include "firmware/ports/atmega2560/board.h"
+#include <board.h>
 #include "firmware/ports/atmega2560/emission_slots.h"
 
 #define TICK_FLAGS _SFR_IO_ADDR(GPIOR0)

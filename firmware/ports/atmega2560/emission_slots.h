@@ -10,7 +10,7 @@
 #define SAVED_LOW r4  // a pointer register of the code that was interrupted
 #define SAVED_HIGH r5
 #define DATA_LOW r6
-#define DATA_HIGH r7
+#define DATA_HIGH r7  // of the slots alone, for their second port
 #define SLOT_MARK r8  // low byte of SLOT behind the first slot of a tick, later behind its last one
 #define ZERO r9
 

@@ -1,6 +1,6 @@
 #include "firmware/ports/atmega2560/inputs.h"
 
-#include "firmware/ports/atmega2560/board.h"
+#include <board.h>
 
 #define SETTLE_CYCLES (200UL * CYCLES_PER_US)
 

@@ -1,8 +1,8 @@
 #include "firmware/ports/atmega2560/line.h"
 
 #include <avr/interrupt.h>
+#include <board.h>
 
-#include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/line_interrupts.h"
 
@@ -16,9 +16,10 @@
 #define SKIPPED_BYTES 64u
 _Static_assert(LINE_REPLY_AT >= 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC + 2 * CHECK_BYTES,
                "what others answer needs less (bushd_receiver_pass_reply)");
-// What timer 3 waits for at least, and at most at a time.
-#define SHORTEST_CYCLES 64UL
-#define TURN_CYCLES 30000UL
+// What timer 3 waits for at least, and at most at a time: in its counts.
+#define SHORTEST_COUNTS (64UL / LINE_COUNT_CYCLES)
+#define TURN_COUNTS 30000UL
+#define WAITING (1 << OCIE3A)
 
 // Filled by line_interrupts.S.
 // At the end of RAM (CMakeLists.txt), above the stack.
@@ -29,24 +30,24 @@ static uint8_t stamps_out;
 static uint32_t last_delimiter;
 
 volatile uint8_t line_sending_end;
-static uint32_t cycles_to_wait;
+static uint32_t counts_to_wait;
 
 // Timer 3 runs freely; until an answer is due it may take several turns. None is short.
 static uint16_t next_turn(void) {
-  const uint16_t turn = (uint16_t)(cycles_to_wait < 2 * TURN_CYCLES ? cycles_to_wait : TURN_CYCLES);
-  cycles_to_wait -= turn;
+  const uint16_t turn = (uint16_t)(counts_to_wait < 2 * TURN_COUNTS ? counts_to_wait : TURN_COUNTS);
+  counts_to_wait -= turn;
   return turn;
 }
 
 static inline void wait_until(uint16_t count) {
-  OCR3A = count;
+  line_timer_wait(count);
   TIFR3 = 1 << OCF3A;
-  TIMSK3 = 1 << OCIE3A;
+  TIMSK3 = LINE_OTHER_INTERRUPTS | WAITING;
 }
 
 ISR(TIMER3_COMPA_vect, ISR_NOBLOCK) {
-  TIMSK3 = 0;
-  if (cycles_to_wait != 0) {
+  TIMSK3 = LINE_OTHER_INTERRUPTS;
+  if (counts_to_wait != 0) {
     wait_until((uint16_t)(OCR3A + next_turn()));
     return;
   }
@@ -56,7 +57,7 @@ ISR(TIMER3_COMPA_vect, ISR_NOBLOCK) {
 
 void line_init(void) {
   LINE_IN = LINE_OUT = 0;
-  TCCR3B = 1 << CS30;
+  line_timer_start();
   UCSR0A = 1 << U2X0;
   UBRR0H = (uint8_t)(DIVISOR >> 8);
   UBRR0L = (uint8_t)DIVISOR;
@@ -81,7 +82,7 @@ static inline bool is_sending(void) {
 
 // An answer waits, or is being sent.
 static inline bool has_reply(void) {
-  return TIMSK3 != 0 || is_sending();
+  return (TIMSK3 & WAITING) != 0 || is_sending();
 }
 
 // Of the buffer. What others answer finds room before an answer that waits. A master that speaks
@@ -90,7 +91,7 @@ static uint16_t room_for(const bushd_receiver* receiver, uint8_t more) {
   if (!has_reply()) return sizeof receiver->buffer;
   const bool fits = receiver->size + more <= LINE_REPLY_AT || receiver->size > LINE_REPLY_AT;
   if (fits || (receiver->buffer[2] & BUSHD_TYPE_REPLY) != 0) return LINE_REPLY_AT;
-  TIMSK3 = 0;
+  TIMSK3 = LINE_OTHER_INTERRUPTS;
   return is_sending() ? LINE_REPLY_AT : sizeof receiver->buffer;
 }
 
@@ -150,7 +151,7 @@ bool line_is_idle(void) {
 bool line_may_take(const bushd_receiver* receiver) {
   // Less is no frame, but what a transceiver makes of its switching on.
   const bool whole = receiver->size >= 1 + BUSHD_FRAME_HEADER + BUSHD_FRAME_CRC;
-  if (whole && (receiver->buffer[2] & BUSHD_TYPE_REPLY) == 0) TIMSK3 = 0;
+  if (whole && (receiver->buffer[2] & BUSHD_TYPE_REPLY) == 0) TIMSK3 = LINE_OTHER_INTERRUPTS;
   return !is_sending();
 }
 
@@ -165,20 +166,20 @@ void line_transmit(const uint8_t* wire, size_t size, uint32_t delay_ns) {
   // Reply slots are whole multiples of 10 us.
   const uint32_t delay = delay_ns / 1000u * CYCLES_PER_US;
   const uint32_t due = last_delimiter + (delay > TURNAROUND_CYCLES ? delay : TURNAROUND_CYCLES);
-  TIMSK3 = 0;
-  LINE_SENDING_LOW = (uint8_t)(uintptr_t)wire;
-  LINE_SENDING_HIGH = (uint8_t)((uintptr_t)wire >> 8);
+  TIMSK3 = LINE_OTHER_INTERRUPTS;
+  line_set_sending(wire);
   line_sending_end = (uint8_t)(uintptr_t)(wire + size);
   const uint32_t now = clock_now();
-  cycles_to_wait = clock_before(now + SHORTEST_CYCLES, due) ? due - now : SHORTEST_CYCLES;
+  const bool early = clock_before(now + SHORTEST_COUNTS * LINE_COUNT_CYCLES, due);
+  counts_to_wait = early ? (due - now) / LINE_COUNT_CYCLES : SHORTEST_COUNTS;
   const uint16_t turn = next_turn();
   // With interrupts on, so that no slot waits for it. If they took so long that the count was
   // passed before it was set, the compare would come a turn of the timer later.
   for (;;) {
-    const uint16_t begin = TCNT3;
+    const uint16_t begin = line_timer_now();
     wait_until((uint16_t)(begin + turn));
-    if ((uint16_t)(TCNT3 - begin) < turn) return;
-    TIMSK3 = 0;
+    if ((uint16_t)(line_timer_now() - begin) < turn) return;
+    TIMSK3 = LINE_OTHER_INTERRUPTS;
     if (is_sending()) return;
   }
 }

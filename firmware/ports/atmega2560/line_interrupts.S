@@ -5,7 +5,8 @@
 
 #include <avr/io.h>
 
-#include "firmware/ports/atmega2560/board.h"
+#include <board.h>
+#include <board.inc>
 #include "firmware/ports/atmega2560/emission_slots.h"
 #include "firmware/ports/atmega2560/line_interrupts.h"
 
@@ -18,8 +19,8 @@ USART0_RX_vect:
     ldi r31, hi8(line_bytes)
     lds DATA_LOW, UDR0
     st Z+, DATA_LOW
-    in DATA_HIGH, _SFR_IO_ADDR(LINE_OUT)
-    cpse r30, DATA_HIGH
+    in r31, _SFR_IO_ADDR(LINE_OUT)
+    cpse r30, r31
     rjmp has_room
     ; The ring is full: the byte is lost.
     movw r30, SAVED_LOW
@@ -39,9 +40,9 @@ has_room:
 1:
     ; The trigger's interrupt reads the timer through the same register for its high byte, which counts then if the low
     ; one has begun anew.
-    lds r30, TCNT5L
-    lds r31, TCNT5H
-    lds r24, TCNT5L
+    lds r30, CLOCK_COUNT_LOW
+    lds r31, CLOCK_COUNT_HIGH
+    lds r24, CLOCK_COUNT_LOW
     cp r24, r30
     brlo 1b
     push r26
@@ -71,8 +72,7 @@ has_room:
     .global USART0_UDRE_vect
 USART0_UDRE_vect:
     movw SAVED_LOW, r30
-    in r30, _SFR_IO_ADDR(LINE_SENDING_LOW)
-    in r31, _SFR_IO_ADDR(LINE_SENDING_HIGH)
+    load_sending
     ld DATA_LOW, Z+
     sts UDR0, DATA_LOW
     lds DATA_LOW, line_sending_end
@@ -86,8 +86,7 @@ USART0_UDRE_vect:
     movw r30, SAVED_LOW
     reti
 more_to_send:
-    out _SFR_IO_ADDR(LINE_SENDING_LOW), r30
-    out _SFR_IO_ADDR(LINE_SENDING_HIGH), r31
+    store_sending
     movw r30, SAVED_LOW
     reti
 

@@ -10,10 +10,6 @@
 #define LINE_IN GPIOR1
 #define LINE_OUT GPIOR2
 
-// Where the next byte to be sent lies: in registers of timer 0, which is at rest.
-#define LINE_SENDING_LOW OCR0A
-#define LINE_SENDING_HIGH OCR0B
-
 #ifndef __ASSEMBLER__
 
 #include <stdint.h>

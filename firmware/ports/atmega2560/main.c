@@ -2,8 +2,8 @@
 // collect bytes with the times of delimiters, and send; the core runs in the main loop only.
 #include <avr/interrupt.h>
 #include <avr/wdt.h>
+#include <board.h>
 
-#include "firmware/ports/atmega2560/board.h"
 #include "firmware/ports/atmega2560/boot_tests.h"
 #include "firmware/ports/atmega2560/clock.h"
 #include "firmware/ports/atmega2560/compare_output.h"
@@ -16,17 +16,15 @@
 #include "firmware/ports/atmega2560/trigger.h"
 #include "firmware/ports/memory_names.h"
 
-#define QUEUE_TICKS 64u
-#define TABLE_CODES 952u  // four tables of 238 codes
-_Static_assert(BUSHD_MCU_NVM_MAX_BYTES(TABLE_CODES) <= NVM_MOST_BYTES,
+_Static_assert(BUSHD_MCU_NVM_MAX_BYTES(BOARD_TABLE_CODES) <= NVM_MOST_BYTES,
                "the EEPROM holds all of it");
 // Only a new tick keeps it quiet, which takes timer, interrupts and main loop. The longest lasts 20
 // ms.
 #define WATCHDOG WDTO_120MS
 
 static bushd_mcu mcu;
-static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
-static uint16_t codes[TABLE_CODES];
+static int16_t queue[BOARD_QUEUE_TICKS * BOARD_MOTORS];
+static uint16_t codes[BOARD_TABLE_CODES];
 static uint8_t failed_tests;
 
 static inline void name_parts(void) {
@@ -128,18 +126,19 @@ __attribute__((noinline)) static void boot(void) {
   port.self_test = port_self_test;
   port.keep_enable = port_keep_enable;
   port.set_trigger = port_set_trigger;
-  bushd_mcu_config config = {.motors = BUSHD_MOTORS_PER_MCU,
+  port.set_current = BOARD_SET_CURRENT;
+  bushd_mcu_config config = {.motors = BOARD_MOTORS,
                              .slots = EMISSION_SLOTS,
-                             .min_tick_ns = EMISSION_MIN_TICK_NS,
-                             // A frame of them stands for more ticks than it could make in one;
-                             // a line of more than a few motors would take it longer than a tick.
-                             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN,
+                             .min_tick_ns = BOARD_MIN_TICK_NS,
+                             .disabled_capabilities = BOARD_DISABLED,
                              .pulse_ns = EMISSION_PULSE_NS,
                              .in_pieces = true,
+                             .currents = BOARD_CURRENTS,
+                             .current_motors = BOARD_CURRENT_MOTORS,
                              .queue = queue,
-                             .queue_ticks = QUEUE_TICKS,
+                             .queue_ticks = BOARD_QUEUE_TICKS,
                              .codes = codes,
-                             .code_count = TABLE_CODES,
+                             .code_count = BOARD_TABLE_CODES,
                              .reply = line_reply(&mcu.receiver)};
   identity kept;
   config.reset_cause = reset_cause();

@@ -56,12 +56,12 @@ void bushd_slots_clear(uint16_t* masks, uint16_t slot_count) {
 void bushd_slots_fill(uint16_t* masks, uint16_t slot_count, const bushd_slots* plans,
                       uint8_t motors) {
   (void)slot_count;
-  (void)motors;
   for (uint8_t half = 0; half < 2; ++half) {
     uint8_t* const bytes = (uint8_t*)masks + half;
     const bushd_slots* const eight = plans + 8 * half;
+    const uint8_t its = motors > 8 * half ? 8 : 0;  // an MCU has 8 or 16
     bool moves = false;
-    for (uint8_t m = 0; m < 8; ++m) moves = moves || eight[m].distance != 0;
+    for (uint8_t m = 0; m < its; ++m) moves = moves || eight[m].distance != 0;
     if (moves) {
       fill_fine(bytes, eight);
     } else {

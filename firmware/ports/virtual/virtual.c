@@ -225,6 +225,12 @@ static uint16_t port_read_current(void* context) {
   return v->current;
 }
 
+static void port_set_current(void* context, uint8_t motor, uint16_t ma, bool fast_decay) {
+  bushd_virtual* v = context;
+  (void)fast_decay;
+  v->current_ma[motor] = ma;
+}
+
 static uint8_t port_self_test(void* context) {
   const bushd_virtual* v = context;
   return v->failing_tests;
@@ -236,18 +242,20 @@ static void port_keep_enable(void* context, bool on) {
 }
 
 static void boot(bushd_virtual* v) {
-  const bushd_port port = {.context = v,
-                           .transmit = port_transmit,
-                           .store_address = port_store_address,
-                           .set_enable = port_set_enable,
-                           .set_tick = port_set_tick,
-                           .adjust_tick = port_adjust_tick,
-                           .time_in_tick_ns = port_time_in_tick_ns,
-                           .read_inputs = port_read_inputs,
-                           .read_current = port_read_current,
-                           .self_test = port_self_test,
-                           .keep_enable = port_keep_enable,
-                           .set_trigger = port_set_trigger};
+  const bushd_port port = {
+      .context = v,
+      .transmit = port_transmit,
+      .store_address = port_store_address,
+      .set_enable = port_set_enable,
+      .set_tick = port_set_tick,
+      .adjust_tick = port_adjust_tick,
+      .time_in_tick_ns = port_time_in_tick_ns,
+      .read_inputs = port_read_inputs,
+      .read_current = port_read_current,
+      .self_test = port_self_test,
+      .keep_enable = port_keep_enable,
+      .set_trigger = port_set_trigger,
+      .set_current = v->config.mcu.current_motors > 0 ? port_set_current : NULL};
   v->config.mcu.reset_cause = v->reset_cause;
   v->config.mcu.enable_at_boot = v->enable_kept && v->reset_cause == BUSHD_RESET_WATCHDOG;
   v->enable_kept = false;
@@ -258,6 +266,8 @@ static void boot(bushd_virtual* v) {
   v->tick_ns = BUSHD_BOOT_TICK_NS;
   v->adjust_ns = 0;
   v->trigger_edge = BUSHD_EDGE_NONE;
+  memset(v->currents, 0, sizeof v->currents);
+  memset(v->current_ma, 0, sizeof v->current_ma);
   begin_tick(v, 0);
   bushd_mcu_boot(&v->mcu, &port, &v->config.mcu);
   bushd_mcu_prepare(&v->mcu);
@@ -269,6 +279,7 @@ void bushd_virtual_init(bushd_virtual* v, const bushd_virtual_config* config) {
   memset(v, 0, sizeof *v);
   v->config = *config;
   v->config.mcu.reply = v->reply;
+  v->config.mcu.currents = v->currents;
   v->next_event_ns = config->boot_ns;
   v->reset_cause = BUSHD_RESET_POWER_ON;
 }

@@ -75,6 +75,7 @@ typedef struct bushd_virtual {
   bushd_inputs inputs;                               // the input pins
   uint16_t current;                                  // set: what the current sensor reads
   uint8_t failing_tests;                             // set: BUSHD_TEST_*, for the next boots
+  uint16_t current_ma[BUSHD_MAX_CURRENT_MOTORS];     // of windings, as the MCU wants them; 0: none
   uint8_t reset_cause;  // set: BUSHD_RESET_* of the next boot; falls to external with each
 
   // Private.
@@ -93,6 +94,7 @@ typedef struct bushd_virtual {
   bool enable_level;
   bool enable_kept;
   uint8_t reply[BUSHD_MCU_MAX_REPLY];
+  bushd_mcu_currents currents[BUSHD_MAX_CURRENT_MOTORS];
   bool compare_level;
   bushd_edge trigger_edge;  // awaited
 } bushd_virtual;

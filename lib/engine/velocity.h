@@ -1,0 +1,50 @@
+// The velocity loop of "Stepper motor controller, part 3": a motor that follows a wanted speed with
+// constant acceleration, in whole numbers.
+//
+// VC, the speed now, and VR, the wanted one, are signed, in 1/64 step/s. Every 15.625 ms, which are
+// 625 intervals of 25 us, VC moves towards VR by A and is no more than VR then. So it goes through
+// 0 by itself where their signs differ. The period of steps, in intervals, is
+//
+//     T = floor(2560000 / max(|VC|, VMIN))
+//
+// and takes effect when the one that is running has ended. With VC = 0 no step is made.
+#ifndef BUSHD_ENGINE_VELOCITY_H
+#define BUSHD_ENGINE_VELOCITY_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define BUSHD_VELOCITY_INTERVAL_NS 25000u
+#define BUSHD_VELOCITY_UPDATE_INTERVALS 625u  // 1/64 s
+#define BUSHD_VELOCITY_PERIOD_OF_ONE 2560000u
+// Of VMIN: T has 16 bits. Of all: the variables have 24.
+#define BUSHD_VELOCITY_LEAST 40
+#define BUSHD_VELOCITY_MOST 0x7FFFFF
+
+typedef struct bushd_velocity {
+  // Settings, in 1/64 step/s.
+  int32_t wanted;  // VR, |VR| <= BUSHD_VELOCITY_MOST
+  int32_t
+      change;     // A, 1..BUSHD_VELOCITY_MOST: of the speed in 1/64 s, so steps/s^2 in its own unit
+  int32_t least;  // VMIN, BUSHD_VELOCITY_LEAST..BUSHD_VELOCITY_MOST
+  // State.
+  int32_t now;         // VC
+  uint16_t period;     // T
+  uint16_t step_left;  // intervals of the running period (STCNT)
+  uint16_t update_left;
+} bushd_velocity;
+
+// At rest. Preconditions: the ranges above.
+void bushd_velocity_init(bushd_velocity* velocity, int32_t change, int32_t least);
+
+// The next interval of 25 us: +1 or -1 if a step is made at its end, else 0. O(1), a division in
+// one interval of 625.
+int8_t bushd_velocity_interval(bushd_velocity* velocity);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

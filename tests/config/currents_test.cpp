@@ -1,0 +1,57 @@
+// `currents` of a motor: peak currents of its windings.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "config/config.h"
+#include "config/config_file.h"
+
+namespace bushd::config {
+namespace {
+
+using test::ConfigFile;
+using test::kGood;
+using test::replaced;
+using testing::HasSubstr;
+
+// Of "theta", on an MCU with this emission; on line 33.
+std::string with(const std::string& currents, const std::string& emission = "phases") {
+  const std::string mcu =
+      replaced(kGood, "address = 1\n", "address = 1\nemission = \"" + emission + "\"\n");
+  return replaced(mcu, "output = 0\n", "output = 0\ncurrents = " + currents + "\n");
+}
+
+std::string error_of(const std::string& text) {
+  const ConfigFile file(text);
+  const auto config = file.load();
+  return config ? "no error" : config.error().text();
+}
+
+TEST(Currents, AreReadOfAMotorWithPhases) {
+  const auto config =
+      ConfigFile(with("{ ramp_ma = 1500, cruise_ma = 1000, hold_ma = 300, decay = \"fast\" }"))
+          .load();
+  ASSERT_TRUE(config) << config.error().text();
+  const auto& currents = config->motors[0].currents;
+  ASSERT_TRUE(currents);
+  EXPECT_EQ(currents->ramp_ma, 1500);
+  EXPECT_EQ(currents->cruise_ma, 1000);
+  EXPECT_EQ(currents->hold_ma, 300);
+  EXPECT_TRUE(currents->fast_decay);
+  EXPECT_FALSE(config->motors[1].currents);
+}
+
+TEST(Currents, WhatIsWrongIsNamed) {
+  EXPECT_THAT(error_of(with("{ ramp_ma = 1, cruise_ma = 1, hold_ma = 1 }", "even")),
+              HasSubstr("33:12: motor[0].currents: says nothing of a driver with STEP and DIR; "
+                        "allowed: only with emission = \"phases\" of its MCU"));
+  EXPECT_THAT(error_of(with("{ ramp_ma = 1500, cruise_ma = 1000 }")), HasSubstr("hold_ma"));
+  EXPECT_THAT(error_of(with("{ ramp_ma = 5111, cruise_ma = 1, hold_ma = 1 }")),
+              HasSubstr("ramp_ma: is 5111; allowed: a whole number 1..5110 mA"));
+  EXPECT_THAT(error_of(with("{ ramp_ma = 9, cruise_ma = 1, hold_ma = 1, decay = \"mixed\" }")),
+              HasSubstr("decay: is \"mixed\"; allowed: \"slow\" or \"fast\""));
+}
+
+}  // namespace
+}  // namespace bushd::config
