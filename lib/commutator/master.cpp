@@ -165,7 +165,39 @@ void Master::ask(std::int64_t now_us) {
   const auto next = motion.cut ? std::nullopt : motion.steps.take();
   if (!next) return end_motion();
   motion.asked = next;
-  exchange_.step(now_us, motion.motor, next->direction < 0, next->delay_ns);
+  exchange_.step(now_us, motion.motor, next->direction < 0, paced(now_us, next->delay_ns));
+}
+
+// The delay of the next step: that of the plan, or longer on the way up again after a pause.
+std::uint64_t Master::paced(std::int64_t now_us, std::uint64_t delay_ns) {
+  Motion& motion = *motion_;
+  const auto slot = board_.setup.table_of_motor.at(motion.motor);
+  const bushd_table& table = *board_.setup.tables.at(*slot).table;
+  const auto accel_ns = [&table](std::uint32_t i) {
+    return std::uint64_t{table.accel.code[i]} * table.time_unit_ns;
+  };
+  if (motion.delay_ns != 0) {
+    const auto taken_ns =
+        static_cast<std::uint64_t>(std::max<std::int64_t>(now_us - motion.sent_us, 0)) * 1000;
+    const std::uint64_t late_ns = taken_ns - std::min(taken_ns, motion.delay_ns);
+    const std::uint64_t interval_ns = delay_ns + late_ns;
+    if (motion.interval_ns < accel_ns(0) && late_ns > accel_ns(0)) {
+      uncertain(motion.motor,
+                fmt::format("there was a pause of {} ms between two steps at speed, so it stood, "
+                            "and may have lost steps",
+                            interval_ns / 1'000'000));
+      motion.steps_since_pause = 0;
+    }
+    motion.interval_ns = interval_ns;
+  }
+  if (motion.steps_since_pause < table.accel.count) {
+    // The pause was the first delay.
+    const std::uint32_t i = motion.steps_since_pause++;
+    if (i != 0) delay_ns = std::max(delay_ns, accel_ns(i));
+  }
+  motion.sent_us = now_us;
+  motion.delay_ns = delay_ns;
+  return delay_ns;
 }
 
 void Master::answered(std::int64_t now_us, const Status& status) {

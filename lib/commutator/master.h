@@ -7,6 +7,9 @@
 // which the plan has made no more steps than the motor has, and what is planned from a tick on is
 // planned from a step on.
 //
+// A pause at speed that lets the motor stand (longer than the first delay of its table) makes its
+// position uncertain, and from there it speeds up by its table again.
+//
 // A step without an answer, or a supply or motor that the board misses, ends the motion and takes
 // the MCU off line for a while; the motor's position is then uncertain by one step, or by what an
 // unpowered motor does, and that is said. A board says nothing unless it is asked for a step, so it
@@ -70,6 +73,11 @@ class Master final : public link::BusMaster {
     PlannedSteps steps;
     std::optional<PlannedSteps::Step> asked{};  // of the board
     bool cut = false;                           // no step more
+    // Of the code sent last, and the interval between its step and the one before.
+    std::int64_t sent_us = 0;
+    std::uint64_t delay_ns = 0;
+    std::uint64_t interval_ns = UINT64_MAX;
+    std::uint32_t steps_since_pause = UINT32_MAX;
   };
 
   std::int64_t plan_ns(std::int64_t now_us) const;
@@ -80,6 +88,7 @@ class Master final : public link::BusMaster {
   void lost(std::int64_t now_us, const std::string& cause);
   void take_limits(const Status& status, std::uint8_t motor);
   void ask(std::int64_t now_us);
+  std::uint64_t paced(std::int64_t now_us, std::uint64_t delay_ns);
   void leave_plan();
   void cut();
   void end_motion();

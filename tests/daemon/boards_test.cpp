@@ -187,6 +187,35 @@ TEST(Boards, LostAnswerIsAStepThatIsUncertainAndSaid) {
   EXPECT_EQ(lab.move("m0", 100).result, "reached");
 }
 
+// A motor at 2500 steps/s that gets no code for 30 ms stands, and cannot go on at 2500 steps/s.
+TEST(Boards, PauseAtSpeedIsSaidAndFollowedByTheRampUp) {
+  const auto accel = codes_of("bushd2-constant");
+  BoardLab lab;
+  const auto move = lab.send(Ask::kMoveBy, {"m0"}, {3000});
+  lab.moves(1000);
+  lab.pause_daemon(0.03);
+  const Answer answer = lab.wait(move);
+  EXPECT_EQ(answer.result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m0"), 3000);
+  EXPECT_THAT(lab.motor("m0").uncertain_reason, HasSubstr("a pause of 30 ms between two steps"));
+  const auto& steps = lab.board(0).steps();
+  std::size_t paused = 1;
+  while (steps[paused].time_ns - steps[paused - 1].time_ns < 20'000'000) ++paused;
+  for (std::size_t i = 1; i < accel.size(); ++i) {
+    const std::int64_t taken_ns = steps[paused + i].time_ns - steps[paused + i - 1].time_ns;
+    ASSERT_GE(taken_ns, accel[i] * kUnitNs) << i;
+    ASSERT_LE(taken_ns, accel[i] * kUnitNs + 180'000) << i;
+  }
+
+  // A slow motor stands between all steps.
+  lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {0}));
+  const auto slow = lab.send(Ask::kMoveBy, {"m0"}, {2});
+  lab.run_for(0.005);
+  lab.pause_daemon(0.03);
+  EXPECT_EQ(lab.wait(slow).result, "reached");
+  EXPECT_TRUE(lab.trusted("m0"));
+}
+
 TEST(Boards, CableThatIsCutLosesOneStepAtMost) {
   BoardLab lab;
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
