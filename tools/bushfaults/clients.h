@@ -9,6 +9,7 @@
 
 #include "joggers.h"
 #include "kinds.h"
+#include "programs.h"
 #include "request.h"
 #include "sim/line.h"
 #include "sim/random.h"
@@ -71,6 +72,7 @@ class Clients {
   Request jog();
   Request pause_or_hold();
   Request change_settings();
+  Request of_program();
   Request of_some(Ask ask, std::vector<std::string> motors);
   std::vector<std::string> motors_with(bool bushd::api::MotorState::*flag) const;
   std::optional<Request> remedy_of_pauses();
@@ -88,6 +90,7 @@ class Clients {
   const double per_hour_;  // of all kinds
   bushd::sim::Random random_;
   Joggers joggers_;
+  Programs programs_;
   CommandCounts sent_by_kind_{};
 };
 

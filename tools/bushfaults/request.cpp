@@ -7,6 +7,9 @@
 #include <optional>
 #include <string_view>
 #include <utility>
+#include <vector>
+
+#include "camac/module.h"
 
 namespace bushfaults {
 namespace {
@@ -78,6 +81,23 @@ api::MoveLine line_of(const Request& request) {
       .speed = speed_of(request)};
 }
 
+// Those at one address are one, which shows the first word.
+std::vector<std::pair<bushd::camac::Naf, int>> runs_of(
+    const std::vector<bushd::camac::Naf>& cycles) {
+  std::vector<std::pair<bushd::camac::Naf, int>> runs;
+  for (const bushd::camac::Naf& naf : cycles) {
+    const bool same = !runs.empty() && runs.back().first.station == naf.station &&
+                      runs.back().first.subaddress == naf.subaddress &&
+                      runs.back().first.function == naf.function;
+    if (same) {
+      ++runs.back().second;
+    } else {
+      runs.emplace_back(naf, 1);
+    }
+  }
+  return runs;
+}
+
 std::string_view word_of(const Request& request) {
   switch (request.ask) {
     case Ask::kMoveBy:
@@ -141,6 +161,10 @@ api::Request api_of(const Request& request) {
       return api::Release{request.motors};
     case Ask::kConfigure:
       return configure_of(request);
+    case Ask::kCamac:
+      return api::Camac{
+          .block = {.cycles = request.cycles,
+                    .count = static_cast<std::uint32_t>(request.cycles.size())}};
     case Ask::kDisarm:
       break;
   }
@@ -177,6 +201,11 @@ std::string text_of(const Request& request) {
   if (request.renew) how += " (renewed)";
   if (request.ask == Ask::kJog) how += fmt::format(", {} ms", request.keepalive_ms);
   if (request.steps_after) how += fmt::format(", {} steps after", *request.steps_after);
+  for (const auto& [naf, count] : runs_of(request.cycles)) {
+    how += fmt::format(" N{}A{}F{}", naf.station, naf.subaddress, naf.function);
+    if (bushd::camac::writes(naf.function)) how += fmt::format(":{:#x}", naf.data);
+    if (count > 1) how += fmt::format("*{}", count);
+  }
   for (const Setting& setting : request.settings) {
     const auto [key, value] = key_and_value(setting);
     how += fmt::format(" {}={}", key, value);

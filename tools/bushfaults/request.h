@@ -33,6 +33,7 @@ enum class Ask : std::uint8_t {
   kHold,
   kRelease,
   kConfigure,
+  kCamac,
 };
 
 // What a motor may be given in operation. Numbers are millionths of its unit.
@@ -65,6 +66,8 @@ struct Request {
   std::vector<Setting> settings{};            // kConfigure: as many as motors
   bool rising = false;                        // kArm: the edge
   std::int32_t delay_us = 0;                  // kArm
+  std::vector<bushd::camac::Naf> cycles{};    // kCamac
+  bool unknown_way = false;                   // a move, and nobody knows by how many steps
   Damage damage = Damage::kNone;
 
   void add(const std::string& motor, std::int64_t steps_of_it) {
