@@ -295,6 +295,10 @@ Request Clients::compose(CommandKind kind) {
       return change_settings();
     case CommandKind::kLine:
       return move_along_line();
+    case CommandKind::kPath:
+      return move_along_path();
+    case CommandKind::kArray:
+      return tell_array();
     case CommandKind::kCamac:
       return of_program();
   }

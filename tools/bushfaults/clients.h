@@ -30,8 +30,12 @@ class Clients {
   Request enable_all() { return of_all_online(Ask::kEnable); }
   Request clear_all() { return of_all_online(Ask::kClearFaults); }
   // What those ask who have begun to jog; before quiet they die.
-  std::vector<Request> due(bushd::sim::TimeNs now_ns) { return joggers_.due(now_ns); }
-  void let_go() { joggers_.die(); }
+  // So do those whose array was told; what is left of it comes later.
+  std::vector<Request> due(bushd::sim::TimeNs now_ns);
+  void let_go() {
+    joggers_.die();
+    later_.clear();
+  }
   // Some MCU stands still after an emergency stop or input, as far as the daemon has said.
   bool emergency() const { return says("emergency"); }
 
@@ -73,6 +77,10 @@ class Clients {
   Request pause_or_hold();
   Request change_settings();
   Request of_program();
+  // Of motors at rest without backlash; one, if there are none.
+  std::vector<Choice> some_at_rest(std::int64_t most);
+  Request move_along_path();
+  Request tell_array();
   Request of_some(Ask ask, std::vector<std::string> motors);
   std::vector<std::string> motors_with(bool bushd::api::MotorState::*flag) const;
   std::optional<Request> remedy_of_pauses();
@@ -91,6 +99,13 @@ class Clients {
   bushd::sim::Random random_;
   Joggers joggers_;
   Programs programs_;
+  struct Later {
+    bushd::sim::TimeNs after_ns;
+    bushd::sim::TimeNs due_ns;  // 0: it has only just been thought of
+    Request request;
+  };
+  std::vector<Later> later_;
+  std::int64_t arrays_ = 0;
   CommandCounts sent_by_kind_{};
 };
 

@@ -188,9 +188,8 @@ Request Clients::of_program() {
   std::int64_t position_steps = 0;
   if (state) {
     const auto& motors = state->motors;
-    position_steps =
-        std::ranges::find(motors, config_[motor].name, &bushd::api::MotorState::name)
-            ->position_steps;
+    position_steps = std::ranges::find(motors, config_[motor].name, &bushd::api::MotorState::name)
+                         ->position_steps;
   }
   return programs_.next(position_steps, number);
 }

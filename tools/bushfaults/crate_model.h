@@ -24,7 +24,7 @@ inline constexpr int kBushd2Station = 5;
 
 // One motion of BUSHD-2: so many steps, at the times of its codes.
 struct ProgramMotion {
-  std::size_t motor = 0;  // of the module
+  std::size_t motor = 0;   // of the module
   std::int64_t steps = 0;  // left: below 0
   std::int64_t first_to_last_ns = 0;
   bushd::camac::Program program{};

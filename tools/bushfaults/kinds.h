@@ -73,8 +73,10 @@ enum class CommandKind : std::uint8_t {
   kSettings,
   kLine,
   kCamac,
+  kPath,
+  kArray,
 };
-inline constexpr std::size_t kCommandKinds = 23;
+inline constexpr std::size_t kCommandKinds = 25;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

@@ -20,8 +20,8 @@ constexpr std::int64_t kLongestProgram = 2000;  // steps: four seconds at most
 // Programs are the table of their group, each of whose codes comes a few times: with so many
 // hundredths of it for each step.
 constexpr std::int64_t kSlowestProgram = 33;
-constexpr std::int64_t kSlowestCode = 250;      // F_start, as of all tables here
-constexpr int kStartHz = 100;                   // likewise
+constexpr std::int64_t kSlowestCode = 250;  // F_start, as of all tables here
+constexpr int kStartHz = 100;               // likewise
 
 // Never faster than the table, and never accelerating more: by that every step is judged.
 std::uint16_t stretched(const bushd_table& table, std::size_t k, std::int64_t hundredths) {
@@ -125,10 +125,10 @@ void Programs::control_crate(Cycles& cycles) {
 // Whatever the crate answers, but what starts motion, writes into memories, or enables overflow.
 void Programs::random_cycles(Cycles& cycles) {
   for (std::int64_t n = random_.between(1, 20); n > 0; --n) {
-    bushd::camac::Naf naf{.station = random_.one_in(2) ? kStation
-                                                       : static_cast<int>(random_.between(1, 31)),
-                          .subaddress = static_cast<int>(random_.below(random_.one_in(4) ? 16 : 4)),
-                          .function = static_cast<int>(random_.below(32))};
+    bushd::camac::Naf naf{
+        .station = random_.one_in(2) ? kStation : static_cast<int>(random_.between(1, 31)),
+        .subaddress = static_cast<int>(random_.below(random_.one_in(4) ? 16 : 4)),
+        .function = static_cast<int>(random_.below(32))};
     if (bushd::camac::writes(naf.function)) {
       naf.data = static_cast<std::uint32_t>(random_.below(1U << 24));
     }

@@ -98,11 +98,42 @@ std::vector<std::pair<bushd::camac::Naf, int>> runs_of(
   return runs;
 }
 
+std::vector<double> numbers_of(const std::vector<std::int64_t>& scaled, double by) {
+  std::vector<double> numbers;
+  for (const std::int64_t one : scaled) numbers.push_back(static_cast<double>(one) / by);
+  return numbers;
+}
+
+api::MovePath path_of(const Request& request) {
+  return {.motors = request.motors,
+          .rows = static_cast<std::int32_t>(request.points.size() / request.motors.size()),
+          .positions = numbers_of(request.points, kMicro),
+          .speeds = request.point_speeds,
+          .corners =
+              request.exact ? api::MovePath::Corners::kExact : api::MovePath::Corners::kContinuous,
+          .speed = speed_of(request)};
+}
+
+api::Follow follow_of(const Request& request) {
+  using Part = api::Follow::Part;
+  const bool rows = request.ask == Ask::kRows;
+  return {.part = !rows               ? Part::kRun
+                  : request.last_rows ? Part::kLastRows
+                                      : Part::kRows,
+          .array = request.array,
+          .motors = request.motors,
+          .cubic = request.cubic,
+          .time_s = numbers_of(request.times_ms, 1000),
+          .positions = numbers_of(request.points, kMicro)};
+}
+
 std::string_view word_of(const Request& request) {
   switch (request.ask) {
     case Ask::kMoveBy:
       return request.line ? "line by" : "move by";
     case Ask::kMoveTo:
+      if (!request.points.empty()) return request.exact ? "exact path to" : "path to";
+      if (request.array != 0) return "follow to";
       return request.line ? "line to" : "move to";
     case Ask::kArm:
       return request.rising ? "arm (rising)" : "arm (falling)";
@@ -125,6 +156,8 @@ api::Request api_of(const Request& request) {
                        .motors = motor_steps(request),
                        .speed = speed_of(request)};
     case Ask::kMoveTo:
+      if (!request.points.empty()) return path_of(request);
+      if (request.array != 0) return follow_of(request);
       if (request.line) return line_of(request);
       return api::Move{.kind = api::Move::Kind::kAbsolute,
                        .motors = motor_steps(request),
@@ -161,10 +194,11 @@ api::Request api_of(const Request& request) {
       return api::Release{request.motors};
     case Ask::kConfigure:
       return configure_of(request);
+    case Ask::kRows:
+      return follow_of(request);
     case Ask::kCamac:
-      return api::Camac{
-          .block = {.cycles = request.cycles,
-                    .count = static_cast<std::uint32_t>(request.cycles.size())}};
+      return api::Camac{.block = {.cycles = request.cycles,
+                                  .count = static_cast<std::uint32_t>(request.cycles.size())}};
     case Ask::kDisarm:
       break;
   }
@@ -201,6 +235,9 @@ std::string text_of(const Request& request) {
   if (request.renew) how += " (renewed)";
   if (request.ask == Ask::kJog) how += fmt::format(", {} ms", request.keepalive_ms);
   if (request.steps_after) how += fmt::format(", {} steps after", *request.steps_after);
+  if (request.array != 0) how += fmt::format(" array {}", request.array);
+  if (!request.points.empty()) how += fmt::format(" by {}", fmt::join(request.points, ","));
+  if (!request.times_ms.empty()) how += fmt::format(" at {}", fmt::join(request.times_ms, ","));
   for (const auto& [naf, count] : runs_of(request.cycles)) {
     how += fmt::format(" N{}A{}F{}", naf.station, naf.subaddress, naf.function);
     if (bushd::camac::writes(naf.function)) how += fmt::format(":{:#x}", naf.data);

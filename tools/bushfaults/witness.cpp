@@ -166,8 +166,9 @@ std::string Witness::not_ready() const {
 }
 
 bool Witness::commands_open() const {
-  return promise_.waits() || crates_.any_open() || std::any_of(asked_.begin(), asked_.end(),
-                                         [](const auto& entry) { return !entry.second.finished; });
+  return promise_.waits() || crates_.any_open() ||
+         std::any_of(asked_.begin(), asked_.end(),
+                     [](const auto& entry) { return !entry.second.finished; });
 }
 
 std::uint64_t Witness::steps_unaccounted() const {

@@ -90,6 +90,9 @@ class Witness {
   std::uint64_t approaches() const { return approaches_; }
   std::uint64_t times_paused() const { return times_paused_; }
   std::uint64_t steps_commanded() const { return steps_commanded_; }
+  // Lines and paths that were reached, and how far motors were off them, in steps.
+  std::uint64_t ways() const { return ways_; }
+  double worst_off_way() const { return worst_off_way_; }
   // Between the last states and the motors, where the daemon claims to know.
   std::uint64_t steps_unaccounted() const;
 
@@ -162,7 +165,9 @@ class Witness {
     std::vector<bool> told{};   // how a run of it ended
     std::vector<bool> stops{};  // somebody has stopped it
     std::optional<JogOpen> jog{};
-    std::vector<std::uint64_t> changes{};        // of settings
+    std::vector<std::int64_t> polyline{};  // row by row, from where they stood, as the plant counts
+    double off_way = 0;                    // at most, so far
+    std::vector<std::uint64_t> changes{};  // of settings
     std::vector<std::optional<bool>> outside{};  // of its new limits; nothing: it is not known
     std::size_t index_of(const std::string& motor) const {
       const auto& all = request.motors;
@@ -216,6 +221,10 @@ class Witness {
   void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void keep_within(TimeNs now_ns, Motor& motor);
+  // Motors on one way, along a line or a path.
+  void begin_way(Asked& asked);
+  void watch_ways();
+  void check_way(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
   void run_begins(TimeNs now_ns, Motor& motor);
   void run_ended(TimeNs now_ns, Motor& motor, End end);
   void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, const End& end,
@@ -273,6 +282,8 @@ class Witness {
   std::uint64_t approaches_ = 0;
   std::uint64_t times_paused_ = 0;
   std::uint64_t steps_commanded_ = 0;
+  std::uint64_t ways_ = 0;
+  double worst_off_way_ = 0;
 };
 
 }  // namespace bushfaults

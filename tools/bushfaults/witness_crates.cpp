@@ -29,9 +29,8 @@ void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& 
   if (accepted.wrong) return violated(now_ns, *accepted.wrong);
   std::erase_if(asked_, [&](const auto& entry) {
     const bool of_module = std::get<1>(entry.first) == Crates::kBushd2Client;
-    return of_module && std::ranges::none_of(motors_, [&](const Motor& other) {
-             return other.move == entry.first;
-           });
+    return of_module && std::ranges::none_of(
+                            motors_, [&](const Motor& other) { return other.move == entry.first; });
   });
   program_ = accepted.motion;
   Request request{.client = Crates::kBushd2Client,
@@ -44,9 +43,8 @@ void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& 
     const bushd::config::Bus& bus = config_.buses.front();
     const auto table = bushd::daemon::table_of_program(program_->program, module.f_start_hz, "");
     if (!table) return violated(now_ns, motor.name + " moves by codes that rise");
-    motor.own_ramp_excess =
-        std::max(motor.own_ramp_excess,
-                 own_ramp_excess((*table)->view(), bus.tick_us * 1000, bus.format));
+    motor.own_ramp_excess = std::max(
+        motor.own_ramp_excess, own_ramp_excess((*table)->view(), bus.tick_us * 1000, bus.format));
   }
   const Key key = key_of(request.id());
   Asked& asked = asked_[key];
@@ -73,8 +71,8 @@ void Witness::check_program(TimeNs now_ns, const Motor& motor) {
   if (!program_ || std::abs(program_->steps) < 2) return;
   const TimeNs tick_ns = config_.buses.front().tick_ns();
   const TimeNs due_ns = program_->first_to_last_ns;
-  const TimeNs took_ns = plant_.last_step_ns(motor.mcu, motor.output) -
-                         plant_.first_step_ns(motor.mcu, motor.output);
+  const TimeNs took_ns =
+      plant_.last_step_ns(motor.mcu, motor.output) - plant_.first_step_ns(motor.mcu, motor.output);
   const TimeNs drift_ns = due_ns / 63;
   if (took_ns >= due_ns - drift_ns - 2 * tick_ns && took_ns <= due_ns + drift_ns + 3 * tick_ns) {
     return;

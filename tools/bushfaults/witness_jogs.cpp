@@ -234,6 +234,7 @@ void Witness::configured(TimeNs now_ns, const Asked& asked, const api::Completed
 }
 
 void Witness::watch(TimeNs now_ns) {
+  watch_ways();
   const bool second = second_ns_ >= 0 && now_ns - second_ns_ < 5 * kSecond;
   for (Motor& motor : motors_) {
     if (second) motor.held_at.reset();

@@ -56,6 +56,7 @@ void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
       motor.range.reset();
     }
   }
+  if (request.is_move() && request.line) begin_way(asked);
 }
 
 void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::size_t i) {
@@ -111,7 +112,8 @@ std::vector<std::int64_t> Witness::legs_to(const Motor& motor, const Request& re
   const std::int64_t backlash = units_.backlash_steps(index);
   const std::int64_t way = target - plant_steps(motor);
   const bool rests = !motor.moves();
-  if (request.ask == Ask::kArm || backlash == 0 || (rests && way == 0)) return {target};
+  const bool straight = !request.points.empty() || request.array != 0;
+  if (straight || request.ask == Ask::kArm || backlash == 0 || (rests && way == 0)) return {target};
   const bool near =
       std::abs(way) <= std::abs(backlash) || !units_.approach_is_slower(index, request);
   if (rests && (way > 0) == (backlash > 0) && near) return {target};
@@ -220,6 +222,7 @@ void Witness::moved(TimeNs now_ns, const Asked& asked, const api::Completed& com
       violated(now_ns, "nobody has stopped it: " + completed.reason);
     }
   }
+  check_way(now_ns, asked, completed);
   const auto wrong = starts_.check(asked.request, asked.first_step_ns);
   if (wrong) violated(now_ns, *wrong);
 }
@@ -251,7 +254,10 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
   if (begins && on_run) {
-    on_run(motor.mcu, motor.output, line.contains("line"), line.at("moves") == "table");
+    // One that is lost makes what its MCU has: of a path, or an array, it may speed up again.
+    const bool winds = line.contains("path") || line.contains("array");
+    on_run(motor.mcu, motor.output, winds || line.contains("line"),
+           winds || line.at("moves") == "table");
   }
   if (begins && motor.move) return run_begins(now_ns, motor);
   if (begins) return;
