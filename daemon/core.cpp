@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/overloaded.h"
+#include "daemon/request_log.h"
 
 namespace bushd::daemon {
 
@@ -44,7 +45,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 [this](MotorId motor) { return departures_.holds(motor); }),
       camac_(installation_, interlocks_, tables_, travels_, kept_, outputs,
              [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
-               this->request(now_us, asker, request);
+               this->request(now_us, logged(asker, request, outputs_), request);
              }),
       // What an MCU's positions are worth comes before whoever goes by that.
       services_{&kept_,    &idle_drivers_,   &journal_, &moves_,     &homing_,  &link_faults_,

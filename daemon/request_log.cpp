@@ -35,6 +35,18 @@ bool is_logged(const api::Request& request) {
   return api::is_stop(request) || !api::is_repeatable(request);
 }
 
+const char* word(api::Transport transport) {
+  switch (transport) {
+    case api::Transport::kSocket:
+      return "socket";
+    case api::Transport::kCamac:
+      return "camac";
+    case api::Transport::kLcm:
+      break;
+  }
+  return "lcm";
+}
+
 std::string line_of(std::int64_t unix_us, const api::Session& session, std::int64_t number,
                     const api::Request& request) {
   nlohmann::json line = {{"event", "request"},
@@ -42,7 +54,7 @@ std::string line_of(std::int64_t unix_us, const api::Session& session, std::int6
                          {"request", api::name_of(request)},
                          {"client", session.client_id()},
                          {"number", number},
-                         {"by", session.transport() == api::Transport::kSocket ? "socket" : "lcm"}};
+                         {"by", word(session.transport())}};
   if (const auto& credentials = session.credentials()) {
     line["uid"] = credentials->uid;
     line["pid"] = credentials->pid;

@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "base/overloaded.h"
+#include "daemon/mcu_setup.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -167,8 +168,24 @@ void Supervisor::watch_for_other_masters(std::int64_t now_us) {
                        "until it is silent");
     } else {
       outputs_.log(LogLevel::kInfo, {}, "bus " + bus.config.name + ": the other master is silent");
+      for (const McuId mcu : installation_.mcus()) {
+        if (&installation_.bus_of(installation_[mcu]) == &bus) to_set_up_.push_back(mcu);
+      }
     }
   }
+  set_up_again();
+}
+
+// Tables, inputs and all else may be those of the other one. What they have already they are not
+// given again, and a motion that has gone on keeps its table.
+void Supervisor::set_up_again() {
+  std::erase_if(to_set_up_, [this](McuId id) {
+    Mcu& mcu = installation_[id];
+    if (installation_.any_moves(mcu)) return false;
+    mcu.reconfigure(setup_of(installation_.config(), id, installation_.tables()));
+    installation_.changed = true;
+    return true;
+  });
 }
 
 }  // namespace bushd::daemon

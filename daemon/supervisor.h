@@ -30,6 +30,7 @@ class Supervisor {
   void goes_offline(std::int64_t now_us, Mcu& mcu);
   void follow_position(MotorId motor, std::int64_t before_steps);
   void reports(std::int64_t now_us, Mcu& mcu);
+  void set_up_again();
   void starts_late(Mcu& mcu, Output output);
   void is_uncertain(const Mcu& mcu, Output output);
   void replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs);
@@ -47,6 +48,7 @@ class Supervisor {
     std::int64_t report_us = 0;                  // the last report
   };
   ById<McuId, Heard> heard_;
+  std::vector<McuId> to_set_up_;  // when they rest, since another master has had them
 };
 
 }  // namespace bushd::daemon

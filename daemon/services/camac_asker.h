@@ -20,7 +20,7 @@ using AskCore =
 class CamacSession final : public api::Session {
  public:
   explicit CamacSession(std::string name)
-      : Session(api::Transport::kSocket, std::move(name), true) {}
+      : Session(api::Transport::kCamac, std::move(name), true) {}
 
   // Of the request that is made next.
   std::int64_t next_number() {

@@ -78,10 +78,11 @@ bool CamacShutter::step(const camac::SingleStep& step) {
 
 bool CamacShutter::travel(const camac::Travel& travel) {
   const Mcu& mcu = installation_.mcu_of(motor_);
-  if (!mcu.can_travel() || (travel.synchronous && !mcu.can_trigger())) {
-    return refuse(
-        "the firmware of its MCU does not travel between limits by itself; modes 00 and "
-        "01 are available");
+  if (!mcu.can_travel()) {
+    return refuse("the firmware of its MCU does not travel between limits by itself; use mode 00");
+  }
+  if (travel.synchronous && !mcu.can_trigger()) {
+    return refuse("its MCU has no trigger input for the reactor start; use mode 10");
   }
   const auto table = table_of_travel(travel, name_);
   if (!table) return refuse(table.error().text());

@@ -13,7 +13,11 @@
 
 namespace bushd::api {
 
-enum class Transport { kLcm, kSocket };
+enum class Transport {
+  kLcm,
+  kSocket,
+  kCamac  // none: a module of a crate, in the daemon itself
+};
 
 // Of the process at the other end of a socket, as the kernel tells it.
 struct Credentials {

@@ -48,6 +48,7 @@ bool Connector::reconfigure(McuIndex mcu, McuSetup setup) {
   McuRecord& record = mcus_[mcu];
   record.setup = std::move(setup);
   if (record.view.phase == McuPhase::kOffline) return false;
+  links_[mcu].was_online |= record.view.phase == McuPhase::kOnline;
   record.view.phase = McuPhase::kConnecting;
   record.view.detail = "being configured";
   record.poll_wanted = true;
@@ -289,6 +290,7 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
   } else if (report.state != BUSHD_STATE_BUSY || !*link.powered) {
     view.phase = McuPhase::kOnline;
     view.detail.clear();
+    link.was_online = false;
     listener_.came_online(mcu);
   } else if ((report.flags & BUSHD_FLAG_CONFIGURED) != 0 &&
              (report.flags & BUSHD_FLAG_ENABLED) == 0) {
@@ -299,7 +301,8 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
 
 void Connector::give_up(McuIndex mcu, const std::string& cause, std::int64_t retry_due_us) {
   McuView& view = mcus_[mcu].view;
-  const bool was_online = view.phase == McuPhase::kOnline;
+  const bool was_online =
+      std::exchange(links_[mcu].was_online, false) || view.phase == McuPhase::kOnline;
   view.phase = McuPhase::kOffline;
   view.detail = cause;
   links_[mcu].retry_due_us = retry_due_us;

@@ -75,6 +75,7 @@ class Connector {
   struct Link {
     SetupQueue queue;
     bool setup_written = false;  // while connecting: into the queue
+    bool was_online = false;     // while it gets another setup: nobody was told otherwise
     // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
     // switched off stay off through restarts and lost links: there may be hands in the mechanism.
     std::optional<bool> powered;

@@ -54,6 +54,11 @@ class PaceRules {
   PaceRules(const bushd_table& table, std::uint32_t tick_ns, std::uint16_t slots,
             bushd_format format);
 
+  // The motor may move by slower tables as well, which take longer to ramp down.
+  void allow_slower(const PaceRules& slower) {
+    for (TimeNs& ns : ramp_down_ns_) ns = std::max(ns, slower.ramp_down_ns_.back());
+  }
+
   TimeNs tick_ns() const { return tick_ns_; }
   std::size_t last() const { return delay_ns_.size() - 1; }              // the index of cruise
   TimeNs delay_ns(std::size_t k) const { return delay_ns_[k]; }          // A(k), 1/63 shorter

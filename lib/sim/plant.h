@@ -68,6 +68,10 @@ class Plant final : public EdgeSink {
   TimeNs first_step_ns(std::size_t mcu, std::size_t output) const {
     return motor_of_[mcu].at(output)->pace.first_ns();
   }
+  // And the last one, so far.
+  TimeNs last_step_ns(std::size_t mcu, std::size_t output) const {
+    return motor_of_[mcu].at(output)->pace.last_ns();
+  }
   // Pulses of all motors.
   std::uint64_t steps_made() const { return steps_made_; }
 

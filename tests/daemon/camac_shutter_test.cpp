@@ -27,6 +27,35 @@ enum Request : std::uint32_t {
 // They fall and rise once, from 20 ms to 2.5 ms.
 const std::vector<int> kCodes{400, 250, 120, 60, 50, 50, 70, 150, 300};
 
+TEST(CamacShutter, AnMcuThatCannotTravelMakesSingleStepsWithoutASensor) {
+  Shutter mechanics;
+  CamacLab lab(lab_with("fine", "", "inputs = { positive = 3, negative = 4, step = 5 }\n"),
+               &mechanics, kShutterStation, BUSHD_CAN_TRAVEL);
+  mechanics.bus = &lab.bus(0);
+  mechanics.tell();
+  lab.run_for(0.1);
+  lab.load_bytes(0, {2, 0, 100, 0, 200, 0, 200, 0});
+  for (const std::uint32_t mode : {kAutomatic, kAutomatic | kSecondMode}) {
+    lab.permit(mode | kAllEnabled);
+    EXPECT_TRUE(lab.lam()) << "at once";
+    EXPECT_EQ(lab.requests(), kTravelFailed | kLeftLevel);
+    EXPECT_EQ(lab.warnings().back(),
+              "camac-1-7: m03: the firmware of its MCU does not travel between limits by itself; "
+              "use mode 00");
+    lab.naf(kShutterStation, 0, 10);
+  }
+  lab.permit(kSecondMode | kAllEnabled);
+  EXPECT_EQ(lab.requests(), kStepNotDone | kLeftLevel);
+  EXPECT_EQ(lab.warnings().back(),
+            "camac-1-7: m03: the firmware of its MCU does not watch a step sensor; use mode 00");
+  lab.naf(kShutterStation, 0, 10);
+  EXPECT_TRUE(mechanics.steps.empty());
+  lab.permit(kAllEnabled);
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.requests() & 0x3FU, kStepDone);
+  EXPECT_EQ(mechanics.steps.size(), 1u);
+}
+
 TEST(CamacShutter, TravelsToTheLimitAndBack) {
   ShutterLab lab;
   EXPECT_EQ(lab.requests(), kLeftLevel);

@@ -214,6 +214,25 @@ TEST(CamacMotion, AStopOfSomebodyElseIsAFault) {
   EXPECT_FALSE(lab.motor("m01").moving);
 }
 
+TEST(CamacMotion, TheLogOfMovesSaysWhoHasAsked) {
+  CamacLab lab;
+  lab.load(0, 20'000, falling_codes());
+  lab.permit(kEnabled);
+  lab.run_until([&] { return lab.shaft_steps("m01") > 500; });
+  lab.naf(kStation, 0, 24);
+  ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m01").moving; }));
+  const auto asked = [&](const std::string& what) {
+    return std::ranges::count_if(lab.move_lines(), [&](const std::string& line) {
+      return line.find("\"request\":\"" + what + "\"") != std::string::npos &&
+             line.find("\"client\":\"camac-1-5\"") != std::string::npos &&
+             line.find("\"by\":\"camac\"") != std::string::npos &&
+             line.find("\"motors\":[\"m01\"]") != std::string::npos;
+    });
+  };
+  EXPECT_EQ(asked("move"), 1);
+  EXPECT_EQ(asked("stop"), 1);
+}
+
 TEST(CamacMotion, SoftLimitsHold) {
   CamacLab lab(lab_with("fine", "unit = \"mm\"\nsteps_per_unit = 100\nsoft_limits = [-1, 1]\n"));
   lab.load(0, 101, falling_codes());

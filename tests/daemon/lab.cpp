@@ -94,7 +94,8 @@ class Lab::Client final : public api::Session {
   std::map<std::int64_t, api::Configuration> configurations;
 };
 
-Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink)
+Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink,
+         std::uint16_t without)
     : client_(std::make_shared<Client>()) {
   directory_ = std::filesystem::temp_directory_path() / ("bushd-lab-" + std::to_string(::getpid()));
   std::filesystem::create_directories(directory_);
@@ -121,6 +122,7 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
       sim::McuOptions options{.address = config_.mcus[m].address.value,
                               .boot_number = static_cast<std::uint16_t>(100 * b + m + 1),
                               .boot_ns = static_cast<std::int64_t>(m) * 777'777};
+      options.disabled_capabilities = without;
       if (config_.mcus[m].emission.measures()) options.supply = sim::SupplyRules{};
       buses_[b].bus->add_mcu(options);
     }

@@ -220,5 +220,17 @@ TEST_F(Connecting, ReconfigurationIsForThoseWhoAreThere) {
   EXPECT_TRUE(mcus[kFirst].poll_wanted);
 }
 
+TEST_F(Connecting, OneThatIsLostWhileItGetsAnotherSetupHasGoneOffline) {
+  mcus[kFirst].view.phase = McuPhase::kOnline;
+  connector.reconfigure(kFirst, mcus[kFirst].setup);
+  connector.reconfigure(kFirst, mcus[kFirst].setup);
+  connector.give_up(kFirst, "does not answer", 700);
+  EXPECT_EQ(story, "offline ");
+  story.clear();
+  find();
+  connector.give_up(kFirst, "does not answer", 700);
+  EXPECT_EQ(story, "found still-offline ") << "once";
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -21,7 +21,8 @@ Clients::Clients(const bushd::config::Config& config, const Witness& witness,
       rates_(rates),
       per_hour_(std::accumulate(rates.begin(), rates.end(), 0.0)),
       random_(seed, kStream),
-      joggers_(seed) {}
+      joggers_(seed),
+      programs_(config, seed) {}
 
 bushd::sim::TimeNs Clients::next_after(bushd::sim::TimeNs now_ns) {
   return per_hour_ > 0 ? now_ns + random_.wait(3.6e12 / per_hour_) : bushd::sim::kNever;
@@ -294,6 +295,12 @@ Request Clients::compose(CommandKind kind) {
       return change_settings();
     case CommandKind::kLine:
       return move_along_line();
+    case CommandKind::kPath:
+      return move_along_path();
+    case CommandKind::kArray:
+      return tell_array();
+    case CommandKind::kCamac:
+      return of_program();
   }
   return nonsense();
 }

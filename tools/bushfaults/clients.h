@@ -9,6 +9,7 @@
 
 #include "joggers.h"
 #include "kinds.h"
+#include "programs.h"
 #include "request.h"
 #include "sim/line.h"
 #include "sim/random.h"
@@ -29,8 +30,12 @@ class Clients {
   Request enable_all() { return of_all_online(Ask::kEnable); }
   Request clear_all() { return of_all_online(Ask::kClearFaults); }
   // What those ask who have begun to jog; before quiet they die.
-  std::vector<Request> due(bushd::sim::TimeNs now_ns) { return joggers_.due(now_ns); }
-  void let_go() { joggers_.die(); }
+  // So do those whose array was told; what is left of it comes later.
+  std::vector<Request> due(bushd::sim::TimeNs now_ns);
+  void let_go() {
+    joggers_.die();
+    later_.clear();
+  }
   // Some MCU stands still after an emergency stop or input, as far as the daemon has said.
   bool emergency() const { return says("emergency"); }
 
@@ -71,6 +76,11 @@ class Clients {
   Request jog();
   Request pause_or_hold();
   Request change_settings();
+  Request of_program();
+  // Of motors at rest without backlash; one, if there are none.
+  std::vector<Choice> some_at_rest(std::int64_t most);
+  Request move_along_path();
+  Request tell_array();
   Request of_some(Ask ask, std::vector<std::string> motors);
   std::vector<std::string> motors_with(bool bushd::api::MotorState::*flag) const;
   std::optional<Request> remedy_of_pauses();
@@ -88,6 +98,14 @@ class Clients {
   const double per_hour_;  // of all kinds
   bushd::sim::Random random_;
   Joggers joggers_;
+  Programs programs_;
+  struct Later {
+    bushd::sim::TimeNs after_ns;
+    bushd::sim::TimeNs due_ns;  // 0: it has only just been thought of
+    Request request;
+  };
+  std::vector<Later> later_;
+  std::int64_t arrays_ = 0;
   CommandCounts sent_by_kind_{};
 };
 

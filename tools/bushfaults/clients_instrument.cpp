@@ -181,4 +181,17 @@ Request Clients::change_settings() {
   return request;
 }
 
+Request Clients::of_program() {
+  const std::size_t number = programs_.any_motor();
+  const bushd::MotorId motor = config_.crates.front().modules.front().motors[number];
+  const auto& state = witness_.states()[config_[motor].mcu.value];
+  std::int64_t position_steps = 0;
+  if (state) {
+    const auto& motors = state->motors;
+    position_steps = std::ranges::find(motors, config_[motor].name, &bushd::api::MotorState::name)
+                         ->position_steps;
+  }
+  return programs_.next(position_steps, number);
+}
+
 }  // namespace bushfaults

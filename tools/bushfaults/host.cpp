@@ -232,6 +232,11 @@ void Host::publish(bushd::BusId bus, const bushd::api::HealthSnapshot& health) {
   daemon_->publishing().publish(bus, health);
 }
 
+void Host::publish_lam(const bushd::api::CamacLam& lam) {
+  witness_.lam(now_ns_, lam);
+  daemon_->publishing().publish_lam(lam);
+}
+
 void Host::serve_tables(const bushd::api::Asker& asker, const bushd::api::Request&) {
   asker.answer(bushd::api::Refused{"there are no table files here"});
 }

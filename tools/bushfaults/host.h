@@ -75,6 +75,7 @@ class Host final : public bushd::daemon::Outputs {
   void publish(bushd::McuId mcu, const bushd::api::StateSnapshot& state) override;
   void publish(bushd::McuId mcu, const bushd::api::Description& description) override;
   void publish(bushd::BusId bus, const bushd::api::HealthSnapshot& health) override;
+  void publish_lam(const bushd::api::CamacLam& lam) override;
   void move_log(const std::string& line) override { witness_.move_log(now_ns_, line); }
   void log(bushd::daemon::LogLevel level, bushd::daemon::LogSubject,
            const std::string& text) override;

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "fieldbus/line_budget.h"
+#include "programs.h"
 #include "sim/random.h"
 #include "tables/table_file.h"
 #include "units.h"
@@ -110,6 +111,7 @@ void furnish(bushd::config::Config& config, const FaultRates& faults, const Comm
       rate(commands, CommandKind::kJog) > 0 || rate(commands, CommandKind::kSettings) > 0;
   if (units) add_units(config, seed);
   if (rate(commands, CommandKind::kLegMove) > 0) add_backlash(config, seed);
+  if (rate(commands, CommandKind::kCamac) > 0) add_crate(config);
   if (rate(commands, CommandKind::kHome) > 0) add_homes(config, seed);
   if (rate(faults, FaultKind::kLimitSwitch) > 0) add_limit_switches(config);
   if (rate(faults, FaultKind::kEmergencyInput) > 0) add_emergency_inputs(config, seed);

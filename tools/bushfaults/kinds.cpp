@@ -63,6 +63,9 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"motor-pauses", 0, "motors are paused, resumed, held and released"},
     {"settings", 0, "other offsets, directions and soft limits of motors at rest"},
     {"lines", 0, "motors at rest move along a straight line"},
+    {"camac-blocks", 0, "programs load, start, stop and read a BUSHD-2, and initialise its crate"},
+    {"paths", 0, "motors at rest move along a path, past its points or to rest at each"},
+    {"arrays", 0, "motors at rest follow positions in time, told before or while they move"},
 }};
 
 template <std::size_t kSize>

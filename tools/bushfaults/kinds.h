@@ -72,8 +72,11 @@ enum class CommandKind : std::uint8_t {
   kMotorPause,
   kSettings,
   kLine,
+  kCamac,
+  kPath,
+  kArray,
 };
-inline constexpr std::size_t kCommandKinds = 22;
+inline constexpr std::size_t kCommandKinds = 25;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

@@ -160,6 +160,8 @@ std::optional<std::string> Positions::check_offline(const bushd::api::StateSnaps
       return claim.name + " is said to be known, and its MCU has never been heard";
     }
     const auto& offset = motors_[index].offset;
+    // Reset while it gets another table: that is heard with its next report.
+    if (!offset && state.state == bushd::api::McuState::kBusy) continue;
     if (offset && plant_steps(index) - *offset == claim.position_steps) continue;
     return fmt::format("{} ({}) is said to be {} to be at {} while {} is {} ({}), and is at {}",
                        claim.name, word(claim.activity), word(claim.trust), claim.position_steps,

@@ -7,6 +7,9 @@
 #include <optional>
 #include <string_view>
 #include <utility>
+#include <vector>
+
+#include "camac/module.h"
 
 namespace bushfaults {
 namespace {
@@ -78,11 +81,59 @@ api::MoveLine line_of(const Request& request) {
       .speed = speed_of(request)};
 }
 
+// Those at one address are one, which shows the first word.
+std::vector<std::pair<bushd::camac::Naf, int>> runs_of(
+    const std::vector<bushd::camac::Naf>& cycles) {
+  std::vector<std::pair<bushd::camac::Naf, int>> runs;
+  for (const bushd::camac::Naf& naf : cycles) {
+    const bool same = !runs.empty() && runs.back().first.station == naf.station &&
+                      runs.back().first.subaddress == naf.subaddress &&
+                      runs.back().first.function == naf.function;
+    if (same) {
+      ++runs.back().second;
+    } else {
+      runs.emplace_back(naf, 1);
+    }
+  }
+  return runs;
+}
+
+std::vector<double> numbers_of(const std::vector<std::int64_t>& scaled, double by) {
+  std::vector<double> numbers;
+  for (const std::int64_t one : scaled) numbers.push_back(static_cast<double>(one) / by);
+  return numbers;
+}
+
+api::MovePath path_of(const Request& request) {
+  return {.motors = request.motors,
+          .rows = static_cast<std::int32_t>(request.points.size() / request.motors.size()),
+          .positions = numbers_of(request.points, kMicro),
+          .speeds = request.point_speeds,
+          .corners =
+              request.exact ? api::MovePath::Corners::kExact : api::MovePath::Corners::kContinuous,
+          .speed = speed_of(request)};
+}
+
+api::Follow follow_of(const Request& request) {
+  using Part = api::Follow::Part;
+  const bool rows = request.ask == Ask::kRows;
+  return {.part = !rows               ? Part::kRun
+                  : request.last_rows ? Part::kLastRows
+                                      : Part::kRows,
+          .array = request.array,
+          .motors = request.motors,
+          .cubic = request.cubic,
+          .time_s = numbers_of(request.times_ms, 1000),
+          .positions = numbers_of(request.points, kMicro)};
+}
+
 std::string_view word_of(const Request& request) {
   switch (request.ask) {
     case Ask::kMoveBy:
       return request.line ? "line by" : "move by";
     case Ask::kMoveTo:
+      if (!request.points.empty()) return request.exact ? "exact path to" : "path to";
+      if (request.array != 0) return "follow to";
       return request.line ? "line to" : "move to";
     case Ask::kArm:
       return request.rising ? "arm (rising)" : "arm (falling)";
@@ -105,6 +156,8 @@ api::Request api_of(const Request& request) {
                        .motors = motor_steps(request),
                        .speed = speed_of(request)};
     case Ask::kMoveTo:
+      if (!request.points.empty()) return path_of(request);
+      if (request.array != 0) return follow_of(request);
       if (request.line) return line_of(request);
       return api::Move{.kind = api::Move::Kind::kAbsolute,
                        .motors = motor_steps(request),
@@ -141,6 +194,11 @@ api::Request api_of(const Request& request) {
       return api::Release{request.motors};
     case Ask::kConfigure:
       return configure_of(request);
+    case Ask::kRows:
+      return follow_of(request);
+    case Ask::kCamac:
+      return api::Camac{.block = {.cycles = request.cycles,
+                                  .count = static_cast<std::uint32_t>(request.cycles.size())}};
     case Ask::kDisarm:
       break;
   }
@@ -177,6 +235,14 @@ std::string text_of(const Request& request) {
   if (request.renew) how += " (renewed)";
   if (request.ask == Ask::kJog) how += fmt::format(", {} ms", request.keepalive_ms);
   if (request.steps_after) how += fmt::format(", {} steps after", *request.steps_after);
+  if (request.array != 0) how += fmt::format(" array {}", request.array);
+  if (!request.points.empty()) how += fmt::format(" by {}", fmt::join(request.points, ","));
+  if (!request.times_ms.empty()) how += fmt::format(" at {}", fmt::join(request.times_ms, ","));
+  for (const auto& [naf, count] : runs_of(request.cycles)) {
+    how += fmt::format(" N{}A{}F{}", naf.station, naf.subaddress, naf.function);
+    if (bushd::camac::writes(naf.function)) how += fmt::format(":{:#x}", naf.data);
+    if (count > 1) how += fmt::format("*{}", count);
+  }
   for (const Setting& setting : request.settings) {
     const auto [key, value] = key_and_value(setting);
     how += fmt::format(" {}={}", key, value);

@@ -33,6 +33,8 @@ enum class Ask : std::uint8_t {
   kHold,
   kRelease,
   kConfigure,
+  kCamac,
+  kRows,
 };
 
 // What a motor may be given in operation. Numbers are millionths of its unit.
@@ -53,11 +55,18 @@ struct Request {
   std::int64_t number = 0;
   Ask ask{};
   std::vector<std::string> motors{};
-  std::vector<std::int64_t> steps{};  // as many as motors
-  bool user = false;                  // they are millionths of each motor's unit
-  bool line = false;                  // kMoveBy, kMoveTo: along a straight line
-  bool dial = false;                  // kSetPosition: on the dial
-  std::int64_t speed_micro = 0;       // of moves and jogs, millionths a second; 0: none
+  std::vector<std::int64_t> steps{};     // as many as motors
+  bool user = false;                     // they are millionths of each motor's unit
+  bool line = false;                     // kMoveBy, kMoveTo: all on one way
+  std::vector<std::int64_t> points{};    // of a path, or an array, row by row, in millionths
+  std::vector<double> point_speeds{};    // of a path of one motor: to each point
+  bool exact = false;                    // a path: with a rest at each point
+  std::int64_t array = 0;                // its number; kMoveTo: to be followed
+  std::vector<std::int64_t> times_ms{};  // kRows: of each row
+  bool cubic = false;                    // an array
+  bool last_rows = false;                // kRows
+  bool dial = false;                     // kSetPosition: on the dial
+  std::int64_t speed_micro = 0;          // of moves and jogs, millionths a second; 0: none
   bool speed_in_steps = false;
   std::int64_t keepalive_ms = 0;              // kJog
   bool renew = false;                         // kJog
@@ -65,6 +74,8 @@ struct Request {
   std::vector<Setting> settings{};            // kConfigure: as many as motors
   bool rising = false;                        // kArm: the edge
   std::int32_t delay_us = 0;                  // kArm
+  std::vector<bushd::camac::Naf> cycles{};    // kCamac
+  bool unknown_way = false;                   // a move, and nobody knows by how many steps
   Damage damage = Damage::kNone;
 
   void add(const std::string& motor, std::int64_t steps_of_it) {

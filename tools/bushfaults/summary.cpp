@@ -71,6 +71,11 @@ std::string summary_text(const World& world, double processor_s) {
   }
   text += fmt::format("legs       {} last approaches, {} rests in pauses\n",
                       world.witness().approaches(), world.witness().times_paused());
+  if (!world.config().crates.empty()) {
+    const Crates& crates = world.witness().crates();
+    text += fmt::format("crate      {} starts, {} ended by a LAM, {} of these after all steps\n",
+                        crates.starts(), crates.ended_by_lam(), crates.ended_all_steps());
+  }
   if (!world.mornings().empty()) text += "mornings   motors by trust\n";
   for (const auto& [trust, count] : world.mornings()) {
     text += fmt::format("           {:<17}{:>9}\n", trust, count);
@@ -78,6 +83,10 @@ std::string summary_text(const World& world, double processor_s) {
   text += fmt::format("steps      {} commanded, {} made, {} unaccounted\n",
                       world.witness().steps_commanded(), world.plant().steps_made(),
                       world.witness().steps_unaccounted());
+  if (world.witness().ways() > 0) {
+    text += fmt::format("ways       {} lines and paths reached, {:.1f} steps off them at most\n",
+                        world.witness().ways(), world.witness().worst_off_way());
+  }
   text += fmt::format("skew       {:.1f} us between MCUs in step, at most\n",
                       static_cast<double>(world.skew().worst_ns()) / 1000);
   text += fmt::format("age        {:.0f} ms of the report behind a state, at most\n",
@@ -99,6 +108,8 @@ std::string summary_json(const World& world) {
       {"homings", world.witness().homings_by_result()},
       {"jogs", world.witness().jogs_by_result()},
       {"approaches", world.witness().approaches()},
+      {"camac_starts", world.witness().crates().starts()},
+      {"camac_lams", world.witness().crates().ended_by_lam()},
       {"times_paused", world.witness().times_paused()},
       {"second_daemons_refused", world.second_daemons().found_other},
       {"second_daemons_ran", world.second_daemons().ran},

@@ -24,7 +24,8 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
       recent_(recent),
       positions_(config, bus, plant),
       starts_(config),
-      units_(config) {
+      units_(config),
+      crates_(config) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
     const bushd::config::Bus& bus_of = config.bus_of(motor);
@@ -70,6 +71,7 @@ void Witness::daemon_started(TimeNs now_ns) {
   std::fill(states_.begin(), states_.end(), std::nullopt);
   positions_.daemon_started();
   units_.daemon_started(offsets_kept_);
+  crates_.daemon_started(now_ns, offsets_kept_);
 }
 
 void Witness::pressed(TimeNs now_ns, std::size_t motor) {
@@ -164,8 +166,9 @@ std::string Witness::not_ready() const {
 }
 
 bool Witness::commands_open() const {
-  return promise_.waits() || std::any_of(asked_.begin(), asked_.end(),
-                                         [](const auto& entry) { return !entry.second.finished; });
+  return promise_.waits() || crates_.any_open() ||
+         std::any_of(asked_.begin(), asked_.end(),
+                     [](const auto& entry) { return !entry.second.finished; });
 }
 
 std::uint64_t Witness::steps_unaccounted() const {

@@ -14,6 +14,7 @@
 
 #include "api/snapshot.h"
 #include "config/config.h"
+#include "crate_model.h"
 #include "positions.h"
 #include "promise.h"
 #include "recent.h"
@@ -51,6 +52,7 @@ class Witness {
   void reply(TimeNs now_ns, const Key& key, const bushd::api::Reply& reply);
   void state(TimeNs now_ns, std::size_t mcu, const bushd::api::StateSnapshot& state);
   void description(TimeNs now_ns, const bushd::api::Description& said);
+  void lam(TimeNs now_ns, const bushd::api::CamacLam& lam);
   // A run of this motor begins, one of a line or of its own, or has ended as this word says.
   std::function<void(std::size_t mcu, std::size_t output, bool on_line, bool by_mcu)> on_run;
   std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, const std::string& word)>
@@ -73,6 +75,7 @@ class Witness {
   Promise& promise() { return promise_; }
   const Promise& promise() const { return promise_; }
   Starts& starts() { return starts_; }
+  const Crates& crates() const { return crates_; }
   // Offsets are kept over restarts of the daemon.
   void keep_offsets() { offsets_kept_ = true; }
   const Units& units() const { return units_; }
@@ -87,6 +90,9 @@ class Witness {
   std::uint64_t approaches() const { return approaches_; }
   std::uint64_t times_paused() const { return times_paused_; }
   std::uint64_t steps_commanded() const { return steps_commanded_; }
+  // Lines and paths that were reached, and how far motors were off them, in steps.
+  std::uint64_t ways() const { return ways_; }
+  double worst_off_way() const { return worst_off_way_; }
   // Between the last states and the motors, where the daemon claims to know.
   std::uint64_t steps_unaccounted() const;
 
@@ -159,7 +165,9 @@ class Witness {
     std::vector<bool> told{};   // how a run of it ended
     std::vector<bool> stops{};  // somebody has stopped it
     std::optional<JogOpen> jog{};
-    std::vector<std::uint64_t> changes{};        // of settings
+    std::vector<std::int64_t> polyline{};  // row by row, from where they stood, as the plant counts
+    double off_way = 0;                    // at most, so far
+    std::vector<std::uint64_t> changes{};  // of settings
     std::vector<std::optional<bool>> outside{};  // of its new limits; nothing: it is not known
     std::size_t index_of(const std::string& motor) const {
       const auto& all = request.motors;
@@ -213,6 +221,10 @@ class Witness {
   void forget_unbegun(Motor& motor);
   void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void keep_within(TimeNs now_ns, Motor& motor);
+  // Motors on one way, along a line or a path.
+  void begin_way(Asked& asked);
+  void watch_ways();
+  void check_way(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
   void run_begins(TimeNs now_ns, Motor& motor);
   void run_ended(TimeNs now_ns, Motor& motor, End end);
   void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, const End& end,
@@ -231,6 +243,14 @@ class Witness {
   void pause_accepted(TimeNs now_ns, const Request& request);
   void hold_accepted(const Request& request);
   void paused(TimeNs now_ns, const Key& key, const std::string& reason);
+  // CAMAC modules, which ask for motion themselves.
+  void asked_by_module(TimeNs now_ns, const std::string& what, const std::string& motor);
+  void module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted);
+  void module_ended(TimeNs now_ns, Motor& motor, const End& end, bool whole);
+  void check_program(TimeNs now_ns, const Motor& motor);
+  bool is_of_module(const Motor& motor) const {
+    return motor.move && std::get<1>(*motor.move) == Crates::kBushd2Client;
+  }
   void configure_accepted(Asked& asked);
   void configured(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
   void check_deadline(TimeNs now_ns, const Key& key, Asked& asked);
@@ -241,6 +261,9 @@ class Witness {
   Positions positions_;
   Starts starts_;
   Units units_;
+  Crates crates_;
+  std::optional<ProgramMotion> program_;  // that a module's motor moves by, if it is known
+  std::int64_t module_moves_ = 0;
   bool offsets_kept_ = false;
   std::optional<Violation> violation_;
   std::vector<Motor> motors_;
@@ -259,6 +282,8 @@ class Witness {
   std::uint64_t approaches_ = 0;
   std::uint64_t times_paused_ = 0;
   std::uint64_t steps_commanded_ = 0;
+  std::uint64_t ways_ = 0;
+  double worst_off_way_ = 0;
 };
 
 }  // namespace bushfaults

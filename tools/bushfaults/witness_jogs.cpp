@@ -47,6 +47,7 @@ void Witness::stop_accepted(const Request& request) {
     motor.target.reset();
     motor.stops = true;
     motor.pauses = false;
+    if (is_of_module(motor) && motor.over) crates_.motion_ended(false);
     if (!motor.move) continue;
     Asked& asked = asked_.at(*motor.move);
     asked.stops[asked.index_of(motor.name)] = true;
@@ -233,6 +234,7 @@ void Witness::configured(TimeNs now_ns, const Asked& asked, const api::Completed
 }
 
 void Witness::watch(TimeNs now_ns) {
+  watch_ways();
   const bool second = second_ns_ >= 0 && now_ns - second_ns_ < 5 * kSecond;
   for (Motor& motor : motors_) {
     if (second) motor.held_at.reset();
@@ -285,11 +287,13 @@ void Witness::check_deadlines(TimeNs now_ns) {
   }
   for (Motor& motor : motors_) {
     ++motor.idle_checks;
+    if (is_of_module(motor) && motor.pauses) crates_.wait_since(now_ns);
     if (motor.held && !motor.held_at && motor.idle_checks > kIdleChecks) {
       motor.held_at = plant_steps(motor);
     }
     if (motor.idle_checks == 0) motor.held_at.reset();
   }
+  if (const auto wrong = crates_.check_deadline(now_ns)) violated(now_ns, *wrong);
   if (!promise_.waits()) none_waits_ns_ = now_ns;
   if (now_ns - none_waits_ns_ > kTurnDueNs) violated(now_ns, "requests wait for their turn");
 }

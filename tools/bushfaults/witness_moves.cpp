@@ -56,6 +56,7 @@ void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
       motor.range.reset();
     }
   }
+  if (request.is_move() && request.line) begin_way(asked);
 }
 
 void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::size_t i) {
@@ -72,6 +73,7 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
              request.ask == Ask::kMoveTo && offset(motor) && position) {
     target = *offset(motor) + *position;
   }
+  if (request.unknown_way) target.reset();
   // One that is stopped where it was paused may not have ended so far.
   const bool known = target && !(motor.move && motor.over && motor.stops);
   asked.legs.push_back(known ? legs_to(motor, request, *target) : std::vector<std::int64_t>());
@@ -110,7 +112,8 @@ std::vector<std::int64_t> Witness::legs_to(const Motor& motor, const Request& re
   const std::int64_t backlash = units_.backlash_steps(index);
   const std::int64_t way = target - plant_steps(motor);
   const bool rests = !motor.moves();
-  if (request.ask == Ask::kArm || backlash == 0 || (rests && way == 0)) return {target};
+  const bool straight = !request.points.empty() || request.array != 0;
+  if (straight || request.ask == Ask::kArm || backlash == 0 || (rests && way == 0)) return {target};
   const bool near =
       std::abs(way) <= std::abs(backlash) || !units_.approach_is_slower(index, request);
   if (rests && (way > 0) == (backlash > 0) && near) return {target};
@@ -127,6 +130,7 @@ void Witness::forget_unbegun(Motor& motor) {
 
 // A motor that moves belongs to the newest move; its part of the one before has ended.
 void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target) {
+  if (is_of_module(motor)) crates_.motion_ended(false);
   if (motor.moves() || motor.stands_paused()) {
     Asked& before = asked_.at(*motor.move);
     before.end[before.index_of(motor.name)] = End{
@@ -171,6 +175,11 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
   if (request.ask == Ask::kConfigure) configured(now_ns, asked, completed);
   if (request.ask == Ask::kPause) paused(now_ns, key, completed.reason);
   if (request.ask == Ask::kJog && asked.jog) jogged(now_ns, asked, completed);
+  if (request.ask == Ask::kCamac) {
+    const auto wrong =
+        crates_.completed(now_ns, request, std::get<api::CamacResult>(completed.detail));
+    if (wrong) violated(now_ns, *wrong);
+  }
   const bool homes = request.ask == Ask::kHome;
   if (homes || request.is_move()) {
     ++(homes ? homings_by_result_ : moves_by_result_)[std::string(word(completed.outcome))];
@@ -213,6 +222,7 @@ void Witness::moved(TimeNs now_ns, const Asked& asked, const api::Completed& com
       violated(now_ns, "nobody has stopped it: " + completed.reason);
     }
   }
+  check_way(now_ns, asked, completed);
   const auto wrong = starts_.check(asked.request, asked.first_step_ns);
   if (wrong) violated(now_ns, *wrong);
 }
@@ -237,11 +247,17 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
     if (line.at("set")) positions_.homed(index, line.at("position_steps"));
     return;
   }
+  if (line.at("event") == "request") {
+    return asked_by_module(now_ns, line.at("request"), line.at("motors").front());
+  }
   const bool begins = line.at("event") == "move";
   if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
   if (begins && on_run) {
-    on_run(motor.mcu, motor.output, line.contains("line"), line.at("moves") == "table");
+    // One that is lost makes what its MCU has: of a path, or an array, it may speed up again.
+    const bool winds = line.contains("path") || line.contains("array");
+    on_run(motor.mcu, motor.output, winds || line.contains("line"),
+           winds || line.at("moves") == "table");
   }
   if (begins && motor.move) return run_begins(now_ns, motor);
   if (begins) return;
@@ -303,6 +319,9 @@ void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
   if (there && !last) ++leg;
   if (end.word != "stopped") motor.pauses = false;
   if (end.paused) ++times_paused_;
+  if (is_of_module(motor) && !end.paused && !motor.goes_on) {
+    module_ended(now_ns, motor, end, legs.size() == 1 && asked.from[index] == motor.run_from);
+  }
   asked.end[index] = std::move(end);
 }
 

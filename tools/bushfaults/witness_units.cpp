@@ -92,6 +92,7 @@ void Witness::check_limits(TimeNs now_ns, const Asked& asked) {
 // approach, for backlash: target ...", "m03: stands at or beyond its soft limit, at ..."
 void Witness::check_refusal(TimeNs now_ns, const Asked& asked, const std::string& reason) {
   const Request& request = asked.request;
+  if (!request.points.empty()) return;  // each of them may be the reason
   if (reason.find(" beyond the soft limit") == std::string::npos &&
       reason.find(" beyond its soft limit, at") == std::string::npos) {
     return;

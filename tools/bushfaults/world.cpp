@@ -79,6 +79,7 @@ void World::add_motors() {
     rules_.push_back(std::make_unique<bushd::sim::PaceRules>(
         group.table->view(), bus.tick_ns(), bushd::sim::McuOptions{}.slots, bus.format));
   }
+  if (!config_.crates.empty()) allow_programs();
   for (const bushd::config::Motor& motor : config_.motors) {
     plant_.attach(motor.mcu.value, motor.output.value, *rules_[motor.group.value]);
   }
@@ -98,6 +99,14 @@ void World::add_motors() {
   plant_.on_cut_off = [this](TimeNs time_ns, std::size_t mcu, std::size_t output) {
     witness_.positions().cut_off(time_ns, mcu, output);
   };
+}
+
+void World::allow_programs() {
+  const bushd::config::Bus& bus = config_.buses[0];
+  const bushd::GroupId group = config_[config_.crates[0].modules[0].motors[0]].group;
+  const auto slowest = slowest_program(*config_[group].table);
+  rules_[group.value]->allow_slower(bushd::sim::PaceRules(
+      slowest->view(), bus.tick_ns(), bushd::sim::McuOptions{}.slots, bus.format));
 }
 
 void World::run() {

@@ -70,6 +70,7 @@ class World {
  private:
   void add_mcus();
   void add_motors();
+  void allow_programs();
   void spell_of_trouble(TimeNs until_ns);
   void calm();
   void be_well(TimeNs began_ns);

@@ -1,0 +1,173 @@
+#include "programs.h"
+
+#include <algorithm>
+
+#include "camac/bushd2.h"
+#include "camac/module.h"
+#include "crate_model.h"
+
+namespace bushfaults {
+namespace {
+
+using bushd::camac::Bushd2;
+
+constexpr std::uint32_t kStream = 420;  // of randomness
+constexpr std::uint64_t kClients = 3;
+constexpr int kStation = kBushd2Station;
+constexpr std::uint32_t kEnabled = 0x60;  // fault and end of motion
+constexpr std::uint32_t kLeft = 0x80;
+constexpr std::int64_t kLongestProgram = 2000;  // steps: four seconds at most
+// Programs are the table of their group, each of whose codes comes a few times: with so many
+// hundredths of it for each step.
+constexpr std::int64_t kSlowestProgram = 33;
+constexpr std::int64_t kSlowestCode = 250;  // F_start, as of all tables here
+constexpr int kStartHz = 100;               // likewise
+
+// Never faster than the table, and never accelerating more: by that every step is judged.
+std::uint16_t stretched(const bushd_table& table, std::size_t k, std::int64_t hundredths) {
+  const std::size_t of = k * static_cast<std::size_t>(hundredths) / 100;
+  return of < table.accel.count ? table.accel.code[of] : table.cruise;
+}
+
+}  // namespace
+
+void add_crate(bushd::config::Config& config) {
+  std::size_t last = 0;
+  for (const bushd::config::Motor& motor : config.motors) last = std::max(last, motor.group.value);
+  bushd::config::CamacModule module{.station = kBushd2Station, .f_start_hz = kStartHz};
+  for (std::size_t i = 0; i < config.motors.size(); ++i) {
+    bushd::config::Motor& motor = config.motors[i];
+    if (motor.group.value != last) continue;
+    // A group has one program: that of a page. Where that is full there are other groups.
+    if (module.motors.size() < Bushd2::kMotorsPerPage) {
+      module.motors.push_back({i});
+    } else {
+      motor.group = {0};
+    }
+  }
+  config.crates.push_back({.number = kCrate, .modules = {module}});
+}
+
+bushd::tables::TablePtr slowest_program(const bushd::tables::Table& table) {
+  const bushd_table& codes = table.view();
+  bushd::tables::TableContent content{.name = "slowest", .time_unit_ns = codes.time_unit_ns};
+  for (std::size_t k = 0; k < Bushd2::kCodes; ++k) {
+    content.accel.push_back(stretched(codes, k, kSlowestProgram));
+  }
+  return *bushd::tables::make(std::move(content));
+}
+
+Programs::Programs(const bushd::config::Config& config, std::uint64_t seed)
+    : config_(config), random_(seed, kStream) {}
+
+std::size_t Programs::motors() const {
+  return config_.crates.empty() ? 0 : config_.crates.front().modules.front().motors.size();
+}
+
+std::size_t Programs::any_motor() {
+  return static_cast<std::size_t>(random_.below(motors()));
+}
+
+void Programs::load(Cycles& cycles, std::size_t motor) {
+  const auto& module = config_.crates.front().modules.front();
+  const bushd_table& table = config_.table_of(config_[module.motors.front()]).view();
+  const std::uint32_t page = static_cast<std::uint32_t>(motor) / Bushd2::kMotorsPerPage;
+  const std::int64_t steps = random_.one_in(30) ? 0 : random_.magnitude(1, kLongestProgram);
+  const std::int64_t hundredths = random_.between(kSlowestProgram, 100);
+  const std::size_t rises = random_.one_in(20) ? 5 : Bushd2::kCodes;
+  const auto write = [&](std::int64_t byte) {
+    cycles.push_back({kStation, 0, 16, static_cast<std::uint32_t>(byte)});
+  };
+  cycles.push_back({kStation, 1, 16, page * static_cast<std::uint32_t>(Bushd2::kPageBytes)});
+  write(steps % 256);
+  write(steps / 256);
+  for (std::size_t k = 0; k < Bushd2::kCodes; ++k) {
+    write(k == rises ? kSlowestCode : stretched(table, k, hundredths));
+  }
+}
+
+// It reads what it starts: after a power cut nobody knows that.
+void Programs::start(Cycles& cycles, std::int64_t position_steps, std::size_t motor) {
+  if (!random_.one_in(3)) cycles.push_back({30, 9, 24});
+  if (random_.one_in(8)) cycles.push_back({kStation, 0, 24});
+  if (random_.one_in(2)) load(cycles, motor);
+  const auto page = static_cast<std::uint32_t>(motor / Bushd2::kMotorsPerPage * Bushd2::kPageBytes);
+  cycles.push_back({kStation, 1, 16, page});
+  cycles.insert(cycles.end(), Bushd2::kFirstCode + Bushd2::kCodes, {kStation, 0, 0});
+  const bool left = random_.one_in(4) ? position_steps < 0 : position_steps > 0;
+  const auto number = static_cast<std::uint32_t>(random_.one_in(30) ? motors() : motor);
+  cycles.push_back({kStation, 2, 16, kEnabled | number | (left ? kLeft : 0)});
+  cycles.push_back({kStation, 0, 10});
+  cycles.push_back({kStation, 0, 26});
+  if (random_.one_in(10)) cycles.push_back({kStation, 0, 26});
+  look(cycles);
+}
+
+void Programs::look(Cycles& cycles) {
+  for (const int subaddress : {1, 2, 3}) cycles.push_back({kStation, subaddress, 0});
+  cycles.push_back({kStation, 0, 8});
+  cycles.push_back({30, 0, 0});
+}
+
+void Programs::control_crate(Cycles& cycles) {
+  switch (random_.below(5)) {
+    case 0:
+      return cycles.push_back({28, 8, 26});  // Z
+    case 1:
+      return cycles.push_back({28, 9, 26});  // C
+    case 2:
+      return cycles.push_back({30, 9, 26});  // I
+    default:
+      return cycles.push_back({30, 9, 24});
+  }
+}
+
+// Whatever the crate answers, but what starts motion, writes into memories, or enables overflow.
+void Programs::random_cycles(Cycles& cycles) {
+  for (std::int64_t n = random_.between(1, 20); n > 0; --n) {
+    bushd::camac::Naf naf{
+        .station = random_.one_in(2) ? kStation : static_cast<int>(random_.between(1, 31)),
+        .subaddress = static_cast<int>(random_.below(random_.one_in(4) ? 16 : 4)),
+        .function = static_cast<int>(random_.below(32))};
+    if (bushd::camac::writes(naf.function)) {
+      naf.data = static_cast<std::uint32_t>(random_.below(1U << 24));
+    }
+    const bool of_module = naf.station == kStation;
+    if (of_module && naf.subaddress == 0 && (naf.function == 16 || naf.function == 26)) continue;
+    if (of_module && naf.function == 16) naf.data = (naf.data & ~0x10U) | kEnabled;
+    cycles.push_back(naf);
+  }
+  look(cycles);
+}
+
+Request Programs::next(std::int64_t position_steps, std::size_t motor) {
+  Request request{.client = "p" + std::to_string(random_.below(kClients)), .ask = Ask::kCamac};
+  Cycles& cycles = request.cycles;
+  switch (random_.below(12)) {
+    case 0:
+    case 1:
+      cycles.push_back({kStation, 0, 24});
+      break;
+    case 2:
+      control_crate(cycles);
+      break;
+    case 3:
+      look(cycles);
+      break;
+    case 4:
+      random_cycles(cycles);
+      break;
+    case 5:
+      load(cycles, motor);
+      break;
+    case 6:
+      cycles.push_back({kStation, 0, 10});
+      break;
+    default:
+      start(cycles, position_steps, motor);
+      break;
+  }
+  return request;
+}
+
+}  // namespace bushfaults

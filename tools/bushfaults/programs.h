@@ -1,0 +1,43 @@
+// Programs of a laboratory of 1985: they load BUSHD-2, start and stop it, clear what it requests,
+// read its registers, and initialise the crate in between. Each of their requests is one block.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "camac/naf.h"
+#include "config/config.h"
+#include "request.h"
+#include "sim/random.h"
+
+namespace bushfaults {
+
+// Gives the configuration a crate, if it has motors for one: those of the last of its groups.
+void add_crate(bushd::config::Config& config);
+// By which no program is slower, of a group with this table.
+bushd::tables::TablePtr slowest_program(const bushd::tables::Table& table);
+
+class Programs {
+ public:
+  // `config` outlives it.
+  Programs(const bushd::config::Config& config, std::uint64_t seed);
+
+  // What one of them asks next. `position_steps`: of a motor of the module, as it is shown.
+  Request next(std::int64_t position_steps, std::size_t motor);
+  // Of the module.
+  std::size_t any_motor();
+  std::size_t motors() const;
+
+ private:
+  using Cycles = std::vector<bushd::camac::Naf>;
+  void load(Cycles& cycles, std::size_t motor);
+  void start(Cycles& cycles, std::int64_t position_steps, std::size_t motor);
+  void look(Cycles& cycles);
+  void control_crate(Cycles& cycles);
+  void random_cycles(Cycles& cycles);
+
+  const bushd::config::Config& config_;
+  bushd::sim::Random random_;
+};
+
+}  // namespace bushfaults

@@ -1,0 +1,84 @@
+// The part of the witness that is about CAMAC modules: what they ask for is in no request of a
+// client, and they get the results.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "daemon/services/camac_motors.h"
+#include "own_ramp.h"
+#include "witness.h"
+
+namespace bushfaults {
+
+void Witness::lam(TimeNs now_ns, const bushd::api::CamacLam& lam) {
+  recent_.note(now_ns, fmt::format("  LAM of {:#x}", lam.raised));
+  if (const auto wrong = crates_.raised(now_ns, lam)) violated(now_ns, *wrong);
+}
+
+void Witness::asked_by_module(TimeNs now_ns, const std::string& what, const std::string& motor) {
+  recent_.note(now_ns, fmt::format("  {} of {}: {}", what, Crates::kBushd2Client, motor));
+  if (what == "move") return module_moves(now_ns, *find(motor), crates_.accepted(motor));
+  Request stop{.client = Crates::kBushd2Client, .ask = Ask::kStop};
+  stop.add(motor, 0);
+  stop_accepted(stop);
+}
+
+// From now on it is a move as everybody's, but that nobody hears its result.
+void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted) {
+  if (accepted.wrong) return violated(now_ns, *accepted.wrong);
+  std::erase_if(asked_, [&](const auto& entry) {
+    const bool of_module = std::get<1>(entry.first) == Crates::kBushd2Client;
+    return of_module && std::ranges::none_of(
+                            motors_, [&](const Motor& other) { return other.move == entry.first; });
+  });
+  program_ = accepted.motion;
+  Request request{.client = Crates::kBushd2Client,
+                  .number = ++module_moves_,
+                  .ask = Ask::kMoveBy,
+                  .unknown_way = !program_};
+  request.add(motor.name, program_ ? program_->steps : 0);
+  if (program_) {
+    const auto& module = config_.crates.front().modules.front();
+    const bushd::config::Bus& bus = config_.buses.front();
+    const auto table = bushd::daemon::table_of_program(program_->program, module.f_start_hz, "");
+    if (!table) return violated(now_ns, motor.name + " moves by codes that rise");
+    motor.own_ramp_excess = std::max(
+        motor.own_ramp_excess, own_ramp_excess((*table)->view(), bus.tick_us * 1000, bus.format));
+  }
+  const Key key = key_of(request.id());
+  Asked& asked = asked_[key];
+  asked = Asked{.request = request,
+                .since_ns = now_ns,
+                .due_since_ns = now_ns,
+                .accepted = true,
+                .finished = true};
+  this->accepted(now_ns, key, asked);
+}
+
+void Witness::module_ended(TimeNs now_ns, Motor& motor, const End& end, bool whole) {
+  const bool reached = end.word == "reached";
+  ++moves_by_result_["camac " + end.word];
+  if (reached && whole) check_program(now_ns, motor);
+  crates_.motion_ended(reached);
+  motor.move.reset();
+}
+
+// From its first step to its last it has taken the time of its codes. Ticks are emitted up to 1/64
+// faster or slower while an MCU is brought into step, each of the two steps is up to a tick off,
+// and the last one may be late by one more (sim/pace.h).
+void Witness::check_program(TimeNs now_ns, const Motor& motor) {
+  if (!program_ || std::abs(program_->steps) < 2) return;
+  const TimeNs tick_ns = config_.buses.front().tick_ns();
+  const TimeNs due_ns = program_->first_to_last_ns;
+  const TimeNs took_ns =
+      plant_.last_step_ns(motor.mcu, motor.output) - plant_.first_step_ns(motor.mcu, motor.output);
+  const TimeNs drift_ns = due_ns / 63;
+  if (took_ns >= due_ns - drift_ns - 2 * tick_ns && took_ns <= due_ns + drift_ns + 3 * tick_ns) {
+    return;
+  }
+  violated(now_ns, fmt::format("{} made {} steps of a program in {} us, not in {}", motor.name,
+                               program_->steps, took_ns / 1000, due_ns / 1000));
+}
+
+}  // namespace bushfaults

@@ -1,0 +1,91 @@
+// The part of the witness that is about motors on one way: lines, and paths through points.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "witness.h"
+
+namespace bushfaults {
+namespace {
+
+// How far the motors are from the nearest point of the polyline.
+double off_polyline(const std::vector<std::int64_t>& rows, const std::vector<std::int64_t>& stand) {
+  const std::size_t width = stand.size();
+  double least = INFINITY;
+  for (std::size_t row = width; row < rows.size(); row += width) {
+    double along = 0;
+    double length = 0;
+    for (std::size_t i = 0; i < width; ++i) {
+      const auto from = static_cast<double>(rows[row - width + i]);
+      const double way = static_cast<double>(rows[row + i]) - from;
+      along += way * (static_cast<double>(stand[i]) - from);
+      length += way * way;
+    }
+    const double share = length > 0 ? std::clamp(along / length, 0.0, 1.0) : 0;
+    double square = 0;
+    for (std::size_t i = 0; i < width; ++i) {
+      const auto from = static_cast<double>(rows[row - width + i]);
+      const double at = from + share * (static_cast<double>(rows[row + i]) - from);
+      square += (static_cast<double>(stand[i]) - at) * (static_cast<double>(stand[i]) - at);
+    }
+    least = std::min(least, std::sqrt(square));
+  }
+  return least;
+}
+
+}  // namespace
+
+// Where all of it is known, and all motors rest.
+void Witness::begin_way(Asked& asked) {
+  const Request& request = asked.request;
+  if (request.array != 0) return;
+  const std::size_t width = request.motors.size();
+  for (std::size_t i = 0; i < width; ++i) {
+    if (!asked.from[i] || !asked.target[i] || !offset(*find(request.motors[i]))) return;
+  }
+  std::vector<std::int64_t> rows;
+  for (const auto& from : asked.from) rows.push_back(*from);
+  for (std::size_t value = 0; value < request.points.size(); ++value) {
+    const Motor& motor = *find(request.motors[value % width]);
+    const auto steps = units_.steps_of_position(index_of(motor), request.points[value]);
+    if (!steps) return;
+    rows.push_back(*offset(motor) + *steps);
+  }
+  if (request.points.empty()) {
+    for (const auto& target : asked.target) rows.push_back(*target);
+  }
+  asked.polyline = std::move(rows);
+}
+
+void Witness::watch_ways() {
+  for (auto& [key, asked] : asked_) {
+    if (asked.finished || asked.polyline.empty()) continue;
+    std::vector<std::int64_t> stand;
+    for (const std::string& name : asked.request.motors) stand.push_back(plant_steps(*find(name)));
+    asked.off_way = std::max(asked.off_way, off_polyline(asked.polyline, stand));
+  }
+}
+
+// Each motor is within half a step of its place, by the run of all; a step of a streamed tick, and
+// an MCU that has only just been brought into step, is off by up to a tick (sim/pace.h), in which a
+// motor makes so many steps, and one more. The nearest point is no farther than that of the same
+// time. A motor that was not ramped down with the others ends otherwise than by reaching its end.
+void Witness::check_way(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result) {
+  if (asked.polyline.empty() || result.outcome != bushd::api::Outcome::kReached) return;
+  ++ways_;
+  double square = 0;
+  for (const std::string& name : asked.request.motors) {
+    const bushd_table& table = config_.table_of(config_.motors[index_of(*find(name))]).view();
+    const double step_ns = static_cast<double>(table.cruise) * table.time_unit_ns;
+    const double most = 1.5 + static_cast<double>(config_.buses.front().tick_ns()) / step_ns;
+    square += most * most;
+  }
+  worst_off_way_ = std::max(worst_off_way_, asked.off_way);
+  if (asked.off_way * asked.off_way <= square) return;
+  violated(now_ns, fmt::format("{:.1f} steps off the way, and {:.1f} are possible: {}",
+                               asked.off_way, std::sqrt(square), text_of(asked.request)));
+}
+
+}  // namespace bushfaults
