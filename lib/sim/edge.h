@@ -9,6 +9,7 @@ namespace bushd::sim {
 // Simulated time since the beginning of the simulation, ns. It has nothing to do with the clock on
 // the wall.
 using TimeNs = std::int64_t;
+inline constexpr TimeNs kNsPerSecond = 1'000'000'000;
 
 enum class Signal : std::uint8_t { kStep, kDir, kEnable, kCommonDir, kPositionCompare };
 

@@ -6,7 +6,6 @@
 namespace bushd::sim {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 // What a receiver makes of two drivers that fight is anything; this never leaves a byte as it was.
 constexpr std::uint8_t kCorruption = 0xA5;
 

@@ -3,11 +3,7 @@
 #include <algorithm>
 
 namespace bushd::sim {
-namespace {
-
-constexpr TimeNs kNsPerSecond = 1'000'000'000;
-
-}  // namespace
+namespace {}  // namespace
 
 void PulseDrive::attach_switch(std::uint8_t line, const SwitchOptions& options) {
   switches_.push_back({line, Switch(options)});

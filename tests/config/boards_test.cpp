@@ -24,7 +24,7 @@ std::string changed(std::string text, const std::string& from, const std::string
   return text.replace(at, from.size(), to);
 }
 
-std::string error_of(const std::string& text) {
+std::string board_error(const std::string& text) {
   const auto config = ConfigFile(text).load();
   return config ? "none" : config.error().text();
 }
@@ -41,22 +41,22 @@ TEST(ConfigBoards, BoardStandsForAnMcuOfItsName) {
 }
 
 TEST(ConfigBoards, WhatABoardDoesNotHaveIsRefused) {
-  EXPECT_THAT(error_of(changed(kBoard, "start_hz = 100\n", "")), HasSubstr("start_hz"));
-  EXPECT_THAT(error_of(changed(kBoard, "= 100\n", "= 101\n")), HasSubstr("1..100 Hz"));
-  EXPECT_THAT(error_of(changed(kBoard, "baud", "tick_us = 2560\nbaud")),
+  EXPECT_THAT(board_error(changed(kBoard, "start_hz = 100\n", "")), HasSubstr("start_hz"));
+  EXPECT_THAT(board_error(changed(kBoard, "= 100\n", "= 101\n")), HasSubstr("1..100 Hz"));
+  EXPECT_THAT(board_error(changed(kBoard, "baud", "tick_us = 2560\nbaud")),
               HasSubstr("unknown key; allowed here: name, kind, port, baud, start_hz, answer_ms"));
-  EXPECT_THAT(error_of(changed(kBoard, "output = 7", "output = 8")),
+  EXPECT_THAT(board_error(changed(kBoard, "output = 7", "output = 8")),
               HasSubstr("is 8; allowed: 0..7 on commutator board \"board\""));
-  EXPECT_THAT(error_of(kBoard + "limit = \"both\"\n"), HasSubstr("limit switches of its own"));
-  EXPECT_THAT(error_of(kBoard + "home = { direction = \"negative\", most_steps = 5 }\n"),
+  EXPECT_THAT(board_error(kBoard + "limit = \"both\"\n"), HasSubstr("limit switches of its own"));
+  EXPECT_THAT(board_error(kBoard + "home = { direction = \"negative\", most_steps = 5 }\n"),
               HasSubstr("motor[0].home"));
-  EXPECT_THAT(error_of("[[mcu]]\nbus = \"board\"\naddress = 1\n" + kBoard),
+  EXPECT_THAT(board_error("[[mcu]]\nbus = \"board\"\naddress = 1\n" + kBoard),
               HasSubstr("Remove this section; its motors have mcu = \"board\""));
   // The table's fastest code is 10 of 40 us.
-  EXPECT_EQ(error_of(changed(kBoard, "= 100\n", "= 10\n")), "none");
-  EXPECT_THAT(error_of(changed(kBoard, "= 100\n", "= 9\n")),
+  EXPECT_EQ(board_error(changed(kBoard, "= 100\n", "= 10\n")), "none");
+  EXPECT_THAT(board_error(changed(kBoard, "= 100\n", "= 9\n")),
               HasSubstr("has steps 400000 ns apart; allowed: 444444 ns and more"));
-  EXPECT_THAT(error_of(changed(kBoard, "\"commutator\"", "\"can\"")),
+  EXPECT_THAT(board_error(changed(kBoard, "\"commutator\"", "\"can\"")),
               HasSubstr("allowed: \"rs485\" or \"commutator\""));
 }
 
@@ -73,16 +73,16 @@ TEST(ConfigKeypads, KeysHaveDefaults) {
 }
 
 TEST(ConfigKeypads, WhatCannotBeIsRefused) {
-  EXPECT_THAT(error_of(changed(kKeypad, "motor = \"m0\"", "motor = \"m1\"")),
+  EXPECT_THAT(board_error(changed(kKeypad, "motor = \"m0\"", "motor = \"m1\"")),
               HasSubstr("keypad[0].motor: is \"m1\"; allowed: the name of a motor"));
-  EXPECT_THAT(error_of(changed(kKeypad, "/dev/b", "/dev/a")), HasSubstr("is already taken"));
-  EXPECT_THAT(error_of(kKeypad + "mode = \"toggle\"\n"),
+  EXPECT_THAT(board_error(changed(kKeypad, "/dev/b", "/dev/a")), HasSubstr("is already taken"));
+  EXPECT_THAT(board_error(kKeypad + "mode = \"toggle\"\n"),
               HasSubstr("allowed: \"hold\" or \"latch\""));
-  EXPECT_THAT(error_of(kKeypad + "baud = 1\n"), HasSubstr("50..4000000"));
-  EXPECT_THAT(error_of(kKeypad + "keepalive_ms = 49\n"), HasSubstr("50..10000"));
-  EXPECT_THAT(error_of(kKeypad + "slowest_us = 2000\n"),
+  EXPECT_THAT(board_error(kKeypad + "baud = 1\n"), HasSubstr("50..4000000"));
+  EXPECT_THAT(board_error(kKeypad + "keepalive_ms = 49\n"), HasSubstr("50..10000"));
+  EXPECT_THAT(board_error(kKeypad + "slowest_us = 2000\n"),
               HasSubstr("slowest_us = 2000 is below delay_us = 3000"));
-  EXPECT_THAT(error_of(kKeypad + "speed = 3\n"), HasSubstr("unknown key"));
+  EXPECT_THAT(board_error(kKeypad + "speed = 3\n"), HasSubstr("unknown key"));
 }
 
 }  // namespace

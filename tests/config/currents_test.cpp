@@ -22,7 +22,7 @@ std::string with(const std::string& currents, const std::string& emission = "pha
   return replaced(mcu, "output = 0\n", "output = 0\ncurrents = " + currents + "\n");
 }
 
-std::string error_of(const std::string& text) {
+std::string currents_error(const std::string& text) {
   const ConfigFile file(text);
   const auto config = file.load();
   return config ? "no error" : config.error().text();
@@ -43,14 +43,15 @@ TEST(Currents, AreReadOfAMotorWithPhases) {
 }
 
 TEST(Currents, WhatIsWrongIsNamed) {
-  EXPECT_THAT(error_of(with("{ ramp_ma = 1, cruise_ma = 1, hold_ma = 1 }", "even")),
+  EXPECT_THAT(currents_error(with("{ ramp_ma = 1, cruise_ma = 1, hold_ma = 1 }", "even")),
               HasSubstr("33:12: motor[0].currents: says nothing of a driver with STEP and DIR; "
                         "allowed: only with emission = \"phases\" of its MCU"));
-  EXPECT_THAT(error_of(with("{ ramp_ma = 1500, cruise_ma = 1000 }")), HasSubstr("hold_ma"));
-  EXPECT_THAT(error_of(with("{ ramp_ma = 5111, cruise_ma = 1, hold_ma = 1 }")),
+  EXPECT_THAT(currents_error(with("{ ramp_ma = 1500, cruise_ma = 1000 }")), HasSubstr("hold_ma"));
+  EXPECT_THAT(currents_error(with("{ ramp_ma = 5111, cruise_ma = 1, hold_ma = 1 }")),
               HasSubstr("ramp_ma: is 5111; allowed: a whole number 1..5110 mA"));
-  EXPECT_THAT(error_of(with("{ ramp_ma = 9, cruise_ma = 1, hold_ma = 1, decay = \"mixed\" }")),
-              HasSubstr("decay: is \"mixed\"; allowed: \"slow\" or \"fast\""));
+  EXPECT_THAT(
+      currents_error(with("{ ramp_ma = 9, cruise_ma = 1, hold_ma = 1, decay = \"mixed\" }")),
+      HasSubstr("decay: is \"mixed\"; allowed: \"slow\" or \"fast\""));
 }
 
 }  // namespace

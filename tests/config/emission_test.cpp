@@ -27,7 +27,7 @@ bushd_emission settings_of(const std::string& keys) {
   return config->mcus[0].emission.settings;
 }
 
-std::string error_of(const std::string& text) {
+std::string emission_error(const std::string& text) {
   const ConfigFile file(text);
   const auto config = file.load();
   if (config) return "no error";
@@ -66,31 +66,31 @@ TEST(EmissionKeys, EachModeHasItsKeys) {
 }
 
 TEST(EmissionKeys, WhatIsWrongIsNamedWithItsLine) {
-  EXPECT_THAT(error_of(with_keys("emission = \"odd\"\n")),
+  EXPECT_THAT(emission_error(with_keys("emission = \"odd\"\n")),
               EndsWith("19:12: mcu[0].emission: is \"odd\"; allowed: \"even\", \"burst\", "
                        "\"common-dir\", \"staggered\" or \"phases\""));
-  EXPECT_THAT(error_of(with_keys("emission = \"burst\"\n")),
+  EXPECT_THAT(emission_error(with_keys("emission = \"burst\"\n")),
               HasSubstr("16:1: mcu[0].step_us: is missing; allowed: a whole number 1..65535 us"));
-  EXPECT_THAT(error_of(with_keys("pulse_us = 2.5\n")),
+  EXPECT_THAT(emission_error(with_keys("pulse_us = 2.5\n")),
               HasSubstr("19:12: mcu[0].pulse_us: is the floating-point number 2.5; allowed: a "
                         "whole number 0..65535 us"));
-  EXPECT_THAT(error_of(with_keys("emission = \"phases\"\nhold_current = 1\n")),
+  EXPECT_THAT(emission_error(with_keys("emission = \"phases\"\nhold_current = 1\n")),
               HasSubstr("20:16: mcu[0].hold_current: is 1; allowed: true or false"));
-  EXPECT_THAT(error_of(with_keys("emission = \"phases\"\nphase_sequence = \"four\"\n")),
+  EXPECT_THAT(emission_error(with_keys("emission = \"phases\"\nphase_sequence = \"four\"\n")),
               HasSubstr("20:18: mcu[0].phase_sequence: is \"four\"; allowed: \"wave\", \"full\", "
                         "\"half\" or \"three-phase\""));
 }
 
 TEST(EmissionKeys, KeysThatSayNothingInThisModeAreRefused) {
   EXPECT_THAT(
-      error_of(with_keys("step_us = 300\n")),
+      emission_error(with_keys("step_us = 300\n")),
       HasSubstr("19:11: mcu[0].step_us: says nothing with emission = \"even\"; allowed: only "
                 "with \"burst\", \"common-dir\", \"staggered\""));
-  EXPECT_THAT(error_of(with_keys("emission = \"burst\"\nstep_us = 9\nsettle_us = 5\n")),
+  EXPECT_THAT(emission_error(with_keys("emission = \"burst\"\nstep_us = 9\nsettle_us = 5\n")),
               HasSubstr("mcu[0].settle_us: says nothing"));
-  EXPECT_THAT(error_of(with_keys("emission = \"phases\"\npulse_us = 5\n")),
+  EXPECT_THAT(emission_error(with_keys("emission = \"phases\"\npulse_us = 5\n")),
               HasSubstr("mcu[0].pulse_us: says nothing"));
-  EXPECT_THAT(error_of(with_keys("hold_current = true\n")),
+  EXPECT_THAT(emission_error(with_keys("hold_current = true\n")),
               HasSubstr("mcu[0].hold_current: says nothing"));
 }
 
@@ -98,7 +98,7 @@ TEST(EmissionKeys, StepPeriodMustHaveRoomForWhatTheTablesMake) {
   // The table makes up to seven steps in a tick.
   EXPECT_EQ(settings_of("emission = \"burst\"\nstep_us = 365\n").step_us, 365);
   EXPECT_THAT(
-      error_of(with_keys("emission = \"burst\"\nstep_us = 366\n")),
+      emission_error(with_keys("emission = \"burst\"\nstep_us = 366\n")),
       HasSubstr("20:11: mcu[0].step_us: is 366: room for 6 steps in the 2560 us tick of bus "
                 "\"hall\", but motor \"theta\" makes up to 7 by table \"bushd2-constant\"; "
                 "allowed: 365 or less. Or use a slower table"));
@@ -106,9 +106,9 @@ TEST(EmissionKeys, StepPeriodMustHaveRoomForWhatTheTablesMake) {
 
 TEST(EmissionKeys, PhasesHaveFourOutputsAMotor) {
   const std::string phases = with_keys("emission = \"phases\"\n");
-  EXPECT_EQ(error_of(replaced(phases, "output = 0\n", "output = 3\n")), "no error");
+  EXPECT_EQ(emission_error(replaced(phases, "output = 0\n", "output = 3\n")), "no error");
   EXPECT_THAT(
-      error_of(replaced(phases, "output = 0\n", "output = 4\n")),
+      emission_error(replaced(phases, "output = 0\n", "output = 4\n")),
       HasSubstr("32:10: motor[0].output: is 4; allowed: 0..3 on MCU \"hall:1\", where phases "
                 "take 4 outputs a motor"));
 }

@@ -20,14 +20,10 @@ using bushd::Result;
 using bushd::sim::CommutatorBoard;
 using bushd::sim::TimeNs;
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-constexpr TimeNs kIdleSleepNs = 20'000'000;  // edges are written meanwhile
-constexpr std::size_t kReadBytes = 4096;
-
 std::int64_t monotonic_ns() {
   timespec now{};
   ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kNsPerSecond + now.tv_nsec;
+  return now.tv_sec * bushd::sim::kNsPerSecond + now.tv_nsec;
 }
 
 }  // namespace

@@ -1,12 +1,18 @@
 // A file descriptor that closes itself.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <utility>
 
 #include "base/result.h"
 
 namespace bushsim {
+
+inline constexpr std::size_t kReadBytes = 4096;
+// Where nothing is to be done; edges are written meanwhile.
+inline constexpr std::int64_t kIdleSleepNs = 20'000'000;
 
 class Descriptor {
  public:

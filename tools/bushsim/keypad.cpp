@@ -24,7 +24,7 @@ using bushd::fail;
 using bushd::Result;
 
 constexpr int kLookMs = 20;  // after what the other side has written
-constexpr std::size_t kReadBytes = 256;
+constexpr std::size_t kKeysAtOnce = 256;
 
 // Keys are read as they are pressed, for as long as this lives.
 class RawInput {
@@ -63,7 +63,7 @@ std::optional<std::uint8_t> byte_of(char key) {
 
 // False: there are no more.
 Result<bool> take_keys(Pty& pty) {
-  std::array<char, kReadBytes> keys;
+  std::array<char, kKeysAtOnce> keys;
   const ssize_t size = ::read(STDIN_FILENO, keys.data(), keys.size());
   if (size < 0) return fail(system_error("keys cannot be read"));
   std::vector<std::uint8_t> bytes;
@@ -76,7 +76,7 @@ Result<bool> take_keys(Pty& pty) {
 
 // True: there was something.
 Result<bool> show(Pty& pty) {
-  std::array<std::uint8_t, kReadBytes> shown;
+  std::array<std::uint8_t, kKeysAtOnce> shown;
   const auto size = pty.read(shown);
   if (!size) return fail(size.error());
   for (const std::uint8_t byte : std::span(shown.data(), *size)) {

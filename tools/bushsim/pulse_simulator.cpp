@@ -26,7 +26,6 @@ using bushd::fail;
 using bushd::Result;
 using bushd::sim::TimeNs;
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::uint8_t kAddress = 1;
 // Edges are exact whenever they are looked at; waking up serves to write them down.
 constexpr TimeNs kSleepNs = 20'000'000;
@@ -147,7 +146,7 @@ Result<void> PulseSimulator::take_signal() {
 TimeNs PulseSimulator::now_ns() const {
   timespec now{};
   ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kNsPerSecond + now.tv_nsec - start_ns_;
+  return now.tv_sec * bushd::sim::kNsPerSecond + now.tv_nsec - start_ns_;
 }
 
 // The other side changes its rate only while no byte is under way, so it is that of all of these.
@@ -185,8 +184,8 @@ void PulseSimulator::take_orders() {
 Result<void> PulseSimulator::set_timer() {
   const std::int64_t at_ns = start_ns_ + now_ns() + kSleepNs;
   itimerspec when{};
-  when.it_value.tv_sec = at_ns / kNsPerSecond;
-  when.it_value.tv_nsec = at_ns % kNsPerSecond;
+  when.it_value.tv_sec = at_ns / bushd::sim::kNsPerSecond;
+  when.it_value.tv_nsec = at_ns % bushd::sim::kNsPerSecond;
   if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &when, nullptr) != 0) {
     return fail(system_error("the timer cannot be set"));
   }

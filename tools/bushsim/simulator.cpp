@@ -30,8 +30,6 @@ using bushd::sim::EdgeSink;
 using bushd::sim::Mcu;
 using bushd::sim::TimeNs;
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-
 // Simulated before anybody is told that the bus is there: all MCUs have booted by then. A real one
 // tests itself meanwhile.
 constexpr TimeNs kHeadStartNs = 20'000'000;
@@ -45,10 +43,8 @@ constexpr TimeNs kBootSpreadNs = 2'560'000;
 // out replies (a busy line: soon after they end) and edges (an idle line: now and then).
 constexpr TimeNs kShortestSleepNs = 50'000;
 constexpr TimeNs kBusySleepNs = 1'000'000;
-constexpr TimeNs kIdleSleepNs = 20'000'000;
 constexpr TimeNs kMostBehindNs = 5'000'000;
 
-constexpr std::size_t kReadBytes = 4096;
 // No more is read while this much still waits for the line: so whoever writes faster than the line
 // meets a full buffer, as with a real adapter.
 constexpr std::int64_t kBacklogBytes = 4096;
@@ -228,7 +224,7 @@ Result<void> Simulator::take_signal() {
 TimeNs Simulator::wall_time_ns() const {
   timespec now{};
   ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kNsPerSecond + now.tv_nsec - start_ns_;
+  return now.tv_sec * bushd::sim::kNsPerSecond + now.tv_nsec - start_ns_;
 }
 
 Result<void> Simulator::take_bytes(TimeNs now_ns) {
@@ -250,7 +246,8 @@ Result<void> Simulator::hand_out_replies() {
 }
 
 Result<void> Simulator::hold_back(TimeNs now_ns) {
-  const TimeNs backlog_ns = kBacklogBytes * bushd::sim::kBitsPerByte * kNsPerSecond / setup_.baud;
+  const TimeNs backlog_ns =
+      kBacklogBytes * bushd::sim::kBitsPerByte * bushd::sim::kNsPerSecond / setup_.baud;
   const bool listen = bus_.line_busy_until_ns() - now_ns < backlog_ns;
   if (!pty_ || listen == listening_) return {};
   listening_ = listen;
@@ -272,8 +269,8 @@ Result<void> Simulator::set_timer(TimeNs now_ns) {
           : now_ns + (has_images_ ? kBusySleepNs : kIdleSleepNs);
   const std::int64_t at_ns = start_ns_ + wake_ns;
   itimerspec when{};
-  when.it_value.tv_sec = at_ns / kNsPerSecond;
-  when.it_value.tv_nsec = at_ns % kNsPerSecond;
+  when.it_value.tv_sec = at_ns / bushd::sim::kNsPerSecond;
+  when.it_value.tv_nsec = at_ns % bushd::sim::kNsPerSecond;
   if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &when, nullptr) != 0) {
     return fail(system_error("the timer cannot be set"));
   }
