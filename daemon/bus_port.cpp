@@ -68,6 +68,7 @@ Result<std::unique_ptr<BusPort>> open_port(const std::string& path, const config
       return std::make_unique<PulsePort>(std::move(*opened));
     }
     case config::BusKind::kRs485:
+    case config::BusKind::kCommutator:
       break;
   }
   auto opened = serial::SerialPort::open(path, bus.baud);

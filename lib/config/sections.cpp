@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "config/board_section.h"
+#include "config/bus_section.h"
 #include "config/checks.h"
 #include "config/coordinates.h"
 #include "config/crates.h"
@@ -18,7 +19,6 @@
 #include "config/inputs.h"
 #include "config/keypad_section.h"
 #include "config/port_check.h"
-#include "config/port_pattern.h"
 #include "config/pseudo_section.h"
 #include "config/serial_pulse_section.h"
 #include "config/state_section.h"
@@ -32,8 +32,6 @@ using tables::TomlReader;
 
 // A prefix becomes the beginning of LCM channel names, which have 63 characters at most.
 constexpr std::size_t kMaxPrefix = 48;
-// In the order of BusKind.
-constexpr std::array<std::string_view, 3> kBusKinds = {"rs485", "serial-pulse", "commutator"};
 constexpr std::string_view kPrefixRule =
     "1..48 characters of A-Z a-z 0-9 _ . -, the first one no -";
 
@@ -161,92 +159,11 @@ Result<void> read_control(const TomlReader& root, Config* config) {
   return {};
 }
 
-// The keys of a bus that may be left out.
-Result<void> read_manners(const TomlReader& reader, Bus* bus) {
-  if (reader.has("moves")) {
-    const auto moves = read_word(reader, "moves", {"stream", "table"});
-    if (!moves) return fail(moves.error());
-    bus->table_runs = *moves == 1;
-  }
-  if (reader.has("frames")) {
-    const auto frames = read_word(reader, "frames", {"auto", "ticks"});
-    if (!frames) return fail(frames.error());
-    bus->table_ticks = *frames == 0;
-  }
-  if (reader.has("emergency_stop")) {
-    const auto mode = read_word(reader, "emergency_stop", {"ramp", "immediate"});
-    if (!mode) return fail(mode.error());
-    bus->emergency_stop = *mode == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE;
-  }
-  return {};
-}
-
-Result<std::uint32_t> read_baud(const TomlReader& reader) {
-  const auto rates = baud_rates();
-  const auto baud = reader.integer("baud", rates.front(), rates.back(), "bit/s");
-  if (!baud) return fail(baud.error());
-  const auto rate = static_cast<std::uint32_t>(*baud);
-  if (std::binary_search(rates.begin(), rates.end(), rate)) return rate;
-  return fail(reader.error("baud", fmt::format("is {}; allowed: {}", rate,
-                                               fmt::join(rates.begin(), rates.end(), ", "))));
-}
-
-// Of a bus of kind "rs485".
-Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
-  if (auto known = reader.only({"name", "kind", "port", "baud", "tick_us", "format", "moves",
-                                "frames", "emergency_stop"});
-      !known) {
-    return known;
-  }
-  const auto baud = read_baud(reader);
-  if (!baud) return fail(baud.error());
-  bus->baud = *baud;
-  const auto tick_us =
-      reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
-  if (!tick_us) return fail(tick_us.error());
-  bus->tick_us = static_cast<std::uint32_t>(*tick_us);
-  const auto format = read_word(reader, "format", {"fine", "coarse"});
-  if (!format) return fail(format.error());
-  bus->format = *format == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
-  return {};
-}
-
-// Of a bus of kind "commutator".
-Result<void> read_commutator(const TomlReader& reader, Bus* bus) {
-  if (auto known =
-          reader.only({"name", "kind", "port", "baud", "start_hz", "answer_ms", "emergency_stop"});
-      !known) {
-    return known;
-  }
-  const auto baud = read_baud(reader);
-  if (!baud) return fail(baud.error());
-  bus->baud = *baud;
-  return read_board(reader, bus);
-}
-
-// Which keys a bus has depends on what it is.
-Result<void> read_kind(const TomlReader& reader, Bus* bus) {
-  if (reader.has("kind")) {
-    const auto kind = read_word(reader, "kind", kBusKinds);
-    if (!kind) return fail(kind.error());
-    bus->kind = static_cast<BusKind>(*kind);
-  }
-  switch (bus->kind) {
-    case BusKind::kSerialPulse:
-      return read_serial_pulse(reader, bus);
-    case BusKind::kCommutator:
-      return read_commutator(reader, bus);
-    case BusKind::kRs485:
-      break;
-  }
-  return read_rs485(reader, bus);
-}
-
 Result<void> read_buses(Loading* loading) {
   Taken names;
   for (const TomlReader& reader : loading->buses) {
     Bus bus;
-    if (auto read = read_kind(reader, &bus); !read) return read;
+    if (auto read = read_bus_kind(reader, &bus); !read) return read;
     auto name = read_name(reader);
     if (!name) return fail(name.error());
     bus.name = std::move(*name);
@@ -425,7 +342,6 @@ Result<void> read_motors(Loading* loading) {
     const auto output =
         one_motor ? Result<std::int64_t>(0) : reader.integer("output", 0, BUSHD_MOTORS_PER_MCU - 1);
     if (!output) return fail(output.error());
-    const Bus& bus = config.buses[config.mcus[mcu->value].bus.value];
     if (bus.kind == BusKind::kCommutator) {
       if (auto good = check_board_motor(reader, bus.name, *output); !good) return good;
     }
