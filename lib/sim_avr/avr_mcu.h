@@ -163,6 +163,7 @@ class AvrMcu final : public Mcu {
     std::uint8_t duty = 0;
     TimeNs followed_ns = 0;
     std::array<bool, PowerStage::kPairs> trips{};
+    std::array<double, PowerStage::kWindings> told_a{};  // to the sink
   };
   std::optional<Stage> stage_;
   std::size_t first_dir_ = 0;  // of pins_, behind the shift register

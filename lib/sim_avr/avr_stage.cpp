@@ -21,6 +21,7 @@ constexpr double kFullScaleA = 5.11;  // of 255
 // Of the low-pass, with one pole: a new reference is there to 1 % within a tick.
 constexpr double kFilterNs = 300'000;
 constexpr TimeNs kSampleNs = 5'000;
+constexpr double kSampleA = 0.001;  // less is not told
 
 }  // namespace
 
@@ -50,7 +51,12 @@ void AvrMcu::follow_stage() {
   }
   if (sink_ == nullptr) return;
   for (std::uint8_t w = 0; w < PowerStage::kWindings; ++w) {
-    sink_->sample({now_ns, index_, w, stage.current_a(w)});
+    double& told_a = stage_->told_a[w];
+    const double current_a = stage.current_a(w);
+    const bool same = std::abs(current_a - told_a) < kSampleA && (current_a == 0) == (told_a == 0);
+    if (same) continue;
+    told_a = current_a;
+    sink_->sample({now_ns, index_, w, current_a});
   }
 }
 
