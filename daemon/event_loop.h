@@ -27,6 +27,7 @@
 #include "daemon/table_library.h"
 #include "daemon/worker.h"
 #include "lcm/transport.h"
+#include "serial/serial_port.h"
 #include "state/keeper.h"
 #include "state/store.h"
 

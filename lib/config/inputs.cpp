@@ -61,10 +61,10 @@ Result<void> read_inputs(const TomlReader& reader, bool has_limits, Motor* motor
   std::optional<bool> own_level;
   if (reader.has("input_active")) own_level = own_open;
   if (auto read = read_motor_inputs(reader, own_level, motor); !read) return read;
-  return read_limit_action(reader, motor);
+  return read_limit_action(reader, has_limits, motor);
 }
 
-Result<void> read_limit_action(const TomlReader& reader, Motor* motor) {
+Result<void> read_limit_action(const TomlReader& reader, bool has_limits, Motor* motor) {
   if (!reader.has("limit_action")) return {};
   const auto action = read_word(reader, "limit_action", {"ramp", "immediate"});
   if (!action) return fail(action.error());

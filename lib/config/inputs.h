@@ -10,7 +10,7 @@ Result<void> read_inputs(const tables::TomlReader& reader, Mcu* mcu);
 // `has_limits`: beside those of these keys. Precondition: its output and `home` have been read.
 Result<void> read_inputs(const tables::TomlReader& reader, bool has_limits, Motor* motor);
 
-// The key `limit_action`. Precondition: its limits are known.
-Result<void> read_limit_action(const tables::TomlReader& reader, Motor* motor);
+// The key `limit_action`. `has_limits`: beside `inputs`. Precondition: those have been read.
+Result<void> read_limit_action(const tables::TomlReader& reader, bool has_limits, Motor* motor);
 
 }  // namespace bushd::config

@@ -105,7 +105,7 @@ Result<void> take_serial_pulse(const TomlReader& reader, const Bus& bus, Motor* 
         "home", fmt::format("needs a home switch; add inputs = {{ home = \"cd\" }} to bus \"{}\"",
                             bus.name)));
   }
-  return read_limit_action(reader, motor);
+  return read_limit_action(reader, false, motor);
 }
 
 }  // namespace bushd::config

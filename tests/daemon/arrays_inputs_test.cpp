@@ -18,10 +18,10 @@ using testing::IsEmpty;
 using Part = api::Follow::Part;
 
 // m01 and m02 are at the first MCU, m03 at the second.
-const std::vector<std::string> kMotors{"m01", "m03"};
+const std::vector<std::string> kFlyScan{"m01", "m03"};
 
-api::Follow part_of(Part part) {
-  api::Follow follow{.part = part, .array = 1, .motors = kMotors};
+api::Follow fly_scan_part(Part part) {
+  api::Follow follow{.part = part, .array = 1, .motors = kFlyScan};
   if (part == Part::kRun) return follow;
   // To 150 and -60 steps and back, at up to 100 steps/s.
   follow.time_s = {0, 1.5, 2, 3.5};
@@ -58,8 +58,8 @@ TEST_P(ArrayInputs, APulseComesWhereTheMotorPasses) {
                                      .delay_us = 3'000,
                                      .width_us = 500};
   ASSERT_EQ(lab.wait(lab.send(compare)).result, "done");
-  ASSERT_EQ(lab.wait(lab.send(part_of(Part::kLastRows))).result, "done");
-  const Answer end = lab.wait(lab.send(part_of(Part::kRun)));
+  ASSERT_EQ(lab.wait(lab.send(fly_scan_part(Part::kLastRows))).result, "done");
+  const Answer end = lab.wait(lab.send(fly_scan_part(Part::kRun)));
   EXPECT_EQ(end.result, "reached") << end.reason;
   ASSERT_EQ(pins.steps_ns.size(), 300u);
   ASSERT_EQ(pins.pulses.size(), 2u) << "one pulse, none on the way back";
@@ -78,8 +78,8 @@ TEST_P(ArrayInputs, ALimitSwitchEndsTheArrayForAll) {
   toml.insert(toml.find(first) + first.size(), "limit = \"positive\"\n");
   Lab lab(toml);
   lab.connect();
-  ASSERT_EQ(lab.wait(lab.send(part_of(Part::kLastRows))).result, "done");
-  const auto run = lab.send(part_of(Part::kRun));
+  ASSERT_EQ(lab.wait(lab.send(fly_scan_part(Part::kLastRows))).result, "done");
+  const auto run = lab.send(fly_scan_part(Part::kRun));
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") == 80; }));
   lab.bus(0).mcu(0).set_inputs({1, 0});
   const Answer end = lab.wait(run);
@@ -92,9 +92,9 @@ TEST_P(ArrayInputs, ALimitSwitchEndsTheArrayForAll) {
   EXPECT_LE(lab.shaft_steps("m01"), std::string(GetParam()) == "fine" ? 82 : 84);
   // The daemon hears of it with a report; until then m03 goes on, at 40 steps/s.
   EXPECT_LT(std::abs(lab.shaft_steps("m03")), 59);
-  for (std::size_t i = 0; i < kMotors.size(); ++i) {
-    EXPECT_EQ(lab.shaft_steps(kMotors[i]), end.position_steps[i]);
-    EXPECT_EQ(lab.motor(kMotors[i]).trust, api::Trust::kKnown);
+  for (std::size_t i = 0; i < kFlyScan.size(); ++i) {
+    EXPECT_EQ(lab.shaft_steps(kFlyScan[i]), end.position_steps[i]);
+    EXPECT_EQ(lab.motor(kFlyScan[i]).trust, api::Trust::kKnown);
   }
   // The way back is free, the way on is not.
   EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5})).reason,

@@ -52,7 +52,7 @@ ordered_json side_json(const Table& table, const bushd_ramp& side) {
           {"time_ns", ramp_ns(table, side)}};
 }
 
-const char* text_of(CurveStep::Part part) {
+const char* word_of(CurveStep::Part part) {
   switch (part) {
     case CurveStep::Part::kAccel:
       return "accel";
@@ -69,7 +69,7 @@ ordered_json steps_json(const std::vector<CurveStep>& curve) {
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const CurveStep& step = curve[i];
     steps.push_back({{"step", i + 1},
-                     {"part", text_of(step.part)},
+                     {"part", word_of(step.part)},
                      {"index", step.index},
                      {"delay_ns", step.delay_ns},
                      {"time_ns", step.time_ns},
@@ -88,7 +88,7 @@ void print_steps(const std::vector<CurveStep>& curve) {
     const std::string change =
         i == 0 ? "-" : fmt::format("{:.6g}", acceleration(curve[i - 1], step));
     fmt::print("{:>6}  {:<6} {:>6} {:>14.3f} {:>14.6f} {:>12.6g} {:>14}\n", i + 1,
-               text_of(step.part), step.index, static_cast<double>(step.delay_ns) * 1e-3,
+               word_of(step.part), step.index, static_cast<double>(step.delay_ns) * 1e-3,
                static_cast<double>(step.time_ns) * 1e-6, step.speed_hz(), change);
   }
 }

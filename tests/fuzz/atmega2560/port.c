@@ -25,7 +25,7 @@
 volatile uint8_t PORTA, PORTB, PORTC, PORTD, PORTE, PORTH, PORTJ, PORTK, PORTL;
 volatile uint8_t DDRA, DDRB, DDRC, DDRE, DDRF, DDRG, DDRH, DDRL;
 volatile uint8_t GPIOR1, GPIOR2, OCR0A, OCR0B;
-volatile uint8_t TCCR3B, TIMSK3, TIFR3;
+volatile uint8_t GTCCR, TCCR3B, TCCR4B, TCCR5B, TIMSK3, TIFR3;
 volatile uint16_t TCNT3, OCR3A;
 volatile uint8_t UCSR0A, UCSR0B, UCSR0C, UBRR0H, UBRR0L;
 const uint32_t image_seal = 0x5EA1ED01;
@@ -88,7 +88,7 @@ void host_reset(void) {
   planned = 0;
   in_head = 0;
   stamps_out = line_stamps_in = line_sending_end = 0;
-  last_delimiter = cycles_to_wait = cycles = 0;
+  last_delimiter = counts_to_wait = cycles = 0;
   TIMSK3 = PORTE = 0;
   eeprom_writes = false;
   line_init();

@@ -11,11 +11,16 @@
 extern volatile uint8_t PORTA, PORTB, PORTC, PORTD, PORTE, PORTH, PORTJ, PORTK, PORTL;
 extern volatile uint8_t DDRA, DDRB, DDRC, DDRE, DDRF, DDRG, DDRH, DDRL;
 extern volatile uint8_t GPIOR1, GPIOR2, OCR0A, OCR0B;
-extern volatile uint8_t TCCR3B, TIMSK3, TIFR3;
+extern volatile uint8_t GTCCR, TCCR3B, TCCR4B, TCCR5B, TIMSK3, TIFR3;
 extern volatile uint16_t TCNT3, OCR3A;
 extern volatile uint8_t UCSR0A, UCSR0B, UCSR0C, UBRR0H, UBRR0L;
 
 #define CS30 0
+#define CS40 0
+#define CS41 1
+#define CS51 1
+#define PSRSYNC 0
+#define TSM 7
 #define OCIE3A 1
 #define OCF3A 1
 #define U2X0 1
