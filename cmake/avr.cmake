@@ -10,5 +10,6 @@ set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 get_filename_component(source_dir ${CMAKE_CURRENT_LIST_DIR}/.. ABSOLUTE)
 # A path may have spaces; this compiler would note it with the flags.
 set(debug_flags "-gdwarf-2 -gno-record-gcc-switches \"-fdebug-prefix-map=${source_dir}=.\" \"-fdebug-prefix-map=${CMAKE_BINARY_DIR}=.\"")
-set(CMAKE_C_FLAGS_INIT "-mmcu=${BUSHD_AVR_CHIP} -ffunction-sections -fdata-sections ${debug_flags}")
+# A switch made into a table would have it in RAM.
+set(CMAKE_C_FLAGS_INIT "-mmcu=${BUSHD_AVR_CHIP} -ffunction-sections -fdata-sections -fno-tree-switch-conversion ${debug_flags}")
 set(CMAKE_ASM_FLAGS_INIT "-mmcu=${BUSHD_AVR_CHIP} ${debug_flags}")

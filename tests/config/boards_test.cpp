@@ -57,7 +57,7 @@ TEST(ConfigBoards, WhatABoardDoesNotHaveIsRefused) {
   EXPECT_THAT(board_error(changed(kBoard, "= 100\n", "= 9\n")),
               HasSubstr("has steps 400000 ns apart; allowed: 444444 ns and more"));
   EXPECT_THAT(board_error(changed(kBoard, "\"commutator\"", "\"can\"")),
-              HasSubstr("allowed: \"rs485\" or \"commutator\""));
+              HasSubstr("allowed: \"rs485\", \"serial-pulse\" or \"commutator\""));
 }
 
 TEST(ConfigKeypads, KeysHaveDefaults) {

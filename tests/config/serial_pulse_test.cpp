@@ -25,13 +25,13 @@ const std::string kPort =
 std::string refusal(const std::string& from, const std::string& to) {
   std::string text = kPort;
   text.replace(text.find(from), from.size(), to);
-  const auto config = load(test::ConfigFile(text).path());
+  const auto config = test::ConfigFile(text).load();
   return config ? "accepted" : config.error().text();
 }
 
 TEST(SerialPulse, IsABusWithOneMotor) {
   const test::ConfigFile file(kPort);
-  const auto config = load(file.path());
+  const auto config = file.load();
   ASSERT_TRUE(config) << config.error().text();
   EXPECT_EQ(config->buses[0].kind, BusKind::kSerialPulse);
   EXPECT_TRUE(config->buses[0].serial_pulse.rts);

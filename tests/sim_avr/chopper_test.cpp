@@ -138,7 +138,8 @@ TEST_P(ChopperAtSpeed, CutsEveryWindingAtItsCurrent) {
   const double volt = against_v + found.most_a * rules_.resistance_ohm + back_emf_v();
   const double most_ripple_a = volt / rules_.inductance_h * kPeriodNs * 1e-9;
   EXPECT_LE(found.ripple_a, most_ripple_a);
-  EXPECT_GE(found.ripple_a, most_ripple_a * 0.7);
+  // A cut in the first half of the period leaves the other half to fall in.
+  EXPECT_GE(found.ripple_a, most_ripple_a / 2);
   testing::Test::RecordProperty("ripple_ma", static_cast<int>(found.ripple_a * 1000));
 }
 
