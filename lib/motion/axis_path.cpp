@@ -72,7 +72,7 @@ void Axis::follow_path(Place& place, std::size_t ticks, std::int16_t* out,
   const bool fine = format_ == BUSHD_FORMAT_FINE;
   const PathTrack& track = *place.path.track();
   for (std::size_t i = 0; i < ticks; ++i) {
-    place.path.tick(tick_ns_, fine);
+    place.path.tick(tick_ns_);
     const std::int64_t told_256 =
         path_position_256(track.path(), share_->motor, place.path.step(), place.path.fraction(),
                           track.to(), place.path.segment(), !fine);
@@ -106,8 +106,7 @@ Tick Axis::own_end_on_path(const Place& place) const {
       const auto made = static_cast<std::uint32_t>(std::abs(rest - from));
       const std::uint32_t last = bushd_line_run_step(&line, made);
       bushd_line_go_to(&line, last - 1);
-      const std::int64_t crossing =
-          format_ == BUSHD_FORMAT_FINE ? std::int64_t{bushd_line_crossing(&line)} : 256;
+      const std::int64_t crossing = bushd_line_crossing(&line);
       const std::uint32_t step = begin + last;  // the run's, with or before which that is
       if (step <= place.path.step()) break;
       const std::int64_t after_ns = place.path.ns_to(step);

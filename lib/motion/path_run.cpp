@@ -89,7 +89,7 @@ std::int64_t PathRun::ns_to(std::uint32_t step) const {
          since_ns_;
 }
 
-void PathRun::tick(std::uint32_t tick_ns, bool fine) {
+void PathRun::tick(std::uint32_t tick_ns) {
   if (done()) return;
   const std::uint32_t unit_ns = track_->path().unit_ns();
   const std::uint64_t ns = std::uint64_t{since_ns_} + tick_ns;
@@ -112,7 +112,6 @@ void PathRun::tick(std::uint32_t tick_ns, bool fine) {
       part_left_ = (*profile_)[part_].steps;
     }
   }
-  if (!fine) return;
   fraction_ = static_cast<std::uint8_t>((since_ * unit_ns + since_ns_) * 256 /
                                         (std::uint64_t{delay()} * unit_ns));
 }
@@ -136,8 +135,8 @@ std::int64_t path_position_256(const Path& path, std::size_t motor, std::uint32_
   bushd_line_go_to(&line, std::min(end, path.start_of(segment + 1)) - path.start_of(segment));
   const std::int64_t rest_256 = std::int64_t{line.made} * 256;
   bushd_line_go_to(&line, step - path.start_of(segment));
-  const std::uint64_t at_256 =
-      whole_steps ? std::uint64_t{line.made} * 256 : bushd_line_position(&line, fraction);
+  std::uint64_t at_256 = bushd_line_position(&line, fraction);
+  if (whole_steps) at_256 -= at_256 % 256;
   const std::int64_t made_256 = std::min(static_cast<std::int64_t>(at_256), rest_256);
   return from * 256 + (way < 0 ? -made_256 : made_256);
 }

@@ -70,7 +70,7 @@ class PathRun {
   std::size_t segment() const { return segment_; }     // of the next one, or the last
   std::uint32_t delay() const;                         // of the running step; 0: done
   std::int64_t ns_to(std::uint32_t step) const;        // from now to the end of that step
-  void tick(std::uint32_t tick_ns, bool fine);
+  void tick(std::uint32_t tick_ns);
   // See PathTrack::ending. Precondition: !done().
   void end_at(std::uint32_t end);
 
@@ -91,7 +91,7 @@ class PathRun {
 // Where a motor is on the path when the run has made `step` of its steps and `fraction`/256 of the
 // next one, 1/256 step, as bushd_line_position tells it for each segment: on a whole step at every
 // point. Not beyond the whole step where it is to come to rest when the run ends at `end`.
-// `whole_steps`: what it has made of them.
+// `whole_steps`: rounded down to them.
 std::int64_t path_position_256(const Path& path, std::size_t motor, std::uint32_t step,
                                std::uint8_t fraction, std::uint32_t end, std::size_t segment,
                                bool whole_steps);

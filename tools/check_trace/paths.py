@@ -11,14 +11,12 @@ of it. So every edge says where the run is. It is asked
 - that a motor takes no less time for 1, 4, 16 and 64 steps than its table has for them, to two ticks: of the interval before a
   step that follows i others since the motor stood or turned round, and that k follow until it does, max(A(i), D(k), c, floor).
 
-In the coarse format a step is made with the next one of the run, so that s is a whole number, and intervals are not judged.
 A run may be paused and go on anywhere, and end anywhere.
 """
 
 import csv
 from fractions import Fraction
 from itertools import accumulate
-from math import ceil
 
 from check_trace.problems import InputError
 
@@ -111,11 +109,8 @@ class PathCheck:
                 self._problems.add(motor, "path", "its edges are not the steps of the path's points")
                 continue
             count_to_go([step for step, _ in made])
-            if motor.moves[0].fine:
-                self._check_intervals(motor, made)
-                judged += [(step.s, edge.time_ns, motor) for step, edge in made]
-            else:
-                judged += [(ceil(step.s), edge.time_ns, motor) for step, edge in made]
+            self._check_intervals(motor, made)
+            judged += [(step.s, edge.time_ns, motor) for step, edge in made]
         self._check_order(sorted(judged, key=lambda one: one[:2]))
         return len(judged)
 
