@@ -249,6 +249,7 @@ class Axis {
   double trajectory_velocity(const Place& place) const;
   void follow_trajectory(Place& place, std::size_t ticks, std::int16_t* out,
                          std::size_t stride) const;
+  std::int64_t way_on_trajectory(const Place& place) const;
   std::uint16_t delay_on_trajectory(const Place& place) const;
   std::uint16_t follower_delay(const Place& place) const;
   void leave_trajectory(Place& place) const;

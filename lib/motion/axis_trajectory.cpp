@@ -109,9 +109,9 @@ void Axis::follow_trajectory(Place& place, std::size_t ticks, std::int16_t* out,
   }
 }
 
-// The delay of the running step, rounded down and as the fastest tick of it has it, and the one
-// after this moment: a ramp-down from it is not too short. 0: it stands, or all but.
-std::uint16_t Axis::delay_on_trajectory(const Place& place) const {
+// Of the running step in a tick, as the fastest one of it has it, and the one after this moment: a
+// ramp-down from it is not too short.
+std::int64_t Axis::way_on_trajectory(const Place& place) const {
   const Follower& now = place.follower;
   // One that has all but come to rest since goes no faster than twice as it does.
   Position way = std::min(now.fastest_way(), 2 * now.last_way());
@@ -120,6 +120,12 @@ std::uint16_t Axis::delay_on_trajectory(const Place& place) const {
   if (goes_on && (now.direction() == 0 || later.direction() == now.direction())) {
     way = std::max(way, later.last_way());
   }
+  return way;
+}
+
+// By that way, rounded down. 0: it stands, or all but.
+std::uint16_t Axis::delay_on_trajectory(const Place& place) const {
+  const Position way = way_on_trajectory(place);
   if (way <= 0) return 0;
   // A nanosecond for the rounding of positions.
   const Wide time = Wide{tick_ns_} * Trajectory::kStep + way;
@@ -145,7 +151,12 @@ void Axis::leave_trajectory(Place& place) const {
   const Position aim = follower.at() + direction * (Trajectory::kStep / 2);
   const std::int64_t begun_256 =
       follower.told() == aim ? (follower.told_256() - follower.made() * 256) * direction : 0;
-  const auto fraction = static_cast<std::uint8_t>(std::clamp<std::int64_t>(begun_256, 0, 255));
+  // Where it has slowed down in the running step, or caught up, less of the step's delay is over
+  // than of its way: at least as much as its fastest tick took for that.
+  const Position way = std::max<Position>(way_on_trajectory(place), 0);
+  const Position fastest = std::max<Position>(follower.fastest_told(), 1);
+  const std::int64_t over_256 = begun_256 * std::min(way, fastest) / fastest;
+  const auto fraction = static_cast<std::uint8_t>(std::clamp<std::int64_t>(over_256, 0, 255));
   bushd_run_start_ramp_down(&place.run, table_, delay_on_trajectory(place), fraction, direction);
 }
 

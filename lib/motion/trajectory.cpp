@@ -136,8 +136,13 @@ bool Follower::next(bool rests_at_end) {
   last_way_ = way * direction_;
   const std::int64_t made_before = made_;
   tell(told_ + told);
-  const bool anew = made_ != made_before || direction_ != direction_before;
-  fastest_way_ = anew ? last_way_ : std::max(fastest_way_, last_way_);
+  const bool turned = direction_ != direction_before;
+  if (turned || made_ != made_before) {
+    fastest_before_ = turned ? 0 : fastest_now_;
+    fastest_now_ = fastest_told_ = 0;
+  }
+  fastest_now_ = std::max(fastest_now_, last_way_);
+  fastest_told_ = std::max(fastest_told_, told * direction_);
   return true;
 }
 

@@ -110,9 +110,11 @@ class Follower {
   // Steps, as its MCU counts them by what it is told in 1/256 step.
   std::int64_t made() const { return made_; }
   int direction() const { return direction_; }
-  // What it went in the last tick, in its direction; and the most in any tick since its last step.
+  // What it went in the last tick, in its direction; the most in any tick of the running step and
+  // of the one before it; and the most that was told in one of the running step.
   Position last_way() const { return last_way_; }
-  Position fastest_way() const { return fastest_way_; }
+  Position fastest_told() const { return fastest_told_; }
+  Position fastest_way() const { return std::max(fastest_now_, fastest_before_); }
 
  private:
   void tell(Position told);
@@ -128,7 +130,9 @@ class Follower {
   Position at_ = 0;
   Position told_ = 0;
   Position last_way_ = 0;
-  Position fastest_way_ = 0;
+  Position fastest_now_ = 0;  // in the running step
+  Position fastest_told_ = 0;
+  Position fastest_before_ = 0;  // in the one before it
   std::int64_t told_256_ = 0;
   std::int64_t made_ = 0;
   int direction_ = 0;

@@ -20,8 +20,9 @@ double unit_ns(const bushd_table& table) {
   return table.time_unit_ns;
 }
 
+// At which it may begin from rest, and come to rest.
 double start_speed(const bushd_table& table) {
-  return 1e9 / (table.accel.code[0] * unit_ns(table));
+  return 1e9 / (std::max(table.accel.code[0], table.decel.code[0]) * unit_ns(table));
 }
 
 double least_delay_ns(const TrajectoryCheck::Motor& motor) {

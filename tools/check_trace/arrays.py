@@ -107,7 +107,7 @@ class ArrayMove(Move):
         if not array.closed or array.cubic:
             return array.closed
         way = abs(array.positions[-1][self._column] - array.positions[-2][self._column])
-        first_ns = self.table.accel[0] * self.table.unit_ns
+        first_ns = max(self.table.accel[0], self.table.decel[0]) * self.table.unit_ns
         return way * first_ns * 10**8 <= (array.times[-1] - array.times[-2]) * STEP * (10**8 + 1)
 
     def _ticks(self):
@@ -121,7 +121,8 @@ class ArrayMove(Move):
         told = (at + STEP // 2) // STEP * STEP
         made = told // STEP
         least = min(self.tick_ns * STEP // (2 * self.table.accel[0] * self.table.unit_ns), STEP)
-        direction = row = fastest = tick = way = 0
+        direction = row = tick = way = 0
+        fastest_now = fastest_before = fastest_told = 0  # in the running step, the one before it, and as told
         over = False
         while not (over and told == rest):
             time_ns = (tick + 1) * self.tick_ns
@@ -150,7 +151,11 @@ class ArrayMove(Move):
             parts = -(-told >> 24) if direction < 0 else told >> 24
             steps = int((parts - 256 * made) / 256)
             made += steps
-            fastest = abs(way) if steps or turns else max(fastest, abs(way))
+            if steps or turns:
+                fastest_before = 0 if turns else fastest_now
+                fastest_now = fastest_told = 0
+            fastest_now = max(fastest_now, abs(way))
+            fastest_told = max(fastest_told, move * direction)
             # The way to its last step is cut off there: as of any move, it comes with the end of its tick.
             last = over or (rests and row + 1 == known and told == rest)
             yield Tick(parts if self.fine else 256 * made, direction, row, last, turns or lags)
@@ -159,10 +164,11 @@ class ArrayMove(Move):
             return
         if self._stop is not None and self._stop <= self.start_tick:
             return
-        yield from self._ramp(tick, row, at, told, made, direction, min(fastest, 2 * abs(way)))
+        fastest = min(max(fastest_now, fastest_before), 2 * abs(way))
+        yield from self._ramp(tick, row, at, told, made, direction, fastest, max(fastest_told, 1))
 
-    def _ramp(self, tick, row, at, told, made, direction, fastest):
-        """As if its MCU heard no more: the running step, as fast as it was anywhere, and the fewest that follow."""
+    def _ramp(self, tick, row, at, told, made, direction, fastest, fastest_told):
+        """As if its MCU heard no more: the running step, as fast as it and the one before it were anywhere, and the fewest that follow."""
         array, column = self._array, self._column
         time_ns = (tick + 1) * self.tick_ns
         if time_ns <= array.times[array.known()] or self._rests():
@@ -177,7 +183,9 @@ class ArrayMove(Move):
         parts = -(-told >> 24) if direction < 0 else told >> 24
         # What is still being caught up was told in half its time.
         caught_up = told == at + (direction or 1) * (STEP // 2)
-        begun = min(max((parts - 256 * made) * (direction or 1), 0), 255) if caught_up else 0
+        begun = (parts - 256 * made) * (direction or 1) if caught_up else 0
+        # Of its time less is over than of its way, where it was told faster than it goes now.
+        begun = min(max(begun * min(fastest, fastest_told) // fastest_told, 0), 255)
         delays = []
         if 0 < delay <= 65535:
             delay = max(delay, min(self.table.accel[-1], self.table.decel[-1], self.table.cruise))
