@@ -215,8 +215,9 @@ TEST(Trajectory, EveryStepIsWhereTheRowsPutIt) {
       const long double at = exact.at(ns);
       const long double late = (at - (count - edge.direction * 0.5L)) * edge.direction;
       const long double v = std::abs(exact.at(tick + c.tick_ns) - exact.at(before));
-      const long double bound =
-          exact.swing(before, tick + 2.0 * c.tick_ns) * c.tick_ns / 2 + v / kSlots * 2 + 3.0L / 256;
+      // The last part: times are whole nanoseconds.
+      const long double bound = exact.swing(before, tick + 2.0 * c.tick_ns) * c.tick_ns / 2 +
+                                v / kSlots * 2 + 3.0L / 256 + v / c.tick_ns;
       // It may be late on the first half step after it has turned round.
       const long double lag = 0.5L + v;
       RC_ASSERT(late >= -bound);
