@@ -10,7 +10,7 @@ namespace bushfaults {
 namespace {
 
 constexpr std::int64_t kLongestMove = 6000;
-constexpr std::uint32_t kStream = 100;  // of randomness
+constexpr std::uint32_t kClientsStream = 100;  // of randomness
 
 }  // namespace
 
@@ -20,7 +20,7 @@ Clients::Clients(const bushd::config::Config& config, const Witness& witness,
       witness_(witness),
       rates_(rates),
       per_hour_(std::accumulate(rates.begin(), rates.end(), 0.0)),
-      random_(seed, kStream),
+      random_(seed, kClientsStream),
       joggers_(seed),
       programs_(config, seed) {}
 

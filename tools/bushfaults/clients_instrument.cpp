@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "clients.h"
+#include "request.h"
 
 namespace bushfaults {
 
@@ -161,7 +162,6 @@ std::optional<Request> Clients::remedy_of_pauses() {
 }
 
 Request Clients::change_settings() {
-  constexpr std::int64_t kMicro = 1'000'000;
   Request request = make(Ask::kConfigure);
   std::vector<Choice> some = motors_that(random_.one_in(20), false);
   const std::string motor = some.empty() ? any_motor() : random_.pick(some).name;

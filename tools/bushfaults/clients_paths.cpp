@@ -4,12 +4,12 @@
 #include <utility>
 
 #include "clients.h"
+#include "request.h"
 
 namespace bushfaults {
 namespace {
 
 constexpr std::int64_t kMsNs = 1'000'000;
-constexpr std::int64_t kMicro = 1'000'000;
 
 }  // namespace
 

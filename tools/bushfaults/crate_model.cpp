@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "times.h"
+
 namespace bushfaults {
 namespace {
 
 using bushd::camac::Bushd2;
 using bushd::sim::TimeNs;
 
-constexpr TimeNs kSecond = 1'000'000'000;
 // What was written so long before a daemon ended is on the disk: a disk fault lasts five seconds,
 // and a power cut comes at once.
 constexpr TimeNs kOnDiskNs = 15 * kSecond;

@@ -9,7 +9,7 @@
 namespace bushfaults {
 namespace {
 
-constexpr std::uint32_t kStream = 200;  // of randomness; garblers have the next two
+constexpr std::uint32_t kHostStream = 200;  // of randomness; garblers have the next two
 // What an adapter adds to each transfer, another at each plugging in: from a good one to one whose
 // latency timer is as long as its maker set it.
 constexpr bushd::sim::TimeNs kMaxLatencyNs = 16'000'000;
@@ -24,8 +24,9 @@ Host::Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& w
       bus_(bus),
       witness_(witness),
       recent_(recent),
-      random_(seed, kStream),
-      garbler_{bushd::sim::Garbler(seed, kStream + 1), bushd::sim::Garbler(seed, kStream + 2)} {
+      random_(seed, kHostStream),
+      garbler_{bushd::sim::Garbler(seed, kHostStream + 1),
+               bushd::sim::Garbler(seed, kHostStream + 2)} {
   bus_.on_master_byte = [this](std::uint8_t byte, TimeNs end_ns) {
     if (plugged_ && end_ns >= silent_until_ns_) arriving_.push_back(byte);
   };

@@ -5,13 +5,12 @@
 #include <algorithm>
 
 #include "installation.h"
+#include "times.h"
 
 namespace bushfaults {
 namespace {
 
 using bushd::sim::TimeNs;
-
-constexpr TimeNs kMs = 1'000'000;
 
 }  // namespace
 

@@ -18,7 +18,7 @@ namespace {
 constexpr std::array<const char*, 4> kTables = {"bushd2-constant", "bushd2-scurve",
                                                 "bushd2-exponential", "bushd2-resonance"};
 constexpr std::array<std::uint32_t, 4> kBauds = {500'000, 1'000'000, 2'000'000, 4'000'000};
-constexpr std::uint32_t kStream = 400;  // of randomness
+constexpr std::uint32_t kInstallationStream = 400;  // of randomness
 constexpr std::uint32_t kHomeStream = 401;
 constexpr std::uint32_t kEmergencyStream = 402;
 constexpr std::uint32_t kInputStream = 413;
@@ -29,7 +29,7 @@ constexpr std::uint32_t kLimitStream = 5000;  // likewise
 
 // Every choice is drawn, also where the way is given: so a run told all its ways is the same run.
 bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
-  bushd::sim::Random random(seed, kStream);
+  bushd::sim::Random random(seed, kInstallationStream);
   bushd::config::Bus bus{.name = "hall", .port = "simulated", .tick_us = kTickUs};
   const bool table_runs = random.one_in(2);
   const bool table_ticks = random.one_in(2);

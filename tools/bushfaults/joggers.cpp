@@ -1,18 +1,19 @@
 #include "joggers.h"
 
+#include "request.h"
+#include "times.h"
+
 namespace bushfaults {
 namespace {
 
 using bushd::sim::TimeNs;
 
-constexpr std::uint32_t kStream = 409;  // of randomness
-constexpr TimeNs kMs = 1'000'000;
+constexpr std::uint32_t kJoggersStream = 409;  // of randomness
 constexpr std::uint64_t kClients = 8;
-constexpr std::int64_t kMicro = 1'000'000;
 
 }  // namespace
 
-Joggers::Joggers(std::uint64_t seed) : random_(seed, kStream) {}
+Joggers::Joggers(std::uint64_t seed) : random_(seed, kJoggersStream) {}
 
 Request Joggers::begin(const std::string& motor) {
   Pressed pressed{.client = "j" + std::to_string(random_.below(kClients)),

@@ -9,7 +9,7 @@ namespace {
 namespace state = bushd::state;
 using bushd::daemon::Core;
 
-constexpr std::uint32_t kStream = 405;  // of randomness
+constexpr std::uint32_t kKeptStream = 405;  // of randomness
 // Of a good disk.
 constexpr bushd::sim::TimeNs kFastestNs = 50'000;
 constexpr bushd::sim::TimeNs kSlowestNs = 20'000'000;
@@ -17,7 +17,7 @@ constexpr bushd::sim::TimeNs kSlowestNs = 20'000'000;
 }  // namespace
 
 Kept::Kept(const bushd::config::Config& config, std::uint64_t seed)
-    : config_(config), random_(seed, kStream), disk_(seed) {}
+    : config_(config), random_(seed, kKeptStream), disk_(seed) {}
 
 bushd::Result<void> Kept::use(TimeNs now_ns, Core& core) {
   now_ns_ = now_ns;

@@ -7,14 +7,14 @@
 #include <utility>
 
 #include "api/sessions.h"
+#include "times.h"
 
 namespace bushfaults {
 namespace {
 
 using bushd::sim::TimeNs;
 
-constexpr TimeNs kMs = 1'000'000;
-constexpr std::uint32_t kStream = 404;  // of randomness
+constexpr std::uint32_t kMailStream = 404;  // of randomness
 // As bushctl does.
 constexpr TimeNs kRepeatNs = 300 * kMs;
 constexpr int kRepetitions = 10;
@@ -39,7 +39,7 @@ std::int64_t first_number(bushd::sim::Random& random) {
 }  // namespace
 
 Mail::Mail(Clients& clients, Host& host, std::uint64_t seed)
-    : clients_(clients), host_(host), random_(seed, kStream) {
+    : clients_(clients), host_(host), random_(seed, kMailStream) {
   host_.on_message = [this](const bushd::lcm::DaemonMessage& message) { hear(message); };
 }
 

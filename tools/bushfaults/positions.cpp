@@ -16,10 +16,6 @@ constexpr bushd::sim::TimeNs kMaxAgeNs = 1'500'000'000;
 // pause and kMaxAgeNs together.
 constexpr std::size_t kReportsKept = 1024;
 
-bool is_good(bushd::api::Trust trust) {
-  return trust == bushd::api::Trust::kKnown || trust == bushd::api::Trust::kRestored;
-}
-
 bool is_online(const bushd::api::StateSnapshot& state) {
   using bushd::api::McuState;
   if (state.state == McuState::kOffline) return false;
@@ -28,6 +24,10 @@ bool is_online(const bushd::api::StateSnapshot& state) {
 }
 
 }  // namespace
+
+bool is_good(bushd::api::Trust trust) {
+  return trust == bushd::api::Trust::kKnown || trust == bushd::api::Trust::kRestored;
+}
 
 Positions::Positions(const bushd::config::Config& config, const bushd::sim::Bus& bus,
                      const bushd::sim::Plant& plant)

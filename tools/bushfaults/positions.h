@@ -39,6 +39,9 @@
 
 namespace bushfaults {
 
+// What must be right.
+bool is_good(bushd::api::Trust trust);
+
 class Positions {
  public:
   using TimeNs = bushd::sim::TimeNs;

@@ -11,8 +11,8 @@ namespace {
 
 using bushd::camac::Bushd2;
 
-constexpr std::uint32_t kStream = 420;  // of randomness
-constexpr std::uint64_t kClients = 3;
+constexpr std::uint32_t kProgramsStream = 420;  // of randomness
+constexpr std::uint64_t kProgramClients = 3;
 constexpr int kStation = kBushd2Station;
 constexpr std::uint32_t kEnabled = 0x60;  // fault and end of motion
 constexpr std::uint32_t kLeft = 0x80;
@@ -58,7 +58,7 @@ bushd::tables::TablePtr slowest_program(const bushd::tables::Table& table) {
 }
 
 Programs::Programs(const bushd::config::Config& config, std::uint64_t seed)
-    : config_(config), random_(seed, kStream) {}
+    : config_(config), random_(seed, kProgramsStream) {}
 
 std::size_t Programs::motors() const {
   return config_.crates.empty() ? 0 : config_.crates.front().modules.front().motors.size();
@@ -141,7 +141,7 @@ void Programs::random_cycles(Cycles& cycles) {
 }
 
 Request Programs::next(std::int64_t position_steps, std::size_t motor) {
-  Request request{.client = "p" + std::to_string(random_.below(kClients)), .ask = Ask::kCamac};
+  Request request{.client = "p" + std::to_string(random_.below(kProgramClients)), .ask = Ask::kCamac};
   Cycles& cycles = request.cycles;
   switch (random_.below(12)) {
     case 0:

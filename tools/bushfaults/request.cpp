@@ -16,8 +16,6 @@ namespace {
 
 namespace api = bushd::api;
 
-constexpr double kMicro = 1e6;
-
 std::optional<api::Speed> speed_of(const Request& request) {
   if (request.speed_micro == 0) return std::nullopt;
   return api::Speed{.per_s = static_cast<double>(request.speed_micro) / kMicro,

@@ -14,6 +14,9 @@
 
 namespace bushfaults {
 
+// User units are asked for in millionths.
+inline constexpr std::int64_t kMicro = 1'000'000;
+
 enum class Ask : std::uint8_t {
   kMoveBy,
   kMoveTo,

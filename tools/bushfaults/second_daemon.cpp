@@ -6,15 +6,16 @@
 #include <utility>
 #include <variant>
 
+#include "times.h"
+
 namespace bushfaults {
 namespace {
 
 using bushd::sim::TimeNs;
 
-constexpr TimeNs kMs = 1'000'000;
-constexpr std::uint32_t kStream = 405;       // of randomness
-constexpr TimeNs kLookNs = 750 * kMs;        // as daemon/channel_claim.cpp
-constexpr TimeNs kMovePeriodNs = 100 * kMs;  // of its clients
+constexpr std::uint32_t kSecondDaemonStream = 405;  // of randomness
+constexpr TimeNs kLookNs = 750 * kMs;               // as daemon/channel_claim.cpp
+constexpr TimeNs kMovePeriodNs = 100 * kMs;         // of its clients
 
 }  // namespace
 
@@ -36,7 +37,7 @@ SecondDaemon::SecondDaemon(const bushd::config::Config& config, bushd::sim::Bus&
     : config_(config),
       bus_(bus),
       recent_(recent),
-      random_(seed, kStream),
+      random_(seed, kSecondDaemonStream),
       client_(std::make_shared<Client>(counts_)) {
   bus_.add_second_master();
   bus_.on_second_master_byte = [this](std::uint8_t byte, TimeNs end_ns) {

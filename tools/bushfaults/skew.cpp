@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "times.h"
+
 namespace bushfaults {
 namespace {
 
 using bushd::sim::TimeNs;
 
-constexpr TimeNs kSecond = 1'000'000'000;
 constexpr TimeNs kInStepNs = 3 * kSecond;
 constexpr TimeNs kMaxSkewNs = 20'000;
 constexpr TimeNs kSilenceNs = 10 * kSecond;

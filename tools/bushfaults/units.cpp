@@ -7,14 +7,14 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "request.h"
 #include "sim/random.h"
 
 namespace bushfaults {
 namespace {
 
-constexpr std::uint32_t kStream = 406;  // of randomness
+constexpr std::uint32_t kUnitsStream = 406;  // of randomness
 constexpr std::uint32_t kBacklashStream = 408;
-constexpr std::int64_t kMicro = 1'000'000;
 // 400, 1000/3, 12.5, 80, 2000/7 and 0.4 steps to a unit.
 constexpr std::array<std::int64_t, 6> kMicroPerStep = {2'500,  3'000, 80'000,
                                                        12'500, 3'500, 2'500'000};
@@ -41,7 +41,7 @@ std::int64_t micro_per_step_of(const bushd::config::Motor& motor) {
 }  // namespace
 
 void add_units(bushd::config::Config& config, std::uint64_t seed) {
-  bushd::sim::Random random(seed, kStream);
+  bushd::sim::Random random(seed, kUnitsStream);
   for (bushd::config::Motor& motor : config.motors) {
     const std::int64_t micro_per_step = random.pick(kMicroPerStep);
     const bool negative = random.one_in(2);

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "times.h"
 #include "witness.h"
 
 namespace bushfaults {
@@ -15,8 +16,6 @@ namespace {
 namespace api = bushd::api;
 using bushd::sim::TimeNs;
 
-constexpr TimeNs kMs = 1'000'000;
-constexpr TimeNs kSecond = 1'000 * kMs;
 // The longest ramp, and all that may keep the daemon from it: the line, its own pauses.
 constexpr TimeNs kJogOverNs = 12 * kSecond;
 // A move of the random clients lasts some seconds, the longest fault ten, and then a link is given

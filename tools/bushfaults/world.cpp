@@ -4,15 +4,13 @@
 
 #include <algorithm>
 
+#include "times.h"
+
 namespace bushfaults {
 namespace {
 
 using bushd::sim::kNever;
 using bushd::sim::TimeNs;
-
-constexpr TimeNs kMs = 1'000'000;
-constexpr TimeNs kSecond = 1'000'000'000;
-constexpr TimeNs kHour = 3600 * kSecond;
 
 constexpr TimeNs kWellAfterNs = 5 * kSecond;  // the promise: READY by itself
 constexpr TimeNs kSkewPeriodNs = 20 * kMs;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "positions.h"
+#include "times.h"
 #include "world.h"
 
 namespace bushfaults {
@@ -11,17 +13,10 @@ namespace {
 using bushd::api::Trust;
 using bushd::sim::TimeNs;
 
-constexpr TimeNs kMs = 1'000'000;
-constexpr TimeNs kSecond = 1'000'000'000;
-
 // Until all that stands is on the disk, also what it had to be told twice.
 constexpr TimeNs kSettledNs = 3 * kSecond;
 // As after any other trouble; positions are set in MCUs besides, one after the other.
 constexpr TimeNs kMorningNs = 10 * kSecond;
-
-bool is_good(Trust trust) {
-  return trust == Trust::kKnown || trust == Trust::kRestored;
-}
 
 }  // namespace
 
