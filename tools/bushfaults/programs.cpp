@@ -141,7 +141,8 @@ void Programs::random_cycles(Cycles& cycles) {
 }
 
 Request Programs::next(std::int64_t position_steps, std::size_t motor) {
-  Request request{.client = "p" + std::to_string(random_.below(kProgramClients)), .ask = Ask::kCamac};
+  Request request{.client = "p" + std::to_string(random_.below(kProgramClients)),
+                  .ask = Ask::kCamac};
   Cycles& cycles = request.cycles;
   switch (random_.below(12)) {
     case 0:
