@@ -10,7 +10,7 @@
 """
 
 from . import aio
-from .client import Client, Jog, Motion, Tables, connect
+from .client import Client, connect
 from .errors import (
     BushdError,
     MoveFailed,
@@ -21,6 +21,7 @@ from .errors import (
     TwoDaemons,
     UnknownMotor,
 )
+from .handles import Jog, Motion, Tables
 from .model import (
     Activity,
     BusHealth,
