@@ -1,15 +1,10 @@
 #include "board_simulator.h"
 
 #include <fmt/format.h>
-#include <poll.h>
-#include <sys/signalfd.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <csignal>
-#include <ctime>
 #include <iterator>
 
 namespace bushsim {
@@ -20,17 +15,12 @@ using bushd::Result;
 using bushd::sim::CommutatorBoard;
 using bushd::sim::TimeNs;
 
-std::int64_t monotonic_ns() {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * bushd::sim::kNsPerSecond + now.tv_nsec;
-}
-
 }  // namespace
 
-BoardSimulator::BoardSimulator(const Options& options, Pty pty,
+BoardSimulator::BoardSimulator(const Options& options, Waiter waiter, Pty pty,
                                std::unique_ptr<bushd::sim::VcdWriter> trace)
-    : links_(options.links),
+    : waiter_(std::move(waiter)),
+      links_(options.links),
       pty_(std::move(pty)),
       trace_(std::move(trace)),
       line_(options.setup.baud, options.setup.board_start_hz, trace_.get()),
@@ -56,17 +46,10 @@ Result<std::unique_ptr<BoardSimulator>> BoardSimulator::create(const Options& op
     if (!created) return fail(created.error());
     trace = std::move(*created);
   }
-  std::unique_ptr<BoardSimulator> simulator(
-      new BoardSimulator(options, std::move(*pty), std::move(trace)));
-  sigset_t mask;
-  sigemptyset(&mask);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2}) sigaddset(&mask, signal);
-  if (::sigprocmask(SIG_BLOCK, &mask, nullptr) != 0) {
-    return fail(system_error("signals cannot be blocked"));
-  }
-  simulator->signals_ = Descriptor(::signalfd(-1, &mask, SFD_NONBLOCK | SFD_CLOEXEC));
-  if (!simulator->signals_.valid()) return fail(system_error("signals cannot be read"));
-  return simulator;
+  auto waiter = Waiter::create();
+  if (!waiter) return fail(waiter.error());
+  return std::unique_ptr<BoardSimulator>(
+      new BoardSimulator(options, std::move(*waiter), std::move(*pty), std::move(trace)));
 }
 
 TimeNs BoardSimulator::now_ns() const {
@@ -91,23 +74,21 @@ Result<void> BoardSimulator::run() {
 }
 
 Result<void> BoardSimulator::wait() const {
-  std::array<pollfd, 2> watched{{{signals_.get(), POLLIN, 0}, {pty_ ? pty_->fd() : -1, POLLIN, 0}}};
-  const TimeNs sleep_ns = std::clamp<TimeNs>(line_.next_event_ns() - now_ns(), 0, kIdleSleepNs);
-  const timespec timeout{.tv_sec = 0, .tv_nsec = sleep_ns};
-  if (::ppoll(watched.data(), watched.size(), &timeout, nullptr) >= 0 || errno == EINTR) return {};
-  return fail(system_error("waiting failed"));
+  const TimeNs sleep_ns = std::min(line_.next_event_ns() - now_ns(), kIdleSleepNs);
+  const auto waited = waiter_.wait({pty_ ? pty_->fd() : -1}, sleep_ns);
+  if (!waited) return fail(waited.error());
+  return {};
 }
 
 Result<void> BoardSimulator::take_signals() {
-  signalfd_siginfo info{};
-  while (::read(signals_.get(), &info, sizeof info) == sizeof info) {
-    if (info.ssi_signo == SIGUSR1) {
+  while (const auto signal = waiter_.signal()) {
+    if (*signal == SIGUSR1) {
       pty_.reset();
-    } else if (info.ssi_signo == SIGUSR2 && !pty_) {
+    } else if (*signal == SIGUSR2 && !pty_) {
       auto opened = Pty::open(links_[links_used_++ % links_.size()]);
       if (!opened) return fail(opened.error());
       pty_.emplace(std::move(*opened));
-    } else if (info.ssi_signo != SIGUSR2) {
+    } else if (*signal != SIGUSR2 && *signal != SIGRTMIN) {  // no trigger input
       ended_ = true;
     }
   }

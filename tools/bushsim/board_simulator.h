@@ -13,6 +13,7 @@
 #include "setup.h"
 #include "sim/board_line.h"
 #include "sim/vcd.h"
+#include "waiter.h"
 
 namespace bushsim {
 
@@ -24,7 +25,7 @@ class BoardSimulator {
     std::vector<std::string> links;  // as of Simulator
     std::string trace;
   };
-  // Makes all that can fail. Blocks SIGINT, SIGTERM, SIGHUP, SIGUSR1 and SIGUSR2: run() takes them.
+  // Makes all that can fail, and takes the signals of Waiter.
   static bushd::Result<std::unique_ptr<BoardSimulator>> create(const Options& options);
 
   // Until a signal ends it. SIGUSR1 takes the serial adapter away, SIGUSR2 plugs it in again.
@@ -33,19 +34,20 @@ class BoardSimulator {
   std::string summary() const;
 
  private:
-  BoardSimulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace);
+  BoardSimulator(const Options& options, Waiter waiter, Pty pty,
+                 std::unique_ptr<bushd::sim::VcdWriter> trace);
   bushd::sim::TimeNs now_ns() const;
   bushd::Result<void> wait() const;
   bushd::Result<void> take_signals();
   bushd::Result<void> take_bytes();
   bushd::Result<void> hand_out_answers();
 
+  Waiter waiter_;
   const std::vector<std::string> links_;
   std::size_t links_used_ = 1;
   std::optional<Pty> pty_;  // none: unplugged
   std::unique_ptr<bushd::sim::VcdWriter> trace_;
   bushd::sim::BoardLine line_;
-  Descriptor signals_;
   const std::int64_t start_ns_;  // CLOCK_MONOTONIC at simulated time 0
   bool ended_ = false;
 };

@@ -1,14 +1,11 @@
 #include "keypad.h"
 
 #include <fmt/core.h>
-#include <poll.h>
-#include <sys/signalfd.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
-#include <csignal>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -16,6 +13,7 @@
 
 #include "descriptor.h"
 #include "pty.h"
+#include "waiter.h"
 
 namespace bushsim {
 namespace {
@@ -23,7 +21,7 @@ namespace {
 using bushd::fail;
 using bushd::Result;
 
-constexpr int kLookMs = 20;  // after what the other side has written
+constexpr bushd::sim::TimeNs kLookNs = 20'000'000;  // after what the other side has written
 constexpr std::size_t kKeysAtOnce = 256;
 
 // Keys are read as they are pressed, for as long as this lives.
@@ -92,29 +90,21 @@ Result<bool> show(Pty& pty) {
 Result<void> run_keypad(const std::string& link) {
   auto pty = Pty::open(link);
   if (!pty) return fail(pty.error());
-  sigset_t mask;
-  sigemptyset(&mask);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&mask, signal);
-  if (::sigprocmask(SIG_BLOCK, &mask, nullptr) != 0) {
-    return fail(system_error("signals cannot be blocked"));
-  }
-  const Descriptor signals(::signalfd(-1, &mask, SFD_NONBLOCK | SFD_CLOEXEC));
-  if (!signals.valid()) return fail(system_error("signals cannot be read"));
+  const auto waiter = Waiter::create();
+  if (!waiter) return fail(waiter.error());
   const RawInput input;
   fmt::print("bushsim: ready {}\nkeys: f forward, r reverse, s slower, x stop\n", link);
   std::fflush(stdout);
   while (true) {
-    std::array<pollfd, 2> watched{{{signals.get(), POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}}};
-    if (::poll(watched.data(), watched.size(), kLookMs) < 0 && errno != EINTR) {
-      return fail(system_error("waiting failed"));
-    }
+    const auto readable = waiter->wait({STDIN_FILENO}, kLookNs);
+    if (!readable) return fail(readable.error());
     if (const auto shown = show(*pty); !shown) {
       return fail(shown.error());
     } else if (!*shown) {
       pty->lift_exclusive_use();
     }
-    if ((watched[0].revents & POLLIN) != 0) return {};
-    if ((watched[1].revents & (POLLIN | POLLHUP)) == 0) continue;
+    if (waiter->signal()) return {};
+    if (*readable == 0) continue;
     const auto more = take_keys(*pty);
     if (!more) return fail(more.error());
     if (!*more) return {};

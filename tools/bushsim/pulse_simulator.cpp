@@ -1,10 +1,7 @@
 #include "pulse_simulator.h"
 
 #include <fmt/format.h>
-#include <sys/epoll.h>
-#include <sys/signalfd.h>
 #include <sys/socket.h>
-#include <sys/timerfd.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -13,7 +10,6 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <ctime>
 #include <iterator>
 
 #include "serial/any_rate.h"
@@ -32,8 +28,12 @@ constexpr TimeNs kSleepNs = 20'000'000;
 
 }  // namespace
 
-PulseSimulator::PulseSimulator(const Options& options, std::unique_ptr<bushd::sim::VcdWriter> trace)
-    : links_(options.links), trace_(std::move(trace)), drive_(trace_.get()) {
+PulseSimulator::PulseSimulator(const Options& options, Waiter waiter,
+                               std::unique_ptr<bushd::sim::VcdWriter> trace)
+    : waiter_(std::move(waiter)),
+      links_(options.links),
+      trace_(std::move(trace)),
+      drive_(trace_.get()) {
   for (const SwitchAt& one : options.switches) {
     if (one.options.input.value_or(0) < 4) {
       drive_.attach_switch(one.options.input.value_or(0), one.options);
@@ -52,42 +52,13 @@ Result<std::unique_ptr<PulseSimulator>> PulseSimulator::create(const Options& op
     if (!created) return fail(created.error());
     trace = std::move(*created);
   }
-  std::unique_ptr<PulseSimulator> simulator(new PulseSimulator(options, std::move(trace)));
-  if (const auto watched = simulator->watch(); !watched) return fail(watched.error());
+  auto waiter = Waiter::create();
+  if (!waiter) return fail(waiter.error());
+  std::unique_ptr<PulseSimulator> simulator(
+      new PulseSimulator(options, std::move(*waiter), std::move(trace)));
+  simulator->start_ns_ = monotonic_ns();
+  if (const auto plugged = simulator->plug_in(); !plugged) return fail(plugged.error());
   return simulator;
-}
-
-Result<void> PulseSimulator::watch() {
-  sigset_t mask;
-  sigemptyset(&mask);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2, SIGRTMIN}) {
-    sigaddset(&mask, signal);
-  }
-  if (::sigprocmask(SIG_BLOCK, &mask, nullptr) != 0) {
-    return fail(system_error("signals cannot be blocked"));
-  }
-  signals_ = Descriptor(::signalfd(-1, &mask, SFD_NONBLOCK | SFD_CLOEXEC));
-  timer_ = Descriptor(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
-  epoll_ = Descriptor(::epoll_create1(EPOLL_CLOEXEC));
-  if (!signals_.valid() || !timer_.valid() || !epoll_.valid()) {
-    return fail(system_error("the event loop cannot be set up"));
-  }
-  for (const int fd : {signals_.get(), timer_.get()}) {
-    if (const auto watched = watch(fd); !watched) return watched;
-  }
-  start_ns_ = now_ns();
-  if (const auto plugged = plug_in(); !plugged) return plugged;
-  return set_timer();
-}
-
-Result<void> PulseSimulator::watch(int fd) {
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.fd = fd;
-  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0) {
-    return fail(system_error("the event loop cannot be set up"));
-  }
-  return {};
 }
 
 // The lines first: whoever sees the port finds them.
@@ -114,11 +85,9 @@ Result<void> PulseSimulator::plug_in() {
   auto opened = Pty::open(link);
   if (!opened) return fail(opened.error());
   pty_.emplace(std::move(*opened));
-  if (const auto watched = watch(listener_.get()); !watched) return watched;
-  return watch(pty_->fd());
+  return {};
 }
 
-// Closing takes them out of the epoll set.
 void PulseSimulator::unplug() {
   drive_.break_off(now_ns());
   pty_.reset();
@@ -127,26 +96,22 @@ void PulseSimulator::unplug() {
   ::unlink(socket_path_.c_str());
 }
 
-Result<void> PulseSimulator::take_signal() {
-  signalfd_siginfo info{};
-  if (::read(signals_.get(), &info, sizeof info) != sizeof info) {
-    return fail(system_error("a signal cannot be read"));
-  }
-  if (info.ssi_signo == static_cast<std::uint32_t>(SIGRTMIN)) return {};  // no trigger input
-  if (info.ssi_signo == SIGUSR1) {
-    if (pty_) unplug();
-  } else if (info.ssi_signo == SIGUSR2) {
-    return plug_in();
-  } else {
-    ended_ = true;
+Result<void> PulseSimulator::take_signals() {
+  while (const auto signal = waiter_.signal()) {
+    if (*signal == SIGRTMIN) continue;  // no trigger input
+    if (*signal == SIGUSR1) {
+      if (pty_) unplug();
+    } else if (*signal == SIGUSR2) {
+      if (const auto plugged = plug_in(); !plugged) return plugged;
+    } else {
+      ended_ = true;
+    }
   }
   return {};
 }
 
 TimeNs PulseSimulator::now_ns() const {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * bushd::sim::kNsPerSecond + now.tv_nsec - start_ns_;
+  return monotonic_ns() - start_ns_;
 }
 
 // The other side changes its rate only while no byte is under way, so it is that of all of these.
@@ -158,11 +123,19 @@ Result<void> PulseSimulator::take_bytes() {
   if (baud > 0 && baud != drive_.baud()) drive_.set_baud(now_ns(), baud);
   drive_.send(now_ns(), {space.data(), *size});
   taken_ += *size;
+  if (*size == 0) pty_->lift_exclusive_use();
   return {};
 }
 
+void PulseSimulator::take_client() {
+  const int client = ::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (client < 0) return;
+  client_ = Descriptor(client);
+  taken_ = 0;
+}
+
 void PulseSimulator::take_orders() {
-  for (;;) {
+  while (client_.valid()) {
     bushd::serial::LineOrder order;
     const ssize_t got = ::recv(client_.get(), &order, sizeof order, 0);
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) return;
@@ -181,45 +154,21 @@ void PulseSimulator::take_orders() {
   }
 }
 
-Result<void> PulseSimulator::set_timer() {
-  const std::int64_t at_ns = start_ns_ + now_ns() + kSleepNs;
-  itimerspec when{};
-  when.it_value.tv_sec = at_ns / bushd::sim::kNsPerSecond;
-  when.it_value.tv_nsec = at_ns % bushd::sim::kNsPerSecond;
-  if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &when, nullptr) != 0) {
-    return fail(system_error("the timer cannot be set"));
-  }
-  return {};
-}
-
 Result<void> PulseSimulator::loop() {
-  for (;;) {
-    std::array<epoll_event, 5> events;
-    const int count = ::epoll_wait(epoll_.get(), events.data(), std::ssize(events), -1);
-    if (count < 0 && errno != EINTR) return fail(system_error("waiting failed"));
+  while (!ended_) {
+    const auto waited =
+        waiter_.wait({pty_ ? pty_->fd() : -1, listener_.get(), client_.get()}, kSleepNs);
+    if (!waited) return fail(waited.error());
     drive_.advance_to(now_ns());
-    for (int i = 0; i < count; ++i) {
-      const int fd = events[static_cast<std::size_t>(i)].data.fd;
-      if (fd == signals_.get()) {
-        if (const auto taken = take_signal(); !taken) return taken;
-      } else if (pty_ && fd == pty_->fd()) {
-        if (const auto taken = take_bytes(); !taken) return taken;
-      } else if (pty_ && fd == listener_.get()) {
-        client_ = Descriptor(::accept4(fd, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-        taken_ = 0;
-        if (client_.valid()) {
-          if (const auto watched = watch(client_.get()); !watched) return watched;
-        }
-      } else if (client_.valid() && fd == client_.get()) {
-        take_orders();
-      } else if (pty_) {
-        pty_->lift_exclusive_use();
-      }
+    if (const auto taken = take_signals(); !taken) return taken;
+    if (pty_) {
+      take_client();  // whose bytes are counted from now on
+      if (const auto taken = take_bytes(); !taken) return taken;
+      take_orders();
     }
     if (trace_ && trace_->error()) return fail(*trace_->error());
-    if (ended_) return {};
-    if (const auto set = set_timer(); !set) return set;
   }
+  return {};
 }
 
 Result<void> PulseSimulator::run() {

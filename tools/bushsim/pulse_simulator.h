@@ -15,6 +15,7 @@
 #include "sim/pulse_drive.h"
 #include "sim/vcd.h"
 #include "simulator.h"
+#include "waiter.h"
 
 namespace bushsim {
 
@@ -30,18 +31,18 @@ class PulseSimulator {
   std::string summary() const;
 
  private:
-  PulseSimulator(const Options& options, std::unique_ptr<bushd::sim::VcdWriter> trace);
-  bushd::Result<void> watch();
-  bushd::Result<void> watch(int fd);
+  PulseSimulator(const Options& options, Waiter waiter,
+                 std::unique_ptr<bushd::sim::VcdWriter> trace);
   bushd::Result<void> plug_in();
   void unplug();
-  bushd::Result<void> take_signal();
+  bushd::Result<void> take_signals();
   bushd::Result<void> take_bytes();
+  void take_client();
   void take_orders();
-  bushd::Result<void> set_timer();
   bushd::Result<void> loop();
   bushd::sim::TimeNs now_ns() const;
 
+  Waiter waiter_;
   std::vector<std::string> links_;
   std::size_t links_used_ = 0;
   std::unique_ptr<bushd::sim::VcdWriter> trace_;
@@ -50,10 +51,7 @@ class PulseSimulator {
   std::string socket_path_;
   Descriptor listener_;
   Descriptor client_;
-  std::uint64_t taken_ = 0;  // bytes since the client was connected
-  Descriptor epoll_;
-  Descriptor timer_;
-  Descriptor signals_;
+  std::uint64_t taken_ = 0;    // bytes since the client was connected
   std::int64_t start_ns_ = 0;  // CLOCK_MONOTONIC at time 0
   bool ended_ = false;
 };

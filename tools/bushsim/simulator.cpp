@@ -1,16 +1,10 @@
 #include "simulator.h"
 
 #include <fmt/format.h>
-#include <sys/epoll.h>
-#include <sys/signalfd.h>
-#include <sys/timerfd.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <csignal>
-#include <ctime>
 #include <iterator>
 #include <set>
 
@@ -78,8 +72,10 @@ std::unique_ptr<Mcu> make_mcu([[maybe_unused]] const Image& image,
 
 }  // namespace
 
-Simulator::Simulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace)
-    : setup_(options.setup),
+Simulator::Simulator(const Options& options, Waiter waiter, Pty pty,
+                     std::unique_ptr<bushd::sim::VcdWriter> trace)
+    : waiter_(std::move(waiter)),
+      setup_(options.setup),
       links_(options.links),
       pty_(std::move(pty)),
       trace_(std::move(trace)),
@@ -142,43 +138,18 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
     if (!created) return fail(created.error());
     trace = std::move(*created);
   }
-  std::unique_ptr<Simulator> simulator(new Simulator(options, std::move(*pty), std::move(trace)));
-  if (const auto watched = simulator->watch(); !watched) return fail(watched.error());
+  auto waiter = Waiter::create();
+  if (!waiter) return fail(waiter.error());
+  std::unique_ptr<Simulator> simulator(
+      new Simulator(options, std::move(*waiter), std::move(*pty), std::move(trace)));
+  simulator->start();
   return simulator;
 }
 
-Result<void> Simulator::watch() {
-  sigset_t mask;
-  sigemptyset(&mask);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2, SIGRTMIN}) {
-    sigaddset(&mask, signal);
-  }
-  if (::sigprocmask(SIG_BLOCK, &mask, nullptr) != 0) {
-    return fail(system_error("signals cannot be blocked"));
-  }
-  signals_ = Descriptor(::signalfd(-1, &mask, SFD_NONBLOCK | SFD_CLOEXEC));
-  timer_ = Descriptor(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
-  epoll_ = Descriptor(::epoll_create1(EPOLL_CLOEXEC));
-  if (!signals_.valid() || !timer_.valid() || !epoll_.valid()) {
-    return fail(system_error("the event loop cannot be set up"));
-  }
-  for (const int fd : {signals_.get(), timer_.get(), pty_->fd()}) {
-    if (const auto watched = watch(fd); !watched) return watched;
-  }
+void Simulator::start() {
   const TimeNs head_start_ns = has_images_ ? kRealHeadStartNs : kHeadStartNs;
   bus_.advance_to(head_start_ns);
-  start_ns_ = wall_time_ns() - head_start_ns;
-  return set_timer(head_start_ns);
-}
-
-Result<void> Simulator::watch(int fd) {
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.fd = fd;
-  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0) {
-    return fail(system_error("the event loop cannot be set up"));
-  }
-  return {};
+  start_ns_ = monotonic_ns() - head_start_ns;
 }
 
 Result<void> Simulator::plug_in() {
@@ -187,44 +158,35 @@ Result<void> Simulator::plug_in() {
   if (!opened) return fail(opened.error());
   ++links_used_;
   pty_.emplace(std::move(*opened));
-  listening_ = true;
-  return watch(pty_->fd());
+  return {};
 }
 
 // The adapter loses its power: what it was sending breaks off, what it holds is lost.
 void Simulator::unplug() {
-  pty_.reset();  // closing takes it out of the epoll set
+  pty_.reset();
   bus_.break_off_master();
 }
 
-Result<void> Simulator::take_signal() {
-  signalfd_siginfo info{};
-  if (::read(signals_.get(), &info, sizeof info) != sizeof info) {
-    return fail(system_error("a signal cannot be read"));
-  }
-  if (info.ssi_signo == static_cast<std::uint32_t>(SIGRTMIN)) {
-    triggered_ = !triggered_;
-    const std::uint8_t system = triggered_ ? BUSHD_INPUT_TRIGGER : 0;
-    for (std::size_t i = 0; i < bus_.mcu_count(); ++i) bus_.node(i).set_inputs({0, system});
-    return {};
-  }
-  switch (info.ssi_signo) {
-    case SIGUSR1:
+Result<void> Simulator::take_signals() {
+  while (const auto signal = waiter_.signal()) {
+    if (*signal == SIGRTMIN) {
+      triggered_ = !triggered_;
+      const std::uint8_t system = triggered_ ? BUSHD_INPUT_TRIGGER : 0;
+      for (std::size_t i = 0; i < bus_.mcu_count(); ++i) bus_.node(i).set_inputs({0, system});
+    } else if (*signal == SIGUSR1) {
       unplug();
-      return {};
-    case SIGUSR2:
-      return plug_in();
-    default:
+    } else if (*signal == SIGUSR2) {
+      if (const auto plugged = plug_in(); !plugged) return plugged;
+    } else {
       ended_ = true;
-      return {};
+    }
   }
+  return {};
 }
 
 // Simulated time as the clock on the wall has it.
 TimeNs Simulator::wall_time_ns() const {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * bushd::sim::kNsPerSecond + now.tv_nsec - start_ns_;
+  return monotonic_ns() - start_ns_;
 }
 
 Result<void> Simulator::take_bytes(TimeNs now_ns) {
@@ -232,6 +194,7 @@ Result<void> Simulator::take_bytes(TimeNs now_ns) {
   const auto size = pty_->read(space);
   if (!size) return fail(size.error());
   bus_.master_send({space.data(), *size}, now_ns);
+  if (*size == 0) pty_->lift_exclusive_use();
   return {};
 }
 
@@ -245,36 +208,17 @@ Result<void> Simulator::hand_out_replies() {
   return {};
 }
 
-Result<void> Simulator::hold_back(TimeNs now_ns) {
+bool Simulator::line_takes_more(TimeNs now_ns) const {
   const TimeNs backlog_ns =
       kBacklogBytes * bushd::sim::kBitsPerByte * bushd::sim::kNsPerSecond / setup_.baud;
-  const bool listen = bus_.line_busy_until_ns() - now_ns < backlog_ns;
-  if (!pty_ || listen == listening_) return {};
-  listening_ = listen;
-  epoll_event event{};
-  event.events = listen ? EPOLLIN : 0u;
-  event.data.fd = pty_->fd();
-  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, pty_->fd(), &event) != 0) {
-    return fail(system_error("the event loop cannot be changed"));
-  }
-  return {};
+  return bus_.line_busy_until_ns() - now_ns < backlog_ns;
 }
 
-Result<void> Simulator::set_timer(TimeNs now_ns) {
-  const TimeNs busy_until_ns = bus_.line_busy_until_ns();
-  const TimeNs wake_ns =
-      busy_until_ns > now_ns
-          ? std::clamp(busy_until_ns, now_ns + kShortestSleepNs, now_ns + kBusySleepNs)
-          // When an image answers is not known before it does.
-          : now_ns + (has_images_ ? kBusySleepNs : kIdleSleepNs);
-  const std::int64_t at_ns = start_ns_ + wake_ns;
-  itimerspec when{};
-  when.it_value.tv_sec = at_ns / bushd::sim::kNsPerSecond;
-  when.it_value.tv_nsec = at_ns % bushd::sim::kNsPerSecond;
-  if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &when, nullptr) != 0) {
-    return fail(system_error("the timer cannot be set"));
-  }
-  return {};
+TimeNs Simulator::sleep_ns(TimeNs now_ns) const {
+  const TimeNs busy_ns = bus_.line_busy_until_ns() - now_ns;
+  if (busy_ns > 0) return std::clamp(busy_ns, kShortestSleepNs, kBusySleepNs);
+  // When an image answers is not known before it does.
+  return has_images_ ? kBusySleepNs : kIdleSleepNs;
 }
 
 // An image may take longer than the chip would: then simulated time falls behind, rather than that
@@ -285,30 +229,23 @@ void Simulator::slip() {
 }
 
 Result<void> Simulator::loop() {
-  for (;;) {
-    std::array<epoll_event, 3> events;
-    const int count = ::epoll_wait(epoll_.get(), events.data(), std::ssize(events), -1);
-    if (count < 0 && errno != EINTR) return fail(system_error("waiting failed"));
+  TimeNs now_ns = wall_time_ns();
+  while (!ended_) {
+    const bool listens = pty_ && line_takes_more(now_ns);
+    const TimeNs until_ns = now_ns + sleep_ns(now_ns);
+    const auto waited = waiter_.wait({listens ? pty_->fd() : -1}, until_ns - wall_time_ns());
+    if (!waited) return fail(waited.error());
     if (has_images_) slip();
-    const TimeNs now_ns = wall_time_ns();
+    now_ns = wall_time_ns();
     bus_.advance_to(now_ns);
-    for (int i = 0; i < count; ++i) {
-      const int fd = events[static_cast<std::size_t>(i)].data.fd;
-      if (fd == signals_.get()) {
-        if (const auto taken = take_signal(); !taken) return taken;
-      } else if (pty_ && fd == pty_->fd()) {
-        if (const auto taken = take_bytes(now_ns); !taken) return taken;
-      } else if (pty_) {
-        pty_->lift_exclusive_use();
-      }
+    if (const auto taken = take_signals(); !taken) return taken;
+    if (pty_ && listens) {
+      if (const auto taken = take_bytes(now_ns); !taken) return taken;
     }
     if (const auto handed = hand_out_replies(); !handed) return handed;
     if (trace_ && trace_->error()) return fail(*trace_->error());
-    if (ended_) return {};
-    if (const auto held = hold_back(now_ns); !held) return held;
-    // Setting the timer anew also clears its expiration.
-    if (const auto set = set_timer(now_ns); !set) return set;
   }
+  return {};
 }
 
 Result<void> Simulator::run() {

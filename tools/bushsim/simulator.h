@@ -13,6 +13,7 @@
 #include "setup.h"
 #include "sim/bus.h"
 #include "sim/vcd.h"
+#include "waiter.h"
 
 namespace bushsim {
 
@@ -27,35 +28,35 @@ struct Options {
 
 class Simulator {
  public:
-  // Makes all that can fail: pty, link, trace, timers. Blocks SIGINT, SIGTERM, SIGHUP, SIGUSR1,
-  // SIGUSR2 and SIGRTMIN: run() takes them.
+  // Makes all that can fail: pty, link, trace. Takes the signals of Waiter.
   static bushd::Result<std::unique_ptr<Simulator>> create(const Options& options);
 
   // Until a signal ends it. SIGUSR1 takes the serial adapter away, SIGUSR2 plugs it in again; the
   // MCUs live on. SIGRTMIN makes their trigger inputs active, or inactive if they are. One
-  // thread, one epoll loop.
+  // thread.
   bushd::Result<void> run();
 
   // What was done, for people: a line per MCU and one for the line.
   std::string summary() const;
 
  private:
-  Simulator(const Options& options, Pty pty, std::unique_ptr<bushd::sim::VcdWriter> trace);
+  Simulator(const Options& options, Waiter waiter, Pty pty,
+            std::unique_ptr<bushd::sim::VcdWriter> trace);
   void add_mcus(const Options& options);
-  bushd::Result<void> watch();
-  bushd::Result<void> watch(int fd);
+  void start();
   bushd::Result<void> plug_in();
   void unplug();
-  bushd::Result<void> take_signal();
+  bushd::Result<void> take_signals();
   bushd::sim::TimeNs wall_time_ns() const;
   bushd::Result<void> take_bytes(bushd::sim::TimeNs now_ns);
   bushd::Result<void> hand_out_replies();
-  bushd::Result<void> hold_back(bushd::sim::TimeNs now_ns);
+  bool line_takes_more(bushd::sim::TimeNs now_ns) const;
+  bushd::sim::TimeNs sleep_ns(bushd::sim::TimeNs now_ns) const;
   void report_collision(bushd::sim::TimeNs time_ns, std::uint8_t first, std::uint8_t second);
   void slip();
-  bushd::Result<void> set_timer(bushd::sim::TimeNs now_ns);
   bushd::Result<void> loop();
 
+  Waiter waiter_;
   Setup setup_;
   std::vector<std::string> links_;
   std::size_t links_used_ = 1;
@@ -64,13 +65,9 @@ class Simulator {
   bushd::sim::Bus bus_;
   std::vector<bool> is_virtual_;  // by MCU
   bool has_images_;
-  Descriptor epoll_;
-  Descriptor timer_;
-  Descriptor signals_;
   std::int64_t start_ns_ = 0;  // CLOCK_MONOTONIC at simulated time 0
   std::vector<std::uint8_t> replies_;
   std::uint64_t dropped_bytes_ = 0;
-  bool listening_ = true;   // to the pty
   bool ended_ = false;      // by a signal
   bool triggered_ = false;  // the trigger inputs are active
 };
