@@ -145,6 +145,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::MovePath& r) { lines_.request(now, asker, r); },
                  [&](const api::Camac& r) { camac_.request(now, asker, r); },
                  [&](const api::Follow& r) { arrays_.request(now, asker, r); },
+                 [&](const api::ArmLine& r) { lines_.request(asker, r); },
              },
              request);
 }

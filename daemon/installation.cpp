@@ -152,14 +152,14 @@ std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const
   return motors;
 }
 
-link::LineRun Mcu::line_run(const motion::Axis& axis) const {
-  const motion::LineShare& share = *axis.line();
+link::LineRun Mcu::line_run(const motion::LineShare& share, std::uint16_t floor,
+                            link::Tick ticks) const {
   return {.slot = *master_.slot_of(on_bus_, share.table->view()),
-          .floor = axis.floor(),
+          .floor = floor,
           .longest = share.longest,
           .from = share.from,
           .steps = share.to - share.from,
-          .ticks = axis.over_tick() - axis.start_tick(),
+          .ticks = ticks,
           .increment = share.increment,
           .direction = share.direction};
 }

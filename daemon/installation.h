@@ -95,6 +95,7 @@ class Mcu {
     return master_.slot_of(on_bus_, table).has_value();
   }
   bool can_trigger() const { return master_.can_trigger(on_bus_); }
+  bool can_arm_lines() const { return master_.can_arm_lines(on_bus_); }
   bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }
   bool can_travel() const { return master_.can_travel(on_bus_); }
   bool can_home() const { return master_.can_home(on_bus_); }
@@ -115,13 +116,21 @@ class Mcu {
   void begin_table_run(Output output, link::Tick start, link::TableRun run) {
     master_.begin_table_run(on_bus_, output.value, start, run);
   }
-  // Of a motor's share that the MCUs are to make themselves. Precondition: has_table of its line.
-  link::LineRun line_run(const motion::Axis& axis) const;
+  // Of a motor's share that the MCUs are to make themselves, in so many ticks. Precondition:
+  // has_table of its line.
+  link::LineRun line_run(const motion::LineShare& share, std::uint16_t floor,
+                         link::Tick ticks) const;
+  link::LineRun line_run(const motion::Axis& axis) const {
+    return line_run(*axis.line(), axis.floor(), axis.over_tick() - axis.start_tick());
+  }
   void begin_line_run(Output output, const motion::Axis& axis) {
     master_.begin_line_run(on_bus_, output.value, axis.start_tick(), line_run(axis));
   }
   void follow_table_run(Output output, link::Tick start, link::TableRun run) {
-    master_.follow_table_run(on_bus_, output.value, start, run);
+    master_.follow_run(on_bus_, output.value, start, run);
+  }
+  void follow_line_run(Output output, const motion::Axis& axis) {
+    master_.follow_run(on_bus_, output.value, axis.start_tick(), line_run(axis));
   }
   void replace(std::uint16_t outputs, link::Tick first) {
     master_.replace(on_bus_, outputs, first);
@@ -130,6 +139,10 @@ class Mcu {
   std::uint8_t arm(bushd_edge edge, std::uint32_t delay_us,
                    std::span<const link::BusMaster::Armed> moves) {
     return master_.arm(on_bus_, edge, delay_us, moves);
+  }
+  std::uint8_t arm_line(bushd_edge edge, std::uint32_t delay_us,
+                        std::span<const link::BusMaster::ArmedOnLine> parts) {
+    return master_.arm_line(on_bus_, edge, delay_us, parts);
   }
   void disarm() { master_.disarm(on_bus_); }
   void compare_positions(const bushd_position_compare& message) {

@@ -40,6 +40,7 @@ std::optional<std::vector<MotorId>> Departures::motors_of(const api::Request& re
                               return installation_.find(r.motors);
                             },
                             [&](const api::Arm& r) { return installation_.find(r.motors); },
+                            [&](const api::ArmLine& r) { return installation_.find(r.motors); },
                             [&](const api::Jog& r) -> Result<std::vector<MotorId>> {
                               if (r.per_s == 0 || r.renew) return std::vector<MotorId>();
                               return installation_.find(api::MotorNames{r.motor});

@@ -9,13 +9,16 @@
 #include <utility>
 
 namespace bushd::daemon {
-namespace {}  // namespace
-
 void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request) {
   const auto motors = installation_.find(request.motors);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   const bool moves = std::ranges::any_of(
       *motors, [this](MotorId motor) { return installation_[motor].has_plan(); });
+  for (const MotorId motor : *motors) {
+    if (!installation_[motor].is<motion::Armed>()) continue;
+    return asker.answer(
+        api::Refused{installation_[motor].busy_text() + "; disarm it first, or wait for it"});
+  }
   if (moves) return redirect(now_us, asker, *motors, request);
   auto line = line_of(request);
   if (!line) return asker.answer(api::Refused{line.error().text()});
@@ -361,6 +364,7 @@ void Lines::step(std::int64_t now_us) {
 }
 
 bool Lines::follow(std::int64_t now_us, std::uint64_t number, Line& line) {
+  if (line.waits && !follow_trigger(now_us, number, line)) return true;
   const auto cause = cause_to_end(now_us, number, line);
   if (cause) end(now_us, number, line, *cause);
   bool any = false;
@@ -452,6 +456,7 @@ std::string Lines::conclusion(std::uint64_t number) const {
   const auto found = lines_.find(number);
   if (found == lines_.end()) return {};
   const Line& line = found->second;
+  if (!line.begun) return {};
   const bool moves_on = std::ranges::any_of(
       line.motors, [&](MotorId motor) { return on_line(motor, number) != nullptr; });
   if (moves_on) return {};

@@ -36,6 +36,7 @@ class Lines final : public Service {
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request);
   void request(std::int64_t now_us, const api::Asker& asker, const api::MovePath& request);
+  void request(const api::Asker& asker, const api::ArmLine& request);
 
   // A path is being planned; one slice of that.
   bool plans() const;
@@ -59,6 +60,9 @@ class Lines final : public Service {
     std::shared_ptr<motion::Path> rest{};
     std::shared_ptr<const motion::PathTrack> track{};  // of the whole rest
     std::vector<tables::TablePtr> tables{};            // that it points to
+    // For the trigger: some of its motors, or all while none has begun.
+    bool waits = false;
+    bool begun = true;
 
     std::uint32_t longest() const;
     std::int64_t position_at(std::size_t motor, std::uint32_t step) const;
@@ -109,6 +113,18 @@ class Lines final : public Service {
   Result<void> check_ends(const Incoming& incoming) const;
   Result<void> may_begin(const Line& line) const;
   void begin_path(std::int64_t now_us, Coming coming);
+
+  // lines_trigger.cpp
+  Result<Line> line_to_arm(const api::ArmLine& request) const;
+  Result<void> may_wait(const Line& line) const;
+  void arm(const api::ArmLine& request, std::uint64_t number, Line& line);
+  bool waits(MotorId motor, std::uint64_t number) const;
+  // Returns whether all of its motors that are left have begun.
+  bool follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line);
+  std::optional<std::string> cause_to_wait_no_more(const Line& line,
+                                                   const std::vector<MotorId>& begun,
+                                                   const std::vector<MotorId>& waiting) const;
+  void keep_together(std::int64_t now_us, const std::vector<MotorId>& begun);
 
   // A request for motors that move.
   Result<std::uint64_t> number_of(const std::vector<MotorId>& motors) const;

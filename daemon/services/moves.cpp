@@ -305,78 +305,10 @@ void Moves::cancel_armed_group(MotorId ended) {
         installation_.config()[id].mcu == installation_.config()[ended].mcu) {
       continue;
     }
-    motor.stop(installation_[ended].name());
+    motor.stop(installation_[ended].name() + ", armed with it, does not wait any more");
     others.push_back(id);
   }
   disarm(others);
-}
-
-void Moves::replan(std::int64_t now_us, const std::vector<MotorId>& motors) {
-  plan(now_us, with_whole_lines(motors));
-}
-
-void Moves::plan_again(std::int64_t now_us, const std::vector<MotorId>& motors) {
-  plan(now_us, motors);
-}
-
-// The motors of a line change at the same tick, or not yet: one of them may have taken a change
-// that another one is not known to have taken.
-std::vector<MotorId> Moves::with_whole_lines(const std::vector<MotorId>& motors) {
-  std::set<std::uint64_t> stop;
-  std::set<std::uint64_t> wait;
-  std::vector<MotorId> all = installation_.with_lines(motors);
-  for (const MotorId id : all) {
-    const motion::Motor& motor = installation_[id];
-    const auto* on_line = motor.as<motion::OnLine>();
-    if (on_line == nullptr) continue;
-    if (motor.axis().open_change()) wait.insert(on_line->line);
-    if (motor.axis().stopping() && !motor.is_paused()) stop.insert(on_line->line);
-  }
-  std::erase_if(all, [&](MotorId id) {
-    const auto* on_line = installation_[id].as<motion::OnLine>();
-    return on_line != nullptr && wait.contains(on_line->line);
-  });
-  for (const MotorId id : all) {
-    const auto* on_line = installation_[id].as<motion::OnLine>();
-    if (on_line != nullptr && stop.contains(on_line->line)) installation_[id].stop();
-  }
-  return all;
-}
-
-void Moves::plan(std::int64_t now_us, const std::vector<MotorId>& motors) {
-  // One replacement serves all motors of an MCU. It can bring a motor that has not begun to rest at
-  // any tick, but another beginning only at the tick where it was to begin.
-  std::map<McuId, motion::Tick> at;
-  for (const MotorId id : motors) {
-    const Mcu& mcu = installation_.mcu_of(id);
-    const motion::Axis& axis = installation_[id].axis();
-    const motion::Tick first = axis.stopping() ? mcu.earliest_replace(now_us)
-                                               : mcu.earliest_retarget(now_us, axis.start_tick());
-    motion::Tick& common = at.try_emplace(mcu.id, first).first->second;
-    common = std::max(common, first);
-  }
-  std::map<BusId, motion::Tick> of_lines;
-  for (const MotorId id : motors) {
-    if (!installation_[id].is<motion::OnLine>()) continue;
-    const Mcu& mcu = installation_.mcu_of(id);
-    // What an MCU has not taken, it should take where the others have.
-    const motion::Tick others = installation_[id].axis().open_change().value_or(INT64_MIN);
-    motion::Tick& common = of_lines.try_emplace(mcu.config.bus, INT64_MIN).first->second;
-    common = std::max({common, at[mcu.id], others});
-  }
-  for (auto& [mcu, tick] : at) {
-    const auto common = of_lines.find(installation_[mcu].config.bus);
-    if (common != of_lines.end()) tick = std::max(tick, common->second);
-  }
-  std::map<McuId, std::uint16_t> masks;
-  for (const MotorId id : motors) {
-    motion::Motor& motor = installation_[id];
-    const McuId mcu = installation_.config()[id].mcu;
-    if (!motor.change(at[mcu])) continue;
-    masks[mcu] |= static_cast<std::uint16_t>(1u << motor.output().value);
-  }
-  for (const auto& [mcu, mask] : masks) installation_[mcu].replace(mask, at[mcu]);
-  installation_.changed = true;
 }
 
 void Moves::retarget(std::int64_t now_us, const std::vector<MotorId>& motors) {
@@ -412,9 +344,13 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [](const motion::event::Waits&) {},
             [&](const motion::event::Started& started) {
               journal_.started(id, started.steps, started.start, started.late_ns, true);
-              mcu.follow_table_run(
-                  motor.output(), started.start,
-                  {static_cast<std::int32_t>(started.steps), motor.axis().floor()});
+              if (motor.is<motion::OnLine>()) {
+                mcu.follow_line_run(motor.output(), motor.axis());
+              } else {
+                mcu.follow_table_run(
+                    motor.output(), started.start,
+                    {static_cast<std::int32_t>(started.steps), motor.axis().floor()});
+              }
             },
             [&](const motion::event::Executed& executed) { journal_.changed(id, executed.change); },
             [&](const motion::event::Replan&) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -93,7 +94,12 @@ class Moves final : public Service {
     std::vector<motion::Leg> legs;  // at least one
   };
   Result<std::vector<Part>> parts_of(const api::Move& move) const;
+  // moves_plan.cpp
   void plan(std::int64_t now_us, const std::vector<MotorId>& motors);
+  std::map<McuId, motion::Tick> ticks_to_change_at(std::int64_t now_us,
+                                                   const std::vector<MotorId>& motors) const;
+  // Of motors whose line stops farther on than their own plan does: there.
+  std::map<MotorId, std::uint32_t> common_ends(const std::vector<MotorId>& motors) const;
   std::vector<MotorId> with_whole_lines(const std::vector<MotorId>& motors);
   bool has_time_to_retarget(std::int64_t now_us, MotorId motor) const;
   void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);

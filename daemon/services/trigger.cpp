@@ -5,6 +5,13 @@
 
 namespace bushd::daemon {
 
+Result<void> check_trigger_delay(std::int64_t delay_us) {
+  if (delay_us >= BUSHD_TRIGGER_MIN_DELAY_US && delay_us <= BUSHD_TRIGGER_MAX_DELAY_US) return {};
+  return fail("a delay of " + std::to_string(delay_us) +
+              " us after the trigger; allowed: " + std::to_string(BUSHD_TRIGGER_MIN_DELAY_US) +
+              " to " + std::to_string(BUSHD_TRIGGER_MAX_DELAY_US));
+}
+
 void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   const auto motors = motors_of(request);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
@@ -43,12 +50,7 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
                                          api::Move::Kind::kRelative, *floor);
     if (!target) return fail(target.error());
   }
-  if (request.delay_us < BUSHD_TRIGGER_MIN_DELAY_US ||
-      request.delay_us > BUSHD_TRIGGER_MAX_DELAY_US) {
-    return fail("a delay of " + std::to_string(request.delay_us) +
-                " us after the trigger; allowed: " + std::to_string(BUSHD_TRIGGER_MIN_DELAY_US) +
-                " to " + std::to_string(BUSHD_TRIGGER_MAX_DELAY_US));
-  }
+  if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
   const std::vector<std::int64_t> steps = steps_of(*motors, request);
   for (std::size_t i = 0; i < motors->size(); ++i) {
     if (auto may = may_arm((*motors)[i], steps[i]); !may) return fail(may.error());

@@ -12,6 +12,9 @@
 
 namespace bushd::daemon {
 
+// Of every move that waits for a trigger.
+Result<void> check_trigger_delay(std::int64_t delay_us);
+
 class Trigger final : public Service {
  public:
   Trigger(Installation& installation, const Interlocks& interlocks, const Moves& moves,

@@ -1,7 +1,7 @@
-// LINE_RUN. One run for all motors of the line, made step by step; in each of its steps every motor
-// is asked whether it makes one of its own there (engine/line_follower.h). All MCUs of the line
-// have the same run, begun at the same tick, and changed at the same ticks by the same rules: so
-// the motors of all of them are on the line without a word between them.
+// LINE_RUN and LINE_TRIGGER. One run for all motors of the line, made step by step; in each of its
+// steps every motor is asked whether it makes one of its own there (engine/line_follower.h). All
+// MCUs of the line have the same run, begun at the same tick, and changed at the same ticks by the
+// same rules: so the motors of all of them are on the line without a word between them.
 //
 // The silence after which the run is ramped down is counted from a time that all MCUs know alike:
 // that which the last SYNC frame has told, in ticks of the bus, or the run's first tick.
@@ -10,6 +10,7 @@
 #include "engine/run_plan.h"
 #include "firmware/core/access.h"
 #include "firmware/core/limits.h"
+#include "firmware/core/state.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/table_run.h"
 
@@ -46,8 +47,14 @@ static uint16_t motors_of(const bushd_line_part* part) {
   return mask;
 }
 
-static void begin(bushd_mcu* mcu, const bushd_line_run* message, uint32_t ticks) {
-  const bushd_line_part* part = &message->line;
+static bool is_taken(const bushd_mcu* mcu) {
+  return mcu->line.motors != 0 || (mcu->line.waits && mcu->trigger.armed != 0);
+}
+
+// The run, its motors' places on the line, and how many ticks it takes (bushd_mcu_ticks_of_run).
+static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, uint32_t* spare_ns) {
+  bushd_run_start(&mcu->line.run, &mcu->tables.slot[part->slot].table, part->steps, 1, part->floor);
+  if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, ticks, spare_ns)) return false;
   mcu->line.slot = part->slot;
   mcu->line.longest = part->longest;
   mcu->line.step = part->from + 1u;
@@ -60,8 +67,15 @@ static void begin(bushd_mcu* mcu, const bushd_line_run* message, uint32_t ticks)
     on_line->direction = entry.direction;
     on_line->share = share < UINT16_MAX ? (uint16_t)share : UINT16_MAX;
     bushd_line_follower_start(&on_line->follower, entry.increment, part->longest, part->from);
-    mcu->line.motors |= motor_bit(entry.motor);
-    bushd_mcu_begin_run(mcu, entry.motor, message->first_tick, ticks);
+  }
+  return true;
+}
+
+static void begin(bushd_mcu* mcu, uint16_t motors, uint32_t first_tick, uint32_t ticks) {
+  mcu->line.waits = false;
+  mcu->line.motors = motors;
+  for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
+    if (motors & 1u) bushd_mcu_begin_run(mcu, m, first_tick, ticks);
   }
 }
 
@@ -76,15 +90,51 @@ bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* messa
   if (status == BUSHD_OK) status = check_table(mcu, part->slot);
   if (status != BUSHD_OK) return status;
   if (barred) return BUSHD_E_FORBIDDEN;
-  if (mcu->line.motors != 0) return BUSHD_E_STATE;
+  if (is_taken(mcu)) return BUSHD_E_STATE;
   uint32_t ticks;
   uint32_t spare_ns;
-  bushd_run_start(&mcu->line.run, &mcu->tables.slot[part->slot].table, part->steps, 1, part->floor);
-  if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, &ticks, &spare_ns)) {
-    return BUSHD_E_CAPACITY;
-  }
-  begin(mcu, message, ticks);
+  if (!make(mcu, part, &ticks, &spare_ns)) return BUSHD_E_CAPACITY;
+  begin(mcu, range.mask, message->first_tick, ticks);
   return BUSHD_OK;
+}
+
+static bushd_status check_waiting(const bushd_mcu* mcu, const bushd_line_part* part) {
+  const uint8_t* at = part->entries;
+  for (uint8_t i = 0; i < part->count; ++i) {
+    const bushd_line_entry entry = bushd_next_line_entry(&at);
+    if (entry.motor >= mcu->config.motors) return BUSHD_E_FORMAT;
+    if (mcu->motor[entry.motor].table < 0) return BUSHD_E_NO_TABLE;
+    const uint16_t forbidden = bushd_mcu_forbidden(mcu, entry.direction);
+    if ((forbidden & motor_bit(entry.motor)) != 0) return BUSHD_E_FORBIDDEN;
+  }
+  return check_table(mcu, part->slot);
+}
+
+bushd_status bushd_mcu_hold_line(bushd_mcu* mcu, const bushd_line_part* part, uint16_t* motors) {
+  const bushd_status status = check_waiting(mcu, part);
+  if (status != BUSHD_OK) return status;
+  *motors = motors_of(part);
+  if (is_taken(mcu) || (bushd_mcu_moving(mcu) & *motors) != 0) return BUSHD_E_STATE;
+  uint32_t ticks;
+  uint32_t spare_ns;
+  if (!make(mcu, part, &ticks, &spare_ns)) return BUSHD_E_CAPACITY;
+  mcu->stream.starting &= (uint16_t) ~*motors;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if ((*motors & motor_bit(m)) == 0) continue;
+    mcu->motor[m].on_line.until = ticks;
+    mcu->motor[m].spare_ns = spare_ns;
+  }
+  mcu->line.waits = true;
+  return BUSHD_OK;
+}
+
+void bushd_mcu_begin_held_line(bushd_mcu* mcu, uint16_t motors, uint32_t first_tick, uint32_t ns) {
+  uint8_t m = 0;
+  while ((motors & motor_bit(m)) == 0) ++m;
+  const bushd_mcu_motor* motor = &mcu->motor[m];  // they all know it
+  const uint32_t ticks = motor->on_line.until + (ns > motor->spare_ns);
+  bushd_run_begin_late(&mcu->line.run, ns);
+  begin(mcu, motors, first_tick, ticks);
 }
 
 // What the motors make of the part of a step of the run that lies in this tick.

@@ -19,10 +19,16 @@ typedef struct bushd_mcu_line {
   uint32_t longest;
   uint32_t step;  // of the line, that is under way, counted from 1
   uint32_t last;  // and where the run ends
+  bool waits;     // for the trigger, if any motor does: it is those motors' and none is on it yet
   bushd_run run;
 } bushd_mcu_line;
 
 bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message);
+// Of motors at rest, for the trigger (trigger.c): all is ready but its beginning. Returns the
+// motors.
+bushd_status bushd_mcu_hold_line(bushd_mcu* mcu, const bushd_line_part* part, uint16_t* motors);
+// It has come: these begin, `ns` after the beginning of that tick.
+void bushd_mcu_begin_held_line(bushd_mcu* mcu, uint16_t motors, uint32_t first_tick, uint32_t ns);
 // The next tick of the run, and what these motors make of it.
 void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors);
 // All that are on the line and have begun it ramp down along it. Returns those that were to go on.

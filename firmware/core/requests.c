@@ -258,7 +258,7 @@ static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_
 
 // What a frame of this type asks for is beyond the port. Modes of emission have statuses of their
 // own.
-// Without which an MCU does not know such a message; 0: every MCU does.
+// Without all of which an MCU does not know such a message; 0: every MCU does.
 static uint16_t capability_of(uint8_t type) {
   switch (type) {
     case BUSHD_MSG_TABLE_TICKS:
@@ -277,6 +277,8 @@ static uint16_t capability_of(uint8_t type) {
       return BUSHD_CAN_MOTOR_INPUTS;
     case BUSHD_MSG_LINE_RUN:
       return BUSHD_CAN_LINE_RUN;
+    case BUSHD_MSG_LINE_TRIGGER:
+      return BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRIGGER;
     case BUSHD_MSG_CURRENTS:
       return BUSHD_CAN_CURRENTS;
     default:
@@ -328,6 +330,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(travel, bushd_mcu_take_travel);
     case BUSHD_MSG_TRIGGER:
       HANDLE(trigger, bushd_mcu_arm);
+    case BUSHD_MSG_LINE_TRIGGER:
+      HANDLE(line_trigger, bushd_mcu_arm_line);
     case BUSHD_MSG_POSITION_COMPARE:
       HANDLE(position_compare, bushd_mcu_take_position_compare);
     case BUSHD_MSG_CURRENTS:

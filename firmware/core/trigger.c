@@ -1,5 +1,5 @@
-// Table runs that an edge at the trigger input starts. With e the time of the edge as the port has
-// captured it, they begin at
+// Runs of tables, or that of a line, that an edge at the trigger input starts. With e the time of
+// the edge as the port has captured it, they begin at
 //
 //     e + BUSHD_TRIGGER_FIXED_TICKS ticks + delay
 //
@@ -10,6 +10,7 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/limits.h"
+#include "firmware/core/line_run.h"
 #include "firmware/core/state.h"
 #include "firmware/core/table_run.h"
 
@@ -26,6 +27,21 @@ bushd_edge bushd_mcu_edge_of_pin(const bushd_mcu* mcu, bushd_edge edge) {
   return edge == BUSHD_EDGE_RISING ? BUSHD_EDGE_FALLING : BUSHD_EDGE_RISING;
 }
 
+static bool may_arm(bushd_mcu* mcu) {
+  bushd_mcu_update_state(mcu);
+  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return false;
+  return mcu->trigger.armed == 0 && !bushd_mcu_travels(&mcu->travel);
+}
+
+static void await_edge(bushd_mcu* mcu, uint16_t motors, uint8_t number, bushd_edge edge,
+                       uint32_t delay_us) {
+  mcu->trigger.armed = motors;
+  mcu->trigger.number = number;
+  mcu->trigger.state = BUSHD_TRIGGER_ARMED;
+  mcu->trigger.delay_us = delay_us;
+  mcu->port.set_trigger(mcu->port.context, bushd_mcu_edge_of_pin(mcu, edge));
+}
+
 bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
   if (mcu->port.set_trigger == NULL) return BUSHD_E_UNKNOWN_MESSAGE;
   if (message->edge == BUSHD_EDGE_NONE) {
@@ -34,9 +50,7 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
   }
   // Its acknowledgement was lost. The edge may have come since.
   if (message->number == mcu->trigger.number) return BUSHD_OK;
-  bushd_mcu_update_state(mcu);
-  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
-  if (mcu->trigger.armed != 0 || bushd_mcu_travels(&mcu->travel)) return BUSHD_E_STATE;
+  if (!may_arm(mcu)) return BUSHD_E_STATE;
   uint16_t mask = 0;
   const uint8_t* at = message->entries;
   for (uint8_t i = 0; i < message->count; ++i) {
@@ -53,11 +67,18 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
     uint32_t* const spare_ns = &mcu->motor[entry.motor].spare_ns;
     if (!bushd_mcu_make_run(mcu, &entry, spare_ns)) return BUSHD_E_CAPACITY;
   }
-  mcu->trigger.armed = mask;
-  mcu->trigger.number = message->number;
-  mcu->trigger.state = BUSHD_TRIGGER_ARMED;
-  mcu->trigger.delay_us = message->delay_us;
-  mcu->port.set_trigger(mcu->port.context, bushd_mcu_edge_of_pin(mcu, message->edge));
+  mcu->line.waits = false;
+  await_edge(mcu, mask, message->number, message->edge, message->delay_us);
+  return BUSHD_OK;
+}
+
+bushd_status bushd_mcu_arm_line(bushd_mcu* mcu, const bushd_line_trigger* message) {
+  if (message->number == mcu->trigger.number) return BUSHD_OK;  // as above
+  if (!may_arm(mcu)) return BUSHD_E_STATE;
+  uint16_t motors;
+  const bushd_status status = bushd_mcu_hold_line(mcu, &message->line, &motors);
+  if (status != BUSHD_OK) return status;
+  await_edge(mcu, motors, message->number, message->edge, message->delay_us);
   return BUSHD_OK;
 }
 
@@ -79,8 +100,9 @@ static bool is_forbidden(const bushd_mcu* mcu, uint16_t motors) {
   const uint16_t negative = bushd_mcu_forbidden(mcu, -1) & motors;
   uint16_t left = positive | negative;
   for (uint8_t m = 0; left != 0; ++m, left = (uint16_t)(left >> 1)) {
-    const uint16_t barred = mcu->motor[m].made.run.direction > 0 ? positive : negative;
-    if (barred & motor_bit(m)) return true;
+    const bushd_mcu_motor* motor = &mcu->motor[m];
+    const int8_t direction = mcu->line.waits ? motor->on_line.direction : motor->made.run.direction;
+    if ((direction > 0 ? positive : negative) & motor_bit(m)) return true;
   }
   return false;
 }
@@ -111,6 +133,10 @@ void bushd_mcu_begin_armed(bushd_mcu* mcu, int32_t time_in_tick_ns) {
   mcu->stream.queue_summary.stale = true;
   mcu->trigger.start_tick = tick;
   mcu->trigger.start_ns = after_ns % mcu->tick_ns;
+  if (mcu->line.waits) {
+    bushd_mcu_begin_held_line(mcu, armed, tick, mcu->trigger.start_ns);
+    return;
+  }
   for (uint8_t m = 0; armed != 0; ++m, armed = (uint16_t)(armed >> 1)) {
     if (armed & 1u) begin_late(mcu, m, tick, mcu->trigger.start_ns);
   }

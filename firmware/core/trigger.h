@@ -9,7 +9,7 @@
 typedef struct bushd_mcu bushd_mcu;
 
 // Runs that wait for the trigger, and what became of the last ones (trigger.c). The runs are in
-// their motors.
+// their motors, that of a line (line_run.h) in its place.
 typedef struct bushd_mcu_trigger_input {
   uint16_t armed;  // motors
   uint8_t number;
@@ -20,6 +20,7 @@ typedef struct bushd_mcu_trigger_input {
 } bushd_mcu_trigger_input;
 
 bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message);
+bushd_status bushd_mcu_arm_line(bushd_mcu* mcu, const bushd_line_trigger* message);
 // The edge that armed motors wait for (bushd_mcu_trigger).
 void bushd_mcu_begin_armed(bushd_mcu* mcu, int32_t time_in_tick_ns);
 // The port knows nothing of inputs that are inverted.

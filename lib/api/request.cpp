@@ -34,7 +34,8 @@ constexpr std::array<std::string_view, std::variant_size_v<Request::variant>> kN
     "move line",
     "camac",
     "move path",
-    "follow"};
+    "follow",
+    "arm line"};
 
 }  // namespace
 

@@ -185,6 +185,19 @@ struct Arm {
   std::optional<Speed> speed{};
 };
 
+// Motors of one bus, at rest, wait for an edge at the trigger inputs of their MCUs and begin a line
+// (MoveLine) after it, which the MCUs run by themselves: each must have the line's table. Each MCU
+// begins by the edge at its own input; one that has it more than a tick later ends the line.
+// Result: as of MoveLine.
+struct ArmLine {
+  Edge edge = Edge::kRising;
+  std::int64_t delay_us = 0;  // as of Arm
+  Move::Kind kind = Move::Kind::kRelative;
+  std::vector<MotorAmount> motors{};   // as of MoveLine; each makes a step at least
+  std::optional<Speed> speed{};        // as of MoveLine
+  std::optional<double> duration_s{};  // as of MoveLine
+};
+
 // Motors that wait for the trigger do so no more, nor do those armed with them; none named: all.
 struct Disarm {
   MotorNames motors{};
@@ -297,10 +310,11 @@ struct Camac {
   camac::Block block{};  // stations 1..31, subaddresses 0..15, functions 0..31, 24 bits of data
 };
 
-struct Request : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
-                              UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare,
-                              ListTables, GetTable, SetTable, Confirm, GetHistory, Configure, Jog,
-                              Pause, Resume, Hold, Release, MoveLine, Camac, MovePath, Follow> {
+struct Request
+    : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
+                   ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables, GetTable, SetTable,
+                   Confirm, GetHistory, Configure, Jog, Pause, Resume, Hold, Release, MoveLine,
+                   Camac, MovePath, Follow, ArmLine> {
   using variant::variant;
   Request();
   Request(const Request&);

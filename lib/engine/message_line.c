@@ -35,38 +35,71 @@ bushd_line_entry bushd_next_line_entry(const uint8_t** at) {
   return entry;
 }
 
+static void put_line(writer* w, const bushd_line_part* line, const bushd_line_entry* entries,
+                     uint8_t count) {
+  put8(w, line->slot);
+  put16(w, line->floor);
+  put32(w, line->longest);
+  put32(w, line->from);
+  put32(w, line->steps);
+  for (uint8_t i = 0; i < count; ++i) {
+    put8(w, (uint8_t)(entries[i].motor | (entries[i].direction > 0 ? HEAD_POSITIVE : 0u)));
+    put32(w, entries[i].increment);
+  }
+}
+
+// To the payload's end.
+static bushd_status get_line(reader* r, bushd_line_part* line, bool in_range) {
+  line->slot = get8(r);
+  line->floor = get16(r);
+  line->longest = get32(r);
+  line->from = get32(r);
+  line->steps = get32(r);
+  if (r->short_of_bytes) return BUSHD_E_LENGTH;
+  if (line->slot >= BUSHD_TABLE_SLOTS || line->longest > INT32_MAX || line->from >= line->longest ||
+      line->steps < 1 || line->steps > line->longest - line->from) {
+    in_range = false;
+  }
+  get_entries(r, line, &in_range);
+  return finish(r, in_range);
+}
+
 size_t bushd_encode_line_run(const bushd_line_run* message, const bushd_line_entry* entries,
                              uint8_t count, uint8_t* payload) {
-  const bushd_line_part* line = &message->line;
   writer w = {payload};
   put8(&w, message->epoch);
   put32(&w, message->first_tick);
-  put8(&w, line->slot);
-  put16(&w, line->floor);
-  put32(&w, line->longest);
-  put32(&w, line->from);
-  put32(&w, line->steps);
-  for (uint8_t i = 0; i < count; ++i) {
-    put8(&w, (uint8_t)(entries[i].motor | (entries[i].direction > 0 ? HEAD_POSITIVE : 0u)));
-    put32(&w, entries[i].increment);
-  }
+  put_line(&w, &message->line, entries, count);
   return (size_t)(w.at - payload);
 }
 
 bushd_status bushd_decode_line_run(const uint8_t* payload, size_t size, bushd_line_run* message) {
-  bushd_line_part* line = &message->line;
   reader r = read_from(payload, size);
   message->epoch = get8(&r);
   message->first_tick = get32(&r);
-  line->slot = get8(&r);
-  line->floor = get16(&r);
-  line->longest = get32(&r);
-  line->from = get32(&r);
-  line->steps = get32(&r);
-  if (r.short_of_bytes) return BUSHD_E_LENGTH;
-  bool in_range = line->slot < BUSHD_TABLE_SLOTS && line->longest <= INT32_MAX &&
-                  line->from < line->longest && line->steps >= 1 &&
-                  line->steps <= line->longest - line->from;
-  get_entries(&r, line, &in_range);
-  return finish(&r, in_range);
+  return get_line(&r, &message->line, true);
+}
+
+size_t bushd_encode_line_trigger(const bushd_line_trigger* message, const bushd_line_entry* entries,
+                                 uint8_t count, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, message->number);
+  put8(&w, (uint8_t)message->edge);
+  put32(&w, message->delay_us);
+  put_line(&w, &message->line, entries, count);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_line_trigger(const uint8_t* payload, size_t size,
+                                       bushd_line_trigger* message) {
+  reader r = read_from(payload, size);
+  message->number = get8(&r);
+  const uint8_t edge = get8(&r);
+  message->edge = (bushd_edge)edge;
+  message->delay_us = get32(&r);
+  const bool in_range = message->number != 0 &&
+                        (edge == BUSHD_EDGE_RISING || edge == BUSHD_EDGE_FALLING) &&
+                        message->delay_us >= BUSHD_TRIGGER_MIN_DELAY_US &&
+                        message->delay_us <= BUSHD_TRIGGER_MAX_DELAY_US;
+  return get_line(&r, &message->line, in_range);
 }

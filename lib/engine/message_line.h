@@ -1,10 +1,12 @@
-// LINE_RUN: motors that follow one run along a straight line (engine/line.h, engine/message.h).
+// LINE_RUN, LINE_TRIGGER: motors that follow one run along a straight line (engine/line.h,
+// engine/message.h).
 #ifndef BUSHD_ENGINE_MESSAGE_LINE_H
 #define BUSHD_ENGINE_MESSAGE_LINE_H
 
 #include <stddef.h>
 #include <stdint.h>
 
+#include "engine/message_motion.h"
 #include "engine/status.h"
 
 #ifdef __cplusplus
@@ -37,6 +39,16 @@ typedef struct bushd_line_run {
   bushd_line_part line;
 } bushd_line_run;
 
+// The same, begun by an edge at the trigger input, BUSHD_TRIGGER_FIXED_TICKS ticks and delay_us
+// after it: as of bushd_trigger, which disarms it, too.
+typedef struct bushd_line_trigger {
+  uint8_t number;   // 1..255
+  bushd_edge edge;  // not BUSHD_EDGE_NONE
+  uint32_t delay_us;
+  bushd_line_part line;
+} bushd_line_trigger;
+#define BUSHD_LINE_TRIGGER_HEADER 21u
+
 // The entry at *at, which moves on to the next one.
 bushd_line_entry bushd_next_line_entry(const uint8_t** at);
 
@@ -46,6 +58,10 @@ size_t bushd_encode_line_run(const bushd_line_run* message, const bushd_line_ent
                              uint8_t count, uint8_t* payload);
 // Returns BUSHD_OK, BUSHD_E_LENGTH or BUSHD_E_FORMAT.
 bushd_status bushd_decode_line_run(const uint8_t* payload, size_t size, bushd_line_run* message);
+size_t bushd_encode_line_trigger(const bushd_line_trigger* message, const bushd_line_entry* entries,
+                                 uint8_t count, uint8_t* payload);
+bushd_status bushd_decode_line_trigger(const uint8_t* payload, size_t size,
+                                       bushd_line_trigger* message);
 
 #ifdef __cplusplus
 }

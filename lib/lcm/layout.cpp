@@ -34,6 +34,7 @@ BUSHD_LAYOUT(welcome_t, "llsll")
 BUSHD_LAYOUT(subscribe_t, "bbb")
 
 BUSHD_LAYOUT(arm_t, "tbldbnT", {&kRequest, &kMotorAmount})
+BUSHD_LAYOUT(arm_line_t, "tblbdbdnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(camac_request_t, "tibiiinBBBI", {&kRequest})
 BUSHD_LAYOUT(clear_faults_t, kMotors)
 BUSHD_LAYOUT(configure_t, "tbnSnSSSs", {&kRequest})

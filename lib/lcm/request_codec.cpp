@@ -226,6 +226,35 @@ std::optional<api::Request> from_message(const arm_t& message) {
                   .speed = speed_of(message)};
 }
 
+arm_line_t to_message(const api::ArmLine& arm) {
+  arm_line_t message{};
+  message.edge = arm.edge == api::Edge::kRising ? arm_line_t::RISING : arm_line_t::FALLING;
+  message.delay_us = arm.delay_us;
+  message.kind =
+      arm.kind == api::Move::Kind::kAbsolute ? arm_line_t::ABSOLUTE : arm_line_t::RELATIVE;
+  put_speed(message, arm.speed);
+  message.duration_s = arm.duration_s.value_or(0.0);
+  put_motors(message, arm.motors);
+  return message;
+}
+std::optional<api::Request> from_message(const arm_line_t& message) {
+  if (message.edge != arm_line_t::RISING && message.edge != arm_line_t::FALLING) {
+    return std::nullopt;
+  }
+  if (message.kind != arm_line_t::RELATIVE && message.kind != arm_line_t::ABSOLUTE) {
+    return std::nullopt;
+  }
+  api::ArmLine arm{
+      .edge = message.edge == arm_line_t::RISING ? api::Edge::kRising : api::Edge::kFalling,
+      .delay_us = message.delay_us,
+      .kind = message.kind == arm_line_t::ABSOLUTE ? api::Move::Kind::kAbsolute
+                                                   : api::Move::Kind::kRelative,
+      .motors = amounts_of(message.motors),
+      .speed = speed_of(message)};
+  if (message.duration_s != 0) arm.duration_s = message.duration_s;
+  return arm;
+}
+
 position_compare_t to_message(const api::PositionCompare& compare) {
   position_compare_t message{};
   message.position = amount_message({compare.motor, compare.position});
@@ -465,6 +494,7 @@ constexpr std::array<std::pair<std::string_view, RequestDecoder>, kRequests + 3>
         {"CAMAC", decode_request<camac_request_t>},
         {"MOVE_PATH", decode_request<move_path_t>},
         {"FOLLOW", decode_request<follow_t>},
+        {"ARM_LINE", decode_request<arm_line_t>},
         {"HELLO", decode_hello},
         {"SUBSCRIBE", decode_subscription},
         {"GET_STATUS", decode_get_status},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "bushd/answer_t.hpp"
+#include "bushd/arm_line_t.hpp"
 #include "bushd/arm_t.hpp"
 #include "bushd/camac_lam_t.hpp"
 #include "bushd/camac_reply_t.hpp"

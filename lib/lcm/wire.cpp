@@ -214,6 +214,7 @@ std::optional<T> decode(std::span<const std::uint8_t> payload) {
 
 BUSHD_TRAVELS(answer_t)
 BUSHD_TRAVELS(arm_t)
+BUSHD_TRAVELS(arm_line_t)
 BUSHD_TRAVELS(camac_lam_t)
 BUSHD_TRAVELS(camac_reply_t)
 BUSHD_TRAVELS(camac_request_t)

@@ -139,10 +139,22 @@ class BusMaster {
   virtual std::uint8_t arm(McuIndex, bushd_edge, std::uint32_t, std::span<const Armed>) {
     return 0;
   }
+  // The same for the motors' parts of one run of a line. Precondition also: the MCU has no other
+  // line.
+  struct ArmedOnLine {
+    std::uint8_t motor;
+    LineRun run;
+  };
+  bool can_arm_lines(McuIndex mcu) const {
+    return can_trigger(mcu) && can(mcu, BUSHD_CAN_LINE_RUN);
+  }
+  virtual std::uint8_t arm_line(McuIndex, bushd_edge, std::uint32_t, std::span<const ArmedOnLine>) {
+    return 0;
+  }
   // None of them waits any more; those that have been started go on.
   virtual void disarm(McuIndex) {}
-  // The MCU has started one of them; from now on it is a table run like any other.
-  virtual void follow_table_run(McuIndex, std::uint8_t, Tick, TableRun) {}
+  // The MCU has started one of them; from now on it is a run like any other.
+  virtual void follow_run(McuIndex, std::uint8_t, Tick, const McuRun&) {}
 
   // A motor travels, or makes a step that its sensor has to see, by itself; how that goes is told
   // by reports, from when they have the number returned here. `message`: without number.

@@ -184,8 +184,9 @@ std::optional<std::uint8_t> Master::slot_of(McuIndex mcu, const bushd_table& tab
   return std::nullopt;
 }
 
-void Master::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
-  streams_.follow_table_run(mcu, motor, start, run);
+void Master::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) {
+  streams_.follow_run(mcu, motor, start, run);
+  if (std::holds_alternative<LineRun>(run)) synchroniser_.lines_run(true);
 }
 
 void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
@@ -212,6 +213,22 @@ std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
             [](const auto& a, const auto& b) { return a.motor < b.motor; });
   const std::uint8_t number = next_trigger_number(record.view.report);
   connector_.queue(mcu).arm(number, edge, delay_us, entries);
+  return number;
+}
+
+std::uint8_t Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
+                              std::span<const ArmedOnLine> parts) {
+  std::vector<bushd_line_entry> entries;
+  for (const auto& [motor, run] : parts) {
+    entries.push_back({motor, static_cast<std::int8_t>(run.direction), run.increment});
+  }
+  std::ranges::sort(entries, {}, &bushd_line_entry::motor);
+  const std::uint8_t number = next_trigger_number(mcus_[mcu].view.report);
+  connector_.queue(mcu).arm_line({.number = number,
+                                  .edge = edge,
+                                  .delay_us = delay_us,
+                                  .line = line_part_of(parts.front().run)},
+                                 entries);
   return number;
 }
 

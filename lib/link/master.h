@@ -98,8 +98,10 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   std::optional<std::uint8_t> slot_of(McuIndex mcu, const bushd_table& table) const override;
   std::uint8_t arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                    std::span<const Armed> moves) override;
+  std::uint8_t arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
+                        std::span<const ArmedOnLine> parts) override;
   void disarm(McuIndex mcu) override { connector_.queue(mcu).disarm(); }
-  void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
+  void follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) override;
   std::uint8_t travel(McuIndex mcu, bushd_travel message) override;
   void end_travel(McuIndex mcu, std::uint8_t motor) override;
   void position_compare(McuIndex mcu, const bushd_position_compare& message) override;

@@ -117,6 +117,14 @@ void SetupQueue::arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_u
   });
 }
 
+void SetupQueue::arm_line(const bushd_line_trigger& message,
+                          std::span<const bushd_line_entry> entries) {
+  add(BUSHD_MSG_LINE_TRIGGER, [&](std::uint8_t* p) {
+    return bushd_encode_line_trigger(&message, entries.data(),
+                                     static_cast<std::uint8_t>(entries.size()), p);
+  });
+}
+
 void SetupQueue::disarm() {
   add(BUSHD_MSG_TRIGGER,
       [](std::uint8_t* p) { return bushd_encode_trigger(0, BUSHD_EDGE_NONE, 0, nullptr, 0, p); });

@@ -48,6 +48,7 @@ class SetupQueue {
   // `entries` by rising motor.
   void arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
            std::span<const bushd_table_run_entry> entries);
+  void arm_line(const bushd_line_trigger& message, std::span<const bushd_line_entry> entries);
   void disarm();
 
  private:

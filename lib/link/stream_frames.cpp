@@ -183,13 +183,7 @@ void StreamScheduler::send_line_run(std::int64_t now_us, McuIndex index, std::ui
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if (!has(mask, m)) continue;
     const auto& run = std::get<LineRun>(*mcus_[index].stream[m].run);
-    message.line = {.slot = run.slot,
-                    .floor = run.floor,
-                    .longest = run.longest,
-                    .from = run.from,
-                    .steps = run.steps,
-                    .count = 0,
-                    .entries = nullptr};
+    message.line = line_part_of(run);
     entries[count++] = {m, static_cast<std::int8_t>(run.direction), run.increment};
     // Also when it has made its last step: a replacement must take it off the line.
     note_sent(index, m, first, first + run.ticks);

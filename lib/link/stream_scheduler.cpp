@@ -37,10 +37,12 @@ void StreamScheduler::begin_run(McuIndex mcu, std::uint8_t motor, Tick start, co
   mcus_[mcu].stream[motor].run = run;
 }
 
-void StreamScheduler::follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
+void StreamScheduler::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) {
   begin_run(mcu, motor, start, run);
   Stream& stream = mcus_[mcu].stream[motor];
-  stream.next = stream.sent = source_.end_tick(mcu, motor);
+  const auto* on_line = std::get_if<LineRun>(&run);
+  stream.next = stream.sent =
+      on_line != nullptr ? start + on_line->ticks : source_.end_tick(mcu, motor);
   stream.finished = true;
 }
 

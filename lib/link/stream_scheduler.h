@@ -44,7 +44,7 @@ class StreamScheduler {
   // See Master for these. Preconditions: as there.
   void begin(McuIndex mcu, std::uint8_t motor, Tick start);
   void begin_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run);
-  void follow_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run);
+  void follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run);
   void replace(McuIndex mcu, std::uint16_t motors, Tick first, Tick now);
   void drop(McuIndex mcu, std::uint8_t motor);
 

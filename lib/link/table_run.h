@@ -30,6 +30,17 @@ struct LineRun {
 
 using McuRun = std::variant<TableRun, LineRun>;
 
+// What the motors of an MCU have in common of a line's run.
+inline bushd_line_part line_part_of(const LineRun& run) {
+  return {.slot = run.slot,
+          .floor = run.floor,
+          .longest = run.longest,
+          .from = run.from,
+          .steps = run.steps,
+          .count = 0,
+          .entries = nullptr};
+}
+
 // `slot`: of the table that the motor has.
 inline bushd_table_run_entry entry_of(std::uint8_t motor, std::uint8_t slot, TableRun run) {
   return {.motor = motor,

@@ -64,10 +64,11 @@ void Axis::restart(bushd_run& run, std::uint32_t steps, int direction, std::uint
   bushd_run_begin_late(&run, late_ns_);
 }
 
-void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor) {
+void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor,
+                      std::uint32_t late_ns) {
   busy_ = true;
   start_ = start;
-  late_ns_ = 0;
+  late_ns_ = late_ns;
   from_ = from_steps;
   floor_ = floor;
   stopping_ = false;
@@ -128,7 +129,7 @@ void Axis::aim_on_line(std::uint32_t line_step, std::uint16_t floor) {
   aim(from_ + share_->direction * (line_steps(run_target_) - share_from_steps_), floor);
 }
 
-bool Axis::change(Tick at) {
+bool Axis::change(Tick at, std::uint32_t least_end) {
   stale_ = false;
   change_.reset();
   head_ = base_;
@@ -141,6 +142,11 @@ bool Axis::change(Tick at) {
   if (at >= std::max(over_tick(), start_ + 1)) return false;
   change_ = Change{.at = at, .target_steps = {}, .floor = floor_, .run_steps = run_target_};
   if (!stopping_) change_->target_steps = target_;
+  if (stopping_ && share_ && !on_path() && least_end > share_->from) {
+    change_->run_steps = least_end - share_->from;
+    change_->target_steps =
+        from_ + share_->direction * (line_steps(change_->run_steps) - share_from_steps_);
+  }
   plan_end();
   if (followed_) return true;
   const bool same_end = planned_end_ == planned_end && planned_run_steps_ == planned_run_steps;

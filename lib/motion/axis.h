@@ -97,8 +97,10 @@ class Axis {
              std::uint16_t floor = 0);
 
   // The same for a part of a line; `floor` in the line's time units.
-  // Precondition: !busy(), the run of all of it takes at most kMaxDurationTicks.
-  void start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor);
+  // Precondition: !busy(), the run of all of it takes at most kMaxDurationTicks; of a path late_ns
+  // is 0.
+  void start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor,
+                  std::uint32_t late_ns = 0);
 
   // Follows a trajectory, whose first row is where it stands.
   // Precondition: !busy(), TrajectoryCheck has nothing against it as far as it is known.
@@ -139,7 +141,9 @@ class Axis {
   // the MCU has not taken. Returns false if the plan stays what it was without any change: over by
   // then, or it leads there already. Of a line: if that is so of this motor, which may have made
   // all of its steps before the others have. Precondition: busy(), `at` not yet executed.
-  bool change(Tick at);
+  //   least_end  of a line that is to stop: not before this step of it, where others of it, which
+  //              a trigger has begun earlier, will stop; a run that ramps down there, if it can
+  bool change(Tick at, std::uint32_t least_end = 0);
 
   // Displacements of ticks first .. first+count-1 (before the start and after the end: 0) into
   // out[0], out[stride], ... as the format has them (coarse: the byte's value). Returns the delay
@@ -171,6 +175,7 @@ class Axis {
   bool busy() const { return busy_; }
   bool stopping() const { return stopping_; }
   Tick start_tick() const { return start_; }
+  std::uint32_t late_ns() const { return late_ns_; }  // after its beginning the run begins
   // First tick after the last step, as planned now.
   Tick end_tick() const { return end_; }
   std::int64_t from_steps() const { return from_; }
@@ -223,6 +228,8 @@ class Axis {
   double share_of_run(const Place& place) const;
   void take_change_on_path(Place& place) const;
   void follow_path(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  std::int64_t not_short_of_turn(const Place& place, std::size_t segment_before,
+                                 std::int64_t told_256) const;
   Tick own_end_on_path(const Place& place) const;
   std::int64_t steps_of(const Place& place) const;
   std::int64_t line_steps(std::uint32_t run_steps) const;

@@ -37,6 +37,13 @@ void Motor::arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor) {
   axis_.start(position_, steps, kNever, 0, floor);
 }
 
+void Motor::arm_line(std::uint8_t number, const OnLine& on_line, LineShare share,
+                     std::uint16_t floor) {
+  axis_.start_line(position_, std::move(share), kNever, floor);
+  const std::int64_t steps = axis_.target_steps() - position_;
+  activity_ = Armed{.number = number, .steps = steps, .on_line = on_line};
+}
+
 void Motor::aim(std::int64_t target, std::uint16_t floor) {
   pause_ = Pause::kNo;
   axis_.aim(target, floor);
@@ -90,6 +97,8 @@ std::int64_t Motor::target_steps() const {
   if (!has_plan()) return position_;
   if (axis_.stopping() && !is_paused()) return axis_.end_steps();
   if (const OnLine* on_line = as<OnLine>()) return on_line->target_steps;
+  const Armed* armed = as<Armed>();
+  if (armed != nullptr && armed->on_line) return armed->on_line->target_steps;
   return further_.empty() ? axis_.target_steps() : further_.back().target;
 }
 
@@ -338,8 +347,14 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
   const bool told = mcu.trigger_number == armed.number;
   if (told && mcu.trigger_state == BUSHD_TRIGGER_STARTED) {
     const Tick start = report.tick + static_cast<std::int32_t>(mcu.start_tick - mcu.tick);
-    activity_ = Moving{};
-    axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns, axis_.floor());
+    if (armed.on_line) {
+      activity_ = *armed.on_line;
+      const LineShare share = *axis_.line();
+      axis_.start_line(axis_.from_steps(), share, start, axis_.floor(), mcu.start_ns);
+    } else {
+      activity_ = Moving{};
+      axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns, axis_.floor());
+    }
     if (armed.stops) axis_.stop();
     events.emplace_back(
         event::Started{.start = start, .late_ns = mcu.start_ns, .steps = armed.steps});
@@ -364,10 +379,9 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
               name + " did not arm it: " + bushd_status_text(mcu.last_rejection) +
                   "; 'bushctl status' tells how that MCU is, arm again when it is ready"));
   } else if (mcu.trigger_state == BUSHD_TRIGGER_DISARMED) {
-    events.emplace_back(
-        ended(Outcome::kStopped, !armed.ended_by ? "disarmed before the trigger came"
-                                                 : "disarmed, because " + *armed.ended_by +
-                                                       ", armed with it, does not wait any more"));
+    events.emplace_back(ended(Outcome::kStopped, !armed.ended_by
+                                                     ? "disarmed before the trigger came"
+                                                     : "disarmed, because " + *armed.ended_by));
   } else if (mcu.trigger_state == BUSHD_TRIGGER_LATE) {
     events.emplace_back(
         ended(Outcome::kFault,

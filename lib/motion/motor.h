@@ -53,14 +53,6 @@ struct Moving {
   int limit = 0;                   // +1, -1: its limit switch at this end stops it
   std::uint8_t faults = 0;         // with which its MCU runs it down
 };
-// Waits for the trigger, or for the MCU to say that it does: the axis has no start yet.
-struct Armed {
-  std::uint8_t number;  // of link::BusMaster::arm
-  std::int64_t steps;
-  bool confirmed = false;                 // the MCU has said that it waits
-  bool stops = false;                     // as soon as it has started: that came before disarming
-  std::optional<std::string> ended_by{};  // the motor armed with it whose end ends it too
-};
 struct Homing {};  // by its MCU, or it waits for its turn
 // Moves on a line with others. Whoever leads the line begins its runs, all at the same ticks.
 struct OnLine : Moving {
@@ -70,6 +62,15 @@ struct OnLine : Moving {
   bool to_point = true;  // this run leads where the line, or its leg, is to end
   bool stands = false;   // where a run has led that was not the last one
   bool resumes = false;  // paused, and to go on as soon as all motors of the line stand
+};
+// Waits for the trigger, or for the MCU to say that it does: the axis has no start yet.
+struct Armed {
+  std::uint8_t number;  // of link::BusMaster::arm
+  std::int64_t steps;
+  bool confirmed = false;                 // the MCU has said that it waits
+  bool stops = false;                     // as soon as it has started: that came before disarming
+  std::optional<std::string> ended_by{};  // why, if nobody has asked for that
+  std::optional<OnLine> on_line{};        // what it is from its start on, in place of Moving
 };
 struct Local {};       // the inputs at its MCU move it, or another master does
 struct Travelling {};  // by its MCU, between its limits or for one step, or it is about to
@@ -219,13 +220,16 @@ class Motor {
   void hold(bool now) { held_ = now; }
   bool is_held() const { return held_; }
   void arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor = 0);
+  void arm_line(std::uint8_t number, const OnLine& on_line, LineShare share, std::uint16_t floor);
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
-  // `ended_by` is whose end ends it too.
+  // `ended_by`: why, if nobody has asked for it.
   void stop(std::optional<std::string> ended_by = {});
   // The plan is not yet what was requested, and can be changed.
   bool needs_change() const { return moves() && axis_.needs_change(); }
   // Whether the plan is another one now from this tick on.
-  bool change(Tick at) { return has_plan() && axis_.change(at); }
+  bool change(Tick at, std::uint32_t least_end = 0) {
+    return has_plan() && axis_.change(at, least_end);
+  }
   void home() { activity_ = Homing{}; }
   void end_homing(bool found);
   void travel() { activity_ = Travelling{}; }

@@ -1,5 +1,7 @@
 // Motors of two MCUs on one line: an image beside its virtual twin, told the same run. So the twins
 // are also what a line of two MCUs is: their motors make the same steps in the same slots.
+#include <algorithm>
+#include <random>
 #include <vector>
 
 #include "conformance/script.h"
@@ -63,6 +65,8 @@ TEST_P(DeniedLine, IsRefusedAndNothingMoves) {
   begin_line();
   pass_ticks(60);
   EXPECT_EQ(master_.poll(kReal).last_rejection, BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(master_.acknowledged(kReal, BUSHD_MSG_LINE_TRIGGER, Bytes(26)),
+            BUSHD_E_UNKNOWN_MESSAGE);
   EXPECT_EQ(steps(1, 1).size(), before);
 }
 
@@ -108,6 +112,70 @@ TEST_P(LineScript, SilenceEndsItInTheSameTick) {
   EXPECT_GT(steps(0, 1).size(), 0u);
   EXPECT_EQ(master_.poll(kReal).faults, BUSHD_FAULT_LINK);
   expect_alike();
+}
+
+// When the steps of a motor are due, counted from the run's beginning: by the codes of the table
+// and the statement of the protocol.
+std::vector<TimeNs> due_times(std::uint32_t increment, std::uint16_t floor) {
+  const std::vector<std::uint16_t> codes = ramp();
+  std::vector<TimeNs> ends{0};  // of the run's steps
+  for (std::size_t j = 1; j <= kLongest; ++j) {
+    std::uint16_t delay = std::max(kCruise, floor);
+    if (j <= codes.size()) delay = std::max(delay, codes[j - 1]);
+    if (kLongest - j < codes.size()) delay = std::max(delay, codes[kLongest - j]);
+    ends.push_back(ends.back() + TimeNs{delay} * kUnitNs);
+  }
+  std::vector<TimeNs> times;
+  for (std::uint64_t j = 1; j <= increment; ++j) {
+    const std::uint64_t parts = (128 * (2 * j - 1) * kLongest + increment - 1) / increment + 128;
+    const std::size_t step = (parts - 1) / 256;
+    const auto part = static_cast<TimeNs>(parts - 256 * step);
+    times.push_back(ends[step] + (ends[step + 1] - ends[step]) * part / 256);
+  }
+  return times;
+}
+
+// Counted from the edge; the clocks are the bus's.
+TEST_P(LineScript, TriggeredEveryStepIsWithinASlotOfItsTime) {
+  constexpr TimeNs kSlotNs = kTickNs / 128;
+  std::mt19937 random(8);
+  for (const bushd_format format : {BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE}) {
+    ASSERT_NO_FATAL_FAILURE(make_ready(format, motors_));
+    const auto number = static_cast<std::uint8_t>(format + 1);
+    const auto floor = static_cast<std::uint16_t>(format == BUSHD_FORMAT_FINE ? 0 : kCruise + 11);
+    const auto delay_us = static_cast<std::uint32_t>(50 + random() % 20'000);
+    const bushd_line_trigger message{
+        number, BUSHD_EDGE_RISING, delay_us, {0, floor, kLongest, 0, kLongest, 0, nullptr}};
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_line_trigger(
+        &message, kEntries.data(), static_cast<std::uint8_t>(kEntries.size()), payload.data()));
+    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LINE_TRIGGER, payload));
+    tell_time();
+    EXPECT_EQ(master_.poll(kReal).armed, 1u << 1 | 1u << 6 | 1u << 9 | 1u << 15);
+    EXPECT_EQ(master_.poll(kReal).moving, 0);
+    bus_.advance_to(bus_.now_ns() + static_cast<TimeNs>(random() % (2 * kTickNs)));
+    set_inputs({0, BUSHD_INPUT_TRIGGER});
+    const TimeNs edge_ns = bus_.now_ns();
+    pass_ticks(300);
+    set_inputs({0, 0});
+    EXPECT_EQ(master_.poll(kReal).trigger_state, BUSHD_TRIGGER_STARTED);
+    expect_the_same_reports();
+    for (const bushd_line_entry& entry : kEntries) {
+      const std::vector<TimeNs> due = due_times(entry.increment, floor);
+      for (const std::size_t mcu : {0, 1}) {
+        SCOPED_TRACE("motor " + std::to_string(entry.motor) + (mcu == 0 ? " virtual" : " real"));
+        std::vector<Step> made = steps(mcu, entry.motor);
+        std::erase_if(made, [&](const Step& step) { return step.time_ns < edge_ns; });
+        ASSERT_EQ(made.size(), due.size());
+        for (std::size_t i = 0; i < due.size(); ++i) {
+          const TimeNs expected_ns =
+              edge_ns + 3 * TimeNs{kTickNs} + TimeNs{delay_us} * 1000 + due[i];
+          ASSERT_LE(std::abs(made[i].time_ns - expected_ns), kSlotNs + 5'000) << "step " << i;
+          ASSERT_EQ(made[i].positive, entry.direction > 0);
+        }
+      }
+    }
+  }
 }
 
 }  // namespace

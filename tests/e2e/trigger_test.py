@@ -9,7 +9,7 @@ from rig import GIVE_UP_S, TABLE_RUNS, EndToEndTest
 class Trigger(EndToEndTest):
     def start_armed(self, *arguments):
         """bushctl arm --wait, until the motors wait for the trigger."""
-        names = arguments[::2]
+        names = [name for name in arguments if str(name)[0].isalpha()]
         armed = self.start_bushctl("arm", "--wait", "--delay-us", 700, *arguments)
         self.wait_until("the motors to be armed", lambda: all(self.motors()[name]["activity"] == "armed" for name in names))
         return armed
@@ -38,13 +38,19 @@ class Trigger(EndToEndTest):
         third = self.start_armed("a0", -600)
         self.bushsim.send(signal.SIGRTMIN)
         self.assertEqual(self.pull_trigger(third), 0, third.said())
+
+        # Motors of both MCUs, which have one table, along a line.
+        line = self.start_armed("--line", "a1", -300, "b1", 300)
+        self.bushsim.send(signal.SIGRTMIN)
+        self.assertEqual(self.pull_trigger(line), 0, line.said())
+        self.assertIn("the line was limited by", line.said())
         status = self.status()
-        self.assertEqual(self.positions()["a0"], 0)
+        self.assertEqual([self.positions()[name] for name in ("a0", "a1", "b1")], [0, 100, -200])
         self.assertEqual(self.bushd.end(), 0)
         self.assertEqual(self.bushsim.end(), 0)
         self.assert_one_result_each()
         self.assert_trace_is_right(status)
-        self.assertEqual(len(self.moves()), 8, "four moves and their results")
+        self.assertEqual(len([event for event in self.moves() if event["event"] in ("move", "result")]), 12)
         self.assertTrue(any("late_ns" in event for event in self.moves()))
 
     def test_starts_moves_exactly_and_once(self):

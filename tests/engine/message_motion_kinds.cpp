@@ -177,6 +177,28 @@ Bytes any_line_run() {
   return payload;
 }
 
+bushd_status line_trigger_again(const Bytes& payload, Bytes* again) {
+  bushd_line_trigger m{};
+  const bushd_status status = bushd_decode_line_trigger(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  std::vector<bushd_line_entry> entries;
+  const uint8_t* at = m.line.entries;
+  for (uint8_t i = 0; i < m.line.count; ++i) entries.push_back(bushd_next_line_entry(&at));
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(bushd_encode_line_trigger(&m, entries.data(), m.line.count, again->data()));
+  return status;
+}
+
+Bytes any_line_trigger() {
+  const Bytes run = any_line_run();
+  Bytes payload(6);
+  payload[0] = between<uint8_t>(1, 255);
+  payload[1] = between<uint8_t>(1, 2);
+  bushd_put_u32(&payload[2], between<uint32_t>(50, 1'650'000));
+  payload.insert(payload.end(), run.begin() + 5, run.end());
+  return payload;
+}
+
 bushd_status trigger_again(const Bytes& payload, Bytes* again) {
   bushd_trigger m{};
   const bushd_status status = bushd_decode_trigger(payload.data(), payload.size(), &m);
@@ -325,6 +347,20 @@ Kinds motion_kinds() {
             p->insert(p->end(), entry.begin(), entry.end());
             p->insert(p->end(), entry.begin(), entry.end());
           }}},
+        true}},
+      {"line_trigger",
+       {any_line_trigger,
+        line_trigger_again,
+        {{"no number", set8(0, 0)},
+         {"no edge", set8(1, 0)},
+         {"no such edge", set8(1, 3)},
+         {"too short a delay", set32(2, 49)},
+         {"too long a delay", set32(2, 1'650'001)},
+         {"no such slot", set8(6, 8)},
+         {"no way", set32(9, 0)},
+         {"no step of the run", set32(17, 0)},
+         {"longer than the longest", entry_alone(BUSHD_LINE_TRIGGER_HEADER, {0, 0, 0, 0, 0x80})},
+         {"no entry", [](Bytes* p) { p->resize(BUSHD_LINE_TRIGGER_HEADER); }}},
         true}},
       {"trigger",
        {any_trigger,

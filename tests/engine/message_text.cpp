@@ -163,17 +163,24 @@ void put(const bushd_table_run& m, Fields& f) {
   f.add("epoch", m.epoch).add("first_tick", m.first_tick);
   put_entries(m.entries, m.count, f);
 }
-void put(const bushd_line_run& m, Fields& f) {
-  f.add("epoch", m.epoch).add("first_tick", m.first_tick).add("slot", m.line.slot);
-  f.add("floor", m.line.floor).add("longest", m.line.longest).add("from", m.line.from);
-  f.add("steps", m.line.steps);
+void put_line(const bushd_line_part& line, Fields& f) {
+  f.add("slot", line.slot).add("floor", line.floor).add("longest", line.longest);
+  f.add("from", line.from).add("steps", line.steps);
   std::string text;
-  const uint8_t* at = m.line.entries;
-  for (uint8_t i = 0; i < m.line.count; ++i) {
+  const uint8_t* at = line.entries;
+  for (uint8_t i = 0; i < line.count; ++i) {
     const bushd_line_entry entry = bushd_next_line_entry(&at);
     append(&text, parts({entry.motor, entry.direction, entry.increment}));
   }
   f.add_text("entries", text);
+}
+void put(const bushd_line_run& m, Fields& f) {
+  f.add("epoch", m.epoch).add("first_tick", m.first_tick);
+  put_line(m.line, f);
+}
+void put(const bushd_line_trigger& m, Fields& f) {
+  f.add("number", m.number).add("edge", m.edge).add("delay_us", m.delay_us);
+  put_line(m.line, f);
 }
 void put(const bushd_trigger& m, Fields& f) {
   f.add("number", m.number).add("edge", m.edge).add("delay_us", m.delay_us);
@@ -265,6 +272,8 @@ std::string message_text(const bushd_frame& frame) {
       return text("table_run", frame, bushd_decode_table_run);
     case BUSHD_MSG_LINE_RUN:
       return text("line_run", frame, bushd_decode_line_run);
+    case BUSHD_MSG_LINE_TRIGGER:
+      return text("line_trigger", frame, bushd_decode_line_trigger);
     case BUSHD_MSG_TRIGGER:
       return text("trigger", frame, bushd_decode_trigger);
     case BUSHD_MSG_POSITION_COMPARE:
@@ -309,7 +318,8 @@ std::set<std::string> message_names() {
           "report",           "sync",         "ticks",       "acknowledgement", "table_ticks",
           "table_run",        "emergency",    "set_address", "get_tables",      "tables",
           "set_inputs",       "emission",     "home",        "local",           "trigger",
-          "position_compare", "motor_inputs", "line_run",    "travel",          "currents"};
+          "position_compare", "motor_inputs", "line_run",    "travel",          "currents",
+          "line_trigger"};
 }
 
 }  // namespace bushd::test

@@ -1,111 +1,17 @@
 // LINE_RUN: motors that follow one run along a line, exact to a slot.
-#include <algorithm>
 #include <array>
 #include <vector>
 
-#include "engine/line.h"
-#include "firmware/streams.h"
+#include "firmware/line_runs.h"
 
 namespace bushd::test {
 namespace {
 
-struct Motor {
-  std::uint8_t number;
-  std::int32_t steps;  // of the whole line
-};
-
-std::uint32_t length(std::int32_t steps) {
-  return static_cast<std::uint32_t>(std::abs(steps));
-}
-
-// When, in 1/256 ns from the run's beginning: by rational numbers, rounded up to 1/256 of a step of
-// the run.
-std::vector<Wide> times_of(const Reference& run, std::uint32_t increment, std::uint32_t longest,
-                           std::uint32_t from = 0) {
-  std::vector<Wide> times;
-  for (Wide j = 1; j <= increment; ++j) {
-    const Wide parts = (128 * (2 * j - 1) * longest + increment - 1) / increment + 128;
-    const Wide step = (parts + 255) / 256 - 1 - from;
-    if (step < 0) continue;
-    if (step >= static_cast<Wide>(run.steps())) break;
-    const Step& running = run.step(static_cast<std::size_t>(step));
-    const Wide begin = running.end - running.delay;
-    times.push_back(begin + running.delay * (parts - 256 * (step + from)) / 256);
-  }
-  return times;
-}
-
-// Of an MCU with four motors; the run is of `law`, in slot 0, as are their tables.
-class LineRun : public Streams {
- protected:
-  LineRun() : Streams({.queue_ticks = 256}) {}
-
-  struct Frame {
-    std::uint32_t first;
-    std::vector<Motor> motors;
-    std::uint32_t longest;
-    std::uint32_t from = 0;
-    std::uint32_t steps = 0;  // 0: all
-    std::uint16_t floor = 0;
-    std::uint8_t slot = 0;
-    std::uint8_t epoch = 0;
-  };
-  static Bytes frame(const Frame& of) {
-    std::vector<bushd_line_entry> entries;
-    for (const Motor& motor : of.motors) {
-      entries.push_back(
-          {motor.number, static_cast<std::int8_t>(motor.steps < 0 ? -1 : 1), length(motor.steps)});
-    }
-    bushd_line_run message{};
-    message.epoch = of.epoch;
-    message.first_tick = of.first;
-    message.line = {.slot = of.slot,
-                    .floor = of.floor,
-                    .longest = of.longest,
-                    .from = of.from,
-                    .steps = of.steps == 0 ? of.longest - of.from : of.steps,
-                    .count = 0,
-                    .entries = nullptr};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_line_run(
-        &message, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
-    return payload;
-  }
-  static bushd_status start(Rig& on, const Frame& of) {
-    return on.take(BUSHD_MSG_LINE_RUN, frame(of));
-  }
-
-  // From tick `first` on, each slot of each tick until the run is over.
-  static void expect_slots(Rig& of, const Reference& run, const Frame& frame) {
-    const std::uint16_t slots = of.options().slots;
-    std::vector<std::vector<Wide>> times;
-    for (const Motor& motor : frame.motors) {
-      times.push_back(times_of(run, length(motor.steps), frame.longest, frame.from));
-    }
-    std::vector<std::size_t> made(frame.motors.size());
-    while (of.tick() != frame.first) of.pass();
-    for (std::uint64_t tick = 0; of.poll().moving != 0; ++tick, of.pass()) {
-      std::vector<std::uint16_t> expected(slots);
-      const Wide begin = Wide{tick * Rig::kTickNs} * 256;
-      const Wide length = Wide{Rig::kTickNs} * 256;
-      for (std::size_t i = 0; i < times.size(); ++i) {
-        for (; made[i] < times[i].size() && times[i][made[i]] <= begin + length; ++made[i]) {
-          const auto slot = static_cast<std::size_t>((times[i][made[i]] - begin) * slots / length);
-          expected[std::min<std::size_t>(slot, slots - 1u)] |=
-              static_cast<std::uint16_t>(1u << frame.motors[i].number);
-        }
-      }
-      ASSERT_TRUE(std::ranges::equal(std::span(of.slot_buffer().step).first(slots), expected))
-          << tick;
-    }
-    for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(made[i], times[i].size());
-    EXPECT_EQ(of.poll().faults, 0);
-  }
-};
+using LineRun = OfLines;
 INSTANTIATE_TEST_SUITE_P(Formats, LineRun, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
                          format_name);
 
-const std::vector<Motor> kOnLine = {{0, 333}, {1, -118}, {2, 1}, {3, 332}};
+const std::vector<LineMotor> kOnLine = {{0, 333}, {1, -118}, {2, 1}, {3, 332}};
 
 TEST_P(LineRun, EveryStepFallsIntoItsSlot) {
   std::array<std::int64_t, 4> at{};
@@ -114,7 +20,7 @@ TEST_P(LineRun, EveryStepFallsIntoItsSlot) {
         .first = rig.first_open() + 3, .motors = kOnLine, .longest = 333, .floor = floor};
     ASSERT_EQ(start(rig, line), BUSHD_OK);
     expect_slots(rig, Reference::move(law, 333, floor), line);
-    for (const Motor& motor : kOnLine) at[motor.number] += motor.steps;
+    for (const LineMotor& motor : kOnLine) at[motor.number] += motor.steps;
   }
   for (std::size_t m = 0; m < 4; ++m) EXPECT_EQ(rig.poll().motor[m].position_steps, at[m]);
   EXPECT_EQ(rig.steps_with_dir(), 0);
@@ -205,9 +111,9 @@ TEST_P(LineRun, IsUnknownWhereItIsDenied) {
 // ways, and in the fine format nothing shows where they took over.
 TEST_P(LineRun, IsReplacedByTicksAtEveryTick) {
   constexpr std::uint32_t kLongest = 120;
-  const std::vector<Motor> motors = {{0, -120}, {1, 43}, {2, -3}};
+  const std::vector<LineMotor> motors = {{0, -120}, {1, 43}, {2, -3}};
   const Plan run = plan_move(law, kLongest, Rig::kTickNs, BUSHD_FORMAT_FINE);
-  const auto position_at = [&](const Motor& motor, std::size_t tick) {
+  const auto position_at = [&](const LineMotor& motor, std::size_t tick) {
     bushd_line line;
     bushd_line_start(&line, length(motor.steps), kLongest);
     const std::int64_t at = tick == 0 ? 0 : run.made[tick - 1];
@@ -234,7 +140,7 @@ TEST_P(LineRun, IsReplacedByTicksAtEveryTick) {
                  .delays = {},
                  .epoch = 1};
       for (std::size_t tick = from; tick < from + count; ++tick) {
-        for (const Motor& motor : motors) {
+        for (const LineMotor& motor : motors) {
           const std::int64_t moved = position_at(motor, tick + 1) - position_at(motor, tick);
           const bool back = motor.steps < 0;
           rest.displacements.push_back(static_cast<std::int16_t>(
@@ -250,7 +156,7 @@ TEST_P(LineRun, IsReplacedByTicksAtEveryTick) {
       while (static_cast<std::int32_t>(rest.first - fresh.tick()) > 50) fresh.pass();
     }
     fresh.pass_until_rest();
-    for (const Motor& motor : motors) {
+    for (const LineMotor& motor : motors) {
       ASSERT_EQ(fresh.pulses(motor.number), motor.steps) << k;
       ASSERT_EQ(fresh.mcu().motor[motor.number].remainder, 0) << k;
     }
@@ -260,9 +166,9 @@ TEST_P(LineRun, IsReplacedByTicksAtEveryTick) {
 }
 
 // Where motors of the line are when `steps` of its run are over.
-void expect_on_line(const Rig& of, const std::vector<Motor>& motors, std::uint32_t longest,
+void expect_on_line(const Rig& of, const std::vector<LineMotor>& motors, std::uint32_t longest,
                     std::uint32_t steps) {
-  for (const Motor& motor : motors) {
+  for (const LineMotor& motor : motors) {
     bushd_line line;
     bushd_line_start(&line, length(motor.steps), longest);
     bushd_line_go_to(&line, steps);
@@ -330,7 +236,7 @@ TEST_P(LineRun, ThatWaitsIsCancelledBySilence) {
   EXPECT_EQ(rig.poll().ramp_downs, 0);
   EXPECT_EQ(rig.poll().moving, 0);
   EXPECT_EQ(rig.mcu().line.motors, 0);
-  for (const Motor& motor : kOnLine) EXPECT_EQ(rig.pulses(motor.number), 0);
+  for (const LineMotor& motor : kOnLine) EXPECT_EQ(rig.pulses(motor.number), 0);
 }
 
 TEST_P(LineRun, EmergencyRampLeadsAlongTheLine) {

@@ -13,7 +13,7 @@ CORPORA = pathlib.Path(__file__).parent / "corpus"
 TICK_NS = 2_560_000
 (IDENTIFY, CONFIGURE, TABLE_BEGIN, TABLE_DATA, TABLE_END, ASSIGN, CONTROL, SET_POSITION, POLL, SYNC, TICKS,
  TABLE_TICKS, TABLE_RUN, EMERGENCY, SET_ADDRESS, TABLES, INPUTS, EMISSION, HOME, LOCAL, TRIGGER,
- POSITION_COMPARE, MOTOR_INPUTS, LINE_RUN, TRAVEL) = range(1, 0x1A)
+ POSITION_COMPARE, MOTOR_INPUTS, LINE_RUN, TRAVEL, CURRENTS, LINE_TRIGGER) = range(1, 0x1C)
 FINE, REPLACE, START = 1, 2, 4
 EMERGENCY_PIN, FORWARD, REVERSE = 1, 2, 4
 
@@ -121,10 +121,19 @@ def entries(*motors):
     return b"".join(struct.pack("<BI", m | 0x80, 30 + m) for m in motors)
 
 
+def line(increments, longest, begun):
+    """Of the motors from 0 on; negative: back."""
+    return struct.pack("<BHIII", 0, 0, longest, begun, longest - begun) + b"".join(
+        struct.pack("<BI", m | (0x80 if n > 0 else 0), abs(n)) for m, n in enumerate(increments))
+
+
 def line_run(*increments, first=16, longest=90, begun=0):
-    """Of the motors from 0 on; negative: back. `first` counts from boot."""
-    return frame(LINE_RUN, struct.pack("<BIBHIII", 0, first, 0, 0, longest, begun, longest - begun) + b"".join(
-        struct.pack("<BI", m | (0x80 if n > 0 else 0), abs(n)) for m, n in enumerate(increments)))
+    """`first` counts from boot."""
+    return frame(LINE_RUN, struct.pack("<BI", 0, first) + line(increments, longest, begun))
+
+
+def line_trigger(number, edge, delay_us, *increments, longest=90, begun=0):
+    return frame(LINE_TRIGGER, struct.pack("<BBI", number, edge, delay_us) + line(increments, longest, begun))
 
 
 def trigger(number, edge, delay_us, runs):
@@ -196,6 +205,9 @@ SEEDS = {
     "line-run": ready(0) + line_run(90, -31, 1) + passes(60) + frame(EMERGENCY, b"\0", True) + passes(30)
                 + frame(CONTROL, b"\4") + line_run(90, first=110) + passes(60),
     "line-run-replaced": ready(1) + line_run(90, -89) + passes(15) + REPLACEMENT + passes(40),
+    "line-trigger": ready(0) + line_trigger(1, 1, 5000, 90, -31, 1) + passes(3) + trigger_edge() + passes(60)
+                    + line_trigger(1, 1, 5000, 90) + line_trigger(2, 2, 50, 40, 90) + line_run(9, longest=9, first=90)
+                    + trigger(0, 0, 0, b"") + passes(2) + line_run(9, longest=9, first=110) + passes(15),
     "line-run-into-limit": ready(1, inputs(positive=3)) + line_run(70, 90, 90, first=20, begun=9) + passes(25) + pins(2)
                            + passes(60),
     "position-compare": ready(0) + frame(POSITION_COMPARE, struct.pack("<BBiII", 0, 3, 3, 700, 4000)) + MOVE[0] + passes(20),

@@ -48,7 +48,7 @@ void run(Input input) {
                mcu_state_t, move_line_t, move_t, position_compare_t, set_position_t, set_table_t,
                stop_t, subscribe_t, table_answer_t, use_table_t, welcome_t, get_history_t,
                history_answer_t, jog_t, camac_request_t, camac_reply_t, camac_lam_t, move_path_t,
-               follow_t>(input);
+               follow_t, arm_line_t>(input);
 }
 
 }  // namespace

@@ -319,6 +319,8 @@ class Bus {
         return decodes(bushd_table_run{}, bushd_decode_table_run);
       case BUSHD_MSG_LINE_RUN:
         return decodes(bushd_line_run{}, bushd_decode_line_run);
+      case BUSHD_MSG_LINE_TRIGGER:
+        return decodes(bushd_line_trigger{}, bushd_decode_line_trigger);
       case BUSHD_MSG_HOME:
         return decodes(bushd_home{}, bushd_decode_home);
       case BUSHD_MSG_LOCAL:
@@ -465,7 +467,7 @@ void started(Bus& bus, Input& input) {
   const link::Tick start = bus.master().earliest_start(bus.now_us(), mcu, motor) + later;
   bus.source().start[mcu.value][motor] = start;
   bus.source().length[mcu.value][motor] = 90;
-  bus.master().follow_table_run(mcu, motor, start, {70});
+  bus.master().follow_run(mcu, motor, start, link::TableRun{70});
 }
 
 void position_compare(Bus& bus, Input& input) {

@@ -244,10 +244,9 @@ void decode_table_run(Bytes payload) {
   decoded(payload, &message, bushd_decode_table_run, encode);
 }
 
-void decode_line_run(Bytes payload) {
+void decode_lines(Bytes payload) {
   std::array<bushd_line_entry, BUSHD_MOTORS_PER_MCU> entries;
-  const auto encode = [&](const bushd_line_run* message, std::uint8_t* out) {
-    const bushd_line_part& line = message->line;
+  const auto check = [&](const bushd_line_part& line) {
     BUSHD_REQUIRE(line.count >= 1 && line.count <= BUSHD_MOTORS_PER_MCU);
     BUSHD_REQUIRE(line.slot < BUSHD_TABLE_SLOTS && line.longest <= INT32_MAX && line.steps >= 1);
     BUSHD_REQUIRE(line.from <= line.longest && line.steps <= line.longest - line.from);
@@ -257,10 +256,20 @@ void decode_line_run(Bytes payload) {
       BUSHD_REQUIRE(entries[i].increment >= 1 && entries[i].increment <= line.longest);
       BUSHD_REQUIRE(i == 0 || entries[i].motor > entries[i - 1u].motor);
     }
-    return bushd_encode_line_run(message, entries.data(), line.count, out);
   };
-  bushd_line_run message;
-  decoded(payload, &message, bushd_decode_line_run, encode);
+  bushd_line_run run;
+  decoded(payload, &run, bushd_decode_line_run,
+          [&](const bushd_line_run* message, std::uint8_t* out) {
+            check(message->line);
+            return bushd_encode_line_run(message, entries.data(), message->line.count, out);
+          });
+  bushd_line_trigger trigger;
+  decoded(payload, &trigger, bushd_decode_line_trigger,
+          [&](const bushd_line_trigger* message, std::uint8_t* out) {
+            BUSHD_REQUIRE(message->number != 0 && message->edge != BUSHD_EDGE_NONE);
+            check(message->line);
+            return bushd_encode_line_trigger(message, entries.data(), message->line.count, out);
+          });
 }
 
 void decode_trigger(Bytes payload) {
@@ -315,7 +324,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   bushd::fuzz::decode_ticks(payload);
   bushd::fuzz::decode_table_ticks(payload);
   bushd::fuzz::decode_table_run(payload);
-  bushd::fuzz::decode_line_run(payload);
+  bushd::fuzz::decode_lines(payload);
   bushd::fuzz::decode_trigger(payload);
   bushd::fuzz::decode_for_master(payload);
   return 0;

@@ -84,6 +84,20 @@ TEST(Codec, OtherRequestsDoToo) {
       api::Arm{.edge = api::Edge::kFalling, .delay_us = 100, .motors = {{"a", 3}}});
   EXPECT_EQ(arm.edge, api::Edge::kFalling);
   EXPECT_EQ(arm.delay_us, 100);
+  const auto armed =
+      request_over_the_wire(api::ArmLine{.edge = api::Edge::kFalling,
+                                         .delay_us = 77,
+                                         .kind = api::Move::Kind::kAbsolute,
+                                         .motors = {{"a", 3}, {"b", api::UserUnits{-0.5}}},
+                                         .speed = api::Speed{.per_s = 4, .in_steps = true},
+                                         .duration_s = 2.5});
+  EXPECT_EQ(armed.edge, api::Edge::kFalling);
+  EXPECT_EQ(armed.delay_us, 77);
+  EXPECT_EQ(armed.kind, api::Move::Kind::kAbsolute);
+  EXPECT_EQ(armed.motors, (std::vector<api::MotorAmount>{{"a", 3}, {"b", api::UserUnits{-0.5}}}));
+  EXPECT_EQ(armed.speed, (api::Speed{.per_s = 4, .in_steps = true}));
+  EXPECT_EQ(armed.duration_s, 2.5);
+  EXPECT_FALSE(request_over_the_wire(api::ArmLine{.motors = {{"a", 3}}}).duration_s);
   EXPECT_EQ(request_over_the_wire(api::Disarm{{"a"}}).motors, api::MotorNames{"a"});
   const auto compare = request_over_the_wire(api::PositionCompare{
       .motor = "a", .position = 9, .arrivals = {.negative = true}, .delay_us = 5, .width_us = 6});
@@ -209,6 +223,13 @@ TEST(Codec, WhatNoMessageMeansIsRefused) {
   arm_t arm{};
   arm.edge = 0;
   EXPECT_FALSE(decode_client_message("ARM", *encode(arm)));
+  arm_line_t line{};
+  line.edge = arm_line_t::RISING;
+  EXPECT_FALSE(decode_client_message("ARM_LINE", *encode(line)));
+  line.kind = arm_line_t::ABSOLUTE;
+  EXPECT_TRUE(decode_client_message("ARM_LINE", *encode(line)));
+  line.edge = 3;
+  EXPECT_FALSE(decode_client_message("ARM_LINE", *encode(line)));
   configure_t configure{};
   configure.kind = 4;
   EXPECT_FALSE(decode_client_message("CONFIGURE", *encode(configure)));

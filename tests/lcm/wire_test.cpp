@@ -63,12 +63,13 @@ class Wire : public testing::Test {
 };
 
 // Of those of the same layout, one.
-using Types = testing::Types<answer_t, arm_t, emergency_stop_t, get_table_t, health_t, hello_t,
-                             mcu_description_t, mcu_state_t, move_line_t, move_t,
-                             position_compare_t, set_position_t, set_table_t, stop_t, subscribe_t,
-                             table_answer_t, use_table_t, welcome_t, get_history_t,
-                             history_answer_t, configure_t, configuration_answer_t, home_t, jog_t,
-                             camac_request_t, camac_reply_t, camac_lam_t, move_path_t, follow_t>;
+using Types =
+    testing::Types<answer_t, arm_t, emergency_stop_t, get_table_t, health_t, hello_t,
+                   mcu_description_t, mcu_state_t, move_line_t, move_t, position_compare_t,
+                   set_position_t, set_table_t, stop_t, subscribe_t, table_answer_t, use_table_t,
+                   welcome_t, get_history_t, history_answer_t, configure_t, configuration_answer_t,
+                   home_t, jog_t, camac_request_t, camac_reply_t, camac_lam_t, move_path_t,
+                   follow_t, arm_line_t>;
 
 class TypeNames {
  public:

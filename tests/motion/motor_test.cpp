@@ -205,13 +205,14 @@ TEST_F(MotorTest, IsArmedOnceItsMcuSaysSo) {
 
 TEST_F(MotorTest, WhatDisarmsItEndsIt) {
   motor.arm(9, kSteps);
-  motor.stop("phi");
+  motor.stop("phi, armed with it, has ended");
   mcu.trigger_number = 9;
   mcu.trigger_state = BUSHD_TRIGGER_DISARMED;
   const auto events = report(kStart);
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_TRUE(find<event::Ended>(events)->was_armed);
-  EXPECT_THAT(find<event::Ended>(events)->reason, HasSubstr("because phi, armed with it"));
+  EXPECT_THAT(find<event::Ended>(events)->reason,
+              HasSubstr("disarmed, because phi, armed with it, has ended"));
   EXPECT_TRUE(motor.is<Resting>());
 }
 

@@ -135,6 +135,13 @@ class Blocking(PythonTest):
                 self.assertEqual(result["b1"].position_steps, before - 200)
                 self.assertIsNone(client.where("b1").line)
                 client.move_line({"a0": 0, "b1": before})
+                steps = client.where("a1").position_steps
+                armed = client.arm_line(by={"a1": 100, "b1": -100}, unit="steps", delay_us=300)
+                self.wait_until("the line to wait", lambda: client.where("b1").activity == bushd.Activity.ARMED)
+                self.bushsim.send(signal.SIGRTMIN)
+                self.assertEqual(armed.wait()["a1"].position_steps, steps + 100)
+                self.bushsim.send(signal.SIGRTMIN)
+                client.move_line({"a0": 0, "b1": before})
                 with self.assertRaisesRegex(bushd.Refused, "takes at least"):
                     client.move_line(by={"a0": 5, "b1": -200}, duration_s=0.001)
         self.assert_one_result_each()

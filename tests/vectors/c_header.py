@@ -47,17 +47,20 @@ def c_encoder(index, message, fields):
         lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
         lines.append(f"  return bushd_encode_table_run({fields['epoch']}, UINT32_C({fields['first_tick']}), entries, "
                      f"{len(fields['entries'])}, payload);")
-    elif message == "line_run":
+    elif message in ("line_run", "line_trigger"):
         entries = ", ".join(f"{{{motor}, {direction}, UINT32_C({increment})}}"
                             for motor, direction, increment in fields["entries"])
         lines.append(f"  static const bushd_line_entry entries[] = {{{entries}}};")
-        lines.append("  bushd_line_run message;")
+        lines.append(f"  bushd_{message} message;")
         lines.append("  memset(&message, 0, sizeof message);")
-        for name in ("epoch", "first_tick"):
-            lines.append(f"  message.{name} = {fields[name]}u;")
+        for name in ("epoch", "first_tick", "number", "delay_us"):
+            if name in fields:
+                lines.append(f"  message.{name} = {fields[name]}u;")
+        if "edge" in fields:
+            lines.append(f"  message.edge = (bushd_edge){fields['edge']};")
         for name in ("slot", "floor", "longest", "from", "steps"):
             lines.append(f"  message.line.{name} = {fields[name]}u;")
-        lines.append(f"  return bushd_encode_line_run(&message, entries, {len(fields['entries'])}, payload);")
+        lines.append(f"  return bushd_encode_{message}(&message, entries, {len(fields['entries'])}, payload);")
     elif message == "trigger":
         entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {floor}}}"
                             for motor, slot, direction, steps, floor in fields["entries"])

@@ -122,6 +122,10 @@ FRAMES = [
     # The rest of one after a pause, with a floor.
     (1, 27, "line_run", {"epoch": 255, "first_tick": 4294967295, "slot": 7, "floor": 513, "longest": 2147483647,
                          "from": 2147483640, "steps": 7, "entries": [[15, -1, 1]]}),
+    (1, 28, "line_trigger", {"number": 1, "edge": 2, "delay_us": 50, "slot": 3, "floor": 0, "longest": 700, "from": 0,
+                             "steps": 700, "entries": [[0, 1, 700], [2, -1, 211]]}),
+    (1, 29, "line_trigger", {"number": 255, "edge": 1, "delay_us": 1650000, "slot": 7, "floor": 513,
+                             "longest": 2147483647, "from": 2147483640, "steps": 7, "entries": [[15, -1, 1]]}),
     (1, 21, "trigger", {"number": 1, "edge": 2, "delay_us": 50, "entries": [[0, 2, 1, 200, 0]]}),
     (1, 22, "trigger", {"number": 255, "edge": 1, "delay_us": 1650000,
                         "entries": [[1, 0, -1, 1, 513], [15, 7, 1, 2147483647, 0]]}),

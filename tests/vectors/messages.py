@@ -19,6 +19,8 @@ LAYOUTS = {
     "table_run": (0x0D, [("epoch", 1), ("first_tick", 4), ("entries", "table_run")]),
     "line_run": (0x18, [("epoch", 1), ("first_tick", 4), ("slot", 1), ("floor", 2), ("longest", 4), ("from", 4),
                         ("steps", 4), ("entries", "line")]),
+    "line_trigger": (0x1B, [("number", 1), ("edge", 1), ("delay_us", 4), ("slot", 1), ("floor", 2), ("longest", 4),
+                            ("from", 4), ("steps", 4), ("entries", "line")]),
     "trigger": (0x15, [("number", 1), ("edge", 1), ("delay_us", 4), ("entries", "table_run")]),
     "position_compare": (0x16, [("motor", 1), ("arrivals", 1), ("position_steps", -4), ("delay_us", 4), ("width_us", 4)]),
     "emergency": (0x0E, [("mode", 1)]),

@@ -39,6 +39,7 @@ api::MotorNames motors_of(const api::Request& request) {
   if (const auto* move = std::get_if<api::MoveLine>(&request)) add(move->motors);
   if (const auto* path = std::get_if<api::MovePath>(&request)) names = path->motors;
   if (const auto* arm = std::get_if<api::Arm>(&request)) add(arm->motors);
+  if (const auto* arm = std::get_if<api::ArmLine>(&request)) add(arm->motors);
   if (const auto* home = std::get_if<api::Home>(&request)) names = home->motors;
   const auto* follow = std::get_if<api::Follow>(&request);
   if (follow != nullptr && follow->part == api::Follow::Part::kRun) names = follow->motors;
@@ -154,8 +155,9 @@ int send(Client& client, const api::Request& request, Client::Until until, Hope 
     for (const std::string& line : rounding_lines(request, heard)) fmt::print("{}\n", line);
     // What limits a line, and how near to it the motors are.
     const auto* completed = std::get_if<api::Completed>(&heard);
-    if (completed != nullptr && std::holds_alternative<api::MoveLine>(request) &&
-        as_hoped(heard, hope)) {
+    const bool is_line = std::holds_alternative<api::MoveLine>(request) ||
+                         std::holds_alternative<api::ArmLine>(request);
+    if (completed != nullptr && is_line && as_hoped(heard, hope)) {
       fmt::print("{}\n", bushd::printable(completed->reason));
     }
     std::fflush(stdout);

@@ -115,34 +115,49 @@ void add_arm(CommandLine& line) {
   struct Options {
     std::string edge = "rising";
     std::int64_t delay_us = 0;
+    bool line = false;
+    std::string duration;
     bool steps = false;
     bool wait = false;
     std::string speed;
     std::vector<std::string> words;
   };
   const auto options = std::make_shared<Options>();
+  const auto carry_out = [&line, options](auto arm) {
+    if (!arm) return wrong_usage(arm.error());
+    const auto speed = parse_speed(options->speed, numbers(options->steps));
+    if (!speed) return wrong_usage(speed.error());
+    arm->speed = *speed;
+    return send(line.connection(), *arm, until(options->wait), Hope::kReached);
+  };
   line.add("arm", "Let moves wait for the trigger of their MCU")
       .footer(
           "bushctl arm --delay-us US NAME DISTANCE [NAME DISTANCE...]\n"
+          "bushctl arm --delay-us US --line NAME DISTANCE [NAME DISTANCE...], or NAME --to "
+          "POSITION\n"
           "Motors at rest. Those of one MCU begin in the same slot, three ticks and the delay "
           "after "
-          "the edge at its trigger input. With --wait the exit code is 0 only if every motor "
+          "the edge at its trigger input. With --line they move along a straight line, as with "
+          "move --line, on MCUs that can make it; each MCU goes by the edge at its own input. With "
+          "--wait the exit code is 0 only if every motor "
           "reached its target.")
       .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'650'000,
                             "Delay from the edge, beyond the three ticks", Command::Needed::kYes)
+      .flag("--line", &options->line, "Along a straight line; all motors on one bus")
+      .option_with("--line", "--duration", &options->duration,
+                   "With --line: take at least so many seconds")
       .choice("--edge", &options->edge, {"rising", "falling"}, "Edge that starts the moves")
       .option("--speed", &options->speed, kSpeed)
       .flag("--steps", &options->steps, kSteps)
       .flag("--wait", &options->wait, "Wait for the result")
       .raw_words(&options->words)
-      .run([&line, options] {
-        auto arm =
-            parse_arm(options->words, numbers(options->steps), options->edge, options->delay_us);
-        if (!arm) return wrong_usage(arm.error());
-        const auto speed = parse_speed(options->speed, numbers(options->steps));
-        if (!speed) return wrong_usage(speed.error());
-        arm->speed = *speed;
-        return send(line.connection(), *arm, until(options->wait), Hope::kReached);
+      .run([carry_out, options] {
+        const Numbers as = numbers(options->steps);
+        if (options->line) {
+          return carry_out(parse_arm_line(options->words, as, options->edge, options->delay_us,
+                                          options->duration));
+        }
+        return carry_out(parse_arm(options->words, as, options->edge, options->delay_us));
       });
 }
 

@@ -104,16 +104,35 @@ Result<api::MoveLine> parse_move_line(const std::vector<std::string>& words, Num
   return fail(fmt::format("--duration: \"{}\" is not a number of seconds above 0", duration));
 }
 
+namespace {
+
+api::Edge edge_of(const std::string& word) {
+  return word == "falling" ? api::Edge::kFalling : api::Edge::kRising;
+}
+
+}  // namespace
+
+Result<api::ArmLine> parse_arm_line(const std::vector<std::string>& words, Numbers numbers,
+                                    const std::string& edge, std::int64_t delay_us,
+                                    const std::string& duration) {
+  auto line = parse_move_line(words, numbers, duration);
+  if (!line) return fail(line.error());
+  return api::ArmLine{.edge = edge_of(edge),
+                      .delay_us = delay_us,
+                      .kind = line->kind,
+                      .motors = std::move(line->motors),
+                      .duration_s = line->duration_s};
+}
+
 Result<api::Arm> parse_arm(const std::vector<std::string>& words, Numbers numbers,
                            const std::string& edge, std::int64_t delay_us) {
   const auto move = parse_move(words, numbers);
   if (!move) return fail(move.error());
   if (move->kind != api::Move::Kind::kRelative) {
-    return fail("--to: what waits for the trigger is moved by a distance; write NAME DISTANCE");
+    return fail(
+        "--to: what waits for the trigger is moved by a distance; write NAME DISTANCE, or --line");
   }
-  return api::Arm{.edge = edge == "falling" ? api::Edge::kFalling : api::Edge::kRising,
-                  .delay_us = delay_us,
-                  .motors = move->motors};
+  return api::Arm{.edge = edge_of(edge), .delay_us = delay_us, .motors = move->motors};
 }
 
 Result<api::PositionCompare> parse_position_compare(const std::string& motor,

@@ -30,6 +30,12 @@ bushd::Result<bushd::api::MoveLine> parse_move_line(const std::vector<std::strin
 bushd::Result<bushd::api::Arm> parse_arm(const std::vector<std::string>& words, Numbers numbers,
                                          const std::string& edge, std::int64_t delay_us);
 
+// "theta 400 chi -20", also with --to: along a straight line, when the trigger comes.
+bushd::Result<bushd::api::ArmLine> parse_arm_line(const std::vector<std::string>& words,
+                                                  Numbers numbers, const std::string& edge,
+                                                  std::int64_t delay_us,
+                                                  const std::string& duration);
+
 struct Pulse {
   std::string direction = "both";  // or "positive", "negative"
   std::int64_t delay_us = 0;

@@ -9,7 +9,7 @@ r = N / L, all rounded up,
     A(k) = max r A_i(floor(r k)),  D(k) = max r D_i(k) for r = 1, else r D_i(max(0, floor(r k) - 1)),  c = max r c_i.
 
 In ticks a motor's position is told in 1/256 step, rounded down; it ends on a whole step, which it does not go beyond, and before
-its first step it rises twice as fast, from 0. So the tick of the first step of a run is judged as a first tick.
+its first step it rises twice as fast, from 0. A run that a trigger has started begins "late_ns" after the beginning of its start tick. So the tick of the first step of a run is judged as a first tick.
 """
 
 import bisect
@@ -174,7 +174,7 @@ class LineMove(Move):
             self._run.restart(run_steps if target_steps is not None else 0, floor)
             self._rests = [(-1, self._rest())]
             return
-        at_ns = (tick - self.start_tick) * self.tick_ns
+        at_ns = (tick - self.start_tick) * self.tick_ns - self.late_ns
         running = bisect.bisect_right(self._run.ends, at_ns // self._envelope.unit_ns)
         if running == len(self._run.delays):
             return
@@ -200,12 +200,12 @@ class LineMove(Move):
             units = ends[before] * whole
             if rest > 0:
                 units += rest * self._run.delays[before]
-            yield units * self._envelope.unit_ns
+            yield units * self._envelope.unit_ns + whole * self.late_ns
 
     @property
     def delays(self):
         """In units of the motor's own table, rounded up."""
-        times = [0, *self._times()]
+        times = [2 * self._increment * self.late_ns, *self._times()]
         return [up(after - before, 2 * self._increment * self.table.unit_ns) for before, after in zip(times, times[1:])]
 
     def too_close(self):
@@ -225,12 +225,12 @@ class LineMove(Move):
         return self.from_steps + self.direction * (self._rest() - self._made(self._from))
 
     def end_tick(self):
-        run_ns = (self._run.ends[-1] if self._run.ends else 0) * self._envelope.unit_ns
+        run_ns = (self._run.ends[-1] if self._run.ends else 0) * self._envelope.unit_ns + self.late_ns
         return self.start_tick - (-run_ns // self.tick_ns)
 
     def _place(self, tick):
         """What is told as the position at the end of a tick, 1/256 step from the line's beginning."""
-        at_ns = (tick + 1) * self.tick_ns
+        at_ns = (tick + 1) * self.tick_ns - self.late_ns
         rest = next(rest for since, rest in reversed(self._rests) if tick >= since)
         run = bisect.bisect_right(self._run.ends, at_ns // self._envelope.unit_ns)
         s = self._from + run
@@ -250,7 +250,7 @@ class LineMove(Move):
         before = up(parts, 256) - 1
         ends = self._run.ends[before - 1] if before else 0
         part_ns = Fraction(self._run.delays[before] * self._envelope.unit_ns, 256)
-        return ends * self._envelope.unit_ns + (parts - 256 * before) * part_ns, part_ns
+        return self.late_ns + ends * self._envelope.unit_ns + (parts - 256 * before) * part_ns, part_ns
 
     def steps(self, slots):
         times = self.times_ns()
@@ -296,8 +296,8 @@ class LineMove(Move):
         if self.emission in ("burst", "common-dir", "staggered") or place == FIRST_TICK:
             return self.tick_ns
         unit_ns = self._envelope.unit_ns
-        begin = bisect.bisect_right(self._run.ends, tick * self.tick_ns // unit_ns)
-        end = bisect.bisect_right(self._run.ends, (tick + 1) * self.tick_ns // unit_ns)
+        begin = bisect.bisect_right(self._run.ends, (tick * self.tick_ns - self.late_ns) // unit_ns)
+        end = bisect.bisect_right(self._run.ends, ((tick + 1) * self.tick_ns - self.late_ns) // unit_ns)
         delays = self._run.delays[begin : end + 1]
         share = self._increment / self._longest
         vmax = share / (min(delays) * unit_ns)

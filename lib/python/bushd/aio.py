@@ -317,6 +317,32 @@ class Client:
         request = requests.arm(motors, in_steps=in_steps, falling=edge == "falling", delay_us=delay_us, speed=speed)
         return await self._motion(request, list(motors)).accepted()
 
+    async def arm_line(
+        self,
+        motors: Mapping[str, float] | None = None,
+        *,
+        to: Mapping[str, float] | None = None,
+        by: Mapping[str, float] | None = None,
+        unit: str | None = None,
+        edge: Literal["rising", "falling"] = "rising",
+        delay_us: int = 50,
+        speed: float | None = None,
+        duration_s: float | None = None,
+    ) -> Motion:
+        if edge not in ("rising", "falling"):
+            raise ValueError(f'edge "{edge}": it is "rising" or "falling"')
+        wanted = await self._amounts(motors, to, by, unit)
+        request = requests.arm_line(
+            wanted.values,
+            absolute=wanted.absolute,
+            in_steps=wanted.in_steps,
+            falling=edge == "falling",
+            delay_us=delay_us,
+            speed=speed,
+            duration_s=duration_s,
+        )
+        return await self._motion(request, list(wanted.values)).accepted()
+
     async def disarm(self, *names: str, check: bool = True) -> model.Result:
         return await self._result(requests.of_motors("DISARM", names), check)
 

@@ -363,6 +363,27 @@ class Client:
         begun = self._client.arm(motors, unit=unit, edge=edge, delay_us=delay_us, speed=speed)
         return Motion(self._loop, self._loop.run(begun))
 
+    def arm_line(
+        self,
+        motors: Mapping[str, float] | None = None,
+        *,
+        to: Mapping[str, float] | None = None,
+        by: Mapping[str, float] | None = None,
+        unit: str | None = None,
+        edge: Literal["rising", "falling"] = "rising",
+        delay_us: int = 50,
+        speed: float | None = None,
+        duration_s: float | None = None,
+    ) -> Motion:
+        """Lets these motors, at rest, wait for an edge at the trigger inputs of their MCUs, to make a line (`move_line()`).
+
+        For MCUs that make the line themselves; refused where they cannot. All else as of `arm()`.
+        """
+        begun = self._client.arm_line(
+            motors, to=to, by=by, unit=unit, edge=edge, delay_us=delay_us, speed=speed, duration_s=duration_s
+        )
+        return Motion(self._loop, self._loop.run(begun))
+
     def disarm(self, *names: str, check: bool = True) -> model.Result:
         """Ends the wait for the trigger of these motors, and of all armed with them; none named: of all."""
         return self._loop.run(self._client.disarm(*names, check=check))

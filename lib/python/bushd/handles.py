@@ -9,7 +9,7 @@ from .loop import Loop as _Loop
 
 
 class Motion:
-    """A motion under way, of `move(..., wait=False)`, `home(..., wait=False)` and `arm()`."""
+    """A motion under way, of `move(..., wait=False)`, `home(..., wait=False)`, `arm()` and `arm_line()`."""
 
     def __init__(self, loop: _Loop, begun: motion.Motion) -> None:
         self._loop = loop

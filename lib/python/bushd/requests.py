@@ -45,17 +45,33 @@ def move_line(
     message.kind = messages.move_line_t.ABSOLUTE if absolute else messages.move_line_t.RELATIVE
     message.dry_run = bool(dry_run)
     _put_speed(message, speed, in_steps)
-    if duration_s is not None:
-        # 0 on the bus of messages is "none".
-        if not codec.finite(float(duration_s)) > 0:
-            raise ValueError(f"duration_s={duration_s}; allowed: above 0")
-        message.duration_s = float(duration_s)
+    _put_duration(message, duration_s)
     _put_amounts(message, amounts, in_steps)
     return Request("MOVE_LINE", message)
 
 
 # What one message holds (move_path_t, follow_t); more come in several.
 MOST_VALUES = 4096
+
+
+def arm_line(
+    amounts: Amounts,
+    *,
+    absolute: bool,
+    in_steps: bool,
+    falling: bool = False,
+    delay_us: int = 50,
+    speed: float | None = None,
+    duration_s: float | None = None,
+) -> Request:
+    message = messages.arm_line_t()
+    message.edge = messages.arm_line_t.FALLING if falling else messages.arm_line_t.RISING
+    message.delay_us = operator.index(delay_us)
+    message.kind = messages.arm_line_t.ABSOLUTE if absolute else messages.arm_line_t.RELATIVE
+    _put_speed(message, speed, in_steps)
+    _put_duration(message, duration_s)
+    _put_amounts(message, amounts, in_steps)
+    return Request("ARM_LINE", message)
 
 
 def move_path(
@@ -333,6 +349,15 @@ def _put_speed(message: Any, speed: float | None, in_steps: bool) -> None:
     message.speed_in_steps = in_steps
     if message.speed <= 0:
         raise ValueError(f"a speed of {speed:g}: it is to be above 0")
+
+
+def _put_duration(message: Any, duration_s: float | None) -> None:
+    if duration_s is None:
+        return
+    # 0 on the bus of messages is "none".
+    if not codec.finite(float(duration_s)) > 0:
+        raise ValueError(f"duration_s={duration_s}; allowed: above 0")
+    message.duration_s = float(duration_s)
 
 
 def _named(message: Any, names: Names) -> Any:

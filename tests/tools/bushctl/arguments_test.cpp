@@ -86,6 +86,20 @@ TEST(ArmArguments, ArePairsWithAnEdgeAndADelay) {
   EXPECT_FALSE(parse_arm({}, kUser, "rising", 50));
 }
 
+TEST(ArmArguments, OfALineAreThoseOfALineAndATrigger) {
+  const auto line =
+      parse_arm_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, "falling", 1500, "2.5");
+  ASSERT_TRUE(line) << line.error().message;
+  EXPECT_EQ(line->kind, api::Move::Kind::kAbsolute);
+  EXPECT_EQ(line->motors, (Motors{{"a", User{10}}, {"b", User{-3.5}}}));
+  EXPECT_EQ(line->edge, api::Edge::kFalling);
+  EXPECT_EQ(line->delay_us, 1500);
+  EXPECT_EQ(line->duration_s, 2.5);
+  EXPECT_EQ(parse_arm_line({"a", "4"}, kUser, "rising", 50, "")->kind, api::Move::Kind::kRelative);
+  EXPECT_FALSE(parse_arm_line({"a", "4"}, kUser, "rising", 50, "0"));
+  EXPECT_FALSE(parse_arm_line({"a"}, kUser, "rising", 50, ""));
+}
+
 TEST(ReferenceArguments, NameAMotorAndWhereItPulses) {
   const auto compare = parse_position_compare(
       "theta", "-7", kUser, {.direction = "negative", .delay_us = 30, .width_us = 4});

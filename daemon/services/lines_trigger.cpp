@@ -1,0 +1,199 @@
+// Lines that wait for a trigger: their MCUs hold the run, and each begins it by the edge at its own
+// input (docs/decisions/0048-triggered-lines.md). When all have begun it is a line like any other.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <map>
+#include <utility>
+
+#include "daemon/services/lines.h"
+#include "daemon/services/trigger.h"
+
+namespace bushd::daemon {
+
+void Lines::request(const api::Asker& asker, const api::ArmLine& request) {
+  auto line = line_to_arm(request);
+  if (!line) return asker.answer(api::Refused{line.error().text()});
+  asker.answer(api::Accepted{});
+  const std::uint64_t number = ++last_number_;
+  line->waits = true;
+  line->begun = false;
+  open(asker, number, *line);
+  Line& kept = lines_.emplace(number, std::move(*line)).first->second;
+  log(kept);
+  arm(request, number, kept);
+}
+
+Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
+  const auto motors = installation_.find(request.motors);
+  if (!motors) return fail(motors.error());
+  for (const MotorId id : *motors) {
+    const motion::Motor& motor = installation_[id];
+    if (!motor.has_plan()) continue;
+    return fail(motor.busy_text() + (motor.moves() ? "; stop it first" : "; disarm it first"));
+  }
+  if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
+  auto line = line_of({.kind = request.kind,
+                       .motors = request.motors,
+                       .speed = request.speed,
+                       .duration_s = request.duration_s});
+  if (!line) return line;
+  for (std::size_t i = 0; i < line->motors.size(); ++i) {
+    if (line->way.increment(i) != 0) continue;
+    return fail(installation_[line->motors[i]].name() +
+                ": a move of no steps; leave it out, as a trigger cannot begin that");
+  }
+  if (const auto may = may_wait(*line); !may) return fail(may.error());
+  return line;
+}
+
+Result<void> Lines::may_wait(const Line& line) const {
+  for (const McuId id : installation_.mcus_of(line.motors)) {
+    const Mcu& mcu = installation_[id];
+    if (!mcu.can_arm_lines()) {
+      return fail(fmt::format(
+          "MCU {} makes no lines that a trigger begins: it has no trigger input, or makes no lines "
+          "by itself (LINE_RUN); move them without a trigger, or arm single motors",
+          mcu.name()));
+    }
+    for (const MotorId other : mcu.motors()) {
+      const motion::Motor& motor = installation_[other];
+      if (motor.is<motion::Armed>()) {
+        return fail(fmt::format("{} waits for the trigger of MCU {} already; disarm it first",
+                                motor.name(), mcu.name()));
+      }
+      if (motor.is<motion::OnLine>() && motor.axis().line() && motor.axis().line()->in_mcus) {
+        return fail(fmt::format(
+            "{} moves on a line that MCU {} makes, which has room for one; wait for its result",
+            motor.name(), mcu.name()));
+      }
+    }
+    if (!mcu.has_table(line.way.table()->view())) {
+      return fail(fmt::format(
+          "the line goes by a table of its own, which MCU {} does not have: a line that waits for "
+          "a "
+          "trigger needs motors of one table, whose ways are equal or a tenth of the longest at "
+          "most. Move it without a trigger",
+          mcu.name()));
+    }
+  }
+  return {};
+}
+
+void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
+  const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
+  const std::uint16_t floor = line.way.floor();
+  std::map<McuId, std::vector<link::BusMaster::ArmedOnLine>> parts;
+  std::vector<motion::LineShare> shares;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    shares.push_back(line.share(i, 0, line.longest()));
+    shares.back().in_mcus = true;
+    const Mcu& mcu = installation_.mcu_of(line.motors[i]);
+    parts[mcu.id].push_back({.motor = installation_[line.motors[i]].output().value,
+                             .run = mcu.line_run(shares.back(), floor, 0)});
+  }
+  std::map<McuId, std::uint8_t> numbers;
+  for (const auto& [mcu, of_mcu] : parts) {
+    numbers[mcu] =
+        installation_[mcu].arm_line(edge, static_cast<std::uint32_t>(request.delay_us), of_mcu);
+  }
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    motion::OnLine on_line;
+    on_line.line = number;
+    on_line.target_steps = line.points.back().steps[i];
+    on_line.last_run = line.points.size() == 1;
+    const McuId mcu = installation_.config()[line.motors[i]].mcu;
+    installation_[line.motors[i]].arm_line(numbers[mcu], on_line, std::move(shares[i]), floor);
+  }
+  installation_.changed = true;
+}
+
+bool Lines::waits(MotorId motor, std::uint64_t number) const {
+  const auto* armed = installation_[motor].as<motion::Armed>();
+  return armed != nullptr && armed->on_line && armed->on_line->line == number;
+}
+
+// Of its MCUs: in the first reports after the edge some have begun and others are yet to tell.
+bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line) {
+  std::vector<MotorId> begun;
+  std::vector<MotorId> waiting;
+  for (const MotorId id : line.motors) {
+    if (on_line(id, number) != nullptr) begun.push_back(id);
+    if (waits(id, number)) waiting.push_back(id);
+  }
+  line.waits = !waiting.empty();
+  if (begun.empty()) return !line.waits;  // an end of one that waits ends the others (Moves)
+  line.begun = true;
+  if (const auto cause = cause_to_wait_no_more(line, begun, waiting)) {
+    std::erase_if(waiting,
+                  [&](MotorId id) { return installation_[id].as<motion::Armed>()->stops; });
+    for (const MotorId id : waiting) installation_[id].stop(*cause);
+    moves_.stop(now_us, waiting);
+    const bool all_stop = std::ranges::all_of(begun, [&](MotorId id) {
+      return installation_[id].axis().stopping() && !installation_[id].is_paused();
+    });
+    if (!all_stop) end(now_us, number, line, *cause);
+  } else {
+    keep_together(now_us, begun);
+  }
+  return !line.waits;
+}
+
+std::optional<std::string> Lines::cause_to_wait_no_more(const Line& line,
+                                                        const std::vector<MotorId>& begun,
+                                                        const std::vector<MotorId>& waiting) const {
+  const auto begin_of = [this](MotorId id) -> const motion::Axis& {
+    return installation_[id].axis();
+  };
+  const auto earlier = [&](MotorId a, MotorId b) {
+    const auto time = [](const motion::Axis& axis) {
+      return std::pair(axis.start_tick(), axis.late_ns());
+    };
+    return time(begin_of(a)) < time(begin_of(b));
+  };
+  const auto [first, last] = std::ranges::minmax_element(begun, earlier);
+  for (const MotorId id : line.motors) {
+    const bool is_left = std::ranges::find(begun, id) != begun.end() ||
+                         std::ranges::find(waiting, id) != waiting.end();
+    if (!is_left) return installation_[id].name() + " did not begin with the others";
+  }
+  for (const MotorId id : waiting) {
+    if (installation_[id].as<motion::Armed>()->stops) {
+      return installation_[id].name() + " was stopped before it began";
+    }
+    const Mcu& mcu = installation_.mcu_of(id);
+    if (mcu.view().tick <= begin_of(*first).start_tick() + 1) continue;
+    return fmt::format("the trigger has come to MCU {}, and not to MCU {}",
+                       installation_.mcu_of(*first).name(), mcu.name());
+  }
+  const std::int64_t tick_ns = begin_of(*first).tick_ns();
+  const std::int64_t apart_ns =
+      (begin_of(*last).start_tick() - begin_of(*first).start_tick()) * tick_ns +
+      begin_of(*last).late_ns() - begin_of(*first).late_ns();
+  if (apart_ns <= tick_ns) return std::nullopt;
+  return fmt::format("the trigger came to MCU {} {} us later than to MCU {}",
+                     installation_.mcu_of(*last).name(), apart_ns / 1000,
+                     installation_.mcu_of(*first).name());
+}
+
+// What was asked of those that were known to have begun is for all.
+void Lines::keep_together(std::int64_t now_us, const std::vector<MotorId>& begun) {
+  std::vector<MotorId> go_on;
+  bool stops = false;
+  bool paused = false;
+  bool resumes = false;
+  for (const MotorId id : begun) {
+    const motion::Motor& motor = installation_[id];
+    if (!motor.axis().stopping()) go_on.push_back(id);
+    stops = stops || (motor.axis().stopping() && !motor.is_paused());
+    paused = paused || motor.is_paused();
+    resumes = resumes || motor.as<motion::OnLine>()->resumes;
+  }
+  if (go_on.empty() || (!stops && !paused)) return;
+  if (stops) return moves_.stop(now_us, begun);
+  moves_.pause(now_us, go_on);
+  if (resumes) moves_.resume(now_us, go_on);
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,115 @@
+// How plans change: from which tick on, and for whom.
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "daemon/services/moves.h"
+
+namespace bushd::daemon {
+
+void Moves::replan(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  plan(now_us, with_whole_lines(motors));
+}
+
+void Moves::plan_again(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  plan(now_us, motors);
+}
+
+// The motors of a line change at the same tick, or not yet: one of them may have taken a change
+// that another one is not known to have taken.
+std::vector<MotorId> Moves::with_whole_lines(const std::vector<MotorId>& motors) {
+  std::set<std::uint64_t> stop;
+  std::set<std::uint64_t> wait;
+  std::vector<MotorId> all = installation_.with_lines(motors);
+  for (const MotorId id : all) {
+    const motion::Motor& motor = installation_[id];
+    const auto* on_line = motor.as<motion::OnLine>();
+    if (on_line == nullptr) continue;
+    if (motor.axis().open_change()) wait.insert(on_line->line);
+    if (motor.axis().stopping() && !motor.is_paused()) stop.insert(on_line->line);
+  }
+  std::erase_if(all, [&](MotorId id) {
+    const auto* on_line = installation_[id].as<motion::OnLine>();
+    return on_line != nullptr && wait.contains(on_line->line);
+  });
+  for (const MotorId id : all) {
+    const auto* on_line = installation_[id].as<motion::OnLine>();
+    if (on_line != nullptr && stop.contains(on_line->line)) installation_[id].stop();
+  }
+  return all;
+}
+
+std::map<McuId, motion::Tick> Moves::ticks_to_change_at(std::int64_t now_us,
+                                                        const std::vector<MotorId>& motors) const {
+  // One replacement serves all motors of an MCU. It can bring a motor that has not begun to rest at
+  // any tick, but another beginning only at the tick where it was to begin.
+  std::map<McuId, motion::Tick> at;
+  for (const MotorId id : motors) {
+    const Mcu& mcu = installation_.mcu_of(id);
+    const motion::Axis& axis = installation_[id].axis();
+    const motion::Tick first = axis.stopping() ? mcu.earliest_replace(now_us)
+                                               : mcu.earliest_retarget(now_us, axis.start_tick());
+    motion::Tick& common = at.try_emplace(mcu.id, first).first->second;
+    common = std::max(common, first);
+  }
+  std::map<BusId, motion::Tick> of_lines;
+  for (const MotorId id : motors) {
+    if (!installation_[id].is<motion::OnLine>()) continue;
+    const Mcu& mcu = installation_.mcu_of(id);
+    // What an MCU has not taken, it should take where the others have.
+    const motion::Tick others = installation_[id].axis().open_change().value_or(INT64_MIN);
+    motion::Tick& common = of_lines.try_emplace(mcu.config.bus, INT64_MIN).first->second;
+    common = std::max({common, at[mcu.id], others});
+  }
+  for (auto& [mcu, tick] : at) {
+    const auto common = of_lines.find(installation_[mcu].config.bus);
+    if (common != of_lines.end()) tick = std::max(tick, common->second);
+  }
+  return at;
+}
+
+// Runs of a line that a trigger has begun are microseconds apart, so that not all are in the same
+// step when they are to stop: they stop where the foremost does.
+std::map<MotorId, std::uint32_t> Moves::common_ends(const std::vector<MotorId>& motors) const {
+  std::map<std::uint64_t, std::uint32_t> farthest;
+  const auto stops_on_line = [this](MotorId id) -> const motion::OnLine* {
+    const motion::Motor& motor = installation_[id];
+    const auto* on_line = motor.as<motion::OnLine>();
+    const bool stops = on_line != nullptr && motor.axis().stopping() && !motor.axis().line()->track;
+    return stops ? on_line : nullptr;
+  };
+  for (const MotorId id : motors) {
+    const motion::OnLine* on_line = stops_on_line(id);
+    if (on_line == nullptr) continue;
+    std::uint32_t& end = farthest[on_line->line];
+    end = std::max(end, installation_[id].axis().line_planned_end());
+  }
+  std::map<MotorId, std::uint32_t> ends;
+  for (const MotorId id : motors) {
+    const motion::OnLine* on_line = stops_on_line(id);
+    if (on_line == nullptr) continue;
+    const std::uint32_t end = farthest[on_line->line];
+    if (installation_[id].axis().line_planned_end() < end) ends[id] = end;
+  }
+  return ends;
+}
+
+void Moves::plan(std::int64_t now_us, const std::vector<MotorId>& motors) {
+  const std::map<McuId, motion::Tick> at = ticks_to_change_at(now_us, motors);
+  std::map<McuId, std::uint16_t> masks;
+  const auto change = [&](MotorId id, std::uint32_t least_end) {
+    motion::Motor& motor = installation_[id];
+    const McuId mcu = installation_.config()[id].mcu;
+    const auto bit = static_cast<std::uint16_t>(1u << motor.output().value);
+    masks[mcu] &= static_cast<std::uint16_t>(~bit);
+    if (motor.change(at.at(mcu), least_end)) masks[mcu] |= bit;
+  };
+  for (const MotorId id : motors) change(id, 0);
+  for (const auto& [id, end] : common_ends(motors)) change(id, end);
+  for (const auto& [mcu, mask] : masks) {
+    if (mask != 0) installation_[mcu].replace(mask, at.at(mcu));
+  }
+  installation_.changed = true;
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,110 @@
+// Motors of an MCU that follow one run along a line, and where their steps belong.
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "engine/line.h"
+#include "firmware/streams.h"
+
+namespace bushd::test {
+
+struct LineMotor {
+  std::uint8_t number;
+  std::int32_t steps;  // of the whole line
+};
+
+inline std::uint32_t length(std::int32_t steps) {
+  return static_cast<std::uint32_t>(std::abs(steps));
+}
+
+// When, in 1/256 ns from the run's beginning: by rational numbers, rounded up to 1/256 of a step of
+// the run.
+inline std::vector<Wide> times_of(const Reference& run, std::uint32_t increment,
+                                  std::uint32_t longest, std::uint32_t from = 0) {
+  std::vector<Wide> times;
+  for (Wide j = 1; j <= increment; ++j) {
+    const Wide parts = (128 * (2 * j - 1) * longest + increment - 1) / increment + 128;
+    const Wide step = (parts + 255) / 256 - 1 - from;
+    if (step < 0) continue;
+    if (step >= static_cast<Wide>(run.steps())) break;
+    const Step& running = run.step(static_cast<std::size_t>(step));
+    const Wide begin = running.end - running.delay;
+    times.push_back(begin + running.delay * (parts - 256 * (step + from)) / 256);
+  }
+  return times;
+}
+
+// Of an MCU with four motors; the run is of `law`, in slot 0, as are their tables.
+class OfLines : public Streams {
+ protected:
+  OfLines() : Streams({.queue_ticks = 256}) {}
+
+  struct Frame {
+    std::uint32_t first = 0;
+    std::vector<LineMotor> motors;
+    std::uint32_t longest;
+    std::uint32_t from = 0;
+    std::uint32_t steps = 0;  // 0: all
+    std::uint16_t floor = 0;
+    std::uint8_t slot = 0;
+    std::uint8_t epoch = 0;
+  };
+  static Bytes frame(const Frame& of) {
+    std::vector<bushd_line_entry> entries;
+    for (const LineMotor& motor : of.motors) {
+      entries.push_back(
+          {motor.number, static_cast<std::int8_t>(motor.steps < 0 ? -1 : 1), length(motor.steps)});
+    }
+    bushd_line_run message{};
+    message.epoch = of.epoch;
+    message.first_tick = of.first;
+    message.line = {.slot = of.slot,
+                    .floor = of.floor,
+                    .longest = of.longest,
+                    .from = of.from,
+                    .steps = of.steps == 0 ? of.longest - of.from : of.steps,
+                    .count = 0,
+                    .entries = nullptr};
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_line_run(
+        &message, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
+    return payload;
+  }
+  static bushd_status start(Rig& on, const Frame& of) {
+    return on.take(BUSHD_MSG_LINE_RUN, frame(of));
+  }
+
+  // From tick `first` on, each slot of each tick until the run is over, which begins `late_ns`
+  // after the beginning of that tick.
+  static void expect_slots(Rig& of, const Reference& run, const Frame& frame,
+                           std::uint32_t late_ns = 0) {
+    const std::uint16_t slots = of.options().slots;
+    std::vector<std::vector<Wide>> times;
+    for (const LineMotor& motor : frame.motors) {
+      times.push_back(times_of(run, length(motor.steps), frame.longest, frame.from));
+    }
+    std::vector<std::size_t> made(frame.motors.size());
+    while (of.tick() != frame.first) of.pass();
+    for (std::uint64_t tick = 0; of.poll().moving != 0; ++tick, of.pass()) {
+      std::vector<std::uint16_t> expected(slots);
+      const Wide begin = (Wide{tick * Rig::kTickNs} - late_ns) * 256;
+      const Wide length = Wide{Rig::kTickNs} * 256;
+      for (std::size_t i = 0; i < times.size(); ++i) {
+        for (; made[i] < times[i].size() && times[i][made[i]] <= begin + length; ++made[i]) {
+          const auto slot = static_cast<std::size_t>((times[i][made[i]] - begin) * slots / length);
+          expected[std::min<std::size_t>(slot, slots - 1u)] |=
+              static_cast<std::uint16_t>(1u << frame.motors[i].number);
+        }
+      }
+      ASSERT_TRUE(std::ranges::equal(std::span(of.slot_buffer().step).first(slots), expected))
+          << tick;
+    }
+    for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(made[i], times[i].size());
+    EXPECT_EQ(of.poll().faults, 0);
+  }
+};
+
+}  // namespace bushd::test
