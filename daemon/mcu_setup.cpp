@@ -5,6 +5,8 @@
 namespace bushd::daemon {
 namespace {
 
+constexpr std::int32_t kVelocityUnits = 64;  // of VELOCITY, in a step/s
+
 std::uint16_t bit_of(Output output) {
   return static_cast<std::uint16_t>(1u << output.value);
 }
@@ -75,6 +77,13 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
       const config::Currents its = motor->currents.value_or(config::Currents{});
       setup.currents.push_back(
           {motor->output.value, its.fast_decay, its.ramp_ma, its.cruise_ma, its.hold_ma});
+    }
+    if (motor->local) {
+      const config::Velocity its = motor->velocity.value_or(config::Velocity{});
+      setup.velocities.push_back({.motor = motor->output.value,
+                                  .least = its.min_steps_per_s * kVelocityUnits,
+                                  .most = its.max_steps_per_s * kVelocityUnits,
+                                  .acceleration = its.steps_per_s2});
     }
     add_table(setup, motor->output, *tables[motor->group]);
   }

@@ -134,6 +134,14 @@ struct Currents {
   bool fast_decay = false;
 };
 
+// Local motion by the velocity loop of engine/velocity.h.
+inline constexpr std::int64_t kMostStepsPerS = 40'000;  // a step in each interval of 25 us
+struct Velocity {
+  std::int32_t min_steps_per_s = 0;
+  std::int32_t max_steps_per_s = 0;
+  std::int32_t steps_per_s2 = 0;
+};
+
 struct Motor {
   std::string name;
   McuId mcu;
@@ -152,7 +160,8 @@ struct Motor {
   std::optional<double> backlash_speed = {};  // of that, user units/s, above 0
   std::int64_t settle_ms = 0;                 // from the last step to the result
   std::optional<Currents> currents = {};
-  bool never_disable = false;  // its MCU's drivers stay enabled at rest
+  std::optional<Velocity> velocity = {};  // only with `local`
+  bool never_disable = false;             // its MCU's drivers stay enabled at rest
 };
 
 // A box with keys on a serial line of its own, which jogs a motor.

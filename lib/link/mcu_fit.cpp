@@ -42,6 +42,17 @@ Result<void> check_currents(const McuSetup& setup, const bushd_identity& identit
   return {};
 }
 
+Result<void> check_velocities(const McuSetup& setup, const bushd_identity& identity) {
+  if ((identity.capabilities & BUSHD_CAN_VELOCITY) != 0) return {};
+  for (const bushd_set_velocity& one : setup.velocities) {
+    if (one.most == 0) continue;
+    return fail("moves no motor by the velocity loop, but motor " + std::to_string(one.motor) +
+                " has `velocity`: leave it out, so that local inputs move it by its table, or "
+                "connect it to an MCU that has the loop");
+  }
+  return {};
+}
+
 // An MCU has as many inputs as motors.
 Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity) {
   for (unsigned n = identity.motors; n < BUSHD_MOTORS_PER_MCU; ++n) {
@@ -91,6 +102,7 @@ Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_i
   }
   if (auto inputs = check_inputs(setup, identity); !inputs) return inputs;
   if (auto currents = check_currents(setup, identity); !currents) return currents;
+  if (auto velocities = check_velocities(setup, identity); !velocities) return velocities;
   if (auto room = check_room(setup, identity, bus.tick_ns); !room) return room;
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * bus.tick_ns / 1000;
@@ -108,13 +120,17 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
   if (type == BUSHD_MSG_EMISSION) {
     return fieldbus::emission_refusal(setup.emission, status, identity.slots, bus.tick_ns);
   }
+  if (type == BUSHD_MSG_VELOCITY && status == BUSHD_E_FORMAT) {
+    return "VELOCITY: only its first motors have the velocity loop; leave out `velocity` of the "
+           "others, or connect them to the first outputs";
+  }
   struct Request {
     std::uint8_t type;
     const char* name;
     const char* if_too_much;  // remedy
   };
   constexpr const char* kTables = "use shorter or slower tables, or fewer on this MCU";
-  static constexpr std::array<Request, 9> kRequests = {{
+  static constexpr std::array<Request, 10> kRequests = {{
       {BUSHD_MSG_CONFIGURE, "CONFIGURE", "use a longer tick_us on its bus"},
       {BUSHD_MSG_TABLE_BEGIN, "TABLE_BEGIN", kTables},
       {BUSHD_MSG_TABLE_DATA, "TABLE_DATA", kTables},
@@ -124,6 +140,7 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
       {BUSHD_MSG_MOTOR_INPUTS, "MOTOR_INPUTS", nullptr},
       {BUSHD_MSG_LOCAL, "LOCAL", nullptr},
       {BUSHD_MSG_CURRENTS, "CURRENTS", nullptr},
+      {BUSHD_MSG_VELOCITY, "VELOCITY", "use a lower max_steps_per_s in `velocity`"},
   }};
   const auto* const request =
       std::find_if(kRequests.begin(), kRequests.end(),
