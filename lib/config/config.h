@@ -15,6 +15,7 @@
 
 #include "base/ids.h"
 #include "base/result.h"
+#include "config/drive.h"
 #include "engine/message.h"
 #include "fieldbus/emission_setup.h"
 #include "pseudo/curved_axis.h"
@@ -126,22 +127,6 @@ struct Home {
   std::optional<double> then = {};   // user position to move to once the switch was found
 };
 
-// Peak currents of the windings of a motor that its MCU drives by phases.
-struct Currents {
-  std::uint16_t ramp_ma = 0;
-  std::uint16_t cruise_ma = 0;
-  std::uint16_t hold_ma = 0;
-  bool fast_decay = false;
-};
-
-// Local motion by the velocity loop of engine/velocity.h.
-inline constexpr std::int64_t kMostStepsPerS = 40'000;  // a step in each interval of 25 us
-struct Velocity {
-  std::int32_t min_steps_per_s = 0;
-  std::int32_t max_steps_per_s = 0;
-  std::int32_t steps_per_s2 = 0;
-};
-
 struct Motor {
   std::string name;
   McuId mcu;
@@ -159,9 +144,8 @@ struct Motor {
   double backlash = 0;                        // user units; its sign is that of the last approach
   std::optional<double> backlash_speed = {};  // of that, user units/s, above 0
   std::int64_t settle_ms = 0;                 // from the last step to the result
-  std::optional<Currents> currents = {};
-  std::optional<Velocity> velocity = {};  // only with `local`
-  bool never_disable = false;             // its MCU's drivers stay enabled at rest
+  Drive drive{};               // currents with phases only, velocity with `local` only
+  bool never_disable = false;  // its MCU's drivers stay enabled at rest
 };
 
 // A box with keys on a serial line of its own, which jogs a motor.

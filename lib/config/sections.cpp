@@ -371,10 +371,10 @@ Result<void> read_motors(Loading* loading) {
     if (auto read = read_restored(reader, &motor); !read) return read;
     auto currents = read_currents(reader, config.mcus[mcu->value]);
     if (!currents) return fail(currents.error());
-    motor.currents = *currents;
+    motor.drive.currents = *currents;
     auto velocity = read_velocity(reader, motor);
     if (!velocity) return fail(velocity.error());
-    motor.velocity = *velocity;
+    motor.drive.velocity = *velocity;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
     if (auto checked = check_then(reader, motor); !checked) return checked;
     config.motors.push_back(std::move(motor));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/velocity.h"
 #include "fieldbus/line_times.h"
 
 namespace bushd::link {
@@ -28,6 +29,17 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
                 std::to_string(identity.slots) + " slots, but the table of output " +
                 std::to_string(output) + " makes up to " + std::to_string(steps) +
                 ": use a slower table, or less step_us or dir_setup_us");
+  }
+  for (const bushd_set_velocity& one : setup.velocities) {
+    if (one.most == 0) continue;
+    const std::uint32_t period_ns =
+        bushd_velocity_period(one.most, one.least) * BUSHD_VELOCITY_INTERVAL_NS;
+    const std::uint32_t steps = tick_ns / period_ns + 1;
+    if (steps <= *room) continue;
+    return fail("has room for " + std::to_string(*room) +
+                " steps of a motor in a tick, but motor " + std::to_string(one.motor) +
+                " makes up to " + std::to_string(steps) +
+                " by its `velocity`: use a lower max_steps_per_s, or a shorter tick_us");
   }
   return {};
 }
@@ -72,6 +84,8 @@ Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity)
 
 Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
                         std::uint32_t tick_ns) {
+  if (auto currents = check_currents(setup, identity); !currents) return currents;
+  if (auto velocities = check_velocities(setup, identity); !velocities) return velocities;
   std::size_t codes = 0;
   for (const TableRef& ref : setup.tables) {
     codes += ref.table->accel.count;
@@ -101,8 +115,6 @@ Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_i
     }
   }
   if (auto inputs = check_inputs(setup, identity); !inputs) return inputs;
-  if (auto currents = check_currents(setup, identity); !currents) return currents;
-  if (auto velocities = check_velocities(setup, identity); !velocities) return velocities;
   if (auto room = check_room(setup, identity, bus.tick_ns); !room) return room;
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * bus.tick_ns / 1000;

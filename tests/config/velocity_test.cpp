@@ -33,12 +33,12 @@ TEST(Velocity, IsReadOfAMotorWithLocalInputs) {
           with_velocity("{ min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = 500 }"))
           .load();
   ASSERT_TRUE(config) << config.error().text();
-  const auto& velocity = config->motors[0].velocity;
+  const auto& velocity = config->motors[0].drive.velocity;
   ASSERT_TRUE(velocity);
   EXPECT_EQ(velocity->min_steps_per_s, 100);
   EXPECT_EQ(velocity->max_steps_per_s, 1500);
   EXPECT_EQ(velocity->steps_per_s2, 500);
-  EXPECT_FALSE(config->motors[1].velocity);
+  EXPECT_FALSE(config->motors[1].drive.velocity);
 }
 
 TEST(Velocity, WhatIsWrongIsNamed) {
