@@ -64,6 +64,7 @@ Result<void> Mcu::has_room(const link::McuSetup& setup) const {
 
 Installation::Installation(const config::Config& config, std::uint16_t master) : config_(config) {
   for (const config::Group& group : config.groups) tables_.add(group.table);
+  for (const config::Motor& motor : config.motors) drives_.add(motor.drive);
   add_buses(master);
   add_mcus();
   add_motors();
@@ -82,7 +83,7 @@ void Installation::add_buses(std::uint16_t master) {
     for (std::size_t m = 0; m < config_.mcus.size(); ++m) {
       if (config_.mcus[m].bus != id) continue;
       members.push_back({m});
-      setup.mcus.push_back(setup_of(config_, {m}, tables_));
+      setup.mcus.push_back(setup_of({m}));
     }
     buses_.add(std::make_unique<Bus>(bus, std::move(setup), *this));
     buses_[id]->mcus = std::move(members);

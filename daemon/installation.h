@@ -174,6 +174,12 @@ class Installation {
   Installation& operator=(const Installation&) = delete;
 
   const config::Config& config() const { return config_; }
+  // Currents and velocities as they are now. What is put has yet to be told to the MCU.
+  const Drives& drives() const { return drives_; }
+  void put(MotorId motor, const config::Drive& drive) { drives_[motor] = drive; }
+  link::McuSetup setup_of(McuId mcu) const {
+    return daemon::setup_of(config_, mcu, tables_, drives_);
+  }
 
   Bus& operator[](BusId id) { return *buses_[id]; }
   const Bus& operator[](BusId id) const { return *buses_[id]; }
@@ -219,6 +225,7 @@ class Installation {
   void add_motors();
 
   const config::Config& config_;
+  Drives drives_;
   Tables tables_;  // in service
   ById<BusId, std::unique_ptr<Bus>> buses_;
   ById<McuId, Mcu> mcus_;

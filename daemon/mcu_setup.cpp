@@ -5,6 +5,8 @@
 namespace bushd::daemon {
 namespace {
 
+constexpr std::int32_t kVelocityUnits = 64;  // of VELOCITY, in a step/s
+
 std::uint16_t bit_of(Output output) {
   return static_cast<std::uint16_t>(1u << output.value);
 }
@@ -56,7 +58,8 @@ void add_table(link::McuSetup& setup, Output output, const tables::Table& table)
 
 }  // namespace
 
-link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& tables) {
+link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& tables,
+                        const Drives& drives) {
   const config::Mcu& mcu = config[id];
   link::McuSetup setup{.address = mcu.address, .tables = {}};
   setup.emission = mcu.emission;
@@ -66,15 +69,25 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
   for (const config::Motor& motor : config.motors) {
     if (motor.mcu == id) motors.push_back(&motor);
   }
+  const auto drive_of = [&](const config::Motor* motor) -> const config::Drive& {
+    return drives[{static_cast<std::size_t>(motor - config.motors.data())}];
+  };
   // Slots are given in the order of outputs.
   std::ranges::sort(motors, {}, [](const config::Motor* motor) { return motor->output; });
   for (const config::Motor* motor : motors) {
     add_inputs(setup, *motor);
     if (motor->local) setup.local_motors |= bit_of(motor->output);
     if (setup.emission.settings.mode == BUSHD_EMISSION_PHASES) {
-      const config::Currents its = motor->currents.value_or(config::Currents{});
+      const config::Currents its = drive_of(motor).currents.value_or(config::Currents{});
       setup.currents.push_back(
           {motor->output.value, its.fast_decay, its.ramp_ma, its.cruise_ma, its.hold_ma});
+    }
+    if (motor->local) {
+      const config::Velocity its = drive_of(motor).velocity.value_or(config::Velocity{});
+      setup.velocities.push_back({.motor = motor->output.value,
+                                  .least = its.min_steps_per_s * kVelocityUnits,
+                                  .most = its.max_steps_per_s * kVelocityUnits,
+                                  .acceleration = its.steps_per_s2});
     }
     add_table(setup, motor->output, *tables[motor->group]);
   }

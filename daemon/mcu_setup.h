@@ -8,8 +8,11 @@
 namespace bushd::daemon {
 
 using Tables = ById<GroupId, tables::TablePtr>;
+// As they are now: they may be changed in operation.
+using Drives = ById<MotorId, config::Drive>;
 
 // The tables outlive the setup.
-link::McuSetup setup_of(const config::Config& config, McuId mcu, const Tables& tables);
+link::McuSetup setup_of(const config::Config& config, McuId mcu, const Tables& tables,
+                        const Drives& drives);
 
 }  // namespace bushd::daemon

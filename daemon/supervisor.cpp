@@ -182,7 +182,7 @@ void Supervisor::set_up_again() {
   std::erase_if(to_set_up_, [this](McuId id) {
     Mcu& mcu = installation_[id];
     if (installation_.any_moves(mcu)) return false;
-    mcu.reconfigure(setup_of(installation_.config(), id, installation_.tables()));
+    mcu.reconfigure(installation_.setup_of(id));
     installation_.changed = true;
     return true;
   });

@@ -29,12 +29,17 @@ MotorSettings::MotorSettings(Installation& installation, const Positions& positi
       file_sha256_(installation.config().text_sha256) {
   for (const MotorId id : installation.motors()) {
     const config::Motor& motor = installation.config()[id];
-    in_file_.add(config::Settings{motor.coordinates, motor.soft_limits});
+    in_file_.add(config::settings_of(motor, installation.config().mcu_of(motor)));
   }
 }
 
-config::Settings MotorSettings::settings_of(const motion::Motor& motor) {
-  return {motor.coordinates(), motor.soft_limits()};
+config::Settings MotorSettings::settings_of(MotorId id) const {
+  config::Settings settings = in_file_[id];
+  const motion::Motor& motor = installation_[id];
+  settings.coordinates = motor.coordinates();
+  settings.soft_limits = motor.soft_limits();
+  settings.drive = installation_.drives()[id];
+  return settings;
 }
 
 void MotorSettings::request(const api::Asker& asker, const api::Configure& request) {
@@ -57,13 +62,13 @@ Result<MotorSettings::Plan> MotorSettings::plan_of(
     const auto key = config::setting_key_of(word);
     if (!key) {
       return fail(name + ": \"" + word +
-                  "\" cannot be changed in operation; allowed: offset, direction, soft_limits. "
-                  "Edit bushd.toml and restart bushd for other keys");
+                  "\" cannot be changed in operation; allowed: offset, direction, soft_limits, "
+                  "velocity, currents. Edit bushd.toml and restart bushd for other keys");
     }
     auto at = static_cast<std::size_t>(std::ranges::find(plan.motors, *id) - plan.motors.begin());
     if (at == plan.motors.size()) {
       plan.motors.push_back(*id);
-      plan.settings.push_back(from ? (*from)[*id] : settings_of(installation_[*id]));
+      plan.settings.push_back(from ? (*from)[*id] : settings_of(*id));
     }
     auto changed = config::with(plan.settings[at], *key, value);
     if (!changed) return fail(name + ": " + changed.error().message);
@@ -86,18 +91,33 @@ Result<void> MotorSettings::may_be_changed(MotorId id) const {
   return fail(motor.name() + ": its position is being set; wait for that result");
 }
 
+// An MCU is set up anew with what it keeps of a motor, while all of its motors rest.
+Result<void> MotorSettings::mcu_takes(const Plan& plan, MotorId id) const {
+  const auto drive_of = [&plan](std::size_t i) { return plan.settings[i].drive; };
+  Drives drives = installation_.drives();
+  for (std::size_t i = 0; i < plan.motors.size(); ++i) drives[plan.motors[i]] = drive_of(i);
+  if (drives[id] == installation_.drives()[id]) return {};
+  const Mcu& mcu = installation_.mcu_of(id);
+  if (installation_.any_moves(mcu) || (mcu.online() && mcu.report().moving != 0)) {
+    return fail("a motor of MCU " + mcu.name() + " moves; its velocities and currents can be " +
+                "changed when all of them are at rest");
+  }
+  return mcu.has_room(
+      daemon::setup_of(installation_.config(), mcu.id, installation_.tables(), drives));
+}
+
 void MotorSettings::change(const api::Asker& asker, const api::Configure& request) {
   const auto plan = plan_of(request, nullptr);
   if (!plan) return asker.answer(api::Refused{plan.error().text()});
   for (const MotorId motor : plan->motors) {
-    if (const auto may = may_be_changed(motor); !may) {
-      return asker.answer(api::Refused{may.error().text()});
-    }
+    auto may = may_be_changed(motor);
+    if (may) may = mcu_takes(*plan, motor);
+    if (!may) return asker.answer(api::Refused{may.error().text()});
   }
   asker.answer(api::Accepted{});
   carry_out(*plan, asker);
   api::Completed answer{.reason = text_of(*plan), .detail = configuration_of(plan->motors)};
-  open_.push_back({asker, kept_.told(), std::move(answer)});
+  open_.push_back({asker, kept_.told(), std::move(answer), plan->motors});
 }
 
 void MotorSettings::carry_out(const Plan& plan, const api::Asker& asker) {
@@ -151,14 +171,20 @@ void MotorSettings::offset_set(MotorId id, const units::Coordinates& before, con
 void MotorSettings::put(MotorId id, const config::Settings& settings) {
   installation_[id].set_coordinates(settings.coordinates);
   installation_[id].set_soft_limits(settings.soft_limits);
+  if (settings.drive != installation_.drives()[id]) {
+    installation_.put(id, settings.drive);
+    Mcu& mcu = installation_.mcu_of(id);
+    mcu.reconfigure(installation_.setup_of(mcu.id));
+  }
   installation_.changed = true;
 }
 
 // What bushd.toml says by now is nothing to keep. Keys that this daemon does not know stay.
 void MotorSettings::keep(MotorId id) {
   state::Settings all = kept_.settings(id);
-  const config::Settings now = settings_of(installation_[id]);
+  const config::Settings now = settings_of(id);
   for (const SettingKey key : config::kSettingKeys) {
+    if (!config::applies(now, key)) continue;
     const std::string value = config::text_of(now, key);
     const std::string in_file = config::text_of(in_file_[id], key);
     all.erase(std::string(config::name_of(key)));
@@ -192,7 +218,7 @@ void MotorSettings::take_kept(MotorId id, SettingKey key, const state::Setting& 
     return;
   }
   if (kept.value == in_file) return;
-  const auto settings = config::with(settings_of(motor), key, kept.value);
+  const auto settings = config::with(settings_of(id), key, kept.value);
   if (!settings) {
     outputs_.log(LogLevel::kWarning, id,
                  motor.name() + ": what was set in operation is not possible any more: " +
@@ -231,7 +257,7 @@ api::Configuration MotorSettings::configuration_of(const std::vector<MotorId>& m
   api::Configuration out{
       .path = installation_.config().absolute_path, .sha256 = file_sha256_, .settings = {}};
   for (const MotorId id : motors) {
-    const config::Settings now = settings_of(installation_[id]);
+    const config::Settings now = settings_of(id);
     for (const SettingKey key : config::kSettingKeys) {
       if (!config::applies(now, key)) continue;
       out.settings.push_back({.motor = installation_[id].name(),
@@ -258,9 +284,17 @@ void MotorSettings::saved(const api::Asker& asker, const api::Configure& request
   open_.push_back({asker, kept_.told(), std::move(answer)});
 }
 
-// Whoever has been answered finds it after a power cut, unless the disk fails.
+bool MotorSettings::being_set_up(const Open& open) const {
+  return std::ranges::any_of(open.motors, [this](MotorId motor) {
+    return installation_.mcu_of(motor).view().phase == link::McuPhase::kConnecting;
+  });
+}
+
+// Whoever has been answered finds it after a power cut, unless the disk fails, and its MCU has it,
+// unless that is offline.
 void MotorSettings::step(std::int64_t) {
   std::erase_if(open_, [this](Open& open) {
+    if (being_set_up(open)) return false;
     const auto trouble = kept_.trouble();
     if (kept_.kept_up_to() < open.number && !trouble) return false;
     if (trouble) open.answer.reason += "; not on the disk yet: " + *trouble;

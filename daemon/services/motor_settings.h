@@ -1,5 +1,6 @@
-// What may be changed of motors in operation: their offsets, directions and soft limits. Kept in
-// the state store, where each counts until its key in bushd.toml is edited.
+// What may be changed of motors in operation: their offsets, directions and soft limits, and what
+// their MCU keeps of velocity loop and currents. Kept in the state store, where each counts until
+// its key in bushd.toml is edited.
 //
 // This daemon reads bushd.toml when it starts and never writes it: clients do, with the rights of
 // those who use them, and say so (docs/decisions/0033-settings-in-operation.md).
@@ -48,22 +49,25 @@ class MotorSettings final : public Service {
     std::vector<config::Settings> settings{};  // of these, afterwards
     std::vector<Change> changes{};
   };
-  // Changed, and not yet on the disk.
+  // Changed, and not yet on the disk, or not yet told to all MCUs.
   struct Open {
     api::Asker asker;
     std::uint64_t number;  // of KeptPositions::told
     api::Completed answer;
+    std::vector<MotorId> motors{};
   };
-  static config::Settings settings_of(const motion::Motor& motor);
+  config::Settings settings_of(MotorId motor) const;
   Result<Plan> plan_of(const api::Configure& request,
                        const ById<MotorId, config::Settings>* from) const;
   Result<void> may_be_changed(MotorId motor) const;
+  Result<void> mcu_takes(const Plan& plan, MotorId motor) const;
   void change(const api::Asker& asker, const api::Configure& request);
   void carry_out(const Plan& plan, const api::Asker& asker);
   void saved(const api::Asker& asker, const api::Configure& request);
   void keep(MotorId motor);
   void take_kept(MotorId motor, config::SettingKey key, const state::Setting& kept);
   void put(MotorId motor, const config::Settings& settings);
+  bool being_set_up(const Open& open) const;
   std::string text_of(const Plan& plan) const;
   api::Configuration configuration_of(const std::vector<MotorId>& motors) const;
 

@@ -199,7 +199,8 @@ Result<void> TablesInService::fits(const Tables& tables, GroupId group,
           review != nullptr ? review->by_tick_ns.at(tick_ns) : check_by_tick(table, tick_ns);
       if (!good) return good;
     }
-    const link::McuSetup setup = setup_of(installation_.config(), mcu.id, tables);
+    const link::McuSetup setup =
+        setup_of(installation_.config(), mcu.id, tables, installation_.drives());
     if (setup.tables.size() > BUSHD_TABLE_SLOTS) {
       return fail("MCU " + mcu.name() + " would need " + std::to_string(setup.tables.size()) +
                   " different tables; allowed: " + std::to_string(BUSHD_TABLE_SLOTS));
@@ -277,7 +278,7 @@ void TablesInService::begin_upload(std::int64_t now_us, Change& change) {
   std::string absent;
   for (const McuId id : change.mcus) {
     Mcu& mcu = installation_[id];
-    mcu.reconfigure(setup_of(installation_.config(), id, installation_.tables()));
+    mcu.reconfigure(installation_.setup_of(id));
     if (mcu.offline()) {
       absent += " " + mcu.name();
     } else {
@@ -295,7 +296,7 @@ void TablesInService::begin_upload(std::int64_t now_us, Change& change) {
 std::int64_t TablesInService::upload_us(const Mcu& mcu) const {
   if (!mcu.streams()) return 0;  // nothing is sent
   std::size_t requests = 0;
-  const link::McuSetup setup = setup_of(installation_.config(), mcu.id, installation_.tables());
+  const link::McuSetup setup = installation_.setup_of(mcu.id);
   for (const link::TableRef& ref : setup.tables) {
     const std::size_t codes = ref.table->accel.count + ref.table->decel.count;
     requests += kRequestsPerTable + codes / BUSHD_TABLE_DATA_MAX_CODES;
@@ -323,7 +324,7 @@ void TablesInService::roll_back(Change& change) {
     add_sentence(who, "group " + name_of(part.group) + " keeps " + text_of(*part.before));
   }
   for (const McuId id : mcus_of(change.parts)) {
-    installation_[id].reconfigure(setup_of(installation_.config(), id, installation_.tables()));
+    installation_[id].reconfigure(installation_.setup_of(id));
   }
   change.notes = who;
 }
@@ -415,7 +416,7 @@ Result<void> TablesInService::restore(GroupId group, const std::string& wanted,
   installation_.put_in_service(group, table);
   wanted_[group] = wanted;
   for (const McuId id : installation_.mcus()) {
-    installation_[id].reconfigure(setup_of(installation_.config(), id, installation_.tables()));
+    installation_[id].reconfigure(installation_.setup_of(id));
   }
   outputs_.log(LogLevel::kInfo, {},
                "group " + name_of(group) + " has table " + wanted + ", " + text_of(*table) +

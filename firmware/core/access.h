@@ -15,6 +15,15 @@ static inline uint16_t bushd_mcu_own_motors(const bushd_mcu* mcu) {
   return (uint16_t)(motor_bit((uint8_t)(mcu->config.motors - 1u)) * 2u - 1u);
 }
 
+// With phases a motor has BUSHD_PHASE_OUTPUTS of the outputs.
+static inline uint8_t bushd_mcu_motors_with_outputs(const bushd_mcu* mcu) {
+  const bool phases = mcu->emission.grid.mode == BUSHD_EMISSION_PHASES;
+  return phases ? (uint8_t)(mcu->config.motors / BUSHD_PHASE_OUTPUTS) : mcu->config.motors;
+}
+static inline bool bushd_mcu_has_output(const bushd_mcu* mcu, uint8_t motor) {
+  return motor < bushd_mcu_motors_with_outputs(mcu);
+}
+
 static inline int16_t* bushd_mcu_queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t motor) {
   const uint16_t row = (uint16_t)tick & (uint16_t)(mcu->config.queue_ticks - 1u);
   return &mcu->config.queue[(size_t)row * mcu->config.motors + motor];

@@ -4,6 +4,7 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/state.h"
+#include "firmware/core/velocity.h"
 
 // Two displacements of one speed differ by so much at most: rounding, to 1/256 step or to a step.
 static uint16_t tolerance_of(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
@@ -17,6 +18,7 @@ static uint16_t speed_of(const bushd_mcu* mcu, uint8_t m) {
   const bushd_slot_buffer* next = &mcu->slot_buffer[mcu->front ^ 1u];
   if (((bushd_mcu_moving(mcu) | next->active) & motor_bit(m)) == 0) return 0;
   if (motor->exact && motor->mode != BUSHD_MCU_STREAM) {
+    if (motor->mode == BUSHD_MCU_VELOCITY) return bushd_mcu_velocity_period(mcu, m);
     const bool on_line = (mcu->line.motors & motor_bit(m)) != 0;
     return on_line ? bushd_mcu_line_delay(mcu, m) : bushd_run_delay(&motor->made.run);
   }

@@ -7,6 +7,7 @@
 #include "firmware/core/access.h"
 #include "firmware/core/settle.h"
 #include "firmware/core/state.h"
+#include "firmware/core/velocity.h"
 
 // Windings stay on for so long after a move, until the rotor has come to rest.
 #define ROTOR_SETTLES_NS 100000000u
@@ -63,16 +64,8 @@ bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* messa
   if (status != BUSHD_OK) return status;
   // What was good for another number of steps in a tick must be asked for again.
   for (uint8_t m = 0; m < mcu->config.motors; ++m) mcu->motor[m].table = -1;
+  bushd_mcu_forget_velocities(mcu);
   return BUSHD_OK;
-}
-
-static uint8_t motors_of(const bushd_mcu* mcu) {
-  const bool phases = mcu->emission.grid.mode == BUSHD_EMISSION_PHASES;
-  return phases ? (uint8_t)(mcu->config.motors / BUSHD_PHASE_OUTPUTS) : mcu->config.motors;
-}
-
-bool bushd_mcu_has_output(const bushd_mcu* mcu, uint8_t motor) {
-  return motor < motors_of(mcu);
 }
 
 // Nothing of a motor is on that has been at rest for long and is not to hold.
@@ -108,7 +101,7 @@ static uint16_t levels_of(const bushd_mcu* mcu, uint8_t m) {
 static void shape_phases(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   const uint8_t count = bushd_phase_count(mcu->emission.settings.sequence);
   const uint16_t moving = bushd_mcu_moving(mcu);
-  const uint8_t motors = motors_of(mcu);
+  const uint8_t motors = bushd_mcu_motors_with_outputs(mcu);
   uint16_t on = 0;
   uint16_t levels = 0;
   for (uint8_t m = 0; m < motors; ++m) {

@@ -31,7 +31,6 @@ typedef struct bushd_mcu_emission {
 bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* message);
 void bushd_mcu_default_emission(bushd_mcu* mcu);
 void bushd_mcu_restore_emission(bushd_mcu* mcu);
-bool bushd_mcu_has_output(const bushd_mcu* mcu, uint8_t motor);
 // The slot_buffer is complete but for what the emission makes of it.
 void bushd_mcu_shape(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer);
 

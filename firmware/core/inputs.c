@@ -10,6 +10,7 @@
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
 #include "firmware/core/travel.h"
+#include "firmware/core/velocity.h"
 
 // `now_active`: a switch of the motor has just become so.
 static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
@@ -26,7 +27,10 @@ static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
   if (travels && !bushd_mcu_travel_meets_limit(mcu)) return;
   // One that only turns towards the switch is at rest as far as this direction goes.
   const bool immediate = cuts || heading != bushd_mcu_last_direction(mcu, m);
-  if (immediate || mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) {
+  const uint8_t mode = mcu->motor[m].mode;
+  const bool ramps_down =
+      mode == BUSHD_MCU_VELOCITY ? bushd_mcu_is_braking(mcu, m) : mode == BUSHD_MCU_RAMP_DOWN;
+  if (immediate || !ramps_down) {
     bushd_mcu_stop_motor(mcu, m, immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP, next);
   }
 }

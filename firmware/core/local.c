@@ -2,6 +2,7 @@
 // or REVERSE is held they accelerate by their tables and cruise; when it is released, or both are
 // held, they ramp down. A press counts when it has lasted for READINGS readings, a release at
 // once. What is active at boot, or when the settings come, may be stuck: it must be released first.
+// Motors with VELOCITY settings speed up and down by these, and need not come to rest to reverse.
 #include "firmware/core/local.h"
 
 #include "firmware/core/access.h"
@@ -11,6 +12,7 @@
 #include "firmware/core/state.h"
 #include "firmware/core/table_run.h"
 #include "firmware/core/travel.h"
+#include "firmware/core/velocity.h"
 
 enum { READINGS = 3 };
 
@@ -32,15 +34,28 @@ static void release(bushd_mcu* mcu) {
   }
 }
 
+// Those that move by the loop still, after a release or a turn.
+static void steer_held(bushd_mcu* mcu) {
+  if (mcu->config.velocity_motors == 0) return;
+  const uint16_t held = (uint16_t)(mcu->local.held & ~bushd_mcu_forbidden(mcu, mcu->local.wish));
+  const uint16_t steered = held & bushd_mcu_moved_by_velocity(mcu);
+  for (uint8_t m = 0; steered >> m != 0; ++m) {
+    if ((steered & motor_bit(m)) != 0) bushd_mcu_steer(mcu, m, mcu->local.wish);
+  }
+}
+
 // Also those that come to rest only now. What a host moves stays the host's until the next press.
 static void begin_held(bushd_mcu* mcu) {
+  steer_held(mcu);
   if ((mcu->local.held & ~mcu->autonomous) == 0) return;
   mcu->local.held &= (uint16_t) ~(bushd_mcu_engaged(mcu) & ~mcu->autonomous);
   uint16_t begins =
       (uint16_t)(mcu->local.held & ~mcu->autonomous & ~bushd_mcu_forbidden(mcu, mcu->local.wish));
   for (uint8_t m = 0; begins != 0; ++m, begins = (uint16_t)(begins >> 1)) {
     if ((begins & 1u) == 0) continue;
-    if (mcu->motor[m].table < 0) {
+    if (bushd_mcu_has_velocity(mcu, m)) {
+      bushd_mcu_steer(mcu, m, mcu->local.wish);
+    } else if (mcu->motor[m].table < 0) {
       mcu->local.held &= (uint16_t)~motor_bit(m);
     } else {
       bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish, 0);

@@ -42,6 +42,7 @@ extern "C" {
 #include "firmware/core/tables.h"
 #include "firmware/core/travel.h"
 #include "firmware/core/trigger.h"
+#include "firmware/core/velocity.h"
 #ifdef __cplusplus
 }
 #endif
@@ -75,7 +76,10 @@ typedef struct bushd_mcu_config {
   // Of motors 0 .. current_motors-1, whose windings' currents the port controls; all zero.
   bushd_mcu_currents* currents;
   uint8_t current_motors;  // at most BUSHD_MAX_CURRENT_MOTORS
-  uint16_t* codes;         // table memory
+  // Of motors 0 .. velocity_motors-1, that may move locally by the velocity loop; all zero.
+  bushd_mcu_velocity* velocity;
+  uint8_t velocity_motors;  // at most BUSHD_MAX_VELOCITY_MOTORS
+  uint16_t* codes;          // table memory
   uint16_t code_count;
   // BUSHD_MCU_MAX_REPLY bytes for answers. May be the end of the receiver's buffer, if the port
   // keeps the receiver out of it from the making of an answer until it is sent.
@@ -155,7 +159,8 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
    BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) + sizeof(bushd_emission) + sizeof(uint16_t) + \
    BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) + sizeof(uint16_t) +              \
    (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t) +                       \
-   BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents))
+   BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents) +                                             \
+   BUSHD_MAX_VELOCITY_MOTORS * sizeof(bushd_mcu_velocity_settings))
 void bushd_mcu_nvm_restored(bushd_mcu* mcu);
 
 // For a port that goes through all pieces a little at a time, again and again.

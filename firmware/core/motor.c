@@ -9,6 +9,7 @@
 #include "firmware/core/stop.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/table_run.h"
+#include "firmware/core/velocity.h"
 
 static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
@@ -345,7 +346,8 @@ static uint16_t plan(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
 }
 
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
-  const uint16_t exact = plan(mcu, slot_buffer);
+  uint16_t exact = plan(mcu, slot_buffer);
+  exact &= (uint16_t)~bushd_mcu_emit_velocity(mcu, slot_buffer, exact);
   const uint16_t on_line = exact & mcu->line.motors;
   if (exact != on_line) emit_runs(mcu, slot_buffer, exact & (uint16_t)~on_line);
   if (on_line != 0) bushd_mcu_emit_line(mcu, slot_buffer, on_line);

@@ -17,7 +17,8 @@ typedef enum bushd_mcu_mode {
   BUSHD_MCU_TABLE_RUN = 2,
   BUSHD_MCU_RAMP_DOWN = 3,
   BUSHD_MCU_AUTONOMOUS =
-      4  // `run` is made, whatever its stage, until homing or local inputs end it
+      4,                  // `run` is made, whatever its stage, until homing or local inputs end it
+  BUSHD_MCU_VELOCITY = 5  // by the velocity loop (velocity.h), until it is at rest
 } bushd_mcu_mode;
 
 // Ticks that are queued beyond a gap.

@@ -11,6 +11,18 @@ static bushd_mcu_nvm_region piece_of(void* at, size_t size) {
   return piece;
 }
 
+// Behind all else: what only some motors have.
+static bushd_mcu_nvm_region setting_of_motor(bushd_mcu* mcu, uint8_t index) {
+  if (index < mcu->config.current_motors) {
+    bushd_currents* const its = &mcu->config.currents[index].settings;
+    return piece_of(its, sizeof *its);
+  }
+  index = (uint8_t)(index - mcu->config.current_motors);
+  if (index >= mcu->config.velocity_motors) return piece_of(NULL, 0);
+  bushd_mcu_velocity_settings* const its = &mcu->config.velocity[index].settings;
+  return piece_of(its, sizeof *its);
+}
+
 bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
   enum {
     TICK,
@@ -49,10 +61,7 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
     default: {
       uint8_t motor = (uint8_t)(index - MOTORS);
       if (motor >= mcu->config.motors) {
-        motor = (uint8_t)(motor - mcu->config.motors);
-        if (motor >= mcu->config.current_motors) return piece_of(NULL, 0);
-        bushd_currents* const its = &mcu->config.currents[motor].settings;
-        return piece_of(its, sizeof *its);
+        return setting_of_motor(mcu, (uint8_t)(motor - mcu->config.motors));
       }
       return piece_of(&mcu->motor[motor].table, sizeof mcu->motor[motor].table);
     }

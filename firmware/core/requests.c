@@ -21,6 +21,7 @@
 #include "firmware/core/tables.h"
 #include "firmware/core/travel.h"
 #include "firmware/core/trigger.h"
+#include "firmware/core/velocity.h"
 
 // What it says of each motor. One out-of-order range has room in a report: that of the lowest
 // motor, and who else has the same one.
@@ -89,14 +90,15 @@ __attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* p
   return bushd_encode_report(&report, payload);
 }
 
-static uint16_t capabilities_of(const bushd_mcu* mcu) {
-  uint16_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
+static uint32_t capabilities_of(const bushd_mcu* mcu) {
+  uint32_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
                  BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
                  BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
                  BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
   if (mcu->port.set_current != NULL) all |= BUSHD_CAN_CURRENTS;
-  return (uint16_t)(all & ~mcu->config.disabled_capabilities);
+  if (mcu->config.velocity_motors != 0) all |= BUSHD_CAN_VELOCITY;
+  return all & ~(uint32_t)mcu->config.disabled_capabilities;
 }
 
 static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
@@ -134,6 +136,7 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
     mcu->motor[m].table = -1;
     mcu->motor[m].remainder = 0;
   }
+  bushd_mcu_forget_velocities(mcu);
   mcu->port.set_tick(mcu->port.context, mcu->tick_ns);
   return BUSHD_OK;
 }
@@ -259,7 +262,7 @@ static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_
 // What a frame of this type asks for is beyond the port. Modes of emission have statuses of their
 // own.
 // Without all of which an MCU does not know such a message; 0: every MCU does.
-static uint16_t capability_of(uint8_t type) {
+static uint32_t capability_of(uint8_t type) {
   switch (type) {
     case BUSHD_MSG_TABLE_TICKS:
       return BUSHD_CAN_TABLE_TICKS;
@@ -281,6 +284,8 @@ static uint16_t capability_of(uint8_t type) {
       return BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRIGGER;
     case BUSHD_MSG_CURRENTS:
       return BUSHD_CAN_CURRENTS;
+    case BUSHD_MSG_VELOCITY:
+      return BUSHD_CAN_VELOCITY;
     default:
       return 0;
   }
@@ -336,6 +341,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(position_compare, bushd_mcu_take_position_compare);
     case BUSHD_MSG_CURRENTS:
       HANDLE(currents, bushd_mcu_set_currents);
+    case BUSHD_MSG_VELOCITY:
+      HANDLE(set_velocity, bushd_mcu_take_velocity);
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:
@@ -356,7 +363,7 @@ void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t ti
   a.size = 0;
   // The frame may lie in the same buffer (bushd_mcu_config.reply): it is read by then.
   a.payload = mcu->config.reply + 2 + BUSHD_FRAME_HEADER;
-  const uint16_t needed = capability_of(frame->type);
+  const uint32_t needed = capability_of(frame->type);
   const bool denied = (needed & ~capabilities_of(mcu)) != 0;
   const bushd_status status =
       denied ? BUSHD_E_UNKNOWN_MESSAGE : handle(mcu, frame, time_in_tick_ns, &a);

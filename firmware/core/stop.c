@@ -9,6 +9,7 @@
 #include "firmware/core/line_run.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/table_run.h"
+#include "firmware/core/velocity.h"
 
 void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
   bushd_mcu_motor* motor = &mcu->motor[m];
@@ -26,7 +27,8 @@ void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
 }
 
 static bool in_run(const bushd_mcu_motor* motor) {
-  return motor->mode == BUSHD_MCU_AUTONOMOUS || motor->mode == BUSHD_MCU_TABLE_RUN;
+  return motor->mode == BUSHD_MCU_AUTONOMOUS || motor->mode == BUSHD_MCU_TABLE_RUN ||
+         motor->mode == BUSHD_MCU_VELOCITY;
 }
 
 // A start is to come at `next`, the first tick that is not prepared, or later: the motor rests
@@ -183,6 +185,7 @@ int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   const bool begins = motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)next;
   const bool runs =
       (begins || motor->mode == BUSHD_MCU_TABLE_RUN) && ticks_after(motor->made.until, next) > 0;
+  if (motor->mode == BUSHD_MCU_VELOCITY) return bushd_mcu_velocity_heading(mcu, m);
   if (runs || motor->mode >= BUSHD_MCU_RAMP_DOWN) return bushd_mcu_run_direction(mcu, m);
   const int16_t queued = ticks_after(motor->known_until, next) > 0
                              ? *bushd_mcu_queue_at((bushd_mcu*)mcu, next, m)

@@ -4,6 +4,7 @@
 #include "firmware/core/access.h"
 #include "firmware/core/limits.h"
 #include "firmware/core/stream.h"
+#include "firmware/core/velocity.h"
 
 bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
                             uint32_t* spare_ns) {
@@ -89,6 +90,10 @@ void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   // It was cut, or does so already.
   if (motor->mode == BUSHD_MCU_STREAM || motor->mode == BUSHD_MCU_RAMP_DOWN) return;
+  if (motor->mode == BUSHD_MCU_VELOCITY) {
+    bushd_mcu_brake(mcu, m);
+    return;
+  }
   mcu->stream.queue_summary.stale = true;
   bushd_run_ramp_down(&motor->made.run);
   motor->mode = bushd_run_done(&motor->made.run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;

@@ -241,7 +241,7 @@ struct GetHistory {
   std::int32_t most = 20;  // 1..1000
 };
 
-// Keys of motors that may be changed in operation: offset, direction, soft_limits. Their values are
+// Keys of motors that may be changed in operation (config/setting.h). Their values are
 // texts as in bushd.toml: 12.5, negative, [-5, 30]; without soft limits none. Result: Configuration
 // of the motors that were named.
 struct Configure {

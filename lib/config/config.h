@@ -15,6 +15,7 @@
 
 #include "base/ids.h"
 #include "base/result.h"
+#include "config/drive.h"
 #include "engine/message.h"
 #include "fieldbus/emission_setup.h"
 #include "pseudo/curved_axis.h"
@@ -126,14 +127,6 @@ struct Home {
   std::optional<double> then = {};   // user position to move to once the switch was found
 };
 
-// Peak currents of the windings of a motor that its MCU drives by phases.
-struct Currents {
-  std::uint16_t ramp_ma = 0;
-  std::uint16_t cruise_ma = 0;
-  std::uint16_t hold_ma = 0;
-  bool fast_decay = false;
-};
-
 struct Motor {
   std::string name;
   McuId mcu;
@@ -151,7 +144,7 @@ struct Motor {
   double backlash = 0;                        // user units; its sign is that of the last approach
   std::optional<double> backlash_speed = {};  // of that, user units/s, above 0
   std::int64_t settle_ms = 0;                 // from the last step to the result
-  std::optional<Currents> currents = {};
+  Drive drive{};               // currents with phases only, velocity with `local` only
   bool never_disable = false;  // its MCU's drivers stay enabled at rest
 };
 

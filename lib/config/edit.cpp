@@ -35,6 +35,11 @@ std::string toml_text(SettingKey key, const std::string& value) {
   return key == SettingKey::kDirection ? "\"" + value + "\"" : value;
 }
 
+// Such a value has no key.
+bool is_none(SettingKey key, std::string_view value) {
+  return key != SettingKey::kOffset && key != SettingKey::kDirection && value == "none";
+}
+
 Span value_span(const TomlText& text, const toml::node& node) {
   return {text.offset(node.source().begin), text.value_end(node)};
 }
@@ -56,7 +61,7 @@ class Editing {
 
   std::optional<std::string> set(SettingKey key, const std::string& value) const {
     const toml::node* node = motor_.get(name_of(key));
-    const bool none = key == SettingKey::kSoftLimits && value == "none";
+    const bool none = is_none(key, value);
     if (node == nullptr) return none ? std::string(toml_.text()) : add(key, value);
     if (none) return remove(key, *node);
     return replaced(value_span(toml_, *node), toml_text(key, value));
@@ -111,7 +116,7 @@ class Editing {
 
 // What the document has to be afterwards.
 Result<void> put(toml::table& motor, const Edit& edit) {
-  if (edit.key == SettingKey::kSoftLimits && edit.value == "none") {
+  if (is_none(edit.key, edit.value)) {
     motor.erase(name_of(edit.key));
     return {};
   }
@@ -148,7 +153,7 @@ Result<std::string> edited(std::string_view text, std::span<const Edit> edits,
     if (motor == config->motors.end()) {
       return fail(Error{.message = "has no motor \"" + edit.motor + "\"", .file = path});
     }
-    const auto settings = with({motor->coordinates, motor->soft_limits}, edit.key, edit.value);
+    const auto settings = with(settings_of(*motor, config->mcu_of(*motor)), edit.key, edit.value);
     if (!settings) return fail(edit.motor + ": " + settings.error().message);
     edit.value = text_of(*settings, edit.key);
     auto next = edited_once(out, edit, path);

@@ -16,7 +16,7 @@ struct Edit {
   std::string value{};  // as text_of() makes it
 };
 
-// `text` with these values. Soft limits that are none have no key. `path` is what errors say, and
+// `text` with these values. What is none has no key. `path` is what errors say, and
 // where tables are looked for. Errors: `text` is no configuration, or has no such motor; a value
 // does not fit it; it is written in a way that cannot be changed in place.
 // A configuration that comes out is read again: it says what was asked for, and all else as before.

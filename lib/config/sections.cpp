@@ -23,6 +23,7 @@
 #include "config/serial_pulse_section.h"
 #include "config/state_section.h"
 #include "config/table_shelf.h"
+#include "config/velocity.h"
 #include "config/words.h"
 
 namespace bushd::config {
@@ -323,7 +324,8 @@ Result<void> read_motors(Loading* loading) {
                                   "precision",    "soft_limits",
                                   "max_speed",    "never_disable",
                                   "backlash",     "backlash_speed",
-                                  "settle_ms",    "currents"});
+                                  "settle_ms",    "currents",
+                                  "velocity"});
         !known) {
       return known;
     }
@@ -369,7 +371,10 @@ Result<void> read_motors(Loading* loading) {
     if (auto read = read_restored(reader, &motor); !read) return read;
     auto currents = read_currents(reader, config.mcus[mcu->value]);
     if (!currents) return fail(currents.error());
-    motor.currents = *currents;
+    motor.drive.currents = *currents;
+    auto velocity = read_velocity(reader, motor);
+    if (!velocity) return fail(velocity.error());
+    motor.drive.velocity = *velocity;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
     if (auto checked = check_then(reader, motor); !checked) return checked;
     config.motors.push_back(std::move(motor));

@@ -5,8 +5,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <span>
 #include <system_error>
 #include <utility>
+#include <vector>
+
+#include "config/config.h"
+#include "engine/velocity.h"
 
 namespace bushd::config {
 namespace {
@@ -14,10 +19,18 @@ namespace {
 constexpr std::string_view kNone = "none";
 
 // In the order of the enumeration.
-constexpr std::array<std::string_view, kSettingKeys.size()> kKeyNames = {"offset", "direction",
-                                                                         "soft_limits"};
+constexpr std::array<std::string_view, kSettingKeys.size()> kKeyNames = {
+    "offset", "direction", "soft_limits", "velocity", "currents"};
 constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
-    "a number of user units", "negative, positive", "[LOWEST, HIGHEST] dial position, or none"};
+    "a number of user units", "negative, positive", "[LOWEST, HIGHEST] dial position, or none",
+    "MIN,MAX,ACCELERATION, whole numbers of 1..40000 steps/s, MIN to 40000 steps/s and 1..8388607 "
+    "steps/s^2, or none",
+    "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or none"};
+// What an inline table of these keys has, in order.
+constexpr std::array<std::string_view, 3> kVelocityNames = {"min_steps_per_s", "max_steps_per_s",
+                                                            "steps_per_s2"};
+constexpr std::array<std::string_view, 4> kCurrentsNames = {"ramp_ma", "cruise_ma", "hold_ma",
+                                                            "decay"};
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t begin = std::min(text.find_first_not_of(' '), text.size());
@@ -67,7 +80,116 @@ Result<Settings> with_soft_limits(Settings settings, std::string_view text) {
   return settings;
 }
 
+// The values of `names` in "{ name = value, ... }", or without names in their order; empty where
+// there is none. Nothing if it is neither.
+std::optional<std::vector<std::string_view>> values_of(std::string_view text,
+                                                       std::span<const std::string_view> names) {
+  text = trimmed(text);
+  if (text.starts_with('{') && text.ends_with('}') && text.size() > 1) {
+    text = text.substr(1, text.size() - 2);
+  }
+  std::vector<std::string_view> values(names.size());
+  for (std::size_t i = 0; !text.empty(); ++i) {
+    if (i == names.size()) return std::nullopt;
+    const std::size_t comma = std::min(text.find(','), text.size());
+    const std::string_view item = text.substr(0, comma);
+    const bool ends = comma == text.size();
+    text.remove_prefix(ends ? comma : comma + 1);
+    if (!ends && trimmed(text).empty()) return std::nullopt;
+    const std::size_t equals = item.find('=');
+    const bool named = equals != std::string_view::npos;
+    const auto name = named ? std::ranges::find(names, trimmed(item.substr(0, equals)))
+                            : names.begin() + static_cast<std::ptrdiff_t>(i);
+    if (name == names.end()) return std::nullopt;
+    std::string_view& value = values[static_cast<std::size_t>(name - names.begin())];
+    if (!value.empty()) return std::nullopt;
+    value = trimmed(named ? item.substr(equals + 1) : item);
+    if (value.empty()) return std::nullopt;
+  }
+  return values;
+}
+
+std::optional<std::int32_t> whole_number_of(std::string_view text, std::int64_t lowest,
+                                            std::int64_t highest) {
+  std::int32_t value = 0;
+  const char* const end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, value);
+  if (read.ec != std::errc() || read.ptr != end || value < lowest || value > highest) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+Result<Settings> with_velocity(Settings settings, std::string_view text) {
+  settings.drive.velocity.reset();
+  if (trimmed(text) == kNone) return settings;
+  const auto values = values_of(text, kVelocityNames);
+  if (!values) return refuse(SettingKey::kVelocity, text);
+  const auto least = whole_number_of((*values)[0], 1, kMostStepsPerS);
+  const auto most = whole_number_of((*values)[1], least.value_or(1), kMostStepsPerS);
+  const auto acceleration = whole_number_of((*values)[2], 1, BUSHD_VELOCITY_MOST);
+  if (!least || !most || !acceleration) return refuse(SettingKey::kVelocity, text);
+  settings.drive.velocity = Velocity{*least, *most, *acceleration};
+  return settings;
+}
+
+Result<Settings> with_currents(Settings settings, std::string_view text) {
+  settings.drive.currents.reset();
+  if (trimmed(text) == kNone) return settings;
+  const auto values = values_of(text, kCurrentsNames);
+  if (!values) return refuse(SettingKey::kCurrents, text);
+  Currents currents;
+  const std::array ma = {&currents.ramp_ma, &currents.cruise_ma, &currents.hold_ma};
+  for (std::size_t i = 0; i < ma.size(); ++i) {
+    const auto value = whole_number_of((*values)[i], 1, BUSHD_MAX_CURRENT_MA);
+    if (!value) return refuse(SettingKey::kCurrents, text);
+    *ma[i] = static_cast<std::uint16_t>(*value);
+  }
+  const std::string_view decay = (*values)[3];
+  currents.fast_decay = decay == "fast" || decay == "\"fast\"";
+  if (!currents.fast_decay && !decay.empty() && decay != "slow" && decay != "\"slow\"") {
+    return refuse(SettingKey::kCurrents, text);
+  }
+  settings.drive.currents = currents;
+  return settings;
+}
+
+std::string text_of(const std::optional<Velocity>& velocity) {
+  if (!velocity) return std::string(kNone);
+  return fmt::format("{{ {} = {}, {} = {}, {} = {} }}", kVelocityNames[0],
+                     velocity->min_steps_per_s, kVelocityNames[1], velocity->max_steps_per_s,
+                     kVelocityNames[2], velocity->steps_per_s2);
+}
+
+std::string text_of(const std::optional<Currents>& currents) {
+  if (!currents) return std::string(kNone);
+  return fmt::format("{{ {} = {}, {} = {}, {} = {}, {} = \"{}\" }}", kCurrentsNames[0],
+                     currents->ramp_ma, kCurrentsNames[1], currents->cruise_ma, kCurrentsNames[2],
+                     currents->hold_ma, kCurrentsNames[3], currents->fast_decay ? "fast" : "slow");
+}
+
+std::string_view why_not(SettingKey key) {
+  switch (key) {
+    case SettingKey::kVelocity:
+      return "no local inputs move it; give it `local = true` in bushd.toml first";
+    case SettingKey::kCurrents:
+      return "its MCU does not drive it by phases; give that `emission = \"phases\"` in bushd.toml "
+             "first";
+    default:
+      return "it has no unit, so its positions are steps; give it `unit` and `steps_per_unit` in "
+             "bushd.toml first";
+  }
+}
+
 }  // namespace
+
+Settings settings_of(const Motor& motor, const Mcu& mcu) {
+  return {.coordinates = motor.coordinates,
+          .soft_limits = motor.soft_limits,
+          .drive = motor.drive,
+          .phases = mcu.emission.settings.mode == BUSHD_EMISSION_PHASES,
+          .local = motor.local};
+}
 
 std::string_view name_of(SettingKey key) {
   return kKeyNames.at(static_cast<std::size_t>(key));
@@ -81,7 +203,16 @@ std::optional<SettingKey> setting_key_of(std::string_view name) {
 }
 
 bool applies(const Settings& settings, SettingKey key) {
-  return key == SettingKey::kSoftLimits || settings.coordinates.has_unit();
+  switch (key) {
+    case SettingKey::kSoftLimits:
+      return true;
+    case SettingKey::kVelocity:
+      return settings.local;
+    case SettingKey::kCurrents:
+      return settings.phases;
+    default:
+      return settings.coordinates.has_unit();
+  }
 }
 
 std::string text_of(const Settings& settings, SettingKey key) {
@@ -91,6 +222,10 @@ std::string text_of(const Settings& settings, SettingKey key) {
       return fmt::format("{}", scale.offset == 0 ? 0.0 : scale.offset);
     case SettingKey::kDirection:
       return scale.negative ? "negative" : "positive";
+    case SettingKey::kVelocity:
+      return text_of(settings.drive.velocity);
+    case SettingKey::kCurrents:
+      return text_of(settings.drive.currents);
     case SettingKey::kSoftLimits:
       break;
   }
@@ -99,13 +234,10 @@ std::string text_of(const Settings& settings, SettingKey key) {
 }
 
 Result<Settings> with(Settings settings, SettingKey key, std::string_view text) {
-  if (!applies(settings, key)) {
-    return fail(fmt::format(
-        "{}: it has no unit, so its positions are steps; give it `unit` and `steps_per_unit` in "
-        "bushd.toml first",
-        name_of(key)));
-  }
+  if (!applies(settings, key)) return fail(fmt::format("{}: {}", name_of(key), why_not(key)));
   if (key == SettingKey::kSoftLimits) return with_soft_limits(std::move(settings), text);
+  if (key == SettingKey::kVelocity) return with_velocity(std::move(settings), text);
+  if (key == SettingKey::kCurrents) return with_currents(std::move(settings), text);
   units::Scale scale = settings.coordinates.scale();
   if (key == SettingKey::kDirection) {
     const std::string_view word = trimmed(text);

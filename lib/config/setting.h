@@ -8,13 +8,15 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "config/drive.h"
 #include "units/coordinates.h"
 
 namespace bushd::config {
 
-enum class SettingKey { kOffset, kDirection, kSoftLimits };
+enum class SettingKey { kOffset, kDirection, kSoftLimits, kVelocity, kCurrents };
 inline constexpr std::array kSettingKeys = {SettingKey::kOffset, SettingKey::kDirection,
-                                            SettingKey::kSoftLimits};
+                                            SettingKey::kSoftLimits, SettingKey::kVelocity,
+                                            SettingKey::kCurrents};
 
 std::string_view name_of(SettingKey key);  // as in bushd.toml
 std::optional<SettingKey> setting_key_of(std::string_view name);
@@ -23,16 +25,25 @@ std::optional<SettingKey> setting_key_of(std::string_view name);
 struct Settings {
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits = {};
+  Drive drive{};
+  bool phases = false;  // its MCU drives it by phases: it may have currents
+  bool local = false;   // it may have a velocity
 };
+struct Motor;
+struct Mcu;
+Settings settings_of(const Motor& motor, const Mcu& mcu);  // as bushd.toml has them
 
-// A motor without a unit has soft limits only.
+// A motor without a unit has soft limits only. Velocity is of one with `local`, currents are of one
+// that is driven by phases.
 bool applies(const Settings& settings, SettingKey key);
 
-// "12.5"; "negative"; "[-5, 30]" or "none". The same value has one text.
+// "12.5"; "negative"; "[-5, 30]" or "none"; velocity and currents as an inline table of TOML, or
+// "none". The same value has one text.
 std::string text_of(const Settings& settings, SettingKey key);
 
 // With another value. Beside the texts above, soft limits may come without brackets and blanks:
-// "-5,30". Errors name key, value, cause and what is allowed, not the motor.
+// "-5,30", and inline tables without names, in their order: "100,1500,500" and
+// "1500,1000,300,fast". Errors name key, value, cause and what is allowed, not the motor.
 Result<Settings> with(Settings settings, SettingKey key, std::string_view text);
 
 // Error: no step lies between them.

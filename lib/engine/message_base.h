@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-#define BUSHD_PROTOCOL_VERSION 4u
+#define BUSHD_PROTOCOL_VERSION 5u
 #define BUSHD_MOTORS_PER_MCU 16u
 #define BUSHD_TABLE_SLOTS 8u
 #define BUSHD_MIN_TICK_NS 200000u
@@ -41,9 +41,10 @@ typedef enum bushd_type {
   BUSHD_MSG_POSITION_COMPARE = 0x16,  // bushd_position_compare -> acknowledgement
   BUSHD_MSG_MOTOR_INPUTS = 0x17,      // bushd_motor_inputs -> acknowledgement
   BUSHD_MSG_LINE_RUN = 0x18,          // bushd_line_run, no reply
-  BUSHD_MSG_TRAVEL = 0x19,       // bushd_travel -> acknowledgement; how it goes is told by reports
-  BUSHD_MSG_CURRENTS = 0x1A,     // bushd_currents -> acknowledgement
-  BUSHD_MSG_LINE_TRIGGER = 0x1B  // bushd_line_trigger -> acknowledgement
+  BUSHD_MSG_TRAVEL = 0x19,        // bushd_travel -> acknowledgement; how it goes is told by reports
+  BUSHD_MSG_CURRENTS = 0x1A,      // bushd_currents -> acknowledgement
+  BUSHD_MSG_LINE_TRIGGER = 0x1B,  // bushd_line_trigger -> acknowledgement
+  BUSHD_MSG_VELOCITY = 0x1C       // bushd_set_velocity -> acknowledgement
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its sequence and the MCU's address.
 

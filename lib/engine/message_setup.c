@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "engine/cursor.h"
+#include "engine/velocity.h"
 
 static void put_id(writer* w, const uint8_t* unique_id) {
   memcpy(w->at, unique_id, BUSHD_UNIQUE_ID_SIZE);
@@ -53,7 +54,7 @@ size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload) {
   put16(&w, message->slots);
   put16(&w, message->queue_ticks);
   put16(&w, message->table_codes);
-  put16(&w, message->capabilities);
+  put32(&w, message->capabilities);
   put_id(&w, message->unique_id);
   return (size_t)(w.at - payload);
 }
@@ -70,7 +71,7 @@ bushd_status bushd_decode_identity(const uint8_t* payload, size_t size, bushd_id
   message->slots = get16(&r);
   message->queue_ticks = get16(&r);
   message->table_codes = get16(&r);
-  message->capabilities = get16(&r);
+  message->capabilities = get32(&r);
   get_id(&r, message->unique_id);
   return finish(&r, message->motors >= 1 && message->motors <= BUSHD_MOTORS_PER_MCU);
 }
@@ -342,6 +343,29 @@ bushd_status bushd_decode_currents(const uint8_t* payload, size_t size, bushd_cu
                         (none || all) && message->ramp_ma <= BUSHD_MAX_CURRENT_MA &&
                         message->cruise_ma <= BUSHD_MAX_CURRENT_MA &&
                         message->hold_ma <= BUSHD_MAX_CURRENT_MA);
+}
+
+size_t bushd_encode_set_velocity(const bushd_set_velocity* message, uint8_t* payload) {
+  writer w = {payload};
+  put8(&w, message->motor);
+  put32(&w, (uint32_t)message->least);
+  put32(&w, (uint32_t)message->most);
+  put32(&w, (uint32_t)message->acceleration);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_set_velocity(const uint8_t* payload, size_t size,
+                                       bushd_set_velocity* message) {
+  reader r = read_from(payload, size);
+  message->motor = get8(&r);
+  message->least = (int32_t)get32(&r);
+  message->most = (int32_t)get32(&r);
+  message->acceleration = (int32_t)get32(&r);
+  const bool none = (message->least | message->most | message->acceleration) == 0;
+  const bool all = message->least >= BUSHD_VELOCITY_LEAST && message->most >= message->least &&
+                   message->most <= BUSHD_VELOCITY_MOST && message->acceleration >= 1 &&
+                   message->acceleration <= BUSHD_VELOCITY_MOST;
+  return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU && (none || all));
 }
 
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload) {

@@ -43,7 +43,9 @@ enum {
   BUSHD_CAN_LINE_RUN = 1 << 13,
   BUSHD_CAN_TRAVEL = 1 << 14,  // where it has a trigger input also at its edges
 };
-#define BUSHD_CAN_CURRENTS 0x8000u  // beyond an int of 16 bits
+// Beyond an int of 16 bits.
+#define BUSHD_CAN_CURRENTS UINT32_C(0x8000)
+#define BUSHD_CAN_VELOCITY UINT32_C(0x10000)
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
 // which one it is.
@@ -55,7 +57,7 @@ typedef struct bushd_identity {
   uint16_t slots;         // slots per tick
   uint16_t queue_ticks;   // depth of the tick queue
   uint16_t table_codes;   // table memory, in codes of 16 bits
-  uint16_t capabilities;  // BUSHD_CAN_*
+  uint32_t capabilities;  // BUSHD_CAN_*
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
 } bushd_identity;
 
@@ -198,11 +200,21 @@ typedef struct bushd_currents {
   uint16_t hold_ma;    // at rest, if windings stay on there (bushd_emission.hold_current)
 } bushd_currents;
 
+// Local motion of a motor by the velocity loop of engine/velocity.h, in its unit of 1/64 step/s:
+// BUSHD_VELOCITY_LEAST <= least <= most <= BUSHD_VELOCITY_MOST, acceleration
+// 1..BUSHD_VELOCITY_MOST. All three are 0: by its table.
+typedef struct bushd_set_velocity {
+  uint8_t motor;
+  int32_t least;         // VMIN
+  int32_t most;          // V, while an input is held
+  int32_t acceleration;  // A in 1/64 s: steps/s^2
+} bushd_set_velocity;
+
 typedef struct bushd_acknowledgement {
   uint8_t status;  // bushd_status
 } bushd_acknowledgement;
 
-#define BUSHD_IDENTITY_SIZE 22u
+#define BUSHD_IDENTITY_SIZE 24u
 #define BUSHD_TABLES_SIZE (1u + 8u * BUSHD_TABLE_SLOTS)
 
 // Encoders return the payload's size. Preconditions are the ranges given above.
@@ -221,6 +233,7 @@ size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* paylo
 size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload);
 size_t bushd_encode_motor_inputs(const bushd_motor_inputs* message, uint8_t* payload);
 size_t bushd_encode_currents(const bushd_currents* message, uint8_t* payload);
+size_t bushd_encode_set_velocity(const bushd_set_velocity* message, uint8_t* payload);
 size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload);
 size_t bushd_encode_acknowledgement(const bushd_acknowledgement* message, uint8_t* payload);
 
@@ -245,6 +258,8 @@ bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
 bushd_status bushd_decode_motor_inputs(const uint8_t* payload, size_t size,
                                        bushd_motor_inputs* message);
 bushd_status bushd_decode_currents(const uint8_t* payload, size_t size, bushd_currents* message);
+bushd_status bushd_decode_set_velocity(const uint8_t* payload, size_t size,
+                                       bushd_set_velocity* message);
 bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message);
 bushd_status bushd_decode_acknowledgement(const uint8_t* payload, size_t size,
                                           bushd_acknowledgement* message);

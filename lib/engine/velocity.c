@@ -1,13 +1,13 @@
 #include "engine/velocity.h"
 
-static void find_period(bushd_velocity* velocity) {
-  int32_t speed = velocity->now < 0 ? -velocity->now : velocity->now;
-  if (speed < velocity->least) speed = velocity->least;
+uint16_t bushd_velocity_period(int32_t speed, int32_t least) {
+  if (speed < 0) speed = -speed;
+  if (speed < least) speed = least;
   const uint32_t period = BUSHD_VELOCITY_PERIOD_OF_ONE / (uint32_t)speed;
-  velocity->period = (uint16_t)(period == 0 ? 1u : period);
+  return (uint16_t)(period == 0 ? 1u : period);
 }
 
-static void update(bushd_velocity* velocity) {
+void bushd_velocity_update(bushd_velocity* velocity) {
   if (velocity->now == velocity->wanted) return;
   if (velocity->now < velocity->wanted) {
     velocity->now += velocity->change;
@@ -16,27 +16,14 @@ static void update(bushd_velocity* velocity) {
     velocity->now -= velocity->change;
     if (velocity->now < velocity->wanted) velocity->now = velocity->wanted;
   }
-  find_period(velocity);
+  velocity->period = bushd_velocity_period(velocity->now, velocity->least);
 }
 
 void bushd_velocity_init(bushd_velocity* velocity, int32_t change, int32_t least) {
   velocity->wanted = velocity->now = 0;
   velocity->change = change;
   velocity->least = least;
-  find_period(velocity);
+  velocity->period = bushd_velocity_period(0, least);
   velocity->step_left = velocity->period;
   velocity->update_left = BUSHD_VELOCITY_UPDATE_INTERVALS;
-}
-
-int8_t bushd_velocity_interval(bushd_velocity* velocity) {
-  int8_t step = 0;
-  if (--velocity->step_left == 0) {
-    velocity->step_left = velocity->period;
-    step = (int8_t)((velocity->now > 0) - (velocity->now < 0));
-  }
-  if (--velocity->update_left == 0) {
-    velocity->update_left = BUSHD_VELOCITY_UPDATE_INTERVALS;
-    update(velocity);
-  }
-  return step;
 }

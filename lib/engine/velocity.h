@@ -17,7 +17,7 @@
 extern "C" {
 #endif
 
-#define BUSHD_VELOCITY_INTERVAL_NS 25000u
+#define BUSHD_VELOCITY_INTERVAL_NS UINT32_C(25000)
 #define BUSHD_VELOCITY_UPDATE_INTERVALS 625u  // 1/64 s
 #define BUSHD_VELOCITY_PERIOD_OF_ONE 2560000u
 // Of VMIN: T has 16 bits. Of all: the variables have 24.
@@ -37,12 +37,39 @@ typedef struct bushd_velocity {
   uint16_t update_left;
 } bushd_velocity;
 
+// T at this speed, of either sign.
+uint16_t bushd_velocity_period(int32_t speed, int32_t least);
 // At rest. Preconditions: the ranges above.
 void bushd_velocity_init(bushd_velocity* velocity, int32_t change, int32_t least);
 
+// VC and T, at the end of BUSHD_VELOCITY_UPDATE_INTERVALS. One division.
+void bushd_velocity_update(bushd_velocity* velocity);
+
+// Intervals before the next one at whose end a step may be made, or VC changes. O(1).
+static inline uint16_t bushd_velocity_idle(const bushd_velocity* velocity) {
+  const uint16_t left =
+      velocity->step_left < velocity->update_left ? velocity->step_left : velocity->update_left;
+  return (uint16_t)(left - 1u);
+}
+// Lets as many pass. Precondition: intervals <= bushd_velocity_idle.
+static inline void bushd_velocity_skip(bushd_velocity* velocity, uint16_t intervals) {
+  velocity->step_left = (uint16_t)(velocity->step_left - intervals);
+  velocity->update_left = (uint16_t)(velocity->update_left - intervals);
+}
 // The next interval of 25 us: +1 or -1 if a step is made at its end, else 0. O(1), a division in
 // one interval of 625.
-int8_t bushd_velocity_interval(bushd_velocity* velocity);
+static inline int8_t bushd_velocity_interval(bushd_velocity* velocity) {
+  int8_t step = 0;
+  if (--velocity->step_left == 0) {
+    velocity->step_left = velocity->period;
+    step = (int8_t)((velocity->now > 0) - (velocity->now < 0));
+  }
+  if (--velocity->update_left == 0) {
+    velocity->update_left = BUSHD_VELOCITY_UPDATE_INTERVALS;
+    bushd_velocity_update(velocity);
+  }
+  return step;
+}
 
 #ifdef __cplusplus
 }

@@ -173,7 +173,7 @@ class BusMaster {
   virtual std::optional<BusSnapshot> snapshot(std::int64_t) const { return std::nullopt; }
 
  protected:
-  bool can(McuIndex mcu, std::uint16_t capability) const {
+  bool can(McuIndex mcu, std::uint32_t capability) const {
     return (view(mcu).identity.capabilities & capability) != 0;
   }
 };

@@ -195,6 +195,9 @@ void Connector::write_setup(McuIndex mcu) {
   if ((record.view.identity.capabilities & BUSHD_CAN_CURRENTS) != 0) {
     for (const bushd_currents& one : record.setup.currents) queue.currents(one);
   }
+  if ((record.view.identity.capabilities & BUSHD_CAN_VELOCITY) != 0) {
+    for (const bushd_set_velocity& one : record.setup.velocities) queue.velocity(one);
+  }
   queue.ask_for_tables();
   links_[mcu].setup_written = true;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/velocity.h"
 #include "fieldbus/line_times.h"
 
 namespace bushd::link {
@@ -29,6 +30,17 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
                 std::to_string(output) + " makes up to " + std::to_string(steps) +
                 ": use a slower table, or less step_us or dir_setup_us");
   }
+  for (const bushd_set_velocity& one : setup.velocities) {
+    if (one.most == 0) continue;
+    const std::uint32_t period_ns =
+        bushd_velocity_period(one.most, one.least) * BUSHD_VELOCITY_INTERVAL_NS;
+    const std::uint32_t steps = tick_ns / period_ns + 1;
+    if (steps <= *room) continue;
+    return fail("has room for " + std::to_string(*room) +
+                " steps of a motor in a tick, but motor " + std::to_string(one.motor) +
+                " makes up to " + std::to_string(steps) +
+                " by its `velocity`: use a lower max_steps_per_s, or a shorter tick_us");
+  }
   return {};
 }
 
@@ -38,6 +50,17 @@ Result<void> check_currents(const McuSetup& setup, const bushd_identity& identit
     if (one.ramp_ma == 0) continue;
     return fail("controls no currents of windings, but motor " + std::to_string(one.motor) +
                 " has `currents`: leave them out, or connect it to an MCU with a chopper");
+  }
+  return {};
+}
+
+Result<void> check_velocities(const McuSetup& setup, const bushd_identity& identity) {
+  if ((identity.capabilities & BUSHD_CAN_VELOCITY) != 0) return {};
+  for (const bushd_set_velocity& one : setup.velocities) {
+    if (one.most == 0) continue;
+    return fail("moves no motor by the velocity loop, but motor " + std::to_string(one.motor) +
+                " has `velocity`: leave it out, so that local inputs move it by its table, or "
+                "connect it to an MCU that has the loop");
   }
   return {};
 }
@@ -61,6 +84,8 @@ Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity)
 
 Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
                         std::uint32_t tick_ns) {
+  if (auto currents = check_currents(setup, identity); !currents) return currents;
+  if (auto velocities = check_velocities(setup, identity); !velocities) return velocities;
   std::size_t codes = 0;
   for (const TableRef& ref : setup.tables) {
     codes += ref.table->accel.count;
@@ -90,7 +115,6 @@ Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_i
     }
   }
   if (auto inputs = check_inputs(setup, identity); !inputs) return inputs;
-  if (auto currents = check_currents(setup, identity); !currents) return currents;
   if (auto room = check_room(setup, identity, bus.tick_ns); !room) return room;
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * bus.tick_ns / 1000;
@@ -108,13 +132,17 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
   if (type == BUSHD_MSG_EMISSION) {
     return fieldbus::emission_refusal(setup.emission, status, identity.slots, bus.tick_ns);
   }
+  if (type == BUSHD_MSG_VELOCITY && status == BUSHD_E_FORMAT) {
+    return "VELOCITY: only its first motors have the velocity loop; leave out `velocity` of the "
+           "others, or connect them to the first outputs";
+  }
   struct Request {
     std::uint8_t type;
     const char* name;
     const char* if_too_much;  // remedy
   };
   constexpr const char* kTables = "use shorter or slower tables, or fewer on this MCU";
-  static constexpr std::array<Request, 9> kRequests = {{
+  static constexpr std::array<Request, 10> kRequests = {{
       {BUSHD_MSG_CONFIGURE, "CONFIGURE", "use a longer tick_us on its bus"},
       {BUSHD_MSG_TABLE_BEGIN, "TABLE_BEGIN", kTables},
       {BUSHD_MSG_TABLE_DATA, "TABLE_DATA", kTables},
@@ -124,6 +152,7 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
       {BUSHD_MSG_MOTOR_INPUTS, "MOTOR_INPUTS", nullptr},
       {BUSHD_MSG_LOCAL, "LOCAL", nullptr},
       {BUSHD_MSG_CURRENTS, "CURRENTS", nullptr},
+      {BUSHD_MSG_VELOCITY, "VELOCITY", "use a lower max_steps_per_s in `velocity`"},
   }};
   const auto* const request =
       std::find_if(kRequests.begin(), kRequests.end(),

@@ -39,6 +39,10 @@ void SetupQueue::currents(const bushd_currents& message) {
   add(BUSHD_MSG_CURRENTS, [&](std::uint8_t* p) { return bushd_encode_currents(&message, p); });
 }
 
+void SetupQueue::velocity(const bushd_set_velocity& message) {
+  add(BUSHD_MSG_VELOCITY, [&](std::uint8_t* p) { return bushd_encode_set_velocity(&message, p); });
+}
+
 void SetupQueue::local(const bushd_local& message) {
   add(BUSHD_MSG_LOCAL, [&](std::uint8_t* p) { return bushd_encode_local(&message, p); });
 }

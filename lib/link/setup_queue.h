@@ -32,6 +32,7 @@ class SetupQueue {
   void inputs(const bushd_set_inputs& message);
   void motor_inputs(const bushd_motor_inputs& message);
   void currents(const bushd_currents& message);
+  void velocity(const bushd_set_velocity& message);
   void local(const bushd_local& message);
   // Which tables it has.
   void ask_for_tables();

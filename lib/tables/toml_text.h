@@ -34,9 +34,10 @@ class TomlText {
   }
 
   // Where the value ends that begins at node.source().begin: toml++ tells that of strings; numbers
-  // end with their token, arrays of these behind their bracket.
+  // end with their token, arrays of these and inline tables behind their bracket.
   std::size_t value_end(const toml::node& node) const {
     if (node.is_string()) return offset(node.source().end);
+    if (const toml::table* table = node.as_table()) return table_end(*table);
     const toml::array* array = node.as_array();
     if (array == nullptr) return token_end(offset(node.source().begin));
     return array_end(array->empty() ? offset(node.source().begin) + 1
@@ -56,6 +57,13 @@ class TomlText {
   }
 
  private:
+  // Behind the '}' of an inline table, which has no comments.
+  std::size_t table_end(const toml::table& table) const {
+    std::size_t at = offset(table.source().begin) + 1;
+    for (const auto& [key, value] : table) at = std::max(at, value_end(value));
+    return std::min(text_.find('}', at), text_.size() - 1) + 1;
+  }
+
   // Behind the ']' of an array whose last element, or '[', ends at `at`.
   std::size_t array_end(std::size_t at) const {
     while (at < text_.size() && text_[at] != ']') {

@@ -33,13 +33,13 @@ TEST(Currents, AreReadOfAMotorWithPhases) {
       ConfigFile(with("{ ramp_ma = 1500, cruise_ma = 1000, hold_ma = 300, decay = \"fast\" }"))
           .load();
   ASSERT_TRUE(config) << config.error().text();
-  const auto& currents = config->motors[0].currents;
+  const auto& currents = config->motors[0].drive.currents;
   ASSERT_TRUE(currents);
   EXPECT_EQ(currents->ramp_ma, 1500);
   EXPECT_EQ(currents->cruise_ma, 1000);
   EXPECT_EQ(currents->hold_ma, 300);
   EXPECT_TRUE(currents->fast_decay);
-  EXPECT_FALSE(config->motors[1].currents);
+  EXPECT_FALSE(config->motors[1].drive.currents);
 }
 
 TEST(Currents, WhatIsWrongIsNamed) {

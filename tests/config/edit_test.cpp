@@ -45,6 +45,20 @@ TEST(Edit, AValueIsReplacedWhereItStands) {
          "soft_limits = [1, 2]# all\n");
 }
 
+TEST(Edit, VelocityAndCurrentsAreInlineTables) {
+  expect("local = true\nvelocity = { min_steps_per_s=1, max_steps_per_s=2, steps_per_s2=3 } # v\n",
+         {{"theta", SettingKey::kVelocity, "100,1500,500"}},
+         "local = true\nvelocity = { min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = "
+         "500 } # v\n");
+  expect("local = true\n", {{"theta", SettingKey::kVelocity, "100,1500,500"}},
+         "local = true\nvelocity = { min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = "
+         "500 }\n");
+  expect("local = true\nvelocity = { min_steps_per_s=1, max_steps_per_s=2, steps_per_s2=3 }\n",
+         {{"theta", SettingKey::kVelocity, "none"}}, "local = true\n");
+  EXPECT_THAT(after(with_theta(""), {{"theta", SettingKey::kCurrents, "1,2,3"}}),
+              HasSubstr("its MCU does not drive it by phases"));
+}
+
 TEST(Edit, AKeyThatIsMissingStandsBehindTheOthersOfItsMotor) {
   expect("", {{"theta", kOffset, "-1"}, {"theta", kSoftLimits, "[1, 2]"}},
          "offset = -1\nsoft_limits = [1, 2]\n");

@@ -37,6 +37,50 @@ TEST(Setting, AValueHasOneText) {
   EXPECT_EQ(same(SettingKey::kSoftLimits, "none"), "none");
 }
 
+Settings unipolar() {
+  Settings settings = blade();
+  settings.phases = settings.local = true;
+  return settings;
+}
+
+TEST(Setting, VelocityAndCurrentsHaveOneTextAndReadBack) {
+  const auto same = [](SettingKey key, const char* typed) {
+    return text_of(with(unipolar(), key, typed).value(), key);
+  };
+  const std::string velocity =
+      "{ min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = 500 }";
+  for (const char* typed : {"100,1500,500", " { 100, 1500 ,500}", velocity.c_str(),
+                            "steps_per_s2=500, max_steps_per_s=1500, min_steps_per_s=100"}) {
+    EXPECT_EQ(same(SettingKey::kVelocity, typed), velocity) << typed;
+  }
+  const std::string currents =
+      "{ ramp_ma = 1500, cruise_ma = 1000, hold_ma = 300, decay = \"fast\" }";
+  for (const char* typed : {"1500,1000,300,fast", currents.c_str()}) {
+    EXPECT_EQ(same(SettingKey::kCurrents, typed), currents) << typed;
+  }
+  EXPECT_EQ(same(SettingKey::kCurrents, "1,2,3"),
+            "{ ramp_ma = 1, cruise_ma = 2, hold_ma = 3, decay = \"slow\" }");
+  for (const SettingKey key : {SettingKey::kVelocity, SettingKey::kCurrents}) {
+    EXPECT_EQ(same(key, "none"), "none");
+    EXPECT_FALSE(applies(blade(), key));
+    EXPECT_FALSE(with(blade(), key, "none"));
+  }
+}
+
+TEST(Setting, AnyTextOfVelocityAndCurrentsIsTakenWholeOrRefused) {
+  for (const char* text : {"", "{}", "{", "100", "100,1500", "100,1500,500,1", "0,1500,500",
+                           "200,100,500", "1,40001,5", "1,2,0", "1,2,8388608", "1.5,2,3", "1,,3",
+                           "1,2,3,", "-1,2,3", "min_steps_per_s=1,min_steps_per_s=2,steps_per_s2=3",
+                           "speed=1,max_steps_per_s=2,steps_per_s2=3"}) {
+    const auto changed = with(unipolar(), SettingKey::kVelocity, text);
+    ASSERT_FALSE(changed) << text;
+    EXPECT_THAT(changed.error().message, HasSubstr("velocity: is \"")) << text;
+  }
+  for (const char* text : {"", "1500,1000", "0,1,1", "1,1,5111", "1,1,1,mixed", "1,1,1,fast,1"}) {
+    EXPECT_FALSE(with(unipolar(), SettingKey::kCurrents, text)) << text;
+  }
+}
+
 TEST(Setting, ATextReadsBackAsItsValue) {
   std::mt19937_64 random(20040518);
   std::uniform_real_distribution<double> number(-1e6, 1e6);
@@ -50,6 +94,7 @@ TEST(Setting, ATextReadsBackAsItsValue) {
     settings.soft_limits = units::SoftLimits{low, low + 1};
     Settings back = blade();
     for (const SettingKey key : kSettingKeys) {
+      if (!applies(back, key)) continue;
       back = with(std::move(back), key, text_of(settings, key)).value();
     }
     EXPECT_EQ(back.coordinates.scale(), settings.coordinates.scale());

@@ -152,6 +152,28 @@ TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
   }
 }
 
+TEST_P(Autonomous, LocalInputsMoveAMotorByTheVelocityLoop) {
+  if (real_->twin().velocity_motors == 0) GTEST_SKIP() << "denies VELOCITY";
+  constexpr std::uint8_t kFirst = 0;
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
+                              bushd_set_velocity{kFirst, 200 * 64, 1500 * 64, 3000}));
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kFirst}));
+  for (const std::uint8_t button : {BUSHD_INPUT_FORWARD, BUSHD_INPUT_REVERSE}) {
+    to_inputs_time();
+    set_inputs({0, button});
+    pass_ticks(250);
+    EXPECT_EQ(master_.poll(kReal).autonomous, 1 << kFirst) << "turns without rest";
+  }
+  to_inputs_time();
+  set_inputs({});
+  pass_ticks(300);
+  EXPECT_EQ(master_.poll(kReal).moving, 0);
+  EXPECT_GT(steps(1, kFirst).size(), 800u);
+  expect_the_same_steps(kFirst, steps(0, kFirst).size());
+  expect_the_same_times(kFirst);
+  expect_the_same_reports();
+}
+
 TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
   for (const bool keeps_enable : {false, true}) {
     SCOPED_TRACE(keeps_enable);

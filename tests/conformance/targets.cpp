@@ -58,7 +58,8 @@ class Atmega2560 final : public Avr {
             .queue_ticks = 64,
             .code_count = 952,
             .disabled_capabilities = disabled_capabilities(),
-            .current_motors = 0};
+            .current_motors = 0,
+            .velocity_motors = 0};
   }
   std::uint16_t disabled_capabilities() const override {
     return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN;
@@ -77,7 +78,8 @@ class Atmega1284p final : public Avr {
             .queue_ticks = 64,
             .code_count = 1536,
             .disabled_capabilities = disabled_capabilities(),
-            .current_motors = 1};
+            .current_motors = 1,
+            .velocity_motors = 2};
   }
   std::uint16_t disabled_capabilities() const override {
     return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_COMMON_DIR;
@@ -89,7 +91,11 @@ class Atmega1284p final : public Avr {
 class Lm3s6965 final : public McuUnderTest {
  public:
   McuOptions twin() const override {
-    return {.slots = 128, .queue_ticks = 512, .code_count = 12288, .current_motors = 0};
+    return {.slots = 128,
+            .queue_ticks = 512,
+            .code_count = 12288,
+            .current_motors = 0,
+            .velocity_motors = 0};
   }
   std::uint16_t disabled_capabilities() const override { return 0; }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }

@@ -137,6 +137,55 @@ TEST(MotorSettings, ThatMakeNoSenseAreRefusedWithMotorKeyCauseAndRemedy) {
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
+// m01 has local inputs.
+void hold_forward(Lab& lab, bool held) {
+  lab.bus(0).mcu(0).set_inputs({0, static_cast<std::uint8_t>(held ? BUSHD_INPUT_FORWARD : 0)});
+}
+
+TEST(MotorSettings, OfTheVelocityLoopAreToldToTheMcu) {
+  const std::string local = "offset = 10\nlocal = true\n";
+  SettingsLab lab(blade(local));
+  EXPECT_THAT(lab.show("m01").back(), "m01 velocity = none, in the file none");
+  lab.expect_done("m01", "velocity", "100,1500,500");
+  EXPECT_THAT(lab.show("m01").back(),
+              "m01 velocity = { min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = 500 "
+              "}, in the file none");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {40})).result, "reached");
+  // A second of it: 250 steps by 500 steps/s^2, and some more where the least speed is above that.
+  const auto press = [&lab] {
+    const std::int64_t before = lab.shaft_steps("m01");
+    hold_forward(lab, true);
+    lab.run_for(1);
+    const std::int64_t made = lab.shaft_steps("m01") - before;
+    lab.expect_refused(lab.change("m01", "velocity", "none"), "");
+    hold_forward(lab, false);
+    EXPECT_TRUE(
+        lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kResting; }, 5));
+    EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+    return made;
+  };
+  EXPECT_NEAR(static_cast<double>(press()), 255, 20);
+  lab.restart(blade(local));
+  EXPECT_NEAR(static_cast<double>(press()), 255, 20) << "the state store has kept it";
+  lab.expect_done("m01", "velocity", "none");
+  EXPECT_GT(press(), 300) << "by its table";
+}
+
+TEST(MotorSettings, OfTheMcuAreRefusedWhereTheyDoNotApplyOrAnotherMotorMoves) {
+  SettingsLab lab(blade("local = true\n"));
+  lab.expect_refused(lab.change("m02", "velocity", "100,1500,500"),
+                     "m02: velocity: no local inputs move it");
+  lab.expect_refused(lab.change("m01", "currents", "1500,1000,300"),
+                     "m01: currents: its MCU does not drive it by phases");
+  const auto move = lab.send(Ask::kMoveBy, {"m02"}, {1000});
+  lab.run_for(0.3);
+  lab.expect_refused(lab.change("m01", "velocity", "100,1500,500"),
+                     "a motor of MCU hall:1 moves; its velocities and currents can be changed when "
+                     "all of them are at rest");
+  lab.expect_done("m01", "soft_limits", "[-5, 500]");
+  EXPECT_EQ(lab.wait(move).result, "reached");
+}
+
 TEST(MotorSettings, AreKeptOverPowerCutsUntilTheFileIsEdited) {
   SettingsLab lab;
   lab.expect_done("m01", "offset", "2.5");

@@ -1,4 +1,5 @@
 #include "engine/message_kinds.h"
+#include "engine/velocity.h"
 
 namespace bushd::test {
 namespace {
@@ -24,6 +25,14 @@ Bytes any_table_data() {
 
 void put_tick_ns(Bytes* payload) {
   bushd_put_u32(payload->data(), between(BUSHD_MIN_TICK_NS, BUSHD_MAX_TICK_NS));
+}
+
+auto velocity_of(uint32_t least, uint32_t most, uint32_t change) {
+  return [=](Bytes* p) {
+    bushd_put_u32(p->data() + 1, least);
+    bushd_put_u32(p->data() + 5, most);
+    bushd_put_u32(p->data() + 9, change);
+  };
 }
 
 }  // namespace
@@ -159,6 +168,27 @@ Kinds setup_kinds() {
             bushd_put_u16(p->data() + 2, 100);
             bushd_put_u16(p->data() + 6, 0);
           }}}}},
+      {"set_velocity",
+       {bytes_with(13,
+                   [](Bytes* p) {
+                     (*p)[0] = between<uint8_t>(0, 15);
+                     const bool none = between<uint8_t>(0, 3) == 0;
+                     const auto least =
+                         between<uint32_t>(BUSHD_VELOCITY_LEAST, BUSHD_VELOCITY_MOST);
+                     const auto most = between<uint32_t>(least, BUSHD_VELOCITY_MOST);
+                     bushd_put_u32(p->data() + 1, none ? 0 : least);
+                     bushd_put_u32(p->data() + 5, none ? 0 : most);
+                     bushd_put_u32(p->data() + 9,
+                                   none ? 0 : between<uint32_t>(1, BUSHD_VELOCITY_MOST));
+                   }),
+        codec(bushd_decode_set_velocity, bushd_encode_set_velocity),
+        {{"motor 16", set8(0, 16)},
+         {"T of more than 16 bits", velocity_of(39, 100, 1)},
+         {"slower than its least speed", velocity_of(100, 99, 1)},
+         {"more than 24 bits", velocity_of(100, 0x800000, 1)},
+         {"negative", velocity_of(0xFFFFFF00, 100, 1)},
+         {"no acceleration", velocity_of(100, 100, 0)},
+         {"more acceleration than speed", velocity_of(100, 100, 0x800000)}}}},
       {"acknowledgement",
        {[] { return random_bytes(1); },
         codec(bushd_decode_acknowledgement, bushd_encode_acknowledgement),

@@ -116,6 +116,12 @@ void put(const bushd_currents& m, Fields& f) {
   f.add("motor", m.motor).add("decay", m.decay).add("ramp_ma", m.ramp_ma);
   f.add("cruise_ma", m.cruise_ma).add("hold_ma", m.hold_ma);
 }
+void put(const bushd_set_velocity& m, Fields& f) {
+  f.add("motor", m.motor)
+      .add("least", m.least)
+      .add("most", m.most)
+      .add("acceleration", m.acceleration);
+}
 void put(const bushd_local& m, Fields& f) {
   f.add("motors", m.motors);
 }
@@ -298,6 +304,8 @@ std::string message_text(const bushd_frame& frame) {
       return text("local", frame, bushd_decode_local);
     case BUSHD_MSG_CURRENTS:
       return text("currents", frame, bushd_decode_currents);
+    case BUSHD_MSG_VELOCITY:
+      return text("set_velocity", frame, bushd_decode_set_velocity);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
       return text("tables", frame, bushd_decode_tables);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY:
@@ -319,7 +327,7 @@ std::set<std::string> message_names() {
           "table_run",        "emergency",    "set_address", "get_tables",      "tables",
           "set_inputs",       "emission",     "home",        "local",           "trigger",
           "position_compare", "motor_inputs", "line_run",    "travel",          "currents",
-          "line_trigger"};
+          "line_trigger",     "set_velocity"};
 }
 
 }  // namespace bushd::test

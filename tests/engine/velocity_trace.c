@@ -16,6 +16,12 @@ int main(void) {
   uint64_t at = 0;
   while (scanf("%" SCNu32 " %" SCNd32, &intervals, &velocity.wanted) == 2) {
     for (; intervals > 0; --intervals, ++at) {
+      // As who has no use for idle ones; one by one where that is over.
+      const uint16_t idle = bushd_velocity_idle(&velocity);
+      const uint32_t skipped = idle < intervals - 1u ? idle : intervals - 1u;
+      bushd_velocity_skip(&velocity, (uint16_t)skipped);
+      intervals -= skipped;
+      at += skipped;
       const int step = bushd_velocity_interval(&velocity);
       if (step != 0) printf("%" PRIu64 " %d\n", at, step);
     }

@@ -59,7 +59,9 @@ class Nvm : public testing::Test {
       EXPECT_TRUE(within(part, &rig.mcu(), sizeof(bushd_mcu)) ||
                   within(part, rig.mcu().config.codes, kCodes * sizeof(std::uint16_t)) ||
                   within(part, rig.mcu().config.currents,
-                         rig.options().current_motors * sizeof(bushd_mcu_currents)));
+                         rig.options().current_motors * sizeof(bushd_mcu_currents)) ||
+                  within(part, rig.mcu().config.velocity,
+                         rig.options().velocity_motors * sizeof(bushd_mcu_velocity)));
     }
   }
 
@@ -74,7 +76,9 @@ TEST_F(Nvm, AWalkGoesOverAllOfIt) {
   ASSERT_GT(used, 0u);
   EXPECT_EQ(found.bytes,
             most() - 2 * (kCodes - used) - (BUSHD_MOTORS_PER_MCU - rig.options().motors) -
-                (BUSHD_MAX_CURRENT_MOTORS - rig.options().current_motors) * sizeof(bushd_currents));
+                (BUSHD_MAX_CURRENT_MOTORS - rig.options().current_motors) * sizeof(bushd_currents) -
+                (BUSHD_MAX_VELOCITY_MOTORS - rig.options().velocity_motors) *
+                    sizeof(bushd_mcu_velocity_settings));
 }
 
 // A walk that stood behind the last code went on through all memory, and the ports wrote it down.

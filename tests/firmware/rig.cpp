@@ -119,6 +119,8 @@ Rig::Rig(RigOptions options)
   bushd_mcu_config config{};
   config.currents = currents_.data();
   config.current_motors = options.current_motors;
+  config.velocity = velocity_.data();
+  config.velocity_motors = options.velocity_motors;
   config.address = options.address;
   config.motors = options.motors;
   config.slots = options.slots;
@@ -144,12 +146,14 @@ void Rig::restart_with_nvm() {
   std::vector<Bytes> kept;
   for (std::uint8_t i = 0;; ++i) {
     const bushd_mcu_nvm_region piece = bushd_mcu_nvm_region_at(&mcu_, i);
-    if (piece.size == 0) break;
+    if (piece.at == nullptr) break;
     const auto* const bytes = static_cast<const std::uint8_t*>(piece.at);
     kept.emplace_back(bytes, bytes + piece.size);
   }
   const bushd_port port = mcu_.port;
   const bushd_mcu_config config = mcu_.config;
+  currents_ = {};
+  velocity_ = {};
   bushd_mcu_boot(&mcu_, &port, &config);
   for (std::uint8_t i = 0; i < kept.size(); ++i) {
     std::ranges::copy(kept[i], static_cast<std::uint8_t*>(bushd_mcu_nvm_region_at(&mcu_, i).at));
@@ -260,6 +264,12 @@ bushd_status Rig::currents(const bushd_currents& message) {
   Bytes payload(8);
   bushd_encode_currents(&message, payload.data());
   return request(BUSHD_MSG_CURRENTS, payload);
+}
+
+bushd_status Rig::velocity(const bushd_set_velocity& message) {
+  return request(BUSHD_MSG_VELOCITY, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_set_velocity(&message, p);
+                 }));
 }
 
 bushd_status Rig::home(const bushd_home& message) {

@@ -35,6 +35,7 @@ struct RigOptions {
   bool stores_address = true;
   bool trigger_input = true;
   std::uint8_t current_motors = 1;  // whose windings' currents the port controls
+  std::uint8_t velocity_motors = 2;
 };
 
 struct Answer {
@@ -131,6 +132,7 @@ class Rig {
   bushd_status set_inputs(const InputSettings& settings);
   bushd_status motor_inputs(const bushd_motor_inputs& message);
   bushd_status currents(const bushd_currents& message);
+  bushd_status velocity(const bushd_set_velocity& message);
   // What the port was told, in order of time.
   struct Winding {
     std::uint8_t motor;
@@ -221,6 +223,7 @@ class Rig {
   bushd_inputs pins_{};
   std::uint16_t current_ = 0;
   std::array<bushd_mcu_currents, BUSHD_MAX_CURRENT_MOTORS> currents_{};
+  std::array<bushd_mcu_velocity, BUSHD_MAX_VELOCITY_MOTORS> velocity_{};
   std::vector<Winding> windings_;
   std::uint32_t sync_id_ = 0;
   std::uint32_t port_tick_ns_ = 0;

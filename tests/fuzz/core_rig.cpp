@@ -50,6 +50,7 @@ void CoreRig::boot() {
             BUSHD_REQUIRE(motor < BUSHD_MAX_CURRENT_MOTORS && ma <= BUSHD_MAX_CURRENT_MA);
           }};
   currents_ = {};
+  velocity_ = {};
   bushd_mcu_config config = {.address = address_,
                              .motors = configuration_.motors,
                              .slots = kSlots,
@@ -64,6 +65,8 @@ void CoreRig::boot() {
                              .disabled_capabilities = configuration_.disabled_capabilities,
                              .currents = currents_.data(),
                              .current_motors = static_cast<std::uint8_t>(currents_.size()),
+                             .velocity = velocity_.data(),
+                             .velocity_motors = static_cast<std::uint8_t>(velocity_.size()),
                              .codes = codes_.data(),
                              .code_count = configuration_.codes,
                              .reply = reply(),

@@ -6,6 +6,7 @@
 
 #include "engine/message.h"
 #include "engine/run_state.h"
+#include "engine/velocity.h"
 #include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {
@@ -104,6 +105,12 @@ void decode_for_mcu(Bytes payload) {
     BUSHD_REQUIRE(currents.motor < BUSHD_MOTORS_PER_MCU);
     BUSHD_REQUIRE(currents.ramp_ma <= BUSHD_MAX_CURRENT_MA);
     BUSHD_REQUIRE((currents.cruise_ma == 0) == (currents.hold_ma == 0));
+  }
+  bushd_set_velocity velocity;
+  if (decoded(payload, &velocity, bushd_decode_set_velocity, bushd_encode_set_velocity)) {
+    BUSHD_REQUIRE(velocity.motor < BUSHD_MOTORS_PER_MCU && velocity.most <= BUSHD_VELOCITY_MOST);
+    BUSHD_REQUIRE(velocity.least <= velocity.most);
+    BUSHD_REQUIRE((velocity.most == 0) == (velocity.acceleration == 0));
   }
   bushd_home home;
   if (decoded(payload, &home, bushd_decode_home, bushd_encode_home)) {

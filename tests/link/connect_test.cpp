@@ -98,6 +98,26 @@ TEST(Connect, CurrentsAreToldToAnMcuThatControlsThem) {
   }
 }
 
+TEST(Connect, VelocitiesAreToldToAnMcuThatHasTheLoop) {
+  for (const bool has : {false, true}) {
+    FakeBus bus(1, 2);
+    if (has) bus.slaves[0].identity.capabilities |= BUSHD_CAN_VELOCITY;
+    bus.connect();
+    link::McuSetup setup = bus.setup.mcus[0];
+    setup.velocities = {{0, 0, 0, 0}};
+    if (has) setup.velocities.push_back({1, 6400, 96000, 500});
+    bus.master->reconfigure(McuIndex{0}, setup);
+    bus.heard.clear();
+    bus.connect();
+    const auto told = bus.heard_of(BUSHD_MSG_VELOCITY);
+    ASSERT_EQ(told.size(), has ? 2u : 0u);
+    if (!has) continue;
+    EXPECT_EQ(told[0].payload, std::vector<std::uint8_t>(13, 0)) << "it may have kept others";
+    EXPECT_EQ(told[1].payload,
+              (std::vector<std::uint8_t>{1, 0, 0x19, 0, 0, 0, 0x77, 1, 0, 0xF4, 1, 0, 0}));
+  }
+}
+
 TEST(Connect, AllMcusAgreeOnTheTime) {
   FakeBus bus(5, 2);
   bus.connect();

@@ -20,7 +20,7 @@ class Unfit : public testing::TestWithParam<Misfit> {};
 INSTANTIATE_TEST_SUITE_P(Identities, Unfit,
                          testing::Values(Misfit{"Version",
                                                 [](bushd_identity& i) { i.protocol_version = 9; },
-                                                {"protocol version 9", "this program version 4",
+                                                {"protocol version 9", "this program version 5",
                                                  "update"}},
                                          Misfit{"Outputs",
                                                 [](bushd_identity& i) { i.motors = 3; },
@@ -79,6 +79,17 @@ TEST(Connect, AnMcuWithoutAChopperIsNamedWhereCurrentsAreSet) {
   EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
   EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
               HasSubstr("controls no currents of windings, but motor 1 has `currents`"));
+}
+
+TEST(Connect, AnMcuWithoutTheVelocityLoopIsNamedWhereVelocityIsSet) {
+  FakeBus bus(1, 2);
+  link::McuSetup setup = bus.setup.mcus[0];
+  setup.velocities = {{0, 0, 0, 0}, {1, 6400, 96000, 500}};
+  bus.master->reconfigure(McuIndex{0}, setup);
+  bus.run_for(3'000'000);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
+              HasSubstr("moves no motor by the velocity loop, but motor 1 has `velocity`"));
 }
 
 TEST(Connect, ExactlyEnoughMemoryIsEnough) {

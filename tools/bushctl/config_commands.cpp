@@ -85,12 +85,17 @@ int run(Client& client, const api::Configure& request, const ConfigOptions& opti
 
 void add_config_commands(CommandLine& line) {
   const auto options = std::make_shared<ConfigOptions>();
-  line.add("config", "Change offset, direction and soft_limits of motors in operation")
+  line.add("config", "Change settings of motors in operation")
       .footer(
           "bushctl config [NAME]                what they are, and what bushd.toml says\n"
           "bushctl config NAME KEY=VALUE...     changes them, at rest: offset=12.5, "
           "direction=negative,\n"
-          "                                     soft_limits=-5,30 (on the dial), soft_limits=none\n"
+          "                                     soft_limits=-5,30 (on the dial), "
+          "soft_limits=none,\n"
+          "                                     velocity=MIN,MAX,ACCELERATION of local inputs, in "
+          "steps/s and steps/s^2,\n"
+          "                                     currents=RAMP,CRUISE,HOLD in mA, with slow or fast "
+          "behind them\n"
           "bushctl config --diff                what differs from bushd.toml\n"
           "bushctl config --save                writes that into bushd.toml, on the PC of bushd\n"
           "What is changed is kept in the state store, and counts until its key in bushd.toml is "

@@ -57,6 +57,8 @@
 #define BOARD_CURRENT_MOTORS 1u
 #define BOARD_CURRENTS chopper_currents
 #define BOARD_SET_CURRENT chopper_set
+// Each takes some 15 % of the CPU while it moves by the velocity loop.
+#define BOARD_VELOCITY_MOTORS 2u
 // Shorter, slots would not hold their interrupts: a slot then has 250 cycles.
 #define BOARD_MIN_TICK_NS 2000000u
 

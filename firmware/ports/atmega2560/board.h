@@ -46,6 +46,7 @@
 #define BOARD_CURRENT_MOTORS 0u
 #define BOARD_CURRENTS NULL
 #define BOARD_SET_CURRENT NULL
+#define BOARD_VELOCITY_MOTORS 0u
 // Shorter, slots would not hold their interrupts.
 #define BOARD_MIN_TICK_NS 900000u
 

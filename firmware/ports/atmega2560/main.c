@@ -25,6 +25,12 @@ _Static_assert(BUSHD_MCU_NVM_MAX_BYTES(BOARD_TABLE_CODES) <= NVM_MOST_BYTES,
 static bushd_mcu mcu;
 static int16_t queue[BOARD_QUEUE_TICKS * BOARD_MOTORS];
 static uint16_t codes[BOARD_TABLE_CODES];
+#if BOARD_VELOCITY_MOTORS > 0
+static bushd_mcu_velocity velocity[BOARD_VELOCITY_MOTORS];
+#define VELOCITY velocity
+#else
+#define VELOCITY NULL
+#endif
 static uint8_t failed_tests;
 
 static inline void name_parts(void) {
@@ -135,6 +141,8 @@ __attribute__((noinline)) static void boot(void) {
                              .in_pieces = true,
                              .currents = BOARD_CURRENTS,
                              .current_motors = BOARD_CURRENT_MOTORS,
+                             .velocity = VELOCITY,
+                             .velocity_motors = BOARD_VELOCITY_MOTORS,
                              .queue = queue,
                              .queue_ticks = BOARD_QUEUE_TICKS,
                              .codes = codes,

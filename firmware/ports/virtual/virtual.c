@@ -268,6 +268,7 @@ static void boot(bushd_virtual* v) {
   v->trigger_edge = BUSHD_EDGE_NONE;
   memset(v->currents, 0, sizeof v->currents);
   memset(v->current_ma, 0, sizeof v->current_ma);
+  memset(v->velocity, 0, sizeof v->velocity);
   begin_tick(v, 0);
   bushd_mcu_boot(&v->mcu, &port, &v->config.mcu);
   bushd_mcu_prepare(&v->mcu);
@@ -280,6 +281,7 @@ void bushd_virtual_init(bushd_virtual* v, const bushd_virtual_config* config) {
   v->config = *config;
   v->config.mcu.reply = v->reply;
   v->config.mcu.currents = v->currents;
+  v->config.mcu.velocity = v->velocity;
   v->next_event_ns = config->boot_ns;
   v->reset_cause = BUSHD_RESET_POWER_ON;
 }

@@ -95,6 +95,7 @@ typedef struct bushd_virtual {
   bool enable_kept;
   uint8_t reply[BUSHD_MCU_MAX_REPLY];
   bushd_mcu_currents currents[BUSHD_MAX_CURRENT_MOTORS];
+  bushd_mcu_velocity velocity[BUSHD_MAX_VELOCITY_MOTORS];
   bool compare_level;
   bushd_edge trigger_edge;  // awaited
 } bushd_virtual;

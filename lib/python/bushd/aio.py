@@ -437,8 +437,16 @@ class Client:
         offset: float | object = KEEP,
         direction: str | object = KEEP,
         soft_limits: tuple[float, float] | None | object = KEEP,
+        velocity: tuple[int, int, int] | None | object = KEEP,
+        currents: tuple[int | str, ...] | None | object = KEEP,
     ) -> model.Configuration:
-        given = {"offset": offset, "direction": direction, "soft_limits": soft_limits}
+        given = {
+            "offset": offset,
+            "direction": direction,
+            "soft_limits": soft_limits,
+            "velocity": velocity,
+            "currents": currents,
+        }
         changes = {key: value for key, value in given.items() if value is not KEEP}
         if changes and name is None:
             raise TypeError("name the motor whose settings are to change")

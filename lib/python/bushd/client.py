@@ -503,16 +503,27 @@ class Client:
         offset: float | object = KEEP,
         direction: str | object = KEEP,
         soft_limits: tuple[float, float] | None | object = KEEP,
+        velocity: tuple[int, int, int] | None | object = KEEP,
+        currents: tuple[int | str, ...] | None | object = KEEP,
     ) -> model.Configuration:
         """Shows the settings of this motor (or of all), or changes those that are written, of a motor at rest.
 
             client.config("theta", soft_limits=(-5.0, 30.0))    # None: no soft limits
             client.config("theta", offset=12.5, direction="negative")
+            client.config("theta", velocity=(100, 1500, 500))   # least and full speed in steps/s, steps/s^2
+            client.config("theta", currents=(1500, 1000, 300, "fast"))   # ramp, cruise, hold in mA, decay
 
         They are kept until the key in bushd.toml is edited. Returns what holds now, and what the file says.
         """
         return self._loop.run(
-            self._client.config(name, offset=offset, direction=direction, soft_limits=soft_limits)
+            self._client.config(
+                name,
+                offset=offset,
+                direction=direction,
+                soft_limits=soft_limits,
+                velocity=velocity,
+                currents=currents,
+            )
         )
 
     def history(self, name: str, most: int = 20) -> list[model.PastMotion]:

@@ -238,7 +238,7 @@ def show_configuration(names: Names) -> Request:
 
 
 def change_configuration(motor: str, changes: Mapping[str, object]) -> Request:
-    """Values: a number, a word, (low, high), or None for no soft limits."""
+    """Values: a number, a word, (low, high), a longer tuple of whole numbers and words, or None for none."""
     message = messages.configure_t()
     message.kind = messages.configure_t.CHANGE
     message.change_motors = [codec.text(motor)] * len(changes)
@@ -373,6 +373,8 @@ def _setting(value: object) -> str:
         return "none"
     if isinstance(value, str):
         return codec.text(value)
+    if isinstance(value, (tuple, list)) and len(value) > 2:
+        return ",".join(codec.text(one) if isinstance(one, str) else str(operator.index(one)) for one in value)
     if isinstance(value, (tuple, list)):
         low, high = value
         return f"[{_setting(low)}, {_setting(high)}]"

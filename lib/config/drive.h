@@ -1,0 +1,36 @@
+// What the MCU makes of a motor beyond its steps' times, and may be changed in operation.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace bushd::config {
+
+// Peak currents of the windings of a motor that its MCU drives by phases.
+struct Currents {
+  std::uint16_t ramp_ma = 0;
+  std::uint16_t cruise_ma = 0;
+  std::uint16_t hold_ma = 0;
+  bool fast_decay = false;
+
+  friend bool operator==(const Currents&, const Currents&) = default;
+};
+
+// Local motion by the velocity loop of engine/velocity.h.
+inline constexpr std::int64_t kMostStepsPerS = 40'000;  // a step in each interval of 25 us
+struct Velocity {
+  std::int32_t min_steps_per_s = 0;
+  std::int32_t max_steps_per_s = 0;
+  std::int32_t steps_per_s2 = 0;
+
+  friend bool operator==(const Velocity&, const Velocity&) = default;
+};
+
+struct Drive {
+  std::optional<Currents> currents = {};
+  std::optional<Velocity> velocity = {};
+
+  friend bool operator==(const Drive&, const Drive&) = default;
+};
+
+}  // namespace bushd::config
