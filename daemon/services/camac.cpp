@@ -132,6 +132,7 @@ void Camac::request(std::int64_t now_us, const api::Asker& asker, const api::Cam
   asker.answer(api::Accepted{});
   api::CamacResult result{.block = camac::transfer(now_us, crate->crate, request.block)};
   result.requests = crate->crate.requests();
+  crate->told &= result.requests;  // what is raised again before the next step is told again
   keep_memories(*crate);
   asker.answer(api::Completed{.outcome = api::Outcome::kDone,
                               .reason = std::to_string(result.block.tally) + " words",

@@ -106,16 +106,14 @@ void CamacMotors::step(std::int64_t now_us, Bushd2& module) {
     motion_.reset();
     return module.ends({});
   }
-  if (motion_->stage == Motion::Stage::kBegins) begin(now_us);
-  if (motion_->stage == Motion::Stage::kGetsTable) {
-    follow_table(now_us, module);
-  } else {
-    follow_move(now_us, module);
-  }
+  if (motion_->stage == Motion::Stage::kBegins) begin(now_us, module);
+  if (motion_ && motion_->stage == Motion::Stage::kGetsTable) follow_table(now_us, module);
+  if (motion_ && motion_->stage == Motion::Stage::kMoves) follow_move(now_us, module);
 }
 
-void CamacMotors::begin(std::int64_t now_us) {
+void CamacMotors::begin(std::int64_t now_us, Bushd2& module) {
   const GroupId group = installation_.config()[motion_->motor].group;
+  if (streams()) return move(now_us, module, motion_->table);
   motion_->stage = Motion::Stage::kGetsTable;
   const api::Asker by = asker();
   if (installation_.tables()[group]->content_hash() == motion_->table->content_hash()) {
@@ -124,28 +122,48 @@ void CamacMotors::begin(std::int64_t now_us) {
   tables_.use(now_us, by, group, motion_->table);
 }
 
+// The MCU has another table and cannot take this one, because it moves other motors. It ramps the
+// motor down by the table that it has; from a delay shorter than any of that it could not.
+bool CamacMotors::streams() const {
+  const GroupId group = installation_.config()[motion_->motor].group;
+  const tables::Table& in_mcu = *installation_.tables()[group];
+  if (in_mcu.content_hash() == motion_->table->content_hash()) return false;
+  if (!installation_.mcu_of(motion_->motor).streams() || !tables_.waits_for_motors(group)) {
+    return false;
+  }
+  const std::int64_t fastest_ns =
+      std::int64_t{bushd_table_fastest(&in_mcu.view())} * in_mcu.view().time_unit_ns;
+  const std::uint8_t fastest_code = motion_->program.codes[codes_used(motion_->program) - 1];
+  return fastest_code * std::int64_t{motion_->table->view().time_unit_ns} >= fastest_ns;
+}
+
 void CamacMotors::follow_table(std::int64_t now_us, Bushd2& module) {
   const auto& reply = session_->last_answer();
   if (!reply) return;
+  if (outcome_of(*reply) == api::Outcome::kDone) return move(now_us, module, {});
   const MotorId id = motion_->motor;
-  const motion::Motor& motor = installation_[id];
-  if (outcome_of(*reply) != api::Outcome::kDone) {
-    warn(id, motor.name() + ": its program was not put in service: " + reason_of(*reply));
-  } else if (motion_->to_stop) {
-    warn(id, motor.name() + ": stopped before it began");
-  } else if (motor.has_plan()) {
-    warn(id, motor.busy_text() + ", by another's request");
-  } else {
-    motion_->stage = Motion::Stage::kMoves;
-    motion_->from_steps = motor.position_steps();
-    const std::int64_t steps = motion_->program.steps;
-    ask_(now_us, asker(),
-         api::Move{.kind = api::Move::Kind::kRelative,
-                   .motors = {{motor.name(), motion_->program.left ? -steps : steps}}});
-    return;
-  }
+  warn(id, installation_[id].name() + ": its program was not put in service: " + reason_of(*reply));
   motion_.reset();
   module.ends({});
+}
+
+// By the table of its group, or by this one.
+void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TablePtr& by) {
+  const MotorId id = motion_->motor;
+  const motion::Motor& motor = installation_[id];
+  if (motion_->to_stop || motor.has_plan()) {
+    warn(id, motion_->to_stop ? motor.name() + ": stopped before it began"
+                              : motor.busy_text() + ", by another's request");
+    motion_.reset();
+    return module.ends({});
+  }
+  motion_->stage = Motion::Stage::kMoves;
+  motion_->from_steps = motor.position_steps();
+  const std::int64_t steps = motion_->program.steps;
+  const std::vector<api::MotorAmount> motors{
+      {motor.name(), motion_->program.left ? -steps : steps}};
+  if (by) return ask_(now_us, asker(), api::MoveLine{.motors = motors, .by = by});
+  ask_(now_us, asker(), api::Move{.motors = motors});
 }
 
 // All but the last one, which comes with the result.

@@ -1,6 +1,7 @@
-// The motors behind a BUSHD-2. A program becomes the table of its motor's group, as soon as the
-// MCUs of the group rest; then the motor is moved by the steps of the program. The module is told
-// as much of it as MCUs report.
+// The motors behind a BUSHD-2. A program becomes the table of its motor's group if the MCUs of the
+// group rest, and the motor is moved by it as by any table. Where they move other motors, it is
+// moved by the program at once, along a line of its own (lines.h). The module is told as much of it
+// as MCUs report.
 #pragma once
 
 #include <cstdint>
@@ -59,8 +60,10 @@ class CamacMotors final : public camac::Motors {
   };
 
   api::Asker asker() { return {.session = session_, .number = session_->next_number()}; }
-  void begin(std::int64_t now_us);
+  void begin(std::int64_t now_us, camac::Bushd2& module);
+  bool streams() const;
   void follow_table(std::int64_t now_us, camac::Bushd2& module);
+  void move(std::int64_t now_us, camac::Bushd2& module, const tables::TablePtr& by);
   void follow_move(std::int64_t now_us, camac::Bushd2& module);
   void tell_steps(std::int64_t now_us, camac::Bushd2& module);
   void end(std::int64_t now_us, camac::Bushd2& module, const api::Reply& reply);

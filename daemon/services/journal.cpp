@@ -29,8 +29,27 @@ Journal::Journal(const Installation& installation, Outputs& outputs)
   for ([[maybe_unused]] const MotorId motor : installation.motors()) {
     id_.add(std::uint64_t{0});
     autonomous_.add();
+    table_told_.add();
   }
   for ([[maybe_unused]] const McuId mcu : installation.mcus()) told_.add();
+}
+
+// Where no file has it, nobody could tell from the log what the motor was to do.
+void Journal::tell_table(MotorId motor, const tables::Table& table) {
+  if (!table.path().empty() || table_told_[motor] == table.content_hash()) return;
+  table_told_[motor] = table.content_hash();
+  const bushd_table& codes = table.view();
+  nlohmann::json line = {{"event", "table"},
+                         {"name", table.name()},
+                         {"table_sha256", table.content_hash()},
+                         {"time_unit_ns", codes.time_unit_ns},
+                         {"cruise", codes.cruise},
+                         {"accel", std::span(codes.accel.code, codes.accel.count)}};
+  if (!table.symmetric()) {
+    const std::span decel(codes.decel.code, codes.decel.count);
+    line["decel"] = std::vector<std::uint16_t>(decel.rbegin(), decel.rend());
+  }
+  outputs_.move_log(line.dump());
 }
 
 void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::uint32_t late_ns,
@@ -38,7 +57,9 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
   const motion::Motor& motor = installation_[id];
   const Mcu& mcu = installation_.mcu_of(id);
   const config::Bus& bus = installation_.bus_of(mcu).config;
-  const tables::Table& table = *installation_.table_of(id);
+  const auto& share = motor.axis().line();
+  const tables::Table& table = share && share->by ? *share->by : *installation_.table_of(id);
+  tell_table(id, table);
   id_[id] = ++last_id_;
   nlohmann::json line = {{"event", "move"},
                          {"id", id_[id]},
@@ -54,7 +75,6 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
                          {"start_tick", start},
                          {"steps", steps},
                          {"from_steps", motor.axis().from_steps()}};
-  const auto& share = motor.axis().line();
   if (share && share->track) {
     line["path"] = {{"line", motor.as<motion::OnLine>()->line},
                     {"way", share->way},
@@ -90,13 +110,13 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
 
 std::uint64_t Journal::line_laid(std::uint32_t longest, const std::vector<OnWay>& motors) {
   nlohmann::json line = {{"event", "line"}, {"way", ++last_id_}, {"longest", longest}};
-  for (const auto& [id, increment, floor] : motors) {
-    const tables::Table& table = *installation_.table_of(id);
+  for (const auto& [id, increment, floor, table] : motors) {
+    tell_table(id, *table);
     line["motors"].push_back({{"motor", installation_[id].name()},
                               {"increment", increment},
                               {"floor", floor},
-                              {"table_file", table.path()},
-                              {"table_sha256", table.content_hash()}});
+                              {"table_file", table->path()},
+                              {"table_sha256", table->content_hash()}});
   }
   outputs_.move_log(line.dump());
   return last_id_;
@@ -109,6 +129,7 @@ std::uint64_t Journal::path_laid(const std::vector<MotorId>& motors, const motio
       {"longest", path.steps()}, {"unit_ns", path.unit_ns()}, {"units", path.units()}};
   for (std::size_t i = 0; i < motors.size(); ++i) {
     const tables::Table& table = *installation_.table_of(motors[i]);
+    tell_table(motors[i], table);
     line["motors"].push_back({{"motor", installation_[motors[i]].name()},
                               {"from_steps", path.point(0, i)},
                               {"to_steps", path.point(path.segments(), i)},

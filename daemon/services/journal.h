@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -25,6 +26,7 @@ class Journal final : public Service {
     MotorId motor;
     std::uint32_t increment;
     std::uint16_t floor;
+    tables::TablePtr table;
   };
   std::uint64_t line_laid(std::uint32_t longest, const std::vector<OnWay>& motors);
   std::uint64_t path_laid(const std::vector<MotorId>& motors, const motion::Path& path);
@@ -62,6 +64,7 @@ class Journal final : public Service {
     bool set = false;       // the MCU's counter does not go on from there
   };
   void end_autonomous(MotorId motor, const Mcu& mcu);
+  void tell_table(MotorId motor, const tables::Table& table);
 
   const Installation& installation_;
   Outputs& outputs_;
@@ -69,6 +72,7 @@ class Journal final : public Service {
   std::map<std::uint64_t, std::size_t> rows_logged_;  // by array
   ById<MotorId, std::uint64_t> id_;                   // of its present move in the log
   ById<MotorId, std::optional<Autonomous>> autonomous_;
+  ById<MotorId, std::string> table_told_;  // of those that are no files, the last one: its hash
   ById<McuId, std::optional<motion::Tick>> told_;  // the tick of the last report
 };
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 namespace bushd::daemon {
+
 void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request) {
   const auto motors = installation_.find(request.motors);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
@@ -26,109 +27,6 @@ void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
   start(now_us, asker, std::move(*line));
 }
 
-Result<Lines::Line> Lines::line_of(const api::MoveLine& request) const {
-  Line line{.motors = *installation_.find(request.motors), .points = {}, .way = {}};
-  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
-  if (const auto one = on_one_bus(line.motors); !one) return fail(one.error());
-  auto points = points_of(line.motors, request);
-  if (!points) return fail(points.error());
-  line.points = std::move(*points);
-  std::vector<std::int64_t> from;
-  for (const MotorId motor : line.motors) from.push_back(installation_[motor].position_steps());
-  line.way = lay(line.motors, from, line.points.front());
-  line.target = line.way.longest();
-  if (auto fits = fits_duration(line, request.duration_s); !fits) return fail(fits.error());
-  return line;
-}
-
-Result<void> Lines::on_one_bus(const std::vector<MotorId>& motors) const {
-  if (motors.size() > api::MoveLine::kMostMotors) {
-    return fail(fmt::format("{} motors are named; a line has at most {}", motors.size(),
-                            api::MoveLine::kMostMotors));
-  }
-  const auto bus_name = [this](MotorId motor) {
-    return installation_.bus_of(installation_.mcu_of(motor)).config.name;
-  };
-  for (const MotorId motor : motors) {
-    if (installation_.mcu_of(motor).streams()) continue;
-    return fail(fmt::format(
-        "{} is on bus {}, which makes runs of tables only, no lines or paths; move it without "
-        "--line",
-        installation_[motor].name(), bus_name(motor)));
-  }
-  for (const MotorId motor : motors) {
-    if (bus_name(motor) == bus_name(motors.front())) continue;
-    return fail(fmt::format(
-        "{} is on bus {} and {} on bus {}: ticks of two buses are not in step, so motors of a line "
-        "must be on one. Move them without --line, or connect their MCUs to one bus",
-        installation_[motors.front()].name(), bus_name(motors.front()), installation_[motor].name(),
-        bus_name(motor)));
-  }
-  return {};
-}
-
-// The line itself is straight. A motor that should make a last approach for its backlash makes it
-// when all have arrived, and the others wait.
-Result<std::vector<Lines::Point>> Lines::points_of(const std::vector<MotorId>& motors,
-                                                   const api::MoveLine& request) const {
-  Point to;
-  Point back;
-  Point again;
-  bool approach = false;
-  for (std::size_t i = 0; i < motors.size(); ++i) {
-    const motion::Motor& motor = installation_[motors[i]];
-    const auto floor = moves_.floor_of(motors[i], request.speed);
-    if (!floor) return fail(floor.error());
-    const auto target = moves_.target_of(motors[i], request.motors[i].amount, request.kind, *floor);
-    if (!target) return fail(target.error());
-    const auto legs = motor.legs_to(*target, *floor);
-    if (!legs) return fail(motor.name() + ": " + legs.error().message);
-    const motion::Leg& last = legs->back();
-    const bool straight = legs->size() == 1;
-    approach = approach || !straight;
-    to.steps.push_back(*target);
-    to.floors.push_back(straight ? last.floor : *floor);
-    back.steps.push_back(straight ? *target : legs->front().target);
-    back.floors.push_back(*floor);
-    again.steps.push_back(*target);
-    again.floors.push_back(last.floor);
-  }
-  std::vector<Point> points{std::move(to)};
-  if (approach) {
-    points.push_back(std::move(back));
-    points.push_back(std::move(again));
-  }
-  return points;
-}
-
-motion::Way Lines::lay(const std::vector<MotorId>& motors, const std::vector<std::int64_t>& from,
-                       const Point& to) const {
-  std::vector<motion::Way::Motor> all;
-  for (std::size_t i = 0; i < motors.size(); ++i) {
-    all.push_back({.table = &installation_.table_of(motors[i])->view(),
-                   .from = from[i],
-                   .to = to.steps[i],
-                   .floor = to.floors[i]});
-  }
-  return motion::Way(std::move(all));
-}
-
-Result<void> Lines::fits_duration(Line& line, std::optional<double> duration_s) const {
-  if (line.way.longest() == 0) return {};
-  const double tick_ns = installation_[line.motors.front()].axis().tick_ns();
-  const double longest_ns = tick_ns * motion::Axis::kMaxDurationTicks;
-  if (line.way.duration_ns() > longest_ns) {
-    return fail(fmt::format(
-        "the line would take {:.0f} days, limited by {}; the longest move is {:.0f} days",
-        line.way.duration_ns() / 86400e9, limiting(line), longest_ns / 86400e9));
-  }
-  if (!duration_s) return {};
-  if (auto taken = line.way.take(*duration_s, longest_ns); !taken) {
-    return fail(taken.error().message + "; it is limited by " + limiting(line));
-  }
-  return {};
-}
-
 const std::string& Lines::limiting(const Line& line) const {
   return installation_[line.motors[line.way.limiting()]].name();
 }
@@ -137,7 +35,7 @@ void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, const Line& 
   std::vector<DryRun::Part> parts;
   std::vector<motion::Way> ways{line.way};
   for (std::size_t p = 1; p < line.points.size(); ++p) {
-    ways.push_back(lay(line.motors, line.points[p - 1].steps, line.points[p]));
+    ways.push_back(lay(line, line.points[p - 1].steps, line.points[p]));
   }
   const bool by_mcus = line.way.longest() != 0 && in_mcus(0, line);
   // The ways of one motor stand together.
@@ -181,17 +79,20 @@ void Lines::log(Line& line) {
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     motors.push_back({.motor = line.motors[i],
                       .increment = line.way.increment(i),
-                      .floor = line.way.motors()[i].floor});
+                      .floor = line.way.motors()[i].floor,
+                      .table = table_of(line, i)});
   }
   line.way.set_number(journal_.line_laid(line.way.longest(), motors));
 }
 
 void Lines::open(const api::Asker& asker, std::uint64_t number, const Line& line) {
-  open_.open(asker, line.motors, OpenMoves::Purpose::kLine);
+  // By a table of its own a motor makes what is a move for everybody.
+  const auto purpose = line.by ? OpenMoves::Purpose::kMove : OpenMoves::Purpose::kLine;
+  open_.open(asker, line.motors, purpose, line.by);
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     open_.planned(line.motors[i], static_cast<int>(line.points.size()), line.most_steps_per_s(i));
   }
-  if (line.longest() == 0) return;
+  if (line.longest() == 0 || line.by) return;
   open_.conclude(line.motors.front(), [this, number] { return conclusion(number); });
 }
 
@@ -327,7 +228,8 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
     if (motor.axis().stopping() || motor.is_paused() || motor.as<motion::OnLine>()->stands) {
       return refuse(motor.name() + " is being stopped or paused; wait for that, or resume it");
     }
-    const auto floor = moves_.floor_of(line.motors[i], request.speed);
+    auto floor = moves_.floor_of(line.motors[i], request.speed);
+    if (floor) floor = floor_on(line, i, *floor);
     if (!floor) return refuse(floor.error().text());
     floors.push_back(*floor);
   }
@@ -446,7 +348,7 @@ void Lines::go_on(std::int64_t now_us, std::uint64_t number, Line& line) {
   if (farthest == line.target) line.points.erase(line.points.begin());
   std::vector<std::int64_t> from;
   for (const MotorId id : line.motors) from.push_back(installation_[id].position_steps());
-  line.way = lay(line.motors, from, line.points.front());
+  line.way = lay(line, from, line.points.front());
   line.target = line.way.longest();
   log(line);
   begin_run(now_us, number, line, all, line.target);

@@ -55,6 +55,7 @@ class Lines final : public Service {
     std::vector<Point> points;    // the one that the way leads to, and those to come
     motion::Way way;
     std::uint32_t target = 0;  // step of the way at which its point is
+    tables::TablePtr by{};     // what its one motor goes by, in place of its own table
     // Of a path, in place of the way: all of it, and what the run that is made, or comes, is of it.
     std::shared_ptr<motion::Path> path{};
     std::shared_ptr<motion::Path> rest{};
@@ -92,10 +93,10 @@ class Lines final : public Service {
 
   Result<Line> line_of(const api::MoveLine& request) const;
   Result<void> on_one_bus(const std::vector<MotorId>& motors) const;
-  Result<std::vector<Point>> points_of(const std::vector<MotorId>& motors,
-                                       const api::MoveLine& request) const;
-  motion::Way lay(const std::vector<MotorId>& motors, const std::vector<std::int64_t>& from,
-                  const Point& to) const;
+  Result<std::vector<Point>> points_of(const Line& line, const api::MoveLine& request) const;
+  const tables::TablePtr& table_of(const Line& line, std::size_t motor) const;
+  Result<std::uint16_t> floor_on(const Line& line, std::size_t motor, std::uint16_t floor) const;
+  motion::Way lay(const Line& line, const std::vector<std::int64_t>& from, const Point& to) const;
   Result<void> fits_duration(Line& line, std::optional<double> duration_s) const;
 
   void plan_only(std::int64_t now_us, const api::Asker& asker, const Line& line);

@@ -30,7 +30,11 @@ double Lines::Line::most_steps_per_s(std::size_t motor) const {
 }
 
 motion::LineShare Lines::Line::share(std::size_t motor, std::uint32_t from, std::uint32_t to) {
-  if (!path) return way.share(motor, from, to);
+  if (!path) {
+    motion::LineShare share = way.share(motor, from, to);
+    share.by = by;
+    return share;
+  }
   motion::LineShare share{.way = path->number(),
                           .track = {},
                           .motor = motor,

@@ -29,11 +29,12 @@ std::string_view word(OpenMoves::Purpose purpose) {
   return "";
 }
 
-void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors, Purpose purpose) {
+void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors, Purpose purpose,
+                     const tables::TablePtr& by) {
   Open open{.asker = std::move(asker), .purpose = purpose, .tables = {}};
   for (const MotorId motor : motors) {
     open.from_steps[motor] = installation_[motor].position_steps();
-    open.tables.push_back(api::ref_to(*installation_.table_of(motor)));
+    open.tables.push_back(api::ref_to(by ? *by : *installation_.table_of(motor)));
   }
   open_.emplace(book_.open(motors), std::move(open));
 }

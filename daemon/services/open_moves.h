@@ -38,8 +38,10 @@ class OpenMoves {
   using Listener = std::function<void(const Ended&)>;
   void set_listener(Listener listener) { listener_ = std::move(listener); }
 
-  // Precondition: none of the motors is under way.
-  void open(api::Asker asker, const std::vector<MotorId>& motors, Purpose purpose);
+  // Precondition: none of the motors is under way. `by`: the table of all of them, if it is not
+  // their own.
+  void open(api::Asker asker, const std::vector<MotorId>& motors, Purpose purpose,
+            const tables::TablePtr& by = {});
   // How a motor's part is made: its legs, and the speed that none of them exceeds.
   void planned(MotorId motor, int legs, double most_steps_per_s);
   // What is said of this motor's part, which is open, if its plan ends with `outcome`; not if

@@ -252,6 +252,17 @@ std::vector<McuId> TablesInService::mcus_of(const std::vector<Part>& parts) cons
   return installation_.mcus_of(motors);
 }
 
+// As planned, or as reported.
+bool TablesInService::any_moves(McuId id) const {
+  const Mcu& mcu = installation_[id];
+  return installation_.any_moves(mcu) || (mcu.online() && mcu.report().moving != 0);
+}
+
+bool TablesInService::waits_for_motors(GroupId group) const {
+  return std::ranges::any_of(mcus_of({{.group = group, .wanted = {}}}),
+                             [this](McuId id) { return any_moves(id); });
+}
+
 // MCUs that are offline get the tables when they come.
 bool TablesInService::ready(const Change& change) const {
   for (const Change& other : changes_) {
@@ -263,9 +274,8 @@ bool TablesInService::ready(const Change& change) const {
   }
   return std::ranges::all_of(change.mcus, [this](McuId id) {
     const Mcu& mcu = installation_[id];
-    if (installation_.any_moves(mcu)) return false;
-    if (mcu.offline()) return true;
-    return mcu.online() && mcu.report().moving == 0 && !mcu.busy();
+    if (any_moves(id)) return false;
+    return mcu.offline() || (mcu.online() && !mcu.busy());
   });
 }
 

@@ -38,6 +38,9 @@ class TablesInService final : public Service {
   // the group has already is not given to it again.
   void use(std::int64_t now_us, const api::Asker& asker, GroupId group, tables::TablePtr table);
 
+  // Another table for the group would have to wait until motors of its MCUs rest.
+  bool waits_for_motors(GroupId group) const;
+
   // Answers to Outputs::read_tables and keep_tables.
   void read(std::int64_t now_us, std::uint64_t ticket,
             const std::vector<Result<tables::TablePtr>>& tables);
@@ -87,6 +90,7 @@ class TablesInService final : public Service {
   void supersede(const Change& by);
   const Change* changing(McuId mcu) const;
   std::vector<McuId> mcus_of(const std::vector<Part>& parts) const;
+  bool any_moves(McuId mcu) const;
   bool ready(const Change& change) const;
   void begin_upload(std::int64_t now_us, Change& change);
   std::int64_t upload_us(const Mcu& mcu) const;

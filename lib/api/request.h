@@ -72,6 +72,10 @@ struct MoveLine {
   bool dry_run = false;                // from rest only: result kDone with a MovePlan
   std::optional<Speed> speed{};        // no motor exceeds it; none: as fast as tables allow
   std::optional<double> duration_s{};  // not shorter than this; refused if it cannot be so slow
+  // Of CAMAC modules, no front end tells it: what a motor that is alone moves by, in place of its
+  // own table. Its MCU need not have it, and ramps the motor down by the own one when the link is
+  // lost; so no delay of this move may be shorter than any of that.
+  tables::TablePtr by = {};
 
   static constexpr std::size_t kMostMotors = 127;
 };

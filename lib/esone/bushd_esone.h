@@ -30,9 +30,10 @@
  * BUSHD-1 and BUSHD-2 have no F24 and F26 for LAM: these forbid and permit motion. Enable their
  * requests in the control register, and do not call cclm for them.
  *
- * Left out: CTCOMP, which no implementation at hand has; and what some have beyond the standard:
- * CCGL (crates here have no mask of the graded request), CTSTATUS (ctstat tells the same), CAOPEN,
- * CCOPEN, CDCHN, CCCOFF (nothing is to be opened, and no crate goes off line). */
+ * Left out: CTCOMP, which no implementation at hand has; and what single ones have beyond the
+ * standard, for their own hardware: CCGL (sets a mask of the graded request, which crates here do
+ * not have), CAOPEN, CCOPEN and CDCHN (open a crate, or choose the channel to it: here the daemon
+ * has opened all of them), CCCOFF (takes a crate off line, which none here can be). */
 #ifndef BUSHD_ESONE_H
 #define BUSHD_ESONE_H
 
@@ -49,6 +50,9 @@ int cfsa(int32_t f, int32_t ext, int32_t* data, int32_t* q);
 int cssa(int32_t f, int32_t ext, int16_t* data, int32_t* q);
 /* The status of the thread's last call. */
 int ctstat(int32_t* k);
+/* Not of the standard: the status of the last cycle at this address, of whichever thread, by cfsa,
+ * cssa, cfga, or a block that waits for each LAM; 0 before the first. It leaves ctstat as it is. */
+int ctstatus(int32_t ext, int32_t* k);
 /* Not of the standard: programs call it first. Nothing needs to be initialised. */
 int ccinit(int32_t b);
 

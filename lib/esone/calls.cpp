@@ -91,6 +91,18 @@ void Words::set(std::size_t i, std::uint32_t data) const {
 }
 
 Status Calls::cycle(int f, std::int32_t ext, std::uint32_t* data, bool* q) {
+  Status status = run(f, ext, data, q);
+  if (address_of(ext)) last_k_[ext] = status.k;
+  return status;
+}
+
+Status Calls::last_of(std::int32_t ext) const {
+  if (!address_of(ext)) return failed(kBadExt, "EXT is none of cdreg");
+  const auto found = last_k_.find(ext);
+  return {.k = found == last_k_.end() ? 0 : found->second};
+}
+
+Status Calls::run(int f, std::int32_t ext, std::uint32_t* data, bool* q) {
   *q = false;
   const auto address = address_of(ext);
   if (!is_function(f)) return failed(kBadFunction, "functions are 0..31");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -60,6 +61,8 @@ class Calls {
 
   // One cycle. `data` may be null for a function that moves none.
   Status cycle(int f, std::int32_t ext, std::uint32_t* data, bool* q);
+  // Of the last one at this address; 0 before the first.
+  Status last_of(std::int32_t ext) const;
   // A cycle of the controller of the crate that EXT is in.
   Status control(std::int32_t ext, int n, int a, int f, bool* q);
 
@@ -81,10 +84,12 @@ class Calls {
 
  private:
   Status begin(std::int32_t* cb, std::int32_t timeout_ms);
+  Status run(int f, std::int32_t ext, std::uint32_t* data, bool* q);
   Status at(const Lam& lam, int a, int f, std::uint32_t data, camac::Response* response);
 
   Port* port_;
   std::vector<Lam> lams_;
+  std::map<std::int32_t, std::int32_t> last_k_;  // by EXT
 };
 
 }  // namespace bushd::esone

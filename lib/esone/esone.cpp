@@ -176,6 +176,12 @@ int ctstat(int32_t* k) {
   return *k;
 }
 
+int ctstatus(int32_t ext, int32_t* k) {
+  const std::lock_guard lock(mutex);
+  *k = calls().last_of(ext).k;
+  return *k;
+}
+
 int ccinit(int32_t b) {
   return told(b >= 0 && b <= kLastBranch ? Status{} : failed(kBadBranch, "branches are 0..7"));
 }

@@ -24,6 +24,10 @@ void ctstat_(int32_t* k);
 void ctstat_(int32_t* k) {
   ctstat(k);
 }
+void ctstatus_(const int32_t* ext, int32_t* k);
+void ctstatus_(const int32_t* ext, int32_t* k) {
+  ctstatus(*ext, k);
+}
 void cccz_(const int32_t* ext);
 void cccz_(const int32_t* ext) {
   cccz(*ext);

@@ -28,6 +28,7 @@
 #include "motion/run_blocks.h"
 #include "motion/trajectory.h"
 #include "tables/envelope.h"
+#include "tables/table.h"
 
 namespace bushd::motion {
 
@@ -47,6 +48,7 @@ struct Change {
 // What a motor makes of the run of its line, or of its path.
 struct LineShare {
   std::uint64_t way = 0;                               // its number, for logs
+  tables::TablePtr by = {};                            // the motor's own is not what it goes by
   std::shared_ptr<const tables::Envelope> table = {};  // of the run; none: of a path
   std::shared_ptr<RunBlocks> blocks = {};              // of the run of a line, for all its motors
   std::shared_ptr<const PathTrack> track = {};         // of a path, with the motor's place in it

@@ -33,7 +33,7 @@ Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const 
                 ", or 'bushctl confirm NAME' if it stands where it is shown");
   }
   if (is<OnLine>()) {
-    return fail("it moves on a line with other motors; stop it first, then move it by itself");
+    return fail("it moves on a line, or by a CAMAC program; stop it first, then move it by itself");
   }
   if (follows()) return fail("it follows an array; stop it first, then move it by itself");
   if (restored_reason_ && setup_.restored_refused) {

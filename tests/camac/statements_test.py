@@ -17,7 +17,7 @@ class Statements(unittest.TestCase):
         self.assertEqual(list(rows), [f"S{number}" for number in range(1, 35)])
         tests = set()
         for source in sorted((SOURCE / "tests").glob("*/**/*camac*.cpp")) + sorted((SOURCE / "tests/camac").glob("*.cpp")):
-            tests |= {f"{suite}.{name}" for suite, name in re.findall(r"^TEST(?:_F)?\((\w+), (\w+)\)", source.read_text(), re.MULTILINE)}
+            tests |= {f"{suite}.{name}" for suite, name in re.findall(r"^TEST(?:_[FP])?\((\w+), (\w+)\)", source.read_text(), re.MULTILINE)}
         for statement, cell in rows.items():
             named = re.findall(r"`(\w+\.\w+)`", cell)
             with self.subTest(statement=statement):

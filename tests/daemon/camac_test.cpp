@@ -243,6 +243,28 @@ TEST(CamacMotion, SoftLimitsHold) {
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
+// Cleared and started in one block; what begins after it is refused at once.
+TEST(CamacMotion, ALamThatFallsAndRisesBetweenTwoStepsIsToldAgain) {
+  CamacLab lab(lab_with(
+      "fine", "unit = \"mm\"\nsteps_per_unit = 100\nsoft_limits = [-1, 1]\nbacklash = 0.1\n"));
+  lab.load(0, 100, falling_codes());
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.wait_for_lam());
+  lab.naf(kStation, 1, 16, 0);
+  lab.naf(kStation, 0, 16, 200);  // steps
+  const std::size_t before = lab.lams().size();
+  const Answer answer = lab.block({.cycles = {{kStation, 0, 10},
+                                              {kStation, 2, 16, kEnabled | kLeft},
+                                              {kStation, 0, 26},
+                                              {kStation, 0, 8}},
+                                   .count = 4});
+  EXPECT_FALSE(answer.camac->block.responses.back().q);
+  lab.run_until([&] { return lab.lams().size() > before; }, 3);
+  EXPECT_EQ(lab.lams().size(), before + 1);
+  EXPECT_THAT(lab.warnings().back(), HasSubstr("for backlash"));
+  EXPECT_TRUE(lab.lam());
+}
+
 TEST(CamacMotion, AMotorThatMovesAlreadyIsLeftAlone) {
   CamacLab lab;
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {3000});

@@ -128,6 +128,22 @@ TEST_F(EsoneTest, StatusHasXAndQ) {
   EXPECT_EQ(word, 0xFF);
 }
 
+TEST_F(EsoneTest, EachAddressHasItsStatus) {
+  std::int32_t data = 0;
+  std::int32_t q = 0;
+  std::int32_t k = 7;
+  EXPECT_EQ(ctstatus(ext(5, 3), &k), 0) << "before the first cycle";
+  cfsa(10, ext(5, 0), &data, &q);
+  cfsa(0, ext(9, 0), &data, &q);
+  cfsa(0, ext(5, 1), &data, &q);
+  EXPECT_EQ(ctstatus(ext(5, 0), &k), 1);
+  EXPECT_EQ(k, 1);
+  EXPECT_EQ(ctstatus(ext(9, 0), &k), 3);
+  EXPECT_EQ(ctstatus(ext(5, 1), &k), 0);
+  EXPECT_EQ(e(ctstatus(0, &k)), kBadExt);
+  EXPECT_EQ(ctstat(&k), 0) << "that of the last call";
+}
+
 TEST_F(EsoneTest, CrateControls) {
   std::int32_t l = 5;
   EXPECT_EQ(ccci(ext(5, 0), 2), 0);

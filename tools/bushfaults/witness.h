@@ -245,7 +245,7 @@ class Witness {
   void paused(TimeNs now_ns, const Key& key, const std::string& reason);
   // CAMAC modules, which ask for motion themselves.
   void asked_by_module(TimeNs now_ns, const std::string& what, const std::string& motor);
-  void module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted);
+  void module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted, bool on_line);
   void module_ended(TimeNs now_ns, Motor& motor, const End& end, bool whole);
   void check_program(TimeNs now_ns, const Motor& motor);
   bool is_of_module(const Motor& motor) const {

@@ -18,14 +18,18 @@ void Witness::lam(TimeNs now_ns, const bushd::api::CamacLam& lam) {
 
 void Witness::asked_by_module(TimeNs now_ns, const std::string& what, const std::string& motor) {
   recent_.note(now_ns, fmt::format("  {} of {}: {}", what, Crates::kBushd2Client, motor));
-  if (what == "move") return module_moves(now_ns, *find(motor), crates_.accepted(motor));
+  const bool on_line = what == "move line";  // its MCU has another table
+  if (what == "move" || on_line) {
+    return module_moves(now_ns, *find(motor), crates_.accepted(motor), on_line);
+  }
   Request stop{.client = Crates::kBushd2Client, .ask = Ask::kStop};
   stop.add(motor, 0);
   stop_accepted(stop);
 }
 
 // From now on it is a move as everybody's, but that nobody hears its result.
-void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted) {
+void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted,
+                           bool on_line) {
   if (accepted.wrong) return violated(now_ns, *accepted.wrong);
   std::erase_if(asked_, [&](const auto& entry) {
     const bool of_module = std::get<1>(entry.first) == Crates::kBushd2Client;
@@ -36,6 +40,7 @@ void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& 
   Request request{.client = Crates::kBushd2Client,
                   .number = ++module_moves_,
                   .ask = Ask::kMoveBy,
+                  .line = on_line,
                   .unknown_way = !program_};
   request.add(motor.name, program_ ? program_->steps : 0);
   if (program_) {
@@ -58,7 +63,8 @@ void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& 
 
 void Witness::module_ended(TimeNs now_ns, Motor& motor, const End& end, bool whole) {
   const bool reached = end.word == "reached";
-  ++moves_by_result_["camac " + end.word];
+  const bool on_line = asked_.at(*motor.move).request.line;
+  ++moves_by_result_[(on_line ? "camac streamed " : "camac ") + end.word];
   if (reached && whole) check_program(now_ns, motor);
   crates_.motion_ended(reached);
   motor.move.reset();

@@ -29,7 +29,6 @@ and staggered it lies in its tick: T.
 import bisect
 import hashlib
 import math
-import tomllib
 from collections import namedtuple
 from itertools import chain, repeat
 
@@ -42,14 +41,13 @@ INTERIOR, FIRST_TICK, LAST_TICK = range(3)
 
 
 class Table:
-    def __init__(self, path, text):
+    def __init__(self, path, content):
         try:
-            content = tomllib.loads(text)
             self.accel = content["accel"]
             self.decel = content.get("decel", self.accel[::-1])[::-1]  # by steps before the end
             self.cruise = content.get("cruise", self.accel[-1])
             self.unit_ns = content["time_unit_ns"]
-        except (tomllib.TOMLDecodeError, KeyError, IndexError) as error:
+        except (KeyError, IndexError) as error:
             raise InputError(f"{path}: table cannot be read: {error!r}") from None
 
     def sha256(self):

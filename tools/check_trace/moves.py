@@ -7,7 +7,7 @@ from check_trace.arrays import Array, ArrayMove
 from check_trace.lines import Envelope, LineMove, Part
 from check_trace.motion import Move
 from check_trace.problems import InputError
-from check_trace.tables import find_table
+from check_trace.tables import Tables
 
 
 class Autonomous:
@@ -76,7 +76,7 @@ class MoveLog:
         self._problems = problems
         self._moves = {}  # by motor and id: a group move has one id
         self._at_steps = {}  # by motor name: where the last result or "set" leaves it
-        self._tables = {}
+        self._tables = Tables()
         self._ways = {}  # by number: the tables of lines
         self._arrays = {}  # by number
         self._ticks = set()  # (bus, tick_ns)
@@ -86,6 +86,7 @@ class MoveLog:
         take = {
             "request": lambda event: None,  # who has asked for it
             "requests": lambda event: None,  # how many more
+            "table": self._tables.told,
             "line": self._line,
             "path": self._path,
             "array": self._array,
@@ -146,7 +147,7 @@ class MoveLog:
         motor = self._motor_of(event, f"move {event['id']}")
         if motor is None:
             return
-        table = self._table(event)
+        table = self._tables.of(event)
         if "path" in event:
             move = PathMove(event, table)
         elif "line" in event:
@@ -158,16 +159,10 @@ class MoveLog:
         motor.moves.append(move)
         self._moves[motor.name, move.id] = move
 
-    def _table(self, event):
-        which = event["table_file"], event["table_sha256"]
-        if which not in self._tables:
-            self._tables[which] = find_table(*which)
-        return self._tables[which]
-
     def _line(self, event):
         """A way of a line: the table of its runs."""
         longest = event["longest"]
-        parts = [Part(self._table(motor), motor["increment"], longest, motor["floor"]) for motor in event["motors"]]
+        parts = [Part(self._tables.of(motor), motor["increment"], longest, motor["floor"]) for motor in event["motors"]]
         self._ways[event["way"]] = Envelope(parts)
 
     def _path(self, event):

@@ -6,6 +6,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import tomllib
 import unittest
 
 TOP = pathlib.Path(__file__).resolve().parents[3]
@@ -30,7 +31,7 @@ class CheckPulses(unittest.TestCase):
             (folder / "t.toml").write_text(TABLE)
             (folder / "trace.vcd").write_text(vcd(times_ns, positive))
             move = {"event": "move", "id": 1, "motor": "x", "bus": "com1", "table_file": str(folder / "t.toml")}
-            move |= {"table_sha256": Table("t", TABLE).sha256(), "steps": steps, "from_steps": 5}
+            move |= {"table_sha256": Table("t", tomllib.loads(TABLE)).sha256(), "steps": steps, "from_steps": 5}
             result = {"event": "result", "id": 1, "motor": "x", "result": "reached", "position_steps": 5 + steps}
             (folder / "moves.jsonl").write_text(json.dumps(move) + "\n" + json.dumps(result) + "\n")
             command = [sys.executable, "-B", TOP / "tools" / "check-pulses", "--bus", "com1"]

@@ -1,0 +1,135 @@
+// Where a line leads, by which table, and how fast.
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <utility>
+
+#include "daemon/services/lines.h"
+
+namespace bushd::daemon {
+
+Result<Lines::Line> Lines::line_of(const api::MoveLine& request) const {
+  Line line{
+      .motors = *installation_.find(request.motors), .points = {}, .way = {}, .by = request.by};
+  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
+  if (const auto one = on_one_bus(line.motors); !one) return fail(one.error());
+  auto points = points_of(line, request);
+  if (!points) return fail(points.error());
+  line.points = std::move(*points);
+  std::vector<std::int64_t> from;
+  for (const MotorId motor : line.motors) from.push_back(installation_[motor].position_steps());
+  line.way = lay(line, from, line.points.front());
+  line.target = line.way.longest();
+  if (auto fits = fits_duration(line, request.duration_s); !fits) return fail(fits.error());
+  return line;
+}
+
+Result<void> Lines::on_one_bus(const std::vector<MotorId>& motors) const {
+  if (motors.size() > api::MoveLine::kMostMotors) {
+    return fail(fmt::format("{} motors are named; a line has at most {}", motors.size(),
+                            api::MoveLine::kMostMotors));
+  }
+  const auto bus_name = [this](MotorId motor) {
+    return installation_.bus_of(installation_.mcu_of(motor)).config.name;
+  };
+  for (const MotorId motor : motors) {
+    if (installation_.mcu_of(motor).streams()) continue;
+    return fail(fmt::format(
+        "{} is on bus {}, which makes runs of tables only, no lines or paths; move it without "
+        "--line",
+        installation_[motor].name(), bus_name(motor)));
+  }
+  for (const MotorId motor : motors) {
+    if (bus_name(motor) == bus_name(motors.front())) continue;
+    return fail(fmt::format(
+        "{} is on bus {} and {} on bus {}: ticks of two buses are not in step, so motors of a line "
+        "must be on one. Move them without --line, or connect their MCUs to one bus",
+        installation_[motors.front()].name(), bus_name(motors.front()), installation_[motor].name(),
+        bus_name(motor)));
+  }
+  return {};
+}
+
+// The line itself is straight. A motor that should make a last approach for its backlash makes it
+// when all have arrived, and the others wait; one that is alone turns where it makes it from.
+Result<std::vector<Lines::Point>> Lines::points_of(const Line& line,
+                                                   const api::MoveLine& request) const {
+  const std::vector<MotorId>& motors = line.motors;
+  Point to;
+  Point back;
+  Point again;
+  bool approach = false;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    const motion::Motor& motor = installation_[motors[i]];
+    const auto floor = moves_.floor_of(motors[i], request.speed);
+    if (!floor) return fail(floor.error());
+    const auto target = moves_.target_of(motors[i], request.motors[i].amount, request.kind, *floor);
+    if (!target) return fail(target.error());
+    const auto legs = motor.legs_to(*target, *floor);
+    if (!legs) return fail(motor.name() + ": " + legs.error().message);
+    const motion::Leg& last = legs->back();
+    const bool straight = legs->size() == 1;
+    const auto fast = floor_on(line, i, *floor);
+    const auto slow = floor_on(line, i, last.floor);
+    if (!fast || !slow) return fail(fast ? slow.error() : fast.error());
+    approach = approach || !straight;
+    to.steps.push_back(*target);
+    to.floors.push_back(straight ? *slow : *fast);
+    back.steps.push_back(straight ? *target : legs->front().target);
+    back.floors.push_back(*fast);
+    again.steps.push_back(*target);
+    again.floors.push_back(*slow);
+  }
+  if (!approach) return std::vector<Point>{std::move(to)};
+  if (motors.size() == 1) return std::vector<Point>{std::move(back), std::move(again)};
+  return std::vector<Point>{std::move(to), std::move(back), std::move(again)};
+}
+
+const tables::TablePtr& Lines::table_of(const Line& line, std::size_t motor) const {
+  return line.by ? line.by : installation_.table_of(line.motors[motor]);
+}
+
+// A floor of the motor, which is in units of its own table, in those of the table that it goes by.
+Result<std::uint16_t> Lines::floor_on(const Line& line, std::size_t motor,
+                                      std::uint16_t floor) const {
+  if (!line.by) return floor;
+  const std::uint64_t unit_ns = line.by->view().time_unit_ns;
+  const std::uint64_t own_ns = installation_.table_of(line.motors[motor])->view().time_unit_ns;
+  const std::uint64_t units = (floor * own_ns + unit_ns - 1) / unit_ns;
+  if (units <= UINT16_MAX) return static_cast<std::uint16_t>(units);
+  return fail(
+      fmt::format("{}: a step of {:.3g} s is slower than table {} can tell; raise its "
+                  "max_speed or backlash_speed, or give the table a longer time unit",
+                  installation_[line.motors[motor]].name(),
+                  static_cast<double>(floor * own_ns) * 1e-9, line.by->name()));
+}
+
+motion::Way Lines::lay(const Line& line, const std::vector<std::int64_t>& from,
+                       const Point& to) const {
+  std::vector<motion::Way::Motor> all;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    all.push_back({.table = &table_of(line, i)->view(),
+                   .from = from[i],
+                   .to = to.steps[i],
+                   .floor = to.floors[i]});
+  }
+  return motion::Way(std::move(all));
+}
+
+Result<void> Lines::fits_duration(Line& line, std::optional<double> duration_s) const {
+  if (line.way.longest() == 0) return {};
+  const double tick_ns = installation_[line.motors.front()].axis().tick_ns();
+  const double longest_ns = tick_ns * motion::Axis::kMaxDurationTicks;
+  if (line.way.duration_ns() > longest_ns) {
+    return fail(fmt::format(
+        "the line would take {:.0f} days, limited by {}; the longest move is {:.0f} days",
+        line.way.duration_ns() / 86400e9, limiting(line), longest_ns / 86400e9));
+  }
+  if (!duration_s) return {};
+  if (auto taken = line.way.take(*duration_s, longest_ns); !taken) {
+    return fail(taken.error().message + "; it is limited by " + limiting(line));
+  }
+  return {};
+}
+
+}  // namespace bushd::daemon
