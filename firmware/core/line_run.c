@@ -1,7 +1,7 @@
-// LINE_RUN. One run for all motors of the line, made step by step; in each of its steps every motor
-// is asked whether it makes one of its own there (engine/line_follower.h). All MCUs of the line
-// have the same run, begun at the same tick, and changed at the same ticks by the same rules: so
-// the motors of all of them are on the line without a word between them.
+// LINE_RUN. One run for all motors of the line, made step by step; every motor is asked which of
+// its own steps fall into these (engine/line_follower.h). All MCUs of the line have the same run,
+// begun at the same tick, and changed at the same ticks by the same rules: so the motors of all of
+// them are on the line without a word between them.
 //
 // The silence after which the run is ramped down is counted from a time that all MCUs know alike:
 // that which the last SYNC frame has told, in ticks of the bus, or the run's first tick.
@@ -87,34 +87,42 @@ bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* messa
   return BUSHD_OK;
 }
 
-// What the motors make of the part of a step of the run that lies in this tick.
-static void follow(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors,
-                   const bushd_run_walk* walk, bool keep_slots) {
-  const uint32_t step = mcu->line.step;
-  const uint16_t parts = walk->parts;
+// What the motors make of these steps of the run. Not inlined, as emit_tick: with the spans in its
+// frame it would be slow on an 8-bit MCU.
+__attribute__((noinline)) static void follow(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer,
+                                             uint16_t motors, const bushd_run_spans* spans) {
+  const uint16_t keep_slots = bushd_mcu_steps_keep_slots(mcu) ? UINT16_MAX : 0;
   bushd_mcu_motor* motor = mcu->motor;
   int16_t* steps = slot_buffer->steps;
   uint16_t active = 0;
   uint16_t bit = 1;
   for (; motors != 0; motors = (uint16_t)(motors >> 1), ++motor, ++steps) {
-    bushd_line_follower* follower = &motor->on_line.follower;
-    if ((motors & 1u) != 0 && bushd_line_follower_due(follower, step, parts)) {
-      if (keep_slots) slot_buffer->step[bushd_run_walk_slot(walk, follower->due_part)] |= bit;
-      *steps = (int16_t)(*steps + motor->on_line.direction);
-      active |= bit;
-      bushd_line_follower_step(follower);
+    if ((motors & 1u) != 0) {
+      const uint8_t made =
+          bushd_line_follower_make(&motor->on_line.follower, spans, bit & keep_slots);
+      if (made != 0) {
+        active |= bit;
+        *steps = (int16_t)(motor->on_line.direction < 0 ? *steps - made : *steps + made);
+      }
     }
     bit = (uint16_t)(bit << 1);
   }
   slot_buffer->active |= active;
 }
 
-static uint16_t forward(const bushd_mcu* mcu, uint16_t motors) {
-  uint16_t positive = 0;
-  for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
-    if ((motors & 1u) != 0 && mcu->motor[m].on_line.direction > 0) positive |= motor_bit(m);
+// Before its first step in the tick. Returns those that go forward.
+static uint16_t begin_tick(bushd_mcu_motor* motor, int16_t* steps, uint16_t motors) {
+  uint16_t forward = 0;
+  uint16_t bit = 1;
+  for (; motors != 0; motors = (uint16_t)(motors >> 1), ++motor, ++steps) {
+    if ((motors & 1u) != 0) {
+      *steps = 0;
+      motor->remainder = 0;  // until ticks follow (bushd_mcu_leave_line)
+      if (motor->on_line.direction > 0) forward |= bit;
+    }
+    bit = (uint16_t)(bit << 1);
   }
-  return positive;
+  return forward;
 }
 
 // Of a ramp-down: otherwise the end is known beforehand.
@@ -127,21 +135,22 @@ static void end_ramp_down(bushd_mcu* mcu, uint16_t motors) {
   }
 }
 
-void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors) {
+// Apart from what it needs first: a tick in the terms of a table may have to be made, by divisions.
+__attribute__((noinline)) static void emit_tick(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer,
+                                                uint16_t motors, const bushd_run_tick* tick) {
   bushd_run* run = &mcu->line.run;
-  const bool keep_slots = bushd_mcu_steps_keep_slots(mcu);
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    if ((motors & motor_bit(m)) == 0) continue;
-    slot_buffer->steps[m] = 0;
-    mcu->motor[m].remainder = 0;  // until ticks follow (bushd_mcu_leave_line)
-  }
   bushd_run_walk walk;
-  bushd_run_walk_begin(&walk, run, bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table));
-  while (bushd_run_walk_next(&walk, run)) {
-    follow(mcu, slot_buffer, motors, &walk, keep_slots);
-    if (walk.parts == 256u) ++mcu->line.step;
-  }
-  mcu->direction = (mcu->direction & (uint16_t)~motors) | forward(mcu, motors);
+  bushd_run_spans spans;
+  bushd_run_walk_begin(&walk, run, tick, &spans, mcu->line.step, slot_buffer->step);
+  while (bushd_run_walk_next(&walk, run, &spans)) follow(mcu, slot_buffer, motors, &spans);
+  mcu->line.step = spans.step;
+}
+
+void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors) {
+  const bushd_run* run = &mcu->line.run;
+  const uint16_t forward = begin_tick(mcu->motor, slot_buffer->steps, motors);
+  emit_tick(mcu, slot_buffer, motors, bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table));
+  mcu->direction = (mcu->direction & (uint16_t)~motors) | forward;
   mcu->stream.begun |= motors;
   if (bushd_run_done(run)) end_ramp_down(mcu, motors);
 }
