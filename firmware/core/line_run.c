@@ -46,6 +46,28 @@ static uint16_t motors_of(const bushd_line_part* part) {
   return mask;
 }
 
+bool bushd_mcu_place_on_line(bushd_mcu* mcu) {
+  uint16_t* const unplaced = &mcu->line.unplaced;
+  // The place of one that has left it is another's.
+  *unplaced &= mcu->line.motors;
+  for (uint8_t m = 0; m < mcu->config.motors && *unplaced != 0; ++m) {
+    if ((*unplaced & motor_bit(m)) == 0) continue;
+    bushd_mcu_on_line* on_line = &mcu->motor[m].on_line;
+    const uint32_t increment = on_line->follower.increment;
+    on_line->share = bushd_line_share(increment, mcu->line.longest);
+    bushd_line_follower_start(&on_line->follower, increment, mcu->line.longest,
+                              mcu->line.step - 1u);
+    *unplaced &= (uint16_t)~motor_bit(m);
+    return true;
+  }
+  return false;
+}
+
+static void place_all(bushd_mcu* mcu) {
+  while (bushd_mcu_place_on_line(mcu)) {
+  }
+}
+
 static void begin(bushd_mcu* mcu, const bushd_line_run* message, uint32_t ticks) {
   const bushd_line_part* part = &message->line;
   mcu->line.slot = part->slot;
@@ -56,13 +78,13 @@ static void begin(bushd_mcu* mcu, const bushd_line_run* message, uint32_t ticks)
   for (uint8_t i = 0; i < part->count; ++i) {
     const bushd_line_entry entry = bushd_next_line_entry(&at);
     bushd_mcu_on_line* on_line = &mcu->motor[entry.motor].on_line;
-    const uint64_t share = ((uint64_t)entry.increment << 16) / part->longest;
     on_line->direction = entry.direction;
-    on_line->share = share < UINT16_MAX ? (uint16_t)share : UINT16_MAX;
-    bushd_line_follower_start(&on_line->follower, entry.increment, part->longest, part->from);
+    on_line->follower.increment = entry.increment;
     mcu->line.motors |= motor_bit(entry.motor);
     bushd_mcu_begin_run(mcu, entry.motor, message->first_tick, ticks);
   }
+  mcu->line.unplaced = mcu->line.motors;
+  if (!mcu->config.in_pieces) place_all(mcu);
 }
 
 bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message) {
@@ -148,6 +170,7 @@ __attribute__((noinline)) static void emit_tick(bushd_mcu* mcu, bushd_slot_buffe
 
 void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors) {
   const bushd_run* run = &mcu->line.run;
+  place_all(mcu);
   const uint16_t forward = begin_tick(mcu->motor, slot_buffer->steps, motors);
   emit_tick(mcu, slot_buffer, motors, bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table));
   mcu->direction = (mcu->direction & (uint16_t)~motors) | forward;

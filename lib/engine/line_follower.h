@@ -32,9 +32,12 @@ typedef struct bushd_line_follower {
 } bushd_line_follower;
 
 // The motor's place on its line when `from` steps of the run are over. Precondition: 1 <= increment
-// <= longest < 2^31, from <= longest. Three divisions.
+// <= longest < 2^31, from <= longest. Two divisions of 32 bits, and one of 64 unless `from` is 0.
 void bushd_line_follower_start(bushd_line_follower* follower, uint32_t increment, uint32_t longest,
                                uint32_t from);
+
+// N / L x 2^16, rounded down; for L / L what is just below. Precondition: as above.
+uint16_t bushd_line_share(uint32_t increment, uint32_t longest);
 
 // The step that is due has been made: the next one is. O(1), no division.
 static inline void bushd_line_follower_step(bushd_line_follower* follower) {
