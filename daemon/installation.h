@@ -90,9 +90,8 @@ class Mcu {
   // Its drivers are disabled at rest (IdleDrivers), and enabled when one of its motors is to move.
   bool asleep = false;
   bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
-  bool can_run_lines() const { return master_.can_run_lines(on_bus_); }
-  bool has_table(const bushd_table& table) const {
-    return master_.slot_of(on_bus_, table).has_value();
+  bool can_run_line(const bushd_table& table, std::uint16_t floor, bool alone) const {
+    return master_.can_run_line(on_bus_, table, floor, alone);
   }
   bool can_trigger() const { return master_.can_trigger(on_bus_); }
   bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }
@@ -115,7 +114,8 @@ class Mcu {
   void begin_table_run(Output output, link::Tick start, link::TableRun run) {
     master_.begin_table_run(on_bus_, output.value, start, run);
   }
-  // Of a motor's share that the MCUs are to make themselves. Precondition: has_table of its line.
+  // Of a motor's share that the MCUs are to make themselves. Precondition: can_run_line of its
+  // line.
   link::LineRun line_run(const motion::Axis& axis) const;
   void begin_line_run(Output output, const motion::Axis& axis) {
     master_.begin_line_run(on_bus_, output.value, axis.start_tick(), line_run(axis));

@@ -17,9 +17,13 @@ static inline bool is_on_line(const bushd_mcu* mcu, uint8_t m) {
   return (mcu->line.motors & motor_bit(m)) != 0;
 }
 
-static bushd_status check_table(const bushd_mcu* mcu, uint8_t slot) {
-  if ((mcu->tables.valid & (uint8_t)(1u << slot)) == 0) return BUSHD_E_NO_TABLE;
-  const bushd_table* table = &mcu->tables.slot[slot].table;
+static bushd_status check_table(const bushd_mcu* mcu, const bushd_line_part* part) {
+  if ((mcu->tables.valid & (uint8_t)(1u << part->slot)) == 0) return BUSHD_E_NO_TABLE;
+  const bushd_table* table = &mcu->tables.slot[part->slot].table;
+  const bool slow_only = (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
+  if (slow_only && !bushd_run_is_slow(table, part->floor, mcu->tick_ns, BUSHD_SLOW_LINE_DELAY_NS)) {
+    return BUSHD_E_CAPACITY;
+  }
   const uint32_t most = bushd_table_max_steps_per_tick(table, mcu->tick_ns);
   return most > mcu->emission.grid.max_steps ? BUSHD_E_CAPACITY : BUSHD_OK;
 }
@@ -95,7 +99,7 @@ bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* messa
   if (status != BUSHD_OK) return status;
   bool barred;
   status = check_entries(mcu, message, &barred);
-  if (status == BUSHD_OK) status = check_table(mcu, part->slot);
+  if (status == BUSHD_OK) status = check_table(mcu, part);
   if (status != BUSHD_OK) return status;
   if (barred) return BUSHD_E_FORBIDDEN;
   if (mcu->line.motors != 0) return BUSHD_E_STATE;
