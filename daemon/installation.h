@@ -90,9 +90,11 @@ class Mcu {
   // Its drivers are disabled at rest (IdleDrivers), and enabled when one of its motors is to move.
   bool asleep = false;
   bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
-  bool can_run_lines() const { return master_.can_run_lines(on_bus_); }
   bool has_table(const bushd_table& table) const {
     return master_.slot_of(on_bus_, table).has_value();
+  }
+  bool can_run_line(const bushd_table& table, std::uint16_t floor, bool alone) const {
+    return master_.can_run_line(on_bus_, table, floor, alone);
   }
   bool can_trigger() const { return master_.can_trigger(on_bus_); }
   bool can_arm_lines() const { return master_.can_arm_lines(on_bus_); }
@@ -117,7 +119,7 @@ class Mcu {
     master_.begin_table_run(on_bus_, output.value, start, run);
   }
   // Of a motor's share that the MCUs are to make themselves, in so many ticks. Precondition:
-  // has_table of its line.
+  // can_run_line of its line.
   link::LineRun line_run(const motion::LineShare& share, std::uint16_t floor,
                          link::Tick ticks) const;
   link::LineRun line_run(const motion::Axis& axis) const {

@@ -96,7 +96,8 @@ void Lines::open(const api::Asker& asker, std::uint64_t number, const Line& line
   open_.conclude(line.motors.front(), [this, number] { return conclusion(number); });
 }
 
-// The MCUs make the run themselves if all of them can: they have its table, and no other line.
+// The MCUs make the run themselves if all of them can: it is slow enough, they have its table, and
+// no other line.
 bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
   if (line.path) return false;
   const bushd_table& table = line.way.table()->view();
@@ -107,7 +108,13 @@ bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
       return other != nullptr && other->line != number && installation_[motor].axis().line() &&
              installation_[motor].axis().line()->in_mcus;
     });
-    return mcu.can_run_lines() && !has_other && mcu.has_table(table);
+    return mcu.can_run_line(table, line.way.floor(), has_all_of(line, mcu)) && !has_other;
+  });
+}
+
+bool Lines::has_all_of(const Line& line, const Mcu& mcu) {
+  return std::ranges::all_of(mcu.motors(), [&](MotorId motor) {
+    return std::ranges::find(line.motors, motor) != line.motors.end();
   });
 }
 

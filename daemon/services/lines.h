@@ -103,6 +103,7 @@ class Lines final : public Service {
   void start(std::int64_t now_us, const api::Asker& asker, Line line);
   void log(Line& line);
   void open(const api::Asker& asker, std::uint64_t number, const Line& line);
+  static bool has_all_of(const Line& line, const Mcu& mcu);  // its motors
   bool in_mcus(std::uint64_t number, const Line& line) const;
   // Of these of its motors, by place: the part of the way between these steps of it.
   void begin_run(std::int64_t now_us, std::uint64_t number, Line& line,

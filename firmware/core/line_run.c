@@ -1,7 +1,7 @@
-// LINE_RUN and LINE_TRIGGER. One run for all motors of the line, made step by step; in each of its
-// steps every motor is asked whether it makes one of its own there (engine/line_follower.h). All
-// MCUs of the line have the same run, begun at the same tick, and changed at the same ticks by the
-// same rules: so the motors of all of them are on the line without a word between them.
+// LINE_RUN and LINE_TRIGGER. One run for all motors of the line, made step by step; every motor is
+// asked which of its own steps fall into these (engine/line_follower.h). All MCUs of the line have
+// the same run, begun at the same tick, and changed at the same ticks by the same rules: so the
+// motors of all of them are on the line without a word between them.
 //
 // The silence after which the run is ramped down is counted from a time that all MCUs know alike:
 // that which the last SYNC frame has told, in ticks of the bus, or the run's first tick.
@@ -18,9 +18,13 @@ static inline bool is_on_line(const bushd_mcu* mcu, uint8_t m) {
   return (mcu->line.motors & motor_bit(m)) != 0;
 }
 
-static bushd_status check_table(const bushd_mcu* mcu, uint8_t slot) {
-  if ((mcu->tables.valid & (uint8_t)(1u << slot)) == 0) return BUSHD_E_NO_TABLE;
-  const bushd_table* table = &mcu->tables.slot[slot].table;
+static bushd_status check_table(const bushd_mcu* mcu, const bushd_line_part* part) {
+  if ((mcu->tables.valid & (uint8_t)(1u << part->slot)) == 0) return BUSHD_E_NO_TABLE;
+  const bushd_table* table = &mcu->tables.slot[part->slot].table;
+  const bool slow_only = (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
+  if (slow_only && !bushd_run_is_slow(table, part->floor, mcu->tick_ns, BUSHD_SLOW_LINE_DELAY_NS)) {
+    return BUSHD_E_CAPACITY;
+  }
   const uint32_t most = bushd_table_max_steps_per_tick(table, mcu->tick_ns);
   return most > mcu->emission.grid.max_steps ? BUSHD_E_CAPACITY : BUSHD_OK;
 }
@@ -51,7 +55,29 @@ static bool is_taken(const bushd_mcu* mcu) {
   return mcu->line.motors != 0 || (mcu->line.waits && mcu->trigger.armed != 0);
 }
 
-// The run, its motors' places on the line, and how many ticks it takes (bushd_mcu_ticks_of_run).
+bool bushd_mcu_place_on_line(bushd_mcu* mcu) {
+  uint16_t* const unplaced = &mcu->line.unplaced;
+  // The place of one that has left it is another's.
+  *unplaced &= mcu->line.motors;
+  for (uint8_t m = 0; m < mcu->config.motors && *unplaced != 0; ++m) {
+    if ((*unplaced & motor_bit(m)) == 0) continue;
+    bushd_mcu_on_line* on_line = &mcu->motor[m].on_line;
+    const uint32_t increment = on_line->follower.increment;
+    on_line->share = bushd_line_share(increment, mcu->line.longest);
+    bushd_line_follower_start(&on_line->follower, increment, mcu->line.longest,
+                              mcu->line.step - 1u);
+    *unplaced &= (uint16_t)~motor_bit(m);
+    return true;
+  }
+  return false;
+}
+
+static void place_all(bushd_mcu* mcu) {
+  while (bushd_mcu_place_on_line(mcu)) {
+  }
+}
+
+// The run, what its motors are told of it, and how many ticks it takes (bushd_mcu_ticks_of_run).
 static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, uint32_t* spare_ns) {
   bushd_run_start(&mcu->line.run, &mcu->tables.slot[part->slot].table, part->steps, 1, part->floor);
   if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, ticks, spare_ns)) return false;
@@ -63,20 +89,19 @@ static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, u
   for (uint8_t i = 0; i < part->count; ++i) {
     const bushd_line_entry entry = bushd_next_line_entry(&at);
     bushd_mcu_on_line* on_line = &mcu->motor[entry.motor].on_line;
-    const uint64_t share = ((uint64_t)entry.increment << 16) / part->longest;
     on_line->direction = entry.direction;
-    on_line->share = share < UINT16_MAX ? (uint16_t)share : UINT16_MAX;
-    bushd_line_follower_start(&on_line->follower, entry.increment, part->longest, part->from);
+    on_line->follower.increment = entry.increment;
   }
   return true;
 }
 
 static void begin(bushd_mcu* mcu, uint16_t motors, uint32_t first_tick, uint32_t ticks) {
   mcu->line.waits = false;
-  mcu->line.motors = motors;
+  mcu->line.motors = mcu->line.unplaced = motors;
   for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
     if (motors & 1u) bushd_mcu_begin_run(mcu, m, first_tick, ticks);
   }
+  if (!mcu->config.in_pieces) place_all(mcu);
 }
 
 bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message) {
@@ -87,7 +112,7 @@ bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* messa
   if (status != BUSHD_OK) return status;
   bool barred;
   status = check_entries(mcu, message, &barred);
-  if (status == BUSHD_OK) status = check_table(mcu, part->slot);
+  if (status == BUSHD_OK) status = check_table(mcu, part);
   if (status != BUSHD_OK) return status;
   if (barred) return BUSHD_E_FORBIDDEN;
   if (is_taken(mcu)) return BUSHD_E_STATE;
@@ -107,7 +132,7 @@ static bushd_status check_waiting(const bushd_mcu* mcu, const bushd_line_part* p
     const uint16_t forbidden = bushd_mcu_forbidden(mcu, entry.direction);
     if ((forbidden & motor_bit(entry.motor)) != 0) return BUSHD_E_FORBIDDEN;
   }
-  return check_table(mcu, part->slot);
+  return check_table(mcu, part);
 }
 
 bushd_status bushd_mcu_hold_line(bushd_mcu* mcu, const bushd_line_part* part, uint16_t* motors) {
@@ -137,34 +162,42 @@ void bushd_mcu_begin_held_line(bushd_mcu* mcu, uint16_t motors, uint32_t first_t
   begin(mcu, motors, first_tick, ticks);
 }
 
-// What the motors make of the part of a step of the run that lies in this tick.
-static void follow(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors,
-                   const bushd_run_walk* walk, bool keep_slots) {
-  const uint32_t step = mcu->line.step;
-  const uint16_t parts = walk->parts;
+// What the motors make of these steps of the run. Not inlined, as emit_tick: with the spans in its
+// frame it would be slow on an 8-bit MCU.
+__attribute__((noinline)) static void follow(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer,
+                                             uint16_t motors, const bushd_run_spans* spans) {
+  const uint16_t keep_slots = bushd_mcu_steps_keep_slots(mcu) ? UINT16_MAX : 0;
   bushd_mcu_motor* motor = mcu->motor;
   int16_t* steps = slot_buffer->steps;
   uint16_t active = 0;
   uint16_t bit = 1;
   for (; motors != 0; motors = (uint16_t)(motors >> 1), ++motor, ++steps) {
-    bushd_line_follower* follower = &motor->on_line.follower;
-    if ((motors & 1u) != 0 && bushd_line_follower_due(follower, step, parts)) {
-      if (keep_slots) slot_buffer->step[bushd_run_walk_slot(walk, follower->due_part)] |= bit;
-      *steps = (int16_t)(*steps + motor->on_line.direction);
-      active |= bit;
-      bushd_line_follower_step(follower);
+    if ((motors & 1u) != 0) {
+      const uint8_t made =
+          bushd_line_follower_make(&motor->on_line.follower, spans, bit & keep_slots);
+      if (made != 0) {
+        active |= bit;
+        *steps = (int16_t)(motor->on_line.direction < 0 ? *steps - made : *steps + made);
+      }
     }
     bit = (uint16_t)(bit << 1);
   }
   slot_buffer->active |= active;
 }
 
-static uint16_t forward(const bushd_mcu* mcu, uint16_t motors) {
-  uint16_t positive = 0;
-  for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
-    if ((motors & 1u) != 0 && mcu->motor[m].on_line.direction > 0) positive |= motor_bit(m);
+// Before its first step in the tick. Returns those that go forward.
+static uint16_t begin_tick(bushd_mcu_motor* motor, int16_t* steps, uint16_t motors) {
+  uint16_t forward = 0;
+  uint16_t bit = 1;
+  for (; motors != 0; motors = (uint16_t)(motors >> 1), ++motor, ++steps) {
+    if ((motors & 1u) != 0) {
+      *steps = 0;
+      motor->remainder = 0;  // until ticks follow (bushd_mcu_leave_line)
+      if (motor->on_line.direction > 0) forward |= bit;
+    }
+    bit = (uint16_t)(bit << 1);
   }
-  return positive;
+  return forward;
 }
 
 // Of a ramp-down: otherwise the end is known beforehand.
@@ -177,21 +210,23 @@ static void end_ramp_down(bushd_mcu* mcu, uint16_t motors) {
   }
 }
 
-void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors) {
+// Apart from what it needs first: a tick in the terms of a table may have to be made, by divisions.
+__attribute__((noinline)) static void emit_tick(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer,
+                                                uint16_t motors, const bushd_run_tick* tick) {
   bushd_run* run = &mcu->line.run;
-  const bool keep_slots = bushd_mcu_steps_keep_slots(mcu);
-  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    if ((motors & motor_bit(m)) == 0) continue;
-    slot_buffer->steps[m] = 0;
-    mcu->motor[m].remainder = 0;  // until ticks follow (bushd_mcu_leave_line)
-  }
   bushd_run_walk walk;
-  bushd_run_walk_begin(&walk, run, bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table));
-  while (bushd_run_walk_next(&walk, run)) {
-    follow(mcu, slot_buffer, motors, &walk, keep_slots);
-    if (walk.parts == 256u) ++mcu->line.step;
-  }
-  mcu->direction = (mcu->direction & (uint16_t)~motors) | forward(mcu, motors);
+  bushd_run_spans spans;
+  bushd_run_walk_begin(&walk, run, tick, &spans, mcu->line.step, slot_buffer->step);
+  while (bushd_run_walk_next(&walk, run, &spans)) follow(mcu, slot_buffer, motors, &spans);
+  mcu->line.step = spans.step;
+}
+
+void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors) {
+  const bushd_run* run = &mcu->line.run;
+  place_all(mcu);
+  const uint16_t forward = begin_tick(mcu->motor, slot_buffer->steps, motors);
+  emit_tick(mcu, slot_buffer, motors, bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table));
+  mcu->direction = (mcu->direction & (uint16_t)~motors) | forward;
   mcu->stream.begun |= motors;
   if (bushd_run_done(run)) end_ramp_down(mcu, motors);
 }

@@ -14,6 +14,7 @@ typedef struct bushd_mcu bushd_mcu;
 // The run of the motors on the line: there is room for one. It stands at the first tick that is not
 // prepared.
 typedef struct bushd_mcu_line {
+  uint16_t unplaced;  // of its motors, before it begins: their followers are still to be started
   uint16_t motors;  // on it: those whose bushd_mcu_on_line counts, as long as their mode is a run's
   uint8_t slot;     // of its table
   uint32_t longest;
@@ -29,6 +30,8 @@ bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* messa
 bushd_status bushd_mcu_hold_line(bushd_mcu* mcu, const bushd_line_part* part, uint16_t* motors);
 // It has come: these begin, `ns` after the beginning of that tick.
 void bushd_mcu_begin_held_line(bushd_mcu* mcu, uint16_t motors, uint32_t first_tick, uint32_t ns);
+// One of its motors that is not placed is; false if there is none. Two divisions, or three.
+bool bushd_mcu_place_on_line(bushd_mcu* mcu);
 // The next tick of the run, and what these motors make of it.
 void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors);
 // All that are on the line and have begun it ramp down along it. Returns those that were to go on.

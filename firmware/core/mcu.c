@@ -8,6 +8,7 @@
 #include "firmware/core/emission.h"
 #include "firmware/core/homing.h"
 #include "firmware/core/inputs.h"
+#include "firmware/core/line_run.h"
 #include "firmware/core/local.h"
 #include "firmware/core/motor.h"
 #include "firmware/core/requests.h"
@@ -187,5 +188,6 @@ bool bushd_mcu_work(bushd_mcu* mcu) {
     bushd_mcu_summarise_queue(mcu, bushd_mcu_first_open(mcu));
     return true;
   }
-  return bushd_mcu_go_on_answering(mcu) || bushd_mcu_put_next_row(mcu);
+  return bushd_mcu_go_on_answering(mcu) || bushd_mcu_put_next_row(mcu) ||
+         (mcu->line.unplaced != 0 && bushd_mcu_place_on_line(mcu));
 }

@@ -26,16 +26,17 @@ typedef uint64_t scaled_ns;
 typedef uint32_t scaled_high;
 #endif
 
-static void make_step(bushd_run* run) {
-  bushd_run_count(run, 1);
+// Of one part of the run.
+static void make_steps(bushd_run* run, uint8_t steps) {
+  bushd_run_count(run, steps);
   if (run->lead_delay != 0) {
     run->lead_delay = 0;
   } else if (run->accel_at < run->accel_end) {
-    ++run->accel_at;
+    run->accel_at = (uint16_t)(run->accel_at + steps);
   } else if (run->cruise_left != 0) {
-    --run->cruise_left;
+    run->cruise_left -= steps;
   } else {
-    --run->decel_left;
+    run->decel_left = (uint16_t)(run->decel_left - steps);
   }
 }
 
@@ -93,6 +94,16 @@ bushd_run_tick bushd_run_tick_of(uint32_t tick_ns, const bushd_table* table, uin
 #ifndef BUSHD_OWN_RUN_PARTS
 void bushd_run_move_place(uint64_t* place, const uint64_t* rate, uint16_t times) {
   *place += *rate * times;
+}
+
+// What is rounded is rounded up: no place lies before the tick.
+void bushd_run_take_span(bushd_run_span* span, uint64_t* place, const uint64_t* rate,
+                         uint16_t times) {
+  const uint64_t length = *rate * times;
+  const uint64_t most_rest = (UINT64_C(1) << (32 - BUSHD_SPAN_SHIFT)) - 1u;
+  span->part = (uint32_t)(length >> (40 - BUSHD_SPAN_SHIFT)) + 1u;
+  span->first = (uint32_t)((*place + most_rest) >> (32 - BUSHD_SPAN_SHIFT)) + span->part;
+  *place += length;
 }
 
 uint8_t bushd_run_share(uint16_t numerator, uint8_t low, uint16_t divisor) {
@@ -230,7 +241,7 @@ __attribute__((noinline)) static int16_t make_by_rests(bushd_run* run, const bus
     slot = (uint16_t)(slot + whole_slots(&rest, tick));
     masks[slot < slot_count ? slot : slot_count - 1u] |= bit;
     ++steps;
-    make_step(run);
+    make_steps(run, 1);
     since -= delay;
     delay = bushd_run_delay(run);
     if (delay == 0 || since < delay) break;
@@ -282,83 +293,124 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit
   return run->direction < 0 ? (int16_t)-steps : steps;
 }
 
-void bushd_run_walk_begin(bushd_run_walk* walk, const bushd_run* run, const bushd_run_tick* tick) {
+void bushd_run_walk_begin(bushd_run_walk* walk, const bushd_run* run, const bushd_run_tick* tick,
+                          bushd_run_spans* spans, uint32_t step, uint16_t* masks) {
+  spans->step = step;
+  spans->count = 0;
+  spans->parts = 256;
+  spans->masks = masks;
+  spans->slot_count = tick->slot_count;
   walk->tick = tick;
-  walk->begin_units = -(int32_t)run->since;
-  walk->begin_ns = run->since_ns;
   walk->since = run->since + tick->units;
   walk->since_ns = run->since_ns;
   if (tick->rest_ns != 0) walk->since += carry_rest(run, tick, &walk->since_ns);
-  walk->delay = 0;
-  walk->begin = walk->end = 0;
+  walk->over = false;
+  walk->place = 0;
   if (!tick->has_places) return;
-  const uint64_t unit = tick->per_unit >> (24 - BUSHD_WALK_SHIFT);
-  walk->unit_high = (uint32_t)(unit >> 16);
-  walk->unit_low = (uint16_t)unit + (uint32_t)(unit << (24 - BUSHD_WALK_SHIFT) != tick->per_unit);
   const bool later = bushd_run_begins_later(run);
   const uint16_t units = (uint16_t)(later ? 0u - run->since : run->since);
-  bushd_run_move_place(&walk->end, &tick->per_unit, units);
-  if (!later) walk->end = 0 - walk->end;
+  bushd_run_move_place(&walk->place, &tick->per_unit, units);
+  if (!later) walk->place = 0 - walk->place;
   if (run->since_ns == 0) return;
   uint64_t low = 0;
   uint64_t high = 0;
   bushd_run_move_place(&low, &tick->per_ns, (uint16_t)run->since_ns);
   bushd_run_move_place(&high, &tick->per_ns, (uint16_t)(run->since_ns >> 16));
-  walk->end -= low + (high << 16);
-}
-
-// What is rounded is rounded up: no place lies before the tick.
-static uint32_t walk_place(uint64_t place) {
-  const uint64_t rest = (UINT64_C(1) << (32 - BUSHD_WALK_SHIFT)) - 1u;
-  return (uint32_t)(place >> (32 - BUSHD_WALK_SHIFT)) + ((place & rest) != 0);
+  walk->place -= low + (high << 16);
 }
 
 static uint32_t place_of(uint64_t ns, const bushd_run_tick* tick, uint32_t parts) {
   const uint64_t length = (uint64_t)tick->tick_ns * parts;
   const uint64_t slots = ns * tick->slot_count;
-  const uint64_t rest = (slots % length << BUSHD_WALK_SHIFT) + length - 1u;
-  return (uint32_t)(slots / length << BUSHD_WALK_SHIFT) + (uint32_t)(rest / length);
+  const uint64_t rest = (slots % length << BUSHD_SPAN_SHIFT) + length - 1u;
+  return (uint32_t)(slots / length << BUSHD_SPAN_SHIFT) + (uint32_t)(rest / length);
 }
 
-// Of the step that runs: with places, or by divisions.
-static void walk_parts(bushd_run_walk* walk) {
+// By divisions. At the tick's end the step has run for `since` units and walk->since_ns.
+__attribute__((noinline)) static void divide_span(const bushd_run_walk* walk, uint32_t since,
+                                                  uint16_t delay, bushd_run_span* span) {
   const bushd_run_tick* tick = walk->tick;
-  if (tick->has_places) {
-    walk->part = walk->delay * walk->unit_high + (walk->delay * walk->unit_low >> 16) + 1u;
-    walk->first = walk_place(walk->begin) + walk->part;
-    return;
-  }
-  const int64_t ns = (int64_t)walk->begin_units * tick->unit_ns - walk->begin_ns;
+  const int64_t ns = (int64_t)tick->tick_ns - (int64_t)since * tick->unit_ns - walk->since_ns;
   const uint32_t begin =
       ns < 0 ? 0u - place_of((uint64_t)-ns, tick, 1) + 1u : place_of((uint64_t)ns, tick, 1);
-  walk->part = place_of((uint64_t)walk->delay * tick->unit_ns, tick, 256);
-  walk->first = begin + walk->part;
+  span->part = place_of((uint64_t)delay * tick->unit_ns, tick, 256);
+  span->first = begin + span->part;
 }
 
-bool bushd_run_walk_next(bushd_run_walk* walk, bushd_run* run) {
-  if (walk->delay != 0) {
-    // The tick's end lies in the step before.
-    if (walk->parts < 256u) return false;
-    walk->begin_units += walk->delay;
-    walk->since -= walk->delay;
-  }
-  walk->begin = walk->end;
-  walk->delay = bushd_run_delay(run);
-  run->since_ns = walk->since_ns;
-  if (walk->delay != 0 && walk->since >= walk->delay) {
-    walk->parts = 256;
-    if (walk->tick->has_places) {
-      bushd_run_move_place(&walk->end, &walk->tick->per_unit, walk->delay);
+// Up to `most` (>= 1) steps of one part of the run, whose delays are every `stride`th code. Returns
+// how many of them are over at the tick's end.
+static uint8_t take_spans(bushd_run_walk* walk, const uint16_t* code, int8_t stride, uint8_t most,
+                          bushd_run_span* span) {
+  const bushd_run_tick* tick = walk->tick;
+  uint32_t since = walk->since;
+  uint8_t made = 0;
+  do {
+    const uint16_t delay = *code;
+    if (tick->has_places) {
+      bushd_run_take_span(span, &walk->place, &tick->per_unit, delay);
+    } else {
+      divide_span(walk, since, delay, span);
     }
-    make_step(run);
-    run->since = walk->since - walk->delay;
-  } else {
-    run->since = walk->since;
-    bushd_run_note_fraction(run);
-    walk->parts = run->fraction;
+    if (since < delay) {
+      walk->over = true;
+      break;
+    }
+    since -= delay;
+    code += stride;
+    ++span;
+  } while (++made != most);
+  walk->since = since;
+  return made;
+}
+
+// The part of the run that is next: `left` steps, 0 if the run is done, whose delays are every
+// `stride`th code.
+typedef struct part_codes {
+  const uint16_t* code;
+  uint32_t left;
+  int8_t stride;
+} part_codes;
+
+static part_codes codes_of(const bushd_run* run) {
+  const uint16_t* const accel = run->table->accel.code;
+  const uint16_t* const decel = run->table->decel.code;
+  if (run->lead_delay != 0) return (part_codes){&run->lead_delay, 1, 0};
+  if (run->accel_at < run->accel_end) {
+    return (part_codes){accel + run->accel_at, (uint32_t)(run->accel_end - run->accel_at), 1};
   }
-  if (walk->delay != 0) walk_parts(walk);
-  return walk->delay != 0;
+  if (run->cruise_left != 0) return (part_codes){&run->cruise, run->cruise_left, 0};
+  if (run->decel_left != 0) return (part_codes){decel + run->decel_left - 1, run->decel_left, -1};
+  return (part_codes){decel, 0, 0};
+}
+
+static void walk_part(bushd_run_walk* walk, bushd_run* run, bushd_run_spans* spans) {
+  const part_codes codes = codes_of(run);
+  const uint8_t room = (uint8_t)(BUSHD_RUN_SPANS - spans->count);
+  const uint8_t most = codes.left < room ? (uint8_t)codes.left : room;
+  if (most == 0) {
+    walk->over = true;
+    return;
+  }
+  const uint8_t made = take_spans(walk, codes.code, codes.stride, most, &spans->span[spans->count]);
+  if (made != 0) make_steps(run, made);
+  spans->count = (uint8_t)(spans->count + made + (walk->over ? 1 : 0));
+}
+
+bool bushd_run_walk_next(bushd_run_walk* walk, bushd_run* run, bushd_run_spans* spans) {
+  // Of the last ones.
+  spans->step += spans->count;
+  if (spans->parts != 256u) --spans->step;
+  spans->count = 0;
+  spans->parts = 256;
+  if (walk->over) return false;
+  while (!walk->over && spans->count < BUSHD_RUN_SPANS) walk_part(walk, run, spans);
+  if (walk->over) {
+    run->since = walk->since;
+    run->since_ns = walk->since_ns;
+    bushd_run_note_fraction(run);
+    if (!bushd_run_done(run)) spans->parts = run->fraction;
+  }
+  return spans->count != 0;
 }
 
 void bushd_run_note_fraction(bushd_run* run) {

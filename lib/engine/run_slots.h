@@ -50,7 +50,7 @@ static inline bool bushd_run_tick_fits(const bushd_run_tick* tick, uint32_t tick
 int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks);
 
 // Steps of a tick that follow each other on one part of a run. A small MCU may link the four
-// functions of its own (BUSHD_OWN_RUN_PARTS).
+// functions of its own, and bushd_run_take_span (BUSHD_OWN_RUN_PARTS).
 typedef struct bushd_run_part {
   uint64_t place;        // of the step that is due, in slots from the tick's start x 2^32
   const uint64_t* rate;  // places in a unit; read even for a single step
@@ -74,41 +74,55 @@ void bushd_run_make_evenly(bushd_run_part* part);
 uint8_t bushd_run_share(uint16_t numerator, uint8_t low, uint16_t divisor);
 
 // A tick of a run step by step, for what follows it (engine/line_follower.h). Places are slots from
-// the tick's start: x 2^32, as in bushd_run_part, or x 2^BUSHD_WALK_SHIFT in 32 bits; modulo 2^40
+// the tick's start: x 2^32, as in bushd_run_part, or x 2^BUSHD_SPAN_SHIFT in 32 bits; modulo 2^40
 // at least, and modulo 2^32.
 #if BUSHD_MAX_SLOTS <= 128
-#define BUSHD_WALK_SHIFT 24
+#define BUSHD_SPAN_SHIFT 24
 #else
-#define BUSHD_WALK_SHIFT 23
+#define BUSHD_SPAN_SHIFT 23
 #endif
+// A step of the run.
+typedef struct bushd_run_span {
+  uint32_t first;  // when the first of its 256 parts is over
+  uint32_t part;   // and for each one more
+} bushd_run_span;
+// Some that follow each other, and where what follows them goes.
+#define BUSHD_RUN_SPANS 12u
+typedef struct bushd_run_spans {
+  uint32_t step;   // number of the first one, in the caller's count
+  uint16_t parts;  // of the last one that are over at the tick's end; 256: it ends in this tick
+  uint16_t* masks;
+  uint16_t slot_count;  // of them
+  uint8_t count;
+  bushd_run_span span[BUSHD_RUN_SPANS];
+} bushd_run_spans;
 typedef struct bushd_run_walk {
   const bushd_run_tick* tick;
-  uint64_t begin;      // of the step that runs
-  uint64_t end;        // and where it ends, if that is in this tick
-  uint32_t first;      // when the first of its 256 parts is over
-  uint32_t part;       // and for each one more
-  uint32_t unit_high;  // places of the parts in a unit, whole and
-  uint32_t unit_low;   // x 2^16, rounded up
-  uint32_t since;      // units from where it begins to the tick's end
+  uint64_t place;  // where the step that is next begins
+  uint32_t since;  // units from there to the tick's end
   uint32_t since_ns;
-  int32_t begin_units;  // from the tick's start to where it begins; begin_ns before that
-  uint32_t begin_ns;
-  uint16_t delay;  // of it
-  uint16_t parts;  // of it, 1/256, that are over at the tick's end; 256: it ends in this tick
+  bool over;  // no step that is next begins within the tick
 } bushd_run_walk;
-// At the beginning of the next tick, before any step. As bushd_run_slots; the run is not done.
-void bushd_run_walk_begin(bushd_run_walk* walk, const bushd_run* run, const bushd_run_tick* tick);
-// The step that runs, and the next ones that begin within the tick: true as long as there is one.
-// Then the run stands where that step ends, or at the tick's end.
-bool bushd_run_walk_next(bushd_run_walk* walk, bushd_run* run);
-// The slot of what falls at the end of part `part` (0 .. walk->parts - 1) of this step: that in
-// which this time lies, to within a thousandth of a slot; the last one at the tick's end. As
+// At the beginning of the next tick, before any step. As bushd_run_slots; the run is not done. The
+// step that runs, or is next, has the number `step`.
+void bushd_run_walk_begin(bushd_run_walk* walk, const bushd_run* run, const bushd_run_tick* tick,
+                          bushd_run_spans* spans, uint32_t step, uint16_t* masks);
+// The steps that run in the tick, as many as there is room for: true as long as there are some.
+// Then the run stands at the tick's end, and `step` is that of the step that runs there. O(spans),
+// no division.
+bool bushd_run_walk_next(bushd_run_walk* walk, bushd_run* run, bushd_run_spans* spans);
+// What begins at *place and lasts `times` x *rate; *place moves to its end, as by
+// bushd_run_move_place.
+void bushd_run_take_span(bushd_run_span* span, uint64_t* place, const uint64_t* rate,
+                         uint16_t times);
+// The slot of what falls at the end of part `part` of a step, of those that are over: that in which
+// this time lies, to within a thousandth of a slot; the last one at the tick's end. As
 // bushd_run_slots has it for the run's own steps.
-static inline uint16_t bushd_run_walk_slot(const bushd_run_walk* walk, uint8_t part) {
-  const uint16_t last = (uint16_t)(walk->tick->slot_count - 1u);
-  const uint32_t place = walk->first + walk->part * part;
-  const uint16_t slot = (uint16_t)(place >> BUSHD_WALK_SHIFT);
-  return slot < last ? slot : last;
+static inline uint16_t bushd_run_span_slot(const bushd_run_spans* spans, uint8_t index,
+                                           uint8_t part) {
+  const bushd_run_span* span = &spans->span[index];
+  const uint16_t slot = (uint16_t)((span->first + span->part * part) >> BUSHD_SPAN_SHIFT);
+  return slot < spans->slot_count ? slot : (uint16_t)(spans->slot_count - 1u);
 }
 
 // Makes the run's fraction what bushd_run_expand_fine would have left, so that ticks of that kind

@@ -120,8 +120,12 @@ class BusMaster {
   bool can_run_tables(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TABLE_RUN); }
   virtual void begin_table_run(McuIndex, std::uint8_t, Tick, TableRun) {}
 
-  // The same for a motor's part of a run of a line. Precondition also: the MCU has no other line.
-  virtual bool can_run_lines(McuIndex) const { return false; }
+  // The same for a motor's part of a run of a line, by this table and floor. `alone`: all motors of
+  // the MCU are on it. Precondition also: the MCU has no other line.
+  virtual bool can_run_line(McuIndex, const bushd_table&, std::uint16_t /*floor*/,
+                            bool /*alone*/) const {
+    return false;
+  }
   virtual void begin_line_run(McuIndex, std::uint8_t, Tick, const LineRun&) {}
   // Of a table of the MCU that makes the same runs as this one.
   virtual std::optional<std::uint8_t> slot_of(McuIndex, const bushd_table&) const {

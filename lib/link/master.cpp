@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "engine/run_plan.h"
+
 namespace bushd::link {
 namespace {
 
@@ -174,6 +176,15 @@ void Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, Table
 void Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) {
   streams_.begin_run(mcu, motor, start, run);
   synchroniser_.lines_run(true);
+}
+
+bool Master::can_run_line(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
+                          bool alone) const {
+  // Not where every tick is to be told.
+  if (!setup_.table_ticks || !can(mcu, BUSHD_CAN_LINE_RUN) || !slot_of(mcu, table)) return false;
+  if (can(mcu, BUSHD_CAN_TABLE_TICKS)) return true;
+  return bushd_run_is_slow(&table, floor, setup_.tick_ns,
+                           alone ? BUSHD_SLOW_LINE_DELAY_NS : BUSHD_SHARED_LINE_DELAY_NS);
 }
 
 std::optional<std::uint8_t> Master::slot_of(McuIndex mcu, const bushd_table& table) const {

@@ -90,10 +90,8 @@ class Master final : public BusMaster, private Transactions::Listener, private C
     connector_.queue(mcu).home(message);
   }
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
-  // Not where every tick is to be told.
-  bool can_run_lines(McuIndex mcu) const override {
-    return setup_.table_ticks && can(mcu, BUSHD_CAN_LINE_RUN);
-  }
+  bool can_run_line(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
+                    bool alone) const override;
   void begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) override;
   std::optional<std::uint8_t> slot_of(McuIndex mcu, const bushd_table& table) const override;
   std::uint8_t arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,

@@ -29,13 +29,16 @@ class LineScript : public Script, public testing::WithParamInterface<Target> {
   }
 
   void begin_line(std::uint32_t from = 0, std::uint16_t floor = 0) {
+    begin({0, floor, kLongest, from, kLongest - from, 0, nullptr}, kEntries);
+  }
+  void begin(const bushd_line_part& line, const std::vector<bushd_line_entry>& entries) {
     tell_time();
     bushd_line_run message{};
     message.first_tick = master_.poll(kReal).tick + 40;
-    message.line = {0, floor, kLongest, from, kLongest - from, 0, nullptr};
+    message.line = line;
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(bushd_encode_line_run(
-        &message, kEntries.data(), static_cast<std::uint8_t>(kEntries.size()), payload.data()));
+        &message, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
     tell(BUSHD_MSG_LINE_RUN, payload);
   }
 
@@ -84,6 +87,31 @@ TEST_P(LineScript, EveryStepIsInTheSlotOfTheTwins) {
     begin_line(300, kCruise + 37);
     pass_ticks(140);
     EXPECT_EQ(steps(0, 1).size(), before + 2 * kLongest - 300);
+    expect_alike();
+  }
+}
+
+// Numbers of all lengths: of steps, and of what two steps of a motor are apart.
+TEST_P(LineScript, IsTheSameFarAlongALongLine) {
+  struct Long {
+    std::uint32_t longest;
+    std::uint32_t from;
+    std::vector<std::uint32_t> increments;
+  };
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
+  std::size_t before = steps(0, 6).size();
+  for (const Long& line : std::vector<Long>{
+           {INT32_MAX, INT32_MAX - 440, {INT32_MAX, INT32_MAX - 1, 1'431'655'765, 8'300'000}},
+           {20'000'000, (1u << 24) - 200, {19'999'981, 13'000'007, 158'000, 155'000}},
+           {70'000, (1u << 16) - 150, {69'000, 35'001, 547, 3}}}) {
+    SCOPED_TRACE(line.longest);
+    std::vector<bushd_line_entry> entries = kEntries;
+    for (std::size_t i = 0; i < entries.size(); ++i) entries[i].increment = line.increments[i];
+    begin({0, 0, line.longest, line.from, 400, 0, nullptr}, entries);
+    pass_ticks(240);
+    EXPECT_EQ(master_.poll(kReal).moving, 0);
+    EXPECT_GT(steps(0, 6).size(), before + 190);
+    before = steps(0, 6).size();
     expect_alike();
   }
 }

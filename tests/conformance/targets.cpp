@@ -61,9 +61,7 @@ class Atmega2560 final : public Avr {
             .current_motors = 0,
             .velocity_motors = 0};
   }
-  std::uint16_t disabled_capabilities() const override {
-    return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN;
-  }
+  std::uint16_t disabled_capabilities() const override { return BUSHD_CAN_TABLE_TICKS; }
 };
 
 class Atmega1284p final : public Avr {

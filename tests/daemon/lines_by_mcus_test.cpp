@@ -106,5 +106,46 @@ TEST(LinesByMcus, TakeANearerEndAndAnotherSpeed) {
   }
 }
 
+// An MCU that is too slow for TABLE_TICKS makes a run of 270 us a step itself, or of 400 us where
+// it has other motors; a faster one is streamed to it.
+TEST(LinesByMcus, AreStreamedIfTooFastForThem) {
+  const std::string table =
+      "name = \"glacier\"\ntime_unit_ns = 1000\naccel = [2000, 1000, 700, 500, 400, 300, 250]\n";
+  struct Case {
+    std::uint16_t without;
+    double speed;
+    std::size_t motors;  // of four, on two MCUs
+    bool streamed;
+  };
+  for (const auto& [without, speed, motors, streamed] :
+       std::vector<Case>{{0, 3750, 4, false},
+                         {BUSHD_CAN_TABLE_TICKS, 3700, 4, false},
+                         {BUSHD_CAN_TABLE_TICKS, 3750, 4, true},
+                         {BUSHD_CAN_TABLE_TICKS, 2500, 3, false},
+                         {BUSHD_CAN_TABLE_TICKS, 2520, 3, true}}) {
+    SCOPED_TRACE(std::to_string(without) + " " + std::to_string(speed));
+    Lab lab(hall(2, 2, "fine", "glacier"), table, nullptr, without);
+    lab.connect();
+    const std::vector<std::int64_t> steps{3000, -3000, 3000, 3000};
+    auto line = line_to({kMotors.begin(), kMotors.begin() + static_cast<std::ptrdiff_t>(motors)},
+                        {steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(motors)});
+    line.speed = api::Speed{.per_s = speed, .in_steps = true};
+    MotionFrames sent;
+    lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
+      sent.add(bytes);
+      return true;
+    };
+    EXPECT_EQ(lab.wait(lab.send(line)).result, "reached");
+    lab.run_for(0.3);
+    if (streamed) {
+      EXPECT_GT(sent.frames, 8);
+    } else {
+      EXPECT_EQ(sent.frames, 2);
+    }
+    EXPECT_EQ(lab.shaft_steps("m02"), -3000);
+    EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0u);
+  }
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -96,5 +96,20 @@ TEST(RunPlan, RampsDownToTheEndOfTheTableFromWhereItStands) {
   });
 }
 
+TEST(RunPlan, IsSlowByItsShortestDelayAndTheTick) {
+  const TestTable table({{300, 28}, {400, 29}, 27, 10'000}, false);
+  const TestTable fast({{300, 28}, {400, 29}, 26, 10'000}, false);
+  const auto is_slow = [](const TestTable& of, uint16_t floor, uint32_t tick_ns) {
+    return bushd_run_is_slow(of.view(), floor, tick_ns, BUSHD_SLOW_LINE_DELAY_NS);
+  };
+  EXPECT_TRUE(is_slow(table, 0, 2'400'000));
+  EXPECT_FALSE(is_slow(table, 0, 2'399'999));
+  EXPECT_FALSE(is_slow(fast, 0, 20'000'000));
+  EXPECT_FALSE(is_slow(fast, 26, 2'560'000));
+  EXPECT_TRUE(is_slow(fast, 27, 2'560'000));
+  EXPECT_FALSE(bushd_run_is_slow(table.view(), 39, 2'560'000, BUSHD_SHARED_LINE_DELAY_NS));
+  EXPECT_TRUE(bushd_run_is_slow(table.view(), 40, 2'560'000, BUSHD_SHARED_LINE_DELAY_NS));
+}
+
 }  // namespace
 }  // namespace bushd::test

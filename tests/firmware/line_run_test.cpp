@@ -107,6 +107,25 @@ TEST_P(LineRun, IsUnknownWhereItIsDenied) {
             BUSHD_E_UNKNOWN_MESSAGE);
 }
 
+// One that is too slow for TABLE_TICKS: 270 us between two steps of the run, ticks of 2.4 ms.
+TEST_P(LineRun, OfASlowMcuIsSlow) {
+  Law fast = law;
+  fast.unit_ns = 1'000;
+  fast.accel = fast.decel = {900, 500};
+  fast.cruise = 269;
+  for (const std::uint16_t disabled : {std::uint16_t{0}, std::uint16_t{BUSHD_CAN_TABLE_TICKS}}) {
+    const bool slow = disabled != 0;
+    Rig other({.queue_ticks = 256, .disabled_capabilities = disabled});
+    other.make_ready(fast, format);
+    Frame line{.first = other.first_open() + 3, .motors = kOnLine, .longest = 333, .floor = 269};
+    ASSERT_EQ(start(other, line), slow ? BUSHD_E_CAPACITY : BUSHD_OK);
+    if (!slow) continue;
+    line.floor = 270;
+    ASSERT_EQ(start(other, line), BUSHD_OK);
+    expect_slots(other, Reference::move(fast, 333, 270), line);
+  }
+}
+
 // The rest of the same line as displacements, from every tick on: in the end all have made their
 // ways, and in the fine format nothing shows where they took over.
 TEST_P(LineRun, IsReplacedByTicksAtEveryTick) {

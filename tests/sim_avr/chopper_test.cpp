@@ -68,6 +68,10 @@ class Chopper : public McuAlone {
   AvrMcu* avr_ = nullptr;
 };
 
+// Both windings of a pair have one comparator. An edge of the one that goes off, while the slot's
+// interrupt is served in which the other one goes on, cuts that for the rest of its first period.
+constexpr TimeNs kTakenOverNs = 3'000;
+
 Figures Chopper::figures() const {
   Figures found;
   std::array<double, PowerStage::kWindings> now_a{};
@@ -84,7 +88,8 @@ Figures Chopper::figures() const {
     if (!edge.level) {
       cut_a[w] = now_a[w];
       cut_ns[w] = edge.time_ns;
-    } else if (was_on[w] && edge.time_ns - cut_ns[w] < kPeriodNs) {
+    } else if (was_on[w] && edge.time_ns - cut_ns[w] < kPeriodNs &&
+               cut_ns[w] - cut_ns[w ^ 2u] >= kTakenOverNs) {
       ++found.cuts;
       found.least_a = std::min(found.least_a, cut_a[w]);
       found.most_a = std::max(found.most_a, cut_a[w]);

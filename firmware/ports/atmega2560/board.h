@@ -36,10 +36,9 @@
 #define DE_PORT PORTE
 #define DE_BIT 4
 
-// What main.c makes of it. A frame of TABLE_TICKS stands for more ticks than it could make in one;
-// a line of more than a few motors would take it longer than a tick.
+// What main.c makes of it. A frame of TABLE_TICKS stands for more ticks than it could make in one.
 #define BOARD_MOTORS 16u
-#define BOARD_DISABLED (BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN)
+#define BOARD_DISABLED BUSHD_CAN_TABLE_TICKS
 #define BOARD_QUEUE_TICKS 64u
 #define BOARD_TABLE_CODES 952u  // four tables of 238 codes
 // No current of windings is controlled.

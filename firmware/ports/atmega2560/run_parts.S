@@ -95,6 +95,86 @@ bushd_run_move_place:
     clr r1
     ret
 
+; void bushd_run_take_span(bushd_run_span* span, uint64_t* place, const uint64_t* rate, uint16_t times). What it lasts is in r20,
+; r21, r24, r25, r26 and r17, modulo 2^48.
+    .macro add_to_span low, middle, high
+    ld r27, Z+
+    mul r27, r18
+    add r\low, r0
+    adc r\middle, r1
+    clr r\high
+    adc r\high, r\high
+    mul r27, r19
+    add r\middle, r0
+    adc r\high, r1
+    .endm
+
+    .global bushd_run_take_span
+bushd_run_take_span:
+    push r17
+    push r25
+    push r24
+    movw r30, r20
+    clr r20
+    clr r21
+    add_to_span 20, 21, 24
+    add_to_span 21, 24, 25
+    add_to_span 24, 25, 26
+    add_to_span 25, 26, 17
+    ld r27, Z+
+    mul r27, r18
+    add r26, r0
+    adc r17, r1
+    mul r27, r19
+    add r17, r0
+    ld r27, Z
+    mul r27, r18
+    add r17, r0
+    clr r1
+    movw r30, r22
+    ld r18, Z
+    ldd r19, Z+1
+    ldd r22, Z+2
+    ldd r23, Z+3
+    ldd r27, Z+4
+    mov r0, r18
+    add r0, r20
+    st Z, r0
+    mov r0, r19
+    adc r0, r21
+    std Z+1, r0
+    mov r0, r22
+    adc r0, r24
+    std Z+2, r0
+    mov r0, r23
+    adc r0, r25
+    std Z+3, r0
+    mov r0, r27
+    adc r0, r26
+    std Z+4, r0
+    pop r30
+    pop r31
+    ; A part, rounded up, and the place, rounded up.
+    subi r24, 0xFF
+    sbci r25, 0xFF
+    sbci r26, 0xFF
+    sbci r17, 0xFF
+    cp r1, r18
+    adc r19, r24
+    adc r22, r25
+    adc r23, r26
+    adc r27, r17
+    st Z, r19
+    std Z+SPAN_FIRST+1, r22
+    std Z+SPAN_FIRST+2, r23
+    std Z+SPAN_FIRST+3, r27
+    std Z+SPAN_PART, r24
+    std Z+SPAN_PART+1, r25
+    std Z+SPAN_PART+2, r26
+    std Z+SPAN_PART+3, r17
+    pop r17
+    ret
+
 ; uint8_t bushd_run_share(uint16_t numerator, uint8_t low, uint16_t divisor)
     .global bushd_run_share
 bushd_run_share:
