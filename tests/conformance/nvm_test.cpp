@@ -94,6 +94,28 @@ TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
   EXPECT_EQ(steps_made(4), 0u);
 }
 
+// Without a table, too.
+TEST_P(Nvm, LocalInputsMoveAMotorByTheVelocityLoopAfterAResetWithoutAHost) {
+  if (real_->twin().velocity_motors == 0) GTEST_SKIP() << "denies VELOCITY";
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+  ASSERT_EQ(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
+                bushd_set_velocity{1, 200 * 64, 1000 * 64, 2000}),
+            BUSHD_OK);
+  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 1}), BUSHD_OK);
+  pass(real_->keeps_within_ns(kCodes));
+  reboot();
+  bus_.node(0).set_inputs({0, BUSHD_INPUT_REVERSE});
+  pass(400 * TimeNs{kTickNs});
+  bus_.node(0).set_inputs({0, 0});
+  pass(250 * TimeNs{kTickNs});
+  const bushd_report report = master_.poll(kAddress);
+  EXPECT_EQ(report.moving, 0);
+  EXPECT_EQ(report.motor[1].position_steps, -static_cast<std::int32_t>(steps_made(1)));
+  // 0.5 s at 500 steps/s on the average, each way, 0.517 s of full speed, and 20 steps more where
+  // 200 steps/s are more than the ramp; updates are 15.6 ms apart, 15 steps at full speed.
+  EXPECT_NEAR(static_cast<double>(steps_made(1)), 500 + 517 + 20, 30);
+}
+
 TEST_P(Nvm, WhatIsTheSameIsNotWrittenAgain) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   pass(real_->keeps_within_ns(kCodes));

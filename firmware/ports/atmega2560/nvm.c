@@ -62,7 +62,8 @@ static void compare_whole(const bushd_mcu* mcu) {
   const nvm_head head = read_head();
   const bool same = head.state == HEAD_WHOLE && head.program == image_seal &&
                     head.size == scan.size && head.crc == scan.crc;
-  const bool news = head.state != 0xFF || mcu->tables.codes_used != 0;
+  // Nothing is kept of an MCU that has never been given anything to move by.
+  const bool news = head.state != 0xFF || mcu->tables.codes_used != 0 || mcu->local.motors != 0;
   const bool quiet = bushd_mcu_nvm_is_quiet(mcu, &scan);
   if (!same && news && quiet) {
     phase = WRITE;
