@@ -80,7 +80,7 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
   if (!kept_.keeps() && idle_drivers_.none()) return false;
   auto motors = motors_of(request);
   if (!motors) return false;
-  Held held{.asker = asker, .request = request, .motors = std::move(*motors)};
+  Held held{.asker = asker, .request = request, .motors = std::move(*motors), .since_us = now_us};
   if (held_.size() >= kMostHeld) {
     asker.answer(api::Refused{"too many requests wait for the disk; try again in a moment"});
     return true;
@@ -104,6 +104,14 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
 void Departures::refuse(const Held& held, const std::string& reason) {
   for (const MotorId motor : held.motors) kept_.not_wanted(motor);
   held.asker.answer(api::Refused{reason});
+}
+
+bool Departures::is_let_go(std::int64_t now_us, const Held& held) {
+  const auto* jog = std::get_if<api::Jog>(&held.request);
+  if (jog == nullptr) return false;
+  const std::int64_t keepalive_ms = std::max(jog->keepalive_ms, api::Jog::kLeastKeepaliveMs);
+  return now_us >= held.since_us + keepalive_ms * 1000 ||
+         (held.asker.session && held.asker.session->gone());
 }
 
 void Departures::cancel_if(const std::function<bool(const Held&)>& concerned) {
@@ -156,6 +164,12 @@ void Departures::step(std::int64_t now_us) {
     }
     const Held held = std::move(*it);
     it = held_.erase(it);
+    if (is_let_go(now_us, held)) {
+      refuse(held,
+             "its client was silent for longer than its keepalive time while the jog waited "
+             "to begin; nothing has moved");
+      continue;
+    }
     if (!ready) {
       refuse(held, ready.error().text());
       continue;

@@ -48,7 +48,10 @@ class Departures final : public Service {
     api::Asker asker;
     api::Request request;
     std::vector<MotorId> motors;
+    std::int64_t since_us;
   };
+  // A jog whose client has gone, or has been silent for as long as it may be: it does not begin.
+  static bool is_let_go(std::int64_t now_us, const Held& held);
   // Nothing: the request changes no position, or is refused anyway by who carries it out.
   std::optional<std::vector<MotorId>> motors_of(const api::Request& request) const;
   bool any_held(const std::vector<MotorId>& motors) const;

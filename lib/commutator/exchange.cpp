@@ -59,6 +59,7 @@ void Exchange::send(std::int64_t now_us) {
   const auto bytes = static_cast<std::int64_t>(out_.size() - before) + 1;
   const std::int64_t line_us = bytes * kBitsPerByte * 1'000'000 / setup_.baud + 1;
   const std::int64_t delay_us = asked_->code * static_cast<std::int64_t>(unit_ns()) / 1000 + 1;
+  asked_->not_before_us = now_us + delay_us / 2;
   asked_->deadline_us = now_us + line_us + 2 * delay_us + setup_.answer_us;
 }
 
@@ -70,9 +71,8 @@ bool Exchange::cancel() {
 
 Exchange::Event Exchange::receive(std::int64_t now_us, std::uint8_t byte) {
   // It may have lain in the adapter until after the deadline: what is here counts.
-  (void)now_us;
   Event event;
-  if (!asked_ || !asked_->deadline_us) {
+  if (!asked_ || !asked_->deadline_us || now_us < asked_->not_before_us) {
     event.stray = true;
     return event;
   }

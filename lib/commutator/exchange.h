@@ -14,6 +14,9 @@
 // waits for a code it was never sent (a program was ended, a cable pulled) would take the header
 // for one, and 0 is no delay.
 //
+// A byte that comes before half the time of a code has passed is no answer to it, however it looks:
+// an echo of the last one, or noise.
+//
 // A delay longer than 255 codes is waited here for as long as it is longer; delays that are no
 // whole number of codes are rounded up. So no step comes earlier after the one before than it is
 // asked for; the line and the program's own pauses come on top.
@@ -101,6 +104,7 @@ class Exchange {
     std::uint8_t header;
     std::uint8_t code;
     std::int64_t send_us;
+    std::int64_t not_before_us = 0;             // the answer
     std::optional<std::int64_t> deadline_us{};  // sent
   };
   void send(std::int64_t now_us);

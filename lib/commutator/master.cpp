@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "engine/table.h"
+
 namespace bushd::commutator {
 namespace {
 
@@ -39,6 +41,7 @@ void name_it(bushd_identity& identity, const std::string& name) {
 
 Master::Master(Setup setup, link::BusSetup bus, link::TickSource& source)
     : tick_ns_(bus.tick_ns),
+      codes_per_s_(std::uint64_t{kCodesPerStartPeriod} * setup.board.start_hz),
       settle_us_(std::max<std::int64_t>(
           kMaxCode * static_cast<std::int64_t>(Exchange(setup.board).unit_ns()) / 1000 + 1,
           kLeastSettleUs)),
@@ -359,6 +362,19 @@ void Master::reconfigure(link::McuIndex, link::McuSetup setup) {
   board_.view.phase = link::McuPhase::kConnecting;
   board_.view.detail = "it is being given another table";
   online_us_ = clock_us_;
+}
+
+Result<void> Master::check_room(link::McuIndex, const link::McuSetup& setup) const {
+  for (const link::TableRef& ref : setup.tables) {
+    const std::uint64_t fastest_ns =
+        std::uint64_t{ref.table->time_unit_ns} * bushd_table_fastest(ref.table);
+    if (fastest_ns * codes_per_s_ >= 1'000'000'000) continue;
+    return fail(fmt::format(
+        "makes steps no closer together than one delay code, {} ns by its start_hz, and its "
+        "motors' tables have steps {} ns apart: use a slower table",
+        1'000'000'000 / codes_per_s_, fastest_ns));
+  }
+  return {};
 }
 
 // Windings stay on: a board has nothing to switch them off with.

@@ -64,6 +64,8 @@ class Master final : public link::BusMaster {
   void emergency_stop(bushd_stop_mode mode) override;
 
   void reconfigure(link::McuIndex mcu, link::McuSetup setup) override;
+  // Of a table with steps that come sooner than one delay code: the board could not keep it.
+  Result<void> check_room(link::McuIndex mcu, const link::McuSetup& setup) const override;
   void control(link::McuIndex mcu, std::uint8_t actions) override;
   void set_position(link::McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) override;
 
@@ -98,6 +100,7 @@ class Master final : public link::BusMaster {
   void take_report(std::int64_t now_us);
 
   const std::int64_t tick_ns_;
+  const std::uint64_t codes_per_s_;
   const std::int64_t settle_us_;  // a code of the board's that nobody waits for is over by then
   link::TickSource& source_;
   link::McuRecord board_;

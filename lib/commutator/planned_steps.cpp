@@ -5,7 +5,6 @@
 namespace bushd::commutator {
 namespace {
 
-constexpr unsigned kMaxTicks = 1'000'000;  // looked ahead for the next step
 constexpr std::int64_t kBlockNs = 1'000'000'000;
 
 }  // namespace
@@ -22,13 +21,11 @@ PlannedSteps::PlannedSteps(link::TickSource& source, link::McuIndex mcu, std::ui
 
 std::optional<PlannedSteps::Step> PlannedSteps::take() {
   while (true) {
-    link::Tick until = tick_ + 1;
     if (!known_) {
-      const auto segment = source_.run_at(mcu_, motor_, tick_, kMaxTicks);
-      if (!segment) return std::nullopt;
-      run_ = segment->run;
+      const auto plan = source_.plan_at(mcu_, motor_, tick_);
+      if (!plan) return std::nullopt;
+      run_ = *plan;
       run_ns_ = tick_ * tick_ns_;
-      until = tick_ + segment->ticks;
       known_ = true;
     }
     const std::uint64_t delay_ns = std::uint64_t{bushd_run_delay(&run_)} *
@@ -37,7 +34,8 @@ std::optional<PlannedSteps::Step> PlannedSteps::take() {
     const std::int64_t at_ns = last_ns_ + static_cast<std::int64_t>(delay_ns);
     const link::Tick tick_of_step = (at_ns - 1) / tick_ns_;
     if (left_ || tick_of_step <= tick_) return made(delay_ns, at_ns);
-    tick_ = std::min(tick_of_step, until);
+    // The running step goes on, whatever changes by then.
+    tick_ = tick_of_step;
     known_ = false;
   }
 }

@@ -10,15 +10,35 @@ constexpr std::int64_t kDrainAskUs = 300;
 
 }  // namespace
 
+// A driver may stop for a while. What it still had when it was asked has not left; so nothing is
+// counted that would have left since.
 void Master::count_gone(std::int64_t now_us) {
-  while (!sent_.empty() && sent_.front().gone_ns <= now_us * 1000) {
+  const std::int64_t asked_ns = std::min(now_us, status_us_) * 1000;
+  while (sent_.size() > status_->queued && sent_.front().gone_ns <= asked_ns) {
     if (run_) run_->gone += sent_.front().steps;
     sent_.pop_front();
   }
   if (drained(now_us)) recent_.clear();
-  while (!recent_.empty() && recent_.front().gone_ns + kUnseenUs * 1000 <= now_us * 1000) {
+  while (!recent_.empty() && recent_.front().gone_ns + kUnseenUs * 1000 <= asked_ns) {
     recent_.pop_front();
   }
+}
+
+// The bytes that the driver has leave one after the other, and none of them before now.
+void Master::follow_queue() {
+  if (status_->queued == 0 || status_->baud == 0) return;
+  const auto one_ns = static_cast<std::int64_t>(byte_ns(status_->baud));
+  const std::int64_t begun_ns = status_us_ * 1000;
+  for (std::deque<Sent>* bytes : {&sent_, &recent_}) {
+    auto queued = static_cast<std::int64_t>(status_->queued);
+    for (auto sent = bytes->rbegin(); sent != bytes->rend() && queued > 0; ++sent, --queued) {
+      sent->gone_ns = std::max(sent->gone_ns, begun_ns + queued * one_ns);
+    }
+  }
+  const std::int64_t free_ns = begun_ns + static_cast<std::int64_t>(status_->queued) * one_ns;
+  if (free_ns <= line_free_ns_) return;
+  add_pause((free_ns - line_free_ns_) / 1000);
+  line_free_ns_ = free_ns;
 }
 
 bool Master::drained(std::int64_t now_us) const {
@@ -36,11 +56,10 @@ void Master::wait_until_drained(std::int64_t now_us) {
   wake_at(std::max(free_us, quiet_since_us_) + kUnseenUs);
 }
 
-std::uint32_t Master::unsure_steps(std::int64_t now_us) const {
+// Since it was asked last the driver may have done nothing.
+std::uint32_t Master::unsure_steps() const {
   std::uint32_t steps = 0;
-  for (const Sent& sent : recent_) {
-    if (sent.gone_ns + kUnseenUs * 1000 > now_us * 1000) steps += sent.steps;
-  }
+  for (const Sent& sent : recent_) steps += sent.steps;
   return steps;
 }
 

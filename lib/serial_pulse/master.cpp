@@ -44,13 +44,20 @@ void Master::port_opened(std::int64_t now_us) {
 }
 
 void Master::port_lost(std::int64_t now_us, const std::string& cause) {
-  const std::uint32_t unsure = unsure_steps(now_us);
   const bool was_online = view_.phase == link::McuPhase::kOnline;
+  if (status_) count_gone(now_us);
+  const std::uint32_t unsure = unsure_steps();
   if (run_) {
-    count_gone(now_us);
-    if (run_->planned) base_tick_ = run_->tick;
+    // As far as is known they have left.
+    while (!sent_.empty() && sent_.front().gone_ns <= now_us * 1000) {
+      run_->gone += sent_.front().steps;
+      sent_.pop_front();
+    }
+    if (run_->planned) {
+      base_tick_ = run_->tick;
+      base_us_ = now_us;
+    }
     position_ = run_->from_steps + run_->direction * std::int64_t{run_->gone};
-    base_us_ = now_us;
     run_.reset();
   }
   if (homing_) end_homing(now_us, BUSHD_HOMING_STOPPED);
@@ -79,7 +86,10 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   if (!open_ || waits_) return {};
   wake_us_ = INT64_MAX;
   link::PulseOrder order;
-  if (status_) {
+  // What is known is of then, until the port has answered.
+  if (status_ && now_us > status_us_ + kStillUs) {
+    ask_us_ = now_us;
+  } else if (status_) {
     count_gone(now_us);
     watch_limits(now_us);
     follow_homing(now_us);
@@ -97,7 +107,11 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
     waits_ = fresh_ = true;
     ask_us_ = now_us + (run_ || homing_ ? kMovingAskUs : kRestingAskUs);
   }
-  if (status_ && now_us >= report_due_us_) report(now_us);
+  if (view_.phase != link::McuPhase::kOnline) {
+    wake_at(ask_us_);
+    return {};
+  }
+  if (now_us >= report_due_us_) report(now_us);
   wake_at(std::min(ask_us_, report_due_us_));
   return {};
 }
@@ -121,14 +135,15 @@ void Master::pulse_status(std::int64_t now_us, const link::PulseStatus& status) 
     planner_.learn(*order_->baud, status.baud);
   }
   order_.reset();
-  const bool first = !status_;
   status_ = status;
   status_us_ = now_us;
+  follow_queue();
   for (const int direction : {-1, 1}) {
     if (at_limit(direction)) limit_us_[direction > 0] = now_us;
   }
   wake_us_ = now_us;
-  if (first) identify();
+  // What another program has left in the driver moves the motor still.
+  if (view_.phase != link::McuPhase::kOnline && drained(now_us)) identify();
   measure_pauses();
 }
 

@@ -47,6 +47,8 @@ class Master final : public link::BusMaster {
   static constexpr std::int64_t kUnseenUs = 20'000;
   // The direction is set as long before a step, and kept as long behind it.
   static constexpr std::int64_t kDirectionUs = 1'000;
+  // Nothing was heard of the port for so long: this program stood still.
+  static constexpr std::int64_t kStillUs = 100'000;
   // A limit is active until its contact has been open for as long: it bounces.
   static constexpr std::int64_t kReleaseUs = 100'000;
 
@@ -143,9 +145,10 @@ class Master final : public link::BusMaster {
 
   // What has left.
   void count_gone(std::int64_t now_us);
+  void follow_queue();
   bool drained(std::int64_t now_us) const;
   void wait_until_drained(std::int64_t now_us);
-  std::uint32_t unsure_steps(std::int64_t now_us) const;
+  std::uint32_t unsure_steps() const;
 
   // Runs.
   bushd_run no_steps() const;

@@ -40,6 +40,12 @@ class CommutatorBoard {
   // A byte's stop bit ended. Times never fall.
   void receive(TimeNs now_ns, std::uint8_t byte);
   void advance(TimeNs now_ns);
+  // It knows of no motor and no code any more. Its latches keep the windings as they are.
+  void reset() {
+    selected_ = false;
+    step_ns_.reset();
+    answers_.clear();
+  }
   TimeNs next_event_ns() const { return step_ns_.value_or(kNever); }
   std::vector<std::uint8_t> take_answers();
 

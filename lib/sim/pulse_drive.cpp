@@ -60,7 +60,7 @@ void PulseDrive::advance_to(TimeNs now_ns) {
     if (!level.step) continue;
     position_ += positive_ ? 1 : -1;
     ++steps_;
-    step_times_.push_back(level.time_ns);
+    if (keeps_steps) step_times_.push_back(level.time_ns);
   }
   while (!ends_ns_.empty() && ends_ns_.front() <= now_ns_) ends_ns_.pop_front();
   if (sink_ != nullptr) sink_->settled(now_ns_);

@@ -45,6 +45,7 @@ class PulseDrive {
   std::uint64_t faults() const { return faults_; }
   // When each step was made, ns.
   const std::vector<TimeNs>& step_times_ns() const { return step_times_; }
+  bool keeps_steps = true;  // for step_times_ns()
 
  private:
   struct Level {

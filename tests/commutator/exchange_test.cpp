@@ -39,6 +39,17 @@ TEST(Exchange, HeaderOnceThenACodePerStep) {
   EXPECT_THAT(exchange.take_bytes(), ElementsAre(0, 0x8B, 10));
 }
 
+// The last answer comes a second time, or something else that nobody has sent.
+TEST(Exchange, NoAnswerComesBeforeHalfOfItsDelay) {
+  Exchange exchange(kFast);
+  exchange.step(0, 0, false, 100 * kUnitNs);
+  const auto early = exchange.receive(1'999, 0x10);
+  EXPECT_TRUE(early.stray);
+  EXPECT_FALSE(early.answer);
+  EXPECT_FALSE(exchange.free());
+  EXPECT_TRUE(exchange.receive(2'001, 0x10).answer);
+}
+
 TEST(Exchange, StatusHasAMeaningForEachOfFiveBits) {
   EXPECT_EQ(commutator::status_of(0x01), (Status{.right_limit = true}));
   EXPECT_EQ(commutator::status_of(0x02), (Status{.left_limit = true}));
@@ -54,7 +65,7 @@ TEST(Exchange, DelaysAreRoundedUpToCodesAndLongOnesAreHeldBack) {
   Exchange exchange(kFast);
   exchange.step(0, 0, false, 10 * kUnitNs + 1);
   EXPECT_THAT(exchange.take_bytes(), ElementsAre(0, 0x80, 11));
-  exchange.receive(1, 0x10);
+  exchange.receive(440, 0x10);
   exchange.step(1000, 0, false, 1);
   EXPECT_THAT(exchange.take_bytes(), ElementsAre(1));
   exchange.receive(1100, 0x10);

@@ -326,6 +326,43 @@ TEST(Boards, JogChangesSpeedAndDirectionAndEnds) {
   EXPECT_TRUE(lab.trusted("m0"));
 }
 
+// On its way to a lower speed a run is no state of a table; it goes on all the same.
+TEST(Boards, ALowerSpeedInMotionIsApproachedAlongTheTable) {
+  BoardLab lab;
+  const auto accel = codes_of("bushd2-constant");
+  const auto jog = [&](double per_s) {
+    return lab.send(
+        api::Jog{.motor = "m0", .per_s = per_s, .in_steps = true, .keepalive_ms = 5000});
+  };
+  jog(2000);
+  lab.run_for(1.5);
+  jog(300);
+  lab.run_for(2);
+  lab.wait(jog(0));
+  EXPECT_TRUE(lab.trusted("m0")) << lab.motor("m0").uncertain_reason;
+  EXPECT_EQ(lab.motor("m0").position_steps, lab.shaft_steps("m0"));
+  const auto& steps = lab.board(0).steps();
+  const std::size_t n = steps.size();
+  ASSERT_GT(n, 600u);
+  const auto code = [&](std::size_t i) { return accel[std::min(i, accel.size() - 1)]; };
+  for (std::size_t k = 1; k < n; ++k) {
+    ASSERT_GE(steps[k].time_ns - steps[k - 1].time_ns, std::max(code(k), code(n - 1 - k)) * kUnitNs)
+        << k << " of " << n;
+  }
+}
+
+// As the configuration is refused that names such a table.
+TEST(Boards, ATableFasterThanACodeIsNotPutInService) {
+  BoardLab lab;
+  lab.write_file("swift.toml", "name = \"swift\"\ntime_unit_ns = 1000\naccel = [9000, 39]\n");
+  lab.write_file("just.toml", "name = \"just\"\ntime_unit_ns = 1000\naccel = [9000, 40]\n");
+  const Answer swift = lab.wait(lab.use("axes", "swift"));
+  EXPECT_NE(swift.result, "done");
+  EXPECT_THAT(swift.reason, HasSubstr("one delay code, 40000 ns by its start_hz"));
+  const Answer just = lab.wait(lab.use("axes", "just"));
+  EXPECT_EQ(just.result, "done") << just.reason;
+}
+
 // Each trouble leaves one step unknown at the most, and only where the motor is uncertain then.
 TEST(Boards, WhateverHappensCountsAreRightOrSaidToBeUncertain) {
   for (unsigned seed = 1; seed <= 20; ++seed) {

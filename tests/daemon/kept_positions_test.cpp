@@ -169,6 +169,18 @@ TEST(KeptPositions, WhatIsStoppedBeforeItBeginsIsRefused) {
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
 }
 
+// The key has been let go before the disk is ready: nothing may move by it then.
+TEST(KeptPositions, AJogWhoseClientIsSilentMeanwhileDoesNotBegin) {
+  KeptLab lab;
+  lab.disk_us = 600'000;
+  const auto jog =
+      lab.send(api::Jog{.motor = "m01", .per_s = 500, .in_steps = true, .keepalive_ms = 200});
+  lab.run_for(3);
+  EXPECT_EQ(lab.last_reply(jog).result, "refused");
+  EXPECT_THAT(lab.last_reply(jog).reason, HasSubstr("silent for longer than its keepalive time"));
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
 TEST(KeptPositions, AMotorThatHasItsMarkWaitsForTheOthersWithIt) {
   KeptLab lab;
   lab.run_for(0.5);

@@ -240,6 +240,7 @@ void Lab::pause_daemon(double seconds) {
 
 void Lab::unplug(std::size_t bus) {
   if (buses_[bus].drive) buses_[bus].drive->break_off(now_ns_);
+  buses_[bus].held.clear();
   buses_[bus].plugged = false;
   core().port_lost(now_us(), BusId{bus}, "unplugged");
 }
@@ -264,8 +265,16 @@ void Lab::pulse(BusId id, const link::PulseOrder& order) {
   if (!bus.plugged) return;
   if (order.positive) bus.drive->set_direction(now_ns_, *order.positive);
   if (order.baud) bus.drive->set_baud(now_ns_, *order.baud);
-  bus.drive->send(now_ns_, order.bytes);
+  bus.held.insert(bus.held.end(), order.bytes.begin(), order.bytes.end());
+  if (!pulses_stalled_) bus.drive->send(now_ns_, std::exchange(bus.held, {}));
   bus.ordered = true;
+}
+
+void Lab::stall_pulses(bool stalled) {
+  pulses_stalled_ = stalled;
+  for (SimulatedBus& bus : buses_) {
+    if (bus.drive && !stalled) bus.drive->send(now_ns_, std::exchange(bus.held, {}));
+  }
 }
 
 void Lab::tell_pulse_status() {
@@ -275,8 +284,8 @@ void Lab::tell_pulse_status() {
     link::PulseStatus status = pulse_driver;
     status.baud = drive.baud();
     // What the driver has not sent: not what is in the UART.
-    status.queued = std::max<std::size_t>(drive.queued(), 1) - 1;
-    if (status.empty) status.empty = drive.queued() == 0;
+    status.queued = std::max<std::size_t>(drive.queued(), 1) - 1 + buses_[b].held.size();
+    if (status.empty) status.empty = drive.queued() + buses_[b].held.size() == 0;
     status.lines = drive.lines();
     status.positive = drive.positive();
     core().pulse_status(now_us(), BusId{b}, status);

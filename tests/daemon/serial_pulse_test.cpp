@@ -123,6 +123,44 @@ TEST(SerialPulse, StopsAlongItsRamp) {
   EXPECT_GT(lab.it().steps(), before);
 }
 
+// What the driver still has has not been made, and no more is written on top of it: the ramp-down
+// comes behind 20 ms of bytes, however long the driver stood.
+TEST(SerialPulse, AStalledDriverIsNotCountedOn) {
+  Desk lab;
+  lab.connect();
+  const auto move = lab.send(Ask::kMoveBy, {"m"}, {8000});
+  lab.run_for(1.5);
+  lab.stall_pulses(true);
+  for (int i = 0; i < 20; ++i) {
+    lab.run_for(0.05);
+    ASSERT_LE(lab.motor("m").position_steps, lab.it().position_steps()) << i;
+  }
+  lab.stall_pulses(false);
+  lab.run_for(0.003);
+  const std::int64_t before = lab.it().position_steps();
+  lab.send(Ask::kStop, {"m"});
+  EXPECT_EQ(lab.wait(move).result, "stopped");
+  EXPECT_LE(lab.it().position_steps() - before, 50 + 8 + 61);
+  lab.expect_settled(lab.it().position_steps());
+  lab.expect_run(0, lab.it().steps());
+}
+
+// A daemon was killed, and what it had written leaves later.
+TEST(SerialPulse, WhatAnEarlierDaemonHasLeftInTheDriverIsWaitedFor) {
+  Desk lab;
+  lab.connect();
+  lab.send(Ask::kMoveBy, {"m"}, {8000});
+  lab.run_for(1.5);
+  lab.stall_pulses(true);
+  lab.run_for(0.1);
+  lab.restart_daemon();
+  lab.run_for(0.5);
+  EXPECT_FALSE(lab.has_state("com1") && lab.state_of("com1").state == api::McuState::kReady);
+  lab.stall_pulses(false);
+  EXPECT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 1));
+  EXPECT_EQ(lab.it().queued(), 0u);
+}
+
 TEST(SerialPulse, TakesAnotherTarget) {
   Desk lab;
   lab.connect();
@@ -235,6 +273,42 @@ TEST(SerialPulse, PortLostAtRestLosesNothing) {
   EXPECT_EQ(lab.motor("m").trust, api::Trust::kKnown);
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {0})).result, "reached");
   lab.expect_settled(0);
+}
+
+// Homing is none of the plan's: its ticks have gone on meanwhile, and go on.
+TEST(SerialPulse, PortLostWhileHomingDelaysNothingAfterwards) {
+  Desk lab;
+  lab.connect();
+  lab.wait(lab.send(Ask::kMoveBy, {"m"}, {321}));
+  lab.run_for(10);
+  const auto home = lab.send(Ask::kHome, {"m"});
+  lab.run_for(0.5);
+  lab.unplug(0);
+  lab.wait(home);
+  lab.plug(0);
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 2));
+  lab.wait(lab.send(Ask::kSetPosition, {"m"}, {0}));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {50}), 2).result, "reached");
+}
+
+// This program stood still as the port was lost: nobody knows whether what was under way has left.
+TEST(SerialPulse, PortLostWhileTheDaemonStandsStillIsUncertain) {
+  Desk lab;
+  lab.connect();
+  lab.send(Ask::kMoveBy, {"m"}, {5000});
+  lab.run_for(1.0);
+  const std::int64_t before = lab.it().position_steps();
+  lab.pause_daemon(1.0);
+  const std::int64_t made = lab.it().position_steps() - before;
+  EXPECT_GT(made, 0);
+  lab.unplug(0);
+  lab.plug(0);
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 2));
+  lab.run_for(0.2);
+  EXPECT_EQ(lab.motor("m").trust, api::Trust::kUncertain);
+  const std::string reason = lab.motor("m").uncertain_reason;
+  const std::int64_t most = std::stoll(reason.substr(reason.find("while ") + 6));
+  EXPECT_LE(std::abs(lab.it().position_steps() - lab.motor("m").position_steps), most);
 }
 
 TEST(SerialPulse, EmergencyStopLatchesUntilCleared) {

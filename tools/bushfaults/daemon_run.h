@@ -35,6 +35,10 @@ class DaemonRun {
   bushd::api::Publisher& publishing() { return publishing_; }
   // A message arrives; all that is said at once is heard before it returns.
   void give(const bushd::lcm::Packet& packet);
+  // A request of a client that comes another way.
+  void ask(bushd::api::Asker asker, bushd::api::Request request) {
+    reception_.take(std::move(asker), std::move(request), 1);
+  }
   // As many requests of those that wait as a slice of time may be enough for.
   void carry_out_some();
   bool idle() const { return reception_.idle(); }

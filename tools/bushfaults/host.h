@@ -20,6 +20,8 @@
 
 namespace bushfaults {
 
+class SmallWorld;
+
 // What clients send.
 using Message = std::variant<bushd::lcm::Hello, Request>;
 
@@ -30,8 +32,9 @@ class Host final : public bushd::daemon::Outputs {
   static constexpr TimeNs kStrideNs = 400'000;
 
   // All of them outlive the host. The daemon starts at once. `keeps` positions on a disk.
+  // `small`: null, or the last buses of `config`.
   Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness, Recent& recent,
-       std::uint64_t seed, bool keeps);
+       SmallWorld* small, std::uint64_t seed, bool keeps);
   ~Host() override;
 
   // Null: they are not.
@@ -76,7 +79,8 @@ class Host final : public bushd::daemon::Outputs {
   void publish(bushd::McuId mcu, const bushd::api::Description& description) override;
   void publish(bushd::BusId bus, const bushd::api::HealthSnapshot& health) override;
   void publish_lam(const bushd::api::CamacLam& lam) override;
-  void move_log(const std::string& line) override { witness_.move_log(now_ns_, line); }
+  void pulse(bushd::BusId bus, const bushd::link::PulseOrder& order) override;
+  void move_log(const std::string& line) override;
   void log(bushd::daemon::LogLevel level, bushd::daemon::LogSubject,
            const std::string& text) override;
   void read_tables(std::uint64_t ticket, const std::vector<std::string>& wanted) override;
@@ -104,6 +108,7 @@ class Host final : public bushd::daemon::Outputs {
   bushd::sim::Bus& bus_;
   Witness& witness_;
   Recent& recent_;
+  SmallWorld* const small_;
   bushd::sim::Random random_;
   std::array<bushd::sim::Garbler, 2> garbler_;  // by Direction
   TimeNs now_ns_ = 0;

@@ -48,6 +48,21 @@ void add_rates(CLI::App& app, std::array<double, kSize>& rates, const std::strin
   }
 }
 
+void add_small(CLI::App& app, bushfaults::SmallOptions& small) {
+  const std::string group = "Controllers without firmware";
+  const auto add = [&](const std::string& name, auto& value, const std::string& what) {
+    app.add_option(name, value, what)
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str()
+        ->group(group);
+  };
+  add("--serial-pulse", small.serial_pulse, "Serial ports that make the pulses of a motor each");
+  add("--boards", small.boards, "Commutator boards, of three motors each");
+  add("--keypads", small.keypads, "Keypads, each of one of these motors");
+  add("--controller-faults", small.faults_per_hour, "Faults of all of them per hour");
+  add("--controller-commands", small.commands_per_hour, "Commands for their motors per hour");
+}
+
 int run(int argc, char** argv) {
   CLI::App app{
       "bushfaults: the daemon's core, the firmware core and motors in one process and on virtual\n"
@@ -88,6 +103,7 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
   app.add_flag("--json", json, "Print the summary as a JSON object");
+  add_small(app, options.small);
   add_rates<bushfaults::FaultKind>(app, options.fault_rates, "Faults per hour");
   add_rates<bushfaults::CommandKind>(app, options.command_rates, "Commands per hour");
   try {
@@ -117,10 +133,15 @@ int run(int argc, char** argv) {
     options.fault_rates[static_cast<std::size_t>(bushfaults::FaultKind::kSecondDaemon)] = 0;
   }
   bushfaults::furnish(*config, options.fault_rates, options.command_rates, options.seed);
+  auto whole = bushfaults::with_small(*config, options.small, options.seed);
+  if (!whole) {
+    fmt::print(stderr, "bushfaults: {}\n", whole.error().text());
+    return kUsage;
+  }
   fmt::print(stderr, "seed {}\n", options.seed);
 
   const std::clock_t began = std::clock();
-  bushfaults::World world(options, std::move(*config));
+  bushfaults::World world(options, std::move(*config), std::move(*whole));
   world.run();
   const double processor_s = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
   fmt::print("{}", json ? summary_json(world) : summary_text(world, processor_s));

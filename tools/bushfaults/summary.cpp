@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "installation.h"
+#include "small_world.h"
 
 namespace bushfaults {
 namespace {
@@ -36,6 +37,21 @@ nlohmann::json json_of(const std::array<std::uint64_t, kSize>& counts) {
     all[std::string(info(static_cast<Kind>(i)).name)] = counts[i];
   }
   return all;
+}
+
+std::string small_summary(const World& world) {
+  if (world.small() == nullptr) return {};
+  const SmallWorld& small = *world.small();
+  std::string text = "without firmware\n";
+  for (const auto& [what, count] : small.faults()) {
+    text += fmt::format("           {:<24}{:>9}\n", what, count);
+  }
+  for (const auto& [result, count] : small.judge().results()) {
+    text += fmt::format("           motions {:<16}{:>9}\n", result, count);
+  }
+  return text + fmt::format("           {} keys, {} steps in {} runs, {} states checked\n",
+                            small.keys(), small.judge().steps(), small.judge().runs(),
+                            small.judge().states_checked());
 }
 
 }  // namespace
@@ -91,6 +107,7 @@ std::string summary_text(const World& world, double processor_s) {
                       static_cast<double>(world.skew().worst_ns()) / 1000);
   text += fmt::format("age        {:.0f} ms of the report behind a state, at most\n",
                       static_cast<double>(world.witness().positions().worst_age_ns()) / 1e6);
+  text += small_summary(world);
   text += fmt::format("violations {}\n", world.witness().violation() ? 1 : 0);
   return text;
 }
@@ -128,9 +145,10 @@ std::string story(const World& world, const Options& options) {
   const Violation& violation = *world.witness().violation();
   return fmt::format(
       "VIOLATION at {} s of virtual time: {}\nWhat led to it:\n{}"
-      "Again: bushfaults --seed {} --hours {} --motors {} --mcus {} {} and the same rates\n",
+      "Again: bushfaults --seed {} --hours {} --motors {} --mcus {} {}{} and the same rates\n",
       in_seconds(violation.time_ns), violation.what, world.recent().text(), options.seed,
-      options.hours, options.motors, options.mcus, ways_text(world.config()));
+      options.hours, options.motors, options.mcus, small_text(options.small),
+      ways_text(world.config()));
 }
 
 }  // namespace bushfaults

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "small_world.h"
 #include "times.h"
 
 namespace bushfaults {
@@ -32,15 +33,23 @@ bushd::sim::McuOptions mcu_options(const bushd::config::Mcu& mcu, std::size_t in
 
 }  // namespace
 
-World::World(const Options& options, bushd::config::Config config)
+World::World(const Options& options, bushd::config::Config config, bushd::config::Config whole)
     : options_(options),
       config_(std::move(config)),
+      whole_(std::move(whole)),
       plant_(config_.mcus.size()),
       bus_(config_.buses[0].baud, &plant_),
       witness_(config_, bus_, plant_, recent_),
       skew_(config_, bus_, witness_),
       clients_(config_, witness_, options.command_rates, options.seed),
-      host_(config_, bus_, witness_, recent_, options.seed, options.keep_positions),
+      small_(options.small.any()
+                 ? std::make_unique<SmallWorld>(whole_, config_.buses.size(), options.small,
+                                                options.seed, options.keep_positions, recent_,
+                                                [this](TimeNs now_ns, const std::string& what) {
+                                                  witness_.violated(now_ns, what);
+                                                })
+                 : nullptr),
+      host_(whole_, bus_, witness_, recent_, small_.get(), options.seed, options.keep_positions),
       mail_(clients_, host_, options.seed) {
   add_mcus();
   add_motors();
@@ -56,6 +65,8 @@ World::World(const Options& options, bushd::config::Config config)
     chance_.emplace_back(options.seed, kFaultStream + static_cast<std::uint32_t>(i));
   }
 }
+
+World::~World() = default;
 
 void World::add_mcus() {
   bushd::sim::Random random(options_.seed, kWorldStream);
@@ -124,6 +135,7 @@ void World::spell_of_trouble(TimeNs until_ns) {
     next_fault_ns_[i] =
         per_hour > 0 ? now_ns_ + chance_[i].wait(static_cast<double>(kHour) / per_hour) : kNever;
   }
+  if (small_) small_->trouble(true);
   while (now_ns_ < until_ns && !witness_.violation()) {
     const auto next = std::min_element(next_fault_ns_.begin(), next_fault_ns_.end());
     advance(std::min({until_ns, next_command_ns_, *next}));
@@ -150,6 +162,11 @@ void World::spell_of_trouble(TimeNs until_ns) {
 
 void World::calm() {
   if (witness_.violation()) return;
+  if (small_) {
+    small_->trouble(false);
+    small_->let_go(now_ns_);
+    run_until(small_->faults_over_ns());
+  }
   if (host_.kept() != nullptr) host_.kept()->lose_power_after(UINT64_MAX);
   run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(),
                       mail_.quiet_ns(), second_->over_ns()}));
@@ -160,11 +177,15 @@ void World::calm() {
   be_well(began_ns);
   if (witness_.violation()) return;
   run_until(now_ns_ + kSecond);
-  while (witness_.commands_open() && now_ns_ < began_ns + kMoveNs && !witness_.violation()) {
+  const auto open = [this] { return witness_.commands_open() || (small_ && small_->any_open()); };
+  while (open() && now_ns_ < began_ns + kMoveNs && !witness_.violation()) {
     run_until(now_ns_ + 100 * kMs);
   }
   if (witness_.violation()) return;
-  if (witness_.commands_open()) witness_.violated(now_ns_, "a command without a result in calm");
+  if (open()) {
+    witness_.violated(now_ns_, "a command without a result in calm" +
+                                   (small_ ? ", " + small_->open_text() : std::string()));
+  }
   witness_.check_deadlines(now_ns_);
   if (const std::uint64_t steps = witness_.steps_unaccounted(); steps != 0) {
     witness_.violated(now_ns_, fmt::format("{} steps unaccounted", steps));
@@ -174,14 +195,17 @@ void World::calm() {
 
 void World::be_well(TimeNs began_ns) {
   for (std::size_t i = 0; i < config_.mcus.size(); ++i) witness_.expect(i, is_up(i));
-  const auto ready = [this] { return witness_.all_ready(); };
+  const auto ready = [this] { return witness_.all_ready() && (!small_ || !small_->not_ready()); };
   while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
     run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
     // What a client has switched off or stopped only a client sets going again.
     mail_.send(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
+    if (small_ && small_->not_ready()) small_->clear_faults();
   }
   if (ready() || witness_.violation()) return;
-  witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready());
+  const auto of_small = small_ ? small_->not_ready() : std::nullopt;
+  witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready() +
+                                 of_small.value_or(""));
 }
 
 void World::run_until(TimeNs until_ns) {

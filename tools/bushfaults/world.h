@@ -27,9 +27,12 @@
 #include "sim/bus.h"
 #include "sim/plant.h"
 #include "skew.h"
+#include "small_config.h"
 #include "witness.h"
 
 namespace bushfaults {
+
+class SmallWorld;
 
 struct Options {
   std::uint64_t seed = 1;
@@ -43,6 +46,7 @@ struct Options {
   FaultRates fault_rates = usual_fault_rates();
   CommandRates command_rates = usual_command_rates();
   bool keep_positions = false;
+  SmallOptions small;
   std::int64_t crystal_ppm = 50;
 };
 
@@ -50,7 +54,9 @@ class World {
  public:
   using TimeNs = bushd::sim::TimeNs;
 
-  World(const Options& options, bushd::config::Config config);
+  // `whole`: `config`, and the controllers without firmware behind it.
+  World(const Options& options, bushd::config::Config config, bushd::config::Config whole);
+  ~World();
 
   // Until the end or the first violation.
   void run();
@@ -62,6 +68,7 @@ class World {
   const Skew& skew() const { return skew_; }
   const Witness& witness() const { return witness_; }
   const bushd::sim::Plant& plant() const { return plant_; }
+  const SmallWorld* small() const { return small_.get(); }
   const SecondDaemon::Counts& second_daemons() const { return second_->counts(); }
   const Recent& recent() const { return recent_; }
   // Motors that were asked for what they know after a night without power, by their trust then.
@@ -91,12 +98,14 @@ class World {
 
   Options options_;
   bushd::config::Config config_;
+  bushd::config::Config whole_;
   Recent recent_;
   bushd::sim::Plant plant_;
   bushd::sim::Bus bus_;
   Witness witness_;
   Skew skew_;
   Clients clients_;
+  std::unique_ptr<SmallWorld> small_;  // null: there are none
   Host host_;
   Mail mail_;
   std::vector<std::unique_ptr<bushd::sim::PaceRules>> rules_;  // by group
