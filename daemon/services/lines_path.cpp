@@ -86,6 +86,7 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
     return refuse(good.error());
   }
   if (!*last) {
+    asker.answer(api::Accepted{});
     return asker.answer(api::Completed{.outcome = api::Outcome::kDone,
                                        .reason = "these points are taken; more are to come",
                                        .detail = {}});

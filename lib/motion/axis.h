@@ -228,6 +228,8 @@ class Axis {
   double share_of_run(const Place& place) const;
   void take_change_on_path(Place& place) const;
   void follow_path(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;
+  std::int64_t not_short_of_turn(const Place& place, std::size_t segment_before,
+                                 std::int64_t told_256) const;
   Tick own_end_on_path(const Place& place) const;
   std::int64_t steps_of(const Place& place) const;
   std::int64_t line_steps(std::uint32_t run_steps) const;

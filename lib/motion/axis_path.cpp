@@ -66,16 +66,38 @@ void Axis::take_change_on_path(Place& place) const {
   if (!place.path.done()) place.path.end_at(end);
 }
 
+// A tick is told by the way from its beginning to its end. Where a motor turns round in it, that
+// way does not lead to the whole step at which it turns, and its MCU would make neither the step
+// that leads there, which is the slow one before a rest, nor the one back. So the motor is told to
+// go there in this tick, and is where it should be at the end of the next one: it goes no farther
+// than F = 1 / A(0) takes it in the rest of a tick. If that is a whole step or more, both are left
+// out.
+std::int64_t Axis::not_short_of_turn(const Place& place, std::size_t segment_before,
+                                     std::int64_t told_256) const {
+  const Path& path = place.path.track()->path();
+  if (place.path.done()) return told_256;
+  for (std::size_t i = segment_before + 1; i <= place.path.segment(); ++i) {
+    const std::int64_t point = path.point(i, share_->motor);
+    const std::int64_t way = point - place.made;
+    const std::int64_t back_256 = told_256 - point * 256;
+    const bool turns = (way > 0 && back_256 < 0) || (way < 0 && back_256 > 0);
+    if (turns && std::abs(back_256) < 256) return point * 256;
+  }
+  return told_256;
+}
+
 // The motor's MCU takes a step when it has been told a whole one more than it has made.
 void Axis::follow_path(Place& place, std::size_t ticks, std::int16_t* out,
                        std::size_t stride) const {
   const bool fine = format_ == BUSHD_FORMAT_FINE;
   const PathTrack& track = *place.path.track();
   for (std::size_t i = 0; i < ticks; ++i) {
+    const std::size_t segment = place.path.segment();
     place.path.tick(tick_ns_);
-    const std::int64_t told_256 =
+    std::int64_t told_256 =
         path_position_256(track.path(), share_->motor, place.path.step(), place.path.fraction(),
                           track.to(), place.path.segment(), !fine);
+    if (place.path.segment() != segment) told_256 = not_short_of_turn(place, segment, told_256);
     const std::int64_t moved_256 = told_256 - place.told_256;
     place.told_256 = told_256;
     const std::int64_t off_256 = told_256 - place.made * 256;

@@ -126,10 +126,12 @@ Jump Pace::step(TimeNs t_ns, bool positive) {
     return jump;
   }
   if (positive != positive_) {
-    too_early_ns_ =
-        rules_->delay_ns(0) - rules_->tick_ns() - 2 * rules_->tolerance_ns(0) - apart_ns;
+    const TimeNs least_ns = on_line_ ? rules_->delay_ns(0) / 2 : rules_->delay_ns(0);
+    too_early_ns_ = least_ns - rules_->tick_ns() - 2 * rules_->tolerance_ns(0) - apart_ns;
+    const TimeNs first_ns = first_ns_;
     const Jump jump = come_to_rest();
     start(t_ns, positive);
+    if (on_line_) first_ns_ = first_ns;  // that was no rest
     return too_early_ns_ > 0 ? Jump::kTurned : jump;
   }
   while (cursor_ < rules_->last() && rules_->delay_ns(cursor_ + 1) >= 4 * apart_ns) ++cursor_;

@@ -21,6 +21,13 @@
 // and go on as its table does from rest in as many steps. There k only rises: no delay is shorter
 // than the table's after as many steps from rest.
 //
+// On a path, which is made like a line, it may turn round without a rest, with speeds v1 and v2 of
+// which v1^2 + v2^2 <= F^2, F = 1 / A(0): by its plan it ramps down to the turn as to a rest, and
+// speeds up from it as from one. The turn is half a step beyond the last step, and half a step
+// before the first one back, by the shares r1, r2 of the run, whose own half steps lie between:
+//
+//     apart = (1 - r1) / 2 v1 + (1 + r2) / 2 v2  >=  1 / 2 F = A(0) / 2 ,  as r1 <= 1, v2 <= F.
+//
 // Tolerances. T is the tick, S its slots; ticks are emitted up to 1/64 (sync) and 50 ppm (crystal)
 // faster than real time, so every delay counts 1/63 less. Fine format (docs/performance.md):
 //

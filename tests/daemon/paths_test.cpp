@@ -175,7 +175,10 @@ TEST(Paths, PointsComeInSeveralRequests) {
     path.first_row = static_cast<std::int32_t>(first);
     return path;
   };
-  EXPECT_EQ(lab.wait(lab.send(part(0, 20))).result, "done");
+  const auto first = lab.send(part(0, 20));
+  EXPECT_EQ(lab.wait(first).result, "done");
+  ASSERT_EQ(lab.replies(first).size(), 2u);
+  EXPECT_EQ(lab.replies(first).front().phase, Answer::kAccepted);
   EXPECT_EQ(lab.wait(lab.send(part(20, 40))).result, "done");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   const auto move = lab.send(part(40, 50));

@@ -150,6 +150,32 @@ TEST_P(PaceTest, TurnAtSpeedIsAJump) {
   EXPECT_NE(make(ticks), Jump::kNone);
 }
 
+// On a path a motor turns round without a rest, where its table has led it to one.
+TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
+  constexpr std::size_t kSteps = 40;
+  const auto ramps = [&](bool positive, std::size_t steps) {
+    Jump first = Jump::kNone;
+    for (std::size_t j = 1; j <= steps; ++j) {
+      const std::uint16_t code = std::max(law.accel[j - 1], law.accel[kSteps - j]);
+      now += TimeNs{code} * law.table.time_unit_ns;
+      const Jump jump = pace.step(now, positive);
+      if (first == Jump::kNone) first = jump;
+    }
+    return first;
+  };
+  pace.begin_on_line(false);
+  EXPECT_EQ(ramps(true, kSteps), Jump::kNone);
+  const TimeNs begun_ns = pace.first_ns();
+  now -= rules.delay_ns(0) / 2;  // half a delay after the last step
+  EXPECT_EQ(ramps(false, kSteps), Jump::kNone);
+  EXPECT_EQ(pace.first_ns(), begun_ns) << "that was no rest";
+  EXPECT_EQ(pace.rest_on_line(now, true), Jump::kNone);
+  now += 100 * kTickNs;
+  pace.begin_on_line(false);
+  EXPECT_EQ(ramps(true, kSteps - 3), Jump::kNone);
+  EXPECT_EQ(ramps(false, kSteps), Jump::kStoppedDead);
+}
+
 TEST_P(PaceTest, AFifthFasterThanTheTableIsFound) {
   std::vector<std::int16_t> ticks = move(3000);
   for (std::int16_t& d : ticks) d = static_cast<std::int16_t>(d * 6 / 5);

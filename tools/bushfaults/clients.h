@@ -80,6 +80,7 @@ class Clients {
   // Of motors at rest without backlash; one, if there are none.
   std::vector<Choice> some_at_rest(std::int64_t most);
   Request move_along_path();
+  Request first_of_parts(Request path);
   Request tell_array();
   Request of_some(Ask ask, std::vector<std::string> motors);
   std::vector<std::string> motors_with(bool bushd::api::MotorState::*flag) const;
@@ -106,6 +107,7 @@ class Clients {
   };
   std::vector<Later> later_;
   std::int64_t arrays_ = 0;
+  std::int64_t parts_ = 0;  // paths told in parts
   CommandCounts sent_by_kind_{};
 };
 

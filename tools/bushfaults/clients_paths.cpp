@@ -39,8 +39,8 @@ std::vector<Clients::Choice> Clients::some_at_rest(std::int64_t most) {
   return some;
 }
 
-// From point to point some motors stand and some go on; none turns round, since the plant knows of
-// no ramp-down amid a motion. A single one may have a speed on the way to each point.
+// From point to point some motors stand, some go on and some turn round. A single one may have a
+// speed on the way to each point, and goes on then.
 Request Clients::move_along_path() {
   std::vector<Choice> some = some_at_rest(4);
   if (some.empty()) return move(1);
@@ -58,6 +58,7 @@ Request Clients::move_along_path() {
       const std::size_t motor = index_of(some[i].name);
       std::int64_t& at = some[i].position_steps;
       const std::int64_t way = random_.one_in(4) ? 0 : random_.magnitude(1, 1000);
+      if (!zones && random_.one_in(3)) directions[i] = -directions[i];
       at = std::clamp(at + way * directions[i], -kFarthestSteps, kFarthestSteps);
       request.steps[i] = witness_.units().user_of(motor, at).value_or(0);
       request.points.push_back(request.steps[i]);
@@ -71,7 +72,37 @@ Request Clients::move_along_path() {
     request.speed_micro = random_.magnitude(100, 3'000) * kMicro;
     request.speed_in_steps = true;
   }
-  return request;
+  return zones || random_.one_in(2) ? request : first_of_parts(std::move(request));
+}
+
+// In two or three messages, each some time after the one before, perhaps too late or too early.
+// What a part belongs to is told by motors and rows only, so that paths of one client in a row have
+// other numbers of rows.
+Request Clients::first_of_parts(Request path) {
+  const std::size_t width = path.motors.size();
+  const std::size_t wanted = 4 + static_cast<std::size_t>(parts_++ % 6);
+  while (path.points.size() < wanted * width) {
+    path.points.insert(path.points.end(), path.points.end() - static_cast<std::ptrdiff_t>(width),
+                       path.points.end());
+  }
+  path.points.resize(wanted * width);
+  path.steps.assign(path.points.end() - static_cast<std::ptrdiff_t>(width), path.points.end());
+  const auto first = static_cast<std::size_t>(random_.between(1, 3));
+  Request part = path;
+  part.ask = Ask::kRows;
+  part.line = false;
+  part.end_row = first;
+  path.first_row = first;
+  std::int64_t after_ns = random_.between(5, 800) * kMsNs;
+  if (random_.one_in(3) && first + 1 < wanted) {
+    Request middle = part;
+    middle.first_row = first;
+    middle.end_row = path.first_row = wanted - 1;
+    later_.push_back({.after_ns = after_ns, .due_ns = 0, .request = std::move(middle)});
+    after_ns += random_.between(-50, 500) * kMsNs;
+  }
+  later_.push_back({.after_ns = after_ns, .due_ns = 0, .request = std::move(path)});
+  return part;
 }
 
 // No motor turns round: how close steps may be there is no rule of its table. Of straight lines

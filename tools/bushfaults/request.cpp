@@ -105,9 +105,17 @@ std::vector<double> numbers_of(const std::vector<std::int64_t>& scaled, double b
 }
 
 api::MovePath path_of(const Request& request) {
+  const std::size_t width = request.motors.size();
+  const std::size_t rows = request.points.size() / width;
+  const auto at = [&](std::size_t row) {
+    return request.points.begin() + static_cast<std::ptrdiff_t>(row * width);
+  };
+  const std::vector<std::int64_t> told(at(request.first_row),
+                                       at(request.end_row == 0 ? rows : request.end_row));
   return {.motors = request.motors,
-          .rows = static_cast<std::int32_t>(request.points.size() / request.motors.size()),
-          .positions = numbers_of(request.points, kMicro),
+          .rows = static_cast<std::int32_t>(rows),
+          .first_row = static_cast<std::int32_t>(request.first_row),
+          .positions = numbers_of(told, kMicro),
           .speeds = request.point_speeds,
           .corners =
               request.exact ? api::MovePath::Corners::kExact : api::MovePath::Corners::kContinuous,
@@ -195,6 +203,7 @@ api::Request api_of(const Request& request) {
     case Ask::kConfigure:
       return configure_of(request);
     case Ask::kRows:
+      if (request.array == 0) return path_of(request);
       return follow_of(request);
     case Ask::kCamac:
       return api::Camac{.block = {.cycles = request.cycles,
