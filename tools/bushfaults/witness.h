@@ -167,7 +167,8 @@ class Witness {
     std::optional<JogOpen> jog{};
     std::vector<std::int64_t> polyline{};  // row by row, from where they stood, as the plant counts
     double off_way = 0;                    // at most, so far
-    std::vector<std::uint64_t> changes{};  // of settings
+    bool way_is_over = false;  // a motor of it, which has ended, moves for somebody else
+    std::vector<std::uint64_t> changes{};        // of settings
     std::vector<std::optional<bool>> outside{};  // of its new limits; nothing: it is not known
     std::size_t index_of(const std::string& motor) const {
       const auto& all = request.motors;

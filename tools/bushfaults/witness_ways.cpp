@@ -62,6 +62,11 @@ void Witness::begin_way(Asked& asked) {
 void Witness::watch_ways() {
   for (auto& [key, asked] : asked_) {
     if (asked.finished || asked.polyline.empty()) continue;
+    // All have come to its end then, and some may be settling.
+    for (const std::string& name : asked.request.motors) {
+      asked.way_is_over = asked.way_is_over || find(name)->move != key;
+    }
+    if (asked.way_is_over) continue;
     std::vector<std::int64_t> stand;
     for (const std::string& name : asked.request.motors) stand.push_back(plant_steps(*find(name)));
     asked.off_way = std::max(asked.off_way, off_polyline(asked.polyline, stand));
