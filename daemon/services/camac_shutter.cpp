@@ -20,6 +20,11 @@ bool is_active(const bushd_report& report, const std::optional<config::Input>& i
   return input && (report.inputs >> input->number & 1) != 0;
 }
 
+// Else it is over, and its result comes when the motor stands.
+bool is_under_way(const bushd_report& report) {
+  return report.homing >= BUSHD_TRAVEL_STEPS && report.homing <= BUSHD_TRAVEL_RETURN;
+}
+
 // The stages in which the MCU makes the return, or is about to.
 bool is_return(const bushd_report& report) {
   return report.homing == BUSHD_TRAVEL_RETURN_DELAY || report.homing == BUSHD_TRAVEL_RETURN;
@@ -169,7 +174,7 @@ void CamacShutter::follow_going(std::int64_t now_us, camac::Bushd1& module) {
 
 // What happens between two reports is told in its order, whichever of it they show.
 void CamacShutter::follow_travel(const bushd_report& report, camac::Bushd1& module) {
-  if (motion_->stopping) return;
+  if (motion_->stopping || !is_under_way(report)) return;
   const Motion::Start start{report.start_tick, report.start_ns};
   const bool unseen = report.homing == BUSHD_TRAVEL_ARMED && !motion_->returns && motion_->start &&
                       *motion_->start != start;

@@ -95,6 +95,7 @@ void Plant::edge(const Edge& edge) {
   }
   ++steps_made_;
   motor->count(edge.time_ns);
+  if (on_step) on_step(edge.time_ns, edge.mcu, edge.index, motor->forward);
   if (motor->rotor) motor->rotor->step(edge.time_ns, motor->forward);
   if (motor->halt && edge.time_ns > motor->halt->from_ns) {
     check_halt(edge.time_ns, edge.mcu, edge.index, *motor);

@@ -40,6 +40,9 @@ class Plant final : public EdgeSink {
   std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output, const std::string& what)>
       on_violation;
 
+  // A step has been made.
+  std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output, bool positive)> on_step;
+
   // A motor that an emergency stop has stopped immediately in motion: a real one may have overrun.
   std::function<void(TimeNs time_ns, std::size_t mcu, std::size_t output)> on_cut_off;
 

@@ -20,6 +20,7 @@ struct SwitchOptions {
   std::uint64_t seed = 0;
   std::int64_t width_steps = std::numeric_limits<std::int64_t>::max();  // closed over so many
   bool opens = false;                                                   // where others close
+  std::int64_t period_steps = 0;  // above 0: closed at every so many steps, and nowhere else
   std::optional<std::uint8_t> input = {};  // of the MCU; without: that with the output's number
 };
 
@@ -32,7 +33,9 @@ class Switch {
     const std::int64_t beyond = options_.positive_end ? position_steps - options_.at_steps
                                                       : options_.at_steps - position_steps;
     const std::int64_t slack = closed_ ? options_.hysteresis_steps : 0;
-    const bool closed = beyond >= -slack && beyond - slack < options_.width_steps;
+    const bool closed = options_.period_steps > 0
+                            ? position_steps % options_.period_steps == 0
+                            : beyond >= -slack && beyond - slack < options_.width_steps;
     if (closed != closed_) quiet_ns_ = now_ns + options_.bounce_ns;
     closed_ = closed;
     return now_ns < quiet_ns_ ? random_.below(2) == 0 : closed_ != options_.opens;

@@ -140,6 +140,28 @@ TEST(CamacShutter, ErrorsOfATravelStopIt) {
   }
 }
 
+// The limit that it has left, and returns to, is active sooner than it was left. While it ramps
+// down the MCU already says so.
+TEST(CamacShutter, AReturnThatMeetsItsLimitEarlyFails) {
+  std::vector<int> codes;
+  for (int i = 0; i < 40; ++i) codes.push_back(200 - 7 * std::min(i, 39 - i));
+  for (const int early : {1, 5, 20, 30}) {
+    SCOPED_TRACE(early);
+    ShutterLab lab;
+    lab.load_codes(codes, 2000);
+    lab.shutter().left_limit = early;
+    lab.shutter().tell();
+    lab.run_for(0.1);
+    lab.permit(kAutomatic | kAllEnabled);
+    ASSERT_TRUE(lab.wait_for_lam());
+    ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }));
+    lab.run_for(0.5);
+    EXPECT_THAT(lab.warnings().back(), HasSubstr("was active before its last step"));
+    EXPECT_NE(lab.requests() & kTravelFailed, 0U);
+    EXPECT_EQ(lab.motor("m03").position_steps, lab.shutter().position);
+  }
+}
+
 TEST(CamacShutter, StepsAreSeenByTheSensorInTime) {
   ShutterLab lab;
   lab.permit(kSecondMode | kAllEnabled);

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::int64_t kLongestMove = 6000;
 constexpr std::uint32_t kClientsStream = 100;  // of randomness
+constexpr std::uint32_t kShutterStream = 421;
 
 }  // namespace
 
@@ -22,7 +23,10 @@ Clients::Clients(const bushd::config::Config& config, const Witness& witness,
       per_hour_(std::accumulate(rates.begin(), rates.end(), 0.0)),
       random_(seed, kClientsStream),
       joggers_(seed),
-      programs_(config, seed) {}
+      programs_(config, seed),
+      random_of_shutter_(seed, kShutterStream) {
+  if (const auto motor = ShutterPlace::motor(config)) shutter_ = config[*motor].name;
+}
 
 bushd::sim::TimeNs Clients::next_after(bushd::sim::TimeNs now_ns) {
   return per_hour_ > 0 ? now_ns + random_.wait(3.6e12 / per_hour_) : bushd::sim::kNever;
@@ -53,6 +57,8 @@ std::vector<Clients::Choice> Clients::motors_that(bool moving, bool uncertain) c
   for (const auto& state : witness_.states()) {
     if (!state) continue;
     for (const bushd::api::MotorState& motor : state->motors) {
+      // Its program would seldom find it where it left it.
+      if (shutter_ == motor.name && !random_of_shutter_.one_in(8)) continue;
       const bool waits = motor.activity == bushd::api::Activity::kArming ||
                          motor.activity == bushd::api::Activity::kArmed;
       if (!waits && motor.moving == moving &&
@@ -301,6 +307,10 @@ Request Clients::compose(CommandKind kind) {
       return tell_array();
     case CommandKind::kCamac:
       return of_program();
+    case CommandKind::kShutter:
+      return programs_.next_of_shutter(
+          witness_.positions().plant_steps(ShutterPlace::motor(config_)->value),
+          witness_.shutter().any_open());
   }
   return nonsense();
 }

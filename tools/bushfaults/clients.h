@@ -100,6 +100,8 @@ class Clients {
   bushd::sim::Random random_;
   Joggers joggers_;
   Programs programs_;
+  std::string shutter_{};                         // name of its motor, if there is one
+  mutable bushd::sim::Random random_of_shutter_;  // who moves it beside its programs
   struct Later {
     bushd::sim::TimeNs after_ns;
     bushd::sim::TimeNs due_ns;  // 0: it has only just been thought of

@@ -49,17 +49,81 @@ void Crates::daemon_started(TimeNs now_ns, bool kept) {
 
 Crates::Wrong Crates::completed(TimeNs now_ns, const Request& request,
                                 const bushd::api::CamacResult& result) {
-  if (result.block.responses.size() != request.cycles.size()) {
+  using bushd::camac::BlockMode;
+  const bool single = request.block_mode == BlockMode::kSingle;
+  const bool scan = request.block_mode == BlockMode::kScan;
+  const auto judge = single ? &Crates::in_single_mode
+                     : scan ? &Crates::scanned
+                            : &Crates::of_one_address;
+  if (auto wrong = (this->*judge)(now_ns, request, result.block.responses)) return wrong;
+  std::size_t words = 0;
+  for (const Response& response : result.block.responses) {
+    words += single || (response.x && response.q) ? 1 : 0;
+  }
+  if (words != result.block.tally)
+    return "its tally is not that of its answers: " + text_of(request);
+  return observe((result.requests >> (kBushd2Station - 1) & 1) != 0);
+}
+
+Crates::Wrong Crates::in_single_mode(TimeNs now_ns, const Request& request,
+                                     const std::vector<Response>& responses) {
+  if (responses.size() != request.cycles.size()) {
     return "as many answers as cycles were due: " + text_of(request);
   }
   for (std::size_t i = 0; i < request.cycles.size(); ++i) {
     const Naf& naf = request.cycles[i];
-    if (auto wrong = cycle(now_ns, naf, result.block.responses[i])) {
+    if (auto wrong = cycle(now_ns, naf, responses[i])) {
       return fmt::format("cycle {} of {}, {}: {}", i + 1, request.cycles.size(), text_of(naf),
                          *wrong);
     }
   }
-  return observe((result.requests >> (kBushd2Station - 1) & 1) != 0);
+  return std::nullopt;
+}
+
+// Word after word, until there is no Q; in the mode repeat a word is tried a hundred times.
+Crates::Wrong Crates::of_one_address(TimeNs now_ns, const Request& request,
+                                     const std::vector<Response>& responses) {
+  constexpr int kTries = 100;
+  for (std::size_t i = 0; i < responses.size(); ++i) {
+    const Response& response = responses[i];
+    const Naf& naf = request.cycles[std::min(i, request.cycles.size() - 1)];
+    const bool tried = request.block_mode == bushd::camac::BlockMode::kRepeat && response.x;
+    // In vain: what they have read is not told.
+    for (int more = kTries - 1; tried && !response.q && more > 0; --more) {
+      if (naf.subaddress == 0 && naf.function == kRead)
+        address_ = (address_ + 1) % Bushd2::kMemoryBytes;
+    }
+    if (auto wrong = cycle(now_ns, naf, response)) {
+      return fmt::format("word {}, {}: {}", i + 1, text_of(naf), *wrong);
+    }
+    const bool last = i + 1 == responses.size();
+    if (!last && !(response.x && response.q)) return "it goes on without Q: " + text_of(request);
+    if (last && response.x && response.q && responses.size() != request.words) {
+      return "it ends before its count: " + text_of(request);
+    }
+  }
+  return responses.empty() ? Wrong("no word at all: " + text_of(request)) : std::nullopt;
+}
+
+// Of all stations only that of BUSHD-2 answers: with its memory, which has no Q while L is raised,
+// and then with its registers.
+Crates::Wrong Crates::scanned(TimeNs now_ns, const Request& request,
+                              const std::vector<Response>& responses) {
+  constexpr std::size_t kRegisters = 4;
+  if (responses.empty()) {
+    address_ = (address_ + 1) % Bushd2::kMemoryBytes;
+    return observe(true);
+  }
+  if (responses.size() != std::min<std::size_t>(kRegisters, request.words)) {
+    return fmt::format("{} words of a scan: {}", responses.size(), text_of(request));
+  }
+  for (std::size_t i = 0; i < responses.size(); ++i) {
+    const Naf naf{kBushd2Station, static_cast<int>(i), kRead};
+    if (auto wrong = cycle(now_ns, naf, responses[i])) {
+      return fmt::format("word {} of a scan: {}", i + 1, *wrong);
+    }
+  }
+  return std::nullopt;
 }
 
 Crates::Wrong Crates::cycle(TimeNs now_ns, const Naf& naf, const Response& response) {

@@ -42,7 +42,7 @@ class Crates {
 
   // All registers begin anew. `kept`: what the memory holds was written to a disk.
   void daemon_started(TimeNs now_ns, bool kept);
-  // The cycles of a block and their answers.
+  // The cycles of a block and their answers. Of modes other than single those of BUSHD-2 only.
   Wrong completed(TimeNs now_ns, const Request& request, const bushd::api::CamacResult& result);
   Wrong raised(TimeNs now_ns, const bushd::api::CamacLam& lam);
 
@@ -81,6 +81,11 @@ class Crates {
     std::vector<ProgramMotion> candidates{};
   };
 
+  Wrong in_single_mode(TimeNs now_ns, const Request& request,
+                       const std::vector<Response>& responses);
+  Wrong of_one_address(TimeNs now_ns, const Request& request,
+                       const std::vector<Response>& responses);
+  Wrong scanned(TimeNs now_ns, const Request& request, const std::vector<Response>& responses);
   Wrong cycle(TimeNs now_ns, const Naf& naf, const Response& response);
   Wrong module_cycle(TimeNs now_ns, const Naf& naf, const Response& response);
   Wrong memory_cycle(const Naf& naf, const Response& response);

@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "installation.h"
+#include "programs.h"
+#include "shutter_model.h"
 #include "times.h"
 
 namespace bushfaults {
@@ -26,6 +28,7 @@ Inputs::Inputs(const bushd::config::Config& config, bushd::sim::Bus& bus, bushd:
   for (std::size_t i = 0; i < config.motors.size(); ++i) {
     const bushd::config::Motor& motor = config.motors[i];
     switches_.push_back(limit_switches(config, i, seed));
+    if (ShutterPlace::motor(config) == bushd::MotorId{i}) add_shutter_switches(i);
     const auto home = home_switch(config, i, seed);
     if (!home) continue;
     switches_.back().push_back(*home);
@@ -33,6 +36,22 @@ Inputs::Inputs(const bushd::config::Config& config, bushd::sim::Bus& bus, bushd:
     for (const bushd::sim::SwitchOptions& one : switches_.back()) {
       bus_.mcu(motor.mcu.value).attach_switch(motor.output.value, one);
     }
+  }
+}
+
+// Limits at both ends of its way, and a sensor that sees every second step.
+void Inputs::add_shutter_switches(std::size_t index) {
+  const bushd::config::Motor& motor = config_.motors[index];
+  const bushd::config::MotorInputs& its = motor.inputs;
+  const bushd::sim::SwitchOptions right{
+      .at_steps = ShutterPlace::kRightSteps, .positive_end = true, .input = its.positive->number};
+  const bushd::sim::SwitchOptions left{.at_steps = ShutterPlace::kLeftSteps,
+                                       .input = its.negative->number};
+  const bushd::sim::SwitchOptions sensor{.period_steps = ShutterPlace::kSensorPeriod,
+                                         .input = its.step->number};
+  switches_.back() = {right, left};
+  for (const auto& one : {right, left, sensor}) {
+    bus_.mcu(motor.mcu.value).attach_switch(motor.output.value, one);
   }
 }
 
@@ -49,7 +68,8 @@ void Inputs::set(std::size_t mcu) {
 }
 
 std::string Inputs::press_limit(TimeNs now_ns, bushd::sim::Random& random) {
-  const auto motor = static_cast<std::size_t>(random.below(config_.motors.size()));
+  auto motor = static_cast<std::size_t>(random.below(config_.motors.size()));
+  if (is_of_shutter(config_, motor)) motor = 0;  // its switches are the plant's
   const TimeNs length_ns = random.magnitude(5 * kMs, 2000 * kMs);
   limit_until_ns_[motor] = now_ns + length_ns;
   witness_.pressed(now_ns, motor);
@@ -77,7 +97,7 @@ std::string Inputs::trigger(TimeNs now_ns, bushd::sim::Random& random) {
   for (std::size_t mcu = 0; mcu < config_.mcus.size(); ++mcu) {
     if (!all && mcu != one) continue;
     trigger_[mcu] = !trigger_[mcu];
-    witness_.starts().trigger(now_ns, mcu, trigger_[mcu]);
+    witness_.trigger(now_ns, mcu, trigger_[mcu]);
     set(mcu);
   }
   return all ? "at all MCUs" : "at " + config_.mcus[one].id;

@@ -35,6 +35,7 @@ class Inputs {
   TimeNs released_ns() const;
 
  private:
+  void add_shutter_switches(std::size_t motor);
   void set(std::size_t mcu);
   void watch_switches(TimeNs now_ns);
 

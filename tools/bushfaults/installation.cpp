@@ -111,7 +111,9 @@ void furnish(bushd::config::Config& config, const FaultRates& faults, const Comm
       rate(commands, CommandKind::kJog) > 0 || rate(commands, CommandKind::kSettings) > 0;
   if (units) add_units(config, seed);
   if (rate(commands, CommandKind::kLegMove) > 0) add_backlash(config, seed);
-  if (rate(commands, CommandKind::kCamac) > 0) add_crate(config);
+  const bool shutter = rate(commands, CommandKind::kShutter) > 0;
+  if (shutter || rate(commands, CommandKind::kCamac) > 0) add_crate(config);
+  if (shutter) add_shutter(config);
   if (rate(commands, CommandKind::kHome) > 0) add_homes(config, seed);
   if (rate(faults, FaultKind::kLimitSwitch) > 0) add_limit_switches(config);
   if (rate(faults, FaultKind::kEmergencyInput) > 0) add_emergency_inputs(config, seed);
@@ -122,6 +124,7 @@ void add_homes(bushd::config::Config& config, std::uint64_t seed) {
   bushd::sim::Random speeds(seed, kHomeSpeedStream);
   for (std::size_t i = 0; i < config.motors.size(); i += 2) {
     bushd::config::Motor& motor = config.motors[i];
+    if (is_of_shutter(config, i)) continue;
     bushd::config::Home home;
     home.positive = random.one_in(2);
     home.position_steps =
@@ -205,7 +208,7 @@ void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed) {
 
 void add_limit_switches(bushd::config::Config& config) {
   for (std::size_t i = 0; i < config.motors.size(); ++i) {
-    if (config.motors[i].home) continue;
+    if (config.motors[i].home || is_of_shutter(config, i)) continue;
     const bushd::config::Input own{.number = config.motors[i].output.value};
     if (i % 3 != 1) config.motors[i].inputs.positive = own;
     if (i % 3 != 0) config.motors[i].inputs.negative = own;

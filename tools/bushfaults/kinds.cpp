@@ -66,6 +66,7 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"camac-blocks", 0, "programs load, start, stop and read a BUSHD-2, and initialise its crate"},
     {"paths", 0, "motors at rest move along a path, past its points or to rest at each"},
     {"arrays", 0, "motors at rest follow positions in time, told before or while they move"},
+    {"shutter-blocks", 0, "programs step and open the shutter of a BUSHD-1; wants --triggers"},
 }};
 
 template <std::size_t kSize>

@@ -75,8 +75,9 @@ enum class CommandKind : std::uint8_t {
   kCamac,
   kPath,
   kArray,
+  kShutter,
 };
-inline constexpr std::size_t kCommandKinds = 25;
+inline constexpr std::size_t kCommandKinds = 26;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

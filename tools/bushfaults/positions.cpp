@@ -163,6 +163,11 @@ std::optional<std::string> Positions::check_offline(const bushd::api::StateSnaps
     // Reset while it gets another table: that is heard with its next report.
     if (!offset && state.state == bushd::api::McuState::kBusy) continue;
     if (offset && plant_steps(index) - *offset == claim.position_steps) continue;
+    // Set just before it gets another table, and no report has told of it.
+    const bool set = std::ranges::any_of(motors_[index].perhaps_set, [&](const Motor::Set& one) {
+      return plant_steps(index) - one.offset == claim.position_steps;
+    });
+    if (set && state.state == bushd::api::McuState::kBusy) continue;
     return fmt::format("{} ({}) is said to be {} to be at {} while {} is {} ({}), and is at {}",
                        claim.name, word(claim.activity), word(claim.trust), claim.position_steps,
                        state.mcu, word(state.state), state.detail,

@@ -14,6 +14,11 @@ namespace bushfaults {
 
 // Gives the configuration a crate, if it has motors for one: those of the last of its groups.
 void add_crate(bushd::config::Config& config);
+// And a BUSHD-1, whose motor has a group of its own, and is the only one with switches at its
+// inputs.
+void add_shutter(bushd::config::Config& config);
+// The input with the number of the motor's output is one of the shutter's.
+bool is_of_shutter(const bushd::config::Config& config, std::size_t motor);
 // By which no program is slower, of a group with this table.
 bushd::tables::TablePtr slowest_program(const bushd::tables::Table& table);
 
@@ -24,6 +29,9 @@ class Programs {
 
   // What one of them asks next. `position_steps`: of a motor of the module, as it is shown.
   Request next(std::int64_t position_steps, std::size_t motor);
+  // The same of BUSHD-1, whose motor stands there, as the plant counts. `open`: a start may be
+  // under way.
+  Request next_of_shutter(std::int64_t stands, bool open);
   // Of the module.
   std::size_t any_motor();
   std::size_t motors() const;
@@ -35,6 +43,9 @@ class Programs {
   void look(Cycles& cycles);
   void control_crate(Cycles& cycles);
   void random_cycles(Cycles& cycles);
+  void other_modes(Request& request);
+  void load_shutter(Cycles& cycles, std::int64_t steps);
+  void start_shutter(Cycles& cycles, std::int64_t stands);
 
   const bushd::config::Config& config_;
   bushd::sim::Random random_;

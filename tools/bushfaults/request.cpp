@@ -204,8 +204,12 @@ api::Request api_of(const Request& request) {
       if (request.array == 0) return path_of(request);
       return follow_of(request);
     case Ask::kCamac:
-      return api::Camac{.block = {.cycles = request.cycles,
-                                  .count = static_cast<std::uint32_t>(request.cycles.size())}};
+      return api::Camac{.block = {.mode = request.block_mode,
+                                  .cycles = request.cycles,
+                                  .count = request.block_mode == bushd::camac::BlockMode::kSingle
+                                               ? static_cast<std::uint32_t>(request.cycles.size())
+                                               : request.words,
+                                  .last_station = request.last_station}};
     case Ask::kDisarm:
       break;
   }

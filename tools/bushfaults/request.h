@@ -81,7 +81,10 @@ struct Request {
   bool rising = false;                        // kArm: the edge
   std::int32_t delay_us = 0;                  // kArm
   std::vector<bushd::camac::Naf> cycles{};    // kCamac
-  bool unknown_way = false;                   // a move, and nobody knows by how many steps
+  bushd::camac::BlockMode block_mode = bushd::camac::BlockMode::kSingle;
+  std::uint32_t words = 0;   // of the other modes
+  int last_station = 23;     // of a scan
+  bool unknown_way = false;  // a move, and nobody knows by how many steps
   Damage damage = Damage::kNone;
 
   void add(const std::string& motor, std::int64_t steps_of_it) {

@@ -25,7 +25,8 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
       positions_(config, bus, plant),
       starts_(config),
       units_(config),
-      crates_(config) {
+      crates_(config),
+      shutter_(config) {
   for (const bushd::config::Motor& motor : config.motors) {
     motor_by_name_[motor.name] = motors_.size();
     const bushd::config::Bus& bus_of = config.bus_of(motor);
@@ -72,6 +73,7 @@ void Witness::daemon_started(TimeNs now_ns) {
   positions_.daemon_started();
   units_.daemon_started(offsets_kept_);
   crates_.daemon_started(now_ns, offsets_kept_);
+  shutter_.daemon_started(now_ns, offsets_kept_);
 }
 
 void Witness::pressed(TimeNs now_ns, std::size_t motor) {
@@ -132,6 +134,7 @@ void Witness::state(TimeNs now_ns, std::size_t mcu, const api::StateSnapshot& st
   for (const api::MotorState& motor : state.motors) {
     const auto wrong = units_.check(index_of(*find(motor.name)), motor);
     if (wrong) violated(now_ns, *wrong);
+    if (is_shutter(*find(motor.name))) shutter_.said(now_ns, motor);
   }
 }
 

@@ -19,6 +19,7 @@
 #include "promise.h"
 #include "recent.h"
 #include "request.h"
+#include "shutter_model.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
 #include "starts.h"
@@ -74,8 +75,13 @@ class Witness {
 
   Promise& promise() { return promise_; }
   const Promise& promise() const { return promise_; }
-  Starts& starts() { return starts_; }
+  void trigger(TimeNs now_ns, std::size_t mcu, bool rising);
+  // The motor of the shutter has made a step, and stands there as the plant counts.
+  void shutter_stepped(TimeNs now_ns, bool right, std::int64_t stands);
+  // Clients have stopped all, and all is well.
+  void calm() { shutter_.calm(); }
   const Crates& crates() const { return crates_; }
+  const ShutterModel& shutter() const { return shutter_; }
   // Offsets are kept over restarts of the daemon.
   void keep_offsets() { offsets_kept_ = true; }
   const Units& units() const { return units_; }
@@ -245,7 +251,16 @@ class Witness {
   void hold_accepted(const Request& request);
   void paused(TimeNs now_ns, const Key& key, const std::string& reason);
   // CAMAC modules, which ask for motion themselves.
-  void asked_by_module(TimeNs now_ns, const std::string& what, const std::string& motor);
+  void asked_by_module(TimeNs now_ns, const std::string& client, const std::string& what,
+                       const std::string& motor);
+  void shutter_moves(TimeNs now_ns, Motor& motor);
+  void crate_answered(TimeNs now_ns, const Request& request, const bushd::api::CamacResult& result);
+  bool is_shutter(const Motor& motor) const {
+    return ShutterPlace::motor(config_) == bushd::MotorId{index_of(motor)};
+  }
+  bool is_of_shutter_module(const Motor& motor) const {
+    return motor.move && std::get<1>(*motor.move) == ShutterModel::kClient;
+  }
   void module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted, bool on_line);
   void module_ended(TimeNs now_ns, Motor& motor, const End& end, bool whole);
   void check_program(TimeNs now_ns, const Motor& motor);
@@ -263,6 +278,7 @@ class Witness {
   Starts starts_;
   Units units_;
   Crates crates_;
+  ShutterModel shutter_;
   std::optional<ProgramMotion> program_;  // that a module's motor moves by, if it is known
   std::int64_t module_moves_ = 0;
   bool offsets_kept_ = false;

@@ -14,15 +14,52 @@ namespace bushfaults {
 void Witness::lam(TimeNs now_ns, const bushd::api::CamacLam& lam) {
   recent_.note(now_ns, fmt::format("  LAM of {:#x}", lam.raised));
   if (const auto wrong = crates_.raised(now_ns, lam)) violated(now_ns, *wrong);
+  if (const auto wrong = shutter_.raised(lam)) violated(now_ns, *wrong);
 }
 
-void Witness::asked_by_module(TimeNs now_ns, const std::string& what, const std::string& motor) {
-  recent_.note(now_ns, fmt::format("  {} of {}: {}", what, Crates::kBushd2Client, motor));
+void Witness::trigger(TimeNs now_ns, std::size_t mcu, bool rising) {
+  starts_.trigger(now_ns, mcu, rising);
+  const auto motor = ShutterPlace::motor(config_);
+  if (motor && config_[*motor].mcu.value == mcu) shutter_.trigger(now_ns, rising);
+}
+
+void Witness::shutter_stepped(TimeNs now_ns, bool right, std::int64_t stands) {
+  const bool second = second_ns_ >= 0 && now_ns - second_ns_ < 5'000'000'000;
+  if (second) shutter_.disturbed();
+  if (const auto wrong = shutter_.stepped(now_ns, right, stands)) {
+    violated(now_ns, "the shutter: " + *wrong);
+  }
+}
+
+void Witness::crate_answered(TimeNs now_ns, const Request& request,
+                             const bushd::api::CamacResult& result) {
+  if (const auto wrong = crates_.completed(now_ns, request, result)) {
+    return violated(now_ns, *wrong);
+  }
+  if (request.block_mode != bushd::camac::BlockMode::kSingle) return;
+  shutter_.begin_block();
+  for (std::size_t i = 0; i < request.cycles.size(); ++i) {
+    const auto wrong = shutter_.cycle(now_ns, request.cycles[i], result.block.responses[i]);
+    if (wrong) {
+      return violated(
+          now_ns, fmt::format("BUSHD-1, cycle {} of {}: {}", i + 1, request.cycles.size(), *wrong));
+    }
+  }
+  const bool lam = (result.requests >> (kBushd1Station - 1) & 1) != 0;
+  if (const auto wrong = shutter_.observe(lam)) violated(now_ns, "BUSHD-1: " + *wrong);
+}
+
+void Witness::asked_by_module(TimeNs now_ns, const std::string& client, const std::string& what,
+                              const std::string& motor) {
+  const bool of_shutter = client == ShutterModel::kClient;
+  if (!of_shutter && client != Crates::kBushd2Client) return;
+  recent_.note(now_ns, fmt::format("  {} of {}: {}", what, client, motor));
+  if (of_shutter && what == "move") return shutter_moves(now_ns, *find(motor));
   const bool on_line = what == "move line";  // its MCU has another table
   if (what == "move" || on_line) {
     return module_moves(now_ns, *find(motor), crates_.accepted(motor), on_line);
   }
-  Request stop{.client = Crates::kBushd2Client, .ask = Ask::kStop};
+  Request stop{.client = client, .ask = Ask::kStop};
   stop.add(motor, 0);
   stop_accepted(stop);
 }
@@ -51,6 +88,28 @@ void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& 
     motor.own_ramp_excess = std::max(
         motor.own_ramp_excess, own_ramp_excess((*table)->view(), bus.tick_us * 1000, bus.format));
   }
+  const Key key = key_of(request.id());
+  Asked& asked = asked_[key];
+  asked = Asked{.request = request,
+                .since_ns = now_ns,
+                .due_since_ns = now_ns,
+                .accepted = true,
+                .finished = true};
+  this->accepted(now_ns, key, asked);
+}
+
+// A step: its direction is known by who has started it.
+void Witness::shutter_moves(TimeNs now_ns, Motor& motor) {
+  std::erase_if(asked_, [&](const auto& entry) {
+    const bool of_module = std::get<1>(entry.first) == ShutterModel::kClient;
+    return of_module && std::ranges::none_of(
+                            motors_, [&](const Motor& other) { return other.move == entry.first; });
+  });
+  Request request{.client = ShutterModel::kClient,
+                  .number = ++module_moves_,
+                  .ask = Ask::kMoveBy,
+                  .unknown_way = true};
+  request.add(motor.name, 0);
   const Key key = key_of(request.id());
   Asked& asked = asked_[key];
   asked = Asked{.request = request,

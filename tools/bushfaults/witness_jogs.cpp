@@ -293,6 +293,7 @@ void Witness::check_deadlines(TimeNs now_ns) {
     if (motor.idle_checks == 0) motor.held_at.reset();
   }
   if (const auto wrong = crates_.check_deadline(now_ns)) violated(now_ns, *wrong);
+  if (const auto wrong = shutter_.check_deadline(now_ns)) violated(now_ns, *wrong);
   if (!promise_.waits()) none_waits_ns_ = now_ns;
   if (now_ns - none_waits_ns_ > kTurnDueNs) violated(now_ns, "requests wait for their turn");
 }

@@ -85,6 +85,7 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   asked.began.push_back(request.ask != Ask::kArm);
   asked.told.push_back(false);
   asked.stops.push_back(false);
+  if (is_shutter(motor) && request.client != ShutterModel::kClient) shutter_.disturbed();
   if (request.ask == Ask::kHome) {
     motor.move.reset();
     motor.range.reset();
@@ -176,9 +177,7 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
   if (request.ask == Ask::kPause) paused(now_ns, key, completed.reason);
   if (request.ask == Ask::kJog && asked.jog) jogged(now_ns, asked, completed);
   if (request.ask == Ask::kCamac) {
-    const auto wrong =
-        crates_.completed(now_ns, request, std::get<api::CamacResult>(completed.detail));
-    if (wrong) violated(now_ns, *wrong);
+    crate_answered(now_ns, request, std::get<api::CamacResult>(completed.detail));
   }
   const bool homes = request.ask == Ask::kHome;
   if (homes || request.is_move()) {
@@ -248,7 +247,8 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
     return;
   }
   if (line.at("event") == "request") {
-    return asked_by_module(now_ns, line.at("request"), line.at("motors").front());
+    return asked_by_module(now_ns, line.at("client"), line.at("request"),
+                           line.at("motors").front());
   }
   const bool begins = line.at("event") == "move";
   if (!begins && line.at("event") != "result") return;
@@ -319,6 +319,11 @@ void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
   if (there && !last) ++leg;
   if (end.word != "stopped") motor.pauses = false;
   if (end.paused) ++times_paused_;
+  if (is_of_shutter_module(motor) && !end.paused && !motor.goes_on) {
+    asked.end[index] = std::move(end);
+    motor.move.reset();
+    return;
+  }
   if (is_of_module(motor) && !end.paused && !motor.goes_on) {
     module_ended(now_ns, motor, end, legs.size() == 1 && asked.from[index] == motor.run_from);
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "programs.h"
 #include "small_world.h"
 #include "times.h"
 
@@ -105,6 +106,14 @@ void World::add_motors() {
                                const std::string& what) {
     witness_.violated(time_ns, fmt::format("{} output {}: {}", config_.mcus[mcu].id, output, what));
   };
+  const auto shutter = ShutterPlace::motor(config_);
+  if (shutter) {
+    plant_.on_step = [this, index = shutter->value, its = config_[*shutter]](
+                         TimeNs at_ns, std::size_t mcu, std::size_t output, bool positive) {
+      if (its.mcu.value != mcu || its.output.value != output) return;
+      witness_.shutter_stepped(at_ns, positive, witness_.positions().plant_steps(index));
+    };
+  }
   plant_.on_cut_off = [this](TimeNs time_ns, std::size_t mcu, std::size_t output) {
     witness_.positions().cut_off(time_ns, mcu, output);
   };
@@ -112,10 +121,12 @@ void World::add_motors() {
 
 void World::allow_programs() {
   const bushd::config::Bus& bus = config_.buses[0];
-  const bushd::GroupId group = config_[config_.crates[0].modules[0].motors[0]].group;
-  const auto slowest = slowest_program(*config_[group].table);
-  rules_[group.value]->allow_slower(bushd::sim::PaceRules(
-      slowest->view(), bus.tick_ns(), bushd::sim::McuOptions{}.slots, bus.format));
+  for (const bushd::config::CamacModule& module : config_.crates[0].modules) {
+    const bushd::GroupId group = config_[module.motors[0]].group;
+    const auto slowest = slowest_program(*config_[group].table);
+    rules_[group.value]->allow_slower(bushd::sim::PaceRules(
+        slowest->view(), bus.tick_ns(), bushd::sim::McuOptions{}.slots, bus.format));
+  }
 }
 
 void World::run() {
@@ -190,6 +201,7 @@ void World::calm() {
   if (const std::uint64_t steps = witness_.steps_unaccounted(); steps != 0) {
     witness_.violated(now_ns_, fmt::format("{} steps unaccounted", steps));
   }
+  witness_.calm();
   if (options_.keep_positions) night();
 }
 
@@ -201,6 +213,8 @@ void World::be_well(TimeNs began_ns) {
     // What a client has switched off or stopped only a client sets going again.
     mail_.send(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
     if (small_ && small_->not_ready()) small_->clear_faults();
+    // What has waited for its table does not hear a stop before it begins (docs/faults.md).
+    if (!config_.crates.empty()) mail_.send(now_ns_, clients_.stop_all());
   }
   if (ready() || witness_.violation()) return;
   const auto of_small = small_ ? small_->not_ready() : std::nullopt;
