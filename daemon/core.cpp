@@ -111,7 +111,7 @@ void Core::request(std::int64_t now, const api::Asker& asker, const api::Request
   if (!of_motors) return asker.answer(api::Refused{of_motors.error().text()});
   const api::Request& request = *of_motors ? **of_motors : as_asked;
   // Whoever stops motors stops those as well that are about to begin.
-  departures_.cancel_by(request);
+  camac_.stopped(departures_.cancel_by(request));
   if (!departures_.hold(now, asker, request)) carry_out(now, asker, request);
 }
 

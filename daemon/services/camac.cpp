@@ -60,6 +60,7 @@ class Camac::Station {
   explicit Station(std::string name) : kept_as(std::move(name)) {}
   virtual camac::MotionModule& module() = 0;
   virtual void step(std::int64_t now_us) = 0;
+  virtual void stopped(const std::vector<MotorId>& motors) = 0;
 
   const std::string kept_as;
 };
@@ -71,6 +72,7 @@ class Camac::Bushd1Station final : public Station {
       : Station(std::move(place)), shutter_(std::forward<Args>(args)...) {}
   camac::MotionModule& module() override { return module_; }
   void step(std::int64_t now_us) override { shutter_.follow(now_us, module_); }
+  void stopped(const std::vector<MotorId>& motors) override { shutter_.stopped(motors); }
 
  private:
   CamacShutter shutter_;
@@ -87,6 +89,7 @@ class Camac::Bushd2Station final : public Station {
   camac::MotionModule& module() override { return module_; }
   // Who does not answer is told by the core: his move ends.
   void step(std::int64_t now_us) override { motors_.step(now_us, module_); }
+  void stopped(const std::vector<MotorId>& motors) override { motors_.stopped(motors); }
 
  private:
   CamacMotors motors_;
@@ -144,6 +147,13 @@ void Camac::keep_memories(const Crate& crate) {
   for (const auto& station : crate.stations) {
     const std::string text = camac::to_text(station->module().memory());
     kept_.keep(station->kept_as, {{kMemory, {.value = text}}});
+  }
+}
+
+void Camac::stopped(const std::vector<MotorId>& motors) {
+  if (motors.empty()) return;
+  for (const Crate& crate : crates_) {
+    for (const auto& station : crate.stations) station->stopped(motors);
   }
 }
 

@@ -26,6 +26,8 @@ class Camac final : public Service {
   ~Camac() override;
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request);
+  // By somebody's request. What a module has begun and is not yet asked of them does not begin.
+  void stopped(const std::vector<MotorId>& motors);
   // The store is in use: memories are as they were kept.
   void take_kept();
 

@@ -100,9 +100,15 @@ void CamacMotors::stop(int) {
   if (motion_) motion_->to_stop = true;
 }
 
+void CamacMotors::stopped(const std::vector<MotorId>& motors) {
+  if (!motion_ || motion_->stage == Motion::Stage::kMoves) return;
+  if (std::ranges::find(motors, motion_->motor) != motors.end()) motion_->to_stop = true;
+}
+
 void CamacMotors::step(std::int64_t now_us, Bushd2& module) {
   if (!motion_) return;
   if (motion_->stage == Motion::Stage::kBegins && motion_->to_stop) {
+    warn(motion_->motor, installation_[motion_->motor].name() + ": stopped before it began");
     motion_.reset();
     return module.ends({});
   }

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "camac/bushd2.h"
 #include "daemon/interlocks.h"
@@ -42,6 +43,9 @@ class CamacMotors final : public camac::Motors {
   camac::MotorStatus status(int motor) override;
   bool move(const camac::Program& program) override;
   void stop(int motor) override;
+
+  // By somebody else. A motion that has not begun does not begin.
+  void stopped(const std::vector<MotorId>& motors);
 
   // Does what is due, and tells the module what has become of its motion.
   void step(std::int64_t now_us, camac::Bushd2& module);

@@ -100,9 +100,20 @@ void CamacShutter::stop() {
   if (motion_) motion_->to_stop = true;
 }
 
+void CamacShutter::stopped(const std::vector<MotorId>& motors) {
+  if (!motion_ || motion_->stage == Motion::Stage::kGoes) return;
+  if (std::ranges::find(motors, motor_) == motors.end()) return;
+  motion_->to_stop = motion_->begins_no_more = true;
+}
+
 void CamacShutter::follow(std::int64_t now_us, camac::Bushd1& module) {
   tell_limits(module);
   if (!motion_) return;
+  if (motion_->stage == Motion::Stage::kBegins && motion_->begins_no_more) {
+    refuse("stopped before it began");
+    motion_.reset();
+    return module.stands();
+  }
   if (motion_->stage == Motion::Stage::kBegins) begin(now_us);
   if (motion_->stage == Motion::Stage::kGetsTable) {
     follow_table(module);

@@ -41,6 +41,9 @@ class CamacShutter final : public camac::Shutter {
   bool travel(const camac::Travel& travel) override;
   void stop() override;
 
+  // By somebody else. A motion that has not begun does not begin.
+  void stopped(const std::vector<MotorId>& motors);
+
   // Does what is due, and tells the module what has become of it.
   void follow(std::int64_t now_us, camac::Bushd1& module);
 
@@ -54,7 +57,8 @@ class CamacShutter final : public camac::Shutter {
     tables::TablePtr table{};
     Stage stage = Stage::kBegins;
     bool to_stop = false;
-    bool stopping = false;  // it was asked to
+    bool begins_no_more = false;  // by another's stop
+    bool stopping = false;        // it was asked to
     // Of a travel, as the module knows it.
     bool returns = false;
     std::int64_t from_steps = 0;  // of the run

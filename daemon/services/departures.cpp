@@ -126,11 +126,11 @@ void Departures::cancel(const std::vector<MotorId>& motors) {
   cancel_if([&](const Held& held) { return has_common(held.motors, motors); });
 }
 
-void Departures::cancel_by(const api::Request& request) {
+std::vector<MotorId> Departures::cancel_by(const api::Request& request) {
   if (const auto* jog = std::get_if<api::Jog>(&request)) {
     const auto motor = installation_.find(jog->motor);
     if (motor && jog->per_s == 0 && !jog->renew) cancel_jogs(*motor);
-    return;
+    return {};
   }
   const auto motors = std::visit(
       Overloaded{[&](const api::Stop& r) { return installation_.find_or_all(r.motors); },
@@ -139,7 +139,9 @@ void Departures::cancel_by(const api::Request& request) {
                  [&](const api::EmergencyStop&) { return installation_.find_or_all({}); },
                  [](const auto&) -> Result<std::vector<MotorId>> { return {}; }},
       request);
-  if (motors) cancel(*motors);
+  if (!motors) return {};
+  cancel(*motors);
+  return *motors;
 }
 
 void Departures::cancel_jogs(MotorId motor) {

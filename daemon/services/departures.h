@@ -32,8 +32,9 @@ class Departures final : public Service {
 
   // Whether the request is kept here. It is carried out, or refused, in a later step.
   bool hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
-  // Refuses those whose motors this request stops, if it is one that stops motors.
-  void cancel_by(const api::Request& request);
+  // Refuses those whose motors this request stops, if it is one that stops motors. Returns these
+  // motors.
+  std::vector<MotorId> cancel_by(const api::Request& request);
   // Refuses those of these motors: they are being stopped.
   void cancel(const std::vector<MotorId>& motors);
   bool empty() const { return held_.empty(); }

@@ -214,6 +214,24 @@ TEST(CamacStreaming, FasterProgramsWaitForTheTable) {
   EXPECT_EQ(lab.shaft_steps("m01"), 102);
 }
 
+TEST(CamacStreaming, AStopByOthersEndsWhatWaitsForItsTable) {
+  CamacLab lab(lab_with("fine"));
+  auto codes = program_codes();
+  std::fill(codes.begin() + 200, codes.end(), 9);
+  const auto other = lab.send(Ask::kMoveBy, {"m03"}, {3'000});
+  lab.run_until([&] { return lab.shaft_steps("m03") > 200; });
+  lab.load(0, 500, codes);
+  lab.permit(kEnabled);
+  lab.run_for(0.3);
+  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_TRUE(lab.has_result(other));
+  lab.run_for(3);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(lab.shaft_steps("m03"), 3'000) << "the other is left alone";
+  EXPECT_THAT(lab.warnings().back(), HasSubstr("m01: stopped before it began"));
+}
+
 // Its settings hold, in the units of the program's table.
 TEST(CamacStreaming, LimitsOfSpeedAndBacklashHold) {
   CamacLab lab(lab_with("fine",

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "times.h"
+
 namespace bushfaults {
 namespace {
 
 using bushd::sim::TimeNs;
 
-constexpr TimeNs kMs = 1'000'000;
-constexpr TimeNs kSecond = 1000 * kMs;
 constexpr TimeNs kShutterOnDiskNs = 15 * kSecond;  // as of BUSHD-2 (crate_model.cpp)
 constexpr TimeNs kRequestDueNs = 120 * kSecond;    // likewise
 constexpr TimeNs kTableNs = 20 * kSecond;

@@ -213,8 +213,6 @@ void World::be_well(TimeNs began_ns) {
     // What a client has switched off or stopped only a client sets going again.
     mail_.send(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
     if (small_ && small_->not_ready()) small_->clear_faults();
-    // What has waited for its table does not hear a stop before it begins (docs/faults.md).
-    if (!config_.crates.empty()) mail_.send(now_ns_, clients_.stop_all());
   }
   if (ready() || witness_.violation()) return;
   const auto of_small = small_ ? small_->not_ready() : std::nullopt;
