@@ -28,10 +28,10 @@ MemoryMap::Unit MemoryMap::unit_of(std::string file) {
   return static_cast<Unit>(units_.size() - 1);
 }
 
-std::uint64_t MemoryMap::units_ending(const std::string& end) const {
-  std::uint64_t found = 0;
+MemoryMap::Units MemoryMap::units_ending(const std::string& end) const {
+  Units found;
   for (std::size_t i = 1; i < units_.size(); ++i) {
-    if (end == "*" || ends_with_path(units_[i], end)) found |= std::uint64_t{1} << i;
+    if (end == "*" || ends_with_path(units_[i], end)) found.set(i);
   }
   return found;
 }
@@ -57,7 +57,7 @@ std::set<std::string> MemoryMap::read_owners(const std::string& path) {
   });
   std::ifstream file(path);
   if (!file) throw std::runtime_error(path + ": cannot be read");
-  std::map<std::string, std::uint64_t> owners;
+  std::map<std::string, Units> owners;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     const std::string at = path + ":" + std::to_string(number) + ": ";
@@ -70,8 +70,8 @@ std::set<std::string> MemoryMap::read_owners(const std::string& path) {
     }
     owners[name];  // without a file it is nobody's
     for (std::string end; words >> end;) {
-      const std::uint64_t units = units_ending(end);
-      if (units == 0) throw std::runtime_error(at + "the image has no source file " + end);
+      const Units units = units_ending(end);
+      if (units.none()) throw std::runtime_error(at + "the image has no source file " + end);
       owners[name] |= units;
     }
   }

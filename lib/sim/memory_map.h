@@ -9,6 +9,7 @@
 // is not named belongs to the file that defines it. What is no object belongs to nobody.
 #pragma once
 
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -24,13 +25,14 @@ class MemoryMap {
   // Source files by number; code without line numbers (of libraries) is of none.
   using Unit = std::uint8_t;
   static constexpr Unit kNoUnit = 0;
-  static constexpr std::size_t kMaxUnits = 64;
+  static constexpr std::size_t kMaxUnits = 128;
+  using Units = std::bitset<kMaxUnits>;
 
   struct Object {
     std::string name;
     std::uint32_t address;
     std::uint32_t size;
-    std::uint64_t writers;  // bit per unit
+    Units writers;
   };
 
   const std::string& name_of(Unit unit) const { return units_[unit]; }
@@ -49,13 +51,13 @@ class MemoryMap {
   // The number of a source file, with or without "../" before its path.
   Unit unit_of(std::string file);
   std::size_t units() const { return units_.size(); }
-  std::uint64_t units_ending(const std::string& end) const;
+  Units units_ending(const std::string& end) const;
   void add(Object object) { objects_.push_back(std::move(object)); }
   // When all objects are added. Returns the names that are in the file. Throws std::runtime_error,
   // with file, line and cause.
   std::set<std::string> read_owners(const std::string& path);
   // Of an object that is not in the file of owners.
-  void set_writers(std::size_t object, std::uint64_t units) { objects_[object].writers = units; }
+  void set_writers(std::size_t object, Units units) { objects_[object].writers = units; }
 
  private:
   std::string image_;

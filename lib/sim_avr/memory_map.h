@@ -29,9 +29,7 @@ class AvrMemoryMap : public MemoryMap {
   }
   // The smallest object at this address of RAM, or nullptr.
   const Object* object_at(std::uint16_t address) const;
-  bool may_write(Unit unit, std::uint16_t address) const {
-    return (writers_[address] >> unit & 1) != 0;
-  }
+  bool may_write(Unit unit, std::uint16_t address) const { return writers_[address].test(unit); }
 
   std::uint16_t variables_end() const { return variables_end_; }
   std::uint16_t stack_top() const { return stack_top_; }
@@ -51,7 +49,7 @@ class AvrMemoryMap : public MemoryMap {
   std::vector<Unit> unit_at_;
   std::map<std::string, std::string> defined_in_;  // names of local objects
   std::vector<std::int16_t> object_at_ = std::vector<std::int16_t>(kData, -1);
-  std::vector<std::uint64_t> writers_ = std::vector<std::uint64_t>(kData, 0);
+  std::vector<Units> writers_ = std::vector<Units>(kData);
   std::uint16_t variables_end_ = 0;
   std::uint16_t stack_top_ = 0;
 };

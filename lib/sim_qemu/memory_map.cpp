@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::uint32_t kRam = 0x20000000;
 constexpr std::uint32_t kRamSize = 0x10000;
-constexpr std::uint64_t kEverybody = ~std::uint64_t{0};
+// QEMU's watch has a bit for each.
+constexpr std::size_t kMostUnits = 64;
 
 std::string hex(std::uint32_t value) {
   std::array<char, 16> text;
@@ -32,7 +33,8 @@ QemuMemoryMap::QemuMemoryMap(const std::string& image, const std::string& owners
   if (main_at_ == 0 || stack_limit_ == 0 || stack_end_ == 0 || units() < 2) {
     throw std::runtime_error(image + ": arm-none-eabi-nm finds no symbols with line numbers");
   }
-  add({"stack", stack_limit_, stack_end_ - stack_limit_, kEverybody});
+  if (units() > kMostUnits) throw std::runtime_error(image + ": has too many source files");
+  add({"stack", stack_limit_, stack_end_ - stack_limit_, ~std::uint64_t{0}});
   read_owners(owners);
 }
 
@@ -61,7 +63,7 @@ void QemuMemoryMap::take_symbol(const std::string& line) {
     // Code in RAM is read, and not written.
     if (in_ram(address)) add({name, address & ~1u, size, 0});
   } else if (in_ram(address)) {
-    add({name, address, size, std::uint64_t{unit != kNoUnit} << unit});
+    add({name, address, size, Units(unit != kNoUnit ? 1 : 0) << unit});
   }
 }
 

@@ -121,7 +121,8 @@ void QemuMcu::order_watch() {
     order(LOCKSTEP_WATCH_CODE, code.size, code.address, code.unit);
   }
   for (const auto& object : map_->objects()) {
-    order(LOCKSTEP_WATCH_OBJECT, object.size, object.address, static_cast<TimeNs>(object.writers));
+    order(LOCKSTEP_WATCH_OBJECT, object.size, object.address,
+          static_cast<TimeNs>(object.writers.to_ullong()));
   }
   order(LOCKSTEP_WATCH_FROM, 0, map_->main_at());
 }

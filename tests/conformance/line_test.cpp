@@ -99,19 +99,19 @@ TEST_P(LineScript, IsTheSameFarAlongALongLine) {
     std::vector<std::uint32_t> increments;
   };
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
-  std::size_t before = steps(0, 6).size();
   for (const Long& line : std::vector<Long>{
            {INT32_MAX, INT32_MAX - 440, {INT32_MAX, INT32_MAX - 1, 1'431'655'765, 8'300'000}},
            {20'000'000, (1u << 24) - 200, {19'999'981, 13'000'007, 158'000, 155'000}},
-           {70'000, (1u << 16) - 150, {69'000, 35'001, 547, 3}}}) {
+           {70'000, (1u << 16) - 150, {69'000, 35'001, 547, 183}}}) {
     SCOPED_TRACE(line.longest);
     std::vector<bushd_line_entry> entries = kEntries;
     for (std::size_t i = 0; i < entries.size(); ++i) entries[i].increment = line.increments[i];
+    // The clocks need not be as far apart as in the line before.
+    recorder_.edges.clear();
     begin({0, 0, line.longest, line.from, 400, 0, nullptr}, entries);
     pass_ticks(240);
     EXPECT_EQ(master_.poll(kReal).moving, 0);
-    EXPECT_GT(steps(0, 6).size(), before + 190);
-    before = steps(0, 6).size();
+    EXPECT_GT(steps(0, 6).size(), 190u);
     expect_alike();
   }
 }

@@ -19,9 +19,10 @@ FREESTANDING = {"stdint.h", "stdbool.h", "stddef.h", "limits.h", "string.h"}
 ROOMS = {"lib/engine": ("engine/",), "firmware/core": ("engine/", "firmware/core/")}
 
 MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
-# A port may bring its own: BUSHD_OWN_CRC32, BUSHD_OWN_SLOTS_FILL, BUSHD_OWN_RUN_PARTS.
+# A port may bring its own: BUSHD_OWN_CRC32, BUSHD_OWN_SLOTS_FILL, BUSHD_OWN_RUN_PARTS, BUSHD_OWN_LINE_FOLLOWER.
 OF_PORTS = {"bushd_crc32", "bushd_slots_fill",
-            "bushd_run_make_evenly", "bushd_run_make_on_side", "bushd_run_move_place", "bushd_run_share"}
+            "bushd_run_make_evenly", "bushd_run_make_on_side", "bushd_run_move_place", "bushd_run_share",
+            "bushd_run_take_span", "bushd_line_follower_make"}
 # libgcc's arithmetic on small machines, and the names that AVR objects use to ask for start-up code that copies
 # constants and clears memory.
 COMPILER = re.compile(r"__(aeabi_\w+|[a-z]+[qhsd]i\d?(_s8)?|do_copy_data|do_clear_bss|tablejump2?__|prologue_saves__|"
