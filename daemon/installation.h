@@ -93,6 +93,9 @@ class Mcu {
   bool has_table(const bushd_table& table) const {
     return master_.slot_of(on_bus_, table).has_value();
   }
+  bool keeps_up_with(const bushd_table& table, std::uint16_t floor, bool alone) const {
+    return master_.keeps_up_with(on_bus_, table, floor, alone);
+  }
   bool can_run_line(const bushd_table& table, std::uint16_t floor, bool alone) const {
     return master_.can_run_line(on_bus_, table, floor, alone);
   }

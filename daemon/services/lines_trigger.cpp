@@ -77,7 +77,7 @@ Result<void> Lines::may_wait(const Line& line) const {
           "most. Move it without a trigger",
           mcu.name()));
     }
-    if (!mcu.can_run_line(line.way.table()->view(), line.way.floor(), has_all_of(line, mcu))) {
+    if (!mcu.keeps_up_with(line.way.table()->view(), line.way.floor(), has_all_of(line, mcu))) {
       return fail(fmt::format(
           "MCU {} makes no line as fast as this one by itself; give a lower --speed, or move them "
           "without a trigger",

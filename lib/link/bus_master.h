@@ -126,6 +126,11 @@ class BusMaster {
                             bool /*alone*/) const {
     return false;
   }
+  // Of any MCU that makes lines: whether it is fast enough for that.
+  virtual bool keeps_up_with(McuIndex, const bushd_table&, std::uint16_t /*floor*/,
+                             bool /*alone*/) const {
+    return false;
+  }
   virtual void begin_line_run(McuIndex, std::uint8_t, Tick, const LineRun&) {}
   // Of a table of the MCU that makes the same runs as this one.
   virtual std::optional<std::uint8_t> slot_of(McuIndex, const bushd_table&) const {

@@ -182,6 +182,11 @@ bool Master::can_run_line(McuIndex mcu, const bushd_table& table, std::uint16_t 
                           bool alone) const {
   // Not where every tick is to be told.
   if (!setup_.table_ticks || !can(mcu, BUSHD_CAN_LINE_RUN) || !slot_of(mcu, table)) return false;
+  return keeps_up_with(mcu, table, floor, alone);
+}
+
+bool Master::keeps_up_with(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
+                           bool alone) const {
   if (can(mcu, BUSHD_CAN_TABLE_TICKS)) return true;
   return bushd_run_is_slow(&table, floor, setup_.tick_ns,
                            alone ? BUSHD_SLOW_LINE_DELAY_NS : BUSHD_SHARED_LINE_DELAY_NS);

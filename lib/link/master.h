@@ -92,6 +92,8 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
   bool can_run_line(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
                     bool alone) const override;
+  bool keeps_up_with(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
+                     bool alone) const override;
   void begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) override;
   std::optional<std::uint8_t> slot_of(McuIndex mcu, const bushd_table& table) const override;
   std::uint8_t arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,

@@ -341,6 +341,7 @@ TEST(Lines, WhatIsToldIsTrueOnABadLine) {
     for (std::size_t i = 0; i < motors.size(); ++i) {
       EXPECT_EQ(lab.shaft_steps(motors[i]), lab.motor(motors[i]).position_steps);
     }
+    lab.on_send = nullptr;
     EXPECT_EQ(lab.wait(lab.send(line_to(motors, {0, 0, 0, 0, 0, 0}))).result, "reached");
   }
 }
