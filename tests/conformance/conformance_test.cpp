@@ -44,7 +44,7 @@ TEST_P(Conformance, KeepsItsNewAddressOverAReset) {
   EXPECT_TRUE(master_.identify(77));
   pass_ticks(40);
   bus_.reboot(1);
-  pass_ticks(100);
+  pass_ticks(125);  // 0.3 s
   const auto reply = master_.identify(77);
   ASSERT_TRUE(reply);
   EXPECT_EQ(bushd_get_u16(reply->payload.data() + 4), 8) << "the next boot";

@@ -180,7 +180,7 @@ class ImageReplay final : public fuzz::Programmed {
 
  private:
   static constexpr std::uint32_t kBaud = 500'000;
-  static constexpr TimeNs kBootNs = 250'000'000;
+  static constexpr TimeNs kBootNs = 300'000'000;
   static constexpr TimeNs kPatienceNs = 12'000'000;
 
   static bool acknowledges(std::uint8_t type) {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint32_t kBaud = 500'000;
 constexpr std::uint32_t kTickNs = 2'560'000;
-constexpr TimeNs kBootNs = 250'000'000;
+constexpr TimeNs kBootNs = 300'000'000;
 constexpr std::uint8_t kVirtual = 1;
 constexpr std::uint8_t kReal = 2;
 constexpr std::uint8_t kMotor = 3;

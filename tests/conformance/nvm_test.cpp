@@ -5,7 +5,7 @@
 namespace bushd::sim {
 namespace {
 
-constexpr TimeNs kBootNs = 250'000'000;
+constexpr TimeNs kBootNs = 300'000'000;
 constexpr std::size_t kCodes = 3;
 
 class Nvm : public McuAlone, public testing::WithParamInterface<Target> {

@@ -39,7 +39,7 @@ class Script : public testing::Test {
       return real_->make(kBirth, index, driver, sink);
     });
     master_.patience_ns = 6'000'000;
-    bus_.advance_to(250'000'000);  // a boot takes its time
+    bus_.advance_to(300'000'000);  // a boot takes its time
   }
 
   void TearDown() override {

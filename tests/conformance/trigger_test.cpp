@@ -165,7 +165,7 @@ TEST_P(Current, IsMeasuredAndPulsesAreAsFarApart) {
   });
   Master master(bus);
   master.patience_ns = 6'000'000;
-  bus.advance_to(250'000'000);
+  bus.advance_to(300'000'000);
   ASSERT_NO_FATAL_FAILURE(master.bring_up(kLongTickNs, BUSHD_FORMAT_COARSE));
   ASSERT_NO_FATAL_FAILURE(master.upload_table(kReal, 0, 10'000, {4000, 3000}, 2500));
   bushd_emission settings{};

@@ -80,7 +80,7 @@ TEST_P(AvrWatchdog, BootsAnMcuThatHangsInMotionAnew) {
 
   (avr_->*GetParam().begin)();
   const TimeNs hung_ns = bus_.now_ns();
-  pass(250'000'000 + kBootNs);
+  pass(300'000'000 + kBootNs);
   const auto disabled = recorder_.times(0, Signal::kEnable, 0, false);
   ASSERT_EQ(disabled.size(), 1u);
   EXPECT_LT(disabled[0] - hung_ns, 150'000'000);

@@ -25,7 +25,7 @@ class Chopper : public McuAlone {
   static constexpr std::uint16_t kCruiseMa = 1000;
   static constexpr std::uint16_t kHoldMa = 300;
 
-  Chopper() : McuAlone(kBaud, 250'000'000) {
+  Chopper() : McuAlone(kBaud, 300'000'000) {
     AvrOptions options;
     options.image = ATMEGA1284P_IMAGES "-500000.elf";
     options.memory_owners = ATMEGA1284P_MEMORY_OWNERS;

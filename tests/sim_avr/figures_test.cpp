@@ -31,7 +31,7 @@ struct Load {
 class AvrFigures : public AvrAlone, public testing::WithParamInterface<Load> {
  protected:
   // Phase 0 is that of docs/performance.md.
-  AvrFigures() : AvrAlone(1'000'000, 0) { pass(250'000'000 + GetParam().phase * 73'313); }
+  AvrFigures() : AvrAlone(1'000'000, 0) { pass(300'000'000 + GetParam().phase * 73'313); }
 
   // As long as bushd makes them.
   int ticks_per_frame() const {

@@ -22,7 +22,7 @@ class VelocityOfTheImage : public McuAlone {
  protected:
   static constexpr std::uint16_t kLimit = 1;  // input 0
 
-  VelocityOfTheImage() : McuAlone(kBaud, 250'000'000) {
+  VelocityOfTheImage() : McuAlone(kBaud, 300'000'000) {
     AvrOptions options;
     options.image = ATMEGA1284P_IMAGES "-500000.elf";
     options.memory_owners = ATMEGA1284P_MEMORY_OWNERS;

@@ -27,7 +27,7 @@ using bushd::sim::TimeNs;
 // Simulated before anybody is told that the bus is there: all MCUs have booted by then. A real one
 // tests itself meanwhile.
 constexpr TimeNs kHeadStartNs = 20'000'000;
-constexpr TimeNs kRealHeadStartNs = 250'000'000;
+constexpr TimeNs kRealHeadStartNs = 300'000'000;
 // MCUs come out of reset one after the other, so that their ticks begin in different phases, as on
 // a real bus.
 constexpr TimeNs kBootSpacingNs = 617'000;
