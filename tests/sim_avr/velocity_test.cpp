@@ -168,7 +168,7 @@ TEST_F(VelocityOfTheImage, KeepsItsTicksBesideTheChopper) {
                                  bushd_currents{0, BUSHD_DECAY_FAST, 1500, 1000, 300}),
             BUSHD_OK);
   ASSERT_NO_FATAL_FAILURE(
-      give_settings({{0, 200 * 64, 4000 * 64, 8000}, {1, 200 * 64, 4000 * 64, 8000}}));
+      give_settings({{0, 200 * 64, 3000 * 64, 8000}, {1, 200 * 64, 3000 * 64, 8000}}));
   hold(kForward, 0, 400);
   hold(kReverse, 0, 400);
   hold(0, 0, 300);
