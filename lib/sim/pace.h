@@ -106,7 +106,9 @@ class Pace {
   // Its next motion, from rest, is one of a line, until it is said to rest. Without `ramped_down`
   // it may still move, as its MCU makes it: if that makes the line's run itself (`by_mcu`), along
   // the line, for as long as it goes on without a master.
+  // A line before that was forgotten has come to rest somewhere.
   void begin_on_line(bool by_mcu) {
+    if (excused_) count_ = 0;
     on_line_ = true;
     by_mcu_ = by_mcu;
     line_until_ns_ = kNever;

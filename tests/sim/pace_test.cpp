@@ -176,6 +176,21 @@ TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
   EXPECT_EQ(ramps(false, kSteps), Jump::kStoppedDead);
 }
 
+// A master that was killed has not told that its line is over; another one starts from rest.
+TEST_P(PaceTest, AMotionBeginsWhereTheLineBeforeWasForgotten) {
+  for (const bool positive : {true, false}) {
+    pace.begin_on_line(false);
+    EXPECT_EQ(pace.step(now, true), Jump::kNone);
+    now += 1000 * kTickNs;
+    pace.forget_line();
+    pace.begin_on_line(false);
+    EXPECT_EQ(pace.step(now, positive), Jump::kNone);
+    EXPECT_EQ(pace.first_ns(), now) << "in either direction";
+    now += 1000 * kTickNs;
+    EXPECT_EQ(pace.rest_on_line(now, true), Jump::kNone);
+  }
+}
+
 TEST_P(PaceTest, AFifthFasterThanTheTableIsFound) {
   std::vector<std::int16_t> ticks = move(3000);
   for (std::int16_t& d : ticks) d = static_cast<std::int16_t>(d * 6 / 5);
