@@ -152,8 +152,35 @@ TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
   }
 }
 
-TEST_P(Autonomous, LocalInputsMoveAMotorByTheVelocityLoop) {
-  if (real_->twin().velocity_motors == 0) GTEST_SKIP() << "denies VELOCITY";
+class VelocityLoop : public Autonomous {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(VelocityLoop);
+INSTANTIATE_TEST_SUITE_P(Of, VelocityLoop, testing::ValuesIn(targets_with(BUSHD_CAN_VELOCITY)),
+                         [](auto& target) { return target.param.name; });
+
+class DeniedVelocity : public Autonomous {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(DeniedVelocity);
+INSTANTIATE_TEST_SUITE_P(Of, DeniedVelocity, testing::ValuesIn(targets_without(BUSHD_CAN_VELOCITY)),
+                         [](auto& target) { return target.param.name; });
+
+// Local motion goes by the table then.
+TEST_P(DeniedVelocity, IsRefusedAndLocalInputsMoveByTheTable) {
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
+                                   bushd_set_velocity{kMotor, 200 * 64, 1500 * 64, 3000}),
+              BUSHD_E_UNKNOWN_MESSAGE);
+  }
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor}));
+  to_inputs_time();
+  set_inputs({0, BUSHD_INPUT_FORWARD});
+  pass_ticks(60);
+  to_inputs_time();
+  set_inputs({});
+  pass_ticks(60);
+  EXPECT_GT(steps(1, kMotor).size(), 0u);
+  expect_alike();
+}
+
+TEST_P(VelocityLoop, LocalInputsMoveAMotor) {
   constexpr std::uint8_t kFirst = 0;
   ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
                               bushd_set_velocity{kFirst, 200 * 64, 1500 * 64, 3000}));

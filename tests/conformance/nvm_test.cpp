@@ -94,9 +94,13 @@ TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
   EXPECT_EQ(steps_made(4), 0u);
 }
 
+class NvmVelocity : public Nvm {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(NvmVelocity);
+INSTANTIATE_TEST_SUITE_P(Of, NvmVelocity, testing::ValuesIn(targets_with(BUSHD_CAN_VELOCITY)),
+                         [](auto& target) { return target.param.name; });
+
 // Without a table, too.
-TEST_P(Nvm, LocalInputsMoveAMotorByTheVelocityLoopAfterAResetWithoutAHost) {
-  if (real_->twin().velocity_motors == 0) GTEST_SKIP() << "denies VELOCITY";
+TEST_P(NvmVelocity, LocalInputsMoveAMotorAfterAResetWithoutAHost) {
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
   ASSERT_EQ(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
                 bushd_set_velocity{1, 200 * 64, 1000 * 64, 2000}),

@@ -129,10 +129,17 @@ Target target(const char* name) {
   return {name, [] { return std::make_unique<Kind>(); }};
 }
 
-std::vector<Target> those_that_deny(std::uint16_t capability, bool deny) {
+std::uint32_t denied(const McuUnderTest& mcu) {
+  std::uint32_t capabilities = mcu.disabled_capabilities();
+  if (mcu.twin().current_motors == 0) capabilities |= BUSHD_CAN_CURRENTS;
+  if (mcu.twin().velocity_motors == 0) capabilities |= BUSHD_CAN_VELOCITY;
+  return capabilities;
+}
+
+std::vector<Target> those_that_deny(std::uint32_t capability, bool deny) {
   std::vector<Target> those = targets();
   std::erase_if(those, [=](const Target& target) {
-    return ((target.make()->disabled_capabilities() & capability) != 0) != deny;
+    return ((denied(*target.make()) & capability) != 0) != deny;
   });
   return those;
 }
@@ -151,11 +158,11 @@ std::vector<Target> targets() {
   };
 }
 
-std::vector<Target> targets_with(std::uint16_t capability) {
+std::vector<Target> targets_with(std::uint32_t capability) {
   return those_that_deny(capability, false);
 }
 
-std::vector<Target> targets_without(std::uint16_t capability) {
+std::vector<Target> targets_without(std::uint32_t capability) {
   return those_that_deny(capability, true);
 }
 

@@ -59,7 +59,7 @@ struct Target {
 // Those whose image and simulator were there at build time.
 std::vector<Target> targets();
 // Of these, those that have such a capability (BUSHD_CAN_*), and those that deny it.
-std::vector<Target> targets_with(std::uint16_t capability);
-std::vector<Target> targets_without(std::uint16_t capability);
+std::vector<Target> targets_with(std::uint32_t capability);
+std::vector<Target> targets_without(std::uint32_t capability);
 
 }  // namespace bushd::sim
