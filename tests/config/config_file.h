@@ -67,6 +67,11 @@ class ConfigFile {
   std::string path_;
 };
 
+inline std::string error_of(const std::string& configuration) {
+  const auto config = ConfigFile(configuration).load();
+  return config ? "no error" : config.error().text();
+}
+
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);

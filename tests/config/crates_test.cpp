@@ -29,8 +29,7 @@ const std::string kCrate = kGood +
                            "motor = \"slit\"\n";     // 48
 
 std::string error_of(const std::string& from, const std::string& to) {
-  const auto config = ConfigFile(replaced(kCrate, from, to)).load();
-  return config ? "no error" : config.error().text();
+  return test::error_of(replaced(kCrate, from, to));
 }
 
 TEST(ConfigCrates, NoneIsNeeded) {

@@ -11,6 +11,7 @@ namespace bushd::config {
 namespace {
 
 using test::ConfigFile;
+using test::error_of;
 using test::kGood;
 using test::replaced;
 using testing::HasSubstr;
@@ -20,12 +21,6 @@ std::string with(const std::string& currents, const std::string& emission = "pha
   const std::string mcu =
       replaced(kGood, "address = 1\n", "address = 1\nemission = \"" + emission + "\"\n");
   return replaced(mcu, "output = 0\n", "output = 0\ncurrents = " + currents + "\n");
-}
-
-std::string currents_error(const std::string& text) {
-  const ConfigFile file(text);
-  const auto config = file.load();
-  return config ? "no error" : config.error().text();
 }
 
 TEST(Currents, AreReadOfAMotorWithPhases) {
@@ -43,15 +38,14 @@ TEST(Currents, AreReadOfAMotorWithPhases) {
 }
 
 TEST(Currents, WhatIsWrongIsNamed) {
-  EXPECT_THAT(currents_error(with("{ ramp_ma = 1, cruise_ma = 1, hold_ma = 1 }", "even")),
+  EXPECT_THAT(error_of(with("{ ramp_ma = 1, cruise_ma = 1, hold_ma = 1 }", "even")),
               HasSubstr("33:12: motor[0].currents: says nothing of a driver with STEP and DIR; "
                         "allowed: only with emission = \"phases\" of its MCU"));
-  EXPECT_THAT(currents_error(with("{ ramp_ma = 1500, cruise_ma = 1000 }")), HasSubstr("hold_ma"));
-  EXPECT_THAT(currents_error(with("{ ramp_ma = 5111, cruise_ma = 1, hold_ma = 1 }")),
+  EXPECT_THAT(error_of(with("{ ramp_ma = 1500, cruise_ma = 1000 }")), HasSubstr("hold_ma"));
+  EXPECT_THAT(error_of(with("{ ramp_ma = 5111, cruise_ma = 1, hold_ma = 1 }")),
               HasSubstr("ramp_ma: is 5111; allowed: a whole number 1..5110 mA"));
-  EXPECT_THAT(
-      currents_error(with("{ ramp_ma = 9, cruise_ma = 1, hold_ma = 1, decay = \"mixed\" }")),
-      HasSubstr("decay: is \"mixed\"; allowed: \"slow\" or \"fast\""));
+  EXPECT_THAT(error_of(with("{ ramp_ma = 9, cruise_ma = 1, hold_ma = 1, decay = \"mixed\" }")),
+              HasSubstr("decay: is \"mixed\"; allowed: \"slow\" or \"fast\""));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ namespace bushd::config {
 namespace {
 
 using test::ConfigFile;
+using test::error_of;
 using test::kGood;
 using test::replaced;
 using testing::HasSubstr;
@@ -19,12 +20,6 @@ using testing::HasSubstr;
 std::string with_velocity(const std::string& velocity,
                           const std::string& before = "local = true\n") {
   return replaced(kGood, "output = 0\n", "output = 0\n" + before + "velocity = " + velocity + "\n");
-}
-
-std::string velocity_error(const std::string& text) {
-  const ConfigFile file(text);
-  const auto config = file.load();
-  return config ? "no error" : config.error().text();
 }
 
 TEST(Velocity, IsReadOfAMotorWithLocalInputs) {
@@ -43,20 +38,20 @@ TEST(Velocity, IsReadOfAMotorWithLocalInputs) {
 
 TEST(Velocity, WhatIsWrongIsNamed) {
   const std::string good = "{ min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = 500 }";
-  EXPECT_THAT(velocity_error(with_velocity(good, "")),
+  EXPECT_THAT(error_of(with_velocity(good, "")),
               HasSubstr("motor[0].velocity: is how local inputs move a motor; allowed: only with "
                         "`local = true`"));
-  EXPECT_THAT(velocity_error(with_velocity("{ min_steps_per_s = 100, max_steps_per_s = 1500 }")),
+  EXPECT_THAT(error_of(with_velocity("{ min_steps_per_s = 100, max_steps_per_s = 1500 }")),
               HasSubstr("steps_per_s2"));
-  EXPECT_THAT(velocity_error(with_velocity(
-                  "{ min_steps_per_s = 100, max_steps_per_s = 99, steps_per_s2 = 1 }")),
-              HasSubstr("max_steps_per_s: is 99; allowed: a whole number 100..40000 steps/s"));
-  EXPECT_THAT(velocity_error(with_velocity(
-                  "{ min_steps_per_s = 1, max_steps_per_s = 40001, steps_per_s2 = 1 }")),
-              HasSubstr("max_steps_per_s: is 40001; allowed: a whole number 1..40000 steps/s"));
-  EXPECT_THAT(velocity_error(
-                  with_velocity("{ min_steps_per_s = 0, max_steps_per_s = 9, steps_per_s2 = 1 }")),
-              HasSubstr("min_steps_per_s: is 0; allowed: a whole number 1..40000 steps/s"));
+  EXPECT_THAT(
+      error_of(with_velocity("{ min_steps_per_s = 100, max_steps_per_s = 99, steps_per_s2 = 1 }")),
+      HasSubstr("max_steps_per_s: is 99; allowed: a whole number 100..40000 steps/s"));
+  EXPECT_THAT(
+      error_of(with_velocity("{ min_steps_per_s = 1, max_steps_per_s = 40001, steps_per_s2 = 1 }")),
+      HasSubstr("max_steps_per_s: is 40001; allowed: a whole number 1..40000 steps/s"));
+  EXPECT_THAT(
+      error_of(with_velocity("{ min_steps_per_s = 0, max_steps_per_s = 9, steps_per_s2 = 1 }")),
+      HasSubstr("min_steps_per_s: is 0; allowed: a whole number 1..40000 steps/s"));
 }
 
 }  // namespace

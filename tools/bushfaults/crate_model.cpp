@@ -13,9 +13,6 @@ namespace {
 using bushd::camac::Bushd2;
 using bushd::sim::TimeNs;
 
-// What was written so long before a daemon ended is on the disk: a disk fault lasts five seconds,
-// and a power cut comes at once.
-constexpr TimeNs kOnDiskNs = 15 * kSecond;
 // A result is due after 40 s (witness_jogs.cpp); before that its MCUs come to rest and get a table,
 // with twice as long for those that are away.
 constexpr TimeNs kLamDueNs = 120 * kSecond;
@@ -26,8 +23,6 @@ constexpr std::uint32_t kStepDone = 0x10;
 constexpr int kReceivedShift = 8;
 constexpr std::uint32_t kReceivedBits = 3;
 
-enum Function { kRead = 0, kTestLam = 8, kClearLam = 10, kWrite = 16, kForbid = 24, kPermit = 26 };
-
 std::string text_of(const bushd::camac::Naf& naf) {
   return fmt::format("N{} A{} F{}", naf.station, naf.subaddress, naf.function);
 }
@@ -35,12 +30,7 @@ std::string text_of(const bushd::camac::Naf& naf) {
 }  // namespace
 
 void Crates::daemon_started(TimeNs now_ns, bool kept) {
-  const bool on_disk = kept && now_ns - written_ns_ >= kOnDiskNs;
-  if (!on_disk) {
-    std::ranges::fill(memory_, kept ? std::nullopt : std::optional<std::uint8_t>(0));
-  }
-  address_ = 0;
-  control_ = 0;
+  registers_.daemon_started(now_ns, kept);
   inhibited_ = published_ = false;
   flag_ = false;
   start_.reset();
@@ -90,8 +80,7 @@ Crates::Wrong Crates::of_one_address(TimeNs now_ns, const Request& request,
     const bool tried = request.block_mode == bushd::camac::BlockMode::kRepeat && response.x;
     // In vain: what they have read is not told.
     for (int more = kTries - 1; tried && !response.q && more > 0; --more) {
-      if (naf.subaddress == 0 && naf.function == kRead)
-        address_ = (address_ + 1) % Bushd2::kMemoryBytes;
+      if (naf.subaddress == 0 && naf.function == kRead) registers_.count_up();
     }
     if (auto wrong = cycle(now_ns, naf, response)) {
       return fmt::format("word {}, {}: {}", i + 1, text_of(naf), *wrong);
@@ -111,7 +100,7 @@ Crates::Wrong Crates::scanned(TimeNs now_ns, const Request& request,
                               const std::vector<Response>& responses) {
   constexpr std::size_t kRegisters = 4;
   if (responses.empty()) {
-    address_ = (address_ + 1) % Bushd2::kMemoryBytes;
+    registers_.count_up();
     return observe(true);
   }
   if (responses.size() != std::min<std::size_t>(kRegisters, request.words)) {
@@ -132,8 +121,7 @@ Crates::Wrong Crates::cycle(TimeNs now_ns, const Naf& naf, const Response& respo
   if (common && naf.subaddress == 8) {
     stop();
     clear();
-    address_ = 0;
-    control_ = 0;
+    registers_.initialise();
   } else if (common && naf.subaddress == 9) {
     clear();
   } else if (naf.station == 30 && naf.subaddress == 9) {
@@ -145,12 +133,12 @@ Crates::Wrong Crates::cycle(TimeNs now_ns, const Naf& naf, const Response& respo
 }
 
 Crates::Wrong Crates::module_cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
-  const bool memory = naf.subaddress == 0 && (naf.function == kRead || naf.function == kWrite);
-  if (memory && naf.function == kWrite) written_ns_ = now_ns;
-  if (memory) return memory_cycle(naf, response);
+  if (ModuleRegisters::is_memory(naf)) {
+    if (auto wrong = registers_.memory_cycle(now_ns, naf, response)) return wrong;
+    return observe(!response.q);
+  }
   if (naf.function == kRead && naf.subaddress <= 3) return read_register(naf, response);
-  if (naf.function == kWrite && naf.subaddress == 1) address_ = naf.data % Bushd2::kMemoryBytes;
-  if (naf.function == kWrite && naf.subaddress == 2) control_ = naf.data & 0xFF;
+  if (naf.function == kWrite) registers_.write(naf);
   if (naf.subaddress != 0) return std::nullopt;
   if (naf.function == kTestLam) return observe(response.q);
   if (naf.function == kClearLam) flag_ = published_ = false;
@@ -159,27 +147,10 @@ Crates::Wrong Crates::module_cycle(TimeNs now_ns, const Naf& naf, const Response
   return std::nullopt;
 }
 
-Crates::Wrong Crates::memory_cycle(const Naf& naf, const Response& response) {
-  std::optional<std::uint8_t>& byte = memory_[address_];
-  const std::size_t address = address_;
-  address_ = (address_ + 1) % Bushd2::kMemoryBytes;
-  if (naf.function == kWrite) {
-    byte = static_cast<std::uint8_t>(naf.data);
-  } else if (byte && response.data != *byte) {
-    return fmt::format("address {} holds {}, and {} was written", address, response.data, *byte);
-  } else {
-    byte = static_cast<std::uint8_t>(response.data);
-  }
-  return observe(!response.q);
-}
-
 Crates::Wrong Crates::read_register(const Naf& naf, const Response& response) {
   if (!response.x || !response.q) return "a register does not answer";
   if (naf.subaddress == 3) return read_requests(response);
-  const std::uint32_t expected =
-      naf.subaddress == 1 ? static_cast<std::uint32_t>(address_) : control_;
-  if (response.data == expected) return std::nullopt;
-  return fmt::format("it holds {}, not {}", response.data, expected);
+  return registers_.read(naf, response);
 }
 
 Crates::Wrong Crates::read_requests(const Response& response) const {
@@ -193,7 +164,8 @@ Crates::Wrong Crates::read_requests(const Response& response) const {
 // What only a disabled request could raise is not to be seen.
 Crates::Wrong Crates::observe(bool lam) {
   if (!is_enabled()) {
-    if (lam && (control_ & (kEnables | 0x10)) == 0) return "L, and no request is enabled";
+    if (lam && (registers_.control() & (kEnables | 0x10)) == 0)
+      return "L, and no request is enabled";
     return std::nullopt;
   }
   if (flag_) {
@@ -234,13 +206,13 @@ void Crates::clear() {
 }
 
 ProgramMotion Crates::program() const {
-  ProgramMotion motion{.motor = control_ & kMotorBits};
+  ProgramMotion motion{.motor = registers_.control() & kMotorBits};
   bushd::camac::Program& program = motion.program;
   program.motor = static_cast<int>(motion.motor);
   program.page = program.motor / Bushd2::kMotorsPerPage;
-  program.left = (control_ & kLeft) != 0;
+  program.left = (registers_.control() & kLeft) != 0;
   const std::size_t page = static_cast<std::size_t>(program.page) * Bushd2::kPageBytes;
-  const auto at = [&](std::size_t i) { return memory_[page + i].value_or(0); };
+  const auto at = [&](std::size_t i) { return registers_[page + i]; };
   program.steps = static_cast<std::uint32_t>(at(0) + 256 * at(1));
   for (std::size_t i = 0; i < Bushd2::kCodes; ++i) {
     program.codes.push_back(std::max<std::uint8_t>(at(Bushd2::kFirstCode + i), 1));

@@ -13,6 +13,7 @@
 #include "api/snapshot.h"
 #include "camac/bushd2.h"
 #include "config/config.h"
+#include "module_registers.h"
 #include "request.h"
 #include "sim/line.h"
 
@@ -88,11 +89,10 @@ class Crates {
   Wrong scanned(TimeNs now_ns, const Request& request, const std::vector<Response>& responses);
   Wrong cycle(TimeNs now_ns, const Naf& naf, const Response& response);
   Wrong module_cycle(TimeNs now_ns, const Naf& naf, const Response& response);
-  Wrong memory_cycle(const Naf& naf, const Response& response);
   Wrong read_register(const Naf& naf, const Response& response);
   Wrong read_requests(const Response& response) const;
   Wrong observe(bool lam);
-  bool is_enabled() const { return (control_ & kEnables) == kEnables; }
+  bool is_enabled() const { return (registers_.control() & kEnables) == kEnables; }
   ProgramMotion program() const;
   void start(TimeNs now_ns);
   void stop() {
@@ -104,11 +104,7 @@ class Crates {
   static constexpr std::uint32_t kEnables = 0x60;  // fault and end of motion
 
   const bushd::config::Config& config_;
-  std::vector<std::optional<std::uint8_t>> memory_ =
-      std::vector<std::optional<std::uint8_t>>(bushd::camac::Bushd2::kMemoryBytes, 0);
-  TimeNs written_ns_ = 0;
-  std::size_t address_ = 0;
-  std::uint32_t control_ = 0;
+  ModuleRegisters registers_{bushd::camac::Bushd2::kMemoryBytes};
   bool inhibited_ = false;
   // Fault or end of motion; nothing: a start may have ended at once, and nobody has looked yet.
   std::optional<bool> flag_ = false;

@@ -252,7 +252,8 @@ void Programs::start_shutter(Cycles& cycles, std::int64_t stands) {
 
 // A motor that does not stand at its left limit is brought there by a move, mostly.
 Request Programs::next_of_shutter(std::int64_t stands, bool open) {
-  Request request{.client = "p" + std::to_string(random_.below(kClients)), .ask = Ask::kCamac};
+  Request request{.client = "p" + std::to_string(random_.below(kProgramClients)),
+                  .ask = Ask::kCamac};
   const bool astray = stands > ShutterPlace::kLeftSteps || stands < -80;
   if (!open && astray && random_.one_in(2)) {
     request.ask = Ask::kMoveBy;

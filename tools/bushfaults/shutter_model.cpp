@@ -12,8 +12,7 @@ namespace {
 
 using bushd::sim::TimeNs;
 
-constexpr TimeNs kShutterOnDiskNs = 15 * kSecond;  // as of BUSHD-2 (crate_model.cpp)
-constexpr TimeNs kRequestDueNs = 120 * kSecond;    // likewise
+constexpr TimeNs kRequestDueNs = 120 * kSecond;  // as of BUSHD-2 (crate_model.cpp)
 constexpr TimeNs kTableNs = 20 * kSecond;
 constexpr TimeNs kRestNs = kSecond / 2;  // so long at rest, a travel is over
 constexpr TimeNs kUnit50Ns = 50'000;     // of delays
@@ -22,7 +21,6 @@ constexpr TimeNs kFixedNs = 150 * kMs;   // from a reactor start to the first ru
 constexpr TimeNs kSeenNs = 40 * kMs;
 constexpr std::size_t kEdgesRemembered = 256;
 
-enum Function { kRead = 0, kTestLam = 8, kClearLam = 10, kWrite = 16, kForbid = 24, kPermit = 26 };
 // Bits of the request register.
 constexpr std::uint32_t kRightLimit = 0x01;
 constexpr std::uint32_t kLeftLimit = 0x02;
@@ -56,12 +54,8 @@ std::optional<bushd::MotorId> ShutterPlace::motor(const bushd::config::Config& c
 }
 
 void ShutterModel::daemon_started(TimeNs now_ns, bool kept) {
-  const bool on_disk = kept && now_ns - written_ns_ >= kShutterOnDiskNs;
-  if (!on_disk) {
-    std::ranges::fill(memory_, kept ? std::nullopt : std::optional<std::uint8_t>(0));
-  }
-  address_ = 0;
-  control_ = seen_ = possible_ = 0;
+  registers_.daemon_started(now_ns, kept);
+  seen_ = possible_ = 0;
   inhibited_ = false;
   now_.reset();
   start_.reset();
@@ -72,8 +66,7 @@ ShutterModel::Wrong ShutterModel::cycle(TimeNs now_ns, const Naf& naf, const Res
   if (naf.station == 28 && naf.function == 26 && (naf.subaddress == 8 || naf.subaddress == 9)) {
     if (naf.subaddress == 8) {
       stop();
-      address_ = 0;
-      control_ = 0;
+      registers_.initialise();
     }
     clear();
   } else if (naf.station == 30 && naf.subaddress == 9) {
@@ -81,19 +74,13 @@ ShutterModel::Wrong ShutterModel::cycle(TimeNs now_ns, const Naf& naf, const Res
     if (naf.function == 24) inhibited_ = false;
   }
   if (naf.station != kBushd1Station) return std::nullopt;
-  const bool memory = naf.subaddress == 0 && (naf.function == kRead || naf.function == kWrite);
-  if (memory && naf.function == kWrite) written_ns_ = now_ns;
-  if (memory) return memory_cycle(naf, response);
+  if (ModuleRegisters::is_memory(naf)) return memory_cycle(now_ns, naf, response);
   if (naf.function == kRead && naf.subaddress <= 3) {
     if (!response.x || !response.q) return "a register does not answer";
     if (naf.subaddress == 3) return read_requests(response.data);
-    const std::uint32_t expected =
-        naf.subaddress == 1 ? static_cast<std::uint32_t>(address_) : control_;
-    if (response.data == expected) return std::nullopt;
-    return fmt::format("it holds {}, not {}", response.data, expected);
+    return registers_.read(naf, response);
   }
-  if (naf.function == kWrite && naf.subaddress == 1) address_ = naf.data % memory_.size();
-  if (naf.function == kWrite && naf.subaddress == 2) control_ = naf.data & 0xFF;
+  if (naf.function == kWrite) registers_.write(naf);
   if (naf.subaddress != 0) return std::nullopt;
   if (naf.function == kTestLam) return observe(response.q);
   if (naf.function == kClearLam) clear();
@@ -102,31 +89,23 @@ ShutterModel::Wrong ShutterModel::cycle(TimeNs now_ns, const Naf& naf, const Res
   return std::nullopt;
 }
 
-ShutterModel::Wrong ShutterModel::memory_cycle(const Naf& naf, const Response& response) {
+ShutterModel::Wrong ShutterModel::memory_cycle(TimeNs now_ns, const Naf& naf,
+                                               const Response& response) {
   // Q is that before the cycle.
   auto wrong = observe(!response.q);
-  std::optional<std::uint8_t>& byte = memory_[address_];
-  const std::size_t address = address_;
-  address_ = (address_ + 1) % memory_.size();
-  if (address_ == 0) {
+  const auto held = registers_.memory_cycle(now_ns, naf, response);
+  if (registers_.address() == 0) {
     possible_ |= kOverflow;
     now_.reset();
   }
-  if (wrong) return wrong;
-  if (naf.function == kWrite) {
-    byte = static_cast<std::uint8_t>(naf.data);
-  } else if (byte && response.data != *byte) {
-    return fmt::format("address {} holds {}, and {} was written", address, response.data, *byte);
-  } else {
-    byte = static_cast<std::uint8_t>(response.data);
-  }
-  return std::nullopt;
+  return wrong ? wrong : held;
 }
 
 bool ShutterModel::lam_of(std::uint32_t requests) const {
   const bool failure = (requests & (kStepNotDone | kFailed)) != 0;
   const std::uint32_t others = kRightLimit | kLeftLimit | kStepDone | kOverflow;
-  return (failure && (control_ & kFailureEnabled) != 0) || (requests & control_ & others) != 0;
+  return (failure && (registers_.control() & kFailureEnabled) != 0) ||
+         (requests & registers_.control() & others) != 0;
 }
 
 // What the requests can be.
@@ -140,7 +119,8 @@ std::uint32_t ShutterModel::possible() const {
 ShutterModel::Wrong ShutterModel::observe(bool lam) {
   if (!is_here()) return std::nullopt;
   if (now_ && lam != lam_of(*now_)) {
-    return fmt::format("L is {}, with requests {:#x} and enables {:#x}", lam, *now_, control_);
+    return fmt::format("L is {}, with requests {:#x} and enables {:#x}", lam, *now_,
+                       registers_.control());
   }
   if (lam && !lam_of(possible())) return "L, and nothing can have raised it";
   if (!lam && lam_of(seen_)) return "no L any more, and nobody has cleared it";
@@ -243,16 +223,16 @@ void ShutterModel::start(TimeNs now_ns) {
   ++starts_;
   if (start_) possible_ |= possible();
   Start next{.since_ns = now_ns, .sure = idle, .disturbed = others_move_};
-  const bool automatic = (control_ & kAutomatic) != 0;
-  const bool second = (control_ & kSecondMode) != 0;
+  const bool automatic = (registers_.control() & kAutomatic) != 0;
+  const bool second = (registers_.control() & kSecondMode) != 0;
   next.mode = automatic ? (second ? Mode::kSynchronous : Mode::kTravel)
                         : (second ? Mode::kSensedStep : Mode::kStep);
-  next.left = (control_ & kLeft) != 0;
+  next.left = (registers_.control() & kLeft) != 0;
   const auto word = [this](std::size_t at) {
-    const int value = memory_[at].value_or(0) + 256 * memory_[at + 1].value_or(0);
+    const int value = registers_[at] + 256 * registers_[at + 1];
     return std::clamp(value, 1, 30'000) * kUnit50Ns;
   };
-  const int steps = memory_[0].value_or(0);
+  const int steps = registers_[0];
   for (int i = 0; i < std::min(steps, kMostSteps); ++i) {
     next.delays_ns.push_back(word(4 + 2 * static_cast<std::size_t>(i)));
   }
@@ -373,7 +353,8 @@ ShutterModel::Wrong ShutterModel::check_deadline(TimeNs now_ns) const {
   if (!start_ || !start_->sure || start_->stopped || start_->told || seen_ != 0) {
     return std::nullopt;
   }
-  if (start_->mode == Mode::kSynchronous || (control_ & kAll) != kAll) return std::nullopt;
+  if (start_->mode == Mode::kSynchronous || (registers_.control() & kAll) != kAll)
+    return std::nullopt;
   if (now_ns - start_->since_ns <= kRequestDueNs) return std::nullopt;
   return fmt::format("no LAM of BUSHD-1 {} s after a start", kRequestDueNs / kSecond);
 }

@@ -14,6 +14,7 @@
 #include "api/snapshot.h"
 #include "camac/naf.h"
 #include "config/config.h"
+#include "module_registers.h"
 #include "sim/edge.h"
 
 namespace bushfaults {
@@ -97,7 +98,7 @@ class ShutterModel {
   };
 
   bool is_here() const { return ShutterPlace::motor(config_).has_value(); }
-  Wrong memory_cycle(const Naf& naf, const Response& response);
+  Wrong memory_cycle(TimeNs now_ns, const Naf& naf, const Response& response);
   Wrong read_requests(std::uint32_t data);
   bool lam_of(std::uint32_t requests) const;
   std::uint32_t possible() const;
@@ -111,11 +112,7 @@ class ShutterModel {
   Wrong next_step(TimeNs now_ns, bool right);
 
   const bushd::config::Config& config_;
-  std::vector<std::optional<std::uint8_t>> memory_ =
-      std::vector<std::optional<std::uint8_t>>(256, 0);
-  TimeNs written_ns_ = 0;
-  std::size_t address_ = 0;
-  std::uint32_t control_ = 0;
+  ModuleRegisters registers_{256};
   bool inhibited_ = false;
   std::uint32_t seen_ = 0;            // requests that nobody has cleared
   std::uint32_t possible_ = 0;        // those that starts may have left, since they were cleared
