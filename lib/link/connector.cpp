@@ -66,12 +66,13 @@ Result<void> Connector::check_room(McuIndex mcu, const McuSetup& setup) const {
 void Connector::control(McuIndex mcu, std::uint8_t actions) {
   if (actions & BUSHD_CONTROL_ENABLE) links_[mcu].powered = true;
   if (actions & BUSHD_CONTROL_DISABLE) links_[mcu].powered = false;
+  if (actions & BUSHD_CONTROL_CLEAR_FAULTS) links_[mcu].stopped_by_people = false;
   links_[mcu].queue.control(actions);
 }
 
 void Connector::emergency_stop() {
   for (Link& link : links_) {
-    link.taken_over = false;
+    link.stopped_by_people = true;
     link.queue.discard_clearing();
   }
 }
@@ -239,7 +240,7 @@ std::uint8_t Connector::first_actions(McuIndex mcu, bool may_clear) const {
   const Link& link = links_[mcu];
   unsigned faults = mcus_[mcu].view.report.faults;
   // The emergency stop that took the MCU over is nobody's.
-  if (link.taken_over) faults &= ~unsigned{BUSHD_FAULT_EMERGENCY};
+  if (link.taken_over && !link.stopped_by_people) faults &= ~unsigned{BUSHD_FAULT_EMERGENCY};
   const bool clear = may_clear && (faults & kPeoplesFaults) == 0;
   std::uint8_t actions = clear ? BUSHD_CONTROL_CLEAR_FAULTS : 0;
   if (link.powered.value_or(true) && (faults & kFaultsWithoutEnable) == 0) {
@@ -293,7 +294,7 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
   } else if (report.state != BUSHD_STATE_BUSY || !*link.powered) {
     view.phase = McuPhase::kOnline;
     view.detail.clear();
-    link.was_online = false;
+    link.was_online = link.stopped_by_people = false;
     listener_.came_online(mcu);
   } else if ((report.flags & BUSHD_FLAG_CONFIGURED) != 0 &&
              (report.flags & BUSHD_FLAG_ENABLED) == 0) {

@@ -180,6 +180,43 @@ TEST_F(Connecting, TableRunOfAnEarlierMasterIsRampedDownBeforeTheSetup) {
       << "that emergency stop was nobody's";
 }
 
+// It heard what people said before it was found, or before it was seen to move.
+TEST_F(Connecting, PeoplesEmergencyStopIsNotTakenForThatOfTheTakingOver) {
+  for (const bool found_first : {false, true}) {
+    if (found_first) find();
+    connector.emergency_stop();
+    if (!found_first) find();
+    report() = {};
+    report().moving = report().running = 1;
+    connector.follow_report(0, kFirst, true);
+    ASSERT_TRUE(connector.send_ramp_down(0));
+    report().moving = report().running = 0;
+    report().faults = BUSHD_FAULT_EMERGENCY;
+    connector.follow_report(0, kFirst, true);
+    setup_requests();
+    EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_ENABLE}) << found_first;
+    report().state = BUSHD_STATE_READY;
+    connector.follow_report(0, kFirst, true);
+    ASSERT_EQ(mcus[kFirst].view.phase, link::McuPhase::kOnline);
+    connector.give_up(kFirst, "unplugged", 0);
+  }
+}
+
+TEST_F(Connecting, EmergencyStopThatWasClearedIsOver) {
+  mcus[kFirst].view.phase = McuPhase::kOnline;
+  connector.emergency_stop();
+  connector.control(kFirst, BUSHD_CONTROL_CLEAR_FAULTS);
+  connector.give_up(kFirst, "unplugged", 0);
+  find();
+  report().moving = report().running = 1;
+  connector.follow_report(0, kFirst, true);
+  report().moving = report().running = 0;
+  report().faults = BUSHD_FAULT_EMERGENCY;
+  connector.follow_report(0, kFirst, true);
+  setup_requests();
+  EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_ENABLE});
+}
+
 TEST_F(Connecting, RefusalEndsTheSetupAndOfAnOnlineMcuIsOnlyTold) {
   find();
   connector.follow_report(0, kFirst, false);
