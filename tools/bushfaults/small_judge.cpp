@@ -214,7 +214,7 @@ void SmallJudge::begin(TimeNs, Open& open, const std::string& name,
 
 void SmallJudge::asked(TimeNs now_ns, std::int64_t number, const api::Request& request) {
   Open& open = open_[number];
-  open = {.text = std::string(api::name_of(request)), .since_ns = now_ns};
+  open = {.text = std::string(api::name_of(request)), .since_ns = now_ns, .order = ++requests_};
   recent_.note(now_ns, fmt::format("desk #{}: {}", number, open.text));
   if (const auto* move = std::get_if<api::Move>(&request)) {
     open.is_motion = true;
@@ -253,7 +253,7 @@ void SmallJudge::asked(TimeNs now_ns, std::int64_t number, const api::Request& r
   for (const std::size_t i : open.motors) {
     Motor& motor = motors_[i];
     ++motor.open;
-    motor.touched_ns = now_ns;
+    motor.touched_by = open.order;
     motor.changed = true;
     if (open.homes) motor.homes = motor.perhaps_homed = true;
   }
@@ -269,12 +269,13 @@ void SmallJudge::asked_by_others(TimeNs now_ns, const api::Request& request) {
                                  : resume != nullptr ? &resume->motors
                                                      : nullptr;
   if (names == nullptr && !emergency) return;
+  ++requests_;
   for (Motor& motor : motors_) {
     if (names != nullptr && !names->empty() &&
         std::ranges::find(*names, motor.name) == names->end()) {
       continue;
     }
-    motor.touched_ns = now_ns;
+    motor.touched_by = requests_;
     motor.changed = true;
     if (emergency) motor.cut = true;
     if (resume != nullptr) motor.caused_ns = std::max(motor.caused_ns, now_ns);
@@ -339,14 +340,14 @@ void SmallJudge::ended(TimeNs now_ns, Open& open, std::size_t i, const api::Moto
   Motor& motor = motors_[open.motors[i]];
   if (motor.name != result.motor) return violated(now_ns, motor, "has the result of another motor");
   // Another one of the same request may have moved on, and this one by another request.
-  const bool stands = motor.touched_ns <= open.since_ns;
+  const bool stands = motor.touched_by <= open.order;
   if (result.outcome == api::Outcome::kReached && open.target[i] && stands &&
       motor.position != *open.target[i]) {
     violated(now_ns, motor,
              fmt::format("is said to have reached its target, and stands {} steps off",
                          motor.position - *open.target[i]));
   }
-  if (result.outcome == api::Outcome::kStopped && motor.touched_ns <= open.since_ns &&
+  if (result.outcome == api::Outcome::kStopped && motor.touched_by <= open.order &&
       open.text == "move") {
     violated(now_ns, motor, "is said to have been stopped, and nobody has stopped it");
   }

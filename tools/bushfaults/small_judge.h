@@ -116,7 +116,7 @@ class SmallJudge final : public bushd::sim::EdgeSink {
     TimeNs excused_ns = 0;
     TimeNs keys_ns = -1;
     TimeNs caused_ns = 0;  // by a request, if none is open
-    TimeNs touched_ns = -1;
+    std::uint64_t touched_by = 0;  // the latest request for it, counting all
     std::uint32_t unseen = 0;
     int open = 0;
     // What positions that are told are less than `position`.
@@ -134,6 +134,7 @@ class SmallJudge final : public bushd::sim::EdgeSink {
     bool accepted = false;
     bool is_motion = false;
     TimeNs since_ns = 0;
+    std::uint64_t order = 0;  // among all requests: many come at the same time
     std::vector<std::size_t> motors{};
     std::vector<std::optional<std::int64_t>> target{};
     std::optional<std::int64_t> set_offset{};
@@ -164,6 +165,7 @@ class SmallJudge final : public bushd::sim::EdgeSink {
   std::vector<Motor> motors_;
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> by_output_;
   std::map<std::int64_t, Open> open_;
+  std::uint64_t requests_ = 0;
   TimeNs paused_ns_ = 0;  // the last time
   TimeNs paused_until_ns_ = 0;
   std::uint64_t steps_ = 0;
