@@ -314,7 +314,7 @@ void Axis::advance(Place& place, Tick to) const {
 Tick Axis::end_of(const Place& place) const {
   if (on_path()) {
     const std::int64_t left_ns = place.path.ns_to(place.path.track()->to());
-    return place.tick + (left_ns + tick_ns_ - 1) / tick_ns_;
+    return place.tick + (place.path.stands() ? 1 : 0) + (left_ns + tick_ns_ - 1) / tick_ns_;
   }
   const auto units = static_cast<std::int64_t>(bushd_run_units_left(&place.run));
   const std::int64_t ns = units * table_->time_unit_ns - (units == 0 ? 0 : place.run.since_ns);

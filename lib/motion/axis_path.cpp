@@ -135,7 +135,7 @@ Tick Axis::own_end_on_path(const Place& place) const {
       const std::int64_t before_ns = place.path.ns_to(step - 1);
       const std::int64_t ns = before_ns + (crossing * (after_ns - before_ns) + 255) / 256;
       if (ns <= 0) break;
-      return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
+      return place.tick + (place.path.stands() ? 1 : 0) + (ns + tick_ns_ - 1) / tick_ns_;
     }
     if (begin <= place.path.step()) break;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "engine/line.h"
 
@@ -66,7 +67,9 @@ std::shared_ptr<const PathTrack> PathTrack::ending(const std::shared_ptr<const P
 
 PathRun::PathRun(std::shared_ptr<const PathTrack> track)
     : track_(std::move(track)), step_(track_->from()) {
-  if (!done()) enter(track_->path().segment_at(step_));
+  if (done()) return;
+  enter(track_->path().segment_at(step_));
+  stands_ = step_ > 0;
 }
 
 void PathRun::enter(std::size_t segment) {
@@ -90,7 +93,7 @@ std::int64_t PathRun::ns_to(std::uint32_t step) const {
 }
 
 void PathRun::tick(std::uint32_t tick_ns) {
-  if (done()) return;
+  if (done() || std::exchange(stands_, false)) return;
   const std::uint32_t unit_ns = track_->path().unit_ns();
   const std::uint64_t ns = std::uint64_t{since_ns_} + tick_ns;
   since_ += ns / unit_ns;

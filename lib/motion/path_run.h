@@ -69,7 +69,11 @@ class PathRun {
   std::uint8_t fraction() const { return fraction_; }  // of the next one, 1/256
   std::size_t segment() const { return segment_; }     // of the next one, or the last
   std::uint32_t delay() const;                         // of the running step; 0: done
-  std::int64_t ns_to(std::uint32_t step) const;        // from now to the end of that step
+  std::int64_t ns_to(std::uint32_t step) const;  // from now, or after its first tick if that is
+                                                 // still to come, to the end of that step
+  // A run that begins within the path tells in its first tick, before it goes on, what motors stand
+  // from their whole steps: told together with their first way, a step that is near would be late.
+  bool stands() const { return stands_; }
   void tick(std::uint32_t tick_ns);
   // See PathTrack::ending. Precondition: !done().
   void end_at(std::uint32_t end);
@@ -86,6 +90,7 @@ class PathRun {
   std::uint64_t since_ = 0;  // whole units since the last step
   std::uint32_t since_ns_ = 0;
   std::uint8_t fraction_ = 0;
+  bool stands_ = false;
 };
 
 // Where a motor is on the path when the run has made `step` of its steps and `fraction`/256 of the
