@@ -131,7 +131,9 @@ void Witness::forget_unbegun(Motor& motor) {
 
 // A motor that moves belongs to the newest move; its part of the one before has ended.
 void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target) {
-  if (is_of_module(motor)) crates_.motion_ended(false);
+  // What its module asks for itself replaces only what a daemon that is gone was asked for.
+  const bool by_module = std::get<1>(by) == Crates::kBushd2Client;
+  if (is_of_module(motor) && !by_module) crates_.motion_ended(false);
   if (motor.moves() || motor.stands_paused()) {
     Asked& before = asked_.at(*motor.move);
     before.end[before.index_of(motor.name)] = End{
