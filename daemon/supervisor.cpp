@@ -132,7 +132,8 @@ void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
                 motor.report({.of_mcu = mcu.report(),
                               .tick = mcu.view().tick,
                               .requests_open = mcu.busy(),
-                              .emergency_stop_open = emergency_stop_.under_way()}));
+                              .emergency_stop_open = emergency_stop_.under_way(),
+                              .other_master = installation_.bus_of(mcu).two_masters}));
   }
   journal_.after_report(mcu);
   for (Service* service : services_) service->reports(now_us, mcu);

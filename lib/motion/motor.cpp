@@ -279,6 +279,12 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
     now.position_mismatch = true;
     uncertain_reason_ = "MCU " + setup_.mcu + " counted position " + std::to_string(position_) +
                         " where the table leads to " + std::to_string(planned);
+    if (report.other_master) {
+      // It may go by that one's plan: a ramp-down from where it should be here would cross it.
+      now.faults |= BUSHD_FAULT_LINK;
+      events.emplace_back(event::Drop{});
+      return;
+    }
     events.emplace_back(event::Mismatch{});
     axis_.stop();
   }

@@ -79,9 +79,10 @@ using Activity = std::variant<Resting, Moving, Armed, Homing, Local, OnLine, Tra
 // What an MCU reports, and what is known beside.
 struct Report {
   const bushd_report& of_mcu;
-  Tick tick;                 // of_mcu.tick, unwrapped
-  bool requests_open;        // the MCU has not yet answered all that it was asked
-  bool emergency_stop_open;  // commanded, and not yet known to be obeyed everywhere
+  Tick tick;                  // of_mcu.tick, unwrapped
+  bool requests_open;         // the MCU has not yet answered all that it was asked
+  bool emergency_stop_open;   // commanded, and not yet known to be obeyed everywhere
+  bool other_master = false;  // talks on the line, and may have moved it
 };
 
 // What its position is worth.

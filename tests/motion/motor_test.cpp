@@ -238,6 +238,28 @@ TEST_F(MotorTest, ALimitSwitchInFlightEndsTheMoveWhereItStands) {
   EXPECT_THAT(refusal(-10), HasSubstr("stopped immediately at its limit switch"));
 }
 
+// A stop would be a ramp-down from where the plan is, and the motor may go the other way.
+TEST_F(MotorTest, OneThatAnotherMasterMayMoveIsLeftToIt) {
+  motor.start(kSteps, kStart);
+  report(kStart + 20);
+  mcu.motor[3].position_steps -= 500;
+  const auto told = motor.report({.of_mcu = mcu,
+                                  .tick = kStart + 30,
+                                  .requests_open = false,
+                                  .emergency_stop_open = false,
+                                  .other_master = true});
+  EXPECT_NE(find<event::Drop>(told), nullptr);
+  EXPECT_EQ(find<event::Mismatch>(told), nullptr);
+  EXPECT_FALSE(motor.axis().stopping());
+  EXPECT_TRUE(report(kStart + 31, 0).empty()) << "it moves";
+  set(mcu.moving, false);
+  const auto events = motor.report(
+      {.of_mcu = mcu, .tick = kStart + 40, .requests_open = false, .emergency_stop_open = false});
+  ASSERT_NE(find<event::Ended>(events), nullptr);
+  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kFault);
+  EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("where the table leads to"));
+}
+
 TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
   motor.start(kSteps, kStart);
   report(kStart + 20);

@@ -48,8 +48,8 @@ OnPath any_axes() {
       motors, points, between(0, 1) == 0 ? Path::Corners::kContinuous : Path::Corners::kExact);
   made.path->plan(SIZE_MAX);
   if (between(0, 2) == 0 && made.path->segments() > 0) {
-    made.path =
-        made.path->rest(between<std::uint32_t>(0, static_cast<std::uint32_t>(made.path->steps()) - 1));
+    made.path = made.path->rest(
+        between<std::uint32_t>(0, static_cast<std::uint32_t>(made.path->steps()) - 1));
     made.path->plan(SIZE_MAX);
   }
   made.format = between(0, 1) == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
