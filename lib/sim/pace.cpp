@@ -114,7 +114,7 @@ void Pace::start(TimeNs t_ns, bool positive) {
 }
 
 Jump Pace::step(TimeNs t_ns, bool positive) {
-  if (t_ns > line_until_ns_) forget_line();
+  end_line_if_over(t_ns);
   if (count_ == 0) {
     start(t_ns, positive);
     return Jump::kNone;

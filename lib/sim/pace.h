@@ -109,7 +109,7 @@ class Pace {
   // A line before that was forgotten has come to rest somewhere.
   void begin_on_line(bool by_mcu) {
     if (excused_) count_ = 0;
-    on_line_ = true;
+    on_line_ = told_ = true;
     by_mcu_ = by_mcu;
     line_until_ns_ = kNever;
   }
@@ -121,16 +121,18 @@ class Pace {
       return Jump::kNone;
     }
     leave_line(!ramped_down);
+    told_ = !ramped_down;
     return ramped_down && count_ != 0 ? come_to_rest() : Jump::kNone;
   }
   // Another motion begins: whatever the line was, it is over.
   void forget_line() {
     if (on_line_) leave_line(true);
+    told_ = false;
   }
 
   // No step since the last one until now.
   Jump silent(TimeNs now_ns) {
-    if (now_ns > line_until_ns_) forget_line();
+    end_line_if_over(now_ns);
     if (on_line_ || count_ == 0 || now_ns - last_ns() < rules_->rest_ns()) return Jump::kNone;
     return come_to_rest();
   }
@@ -144,7 +146,7 @@ class Pace {
   // completes its first step.
   TimeNs ramp_down_ns() const {
     const std::size_t k = count_ == 0 ? 0 : std::min(k_ + 1, rules_->last());
-    return rules_->ramp_down_ns(k) + (on_line_ ? rules_->longest_told_ns() : 0);
+    return rules_->ramp_down_ns(k) + (told_ ? rules_->longest_told_ns() : 0);
   }
   TimeNs last_ns() const { return time_ns_[newest_]; }
   // The first step since the last rest.
@@ -164,6 +166,10 @@ class Pace {
     line_until_ns_ = kNever;
   }
 
+  void end_line_if_over(TimeNs now_ns) {
+    if (on_line_ && now_ns > line_until_ns_) leave_line(true);
+  }
+
   void start(TimeNs t_ns, bool positive);
   void remember(TimeNs t_ns);
   Jump come_to_rest();
@@ -175,6 +181,8 @@ class Pace {
   bool positive_ = false;
   bool on_line_ = false;
   bool by_mcu_ = false;
+  // By a line, also by one that was lost: its running step may be as slow as any that can be told.
+  bool told_ = false;
   TimeNs line_until_ns_ = kNever;
   bool excused_ = false;    // from ramping down by its table, until it starts again
   std::size_t k_ = 0;       // the last exact delay was at least A(k)

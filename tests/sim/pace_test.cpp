@@ -191,6 +191,20 @@ TEST_P(PaceTest, AMotionBeginsWhereTheLineBeforeWasForgotten) {
   }
 }
 
+// On a line it may be slower than its table, also when the line is lost with its MCU's link.
+TEST_P(PaceTest, OneThatIsLostOnALineMayTakeTheLongestDelay) {
+  EXPECT_EQ(pace.step(now, true), Jump::kNone);
+  EXPECT_LT(pace.ramp_down_ns(), rules.longest_told_ns());
+  pace.begin_on_line(false);
+  EXPECT_GE(pace.ramp_down_ns(), rules.longest_told_ns());
+  EXPECT_EQ(pace.rest_on_line(now, false), Jump::kNone);
+  now += 1000 * kTickNs;
+  EXPECT_EQ(pace.step(now, true), Jump::kNone);
+  EXPECT_GE(pace.ramp_down_ns(), rules.longest_told_ns());
+  pace.forget_line();
+  EXPECT_LT(pace.ramp_down_ns(), rules.longest_told_ns());
+}
+
 TEST_P(PaceTest, AFifthFasterThanTheTableIsFound) {
   std::vector<std::int16_t> ticks = move(3000);
   for (std::int16_t& d : ticks) d = static_cast<std::int16_t>(d * 6 / 5);
