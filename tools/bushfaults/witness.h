@@ -254,6 +254,7 @@ class Witness {
   void asked_by_module(TimeNs now_ns, const std::string& client, const std::string& what,
                        const std::string& motor);
   void shutter_moves(TimeNs now_ns, Motor& motor);
+  void asks(TimeNs now_ns, const Request& request);
   void crate_answered(TimeNs now_ns, const Request& request, const bushd::api::CamacResult& result);
   bool is_shutter(const Motor& motor) const {
     return ShutterPlace::motor(config_) == bushd::MotorId{index_of(motor)};

@@ -68,11 +68,6 @@ void Witness::asked_by_module(TimeNs now_ns, const std::string& client, const st
 void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted,
                            bool on_line) {
   if (accepted.wrong) return violated(now_ns, *accepted.wrong);
-  std::erase_if(asked_, [&](const auto& entry) {
-    const bool of_module = std::get<1>(entry.first) == Crates::kBushd2Client;
-    return of_module && std::ranges::none_of(
-                            motors_, [&](const Motor& other) { return other.move == entry.first; });
-  });
   program_ = accepted.motion;
   Request request{.client = Crates::kBushd2Client,
                   .number = ++module_moves_,
@@ -88,28 +83,27 @@ void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& 
     motor.own_ramp_excess = std::max(
         motor.own_ramp_excess, own_ramp_excess((*table)->view(), bus.tick_us * 1000, bus.format));
   }
-  const Key key = key_of(request.id());
-  Asked& asked = asked_[key];
-  asked = Asked{.request = request,
-                .since_ns = now_ns,
-                .due_since_ns = now_ns,
-                .accepted = true,
-                .finished = true};
-  this->accepted(now_ns, key, asked);
+  asks(now_ns, request);
 }
 
 // A step: its direction is known by who has started it.
 void Witness::shutter_moves(TimeNs now_ns, Motor& motor) {
-  std::erase_if(asked_, [&](const auto& entry) {
-    const bool of_module = std::get<1>(entry.first) == ShutterModel::kClient;
-    return of_module && std::ranges::none_of(
-                            motors_, [&](const Motor& other) { return other.move == entry.first; });
-  });
   Request request{.client = ShutterModel::kClient,
                   .number = ++module_moves_,
                   .ask = Ask::kMoveBy,
                   .unknown_way = true};
   request.add(motor.name, 0);
+  asks(now_ns, request);
+}
+
+// A module's own request. It is accepted already, and nobody hears its result; of earlier ones only
+// those that still move a motor are known.
+void Witness::asks(TimeNs now_ns, const Request& request) {
+  std::erase_if(asked_, [&](const auto& entry) {
+    const bool its = std::get<1>(entry.first) == request.client;
+    return its && std::ranges::none_of(
+                      motors_, [&](const Motor& other) { return other.move == entry.first; });
+  });
   const Key key = key_of(request.id());
   Asked& asked = asked_[key];
   asked = Asked{.request = request,
