@@ -1,6 +1,7 @@
 // The image for ATmega2560 alone on a bus.
 #pragma once
 
+#include <algorithm>
 #include <string>
 
 #include "sim/mcu_alone.h"
@@ -27,6 +28,31 @@ class AvrAlone : public McuAlone {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
     ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, {400, 300, 200}, 150));
     ASSERT_NO_FATAL_FAILURE(master_.assign_all(kAddress, 0));
+  }
+
+  // It is polled every `poll_ms` (0: not) until all is done, and answers each time. The last report.
+  bushd_report answer_until(TimeNs end_ns, int poll_ms) {
+    master_.frames.clear();
+    std::size_t polls = 0;
+    while (poll_ms != 0 && bus_.now_ns() < end_ns) {
+      ++polls;
+      master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 100, 0});
+      pass(poll_ms * TimeNs{1'000'000});
+    }
+    bus_.advance_to(std::max(end_ns, bus_.now_ns()));
+    EXPECT_EQ(master_.frames.size(), polls);
+    const bushd_report after = master_.poll(kAddress);
+    EXPECT_EQ(after.moving, 0);
+    EXPECT_EQ(after.faults, 0);
+    EXPECT_EQ(after.bad_frames, 0);
+    return after;
+  }
+
+  // Between two reports. Each tells a tick that began up to one before, and takes a share of one.
+  static void expect_no_late_tick(const bushd_report& before, const bushd_report& after,
+                                  TimeNs passed_ns, std::uint32_t tick_ns) {
+    EXPECT_NEAR(after.tick - before.tick, static_cast<double>(passed_ns) / tick_ns, 1.5)
+        << "late ticks";
   }
 
   AvrMcu* avr_ = nullptr;

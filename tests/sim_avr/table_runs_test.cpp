@@ -97,22 +97,8 @@ TEST_P(AvrTableRuns, SixteenKeepTheirSlots) {
   EXPECT_EQ(before.moving, 0xFFFF);
   const std::size_t ticks = slots_of_steps().back() / kSlots + 1;
   const TimeNs end_ns = bus_.now_ns() + static_cast<TimeNs>(ticks + 40) * load.tick_ns;
-  master_.frames.clear();
-  std::size_t polls = 0;
-  while (load.poll_ms != 0 && bus_.now_ns() < end_ns) {
-    ++polls;
-    master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 100, 0});
-    pass(load.poll_ms * TimeNs{1'000'000});
-  }
-  bus_.advance_to(std::max(end_ns, bus_.now_ns()));
-  EXPECT_EQ(master_.frames.size(), polls);
-  const bushd_report after = master_.poll(kAddress);
-  const double passed = static_cast<double>(bus_.now_ns() - before_ns) / load.tick_ns;
-  // Each report tells a tick that began up to one before, and takes a share of one.
-  EXPECT_NEAR(after.tick - before.tick, passed, 1.5) << "late ticks";
-  EXPECT_EQ(after.moving, 0);
-  EXPECT_EQ(after.faults, 0);
-  EXPECT_EQ(after.bad_frames, 0);
+  const bushd_report after = answer_until(end_ns, load.poll_ms);
+  expect_no_late_tick(before, after, bus_.now_ns() - before_ns, load.tick_ns);
   ASSERT_NO_FATAL_FAILURE(expect_steps_in_slots());
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     const int steps = static_cast<int>(kSteps);
