@@ -30,6 +30,20 @@ std::vector<int> program_codes() {
   return codes;
 }
 
+// Faster than its MCU could ramp down from by the table that it has.
+std::vector<int> fast_codes() {
+  auto codes = program_codes();
+  std::fill(codes.begin() + 200, codes.end(), 9);
+  return codes;
+}
+
+// The MCU of m01 moves another motor, so that it takes no table.
+std::int64_t move_another(CamacLab& lab, std::int64_t steps) {
+  const auto other = lab.send(Ask::kMoveBy, {"m03"}, {steps});
+  lab.run_until([&] { return lab.shaft_steps("m03") > 200; });
+  return other;
+}
+
 class CamacStream : public Traced<const char*> {
  protected:
   // m03, of another group and the same MCU, moves.
@@ -188,12 +202,8 @@ TEST_P(CamacStream, ALostLinkRampsItDownByTheTableOfTheGroup) {
 // What its MCU could not ramp down by the table that it has waits, as before.
 TEST(CamacStreaming, FasterProgramsWaitForTheTable) {
   CamacLab lab(lab_with("fine"));
-  auto codes = program_codes();
-  codes[200] = codes[237] = 9;
-  std::fill(codes.begin() + 200, codes.end(), 9);
-  const auto other = lab.send(Ask::kMoveBy, {"m03"}, {3'000});
-  lab.run_until([&] { return lab.shaft_steps("m03") > 200; });
-  lab.load(0, 500, codes);
+  const auto other = move_another(lab, 3'000);
+  lab.load(0, 500, fast_codes());
   lab.permit(kEnabled);
   lab.run_for(0.3);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
@@ -207,7 +217,7 @@ TEST(CamacStreaming, FasterProgramsWaitForTheTable) {
   lab.wait(lab.use("axes", "bushd2-constant"));
   const auto again = lab.send(Ask::kMoveBy, {"m03"}, {-20'000});
   lab.run_until([&] { return lab.shaft_steps("m03") < 2800; });
-  lab.load(0, 398, codes);
+  lab.load(0, 398, fast_codes());
   lab.permit(kEnabled | kLeft);
   ASSERT_TRUE(lab.wait_for_lam());
   EXPECT_FALSE(lab.has_result(again));
@@ -216,11 +226,8 @@ TEST(CamacStreaming, FasterProgramsWaitForTheTable) {
 
 TEST(CamacStreaming, AStopByOthersEndsWhatWaitsForItsTable) {
   CamacLab lab(lab_with("fine"));
-  auto codes = program_codes();
-  std::fill(codes.begin() + 200, codes.end(), 9);
-  const auto other = lab.send(Ask::kMoveBy, {"m03"}, {3'000});
-  lab.run_until([&] { return lab.shaft_steps("m03") > 200; });
-  lab.load(0, 500, codes);
+  const auto other = move_another(lab, 3'000);
+  lab.load(0, 500, fast_codes());
   lab.permit(kEnabled);
   lab.run_for(0.3);
   lab.wait(lab.send(Ask::kStop, {"m01"}));
@@ -237,8 +244,7 @@ TEST(CamacStreaming, LimitsOfSpeedAndBacklashHold) {
   CamacLab lab(lab_with("fine",
                         "unit = \"mm\"\nsteps_per_unit = 100\nmax_speed = 5\nbacklash = 0.2\n"
                         "soft_limits = [-20, 20]\n"));
-  const auto other = lab.send(Ask::kMoveBy, {"m03"}, {30'000});
-  lab.run_until([&] { return lab.shaft_steps("m03") > 200; });
+  const auto other = move_another(lab, 30'000);
   lab.load(0, 1000, program_codes());
   lab.permit(kEnabled | kLeft);
   const std::int64_t begun_us = lab.now_us();
@@ -258,8 +264,7 @@ TEST(CamacStreaming, IsKeptLikeOtherMoves) {
   CamacLab lab;
   lab.keep_positions();
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
-  lab.send(Ask::kMoveBy, {"m03"}, {30'000});
-  lab.run_until([&] { return lab.shaft_steps("m03") > 200; });
+  move_another(lab, 30'000);
   lab.load(0, 300, program_codes());
   lab.permit(kEnabled);
   ASSERT_TRUE(lab.wait_for_lam());

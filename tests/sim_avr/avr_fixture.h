@@ -30,7 +30,8 @@ class AvrAlone : public McuAlone {
     ASSERT_NO_FATAL_FAILURE(master_.assign_all(kAddress, 0));
   }
 
-  // It is polled every `poll_ms` (0: not) until all is done, and answers each time. The last report.
+  // It is polled every `poll_ms` (0: not) until all is done, and answers each time. The last
+  // report.
   bushd_report answer_until(TimeNs end_ns, int poll_ms) {
     master_.frames.clear();
     std::size_t polls = 0;
