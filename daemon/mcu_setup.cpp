@@ -76,7 +76,7 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
   std::ranges::sort(motors, {}, [](const config::Motor* motor) { return motor->output; });
   for (const config::Motor* motor : motors) {
     add_inputs(setup, *motor);
-    if (motor->local) setup.local_motors |= bit_of(motor->output);
+    if (motor->local) setup.local.motors |= bit_of(motor->output);
     if (setup.emission.settings.mode == BUSHD_EMISSION_PHASES) {
       const config::Currents its = drive_of(motor).currents.value_or(config::Currents{});
       setup.currents.push_back(

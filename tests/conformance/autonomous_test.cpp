@@ -131,7 +131,7 @@ TEST_P(HomingScript, WhereverItComesFromItIsTheSameToOneStep) {
 }
 
 TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor}));
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor, 0, 0}));
   for (const std::uint8_t button : {BUSHD_INPUT_FORWARD, BUSHD_INPUT_REVERSE}) {
     const std::size_t before = steps(1, kMotor).size();
     const std::int32_t from_steps = master_.poll(kReal).motor[kMotor].position_steps;
@@ -157,7 +157,7 @@ TEST_P(Autonomous, LocalInputsMoveAMotorByTheVelocityLoop) {
   constexpr std::uint8_t kFirst = 0;
   ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
                               bushd_set_velocity{kFirst, 200 * 64, 1500 * 64, 3000}));
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kFirst}));
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kFirst, 0, 0}));
   for (const std::uint8_t button : {BUSHD_INPUT_FORWARD, BUSHD_INPUT_REVERSE}) {
     to_inputs_time();
     set_inputs({0, button});
