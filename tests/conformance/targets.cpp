@@ -59,8 +59,7 @@ class Atmega2560 final : public Avr {
             .code_count = 952,
             .disabled_capabilities = disabled_capabilities(),
             .current_motors = 0,
-            .velocity_motors = 0,
-            .keypad = false};
+            .velocity_motors = 0};
   }
   std::uint16_t disabled_capabilities() const override { return BUSHD_CAN_TABLE_TICKS; }
 };
