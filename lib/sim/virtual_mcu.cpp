@@ -70,6 +70,15 @@ bushd_inputs VirtualMcu::on_read_inputs(void* context, std::int64_t time_ns) {
   return inputs;
 }
 
+std::string VirtualMcu::take_keypad_display() {
+  std::string text;
+  for (int next = bushd_virtual_keypad_display(&port_); next >= 0;
+       next = bushd_virtual_keypad_display(&port_)) {
+    text += static_cast<char>(next);
+  }
+  return text;
+}
+
 void VirtualMcu::on_transmit(void* context, std::int64_t start_ns, const std::uint8_t* wire,
                              std::size_t size) {
   const auto& self = *static_cast<VirtualMcu*>(context);

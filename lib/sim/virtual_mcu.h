@@ -68,11 +68,12 @@ class VirtualMcu final : public Mcu {
   void receive(std::uint8_t byte, TimeNs now_ns) override {
     bushd_virtual_receive(&port_, byte, now_ns);
   }
-  void keypad_byte(std::uint8_t byte, TimeNs now_ns) {
+  void keypad_byte(std::uint8_t byte, TimeNs now_ns) override {
     bushd_virtual_keypad_byte(&port_, byte, now_ns);
   }
   void keypad_break(TimeNs now_ns) { bushd_virtual_keypad_break(&port_, now_ns); }
-  int keypad_display() { return bushd_virtual_keypad_display(&port_); }
+  // At once, without the time of a line.
+  std::string take_keypad_display() override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override {
     bushd_virtual_reset(&port_, now_ns, boot_ns, boot_number);
   }

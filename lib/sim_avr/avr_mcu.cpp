@@ -29,6 +29,7 @@ constexpr std::uint32_t kFrequency = 16'000'000;
 constexpr std::uint8_t kPaint = 0xC5;  // firmware/ports/atmega2560/boot_tests.h
 // Behind the one that simavr holds: the chip's buffer has two, its shift register one more.
 constexpr std::size_t kHardwareFifo = 2;
+constexpr std::size_t kMostDisplay = 256;
 // In the address space of data.
 constexpr std::size_t kMcusr = 0x54;
 constexpr std::size_t kEecr = 0x3F;
@@ -151,8 +152,11 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   if (chip_.keypad_uart != 0) {
     keypad_ = std::make_unique<AvrUartLine>(
         avr_, chip_.keypad_uart, [this](std::uint64_t cycle, std::uint8_t byte) {
-          if (!on_keypad_display) return;
-          on_keypad_display(cycle_0_ns_ + static_cast<TimeNs>(cycle) * 125 / 2, byte);
+          if (on_keypad_display) {
+            on_keypad_display(cycle_0_ns_ + static_cast<TimeNs>(cycle) * 125 / 2, byte);
+          } else if (display_.size() < kMostDisplay) {
+            display_ += static_cast<char>(byte);
+          }
         });
   }
 
@@ -377,7 +381,7 @@ void AvrMcu::receive(std::uint8_t byte, TimeNs now_ns) {
 
 void AvrMcu::keypad_byte(std::uint8_t byte, TimeNs now_ns) {
   advance(now_ns);
-  keypad_->receive(byte);
+  if (keypad_) keypad_->receive(byte);
 }
 
 void AvrMcu::keypad_break(TimeNs now_ns) {
