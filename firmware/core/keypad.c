@@ -18,7 +18,7 @@ void bushd_mcu_keypad_byte(bushd_mcu* mcu, uint8_t byte) {
     case FORWARD:
     case REVERSE:
       keypad->direction = byte == FORWARD ? 1 : -1;
-      keypad->heard = (uint16_t)mcu->uptime;
+      keypad->fresh = true;
       break;
     case SLOWER:
       keypad->slower = keypad->slower < LAST_AMOUNT ? (uint8_t)(keypad->slower + 1u) : 0;
@@ -63,6 +63,9 @@ int16_t bushd_mcu_keypad_display(bushd_mcu* mcu) {
 
 int8_t bushd_mcu_keypad_direction(bushd_mcu* mcu) {
   bushd_mcu_keypad* keypad = &mcu->local.pad;
+  // Not when its byte came: ports look at their lines at other times of a tick.
+  if (keypad->fresh) keypad->heard = (uint16_t)mcu->uptime;
+  keypad->fresh = false;
   const uint16_t most = mcu->local.settings.keypad_ticks;
   if (most != 0 && (uint16_t)((uint16_t)mcu->uptime - keypad->heard) >= most) keypad->direction = 0;
   return keypad->direction;

@@ -31,8 +31,9 @@ typedef struct bushd_mcu bushd_mcu;
 typedef struct bushd_mcu_keypad {
   int8_t direction;  // of the key that counts, +1 or -1; 0: none does
   uint8_t slower;    // by so many amounts
-  uint16_t heard;    // the direction's byte, in low bits of uptime
+  uint16_t heard;    // when a tick was prepared first with the direction, in low bits of uptime
   uint8_t left : 3;  // characters of the display still to be sent
+  bool fresh : 1;    // no tick was prepared yet with the direction
   bool due : 1;      // the display is to be sent anew
   bool slowed : 1;   // the speed is another one, and those that move do not know
   bool refused : 1;  // the key counts for nothing
