@@ -109,7 +109,7 @@ void Installation::add_motors() {
             .mcu = mcu.id,
             .output = config.output,
             .has_home = config.home.has_value(),
-            .local = config.local,
+            .local = config.drive.moved_by_people(),
             .restored_refused = config.restored_refused,
             .limit_immediate = config.limit_action == BUSHD_STOP_IMMEDIATE,
             .emergency_stop_immediate = bus.emergency_stop == BUSHD_STOP_IMMEDIATE,

@@ -21,7 +21,7 @@ bushd_set_inputs inputs_of(const config::Mcu& mcu) {
   return inputs;
 }
 
-void add_inputs(link::McuSetup& setup, const config::Motor& motor) {
+void add_inputs(link::McuSetup& setup, const config::Motor& motor, bool one_input_open) {
   const std::uint16_t bit = bit_of(motor.output);
   const config::MotorInputs& its = motor.inputs;
   if (its.positive) setup.inputs.limit_positive |= bit;
@@ -30,7 +30,7 @@ void add_inputs(link::McuSetup& setup, const config::Motor& motor) {
   for (const auto& input : {its.positive, its.negative, its.home, its.step, its.own}) {
     if (!input) continue;
     setup.used_inputs |= static_cast<std::uint16_t>(1u << input->number);
-    if (input->active_open) {
+    if (motor.has_one_input ? one_input_open : input->active_open) {
       setup.inputs.inverted |= static_cast<std::uint16_t>(1u << input->number);
     }
   }
@@ -44,6 +44,12 @@ void add_inputs(link::McuSetup& setup, const config::Motor& motor) {
                                       .home = number(its.home)};
   if (numbers.positive == own && numbers.negative == own && numbers.home == own) return;
   setup.motor_inputs.push_back(numbers);
+}
+
+// Rounded up: 0 would be no limit.
+std::uint16_t keypad_ticks(const config::Config& config, const config::Mcu& mcu) {
+  const std::uint32_t tick_us = config.bus_of(mcu).tick_us;
+  return static_cast<std::uint16_t>((mcu.keypad_ms * 1000 + tick_us - 1) / tick_us);
 }
 
 // Motors with the same table share it.
@@ -75,14 +81,18 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
   // Slots are given in the order of outputs.
   std::ranges::sort(motors, {}, [](const config::Motor* motor) { return motor->output; });
   for (const config::Motor* motor : motors) {
-    add_inputs(setup, *motor);
-    if (motor->local) setup.local_motors |= bit_of(motor->output);
+    add_inputs(setup, *motor, drive_of(motor).input_open);
+    if (drive_of(motor).local) setup.local.motors |= bit_of(motor->output);
+    if (drive_of(motor).keypad) {
+      setup.local.keypad |= bit_of(motor->output);
+      setup.local.keypad_ticks = keypad_ticks(config, mcu);
+    }
     if (setup.emission.settings.mode == BUSHD_EMISSION_PHASES) {
       const config::Currents its = drive_of(motor).currents.value_or(config::Currents{});
       setup.currents.push_back(
           {motor->output.value, its.fast_decay, its.ramp_ma, its.cruise_ma, its.hold_ma});
     }
-    if (motor->local) {
+    if (drive_of(motor).moved_by_people()) {
       const config::Velocity its = drive_of(motor).velocity.value_or(config::Velocity{});
       setup.velocities.push_back({.motor = motor->output.value,
                                   .least = its.min_steps_per_s * kVelocityUnits,

@@ -5,16 +5,18 @@ find_package(Python3 REQUIRED COMPONENTS Interpreter)
 set(BUSHD_IMAGES_DIR ${CMAKE_BINARY_DIR}/images CACHE PATH "Where the builds of the images for MCUs are, a folder each")
 
 # Where toolchain and simulator are there, <TARGET> is made and <PREFIX>_IMAGES says where its images are:
-# ${..._IMAGES}-<baud rate>.elf
+# ${..._IMAGES} and the ends of their names, such as -500000.elf; what follows are those that others need.
 function(bushd_images target prefix toolchain port)
   set(build ${BUSHD_IMAGES_DIR}/${toolchain})
   set(images ${build}/firmware/ports/${port}/bushd-${port})
+  set(files ${ARGN})
+  list(TRANSFORM files PREPEND ${images})
   add_custom_target(${target}
     COMMAND ${CMAKE_COMMAND} -S ${PROJECT_SOURCE_DIR} -B ${build} -G Ninja --log-level=WARNING
       -DCMAKE_TOOLCHAIN_FILE=${PROJECT_SOURCE_DIR}/cmake/${toolchain}.cmake -DCMAKE_BUILD_TYPE=Release
       -DBUSHD_FIRMWARE_ONLY=ON -DBUSHD_WERROR=${BUSHD_WERROR}
     COMMAND ${CMAKE_COMMAND} --build ${build}
-    BYPRODUCTS ${images}-500000.elf ${images}-1000000.elf
+    BYPRODUCTS ${files}
     VERBATIM)
   bushd_check(${target}_is_reproducible LABEL slow STAGE nightly NEEDS ${target}
     COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/ports/reproducible_test.py ${PROJECT_SOURCE_DIR}
@@ -23,11 +25,13 @@ function(bushd_images target prefix toolchain port)
 endfunction()
 
 if(TARGET bushd_sim_avr AND AVR_GCC)
-  bushd_images(avr_image AVR avr atmega2560)
-  bushd_images(atmega1284p_image ATMEGA1284P atmega1284p atmega1284p)
+  bushd_images(avr_image AVR avr atmega2560 -500000.elf -1000000.elf)
+  bushd_images(atmega1284p_image ATMEGA1284P atmega1284p atmega1284p -500000.elf -1000000.elf)
+  bushd_images(keypad_image KEYPAD keypad keypad .elf)
   set(AVR_DEFINITIONS AVR_IMAGES="${AVR_IMAGES}"
     AVR_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega2560/memory_owners"
     ATMEGA1284P_IMAGES="${ATMEGA1284P_IMAGES}"
+    KEYPAD_IMAGE="${KEYPAD_IMAGES}.elf"
     ATMEGA1284P_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega1284p/memory_owners")
   bushd_check(avr_stack_is_bounded LABEL slow NEEDS avr_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega2560 avr-objdump ${AVR_IMAGES}-500000.elf)
@@ -38,7 +42,7 @@ else()
 endif()
 
 if(ARM_GCC AND QEMU_SYSTEM_ARM)
-  bushd_images(cortex_m_image LM3S cortex-m lm3s6965)
+  bushd_images(cortex_m_image LM3S cortex-m lm3s6965 -500000.elf -1000000.elf)
   bushd_check(cortex_m_stack_is_bounded LABEL slow NEEDS cortex_m_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/cortex_m_stack_bound_test.py arm-none-eabi-objdump ${LM3S_IMAGES}-500000.elf)
 else()

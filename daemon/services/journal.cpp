@@ -244,7 +244,8 @@ void Journal::before_report(MotorId id, bool being_set) {
   const unsigned output = motor.output().value;
   const bool autonomous = (mcu.report().autonomous >> output & 1) != 0;
   // Somebody has tapped a button between two reports.
-  const bool tapped = installation_.config()[id].local && !motor.has_plan() && !being_set &&
+  const bool tapped = installation_.drives()[id].moved_by_people() && !motor.has_plan() &&
+                      !being_set &&
                       mcu.report().motor[output].position_steps != motor.position_steps();
   if (!autonomous && !tapped) return;
   autonomous_[id] = Autonomous{

@@ -219,7 +219,7 @@ void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
              .position_text = same_scale && motor.coordinates().has_unit()
                                   ? motor.coordinates().text(kept.record->steps)
                                   : std::string(),
-             .local = config.local,
+             .local = installation_.drives()[id].moved_by_people(),
              .may_have_overrun = at_limit && config.limit_action == BUSHD_STOP_IMMEDIATE});
   // What the MCU itself reports of before this daemon.
   if (first && motor.uncertain_reason() && verdict.trust != state::Trust::kUncertain) {

@@ -63,7 +63,8 @@ Result<MotorSettings::Plan> MotorSettings::plan_of(
     if (!key) {
       return fail(name + ": \"" + word +
                   "\" cannot be changed in operation; allowed: offset, direction, soft_limits, "
-                  "velocity, currents. Edit bushd.toml and restart bushd for other keys");
+                  "input_active, local, keypad, velocity, currents. Edit bushd.toml and restart "
+                  "bushd for other keys");
     }
     auto at = static_cast<std::size_t>(std::ranges::find(plan.motors, *id) - plan.motors.begin());
     if (at == plan.motors.size()) {
@@ -99,7 +100,7 @@ Result<void> MotorSettings::mcu_takes(const Plan& plan, MotorId id) const {
   if (drives[id] == installation_.drives()[id]) return {};
   const Mcu& mcu = installation_.mcu_of(id);
   if (installation_.any_moves(mcu) || (mcu.online() && mcu.report().moving != 0)) {
-    return fail("a motor of MCU " + mcu.name() + " moves; its velocities and currents can be " +
+    return fail("a motor of MCU " + mcu.name() + " moves; what it does by itself can be " +
                 "changed when all of them are at rest");
   }
   return mcu.has_room(
@@ -173,6 +174,7 @@ void MotorSettings::put(MotorId id, const config::Settings& settings) {
   installation_[id].set_soft_limits(settings.soft_limits);
   if (settings.drive != installation_.drives()[id]) {
     installation_.put(id, settings.drive);
+    installation_[id].set_local(settings.drive.moved_by_people());
     Mcu& mcu = installation_.mcu_of(id);
     mcu.reconfigure(installation_.setup_of(mcu.id));
   }
@@ -259,6 +261,7 @@ api::Configuration MotorSettings::configuration_of(const std::vector<MotorId>& m
   for (const MotorId id : motors) {
     const config::Settings now = settings_of(id);
     for (const SettingKey key : config::kSettingKeys) {
+      if (!config::is_told(now, key) && !config::is_told(in_file_[id], key)) continue;
       if (!config::applies(now, key)) continue;
       out.settings.push_back({.motor = installation_[id].name(),
                               .key = std::string(config::name_of(key)),

@@ -1,29 +1,38 @@
 // LOCAL: motors that people move by two buttons at the MCU, with a host or without. While FORWARD
 // or REVERSE is held they accelerate by their tables and cruise; when it is released, or both are
-// held, they ramp down. A press counts when it has lasted for READINGS readings, a release at
-// once. What is active at boot, or when the settings come, may be stuck: it must be released first.
-// Motors with VELOCITY settings speed up and down by these, and need not come to rest to reverse.
+// held, they ramp down. A press counts when it has lasted for BUSHD_MCU_LOCAL_READINGS readings, a
+// release at once. What is active at boot, or when the settings come, may be stuck: it must be
+// released first. Motors with VELOCITY settings speed up and down by these, and need not come to
+// rest to reverse.
+//
+// A key of the keypad is such a press, with a speed of its own, as long as no button is active. One
+// that cannot move a motor, or no longer, is forgotten: it has to be pressed again. A run of a
+// table takes another speed up from rest.
 #include "firmware/core/local.h"
 
 #include "firmware/core/access.h"
 #include "firmware/core/drivers.h"
 #include "firmware/core/homing.h"
+#include "firmware/core/keypad.h"
 #include "firmware/core/limits.h"
 #include "firmware/core/state.h"
 #include "firmware/core/table_run.h"
 #include "firmware/core/travel.h"
 #include "firmware/core/velocity.h"
 
-enum { READINGS = 3 };
+enum { READINGS = BUSHD_MCU_LOCAL_READINGS };
 
 // Other faults are the host's: without one, people may still move a motor.
 static const uint8_t kForbids = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_EMERGENCY |
                                 BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_OVERCURRENT;
 
-static int8_t wish_of(uint8_t system_inputs) {
-  const bool forward = (system_inputs & BUSHD_INPUT_FORWARD) != 0;
-  const bool reverse = (system_inputs & BUSHD_INPUT_REVERSE) != 0;
-  return (int8_t)(forward - reverse);
+static uint8_t buttons_of(const bushd_mcu* mcu, uint8_t system_inputs) {
+  if (mcu->local.settings.motors == 0) return 0;
+  return system_inputs & (BUSHD_INPUT_FORWARD | BUSHD_INPUT_REVERSE);
+}
+
+static int8_t wish_of(uint8_t buttons) {
+  return (int8_t)(((buttons & BUSHD_INPUT_FORWARD) != 0) - ((buttons & BUSHD_INPUT_REVERSE) != 0));
 }
 
 static void release(bushd_mcu* mcu) {
@@ -34,13 +43,19 @@ static void release(bushd_mcu* mcu) {
   }
 }
 
+static void steer(bushd_mcu* mcu, uint8_t m) {
+  const bushd_mcu_local* local = &mcu->local;
+  const int32_t most = local->by_keypad ? bushd_mcu_keypad_speed(mcu) : INT32_MAX;
+  bushd_mcu_steer(mcu, m, local->wish, most);
+}
+
 // Those that move by the loop still, after a release or a turn.
 static void steer_held(bushd_mcu* mcu) {
   if (mcu->config.velocity_motors == 0) return;
   const uint16_t held = (uint16_t)(mcu->local.held & ~bushd_mcu_forbidden(mcu, mcu->local.wish));
   const uint16_t steered = held & bushd_mcu_moved_by_velocity(mcu);
   for (uint8_t m = 0; steered >> m != 0; ++m) {
-    if ((steered & motor_bit(m)) != 0) bushd_mcu_steer(mcu, m, mcu->local.wish);
+    if ((steered & motor_bit(m)) != 0) steer(mcu, m);
   }
 }
 
@@ -54,11 +69,13 @@ static void begin_held(bushd_mcu* mcu) {
   for (uint8_t m = 0; begins != 0; ++m, begins = (uint16_t)(begins >> 1)) {
     if ((begins & 1u) == 0) continue;
     if (bushd_mcu_has_velocity(mcu, m)) {
-      bushd_mcu_steer(mcu, m, mcu->local.wish);
+      steer(mcu, m);
     } else if (mcu->motor[m].table < 0) {
       mcu->local.held &= (uint16_t)~motor_bit(m);
     } else {
-      bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish, 0);
+      const bushd_table* table = bushd_mcu_table_of(mcu, &mcu->motor[m]);
+      const uint16_t floor = mcu->local.by_keypad ? bushd_mcu_keypad_floor(mcu, table) : 0;
+      bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish, floor);
     }
   }
 }
@@ -69,41 +86,76 @@ static bool may_enable(const bushd_mcu* mcu) {
   return its != BUSHD_FLAG_CONFIGURED;
 }
 
+// Those that go by their tables come to rest, and begin anew. The loop goes on from where it is.
+static void slow_down(bushd_mcu* mcu) {
+  if (!mcu->local.pad.slowed) return;
+  mcu->local.pad.slowed = false;
+  if (!mcu->local.by_keypad) return;
+  uint16_t moving =
+      (uint16_t)(mcu->local.held & mcu->autonomous & ~bushd_mcu_moved_by_velocity(mcu));
+  for (uint8_t m = 0; moving != 0; ++m, moving = (uint16_t)(moving >> 1)) {
+    if (moving & 1u) bushd_mcu_ramp_down_run(mcu, m);
+  }
+}
+
+static bool moves_none(const bushd_mcu* mcu) {
+  return (mcu->local.held & ~bushd_mcu_forbidden(mcu, mcu->local.wish)) == 0;
+}
+
 void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs) {
   bushd_mcu_local* local = &mcu->local;
-  const int8_t wish = wish_of(system_inputs);
+  const uint8_t buttons = buttons_of(mcu, system_inputs);
   const bool allowed = may_enable(mcu) && (mcu->faults & kForbids) == 0;
-  if (wish != local->wish || !allowed) {
+  if (buttons != 0 || !allowed) bushd_mcu_keypad_refuse(mcu);
+  const int8_t key = bushd_mcu_keypad_direction(mcu);
+  const int8_t wish = key != 0 ? key : wish_of(buttons);
+  slow_down(mcu);
+  if (wish != local->wish || local->by_keypad != (key != 0) || !allowed) {
     release(mcu);
     local->wish = wish;
+    local->by_keypad = key != 0;
     // To clear a fault, or to raise EN, is not to ask for motion: what is held then must be pressed
     // anew.
     local->readings = allowed ? 0 : READINGS;
   }
   if (wish == 0 || !allowed) return;
   if (local->readings < READINGS && ++local->readings == READINGS) {
-    local->held =
-        (uint16_t)(local->motors & ~(bushd_mcu_homing_motor(mcu) | bushd_mcu_travel_motor(mcu)));
+    const uint16_t motors = local->by_keypad ? local->settings.keypad : local->settings.motors;
+    local->held = (uint16_t)(motors & ~(bushd_mcu_homing_motor(mcu) | bushd_mcu_travel_motor(mcu)));
     if ((mcu->flags & BUSHD_FLAG_ENABLED) == 0) bushd_mcu_set_enable(mcu, true);
   }
   begin_held(mcu);
+  if (local->by_keypad && local->readings == READINGS && moves_none(mcu)) {
+    bushd_mcu_keypad_refuse(mcu);
+  }
 }
 
 void bushd_mcu_forget_presses(bushd_mcu* mcu, uint8_t system_inputs) {
+  bushd_mcu_keypad_refuse(mcu);
   mcu->local.held = 0;
-  mcu->local.wish = wish_of(system_inputs);
+  mcu->local.wish = wish_of(buttons_of(mcu, system_inputs));
+  mcu->local.by_keypad = false;
   mcu->local.readings = READINGS;
 }
 
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
-  if ((message->motors & ~bushd_mcu_own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
-  const uint16_t changed = (uint16_t)(mcu->local.motors ^ message->motors);
+  bushd_local* settings = &mcu->local.settings;
+  if (((message->motors | message->keypad) & ~bushd_mcu_own_motors(mcu)) != 0) {
+    return BUSHD_E_FORMAT;
+  }
+  if (message->keypad != 0 && !mcu->config.keypad) return BUSHD_E_FORMAT;
+  const uint16_t of_keypad = settings->keypad ^ message->keypad;
+  const uint16_t changed = (uint16_t)((settings->motors ^ message->motors) | of_keypad);
   if (changed & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
-  if (mcu->local.motors == 0) {
+  const bool first = settings->motors == 0 && message->motors != 0;
+  // A key that moves others would be forgotten.
+  if (first && (mcu->local.held & mcu->autonomous) != 0) return BUSHD_E_STATE;
+  *settings = *message;
+  if (first) {
     const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
     bushd_mcu_forget_presses(mcu, pins.system ^ mcu->inputs.system_inverted);
   }
-  mcu->local.motors = message->motors;
-  mcu->local.held &= message->motors;
+  if (of_keypad != 0) bushd_mcu_keypad_refuse(mcu);
+  mcu->local.held &= mcu->local.by_keypad ? message->keypad : message->motors;
   return BUSHD_OK;
 }

@@ -1,18 +1,24 @@
-// LOCAL: motors that people move by two buttons at the MCU.
+// LOCAL: motors that people move by two buttons at the MCU, or by a keypad (keypad.h).
 #ifndef BUSHD_FIRMWARE_CORE_LOCAL_H
 #define BUSHD_FIRMWARE_CORE_LOCAL_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "engine/message.h"
+#include "firmware/core/keypad.h"
 
 typedef struct bushd_mcu bushd_mcu;
 
+#define BUSHD_MCU_LOCAL_READINGS 3u  // of a press, before it counts
+
 typedef struct bushd_mcu_local {
-  uint16_t motors;   // a setting
-  uint16_t held;     // of them, those that the button has moved or will move, until it is released
+  bushd_local settings;
+  uint16_t held;     // motors that the button has moved or will move, until it is released
   int8_t wish;       // +1, -1; 0: none, or both
+  bool by_keypad;    // who wishes it
   uint8_t readings;  // since it changed
+  bushd_mcu_keypad pad;
 } bushd_mcu_local;
 
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message);

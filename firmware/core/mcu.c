@@ -116,7 +116,7 @@ static void move_by_itself(bushd_mcu* mcu) {
   const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
   bushd_mcu_go_home(mcu, pins.motors ^ mcu->inputs.inverted);
   bushd_mcu_go_travel(mcu, pins.motors ^ mcu->inputs.inverted);
-  if (mcu->local.motors != 0) {
+  if ((mcu->local.settings.motors | mcu->local.settings.keypad) != 0) {
     bushd_mcu_move_locally(mcu, pins.system ^ mcu->inputs.system_inverted);
   }
 }
@@ -124,7 +124,8 @@ static void move_by_itself(bushd_mcu* mcu) {
 void bushd_mcu_prepare(bushd_mcu* mcu) {
   bushd_mcu_finish_row(mcu, mcu->tick + 1u);
   bushd_mcu_watch_inputs(mcu);
-  if ((mcu->autonomous | mcu->local.motors) != 0) move_by_itself(mcu);
+  const uint16_t by_people = mcu->local.settings.motors | mcu->local.settings.keypad;
+  if ((mcu->autonomous | by_people) != 0) move_by_itself(mcu);
   bushd_mcu_watch_comm_timeout(mcu);
   bushd_mcu_emit(mcu, &mcu->slot_buffer[mcu->front ^ 1u]);
   bushd_mcu_choose_currents(mcu);

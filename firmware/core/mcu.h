@@ -59,14 +59,15 @@ extern "C" {
 
 // Memory and identity, given by the port; all of it outlives the MCU struct.
 typedef struct bushd_mcu_config {
-  uint8_t address;       // 1..255
-  uint8_t motors;        // 1..BUSHD_MOTORS_PER_MCU
-  uint16_t slots;        // BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS
-  uint16_t boot_number;  // differs from that of the boot before
-  uint8_t reset_cause;   // BUSHD_RESET_*
-  bool enable_at_boot;   // what keep_enable was told last, after a watchdog reset; else false
-  bool in_pieces;        // answers are left to bushd_mcu_work; else they are sent at once
-  int16_t* queue;        // queue_ticks x motors displacements
+  uint8_t address;          // 1..255
+  uint8_t motors;           // 1..BUSHD_MOTORS_PER_MCU
+  uint16_t slots;           // BUSHD_MIN_SLOTS..BUSHD_MAX_SLOTS
+  uint16_t boot_number;     // differs from that of the boot before
+  uint8_t reset_cause;      // BUSHD_RESET_*
+  bool enable_at_boot : 1;  // what keep_enable was told last, after a watchdog reset; else false
+  bool in_pieces : 1;       // answers are left to bushd_mcu_work; else they are sent at once
+  bool keypad : 1;          // it has a line for one (keypad.h)
+  int16_t* queue;           // queue_ticks x motors displacements
   uint16_t
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint32_t min_tick_ns;  // shorter ones are refused
@@ -154,12 +155,12 @@ typedef struct bushd_mcu_nvm_region {
 } bushd_mcu_nvm_region;
 bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
 // Bytes of all pieces together, with this much table memory and all motors.
-#define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                        \
-  (sizeof(uint32_t) + sizeof(bushd_format) + sizeof(bushd_set_inputs) +                            \
-   BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) + sizeof(bushd_emission) + sizeof(uint16_t) + \
-   BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) + sizeof(uint16_t) +              \
-   (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t) +                       \
-   BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents) +                                             \
+#define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                     \
+  (sizeof(uint32_t) + sizeof(bushd_format) + sizeof(bushd_set_inputs) +                         \
+   BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) + sizeof(bushd_emission) +                 \
+   sizeof(bushd_local) + BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) +        \
+   sizeof(uint16_t) + (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t) + \
+   BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents) +                                          \
    BUSHD_MAX_VELOCITY_MOTORS * sizeof(bushd_mcu_velocity_settings))
 void bushd_mcu_nvm_restored(bushd_mcu* mcu);
 

@@ -49,7 +49,7 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
     case EMISSION:
       return piece_of(&mcu->emission.settings, sizeof mcu->emission.settings);
     case LOCAL:
-      return piece_of(&mcu->local.motors, sizeof mcu->local.motors);
+      return piece_of(&mcu->local.settings, sizeof mcu->local.settings);
     case TABLES:
       return piece_of(mcu->tables.slot, sizeof mcu->tables.slot);
     case VALID_TABLES:

@@ -56,7 +56,7 @@ void bushd_mcu_forget_velocities(bushd_mcu* mcu) {
   }
 }
 
-void bushd_mcu_steer(bushd_mcu* mcu, uint8_t m, int8_t direction) {
+void bushd_mcu_steer(bushd_mcu* mcu, uint8_t m, int8_t direction, int32_t most) {
   bushd_mcu_velocity* its = &mcu->config.velocity[m];
   bushd_mcu_motor* motor = &mcu->motor[m];
   if (motor->mode != BUSHD_MCU_VELOCITY) {
@@ -67,7 +67,8 @@ void bushd_mcu_steer(bushd_mcu* mcu, uint8_t m, int8_t direction) {
     mcu->autonomous |= motor_bit(m);
     mcu->stream.queue_summary.stale = true;
   }
-  its->loop.wanted = direction > 0 ? its->settings.most : -its->settings.most;
+  const int32_t speed = its->settings.most < most ? its->settings.most : most;
+  its->loop.wanted = direction > 0 ? speed : -speed;
 }
 
 void bushd_mcu_brake(bushd_mcu* mcu, uint8_t m) {

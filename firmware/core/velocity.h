@@ -42,8 +42,9 @@ bool bushd_mcu_has_velocity(const bushd_mcu* mcu, uint8_t m);
 uint16_t bushd_mcu_moved_by_velocity(const bushd_mcu* mcu);
 
 // Precondition of these: the motor has settings. It is to move in this direction (+1, -1) as fast
-// as they allow: from rest, or if it moves by the loop already, by way of zero if need be.
-void bushd_mcu_steer(bushd_mcu* mcu, uint8_t m, int8_t direction);
+// as they allow, and as `most`, in 1/64 step/s, does: from rest, or if it moves by the loop
+// already, by way of zero if need be.
+void bushd_mcu_steer(bushd_mcu* mcu, uint8_t m, int8_t direction, int32_t most);
 // Of one that moves by the loop: down to rest.
 void bushd_mcu_brake(bushd_mcu* mcu, uint8_t m);
 // Where it goes: +1, -1; 0 if it only comes to rest.

@@ -25,7 +25,8 @@ Result<void> check_board_motor(const TomlReader& reader, const std::string& boar
                                                    "\"{}\"",
                                                    output, board)));
   }
-  for (const char* const key : {"inputs", "limit", "input_active", "home", "local", "velocity"}) {
+  for (const char* const key :
+       {"inputs", "limit", "input_active", "home", "local", "keypad", "velocity"}) {
     if (!reader.has(key)) continue;
     return fail(reader.error(
         key, fmt::format("is for motors of MCUs; the board \"{}\" has limit switches of its own "

@@ -59,9 +59,9 @@ Result<void> check_step_period(const Loading& loading, std::size_t index) {
 Result<void> check_idle(const Loading& loading, std::size_t index) {
   const Motor& motor = loading.config.motors[index];
   const Mcu& mcu = loading.config.mcu_of(motor);
-  if (!motor.local || !mcu.idle_disable_s) return {};
+  if (!motor.drive.moved_by_people() || !mcu.idle_disable_s) return {};
   return fail(loading.motors[index].error(
-      "local",
+      motor.drive.local ? "local" : "keypad",
       fmt::format("is true, but MCU \"{}\" has idle_disable_s: its inputs would not move the "
                   "motor once its drivers are disabled; leave out one of the two",
                   mcu.id)));

@@ -106,6 +106,8 @@ struct Mcu {
   EnableAfterReset enable_after_reset = EnableAfterReset::kReady;
   std::optional<double> idle_disable_s = {};  // drivers are disabled after so long a rest
   std::uint32_t enable_settle_ms = 0;         // from enabling them to the first step
+  std::uint32_t keypad_ms = 500;  // that a key of its keypad counts; 0: until the next one
+  bool stand_in = false;          // for a bus that has no MCUs
 };
 
 struct Group {
@@ -135,7 +137,6 @@ struct Motor {
   MotorInputs inputs = {};
   bushd_stop_mode limit_action = BUSHD_STOP_RAMP;
   std::optional<Home> home = {};
-  bool local = false;             // its MCU's FORWARD and REVERSE inputs move it
   bool restored_refused = false;  // it may not move while its position is only restored
   std::string description{};
   units::Coordinates coordinates{};
@@ -144,7 +145,8 @@ struct Motor {
   double backlash = 0;                        // user units; its sign is that of the last approach
   std::optional<double> backlash_speed = {};  // of that, user units/s, above 0
   std::int64_t settle_ms = 0;                 // from the last step to the result
-  Drive drive{};               // currents with phases only, velocity with `local` only
+  Drive drive{};
+  bool has_one_input = false;  // that with the number of its output, which no other motor names
   bool never_disable = false;  // its MCU's drivers stay enabled at rest
 };
 

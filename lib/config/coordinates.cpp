@@ -123,11 +123,12 @@ Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {
   if (!(*speed > 0)) {
     return fail(reader.error(kKey, fmt::format("is {}; allowed: a number above 0", *speed)));
   }
-  if (motor.local) {
-    return fail(reader.error(kKey,
-                             "does not hold for local motion, which the MCU makes by the "
-                             "table alone; leave out `local`, or give the group a slower "
-                             "table"));
+  if (motor.drive.moved_by_people()) {
+    return fail(
+        reader.error(kKey,
+                     "does not hold for local motion, which the MCU makes by the "
+                     "table alone; leave out `local` and `keypad`, or give the group a slower "
+                     "table"));
   }
   return speed;
 }

@@ -27,8 +27,13 @@ struct Velocity {
 };
 
 struct Drive {
-  std::optional<Currents> currents = {};
-  std::optional<Velocity> velocity = {};
+  std::optional<Currents> currents = {};  // with phases only
+  std::optional<Velocity> velocity = {};  // counts where people move it
+  bool local = false;                     // the MCU's FORWARD and REVERSE inputs move it
+  bool keypad = false;                    // the keypad at the MCU moves it
+  bool input_open = false;                // its one input is active when open
+
+  bool moved_by_people() const { return local || keypad; }
 
   friend bool operator==(const Drive&, const Drive&) = default;
 };

@@ -32,7 +32,8 @@ tl::unexpected<Error> cannot(const std::string& motor, SettingKey key, const std
 
 // What a value is in TOML.
 std::string toml_text(SettingKey key, const std::string& value) {
-  return key == SettingKey::kDirection ? "\"" + value + "\"" : value;
+  const bool is_word = key == SettingKey::kDirection || key == SettingKey::kInputActive;
+  return is_word ? "\"" + value + "\"" : value;
 }
 
 // Such a value has no key.

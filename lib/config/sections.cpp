@@ -204,6 +204,8 @@ Result<void> read_idle(const TomlReader& reader, Mcu* mcu) {
   return {};
 }
 
+constexpr std::int64_t kMostKeypadMs = 10'000;  // some 50000 of the shortest ticks
+
 Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
   Taken ids;
   for (const TomlReader& reader : readers) {
@@ -211,7 +213,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
             reader.only({"bus", "address", "emission", "step_us", "settle_us", "dir_setup_us",
                          "pulse_us", "phase_sequence", "hold_current", "emergency_input",
                          "emergency_active", "debounce_ticks", "overcurrent", "enable_after_reset",
-                         "idle_disable_s", "enable_settle_ms"});
+                         "idle_disable_s", "enable_settle_ms", "keypad_ms"});
         !known) {
       return known;
     }
@@ -237,6 +239,11 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     if (auto taken = ids.take(reader, "address", mcu.id, what); !taken) return taken;
     if (auto read = read_inputs(reader, &mcu); !read) return read;
     if (auto read = read_idle(reader, &mcu); !read) return read;
+    if (reader.has("keypad_ms")) {
+      const auto ms = reader.integer("keypad_ms", 0, kMostKeypadMs, "ms");
+      if (!ms) return fail(ms.error());
+      mcu.keypad_ms = static_cast<std::uint32_t>(*ms);
+    }
     config->mcus.push_back(std::move(mcu));
   }
   return {};
@@ -254,7 +261,8 @@ Result<void> add_stand_ins(const std::vector<TomlReader>& readers, Config* confi
   }
   for (std::size_t i = 0; i < config->buses.size(); ++i) {
     if (config->buses[i].kind == BusKind::kRs485) continue;
-    config->mcus.push_back({.bus = {i}, .address = {1}, .id = config->buses[i].name});
+    config->mcus.push_back(
+        {.bus = {i}, .address = {1}, .id = config->buses[i].name, .stand_in = true});
   }
   return {};
 }
@@ -300,11 +308,25 @@ Result<void> read_motion_of_its_own(const TomlReader& reader, Motor* motor) {
     if (!never) return fail(never.error());
     motor->never_disable = *never;
   }
-  if (!reader.has("local")) return {};
-  const auto local = reader.boolean("local");
-  if (!local) return fail(local.error());
-  motor->local = *local;
+  for (const auto& [key, at] :
+       {std::pair{"local", &motor->drive.local}, std::pair{"keypad", &motor->drive.keypad}}) {
+    if (!reader.has(key)) continue;
+    const auto value = reader.boolean(key);
+    if (!value) return fail(value.error());
+    *at = *value;
+  }
   return {};
+}
+
+bool another_names_its_input(const Config& config, const Motor& motor) {
+  return std::ranges::any_of(config.motors, [&motor](const Motor& other) {
+    if (&other == &motor || other.mcu != motor.mcu) return false;
+    const MotorInputs& its = other.inputs;
+    return std::ranges::any_of(std::array{its.positive, its.negative, its.home, its.step},
+                               [&motor](const std::optional<Input>& input) {
+                                 return input && input->number == motor.inputs.own->number;
+                               });
+  });
 }
 
 Result<void> read_motors(Loading* loading) {
@@ -325,7 +347,7 @@ Result<void> read_motors(Loading* loading) {
                                   "max_speed",    "never_disable",
                                   "backlash",     "backlash_speed",
                                   "settle_ms",    "currents",
-                                  "velocity"});
+                                  "velocity",     "keypad"});
         !known) {
       return known;
     }
@@ -377,7 +399,13 @@ Result<void> read_motors(Loading* loading) {
     motor.drive.velocity = *velocity;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
     if (auto checked = check_then(reader, motor); !checked) return checked;
+    const bool has_mcu = !config.mcus[mcu->value].stand_in;
+    motor.has_one_input = has_mcu && motor.inputs.own && !reader.has("inputs");
+    motor.drive.input_open = motor.has_one_input && motor.inputs.own->active_open;
     config.motors.push_back(std::move(motor));
+  }
+  for (Motor& motor : config.motors) {
+    motor.has_one_input = motor.has_one_input && !another_names_its_input(config, motor);
   }
   return {};
 }

@@ -93,7 +93,7 @@ Result<void> read_serial_pulse(const TomlReader& reader, Bus* bus) {
 
 Result<void> take_serial_pulse(const TomlReader& reader, const Bus& bus, Motor* motor) {
   for (const std::string_view key :
-       {"output", "inputs", "limit", "input_active", "local", "velocity"}) {
+       {"output", "inputs", "limit", "input_active", "local", "keypad", "velocity"}) {
     if (!reader.has(key)) continue;
     return fail(reader.error(
         key, fmt::format("does not apply to the motor of bus \"{}\", a serial port with one motor; "

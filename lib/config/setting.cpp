@@ -20,9 +20,15 @@ constexpr std::string_view kNone = "none";
 
 // In the order of the enumeration.
 constexpr std::array<std::string_view, kSettingKeys.size()> kKeyNames = {
-    "offset", "direction", "soft_limits", "velocity", "currents"};
+    "offset", "direction", "soft_limits", "input_active",
+    "local",  "keypad",    "velocity",    "currents"};
 constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
-    "a number of user units", "negative, positive", "[LOWEST, HIGHEST] dial position, or none",
+    "a number of user units",
+    "negative, positive",
+    "[LOWEST, HIGHEST] dial position, or none",
+    "closed, open",
+    "true, false",
+    "true, false",
     "MIN,MAX,ACCELERATION, whole numbers of 1..40000 steps/s, MIN to 40000 steps/s and 1..8388607 "
     "steps/s^2, or none",
     "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or none"};
@@ -168,10 +174,40 @@ std::string text_of(const std::optional<Currents>& currents) {
                      currents->hold_ma, kCurrentsNames[3], currents->fast_decay ? "fast" : "slow");
 }
 
+Result<Settings> with_input_level(Settings settings, std::string_view text) {
+  const std::string_view word = trimmed(text);
+  if (word != "closed" && word != "open") return refuse(SettingKey::kInputActive, text);
+  settings.drive.input_open = word == "open";
+  return settings;
+}
+
+// People at an MCU move it, or no longer do.
+Result<Settings> with_people(Settings settings, SettingKey key, std::string_view text) {
+  const std::string_view word = trimmed(text);
+  if (word != "true" && word != "false") return refuse(key, text);
+  if (word == "true" && settings.max_speed) {
+    return refuse(key, text,
+                  "max_speed does not hold for local motion, which the MCU makes by the table "
+                  "alone; leave that out in bushd.toml first");
+  }
+  if (word == "true" && settings.idle_disabled) {
+    return refuse(key, text,
+                  "its MCU has idle_disable_s, and people could not enable the drivers; leave that "
+                  "out in bushd.toml first");
+  }
+  (key == SettingKey::kLocal ? settings.drive.local : settings.drive.keypad) = word == "true";
+  return settings;
+}
+
 std::string_view why_not(SettingKey key) {
   switch (key) {
     case SettingKey::kVelocity:
-      return "no local inputs move it; give it `local = true` in bushd.toml first";
+      return "no local inputs move it; set local=true or keypad=true first";
+    case SettingKey::kInputActive:
+      return "it has not just one input for itself; change `inputs` in bushd.toml";
+    case SettingKey::kLocal:
+    case SettingKey::kKeypad:
+      return "its bus has no MCUs, where people could move it";
     case SettingKey::kCurrents:
       return "its MCU does not drive it by phases; give that `emission = \"phases\"` in bushd.toml "
              "first";
@@ -188,7 +224,10 @@ Settings settings_of(const Motor& motor, const Mcu& mcu) {
           .soft_limits = motor.soft_limits,
           .drive = motor.drive,
           .phases = mcu.emission.settings.mode == BUSHD_EMISSION_PHASES,
-          .local = motor.local};
+          .has_mcu = !mcu.stand_in,
+          .max_speed = motor.max_speed.has_value(),
+          .idle_disabled = mcu.idle_disable_s.has_value(),
+          .has_one_input = motor.has_one_input};
 }
 
 std::string_view name_of(SettingKey key) {
@@ -206,13 +245,25 @@ bool applies(const Settings& settings, SettingKey key) {
   switch (key) {
     case SettingKey::kSoftLimits:
       return true;
+    case SettingKey::kInputActive:
+      return settings.has_one_input;
+    case SettingKey::kLocal:
+    case SettingKey::kKeypad:
+      return settings.has_mcu;
     case SettingKey::kVelocity:
-      return settings.local;
+      return settings.drive.moved_by_people();
     case SettingKey::kCurrents:
       return settings.phases;
     default:
       return settings.coordinates.has_unit();
   }
+}
+
+bool is_told(const Settings& settings, SettingKey key) {
+  if (key == SettingKey::kInputActive) return settings.drive.input_open;
+  if (key == SettingKey::kLocal) return settings.drive.local;
+  if (key == SettingKey::kKeypad) return settings.drive.keypad;
+  return applies(settings, key);
 }
 
 std::string text_of(const Settings& settings, SettingKey key) {
@@ -222,6 +273,12 @@ std::string text_of(const Settings& settings, SettingKey key) {
       return fmt::format("{}", scale.offset == 0 ? 0.0 : scale.offset);
     case SettingKey::kDirection:
       return scale.negative ? "negative" : "positive";
+    case SettingKey::kInputActive:
+      return settings.drive.input_open ? "open" : "closed";
+    case SettingKey::kLocal:
+      return settings.drive.local ? "true" : "false";
+    case SettingKey::kKeypad:
+      return settings.drive.keypad ? "true" : "false";
     case SettingKey::kVelocity:
       return text_of(settings.drive.velocity);
     case SettingKey::kCurrents:
@@ -236,6 +293,10 @@ std::string text_of(const Settings& settings, SettingKey key) {
 Result<Settings> with(Settings settings, SettingKey key, std::string_view text) {
   if (!applies(settings, key)) return fail(fmt::format("{}: {}", name_of(key), why_not(key)));
   if (key == SettingKey::kSoftLimits) return with_soft_limits(std::move(settings), text);
+  if (key == SettingKey::kInputActive) return with_input_level(std::move(settings), text);
+  if (key == SettingKey::kLocal || key == SettingKey::kKeypad) {
+    return with_people(std::move(settings), key, text);
+  }
   if (key == SettingKey::kVelocity) return with_velocity(std::move(settings), text);
   if (key == SettingKey::kCurrents) return with_currents(std::move(settings), text);
   units::Scale scale = settings.coordinates.scale();

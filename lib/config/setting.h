@@ -13,10 +13,20 @@
 
 namespace bushd::config {
 
-enum class SettingKey { kOffset, kDirection, kSoftLimits, kVelocity, kCurrents };
-inline constexpr std::array kSettingKeys = {SettingKey::kOffset, SettingKey::kDirection,
-                                            SettingKey::kSoftLimits, SettingKey::kVelocity,
-                                            SettingKey::kCurrents};
+enum class SettingKey {
+  kOffset,
+  kDirection,
+  kSoftLimits,
+  kInputActive,
+  kLocal,
+  kKeypad,
+  kVelocity,
+  kCurrents
+};
+// In the order in which they may be taken: a velocity is of a motor that people move.
+inline constexpr std::array kSettingKeys = {
+    SettingKey::kOffset, SettingKey::kDirection, SettingKey::kSoftLimits, SettingKey::kInputActive,
+    SettingKey::kLocal,  SettingKey::kKeypad,    SettingKey::kVelocity,   SettingKey::kCurrents};
 
 std::string_view name_of(SettingKey key);  // as in bushd.toml
 std::optional<SettingKey> setting_key_of(std::string_view name);
@@ -26,19 +36,25 @@ struct Settings {
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits = {};
   Drive drive{};
-  bool phases = false;  // its MCU drives it by phases: it may have currents
-  bool local = false;   // it may have a velocity
+  bool phases = false;     // its MCU drives it by phases: it may have currents
+  bool has_mcu = false;    // people may move it there
+  bool max_speed = false;  // it has one, which people could not be held to
+  // Its drivers are disabled at rest, and people cannot enable them.
+  bool idle_disabled = false;
+  bool has_one_input = false;  // whose level may be changed
 };
 struct Motor;
 struct Mcu;
 Settings settings_of(const Motor& motor, const Mcu& mcu);  // as bushd.toml has them
 
-// A motor without a unit has soft limits only. Velocity is of one with `local`, currents are of one
-// that is driven by phases.
+// A motor without a unit has neither offset nor direction. Velocity is of one that people move,
+// currents are of one that is driven by phases.
 bool applies(const Settings& settings, SettingKey key);
+// Whether it is worth to be told: not that people do not move a motor, or that its input is closed.
+bool is_told(const Settings& settings, SettingKey key);
 
-// "12.5"; "negative"; "[-5, 30]" or "none"; velocity and currents as an inline table of TOML, or
-// "none". The same value has one text.
+// "12.5"; "negative"; "[-5, 30]" or "none"; "true" or "false"; velocity and currents as an inline
+// table of TOML, or "none". The same value has one text.
 std::string text_of(const Settings& settings, SettingKey key);
 
 // With another value. Beside the texts above, soft limits may come without brackets and blanks:

@@ -11,9 +11,10 @@ Result<std::optional<Velocity>> read_velocity(const tables::TomlReader& reader,
                                               const Motor& motor) {
   constexpr std::string_view kKey = "velocity";
   if (!reader.has(kKey)) return std::nullopt;
-  if (!motor.local) {
-    return fail(
-        reader.error(kKey, "is how local inputs move a motor; allowed: only with `local = true`"));
+  if (!motor.drive.moved_by_people()) {
+    return fail(reader.error(kKey,
+                             "is how local inputs move a motor; allowed: only with `local = true` "
+                             "or `keypad = true`"));
   }
   auto section = reader.section(
       kKey,

@@ -9,7 +9,7 @@
 
 namespace bushd::config {
 
-// Nothing without the key. `motor` has been given `local`.
+// Nothing without the key. `motor` has been given `local` and `keypad`.
 Result<std::optional<Velocity>> read_velocity(const tables::TomlReader& reader, const Motor& motor);
 
 }  // namespace bushd::config

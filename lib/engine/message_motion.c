@@ -369,13 +369,18 @@ bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* 
 }
 
 size_t bushd_encode_local(const bushd_local* message, uint8_t* payload) {
-  bushd_put_u16(payload, message->motors);
-  return 2;
+  writer w = {payload};
+  put16(&w, message->motors);
+  put16(&w, message->keypad);
+  put16(&w, message->keypad_ticks);
+  return (size_t)(w.at - payload);
 }
 
 bushd_status bushd_decode_local(const uint8_t* payload, size_t size, bushd_local* message) {
   reader r = read_from(payload, size);
   message->motors = get16(&r);
+  message->keypad = get16(&r);
+  message->keypad_ticks = get16(&r);
   return finish(&r, true);
 }
 

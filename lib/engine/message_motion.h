@@ -45,10 +45,13 @@ typedef enum bushd_homing {
   BUSHD_HOMING_LIMIT = 10      // by a limit that is not the switch, in a slow stage
 } bushd_homing;
 
-// Motors that the MCU's FORWARD and REVERSE inputs move, by their tables, while one of them is
-// active.
+// Motors that people move at the MCU, by their tables: while its FORWARD or REVERSE input is
+// active, or by its keypad. A key counts for `keypad_ticks` after it was heard last; 0: until the
+// next one.
 typedef struct bushd_local {
   uint16_t motors;
+  uint16_t keypad;
+  uint16_t keypad_ticks;
 } bushd_local;
 
 // Asks `count` MCUs for reports, each in a reply slot of its own: entry i (bushd_poll_entry) names

@@ -46,6 +46,7 @@ enum {
 // Beyond an int of 16 bits.
 #define BUSHD_CAN_CURRENTS UINT32_C(0x8000)
 #define BUSHD_CAN_VELOCITY UINT32_C(0x10000)
+#define BUSHD_CAN_KEYPAD UINT32_C(0x20000)
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
 // which one it is.

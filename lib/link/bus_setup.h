@@ -31,11 +31,11 @@ struct McuSetup {
   std::vector<bushd_motor_inputs> motor_inputs{};
   // Of all motors that are driven by phases: those without current control have zeros.
   std::vector<bushd_currents> currents{};
-  // Of all motors that its local inputs move: those that do so by their table have zeros.
+  // Of all motors that people move at it: those that do so by their table have zeros.
   std::vector<bushd_set_velocity> velocities{};
   std::uint16_t used_inputs = 0;
   bool off_after_watchdog = false;  // then drivers stay off until control() enables them
-  std::uint16_t local_motors = 0;   // that its FORWARD and REVERSE inputs move
+  bushd_local local{};              // motors that people move at it
 };
 
 struct BusSetup {

@@ -231,7 +231,7 @@ void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
     if (const auto slot = record.setup.table_of_motor[m]) queue.assign(m, *slot);
   }
   if (record.view.identity.capabilities & BUSHD_CAN_LOCAL) {
-    queue.local({record.setup.local_motors});
+    queue.local(record.setup.local);
   }
   queue.control(first_actions(mcu, may_clear));
 }

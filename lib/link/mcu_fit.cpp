@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <string>
 
 #include "engine/velocity.h"
 #include "fieldbus/line_times.h"
@@ -65,6 +67,13 @@ Result<void> check_velocities(const McuSetup& setup, const bushd_identity& ident
   return {};
 }
 
+Result<void> check_keypad(const McuSetup& setup, const bushd_identity& identity) {
+  if (setup.local.keypad == 0 || (identity.capabilities & BUSHD_CAN_KEYPAD) != 0) return {};
+  return fail("has no line for a keypad, but motor " +
+              std::to_string(std::countr_zero(setup.local.keypad)) +
+              " has `keypad`: leave it out, or connect the keypad to the PC as a [[keypad]]");
+}
+
 // An MCU has as many inputs as motors.
 Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity) {
   for (unsigned n = identity.motors; n < BUSHD_MOTORS_PER_MCU; ++n) {
@@ -86,6 +95,7 @@ Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
                         std::uint32_t tick_ns) {
   if (auto currents = check_currents(setup, identity); !currents) return currents;
   if (auto velocities = check_velocities(setup, identity); !velocities) return velocities;
+  if (auto keypad = check_keypad(setup, identity); !keypad) return keypad;
   std::size_t codes = 0;
   for (const TableRef& ref : setup.tables) {
     codes += ref.table->accel.count;

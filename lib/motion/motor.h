@@ -239,6 +239,7 @@ class Motor {
     setup_.coordinates = std::move(coordinates);
   }
   void set_soft_limits(std::optional<units::SoftLimits> limits) { setup_.soft_limits = limits; }
+  void set_local(bool local) { setup_.local = local; }
   // Error: how far it is from where it may be.
   Result<void> stands_within_soft_limits() const;
   void position_is_known();

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "firmware/core/port.h"
 #include "sim/edge.h"
@@ -34,6 +35,14 @@ class Mcu {
   // What its pins say from now on, as in port.h.
   virtual void set_inputs(bushd_inputs inputs) = 0;
   virtual void set_current(std::uint16_t reading) = 0;  // 0..BUSHD_MAX_CURRENT
+
+  // A byte of a keypad at a line of its own has ended at now_ns; and what has gone back since the
+  // last call. An MCU without such a line takes no notice.
+  virtual void keypad_byte(std::uint8_t byte, TimeNs now_ns) {
+    (void)byte;
+    (void)now_ns;
+  }
+  virtual std::string take_keypad_display() { return {}; }
 
   // When it next does something by itself.
   virtual TimeNs next_event_ns() const = 0;

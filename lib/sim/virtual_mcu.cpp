@@ -21,6 +21,7 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
   config.mcu.disabled_capabilities = options.disabled_capabilities;
   config.mcu.current_motors = options.current_motors;
   config.mcu.velocity_motors = options.velocity_motors;
+  config.mcu.keypad = options.keypad;
   const std::uint64_t unique_id = options.unique_id != 0 ? options.unique_id : index + 1;
   for (std::size_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {
     config.mcu.unique_id[i] = static_cast<std::uint8_t>(unique_id >> 8 * i);
@@ -67,6 +68,15 @@ bushd_inputs VirtualMcu::on_read_inputs(void* context, std::int64_t time_ns) {
     inputs.motors = static_cast<std::uint16_t>(active ? inputs.motors | bit : inputs.motors & ~bit);
   }
   return inputs;
+}
+
+std::string VirtualMcu::take_keypad_display() {
+  std::string text;
+  for (int next = bushd_virtual_keypad_display(&port_); next >= 0;
+       next = bushd_virtual_keypad_display(&port_)) {
+    text += static_cast<char>(next);
+  }
+  return text;
 }
 
 void VirtualMcu::on_transmit(void* context, std::int64_t start_ns, const std::uint8_t* wire,

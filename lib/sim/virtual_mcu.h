@@ -25,6 +25,7 @@ struct McuOptions {
   std::uint16_t disabled_capabilities = 0;  // BUSHD_CAN_* that it does as if it were too slow for
   std::uint8_t current_motors = BUSHD_MAX_CURRENT_MOTORS;    // whose windings' currents it controls
   std::uint8_t velocity_motors = BUSHD_MAX_VELOCITY_MOTORS;  // that may move by the velocity loop
+  bool keypad = true;                                        // it has a line for one
   TimeNs boot_ns =
       0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
   std::int32_t clock_ppm = 0;  // > 0: its clock is fast
@@ -67,6 +68,12 @@ class VirtualMcu final : public Mcu {
   void receive(std::uint8_t byte, TimeNs now_ns) override {
     bushd_virtual_receive(&port_, byte, now_ns);
   }
+  void keypad_byte(std::uint8_t byte, TimeNs now_ns) override {
+    bushd_virtual_keypad_byte(&port_, byte, now_ns);
+  }
+  void keypad_break(TimeNs now_ns) { bushd_virtual_keypad_break(&port_, now_ns); }
+  // At once, without the time of a line.
+  std::string take_keypad_display() override;
   void reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t boot_number) override {
     bushd_virtual_reset(&port_, now_ns, boot_ns, boot_number);
   }

@@ -37,7 +37,8 @@ constexpr AvrChip kAtmega2560{.name = "atmega2560",
                               .forward = {'D', 2},
                               .reverse = {'D', 3},
                               .spi_data = 0,
-                              .dir_latch = {}};
+                              .dir_latch = {},
+                              .keypad_uart = '2'};
 
 constexpr AvrChip kAtmega1284p{
     .name = "atmega1284p",
@@ -57,7 +58,8 @@ constexpr AvrChip kAtmega1284p{
     .forward = {'B', 3},
     .reverse = {'B', 6},
     .spi_data = 0x4E,
-    .dir_latch = {'B', 4}};
+    .dir_latch = {'B', 4},
+    .keypad_uart = 0};
 
 }  // namespace
 

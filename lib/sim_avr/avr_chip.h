@@ -35,6 +35,7 @@ struct AvrChip {
   // ports.
   std::uint16_t spi_data;
   AvrPin dir_latch;
+  char keypad_uart;  // 0: none
 };
 
 // Throws std::runtime_error for another one than "atmega2560" and "atmega1284p".

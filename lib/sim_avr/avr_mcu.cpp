@@ -29,6 +29,7 @@ constexpr std::uint32_t kFrequency = 16'000'000;
 constexpr std::uint8_t kPaint = 0xC5;  // firmware/ports/atmega2560/boot_tests.h
 // Behind the one that simavr holds: the chip's buffer has two, its shift register one more.
 constexpr std::size_t kHardwareFifo = 2;
+constexpr std::size_t kMostDisplay = 256;
 // In the address space of data.
 constexpr std::size_t kMcusr = 0x54;
 constexpr std::size_t kEecr = 0x3F;
@@ -147,6 +148,17 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   }
   avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER), on_adc,
                           this);
+
+  if (chip_.keypad_uart != 0) {
+    keypad_ = std::make_unique<AvrUartLine>(
+        avr_, chip_.keypad_uart, [this](std::uint64_t cycle, std::uint8_t byte) {
+          if (on_keypad_display) {
+            on_keypad_display(cycle_0_ns_ + static_cast<TimeNs>(cycle) * 125 / 2, byte);
+          } else if (display_.size() < kMostDisplay) {
+            display_ += static_cast<char>(byte);
+          }
+        });
+  }
 
   reset_hook_ = std::make_unique<ResetHook>();
   reset_hook_->io.kind = "board";
@@ -295,6 +307,7 @@ void AvrMcu::on_reset(avr_io_t* io) {
 void AvrMcu::drop_outputs() {
   driver_enable_ = false;
   received_.clear();
+  if (keypad_) keypad_->reset();
   for (std::size_t i = 0; i < pin_count_; ++i) {
     Pin& pin = pins_[i];
     set_pin(pin, false);
@@ -335,6 +348,7 @@ void AvrMcu::advance(TimeNs now_ns) {
       byte_cycles_ = uart_->cycles_per_byte = uart_->cycles_per_byte * 10 / 11;
     }
     feed();
+    if (keypad_) keypad_->step();
     auto left = static_cast<avr_cycle_count_t>((now_ns - time_ns()) * 2 / 125 + 1);
     if (stuck_) {
       left = 1;
@@ -363,6 +377,16 @@ void AvrMcu::receive(std::uint8_t byte, TimeNs now_ns) {
   }
   received_.push_back(byte);
   feed();
+}
+
+void AvrMcu::keypad_byte(std::uint8_t byte, TimeNs now_ns) {
+  advance(now_ns);
+  if (keypad_) keypad_->receive(byte);
+}
+
+void AvrMcu::keypad_break(TimeNs now_ns) {
+  advance(now_ns);
+  keypad_->receive_break();
 }
 
 // simavr forgets the interrupt of a byte that waits behind another one: it gets one at a time.

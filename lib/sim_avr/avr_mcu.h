@@ -13,10 +13,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "sim/mcu.h"
 #include "sim/power_stage.h"
 #include "sim_avr/avr_chip.h"
+#include "sim_avr/avr_uart_line.h"
 #include "sim_avr/memory_watch.h"
 
 struct avr_t;
@@ -63,6 +65,13 @@ class AvrMcu final : public Mcu {
 
   // What the current sensor reads when a conversion begins; not set: what set_current said.
   std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
+
+  void keypad_byte(std::uint8_t byte, TimeNs now_ns) override;
+  // Likewise, but with a framing error. Precondition: the chip has such a line.
+  void keypad_break(TimeNs now_ns);
+  std::string take_keypad_display() override { return std::exchange(display_, {}); }
+  // If set, it gets what would be taken: when the stop bit ends, and the byte.
+  std::function<void(TimeNs end_ns, std::uint8_t byte)> on_keypad_display;
 
   // Precondition: it has one.
   const PowerStage& power_stage() const { return stage_->stage; }
@@ -132,6 +141,8 @@ class AvrMcu final : public Mcu {
   std::unique_ptr<ResetHook> reset_hook_;
   std::unique_ptr<AvrMemoryWatch> watch_;
   avr_uart_t* uart_ = nullptr;
+  std::unique_ptr<AvrUartLine> keypad_;  // if the chip has it
+  std::string display_;                  // sent to it and not taken; no more than some lines
   std::uint64_t byte_cycles_ = 0;
   std::deque<std::uint8_t> received_;  // that the image has not been given yet
   TimeNs cycle_0_ns_ = 0;

@@ -82,9 +82,18 @@ TEST(Config, MotorsMayHaveASwitchAndButtons) {
   EXPECT_EQ(motor.home->slow_steps_per_s, 50u);
   EXPECT_EQ(motor.home->slow_most_steps, 400u);
   EXPECT_TRUE(motor.home->at_start);
-  EXPECT_TRUE(motor.local);
+  EXPECT_TRUE(motor.drive.local);
+  EXPECT_FALSE(motor.drive.keypad);
   EXPECT_FALSE(config->motors[1].home);
-  EXPECT_FALSE(config->motors[1].local);
+  EXPECT_FALSE(config->motors[1].drive.local);
+  const auto keypad =
+      ConfigFile(replaced(replaced(kGood, "output = 0\n", "output = 0\nkeypad = true\n"),
+                          "address = 1\n", "address = 1\nkeypad_ms = 0\n"))
+          .load();
+  ASSERT_TRUE(keypad.has_value()) << keypad.error().text();
+  EXPECT_TRUE(keypad->motors[0].drive.keypad);
+  EXPECT_EQ(keypad->mcus[0].keypad_ms, 0u);
+  EXPECT_EQ(config->mcus[0].keypad_ms, 500u);
   const auto little =
       ConfigFile(replaced(kGood, "output = 0\n",
                           "output = 0\nhome = { direction = \"negative\", most_steps "

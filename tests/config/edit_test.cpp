@@ -45,6 +45,14 @@ TEST(Edit, AValueIsReplacedWhereItStands) {
          "soft_limits = [1, 2]# all\n");
 }
 
+TEST(Edit, WordsHaveQuotesAndTruthHasNone) {
+  expect("", {{"theta", SettingKey::kInputActive, "open"}}, "input_active = \"open\"\n");
+  expect("input_active = \"open\" # NC\n", {{"theta", SettingKey::kInputActive, "closed"}},
+         "input_active = \"closed\" # NC\n");
+  expect("local = true\n", {{"theta", SettingKey::kLocal, "false"}}, "local = false\n");
+  expect("", {{"theta", SettingKey::kKeypad, "true"}}, "keypad = true\n");
+}
+
 TEST(Edit, VelocityAndCurrentsAreInlineTables) {
   expect("local = true\nvelocity = { min_steps_per_s=1, max_steps_per_s=2, steps_per_s2=3 } # v\n",
          {{"theta", SettingKey::kVelocity, "100,1500,500"}},

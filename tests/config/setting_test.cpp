@@ -39,7 +39,7 @@ TEST(Setting, AValueHasOneText) {
 
 Settings unipolar() {
   Settings settings = blade();
-  settings.phases = settings.local = true;
+  settings.phases = settings.has_mcu = settings.drive.local = true;
   return settings;
 }
 
@@ -64,6 +64,47 @@ TEST(Setting, VelocityAndCurrentsHaveOneTextAndReadBack) {
     EXPECT_EQ(same(key, "none"), "none");
     EXPECT_FALSE(applies(blade(), key));
     EXPECT_FALSE(with(blade(), key, "none"));
+  }
+}
+
+TEST(Setting, TheLevelOfAnInputIsAWord) {
+  Settings settings = blade();
+  EXPECT_THAT(with(settings, SettingKey::kInputActive, "open").error().message,
+              HasSubstr("not just one input"));
+  settings.has_one_input = true;
+  EXPECT_EQ(text_of(settings, SettingKey::kInputActive), "closed");
+  EXPECT_FALSE(is_told(settings, SettingKey::kInputActive));
+  settings = with(settings, SettingKey::kInputActive, "open").value();
+  EXPECT_EQ(text_of(settings, SettingKey::kInputActive), "open");
+  EXPECT_TRUE(is_told(settings, SettingKey::kInputActive));
+  EXPECT_THAT(with(settings, SettingKey::kInputActive, "none").error().message,
+              HasSubstr("allowed: closed, open"));
+}
+
+TEST(Setting, PeopleMoveAMotorWhereItsMcuLetsThem) {
+  Settings settings = blade();
+  for (const SettingKey key : {SettingKey::kLocal, SettingKey::kKeypad}) {
+    EXPECT_THAT(with(settings, key, "true").error().message, HasSubstr("its bus has no MCUs"));
+  }
+  settings.has_mcu = true;
+  EXPECT_FALSE(is_told(settings, SettingKey::kLocal));
+  for (const SettingKey key : {SettingKey::kLocal, SettingKey::kKeypad}) {
+    EXPECT_EQ(text_of(settings, key), "false");
+    const Settings moved = with(settings, key, " true ").value();
+    EXPECT_EQ(text_of(moved, key), "true");
+    EXPECT_TRUE(is_told(moved, key));
+    EXPECT_TRUE(applies(moved, SettingKey::kVelocity));
+    EXPECT_EQ(text_of(with(moved, key, "false").value(), key), "false");
+    for (const char* text : {"", "1", "True", "none", "yes"}) {
+      EXPECT_THAT(with(settings, key, text).error().message, HasSubstr("allowed: true, false"));
+    }
+    Settings held = settings;
+    held.max_speed = true;
+    EXPECT_THAT(with(held, key, "true").error().message, HasSubstr("max_speed does not hold"));
+    EXPECT_TRUE(with(held, key, "false"));
+    Settings idle = settings;
+    idle.idle_disabled = true;
+    EXPECT_THAT(with(idle, key, "true").error().message, HasSubstr("idle_disable_s"));
   }
 }
 

@@ -131,7 +131,7 @@ TEST_P(HomingScript, WhereverItComesFromItIsTheSameToOneStep) {
 }
 
 TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor}));
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor, 0, 0}));
   for (const std::uint8_t button : {BUSHD_INPUT_FORWARD, BUSHD_INPUT_REVERSE}) {
     const std::size_t before = steps(1, kMotor).size();
     const std::int32_t from_steps = master_.poll(kReal).motor[kMotor].position_steps;
@@ -150,6 +150,54 @@ TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
     EXPECT_LT(steps(1, kMotor).size(), until_released + 30) << "it ramps down";
     expect_alike();
   }
+}
+
+class KeypadLine : public Autonomous {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(KeypadLine);
+INSTANTIATE_TEST_SUITE_P(Of, KeypadLine, testing::ValuesIn(targets_with(BUSHD_CAN_KEYPAD)),
+                         [](auto& target) { return target.param.name; });
+
+class DeniedKeypad : public Autonomous {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(DeniedKeypad);
+INSTANTIATE_TEST_SUITE_P(Of, DeniedKeypad, testing::ValuesIn(targets_without(BUSHD_CAN_KEYPAD)),
+                         [](auto& target) { return target.param.name; });
+
+TEST_P(DeniedKeypad, IsRefused) {
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_LOCAL, bushd_encode_local,
+                                   bushd_local{0, 1 << kMotor, 100}),
+              BUSHD_E_FORMAT);
+  }
+  expect_the_same_reports();
+}
+
+TEST_P(KeypadLine, MovesItsMotors) {
+  ASSERT_NO_FATAL_FAILURE(
+      ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{0, 1 << kMotor, 100}));
+  constexpr std::uint8_t kForward = 0x00;
+  constexpr std::uint8_t kReverse = 0xFF;
+  constexpr std::uint8_t kSlower = 0xFE;
+  constexpr std::uint8_t kStop = 0xFD;
+  const auto press = [this](std::uint8_t key, int ticks) {
+    to_inputs_time();
+    for (std::size_t i = 0; i < 2; ++i) bus_.node(i).keypad_byte(key, bus_.now_ns());
+    pass_ticks(ticks);
+  };
+  press(kForward, 60);
+  EXPECT_EQ(master_.poll(kReal).autonomous, 1 << kMotor);
+  press(kSlower, 20);
+  press(kForward, 40);
+  press(kReverse, 60);
+  press(kStop, 20);
+  EXPECT_EQ(master_.poll(kReal).moving, 0);
+  const std::size_t made = steps(1, kMotor).size();
+  EXPECT_GT(made, 100u) << "3 ms and 3.3 ms a step";
+  expect_alike();
+  // Not repeated: for 100 ticks, and its ramp.
+  press(kForward, 160);
+  EXPECT_EQ(master_.poll(kReal).moving, 0);
+  EXPECT_NEAR(static_cast<double>(steps(1, kMotor).size() - made), 100 * 2.56 / 3.3, 4);
+  expect_alike();
 }
 
 class VelocityLoop : public Autonomous {};
@@ -184,7 +232,7 @@ TEST_P(VelocityLoop, LocalInputsMoveAMotor) {
   constexpr std::uint8_t kFirst = 0;
   ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
                               bushd_set_velocity{kFirst, 200 * 64, 1500 * 64, 3000}));
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kFirst}));
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kFirst, 0, 0}));
   for (const std::uint8_t button : {BUSHD_INPUT_FORWARD, BUSHD_INPUT_REVERSE}) {
     to_inputs_time();
     set_inputs({0, button});

@@ -78,7 +78,7 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
 
 TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 3}), BUSHD_OK);
+  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 3, 0, 0}), BUSHD_OK);
   pass(real_->keeps_within_ns(kCodes));
   reboot();
   bus_.node(0).set_inputs({0, BUSHD_INPUT_REVERSE});
@@ -105,7 +105,7 @@ TEST_P(NvmVelocity, LocalInputsMoveAMotorAfterAResetWithoutAHost) {
   ASSERT_EQ(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
                 bushd_set_velocity{1, 200 * 64, 1000 * 64, 2000}),
             BUSHD_OK);
-  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 1}), BUSHD_OK);
+  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 1, 0, 0}), BUSHD_OK);
   pass(real_->keeps_within_ns(kCodes));
   reboot();
   bus_.node(0).set_inputs({0, BUSHD_INPUT_REVERSE});

@@ -77,7 +77,8 @@ class Atmega1284p final : public Avr {
             .code_count = 1536,
             .disabled_capabilities = disabled_capabilities(),
             .current_motors = 1,
-            .velocity_motors = 2};
+            .velocity_motors = 2,
+            .keypad = false};
   }
   std::uint16_t disabled_capabilities() const override {
     return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_COMMON_DIR;
@@ -93,7 +94,8 @@ class Lm3s6965 final : public McuUnderTest {
             .queue_ticks = 512,
             .code_count = 12288,
             .current_motors = 0,
-            .velocity_motors = 0};
+            .velocity_motors = 0,
+            .keypad = false};
   }
   std::uint16_t disabled_capabilities() const override { return 0; }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }
@@ -133,6 +135,7 @@ std::uint32_t denied(const McuUnderTest& mcu) {
   std::uint32_t capabilities = mcu.disabled_capabilities();
   if (mcu.twin().current_motors == 0) capabilities |= BUSHD_CAN_CURRENTS;
   if (mcu.twin().velocity_motors == 0) capabilities |= BUSHD_CAN_VELOCITY;
+  if (!mcu.twin().keypad) capabilities |= BUSHD_CAN_KEYPAD;
   return capabilities;
 }
 

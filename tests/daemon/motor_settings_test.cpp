@@ -8,6 +8,7 @@
 namespace bushd::test {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -171,6 +172,62 @@ TEST(MotorSettings, OfTheVelocityLoopAreToldToTheMcu) {
   EXPECT_GT(press(), 300) << "by its table";
 }
 
+TEST(MotorSettings, OfWhoMovesAMotorAreToldToTheMcu) {
+  SettingsLab lab;
+  EXPECT_EQ(lab.show("m01").size(), 3u) << "nobody needs to be told";
+  const auto press = [&lab] {
+    const std::int64_t before = lab.shaft_steps("m01");
+    hold_forward(lab, true);
+    lab.run_for(1);
+    hold_forward(lab, false);
+    lab.run_for(3);
+    EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+    return lab.shaft_steps("m01") - before;
+  };
+  EXPECT_EQ(press(), 0);
+  lab.expect_done("m01", "local", "true");
+  EXPECT_THAT(lab.show("m01"), Contains("m01 local = true, in the file false"));
+  EXPECT_GT(press(), 100);
+  lab.cut_pc_power();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 20));
+  EXPECT_GT(press(), 100) << "the state store has kept it";
+  lab.expect_done("m01", "local", "false");
+  EXPECT_EQ(press(), 0);
+  lab.expect_refused(lab.change("m01", "local", "yes"), "m01: local: is \"yes\"");
+
+  sim::VirtualMcu& mcu = lab.bus(0).mcu(0);
+  const auto key = [&](std::uint8_t byte, double seconds) {
+    const std::int64_t before = lab.shaft_steps("m01");
+    mcu.keypad_byte(byte, lab.now_us() * 1000);
+    lab.run_for(seconds);
+    return lab.shaft_steps("m01") - before;
+  };
+  EXPECT_EQ(key(0x00, 1), 0);
+  lab.expect_done("m01", "keypad", "true");
+  // For 500 ms, 3 ms a step, and its ramps.
+  EXPECT_NEAR(static_cast<double>(key(0x00, 2)), 166, 10);
+  EXPECT_EQ(lab.motor("m01").activity, api::Activity::kResting);
+  lab.restart(blade("offset = 10\nsoft_limits = [-5, 5.5]\n"));
+  EXPECT_NEAR(static_cast<double>(key(0xFF, 2)), -166, 10) << "the state store has kept it";
+  EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+}
+
+// A limit switch that opens was wired where one that closes was expected.
+TEST(MotorSettings, TheLevelOfAnInputCountsAtOnce) {
+  SettingsLab lab(blade("limit = \"positive\"\n"));
+  lab.bus(0).mcu(0).set_inputs({1, 0});
+  lab.run_for(0.2);
+  lab.expect_refused(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})), "limit");
+  lab.expect_done("m01", "input_active", "open");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  lab.bus(0).mcu(0).set_inputs({0, 0});
+  lab.run_for(0.2);
+  lab.expect_refused(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})), "limit");
+  lab.restart(blade("limit = \"positive\"\n"));
+  lab.expect_refused(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})), "limit");
+  EXPECT_THAT(lab.show("m01"), Contains("m01 input_active = open, in the file closed"));
+}
+
 TEST(MotorSettings, OfTheMcuAreRefusedWhereTheyDoNotApplyOrAnotherMotorMoves) {
   SettingsLab lab(blade("local = true\n"));
   lab.expect_refused(lab.change("m02", "velocity", "100,1500,500"),
@@ -180,7 +237,7 @@ TEST(MotorSettings, OfTheMcuAreRefusedWhereTheyDoNotApplyOrAnotherMotorMoves) {
   const auto move = lab.send(Ask::kMoveBy, {"m02"}, {1000});
   lab.run_for(0.3);
   lab.expect_refused(lab.change("m01", "velocity", "100,1500,500"),
-                     "a motor of MCU hall:1 moves; its velocities and currents can be changed when "
+                     "a motor of MCU hall:1 moves; what it does by itself can be changed when "
                      "all of them are at rest");
   lab.expect_done("m01", "soft_limits", "[-5, 500]");
   EXPECT_EQ(lab.wait(move).result, "reached");

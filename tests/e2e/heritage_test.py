@@ -118,6 +118,45 @@ class Heritage(EndToEndTest):
         self.wait_until("theta to rest", lambda: self.motors()["theta"]["activity"] == "rest")
         self.assertTrue(self.programs[1].lives())
 
+    def test_panel_at_an_mcu(self):
+        files, commands = sections()["Keypads"]
+        self.write_files(files)
+        simulate, serve, status = commands[3:]
+        line, log = self.shell(f"exec {simulate}", "panel.log")
+        with log.open("wb") as shown:
+            panel = subprocess.Popen(line, stdin=subprocess.PIPE, stdout=shown, stderr=shown)
+        self.addCleanup(panel.kill)
+        self.wait_until("bushsim", lambda: "bushsim: ready" in log.read_text())
+        self.programs.append(Running(*self.shell(f"exec {serve[:-2]}", "bushd.log")))
+        self.wait_for_start(serve, self.programs[-1])
+
+        def press(key):
+            panel.stdin.write(key.encode())
+            panel.stdin.flush()
+
+        def rests():
+            return self.motors()["theta"]["activity"] == "rest"
+
+        press("F")
+        self.wait_until("theta to move", lambda: self.position("theta") > 300)
+        self.assertEqual(self.motors()["theta"]["activity"], "local")
+        shown = subprocess.run(self.shell(status, "")[0], capture_output=True, text=True, check=True, env=self.environment)
+        self.assertRegex(shown.stdout, r"theta .* local")
+        press("X")
+        self.wait_until("theta to rest", rests)
+        press("sr")
+        self.wait_until("theta to come back", lambda: self.position("theta") < 0)
+        press("x")
+        self.wait_until("theta to rest", rests)
+        self.assertEqual(re.findall(r"^[-0-9]{4}$", log.read_text(), re.MULTILINE), ["0330", "0330"])
+        # Nobody types any more.
+        press("F")
+        self.wait_until("theta to move", lambda: not rests())
+        panel.stdin.close()
+        self.wait_until("theta to rest", rests)
+        panel.terminate()
+        self.assertEqual(panel.wait(60), 0)
+
     def test_one_unipolar_motor_with_chopper(self):
         image = pathlib.Path(os.environ.get("ATMEGA1284P_IMAGE", ""))
         if not image.is_file():

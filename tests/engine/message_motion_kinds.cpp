@@ -286,7 +286,7 @@ Kinds motion_kinds() {
          {"too short a wait", set32(14, 49)},
          {"too long a wait", set32(14, 1'650'001)}}}},
       {"local",
-       {[] { return random_bytes(2); }, codec(bushd_decode_local, bushd_encode_local), {}}},
+       {[] { return random_bytes(6); }, codec(bushd_decode_local, bushd_encode_local), {}}},
       {"poll", {any_poll, poll_again, {}}},
       {"sync",
        {bytes_with(19,

@@ -123,7 +123,7 @@ void put(const bushd_set_velocity& m, Fields& f) {
       .add("acceleration", m.acceleration);
 }
 void put(const bushd_local& m, Fields& f) {
-  f.add("motors", m.motors);
+  f.add("motors", m.motors).add("keypad", m.keypad).add("keypad_ticks", m.keypad_ticks);
 }
 void put(const bushd_poll& m, Fields& f) {
   std::string entries;

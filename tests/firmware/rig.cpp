@@ -121,6 +121,7 @@ Rig::Rig(RigOptions options)
   config.current_motors = options.current_motors;
   config.velocity = velocity_.data();
   config.velocity_motors = options.velocity_motors;
+  config.keypad = options.keypad;
   config.address = options.address;
   config.motors = options.motors;
   config.slots = options.slots;
@@ -277,8 +278,16 @@ bushd_status Rig::home(const bushd_home& message) {
                  payload_of([&](std::uint8_t* p) { return bushd_encode_home(&message, p); }));
 }
 
-bushd_status Rig::local(std::uint16_t motors) {
-  const bushd_local message = {motors};
+std::string Rig::keypad_display() {
+  std::string text;
+  for (int c = bushd_mcu_keypad_display(&mcu_); c >= 0; c = bushd_mcu_keypad_display(&mcu_)) {
+    text += static_cast<char>(c);
+  }
+  return text;
+}
+
+bushd_status Rig::local(std::uint16_t motors, std::uint16_t keypad, std::uint16_t keypad_ticks) {
+  const bushd_local message = {motors, keypad, keypad_ticks};
   return request(BUSHD_MSG_LOCAL,
                  payload_of([&](std::uint8_t* p) { return bushd_encode_local(&message, p); }));
 }

@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -36,6 +37,7 @@ struct RigOptions {
   bool trigger_input = true;
   std::uint8_t current_motors = 1;  // whose windings' currents the port controls
   std::uint8_t velocity_motors = 2;
+  bool keypad = true;
 };
 
 struct Answer {
@@ -141,7 +143,12 @@ class Rig {
   };
   const std::vector<Winding>& windings() const { return windings_; }
   bushd_status home(const bushd_home& message);
-  bushd_status local(std::uint16_t motors);
+  bushd_status local(std::uint16_t motors, std::uint16_t keypad = 0,
+                     std::uint16_t keypad_ticks = 0);
+  void keypad(std::uint8_t byte) { bushd_mcu_keypad_byte(&mcu_, byte); }
+  void keypad_break() { bushd_mcu_keypad_break(&mcu_); }
+  // What is due for its display now.
+  std::string keypad_display();
   // The pins, from the next tick that is prepared on.
   void pins(bushd_inputs inputs) { pins_ = inputs; }
   // If set, the pins are what this says whenever they are read.

@@ -58,6 +58,7 @@ void CoreRig::boot() {
                              .reset_cause = BUSHD_RESET_WATCHDOG,
                              .enable_at_boot = enable_at_boot_,
                              .in_pieces = configuration_.in_pieces,
+                             .keypad = true,
                              .queue = queue_.data(),
                              .queue_ticks = configuration_.queue_ticks,
                              .min_tick_ns = configuration_.min_tick_ns,
@@ -96,6 +97,8 @@ void CoreRig::pass() {
   if (!homed && mcu_.homing.stage == BUSHD_HOMING_DONE) take_home();
   check_state();
   BUSHD_REQUIRE((mcu_.state == BUSHD_STATE_FAULT) == (mcu_.faults != 0));
+  const int shown = bushd_mcu_keypad_display(&mcu_);
+  BUSHD_REQUIRE(shown == -1 || shown == '\n' || shown == '-' || (shown >= '0' && shown <= '9'));
 }
 
 void CoreRig::feed(Bytes bytes) {
@@ -134,6 +137,13 @@ void CoreRig::frame(std::uint8_t address, std::uint8_t type, Bytes payload, std:
 void CoreRig::set_pins(std::uint16_t motors, std::uint8_t system, std::uint16_t current) {
   pins_ = {{motors, static_cast<std::uint8_t>(system & BUSHD_SYSTEM_INPUTS)},
            static_cast<std::uint16_t>(current % (BUSHD_MAX_CURRENT + 1))};
+  // What is no input: bytes of the keypad, most of them with a meaning.
+  constexpr unsigned kBroken = 6;
+  const unsigned key = system >> 4;
+  if (key == kBroken) bushd_mcu_keypad_break(&mcu_);
+  if (key != 0 && key < kBroken) {
+    bushd_mcu_keypad_byte(&mcu_, static_cast<std::uint8_t>(0xFC + key));
+  }
 }
 
 void CoreRig::trigger(std::int16_t share) {

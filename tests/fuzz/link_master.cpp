@@ -72,7 +72,7 @@ link::McuSetup mcu_setup(std::uint8_t address) {
                                .dir_setup_us = 0,
                                .pulse_us = 2};
     setup.inputs.limit_negative = 1;
-    setup.local_motors = 2;
+    setup.local.motors = 2;
   }
   return setup;
 }

@@ -92,6 +92,17 @@ TEST(Connect, AnMcuWithoutTheVelocityLoopIsNamedWhereVelocityIsSet) {
               HasSubstr("moves no motor by the velocity loop, but motor 1 has `velocity`"));
 }
 
+TEST(Connect, AnMcuWithoutALineForAKeypadIsNamedWhereOneIsSet) {
+  FakeBus bus(1, 2);
+  link::McuSetup setup = bus.setup.mcus[0];
+  setup.local = {.motors = 1, .keypad = 2, .keypad_ticks = 0};
+  bus.master->reconfigure(McuIndex{0}, setup);
+  bus.run_for(3'000'000);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
+              HasSubstr("has no line for a keypad, but motor 1 has `keypad`"));
+}
+
 TEST(Connect, ExactlyEnoughMemoryIsEnough) {
   FakeBus bus(1, 4);
   bus.slaves[0].identity.table_codes = 350;

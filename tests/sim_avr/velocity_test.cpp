@@ -56,7 +56,7 @@ class VelocityOfTheImage : public McuAlone {
     inputs.limit_positive = kLimit;
     ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
               BUSHD_OK);
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_LOCAL, bushd_encode_local, {mask}),
+    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_LOCAL, bushd_encode_local, {mask, 0, 0}),
               BUSHD_OK);
     tick_0_ns_ = tick_0_ns();
     out_ << "at 0 " << tick_0_ns_ << '\n';

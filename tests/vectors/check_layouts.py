@@ -32,7 +32,7 @@ PARTS = {
 }
 SHORTER = {"version": "protocol_version", "firmware": "firmware_version"}  # names in the drawings
 # Of one byte and told in words.
-WITHOUT_DRAWING = {"control", "emergency", "acknowledgement", "local", "get_tables"}
+WITHOUT_DRAWING = {"control", "emergency", "acknowledgement", "get_tables"}
 
 
 def described(layout):

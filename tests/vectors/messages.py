@@ -36,7 +36,7 @@ LAYOUTS = {
                     ("position_steps", -4)]),
     "travel": (0x19, [("number", 1), ("kind", 1), ("motor", 1), ("direction", -1), ("edge", 1), ("sensor", 1), ("steps", 4),
                       ("delay_us", 4), ("wait_us", 4)]),
-    "local": (0x14, [("motors", 2)]),
+    "local": (0x14, [("motors", 2), ("keypad", 2), ("keypad_ticks", 2)]),
     "currents": (0x1A, [("motor", 1), ("decay", 1), ("ramp_ma", 2), ("cruise_ma", 2), ("hold_ma", 2)]),
     "set_velocity": (0x1C, [("motor", 1), ("least", 4), ("most", 4), ("acceleration", 4)]),
     "identity": (0x81, [("protocol_version", 1), ("motors", 1), ("firmware_version", 2), ("boot_number", 2),

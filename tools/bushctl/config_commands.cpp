@@ -92,6 +92,8 @@ void add_config_commands(CommandLine& line) {
           "direction=negative,\n"
           "                                     soft_limits=-5,30 (on the dial), "
           "soft_limits=none,\n"
+          "                                     input_active=open or closed, of its one input,\n"
+          "                                     local=true, keypad=true: who at its MCU moves it,\n"
           "                                     velocity=MIN,MAX,ACCELERATION of local inputs, in "
           "steps/s and steps/s^2,\n"
           "                                     currents=RAMP,CRUISE,HOLD in mA, with slow or fast "

@@ -21,7 +21,9 @@ using bushd::Result;
 
 // Of a daemon that is newer, a text.
 nlohmann::json json_of(const std::string& key, const std::string& value) {
-  if (key == name_of(config::SettingKey::kDirection)) return value;
+  for (const auto word : {config::SettingKey::kDirection, config::SettingKey::kInputActive}) {
+    if (key == name_of(word)) return value;
+  }
   if (value == "none") return nullptr;
   nlohmann::json parsed = nlohmann::json::parse(value, nullptr, false);
   return parsed.is_discarded() ? nlohmann::json(value) : parsed;

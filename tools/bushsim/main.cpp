@@ -100,6 +100,11 @@ int run(int argc, char** argv) {
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
+  app.add_option("--console", options.console,
+                 "What is typed is pressed at this MCU: F and R hold its inputs FORWARD and "
+                 "REVERSE, X releases them; f, r, s, x are keys of a keypad at a line of its own, "
+                 "and what that would show is printed")
+      ->check(CLI::Range(1, 255));
   bool keypad = false;
   app.add_flag("--keypad", keypad,
                "A keypad instead of a bus: what is typed are its keys (f, r, s, x), and what it "
@@ -131,6 +136,10 @@ int run(int argc, char** argv) {
   const auto wired = bushsim::parse_switches(switches, *setup, *images);
   if (!wired) return refuse(wired.error());
   options.switches = *wired;
+  if (options.console && (setup->pulses || setup->board_start_hz != 0)) {
+    return refuse(
+        {"this bus has no MCUs, where somebody could press something: leave out --console"});
+  }
   if (setup->board_start_hz != 0) {
     if (!mcus.empty() || !doubled.empty()) {
       return refuse({"a commutator board has no MCUs: leave out --mcu and --doubled"});

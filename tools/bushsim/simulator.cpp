@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstdio>
 #include <iterator>
 #include <set>
 
@@ -140,9 +141,18 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
   }
   auto waiter = Waiter::create();
   if (!waiter) return fail(waiter.error());
+  const auto at = std::ranges::find(options.setup.addresses, options.console.value_or(0));
+  if (options.console && at == options.setup.addresses.end()) {
+    return fail(fmt::format("--console {}: bus \"{}\" has no MCU with this address",
+                            *options.console, options.setup.bus));
+  }
   std::unique_ptr<Simulator> simulator(
       new Simulator(options, std::move(*waiter), std::move(*pty), std::move(trace)));
   simulator->start();
+  if (options.console) {
+    simulator->console_ = static_cast<std::size_t>(at - options.setup.addresses.begin());
+    simulator->typed_.emplace();
+  }
   return simulator;
 }
 
@@ -171,8 +181,7 @@ Result<void> Simulator::take_signals() {
   while (const auto signal = waiter_.signal()) {
     if (*signal == SIGRTMIN) {
       triggered_ = !triggered_;
-      const std::uint8_t system = triggered_ ? BUSHD_INPUT_TRIGGER : 0;
-      for (std::size_t i = 0; i < bus_.mcu_count(); ++i) bus_.node(i).set_inputs({0, system});
+      drive_inputs();
     } else if (*signal == SIGUSR1) {
       unplug();
     } else if (*signal == SIGUSR2) {
@@ -182,6 +191,41 @@ Result<void> Simulator::take_signals() {
     }
   }
   return {};
+}
+
+void Simulator::drive_inputs() {
+  const std::uint8_t system = triggered_ ? BUSHD_INPUT_TRIGGER : 0;
+  for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
+    const bool pressed = typed_ && i == console_;
+    bus_.node(i).set_inputs({0, static_cast<std::uint8_t>(pressed ? system | buttons_ : system)});
+  }
+}
+
+void Simulator::press(char key) {
+  if (const auto byte = keypad_byte_of(key)) {
+    bus_.node(console_).keypad_byte(*byte, bus_.now_ns());
+  } else if (key == 'F' || key == 'R' || key == 'X') {
+    buttons_ = key == 'F' ? BUSHD_INPUT_FORWARD : key == 'R' ? BUSHD_INPUT_REVERSE : 0;
+    drive_inputs();
+  }
+}
+
+// Whoever types no more holds nothing.
+Result<void> Simulator::take_keys() {
+  const auto keys = typed_->read();
+  if (!keys) return fail(keys.error());
+  for (const char key : *keys) press(key);
+  if (!keys->empty()) return {};
+  press('X');
+  typed_.reset();
+  return {};
+}
+
+void Simulator::show() {
+  const std::string text = bus_.node(console_).take_keypad_display();
+  if (text.empty()) return;
+  fmt::print("{}", text);
+  std::fflush(stdout);
 }
 
 // Simulated time as the clock on the wall has it.
@@ -233,12 +277,17 @@ Result<void> Simulator::loop() {
   while (!ended_) {
     const bool listens = pty_ && line_takes_more(now_ns);
     const TimeNs until_ns = now_ns + sleep_ns(now_ns);
-    const auto waited = waiter_.wait({listens ? pty_->fd() : -1}, until_ns - wall_time_ns());
+    const auto waited = waiter_.wait({listens ? pty_->fd() : -1, typed_ ? typed_->fd() : -1},
+                                     until_ns - wall_time_ns());
     if (!waited) return fail(waited.error());
     if (has_images_) slip();
     now_ns = wall_time_ns();
     bus_.advance_to(now_ns);
     if (const auto taken = take_signals(); !taken) return taken;
+    if ((*waited & 2u) != 0) {
+      if (const auto taken = take_keys(); !taken) return taken;
+    }
+    if (typed_) show();
     if (pty_ && listens) {
       if (const auto taken = take_bytes(now_ns); !taken) return taken;
     }

@@ -13,6 +13,7 @@
 #include "setup.h"
 #include "sim/bus.h"
 #include "sim/vcd.h"
+#include "typed_keys.h"
 #include "waiter.h"
 
 namespace bushsim {
@@ -24,6 +25,7 @@ struct Options {
   std::vector<std::string> links;  // at least one: the port's names, each time it is plugged in
   std::string trace;               // empty: none
   std::uint16_t boot_number = 1;
+  std::optional<std::uint8_t> console;  // what is typed is pressed at this MCU (press)
 };
 
 class Simulator {
@@ -47,6 +49,10 @@ class Simulator {
   bushd::Result<void> plug_in();
   void unplug();
   bushd::Result<void> take_signals();
+  bushd::Result<void> take_keys();
+  void press(char key);
+  void show();
+  void drive_inputs();
   bushd::sim::TimeNs wall_time_ns() const;
   bushd::Result<void> take_bytes(bushd::sim::TimeNs now_ns);
   bushd::Result<void> hand_out_replies();
@@ -70,6 +76,9 @@ class Simulator {
   std::uint64_t dropped_bytes_ = 0;
   bool ended_ = false;      // by a signal
   bool triggered_ = false;  // the trigger inputs are active
+  std::optional<TypedKeys> typed_;
+  std::size_t console_ = 0;   // its MCU
+  std::uint8_t buttons_ = 0;  // that are held there
 };
 
 }  // namespace bushsim

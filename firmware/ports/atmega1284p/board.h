@@ -59,6 +59,8 @@
 #define BOARD_SET_CURRENT chopper_set
 // Each takes some 15 % of the CPU while it moves by the velocity loop.
 #define BOARD_VELOCITY_MOTORS 2u
+// The comparators have the pins of UART 1.
+#define BOARD_KEYPAD 0
 // Shorter, slots would not hold their interrupts: a slot then has 250 cycles.
 #define BOARD_MIN_TICK_NS 2000000u
 

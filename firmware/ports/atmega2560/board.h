@@ -46,6 +46,8 @@
 #define BOARD_CURRENTS NULL
 #define BOARD_SET_CURRENT NULL
 #define BOARD_VELOCITY_MOTORS 0u
+// UART 2 is the line of a keypad.
+#define BOARD_KEYPAD 1
 // Shorter, slots would not hold their interrupts.
 #define BOARD_MIN_TICK_NS 900000u
 

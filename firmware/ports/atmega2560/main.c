@@ -11,6 +11,7 @@
 #include "firmware/ports/atmega2560/emission.h"
 #include "firmware/ports/atmega2560/identity.h"
 #include "firmware/ports/atmega2560/inputs.h"
+#include "firmware/ports/atmega2560/keypad_line.h"
 #include "firmware/ports/atmega2560/line.h"
 #include "firmware/ports/atmega2560/nvm.h"
 #include "firmware/ports/atmega2560/trigger.h"
@@ -139,6 +140,7 @@ __attribute__((noinline)) static void boot(void) {
                              .disabled_capabilities = BOARD_DISABLED,
                              .pulse_ns = EMISSION_PULSE_NS,
                              .in_pieces = true,
+                             .keypad = BOARD_KEYPAD,
                              .currents = BOARD_CURRENTS,
                              .current_motors = BOARD_CURRENT_MOTORS,
                              .velocity = VELOCITY,
@@ -176,6 +178,18 @@ static void prepare(void) {
   if (slot_buffer->compare_fall) compare_fall(emission_slot_time(slot_buffer->compare_fall - 1u));
 }
 
+static void hear_keypad(void) {
+#if BOARD_KEYPAD
+  keypad_line_hear(&mcu);
+#endif
+}
+
+static void show_at_keypad(void) {
+#if BOARD_KEYPAD
+  if (mcu.local.settings.keypad != 0 && !emission_begins_soon()) keypad_line_show(&mcu);
+#endif
+}
+
 static void hear_line(void) {
   uint32_t ended = 0;
   if (line_collect(&mcu.receiver, &ended)) {
@@ -189,6 +203,7 @@ static void hear_line(void) {
   } else if (line_is_idle()) {
     clock_now();  // a tick may last longer than it may go unasked
     poll_eeprom();
+    show_at_keypad();
   }
 }
 
@@ -212,6 +227,7 @@ int main(void) {
       emission_swap();
       clock_now();  // it must be asked every 30 ms
       bushd_mcu_swap(&mcu);
+      hear_keypad();
       prepare();
       wdt_reset();
     } else if (!bushd_mcu_work(&mcu)) {

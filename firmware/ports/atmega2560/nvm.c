@@ -63,7 +63,8 @@ static void compare_whole(const bushd_mcu* mcu) {
   const bool same = head.state == HEAD_WHOLE && head.program == image_seal &&
                     head.size == scan.size && head.crc == scan.crc;
   // Nothing is kept of an MCU that has never been given anything to move by.
-  const bool news = head.state != 0xFF || mcu->tables.codes_used != 0 || mcu->local.motors != 0;
+  const bool by_people = (mcu->local.settings.motors | mcu->local.settings.keypad) != 0;
+  const bool news = head.state != 0xFF || mcu->tables.codes_used != 0 || by_people;
   const bool quiet = bushd_mcu_nvm_is_quiet(mcu, &scan);
   if (!same && news && quiet) {
     phase = WRITE;

@@ -308,6 +308,20 @@ void bushd_virtual_receive(bushd_virtual* v, uint8_t byte, int64_t now_ns) {
   if (v->running) bushd_mcu_receive(&v->mcu, byte, (int32_t)port_time_in_tick_ns(v));
 }
 
+void bushd_virtual_keypad_byte(bushd_virtual* v, uint8_t byte, int64_t now_ns) {
+  bushd_virtual_advance(v, now_ns);
+  if (v->running) bushd_mcu_keypad_byte(&v->mcu, byte);
+}
+
+void bushd_virtual_keypad_break(bushd_virtual* v, int64_t now_ns) {
+  bushd_virtual_advance(v, now_ns);
+  if (v->running) bushd_mcu_keypad_break(&v->mcu);
+}
+
+int bushd_virtual_keypad_display(bushd_virtual* v) {
+  return v->running ? bushd_mcu_keypad_display(&v->mcu) : -1;
+}
+
 void bushd_virtual_set_inputs(bushd_virtual* v, bushd_inputs inputs) {
   const uint8_t changed = v->inputs.system ^ inputs.system;
   v->inputs = inputs;

@@ -114,6 +114,12 @@ void bushd_virtual_advance(bushd_virtual* v, int64_t now_ns);
 // A byte's stop bit ended at now_ns. Advances to that time first; lost on an MCU in reset.
 void bushd_virtual_receive(bushd_virtual* v, uint8_t byte, int64_t now_ns);
 
+// A byte of the keypad ended at now_ns, or its line broke. As above.
+void bushd_virtual_keypad_byte(bushd_virtual* v, uint8_t byte, int64_t now_ns);
+void bushd_virtual_keypad_break(bushd_virtual* v, int64_t now_ns);
+// The next character for its display, -1: none is due now. As fast as the caller likes.
+int bushd_virtual_keypad_display(bushd_virtual* v);
+
 // The inputs from the last time given on. An edge at the trigger's is captured.
 void bushd_virtual_set_inputs(bushd_virtual* v, bushd_inputs inputs);
 

@@ -437,6 +437,9 @@ class Client:
         offset: float | object = KEEP,
         direction: str | object = KEEP,
         soft_limits: tuple[float, float] | None | object = KEEP,
+        input_active: str | object = KEEP,
+        local: bool | object = KEEP,
+        keypad: bool | object = KEEP,
         velocity: tuple[int, int, int] | None | object = KEEP,
         currents: tuple[int | str, ...] | None | object = KEEP,
     ) -> model.Configuration:
@@ -444,6 +447,9 @@ class Client:
             "offset": offset,
             "direction": direction,
             "soft_limits": soft_limits,
+            "input_active": input_active,
+            "local": local,
+            "keypad": keypad,
             "velocity": velocity,
             "currents": currents,
         }

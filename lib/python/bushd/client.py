@@ -503,6 +503,9 @@ class Client:
         offset: float | object = KEEP,
         direction: str | object = KEEP,
         soft_limits: tuple[float, float] | None | object = KEEP,
+        input_active: str | object = KEEP,
+        local: bool | object = KEEP,
+        keypad: bool | object = KEEP,
         velocity: tuple[int, int, int] | None | object = KEEP,
         currents: tuple[int | str, ...] | None | object = KEEP,
     ) -> model.Configuration:
@@ -510,6 +513,7 @@ class Client:
 
             client.config("theta", soft_limits=(-5.0, 30.0))    # None: no soft limits
             client.config("theta", offset=12.5, direction="negative")
+            client.config("theta", local=True, keypad=False)    # who at its MCU moves it
             client.config("theta", velocity=(100, 1500, 500))   # least and full speed in steps/s, steps/s^2
             client.config("theta", currents=(1500, 1000, 300, "fast"))   # ramp, cruise, hold in mA, decay
 
@@ -521,6 +525,9 @@ class Client:
                 offset=offset,
                 direction=direction,
                 soft_limits=soft_limits,
+                input_active=input_active,
+                local=local,
+                keypad=keypad,
                 velocity=velocity,
                 currents=currents,
             )

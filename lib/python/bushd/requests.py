@@ -238,7 +238,7 @@ def show_configuration(names: Names) -> Request:
 
 
 def change_configuration(motor: str, changes: Mapping[str, object]) -> Request:
-    """Values: a number, a word, (low, high), a longer tuple of whole numbers and words, or None for none."""
+    """Values: a number, a word, True or False, (low, high), a longer tuple of whole numbers and words, or None for none."""
     message = messages.configure_t()
     message.kind = messages.configure_t.CHANGE
     message.change_motors = [codec.text(motor)] * len(changes)
@@ -371,6 +371,8 @@ def _named(message: Any, names: Names) -> Any:
 def _setting(value: object) -> str:
     if value is None:
         return "none"
+    if isinstance(value, bool):
+        return "true" if value else "false"
     if isinstance(value, str):
         return codec.text(value)
     if isinstance(value, (tuple, list)) and len(value) > 2:

@@ -1,0 +1,90 @@
+#include "firmware/core/keypad.h"
+
+#include "firmware/core/mcu.h"
+
+enum { FORWARD = 0x00, REVERSE = 0xFF, SLOWER = 0xFE, STOP = 0xFD };
+enum { TEXT = 5, LAST_AMOUNT = (BUSHD_KEYPAD_SLOWEST - BUSHD_KEYPAD_FIRST) / BUSHD_KEYPAD_SLOWER };
+
+_Static_assert(LAST_AMOUNT < UINT8_MAX, "counted in a byte");
+
+static uint16_t delay_of(const bushd_mcu_keypad* keypad) {
+  return (uint16_t)(BUSHD_KEYPAD_FIRST + keypad->slower * BUSHD_KEYPAD_SLOWER);
+}
+
+void bushd_mcu_keypad_byte(bushd_mcu* mcu, uint8_t byte) {
+  bushd_mcu_keypad* keypad = &mcu->local.pad;
+  if (mcu->local.settings.keypad == 0) return;
+  switch (byte) {
+    case FORWARD:
+    case REVERSE:
+      keypad->direction = byte == FORWARD ? 1 : -1;
+      keypad->fresh = true;
+      break;
+    case SLOWER:
+      keypad->slower = keypad->slower < LAST_AMOUNT ? (uint8_t)(keypad->slower + 1u) : 0;
+      keypad->slowed = true;
+      break;
+    case STOP:
+      keypad->direction = 0;
+      break;
+    default:
+      return;
+  }
+  keypad->refused = false;
+  keypad->due = true;
+}
+
+void bushd_mcu_keypad_break(bushd_mcu* mcu) {
+  mcu->local.pad.direction = 0;
+}
+
+// Whether a key counts shows only when its motors would begin.
+static bool is_settled(const bushd_mcu_local* local) {
+  return local->pad.direction == 0 || (local->by_keypad && local->wish == local->pad.direction &&
+                                       local->readings == BUSHD_MCU_LOCAL_READINGS);
+}
+
+int16_t bushd_mcu_keypad_display(bushd_mcu* mcu) {
+  bushd_mcu_keypad* keypad = &mcu->local.pad;
+  if (keypad->left == 0) {
+    if (!keypad->due || !is_settled(&mcu->local)) return -1;
+    keypad->due = false;
+    keypad->dashes = keypad->refused;
+    keypad->left = TEXT;
+  }
+  const uint8_t left = keypad->left;
+  keypad->left = (uint8_t)(left - 1u) & 7u;
+  if (left == 1) return '\n';
+  if (keypad->dashes) return '-';
+  uint16_t digits = delay_of(keypad);
+  for (uint8_t behind = (uint8_t)(left - 2u); behind > 0; --behind) digits /= 10;
+  return (int16_t)('0' + digits % 10);
+}
+
+int8_t bushd_mcu_keypad_direction(bushd_mcu* mcu) {
+  bushd_mcu_keypad* keypad = &mcu->local.pad;
+  // Not when its byte came: ports look at their lines at other times of a tick.
+  if (keypad->fresh) keypad->heard = (uint16_t)mcu->uptime;
+  keypad->fresh = false;
+  const uint16_t most = mcu->local.settings.keypad_ticks;
+  if (most != 0 && (uint16_t)((uint16_t)mcu->uptime - keypad->heard) >= most) keypad->direction = 0;
+  return keypad->direction;
+}
+
+void bushd_mcu_keypad_refuse(bushd_mcu* mcu) {
+  bushd_mcu_keypad* keypad = &mcu->local.pad;
+  if (keypad->direction == 0) return;
+  keypad->direction = 0;
+  keypad->refused = true;
+  keypad->due = true;
+}
+
+uint16_t bushd_mcu_keypad_floor(const bushd_mcu* mcu, const bushd_table* table) {
+  const uint32_t ns = delay_of(&mcu->local.pad) * BUSHD_KEYPAD_UNIT_NS;
+  const uint32_t units = (ns - 1u) / table->time_unit_ns + 1u;
+  return units < UINT16_MAX ? (uint16_t)units : UINT16_MAX;
+}
+
+int32_t bushd_mcu_keypad_speed(const bushd_mcu* mcu) {
+  return (int32_t)(64u * (1000000000u / BUSHD_KEYPAD_UNIT_NS) / delay_of(&mcu->local.pad));
+}
