@@ -16,9 +16,10 @@ from check_trace.motion import Table
 TABLE = 'name = "t"\ntime_unit_ns = 100000\naccel = [100, 50, 30]\n'
 
 
-def vcd(times_ns, positive, begin_ns=0):
+def vcd(times_ns, positive, begin_ns=0, output=0):
     lines = [f"$comment time 0 is {begin_ns} ns of CLOCK_MONOTONIC $end"]
-    lines += ["$timescale 1 ns $end", "$scope module mcu1 $end", "$var wire 1 ! step0 $end", "$var wire 1 \" dir0 $end"]
+    lines += ["$timescale 1 ns $end", "$scope module mcu1 $end", f"$var wire 1 ! step{output} $end"]
+    lines += [f'$var wire 1 " dir{output} $end']
     lines += ["$var wire 1 # en $end", "$upscope $end", "$enddefinitions $end", "#0", "0!", f'{int(positive)}"', "1#"]
     for time_ns in times_ns:
         lines += [f"#{time_ns}", "1!", f"#{time_ns + 1000}", "0!"]
@@ -26,13 +27,15 @@ def vcd(times_ns, positive, begin_ns=0):
 
 
 class CheckPulses(unittest.TestCase):
-    def judge(self, times_ns, steps=6, positive=True):
+    def judge(self, times_ns, steps=6, positive=True, output=None, traced=0):
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
             (folder / "t.toml").write_text(TABLE)
-            (folder / "trace.vcd").write_text(vcd(times_ns, positive))
+            (folder / "trace.vcd").write_text(vcd(times_ns, positive, output=traced))
             move = {"event": "move", "id": 1, "motor": "x", "bus": "com1", "table_file": str(folder / "t.toml")}
             move |= {"table_sha256": Table("t", tomllib.loads(TABLE)).sha256(), "steps": steps, "from_steps": 5}
+            if output is not None:
+                move["output"] = output
             result = {"event": "result", "id": 1, "motor": "x", "result": "reached", "position_steps": 5 + steps}
             (folder / "moves.jsonl").write_text(json.dumps(move) + "\n" + json.dumps(result) + "\n")
             command = [sys.executable, "-B", TOP / "tools" / "check-pulses", "--bus", "com1"]
@@ -59,6 +62,14 @@ class CheckPulses(unittest.TestCase):
         self.assertIn("5 of 6 steps", self.judge(self.exact[:-1])[1])
         self.assertIn("no move accounts for", self.judge([*self.exact, 90_000_000])[1])
         self.assertIn("in the other direction", self.judge(self.exact, positive=False)[1])
+    def test_an_output_of_a_board(self):
+        self.assertEqual(self.judge(self.exact, output=5, traced=5)[0], 0)
+        early = [time - (2 if time > 18_000_000 else 0) for time in self.exact]
+        self.assertEqual(self.judge(early, output=5, traced=5)[0], 1)
+        said = self.judge(self.exact, output=5, traced=4)[1]
+        self.assertIn("0 of 6 steps", said)
+        self.assertIn("output 4: 6 steps that no move accounts for", said)
+
     # x makes 6 steps and y 3, each half way between two of x: after 1.5, 3.5 and 5.5 of its run.
     def judge_line(self, late_ns, apart_ms):
         times = {"x": self.exact, "y": [12_500_000, 19_500_000, 31_000_000]}
