@@ -282,10 +282,11 @@ void Master::begin_run(std::int64_t now_us, const link::MotorPlan& plan, Tick st
                    .start = start,
                    .tick = view_.tick,
                    .planned = planned,
-                   .direction = plan.line ? plan.line->direction : run.direction,
+                   .direction = run.direction < 0 ? -1 : 1,
                    .from_steps = position_,
                    .not_before_us = start_us + first_us,
                    .on_line = plan.line.has_value()});
+  if (plan.line) run_->direction = plan.line->direction;
   plan_rates(plan);
   wake_us_ = 0;
 }
@@ -303,8 +304,8 @@ void Master::plan_rates(const link::MotorPlan& plan) {
   const std::vector<Rate> of_floor = rates_for(driver, ns_of(run.cruise), longest);
   rates.insert(rates.end(), of_floor.begin(), of_floor.end());
   std::ranges::sort(rates, std::greater<>(), &Rate::ask);
-  const auto same = std::ranges::unique(rates, {}, &Rate::ask);
-  rates.erase(same.begin(), same.end());
+  const auto same = [](const Rate& one, const Rate& other) { return one.ask == other.ask; };
+  rates.erase(std::unique(rates.begin(), rates.end(), same), rates.end());
   const std::int64_t change_us = kChangeUs + (status_->empty ? 0 : kUnseenUs);
   planner_ = Planner(std::move(rates), static_cast<std::uint64_t>(change_us) * 1000);
   for (const auto& [ask, made] : made_) planner_.learn(ask, made);
@@ -329,7 +330,7 @@ void Master::replace(McuIndex, std::uint16_t, Tick first) {
   }
   run.ahead = Steps(*plan);
   run.by_ticks = by_ticks;
-  if (!plan->line) run.direction = plan->run.direction;
+  if (!plan->line) run.direction = plan->run.direction < 0 ? -1 : 1;
 }
 
 // From now on ticks go by the clock, for the plan does not tell any more where the motor is.

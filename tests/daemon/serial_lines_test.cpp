@@ -294,8 +294,8 @@ TEST(SerialLines, AStalledDriverHoldsTheOtherOneBack) {
     const Answer answer = lab.wait(line);
     EXPECT_EQ(answer.result, "reached") << answer.reason;
     lab.expect_line_of(steps, Table::skew_ms(answer));
-    // 20 ms under way, tolerances of the pace, 2 ms until it is asked, and what the other one became
-    // late in those 20 ms by its rates: at cruise nothing, in the ramps before up to 6 ms.
+    // 20 ms under way, tolerances of the pace, 2 ms until it is asked, and what the other one
+    // became late in those 20 ms by its rates: at cruise nothing, in the ramps before up to 6 ms.
     EXPECT_LE(Table::skew_ms(answer), 20 + 1.5 + 2 + 6);
     EXPECT_GE(Table::skew_ms(answer), 10);
   }
