@@ -38,6 +38,20 @@ std::optional<bushd_run> AxisSource::plan_at(link::McuIndex mcu, std::uint8_t mo
   return axis == nullptr ? std::nullopt : axis->plan_at(at);
 }
 
+std::optional<link::MotorPlan> AxisSource::plan_on_line_at(link::McuIndex mcu, std::uint8_t motor,
+                                                           link::Tick at) {
+  motion::Axis* axis = axis_of(mcu, Output{motor});
+  if (axis == nullptr) return std::nullopt;
+  const auto run = axis->line_run_at(at);
+  if (!run) return std::nullopt;
+  const motion::LineShare& share = *axis->line();
+  return link::MotorPlan{.run = *run,
+                         .line = link::MotorPlan::Line{.increment = share.increment,
+                                                       .longest = share.longest,
+                                                       .from = share.from,
+                                                       .direction = share.direction}};
+}
+
 link::Tick AxisSource::end_tick(link::McuIndex mcu, std::uint8_t motor) {
   const motion::Axis* axis = axis_of(mcu, Output{motor});
   return axis == nullptr ? 0 : axis->end_tick();

@@ -37,6 +37,8 @@ class AxisSource : public link::TickSource {
   std::optional<RunSegment> run_at(link::McuIndex mcu, std::uint8_t motor, link::Tick first,
                                    unsigned max_ticks) final;
   std::optional<bushd_run> plan_at(link::McuIndex mcu, std::uint8_t motor, link::Tick at) final;
+  std::optional<link::MotorPlan> plan_on_line_at(link::McuIndex mcu, std::uint8_t motor,
+                                                 link::Tick at) final;
   link::Tick end_tick(link::McuIndex mcu, std::uint8_t motor) final;
 };
 
@@ -116,6 +118,10 @@ class Mcu {
   }
   bool has_time_to_retarget(std::int64_t now_us) const {
     return master_.has_time_to_retarget(now_us, on_bus_);
+  }
+  bool keeps_pace() const { return master_.keeps_pace(); }
+  void begin_in_pace(Output output, link::Tick start, const std::shared_ptr<link::LinePace>& pace) {
+    master_.begin_in_pace(on_bus_, output.value, start, link::LinePace::Place(pace));
   }
   void begin(Output output, link::Tick start) { master_.begin(on_bus_, output.value, start); }
   void begin_table_run(Output output, link::Tick start, link::TableRun run) {

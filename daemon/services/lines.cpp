@@ -120,15 +120,14 @@ bool Lines::has_all_of(const Line& line, const Mcu& mcu) {
 
 void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                       const std::vector<std::size_t>& indices, std::uint32_t to) {
-  motion::Tick start = INT64_MIN;
   std::vector<MotorId> motors;
-  for (const std::size_t i : indices) {
-    const MotorId id = line.motors[i];
-    motors.push_back(id);
-    start = std::max(start,
-                     installation_.mcu_of(id).earliest_start(now_us, installation_[id].output()));
-  }
-  const bool by_mcus = in_mcus(number, line);
+  for (const std::size_t i : indices) motors.push_back(line.motors[i]);
+  const std::map<BusId, motion::Tick> start = starts_of(now_us, motors);
+  const bool by_ports = installation_.mcu_of(motors.front()).keeps_pace();
+  const auto ports = static_cast<unsigned>(motors.size());
+  const std::int64_t ahead_ns = line.pace ? line.pace->most_ahead_ns() : 0;
+  line.pace = by_ports ? std::make_shared<link::LinePace>(ports, ahead_ns) : nullptr;
+  const bool by_mcus = by_ports || in_mcus(number, line);
   for (const std::size_t i : indices) {
     motion::Motor& motor = installation_[line.motors[i]];
     const auto* before = motor.as<motion::OnLine>();
@@ -142,9 +141,22 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
     motion::LineShare share = line.share(i, from, to);
     share.in_mcus = by_mcus;
-    motor.start_line(on_line, std::move(share), start, line.path ? 0 : line.way.floor());
+    const BusId bus = installation_.mcu_of(line.motors[i]).config.bus;
+    motor.start_line(on_line, std::move(share), start.at(bus), line.path ? 0 : line.way.floor());
   }
-  moves_.begin_on_line(motors);
+  moves_.begin_on_line(motors, line.pace);
+}
+
+// One tick of each bus: there is one, or one a motor.
+std::map<BusId, motion::Tick> Lines::starts_of(std::int64_t now_us,
+                                               const std::vector<MotorId>& motors) const {
+  std::map<BusId, motion::Tick> start;
+  for (const MotorId id : motors) {
+    const Mcu& mcu = installation_.mcu_of(id);
+    motion::Tick& of_bus = start.try_emplace(mcu.config.bus, INT64_MIN).first->second;
+    of_bus = std::max(of_bus, mcu.earliest_start(now_us, installation_[id].output()));
+  }
+  return start;
 }
 
 const motion::OnLine* Lines::on_line(MotorId motor, std::uint64_t number) const {
@@ -370,7 +382,14 @@ std::string Lines::conclusion(std::uint64_t number) const {
       line.motors, [&](MotorId motor) { return on_line(motor, number) != nullptr; });
   if (moves_on) return {};
   if (line.path) return deviation(line).insert(0, "; the path has ended");
-  return fmt::format("; the line was limited by {}{}", limiting(line), deviation(line));
+  return fmt::format("; the line was limited by {}{}{}", limiting(line), deviation(line),
+                     apart(line));
+}
+
+std::string Lines::apart(const Line& line) {
+  if (!line.pace) return {};
+  return fmt::format("; the ports were at most {:.1f} ms apart",
+                     1e-6 * static_cast<double>(line.pace->most_ahead_ns()));
 }
 
 // At the point of the line that is nearest to where the motors stand.

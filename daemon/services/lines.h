@@ -1,7 +1,8 @@
-// Motors of one bus as one, along a straight line or a path of several. Each of them has a copy of
-// the line's run (motion/axis.h), begun at the same tick and changed at the same ticks; who does
-// that is Moves. Here is what is about all of them: the line's table, its runs one after the other,
-// and what happens to the others when one does not go on.
+// Motors of one bus, or at ports that keep pace with each other, as one, along a straight line or a
+// path of several. Each of them has a copy of the line's run (motion/axis.h), begun at the same
+// tick and changed at the same ticks; who does that is Moves. Here is what is about all of them:
+// the line's table, its runs one after the other, and what happens to the others when one does not
+// go on.
 #pragma once
 
 #include <cstdint>
@@ -64,6 +65,7 @@ class Lines final : public Service {
     // For the trigger: some of its motors, or all while none has begun.
     bool waits = false;
     bool begun = true;
+    std::shared_ptr<link::LinePace> pace{};  // of the run under way, where ports make it
 
     std::uint32_t longest() const;
     std::int64_t position_at(std::size_t motor, std::uint32_t step) const;
@@ -92,6 +94,7 @@ class Lines final : public Service {
   };
 
   Result<Line> line_of(const api::MoveLine& request) const;
+  Result<void> may_be_one_line(const std::vector<MotorId>& motors) const;
   Result<void> on_one_bus(const std::vector<MotorId>& motors) const;
   Result<std::vector<Point>> points_of(const Line& line, const api::MoveLine& request) const;
   const tables::TablePtr& table_of(const Line& line, std::size_t motor) const;
@@ -105,6 +108,8 @@ class Lines final : public Service {
   void open(const api::Asker& asker, std::uint64_t number, const Line& line);
   static bool has_all_of(const Line& line, const Mcu& mcu);  // its motors
   bool in_mcus(std::uint64_t number, const Line& line) const;
+  std::map<BusId, motion::Tick> starts_of(std::int64_t now_us,
+                                          const std::vector<MotorId>& motors) const;
   // Of these of its motors, by place: the part of the way between these steps of it.
   void begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                  const std::vector<std::size_t>& indices, std::uint32_t to);
@@ -144,6 +149,8 @@ class Lines final : public Service {
   void go_on(std::int64_t now_us, std::uint64_t number, Line& line);
   std::string conclusion(std::uint64_t number) const;
   std::string deviation(const Line& line) const;
+  // How far its ports were apart.
+  static std::string apart(const Line& line);
   const std::string& limiting(const Line& line) const;
 
   Installation& installation_;

@@ -7,12 +7,21 @@
 #include "daemon/services/lines.h"
 
 namespace bushd::daemon {
+namespace {
+
+Result<void> few_enough(std::size_t motors) {
+  if (motors <= api::MoveLine::kMostMotors) return {};
+  return fail(fmt::format("{} motors are named; a line has at most {}", motors,
+                          api::MoveLine::kMostMotors));
+}
+
+}  // namespace
 
 Result<Lines::Line> Lines::line_of(const api::MoveLine& request) const {
   Line line{
       .motors = *installation_.find(request.motors), .points = {}, .way = {}, .by = request.by};
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
-  if (const auto one = on_one_bus(line.motors); !one) return fail(one.error());
+  if (const auto may = may_be_one_line(line.motors); !may) return fail(may.error());
   auto points = points_of(line, request);
   if (!points) return fail(points.error());
   line.points = std::move(*points);
@@ -24,20 +33,46 @@ Result<Lines::Line> Lines::line_of(const api::MoveLine& request) const {
   return line;
 }
 
-Result<void> Lines::on_one_bus(const std::vector<MotorId>& motors) const {
-  if (motors.size() > api::MoveLine::kMostMotors) {
-    return fail(fmt::format("{} motors are named; a line has at most {}", motors.size(),
-                            api::MoveLine::kMostMotors));
+// On one bus that has ticks, or each at a port of its own that keeps pace with the others.
+Result<void> Lines::may_be_one_line(const std::vector<MotorId>& motors) const {
+  const auto keeps_pace = [this](MotorId motor) {
+    return installation_.mcu_of(motor).keeps_pace();
+  };
+  const auto at_port = std::ranges::find_if(motors, keeps_pace);
+  if (at_port == motors.end()) return on_one_bus(motors);
+  if (auto few = few_enough(motors.size()); !few) return few;
+  const auto not_at_port = std::ranges::find_if_not(motors, keeps_pace);
+  if (not_at_port != motors.end()) {
+    return fail(fmt::format(
+        "{} is at a serial port that makes pulses, and {} at MCU {}: their steps have no common "
+        "time. Move them without --line, or connect them alike",
+        installation_[*at_port].name(), installation_[*not_at_port].name(),
+        installation_.mcu_of(*not_at_port).name()));
   }
+  for (const MotorId motor : motors) {
+    const config::Bus& first = installation_.bus_of(installation_.mcu_of(motors.front())).config;
+    const config::Bus& bus = installation_.bus_of(installation_.mcu_of(motor)).config;
+    if (bus.tick_us == first.tick_us) continue;
+    return fail(fmt::format(
+        "bus {} has tick_us = {} and bus {} tick_us = {}: ports of a line go by the same ticks. "
+        "Give both the same tick_us, or move them without --line",
+        first.name, first.tick_us, bus.name, bus.tick_us));
+  }
+  return {};
+}
+
+Result<void> Lines::on_one_bus(const std::vector<MotorId>& motors) const {
+  if (auto few = few_enough(motors.size()); !few) return few;
   const auto bus_name = [this](MotorId motor) {
     return installation_.bus_of(installation_.mcu_of(motor)).config.name;
   };
   for (const MotorId motor : motors) {
     if (installation_.mcu_of(motor).streams()) continue;
-    return fail(fmt::format(
-        "{} is on bus {}, which makes runs of tables only, no lines or paths; move it without "
-        "--line",
-        installation_[motor].name(), bus_name(motor)));
+    const bool lines = installation_.mcu_of(motor).keeps_pace();
+    return fail(fmt::format("{} is on bus {}, which makes runs of tables {}; move it {}",
+                            installation_[motor].name(), bus_name(motor),
+                            lines ? "and lines, but no paths" : "only, no lines or paths",
+                            lines ? "from point to point, by 'move --line'" : "without --line"));
   }
   for (const MotorId motor : motors) {
     if (bus_name(motor) == bus_name(motors.front())) continue;

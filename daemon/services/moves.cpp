@@ -225,14 +225,19 @@ void Moves::start_leg(std::int64_t now_us, MotorId id) {
   start_run(id, leg.target, mcu.earliest_start(now_us, installation_[id].output()), leg.floor);
 }
 
-void Moves::begin_on_line(const std::vector<MotorId>& motors) {
+void Moves::begin_on_line(const std::vector<MotorId>& motors,
+                          const std::shared_ptr<link::LinePace>& pace) {
   for (const MotorId id : motors) {
     const motion::Axis& axis = installation_[id].axis();
     const bool in_mcus = axis.line() && axis.line()->in_mcus;
     journal_.started(id, axis.target_steps() - axis.from_steps(), axis.start_tick(), 0, in_mcus);
+    Mcu& mcu = installation_.mcu_of(id);
+    if (pace) {
+      mcu.begin_in_pace(installation_[id].output(), axis.start_tick(), pace);
+      continue;
+    }
     // One that makes no step of it only waits.
     if (axis.end_tick() <= axis.start_tick()) continue;
-    Mcu& mcu = installation_.mcu_of(id);
     if (in_mcus) {
       mcu.begin_line_run(installation_[id].output(), axis);
     } else {

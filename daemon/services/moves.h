@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -52,8 +53,9 @@ class Moves final : public Service {
   void pause(std::int64_t now_us, const std::vector<MotorId>& motors);
   void resume(std::int64_t now_us, const std::vector<MotorId>& motors);
   // Motors of one line, all planned by who leads it. Precondition: their part of an open move.
-  // Runs that have just been started, at one tick:
-  void begin_on_line(const std::vector<MotorId>& motors);
+  // Runs that have just been started, at one tick, or in this pace, each at one of its own bus:
+  void begin_on_line(const std::vector<MotorId>& motors,
+                     const std::shared_ptr<link::LinePace>& pace = nullptr);
   // Runs with another end or speed:
   void redirect_on_line(std::int64_t now_us, const std::vector<MotorId>& motors);
   // They are given to another move.
@@ -98,6 +100,10 @@ class Moves final : public Service {
   void plan(std::int64_t now_us, const std::vector<MotorId>& motors);
   std::map<McuId, motion::Tick> ticks_to_change_at(std::int64_t now_us,
                                                    const std::vector<MotorId>& motors) const;
+  // Buses that keep pace have ticks of their own, counted from the line's beginning they are the
+  // same.
+  void at_one_tick_of_line(const std::vector<MotorId>& motors,
+                           std::map<McuId, motion::Tick>& at) const;
   // Of motors whose line stops farther on than their own plan does: there.
   std::map<MotorId, std::uint32_t> common_ends(const std::vector<MotorId>& motors) const;
   std::vector<MotorId> with_whole_lines(const std::vector<MotorId>& motors);

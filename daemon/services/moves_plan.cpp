@@ -65,7 +65,29 @@ std::map<McuId, motion::Tick> Moves::ticks_to_change_at(std::int64_t now_us,
     const auto common = of_lines.find(installation_[mcu].config.bus);
     if (common != of_lines.end()) tick = std::max(tick, common->second);
   }
+  at_one_tick_of_line(motors, at);
   return at;
+}
+
+void Moves::at_one_tick_of_line(const std::vector<MotorId>& motors,
+                                std::map<McuId, motion::Tick>& at) const {
+  std::map<std::uint64_t, motion::Tick> since_start;  // by line
+  const auto for_each = [&](const auto& take) {
+    for (const MotorId id : motors) {
+      const auto* on_line = installation_[id].as<motion::OnLine>();
+      const Mcu& mcu = installation_.mcu_of(id);
+      if (on_line == nullptr || !mcu.keeps_pace()) continue;
+      // One whose run is over has other ticks since.
+      if (on_line->stands || mcu.view().tick >= installation_[id].axis().over_tick()) continue;
+      motion::Tick& common = since_start.try_emplace(on_line->line, INT64_MIN).first->second;
+      take(at.at(mcu.id), installation_[id].axis().start_tick(), common);
+    }
+  };
+  for_each([](motion::Tick tick, motion::Tick start, motion::Tick& common) {
+    common = std::max(common, tick - start);
+  });
+  for_each(
+      [](motion::Tick& tick, motion::Tick start, motion::Tick common) { tick = start + common; });
 }
 
 // Runs of a line that a trigger has begun are microseconds apart, so that not all are in the same

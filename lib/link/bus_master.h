@@ -25,6 +25,7 @@
 #include "link/bus_setup.h"
 #include "link/event.h"
 #include "link/health.h"
+#include "link/line_pace.h"
 #include "link/mcu_index.h"
 #include "link/mcu_record.h"
 #include "link/pulse_port.h"
@@ -76,6 +77,10 @@ class BusMaster {
   // that. Where it is no, a motor makes runs of its table, at least as slow as the table says, and
   // its ticks wait for it.
   virtual bool streams() const { return false; }
+  // Motors make their parts of a line's run with motors of other buses that answer yes, each by
+  // itself and no faster than the slowest (line_pace.h). Then the bus has one motor.
+  virtual bool keeps_pace() const { return false; }
+  virtual void begin_in_pace(McuIndex, std::uint8_t, Tick /*start*/, LinePace::Place) {}
   // A motor of an MCU begins only when no other one of it moves: precondition of begin().
   virtual bool one_at_a_time() const { return false; }
 

@@ -11,6 +11,18 @@
 
 namespace bushd::link {
 
+// What a motor does from some tick on: a run of its table, or its part of a line's run.
+struct MotorPlan {
+  bushd_run run;
+  struct Line {
+    std::uint32_t increment;  // engine/line.h
+    std::uint32_t longest;
+    std::uint32_t from;  // of the line's steps, where the run begins
+    int direction;       // of the motor; that of the run says nothing
+  };
+  std::optional<Line> line;
+};
+
 class TickSource {
  public:
   virtual ~TickSource() = default;
@@ -32,6 +44,10 @@ class TickSource {
   // later; whatever it does then. Nothing: the motor has no plan, or one that is no run of its
   // table.
   virtual std::optional<bushd_run> plan_at(McuIndex, std::uint8_t, Tick) { return std::nullopt; }
+  // The same where the motor's run may be that of a line.
+  virtual std::optional<MotorPlan> plan_on_line_at(McuIndex, std::uint8_t, Tick) {
+    return std::nullopt;
+  }
   // First tick after the motor's last step, as planned now.
   virtual Tick end_tick(McuIndex mcu, std::uint8_t motor) = 0;
 };

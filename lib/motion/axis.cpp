@@ -381,6 +381,15 @@ std::optional<Axis::RunSegment> Axis::run_at(Tick first, unsigned max_ticks) {
 
 std::optional<bushd_run> Axis::plan_at(Tick first) {
   if (!busy_ || share_ || followed_) return std::nullopt;
+  return run_from(first);
+}
+
+std::optional<bushd_run> Axis::line_run_at(Tick first) {
+  if (!busy_ || !share_ || on_path()) return std::nullopt;
+  return run_from(first);
+}
+
+bushd_run Axis::run_from(Tick first) {
   go_to(std::max(first, start_));
   Place place = head_;
   take_change(place);

@@ -60,7 +60,7 @@ struct LineShare {
   // This run's part of the line, by its steps.
   std::uint32_t from = 0;
   std::uint32_t to = 0;
-  // The MCUs make the run themselves (LINE_RUN).
+  // The MCUs make the run themselves (LINE_RUN), or what stands in for them does.
   bool in_mcus = false;
 };
 
@@ -166,6 +166,8 @@ class Axis {
   // The same, whatever it does then: `first` or its start, if that is later. Nothing: no run of the
   // motor's own table.
   std::optional<bushd_run> plan_at(Tick first);
+  // The same of the run of a line that is no path.
+  std::optional<bushd_run> line_run_at(Tick first);
 
   // The ticks before `until` are over and will not be asked for again. Returns the change that was
   // among them.
@@ -237,6 +239,7 @@ class Axis {
   std::int64_t line_steps(std::uint32_t run_steps) const;
   Tick effective() const { return std::max(change_->at, start_); }
   void go_to(Tick first);
+  bushd_run run_from(Tick first);
   void take_change(Place& place) const;
   void advance(Place& place, Tick to) const;
   void expand(Place& place, std::size_t ticks, std::int16_t* out, std::size_t stride) const;

@@ -7,6 +7,7 @@ namespace bushd::serial_pulse {
 namespace {
 
 constexpr std::int64_t kDrainAskUs = 300;
+constexpr std::int64_t kLineAskUs = 2'000;  // whether the run of the line is over
 
 }  // namespace
 
@@ -15,7 +16,10 @@ constexpr std::int64_t kDrainAskUs = 300;
 void Master::count_gone(std::int64_t now_us) {
   const std::int64_t asked_ns = std::min(now_us, status_us_) * 1000;
   while (sent_.size() > status_->queued && sent_.front().gone_ns <= asked_ns) {
-    if (run_) run_->gone += sent_.front().steps;
+    if (run_) {
+      run_->gone += sent_.front().steps;
+      run_->left_ns = sent_.front().last_ns;
+    }
     sent_.pop_front();
   }
   if (drained(now_us)) recent_.clear();
@@ -64,6 +68,8 @@ std::uint32_t Master::unsure_steps() const {
 }
 
 void Master::write(std::int64_t now_us, link::PulseOrder& order) {
+  if (run_->pace) tell_line(now_us);
+  if (run_->ahead.left() == 0 && run_->pace && drained(now_us)) return wake_at(now_us + kLineAskUs);
   if (run_->ahead.left() == 0) return wait_until_drained(now_us);
   if (!may_write(now_us, order)) return;
   while (run_->ahead.left() > 0 && write_byte(now_us, order)) {
@@ -119,6 +125,7 @@ bool Master::write_byte(std::int64_t now_us, link::PulseOrder& order) {
     order.baud = asked_baud_ = choice.rate.ask;
     return false;
   }
+  if (run.pace && waits_for_line(now_us)) return false;
   const auto one_ns = static_cast<std::int64_t>(byte_ns(choice.rate.ask));
   const std::int64_t under_way_ns = line_free_ns_ - now_us * 1000;
   const std::int64_t room_ns = std::max(kMostAheadUs * 1000 - one_ns, kSpareUs * 1000);
@@ -127,17 +134,29 @@ bool Master::write_byte(std::int64_t now_us, link::PulseOrder& order) {
     wake_at(us_of(line_free_ns_ - room_ns + std::min(room_ns / 2, kSpareUs * 1000)));
     return false;
   }
-  if (burst_us_ && under_way_ns < 0 && run.hold_us == 0) add_pause(-under_way_ns / 1000);
+  if (burst_us_ && under_way_ns < 0 && run.hold_us == 0 && !run.on_line)
+    add_pause(-under_way_ns / 1000);
   if (!burst_us_) burst_us_ = now_us;
   pauses_.bytes_us += one_ns / 1000;
-  for (unsigned i = 0; i < choice.pattern.steps; ++i) run.ahead.take();
+  run.ahead.take_ns();
+  const std::int64_t first_ns = run.ahead.time_ns();
+  for (unsigned i = 1; i < choice.pattern.steps; ++i) run.ahead.take_ns();
   run.written += choice.pattern.steps;
   order.bytes.push_back(choice.pattern.byte);
   line_free_ns_ = std::max(line_free_ns_, now_us * 1000) + one_ns;
-  sent_.push_back({.gone_ns = line_free_ns_, .steps = choice.pattern.steps});
+  sent_.push_back({.gone_ns = line_free_ns_,
+                   .steps = choice.pattern.steps,
+                   .takes_ns = one_ns,
+                   .last_step_ns = one_ns * (kBitsPerByte - choice.pattern.after_bits) /
+                                   std::int64_t{kBitsPerByte},
+                   .first_ns = first_ns,
+                   .last_ns = run.ahead.time_ns()});
   recent_.push_back(sent_.back());
-  if (choice.then_wait && delays.size() > 1)
-    run.hold_us = us_of(static_cast<std::int64_t>(delays[1]));
+  const std::uint64_t after_ns = choice.pattern.after_bits * std::uint64_t{1'000'000'000};
+  run.kept_ns = after_ns / choice.rate.most;
+  if (choice.then_wait && delays.size() > 1) {
+    run.hold_us = hold_us_of(delays[1], run.on_line ? run.kept_ns : 0);
+  }
   return !run.slow && run.hold_us == 0;
 }
 
@@ -160,7 +179,8 @@ void Master::add_pause(std::int64_t us) {
   char text[96];
   std::snprintf(text, sizeof text, "pauses amid bytes: %.2f %% of their time, the longest %.1f ms",
                 100 * share, 1e-3 * static_cast<double>(pauses_.longest_us));
-  view_.note = text;
+  pauses_note_ = text;
+  tell_note();
 }
 
 }  // namespace bushd::serial_pulse

@@ -49,7 +49,7 @@ void Master::begin_fast(std::int64_t now_us, int direction) {
   homing_->meets_limit = false;
   bushd_run run;
   bushd_run_start(&run, &table(), homing_->message.most_steps, direction, homing_->message.floor);
-  begin_run(now_us, run, 0, false);
+  begin_run(now_us, {.run = run, .line = {}}, 0, false);
 }
 
 void Master::begin_slow(std::int64_t now_us, bushd_homing stage, int direction) {
@@ -61,7 +61,7 @@ void Master::begin_slow(std::int64_t now_us, bushd_homing stage, int direction) 
   slow_.accel.count = slow_.decel.count = 1;
   bushd_run run;
   bushd_run_start(&run, &slow_, homing_->message.slow_steps, direction, 0);
-  begin_run(now_us, run, 0, false);
+  begin_run(now_us, {.run = run, .line = {}}, 0, false);
   run_->slow = true;
 }
 

@@ -14,8 +14,18 @@ constexpr std::int64_t kMovingAskUs = 2'000;
 constexpr std::int64_t kRestingAskUs = 20'000;
 constexpr std::int64_t kReportUs = 20'000;
 constexpr std::int64_t kRestingReportUs = 100'000;
+constexpr std::uint32_t kLowestOnLine = 1'000;
 // What a change of rate takes beside the time in which the line is drained for sure.
 constexpr std::int64_t kChangeUs = 2'000;
+
+// A delay of the run between two steps of the motor; none is told to be longer than a day.
+std::uint64_t motor_ns(const link::MotorPlan& plan, std::uint32_t delay) {
+  __extension__ using Wide = unsigned __int128;
+  constexpr Wide kLongestNs = Wide{86'400} * 1'000'000'000;
+  Wide ns = Wide{delay} * plan.run.table->time_unit_ns;
+  if (plan.line && plan.line->increment != 0) ns = ns * plan.line->longest / plan.line->increment;
+  return static_cast<std::uint64_t>(std::min(ns, kLongestNs));
+}
 
 }  // namespace
 
@@ -91,11 +101,12 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
     ask_us_ = now_us;
   } else if (status_) {
     count_gone(now_us);
+    measure_line(now_us);
     watch_limits(now_us);
     follow_homing(now_us);
     if (run_) {
       if (run_->planned) advance_ticks(now_us, false);
-      if (run_->ahead.left() == 0 && drained(now_us)) {
+      if (run_->ahead.left() == 0 && drained(now_us) && line_is_over(now_us)) {
         end_run(now_us);
         follow_homing(now_us);
       }
@@ -178,13 +189,12 @@ Tick Master::earliest_replace(std::int64_t now_us) const {
   if (!run_ || !run_->planned) return clock(now_us) + 2;
   const Run& run = *run_;
   if (run.written == 0) return run.tick;
-  bushd_run by_ticks = run.by_ticks;
+  Ticks by_ticks = run.by_ticks;
   Tick tick = run.tick;
   for (;; ++tick) {
-    if (run.change && tick == run.change->at) by_ticks = run.change->run;
-    if (by_ticks.steps_done >= run.written || bushd_run_done(&by_ticks)) return tick;
-    std::int16_t moved = 0;
-    bushd_run_expand_fine(&by_ticks, setup_.tick_ns, 1, &moved, 1);
+    if (run.change && tick == run.change->at) by_ticks = run.change->plan;
+    if (by_ticks.made() >= run.written || by_ticks.over()) return tick;
+    by_ticks.pass(setup_.tick_ns);
   }
 }
 
@@ -196,18 +206,17 @@ Tick Master::earliest_retarget(std::int64_t now_us, Tick start) const {
 // The last tick of a run is told when all has left for sure.
 void Master::advance_ticks(std::int64_t now_us, bool to_the_end) {
   Run& run = *run_;
-  const Tick now = clock(now_us);
-  if (run.tick < run.start) run.tick = to_the_end ? run.start : std::min(run.start, now);
+  if (run.tick < run.start) run.tick = to_the_end ? run.start : std::min(run.start, clock(now_us));
   if (run.tick < run.start) return;
+  const Tick now = run.pace ? line_clock(now_us) : clock(now_us);
   for (;;) {
     if (run.change && run.tick == run.change->at) {
-      run.by_ticks = std::exchange(run.change, std::nullopt)->run;
+      run.by_ticks = std::exchange(run.change, std::nullopt)->plan;
     }
-    if (bushd_run_done(&run.by_ticks)) return;
-    bushd_run next = run.by_ticks;
-    std::int16_t moved = 0;
-    bushd_run_expand_fine(&next, setup_.tick_ns, 1, &moved, 1);
-    const bool early = next.steps_done > run.gone || run.tick >= now || bushd_run_done(&next);
+    if (run.by_ticks.over()) return;
+    Ticks next = run.by_ticks;
+    next.pass(setup_.tick_ns);
+    const bool early = next.made() > run.gone || run.tick >= now || next.over();
     if (early && !to_the_end) return;
     run.by_ticks = next;
     ++run.tick;
@@ -253,49 +262,50 @@ const bushd_table& Master::table() const {
   return *mcu.tables[mcu.table_of_motor[0].value_or(0)].table;
 }
 
-bushd_run Master::no_steps() const {
-  bushd_run run;
-  bushd_run_start(&run, &table(), 0, 1, 0);
-  return run;
-}
-
 void Master::begin(McuIndex, std::uint8_t, Tick start) {
   const auto plan = source_.plan_at(kMcu, 0, start);
   if (!plan || run_ || !status_) {
     events_.push_back(link::StartMissed{kMcu, 0});
     return;
   }
-  begin_run(base_us_, *plan, start, true);
+  begin_run(base_us_, {.run = *plan, .line = {}}, start, true);
 }
 
-void Master::begin_run(std::int64_t now_us, const bushd_run& run, Tick start, bool planned) {
+void Master::begin_run(std::int64_t now_us, const link::MotorPlan& plan, Tick start, bool planned) {
+  const bushd_run& run = plan.run;
+  // Of a line the delay before the first step counts from when all are ready.
   const std::int64_t first_us =
-      us_of(std::int64_t{bushd_run_delay(&run)} * run.table->time_unit_ns);
+      plan.line ? 0 : us_of(std::int64_t{bushd_run_delay(&run)} * run.table->time_unit_ns);
   const std::int64_t start_us = planned ? base_us_ + us_per_ticks(start - base_tick_) + 1 : now_us;
-  run_ = Run{.ahead = {run},
-             .by_ticks = run,
-             .start = start,
-             .tick = view_.tick,
-             .planned = planned,
-             .direction = run.direction,
-             .from_steps = position_,
-             .not_before_us = start_us + first_us};
-  plan_rates(run);
+  run_.emplace(Run{.ahead = Steps(plan),
+                   .by_ticks = Ticks(plan),
+                   .start = start,
+                   .tick = view_.tick,
+                   .planned = planned,
+                   .direction = run.direction < 0 ? -1 : 1,
+                   .from_steps = position_,
+                   .not_before_us = start_us + first_us,
+                   .on_line = plan.line.has_value()});
+  if (plan.line) run_->direction = plan.line->direction;
+  plan_rates(plan);
   wake_us_ = 0;
 }
 
-void Master::plan_rates(const bushd_run& run) {
-  const std::uint64_t unit = run.table->time_unit_ns;
+void Master::plan_rates(const link::MotorPlan& plan) {
+  const bushd_run& run = plan.run;
+  const auto ns_of = [&](std::uint32_t delay) { return motor_ns(plan, delay); };
   const std::uint64_t longest =
-      unit * std::max({run.table->accel.code[0], run.table->decel.code[0], run.cruise});
-  const Rates driver{.any = status_->any_rate, .base = status_->base};
-  std::vector<Rate> rates = rates_for(driver, unit * run.table->cruise, longest);
+      ns_of(std::max({run.table->accel.code[0], run.table->decel.code[0], run.cruise}));
+  Rates driver{.any = status_->any_rate, .base = status_->base};
+  // On a line slower steps wait for their time one by one, where that does not take longer.
+  if (plan.line && status_->empty) driver.lowest = kLowestOnLine;
+  std::vector<Rate> rates = rates_for(driver, ns_of(run.table->cruise), longest);
   // The floor of the run may be another speed than one of the table.
-  const std::vector<Rate> of_floor = rates_for(driver, unit * run.cruise, longest);
+  const std::vector<Rate> of_floor = rates_for(driver, ns_of(run.cruise), longest);
   rates.insert(rates.end(), of_floor.begin(), of_floor.end());
   std::ranges::sort(rates, std::greater<>(), &Rate::ask);
-  const auto same = std::ranges::unique(rates, {}, &Rate::ask);
-  rates.erase(same.begin(), same.end());
+  const auto same = [](const Rate& one, const Rate& other) { return one.ask == other.ask; };
+  rates.erase(std::unique(rates.begin(), rates.end(), same), rates.end());
   const std::int64_t change_us = kChangeUs + (status_->empty ? 0 : kUnseenUs);
   planner_ = Planner(std::move(rates), static_cast<std::uint64_t>(change_us) * 1000);
   for (const auto& [ask, made] : made_) planner_.learn(ask, made);
@@ -304,22 +314,23 @@ void Master::plan_rates(const bushd_run& run) {
 void Master::replace(McuIndex, std::uint16_t, Tick first) {
   if (!run_ || !run_->planned) return;
   Run& run = *run_;
-  const auto plan = source_.plan_at(kMcu, 0, first);
+  const auto plan = plan_from(first);
   if (!plan) return;
-  if (plan->steps_done < run.written) {
+  const Ticks by_ticks(*plan);
+  if (by_ticks.made() < run.written) {
     events_.push_back(link::ReplacementFailed{kMcu, 1});
     return;
   }
   plan_rates(*plan);
   wake_us_ = 0;
   if (first > run.start) {
-    run.change = Run::Change{.at = first, .run = *plan};
-    run.ahead.then = *plan;
-    return;
+    run.change = Run::Change{.at = first, .plan = by_ticks};
+    run.ahead.become(plan->run);
+    return keep_delay_of(run.ahead);
   }
-  run.ahead = {*plan};
-  run.by_ticks = *plan;
-  run.direction = plan->direction;
+  run.ahead = Steps(*plan);
+  run.by_ticks = by_ticks;
+  if (!plan->line) run.direction = plan->run.direction < 0 ? -1 : 1;
 }
 
 // From now on ticks go by the clock, for the plan does not tell any more where the motor is.
@@ -328,20 +339,20 @@ void Master::leave_plan(std::int64_t now_us, bool immediately) {
     base_tick_ = run_->tick;
     base_us_ = now_us;
     run_->planned = false;
+    run_->pace.reset();
   }
   ramp_down(immediately);
   report_due_us_ = now_us;
 }
 
 void Master::ramp_down(bool immediately) {
-  Steps& ahead = run_->ahead;
-  ahead.then.reset();
+  Run& run = *run_;
   // One that has not made a step need not begin in order to stop.
-  if (immediately || run_->written == 0) {
-    ahead.run = no_steps();
-  } else {
-    bushd_run_ramp_down(&ahead.run);
-  }
+  if (immediately || run.written == 0) return run.ahead.end();
+  const bool changed = run.change && run.change->plan.run_steps() <= run.ahead.run_steps();
+  run.ahead.ramp_down(changed ? run.change->plan : run.by_ticks);
+  run.change.reset();
+  keep_delay_of(run.ahead);
 }
 
 void Master::end_run(std::int64_t now_us) {
@@ -357,7 +368,8 @@ void Master::end_run(std::int64_t now_us) {
 }
 
 void Master::drop(McuIndex, std::uint8_t) {
-  if (run_ && run_->planned && run_->ahead.left() > 0) leave_plan(now_us_, false);
+  if (!run_ || !run_->planned) return;
+  if (run_->ahead.left() > 0 || run_->pace) leave_plan(now_us_, false);
 }
 
 void Master::emergency_stop(bushd_stop_mode mode) {
@@ -396,7 +408,7 @@ void Master::report(std::int64_t now_us) {
   std::int64_t position = position_;
   view_.tick = std::max(view_.tick, tick_at(now_us));
   if (run_) {
-    const std::uint32_t made = run_->planned ? run_->by_ticks.steps_done : run_->gone;
+    const std::uint32_t made = run_->planned ? run_->by_ticks.made() : run_->gone;
     position = run_->from_steps + run_->direction * std::int64_t{made};
   }
   bushd_report report{};

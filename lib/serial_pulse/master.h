@@ -14,6 +14,9 @@
 //
 // Ticks follow the motor, as docs/decisions/0043-bus-kinds.md says: the reported one is the last at
 // whose beginning the plan had made no more steps than have left.
+//
+// On a line with other ports (link/line_pace.h) it makes its motor's part of the line's run, no
+// step before the line's time, and its ticks are not ahead of that (line.cpp).
 #pragma once
 
 #include <algorithm>
@@ -38,7 +41,7 @@ constexpr std::int64_t us_of(std::int64_t ns) {
   return (ns + 999) / 1000;
 }
 
-class Master final : public link::BusMaster {
+class Master final : public link::BusMaster, private link::LinePort {
  public:
   // Bytes under way, at most: where one takes nearly as long or longer, it and as much before it.
   static constexpr std::int64_t kMostAheadUs = 20'000;
@@ -77,6 +80,9 @@ class Master final : public link::BusMaster {
   link::Tick earliest_replace(std::int64_t now_us) const override;
   link::Tick earliest_retarget(std::int64_t now_us, link::Tick start) const override;
   void begin(link::McuIndex, std::uint8_t, link::Tick start) override;
+  bool keeps_pace() const override { return true; }
+  void begin_in_pace(link::McuIndex, std::uint8_t, link::Tick start,
+                     link::LinePace::Place place) override;
   void begin_table_run(link::McuIndex mcu, std::uint8_t motor, link::Tick start,
                        link::TableRun) override {
     begin(mcu, motor, start);
@@ -102,17 +108,22 @@ class Master final : public link::BusMaster {
   struct Sent {
     std::int64_t gone_ns;  // when it has left, by its rate
     std::uint8_t steps;
+    std::int64_t takes_ns;
+    std::int64_t last_step_ns;  // behind its first one
+    // Of a line: times of its run at which the first and the last of them are due.
+    std::int64_t first_ns;
+    std::int64_t last_ns;
   };
   // Steps to be made. `ahead` is ahead of `by_ticks` by what is under way.
   struct Run {
     Steps ahead;
-    bushd_run by_ticks{};
+    Ticks by_ticks;
     link::Tick start;  // of its first tick
     link::Tick tick;   // of by_ticks
     bool planned;      // the source's, else of its own: homing, or a ramp-down
     struct Change {
       link::Tick at;
-      bushd_run run;  // from there on
+      Ticks plan;  // from there on
     };
     std::optional<Change> change{};  // that by_ticks has not come to
     int direction = 1;
@@ -122,6 +133,10 @@ class Master final : public link::BusMaster {
     std::uint32_t written = 0;
     std::uint32_t gone = 0;
     bool limited = false;  // a limit ends it
+    bool on_line = false;
+    std::optional<link::LinePace::Place> pace{};  // of a line, as long as it is planned
+    std::int64_t left_ns = 0;   // of a line: time of the run of the last step that has left
+    std::uint64_t kept_ns = 0;  // of a line: by the last byte, from its last step to its end
     bool slow = false;  // of homing: a byte is written when the one before it has left, and looked
   };
   struct Homing {
@@ -151,9 +166,8 @@ class Master final : public link::BusMaster {
   std::uint32_t unsure_steps() const;
 
   // Runs.
-  bushd_run no_steps() const;
-  void begin_run(std::int64_t now_us, const bushd_run& run, link::Tick start, bool planned);
-  void plan_rates(const bushd_run& run);
+  void begin_run(std::int64_t now_us, const link::MotorPlan& plan, link::Tick start, bool planned);
+  void plan_rates(const link::MotorPlan& plan);
   void advance_ticks(std::int64_t now_us, bool to_the_end);
   void leave_plan(std::int64_t now_us, bool immediately);
   void ramp_down(bool immediately);
@@ -162,6 +176,18 @@ class Master final : public link::BusMaster {
   void write(std::int64_t now_us, link::PulseOrder& order);
   bool may_write(std::int64_t now_us, link::PulseOrder& order);
   bool write_byte(std::int64_t now_us, link::PulseOrder& order);
+
+  // line.cpp
+  std::optional<link::MotorPlan> plan_from(link::Tick first);
+  link::Tick line_clock(std::int64_t now_us) const;
+  bool line_is_over(std::int64_t now_us);
+  void tell_line(std::int64_t now_us);
+  bool waits_for_line(std::int64_t now_us);
+  void keep_delay_of(const Steps& ahead);
+  std::int64_t hold_us_of(std::uint64_t delay_ns, std::uint64_t kept_ns) const;
+  link::RunProgress progress_at(std::int64_t now_ns) const override;
+  void measure_line(std::int64_t now_us);
+  void tell_note();
 
   // homing.cpp
   void follow_homing(std::int64_t now_us);
@@ -187,6 +213,8 @@ class Master final : public link::BusMaster {
   link::BusHealth bus_health_;
   std::vector<link::Event> events_;
   Pauses pauses_;
+  std::string pauses_note_;
+  std::string line_note_;                 // of the last one
   std::optional<std::int64_t> burst_us_;  // bytes have been written since then, without a rest
 
   bool open_ = false;

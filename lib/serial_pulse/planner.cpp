@@ -142,24 +142,14 @@ void Planner::learn(std::uint32_t ask, std::uint32_t made) {
   }
 }
 
-std::uint16_t Steps::take() {
-  if (then && run.steps_done >= then->steps_done) run = *std::exchange(then, std::nullopt);
-  return bushd_run_take_step(&run);
-}
-
-std::uint32_t Steps::left() const {
-  if (!then) return bushd_run_steps_left(&run);
-  return then->steps_done - run.steps_done + bushd_run_steps_left(&*then);
-}
-
 std::vector<std::uint64_t> delays_ahead(Steps steps, std::uint64_t horizon_ns, std::size_t most) {
   std::vector<std::uint64_t> delays;
   std::uint64_t sum_ns = 0;
   while (delays.size() < most && (sum_ns < horizon_ns || delays.size() < 2 * kMostSteps)) {
-    const std::uint64_t delay = steps.take();
-    if (delay == 0) break;
-    delays.push_back(delay * steps.run.table->time_unit_ns);
-    sum_ns += delays.back();
+    const std::uint64_t delay_ns = steps.take_ns();
+    if (delay_ns == 0) break;
+    delays.push_back(delay_ns);
+    sum_ns += delay_ns;
   }
   return delays;
 }
@@ -170,7 +160,7 @@ Survey survey(bushd_run run, Planner planner) {
   bool first = true;
   std::uint64_t after_ns = 0;  // kept behind the byte before
   while (!bushd_run_done(&run)) {
-    const auto delays = delays_ahead({run}, planner.horizon_ns(), Planner::kLookAhead);
+    const auto delays = delays_ahead(Steps(run), planner.horizon_ns(), Planner::kLookAhead);
     const Ahead ahead{.delays_ns = delays,
                       .to_the_end = delays.size() == bushd_run_steps_left(&run)};
     const auto [rate, pattern, then_wait] = planner.choose(ahead, now);

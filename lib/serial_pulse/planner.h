@@ -23,6 +23,7 @@
 
 #include "engine/run.h"
 #include "serial_pulse/pattern.h"
+#include "serial_pulse/steps.h"
 
 namespace bushd::serial_pulse {
 
@@ -95,15 +96,6 @@ class Planner {
 const Pattern* fastest_byte(const Ahead& ahead, std::size_t from, const Rate& rate);
 
 std::uint64_t byte_ns(std::uint32_t baud);  // how long a byte takes, rounded up
-
-// Steps of a run, and of the one that it becomes when it has made some.
-struct Steps {
-  bushd_run run;
-  std::optional<bushd_run> then{};  // from where it has made `then.steps_done`
-
-  std::uint16_t take();  // bushd_run_take_step
-  std::uint32_t left() const;
-};
 
 // The next delays, without making the steps.
 std::vector<std::uint64_t> delays_ahead(Steps steps, std::uint64_t horizon_ns, std::size_t most);

@@ -59,12 +59,14 @@ Error write_error(const std::string& path, const char* what, int error_number) {
 
 Result<std::unique_ptr<VcdWriter>> VcdWriter::create(const std::string& path,
                                                      std::span<const std::uint8_t> addresses,
-                                                     const std::set<std::uint8_t>& measured) {
+                                                     const std::set<std::uint8_t>& measured,
+                                                     const std::string& comment) {
   File file(std::fopen(path.c_str(), "we"));
   if (!file) return fail(write_error(path, "the trace cannot be created", errno));
   // Text is gathered here already; a second buffer would only delay the news of a full disk.
   std::setvbuf(file.get(), nullptr, _IONBF, 0);
   std::unique_ptr<VcdWriter> writer(new VcdWriter(path, std::move(file), addresses.size()));
+  if (!comment.empty()) writer->text_ += "$comment " + comment + " $end\n";
   writer->write_head(addresses, measured);
   writer->flush_text();
   if (writer->error_) return fail(*writer->error_);

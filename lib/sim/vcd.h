@@ -27,10 +27,11 @@ class VcdWriter final : public EdgeSink {
  public:
   // Creates (or empties) the file and writes its head. `addresses` in the order of the MCUs on the
   // bus.
-  // Those of `measured` have windings.
+  // Those of `measured` have windings. `comment`: for the head, if not empty.
   static Result<std::unique_ptr<VcdWriter>> create(const std::string& path,
                                                    std::span<const std::uint8_t> addresses,
-                                                   const std::set<std::uint8_t>& measured = {});
+                                                   const std::set<std::uint8_t>& measured = {},
+                                                   const std::string& comment = {});
 
   // A writer that was not closed leaves a file without its end; call close() to know that all is
   // written.

@@ -266,14 +266,16 @@ void Lab::pulse(BusId id, const link::PulseOrder& order) {
   if (order.positive) bus.drive->set_direction(now_ns_, *order.positive);
   if (order.baud) bus.drive->set_baud(now_ns_, *order.baud);
   bus.held.insert(bus.held.end(), order.bytes.begin(), order.bytes.end());
-  if (!pulses_stalled_) bus.drive->send(now_ns_, std::exchange(bus.held, {}));
+  if (!bus.stalled) bus.drive->send(now_ns_, std::exchange(bus.held, {}));
   bus.ordered = true;
 }
 
-void Lab::stall_pulses(bool stalled) {
-  pulses_stalled_ = stalled;
-  for (SimulatedBus& bus : buses_) {
-    if (bus.drive && !stalled) bus.drive->send(now_ns_, std::exchange(bus.held, {}));
+void Lab::stall_pulses(bool stalled, std::optional<std::size_t> of) {
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    SimulatedBus& bus = buses_[b];
+    if (!bus.drive || (of && *of != b)) continue;
+    bus.stalled = stalled;
+    if (!stalled) bus.drive->send(now_ns_, std::exchange(bus.held, {}));
   }
 }
 

@@ -160,8 +160,8 @@ class Lab : public daemon::Outputs, private state::Backend {
   sim::PulseDrive& drive(std::size_t index) { return *buses_[index].drive; }
   // What the drivers of such ports can do, from the next time that one is opened.
   link::PulseStatus pulse_driver = {.any_rate = true, .empty = true};
-  // Their drivers pass nothing on, and say so, until this ends.
-  void stall_pulses(bool stalled);
+  // Their drivers pass nothing on, and say so, until this ends; of all buses, or of this one.
+  void stall_pulses(bool stalled, std::optional<std::size_t> bus = {});
   sim::CommutatorBoard& board(std::size_t index) { return buses_[index].board->board; }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   const std::vector<std::string>& move_lines() const { return move_lines_; }
@@ -174,6 +174,7 @@ class Lab : public daemon::Outputs, private state::Backend {
     std::unique_ptr<sim::PulseDrive> drive = {};
     bool ordered = false;                 // the drive's status is to be told
     std::vector<std::uint8_t> held = {};  // by its driver
+    bool stalled = false;
     std::vector<std::uint8_t> received;
     bool plugged = true;
     std::unique_ptr<sim::BoardLine> board = {};
@@ -204,7 +205,6 @@ class Lab : public daemon::Outputs, private state::Backend {
   void advance();
   void pulse(BusId bus, const link::PulseOrder& order) override;
   void tell_pulse_status();
-  bool pulses_stalled_ = false;
   void run_buses();  // until now; the daemon reads what has arrived
 
   std::filesystem::path directory_;

@@ -357,14 +357,6 @@ TEST(SerialPulse, SlowSpeedsWaitBetweenBytes) {
   }
 }
 
-TEST(SerialPulse, RefusesWhatNeedsTicks) {
-  Desk lab;
-  lab.connect();
-  const auto line = lab.send(
-      api::MoveLine{.kind = api::Move::Kind::kRelative, .motors = motor_steps({"m"}, {10})});
-  EXPECT_NE(lab.wait(line).reason.find("runs of tables only"), std::string::npos);
-}
-
 TEST(SerialPulse, TellsPausesAmidBytes) {
   Desk lab;
   lab.connect();

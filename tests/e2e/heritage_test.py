@@ -5,6 +5,7 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
 import unittest
 
 from rig import TOP, EndToEndTest, Running, program
@@ -82,8 +83,14 @@ class Heritage(EndToEndTest):
         self.assertEqual(self.programs[1].end(), 0)
         self.assertEqual(self.programs[0].end(), 0)
         self.assertIn("step0 400 (at +400), step5 300 (at +300)", self.programs[0].said())
-        steps = self.file("board.vcd").read_text()
-        self.assertIn("$scope module mcu1 $end", steps)
+        words = "tools/check-pulses --bus board --moves moves.jsonl --trace board.vcd"
+        self.assertIn(words, (TOP / "docs" / "heritage.md").read_text())
+        judge, *arguments = words.split()
+        judged = subprocess.run(
+            [sys.executable, "-B", TOP / judge, *arguments], cwd=self.folder, capture_output=True, text=True, check=False
+        )
+        self.assertEqual(judged.returncode, 0, judged.stdout + judged.stderr)
+        self.assertIn("2 runs, 700 steps", judged.stdout)
 
     def test_keypads(self):
         files, commands = sections()["Keypads"]

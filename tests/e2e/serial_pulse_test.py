@@ -32,6 +32,19 @@ home = {{ direction = "negative", most_steps = 3000 }}
 """
 
 
+SECOND = """
+[[bus]]
+name = "com2"
+kind = "serial-pulse"
+port = "{port}"
+direction_line = "rts"
+[[motor]]
+name = "y"
+mcu = "com2"
+group = "table"
+"""
+
+
 class SerialPulse(EndToEndTest):
     def begin(self, *options):
         self.file("bushd.toml").write_text(CONFIG.format(port=self.file("port"), control=self.file("control")))
@@ -104,6 +117,46 @@ class SerialPulse(EndToEndTest):
         made, position = self.end()
         self.assertLessEqual(abs(position - x["position_steps"]), most)
         self.assertGreater(made, 1000)
+
+    def begin_two(self):
+        both = CONFIG.format(port=self.file("port"), control=self.file("control"))
+        self.file("bushd.toml").write_text(both + SECOND.format(port=self.file("port2")))
+        self.bushsim = self.start_bushsim(options=("--bus", "com1"))
+        command = [program("BUSHSIM"), "--config", self.file("bushd.toml"), "--bus", "com2"]
+        command += ["--link", self.file("port2"), "--trace", self.file("second.vcd")]
+        self.second = self.start(command, "bushsim-second.log", True)
+        self.wait_until("the second bushsim to offer its port", lambda: "bushsim: ready" in self.second.said())
+        self.bushd = self.start_bushd()
+        self.wait_until("the ports to be READY", lambda: self.mcu_states() == ["READY", "READY"])
+        for motor in "xy":
+            self.command("set", motor, "0")
+
+    def apart_ms(self, said):
+        found = re.search(r"the ports were at most ([0-9.]+) ms apart", said)
+        self.assertTrue(found, said)
+        return float(found[1])
+
+    def test_two_ports_move_along_lines(self):
+        self.begin_two()
+        apart = []
+        for x, y in ((900, 611), (-1500, 40), (7, -700)):
+            apart.append(self.apart_ms(self.command("move", "--line", "--wait", "x", x, "y", y).stdout))
+        self.assertEqual([self.motors()[name]["position_steps"] for name in "xy"], [-593, -49])
+        line = self.start_move("--line", "x", "-40000", "y", "20000")
+        self.wait_until_beyond(1500)
+        self.assertIn("ms ahead of the slowest port; ports were at most", self.command("status").stdout)
+        self.command("stop", "y")
+        self.assertEqual(line.process.wait(60), 1)
+        apart.append(self.apart_ms(line.said()))
+        ends = [self.motors()[name]["position_steps"] for name in "xy"]
+        self.assertEqual(self.second.end(), 0)
+        self.assertEqual(self.end()[1], ends[0])
+        self.assertIn(f"(at {ends[1]:+})", self.second.said())
+        command = [sys.executable, "-B", TOP / "tools" / "check-pulses", "--bus", "com1", "--moves", self.file("moves.jsonl")]
+        command += ["--trace", self.file("trace.vcd"), "--other", f"com2={self.file('second.vcd')}"]
+        ran = self.run_program(*command, "--apart-ms", str(max(apart)))
+        self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
+        print(apart, ran.stdout, end="")
 
     def test_the_commands_of_the_document(self):
         document = (TOP / "docs" / "heritage.md").read_text()

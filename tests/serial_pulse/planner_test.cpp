@@ -53,7 +53,7 @@ Made make(bushd_run run, Planner planner, std::uint32_t per_mille_more,
   Fraction since_last;  // from the last fall to the end of the byte that it is in
   for (std::uint64_t bytes = 0; !bushd_run_done(&run); ++bytes) {
     if (bytes == end_after) bushd_run_ramp_down(&run);
-    const auto delays = delays_ahead({run}, planner.horizon_ns(), Planner::kLookAhead);
+    const auto delays = delays_ahead(Steps(run), planner.horizon_ns(), Planner::kLookAhead);
     const Ahead ahead{.delays_ns = delays,
                       .to_the_end = delays.size() == bushd_run_steps_left(&run)};
     const auto [rate, pattern, then_wait] = planner.choose(ahead, asked);

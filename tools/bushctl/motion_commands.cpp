@@ -79,7 +79,8 @@ void add_move(CommandLine& line) {
           "NAME --to POSITION --speed-at AT:SPEED [--speed-at AT:SPEED...] moves one motor, from "
           "each of these positions on not faster than that, until the next one; it makes no last "
           "approach for backlash.")
-      .flag("--line", &options->line, "Along a straight line; all motors on one bus")
+      .flag("--line", &options->line,
+            "Along a straight line; all motors on one bus, or each at a serial port of its own")
       .flag("--wait", &options->wait, "Wait for the result")
       .option("--speed", &options->speed, kSpeed)
       .option_with("--line", "--duration", &options->duration,

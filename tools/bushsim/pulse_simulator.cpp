@@ -46,9 +46,13 @@ PulseSimulator::~PulseSimulator() {
 }
 
 Result<std::unique_ptr<PulseSimulator>> PulseSimulator::create(const Options& options) {
+  const std::int64_t start_ns = monotonic_ns();
   std::unique_ptr<bushd::sim::VcdWriter> trace;
   if (!options.trace.empty()) {
-    auto created = bushd::sim::VcdWriter::create(options.trace, std::array{kAddress});
+    // By it traces of two ports can be laid side by side.
+    auto created =
+        bushd::sim::VcdWriter::create(options.trace, std::array{kAddress}, {},
+                                      fmt::format("time 0 is {} ns of CLOCK_MONOTONIC", start_ns));
     if (!created) return fail(created.error());
     trace = std::move(*created);
   }
@@ -56,7 +60,7 @@ Result<std::unique_ptr<PulseSimulator>> PulseSimulator::create(const Options& op
   if (!waiter) return fail(waiter.error());
   std::unique_ptr<PulseSimulator> simulator(
       new PulseSimulator(options, std::move(*waiter), std::move(trace)));
-  simulator->start_ns_ = monotonic_ns();
+  simulator->start_ns_ = start_ns;
   if (const auto plugged = simulator->plug_in(); !plugged) return fail(plugged.error());
   return simulator;
 }
