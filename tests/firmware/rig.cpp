@@ -121,6 +121,7 @@ Rig::Rig(RigOptions options)
   config.current_motors = options.current_motors;
   config.velocity = velocity_.data();
   config.velocity_motors = options.velocity_motors;
+  config.scratch = options.scratch ? &scratch_ : nullptr;
   config.address = options.address;
   config.motors = options.motors;
   config.slots = options.slots;
