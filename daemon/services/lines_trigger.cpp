@@ -25,6 +25,13 @@ void Lines::request(const api::Asker& asker, const api::ArmLine& request) {
   arm(request, number, kept);
 }
 
+api::MoveLine Lines::as_move(const api::ArmLine& request) {
+  return {.kind = request.kind,
+          .motors = request.motors,
+          .speed = request.speed,
+          .duration_s = request.duration_s};
+}
+
 Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
   const auto motors = installation_.find(request.motors);
   if (!motors) return fail(motors.error());
@@ -34,10 +41,7 @@ Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
     return fail(motor.busy_text() + (motor.moves() ? "; stop it first" : "; disarm it first"));
   }
   if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
-  auto line = line_of({.kind = request.kind,
-                       .motors = request.motors,
-                       .speed = request.speed,
-                       .duration_s = request.duration_s});
+  auto line = line_of(as_move(request));
   if (!line) return line;
   for (std::size_t i = 0; i < line->motors.size(); ++i) {
     if (line->way.increment(i) != 0) continue;
@@ -69,14 +73,7 @@ Result<void> Lines::may_wait(const Line& line) const {
             motor.name(), mcu.name()));
       }
     }
-    if (!mcu.has_table(line.way.table()->view())) {
-      return fail(fmt::format(
-          "the line goes by a table of its own, which MCU {} does not have: a line that waits for "
-          "a "
-          "trigger needs motors of one table, whose ways are equal or a tenth of the longest at "
-          "most. Move it without a trigger",
-          mcu.name()));
-    }
+    if (auto has_table = check_table(line, mcu); !has_table) return has_table;
     if (!mcu.keeps_up_with(line.way.table()->view(), line.way.floor(), has_all_of(line, mcu))) {
       return fail(fmt::format(
           "MCU {} makes no line as fast as this one by itself; give a lower --speed, or move them "
@@ -85,6 +82,25 @@ Result<void> Lines::may_wait(const Line& line) const {
     }
   }
   return {};
+}
+
+// It has been uploaded if that was possible.
+Result<void> Lines::check_table(const Line& line, const Mcu& mcu) const {
+  const bushd_table& table = line.way.table()->view();
+  if (mcu.has_table(table)) return {};
+  const std::string what =
+      fmt::format("the line goes by a table of its own, which MCU {} does not have", mcu.name());
+  if (!mcu.can_upload(table)) {
+    return fail(what +
+                ", and has no room for: a line that waits for a trigger needs motors of one table "
+                "there, whose ways are equal or a tenth of the longest at most. Move it without a "
+                "trigger");
+  }
+  if (!installation_.rests(mcu)) {
+    return fail(what +
+                ", and takes only while all its motors rest: wait for their results, or stop them");
+  }
+  return fail(what + ", and has not taken: try again, or move it without a trigger");
 }
 
 void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {

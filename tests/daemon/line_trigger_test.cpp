@@ -247,12 +247,12 @@ class ArmedLine : public testing::Test {
 };
 
 TEST_F(ArmedLine, IsRefusedWhereItCannotWait) {
-  Lab lab(hall(2, 2, "fine"));
+  Lab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_SCRATCH);
   lab.connect();
   EXPECT_THAT(refusal(lab, kMotors, kInMcus, 49), HasSubstr("allowed: 50 to 1650000"));
   EXPECT_THAT(refusal(lab, kMotors, kSteps), HasSubstr("m04: a move of no steps"));
   EXPECT_THAT(refusal(lab, kMotors, {3000, -1201, 17, 3}),
-              HasSubstr("a table of its own, which MCU hall:1 does not have"));
+              HasSubstr("a table of its own, which MCU hall:1 does not have, and has no room for"));
   EXPECT_THAT(refusal(lab, {"m09"}, {1}), HasSubstr("no motor \"m09\""));
   const auto waits =
       lab.send(api::ArmLine{.delay_us = 100, .motors = motor_steps({"m01", "m03"}, {500, 500})});
