@@ -146,6 +146,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     on_line.last_run = line.points.size() == 1 && to == line.target;
     const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
     motion::LineShare share = line.share(i, from, to);
+    share.line = number;
     share.in_mcus = by_mcus;
     motor.start_line(on_line, std::move(share), start, line.path ? 0 : line.way.floor());
   }

@@ -61,6 +61,12 @@ class Lines final : public Service {
     std::vector<std::int64_t> steps;
     std::vector<std::uint16_t> floors;
   };
+  // By the trigger.
+  struct Begin {
+    MotorId motor;
+    motion::Tick start;
+    std::int64_t late_ns;
+  };
   struct Line {
     std::vector<MotorId> motors;  // in the request's order, as all that is by motor
     std::vector<Point> points;    // the one that the way leads to, and those to come
@@ -75,6 +81,7 @@ class Lines final : public Service {
     // For the trigger: some of its motors, or all while none has begun.
     bool waits = false;
     bool begun = true;
+    std::vector<Begin> begins{};  // of those for which it has come
 
     std::uint32_t longest() const;
     std::int64_t position_at(std::size_t motor, std::uint32_t step) const;
@@ -138,10 +145,10 @@ class Lines final : public Service {
   Result<void> may_wait(const Line& line) const;
   void arm(const api::ArmLine& request, std::uint64_t number, Line& line);
   bool waits(MotorId motor, std::uint64_t number) const;
+  void note_begin(MotorId motor, std::uint64_t number, Line& line) const;
   // Returns whether all of its motors that are left have begun.
   bool follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line);
   std::optional<std::string> cause_to_wait_no_more(const Line& line,
-                                                   const std::vector<MotorId>& begun,
                                                    const std::vector<MotorId>& waiting) const;
   void keep_together(std::int64_t now_us, const std::vector<MotorId>& begun);
 

@@ -110,7 +110,9 @@ void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
   std::vector<motion::LineShare> shares;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     shares.push_back(line.share(i, 0, line.longest()));
+    shares.back().line = number;
     shares.back().in_mcus = true;
+    shares.back().waits = true;
     const Mcu& mcu = installation_.mcu_of(line.motors[i]);
     parts[mcu.id].push_back({.motor = installation_[line.motors[i]].output().value,
                              .run = mcu.line_run(shares.back(), floor, 0)});
@@ -138,16 +140,17 @@ bool Lines::waits(MotorId motor, std::uint64_t number) const {
 
 // Of its MCUs: in the first reports after the edge some have begun and others are yet to tell.
 bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line) {
-  std::vector<MotorId> begun;
+  std::vector<MotorId> begun;  // and not over
   std::vector<MotorId> waiting;
   for (const MotorId id : line.motors) {
+    note_begin(id, number, line);
     if (on_line(id, number) != nullptr) begun.push_back(id);
     if (waits(id, number)) waiting.push_back(id);
   }
   line.waits = !waiting.empty();
-  if (begun.empty()) return !line.waits;  // an end of one that waits ends the others (Moves)
+  if (line.begins.empty()) return !line.waits;  // an end of one that waits ends the others (Moves)
   line.begun = true;
-  if (const auto cause = cause_to_wait_no_more(line, begun, waiting)) {
+  if (const auto cause = cause_to_wait_no_more(line, waiting)) {
     std::erase_if(waiting,
                   [&](MotorId id) { return installation_[id].as<motion::Armed>()->stops; });
     for (const MotorId id : waiting) installation_[id].stop(*cause);
@@ -162,21 +165,20 @@ bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line
   return !line.waits;
 }
 
+// A short line may be over by the report that tells of its beginning.
+void Lines::note_begin(MotorId id, std::uint64_t number, Line& line) const {
+  const motion::Axis& axis = installation_[id].axis();
+  const bool has_begun = axis.line() && axis.line()->line == number && !axis.line()->waits;
+  if (!has_begun || std::ranges::find(line.begins, id, &Begin::motor) != line.begins.end()) return;
+  line.begins.push_back({.motor = id, .start = axis.start_tick(), .late_ns = axis.late_ns()});
+}
+
 std::optional<std::string> Lines::cause_to_wait_no_more(const Line& line,
-                                                        const std::vector<MotorId>& begun,
                                                         const std::vector<MotorId>& waiting) const {
-  const auto begin_of = [this](MotorId id) -> const motion::Axis& {
-    return installation_[id].axis();
-  };
-  const auto earlier = [&](MotorId a, MotorId b) {
-    const auto time = [](const motion::Axis& axis) {
-      return std::pair(axis.start_tick(), axis.late_ns());
-    };
-    return time(begin_of(a)) < time(begin_of(b));
-  };
-  const auto [first, last] = std::ranges::minmax_element(begun, earlier);
+  const auto time = [](const Begin& begin) { return std::pair(begin.start, begin.late_ns); };
+  const auto [first, last] = std::ranges::minmax_element(line.begins, {}, time);
   for (const MotorId id : line.motors) {
-    const bool is_left = std::ranges::find(begun, id) != begun.end() ||
+    const bool is_left = std::ranges::find(line.begins, id, &Begin::motor) != line.begins.end() ||
                          std::ranges::find(waiting, id) != waiting.end();
     if (!is_left) return installation_[id].name() + " did not begin with the others";
   }
@@ -185,18 +187,17 @@ std::optional<std::string> Lines::cause_to_wait_no_more(const Line& line,
       return installation_[id].name() + " was stopped before it began";
     }
     const Mcu& mcu = installation_.mcu_of(id);
-    if (mcu.view().tick <= begin_of(*first).start_tick() + 1) continue;
+    if (mcu.view().tick <= first->start + 1) continue;
     return fmt::format("the trigger has come to MCU {}, and not to MCU {}",
-                       installation_.mcu_of(*first).name(), mcu.name());
+                       installation_.mcu_of(first->motor).name(), mcu.name());
   }
-  const std::int64_t tick_ns = begin_of(*first).tick_ns();
+  const std::int64_t tick_ns = installation_[first->motor].axis().tick_ns();
   const std::int64_t apart_ns =
-      (begin_of(*last).start_tick() - begin_of(*first).start_tick()) * tick_ns +
-      begin_of(*last).late_ns() - begin_of(*first).late_ns();
+      (last->start - first->start) * tick_ns + last->late_ns - first->late_ns;
   if (apart_ns <= tick_ns) return std::nullopt;
   return fmt::format("the trigger came to MCU {} {} us later than to MCU {}",
-                     installation_.mcu_of(*last).name(), apart_ns / 1000,
-                     installation_.mcu_of(*first).name());
+                     installation_.mcu_of(last->motor).name(), apart_ns / 1000,
+                     installation_.mcu_of(first->motor).name());
 }
 
 // What was asked of those that were known to have begun is for all.
