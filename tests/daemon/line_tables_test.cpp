@@ -139,6 +139,71 @@ TEST_P(UploadedLine, BeginsByATrigger) {
   EXPECT_EQ(check(lab, ""), 0) << said();
 }
 
+// The daemon plans the stop, and both must count alike.
+TEST_P(UploadedLine, IsCountedAlikeWhereverItIsStopped) {
+  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
+  lab.connect();
+  for (int i = 0; i < 12; ++i) {
+    SCOPED_TRACE(i);
+    const auto move = lab.send(api::ArmLine{
+        .edge = api::Edge::kRising,
+        .delay_us = 100,
+        .motors = motor_steps({"m01", "m02", "m03"}, {233, -50, i % 2 == 0 ? 1907 : -1907})});
+    lab.run_for(0.5);
+    EXPECT_EQ(lab.last_reply(move).phase, Answer::kAccepted) << lab.last_reply(move).reason;
+    lab.bus(0).mcu(0).set_inputs({0, BUSHD_INPUT_TRIGGER});
+    lab.run_for(0.004 + 0.0037 * i);
+    lab.bus(0).mcu(1).set_inputs({0, BUSHD_INPUT_TRIGGER});
+    const Answer result = lab.wait(move);
+    EXPECT_EQ(result.result, "stopped") << result.reason;
+    lab.run_for(0.3);
+    for (const char* motor : {"m01", "m02", "m03"}) {
+      EXPECT_EQ(lab.motor(motor).position_steps, lab.shaft_steps(motor));
+    }
+    for (const std::size_t mcu : {0, 1}) lab.bus(0).mcu(mcu).set_inputs({});
+  }
+  expect_clean(lab);
+}
+
+// Of one MCU they stand already when those of the other one, which has not heard that they wait no
+// more, have begun and are to stop farther along the line.
+TEST_P(UploadedLine, IsCountedAlikeIfAnMcuBeginsLate) {
+  for (int i = 2; i < 24; ++i) {
+    SCOPED_TRACE(i);
+    Lab lab(hall(2, 2, GetParam()));
+    lab.connect();
+    const auto move =
+        lab.send(api::ArmLine{.edge = api::Edge::kRising,
+                              .delay_us = 100,
+                              .motors = motor_steps({"m01", "m02", "m03"}, {233, -50, 1907})});
+    lab.run_for(0.5);
+    lab.bus(0).mcu(0).set_inputs({0, BUSHD_INPUT_TRIGGER});
+    lab.run_for(0.002 * i);
+    lab.bus(0).mcu(1).set_inputs({0, BUSHD_INPUT_TRIGGER});
+    // What the first one is told arrives, the second one is deaf for a while.
+    lab.run_for(0.01);
+    bushd_receiver receiver{};
+    lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
+      bool arrives = true;
+      for (const std::uint8_t byte : bytes) {
+        bushd_frame frame;
+        const auto status = bushd_receive_byte(&receiver, byte, &frame);
+        if (status == BUSHD_RECEIVE_FRAME && frame.address == 2) arrives = false;
+      }
+      return arrives;
+    };
+    lab.run_for(0.15);
+    lab.on_send = nullptr;
+    const Answer result = lab.wait(move);
+    EXPECT_EQ(result.result, "stopped") << result.reason;
+    lab.run_for(0.3);
+    for (const char* motor : {"m01", "m02", "m03"}) {
+      EXPECT_EQ(lab.motor(motor).position_steps, lab.shaft_steps(motor));
+    }
+    EXPECT_THAT(lab.errors(), testing::IsEmpty());
+  }
+}
+
 // Three motors an MCU; the third of each is on no line.
 class WaitingLine : public testing::Test {
  protected:

@@ -39,6 +39,7 @@ void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   const Request& request = asked.request;
   check_limits(now_ns, asked);
   if (request.is_stop()) stop_accepted(request);
+  if (request.ask == Ask::kDisarm) disarm_accepted(request);
   if (request.ask == Ask::kPause || request.ask == Ask::kResume) pause_accepted(now_ns, request);
   if (request.ask == Ask::kHold || request.ask == Ask::kRelease) hold_accepted(request);
   if (request.ask == Ask::kConfigure) configure_accepted(asked);
