@@ -86,8 +86,10 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   asked.began.push_back(request.ask != Ask::kArm);
   asked.told.push_back(false);
   asked.stops.push_back(false);
-  // The trigger begins it before anybody tells.
-  if (request.ask == Ask::kArm && request.line && on_run) {
+  // The trigger begins it before anybody tells; what came before is over.
+  if (request.ask == Ask::kArm && request.line && on_run && on_run_end) {
+    on_run(motor.mcu, motor.output, true, true);
+    on_run_end(now_ns, motor.mcu, motor.output, "stopped");
     on_run(motor.mcu, motor.output, true, true);
   }
   if (is_shutter(motor) && request.client != ShutterModel::kClient) shutter_.disturbed();
