@@ -153,7 +153,11 @@ bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line
   if (const auto cause = cause_to_wait_no_more(line, waiting)) {
     std::erase_if(waiting,
                   [&](MotorId id) { return installation_[id].as<motion::Armed>()->stops; });
-    for (const MotorId id : waiting) installation_[id].stop(*cause);
+    for (const MotorId id : waiting) {
+      installation_[id].stop(*cause);
+      // It may begin before its MCU hears of that.
+      open_.say(id, api::Outcome::kStopped, {api::Outcome::kStopped, "stopped, because " + *cause});
+    }
     moves_.stop(now_us, waiting);
     const bool all_stop = std::ranges::all_of(begun, [&](MotorId id) {
       return installation_[id].axis().stopping() && !installation_[id].is_paused();
