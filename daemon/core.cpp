@@ -34,8 +34,9 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       position_compare_(installation_),
       pseudo_axes_(installation_),
       state_(installation_, pseudo_axes_, outputs),
+      line_tables_(installation_, lines_),
       departures_(
-          installation_, interlocks_, kept_, idle_drivers_,
+          installation_, interlocks_, kept_, idle_drivers_, line_tables_,
           [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
             carry_out(now_us, asker, request);
           },

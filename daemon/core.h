@@ -122,6 +122,7 @@ class Core {
   PositionCompare position_compare_;
   PseudoAxes pseudo_axes_;
   StatePublisher state_;
+  LineTables line_tables_;
   Departures departures_;
   HealthPublisher health_;
   MotorSettings settings_;

@@ -169,7 +169,7 @@ std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const
 
 link::LineRun Mcu::line_run(const motion::LineShare& share, std::uint16_t floor,
                             link::Tick ticks) const {
-  return {.slot = *master_.slot_of(on_bus_, share.table->view()),
+  return {.slot = master_.slot_of(on_bus_, share.table->view()).value_or(BUSHD_SCRATCH_SLOT),
           .floor = floor,
           .longest = share.longest,
           .from = share.from,
@@ -182,6 +182,10 @@ link::LineRun Mcu::line_run(const motion::LineShare& share, std::uint16_t floor,
 bool Installation::any_moves(const Mcu& mcu) const {
   return std::ranges::any_of(
       mcu.motors(), [this](MotorId motor) { return !motors_[motor].is<motion::Resting>(); });
+}
+
+bool Installation::rests(const Mcu& mcu) const {
+  return !any_moves(mcu) && (!mcu.online() || mcu.report().moving == 0);
 }
 
 bool Installation::by_table(const Mcu& mcu, std::int64_t steps) const {

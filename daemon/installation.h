@@ -101,6 +101,12 @@ class Mcu {
   bool can_run_line(const bushd_table& table, std::uint16_t floor, bool alone) const {
     return master_.can_run_line(on_bus_, table, floor, alone);
   }
+  bool makes_lines() const { return master_.makes_lines(on_bus_); }
+  // A table for lines (link::BusMaster::upload). Precondition: it rests, and has answered.
+  bool can_upload(const bushd_table& table) const { return master_.can_upload(on_bus_, table); }
+  void upload(const bushd_table& table) { master_.upload(on_bus_, table); }
+  bool uploads() const { return master_.uploads(on_bus_); }
+  void end_upload() { master_.end_upload(on_bus_); }
   bool can_trigger() const { return master_.can_trigger(on_bus_); }
   bool can_arm_lines() const { return master_.can_arm_lines(on_bus_); }
   bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }
@@ -128,7 +134,7 @@ class Mcu {
     master_.begin_table_run(on_bus_, output.value, start, run);
   }
   // Of a motor's share that the MCUs are to make themselves, in so many ticks. Precondition:
-  // can_run_line of its line.
+  // can_run_line of its line, or its table is yet to be uploaded.
   link::LineRun line_run(const motion::LineShare& share, std::uint16_t floor,
                          link::Tick ticks) const;
   link::LineRun line_run(const motion::Axis& axis) const {
@@ -209,6 +215,7 @@ class Installation {
   // With those that move on a line with one of them.
   std::vector<MotorId> with_lines(std::vector<MotorId> motors) const;
   bool any_moves(const Mcu& mcu) const;  // or is not at rest
+  bool rests(const Mcu& mcu) const;      // all of it, as planned and as reported
   // The MCU gets such a move as a whole and runs it by the motor's table.
   bool by_table(const Mcu& mcu, std::int64_t steps) const;
 

@@ -63,7 +63,7 @@ bool Departures::any_held(const std::vector<MotorId>& motors) const {
                              [&](const Held& held) { return has_common(held.motors, motors); });
 }
 
-Result<bool> Departures::make_ready(std::int64_t now_us, const Held& held) {
+Result<bool> Departures::make_ready(std::int64_t now_us, Held& held) {
   bool ready = true;
   const bool moves = !std::holds_alternative<api::SetPosition>(held.request);
   for (const MotorId motor : held.motors) {
@@ -73,11 +73,13 @@ Result<bool> Departures::make_ready(std::int64_t now_us, const Held& held) {
     if (!one) return fail(installation_[motor].name() + ": " + one.error().text());
     ready = ready && *one;
   }
-  return ready;
+  // When the line's motors are known to be where they are.
+  return ready && line_tables_.make_ready(now_us, held.request, held.table);
 }
 
 bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
-  if (!kept_.keeps() && idle_drivers_.none()) return false;
+  const bool may_wait = kept_.keeps() || !idle_drivers_.none() || LineTables::concerns(request);
+  if (!may_wait && held_.empty()) return false;
   auto motors = motors_of(request);
   if (!motors) return false;
   Held held{.asker = asker, .request = request, .motors = std::move(*motors), .since_us = now_us};
@@ -101,7 +103,8 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
   return true;
 }
 
-void Departures::refuse(const Held& held, const std::string& reason) {
+void Departures::refuse(Held& held, const std::string& reason) {
+  line_tables_.end(held.table);
   for (const MotorId motor : held.motors) kept_.not_wanted(motor);
   held.asker.answer(api::Refused{reason});
 }
@@ -115,7 +118,7 @@ bool Departures::is_let_go(std::int64_t now_us, const Held& held) {
 }
 
 void Departures::cancel_if(const std::function<bool(const Held&)>& concerned) {
-  std::erase_if(held_, [&](const Held& held) {
+  std::erase_if(held_, [&](Held& held) {
     if (!concerned(held)) return false;
     refuse(held, "stopped before it was carried out; nothing has moved");
     return true;
@@ -164,8 +167,9 @@ void Departures::step(std::int64_t now_us) {
       ++it;
       continue;
     }
-    const Held held = std::move(*it);
+    Held held = std::move(*it);
     it = held_.erase(it);
+    line_tables_.end(held.table);
     if (is_let_go(now_us, held)) {
       refuse(held,
              "its client was silent for longer than its keepalive time while the jog waited "

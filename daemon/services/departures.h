@@ -1,6 +1,6 @@
 // Requests that change where motors stand, until the disk knows that these motors are no longer at
-// rest, until their positions are restored, and until their drivers are enabled. Mostly a
-// millisecond or two, often none.
+// rest, until their positions are restored, and until their drivers are enabled; of lines also
+// until their MCUs have the table. Mostly a millisecond or two, often none.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,7 @@
 #include "daemon/service.h"
 #include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
+#include "daemon/services/line_tables.h"
 
 namespace bushd::daemon {
 
@@ -22,11 +23,13 @@ class Departures final : public Service {
   using CarryOut = std::function<void(std::int64_t now_us, const api::Asker&, const api::Request&)>;
   // `busy`: what was carried out before is still being begun; all that is held waits for it.
   Departures(const Installation& installation, const Interlocks& interlocks, KeptPositions& kept,
-             IdleDrivers& idle_drivers, CarryOut carry_out, std::function<bool()> busy)
+             IdleDrivers& idle_drivers, LineTables& line_tables, CarryOut carry_out,
+             std::function<bool()> busy)
       : installation_(installation),
         interlocks_(interlocks),
         kept_(kept),
         idle_drivers_(idle_drivers),
+        line_tables_(line_tables),
         carry_out_(std::move(carry_out)),
         busy_(std::move(busy)) {}
 
@@ -50,14 +53,15 @@ class Departures final : public Service {
     api::Request request;
     std::vector<MotorId> motors;
     std::int64_t since_us;
+    LineTables::Wait table{};
   };
   // A jog whose client has gone, or has been silent for as long as it may be: it does not begin.
   static bool is_let_go(std::int64_t now_us, const Held& held);
   // Nothing: the request changes no position, or is refused anyway by who carries it out.
   std::optional<std::vector<MotorId>> motors_of(const api::Request& request) const;
   bool any_held(const std::vector<MotorId>& motors) const;
-  Result<bool> make_ready(std::int64_t now_us, const Held& held);
-  void refuse(const Held& held, const std::string& reason);
+  Result<bool> make_ready(std::int64_t now_us, Held& held);
+  void refuse(Held& held, const std::string& reason);
   void cancel_jogs(MotorId motor);
   void cancel_if(const std::function<bool(const Held&)>& concerned);
 
@@ -65,6 +69,7 @@ class Departures final : public Service {
   const Interlocks& interlocks_;
   KeptPositions& kept_;
   IdleDrivers& idle_drivers_;
+  LineTables& line_tables_;
   CarryOut carry_out_;
   std::function<bool()> busy_;
   std::list<Held> held_;

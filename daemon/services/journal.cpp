@@ -76,13 +76,11 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
                          {"steps", steps},
                          {"from_steps", motor.axis().from_steps()}};
   if (share && share->track) {
-    line["path"] = {{"line", motor.as<motion::OnLine>()->line},
-                    {"way", share->way},
-                    {"from", share->from},
-                    {"to", share->to}};
+    line["path"] = {
+        {"line", share->line}, {"way", share->way}, {"from", share->from}, {"to", share->to}};
   } else if (share) {
     // Of all motors of a line the same, but for the increment.
-    line["line"] = {{"line", motor.as<motion::OnLine>()->line},
+    line["line"] = {{"line", share->line},
                     {"way", share->way},
                     {"increment", share->increment},
                     {"longest", share->longest},

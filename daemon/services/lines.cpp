@@ -37,7 +37,8 @@ void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, const Line& 
   for (std::size_t p = 1; p < line.points.size(); ++p) {
     ways.push_back(lay(line, line.points[p - 1].steps, line.points[p]));
   }
-  const bool by_mcus = line.way.longest() != 0 && in_mcus(0, line);
+  const bool by_mcus =
+      line.way.longest() != 0 && (in_mcus(0, line) || table_to_upload(line, false));
   // The ways of one motor stand together.
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     for (const motion::Way& way : ways) {
@@ -103,12 +104,16 @@ bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
   const bushd_table& table = line.way.table()->view();
   return std::ranges::all_of(installation_.mcus_of(line.motors), [&](McuId id) {
     const Mcu& mcu = installation_[id];
-    const bool has_other = std::ranges::any_of(mcu.motors(), [&](MotorId motor) {
-      const auto* other = installation_[motor].as<motion::OnLine>();
-      return other != nullptr && other->line != number && installation_[motor].axis().line() &&
-             installation_[motor].axis().line()->in_mcus;
-    });
-    return mcu.can_run_line(table, line.way.floor(), has_all_of(line, mcu)) && !has_other;
+    return mcu.can_run_line(table, line.way.floor(), has_all_of(line, mcu)) &&
+           !makes_another(mcu, number);
+  });
+}
+
+bool Lines::makes_another(const Mcu& mcu, std::uint64_t number) const {
+  return std::ranges::any_of(mcu.motors(), [&](MotorId motor) {
+    const auto* other = installation_[motor].as<motion::OnLine>();
+    return other != nullptr && other->line != number && installation_[motor].axis().line() &&
+           installation_[motor].axis().line()->in_mcus;
   });
 }
 
@@ -140,6 +145,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     on_line.last_run = line.points.size() == 1 && to == line.target;
     const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
     motion::LineShare share = line.share(i, from, to);
+    share.line = number;
     share.in_mcus = by_mcus;
     const BusId bus = installation_.mcu_of(line.motors[i]).config.bus;
     motor.start_line(on_line, std::move(share), start.at(bus), line.path ? 0 : line.way.floor());

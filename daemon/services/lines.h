@@ -39,6 +39,17 @@ class Lines final : public Service {
   void request(std::int64_t now_us, const api::Asker& asker, const api::MovePath& request);
   void request(const api::Asker& asker, const api::ArmLine& request);
 
+  // The table of the line that is asked for, if the line is to wait until it has been uploaded to
+  // these MCUs: they rest, have room for it, and make the line's run then, as those do that have it
+  // already. Milliseconds for long tables.
+  struct WantedTable {
+    std::shared_ptr<const tables::Envelope> table;
+    std::vector<McuId> mcus;
+    std::int64_t upload_us;  // on a line that loses nothing
+  };
+  std::optional<WantedTable> table_to_upload(const api::MoveLine& request) const;
+  std::optional<WantedTable> table_to_upload(const api::ArmLine& request) const;
+
   // A path is being planned; one slice of that.
   bool plans() const;
   void work();
@@ -50,6 +61,12 @@ class Lines final : public Service {
   struct Point {
     std::vector<std::int64_t> steps;
     std::vector<std::uint16_t> floors;
+  };
+  // By the trigger.
+  struct Begin {
+    MotorId motor;
+    motion::Tick start;
+    std::int64_t late_ns;
   };
   struct Line {
     std::vector<MotorId> motors;  // in the request's order, as all that is by motor
@@ -66,6 +83,7 @@ class Lines final : public Service {
     bool waits = false;
     bool begun = true;
     std::shared_ptr<link::LinePace> pace{};  // of the run under way, where ports make it
+    std::vector<Begin> begins{};  // of those for which it has come
 
     std::uint32_t longest() const;
     std::int64_t position_at(std::size_t motor, std::uint32_t step) const;
@@ -110,6 +128,10 @@ class Lines final : public Service {
   bool in_mcus(std::uint64_t number, const Line& line) const;
   std::map<BusId, motion::Tick> starts_of(std::int64_t now_us,
                                           const std::vector<MotorId>& motors) const;
+  bool makes_another(const Mcu& mcu, std::uint64_t number) const;  // line than this one
+  std::optional<WantedTable> table_to_upload(const api::MoveLine& request, bool armed) const;
+  std::optional<WantedTable> table_to_upload(const Line& line, bool armed) const;
+  bool may_get_tables(const std::vector<MotorId>& motors, bool armed) const;
   // Of these of its motors, by place: the part of the way between these steps of it.
   void begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                  const std::vector<std::size_t>& indices, std::uint32_t to);
@@ -122,14 +144,16 @@ class Lines final : public Service {
   void begin_path(std::int64_t now_us, Coming coming);
 
   // lines_trigger.cpp
+  static api::MoveLine as_move(const api::ArmLine& request);
+  Result<void> check_table(const Line& line, const Mcu& mcu) const;
   Result<Line> line_to_arm(const api::ArmLine& request) const;
   Result<void> may_wait(const Line& line) const;
   void arm(const api::ArmLine& request, std::uint64_t number, Line& line);
   bool waits(MotorId motor, std::uint64_t number) const;
+  void note_begin(MotorId motor, std::uint64_t number, Line& line) const;
   // Returns whether all of its motors that are left have begun.
   bool follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line);
   std::optional<std::string> cause_to_wait_no_more(const Line& line,
-                                                   const std::vector<MotorId>& begun,
                                                    const std::vector<MotorId>& waiting) const;
   void keep_together(std::int64_t now_us, const std::vector<MotorId>& begun);
 

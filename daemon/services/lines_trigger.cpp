@@ -25,6 +25,13 @@ void Lines::request(const api::Asker& asker, const api::ArmLine& request) {
   arm(request, number, kept);
 }
 
+api::MoveLine Lines::as_move(const api::ArmLine& request) {
+  return {.kind = request.kind,
+          .motors = request.motors,
+          .speed = request.speed,
+          .duration_s = request.duration_s};
+}
+
 Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
   const auto motors = installation_.find(request.motors);
   if (!motors) return fail(motors.error());
@@ -34,10 +41,7 @@ Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
     return fail(motor.busy_text() + (motor.moves() ? "; stop it first" : "; disarm it first"));
   }
   if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
-  auto line = line_of({.kind = request.kind,
-                       .motors = request.motors,
-                       .speed = request.speed,
-                       .duration_s = request.duration_s});
+  auto line = line_of(as_move(request));
   if (!line) return line;
   for (std::size_t i = 0; i < line->motors.size(); ++i) {
     if (line->way.increment(i) != 0) continue;
@@ -69,14 +73,7 @@ Result<void> Lines::may_wait(const Line& line) const {
             motor.name(), mcu.name()));
       }
     }
-    if (!mcu.has_table(line.way.table()->view())) {
-      return fail(fmt::format(
-          "the line goes by a table of its own, which MCU {} does not have: a line that waits for "
-          "a "
-          "trigger needs motors of one table, whose ways are equal or a tenth of the longest at "
-          "most. Move it without a trigger",
-          mcu.name()));
-    }
+    if (auto has_table = check_table(line, mcu); !has_table) return has_table;
     if (!mcu.keeps_up_with(line.way.table()->view(), line.way.floor(), has_all_of(line, mcu))) {
       return fail(fmt::format(
           "MCU {} makes no line as fast as this one by itself; give a lower --speed, or move them "
@@ -87,6 +84,25 @@ Result<void> Lines::may_wait(const Line& line) const {
   return {};
 }
 
+// It has been uploaded if that was possible.
+Result<void> Lines::check_table(const Line& line, const Mcu& mcu) const {
+  const bushd_table& table = line.way.table()->view();
+  if (mcu.has_table(table)) return {};
+  const std::string what =
+      fmt::format("the line goes by a table of its own, which MCU {} does not have", mcu.name());
+  if (!mcu.can_upload(table)) {
+    return fail(what +
+                ", and has no room for: a line that waits for a trigger needs motors of one table "
+                "there, whose ways are equal or a tenth of the longest at most. Move it without a "
+                "trigger");
+  }
+  if (!installation_.rests(mcu)) {
+    return fail(what +
+                ", and takes only while all its motors rest: wait for their results, or stop them");
+  }
+  return fail(what + ", and has not taken: try again, or move it without a trigger");
+}
+
 void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
   const std::uint16_t floor = line.way.floor();
@@ -94,7 +110,9 @@ void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
   std::vector<motion::LineShare> shares;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     shares.push_back(line.share(i, 0, line.longest()));
+    shares.back().line = number;
     shares.back().in_mcus = true;
+    shares.back().waits = true;
     const Mcu& mcu = installation_.mcu_of(line.motors[i]);
     parts[mcu.id].push_back({.motor = installation_[line.motors[i]].output().value,
                              .run = mcu.line_run(shares.back(), floor, 0)});
@@ -122,19 +140,24 @@ bool Lines::waits(MotorId motor, std::uint64_t number) const {
 
 // Of its MCUs: in the first reports after the edge some have begun and others are yet to tell.
 bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line) {
-  std::vector<MotorId> begun;
+  std::vector<MotorId> begun;  // and not over
   std::vector<MotorId> waiting;
   for (const MotorId id : line.motors) {
+    note_begin(id, number, line);
     if (on_line(id, number) != nullptr) begun.push_back(id);
     if (waits(id, number)) waiting.push_back(id);
   }
   line.waits = !waiting.empty();
-  if (begun.empty()) return !line.waits;  // an end of one that waits ends the others (Moves)
+  if (line.begins.empty()) return !line.waits;  // an end of one that waits ends the others (Moves)
   line.begun = true;
-  if (const auto cause = cause_to_wait_no_more(line, begun, waiting)) {
+  if (const auto cause = cause_to_wait_no_more(line, waiting)) {
     std::erase_if(waiting,
                   [&](MotorId id) { return installation_[id].as<motion::Armed>()->stops; });
-    for (const MotorId id : waiting) installation_[id].stop(*cause);
+    for (const MotorId id : waiting) {
+      installation_[id].stop(*cause);
+      // It may begin before its MCU hears of that.
+      open_.say(id, api::Outcome::kStopped, {api::Outcome::kStopped, "stopped, because " + *cause});
+    }
     moves_.stop(now_us, waiting);
     const bool all_stop = std::ranges::all_of(begun, [&](MotorId id) {
       return installation_[id].axis().stopping() && !installation_[id].is_paused();
@@ -146,21 +169,20 @@ bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line
   return !line.waits;
 }
 
+// A short line may be over by the report that tells of its beginning.
+void Lines::note_begin(MotorId id, std::uint64_t number, Line& line) const {
+  const motion::Axis& axis = installation_[id].axis();
+  const bool has_begun = axis.line() && axis.line()->line == number && !axis.line()->waits;
+  if (!has_begun || std::ranges::find(line.begins, id, &Begin::motor) != line.begins.end()) return;
+  line.begins.push_back({.motor = id, .start = axis.start_tick(), .late_ns = axis.late_ns()});
+}
+
 std::optional<std::string> Lines::cause_to_wait_no_more(const Line& line,
-                                                        const std::vector<MotorId>& begun,
                                                         const std::vector<MotorId>& waiting) const {
-  const auto begin_of = [this](MotorId id) -> const motion::Axis& {
-    return installation_[id].axis();
-  };
-  const auto earlier = [&](MotorId a, MotorId b) {
-    const auto time = [](const motion::Axis& axis) {
-      return std::pair(axis.start_tick(), axis.late_ns());
-    };
-    return time(begin_of(a)) < time(begin_of(b));
-  };
-  const auto [first, last] = std::ranges::minmax_element(begun, earlier);
+  const auto time = [](const Begin& begin) { return std::pair(begin.start, begin.late_ns); };
+  const auto [first, last] = std::ranges::minmax_element(line.begins, {}, time);
   for (const MotorId id : line.motors) {
-    const bool is_left = std::ranges::find(begun, id) != begun.end() ||
+    const bool is_left = std::ranges::find(line.begins, id, &Begin::motor) != line.begins.end() ||
                          std::ranges::find(waiting, id) != waiting.end();
     if (!is_left) return installation_[id].name() + " did not begin with the others";
   }
@@ -169,18 +191,17 @@ std::optional<std::string> Lines::cause_to_wait_no_more(const Line& line,
       return installation_[id].name() + " was stopped before it began";
     }
     const Mcu& mcu = installation_.mcu_of(id);
-    if (mcu.view().tick <= begin_of(*first).start_tick() + 1) continue;
+    if (mcu.view().tick <= first->start + 1) continue;
     return fmt::format("the trigger has come to MCU {}, and not to MCU {}",
-                       installation_.mcu_of(*first).name(), mcu.name());
+                       installation_.mcu_of(first->motor).name(), mcu.name());
   }
-  const std::int64_t tick_ns = begin_of(*first).tick_ns();
+  const std::int64_t tick_ns = installation_[first->motor].axis().tick_ns();
   const std::int64_t apart_ns =
-      (begin_of(*last).start_tick() - begin_of(*first).start_tick()) * tick_ns +
-      begin_of(*last).late_ns() - begin_of(*first).late_ns();
+      (last->start - first->start) * tick_ns + last->late_ns - first->late_ns;
   if (apart_ns <= tick_ns) return std::nullopt;
   return fmt::format("the trigger came to MCU {} {} us later than to MCU {}",
-                     installation_.mcu_of(*last).name(), apart_ns / 1000,
-                     installation_.mcu_of(*first).name());
+                     installation_.mcu_of(last->motor).name(), apart_ns / 1000,
+                     installation_.mcu_of(first->motor).name());
 }
 
 // What was asked of those that were known to have begun is for all.

@@ -99,7 +99,7 @@ Result<void> MotorSettings::mcu_takes(const Plan& plan, MotorId id) const {
   for (std::size_t i = 0; i < plan.motors.size(); ++i) drives[plan.motors[i]] = drive_of(i);
   if (drives[id] == installation_.drives()[id]) return {};
   const Mcu& mcu = installation_.mcu_of(id);
-  if (installation_.any_moves(mcu) || (mcu.online() && mcu.report().moving != 0)) {
+  if (!installation_.rests(mcu)) {
     return fail("a motor of MCU " + mcu.name() + " moves; what it does by itself can be " +
                 "changed when all of them are at rest");
   }

@@ -349,7 +349,8 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [](const motion::event::Waits&) {},
             [&](const motion::event::Started& started) {
               journal_.started(id, started.steps, started.start, started.late_ns, true);
-              if (motor.is<motion::OnLine>()) {
+              // Perhaps it is over already, by the same report.
+              if (motor.axis().line()) {
                 mcu.follow_line_run(motor.output(), motor.axis());
               } else {
                 mcu.follow_table_run(

@@ -1,6 +1,7 @@
 // How plans change: from which tick on, and for whom.
 #include <algorithm>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "daemon/services/moves.h"
@@ -126,8 +127,16 @@ void Moves::plan(std::int64_t now_us, const std::vector<MotorId>& motors) {
     masks[mcu] &= static_cast<std::uint16_t>(~bit);
     if (motor.change(at.at(mcu), least_end)) masks[mcu] |= bit;
   };
-  for (const MotorId id : motors) change(id, 0);
-  for (const auto& [id, end] : common_ends(motors)) change(id, end);
+  std::set<MotorId> changed;
+  for (const MotorId id : motors) {
+    change(id, 0);
+    const auto bit = static_cast<std::uint16_t>(1u << installation_[id].output().value);
+    if ((masks[installation_.config()[id].mcu] & bit) != 0) changed.insert(id);
+  }
+  // One that stops already may have made its last step: its MCU would take no more.
+  for (const auto& [id, end] : common_ends(motors)) {
+    if (changed.contains(id)) change(id, end);
+  }
   for (const auto& [mcu, mask] : masks) {
     if (mask != 0) installation_[mcu].replace(mask, at.at(mcu));
   }

@@ -252,15 +252,9 @@ std::vector<McuId> TablesInService::mcus_of(const std::vector<Part>& parts) cons
   return installation_.mcus_of(motors);
 }
 
-// As planned, or as reported.
-bool TablesInService::any_moves(McuId id) const {
-  const Mcu& mcu = installation_[id];
-  return installation_.any_moves(mcu) || (mcu.online() && mcu.report().moving != 0);
-}
-
 bool TablesInService::waits_for_motors(GroupId group) const {
   return std::ranges::any_of(mcus_of({{.group = group, .wanted = {}}}),
-                             [this](McuId id) { return any_moves(id); });
+                             [this](McuId id) { return !installation_.rests(installation_[id]); });
 }
 
 // MCUs that are offline get the tables when they come.
@@ -274,7 +268,7 @@ bool TablesInService::ready(const Change& change) const {
   }
   return std::ranges::all_of(change.mcus, [this](McuId id) {
     const Mcu& mcu = installation_[id];
-    if (any_moves(id)) return false;
+    if (!installation_.rests(mcu)) return false;
     return mcu.offline() || (mcu.online() && !mcu.busy());
   });
 }

@@ -90,7 +90,6 @@ class TablesInService final : public Service {
   void supersede(const Change& by);
   const Change* changing(McuId mcu) const;
   std::vector<McuId> mcus_of(const std::vector<Part>& parts) const;
-  bool any_moves(McuId mcu) const;
   bool ready(const Change& change) const;
   void begin_upload(std::int64_t now_us, Change& change);
   std::int64_t upload_us(const Mcu& mcu) const;

@@ -13,14 +13,15 @@
 #include "firmware/core/state.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/table_run.h"
+#include "firmware/core/tables.h"
 
 static inline bool is_on_line(const bushd_mcu* mcu, uint8_t m) {
   return (mcu->line.motors & motor_bit(m)) != 0;
 }
 
 static bushd_status check_table(const bushd_mcu* mcu, const bushd_line_part* part) {
-  if ((mcu->tables.valid & (uint8_t)(1u << part->slot)) == 0) return BUSHD_E_NO_TABLE;
-  const bushd_table* table = &mcu->tables.slot[part->slot].table;
+  const bushd_table* table = bushd_mcu_checked_table(mcu, part->slot);
+  if (table == NULL) return BUSHD_E_NO_TABLE;
   const bool slow_only = (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
   if (slow_only && !bushd_run_is_slow(table, part->floor, mcu->tick_ns, BUSHD_SLOW_LINE_DELAY_NS)) {
     return BUSHD_E_CAPACITY;
@@ -79,7 +80,8 @@ static void place_all(bushd_mcu* mcu) {
 
 // The run, what its motors are told of it, and how many ticks it takes (bushd_mcu_ticks_of_run).
 static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, uint32_t* spare_ns) {
-  bushd_run_start(&mcu->line.run, &mcu->tables.slot[part->slot].table, part->steps, 1, part->floor);
+  bushd_run_start(&mcu->line.run, bushd_mcu_checked_table(mcu, part->slot), part->steps, 1,
+                  part->floor);
   if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, ticks, spare_ns)) return false;
   mcu->line.slot = part->slot;
   mcu->line.longest = part->longest;

@@ -60,6 +60,7 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   memset(mcu, 0, sizeof *mcu);
   mcu->port = *port;
   mcu->config = *config;
+  if (config->scratch != NULL) memset(config->scratch, 0, sizeof *config->scratch);
   mcu->tick_ns = BUSHD_BOOT_TICK_NS;
   mcu->low_water_ticks = UINT16_MAX;
   port->set_enable(port->context, false);

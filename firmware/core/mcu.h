@@ -79,8 +79,9 @@ typedef struct bushd_mcu_config {
   uint8_t current_motors;  // at most BUSHD_MAX_CURRENT_MOTORS
   // Of motors 0 .. velocity_motors-1, that may move locally by the velocity loop; all zero.
   bushd_mcu_velocity* velocity;
-  uint8_t velocity_motors;  // at most BUSHD_MAX_VELOCITY_MOTORS
-  uint16_t* codes;          // table memory
+  uint8_t velocity_motors;     // at most BUSHD_MAX_VELOCITY_MOTORS
+  bushd_mcu_scratch* scratch;  // NULL: it has no BUSHD_SCRATCH_SLOT
+  uint16_t* codes;             // table memory
   uint16_t code_count;
   // BUSHD_MCU_MAX_REPLY bytes for answers. May be the end of the receiver's buffer, if the port
   // keeps the receiver out of it from the making of an answer until it is sent.

@@ -99,6 +99,7 @@ static uint32_t capabilities_of(const bushd_mcu* mcu) {
   if (mcu->port.set_current != NULL) all |= BUSHD_CAN_CURRENTS;
   if (mcu->config.velocity_motors != 0) all |= BUSHD_CAN_VELOCITY;
   if (mcu->config.keypad) all |= BUSHD_CAN_KEYPAD;
+  if (mcu->config.scratch != NULL) all |= BUSHD_CAN_SCRATCH;
   return all & ~(uint32_t)mcu->config.disabled_capabilities;
 }
 

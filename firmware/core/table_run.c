@@ -25,7 +25,8 @@ __attribute__((noinline)) static void make_run_tick(const bushd_mcu* mcu, const 
 // Divisions: in the first tick of a run at most, and where homing changes to its slow table.
 const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t slot,
                                             const bushd_table* table) {
-  bushd_run_tick* tick = &mcu->run_tick[slot];
+  bushd_run_tick* tick =
+      slot == BUSHD_SCRATCH_SLOT ? &mcu->config.scratch->run_tick : &mcu->run_tick[slot];
   if (!bushd_run_tick_fits(tick, mcu->tick_ns, table)) make_run_tick(mcu, table, tick);
   return tick;
 }

@@ -1,5 +1,6 @@
 // Table memory: the tables' codes lie one behind the other; a table that is sent anew first gives
-// its place back.
+// its place back. Behind all that are kept over resets lies the one that is not: so what a port
+// keeps does not know of it.
 #include "firmware/core/tables.h"
 
 #include <string.h>
@@ -22,8 +23,22 @@ static inline uint8_t slot_bit(uint8_t slot) {
   return (uint8_t)(1u << slot);
 }
 
+static bool has_slot(const bushd_mcu* mcu, uint8_t slot) {
+  return slot != BUSHD_SCRATCH_SLOT || mcu->config.scratch != NULL;
+}
+
+// Precondition for these: the MCU has the slot.
 static bool is_valid(const bushd_mcu* mcu, uint8_t slot) {
+  if (slot == BUSHD_SCRATCH_SLOT) return mcu->config.scratch->valid;
   return (mcu->tables.valid & slot_bit(slot)) != 0;
+}
+
+static bushd_mcu_table* entry_of(bushd_mcu* mcu, uint8_t slot) {
+  return slot == BUSHD_SCRATCH_SLOT ? &mcu->config.scratch->entry : &mcu->tables.slot[slot];
+}
+
+static void forget_scratch(bushd_mcu* mcu) {
+  if (mcu->config.scratch != NULL) memset(mcu->config.scratch, 0, sizeof *mcu->config.scratch);
 }
 
 static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
@@ -41,14 +56,22 @@ static void give_back(bushd_mcu* mcu, bushd_mcu_table* entry) {
   memset(entry, 0, sizeof *entry);
 }
 
-bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message) {
-  if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
-  bushd_mcu_table* entry = &mcu->tables.slot[message->slot];
+static void forget_table(bushd_mcu* mcu, uint8_t slot) {
+  bushd_mcu_table* entry = &mcu->tables.slot[slot];
   if (entry->table.accel.count != 0) give_back(mcu, entry);
-  mcu->tables.valid &= (uint8_t)~slot_bit(message->slot);
+  mcu->tables.valid &= (uint8_t)~slot_bit(slot);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    if (mcu->motor[m].table == (int8_t)message->slot) mcu->motor[m].table = -1;
+    if (mcu->motor[m].table == (int8_t)slot) mcu->motor[m].table = -1;
   }
+}
+
+bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message) {
+  if (!has_slot(mcu, message->slot)) return BUSHD_E_FORMAT;
+  if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
+  forget_scratch(mcu);
+  const bool kept = message->slot != BUSHD_SCRATCH_SLOT;
+  if (kept) forget_table(mcu, message->slot);
+  bushd_mcu_table* entry = entry_of(mcu, message->slot);
   const uint32_t count = (uint32_t)message->accel_count + message->decel_count;
   if (count > (uint32_t)(mcu->config.code_count - mcu->tables.codes_used)) return BUSHD_E_CAPACITY;
   const bool symmetric = message->decel_count == 0;
@@ -60,12 +83,13 @@ bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* mess
   entry->table.time_unit_ns = message->time_unit_ns;
   entry->revision = message->revision;
   entry->received = 0;
-  mcu->tables.codes_used = (uint16_t)(mcu->tables.codes_used + count);
+  if (kept) mcu->tables.codes_used = (uint16_t)(mcu->tables.codes_used + count);
   return BUSHD_OK;
 }
 
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message) {
-  bushd_mcu_table* entry = &mcu->tables.slot[message->slot];
+  if (!has_slot(mcu, message->slot)) return BUSHD_E_FORMAT;
+  bushd_mcu_table* entry = entry_of(mcu, message->slot);
   const uint32_t end = (uint32_t)message->offset + message->count;
   const bushd_table* table = &entry->table;
   // Pieces come in order; one that was sent again because its acknowledgement was lost is written
@@ -80,18 +104,32 @@ bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* messag
 }
 
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message) {
-  bushd_mcu_table* entry = &mcu->tables.slot[message->slot];
+  if (!has_slot(mcu, message->slot)) return BUSHD_E_FORMAT;
+  bushd_mcu_table* entry = entry_of(mcu, message->slot);
   const uint16_t count = count_of(&entry->table);
   // Its acknowledgement was lost.
   if (is_valid(mcu, message->slot)) return entry->crc == message->crc ? BUSHD_OK : BUSHD_E_CRC;
   if (count == 0 || entry->received != count) return BUSHD_E_STATE;
+  // A master may send it at any time, and the checks may take longer than a tick.
+  const bool scratch = message->slot == BUSHD_SCRATCH_SLOT;
+  if (scratch && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   const uint32_t crc = bushd_table_crc32(&entry->table);
   if (crc != message->crc) return BUSHD_E_CRC;
   const bushd_status status = bushd_table_check(&entry->table, NULL, NULL);
   if (status != BUSHD_OK) return status;
   entry->crc = crc;
-  mcu->tables.valid |= slot_bit(message->slot);
+  if (scratch) {
+    mcu->config.scratch->valid = true;
+  } else {
+    mcu->tables.valid |= slot_bit(message->slot);
+  }
   return BUSHD_OK;
+}
+
+const bushd_table* bushd_mcu_checked_table(const bushd_mcu* mcu, uint8_t slot) {
+  if (!has_slot(mcu, slot) || !is_valid(mcu, slot)) return NULL;
+  return slot == BUSHD_SCRATCH_SLOT ? &mcu->config.scratch->entry.table
+                                    : &mcu->tables.slot[slot].table;
 }
 
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
@@ -121,6 +159,7 @@ bushd_tables bushd_mcu_tables(const bushd_mcu* mcu) {
 }
 
 void bushd_mcu_forget_tables(bushd_mcu* mcu) {
+  forget_scratch(mcu);
   memset(mcu->tables.slot, 0, sizeof mcu->tables.slot);
   mcu->tables.codes_used = 0;
   mcu->tables.valid = 0;

@@ -2,9 +2,11 @@
 #ifndef BUSHD_FIRMWARE_CORE_TABLES_H
 #define BUSHD_FIRMWARE_CORE_TABLES_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "engine/message.h"
+#include "engine/run_slots.h"
 #include "engine/table.h"
 
 typedef struct bushd_mcu bushd_mcu;
@@ -24,9 +26,20 @@ typedef struct bushd_mcu_table_memory {
   uint16_t codes_used;  // of the port's table memory
 } bushd_mcu_table_memory;
 
+// The table in BUSHD_SCRATCH_SLOT, by which no motor ramps down and lines may go. Its codes lie
+// behind those of all others, and are no part of what a port keeps over resets. Any TABLE_BEGIN
+// discards it.
+typedef struct bushd_mcu_scratch {
+  bushd_mcu_table entry;
+  bool valid;               // it has come whole, and is good
+  bushd_run_tick run_tick;  // in its terms
+} bushd_mcu_scratch;
+
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message);
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message);
+// The one in this slot; NULL if none has come whole. Precondition: slot <= BUSHD_SCRATCH_SLOT.
+const bushd_table* bushd_mcu_checked_table(const bushd_mcu* mcu, uint8_t slot);
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message);
 bushd_tables bushd_mcu_tables(const bushd_mcu* mcu);
 void bushd_mcu_forget_tables(bushd_mcu* mcu);

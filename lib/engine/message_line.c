@@ -56,7 +56,7 @@ static bushd_status get_line(reader* r, bushd_line_part* line, bool in_range) {
   line->from = get32(r);
   line->steps = get32(r);
   if (r->short_of_bytes) return BUSHD_E_LENGTH;
-  if (line->slot >= BUSHD_TABLE_SLOTS || line->longest > INT32_MAX || line->from >= line->longest ||
+  if (line->slot > BUSHD_SCRATCH_SLOT || line->longest > INT32_MAX || line->from >= line->longest ||
       line->steps < 1 || line->steps > line->longest - line->from) {
     in_range = false;
   }

@@ -160,7 +160,7 @@ bushd_status bushd_decode_table_begin(const uint8_t* payload, size_t size,
   message->cruise = get16(&r);
   message->time_unit_ns = get32(&r);
   message->revision = get32(&r);
-  return finish(&r, message->slot < BUSHD_TABLE_SLOTS && message->accel_count >= 1 &&
+  return finish(&r, message->slot <= BUSHD_SCRATCH_SLOT && message->accel_count >= 1 &&
                         message->cruise >= 1 && message->time_unit_ns >= 1);
 }
 
@@ -181,7 +181,7 @@ bushd_status bushd_decode_table_data(const uint8_t* payload, size_t size,
   message->offset = get16(&r);
   message->count = get8(&r);
   message->codes = take(&r, 2u * message->count);
-  return finish(&r, message->slot < BUSHD_TABLE_SLOTS && message->count >= 1 &&
+  return finish(&r, message->slot <= BUSHD_SCRATCH_SLOT && message->count >= 1 &&
                         message->count <= BUSHD_TABLE_DATA_MAX_CODES);
 }
 
@@ -196,7 +196,7 @@ bushd_status bushd_decode_table_end(const uint8_t* payload, size_t size, bushd_t
   reader r = read_from(payload, size);
   message->slot = get8(&r);
   message->crc = get32(&r);
-  return finish(&r, message->slot < BUSHD_TABLE_SLOTS);
+  return finish(&r, message->slot <= BUSHD_SCRATCH_SLOT);
 }
 
 size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload) {

@@ -47,6 +47,7 @@ enum {
 #define BUSHD_CAN_CURRENTS UINT32_C(0x8000)
 #define BUSHD_CAN_VELOCITY UINT32_C(0x10000)
 #define BUSHD_CAN_KEYPAD UINT32_C(0x20000)
+#define BUSHD_CAN_SCRATCH UINT32_C(0x40000)  // has BUSHD_SCRATCH_SLOT
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
 // which one it is.
@@ -104,7 +105,8 @@ typedef struct bushd_emission {
 } bushd_emission;
 
 // A table is sent as: begin, data (accelerating side, then decelerating side unless it is the
-// same), end. `slot` 0 .. BUSHD_TABLE_SLOTS-1. Codes run from slow to fast on both sides.
+// same), end. `slot` 0 .. BUSHD_TABLE_SLOTS-1, or BUSHD_SCRATCH_SLOT: a table that lines go by.
+// Codes run from slow to fast on both sides.
 typedef struct bushd_table_begin {
   uint8_t slot;
   uint16_t accel_count;
@@ -127,7 +129,7 @@ typedef struct bushd_table_end {
   uint32_t crc;  // bushd_table_crc32 (engine/table.h) of the whole table
 } bushd_table_end;
 
-// What an MCU holds, by table slot.
+// What an MCU holds over resets, by table slot.
 typedef struct bushd_table_held {
   bool valid;
   uint32_t crc;

@@ -131,6 +131,8 @@ class BusMaster {
                             bool /*alone*/) const {
     return false;
   }
+  // It can make runs of lines, and may: ticks need not be told one by one.
+  virtual bool makes_lines(McuIndex) const { return false; }
   // Of any MCU that makes lines: whether it is fast enough for that.
   virtual bool keeps_up_with(McuIndex, const bushd_table&, std::uint16_t /*floor*/,
                              bool /*alone*/) const {
@@ -141,6 +143,15 @@ class BusMaster {
   virtual std::optional<std::uint8_t> slot_of(McuIndex, const bushd_table&) const {
     return std::nullopt;
   }
+
+  // A table that lines go by, into a slot that the MCU does not keep over resets, in place of what
+  // was there: from when it is there slot_of() finds it. It is sent in parts when nothing else is
+  // asked of the MCU, which is not busy() with it. The MCU takes it only while it rests: otherwise
+  // the upload ends without it. Preconditions of upload(): can_upload, the MCU is online.
+  virtual bool can_upload(McuIndex, const bushd_table&) const { return false; }
+  virtual void upload(McuIndex, const bushd_table&) {}
+  virtual bool uploads(McuIndex) const { return false; }
+  virtual void end_upload(McuIndex) {}
 
   // Runs of the MCU's motors that an edge at its trigger input starts. What becomes of them its
   // reports tell, from when they have the number returned here. Preconditions: the MCU is online

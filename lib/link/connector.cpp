@@ -26,6 +26,11 @@ bool same_id(const bushd_identity& a, const bushd_identity& b) {
   return std::memcmp(a.unique_id, b.unique_id, BUSHD_UNIQUE_ID_SIZE) == 0;
 }
 
+bool is_part_of_table(std::uint8_t type) {
+  return type == BUSHD_MSG_TABLE_BEGIN || type == BUSHD_MSG_TABLE_DATA ||
+         type == BUSHD_MSG_TABLE_END;
+}
+
 }  // namespace
 
 Connector::Connector(const BusSetup& setup, PerMcu<McuRecord>& mcus, Transactions& transactions,
@@ -54,6 +59,7 @@ bool Connector::reconfigure(McuIndex mcu, McuSetup setup) {
   record.poll_wanted = true;
   links_[mcu].setup_written = false;
   links_[mcu].queue.clear();
+  links_[mcu].scratch.clear();
   return true;
 }
 
@@ -114,18 +120,24 @@ bool Connector::send_ramp_down(std::int64_t now_us) {
   return false;
 }
 
+const SetupQueue::Request* Connector::next_request(McuIndex mcu) const {
+  if (mcus_[mcu].view.phase == McuPhase::kOffline) return nullptr;
+  const Link& link = links_[mcu];
+  if (!link.queue.empty()) return &link.queue.front();
+  return link.scratch.under_way() ? &link.scratch.front() : nullptr;
+}
+
 bool Connector::send_request(std::int64_t now_us) {
   for (std::size_t n = 0; n < mcus_.size(); ++n) {
     const McuIndex i{(turn_ + n) % mcus_.size()};
-    const SetupQueue& queue = links_[i].queue;
-    if (mcus_[i].view.phase == McuPhase::kOffline || queue.empty()) continue;
+    const SetupQueue::Request* request = next_request(i);
+    if (request == nullptr) continue;
     turn_ = i.value + 1;
-    const SetupQueue::Request& request = queue.front();
     transactions_.ask(now_us, {.mcu = i,
                                .address = mcus_[i].setup.address,
-                               .type = request.type,
-                               .payload = request.payload,
-                               .reply_payload = request.reply_payload()});
+                               .type = request->type,
+                               .payload = request->payload,
+                               .reply_payload = request->reply_payload()});
     return true;
   }
   return false;
@@ -173,6 +185,7 @@ void Connector::take(std::int64_t now_us, McuIndex mcu, const bushd_identity& id
   link.setup_written = false;
   link.taken_over = false;
   link.queue.clear();
+  link.scratch.clear();
   link.identify_attempts = 0;
   listener_.found(now_us, mcu);
 }
@@ -252,6 +265,10 @@ std::uint8_t Connector::first_actions(McuIndex mcu, bool may_clear) const {
 void Connector::acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t type,
                              std::uint8_t status) {
   McuRecord& record = mcus_[mcu];
+  // Tables of motors are sent before it is online.
+  if (record.view.phase == McuPhase::kOnline && is_part_of_table(type)) {
+    return links_[mcu].scratch.acknowledged(type, status);
+  }
   links_[mcu].queue.done(type);
   record.poll_wanted = links_[mcu].queue.empty();
   if (status == BUSHD_OK) return;
@@ -312,6 +329,7 @@ void Connector::give_up(McuIndex mcu, const std::string& cause, std::int64_t ret
   links_[mcu].retry_due_us = retry_due_us;
   links_[mcu].identify_attempts = 0;
   links_[mcu].queue.clear();
+  links_[mcu].scratch.clear();
   listener_.went_offline(mcu, was_online);
 }
 

@@ -12,6 +12,7 @@
 #include "engine/message.h"
 #include "link/bus_setup.h"
 #include "link/mcu_record.h"
+#include "link/scratch.h"
 #include "link/setup_queue.h"
 #include "link/transactions.h"
 
@@ -50,6 +51,9 @@ class Connector {
   SetupQueue& queue(McuIndex mcu) { return links_[mcu].queue; }
   const SetupQueue& queue(McuIndex mcu) const { return links_[mcu].queue; }
   void control(McuIndex mcu, std::uint8_t actions);
+  // Its requests are sent when there are no others.
+  Scratch& scratch(McuIndex mcu) { return links_[mcu].scratch; }
+  const Scratch& scratch(McuIndex mcu) const { return links_[mcu].scratch; }
 
   bool send_due_identify(std::int64_t now_us);
   // Table runs of an earlier master are ramped down before the setup.
@@ -74,6 +78,7 @@ class Connector {
  private:
   struct Link {
     SetupQueue queue;
+    Scratch scratch;             // of an MCU that is online
     bool setup_written = false;  // while connecting: into the queue
     bool was_online = false;     // while it gets another setup: nobody was told otherwise
     // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
@@ -89,6 +94,8 @@ class Connector {
     unsigned identify_attempts = 0;  // in a row without an MCU that fits
   };
 
+  // The request that is to be sent next; null if there is none.
+  const SetupQueue::Request* next_request(McuIndex mcu) const;
   void take(std::int64_t now_us, McuIndex mcu, const bushd_identity& identity);
   void write_setup(McuIndex mcu);
   bool holds_its_tables(McuIndex mcu, const bushd_tables& held) const;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/run_plan.h"
+#include "link/mcu_fit.h"
 
 namespace bushd::link {
 namespace {
@@ -139,7 +140,8 @@ std::int64_t Master::next_wake_us() const {
 std::int64_t Master::wake_us(McuIndex mcu) const {
   if (mcus_[mcu].view.phase == McuPhase::kOffline) return connector_.retry_due_us(mcu);
   if (streams_.has_replacement_to_send(mcu) || mcus_[mcu].poll_wanted) return stepped_us_;
-  const bool open = streams_.has_ticks_to_send(mcu) || !connector_.queue(mcu).empty();
+  const bool open = streams_.has_ticks_to_send(mcu) || !connector_.queue(mcu).empty() ||
+                    connector_.scratch(mcu).under_way();
   return std::min(poller_.due_us(mcu), open ? stepped_us_ + kStreamWakeUs : INT64_MAX);
 }
 
@@ -180,9 +182,7 @@ void Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const 
 
 bool Master::can_run_line(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
                           bool alone) const {
-  // Not where every tick is to be told.
-  if (!setup_.table_ticks || !can(mcu, BUSHD_CAN_LINE_RUN) || !slot_of(mcu, table)) return false;
-  return keeps_up_with(mcu, table, floor, alone);
+  return makes_lines(mcu) && slot_of(mcu, table) && keeps_up_with(mcu, table, floor, alone);
 }
 
 bool Master::keeps_up_with(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
@@ -197,7 +197,20 @@ std::optional<std::uint8_t> Master::slot_of(McuIndex mcu, const bushd_table& tab
   for (std::size_t slot = 0; slot < tables.size(); ++slot) {
     if (makes_the_same_runs(*tables[slot].table, table)) return static_cast<std::uint8_t>(slot);
   }
-  return std::nullopt;
+  const bushd_table* scratch = connector_.scratch(mcu).table();
+  if (scratch == nullptr || !makes_the_same_runs(*scratch, table)) return std::nullopt;
+  return BUSHD_SCRATCH_SLOT;
+}
+
+bool Master::can_upload(McuIndex mcu, const bushd_table& table) const {
+  const McuRecord& record = mcus_[mcu];
+  std::size_t codes = codes_of(table);
+  for (const TableRef& ref : record.setup.tables) codes += codes_of(*ref.table);
+  return can(mcu, BUSHD_CAN_SCRATCH) && codes <= record.view.identity.table_codes;
+}
+
+void Master::end_upload(McuIndex mcu) {
+  if (uploads(mcu)) connector_.scratch(mcu).clear();
 }
 
 void Master::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) {

@@ -92,10 +92,19 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
   bool can_run_line(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
                     bool alone) const override;
+  bool makes_lines(McuIndex mcu) const override {
+    return setup_.table_ticks && can(mcu, BUSHD_CAN_LINE_RUN);
+  }
   bool keeps_up_with(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
                      bool alone) const override;
   void begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) override;
   std::optional<std::uint8_t> slot_of(McuIndex mcu, const bushd_table& table) const override;
+  bool can_upload(McuIndex mcu, const bushd_table& table) const override;
+  void upload(McuIndex mcu, const bushd_table& table) override {
+    connector_.scratch(mcu).upload(table);
+  }
+  bool uploads(McuIndex mcu) const override { return connector_.scratch(mcu).under_way(); }
+  void end_upload(McuIndex mcu) override;
   std::uint8_t arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                    std::span<const Armed> moves) override;
   std::uint8_t arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,

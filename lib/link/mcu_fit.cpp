@@ -91,16 +91,18 @@ Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity)
 
 }  // namespace
 
+std::size_t codes_of(const bushd_table& table) {
+  const bool symmetric = table.decel.code == table.accel.code;
+  return std::size_t{table.accel.count} + (symmetric ? 0 : table.decel.count);
+}
+
 Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
                         std::uint32_t tick_ns) {
   if (auto currents = check_currents(setup, identity); !currents) return currents;
   if (auto velocities = check_velocities(setup, identity); !velocities) return velocities;
   if (auto keypad = check_keypad(setup, identity); !keypad) return keypad;
   std::size_t codes = 0;
-  for (const TableRef& ref : setup.tables) {
-    codes += ref.table->accel.count;
-    if (ref.table->decel.code != ref.table->accel.code) codes += ref.table->decel.count;
-  }
+  for (const TableRef& ref : setup.tables) codes += codes_of(*ref.table);
   if (codes <= identity.table_codes) return check_time(setup, identity, tick_ns);
   return fail("has memory for " + std::to_string(identity.table_codes) +
               " table codes, but its motors' tables need " + std::to_string(codes) +

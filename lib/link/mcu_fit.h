@@ -1,6 +1,7 @@
 // Whether an MCU can do what is configured for it, and in words why not.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -9,6 +10,9 @@
 #include "link/bus_setup.h"
 
 namespace bushd::link {
+
+// In the memory of an MCU: a side that is both is there once.
+std::size_t codes_of(const bushd_table& table);
 
 // The MCU has room for its tables, and time for them with its emission; or why not.
 Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,

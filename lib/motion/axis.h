@@ -48,6 +48,7 @@ struct Change {
 // What a motor makes of the run of its line, or of its path.
 struct LineShare {
   std::uint64_t way = 0;                               // its number, for logs
+  std::uint64_t line = 0;                              // of which it is, likewise
   tables::TablePtr by = {};                            // the motor's own is not what it goes by
   std::shared_ptr<const tables::Envelope> table = {};  // of the run; none: of a path
   std::shared_ptr<RunBlocks> blocks = {};              // of the run of a line, for all its motors
@@ -62,6 +63,7 @@ struct LineShare {
   std::uint32_t to = 0;
   // The MCUs make the run themselves (LINE_RUN), or what stands in for them does.
   bool in_mcus = false;
+  bool waits = false;  // the trigger that begins it has not come
 };
 
 // The motor's part of a trajectory.

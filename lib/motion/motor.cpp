@@ -355,7 +355,8 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
     const Tick start = report.tick + static_cast<std::int32_t>(mcu.start_tick - mcu.tick);
     if (armed.on_line) {
       activity_ = *armed.on_line;
-      const LineShare share = *axis_.line();
+      LineShare share = *axis_.line();
+      share.waits = false;
       axis_.start_line(axis_.from_steps(), share, start, axis_.floor(), mcu.start_ns);
     } else {
       activity_ = Moving{};

@@ -22,6 +22,7 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
   config.mcu.current_motors = options.current_motors;
   config.mcu.velocity_motors = options.velocity_motors;
   config.mcu.keypad = options.keypad;
+  config.mcu.scratch = options.scratch ? &scratch_ : nullptr;
   const std::uint64_t unique_id = options.unique_id != 0 ? options.unique_id : index + 1;
   for (std::size_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {
     config.mcu.unique_id[i] = static_cast<std::uint8_t>(unique_id >> 8 * i);

@@ -26,6 +26,7 @@ struct McuOptions {
   std::uint8_t current_motors = BUSHD_MAX_CURRENT_MOTORS;    // whose windings' currents it controls
   std::uint8_t velocity_motors = BUSHD_MAX_VELOCITY_MOTORS;  // that may move by the velocity loop
   bool keypad = true;                                        // it has a line for one
+  bool scratch = true;  // has a slot for a table that is not kept
   TimeNs boot_ns =
       0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
   std::int32_t clock_ppm = 0;  // > 0: its clock is fast
@@ -92,6 +93,7 @@ class VirtualMcu final : public Mcu {
   std::optional<SupplyCurrent> supply_;
   std::vector<std::int16_t> queue_;
   std::vector<std::uint16_t> codes_;
+  bushd_mcu_scratch scratch_{};
   struct Wired {
     std::size_t output;
     Switch contact;

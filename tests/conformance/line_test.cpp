@@ -91,6 +91,27 @@ TEST_P(LineScript, EveryStepIsInTheSlotOfTheTwins) {
   }
 }
 
+// By a table that is not kept, between lines by the one that is.
+TEST_P(LineScript, ATableForLinesMakesTheSameSteps) {
+  if (!real_->twin().scratch) GTEST_SKIP() << "has no slot for one";
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
+  std::vector<std::uint16_t> slower = codes_;
+  for (std::uint16_t& code : slower) code = static_cast<std::uint16_t>(code * 7 / 6);
+  for (int i = 0; i < 3; ++i) {
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      ASSERT_NO_FATAL_FAILURE(
+          master_.upload_table(address, BUSHD_SCRATCH_SLOT, kUnitNs, slower, kCruise + 9));
+    }
+    begin({BUSHD_SCRATCH_SLOT, 0, kLongest, 0, kLongest, 0, nullptr}, kEntries);
+    pass_ticks(300);
+    begin_line();
+    pass_ticks(230);
+    EXPECT_EQ(steps(0, 1).size(), static_cast<std::size_t>(i + 1) * 2 * kLongest);
+    expect_alike();
+    slower.push_back(kCruise + 10);
+  }
+}
+
 // Numbers of all lengths: of steps, and of what two steps of a motor are apart.
 TEST_P(LineScript, IsTheSameFarAlongALongLine) {
   struct Long {

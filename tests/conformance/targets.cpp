@@ -59,7 +59,8 @@ class Atmega2560 final : public Avr {
             .code_count = 952,
             .disabled_capabilities = disabled_capabilities(),
             .current_motors = 0,
-            .velocity_motors = 0};
+            .velocity_motors = 0,
+            .scratch = false};
   }
   std::uint16_t disabled_capabilities() const override { return BUSHD_CAN_TABLE_TICKS; }
 };
@@ -78,7 +79,8 @@ class Atmega1284p final : public Avr {
             .disabled_capabilities = disabled_capabilities(),
             .current_motors = 1,
             .velocity_motors = 2,
-            .keypad = false};
+            .keypad = false,
+            .scratch = false};
   }
   std::uint16_t disabled_capabilities() const override {
     return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_COMMON_DIR;

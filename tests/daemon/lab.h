@@ -78,7 +78,7 @@ class Lab : public daemon::Outputs, private state::Backend {
   // `glacier` is the text of a table file of that name beside it, if not empty. No MCU has the
   // capabilities `without`, BUSHD_CAN_*.
   explicit Lab(const std::string& toml, const std::string& glacier = {},
-               sim::EdgeSink* sink = nullptr, std::uint16_t without = 0);
+               sim::EdgeSink* sink = nullptr, std::uint32_t without = 0);
   ~Lab() override;
 
   // Runs until `done` holds (checked after every event) or `limit_s` has passed; returns whether it

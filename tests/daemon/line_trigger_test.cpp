@@ -220,6 +220,34 @@ TEST_P(TriggeredLine, EndsForAllIfAnMcuGivesUp) {
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
+// The report that tells of its beginning tells of its end, too: of all MCUs, or of one while
+// another one waits on.
+TEST_P(TriggeredLine, MayBeOverWhenItsBeginningIsTold) {
+  for (const std::size_t deaf : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
+    SCOPED_TRACE(deaf);
+    Lab lab(hall(2, 2, GetParam()));
+    lab.connect();
+    const auto move = arm(lab, armed_to({3, -3, 3, 3}));
+    lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
+    if (deaf == 2) {
+      fire_both(lab);
+    } else {
+      fire(lab, 1 - deaf);
+    }
+    lab.run_for(0.2);
+    lab.on_send = nullptr;
+    const Answer result = lab.wait(move, 5);
+    if (deaf == 2) {
+      EXPECT_EQ(result.result, "reached") << result.reason;
+      EXPECT_EQ(lab.shaft_steps("m04"), 3);
+    } else {
+      EXPECT_EQ(result.result, "stopped");
+      EXPECT_THAT(result.reason, HasSubstr("the trigger has come to MCU"));
+      EXPECT_EQ(lab.motor(deaf == 1 ? "m04" : "m01").activity, api::Activity::kResting);
+    }
+  }
+}
+
 TEST_P(TriggeredLine, IsMadeOfLegsWithBacklash) {
   Lab lab(with_keys(hall(2, 2, GetParam()), "m02", "backlash = 20\n"));
   lab.connect();
@@ -247,12 +275,12 @@ class ArmedLine : public testing::Test {
 };
 
 TEST_F(ArmedLine, IsRefusedWhereItCannotWait) {
-  Lab lab(hall(2, 2, "fine"));
+  Lab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_SCRATCH);
   lab.connect();
   EXPECT_THAT(refusal(lab, kMotors, kInMcus, 49), HasSubstr("allowed: 50 to 1650000"));
   EXPECT_THAT(refusal(lab, kMotors, kSteps), HasSubstr("m04: a move of no steps"));
   EXPECT_THAT(refusal(lab, kMotors, {3000, -1201, 17, 3}),
-              HasSubstr("a table of its own, which MCU hall:1 does not have"));
+              HasSubstr("a table of its own, which MCU hall:1 does not have, and has no room for"));
   EXPECT_THAT(refusal(lab, {"m09"}, {1}), HasSubstr("no motor \"m09\""));
   const auto waits =
       lab.send(api::ArmLine{.delay_us = 100, .motors = motor_steps({"m01", "m03"}, {500, 500})});

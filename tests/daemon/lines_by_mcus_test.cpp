@@ -1,7 +1,5 @@
 // Lines whose run the MCUs make themselves: what goes over the bus, where the motors are, and where
 // a lost link leaves them.
-#include <tuple>
-
 #include "daemon/motion_frames.h"
 #include "daemon/on_line.h"
 
@@ -14,15 +12,23 @@ TEST(LinesByMcus, AllMotorsAreOnThemToAStep) {
   }
 }
 
-// Of motors with one table the line's is that one, unless their ways are nearly as long.
+// Of motors with one table the line's is that one, unless their ways are nearly as long. Then they
+// get it first, if they take any.
 TEST(LinesByMcus, OneFrameTellsAnMcuAllOfIt) {
-  for (const auto& [manner, steps, most] :
-       std::vector<std::tuple<const char*, std::int64_t, int>>{{"fine", 2000, 2},
-                                                               {"coarse", -1, 2},
-                                                               {"fine", 1999, 1000},
-                                                               {"fine_ticks", 2000, 1000}}) {
+  struct Case {
+    const char* manner;
+    std::int64_t steps;
+    std::uint32_t without;
+    int most;
+  };
+  for (const auto& [manner, steps, without, most] :
+       std::vector<Case>{{"fine", 2000, 0, 2},
+                         {"coarse", -1, 0, 2},
+                         {"fine", 1999, 0, 2},
+                         {"fine", 1999, BUSHD_CAN_SCRATCH, 1000},
+                         {"fine_ticks", 2000, 0, 1000}}) {
     SCOPED_TRACE(std::string(manner) + " " + std::to_string(steps));
-    Lab lab(hall(2, 2, manner));
+    Lab lab(hall(2, 2, manner), {}, nullptr, without);
     lab.connect();
     auto line = line_to({"m01", "m02", "m03"}, {2000, -2000, steps});
     line.dry_run = true;

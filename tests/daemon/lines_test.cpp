@@ -27,7 +27,7 @@ TEST(Lines, AllMotorsAreOnTheLineAtAnyTime) {
 }
 
 TEST(Lines, EqualMotorsTakeTheTimeOfOne) {
-  Lab lab(hall(1, 3));
+  StreamedLab lab(hall(1, 3));
   lab.connect();
   auto alone = api::Move{.motors = motor_steps({"m01"}, {2000}), .dry_run = true};
   auto line = line_to({"m01", "m02", "m03"}, {2000, 0, -2000});
@@ -44,7 +44,7 @@ TEST(Lines, EqualMotorsTakeTheTimeOfOne) {
 }
 
 TEST(Lines, StateTellsTheShareAndTheTimeLeft) {
-  Lab lab(hall(2, 1));
+  StreamedLab lab(hall(2, 1));
   lab.connect();
   const auto move = lab.send(line_to({"m01", "m02"}, {1000, 4000}));
   lab.run_until([&] { return lab.shaft_steps("m02") >= 2000; });
@@ -66,7 +66,7 @@ void expect_on_line_after_a_stop(const std::vector<std::int64_t>& steps) {
   for (const char* manner : {"fine", "coarse"}) {
     for (const double after_s : {0.105, 0.12, 0.15, 0.3, 0.6, 0.9, 1.0}) {
       SCOPED_TRACE(std::string(manner) + " " + std::to_string(after_s));
-      Lab lab(hall(2, 2, manner));
+      StreamedLab lab(hall(2, 2, manner));
       lab.connect();
       const auto move = lab.send(line_to(kMotors, steps));
       lab.run_for(after_s);
@@ -94,7 +94,7 @@ TEST(Lines, AStopOfOneLeavesAllOnTheLine) {
 void expect_pause(const std::vector<std::int64_t>& steps) {
   for (const char* manner : {"fine", "coarse"}) {
     SCOPED_TRACE(manner);
-    Lab lab(hall(2, 2, manner));
+    StreamedLab lab(hall(2, 2, manner));
     lab.connect();
     const auto move = lab.send(line_to(kMotors, steps));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 700; });
@@ -127,7 +127,7 @@ TEST(Lines, PausesAndGoesOn) {
 }
 
 TEST(Lines, ResumedWhileTheyRampDownTheyStandFirst) {
-  Lab lab(hall(2, 2));
+  StreamedLab lab(hall(2, 2));
   lab.connect();
   const auto move = lab.send(line_to(kMotors, kSteps));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1500; });
@@ -139,7 +139,7 @@ TEST(Lines, ResumedWhileTheyRampDownTheyStandFirst) {
 }
 
 TEST(Lines, ASpeedIsThatOfEachMotor) {
-  Lab lab(hall(1, 2));
+  StreamedLab lab(hall(1, 2));
   lab.connect();
   auto line = line_to({"m01", "m02"}, {1000, 500});
   line.speed = api::Speed{.per_s = 100, .in_steps = true};
@@ -151,7 +151,7 @@ TEST(Lines, ASpeedIsThatOfEachMotor) {
 }
 
 TEST(Lines, ADurationIsAsked) {
-  Lab lab(hall(1, 2));
+  StreamedLab lab(hall(1, 2));
   lab.connect();
   auto line = line_to({"m01", "m02"}, {1000, 300});
   line.duration_s = 12;
@@ -168,7 +168,7 @@ TEST(Lines, ADurationIsAsked) {
 }
 
 TEST(Lines, ANearerEndAndAnotherSpeed) {
-  Lab lab(hall(2, 2));
+  StreamedLab lab(hall(2, 2));
   lab.connect();
   const auto move = lab.send(line_to(kMotors, {4000, -2000, 1000, 0}));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 800; });
@@ -192,7 +192,7 @@ TEST(Lines, ANearerEndAndAnotherSpeed) {
 TEST(Lines, AnEndThatComesTooLateIsReachedFromBeyond) {
   for (const std::int64_t steps : {-200, -400}) {  // the latter by the MCUs
     SCOPED_TRACE(steps);
-    Lab lab(hall(2, 2));
+    StreamedLab lab(hall(2, 2));
     lab.connect();
     const auto move = lab.send(line_to(kMotors, {4000, 10 * steps, 0, 4000}));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
@@ -206,7 +206,7 @@ TEST(Lines, AnEndThatComesTooLateIsReachedFromBeyond) {
 }
 
 TEST(Lines, WhatIsNotOnTheLineIsRefused) {
-  Lab lab(hall(2, 2));
+  StreamedLab lab(hall(2, 2));
   lab.connect();
   const auto move = lab.send(line_to(kMotors, {4000, -2000, 1000, 0}));
   lab.run_for(0.5);
@@ -226,10 +226,11 @@ TEST(Lines, WhatIsNotOnTheLineIsRefused) {
 }
 
 TEST(Lines, BeginAtRestAndOnOneBus) {
-  Lab lab(hall(1, 2) +
-          "\n[[bus]]\nname = \"lab\"\nport = \"/dev/null1\"\nbaud = 500000\ntick_us = 2560\n"
-          "format = \"fine\"\n[[mcu]]\nbus = \"lab\"\naddress = 1\n"
-          "[[motor]]\nname = \"far\"\nmcu = \"lab:1\"\noutput = 0\ngroup = \"axes\"\n");
+  StreamedLab lab(
+      hall(1, 2) +
+      "\n[[bus]]\nname = \"lab\"\nport = \"/dev/null1\"\nbaud = 500000\ntick_us = 2560\n"
+      "format = \"fine\"\n[[mcu]]\nbus = \"lab\"\naddress = 1\n"
+      "[[motor]]\nname = \"far\"\nmcu = \"lab:1\"\noutput = 0\ngroup = \"axes\"\n");
   lab.connect();
   EXPECT_THAT(lab.wait(lab.send(line_to({"m01", "far"}, {10, 10}))).reason,
               HasSubstr("m01 is on bus hall and far on bus lab"));
@@ -243,7 +244,7 @@ TEST(Lines, BeginAtRestAndOnOneBus) {
 }
 
 TEST(Lines, SoftLimitsAreThoseOfEachMotor) {
-  Lab lab(with_keys(hall(1, 2), "m02", "soft_limits = [-100, 100]\n"));
+  StreamedLab lab(with_keys(hall(1, 2), "m02", "soft_limits = [-100, 100]\n"));
   lab.connect();
   const std::string why = lab.wait(lab.send(line_to({"m01", "m02"}, {1000, 101}))).reason;
   EXPECT_THAT(why, HasSubstr("m02: target 101 steps is beyond the soft limit at 100"));
@@ -251,7 +252,7 @@ TEST(Lines, SoftLimitsAreThoseOfEachMotor) {
 }
 
 TEST(Lines, BacklashIsTakenUpWhenAllHaveArrived) {
-  Lab lab(with_keys(hall(1, 2), "m02", "backlash = 30\n"));
+  StreamedLab lab(with_keys(hall(1, 2), "m02", "backlash = 30\n"));
   lab.connect();
   const auto move = lab.send(line_to({"m01", "m02"}, {-600, -300}));
   lab.run_until([&] { return lab.shaft_steps("m01") == -600; });
@@ -274,7 +275,7 @@ TEST(Lines, BacklashIsTakenUpWhenAllHaveArrived) {
 TEST(Lines, OneThatIsLostEndsTheOthersAlongTheLine) {
   for (const std::int64_t steps : {-3001, -6000}) {  // the latter by the MCUs
     SCOPED_TRACE(steps);
-    Lab lab(hall(2, 2));
+    StreamedLab lab(hall(2, 2));
     lab.connect();
     const auto move = lab.send(line_to(kMotors, {6000, steps, 500, 6000}));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
@@ -290,7 +291,7 @@ TEST(Lines, OneThatIsLostEndsTheOthersAlongTheLine) {
 }
 
 void expect_end_at_a_limit(const std::vector<std::int64_t>& steps, const std::string& limited_by) {
-  Lab lab(with_keys(hall(2, 2), "m03", "limit = \"positive\"\n"));
+  StreamedLab lab(with_keys(hall(2, 2), "m03", "limit = \"positive\"\n"));
   lab.connect();
   const auto move = lab.send(line_to(kMotors, steps));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
@@ -316,7 +317,7 @@ TEST(Lines, ALimitSwitchOfOneEndsTheOthersAlongTheLine) {
 TEST(Lines, WhatIsToldIsTrueOnABadLine) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(seed);
-    Lab lab(hall(3, 2));
+    StreamedLab lab(hall(3, 2));
     lab.connect();
     std::mt19937 random(seed);
     lab.on_send = [&random](std::size_t, std::vector<std::uint8_t>&) { return random() % 12 != 0; };
@@ -347,7 +348,7 @@ TEST(Lines, WhatIsToldIsTrueOnABadLine) {
 }
 
 TEST(Lines, AnEmergencyStopEndsThem) {
-  Lab lab(hall(2, 2));
+  StreamedLab lab(hall(2, 2));
   lab.connect();
   const auto move = lab.send(line_to(kMotors, kSteps));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1000; });
@@ -361,7 +362,7 @@ TEST(Lines, AnEmergencyStopEndsThem) {
 }
 
 TEST(Lines, AStopBeforeTheStartMovesNothing) {
-  Lab lab(hall(2, 2));
+  StreamedLab lab(hall(2, 2));
   lab.connect();
   const auto move = lab.send(line_to(kMotors, kSteps));
   lab.run_for(0.005);
@@ -372,7 +373,7 @@ TEST(Lines, AStopBeforeTheStartMovesNothing) {
 }
 
 TEST(Lines, AreKeptLikeOtherMoves) {
-  Lab lab(hall(2, 2));
+  StreamedLab lab(hall(2, 2));
   lab.connect();
   lab.keep_positions();
   lab.connect();

@@ -18,7 +18,7 @@ bushd_status table_data_again(const Bytes& payload, Bytes* again) {
 Bytes any_table_data() {
   const auto count = between<uint8_t>(1, BUSHD_TABLE_DATA_MAX_CODES);
   Bytes payload = random_bytes(4u + 2u * count);
-  payload[0] = between<uint8_t>(0, BUSHD_TABLE_SLOTS - 1);
+  payload[0] = between<uint8_t>(0, BUSHD_SCRATCH_SLOT);
   payload[3] = count;
   return payload;
 }
@@ -70,19 +70,19 @@ Kinds setup_kinds() {
       {"table_begin",
        {bytes_with(15,
                    [](Bytes* p) {
-                     (*p)[0] = between<uint8_t>(0, 7);
+                     (*p)[0] = between<uint8_t>(0, 8);
                      for (const size_t at : {1u, 5u, 7u}) (*p)[at] |= 1;
                    }),
         codec(bushd_decode_table_begin, bushd_encode_table_begin),
-        {{"slot 8", set8(0, 8)},
+        {{"slot 9", set8(0, 9)},
          {"no codes", set16(1, 0)},
          {"cruise 0", set16(5, 0)},
          {"unit 0", set32(7, 0)}}}},
-      {"table_data", {any_table_data, table_data_again, {{"slot 8", set8(0, 8)}}}},
+      {"table_data", {any_table_data, table_data_again, {{"slot 9", set8(0, 9)}}}},
       {"table_end",
-       {bytes_with(5, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 7); }),
+       {bytes_with(5, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 8); }),
         codec(bushd_decode_table_end, bushd_encode_table_end),
-        {{"slot 8", set8(0, 8)}}}},
+        {{"slot 9", set8(0, 9)}}}},
       {"tables",
        {[] { return random_bytes(BUSHD_TABLES_SIZE); },
         codec(bushd_decode_tables, bushd_encode_tables),

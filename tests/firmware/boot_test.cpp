@@ -59,7 +59,8 @@ TEST(Boot, IdentitySaysWhatThePortGave) {
                 BUSHD_CAN_LINE_RUN | BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_TRIGGER |
                 BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST | BUSHD_CAN_COMMON_DIR |
                 BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES | BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_TRAVEL |
-                BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD);
+                BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD |
+                BUSHD_CAN_SCRATCH);
   EXPECT_TRUE(std::ranges::equal(identity.unique_id, Rig::unique_id()));
 }
 

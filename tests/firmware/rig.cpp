@@ -122,6 +122,7 @@ Rig::Rig(RigOptions options)
   config.velocity = velocity_.data();
   config.velocity_motors = options.velocity_motors;
   config.keypad = options.keypad;
+  config.scratch = options.scratch ? &scratch_ : nullptr;
   config.address = options.address;
   config.motors = options.motors;
   config.slots = options.slots;

@@ -38,6 +38,7 @@ struct RigOptions {
   std::uint8_t current_motors = 1;  // whose windings' currents the port controls
   std::uint8_t velocity_motors = 2;
   bool keypad = true;
+  bool scratch = true;  // has BUSHD_SCRATCH_SLOT
 };
 
 struct Answer {
@@ -232,6 +233,7 @@ class Rig {
   std::array<bushd_mcu_currents, BUSHD_MAX_CURRENT_MOTORS> currents_{};
   std::array<bushd_mcu_velocity, BUSHD_MAX_VELOCITY_MOTORS> velocity_{};
   std::vector<Winding> windings_;
+  bushd_mcu_scratch scratch_{};
   std::uint32_t sync_id_ = 0;
   std::uint32_t port_tick_ns_ = 0;
   std::uint16_t direction_ = 0;

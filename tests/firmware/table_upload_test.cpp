@@ -110,7 +110,7 @@ TEST_F(TableUpload, BadTablesAreNamedAndUseless) {
   Law no_cruise = flat_law(200, 1, 1);
   no_cruise.cruise = 0;
   EXPECT_EQ(rig.begin(1, no_cruise), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.begin(8, flat_law(200, 1, 1)), BUSHD_E_FORMAT) << "slots 0..7";
+  EXPECT_EQ(rig.begin(9, flat_law(200, 1, 1)), BUSHD_E_FORMAT) << "slots 0..8";
 }
 
 TEST_F(TableUpload, AssignNeedsAConfiguredMcuAndATableSlowEnough) {

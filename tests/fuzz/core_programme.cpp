@@ -100,7 +100,7 @@ void send_sync(Programmed& mcu, Input& input) {
 }
 
 void send_table_end(Programmed& mcu, Input& input) {
-  bushd_table_end end = {.slot = static_cast<std::uint8_t>(input.u8() % BUSHD_TABLE_SLOTS),
+  bushd_table_end end = {.slot = static_cast<std::uint8_t>(input.u8() % (BUSHD_SCRATCH_SLOT + 1)),
                          .crc = 0};
   end.crc = mcu.table_crc(end.slot);
   Payload payload;

@@ -19,7 +19,8 @@ Sight CoreRig::sight() {
 }
 
 std::uint32_t CoreRig::table_crc(std::uint8_t slot) {
-  const bushd_table& table = mcu_.tables.slot[slot].table;
+  const bushd_table& table =
+      slot == BUSHD_SCRATCH_SLOT ? scratch_.front().entry.table : mcu_.tables.slot[slot].table;
   return table.accel.count != 0 ? bushd_table_crc32(&table) : 0;
 }
 
@@ -68,6 +69,7 @@ void CoreRig::boot() {
                              .current_motors = static_cast<std::uint8_t>(currents_.size()),
                              .velocity = velocity_.data(),
                              .velocity_motors = static_cast<std::uint8_t>(velocity_.size()),
+                             .scratch = scratch_.data(),
                              .codes = codes_.data(),
                              .code_count = configuration_.codes,
                              .reply = reply(),

@@ -72,6 +72,7 @@ class CoreRig : public Programmed {
   // On the heap, each by itself: there a sanitizer sees what lies beside them.
   std::vector<std::int16_t> queue_;
   std::vector<std::uint16_t> codes_;
+  std::vector<bushd_mcu_scratch> scratch_ = std::vector<bushd_mcu_scratch>(1);
   std::array<bushd_mcu_currents, BUSHD_MAX_CURRENT_MOTORS> currents_{};
   std::array<bushd_mcu_velocity, BUSHD_MAX_VELOCITY_MOTORS> velocity_{};
   std::vector<std::uint8_t> reply_ = std::vector<std::uint8_t>(BUSHD_MCU_MAX_REPLY);

@@ -55,7 +55,7 @@ void decode_for_mcu(Bytes payload) {
   }
   bushd_table_begin begin;
   if (decoded(payload, &begin, bushd_decode_table_begin, bushd_encode_table_begin)) {
-    BUSHD_REQUIRE(begin.slot < BUSHD_TABLE_SLOTS && begin.accel_count >= 1);
+    BUSHD_REQUIRE(begin.slot <= BUSHD_SCRATCH_SLOT && begin.accel_count >= 1);
     BUSHD_REQUIRE(begin.cruise >= 1 && begin.time_unit_ns >= 1);
   }
   bushd_table_data data;
@@ -68,13 +68,13 @@ void decode_for_mcu(Bytes payload) {
                                    out);
   };
   if (decoded(payload, &data, bushd_decode_table_data, encode_data)) {
-    BUSHD_REQUIRE(data.slot < BUSHD_TABLE_SLOTS && data.count >= 1);
+    BUSHD_REQUIRE(data.slot <= BUSHD_SCRATCH_SLOT && data.count >= 1);
     BUSHD_REQUIRE(data.count <= BUSHD_TABLE_DATA_MAX_CODES);
     BUSHD_REQUIRE(inside(payload, data.codes, 2u * data.count));
   }
   bushd_table_end end;
   if (decoded(payload, &end, bushd_decode_table_end, bushd_encode_table_end)) {
-    BUSHD_REQUIRE(end.slot < BUSHD_TABLE_SLOTS);
+    BUSHD_REQUIRE(end.slot <= BUSHD_SCRATCH_SLOT);
   }
   bushd_assign assign;
   if (decoded(payload, &assign, bushd_decode_assign, bushd_encode_assign)) {
@@ -255,7 +255,7 @@ void decode_lines(Bytes payload) {
   std::array<bushd_line_entry, BUSHD_MOTORS_PER_MCU> entries;
   const auto check = [&](const bushd_line_part& line) {
     BUSHD_REQUIRE(line.count >= 1 && line.count <= BUSHD_MOTORS_PER_MCU);
-    BUSHD_REQUIRE(line.slot < BUSHD_TABLE_SLOTS && line.longest <= INT32_MAX && line.steps >= 1);
+    BUSHD_REQUIRE(line.slot <= BUSHD_SCRATCH_SLOT && line.longest <= INT32_MAX && line.steps >= 1);
     BUSHD_REQUIRE(line.from <= line.longest && line.steps <= line.longest - line.from);
     const std::uint8_t* at = line.entries;
     for (std::uint8_t i = 0; i < line.count; ++i) {

@@ -301,6 +301,8 @@ Request Clients::compose(CommandKind kind) {
       return change_settings();
     case CommandKind::kLine:
       return move_along_line();
+    case CommandKind::kArmLine:
+      return arm_line();
     case CommandKind::kPath:
       return move_along_path();
     case CommandKind::kArray:

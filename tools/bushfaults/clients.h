@@ -73,6 +73,7 @@ class Clients {
   Request move_or_retarget();
   Request move_with_legs();
   Request move_along_line();
+  Request arm_line();
   Request jog();
   Request pause_or_hold();
   Request change_settings();

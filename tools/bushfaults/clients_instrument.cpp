@@ -109,6 +109,35 @@ Request Clients::move_along_line() {
   return request;
 }
 
+// Every second one of motors with one table and equal ways. Most others get a table of their own
+// first, and are refused where that cannot be.
+Request Clients::arm_line() {
+  Request request = make(Ask::kArm);
+  request.line = true;
+  request.rising = random_.one_in(2);
+  request.delay_us = static_cast<std::int32_t>(random_.magnitude(50, 1'500'000));
+  std::vector<Choice> free = motors_that(false, false);
+  std::erase_if(free, [this](const Choice& choice) {
+    return config_.motors[index_of(choice.name)].backlash != 0;
+  });
+  const bool equal = random_.one_in(2);
+  const std::int64_t way = random_.magnitude(1, 6000);
+  for (std::int64_t n = random_.between(2, 5); n > 0 && !free.empty(); --n) {
+    const auto index = static_cast<std::size_t>(random_.below(free.size()));
+    std::int64_t steps = equal ? way : random_.magnitude(1, 6000);
+    if (random_.one_in(2)) steps = -steps;
+    if (std::abs(free[index].position_steps + steps) > kFarthestSteps) steps = -steps;
+    request.add(free[index].name, steps);
+    const auto group = config_.motors[index_of(free[index].name)].group;
+    free.erase(free.begin() + static_cast<std::ptrdiff_t>(index));
+    if (!equal) continue;
+    std::erase_if(free, [&](const Choice& choice) {
+      return config_.motors[index_of(choice.name)].group != group;
+    });
+  }
+  return request.motors.empty() ? arm() : request;
+}
+
 Request Clients::jog() {
   std::vector<Choice> some = motors_that(random_.one_in(4), false);
   return joggers_.begin(some.empty() ? any_motor() : random_.pick(some).name);

@@ -67,6 +67,7 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"paths", 0, "motors at rest move along a path, past its points or to rest at each"},
     {"arrays", 0, "motors at rest follow positions in time, told before or while they move"},
     {"shutter-blocks", 0, "programs step and open the shutter of a BUSHD-1; wants --triggers"},
+    {"line-armings", 0, "2 .. 5 motors wait for the trigger, on one line; wants --triggers"},
 }};
 
 template <std::size_t kSize>

@@ -76,8 +76,9 @@ enum class CommandKind : std::uint8_t {
   kPath,
   kArray,
   kShutter,
+  kArmLine,
 };
-inline constexpr std::size_t kCommandKinds = 26;
+inline constexpr std::size_t kCommandKinds = 27;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

@@ -79,6 +79,17 @@ api::MoveLine line_of(const Request& request) {
       .speed = speed_of(request)};
 }
 
+api::Edge edge_of(const Request& request) {
+  return request.rising ? api::Edge::kRising : api::Edge::kFalling;
+}
+
+api::ArmLine armed_line_of(const Request& request) {
+  return {.edge = edge_of(request),
+          .delay_us = request.delay_us,
+          .kind = api::Move::Kind::kRelative,
+          .motors = motor_steps(request)};
+}
+
 // Those at one address are one, which shows the first word.
 std::vector<std::pair<bushd::camac::Naf, int>> runs_of(
     const std::vector<bushd::camac::Naf>& cycles) {
@@ -142,6 +153,7 @@ std::string_view word_of(const Request& request) {
       if (request.array != 0) return "follow to";
       return request.line ? "line to" : "move to";
     case Ask::kArm:
+      if (request.line) return request.rising ? "arm line (rising)" : "arm line (falling)";
       return request.rising ? "arm (rising)" : "arm (falling)";
     default:
       return name_of(api_of(request));
@@ -183,9 +195,9 @@ api::Request api_of(const Request& request) {
     case Ask::kHome:
       return api::Home{request.motors};
     case Ask::kArm:
-      return api::Arm{.edge = request.rising ? api::Edge::kRising : api::Edge::kFalling,
-                      .delay_us = request.delay_us,
-                      .motors = motor_steps(request)};
+      if (request.line) return armed_line_of(request);
+      return api::Arm{
+          .edge = edge_of(request), .delay_us = request.delay_us, .motors = motor_steps(request)};
     case Ask::kConfirm:
       return api::Confirm{request.motors};
     case Ask::kJog:

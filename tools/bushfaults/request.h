@@ -60,7 +60,7 @@ struct Request {
   std::vector<std::string> motors{};
   std::vector<std::int64_t> steps{};   // as many as motors
   bool user = false;                   // they are millionths of each motor's unit
-  bool line = false;                   // kMoveBy, kMoveTo: all on one way
+  bool line = false;                   // kMoveBy, kMoveTo, kArm: all on one way
   std::vector<std::int64_t> points{};  // of a path, or an array, row by row, in millionths
   std::vector<double> point_speeds{};  // of a path of one motor: to each point
   bool exact = false;                  // a path: with a rest at each point

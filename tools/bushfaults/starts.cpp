@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace bushfaults {
 namespace {
@@ -11,6 +12,15 @@ using bushd::sim::TimeNs;
 
 constexpr std::size_t kEdgesKept = 1024;  // more than there are while a move waits and moves
 constexpr int kTriggerTicks = 3;          // docs/protocol.md, TRIGGER
+
+// On a line all but the longest motor make their first steps when their shares of it are due.
+bool begins_first(const Request& request, std::size_t motor) {
+  const auto way = [&](std::size_t i) { return std::abs(request.steps[i]); };
+  for (std::size_t i = 0; i < request.steps.size(); ++i) {
+    if (request.line && way(i) > way(motor)) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -27,7 +37,7 @@ std::optional<std::string> Starts::check(
   for (std::size_t i = 0; i < first_step_ns.size(); ++i) {
     if (!first_step_ns[i]) continue;
     first.push_back(*first_step_ns[i]);
-    if (request.ask != Ask::kArm) continue;
+    if (request.ask != Ask::kArm || !begins_first(request, i)) continue;
     if (auto wrong = check_triggered(request, request.motors[i], first.back())) return wrong;
   }
   // On a line each motor makes its first step when its share of the line is due.

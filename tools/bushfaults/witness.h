@@ -233,6 +233,8 @@ class Witness {
   void watch_ways();
   void check_way(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
   void run_begins(TimeNs now_ns, Motor& motor);
+  void disarm_accepted(const Request& request);
+  void pause_with_others(Motor& motor, const Asked& asked);
   void run_ended(TimeNs now_ns, Motor& motor, End end);
   void check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, const End& end,
                  std::optional<std::int64_t> target);

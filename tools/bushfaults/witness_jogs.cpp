@@ -53,6 +53,16 @@ void Witness::stop_accepted(const Request& request) {
   }
 }
 
+// Where some of a line wait no more, those that have begun are stopped.
+void Witness::disarm_accepted(const Request& request) {
+  for (const Motor& motor : motors_) {
+    if (!motor.move || !concerns(request, motor)) continue;
+    Asked& asked = asked_.at(*motor.move);
+    const bool waits = asked.request.ask == Ask::kArm && asked.request.line;
+    if (waits) asked.stops[asked.index_of(motor.name)] = true;
+  }
+}
+
 // What is being stopped, and what waits for the trigger, is left alone. Jogs end.
 void Witness::pause_accepted(TimeNs now_ns, const Request& request) {
   for (Motor& motor : motors_) {

@@ -39,6 +39,7 @@ void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   const Request& request = asked.request;
   check_limits(now_ns, asked);
   if (request.is_stop()) stop_accepted(request);
+  if (request.ask == Ask::kDisarm) disarm_accepted(request);
   if (request.ask == Ask::kPause || request.ask == Ask::kResume) pause_accepted(now_ns, request);
   if (request.ask == Ask::kHold || request.ask == Ask::kRelease) hold_accepted(request);
   if (request.ask == Ask::kConfigure) configure_accepted(asked);
@@ -85,6 +86,12 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   asked.began.push_back(request.ask != Ask::kArm);
   asked.told.push_back(false);
   asked.stops.push_back(false);
+  // The trigger begins it before anybody tells; what came before is over.
+  if (request.ask == Ask::kArm && request.line && on_run && on_run_end) {
+    on_run(motor.mcu, motor.output, true, true);
+    on_run_end(now_ns, motor.mcu, motor.output, "stopped");
+    on_run(motor.mcu, motor.output, true, true);
+  }
   if (is_shutter(motor) && request.client != ShutterModel::kClient) shutter_.disturbed();
   if (request.ask == Ask::kHome) {
     motor.move.reset();
@@ -194,8 +201,12 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
       moved(now_ns, asked, completed, *motors);
     }
   }
-  for (const std::string& name : request.motors) {
-    if (Motor* motor = find(name); motor != nullptr && motor->move == key) motor->move.reset();
+  for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    Motor* motor = find(request.motors[i]);
+    if (motor == nullptr || motor->move != key) continue;
+    motor->move.reset();
+    const bool waited = request.ask == Ask::kArm && request.line && !asked.began[i];
+    if (waited && on_run_end) on_run_end(now_ns, motor->mcu, motor->output, "stopped");
   }
 }
 
@@ -272,11 +283,23 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
 void Witness::run_begins(TimeNs now_ns, Motor& motor) {
   Asked& asked = asked_.at(*motor.move);
   const std::size_t index = asked.index_of(motor.name);
+  const bool waited = !asked.began[index];
   asked.began[index] = true;
   if (motor.over && !motor.goes_on) violated(now_ns, motor.name + " moves on after its end");
   motor.over = motor.goes_on = false;
   // The trigger may have begun it a while ago.
-  motor.run_from = asked.request.ask == Ask::kArm ? asked.from[index] : plant_steps(motor);
+  motor.run_from = waited ? asked.from[index] : plant_steps(motor);
+  if (waited && asked.request.line) pause_with_others(motor, asked);
+}
+
+// Of its line some have begun earlier, and may be paused: it is, too.
+void Witness::pause_with_others(Motor& motor, const Asked& asked) {
+  for (const std::string& name : asked.request.motors) {
+    const Motor& other = *find(name);
+    if (other.move != motor.move || !other.pauses) continue;
+    motor.pauses = true;
+    motor.paused_by = other.paused_by;
+  }
 }
 
 void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {

@@ -41,6 +41,11 @@ double off_polyline(const std::vector<std::int64_t>& rows, const std::vector<std
 void Witness::begin_way(Asked& asked) {
   const Request& request = asked.request;
   if (request.array != 0) return;
+  // Edges at several MCUs may be apart, and a short line over before that is known.
+  const bool several = std::ranges::any_of(request.motors, [&](const std::string& name) {
+    return find(name)->mcu != find(request.motors.front())->mcu;
+  });
+  if (request.ask == Ask::kArm && several) return;
   const std::size_t width = request.motors.size();
   for (std::size_t i = 0; i < width; ++i) {
     if (!asked.from[i] || !asked.target[i] || !offset(*find(request.motors[i]))) return;

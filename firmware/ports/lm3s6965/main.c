@@ -18,6 +18,7 @@
 static bushd_mcu mcu;
 static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
 static uint16_t codes[TABLE_CODES];
+static bushd_mcu_scratch scratch;
 static uint8_t reply[BUSHD_MCU_MAX_REPLY];
 static bool eeprom_failed;
 static uint16_t motor_inputs;
@@ -118,6 +119,7 @@ static void boot(void) {
                              .queue_ticks = QUEUE_TICKS,
                              .codes = codes,
                              .code_count = TABLE_CODES,
+                             .scratch = &scratch,
                              .reply = reply};
   journal_state kept;
   name_parts_of_core();

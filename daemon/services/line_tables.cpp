@@ -1,0 +1,56 @@
+#include "daemon/services/line_tables.h"
+
+#include <algorithm>
+#include <variant>
+
+#include "base/overloaded.h"
+#include "daemon/confirmation.h"
+
+namespace bushd::daemon {
+
+bool LineTables::concerns(const api::Request& request) {
+  return std::holds_alternative<api::MoveLine>(request) ||
+         std::holds_alternative<api::ArmLine>(request);
+}
+
+bool LineTables::make_ready(std::int64_t now_us, const api::Request& request, Wait& wait) {
+  if (!wait.looked) begin(now_us, request, wait);
+  if (wait.table && !is_over(now_us, wait)) return false;
+  end(wait);
+  return true;
+}
+
+void LineTables::begin(std::int64_t now_us, const api::Request& request, Wait& wait) {
+  using Wanted = std::optional<Lines::WantedTable>;
+  wait.looked = true;
+  auto wanted =
+      std::visit(Overloaded{[&](const api::MoveLine& r) { return lines_.table_to_upload(r); },
+                            [&](const api::ArmLine& r) { return lines_.table_to_upload(r); },
+                            [](const auto&) -> Wanted { return std::nullopt; }},
+                 request);
+  if (!wanted) return;
+  for (const McuId id : wanted->mcus) installation_[id].upload(wanted->table->view());
+  // Streams of other MCUs come first, and parts that are lost are sent again.
+  wait.deadline_us = now_us + kConfirmUs + 4 * wanted->upload_us;
+  wait.table = std::move(wanted);
+}
+
+bool LineTables::is_over(std::int64_t now_us, const Wait& wait) const {
+  const auto has_it = [&](McuId id) {
+    return installation_[id].has_table(wait.table->table->view());
+  };
+  const std::vector<McuId>& mcus = wait.table->mcus;
+  if (now_us > wait.deadline_us || std::ranges::all_of(mcus, has_it)) return true;
+  return !std::ranges::all_of(mcus, [&](McuId id) {
+    const Mcu& mcu = installation_[id];
+    return installation_.rests(mcu) && (has_it(id) || mcu.uploads());
+  });
+}
+
+void LineTables::end(Wait& wait) {
+  if (!wait.table) return;
+  for (const McuId id : wait.table->mcus) installation_[id].end_upload();
+  wait.table.reset();
+}
+
+}  // namespace bushd::daemon

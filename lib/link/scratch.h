@@ -1,0 +1,37 @@
+// The table slot of one MCU that is not kept over resets (BUSHD_SCRATCH_SLOT): what is in it, and
+// the requests that put another one there.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/message.h"
+#include "engine/table.h"
+#include "link/setup_queue.h"
+
+namespace bushd::link {
+
+class Scratch {
+ public:
+  // From now on this table is being uploaded, in place of what was there. It is copied.
+  void upload(const bushd_table& table);
+  // What is in the slot is not known.
+  void clear();
+
+  bool under_way() const { return !requests_.empty(); }
+  // The next request. Precondition: one is under way.
+  const SetupQueue::Request& front() const { return requests_.front(); }
+  // The MCU has answered a request of this type with this status, and nobody else had asked. A
+  // refusal ends the upload.
+  void acknowledged(std::uint8_t type, std::uint8_t status);
+  // The table that has been uploaded, whole; null if there is none.
+  const bushd_table* table() const { return there_ ? &table_ : nullptr; }
+
+ private:
+  std::vector<std::uint16_t> codes_;  // of both sides, or of one if they are the same
+  bushd_table table_{};
+  bool there_ = false;
+  SetupQueue requests_;
+};
+
+}  // namespace bushd::link
