@@ -83,7 +83,7 @@ class Lines final : public Service {
     bool waits = false;
     bool begun = true;
     std::shared_ptr<link::LinePace> pace{};  // of the run under way, where ports make it
-    std::vector<Begin> begins{};  // of those for which it has come
+    std::vector<Begin> begins{};             // of those for which it has come
 
     std::uint32_t longest() const;
     std::int64_t position_at(std::size_t motor, std::uint32_t step) const;

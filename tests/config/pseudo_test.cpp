@@ -29,7 +29,7 @@ Result<Config> load(const std::string& keys, const std::string& calibration = ""
   return file.load();
 }
 
-std::string error_of(const std::string& keys, const std::string& calibration = "") {
+std::string pseudo_error(const std::string& keys, const std::string& calibration = "") {
   const auto config = load(keys, calibration);
   return config ? "none" : config.error().text();
 }
@@ -76,20 +76,20 @@ TEST(ConfigPseudo, ACalibrationIsBesideTheConfiguration) {
 }
 
 TEST(ConfigPseudo, WhatIsWrongInACalibrationNamesBothFiles) {
-  EXPECT_THAT(error_of(kEnergy, "energy,left\n5000,20\n5000,15\n"),
+  EXPECT_THAT(pseudo_error(kEnergy, "energy,left\n5000,20\n5000,15\n"),
               testing::AllOf(HasSubstr("energy.csv:3: left over energy: 5000 does not rise"),
                              HasSubstr("(the calibration in "), HasSubstr("bushd.toml:")));
-  EXPECT_THAT(error_of(kEnergy, "energy,right\n1,2\n3,4\n"), HasSubstr("no column \"left\""));
-  EXPECT_THAT(error_of(replaced(kEnergy, "energy.csv", "none.csv")), HasSubstr("none.csv"));
-  EXPECT_THAT(error_of(kEnergy + "matrix = [[1]]\n", "energy,left\n1,2\n3,4\n"),
+  EXPECT_THAT(pseudo_error(kEnergy, "energy,right\n1,2\n3,4\n"), HasSubstr("no column \"left\""));
+  EXPECT_THAT(pseudo_error(replaced(kEnergy, "energy.csv", "none.csv")), HasSubstr("none.csv"));
+  EXPECT_THAT(pseudo_error(kEnergy + "matrix = [[1]]\n", "energy,left\n1,2\n3,4\n"),
               HasSubstr("matrix: does not go with `calibration`"));
 }
 
 TEST(ConfigPseudo, WhatCannotBeIsRefused) {
   const std::string matrix = kSlit + "matrix = [[1, 0], [0, 1]]\n";
-  EXPECT_EQ(error_of(matrix), "none");
+  EXPECT_EQ(pseudo_error(matrix), "none");
   const auto with = [&](const std::string& from, const std::string& to) {
-    return error_of(replaced(matrix, from, to));
+    return pseudo_error(replaced(matrix, from, to));
   };
   EXPECT_THAT(with("gap", "left"), HasSubstr("left is already taken in line"));
   EXPECT_THAT(with("gap", "Centre"), HasSubstr("centre is already taken in line"));
@@ -105,14 +105,16 @@ TEST(ConfigPseudo, WhatCannotBeIsRefused) {
   EXPECT_THAT(with("[0, 1]]", "[2, 0]]"), HasSubstr("depend on each other"));
   EXPECT_THAT(with("[0, 1]]", "[0]]"), HasSubstr("matrix: allowed: 2 rows, as `name`, of 2"));
   EXPECT_THAT(with("[0, 1]]", "7]"), HasSubstr("matrix[1]: is 7"));
-  EXPECT_THAT(error_of(matrix + "offset = [1]\n"), HasSubstr("offset: has 1 elements"));
-  EXPECT_THAT(error_of(matrix + "soft_limits = [0, 1]\n"), HasSubstr("soft_limits[0]: is 0"));
-  EXPECT_THAT(error_of(matrix + "soft_limits = [[0, 1], [2, 2]]\n"), HasSubstr("soft_limits[1]"));
-  EXPECT_THAT(error_of(matrix + "speed = 3\n"), HasSubstr("speed"));
-  EXPECT_THAT(error_of(kSlit), HasSubstr("matrix: is missing"));
-  EXPECT_THAT(error_of(replaced(kSlit, "\"centre\"]", "\"centre\", \"x\"]") + "kind = \"slit\"\n"),
-              HasSubstr("kind: is \"slit\", which has two axes"));
-  EXPECT_THAT(error_of(kSlit + "kind = \"table\"\n"), HasSubstr("allowed: \"slit\""));
+  EXPECT_THAT(pseudo_error(matrix + "offset = [1]\n"), HasSubstr("offset: has 1 elements"));
+  EXPECT_THAT(pseudo_error(matrix + "soft_limits = [0, 1]\n"), HasSubstr("soft_limits[0]: is 0"));
+  EXPECT_THAT(pseudo_error(matrix + "soft_limits = [[0, 1], [2, 2]]\n"),
+              HasSubstr("soft_limits[1]"));
+  EXPECT_THAT(pseudo_error(matrix + "speed = 3\n"), HasSubstr("speed"));
+  EXPECT_THAT(pseudo_error(kSlit), HasSubstr("matrix: is missing"));
+  EXPECT_THAT(
+      pseudo_error(replaced(kSlit, "\"centre\"]", "\"centre\", \"x\"]") + "kind = \"slit\"\n"),
+      HasSubstr("kind: is \"slit\", which has two axes"));
+  EXPECT_THAT(pseudo_error(kSlit + "kind = \"table\"\n"), HasSubstr("allowed: \"slit\""));
 }
 
 }  // namespace

@@ -217,7 +217,7 @@ TEST_P(DeniedVelocity, IsRefusedAndLocalInputsMoveByTheTable) {
                                    bushd_set_velocity{kMotor, 200 * 64, 1500 * 64, 3000}),
               BUSHD_E_UNKNOWN_MESSAGE);
   }
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor}));
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor, 0, 0}));
   to_inputs_time();
   set_inputs({0, BUSHD_INPUT_FORWARD});
   pass_ticks(60);

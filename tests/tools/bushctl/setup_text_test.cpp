@@ -14,7 +14,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-Found mcu(std::uint8_t address, std::uint8_t id, std::uint8_t motors = 16) {
+Found mcu_found(std::uint8_t address, std::uint8_t id, std::uint8_t motors = 16) {
   Found found{.address = address};
   found.identity.protocol_version = BUSHD_PROTOCOL_VERSION;
   found.identity.unique_id[7] = id;
@@ -33,7 +33,7 @@ bushd::Result<bushd::config::Config> parsed(const std::vector<FoundBus>& buses,
 }
 
 TEST(Setup, EachMcuHasAMotorAndLcmTakesNoCommands) {
-  const auto config = parsed({bus("/dev/a", {mcu(2, 1), mcu(1, 2, 4)})});
+  const auto config = parsed({bus("/dev/a", {mcu_found(2, 1), mcu_found(1, 2, 4)})});
   ASSERT_TRUE(config) << config.error().text();
   ASSERT_EQ(config->mcus.size(), 2u);
   EXPECT_EQ(config->buses[0].port, "/dev/a");
@@ -43,7 +43,8 @@ TEST(Setup, EachMcuHasAMotorAndLcmTakesNoCommands) {
 }
 
 TEST(Setup, SeveralBusesHaveMotorsOfDifferentNames) {
-  const auto config = parsed({bus("/dev/a", {mcu(1, 1)}), bus("/dev/b", {mcu(1, 2)}, 1'000'000)});
+  const auto config =
+      parsed({bus("/dev/a", {mcu_found(1, 1)}), bus("/dev/b", {mcu_found(1, 2)}, 1'000'000)});
   ASSERT_TRUE(config) << config.error().text();
   EXPECT_EQ(config->motors[0].name, "bus1-m1-0");
   EXPECT_EQ(config->motors[1].name, "bus2-m1-0");
@@ -52,17 +53,18 @@ TEST(Setup, SeveralBusesHaveMotorsOfDifferentNames) {
 
 TEST(Setup, ASlowLineAndManyMcusFitWithLongerTicks) {
   std::vector<Found> many;
-  for (std::uint8_t address = 1; address <= 32; ++address) many.push_back(mcu(address, address));
+  for (std::uint8_t address = 1; address <= 32; ++address)
+    many.push_back(mcu_found(address, address));
   EXPECT_FALSE(parsed({bus("/dev/a", many, 115'200)}, 2560));
   const auto fits = parsed({bus("/dev/a", many, 2'000'000)}, 10'240);
   EXPECT_TRUE(fits) << fits.error().text();
-  EXPECT_TRUE(parsed({bus("/dev/a", {mcu(1, 1)}, 115'200)}, 5120));
+  EXPECT_TRUE(parsed({bus("/dev/a", {mcu_found(1, 1)}, 115'200)}, 5120));
 }
 
 TEST(Setup, McusThatCannotBeNamedAreComments) {
-  Found old = mcu(7, 9);
+  Found old = mcu_found(7, 9);
   old.identity.protocol_version = 1;
-  const FoundBus found = bus("/dev/a", {mcu(1, 0xAA), mcu(1, 0xBB), old});
+  const FoundBus found = bus("/dev/a", {mcu_found(1, 0xAA), mcu_found(1, 0xBB), old});
   const auto config = parsed({found});
   ASSERT_TRUE(config) << config.error().text();
   EXPECT_EQ(config->mcus.size(), 1u);
@@ -78,7 +80,7 @@ TEST(Setup, McusThatCannotBeNamedAreComments) {
 }
 
 TEST(Setup, NamesOfPortsAreQuoted) {
-  const auto config = parsed({bus("/dev/a\"b\\c", {mcu(1, 1)})});
+  const auto config = parsed({bus("/dev/a\"b\\c", {mcu_found(1, 1)})});
   ASSERT_TRUE(config) << config.error().text();
   EXPECT_EQ(config->buses[0].port, "/dev/a\"b\\c");
 }
