@@ -57,9 +57,7 @@ class Autonomous : public Script, public testing::WithParamInterface<Target> {
     expect_the_same_reports();
   }
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Autonomous);
-INSTANTIATE_TEST_SUITE_P(Of, Autonomous, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Autonomous, targets());
 
 class HomingScript : public Autonomous {
  protected:
@@ -105,9 +103,7 @@ class HomingScript : public Autonomous {
   Carriage virtual_{0, contact()};
   Carriage real_carriage_{1, contact()};
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(HomingScript);
-INSTANTIATE_TEST_SUITE_P(Of, HomingScript, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(HomingScript, targets());
 
 // Fast approach, ramp-down on the switch, back-off, slow approach, each step in the slot of the
 // twin's.
@@ -153,14 +149,10 @@ TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
 }
 
 class KeypadLine : public Autonomous {};
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(KeypadLine);
-INSTANTIATE_TEST_SUITE_P(Of, KeypadLine, testing::ValuesIn(targets_with(BUSHD_CAN_KEYPAD)),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(KeypadLine, targets_with(BUSHD_CAN_KEYPAD));
 
 class DeniedKeypad : public Autonomous {};
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(DeniedKeypad);
-INSTANTIATE_TEST_SUITE_P(Of, DeniedKeypad, testing::ValuesIn(targets_without(BUSHD_CAN_KEYPAD)),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(DeniedKeypad, targets_without(BUSHD_CAN_KEYPAD));
 
 TEST_P(DeniedKeypad, IsRefused) {
   for (const std::uint8_t address : {kVirtual, kReal}) {
@@ -201,14 +193,10 @@ TEST_P(KeypadLine, MovesItsMotors) {
 }
 
 class VelocityLoop : public Autonomous {};
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(VelocityLoop);
-INSTANTIATE_TEST_SUITE_P(Of, VelocityLoop, testing::ValuesIn(targets_with(BUSHD_CAN_VELOCITY)),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(VelocityLoop, targets_with(BUSHD_CAN_VELOCITY));
 
 class DeniedVelocity : public Autonomous {};
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(DeniedVelocity);
-INSTANTIATE_TEST_SUITE_P(Of, DeniedVelocity, testing::ValuesIn(targets_without(BUSHD_CAN_VELOCITY)),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(DeniedVelocity, targets_without(BUSHD_CAN_VELOCITY));
 
 // Local motion goes by the table then.
 TEST_P(DeniedVelocity, IsRefusedAndLocalInputsMoveByTheTable) {

@@ -9,9 +9,7 @@ class Conformance : public Script, public testing::WithParamInterface<Target> {
  protected:
   Conformance() : Script(GetParam()) {}
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Conformance);
-INSTANTIATE_TEST_SUITE_P(Of, Conformance, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Conformance, targets());
 
 TEST_P(Conformance, TellsWhoItIs) {
   const auto identity_of = [this](std::uint8_t address) {

@@ -111,9 +111,7 @@ class Faults : public testing::TestWithParam<Target> {
   Master master_;
   std::uint32_t first_tick_ = 0;
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Faults);
-INSTANTIATE_TEST_SUITE_P(Of, Faults, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Faults, targets());
 
 TEST_P(Faults, ADamagedFrameCountsForNothingAndIsRepaired) {
   first_tick_ = master_.poll(kReal).tick + 16;
@@ -197,9 +195,7 @@ class Inputs : public Faults {
     }
   }
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Inputs);
-INSTANTIATE_TEST_SUITE_P(Of, Inputs, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Inputs, targets());
 
 TEST_P(Inputs, ALimitStopsItsMotorAndForbidsTheDirection) {
   bushd_set_inputs settings{};
@@ -288,9 +284,7 @@ class GoldenFrames : public testing::TestWithParam<Target> {
     return answers;
   }
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(GoldenFrames);
-INSTANTIATE_TEST_SUITE_P(Of, GoldenFrames, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(GoldenFrames, targets());
 
 TEST_P(GoldenFrames, AreAnsweredLikeTheVirtualMcuDoes) {
   const auto real = GetParam().make();

@@ -53,14 +53,10 @@ class LineScript : public Script, public testing::WithParamInterface<Target> {
 
   std::vector<std::uint8_t> motors_;
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(LineScript);
-INSTANTIATE_TEST_SUITE_P(Of, LineScript, testing::ValuesIn(targets_with(BUSHD_CAN_LINE_RUN)),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(LineScript, targets_with(BUSHD_CAN_LINE_RUN));
 
 class DeniedLine : public LineScript {};
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(DeniedLine);
-INSTANTIATE_TEST_SUITE_P(Of, DeniedLine, testing::ValuesIn(targets_without(BUSHD_CAN_LINE_RUN)),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(DeniedLine, targets_without(BUSHD_CAN_LINE_RUN));
 
 TEST_P(DeniedLine, IsRefusedAndNothingMoves) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));

@@ -33,9 +33,7 @@ class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
 
   const std::unique_ptr<McuUnderTest> real_;
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Nvm);
-INSTANTIATE_TEST_SUITE_P(Of, Nvm, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Nvm, targets());
 
 TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
@@ -95,9 +93,7 @@ TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
 }
 
 class NvmVelocity : public Nvm {};
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(NvmVelocity);
-INSTANTIATE_TEST_SUITE_P(Of, NvmVelocity, testing::ValuesIn(targets_with(BUSHD_CAN_VELOCITY)),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(NvmVelocity, targets_with(BUSHD_CAN_VELOCITY));
 
 // Without a table, too.
 TEST_P(NvmVelocity, LocalInputsMoveAMotorAfterAResetWithoutAHost) {

@@ -150,9 +150,7 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
 
   Stage stage_{kHomeAt, own(kPositive), own(kHome)};
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Switches);
-INSTANTIATE_TEST_SUITE_P(Of, Switches, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Switches, targets());
 
 TEST_P(Switches, EachLimitStopsItsDirection) {
   for (const std::int8_t direction : {std::int8_t{1}, std::int8_t{-1}}) {

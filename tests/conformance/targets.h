@@ -1,6 +1,8 @@
 // The kinds of MCU that must all do the same. A new port adds one here.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -61,5 +63,11 @@ std::vector<Target> targets();
 // Of these, those that have such a capability (BUSHD_CAN_*), and those that deny it.
 std::vector<Target> targets_with(std::uint32_t capability);
 std::vector<Target> targets_without(std::uint32_t capability);
+
+// A suite of tests with a parameter, for each of them; for none if no image was there.
+#define BUSHD_FOR_TARGETS(suite, those)                         \
+  GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(suite);         \
+  INSTANTIATE_TEST_SUITE_P(Of, suite, testing::ValuesIn(those), \
+                           [](auto& target) { return target.param.name; })
 
 }  // namespace bushd::sim

@@ -85,9 +85,7 @@ class Travels : public Script, public testing::WithParamInterface<Target> {
   std::uint16_t others_ = 0;
   std::uint8_t system_ = 0;
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Travels);
-INSTANTIATE_TEST_SUITE_P(Of, Travels, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Travels, targets());
 
 TEST_P(Travels, EachReactorStartOpensTheShutterOnceAndInTime) {
   constexpr std::uint32_t kWaitUs = 320'000;

@@ -37,9 +37,7 @@ class Triggers : public Script, public testing::WithParamInterface<Target> {
     return found;
   }
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Triggers);
-INSTANTIATE_TEST_SUITE_P(Of, Triggers, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Triggers, targets());
 
 // By the sums of the table's delays, from the edge and the three ticks on; the clocks are the
 // bus's.
@@ -150,9 +148,7 @@ class Supply final : public EdgeSink {
 };
 
 class Current : public testing::TestWithParam<Target> {};
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Current);
-INSTANTIATE_TEST_SUITE_P(Of, Current, testing::ValuesIn(targets()),
-                         [](auto& target) { return target.param.name; });
+BUSHD_FOR_TARGETS(Current, targets());
 
 TEST_P(Current, IsMeasuredAndPulsesAreAsFarApart) {
   constexpr std::uint32_t kLongTickNs = 16'384'000;  // 128 slots of 128 us

@@ -44,17 +44,7 @@ class Keypad : public Streams {
   }
   void expect_counted_after_stop() {
     press(kStop, 1);
-    expect_counted();
-  }
-  void expect_counted() {
-    rig.pass_until_rest();
-    const bushd_report report = rig.poll();
-    EXPECT_EQ(report.autonomous, 0);
-    for (std::uint8_t m = 0; m < report.motor_count; ++m) {
-      EXPECT_EQ(report.motor[m].position_steps, rig.pulses(m));
-    }
-    EXPECT_EQ(rig.steps_with_dir(), 0);
-    EXPECT_EQ(rig.steps_while_disabled(), 0);
+    expect_rest_as_counted();
   }
 };
 INSTANTIATE_TEST_SUITE_P(Formats, Keypad, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
@@ -69,7 +59,7 @@ TEST_P(Keypad, ADirectionCountsUntilTheNextKeyWithTheFirstSpeed) {
     EXPECT_EQ(rig.keypad_display(), "0300\n");
     expect_steps(3'000'000, direction, 190);
     press(kStop, 1);
-    expect_counted();
+    expect_rest_as_counted();
     EXPECT_EQ(rig.keypad_display(), "0300\n");
   }
 }
@@ -87,7 +77,7 @@ TEST_P(Keypad, SlowerAddsTheSameUntilItBeginsAgain) {
   press(kStop, 30);
   press(kSlower, 1);
   EXPECT_EQ(rig.keypad_display(), "0300\n");
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 TEST_P(Keypad, SlowerInMotionIsARampDownAndANewBeginning) {
@@ -102,7 +92,7 @@ TEST_P(Keypad, SlowerInMotionIsARampDownAndANewBeginning) {
   for (std::size_t i = 100; i < 199; ++i) steps += rig.history(1)[i];
   EXPECT_NEAR(steps, 99 * 2.56 / 3.3, 1.0);
   press(kStop, 1);
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 // The period of the loop is in 25 us: 3 ms are 120 of them, 3.3 ms 132.
@@ -137,7 +127,7 @@ TEST_P(Keypad, AKeyThatIsNotRepeatedCountsForAWhileWhereThatIsSet) {
   rig.pass_until_rest(60);
   EXPECT_EQ(rig.poll().autonomous, 0);
   EXPECT_EQ(rig.keypad_display(), "0300\n") << "not refused";
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 TEST_P(Keypad, ABrokenLineEndsMotionUntilAKeyIsPressed) {
@@ -150,7 +140,7 @@ TEST_P(Keypad, ABrokenLineEndsMotionUntilAKeyIsPressed) {
   press(kForward, 60);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   press(kStop, 1);
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 TEST_P(Keypad, OtherBytesMeanNothing) {
@@ -217,7 +207,7 @@ TEST_P(Keypad, PeopleAtTheInputsComeFirst) {
   rig.pass_until_rest();
   rig.pass(60);
   EXPECT_EQ(rig.poll().autonomous, 0) << "it has to be pressed again";
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 TEST_P(Keypad, AHostsMotorIsNotItsUntilThatRests) {

@@ -17,16 +17,6 @@ class Local : public Streams {
     rig.pass(ticks);
   }
   void release() { hold(0, 1); }
-  void expect_counted() {
-    rig.pass_until_rest();
-    const bushd_report report = rig.poll();
-    EXPECT_EQ(report.autonomous, 0);
-    for (std::uint8_t m = 0; m < report.motor_count; ++m) {
-      EXPECT_EQ(report.motor[m].position_steps, rig.pulses(m));
-    }
-    EXPECT_EQ(rig.steps_with_dir(), 0);
-    EXPECT_EQ(rig.steps_while_disabled(), 0);
-  }
 };
 INSTANTIATE_TEST_SUITE_P(Formats, Local, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
                          format_name);
@@ -54,7 +44,7 @@ TEST_P(Local, WhileHeldMotorsFollowTheirTableAndThenRampDown) {
     EXPECT_EQ(seen, expected);
     EXPECT_EQ(rig.history(0), rig.history(2));
     EXPECT_EQ(rig.pulses(1), 0) << "not one of these";
-    expect_counted();
+    expect_rest_as_counted();
     EXPECT_EQ(rig.poll().faults, 0);
   }
 }
@@ -74,7 +64,7 @@ TEST_P(Local, BothButtonsRampDownAndABounceIsNoPress) {
   release();
   rig.pass_until_rest();
   EXPECT_LT(rig.pulses(0), at);
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 // A tap on the other button: it turns only after its ramp, and only where it is still asked to.
@@ -88,7 +78,7 @@ TEST_P(Local, PressedAgainOnTheRampItMovesOnceItRests) {
   const auto turned = std::find_if(ticks.begin(), ticks.end(), [](int n) { return n < 0; });
   ASSERT_NE(turned, ticks.end());
   EXPECT_TRUE(std::none_of(turned, ticks.end(), [](int n) { return n > 0; }));
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 TEST_P(Local, AStreamOnSuchAMotorIsRefusedMeanwhileAndWhatStreamsIsLeftAlone) {
@@ -110,7 +100,7 @@ TEST_P(Local, AStreamOnSuchAMotorIsRefusedMeanwhileAndWhatStreamsIsLeftAlone) {
   release();
   rig.pass_until_rest();
   EXPECT_LT(rig.pulses(0), at + 30);
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 TEST_P(Local, EmergencyStopsItUntilItIsClearedAndPressedAgain) {
@@ -126,7 +116,7 @@ TEST_P(Local, EmergencyStopsItUntilItIsClearedAndPressedAgain) {
   hold(BUSHD_INPUT_FORWARD, 50);
   EXPECT_GT(rig.pulses(0), at);
   release();
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 TEST_P(Local, ACutIsNoRampWhoeverAsksForIt) {
@@ -169,7 +159,7 @@ TEST_P(Local, WorksWithoutAHostButNotWithoutDriversOrTables) {
   rig.pass_until_rest();
   EXPECT_GT(rig.pulses(0), 20);
   EXPECT_EQ(rig.poll().faults, 0) << "nobody's silence is a fault here";
-  expect_counted();
+  expect_rest_as_counted();
   const std::int64_t at = rig.pulses(0);
   ASSERT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_OK);
   hold(BUSHD_INPUT_FORWARD, 60);
@@ -202,7 +192,7 @@ TEST_P(Local, StopsAtALimitAndComesBackFromIt) {
   rig.pass(50);
   release();
   EXPECT_LT(rig.pulses(0), at);
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 TEST_P(Local, MotorsThatTheMcuDoesNotHaveAreRefused) {
@@ -210,7 +200,7 @@ TEST_P(Local, MotorsThatTheMcuDoesNotHaveAreRefused) {
   hold(BUSHD_INPUT_FORWARD, 60);
   EXPECT_EQ(rig.poll().autonomous, kLocal) << "as it was told before";
   release();
-  expect_counted();
+  expect_rest_as_counted();
 }
 
 // People expect nothing of a button that was held, or is shorted, before anybody could press it.

@@ -34,6 +34,16 @@ class Streams : public testing::TestWithParam<bushd_format> {
     EXPECT_EQ(rig.poll().motor[motor].position_steps, steps);
     EXPECT_EQ(rig.poll().faults, 0);
   }
+  void expect_rest_as_counted() {
+    rig.pass_until_rest();
+    const bushd_report report = rig.poll();
+    EXPECT_EQ(report.autonomous, 0);
+    for (std::uint8_t m = 0; m < report.motor_count; ++m) {
+      EXPECT_EQ(report.motor[m].position_steps, rig.pulses(m));
+    }
+    EXPECT_EQ(rig.steps_with_dir(), 0);
+    EXPECT_EQ(rig.steps_while_disabled(), 0);
+  }
 
   const bushd_format format = GetParam();
   const Law law = ramp_law();

@@ -206,7 +206,8 @@ class Move:
             if after > made:
                 last = after == len(times)
                 place = LAST_TICK if last else FIRST_TICK if tick == 0 else INTERIOR
-                bound_ns = self.bound_ns(delays[made : after + 1], last, q1 - q0, slots)
+                stands = last or (tick == 0 and self.late_ns > 0)  # in a part of the tick
+                bound_ns = self.bound_ns(delays[made : after + 1], stands, q1 - q0, slots)
             by_table = self.start_tick + tick < self.ticks_from
             begin_ns = (self.start_tick + tick) * self.tick_ns
             for n in range(made, after):
@@ -232,10 +233,10 @@ class Move:
             q0 = q1
             tick += 1
 
-    def bound_ns(self, delays, last, displacement, slots):
+    def bound_ns(self, delays, stands, displacement, slots):
         """How far an edge of a tick may lie from the table (above); `delays` are those that run in it."""
         vmax = 1 / (min(delays) * self.table.unit_ns)
-        vmin = 0 if last else 1 / (max(delays) * self.table.unit_ns)
+        vmin = 0 if stands else 1 / (max(delays) * self.table.unit_ns)
         rounding = 1 / 256 if self.fine else 1 / 2
         off_steps = (vmax - vmin) * self.tick_ns / 4 + rounding
         return min(self.tick_ns, 256 * self.tick_ns / displacement * off_steps + self.tick_ns / slots)

@@ -171,6 +171,9 @@ class RightTraces(CheckTraceTest):
     def test_a_first_step_in_the_first_slot_of_a_later_tick(self):
         self.any_tables_and_stops(2601170235)
 
+    def test_a_late_start_at_speed(self):
+        self.any_tables_and_stops(1582628897)
+
     def any_tables_and_stops(self, seed):
         chance = random.Random(seed)
         for round_number in range(12):
