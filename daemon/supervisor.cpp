@@ -128,12 +128,13 @@ void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
     motion::Motor& motor = installation_[id];
     if (!is_reported(mcu, motor)) continue;
     journal_.before_report(id, positions_.being_set(id) || kept_.being_restored(id));
-    moves_.take(now_us, id,
-                motor.report({.of_mcu = mcu.report(),
-                              .tick = mcu.view().tick,
-                              .requests_open = mcu.busy(),
-                              .emergency_stop_open = emergency_stop_.under_way(),
-                              .other_master = installation_.bus_of(mcu).two_masters}));
+    moves_.take(
+        now_us, id,
+        motor.report({.of_mcu = mcu.report(),
+                      .tick = mcu.view().tick,
+                      .requests_open = mcu.busy(),
+                      .emergency_stop_open = emergency_stop_.under_way(),
+                      .other_master = installation_.bus_of(mcu).master.two_masters(now_us)}));
   }
   journal_.after_report(mcu);
   for (Service* service : services_) service->reports(now_us, mcu);

@@ -4,7 +4,6 @@
 #include <variant>
 
 #include "base/overloaded.h"
-#include "daemon/confirmation.h"
 
 namespace bushd::daemon {
 
@@ -29,9 +28,12 @@ void LineTables::begin(std::int64_t now_us, const api::Request& request, Wait& w
                             [](const auto&) -> Wanted { return std::nullopt; }},
                  request);
   if (!wanted) return;
+  // An MCU has one such table: what one line waits for, or goes by, no other one replaces.
+  const auto waits = [this](McuId id) { return std::ranges::find(waiting_, id) != waiting_.end(); };
+  if (std::ranges::any_of(wanted->all, waits)) return;
+  waiting_.insert(waiting_.end(), wanted->all.begin(), wanted->all.end());
   for (const McuId id : wanted->mcus) installation_[id].upload(wanted->table->view());
-  // Streams of other MCUs come first, and parts that are lost are sent again.
-  wait.deadline_us = now_us + kConfirmUs + 4 * wanted->upload_us;
+  wait.deadline_us = now_us + wanted->most_us;
   wait.table = std::move(wanted);
 }
 
@@ -50,6 +52,9 @@ bool LineTables::is_over(std::int64_t now_us, const Wait& wait) const {
 void LineTables::end(Wait& wait) {
   if (!wait.table) return;
   for (const McuId id : wait.table->mcus) installation_[id].end_upload();
+  std::erase_if(waiting_, [&](McuId id) {
+    return std::ranges::find(wait.table->all, id) != wait.table->all.end();
+  });
   wait.table.reset();
 }
 

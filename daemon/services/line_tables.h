@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "api/request.h"
 #include "daemon/services/lines.h"
@@ -36,6 +37,7 @@ class LineTables {
 
   Installation& installation_;
   const Lines& lines_;
+  std::vector<McuId> waiting_;  // of all lines that wait
 };
 
 }  // namespace bushd::daemon

@@ -24,6 +24,12 @@
 
 namespace bushd::daemon {
 
+// How long a table of a line takes to be uploaded, where nothing is lost.
+std::int64_t upload_us(const bushd_table& table, std::int64_t baud);
+// A line for the trigger waits no longer for it: clients wait 3 s for an answer, and nobody may be
+// gone who could disarm it.
+inline constexpr std::int64_t kMostArmedUs = 2'500'000;
+
 class Lines final : public Service {
  public:
   Lines(Installation& installation, const Interlocks& interlocks, Journal& journal, Moves& moves,
@@ -44,8 +50,10 @@ class Lines final : public Service {
   // already. Milliseconds for long tables.
   struct WantedTable {
     std::shared_ptr<const tables::Envelope> table;
-    std::vector<McuId> mcus;
-    std::int64_t upload_us;  // on a line that loses nothing
+    std::vector<McuId> mcus;  // that get it
+    std::vector<McuId> all;   // of the line
+    std::int64_t upload_us;   // on a line that loses nothing
+    std::int64_t most_us;     // the request waits no longer
   };
   std::optional<WantedTable> table_to_upload(const api::MoveLine& request) const;
   std::optional<WantedTable> table_to_upload(const api::ArmLine& request) const;

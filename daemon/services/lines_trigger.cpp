@@ -100,6 +100,13 @@ Result<void> Lines::check_table(const Line& line, const Mcu& mcu) const {
     return fail(what +
                 ", and takes only while all its motors rest: wait for their results, or stop them");
   }
+  if (const auto takes_us = upload_us(table, installation_.bus_of(mcu).config.baud);
+      takes_us > kMostArmedUs) {
+    return fail(
+        fmt::format("{}, and would take {:.1f} s to get, which is longer than clients wait: "
+                    "use a higher baud rate, or move it without a trigger",
+                    what, static_cast<double>(takes_us) / 1e6));
+  }
   return fail(what + ", and has not taken: try again, or move it without a trigger");
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "daemon/services/lines.h"
+#include "link/mcu_fit.h"
 
 namespace bushd::daemon {
 namespace {
@@ -11,13 +12,13 @@ constexpr std::int64_t kMostUs = 500'000;
 constexpr std::int64_t kPerPartUs = 2'000;       // adapter and MCU, until the next one can be sent
 constexpr std::int64_t kBitsPerPart = 10 * 270;  // with its answer
 
+}  // namespace
+
 std::int64_t upload_us(const bushd_table& table, std::int64_t baud) {
-  const std::int64_t codes = std::int64_t{table.accel.count} + table.decel.count;
+  const auto codes = static_cast<std::int64_t>(link::codes_of(table));
   const std::int64_t parts = 3 + codes / BUSHD_TABLE_DATA_MAX_CODES;
   return parts * (kPerPartUs + kBitsPerPart * 1'000'000 / baud);
 }
-
-}  // namespace
 
 std::optional<Lines::WantedTable> Lines::table_to_upload(const api::MoveLine& request) const {
   if (request.dry_run) return std::nullopt;
@@ -49,9 +50,13 @@ bool Lines::may_get_tables(const std::vector<MotorId>& motors, bool armed) const
 std::optional<Lines::WantedTable> Lines::table_to_upload(const Line& line, bool armed) const {
   // By a table of its own a motor moves where its MCU does not rest.
   if (line.by || line.longest() == 0 || !may_get_tables(line.motors, armed)) return std::nullopt;
-  WantedTable wanted{.table = line.way.table(), .mcus = {}, .upload_us = 0};
+  WantedTable wanted{.table = line.way.table(),
+                     .mcus = {},
+                     .all = installation_.mcus_of(line.motors),
+                     .upload_us = 0,
+                     .most_us = armed ? kMostArmedUs : kMostUs};
   const bushd_table& table = wanted.table->view();
-  for (const McuId id : installation_.mcus_of(line.motors)) {
+  for (const McuId id : wanted.all) {
     const Mcu& mcu = installation_[id];
     if (!mcu.keeps_up_with(table, line.way.floor(), has_all_of(line, mcu))) return std::nullopt;
     if (mcu.has_table(table)) continue;
@@ -59,7 +64,7 @@ std::optional<Lines::WantedTable> Lines::table_to_upload(const Line& line, bool 
     wanted.mcus.push_back(id);
     wanted.upload_us += upload_us(table, installation_.bus_of(mcu).config.baud);
   }
-  if (wanted.mcus.empty() || (!armed && wanted.upload_us > kMostUs)) return std::nullopt;
+  if (wanted.mcus.empty() || wanted.upload_us > wanted.most_us) return std::nullopt;
   return wanted;
 }
 

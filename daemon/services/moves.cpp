@@ -364,9 +364,12 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
               retarget(now_us, {id});
             },
             [&](const motion::event::Drop&) { mcu.drop(motor.output()); },
-            [&](const motion::event::Mismatch&) {
+            [&](const motion::event::Mismatch& mismatch) {
               outputs_.log(LogLevel::kError, id,
-                           motor.name() + ": " + *motor.uncertain_reason() + "; it is stopped");
+                           motor.name() + ": " + *motor.uncertain_reason() +
+                               (mismatch.stopped ? "; it is stopped"
+                                                 : "; it is left to the other master on the line, "
+                                                   "only an emergency stop reaches it"));
             },
             [&](const motion::event::Turn&) {
               journal_.ended(id, "turned");

@@ -11,7 +11,7 @@ extern "C" {
 #define BUSHD_PROTOCOL_VERSION 5u
 #define BUSHD_MOTORS_PER_MCU 16u
 #define BUSHD_TABLE_SLOTS 8u
-#define BUSHD_SCRATCH_SLOT 8u  // of a table that is not kept over resets (BUSHD_CAN_SCRATCH)
+#define BUSHD_SCRATCH_SLOT 8u  // volatile: its table is lost at a reset (BUSHD_CAN_SCRATCH)
 #define BUSHD_MIN_TICK_NS 200000u
 #define BUSHD_MAX_TICK_NS 20000000u
 #define BUSHD_UNIQUE_ID_SIZE 8u

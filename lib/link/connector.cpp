@@ -121,18 +121,28 @@ bool Connector::send_ramp_down(std::int64_t now_us) {
 }
 
 const SetupQueue::Request* Connector::next_request(McuIndex mcu) const {
-  if (mcus_[mcu].view.phase == McuPhase::kOffline) return nullptr;
-  const Link& link = links_[mcu];
-  if (!link.queue.empty()) return &link.queue.front();
-  return link.scratch.under_way() ? &link.scratch.front() : nullptr;
+  const SetupQueue& queue = links_[mcu].queue;
+  return queue.empty() ? nullptr : &queue.front();
+}
+
+const SetupQueue::Request* Connector::next_part(McuIndex mcu) {
+  Scratch& scratch = links_[mcu].scratch;
+  return scratch.under_way() ? &scratch.ask() : nullptr;
 }
 
 bool Connector::send_request(std::int64_t now_us) {
+  return send_first(now_us, turn_, [this](McuIndex mcu) { return next_request(mcu); }) ||
+         send_first(now_us, part_turn_, [this](McuIndex mcu) { return next_part(mcu); });
+}
+
+template <class Next>
+bool Connector::send_first(std::int64_t now_us, std::size_t& turn, Next next) {
   for (std::size_t n = 0; n < mcus_.size(); ++n) {
-    const McuIndex i{(turn_ + n) % mcus_.size()};
-    const SetupQueue::Request* request = next_request(i);
+    const McuIndex i{(turn + n) % mcus_.size()};
+    if (mcus_[i].view.phase == McuPhase::kOffline) continue;
+    const SetupQueue::Request* request = next(i);
     if (request == nullptr) continue;
-    turn_ = i.value + 1;
+    turn = i.value + 1;
     transactions_.ask(now_us, {.mcu = i,
                                .address = mcus_[i].setup.address,
                                .type = request->type,

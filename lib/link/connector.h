@@ -96,6 +96,9 @@ class Connector {
 
   // The request that is to be sent next; null if there is none.
   const SetupQueue::Request* next_request(McuIndex mcu) const;
+  const SetupQueue::Request* next_part(McuIndex mcu);
+  template <class Next>
+  bool send_first(std::int64_t now_us, std::size_t& turn, Next next);
   void take(std::int64_t now_us, McuIndex mcu, const bushd_identity& identity);
   void write_setup(McuIndex mcu);
   bool holds_its_tables(McuIndex mcu, const bushd_tables& held) const;
@@ -111,6 +114,7 @@ class Connector {
   std::uint16_t salt_ = 0;
   std::vector<bushd_identity> identities_;  // that the last IDENTIFY was answered with
   std::size_t turn_ = 0;                    // whose request is sent next
+  std::size_t part_turn_ = 0;               // whose part of a table, if nothing else is asked
 };
 
 }  // namespace bushd::link

@@ -23,12 +23,13 @@ void Scratch::upload(const bushd_table& table) {
 }
 
 void Scratch::clear() {
-  there_ = false;
+  there_ = asked_ = false;
   requests_.clear();
 }
 
 void Scratch::acknowledged(std::uint8_t type, std::uint8_t status) {
-  if (!requests_.done(type)) return;
+  if (!asked_ || !requests_.done(type)) return;
+  asked_ = false;
   if (status != BUSHD_OK) return clear();
   there_ = requests_.empty();
 }

@@ -21,8 +21,13 @@ class Scratch {
   bool under_way() const { return !requests_.empty(); }
   // The next request. Precondition: one is under way.
   const SetupQueue::Request& front() const { return requests_.front(); }
-  // The MCU has answered a request of this type with this status, and nobody else had asked. A
-  // refusal ends the upload.
+  // The same: it is being sent now.
+  const SetupQueue::Request& ask() {
+    asked_ = true;
+    return front();
+  }
+  // The MCU has answered a request of this type with this status. A refusal ends the upload. What
+  // answers a request of an earlier upload is ignored.
   void acknowledged(std::uint8_t type, std::uint8_t status);
   // The table that has been uploaded, whole; null if there is none.
   const bushd_table* table() const { return there_ ? &table_ : nullptr; }
@@ -31,6 +36,7 @@ class Scratch {
   std::vector<std::uint16_t> codes_;  // of both sides, or of one if they are the same
   bushd_table table_{};
   bool there_ = false;
+  bool asked_ = false;  // the next request has been sent
   SetupQueue requests_;
 };
 

@@ -283,6 +283,7 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
       // It may go by that one's plan: a ramp-down from where it should be here would cross it.
       now.faults |= BUSHD_FAULT_LINK;
       events.emplace_back(event::Drop{});
+      events.emplace_back(event::Mismatch{.stopped = false});
       return;
     }
     events.emplace_back(event::Mismatch{});

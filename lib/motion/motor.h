@@ -105,7 +105,9 @@ struct Executed {  // a change of plan
 };
 struct Replan {};  // the plan is not what was requested any more
 struct Drop {};    // its MCU takes no more ticks for this motion
-struct Mismatch {};
+struct Mismatch {
+  bool stopped = true;  // by its plan; else it is left to another master
+};
 struct Turn {};        // it stands on the way to a target that takes a second run
 struct NextLeg {};     // it stands where a leg has led, and another one follows
 struct Paused {};      // it stands where it was to pause

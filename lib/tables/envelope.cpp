@@ -138,7 +138,7 @@ Envelope::Envelope(std::span<const LinePart> parts, std::uint32_t longest) {
   accel_.code = side_of(parts, scale, longest, false, view_.cruise);
   decel_.code = side_of(parts, scale, longest, true, view_.cruise);
   view_.accel = accel_.index();
-  view_.decel = decel_.index();
+  view_.decel = decel_.code == accel_.code ? view_.accel : decel_.index();  // the same codes
 }
 
 std::optional<std::uint16_t> Envelope::floor_of(std::span<const LinePart> parts,

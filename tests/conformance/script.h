@@ -193,7 +193,6 @@ class Script : public testing::Test {
       most_ns = std::max(most_ns, made[i].time_ns - expected[i].time_ns);
     }
     EXPECT_LE(most_ns - least_ns, slot_ns / 2);
-    printf("DBG %ld %ld\n", least_ns, most_ns);
     EXPECT_LE(std::max(std::abs(most_ns), std::abs(least_ns)), slot_ns);
   }
 

@@ -36,7 +36,7 @@ int acknowledge_all(Scratch& scratch) {
   int requests = 0;
   for (; scratch.under_way(); ++requests) {
     EXPECT_EQ(scratch.table(), nullptr);
-    scratch.acknowledged(scratch.front().type, BUSHD_OK);
+    scratch.acknowledged(scratch.ask().type, BUSHD_OK);
   }
   return requests;
 }
@@ -73,7 +73,7 @@ TEST(Scratch, ARefusalEndsIt) {
     Scratch scratch;
     const Codes codes({50, 40}, {50, 40});
     scratch.upload(codes.table);
-    for (int i = 0; i < refused; ++i) scratch.acknowledged(scratch.front().type, BUSHD_OK);
+    for (int i = 0; i < refused; ++i) scratch.acknowledged(scratch.ask().type, BUSHD_OK);
     scratch.acknowledged(scratch.front().type, BUSHD_E_STATE);
     EXPECT_FALSE(scratch.under_way());
     EXPECT_EQ(scratch.table(), nullptr);
