@@ -87,8 +87,8 @@ class Connector {
     // While connecting: table runs of an earlier master are to be stopped, and were.
     bool ramp_down_now = false;
     bool taken_over = false;
-    // And nobody has cleared it, nor has it come online since: an MCU that nobody hears may have
-    // heard it.
+    // An emergency stop was commanded, and since then neither were faults cleared nor has the MCU
+    // come online.
     bool stopped_by_people = false;
     std::int64_t retry_due_us = 0;
     unsigned identify_attempts = 0;  // in a row without an MCU that fits

@@ -1,4 +1,4 @@
-// The table slot of one MCU that is not kept over resets (BUSHD_SCRATCH_SLOT): what is in it, and
+// The volatile table slot of one MCU (BUSHD_SCRATCH_SLOT): what is in it, and
 // the requests that put another one there.
 #pragma once
 

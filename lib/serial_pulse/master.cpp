@@ -363,6 +363,7 @@ void Master::end_run(std::int64_t now_us) {
   }
   position_ = run_->from_steps + run_->direction * std::int64_t{run_->gone};
   if (run_->limited) limit_us_[run_->direction > 0] = now_us;
+  if (run_->pace) health_.clock_offset_us = 0;
   run_.reset();
   report_due_us_ = now_us;
 }

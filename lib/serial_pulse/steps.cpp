@@ -27,20 +27,36 @@ Steps::Steps(const link::MotorPlan& plan) : run_(plan.run), line_(plan.line) {
 void Steps::be(const bushd_run& run) {
   if (line_) run_ns_ = time_ns(run.steps_done);
   run_ = run;
-  then_.reset();
+}
+
+// One that is before `run` is still to be passed: the motor's next step may lie behind both.
+void Steps::become(const bushd_run& run) {
+  if (!line_) then_.clear();
+  while (!then_.empty() && then_.back().steps_done >= run.steps_done) then_.pop_back();
+  then_.push_back(run);
+}
+
+void Steps::pass(std::uint32_t run_steps) {
+  while (!then_.empty() && then_.front().steps_done < run_steps) {
+    be(then_.front());
+    then_.pop_front();
+  }
 }
 
 void Steps::ramp_down(const Ticks& ticks) {
   if (!line_) {
-    then_.reset();
+    then_.clear();
     return bushd_run_ramp_down(&run_);
   }
-  be(ticks.after(run_step_));
+  const bushd_run from = ticks.after(run_step_);
+  pass(from.steps_done);
+  then_.clear();
+  be(from);
   bushd_run_ramp_down_once(&run_);
 }
 
 std::uint32_t Steps::run_end() const {
-  const bushd_run& last = then_ ? *then_ : run_;
+  const bushd_run& last = then_.empty() ? run_ : then_.back();
   return last.steps_done + bushd_run_steps_left(&last);
 }
 
@@ -61,14 +77,17 @@ std::uint64_t Steps::time_ns(std::uint32_t run_steps) const {
 std::uint64_t Steps::take_ns() {
   if (ended_ || left() == 0) return 0;
   if (line_) return take_on_line();
-  if (then_ && run_.steps_done >= then_->steps_done) run_ = *std::exchange(then_, std::nullopt);
+  if (!then_.empty() && run_.steps_done >= then_.front().steps_done) {
+    run_ = then_.front();
+    then_.pop_front();
+  }
   return std::uint64_t{bushd_run_take_step(&run_)} * run_.table->time_unit_ns;
 }
 
 std::uint64_t Steps::take_on_line() {
   bushd_line place = place_of(*line_, 0);
   const std::uint32_t run_step = bushd_line_run_step(&place, made_ + 1) - line_->from;
-  if (then_ && run_step > then_->steps_done) be(bushd_run{*then_});
+  pass(run_step);
   place = place_of(*line_, run_step - 1);
   // What is missing to the next step of the motor is missing / 2N of this step of the run.
   const std::uint64_t twice_longest = std::uint64_t{line_->longest} * 2;

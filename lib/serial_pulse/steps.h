@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 
 #include "engine/run.h"
@@ -51,7 +52,7 @@ class Steps {
 
   // From where `run` is in its steps it is that one. What has been taken lies before, or in the
   // step that runs there, which both have.
-  void become(const bushd_run& run) { then_ = run; }
+  void become(const bushd_run& run);
   // It ramps down behind what has been taken. `ticks`: the plan that what was taken last is of, at
   // a tick at which no more had been made.
   void ramp_down(const Ticks& ticks);
@@ -60,12 +61,13 @@ class Steps {
 
  private:
   void be(const bushd_run& run);
+  void pass(std::uint32_t run_steps);
   std::uint64_t take_on_line();
   std::uint64_t time_ns(std::uint32_t run_steps) const;
   std::uint32_t run_end() const;
 
   bushd_run run_;
-  std::optional<bushd_run> then_;
+  std::deque<bushd_run> then_;  // in the order of their steps; of a line there may be several
   std::optional<link::MotorPlan::Line> line_;
   bool ended_ = false;
   // Of a line:

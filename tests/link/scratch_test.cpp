@@ -1,4 +1,4 @@
-// What is uploaded into the slot that is not kept, request by request.
+// What is uploaded into the volatile slot, request by request.
 #include "link/scratch.h"
 
 #include <gtest/gtest.h>

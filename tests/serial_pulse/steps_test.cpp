@@ -152,5 +152,45 @@ TEST(StepsOnALine, KeepToTheTableOfEachMotor) {
   });
 }
 
+// A motor of few steps may make none between two changes of the run.
+TEST(StepsOnALine, TwoChangesBetweenTwoStepsOfAMotor) {
+  constexpr std::uint32_t kLongest = 4000;
+  constexpr std::uint32_t kIncrement = 4;
+  const std::vector<std::uint16_t> codes = {10};
+  bushd_table table{};
+  table.accel.code = table.decel.code = codes.data();
+  table.accel.count = table.decel.count = 1;
+  table.cruise = 10;
+  table.time_unit_ns = 40'000;
+  const link::MotorPlan plan = plan_of(table, kIncrement, kLongest);
+  Steps steps(plan);
+  std::vector<std::int64_t> made_ns;
+  made_ns.push_back(static_cast<std::int64_t>(steps.take_ns()));
+  // The run by itself, with its floor changed where it has made so many steps.
+  std::vector<std::int64_t> ends_ns = {0};
+  bushd_run run = plan.run;
+  for (const auto& [at, floor] : {std::pair<std::uint32_t, std::uint16_t>{604, 100}, {1400, 50}}) {
+    while (run.steps_done < at) {
+      ends_ns.push_back(ends_ns.back() +
+                        std::int64_t{bushd_run_take_step(&run)} * table.time_unit_ns);
+    }
+    ASSERT_TRUE(bushd_run_retarget(&run, bushd_run_steps_left(&run) - 1, floor));
+    steps.become(run);
+  }
+  while (bushd_run_steps_left(&run) > 0) {
+    ends_ns.push_back(ends_ns.back() +
+                      std::int64_t{bushd_run_take_step(&run)} * table.time_unit_ns);
+  }
+  while (steps.left() > 0) {
+    made_ns.push_back(made_ns.back() + static_cast<std::int64_t>(steps.take_ns()));
+  }
+  ASSERT_EQ(made_ns.size(), kIncrement);
+  for (std::size_t j = 0; j < kIncrement; ++j) {
+    // Half of the run's step behind 500, 1500, 2500, 3500.
+    const std::size_t before = 500 + 1000 * j;
+    EXPECT_EQ(made_ns[j], (ends_ns[before] + ends_ns[before + 1]) / 2) << j;
+  }
+}
+
 }  // namespace
 }  // namespace bushd::serial_pulse

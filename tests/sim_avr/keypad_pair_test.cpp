@@ -179,6 +179,8 @@ TEST_F(KeypadPair, TwoKeysAtOnceStop) {
   press(kForward, 300);
   hold(kForward | kReverse, 200);
   const std::size_t made = steps();
+  hold(kForward, 200);
+  EXPECT_EQ(steps(), made) << "the rest of two keys is none";
   hold(0, 200);
   EXPECT_EQ(steps(), made);
   end();

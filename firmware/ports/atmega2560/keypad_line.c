@@ -12,7 +12,7 @@ void keypad_line_hear(bushd_mcu* mcu) {
     UCSR2B = 0;
     return;
   }
-  if (UCSR2B != ON) {
+  if ((UCSR2B & ON) != ON) {
     UBRR2 = DIVISOR;
     UCSR2B = ON;
   }

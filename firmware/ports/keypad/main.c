@@ -26,11 +26,12 @@ enum { DEBOUNCE_MS = 10, REPEAT_MS = 100, DIGITS = 4 };
 #define FIRST_DIGIT 1u
 #define OUTPUTS_B 0x1Fu
 
-// Bytes of keys, and two that are none.
+// Bytes of keys, and three that are none.
 typedef enum key {
   FORWARD = 0x00,
   NONE = 0x01,
-  HELD_AT_BOOT = 0x02,  // and perhaps stuck
+  RELEASE_FIRST = 0x02,  // held at boot, perhaps stuck, or the rest of several
+  SEVERAL = 0x03,
   STOP = 0xFD,
   SLOWER = 0xFE,
   REVERSE = 0xFF
@@ -50,7 +51,6 @@ typedef struct display {
   uint8_t lit;
 } display;
 
-// Two keys at once mean neither.
 static key read_keys(void) {
   switch ((uint8_t)~PINC & KEYS) {
     case 0:
@@ -61,8 +61,10 @@ static key read_keys(void) {
       return REVERSE;
     case 4:
       return SLOWER;
-    default:
+    case 8:
       return STOP;
+    default:
+      return SEVERAL;
   }
 }
 
@@ -77,13 +79,14 @@ static void follow_keys(keys* k) {
   if (k->repeat_ms < REPEAT_MS) ++k->repeat_ms;
   // Nothing is forgotten for a line that is busy: the key waits.
   if (k->read_ms < DEBOUNCE_MS || (UCSR0A & 1 << UDRE0) == 0) return;
-  const bool is_new = now != k->counts && !(k->counts == HELD_AT_BOOT && now != NONE);
+  const bool is_new = now != k->counts && !(k->counts == RELEASE_FIRST && now != NONE);
   const bool again =
       now == k->counts && (now == FORWARD || now == REVERSE) && k->repeat_ms == REPEAT_MS;
   if (!is_new && !again) return;
-  k->counts = now;
+  // Several keys at once stop the motor; that which is released last means nothing.
+  k->counts = now == SEVERAL ? RELEASE_FIRST : now;
   k->repeat_ms = 0;
-  if (now != NONE) UDR0 = (uint8_t)now;
+  if (now != NONE) UDR0 = (uint8_t)(now == SEVERAL ? STOP : now);
 }
 
 static uint8_t segments_of(char character) {
@@ -136,7 +139,7 @@ static void begin(void) {
 }
 
 int main(void) {
-  keys k = {HELD_AT_BOOT, NONE, 0, 0};
+  keys k = {RELEASE_FIRST, NONE, 0, 0};
   display d = {{0}, 0, {0}, 0};
   begin();
   for (;;) {
