@@ -106,9 +106,9 @@ class Pace {
   // Its next motion, from rest, is one of a line, until it is said to rest. Without `ramped_down`
   // it may still move, as its MCU makes it: if that makes the line's run itself (`by_mcu`), along
   // the line, for as long as it goes on without a master.
-  // A line before that was forgotten has come to rest somewhere.
-  void begin_on_line(bool by_mcu) {
-    if (excused_) count_ = 0;
+  // A line before that was forgotten is over where it has made no step for so long as at rest.
+  void begin_on_line(TimeNs now_ns, bool by_mcu) {
+    if (excused_ && count_ != 0 && now_ns - last_ns() >= rules_->rest_ns()) count_ = 0;
     on_line_ = told_ = true;
     by_mcu_ = by_mcu;
     line_until_ns_ = kNever;

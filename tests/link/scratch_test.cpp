@@ -74,7 +74,7 @@ TEST(Scratch, ARefusalEndsIt) {
     const Codes codes({50, 40}, {50, 40});
     scratch.upload(codes.table);
     for (int i = 0; i < refused; ++i) scratch.acknowledged(scratch.ask().type, BUSHD_OK);
-    scratch.acknowledged(scratch.front().type, BUSHD_E_STATE);
+    scratch.acknowledged(scratch.ask().type, BUSHD_E_STATE);
     EXPECT_FALSE(scratch.under_way());
     EXPECT_EQ(scratch.table(), nullptr);
   }

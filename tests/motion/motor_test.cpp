@@ -249,7 +249,8 @@ TEST_F(MotorTest, OneThatAnotherMasterMayMoveIsLeftToIt) {
                                   .emergency_stop_open = false,
                                   .other_master = true});
   EXPECT_NE(find<event::Drop>(told), nullptr);
-  EXPECT_EQ(find<event::Mismatch>(told), nullptr);
+  ASSERT_NE(find<event::Mismatch>(told), nullptr);
+  EXPECT_FALSE(find<event::Mismatch>(told)->stopped);
   EXPECT_FALSE(motor.axis().stopping());
   EXPECT_TRUE(report(kStart + 31, 0).empty()) << "it moves";
   set(mcu.moving, false);

@@ -163,7 +163,7 @@ TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
     }
     return first;
   };
-  pace.begin_on_line(false);
+  pace.begin_on_line(now, false);
   EXPECT_EQ(ramps(true, kSteps), Jump::kNone);
   const TimeNs begun_ns = pace.first_ns();
   now -= rules.delay_ns(0) / 2;  // half a delay after the last step
@@ -171,7 +171,7 @@ TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
   EXPECT_EQ(pace.first_ns(), begun_ns) << "that was no rest";
   EXPECT_EQ(pace.rest_on_line(now, true), Jump::kNone);
   now += 100 * kTickNs;
-  pace.begin_on_line(false);
+  pace.begin_on_line(now, false);
   EXPECT_EQ(ramps(true, kSteps - 3), Jump::kNone);
   EXPECT_EQ(ramps(false, kSteps), Jump::kStoppedDead);
 }
@@ -179,11 +179,11 @@ TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
 // A master that was killed has not told that its line is over; another one starts from rest.
 TEST_P(PaceTest, AMotionBeginsWhereTheLineBeforeWasForgotten) {
   for (const bool positive : {true, false}) {
-    pace.begin_on_line(false);
+    pace.begin_on_line(now, false);
     EXPECT_EQ(pace.step(now, true), Jump::kNone);
     now += 1000 * kTickNs;
     pace.forget_line();
-    pace.begin_on_line(false);
+    pace.begin_on_line(now, false);
     EXPECT_EQ(pace.step(now, positive), Jump::kNone);
     EXPECT_EQ(pace.first_ns(), now) << "in either direction";
     now += 1000 * kTickNs;
@@ -195,7 +195,7 @@ TEST_P(PaceTest, AMotionBeginsWhereTheLineBeforeWasForgotten) {
 TEST_P(PaceTest, OneThatIsLostOnALineMayTakeTheLongestDelay) {
   EXPECT_EQ(pace.step(now, true), Jump::kNone);
   EXPECT_LT(pace.ramp_down_ns(), rules.longest_told_ns());
-  pace.begin_on_line(false);
+  pace.begin_on_line(now, false);
   EXPECT_GE(pace.ramp_down_ns(), rules.longest_told_ns());
   EXPECT_EQ(pace.rest_on_line(now, false), Jump::kNone);
   now += 1000 * kTickNs;

@@ -88,9 +88,9 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   asked.stops.push_back(false);
   // The trigger begins it before anybody tells; what came before is over.
   if (request.ask == Ask::kArm && request.line && on_run && on_run_end) {
-    on_run(motor.mcu, motor.output, true, true);
+    on_run(now_ns, motor.mcu, motor.output, true, true);
     on_run_end(now_ns, motor.mcu, motor.output, "stopped");
-    on_run(motor.mcu, motor.output, true, true);
+    on_run(now_ns, motor.mcu, motor.output, true, true);
   }
   if (is_shutter(motor) && request.client != ShutterModel::kClient) shutter_.disturbed();
   if (request.ask == Ask::kHome) {
@@ -269,7 +269,7 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   if (begins && on_run) {
     // One that is lost makes what its MCU has: of a path, or an array, it may speed up again.
     const bool winds = line.contains("path") || line.contains("array");
-    on_run(motor.mcu, motor.output, winds || line.contains("line"),
+    on_run(now_ns, motor.mcu, motor.output, winds || line.contains("line"),
            winds || line.at("moves") == "table");
   }
   if (begins && motor.move) return run_begins(now_ns, motor);
