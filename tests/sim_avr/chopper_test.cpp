@@ -62,10 +62,12 @@ class Chopper : public McuAlone {
   void forget() {
     recorder_.samples.clear();
     recorder_.edges.clear();
+    since_ns_ = bus_.now_ns();
   }
 
   PowerStageRules rules_{};
   AvrMcu* avr_ = nullptr;
+  TimeNs since_ns_ = 0;  // what is recorded
 };
 
 // Both windings of a pair have one comparator. An edge of the one that goes off, while the slot's
@@ -76,7 +78,9 @@ Figures Chopper::figures() const {
   Figures found;
   std::array<double, PowerStage::kWindings> now_a{};
   std::array<double, PowerStage::kWindings> cut_a{};
-  std::array<TimeNs, PowerStage::kWindings> cut_ns{};
+  // The other one of a pair may have gone off just before.
+  std::array<TimeNs, PowerStage::kWindings> cut_ns;
+  cut_ns.fill(since_ns_);
   std::array<bool, PowerStage::kWindings> was_on{};
   auto sample = recorder_.samples.begin();
   for (const Edge& edge : recorder_.edges) {
