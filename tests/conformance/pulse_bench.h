@@ -76,7 +76,7 @@ class PulseBench : private link::TickSource, private sim::EdgeSink {
 
   // All steps from the `from`th on are one run: none before A(j-1), D(N-j) and the cruise delay, or
   // `floor`, after the one before. Times are whole ns: exact to one.
-  void expect_run(std::size_t from, std::int64_t floor = 0);
+  void expect_run(std::size_t from, std::int64_t floor = 0, bool stopped = false);
   void expect_count() { EXPECT_EQ(counted(), drive_.position_steps() - origin_); }
   // The most steps that may be under way at full speed: 20 ms of bytes, which is 50, and one more
   // byte.
@@ -85,6 +85,7 @@ class PulseBench : private link::TickSource, private sim::EdgeSink {
   static constexpr std::int64_t kRampDown = 40 + 1 + 14;
 
  private:
+  std::size_t most_left_out(std::size_t to_go) const;
   std::uint16_t render(link::McuIndex, std::uint8_t, link::Tick first, unsigned count,
                        std::int16_t* out, std::size_t stride) override {
     return axis_.render(first, count, out, stride);
