@@ -6,7 +6,7 @@
 
 #include "camac/bench.h"
 
-namespace bushd::camac {
+namespace bushd::camac::block_test {
 namespace {
 
 // Answers as the test says, and counts.
@@ -118,4 +118,4 @@ TEST(Block, WordsOfModes) {
 }
 
 }  // namespace
-}  // namespace bushd::camac
+}  // namespace bushd::camac::block_test

@@ -5,7 +5,7 @@
 
 #include "camac/bench.h"
 
-namespace bushd::camac {
+namespace bushd::camac::bushd1_test {
 namespace {
 
 constexpr std::uint32_t kLeft = 0x08;
@@ -426,4 +426,4 @@ TEST(Bushd1, InitialiseClearAndInhibit) {  // U18
 }
 
 }  // namespace
-}  // namespace bushd::camac
+}  // namespace bushd::camac::bushd1_test

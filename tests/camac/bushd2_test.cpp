@@ -7,7 +7,7 @@
 #include "camac/bench.h"
 #include "tables/table.h"
 
-namespace bushd::camac {
+namespace bushd::camac::bushd2_test {
 namespace {
 
 constexpr std::uint32_t kEnableAddress = 0x10;  // bit 5, also of the motor's number
@@ -415,4 +415,4 @@ TEST(Bushd2, MemoryIsKeptByWhoeverKeepsIt) {
 }
 
 }  // namespace
-}  // namespace bushd::camac
+}  // namespace bushd::camac::bushd2_test

@@ -4,7 +4,7 @@
 
 #include "camac/bench.h"
 
-namespace bushd::camac {
+namespace bushd::camac::crate_test {
 namespace {
 
 constexpr int kDisable = 24;
@@ -115,4 +115,4 @@ TEST_F(CrateBench, GradedRequestAndDemand) {
 }
 
 }  // namespace
-}  // namespace bushd::camac
+}  // namespace bushd::camac::crate_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace bushd::camac {
+namespace bushd::camac::memory_text_test {
 namespace {
 
 TEST(MemoryText, BytesComeBack) {
@@ -18,4 +18,4 @@ TEST(MemoryText, OtherTextIsNone) {
 }
 
 }  // namespace
-}  // namespace bushd::camac
+}  // namespace bushd::camac::memory_text_test

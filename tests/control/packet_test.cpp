@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace bushd::control {
+namespace bushd::control::packet_test {
 namespace {
 
 std::vector<std::uint8_t> bytes(const std::string& text) {
@@ -38,4 +38,4 @@ TEST(Packet, AnyBytesAreSafe) {
 }
 
 }  // namespace
-}  // namespace bushd::control
+}  // namespace bushd::control::packet_test

@@ -6,7 +6,7 @@
 
 #include "tables/temp_directory.h"
 
-namespace bushd::control {
+namespace bushd::control::pid_lock_test {
 namespace {
 
 TEST(PidLock, NamesTheProcessThatHoldsIt) {
@@ -40,4 +40,4 @@ TEST(PidLock, WhereThereCanBeNoneItSaysWhy) {
 }
 
 }  // namespace
-}  // namespace bushd::control
+}  // namespace bushd::control::pid_lock_test

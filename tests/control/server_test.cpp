@@ -19,7 +19,7 @@
 
 #include "tables/temp_directory.h"
 
-namespace bushd::control {
+namespace bushd::control::server_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -331,4 +331,4 @@ TEST_F(ServerTest, WithoutDescriptorsConnectionsAreTurnedAway) {
 }
 
 }  // namespace
-}  // namespace bushd::control
+}  // namespace bushd::control::server_test

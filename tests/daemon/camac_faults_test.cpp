@@ -9,7 +9,7 @@
 
 #include "daemon/camac_lab.h"
 
-namespace bushd::test {
+namespace bushd::test::camac_faults_test {
 namespace {
 
 constexpr std::uint32_t kEnabled = 0x60;  // of BUSHD-2: fault and end of motion
@@ -237,4 +237,4 @@ TEST(CamacFaults, TheShutterIsAccountedFor) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::camac_faults_test

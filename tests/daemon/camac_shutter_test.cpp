@@ -5,7 +5,7 @@
 
 #include "daemon/camac_lab.h"
 
-namespace bushd::test {
+namespace bushd::test::camac_shutter_test {
 namespace {
 
 using testing::HasSubstr;
@@ -246,4 +246,4 @@ TEST(CamacShutter, FaultsInBetweenEndIt) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::camac_shutter_test

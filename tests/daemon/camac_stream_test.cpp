@@ -13,7 +13,7 @@
 #include "daemon/traced.h"
 #include "tables/table_file.h"
 
-namespace bushd::test {
+namespace bushd::test::camac_stream_test {
 namespace {
 
 using testing::HasSubstr;
@@ -284,4 +284,4 @@ TEST(CamacStreaming, IsKeptLikeOtherMoves) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::camac_stream_test

@@ -9,7 +9,7 @@
 #include "camac/bushd2.h"
 #include "daemon/camac_lab.h"
 
-namespace bushd::test {
+namespace bushd::test::camac_test {
 namespace {
 
 using camac::Bushd2;
@@ -365,4 +365,4 @@ TEST(CamacRequests, ABlockReadsTheMemory) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::camac_test

@@ -11,7 +11,7 @@
 #include "daemon/lab.h"
 #include "daemon/reception.h"
 
-namespace bushd::test {
+namespace bushd::test::slices_test {
 namespace {
 
 using daemon::DryRuns;
@@ -228,4 +228,4 @@ TEST_F(Slices, DryRunsAreBoundedPerClientAndInAll) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::slices_test

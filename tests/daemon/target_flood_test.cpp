@@ -11,7 +11,7 @@
 
 #include "daemon/lab.h"
 
-namespace bushd::test {
+namespace bushd::test::target_flood_test {
 namespace {
 
 using testing::Each;
@@ -150,4 +150,4 @@ TEST_P(Flood, OfEnablesDisturbsNoMove) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::target_flood_test

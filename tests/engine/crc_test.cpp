@@ -6,7 +6,7 @@
 #include "engine/frame.h"
 #include "engine/properties.h"
 
-namespace bushd::test {
+namespace bushd::test::crc_test {
 namespace {
 
 // The definition: one bit of the message at a time, each byte's lowest first, through 0x04C11DB7
@@ -70,4 +70,4 @@ TEST(Crc, MayBeComputedInPieces) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::crc_test

@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-namespace bushd::test {
+namespace bushd::test::emission_test {
 namespace {
 
 // The document's figures: T_step 2.048 ms, eight of them in a tick, dt_p 0.518 ms.
@@ -195,4 +195,4 @@ TEST(Phases, EachStepSwitchesAsTheSequencesSay) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::emission_test

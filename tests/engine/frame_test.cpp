@@ -6,7 +6,7 @@
 
 #include "engine/properties.h"
 
-namespace bushd::test {
+namespace bushd::test::frame_test {
 namespace {
 
 using Bytes = std::vector<uint8_t>;
@@ -281,4 +281,4 @@ TEST(Receiver, SurvivesAnyBytes) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::frame_test

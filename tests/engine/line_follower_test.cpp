@@ -7,7 +7,7 @@
 #include "engine/line_motor.h"
 #include "engine/properties.h"
 
-namespace bushd::test {
+namespace bushd::test::line_follower_test {
 namespace {
 
 TEST(LineFollower, IsWhereTheLineIs) {
@@ -69,4 +69,4 @@ TEST(LineFollower, OfTheLongestStepsWithTheRun) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::line_follower_test

@@ -7,7 +7,7 @@
 #include "engine/line_motor.h"
 #include "engine/properties.h"
 
-namespace bushd::test {
+namespace bushd::test::line_test {
 namespace {
 
 // Exact, from the definition: numbers over a common denominator in 128 bits.
@@ -195,4 +195,4 @@ TEST(Line, OrderOfStepsIsThatOfIvanovInAllQuadrants) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::line_test

@@ -7,7 +7,7 @@
 
 #include "engine/message_kinds.h"
 
-namespace bushd::test {
+namespace bushd::test::message_test {
 namespace {
 
 const Kinds& kinds() {
@@ -268,4 +268,4 @@ TEST(Status, EveryCodeHasItsOwnText) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::message_test

@@ -6,7 +6,7 @@
 #include "engine/run.h"
 #include "engine/tables.h"
 
-namespace bushd::test {
+namespace bushd::test::retarget_test {
 namespace {
 
 constexpr std::size_t kMostTicks = 1500;
@@ -206,4 +206,4 @@ TEST(Retarget, TheMostStepsAreTakenInstantly) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::retarget_test

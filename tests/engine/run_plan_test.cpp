@@ -5,7 +5,7 @@
 
 #include "engine/tables.h"
 
-namespace bushd::test {
+namespace bushd::test::run_plan_test {
 namespace {
 
 // The delays that the run still makes, taken one after the other.
@@ -112,4 +112,4 @@ TEST(RunPlan, IsSlowByItsShortestDelayAndTheTick) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::run_plan_test

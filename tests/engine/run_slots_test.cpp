@@ -5,7 +5,7 @@
 #include "engine/slots.h"
 #include "engine/tables.h"
 
-namespace bushd::test {
+namespace bushd::test::run_slots_test {
 namespace {
 
 struct Emitted {
@@ -121,4 +121,4 @@ TEST(RunSlots, MotorsShareMasksAndADoneRunMakesNothing) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::run_slots_test

@@ -9,7 +9,7 @@
 #include "engine/message.h"
 #include "engine/tables.h"
 
-namespace bushd::test {
+namespace bushd::test::run_state_test {
 namespace {
 
 enum class Format { kCoarse, kFine };
@@ -278,4 +278,4 @@ TEST(RunState, RefusesJumpsInSpeed) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::run_state_test

@@ -5,7 +5,7 @@
 
 #include "engine/tables.h"
 
-namespace bushd::test {
+namespace bushd::test::run_test {
 namespace {
 
 enum class Format { kCoarse, kFine };
@@ -364,4 +364,4 @@ TEST(Run, ACopyReplaysTheSameTicks) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::run_test

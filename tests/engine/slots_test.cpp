@@ -7,7 +7,7 @@
 
 #include "engine/properties.h"
 
-namespace bushd::test {
+namespace bushd::test::slots_test {
 namespace {
 
 constexpr uint16_t kBit = 0x0010;
@@ -133,4 +133,4 @@ TEST(SlotsFine, EveryDisplacementAndRemainderHasASlotForEachStep) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::slots_test

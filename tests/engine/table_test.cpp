@@ -5,7 +5,7 @@
 
 #include "engine/tables.h"
 
-namespace bushd::test {
+namespace bushd::test::table_test {
 namespace {
 
 struct Checked {
@@ -166,4 +166,4 @@ TEST(RampIndex, HoldsThePrefixSumsAndTheGreatestIndexOfEachBucket) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::table_test

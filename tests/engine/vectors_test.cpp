@@ -20,7 +20,7 @@
 #include "engine/tables.h"
 #include "source_path.h"
 
-namespace bushd::test {
+namespace bushd::test::vectors_test {
 namespace {
 
 using Row = std::map<std::string, std::string>;
@@ -295,4 +295,4 @@ TEST(Vectors, HaveAFrameOfEveryMessage) {
 }
 
 }  // namespace
-}  // namespace bushd::test
+}  // namespace bushd::test::vectors_test

@@ -6,7 +6,7 @@
 
 #include "bus_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::bus_test {
 namespace {
 
 using testing::ElementsAre;
@@ -313,4 +313,4 @@ TEST_F(TwoMcus, NextEventIsNeverLateAndNeverPast) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::bus_test

@@ -10,7 +10,7 @@
 
 #include "sim/emission_bus.h"
 
-namespace bushd::sim {
+namespace bushd::sim::emission_test {
 namespace {
 
 struct Step {
@@ -297,4 +297,4 @@ TEST(EmissionOnPins, StepsOfATickThatAResetCutsAreThoseThatWereMade) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::emission_test

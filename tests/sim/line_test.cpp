@@ -5,7 +5,7 @@
 #include <array>
 #include <numeric>
 
-namespace bushd::sim {
+namespace bushd::sim::line_test {
 namespace {
 
 constexpr std::uint32_t kBaud = 500'000;
@@ -101,4 +101,4 @@ TEST_F(TwoTalkers, SilencedTalkerBreaksItsByteOffAndDropsTheRest) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::line_test

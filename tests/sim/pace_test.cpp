@@ -9,7 +9,7 @@
 #include "engine/run.h"
 #include "engine/slots.h"
 
-namespace bushd::sim {
+namespace bushd::sim::pace_test {
 namespace {
 
 constexpr TimeNs kTickNs = 2'560'000;
@@ -222,4 +222,4 @@ TEST_P(PaceTest, WhatAResetCutOffIsExcused) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::pace_test

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace bushd::sim {
+namespace bushd::sim::plant_test {
 namespace {
 
 constexpr TimeNs kTickNs = 2'560'000;
@@ -116,4 +116,4 @@ TEST_F(PlantTest, PositionBeforeATimeLeavesOutWhatCameSince) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::plant_test

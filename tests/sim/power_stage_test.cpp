@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace bushd::sim {
+namespace bushd::sim::power_stage_test {
 namespace {
 
 constexpr PowerStageRules kRules{};
@@ -82,4 +82,4 @@ TEST(PowerStage, BackEmfOfARotorThatTurns) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::power_stage_test

@@ -7,7 +7,7 @@
 #include <functional>
 #include <numbers>
 
-namespace bushd::sim {
+namespace bushd::sim::rotor_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -172,4 +172,4 @@ TEST(Rotor, GoesBackAsItGoesForward) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::rotor_test

@@ -10,7 +10,7 @@
 
 #include "sim/emission_bus.h"
 
-namespace bushd::sim {
+namespace bushd::sim::supply_current_test {
 namespace {
 
 constexpr std::uint32_t kTickNs = 16'384'000;  // eight T_step
@@ -147,4 +147,4 @@ TEST(SupplyCurrent, NothingIsMeasuredWithoutEnOrWithATimeThatIsGiven) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::supply_current_test

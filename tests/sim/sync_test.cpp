@@ -7,7 +7,7 @@
 
 #include "bus_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::sync_test {
 namespace {
 
 constexpr std::uint32_t kTickNs = 2'560'000;
@@ -227,4 +227,4 @@ TEST(Sync, RateHoldsForAllTickLengths) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::sync_test

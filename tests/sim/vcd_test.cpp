@@ -9,7 +9,7 @@
 #include "bus_fixture.h"
 #include "vcd_reader.h"
 
-namespace bushd::sim {
+namespace bushd::sim::vcd_test {
 namespace {
 
 class Vcd : public testing::Test {
@@ -115,4 +115,4 @@ TEST(VcdOnFullDisk, FailureIsReported) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::vcd_test

@@ -2,7 +2,7 @@
 #include "sim/random.h"
 #include "sim_avr/avr_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::answers_test {
 namespace {
 
 class AvrAnswers : public AvrAlone {};
@@ -93,4 +93,4 @@ TEST_F(AvrAnswers, FollowFramesOfEveryLength) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::answers_test

@@ -2,7 +2,7 @@
 // it again when it hangs.
 #include "sim_avr/avr_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::boot_test {
 namespace {
 
 class AvrBoot : public AvrAlone {};
@@ -125,4 +125,4 @@ TEST_F(AvrBoot, TheWatchdogLeavesAnIdleMcuAlone) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::boot_test

@@ -6,7 +6,7 @@
 #include "sim/mcu_alone.h"
 #include "sim_avr/avr_mcu.h"
 
-namespace bushd::sim {
+namespace bushd::sim::chopper_test {
 namespace {
 
 constexpr TimeNs kPeriodNs = 25'000;
@@ -217,4 +217,4 @@ TEST_F(Chopper, OnlyMotor0HasOne) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::chopper_test

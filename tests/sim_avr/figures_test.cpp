@@ -10,7 +10,7 @@
 #include "sim/step_slots.h"
 #include "sim_avr/avr_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::figures_test {
 namespace {
 
 constexpr std::uint16_t kDelay = 100;
@@ -155,4 +155,4 @@ INSTANTIATE_TEST_SUITE_P(Formats, AvrFigures, testing::ValuesIn(kLoads), name_of
 INSTANTIATE_TEST_SUITE_P(OtherPhases, AvrFigures, testing::ValuesIn(in_other_phases()), name_of);
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::figures_test

@@ -3,7 +3,7 @@
 
 #include "sim_avr/avr_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::flood_test {
 namespace {
 
 constexpr std::uint32_t kFastBaud = 1'000'000;
@@ -44,4 +44,4 @@ TEST_F(AvrFlooded, ShortFramesKeepItBusyForTheRingsLengthOnly) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::flood_test

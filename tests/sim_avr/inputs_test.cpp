@@ -1,7 +1,7 @@
 // Each pin of the ATmega2560's inputs is the one that docs/firmware.md says.
 #include "sim_avr/avr_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::inputs_test {
 namespace {
 
 class AvrInputs : public AvrAlone {
@@ -46,4 +46,4 @@ TEST_F(AvrInputs, TheCurrentIsThatOfTheLastConversion) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::inputs_test

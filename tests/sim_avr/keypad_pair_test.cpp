@@ -16,7 +16,7 @@
 #include "sim_avr/avr_fixture.h"
 #include "sim_avr/avr_keypad.h"
 
-namespace bushd::sim {
+namespace bushd::sim::keypad_pair_test {
 namespace {
 
 constexpr std::uint8_t kMotor = 3;
@@ -241,4 +241,4 @@ TEST_F(KeypadPair, ShowsThatALimitForbidsIt) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::keypad_pair_test

@@ -5,7 +5,7 @@
 
 #include "sim_avr/avr_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::line_runs_test {
 namespace {
 
 constexpr std::int64_t kSlots = 128;
@@ -160,4 +160,4 @@ std::string name_of_line(const testing::TestParamInfo<LineLoad>& load) {
 INSTANTIATE_TEST_SUITE_P(Loads, AvrLineRuns, testing::ValuesIn(line_loads()), name_of_line);
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::line_runs_test

@@ -7,7 +7,7 @@
 #include "sim_avr/avr_fixture.h"
 #include "sim_avr/memory_map.h"
 
-namespace bushd::sim {
+namespace bushd::sim::memory_watch_test {
 namespace {
 
 using testing::HasSubstr;
@@ -87,4 +87,4 @@ TEST_F(AvrMemoryWatched, NamesWhoLeavesTheEeprom) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::memory_watch_test

@@ -3,7 +3,7 @@
 #include "sim/random.h"
 #include "sim_avr/avr_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::nvm_test {
 namespace {
 
 class AvrNvm : public AvrAlone {
@@ -136,4 +136,4 @@ TEST_F(AvrNvm, NothingIsWrittenWhileAMotorMoves) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::nvm_test

@@ -3,7 +3,7 @@
 
 #include "sim_avr/avr_mcu.h"
 
-namespace bushd::sim {
+namespace bushd::sim::random_streams_test {
 namespace {
 
 class AvrRandomStreams : public RandomStreams {
@@ -24,4 +24,4 @@ TEST_F(AvrRandomStreams, LeaveItAliveAnsweringAndCountingRight) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::random_streams_test

@@ -5,7 +5,7 @@
 
 #include "sim_avr/avr_fixture.h"
 
-namespace bushd::sim {
+namespace bushd::sim::table_runs_test {
 namespace {
 
 constexpr std::size_t kSlots = 128;
@@ -153,4 +153,4 @@ std::string name_of(const testing::TestParamInfo<Load>& load) {
 INSTANTIATE_TEST_SUITE_P(Loads, AvrTableRuns, testing::ValuesIn(loads()), name_of);
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::table_runs_test

@@ -15,7 +15,7 @@
 #include "sim/mcu_alone.h"
 #include "sim_avr/avr_mcu.h"
 
-namespace bushd::sim {
+namespace bushd::sim::velocity_test {
 namespace {
 
 class VelocityOfTheImage : public McuAlone {
@@ -176,4 +176,4 @@ TEST_F(VelocityOfTheImage, KeepsItsTicksBesideTheChopper) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::velocity_test

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace bushd::state {
+namespace bushd::state::keeper_test {
 namespace {
 
 using testing::ElementsAre;
@@ -180,4 +180,4 @@ TEST_F(KeeperTest, NorIsItForgottenThatItStandsWhereItStood) {
 }
 
 }  // namespace
-}  // namespace bushd::state
+}  // namespace bushd::state::keeper_test

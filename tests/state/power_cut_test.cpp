@@ -11,7 +11,7 @@
 #include "state/rules.h"
 #include "state/store.h"
 
-namespace bushd::state {
+namespace bushd::state::power_cut_test {
 namespace {
 
 const std::vector<std::string> kMotors{"phi", "theta", "psi"};
@@ -266,4 +266,4 @@ TEST(PowerCuts, NoPositionIsTrustedAndWrong) {
 }
 
 }  // namespace
-}  // namespace bushd::state
+}  // namespace bushd::state::power_cut_test

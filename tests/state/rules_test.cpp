@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace bushd::state {
+namespace bushd::state::rules_test {
 namespace {
 
 using testing::HasSubstr;
@@ -106,4 +106,4 @@ TEST(Rules, EveryCombination) {
 }
 
 }  // namespace
-}  // namespace bushd::state
+}  // namespace bushd::state::rules_test

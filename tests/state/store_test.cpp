@@ -8,7 +8,7 @@
 #include "sim_disk/sim_disk.h"
 #include "state/rules.h"
 
-namespace bushd::state {
+namespace bushd::state::store_test {
 namespace {
 
 using testing::Contains;
@@ -382,4 +382,4 @@ TEST(RealDisk, SaysWhyAFolderCannotBeUsed) {
 }
 
 }  // namespace
-}  // namespace bushd::state
+}  // namespace bushd::state::store_test
