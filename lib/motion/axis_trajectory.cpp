@@ -10,7 +10,7 @@
 namespace bushd::motion {
 namespace {
 
-__extension__ using Wide = __int128;
+__extension__ using SignedWide = __int128;
 using Position = Trajectory::Position;
 
 // To go through this many ticks takes a fraction of a millisecond.
@@ -128,8 +128,8 @@ std::uint16_t Axis::delay_on_trajectory(const Place& place) const {
   const Position way = way_on_trajectory(place);
   if (way <= 0) return 0;
   // A nanosecond for the rounding of positions.
-  const Wide time = Wide{tick_ns_} * Trajectory::kStep + way;
-  const Wide units = time / (Wide{way} * table_->time_unit_ns);
+  const SignedWide time = SignedWide{tick_ns_} * Trajectory::kStep + way;
+  const SignedWide units = time / (SignedWide{way} * table_->time_unit_ns);
   if (units > UINT16_MAX) return 0;
   return std::max(static_cast<std::uint16_t>(units), bushd_table_fastest(table_));
 }

@@ -9,7 +9,7 @@ namespace bushd::motion {
 namespace {
 
 using Position = Trajectory::Position;
-using Wide = Trajectory::Segment::Wide;
+using SignedWide = Trajectory::Segment::Wide;
 
 // Of u in a cubic.
 constexpr int kShareBits = 40;
@@ -17,8 +17,8 @@ constexpr int kShareBits = 40;
 // More than that in a tick no table allows, and no MCU takes.
 constexpr Position kMostInATick = 127 * Trajectory::kStep;
 
-Wide floor_of(Wide numerator, Wide denominator) {
-  const Wide quotient = numerator / denominator;
+SignedWide floor_of(SignedWide numerator, SignedWide denominator) {
+  const SignedWide quotient = numerator / denominator;
   return numerator % denominator < 0 ? quotient - 1 : quotient;
 }
 
@@ -43,20 +43,20 @@ double Trajectory::speed_after(std::size_t row, std::size_t motor) const {
 Trajectory Trajectory::stretched(std::int64_t thousandths) const {
   Trajectory longer = *this;
   for (std::int64_t& time_ns : longer.time_ns_) {
-    time_ns = static_cast<std::int64_t>((Wide{time_ns} * thousandths + 500) / 1000);
+    time_ns = static_cast<std::int64_t>((SignedWide{time_ns} * thousandths + 500) / 1000);
   }
   return longer;
 }
 
 // Times `times_ns`. The parabola through three rows has at the middle one the mean of the speeds
 // before and after it, each weighed by the time on the other side.
-Wide Trajectory::speed_at(std::size_t row, std::size_t motor, std::int64_t times_ns) const {
+SignedWide Trajectory::speed_at(std::size_t row, std::size_t motor, std::int64_t times_ns) const {
   if (row == 0 || row + 1 == rows()) return 0;
-  const Wide before_ns = time_ns_[row] - time_ns_[row - 1];
-  const Wide after_ns = time_ns_[row + 1] - time_ns_[row];
-  const Wide before = position(row, motor) - position(row - 1, motor);
-  const Wide after = position(row + 1, motor) - position(row, motor);
-  const Wide both_ns = before_ns + after_ns;
+  const SignedWide before_ns = time_ns_[row] - time_ns_[row - 1];
+  const SignedWide after_ns = time_ns_[row + 1] - time_ns_[row];
+  const SignedWide before = position(row, motor) - position(row - 1, motor);
+  const SignedWide after = position(row + 1, motor) - position(row, motor);
+  const SignedWide both_ns = before_ns + after_ns;
   return floor_of(before * times_ns / before_ns * after_ns, both_ns) +
          floor_of(after * times_ns / after_ns * before_ns, both_ns);
 }
@@ -65,13 +65,13 @@ Trajectory::Segment Trajectory::segment(std::size_t row, std::size_t motor) cons
   Segment segment{.begin_ns = time_ns_[row],
                   .length_ns = time_ns_[row + 1] - time_ns_[row],
                   .begin = position(row, motor)};
-  const Wide d = Wide{position(row + 1, motor)} - position(row, motor);
+  const SignedWide d = SignedWide{position(row + 1, motor)} - position(row, motor);
   if (interpolation_ == Interpolation::kLinear) {
     segment.k1 = d;
     return segment;
   }
-  const Wide m0 = speed_at(row, motor, segment.length_ns);
-  const Wide m1 = speed_at(row + 1, motor, segment.length_ns);
+  const SignedWide m0 = speed_at(row, motor, segment.length_ns);
+  const SignedWide m1 = speed_at(row + 1, motor, segment.length_ns);
   segment.k1 = m0;
   segment.k2 = 3 * d - 2 * m0 - m1;
   segment.k3 = m0 + m1 - 2 * d;
@@ -79,11 +79,11 @@ Trajectory::Segment Trajectory::segment(std::size_t row, std::size_t motor) cons
 }
 
 Position Trajectory::Segment::at(std::int64_t time_ns) const {
-  const Wide t = time_ns - begin_ns;
+  const SignedWide t = time_ns - begin_ns;
   if (k2 == 0 && k3 == 0) return begin + static_cast<Position>(floor_of(k1 * t, length_ns));
-  const Wide u = (t << kShareBits) / length_ns;
-  Wide sum = k3;
-  for (const Wide k : {k2, k1, Wide{0}}) sum = ((sum * u) >> kShareBits) + k;
+  const SignedWide u = (t << kShareBits) / length_ns;
+  SignedWide sum = k3;
+  for (const SignedWide k : {k2, k1, SignedWide{0}}) sum = ((sum * u) >> kShareBits) + k;
   return begin + static_cast<Position>(sum);
 }
 
