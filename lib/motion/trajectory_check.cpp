@@ -83,8 +83,8 @@ std::int64_t nearest_step(Position position) {
 
 Position way_to_catch_up(const bushd_table& table, std::uint32_t tick_ns) {
   const SignedWide delay_ns = SignedWide{table.accel.code[0]} * table.time_unit_ns;
-  return static_cast<Position>(
-      std::min(SignedWide{tick_ns} * Trajectory::kStep / (2 * delay_ns), SignedWide{Trajectory::kStep}));
+  return static_cast<Position>(std::min(SignedWide{tick_ns} * Trajectory::kStep / (2 * delay_ns),
+                                        SignedWide{Trajectory::kStep}));
 }
 
 bool rests_at_end(const Trajectory& trajectory, std::size_t motor, const bushd_table& table) {
@@ -247,8 +247,8 @@ std::int64_t TrajectoryCheck::step_between(std::size_t m, std::int64_t next, Poi
 void TrajectoryCheck::look_at_ramp_down(std::size_t m) {
   const auto& [motor, follower, runs, direction, tick, ns, delays, peak] = watched_[m];
   if (follower.last_way() == 0) return;
-  const SignedWide delay =
-      SignedWide{tick_ns_} * Trajectory::kStep / (SignedWide{follower.last_way()} * motor.table->time_unit_ns);
+  const SignedWide delay = SignedWide{tick_ns_} * Trajectory::kStep /
+                           (SignedWide{follower.last_way()} * motor.table->time_unit_ns);
   const auto code = static_cast<std::uint16_t>(std::min<SignedWide>(delay, UINT16_MAX));
   const std::uint16_t fastest = bushd_table_fastest(motor.table);
   const std::int64_t ramp = bushd_table_steps_to_stop(motor.table, std::max(code, fastest));
