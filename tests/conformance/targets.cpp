@@ -138,13 +138,14 @@ std::uint32_t denied(const McuUnderTest& mcu) {
   if (mcu.twin().current_motors == 0) capabilities |= BUSHD_CAN_CURRENTS;
   if (mcu.twin().velocity_motors == 0) capabilities |= BUSHD_CAN_VELOCITY;
   if (!mcu.twin().keypad) capabilities |= BUSHD_CAN_KEYPAD;
+  if (!mcu.twin().scratch) capabilities |= BUSHD_CAN_SCRATCH;
   return capabilities;
 }
 
-std::vector<Target> those_that_deny(std::uint32_t capability, bool deny) {
+std::vector<Target> those_that_deny(std::uint32_t capabilities, bool deny) {
   std::vector<Target> those = targets();
   std::erase_if(those, [=](const Target& target) {
-    return ((denied(*target.make()) & capability) != 0) != deny;
+    return ((denied(*target.make()) & capabilities) != 0) != deny;
   });
   return those;
 }
@@ -163,12 +164,12 @@ std::vector<Target> targets() {
   };
 }
 
-std::vector<Target> targets_with(std::uint32_t capability) {
-  return those_that_deny(capability, false);
+std::vector<Target> targets_with(std::uint32_t capabilities) {
+  return those_that_deny(capabilities, false);
 }
 
-std::vector<Target> targets_without(std::uint32_t capability) {
-  return those_that_deny(capability, true);
+std::vector<Target> targets_without(std::uint32_t capabilities) {
+  return those_that_deny(capabilities, true);
 }
 
 }  // namespace bushd::sim
