@@ -28,9 +28,9 @@ class McuUnderTest {
   McuUnderTest& operator=(const McuUnderTest&) = delete;
   virtual ~McuUnderTest() = default;
 
-  // The virtual MCU that it is compared with: as many slots, ticks and codes.
+  // The virtual MCU that it is compared with: as many slots, ticks and codes, and the same
+  // capabilities.
   virtual McuOptions twin() const = 0;
-  virtual std::uint16_t disabled_capabilities() const = 0;  // BUSHD_CAN_* that the twin has
   // A tick in which it can make all that a frame may ask for: of all motors, to and fro, up to 127
   // steps.
   virtual std::uint32_t full_tick_ns(bushd_format format) const = 0;

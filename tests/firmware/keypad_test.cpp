@@ -233,7 +233,7 @@ TEST_P(Keypad, SettingsAreRefusedThatDoNotFit) {
   rig.pass(10);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   expect_counted_after_stop();
-  Rig without({.keypad = false});
+  Rig without({.disabled_capabilities = BUSHD_CAN_KEYPAD});
   EXPECT_EQ(without.local(0, 1), BUSHD_E_FORMAT);
   EXPECT_EQ(without.identify().capabilities & BUSHD_CAN_KEYPAD, 0u);
 }
