@@ -68,8 +68,8 @@ def parts(run):
 
 def judge(run):
     tick = run["tick"]
-    stretches, checked = parts(run), 0
-    for (_, was, old_ns), (begin, direction, new_ns), (end, *_) in zip(stretches, stretches[1:], stretches[2:]):
+    segments, checked = parts(run), 0
+    for (_, was, old_ns), (begin, direction, new_ns), (end, *_) in zip(segments, segments[1:], segments[2:]):
         went_on_ns = begin + 2 * tick + old_ns + FIRST_NS + LOOK_NS if was else begin
         latest_begin_ns = max(begin + 4 * tick, went_on_ns + tick) + LOOK_NS
         steps = [(ns, sign) for ns, sign in run["steps"] if begin <= ns < end]
