@@ -8,6 +8,12 @@ namespace {
 constexpr TimeNs kBootNs = 300'000'000;
 constexpr std::size_t kCodes = 3;
 
+std::vector<std::uint16_t> long_ramp() {
+  std::vector<std::uint16_t> codes;
+  while (codes.size() < 900) codes.push_back(static_cast<std::uint16_t>(2000 - codes.size()));
+  return codes;
+}
+
 class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
  protected:
   Nvm() : McuAlone(kBaud, kBootNs), real_(GetParam().make()) {
@@ -37,8 +43,7 @@ BUSHD_FOR_TARGETS(Nvm, targets());
 
 TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  std::vector<std::uint16_t> ramp;
-  while (ramp.size() < 900) ramp.push_back(static_cast<std::uint16_t>(2000 - ramp.size()));
+  const std::vector<std::uint16_t> ramp = long_ramp();
   ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp, 1100));
   bushd_set_inputs inputs{};
   inputs.system_inverted = BUSHD_INPUT_FORWARD;
@@ -164,9 +169,8 @@ class NvmScratch : public Nvm {
 BUSHD_FOR_TARGETS(NvmScratch, targets_with(BUSHD_CAN_SCRATCH));
 
 TEST_P(NvmScratch, ATableForLinesIsNotKeptAndLeavesTheOthersAlone) {
-  std::vector<std::uint16_t> ramp;
-  while (ramp.size() < 900) ramp.push_back(static_cast<std::uint16_t>(2000 - ramp.size()));
-  ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, BUSHD_SCRATCH_SLOT, 10'000, ramp, 1100));
+  ASSERT_NO_FATAL_FAILURE(
+      master_.upload_table(kAddress, BUSHD_SCRATCH_SLOT, 10'000, long_ramp(), 1100));
   expect_only_the_other_table_is_kept();
 }
 
